@@ -7,16 +7,17 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail, ensure};
 use pack::Fmi;
 
-/// Folders of the project's FMUs relative to the command's own: next to it, in its data folder,
-/// in the Python package that it came with.
+/// Folders of the project's FMUs relative to the command's own: next to it, in its data folder, in the Python
+/// package that it came with.
 const INSTALLED: [&str; 5] =
     [".", "fmus", "../share/hubslosh", "../hubslosh/fmus", "../Lib/site-packages/hubslosh/fmus"];
 
-/// The file of an FMU: `name` is a file, or the name of one of this project's FMUs. The search
-/// order is `dist`, where `hubslosh pack` puts it, the folder of this command, then `dist` of the source that the command was built
-/// from. There the command packs the FMU if necessary.
+/// Returns the file of an FMU. `name` is a file, or the name of one of this project's FMUs. The search order
+/// is `dist`, where `hubslosh pack` puts it, the folder of this command, then `dist` of the source that the
+/// command was built from. There the command packs the FMU if necessary.
 ///
 /// # Errors
+///
 /// If there is none; the error says what to do.
 pub fn find(name: &Path) -> Result<PathBuf> {
     let Some((model, fmi)) = name.to_str().and_then(pack::named) else {
@@ -57,7 +58,8 @@ pub fn find(name: &Path) -> Result<PathBuf> {
     Ok(packed)
 }
 
-/// The FMUs that [`find`] finds without building: those of `dist`, then those that came with this command.
+/// Lists the FMUs that [`find`] finds without building: those of `dist`, then those that came with this
+/// command.
 pub fn all() -> Vec<PathBuf> {
     let mut found: Vec<PathBuf> = Vec::new();
     for folder in ["dist".into()].into_iter().chain(folders()) {
@@ -71,24 +73,24 @@ pub fn all() -> Vec<PathBuf> {
     found
 }
 
-/// The FMU that came with this command.
+/// Returns the path of an FMU that came with this command, by its file name.
 pub fn installed(file: &str) -> Option<PathBuf> {
     folders().into_iter().map(|folder| folder.join(file)).find(|path| path.is_file())
 }
 
-/// A folder of the Python package that came with this command.
+/// Returns a folder of the Python package that came with this command, such as `examples`.
 pub fn came_with(folder: &str) -> Option<PathBuf> {
     let packages = folders().into_iter().filter(|fmus| fmus.ends_with("hubslosh/fmus"));
     packages.map(|fmus| fmus.with_file_name(folder)).find(|path| path.is_dir())
 }
 
-/// The folders that [`INSTALLED`] means.
+/// Lists the folders of [`INSTALLED`] that exist, also those of the Python versions next to this command.
 fn folders() -> Vec<PathBuf> {
     let command = std::env::current_exe().and_then(|path| path.canonicalize());
     let Some(own) = command.ok().and_then(|path| path.parent().map(Path::to_path_buf)) else {
         return Vec::new();
     };
-    // lib/python3.12/site-packages on Linux and macOS
+    // On Linux and macOS the folder is lib/python3.12/site-packages.
     let versions = std::fs::read_dir(own.join("../lib")).into_iter().flatten().flatten();
     let mut pythons: Vec<_> = versions
         .map(|entry| entry.path())
@@ -97,6 +99,6 @@ fn folders() -> Vec<PathBuf> {
         .collect();
     pythons.sort();
     let all = INSTALLED.iter().map(|place| own.join(place)).chain(pythons);
-    // as the reader would write it, where it is there
+    // Written without `..` if the folder exists, as a user would write it.
     all.filter(|place| place.is_dir()).map(|place| place.canonicalize().unwrap_or(place)).collect()
 }

@@ -1,18 +1,18 @@
 //! The command line `hubslosh`.
 
-/// `println!` of the standard library panics when its reader is gone (`hubslosh variables | head`);
-/// this one ends the program.
+/// Prints a line to stdout. The macro of the standard library panics when its reader is gone (`hubslosh
+/// variables | head`); this one ends the program.
 macro_rules! println {
-    () => { crate::terminal::say("\n".into()) };
-    ($($arguments:tt)*) => { crate::terminal::say(format!("{}\n", format_args!($($arguments)*))) };
+    () => { crate::terminal::print("\n".into()) };
+    ($($arguments:tt)*) => { crate::terminal::print(format!("{}\n", format_args!($($arguments)*))) };
 }
 
-/// The same of `print!`.
+/// Prints a text without a line break to stdout, and ends the program when its reader is gone.
 macro_rules! print {
-    ($($arguments:tt)*) => { crate::terminal::say(format!($($arguments)*)) };
+    ($($arguments:tt)*) => { crate::terminal::print(format!($($arguments)*)) };
 }
 
-/// A line on stdout about what was done, which is not a result: not with `--quiet`.
+/// Prints a line about what was done, which is not a result; `--quiet` suppresses it.
 macro_rules! done {
     ($($arguments:tt)*) => {
         if !crate::terminal::is_quiet() {
@@ -67,7 +67,7 @@ struct Cli {
 }
 
 impl Cli {
-    /// The FMU that the command loads into its own process, as the command line names it.
+    /// Returns the FMU that the command loads into its own process, as the command line names it.
     fn fmu(&self) -> Option<&Path> {
         use Command::*;
         match self.command.as_ref()? {
@@ -82,7 +82,8 @@ impl Cli {
         }
     }
 
-    /// Returns true if memory and files of the command are limited.
+    /// Returns true if memory and files of the command are limited, because it simulates FMUs and little
+    /// else.
     fn has_memory_limit(&self) -> bool {
         matches!(
             self.command,
@@ -90,21 +91,20 @@ impl Cli {
         )
     }
 
-    /// Limits of the process that runs the command.
+    /// Returns the limits on time, memory and files of the process that runs the command.
     fn limits(&self) -> Result<Limits> {
         let call = Duration::try_from_secs_f64(self.call_limit).ok().filter(|time| !time.is_zero());
         let call =
             call.with_context(|| format!("--call-limit {} (allowed: above 0 s)", self.call_limit))?;
         let (memory, file) = match self.has_memory_limit() {
             true => (self.memory.saturating_mul(1 << 20), guard::FILE),
-            // fits and records take what they need
+            // Fits and records take what they need.
             false => (1 << 40, 1 << 40),
         };
         Ok(Limits { call, total: None, memory, file })
     }
 }
 
-/// Meaning of the exit codes.
 const EXIT_CODES: &str = "Exit codes:\n  \
     0  done, or the reader of its output has closed the pipe\n  \
     1  an error, which stderr explains; of check: the FMU has errors; with --strict: there was a warning\n  \
@@ -137,7 +137,8 @@ enum Command {
     Book(book::BookArgs),
 }
 
-/// The command line, in which `--fill -1` is a value, to be refused with what is allowed.
+/// Returns the command line parser. It takes `-1` in `--fill -1` as a value, so that the message can say what
+/// is allowed.
 fn command_line() -> clap::Command {
     fn with_negative_numbers(command: clap::Command) -> clap::Command {
         let of = |arg: clap::Arg| match arg.get_action().takes_values() {
@@ -149,8 +150,8 @@ fn command_line() -> clap::Command {
     with_negative_numbers(Cli::command()).color(terminal::color_of_arguments())
 }
 
-/// Has SIGINT and SIGTERM end guarded processes and remove what is temporary before they end the program. SIGHUP stays as it
-/// was, for nohup.
+/// Makes SIGINT and SIGTERM end the guarded processes and remove temporary files before they end the program.
+/// SIGHUP is unchanged, for nohup.
 #[cfg(unix)]
 fn clean_up_on_signals() {
     use signal_hook::consts::{SIGINT, SIGTERM};
@@ -209,14 +210,14 @@ fn main() -> ExitCode {
     code.into()
 }
 
-/// `cargo run` sets this variable for the program that it runs.
+/// Returns true if `cargo run` started this program; cargo sets the variable.
 fn is_run_by_cargo() -> bool {
     std::env::var_os("CARGO_MANIFEST_DIR").is_some()
 }
 
-/// Has a guarded process carry the command out.
+/// Runs the command in a guarded process and returns the exit code.
 fn guarded(cli: &Cli) -> Result<u8> {
-    // before the guard: what is built is not to be built within its limits
+    // Before the guard, because what is built must not be built within its limits.
     match cli.fmu() {
         Some(name) => drop(fmu::find(name)?),
         None if fmu::installed("HubSlosh.fmu").is_none() && ::pack::has_source() => {
@@ -265,7 +266,7 @@ fn guarded(cli: &Cli) -> Result<u8> {
     }
 }
 
-/// Carries the command out in this process and returns the exit code.
+/// Runs the command in this process and returns the exit code.
 fn carry_out(cli: Cli) -> u8 {
     let done = match cli.command {
         Some(Command::Pack(args)) => args.run(),
@@ -289,7 +290,7 @@ fn carry_out(cli: Cli) -> u8 {
         Some(Command::Review(args)) => args.run(),
         Some(Command::Release(args)) => args.run(),
         Some(Command::Book(args)) => args.run(),
-        None => everything(),
+        None => run_default_job(),
     };
     match done {
         Ok(()) => terminal::code(),
@@ -300,8 +301,9 @@ fn carry_out(cli: Cli) -> u8 {
     }
 }
 
-/// Runs the default job of `cargo run --release` with the FMU that it has packed.
-fn everything() -> Result<()> {
+/// Runs the default job of `cargo run --release` with the FMU that it has packed: the campaign of the thesis
+/// and its report.
+fn run_default_job() -> Result<()> {
     let plan = Plan::read("thesis")?;
     let out = DEFAULT_CAMPAIGN.into();
     let campaign = Campaign { plan, force: false, jobs: 0, compare: None, out };

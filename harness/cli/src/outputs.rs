@@ -9,8 +9,8 @@ use clap::parser::ValueSource;
 use files::input;
 use files::output::{self, Destination};
 
-/// Options whose values are files or directories that a command writes: command, option, and the endings of files that
-/// it writes there. Every other value that names a file is an input.
+/// Options whose values are files or directories that a command writes: command, option, and the endings of
+/// files that it writes there. Every other value that names a file is an input.
 const OUTPUTS: [(&str, &str, &[&str]); 22] = [
     ("analyse", "out", &[]),
     ("book", "out", &[]),
@@ -39,15 +39,16 @@ const OUTPUTS: [(&str, &str, &[&str]); 22] = [
 /// Endings of files that commands read.
 const INPUTS: [&str; 9] = ["fmu", "toml", "ssv", "csv", "tsv", "parquet", "mat", "json", "svg"];
 
-/// Protects the inputs that the command line names, and refuses outputs that would replace one of them, that are
-/// probably meant as inputs, or that are one file twice.
+/// Protects the inputs that the command line names, and refuses outputs that would replace one of them, that
+/// are probably meant as inputs, or that are one file twice.
 ///
 /// # Errors
-/// As said; the message names the option and its value.
+///
+/// As described; the message names the option and its value.
 pub fn check(command: &clap::Command, matches: &ArgMatches) -> Result<()> {
     let Some((name, matches)) = matches.subcommand() else { return Ok(()) };
     let Some(command) = command.find_subcommand(name) else { return Ok(()) };
-    // the kinds of recordings of identify have its options
+    // The kinds of recordings of `identify` have its options.
     let (command, matches) = match matches.subcommand() {
         Some((kind, matches)) => (command.find_subcommand(kind).unwrap_or(command), matches),
         None => (command, matches),
@@ -95,13 +96,14 @@ pub fn check(command: &clap::Command, matches: &ArgMatches) -> Result<()> {
     Ok(())
 }
 
-/// Protects a file and, of a plan or a tank, the files that it names: recordings, torques, drawings.
+/// Protects a file from being overwritten and, for a plan or a tank, also the files that it names:
+/// recordings, torques, drawings.
 fn protect(path: &Path) {
     input::protect(path);
     if path.extension().is_none_or(|ending| ending != "toml") || !path.is_file() {
         return;
     }
-    // what is wrong with the file is for the command to say
+    // The command itself reports what is wrong with the file.
     let read = input::text(path).ok().and_then(|text| text.parse::<toml::Table>().ok());
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut values: Vec<toml::Value> = read.into_iter().map(toml::Value::Table).collect();
@@ -120,8 +122,8 @@ fn protect(path: &Path) {
     }
 }
 
-/// Paths that a value may name: itself, and what follows a colon or a sign of equality, as in `2:fuel.toml` and
-/// `file:path=torque.csv,hold=true`.
+/// Lists the paths that a value may name: itself, and what follows a colon or a sign of equality, as in
+/// `2:fuel.toml` and `file:path=torque.csv,hold=true`.
 fn files_in(value: &OsStr) -> Vec<PathBuf> {
     let mut paths = vec![PathBuf::from(value)];
     let text = value.to_str().unwrap_or_default();
@@ -133,7 +135,8 @@ fn files_in(value: &OsStr) -> Vec<PathBuf> {
     paths
 }
 
-/// The plain file that a path leads to, whether or not it exists; `None` for a device or a pipe, which takes several outputs.
+/// Returns the plain file to which a path leads, whether or not it exists; `None` for a device or a pipe,
+/// which takes several outputs.
 fn place(path: &Path) -> Option<PathBuf> {
     let Ok(Destination::File(file)) = output::destination(path) else { return None };
     let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty());

@@ -1,4 +1,4 @@
-//! Progress bars on a terminal; the libraries only tell how far they are.
+//! Progress bars on a terminal. The libraries only report how far they are.
 
 use std::io;
 use std::sync::{Mutex, PoisonError};
@@ -9,31 +9,31 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle, TermLike};
 
 use crate::terminal;
 
-/// A bar for steps of one run.
-pub fn of_steps() -> Result<ProgressBar> {
+/// Returns a bar for the steps of one run.
+pub fn steps_bar() -> Result<ProgressBar> {
     bar("{bar:40} {percent:>3} %  {elapsed} elapsed, {eta} left")
 }
 
-/// A bar for the steps of many runs.
-pub fn of_runs() -> Result<ProgressBar> {
+/// Returns a bar for the steps of many runs, with a message for their number.
+pub fn runs_bar() -> Result<ProgressBar> {
     bar("{msg} {bar:40} {percent:>3} %  {elapsed} elapsed, {eta} left")
 }
 
-/// A bar for the rules of a check.
-pub fn of_rules() -> Result<ProgressBar> {
+/// Returns a bar for the rules of a check.
+pub fn rules_bar() -> Result<ProgressBar> {
     bar("{bar:40} {pos} of {len} rules of calls  {elapsed} elapsed, {eta} left")
 }
 
-/// A spinner for a search whose length nobody knows.
-pub fn of_search() -> Result<ProgressBar> {
+/// Returns a spinner for a search of unknown length.
+pub fn search_spinner() -> Result<ProgressBar> {
     let spinner = bar("{spinner} {elapsed}  {msg}")?;
     spinner.enable_steady_tick(std::time::Duration::from_millis(200));
     Ok(spinner)
 }
 
-/// A line that stays above a bar, and the bar's message.
-pub fn tell(bar: &ProgressBar, line: &str) {
-    // where no bar is drawn, indicatif would swallow the line
+/// Prints a line that stays above a bar, and makes it the bar's message.
+pub fn show_line(bar: &ProgressBar, line: &str) {
+    // Where no bar is drawn, indicatif would lose the line.
     if bar.is_hidden() {
         terminal::note(line);
     } else {
@@ -62,7 +62,7 @@ fn bar(template: &str) -> Result<ProgressBar> {
     Ok(bar)
 }
 
-/// A terminal of one line, which is sent to the program that started this one.
+/// A terminal with one line, which is sent as a message to the program that started this one.
 #[derive(Debug, Default)]
 struct Messages {
     line: Mutex<String>,
@@ -98,7 +98,7 @@ impl TermLike for Messages {
 
     fn write_line(&self, text: &str) -> io::Result<()> {
         self.change(|line| {
-            // the rest of a line is filled with spaces
+            // The rest of a line is filled with spaces.
             if !text.trim().is_empty() {
                 *line = text.trim().into();
             }
@@ -123,7 +123,7 @@ impl TermLike for Messages {
     }
 }
 
-/// Shows a piece of news of the bench.
+/// Updates a bar with the progress of a campaign.
 pub fn show(bar: &ProgressBar, news: Progress) {
     match news {
         Progress::Begins { runs, steps } => {
@@ -131,7 +131,7 @@ pub fn show(bar: &ProgressBar, news: Progress) {
             bar.set_message(format!("{runs} runs"));
         }
         Progress::Steps(steps) => bar.inc(steps),
-        // where no bar is drawn, indicatif would swallow the line
+        // Where no bar is drawn, indicatif would lose the line.
         Progress::Note(line) if bar.is_hidden() => terminal::note(line),
         Progress::Note(line) => bar.println(line),
     }

@@ -6,10 +6,15 @@ use anyhow::{Context, Result};
 use host::description::ModelDescription;
 use host::parameter_set::ParameterSet;
 
-/// Reads the description of the FMU that the parameters are for: units are converted to its own.
+/// Reads the description of the FMU that the parameters are for, to convert units to the FMU's own.
 pub type Describe<'a> = &'a dyn Fn() -> Result<ModelDescription>;
 
-/// Returns names and values of a file in its order; numbers in the units of the FMU.
+/// Reads names and values from a file of parameters, in its order. Numbers are converted to the units of the
+/// FMU.
+///
+/// # Errors
+///
+/// If the file or the FMU's description cannot be read, or a unit does not fit.
 pub fn read(path: &Path, description: Describe) -> Result<Vec<(String, String)>> {
     let found = ParameterSet::read(path)?;
     for warning in found.warnings {

@@ -35,7 +35,7 @@ static TERMINAL: OnceLock<Terminal> = OnceLock::new();
 static WARNINGS: AtomicUsize = AtomicUsize::new(0);
 
 impl Terminal {
-    /// Applies these settings from now on.
+    /// Applies these settings from now on; only the first call has an effect.
     pub fn set(self) {
         TERMINAL.get_or_init(|| self);
     }
@@ -50,19 +50,21 @@ pub fn is_quiet() -> bool {
     terminal().quiet
 }
 
-/// Returns true if the program that started this one reads [`message`]s.
+/// Returns true if the program that started this one reads messages (option `--messages`, used by the Python
+/// package).
 pub fn has_reader() -> bool {
     terminal().messages
 }
 
-/// Sends a message: `value` is JSON, which may have several lines.
+/// Sends a message to the program that started this one. `value` is JSON and may have several lines.
 pub fn message(name: &str, value: &str) {
-    // a line break within a text is escaped, so the others only lay the JSON out
+    // A line break within a string is escaped, so the others only lay out the JSON.
     let value: String = value.lines().map(str::trim).collect();
-    say(format!("\u{1e}{{{name:?}:{value}}}\n"));
+    print(format!("\u{1e}{{{name:?}:{value}}}\n"));
 }
 
-/// The choice of `--color` before the command line is parsed, for messages about the command line.
+/// Finds the value of `--color` before the command line is parsed, for messages about the command line
+/// itself.
 pub fn color_of_arguments() -> ColorChoice {
     let arguments: Vec<_> = std::env::args_os().map(|a| a.to_string_lossy().into_owned()).collect();
     let flags = arguments.iter().take_while(|argument| *argument != "--");
@@ -79,21 +81,21 @@ pub fn error(text: impl std::fmt::Display) {
     complain(format!("{} {text}\n", styled("error:", *Styles::styled().get_error())));
 }
 
-/// Prints a warning; with `--strict` the command fails in the end.
+/// Prints a warning. With `--strict` a warning makes the exit code 1.
 pub fn warn(text: impl std::fmt::Display) {
     WARNINGS.fetch_add(1, Ordering::Relaxed);
     let style = AnsiColor::Yellow.on_default().effects(Effects::BOLD);
     complain(format!("{} {text}\n", styled("warning:", style)));
 }
 
-/// Prints progress and results of work; not with `--quiet`.
+/// Prints progress and results of work to stderr; `--quiet` suppresses it.
 pub fn note(text: impl std::fmt::Display) {
     if !is_quiet() {
         complain(format!("{text}\n"));
     }
 }
 
-/// The exit code of a command that has done its work.
+/// Returns the exit code of a command that has done its work: 0, or 1 if `--strict` makes warnings errors.
 pub fn code() -> u8 {
     match WARNINGS.load(Ordering::Relaxed) {
         0 => 0,
@@ -116,7 +118,8 @@ fn styled(word: &str, style: Style) -> String {
     }
 }
 
-/// Choice of colours on stderr, including the one behind a guard's pipes.
+/// Decides whether messages have colours. In a guarded process the decision depends on the stderr of the
+/// program behind it.
 fn choice() -> anstream::ColorChoice {
     let auto = || match guard::streams() {
         Some((_, stderr)) => AutoStream::choice(stderr),
@@ -129,8 +132,8 @@ fn choice() -> anstream::ColorChoice {
     }
 }
 
-/// Prints a text to stdout.
-pub fn say(text: String) {
+/// Prints a text to stdout. If that fails, the program ends.
+pub fn print(text: String) {
     if let Err(error) = quiet_if_closed(stdout().write_all(text.as_bytes())) {
         self::error(format_args!("could not write to stdout: {error}"));
         exit(1);
@@ -138,12 +141,12 @@ pub fn say(text: String) {
 }
 
 /// Prints a value as JSON.
-pub fn say_json(value: &impl serde::Serialize) -> Result<()> {
-    say(serde_json::to_string_pretty(value)? + "\n");
+pub fn print_json(value: &impl serde::Serialize) -> Result<()> {
+    print(serde_json::to_string_pretty(value)? + "\n");
     Ok(())
 }
 
-/// stdout, out of the reach of a guarded FMU.
+/// Returns the program's stdout, which a guarded FMU cannot write to.
 pub fn stdout() -> Box<dyn Write> {
     match guard::streams() {
         Some((stdout, _)) => Box::new(stdout),
@@ -151,22 +154,23 @@ pub fn stdout() -> Box<dyn Write> {
     }
 }
 
-/// Prints a text to stderr, the standard library's or that which a guarded FMU does not know.
+/// Prints a text to stderr; in a guarded process to the stderr that the FMU cannot write to.
 fn complain(text: String) {
-    // who has closed it does not want to know
+    // A closed stderr means that nobody wants to read the messages.
     let _ = match guard::streams() {
         Some((_, mut stderr)) => stderr.write_all(text.as_bytes()),
         None => AutoStream::new(std::io::stderr(), choice()).write_all(text.as_bytes()),
     };
 }
 
-/// Ends the program on purpose.
+/// Ends the program on purpose, so that the guard does not report a crash.
 fn exit(code: u8) -> ! {
     guard::done(code);
     std::process::exit(code.into())
 }
 
-/// Ends the program, as done, if what was written to has no reader any more.
+/// Ends the program with exit code 0 if the reader of its output has closed the pipe; passes on any other
+/// error.
 pub fn quiet_if_closed<T, E: Into<anyhow::Error>>(written: Result<T, E>) -> Result<T> {
     written.map_err(|error| {
         let error = error.into();

@@ -1,5 +1,5 @@
-//! Files of other kinds than text in columns and Parquet (`.mat`, HDF5, TDMS, MDF4, Excel): the Python package `hubslosh` writes
-//! them as text, which is read here then.
+//! Files of other kinds than text in columns and Parquet (`.mat`, HDF5, TDMS, MDF4, Excel): the Python
+//! package `hubslosh` converts them to text, which is then read here.
 
 use std::fmt;
 use std::io::{ErrorKind, Read as _};
@@ -10,7 +10,7 @@ use anyhow::{Context, Result, bail};
 use files::input;
 use files::temporary::Folder;
 
-/// Error of a file that the Python package may read.
+/// The error for a file that is not read here but perhaps by the Python package.
 #[derive(Debug)]
 pub struct Foreign(pub String);
 
@@ -22,21 +22,22 @@ impl fmt::Display for Foreign {
 
 impl std::error::Error for Foreign {}
 
-/// Advice for a user who has not installed the Python package.
+/// What to do without the Python package.
 const ADVICE: &str = "the Python package reads .mat (5 and 7.3), HDF5, TDMS, MDF4, .xlsx and every type of Parquet: \
     pip install 'hubslosh[recordings]', then python3 -m hubslosh.recordings FILE FILE.csv writes text that is read here";
 
-/// Kind of a file, by its first bytes.
+/// Kind of a file, detected from its first bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     Text,
     Parquet,
 }
 
-/// Returns the kind of a file.
+/// Detects the kind of a file from its first bytes.
 ///
 /// # Errors
-/// [`Foreign`] if it is another one.
+///
+/// [`Foreign`] if it is neither text nor Parquet.
 pub fn kind(path: &Path) -> Result<Kind> {
     const PACKED: [(&[u8], &str); 3] = [
         (b"\x1f\x8b", "it is compressed with gzip: unpack it first (gunzip)"),
@@ -61,10 +62,13 @@ pub fn kind(path: &Path) -> Result<Kind> {
     }
 }
 
-/// Has the Python package write a file as text in columns, in a folder that goes with the value.
+/// Converts a file to text in columns with the Python package. The folder of the text is deleted when the
+/// returned value is dropped.
 ///
 /// # Errors
-/// If there is no such package, or it cannot read the file.
+///
+/// If no Python with the package is found, or the package cannot read the file; `why` is the reason that the
+/// file was not read here.
 pub fn converted(path: &Path, why: &anyhow::Error) -> Result<(Folder, PathBuf)> {
     let folder = Folder::new()?;
     let out = folder.path().join("recording.csv");
@@ -72,7 +76,7 @@ pub fn converted(path: &Path, why: &anyhow::Error) -> Result<(Folder, PathBuf)> 
     let program = std::env::current_exe().ok().and_then(|own| Some(own.parent()?.join(name)));
     let given = std::env::var_os("HUBSLOSH_PYTHON").map(PathBuf::from);
     for python in given.into_iter().chain(program).chain([name.into()]) {
-        // -P: a folder hubslosh where the command runs is not the package
+        // -P prevents Python from taking a folder hubslosh in the working directory for the package.
         let mut command = Command::new(python);
         command.args(["-P", "-m", "hubslosh.recordings"]).arg(path).arg(&out);
         let done = match command.output() {
@@ -83,7 +87,7 @@ pub fn converted(path: &Path, why: &anyhow::Error) -> Result<(Folder, PathBuf)> 
             return Ok((folder, out));
         }
         let words = String::from_utf8_lossy(&done.stderr);
-        // an interpreter without the package, or with an older one
+        // The interpreter lacks the package or has an older version of it.
         let is_there = words.lines().last().and_then(|line| line.strip_prefix("error: "));
         if let Some(words) = is_there {
             bail!("{words}");

@@ -10,7 +10,8 @@ use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 
 pub use realfft::num_complex::Complex64;
 
-/// Keeps what was prepared for each length: preparing a transform takes longer than one takes.
+/// Returns the planner, which keeps what was prepared for each length: preparing a transform takes longer
+/// than computing one.
 fn planner() -> MutexGuard<'static, RealFftPlanner<f64>> {
     static PLANNER: LazyLock<Mutex<RealFftPlanner<f64>>> = LazyLock::new(Default::default);
     PLANNER.lock().unwrap_or_else(PoisonError::into_inner)
@@ -20,15 +21,16 @@ fn planner() -> MutexGuard<'static, RealFftPlanner<f64>> {
 pub struct Forward(Arc<dyn RealToComplex<f64>>);
 
 impl Forward {
-    /// Returns the transform for signals of `length` samples.
+    /// Prepares the transform for signals of `length` samples.
     pub fn new(length: usize) -> Self {
         Forward(planner().plan_fft_forward(length))
     }
 
-    /// The spectrum of a signal, N/2 + 1 lines.
+    /// Returns the spectrum of a signal, N/2 + 1 lines.
     ///
     /// # Panics
-    /// If the signal has another length.
+    ///
+    /// If the signal has another length than the transform.
     pub fn of(&self, mut signal: Vec<f64>) -> Vec<Complex64> {
         let mut spectrum = self.0.make_output_vec();
         self.0.process(&mut signal, &mut spectrum).expect("a signal of the transform's length");
@@ -40,15 +42,16 @@ impl Forward {
 pub struct Inverse(Arc<dyn ComplexToReal<f64>>);
 
 impl Inverse {
-    /// Returns the transform for signals of `length` samples.
+    /// Prepares the transform for signals of `length` samples.
     pub fn new(length: usize) -> Self {
         Inverse(planner().plan_fft_inverse(length))
     }
 
-    /// N times the signal of a spectrum of N/2 + 1 lines. Line 0 and, if N is even, the last are
-    /// taken as real.
+    /// Returns N times the signal of a spectrum of N/2 + 1 lines. Imaginary parts of line 0 and, if N is
+    /// even, of the last line are ignored, because a real signal has none.
     ///
     /// # Panics
+    ///
     /// If the spectrum has another length.
     pub fn of(&self, mut spectrum: Vec<Complex64>) -> Vec<f64> {
         let last = spectrum.len() - 1;

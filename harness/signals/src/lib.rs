@@ -1,6 +1,6 @@
-//! Sampled signals: as columns of files, of our own (`table`) and of others (`recording`), and their Fourier
-//! transforms. What needs the large generic crates `parquet` and `realfft` stands here, so that their code is
-//! compiled once.
+//! Sampled signals: as columns of the project's own files (`table`) and of recordings made by others
+//! (`recording`), and their Fourier transforms. Everything that needs the large generic crates `parquet` and
+//! `realfft` is here, so that their code is compiled only once.
 
 mod foreign;
 pub mod fourier;

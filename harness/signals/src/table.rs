@@ -1,5 +1,5 @@
-//! Columns of numbers with names, in CSV or Parquet files (told apart by the
-//! ending). Signals are in SI units under the FMU's names, `time` in s.
+//! Tables of numbers in CSV or Parquet files (distinguished by the ending). Signals are in SI units under the
+//! FMU's names, `time` in s.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
@@ -20,16 +20,20 @@ use files::{budget, input};
 
 use crate::parquet_file;
 
-/// Columns of equal length.
+/// Named columns of equal length.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Table {
     names: Vec<String>,
     columns: Vec<Vec<f64>>,
-    /// Names of the columns in which NaN stands where a value is missing.
+    /// Names of the columns in which NaN marks missing values.
     gaps: BTreeSet<String>,
 }
 
-/// Returns true for the name of a Parquet file, false for one of CSV.
+/// Returns true for the name of a Parquet file, false for a CSV file.
+///
+/// # Errors
+///
+/// If the name has another ending.
 fn is_parquet(path: &Path) -> Result<bool> {
     match path.extension().and_then(|e| e.to_str()).map(str::to_lowercase).as_deref() {
         Some("csv") => Ok(false),
@@ -38,23 +42,32 @@ fn is_parquet(path: &Path) -> Result<bool> {
     }
 }
 
-/// Fails unless `path` names a kind of file that can be written.
+/// Checks that a table can be written to `path`.
+///
+/// # Errors
+///
+/// If its name ends neither in .csv nor in .parquet.
 pub fn check_ending(path: &Path) -> Result<()> {
     is_parquet(path).map(drop)
 }
 
 impl Table {
-    /// A table of the given columns.
+    /// Makes a table from columns with their names.
+    ///
+    /// # Panics
+    ///
+    /// If the columns are not equally long, or names and columns differ in number.
     pub fn new(names: Vec<String>, columns: Vec<Vec<f64>>) -> Self {
         assert_eq!(names.len(), columns.len());
         assert!(columns.windows(2).all(|pair| pair[0].len() == pair[1].len()));
         Table { names, columns, gaps: BTreeSet::new() }
     }
 
-    /// The table and a further column, in which NaN stands where a value is missing; a file has nothing there.
+    /// Adds a column in which NaN marks missing values; the file then has an empty field or a null there.
     ///
     /// # Panics
-    /// If it has another number of rows.
+    ///
+    /// If it has another number of rows than the table.
     pub fn with_gaps(mut self, name: &str, column: Vec<f64>) -> Table {
         assert_eq!(column.len(), self.rows());
         self.names.push(name.into());
@@ -63,28 +76,29 @@ impl Table {
         self
     }
 
-    /// Number of rows.
     pub fn rows(&self) -> usize {
         self.columns.first().map_or(0, Vec::len)
     }
 
-    /// Names of the columns.
     pub fn names(&self) -> &[String] {
         &self.names
     }
 
-    /// Values of the columns.
     pub fn columns(&self) -> &[Vec<f64>] {
         &self.columns
     }
 
-    /// The column of that name.
+    /// Returns the values of the column `name`; `None` if there is none.
     pub fn column(&self, name: &str) -> Option<&[f64]> {
         let index = self.names.iter().position(|n| n == name)?;
         Some(&self.columns[index])
     }
 
-    /// The table with only the columns `names`, which must be there.
+    /// Returns a table with only the columns `names`, in this order.
+    ///
+    /// # Panics
+    ///
+    /// If a column is not there.
     pub fn only(&self, names: &[&str]) -> Table {
         let column = |name: &&str| self.column(name).expect("a column of this table").to_vec();
         Table {
@@ -94,8 +108,11 @@ impl Table {
         }
     }
 
-    /// Reads the columns `wanted` of a file, which may hold others. Every value must be a finite
-    /// number.
+    /// Reads the columns `wanted` from a file, which may have others.
+    ///
+    /// # Errors
+    ///
+    /// If the file cannot be read, a column is missing or there twice, or a value is not a finite number.
     pub fn read(path: &Path, wanted: &[&str]) -> Result<Table> {
         let name = path.display();
         let read = if is_parquet(path)? { read_parquet } else { read_csv };
@@ -104,7 +121,11 @@ impl Table {
         Ok(table)
     }
 
-    /// Fails with the first value that is not finite, nor missing where values may be.
+    /// Checks that all values are finite, except missing ones in columns with gaps.
+    ///
+    /// # Errors
+    ///
+    /// Names the first value that is not.
     pub fn all_finite(&self) -> Result<()> {
         for (column, values) in self.names.iter().zip(&self.columns) {
             let gaps = self.gaps.contains(column);
@@ -117,7 +138,8 @@ impl Table {
         Ok(())
     }
 
-    /// Fails unless the table can be written and read again: all values finite, no name twice.
+    /// Checks that the table can be read again after it was written: all values finite, no two columns with
+    /// the same name.
     fn check(&self) -> Result<()> {
         let mut names = BTreeSet::new();
         if let Some(twice) = self.names.iter().find(|name| !names.insert(*name)) {
@@ -126,8 +148,12 @@ impl Table {
         self.all_finite()
     }
 
-    /// Writes the table, if all its values are finite or may be missing; `metadata` are a Parquet file's key-value
-    /// pairs.
+    /// Writes the table to a CSV or Parquet file, replacing the file as a whole. `metadata` are a Parquet
+    /// file's key-value pairs; a CSV file has none.
+    ///
+    /// # Errors
+    ///
+    /// If a value is neither finite nor missing, or the file cannot be written.
     pub fn write(&self, path: &Path, metadata: &BTreeMap<String, String>) -> Result<()> {
         let is_parquet = is_parquet(path)?;
         atomically(path, |file| match is_parquet {
@@ -136,11 +162,15 @@ impl Table {
         })
     }
 
-    /// Writes the table as CSV, if all its values are finite.
+    /// Writes the table as CSV.
+    ///
+    /// # Errors
+    ///
+    /// If a value is neither finite nor missing, or the file cannot be written.
     pub fn write_csv(&self, file: impl Write) -> Result<()> {
         self.check()?;
         let mut out = BufWriter::new(file);
-        // a comma within the name of an element, p[1,2], divides no columns (RFC 4180)
+        // A comma within the name of an array's element, p[1,2], does not separate columns (RFC 4180).
         let quoted = |name: &String| match name.contains([',', '"']) {
             true => format!("\"{}\"", name.replace('"', "\"\"")),
             false => name.clone(),
@@ -148,7 +178,7 @@ impl Table {
         writeln!(out, "{}", self.names.iter().map(quoted).collect::<Vec<_>>().join(","))?;
         for row in 0..self.rows() {
             for (i, column) in self.columns.iter().enumerate() {
-                // the shortest digits that read back to the same number
+                // The shortest digits that read back to the same number.
                 let comma = if i == 0 { "" } else { "," };
                 match column[row] {
                     value if value.is_nan() => write!(out, "{comma}")?,
@@ -205,7 +235,11 @@ impl Table {
     }
 }
 
-/// The key-value metadata of a Parquet file; an error if the file is not complete.
+/// Returns the key-value metadata of a Parquet file.
+///
+/// # Errors
+///
+/// If the file is not complete.
 pub fn metadata(path: &Path) -> Result<BTreeMap<String, String>> {
     parquet_file::metadata(path).with_context(|| format!("{} cannot be used", path.display()))
 }
@@ -217,7 +251,11 @@ pub fn is_ours(path: &Path) -> bool {
     writer.is_none_or(|writer| writer.starts_with("parquet-rs"))
 }
 
-/// Names of the columns of a file.
+/// Lists the names of the columns of a file.
+///
+/// # Errors
+///
+/// If the file cannot be read or has no header.
 pub fn names(path: &Path) -> Result<Vec<String>> {
     let names = match is_parquet(path)? {
         true => parquet_file::names(path),
@@ -226,7 +264,7 @@ pub fn names(path: &Path) -> Result<Vec<String>> {
     names.with_context(|| format!("{} cannot be used", path.display()))
 }
 
-/// The rows of a CSV file, and the names of its columns.
+/// Opens a CSV file and reads its header: the rows that follow, and the names of the columns.
 fn header(path: &Path) -> Result<(csv::Reader<File>, Vec<String>)> {
     let file = input::open(path).context("it cannot be opened")?;
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(file);
@@ -235,7 +273,11 @@ fn header(path: &Path) -> Result<(csv::Reader<File>, Vec<String>)> {
     Ok((reader, names))
 }
 
-/// Position of each wanted column, or the missing ones.
+/// Finds the position of each wanted column.
+///
+/// # Errors
+///
+/// Lists the columns that are missing, and those that are there twice.
 fn positions(there: &[String], wanted: &[&str]) -> Result<Vec<usize>> {
     let count = |name: &&&str| there.iter().filter(|other| other.trim() == **name).count();
     let listed = |of: fn(usize) -> bool| {

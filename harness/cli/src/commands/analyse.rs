@@ -54,7 +54,6 @@ pub struct AnalyseArgs {
 }
 
 impl AnalyseArgs {
-    /// Runs the command.
     pub fn run(self) -> Result<()> {
         if let Some(directory) = &self.bench_day {
             return bench_day::run(directory, &self.runs.fmu, self.runs.jobs, self.out.clone());
@@ -84,7 +83,8 @@ impl AnalyseArgs {
         campaign::drive(&fmu, &campaign, store, Vec::new())
     }
 
-    /// The plan of the command line: every recording as a run with its torque's amplitude, simulated with every model.
+    /// Writes the plan that the command line describes: every recording is a run with the amplitude of its
+    /// own torque, and is simulated with every model.
     fn written(&self) -> Result<String> {
         let profile: Written = self.profile.parse()?;
         let torque = profile.torque()?;
@@ -99,7 +99,7 @@ impl AnalyseArgs {
         let (mut runs, mut step) = (String::new(), None);
         for path in &self.recordings {
             let recorded = Recorded { path: path.clone(), columns: self.columns.clone() };
-            // its analysis prints what was changed
+            // The analysis of the recording prints what was changed.
             let (each, table) = recorded::read(&recorded, &mut |_| {})?;
             ensure!(
                 each >= 1e-6,
@@ -118,7 +118,7 @@ impl AnalyseArgs {
             if !columns.is_empty() {
                 runs.push_str(&format!("columns = {}\n", text(&columns)));
             }
-            // to four digits: what a command was meant to be
+            // Four digits, because the command was meant to be a round number.
             let digits = 10f64.powi(3 - amplitude.log10().floor() as i32);
             runs.push_str(&format!("{AMPLITUDE} = {:?}\n", (amplitude * digits).round() / digits));
         }

@@ -82,44 +82,39 @@ pub struct PointsArgs {
     found: Option<PathBuf>,
 }
 
-/// Options of all commands.
+/// Options that `identify --free` and `design --free` share with the other kinds of recordings.
 pub struct Told<'a> {
-    /// Recordings.
     pub data: &'a [PathBuf],
-    /// `--set`.
     pub settings: &'a [(String, String)],
-    /// `--columns`.
     pub columns: &'a str,
-    /// `--rate`.
     pub rate: Option<f64>,
-    /// The FMU.
     pub fmu: &'a Path,
-    /// JSON in place of tables.
     pub json: bool,
 }
 
-/// Items of a flag.
+/// Parses the items of a flag that may be given several times, with commas between items. Items that are
+/// wrong go to `problems`, so that one message can list them all.
 fn read<T: std::str::FromStr<Err = anyhow::Error>>(
     flags: &[String],
     problems: &mut Vec<String>,
 ) -> Vec<T> {
-    kept(flags.iter().flat_map(|flag| list(flag)).map(str::parse), problems)
+    parsed(flags.iter().flat_map(|flag| list(flag)).map(str::parse), problems)
 }
 
-/// The items that were read; the error lists every item that is wrong.
-fn kept<T>(read: impl Iterator<Item = Result<T>>, problems: &mut Vec<String>) -> Vec<T> {
+/// Returns the items that were parsed, and adds the errors of the others to `problems`.
+fn parsed<T>(read: impl Iterator<Item = Result<T>>, problems: &mut Vec<String>) -> Vec<T> {
     read.filter_map(|item| item.map_err(|error| problems.push(format!("{error:#}"))).ok()).collect()
 }
 
 impl Told<'_> {
-    /// `--set` as it was written.
+    /// Returns the settings as `NAME=VALUE`, as they were written after `--set`.
     fn texts(&self) -> Vec<String> {
         self.settings.iter().map(|(name, value)| format!("{name}={value}")).collect()
     }
 }
 
 impl AnyFmuArgs {
-    /// Returns true if unknowns are named.
+    /// Returns true if `--free` names unknowns, so that any FMU is fitted in place of the bench.
     pub fn is_asked(&self) -> bool {
         !self.free.is_empty()
     }
@@ -140,14 +135,14 @@ impl AnyFmuArgs {
             free: read(&self.free, &mut problems),
             priors: read(&self.prior, &mut problems),
             tolerances: read(&self.tolerances, &mut problems),
-            settings: kept(told.texts().iter().map(|text| text.parse()), &mut problems),
+            settings: parsed(told.texts().iter().map(|text| text.parse()), &mut problems),
             inputs: names(&self.inputs),
             held: names(&self.held),
             outputs: names(&self.outputs),
             sensors: self.sensors.clone(),
             biases: read(&self.bias, &mut problems),
-            // its names have commas before the sign of equality
-            triads: kept(self.triad.iter().map(|text| text.parse()), &mut problems),
+            // The name of a triad has commas before its sign of equality.
+            triads: parsed(self.triad.iter().map(|text| text.parse()), &mut problems),
             drift: self.drift,
             solver: self.exchange.map_or(Solver::Own, Solver::Host),
             tolerance: self.solver_tolerance,
@@ -181,7 +176,8 @@ impl AnyFmuArgs {
         Ok(model)
     }
 
-    /// Identifies, writes and prints; or returns the likelihood at `points`.
+    /// Fits the unknowns to the recordings, writes the result to the files of `out` and prints it. With
+    /// `--points` it writes −2 ln L at the given points instead.
     pub fn identify(&self, told: &Told, points: &PointsArgs, out: &Out) -> Result<()> {
         let question = self.question(told)?;
         let model = self.model(told, &question)?;
@@ -215,15 +211,16 @@ impl AnyFmuArgs {
             let result = files::input::text(found)
                 .with_context(|| format!("{} cannot be read", found.display()))?;
             let deviances = deviances(&model, &question, &records, &result, &rows)?;
-            return out.keep(&(serde_json::to_string(&deviances)? + "\n"));
+            return out.save(&(serde_json::to_string(&deviances)? + "\n"));
         }
         let mut found = out.search(|news| any_fmu::identify(&model, &question, &records, news))?;
         found.done.splice(0..0, notes);
         let is_trusted = found.fits == Some(true) && found.converged;
-        out.give(&found.json()?, is_trusted, || tell(&found), || any_fmu::page(&found))
+        out.finish(&found.json()?, is_trusted, || print_found(&found), || any_fmu::page(&found))
     }
 
-    /// Predicts the uncertainty of a fit to recordings with these inputs; `noise`: `OUTPUT=STD,…`.
+    /// Predicts the standard deviations that a fit to recordings with these inputs would have (Cramér–Rao
+    /// bound), and prints them. `noise` has items `OUTPUT=STD,…`, the noise of one row in the output's unit.
     pub fn design(&self, told: &Told, noise: &[String]) -> Result<()> {
         let question = self.question(told)?;
         let model = self.model(told, &question)?;
@@ -260,21 +257,21 @@ impl AnyFmuArgs {
         if told.json {
             println!("{}", serde_json::to_string_pretty(&bounds)?);
         } else {
-            foreseen(&bounds);
+            print_predicted(&bounds);
         }
         Ok(())
     }
 }
 
-/// Prints tables and verdict.
-fn tell(found: &Identification) {
+/// Prints the estimates with their standard deviations, and the verdict on the fit.
+fn print_found(found: &Identification) {
     print_estimates(&[&found.parameters, &found.measurement]);
     for line in any_fmu::lines(found).iter().chain(&found.verdict) {
         println!("{line}");
     }
 }
 
-fn foreseen(bounds: &[Bound]) {
+fn print_predicted(bounds: &[Bound]) {
     println!(
         "{:28} {:>12} {:>10} {:>9} {:>10}  most correlated with",
         "", "value", "std", "std %", "if alone"

@@ -26,7 +26,6 @@ pub struct BookArgs {
 }
 
 impl BookArgs {
-    /// Runs the command.
     pub fn run(self) -> Result<()> {
         if fmu::came_with("fmus").is_some() || !pack::has_source() {
             let address = book::address();

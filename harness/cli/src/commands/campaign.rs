@@ -194,16 +194,18 @@ pub fn drive(fmu: &Fmu, campaign: &Campaign, store: Store, chapters: Vec<Chapter
     let kept = rows.len().min(CURVES) * (4 << 20) + rows.len() * (64 << 10);
     let jobs = jobs.min(rows.len());
     guard::allow((jobs * largest * 4 + kept) as u64 + jobs as u64 * courses);
-    let bar = progress::of_runs()?;
+    let bar = progress::runs_bar()?;
     let results = campaign.execute(fmu, &store, &|news| progress::show(&bar, news))?;
     bar.finish_and_clear();
     let mut files = campaign.tables(fmu, &results)?;
     files.push(("plan.toml", campaign.plan.text.clone().into_bytes()));
     let telling = report::campaign::run_to_view(&results);
     let shown = match telling {
-        Some(run) => {
-            Some(view::of_stored(fmu.description(), &store.run(&run.case.name), &run.case.name)?)
-        }
+        Some(run) => Some(view::page_of_stored_run(
+            fmu.description(),
+            &store.run(&run.case.name),
+            &run.case.name,
+        )?),
         None => None,
     };
     let view = telling.map(|run| ("view.html", run));

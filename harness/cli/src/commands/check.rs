@@ -42,7 +42,8 @@ pub struct CheckArgs {
     rules: bool,
 }
 
-/// No selected rule was checked; the exit code is 2.
+/// The error if no selected rule could be checked. It has the exit code 2 of its own, to tell it from an FMU
+/// with errors.
 #[derive(Debug)]
 pub struct Unchecked(String);
 
@@ -65,11 +66,10 @@ pub struct CheckCallsArgs {
 }
 
 impl CheckArgs {
-    /// Runs the command.
     pub fn run(self) -> Result<()> {
         if self.rules {
             match self.json {
-                Some(_) => terminal::say_json(&check::rules())?,
+                Some(_) => terminal::print_json(&check::rules())?,
                 None => {
                     print!("## FMI 2.0\n\n{}\n## FMI 3.0\n\n{}", table(RULES), table(fmi3::RULES));
                 }
@@ -82,7 +82,7 @@ impl CheckArgs {
             limit.with_context(|| format!("--limit {} (allowed: above 0 s)", self.limit))?;
         let program = std::env::current_exe().context("this program cannot find itself")?;
         let options = Options { program, only: self.only.clone(), limit };
-        let bar = progress::of_rules()?;
+        let bar = progress::rules_bar()?;
         let report = check(fmu, &options, |rules| {
             bar.set_length(rules as u64);
             bar.inc(1);
@@ -124,7 +124,6 @@ impl CheckArgs {
 }
 
 impl CheckCallsArgs {
-    /// Runs the command.
     pub fn run(self) -> Result<()> {
         let limit = Duration::try_from_secs_f64(self.limit).context("no time limit")?;
         let fmu = process::Unpacked {

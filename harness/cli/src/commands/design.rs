@@ -96,15 +96,15 @@ pub struct DesignArgs {
     any: AnyFmuArgs,
 }
 
-/// Rows of the plan are this far apart, s.
+/// Time between two rows of the plan, s.
 const STEP: f64 = 0.02;
-/// Slosh angle at which the wave at the wall, 2 α R/(ξ² − 1), is 0.15 R, rad.
+/// Slosh angle at which the wave at the wall, 2 α R/(ξ² − 1), reaches 0.15 R, where linear theory ends, rad.
 const LINEAR: f64 = 0.18;
-/// Columns of numbers that the bound is computed from.
+/// Number of columns in the table from which the bound is computed, for the estimate of the memory that it
+/// takes.
 const COLUMNS: usize = 20;
 
 impl DesignArgs {
-    /// Runs the command.
     pub fn run(mut self) -> Result<()> {
         if !self.any.is_asked() {
             self.settings = nominal::with_damping(self.settings);
@@ -154,7 +154,7 @@ impl DesignArgs {
             sweep: self.optimal.then(|| self.sweep(&bench, &time, full)).transpose()?,
         };
         if self.json {
-            terminal::say_json(&plan.json(&fmu, &wheel))?;
+            terminal::print_json(&plan.json(&fmu, &wheel))?;
         } else {
             plan.print(&wheel, self.slosh_angle);
         }
@@ -166,14 +166,15 @@ impl DesignArgs {
         Ok(())
     }
 
-    /// Rows of the torque that is planned, s and N·m, and the factor that brought it within the wheel's limits.
+    /// Returns the planned torque at the rows of the plan: time (s), torque (N·m), and the factor by which it
+    /// was reduced to respect the limits of the reaction wheel.
     fn torque(
         &self,
         wheel: &Wheel,
         real: &mut dyn FnMut(&str) -> Result<f64>,
     ) -> Result<(Vec<f64>, Vec<f64>, f64)> {
         let sampled = |stop: f64, at: &dyn Fn(f64) -> f64| -> Result<(Vec<f64>, Vec<f64>)> {
-            // time, torque, rate and its derivative with respect to every unknown
+            // Time, torque, rate and the derivative of the rate with respect to every unknown.
             budget::table(budget::steps(stop, STEP)? + 1, COLUMNS)?;
             let rows = (stop / STEP).round() as usize;
             let time: Vec<f64> = (0..=rows).map(|k| k as f64 * STEP).collect();
@@ -209,7 +210,8 @@ impl DesignArgs {
         Ok((time, tau, factor))
     }
 
-    /// Information from a plain sweep of the peak `peak`, N·m, before its liquid is limited.
+    /// Computes the information from a plain sweep with the peak `peak`, N·m, which the limits of the wheel
+    /// and of the slosh angle may reduce further.
     fn sweep(&self, bench: &Bench, time: &[f64], peak: f64) -> Result<Sweep> {
         let (f0, f1) = (self.band[0], self.band[1]);
         let written = |peak: f64| {
@@ -225,7 +227,12 @@ impl DesignArgs {
     }
 }
 
-/// Fails unless lines between the rows `time` (s) and `tau` (N·m) of a plan follow the torque.
+/// Checks that straight lines between the rows `time` (s) and `tau` (N·m) reproduce the torque between the
+/// rows.
+///
+/// # Errors
+///
+/// If they do not; a smaller step or a held torque helps.
 fn check_rows(torque: &Torque, time: &[f64], tau: &[f64]) -> Result<()> {
     let history = torque.history(STEP, time[time.len() - 1], false)?;
     let lines = History::new(time.to_vec(), tau.to_vec(), None, false)?;
@@ -234,7 +241,7 @@ fn check_rows(torque: &Torque, time: &[f64], tau: &[f64]) -> Result<()> {
     let peak = knots.iter().fold(0.0_f64, |peak, t| peak.max(wanted(*t).abs()));
     let mut lines = lines.cursor();
     for &t in knots.iter().filter(|t| **t <= time[time.len() - 1]) {
-        // an edge may lie an ulp before the row that it is meant to meet
+        // An edge may lie one ulp before the row that it coincides with.
         let row = (t / STEP).round() * STEP;
         let made = lines.after(if (t - row).abs() < 1e-6 * STEP { row } else { t }).0;
         ensure!(
@@ -248,16 +255,16 @@ fn check_rows(torque: &Torque, time: &[f64], tau: &[f64]) -> Result<()> {
     Ok(())
 }
 
-/// Bench on which a plan is tried.
+/// The bench as it is expected to be, on which a planned torque is tried.
 struct Bench<'f> {
     fmu: &'f Fmu,
-    /// Setup with the FMU's own damping, by the correlation or not.
+    /// Settings of the FMU with its own damping, from the correlation or not.
     setup: Setup,
-    /// Setup with the damping ratio of the unknowns.
+    /// Settings in which the damping ratio is a free parameter, because it is an unknown of the fit.
     fitted: Setup,
     unknowns: Vec<Unknown>,
     noise: Noise,
-    /// Largest slosh angle that is wanted, rad.
+    /// Largest slosh angle that `--slosh-angle` allows, rad.
     limit: Option<f64>,
 }
 
@@ -283,13 +290,15 @@ impl<'f> Bench<'f> {
             unknowns.extend([Unknown::asymmetry(), Unknown::delay(), Unknown::gyro_bias(0)]);
         }
         let white = white_noise(real)?;
-        // Gauss–Markov bias of IEEE Std 952: its standard deviation is the instability over 0.664
+        // Gauss–Markov bias of IEEE Std 952: its standard deviation is the bias instability divided by
+        // 0.664.
         let drift = real(imu::BIAS_INSTABILITY)? / 0.664 / white;
         let noise = Noise { white, drift, time: real(imu::BIAS_TIME)? };
         Ok(Bench { fmu, setup, fitted, unknowns, noise, limit: asked.slosh_angle })
     }
 
-    /// A torque as much smaller as the liquid's angle needs, and the factor.
+    /// Reduces a torque until the liquid's angle stays within the limit, and returns the factor with the
+    /// torque.
     fn limited(&self, time: &[f64], torque: Vec<f64>) -> Result<(f64, Vec<f64>)> {
         let Some(limit) = self.limit else { return Ok((1.0, torque)) };
         ensure!(limit > 0.0, "--slosh-angle must be a positive number, rad");
@@ -297,7 +306,11 @@ impl<'f> Bench<'f> {
         Ok((factor, torque.iter().map(|t| factor * t).collect()))
     }
 
-    /// Cramér–Rao bounds for a torque: name, expected value and standard deviation of every unknown.
+    /// Computes the Cramér–Rao bounds of all unknowns for a torque (N·m) at the times `time` (s).
+    ///
+    /// # Errors
+    ///
+    /// If the plan has no more rows than unknowns, or the simulation fails.
     fn bounds(&self, time: &[f64], torque: &[f64]) -> Result<Bounds> {
         let rows = (time.to_vec(), torque.to_vec());
         let unknowns = self.unknowns.clone();
@@ -311,40 +324,40 @@ impl<'f> Bench<'f> {
     }
 }
 
-/// White noise of a row of the gyro, rad/s.
+/// Returns the standard deviation of the gyro's white noise in one sample, rad/s: the angle random walk times
+/// the root of the sampling rate.
 fn white_noise(real: &mut dyn FnMut(&str) -> Result<f64>) -> Result<f64> {
     let white = real(imu::ARW)? * real(imu::RATE)?.sqrt();
     ensure!(white > 0.0, "imu.arw = 0 leaves no noise to compare with (allowed: above 0)");
     Ok(white)
 }
 
-/// Name, expected value and standard deviation of every unknown.
 type Bounds = Vec<(String, f64, f64)>;
 
-/// A plain sweep, to compare an optimal multisine with.
+/// A plain sweep with the same peak, against which an optimal multisine is compared.
 struct Sweep {
     profile: String,
-    /// rad.
+    /// Largest slosh angle, rad.
     angle: f64,
     bounds: Bounds,
 }
 
-/// A torque, its effect and its information.
+/// A planned torque with its effect on bench and liquid, and the bounds of the unknowns.
 struct Plan {
-    /// Factor by which it has been reduced.
+    /// Factor by which the torque was reduced to respect the limits.
     factor: f64,
-    /// N·m.
+    /// Largest torque, N·m.
     peak: f64,
     /// Largest slosh angle, rad.
     angle: f64,
-    /// Least and largest speed of the wheel, rad/s.
+    /// Least and largest speed of the reaction wheel, rad/s.
     speeds: (f64, f64),
     bounds: Bounds,
     sweep: Option<Sweep>,
 }
 
 impl Plan {
-    /// The sweep, if it tells more.
+    /// Returns the plain sweep if its bounds are tighter than those of the plan.
     fn better(&self) -> Option<&Sweep> {
         let merit = design::merit(&self.bounds);
         self.sweep.as_ref().filter(|sweep| design::merit(&sweep.bounds) < merit)
@@ -407,7 +420,7 @@ impl Plan {
         let head = if self.sweep.is_some() { "sweep %" } else { "" };
         println!("{:20} {:>12} {:>12} {:>9} {head:>9}", "", "expected", "std, noise", "std %");
         for (k, (name, value, deviation)) in self.bounds.iter().enumerate() {
-            // nothing is a part of what is expected to be 0
+            // A standard deviation has no percentage of an expected value of 0.
             let percent = |std: f64| match *value {
                 0.0 => "-".to_string(),
                 _ if !std.is_finite() => "-".to_string(),
@@ -443,7 +456,9 @@ impl Plan {
 }
 
 impl DesignArgs {
-    /// Prints the torque for a rate of this signal-to-noise ratio.
+    /// Prints the torque amplitude of a sine for which the rate has the signal-to-noise ratio `snr`, dB, in
+    /// the gyro's samples: on the band, at resonance and antiresonance, and for a rigid hub. `limit` is the
+    /// largest torque of the wheel, N·m (thesis 8.6.1).
     fn torque_for(
         &self,
         snr: f64,
@@ -453,11 +468,11 @@ impl DesignArgs {
         let [f0, f1] = self.band[..] else { bail!("--band needs two frequencies, Hz") };
         ensure!(0.0 < f0 && f0 < f1 && f1.is_finite(), "--band = {f0},{f1} (allowed: 0 < f0 < f1)");
         ensure!(snr.abs() <= 200.0, "--snr = {snr} (allowed: -200 to 200 dB)");
-        // Per sample: the sine's power Ω²/2 over arw² times the sampling rate.
+        // Per sample: the sine's power Ω²/2 divided by the noise power, arw² times the sampling rate.
         let sigma = white_noise(real)?;
         let rate = sigma * std::f64::consts::SQRT_2 * 10f64.powf(snr / 20.0);
         let dry = real(friction::C)? + real(friction::D)?;
-        // Its describing function at that rate.
+        // Describing function of the dry friction at that rate.
         let mut bench = expected(real, 1.0)?;
         bench.friction =
             real(friction::B)? + real(hub::C)? + 4.0 * dry / (std::f64::consts::PI * rate);
@@ -486,7 +501,7 @@ impl DesignArgs {
             let all = rows.map(|(what, f, torque)| {
                 json!({ "what": what, "frequency": f, "torque": torque, "wheel": torque <= limit })
             });
-            return terminal::say_json(
+            return terminal::print_json(
                 &json!({ "snr": snr, "rate": rate, "wheel_torque": limit, "needs": all }),
             );
         }
@@ -502,8 +517,8 @@ impl DesignArgs {
     }
 }
 
-/// Returns the expected linear bench. Its viscous friction takes the same power as the dry friction, at the rate of a torque with
-/// this peak (crest factor 3) far from resonance.
+/// Returns the expected linear bench. Its viscous friction takes the same power as the dry friction, at the
+/// rate of a torque with this peak (crest factor 3) far from resonance.
 fn expected(real: &mut dyn FnMut(&str) -> Result<f64>, peak: f64) -> Result<Linear> {
     let arm = real(tank::R)?;
     let mode = Mode {
@@ -513,7 +528,7 @@ fn expected(real: &mut dyn FnMut(&str) -> Result<f64>, peak: f64) -> Result<Line
     };
     let inertia = real(hub::I)? + real(tank::M_0)? * arm * arm;
     let rate = peak / 3.0 / (inertia * std::f64::consts::TAU * mode.frequency);
-    // ⟨|ω|⟩ of a normal distribution is sqrt(2/π) σ
+    // The mean of |ω| for a normal distribution is sqrt(2/π) σ.
     let dry = real(friction::C)? + real(friction::D)?;
     let viscous = real(friction::B)? + real(hub::C)?;
     let friction = viscous + dry * (2.0 / std::f64::consts::PI).sqrt() / rate;

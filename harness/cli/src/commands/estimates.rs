@@ -10,38 +10,38 @@ use identify::news::News;
 
 use crate::{progress, terminal};
 
-/// Files and form of the results.
 pub struct Out<'a> {
-    /// File of the result, JSON.
     pub result: Option<&'a Path>,
-    /// File of the report, HTML.
     pub report: Option<&'a Path>,
-    /// Prints the result as JSON in place of tables.
+    /// Print the result as JSON instead of tables.
     pub json: bool,
-    /// Prints each attempt of the search.
+    /// Also print each attempt of the search.
     pub verbose: bool,
 }
 
 impl Out<'_> {
-    /// Shows the progress of a search.
+    /// Runs a search and shows its progress as a spinner; with `verbose` also each attempt.
     ///
     /// # Errors
+    ///
     /// If the search fails.
     pub fn search<T>(&self, search: impl FnOnce(&mut dyn FnMut(&News)) -> Result<T>) -> Result<T> {
-        let spinner = progress::of_search()?;
+        let spinner = progress::search_spinner()?;
         let found = search(&mut |news| match news {
             News::Detail(line) if !self.verbose => spinner.set_message(line.clone()),
-            news => progress::tell(&spinner, news.line()),
+            news => progress::show_line(&spinner, news.line()),
         });
         spinner.finish_and_clear();
         found
     }
 
-    /// Writes a result to its file, and sends it to the program that started this one, if there is one. `text` is JSON.
+    /// Writes a result to its file, and sends it to the program that started this one, if there is one (the
+    /// Python package reads it there). `text` is JSON.
     ///
     /// # Errors
+    ///
     /// If the file cannot be written.
-    pub fn keep(&self, text: &str) -> Result<()> {
+    pub fn save(&self, text: &str) -> Result<()> {
         if terminal::has_reader() {
             terminal::message("result", text);
         }
@@ -51,18 +51,20 @@ impl Out<'_> {
         }
     }
 
-    /// Keeps a result, prints it by `tables`, and writes the report.
+    /// Saves a result, prints it as JSON or by `tables`, and writes the report. A result that cannot be
+    /// trusted is also a warning, which `--strict` makes an error.
     ///
     /// # Errors
+    ///
     /// If a file cannot be written.
-    pub fn give(
+    pub fn finish(
         &self,
         text: &str,
         is_trusted: bool,
         tables: impl FnOnce(),
         page: impl FnOnce() -> String,
     ) -> Result<()> {
-        self.keep(text)?;
+        self.save(text)?;
         if self.json {
             print!("{text}");
         } else if !terminal::has_reader() {
@@ -82,7 +84,7 @@ impl Out<'_> {
     }
 }
 
-/// Prints a table of estimates.
+/// Prints a table of estimates: name, value, standard deviation (also in percent) and unit.
 pub(super) fn print_estimates(tables: &[&BTreeMap<String, Estimated>]) {
     println!("{:24} {:>14} {:>12} {:>9}  unit", "", "value", "std", "std %");
     for (name, p) in tables.iter().flat_map(|table| table.iter()) {
@@ -93,7 +95,8 @@ pub(super) fn print_estimates(tables: &[&BTreeMap<String, Estimated>]) {
     }
 }
 
-/// Returns a standard deviation that is foreseen, for a table; NaN: the inputs tell nothing of it.
+/// Formats a predicted standard deviation for a table; NaN is written as "not told", because the inputs carry
+/// no information about this unknown.
 pub(super) fn deviation(std: f64) -> String {
     if std.is_finite() { format!("{std:.2e}") } else { "not told".into() }
 }

@@ -19,7 +19,6 @@ pub struct ExampleArgs {
 }
 
 impl ExampleArgs {
-    /// Runs the command.
     pub fn run(self) -> Result<()> {
         pack::needs_source("the example")?;
         let fmu = open(&self.fmu)?;

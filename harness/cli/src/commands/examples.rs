@@ -19,7 +19,6 @@ pub struct ExamplesArgs {
 }
 
 impl ExamplesArgs {
-    /// Runs the command.
     pub fn run(self) -> Result<()> {
         let found = fmu::came_with("examples").or_else(|| {
             let source = ::pack::root().join("examples");
@@ -49,7 +48,7 @@ impl ExamplesArgs {
     }
 }
 
-/// Folders of the examples, by their numbers.
+/// Lists the folders of the examples in the order of the numbers at the beginning of their names.
 fn folders(examples: &Path) -> Result<Vec<PathBuf>> {
     let entries = std::fs::read_dir(examples)
         .with_context(|| format!("{} cannot be read", examples.display()))?;

@@ -12,7 +12,6 @@ use crate::fmu;
 pub struct FmusArgs {}
 
 impl FmusArgs {
-    /// Runs the command.
     pub fn run(self) -> Result<()> {
         let all = fmu::all();
         ensure!(!all.is_empty(), "no FMU came with this command, and none is in dist");

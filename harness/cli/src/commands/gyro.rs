@@ -14,7 +14,6 @@ use signals::table::Table;
 use super::{DEFAULT_FMU, open, setting};
 use crate::{progress, terminal};
 
-/// Folder for its files.
 const DEFAULT_GYRO: &str = "dist/gyro";
 
 /// Simulates the gyro at rest for hours and compares its Allan deviation with the specified noise; or analyses a
@@ -69,19 +68,18 @@ pub struct GyroArgs {
 }
 
 impl GyroArgs {
-    /// Returns true if it records the FMU's gyro.
+    /// Returns true if the command simulates the FMU's gyro, and false if it analyses a recording.
     pub fn needs_fmu(&self) -> bool {
         self.recording.is_none()
     }
 
-    /// Runs the command.
     pub fn run(self) -> Result<()> {
         if let Some(path) = &self.recording {
-            return self.look_at(path);
+            return self.analyse_recording(path);
         }
         let recording =
             Recording { settings: self.settings, hours: self.hours, records: self.records };
-        let bar = progress::of_steps()?;
+        let bar = progress::steps_bar()?;
         let found =
             recording.characterise(&open(&self.fmu)?, &|news| progress::show(&bar, news))?;
         bar.finish_and_clear();
@@ -90,7 +88,7 @@ impl GyroArgs {
         found.table().write(&table, &BTreeMap::new())?;
         output::write(&picture, report::gyro::allan_deviations(&found).as_bytes())?;
         match self.json {
-            true => terminal::say_json(&found.json())?,
+            true => terminal::print_json(&found.json())?,
             false => print!("{}", found.text()),
         }
         done!("{}\n{}", table.display(), picture.display());
@@ -98,13 +96,13 @@ impl GyroArgs {
     }
 }
 
-/// Longest lag of the autocorrelation, s, and the shortest record in chunks.
+/// Longest lag of the autocorrelation, s. The next constant is the least number of chunks in a record.
 const LAG: f64 = 10.0;
 const LEAST_CHUNKS: f64 = 3.0;
 
 impl GyroArgs {
-    /// Looks at a recording.
-    fn look_at(&self, path: &Path) -> Result<()> {
+    /// Analyses a recording of a real gyro at rest, prints its statistics and writes tables and figures.
+    fn analyse_recording(&self, path: &Path) -> Result<()> {
         let signals =
             [Signal { name: "omega", required: true, between: Between::Line, unit: None }];
         let columns = self.columns.clone().with_rate(self.rate)?;
@@ -149,7 +147,8 @@ impl GyroArgs {
     }
 }
 
-/// The tables of a recording at rest, each with its file's name.
+/// Returns the tables of a recording at rest (Allan deviation, quantiles, autocorrelation, chunks), each with
+/// the name of its file.
 fn tables(rest: &Rest) -> [(&'static str, Table); 4] {
     let table = |names: &[&str], columns: Vec<Vec<f64>>| {
         Table::new(names.iter().map(|name| name.to_string()).collect(), columns)
@@ -188,7 +187,8 @@ fn tables(rest: &Rest) -> [(&'static str, Table); 4] {
     ]
 }
 
-/// Parameters of a recording's noise with their intervals, and whether they describe its Allan deviation: name and value.
+/// Lists the noise parameters of a recording with their confidence intervals, and whether they describe its
+/// Allan deviation, as pairs of name and value.
 pub fn noise_rows(fit: &Fit) -> Vec<(&'static str, String)> {
     let stated = |Estimate { value, low, high, .. }: &Estimate, unit: &str| match (*low, *high) {
         (low, high) if low.is_nan() || high.is_nan() => {
@@ -233,7 +233,7 @@ pub fn noise_rows(fit: &Fit) -> Vec<(&'static str, String)> {
     rows
 }
 
-/// Statistics of a recording at rest: name and value.
+/// Lists the statistics of a recording at rest as pairs of name and value.
 fn rows(rest: &Rest) -> Vec<(String, String)> {
     let hours = rest.count as f64 * rest.step / 3600.0;
     let chunks = rest.chunks.len();

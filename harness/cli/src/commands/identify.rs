@@ -121,7 +121,7 @@ struct KnownArgs {
     #[arg(long = "tolerance", value_name = "NAME=SIZE,…")]
     tolerances: Vec<String>,
     /// Prior knowledge of a parameter: its value and standard deviation.
-    #[arg(long, value_name = "NAME=VALUE:STD", value_parser = known)]
+    #[arg(long, value_name = "NAME=VALUE:STD", value_parser = prior)]
     known: Vec<(String, f64, f64)>,
     /// Standard deviation of the scale factor of the gyro about 1. 0 means that the factor is exactly 1.
     #[arg(long, value_name = "NUMBER", default_value_t = 0.01)]
@@ -234,7 +234,7 @@ pub struct FmuArgs {
     points: PointsArgs,
 }
 
-/// Removed methods, and what replaces each.
+/// Methods of older versions that were removed, and what replaces each.
 const REMOVED: [(&str, &str); 6] = [
     ("output-error", "identify bench, or identify without a kind of recording"),
     ("acceleration", "identify friction"),
@@ -250,17 +250,19 @@ const REMOVED: [(&str, &str); 6] = [
     ),
 ];
 
-/// Returns the command line in which `identify DATA` names its kind of recording: `bench`, or `fmu` if --free is there.
+/// Adds the kind of recording to `identify DATA`, which names none: `fmu` if `--free` is there, otherwise
+/// `bench`. Other command lines stay as they are.
 ///
 /// # Errors
-/// If a removed option is there, with what replaces it.
+///
+/// If the command line has a removed option; the message says what replaces it.
 pub fn with_kind(mut arguments: Vec<OsString>) -> Result<Vec<OsString>> {
     const KINDS: [&str; 7] = ["bench", "fmu", "decay", "friction", "help", "--help", "-h"];
     const FLAGS: [&str; 4] = ["--messages", "--quiet", "-q", "--strict"];
     let Some(place) = arguments.iter().position(|argument| argument == "identify") else {
         return Ok(arguments);
     };
-    // options of the program may be before the command, other commands may not
+    // Options of the program may stand before the command, other commands may not.
     let is_value = |k: usize| arguments[k - 1].to_string_lossy().starts_with("--");
     let before = (1..place).all(|k| arguments[k].to_string_lossy().starts_with('-') || is_value(k));
     if !before {
@@ -288,7 +290,7 @@ pub fn with_kind(mut arguments: Vec<OsString>) -> Result<Vec<OsString>> {
             _ => {}
         }
     }
-    // flags of the program may be between the command and the kind, which they follow from here on
+    // Flags of the program may stand between the command and the kind; they are moved behind the kind.
     let Some(k) = own.iter().position(|word| !FLAGS.contains(word)) else { return Ok(arguments) };
     let kind = match KINDS.contains(&own[k]) {
         true => arguments.remove(place + 1 + k),
@@ -306,7 +308,7 @@ fn start_value(text: &str) -> Result<(String, f64)> {
     Ok((name, value))
 }
 
-fn known(text: &str) -> Result<(String, f64, f64)> {
+fn prior(text: &str) -> Result<(String, f64, f64)> {
     let (name, value) = setting(text)?;
     let parts = value.split_once(':').and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?)));
     let Some((mean, deviation)) = parts else {
@@ -319,12 +321,12 @@ fn known(text: &str) -> Result<(String, f64, f64)> {
     Ok((name, mean, deviation))
 }
 
-/// Tolerances of the bench.
+/// Parses the tolerances of known values of the bench, `NAME=SIZE`.
 fn tolerances(texts: &[String]) -> Result<Tolerances> {
     texts.iter().try_fold(Tolerances::default(), |all, text| all.with(text))
 }
 
-/// Times between which rows are used.
+/// Parses `--trim`, the first and last time (s) of the rows to use; empty means all rows.
 fn trim(times: &[f64]) -> Result<Option<(f64, f64)>> {
     match times {
         [] => Ok(None),
@@ -334,7 +336,7 @@ fn trim(times: &[f64]) -> Result<Option<(f64, f64)>> {
 }
 
 impl IdentifyArgs {
-    /// Returns the FMU that is simulated, if one is.
+    /// Returns the FMU that the command simulates; a free decay needs none.
     pub fn fmu(&self) -> Option<&Path> {
         match &self.kind {
             Kind::Bench(args) => Some(&args.known.fmu),
@@ -344,7 +346,6 @@ impl IdentifyArgs {
         }
     }
 
-    /// Runs the command.
     pub fn run(self) -> Result<()> {
         match self.kind {
             Kind::Bench(args) => args.run(),
@@ -399,7 +400,7 @@ impl FrictionArgs {
 }
 
 impl DecayArgs {
-    /// Reads free decays, which are of one signal, and identifies.
+    /// Reads free decays and fits frequency and damping. All must be recordings of the same signal.
     fn run(&self) -> Result<()> {
         self.data.check()?;
         let source = self.data.source(trim(&self.trim)?)?;
@@ -425,7 +426,7 @@ impl DecayArgs {
 }
 
 impl KnownArgs {
-    /// Options with the names of the FMU.
+    /// Collects what the options state about the bench. Names are those of the FMU's parameters.
     fn options(&self) -> Result<Options> {
         ensure!(
             (0.0..1.0).contains(&self.gyro_scale),
@@ -449,7 +450,7 @@ impl KnownArgs {
         })
     }
 
-    /// Reads the recordings, fits them by `method` and prints the result.
+    /// Reads the recordings, fits them by `method`, and prints and writes the result.
     fn identify_and_print<M: Method>(
         &self,
         method: M,
@@ -482,7 +483,7 @@ impl KnownArgs {
 }
 
 impl DataArgs {
-    /// Refuses outputs that cannot be written, before a search that may take minutes.
+    /// Checks that the outputs can be written, before a search that may take minutes.
     fn check(&self) -> Result<()> {
         for (path, ending) in [(&self.out, "json"), (&self.report, "html")] {
             let Some(path) = path else { continue };
@@ -495,30 +496,29 @@ impl DataArgs {
         Ok(())
     }
 
-    /// Options for reading the recordings.
+    /// Returns the columns and times to read from the recordings.
     fn source(&self, trim: Option<(f64, f64)>) -> Result<Source> {
         let columns: Columns = self.columns.parse()?;
         Ok(Source { columns: columns.with_rate(self.rate)?, trim })
     }
 
-    /// Identifies, writes and prints.
+    /// Fits by `method`, writes the result to the output files and prints it.
     fn find<M: Method>(&self, method: M, task: &Task, notes: Vec<String>) -> Result<()> {
         let out = self.outputs();
         let mut found = out.search(|news| method.identify(task, news))?;
         found.done.splice(0..0, notes);
         let is_trusted = found.fits != Some(false) && found.converged;
-        out.give(&found.json()?, is_trusted, || tell::<M>(&found), || M::page(&found))
+        out.finish(&found.json()?, is_trusted, || print_found::<M>(&found), || M::page(&found))
     }
 
-    /// Files and form of the results.
     fn outputs(&self) -> Out<'_> {
         let (result, report) = (self.out.as_deref(), self.report.as_deref());
         Out { result, report, json: self.json, verbose: self.verbose }
     }
 }
 
-/// Prints tables and verdict.
-fn tell<M: Method>(found: &Identified<M::Details>) {
+/// Prints the estimates with their standard deviations, and the verdict on the fit.
+fn print_found<M: Method>(found: &Identified<M::Details>) {
     if !(found.parameters.is_empty() && found.measurement.is_empty()) {
         print_estimates(&[&found.parameters, &found.measurement]);
     }

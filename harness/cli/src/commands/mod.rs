@@ -33,9 +33,8 @@ pub mod torque;
 pub mod variables;
 pub mod view;
 
-/// The FMU that commands drive unless another is named.
+/// Name of the FMU that commands use unless `--fmu` names another.
 pub const DEFAULT_FMU: &str = "HubSlosh";
-/// Default folder of a campaign.
 pub const DEFAULT_CAMPAIGN: &str = "dist/campaign";
 
 /// Options of commands that make many runs.
@@ -49,17 +48,19 @@ pub struct RunsArgs {
     pub fmu: PathBuf,
 }
 
-/// Opens the FMU that `--fmu` names, and says what that has changed.
+/// Opens the FMU that `--fmu` names. A library that changes this process when it is loaded, such as its
+/// rounding mode, causes a warning.
 pub fn open(name: &Path) -> Result<Fmu> {
     open_with(name, &[])
 }
 
-/// The same; arrays of FMI 3.0 have the sizes that structural parameters among the settings give them.
+/// Opens an FMU as [`open`] does. Arrays of FMI 3.0 have the sizes that structural parameters among the
+/// settings give them.
 pub fn open_with(name: &Path, settings: &[(String, String)]) -> Result<Fmu> {
     opened(Fmu::open_with(crate::fmu::find(name)?, settings)?)
 }
 
-/// The same for a run: by Model Exchange if the FMU offers nothing else.
+/// Opens an FMU as [`open_with`] does, but also one that only offers Model Exchange.
 pub fn open_to_run(name: &Path, settings: &[(String, String)]) -> Result<Fmu> {
     opened(Fmu::open_to_run(crate::fmu::find(name)?, settings)?)
 }
@@ -74,7 +75,7 @@ fn opened(fmu: Fmu) -> Result<Fmu> {
     Ok(fmu)
 }
 
-/// The value of a flag `--set`.
+/// Parses the value of a flag `--set`, `NAME=VALUE`.
 fn setting(text: &str) -> Result<(String, String)> {
     let (name, value) = text
         .split_once('=')
@@ -82,12 +83,16 @@ fn setting(text: &str) -> Result<(String, String)> {
     Ok((name.trim().into(), value.trim().into()))
 }
 
-/// Fails unless a table can be written to `out`: a name ending in .csv or .parquet, or `-`.
+/// Checks that a table can be written to `out`.
+///
+/// # Errors
+///
+/// If the name neither ends in .csv or .parquet nor is `-`.
 fn check_out(out: &Path) -> Result<()> {
     if out == Path::new("-") { Ok(()) } else { table::check_ending(out) }
 }
 
-/// Writes a table and says where; to `-` it prints CSV.
+/// Writes a table and prints where it is. For `-` it prints the table itself as CSV.
 fn write_out(table: &Table, out: &Path, metadata: &BTreeMap<String, String>) -> Result<()> {
     if out == Path::new("-") {
         return terminal::quiet_if_closed(table.write_csv(terminal::stdout()));

@@ -63,7 +63,6 @@ pub struct PackArgs {
 }
 
 impl PackArgs {
-    /// Runs the command.
     pub fn run(self) -> Result<()> {
         pack::needs_source("an FMU")?;
         if self.python || self.sdist {
@@ -109,7 +108,8 @@ impl PackArgs {
 }
 
 impl PackArgs {
-    /// The sizes of --tanks and --modes, all of the FMU's; none without these options.
+    /// Returns the limits that `--tanks` and `--modes` put on all sizes of the FMU; empty without these
+    /// options.
     fn limits(&self) -> Result<Vec<Limit<'static>>> {
         let sizes = match self.model.name {
             "HubSlosh" => names::hubslosh::SIZES,
@@ -145,7 +145,8 @@ impl PackArgs {
         Ok(limits)
     }
 
-    /// Leaves the variables within the limits in a packed FMU.
+    /// Removes the variables beyond the limits from a packed FMU, and makes the parameters of `--parameters`
+    /// its start values.
     fn reduce(&self, limits: &[Limit], fmu: &Path) -> Result<()> {
         if limits.is_empty() {
             return Ok(());
@@ -178,7 +179,7 @@ fn fmi(text: &str) -> Result<Fmi> {
     }
 }
 
-/// Packs for this machine's platform.
+/// Packs an FMU with the binary for this machine's platform.
 pub fn native(model: &Model, fmi: Fmi, out: &Path) -> Result<()> {
     pack::pack(model, fmi, out)?;
     done!("packed {}", out.display());

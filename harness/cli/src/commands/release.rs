@@ -9,7 +9,6 @@ use pack::{Model, release};
 
 use crate::progress;
 
-/// Default folder of the release.
 const DEFAULT_RELEASE: &str = "dist/release";
 
 /// Builds and checks the files of a release for all platforms.
@@ -34,7 +33,6 @@ pub struct ReleaseArgs {
 }
 
 impl ReleaseArgs {
-    /// Runs the command.
     pub fn run(self) -> Result<()> {
         pack::needs_source("a release")?;
         let models = self.model.map_or(&pack::MODELS[..], std::slice::from_ref);
@@ -52,17 +50,21 @@ impl ReleaseArgs {
     }
 }
 
-/// The report of `hubslosh check` on the FMU; fails with it if there are errors.
+/// Returns the report of `hubslosh check` on an FMU.
+///
+/// # Errors
+///
+/// If the check finds errors; the message is the report.
 fn checked(fmu: &Path) -> Result<String> {
     let program = std::env::current_exe().context("this program cannot find itself")?;
     let options = Options { program, only: vec![], limit: Duration::from_secs(60) };
-    let bar = progress::of_rules()?;
+    let bar = progress::rules_bar()?;
     let mut report = check::check(fmu, &options, |rules| {
         bar.set_length(rules as u64);
         bar.inc(1);
     })?;
     bar.finish_and_clear();
-    // not where it happened to lie while it was checked
+    // The report names the FMU, not the temporary folder in which it was checked.
     report.path = fmu.file_name().unwrap_or_default().into();
     let text = report.text();
     match report.count_findings(Severity::Error) {

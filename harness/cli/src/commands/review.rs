@@ -25,7 +25,6 @@ pub struct ReviewArgs {
 }
 
 impl ReviewArgs {
-    /// Runs the command.
     pub fn run(self) -> Result<()> {
         let own = std::env::current_exe().context("this program cannot find itself")?;
         let out = self.out.unwrap_or_else(|| self.plan.with_extension("html"));
@@ -56,7 +55,8 @@ impl ReviewArgs {
     }
 }
 
-/// Returns the places to look for Python: the environment of this command, then PATH.
+/// Returns the Python programs to try: that in the folder of this command (its environment), then those on
+/// PATH.
 fn pythons(own: &Path) -> Vec<PathBuf> {
     let near = own.with_file_name(if cfg!(windows) { "python.exe" } else { "python3" });
     [near, "python3".into(), "python".into()].to_vec()

@@ -92,7 +92,6 @@ pub struct RunArgs {
 }
 
 impl RunArgs {
-    /// Runs the command.
     pub fn run(self) -> Result<()> {
         check_out(&self.out)?;
         let mut settings = match &self.parameters {
@@ -151,22 +150,22 @@ impl RunArgs {
         }
         let named: Vec<String> =
             run.input.iter().chain(run.others.iter().map(|(name, _)| name)).cloned().collect();
-        // at rest, but for what is set
+        // The bench is at rest, except for what the settings say.
         let rest = rest::moving_starts(description).into_iter().map(|name| (name, "0".into()));
         let settings: Vec<_> = rest.chain(run.settings.iter().cloned()).collect();
         let parameters = run::parameters(description, &settings, &named);
         let columns = match self.columns.is_empty() {
-            // what is driven stands in the table anyway
+            // Driven inputs are in the table anyway.
             true => default_columns(description, &parameters),
             false => whole_names(self.columns),
         };
         if let Some(i) = (1..columns.len()).find(|i| columns[..*i].contains(&columns[*i])) {
             bail!("--columns names {} twice", columns[i]);
         }
-        // time and what is driven stand in the table anyway
+        // Time and driven inputs are in the table anyway.
         let columns = run.columns_with(&[], columns.iter().map(String::as_str));
         let asked = columns.len();
-        // read along, to say at the end whether the model still meant something
+        // Also recorded, to say at the end whether the model stayed within its range of validity.
         let range = Range::of(description, &mut instance)?;
         let tanks = Tanks::of(description, &mut instance, self.tension.unwrap_or(WATER_TENSION))?;
         if self.tension.is_some() && tanks.is_none() {
@@ -181,10 +180,10 @@ impl RunArgs {
         let needs = wave.into_iter().chain(forces.iter().map(String::as_str));
         let columns =
             run.columns_with(&columns, needs.chain(limits.needs()).chain(sensors.needs()));
-        // the table, its copy for --columns, and what is written: 25 characters for a number
+        // Memory for the table, its copy for `--columns`, and what is written: 25 characters for a number.
         let all = columns.len() + sensors.columns().len();
         guard::allow((run.steps() * (all + 3) * 50) as u64 + run.course_bytes());
-        let bar = progress::of_steps()?;
+        let bar = progress::steps_bar()?;
         bar.set_length(run.steps() as u64);
         let table = run.drive(&mut instance, &columns, |steps| bar.inc(steps))?;
         bar.finish_and_clear();
@@ -223,9 +222,9 @@ impl RunArgs {
     }
 }
 
-/// Returns the columns to record by default. For the bench these are four signals; for another FMU all numeric outputs and the
-/// slosh angles, as in a campaign. `hubslosh view` also needs the states of the bench's modes after the first, and the liquid
-/// left in draining tanks.
+/// Returns the columns to record by default. For the bench these are four signals; for another FMU all
+/// numeric outputs and the slosh angles, as in a campaign. `hubslosh view` also needs the states of the
+/// bench's modes after the first, and the liquid left in draining tanks.
 fn default_columns(
     description: &ModelDescription,
     parameters: &BTreeMap<String, String>,
@@ -240,7 +239,8 @@ fn default_columns(
     names
 }
 
-/// Names from what stands between commas: that in `inertia[1,2]` is part of the name.
+/// Joins the parts of a text that was split at commas where a comma belongs to an index, as in
+/// `inertia[1,2]`.
 fn whole_names(parts: Vec<String>) -> Vec<String> {
     let mut names: Vec<String> = Vec::new();
     for part in parts {

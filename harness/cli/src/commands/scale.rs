@@ -116,7 +116,6 @@ struct TankAtRest {
 }
 
 impl ScaleArgs {
-    /// Runs the command.
     pub fn run(self) -> Result<()> {
         let found = match self.what {
             Scale::Thesis => scaling::thesis_found(),
@@ -150,7 +149,7 @@ impl ScaleArgs {
             }
         };
         match self.json {
-            true => terminal::say_json(&found.json)?,
+            true => terminal::print_json(&found.json)?,
             false => print!("{}", found.text),
         }
         Ok(())

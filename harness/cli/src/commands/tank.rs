@@ -94,7 +94,6 @@ enum Model {
 }
 
 impl TankArgs {
-    /// Runs the command.
     pub fn run(self) -> Result<()> {
         ensure!(
             self.gravity.is_finite() && self.gravity >= 0.0,
@@ -117,7 +116,7 @@ impl TankArgs {
             Some(fill) => {
                 let data = parameters::solve(&tank, fill, self.modes, self.liquid());
                 let data = data.with_context(read)?;
-                // The table has those of a given surface tension, and --parameters warns of its own.
+                // The table is for a given surface tension, and `--parameters` has its own warning.
                 let has_table = !(self.json || self.out.is_some()) && data.capillarity.is_some();
                 if self.parameters.is_none() && !has_table {
                     let found = parameters::surface_tension_warnings(&data, self.liquid());
@@ -181,7 +180,8 @@ impl TankArgs {
         }
     }
 
-    /// The file of --parameters and what stands in it.
+    /// Returns the path of `--parameters` with the text of the file, in the format of its ending; `None`
+    /// without the option. `make` computes the parameters for a target FMU.
     fn set_file(
         &self,
         make: impl Fn(Target, Liquid) -> Result<ParameterSet, Problems>,

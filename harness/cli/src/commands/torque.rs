@@ -46,11 +46,10 @@ pub struct TorqueArgs {
 }
 
 impl TorqueArgs {
-    /// Runs the command.
     pub fn run(self) -> Result<()> {
         if self.profiles {
             match self.json {
-                true => terminal::say_json(&profile::list())?,
+                true => terminal::print_json(&profile::list())?,
                 false => print!("{}", profile::table()),
             }
             return Ok(());

@@ -30,14 +30,13 @@ pub struct VariablesArgs {
     pub fmu: PathBuf,
 }
 
-/// Characters to which a column is filled; longer cells push the next ones to the right.
+/// Characters to which a column is padded; a longer cell pushes the next ones to the right.
 const WIDEST: usize = 80;
 
-/// Items of an enumeration that are listed.
+/// Number of items of an enumeration that are listed at most.
 const ITEMS: usize = 50;
 
 impl VariablesArgs {
-    /// Runs the command.
     pub fn run(self) -> Result<()> {
         let fmu = fmu::find(&self.fmu)?;
         let description = &ModelDescription::from_fmu(&fmu)?;
@@ -49,7 +48,9 @@ impl VariablesArgs {
         };
         if self.json && description.variables.iter().any(|v| wanted(&v)) {
             let chosen = description.variables.iter().filter(wanted);
-            return terminal::say_json(&chosen.map(|v| object(description, v)).collect::<Vec<_>>());
+            return terminal::print_json(
+                &chosen.map(|v| object(description, v)).collect::<Vec<_>>(),
+            );
         }
         let rows: Vec<[String; 6]> =
             description.variables.iter().filter(wanted).map(|v| row(description, v)).collect();
@@ -82,7 +83,7 @@ impl VariablesArgs {
     }
 }
 
-/// All that the FMU says of a variable.
+/// Returns all that the FMU's description says about a variable as a JSON object.
 fn object(description: &ModelDescription, variable: &Variable) -> Value {
     let attributes = variable.attributes();
     let own = description.unit(variable);
@@ -91,7 +92,7 @@ fn object(description: &ModelDescription, variable: &Variable) -> Value {
         .display_units(variable)
         .iter()
         .map(|unit| (unit.name.clone(), json!({ "factor": unit.factor, "offset": unit.offset })));
-    // numbers as numbers: what is written in the FMU is exact
+    // Numbers become JSON numbers; the digits are those in the FMU.
     let value = |text: &Option<String>| {
         let text = text.as_ref()?;
         Some(match description.value(variable, text) {
@@ -117,7 +118,8 @@ fn object(description: &ModelDescription, variable: &Variable) -> Value {
     })
 }
 
-/// Name, causality, start, unit, range (of an enumeration its items), meaning.
+/// Returns the row of a variable in the table: name, causality, start, unit, range (of an enumeration its
+/// items) and description.
 fn row(description: &ModelDescription, variable: &Variable) -> [String; 6] {
     let attributes = variable.attributes();
     let items = description.items(variable);

@@ -55,7 +55,6 @@ pub struct ViewArgs {
 }
 
 impl ViewArgs {
-    /// Runs the command.
     pub fn run(self) -> Result<()> {
         let out = self.out.clone().unwrap_or_else(|| self.run.with_extension("html"));
         ensure!(
@@ -68,7 +67,7 @@ impl ViewArgs {
         let notes = if is_parquet { table::metadata(&self.run)? } else { BTreeMap::new() };
         let name = match &self.fmu {
             Some(fmu) => fmu.clone(),
-            None => notes.get("model").map(PathBuf::from).or_else(|| model_of(&there)).with_context(|| {
+            None => notes.get("model").map(PathBuf::from).or_else(|| find_model(&there)).with_context(|| {
                 format!(
                     "{}: its columns are of no FMU of this project ({}): name the FMU that made it by --fmu",
                     self.run.display(),
@@ -123,13 +122,22 @@ impl ViewArgs {
     }
 }
 
-/// The page of a campaign's stored run.
-pub fn of_stored(description: &ModelDescription, file: &Path, title: &str) -> Result<String> {
+/// Makes the page of a run that a campaign has stored in `file`. The parameters come from the file's
+/// metadata.
+///
+/// # Errors
+///
+/// If the file cannot be read or its metadata are damaged.
+pub fn page_of_stored_run(
+    description: &ModelDescription,
+    file: &Path,
+    title: &str,
+) -> Result<String> {
     let notes = table::metadata(file)?;
     let parameters = serde_json::from_str(notes.get("parameters").map_or("{}", String::as_str))
         .with_context(|| format!("{}: its metadata are damaged", file.display()))?;
     let names = table::names(file)?;
-    // readings of sensors are no variables: the picture has no place for them
+    // Readings of sensors are not variables, so the picture has no place for them.
     let known = |n: &&str| *n == "time" || description.variables.iter().any(|v| v.name == *n);
     let names: Vec<&str> = names.iter().map(String::as_str).filter(known).collect();
     let table = Table::read(file, &names)?;
@@ -145,8 +153,8 @@ pub fn of_stored(description: &ModelDescription, file: &Path, title: &str) -> Re
     Ok(page.html)
 }
 
-/// The FMU of this project whose variables the columns are.
-fn model_of(columns: &[String]) -> Option<PathBuf> {
+/// Returns the path of the project's FMU whose variables the columns are; `None` if no FMU fits.
+fn find_model(columns: &[String]) -> Option<PathBuf> {
     let any = |beginning: &str| columns.iter().any(|name| name.starts_with(beginning));
     let name = match () {
         () if any(SLOSH_ANGLE) || any(TAU_CMD) => "HubSlosh",
@@ -157,11 +165,15 @@ fn model_of(columns: &[String]) -> Option<PathBuf> {
     Some(name.into())
 }
 
-/// The rows between two times.
+/// Returns the rows with a time from `from` to `to`, s.
+///
+/// # Errors
+///
+/// If there are fewer than two such rows.
 fn part(table: &Table, from: Option<f64>, to: Option<f64>) -> Result<Table> {
     let time = table.column("time").unwrap_or_default();
     let (from, to) = (from.unwrap_or(f64::NEG_INFINITY), to.unwrap_or(f64::INFINITY));
-    // a time that is written with fewer digits than it has is meant
+    // The limit may have been written with fewer digits than the time in the table.
     let kept: Vec<usize> =
         (0..time.len()).filter(|k| time[*k] >= from - 1e-9 && time[*k] <= to + 1e-9).collect();
     if kept.len() < 2 && time.len() > 1 {
@@ -179,13 +191,13 @@ fn part(table: &Table, from: Option<f64>, to: Option<f64>) -> Result<Table> {
     Ok(Table::new(table.names().to_vec(), table.names().iter().map(column).collect()))
 }
 
-/// Points of a drawn contour's segment, and masses at which the surface's height is computed.
+/// Number of points on a segment of a drawn contour, and of masses at which the surface's height is computed.
 const POINTS: usize = 24;
 
-/// Steps of the radius over which a mode's surface is given.
+/// Number of radial steps at which the surface of a mode is given.
 const STEPS: usize = 80;
 
-/// Parses `--tank [N:]FILE`.
+/// Parses `--tank [N:]FILE` and reads the drawing of the tank.
 fn drawing(text: &str) -> Result<(usize, Drawing)> {
     let (number, path) = match text.split_once(':') {
         Some((number, path)) if number.parse::<usize>().is_ok() => (number.parse()?, path),
@@ -221,7 +233,7 @@ fn drawing(text: &str) -> Result<(usize, Drawing)> {
             (number, Drawing { name, outline: Outline::Revolved(points), levels, surfaces })
         }
         Geometry::Box { length_x, length_y } => {
-            // open at the top: as high as it is long
+            // A tank that is open at the top is drawn as high as it is long.
             let top = length_x.max(*length_y);
             let most = top * length_x * length_y * tank.density;
             let outline = Outline::Box([*length_x, *length_y, 0.0, top]);
@@ -231,7 +243,8 @@ fn drawing(text: &str) -> Result<(usize, Drawing)> {
     })
 }
 
-/// Elevations at equal steps of the radius, over that at the outer wall.
+/// Interpolates a mode's surface elevation to equal steps of the radius, divided by the elevation at the
+/// outer wall. `shape` has pairs of radius and elevation.
 fn equally_spaced(shape: &[[f64; 2]]) -> Vec<f64> {
     let (first, last) = (shape[0], shape[shape.len() - 1]);
     let at = |i: usize| {

@@ -17,7 +17,7 @@ use parquet::schema::types::ColumnDescriptor;
 
 use crate::foreign::Foreign;
 
-/// Rows that are decoded at once.
+/// Number of rows decoded at a time.
 const BATCH: usize = 1 << 16;
 
 /// Type of a column.
@@ -28,12 +28,12 @@ enum Kind {
     Integer {
         is_signed: bool,
     },
-    /// Ticks since 1970, so many a second.
+    /// Timestamp in ticks since 1970; the field is the number of ticks in a second.
     Date(i64),
 }
 
 impl Kind {
-    /// Returns the type of a column; `None` for one that is not read here.
+    /// Returns the type of a column; `None` for a type that only the Python package reads.
     fn from_column(column: &ColumnDescriptor) -> Option<Kind> {
         let logical = match (column.logical_type_ref(), column.converted_type()) {
             (Some(LogicalType::Timestamp(stamp)), _) => Some(Kind::Date(match stamp.unit {
@@ -59,17 +59,18 @@ impl Kind {
     }
 }
 
-/// Columns that were read, NaN where a value is missing.
+/// Columns that were read; NaN marks missing values.
 pub struct Found {
-    /// Values of each wanted column.
     pub columns: Vec<Vec<f64>>,
-    /// The first row's date in RFC 3339, if the times are dates: they count from that row, in seconds.
+    /// Date of the first row in RFC 3339, if the times are dates. The times then count from that row, in
+    /// seconds.
     pub origin: Option<String>,
 }
 
-/// Paths of the columns, `a.b` within a structure.
+/// Lists the paths of the columns; `a.b` is the column b within the structure a.
 ///
 /// # Errors
+///
 /// If the file cannot be read.
 pub fn names(path: &Path) -> Result<Vec<String>> {
     guarded(|| {
@@ -79,28 +80,32 @@ pub fn names(path: &Path) -> Result<Vec<String>> {
     })
 }
 
-/// The key-value metadata.
+/// Returns the key-value metadata.
 ///
 /// # Errors
+///
 /// If the file is not complete.
 pub fn metadata(path: &Path) -> Result<BTreeMap<String, String>> {
     guarded(|| Ok(pairs(&open(path)?)))
 }
 
-/// The library that wrote the file, if the file names it.
+/// Returns the name of the library that wrote the file, if the file has it.
 ///
 /// # Errors
+///
 /// If the file is not complete.
 pub fn writer(path: &Path) -> Result<Option<String>> {
     guarded(|| Ok(open(path)?.metadata().file_metadata().created_by().map(String::from)))
 }
 
-/// Reads the columns at the places that `positions` finds among the names of all. `time` is the place of the time among them, with the
-/// seconds of the unit that is stated for it: integers need one, and timestamps have their own. Columns at which `booleans` is true
-/// may hold true and false.
+/// Reads columns. `positions` selects them among the names of all columns of the file. `time` is the position
+/// of the time among the selected ones, with the seconds of the unit that is stated for it: integers need
+/// one, and timestamps have their own. Columns at which `booleans` is true may hold true and false.
 ///
 /// # Errors
-/// If the file cannot be read, or another unit is stated for timestamps than theirs; [`Foreign`] for types that are not read here.
+///
+/// If the file cannot be read, or another unit is stated for timestamps than theirs; [`Foreign`] for types
+/// that are not read here.
 pub fn read(
     path: &Path,
     positions: impl Fn(&[String]) -> Result<Vec<usize>>,
@@ -206,7 +211,8 @@ fn pairs(reader: &SerializedFileReader<File>) -> BTreeMap<String, String> {
     pairs.map(|pair| (pair.key.clone(), pair.value.clone().unwrap_or_default())).collect()
 }
 
-/// Appends the values of a column of a type and a level of definition; dates count from the first.
+/// Appends the values of a column to `into`. `level` is the definition level at which a value is present.
+/// Dates are counted from `first`, which the first row sets.
 fn values(
     reader: ColumnReader,
     rows: usize,
@@ -236,7 +242,7 @@ fn values(
     }
 }
 
-/// Appends `rows` values, a batch at a time; a missing one becomes NaN.
+/// Appends `rows` values to `into`, a batch at a time. A missing value becomes NaN.
 fn batches<T: DataType>(
     mut reader: ColumnReaderImpl<T>,
     rows: usize,

@@ -1,5 +1,5 @@
-//! Sizes that the pages of a column state, checked before the Parquet library allocates them: a header of some bytes
-//! may claim 2 GB.
+//! Sizes that the pages of a column claim, checked before the Parquet library allocates memory for them: a
+//! header of a few bytes may claim 2 GB.
 
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
@@ -7,17 +7,18 @@ use std::io::{Read, Seek, SeekFrom};
 use anyhow::{Context, Result, ensure};
 use files::budget;
 
-/// Largest page, bytes: 500 times what writers make.
+/// Largest page that is accepted, bytes: 500 times the size that common writers use.
 const LARGEST: u64 = 512 << 20;
-/// Longest header of a page, bytes: its statistics are two numbers.
+/// Longest page header that is accepted, bytes. A header is short, because its statistics are two numbers.
 const HEADER: u64 = 1 << 16;
-/// Deepest structure within a header.
+/// Deepest nesting of structures within a header.
 const DEEPEST: usize = 16;
 
-/// Checks the pages in `length` bytes from `start` of a file of `size` bytes.
+/// Checks the pages in the `length` bytes from `start` of a file with `size` bytes.
 ///
 /// # Errors
-/// If a header is damaged, or the pages are larger than the budget.
+///
+/// If a header is damaged, or the pages are larger than the memory budget.
 pub fn check(mut file: &File, start: u64, length: u64, size: u64) -> Result<()> {
     let end = start.checked_add(length).filter(|end| *end <= size);
     let end = end.context("it lies outside the file")?;
@@ -46,14 +47,14 @@ pub fn check(mut file: &File, start: u64, length: u64, size: u64) -> Result<()> 
     Ok(())
 }
 
-/// A `PageHeader` in Thrift's compact protocol.
+/// Reader of a `PageHeader` in Thrift's compact protocol.
 struct Header<'a> {
     bytes: &'a [u8],
     at: usize,
 }
 
 impl Header<'_> {
-    /// Bytes of the page, decompressed and as they are stored.
+    /// Returns the size of the page in bytes, decompressed and as it is stored.
     fn sizes(&mut self) -> Result<(u64, u64)> {
         let (mut inflated, mut stored) = (None, None);
         let mut id = 0_i64;
@@ -91,7 +92,8 @@ impl Header<'_> {
         Ok((value >> 1) as i64 ^ -((value & 1) as i64))
     }
 
-    /// Number and type of the next field; `None` at the end of a structure.
+    /// Reads the number and type of the next field; `None` at the end of a structure. `last` is the number of
+    /// the field before, because numbers are stored as differences.
     fn field(&mut self, last: i64) -> Result<Option<(i64, u8)>> {
         let byte = self.byte()?;
         if byte == 0 {
@@ -122,7 +124,7 @@ impl Header<'_> {
                     count => u64::from(count),
                 };
                 for _ in 0..count {
-                    // an element of a list of truths has a byte
+                    // In a list of Booleans each element takes one byte.
                     match byte & 15 {
                         1 | 2 => drop(self.byte()?),
                         kind => self.skip(kind, depth + 1)?,

@@ -1,5 +1,5 @@
-//! `--columns time=t,tau_cmd=T_cmd:mNm,omega=gyro_z:deg/s`: which column of a file is which signal, in what
-//! unit.
+//! `--columns time=t,tau_cmd=T_cmd:mNm,omega=gyro_z:deg/s`: which column of a file holds which signal, and in
+//! which unit.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -9,24 +9,21 @@ use anyhow::{Context, Error, Result, bail, ensure};
 
 use super::unit::Quantity;
 
-/// A column of a file.
+/// A column of a file. Its name is that in the file, or `#3` for the third column.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Column {
-    /// Name in the file, or `#3`: the third.
     pub name: String,
-    /// Unit, if it is given.
     pub unit: Option<String>,
 }
 
-/// Signals by name, each with its column.
+/// Signals by name, each with its column, and the rate (rows per second) of files without a time column.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Columns {
     of: BTreeMap<String, Column>,
-    /// Rows a second, of files without times.
     rate: Option<f64>,
 }
 
-/// The signals that recordings may have, with what they measure.
+/// Signals that a recording of the bench may have, with their quantities.
 pub const SIGNALS: [(&str, Quantity); 10] = [
     ("time", Quantity::Time),
     ("tau_cmd", Quantity::Torque),
@@ -40,10 +37,11 @@ pub const SIGNALS: [(&str, Quantity); 10] = [
     ("force", Quantity::Force),
 ];
 
-/// Quantity of a signal.
+/// Returns the quantity of a signal.
 ///
 /// # Errors
-/// If there is no such signal.
+///
+/// If no signal has this name.
 pub fn quantity(signal: &str) -> Result<Quantity> {
     let known = SIGNALS.iter().find(|(name, _)| *name == signal).map(|(_, quantity)| *quantity);
     known.with_context(|| {
@@ -55,13 +53,14 @@ pub fn quantity(signal: &str) -> Result<Quantity> {
 impl FromStr for Columns {
     type Err = Error;
 
-    /// The error lists everything that is wrong with it.
+    /// Parses the items between commas. The error lists every item that is wrong.
     fn from_str(text: &str) -> Result<Self> {
         Columns::parse(text.split(','), one)
     }
 }
 
-/// `SIGNAL=COLUMN[:UNIT]`; what follows the last colon is the unit.
+/// Parses `SIGNAL=COLUMN[:UNIT]` for a signal of the bench. The text after the last colon is the unit, which
+/// must fit the signal's quantity.
 fn one(item: &str) -> Result<(String, Column)> {
     let (signal, column) = named(item)?;
     let quantity = quantity(&signal)?;
@@ -75,7 +74,7 @@ fn one(item: &str) -> Result<(String, Column)> {
     Ok((signal, column))
 }
 
-/// The same, of any signal and unit.
+/// Parses `NAME=COLUMN[:UNIT]` for a signal of any name and a unit of any quantity.
 fn named(item: &str) -> Result<(String, Column)> {
     let Some((signal, column)) = item.split_once('=') else {
         bail!("\"{item}\" is not SIGNAL=COLUMN or SIGNAL=COLUMN:UNIT")
@@ -101,10 +100,12 @@ impl fmt::Display for Columns {
 }
 
 impl Columns {
-    /// Columns of an FMU's variables, `NAME=COLUMN[:UNIT]`, not split at commas.
+    /// Parses columns for the variables of an FMU, `NAME=COLUMN[:UNIT]`. Items are not split at commas,
+    /// because names like `p[1,2]` contain them.
     ///
     /// # Errors
-    /// All that is wrong with them.
+    ///
+    /// Lists all items that are wrong.
     pub fn of_variables<'a>(items: impl IntoIterator<Item = &'a str>) -> Result<Self> {
         Columns::parse(items, named)
     }
@@ -127,10 +128,11 @@ impl Columns {
         Ok(Columns { of: columns, rate: None })
     }
 
-    /// The same for files without times, whose rows come this many times a second.
+    /// Sets the rate of files without times, in rows per second.
     ///
     /// # Errors
-    /// If that is not a positive number.
+    ///
+    /// If the rate is not a positive number.
     pub fn with_rate(self, rate: Option<f64>) -> Result<Self> {
         if let Some(rate) = rate {
             ensure!(
@@ -141,12 +143,11 @@ impl Columns {
         Ok(Columns { rate, ..self })
     }
 
-    /// Rows a second, if the files have no times.
     pub fn rate(&self) -> Option<f64> {
         self.rate
     }
 
-    /// The column of a signal; the one of its own name unless another is given.
+    /// Returns the column of a signal: the given one, otherwise the column with the signal's own name.
     pub fn of(&self, signal: &str) -> Column {
         let own = || Column { name: signal.into(), unit: None };
         self.of.get(signal).cloned().unwrap_or_else(own)
@@ -157,7 +158,7 @@ impl Columns {
         self.of.contains_key(signal)
     }
 
-    /// The signals whose columns were given.
+    /// Lists the signals whose columns were given.
     pub fn signals(&self) -> impl Iterator<Item = &str> {
         self.of.keys().map(String::as_str)
     }

@@ -1,4 +1,4 @@
-//! Rows on an even grid, for what needs one: spectra, Allan variances.
+//! Resampling to an even time grid, for methods that need one: spectra, Allan variances.
 
 use anyhow::{Result, ensure};
 use files::budget;
@@ -6,18 +6,20 @@ use files::budget;
 use super::SHORT;
 use crate::table::Table;
 
-/// Part of the step by which times may be off the grid and count as on it.
+/// Fraction of the step by which a time may be off the grid and still count as on it.
 const OFF: f64 = 1e-3;
-/// Part of the record that may be missing and is joined by lines.
+/// Fraction of the rows that may be missing and are interpolated linearly.
 const MISSING: f64 = 0.01;
-/// Rows of the grid for each row of the table, at most.
+/// Largest number of rows of the grid for each row of the table.
 const MOST_ROWS: f64 = 10.0;
 
-/// The table on an even grid, and its step, s. Values of rows that lie on one are as they are; else they are
-/// joined by lines, over gaps too, as long as these are little of the whole. `done` hears it.
+/// Puts a table on an even time grid, and returns the step, s, with the table. Rows on the grid keep their
+/// values; between them values are interpolated linearly, also over gaps as long as few rows are missing.
+/// `done` receives messages about that.
 ///
 /// # Errors
-/// If time does not grow, or if too much is missing.
+///
+/// If time does not grow, or if too many rows are missing.
 pub fn even(table: Table, done: &mut dyn FnMut(String)) -> Result<(f64, Table)> {
     even_with_gaps(table, MISSING, done)
 }
@@ -59,9 +61,9 @@ pub fn even_with_gaps(
         100.0 * most_missing
     );
     let lost = time.windows(2).filter(|pair| pair[1] - pair[0] > 1.5 * usual).count();
-    // the whole number of steps that is nearest
+    // The nearest whole number of steps.
     let count_of = ((last - first) / usual).round().max(1.0);
-    // whatever the spacing, the grid has no more rows than fit
+    // The number of rows of the grid is limited, whatever the spacing of the times.
     ensure!(
         count_of <= MOST_ROWS * rows as f64,
         "its rows are {usual:e} s apart mostly, and {count_of:.1e} of these steps are in the {:.3e} s of it: they make no even \

@@ -1,12 +1,14 @@
-//! Recordings: signals in SI units from files that others wrote. Text in columns and Parquet are read here; the Python
-//! package converts other kinds to text ([`crate::foreign`]). [`Columns`], a row of units or the names of the columns (`gyro_z [deg/s]`,
-//! `gyro_z_dps`) give the signal and the unit of each column; a unit that none of them states is SI's, which the output states, or the file is
-//! refused where that is implausible.
+//! Recordings: signals in SI units from files that others wrote. Text in columns and Parquet are read here;
+//! the Python package converts other kinds to text ([`crate::foreign`]). [`Columns`], a row of units or the
+//! names of the columns (`gyro_z [deg/s]`, `gyro_z_dps`) give the signal and the unit of each column. Without
+//! a stated unit a column is taken to be in SI units, which a message says, or the file is refused where that
+//! is implausible.
 //!
-//! The rows of a recording are those with a value of one signal, its rows' signal. Where another one has none,
-//! because it is slower or was lost, it is completed: held, or joined by lines. Nothing is resampled. Times that are
-//! printed to few digits are put back onto their even grid ([`stamps`]). Files of inputs ([`read_inputs`]) are read by the same
-//! rules, with every row as it is.
+//! The rows of a recording are those with a value of one signal, the rows' signal. Other signals may lack
+//! values in these rows, because they are slower or values were lost; they are completed by holding the last
+//! value or by linear interpolation. Nothing is resampled. Times that were printed with few digits are put
+//! back onto their even grid ([`stamps`]). Files of inputs ([`read_inputs`]) are read by the same rules, but
+//! keep all rows.
 
 mod columns;
 mod even;
@@ -34,12 +36,12 @@ struct Header {
     names: Vec<String>,
     /// Names as they are in the file.
     full: Vec<String>,
-    /// Units in a row below the names; `None` for a column without one.
+    /// Units from a row below the names; `None` for a column without one.
     row: Vec<Option<String>>,
 }
 
 impl Header {
-    /// Makes a header of the names of all columns and of a row of units.
+    /// Makes a header from the names of all columns and, if there is one, the row of units.
     fn from_names(names: Vec<String>, row: Option<&Vec<String>>) -> Header {
         let mut header = Header { names: Vec::new(), full: Vec::new(), row: Vec::new() };
         for (k, name) in names.into_iter().enumerate() {
@@ -52,7 +54,7 @@ impl Header {
         header
     }
 
-    /// Columns without a name are called by their numbers.
+    /// Adds columns without a name up to the number `width`; they are called `#4`, `#5`, … by their numbers.
     fn widen(&mut self, width: usize) {
         for k in self.names.len()..width {
             self.names.push(format!("#{}", k + 1));
@@ -61,7 +63,8 @@ impl Header {
         }
     }
 
-    /// Position of a column: by its name as it is in the file, without a unit in brackets, or without any unit of that dimension.
+    /// Finds the position of a column by its name as it is in the file, by the name without a unit in
+    /// brackets, or by the name without any unit of `dimension`.
     fn place(&self, column: &str, dimension: Option<Dimension>) -> Result<usize> {
         let number = column.strip_prefix('#').and_then(|number| number.parse::<usize>().ok());
         if let Some(place) = number.filter(|n| (1..=self.names.len()).contains(n)) {
@@ -87,7 +90,8 @@ impl Header {
         }
     }
 
-    /// Unit of a signal in its column, and the factor to the unit in which it is wanted; `None` if the file states none.
+    /// Returns the unit of a signal in its column, and the factor to the unit in which the signal is wanted;
+    /// `None` if the file states no unit.
     fn unit(&self, place: usize, signal: &Signal) -> Result<Option<(String, f64)>> {
         let row = match &self.row[place] {
             Some(unit) => Some((unit.clone(), factor(signal, unit)?)),
@@ -116,7 +120,8 @@ impl Header {
         }
     }
 
-    /// Columns of whole seconds and of the rest of a second, with the factor of the rest: `stamp.sec`, `stamp.nanosec`.
+    /// Finds pairs of columns with whole seconds and with the rest of a second, such as `stamp.sec` and
+    /// `stamp.nanosec`, with the factor from the rest to seconds.
     fn halves(&self) -> Vec<(usize, usize, f64)> {
         const RESTS: [(&str, f64); 3] = [
             ("nanoseconds nanosecs nanosec nsecs nsec ns", 1e-9),
@@ -144,7 +149,7 @@ impl Header {
     }
 }
 
-/// Name and unit of `torque [mNm]` or `torque (mNm)`.
+/// Splits `torque [mNm]` or `torque (mNm)` into name and unit.
 fn bracketed(name: &str) -> Option<(&str, &str)> {
     let (open, close) = match name.chars().last()? {
         ']' => ('[', ']'),
@@ -153,7 +158,7 @@ fn bracketed(name: &str) -> Option<(&str, &str)> {
     };
     let (bare, unit) = name.rsplit_once(open)?;
     let (bare, unit) = (bare.trim(), unit.trim_end_matches(close).trim());
-    // data(3) is a name
+    // `data(3)` is a name.
     let number = unit.chars().all(|c| c.is_ascii_digit());
     (!bare.is_empty() && !number).then_some((bare, unit))
 }
@@ -161,55 +166,58 @@ fn bracketed(name: &str) -> Option<(&str, &str)> {
 /// Treatment of a signal in rows without a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Between {
-    /// The last value, as of a command that is held.
+    /// Keep the last value, as for a command that is held.
     Held,
-    /// A line from the last value to the next.
+    /// Interpolate linearly from the last value to the next.
     Line,
-    /// Nothing: it stays NaN.
+    /// Leave NaN.
     Missing,
 }
 
-/// A signal that is wanted of a recording.
+/// A signal that is to be read from a recording.
 #[derive(Clone, Copy, Debug)]
 pub struct Signal<'a> {
     /// One of [`SIGNALS`], or a variable of an FMU.
     pub name: &'a str,
-    /// It must be there.
+    /// True if a file without the signal is an error.
     pub required: bool,
     /// Treatment of rows without a value.
     pub between: Between,
-    /// The unit in which its values are wanted, and in which they are where the file names none; `None`: SI.
+    /// Unit in which the values are returned, and which is assumed where the file states none; `None`: SI.
     pub unit: Option<&'a str>,
 }
 
 /// Signals to read in addition to time.
 #[derive(Clone, Copy, Debug)]
 pub struct Wanted<'a> {
-    /// The first is the rows' signal, unless it may be missing ([`Between::Missing`]).
+    /// The first one is the rows' signal, unless it may be missing ([`Between::Missing`]).
     pub signals: &'a [Signal<'a>],
-    /// Columns of the signals.
     pub columns: &'a Columns,
 }
 
-/// Times from here on, s, are counted from the recording's beginning: seconds since 1970, say.
+/// Times later than this, s, are counted from the beginning of the recording, because they are probably
+/// seconds since 1970.
 const LATE: f64 = 1e6;
-/// Latest time whose unit may be unstated, s since 1970: the year 5138. Milliseconds since 1970 are later.
+/// Latest time that may have no stated unit, s since 1970: the year 5138. Milliseconds since 1970 are later.
 const LATEST: f64 = 1e11;
-/// Time between rows, s, from which on a unit must be stated: slosh has periods of a second.
+/// Time between rows, s, above which a unit must be stated: slosh has periods of about a second.
 const SLOWEST: f64 = 1.0;
-/// The same, up to which one must be stated: no slosh is recorded at 20 kHz, and rows at 50 Hz in days are 2e-7 apart.
+/// Time between rows, s, below which a unit must be stated: no slosh is recorded at 20 kHz, but rows at 50 Hz
+/// with times in days are 2e-7 apart.
 const FASTEST: f64 = 5e-5;
-/// Largest magnitude of a value in SI: its fourth power, which statistics take, is finite in sums over all rows.
+/// Largest magnitude of a value in SI. Its fourth power, which statistics need, is finite in sums over all
+/// rows.
 const LARGEST: f64 = 1e60;
-/// Rows that a slow signal may miss in succession, in units of its usual spacing, and at least [`SHORT`].
+/// Longest gap of a slow signal that is completed, in units of the signal's usual spacing. Gaps up to
+/// [`SHORT`] are always completed.
 const LOST: f64 = 10.0;
-/// Spacing, in units of the usual one, from which on a value in between must have been lost.
+/// Spacing, in units of the usual one, above which a value must have been lost.
 const LATE_BY: f64 = 1.5;
-/// Time over which any signal may be completed, s.
+/// Gap that is completed in any signal, s.
 const SHORT: f64 = 0.25;
 
-/// Returns every column of a file by its name there, with the place among `signals` of the one that it is: it has the signal's name,
-/// with a unit or without.
+/// Lists every column of a file by its name there, with the position in `signals` of the signal that the
+/// column holds. A column holds the signal of its name, with or without a unit.
 pub fn assigned(path: &Path, signals: &[Signal]) -> Result<Vec<(String, Option<usize>)>> {
     let file = opened(path, File::open)?;
     let header = file.header();
@@ -223,9 +231,11 @@ pub fn assigned(path: &Path, signals: &[Signal]) -> Result<Vec<(String, Option<u
     Ok(found)
 }
 
-/// Reads a recording: `time` (s) and the signals that are there, in SI units. `done` hears what was done to it.
+/// Reads a recording: `time` (s) and those of the wanted signals that are there, in SI units. `done` receives
+/// messages about what was converted or completed.
 ///
 /// # Errors
+///
 /// If the file cannot be read so. The error lists all faults of its columns.
 pub fn read(path: &Path, wanted: &Wanted, done: &mut dyn FnMut(String)) -> Result<Table> {
     let name = path.display().to_string();
@@ -233,11 +243,12 @@ pub fn read(path: &Path, wanted: &Wanted, done: &mut dyn FnMut(String)) -> Resul
     opened(path, |path| read_as(path, wanted, None, &mut done))
 }
 
-/// Reads a recording that errors call `name`, if it is text in columns or Parquet; `None` for one of another kind, which the
-/// Python package converts.
+/// Reads a recording if it is text in columns or Parquet; `None` for other kinds, which the Python package
+/// converts. `name` is the file's name in errors, because `path` may be temporary.
 ///
 /// # Errors
-/// If a file of these kinds cannot be read so. The error lists all faults of its columns.
+///
+/// If the file cannot be read so. The error lists all faults of its columns.
 pub fn read_here(
     path: &Path,
     name: &Path,
@@ -250,10 +261,11 @@ pub fn read_here(
     }
 }
 
-/// Reads histories of inputs: `time` (s) and the signals, every row as it is. Those among `booleans` may be `true` and `false`, which
-/// are 1 and 0. Rows may come at any times, and each must have every value.
+/// Reads histories of inputs: `time` (s) and the signals, with all rows. Signals in `booleans` may be `true`
+/// and `false`, which become 1 and 0. Rows may be unevenly spaced, and each must have every value.
 ///
 /// # Errors
+///
 /// If the file cannot be read so.
 pub fn read_inputs(
     path: &Path,
@@ -268,7 +280,7 @@ pub fn read_inputs(
     Ok(table)
 }
 
-/// A file that is read here.
+/// A file of a kind that is read here, with its header.
 enum File {
     Text(text::Layout),
     Parquet(Header),
@@ -290,7 +302,8 @@ impl File {
     }
 }
 
-/// Has `work` read a file, or the text to which the Python package converts it.
+/// Lets `work` read a file, or the text to which the Python package converts the file if it is of another
+/// kind.
 fn opened<T>(path: &Path, mut work: impl FnMut(&Path) -> Result<T>) -> Result<T> {
     let read = match work(path) {
         Err(error) if error.is::<Foreign>() => {
@@ -301,7 +314,7 @@ fn opened<T>(path: &Path, mut work: impl FnMut(&Path) -> Result<T>) -> Result<T>
     read.with_context(|| format!("{} cannot be used", path.display()))
 }
 
-/// Reads a recording, or with `inputs`, of which those are Booleans, histories of inputs.
+/// Reads a recording, or histories of inputs if `inputs` is given; it then lists those that are Booleans.
 fn read_as(
     path: &Path,
     wanted: &Wanted,
@@ -310,8 +323,7 @@ fn read_as(
 ) -> Result<Table> {
     let file = File::open(path)?;
     let header = file.header();
-    // time first, then the signals that are there
-    // a table of times alone has no signal
+    // Time first, then the signals that are there. A table of times alone has no signal.
     let rows_signal = wanted.signals.first().map_or("time", |signal| signal.name);
     let time_signal = Signal { name: "time", required: true, between: Between::Line, unit: None };
     let counted = wanted.columns.rate();
@@ -398,7 +410,7 @@ fn read_as(
     );
     let time = header.full[places[0]].as_str();
     let timed = counted.is_none();
-    // seconds and the rest of them in two columns are one time
+    // Whole seconds and the rest of a second in two columns are one time.
     let half = halves.iter().find(|(whole, rest, _)| {
         timed && (places[0] == *whole && stated.is_none_or(|s| s == 1.0) || places[0] == *rest)
     });
@@ -433,7 +445,7 @@ fn read_as(
                 header.full[*whole], header.full[*rest]
             ));
         } else if time == header.full[*rest] {
-            // a time of its own
+            // The file has a time of its own.
             columns[0] = part;
         }
     }
@@ -487,7 +499,8 @@ fn read_as(
     Ok(Table::new(names, columns))
 }
 
-/// Times of whole seconds and parts of them, s, from the first whole second, which comes first; `None` if they are not.
+/// Joins whole seconds and the rest of a second (times `factor`, s) to one time. Returns the first whole
+/// second, from which the times count, and the times, s; `None` if the columns are something else.
 fn joined(whole: &[f64], part: &[f64], factor: f64) -> Option<(f64, Vec<f64>)> {
     let first = *whole.first()?;
     let fine =
@@ -497,7 +510,11 @@ fn joined(whole: &[f64], part: &[f64], factor: f64) -> Option<(f64, Vec<f64>)> {
         .then(|| (first, all().map(|(whole, part)| whole - first + part * factor).collect()))
 }
 
-/// Fails if times whose unit is not stated are none in seconds: milliseconds, days.
+/// Checks that times without a stated unit can be seconds.
+///
+/// # Errors
+///
+/// If they look like milliseconds or days.
 fn plausible(time: &[f64]) -> Result<()> {
     if let Some(late) = time.iter().find(|t| t.abs() > LATEST) {
         bail!(
@@ -511,7 +528,7 @@ fn plausible(time: &[f64]) -> Result<()> {
     if usual == 0.0 {
         usual = (time[time.len() - 1] - time[0]) / steps.len() as f64;
     }
-    // to six digits
+    // Compared with six digits.
     let shown: f64 = format!("{usual:.5e}").parse().unwrap_or(usual);
     ensure!(
         usual < SLOWEST && (usual > FASTEST || usual <= 0.0),
@@ -520,13 +537,14 @@ fn plausible(time: &[f64]) -> Result<()> {
     Ok(())
 }
 
-/// Unit that is taken for a signal whose file states none; `None` for an FMU's variable without a unit.
+/// Returns the unit that is assumed for a signal whose file states none; `None` for a variable of an FMU
+/// without a unit.
 fn unstated<'a>(signal: &Signal<'a>) -> Option<&'a str> {
     let own = signal.unit.or_else(|| Some(quantity(signal.name).ok()?.unit()));
     own.filter(|unit| !unit.is_empty())
 }
 
-/// Dimension of a signal and the value in SI of the unit in which it is wanted.
+/// Returns the dimension of a signal, and the value in SI of the unit in which it is wanted.
 fn dimension(signal: &Signal) -> Option<(Dimension, f64)> {
     match signal.unit {
         Some(unit) => unit::dimension_of(unit),
@@ -534,7 +552,11 @@ fn dimension(signal: &Signal) -> Option<(Dimension, f64)> {
     }
 }
 
-/// Factor from a unit to the one in which a signal is wanted.
+/// Returns the factor from `unit` to the unit in which a signal is wanted.
+///
+/// # Errors
+///
+/// If `unit` is not a unit of the signal's quantity.
 fn factor(signal: &Signal, unit: &str) -> Result<f64> {
     let Some(own) = signal.unit else {
         let quantity = quantity(signal.name)?;
@@ -542,12 +564,17 @@ fn factor(signal: &Signal, unit: &str) -> Result<f64> {
             format!("\"{unit}\" is not a unit of {quantity} (allowed: {})", quantity.units())
         });
     };
-    // an FMU that names no unit gives no reason to convert
+    // Without a unit in the FMU there is no reason to convert.
     let known = if own.is_empty() { Some(1.0) } else { conversion(unit, own) };
     known.with_context(|| format!("\"{unit}\" cannot be converted to {}'s \"{own}\"", signal.name))
 }
 
-/// The rows with a value of the rows' signal; the other signals completed there.
+/// Selects the rows with a value of the rows' signal, and completes the other signals there by their
+/// [`Between`].
+///
+/// # Errors
+///
+/// If a gap is too long to complete.
 fn complete(
     signals: &[Signal],
     mut columns: Vec<Vec<f64>>,
@@ -623,7 +650,7 @@ fn complete(
                 };
             }
         }
-        // before its first value and, unless it is held a usual spacing longer, after its last
+        // Before its first value and after its last; a held signal lasts for one usual spacing longer.
         let last = there[there.len() - 1];
         for k in (0..there[0]).chain(last + 1..rows) {
             let holds = k > last && signal.between == Between::Held && time[k] - time[last] < usual;

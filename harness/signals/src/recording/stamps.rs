@@ -1,46 +1,44 @@
-//! Times that a logger printed to a few digits, put back onto the even grid that they come from.
+//! Times that a logger printed with few digits, put back onto the even grid that they come from.
 //!
-//! A logger at 33 Hz that prints milliseconds writes 0.030, 0.061, 0.091. Each stamp is off by up to half a millisecond, and a
-//! torque that is moved by so much is wrong by more than a gyro's noise. If one even grid, rows left out or not, gives every
-//! stamp within its rounding, that grid is what the logger had.
+//! A logger at 33 Hz that prints milliseconds writes 0.030, 0.061, 0.091. Each stamp is wrong by up to half a
+//! millisecond, and a torque that is shifted by so much causes larger errors than a gyro's noise. If one even
+//! grid, possibly with rows left out, explains every stamp within its rounding, that is the logger's grid.
 
-/// An even grid under printed times.
+/// An even grid that explains printed times: the unit of their last digit, the step, and the times, all in s.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grid {
-    /// The unit of the last digit, s.
     pub quantum: f64,
-    /// Time between rows, s.
     pub step: f64,
-    /// The times, s.
     pub time: Vec<f64>,
 }
 
-/// Most decimals of a printed time, s.
+/// Largest number of decimals of a printed time in s.
 const DECIMALS: i32 = 6;
-/// Part of the quantum by which a time may be off a whole number of them: times since 1970 have 52 binary digits.
+/// Fraction of the quantum by which a time may differ from a multiple of it: times since 1970 have only 52
+/// binary digits.
 const OFF: f64 = 1e-2;
-/// Part of the quantum by which the spread of the stamps about the grid may exceed it.
+/// Fraction of the quantum by which the spread of the stamps about the grid may exceed the quantum.
 const BEYOND: f64 = 0.02;
-/// Fewest rows.
+/// Least number of rows from which a grid is estimated.
 const FEWEST: usize = 20;
 
 /// Relation between the times of a recording and an even grid.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Stamps {
-    /// On an even grid anyway, or on none that explains them.
+    /// The times are already even, or no grid explains them.
     AsTheyAre,
-    /// Rounded times of a grid.
+    /// The times are rounded times of a grid.
     On(Grid),
-    /// Times that several rows share, of which the true ones are not known; the reason.
+    /// Several rows share one time, so the true times are unknown; the field is the reason.
     Unknown(String),
 }
 
-/// Relative error of a grid's step up to which it is taken: that of a logger's clock, which every recording has.
+/// Largest accepted relative error of a grid's step. Every logger's clock has an error of this size.
 const LARGEST_ERROR: f64 = 1e-4;
-/// Part of the rows that share their time with the row before from which on the times are not those of the rows.
+/// Fraction of rows with the same time as the row before, above which the times are not those of the rows.
 const SHARED: f64 = 0.05;
 
-/// Returns the grid under times, s.
+/// Finds the even grid of which `time` (s) are rounded times.
 pub fn regular(time: &[f64]) -> Stamps {
     if time.len() < FEWEST || !time.iter().all(|t| t.is_finite()) {
         return Stamps::AsTheyAre;
@@ -67,7 +65,7 @@ pub fn regular(time: &[f64]) -> Stamps {
     }
 }
 
-/// The even grid that explains rounded times, and the relative error that its step may have.
+/// Returns the even grid that explains rounded times, and the largest relative error that its step may have.
 fn grid(time: &[f64]) -> Option<(Grid, f64)> {
     let quantum = quantum(time)?;
     let units: Vec<f64> = time.iter().map(|t| ((t - time[0]) / quantum).round()).collect();
@@ -78,7 +76,7 @@ fn grid(time: &[f64]) -> Option<(Grid, f64)> {
     let mut sorted = steps.clone();
     let middle = (steps.len() - 1) / 2;
     let usual = *sorted.select_nth_unstable_by(middle, f64::total_cmp).1;
-    // nothing was rounded
+    // No time was rounded.
     if steps.iter().all(|step| *step > 0.0 && (step / usual).fract() == 0.0) {
         return None;
     }
@@ -99,8 +97,9 @@ fn grid(time: &[f64]) -> Option<(Grid, f64)> {
     Some((grid, uncertainty(&units, &counts, step) / step))
 }
 
-/// How far the step may be from `step`, in quanta, such that a grid still explains all stamps: the spread of the stamps about the
-/// grid is a convex function of the step.
+/// Returns by how much the step may differ from `step`, in quanta, such that a grid still explains all
+/// stamps. The spread of the stamps about the grid is a convex function of the step, which makes the bounds
+/// unique.
 fn uncertainty(units: &[f64], counts: &[f64], step: f64) -> f64 {
     let spread = |step: f64| {
         let off = units.iter().zip(counts).map(|(unit, count)| unit - step * count);
@@ -123,7 +122,7 @@ fn uncertainty(units: &[f64], counts: &[f64], step: f64) -> f64 {
     reach(1.0).max(reach(-1.0))
 }
 
-/// A quantum in words.
+/// Formats a quantum (s) for messages, in s, ms or us.
 pub fn words(quantum: f64) -> String {
     match quantum {
         q if q >= 1.0 => format!("{q} s"),
@@ -132,7 +131,7 @@ pub fn words(quantum: f64) -> String {
     }
 }
 
-/// The largest power of ten, s, of which all times are multiples.
+/// Returns the largest power of ten, s, of which all times are multiples.
 fn quantum(time: &[f64]) -> Option<f64> {
     (0..=DECIMALS).map(|k| 10_f64.powi(-k)).find(|quantum| {
         let off = |t: &f64| {
@@ -143,7 +142,8 @@ fn quantum(time: &[f64]) -> Option<f64> {
     })
 }
 
-/// The row numbers, offset and step of the grid that explains all stamps (in quanta), from first row numbers.
+/// Improves the row numbers of the stamps (in quanta) iteratively, and returns them with offset and step of
+/// the grid that explains all stamps; `None` if no grid does.
 fn fitted(units: &[f64], mut counts: Vec<f64>) -> Option<(Vec<f64>, f64, f64)> {
     let n = units.len() as f64;
     let mean = |x: &[f64]| x.iter().sum::<f64>() / n;
@@ -163,7 +163,7 @@ fn fitted(units: &[f64], mut counts: Vec<f64>) -> Option<(Vec<f64>, f64, f64)> {
         if grows && high - low <= 1.0 + BEYOND {
             return Some((counts, from, step));
         }
-        // rows of less than a quantum cannot be counted by their stamps
+        // Rows that are less than a quantum apart cannot be counted from their stamps.
         if step < 1.0 {
             return None;
         }

@@ -1,6 +1,6 @@
-//! Numbers in columns of text: separated by semicolons, tabs, commas or blanks, with decimal points or commas, lines of comment, lines
-//! above the header, a row of units below it, dates or clock times as time. The first lines of a file show its layout. Columns of text
-//! are skipped.
+//! Reads numbers in columns of text: separated by semicolons, tabs, commas or blanks, with decimal points or
+//! commas, comment lines, lines above the header, a row of units below it, dates or clock times as time. The
+//! layout is detected in the first lines of a file. Columns of text are skipped.
 
 use std::borrow::Cow;
 use std::collections::BTreeSet;
@@ -16,16 +16,16 @@ use super::Header;
 use super::time::{Moment, Times, moment};
 use crate::parquet_file::Found;
 
-/// Lines from which separator and header are detected.
+/// Number of lines from which separator and header are detected.
 const SAMPLE: usize = 200;
-/// Faults that are named before the rest is only counted.
+/// Number of faults that are reported one by one; the others are only counted.
 const NAMED: usize = 5;
 /// Separators, in the order in which they are preferred.
 const SEPARATORS: [(u8, &str); 4] =
     [(b';', "semicolons"), (b'\t', "tabs"), (b',', "commas"), (b' ', "blanks")];
-/// Beginnings of lines of comment.
+/// Prefixes of comment lines.
 const COMMENTS: [&str; 3] = ["#", "%", "//"];
-/// Missing values, and what C's library and spreadsheets print for NaN.
+/// Words for missing values, including those that C libraries and spreadsheets print for NaN.
 const MISSING: &str = "nan na n/a #n/a null none - -- nat -nan nan(ind) -nan(ind) 1.#qnan -1.#qnan 1.#ind -1.#ind #nv #div/0!";
 
 /// Value of a field.
@@ -34,18 +34,19 @@ enum Value {
     Number(f64),
     Time(Moment),
     Missing,
-    /// A number or a time that can be read in two ways, or in none; the reason.
+    /// A number or a time that can be read in two ways, or in none; the field is the reason.
     Ambiguous(String),
     Other,
 }
 
 impl Value {
-    /// Returns true for a number or a time.
+    /// Returns true for a number or a time, also an ambiguous one.
     fn is_there(&self) -> bool {
         !matches!(self, Value::Missing | Value::Other)
     }
 
-    /// Reads a field; `decimal` is the decimal sign of the fields before.
+    /// Parses a field. `decimal` is the decimal sign of the fields before, and is set by the first number
+    /// that has one.
     fn parse(field: &str, separator: u8, decimal: &mut Option<char>) -> Value {
         match number(field, separator, decimal) {
             Ok(Some(number)) => Value::Number(number),
@@ -63,9 +64,10 @@ impl Value {
     }
 }
 
-/// The number of a field; `None`: it is not one.
+/// Parses a field as a number; `None` if it is not one.
 ///
 /// # Errors
+///
 /// If it can be read in two ways, or has another decimal sign than the fields before.
 fn number(field: &str, separator: u8, decimal: &mut Option<char>) -> Result<Option<f64>, String> {
     if !field.contains(|c: char| c.is_ascii_digit()) {
@@ -84,7 +86,7 @@ fn number(field: &str, separator: u8, decimal: &mut Option<char>) -> Result<Opti
             name(before)
         ));
     }
-    // quotes around a comma are about the columns' separator: "1,234"
+    // Quotes around a field with a comma show that the comma is not the separator: "1,234".
     if let (b',', Some((whole, rest)), None) = (separator, text.split_once(','), *decimal)
         && rest.len() == 3
         && (1..4).contains(&whole.trim_start_matches(['-', '+']).len())
@@ -97,7 +99,7 @@ fn number(field: &str, separator: u8, decimal: &mut Option<char>) -> Result<Opti
     Ok(value.is_finite().then_some(value))
 }
 
-/// The number of a Boolean.
+/// Parses a Boolean as 1 or 0.
 fn truth(field: &str) -> Result<f64, String> {
     match field.to_ascii_lowercase().as_str() {
         "true" => Ok(1.0),
@@ -106,14 +108,14 @@ fn truth(field: &str) -> Result<f64, String> {
     }
 }
 
-/// The lines of a file, divided into fields, without comments and empty ones.
+/// The lines of a file, split into fields; comments and empty lines are skipped. `count` is the number of
+/// lines so far, `comment` the fields of the last comment.
 struct Lines {
     reader: csv::Reader<File>,
     record: ByteRecord,
     separator: u8,
     /// Lines so far.
     count: usize,
-    /// Fields of the last comment, without its sign.
     comment: Vec<String>,
 }
 
@@ -126,7 +128,6 @@ impl Lines {
         Ok(Lines { reader, record: ByteRecord::new(), separator, count: 0, comment: Vec::new() })
     }
 
-    /// Goes to the next line; false at the end.
     fn next(&mut self) -> Result<bool> {
         while self.reader.read_byte_record(&mut self.record)? {
             ensure!(
@@ -160,7 +161,8 @@ impl Lines {
         self.record.position().map_or(0, csv::Position::line)
     }
 
-    /// The fields without blanks around them; names in an old code page have � for ° and µ.
+    /// Returns the fields of the line without surrounding blanks. In files with an old code page, ° and µ
+    /// become �.
     fn fields(&self) -> Vec<Cow<'_, str>> {
         let all =
             self.record.iter().map(|field| match String::from_utf8_lossy(field.trim_ascii()) {
@@ -171,22 +173,21 @@ impl Lines {
     }
 }
 
-/// First lines of a file under one separator.
+/// First lines of a file, split by one of the separators.
 struct Sample {
     separator: (u8, &'static str),
-    /// Number, fields and values of each line.
+    /// Line number, fields and values of each line.
     lines: Vec<(u64, Vec<String>, Vec<Value>)>,
-    /// The comment before the first line.
     comment: Vec<String>,
     width: usize,
-    /// Places of the columns that hold text, not numbers or times.
+    /// Positions of the columns that hold text instead of numbers or times.
     texts: Vec<usize>,
-    /// Places of the rows.
+    /// Positions in `lines` of the rows of values.
     rows: Vec<usize>,
 }
 
 impl Sample {
-    /// Reads the first lines; rows have at least `least` fields.
+    /// Reads the first lines of a file. Rows must have at least `least` fields.
     fn read(path: &Path, separator: (u8, &'static str), least: usize) -> Result<Sample> {
         let mut file = Lines::open(path, separator.0)?;
         let (mut lines, mut comment) = (Vec::new(), Vec::new());
@@ -199,7 +200,7 @@ impl Sample {
                 fields.iter().map(|field| Value::parse(field, separator.0, &mut None)).collect();
             lines.push((file.number(), fields, values));
         }
-        // lines with a value somewhere are rows, or a row of units with a 1
+        // Lines with a value somewhere are rows; a row of units may contain a 1, too.
         let valued = |(_, _, values): &&(u64, _, Vec<Value>)| {
             values.len() >= least && values.iter().any(Value::is_there)
         };
@@ -235,18 +236,22 @@ pub(super) struct Layout {
     separator: u8,
     /// Names and units of its columns.
     pub header: Header,
-    /// Lines before the first row.
+    /// Number of lines before the first row.
     above: usize,
     /// Notes on the detected layout.
     pub notes: Vec<String>,
-    /// Names of the columns that hold text, as the end of the message that a column is missing.
+    /// End of the message that a column is missing: the names of columns that hold text.
     pub texts: String,
 }
 
 impl Layout {
-    /// Detects the layout of a file.
+    /// Detects the layout of a file: separator, header, units and first row.
+    ///
+    /// # Errors
+    ///
+    /// If no separator gives rows of numbers.
     pub fn detect(path: &Path) -> Result<Self> {
-        // a table of times alone has one column
+        // A table of times alone has one column.
         let mut tried = Vec::new();
         for (separator, least) in
             SEPARATORS.map(|of| (of, 2)).into_iter().chain([(SEPARATORS[2], 1)])
@@ -258,7 +263,8 @@ impl Layout {
             let line = fields.join(&char::from(separator).to_string());
             line.chars().take(60).collect::<String>()
         };
-        // the separator by which most lines are rows; columns of text count only where no separator does without
+        // Chooses the separator by which most lines are rows. Columns of text count only if every separator
+        // has them.
         let key = |sample: &&Sample| (sample.width > 1, sample.texts.is_empty(), sample.rows.len());
         let usable = tried
             .iter()
@@ -297,7 +303,7 @@ impl Layout {
                     "line {line}, \"{}\", is neither a row of numbers nor a header (allowed: names above the rows)",
                     start(fields, separator.0)
                 );
-                // separators at the end of each row
+                // Each row ends with separators.
                 let is_empty = |k: usize| rows.iter().all(|row| lines[*row].1[k].is_empty());
                 while width > names.len() && is_empty(width - 1) && fields.len() < width {
                     width -= 1;
@@ -353,8 +359,12 @@ impl Layout {
         Ok(Layout { separator: separator.0, header, above: at, notes, texts: shown })
     }
 
-    /// Reads the columns at these places, that of the time first if the file has `times`: dates and clock times are
-    /// allowed there. `true` and `false` are allowed where `booleans` is true. NaN where a value is missing.
+    /// Reads the columns at the positions `places`. If `times`, the first one is the time and may hold dates
+    /// and clock times. `true` and `false` are allowed where `booleans` is true. NaN marks missing values.
+    ///
+    /// # Errors
+    ///
+    /// If a field is not a number, or can be read in two ways; the error names the lines.
     pub fn read(
         &self,
         path: &Path,

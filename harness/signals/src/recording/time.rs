@@ -1,8 +1,9 @@
-//! Times as dates and clock times: the one parser of times in text.
+//! Times as dates and clock times: the only parser of times in text.
 //!
-//! Dates by ISO 8601 (also without signs), 2026/01/31, 31.01.2026, 31-Jan-2026, Jan 31, 2026, and with slashes or dashes in the
-//! order that the file shows; clocks of 24 and 12 hours with any decimals, `12:00:00:020`; offsets from UTC as Z, UTC, +01:00,
-//! +0100, +01; durations as `1 days 00:00:00.02`. What can be read in two ways is an error.
+//! Dates by ISO 8601 (also without signs), 2026/01/31, 31.01.2026, 31-Jan-2026, Jan 31, 2026, and with
+//! slashes or dashes in the order that the file shows; clocks of 24 and 12 hours with any decimals,
+//! `12:00:00:020`; offsets from UTC as Z, UTC, +01:00, +0100, +01; durations as `1 days 00:00:00.02`. A text
+//! that can be read in two ways is an error.
 
 use chrono::{DateTime, Datelike as _, NaiveDate, NaiveTime, Timelike as _};
 
@@ -13,26 +14,26 @@ const DAY: i64 = 86_400 * SECOND;
 /// A date, or a clock time without one.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Moment {
-    /// Nanoseconds since 1970, UTC unless the text says otherwise.
+    /// Nanoseconds since 1970, UTC unless the text has another offset.
     Date(i64),
     /// Nanoseconds since midnight.
     Clock(i64),
-    /// A date whose order is not known, and the nanoseconds since its midnight.
+    /// A date with an unknown order of day and month, and nanoseconds since its midnight.
     Ordered(Ordered, i64),
 }
 
-/// A date as 3/4/2026: day or month first.
+/// A date such as 3/4/2026, in which day or month may be first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ordered {
     first: u32,
     second: u32,
     year: i32,
-    /// True for a year of two digits, which may as well stand first.
+    /// True for a year with two digits, which may also be first.
     is_short: bool,
 }
 
 impl Ordered {
-    /// Days since 1970.
+    /// Returns days since 1970.
     fn day(self, day_first: bool) -> Result<i64, String> {
         let Ordered { first, second, year, .. } = self;
         let (day, month) = if day_first { (first, second) } else { (second, first) };
@@ -47,15 +48,17 @@ fn days(year: i32, month: u32, day: u32) -> Result<i64, String> {
     Ok(i64::from(date.num_days_from_ce()) - 719_163) // 1 January 1970
 }
 
-/// Months by the beginnings of their English names.
+/// First letters of the English names of months.
 const MONTHS: [&str; 12] =
     ["jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec"];
 const WEEKDAYS: [&str; 7] = ["mon", "tue", "wed", "thu", "fri", "sat", "sun"];
 
-/// The moment of a field; `None` for a text that is none.
+/// Parses a field as a date or a clock time; `None` if it is neither.
 ///
 /// # Errors
-/// If it is one that cannot be read, or in two ways: the reason, to stand after the field.
+///
+/// If it is one that cannot be read, or that can be read in two ways. The error is the reason, worded to
+/// follow the field.
 pub fn moment(field: &str) -> Result<Option<Moment>, String> {
     if field.len() < 4
         || field.len() > 60
@@ -64,7 +67,7 @@ pub fn moment(field: &str) -> Result<Option<Moment>, String> {
         return Ok(None);
     }
     let Some(colon) = field.find(':') else { return basic(field) };
-    // decimal commas, as Python's logging writes them
+    // Decimal commas are written by Python's logging.
     let bytes = field.as_bytes();
     let decimal = field.rfind(',').filter(|at| {
         *at > colon
@@ -89,7 +92,7 @@ pub fn moment(field: &str) -> Result<Option<Moment>, String> {
     if before.is_empty() {
         return Ok(Some(Moment::Clock(time - offset)));
     }
-    // pandas and Python: 1 days 00:00:00.02; 1 day, 0:00:00.02
+    // Durations of pandas and Python: 1 days 00:00:00.02; 1 day, 0:00:00.02.
     if let Some((count, word)) = before.split_once(' ')
         && matches!(word, "day" | "days")
     {
@@ -105,7 +108,7 @@ pub fn moment(field: &str) -> Result<Option<Moment>, String> {
     })
 }
 
-/// ISO 8601 without signs, 20260131T120000.020.
+/// Parses ISO 8601 without separators, such as 20260131T120000.020.
 fn basic(field: &str) -> Result<Option<Moment>, String> {
     let Some((day, clock)) = field.split_once(['T', ' ', '_']) else { return Ok(None) };
     let is_number = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
@@ -122,7 +125,7 @@ fn basic(field: &str) -> Result<Option<Moment>, String> {
     })
 }
 
-/// A clock time with its half of the day, and its offset from UTC, ns.
+/// Splits a clock time into the time with its half of the day (am, pm) and the offset from UTC, ns.
 fn zoned(clock: &str) -> Result<Option<(String, i64)>, String> {
     let end = clock.find(|c: char| !matches!(c, '0'..='9' | ':' | '.')).unwrap_or(clock.len());
     let (time, rest) = clock.split_at(end);
@@ -138,7 +141,7 @@ fn zoned(clock: &str) -> Result<Option<(String, i64)>, String> {
         _ => ("", lower.as_str()),
     };
     let zone = zone.strip_prefix("utc").or_else(|| zone.strip_prefix("gmt")).unwrap_or(zone);
-    // chrono reads an offset after a date
+    // chrono reads an offset only after a date.
     let offset = DateTime::parse_from_str(&format!("2000-01-01 0:0 {zone}"), "%Y-%m-%d %H:%M %#z");
     let offset = match (zone, offset) {
         ("" | "z", _) => 0,
@@ -153,10 +156,12 @@ fn zoned(clock: &str) -> Result<Option<(String, i64)>, String> {
     Ok(Some((format!("{time}{half}"), offset * SECOND)))
 }
 
-/// Nanoseconds since midnight of `12:00:00.020`, `12:00:00:020`, `12:00:00.020pm` and, next to a date, `12:00`.
+/// Parses a clock time to nanoseconds since midnight: `12:00:00.020`, `12:00:00:020`, `12:00:00.020pm` and,
+/// next to a date, `12:00`.
 fn clock_time(text: &str, has_date: bool) -> Result<Option<i64>, String> {
     let mut text = text.to_string();
-    // milli-, micro- or nanoseconds after a colon; not the frames of a film
+    // Three, six or nine digits after a third colon are milli-, micro- or nanoseconds; two would be frames
+    // of a film.
     if let Some((whole, part)) = text.rsplit_once(':')
         && whole.matches(':').count() == 2
         && [3, 6, 9].contains(&part.trim_end_matches(['a', 'p', 'm']).len())
@@ -169,7 +174,7 @@ fn clock_time(text: &str, has_date: bool) -> Result<Option<i64>, String> {
         (true, _) => "%I:%M:%S%.f%p",
     };
     match NaiveTime::parse_from_str(&text, format) {
-        // a leap second is no second of the day
+        // A leap second is outside the day's seconds.
         Ok(time) if i64::from(time.nanosecond()) < SECOND => {
             let seconds = i64::from(time.num_seconds_from_midnight());
             Ok(Some(seconds * SECOND + i64::from(time.nanosecond())))
@@ -182,7 +187,7 @@ fn clock_time(text: &str, has_date: bool) -> Result<Option<i64>, String> {
     }
 }
 
-/// A date.
+/// A date, or one in which day and month can be read in two ways.
 enum Day {
     /// Days since 1970.
     Known(i64),
@@ -242,13 +247,13 @@ fn date(text: &str) -> Result<Option<Day>, String> {
     }
 }
 
-/// Times of a column, counted from the first.
+/// Converts the times of a column to seconds from the first one.
 #[derive(Default)]
 pub struct Times {
     first: Option<(Moment, String)>,
-    /// The last clock time with the days that have passed, ns.
+    /// Last clock time plus the days that have passed, ns.
     last: i64,
-    /// True for days before months, once a date shows it.
+    /// True if days stand before months; unknown until a date shows the order.
     day_first: Option<bool>,
 }
 
@@ -258,10 +263,12 @@ impl Times {
         self.first.is_none()
     }
 
-    /// Seconds from the first time to this one.
+    /// Returns the seconds from the first time to this one. `field` is the text, which messages repeat. A
+    /// clock time that jumps back by more than half a day has passed midnight.
     ///
     /// # Errors
-    /// If it is of another kind, or its date can be read in two ways.
+    ///
+    /// If the time is of another kind than the first, or its date can be read in two ways.
     pub fn seconds(&mut self, moment: Moment, field: &str) -> Result<f64, String> {
         if let Moment::Ordered(Ordered { first, second, .. }, _) = moment
             && first.max(second) > 12
@@ -280,7 +287,7 @@ impl Times {
         let elapsed = match (&*first, moment) {
             (Moment::Date(first), Moment::Date(at)) => i128::from(at) - i128::from(*first),
             (Moment::Clock(first), Moment::Clock(at)) => {
-                // half a day back is a midnight
+                // A jump back by half a day or more is a midnight.
                 let days = (self.last - at + DAY / 2).div_euclid(DAY).max(0);
                 self.last = at + days * DAY;
                 i128::from(self.last) - i128::from(*first)
@@ -315,7 +322,7 @@ impl Times {
         Ok(elapsed as f64 * 1e-9)
     }
 
-    /// The first one, in words.
+    /// Returns the first time as a text: a date in RFC 3339, or the clock time as in the file.
     pub fn origin(&self) -> Option<String> {
         self.first.as_ref().map(|(moment, field)| match moment {
             Moment::Date(at) => DateTime::from_timestamp_nanos(*at).to_rfc3339(),

@@ -1,28 +1,22 @@
 //! Units in which recordings come, and their values in SI.
 //!
-//! One grammar reads a unit wherever a file states it: in brackets, in a row of units, and in the name of a column itself
-//! ([`in_name`]). A unit is a product of symbols (`mN`, `deg`, `s`) or words (`degrees`, `microseconds`) with whole exponents:
-//! `N·m`, `mN.m`, `Nm`, `m/s^2`, `m s⁻²`, `deg per sec`, `deg_s`. Which product a text means is decided by the quantity that is
-//! expected: `nm` is a torque in newton metres or a length in nanometres.
+//! One grammar reads a unit wherever a file states it: in brackets, in a row of units, and in the name of a
+//! column itself ([`in_name`]). A unit is a product of symbols (`mN`, `deg`, `s`) or words (`degrees`,
+//! `microseconds`) with whole exponents: `N·m`, `mN.m`, `Nm`, `m/s^2`, `m s⁻²`, `deg per sec`, `deg_s`. The
+//! expected quantity decides between several meanings: `nm` is newton metres for a torque and nanometres for
+//! a length.
 
 use std::fmt;
 
-/// Quantity of a signal.
+/// Quantity of a signal, which decides how its unit is read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
-    /// s.
     Time,
-    /// N·m.
     Torque,
-    /// rad/s.
     Rate,
-    /// rad.
     Angle,
-    /// m/s².
     Acceleration,
-    /// m.
     Length,
-    /// N.
     Force,
 }
 
@@ -37,7 +31,7 @@ const DEGREE: f64 = std::f64::consts::PI / 180.0;
 /// The force of a pound under standard gravity, N (0.453 592 37 kg, the international yard and pound agreement of 1959).
 const POUND: f64 = 0.453_592_37 * GRAVITY;
 
-/// A symbol: its dimension, its value in SI, and the prefixes that it takes.
+/// A symbol: its name, its dimension, its value in SI, and the prefixes that it takes.
 type Symbol = (&'static str, Dimension, f64, &'static str);
 
 const SYMBOLS: [Symbol; 20] = [
@@ -73,14 +67,15 @@ const PREFIXES: [(&str, &str, f64); 5] = [
     ("k", "kilo", 1e3),
 ];
 
-/// Words in lower case for symbols, in the singular.
+/// Words and the symbols for them, in lower case and in the singular.
 const WORDS: &str = "sec=s second=s msec=ms milli=ms usec=us micro=us nsec=ns nano=ns min=min minute=min hr=h hour=h day=d rad=rad \
     radian=rad deg=deg degree=deg rev=rev revolution=rev newton=N meter=m metre=m inch=in foot=ft lb=lbf oz=ozf";
 
-/// A product of symbols.
+/// Dimension and value in SI of a product of symbols.
 type Product = (Dimension, f64);
 
-/// The symbol of that name; with `fold` in any case.
+/// Finds the symbol `name`, also with a prefix. With `fold` the case of letters does not count, which may
+/// give several results.
 fn symbol(name: &str, fold: bool) -> Vec<Product> {
     let same = |a: &str, b: &str| if fold { a.eq_ignore_ascii_case(b) } else { a == b };
     let mut found = Vec::new();
@@ -98,7 +93,7 @@ fn symbol(name: &str, fold: bool) -> Vec<Product> {
     found
 }
 
-/// Words are the same in any case, in the plural, and with a prefix before them: `Milliseconds`.
+/// Finds a unit written as a word in any case, also in the plural and with a prefix: `Milliseconds`.
 fn word(name: &str) -> Vec<Product> {
     let lower = name.to_lowercase();
     let mut found = Vec::new();
@@ -118,11 +113,11 @@ fn word(name: &str) -> Vec<Product> {
     found
 }
 
-/// A run of letters: a symbol, a word, or two of them without a sign between (`mNm`, `inlb`).
+/// Reads a run of letters: a symbol, a word, or two of them without a sign between (`mNm`, `inlb`).
 fn run(name: &str, fold: bool) -> Vec<Product> {
     let either = |name: &str| [symbol(name, fold), word(name)].concat();
     let mut found = either(name);
-    // in capitals mega and milli are the same: both, so that neither is taken
+    // In capitals mega and milli are the same: both are returned, so that neither is taken.
     if fold && name.starts_with(['M']) && name[1..].starts_with(['n', 'N']) {
         let milli = run(&format!("m{}", &name[1..]), true);
         return milli.iter().map(|m| (m.0, 1e9 * m.1)).chain(milli.clone()).collect();
@@ -155,15 +150,15 @@ fn times(a: Product, b: Product, exponent: i8) -> Product {
     (dimension, factor)
 }
 
-/// A run of letters within a unit.
+/// A run of letters within a unit, with its exponent.
 struct Term {
     letters: String,
     exponent: i8,
-    /// True if the sign before it may stand for a product or for a quotient: `deg_s`.
+    /// True if the sign before it may stand for a product or for a quotient, as in `deg_s`.
     is_soft: bool,
 }
 
-/// The terms of a unit; `None` if a text is none.
+/// Splits a unit into terms; `None` if the text is not a unit.
 fn terms(text: &str) -> Option<Vec<Term>> {
     let text = text.replace('°', "deg").replace(['µ', 'μ', 'Μ'], "u").replace('″', "arcsec");
     let mut found: Vec<Term> = Vec::new();
@@ -212,10 +207,11 @@ fn terms(text: &str) -> Option<Vec<Term>> {
     (!found.is_empty() && !divides).then_some(found)
 }
 
-/// The products that a unit may mean. With `fold` the case of letters does not count, with `divide` soft signs divide.
+/// Returns the products that a unit may mean. With `fold` the case of letters does not count; with `divide`
+/// ambiguous signs, as in `deg_s`, are read as division.
 fn products(text: &str, fold: bool, divide: bool) -> Vec<Product> {
     let Some(terms) = terms(text).filter(|terms| terms.len() < 6) else { return Vec::new() };
-    // m/s² without the sign of division
+    // ms2 and ms-2 are m/s² without the sign of division.
     if let [Term { letters, exponent: 2 | -2, .. }] = &terms[..]
         && letters.eq_ignore_ascii_case("ms")
     {
@@ -225,7 +221,7 @@ fn products(text: &str, fold: bool, divide: bool) -> Vec<Product> {
     let is_single = terms.len() == 1;
     for term in terms {
         let exponent = if divide && term.is_soft { -term.exponent } else { term.exponent };
-        // mps2 is m/s²; dps is a symbol
+        // mps2 is m/s²; dps is a symbol.
         let whole = run(&term.letters, fold);
         if whole.is_empty() {
             let letters = &term.letters;
@@ -242,7 +238,7 @@ fn products(text: &str, fold: bool, divide: bool) -> Vec<Product> {
             found = each.collect();
             continue;
         }
-        // rads^-1 is rad/s
+        // rads^-1 is rad/s.
         let left = term.letters.strip_suffix(['s', 'S']).filter(|_| is_single && exponent < 0);
         let left = left.map(|left| run(left, fold)).unwrap_or_default();
         let each = found.iter().flat_map(|a| {
@@ -256,7 +252,8 @@ fn products(text: &str, fold: bool, divide: bool) -> Vec<Product> {
     found
 }
 
-/// Values in SI of a unit of that dimension: one for a unit, none for a text that is none, several for one that is ambiguous.
+/// Returns the values in SI of a unit of the given dimension: one value for a unit, none for a text that is
+/// not a unit, several if the text is ambiguous.
 pub(super) fn factors(text: &str, dimension: Dimension) -> Vec<f64> {
     for fold in [false, true] {
         for divide in [false, true] {
@@ -275,7 +272,7 @@ pub(super) fn factors(text: &str, dimension: Dimension) -> Vec<f64> {
     Vec::new()
 }
 
-/// Units of quantities that no signal has, by which a row of units is known.
+/// Units of quantities that no signal has, to recognise a row of units.
 const OTHERS: [&str; 42] = [
     "-", "1", "%", "V", "mV", "A", "mA", "W", "J", "ohm", "K", "C", "degC", "°C", "degF", "Pa",
     "hPa", "kPa", "MPa", "bar", "mbar", "psi", "Hz", "kHz", "l", "m/s", "km/h", "mph", "km", "T",
@@ -283,7 +280,8 @@ const OTHERS: [&str; 42] = [
     "grad",
 ];
 
-/// Returns true for the name of a unit, which may stand in brackets. The halves of a time (`nanosec`) are names of columns.
+/// Returns true for the name of a unit, which may stand in brackets. `nanosec` and similar names are columns
+/// with the rest of a second.
 pub(super) fn is_unit(text: &str) -> bool {
     let text = text.trim_matches(['[', ']', '(', ')', ' ']);
     if ["nanosec", "nanosecs", "nsec", "nsecs"].contains(&text) {
@@ -295,7 +293,7 @@ pub(super) fn is_unit(text: &str) -> bool {
     OTHERS.contains(&text) || Quantity::ALL.into_iter().any(known)
 }
 
-/// Factor from one unit to another; `None` unless both are known units of one quantity.
+/// Returns the factor from one unit to another; `None` unless both are known units of one quantity.
 pub fn conversion(from: &str, to: &str) -> Option<f64> {
     if from == to {
         return Some(1.0);
@@ -307,7 +305,7 @@ pub fn conversion(from: &str, to: &str) -> Option<f64> {
     }
 }
 
-/// Dimension and value in SI of a unit of an FMU.
+/// Returns dimension and value in SI of a unit of an FMU; `None` if it is unknown or ambiguous.
 pub(super) fn dimension_of(unit: &str) -> Option<Product> {
     match products(unit, false, false)[..] {
         [only] => Some(only),
@@ -315,21 +313,19 @@ pub(super) fn dimension_of(unit: &str) -> Option<Product> {
     }
 }
 
-/// Signs between the words of a column's name.
+/// Signs that separate the words of a column's name.
 const BETWEEN: [char; 11] = ['_', '.', ' ', '-', ',', ':', '/', '(', ')', '[', ']'];
-/// Words at the end of a name that are units and often something else: minimum, input, revision.
+/// Units at the end of a name that often have another meaning: minimum, input, revision.
 const OFTEN_OTHERS: [&str; 5] = ["min", "in", "rev", "raw", "counts"];
 
-/// A unit within the name of a column.
+/// A unit found in the name of a column: its text, its value in SI (`factor`), and the beginning of the name
+/// before it.
 #[derive(Debug, PartialEq)]
 pub(super) struct Stated {
-    /// The unit as the name writes it.
     pub text: String,
-    /// Value in SI.
     pub factor: f64,
-    /// Beginning of the name, up to the unit.
     pub before: String,
-    /// True if the name ends with the unit.
+    /// True if the unit is the end of the name.
     pub is_last: bool,
 }
 
@@ -342,11 +338,12 @@ pub(super) enum Fault {
     Two(String, String),
 }
 
-/// Finds the unit of a dimension within the name of a column: `gyro [deg/s]`, `gyro{deg/s} z`, `gyro_dps`, `gyroDegPerSec`,
-/// `gyro in deg/s`, `time_ms_boot`, `TIME_US`.
+/// Finds the unit of a dimension within the name of a column: `gyro [deg/s]`, `gyro{deg/s} z`, `gyro_dps`,
+/// `gyroDegPerSec`, `gyro in deg/s`, `time_ms_boot`, `TIME_US`.
 ///
 /// # Errors
-/// If it names a unit of another dimension, or two units.
+///
+/// If the name states a unit of another dimension, or two units.
 pub(super) fn in_name(name: &str, dimension: Dimension) -> Result<Option<Stated>, Fault> {
     let stated = |from: usize, to: usize, text: &str, factor: f64| Stated {
         text: text.trim().into(),
@@ -361,7 +358,7 @@ pub(super) fn in_name(name: &str, dimension: Dimension) -> Result<Option<Stated>
         match factors(inside, dimension)[..] {
             [factor] => {
                 let found_here = stated(from, to, inside, factor);
-                // t_ms [s]
+                // For example t_ms [s].
                 if let Ok(Some(also)) = in_name(&found_here.before, dimension)
                     && also.text.len() > 1
                     && also.factor != factor
@@ -370,7 +367,7 @@ pub(super) fn in_name(name: &str, dimension: Dimension) -> Result<Option<Stated>
                 }
                 found.push(found_here);
             }
-            // `data(3)` of a .mat file and `p[1,2]` of an FMU are names
+            // `data(3)` of a .mat file and `p[1,2]` of an FMU are names.
             [] if inside.chars().all(|c| c.is_ascii_digit() || ", ".contains(c)) => {}
             [] if !is_unit(inside) && !name[to..].trim().is_empty() => {}
             _ => other = Some(inside),
@@ -382,10 +379,10 @@ pub(super) fn in_name(name: &str, dimension: Dimension) -> Result<Option<Stated>
         let mut taken = (usize::MAX, 0);
         let mut windows: Vec<(usize, usize)> =
             starts.iter().flat_map(|from| ends.iter().map(move |to| (*from, *to))).collect();
-        // gyro in deg/s
+        // For example gyro in deg/s.
         let leads = |from: usize| name[from..].to_lowercase().starts_with("in ");
         windows.retain(|(from, to)| from < to && to - from <= 40 && !leads(*from));
-        // the longest first, of equal ones the last
+        // The longest is taken first, among equally long ones the last.
         windows.sort_by_key(|(from, to)| (std::cmp::Reverse(to - from), std::cmp::Reverse(*from)));
         for (from, to) in windows {
             let text = &name[from..to];
@@ -402,7 +399,7 @@ pub(super) fn in_name(name: &str, dimension: Dimension) -> Result<Option<Stated>
             if factors.is_empty() {
                 continue;
             }
-            // Nm_s is no torque
+            // Nm_s is not a torque.
             let rest = name[from..].trim();
             let continues = !is_last
                 && [false, true].iter().any(|divide| !products(rest, false, *divide).is_empty());
@@ -416,7 +413,7 @@ pub(super) fn in_name(name: &str, dimension: Dimension) -> Result<Option<Stated>
         }
         let is_foreign = |text: &str| {
             let minutes = dimension == Time.dimension() && text.eq_ignore_ascii_case("m");
-            // an index is no unit: omega[1]
+            // An index is not a unit: omega[1].
             let is_index = !text.contains(|c: char| c.is_alphabetic() || "%°".contains(c));
             minutes || !is_index && text.len() > 1 && !OFTEN_OTHERS.contains(&text) && is_unit(text)
         };
@@ -434,8 +431,8 @@ pub(super) fn in_name(name: &str, dimension: Dimension) -> Result<Option<Stated>
     }
 }
 
-/// Returns true if a part of a name can be a unit. A single letter is one only at the end, after a sign, and in the right case; a
-/// whole name only if it is a time (`millis`).
+/// Returns true if a part of a name can be a unit. A single letter is a unit only at the end, after a
+/// separator and in the right case; the whole name only if it is a time (`millis`).
 fn may_be_unit(name: &str, text: &str, from: usize, is_last: bool, dimension: Dimension) -> bool {
     let shouts = !name.contains(|c: char| c.is_lowercase());
     let is_time = dimension == Time.dimension();
@@ -450,14 +447,14 @@ fn may_be_unit(name: &str, text: &str, from: usize, is_last: bool, dimension: Di
     }
 }
 
-/// A name without the signs and the word "in" that lead to its unit.
+/// Returns a name without the separators and the word "in" before its unit.
 fn before(name: &str) -> &str {
     let name = name.trim_end_matches(|c| BETWEEN.contains(&c) || ['[', '(', '{', '<'].contains(&c));
     let cut = name.strip_suffix(" in").unwrap_or(name);
     cut.trim_end_matches(|c| BETWEEN.contains(&c))
 }
 
-/// Places of what stands in brackets.
+/// Finds the positions of texts in brackets.
 fn brackets(name: &str) -> Vec<(usize, usize)> {
     let mut found = Vec::new();
     for (open, close) in [('[', ']'), ('(', ')'), ('{', '}'), ('<', '>')] {
@@ -468,14 +465,15 @@ fn brackets(name: &str) -> Vec<(usize, usize)> {
             from = end;
         }
     }
-    // [rad/(s)] counts once
+    // [rad/(s)] counts once.
     let inside = |a: &(usize, usize), b: &(usize, usize)| a != b && b.0 <= a.0 && a.1 <= b.1;
     let all = found.clone();
     found.retain(|a| !all.iter().any(|b| inside(a, b)));
     found
 }
 
-/// Returns true if a word begins at a place: after a sign, or at a capital after a small letter.
+/// Returns true if a word begins at the position `at`: after a separator, or at a capital after a small
+/// letter.
 fn begins(name: &str, at: usize) -> bool {
     let (Some(left), Some(right)) = (name.get(..at), name.get(at..)) else { return false };
     let (Some(next), last) = (right.chars().next(), left.chars().next_back()) else { return false };
@@ -490,12 +488,12 @@ fn ends(name: &str, at: usize) -> bool {
     !BETWEEN.contains(&last) && next.is_none_or(|next| BETWEEN.contains(&next) || is_hump(next))
 }
 
-/// Returns true if a word begins with `next`: aB, and A before Bc.
+/// Returns true if a new word begins with the capital `next`: aB, and A before Bc.
 fn is_hump(last: char, next: char, after: Option<char>) -> bool {
     next.is_uppercase() && (!last.is_uppercase() || after.is_some_and(char::is_lowercase))
 }
 
-/// `DegPerSec` as `Deg_Per_Sec`.
+/// Inserts separators between words in mixed case: `DegPerSec` becomes `Deg_Per_Sec`.
 fn parted(text: &str) -> String {
     let mut found = String::new();
     for (at, c) in text.char_indices() {
@@ -524,7 +522,7 @@ impl Quantity {
         }
     }
 
-    /// Factor from that unit to SI; `None` for an unknown unit.
+    /// Returns the factor from a unit of this quantity to SI; `None` for an unknown unit.
     pub fn factor(self, unit: &str) -> Option<f64> {
         match factors(unit, self.dimension())[..] {
             [factor] => Some(factor),
@@ -532,7 +530,7 @@ impl Quantity {
         }
     }
 
-    /// The names of common units, the SI unit first.
+    /// Lists the names of common units for messages, the SI unit first.
     pub fn units(self) -> &'static str {
         match self {
             Time => "s, ms, us, ns, min, h, d",
@@ -545,7 +543,6 @@ impl Quantity {
         }
     }
 
-    /// The SI unit.
     pub fn unit(self) -> &'static str {
         self.units().split(',').next().unwrap_or_default()
     }

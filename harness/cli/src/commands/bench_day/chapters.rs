@@ -1,4 +1,5 @@
-//! Chapters of the report on a day that do not come from sweeps: Bond number, friction, preferential direction, gyro.
+//! Chapters of the report on a day at the bench that do not come from sweeps: Bond number, friction,
+//! preferential direction, gyro.
 
 use std::f64::consts::{PI, TAU};
 
@@ -24,7 +25,7 @@ use super::super::gyro::noise_rows;
 use super::{Day, Item, Kind};
 use crate::terminal;
 
-/// Parameters of Table 5.5 of Rubaga's thesis.
+/// Friction parameters and hub inertia in Table 5.5 of Rubaga's thesis, SI.
 const THESIS: [(&str, f64); 5] = [
     (friction::B, 0.03793),
     (friction::C, 0.003498),
@@ -36,20 +37,22 @@ const THESIS: [(&str, f64); 5] = [
 const CENTAUR: f64 = 2.0425;
 /// Standard gravity as in the thesis, m/s².
 const GRAVITY: f64 = 9.81;
-/// Points of a cloud in a figure.
+/// Largest number of points of a cloud in a figure.
 const POINTS: usize = 1500;
-/// Other starts of each unknown of the friction law.
+/// Number of random starts for the fit of the friction law.
 const STARTS: usize = 8;
-/// Largest rate of the friction curve near zero, in Stribeck speeds.
+/// Largest rate of the friction curve near zero, in Stribeck speeds ω_s.
 const NEAR: f64 = 5.0;
-/// Longest lag of the gyro's autocorrelation, s; length of a chunk as in the thesis, s, and the least number of chunks.
+/// Longest lag of the gyro's autocorrelation, s. The next constants are the length of a chunk, s, as in the
+/// thesis, and the least number of chunks in a record.
 const LAG: f64 = 10.0;
 const CHUNK: f64 = 900.0;
 const CHUNKS: f64 = 8.0;
 
-/// Returns the chapters, and the fit of friction and inertia. `problems` receives one message for each recording that cannot be used, `found` the parameters
-/// of hub and bearing.
-pub fn of(
+/// Computes the chapters of the report, and the fit of friction and inertia if there are recordings for it.
+/// `problems` receives one message for each recording that cannot be used, `found` the parameters of hub and
+/// bearing as settings for the simulation of the sweeps.
+pub fn chapters(
     day: &Day,
     fmu: &Fmu,
     problems: &mut Vec<String>,
@@ -61,7 +64,7 @@ pub fn of(
     let has_friction = !friction.is_empty();
     let all: Vec<Recording> = friction.into_iter().chain(decays).collect();
     let mut settings = nominal::with_damping(day.settings.clone());
-    // the tank is empty in these runs
+    // The tank is empty in these runs.
     settings.extend(runs::empty());
     let options = Options {
         settings,
@@ -86,7 +89,7 @@ pub fn of(
     }
     chapters.push(match &fitted {
         Some(fitted) => bearing(fitted, usable.is_some() && has_friction),
-        None => none("Friction and inertia (thesis 5.2)", Kind::Friction, problems),
+        None => missing_chapter("Friction and inertia (thesis 5.2)", Kind::Friction, problems),
     });
     let braking = fitted.as_ref().map_or(&[][..], |fitted| &fitted.details.braking);
     chapters.push(match braking {
@@ -95,14 +98,14 @@ pub fn of(
             let asymmetry = fitted.and_then(|fitted| fitted.parameters.get(friction::ASYMMETRY));
             preferential_direction(ahead, back, asymmetry)
         }
-        _ => none("Preferential direction (thesis 5.4)", Kind::Decay, problems),
+        _ => missing_chapter("Preferential direction (thesis 5.4)", Kind::Decay, problems),
     });
     chapters.push(gyro(day, problems));
     Ok((chapters, fitted))
 }
 
-/// A chapter without recordings.
-fn none(title: &str, kind: Kind, problems: &[String]) -> Chapter {
+/// Returns a chapter that says which recordings are missing, and why those that are there could not be used.
+fn missing_chapter(title: &str, kind: Kind, problems: &[String]) -> Chapter {
     let (word, needs) = match kind {
         Kind::Friction => ("friction", "ramps, steps and sweeps of the torque with the tank empty"),
         Kind::Decay => (
@@ -126,10 +129,11 @@ fn none(title: &str, kind: Kind, problems: &[String]) -> Chapter {
     }
 }
 
-/// Reads recordings with torque and rate.
+/// Reads all recordings of one kind with torque and rate. A recording that cannot be read adds a message to
+/// `problems` and is left out.
 fn bench_recordings(day: &Day, kind: Kind, problems: &mut Vec<String>) -> Vec<Recording> {
     let mut all = Vec::new();
-    for item in day.of(kind) {
+    for item in day.of_kind(kind) {
         let source = Source { columns: item.recorded.columns.clone(), trim: None };
         match reading::read(&item.recorded.path, &source, f64::INFINITY, &mut |line| {
             terminal::note(line)
@@ -166,7 +170,8 @@ fn illustration(chart: Chart, thesis: &'static str, caption: impl Into<String>) 
     Illustration { chart, thesis, caption: caption.into(), equal: false }
 }
 
-/// A value of the FMU, as set or by default.
+/// Returns the value of a real parameter in SI units: from the manifest if it sets the parameter, otherwise
+/// the FMU's start value.
 fn value(day: &Day, fmu: &Fmu, name: &str) -> Result<f64> {
     let set = day.settings.iter().find(|(other, _)| other == name).map(|(_, value)| value.clone());
     let start = fmu.description().variable(name)?.attributes().start.clone();
@@ -174,7 +179,8 @@ fn value(day: &Day, fmu: &Fmu, name: &str) -> Result<f64> {
     text.parse().with_context(|| format!("{name} = {text}: a number in SI units is needed"))
 }
 
-/// Bond number against the diameter, and the tank in space with the same one.
+/// Computes the Bond number as a function of the tank's diameter, and the tank in space that has the Bond
+/// number of the bench.
 fn bond_number(day: &Day, fmu: &Fmu) -> Result<Chapter> {
     let radius = value(day, fmu, tank::D)? / 2.0;
     let bond = |radius: f64| WATER.bond(GRAVITY, radius);
@@ -222,8 +228,9 @@ fn bond_number(day: &Day, fmu: &Fmu) -> Result<Chapter> {
     })
 }
 
-/// Every so many points that a figure shows.
-fn some(points: &[(f64, f64)]) -> impl Iterator<Item = (f64, f64)> + '_ {
+/// Thins points to at most [`POINTS`] by taking every n-th one, because a figure with all samples of a
+/// recording would be slow to draw.
+fn thinned(points: &[(f64, f64)]) -> impl Iterator<Item = (f64, f64)> + '_ {
     points.iter().copied().step_by(points.len().div_ceil(POINTS).max(1))
 }
 
@@ -239,7 +246,7 @@ fn bearing(fitted: &Identification, is_used: bool) -> Chapter {
     let most = points.iter().fold(0.0_f64, |most, p| most.max(p.rate.abs()));
     let friction_chart = |title: &str, most: f64| {
         let rates = (-200..=200).map(|k| most * f64::from(k) / 200.0);
-        // the law jumps at zero: a gap parts its two sides
+        // The law jumps at zero; a gap separates its two branches.
         let law = rates.map(|w| (w, if w == 0.0 { f64::NAN } else { 1e3 * curve(w) }));
         let within = points.iter().filter(|p| p.rate.abs() <= most);
         let measured = within.map(|p| (p.rate, 1e3 * p.torque));
@@ -307,7 +314,7 @@ fn preferential_direction(
 ) -> Chapter {
     let wrapped = |angle: f64| (angle + PI).rem_euclid(TAU) - PI;
     let degrees = |points: &[(f64, f64)], sign: f64| -> Vec<(f64, f64)> {
-        some(points).map(|(angle, a)| (wrapped(angle).to_degrees(), sign * a)).collect()
+        thinned(points).map(|(angle, a)| (wrapped(angle).to_degrees(), sign * a)).collect()
     };
     let angles = || (-90..=90).map(|k| 2.0 * f64::from(k));
     let braking = |of: &Braking, sign: f64, degrees: f64| sign * of.at(degrees.to_radians());
@@ -317,7 +324,8 @@ fn preferential_direction(
     };
     let differences: Vec<(f64, f64)> =
         fit(ccw).into_iter().zip(fit(cw)).map(|((angle, a), (_, b))| (angle, a - b)).collect();
-    // the directions are independent; the band of the difference is for the whole curve, as those of the fits are
+    // The fits of the two directions are independent. The band is a confidence band for the whole curve of
+    // the difference, as those of the two fits are.
     let band: Option<Vec<(f64, f64)>> = angles()
         .map(|angle| {
             let half = |braking: &Braking| braking.half_width(angle.to_radians());
@@ -431,7 +439,7 @@ fn preferential_direction(
     }
 }
 
-/// Statistics of one recording at rest.
+/// Computes bias, trend, noise and autocorrelation of one recording of the gyro at rest.
 fn at_rest(item: &Item) -> Result<Rest> {
     let signals = [Signal { name: "omega", required: true, between: Between::Line, unit: None }];
     let wanted = Wanted { signals: &signals, columns: &item.recorded.columns };
@@ -452,14 +460,14 @@ fn at_rest(item: &Item) -> Result<Rest> {
 fn gyro(day: &Day, problems: &mut Vec<String>) -> Chapter {
     let title = "Gyro at rest (thesis 5.5)";
     let mut found = Vec::new();
-    for item in day.of(Kind::Rest) {
+    for item in day.of_kind(Kind::Rest) {
         match at_rest(item) {
             Ok(rest) => found.push((item.recorded.path.display().to_string(), rest)),
             Err(error) => problems.push(format!("{error:#}")),
         }
     }
     if found.is_empty() {
-        return none(title, Kind::Rest, problems);
+        return missing_chapter(title, Kind::Rest, problems);
     }
     let mut chapter = Chapter { title: title.into(), ..Chapter::default() };
     for (name, rest) in &found {

@@ -1,7 +1,8 @@
 //! `hubslosh analyse --bench-day`: the recordings of a day at the bench as one report.
 //!
-//! The sine sweeps become a plan whose runs are recordings, so a campaign analyses them and simulates the models under the
-//! same torque. Friction runs, free decays and the gyro at rest become chapters of the campaign's page.
+//! The sine sweeps become a plan whose runs are recordings, so a campaign analyses them and simulates the
+//! models under the same torque. Friction runs, free decays and the gyro at rest become chapters of the
+//! campaign's page.
 
 mod chapters;
 
@@ -20,10 +21,8 @@ use super::campaign::drive;
 use super::open;
 use crate::terminal;
 
-/// Name of the manifest.
 const MANIFEST: &str = "day.toml";
 
-/// Kind of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 enum Kind {
@@ -37,7 +36,6 @@ enum Kind {
     Sweep,
 }
 
-/// `day.toml`.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Manifest {
@@ -77,7 +75,6 @@ fn models() -> Vec<String> {
     vec!["linear".into(), "spherical".into()]
 }
 
-/// `[[recording]]`.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Entry {
@@ -88,7 +85,6 @@ struct Entry {
     amplitude: Option<toml::Value>,
 }
 
-/// A recording of the manifest.
 struct Item {
     kind: Kind,
     recorded: Recorded,
@@ -96,17 +92,20 @@ struct Item {
     amplitude: Option<toml::Value>,
 }
 
-/// A day at the bench.
 struct Day {
     manifest: Manifest,
     tolerances: Tolerances,
     items: Vec<Item>,
-    /// Values that are known, by FMU name.
+    /// Known parameters by FMU name, which are set in every simulation.
     settings: Vec<(String, String)>,
 }
 
 impl Day {
-    /// Reads the manifest of a directory.
+    /// Reads `day.toml` in `directory`.
+    ///
+    /// # Errors
+    ///
+    /// If the manifest or a recording in it is missing, or an entry is invalid.
     fn read(directory: &Path) -> Result<Day> {
         let path = directory.join(MANIFEST);
         let text = input::text(&path).with_context(|| {
@@ -159,11 +158,12 @@ impl Day {
         Ok(Day { manifest, tolerances, items, settings })
     }
 
-    fn of(&self, kind: Kind) -> impl Iterator<Item = &Item> {
+    fn of_kind(&self, kind: Kind) -> impl Iterator<Item = &Item> {
         self.items.iter().filter(move |item| item.kind == kind)
     }
 
-    /// The plan: every sweep as a recording, simulated with every model. `found` are parameters from the friction runs.
+    /// Writes the sweeps as a plan for a campaign, each as a recording that is simulated with every model.
+    /// `found` are parameters from the friction runs, which the simulations use.
     fn plan(&self, found: &[(String, String)]) -> Result<String> {
         let text = |value: &str| toml::Value::from(value).to_string();
         let mut plan = format!(
@@ -171,7 +171,7 @@ impl Day {
             text(&self.manifest.title),
             text(&self.manifest.profile)
         );
-        let mut sweeps = self.of(Kind::Sweep);
+        let mut sweeps = self.of_kind(Kind::Sweep);
         let step = sweeps.find_map(|item| recorded::read(&item.recorded, &mut |_| {}).ok());
         let Some((step, _)) = step else { bail!("no sweep of {MANIFEST} can be read") };
         plan.push_str(&format!("step = {:?}\n[set]\n", (step * 1e9).round() / 1e9));
@@ -181,7 +181,7 @@ impl Day {
             let value = if plain { value.clone() } else { text(value) };
             plan.push_str(&format!("{name} = {value}\n"));
         }
-        for item in self.of(Kind::Sweep) {
+        for item in self.of_kind(Kind::Sweep) {
             let recording = text(&item.recorded.path.display().to_string());
             plan.push_str(&format!("[[run]]\nrecording = {recording}\n"));
             let columns = item.recorded.columns.to_string();
@@ -198,7 +198,8 @@ impl Day {
     }
 }
 
-/// Lists the values of nested tables by their dotted names.
+/// Lists the values of nested tables under dotted names, as parameters of the FMU are named: `[tank] h =
+/// 0.08` becomes `tank.h`.
 fn flatten(prefix: &str, table: &toml::Table, values: &mut Vec<(String, String)>) {
     for (key, value) in table {
         let name = format!("{prefix}{key}");
@@ -210,12 +211,13 @@ fn flatten(prefix: &str, table: &toml::Table, values: &mut Vec<(String, String)>
     }
 }
 
-/// Writes tables and report of a day into `out`.
+/// Analyses the day in `directory` and writes its tables and report into `out` (default: a folder in dist
+/// named after the day).
 pub fn run(directory: &Path, fmu: &Path, jobs: usize, out: Option<PathBuf>) -> Result<()> {
     let day = Day::read(directory)?;
     let fmu = open(fmu)?;
     let (mut problems, mut found) = (Vec::new(), Vec::new());
-    let (chapters, bearing) = chapters::of(&day, &fmu, &mut problems, &mut found)?;
+    let (chapters, bearing) = chapters::chapters(&day, &fmu, &mut problems, &mut found)?;
     for problem in &problems {
         terminal::error(problem);
     }
