@@ -181,7 +181,7 @@ impl AnyFmuArgs {
     pub fn identify(&self, told: &Told, points: &PointsArgs, out: &Out) -> Result<()> {
         let question = self.question(told)?;
         let model = self.model(told, &question)?;
-        let columns = Columns::of_variables(list(told.columns))?.with_rate(told.rate)?;
+        let columns = Columns::for_variables(list(told.columns))?.with_rate(told.rate)?;
         let mut notes = Vec::new();
         let mut records = Vec::new();
         for path in told.data {
@@ -224,7 +224,7 @@ impl AnyFmuArgs {
     pub fn design(&self, told: &Told, noise: &[String]) -> Result<()> {
         let question = self.question(told)?;
         let model = self.model(told, &question)?;
-        let columns = Columns::of_variables(list(told.columns))?.with_rate(told.rate)?;
+        let columns = Columns::for_variables(list(told.columns))?.with_rate(told.rate)?;
         let mut given = BTreeMap::new();
         for item in noise.iter().flat_map(|flag| list(flag)) {
             let (name, std) = super::setting(item)?;

@@ -213,7 +213,7 @@ fn missing_readings_are_missing_in_files() {
     let signal = |name, between| Signal { name, required: true, between, unit: None };
     let signals = [signal("omega", Between::Line), signal("s", Between::Missing)];
     for path in [csv, parquet] {
-        let columns = Columns::of_variables(std::iter::empty()).unwrap();
+        let columns = Columns::for_variables(std::iter::empty()).unwrap();
         let wanted = Wanted { signals: &signals, columns: &columns };
         let back = read(&path, &wanted, &mut |_| {}).unwrap();
         let there = |values: &[f64]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();

@@ -19,7 +19,7 @@ pub struct Column {
 /// Signals by name, each with its column, and the rate (rows per second) of files without a time column.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Columns {
-    of: BTreeMap<String, Column>,
+    by_signal: BTreeMap<String, Column>,
     rate: Option<f64>,
 }
 
@@ -89,7 +89,7 @@ fn named(item: &str) -> Result<(String, Column)> {
 
 impl fmt::Display for Columns {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        for (k, (signal, column)) in self.of.iter().enumerate() {
+        for (k, (signal, column)) in self.by_signal.iter().enumerate() {
             write!(f, "{}{signal}={}", if k == 0 { "" } else { "," }, column.name)?;
             if let Some(unit) = &column.unit {
                 write!(f, ":{unit}")?;
@@ -106,7 +106,7 @@ impl Columns {
     /// # Errors
     ///
     /// Lists all items that are wrong.
-    pub fn of_variables<'a>(items: impl IntoIterator<Item = &'a str>) -> Result<Self> {
+    pub fn for_variables<'a>(items: impl IntoIterator<Item = &'a str>) -> Result<Self> {
         Columns::parse(items, named)
     }
 
@@ -125,7 +125,7 @@ impl Columns {
             }
         }
         ensure!(problems.is_empty(), "{}", problems.join("; "));
-        Ok(Columns { of: columns, rate: None })
+        Ok(Columns { by_signal: columns, rate: None })
     }
 
     /// Sets the rate of files without times, in rows per second.
@@ -148,19 +148,19 @@ impl Columns {
     }
 
     /// Returns the column of a signal: the given one, otherwise the column with the signal's own name.
-    pub fn of(&self, signal: &str) -> Column {
+    pub fn column(&self, signal: &str) -> Column {
         let own = || Column { name: signal.into(), unit: None };
-        self.of.get(signal).cloned().unwrap_or_else(own)
+        self.by_signal.get(signal).cloned().unwrap_or_else(own)
     }
 
     /// Returns true if the user named the signal's column.
     pub fn names(&self, signal: &str) -> bool {
-        self.of.contains_key(signal)
+        self.by_signal.contains_key(signal)
     }
 
     /// Lists the signals whose columns were given.
     pub fn signals(&self) -> impl Iterator<Item = &str> {
-        self.of.keys().map(String::as_str)
+        self.by_signal.keys().map(String::as_str)
     }
 }
 
@@ -175,9 +175,9 @@ mod tests {
             name: name.into(),
             unit: unit.map(String::from),
         };
-        assert_eq!(columns.of("tau_cmd"), column("T_cmd", Some("mNm")));
-        assert_eq!(columns.of("time"), column("t", None));
-        assert_eq!(columns.of("theta"), column("theta", None));
+        assert_eq!(columns.column("tau_cmd"), column("T_cmd", Some("mNm")));
+        assert_eq!(columns.column("time"), column("t", None));
+        assert_eq!(columns.column("theta"), column("theta", None));
         let error = "torque=T,omega=w:deg,time".parse::<Columns>().unwrap_err().to_string();
         for words in [
             "torque is not a signal of a recording (allowed: time, tau_cmd,",

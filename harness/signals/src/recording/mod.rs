@@ -332,7 +332,7 @@ fn read_as(
             !wanted.columns.names("time"),
             "--rate {rate} is for rows whose times are not read, and --columns names the column of the time, {} (allowed: one of \
              them)",
-            wanted.columns.of("time").name
+            wanted.columns.column("time").name
         );
         if let Ok(own) = header.place("time", Some(Quantity::Time.dimension())) {
             done(format!("its column {} is passed over (--rate)", header.full[own]));
@@ -350,7 +350,7 @@ fn read_as(
     let halves = header.halves();
     let own_time = counted.is_none().then_some(&time_signal);
     for signal in own_time.into_iter().chain(wanted.signals) {
-        let column = wanted.columns.of(signal.name);
+        let column = wanted.columns.column(signal.name);
         let is_time = signal.name == "time";
         let place = match header
             .place(&column.name, dimension(signal).map(|(dimension, _)| dimension))
@@ -485,7 +485,7 @@ fn read_as(
         Stamps::On(grid) => {
             done(format!(
                 "its times are printed to {}: rows {:.6} ms apart have these times, and are taken so",
-                stamps::words(grid.quantum),
+                stamps::format_quantum(grid.quantum),
                 1e3 * grid.step
             ));
             columns[0] = grid.time;

@@ -123,7 +123,7 @@ fn uncertainty(units: &[f64], counts: &[f64], step: f64) -> f64 {
 }
 
 /// Formats a quantum (s) for messages, in s, ms or us.
-pub fn words(quantum: f64) -> String {
+pub fn format_quantum(quantum: f64) -> String {
     match quantum {
         q if q >= 1.0 => format!("{q} s"),
         q if q >= 0.999e-3 => format!("{:.0} ms", 1e3 * q),
