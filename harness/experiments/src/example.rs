@@ -19,7 +19,6 @@ use signals::table::Table;
 /// The example of an FMU of this project.
 #[derive(Clone, Copy, Debug)]
 pub struct Example {
-    /// The FMU's modelName, with which the names of the files begin.
     pub model: &'static str,
     /// Driven inputs: name, amplitude, time function.
     inputs: &'static [(&'static str, f64, Course)],
@@ -82,7 +81,7 @@ impl Example {
     ///
     /// # Errors
     /// The FMU has no example.
-    pub fn of(fmu: &Fmu) -> Result<&'static Example> {
+    pub fn for_fmu(fmu: &Fmu) -> Result<&'static Example> {
         let model = &fmu.description().model_name;
         let found = EXAMPLES.iter().find(|example| example.model == model);
         found.with_context(|| {

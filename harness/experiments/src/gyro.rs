@@ -25,9 +25,7 @@ const LEAST_TIMES: f64 = 30.0;
 pub struct Recording {
     /// Start values by FMU name, as text; not `imu.enabled` and `imu.seed`.
     pub settings: Vec<(String, String)>,
-    /// Length of a record, h.
     pub hours: f64,
-    /// Number of records; their `imu.seed` counts from 1.
     pub records: usize,
 }
 
@@ -105,7 +103,7 @@ impl Recording {
         watch(Progress::Begins { runs: runs.len(), steps });
         let records: Vec<(Vec<Point>, Octaves)> =
             runs.par_iter().map(|run| record(run, fmu, watch)).collect::<Result<_>>()?;
-        Characteristics::of(specified, &records)
+        Characteristics::estimate(specified, &records)
     }
 
     /// Returns one record, sampled at the gyro's own instants.
@@ -147,7 +145,7 @@ fn record(
 }
 
 impl Characteristics {
-    fn of(specified: Noise, records: &[(Vec<Point>, Octaves)]) -> Result<Self> {
+    fn estimate(specified: Noise, records: &[(Vec<Point>, Octaves)]) -> Result<Self> {
         let count = records.len() as f64;
         let points: Vec<Point> = (0..records[0].0.len())
             .map(|i| Point {

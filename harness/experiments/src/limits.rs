@@ -22,14 +22,14 @@ impl Limits {
         Limits { tanks: all.filter(|(name, _)| description.variable(name).is_ok()).collect() }
     }
 
-    /// Returns the columns that [`Limits::words`] reads.
+    /// Returns the columns that [`Limits::describe`] reads.
     pub fn needs(&self) -> impl Iterator<Item = &str> {
         self.tanks.iter().map(|(name, _)| name.as_str())
     }
 
     /// Returns a sentence for each tank that was out of range: the reasons with their shares of the time, the longest first.
     /// A row holds until the next one.
-    pub fn words(&self, table: &Table) -> Vec<String> {
+    pub fn describe(&self, table: &Table) -> Vec<String> {
         let of_tank = |(name, tank): &(String, String)| {
             let reasons = table.column(name)?;
             let shares = shares(table.column("time")?, reasons);

@@ -1,11 +1,12 @@
-//! Numbers with the digits that mean something.
+//! Rounding of numbers to the digits that are meaningful.
 
-/// A quantity in thousandths of its unit, without the dust of binary fractions.
+/// Converts a quantity to thousandths of its unit, and removes the rounding errors of binary fractions:
+/// 0.0125 becomes 12.5.
 pub fn thousandths(value: f64) -> f64 {
     (value * 1e9).round() / 1e6
 }
 
-/// A value rounded to so many significant digits, and no sign at zero.
+/// Rounds a value to this number of significant digits; zero has no sign.
 pub fn significant(value: f64, digits: usize) -> f64 {
     format!("{value:.*e}", digits - 1).parse().unwrap_or(value) + 0.0
 }

@@ -18,37 +18,37 @@ use names::hubslosh::TAU_CMD;
 use signals::recording::{self, Between, Columns, Signal, Wanted};
 use signals::table::Table;
 
-/// A run of an FMU.
+/// A simulation of an FMU.
 #[derive(Clone, Debug)]
 pub struct Run {
     /// Start values by FMU name, as text; set in this order.
     pub settings: Vec<(String, String)>,
-    /// The input that the torque drives, by FMU name; `None`: none is driven.
+    /// Name of the input that the torque drives; `None` if no input is driven.
     pub input: Option<String>,
     /// The torque command.
     pub torque: Torque,
     /// Further inputs by FMU name, each with its history in the input's unit.
     pub others: Vec<(String, Torque)>,
-    /// Time between the rows of the result, s.
     pub step: f64,
     /// Time between the commands of a profile, s; see [`Torque::history`].
     pub sample: f64,
-    /// Stop time, s.
     pub stop: f64,
     /// Relative tolerance for the FMU's solver; `None`: the FMU's own.
     pub tolerance: Option<f64>,
-    /// Inputs are held from row to row, a profile from command to command (else they are straight lines).
+    /// True if inputs are held from row to row, and a profile from command to command; false for straight
+    /// lines.
     pub hold: bool,
 }
 
-/// The input that the torque drives, where an FMU has one of that name.
+/// Name of the input that the torque drives if an FMU has it.
 pub const TORQUE: &str = TAU_CMD;
 
-/// Returns the driven input of an FMU: `chosen` if given, otherwise [`TORQUE`], otherwise its only Real
-/// input. Returns none if the FMU has no input.
+/// Returns the name of the input that the torque drives: `chosen` if given, otherwise [`TORQUE`], otherwise
+/// the FMU's only Real input. Returns `None` if the FMU has no input.
 ///
 /// # Errors
-/// The input does not exist, or several inputs are possible.
+///
+/// If the input does not exist, or several inputs are possible.
 pub fn driven(description: &ModelDescription, chosen: Option<&str>) -> Result<Option<String>> {
     if let Some(name) = chosen {
         let variable = description.variable(name)?;
@@ -72,13 +72,15 @@ pub fn driven(description: &ModelDescription, chosen: Option<&str>) -> Result<Op
 /// Column of a torque history that is not an input: the derivative of [`TORQUE`] until the next row.
 pub const SLOPE: &str = "tau_slope";
 
-/// Reads a file's histories of inputs: every column that is an input of the FMU, and [`SLOPE`] with [`TORQUE`].
-/// Integers, enumerations (by value) and Booleans (true and false, or 1 and 0) hold from row to row. Other columns except `time` are
-/// refused by name, or ignored with `ignore`. The first history is the input `chosen`, else [`TORQUE`], else the
-/// file's first. `done` hears in what units the columns are read.
+/// Reads a file's histories of inputs: every column that is an input of the FMU, and [`SLOPE`] with
+/// [`TORQUE`]. Integers, enumerations (by value) and Booleans (true and false, or 1 and 0) hold from row to
+/// row. Other columns except `time` are an error, or ignored with `ignore`. The first history is the input
+/// `chosen`, else [`TORQUE`], else the file's first. `done` receives messages about the units in which the
+/// columns are read.
 ///
 /// # Errors
-/// The file has no such column, or other columns. The error lists all problems of the columns.
+///
+/// If the file has no such column, or other columns. The error lists all problems of the columns.
 pub fn histories(
     description: &ModelDescription,
     path: &Path,
@@ -101,7 +103,7 @@ pub fn histories(
         })
         .collect();
     signals.extend([signal("time", None), signal(SLOPE, Some("N.m/s"))]);
-    // by the names of the inputs, whatever units stand behind them
+    // By the names of the inputs, with any unit.
     let there = recording::assigned(path, &signals)?;
     let columns: Vec<&str> = there
         .iter()
@@ -179,7 +181,7 @@ pub fn histories(
         .collect()
 }
 
-/// Returns true for what a host sets before a run.
+/// Returns true for a variable that a host sets before a run.
 fn is_settable(variable: &Variable) -> bool {
     matches!(
         variable.causality,
@@ -187,8 +189,9 @@ fn is_settable(variable: &Variable) -> bool {
     )
 }
 
-/// Every parameter and input with the text of its start value: as a run sets it, or the FMU's own; inputs that are `driven`
-/// are left out. Numbers are written in one way, enumerations by name.
+/// Returns every parameter and input with its start value as a text: the value that the run sets, otherwise
+/// the FMU's own. Inputs that are `driven` are left out. Numbers are formatted uniformly and enumerations are
+/// written by name, so that equal values have equal texts.
 pub fn parameters(
     description: &ModelDescription,
     settings: &[(String, String)],
@@ -217,29 +220,31 @@ pub fn parameters(
         .collect()
 }
 
-/// Steps between two reports of progress.
+/// Number of steps between two reports of progress.
 const REPORT_EVERY: usize = 1024;
 
 impl Run {
-    /// Start time, s: that of the torque history.
+    /// Returns the start time, s, which is that of the torque history.
     pub fn start(&self) -> f64 {
         self.torque.span().0
     }
 
-    /// Number of steps between rows of the result; the last may be shorter. None if [`Run::check`] fails.
+    /// Returns the number of steps between rows of the result, the last of which may be shorter; 0 if
+    /// [`Run::check`] fails.
     pub fn steps(&self) -> usize {
         budget::steps(self.stop - self.start(), self.step).unwrap_or(0)
     }
 
-    /// Bytes that the communication points and the histories of the inputs take while the run is made.
+    /// Estimates the memory in bytes that the communication points and the histories of the inputs take
+    /// during the run.
     pub fn course_bytes(&self) -> u64 {
         let all = [&self.torque].into_iter().chain(self.others.iter().map(|(_, other)| other));
         let counts = all.map(|torque| torque.count(self.sample, self.stop, self.hold).unwrap_or(0));
-        // of each its time, value and slope, and its communication point; lists that grow take twice as much
+        // Each has time, value and slope, and a communication point; growing lists take twice as much.
         (counts.sum::<usize>() + self.steps()) as u64 * 100
     }
 
-    /// Histories of the torque and of the other inputs, and the communication points.
+    /// Returns the histories of the torque and of the other inputs, and the communication points.
     fn course(&self) -> Result<(Vec<Cow<'_, History>>, Schedule)> {
         let others = self.others.iter().map(|(_, other)| other);
         let histories = [&self.torque]
@@ -252,12 +257,13 @@ impl Run {
         Ok((histories, schedule))
     }
 
-    /// The torque as a run hands it to the FMU: at every communication point `time` (s), `tau_cmd`
-    /// (N·m) and `tau_slope`, its derivative until the next point (N·m/s). Also which of the points are rows of
-    /// the result.
+    /// Returns the torque as the run passes it to the FMU: at every communication point `time` (s), `tau_cmd`
+    /// (N·m) and `tau_slope`, its derivative until the next point (N·m/s). The schedule says which points are
+    /// rows of the result.
     ///
     /// # Errors
-    /// The profile takes too many commands.
+    ///
+    /// If the profile takes too many commands.
     pub fn torque_table(&self) -> Result<(Table, Schedule)> {
         let (histories, schedule) = self.course()?;
         let mut torque = histories[0].cursor();
@@ -273,20 +279,24 @@ impl Run {
         Ok((Table::new(names, columns), schedule))
     }
 
-    /// Every driven input with its history, that of the torque first.
+    /// Returns every driven input with its history, that of the torque first.
     fn driven(&self) -> Vec<(&str, &Torque)> {
         let first = self.input.iter().map(|name| (name.as_str(), &self.torque));
         first.chain(self.others.iter().map(|(name, history)| (name.as_str(), history))).collect()
     }
 
-    /// The driven inputs as the FMU gets them.
+    /// Returns the driven inputs in the form that the FMU's instance takes.
     fn inputs(&self, description: &ModelDescription) -> Result<Inputs> {
         let driven = self.driven();
         let names: Vec<&str> = driven.iter().map(|(name, _)| *name).collect();
         Ok(Inputs::new(description, &names, self.hold)?.with_tolerance(self.tolerance))
     }
 
-    /// Fails with one sentence if the numbers make no sense.
+    /// Checks stop time, step, tolerance and inputs.
+    ///
+    /// # Errors
+    ///
+    /// One sentence about the value that is not allowed.
     pub fn check(&self) -> Result<()> {
         ensure!(
             self.stop > self.start() && self.stop.is_finite(),
@@ -305,7 +315,11 @@ impl Run {
         Ok(())
     }
 
-    /// A new instance with the start values set, ready for the first step.
+    /// Creates an instance with the start values set, ready for the first step.
+    ///
+    /// # Errors
+    ///
+    /// If [`Run::check`] fails, or the FMU refuses a setting.
     pub fn initialise<'fmu>(&self, fmu: &'fmu Fmu) -> Result<Instance<'fmu>> {
         self.check()?;
         let mut instance = rest::instantiate(fmu, "run")?;
@@ -339,8 +353,8 @@ impl Run {
         Ok(instance)
     }
 
-    /// These columns and, after them, what else must be recorded because something `needs` it, each once; time and what is
-    /// driven are in the table anyway.
+    /// Adds to `columns` the variables in `needs` that must be recorded too, each once. Time and the driven
+    /// inputs are in the table anyway.
     pub fn columns_with<'n>(
         &self,
         columns: &[&'n str],
@@ -359,9 +373,14 @@ impl Run {
         all
     }
 
-    /// Steps an initialised instance to the stop time, with a communication point at every row of an input and of the
-    /// result. The table has `time`, the driven inputs and the variables `columns` every [`Run::step`] seconds. A row pairs
-    /// what [`schedule::ROWS`] says. `progress` hears how many rows were made since it was last called.
+    /// Steps an initialised instance to the stop time, with a communication point at every row of an input
+    /// and of the result. The table has `time`, the driven inputs and the variables `columns` every
+    /// [`Run::step`] seconds; [`schedule::ROWS`] says which values of inputs and outputs a row pairs.
+    /// `progress` receives the number of rows since its last call.
+    ///
+    /// # Errors
+    ///
+    /// If the FMU refuses a call, or a recorded value is not finite.
     pub fn drive(
         &self,
         instance: &mut Instance,
@@ -382,7 +401,7 @@ impl Run {
         let mut time = Vec::with_capacity(rows);
         let mut given: Vec<Vec<f64>> = driven.iter().map(|_| Vec::with_capacity(rows)).collect();
         let inputs = self.inputs(instance.description())?;
-        // without an input there is no torque to follow
+        // Without an input there is no torque to follow.
         let mut cursors: Vec<_> = histories.iter().map(|history| history.cursor()).collect();
         let mut point = 0;
         inputs.drive(instance, self.start(), |instance, t, course| {
@@ -458,7 +477,7 @@ impl Recorder {
         })
     }
 
-    /// Adds a row. Returns the first column that is NaN or infinite.
+    /// Adds a row, and returns the position of the first value that is NaN or infinite.
     fn record(&mut self, instance: &mut Instance) -> Result<Option<usize>> {
         instance.get_real(&self.reals, &mut self.values)?;
         for (value, place) in self.values.iter().zip(&self.places) {

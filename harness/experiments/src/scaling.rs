@@ -1,8 +1,8 @@
-//! Prints the similarity of a bench and a flight tank: Bond numbers, the tank with equal Bond numbers, Froude's factors. Sources:
-//! `formulas::similarity`; Rubaga's thesis 2.5, 2.6 and 7.2, with corrected numbers.
+//! Similarity of a bench and a flight tank: Bond numbers, the tank with equal Bond numbers, Froude's factors.
+//! Sources: `formulas::similarity`; Rubaga's thesis 2.5, 2.6 and 7.2, with corrected numbers.
 //!
-//! An angular acceleration has two different numbers. The thesis's 45.87 is Bo_i of its bench, but
-//! its equivalent tank follows from Bo_r.
+//! For an angular acceleration there are two different Bond numbers. The thesis's 45.87 is Bo_i of its bench,
+//! but its equivalent tank follows from Bo_r.
 
 use std::fmt::Write;
 
@@ -14,16 +14,20 @@ use formulas::similarity::{self, Liquid, agility, froude_viscosity, regime};
 
 use crate::rounding::significant;
 
-/// Water at 25 degC as the thesis's 7.2.1 has it.
+/// Water at 25 degC, as in the thesis's 7.2.1.
 pub const WATER: Liquid = Liquid { density: 997.0, tension: 0.072 };
-/// Water as the thesis's 7.2.2 has it.
+/// Water with rounded values, as in the thesis's 7.2.2.
 pub const ROUND_WATER: Liquid = Liquid { density: 1000.0, tension: 0.072 };
 /// Liquid oxygen at its boiling point, 90 K (the thesis says -200 degC).
 pub const OXYGEN: Liquid = Liquid { density: 1141.0, tension: 0.0132 };
-/// The bench's tank: its radius and its distance from the axis, m.
+/// Radius of the bench's tank and its distance from the axis, m.
 pub const BENCH: (f64, f64) = (0.0815, 0.225);
 
-/// All of these must be positive numbers; names all that are not.
+/// Checks that all values are positive numbers.
+///
+/// # Errors
+///
+/// Names all that are not.
 fn positive(values: &[(&str, f64)]) -> Result<()> {
     let wrong: Vec<String> = values
         .iter()
@@ -34,25 +38,29 @@ fn positive(values: &[(&str, f64)]) -> Result<()> {
     Ok(())
 }
 
-/// Results in words and for programs.
+/// Results as text and, with the same numbers in SI units, as JSON.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Found {
-    /// Lines for people.
     pub text: String,
     /// The same numbers, SI.
     pub json: Value,
 }
 
-/// Known quantities of the flight tank.
+/// Known quantity of the flight tank.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Flight {
-    /// Radius, m; wanted is the acceleration.
+    /// Radius, m; the acceleration is computed.
     Radius(f64),
-    /// The acceleration, m/s2 or rad/s2; wanted is the radius.
+    /// Acceleration, m/s² or rad/s²; the radius is computed.
     Acceleration(f64),
 }
 
-/// The bench's Bond number and the flight tank that has the same.
+/// Computes the Bond number of the bench's liquid at the acceleration `a` (m/s²) in a tank of `radius` (m),
+/// and the flight tank with `liquid` that has the same Bond number.
+///
+/// # Errors
+///
+/// If a value is not positive.
 pub fn bond(
     bench: Liquid,
     (a, radius): (f64, f64),
@@ -92,8 +100,12 @@ pub fn bond(
     Ok(Found { text, json })
 }
 
-/// Prints Bond, Weber and Froude numbers of a liquid that moves at a velocity (m/s), and the dominant force. Also prints the
-/// times that gravity and surface tension take over the radius (2.28, 2.29).
+/// Computes Bond, Weber and Froude numbers of a liquid that moves at `velocity` (m/s), and names the dominant
+/// force. Also computes the times that gravity and surface tension take over the radius (thesis 2.28, 2.29).
+///
+/// # Errors
+///
+/// If a value is not positive.
 pub fn numbers(liquid: Liquid, (a, radius): (f64, f64), velocity: f64) -> Result<Found> {
     positive(&[
         ("density", liquid.density),
@@ -129,8 +141,12 @@ pub fn numbers(liquid: Liquid, (a, radius): (f64, f64), velocity: f64) -> Result
     Ok(Found { text, json })
 }
 
-/// The bench's rotational Bond numbers, and the tanks that have the same at another angular
-/// acceleration.
+/// Computes the bench's rotational Bond numbers at the angular acceleration `alpha` (rad/s²) and rate `omega`
+/// (rad/s), and the tanks that have the same numbers at the angular acceleration `target` in flight.
+///
+/// # Errors
+///
+/// If a value is not positive.
 pub fn rotation(
     liquid: Liquid,
     (radius, arm): (f64, f64),
@@ -176,7 +192,12 @@ pub fn rotation(
     Ok(Found { text, json })
 }
 
-/// Table 2.3 for a scale.
+/// Computes the factors of Froude similarity (the thesis's Table 2.3) for the ratios of length, density and
+/// gravity of full size to model.
+///
+/// # Errors
+///
+/// If a ratio is not positive, or a factor overflows.
 pub fn froude(lambda: f64, density: f64, gravity: f64) -> Result<Found> {
     positive(&[("lambda", lambda), ("density ratio", density), ("gravity ratio", gravity)])?;
     let factors = similarity::froude(lambda, density, gravity);
@@ -204,22 +225,18 @@ pub fn froude(lambda: f64, density: f64, gravity: f64) -> Result<Found> {
     Ok(Found { text, json })
 }
 
-/// A number of the thesis's scaling, as printed and as it follows from its own data.
+/// A number of the thesis's scaling: its place and name, the value as printed, the value that follows from
+/// the thesis's own data with its unit, and the reason for a difference.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Comparison {
-    /// Place and name of the number in the thesis.
     pub what: &'static str,
-    /// Value as printed.
     pub printed: &'static str,
-    /// Value that follows from the formulas.
     pub value: f64,
-    /// Unit.
     pub unit: &'static str,
-    /// Reason for a difference, if there is one.
     pub remark: &'static str,
 }
 
-/// The thesis's numbers of 7.2 and what is behind them, computed anew.
+/// Recomputes the numbers of the thesis's section 7.2 and their intermediate results.
 pub fn thesis() -> Vec<Comparison> {
     let compared =
         |what, printed, value, unit, remark| Comparison { what, printed, value, unit, remark };
@@ -284,7 +301,7 @@ pub fn thesis() -> Vec<Comparison> {
     ]
 }
 
-/// [`thesis`] as a table and for programs.
+/// Formats [`thesis`] as a table, and for programs.
 pub fn thesis_found() -> Found {
     let json = json!(thesis());
     let line = |f: Comparison| {

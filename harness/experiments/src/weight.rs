@@ -1,5 +1,5 @@
-//! Detects runs in which weight does not dominate the liquid: Bond, Weber and Froude numbers (Rubaga's thesis 2.5) of the bench's tank and of
-//! tanks in six axes.
+//! Detects runs in which weight does not dominate the liquid, from Bond, Weber and Froude numbers (Rubaga's
+//! thesis 2.5), for the bench's tank and for tanks in six axes.
 
 use anyhow::{Result, ensure};
 use formulas::cylinder::{self, XI};
@@ -9,25 +9,23 @@ use host::fmu::Instance;
 use names::{sloshtank, spacecraft};
 use signals::table::Table;
 
-/// Below this Bond number no model here stands for the liquid (thesis 2.5, 8.2.2).
+/// Bond number below which none of the project's models represents the liquid (thesis 2.5, 8.2.2).
 const LEAST_BOND: f64 = 30.0;
 
 /// Surface tension of water at 24 degC, N/m: HubSlosh's start value of `fluid.sigma`.
 pub const WATER_TENSION: f64 = 0.07213;
 
-/// A liquid in a tank.
+/// A liquid in a tank of a given radius, m.
 #[derive(Clone, Copy, Debug)]
 pub struct Contents {
-    /// Density and surface tension.
     pub liquid: Liquid,
-    /// Radius of the tank, m.
     pub radius: f64,
 }
 
-/// The numbers of the row in which weight rules least.
+/// Bond and Weber number of the row in which weight dominates least.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Weightless {
-    /// Below 0 where the specific force points out of the liquid.
+    /// Negative if the specific force points out of the liquid.
     bond: f64,
     weber: f64,
 }
@@ -42,7 +40,7 @@ impl Contents {
             speed = speed.max(v);
             let bond = self.liquid.bond(g, self.radius);
             let weber = self.liquid.weber(speed, self.radius);
-            // how far weight is from ruling: against 30, and against inertia
+            // The distance from dominance: Bond number against 30, and weight against inertia.
             let rules = (bond / LEAST_BOND).min(bond / weber.max(1.0));
             if rules < 1.0 && worst.is_none_or(|(other, _)| rules < other) {
                 worst = Some((rules, Weightless { bond, weber }));
@@ -67,7 +65,7 @@ impl std::fmt::Display for Weightless {
             _ if bond < -1.0 && weber <= -bond => {
                 "the specific force points out of the liquid, which falls to the tank's other end"
             }
-            // it still rules, but the surface is curved
+            // Weight still dominates, but the surface is curved.
             gravity if gravity.starts_with("gravity") => {
                 "the surface is curved, and where the liquid is, is uncertain"
             }
@@ -87,7 +85,8 @@ struct Tank {
     /// Prefix of variables' names: `tank[1]`, `tank`.
     name: String,
     contents: Contents,
-    /// The hinge of mode 1 from O, m, and the direction out of the liquid, axes of craft or host.
+    /// Position of the hinge of mode 1 relative to O, m, in axes of craft or host; the next field is the
+    /// direction out of the liquid.
     hinge: [f64; 3],
     upwards: [f64; 3],
     /// Wall elevation per slosh angle of each mode, m.
@@ -96,7 +95,7 @@ struct Tank {
     has_ball: bool,
 }
 
-/// The tanks of Spacecraft or SloshTank that weight alone holds the liquid in.
+/// The tanks of Spacecraft or SloshTank in which only weight holds the liquid.
 #[derive(Clone, Debug)]
 pub struct Tanks {
     tanks: Vec<Tank>,
@@ -104,21 +103,23 @@ pub struct Tanks {
     accelerometer: &'static str,
 }
 
-/// The three components of a vector variable.
+/// Returns the names of the three components of a vector variable.
 fn components(name: &str) -> [String; 3] {
     [1, 2, 3].map(|i| format!("{name}[{i}]"))
 }
 
 impl Tanks {
-    /// Tanks of an initialised instance; `None` if the FMU is neither Spacecraft nor SloshTank.
+    /// Reads the tanks of an initialised instance; `None` if the FMU is neither Spacecraft nor SloshTank.
     ///
-    /// The density is the tank's `density`. The radius is that of its `diameter`, or of the cylinder with its `wave`,
-    /// R = wave (ξ² − 1)/2. The surface `tension` is in N/m; no FMU in six axes has it. Tanks without modes, unknown
-    /// ones (`wave` = 0), and those whose liquid a stiffness k holds are left out.
+    /// The density is the tank's `density`. The radius is half its `diameter`, or that of the cylinder with
+    /// its `wave`, R = wave (ξ² − 1)/2. The surface `tension` is in N/m; no FMU in six axes has it. Tanks
+    /// without modes, with unknown dimensions (`wave` = 0), and those whose liquid a stiffness k holds are
+    /// left out.
     ///
     /// # Errors
+    ///
     /// If the tension is not positive, or a variable cannot be read.
-    pub fn of(
+    pub fn read(
         description: &ModelDescription,
         instance: &mut Instance,
         tension: f64,
@@ -142,19 +143,20 @@ impl Tanks {
         );
         let tanks = names
             .into_iter()
-            .filter_map(|name| Tank::of(description, instance, name, tension).transpose())
+            .filter_map(|name| Tank::read(description, instance, name, tension).transpose())
             .collect::<Result<_>>()?;
         Ok(Some(Tanks { tanks, accelerometer }))
     }
 
-    /// Variables that must be recorded.
+    /// Lists the variables that must be recorded.
     pub fn needs(&self) -> Vec<String> {
         let host = [self.accelerometer, "omega", "omega_dot"].map(components).into_iter().flatten();
         let tanks = self.tanks.iter().flat_map(Tank::rates);
         if self.tanks.is_empty() { Vec::new() } else { host.chain(tanks).collect() }
     }
 
-    /// The tanks of a run, recorded with what is [needed](Tanks::needs), in which weight does not rule the liquid, and how.
+    /// Describes the tanks of a run in which weight does not dominate the liquid. The table must have the
+    /// variables of [`Tanks::needs`].
     pub fn without_weight(&self, table: &Table) -> Vec<String> {
         self.tanks
             .iter()
@@ -171,7 +173,7 @@ fn integer(description: &ModelDescription, instance: &mut Instance, name: &str) 
 }
 
 impl Tank {
-    fn of(
+    fn read(
         description: &ModelDescription,
         instance: &mut Instance,
         name: String,
@@ -192,7 +194,7 @@ impl Tank {
         if real("k[1]")? > 0.0 {
             return Ok(None);
         }
-        // Of a tank that drains the hinge moves: its origin stands for it.
+        // In a tank that drains the hinge moves; the origin of the tank is used instead.
         let height = match (drains, diameter > 0.0) {
             (true, _) => 0.0,
             (_, true) => cylinder(1).hinge,
@@ -213,14 +215,15 @@ impl Tank {
         Ok(Some(Tank { name, contents, hinge, upwards, wave, has_ball }))
     }
 
-    /// Rates of the modes' directions across the tank's axis, 1/s.
+    /// Lists the rates of the modes' directions across the tank's axis, 1/s.
     fn rates(&self) -> Vec<String> {
         let modes = 1..=self.wave.len();
         modes.flat_map(|n| [1, 2].map(|i| format!("{}.p_dot[{n},{i}]", self.name))).collect()
     }
 
-    /// Specific force along the axis at the hinge of mode 1, f_O + ω' × ρ + ω × (ω × ρ), and speed of the surface at the wall, all modes
-    /// together.
+    /// Describes how weight fails to dominate in this tank, from the specific force along the axis at the
+    /// hinge of mode 1, f_O + ω' × ρ + ω × (ω × ρ), and the speed of the surface at the wall, summed over all
+    /// modes.
     fn without_weight(&self, table: &Table, accelerometer: &str) -> Option<String> {
         let column = |name: &String| table.column(name);
         let vector = |name: &str| {
@@ -255,7 +258,7 @@ impl Tank {
     }
 }
 
-/// The z axis of a frame with this attitude, a quaternion of any norm, scalar first.
+/// Returns the z axis of a frame from its attitude, a quaternion of any norm with the scalar first.
 fn third_axis([w, x, y, z]: [f64; 4]) -> [f64; 3] {
     let norm2 = w * w + x * x + y * y + z * z;
     [2.0 * (x * z + w * y), 2.0 * (y * z - w * x), w * w - x * x - y * y + z * z]

@@ -22,7 +22,7 @@ impl ExampleArgs {
     pub fn run(self) -> Result<()> {
         pack::needs_source("the example")?;
         let fmu = open(&self.fmu)?;
-        let example = Example::of(&fmu)?;
+        let example = Example::for_fmu(&fmu)?;
         let model = pack::model(example.model)?;
         let folder = model.example();
         example.write(&fmu, &folder)?;

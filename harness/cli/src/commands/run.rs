@@ -166,8 +166,8 @@ impl RunArgs {
         let columns = run.columns_with(&[], columns.iter().map(String::as_str));
         let asked = columns.len();
         // Also recorded, to say at the end whether the model stayed within its range of validity.
-        let range = Range::of(description, &mut instance)?;
-        let tanks = Tanks::of(description, &mut instance, self.tension.unwrap_or(WATER_TENSION))?;
+        let range = Range::read(description, &mut instance)?;
+        let tanks = Tanks::read(description, &mut instance, self.tension.unwrap_or(WATER_TENSION))?;
         if self.tension.is_some() && tanks.is_none() {
             bail!(
                 "--tension is for the tanks of Spacecraft and SloshTank (the bench's is fluid.sigma)"
@@ -210,7 +210,7 @@ impl RunArgs {
             })
             .flatten()
             .chain(tanks.iter().flat_map(|tanks| tanks.without_weight(&table)))
-            .chain(limits.words(&table))
+            .chain(limits.describe(&table))
             .collect();
         let driven = table.names().len() - columns.len();
         let table = sensors.recorded(table, driven + asked, "run", run.step)?;

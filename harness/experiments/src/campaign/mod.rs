@@ -103,7 +103,6 @@ pub fn stored_columns(description: &ModelDescription, input: Option<&str>) -> Ve
 /// A plan with the settings for its execution.
 #[derive(Clone, Debug)]
 pub struct Campaign {
-    /// Plan of the campaign.
     pub plan: Plan,
     /// True to simulate stored runs again.
     pub force: bool,
@@ -111,23 +110,19 @@ pub struct Campaign {
     pub jobs: usize,
     /// Directory of another campaign that the report compares with.
     pub compare: Option<PathBuf>,
-    /// Directory for runs, tables and report.
     pub out: PathBuf,
 }
 
 /// A failed run and the reason.
 #[derive(Clone, Debug)]
 pub struct Failure {
-    /// The run.
     pub case: Case,
-    /// Reason of the failure.
     pub reason: String,
 }
 
 /// A run of an FMU that is not the bench.
 #[derive(Clone, Debug)]
 pub struct Unanalysed {
-    /// The run.
     pub case: Case,
     /// Stored columns, thinned; empty for most runs of a large campaign ([`keeps_curves`]).
     pub history: History,
@@ -183,14 +178,11 @@ impl Done {
     }
 }
 
-/// Results of a campaign.
 #[derive(Clone, Debug, Default)]
 pub struct Results {
-    /// Analysed runs of the bench, by model, fill and amplitude as in the plan.
     pub outcomes: Vec<Outcome>,
     /// Runs of another FMU, which are not analysed.
     pub unanalysed: Vec<Unanalysed>,
-    /// Runs that failed.
     pub failures: Vec<Failure>,
 }
 
@@ -384,7 +376,7 @@ impl Campaign {
                 outcome::check_work(&case.torque, step, table.rows())?;
                 put(&table, &recipe)?;
                 let run = Run { step, ..run };
-                Outcome::of(case, &run, &mut instance, &table, false)
+                Outcome::analyse(case, &run, &mut instance, &table, false)
             });
             let analysed = analysed.inspect(|outcome| tell(outcome));
             return Ok(
@@ -450,10 +442,10 @@ impl Campaign {
                 .filter_map(|name| Some((name.as_str(), table.column(name)?)))
                 .collect();
             let time = table.column("time").unwrap_or_default();
-            let history = History::of(time, &columns);
+            let history = History::thin(time, &columns);
             let from = time.len().saturating_sub(2 * History::STRETCHES);
             let last: Vec<(&str, &[f64])> = columns.iter().map(|(n, v)| (*n, &v[from..])).collect();
-            let tail = History::of(&time[from..], &last);
+            let tail = History::thin(&time[from..], &last);
             let angles = columns.iter().filter(|(name, _)| is_slosh_angle(name));
             let angles = angles.map(|(name, values)| {
                 (values.iter().fold(0.0, |most: f64, angle| most.max(angle.abs())), *name)
@@ -463,7 +455,7 @@ impl Campaign {
             let run = Unanalysed { case: case.clone(), history, tail, largest_angle, reused };
             return Ok(Done::Unanalysed(Box::new(run)));
         }
-        Ok(match Outcome::of(case, &run, &mut instance, &table, reused) {
+        Ok(match Outcome::analyse(case, &run, &mut instance, &table, reused) {
             Ok(outcome) => {
                 tell(&outcome);
                 Done::Analysed(Box::new(outcome))
@@ -481,7 +473,7 @@ impl Campaign {
         let mut tables = Vec::new();
         type Of = dyn Fn(&Outcome) -> Option<(&Estimate, &'static str)>;
         let mut features = |name: &'static str, of: &Of| -> Result<()> {
-            let row = |run| rows::record(&FeatureRow::of(run, of(run), &plan));
+            let row = |run| rows::record(&FeatureRow::new(run, of(run), &plan));
             tables.push((name, written(&header, results.outcomes.iter().map(row))?));
             Ok(())
         };
@@ -491,7 +483,7 @@ impl Campaign {
             features("features_h1.csv", &|run| Some((&run.record.as_ref()?.h1, "h1")))?;
         }
         let analysed = results.outcomes.iter().map(|run| {
-            let row = FeatureRow::of(run, run.estimate(), &plan);
+            let row = FeatureRow::new(run, run.estimate(), &plan);
             (&run.case, None, row)
         });
         let unanalysed = results.unanalysed.iter().map(|run| (&run.case, None));
@@ -500,7 +492,7 @@ impl Campaign {
             .chain(failed)
             .map(|(case, failure)| (case, failure, FeatureRow::unanalysed(case, &plan)));
         let rows = analysed.chain(others).map(|(case, failure, row)| {
-            let made_from = rows::record(&MadeFrom::of(case, failure, fmu))?;
+            let made_from = rows::record(&MadeFrom::new(case, failure, fmu))?;
             Ok([made_from, case.varied.clone(), rows::record(&row)?].concat())
         });
         let made_from = rows::columns::<MadeFrom>()?;

@@ -16,7 +16,6 @@ use crate::progress::Progress;
 
 /// Distance of the frequencies, Hz.
 const APART: f64 = 0.0025;
-/// Largest distance of a torque without rotary slosh from the onset, N·m.
 const WITHIN: f64 = 0.0025;
 /// Steps of the grid by which the frequencies of a smaller torque may lie outside those of a larger one.
 const MARGIN: usize = 3;

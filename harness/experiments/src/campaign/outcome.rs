@@ -78,9 +78,7 @@ pub(super) fn check_work(torque: &Torque, step: f64, rows: usize) -> Result<()> 
 pub struct Totals {
     /// Largest |slosh_angle|, rad.
     pub peak_slosh_angle: f64,
-    /// Largest |slosh_angle_radial|, rad.
     pub peak_radial_angle: f64,
-    /// Largest wave height, m.
     pub peak_wave_height: f64,
     /// Largest |gyro rate minus bias|, rad/s; the bias is the mean under a sweep or noise.
     pub peak_rate: f64,
@@ -97,7 +95,7 @@ pub struct Totals {
 
 impl Totals {
     /// Returns the totals of a recording.
-    fn of_recording(table: &Table, rates: &Rates) -> Self {
+    fn from_recording(table: &Table, rates: &Rates) -> Self {
         Totals {
             peak_slosh_angle: f64::NAN,
             peak_radial_angle: f64::NAN,
@@ -105,11 +103,11 @@ impl Totals {
             gyro_errors: true,
             max_energy_residual: f64::NAN,
             stuck: f64::NAN,
-            ..Totals::of(table, rates)
+            ..Totals::from_run(table, rates)
         }
     }
 
-    fn of(table: &Table, rates: &Rates) -> Self {
+    fn from_run(table: &Table, rates: &Rates) -> Self {
         let column = |name| table.column(name).unwrap_or_default();
         let peak = |name| column(name).iter().fold(0.0_f64, |m, v| m.max(v.abs()));
         let (energy, work, heat) = (column(ENERGY), column(WORK), column(HEAT));
@@ -133,7 +131,6 @@ impl Totals {
 
 /// Rates measured by a gyro, minus their biases, rad/s.
 struct Rates {
-    /// Rate about the hub's axis.
     about_axis: Vec<f64>,
     /// Rates about x and y, if a recording has them.
     others: [Option<Vec<f64>>; 2],
@@ -152,7 +149,7 @@ impl Rates {
     /// For a sweep or noise, which turn the hub to and fro, the bias is the mean of the record. With another torque the mean
     /// also contains motion. The bias of a simulated gyro is then the mean difference from the true rate, and that of a
     /// recorded gyro is unknown and not removed.
-    fn of(table: &Table, alternates: bool, is_recording: bool) -> Rates {
+    fn measure(table: &Table, alternates: bool, is_recording: bool) -> Rates {
         let column = |name| table.column(name).unwrap_or_default();
         let (rate, truth) = (column(OMEGA_IMU), column(OMEGA));
         let has_errors = is_recording || rate != truth;
@@ -215,7 +212,6 @@ fn peak_slope(time: &[f64], signal: &[f64]) -> f64 {
 /// [`History::STRETCHES`] stretches, in the order of time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct History {
-    /// Times, s.
     pub time: Vec<f64>,
     /// Names and values.
     pub signals: Vec<(String, Vec<f64>)>,
@@ -226,7 +222,7 @@ impl History {
     pub const STRETCHES: usize = 300;
 
     /// Creates the history from columns of equal length.
-    pub fn of(time: &[f64], columns: &[(&str, &[f64])]) -> History {
+    pub fn thin(time: &[f64], columns: &[(&str, &[f64])]) -> History {
         let length = time.len().div_ceil(Self::STRETCHES);
         if length <= 2 {
             let copy = |(name, values): &(&str, &[f64])| (name.to_string(), values.to_vec());
@@ -253,7 +249,7 @@ impl History {
         }
     }
 
-    /// A signal over time.
+    /// Returns a signal as points (time, value); empty if the history does not have it.
     pub fn curve(&self, name: &str) -> Curve {
         let values = self.signals.iter().find(|(n, _)| n == name).map(|(_, values)| values);
         values.map_or(Curve::new(), |v| self.time.iter().copied().zip(v.iter().copied()).collect())
@@ -272,7 +268,7 @@ pub struct Ending {
 }
 
 impl Ending {
-    fn of(history: &History) -> Ending {
+    fn measure(history: &History) -> Ending {
         let manoeuvre = manoeuvre(&history.curve(TAU_CMD));
         let largest = |signal: &str| {
             let curve = history.curve(signal);
@@ -307,7 +303,7 @@ impl SloshPath {
     /// Length of the stretch around the onset, in slosh periods.
     pub const ONSET: f64 = 38.0;
 
-    fn of(table: &Table, onset: Option<f64>, frequency: f64) -> Self {
+    fn around_extremes(table: &Table, onset: Option<f64>, frequency: f64) -> Self {
         let column = |name| table.column(name).unwrap_or_default();
         let (time, radial, tangential) =
             (column("time"), column(SLOSH_ANGLE_RADIAL), column(SLOSH_ANGLE));
@@ -329,13 +325,11 @@ impl SloshPath {
 /// A run of the bench with its results.
 #[derive(Clone, Debug)]
 pub struct Outcome {
-    /// The run.
     pub case: Case,
     /// Model, tank and fill.
     pub range: Range,
     /// Exact linear plant with viscous friction for the run, from the FMU's calculated parameters.
     pub linear: Linear,
-    /// Totals over the whole run.
     pub totals: Totals,
     /// Estimates from the whole record; `None` if the torque is neither sweep nor noise.
     pub record: Option<Record>,
@@ -348,11 +342,9 @@ pub struct Outcome {
     pub history: History,
     /// The crest's path seen from above.
     pub path: SloshPath,
-    /// Residual motion at the run's end.
     pub ending: Ending,
     /// Dominant force on the liquid if it is not gravity ([`Range::without_weight`]).
     pub weightless: Option<String>,
-    /// True if the run was read from a file, not simulated.
     pub reused: bool,
     /// Warnings about the rates that a gyro measured.
     pub warnings: Vec<String>,
@@ -361,7 +353,6 @@ pub struct Outcome {
 /// A frequency response and its features.
 #[derive(Clone, Debug)]
 pub struct Estimate {
-    /// Rate over torque.
     pub response: FrequencyResponse,
     /// Antiresonance and resonance; none if they are not valid.
     pub features: Features,
@@ -405,7 +396,7 @@ impl std::fmt::Display for Doubt {
 impl Estimate {
     /// Creates an estimate from a response with the features between two frequencies, Hz; `doubt`
     /// is the reason to reject them.
-    fn of(
+    fn new(
         response: FrequencyResponse,
         inner: (f64, f64),
         resolution: f64,
@@ -486,7 +477,7 @@ pub struct Passing {
 impl Record {
     /// `enough`: there is an estimate to be trusted already. `unexplained`: power of what no linear
     /// response explains, at the frequencies of the responses.
-    fn of(
+    fn estimate(
         profile: &Profile,
         step: f64,
         tau: &[f64],
@@ -511,7 +502,7 @@ impl Record {
             let resolution = 1.0 / length;
             // at its ends the band is cut off, which rings
             let inner = (band.0 + resolution, band.1 - resolution);
-            Estimate::of(response, inner, resolution, |features| match features {
+            Estimate::new(response, inner, resolution, |features| match features {
                 features if closer(features, RESOLVED * resolution) => Some(Doubt::TooShort),
                 features if noisy(features) => Some(Doubt::Noise),
                 _ => None,
@@ -527,7 +518,7 @@ impl Record {
             .flatten()
             .map(|fitted| {
                 let response = fitted.frequency_response(&frequencies);
-                let estimate = Estimate::of(response, band, 1.0 / duration, |_| {
+                let estimate = Estimate::new(response, band, 1.0 / duration, |_| {
                     (fitted.misfit > MOST_MISFIT).then_some(Doubt::Noise)
                 });
                 let (deviation, deviations) = fitted.deviations(&frequencies);
@@ -560,7 +551,7 @@ impl Record {
 
 impl Passing {
     /// `unexplained`: as for [`Record`].
-    fn of(
+    fn demodulate(
         sweep: &Sweep,
         table: &Table,
         rates: &Rates,
@@ -624,7 +615,7 @@ impl Passing {
         );
         let moves = |f: f64| sweep.rate_at(f).abs() * demodulation::cycles(sweep, f) / f;
         let middle = sweep.band();
-        let mut rate = Estimate::of(rate, inner, 0.0, |features| {
+        let mut rate = Estimate::new(rate, inner, 0.0, |features| {
             let shift = |f: f64| 0.6 * sweep.rate_at(f).abs().sqrt();
             let fast = features.f_res.is_some_and(|f| closer(features, shift(f) / MOST_SHIFT));
             fast.then_some(Doubt::TooFast)
@@ -666,8 +657,9 @@ fn modelled(
 }
 
 impl Outcome {
-    /// Computes the outcome of a stored run; an initialised instance has the parameters.
-    pub(super) fn of(
+    /// Computes the outcome of a stored run. The FMU's calculated parameters, such as the mass of the liquid,
+    /// come from an initialised instance.
+    pub(super) fn analyse(
         case: &Case,
         run: &Run,
         instance: &mut Instance,
@@ -675,7 +667,7 @@ impl Outcome {
         reused: bool,
     ) -> Result<Outcome> {
         let linear = exact_linear(instance)?;
-        let mut range = Range::of(instance.description(), instance)?.context("not the bench")?;
+        let mut range = Range::read(instance.description(), instance)?.context("not the bench")?;
         if case.recording.is_some() {
             range.model = RECORDING.into();
         }
@@ -685,7 +677,7 @@ impl Outcome {
             Torque::Profile(profile) => profile.band().is_some(),
             Torque::Rows { .. } => false,
         };
-        let rates = Rates::of(table, alternates, is_recording);
+        let rates = Rates::measure(table, alternates, is_recording);
         let (record, swept) = match &run.torque {
             Torque::Rows { .. } => (None, None),
             Torque::Profile(profile) => {
@@ -697,12 +689,12 @@ impl Outcome {
                     let power = noise::power(run.step, tau, omega, &some);
                     power.into_iter().flat_map(|power| [power; 4]).collect()
                 });
-                let swept = profile
-                    .sweep()
-                    .map(|sweep| Passing::of(sweep, table, &rates, linear.arm, &unexplained));
+                let swept = profile.sweep().map(|sweep| {
+                    Passing::demodulate(sweep, table, &rates, linear.arm, &unexplained)
+                });
                 let enough =
                     swept.as_ref().is_some_and(|(passing, _)| passing.rate.doubt.is_none());
-                (Record::of(profile, run.step, tau, omega, &unexplained, enough), swept)
+                (Record::estimate(profile, run.step, tau, omega, &unexplained, enough), swept)
             }
         };
         // of a recording, the true rate at the start is the measured one less the bias
@@ -723,17 +715,17 @@ impl Outcome {
             let Torque::Profile(profile) = &run.torque else { return None };
             profile.sweep()?.time_of(rotary.from?)
         });
-        let history = History::of(column("time"), &all);
+        let history = History::thin(column("time"), &all);
         Ok(Outcome {
-            ending: Ending::of(&history),
+            ending: Ending::measure(&history),
             history,
             path: match case.recording {
                 Some(_) => SloshPath::default(),
-                None => SloshPath::of(table, onset, frequency),
+                None => SloshPath::around_extremes(table, onset, frequency),
             },
             totals: match case.recording {
-                Some(_) => Totals::of_recording(table, &rates),
-                None => Totals::of(table, &rates),
+                Some(_) => Totals::from_recording(table, &rates),
+                None => Totals::from_run(table, &rates),
             },
             warnings: rates.warnings,
             case: case.clone(),
@@ -786,7 +778,7 @@ impl Outcome {
         }
     }
 
-    /// Features of [`Outcome::estimate`].
+    /// Returns the features of [`Outcome::estimate`], empty without an estimate.
     pub fn features(&self) -> Features {
         self.estimate().map_or(Features::default(), |(estimate, _)| estimate.features)
     }
@@ -798,22 +790,22 @@ impl Outcome {
         (!how.is_empty()).then(|| how.join("; "))
     }
 
-    /// Features of the `spa` response.
+    /// Returns the features of the `spa` response, empty without one.
     pub fn spa_features(&self) -> Features {
         self.record.as_ref().map_or(Features::default(), |record| record.spa.features)
     }
 
-    /// The fitted linear model.
+    /// Returns the linear model that was fitted to the `spa` response.
     pub fn fit(&self) -> Option<ModelFit> {
         Some(self.record.as_ref()?.fit.as_ref()?.0)
     }
 
-    /// Share of the liquid's force off the axis.
+    /// Returns the share of the liquid's force off the axis, which is known only for sweeps.
     pub fn off_axis(&self) -> Option<OffAxis> {
         self.passing.as_ref()?.off_axis
     }
 
-    /// The liquid's regime at its largest wave; `None` of a recording, which has no wave.
+    /// Returns the liquid's regime at its largest wave; `None` for a recording, which has no wave.
     pub fn regime(&self) -> Option<&'static str> {
         let ratio = self.totals.peak_wave_height / self.range.radius;
         (!ratio.is_nan()).then(|| match Regime::of(ratio) {
@@ -850,8 +842,8 @@ pub struct Range {
 }
 
 impl Range {
-    /// Range of an initialised instance; `None` if the FMU is not the bench.
-    pub fn of(description: &ModelDescription, instance: &mut Instance) -> Result<Option<Range>> {
+    /// Reads the range of an initialised instance; `None` if the FMU is not the bench.
+    pub fn read(description: &ModelDescription, instance: &mut Instance) -> Result<Option<Range>> {
         if !super::is_bench(description) {
             return Ok(None);
         }
@@ -919,12 +911,12 @@ fn item(instance: &mut Instance, name: &str, kind: &str) -> Result<Option<String
     Ok(found.map(|item| item.name.clone()))
 }
 
-/// The linear model that has the FMU's own (calculated) parameters, with viscous friction unless the
-/// FMU has none, and the line that it hangs from.
+/// Computes the linear model with the FMU's own (calculated) parameters, with viscous friction unless the FMU
+/// has none, and with the line from which the bench hangs.
 pub(super) fn exact_linear(instance: &mut Instance) -> Result<Linear> {
     let mut real = |name: &str| instance.real(name);
     let arm = real(tank::R)?;
-    // What of the modes' masses is carried across their directions.
+    // Share of the modes' masses that is carried across the direction of the mode.
     let (mut modes, mut carried) = (Vec::new(), 0.0);
     for n in 1..=slosh::MOST_MODES {
         let mass = real(&slosh::MASS.at([n]))?;
@@ -948,7 +940,7 @@ pub(super) fn exact_linear(instance: &mut Instance) -> Result<Linear> {
     let viscous = real(friction::B)?;
     let law = item(instance, friction::MODEL, friction::KIND)?;
     let bearing = if law.as_deref() == Some(FrictionModel::None.name()) { 0.0 } else { viscous };
-    // A bench of before 0.4 hangs from no line.
+    // In versions before 0.4 the bench does not hang from a line.
     let mut line = |name: &str| instance.real(name).unwrap_or(0.0);
     let (stiffness, friction) = (line(hub::K), bearing + line(hub::C));
     Ok(Linear { inertia, friction, stiffness, arm, modes })

@@ -216,7 +216,7 @@ impl Sought<'_> {
         !is_plain && self.found_in(&reversed).1 > correlation.max(LEAST_CORRELATION)
     }
 
-    /// Time of the sweep at a row of the record.
+    /// Returns the time of the sweep, s, at a row of the record.
     fn time(&self, clock: Clock, row: usize) -> f64 {
         self.span.0 + (row as f64 - clock.first) * self.step / (1.0 + clock.rate)
     }

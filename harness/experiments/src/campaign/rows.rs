@@ -66,7 +66,7 @@ impl FeatureRow {
     }
 
     /// Returns the row of a run with one of its estimates and the estimator's name.
-    pub fn of(
+    pub fn new(
         run: &Outcome,
         estimate: Option<(&Estimate, &'static str)>,
         plan_sha256: &str,
@@ -133,7 +133,7 @@ pub struct MadeFrom {
 
 impl MadeFrom {
     /// Returns the row of a run, with the reason if it failed.
-    pub fn of(case: &Case, failure: Option<&Failure>, fmu: &host::fmu::Fmu) -> MadeFrom {
+    pub fn new(case: &Case, failure: Option<&Failure>, fmu: &host::fmu::Fmu) -> MadeFrom {
         let recording = case.recording.as_ref();
         let file = recording.and_then(|recording| input::open(&recording.path).ok());
         MadeFrom {

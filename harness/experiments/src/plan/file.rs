@@ -45,7 +45,6 @@ impl fmt::Display for Scalar {
     }
 }
 
-/// Keys of the file.
 const KEYS: [&str; 14] = [
     "title",
     "profile",
@@ -132,7 +131,6 @@ pub(super) fn read(text: &str, problems: &mut Problems) -> Option<Plan> {
     })
 }
 
-/// Values by name.
 type Values<'t, 'i> = Vec<(String, &'t Spanned<DeValue<'i>>)>;
 
 /// Returns values by name. In TOML `tank.h = 1` is a table in a table; here it is the name

@@ -80,9 +80,7 @@ impl<T> Named<T> {
 /// Plan of a campaign.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// Title of the report.
     pub title: String,
-    /// The file's text.
     pub text: String,
     profile: Named<Written>,
     step: f64,
@@ -116,9 +114,7 @@ pub(crate) struct Onset {
 pub struct Sweeps {
     /// Values of `slosh.model`, by name.
     pub models: Vec<String>,
-    /// Fills, m.
     pub fills: Vec<f64>,
-    /// Torque amplitudes, N·m.
     pub amplitudes: Vec<f64>,
     /// Name of the profile, `exp-sweep` or `lin-sweep`.
     pub profile: &'static str,
@@ -139,7 +135,6 @@ struct Listed {
 /// A recording of a run, and the columns of its signals.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recorded {
-    /// File.
     pub path: PathBuf,
     /// Columns and units.
     pub columns: Columns,
@@ -151,7 +146,6 @@ pub const RECORDING: &str = "recording";
 /// One run of a plan.
 #[derive(Clone, Debug)]
 pub struct Case {
-    /// Name, unique in the plan; the run's file is `runs/<name>.parquet`.
     pub name: String,
     /// The name of its `[[run]]`, if the plan gives one.
     pub listed: Option<String>,
@@ -164,9 +158,7 @@ pub struct Case {
     pub fill: Option<f64>,
     /// The profile's `amplitude`, N·m, if it has one.
     pub amplitude: Option<f64>,
-    /// The profile's text.
     pub profile: String,
-    /// Torque of the profile.
     pub torque: Arc<Torque>,
     /// SHA-256 of the torque's file, if it comes from one.
     pub torque_sha256: Option<String>,
@@ -176,20 +168,18 @@ pub struct Case {
     pub settings: Vec<(String, String)>,
     /// Time between the rows of the result, and between the commands of the profile, s.
     pub step: f64,
-    /// Stop time, s.
     pub stop: f64,
     /// Relative tolerance of the FMU's solver; `None`: the FMU's own.
     pub tolerance: Option<f64>,
     /// True if the torque is held over each step.
     pub hold: bool,
-    /// Sensors recorded in addition to the FMU's variables.
     pub sensors: Vec<Sensor>,
     /// Recording of a bench under this torque, read in place of a simulation.
     pub recording: Option<Recorded>,
 }
 
 impl Case {
-    /// Run that the case describes.
+    /// Returns the run that the case describes.
     pub fn run(&self) -> Run {
         Run {
             settings: self.settings.clone(),
@@ -317,8 +307,6 @@ impl Plan {
         }
     }
 
-    /// Returns the names that the plan varies: first those of its `[[run]]`s, then `[vary]`,
-    /// `[random]` and `[count]`.
     pub fn varied(&self) -> Vec<&str> {
         let mut names = self.grouping();
         names.extend(self.draws.iter().flat_map(|d| &d.draw).map(|one| one.name.as_str()));
@@ -384,7 +372,7 @@ impl Plan {
         }
     }
 
-    /// Settings of every run, by FMU name.
+    /// Returns the settings of every run by FMU name.
     pub fn set(&self) -> impl Iterator<Item = (&str, &str)> {
         self.set.iter().map(|set| (set.name.as_str(), set.value.as_str()))
     }

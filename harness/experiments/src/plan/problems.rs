@@ -2,17 +2,16 @@
 
 use anyhow::{Result, bail};
 
-/// Lines of a file, ascending; empty without a file.
+/// Line numbers of a file, ascending; empty without a file.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Lines(Vec<usize>);
 
 impl Lines {
-    /// One line.
     pub fn one(line: usize) -> Self {
         Lines(vec![line])
     }
 
-    /// Returns both sets of lines.
+    /// Returns the union of both sets of lines.
     pub fn and(&self, other: &Lines) -> Self {
         let mut all = [&self.0[..], &other.0].concat();
         all.sort_unstable();
@@ -21,7 +20,7 @@ impl Lines {
     }
 
     /// Returns the lines as words that begin a message.
-    fn words(&self) -> String {
+    fn prefix(&self) -> String {
         match &self.0[..] {
             [] => String::new(),
             [one] => format!("line {one}: "),
@@ -33,7 +32,7 @@ impl Lines {
     }
 }
 
-/// Errors, each once.
+/// Problems, each recorded only once.
 #[derive(Default)]
 pub(super) struct Problems(Vec<(Lines, String)>);
 
@@ -45,7 +44,7 @@ impl Problems {
         }
     }
 
-    /// Returns the value, or records the problem.
+    /// Returns the value of a result; an error is recorded as a problem of these lines.
     pub fn take<T>(&mut self, lines: &Lines, result: Result<T>) -> Option<T> {
         result.map_err(|error| self.add(lines, format!("{error:#}"))).ok()
     }
@@ -54,11 +53,11 @@ impl Problems {
         self.0.len()
     }
 
-    /// Fails if there are problems, in the file's order.
+    /// Returns all problems as one error, in the order of the file; nothing if there are none.
     pub fn check(mut self) -> Result<()> {
         self.0.sort_by_key(|(lines, _)| lines.0.first().copied());
         let all: Vec<String> =
-            self.0.iter().map(|(lines, problem)| lines.words() + problem).collect();
+            self.0.iter().map(|(lines, problem)| lines.prefix() + problem).collect();
         match &all[..] {
             [] => Ok(()),
             [one] => bail!("{one}"),

@@ -1,5 +1,3 @@
-//! `[random]`: values drawn from distributions.
-
 use analysis::random::Random;
 use anyhow::{Result, bail};
 use host::description::{ModelDescription, Type, Variable};
@@ -11,7 +9,6 @@ use crate::profile::Written;
 /// Largest number of draws until a number lies within its bounds.
 const MOST_DRAWS: usize = 10_000;
 
-/// `[random]`.
 #[derive(Clone, Debug)]
 pub(super) struct Draws {
     pub runs: usize,

@@ -1,5 +1,5 @@
-//! Every profile, one entry each: the parser, `--help`, the keys `profile.…` of plans, the page of
-//! the documentation and the torque itself come from here.
+//! The table of all profiles. The parser, `--help`, the keys `profile.…` of plans, the page of the
+//! documentation and the torque itself are made from it.
 
 use std::sync::Arc;
 
@@ -13,55 +13,46 @@ use super::shape::{Dwell, Piece, Pieces, Shape};
 /// A kind of torque history. Times in s, frequencies in Hz, torques in N·m.
 #[derive(Debug)]
 pub struct Kind {
-    /// Name.
     pub name: &'static str,
-    /// Description of the torque, for readers.
+    /// Description of the torque for readers of help and documentation.
     pub says: &'static str,
-    /// Parameters; one is called `duration`.
+    /// Parameters; one of them is `duration`.
     pub parameters: &'static [Parameter],
-    /// Conditions between several parameters, each with its sentence.
+    /// Conditions on several parameters, each with the sentence that states it.
     pub(super) demands: &'static [Demand],
-    /// The torque; the values are allowed ones.
+    /// Makes the torque from values that are allowed.
     pub(super) shape: fn(&Values) -> Arc<dyn Shape>,
 }
 
 /// A condition, and the sentence that states it.
 pub(super) type Demand = (fn(&Values) -> bool, &'static str);
 
-/// A number that a profile or a sensor is given.
+/// A parameter of a profile or a sensor: its name, default, unit (empty without one) and label on axes.
 #[derive(Clone, Copy, Debug)]
 pub struct Parameter {
-    /// Name.
     pub name: &'static str,
-    /// Value where none is given.
     pub default: f64,
-    /// Unit; empty if it has none.
     pub unit: &'static str,
-    /// Label on axes.
     pub label: &'static str,
     /// Allowed values.
     pub allowed: Allowed,
 }
 
-/// Allowed values of a parameter; all are finite.
+/// Allowed values of a parameter; all must be finite.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Allowed {
-    /// All.
     Any,
-    /// All but 0.
     NotZero,
-    /// Above 0.
     Positive,
-    /// 0 or above.
     NotNegative,
-    /// Within ±this.
+    /// From minus this to this.
     Within(f64),
     /// Whole numbers from 0 to this.
     Whole(f64),
 }
 
 impl Allowed {
-    /// States what is wrong with a value; the text follows the parameter's name.
+    /// States what is wrong with a value, worded to follow the parameter's name; `None` for an allowed value.
     pub(super) fn fault(self, value: f64) -> Option<String> {
         let (met, demand) = match self {
             Allowed::Any => (true, String::new()),
@@ -81,7 +72,7 @@ impl Allowed {
 }
 
 impl Parameter {
-    /// A number as it is written: in the parameter's unit, or an angle in degrees (90deg), a length in mm (5mm).
+    /// Parses a number in the parameter's unit. Angles may be in degrees (90deg) and lengths in mm (5mm).
     pub(super) fn number(&self, text: &str) -> Option<f64> {
         let (text, factor) = match self.unit {
             "rad" => text.strip_suffix("deg").map_or((text, 1.0), |t| (t, 1f64.to_radians())),
@@ -110,7 +101,7 @@ const fn time(name: &'static str, default: f64, label: &'static str) -> Paramete
     parameter(name, default, "s", label, Allowed::NotNegative)
 }
 
-/// A sweep from a first frequency of which this is allowed.
+/// Returns the parameters of a sweep whose first frequency is restricted to `first`.
 const fn sweep_from(first: Allowed) -> [Parameter; 4] {
     [
         parameter(
@@ -125,33 +116,33 @@ const fn sweep_from(first: Allowed) -> [Parameter; 4] {
         duration(Sweep::THESIS.duration),
     ]
 }
-/// No sweep stays where it is.
-const MOVES: Demand = (|v| v.of("f0") != v.of("f1"), "f0 and f1 are equal; use sine");
-/// Range of frequencies; above it, the phase of a sine has no valid digits.
+/// Condition that the frequencies of a sweep differ.
+const MOVES: Demand = (|v| v.value("f0") != v.value("f1"), "f0 and f1 are equal; use sine");
+/// Condition on frequencies: beyond this range the phase of a sine has no valid digits.
 const BAND: Demand = (
-    |v| ["f0", "f1"].iter().all(|name| (1.0 / FREQUENCY..=FREQUENCY).contains(&v.of(name))),
+    |v| ["f0", "f1"].iter().all(|name| (1.0 / FREQUENCY..=FREQUENCY).contains(&v.value(name))),
     "f0 and f1 must be from 1e-9 to 1e9 Hz",
 );
 
-/// Condition for a band that may begin at 0 Hz.
+/// Condition on a band that may begin at 0 Hz.
 const BAND_FROM_ZERO: Demand = (
     |v| {
         let band = 1.0 / FREQUENCY..=FREQUENCY;
-        let (f0, f1) = (v.of("f0"), v.of("f1"));
+        let (f0, f1) = (v.value("f0"), v.value("f1"));
         (f0 == 0.0 || band.contains(&f0)) && band.contains(&f1)
     },
     "f0 must be 0 or, as f1, from 1e-9 to 1e9 Hz",
 );
 const NOISE_BAND: [Demand; 2] =
-    [(|v| v.of("f0") < v.of("f1"), "it expects f0 < f1"), BAND_FROM_ZERO];
+    [(|v| v.value("f0") < v.value("f1"), "it expects f0 < f1"), BAND_FROM_ZERO];
 
 fn noise(v: &Values, limit: f64) -> Noise {
-    let band = (v.of("f0"), v.of("f1"));
-    Noise::new(v.of("rms"), band, v.of("exponent"), v.of("seed") as u64, limit)
+    let band = (v.value("f0"), v.value("f1"));
+    Noise::new(v.value("rms"), band, v.value("exponent"), v.value("seed") as u64, limit)
 }
 
 fn sweep(v: &Values, law: Law) -> Arc<dyn Shape> {
-    let [amplitude, f0, f1, duration] = ["amplitude", "f0", "f1", "duration"].map(|n| v.of(n));
+    let [amplitude, f0, f1, duration] = ["amplitude", "f0", "f1", "duration"].map(|n| v.value(n));
     Arc::new(Sweep { amplitude, f0, f1, duration, law })
 }
 
@@ -159,7 +150,7 @@ fn pieces(list: impl Into<Vec<Piece>>) -> Arc<dyn Shape> {
     Arc::new(Pieces(list.into()))
 }
 
-/// All profiles but [`FILE`].
+/// All profiles except [`FILE`].
 pub const KINDS: &[Kind] = &[
     Kind {
         name: "exp-sweep",
@@ -184,7 +175,9 @@ pub const KINDS: &[Kind] = &[
             duration(60.0),
         ],
         demands: &[],
-        shape: |v| Arc::new(Dwell { amplitude: v.of("amplitude"), frequency: v.of("frequency") }),
+        shape: |v| {
+            Arc::new(Dwell { amplitude: v.value("amplitude"), frequency: v.value("frequency") })
+        },
     },
     Kind {
         name: "constant",
@@ -194,7 +187,7 @@ pub const KINDS: &[Kind] = &[
             duration(20.0),
         ],
         demands: &[],
-        shape: |v| pieces([Piece::always(v.of("amplitude"))]),
+        shape: |v| pieces([Piece::always(v.value("amplitude"))]),
     },
     Kind {
         name: "pulse",
@@ -206,7 +199,7 @@ pub const KINDS: &[Kind] = &[
             duration(20.0),
         ],
         demands: &[],
-        shape: |v| pieces([Piece::new(v.of("start"), v.of("width"), v.of("amplitude"))]),
+        shape: |v| pieces([Piece::new(v.value("start"), v.value("width"), v.value("amplitude"))]),
     },
     Kind {
         name: "bang-stop-bang",
@@ -221,7 +214,7 @@ pub const KINDS: &[Kind] = &[
         demands: &[],
         shape: |v| {
             let [amplitude, start, bang, stop] =
-                ["amplitude", "start", "bang", "stop"].map(|n| v.of(n));
+                ["amplitude", "start", "bang", "stop"].map(|n| v.value(n));
             pieces([
                 Piece::new(start, bang, amplitude),
                 Piece::new(start + bang + stop, bang, -amplitude),
@@ -233,7 +226,7 @@ pub const KINDS: &[Kind] = &[
         says: "inertia × acceleration for `width` seconds from `start` on, as of a wheel whose speed changes linearly (thesis 2.7.1)",
         parameters: &[
             parameter("acceleration", 0.1, "rad/s²", "acceleration", Allowed::Any),
-            // hub.I + tank.m_liq tank.r² at the FMU's start values
+            // hub.I + tank.m_liq tank.r² at the FMU's start values.
             parameter("inertia", 0.428054, "kg·m²", "inertia", Allowed::Positive),
             time("start", 1.0, "start of the torque"),
             time("width", 5.0, "length of the pulse"),
@@ -241,8 +234,8 @@ pub const KINDS: &[Kind] = &[
         ],
         demands: &[],
         shape: |v| {
-            let torque = v.of("inertia") * v.of("acceleration");
-            pieces([Piece::new(v.of("start"), v.of("width"), torque)])
+            let torque = v.value("inertia") * v.value("acceleration");
+            pieces([Piece::new(v.value("start"), v.value("width"), torque)])
         },
     },
     Kind {
@@ -261,11 +254,11 @@ pub const KINDS: &[Kind] = &[
             NOISE_BAND[0],
             NOISE_BAND[1],
             (
-                |v| v.of("rms") <= v.of("limit") / 2.0,
+                |v| v.value("rms") <= v.value("limit") / 2.0,
                 "rms must be at most half of limit (else too much of it is clipped)",
             ),
         ],
-        shape: |v| Arc::new(noise(v, v.of("limit"))),
+        shape: |v| Arc::new(noise(v, v.value("limit"))),
     },
     Kind {
         name: "sine-noise",
@@ -285,14 +278,14 @@ pub const KINDS: &[Kind] = &[
             NOISE_BAND[0],
             NOISE_BAND[1],
             (
-                |v| v.of("amplitude").abs() + 2.0 * v.of("rms") <= v.of("limit"),
+                |v| v.value("amplitude").abs() + 2.0 * v.value("rms") <= v.value("limit"),
                 "amplitude and twice rms together must be within limit (else too much is clipped)",
             ),
         ],
         shape: |v| {
-            let dwell = Dwell { amplitude: v.of("amplitude"), frequency: v.of("frequency") };
+            let dwell = Dwell { amplitude: v.value("amplitude"), frequency: v.value("frequency") };
             let noise = noise(v, f64::INFINITY);
-            Arc::new(DwellInNoise { dwell, noise, limit: v.of("limit") })
+            Arc::new(DwellInNoise { dwell, noise, limit: v.value("limit") })
         },
     },
     Kind {
@@ -304,7 +297,7 @@ pub const KINDS: &[Kind] = &[
     },
 ];
 
-/// The profile that is not a formula: how it is written, and what it is.
+/// The only profile that is not a formula: its text, and its description.
 pub const FILE: (&str, &str) = (
     "file:path=FILE,hold=false",
     "the rows of a CSV or Parquet file with the columns `time` and `tau_cmd`, joined by lines, or held with hold=true; a relative path starts where the command is started",

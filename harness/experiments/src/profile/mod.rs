@@ -1,4 +1,4 @@
-//! Torque against time: named profiles with parameters ([`KINDS`]), or the rows of a file.
+//! Torque as a function of time: named profiles with parameters ([`KINDS`]), or the rows of a file.
 
 mod kinds;
 mod noise;
@@ -32,18 +32,18 @@ pub struct Profile {
     shape: Arc<dyn Shape>,
 }
 
-/// The values of a kind's parameters, by name.
 pub struct Values<'a> {
     kind: &'a Kind,
     values: &'a [f64],
 }
 
 impl Values<'_> {
-    /// The value of a parameter.
+    /// Returns the value of a parameter.
     ///
     /// # Panics
+    ///
     /// If the kind has no such parameter.
-    pub fn of(&self, name: &str) -> f64 {
+    pub fn value(&self, name: &str) -> f64 {
         self.get(name).unwrap_or_else(|| panic!("{} has no {name}", self.kind.name))
     }
 
@@ -54,7 +54,7 @@ impl Values<'_> {
 }
 
 impl Kind {
-    /// Returns the profile's text with these values, as the parser takes it.
+    /// Formats the profile with these values, as the parser reads it.
     fn written(&self, values: &[f64]) -> String {
         let pairs = self.parameters.iter().zip(values);
         let pairs: Vec<_> = pairs.map(|(p, value)| format!("{}={value}", p.name)).collect();
@@ -66,7 +66,7 @@ impl Kind {
     }
 }
 
-/// Every profile with its defaults and what it is, for `--help`.
+/// Lists every profile with its defaults and description, for `--help`.
 pub fn help() -> String {
     let all = KINDS.iter().map(|kind| (kind.written(&kind.defaults()), kind.says));
     all.chain([(FILE.0.into(), FILE.1)])
@@ -74,7 +74,7 @@ pub fn help() -> String {
         .collect()
 }
 
-/// Every profile as a Markdown table, as the documentation shows it.
+/// Lists every profile as a Markdown table for the documentation.
 pub fn table() -> String {
     let mut text =
         String::from("| profile, with its defaults | torque | units |\n| --- | --- | --- |\n");
@@ -88,7 +88,7 @@ pub fn table() -> String {
     text
 }
 
-/// The profiles that take numbers, for programs.
+/// Lists the profiles with numeric parameters as JSON, for programs.
 pub fn list() -> Vec<serde_json::Value> {
     let parameter =
         |p: &kinds::Parameter| json!({ "name": p.name, "unit": p.unit, "default": p.default });
@@ -102,7 +102,7 @@ pub fn list() -> Vec<serde_json::Value> {
     KINDS.iter().map(profile).collect()
 }
 
-/// A profile as it was written, `name` or `name:key=value,key=value`: not yet looked at.
+/// The text of a profile, `name` or `name:key=value,key=value`, split but not yet checked.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Written {
     name: String,
@@ -118,12 +118,12 @@ impl FromStr for Written {
 }
 
 impl Written {
-    /// Parses text. Error messages begin with `what`.
+    /// Splits a text into name and pairs. Error messages begin with `what`, such as "profile".
     pub(crate) fn read(what: &str, text: &str) -> Result<Self> {
         let (name, rest) = text.split_once(':').unwrap_or((text, ""));
         let name = name.trim();
         let mut written = Written { name: name.into(), pairs: Vec::new() };
-        // a comma within a name, p[1,2], divides no pairs
+        // A comma within the name of an array's element, p[1,2], does not separate pairs.
         let mut depth = 0i32;
         let pairs = rest.split(|c| {
             depth += i32::from(c == '[') - i32::from(c == ']');
@@ -153,23 +153,26 @@ impl fmt::Display for Written {
 }
 
 impl Written {
-    /// Name of its kind: `sine`.
     pub(crate) fn kind(&self) -> &str {
         &self.name
     }
 
-    /// Gives a parameter another value.
+    /// Sets a parameter, in place of the value in the text.
     pub fn set(&mut self, key: &str, value: &str) {
         self.pairs.retain(|(k, _)| k != key);
         self.pairs.push((key.into(), value.into()));
     }
 
-    /// The torque it stands for; a file is read.
+    /// Makes the torque; a file is read.
+    ///
+    /// # Errors
+    ///
+    /// If there is no such profile, a parameter is unknown or not allowed, or the file cannot be read.
     pub fn torque(&self) -> Result<Torque> {
         if self.name == "file" { self.file() } else { Ok(Torque::Profile(self.profile()?)) }
     }
 
-    /// The file that `file:path=…` names.
+    /// Returns the path in `file:path=…`, `None` for other profiles.
     pub fn path(&self) -> Option<&Path> {
         let path = self.pairs.iter().find(|(key, _)| key == "path");
         path.filter(|_| self.name == "file").map(|(_, path)| Path::new(path))
@@ -189,25 +192,24 @@ impl Written {
         Torque::read(path, held)
     }
 
-    /// Returns true if a parameter takes integers only.
+    /// Returns true if a parameter takes only integers.
     pub fn is_whole(&self, key: &str) -> bool {
         let kind = KINDS.iter().find(|kind| kind.name == self.name);
         let parameter = kind.and_then(|kind| kind.parameters.iter().find(|p| p.name == key));
         parameter.is_some_and(|p| matches!(p.allowed, Allowed::Whole(_)))
     }
 
-    /// The name before the colon.
     pub(crate) fn name(&self) -> &str {
         &self.name
     }
 
-    /// Takes a key that is not a number away.
     pub(crate) fn take(&mut self, key: &str) -> Option<String> {
         let place = self.pairs.iter().position(|(k, _)| k == key)?;
         Some(self.pairs.remove(place).1)
     }
 
-    /// The values of these parameters, in their order, the defaults where none is given; and all that is wrong with them.
+    /// Returns the values of `parameters` in their order, with defaults where the text gives none, and a list
+    /// of everything that is wrong with the text.
     pub(crate) fn values(&self, parameters: &[Parameter]) -> (Vec<f64>, Vec<String>) {
         let mut values: Vec<f64> = parameters.iter().map(|p| p.default).collect();
         let mut problems = Vec::new();
@@ -251,14 +253,14 @@ impl Written {
 impl FromStr for Profile {
     type Err = anyhow::Error;
 
-    /// `name` or `name:key=value,key=value`; what is not given has its default.
+    /// Parses `name` or `name:key=value,key=value`; parameters that are not given have their defaults.
     fn from_str(text: &str) -> Result<Self> {
         text.parse::<Written>()?.profile()
     }
 }
 
 impl fmt::Display for Profile {
-    /// Writes the profile as the parser reads it, with every parameter.
+    /// Formats the profile with every parameter, as the parser reads it.
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         f.write_str(&self.kind.written(&self.values))
     }
@@ -275,47 +277,48 @@ impl Profile {
         Values { kind: self.kind, values: &self.values }.get(name)
     }
 
-    /// Description of a parameter.
+    /// Returns the description of a parameter, if the profile has it.
     pub fn parameter(&self, name: &str) -> Option<&'static Parameter> {
         self.kind.parameters.iter().find(|parameter| parameter.name == name)
     }
 
-    /// Length, s.
+    /// Returns the duration, s.
     pub fn duration(&self) -> f64 {
         self.get("duration").unwrap_or(0.0)
     }
 
-    /// Returns the parameter `amplitude`, N·m, if it has one.
     pub fn amplitude(&self) -> Option<f64> {
         self.get("amplitude")
     }
 
-    /// Returns the parameter `frequency`, Hz, if it has one.
     pub fn frequency(&self) -> Option<f64> {
         self.get("frequency")
     }
 
-    /// The sweep, if its frequency sweeps.
+    /// Returns the sweep, if the profile is one.
     pub fn sweep(&self) -> Option<&Sweep> {
         self.shape.sweep()
     }
 
-    /// The frequencies it excites uniformly enough for a frequency response, from and to, Hz; `None`
-    /// if there are none.
+    /// Returns the lowest and highest frequency (Hz) that the torque excites uniformly enough for a frequency
+    /// response; `None` if there are none.
     pub fn band(&self) -> Option<(f64, f64)> {
         self.shape.band()
     }
 }
 
-/// Interval at which the torque of a profile is commanded, s: 50 Hz, as on the thesis's bench.
+/// Default interval between two commands of a profile, s: 50 Hz, as on the thesis's bench.
 pub const SAMPLE: f64 = 0.02;
-/// A line between two commands differs from a sine of the frequency f by at most (2π f · interval)²/8 of its amplitude. Commands that
-/// are a given interval apart may differ by this part, so that the thesis's sweeps up to 3.5 Hz are commanded at 50 Hz.
+/// Largest error of straight lines between commands at the given interval, as a fraction of the amplitude.
+/// For a sine of frequency f the error is (2π f · interval)²/8. The value allows the thesis's sweeps up to
+/// 3.5 Hz to be commanded at 50 Hz.
 pub const COARSEST: f64 = 0.025;
-/// The same for commands that are closer than the given interval because of [`COARSEST`].
+/// Largest error of straight lines between commands that are closer than the given interval because of
+/// [`COARSEST`].
 const FINEST: f64 = 0.001;
 
-/// Returns the largest product of frequency and interval (cycles) for which lines differ by at most this part of the amplitude.
+/// Returns the largest product of frequency and interval (cycles) at which lines differ from a sine by at
+/// most the fraction `error` of its amplitude.
 pub fn cycles(error: f64) -> f64 {
     (8.0 * error).sqrt() / std::f64::consts::TAU
 }
@@ -323,19 +326,21 @@ pub fn cycles(error: f64) -> f64 {
 /// Source of a run's torque.
 #[derive(Clone, Debug)]
 pub enum Torque {
-    /// A formula.
     Profile(Profile),
-    /// Rows, torque in N·m.
+    /// Rows of time (s) and torque (N·m).
     Rows {
-        /// The rows.
         history: History,
-        /// True if they are held from row to row, else they are linear between rows.
+        /// True if each row holds until the next; false for straight lines between rows.
         held: bool,
     },
 }
 
 impl Torque {
-    /// Reads the columns `time,tau_cmd` of a file.
+    /// Reads the columns `time` (s) and `tau_cmd` (N·m) of a file. `held`: see [`Torque::Rows`].
+    ///
+    /// # Errors
+    ///
+    /// If the file cannot be read as a history of inputs.
     pub fn read(path: &Path, held: bool) -> Result<Self> {
         let signal =
             Signal { name: TAU_CMD, required: true, between: Between::Missing, unit: None };
@@ -346,13 +351,18 @@ impl Torque {
             .with_context(|| format!("{} cannot be used", path.display()))
     }
 
-    /// Returns a torque from rows. With `slopes` the torque follows each row's slope until the next row, and may jump there.
+    /// Makes a torque from rows of time (s) and torque (N·m). With `slopes` (N·m/s) the torque follows each
+    /// row's slope until the next row, and may jump there.
+    ///
+    /// # Errors
+    ///
+    /// If there are no rows, or the times do not ascend.
     pub fn rows(time: &[f64], tau: &[f64], slopes: Option<&[f64]>, held: bool) -> Result<Self> {
         let slopes = slopes.map(<[f64]>::to_vec);
         Ok(Torque::Rows { history: History::new(time.to_vec(), tau.to_vec(), slopes, held)?, held })
     }
 
-    /// First and last time, s.
+    /// Returns first and last time, s.
     pub fn span(&self) -> (f64, f64) {
         match self {
             Torque::Profile(profile) => (0.0, profile.duration()),
@@ -363,22 +373,24 @@ impl Torque {
         }
     }
 
-    /// Torque at `t`, N·m (at a jump: after it).
+    /// Returns the torque at `t` (s), N·m; at a jump the value after it.
     pub fn at(&self, t: f64) -> f64 {
         match self {
             Torque::Profile(profile) => profile.shape.after(t),
-            // communication points k·H may lie an ulp before the row they are meant to meet
+            // Communication points k·H may lie one ulp before the row that they coincide with.
             Torque::Rows { history, .. } => history.near(t),
         }
     }
 
-    /// The torque until `stop` (s) as rows that are joined by lines or held. The rows of a file are its own. Edges of a profile
-    /// are rows. A profile that oscillates has a row every `sample` seconds. If lines between those would differ from
-    /// it by more than 2.5 % of the amplitude, `sample` is divided so that they differ by at most 0.1 %. Held rows are never
-    /// divided.
+    /// Returns the torque until `stop` (s) as rows that are joined by lines or held. The rows of a file are
+    /// unchanged. Edges of a profile are rows. A profile that oscillates has a row every `sample` seconds. If
+    /// lines between those would differ from it by more than 2.5 % of the amplitude, `sample` is divided so
+    /// that they differ by at most 0.1 %. Held rows are never divided.
     ///
     /// # Errors
-    /// There would be more than [`budget::ROWS`] rows, or the profile has frequencies above half of the rate of held rows.
+    ///
+    /// If there would be more than [`budget::ROWS`] rows, or the profile has frequencies above half of the
+    /// rate of held rows.
     pub fn history(&self, sample: f64, stop: f64, hold: bool) -> Result<Cow<'_, History>> {
         match self {
             Torque::Rows { history, .. } if hold => Ok(Cow::Owned(history.held())),
@@ -387,7 +399,11 @@ impl Torque {
         }
     }
 
-    /// Returns the number of rows of [`Torque::history`], or fails as it does.
+    /// Returns the number of rows of [`Torque::history`] without making them.
+    ///
+    /// # Errors
+    ///
+    /// As [`Torque::history`].
     pub fn count(&self, sample: f64, stop: f64, hold: bool) -> Result<usize> {
         Ok(match self {
             Torque::Rows { history, .. } => history.time().len(),
@@ -398,7 +414,11 @@ impl Torque {
         })
     }
 
-    /// Fails if rows that are `step` s apart cannot show the torque because it has frequencies of half of their rate or more.
+    /// Checks that rows `step` s apart can represent the torque.
+    ///
+    /// # Errors
+    ///
+    /// If its highest frequency is half of the rows' rate or more.
     pub fn check_rows(&self, step: f64, stop: f64) -> Result<()> {
         let Torque::Profile(profile) = self else { return Ok(()) };
         let highest = profile.shape.highest(stop);
@@ -412,8 +432,8 @@ impl Torque {
 }
 
 impl Profile {
-    /// Number of intervals between commands until `stop`, perhaps not a whole one, and of those in `sample` s; `None`: the torque is constant between its
-    /// edges.
+    /// Returns the number of intervals between commands until `stop`, which may have a fraction, and the
+    /// number of intervals in `sample` s; `None` if the torque is constant between its edges.
     fn commands(&self, sample: f64, stop: f64, hold: bool) -> Result<Option<(f64, usize)>> {
         let highest = self.shape.highest(stop);
         if highest == 0.0 {
@@ -448,7 +468,7 @@ impl Profile {
         Ok(Some((intervals, parts as usize)))
     }
 
-    /// See [`Torque::history`].
+    /// Makes the rows; see [`Torque::history`].
     fn history(&self, sample: f64, stop: f64, hold: bool) -> Result<History> {
         let (mut time, mut values) = (vec![0.0], vec![self.shape.after(0.0)]);
         let mut row = |t: f64| {
@@ -460,7 +480,7 @@ impl Profile {
             edges.sort_by(f64::total_cmp);
             let mut last = 0.0;
             for edge in edges {
-                // two edges an ulp apart are one
+                // Two edges one ulp apart are the same.
                 let apart = 1e-9 * (1.0 + edge.abs());
                 if edge > last + apart && edge < stop - apart {
                     row(edge);
@@ -475,7 +495,8 @@ impl Profile {
         let whole = (intervals - intervals.round()).abs() < 1e-6;
         let last = if whole { intervals.round() } else { intervals.ceil() }.max(1.0) as usize;
         (1..last).for_each(|k| row(command(k)));
-        // the first command after the stop time: the torque does not depend on when the run ends
+        // The last row is the first command after the stop time, so that the torque does not depend on when
+        // the run ends.
         row(if whole { stop } else { command(last) });
         History::new(time, values, None, hold)
     }

@@ -4,22 +4,22 @@
 //! τ(t) = Σ a_k sin(2π f_k t + φ_k),   a_k² ∝ f_k^exponent,   Σ a_k²/2 = rms²
 //! ```
 //!
-//! The band is cut into [`TONES`] equal cells; f_k lies somewhere in the k-th, φ_k anywhere, by
-//! the seed. So it has a value at any time, knows no period, and is the same on every machine.
+//! The band is divided into [`TONES`] equal cells. The seed determines f_k within the k-th cell and the phase
+//! φ_k. So the noise has a value at any time, has no period, and is the same on every machine.
 
 use std::f64::consts::TAU;
 
 use super::shape::{Dwell, Shape};
 use analysis::random::Random;
 
-/// Number of sines. Over the thesis's band they stand 4.4 mHz apart, closer than the 5 mHz that
-/// `spa` resolves: it sees no gaps.
+/// Number of sines. Over the thesis's band they are 4.4 mHz apart, closer than the 5 mHz that `spa` resolves,
+/// so that the estimate has no gaps.
 pub const TONES: usize = 512;
 
-/// A noise torque.
+/// A noise torque. `rms` is the root mean square before the limit, `limit` the torque at which it is clipped,
+/// both in N·m.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Noise {
-    /// Root mean square before the limit, N·m.
     pub rms: f64,
     /// Lower end of the band, Hz; may be 0.
     pub f0: f64,
@@ -27,25 +27,21 @@ pub struct Noise {
     pub f1: f64,
     /// Power density ∝ f^exponent: 0 white, −1 pink, −2 brown.
     pub exponent: f64,
-    /// Seed of the noise.
     pub seed: u64,
-    /// Largest torque, N·m; beyond it the noise is clipped.
+    /// Largest torque, N·m; the noise is clipped there.
     pub limit: f64,
     tones: Vec<Tone>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Tone {
-    /// a, N·m.
     amplitude: f64,
-    /// 2πf, rad/s.
     rate: f64,
-    /// φ, rad.
     phase: f64,
 }
 
 impl Noise {
-    /// A noise of that kind; the parameters are those of the fields.
+    /// Makes the noise; the arguments are the fields of [`Noise`], in SI units.
     pub fn new(rms: f64, (f0, f1): (f64, f64), exponent: f64, seed: u64, limit: f64) -> Self {
         let mut random = Random::new(seed, 0);
         let cell = (f1 - f0) / TONES as f64;
@@ -82,21 +78,19 @@ impl Shape for Noise {
         self.f1
     }
 
-    /// Returns the band from the second tone on: if the band begins at 0, the first tone may be anywhere near it.
+    /// Returns the band from the second tone on if it begins at 0, because the first tone may be at any
+    /// frequency near 0.
     fn band(&self) -> Option<(f64, f64)> {
         let tone = (self.f1 - self.f0) / TONES as f64;
         Some((if self.f0 > 0.0 { self.f0 } else { tone }, self.f1))
     }
 }
 
-/// A sine and noise on it, both together within a limit.
+/// A sine with noise; their sum is clipped at ±`limit`, N·m.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DwellInNoise {
-    /// The sine.
     pub dwell: Dwell,
-    /// The noise, without a limit of its own.
     pub noise: Noise,
-    /// Largest torque, N·m.
     pub limit: f64,
 }
 

@@ -1,30 +1,30 @@
-//! Torque against time by a formula: what the profiles are made from.
+//! Formulas for torque as a function of time, of which the profiles consist.
 
 use std::f64::consts::TAU;
 use std::fmt::Debug;
 
 use analysis::sweep::Sweep;
 
-/// A torque against time; t in s, torque in N·m.
+/// A torque as a function of time; t in s, torque in N·m.
 pub trait Shape: Debug + Send + Sync {
-    /// Torque just after `t`.
+    /// Returns the torque just after `t`.
     fn after(&self, t: f64) -> f64;
 
-    /// Highest frequency from 0 to `stop` (s), Hz. It is 0 if the torque is constant between its edges.
+    /// Returns the highest frequency from 0 to `stop` (s), Hz; 0 if the torque is constant between its edges.
     fn highest(&self, stop: f64) -> f64;
 
-    /// Times at which the torque jumps, s.
+    /// Returns the times at which the torque jumps, s.
     fn edges(&self) -> Vec<f64> {
         Vec::new()
     }
 
-    /// The frequencies it excites uniformly enough for a frequency response, from and to, Hz; `None`
-    /// if there are none.
+    /// Returns the lowest and highest frequency (Hz) that the torque excites uniformly enough for a frequency
+    /// response; `None` if there are none.
     fn band(&self) -> Option<(f64, f64)> {
         None
     }
 
-    /// Itself, if its frequency sweeps.
+    /// Returns the sweep, if the torque is one.
     fn sweep(&self) -> Option<&Sweep> {
         None
     }
@@ -49,12 +49,10 @@ impl Shape for Sweep {
     }
 }
 
-/// A sin 2πft.
+/// A sine A sin 2πft with the amplitude A (N·m) and the frequency f (Hz).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dwell {
-    /// A, N·m.
     pub amplitude: f64,
-    /// f, Hz.
     pub frequency: f64,
 }
 
@@ -68,11 +66,11 @@ impl Shape for Dwell {
     }
 }
 
-/// Constant torques one after the other, none between them.
+/// Constant torques one after the other, zero between them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pieces(pub Vec<Piece>);
 
-/// A constant torque for some time.
+/// A constant torque (N·m) from one time to another, s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Piece {
     from: f64,
@@ -81,12 +79,12 @@ pub struct Piece {
 }
 
 impl Piece {
-    /// A torque (N·m) from `start` for `width` seconds.
+    /// Makes a torque (N·m) from `start` for `width` seconds.
     pub fn new(start: f64, width: f64, torque: f64) -> Piece {
         Piece { from: start, to: start + width, torque }
     }
 
-    /// A torque (N·m) without end.
+    /// Makes a torque (N·m) that lasts for all times.
     pub fn always(torque: f64) -> Piece {
         Piece { from: f64::NEG_INFINITY, to: f64::INFINITY, torque }
     }
@@ -94,7 +92,7 @@ impl Piece {
 
 impl Shape for Pieces {
     fn after(&self, t: f64) -> f64 {
-        // a communication point k·H may differ from the edge by an ulp
+        // A communication point k·H may differ from the edge by one ulp.
         let slack = 1e-9 * (1.0 + t.abs());
         let now = self.0.iter().find(|piece| t >= piece.from - slack && t < piece.to - slack);
         now.map_or(0.0, |piece| piece.torque)

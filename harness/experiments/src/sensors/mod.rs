@@ -1,10 +1,11 @@
-//! Sensors in the record of a run: what they measure ([`quantity`]), and how wrong they are. A reading is
+//! Sensors in the record of a run: what they measure ([`quantity`]), and their errors. A reading is
 //!
 //! ```text
 //! y = quantum · round((scale · x(t − delay) + bias + noise · n)/quantum),   n ~ N(0, 1) in every sample
 //! ```
 //!
-//! x is taken every 1/rate seconds, and a row has a reading where one arrives; where none does it has no value.
+//! x is sampled every 1/rate seconds. A row at which a sample arrives has a reading; other rows have no
+//! value.
 
 pub mod quantity;
 
@@ -21,18 +22,17 @@ use crate::profile::{Allowed, Parameter, Written, parameter};
 use crate::run;
 use signals::table::Table;
 
-/// A kind of sensor.
+/// A kind of sensor, with a description of the measured quantity for readers (`says`).
 #[derive(Debug)]
 pub struct Kind {
-    /// Name.
     pub name: &'static str,
-    /// Description of the measured quantity, for readers.
     pub says: &'static str,
     /// Parameters in addition to [`ERRORS`].
     pub parameters: &'static [Parameter],
-    /// Unit of its readings; empty: that of the variable.
+    /// Unit of the readings; empty if it is that of the variable.
     pub unit: &'static str,
-    /// Variable that the sensor reads, by default this one; `of` names another.
+    /// Variable that the sensor reads unless `of=NAME` names another; the outer `None` if the kind does not
+    /// read a variable.
     of: Option<Option<&'static str>>,
 }
 
@@ -44,7 +44,7 @@ const ANGLE: Parameter = parameter(
     Allowed::Any,
 );
 
-/// Every kind.
+/// All kinds of sensors.
 pub const KINDS: &[Kind] = &[
     Kind {
         name: "gauge",
@@ -103,10 +103,10 @@ pub const KINDS: &[Kind] = &[
     },
 ];
 
-/// Stands for the unit of a sensor's readings.
+/// Placeholder for the unit of a sensor's readings.
 const READING: &str = "its unit";
 
-/// Errors that any sensor can have.
+/// Parameters of the errors that any sensor can have.
 pub const ERRORS: [Parameter; 7] = [
     parameter("rate", 0.0, "Hz", "samples a second; 0: one a row", Allowed::NotNegative),
     parameter("noise", 0.0, READING, "standard deviation of a sample", Allowed::NotNegative),
@@ -117,12 +117,10 @@ pub const ERRORS: [Parameter; 7] = [
     parameter("seed", 1.0, "", "seed of the noise", Allowed::Whole(9e15)),
 ];
 
-/// One sensor, as it was written: `NAME=KIND:key=value,…`.
+/// A sensor that was given as `NAME=KIND:key=value,…`; the name is that of its column.
 #[derive(Clone, Debug)]
 pub struct Sensor {
-    /// The column's name.
     pub name: String,
-    /// The text that was parsed.
     pub text: String,
     kind: &'static Kind,
     of: Option<String>,
@@ -130,22 +128,18 @@ pub struct Sensor {
     errors: Errors,
 }
 
-/// Values of [`ERRORS`].
+/// Values of [`ERRORS`]; the unit of noise, bias and quantum is the sensor's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Errors {
-    /// Samples a second; 0: one a row.
     pub rate: f64,
-    /// Standard deviation of a sample, in the sensor's unit, as the next two.
+    /// Standard deviation of a sample.
     pub noise: f64,
-    /// Reading at 0.
     pub bias: f64,
-    /// Reading over quantity.
+    /// Reading divided by the quantity.
     pub scale: f64,
-    /// Step of the readings; 0: none.
     pub quantum: f64,
-    /// Time until a sample is read, s.
+    /// Time between sampling and reading, s.
     pub delay: f64,
-    /// Seed of the noise.
     pub seed: u64,
 }
 
@@ -161,10 +155,11 @@ impl FromStr for Sensor {
 }
 
 impl Sensor {
-    /// A sensor by the name of its column, from `KIND:key=value,…`.
+    /// Makes a sensor with the name of its column from `KIND:key=value,…`.
     ///
     /// # Errors
-    /// All that is wrong with it.
+    ///
+    /// Lists everything that is wrong with it.
     pub fn new(name: &str, text: &str) -> Result<Self> {
         let plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '.';
         ensure!(
@@ -202,14 +197,14 @@ impl Sensor {
         Ok(Sensor { name: name.into(), text: text.trim().into(), kind, of, own: values, errors })
     }
 
-    /// Errors of the sensor.
     pub fn errors(&self) -> &Errors {
         &self.errors
     }
 
-    /// Quantity that the sensor measures in an FMU with these settings.
+    /// Returns the quantity that the sensor measures in an FMU with these settings.
     ///
     /// # Errors
+    ///
     /// If the FMU has no such quantity.
     pub fn quantity(
         &self,
@@ -233,7 +228,7 @@ impl Sensor {
         quantity.with_context(|| format!("sensor {} ({})", self.name, self.kind.name))
     }
 
-    /// The column of a channel.
+    /// Returns the name of a channel's column: the sensor's name, with `.channel` if there are several.
     pub fn column(&self, channel: &str) -> String {
         match channel {
             "" => self.name.clone(),
@@ -247,13 +242,14 @@ impl Sensor {
         rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
     }
 
-    /// Reading of a sensor that samples in every row, without noise and quantisation.
+    /// Returns the reading for a value of the quantity without noise, delay and quantisation.
     pub fn expected(&self, value: f64) -> f64 {
         self.errors.scale * value + self.errors.bias
     }
 
-    /// Readings of one channel in the rows of a run; NaN in rows without a reading. `stream` separates the noise of channels and
-    /// runs.
+    /// Returns the readings of one channel in the rows of a run; NaN in rows without a reading. A sample is
+    /// taken in every `every`-th row and read `late` rows later. `stream` seeds the noise, so that channels
+    /// and runs have different noise.
     fn readings(&self, truth: &[f64], every: usize, late: usize, stream: &str) -> Vec<f64> {
         let Errors { noise, quantum, seed, .. } = self.errors;
         let mut random = Random::new(seed, fnv(stream));
@@ -261,7 +257,7 @@ impl Sensor {
         for (k, value) in truth.iter().enumerate().step_by(every) {
             let y = self.expected(*value) + noise * random.normal();
             if let Some(reading) = readings.get_mut(k + late) {
-                // + 0.0: no −0 in a file
+                // + 0.0 prevents −0 in a file.
                 *reading = if quantum > 0.0 { quantum * (y / quantum).round() + 0.0 } else { y };
             }
         }
@@ -269,15 +265,16 @@ impl Sensor {
     }
 }
 
-/// Several sensors of one FMU, each with what it measures.
+/// Several sensors of one FMU, each with the quantity that it measures.
 #[derive(Debug, Default)]
 pub struct Sensors(Vec<(Sensor, Quantity)>);
 
 impl Sensors {
-    /// The sensors of a run with these settings, whose rows are `step` seconds apart.
+    /// Makes the sensors of a run with these settings, whose rows are `step` seconds apart.
     ///
     /// # Errors
-    /// All that is wrong with them.
+    ///
+    /// Lists everything that is wrong with them.
     pub fn new(
         sensors: &[Sensor],
         description: &ModelDescription,
@@ -304,7 +301,7 @@ impl Sensors {
         Ok(Sensors(bound))
     }
 
-    /// Variables that a run must record for them, each once.
+    /// Lists the variables that a run must record for the sensors, each once.
     pub fn needs(&self) -> Vec<&str> {
         let mut needs: Vec<&str> = Vec::new();
         for name in self.0.iter().flat_map(|(_, quantity)| &quantity.needs) {
@@ -315,7 +312,7 @@ impl Sensors {
         needs
     }
 
-    /// Their columns' names.
+    /// Lists the names of the sensors' columns.
     pub fn columns(&self) -> Vec<String> {
         let one = |(sensor, quantity): &(Sensor, Quantity)| {
             let names = quantity.channels.iter().map(|(channel, _)| sensor.column(channel));
@@ -324,10 +321,12 @@ impl Sensors {
         self.0.iter().flat_map(one).collect()
     }
 
-    /// The first `kept` columns of a run's table and the readings of [`Sensors::read`], without what was recorded for these alone.
+    /// Returns the first `kept` columns of a run's table and the readings of [`Sensors::read`], without the
+    /// columns that were recorded only for the sensors.
     ///
     /// # Errors
-    /// If the table lacks what they need.
+    ///
+    /// If the table lacks a variable that they need.
     pub fn recorded(&self, table: Table, kept: usize, run: &str, step: f64) -> Result<Table> {
         let names: Vec<String> =
             table.names()[..kept].iter().cloned().chain(self.columns()).collect();
@@ -335,10 +334,12 @@ impl Sensors {
         Ok(self.read(table, run, step)?.only(&names))
     }
 
-    /// A run's table and their readings of it. `run` tells the noise of runs with one seed apart.
+    /// Adds the readings of all sensors to a run's table. `run` is the name of the run; runs with the same
+    /// seed but different names have different noise.
     ///
     /// # Errors
-    /// If the table lacks what they need.
+    ///
+    /// If the table lacks a variable that they need.
     pub fn read(&self, table: Table, run: &str, step: f64) -> Result<Table> {
         let mut columns = Vec::new();
         for (sensor, quantity) in &self.0 {
@@ -361,14 +362,18 @@ impl Sensors {
         Ok(columns.into_iter().fold(table, |table, (name, column)| table.with_gaps(&name, column)))
     }
 
-    /// The text of each by its name, for a file's metadata.
+    /// Returns the text of each sensor by its name, for a file's metadata.
     pub fn texts(&self) -> BTreeMap<&str, &str> {
         self.0.iter().map(|(sensor, _)| (sensor.name.as_str(), sensor.text.as_str())).collect()
     }
 }
 
 impl Sensor {
-    /// Rows from sample to sample, and from a sample to its reading.
+    /// Converts period and delay to numbers of rows: from sample to sample, and from a sample to its reading.
+    ///
+    /// # Errors
+    ///
+    /// If one is not a multiple of the step.
     fn rows(&self, step: f64) -> Result<[usize; 2]> {
         let whole = |what: &str, seconds: f64| {
             let rows = seconds / step;
@@ -388,7 +393,7 @@ impl Sensor {
     }
 }
 
-/// Every kind with its defaults and what it is, for `--help`.
+/// Lists every kind with its defaults and description, for `--help`.
 pub fn help() -> String {
     let written = |parameters: &[Parameter]| {
         let pairs = parameters.iter().map(|p| match p.unit {
@@ -408,7 +413,7 @@ pub fn help() -> String {
     kinds.chain([errors]).collect()
 }
 
-/// A number for a text, the same on every machine (FNV-1a).
+/// Hashes a text to a number that is the same on every machine (FNV-1a).
 fn fnv(text: &str) -> u64 {
     let step = |hash: u64, byte: u8| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
     text.bytes().fold(0xcbf2_9ce4_8422_2325, step)

@@ -1,7 +1,8 @@
 //! Measured quantities, computed from variables of the FMU.
 //!
-//! The surface in an upright cylinder of radius R = d/2, filled to h, is a sum of modes (NASA SP-106, chapter 2; Dodge 2000). At the
-//! angle φ on the wall, from radial outwards towards tangential, with α_n the slosh angle of mode n in that direction:
+//! The surface in an upright cylinder of radius R = d/2, filled to h, is a sum of modes (NASA SP-106, chapter
+//! 2; Dodge 2000). At the angle φ on the wall, from radial outwards towards tangential, with α_n the slosh
+//! angle of mode n in that direction:
 //!
 //! ```text
 //! wave       η(φ) = Σ b_n α_n                        b_n = 2 R/(ξ_n² − 1)
@@ -9,11 +10,13 @@
 //! pressure   p(φ, z) = ρ g (h − z) + ρ Σ b_n (g α_n + a) cosh(ξ_n z/R)/cosh(ξ_n h/R) − ρ a R
 //! ```
 //!
-//! p is the pressure above that of the gas at the height z over the bottom, a the acceleration of the tank in the direction φ, less
-//! that of gravity. Where p comes from: in the frame of the tank Φ_t + g η + a r cos φ = 0 at the surface, and
-//! p = ρ g (h − z) − ρ Φ_t − ρ a R at the wall; each mode of Φ falls with depth as its cosh. A mode that is not kept follows at
-//! once, g α_n + a = 0, and adds nothing. Over the wall p adds up to the force of the pendulums and of the liquid that moves with the
-//! tank, Σ m_n g α_n − m_0 a (`tests/all/sensors.rs`). The plane is the least-squares fit over the disc: ∫ J_1(ξ r/R) r² dr = R³ J_1(ξ)/ξ².
+//! p is the pressure above that of the gas at the height z over the bottom, a the acceleration of the tank in
+//! the direction φ, less that of gravity. The formula for p follows in the frame of the tank from Φ_t + g η +
+//! a r cos φ = 0 at the surface, and p = ρ g (h − z) − ρ Φ_t − ρ a R at the wall; each mode of Φ decreases
+//! with depth as its cosh. A mode that the model does not include follows the acceleration at once, g α_n + a
+//! = 0, and contributes nothing. Integrated over the wall, p gives the force of the pendulums and of the
+//! liquid that moves with the tank, Σ m_n g α_n − m_0 a (`tests/all/sensors.rs`). The plane is the
+//! least-squares fit over the disc: ∫ J_1(ξ r/R) r² dr = R³ J_1(ξ)/ξ².
 
 use std::collections::BTreeMap;
 
@@ -27,7 +30,7 @@ use names::hubslosh::{
 /// Measured quantity of one sensor.
 #[derive(Clone, Debug)]
 pub struct Quantity {
-    /// Variables of the FMU that it follows from, all Real.
+    /// Variables of the FMU from which the quantity is computed, all Real.
     pub needs: Vec<String>,
     /// Channels: the ending of the column's name, and the unit.
     pub channels: Vec<(String, String)>,
@@ -43,20 +46,20 @@ enum Rule {
     Acceleration { radius: f64, angle: f64 },
 }
 
-/// Relation between the coordinates `slosh.q_radial`, `slosh.q_tangential` of a mode of HubSlosh and slosh angles.
+/// Meaning of the coordinates `slosh.q_radial`, `slosh.q_tangential` of a mode of HubSlosh.
 #[derive(Clone, Copy, Debug)]
 pub enum Coordinate {
-    /// The angle itself.
+    /// Slosh angle, rad.
     Angle,
-    /// The tangent of half the angle from the vertical, times the direction.
+    /// Tangent of half the angle from the vertical, times the direction.
     Stereographic,
-    /// The displacement, m.
+    /// Displacement of the pendulum's bob, m.
     Displacement,
 }
 
 impl Coordinate {
-    /// Coordinate of a `slosh.model`; `None` for a model whose liquid does not move.
-    pub fn of(model: &str) -> Option<Coordinate> {
+    /// Returns the coordinate that a `slosh.model` uses; `None` for a model whose liquid does not move.
+    pub fn from_model(model: &str) -> Option<Coordinate> {
         use SloshModel::{Frozen, Linear, Liquid, Planar, Spherical};
         match SloshModel::named(model)? {
             Frozen => None,
@@ -66,7 +69,8 @@ impl Coordinate {
         }
     }
 
-    /// Slosh angles, radial and tangential, rad, of a mode whose pendulum has this length, m.
+    /// Converts coordinates to slosh angles, radial and tangential, rad. `length` is that of the mode's
+    /// pendulum, m.
     pub fn angles(self, q: [f64; 2], length: f64) -> [f64; 2] {
         match self {
             Coordinate::Angle => q,
@@ -79,7 +83,8 @@ impl Coordinate {
     }
 }
 
-/// The modes whose coordinates are the first things needed: of each radial, tangential and length; then the tank's diameter.
+/// Modes whose coordinates are the first of the needed variables: for each mode radial and tangential
+/// coordinate and length, then once the tank's diameter.
 #[derive(Clone, Debug)]
 struct Modes {
     count: usize,
@@ -91,10 +96,11 @@ const MOTION: [&str; 7] =
     [THETA, OMEGA, OMEGA_DOT, tank::R, G_AXIAL, bench::TILT, bench::TILT_AZIMUTH];
 
 impl Quantity {
-    /// A Real of the FMU; `unit`: the one that it must have.
+    /// Makes the quantity that a Real variable of the FMU is. `unit` is the unit that the variable must have.
     ///
     /// # Errors
-    /// If there is no such variable, or none of that unit.
+    ///
+    /// If there is no such variable, or it has another unit.
     pub fn variable(
         description: &ModelDescription,
         name: &str,
@@ -112,19 +118,21 @@ impl Quantity {
         Ok(Quantity { needs: vec![name.into()], channels, rule: Rule::Itself })
     }
 
-    /// The wave at an angle on the wall (rad), m.
+    /// Makes the wave at an angle on the wall (rad), m.
     ///
     /// # Errors
+    ///
     /// If the FMU is not HubSlosh with an upright cylinder whose liquid moves.
     pub fn wave(surface: &Surface, angle: f64) -> Result<Self> {
         let (needs, modes) = surface.modes()?;
         Ok(Quantity { needs, channels: one("m"), rule: Rule::Wave { modes, angle } })
     }
 
-    /// The pressure at an angle on the wall (rad) and a height over the bottom (m), Pa.
+    /// Makes the pressure at an angle on the wall (rad) and a height over the bottom (m), Pa.
     ///
     /// # Errors
-    /// As [`Quantity::wave`]; if the height is that of no liquid at rest.
+    ///
+    /// As [`Quantity::wave`]; also if the height is above the liquid at rest.
     pub fn pressure(surface: &Surface, angle: f64, height: f64) -> Result<Self> {
         let (mut needs, modes) = surface.modes()?;
         let h = surface.number(tank::H)?;
@@ -133,9 +141,11 @@ impl Quantity {
         Ok(Quantity { needs, channels: one("Pa"), rule: Rule::Pressure { modes, angle, height } })
     }
 
-    /// The surface as a camera sees it: the plane that fits best, and every mode, at the wall, m.
+    /// Makes the surface as a camera sees it: the plane that fits best, and every mode, each as a height at
+    /// the wall, m.
     ///
     /// # Errors
+    ///
     /// As [`Quantity::wave`].
     pub fn camera(surface: &Surface) -> Result<Self> {
         let (needs, modes) = surface.modes()?;
@@ -146,9 +156,11 @@ impl Quantity {
         Ok(Quantity { needs, channels, rule: Rule::Camera { modes } })
     }
 
-    /// The specific force of a point of the hub along an angle (rad), from radial outwards towards tangential, m/s².
+    /// Makes the specific force of a point of the hub in the direction of an angle (rad), from radial
+    /// outwards towards tangential, m/s².
     ///
     /// # Errors
+    ///
     /// If the FMU is not HubSlosh.
     pub fn acceleration(description: &ModelDescription, radius: f64, angle: f64) -> Result<Self> {
         let needs: Vec<String> = MOTION.map(String::from).into();
@@ -156,7 +168,7 @@ impl Quantity {
         Ok(Quantity { needs, channels: one("m/s2"), rule: Rule::Acceleration { radius, angle } })
     }
 
-    /// Value of each channel for these values of the required variables, in their order.
+    /// Computes the value of each channel from the values of the needed variables, in their order.
     pub fn values(&self, read: &[f64]) -> Vec<f64> {
         match &self.rule {
             Rule::Itself => vec![read[0]],
@@ -174,7 +186,7 @@ impl Quantity {
                 let (g, a) = (motion[4], along(acceleration(motion, motion[3]), *angle));
                 let modal = |(n, angles): (usize, &[f64; 2])| {
                     let k = XI[n] / radius;
-                    // cosh kz / cosh kh without overflow
+                    // cosh kz / cosh kh without overflow.
                     let falls = (k * (height - h)).exp() * (1.0 + (-2.0 * k * height).exp())
                         / (1.0 + (-2.0 * k * h).exp());
                     wall(n, radius) * (g * along(*angles, *angle) + a) * falls
@@ -199,7 +211,7 @@ impl Quantity {
     }
 }
 
-/// Elevation at the wall per slosh angle of mode n from 0, m.
+/// Returns the elevation at the wall per slosh angle of mode n, counted from 0, m.
 fn wall(n: usize, radius: f64) -> f64 {
     2.0 * radius / (XI[n] * XI[n] - 1.0)
 }
@@ -208,7 +220,8 @@ fn along([radial, tangential]: [f64; 2], angle: f64) -> f64 {
     radial * angle.cos() + tangential * angle.sin()
 }
 
-/// Radial and tangential acceleration of a point of the hub on the tank's side, less that of gravity; [`MOTION`] is given.
+/// Returns radial and tangential acceleration of a point of the hub on the tank's side, less that of gravity,
+/// m/s². `motion` has the values of [`MOTION`].
 fn acceleration(motion: &[f64], radius: f64) -> [f64; 2] {
     let [theta, omega, omega_dot, _, g, tilt, azimuth] = std::array::from_fn(|k| motion[k]);
     let (across, from_low) = (g * f64::tan(tilt), theta - azimuth);
@@ -223,7 +236,7 @@ fn one(unit: &str) -> Vec<(String, String)> {
 }
 
 impl Modes {
-    /// Number of values that belong to this part.
+    /// Returns the number of values that belong to the modes.
     fn reads(&self) -> usize {
         3 * self.count + 1
     }
@@ -232,18 +245,16 @@ impl Modes {
         0.5 * read[3 * self.count]
     }
 
-    /// Slosh angles, radial and tangential, rad.
+    /// Returns the slosh angles of all modes, radial and tangential, rad.
     fn angles(&self, read: &[f64]) -> Vec<[f64; 2]> {
         let angle = |mode: &[f64]| self.coordinate.angles([mode[0], mode[1]], mode[2]);
         read[..3 * self.count].chunks_exact(3).map(angle).collect()
     }
 }
 
-/// HubSlosh's start values as text, from which the surface is computed.
+/// HubSlosh's description and start values, from which the surface is computed.
 pub struct Surface<'a> {
-    /// The FMU.
     pub description: &'a ModelDescription,
-    /// Parameters by name.
     pub parameters: &'a BTreeMap<String, String>,
 }
 
@@ -257,7 +268,8 @@ impl Surface<'_> {
         Ok(self.text(name)?.parse()?)
     }
 
-    /// An enumeration by name, or by the number that hosts set that cannot set enumerations.
+    /// Returns the item of an enumeration, or that of its integer twin `kind`, which hosts set that cannot
+    /// set enumerations.
     fn choice(&self, name: &str, kind: &str) -> Result<String> {
         let number: i64 = self.text(kind)?.parse()?;
         let items = self.description.items(self.description.variable(name)?);
@@ -272,7 +284,7 @@ impl Surface<'_> {
             "it is known of an upright cylinder alone (slosh.source = geometry), not of a {source}"
         );
         let model = self.choice(hubslosh::slosh::MODEL, hubslosh::slosh::KIND)?;
-        let coordinate = Coordinate::of(&model)
+        let coordinate = Coordinate::from_model(&model)
             .with_context(|| format!("slosh.model = {model} has no surface that moves"))?;
         let count = (self.number(hubslosh::slosh::MODES)? as usize).clamp(1, MODES);
         let mut needs = Vec::new();
@@ -286,7 +298,7 @@ impl Surface<'_> {
     }
 }
 
-/// Fails if the FMU is not one that has all of these.
+/// Checks that the FMU has all these variables.
 fn present(description: &ModelDescription, names: &[String]) -> Result<()> {
     for name in names {
         description.variable(name).with_context(|| format!("it needs {name} of HubSlosh"))?;

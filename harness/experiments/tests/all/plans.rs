@@ -34,7 +34,7 @@ fn beyond(fmu: &Fmu, case: &Case) -> Vec<String> {
     let mut said = instance.take_warnings();
     // A plan can compare models of which one does not use a parameter.
     said.retain(|warning| !warning.contains(" no effect: "));
-    let range = Range::of(fmu.description(), &mut instance).unwrap().unwrap();
+    let range = Range::read(fmu.description(), &mut instance).unwrap().unwrap();
     let table = run.drive(&mut instance, &[WAVE], |_| {}).unwrap();
     said.extend(range.left(table.column(WAVE).unwrap()));
     said.into_iter().map(|why| format!("{}: {why}", case.name)).collect()

@@ -192,7 +192,7 @@ fn coordinates(n: usize) -> [String; 2] {
 /// Returns the radial and tangential slosh angles of HubSlosh's modes after the first, as far as they were
 /// recorded. The FMU has no outputs of these angles, so they are computed from its states.
 fn higher_modes(table: &Table, model: &str, modes: &[Pendulum]) -> Vec<[Vec<f64>; 2]> {
-    let Some(coordinate) = Coordinate::of(model) else { return Vec::new() };
+    let Some(coordinate) = Coordinate::from_model(model) else { return Vec::new() };
     let recorded = (2..).zip(&modes[1..]).map_while(|(n, mode)| {
         let [radial, tangential] = coordinates(n);
         let y = table.column(&tangential)?;
