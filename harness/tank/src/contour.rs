@@ -167,12 +167,12 @@ impl Contour {
         Ok(Contour { segments: from_the_top(segments, size), bottom, top, size })
     }
 
-    /// All segments.
+    /// Returns all segments in the order of the contour.
     pub fn segments(&self) -> &[Segment] {
         &self.segments
     }
 
-    /// Height of the lowest point, m, from the contour's own zero.
+    /// Returns the height of the lowest point, m, from the contour's own zero.
     pub fn bottom(&self) -> f64 {
         self.bottom
     }

@@ -311,7 +311,7 @@ fn motions() -> [Motion; 2] {
     [planar, circular]
 }
 
-/// Mean over azimuth and phase, exact for trigonometric polynomials of degree 11.
+/// Returns the mean over azimuth and phase, exact for trigonometric polynomials of degree 11.
 fn average(f: impl Fn(f64, f64) -> f64) -> f64 {
     let angle = |i: i32| TAU * f64::from(i) / 12.0;
     (0..144).map(|i| f(angle(i / 12), angle(i % 12))).sum::<f64>() / 144.0
@@ -343,7 +343,7 @@ struct Second {
 }
 
 impl Second {
-    /// Elevation at the wall on the side of the crest, when it is largest there.
+    /// Returns the elevation at the wall on the side of the crest when it is largest there.
     fn at_wall(&self, f: &DMatrix<f64>) -> f64 {
         (f.row(f.nrows() - 1) * (&self.p + &self.r))[0]
     }

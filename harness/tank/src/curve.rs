@@ -81,7 +81,7 @@ const GAUSS8: [(f64, f64); 4] = [
 ];
 
 impl Curve {
-    /// Point at t.
+    /// Returns the point at the parameter t.
     pub fn at(&self, t: f64) -> Point {
         match *self {
             Curve::Line { from, to } => {
@@ -104,7 +104,7 @@ impl Curve {
         }
     }
 
-    /// Derivative by t.
+    /// Returns the derivative by t.
     pub fn slope(&self, t: f64) -> Point {
         match *self {
             Curve::Line { from, to } => sub(to, from),
@@ -170,16 +170,14 @@ fn cassini(a: f64, c: f64, t: f64) -> (f64, f64) {
 /// A curve between two values of its parameter, in the direction from the first to the second.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Segment {
-    /// The curve.
     pub curve: Curve,
-    /// Parameter at the start.
     pub from: f64,
     /// Parameter at the end; may be less than `from`.
     pub to: f64,
 }
 
 impl Segment {
-    /// Straight line.
+    /// Creates a straight line.
     pub fn line(from: Point, to: Point) -> Segment {
         Segment { curve: Curve::Line { from, to }, from: 0.0, to: 1.0 }
     }
@@ -202,7 +200,7 @@ impl Segment {
         self.settle(self.curve.at(self.from))
     }
 
-    /// Last point.
+    /// Returns the last point, exactly on the axis if it is within rounding of it.
     pub fn end(&self) -> Point {
         self.settle(self.curve.at(self.to))
     }
@@ -223,7 +221,7 @@ impl Segment {
         }
     }
 
-    /// Unit tangent in the direction of travel at the fraction `s` = 0..1 of the parameter.
+    /// Returns the unit tangent in the direction of travel at the fraction `s` = 0..1 of the parameter.
     pub fn tangent(&self, s: f64) -> Point {
         let sign = if self.to > self.from { 1.0 } else { -1.0 };
         let slope = self.curve.slope(self.from + s * (self.to - self.from));
@@ -231,7 +229,7 @@ impl Segment {
         [sign * slope[0] / length, sign * slope[1] / length]
     }
 
-    /// Point at the fraction `s` of the parameter.
+    /// Returns the point at the fraction `s` of the parameter.
     pub fn at(&self, s: f64) -> Point {
         self.curve.at(self.from + s * (self.to - self.from))
     }

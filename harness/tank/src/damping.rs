@@ -312,7 +312,6 @@ fn outside(shape: formula::Shape, nu: f64, g: f64) -> Vec<String> {
 /// A damping ratio, with the ranges that its formula leaves.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Formula {
-    /// Damping ratio.
     pub zeta: f64,
     /// One sentence for each range that the formula leaves; empty inside.
     pub outside: Vec<String>,
@@ -325,12 +324,12 @@ impl Formula {
     }
 }
 
-/// Damping ratio by the laminar layer at the wetted wall of any tank, for one mode. zeta_n = beta_n
-/// sqrt(nu/(8 omega_n)), omega_n^2 = g lambda_n (cylinder: Case and Parkinson 1957, box: Keulegan
+/// Computes the damping ratio of one mode from the laminar layer at the wetted wall of any tank: zeta_n =
+/// beta_n sqrt(nu/(8 omega_n)), omega_n^2 = g lambda_n (cylinder: Case and Parkinson 1957, box: Keulegan
 /// 1959).
 ///
-/// It does not include surface film, contact line and turbulence. Measured cylinders have 1.4 to
-/// 1.5 times as much, see [`of_tank`].
+/// Surface film, contact line and turbulence are not included. Measured cylinders have 1.4 to 1.5 times as
+/// much, see [`of_tank`].
 pub fn laminar(mode: &Mode, nu: f64, g: f64) -> Formula {
     let omega = (g * mode.lambda).sqrt();
     let layer = (2.0 * nu / omega).sqrt();
@@ -339,8 +338,9 @@ pub fn laminar(mode: &Mode, nu: f64, g: f64) -> Formula {
     Formula::new(formula::laminar(mode.beta, nu, omega), &[(thin, text)])
 }
 
-/// Upright cylinder, Mikishev and Dorozhkin. In shallow liquid the formula falls below the laminar layer; use
-/// [`stephens`] there.
+/// Computes the damping ratio of an upright cylinder by Mikishev and Dorozhkin. In shallow liquid the formula
+/// falls below the laminar layer; use [`stephens`] there. `radius` and `fill` in m, `nu` in m²/s, `g` in
+/// m/s²; the next functions take the same units.
 pub fn mikishev_dorozhkin(radius: f64, fill: f64, nu: f64, g: f64) -> Formula {
     let x = fill / radius;
     let text =
@@ -348,12 +348,13 @@ pub fn mikishev_dorozhkin(radius: f64, fill: f64, nu: f64, g: f64) -> Formula {
     Formula::new(formula::mikishev_dorozhkin(radius, fill, nu, g), &[(x >= 0.5, text)])
 }
 
-/// Upright cylinder, Stephens, Leonard and Perry: 1.493 times the laminar layer at every depth.
+/// Computes the damping ratio of an upright cylinder by Stephens, Leonard and Perry: 1.493 times the laminar
+/// layer at every depth.
 pub fn stephens(radius: f64, fill: f64, nu: f64, g: f64) -> Formula {
     Formula::new(formula::stephens(radius, fill, nu, g), &[])
 }
 
-/// Sphere, see [`formula::sphere`].
+/// Computes the damping ratio of a sphere, see [`formula::sphere`].
 pub fn sphere(radius: f64, fill: f64, nu: f64, g: f64) -> Formula {
     let (x, b) = (fill / radius, formula::sphere_number(radius, nu, g));
     Formula::new(
@@ -365,14 +366,15 @@ pub fn sphere(radius: f64, fill: f64, nu: f64, g: f64) -> Formula {
     )
 }
 
-/// Cone with its apex down, `radius` of the free surface, `half_angle` in degrees.
+/// Computes the damping ratio of a cone with its apex down; `radius` is that of the free surface,
+/// `half_angle` in degrees.
 pub fn cone(radius: f64, half_angle: f64, nu: f64, g: f64) -> Formula {
     let known = (0.0..=45.0).contains(&half_angle);
     let text = format!("the half angle of {half_angle} degrees is outside 0 to 45");
     Formula::new(formula::cone(radius, half_angle, nu, g), &[(known, text)])
 }
 
-/// Torus, `tube_radius` of its section.
+/// Computes the damping ratio of a torus; `tube_radius` is that of its section.
 pub fn torus(tube_radius: f64, fill: f64, nu: f64, g: f64) -> Formula {
     let (y, scale) = (0.5 * fill / tube_radius, formula::torus_number(tube_radius, nu, g));
     Formula::new(
@@ -387,12 +389,10 @@ pub fn torus(tube_radius: f64, fill: f64, nu: f64, g: f64) -> Formula {
     )
 }
 
-/// A flat ring baffle at the wall.
+/// A flat ring baffle at the wall: its depth below the free surface and its width, m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ring {
-    /// Depth below the free surface, m.
     pub depth: f64,
-    /// Width, m.
     pub width: f64,
 }
 
@@ -417,7 +417,8 @@ fn ring_ranges(ring: Ring, amplitude: f64, reach: f64, covered: f64) -> Vec<(boo
     ]
 }
 
-/// Ring baffle in an upright cylinder, `amplitude` of the wave at the wall: see [`formula::miles_ring`].
+/// Computes the damping ratio of a ring baffle in an upright cylinder, for the `amplitude` (m) of the wave at
+/// the wall: see [`formula::miles_ring`].
 pub fn miles_ring(radius: f64, ring: Ring, amplitude: f64) -> Formula {
     let Ring { depth, width } = ring;
     let (reach, covered) =
@@ -428,10 +429,10 @@ pub fn miles_ring(radius: f64, ring: Ring, amplitude: f64) -> Formula {
     )
 }
 
-/// Ring baffle at the outer wall of any tank of revolution, first mode: zeta = 1.53 lambda w^(3/2)
-/// eta^(1/2) G^(5/2) r_b phi(R_F)^2/N. G = |phi_s|/(lambda phi(R_F)) at the ring's radius r_b, and
-/// phi(R_F)^2/N = rho pi lambda wave^2/m. The law comes from Keulegan and Carpenter's plates,
-/// scaled to Miles for the cylinder.
+/// Computes the damping ratio of a ring baffle at the outer wall of any tank of revolution, for the first
+/// mode: zeta = 1.53 lambda w^(3/2) eta^(1/2) G^(5/2) r_b phi(R_F)^2/N. G = |phi_s|/(lambda phi(R_F)) at the
+/// ring's radius r_b, and phi(R_F)^2/N = rho pi lambda wave^2/m. The law comes from Keulegan and Carpenter's
+/// plates, scaled to Miles for the cylinder.
 ///
 /// Returns `None` for a box, or if no wall is at this depth.
 pub fn ring(data: &ModalData, ring: Ring, amplitude: f64) -> Option<Formula> {

@@ -7,19 +7,17 @@
 use crate::interpolation::Monotone;
 use crate::modal::Mode;
 
-/// A liquid at a specific force.
+/// A liquid of density `rho` (kg/m³) and surface tension `sigma` (N/m) at the specific force `g` along the
+/// axis (m/s²).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fluid {
-    /// Density, kg/m³.
     pub rho: f64,
-    /// Surface tension, N/m.
     pub sigma: f64,
-    /// Specific force along the axis, m/s².
     pub g: f64,
 }
 
 impl Fluid {
-    /// Bond number rho g R^2/sigma.
+    /// Returns the Bond number rho g R^2/sigma.
     pub fn bond(&self, radius: f64) -> f64 {
         self.rho * self.g * radius * radius / self.sigma
     }
@@ -89,12 +87,12 @@ const TABLE: [[f64; 7]; 6] = [
     [190.3599, 188.8619, 187.4498, 186.2136, 185.2381, 184.6017, 184.4012],
 ];
 
-/// Omega_1^2 = omega_1^2 rho R^3/sigma of a deep upright cylinder, contact angle in degrees.
+/// Returns Omega_1^2 = omega_1^2 rho R^3/sigma of a deep upright cylinder, contact angle in degrees.
 pub fn cylinder_omega2(bond: f64, contact_angle: f64) -> f64 {
     flat_omega2(bond) + meniscus_shift(bond, contact_angle)
 }
 
-/// Omega_1^2 under a flat surface, contact angle 90 degrees.
+/// Returns Omega_1^2 under a flat surface, contact angle 90 degrees.
 fn flat_omega2(bond: f64) -> f64 {
     XI * bond + XI.powi(3)
 }

@@ -100,7 +100,6 @@ pub struct WallSpeed {
 /// Fixed mass when the first `modes` modes are pendulums.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Rest {
-    /// Number of modes that are pendulums.
     pub modes: usize,
     /// Fixed mass, kg.
     pub m_0: f64,
@@ -130,9 +129,7 @@ pub struct Axis {
 /// Both horizontal axes of a box.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Axes {
-    /// Motion along the first length.
     pub x: Axis,
-    /// Motion along the second length.
     pub y: Axis,
 }
 
@@ -165,7 +162,6 @@ pub struct Damping {
 /// A measured shape of a part of the wetted wall.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct DampingPart {
-    /// Name of the shape.
     pub shape: &'static str,
     /// Share of the area of the wetted wall.
     pub share: f64,
@@ -220,7 +216,6 @@ pub struct ModeDamping {
 /// Modal parameters of a tank at one fill.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ModalData {
-    /// The tank's name.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
     /// `revolution` or `box`.

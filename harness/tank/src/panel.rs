@@ -89,7 +89,7 @@ impl Boundary {
         Boundary { segments, surface, ends, grading }
     }
 
-    /// The point at `v` of a panel.
+    /// Returns the point at `v` of a panel.
     pub(crate) fn point(&self, panel: &Panel, v: f64) -> BoundaryPoint {
         let segment = &self.segments[panel.segment];
         let (power, slope) = if panel.gamma == 1.0 {

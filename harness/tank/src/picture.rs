@@ -274,8 +274,8 @@ pub fn tank(tank: &Tank, data: &ModalData, gravity: f64) -> String {
     text(&mut svg, frame.left, 28.0, "start", &title);
     let mut y = 70.0;
     for line in [
-        format!("liquid {} kg", digits(data.m_liq)),
-        format!("centre of mass at {} m", digits(data.z_cg)),
+        format!("liquid {} kg", three_digits(data.m_liq)),
+        format!("centre of mass at {} m", three_digits(data.z_cg)),
         match &data.capillarity {
             Some(found) => {
                 let [g, sigma] = [gravity, found.sigma].map(significant);
@@ -297,8 +297,8 @@ pub fn tank(tank: &Tank, data: &ModalData, gravity: f64) -> String {
         let words = format!(
             "{}: {}, {} % of the mass",
             mode.n,
-            f.map_or("frequency not known".to_string(), |f| format!("{} Hz", digits(f))),
-            digits(100.0 * mode.m_ratio)
+            f.map_or("frequency not known".to_string(), |f| format!("{} Hz", three_digits(f))),
+            three_digits(100.0 * mode.m_ratio)
         );
         text(&mut svg, x + 32.0, y, "start", &words);
         y += 20.0;
@@ -311,8 +311,8 @@ pub fn tank(tank: &Tank, data: &ModalData, gravity: f64) -> String {
     page(x + 280.0, (frame.top + frame.height + 60.0).max(y + 20.0), &title, &svg)
 }
 
-/// Returns three significant digits.
-fn digits(value: f64) -> String {
+/// Formats a value with three significant digits.
+fn three_digits(value: f64) -> String {
     if value == 0.0 {
         return "0".into();
     }

@@ -123,19 +123,18 @@ impl Discretisation {
         }
     }
 
-    /// Number of unknowns.
+    /// Returns the number of unknowns.
     pub(crate) fn len(&self) -> usize {
         self.points.len()
     }
 
-    /// Weight r ds of every point.
+    /// Returns the weight r ds of every point.
     pub(crate) fn weights(&self) -> Vec<f64> {
         let weight =
             |(i, x): (usize, &BoundaryPoint)| x.p[0] * x.speed * self.rule.weights[i % self.order];
         self.points.iter().enumerate().map(weight).collect()
     }
 
-    /// Returns the radii of the points.
     pub(crate) fn radii(&self) -> Vec<f64> {
         self.points.iter().map(|x| x.p[0]).collect()
     }
@@ -145,7 +144,7 @@ impl Discretisation {
         self.points.iter().map(|x| (x.p[1] - z0) * x.n[0] - x.p[0] * x.n[1]).collect()
     }
 
-    /// Range of the points on the free surface.
+    /// Returns the range of the points on the free surface.
     pub(crate) fn on_surface(&self) -> core::ops::Range<usize> {
         self.surface..self.points.len()
     }

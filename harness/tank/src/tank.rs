@@ -42,36 +42,20 @@ enum Entry {
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Shape {
     /// Upright circular cylinder with flat ends.
-    Cylinder {
-        /// Radius.
-        radius: f64,
-        /// Height.
-        height: f64,
-    },
+    Cylinder { radius: f64, height: f64 },
     /// Sphere.
-    Sphere {
-        /// Radius.
-        radius: f64,
-    },
+    Sphere { radius: f64 },
     /// Ellipsoid of revolution about the vertical axis.
     Spheroid {
-        /// Radius of the equator.
         radius: f64,
         /// Half of its height.
         half_height: f64,
     },
     /// Cone with its apex at the bottom, open at the top.
-    Cone {
-        /// Angle between axis and wall, degrees.
-        half_angle: f64,
-        /// Height.
-        height: f64,
-    },
+    Cone { half_angle: f64, height: f64 },
     /// Cylinder with elliptical domes.
     DomedCylinder {
-        /// Radius.
         radius: f64,
-        /// Height of the cylindrical part.
         height: f64,
         /// Depth of the bottom dome; 0 is flat, below 0 it bulges into the tank.
         bottom: f64,
@@ -79,38 +63,18 @@ pub enum Shape {
         top: f64,
     },
     /// Cylinder with torispherical heads: a spherical crown and a toroidal knuckle.
-    Torispherical {
-        /// Radius of the cylinder.
-        radius: f64,
-        /// Height of the cylindrical part.
-        height: f64,
-        /// Radius of the crown.
-        crown_radius: f64,
-        /// Radius of the knuckle.
-        knuckle_radius: f64,
-    },
+    Torispherical { radius: f64, height: f64, crown_radius: f64, knuckle_radius: f64 },
     /// Upright annular cylinder with a flat bottom.
-    Annulus {
-        /// Radius of the inner wall.
-        inner_radius: f64,
-        /// Radius of the outer wall.
-        outer_radius: f64,
-        /// Height.
-        height: f64,
-    },
+    Annulus { inner_radius: f64, outer_radius: f64, height: f64 },
     /// Ring with a circular section, its axis vertical.
-    Torus {
-        /// Radius of the ring's centre line.
-        ring_radius: f64,
-        /// Radius of the section.
-        tube_radius: f64,
-    },
+    Torus { ring_radius: f64, tube_radius: f64 },
 }
 
 impl Shape {
-    /// The generating curve.
+    /// Returns the generating curve.
     ///
     /// # Errors
+    ///
     /// Every dimension that is not allowed.
     pub fn segments(&self) -> Result<Vec<Segment>, Problems> {
         let mut problems = Vec::new();
@@ -207,28 +171,20 @@ impl Shape {
 pub enum Geometry {
     /// A body of revolution.
     Revolution {
-        /// Generating curve.
         contour: Contour,
         /// The shape from which it was built, if any.
         shape: Option<Shape>,
     },
     /// A box, lengths in m; open at the top.
-    Box {
-        /// Along x.
-        length_x: f64,
-        /// Along y.
-        length_y: f64,
-    },
+    Box { length_x: f64, length_y: f64 },
 }
 
 /// A tank and its liquid.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tank {
-    /// Name of the tank, if it has one.
     pub name: Option<String>,
     /// Density of the liquid, kg/m³.
     pub density: f64,
-    /// Geometry of the tank.
     pub geometry: Geometry,
 }
 

@@ -55,7 +55,9 @@ pub fn recipe(fmu: &Fmu, case: &Case, columns: &[String]) -> BTreeMap<String, St
     recipe
 }
 
+/// A stored run.
 pub struct Stored {
+    /// Columns.
     pub table: Table,
     /// The table has the signals for the sensors but not their readings, because another program wrote it.
     pub lacks_sensors: bool,
@@ -130,6 +132,7 @@ fn difference(
     // causes first; parameters before the settings that set them
     const ORDER: [&str; 4] = ["format", "model", "binary_sha256", "parameters"];
     let rest = wanted.keys().map(String::as_str).filter(|key| !ORDER.contains(key));
+    // equal parameters from other settings are the same run
     let keys = ORDER.into_iter().chain(rest).filter(|key| *key != "settings");
     for key in keys {
         let (was, is) = (found.get(key), &wanted[key]);
