@@ -59,7 +59,7 @@ impl Acting<f64> {
 }
 
 impl Acting<f64> {
-    /// Inputs with flows only.
+    /// Returns inputs that are 0 except for the flows.
     fn flowing(flow: [f64; TANKS], slope: [f64; TANKS]) -> Acting<f64> {
         let lines = core::array::from_fn(|i| Line { value: flow[i], slope: slope[i] });
         Acting::of(&Inputs { mass_flow: lines, ..Inputs::default() }, 0.0)
@@ -67,7 +67,7 @@ impl Acting<f64> {
 }
 
 impl Acting<Dual> {
-    /// Inputs with derivatives along du.
+    /// Returns the inputs with their derivatives in the direction du.
     pub fn along(inputs: &Inputs, du: &[f64; INPUTS]) -> Acting<Dual> {
         let now = Acting::of(inputs, 0.0);
         let with = |x: Vec3, at: usize| [0, 1, 2].map(|i| Dual::of(x[i], du[at + i]));
@@ -280,7 +280,7 @@ impl Draining {
         }
     }
 
-    /// Total energy, J.
+    /// Returns the total energy, J.
     fn energy(&self, state: &State) -> f64 {
         let acting = Acting::flowing(state.flow, [0.0; TANKS]);
         self.evaluate(&state.x, &acting).outputs(&state.x).energy
@@ -388,7 +388,7 @@ impl Draining {
         Instant { q, axes, velocity, w, a, w_d, by_pivot }
     }
 
-    /// Returns the rates of the states.
+    /// Returns the rates of the states x under the acting forces and flows.
     pub fn rates<T: Number>(&self, x: &[T; STATES], acting: &Acting<T>) -> [T; STATES] {
         let mut contents = [const { None }; TANKS];
         let Instant { q, axes, velocity, w, a, w_d, by_pivot } =
@@ -427,7 +427,8 @@ impl Draining {
         rate
     }
 
-    /// Returns the values for the outputs.
+    /// Returns everything from which the outputs are computed, for the states x under the acting forces and
+    /// flows.
     pub fn evaluate<T: Number>(&self, x: &[T; STATES], acting: &Acting<T>) -> Now<T> {
         let mut contents = [const { None }; TANKS];
         let Instant { axes, velocity, w, a, w_d, .. } =

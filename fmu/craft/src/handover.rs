@@ -23,39 +23,39 @@ pub(crate) trait Carrier {
 
     fn restore(&mut self, memory: &Self::Memory);
 
-    /// Evaluates the equations at `t`.
+    /// Computes all quantities of the equations of motion at the time `t`, s.
     fn evaluate_at(&mut self, t: f64);
 
     fn lump(&self, lump: usize) -> &Lump;
 
-    /// State of the detached liquid.
+    /// Returns the state of the detached liquid: settled, flying, or on the wall.
     fn ball_state(&mut self, lump: usize) -> &mut BallState;
 
-    /// The six numbers of the detached liquid among the states.
+    /// Returns the six numbers of the detached liquid (position and velocity) among the states.
     fn ball(&mut self, lump: usize) -> &mut [f64];
 
-    /// The six numbers of a bob of its tank.
+    /// Returns the six numbers of a bob (direction p and velocity v) of the lump's tank among the states.
     fn bob(&mut self, lump: usize, n: usize) -> &mut [f64];
 
-    /// The directions of the bobs of its tank.
+    /// Returns the directions of the bobs of the lump's tank, unit vectors.
     fn directions(&self, lump: usize) -> Directions;
 
-    /// The bobs of its tank, after [`Carrier::evaluate_at`].
+    /// Returns the bobs of the lump's tank with their present motion, after [`Carrier::evaluate_at`].
     fn bobs_of(&self, lump: usize) -> impl Iterator<Item = BobNow<f64>>;
 
-    /// All bobs and lumps that move, after [`Carrier::evaluate_at`].
+    /// Returns all bobs and lumps that move, after [`Carrier::evaluate_at`].
     fn points(&self) -> impl Iterator<Item = BobNow<f64>>;
 
-    /// The carrier with all rigid liquids.
+    /// Returns the carrier and all rigid liquid as one rigid body.
     fn rigid(&self) -> Rigid;
 
-    /// a, w, w'
+    /// Returns the acceleration a, the angular velocity w and the angular acceleration w' of the carrier.
     fn motion(&self) -> [&Vector; 3];
 
     /// Factors of the mass matrix with everything attached to the carrier.
     fn factors(&self) -> &Factors;
 
-    /// Energy dissipated since the start, J.
+    /// Returns the energy dissipated since the start, J.
     fn dissipated(&mut self) -> &mut f64;
 
     /// Applies an impulse about O to the carrier and everything attached to it. Returns the changes of V and w.
@@ -67,7 +67,8 @@ pub(crate) trait Carrier {
     /// Returns true if the wall presses on the lump in its current state.
     fn is_pressed(&mut self, lump: usize, t: f64) -> bool;
 
-    /// Performs the event `due`.
+    /// Performs the event `due` of the lump at the time `t`: it leaves the bottom, meets the wall, is
+    /// released from it, begins or ends to feel drag, or settles.
     #[inline(never)]
     fn change(&mut self, lump: usize, due: Due, t: f64) {
         self.evaluate_at(t);
@@ -130,8 +131,8 @@ pub(crate) trait Carrier {
         (mass, scale(1.0 / mass, momentum))
     }
 
-    /// The liquid leaves the bottom. Its centre keeps its velocity. The shape absorbs motions within the liquid, and
-    /// the carrier takes over the shape's moment of momentum.
+    /// Detaches the liquid from the bottom. Its centre keeps its velocity. The shape absorbs motions within
+    /// the liquid, and the carrier takes over the shape's moment of momentum.
     fn leave(&mut self, lump: usize, t: f64) {
         let before = self.energy_with([0.0; 3]);
         let center = self.lump(lump).center_of(&self.directions(lump));
@@ -148,7 +149,7 @@ pub(crate) trait Carrier {
         *self.dissipated() += loss;
     }
 
-    /// The wall reflects the lump, or holds it if it is slow and pressed to the wall.
+    /// Reflects the lump at the wall, or holds it there if it is slow and pressed to the wall.
     fn throw_back(&mut self, lump: usize, t: f64) {
         let before = self.memory();
         let (e, contact_speed) = self.lump(lump).restitution();
@@ -209,7 +210,8 @@ pub(crate) trait Carrier {
         *self.dissipated() += (1.0 - e) * j * v_n / 2.0;
     }
 
-    /// The pendulums take over the liquid. Returns true if this loses energy; otherwise the states are unusable.
+    /// Hands the liquid over to the pendulums. Returns true if this loses energy; otherwise the states are
+    /// unusable.
     fn settle(&mut self, lump: usize, t: f64) -> bool {
         let before = self.energy_with([0.0; 3]);
         let (mass, of_center) = self.drift_of_center();

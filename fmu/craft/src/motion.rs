@@ -63,8 +63,7 @@ use crate::state::{BallState, Inputs, STATES, State, index};
 /// change.
 pub const SCALE_TIME: f64 = 0.1;
 
-/// Coefficient n of the matrix of y -> w x (w x y) = (w w^T - |w|^2 1) y, from that of
-/// w w^T.
+/// Returns coefficient n of the matrix of y -> w x (w x y) = (w w^T - |w|^2 1) y, from that of w w^T.
 #[inline(always)]
 pub fn twice_crossed([xx, yy, zz, xy, xz, yz]: [f64; 6]) -> Mat3 {
     [[-yy - zz, xy, xz], [xy, -xx - zz, yz], [xz, yz, -xx - yy]]
@@ -328,8 +327,8 @@ impl CraftMotion {
         true
     }
 
-    /// After [`Motion::start`], updates the states for an impulse that changes the craft's velocity by dV (of O) and dw,
-    /// body axes.
+    /// Updates the states, after [`Motion::start`], for an impulse that changes the craft's velocity by dV
+    /// (of O) and dw, body axes.
     #[inline(never)]
     fn follow_impulse(&mut self, dv: Vec3, dw: Vec3) {
         let velocity_change = times(&rotation(&self.q.get(0)), dv);
@@ -526,7 +525,7 @@ impl CraftMotion {
         }
     }
 
-    /// Time over which the series of the bobs' drag are valid, s.
+    /// Returns the time over which the series of the bobs' drag are valid, s.
     #[inline(never)]
     fn drag_convergence_radius(&self) -> f64 {
         let constrained = self.constrained.iter().map(ConstrainedBob::convergence_radius);
@@ -537,7 +536,7 @@ impl CraftMotion {
             .fold(f64::INFINITY, f64::min)
     }
 
-    /// Error of the bobs' v by the series of their drag, relative to the allowed error.
+    /// Returns the error of the bobs' v that the series of their drag cause, relative to the allowed error.
     #[inline(never)]
     fn drag_defect(&self, n: usize, h: f64) -> f64 {
         let constrained = self.constrained.iter().map(|bob| bob.defect(n, h));
@@ -545,7 +544,7 @@ impl CraftMotion {
         all.fold(0.0, f64::max) * self.inv_allowed[2]
     }
 
-    /// Time over which the series of the pivot's dry friction are valid, s.
+    /// Returns the time over which the series of the pivot's dry friction are valid, s.
     #[inline(never)]
     fn friction_convergence_radius(&self) -> f64 {
         let about = |(i, rubbing): (usize, &Rubbing)| {
@@ -635,7 +634,8 @@ impl Motion for CraftMotion {
         if self.rubbing.is_empty() { h } else { h.min(self.friction_convergence_radius()) }
     }
 
-    /// For tanh starting at rest, three successive terms may vanish by symmetry.
+    /// Requires four negligible terms in succession with dry friction, because for tanh starting at rest
+    /// three may vanish by symmetry.
     #[inline(always)]
     fn convergence(&self) -> Convergence {
         if self.rubbing.is_empty() { Convergence::Decay } else { Convergence::Terms(4) }
@@ -1021,7 +1021,7 @@ impl Carrier for CraftMotion {
     }
 }
 
-/// The directions of a tank's bobs.
+/// Returns the directions of a tank's bobs.
 fn directions(x: &[f64; STATES], tank: usize) -> Directions {
     core::array::from_fn(|n| part(x, index::bob(tank, n)))
 }

@@ -68,7 +68,7 @@ impl<T: Number> Rigid<T> {
         Rigid { mass: m, moment: scale(m, s), inertia }
     }
 
-    /// Returns both bodies as one.
+    /// Returns both bodies as one rigid body: masses, moments and inertias added.
     pub fn and(&self, b: &Rigid<T>) -> Rigid<T> {
         let mut sum = *self;
         sum.mass = sum.mass + b.mass;
@@ -119,7 +119,7 @@ pub fn add_rank_one(matrix: &mut Mat6, m: f64, u: &[f64; 6]) {
     }
 }
 
-/// Returns [p; P x p].
+/// Returns [p; P x p]: a force along the direction p of a rod, and its moment about O, for a hinge at P.
 #[inline(always)]
 pub fn along_rod<T: Number>(p: Vec3<T>, hinge: Vec3<T>) -> [T; 6] {
     let c = cross(hinge, p);

@@ -233,7 +233,8 @@ pub struct TankInputs {
 }
 
 impl TankInputs {
-    /// Returns omega after `t` seconds.
+    /// Returns the host's angular velocity after `t` seconds, rad/s, with the angular acceleration along its
+    /// ramp.
     fn omega_at(&self, t: f64) -> Vec3 {
         let TankInputs { omega, omega_dot, .. } = self;
         [0, 1, 2].map(|i| omega[i] + (omega_dot.value[i] + omega_dot.slope[i] * t / 2.0) * t)
@@ -558,7 +559,7 @@ impl Motion for TankMotion {
     }
 }
 
-/// Returns the detached liquid, if any.
+/// Returns the detached liquid, if the tank has any and it is loose.
 #[inline(always)]
 fn loose(ball: &mut Option<Loose>) -> Option<&mut Lump> {
     ball.as_mut().map(|ball| &mut ball.lump).filter(|lump| lump.is_loose())
@@ -817,7 +818,7 @@ impl TankMotion {
         (self.w[1], self.w[2]) = (self.w_d[0], [0.0; 3]);
     }
 
-    /// Over the `h` before `t`, adds the part of the host's response that the host does not apply.
+    /// Adds the part of the host's response that the host does not apply, over the `h` seconds before `t`.
     #[inline(never)]
     fn lag(&mut self, h: f64, t: f64) {
         if self.loose().rest.is_none() {
@@ -880,7 +881,7 @@ impl TankMotion {
         }
     }
 
-    /// State of the detached liquid.
+    /// Returns the state of the detached liquid.
     fn state_of_ball(&self) -> BallState {
         if self.ball.is_some() { self.state.ball } else { BallState::Settled }
     }
@@ -972,7 +973,7 @@ impl Carrier for TankMotion {
         [dv, dw]
     }
 
-    /// The host does not move.
+    /// Does nothing, because the host does not move.
     fn shift(&mut self, _: Vec3) {}
 
     fn is_pressed(&mut self, _: usize, t: f64) -> bool {
@@ -982,8 +983,8 @@ impl Carrier for TankMotion {
 }
 
 impl TankMotion {
-    /// After [`Motion::start`], updates the rates of bobs and detached liquid, which keep part of their velocities when
-    /// the host's change.
+    /// Updates the rates of bobs and detached liquid, after [`Motion::start`]: they keep part of their
+    /// velocities when the host's change.
     fn follow_impulse(&mut self, dv: Vec3, dw: Vec3) {
         for bob in &self.bobs {
             let at = 6 * bob.mode;

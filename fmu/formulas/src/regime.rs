@@ -23,7 +23,7 @@ impl Regime {
         }
     }
 
-    /// Returns the class with this number.
+    /// Returns the class with this number; `None` if there is none.
     pub fn from_number(number: u8) -> Option<Regime> {
         [Regime::Linear, Regime::Transitional, Regime::Nonlinear]
             .into_iter()

@@ -106,7 +106,8 @@ pub(crate) fn problems(p: &Parameters) -> Vec<String> {
     problems
 }
 
-/// Lists warnings about the baffle.
+/// Lists warnings about a ring baffle for which Miles's formula does not hold: a wide ring, or a tank
+/// given by a table of modes.
 pub(crate) fn warnings(p: &Parameters) -> Vec<String> {
     let mut warnings = Vec::new();
     if p.baffle.width <= 0.0 {

@@ -43,7 +43,7 @@ impl Plant {
         }
     }
 
-    /// Returns x'.
+    /// Returns the derivatives x' of the continuous states, for hosts that integrate themselves.
     pub fn derivatives(&mut self, inputs: &Inputs) -> [f64; STATES] {
         self.evaluate(inputs);
         let torque = self.wheel.torque(self.state.x[x::WHEEL_SPEED], inputs.tau_cmd);
@@ -261,7 +261,7 @@ impl Plant {
         Ok(())
     }
 
-    /// Time of the gyro's next sample on the host's clock, s; `None` without a gyro.
+    /// Returns the time of the gyro's next sample on the host's clock, s; `None` without a gyro.
     pub fn next_time_event(&self) -> Option<f64> {
         self.next_sample().map(|due| self.state.time + due)
     }
@@ -277,7 +277,7 @@ impl Plant {
         takes
     }
 
-    /// Delay until the gyro's next sample, s.
+    /// Returns the delay until the gyro's next sample, s.
     fn next_sample(&self) -> Option<f64> {
         let State { gyro, elapsed, .. } = &self.state;
         self.imu.enabled.then(|| self.imu.due(gyro.next, elapsed[0]))

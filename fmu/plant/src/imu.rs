@@ -19,9 +19,9 @@ const SLACK: f64 = 1e-6;
 
 /// Number of processes of the flicker noise.
 pub(crate) const FLICKERS: usize = 8;
-/// Ratio of their correlation times, …
+/// Ratio of the correlation times of successive processes.
 const RATIO: f64 = 6.0;
-/// … and the shortest, s. At 0.1 s the white noise of a gyro is far larger.
+/// Shortest correlation time, s. At 0.1 s the white noise of a gyro is far larger than the flicker noise.
 const SHORTEST: f64 = 0.1;
 
 /// State of the gyro.
@@ -31,7 +31,7 @@ pub(crate) struct Gyro {
     pub next: u64,
     /// Bias of the next sample, rad/s.
     pub bias: f64,
-    /// The value held, rad/s.
+    /// Value that the gyro holds until the next sample, rad/s.
     pub held: f64,
     /// Rate random walk of the next sample, rad/s.
     pub walk: f64,
@@ -142,7 +142,7 @@ fn normals_of(seed: i32, stream: u64, k: u64) -> (f64, f64) {
     (radius * cos, radius * sin)
 }
 
-/// Step and finaliser of the SplitMix64 generator (Steele, Lea, Flood 2014).
+/// Returns the next number of the SplitMix64 generator from its state `x` (Steele, Lea, Flood 2014).
 fn mix(x: u64) -> u64 {
     let mut z = x.wrapping_add(0x9E37_79B9_7F4A_7C15);
     z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);

@@ -60,9 +60,8 @@ pub(crate) struct Mode {
 }
 
 impl Leaning {
-    /// Returns the tilt of the bench at the start; `None` for an upright bench or a tank given by a
-    /// table.
-    pub fn of(p: &Parameters) -> Option<Leaning> {
+    /// Returns the tilt of the bench at the start; `None` for an upright bench or a tank given by a table.
+    pub fn from_parameters(p: &Parameters) -> Option<Leaning> {
         let leans = p.bench.tilt != 0.0 && p.slosh.source == SloshSource::Geometry;
         leans.then(|| {
             let n = libm::sin(p.bench.tilt_azimuth - p.init.theta);
@@ -105,7 +104,8 @@ impl Leaning {
 /// Lists problems of the parameters with this tilt.
 pub(crate) fn problems(p: &Parameters) -> Vec<String> {
     let mut problems = Vec::new();
-    let (Some(Leaning { slope, .. }), true) = (Leaning::of(p), p.slosh.model != SloshModel::Frozen)
+    let (Some(Leaning { slope, .. }), true) =
+        (Leaning::from_parameters(p), p.slosh.model != SloshModel::Frozen)
     else {
         return problems;
     };
@@ -129,7 +129,7 @@ const APART: f64 = 0.01;
 /// Lists warnings about the modes with this tilt.
 pub(crate) fn warnings(p: &Parameters) -> Vec<String> {
     let mut warnings = Vec::new();
-    let Some(leaning) = Leaning::of(p) else { return warnings };
+    let Some(leaning) = Leaning::from_parameters(p) else { return warnings };
     let fill = 2.0 * p.tank.h / p.tank.d;
     let most = largest_slope(fill);
     if leaning.slope > most {

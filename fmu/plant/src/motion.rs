@@ -361,7 +361,8 @@ impl Motion {
         !self.varies && !self.suspension.exists
     }
 
-    /// [`Motion::advance`] for one slosh model; `UNROLLED` only for a constant specific force and plain motion.
+    /// Works like [`Motion::advance`] for one slosh model; `UNROLLED` only for a constant specific force and
+    /// plain motion.
     #[inline(always)]
     fn advance_along<const UNROLLED: bool, M: SloshMode>(
         &mut self,
@@ -519,7 +520,7 @@ impl<const UNROLLED: bool, M: SloshMode> integrator::Motion for Stretch<'_, UNRO
         all.fold(0.0, larger) / self.allowed[1]
     }
 
-    /// The hub comes to rest or breaks away.
+    /// Returns the time within `h` at which the hub comes to rest or breaks away, s.
     #[inline(always)]
     fn event(&mut self, n: usize, h: f64) -> Option<f64> {
         self.event = None;

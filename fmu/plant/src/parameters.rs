@@ -376,7 +376,7 @@ impl Default for Imu {
 }
 
 impl Default for Solver {
-    /// With the default limit a step of one mode takes at most a fraction of a second, of ten
+    /// Allows so many steps that a step of one mode takes at most a fraction of a second, and of ten
     /// spherical modes about six seconds.
     fn default() -> Self {
         Solver { max_steps: 200_000 }

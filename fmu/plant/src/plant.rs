@@ -128,7 +128,7 @@ impl StoppedStep {
     }
 }
 
-/// Rounding errors of durations within a step of length `h`, s.
+/// Returns the rounding errors of durations within a step of length `h`, s.
 fn rounding(h: f64) -> f64 {
     4.0 * f64::EPSILON * h
 }
@@ -275,7 +275,7 @@ impl Plant {
         self.stopped.as_ref()
     }
 
-    /// Restores a saved one.
+    /// Restores a stopped step that was saved.
     pub fn set_stopped(&mut self, stopped: Option<StoppedStep>) {
         self.stopped = stopped;
     }
@@ -407,7 +407,8 @@ impl Plant {
         self.work_axial_at(change, self.height())
     }
 
-    /// Returns the same from g_axial's change since the last accepted step and from the liquid's mass times height.
+    /// Computes [`Plant::work_axial`] from g_axial's change since the last accepted step and from the
+    /// liquid's mass times height.
     pub(crate) fn work_axial_at<T: Number>(&self, change: T, [mass_height, rate]: [T; 2]) -> T {
         let last = self.state.axial;
         let c = T::constant;

@@ -337,7 +337,7 @@ impl Calculated {
         let bond = liquid.bond(g, radius);
         let mut all = Calculated { m_liq, m_0: m_liq, bond, ..Default::default() };
         let modes = if slosh.model == SloshModel::Frozen { 0 } else { slosh.modes.min(MODES) };
-        let leaning = Leaning::of(p);
+        let leaning = Leaning::from_parameters(p);
         for n in 0..modes {
             // Of an upright pendulum of the mode's frequency; an oblique one has another length.
             let upright;

@@ -61,7 +61,7 @@ impl Log {
         Log { logger, filter: Filter::FAILURES, step_warned: false }
     }
 
-    /// Logs why a call has failed.
+    /// Logs why a call has failed, under the category for its severity.
     pub fn report(&self, fault: &Fault) {
         self.write(status(fault.severity), Topic::Failure(fault.severity), || fault.text.clone());
     }

@@ -16,7 +16,7 @@ pub enum Interface {
 }
 
 impl Interface {
-    /// Returns the name for messages.
+    /// Returns the name of the interface for messages.
     pub const fn name(self) -> &'static str {
         match self {
             Interface::ModelExchange => "Model Exchange",
@@ -87,7 +87,7 @@ impl InstanceState {
         InstanceState::Intermediate,
     ];
 
-    /// Returns the name for messages.
+    /// Returns the name of the state for messages.
     pub const fn name(self) -> &'static str {
         match self {
             InstanceState::Instantiated => "instantiated",
@@ -180,7 +180,7 @@ impl Call {
         Call { c_type: Some(c_type), ..self }
     }
 
-    /// Restricts the function to one interface.
+    /// Restricts the function to instances of one interface.
     pub(crate) const fn only_in(self, interface: Interface) -> Call {
         Call { only_in: Some(interface), ..self }
     }

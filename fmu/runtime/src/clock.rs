@@ -40,7 +40,7 @@ pub(crate) struct Clock {
 }
 
 impl Clock {
-    /// Returns a clock at `start`.
+    /// Returns a clock at the time `start`, s; `stop` is the end of the experiment, if the host gives one.
     pub fn new(interface: Interface, start: f64, stop: Option<f64>) -> Clock {
         let is_hosts = interface == Interface::ModelExchange;
         Clock { start, stop, time: start, is_hosts, last_event: f64::NEG_INFINITY }

@@ -129,7 +129,7 @@ impl Extent {
         Ok(())
     }
 
-    /// Returns the GUID or instantiationToken.
+    /// Returns the GUID (FMI 2.0) or instantiationToken (FMI 3.0).
     pub fn token(&self) -> &str {
         &self.token
     }
@@ -139,7 +139,7 @@ impl Extent {
         &self.places
     }
 
-    /// Returns the number of event indicators.
+    /// Returns the number of event indicators in use.
     pub fn indicators(&self) -> usize {
         self.indicators
     }

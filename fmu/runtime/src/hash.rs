@@ -11,7 +11,7 @@ impl Hash {
         Hash(0x6c62_272e_07bb_0142_62b8_2175_6295_c58d)
     }
 
-    /// Returns the hash after appending `bytes`.
+    /// Returns the hash of everything so far and of `bytes`.
     pub fn bytes(mut self, bytes: &[u8]) -> Hash {
         for byte in bytes {
             self.0 ^= u128::from(*byte);

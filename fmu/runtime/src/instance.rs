@@ -194,7 +194,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         Places { extent: self.extent.clone(), next: 0, model: PhantomData }
     }
 
-    /// Returns the interface of the instance.
+    /// Returns the interface for which the instance was created.
     pub fn interface(&self) -> Interface {
         self.interface
     }
@@ -210,7 +210,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(call)
     }
 
-    /// Returns the instance state.
+    /// Returns the state in the standard's state machine, which decides what calls are allowed.
     pub fn state(&self) -> InstanceState {
         self.state
     }
@@ -339,7 +339,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Ends the simulation.
+    /// Ends the simulation; afterwards variables can still be read.
     pub fn terminate(&mut self) -> Result<(), Fault> {
         let call = self.check(V::TERMINATE)?;
         self.leave_initialized(call)?;
@@ -1068,7 +1068,11 @@ impl<M: Model, V: Version> Instance<M, V> {
 
     // ---- Events and continuous time, handled by the host ----
 
-    /// Enters event mode.
+    /// Enters event mode, in which the host may change discrete inputs and handle events.
+    ///
+    /// # Errors
+    ///
+    /// If the present state does not allow it.
     pub fn enter_event_mode(&mut self) -> Result<(), Fault> {
         let call = self.check(V::ENTER_EVENT)?;
         if self.events == Events::InStep {
@@ -1109,7 +1113,11 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(EventInfo { states_changed: false, next_time })
     }
 
-    /// Enters or leaves configuration mode.
+    /// Enters or leaves configuration mode, in which structural parameters can be set.
+    ///
+    /// # Errors
+    ///
+    /// If the present state does not allow it.
     pub fn configure(&mut self, call: &'static Call, to: InstanceState) -> Result<(), Fault> {
         self.check(call)?;
         self.state = to;
@@ -1123,7 +1131,11 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Enters continuous-time mode.
+    /// Enters continuous-time mode, in which the host integrates.
+    ///
+    /// # Errors
+    ///
+    /// If the present state does not allow it.
     pub fn enter_continuous_time_mode(&mut self) -> Result<(), Fault> {
         let call = self.check(V::ENTER_CONTINUOUS_TIME)?;
         self.leave_initialized(call)?;

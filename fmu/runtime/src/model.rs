@@ -111,7 +111,7 @@ pub trait Model: Clone + Debug + Sized + 'static {
         let _ = inputs;
     }
 
-    /// Returns the current outputs.
+    /// Returns the outputs for the present states and the given inputs.
     fn outputs(&mut self, inputs: &Self::Inputs) -> Self::Outputs;
 
     /// Sets the slopes, over a step of size `h` (s), of inputs that follow from other inputs during the step,
@@ -126,7 +126,7 @@ pub trait Model: Clone + Debug + Sized + 'static {
     /// Returns the continuous states in the model's own order (see `Variable::state`).
     fn continuous_states(&self) -> &[f64];
 
-    /// Sets the continuous states (Model Exchange).
+    /// Sets the continuous states from the host's integrator (Model Exchange).
     fn set_continuous_states(&mut self, x: &[f64]);
 
     /// Sets the present time of the host's clock.
@@ -154,7 +154,7 @@ pub trait Model: Clone + Debug + Sized + 'static {
         Self::Discrete::default()
     }
 
-    /// Reverts [`Model::apply_present_inputs`].
+    /// Reverts [`Model::apply_present_inputs`], so that reading outputs does not change the model.
     fn revert(&mut self, before: Self::Discrete) {
         let _ = before;
     }

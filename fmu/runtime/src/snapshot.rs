@@ -50,7 +50,7 @@ pub fn size<M: Model>() -> usize {
     head + set + table.about.saved_words * 8 + 16
 }
 
-/// Serialises a saved state.
+/// Writes a saved state as bytes that another process can read.
 pub fn to_bytes<M: Model, V: Version>(saved: &Instance<M, V>) -> Vec<u8> {
     let (table, size) = (M::table(), size::<M>());
     let mut bytes = Vec::with_capacity(size);

@@ -172,7 +172,7 @@ pub const fn scalars<M: Model, const N: usize>(
     scalars
 }
 
-/// Returns true for a discrete output.
+/// Returns true for a discrete output, which changes only at events.
 const fn is_discrete<M: Model>(variable: &Variable<M>) -> bool {
     matches!(variable.access, Access::OutputInteger(_) | Access::OutputBoolean(_))
 }
@@ -237,7 +237,7 @@ impl<M: Model> Scalar<M> {
 }
 
 impl<M: Model> Table<M> {
-    /// Creates a model's table.
+    /// Creates a model's table from the declared variables and their scalars.
     pub const fn new(
         about: About,
         variables: &'static [Variable<M>],
@@ -418,7 +418,7 @@ impl<M: Model> Table<M> {
     }
 }
 
-/// Formats a hash like a GUID.
+/// Formats a hash in the form of a GUID, as FMI 2.0 requires it.
 fn braced(hash: Hash) -> String {
     let hex = format!("{:032x}", hash.value());
     format!("{{{}-{}-{}-{}-{}}}", &hex[..8], &hex[8..12], &hex[12..16], &hex[16..20], &hex[20..])

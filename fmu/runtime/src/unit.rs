@@ -64,7 +64,7 @@ pub static UNITS: &[Unit] = &[
     Unit { name: "rad/s/sqrt(s)", base: None, display_units: &[] },
 ];
 
-/// Finds a unit by its name.
+/// Finds a unit by its name; `None` if no variable can have it.
 pub fn find(name: &str) -> Option<&'static Unit> {
     UNITS.iter().find(|unit| unit.name == name)
 }

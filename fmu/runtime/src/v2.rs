@@ -223,7 +223,6 @@ pub fn fmi2GetTypesPlatform() -> fmi2String {
     c"default".as_ptr()
 }
 
-/// "2.0"
 pub fn fmi2GetVersion() -> fmi2String {
     c"2.0".as_ptr()
 }
@@ -571,7 +570,8 @@ pub unsafe fn fmi2EnterEventMode<M: Model>(c: fmi2Component) -> fmi2Status {
     }
 }
 
-/// Handles the events that are due.
+/// Handles the events that are due, and tells the host whether another one follows at once and when the next
+/// time event is.
 pub unsafe fn fmi2NewDiscreteStates<M: Model>(
     c: fmi2Component,
     eventInfo: *mut fmi2EventInfo,
@@ -716,7 +716,8 @@ pub unsafe fn fmi2SetRealInputDerivatives<M: Model>(
     }
 }
 
-/// Computes the time derivatives of outputs.
+/// Computes the time derivatives of outputs at the end of the last step, for hosts that extrapolate; only
+/// order 1 is supported.
 pub unsafe fn fmi2GetRealOutputDerivatives<M: Model>(
     c: fmi2Component,
     vr: *const fmi2ValueReference,

@@ -83,7 +83,7 @@ pub struct Item {
 }
 
 impl Item {
-    /// Creates an item.
+    /// Creates an item of an enumeration with its description.
     pub const fn new(name: &'static str, description: &'static str) -> Item {
         Item { name, description }
     }
@@ -147,7 +147,7 @@ pub enum Dimension {
 }
 
 impl Dimension {
-    /// Returns the largest length.
+    /// Returns the largest length that the dimension can have.
     pub const fn most(self) -> usize {
         match self {
             Dimension::Fixed(length) | Dimension::Sized(_, length) | Dimension::Used(_, length) => {
@@ -290,7 +290,7 @@ impl<M: Model> Variable<M> {
         variable(name, Causality::Input, quantity(unit), Access::Input(ramp), description)
     }
 
-    /// Declares an output.
+    /// Declares an output; `get` reads element n from the model's outputs.
     pub const fn output(
         name: &'static str,
         get: fn(&M::Outputs, usize) -> f64,
@@ -300,7 +300,7 @@ impl<M: Model> Variable<M> {
         variable(name, Causality::Output, quantity(unit), Access::Output(get), description)
     }
 
-    /// Declares a real local variable.
+    /// Declares a real local variable; `get` reads element n from the model's outputs.
     pub const fn local(
         name: &'static str,
         get: fn(&M::Outputs, usize) -> f64,
@@ -341,7 +341,7 @@ impl<M: Model> Variable<M> {
         variable(name, Causality::Local, quantity(unit), Access::Derivative(of), description)
     }
 
-    /// Declares a Boolean local variable.
+    /// Declares a Boolean local variable; `get` reads element n from the model's outputs.
     pub const fn local_boolean(
         name: &'static str,
         get: fn(&M::Outputs, usize) -> bool,
@@ -350,7 +350,7 @@ impl<M: Model> Variable<M> {
         variable(name, Causality::Local, Kind::Boolean, Access::OutputBoolean(get), description)
     }
 
-    /// Declares an integer local variable.
+    /// Declares an integer local variable; `get` reads element n from the model's outputs.
     pub const fn local_integer(
         name: &'static str,
         get: fn(&M::Outputs, usize) -> i32,
@@ -371,7 +371,7 @@ impl<M: Model> Variable<M> {
         variable(name, Causality::Local, kind, Access::OutputInteger(get), description)
     }
 
-    /// Declares a real parameter.
+    /// Declares a real parameter; `field` returns the place of element n in the model's parameters.
     pub const fn parameter(
         name: &'static str,
         field: fn(&mut M::Parameters, usize) -> &mut f64,
@@ -381,7 +381,7 @@ impl<M: Model> Variable<M> {
         variable(name, Causality::Parameter, quantity(unit), Access::Real(field), description)
     }
 
-    /// Declares a Boolean parameter.
+    /// Declares a Boolean parameter; `field` returns its place in the model's parameters.
     pub const fn switch(
         name: &'static str,
         field: fn(&mut M::Parameters) -> &mut bool,
@@ -390,7 +390,7 @@ impl<M: Model> Variable<M> {
         variable(name, Causality::Parameter, Kind::Boolean, Access::Boolean(field), description)
     }
 
-    /// Declares an integer parameter.
+    /// Declares an integer parameter; `field` returns the place of element n in the model's parameters.
     pub const fn integer(
         name: &'static str,
         field: fn(&mut M::Parameters, usize) -> &mut i32,
@@ -423,7 +423,7 @@ impl<M: Model> Variable<M> {
         variable(name, Causality::Parameter, kind, Access::Choice { get, set }, description)
     }
 
-    /// Declares a calculated parameter.
+    /// Declares a calculated parameter; `get` computes element n from the model with its parameters.
     pub const fn calculated(
         name: &'static str,
         get: fn(&M, usize) -> f64,
@@ -434,7 +434,7 @@ impl<M: Model> Variable<M> {
         variable(name, Causality::CalculatedParameter, quantity(unit), access, description)
     }
 
-    /// Sets the display unit.
+    /// Sets the unit in which hosts show the variable by default.
     pub const fn display_unit(mut self, unit: &'static str) -> Self {
         if let Kind::Real(quantity) = &mut self.kind {
             quantity.display_unit = Some(unit);
@@ -465,7 +465,7 @@ impl<M: Model> Variable<M> {
         self
     }
 
-    /// Sets the nominal value.
+    /// Sets the nominal value, which hosts use to scale tolerances.
     pub const fn nominal(mut self, nominal: f64) -> Self {
         if let Kind::Real(quantity) = &mut self.kind {
             quantity.nominal = Some(nominal);
@@ -515,7 +515,7 @@ impl<M: Model> Variable<M> {
         self
     }
 
-    /// Returns the number of scalars.
+    /// Returns the number of scalars: the product of the largest lengths of all dimensions.
     pub const fn len(&self) -> usize {
         let (mut len, mut n) = (1, 0);
         while n < self.shape.len() {
@@ -712,7 +712,7 @@ impl<M: Model> Variable<M> {
         }
     }
 
-    /// Describes the allowed range.
+    /// Describes the allowed range in the variable's unit, for messages.
     fn allowed(&self) -> String {
         match self.kind {
             Kind::Real(Quantity { min, max, .. }) => match (min, max) {

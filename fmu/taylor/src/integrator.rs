@@ -70,7 +70,7 @@ impl Steps {
         StepError::TooManySteps { time, max_steps: self.max, advice: self.advice }
     }
 
-    /// Number of steps left.
+    /// Returns the number of steps that may still be taken.
     pub fn left(&self) -> usize {
         self.max - self.taken
     }

@@ -14,13 +14,13 @@ pub trait Number:
     + Div<Output = Self>
     + Neg<Output = Self>
 {
-    /// Returns a constant.
+    /// Returns a constant, whose derivative is 0.
     fn constant(value: f64) -> Self;
     /// Returns a quantity from coefficients 0 and 1 of its series.
     fn of(value: f64, slope: f64) -> Self;
-    /// Returns the value, or the derivative.
+    /// Returns the value of a plain number, or the derivative of a dual number.
     fn result(self) -> f64;
-    /// Returns the value.
+    /// Returns the value, also of a dual number.
     fn value(self) -> f64;
     /// Returns the larger of itself and a constant. The value is a maximum and no choice of two numbers: from 1/choice the
     /// compiler makes a choice of two quotients, and divides by a zero that was not chosen.
@@ -38,19 +38,19 @@ pub trait Number:
     fn clamp(self, low: f64, high: f64) -> Self {
         if self.value() > high { Self::constant(high) } else { self.at_least(low) }
     }
-    /// 1/self
+    /// Returns 1/self.
     fn recip(self) -> Self;
-    /// Square root. The derivative is 0 at 0, where it does not exist.
+    /// Returns the square root. The derivative is set to 0 at 0, where it does not exist.
     fn sqrt(self) -> Self;
-    /// sin
+    /// Returns the sine.
     fn sin(self) -> Self;
-    /// exp
+    /// Returns the exponential.
     fn exp(self) -> Self;
-    /// tanh
+    /// Returns the hyperbolic tangent.
     fn tanh(self) -> Self;
-    /// asin. The derivative is 0 at +-1, where it does not exist.
+    /// Returns the arc sine, rad. The derivative is set to 0 at +-1, where it does not exist.
     fn asin(self) -> Self;
-    /// sqrt(self^2 + b^2). The derivative is 0 at 0, where it does not exist.
+    /// Returns sqrt(self^2 + b^2). The derivative is set to 0 at 0, where it does not exist.
     fn hypot(self, b: Self) -> Self;
 }
 

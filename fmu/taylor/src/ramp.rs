@@ -12,7 +12,7 @@ pub struct Ramp<T = f64> {
 }
 
 impl Ramp {
-    /// Returns a constant quantity.
+    /// Returns a quantity that is constant over the step.
     pub fn held(value: f64) -> Ramp {
         Ramp { value, slope: 0.0 }
     }

@@ -29,13 +29,13 @@ pub struct Pair([[[f64; 2]; 3]; ORDER + 1]);
 pub const ZERO_PAIR: Pair = Pair([[[0.0; 2]; 3]; ORDER + 1]);
 
 impl Pair {
-    /// Sets coefficient n of both.
+    /// Sets coefficient n of both vectors.
     #[inline(always)]
     pub fn set(&mut self, n: usize, a: Vec3, b: Vec3) {
         self.0[n] = [[a[0], b[0]], [a[1], b[1]], [a[2], b[2]]];
     }
 
-    /// Returns coefficient n of both.
+    /// Returns coefficient n of both vectors.
     #[inline(always)]
     pub fn get(&self, n: usize) -> [Vec3; 2] {
         let [x, y, z] = self.0[n];
@@ -235,7 +235,7 @@ pub struct Attitude([[[f64; 2]; 4]; ORDER + 1]);
 pub const ZERO_ATTITUDE: Attitude = Attitude([[[0.0; 2]; 4]; ORDER + 1]);
 
 impl Attitude {
-    /// Sets coefficient n.
+    /// Sets coefficient n of the quaternion.
     #[inline(always)]
     pub fn set(&mut self, n: usize, [a, b, c, d]: [f64; 4]) {
         self.0[n] = [[-b, a], [c, d], [-d, c], [a, b]];
@@ -247,7 +247,7 @@ impl Attitude {
         self.set(n + 1, rate.map(|rate| rate * RECIPROCAL[n + 1]));
     }
 
-    /// Returns coefficient n.
+    /// Returns coefficient n of the quaternion.
     #[inline(always)]
     pub fn get(&self, n: usize) -> [f64; 4] {
         let [_, [c, d], _, [a, b]] = self.0[n];

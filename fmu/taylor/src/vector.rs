@@ -17,43 +17,43 @@ pub fn part(x: &[f64], at: usize) -> Vec3 {
     [x[at], x[at + 1], x[at + 2]]
 }
 
-/// a + b.
+/// Returns a + b.
 #[inline(always)]
 pub fn add<T: Number>(a: Vec3<T>, b: Vec3<T>) -> Vec3<T> {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
-/// a - b.
+/// Returns a - b.
 #[inline(always)]
 pub fn sub<T: Number>(a: Vec3<T>, b: Vec3<T>) -> Vec3<T> {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
-/// a b, b a vector.
+/// Returns the number a times the vector b.
 #[inline(always)]
 pub fn scale<T: Number>(a: T, b: Vec3<T>) -> Vec3<T> {
     [a * b[0], a * b[1], a * b[2]]
 }
 
-/// a.b
+/// Returns the scalar product a.b.
 #[inline(always)]
 pub fn dot<T: Number>(a: Vec3<T>, b: Vec3<T>) -> T {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// a x b.
+/// Returns the vector product a x b.
 #[inline(always)]
 pub fn cross<T: Number>(a: Vec3<T>, b: Vec3<T>) -> Vec3<T> {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// A b, b a column.
+/// Returns the matrix A times the column b.
 #[inline(always)]
 pub fn times<T: Number>(a: &Mat3<T>, b: Vec3<T>) -> Vec3<T> {
     [dot(a[0], b), dot(a[1], b), dot(a[2], b)]
 }
 
-/// A^T b.
+/// Returns the transposed matrix A^T times the column b.
 #[inline(always)]
 pub fn transposed_times<T: Number>(a: &Mat3<T>, b: Vec3<T>) -> Vec3<T> {
     [0, 1, 2].map(|i| a[0][i] * b[0] + a[1][i] * b[1] + a[2][i] * b[2])
@@ -94,7 +94,7 @@ pub fn rotation<T: Number>(q: &Quaternion<T>) -> Mat3<T> {
     ]
 }
 
-/// q/|q|.
+/// Returns q/|q|, the unit quaternion of the same rotation.
 #[inline(always)]
 pub fn unit_quaternion<T: Number>(q: Quaternion<T>) -> Quaternion<T> {
     let share = (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]).sqrt().recip();

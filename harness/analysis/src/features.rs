@@ -119,7 +119,7 @@ impl Features {
         self.f_dip.is_some() || self.f_res.is_some()
     }
 
-    /// Returns the separation f_res − f_dip, Hz.
+    /// Returns the separation f_res − f_dip of resonance and antiresonance, Hz.
     pub fn delta_f(&self) -> Option<f64> {
         Some(self.f_res? - self.f_dip?)
     }

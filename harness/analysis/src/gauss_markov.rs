@@ -32,7 +32,7 @@ pub struct Whitening {
 }
 
 impl Noise {
-    /// Creates white noise without drift.
+    /// Creates white noise of the standard deviation `sigma` without drift.
     pub fn white(sigma: f64) -> Self {
         Noise { white: sigma, drift: 0.0, time: 100.0 }
     }

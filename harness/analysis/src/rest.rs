@@ -198,7 +198,7 @@ fn modified(distance: f64, n: f64) -> f64 {
     distance * (n.sqrt() - 0.01 + 0.85 / n.sqrt())
 }
 
-/// Computes [`Chunk::kolmogorov`] from samples.
+/// Computes [`Chunk::kolmogorov`], the test of normality, from samples.
 fn kolmogorov(samples: &[f64]) -> f64 {
     let mut sorted = samples.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);

@@ -32,7 +32,7 @@ pub struct Coefficients {
 }
 
 impl Coefficients {
-    /// Evaluates B(s)/A(s).
+    /// Evaluates the transfer function B(s)/A(s).
     pub fn response(&self, s: Complex64) -> Complex64 {
         let [b2, b1, b0] = self.numerator;
         (b2 * s * s + b1 * s + b0) / self.denominator_at(s)

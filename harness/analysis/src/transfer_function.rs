@@ -57,7 +57,7 @@ impl TransferFunction {
         self.pole_omega / TAU
     }
 
-    /// Evaluates H at a frequency, Hz.
+    /// Evaluates the transfer function H at a frequency, Hz.
     pub fn response(&self, frequency: f64) -> Complex64 {
         let s = Complex64::new(0.0, TAU * frequency);
         let [b2, b1, b0] = self.numerator;

@@ -259,7 +259,7 @@ pub trait UnderTest: Deref<Target = Loaded<Self::Version>> {
     /// Returns the interface to which a use belongs.
     fn interface(using: Self::Use) -> Interface;
 
-    /// Creates an instance.
+    /// Creates an instance for one interface of the FMU under test.
     fn session(&self, using: Self::Use) -> Result<Self::Session<'_>>;
 
     /// Creates an instance and initialises it with the FMU's default experiment, so that it is ready for a

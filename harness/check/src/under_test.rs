@@ -634,7 +634,7 @@ impl<'f> Session<'f> {
         root.number("numberOfEventIndicators").unwrap_or(0.0) as usize
     }
 
-    /// Reads one variable.
+    /// Reads one variable by the function for its type.
     pub fn get(&mut self, v: &Variable) -> Called<Reading> {
         let reference = [v.reference];
         Ok(match v.kind {

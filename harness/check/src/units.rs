@@ -166,7 +166,7 @@ fn read(name: &str) -> Vec<Unit> {
     }
 }
 
-/// Parses `product` or `product/factor`.
+/// Parses a unit of the form `product` or `product/factor`, such as `kg.m2/s`.
 fn quotient(rest: &mut &str) -> Option<Vec<Unit>> {
     let above = product(rest)?;
     let Some(after) = rest.strip_prefix('/') else { return Some(above) };

@@ -76,7 +76,7 @@ pub fn color_of_arguments() -> ColorChoice {
     value.and_then(|value| value.parse().ok()).unwrap_or_default()
 }
 
-/// Prints an error in clap's style.
+/// Prints an error to stderr in the style of clap's errors.
 pub fn error(text: impl std::fmt::Display) {
     complain(format!("{} {text}\n", styled("error:", *Styles::styled().get_error())));
 }
@@ -140,7 +140,7 @@ pub fn print(text: String) {
     }
 }
 
-/// Prints a value as JSON.
+/// Prints a value as indented JSON to stdout.
 pub fn print_json(value: &impl serde::Serialize) -> Result<()> {
     print(serde_json::to_string_pretty(value)? + "\n");
     Ok(())

@@ -12,7 +12,7 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// Finds the variables of an FMU.
+    /// Finds the variables of an FMU by which its tanks say why they are out of range.
     pub fn find(description: &ModelDescription) -> Limits {
         let several = (1..=spacecraft::MOST_TANKS)
             .map(|i| (spacecraft::tank::LIMITED_BY_KIND.at([i]), format!("tank {i}: ")));

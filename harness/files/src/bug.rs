@@ -67,7 +67,8 @@ pub fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
     })
 }
 
-/// Message of a panic for the user.
+/// Formats the message of a panic for the user: the panic itself, the files that had been read, and the request
+/// to report it as a bug.
 pub fn report(panic: &str) -> String {
     let read = input::read_so_far();
     let files = match read.is_empty() {

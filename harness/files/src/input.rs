@@ -35,7 +35,7 @@ const MOST_NAMED: usize = 20;
 
 static READ: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
-/// The first files that this process has opened here, for reports of bugs.
+/// Lists the first files that this process has opened here, for reports of bugs.
 pub fn read_so_far() -> Vec<String> {
     let all = READ.lock().unwrap_or_else(PoisonError::into_inner);
     all.iter().map(|path| path.display().to_string()).collect()

@@ -52,7 +52,7 @@ pub fn destination(path: &Path) -> Result<Destination> {
     )
 }
 
-/// The folder of a path; `.` for a bare name.
+/// Returns the folder of a path; `.` for a bare name.
 fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
@@ -115,7 +115,7 @@ fn pour(draft: &mut File, path: &Path) -> io::Result<()> {
     io::copy(draft, &mut File::options().append(true).open(path)?).map(drop)
 }
 
-/// Writes `path` as [`atomically`] does.
+/// Writes `bytes` to `path` completely or not at all, as [`atomically`] does.
 pub fn write(path: &Path, bytes: impl AsRef<[u8]>) -> Result<()> {
     atomically(path, |file| Ok(file.write_all(bytes.as_ref())?))
 }
@@ -126,12 +126,12 @@ pub fn directory(path: &Path) -> Result<()> {
         .with_context(|| format!("the directory {} cannot be made", path.display()))
 }
 
-/// SHA-256 in hexadecimal digits.
+/// Returns the SHA-256 of `bytes` in hexadecimal digits.
 pub fn sha256(bytes: &[u8]) -> String {
     base16ct::lower::encode_string(&Sha256::digest(bytes))
 }
 
-/// The same of all that can be read from `from`, which need not fit into memory.
+/// Returns the SHA-256 of everything that can be read from `from`, which need not fit into memory.
 pub fn sha256_of(mut from: impl Read) -> Result<String> {
     let (mut hash, mut buffer) = (Sha256::new(), vec![0; 1 << 16]);
     loop {

@@ -103,7 +103,7 @@ impl Folder {
         })
     }
 
-    /// Path for files.
+    /// Returns the path for the files.
     pub fn path(&self) -> &Path {
         &self.files
     }

@@ -183,7 +183,7 @@ impl Archive {
         Ok(())
     }
 
-    /// Unpacks a file into memory.
+    /// Unpacks a file of the archive into memory.
     pub fn content(&self, entry: &Entry) -> Result<Vec<u8>> {
         let mut content = Vec::new();
         self.copy(entry, &mut content)?;

@@ -177,7 +177,7 @@ impl Binary {
         faults
     }
 
-    /// Names the functions of `wanted` that the binary does not export, in one sentence; `None` if none is
+    /// Lists the functions of `wanted` that the binary does not export, in one sentence; `None` if none is
     /// missing.
     pub fn lacking(&self, wanted: &[&str]) -> Option<String> {
         let lacking: Vec<_> =
@@ -185,7 +185,7 @@ impl Binary {
         (!lacking.is_empty()).then(|| format!("it does not export {}", lacking.join(", ")))
     }
 
-    /// Names the exports that are not functions of FMI, in one sentence; `None` if there are none.
+    /// Lists the exports that are not functions of FMI, in one sentence; `None` if there are none.
     pub fn surplus(&self) -> Option<String> {
         // macOS binds a name to the library that it comes from, so that further exports do no harm there;
         // and the linker for macOS exports some of Rust's names when it runs on other systems. One library

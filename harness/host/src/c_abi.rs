@@ -257,7 +257,8 @@ macro_rules! functions {
         }
 
         impl $(<$boolean>)? $table $(<$boolean>)? {
-            /// Names of all functions of the table; `version` is the index among each function's symbols.
+            /// Lists the names of all functions of the table; `version` is the index among each function's
+            /// symbols.
             pub(crate) fn symbols(version: usize) -> Vec<&'static str> {
                 vec![$([$($symbol),+][version],)*]
             }
@@ -305,7 +306,7 @@ impl HostState {
         }
     }
 
-    /// Names the parts of the state that differ from the present state.
+    /// Lists the parts of the process state that differ from the recorded state.
     pub(crate) fn changed(&self) -> Vec<&'static str> {
         let now = HostState::now();
         let parts = [

@@ -332,22 +332,22 @@ impl Fmu {
         self.exchange.is_some() && self.own.events.is_some()
     }
 
-    /// Names of the 25 C functions that every FMU must export.
+    /// Lists the 25 C functions that every FMU must export.
     pub fn symbols() -> Vec<&'static str> {
         [Common::<c_int>::symbols(0), Functions::symbols(0)].concat()
     }
 
-    /// Names of the 9 C functions that an FMU for Co-Simulation must export in addition.
+    /// Lists the 9 C functions that an FMU for Co-Simulation must export in addition.
     pub fn step_symbols() -> Vec<&'static str> {
         StepFunctions::symbols(0)
     }
 
-    /// Names of the 10 C functions that an FMU for Model Exchange must export in addition.
+    /// Lists the 10 C functions that an FMU for Model Exchange must export in addition.
     pub fn exchange_symbols() -> Vec<&'static str> {
         [EventFunctions::symbols(0), Exchange::<c_int>::symbols(0)].concat()
     }
 
-    /// Returns the result of fmi2GetTypesPlatform.
+    /// Returns the result of fmi2GetTypesPlatform; "default" is the only one that the standard allows.
     pub fn types_platform(&self) -> String {
         // SAFETY: takes nothing, returns a constant string.
         unsafe { copied((self.own.functions.get_types_platform.call)()) }
@@ -368,7 +368,7 @@ impl Fmu {
         }
     }
 
-    /// Calls fmi2Instantiate with exactly these arguments.
+    /// Calls fmi2Instantiate with exactly these arguments, also wrong ones.
     pub fn instantiate_with(&self, with: &Instantiation) -> Result<Instance<'_>, CallError> {
         let (name, guid, resources) =
             (c_string(with.name), c_string(with.guid), c_string(with.resources));
@@ -739,7 +739,7 @@ impl<'fmu> Instance<'fmu> {
         self.call(self.functions().set_string, |f, c| unsafe { f(c, &reference, 1, &text) })
     }
 
-    /// Calls fmi2SetFMUstate with NULL.
+    /// Calls fmi2SetFMUstate with NULL in place of a state.
     pub fn set_state_null(&mut self) -> Called {
         self.set_state(&FmuState(null_mut()))
     }

@@ -509,7 +509,7 @@ impl Fmu {
         Fmu::load_parsed(interface, directory, path, root)
     }
 
-    /// Names of the 75 functions that every FMU must export (section 2.5).
+    /// Lists the 75 functions that every FMU must export (section 2.5).
     pub fn symbols() -> Vec<&'static str> {
         let mut all = Fmi3::required_functions(true, true);
         all.extend(UNCALLED);

@@ -98,7 +98,7 @@ impl Fmu {
         each!(Fmu, self, fmu => fmu.binary_hash())
     }
 
-    /// Names the parts of the process state that loading the binary has changed, for example the rounding
+    /// Lists the parts of the process state that loading the binary has changed, for example the rounding
     /// mode.
     pub fn changed(&self) -> &[&'static str] {
         each!(Fmu, self, fmu => fmu.changed())

@@ -149,7 +149,7 @@ impl Element {
         Some(Element { name, line, attributes, children })
     }
 
-    /// Returns the element without its children.
+    /// Returns a copy of the element without its children.
     pub fn alone(&self) -> Element {
         let Element { name, line, attributes, .. } = self;
         let (name, attributes) = (name.clone(), attributes.clone());

@@ -49,7 +49,7 @@ impl StribeckCurve {
         series::time_within(dv, v1, v2)
     }
 
-    /// Returns T_C(0), N m.
+    /// Returns the dry friction at rest, T_C(0), N m.
     pub fn at_rest(&self) -> f64 {
         self.c + self.d
     }

@@ -48,7 +48,7 @@ impl OneWay {
         lowest - bend * (angle(1) / 2.0) * (angle(1) / 2.0) / 2.0
     }
 
-    /// Returns coefficient n of B.
+    /// Returns coefficient n of B in one direction.
     #[inline(always)]
     fn coefficient(&self, n: usize, trig: &[Series; 4]) -> f64 {
         let mean = series::constant(n, self.mean);
@@ -128,12 +128,13 @@ impl DirectionalFactor {
 
     /// Returns coefficient n of B in the hub's direction of rotation.
     pub fn coefficient(&self, n: usize, contact: Contact) -> f64 {
-        self.of(n, self.one_way(contact))
+        self.coefficient_of(n, self.one_way(contact))
     }
 
     /// Returns coefficient n of (B+ + B-)/2 and (B+ - B-)/2.
     pub fn even_odd(&self, n: usize) -> (f64, f64) {
-        let (forward, backward) = (self.of(n, &self.forward), self.of(n, &self.backward));
+        let (forward, backward) =
+            (self.coefficient_of(n, &self.forward), self.coefficient_of(n, &self.backward));
         ((forward + backward) / 2.0, (forward - backward) / 2.0)
     }
 
@@ -142,7 +143,7 @@ impl DirectionalFactor {
     }
 
     #[inline(always)]
-    fn of(&self, n: usize, one_way: &OneWay) -> f64 {
+    fn coefficient_of(&self, n: usize, one_way: &OneWay) -> f64 {
         match &self.trig {
             Some(trig) => one_way.coefficient(n, trig),
             None => series::constant(n, one_way.mean),

@@ -144,12 +144,14 @@ impl FrictionLaw for Lugre {
         [*z] = series::values([&self.z], n, t);
     }
 
-    /// Scale: torques within the tolerance of the dry friction.
+    /// Returns the coefficient relative to the largest deflection: torques then have the tolerance of the dry
+    /// friction.
     fn coefficient_norm(&self, n: usize) -> f64 {
         self.z[n].abs() * self.inv_deflection
     }
 
-    /// The bristle's torque -sigma_0 z also acts at rest.
+    /// Returns the contact that the net torque causes together with the bristle's torque -sigma_0 z, which
+    /// also acts at rest.
     fn contact_at_rest(&self, [net, slope]: [f64; 2], _: f64, before: Contact) -> Contact {
         let torque = net - self.sigma0 * self.z[0];
         match if torque != 0.0 { torque } else { slope } {

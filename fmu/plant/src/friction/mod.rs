@@ -67,7 +67,7 @@ pub trait FrictionLaw {
     /// Advances the law's own state z by `t`, from the series up to order n.
     fn advance(&self, _n: usize, _t: f64, _z: &mut f64) {}
 
-    /// Magnitude of coefficient n of the law's own state, relative to its allowed error.
+    /// Returns the magnitude of coefficient n of the law's own state, relative to its allowed error.
     #[inline(always)]
     fn coefficient_norm(&self, _n: usize) -> f64 {
         0.0
@@ -95,7 +95,8 @@ pub trait FrictionLaw {
 /// Dispatches over the law of every [`FrictionModel`]. The compiler reports a missing law.
 macro_rules! laws {
     ($($name:ident => $law:ty;)*) => {
-        /// The law in use. The plant has one, in a box with all other series.
+        /// The friction law in use; its functions are those of [`FrictionLaw`]. The plant has one law, in a
+        /// box with all other series.
         #[derive(Clone, Debug)]
         #[allow(clippy::large_enum_variant)]
         pub enum Law {
@@ -103,7 +104,6 @@ macro_rules! laws {
         }
 
         impl Law {
-            /// Creates the law from its parameters.
             pub fn new(p: &Friction) -> Law {
                 match p.model {
                     $(FrictionModel::$name => Law::$name(<$law>::new(p)),)*
@@ -119,7 +119,6 @@ macro_rules! laws {
                 problems
             }
 
-            /// See [`FrictionLaw::SWITCHES_AT_REST`].
             #[inline(always)]
             pub fn switches_at_rest(&self) -> bool {
                 match self {
@@ -127,14 +126,12 @@ macro_rules! laws {
                 }
             }
 
-            /// See [`FrictionLaw::STICKS`].
             pub fn sticks(&self) -> bool {
                 match self {
                     $(Law::$name(_) => <$law>::STICKS,)*
                 }
             }
 
-            /// See [`FrictionLaw::NEGLIGIBLE_TERMS`].
             #[inline(always)]
             pub fn negligible_terms(&self) -> usize {
                 match self {
@@ -142,7 +139,6 @@ macro_rules! laws {
                 }
             }
 
-            /// See [`FrictionLaw::set_state`].
             #[inline(always)]
             pub fn set_state(&mut self, n: usize, z: f64) {
                 match self {
@@ -150,7 +146,6 @@ macro_rules! laws {
                 }
             }
 
-            /// See [`FrictionLaw::torque`].
             #[inline(always)]
             pub fn torque(&mut self, n: usize, contact: Contact, hub: &HubMotion) -> f64 {
                 match self {
@@ -158,7 +153,6 @@ macro_rules! laws {
                 }
             }
 
-            /// See [`FrictionLaw::dissipation`].
             #[inline(always)]
             pub fn dissipation(&self, n: usize, tau_f: &Series, omega: &Series) -> f64 {
                 match self {
@@ -166,21 +160,18 @@ macro_rules! laws {
                 }
             }
 
-            /// See [`FrictionLaw::energy`].
             pub fn energy(&self, n: usize) -> f64 {
                 match self {
                     $(Law::$name(law) => law.energy(n),)*
                 }
             }
 
-            /// See [`FrictionLaw::derivative`].
             pub fn derivative(&self, n: usize) -> f64 {
                 match self {
                     $(Law::$name(law) => law.derivative(n),)*
                 }
             }
 
-            /// See [`FrictionLaw::advance`].
             #[inline(always)]
             pub fn advance(&self, n: usize, t: f64, z: &mut f64) {
                 match self {
@@ -188,7 +179,6 @@ macro_rules! laws {
                 }
             }
 
-            /// See [`FrictionLaw::coefficient_norm`].
             #[inline(always)]
             pub fn coefficient_norm(&self, n: usize) -> f64 {
                 match self {
@@ -196,7 +186,6 @@ macro_rules! laws {
                 }
             }
 
-            /// See [`FrictionLaw::convergence_radius`].
             #[inline(always)]
             pub fn convergence_radius(&self, omega: &Series) -> f64 {
                 match self {
@@ -204,14 +193,12 @@ macro_rules! laws {
                 }
             }
 
-            /// See [`FrictionLaw::holds`].
             pub fn holds(&self, theta: f64) -> (f64, f64) {
                 match self {
                     $(Law::$name(law) => law.holds(theta),)*
                 }
             }
 
-            /// See [`FrictionLaw::contact_at_rest`].
             pub fn contact_at_rest(&self, net: [f64; 2], theta: f64, before: Contact) -> Contact {
                 match self {
                     $(Law::$name(law) => law.contact_at_rest(net, theta, before),)*

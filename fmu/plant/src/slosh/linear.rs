@@ -148,7 +148,7 @@ impl SloshMode for Linear {
             * if ramp { mul(n, &self.drag, &self.al_d) } else { square(n, &self.al_d) }
     }
 
-    /// m l al^2/2
+    /// Returns coefficient n of m l al^2/2, and the height of the bob on a tilted bench times m.
     #[inline(always)]
     fn mass_height(&mut self, n: usize, hub: &HubMotion) -> f64 {
         let Pendulum { m, l, r, along: [n_x, n_t], .. } = self.p;
@@ -171,8 +171,8 @@ impl SloshMode for Linear {
         [al * al * (m * l) * 0.5 + tilted[0] * m, al * al_d * (m * l) + tilted[1] * m]
     }
 
-    /// Tangential: -m (r w' + l al'' n_t). Radial, from the bob's position (r + l al n_x, l al n_t): -m l al'' n_x and,
-    /// of second order in the motion, m (r w^2 + 2 w l al' n_t + w' l al n_t).
+    /// Returns the force. Tangential: -m (r w' + l al'' n_t). Radial, from the bob's position (r + l al n_x,
+    /// l al n_t): -m l al'' n_x and, of second order in the motion, m (r w^2 + 2 w l al' n_t + w' l al n_t).
     fn force<T: Number>(&self, hub: &HubMotion) -> [T; 2] {
         let Pendulum { m, l, r, .. } = self.p;
         let [w, wd]: [T; 2] = [number(&hub.omega), number(&hub.omega_dot)];
@@ -183,8 +183,7 @@ impl SloshMode for Linear {
         [radial + e_x * m - al_dd * (m * l * n_x), e_y * m - (wd * r + al_dd * l * n_t) * m]
     }
 
-    /// r F_y. In the linear model the force acts at the hinge, gravity of a tilted bench at the
-    /// bob.
+    /// Returns r F_y. In the linear model the force acts at the hinge, gravity of a tilted bench at the bob.
     fn torque<T: Number>(&self, hub: &HubMotion) -> T {
         let Pendulum { m, l, r, .. } = self.p;
         let ([_, f_y], [e_x, e_y]): ([T; 2], [T; 2]) = (self.force(hub), hub.tilt.now());

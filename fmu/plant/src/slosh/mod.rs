@@ -94,7 +94,7 @@ pub struct Angles<T = f64> {
 }
 
 impl<T: Number> Angles<T> {
-    /// Angles of a mode at rest.
+    /// Returns the angles of a mode at rest.
     pub fn zero() -> Angles<T> {
         let zero = [T::constant(0.0); 2];
         Angles { angle: zero, rate: zero }
@@ -141,9 +141,9 @@ pub trait SloshMode {
     /// Computes coefficient n of q'' and n + 1 of q and q', after `hub_reaction`, with w' known up
     /// to n.
     fn accelerate(&mut self, n: usize, varies: bool, hub: &HubMotion);
-    /// Scale of the motion for the tolerance, rad/s.
+    /// Returns the scale of the motion for the tolerance, rad/s.
     fn error_scale(&self) -> f64;
-    /// Magnitude of coefficient `n` of the rates, rad/s.
+    /// Returns the magnitude of coefficient `n` of the rates, rad/s.
     fn coefficient_norm(&self, n: usize) -> f64;
     /// Returns coefficient n of the mode's dissipated power, W, after `hub_reaction`.
     fn dissipation(&mut self, n: usize, ramp: bool) -> f64;

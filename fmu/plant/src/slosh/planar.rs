@@ -176,7 +176,7 @@ impl SloshMode for Planar {
             * if ramp { mul(n, &self.drag, &self.al_d) } else { square(n, &self.al_d) }
     }
 
-    /// 2 m l sin^2(al/2), with the rate m l s al'
+    /// Returns coefficient n of 2 m l sin^2(al/2), whose rate is m l s al'.
     #[inline(always)]
     fn mass_height(&mut self, n: usize, hub: &HubMotion) -> f64 {
         let Pendulum { m, l, r, along: [n_x, n_t], .. } = self.p;

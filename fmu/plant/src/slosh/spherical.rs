@@ -195,7 +195,7 @@ impl SloshMode for Spherical {
         })
     }
 
-    /// sin(angle) = p_x, p_y with the bob below its hinge.
+    /// Computes the coordinates from sin(angle) = p_x, p_y, with the bob below its hinge.
     fn coordinates(&self, at: &Angles) -> [f64; 4] {
         let [p_x, p_y] = at.angle.map(libm::sin);
         let [v_x, v_y] = [0, 1].map(|i| libm::cos(at.angle[i]) * at.rate[i]);
@@ -311,7 +311,7 @@ impl SloshMode for Spherical {
         largest(self.v[n]).max(self.v_z[n].abs())
     }
 
-    /// c l^2 |p'|^2
+    /// Returns coefficient n of c l^2 |p'|^2.
     #[inline(always)]
     fn dissipation(&mut self, n: usize, ramp: bool) -> f64 {
         let speed2 = if ramp {
@@ -323,7 +323,7 @@ impl SloshMode for Spherical {
         self.p.c * self.p.l * self.p.l * speed2
     }
 
-    /// m l (1 + p_z), and 1 + p_z = |xi|^2 k without cancellation near rest
+    /// Returns coefficient n of m l (1 + p_z), with 1 + p_z = |xi|^2 k, which has no cancellation near rest.
     #[inline(always)]
     fn mass_height(&mut self, n: usize, hub: &HubMotion) -> f64 {
         let [xi_1, xi_2] = self.xi[0];
@@ -333,7 +333,8 @@ impl SloshMode for Spherical {
         m * l * height + m * hub.tilt.height(n, place)
     }
 
-    /// xi = p/k and k xi' = p' + v_z xi; k = 1 - p_z, above the horizontal by |p| = 1.
+    /// Computes the coordinates from the direction p: xi = p/k and k xi' = p' + v_z xi; k = 1 - p_z, above
+    /// the horizontal by |p| = 1.
     #[inline(always)]
     fn at(&self, n: usize, t: f64, omega: f64, _: bool) -> [f64; 4] {
         let [[x, y], [v_x, v_y]] = plane::values([&self.dir, &self.v], n, t);
@@ -360,7 +361,7 @@ impl SloshMode for Spherical {
         [0, 1].map(|i| tension * (m * l) * p[i] + c * l * p_d[i])
     }
 
-    /// The tension acts at the hinge, the drag at the bob.
+    /// Returns the torque: the tension acts at the hinge, the drag at the bob.
     fn torque<T: Number>(&self, hub: &HubMotion) -> T {
         let (Pendulum { l, r, .. }, [_, c]) = (self.p, self.p.restoring_and_drag::<T>());
         let [[x, y], [x_d, y_d]] = [&self.dir, &self.dir_d].map(numbers::<T>);

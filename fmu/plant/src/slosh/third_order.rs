@@ -208,7 +208,7 @@ impl SloshMode for ThirdOrder {
         c * (power.0 + s * power.1 / (l * l))
     }
 
-    /// m (|q|^2/2 + h |q|^4/4)/l
+    /// Returns coefficient n of m (|q|^2/2 + h |q|^4/4)/l.
     #[inline(always)]
     fn mass_height(&mut self, n: usize, hub: &HubMotion) -> f64 {
         let Pendulum { m, l, r, spring, .. } = self.p;

@@ -77,12 +77,12 @@ impl Arrays {
         self.types.get(n).copied().unwrap_or(CType::Real)
     }
 
-    /// Returns the number of variables.
+    /// Returns the number of variables with their own value reference in this layout.
     pub fn len(&self) -> usize {
         self.ends.len()
     }
 
-    /// Returns true without variables.
+    /// Returns true if there are no variables.
     pub fn is_empty(&self) -> bool {
         self.ends.is_empty()
     }
@@ -150,7 +150,7 @@ pub fn time<M: Model>() -> u32 {
 /// Name of the event indicators.
 pub const INDICATORS: &str = "event_indicator";
 
-/// Returns the name of a variable.
+/// Returns the name of a variable by its value reference; `None` if there is none.
 pub fn name<M: Model>(reference: u32) -> Option<String> {
     let beyond = reference.checked_sub(time::<M>());
     match beyond {

@@ -18,7 +18,7 @@ struct Dependency {
     independent_element: usize,
 }
 
-/// Returns the dependencies of a variable.
+/// Finds the scalars on which a variable depends in the present state, and how.
 fn dependencies<M: Model>(
     component: &mut Component<M, Fmi3>,
     call: &Call,

@@ -27,7 +27,7 @@ use crate::model::Model;
 use crate::table::Layout;
 use crate::version::Version;
 
-/// Returns "3.0".
+/// Returns the version of FMI, "3.0".
 pub fn fmi3GetVersion() -> fmi3String {
     c"3.0".as_ptr()
 }
@@ -299,7 +299,7 @@ pub unsafe fn fmi3EnterConfigurationMode<M: Model>(instance: fmi3Instance) -> fm
     }
 }
 
-/// Leaves configuration mode.
+/// Leaves configuration mode; the arrays have their new sizes from here on.
 pub unsafe fn fmi3ExitConfigurationMode<M: Model>(instance: fmi3Instance) -> fmi3Status {
     unsafe {
         on::<M, Fmi3>(instance, &EXIT_CONFIGURATION, |component| {
@@ -314,7 +314,8 @@ pub unsafe fn fmi3EvaluateDiscreteStates<M: Model>(instance: fmi3Instance) -> fm
     unsafe { on::<M, Fmi3>(instance, call, |component| component.instance.check(call).map(|_| ())) }
 }
 
-/// Handles the events that are due.
+/// Handles the events that are due, and tells the host whether another one follows at once and when the next
+/// time event is.
 pub unsafe fn fmi3UpdateDiscreteStates<M: Model>(
     instance: fmi3Instance,
     discreteStatesNeedUpdate: *mut fmi3Boolean,

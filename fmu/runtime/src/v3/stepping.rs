@@ -25,7 +25,7 @@ pub unsafe fn fmi3EnterStepMode<M: Model>(instance: fmi3Instance) -> fmi3Status 
     }
 }
 
-/// Computes the time derivatives of outputs.
+/// Computes the time derivatives of outputs at the end of the last step; only order 1 is supported.
 pub unsafe fn fmi3GetOutputDerivatives<M: Model>(
     instance: fmi3Instance,
     valueReferences: *const fmi3ValueReference,

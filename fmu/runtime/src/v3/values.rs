@@ -151,7 +151,7 @@ unsafe fn set<M: Model, T: Copy>(
     }
 }
 
-/// Sets all elements of array variables.
+/// Sets all elements of array variables; `values` has the elements one after the other.
 #[cold]
 fn set_arrays<M: Model>(
     component: &mut Component<M, Fmi3>,

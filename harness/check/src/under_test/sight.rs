@@ -24,7 +24,7 @@ fn discrete(fmu: &FmuUnderTest) -> impl Iterator<Item = &Variable> {
 }
 
 impl Sight {
-    /// Reads the present values.
+    /// Reads the present values of the continuous states, their derivatives and the discrete variables.
     pub fn read(session: &mut Session) -> Result<Sight> {
         let n = session.states();
         let (mut states, mut derivatives) = (vec![0.0; n], vec![0.0; n]);

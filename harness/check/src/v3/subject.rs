@@ -515,7 +515,7 @@ impl<'f> Life<'f, Fmi3> for Session<'f> {
     }
 }
 
-/// Formats a value for a finding.
+/// Formats a value for a finding, with all digits.
 fn shown(value: &Value) -> String {
     match value {
         Value::Real(x) => format!("{x:?}"),

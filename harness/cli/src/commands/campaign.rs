@@ -82,7 +82,6 @@ enum Sweep {
 }
 
 impl CampaignArgs {
-    /// Runs the command.
     pub fn run(self) -> Result<()> {
         let (plan, out) = match &self.plan {
             Some(file) => {

@@ -83,8 +83,8 @@ pub fn is_slosh_angle(name: &str) -> bool {
     name.starts_with("tank") && (name.contains(".angle_x[") || name.contains(".angle_y["))
 }
 
-/// Stored columns of a run: [`STORED`] for the bench; otherwise time, the driven input and
-/// every numeric output.
+/// Lists the stored columns of a run: [`STORED`] for the bench; otherwise time, the driven input and every
+/// numeric output.
 pub fn stored_columns(description: &ModelDescription, input: Option<&str>) -> Vec<String> {
     if is_bench(description) {
         return STORED.map(String::from).to_vec();
@@ -135,7 +135,7 @@ pub struct Unanalysed {
 }
 
 impl Results {
-    /// Returns the number of recorded runs.
+    /// Returns the number of runs that were read from recordings.
     pub fn recordings(&self) -> usize {
         self.outcomes.iter().filter(|run| run.is_recording()).count()
     }
@@ -187,7 +187,11 @@ pub struct Results {
 }
 
 impl Campaign {
-    /// Locks the directory for this campaign.
+    /// Locks the results directory for this campaign.
+    ///
+    /// # Errors
+    ///
+    /// If another process holds it, or the directory belongs to something else.
     pub fn take(&self) -> Result<Store> {
         Store::take(&self.out, CAMPAIGN, &format!("the plan \"{}\"", self.plan.title), None)
     }
@@ -249,7 +253,7 @@ impl Campaign {
         files::input::text(&self.plan_file()).is_ok_and(|text| text != self.plan.text)
     }
 
-    /// File name of the copy of the plan in the results folder.
+    /// Returns the path of the copy of the plan in the results directory.
     pub fn plan_file(&self) -> PathBuf {
         self.out.join("plan.toml")
     }

@@ -94,7 +94,7 @@ pub struct Totals {
 }
 
 impl Totals {
-    /// Returns the totals of a recording.
+    /// Returns the totals of a recording; NaN for signals that only a simulation has.
     fn from_recording(table: &Table, rates: &Rates) -> Self {
         Totals {
             peak_slosh_angle: f64::NAN,
@@ -146,9 +146,10 @@ const NOTABLE_MEAN: f64 = 0.1;
 const PARTS: usize = 8;
 
 impl Rates {
-    /// For a sweep or noise, which turn the hub to and fro, the bias is the mean of the record. With another torque the mean
-    /// also contains motion. The bias of a simulated gyro is then the mean difference from the true rate, and that of a
-    /// recorded gyro is unknown and not removed.
+    /// Measures the rates and their biases. For a sweep or noise, which turn the hub to and fro, the bias is
+    /// the mean of the record. With another torque the mean also contains motion. The bias of a simulated
+    /// gyro is then the mean difference from the true rate, and that of a recorded gyro is unknown and not
+    /// removed.
     fn measure(table: &Table, alternates: bool, is_recording: bool) -> Rates {
         let column = |name| table.column(name).unwrap_or_default();
         let (rate, truth) = (column(OMEGA_IMU), column(OMEGA));
@@ -475,8 +476,10 @@ pub struct Passing {
 }
 
 impl Record {
-    /// `enough`: there is an estimate to be trusted already. `unexplained`: power of what no linear
-    /// response explains, at the frequencies of the responses.
+    /// Estimates the frequency response from the whole record of torque `tau` (N·m) and rate `omega` (rad/s).
+    /// `enough` is true if there is a trusted estimate already, which makes a fitted transfer function
+    /// unnecessary. `unexplained` is the power that no linear response explains, at the frequencies of the
+    /// responses.
     fn estimate(
         profile: &Profile,
         step: f64,
@@ -550,7 +553,8 @@ impl Record {
 }
 
 impl Passing {
-    /// `unexplained`: as for [`Record`].
+    /// Estimates the frequency response while the sweep passes, and finds rotary slosh. `arm` is the distance
+    /// of the tank from the axis, m; `unexplained` as for [`Record`].
     fn demodulate(
         sweep: &Sweep,
         table: &Table,
@@ -739,7 +743,7 @@ impl Outcome {
         })
     }
 
-    /// The run without its curves, which take a quarter of a megabyte; all numbers stay.
+    /// Drops the curves of the run, which take a quarter of a megabyte; all numbers stay.
     pub fn without_curves(mut self) -> Outcome {
         (self.history, self.path) = Default::default();
         if let Some(record) = &mut self.record {

@@ -282,7 +282,7 @@ impl Profile {
         self.kind.parameters.iter().find(|parameter| parameter.name == name)
     }
 
-    /// Returns the duration, s.
+    /// Returns the length of the profile, s.
     pub fn duration(&self) -> f64 {
         self.get("duration").unwrap_or(0.0)
     }
@@ -362,7 +362,7 @@ impl Torque {
         Ok(Torque::Rows { history: History::new(time.to_vec(), tau.to_vec(), slopes, held)?, held })
     }
 
-    /// Returns first and last time, s.
+    /// Returns the first and the last time, s.
     pub fn span(&self) -> (f64, f64) {
         match self {
             Torque::Profile(profile) => (0.0, profile.duration()),
@@ -468,7 +468,7 @@ impl Profile {
         Ok(Some((intervals, parts as usize)))
     }
 
-    /// Makes the rows; see [`Torque::history`].
+    /// Makes the rows of the torque, as [`Torque::history`] describes them.
     fn history(&self, sample: f64, stop: f64, hold: bool) -> Result<History> {
         let (mut time, mut values) = (vec![0.0], vec![self.shape.after(0.0)]);
         let mut row = |t: f64| {

@@ -7,7 +7,7 @@ use analysis::sweep::Sweep;
 
 /// A torque as a function of time; t in s, torque in N·m.
 pub trait Shape: Debug + Send + Sync {
-    /// Returns the torque just after `t`.
+    /// Returns the torque just after `t` (s), N·m; at a jump the new value.
     fn after(&self, t: f64) -> f64;
 
     /// Returns the highest frequency from 0 to `stop` (s), Hz; 0 if the torque is constant between its edges.

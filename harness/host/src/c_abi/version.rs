@@ -119,7 +119,7 @@ pub trait Version: Sized {
     /// version's instantiation expects.
     fn resources(directory: &Path) -> Option<String>;
 
-    /// Creates an instance with logging on.
+    /// Creates an instance with logging on; `name` is the instance's name in the log.
     fn instantiate<'fmu>(fmu: &'fmu Fmu<Self>, name: &str) -> Called<Instance<'fmu, Self>>;
 
     /// Enters initialization mode with start and stop time (s) and relative tolerance.
@@ -404,7 +404,7 @@ impl<V: Version> Fmu<V> {
         &self.binary_hash
     }
 
-    /// Names the parts of the process state that loading the binary has changed, for example the rounding
+    /// Lists the parts of the process state that loading the binary has changed, for example the rounding
     /// mode.
     pub fn changed(&self) -> &[&'static str] {
         &self.changed
@@ -642,7 +642,7 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         Ok(pointers.into_iter().map(|text| unsafe { copied(text) }).collect())
     }
 
-    /// Calls a function that sets texts.
+    /// Calls a function of the FMU that sets texts, with `values` as strings of C.
     pub(crate) fn write_texts(
         &self,
         function: Function<impl Setter<*const c_char>>,
@@ -818,7 +818,7 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         self.call(self.fmu.common.free_fmu_state, |f, c| unsafe { f(c, &mut state.0) })
     }
 
-    /// Serialises a saved state to bytes.
+    /// Serialises a saved state to bytes that another instance of the FMU can read.
     pub fn serialize(&mut self, state: &FmuState) -> Called<Vec<u8>> {
         let mut size = 0;
         let common = &self.fmu.common;

@@ -33,7 +33,7 @@ pub struct Ordered {
 }
 
 impl Ordered {
-    /// Returns days since 1970.
+    /// Returns the date in days since 1970; `day_first` says which of the two numbers is the day.
     fn day(self, day_first: bool) -> Result<i64, String> {
         let Ordered { first, second, year, .. } = self;
         let (day, month) = if day_first { (first, second) } else { (second, first) };
@@ -258,7 +258,7 @@ pub struct Times {
 }
 
 impl Times {
-    /// Returns true before the first time.
+    /// Returns true as long as no time has been converted.
     pub fn is_empty(&self) -> bool {
         self.first.is_none()
     }
