@@ -58,7 +58,7 @@ fn pages_of_variables_have_the_start_values_of_all_components() {
 /// Scalar parameters, and those of them that a craft with one tank of one mode has: without further tanks and modes.
 fn parameters<M: Model>() -> [usize; 2] {
     /// Arrays of a tank whose first index is the mode.
-    const OF_MODES: [&str; 26] = [
+    const OF_MODES: [&str; 30] = [
         "mass",
         "length",
         "frequency",
@@ -72,6 +72,10 @@ fn parameters<M: Model>() -> [usize; 2] {
         "breaking_steepness",
         "nonlinear_inertia",
         "nonlinear_stiffness",
+        "nonlinear_inertia_2",
+        "nonlinear_stiffness_2",
+        "rotary_inertia",
+        "rotary_inertia_2",
         "angle_limit",
         "swirl_limit",
         "wave",

@@ -54,6 +54,8 @@ pub(crate) struct BobNow<T> {
     pub wave: f64,
     /// Energy of the centring stiffness.
     pub centring: T,
+    /// Angular momentum beyond that of a point mass, if there is any.
+    pub spin: Option<Vec3<T>>,
 }
 
 /// One bob: its parameters and the power series of its motion.
@@ -393,6 +395,7 @@ impl Bob {
             in_tank: transposed_times(&self.axes.map(constant), p),
             wave: self.wave,
             centring: dot(p_perp, p_perp) * (0.5 * self.k * self.l * self.l),
+            spin: None,
         }
     }
 

@@ -24,9 +24,21 @@
 //! I is the inertia along the meridian relative to a pendulum's. H is N of `surface.rs`, so the craft's mass matrix
 //! contains m J^T H J.
 //!
+//! **Coefficients beyond the third order** (`surface.rs`, with S, T, tau and beta from there) add to f, with P = T tau, m = e x q,
+//! w_e = w.e, and to the craft's torque
+//!
+//! ```text
+//! f  gains D q + P' m + 2 P e x q' in place of S q,   D = (S sigma)' - s_2 sigma^2 - t_2 tau^2 - 2 P w_e
+//! torque gains -m l^2 [(u P)' e + u P w x e]
+//! ```
+//!
+//! sigma' and tau' = (q x r' + w_e u)' belong to the newest order. m is perpendicular to n and d, so that H gains T/(1 + T u) m
+//! m^T; the row [a; w'] of tau' has - l u e in addition (`surface.rs`).
+//!
 //! Source: Lagrange's equations of the first kind for the energies in `surface.rs`. tests/craft/independent.rs checks
 //! them against Newton's law in other variables, exchange.rs against `contents.rs`.
 
+use alloc::boxed::Box;
 use alloc::string::String;
 
 use taylor::root::first_root;
@@ -40,7 +52,7 @@ use taylor::vector::{
 use crate::damping::Drag;
 use crate::parameters::Tank;
 use crate::rigid::{Mat6, add_rank_one, along_rod};
-use crate::surface::{self, LEAST_INERTIA, Surface};
+use crate::surface::{self, Higher, LEAST_INERTIA, Surface};
 
 /// One bob: its parameters and the power series of its motion, in tank axes.
 #[derive(Clone, Debug)]
@@ -67,8 +79,11 @@ pub(crate) struct ConstrainedBob {
     surface: Surface,
     /// s and kappa
     coefficients: [f64; 2],
+    higher: Option<Box<HigherSeries>>,
     /// eta at which the model ends, if it does.
     highest: Option<f64>,
+    /// w, of use with the terms beyond the third order.
+    in_tank: Vector,
     /// w and w; r from coefficient 1 on and V.
     w: Pair,
     both: Pair,
@@ -99,6 +114,136 @@ pub(crate) struct ConstrainedBob {
     ahead: Vec3,
     /// B/l at the start of the expansion.
     specific_force: Vec3,
+}
+
+/// Series of the terms beyond the third order.
+#[derive(Clone, Debug)]
+struct HigherSeries {
+    by: Higher,
+    /// u^3 and beta
+    u3: Series,
+    beta: Series,
+    /// w_e, sigma, tau, P and u P.
+    turning: Series,
+    sigma: Series,
+    tau: Series,
+    swirl: Series,
+    spin: Series,
+    /// D and P'.
+    inwards: Series,
+    around: Series,
+    /// T at the start of the expansion, T/(1 + T u), and m.
+    inertia: f64,
+    share: f64,
+    m: Vec3,
+    /// Terms of the current order without the newest [a; w']: of D, P' and tau'.
+    known: [f64; 3],
+}
+
+impl HigherSeries {
+    fn new(by: Higher) -> Box<HigherSeries> {
+        Box::new(HigherSeries {
+            by,
+            u3: ZERO,
+            beta: ZERO,
+            turning: ZERO,
+            sigma: ZERO,
+            tau: ZERO,
+            swirl: ZERO,
+            spin: ZERO,
+            inwards: ZERO,
+            around: ZERO,
+            inertia: 0.0,
+            share: 0.0,
+            m: [0.0; 3],
+            known: [0.0; 3],
+        })
+    }
+
+    /// Starts an expansion at q and u.
+    fn start(&mut self, q: Vec3, u: f64) {
+        self.u3[0] = u * u * u;
+        let t = self.by.rotary_inertia(u);
+        self.inertia = t;
+        self.share = t / f64::max(1.0 + t * u, 0.5 * LEAST_INERTIA);
+        self.m = [-q[1], q[0], 0.0];
+    }
+
+    /// Computes the terms of order n from r to order n + 1, r' and w_e to order n, and u to order n + 1. Returns the sum of
+    /// the known terms in f.
+    #[inline(never)]
+    fn expand(&mut self, n: usize, w_e: f64, r: &Vector, r_d: &Vector, u: &Series) -> [f64; 2] {
+        let HigherSeries { by, .. } = *self;
+        let order = (n + 1) as f64;
+        self.turning[n] = w_e;
+        // sigma = q.q', tau = q x q' + w_e u
+        let (mut inwards, mut twist) = ([0.0; 2], [0.0; 2]);
+        // of order n, and of order n + 1 without what [a; w'] of order n decides
+        for (k, last) in [n, n + 1].into_iter().enumerate() {
+            for j in k..=last {
+                let (a, b) = (r[j], r_d[last - j]);
+                inwards[k] += a[0] * b[0] + a[1] * b[1];
+                twist[k] += a[0] * b[1] - a[1] * b[0];
+            }
+            for j in k..=last {
+                twist[k] += u[j] * self.turning[last - j];
+            }
+        }
+        (self.sigma[n], self.tau[n]) = (inwards[0], twist[0]);
+        // S sigma of order n + 1 and T tau of orders n and n + 1, without coefficient 0 of S and T
+        let (mut faster, mut swirls) = (0.0, [0.0; 2]);
+        for j in 1..=n + 1 {
+            faster += by.inertia * u[j] * self.sigma[n + 1 - j];
+            swirls[1] += by.rotary[1] * u[j] * self.tau[n + 1 - j];
+        }
+        for j in 1..=n {
+            swirls[0] += by.rotary[1] * u[j] * self.tau[n - j];
+        }
+        self.swirl[n] = self.inertia * self.tau[n] + swirls[0];
+        self.spin[n] = mul(n, u, &self.swirl);
+        let inwards_known = order * faster
+            - by.inertia * square(n, &self.sigma)
+            - by.rotary[1] * square(n, &self.tau)
+            - 2.0 * mul(n, &self.swirl, &self.turning);
+        self.known = [inwards_known, order * swirls[1], order * twist[1]];
+        let mut f = [0.0; 2];
+        for j in 0..=n {
+            let (swirl, rate) = (2.0 * self.swirl[j], r_d[n - j]);
+            f = [f[0] - swirl * rate[1], f[1] + swirl * rate[0]];
+        }
+        for j in 0..n {
+            let (d, p, at) = (self.inwards[j], self.around[j], r[n - j]);
+            f = [f[0] + d * at[0] - p * at[1], f[1] + d * at[1] + p * at[0]];
+        }
+        [
+            f[0] + self.known[0] * r[0][0] - self.known[1] * r[0][1],
+            f[1] + self.known[0] * r[0][1] + self.known[1] * r[0][0],
+        ]
+    }
+
+    /// Returns T tau' of the newest order under Y and w_e'.
+    fn pull(&self, y: Vec3, w_e_d: f64, u: f64) -> f64 {
+        self.share * (self.known[2] + dot(self.m, y) + w_e_d * u)
+    }
+
+    /// Sets coefficient n of D and P' from S sigma' and T tau' of the newest order.
+    fn set(&mut self, n: usize, inner: f64, pull: f64) {
+        (self.inwards[n], self.around[n]) = (self.known[0] + inner, self.known[1] + pull);
+    }
+
+    /// Returns coefficient n of (u P)' e + u P w x e; `pull` is T tau' of the newest order.
+    fn couple(&self, n: usize, pull: f64, w: &Vector, u: &Series) -> Vec3 {
+        let mut couple = [0.0, 0.0, u[0] * (self.known[1] + pull)];
+        for j in 0..n {
+            couple[2] += u[n - j] * self.around[j];
+        }
+        couple[2] += 2.0 * mul(n, &self.sigma, &self.swirl);
+        for j in 0..=n {
+            let (spin, w) = (self.spin[j], w[n - j]);
+            couple = [couple[0] + spin * w[1], couple[1] - spin * w[0], couple[2]];
+        }
+        couple
+    }
 }
 
 /// Returns the sum of a_j.b_(n-j) from j = 1 on.
@@ -148,6 +293,8 @@ impl ConstrainedBob {
             across,
             surface,
             coefficients: [tank.nonlinear_inertia[mode], tank.nonlinear_stiffness[mode]],
+            higher: surface.higher().map(HigherSeries::new),
+            in_tank: ZERO_VECTOR,
             highest: surface.highest(),
             w: ZERO_PAIR,
             both: ZERO_PAIR,
@@ -188,12 +335,15 @@ impl ConstrainedBob {
         let turned = cross(transposed_times(&self.axes, w), self.r[0]);
         self.v[0] = add(r_d, turned);
         self.ahead = [0.0; 3];
+        if let Some(higher) = &mut self.higher {
+            higher.start(q, u);
+        }
         self.set_normal(0);
         let n = self.n[0];
         let (n2, nq) = (dot(n, n), dot(n, q));
         let inertia = self.surface.meridian_inertia(p[2], u);
         (self.n2, self.ratio) = (n2, nq / n2);
-        self.share = self.surface.inner() * n2 / f64::max(inertia, 0.5 * LEAST_INERTIA);
+        self.share = self.surface.inner_at(u) * n2 / f64::max(inertia, 0.5 * LEAST_INERTIA);
         self.d = sub(q, scale(self.ratio, n));
     }
 
@@ -214,7 +364,14 @@ impl ConstrainedBob {
         if self.surface.is_sphere() {
             return;
         }
-        self.slope[n] = self.surface.bend() * mul(n, &self.u, &self.eta);
+        self.slope[n] = match &mut self.higher {
+            Some(higher) => {
+                let by_square = 0.375 * higher.by.stiffness * self.u2[n];
+                higher.beta[n] = self.surface.bend() * self.u[n] + by_square;
+                mul(n, &higher.beta, &self.eta)
+            }
+            None => self.surface.bend() * mul(n, &self.u, &self.eta),
+        };
         let mut bent = [0.0; 2];
         for (s, r) in self.slope[..=n].iter().zip(self.r[..=n].iter().rev()) {
             bent = [bent[0] + s * r[0], bent[1] + s * r[1]];
@@ -248,6 +405,13 @@ impl ConstrainedBob {
             let u = along_rod(times(&self.axes, direction), rho);
             add_rank_one(matrix, self.m * share, &u);
         }
+        if let Some(higher) = &self.higher {
+            let mut u = along_rod(times(&self.axes, higher.m), rho);
+            for (u, row) in u[3..].iter_mut().zip(&self.axes) {
+                *u -= self.l * self.u[0] * row[2];
+            }
+            add_rank_one(matrix, self.m * higher.share, &u);
+        }
     }
 
     /// Returns coefficient n of force and torque about O on the craft without the terms in [a; w'] of this order. `w` is
@@ -266,6 +430,10 @@ impl ConstrainedBob {
         if !self.surface.is_sphere() {
             self.u2[n + 1] = square(n + 1, &self.u);
             self.eta[n + 1] -= self.surface.lift_of_square() * self.u2[n + 1];
+            if let Some(higher) = &mut self.higher {
+                higher.u3[n + 1] = mul(n + 1, &self.u, &self.u2);
+                self.eta[n + 1] -= 0.0625 * higher.by.stiffness * higher.u3[n + 1];
+            }
         }
         self.set_normal(n + 1);
 
@@ -291,7 +459,14 @@ impl ConstrainedBob {
         }
         let normal = dot_from_1(n + 1, &self.n, &self.r_d);
         let mut inwards = 0.0;
-        if self.surface.inner() != 0.0 {
+        if let Some(higher) = &mut self.higher {
+            self.in_tank[n] = w;
+            let more = higher.expand(n, w[2], &self.r, &self.r_d, &self.u);
+            (f[0], f[1]) = (f[0] + more[0], f[1] + more[1]);
+            for (r, r_d) in self.r[1..=n + 1].iter().zip(self.r_d[..=n].iter().rev()) {
+                inwards += r[0] * r_d[0] + r[1] * r_d[1];
+            }
+        } else if self.surface.inner() != 0.0 {
             for (s, r) in self.inner[..n].iter().zip(self.r[1..=n].iter().rev()) {
                 f[0] += s * r[0];
                 f[1] += s * r[1];
@@ -303,10 +478,14 @@ impl ConstrainedBob {
         self.rest = f;
         self.known = sub(sub(self.fall, f), scale(order, self.ahead));
         self.multipliers = [order * normal, order * inwards];
-        let known = self.force(self.known);
+        let known = self.force(self.known, 0.0);
         self.f[n] = known;
         let force = times(&self.axes, scale(self.m * self.l, known));
-        let arm = space::cross_of(n, &self.r, &self.f);
+        let mut arm = space::cross_of(n, &self.r, &self.f);
+        if let Some(higher) = &self.higher {
+            let pull = higher.pull(self.known, 0.0, self.u[0]);
+            arm = sub(arm, higher.couple(n, pull, &self.in_tank, &self.u));
+        }
         let twist = times(&self.axes, scale(self.m * self.l * self.l, arm));
         [force, add(cross(self.hinge, force), twist)]
     }
@@ -320,12 +499,15 @@ impl ConstrainedBob {
         [normal / self.n2 - self.ratio * inner, inner]
     }
 
-    /// Returns f under Y.
-    fn force(&self, y: Vec3) -> Vec3 {
+    /// Returns f under Y, and under w_e' beyond what Y has of it.
+    fn force(&self, y: Vec3, w_e_d: f64) -> Vec3 {
         let [tension, inner] = self.multipliers(y);
         let mut f = add(self.rest, scale(tension, self.n[0]));
         f[0] += inner * self.r[0][0];
         f[1] += inner * self.r[0][1];
+        if let Some(higher) = &self.higher {
+            f = add(f, scale(higher.pull(y, w_e_d, self.u[0]), higher.m));
+        }
         match self.across {
             Some(b) => add(f, scale(dot(b, y), b)),
             None => f,
@@ -361,7 +543,11 @@ impl ConstrainedBob {
         let w_d = transposed_times(&self.axes, w_d);
         let y = sub(sub(self.known, at_hinge), cross(w_d, self.r[0]));
         [self.tension[n], self.inner[n]] = self.multipliers(y);
-        self.f[n] = self.force(y);
+        self.f[n] = self.force(y, w_d[2]);
+        if let Some(higher) = &mut self.higher {
+            let pull = higher.pull(y, w_d[2], self.u[0]);
+            higher.set(n, self.inner[n], pull);
+        }
         if n == 0 {
             self.specific_force = sub(at_hinge, self.fall);
         }
@@ -401,7 +587,8 @@ impl ConstrainedBob {
 
     /// Returns the message for a bob beyond the bound of its surface; `name` is that of the tank.
     pub fn beyond(&self, name: &str) -> String {
-        surface::beyond(self.coefficients, self.mode, name)
+        let higher = self.surface.higher().unwrap_or_default();
+        surface::beyond(self.coefficients, higher, self.mode, name)
     }
 
     /// Returns true if the drag depends on acceleration or amplitude.
@@ -456,7 +643,12 @@ impl ConstrainedBob {
     /// -(1 - H)(dV + dw x rho). `x` is the six numbers at the start of the expansion.
     pub fn after_impulse(&self, x: &mut [f64; 6], dv: Vec3, dw: Vec3) {
         let kick = transposed_times(&self.axes, add(dv, cross(dw, self.place())));
-        let change = scale(-self.inv_l, sub(kick, self.held(kick)));
+        let mut change = scale(-self.inv_l, sub(kick, self.held(kick)));
+        if let Some(higher) = &self.higher {
+            let turned = self.u[0] * transposed_times(&self.axes, dw)[2];
+            let pull = higher.share * (turned - self.inv_l * dot(higher.m, kick));
+            change = sub(change, scale(pull, higher.m));
+        }
         let [r_x, r_y, _] = self.r[0];
         let sigma = r_x * change[0] + r_y * change[1];
         x[3] += change[0];

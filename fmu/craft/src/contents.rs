@@ -70,7 +70,7 @@ use crate::parameters::{Limits, Tank};
 use crate::rigid::{Mat6, Rigid, along_rod};
 use crate::sizes::MODES;
 use crate::state::Line;
-use crate::surface::{LEAST_INERTIA, Lift, Meridian, Surface};
+use crate::surface::{LEAST_INERTIA, Lift, Meridian, Rotary, Surface};
 use crate::table::{FillCurves, Jet};
 
 /// A tank in its mounting position.
@@ -127,6 +127,8 @@ struct OnSurface<T> {
     /// z, and i.
     z: T,
     inner: Vec3<T>,
+    e: Vec3<T>,
+    rotary: Option<Rotary<T>>,
 }
 
 /// A tank's contents at an instant.
@@ -234,14 +236,14 @@ impl MountedTank {
         [sub(hinge, b.map(|b| b * self.tank.arm[n])), p, p_d]
     }
 
-    /// Returns surface and height of the bob of mode n (from 0) from l with its derivatives, and p and p'. `changing` has s
+    /// Returns surface and height of the bob of mode n (from 0) from l with its derivatives, and p, p' and w. `changing` has s
     /// and kappa with their derivatives if the table gives them.
     #[inline(never)]
     fn on_surface<T: Number>(
         &self,
         n: usize,
         l: Jet<T>,
-        [p, p_d]: [Vec3<T>; 2],
+        [p, p_d, w]: [Vec3<T>; 3],
         changing: Option<[Jet<T>; 2]>,
     ) -> Option<(Meridian<T>, Lift<T>)> {
         let across = self.across[n].map(constant);
@@ -250,7 +252,7 @@ impl MountedTank {
             None => self.surfaces[n]?.lift_to(),
         };
         let meridian = Meridian::new(surface, constant(self.e), p, across);
-        let lift = meridian.lift(l, p_d, changing);
+        let lift = meridian.lift(l, p_d, w, changing);
         Some((meridian, lift))
     }
 
@@ -279,7 +281,7 @@ impl MountedTank {
             let g = bob.acceleration(a, w_d);
             let mut across = sub(g, scale(dot(bob.p, g), bob.p));
             if let Some(surface) = &bob.surface {
-                across = surface.slide(g);
+                across = surface.slide(g, w_d);
             } else if self.planar
                 && let Some(b) = self.across[n].map(constant)
             {
@@ -311,6 +313,7 @@ impl MountedTank {
                 in_tank: transposed_times(&axes, bob.p),
                 wave: self.tank.wave[n],
                 centring: bob.centring,
+                spin: bob.surface.as_ref().and_then(|on| on.spin()).map(|spin| scale(bob.m, spin)),
             });
         }
         bobs
@@ -331,11 +334,11 @@ impl MountedTank {
     /// `liquid` matters only for tanks with a table.
     #[inline(never)]
     pub fn is_beyond(&self, x: &[f64], liquid: f64) -> bool {
-        (0..MODES).any(|n| self.inertia_along_meridian(n, x, liquid) < LEAST_INERTIA)
+        (0..MODES).any(|n| self.least_inertia(n, x, liquid) < LEAST_INERTIA)
     }
 
-    /// Returns the inertia along its meridian of the bob of mode n (from 0), relative to a pendulum's.
-    fn inertia_along_meridian(&self, n: usize, x: &[f64], liquid: f64) -> f64 {
+    /// Returns the smaller inertia, along the meridian or across it, of the bob of mode n (from 0), relative to a pendulum's.
+    fn least_inertia(&self, n: usize, x: &[f64], liquid: f64) -> f64 {
         let Some(mut surface) = self.surfaces[n] else { return 1.0 };
         if self.tank.fill.points > 0
             && let Some([[s, ..], [kappa, ..]]) = self.curves.surface(n, self.curves.place(liquid))
@@ -343,14 +346,13 @@ impl MountedTank {
             surface = Surface::of([s, kappa]);
         }
         let [p, _] = on_sphere(vec_of(x, 6 * n), [0.0; 3]);
-        surface.meridian_inertia(p[2], p[0] * p[0] + p[1] * p[1])
+        surface.least_inertia(p[2], p[0] * p[0] + p[1] * p[1])
     }
 
     /// Refuses bobs at angles at which the inertia along their meridian is too small. `tank` is the tank's number from 1, 0
     /// if the system has only one. The slack recognises a step that could not pass the bound.
     pub fn check_surfaces(&self, x: &[f64], liquid: f64, tank: usize) -> Result<(), StepError> {
-        let is_near =
-            |n: &usize| self.inertia_along_meridian(*n, x, liquid) < LEAST_INERTIA * (1.0 + 1e-6);
+        let is_near = |n: &usize| self.least_inertia(*n, x, liquid) < LEAST_INERTIA * (1.0 + 1e-6);
         let Some(n) = (0..MODES).find(is_near) else { return Ok(()) };
         let index = if tank > 0 { format!("[{tank}]") } else { String::new() };
         let now = Tank { liquid_0: liquid, ..self.tank }.resolve();
@@ -384,9 +386,14 @@ impl<T: Number> Swing<T> {
     fn wrench(&self, a: Vec3<T>, w_d: Vec3<T>) -> [Vec3<T>; 2] {
         match &self.surface {
             Some(surface) => {
-                let slowed = surface.share(self.acceleration(a, w_d));
+                let slid = surface.slide(self.acceleration(a, w_d), w_d);
+                let slowed = sub(self.acceleration(a, w_d), surface.meridian.along(slid));
                 let force = sub(self.phi, scale(self.m, slowed));
-                [force, cross(self.rho, force)]
+                let mut torque = cross(self.rho, force);
+                if let Some(couple) = surface.couple(slid, w_d) {
+                    torque = add(torque, scale(self.m, couple));
+                }
+                [force, torque]
             }
             None => self.wrench_at(self.tension(a, w_d)),
         }
@@ -408,14 +415,24 @@ impl<T: Number> Swing<T> {
 }
 
 impl<T: Number> OnSurface<T> {
-    /// Returns -l y under G.
-    fn slide(&self, g: Vec3<T>) -> Vec3<T> {
-        self.meridian.free(add(self.meridian.back(g), self.inner))
+    /// Returns -l y under G and w'.
+    fn slide(&self, g: Vec3<T>, w_d: Vec3<T>) -> Vec3<T> {
+        let mut force = add(self.meridian.back(g), self.inner);
+        if let (Some(rotary), Some(n)) = (&self.rotary, self.meridian.around()) {
+            force = add(force, scale(rotary.pull(dot(self.e, w_d)), n));
+        }
+        self.meridian.free(force)
     }
 
-    /// Returns G + l D y under G.
-    fn share(&self, g: Vec3<T>) -> Vec3<T> {
-        sub(g, self.meridian.along(self.slide(g)))
+    /// Returns the couple on the craft over m, at -l y, `slid`.
+    fn couple(&self, slid: Vec3<T>, w_d: Vec3<T>) -> Option<Vec3<T>> {
+        let (rotary, n) = (self.rotary.as_ref()?, self.meridian.around()?);
+        Some(rotary.couple(dot(n, slid), dot(self.e, w_d), self.e))
+    }
+
+    /// Returns the angular momentum of rotary motion about the axis, beyond that of the bob, over m.
+    fn spin(&self) -> Option<Vec3<T>> {
+        Some(scale(self.rotary.as_ref()?.spin(), self.e))
     }
 }
 
@@ -483,7 +500,7 @@ impl<T: Number> Contents<'_, T> {
             let mut rho_d = add(add(scale(h[1], e), scale(l[1], p)), scale(l[0], p_d));
             let on_surface = if mounted.curved {
                 let changing = place.and_then(|place| curves.surface(n, place));
-                mounted.on_surface(n, l, [p, p_d], changing.map(|pair| pair.map(follow)))
+                mounted.on_surface(n, l, [p, p_d, w], changing.map(|pair| pair.map(follow)))
             } else {
                 None
             };
@@ -543,7 +560,7 @@ impl<T: Number> Contents<'_, T> {
                 centring = centring + m[0] * lift.energy;
                 known = add(known, scale(l[2] - l[0] * dot(p_d, p_d), p));
                 known = add(known, scale(lift.z_dd, e));
-                OnSurface { meridian, z: lift.z, inner: lift.inner }
+                OnSurface { meridian, z: lift.z, inner: lift.inner, e, rotary: lift.rotary }
             });
             self.dissipation = self.dissipation + drag * l[0] * l[0] * dot(moved, moved);
             self.bobs[n] = Some(Swing {
@@ -605,7 +622,10 @@ impl<T: Number> Contents<'_, T> {
     pub fn add_rods(&self, matrix: &mut Mat6<T>) {
         for bob in self.bobs.iter().flatten() {
             if let Some(surface) = &bob.surface {
-                let held = surface.meridian.mass_matrix(bob.m, bob.rho);
+                let mut held = surface.meridian.mass_matrix(bob.m, bob.rho);
+                if surface.rotary.is_some() {
+                    surface.meridian.add_rotary([bob.m, bob.l], bob.rho, &mut held);
+                }
                 for i in 0..6 {
                     for k in 0..6 {
                         matrix[i][k] = matrix[i][k] + held[i][k];

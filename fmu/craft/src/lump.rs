@@ -555,6 +555,7 @@ impl Lump {
             in_tank: constant([0.0; 3]),
             wave: 0.0,
             centring: T::constant(0.0),
+            spin: None,
         }
     }
 

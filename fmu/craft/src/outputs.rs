@@ -8,6 +8,7 @@
 //!     + sum of k l^2 |p_perp|^2/2           E' = f.V + (tau - h_w').w - dissipation - drained'
 //! ```
 //!
+//! H also has the angular momentum of rotary motion (`surface.rs`), and E its energy.
 //! m, S, I: dry craft and rigid liquids about O. Sums run over the bobs. r_c: centre of mass of everything from O. V is
 //! in body axes. H is about r_c and does not contain V, so nothing cancels after a long thrust. drained':
 //! `contents.rs`. On a pivot H is about O, and E includes the potential a.S of all masses and the pivot's U
@@ -311,6 +312,9 @@ impl<T: Number> Now<T> {
             all.add(bob.m, bob.rho);
             inner_momentum = add(inner_momentum, scale(bob.m, against_o));
             inner_angular = add(inner_angular, scale(bob.m, cross(bob.rho, against_o)));
+            if let Some(spin) = bob.spin {
+                inner_angular = add(inner_angular, spin);
+            }
             let speed = add(velocity, against_o);
             energy = energy + dot(speed, speed) * bob.m * half + bob.centring;
         }

@@ -21,6 +21,10 @@ impl Tank {
                 | "swirl_limit"
                 | "nonlinear_inertia"
                 | "nonlinear_stiffness"
+                | "nonlinear_inertia_2"
+                | "nonlinear_stiffness_2"
+                | "rotary_inertia"
+                | "rotary_inertia_2"
         );
         if is_of_mode && n >= self.modes {
             return None;

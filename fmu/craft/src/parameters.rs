@@ -15,7 +15,7 @@ use taylor::vector::{
 use crate::pivot::Pivot;
 use crate::rigid::{Mat6, Rigid, add_rank_one, along_rod, smallest_pivot};
 use crate::sizes::{MODES, POINTS, TANKS};
-use crate::surface::{self, Surface};
+use crate::surface::{self, Higher, Surface};
 use crate::table::{FillTable, LIGHTEST, SHORTEST};
 
 /// Symmetric inertia tensor, kg m2: the matrix of J = integral of (|s|^2 1 - s s^T) dm.
@@ -223,6 +223,14 @@ pub struct Tank {
     pub nonlinear_inertia: [f64; MODES],
     /// Coefficient kappa of the mode's stiffness at finite amplitude, 1 for a pendulum (`surface.rs`).
     pub nonlinear_stiffness: [f64; MODES],
+    /// Coefficient s_2 of the mode's inertia beyond the third order, 0 for a pendulum and in tanks with a fill table.
+    pub nonlinear_inertia_2: [f64; MODES],
+    /// Coefficient kappa_2 of the mode's stiffness beyond the third order, likewise.
+    pub nonlinear_stiffness_2: [f64; MODES],
+    /// Coefficient t of the inertia of the mode's rotary motion, likewise.
+    pub rotary_inertia: [f64; MODES],
+    /// Coefficient t_2 of the inertia of the mode's rotary motion, likewise.
+    pub rotary_inertia_2: [f64; MODES],
     /// Slosh angle above which the mode is out of range, rad; 0 if it is not known (`ranges.rs`).
     pub angle_limit: [f64; MODES],
     /// Slosh angle above which rotary motion of the mode is out of range because its branch folds, rad; 0 if it is not
@@ -346,20 +354,29 @@ impl Tank {
         let [s, kappa] = [self.nonlinear_inertia[n], self.nonlinear_stiffness[n]];
         let surface = match self.fill.has_surface(n) {
             true => Some(Surface::of([s, kappa])),
-            false => Surface::new(s, kappa),
+            false => Surface::new(s, kappa, self.higher(n)),
         };
         surface.filter(|_| n < self.modes)
     }
 
-    /// Returns true if any mode has other coefficients of the third order than a pendulum.
+    /// Returns the coefficients of mode n (from 0) beyond the third order.
+    pub(crate) fn higher(&self, n: usize) -> Higher {
+        Higher {
+            inertia: self.nonlinear_inertia_2[n],
+            stiffness: self.nonlinear_stiffness_2[n],
+            rotary: [self.rotary_inertia[n], self.rotary_inertia_2[n]],
+        }
+    }
+
+    /// Returns true if any mode has other coefficients than a pendulum.
     pub(crate) fn has_surface(&self) -> bool {
         (0..MODES).any(|n| self.surface(n).is_some())
     }
 
     /// Returns the message for a bob of mode n (from 0) beyond the bound of its surface; `name` is that of the tank.
     pub(crate) fn beyond(&self, n: usize, name: &str) -> String {
-        let text =
-            surface::beyond([self.nonlinear_inertia[n], self.nonlinear_stiffness[n]], n, name);
+        let pair = [self.nonlinear_inertia[n], self.nonlinear_stiffness[n]];
+        let text = surface::beyond(pair, self.higher(n), n, name);
         match self.fill.has_surface(n) {
             true => format!("{text}; {name}.fill gives them at {:?} kg", self.liquid_0),
             false => text,
@@ -628,6 +645,10 @@ impl Default for Tank {
             breaking_steepness: [0.0; MODES],
             nonlinear_inertia: [1.0; MODES],
             nonlinear_stiffness: [1.0; MODES],
+            nonlinear_inertia_2: [0.0; MODES],
+            nonlinear_stiffness_2: [0.0; MODES],
+            rotary_inertia: [0.0; MODES],
+            rotary_inertia_2: [0.0; MODES],
             angle_limit: [0.0; MODES],
             swirl_limit: [0.0; MODES],
             g_bond: 0.0,
@@ -885,6 +906,20 @@ impl Tank {
             ] {
                 problems.number(&format!("{name}.{what}[{i}]"), value, -1e3, 1e3, "");
             }
+            for (what, value) in self.beyond_third_order(n) {
+                problems.number(&format!("{name}.{what}[{i}]"), value, -1e5, 1e5, "");
+                if value != 0.0 && self.fill.points > 0 {
+                    problems.0.push(format!(
+                        "{name}.{what}[{i}] = {value:?} with {name}.fill (allowed: 0, because the table has coefficients of the third \
+                         order only)"
+                    ));
+                } else if value != 0.0 && what.starts_with("rotary") && self.across(n).is_some() {
+                    problems.0.push(format!(
+                        "{name}.{what}[{i}] = {value:?} with {name}.direction[{i}] (allowed: 0, because a mode in a plane does not \
+                         rotate)"
+                    ));
+                }
+            }
             for (what, value) in
                 [("angle_limit", self.angle_limit[n]), ("swirl_limit", self.swirl_limit[n])]
             {
@@ -922,6 +957,16 @@ impl Tank {
         if problems.0.len() == before_all {
             self.find_ball_surface_problems(name, problems);
         }
+    }
+
+    /// Returns the coefficients of mode n (from 0) beyond the third order with their names.
+    fn beyond_third_order(&self, n: usize) -> [(&'static str, f64); 4] {
+        [
+            ("nonlinear_inertia_2", self.nonlinear_inertia_2[n]),
+            ("nonlinear_stiffness_2", self.nonlinear_stiffness_2[n]),
+            ("rotary_inertia", self.rotary_inertia[n]),
+            ("rotary_inertia_2", self.rotary_inertia_2[n]),
+        ]
     }
 
     /// Reports parameters of axial symmetry combined with planar modes.

@@ -1,4 +1,5 @@
-//! Finite amplitude: a bob on a surface of revolution about the tank's axis, with two coefficients of the third order.
+//! Finite amplitude: a bob on a surface of revolution about the tank's axis, with two coefficients of the third order and
+//! four of the order beyond.
 //!
 //! ```text
 //! L = m |q'|^2/2 + m s (q.q')^2/(2 l^2) - m w^2 (|q|^2/2 + kappa |q|^4/(8 l^2)),   q = l p_perp,  A = |q|/l
@@ -47,7 +48,28 @@
 //! Drag and centring are phi = c l D p' + k l p_perp, with the power c l^2 |D p'|^2. While the tank drains, the leaving mass
 //! takes its share of E_i with it. s and kappa of its fill table then depend on time, so that z gains the rate kappa' l u^2/8.
 //!
-//! Source: the coefficients are those of `formulas::third_order`. The equations are Lagrange's for these energies.
+//! **Beyond the third order** ([`Higher`]) a tank that keeps its liquid may have
+//!
+//! ```text
+//! z   = l [(kappa - 1) u^2/8 + kappa_2 u^3/16],   beta = (kappa - 1) u/2 + 3 kappa_2 u^2/8
+//! E_i = m l^2 [S sigma^2 + T tau^2]/2,   S = s - 1 + s_2 u,   T = t + t_2 u
+//! tau = e.(p_perp x p_perp') + w_e u,   w_e = e.w
+//! ```
+//!
+//! tau is the rate of rotary motion against inertial axes: a wave does not feel a tank that turns about its axis. E_i
+//! therefore has an angular momentum about the axis, m l^2 u T tau, but no momentum. With n = e x p_perp the force per mass
+//! and length is
+//!
+//! ```text
+//! (S sigma)' p_perp - (s_2 sigma^2 + t_2 tau^2 + 2 T tau w_e) p_perp + (T tau)' n + 2 T tau e x p_perp'
+//! M gains T n n^T,   i gains the part without y,   tau' = n.y + w_e' u + 2 w_e sigma
+//! torque on the craft   rho x F - m l^2 [(u T tau)' e + u T tau w x e]
+//! ```
+//!
+//! About the axis both parts of the torque by E_i cancel. [a; w'] acts on tau' by v = [n; rho x n - l u e], which adds m T/(1 +
+//! T u) v v^T to the mass matrix.
+//!
+//! Source: the coefficients are those of `formulas::third_order` and `formulas::energy_terms`. The equations are Lagrange's for these energies.
 //! tests/craft/surface.rs checks them against Newton's law in Cartesian coordinates with the surface as a constraint, and
 //! those of a draining tank against differences of the Lagrangian.
 
@@ -55,7 +77,7 @@ use alloc::format;
 use alloc::string::String;
 
 use taylor::number::Number;
-use taylor::vector::{Vec3, add, dot, scale, sub};
+use taylor::vector::{Vec3, add, cross, dot, scale, sub};
 
 use crate::table::Jet;
 
@@ -65,78 +87,139 @@ pub(crate) const LEAST_INERTIA: f64 = 0.5;
 /// Angle between the checks of [`Surface::largest_angle`], rad.
 const ANGLE_STEP: f64 = core::f64::consts::PI / 1800.0;
 
-/// The two coefficients of a mode.
+/// Coefficients of a mode beyond the third order; all 0 for none.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Higher {
+    /// s_2
+    pub inertia: f64,
+    /// kappa_2
+    pub stiffness: f64,
+    /// t and t_2
+    pub rotary: [f64; 2],
+}
+
+impl Higher {
+    /// Returns T.
+    pub fn rotary_inertia<T: Number>(&self, u: T) -> T {
+        T::constant(self.rotary[0]) + u * self.rotary[1]
+    }
+}
+
+/// The coefficients of a mode.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Surface<T = f64> {
     /// s - 1
     inertia: T,
     /// kappa - 1
     stiffness: T,
+    /// `None` if all are 0, which leaves the terms out.
+    higher: Option<Higher>,
 }
 
 impl<T: Number> Surface<T> {
     /// Returns the surface with s and kappa, also that of a pendulum.
     pub fn of([s, kappa]: [T; 2]) -> Surface<T> {
         let one = T::constant(1.0);
-        Surface { inertia: s - one, stiffness: kappa - one }
+        Surface { inertia: s - one, stiffness: kappa - one, higher: None }
+    }
+
+    /// Returns beta.
+    fn rise_of(&self, u: T) -> T {
+        let rise = u * (self.stiffness * 0.5);
+        match &self.higher {
+            Some(higher) => rise + u * u * (0.375 * higher.stiffness),
+            None => rise,
+        }
+    }
+
+    /// Returns S.
+    fn inner_of(&self, u: T) -> T {
+        match &self.higher {
+            Some(higher) => self.inertia + u * higher.inertia,
+            None => self.inertia,
+        }
     }
 
     /// Returns the inertia along the meridian, relative to a pendulum's, from eta = p.e and u.
     pub fn meridian_inertia(&self, eta: T, u: T) -> T {
-        let tilt = T::constant(1.0) - u * eta * (self.stiffness * 0.5);
+        let one = T::constant(1.0);
+        let tilt = match self.higher {
+            Some(_) => one - self.rise_of(u) * eta,
+            None => one - u * eta * (self.stiffness * 0.5),
+        };
         // eta^2 + u = 1
-        eta * eta * (T::constant(1.0) + u * self.inertia) + u * tilt * tilt
+        eta * eta * (one + u * self.inner_of(u)) + u * tilt * tilt
     }
 }
 
 impl Surface {
     /// The surface of a pendulum.
-    pub const SPHERE: Surface = Surface { inertia: 0.0, stiffness: 0.0 };
+    pub const SPHERE: Surface = Surface { inertia: 0.0, stiffness: 0.0, higher: None };
+
+    /// Returns the coefficients beyond the third order, if there are any.
+    pub fn higher(&self) -> Option<Higher> {
+        self.higher
+    }
 
     /// Returns s - 1.
     pub fn inner(&self) -> f64 {
         self.inertia
     }
 
-    /// Returns true if the bob moves on a sphere.
-    pub fn is_sphere(&self) -> bool {
-        self.stiffness == 0.0
+    /// Returns S.
+    pub fn inner_at(&self, u: f64) -> f64 {
+        self.inner_of(u)
     }
 
-    /// Returns z/(l u^2).
+    /// Returns true if the bob moves on a sphere.
+    pub fn is_sphere(&self) -> bool {
+        self.stiffness == 0.0 && self.higher.is_none()
+    }
+
+    /// Returns the share of kappa in z/(l u^2).
     pub fn lift_of_square(&self) -> f64 {
         0.125 * self.stiffness
     }
 
     /// Returns z/l.
     pub fn lift(&self, u: f64) -> f64 {
-        self.lift_of_square() * u * u
+        let lift = self.lift_of_square() * u * u;
+        match &self.higher {
+            Some(higher) => lift + 0.0625 * higher.stiffness * u * u * u,
+            None => lift,
+        }
     }
 
-    /// Returns beta/u.
+    /// Returns the share of kappa in beta/u.
     pub fn bend(&self) -> f64 {
         0.5 * self.stiffness
     }
 
     /// Returns beta: z' = l beta p_perp.p'.
     pub fn rise(&self, u: f64) -> f64 {
-        self.bend() * u
+        self.rise_of(u)
     }
 
     /// Returns the surface of a mode, `None` for a pendulum.
-    pub fn new(s: f64, kappa: f64) -> Option<Surface> {
-        (s != 1.0 || kappa != 1.0).then(|| Surface::of([s, kappa]))
+    pub fn new(s: f64, kappa: f64, higher: Higher) -> Option<Surface> {
+        let higher = (higher != Higher::default()).then_some(higher);
+        let is_pendulum = s == 1.0 && kappa == 1.0 && higher.is_none();
+        (!is_pendulum).then(|| Surface { higher, ..Surface::of([s, kappa]) })
     }
 
     /// Returns the surface over a number type.
     pub fn lift_to<T: Number>(&self) -> Surface<T> {
         let [inertia, stiffness] = [self.inertia, self.stiffness].map(T::constant);
-        Surface { inertia, stiffness }
+        Surface { inertia, stiffness, higher: self.higher }
     }
 
     /// Returns the largest distance of the bob from its hinge within 45 degrees, over l, or more.
     pub fn reach(&self) -> f64 {
-        1.0 + self.stiffness.abs() / 32.0
+        let reach = 1.0 + self.stiffness.abs() / 32.0;
+        match &self.higher {
+            Some(higher) => reach + higher.stiffness.abs() / 128.0,
+            None => reach,
+        }
     }
 
     /// Returns minus the smallest eigenvalue of N within 45 degrees and the bound of the model, or 0. It is at most 1.
@@ -145,15 +228,29 @@ impl Surface {
             let u = 0.5 * f64::from(k) / 64.0;
             let eta = -libm::sqrt(1.0 - u);
             let inertia = self.meridian_inertia(eta, u);
-            (inertia >= LEAST_INERTIA).then(|| -self.inertia * eta * eta * u / inertia)
+            let [around, lent] = self.around(u);
+            let along = -self.inner_of(u) * eta * eta * u / inertia;
+            (inertia >= LEAST_INERTIA && around >= LEAST_INERTIA).then(|| along.max(lent))
         };
         (0..=64).map_while(at).fold(0.0, f64::max)
+    }
+
+    /// Returns the inertia across the meridian, relative to a pendulum's, and minus the eigenvalue of N there.
+    fn around(&self, u: f64) -> [f64; 2] {
+        let Some(higher) = &self.higher else { return [1.0, 0.0] };
+        let more = higher.rotary_inertia(u) * u;
+        [1.0 + more, -more / f64::max(1.0 + more, 0.5 * LEAST_INERTIA)]
+    }
+
+    /// Returns the smaller one of the inertias along the meridian and across it, relative to a pendulum's.
+    pub fn least_inertia(&self, eta: f64, u: f64) -> f64 {
+        f64::min(self.meridian_inertia(eta, u), self.around(u)[0])
     }
 
     /// Returns true if the inertia along the meridian is large enough at an angle from the axis, rad.
     fn holds(&self, angle: f64) -> bool {
         let (sin, cos) = libm::sincos(angle);
-        self.meridian_inertia(-cos, sin * sin) >= LEAST_INERTIA
+        self.least_inertia(-cos, sin * sin) >= LEAST_INERTIA
     }
 
     /// Returns the smallest angle from the axis at which the model ends, rad, rounded down to tenths of a degree.
@@ -180,8 +277,22 @@ impl Surface {
 
 /// Returns the message for a bob of mode n (from 0) beyond the bound of its surface, with s and kappa; `name` is that of the
 /// tank.
-pub(crate) fn beyond([s, kappa]: [f64; 2], n: usize, name: &str) -> String {
-    let most = Surface::new(s, kappa).map_or(0.0, |surface| surface.largest_angle().to_degrees());
+pub(crate) fn beyond([s, kappa]: [f64; 2], higher: Higher, n: usize, name: &str) -> String {
+    let surface = Surface::new(s, kappa, higher);
+    let most = surface.map_or(0.0, |surface| surface.largest_angle().to_degrees());
+    if higher != Higher::default() {
+        return format!(
+            "the slosh angle of mode {} of {name} exceeds {most:.1} degrees, where {name}.nonlinear_inertia[{1}] = {s:?}, \
+             nonlinear_inertia_2[{1}] = {2:?}, nonlinear_stiffness[{1}] = {kappa:?}, nonlinear_stiffness_2[{1}] = {3:?}, \
+             rotary_inertia[{1}] = {4:?} and rotary_inertia_2[{1}] = {5:?} leave too little inertia (allowed: smaller angles)",
+            n + 1,
+            n + 1,
+            higher.inertia,
+            higher.stiffness,
+            higher.rotary[0],
+            higher.rotary[1]
+        );
+    }
     format!(
         "the slosh angle of mode {} of {name} exceeds {most:.1} degrees, where {name}.nonlinear_inertia[{}] = {s:?} and \
          {name}.nonlinear_stiffness[{}] = {kappa:?} leave too little inertia for the third order to be valid (allowed: \
@@ -206,6 +317,8 @@ pub(crate) struct Meridian<T> {
     eased: T,
     /// b of a planar mode.
     across: Option<Vec3<T>>,
+    /// n and T/(1 + T u).
+    around: Option<(Vec3<T>, T)>,
 }
 
 /// z with its derivatives, the last one without y.
@@ -220,6 +333,24 @@ pub(crate) struct Lift<T> {
     pub energy_d: T,
     /// [(kappa - 1) l]' u^2/8, the rate of z of a bob at rest.
     pub z_at_rest: T,
+    /// Rotary motion, if it has inertia.
+    pub rotary: Option<Rotary<T>>,
+}
+
+/// Rotary motion with inertia beyond that of the bob.
+pub(crate) struct Rotary<T> {
+    /// l u T
+    lever: T,
+    /// l T, 2 w_e sigma and 2 t_2 l sigma tau: l (T tau)' = l T (n.y + w_e' u + 2 w_e sigma) + 2 t_2 l sigma tau.
+    inertia: T,
+    turning: T,
+    growing: T,
+    /// l^2 u T tau, and 2 l^2 T tau sigma.
+    spin: T,
+    swept: T,
+    u: T,
+    l: T,
+    w: Vec3<T>,
 }
 
 impl<T: Number> Meridian<T> {
@@ -233,10 +364,15 @@ impl<T: Number> Meridian<T> {
         let eta = dot(e, p);
         let p_perp = sub(p, scale(eta, e));
         let u = dot(p_perp, p_perp);
-        let beta = u * (surface.stiffness * 0.5);
-        let gamma = beta * (beta * eta - T::constant(2.0)) * eta + eta * eta * surface.inertia;
+        let beta = surface.rise_of(u);
+        let gamma = beta * (beta * eta - T::constant(2.0)) * eta + eta * eta * surface.inner_of(u);
         let inertia = surface.meridian_inertia(eta, u).at_least(0.5 * LEAST_INERTIA);
-        Meridian { surface, p, e, p_perp, u, eta, beta, eased: gamma / inertia, across }
+        let around = surface.higher.filter(|higher| higher.rotary != [0.0; 2]).map(|higher| {
+            let t = higher.rotary_inertia(u);
+            let inertia = (T::constant(1.0) + t * u).at_least(0.5 * LEAST_INERTIA);
+            (cross(e, p_perp), t / inertia)
+        });
+        Meridian { surface, p, e, p_perp, u, eta, beta, eased: gamma / inertia, across, around }
     }
 
     /// Returns D x.
@@ -256,7 +392,11 @@ impl<T: Number> Meridian<T> {
             x = sub(x, scale(dot(b, x), b));
         }
         let meridian = sub(self.e, scale(self.eta, self.p));
-        sub(x, scale(self.eased * dot(meridian, x), meridian))
+        let free = sub(x, scale(self.eased * dot(meridian, x), meridian));
+        match &self.around {
+            Some((n, share)) => sub(free, scale(*share * dot(*n, x), *n)),
+            None => free,
+        }
     }
 
     /// Returns N x.
@@ -271,13 +411,34 @@ impl<T: Number> Meridian<T> {
         for (k, column) in columns.iter_mut().enumerate() {
             let mut unit = [zero; 3];
             unit[k % 3] = one;
-            let moved = if k < 3 { unit } else { taylor::vector::cross(unit, rho) };
+            let moved = if k < 3 { unit } else { cross(unit, rho) };
             let force = scale(m, self.held(moved));
-            let torque = taylor::vector::cross(rho, force);
+            let torque = cross(rho, force);
             column[..3].copy_from_slice(&force);
             column[3..].copy_from_slice(&torque);
         }
         columns
+    }
+
+    /// Adds to the mass matrix of the bob what v has beyond [n; rho x n], - l u e: tau is taken against inertial axes.
+    pub fn add_rotary(&self, [m, l]: [T; 2], rho: Vec3<T>, matrix: &mut [[T; 6]; 6]) {
+        let Some((n, share)) = self.around else { return };
+        let arm = cross(rho, n);
+        let bob = [n[0], n[1], n[2], arm[0], arm[1], arm[2]];
+        let zero = T::constant(0.0);
+        let [x, y, z] = scale(-(l * self.u), self.e);
+        let axial = [zero, zero, zero, x, y, z];
+        for (i, row) in matrix.iter_mut().enumerate() {
+            for (k, element) in row.iter_mut().enumerate() {
+                let more = bob[i] * axial[k] + axial[i] * (bob[k] + axial[k]);
+                *element = *element + m * share * more;
+            }
+        }
+    }
+
+    /// Returns n, if rotary motion has inertia.
+    pub fn around(&self) -> Option<Vec3<T>> {
+        self.around.map(|(n, _)| n)
     }
 
     /// Returns the bob's height and the terms of E_i at the rate p', with l and its derivatives, and those of s and kappa
@@ -286,6 +447,7 @@ impl<T: Number> Meridian<T> {
         &self,
         [l, l_d, l_dd]: Jet<T>,
         p_d: Vec3<T>,
+        w: Vec3<T>,
         changing: Option<[Jet<T>; 2]>,
     ) -> Lift<T> {
         let Meridian { u, e, p_perp, surface, .. } = *self;
@@ -305,7 +467,11 @@ impl<T: Number> Meridian<T> {
             energy: l * l * sigma * sigma * (own * 0.5),
             energy_d: -(l * l_d * sigma * sigma * own),
             z_at_rest: l_d * rising * surface.stiffness,
+            rotary: None,
         };
+        if let Some(higher) = &surface.higher {
+            self.lift_higher(&mut lift, higher, l, [p_perp_d, w], [sigma, psi]);
+        }
         if let Some([[_, s_d, _], [_, kappa_d, kappa_dd]]) = changing {
             let by_kappa = kappa_d * l * rising;
             lift.z_d = lift.z_d + by_kappa;
@@ -316,5 +482,68 @@ impl<T: Number> Meridian<T> {
             lift.energy_d = lift.energy_d - s_d * l * l * sigma * sigma * 0.5;
         }
         lift
+    }
+    /// Adds the terms of the coefficients beyond the third order, which a tank has that keeps its liquid.
+    #[inline(never)]
+    fn lift_higher(
+        &self,
+        lift: &mut Lift<T>,
+        higher: &Higher,
+        l: T,
+        [p_perp_d, w]: [Vec3<T>; 2],
+        [sigma, psi]: [T; 2],
+    ) {
+        let Meridian { u, e, p_perp, .. } = *self;
+        let (u2, squared) = (u * u, sigma * sigma);
+        lift.z = lift.z + l * u2 * u * (0.0625 * higher.stiffness);
+        lift.z_d = lift.z_d + l * u2 * sigma * (0.375 * higher.stiffness);
+        lift.z_dd = lift.z_dd + l * (u * squared * 1.5 + u2 * psi * 0.375) * higher.stiffness;
+        // (S sigma)' - s_2 sigma^2 = S sigma' + s_2 sigma^2
+        let mut inwards = (u * psi + squared) * higher.inertia;
+        lift.energy = lift.energy + l * l * u * squared * (0.5 * higher.inertia);
+        if let Some((n, _)) = self.around {
+            let (spin, t) = (dot(e, w), higher.rotary_inertia(u));
+            let tau = dot(n, p_perp_d) + spin * u;
+            let momentum = t * tau;
+            inwards = inwards - tau * tau * higher.rotary[1] - momentum * spin * 2.0;
+            let growing = l * sigma * tau * (2.0 * higher.rotary[1]);
+            let turning = spin * sigma * 2.0;
+            let sideways = scale(l * t * turning + growing, n);
+            let swept = scale(l * momentum * 2.0, cross(e, p_perp_d));
+            lift.inner = add(lift.inner, add(sideways, swept));
+            lift.energy = lift.energy + l * l * momentum * tau * 0.5;
+            lift.rotary = Some(Rotary {
+                lever: l * u * t,
+                inertia: t,
+                turning: l * turning,
+                growing,
+                spin: l * l * u * momentum,
+                swept: l * l * momentum * sigma * 2.0,
+                u,
+                l,
+                w,
+            });
+        }
+        lift.inner = add(lift.inner, scale(l * inwards, p_perp));
+    }
+}
+
+impl<T: Number> Rotary<T> {
+    /// Returns l T u w_e', which acts along n, at e.w'.
+    pub fn pull(&self, rate_d: T) -> T {
+        self.lever * rate_d
+    }
+
+    /// Returns the couple on the craft over m, with n.(-l y), `slid`, and e.w'.
+    pub fn couple(&self, slid: T, rate_d: T, e: Vec3<T>) -> Vec3<T> {
+        let tau_d = self.l * self.u * rate_d + self.turning - slid;
+        let along = self.l * self.u * (self.inertia * tau_d + self.growing) + self.swept;
+        let turned = scale(self.spin, cross(self.w, e));
+        [0, 1, 2].map(|i| -(along * e[i] + turned[i]))
+    }
+
+    /// Returns the angular momentum about the axis over m.
+    pub fn spin(&self) -> T {
+        self.spin
     }
 }

@@ -256,8 +256,16 @@ static VARIABLES: &[Variable<Model>] = &[
         .shape(PER_MODE).range(0.0, 10.0),
     V::parameter("tank.nonlinear_inertia", |p, n| &mut p.tank.nonlinear_inertia[n], "1", "Third-order coefficient s of a slosh mode's inertia. The slosh angle A changes the frequency of a planar wave by the share (3 kappa/8 - s/2) A^2/2. The default, a pendulum, is 1. A negative value, for shallow liquid, bounds the slosh angle")
         .shape(PER_MODE).range(-1e3, 1e3),
-    V::parameter("tank.nonlinear_stiffness", |p, n| &mut p.tank.nonlinear_stiffness[n], "1", "Third-order coefficient kappa of a slosh mode's stiffness. The slosh angle A changes the frequency of a rotary wave by the share kappa A^2/4. The default, a pendulum, is 1")
+    V::parameter("tank.nonlinear_stiffness", |p, n| &mut p.tank.nonlinear_stiffness[n], "1", "Third-order coefficient kappa of a slosh mode's stiffness. The slosh angle A changes the frequency of a rotary wave by the share (kappa/4 - t) A^2, with t = rotary_inertia. The default, a pendulum, is 1")
         .shape(PER_MODE).range(-1e3, 1e3),
+    V::parameter("tank.nonlinear_inertia_2", |p, n| &mut p.tank.nonlinear_inertia_2[n], "1", "Coefficient s_2 of a slosh mode beyond the third order: kinetic energy m s_2 |q|^2 (q.q')^2/(2 l^4) with the displacement q and the length l. 0 for a pendulum; tanks with a fill table have none")
+        .shape(PER_MODE).range(-1e5, 1e5),
+    V::parameter("tank.nonlinear_stiffness_2", |p, n| &mut p.tank.nonlinear_stiffness_2[n], "1", "Coefficient kappa_2 of a slosh mode beyond the third order: the bob is l kappa_2 (|q|/l)^6/16 higher. 0 for a pendulum; tanks with a fill table have none")
+        .shape(PER_MODE).range(-1e5, 1e5),
+    V::parameter("tank.rotary_inertia", |p, n| &mut p.tank.rotary_inertia[n], "1", "Coefficient t of a slosh mode's rotary motion: kinetic energy m t (q x q')^2/(2 l^2), with q' against axes that do not turn about the tank's axis. The slosh angle A changes the frequency of a rotary wave by the share (kappa/4 - t) A^2. 0 for a pendulum; tanks with a fill table have none")
+        .shape(PER_MODE).range(-1e5, 1e5),
+    V::parameter("tank.rotary_inertia_2", |p, n| &mut p.tank.rotary_inertia_2[n], "1", "Coefficient t_2 of a slosh mode's rotary motion: kinetic energy m t_2 |q|^2 (q x q')^2/(2 l^4). 0 for a pendulum; tanks with a fill table have none")
+        .shape(PER_MODE).range(-1e5, 1e5),
     V::parameter("tank.angle_limit", |p, n| &mut p.tank.angle_limit[n], "rad", "Slosh angle above which a mode is out of range (limited_by = third_order): the smaller of the angles at which its frequency errs by 0.3 % and a forced response by 3 %. 0: not known; mode 1 of a tank with diameter above 0 then has that of an upright cylinder")
         .display_unit("deg").shape(PER_MODE).range(0.0, 1.6),
     V::parameter("tank.swirl_limit", |p, n| &mut p.tank.swirl_limit[n], "rad", "Slosh angle above which rotary motion of a mode is out of range (limited_by = secondary_resonance), because its branch folds by a secondary resonance. 0: not known; mode 1 of a tank with diameter above 0 then has that of an upright cylinder")

@@ -87,6 +87,10 @@ pub mod tank {
     pub const BREAKING_STEEPNESS: crate::Array<2> = crate::Array("tank[].breaking_steepness");
     pub const NONLINEAR_INERTIA: crate::Array<2> = crate::Array("tank[].nonlinear_inertia");
     pub const NONLINEAR_STIFFNESS: crate::Array<2> = crate::Array("tank[].nonlinear_stiffness");
+    pub const NONLINEAR_INERTIA_2: crate::Array<2> = crate::Array("tank[].nonlinear_inertia_2");
+    pub const NONLINEAR_STIFFNESS_2: crate::Array<2> = crate::Array("tank[].nonlinear_stiffness_2");
+    pub const ROTARY_INERTIA: crate::Array<2> = crate::Array("tank[].rotary_inertia");
+    pub const ROTARY_INERTIA_2: crate::Array<2> = crate::Array("tank[].rotary_inertia_2");
     pub const ANGLE_LIMIT: crate::Array<2> = crate::Array("tank[].angle_limit");
     pub const SWIRL_LIMIT: crate::Array<2> = crate::Array("tank[].swirl_limit");
     pub const G_BOND: crate::Array<1> = crate::Array("tank[].g_bond");
@@ -211,6 +215,10 @@ pub const SIZES: &[crate::Size] = &[
             ("tank[].breaking_steepness", 0),
             ("tank[].nonlinear_inertia", 0),
             ("tank[].nonlinear_stiffness", 0),
+            ("tank[].nonlinear_inertia_2", 0),
+            ("tank[].nonlinear_stiffness_2", 0),
+            ("tank[].rotary_inertia", 0),
+            ("tank[].rotary_inertia_2", 0),
             ("tank[].angle_limit", 0),
             ("tank[].swirl_limit", 0),
             ("tank[].g_bond", 0),
@@ -263,6 +271,10 @@ pub const SIZES: &[crate::Size] = &[
             ("tank[].breaking_steepness", 1),
             ("tank[].nonlinear_inertia", 1),
             ("tank[].nonlinear_stiffness", 1),
+            ("tank[].nonlinear_inertia_2", 1),
+            ("tank[].nonlinear_stiffness_2", 1),
+            ("tank[].rotary_inertia", 1),
+            ("tank[].rotary_inertia_2", 1),
             ("tank[].angle_limit", 1),
             ("tank[].swirl_limit", 1),
             ("tank[].wave", 1),

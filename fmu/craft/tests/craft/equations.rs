@@ -157,6 +157,7 @@ fn a_tank_s_directional_derivatives_are_those_by_differences() {
         }
         if seed >= 72 {
             random.bend(&mut p.tank);
+            random.bend_further(&mut p.tank);
         }
         p.coupling = Coupling::ALL[seed as usize % 3];
         let mut ramp = || Ramp { value: random.vector(1.0), slope: random.vector(1.0) };

@@ -85,6 +85,23 @@ impl Random {
     pub fn bend_all(&mut self, p: &mut Parameters) {
         p.tanks = p.tanks.max(1);
         p.tank.iter_mut().for_each(|tank| self.bend(tank));
+        p.tank.iter_mut().for_each(|tank| self.bend_further(tank));
+    }
+
+    /// Gives the bobs of a tank that keeps its liquid coefficients beyond the third order, those that rotate also inertia of
+    /// rotary motion. No inertia vanishes at any angle.
+    pub fn bend_further(&mut self, tank: &mut Tank) {
+        if tank.fill.points > 0 {
+            return;
+        }
+        for n in 0..craft::MODES {
+            tank.nonlinear_inertia_2[n] = self.between(-0.1, 1.0);
+            tank.nonlinear_stiffness_2[n] = self.between(-0.5, 1.0);
+            let rotary = [self.between(0.0, 1.5), self.between(-0.3, 0.5)];
+            if tank.direction[n] == [0.0; 2] {
+                [tank.rotary_inertia[n], tank.rotary_inertia_2[n]] = rotary;
+            }
+        }
     }
 
     /// Gives the bobs of a tank surfaces other than spheres.

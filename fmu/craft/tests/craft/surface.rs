@@ -1,4 +1,4 @@
-//! Coefficients of the third order: bobs on other surfaces than spheres.
+//! Coefficients of the third order and beyond: bobs on other surfaces than spheres.
 //!
 //! `tests/six` compares their waves with potential flow.
 //! `independent.rs`, `equations.rs`, `exchange.rs`, `balances.rs`, `draining.rs` and `impulses.rs` have such bobs among
@@ -55,6 +55,9 @@ fn a_tank_s_motion_does_not_depend_on_its_steps() {
             random.make_planar(&mut p.tank);
         }
         random.bend(&mut p.tank);
+        if seed > 3 {
+            random.bend_further(&mut p.tank);
+        }
         if seed.is_multiple_of(2) {
             random.follow(&mut p.tank);
         }
@@ -233,6 +236,12 @@ struct Lagrangian<'a> {
 impl Lagrangian<'_> {
     /// Returns l, h, m, s and kappa.
     fn table<T: Number>(&self, t: T) -> [T; 5] {
+        if self.tank.fill.points == 0 {
+            let Tank {
+                length, hinge, mass, nonlinear_inertia: s, nonlinear_stiffness: kappa, ..
+            } = self.tank;
+            return [length, hinge, mass, s, kappa].map(|of| T::constant(of[self.n]));
+        }
         let (FillTable { liquid, mass, length, hinge, .. }, n) = (&self.tank.fill, self.n);
         let flow = self.u.mass_flow;
         let left = T::constant(self.tank.liquid_0)
@@ -254,7 +263,9 @@ impl Lagrangian<'_> {
         let [x, y] = [0, 1].map(|i| Dual::of(q[i], q_d[i]));
         let u = x * x + y * y;
         let one = Dual::constant(1.0);
-        let up = h + (kappa - one) * l * u * u * 0.125 - l * (one - u).sqrt();
+        let kappa_2 = self.tank.nonlinear_stiffness_2[self.n];
+        let up = h + (kappa - one) * l * u * u * 0.125 + l * u * u * u * (kappa_2 / 16.0)
+            - l * (one - u).sqrt();
         let in_tank = [l * x, l * y, up];
         let vector = |of: fn(Dual) -> f64| Vector3::from(in_tank.map(of));
         let [w, x_q, y_q, z_q] = self.tank.q;
@@ -266,7 +277,11 @@ impl Lagrangian<'_> {
         let speed = turn * vector(Dual::result) + w.cross(&rho);
         let [l, _, m, s, _] = self.table(t);
         let sigma = q[0] * q_d[0] + q[1] * q_d[1];
-        let inner = 0.5 * (s - 1.0) * (l * sigma).powi(2);
+        let (u, tank) = (u.value(), self.tank);
+        let tau = q[0] * q_d[1] - q[1] * q_d[0] + u * w.dot(&(turn * Vector3::z()));
+        let along = s - 1.0 + tank.nonlinear_inertia_2[self.n] * u;
+        let around = tank.rotary_inertia[self.n] + tank.rotary_inertia_2[self.n] * u;
+        let inner = 0.5 * (along * (l * sigma).powi(2) + around * (l * tau).powi(2));
         let centring = 0.5 * self.tank.k[self.n] / m * l * l * (q[0] * q[0] + q[1] * q[1]);
         0.5 * speed.norm_squared() - Vector3::from(a.at(t)).dot(&rho) + inner - centring
     }
@@ -282,16 +297,21 @@ const DIFFERENCES: [(f64, f64); 6] = [
     (-3.0, -1.0 / 60.0),
 ];
 
-/// The motion of a draining tank's bobs satisfies Lagrange's equations d(dL/dq')/dt = dL/dq, by differences of L and along the
-/// motion. Liquid flows so fast that s' and kappa' matter.
+/// The motion of a tank's bobs satisfies Lagrange's equations d(dL/dq')/dt = dL/dq, by differences of L and along the
+/// motion. Liquid flows so fast that s' and kappa' matter, or has coefficients beyond the third order.
 #[test]
-fn bobs_of_a_draining_tank_move_by_lagrange_s_equations() {
-    for seed in 0..24 {
+fn bobs_move_by_lagrange_s_equations() {
+    for seed in 0..36 {
         let mut random = Random::new(seed);
         let mut tank = draining_tank(&mut random, 1 + seed as usize % 3);
         random.bend_by_fill(&mut tank);
         (tank.fill.points, tank.zeta, tank.fill.zeta) = (2, [0.0; MODES], [[0.0; POINTS]; MODES]);
         tank.liquid_0 = 0.5 * (tank.fill.liquid[0] + tank.fill.liquid[1]);
+        if seed >= 24 {
+            tank.fill.points = 0;
+            random.bend(&mut tank);
+            random.bend_further(&mut tank);
+        }
         let mut ramp = || Ramp { value: random.vector(2.0), slope: random.vector(1.0) };
         let (a, omega, omega_dot) = (ramp(), ramp().value, ramp());
         let mass_flow =
@@ -340,6 +360,68 @@ fn bobs_of_a_draining_tank_move_by_lagrange_s_equations() {
             }
         }
     }
+}
+
+/// A wave does not feel a tank that turns about its axis: with and without the turn the bob is at the same place in inertial
+/// axes, and the tank gets no torque about the axis.
+#[test]
+fn a_wave_in_a_tank_that_turns_about_its_axis_stays_the_same() {
+    let mut tank = bench(0.5);
+    [tank.nonlinear_inertia[0], tank.nonlinear_inertia_2[0]] = [3.02, -0.65];
+    [tank.nonlinear_stiffness[0], tank.nonlinear_stiffness_2[0]] = [4.11, -6.6];
+    [tank.rotary_inertia[0], tank.rotary_inertia_2[0]] = [0.70, -1.56];
+    tank.p_0[0] = [0.2, 0.0, -f64::sqrt(0.96)];
+    let still = [0.05, 2.0];
+    let moved = |rate: f64| {
+        let mut tank = tank;
+        tank.p_dot_0[0] = [still[0], still[1] - 0.2 * rate, 0.0];
+        let a = Ramp::held([0.0, 0.0, G]);
+        let u = TankInputs { a, omega: [0.0, 0.0, rate], ..TankInputs::default() };
+        let p = TankParameters { tank, ..TankParameters::default() };
+        let mut tank = SloshTank::new(&p, &u, 0.0, 1e-12).unwrap();
+        assert_eq!(p.problems(), [""; 0]);
+        tank.step(&u, 3.0).unwrap();
+        let torque = tank.outputs(&u).tank.torque[2];
+        assert!(torque.abs() < 1e-13, "{rate}: {torque:e}");
+        let x = tank.continuous_states();
+        let turned = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 3.0 * rate);
+        turned * Vector3::new(x[0], x[1], x[2])
+    };
+    let without = moved(0.0);
+    for rate in [0.7, -2.0] {
+        let off = (moved(rate) - without).norm();
+        assert!(off < 1e-9, "{rate}: {off:e}");
+    }
+}
+
+/// At an angle at which the inertia of rotary motion, 1 - 4 u, is half of a pendulum's, the model ends: 20.7 degrees.
+#[test]
+fn angles_at_which_the_inertia_of_rotary_motion_vanishes_are_refused() {
+    let mut tank = bench(1.227);
+    (tank.rotary_inertia[0], tank.nonlinear_inertia[0]) = (-4.0, 1.0);
+    tank.p_0[0] = [0.36, 0.0, -f64::sqrt(1.0 - 0.36 * 0.36)];
+    let said = TankParameters { tank, ..TankParameters::default() }.problems();
+    assert!(said.len() == 1 && said[0].contains("exceeds 20.7 degrees"), "{said:?}");
+    assert!(said[0].contains("rotary_inertia[1] = -4.0"), "{said:?}");
+    tank.p_0[0] = [0.35, 0.0, -f64::sqrt(1.0 - 0.35 * 0.35)];
+    assert_eq!(TankParameters { tank, ..TankParameters::default() }.problems(), [""; 0]);
+}
+
+#[test]
+fn coefficients_beyond_the_third_order_are_refused_where_no_equation_has_them() {
+    let mut p = TankParameters::default();
+    p.tank.rotary_inertia[0] = 0.5;
+    p.tank.direction[0] = [1.0, 0.0];
+    let said = p.problems();
+    assert!(said[0].starts_with("tank.rotary_inertia[1] = 0.5 with tank.direction[1]"), "{said:?}");
+    p.tank.direction[0] = [0.0; 2];
+    assert_eq!(p.problems(), [""; 0]);
+    p.tank.fill.points = POINTS;
+    let said = p.problems();
+    assert!(said[0].starts_with("tank.rotary_inertia[1] = 0.5 with tank.fill"), "{said:?}");
+    (p.tank.fill.points, p.tank.nonlinear_inertia_2[0]) = (0, 2e5);
+    let said = p.problems();
+    assert!(said[0].starts_with("tank.nonlinear_inertia_2[1] = 200000.0 (allowed: "), "{said:?}");
 }
 
 /// A table with the same s and kappa at all points is a tank with them.
