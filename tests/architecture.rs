@@ -9,7 +9,7 @@ use cargo_metadata::{DependencyKind, MetadataCommand};
 
 use crate::common::run;
 
-/// Linked packages of each package of the workspace, without tests and build scripts.
+/// Returns the packages that each package of the workspace links, without tests and build scripts.
 fn dependencies() -> BTreeMap<String, BTreeSet<String>> {
     let metadata =
         MetadataCommand::new().current_dir(pack::root()).no_deps().exec().expect("cargo metadata");
@@ -33,7 +33,7 @@ fn the_physics_knows_no_fmi_and_the_runtime_no_physics() {
     assert_eq!(all["runtime"], BTreeSet::new());
 }
 
-/// A build is the check: without the standard library's prelude a crate that needs it does not compile.
+/// The build is the check: without the standard library's prelude, a crate that needs it does not compile.
 #[test]
 fn the_models_and_what_they_are_made_of_need_no_standard_library() {
     for krate in ["formulas", "taylor", "plant", "craft"] {
@@ -45,8 +45,8 @@ fn the_models_and_what_they_are_made_of_need_no_standard_library() {
     }
 }
 
-/// The packages of the harness, each with those of the workspace that it may link: of `fmu/` the formulas
-/// alone, which are no model.
+/// The packages of the harness, each with the packages of the workspace that it may link. From `fmu/` this is
+/// only `formulas`, which contains no model.
 const HARNESS: [(&str, &[&str]); 14] = [
     ("files", &[]),
     ("names", &[]),
@@ -100,7 +100,8 @@ fn the_harness_never_links_a_model_and_its_packages_depend_one_way() {
     }
 }
 
-/// Otherwise `cargo run` compiles once more what `cargo test` has compiled, and a test that builds the program does.
+/// Otherwise `cargo run`, or a test that builds the program, would compile again what `cargo test` has
+/// compiled.
 #[test]
 fn tests_turn_on_no_feature_of_what_the_program_is_made_of() {
     let packages = |edges: &str| -> BTreeSet<String> {
@@ -126,7 +127,7 @@ fn only_the_command_line_draws_progress() {
     }
 }
 
-/// Files in which the workspace's `unsafe_code = "deny"` is lifted.
+/// Lists the files in which the workspace's `unsafe_code = "deny"` is lifted.
 #[test]
 fn unsafe_code_stands_in_the_files_of_the_c_interface() {
     let root = pack::root();
@@ -163,7 +164,7 @@ fn unsafe_code_stands_in_the_files_of_the_c_interface() {
     assert_eq!(found, known.map(String::from).into());
 }
 
-/// `cargo test` leaves out ignored tests: each is in a command of a script of `.ci`.
+/// `cargo test` leaves out ignored tests, so each must be in a command of a script in `.ci`.
 #[test]
 fn a_script_runs_every_test_that_is_ignored() {
     let root = pack::root();
@@ -232,7 +233,6 @@ fn tests_that_the_tuning_of_fits_names_are_there() {
     assert!(missing.is_empty(), "{missing:?}");
 }
 
-/// Files below a folder, as paths from the root.
 fn collect(root: &Path, folder: &Path, found: &mut Vec<String>) {
     for entry in fs::read_dir(folder).expect("a folder of the project").flatten() {
         let path = entry.path();
@@ -246,7 +246,7 @@ fn collect(root: &Path, folder: &Path, found: &mut Vec<String>) {
     }
 }
 
-/// The crates whose modules use each other one way, in each folder, with the modules that may go round in a circle.
+/// Crates in which modules of a folder must not use each other in a circle, with the modules that may.
 const ONE_WAY: [(&str, &[&str]); 23] = [
     ("fmu/plant", &[]),
     ("fmu/craft", &[]),
@@ -278,7 +278,7 @@ const ONE_WAY: [(&str, &[&str]); 23] = [
 /// A module by its path within the crate: `["methods", "page"]`; the crate's root is `[]`.
 type Module = Vec<String>;
 
-/// The modules of a crate with their code, tests within the files and comments left out.
+/// Collects the modules of a crate with their code, without tests within the files and without comments.
 fn sources(folder: &Path, module: &[String], all: &mut BTreeMap<Module, String>) {
     for entry in fs::read_dir(folder).expect("a folder of modules").flatten() {
         let path = entry.path();
@@ -300,7 +300,7 @@ fn sources(folder: &Path, module: &[String], all: &mut BTreeMap<Module, String>)
     }
 }
 
-/// Words, `::` and other signs of a source, without white space.
+/// Splits a source into words, `::` and other signs, without white space.
 fn tokens(code: &str) -> Vec<&str> {
     let is_word = |c: char| c.is_alphanumeric() || c == '_';
     let (mut found, mut rest) = (Vec::new(), code.trim_start());
@@ -317,8 +317,8 @@ fn tokens(code: &str) -> Vec<&str> {
     found
 }
 
-/// Every path of the tree that begins at `tokens[0]`: `a::{b, c::d as e}` has `a::b` and `a::c::d`. Returns how
-/// many tokens it takes.
+/// Collects every path of the tree that begins at `tokens[0]`: `a::{b, c::d as e}` has `a::b` and `a::c::d`.
+/// Returns the number of tokens of the tree.
 fn paths(tokens: &[&str], base: &Module, found: &mut Vec<Module>) -> usize {
     let mut taken = 1;
     match tokens.first() {
@@ -346,7 +346,7 @@ fn paths(tokens: &[&str], base: &Module, found: &mut Vec<Module>) -> usize {
     }
 }
 
-/// Paths that a module names by `crate::`, `self::` and `super::`, from the crate's root.
+/// Lists the paths that a module names by `crate::`, `self::` and `super::`, from the crate's root.
 fn named(module: &Module, code: &str) -> Vec<Module> {
     let (tokens, mut found) = (tokens(code), Vec::new());
     for at in 0..tokens.len() {
@@ -369,8 +369,8 @@ fn named(module: &Module, code: &str) -> Vec<Module> {
     found
 }
 
-/// Names that modules import, with the paths that they stand for: a module inside uses them as `super::Name`, and all others
-/// if they are re-exported.
+/// Maps names that modules import to the paths for which they stand: a module inside uses them as
+/// `super::Name`, and all others if they are re-exported.
 fn imported(sources: &BTreeMap<Module, String>) -> BTreeMap<Module, Module> {
     let mut all = BTreeMap::new();
     for (module, code) in sources {
@@ -399,7 +399,7 @@ fn imported(sources: &BTreeMap<Module, String>) -> BTreeMap<Module, Module> {
     all
 }
 
-/// The path that a path stands for, through the imports of the modules that it names.
+/// Resolves a path through the imports of the modules that it names.
 fn resolved(mut path: Module, imported: &BTreeMap<Module, Module>) -> Module {
     let mut seen = BTreeSet::new();
     while seen.insert(path.clone()) {
@@ -411,8 +411,9 @@ fn resolved(mut path: Module, imported: &BTreeMap<Module, Module>) -> Module {
     path
 }
 
-/// Modules of each folder of a crate (a folder counts as one), each with the modules of the same folder that it names, itself or
-/// through an import of another. What `mod.rs` or `lib.rs` defines is of the folder: no module of it is named then.
+/// Returns the modules of each folder of a crate (a folder counts as one module), each with the modules of
+/// the same folder that it names, directly or through an import of another. Items defined in `mod.rs` or
+/// `lib.rs` belong to the folder and name no module of it.
 fn modules(
     sources: &BTreeMap<Module, String>,
 ) -> BTreeMap<Module, BTreeMap<String, BTreeSet<String>>> {
@@ -436,7 +437,7 @@ fn modules(
     all
 }
 
-/// Modules in a circle or above one.
+/// Returns the modules that are part of a circle or use one.
 fn circles(mut left: BTreeMap<String, BTreeSet<String>>) -> BTreeMap<String, BTreeSet<String>> {
     // What uses nothing that is left is not part of a circle.
     while let Some(leaf) =
@@ -450,8 +451,8 @@ fn circles(mut left: BTreeMap<String, BTreeSet<String>>) -> BTreeMap<String, BTr
     left
 }
 
-/// Crates whose modules name what they use where it is defined, not by what the crate's root exports again: the root imports every
-/// module, so that a module which imports from the root is in a circle with it.
+/// Crates whose modules name what they use by the place of its definition, not by a re-export of the crate's
+/// root: the root imports every module, so that a module which imports from the root is in a circle with it.
 const NAMED_AT_HOME: [&str; 9] = [
     "fmu/plant",
     "fmu/formulas",

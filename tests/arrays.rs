@@ -12,10 +12,10 @@ use host::part::Limit;
 use host::xml::Element;
 use pack::{Fmi, MODELS, Model, packed_version_for_tests};
 
-/// A number's place in the physics: the name without brackets, and all indices.
+/// Identifies a number in the physics: the name without brackets, and all indices.
 type Key = (String, Vec<usize>);
 
-/// Array and indices of a scalar's name: `tank[1].p[2,3]` is tank.p at 1, 2, 3.
+/// Returns array and indices for a scalar's name: `tank[1].p[2,3]` is tank.p at 1, 2, 3.
 fn key(name: &str) -> Key {
     let (mut plain, mut indices) = (String::new(), Vec::new());
     let mut rest = name;
@@ -28,13 +28,13 @@ fn key(name: &str) -> Key {
     (plain + rest, indices)
 }
 
-/// A variable as modelDescription.xml has it.
+/// A variable as modelDescription.xml declares it.
 struct Variable {
     name: String,
     reference: u32,
     kind: String,
     causality: String,
-    /// Sizes, or the references of what says them.
+    /// Lengths of the dimensions, or the value references of the parameters that determine them.
     dimensions: Vec<Result<usize, u32>>,
     xml: Element,
 }
@@ -62,7 +62,7 @@ impl Variable {
             .collect()
     }
 
-    /// Its elements by rows, where structural parameters have these values.
+    /// Returns the elements of the variable, row by row, for these values of the structural parameters.
     fn keys(&self, sizes: &BTreeMap<u32, usize>) -> Vec<Key> {
         let mut all = vec![Vec::new()];
         for dimension in &self.dimensions {
@@ -81,7 +81,6 @@ impl Variable {
     }
 }
 
-/// A packed FMU, its binary loaded.
 struct Opened {
     fmu: Fmu,
     variables: Vec<Variable>,
@@ -121,7 +120,7 @@ impl Opened {
     }
 }
 
-/// An instance, and what its structural parameters are.
+/// An instance with the values of its structural parameters.
 struct Run<'a> {
     opened: &'a Opened,
     instance: Instance<'a>,
@@ -129,7 +128,7 @@ struct Run<'a> {
 }
 
 impl Run<'_> {
-    /// Sets a structural parameter.
+    /// Sets a structural parameter in configuration mode.
     fn resize(&mut self, name: &str, size: usize) {
         let reference = self.opened.variable(name).reference;
         self.instance.enter_configuration_mode().unwrap();
@@ -138,7 +137,8 @@ impl Run<'_> {
         self.sizes.insert(reference, size);
     }
 
-    /// Gives variables the values of a function of key, where it has one; each array in one call.
+    /// Sets variables to the values of a function of their keys, where it returns one; each array in one
+    /// call.
     fn set(&mut self, value: impl Fn(&Key) -> Option<Value>) {
         for v in &self.opened.variables {
             let keys = v.keys(&self.sizes);
@@ -149,7 +149,7 @@ impl Run<'_> {
         }
     }
 
-    /// The bits of everything that can be read.
+    /// Returns the bits of everything that can be read.
     fn everything(&mut self) -> BTreeMap<Key, u64> {
         let mut all = BTreeMap::new();
         for v in self.opened.variables.iter().filter(|v| v.kind != "UInt64") {
@@ -175,14 +175,15 @@ fn bits(value: &Value) -> u64 {
     }
 }
 
-/// Everything that the FMU with arrays has, the other has with the same bits; what it has besides is beyond the sizes.
+/// Asserts that the FMU with scalars has everything that the FMU with arrays has, with the same bits; what it
+/// has in addition is beyond the sizes.
 fn assert_same(arrays: &BTreeMap<Key, u64>, scalars: &BTreeMap<Key, u64>, when: &str) {
     for (key, bits) in arrays {
         assert_eq!(scalars.get(key), Some(bits), "{key:?} {when}");
     }
 }
 
-/// Sizes of the FMU with arrays, and settings of both FMUs.
+/// A test case: the FMU, and the size of its arrays.
 struct Case {
     model: &'static Model,
     size: Option<(&'static str, usize)>,
@@ -202,7 +203,8 @@ fn cases() -> Vec<Case> {
     ]
 }
 
-/// Parameters, by their places, that are not as they start: every tank and mode another one.
+/// Returns a value that differs from the start value for some parameters, another one for every tank and
+/// mode.
 fn parameter(model: &Model, (name, indices): &Key) -> Option<Value> {
     let real = |x: f64| Some(Value::Real(x));
     let integer = |n: usize| Some(Value::Integer(n as i64));
@@ -228,7 +230,7 @@ fn parameter(model: &Model, (name, indices): &Key) -> Option<Value> {
     }
 }
 
-/// Inputs that go to and fro, each element in its own way.
+/// Returns the value of an input that oscillates, differently for each element.
 fn input(model: &Model, inputs: &[String], (name, indices): &Key, time: f64) -> Option<Value> {
     if !inputs.contains(name) {
         return None;
@@ -246,7 +248,7 @@ fn input(model: &Model, inputs: &[String], (name, indices): &Key, time: f64) -> 
     Some(Value::Real(size * (n * time + 0.3 * n).sin()))
 }
 
-/// Both FMUs, set up as a case says.
+/// Creates an instance of both FMUs with the settings of a case.
 fn set_up<'a>(
     case: &Case,
     [arrays, scalars]: [&'a Opened; 2],
@@ -347,7 +349,7 @@ fn the_fmu_with_arrays_has_the_states_derivatives_and_indicators_of_that_with_sc
     }
 }
 
-/// The error's words, and the status.
+/// Returns status and messages of a refused call.
 fn refusal<T>(called: Result<T, CallError>) -> (Status, String) {
     let error = called.err().expect("it is refused");
     let texts: Vec<_> = error.messages.iter().map(|message| &*message.text).collect();
@@ -652,7 +654,7 @@ fn each_element_of_an_array_says_of_itself_what_the_scalar_says() {
     }
 }
 
-/// Spacecraft for FMI 3.0 with the variables of two tanks of one mode.
+/// Packs Spacecraft for FMI 3.0 with the variables of two tanks of one mode.
 fn part_of_spacecraft(starts: &[(&str, &str)]) -> (Opened, tempfile::TempDir) {
     let size = |size: &'static names::Size| Limit {
         parameter: size.parameter,
@@ -670,7 +672,7 @@ fn part_of_spacecraft(starts: &[(&str, &str)]) -> (Opened, tempfile::TempDir) {
     (Opened::from(&out), folder)
 }
 
-/// Start values of a part, and the same as settings of the whole.
+/// Start values of a reduced FMU, which are also settings of the full one.
 const STARTS: [(&str, f64); 5] = [
     ("tanks", 2.0),
     ("tank[2].position[1]", 0.4),

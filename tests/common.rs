@@ -7,9 +7,10 @@ use std::sync::LazyLock;
 use HubSlosh::table::TABLE;
 use runtime::variable::Kind;
 
-/// The numbers of the items of an enumeration, by the name of a variable.
+/// Returns the numbers of the items of an enumeration.
 ///
 /// # Panics
+///
 /// If there is no such variable, or if it is not an enumeration.
 pub fn items(name: &str) -> std::ops::RangeInclusive<i32> {
     let variable = TABLE.variables.iter().find(|v| v.name == name);
@@ -19,10 +20,11 @@ pub fn items(name: &str) -> std::ops::RangeInclusive<i32> {
     }
 }
 
-/// The output of a command that must succeed.
+/// Runs a command that must succeed, and returns its output.
 ///
 /// # Panics
-/// If it does not, with what it said and `sentence`.
+///
+/// If it fails, with its output and `sentence`.
 pub fn run(command: &mut Command, sentence: &str) -> String {
     let why = match command.output() {
         Err(error) => error.to_string(),
@@ -37,18 +39,21 @@ pub fn run(command: &mut Command, sentence: &str) -> String {
     panic!("{why}\n{sentence}\n(the command: {command:?})");
 }
 
-/// Cargo's target directory.
+/// Returns Cargo's target directory.
 ///
 /// # Panics
-/// If the FMU that tells where it is cannot be packed.
+///
+/// If the FMU from whose path it is derived cannot be packed.
 pub fn target() -> &'static Path {
     pack::packed_for_tests().ancestors().nth(2).expect("<target>/test-fmu/HubSlosh.fmu")
 }
 
-/// The interpreter of the tests' virtual environment, which is made if need be, as the package's compiled half.
+/// Returns the Python interpreter of the tests' virtual environment, which is created if necessary, with the
+/// package's compiled half.
 ///
 /// # Panics
-/// If they can't be made.
+///
+/// If that fails.
 pub fn python() -> &'static Path {
     static PYTHON: LazyLock<PathBuf> = LazyLock::new(|| {
         pack::build_native(true).expect("the compiled half of the Python package");
@@ -66,17 +71,19 @@ pub fn python() -> &'static Path {
     &PYTHON
 }
 
-/// The binary `hubslosh`, of the profile that this test was built with; it is
-/// another package's, so Cargo does not say where it is.
+/// Returns the binary `hubslosh` of the profile with which this test was built. It belongs to another
+/// package, so Cargo does not state its path.
 pub fn harness() -> &'static Path {
     static HARNESS: LazyLock<PathBuf> = LazyLock::new(|| binary("hubslosh", &[]));
     &HARNESS
 }
 
-/// A binary of the workspace by its name, of the profile that this test was built with; `of` says where it is if not in one
-/// of the default members: in the `--workspace`. Not by `-p`: with one package's features alone Cargo compiles most again.
+/// Builds a binary of the workspace in the profile with which this test was built, and returns its path. `of`
+/// are arguments for Cargo if the binary is not in one of the default members: `--workspace`. Not `-p`: with
+/// the features of only one package Cargo would compile most of it again.
 ///
 /// # Panics
+///
 /// If it does not build.
 pub fn binary(name: &str, of: &[&str]) -> PathBuf {
     let mut build = Command::new(env!("CARGO"));

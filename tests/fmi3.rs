@@ -6,8 +6,8 @@ use std::process::Command;
 use crate::common::{python, run};
 use pack::{Fmi, MODELS, packed_model_for_tests, packed_version_for_tests};
 
-/// The motion is bit-identical to FMI 2.0 however FMPy handles events. Through CVODE it is equal within the error of a tolerance
-/// of 1e-9 over 20 s of stick and slip.
+/// The motion is bit-identical to FMI 2.0, in whatever way FMPy handles events. With CVODE it agrees within
+/// the error of a tolerance of 1e-9 over 20 s of stick and slip.
 const FMPY: &str = r#"
 import sys
 import numpy as np
@@ -82,7 +82,7 @@ fn fmpy_finds_no_fault_in_fmi_3_and_gets_the_bits_of_fmi_2_whatever_it_is_told_o
     }
 }
 
-/// With arrays: as FMPy gives them, and sized by hand in configuration mode, which it leaves to its users.
+/// Tests arrays as FMPy passes them, and sized by hand in configuration mode, which FMPy leaves to its users.
 const FMPY_ARRAYS: &str = r#"
 import shutil
 import sys

@@ -14,17 +14,16 @@ use runtime::variable::Causality;
 const STATES: usize = plant::STATES;
 const INDICATORS: usize = plant::INDICATORS;
 
-/// Everything moves.
+/// Start values with which everything moves.
 const START: [(&str, f64); 3] =
     [("init.omega", 0.2), ("init.slosh_angle", 0.2), ("init.slosh_angle_radial", 0.1)];
-/// slosh.model
 const SPHERICAL: i32 = 4;
 
 fn references(fmu: &Fmu, names: &[&str]) -> Vec<u32> {
     names.iter().map(|name| fmu.description().variable(name).unwrap().reference).collect()
 }
 
-/// The same start in the other importer's hands.
+/// Starts an instance of the other importer.
 fn start(instance: &mut impl Common, fmu: &Fmu) {
     let names = START.map(|(name, _)| name);
     instance.set_real(&references(fmu, &names), &START.map(|(_, value)| value)).unwrap();
@@ -35,7 +34,7 @@ fn start(instance: &mut impl Common, fmu: &Fmu) {
     Common::exit_initialization_mode(instance).unwrap();
 }
 
-/// And in ours.
+/// Starts an instance of our host in the same way.
 fn started<'fmu>(fmu: &'fmu Fmu, kind: i32) -> Instance<'fmu> {
     let mut with = fmu.instantiation("ours");
     with.kind = kind;
@@ -163,7 +162,7 @@ fn model_exchange_gives_the_crate_fmi_the_bits_that_it_gives_us() {
     theirs.terminate().unwrap();
 }
 
-/// The crate runs FMI 3.0; our host runs FMI 2.0 for comparison.
+/// The crate fmi runs FMI 3.0, and our host runs FMI 2.0 for comparison.
 mod fmi3 {
     use std::io::{Read, Write};
 
@@ -178,8 +177,8 @@ mod fmi3 {
 
     use super::{SPHERICAL, bits, started};
 
-    /// The crate's schema, 0.8, ends at units and nominal values of variables, which are the standard's (2.4.7.5): it
-    /// gets a copy without.
+    /// Imports the FMU by the crate fmi. Version 0.8 of its schema does not know units and nominal values of
+    /// variables, which the standard has (2.4.7.5), so it gets a copy without them.
     fn import(model: &Model) -> (Fmi3Import, ModelDescription) {
         let packed = packed_version_for_tests(model, Fmi::V3);
         let copy = tempfile::NamedTempFile::new().unwrap();
@@ -215,14 +214,14 @@ mod fmi3 {
         names.iter().map(|name| description.variable(name).unwrap().reference).collect()
     }
 
-    /// Through event mode; where there is none, nothing.
+    /// Passes through event mode, in which nothing may happen.
     fn handle(instance: &mut impl Common) {
         let mut flags = EventFlags::default();
         instance.update_discrete_states(&mut flags).unwrap();
         assert!(!flags.discrete_states_need_update && !flags.terminate_simulation);
     }
 
-    /// A torque, or a pull on a tank, of a communication step.
+    /// Returns an input and its value, which drives the FMU during a communication step.
     fn input(model: &Model) -> (&'static str, f64) {
         match model.name {
             "HubSlosh" => ("tau_cmd", 0.05),

@@ -8,9 +8,10 @@ use pack::{Fmi, MODELS};
 
 use crate::common::{binary, harness, python, run, target};
 
-/// Runs pytest in the tests' environment, and says how many passed.
+/// Runs pytest in the tests' environment, and checks how many tests passed.
 ///
 /// # Panics
+///
 /// If a test fails, or is not run.
 fn pytest(arguments: &mut Command, sentence: &str) {
     let settings = pack::root().join("harness/python/pyproject.toml");
@@ -29,10 +30,11 @@ fn pytest(arguments: &mut Command, sentence: &str) {
     println!("{last}");
 }
 
-/// Tests of `harness/python` that need no wheel. They run in parallel with the others, which would otherwise be one long test.
+/// Tests of `harness/python` that need no wheel. They run in parallel with the others, which would otherwise
+/// be one long test.
 const BESIDE: [&str; 2] = ["test_liquid.py", "test_model_exchange.py"];
 
-/// pytest with what the package's tests are given: FMU and command.
+/// Returns the command for pytest with the options of the package's tests: FMU and command.
 fn of_the_package() -> Command {
     let mut command = Command::new(python());
     command
@@ -56,7 +58,7 @@ fn fmpy_drives_the_fmu_as_the_harness_does() {
     pytest(&mut command, "the tests in Python failed");
 }
 
-/// 22 sweeps of 45 minutes with each of six slosh models.
+/// Compares 22 sweeps of 45 minutes with each of six slosh models.
 #[test]
 #[ignore = "minutes: cargo test --release --test tests -- --ignored all_sweeps_of_the_thesis"]
 fn fmpy_drives_all_sweeps_of_the_thesis() {
@@ -88,7 +90,8 @@ fn the_studies_compute_the_numbers_of_the_book() {
     pytest(of_the_package().arg(pack::root().join("harness/studies")), "a study failed");
 }
 
-/// Long forms of the studies' tests; [`the_studies_compute_the_numbers_of_the_book`] runs the short ones.
+/// Runs the long forms of the studies' tests; [`the_studies_compute_the_numbers_of_the_book`] runs the short
+/// ones.
 #[test]
 #[ignore = "half a minute: cargo test --release --test tests -- --ignored long_forms_of_the_studies"]
 fn long_forms_of_the_studies_compute_the_numbers_of_the_book() {

@@ -8,7 +8,7 @@ use pack::archive::{self, Files, Packed};
 
 use crate::common::{harness, python, run};
 
-/// The FMU: XML, binary, and what a folder of documentation must hold at least.
+/// Packs the FMU: XML, binary, and the least that a folder of documentation must have.
 fn packed() -> PathBuf {
     let binary = pack::build("spring-fmu", true).unwrap();
     let out = binary.ancestors().nth(2).unwrap().join("test-fmu/Spring.fmu");
@@ -25,7 +25,7 @@ fn packed() -> PathBuf {
     out
 }
 
-/// m x'' + d x' + k x = F, from x0 at rest under a force that is held: the exact motion.
+/// Compares with the exact motion of m x'' + d x' + k x = F from x0 at rest under a constant force.
 const FMPY: &str = r#"
 import sys
 import numpy as np

@@ -18,7 +18,7 @@ use runtime::table::Layout;
 
 const VERSIONS: [Fmi; 2] = [Fmi::V2, Fmi::V3];
 
-/// The unpacked binary, and what the C hosts need to know of the FMU.
+/// An unpacked FMU, and what the C hosts must know of it.
 struct Unpacked {
     fmi: Fmi,
     directory: tempfile::TempDir,
@@ -53,7 +53,6 @@ impl Unpacked {
         Unpacked { fmi, directory, library, description, states, indicators }
     }
 
-    /// GUID or token.
     fn guid(&self) -> &str {
         &self.description.guid
     }
@@ -66,7 +65,7 @@ impl Unpacked {
         self.variable(name).reference.to_string()
     }
 
-    /// Compiles a host from C, once, and gives the command that runs it.
+    /// Compiles a host in C, once, and returns the command that runs it.
     fn host(&self, name: &str, sources: &[&str], link: &[&Path]) -> Command {
         let program = self.directory.path().join(name);
         let sources = sources.iter().map(|source| root().join(source));
@@ -103,7 +102,7 @@ impl Unpacked {
     }
 }
 
-/// Codes of variable types for the C host.
+/// Returns the code of a variable's type for the C host.
 fn letter(variable: &Variable) -> char {
     match variable.kind() {
         Type::Real => 'R',
@@ -113,14 +112,12 @@ fn letter(variable: &Variable) -> char {
     }
 }
 
-/// Share of the cases that one version tries.
+/// Cases that are tested in one version of FMI.
 #[derive(Clone, Copy)]
 struct Share {
-    /// all; or part, and the other version another part
     of: &'static str,
-    /// Instances at once, loads of the library.
+    /// Number of instances at the same time, and number of loads of the library.
     lives: [&'static str; 2],
-    /// Random pairs of values.
     pairs: usize,
 }
 
@@ -131,7 +128,7 @@ fn under_valgrind() -> bool {
     std::env::var_os("HUBSLOSH_VALGRIND").is_some()
 }
 
-/// Folder of fmi2Functions.h and fmi3Functions.h: fmpy contains the official headers.
+/// Returns the folder with fmi2Functions.h and fmi3Functions.h; fmpy contains the official headers.
 fn headers() -> &'static Path {
     static HEADERS: LazyLock<PathBuf> = LazyLock::new(|| {
         let script = "import importlib.util; print(importlib.util.find_spec('fmpy').origin)";
@@ -143,14 +140,15 @@ fn headers() -> &'static Path {
     &HEADERS
 }
 
-/// The number before `word` in what a host says at its end.
+/// Returns the number before `word` in the last output of a host.
 fn number(said: &str, word: &str) -> f64 {
     let before = said.split(word).next().unwrap().trim_end();
     before.rsplit(' ').next().unwrap().parse().unwrap_or_else(|_| panic!("no {word} in: {said}"))
 }
 
-/// Thousands of instances step in turns, and each has the same results as alone. The library is loaded hundreds of times and is
-/// gone after unloading. States go there and back, Model Exchange passes its events, steps take no memory.
+/// Thousands of instances step in turns, and each has the same results as alone. The library is loaded
+/// hundreds of times and is gone after unloading. States are saved and restored, Model Exchange handles its
+/// events, and steps take no memory.
 fn a_whole_life(fmi: Fmi, share: Share) {
     let fmu = Unpacked::new(HUBSLOSH, fmi);
     let [instances, loads] = match std::env::var("HUBSLOSH_VALGRIND").as_deref() {
@@ -185,8 +183,8 @@ fn a_c_host_lives_through_everything_and_nothing_is_left_behind() {
     }
 }
 
-/// The table of functions and modes (`modes.c`) for an FMU, by an output, what follows an input at once, that input, and an
-/// Integer, an enumeration and a Boolean.
+/// Tests which functions are allowed in which mode (`modes.c`). `names` are an output, a variable that
+/// depends directly on an input, that input, an Integer, an enumeration and a Boolean.
 fn functions_answer_as_the_table_has_it(model: &pack::Model, names: [&str; 6], sets: bool) {
     let fmu = Unpacked::new(model, Fmi::V3);
     run(
@@ -222,8 +220,8 @@ fn every_function_of_fmi_3_is_allowed_or_refused_in_words_in_every_mode() {
     }
 }
 
-/// Noise, or the fuzzer's corpus in the folder `HUBSLOSH_CORPUS`, as calls of either version; among what must not
-/// happen (`host.c`) are floating-point exceptions in calls that succeed.
+/// Makes random calls, or those of the fuzzer's corpus in the folder `HUBSLOSH_CORPUS`, in either version.
+/// `host.c` lists what must not happen, among it floating-point exceptions in calls that succeed.
 fn no_calls_break<M: runtime::Model>(inputs: u32) {
     let name = M::table().about.model;
     let fmu = Unpacked::new(pack::model(name).unwrap(), Fmi::V2);
@@ -271,8 +269,8 @@ fn no_calls_break_the_packed_binary_of_sloshtank() {
     no_calls_break::<SloshTank::Model>(2000);
 }
 
-/// The host traps division by zero, invalid operations and overflow, as hosts do that search for the first NaN. No slosh model,
-/// friction law or gyro causes one, in either interface.
+/// The host traps division by zero, invalid operations and overflow, as hosts do that search for the first
+/// NaN. No slosh model, friction law or gyro causes one, in either interface.
 #[cfg(target_os = "linux")]
 fn no_model_traps(fmi: Fmi, share: Share) {
     if under_valgrind() {
@@ -325,7 +323,7 @@ fn no_model_raises_a_floating_point_exception() {
     }
 }
 
-/// The file that `ranges.c` reads: each variable with what its description allows, and the scenes.
+/// Writes the file that `ranges.c` reads: each variable with its allowed values, and the scenes.
 fn ranges(description: &ModelDescription, scenes: &[Vec<(&str, &str)>]) -> String {
     let number = |text: &str| match text {
         "true" => "1".to_string(),
@@ -363,9 +361,9 @@ fn ranges(description: &ModelDescription, scenes: &[Vec<(&str, &str)>]) -> Strin
     lines.join("\n") + "\n"
 }
 
-/// Every parameter and input at min and max in every scene, and random pairs, under traps, in
-/// both interfaces; each Real as NaN and infinity besides. Scenes bound the integrator's steps: what is tried is
-/// whether numbers hold, not for how long.
+/// Sets every parameter and input to min and max in every scene, and random pairs, with floating-point traps,
+/// in both interfaces; each Real also to NaN and infinity. Scenes limit the integrator's steps, because the
+/// test is about numbers, not about run time.
 #[cfg(target_os = "linux")]
 fn no_allowed_value_traps(model: &str, fmi: Fmi, share: Share) {
     if under_valgrind() {
@@ -404,7 +402,7 @@ fn no_allowed_value_traps(model: &str, fmi: Fmi, share: Share) {
     assert!(number(&said, " refused") <= 0.5 * number(&said, " runs"), "{said}");
 }
 
-/// Settings before the test, by the FMU's name.
+/// Returns settings that are made before the test, by the FMU's names.
 #[cfg(target_os = "linux")]
 fn scenes(model: &str) -> Vec<Vec<(&'static str, &'static str)>> {
     let few = ("solver.max_steps", "300");
@@ -603,7 +601,8 @@ fn no_allowed_value_of_sloshtank_raises_a_floating_point_exception() {
     }
 }
 
-/// Each version tries here what the suite divides between the versions: minutes, by hand.
+/// Tests in each version what the suite divides between the versions. It takes minutes and is started by
+/// hand.
 #[cfg(target_os = "linux")]
 #[test]
 #[ignore = "minutes: .ci/run --nightly"]
@@ -621,7 +620,7 @@ fn lives_traps_and_allowed_values_all_in_both_versions() {
     });
 }
 
-/// A handle of HubSlosh given to all others' functions, and the rest of `handles.c`.
+/// Passes a handle of HubSlosh to the functions of all other FMUs, and other wrong handles (`handles.c`).
 #[cfg(target_os = "linux")]
 #[test]
 fn handles_of_other_libraries_other_versions_freed_and_not_handles_are_errors() {
@@ -649,8 +648,8 @@ fn handles_of_other_libraries_other_versions_freed_and_not_handles_are_errors() 
     }
 }
 
-/// Stack that an FMU needs, kB: to instantiate and initialise, and for steps. The book's page on real time has these
-/// numbers. The compiler decides on them, so that they have a margin of a quarter above what was measured.
+/// Stack that an FMU needs, kB: to instantiate and initialise, and for steps. The book's page on real time
+/// has these numbers. They depend on the compiler, so they are a quarter above the measured values.
 #[cfg(target_os = "linux")]
 const STACK: [(&str, [u32; 2]); 3] =
     [("HubSlosh", [64, 23]), ("Spacecraft", [156, 112]), ("SloshTank", [122, 66])];
@@ -703,11 +702,12 @@ fn the_stack_that_an_fmu_needs_is_no_more_than_the_book_says() {
 /// Number of steps of `rounding.c`, 20 ms each.
 const STEPS: usize = 250;
 
-/// Further settings of a host, by name, before a motion.
+/// Additional settings of a host before a motion, by name.
 type Settings<'a> = &'a [(&'a str, &'a str)];
 
-/// Returns the bits of all Reals, ten times in 5 s of a motion, under a host's floating-point environment. The motion is the same
-/// in both versions of FMI, to the last bit, whether the FMU handles events or, in 3.0, the host.
+/// Returns the bits of all Reals, ten times in 5 s of a motion, under a host's floating-point environment.
+/// The motion is the same in both versions of FMI, to the last bit, whether the FMU handles events or, in
+/// 3.0, the host.
 #[cfg(all(target_os = "linux", target_arch = "x86_64"))]
 fn rounding_shows_in_the_last_digits_alone(model: &str, settings: Settings) {
     if under_valgrind() {
@@ -828,7 +828,7 @@ fn any_values_end_in_numbers_or_in_an_error() {
     values::<SloshTank::Model>(50);
 }
 
-/// Sequences of calls by hosts whose clocks differ (`fmu/fuzz/src/clocks.rs`).
+/// Runs sequences of calls by hosts whose clocks differ (`fmu/fuzz/src/clocks.rs`).
 fn clocks(sequences: [usize; 3]) {
     fn play<M: runtime::Model>(sequences: usize) {
         let mut rng = fastrand::Rng::with_seed(3);

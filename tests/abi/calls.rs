@@ -9,7 +9,6 @@ use host::fmi2::{CallError, Callbacks, Fmu, Instance, Message, Status};
 use object::Object;
 use pack::packed_for_tests;
 
-/// fmi2StatusKind
 const DO_STEP_STATUS: i32 = 0;
 const PENDING_STATUS: i32 = 1;
 const LAST_SUCCESSFUL_TIME: i32 = 2;
@@ -23,7 +22,7 @@ fn reference(fmu: &Fmu, name: &str) -> u32 {
     fmu.description().variable(name).unwrap().reference
 }
 
-/// Ready to step from 0 s on.
+/// Returns an instance that is ready to step from 0 s on.
 fn stepping<'fmu>(fmu: &'fmu Fmu, settings: &[(&str, &str)]) -> Instance<'fmu> {
     stepping_from(fmu, 0.0, None, settings)
 }
@@ -44,7 +43,7 @@ fn stepping_from<'fmu>(
     instance
 }
 
-/// Everything moves, sticks, samples and saturates.
+/// Start of a motion in which everything moves, sticks, samples and saturates.
 const LIVELY: &[(&str, &str)] = &[
     ("slosh.model", "spherical"),
     ("slosh.modes", "2"),
@@ -55,7 +54,7 @@ const LIVELY: &[(&str, &str)] = &[
     ("imu.enabled", "true"),
 ];
 
-/// Every variable there is, as bits.
+/// Returns the bits of every variable.
 fn all(instance: &mut Instance) -> Vec<u64> {
     let variables = &instance.fmu().description().variables;
     let each = variables.iter().map(|variable| {
@@ -81,7 +80,7 @@ fn all(instance: &mut Instance) -> Vec<u64> {
     each.collect()
 }
 
-/// All there is to an instance, as bytes.
+/// Returns the complete state of an instance as bytes.
 fn state(instance: &mut Instance) -> Vec<u8> {
     let saved = instance.get_state().unwrap();
     let bytes = instance.serialize(&saved).unwrap();
@@ -89,7 +88,7 @@ fn state(instance: &mut Instance) -> Vec<u8> {
     bytes
 }
 
-/// One second in uneven steps under a torque that turns.
+/// Simulates one second in uneven steps under a torque that changes its sign.
 fn drive(instance: &mut Instance, from: f64) {
     let torque = [reference(instance.fmu(), "tau_cmd")];
     let mut at = from;
@@ -101,7 +100,7 @@ fn drive(instance: &mut Instance, from: f64) {
     }
 }
 
-/// The call was refused with fmi2Error and one message, which contains all of `parts`.
+/// Asserts that a call was refused with fmi2Error and one message, which contains all of `parts`.
 #[track_caller]
 fn refused<T>(result: Result<T, CallError>, parts: &[&str]) {
     let Err(error) = result else { panic!("not refused") };
@@ -152,7 +151,7 @@ fn tempfile() -> tempfile::TempDir {
     tempfile::tempdir().unwrap()
 }
 
-/// The functions of fmi3FunctionTypes.h.
+/// Lists the functions of fmi3FunctionTypes.h.
 fn fmi3_functions() -> BTreeSet<String> {
     let values = "Float32 Float64 Int8 UInt8 Int16 UInt16 Int32 UInt32 Int64 UInt64 Boolean String Binary Clock \
                   IntervalDecimal IntervalFraction ShiftDecimal ShiftFraction FMUState";
@@ -278,8 +277,7 @@ fn instances_in_several_threads_give_the_same_bits() {
     });
 }
 
-/// Rounding to nearest, numbers below the normal range kept, the directory where
-/// it was.
+/// The FMU leaves rounding to nearest, subnormal numbers and the working directory unchanged.
 #[test]
 fn host_s_arithmetic_and_directory_are_left_alone() {
     let arithmetic = || {
@@ -443,8 +441,8 @@ fn stick_and_slip_are_told_to_those_who_ask() {
     assert!(texts[1].contains("broke away backwards at t = 20.0 s"), "{texts:?}");
 }
 
-/// A host that has logging on and names a tolerance hears nothing, and never gets a
-/// warning: some take anything but fmi2OK for a failure.
+/// A host with logging on that sets a tolerance receives no message and no warning, because some hosts take
+/// everything except fmi2OK for a failure.
 #[test]
 fn normal_use_is_silent() {
     let fmu = open();
@@ -654,7 +652,7 @@ fn steps_of_no_positive_length_are_refused_and_change_nothing() {
     instance.do_step(0.5, 0.1).unwrap();
 }
 
-/// Hosts say n h or add up h: both are off the true time by a few ulps.
+/// Hosts compute n h or add up h; both differ from the exact time by a few ulps.
 #[test]
 fn communication_point_may_wobble_by_rounding_and_is_landed_on_exactly() {
     let fmu = open();
@@ -683,7 +681,7 @@ fn a_step_past_the_stop_time_is_refused() {
     refused(instance.do_step(1.0, 1e-3), &["stop time"]);
 }
 
-/// Powers of two, so that all times are exact.
+/// All times are exact, because they are multiples of powers of two.
 #[test]
 fn the_time_of_the_start_does_not_matter() {
     let fmu = open();
@@ -786,7 +784,8 @@ fn a_terminated_instance_can_still_be_read() {
     assert_eq!(all(&mut instance), last);
 }
 
-/// Back, and into an instance that was only just made: no setup, no initialization.
+/// The state is restored into the same instance, and into one that was only created: no setup, no
+/// initialization.
 #[test]
 fn a_saved_state_continues_bit_for_bit_also_in_a_new_instance() {
     let fmu = open();
@@ -838,7 +837,7 @@ fn the_handle_of_a_saved_state_is_reused_and_null_is_fine_to_free() {
     refused(instance.set_state_null(), &["FMUstate is NULL"]);
 }
 
-/// A mistake of fmusim 0.0.39, which would end its run with an error.
+/// fmusim 0.0.39 makes this mistake, which would end its run with an error.
 #[test]
 fn a_saved_state_is_freed_by_itself_as_by_its_address() {
     let fmu = open();

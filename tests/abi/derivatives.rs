@@ -7,11 +7,11 @@ use host::description::{ModelDescription, Type, Value, Variable};
 use host::fmi3::{Fmu, Instance, Interface};
 use pack::{Fmi, model, packed_version_for_tests};
 
-/// Rounding error of a sum, relative to the sum of its products' magnitudes: there are up to 100 products, and each number of the
-/// Jacobian is itself rounded.
+/// Rounding error of a sum, relative to the sum of its products' magnitudes: there are up to 100 products,
+/// and each number of the Jacobian is itself rounded.
 const ROUNDING: f64 = 1e-13;
-/// Central differences of order 4 over 1e-3 of a known's size leave out (1e-3)^4 of the fifth derivative, and lose
-/// 1e-16/1e-3 to rounding, more where large terms cancel in a value.
+/// Error of central differences of order 4 over 1e-3 of a known's size: they leave out (1e-3)^4 of the fifth
+/// derivative and lose 1e-16/1e-3 to rounding, or more where large terms cancel in a value.
 const DIFFERENCES: f64 = 1e-6;
 
 fn open(name: &str) -> Fmu {
@@ -24,7 +24,7 @@ fn open(name: &str) -> Fmu {
 struct Sides {
     unknowns: Vec<u32>,
     knowns: Vec<u32>,
-    /// Number of knowns that are inputs: these come first, then the states.
+    /// Number of knowns that are inputs; these come first, then the states.
     inputs: usize,
     names: Vec<String>,
 }
@@ -58,7 +58,7 @@ impl Sides {
     }
 }
 
-/// An operating point: the instance stands there, and `x` has inputs and states, each with its size.
+/// An operating point of an instance. `x` has its inputs and states, `sizes` their typical magnitudes.
 struct Point<'a, 'fmu> {
     sides: &'a Sides,
     instance: Instance<'fmu>,
@@ -74,7 +74,7 @@ impl Point<'_, '_> {
         values
     }
 
-    /// The unknowns where the knowns are moved by `s` in a direction.
+    /// Returns the unknowns if the knowns are moved by `s` in a direction.
     fn at(&mut self, s: f64, direction: &[f64]) -> Vec<f64> {
         let there: Vec<f64> = self.x.iter().zip(direction).map(|(x, d)| x + s * d).collect();
         self.go(&there, direction);
@@ -106,7 +106,8 @@ impl Point<'_, '_> {
             .unwrap_or_else(|error| panic!("{}: {error}", self.what))
     }
 
-    /// Compares both kinds of derivatives with each other, and with differences by the knowns at the places `moved`.
+    /// Compares both kinds of derivatives with each other, and with differences by the knowns at the
+    /// positions `moved`.
     fn check(&mut self, rng: &mut Rng, moved: &[usize]) {
         let sides = self.sides;
         let y = self.values();
@@ -201,10 +202,11 @@ impl Point<'_, '_> {
     }
 }
 
-/// Start time, s. Not 0, so that outputs that are times differ from their derivatives.
+/// Start time, s. It is not 0, so that outputs that are times differ from their derivatives.
 const START: f64 = 1.0;
 
-/// An instance for Model Exchange in continuous-time mode, with its inputs set, at the states that its start leads to.
+/// Returns an instance for Model Exchange in continuous-time mode with its inputs set, at the states of its
+/// start.
 fn exchange<'fmu>(fmu: &'fmu Fmu, settings: &[(String, String)]) -> (Instance<'fmu>, Vec<f64>) {
     let mut with = fmu.instantiation("one");
     with.interface = Interface::ModelExchange;
@@ -219,7 +221,7 @@ fn exchange<'fmu>(fmu: &'fmu Fmu, settings: &[(String, String)]) -> (Instance<'f
     (instance, states)
 }
 
-/// An instance for Co-Simulation after a step of 0.3 s.
+/// Returns an instance for Co-Simulation after a step of 0.3 s.
 fn stepped<'fmu>(fmu: &'fmu Fmu, settings: &[(String, String)]) -> Instance<'fmu> {
     let mut instance = fmu.instantiate("one").unwrap();
     set(&mut instance, settings);
@@ -246,9 +248,9 @@ fn setting(name: impl Into<String>, value: impl ToString) -> (String, String) {
     (name.into(), value.to_string())
 }
 
-/// Checks the point of Model Exchange that `settings` lead to, states moved by random numbers in the ranges of `scatter`, and the
-/// point that Co-Simulation reaches in 0.3 s from the start, where a host can move the inputs alone; not those whose jumps are
-/// impulses, which move states with them.
+/// Checks the derivatives at three points: that of Model Exchange from `settings`, the same with states moved
+/// by random numbers in the ranges of `scatter`, and that which Co-Simulation reaches in 0.3 s, where a host
+/// can change only the inputs; inputs whose jumps are impulses are left out, because they move states.
 fn check(
     fmu: &Fmu,
     rng: &mut Rng,
@@ -289,7 +291,8 @@ fn check(
     Point { sides: &sides, instance, x, sizes, what }.check(rng, &moved);
 }
 
-/// Every slosh model with every friction law in slip; stuck; the wheel at the limits of its torque and of its speed.
+/// Tests every slosh model with every friction law while the hub slips, a stuck hub, and the wheel at the
+/// limits of its torque and of its speed.
 #[test]
 fn derivatives_of_hubslosh_are_transposed_and_those_of_differences_in_slip_in_stick_and_at_the_wheels_limits()
  {
@@ -374,7 +377,7 @@ fn derivatives_of_hubslosh_are_transposed_and_those_of_differences_in_slip_in_st
     }
 }
 
-/// A free craft and one on a pivot, of one to three tanks of one to three modes.
+/// Tests a free craft and one on a pivot, with one to three tanks of one to three modes.
 #[test]
 fn derivatives_of_spacecraft_are_transposed_and_those_of_differences() {
     let fmu = open("Spacecraft");
@@ -407,7 +410,7 @@ fn derivatives_of_spacecraft_are_transposed_and_those_of_differences() {
     }
 }
 
-/// Sizes of what moves in six axes.
+/// Returns the typical magnitude of a variable of a craft.
 fn of_craft(name: &str) -> f64 {
     match name.split('[').next() {
         Some("force") => 100.0,
@@ -419,7 +422,7 @@ fn of_craft(name: &str) -> f64 {
     }
 }
 
-/// Adds the tank's wrench as a host does, with the tank's masses added to the host's.
+/// Adds the tank's wrench to the host, as a host does, with the tank's masses added to the host's.
 #[test]
 fn derivatives_of_sloshtank_are_transposed_and_those_of_differences() {
     let fmu = open("SloshTank");

@@ -36,7 +36,7 @@ struct Host<'fmu> {
     instance: Instance<'fmu>,
     time: f64,
     x: [f64; STATES],
-    /// State events, time events and step events that have been handled.
+    /// Numbers of state events, time events and step events that have been handled.
     events: [usize; 3],
     next: EventInfo,
 }
@@ -83,7 +83,7 @@ impl<'fmu> Host<'fmu> {
         indicators
     }
 
-    /// The states after a step of `h`.
+    /// Returns the states after a step of `h`.
     fn step(&mut self, h: f64) -> [f64; STATES] {
         let (t, x) = (self.time, self.x);
         let moved = |rate: &[f64; STATES], h: f64| std::array::from_fn(|i| x[i] + h * rate[i]);
@@ -94,7 +94,6 @@ impl<'fmu> Host<'fmu> {
         std::array::from_fn(|i| x[i] + h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]))
     }
 
-    /// Integrates to `end` in steps of at most `h`.
     fn run(&mut self, end: f64, h: f64) {
         while self.time < end - 1e-12 {
             let due = match self.next.next_event_time_defined {
@@ -143,7 +142,7 @@ impl<'fmu> Host<'fmu> {
     }
 }
 
-/// Every real output and some locals.
+/// Reads every real output and some local variables.
 fn values(instance: &mut Instance) -> BTreeMap<String, f64> {
     let variables = &instance.fmu().description().variables;
     let outputs =
@@ -153,8 +152,8 @@ fn values(instance: &mut Instance) -> BTreeMap<String, f64> {
     names.into_iter().map(|name| (name.to_string(), instance.real(name).unwrap())).collect()
 }
 
-/// Runs both to `end` and returns the host, for its counts, after comparing everything
-/// once a second.
+/// Runs the host and Co-Simulation to `end`, compares everything once a second, and returns the host's
+/// numbers of events.
 fn compare(
     settings: &[(&str, &str)],
     changes: Changes,
@@ -197,8 +196,8 @@ fn compare(
     (host.events, count as i32)
 }
 
-/// At 15 rad/s order 4 with 0.5 ms is late by omega (omega h)^4/120 = 4e-10 rad a second,
-/// 1e-8 after 20 s; forces are some newtons, slosh rates some rad/s.
+/// At 15 rad/s, order 4 with 0.5 ms is late by omega (omega h)^4/120 = 4e-10 rad per second, 1e-8 after 20 s.
+/// Forces are some newtons, slosh rates some rad/s.
 #[test]
 fn a_host_that_integrates_meets_co_simulation_with_stick_and_slip() {
     for model in ["frozen", "linear", "planar", "spherical", "liquid"] {
@@ -216,7 +215,7 @@ fn a_host_that_integrates_meets_co_simulation_with_stick_and_slip() {
     }
 }
 
-/// Two modes; friction laws without stick.
+/// Tests two modes with the friction laws that do not stick.
 #[test]
 fn a_host_that_integrates_meets_co_simulation_with_every_friction() {
     for friction in ["none", "viscous", "stribeck_smooth"] {
@@ -233,8 +232,8 @@ fn a_host_that_integrates_meets_co_simulation_with_every_friction() {
     }
 }
 
-/// The wheel saturates in torque and speed; the gyro's samples are time events. The
-/// noise is the same to the bit, the rate below it to 1e-7.
+/// The wheel saturates in torque and speed; the gyro's samples are time events. The noise is bit-identical,
+/// the rate agrees to 1e-7.
 #[test]
 fn wheel_and_gyro_are_events_of_model_exchange() {
     let settings = [
@@ -254,7 +253,7 @@ fn wheel_and_gyro_are_events_of_model_exchange() {
     assert_eq!(events[1], 15 * 7);
 }
 
-/// Large waves leave the linear regime: a step event, seen at the end of a step.
+/// Large waves leave the linear regime; this is a step event, which is noticed at the end of a step.
 #[test]
 fn regime_changes_at_events_alone() {
     let fmu = open();
@@ -287,7 +286,7 @@ fn regime_changes_at_events_alone() {
     assert_eq!(host.instance.get("regime").unwrap(), before);
 }
 
-/// A host without root finding, Euler at 50 us: first order, and no better.
+/// A host without root finding that uses Euler's method at 50 us agrees to first order.
 #[test]
 fn euler_meets_co_simulation_to_first_order() {
     let fmu = open();
@@ -396,10 +395,10 @@ fn misread(booleans: &[i32]) -> Vec<i32> {
     bytes.chunks_exact(4).map(|four| i32::from_le_bytes(four.try_into().unwrap())).collect()
 }
 
-/// OpenModelica 1.21 to 1.27 ends the initialization first and then sets all parameters but
-/// enumerations; it sets states, and enters event mode, in the event mode that it is in already
-/// (issue 12893 of its tracker; the template importFMU2ModelExchange of its CodegenFMU.tpl).
-/// Booleans arrive as noise: their integers, as those of enumerations, decide.
+/// OpenModelica 1.21 to 1.27 ends the initialization first and then sets all parameters except enumerations.
+/// It sets states, and enters event mode, in the event mode in which it already is (issue 12893 of its
+/// tracker; the template importFMU2ModelExchange of its CodegenFMU.tpl). Booleans arrive as noise, so their
+/// integer twins decide, as for enumerations.
 #[test]
 fn openmodelica_up_to_1_27_gets_the_motion_of_the_parameters_it_sets() {
     let settings = [
@@ -485,7 +484,7 @@ fn openmodelica_up_to_1_27_gets_the_motion_of_the_parameters_it_sets() {
     }
 }
 
-/// A host that leaves out the start value of an input sets 0, OpenModelica after the initialization.
+/// A host that leaves out the start value of an input sets 0; OpenModelica does so after the initialization.
 #[test]
 fn a_weightless_tank_that_nothing_restores_is_warned_of_when_the_motion_begins() {
     let fmu = open();
@@ -575,7 +574,7 @@ fn parameters_set_after_initialization_are_as_good_as_before_and_bad_ones_are_re
     }
 }
 
-/// Reading makes the plant; what is set after it makes it anew.
+/// Reading creates the plant; setting something after that creates it again.
 #[test]
 fn after_initialization_the_order_of_setting_and_reading_does_not_matter() {
     let fmu = open();
@@ -650,7 +649,8 @@ fn states_out_of_the_models_range_end_the_run() {
     host.instance.terminate().unwrap();
 }
 
-/// Saved in continuous-time mode, restored into a new instance: the same bits on.
+/// The state is saved in continuous-time mode and restored into a new instance, which continues with the same
+/// bits.
 #[test]
 fn a_saved_state_of_model_exchange_continues_bit_for_bit() {
     let fmu = open();

@@ -17,7 +17,8 @@ fn value_of<M: Model>(scalar: &Scalar<M>, x: f64) -> Value {
     }
 }
 
-/// Outputs at the start and after each of four steps, as bits, and the warnings; `None` if the FMU refuses the values.
+/// Returns the bits of the outputs at the start and after each of four steps, and the warnings; `None` if the
+/// FMU refuses the values.
 fn run<M: Model>(values: &[(&'static Scalar<M>, Value)]) -> Option<(Vec<u64>, Vec<String>)> {
     let mut instance = Instance::<M, Fmi2>::new(Interface::CoSimulation);
     for (scalar, value) in values {
@@ -54,7 +55,7 @@ fn run<M: Model>(values: &[(&'static Scalar<M>, Value)]) -> Option<(Vec<u64>, Ve
     Some((bits, warnings))
 }
 
-/// Other values of a parameter, of which the first that the FMU accepts is tried.
+/// Lists other values of a parameter, of which the first one that the FMU accepts is used.
 fn others<M: Model>(scalar: &Scalar<M>, value: Value) -> Vec<Value> {
     match (value, scalar.variable.kind) {
         (Value::Boolean(b), _) => vec![Value::Boolean(!b)],
@@ -71,7 +72,7 @@ fn others<M: Model>(scalar: &Scalar<M>, value: Value) -> Vec<Value> {
     }
 }
 
-/// Changes each parameter alone.
+/// Changes each parameter alone, and asserts that no warning calls a parameter without effect that changes an output.
 fn check<M: Model>(base: Values) {
     let scalar = |name: &str| {
         let n = M::table().find(name).unwrap_or_else(|| panic!("no variable {name}"));
@@ -134,7 +135,7 @@ fn no_warning_names_a_parameter_of_sloshtank_that_changes_an_output() {
     check::<SloshTank::Model>(&[]);
 }
 
-/// Some parameters that others replace, each with the reason.
+/// Tests some parameters that others override, each with the reason in its warning.
 #[test]
 fn a_warning_names_parameters_that_others_replace() {
     fn said<M: Model>(values: Values) -> Vec<String> {

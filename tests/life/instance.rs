@@ -51,14 +51,14 @@ fn real(instance: &mut Instance, name: &str) -> f64 {
     }
 }
 
-/// The time derivative of one variable.
+/// Returns the time derivative of one variable.
 fn output_derivative(instance: &mut Instance, reference: u32, order: i32) -> Result<f64, Fault> {
     let mut answer = [0.0];
     instance.output_derivatives(&[reference], &[order], &mut answer)?;
     Ok(answer[0])
 }
 
-/// Every value there is, as bits.
+/// Returns the bits of every variable.
 fn all(instance: &mut Instance) -> Vec<u64> {
     let each =
         (0..TABLE.scalars.len() as u32).map(|n| match get_by_reference(instance, n).unwrap() {
@@ -69,7 +69,7 @@ fn all(instance: &mut Instance) -> Vec<u64> {
     each.collect()
 }
 
-/// Ready to step from `start`.
+/// Returns an instance that is ready to step from `start`.
 fn stepping_from(start: f64, stop: Option<f64>, values: &[(&str, Value)]) -> Instance {
     let mut instance = fresh();
     set(&mut instance, values);
@@ -87,7 +87,8 @@ const fn number(n: i32) -> Value {
     Value::Integer(n)
 }
 
-/// Everything moves: all models of the liquid, wheel and gyro on.
+/// Returns an instance in which everything moves, with the given slosh model and friction law, wheel and gyro
+/// on.
 fn lively(slosh_model: i32, friction_model: i32) -> Instance {
     stepping(&[
         ("slosh.model", number(slosh_model)),
@@ -142,7 +143,7 @@ fn parameters_and_inputs_can_be_set_before_and_after_setup_and_in_initialization
     assert_eq!(real(&mut instance, "tank.h"), 0.08);
 }
 
-/// The frequency belongs to the specific force there is when initialization ends.
+/// The natural frequency belongs to the specific force at the end of the initialization.
 #[test]
 fn inputs_set_in_initialization_mode_count_from_the_start() {
     let mut instance = fresh();
@@ -268,8 +269,7 @@ fn steps_that_make_no_sense_are_refused_and_change_nothing() {
     instance.do_step(0.25, 0.75).unwrap();
 }
 
-/// Hosts say n h or add up h; both are off the true time by some ulps, and so is
-/// the stop time.
+/// Hosts compute n h or add up h. Both differ from the exact time by some ulps, and so does the stop time.
 #[test]
 fn communication_points_may_wobble_by_rounding() {
     let h = 0.1;
@@ -286,8 +286,8 @@ fn communication_points_may_wobble_by_rounding() {
     }
 }
 
-/// With a slope, one long step sees the same input as many short ones. Both are
-/// within the tolerance 1e-8 (relative) of the truth.
+/// With a slope, one long step sees the same input as many short ones. Both results have an error below the
+/// tolerance 1e-8 (relative).
 #[test]
 fn input_with_a_slope_does_not_depend_on_the_choice_of_communication_step() {
     let run = |cuts: u32| {
@@ -344,7 +344,7 @@ fn reset_is_a_fresh_instance() {
     assert_eq!(to_bytes(&failed), expected);
 }
 
-/// A torque for so long that no number can hold the angle.
+/// Returns an instance after a step that failed: the torque acts so long that the angle exceeds all numbers.
 fn diverged() -> Instance {
     let mut instance = stepping(&[("slosh.model", number(1)), ("tau_cmd", Value::Real(1e12))]);
     instance.do_step(0.0, 1e200).unwrap_err();
@@ -372,8 +372,8 @@ fn after_a_panic_every_call_is_fatal() {
     assert_eq!(instance.restore(&fresh()).unwrap_err().severity, Severity::Fatal);
 }
 
-/// Bit for bit, for every model, in memory and through bytes, into the same
-/// instance and into one that was only just made.
+/// Tests every model bit for bit, in memory and through bytes, in the same instance and in one that was only
+/// created.
 #[test]
 fn restored_state_continues_as_if_nothing_had_happened() {
     for slosh_model in items("slosh.model") {
@@ -402,8 +402,7 @@ fn restored_state_continues_as_if_nothing_had_happened() {
     }
 }
 
-/// One random step, of any length, with or without a slope, sometimes with other
-/// friction.
+/// Makes one random step of any length, with or without a slope, sometimes with other friction.
 fn random_step(rng: &mut fastrand::Rng, instance: &mut Instance) {
     let mut between = |low: f64, high: f64| low + (high - low) * rng.f64();
     let inputs = ["tau_cmd", "tau_ext", "g_axial"].map(reference);
@@ -424,7 +423,7 @@ fn random_step(rng: &mut fastrand::Rng, instance: &mut Instance) {
     instance.do_step(instance.time(), h).unwrap();
 }
 
-/// Calls of a host with an adaptive or iterating master.
+/// Makes the calls of a host with an adaptive or iterating master algorithm.
 #[test]
 fn rollback_is_exact_in_a_thousand_random_sequences() {
     let mut rng = fastrand::Rng::with_seed(11);
@@ -468,7 +467,7 @@ fn rollback_is_exact_in_a_thousand_random_sequences() {
     }
 }
 
-/// Whatever is called with whatever arguments: an answer or a refusal, and no panic.
+/// Calls with any arguments return a result or are refused, but never panic.
 #[test]
 fn random_calls_never_panic() {
     let mut rng = fastrand::Rng::with_seed(13);
@@ -561,8 +560,9 @@ fn bytes_that_are_no_state_are_refused() {
     assert!(from_bytes(b"HubSlosh").is_err());
 }
 
-/// A sample falls due at the end of each of these steps. From 52 s on it once came a step late: the sum of the steps had drifted
-/// from the host's clock by 1e-11 s. The rate moves by 1e-3 rad/s a step; 1e-6 of it is what the allowed part of a period makes.
+/// A sample is due at the end of each of these steps. In an earlier version it came a step late from 52 s on,
+/// because the sum of the steps had drifted from the host's clock by 1e-11 s. The rate changes by 1e-3 rad/s
+/// per step; the allowed part of a period causes 1e-6 of that.
 #[test]
 fn gyro_samples_are_on_time_after_many_steps_whether_the_host_adds_or_multiplies() {
     let h = 0.01;
@@ -590,7 +590,7 @@ fn gyro_samples_are_on_time_after_many_steps_whether_the_host_adds_or_multiplies
     }
 }
 
-/// Saved bytes with another number in the place of one that occurs once, and their checksum made anew.
+/// Replaces a number that occurs once in saved bytes, and adapts the checksum.
 fn with_number(mut bytes: Vec<u8>, old: f64, new: f64) -> Vec<u8> {
     let place = bytes.windows(8).position(|bytes| bytes == old.to_le_bytes()).unwrap();
     bytes[place..place + 8].copy_from_slice(&new.to_le_bytes());
@@ -609,7 +609,8 @@ fn an_input_out_of_range_in_saved_bytes_is_refused() {
     assert!(why.contains("g_axial = -9.123456"), "{why}");
 }
 
-/// A ring wider than the tank's radius is in the range of its variable alone.
+/// A ring wider than the tank's radius is within the range of its variable, but is refused in combination
+/// with the tank.
 #[test]
 fn parameters_in_saved_bytes_that_do_not_go_together_are_refused() {
     let width = 0.0123456;
@@ -622,8 +623,8 @@ fn parameters_in_saved_bytes_that_do_not_go_together_are_refused() {
     assert!(from_bytes(&with_number(bytes, width, 1.9)).is_err());
 }
 
-/// One step of 1 us shows the derivative to (1 us)^2 of the third derivative, at most
-/// 1e3/s^3 of a signal's size here, and to the rounding of 1e-16 / 1e-6.
+/// A step of 1 us shows the derivative up to (1 us)^2 of the third derivative, which is at most 1e3/s^3 of a
+/// signal's size here, and up to the rounding 1e-16 / 1e-6.
 #[test]
 fn output_derivatives_are_how_the_outputs_move_on() {
     for slosh_model in items("slosh.model") {
@@ -676,8 +677,8 @@ fn directional_derivatives_of_outputs_and_state_derivatives_match_finite_differe
     }
 }
 
-/// At a random point in a random direction of inputs and states, through a Model
-/// Exchange instance, which lets its states be set.
+/// Checks directional derivatives at a random point in a random direction of inputs and states, in Model
+/// Exchange, where states can be set.
 fn check_directional_derivatives(rng: &mut fastrand::Rng, slosh_model: i32, friction_model: i32) {
     let mut instance = HubSlosh::instance(Interface::ModelExchange);
     let mut between = |low: f64, high: f64| low + (high - low) * rng.f64();
@@ -775,8 +776,8 @@ fn check_directional_derivatives(rng: &mut fastrand::Rng, slosh_model: i32, fric
     }
 }
 
-/// sqrt(g/l)/2 pi by g; theta by its start; the hub's acceleration by the torque, which is
-/// one over the inertia of hub and liquid when nothing else moves.
+/// The tested derivatives are known: sqrt(g/l)/2 pi by g, theta by its start value, and the hub's
+/// acceleration by the torque, which is the inverse of the inertia of hub and liquid if nothing else moves.
 #[test]
 fn directional_derivatives_in_initialization_mode_are_by_inputs_and_parameters() {
     let mut instance = fresh();
@@ -873,7 +874,7 @@ fn a_state_of_the_other_interface_is_refused() {
     assert_eq!(exchange.interface(), Interface::ModelExchange);
 }
 
-/// The model description promises these dependencies; an importer breaks algebraic loops by them.
+/// The model description declares these dependencies, and an importer breaks algebraic loops by them.
 #[test]
 fn no_variable_follows_an_input_at_once_that_it_does_not_list() {
     for slosh_model in items("slosh.model") {
@@ -906,7 +907,7 @@ fn no_variable_follows_an_input_at_once_that_it_does_not_list() {
     }
 }
 
-/// The same for the values at the start and the parameters.
+/// The same must hold for the values at the start and the parameters.
 #[test]
 fn no_variable_starts_from_a_parameter_that_it_does_not_list() {
     let base: &[(&str, Value)] = &[
@@ -993,8 +994,8 @@ fn no_variable_starts_from_a_parameter_that_it_does_not_list() {
     }
 }
 
-/// The same for the continuous states: a host's solver may leave the entries of the
-/// Jacobian that are not listed at 0.
+/// The same must hold for continuous states: a host's solver may leave entries of the Jacobian that are not
+/// listed at 0.
 #[test]
 fn no_variable_follows_a_continuous_state_that_it_does_not_list() {
     for slosh_model in items("slosh.model") {
@@ -1046,7 +1047,7 @@ fn no_variable_follows_a_continuous_state_that_it_does_not_list() {
     }
 }
 
-/// OpenModelica's import, ecos and libcosim set no enumerations, OMSimulator none called model.
+/// OpenModelica's import, ecos and libcosim set no enumerations; OMSimulator sets none called model.
 #[test]
 fn kinds_choose_what_the_enumerations_choose() {
     for (kind, model) in [("slosh.kind", "slosh.model"), ("friction.kind", "friction.model")] {

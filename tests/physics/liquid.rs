@@ -7,8 +7,8 @@ use plant::SloshModel;
 
 use super::free_oscillation::shifts;
 
-/// Ten times the plant's eight excited modes of each azimuthal number change s and kappa by less than
-/// 1e-4 of themselves; next to a secondary resonance both grow without bound, and with them that.
+/// Ten times the plant's eight excited modes of each azimuthal number change s and kappa by less than 1e-4 of
+/// themselves. Next to a secondary resonance both grow without bound, and so does this difference.
 #[test]
 fn coefficients_of_the_model_are_those_of_potential_flow() {
     let all = Overlaps::new(60);

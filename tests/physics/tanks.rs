@@ -3,7 +3,8 @@
 use hubslosh_tank::Tank;
 use plant::{FrictionModel, Inputs, Outputs, Parameters, Plant, Ramp, SloshModel, SloshSource};
 
-/// A tank's modes as the plant's table, damping ratios those of the plant's correlation.
+/// Returns parameters with a tank's modes as the plant's table, and with the damping ratios of the plant's
+/// correlation.
 fn with_table(p: &Parameters, tank: &str, modes: usize) -> Parameters {
     let tank = Tank::parse(tank, std::path::Path::new("")).unwrap();
     let data = tank.solve(p.tank.h, modes).unwrap();
@@ -37,9 +38,9 @@ fn run(p: &Parameters) -> Vec<Outputs> {
         .collect()
 }
 
-/// The cylinder of the bench by its dimensions, by the closed form of `hubslosh tank`, and by its contour through the boundary
-/// integral equation: masses and lengths agree to 1e-11, and the motion over 10 s to the integrator's tolerance times what rotary
-/// motion makes of a small change.
+/// The bench's cylinder is described by its dimensions, by the closed form of `hubslosh tank`, and by its
+/// contour through the boundary integral equation. Masses and lengths agree to 1e-11, and the motion over 10
+/// s to the integrator's tolerance times the growth of a small change in rotary motion.
 #[test]
 fn table_of_the_old_cylinder_gives_the_old_motion() {
     for model in [SloshModel::Linear, SloshModel::Planar, SloshModel::Spherical] {
@@ -63,8 +64,8 @@ fn table_of_the_old_cylinder_gives_the_old_motion() {
     }
 }
 
-/// A box is dragged along about its vertical axis (`tank.I_own`): with the rigid liquid it is that much
-/// harder to turn, and a square of 0.1 m has 0.1565 of its rigid inertia.
+/// A box carries its liquid along in a rotation about its vertical axis (`tank.I_own`), which makes it harder
+/// to turn. For a square of 0.1 m the effective inertia is 0.1565 of the rigid one.
 #[test]
 fn a_box_drags_liquid_about_its_axis() {
     let tank = Tank::parse("density = 1000\nbox = [0.1, 0.1]", std::path::Path::new("")).unwrap();

@@ -14,10 +14,10 @@ use super::records::{
 
 const TOLERANCE: f64 = 1e-10;
 
-/// Communication steps of a random run, 2 s; its inputs jump every half second.
+/// Number of communication steps of a random run of 2 s; its inputs jump every half second.
 const COUNT: usize = 100;
 
-/// Outputs of a tank without those that `component` does not read.
+/// Returns the outputs of a tank without those that `component` does not read.
 fn read(out: TankOutputs) -> TankOutputs {
     TankOutputs {
         axial: 0.0,
@@ -29,7 +29,8 @@ fn read(out: TankOutputs) -> TankOutputs {
     }
 }
 
-/// Compares outputs after every step, then derivatives and their directional derivative for a host that integrates itself.
+/// Compares the outputs after every step, then the derivatives and their directional derivative for a host
+/// that integrates itself.
 fn compare(what: &str, p: &Parameters, input: impl Fn(usize) -> Inputs, count: usize) {
     let start = input(0);
     let mut own = craft::Spacecraft::new(p, &start, 0.0, TOLERANCE).unwrap();
@@ -64,7 +65,8 @@ fn compare(what: &str, p: &Parameters, input: impl Fn(usize) -> Inputs, count: u
     assert_eq!(packed.directional_derivative(&u, &dx, &du), expected, "{what}");
 }
 
-/// Free and on a pivot, round and planar modes, surfaces other than spheres, every damping law, draining.
+/// Tests craft that are free or on a pivot, round and planar modes, surfaces other than spheres, every
+/// damping law, and draining.
 #[test]
 fn random_craft_have_the_bits_of_the_crate() {
     for seed in 0..40 {
@@ -103,7 +105,8 @@ fn random_craft_have_the_bits_of_the_crate() {
     }
 }
 
-/// The records' inputs bring the same craft to the same place, which the crate's `reference` compares with the records.
+/// The records' inputs bring both craft to the same place; the crate's test `reference` compares that with
+/// the records.
 #[test]
 fn spacecraft_has_the_bits_of_the_crate_in_every_reference_record() {
     for record in &records("craft") {
@@ -143,7 +146,8 @@ fn compare_tank(
     assert_eq!(packed.derivatives(&start), own.derivatives(&start), "{what}");
 }
 
-/// Every coupling, with and without a host, and the variety of [`random_craft_have_the_bits_of_the_crate`].
+/// Tests every coupling, with and without a host, with the variety of
+/// [`random_craft_have_the_bits_of_the_crate`].
 #[test]
 fn random_tanks_have_the_bits_of_the_crate() {
     for seed in 0..36 {
@@ -180,7 +184,7 @@ fn random_tanks_have_the_bits_of_the_crate() {
     }
 }
 
-/// As for the craft.
+/// Tests tanks in the same way as craft.
 #[test]
 fn slosh_tank_has_the_bits_of_the_crate_in_every_reference_record() {
     for record in &records("tank") {

@@ -16,7 +16,7 @@ use pack::models::model;
 use pack::packed_model_for_tests;
 use runtime::table::Table;
 
-/// A packed FMU, loaded. What it was unpacked to is deleted at once.
+/// Packs and loads an FMU; the unpacked files are deleted at once.
 pub fn load(name: &str) -> Fmu {
     let packed = packed_model_for_tests(model(name).unwrap());
     let directory = tempfile::tempdir().unwrap();
@@ -27,17 +27,16 @@ pub fn load(name: &str) -> Fmu {
 static SPACECRAFT: LazyLock<Fmu> = LazyLock::new(|| load("Spacecraft"));
 static SLOSH_TANK: LazyLock<Fmu> = LazyLock::new(|| load("SloshTank"));
 
-/// Names of the elements of an array.
 pub fn elements(name: &str, n: usize) -> impl Iterator<Item = String> {
     (1..=n).map(move |i| format!("{name}[{i}]"))
 }
 
-/// Names of the elements of an array of two dimensions, by rows.
+/// Lists the names of the elements of a two-dimensional array, row by row.
 fn rows(name: &str, (n, m): (usize, usize)) -> impl Iterator<Item = String> {
     (1..=n).flat_map(move |i| (1..=m).map(move |j| format!("{name}[{i},{j}]")))
 }
 
-/// Parameters by name; whole numbers are Integers.
+/// Parameters by name; integers are in a list of their own.
 #[derive(Clone, Default)]
 struct Settings {
     reals: Vec<(String, f64)>,
@@ -165,7 +164,7 @@ impl Settings {
     }
 }
 
-/// An instance, and the references of what is asked of it.
+/// An instance with the value references of the variables that the test reads and sets.
 struct Bound {
     instance: Instance<'static>,
     settings: Settings,
@@ -175,10 +174,10 @@ struct Bound {
     kind: i32,
     inputs: Vec<u32>,
     outputs: Vec<u32>,
-    /// States and their derivatives in the order of the crate `craft`.
+    /// Value references of states and derivatives in the order of the crate `craft`.
     states: Vec<u32>,
     derivatives: Vec<u32>,
-    /// Position of each state of FMI's order.
+    /// Position of each state in FMI's order.
     places: Vec<usize>,
 }
 
@@ -230,7 +229,7 @@ impl Bound {
         instance.exit_initialization_mode()
     }
 
-    /// Sets the inputs and, in Co-Simulation, their slopes over the next step.
+    /// Sets the inputs and, in Co-Simulation, their slopes for the next step.
     fn set(&mut self, values: &[f64], slopes: &[f64]) -> Result<(), CallError> {
         self.instance.set_real(&self.inputs, values)?;
         if self.kind == CO_SIMULATION {
@@ -288,7 +287,7 @@ impl Bound {
     }
 }
 
-/// Takes numbers off a list, one after the other.
+/// Takes numbers from a list, one after the other.
 struct Numbers<'a>(std::slice::Iter<'a, f64>);
 
 impl Numbers<'_> {
@@ -333,7 +332,7 @@ fn read_tank(force: [f64; 3], torque: [f64; 3], next: &mut Numbers) -> TankOutpu
     }
 }
 
-/// Value and slope of three vectors, one after the other.
+/// Returns value and slope of three vectors, each as nine numbers.
 fn flat(ramps: [&Ramp; 3]) -> [[f64; 9]; 2] {
     [|ramp: &Ramp| ramp.value, |ramp: &Ramp| ramp.slope].map(|part| {
         let vectors = ramps.map(part);
@@ -341,7 +340,6 @@ fn flat(ramps: [&Ramp; 3]) -> [[f64; 9]; 2] {
     })
 }
 
-/// Spacecraft.fmu.
 pub struct Spacecraft(Bound);
 
 impl Spacecraft {
@@ -421,12 +419,11 @@ impl Spacecraft {
         self.outputs_after_step()
     }
 
-    /// Outputs and locals.
     pub fn all(&mut self) -> Vec<f64> {
         self.0.outputs()
     }
 
-    /// As a host finds the outputs that has just made a step.
+    /// Returns the outputs as a host reads them after a step.
     pub fn outputs_after_step(&mut self) -> Outputs {
         let numbers = self.0.outputs();
         let next = &mut Numbers(numbers.iter());
@@ -486,7 +483,6 @@ impl Spacecraft {
     }
 }
 
-/// SloshTank.fmu.
 pub struct SloshTank(Bound);
 
 impl SloshTank {
@@ -536,12 +532,11 @@ impl SloshTank {
         self.outputs_after_step()
     }
 
-    /// Outputs and locals.
     pub fn all(&mut self) -> Vec<f64> {
         self.0.outputs()
     }
 
-    /// As a host finds the outputs that has just made a step.
+    /// Returns the outputs as a host reads them after a step.
     pub fn outputs_after_step(&mut self) -> SloshTankOutputs {
         let numbers = self.0.outputs();
         let next = &mut Numbers(numbers.iter());
@@ -559,7 +554,7 @@ impl SloshTank {
         }
     }
 
-    /// Warnings of the instance.
+    /// Returns the warning that the instance has logged, if there is one.
     pub fn warning(&mut self) -> Option<String> {
         let mut messages = self.0.instance.take_messages();
         assert!(messages.len() < 2, "{messages:?}");
@@ -568,12 +563,12 @@ impl SloshTank {
         Some(message.text)
     }
 
-    /// All there is to the instance.
+    /// Saves the complete state of the instance.
     pub fn save(&mut self) -> (FmuState, f64) {
         (self.0.instance.get_state().unwrap(), self.0.time)
     }
 
-    /// Goes back to what was saved.
+    /// Restores a saved state.
     pub fn restore(&mut self, (state, time): (FmuState, f64)) {
         self.0.instance.set_state(&state).unwrap();
         self.0.instance.free_state(state).unwrap();

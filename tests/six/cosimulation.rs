@@ -25,20 +25,20 @@ use super::component::{SloshTank, Spacecraft};
 
 const THRUST: f64 = 2400.0;
 
-/// Data about the tank that the body receives.
+/// How the tank's force is passed to the body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Exchange {
     Total,
     Split,
-    /// The lumped matrix on the side of what is solved for.
+    /// The lumped matrix is added to the matrix of the equations that the body solves.
     Lumped,
-    /// The lumped mass in the body itself.
+    /// The lumped mass is part of the body itself.
     RigidBody,
-    /// The added mass at rest, and the wrench with its share taken out.
+    /// The added mass at rest is constant, and its share is taken out of the wrench.
     Constant,
 }
 
-/// Continuation of the exchanged values within a step, and the order of the two FMUs.
+/// How exchanged values continue within a step, and the order of the two FMUs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Order {
     GaussSeidelHeld,
@@ -50,10 +50,10 @@ enum Order {
 }
 use Order::*;
 
-/// The matrix and the right-hand side that the body is given.
+/// The matrix and the right-hand side that the body receives.
 type Given = (Matrix6<f64>, Vector6<f64>);
 
-/// A rigid body under thrust along z with a tank; its rate is all that matters to the tank.
+/// A rigid body under thrust along z with a tank. Only its rates and accelerations matter to the tank.
 struct Pair {
     mass_matrix: Matrix6<f64>,
     moment: Vector3<f64>,
@@ -64,7 +64,7 @@ struct Pair {
     w: Vector3<f64>,
     /// [a; w'] at the last two communication points.
     x: [Vector6<f64>; 2],
-    /// The tank's matrix and right-hand side there.
+    /// The tank's matrix and right-hand side at these points.
     given: [Given; 2],
     /// The added mass at the start.
     at_rest: Matrix6<f64>,
@@ -79,7 +79,7 @@ fn symmetric(triangle: &[f64]) -> Matrix6<f64> {
     m
 }
 
-/// The 1180 kg body of the tests, its mass properties times `share`, and its tank.
+/// Returns the body of the tests, with its mass properties (1180 kg) times `share`, and its tank.
 fn parameters(share: f64, tank: Tank) -> Parameters {
     let j = Inertia { xx: 860.0, yy: 860.0, zz: 640.0, xy: 0.0, xz: 0.0, yz: 0.0 };
     let scaled = Inertia { xx: share * j.xx, yy: share * j.yy, zz: share * j.zz, ..j };
@@ -89,7 +89,7 @@ fn parameters(share: f64, tank: Tank) -> Parameters {
     p
 }
 
-/// lambda of [`parameters`] at share 1.
+/// Returns the coupling ratio lambda of [`parameters`] at share 1.
 fn ratio(tank: Tank) -> f64 {
     let host = Some(parameters(1.0, tank).craft);
     let p = TankParameters { tank, host, ..TankParameters::default() };
@@ -138,7 +138,7 @@ impl Pair {
         pair
     }
 
-    /// The tank's input over a step at whose ends [a; w'] has the given values.
+    /// Returns the tank's input over a step at whose ends [a; w'] has the given values.
     fn input(&self, [from, to]: [Vector6<f64>; 2], h: f64) -> TankInputs {
         let ramp = |at: usize| Ramp {
             value: [from[at], from[at + 1], from[at + 2]],
@@ -147,7 +147,7 @@ impl Pair {
         TankInputs { a: ramp(0), omega: self.w.into(), omega_dot: ramp(3), ..TankInputs::default() }
     }
 
-    /// System that the body solves: (M_body + matrix) x = rest + right-hand side.
+    /// Returns the terms of the equation that the body solves: (M_body + matrix) x = rest + right-hand side.
     fn look(&mut self, u: &TankInputs) -> Given {
         let SloshTankOutputs { tank, bias, added_mass, .. } = self.tank.outputs(u);
         let wrench = Vector6::from_column_slice(&[tank.force, tank.torque].concat());
@@ -185,8 +185,8 @@ impl Pair {
         (self.mass_matrix + matrix).lu().solve(&rest).unwrap()
     }
 
-    /// The body's step, Runge-Kutta on its rate, while matrix and right-hand side run to `end`:
-    /// [a; w'] at both ends, and the rate.
+    /// Makes the body's step by Runge-Kutta on its rate, while matrix and right-hand side change linearly to
+    /// `end`. Returns [a; w'] at both ends, and the rate.
     fn move_body(&self, end: &Given, h: f64) -> ([Vector6<f64>; 2], Vector3<f64>) {
         let now = &self.given[1];
         let rate = |share: f64, w: Vector3<f64>| {
@@ -204,7 +204,7 @@ impl Pair {
         ([from, to], w)
     }
 
-    /// The tank's step, from the rate that the body has had; what it gives at the end.
+    /// Makes the tank's step with the rate that the body has had, and returns the tank's terms at the end.
     fn move_tank(&mut self, ends: [Vector6<f64>; 2], h: f64) -> Given {
         self.tank.step(&self.input(ends, h), h).unwrap();
         self.look(&self.input([ends[1], ends[1]], h))
@@ -237,14 +237,14 @@ impl Pair {
         self.x = [self.x[1], if is_held { from } else { to }];
     }
 
-    /// p_x, p_x' of the bob.
+    /// Returns p_x, p_x' of the bob.
     fn slosh(&mut self) -> [f64; 2] {
         let x = self.tank.continuous_states();
         [x[0], x[3]]
     }
 }
 
-/// Returns true if a disturbance of 1e-6 of the wrench grows some ten thousand times within 1500 steps.
+/// Returns true if a disturbance of 1e-6 of the wrench grows about ten thousand times within 1500 steps.
 fn total_wrench_diverges(lambda: f64, order: Order, h: f64) -> bool {
     let tank = Tank::default();
     let p = parameters(ratio(tank) / lambda, tank);
@@ -262,7 +262,7 @@ fn total_wrench_diverges(lambda: f64, order: Order, h: f64) -> bool {
     false
 }
 
-/// Within 3 % of the limits on either side, at both steps.
+/// Tests values within 3 % of the limits on either side, at both steps.
 #[test]
 fn total_wrench_diverges_above_the_limits_of_lambda_whatever_the_step() {
     let limits = [
@@ -294,7 +294,7 @@ fn a_host_that_would_diverge_is_warned() {
     assert_eq!(warning(6.0, Coupling::RigidBody), None);
 }
 
-/// The rate at which the slosh amplitude grows between 10 s and 60 s.
+/// Returns the rate at which the slosh amplitude grows between 10 s and 60 s.
 fn growth(share: f64, order: Order, h: f64) -> (f64, f64) {
     let mut tank = Tank { zeta: [0.0; 3], ..Tank::default() };
     tank.p_0[0] = [0.01, 0.0, -1.0];
@@ -340,7 +340,7 @@ fn growth(share: f64, order: Order, h: f64) -> (f64, f64) {
     (f64::ln(means[1] / means[0]) / 50.0, formula)
 }
 
-/// 300 kg: lambda = 1.3.
+/// Share for a body of 300 kg: lambda = 1.3.
 const LIGHT: f64 = 300.0 / 1180.0;
 
 #[test]
@@ -360,7 +360,7 @@ fn the_split_makes_the_slosh_mode_grow_as_its_delay_says() {
     }
 }
 
-/// 400 kg, 0.2 m deep, in a box 1 m by 0.6 m, by potential flow.
+/// Returns a tank with 400 kg, 0.2 m deep, in a box of 1 m by 0.6 m, from potential flow.
 fn a_box() -> Tank {
     let mut tank = Tank {
         zeta: [0.05; 3],
@@ -383,14 +383,14 @@ fn a_box() -> Tank {
     tank
 }
 
-/// [`error_of`] the default tank.
+/// Returns [`error_of`] for the default tank.
 fn error(share: f64, exchange: Exchange, order: Order, h: f64) -> f64 {
     let mut tank = Tank { zeta: [0.05; 3], damping_law: DampingLaw::Constant, ..Tank::default() };
     tank.p_0[0] = [0.1, 0.05, -1.0];
     error_of(share, tank, exchange, order, h)
 }
 
-/// Largest difference of the rate to that of the craft as a whole over 20 s, relative.
+/// Returns the largest relative difference of the rate from that of the craft as a whole over 20 s.
 fn error_of(share: f64, tank: Tank, exchange: Exchange, order: Order, h: f64) -> f64 {
     let p = parameters(share, tank);
     let mut pair = Pair::new(&p, exchange, order);
@@ -408,9 +408,9 @@ fn error_of(share: f64, tank: Tank, exchange: Exchange, order: Order, h: f64) ->
     worst / largest
 }
 
-/// Held: first order; extrapolated linearly: second. The wrench as it is converges at the lower
-/// mass ratio only, and in first order. The constant matrix leaves a delayed share of the wrench,
-/// m sin(angle) [a; w'], which is of first order once the second has become small.
+/// Held values give first order, linearly extrapolated ones second. The total wrench converges only at the
+/// lower mass ratio, and in first order. The constant matrix leaves a delayed share of the wrench, m
+/// sin(angle) [a; w'], which is of first order once the second order has become small.
 #[test]
 fn coupling_converges_with_its_order() {
     use Exchange::*;
@@ -439,8 +439,9 @@ fn coupling_converges_with_its_order() {
     }
 }
 
-/// A box under way in both of its planes, m_0 below 0. With lumped coupling its modes count twice, so a larger part is a step
-/// late. Held values then take away more damping: at lambda 8 and 20 ms the pair diverges. Extrapolated ones do not.
+/// A box moves in both of its planes, with m_0 below 0. With lumped coupling its modes count twice, so a
+/// larger part is a step late. Held values then remove more damping: at lambda 8 and 20 ms the pair diverges.
+/// Extrapolated values do not diverge.
 #[test]
 fn lumped_coupling_of_planar_modes_converges_to_the_craft() {
     let lambda = ratio(a_box());
@@ -462,8 +463,8 @@ fn lumped_coupling_of_planar_modes_converges_to_the_craft() {
     }
 }
 
-/// The lumped matrix on the body's side, in what it solves with or in the body itself, bias^ from
-/// outside. Stable at any mass ratio, and of first order at least.
+/// The lumped matrix is on the body's side, in the equations that it solves or in the body itself, and bias^
+/// comes from outside. This is stable at any mass ratio, and at least of first order.
 #[test]
 fn lumped_coupling_is_stable_and_converges_up_to_lambda_6() {
     let lambda = ratio(Tank::default());

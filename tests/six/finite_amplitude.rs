@@ -12,10 +12,11 @@ use craft::{Craft, Inertia, Inputs, MODES, Parameters, Ramp, Tank, index};
 use super::component::{SloshTank, Spacecraft};
 use super::waves::{Moved, TOLERANCE, bench, circular, linear_frequency, planar, sideways};
 
-/// Mass (kg) and moments of inertia (kg.m2) of the craft. Its weight is near the largest force that the FMU takes.
+/// Mass (kg) and moments of inertia (kg.m2) of the craft. Its weight is near the largest force that the FMU
+/// accepts.
 const HEAVY: f64 = 1e11;
 
-/// A tank at the centre of mass of a craft in free flight that a force at the same place accelerates.
+/// A tank at the centre of mass of a craft in free flight, which a force at the same place accelerates.
 struct Carried {
     craft: Spacecraft,
     mass: f64,
@@ -34,7 +35,7 @@ impl Carried {
     }
 }
 
-/// Force for the acceleration of a mass along x.
+/// Returns the force for the acceleration of a mass along x.
 fn push(mass: f64, a: [f64; 2]) -> Inputs {
     let a = sideways(a);
     let force = Ramp { value: a.value.map(|a| mass * a), slope: a.slope.map(|a| mass * a) };
@@ -63,12 +64,12 @@ impl Moved for Carried {
     }
 }
 
-/// Largest difference of two bobs in the direction and, over `w`, in its rate.
+/// Returns the largest difference of two bobs in the direction and, over `w`, in its rate.
 fn apart(a: [f64; 6], b: [f64; 6], w: f64) -> f64 {
     (0..6).map(|i| (a[i] - b[i]).abs() / if i < 3 { 1.0 } else { w }).fold(0.0, f64::max)
 }
 
-/// First mode's angle in degrees, and frequency over that of small waves.
+/// The numbers are the first mode's angle in degrees, and its frequency over that of small waves.
 #[test]
 fn periodic_waves_have_the_frequencies_of_potential_flow_in_both_fmus() {
     type Frequency = fn(Tank, f64) -> f64;
@@ -107,9 +108,9 @@ fn waves_on_circles_close_after_the_period_of_their_frequency_in_both_fmus() {
     assert!(off.iter().all(|off| *off < 1e-9), "{off:?}");
 }
 
-/// Largest angles along and across in degrees and force along x in N over the last tenth of 150 periods of a tank that moves
-/// sideways by -stroke cos(w t), from rest, with 0.01 rad across. The last value is the largest difference of both FMUs
-/// over all periods, with a craft of mass `heavy`.
+/// Returns the largest angles along and across in degrees and the force along x in N over the last tenth of
+/// 150 periods of a tank that moves sideways by -stroke cos(w t), from rest, with 0.01 rad across. The last
+/// value is the largest difference of both FMUs over all periods, with a craft of mass `heavy`.
 fn forced(ratio: f64, stroke: f64, heavy: f64) -> ([f64; 3], f64) {
     let mut tank = Tank { p_0: [[0.0, 0.01, -1.0]; MODES], ..bench(1.227) };
     tank.zeta[0] = 0.005;
@@ -134,8 +135,8 @@ fn forced(ratio: f64, stroke: f64, heavy: f64) -> ([f64; 3], f64) {
     (largest, off)
 }
 
-/// Series of potential flow that a pendulum misses by up to a factor of two. In the last one what was across at the start
-/// decays. The force has the error of the angle and, of 2 %, that of one mode alone.
+/// A pendulum misses these series of potential flow by up to a factor of two. In the last one the motion
+/// across decays. The force has the error of the angle and an error of 2 % because there is only one mode.
 #[test]
 fn forced_waves_near_resonance_are_those_of_potential_flow_in_both_fmus() {
     for (ratio, stroke, along, across, force) in [
@@ -153,7 +154,7 @@ fn forced_waves_near_resonance_are_those_of_potential_flow_in_both_fmus() {
     }
 }
 
-/// The difference of both FMUs is the recoil: it falls as 1/M.
+/// The difference of both FMUs is the recoil, which falls as 1/M.
 #[test]
 fn a_lighter_craft_recoils_more_by_the_ratio_of_the_masses() {
     let (tank, heavy) = (bench(1.227), 1e6);

@@ -5,22 +5,22 @@ use host::fmi2::{Fmu, Instance};
 
 use super::component::{SloshTank, Spacecraft, load};
 
-/// Knots between which the torque is linear, s.
+/// Time between the knots, between which the torque is linear, s.
 const KNOT: f64 = 0.01;
 const G: f64 = 9.81;
 
-/// Torque on the hub from knot k to the next, N m, and its slope: it swings the liquid to some 30
-/// degrees.
+/// Returns the torque on the hub from knot k to the next, N m, and its slope; it excites the liquid to about
+/// 30 degrees.
 fn torque(k: usize) -> (f64, f64) {
     let at = |k: usize| 1.5 * f64::sin(13.0 * k as f64 * KNOT);
     (at(k), (at(k + 1) - at(k)) / KNOT)
 }
 
-/// Slosh angles and rates at the start: tangential, radial.
+/// Slosh angles and rates at the start, tangential and radial.
 const ANGLES: [f64; 2] = [-0.1, 0.2];
 const RATES: [f64; 2] = [0.5, 0.3];
 
-/// The thesis's bench without friction, at the start of its motion.
+/// Returns the thesis's bench without friction at the start of its motion.
 fn bench(fmu: &Fmu) -> Instance<'_> {
     let mut bench = fmu.instantiate("bench").unwrap();
     for (name, value) in [
@@ -51,7 +51,7 @@ fn step(bench: &mut Instance, k: usize) {
     bench.do_step(k as f64 * KNOT, KNOT).unwrap();
 }
 
-/// Its tank: upright, on the x axis. Heights and I_0 have no effect on one axis.
+/// Returns the bench's tank: upright, on the x axis. Heights and I_0 have no effect on one axis.
 fn tank(bench: &mut Instance) -> Tank {
     let mut get = |name: &str| bench.real(name).unwrap();
     let mut tank = Tank {
@@ -82,8 +82,8 @@ fn assert_close(got: f64, want: f64, allowed: f64, what: &str) {
     assert!((got - want).abs() < allowed, "{what}: {got} {want}");
 }
 
-/// Held to one axis by a mass of 1e11 kg and such moments of inertia; what is left of the craft's
-/// motion goes as 1/M.
+/// A mass of 1e11 kg and corresponding moments of inertia hold the craft to one axis; the rest of its motion
+/// falls as 1/M.
 #[test]
 fn spacecraft_held_to_one_axis_is_hubslosh() {
     let fmu = load("HubSlosh");
@@ -125,9 +125,8 @@ fn spacecraft_held_to_one_axis_is_hubslosh() {
     }
 }
 
-/// I_hub w' = tau + bias_6 - M_a,6. [0, 0, g, 0, 0, w'] in every stage of the host's integrator.
-/// Runge-Kutta's error at 0.25 ms, (15 h)^4/120 of the motion a radian, is 1e-11 after five
-/// seconds.
+/// The host solves I_hub w' = tau + bias_6 - M_a,6 [0, 0, g, 0, 0, w'] in every stage of its integrator. The
+/// error of Runge-Kutta at 0.25 ms, (15 h)^4/120 of the motion per radian, is 1e-11 after five seconds.
 #[test]
 fn slosh_tank_on_a_hub_is_hubslosh() {
     const STEPS: usize = 40;

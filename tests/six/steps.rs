@@ -13,8 +13,8 @@ use super::component::{SloshTank, Spacecraft, load};
 use super::random::{Random, draining_tank};
 use super::records::{STEP, at_end, motion_at_end};
 
-/// Right after a step outputs are limits from the left: they include the torque of wheels that have accelerated, and the rate of
-/// a host that has turned.
+/// Directly after a step the outputs are limits from the left: they include the torque of wheels that have
+/// accelerated, and the rate of a host that has turned.
 #[test]
 fn outputs_after_a_step_are_those_at_its_end() {
     for seed in 0..10 {
@@ -42,8 +42,8 @@ fn outputs_after_a_step_are_those_at_its_end() {
     }
 }
 
-/// Steps of random craft and tanks with anything at all as input, one in twenty beyond all sense:
-/// finite numbers, or fmi2Error with a message. Returns how many were refused.
+/// Makes steps of random craft and tanks with any inputs, one in twenty of extreme magnitude. The results are
+/// finite numbers, or fmi2Error with a message. Returns the number of refused steps.
 fn random_steps(count: usize, seed: u64) -> usize {
     let mut random = Random::new(seed);
     let (mut steps, mut refused) = (0, 0);
@@ -113,14 +113,14 @@ fn random_steps_end_in_numbers_or_a_clear_error() {
     assert!((500..10_000).contains(&refused), "{refused}");
 }
 
-/// The same, longer: `.ci/run` calls it.
+/// The long form of the same test, which `.ci/run` calls.
 #[test]
 #[ignore = "a minute: .ci/run --nightly"]
 fn a_million_random_steps_end_in_numbers_or_a_clear_error() {
     random_steps(1_000_000, 8);
 }
 
-/// omega follows from omega_dot in a step and may not leave its range there.
+/// omega follows from omega_dot in a step and must not leave its range there.
 #[test]
 fn a_step_refused_for_where_an_input_would_end_leaves_the_tank_as_it_was() {
     let mut tank = Instance::<::SloshTank::Model, Fmi2>::new(Interface::CoSimulation);
@@ -135,7 +135,8 @@ fn a_step_refused_for_where_an_input_would_end_leaves_the_tank_as_it_was() {
     assert!(to_bytes(&tank) == before);
 }
 
-/// Outputs of an instance whose enumeration and its kind have been set, or the reason for its refusal.
+/// Returns an output of an instance whose enumeration and integer twin have been set, or the reason for its
+/// refusal.
 fn with_kind<M: runtime::Model>(
     settings: &[(&str, i32)],
     shown: &str,
@@ -178,7 +179,8 @@ fn a_kind_is_its_enumeration_for_hosts_that_set_none() {
     assert!(why.contains("coupling_kind = 3 contradicts coupling = 2"), "{why}");
 }
 
-/// A host that integrates itself moves the wheels and gives no torque: one warning, however many steps follow.
+/// A host that integrates itself moves the wheels and applies no torque: there is one warning, however many
+/// steps follow.
 #[test]
 fn wheels_that_move_without_a_torque_in_model_exchange_are_warned_of_once() {
     let fmu = load("Spacecraft");
@@ -228,7 +230,7 @@ fn liquid_that_leaves_its_bottom_moves_through_the_packed_fmu_as_in_the_crate() 
     assert_eq!(seen.last(), Some(&craft::BallState::Settled));
 }
 
-/// The same of a tank on somebody else's craft, and of the impulses that this gets.
+/// The same holds for a tank on another simulator's craft, and for the impulses that the craft receives.
 #[test]
 fn liquid_that_leaves_its_bottom_gives_its_host_the_impulses_of_the_crate() {
     let mut p = TankParameters { host: Some(Parameters::default().craft), ..Default::default() };
@@ -264,8 +266,8 @@ fn liquid_that_leaves_its_bottom_gives_its_host_the_impulses_of_the_crate() {
     assert!(impulses >= 4, "{impulses}");
 }
 
-/// `canInterpolateInputs` is of all Real inputs, so that hosts set the derivatives of all: omega's is taken, and what omega
-/// does within the step is omega_dot's doing.
+/// `canInterpolateInputs` refers to all Real inputs, so hosts set the derivatives of all. The derivative of
+/// omega is accepted without effect, because omega changes within the step by omega_dot.
 #[test]
 fn a_derivative_that_is_set_for_omega_is_taken_and_changes_no_bit() {
     let table = &::SloshTank::table::TABLE;

@@ -34,7 +34,7 @@ fn up_to_date<M: Model>() {
     }
 }
 
-/// The start of every component, as the XML has it, in the row of its array.
+/// The row of an array must have the start value of every component, as the XML has it.
 #[test]
 fn pages_of_variables_have_the_start_values_of_all_components() {
     let row = |page: &str, name: &str| {
@@ -55,7 +55,8 @@ fn pages_of_variables_have_the_start_values_of_all_components() {
     assert_eq!(row(&page, "a[1..3]"), "0");
 }
 
-/// Scalar parameters, and those of them that a craft with one tank of one mode has: without further tanks and modes.
+/// Returns the number of scalar parameters, and the number of those that a craft with one tank of one mode
+/// has.
 fn parameters<M: Model>() -> [usize; 2] {
     /// Arrays of a tank whose first index is the mode.
     const OF_MODES: [&str; 30] = [

@@ -13,7 +13,7 @@ fn number(element: &Element, attribute: &str) -> Option<f64> {
     element.get(attribute).map(|text| double(text).unwrap())
 }
 
-/// Indices in an attribute that is a list.
+/// Returns the indices in an attribute that is a list.
 fn indices(element: &Element, attribute: &str) -> Vec<usize> {
     let words = element.get(attribute).unwrap_or_default().split_whitespace();
     words.map(|word| word.parse().unwrap()).collect()
@@ -23,12 +23,11 @@ fn committed() -> String {
     std::fs::read_to_string(model_description::path::<HubSlosh::HubSlosh>()).unwrap()
 }
 
-/// The root of the committed file.
 fn root() -> Element {
     Element::parse(committed().as_bytes()).unwrap()
 }
 
-/// Each variable with the element of its type.
+/// Returns each variable with the element of its type.
 fn variables() -> Vec<(Element, Element)> {
     let root = root();
     let of_type = |variable: &Element| (variable.clone(), variable.children[0].clone());
@@ -128,8 +127,7 @@ fn names_and_value_references_are_unique() {
     }
 }
 
-/// Simulink turns dotted ports into buses and cuts parameters' names after 55
-/// characters.
+/// Simulink turns dotted ports into buses, and cuts names of parameters after 55 characters.
 #[test]
 fn ports_have_flat_names_and_parameters_short_ones() {
     for (variable, _) in variables() {
@@ -184,7 +182,7 @@ fn enumerations_are_declared() {
     }
 }
 
-/// The items stand at the numbers of the physics' own, by which they are set.
+/// The items must have the numbers of the physics crate's own enumerations, by which they are set.
 #[test]
 fn enumerations_name_the_physics_own_items_in_their_order() {
     fn compare<T: std::fmt::Debug>(variable: &str, all: &[T]) {
@@ -249,7 +247,7 @@ fn structure_lists_every_output_once_and_what_is_computed_at_the_start() {
     assert_eq!(listed("Derivatives"), rates);
 }
 
-/// Indices of the derivatives and of their states.
+/// Returns the indices of the derivatives and of their states.
 fn derivatives() -> Vec<(usize, usize)> {
     let all = variables();
     let with_index = all.iter().zip(1..);
@@ -280,8 +278,8 @@ fn states_are_continuous_each_has_one_derivative_and_only_states_are_reinitialis
     assert_eq!(indicators, plant::INDICATORS);
 }
 
-/// An importer takes missing dependencies for a dependency on everything, and
-/// sees algebraic loops where there are none.
+/// An importer takes missing dependencies for a dependency on everything, and sees algebraic loops where
+/// there are none.
 #[test]
 fn dependencies_are_always_given_and_point_to_what_the_host_sets() {
     let all = variables();
@@ -330,7 +328,7 @@ fn every_name_in_the_table_s_dependencies_means_something() {
     }
 }
 
-/// Programs and scripts of others use these; more may be added.
+/// Programs and scripts of other people use these names; more may be added.
 #[test]
 fn names_that_others_build_on_are_there() {
     let names = "tau_cmd tau_ext g_axial theta omega omega_dot slosh_angle slosh_rate \

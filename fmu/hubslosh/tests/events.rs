@@ -23,7 +23,7 @@ fn reference<V: Version>(name: &str) -> u32 {
     V::reference(scalar(name))
 }
 
-/// One value, through the function for its type.
+/// Reads one value by the function for its type.
 fn get<V: Version>(instance: &mut Instance<Model, V>, name: &str) -> Value {
     let is_two = V::PREFIX == "fmi2";
     let call = match scalar(name).variable.kind {
@@ -59,7 +59,7 @@ fn set<V: Version>(instance: &mut Instance<Model, V>, name: &str, value: Value) 
     instance.set(call, &[reference::<V>(name)], |_| value).unwrap();
 }
 
-/// A hub that reverses, sticks and breaks away many times; a wheel near its limits; a gyro.
+/// Start of a hub that reverses, sticks and breaks away many times, with a wheel near its limits and a gyro.
 const LIVELY: &[(&str, Value)] = &[
     ("slosh.model", Value::Integer(4)),
     ("slosh.modes", Value::Integer(2)),
@@ -83,7 +83,7 @@ fn initialised<V: Version>(events: Events, values: &[(&str, Value)]) -> Instance
     instance
 }
 
-/// Through event mode, as hosts go.
+/// Handles an event through event mode, as hosts do.
 fn handle(instance: &mut Three) {
     if instance.state() == InstanceState::Stepping {
         instance.enter_event_mode().unwrap();
@@ -93,12 +93,13 @@ fn handle(instance: &mut Three) {
     instance.enter_step_mode(&v3::ENTER_STEP).unwrap();
 }
 
-/// The torque of a communication step, N m.
+/// Returns the torque of a communication step, N m.
 fn torque(step: usize) -> f64 {
     0.06 * (0.7 * step as f64).sin()
 }
 
-/// Variables compared at communication points: the continuous ones, the gyro reading and the number of contact changes.
+/// Variables that are compared at communication points: the continuous ones, the gyro's reading and the
+/// number of contact changes.
 const LOOKED_AT: [&str; 12] = [
     "theta",
     "omega",
@@ -126,7 +127,7 @@ fn discrete<V: Version>(instance: &mut Instance<Model, V>) -> Vec<Value> {
     DISCRETE.iter().map(|name| get(instance, name)).collect()
 }
 
-/// FMI 2.0's trajectory.
+/// Computes the trajectory through FMI 2.0, with which those through FMI 3.0 are compared.
 fn trajectory() -> Vec<(Vec<u64>, Vec<Value>)> {
     let mut two: Two = initialised(Events::InStep, LIVELY);
     let mut all = Vec::new();
@@ -223,7 +224,7 @@ fn a_host_that_ignores_what_it_is_told_gets_the_same_motion() {
     }
 }
 
-/// Without gyro and wheel every early return is a change of contact: where FMI 2.0 says that it was.
+/// Without gyro and wheel every early return is a change of contact, at the time that FMI 2.0 reports for it.
 #[test]
 fn steps_stop_at_the_event_time_of_fmi_2_to_the_last_bit() {
     let values = &LIVELY[..5];
@@ -365,7 +366,8 @@ fn held_g<V: Version>(start: f64, at: impl Fn(usize, f64) -> f64) -> [f64; 2] {
     ["work_axial", "omega_imu"].map(|name| real(&mut instance, name))
 }
 
-/// The reference adds up its steps as the FMU does. Work was off by up to 1.5e-4 J, and at 1e9 s samples were a step late.
+/// The reference adds up its steps as the FMU does. In earlier versions the work was off by up to 1.5e-4 J,
+/// and at 1e9 s samples were a step late.
 #[test]
 fn work_of_g_and_the_gyro_are_the_same_on_every_clock_of_a_host() {
     fn compare<V: Version>() {
@@ -382,7 +384,7 @@ fn work_of_g_and_the_gyro_are_the_same_on_every_clock_of_a_host() {
     compare::<Fmi3>();
 }
 
-/// The energy of a line that is twisted by 1e308 rad is no number.
+/// The energy of a line that is twisted by 1e308 rad is not finite.
 #[test]
 fn a_start_too_large_for_the_equations_is_refused_with_the_parameter() {
     fn refused<V: Version>() {

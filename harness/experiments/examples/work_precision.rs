@@ -29,10 +29,10 @@ use ode_solvers::{Dop853, Dopri5, OutputType, SVector, System};
 
 const STEP: f64 = 0.02;
 const AMPLITUDE: f64 = 0.1;
-/// Steps of 20 ms in a piece that is timed.
+/// Number of steps of 20 ms in one piece whose time is measured.
 const PIECE: usize = 500;
 
-/// Knots of the exponential sweep, 1.25 to 3.5 Hz in 2700 s.
+/// Returns the torque at the knots of the exponential sweep from 1.25 to 3.5 Hz in 2700 s.
 fn torque(seconds: f64) -> Vec<f64> {
     let rate = (3.5f64 / 1.25).ln() / 2700.0;
     let cycles = |t: f64| 1.25 * ((rate * t).exp() - 1.0) / rate;
@@ -41,26 +41,26 @@ fn torque(seconds: f64) -> Vec<f64> {
     (0..=count).map(at).collect()
 }
 
-/// CPU time of this thread.
+/// Returns the CPU time of this thread.
 #[cfg(unix)]
 fn cpu_time() -> Duration {
     let now = nix::time::clock_gettime(nix::time::ClockId::CLOCK_THREAD_CPUTIME_ID);
     now.map_or(Duration::ZERO, Duration::from)
 }
 
-/// Time since the first call.
+/// Returns the time since the first call.
 #[cfg(not(unix))]
 fn cpu_time() -> Duration {
     static START: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
     START.get_or_init(std::time::Instant::now).elapsed()
 }
 
-/// CPU time since `start`, s.
+/// Returns the CPU time since `start`, s.
 fn since(start: Duration) -> f64 {
     (cpu_time() - start).as_secs_f64()
 }
 
-/// Rates at the knots, rad/s, and what each piece took, s.
+/// Rates at the knots, rad/s, and the time that each piece took, s.
 type Solution = (Vec<f64>, Vec<f64>);
 
 fn fmu(model: &str, outputs: usize, tolerance: f64, torque: &[f64]) -> Result<Solution> {
@@ -92,7 +92,8 @@ fn fmu(model: &str, outputs: usize, tolerance: f64, torque: &[f64]) -> Result<So
     Ok((rates, took))
 }
 
-/// Hub and one linear pendulum on the bench, 10 cm fill, smoothed friction.
+/// Hub and one linear pendulum on the bench with 10 cm of water and smoothed friction, as differential
+/// equations for other solvers.
 struct Smooth<'a> {
     torque: &'a [f64],
     /// Scale of the smoothing, rad/s.
@@ -124,7 +125,7 @@ impl System<f64, State> for Smooth<'_> {
     }
 }
 
-/// Takes the solution at the knots from what a solver with dense output gives.
+/// Selects the rates at the knots from the dense output of a solver.
 fn at_knots(times: &[f64], states: &[State], count: usize) -> Result<Vec<f64>> {
     let mut rates = vec![f64::NAN; count];
     for (t, x) in times.iter().zip(states) {

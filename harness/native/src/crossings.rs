@@ -11,32 +11,33 @@ use pyo3::prelude::*;
 
 use crate::numbers::numbers;
 
-/// A loop gain above this is at an integrator, or another pole on the axis: no crossing.
+/// Loop gain above which the frequency is at an integrator or another pole on the axis, so that there is no
+/// crossing.
 const INTEGRATOR: f64 = 1e8;
-/// A loop gain below this is rounding: no phase crossing.
+/// Loop gain below which it is rounding, so that there is no phase crossing.
 const NOTHING: f64 = 1e-12;
-/// Error of what the poles and zeros give, in the logarithm: they are eigenvalues with their own errors.
+/// Error of the logarithm of the gain from poles and zeros, which are eigenvalues with errors of their own.
 const SLACK: f64 = 1e-3;
-/// Frequencies that are looked at in any case.
+/// Number of frequencies that are evaluated in any case.
 const GRID: usize = 40;
-/// Most intervals of a search.
+/// Largest number of intervals in a search.
 const MOST: usize = 5_000;
 
-/// A state-space model, its matrix A in Hessenberg form: a frequency costs n² operations.
+/// A state-space model with its matrix A in Hessenberg form, so that a frequency takes n² operations.
+/// Matrices are stored row after row.
 #[pyclass(frozen, module = "hubslosh")]
 pub struct Model {
     states: usize,
     inputs: usize,
     outputs: usize,
-    /// Row after row.
     a: Vec<f64>,
     b: Vec<f64>,
     c: Vec<f64>,
     d: Vec<f64>,
-    /// 0: continuous time.
+    /// Sampling period, s; 0 for continuous time.
     period: f64,
-    /// Column after column of A, for a model with one input and one output; its B is then a multiple of the first unit
-    /// vector.
+    /// A stored column after column, for a model with one input and one output; its B is then a multiple of
+    /// the first unit vector.
     columns: Vec<f64>,
 }
 
@@ -289,7 +290,7 @@ fn eigenvalues(mut a: Vec<Complex>, n: usize) -> Vec<Complex> {
     found
 }
 
-/// s = jω, or z = exp(jωT) in its place.
+/// Returns s = jω, or z = exp(jωT) for a model with the period T.
 fn point(w: f64, period: f64) -> Complex {
     if period == 0.0 {
         return Complex::new(0.0, w);
@@ -322,18 +323,19 @@ impl Root {
     }
 }
 
-/// A zero and the pole that is nearest of those left: what a pair does to the slope is small where its distance is.
+/// A zero and the nearest of the remaining poles. If they are close to each other, their effect on the slope
+/// is small.
 struct Pair {
-    /// Number of roots: a pair, or one alone.
+    /// Number of roots: two for a pair, one for a single root.
     roots: usize,
     /// Half the distance of both, and a factor over the third power of the distance from them.
     half_gap: f64,
     steep: f64,
 }
 
-/// A rational function by poles, zeros and factor.
+/// A rational function given by its poles, zeros and a factor.
 struct Shape {
-    /// The roots pair after pair, then those left.
+    /// The roots of all pairs one after the other, then the single roots.
     roots: Vec<Root>,
     pairs: Vec<Pair>,
     /// Logarithm of the factor's magnitude, and its phase.
@@ -341,7 +343,7 @@ struct Shape {
     period: f64,
 }
 
-/// Logarithm of a value: magnitude and phase, their slopes over ω.
+/// Logarithm of a value, magnitude and phase, and their derivatives by ω.
 struct Logarithm {
     value: [f64; 2],
     slope: [f64; 2],
@@ -349,7 +351,7 @@ struct Logarithm {
     curvature: [f64; 2],
 }
 
-/// A product of many numbers, with its magnitude apart as a logarithm before it overflows.
+/// A product of many numbers; its magnitude is moved to a logarithm before it overflows.
 struct Product {
     of: Complex,
     scale: f64,
@@ -372,7 +374,8 @@ impl Product {
 }
 
 impl Shape {
-    /// The factor makes it `exact` at most of the frequencies.
+    /// Makes the function from zeros and poles; the factor makes it agree with `exact` at most frequencies of
+    /// the grid.
     fn new(
         [zeros, poles]: [&[Complex]; 2],
         period: f64,
@@ -468,7 +471,7 @@ impl Shape {
         }
     }
 
-    /// Returns the magnitude's logarithm at `w`, but for the factor.
+    /// Returns the logarithm of the magnitude at `w`, without the factor.
     fn size(&self, w: f64) -> f64 {
         let s = point(w, self.period);
         let (mut above, mut below) = (Product::new(), Product::new());
@@ -479,8 +482,7 @@ impl Shape {
         above.scale + above.of.re.ln() - below.scale - below.of.re.ln()
     }
 
-    /// Returns the ends of intervals outside of which there is no crossing, and in each of which there is one at most of
-    /// each kind.
+    /// Returns the ends of intervals that contain all crossings, at most one of each kind per interval.
     fn isolate(&self, grid: &[f64]) -> Vec<f64> {
         let mut ends = Vec::new();
         let whole = grid.windows(2).map(|pair| (pair[0], pair[1], [true; 2]));
@@ -503,7 +505,7 @@ impl Shape {
         ends
     }
 
-    /// Returns frequencies at which the magnitude has its least minima.
+    /// Returns the frequencies of the lowest minima of the magnitude.
     fn minima(&self, grid: &[f64]) -> Vec<f64> {
         let mut points = grid.to_vec();
         let (low, high) = (grid[0], grid[grid.len() - 1]);
@@ -540,12 +542,11 @@ impl Shape {
     }
 }
 
-/// Crossings of an interval.
+/// Result of a search for crossings in an interval.
 #[derive(Clone, Copy, PartialEq)]
 enum Look {
-    /// There is none.
     None,
-    /// There is one at most.
+    /// There is at most one.
     Once,
     /// There may be several.
     Divide,
@@ -579,17 +580,15 @@ impl Logarithm {
     }
 }
 
-/// Kind of a crossing.
+/// Kind of a crossing: the gain has magnitude 1, or it is real.
 #[derive(Clone, Copy, PartialEq)]
 enum Kind {
-    /// The magnitude is 1.
     Gain,
-    /// The value is real.
     Phase,
 }
 
 impl Kind {
-    /// Returns a number that changes its sign at a crossing.
+    /// Returns a number that changes its sign at a crossing of this kind.
     fn height(self, gain: Complex) -> f64 {
         match self {
             Kind::Gain => gain.norm().max(1e-300).ln(),
@@ -638,7 +637,7 @@ fn between(
 
 /// Numbers of states, inputs and outputs.
 type Size = (usize, usize, usize);
-/// A crossing: whether it is one of the gain, ω in rad/s, real and imaginary part of the loop gain.
+/// A crossing: true if it is one of the gain, ω in rad/s, real and imaginary part of the loop gain.
 type Crossing = (bool, f64, f64, f64);
 
 fn search(

@@ -8,29 +8,29 @@ use pyo3::prelude::*;
 use crate::fmu::Fmu;
 use crate::numbers::{Failure, Numbers};
 
-/// A linear controller with state x, which sees the error e = r − y of what is measured:
-/// u = C x + D e + f, then x = A x + B e. Matrices row after row.
+/// A linear controller with the state x, which receives the error e = r − y of the measurements: u = C x + D
+/// e + f, then x = A x + B e. Matrices are stored row after row.
 ///
-/// Sums are taken from left to right without fused multiplication, so that Python has the same bits.
+/// Sums are taken from left to right without fused multiplication, so that Python computes the same bits.
 struct Linear {
     x: Vec<f64>,
     a: Vec<f64>,
     b: Vec<f64>,
     c: Vec<f64>,
     d: Vec<f64>,
-    /// r, a row per cycle.
+    /// Reference r, one row per cycle.
     reference: Vec<f64>,
-    /// f, a row per cycle.
+    /// Feedforward f, one row per cycle.
     feedforward: Vec<f64>,
-    /// Indices of a quaternion in y, scalar first. The error of its vector part is that of q⁻¹ ⊗ r, half the remaining rotation
-    /// about each body axis, the short way.
+    /// Indices of a quaternion in y, scalar first. The error of its vector part is that of q⁻¹ ⊗ r, half the
+    /// remaining rotation about each body axis, the short way.
     quaternion: Option<[usize; 4]>,
-    /// Room for e and the next x.
+    /// Memory for e and the next x.
     error: Vec<f64>,
     next: Vec<f64>,
 }
 
-/// Row `i` of a matrix times `x`, added to `sum`.
+/// Adds the product of row `i` of a matrix and `x` to `sum`.
 fn add_row(mut sum: f64, matrix: &[f64], i: usize, x: &[f64]) -> f64 {
     for (m, x) in matrix[i * x.len()..(i + 1) * x.len()].iter().zip(x) {
         sum += m * x;
@@ -38,7 +38,8 @@ fn add_row(mut sum: f64, matrix: &[f64], i: usize, x: &[f64]) -> f64 {
     sum
 }
 
-/// Vector part of q⁻¹ ⊗ r, of the sign that makes the scalar part positive.
+/// Returns the vector part of q⁻¹ ⊗ r with the sign for which the scalar part is positive: half the rotation
+/// from q to r.
 fn attitude_error(q: [f64; 4], r: [f64; 4]) -> [f64; 3] {
     let scalar = q[0] * r[0] + q[1] * r[1] + q[2] * r[2] + q[3] * r[3];
     let sign = if scalar < 0.0 { -1.0 } else { 1.0 };
@@ -79,26 +80,30 @@ enum Controller {
     Function(Py<PyAny>),
 }
 
-/// The loop around a run, from the class `Feedback` of Python: at every `parts`-th row a cycle begins. What the controller
-/// computes from the measurements there is set `latency` cycles and `switch` rows later, and held until the next command is.
+/// The feedback loop around a run, made from the Python class `Feedback`. A cycle begins at every `parts`-th
+/// row. The commands that the controller computes from the measurements there are set `latency` cycles and
+/// `switch` rows later, and held until the next commands.
 pub struct Feedback {
     controller: Controller,
-    /// Value references of Reals, and their values.
+    /// Value references of the measured Reals, and their values.
     measured: (Vec<u32>, Vec<f64>),
     command: Vec<u32>,
     parts: usize,
     switch: usize,
     latency: usize,
-    /// The last `latency` + 1 commands, cycle k in place k modulo their number.
+    /// The last `latency` + 1 commands; those of cycle k are at position k modulo their number.
     on_the_way: Vec<f64>,
     now: Vec<f64>,
-    /// The commands in force from each row on.
+    /// Commands that act from each row on.
     pub commands: Numbers,
 }
 
 impl Feedback {
+    /// Reads the Python class `Feedback` for a run of `rows` rows.
+    ///
     /// # Errors
-    /// If an attribute is missing or has another type or size.
+    ///
+    /// If an attribute is missing, or has another type or size.
     pub fn of(feedback: &Bound<PyAny>, fmu: &Fmu, rows: usize) -> PyResult<Self> {
         let references = |attribute: &str| -> PyResult<Vec<u32>> {
             let names: Vec<String> = feedback.getattr(attribute)?.extract()?;
@@ -130,7 +135,8 @@ impl Feedback {
         })
     }
 
-    /// Acts at row `row`, `time` in s, between reading outputs and setting inputs.
+    /// Performs the controller's part of row `row` at `time` (s), after the outputs are read and before the
+    /// inputs are set.
     pub fn act(&mut self, fmu: &mut Instance, row: usize, time: f64) -> Result<(), Failure> {
         let (width, cycle) = (self.now.len(), row / self.parts);
         let place = |cycle: usize| (cycle % (self.latency + 1)) * width;
@@ -158,7 +164,7 @@ impl Feedback {
     }
 }
 
-/// Fails if there are more or fewer of something than expected.
+/// Checks that there are as many of something as expected.
 fn expect(what: &str, found: usize, expected: usize) -> PyResult<()> {
     if found == expected {
         return Ok(());
@@ -166,7 +172,7 @@ fn expect(what: &str, found: usize, expected: usize) -> PyResult<()> {
     Err(PyValueError::new_err(format!("{what}: {found} (expected: {expected})")))
 }
 
-/// Reads the class `Linear` of Python.
+/// Reads the Python class `Linear`.
 fn linear(
     of: &Bound<PyAny>,
     (cycles, measured, commands): (usize, usize, usize),

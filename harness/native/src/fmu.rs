@@ -44,12 +44,11 @@ Make warnings errors:
 "
 );
 
-/// An error of the host as one of Python.
+/// Converts an error of the host to the Python exception FmuError.
 pub fn error(why: impl Into<anyhow::Error>) -> PyErr {
     FmuError::new_err(format!("{:#}", why.into()))
 }
 
-/// A variable of an FMU.
 #[pyclass(frozen, get_all, module = "hubslosh")]
 pub struct Variable {
     name: String,
@@ -95,19 +94,19 @@ impl Variable {
     }
 }
 
-/// A packed FMU. Its binary is loaded for the first instance of an interface.
+/// A packed FMU. Its binary is loaded when the first instance of an interface is created.
 #[pyclass(frozen, module = "hubslosh")]
 pub struct Fmu {
     path: PathBuf,
     description: ModelDescription,
-    /// Places in the description by name.
+    /// Positions in the description by name.
     places: BTreeMap<String, usize>,
-    /// Loaded FMU for Co-Simulation and for Model Exchange.
+    /// The FMU loaded for Co-Simulation and for Model Exchange.
     loaded: [Mutex<Option<Arc<host::fmu::Fmu>>>; 2],
 }
 
 impl Fmu {
-    /// The FMU, loaded for an interface.
+    /// Returns the FMU with its binary loaded for an interface; it is loaded only once.
     pub fn load(&self, interface: Interface) -> PyResult<Arc<host::fmu::Fmu>> {
         let place = &self.loaded[usize::from(interface == Interface::ModelExchange)];
         let mut place = place.lock().unwrap_or_else(PoisonError::into_inner);
@@ -118,12 +117,11 @@ impl Fmu {
         Ok(place.insert(Arc::new(loaded)).clone())
     }
 
-    /// Description of the FMU.
     pub fn description(&self) -> &ModelDescription {
         &self.description
     }
 
-    /// A variable by its name.
+    /// Finds a variable by its name.
     pub fn variable(&self, name: &str) -> PyResult<&description::Variable> {
         match self.places.get(name) {
             Some(place) => Ok(&self.description.variables[*place]),

@@ -14,10 +14,10 @@ use pyo3::prelude::*;
 use crate::fmu::{Fmu, FmuError, FmuWarning, error};
 use crate::run::{Run, Stop, Table};
 
-/// An instance, and the FMU that it borrows: dropped in this order.
+/// An instance and the FMU that it borrows; the fields are dropped in this order.
 pub struct Held {
     pub instance: fmu::Instance<'static>,
-    /// Slopes of inputs through the next step, per s: references and values.
+    /// Slopes of inputs during the next step, per s: value references and values.
     slopes: (Vec<u32>, Vec<f64>),
     _fmu: Arc<fmu::Fmu>,
 }
@@ -35,22 +35,21 @@ impl Held {
     }
 }
 
-/// One instance of an FMU. Calls from several threads follow one another.
+/// An instance of an FMU. Calls from several threads wait for one another.
 #[pyclass(frozen, module = "hubslosh")]
 pub struct Instance {
     pub fmu: Py<Fmu>,
     held: Mutex<Option<Held>>,
-    /// The thread that is in a call, by [`this_thread`].
+    /// The thread that is in a call, as [`this_thread`] identifies it; 0 if none is.
     caller: AtomicUsize,
 }
 
-/// A number of this thread that is not 0.
+/// Returns a number that identifies this thread and is not 0.
 fn this_thread() -> usize {
     thread_local!(static PLACE: u8 = const { 0 });
     PLACE.with(|place| std::ptr::from_ref(place).addr())
 }
 
-/// A value for a variable.
 #[derive(FromPyObject)]
 enum Given {
     Boolean(bool),
@@ -60,10 +59,12 @@ enum Given {
 }
 
 impl Instance {
-    /// Makes calls of the instance without Python's lock, and then the FMU's warnings.
+    /// Makes calls of the instance without Python's lock, and then reports the FMU's warnings to Python.
     ///
     /// # Errors
-    /// If `calls` fails, the instance is closed, or this thread is in a call of it, as a controller is.
+    ///
+    /// If `calls` fails, the instance is closed, or this thread is already in a call of it, for example in a
+    /// controller.
     pub fn with<T: Send>(
         &self,
         py: Python,
@@ -95,7 +96,7 @@ impl Instance {
         result
     }
 
-    /// Calls that return what the host does.
+    /// Makes calls of the host, and converts their errors to Python's.
     fn call<T: Send>(
         &self,
         py: Python,

@@ -6,11 +6,11 @@ use pyo3::buffer::PyBuffer;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-/// End of a run before its last row.
+/// Reason for the end of a run before its last row.
 pub enum Failure {
     /// A call of the FMU failed.
     Call(CallError),
-    /// The controller did, or somebody pressed Ctrl-C.
+    /// The controller failed, or the user pressed Ctrl-C.
     Python(PyErr),
 }
 
@@ -34,20 +34,16 @@ pub fn numbers(array: &Bound<PyAny>) -> PyResult<Vec<f64>> {
     PyBuffer::get(array)?.to_vec(array.py())
 }
 
-/// An array of numpy, rows × width, and the rows that are on their way to or from it.
+/// A numpy array of rows × width, and the rows that are being copied to or from it.
 pub struct Numbers {
     array: PyBuffer<f64>,
     width: usize,
     rows: Vec<f64>,
-    /// Numbers of the array before those rows.
+    /// Number of values in the array before those rows.
     at: usize,
 }
 
 impl Numbers {
-    /// `writes`: rows go to it.
-    ///
-    /// # Errors
-    /// If it is not an array of that size with its rows one after the other.
     pub fn of(array: &Bound<PyAny>, rows: usize, width: usize, writes: bool) -> PyResult<Numbers> {
         let array = PyBuffer::get(array)?;
         if array.item_count() != rows * width
@@ -59,12 +55,12 @@ impl Numbers {
         Ok(Numbers { array, width, rows: Vec::new(), at: 0 })
     }
 
-    /// Adds a row.
+    /// Adds a row to those that wait to be written.
     pub fn push(&mut self, row: &[f64]) {
         self.rows.extend_from_slice(row);
     }
 
-    /// Hands the rows over to Python.
+    /// Writes the waiting rows to the Python array.
     pub fn write(&mut self, _: Python) {
         if let Some(mut numbers) = self.array.as_slice_ptr() {
             // SAFETY: of() has looked at its type and size, and nobody else runs Python meanwhile.
@@ -75,7 +71,7 @@ impl Numbers {
         self.rows.clear();
     }
 
-    /// Takes the next rows from Python.
+    /// Copies the next `rows` rows from the Python array.
     pub fn read(&mut self, _: Python, rows: usize) {
         self.at += self.rows.len();
         self.rows.clear();
@@ -86,12 +82,12 @@ impl Numbers {
         }
     }
 
-    /// Puts all rows after the first `rows` of those that were taken back.
+    /// Returns all rows after the first `rows` of those that were read, so that they are read again.
     pub fn keep(&mut self, rows: usize) {
         self.rows.truncate(rows * self.width);
     }
 
-    /// One of the rows taken.
+    /// Returns one of the rows that were read.
     pub fn row(&self, i: usize) -> &[f64] {
         &self.rows[i * self.width..(i + 1) * self.width]
     }

@@ -11,18 +11,18 @@ use crate::feedback::Feedback;
 use crate::fmu::Fmu;
 use crate::numbers::{Failure, Numbers};
 
-/// Most rows between two visits of Python, where Ctrl-C is heard and rows are handed over.
+/// Largest number of rows between two visits of Python, in which Ctrl-C is noticed and rows are exchanged.
 const ROWS: usize = 1024;
 /// Longest time between two visits of Python, if a step takes less.
 const SILENCE: Duration = Duration::from_millis(100);
 
-/// Variables of a table: the Reals in one call, then the others.
+/// Variables of a table; Reals are exchanged in one call, the others one by one.
 struct Columns<'fmu> {
-    /// References of the Reals, their columns, and room for their values.
+    /// Value references of the Reals, their columns, and memory for their values.
     references: Vec<u32>,
     places: Vec<usize>,
     reals: Vec<f64>,
-    /// The others with their columns.
+    /// The other variables with their columns.
     others: Vec<(&'fmu Variable, usize)>,
     row: Vec<f64>,
 }
@@ -76,13 +76,13 @@ impl<'fmu> Columns<'fmu> {
     }
 }
 
-/// Stop of a run by the FMU: its row, the number of rows read, and the reason.
+/// End of a run by the FMU: its row, the number of rows read, and the reason.
 pub type Stop = (usize, usize, String);
 
-/// A table of numbers in Python, and the names of its columns.
+/// The names of the columns of a table, and its numbers in a Python array.
 pub type Table<'py> = (Vec<String>, Bound<'py, PyAny>);
 
-/// A run: a row per communication point.
+/// A run with one row per communication point.
 pub struct Run<'fmu> {
     time: Vec<f64>,
     inputs: (Columns<'fmu>, Numbers),
@@ -93,9 +93,10 @@ pub struct Run<'fmu> {
 }
 
 impl<'fmu> Run<'fmu> {
-    /// `slopes` has the columns of `inputs`.
+    /// Prepares a run. `slopes` has the columns of `inputs`.
     ///
     /// # Errors
+    ///
     /// If a variable is unknown, or a table has another size.
     pub fn new(
         fmu: &'fmu Fmu,
@@ -120,9 +121,10 @@ impl<'fmu> Run<'fmu> {
         })
     }
 
-    /// Makes all rows, without Python's lock but for its visits.
+    /// Makes all rows; Python's lock is held only during the visits.
     ///
     /// # Errors
+    ///
     /// If the controller fails, or on KeyboardInterrupt.
     pub fn make(&mut self, instance: &mut Instance) -> PyResult<Option<Stop>> {
         let end = self.drive(instance);
@@ -140,8 +142,9 @@ impl<'fmu> Run<'fmu> {
         }
     }
 
-    /// Makes a row: outputs are read, then inputs set and the step made, unless it is the last row. A controller acts between
-    /// the two. `i`: the row's place among those that were taken from Python.
+    /// Makes a row: outputs are read, then inputs are set and the step is made, except in the last row. A
+    /// controller acts between the two. `i` is the position of the row among those that were read from
+    /// Python.
     fn row(&mut self, instance: &mut Instance, row: usize, i: usize) -> Result<(), Failure> {
         let (columns, recorded) = &mut self.outputs;
         recorded.push(columns.get(instance)?);
@@ -185,7 +188,7 @@ impl<'fmu> Run<'fmu> {
         Ok(())
     }
 
-    /// Exchanges rows with Python, and hears signals.
+    /// Exchanges rows with Python, and handles signals such as Ctrl-C.
     fn visit(&mut self, py: Python) -> PyResult<()> {
         self.hand_over(py);
         self.inputs.1.read(py, ROWS);

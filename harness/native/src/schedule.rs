@@ -11,7 +11,7 @@ use crate::numbers::numbers;
 #[pyclass(frozen, module = "hubslosh")]
 pub struct History(schedule::History);
 
-/// The floats as bytes, for numpy.
+/// Returns the numbers as bytes, which numpy reads as an array of floats.
 pub fn bytes<'py>(py: Python<'py>, values: &[f64]) -> Bound<'py, PyBytes> {
     let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_ne_bytes()).collect();
     PyBytes::new(py, &bytes)

@@ -18,14 +18,14 @@ use pyo3::types::PyDict;
 
 use crate::fmu::FmuError;
 
-/// Time between two looks for Ctrl-C.
+/// Time between two checks for Ctrl-C.
 const SILENCE: Duration = Duration::from_millis(100);
 
-/// A tank file, read.
+/// A tank that was read from a file or a text.
 #[pyclass(frozen, module = "hubslosh")]
 pub struct Tank {
     tank: hubslosh_tank::Tank,
-    /// The file, if there is one: errors begin with it.
+    /// Path of the file, if there is one; error messages begin with it.
     file: Option<PathBuf>,
 }
 
@@ -177,7 +177,6 @@ impl Solved {
     }
 }
 
-/// Parameters by name, and warnings.
 pub type Parameters<'py> = (Bound<'py, PyDict>, Vec<String>);
 
 fn target(model: &str) -> PyResult<Target> {
@@ -189,7 +188,7 @@ fn target(model: &str) -> PyResult<Target> {
     }
 }
 
-/// Returns a liquid whose gravity the FMUs take as g_ref.
+/// Checks that the liquid's gravity is one that the FMUs accept as g_ref.
 fn checked(liquid: Liquid) -> Result<parameters::Liquid, Problems> {
     let gravity = liquid.0.gravity;
     if gravity > 0.0 && gravity < 1e-9 {
@@ -278,9 +277,9 @@ pub fn table<'py>(
     handed_over(py, set.map_err(|why: Problems| tank.get().error(&why))?)
 }
 
-/// Returns `of(0)` to `of(count - 1)`, computed by a thread for each core.
+/// Returns `of(0)` to `of(count - 1)`, computed by one thread per core.
 ///
-/// On Ctrl-C it returns at once; the threads end with what they are at.
+/// On Ctrl-C it returns at once; the threads finish what they are computing.
 fn in_threads<T: Send + 'static>(
     py: Python,
     count: usize,

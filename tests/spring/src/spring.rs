@@ -19,7 +19,7 @@ impl Default for Parameters {
     }
 }
 
-/// Displacement and velocity, and the parameters.
+/// A spring: displacement and velocity, and the parameters.
 #[derive(Clone, Debug)]
 pub struct Spring {
     p: Parameters,

@@ -35,7 +35,7 @@ fn norm(a: [f64; 3]) -> f64 {
     f64::sqrt(a.iter().map(|x| x * x).sum())
 }
 
-/// v of the body in inertial components: v + 2 u x (u x v + q0 v).
+/// Returns v of the body in inertial components: v + 2 u x (u x v + q0 v).
 fn turned(q: [f64; 4], v: [f64; 3]) -> [f64; 3] {
     let [q0, x, y, z] = q;
     let inner = cross([x, y, z], v);
@@ -43,14 +43,14 @@ fn turned(q: [f64; 4], v: [f64; 3]) -> [f64; 3] {
     [0, 1, 2].map(|i| v[i] + 2.0 * outer[i])
 }
 
-/// Accumulated inputs, and the largest size of every quantity.
+/// Accumulated inputs of a motion, and the largest size of every quantity.
 struct Balance {
     start: Outputs,
     impulse: [f64; 3],
     angular: [f64; 3],
     /// Scales of P, H, E.
     scale: [f64; 3],
-    /// Worst residuals.
+    /// Largest residuals.
     worst: [f64; 3],
 }
 

@@ -18,15 +18,15 @@ pub(super) fn thrust(force: f64) -> Inputs {
     Inputs { force: Ramp::held([0.0, 0.0, force]), ..Inputs::default() }
 }
 
-/// The default craft at rest. Its tank, 1.2 m high, is half full, and the liquid's centre rests 0.3 m above the bottom,
-/// so it crosses 0.6 m.
+/// Returns the default craft at rest. Its tank, 1.2 m high, is half full, and the liquid's centre rests 0.3 m
+/// above the bottom, so the liquid can move by 0.6 m.
 fn craft() -> Parameters {
     let mut p = Parameters::default();
     p.tank[0].ball.travel = 0.6;
     p
 }
 
-/// With two tanks that do not stand on the axis nor along it.
+/// Returns a random craft with two tanks that stand neither on the axis nor along it.
 pub(super) fn askew(random: &mut Random) -> Parameters {
     let mut p = Parameters { tanks: 2, ..random.parameters() };
     p.mount = Mount::Free;
@@ -45,7 +45,7 @@ pub(super) fn askew(random: &mut Random) -> Parameters {
     p
 }
 
-/// The same craft in a state of the liquid that is given.
+/// Returns the same craft with changed states of the liquid.
 pub(super) fn with_states(
     craft: &Spacecraft,
     change: impl Fn(&mut [f64; STATES]),
@@ -325,8 +325,8 @@ fn the_choice_of_communication_step_does_not_matter() {
     }
 }
 
-/// Thrust of any direction for 20 s and reversed thrust for 20 s, on liquid that bounces and slides. Returns attitude, rate and
-/// liquid every 2 s.
+/// Simulates 20 s of thrust in any direction and 20 s of reversed thrust, with liquid that bounces and
+/// slides. Returns attitude, rate and liquid every 2 s.
 fn detached(seed: u64, tolerance: f64, step: f64, shift: f64) -> Vec<f64> {
     let (mut r, mut p) = (Random::new(seed), craft());
     let (m, ball) = (p.craft.mass, &mut p.tank[0].ball);
@@ -416,7 +416,7 @@ fn a_ball_regime_whose_liquid_stays_changes_no_bit() {
 struct Rates {
     a: V,
     w_d: V,
-    /// x'' of each lump, tank axes.
+    /// x'' of each lump in tank axes.
     x_dd: Vec<V>,
 }
 
@@ -424,8 +424,8 @@ pub(super) fn rotation(q: &[f64]) -> Rotation3<f64> {
     UnitQuaternion::from_quaternion(Quaternion::new(q[0], q[1], q[2], q[3])).into()
 }
 
-/// The wall that a tank's lump meets: its centre on the tank's axis and its semi-axes b, b, a, from the liquid's centre
-/// at rest and the pendulums' m l.
+/// Returns the wall that a tank's lump meets: its centre on the tank's axis and its semi-axes b, b, a, from
+/// the liquid's centre at rest and the pendulums' m l.
 pub(super) fn wall(p: &Parameters, i: usize) -> (f64, V, f64) {
     let tank = &p.tank[i];
     let modes = || 0..tank.modes;
@@ -437,7 +437,7 @@ pub(super) fn wall(p: &Parameters, i: usize) -> (f64, V, f64) {
     ((tank.m_0 * tank.h_0 + bobs) / mass + a, V::new(b, b, a), mass)
 }
 
-/// J_a: of the parts of the liquid, with its rods along `p`, about their centre; body axes.
+/// Returns J_a, the inertia of the parts of the liquid about their centre, with rods along `p`, body axes.
 pub(super) fn shape(p: &Parameters, i: usize, x: &[f64]) -> Matrix3<f64> {
     let tank = &p.tank[i];
     let axes = *rotation(&tank.q).matrix();
@@ -456,8 +456,8 @@ pub(super) fn shape(p: &Parameters, i: usize, x: &[f64]) -> Matrix3<f64> {
     axes * j * axes.transpose()
 }
 
-/// All tanks' liquids are lumps, those of `slides` on the wall. Unknowns: a, w', each lump's x'' (body axes) and the force N
-/// with which it presses along the outward normal.
+/// Solves Newton's laws if all tanks' liquids are lumps, those of `slides` on the wall. Unknowns are a, w',
+/// each lump's x'' (body axes) and the force N with which it presses along the outward normal.
 fn newton(p: &Parameters, x: &[f64; STATES], u: &Inputs, slides: &[bool]) -> Rates {
     let n = slides.len();
     let (lump, force) = (|i: usize| 6 + 4 * i, |i: usize| 9 + 4 * i);
@@ -523,7 +523,7 @@ fn newton(p: &Parameters, x: &[f64; STATES], u: &Inputs, slides: &[bool]) -> Rat
     Rates { a: part(0), w_d: part(3), x_dd }
 }
 
-/// Two lumps anywhere within their walls, the second or both on them.
+/// Returns a craft with two lumps anywhere within their walls; the second or both are on them.
 fn loose(random: &mut Random, slides: [bool; 2]) -> (Parameters, Spacecraft) {
     let p = askew(random);
     let mut craft = Spacecraft::new(&p, &Inputs::default(), 0.0, 1e-12).unwrap();
@@ -669,7 +669,7 @@ impl Simulator {
         Pair { particle: s.particle + s.speed * h, ..at(mean, h) }
     }
 
-    /// The particle from the tank's origin, tank axes.
+    /// Returns the particle's position relative to the tank's origin, tank axes.
     fn in_tank(&self, s: &Pair) -> V {
         let tank = &self.p.tank[0];
         let from_o = s.q.inverse() * (s.particle - s.place) + v(&self.p.craft.r);
@@ -680,7 +680,7 @@ impl Simulator {
         1.0 - (self.in_tank(s) - V::z() * self.height).component_div(&self.semi).norm_squared()
     }
 
-    /// Impulse at the contact point of two bodies.
+    /// Applies the impulse of two bodies at their contact point; `e` is the coefficient of restitution.
     fn impact(&self, s: &mut Pair, e: f64) {
         let local = (self.in_tank(s) - V::z() * self.height)
             .component_div(&self.semi.component_mul(&self.semi));

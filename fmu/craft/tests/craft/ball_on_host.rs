@@ -19,7 +19,7 @@ fn alone(p: &Parameters) -> TankParameters {
     TankParameters { tank: p.tank[0], host: Some(p.craft), ..TankParameters::default() }
 }
 
-/// Attitude, rate, position and velocity of O, work.
+/// State of a host: attitude, rate, position and velocity of O, work.
 #[derive(Clone, Copy)]
 struct Host {
     q: [f64; 4],
@@ -29,7 +29,7 @@ struct Host {
     work: f64,
 }
 
-/// A rigid body with one tank.
+/// A rigid body with one tank, simulated by its host.
 pub(super) struct Craft {
     p: Parameters,
     tank: SloshTank,
@@ -53,7 +53,7 @@ impl Craft {
         Craft { p: *p, tank, host, taken: [0.0; 6], impulses: 0 }
     }
 
-    /// M_host about O, and what its rotation takes.
+    /// Returns M_host about O, and the force and torque that its rotation takes.
     fn body(&self, w: V) -> (SMatrix<f64, 6, 6>, Six) {
         let (m, r, j) = (self.p.craft.mass, v(&self.p.craft.r), self.p.craft.j.matrix());
         let arm = r.cross_matrix();
@@ -79,7 +79,7 @@ impl Craft {
         matrix
     }
 
-    /// [a; w'] with what the tank's bias and added mass are.
+    /// Returns [a; w'] from the tank's bias and added mass.
     fn solve(&self, u: &Inputs, t: f64, w: V, bias: &[f64; 6], added: &[f64; 21]) -> Six {
         let (matrix, turning) = self.body(w);
         let (f, tau) = (u.force.at(t), u.torque.at(t));
@@ -97,7 +97,7 @@ impl Craft {
         }
     }
 
-    /// The tank's inputs now; the drag of its bobs does not follow the acceleration here.
+    /// Returns the tank's present inputs; the drag of its bobs does not depend on the acceleration here.
     fn inputs(&mut self, u: &Inputs) -> TankInputs {
         let w = self.host.w;
         let still = self.held(w, &Six::zeros());
@@ -307,7 +307,7 @@ fn runge_kutta(x: &[f64], h: f64, mut rates: impl FnMut(f64, &[f64]) -> Vec<f64>
     (0..x.len()).map(|i| x[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i])).collect()
 }
 
-/// One tank askew, whose bobs' drag does not follow the acceleration.
+/// Returns a craft with one tank that stands askew, whose bobs' drag does not depend on the acceleration.
 fn one(random: &mut Random) -> Parameters {
     let mut p = Parameters { tanks: 1, ..askew(random) };
     let tank = &mut p.tank[0];
@@ -465,7 +465,8 @@ fn a_host_that_exchanges_at_communication_points_comes_to_the_spacecraft_s_motio
     assert!(coarse.iter().all(|error| *error < 1e-2), "{coarse:?}");
 }
 
-/// The tank of [`one`] in the state `ball`, and an acceleration that presses it where it slides.
+/// Returns the tank of [`one`] in the state `ball`, and an acceleration that presses the liquid to the wall
+/// if it slides.
 fn placed(seed: u64, ball: BallState) -> (SloshTank, TankInputs) {
     let mut random = Random::new(seed);
     let p = one(&mut random);

@@ -13,14 +13,15 @@ type V = Vector3<f64>;
 
 const G: f64 = 9.81;
 
-/// One pendulum on the tank's axis, released at `angle` rad in the tank's x z plane.
+/// Returns a tank with one pendulum on its axis, released at `angle` rad in the tank's x z plane.
 fn tank(angle: f64) -> Tank {
     let mut tank = Tank { position: [0.0; 3], modes: 1, g_ref: G, ..Tank::default() };
     tank.p_0[0] = [angle.sin(), 0.0, -angle.cos()];
     tank
 }
 
-/// p_x and its rate after each `period`, in the tank alone and in a craft of 1e9 kg, under `g` along the tank.
+/// Returns p_x and its rate after each `period`, in the tank alone and in a craft of 1e9 kg, under `g` along
+/// the tank.
 fn moments(tank: &Tank, g: f64, period: f64, count: usize) -> [Vec<[f64; 2]>; 2] {
     let p = TankParameters { tank: *tank, ..TankParameters::default() };
     let motion = TankInputs { a: Ramp::held([0.0, 0.0, g]), ..TankInputs::default() };
@@ -82,7 +83,7 @@ fn damping_of_decays_follows_the_frequency_down_to_a_millionth_of_a_metre_per_se
 /// Steepness of the first mode in a cylinder per slosh angle: k = xi/R, elevation 2 R/(xi^2 - 1).
 const STEEPNESS: f64 = 2.0 * 1.841183781340659 / (1.841183781340659 * 1.841183781340659 - 1.0);
 
-/// max(0, x) with a corner rounded over 0.02.
+/// Returns max(0, x) with its corner rounded over 0.02.
 fn rounded(x: f64) -> f64 {
     (x + x.hypot(0.02)) / 2.0
 }
@@ -118,7 +119,8 @@ fn free_oscillations_lose_zeta_plus_zeta_a_times_amplitude_and_what_breaking_add
     }
 }
 
-/// The ranges of a tank in a craft with that thrust, and of the tank alone under the craft's motion, which are the same.
+/// Returns the ranges of a tank in a craft with this thrust, after checking that the tank alone has the same
+/// under the craft's motion.
 fn ranges_of(tank: Tank, thrust: f64) -> Ranges {
     let mut p = Parameters::default();
     p.tank[0] = tank;

@@ -40,7 +40,7 @@ pub fn after(u: &Inputs, t: f64) -> Inputs {
     }
 }
 
-/// Inflow by force, torque and the flows: P' and H' about the inertial origin.
+/// Returns the rates P' and H' about the inertial origin by force, torque and flows.
 fn rates(p: &Parameters, u: &Inputs, out: &Outputs) -> [V; 2] {
     let turn = attitude(&out.q);
     let (force, r) = (turn * v(&u.force.value), v(&out.position));
@@ -54,7 +54,7 @@ fn rates(p: &Parameters, u: &Inputs, out: &Outputs) -> [V; 2] {
     [momentum, angular]
 }
 
-/// P, and H about the inertial origin.
+/// Returns P, and H about the inertial origin.
 pub fn momenta(out: &Outputs) -> [V; 2] {
     let center = v(&out.position) + attitude(&out.q) * v(&out.center_of_mass);
     let momentum = v(&out.momentum);
@@ -334,7 +334,8 @@ fn a_draining_tank_has_the_damping_ratio_of_its_fill() {
     }
 }
 
-/// Energy that is in it, has been dissipated and has gone with the outflow, less work.
+/// Returns the energy of the craft plus the dissipated energy plus that of the outflow, minus the work; it is
+/// constant.
 pub fn energy(out: &Outputs) -> f64 {
     out.energy + out.dissipated + out.drained - out.work
 }
@@ -400,7 +401,7 @@ fn a_valve_that_opens_or_shuts_keeps_momentum_and_energy() {
     }
 }
 
-/// A tank that drains and a host's motion; from seed 12 on with surfaces of the fill.
+/// Returns a tank that drains and a host's motion; from seed 12 on the tank has surfaces for the fill.
 fn tank_alone(seed: u64, coupling: Coupling) -> (TankParameters, TankInputs) {
     let mut random = Random::new(seed);
     let mut tank = draining_tank(&mut random, seed as usize % 4);
@@ -538,7 +539,7 @@ fn tanks_that_drain_on_a_rigid_body_are_the_craft() {
     }
 }
 
-/// Mass, first and second moment about O.
+/// Mass, first and second moment about O of a rigid body.
 struct Rigid {
     mass: f64,
     arm: Matrix3<f64>,
@@ -562,7 +563,7 @@ impl Rigid {
         matrix
     }
 
-    /// w x (w x S), w x (I w)
+    /// Returns w x (w x S) and w x (I w).
     fn turning(&self, w: V) -> [V; 2] {
         [w.cross(&w.cross(&self.moment)), w.cross(&(self.inertia * w))]
     }

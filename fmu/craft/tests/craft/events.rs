@@ -12,7 +12,7 @@ use super::ball::{V, askew, rotation, shape, thrust, v, wall};
 use super::ball_on_host::Craft;
 use super::random::Random;
 
-/// A craft, the force and torque that act on it, and how long the motion lasts, s.
+/// A craft, the force and torque that act on it, and the length of the motion, s.
 struct Case {
     p: Parameters,
     u: Inputs,
@@ -20,7 +20,8 @@ struct Case {
 }
 
 impl Case {
-    /// Time in which the liquid moves a tenth of the wall's least radius of curvature, at most 20 ms.
+    /// Returns the time in which the liquid moves by a tenth of the wall's least radius of curvature, at most
+    /// 20 ms.
     fn step(&self) -> f64 {
         let (_, semi, _) = wall(&self.p, 0);
         let radius = (semi.x * semi.x / semi.z).min(semi.z * semi.z / semi.x);
@@ -28,7 +29,8 @@ impl Case {
         (0.1 * radius / f64::sqrt(4.0 * acceleration * semi.z)).min(0.02)
     }
 
-    /// True if the liquid leaves its bottom at once and stays off, the only case for which the simulator has equations.
+    /// Returns true if the liquid leaves its bottom at once and stays off it, the only case for which the
+    /// simulator has equations.
     fn stays_loose(&self) -> bool {
         let mut craft = Spacecraft::new(&self.p, &self.u, 0.0, 1e-9).unwrap();
         (0..100).all(|k| {
@@ -41,7 +43,8 @@ impl Case {
     }
 }
 
-/// One tank of any size; a thrust between 0.02 and 0.5 m/s2 that takes the liquid from its bottom.
+/// Returns a craft with one tank of any size, under a thrust between 0.02 and 0.5 m/s2 that takes the liquid
+/// off its bottom.
 fn case(seed: u64) -> Case {
     let mut random = Random::new(seed);
     let mut p = Parameters { tanks: 1, ..askew(&mut random) };
@@ -99,7 +102,7 @@ fn attitude(y: &Coordinates) -> UnitQuaternion<f64> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Mode {
     Flying,
-    /// On the wall with its drag, and without.
+    /// On the wall with its drag, and without drag.
     Sliding,
     Light,
 }
@@ -116,7 +119,7 @@ struct Simulator<'a> {
     case: &'a Case,
     inertia: Matrix3<f64>,
     d: Matrix3<f64>,
-    /// The wall's centre from the craft's centre of mass, body axes.
+    /// The wall's centre relative to the craft's centre of mass, body axes.
     center: V,
     mass: f64,
     y: Coordinates,
@@ -126,7 +129,7 @@ struct Simulator<'a> {
 }
 
 impl Simulator<'_> {
-    /// The liquid has just left the bottom of its tank, at rest against it.
+    /// Starts with liquid that has just left the bottom of its tank, at rest relative to it.
     fn new(case: &Case) -> Simulator<'_> {
         let Case { p, u, .. } = case;
         let x = Spacecraft::new(p, u, 0.0, 1e-12).unwrap().continuous_states();
@@ -169,7 +172,8 @@ impl Simulator<'_> {
         InTank { x, rate, gradient, f: 1.0 - x.dot(&gradient) }
     }
 
-    /// y' and the force with which the liquid presses on the wall, N, by a system of 10 equations on the wall.
+    /// Returns y' and the force with which the liquid presses on the wall, N, from a system of 10 equations
+    /// on the wall.
     fn rates(&self, y: &Coordinates, mode: Mode) -> (Coordinates, f64) {
         let (q, w) = (attitude(y), v(&y[W..]));
         let Parameters { craft, tank, .. } = &self.case.p;
@@ -219,7 +223,8 @@ impl Simulator<'_> {
         (rates, press)
     }
 
-    /// The motion `h` later, by the modified midpoint rule with 2, 4, ... 10 steps and extrapolation to none.
+    /// Returns the motion after `h` s by the modified midpoint rule with 2, 4, ... 10 steps, extrapolated to
+    /// infinitely many.
     fn moved(&self, h: f64) -> Coordinates {
         let plus = |y: &Coordinates, r: &Coordinates, h: f64| -> Coordinates {
             std::array::from_fn(|i| y[i] + h * r[i])
@@ -252,7 +257,8 @@ impl Simulator<'_> {
         y
     }
 
-    /// Positive until the liquid meets the wall from inside, is released, or is pressed enough for its drag.
+    /// Returns a number that is positive until the liquid meets the wall from inside, is released, or is
+    /// pressed enough for its drag.
     fn distance_to_event(&self, y: &Coordinates) -> f64 {
         let InTank { rate, gradient, f, .. } = self.in_tank(y);
         match self.mode {
@@ -363,7 +369,7 @@ impl Simulator<'_> {
         self.strike(ball.restitution);
     }
 
-    /// The impulse of two bodies in a point.
+    /// Applies the impulse of two bodies at a point.
     fn strike(&mut self, e: f64) {
         let InTank { x, rate, gradient, .. } = self.in_tank(&self.y);
         let (n, arm, q) = (gradient.normalize(), x + self.center, attitude(&self.y));
@@ -379,7 +385,8 @@ impl Simulator<'_> {
         self.y[DISSIPATED] += (1.0 - e * e) * mu * approach * approach / 2.0;
     }
 
-    /// Compared quantities of hosts: rate, the liquid's position and rate in the tank (tank axes), velocity of O, dissipated energy.
+    /// Returns the quantities that are compared between hosts: rate, the liquid's position and rate in the
+    /// tank (tank axes), velocity of O, dissipated energy.
     fn shown(&self) -> Shown {
         let tank = &self.case.p.tank[0];
         let axes = rotation(&tank.q).inverse();
@@ -400,13 +407,13 @@ fn shown(craft: &mut Spacecraft, u: &Inputs) -> Shown {
     [tank.ball_position, tank.ball_velocity, out.omega, out.velocity, lost]
 }
 
-/// Largest difference, each quantity over 1 or its size.
+/// Returns the largest difference, each quantity over 1 or its size.
 fn distance(a: &Shown, b: &Shown) -> f64 {
     let pairs = a.iter().zip(b);
     pairs.map(|(a, b)| (v(a) - v(b)).norm() / (1.0 + v(b).norm())).fold(0.0, f64::max)
 }
 
-/// The craft's own motion to the end, with communication steps of length `h`.
+/// Simulates the case by the craft's own steps of length `h`, and returns the compared quantities.
 fn by_co_simulation(case: &Case, h: f64) -> Shown {
     let Case { p, u, end } = case;
     let mut craft = Spacecraft::new(p, u, 0.0, 1e-12).unwrap();
@@ -418,7 +425,7 @@ fn by_co_simulation(case: &Case, h: f64) -> Shown {
     shown(&mut craft, u)
 }
 
-/// The tank of the default craft under a thrust of 1.2 kN that is reversed and slightly askew.
+/// Returns the tank of the default craft under a thrust of 1.2 kN that is reversed and slightly askew.
 fn default_case() -> Case {
     let mut p = Parameters::default();
     p.tank[0].ball.travel = 0.6;
@@ -644,8 +651,8 @@ fn hosts_of_model_exchange_find_impacts_after_bounces_shorter_than_their_steps()
     }
 }
 
-/// A host that does not locate events handles an impact when the liquid is already outside. Returns what is missing in the energy
-/// balance, over 1 J or the energy.
+/// Simulates a host that does not locate events and handles an impact when the liquid is already outside.
+/// Returns the error of the energy balance, over 1 J or the energy.
 fn without_location(case: &Case, seed: u64) -> f64 {
     let longest = (case.step() / 10.0).min(2e-3);
     let method = Method { tolerance: 0.0, longest, locates: false };

@@ -7,8 +7,8 @@ use nalgebra::{SMatrix, SVector};
 use super::component::{SloshTank, Spacecraft};
 use super::random::Random;
 
-/// The inputs after t, as hosts give them that integrate themselves: without slopes, the wheels'
-/// reaction in the torque.
+/// Returns the inputs after t as hosts pass them that integrate themselves: without slopes, and with the
+/// wheels' reaction in the torque.
 fn after(u: &Inputs, t: f64) -> Inputs {
     let torque = u.torque.at(t);
     Inputs {
@@ -19,7 +19,7 @@ fn after(u: &Inputs, t: f64) -> Inputs {
     }
 }
 
-/// Classical Runge-Kutta from 0 to `end` in so many steps.
+/// Integrates from 0 to `end` by the classical Runge-Kutta method in this many steps.
 pub fn runge_kutta(
     mut f: impl FnMut(f64, &[f64; STATES]) -> [f64; STATES],
     x: &mut [f64; STATES],

@@ -10,7 +10,8 @@ use super::random::{Random, draining_craft, draining_tank};
 
 type V = Vector3<f64>;
 
-/// Position of the bob from the host's O, and its rate on the rod, with `liquid` in the tank: l, rho, axes.
+/// Returns the bob's position relative to the host's O, and its rate on the rod, with `liquid` in the tank:
+/// l, rho, axes.
 fn rod(tank: &Tank, n: usize, liquid: f64, p: V) -> (f64, V, Matrix3<f64>) {
     let drains = tank.fill.points > 0;
     let [_, l, h] =
@@ -131,7 +132,7 @@ fn liquids_beyond_their_tables_are_refused() {
     }
 }
 
-/// The internal steps that one step of 2 s takes.
+/// Returns the number of internal steps that one step of 2 s takes.
 fn steps(is_enough: impl Fn(usize) -> bool) -> usize {
     let (mut few, mut enough) = (0, 1 << 12);
     while enough - few > 1 {
@@ -141,8 +142,8 @@ fn steps(is_enough: impl Fn(usize) -> bool) -> usize {
     enough
 }
 
-/// Internal steps of a tank that stays and one that drains, at the tolerances 1e-5 and 1e-10 each: alone and on a craft.
-/// More would be slower, fewer less exact.
+/// Numbers of internal steps of a tank that keeps its liquid and one that drains, at the tolerances 1e-5 and
+/// 1e-10: alone and on a craft. More would be slower, fewer less exact.
 const STEPS: [[[usize; 2]; 4]; 2] =
     [[[16, 6], [31, 12], [19, 10], [27, 13]], [[8, 7], [16, 13], [18, 8], [23, 15]]];
 

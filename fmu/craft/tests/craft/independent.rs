@@ -25,13 +25,12 @@ fn rotation(q: &[f64]) -> Rotation3<f64> {
 struct Solution {
     a: V,
     w_d: V,
-    /// p'' of each bob, tank axes
+    /// p'' of each bob, tank axes, then force and torque about O of each tank.
     p_dd: Vec<V>,
-    /// force and torque about O of each tank
     wrench: Vec<[V; 2]>,
 }
 
-/// Mass, centre of mass and inertia about it of the dry craft and of each rigid liquid.
+/// Lists mass, centre of mass and inertia about it for the dry craft and for each rigid liquid.
 fn bodies(p: &Parameters) -> Vec<(f64, V, Matrix3<f64>)> {
     let own = |j: [[f64; 3]; 3]| Matrix3::from_fn(|i, k| j[i][k]);
     let mut bodies = vec![(p.craft.mass, v(&p.craft.r), own(p.craft.j.matrix()))];
@@ -46,7 +45,8 @@ fn bodies(p: &Parameters) -> Vec<(f64, V, Matrix3<f64>)> {
     bodies
 }
 
-/// Unit vector across the plane of a mode that swings in one, tank axes, and its hinge from the tank's origin.
+/// Returns the unit vector across the plane of a mode that swings in one, tank axes, and its hinge relative
+/// to the tank's origin.
 fn plane(tank: &Tank, n: usize) -> (Option<V>, V) {
     let direction = V::new(tank.direction[n][0], tank.direction[n][1], 0.0);
     let on_axis = V::z() * tank.hinge[n];
@@ -58,8 +58,7 @@ fn plane(tank: &Tank, n: usize) -> (Option<V>, V) {
     (Some(across), on_axis - across * tank.arm[n])
 }
 
-/// A pivot's torque: the turn that brings its axis from where it is in the body to the body's z axis, damping and
-/// dry friction.
+/// Returns a pivot's torque: the spring that turns the body's axis to the z axis, damping and dry friction.
 fn of_pivot(p: &Parameters, x: &[f64; STATES]) -> V {
     let upright = rotation(&x[..4]).inverse() * V::z();
     let pull = V::new(p.pivot.k[1] * upright.x, p.pivot.k[0] * upright.y, 0.0);
@@ -72,7 +71,7 @@ fn of_pivot(p: &Parameters, x: &[f64; STATES]) -> V {
     upright.cross(&pull) - v(&p.pivot.c).component_mul(&w) - rubs
 }
 
-/// [a; w'] of craft and liquids at rest as one rigid body, about its centre of mass; body axes.
+/// Returns [a; w'] of craft and liquids at rest as one rigid body, about its centre of mass; body axes.
 fn rigid_motion(p: &Parameters, x: &[f64; STATES], u: &Inputs) -> [V; 2] {
     let w = v(&x[index::OMEGA..]);
     let mut all = bodies(p);
@@ -105,7 +104,7 @@ fn rigid_motion(p: &Parameters, x: &[f64; STATES], u: &Inputs) -> [V; 2] {
     [force / mass - w_d.cross(&center) - w.cross(&w.cross(&center)), w_d]
 }
 
-/// Drag coefficient of a mode under the specific force `x` along its tank.
+/// Returns the drag coefficient of a mode under the specific force `x` along its tank.
 fn drag(tank: &Tank, n: usize, x: f64, p_z: f64, rate2: f64) -> f64 {
     let (m, l) = (tank.mass[n], tank.length[n]);
     let floor = if tank.g_floor > 0.0 { tank.g_floor } else { 1e-4 * tank.g_ref };
@@ -153,7 +152,7 @@ struct Shape {
 }
 
 impl Shape {
-    /// `rod` and its rate, both of a pendulum with the same q.
+    /// Computes the bob's place and rate from `rod` and its rate, both of a pendulum with the same q.
     fn of(tank: &Tank, n: usize, e: V, rod: V, rod_d: V) -> Shape {
         let l = tank.length[n];
         let across = |x: V| x - e * e.dot(&x);
@@ -178,7 +177,7 @@ impl Shape {
         shape
     }
 
-    /// z'' at x''.
+    /// Returns z'' for the acceleration x''.
     fn height_dd(&self, x_dd: V) -> f64 {
         let rate = 2.0 * self.q.dot(&self.q_d);
         let rate_d = 2.0 * (self.q_d.norm_squared() + self.q.dot(&x_dd));
@@ -399,12 +398,12 @@ pub(super) fn newton_rates(p: &Parameters, x: &[f64; STATES], u: &Inputs) -> [f6
     rate
 }
 
-/// A random craft at a random state with bobs anywhere on their spheres.
+/// Returns a random craft in a random state with bobs anywhere on their spheres.
 fn anywhere(seed: u64) -> (Random, Parameters, [f64; STATES], Inputs) {
     anywhere_with(seed, |_, _| {})
 }
 
-/// The same with other tanks.
+/// Returns a random craft as [`anywhere`] does, with changed tanks.
 fn anywhere_with(
     seed: u64,
     change: impl Fn(&mut Random, &mut Tank),
@@ -540,8 +539,8 @@ fn forces_on_the_dry_craft_balance() {
     }
 }
 
-/// A random tank somewhere on its bobs' spheres, and the host's motion; every third without axial symmetry, every third with bobs on
-/// other surfaces than spheres.
+/// Returns a random tank with bobs anywhere on their spheres, and the host's motion. Every third tank has no
+/// axial symmetry, and every third has bobs on surfaces other than spheres.
 fn tank_anywhere(seed: u64, coupling: Coupling) -> (TankParameters, SloshTank, TankInputs) {
     let mut random = Random::new(seed);
     let mut p = TankParameters { tank: random.tank(), coupling, ..TankParameters::default() };
@@ -572,7 +571,7 @@ fn tank_anywhere(seed: u64, coupling: Coupling) -> (TankParameters, SloshTank, T
     (p, tank, u)
 }
 
-/// The symmetric matrix whose upper triangle is given by rows.
+/// Returns the symmetric matrix whose upper triangle is given row by row.
 fn symmetric(triangle: &[f64]) -> DMatrix<f64> {
     let mut m = DMatrix::zeros(6, 6);
     let places = (0..6).flat_map(|i| (i..6).map(move |j| (i, j)));
@@ -821,8 +820,8 @@ fn coupling_ratio_is_the_largest_eigenvalue() {
     assert_eq!(alone.coupling_ratio(), None);
 }
 
-/// The largest deviation of a and w' from a record's, relative to their largest, when they are
-/// worked out from the record's own states.
+/// Returns the largest deviation of a and w' from those of a record, relative to their largest, if they are
+/// computed from the record's own states.
 fn deviation(mistake: Mistake, record: &serde_json::Value) -> f64 {
     let p = records::parameters(record);
     let samples = &record["samples"];

@@ -14,8 +14,8 @@ type V = Vector3<f64>;
 
 const SAME: f64 = 1e-12;
 
-/// A random craft with at least one tank, and its inputs, a force at O and a torque. The tanks
-/// stand within some 30 degrees of the thrust: a bob that falls over grows differences more.
+/// Returns a random craft with at least one tank, and its inputs: a force at O and a torque. The tanks stand
+/// within about 30 degrees of the thrust, because a bob that falls over makes differences grow more.
 fn random_craft(seed: u64) -> (Random, Parameters, Vec<[f64; INPUTS]>) {
     let mut random = Random::new(seed);
     let mut p = random.parameters();
@@ -75,7 +75,7 @@ fn assert_same(got: &[f64], want: &[f64], what: &str) {
     }
 }
 
-/// q up to its sign.
+/// Asserts that attitudes are the same up to the sign of q.
 fn assert_same_attitude(got: &[f64], want: &[f64]) {
     let sign = got.iter().zip(want).map(|(a, b)| a * b).sum::<f64>().signum();
     let turned: Vec<f64> = got[..4].iter().map(|x| sign * x).collect();

@@ -621,7 +621,7 @@ fn a_flow_that_cannot_be_is_refused() {
     assert!(problems[1].starts_with("tank[1].liquid_0 = 30.0"), "{problems:?}");
 }
 
-/// A tank that swings after a jump of the craft's acceleration.
+/// Returns a tank that swings after a jump of the craft's acceleration.
 fn swinging_tank() -> (SloshTank, TankInputs) {
     let inputs = TankInputs { a: Ramp::held([1.0, 0.0, 9.0]), ..TankInputs::default() };
     let mut parameters = TankParameters::default();

@@ -69,12 +69,13 @@ impl Case {
         case
     }
 
-    /// Squared frequency of mode 1.
+    /// Returns the squared frequency of mode 1.
     fn omega2(&self) -> f64 {
         self.motion.axial / self.tank.length[0] + self.tank.k[0] / self.tank.mass[0]
     }
 
-    /// Rate at which the first of both limits by spin is met, by other formulas than the product's.
+    /// Returns the rate at which the first of the two limits by spin is reached, by formulas other than the
+    /// product's.
     fn largest_spin(&self) -> f64 {
         let radius = self.tank.wave[0] * (XI * XI - 1.0) / 2.0;
         let kh = (radius / (XI * self.tank.length[0])).atanh();

@@ -12,12 +12,12 @@ type M = Matrix3<f64>;
 /// A body: mass, centre of mass from O, inertia about it.
 type Body = (f64, V, M);
 
-/// m (|s|^2 1 - s s^T)
+/// Returns m (|s|^2 1 - s s^T), the inertia of a point mass.
 fn point(m: f64, s: V) -> M {
     m * (M::identity() * s.norm_squared() - s * s.transpose())
 }
 
-/// Mass, centre of mass and inertia about it.
+/// Returns mass, centre of mass and inertia about it of all bodies together.
 fn sum(bodies: &[Body]) -> Body {
     let mass: f64 = bodies.iter().map(|(m, ..)| m).sum();
     let center = bodies.iter().map(|(m, s, _)| *m * s).sum::<V>() / mass;
@@ -25,7 +25,7 @@ fn sum(bodies: &[Body]) -> Body {
     (mass, center, inertia)
 }
 
-/// Rigid liquid and bobs where `p` says, from the host's O.
+/// Returns the rigid liquid, and the bobs in the directions `p`, relative to the host's O.
 fn liquid(tank: &Tank, p: &[[f64; 3]]) -> Vec<Body> {
     let [q0, x, y, z] = tank.q;
     let axes = UnitQuaternion::from_quaternion(Quaternion::new(q0, x, y, z));

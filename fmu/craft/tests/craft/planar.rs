@@ -300,7 +300,7 @@ fn a_host_with_its_tanks_keeps_momentum_and_loses_the_energy_that_they_dissipate
     assert!(telling > 5, "{telling}");
 }
 
-/// The host's motion over a step that begins `t` later.
+/// Returns the host's motion over a step that begins `t` later.
 fn later(u: &TankInputs, t: f64) -> TankInputs {
     let at = |ramp: &Ramp| Ramp { value: ramp.at(t), slope: ramp.slope };
     let slope = u.omega_dot.slope;

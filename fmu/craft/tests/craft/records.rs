@@ -12,8 +12,8 @@ use super::component::{SloshTank, Spacecraft};
 /// Communication step of the records, s: inputs are linear between its multiples.
 pub const STEP: f64 = 0.02;
 
-/// The records: of the kind `craft`, and of the kind `tank`. The variable SIX_JSON names another
-/// file of the same form, such as the whole one.
+/// Reads the records of the kind `craft` or `tank`. The variable SIX_JSON can name another file of the same
+/// form, such as the complete one.
 pub fn records(kind: &str) -> Vec<Value> {
     let text = match std::env::var("SIX_JSON") {
         Ok(file) => std::fs::read_to_string(file).unwrap(),
@@ -24,7 +24,7 @@ pub fn records(kind: &str) -> Vec<Value> {
     records.into_iter().filter(|record| record["kind"] == kind).collect()
 }
 
-/// One record by its name.
+/// Returns a record by its name.
 pub fn record(name: &str) -> Value {
     let all = records("craft").into_iter().chain(records("tank"));
     all.into_iter().find(|record| record["name"] == name).unwrap()
@@ -34,14 +34,14 @@ pub fn number(value: &Value) -> f64 {
     value.as_f64().unwrap()
 }
 
-/// A signal's largest value in the record: the excerpt tells that of the whole record.
+/// Returns a signal's largest value in the complete record; the excerpt states it.
 pub fn largest(record: &Value, signal: &str) -> f64 {
     record["largest"][signal].as_f64().unwrap_or_else(|| {
         numbers(&record["samples"][signal]).iter().fold(0.0, |a: f64, x| a.max(x.abs()))
     })
 }
 
-/// Every number in nested lists.
+/// Collects every number in nested lists.
 pub fn numbers(value: &Value) -> Vec<f64> {
     match value {
         Value::Array(list) => list.iter().flat_map(numbers).collect(),
@@ -112,7 +112,7 @@ pub fn tank_parameters(record: &Value) -> TankParameters {
     TankParameters { tank: tank(&record["tank"]), ..TankParameters::default() }
 }
 
-/// An input from knot k to the next: sum of the terms for this port.
+/// Returns an input from knot k to the next: the sum of the terms for this port.
 fn ramp(terms: &Value, port: &str, k: usize) -> Ramp {
     let knot = |k: usize| k as f64 * STEP;
     let mut ends = [[0.0; 3]; 2];
@@ -157,7 +157,6 @@ pub fn inputs(record: &Value, k: usize) -> Inputs {
     }
 }
 
-/// The inputs as they are at the end of a step.
 pub fn at_end(inputs: &Inputs) -> Inputs {
     let end = |ramp: &Ramp| Ramp { value: ramp.at(STEP), slope: ramp.slope };
     Inputs {
@@ -168,7 +167,7 @@ pub fn at_end(inputs: &Inputs) -> Inputs {
     }
 }
 
-/// The host's motion from knot k to the next, where its rate is `omega` at the knot.
+/// Returns the host's motion from knot k to the next, where its rate is `omega` at the knot.
 pub fn motion(record: &Value, k: usize, omega: [f64; 3]) -> TankInputs {
     let terms = &record["motion"];
     TankInputs {
@@ -179,7 +178,7 @@ pub fn motion(record: &Value, k: usize, omega: [f64; 3]) -> TankInputs {
     }
 }
 
-/// The host's motion at the end of a step.
+/// Returns the host's motion at the end of a step.
 pub fn motion_at_end(inputs: &TankInputs) -> TankInputs {
     let end = |ramp: &Ramp| Ramp { value: ramp.at(STEP), slope: ramp.slope };
     let w_d = &inputs.omega_dot;
@@ -200,7 +199,7 @@ pub fn slosh_tank(record: &Value, tolerance: f64) -> SloshTank {
     SloshTank::new(&tank_parameters(record), &TankInputs::default(), 0.0, tolerance).unwrap()
 }
 
-/// Number of communication steps of a record, and number between two samples.
+/// Returns the number of communication steps of a record, and the number between two samples.
 pub fn steps(record: &Value) -> (usize, usize) {
     let whole = |t: f64| (t / STEP).round() as usize;
     (whole(number(&record["t_end"])), whole(number(&record["dt"])))

@@ -2,7 +2,7 @@
 
 use craft::{Inertia, Inputs, MODES, Mount, POINTS, Parameters, Spacecraft, Tank, TankParameters};
 
-/// A parameter: its name in messages, its place, its range.
+/// A parameter: its name in messages, its place, and its range.
 type Number = (&'static str, fn(&mut Parameters) -> &mut f64, f64, f64);
 
 /// Numbers of any craft.
@@ -48,7 +48,6 @@ const FILL: [Number; 6] = [
     ("tank[1].outlet", |p| &mut p.tank[0].outlet, -1e9, 1e9),
 ];
 
-/// Two tanks with two modes each.
 fn craft() -> Parameters {
     let mut p = Parameters { tanks: 2, ..Parameters::default() };
     for tank in &mut p.tank {
@@ -57,7 +56,7 @@ fn craft() -> Parameters {
     p
 }
 
-/// Message for that parameter with this `value`.
+/// Returns the message about this parameter with the value `value`, if it is refused.
 fn said(p: &Parameters, (name, place, ..): &Number, value: f64) -> Option<String> {
     let mut p = *p;
     *place(&mut p) = value;

@@ -30,7 +30,7 @@ fn inputs() -> Inputs {
     Inputs { force: Ramp::held([0.0, 0.0, THRUST]), ..Inputs::default() }
 }
 
-/// One tank on the axis at height z, undamped.
+/// Returns a craft with one undamped tank on the axis at height z.
 fn craft_with_tank_at(z: f64, k: f64, c: f64) -> Parameters {
     let j = Inertia { xx: 860.0, yy: 860.0, zz: 640.0, xy: 0.0, xz: 0.0, yz: 0.0 };
     let mut p = Parameters::default();
@@ -44,10 +44,10 @@ fn craft_with_tank_at(z: f64, k: f64, c: f64) -> Parameters {
     p
 }
 
-/// The closed forms' letters.
+/// Quantities of the closed-form solution, with its letters.
 struct Closed {
     m: f64,
-    /// M and I of R
+    /// M and I of the rigid body R.
     mass: f64,
     inertia: f64,
     g: f64,
@@ -55,7 +55,7 @@ struct Closed {
     b: f64,
     w_0_2: f64,
     sigma: f64,
-    /// height of R's centre of mass from O
+    /// Height of R's centre of mass above O.
     center: f64,
 }
 
@@ -101,7 +101,7 @@ fn column(craft: &mut Spacecraft, state: Option<usize>, du: [f64; INPUTS]) -> [f
     [rate[PITCH_RATE], rate[SLOSH_RATE]]
 }
 
-/// Pole^2, damping 2 zeta_p w_p, and zero^2 of theta over the given input.
+/// Returns pole^2, the damping 2 zeta_p w_p, and zero^2 of theta over the given input.
 fn pole_and_zero(p: &Parameters, du: [f64; INPUTS]) -> [f64; 3] {
     let mut craft = Spacecraft::new(p, &inputs(), 0.0, 1e-9).unwrap();
     let [alpha, gamma] = column(&mut craft, Some(SLOSH), [0.0; INPUTS]);
@@ -118,7 +118,7 @@ fn torque() -> [f64; INPUTS] {
     du
 }
 
-/// A lateral force at the height z from O.
+/// Returns the input direction of a lateral force at the height z above O.
 fn force_at(z: f64) -> [f64; INPUTS] {
     let mut du = [0.0; INPUTS];
     (du[0], du[4]) = (1.0, z);
@@ -164,7 +164,7 @@ fn damped_pole_is_the_closed_form() {
     assert_close(f64::sqrt(w_2 - damping * damping / 4.0), 2.63885131, 1e-8);
 }
 
-/// -p_x''/p_x of a mode whose craft is too heavy to move and accelerates by g.
+/// Returns -p_x''/p_x of a mode whose craft is too heavy to move and accelerates by g.
 fn frequency_2(tank: Tank, g: f64) -> f64 {
     let mut p = Parameters::default();
     let heavy = 1e11;
@@ -243,7 +243,7 @@ fn opposite_tanks_have_the_bench_s_antiresonance_and_resonance_in_yaw() {
 const K_P: f64 = 0.04;
 const K_D: f64 = 0.28;
 
-/// Point of attack of the lateral force, from O, m.
+/// Point of attack of the lateral force, height above O, m.
 const ENGINE: f64 = -1.3;
 
 /// Returns the growth rate of the slosh pole, 1/s, in a loop that makes tau = -K_p theta - K_d
@@ -276,7 +276,7 @@ fn growth(z: f64, c: f64) -> f64 {
     poles.iter().max_by(|a, b| a.norm().total_cmp(&b.norm())).unwrap().re
 }
 
-/// The rate in first order of the gains: K_d (w_z^2 - w_p^2)/(2 I w_p^2).
+/// Returns the growth rate to first order in the gains: K_d (w_z^2 - w_p^2)/(2 I w_p^2).
 fn predicted_growth(z: f64) -> f64 {
     let closed = Closed::new(&craft_with_tank_at(z, 0.0, 0.0));
     let (zero, pole) = (closed.zero_of_force(ENGINE - closed.center), closed.pole());

@@ -5,7 +5,7 @@ use craft::{Inertia, Inputs, Mount, Parameters, Ramp, STATES, TankInputs, TankPa
 use super::component::{SloshTank, Spacecraft};
 use super::random::Random;
 
-/// A torque that swings, N m.
+/// Returns a sinusoidal torque, N m.
 fn torque(t: f64) -> f64 {
     0.6 * f64::sin(13.0 * t)
 }
@@ -18,7 +18,7 @@ fn torque_in_knot(k: usize) -> (f64, f64) {
     (from, (to - from) / KNOT)
 }
 
-/// The states after ten seconds of thrust and a swinging torque.
+/// Returns the states after ten seconds of thrust and a sinusoidal torque.
 fn after_ten_seconds(p: &Parameters) -> [f64; STATES] {
     let force = Ramp::held([50.0, 0.0, 2400.0]);
     let input = |k: usize| {

@@ -11,7 +11,7 @@ use super::component::Spacecraft;
 
 const G: f64 = 9.81;
 
-/// A platform of 12 kg, its centre of mass 0.1 m above the pivot, without tank.
+/// Returns a platform of 12 kg without a tank, with its centre of mass 0.1 m above the pivot.
 fn platform() -> Parameters {
     let j = Inertia { xx: 0.25, yy: 0.25, zz: 0.4, xy: 0.0, xz: 0.0, yz: 0.0 };
     Parameters {
@@ -24,7 +24,7 @@ fn platform() -> Parameters {
     }
 }
 
-/// A tank of 1.33 kg of rigid and 0.76 kg of sloshing liquid, undamped.
+/// Returns an undamped tank of 1.33 kg of rigid and 0.76 kg of sloshing liquid.
 fn tank() -> Tank {
     let mut tank = Tank {
         position: [0.0, 0.0, 0.05],
@@ -43,7 +43,7 @@ fn start(p: &Parameters) -> Spacecraft {
     Spacecraft::new(p, &Inputs::default(), 0.0, 1e-12).unwrap()
 }
 
-/// The quaternion of small turns about x and y.
+/// Returns the quaternion of small rotations about x and y.
 fn tilted([x, y]: [f64; 2]) -> [f64; 4] {
     [1.0, x / 2.0, y / 2.0, 0.0]
 }
@@ -80,7 +80,8 @@ fn a_spinning_platform_nutates_and_precesses_at_the_frequencies_of_a_top_on_a_sp
     }
 }
 
-/// x' = A x + B u of rates and accelerations at rest; the response of the rates about all axes to the torque about z.
+/// Returns the response of the rates about all axes to the torque about z at a frequency, from x' = A x + B u
+/// of rates and accelerations at rest.
 fn rates_per_torque(p: &Parameters, frequency: f64) -> [Complex<f64>; 3] {
     let mut craft = start(p);
     let column = |craft: &mut Spacecraft, state: Option<usize>| -> [f64; STATES] {
@@ -295,7 +296,7 @@ fn the_leakage_of_the_books_platform_is_that_of_its_linear_equations() {
     assert!((sharp / 0.135 - 1.0).abs() < 5e-3, "{sharp}");
 }
 
-/// Root mean square of the leakage on a logarithmic grid from 1.25 to 3.5 Hz.
+/// Returns the root mean square of the leakage on a logarithmic grid from 1.25 to 3.5 Hz.
 fn rms(p: &Parameters) -> f64 {
     let squares: f64 = (0..2000)
         .map(|k| {

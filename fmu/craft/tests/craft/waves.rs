@@ -13,8 +13,8 @@ pub const G: f64 = 9.80665;
 
 pub const TOLERANCE: f64 = 1e-12;
 
-/// The bench's tank of 81.5 mm radius, filled to `fill` radii, with its first mode alone and the coefficients of potential
-/// flow.
+/// Returns the bench's tank of 81.5 mm radius, filled to `fill` radii, with only its first mode and the
+/// coefficients of potential flow.
 pub fn bench(fill: f64) -> Tank {
     let (d, h) = (0.163, 0.0815 * fill);
     let pendulum = cylinder::pendulum(0, d, h, 2.083);
@@ -34,12 +34,12 @@ pub fn bench(fill: f64) -> Tank {
     tank
 }
 
-/// Frequency of small waves, rad/s.
+/// Returns the frequency of small waves, rad/s.
 pub fn linear_frequency(tank: &Tank) -> f64 {
     f64::sqrt(G / tank.length[0])
 }
 
-/// Specific force of an upright tank that is accelerated along x, m/s2.
+/// Returns the specific force of an upright tank that is accelerated along x, m/s2.
 pub fn sideways([value, slope]: [f64; 2]) -> Ramp {
     Ramp { value: [value, 0.0, G], slope: [slope, 0.0, 0.0] }
 }
@@ -52,10 +52,10 @@ pub trait Moved: Sized {
     /// Accelerates the tank along x for `h` s: value at the start (m/s2) and slope.
     fn step(&mut self, a: [f64; 2], h: f64);
 
-    /// p of the first mode and its rate.
+    /// Returns p of the first mode and its rate.
     fn bob(&mut self) -> [f64; 6];
 
-    /// Derivative of [`bob`](Self::bob) in a tank at rest.
+    /// Returns the derivative of [`bob`](Self::bob) in a tank at rest.
     fn rates(&mut self) -> [f64; 6];
 }
 
@@ -81,7 +81,8 @@ impl Moved for SloshTank {
     }
 }
 
-/// Frequency of the mode, over the linear one, when it is released at A = |q|/l in the plane of x and z.
+/// Returns the frequency of the mode, over the linear one, when it is released at A = |q|/l in the plane of x
+/// and z.
 pub fn planar<T: Moved>(mut tank: Tank, a: f64) -> f64 {
     tank.p_0[0] = [a, 0.0, -f64::sqrt(1.0 - a * a)];
     let w = linear_frequency(&tank);
@@ -96,7 +97,7 @@ pub fn planar<T: Moved>(mut tank: Tank, a: f64) -> f64 {
     FRAC_PI_2 / quarter / w
 }
 
-/// Frequency of the mode over the linear one on a circle with A = |q|/l.
+/// Returns the frequency of the mode, over the linear one, on a circle with A = |q|/l.
 pub fn circular<T: Moved>(mut tank: Tank, a: f64) -> f64 {
     let w = linear_frequency(&tank);
     tank.p_0[0] = [a, 0.0, -f64::sqrt(1.0 - a * a)];

@@ -21,7 +21,7 @@ fn at(g: f64) -> Inputs {
     Inputs { g_axial: Ramp::held(g), ..Inputs::default() }
 }
 
-/// The specific force over 4 s: ramps, a jump up, one to 0 and one from there.
+/// The specific force over 4 s: ramps, a jump up, one ramp to 0 and one from 0.
 const PIECES: [(Ramp, f64); 7] = [
     (Ramp { value: 9.81, slope: -3.0 }, 1.0),
     (Ramp { value: 6.81, slope: 0.0 }, 0.5),
@@ -184,7 +184,7 @@ fn ramps_to_zero_and_from_it_take_a_bounded_number_of_steps() {
     }
 }
 
-/// Damping ratio from the logarithmic decrement of the free tangential motion, hub held.
+/// Measures the damping ratio from the logarithmic decrement of the free tangential motion with the hub held.
 fn measured_zeta(p: &Parameters, g_start: f64, g: f64) -> f64 {
     let mut plant = Plant::new(p, &at(g_start), 0.0, TOLERANCE).unwrap();
     let length = plant.calculated().length[0];
@@ -288,8 +288,8 @@ fn derivatives_along_g_are_those_of_the_changing_damping() {
     }
 }
 
-/// One run as a Model Exchange host makes it, fixed steps of Runge-Kutta 4; the balance's
-/// residual over the work of g.
+/// Simulates as a Model Exchange host does, with fixed steps of Runge-Kutta 4, and returns the residual of
+/// the energy balance over the work of g.
 fn residual_of_a_host(p: &Parameters, h: f64, g: impl Fn(f64) -> f64) -> f64 {
     let mut plant = Plant::new(p, &at(g(0.0)), 0.0, TOLERANCE).unwrap();
     let energy = plant.outputs_held(&at(g(0.0))).energy;

@@ -2,7 +2,6 @@
 
 use plant::{FrictionModel, Parameters, SloshModel};
 
-/// Every slosh model.
 pub const SLOSH: [SloshModel; SloshModel::ALL.len()] = SloshModel::ALL;
 
 /// Slosh models with liquid that moves: all but the first, `Frozen`.
@@ -21,10 +20,9 @@ pub fn has_rim(slosh: SloshModel) -> bool {
     slosh == SloshModel::Liquid
 }
 
-/// Every friction law.
 pub const FRICTION: [FrictionModel; FrictionModel::ALL.len()] = FrictionModel::ALL;
 
-/// The bench with the given models.
+/// Returns the bench with the given slosh model and friction law.
 pub fn bench(slosh: SloshModel, friction: FrictionModel) -> Parameters {
     let mut p = Parameters::default();
     p.slosh.model = slosh;
@@ -32,8 +30,8 @@ pub fn bench(slosh: SloshModel, friction: FrictionModel) -> Parameters {
     p
 }
 
-/// A plant somewhere in the allowed range: sizes from a toy to a launcher's stage,
-/// any fill, one to ten modes, any damping and friction, a start in motion.
+/// Returns a plant anywhere in the allowed range: sizes from a toy to a launcher's stage, any fill, one to
+/// ten modes, any damping and friction, a start in motion.
 pub fn anywhere(rng: &mut fastrand::Rng, slosh: SloshModel, friction: FrictionModel) -> Parameters {
     let mut p = bench(slosh, friction);
     let mut between = |low: f64, high: f64| low + (high - low) * rng.f64();

@@ -10,7 +10,7 @@ fn at(g: f64) -> Inputs {
     Inputs { g_axial: Ramp::held(g), ..Inputs::default() }
 }
 
-/// A hub that does not move (the liquid, 2 kg, against 1e9 kg m2), no friction.
+/// Returns a hub without friction that does not move, because the liquid has 2 kg and the hub 1e9 kg m2.
 fn held(model: SloshModel) -> Parameters {
     let mut p = Parameters::default();
     (p.slosh.model, p.friction.model) = (model, FrictionModel::None);

@@ -6,10 +6,10 @@ use super::common::bench;
 use plant::{FrictionModel, Inputs, Outputs, Parameters, Plant, Ramp, SloshModel, SloshSource};
 
 const G: f64 = 9.81;
-/// Rounding of some thousand steps is what is left of balances.
+/// Balances hold up to the rounding errors of some thousand steps.
 const TOLERANCE: f64 = 1e-13;
 
-/// 5 kg of liquid with a mode along the tangent, one askew and one along the radius.
+/// Returns 5 kg of liquid with a mode along the tangent, one askew and one along the radius.
 fn askew(model: SloshModel, friction: FrictionModel) -> Parameters {
     let mut p = bench(model, friction);
     (p.slosh.source, p.slosh.modes) = (SloshSource::Table, 3);
@@ -81,7 +81,7 @@ struct Newton<'a> {
 }
 
 impl Newton<'_> {
-    /// Residual of the equations of hub and bobs with w' and al'' = `unknown`.
+    /// Returns the residual of the equations of hub and bobs for w' and al'' in `unknown`.
     fn residual(&self, x: &[f64], unknown: &[f64]) -> Vec<f64> {
         let (p, table) = (self.p, &self.p.slosh.table);
         let (r, w, w_d) = (p.tank.r, x[1], unknown[0]);
@@ -192,7 +192,8 @@ fn guides_forces_as_unknowns_move_hub_and_bobs_as_the_planar_model_does() {
     }
 }
 
-/// Inertia J of hub and liquid about the axis, with one mode along the radius at the angle be, and its first two derivatives.
+/// Returns the inertia J of hub and liquid about the axis, with one mode along the radius at the angle be,
+/// and its first two derivatives.
 fn inertia(p: &Parameters, be: f64) -> [f64; 3] {
     let (m, l, r) = (p.slosh.table.mass[0], p.slosh.table.length[0], p.tank.r);
     let m_0 = p.slosh.table.m_liq - m;

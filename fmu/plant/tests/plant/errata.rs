@@ -7,8 +7,8 @@ use std::f64::consts::{PI, TAU};
 use super::common::bench;
 use plant::{FrictionModel, Inputs, Plant, Ramp, STATES, SloshModel, x};
 
-/// The linear model's equations as the plant has them, by directional derivatives:
-/// rows theta'', al'' against theta, theta', al, al' and the torque.
+/// Returns the matrices of the plant's linear model by directional derivatives: rows theta'', al'' against
+/// theta, theta', al, al' and the torque.
 fn linear_system(h: f64, b: bool) -> ([[f64; 4]; 4], [f64; 4]) {
     let mut p =
         bench(SloshModel::Linear, if b { FrictionModel::Viscous } else { FrictionModel::None });
@@ -30,7 +30,7 @@ fn linear_system(h: f64, b: bool) -> ([[f64; 4]; 4], [f64; 4]) {
     (a, index.map(|i| rate[i]))
 }
 
-/// |omega/tau| at s = i 2 pi f, by solving (s - A) x = B.
+/// Returns |omega/tau| at s = i 2 pi f, by solving (s - A) x = B.
 fn gain(system: &([[f64; 4]; 4], [f64; 4]), f: f64) -> f64 {
     // Without theta, which nothing depends on: three complex equations by Cramer's rule.
     let (a, b) = system;
@@ -55,7 +55,7 @@ fn gain(system: &([[f64; 4]; 4], [f64; 4]), f: f64) -> f64 {
     n.0.hypot(n.1) / d.0.hypot(d.1)
 }
 
-/// Frequency of the largest (sign 1) or smallest (-1) gain between two frequencies.
+/// Returns the frequency of the largest (sign 1) or smallest (-1) gain between two frequencies.
 fn extremum(system: &([[f64; 4]; 4], [f64; 4]), low: f64, high: f64, sign: f64) -> f64 {
     let (mut low, mut high) = (low, high);
     for _ in 0..200 {

@@ -162,7 +162,8 @@ fn stops(plant: &mut Plant, inputs: &Inputs, end: f64) -> Vec<StepEnd> {
     }
 }
 
-/// Rigid liquid on a hub that a torque brakes by Coulomb friction alone: at rest after I w/(tau + c), held.
+/// Returns a hub with rigid liquid that a torque brakes against Coulomb friction, and the time I w/(tau + c)
+/// after which it comes to rest and is held.
 fn braked() -> (Parameters, f64) {
     let mut p = bench(SloshModel::Frozen, FrictionModel::Stribeck);
     (p.friction.b, p.friction.d, p.init.omega) = (0.0, 0.0, 0.02);

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use plant::{FrictionModel, Inputs, Parameters, Plant, SloshModel};
 
-/// A hub that hardly moves (the liquid, 2 kg, against 1e9 kg m2), no damping, no friction.
+/// Returns a hub that hardly moves (2 kg of liquid against 1e9 kg m2), without damping and friction.
 pub fn held(model: SloshModel, depth: f64) -> Parameters {
     let mut p = Parameters::default();
     (p.slosh.model, p.friction.model) = (model, FrictionModel::None);
@@ -33,13 +33,14 @@ fn frequency(p: &Parameters, h: f64) -> f64 {
     TAU * cycles / (crossings[crossings.len() - 1] - crossings[0])
 }
 
-/// [`shifts_of`] the bench with this model and depth.
+/// Returns [`shifts_of`] for the bench with this model and depth.
 pub fn shifts(model: SloshModel, depth: f64, h: f64) -> [f64; 2] {
     shifts_of(held(model, depth), h)
 }
 
-/// Relative shift of omega^2 per squared slosh angle of planar and circular motion at 0.05 rad. The next
-/// order is that share squared of it, 2.5e-3, times numbers of order 1. The motion is sampled every `h` seconds.
+/// Measures the relative shift of omega^2 per squared slosh angle of planar and circular motion at 0.05 rad.
+/// The next order is 2.5e-3 (0.05 rad squared) of it, times numbers of order 1. The motion is sampled every
+/// `h` seconds.
 pub fn shifts_of(mut p: Parameters, h: f64) -> [f64; 2] {
     let amplitude: f64 = 0.05;
     let plant = Plant::new(&p, &Inputs::default(), 0.0, 1e-9).unwrap();

@@ -4,13 +4,13 @@
 use super::common::bench;
 use plant::{Calculated, FrictionModel, Inputs, Outputs, Parameters, Plant, Ramp, SloshModel, x};
 
-/// Between samples, s. Differences of five points leave (omega h)^4/30 of a derivative: 2e-8 of the second
+/// Sampling interval, s. Differences of five points leave (omega h)^4/30 of a derivative: 2e-8 of the second
 /// mode's, at 25 rad/s.
 const H: f64 = 5e-4;
 
 const G: f64 = 9.81;
 
-/// A bench that leans, with three modes of which two move, and an unbalanced hub.
+/// Returns a tilted bench with three modes, of which two move, and an unbalanced hub.
 fn moving(slosh: SloshModel) -> Parameters {
     let mut p = bench(slosh, FrictionModel::Viscous);
     p.slosh.modes = 3;
@@ -27,11 +27,11 @@ fn moving(slosh: SloshModel) -> Parameters {
 /// m, and what stands for its height in the potential energy.
 struct Place {
     theta: f64,
-    /// x from the axis, y, height that moves with it, height that gravity feels
+    /// For each bob: x from the axis, y, height that moves with it, height that gravity acts on.
     bobs: Vec<[f64; 4]>,
 }
 
-/// Displacement of a bob from the hinge, its height, and the height that gravity feels.
+/// Returns the displacement of a bob from the hinge, its height, and the height that gravity acts on.
 fn displaced(p: &Parameters, l: f64, first: bool, q: [f64; 2]) -> [f64; 4] {
     let [a, b] = q;
     match p.slosh.model {
@@ -68,7 +68,7 @@ fn place(p: &Parameters, known: &Calculated, plant: &Plant) -> Place {
     Place { theta: states[x::THETA], bobs: (0..modes).map(bob).collect() }
 }
 
-/// First and second derivative at the middle of five samples.
+/// Returns the first and second derivative at the middle of five samples.
 fn derivatives(f: [f64; 5]) -> [f64; 2] {
     let [a, b, c, d, e] = f;
     [
@@ -77,7 +77,7 @@ fn derivatives(f: [f64; 5]) -> [f64; 2] {
     ]
 }
 
-/// The outputs in the middle of five samples, with everything as differences have it.
+/// Returns the outputs in the middle of five samples, and the samples from which differences are computed.
 fn sampled(p: &Parameters) -> (Calculated, [Place; 5], Outputs) {
     let inputs = Inputs { tau_cmd: Ramp::held(0.3), ..Inputs::default() };
     let mut plant = Plant::new(p, &inputs, 0.0, 1e-13).unwrap();

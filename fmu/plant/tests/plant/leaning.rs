@@ -9,8 +9,8 @@ use crate::common::SLOSHING;
 
 const G: f64 = 9.81;
 
-/// A tank of h/R = 1, undamped, on a hub that its liquid can't move. Gravity across the axis, of the slope `s`, points `beta` from outwards
-/// to the tangent.
+/// Returns a tank of h/R = 1 without damping, on a hub that its liquid cannot move. Gravity across the axis
+/// has the slope `s` and the direction `beta`, from outwards to the tangent.
 fn leaning(model: SloshModel, s: f64, beta: f64) -> Parameters {
     let mut p = Parameters::default();
     (p.slosh.model, p.friction.model) = (model, FrictionModel::None);
@@ -30,7 +30,7 @@ fn plant(p: &Parameters) -> Plant {
     Plant::new(p, &at(0.0), 0.0, 1e-11).unwrap()
 }
 
-/// Displacement of mode 1 over its pendulum's length where it hangs at rest.
+/// Returns the displacement of mode 1 over its pendulum's length when it hangs at rest.
 fn rest(p: &Parameters) -> f64 {
     let s = p.bench.tilt.tan();
     let spring = match p.slosh.model {

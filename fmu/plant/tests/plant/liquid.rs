@@ -31,7 +31,7 @@ fn a_liquid_has_the_shifts_of_the_third_order() {
     }
 }
 
-/// A tank given by a table, with these coefficients of mode 1.
+/// Returns a tank given by a table, with these coefficients of mode 1.
 fn table(mut p: Parameters, s: f64, kappa: f64) -> Parameters {
     p.slosh.source = SloshSource::Table;
     let table = &mut p.slosh.table;

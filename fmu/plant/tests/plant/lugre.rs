@@ -51,7 +51,7 @@ fn energy_balances_and_the_bearing_never_gives_any() {
     }
 }
 
-/// Dissipated power with the hub at a rate and the bristles at a share of g_max.
+/// Returns the dissipated power with the hub at a rate and the bristles at a share of g_max.
 fn dissipation(plant: &mut Plant, p: &Friction, omega: f64, share: f64) -> f64 {
     let mut x = [0.0; STATES];
     (x[x::OMEGA], x[x::BRISTLE]) = (omega, share * G_MAX / p.sigma0);
@@ -127,8 +127,8 @@ fn stiff_bristles_approach_the_set_valued_law() {
     assert!(differences[2] < 2e-5, "{differences:?}");
 }
 
-/// tau_f along a prescribed motion, by Runge-Kutta 4 on the bristle alone: the hub's rate is
-/// set at every instant. Returns (rate, friction torque, dissipated power) after each step.
+/// Computes tau_f along a prescribed motion by Runge-Kutta 4 on the bristle alone; the hub's rate is set at
+/// every instant. Returns (rate, friction torque, dissipated power) after each step.
 fn driven(
     p: &Parameters,
     omega: impl Fn(f64) -> f64,
@@ -202,7 +202,7 @@ fn motion_before_sliding_runs_through_closed_loops() {
     assert!(third.iter().all(|(_, friction, _)| friction.abs() < 0.8 * G_MAX));
 }
 
-/// Friction on the way up minus on the way down at the mean rate, N m, at a frequency of the
+/// Returns the friction on the way up minus that on the way down at the mean rate, N m, at a frequency of the
 /// rate in rad/s.
 fn lag(frequency: f64) -> f64 {
     let mut p = bench(SloshModel::Frozen);

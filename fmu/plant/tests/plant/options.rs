@@ -7,7 +7,6 @@ use plant::{FrictionModel, Inputs, Outputs, Parameters, Plant, Ramp, SloshModel,
 
 const TOLERANCE: f64 = 1e-9;
 
-/// The models with sloshing liquid.
 fn sloshing() -> impl Iterator<Item = SloshModel> {
     SloshModel::ALL.into_iter().filter(|model| *model != SloshModel::Frozen)
 }
@@ -20,8 +19,8 @@ fn bench(slosh: SloshModel, friction: FrictionModel) -> Parameters {
     p
 }
 
-/// Leaning by 3 degrees, an unbalanced hub, a ring, damping that grows with the amplitude, surface tension a hundred
-/// times water's.
+/// Returns a bench with all options: tilted by 3 degrees, an unbalanced hub, a ring, damping that grows with
+/// the amplitude, surface tension a hundred times that of water.
 fn everything(slosh: SloshModel, friction: FrictionModel) -> Parameters {
     let mut p = bench(slosh, friction);
     (p.bench.tilt, p.bench.tilt_azimuth) = (0.05, 0.7);
@@ -42,7 +41,7 @@ fn plant(p: &Parameters) -> Plant {
     Plant::new(p, &at(9.81), 0.0, TOLERANCE).unwrap()
 }
 
-/// Constant, falling to 0, none, rising again.
+/// Specific force: constant, falling to 0, zero, rising again.
 const PIECES: [(Ramp, f64); 4] = [
     (Ramp { value: 9.81, slope: 0.0 }, 1.0),
     (Ramp { value: 9.81, slope: -9.81 }, 1.0),
@@ -217,7 +216,7 @@ fn dry_friction_holds_a_leaning_hub() {
     assert!(moved.outputs(&at(9.81)).theta > 0.01, "it turns downhill");
 }
 
-/// A hub that does not move, no viscous damping, a ring d/R = w/R = 0.1.
+/// Returns a hub that does not move, without viscous damping, with a ring d/R = w/R = 0.1.
 fn ringed(slosh: SloshModel) -> Parameters {
     let mut p = bench(slosh, FrictionModel::None);
     p.hub.inertia = 1e9;

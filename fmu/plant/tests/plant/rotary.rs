@@ -102,9 +102,9 @@ fn stereographic_model_agrees_with_a_unit_vector_one_past_the_horizontal() {
     }
 }
 
-/// A hub too heavy to feel the liquid, its tank so far out that the hinge moves on a
-/// straight line: y = eps l cos(w t). Starts on the planar orbit of amplitude
-/// a eps^(1/3), mu a + a^3/8 + 1 = 0, with a radial seed; returns whether the seed grows.
+/// Returns whether a radial seed grows. The hub is too heavy to feel the liquid, and its tank is so far out
+/// that the hinge moves on a straight line: y = eps l cos(w t). The motion starts on the planar orbit of
+/// amplitude a eps^(1/3), mu a + a^3/8 + 1 = 0.
 fn leaves_the_plane(eps: f64, mu: f64) -> bool {
     let mut p = bench(SloshModel::Spherical, FrictionModel::None);
     p.tank.r = 1000.0;
@@ -164,7 +164,7 @@ fn forced_pendulum_loses_planar_stability_at_the_analytic_boundaries() {
     }
 }
 
-/// Radial over tangential amplitude in the last 50 of 400 s of a steady sine.
+/// Returns the radial over the tangential amplitude in the last 50 of 400 s of a steady sine.
 fn swirl(p: &Parameters, frequency: f64, amplitude: f64) -> f64 {
     let h = 0.02;
     let torque = |k: usize| amplitude * (TAU * frequency * k as f64 * h).sin();

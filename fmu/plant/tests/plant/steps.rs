@@ -3,7 +3,7 @@
 use super::common::bench;
 use plant::{FrictionModel, Inputs, Parameters, Plant, Ramp, STATES, SloshModel, StepError};
 
-/// Displaced liquid on a hub that turns, under a torque that brakes it.
+/// Returns displaced liquid on a hub that turns, under a torque that brakes it.
 fn start(slosh: SloshModel, friction: FrictionModel) -> (Parameters, Inputs) {
     let mut p = bench(slosh, friction);
     p.friction.eps = 1e-2;
@@ -18,7 +18,7 @@ fn after(p: &Parameters, inputs: &Inputs, tolerance: f64, h: f64) -> [f64; STATE
     *plant.continuous_states()
 }
 
-/// The internal steps that `h` takes.
+/// Returns the number of internal steps that `h` takes.
 fn steps(p: &Parameters, inputs: &Inputs, tolerance: f64, h: f64) -> usize {
     let is_enough = |max_steps: usize| {
         let mut p = *p;
@@ -61,8 +61,9 @@ fn where_series_end_a_long_step_takes_as_many_internal_ones_as_a_short_one() {
     assert_eq!(long, short);
 }
 
-/// Internal steps by slosh model and friction law, each in the order of its numbers, at the tolerances 1e-5 and 1e-10. More would be slower, fewer
-/// less exact; one in twenty is rounding.
+/// Numbers of internal steps by slosh model and friction law, each in the order of its numbers, at the
+/// tolerances 1e-5 and 1e-10. More would be slower, fewer less exact; a deviation of one in twenty is
+/// rounding.
 const STEPS: [[[usize; 2]; FrictionModel::ALL.len()]; SloshModel::ALL.len()] = [
     [[2, 2], [2, 2], [7, 11], [4, 5], [121, 129]],
     [[7, 12], [7, 12], [34, 56], [16, 29], [174, 194]],

@@ -11,14 +11,14 @@ fn plant(p: &Parameters) -> Plant {
     Plant::new(p, &Inputs::default(), 0.0, TOLERANCE).unwrap()
 }
 
-/// A frozen hub on a line of 0.5 N m/rad, twisted by 0.1 rad at the start.
+/// Returns a bench with rigid liquid on a line of 0.5 N m/rad, twisted by 0.1 rad at the start.
 fn frozen(friction: FrictionModel) -> Parameters {
     let mut p = bench(SloshModel::Frozen, friction);
     (p.hub.k, p.hub.theta_0, p.init.theta) = (0.5, -0.2, -0.1);
     p
 }
 
-/// Inertia of hub and rigid liquid, kg m2.
+/// Returns the inertia of hub and rigid liquid, kg m2.
 fn inertia(p: &Parameters) -> f64 {
     let m_liq = 1000.0 * PI / 4.0 * p.tank.d * p.tank.d * p.tank.h;
     p.hub.inertia + m_liq * p.tank.r * p.tank.r

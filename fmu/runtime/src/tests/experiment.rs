@@ -104,7 +104,7 @@ fn parameters_that_do_not_go_together_end_initialization_with_all_that_is_wrong(
     );
 }
 
-/// Every call with its name.
+/// All calls.
 const CALLS: [&Call; 40] = [
     &SET_DEBUG_LOGGING,
     Fmi2::SETUP_EXPERIMENT,
@@ -148,7 +148,7 @@ const CALLS: [&Call; 40] = [
     Fmi2::GET_NOMINALS,
 ];
 
-/// Calls allowed in every state but "fatal" of both interfaces.
+/// Calls that both interfaces allow in every state except "fatal".
 const ALWAYS: [&str; 12] = [
     "SetDebugLogging",
     "Reset",
@@ -168,9 +168,8 @@ const STATUS: [&str; 5] =
 const SET: [&str; 4] = ["SetReal", "SetInteger", "SetBoolean", "SetString"];
 const LOOK: [&str; 3] = ["GetDerivatives", "GetEventIndicators", "GetContinuousStates"];
 
-/// The state machines of FMI 2.0.1 (sections 3.2.3 and 4.2.4), state by state; with what this FMU
-/// allows besides: event mode may be entered once more, time and states set in it, and a step that
-/// failed may be ended.
+/// The state machines of FMI 2.0.1 (sections 3.2.3 and 4.2.4), state by state. In addition this FMU allows
+/// event mode to be entered once more, time and states to be set in it, and a step that failed to be ended.
 #[test]
 fn calls_allowed_in_each_state_are_those_of_the_standard() {
     use InstanceState::*;

@@ -8,10 +8,9 @@ use crate::c_abi::{self, Log, Status};
 use crate::log::{Category, Filter, Topic, categories};
 use crate::version::Version;
 
-/// Status, category, message.
 type Line = (Status, String, String);
 
-/// A log, and what has come through it.
+/// Returns a log and the list of what has been logged.
 fn log() -> (Log, Rc<RefCell<Vec<Line>>>) {
     let lines = Rc::new(RefCell::new(Vec::new()));
     let to = lines.clone();
@@ -63,7 +62,7 @@ fn events_are_told_to_those_who_ask_with_the_last_one_and_their_number() {
     assert!(lines.take().is_empty());
 }
 
-/// From the model that exists: with its parameters, its states and the inputs that act.
+/// Warnings concern the model that begins to move, with its parameters, its states and the present inputs.
 #[test]
 fn warnings_are_of_the_model_that_begins_to_move() {
     let mut instance = fresh(ME);

@@ -33,7 +33,7 @@ fn fresh(interface: Interface) -> Subject {
     Instance::new(interface)
 }
 
-/// An instance whose motion begins at t = 0, with these values set before.
+/// Returns an instance whose motion begins at t = 0, with these values set before.
 fn started(interface: Interface, values: &[(&str, f64)]) -> Subject {
     let mut instance = fresh(interface);
     for (name, value) in values {
@@ -44,7 +44,7 @@ fn started(interface: Interface, values: &[(&str, f64)]) -> Subject {
     instance
 }
 
-/// [`started`] in continuous-time mode.
+/// Returns [`started`] in continuous-time mode.
 fn continuous(values: &[(&str, f64)]) -> Subject {
     let mut instance = started(ME, values);
     instance.enter_continuous_time_mode().unwrap();
@@ -71,7 +71,7 @@ fn set_boolean(instance: &mut Subject, name: &str, b: bool) -> Result<(), Fault>
     instance.set(&SET_BOOLEAN, &[reference(name)], |_| Value::Boolean(b))
 }
 
-/// Any value, in the call for its type.
+/// Reads a value by the call for its type.
 fn get(instance: &mut Subject, name: &str) -> Result<Value, Fault> {
     let reference = reference(name);
     let call = match TABLE.scalars[reference as usize].variable.kind {
@@ -89,7 +89,7 @@ fn real(instance: &mut Subject, name: &str) -> f64 {
     }
 }
 
-/// The message of an error.
+/// Returns the message of a refused call.
 fn refused<T: std::fmt::Debug>(result: Result<T, Fault>) -> String {
     let fault = result.expect_err("it should be refused");
     assert_eq!(fault.severity, Severity::Error, "{}", fault.text);
@@ -102,7 +102,7 @@ fn discarded<T: std::fmt::Debug>(result: Result<T, Fault>) -> String {
     fault.text
 }
 
-/// A refused call leaves the instance unchanged.
+/// Asserts that a refused call leaves the instance unchanged, and returns its message.
 fn unchanged<T: std::fmt::Debug>(
     instance: &mut Subject,
     call: impl FnOnce(&mut Subject) -> Result<T, Fault>,
@@ -117,7 +117,7 @@ fn close(a: f64, b: f64, tolerance: f64) {
     assert!((a - b).abs() <= tolerance * b.abs().max(1e-300), "{a} instead of {b}");
 }
 
-/// A spring whose motion begins.
+/// Returns a spring whose motion begins.
 fn spring(interface: Interface) -> Instance<Spring, Fmi2> {
     let mut instance = Instance::new(interface);
     instance.enter_initialization_mode().unwrap();

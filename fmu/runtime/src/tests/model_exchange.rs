@@ -98,8 +98,8 @@ fn discrete_changes_happen_at_events_alone() {
     );
 }
 
-/// Before the motion what it starts from; then a state's derivatives are not asked for, another's are: without a leak a
-/// rate depends on what flows in alone.
+/// Before the motion a variable depends on the values from which it starts. Later it depends on states and
+/// inputs, as far as they have an effect at present: without a leak a rate depends only on the inflow.
 #[test]
 fn dependencies_are_what_counts_at_present_of_what_is_declared() {
     let of = |instance: &mut Subject, name: &str| {
@@ -142,7 +142,7 @@ fn states_that_mean_nothing_end_the_simulation() {
     assert_eq!(instance.state(), InstanceState::Failed);
 }
 
-/// Within 1e-9 of the time since the start, at least 1e-9 s, and 8 roundings of the largest time.
+/// The slack is 1e-9 of the time since the start, at least 1e-9 s, plus 8 roundings of the largest time.
 #[test]
 fn accepted_steps_may_pass_the_stop_time_by_rounding_errors() {
     for (start, stop, slack) in [

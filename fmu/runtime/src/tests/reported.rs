@@ -15,7 +15,7 @@ fn number(name: &str) -> u32 {
     reference(name) + 1
 }
 
-/// In step mode at `start`, with these values set before.
+/// Returns an instance in step mode at `start`, with these values set before.
 fn stepping(events: Events, start: f64, values: &[(&str, f64)]) -> Host {
     let mut host = Host::with_events(CS, events);
     for (name, x) in values {
@@ -31,7 +31,7 @@ fn stepping(events: Events, start: f64, values: &[(&str, f64)]) -> Host {
     host
 }
 
-/// State, number of movements and position of the valve, as the host sees them.
+/// Returns state, number of movements and position of the valve, as the host sees them.
 fn shown(host: &mut Host) -> [Value; 3] {
     [
         host.get(&GET_BOOLEAN, number("open")).unwrap(),
@@ -71,7 +71,7 @@ fn what_is_discrete_is_shown_as_it_was_until_the_host_handles_the_event() {
     assert_eq!(shown(&mut host), OPENED);
 }
 
-/// An error terminates an instance of FMI 3.0. Its variables can still be read.
+/// An error terminates an instance of FMI 3.0, but its variables can still be read.
 #[test]
 fn after_an_error_before_initialization_discrete_outputs_have_their_start_values() {
     let mut host = Host::with_events(CS, Events::Reported);
@@ -99,7 +99,7 @@ fn after_an_error_in_initialization_by_a_wrong_parameter_outputs_have_no_value()
     assert!(host.get(&GET_FLOAT64, number("level[1]")).is_err());
 }
 
-/// The platform rises by w = 0.25 m/s, from 0 at t = 1.
+/// The platform rises by w = 0.25 m/s from 0 at t = 1, and opens the valve.
 #[test]
 fn a_step_stops_at_an_event_if_the_host_allows_it_and_inputs_with_it() {
     let real = |host: &mut Host, name: &str| match host.get(&GET_FLOAT64, number(name)) {
@@ -119,7 +119,8 @@ fn a_step_stops_at_an_event_if_the_host_allows_it_and_inputs_with_it() {
     assert_eq!(after(Events::InStep, true, 6.0), ((false, false), (7.0, 1.5)), "not told");
 }
 
-/// The slack of a time before the last event: 1e-9 of the time since the start, and 8 roundings of the largest time.
+/// The slack of a time before the last event is 1e-9 of the time since the start, plus 8 roundings of the
+/// largest time.
 #[test]
 fn time_may_go_back_to_the_last_event_but_for_rounding_errors() {
     for (start, last, slack) in [
@@ -148,7 +149,8 @@ fn time_may_go_back_to_the_last_event_but_for_rounding_errors() {
     }
 }
 
-/// In FMI 3.0 the host may go on after both: a value out of its range, and a state that is none.
+/// After both errors the host may continue in FMI 3.0: an input outside its range, and invalid continuous
+/// states.
 #[test]
 fn values_out_of_range_are_discarded_and_say_what_is_allowed() {
     let mut host = stepping(Events::Reported, 0.0, &[]);
@@ -183,8 +185,9 @@ fn values_out_of_range_are_discarded_and_say_what_is_allowed() {
     assert!(refused(set(&mut two, "level[2]", 1.0)).contains("level[2]"));
 }
 
-/// A step that a shorter one may replace, a million internal ones; one that nothing replaces, a vessel that overflows. In
-/// FMI 2.0, where an error ends the simulation, both do.
+/// A step with a million internal steps is discarded, because a shorter one may succeed. A step in which a
+/// vessel overflows is an error, because no shorter one helps. In FMI 2.0 both are errors,
+/// which end the simulation.
 #[test]
 fn a_step_is_discarded_where_a_shorter_one_may_succeed() {
     let too_long = |discards: bool, done: Result<(), Fault>| {

@@ -7,7 +7,7 @@ use crate::hash::Hash;
 use crate::snapshot::{from_bytes, size};
 
 const CHECKSUM: usize = 16;
-/// Number of discrete outputs. The table in `snapshot.rs` has the places of the parts.
+/// Number of discrete outputs. The table in `snapshot.rs` has the positions of the parts.
 const SHOWN_COUNT: usize = 3;
 const FLAGS: usize = 55;
 const TIMES: usize = 58;
@@ -20,7 +20,8 @@ fn read(bytes: &[u8]) -> Result<Subject, String> {
     from_bytes(bytes)
 }
 
-/// A state with everything in it: a stop time, a model that has moved, slopes for the next step.
+/// Returns an instance whose state has all parts: a stop time, a model that has moved, slopes for the next
+/// step.
 fn eventful() -> Subject {
     let mut instance = fresh(CS);
     instance.setup_experiment(Some(1e-4), 1.0, Some(9.0)).unwrap();
@@ -105,7 +106,8 @@ fn a_state_goes_on_as_the_instance_would_have() {
     assert!(refused(again.do_step(2.0, 8.0)).contains("stop time 9.0 s"));
 }
 
-/// The step before ran along slopes: the outputs show them until an input is set, also after a return.
+/// The step before followed slopes: the outputs use them until an input is set, also after the state is
+/// restored.
 #[test]
 fn past_slopes_are_saved() {
     let mut instance = eventful();
@@ -136,7 +138,7 @@ fn a_state_of_the_other_interface_is_not_taken() {
     assert_eq!(to_bytes(&moved), to_bytes(&instance));
 }
 
-/// Bytes with something else in one place, and the right checksum.
+/// Returns bytes that are changed in one place, with the checksum adapted.
 fn patched(bytes: &[u8], place: usize, new: &[u8]) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     bytes[place..place + new.len()].copy_from_slice(new);

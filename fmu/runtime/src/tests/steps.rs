@@ -3,7 +3,7 @@
 use super::*;
 use crate::variable::Access;
 
-/// The level after `h` of one that leaks with k = 1/2.
+/// Returns the level of a vessel after `h` seconds with a leak of k = 1/2.
 fn level(x: f64, q: f64, slope: f64, h: f64) -> f64 {
     let e = (-0.5 * h).exp();
     x * e + 2.0 * q * (1.0 - e) + 2.0 * slope * (h - 2.0 * (1.0 - e))
@@ -53,8 +53,8 @@ fn a_step_has_a_length_and_begins_where_the_last_one_ended() {
     assert!(unchanged(&mut instance, |i| i.do_step(-0.5, 1.0)).contains("= -0.5 s"));
 }
 
-/// Hosts add up steps in their own way: times are the same within 1e-9 of the larger of step and time since the start, and
-/// within 8 roundings of the largest time.
+/// Hosts add up steps in their own ways. Times are the same within 1e-9 of the larger of step and time since
+/// the start, plus 8 roundings of the largest time.
 #[test]
 fn communication_point_may_be_off_by_rounding_errors() {
     for (start, before, h, slack) in [
@@ -115,7 +115,8 @@ fn a_step_to_the_stop_time_is_the_last() {
     );
 }
 
-/// q may not fall below 1. A ramp from 4 down to it may miss it by 1e-9 of its height: it ends there.
+/// q must not fall below 1. A ramp from 4 may miss this value by 1e-9 of its height and then ends exactly
+/// there.
 #[test]
 fn a_ramp_down_to_the_smallest_value_ends_there() {
     let after = |end: f64| {
@@ -163,8 +164,8 @@ fn a_rate_given_as_an_input_moves_the_input_that_it_is_the_rate_of() {
     assert_eq!(real(&mut instance, "z"), 1.25 + 0.5 * 0.5 + 0.5 * 2.0 * 0.25);
 }
 
-/// Outputs at the end of a step are limits from the left, with the slopes of that step; a new value or slope
-/// of any input begins the next one, without them.
+/// Outputs at the end of a step are limits from the left, with the slopes of that step. A new value or slope
+/// of any input begins the next step, without those slopes.
 #[test]
 fn past_slopes_are_seen_until_an_input_is_set() {
     let ramped = || {
@@ -250,7 +251,7 @@ fn derivatives_of_outputs_follow_states_and_slopes() {
     assert!(refused(rate(&mut fresh(CS), "sum")).contains("not allowed in state"));
 }
 
-/// Between steps outputs are as the present inputs leave the valve, and the model is not changed by it.
+/// Between steps, outputs show the valve as the present inputs make it, but the model itself is not changed.
 #[test]
 fn what_present_inputs_change_at_once_is_seen_and_undone() {
     let mut instance = started(CS, &[]);

@@ -95,7 +95,7 @@ fn units_and_enumerations_are_those_in_use() {
     assert!(Spring::table().enumerations().is_empty());
 }
 
-/// kg, m, s, rad of what a unit's name is made of.
+/// Returns the exponents of kg, m, s, rad of a part of a unit's name.
 fn base(symbol: &str) -> [i32; 4] {
     match symbol {
         "1" => [0, 0, 0, 0],
@@ -157,8 +157,8 @@ static OTHER_NAME: Enumeration = Enumeration {
     items: &[Item::new("x", ""), Item::new("y", "")],
 };
 
-/// Everything that a host depends on is in it, and with it a host's model description: it changes with
-/// each, and with nothing else.
+/// The GUID changes with everything on which a host, and therefore its model description, depends, and with
+/// nothing else.
 #[test]
 fn guid_changes_with_whatever_a_host_depends_on() {
     let guid = |about: About, variables: Vec<Variable<Vessels>>| {
@@ -240,7 +240,7 @@ fn inputs_that_do_not_stand_together_are_refused() {
     Table::new(TABLE.about, apart, scalars::<Vessels, N>(apart).to_vec().leak());
 }
 
-/// Only the description with arrays names the parameters that size them.
+/// Only the description with arrays names the parameters that determine their sizes.
 #[test]
 fn token_with_arrays_changes_with_what_sizes_them() {
     let tokens = |shape: &'static [Dimension]| {

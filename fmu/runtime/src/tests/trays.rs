@@ -8,10 +8,9 @@ use crate::table::{About, Scalar, Table, scalar_count, scalars};
 use crate::variable::Dimension::{Fixed, Sized};
 use crate::variable::Variable;
 
-/// Most trays.
 pub const MOST: usize = 3;
 
-/// Number of trays, and arrays without effect: by tray, by side first, and of length zero.
+/// Number of trays, and arrays without effect: sorted by tray, sorted by side, and of length zero.
 #[derive(Clone, Debug)]
 pub struct Parameters {
     rows: u8,
@@ -27,13 +26,12 @@ impl Default for Parameters {
     }
 }
 
-/// Inflow, m/s, with slopes.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Inputs {
     q: [[f64; 2]; MOST],
 }
 
-/// Levels, m.
+/// Levels of the trays, m.
 #[derive(Clone, Debug)]
 pub struct Trays {
     x: [f64; MOST],

@@ -20,21 +20,19 @@ fn token() -> std::ffi::CString {
     c_string(Spring::table().token(Layout::Scalars))
 }
 
-/// The value reference of a name.
 fn reference(name: &str) -> u32 {
     Spring::table().find(name).unwrap() + 1
 }
 
-/// Data of a test's host, behind its environment.
+/// Data of a test's host, to which its environment pointer leads.
 #[derive(Default)]
 struct TestHost {
     instance: Option<usize>,
     lines: Vec<(fmi3Status, String, String)>,
     /// Times of intermediate updates, and whether inputs could be set then.
     updates: Vec<(f64, bool)>,
-    /// The force that it sets at a piece's end.
+    /// The force that the host sets at the end of a part of the step.
     force: Option<f64>,
-    /// Time at which the host requests an early return.
     wish: Option<f64>,
     statuses: Vec<fmi3Status>,
     x: f64,
@@ -92,7 +90,7 @@ unsafe extern "C" fn update(
     }
 }
 
-/// An instance in Step Mode, and its host.
+/// Returns an instance in Step Mode with its host.
 fn stepping(early_return: bool) -> (fmi3Instance, Box<Mutex<TestHost>>) {
     let host = Box::new(Mutex::new(TestHost::default()));
     let environment = ptr::from_ref(&*host).cast_mut().cast();
@@ -124,7 +122,7 @@ fn stepping(early_return: bool) -> (fmi3Instance, Box<Mutex<TestHost>>) {
     (instance, host)
 }
 
-/// A step, its status, whether it returned early, and the last successful time.
+/// Makes a step, and returns its status, whether it returned early, and the last successful time.
 fn step(instance: fmi3Instance, at: f64, h: f64) -> (fmi3Status, bool, f64) {
     let (mut event, mut terminate, mut early, mut last) = (7, 7, 7, f64::NAN);
     let status = unsafe {
@@ -191,7 +189,8 @@ fn an_early_return_that_the_host_asks_for_is_where_it_wants_if_it_may() {
     unsafe { fmi3FreeInstance::<Spring>(instance) };
 }
 
-/// The force is to run to 1 within the step; but the host wants to return at once, and sets nothing in the next one.
+/// The force should rise to 1 within the step, but the host returns at once and sets nothing in the next
+/// step.
 #[test]
 fn after_an_early_return_at_once_inputs_are_held() {
     let (instance, host) = stepping(true);
@@ -380,7 +379,7 @@ fn a_derivative_has_a_number_for_each_of_its_variables() {
     }
 }
 
-/// w.(J v) = (J^T w).v: both sum the same products, in another order.
+/// w.(J v) = (J^T w).v: both sides sum the same products in different orders.
 #[test]
 fn adjoint_derivatives_are_the_transposed_directional_ones() {
     let (instance, _host) = stepping(false);
@@ -472,7 +471,7 @@ fn dependencies_are_those_of_the_start_until_it_is_over_and_then_those_declared(
     }
 }
 
-/// An instance of Model Exchange that tells its messages to `host`.
+/// Returns an instance of Model Exchange that sends its messages to `host`.
 fn model_exchange(host: &Mutex<TestHost>) -> fmi3Instance {
     let environment = ptr::from_ref(host).cast_mut().cast();
     let (name, token) = (c"one".as_ptr(), token());
@@ -591,7 +590,7 @@ fn times_come_with_initialization_and_those_that_are_not_defined_may_be_nan() {
     }
 }
 
-/// fmusim 0.8 asks in continuous-time mode, where the standard's table has neither.
+/// fmusim 0.8 calls these functions in continuous-time mode, where the standard's table allows neither.
 #[test]
 fn fmusim_may_ask_for_the_numbers_of_states_and_indicators_in_continuous_time_mode() {
     let host = Mutex::new(TestHost::default());

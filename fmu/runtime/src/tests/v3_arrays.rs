@@ -18,7 +18,7 @@ unsafe extern "C" fn log(to: *mut c_void, _: fmi3Status, _: fmi3String, what: fm
     lines.lock().unwrap().push(unsafe { text(what) }.unwrap());
 }
 
-/// An instance for a host that knows arrays.
+/// Returns an instance for a host that uses arrays.
 fn made(lines: &Lines) -> fmi3Instance {
     let token = c_string(Trays::table().token(Layout::Arrays));
     let environment = std::ptr::from_ref(lines).cast_mut().cast();
@@ -66,7 +66,7 @@ fn values_of_arrays_come_one_after_the_other_by_rows() {
     assert_eq!(*lines.lock().unwrap(), [""; 0]);
 }
 
-/// Messages name the error and the lengths of the arrays; of five and more the first four.
+/// Messages name the error and the lengths of the arrays; if there are five or more, the first four.
 #[test]
 fn wrong_counts_types_and_references_of_arrays_are_described() {
     let all = [6, 7, 8, 6, 8];
@@ -100,7 +100,8 @@ fn wrong_counts_types_and_references_of_arrays_are_described() {
     }
 }
 
-/// Whatever another number of trays sizes has its start values; the rest, and all where the number is what it was, stays.
+/// Arrays whose size changes get their start values again; everything else keeps its values, and everything
+/// if the number of trays is unchanged.
 #[test]
 fn another_size_starts_what_it_sizes_anew() {
     let lines = Lines::default();
@@ -137,7 +138,7 @@ fn another_size_starts_what_it_sizes_anew() {
     assert_eq!(*lines.lock().unwrap(), [told]);
 }
 
-/// Scalars 1 to 24 (k), time, two indicators: read alone, as Float64.
+/// Scalars 1 to 24 (k), time and two indicators can be read one by one as Float64.
 #[test]
 fn behind_the_table_s_scalars_are_time_and_the_event_indicators() {
     let lines = Lines::default();
@@ -188,8 +189,8 @@ fn behind_the_table_s_scalars_are_time_and_the_event_indicators() {
     assert_eq!(time_reference::<Trays>(), 25);
 }
 
-/// Dependencies on elements: of a square on all levels and inputs of the trays that there are, though all are 0 and so
-/// are the derivatives; of a rate on its own input.
+/// A square depends on all levels and inputs of the present trays, although all are 0 and so are the
+/// derivatives; a rate depends on its own input.
 #[test]
 fn elements_depend_on_elements_also_where_the_derivative_vanishes() {
     let lines = Lines::default();

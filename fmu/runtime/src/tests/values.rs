@@ -254,7 +254,7 @@ fn after_a_step_that_failed_the_last_values_can_be_read() {
     assert!(unchanged(&mut instance, |i| set(i, "z", 1.0)).contains("state \"step failed\""));
 }
 
-/// A leak of 1e300 1/s empties a level of 1e20 m at a rate that no number holds.
+/// A leak of 1e300 1/s empties a level of 1e20 m at a rate that exceeds all numbers.
 #[test]
 fn what_is_no_number_is_an_error_that_names_it_and_what_it_is_computed_from() {
     let mut instance = started(ME, &[]);

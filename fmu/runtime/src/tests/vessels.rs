@@ -11,9 +11,9 @@ use crate::table::{About, Scalar, Table, scalar_count, scalars};
 use crate::variable::Dimension::Fixed;
 use crate::variable::{Enumeration, Item, Variable};
 
-/// The height of the platform at which the valve opens, m.
+/// Height of the platform at which the valve opens, m.
 pub const OPENS: f64 = 2.0;
-/// The level at which a vessel overflows, m.
+/// Level at which a vessel overflows, m.
 pub const OVERFLOWS: f64 = 80.0;
 
 /// Leak (1/s), levels at the start (m), time of an inspection (s), and numbers without effect.
@@ -42,14 +42,12 @@ impl Default for Parameters {
     }
 }
 
-/// Each with its slope.
+/// Inputs, each with its slope.
 #[derive(Clone, Copy, Debug)]
 pub struct Inputs {
-    /// Inflow, m/s.
     q: [[f64; 2]; 2],
-    /// Height of the platform, m: its slope is its rate.
+    /// Height of the platform, m; its slope is the platform's rate.
     z: [f64; 2],
-    /// Rate of the platform, m/s.
     w: [f64; 2],
 }
 
@@ -59,7 +57,6 @@ impl Default for Inputs {
     }
 }
 
-/// Outputs.
 #[derive(Clone, Copy, Debug)]
 pub struct Outputs {
     sum: f64,
@@ -70,7 +67,7 @@ pub struct Outputs {
     valve: i32,
 }
 
-/// The levels are kept in the reverse of the host's order.
+/// The vessels; their levels are stored in the reverse of the host's order.
 #[derive(Clone, Debug)]
 pub struct Vessels {
     k: f64,
@@ -228,7 +225,7 @@ impl Model for Vessels {
         self.handle_event(inputs).map(|_| ()).map_err(failure)
     }
 
-    /// Stops at the inspection.
+    /// Makes a step that stops at the inspection.
     fn step_to_event(&mut self, inputs: &Inputs, h: f64) -> Result<StepEnd, StepFailure> {
         let left = self.inspection - self.time;
         if left <= 0.0 || left > h {

@@ -12,7 +12,7 @@ use crate::common::{
     zipped,
 };
 
-/// Our FMU, but for one misbehaviour.
+/// Returns our FMU with one misbehaviour, which the shim around its binary adds; `word` names it in shim.c.
 fn misbehaving(word: &str) -> Vec<u8> {
     let name = binary();
     let folder = format!("binaries/{PLATFORM}");
@@ -28,7 +28,8 @@ fn misbehaving(word: &str) -> Vec<u8> {
     zipped(&files, CompressionMethod::Stored)
 }
 
-/// The shim hands the address of a variable of its own back; a host that follows it jumps into the logger.
+/// The shim passes the address of its own variable to the logger; a host that follows this pointer would jump
+/// into it.
 #[test]
 fn an_fmu_that_hands_its_own_pointer_to_the_logger_breaks_one_rule_and_runs() {
     let folder = tempfile::tempdir().unwrap();
@@ -50,7 +51,7 @@ fn an_fmu_that_hands_its_own_pointer_to_the_logger_breaks_one_rule_and_runs() {
     assert!(format!("{refused:#}").contains("friction.b = -1"), "{refused:#}");
 }
 
-/// Each misbehaviour, and the rule that must tell it.
+/// Misbehaviours of the shim, and the rule that must find each.
 const MISBEHAVIOURS: &[(&str, &str)] = &[
     ("crashes_when_loaded", "load.opens"),
     ("types_platform", "load.types_platform"),
@@ -156,7 +157,7 @@ fn binaries_that_misbehave_are_told_by_the_rule_that_is_meant() {
     assert!(untold.is_empty(), "{}", untold.join("\n"));
 }
 
-/// Findings of one rule by whether they are errors, of our FMU with one misbehaviour.
+/// Checks our FMU with one misbehaviour, and returns the severities of one rule's findings and the report.
 #[cfg(target_os = "linux")]
 fn severities(word: &str, rule: &str) -> (Vec<Severity>, String) {
     let report = look(&misbehaving(word), &[rule]);
@@ -210,7 +211,8 @@ fn a_call_without_end_is_a_finding_and_not_the_end_of_the_check() {
     assert!(finding.text.contains("no end after 4 s"), "{}", finding.text);
 }
 
-/// Name | the word after which | what | is replaced by | the rule that finds it.
+/// Changes of modelDescription.xml: name | the text after which | the text that | is replaced by | the rule
+/// that must find it.
 const WORDS: &str = r#"
 another start | name="hub.I" | start="0.322414" | start="0.322415" | values.start
 a min that is refused | name="hub.I" | min="1e-6" | min="-1" | values.limits

@@ -13,7 +13,6 @@ use pack::packed_for_tests;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
-/// Files of an archive, in its order.
 pub type Files = Vec<(String, Vec<u8>)>;
 
 pub const XML: &str = "modelDescription.xml";
@@ -44,7 +43,6 @@ pub fn zipped(files: &Files, method: CompressionMethod) -> Vec<u8> {
     to.finish().unwrap().into_inner()
 }
 
-/// Path and name of binaries.
 pub fn binary() -> String {
     format!("binaries/{PLATFORM}/HubSlosh{}", std::env::consts::DLL_SUFFIX)
 }
@@ -59,7 +57,7 @@ pub fn with(name: &str, content: Vec<u8>) -> Files {
     files
 }
 
-/// Looks at some rules of an FMU that is given as bytes.
+/// Checks an FMU that is given as bytes by the rules `only`.
 pub fn look(bytes: &[u8], only: &[&str]) -> Report {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("Mutant.fmu");
@@ -76,12 +74,12 @@ pub fn check_rules(path: &Path, only: &[&str], limit: f64) -> Report {
     check::check(path, &options, |_| {}).unwrap()
 }
 
-/// Rules that are broken.
+/// Returns the rules that are broken.
 pub fn broken(report: &Report) -> BTreeSet<&'static str> {
     report.all().map(|(rule, _)| rule.id).collect()
 }
 
-/// Keeps an FMU for `.ci/other_tools.py`, with the rules that it breaks, in the folder that
+/// Keeps an FMU for `.ci/other_tools.py`, together with the rules that it breaks, in the folder that
 /// HUBSLOSH_KEEP_MUTANTS names.
 pub fn keep(name: &str, bytes: &[u8], rules: &[&str]) {
     let Some(folder) = std::env::var_os("HUBSLOSH_KEEP_MUTANTS").map(PathBuf::from) else { return };
@@ -96,7 +94,7 @@ pub fn keep(name: &str, bytes: &[u8], rules: &[&str]) {
     writeln!(index.unwrap(), "{file}\t{}\t{}", name.escape_debug(), rules.join(" ")).unwrap();
 }
 
-/// Each FMU breaks exactly the rules that are meant, among those of the groups looked at.
+/// Asserts that each FMU breaks exactly the rules that are named with it, among those of the groups.
 pub fn breaks(mutants: Vec<(&str, Vec<u8>, &[&str])>, groups: &[&str]) {
     let mut wrong = Vec::new();
     for (name, bytes, meant) in mutants {
@@ -110,7 +108,7 @@ pub fn breaks(mutants: Vec<(&str, Vec<u8>, &[&str])>, groups: &[&str]) {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// The XML with the first `from` after `after` changed to `to`.
+/// Returns modelDescription.xml with the first `from` after `after` changed to `to`.
 pub fn changed(after: &str, from: &str, to: &str) -> Vec<u8> {
     let text = xml();
     let at = text.find(after).unwrap_or_else(|| panic!("no {after}"));
@@ -120,20 +118,20 @@ pub fn changed(after: &str, from: &str, to: &str) -> Vec<u8> {
     zipped(&with(XML, text.into_bytes()), CompressionMethod::Stored)
 }
 
-/// Packs our FMU with another description.
+/// Packs our FMU with another model description.
 pub fn described(text: String) -> Vec<u8> {
     zipped(&with(XML, text.into_bytes()), CompressionMethod::Stored)
 }
 
-/// Cells of a table: a line a case.
+/// Parses a table into its cells; each line is a case, with " | " between the cells.
 pub fn cases<const N: usize>(table: &str) -> Vec<[&str; N]> {
     let cells = |line| str::split(line, " | ").collect::<Vec<_>>().try_into();
     let lines = table.lines().filter(|line| !line.is_empty());
     lines.map(|line| cells(line).unwrap_or_else(|_| panic!("not {N} cells: {line}"))).collect()
 }
 
-/// Each description breaks exactly the rules of the group `xml` that its line names: name | the word after which | what | is
-/// replaced by | rules.
+/// Asserts that each changed description breaks exactly the rules of the group `xml` that its line names:
+/// name | the text after which | the text that | is replaced by | rules.
 pub fn words_break(table: &str) {
     let cases = cases::<5>(table);
     let rules: Vec<Vec<&str>> = cases.iter().map(|case| case[4].split(' ').collect()).collect();
@@ -144,7 +142,7 @@ pub fn words_break(table: &str) {
     breaks(mutants.collect(), &["xml"]);
 }
 
-/// The library of a source in this folder, compiled once with these definitions.
+/// Returns the library of a source in this folder, compiled once with these definitions.
 pub fn compiled(source: &str, definitions: &[&str]) -> Vec<u8> {
     static LIBRARIES: Mutex<BTreeMap<String, Vec<u8>>> = Mutex::new(BTreeMap::new());
     let mut libraries = LIBRARIES.lock().unwrap_or_else(|poisoned| poisoned.into_inner());

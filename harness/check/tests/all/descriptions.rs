@@ -9,7 +9,7 @@ use crate::common::{
     XML, breaks, broken, changed, described, look, with, words_break, xml, zipped,
 };
 
-/// Ten entities, each ten times the one before: 10^10 characters.
+/// Defines ten entities, each of ten times the one before: 10^10 characters.
 fn entity_bomb() -> String {
     let mut entities = "<!ENTITY e0 \"xxxxxxxxxx\">".to_string();
     for n in 1..10 {
@@ -19,7 +19,7 @@ fn entity_bomb() -> String {
     text.replacen("description=\"", "description=\"&e9;", 1)
 }
 
-/// Elements in elements in an annotation, where the schema allows any.
+/// Returns a description with an annotation of nested elements; the schema allows any there.
 fn nested(levels: usize) -> String {
     let deep = "<a>".repeat(levels) + &"</a>".repeat(levels);
     let annotations =
@@ -27,7 +27,8 @@ fn nested(levels: usize) -> String {
     xml().replacen("<ModelVariables>", &format!("{annotations}<ModelVariables>"), 1)
 }
 
-/// No parser sees them: `host::xml` refuses levels without an end as too deep, not as ill-formed.
+/// No parser sees these levels: `host::xml` counts them first and refuses the file as too deep, not as
+/// ill-formed.
 #[test]
 fn two_hundred_thousand_levels_are_refused_by_their_number() {
     let bytes = zipped(&with(XML, nested(200_000).into_bytes()), CompressionMethod::Deflated);
@@ -141,7 +142,7 @@ a kind missing | index="3" | dependenciesKind="dependent  | dependenciesKind=" |
     );
 }
 
-/// The line of a list, counted from 0.
+/// Returns line `n` of a list in the description, counted from 0.
 fn line(list: &str, n: usize) -> String {
     let text = xml();
     text[text.find(list).unwrap()..].lines().nth(n + 1).unwrap().to_string()

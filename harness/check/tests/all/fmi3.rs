@@ -16,7 +16,8 @@ fn binary() -> String {
     format!("binaries/{PLATFORM}/Model3{}", std::env::consts::DLL_SUFFIX)
 }
 
-/// The files of the model with a fault of its own, whose number replaces the zeros of "MUTANT=00" in the library.
+/// Returns the files of the FMU of model3.c with one fault; its number replaces the zeros of "MUTANT=00" in
+/// the library.
 fn files(mutant: u32) -> Files {
     let mut library = compiled("model3.c", &[]);
     let at = library.windows(9).position(|bytes| bytes == b"MUTANT=00").unwrap();
@@ -39,7 +40,8 @@ fn an_fmu_3_without_a_fault_keeps_every_rule() {
     assert_eq!(skipped, ["zip.licenses", "zip.terminals", "zip.layered_standards"]);
 }
 
-/// A word of modelDescription.xml | what stands in its place | the rule that finds it. `\n` is the end of a line.
+/// Changes of modelDescription.xml: a text | its replacement | the rule that must find it. `
+/// ` is the end of a line.
 const STATIC: &str = r#"
 fmiVersion="3.0" | fmiVersion="3.0.2" | xml.fmi_version
 instantiationToken="{model3}" | instantiationToken="" | xml.token
@@ -164,7 +166,7 @@ fn a_wrong_archive_of_an_fmu_3_is_told() {
     }
 }
 
-/// Faults of model3.c by number, and the rule that tells each.
+/// Faults of model3.c by number, and the rule that must find each.
 const BEHAVIOUR: &[(u32, &str)] = &[
     (1, "instantiate.token"),
     (2, "life.reset"),
@@ -224,14 +226,14 @@ fn an_fmu_3_that_hands_its_instance_to_the_callbacks_breaks_one_rule() {
     assert_eq!(broken(&report), BTreeSet::from(["log.environment"]), "{}", report.text());
 }
 
-/// A comparison of runs says nothing where no two are the same.
+/// If no two runs are the same, a difference after a reset shows nothing.
 #[test]
 fn a_reset_is_not_blamed_for_runs_that_always_differ() {
     let report = report(&files(39), &["life"]);
     assert_eq!(broken(&report), BTreeSet::from(["life.deterministic"]), "{}", report.text());
 }
 
-/// The first library cannot be loaded; the other interface is checked.
+/// The first interface's library cannot be loaded; the other interface is checked nevertheless.
 #[test]
 fn one_interface_that_cannot_be_loaded_is_told_and_the_other_is_called() {
     let mut files = files(0);
@@ -249,7 +251,8 @@ fn one_interface_that_cannot_be_loaded_is_told_and_the_other_is_called() {
     assert_eq!(skipped, ["steps.answers"], "{}", report.text());
 }
 
-/// With fault 36 the library makes one instance in each process, which is a fault if it is not declared.
+/// With fault 36 the library allows only one instance in each process, which breaks rules unless it is
+/// declared.
 #[test]
 fn an_fmu_3_with_one_instance_per_process_keeps_the_rules_if_it_says_so() {
     let undeclared = files(36);

@@ -9,9 +9,9 @@ use zip::{CompressionMethod, ZipArchive};
 
 use crate::common::{Files, XML, broken, compiled, keep, look, zipped};
 
-/// Capabilities and compilation of the FMU of model.c.
+/// Capabilities of the FMU of model.c, and how to compile it.
 struct Small<'a> {
-    /// C definitions besides the rate.
+    /// Definitions for the C compiler in addition to the rate.
     definitions: &'a [&'a str],
     /// k in x' = -k (x - u), 1/s.
     rate: f64,
@@ -132,7 +132,7 @@ fn a_model_without_a_solution_is_told_as_that_and_by_one_rule() {
     assert!(text.contains("cannot be followed past t = 0.1"), "{text}");
 }
 
-/// Report of some rules on an FMU for Co-Simulation with these definitions besides.
+/// Checks the FMU for Co-Simulation with these additional definitions by the rules `only`.
 #[cfg(target_os = "linux")]
 fn stepped(definitions: &[&str], experiment: &str, only: &[&str]) -> Report {
     let all = [&BOTH[..1], definitions].concat();
@@ -211,7 +211,8 @@ fn a_crash_in_every_step_is_one_finding() {
     assert!(because.count() > 15, "{}", report.text());
 }
 
-/// Each case comes from a public FMU: a fault that several rules reported, or a value of ours that the FMU could refuse.
+/// Each case comes from a public FMU: either several rules reported one fault, or the FMU could refuse a
+/// value that the check sets.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_fault_is_told_by_its_own_rule_and_as_severe_as_it_is() {

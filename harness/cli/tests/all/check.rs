@@ -8,7 +8,7 @@ use host::xml::Element;
 use pack::archive::zipped;
 use pack::packed_for_tests;
 
-/// The exit code, stdout and stderr of a check of a file with this content.
+/// Checks a file with this content, and returns exit code, stdout and stderr.
 fn command(content: &[u8], arguments: &[&str]) -> (Option<i32>, String, String) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("file.fmu");
@@ -44,7 +44,7 @@ fn a_check_that_skips_every_selected_rule_fails_with_exit_code_2() {
     }
 }
 
-/// Our description alone, with hub.I = -1.
+/// Returns an archive with only our description, in which hub.I is -1, below its minimum.
 fn with_a_start_out_of_range() -> Vec<u8> {
     let xml = Archive::open(packed_for_tests()).unwrap().description().unwrap();
     let (head, tail) = xml.split_at(xml.find("name=\"hub.I\"").unwrap());

@@ -7,7 +7,6 @@ use std::process::{Command, Output};
 use pack::packed_for_tests;
 use signals::table::Table;
 
-/// Runs `hubslosh` in `directory`.
 fn hubslosh(directory: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_hubslosh"))
         .current_dir(directory)
@@ -16,14 +15,13 @@ fn hubslosh(directory: &Path, arguments: &[&str]) -> Output {
         .expect("the program runs")
 }
 
-/// A run of 0.2 s with further arguments.
+/// Makes a run of 0.2 s with further arguments.
 fn short_run(directory: &Path, arguments: &[&str]) -> Output {
     let fmu = packed_for_tests().to_str().unwrap();
     let common = ["run", "--fmu", fmu, "--stop", "0.2", "--out", "out.csv"];
     hubslosh(directory, &[&common, arguments].concat())
 }
 
-/// Files in a directory, sorted.
 fn files(directory: &Path) -> Vec<String> {
     let names = std::fs::read_dir(directory).unwrap().map(|f| f.unwrap().file_name());
     let mut names: Vec<String> = names.map(|n| n.to_string_lossy().into_owned()).collect();
@@ -31,8 +29,8 @@ fn files(directory: &Path) -> Vec<String> {
     names
 }
 
-/// The run fails with one line that says all of `words`, and leaves the directory as it was. A line with the columns that are
-/// used may stand before it.
+/// Asserts that a command fails with one line that has all of `words`, and leaves the directory unchanged. A
+/// line with the columns that are used may come before it.
 fn refuses(directory: &Path, output: impl FnOnce() -> Output, words: &[&str]) {
     let before = files(directory);
     let output = output();
@@ -46,8 +44,7 @@ fn refuses(directory: &Path, output: impl FnOnce() -> Output, words: &[&str]) {
     assert_eq!(files(directory), before, "it left something behind");
 }
 
-/// A copy of the FMU in `directory` whose modelDescription.xml went through `edit`; `None` leaves
-/// the file out.
+/// Copies the FMU to `directory` with its modelDescription.xml changed by `edit`; `None` leaves the file out.
 fn edited_fmu(directory: &Path, edit: impl Fn(String) -> Option<String>) -> PathBuf {
     use std::io::{Read, Write};
     let path = directory.join("Edited.fmu");

@@ -18,11 +18,11 @@ fn refused(directory: &Path, arguments: &[&str]) -> String {
     String::from_utf8(done.stderr).unwrap()
 }
 
-/// A hub that turns without friction or liquid: its rate is the torque's integral over the inertia, and a run has the rounding errors of
-/// a sum.
+/// A hub that turns without friction and with rigid liquid: its rate is the integral of the torque over the
+/// inertia, so that only the rounding errors of a sum remain.
 const FREE: [&str; 4] = ["--set", "slosh.model=frozen", "--set", "friction.model=none"];
 
-/// `time`, `tau_cmd` and `omega` of a run.
+/// Makes a run and returns `time`, `tau_cmd` and `omega`.
 fn run(directory: &Path, arguments: &[&str]) -> [Vec<f64>; 3] {
     let fmu = packed_for_tests().to_str().unwrap();
     let all = [&["run", "--quiet", "--fmu", fmu, "--out", "run.csv"], arguments].concat();
@@ -33,13 +33,13 @@ fn run(directory: &Path, arguments: &[&str]) -> [Vec<f64>; 3] {
     names.map(|name| table.column(name).unwrap().to_vec())
 }
 
-/// Inertia of the free hub, kg·m²: 1 N·m for a second.
+/// Measures the inertia of the free hub, kg·m², with 1 N·m for one second.
 fn inertia(directory: &Path) -> f64 {
     let profile = ["--profile", "constant:amplitude=1,duration=1"];
     1.0 / run(directory, &[&FREE[..], &profile].concat())[2].last().unwrap()
 }
 
-/// Checks a run with each step against the integral of its torque (N·m·s), in every row.
+/// Compares runs with several steps with the integral of their torque (N·m·s), in every row.
 fn follows(directory: &Path, source: &[&str], integral: &dyn Fn(f64) -> f64, within: f64) {
     let inertia = inertia(directory);
     let mut first: Option<[Vec<f64>; 3]> = None;
@@ -152,7 +152,8 @@ fn profiles_act_with_any_step() {
     follows("lin-sweep:amplitude=1,f0=1,f1=60,duration=2", &integral, 1e-4);
 }
 
-/// The torque is the same lines from command to command: all that changes with `--sample` is how close they are.
+/// The torque is always the same line from command to command; `--sample` only changes how close the commands
+/// are.
 #[test]
 fn a_sampled_controller_is_asked_for_by_its_interval() {
     let folder = tempfile::tempdir().unwrap();
@@ -212,7 +213,8 @@ fn torque_writes_every_edge_and_command() {
     assert!(said.contains("commands until 2700 s") && said.contains("are possible"), "{said}");
 }
 
-/// A campaign's rows must show the torque; what lies between them is followed as by `run`.
+/// A campaign's rows must be close enough to show the torque; between them the torque is followed as by
+/// `run`.
 #[test]
 fn a_campaign_follows_its_torque_or_names_the_step_that_it_needs() {
     let folder = tempfile::tempdir().unwrap();
@@ -277,7 +279,8 @@ fn design_refuses_a_profile_that_its_rows_do_not_follow() {
     assert!(said.contains("commands until 2700 s"), "{said}");
 }
 
-/// Held over each step, a line would be late by half of it, and a row would pair an input with the answer to the one before.
+/// If a line were held over each step, it would be late by half a step, and a row would pair an input with
+/// the response to the previous one.
 #[test]
 fn an_fmu_that_cannot_interpolate_has_inputs_that_are_constant_between_rows() {
     let folder = tempfile::tempdir().unwrap();

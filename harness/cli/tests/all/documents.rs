@@ -7,8 +7,9 @@ fn read(path: &str) -> String {
     std::fs::read_to_string(pack::root().join(path)).unwrap_or_else(|e| panic!("{path}: {e}"))
 }
 
-/// A newcomer finds the way to a first plot, the tools that the FMUs were tried with, and the commands of the source
-/// in the first screen. Each of the two commands of the source stands alone on its line, ready to copy.
+/// The first screen leads a newcomer to a first plot, to the tools with which the FMUs were tested, and to
+/// the commands of the source. Each of the two commands of the source stands alone on its line, ready to
+/// copy.
 #[test]
 fn readmes_first_40_lines_lead_to_a_plot_and_to_the_tests() {
     let readme = read("README.md");
@@ -29,8 +30,8 @@ fn readmes_first_40_lines_lead_to_a_plot_and_to_the_tests() {
     }
 }
 
-/// The wrapper that OpenModelica's importFMU writes drops the start values of inputs: one that is not set is 0,
-/// and with `g_axial` the tank is weightless.
+/// The wrapper that OpenModelica's importFMU writes drops the start values of inputs, so that an input that
+/// is not set is 0. With `g_axial` = 0 the tank would be weightless.
 #[test]
 fn openmodelicas_script_sets_every_input() {
     let script = read("harness/hosts/openmodelica.mos");

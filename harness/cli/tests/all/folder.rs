@@ -10,8 +10,8 @@ use files::output::sha256;
 use files::store::{CAMPAIGN, MANIFEST, Store};
 use pack::packed_for_tests;
 
-/// `hubslosh campaign` on a plan of this text, into `directory`/c; what is temporary goes to
-/// `directory`/tmp.
+/// Prepares `hubslosh campaign` on a plan with this text, with `directory`/c for the results and
+/// `directory`/tmp for temporary files.
 fn campaign(directory: &Path, plan: &str) -> Command {
     std::fs::write(directory.join("given.toml"), plan).unwrap();
     std::fs::create_dir_all(directory.join("tmp")).unwrap();
@@ -33,7 +33,6 @@ fn successful(mut command: Command) -> (String, String) {
     said(&done)
 }
 
-/// Names in a directory, sorted.
 fn names(directory: &Path) -> Vec<String> {
     let names = std::fs::read_dir(directory).unwrap().map(|entry| entry.unwrap().file_name());
     let mut names: Vec<String> = names.map(|name| name.to_string_lossy().into_owned()).collect();
@@ -41,7 +40,7 @@ fn names(directory: &Path) -> Vec<String> {
     names
 }
 
-/// Files of the campaign as name → bytes, those of runs left out.
+/// Returns the published files of the campaign (not the runs) as a map from name to content.
 fn published(directory: &Path) -> BTreeMap<String, Vec<u8>> {
     let files = names(&directory.join("c")).into_iter().filter(|name| name.contains('.'));
     let files = files.filter(|name| !name.starts_with('.'));
@@ -50,7 +49,7 @@ fn published(directory: &Path) -> BTreeMap<String, Vec<u8>> {
         .collect()
 }
 
-/// Every file in the manifest is what it says, and tables and plan belong together.
+/// Asserts that every file has the hash in the manifest, and that tables and plan belong together.
 fn is_consistent(directory: &Path) {
     let folder = directory.join("c");
     let manifest = std::fs::read_to_string(folder.join(MANIFEST)).unwrap();
@@ -197,7 +196,7 @@ fn a_second_campaign_in_a_directory_hears_who_holds_it() {
     successful(campaign(directory, plan));
 }
 
-/// Long enough to be stopped on its way: a run of an hour after a run of a second.
+/// A plan that can be interrupted: a run of one second, then runs of an hour.
 #[cfg(unix)]
 const INTERRUPTED: &str = "profile = \"zero\"\n[vary]\nprofile = [\"sine:duration=1\", \
     \"exp-sweep:duration=40000,amplitude=0.05\", \"exp-sweep:duration=40000,amplitude=0.06\", \
@@ -248,7 +247,7 @@ fn a_stopped_campaign_leaves_what_was_there_and_nothing_temporary() {
     }
 }
 
-/// A disk with room for files of so many blocks of 512 bytes.
+/// Runs a command on a disk with room for files of this many blocks of 512 bytes.
 #[cfg(unix)]
 fn limited(command: &Command, blocks: usize) -> Command {
     let mut shell = Command::new("sh");

@@ -5,12 +5,12 @@ use std::process::Command;
 
 use host::fmi3::PLATFORM;
 
-/// Packs model3.c with the fault of this number.
+/// Packs the FMU of model3.c with the fault of this number.
 pub fn model(path: &Path, mutant: u32) {
     changed_model(path, mutant, &[]);
 }
 
-/// The same with texts replaced, in the description or in the source.
+/// Packs the FMU of model3.c with a fault, and with texts replaced in its description and its source.
 fn changed_model(path: &Path, mutant: u32, changes: &[(&str, &str)]) {
     let sources = concat!(env!("CARGO_MANIFEST_DIR"), "/../check/tests/all/");
     let changed = |name: &str| {
@@ -33,8 +33,8 @@ fn changed_model(path: &Path, mutant: u32, changes: &[(&str, &str)]) {
     pack::archive::write(&files, path).unwrap();
 }
 
-/// Runs the model with an input along lines, which intermediateUpdate sets, and compares its outputs. Mutant 35 hands its
-/// instance to the callbacks.
+/// Runs the model with an input along straight lines, which intermediateUpdate sets, and compares its outputs
+/// with the closed solution. Mutant 35 passes its instance instead of the environment to the callbacks.
 #[test]
 fn an_fmu_3_runs_as_its_closed_solution_with_inputs_along_lines() {
     for mutant in [0, 35] {
@@ -45,7 +45,8 @@ fn an_fmu_3_runs_as_its_closed_solution_with_inputs_along_lines() {
     }
 }
 
-/// Without Co-Simulation the host integrates. A clock that nobody activates is named.
+/// Without Co-Simulation the host integrates. The clock, which the host does not activate, is named in a
+/// message.
 #[test]
 fn an_fmu_with_model_exchange_alone_runs_as_its_closed_solution() {
     let folder = tempfile::tempdir().unwrap();
@@ -68,7 +69,7 @@ fn an_fmu_with_model_exchange_alone_runs_as_its_closed_solution() {
     );
 }
 
-/// Returns what the command printed.
+/// Compares a run with the closed solution to `within`, and returns what the command printed.
 fn follows_its_closed_solution(path: &Path, folder: &Path, within: f64) -> String {
     let input = folder.join("u.csv");
     std::fs::write(&input, "time,u\n0,0\n10,5\n").unwrap();
@@ -103,7 +104,7 @@ fn follows_its_closed_solution(path: &Path, folder: &Path, within: f64) -> Strin
     String::from_utf8(done.stderr).unwrap()
 }
 
-/// The counter of this model shows 100 while its Boolean is true.
+/// The counter of this model is 100 while its Boolean is true.
 #[test]
 fn booleans_are_driven_from_a_file_and_held() {
     let folder = tempfile::tempdir().unwrap();

@@ -6,7 +6,7 @@ use std::process::{Command, Output};
 use analysis::statistics::deviation;
 use signals::table::Table;
 
-/// Runs the program in a folder.
+/// Runs `hubslosh` in a folder with the FMU for tests.
 fn run(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_hubslosh"))
         .current_dir(folder)
@@ -16,14 +16,14 @@ fn run(folder: &Path, arguments: &[&str]) -> Output {
         .unwrap()
 }
 
-/// Output of the program; stderr if it fails.
+/// Runs `hubslosh` and returns its output, or its stderr if it fails.
 fn hubslosh(folder: &Path, arguments: &[&str]) -> Result<String, String> {
     let done = run(folder, arguments);
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     if done.status.success() { Ok(text(&done.stdout)) } else { Err(text(&done.stderr)) }
 }
 
-/// A minute and a half of a bench without slosh, its gyro's noise in `omega`.
+/// Simulates 90 s of a bench without slosh; the column `omega` of the recording has the gyro's noise.
 fn record(folder: &Path, name: &str, settings: &[&str]) {
     let torque = "lin-sweep:amplitude=0.05,f0=0.3,f1=3,duration=90";
     let mut arguments = vec!["run", "--profile", torque, "--columns", "omega,omega_imu"];
@@ -174,7 +174,7 @@ fn a_removed_option_names_what_replaces_it() {
     }
 }
 
-/// `identify FILE` is `identify bench FILE`, and with --free `identify fmu FILE`.
+/// `identify FILE` means `identify bench FILE`, and with --free `identify fmu FILE`.
 #[test]
 fn a_command_without_a_kind_of_recording_has_the_usual_one() {
     let folder = tempfile::tempdir().unwrap();
@@ -227,7 +227,7 @@ fn a_design_uses_the_damping_ratio_that_is_set_and_prints_no_infinite_percentage
     assert!(!said.contains("inf"), "{said}");
 }
 
-/// Each torque is given to the FMU, and its gyro's samples are taken apart into rate and noise.
+/// Each torque drives the FMU, and the gyro's samples are split into rate and noise.
 #[test]
 fn the_torque_for_a_signal_to_noise_ratio_gives_it_in_the_gyros_samples() {
     let folder = tempfile::tempdir().unwrap();

@@ -10,7 +10,7 @@ fn hubslosh(directory: &Path, arguments: &[&str]) -> Output {
     Command::new(program).current_dir(directory).args(arguments).output().unwrap()
 }
 
-/// Error message of the command, in one line.
+/// Asserts that a command fails, and returns its error message.
 fn refused(directory: &Path, arguments: &[&str]) -> String {
     let output = hubslosh(directory, arguments);
     let said = String::from_utf8_lossy(&output.stderr).trim().to_string();
@@ -96,7 +96,7 @@ fn an_existing_file_that_looks_like_an_input_is_not_replaced() {
     assert_eq!(std::fs::read_to_string(at("A.fmu")).unwrap(), "an FMU");
 }
 
-/// Text of the help of a command and of those within it, by name.
+/// Collects the help texts of a command and of its subcommands by name.
 fn helps(command: &[&str], texts: &mut Vec<(String, String)>) {
     let output =
         Command::new(env!("CARGO_BIN_EXE_hubslosh")).args(command).arg("--help").output().unwrap();
@@ -112,7 +112,7 @@ fn helps(command: &[&str], texts: &mut Vec<(String, String)>) {
     texts.push((command.join(" "), text));
 }
 
-/// Options that name files which a command reads.
+/// Options with names of files that a command reads.
 const INPUTS: &str = "analyse --plan, analyse --bench-day, analyse --fmu, campaign --plan, campaign --fmu, \
     campaign --compare, design --fmu, example --fmu, gyro --recording, gyro --fmu, identify --fmu, run --input, \
     run --parameters, run --fmu, pack --parameters, variables --fmu, view --parameters, view --fmu, book --theme";
@@ -146,7 +146,8 @@ fn every_option_that_names_a_file_is_known_as_an_input_or_as_an_output() {
     assert!(unknown.is_empty(), "neither in INPUTS here nor in OUTPUTS of outputs.rs: {unknown:?}");
 }
 
-/// The examples of a help, continued lines joined, and what follows a pipe or a redirection left out.
+/// Returns the examples in a help text. Continued lines are joined; text after a pipe or a redirection is
+/// left out.
 fn examples(text: &str) -> Vec<String> {
     let joined = text.replace("\\\n", " ");
     let lines = joined.lines().filter(|line| line.starts_with("  hubslosh "));
@@ -158,7 +159,7 @@ fn examples(text: &str) -> Vec<String> {
         .collect()
 }
 
-/// Beginnings of examples that run in a second or less each, in a folder with the files that they name.
+/// Beginnings of examples that run in at most a second each, in a folder with the files that they name.
 const CHEAP: [&str; 7] = [
     "hubslosh scale",
     "hubslosh tank",
@@ -289,7 +290,7 @@ fn a_named_pipe_is_refused_as_any_input() {
     }
 }
 
-/// One command for each kind of output, with its file as OUT.
+/// One command for each kind of output, with the file as OUT.
 #[cfg(unix)]
 #[test]
 fn an_output_follows_links_and_is_written_to_a_pipe() {
@@ -365,7 +366,7 @@ fn what_is_driven_stands_once_in_the_table() {
     assert_eq!(text.lines().next().unwrap(), "time,tau_cmd,omega");
 }
 
-/// A parameter set of SSP with one value and, perhaps, units.
+/// Returns a parameter set of SSP with one value and, perhaps, units.
 fn ssv(name: &str, value: &str, units: &str) -> String {
     format!(
         "<?xml version=\"1.0\"?>\n<ssv:ParameterSet version=\"1.0\" name=\"p\" \
@@ -437,7 +438,8 @@ fn units_of_a_parameter_set_are_converted_or_refused() {
     }
 }
 
-/// A sweep from 1 to 3 Hz in 100 s and an answer, with other times and values.
+/// Returns a recording of a sweep from 1 to 3 Hz in 100 s and a response; `times` and `values` are factors on
+/// times and values.
 fn sweep(times: f64, values: f64) -> String {
     let mut text = String::from("time,tau_cmd,omega\n");
     for k in 0..=5000 {

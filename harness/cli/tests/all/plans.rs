@@ -10,14 +10,13 @@ use host::fmi2::Fmu;
 use pack::packed_for_tests;
 use signals::table::Table;
 
-/// `hubslosh` with these arguments.
 fn hubslosh(directory: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_hubslosh"));
     command.current_dir(directory).args(arguments);
     command
 }
 
-/// `hubslosh campaign` on a plan of this text, into the directory `out`.
+/// Prepares `hubslosh campaign` on a plan with this text, with the directory `out` for the results.
 fn campaign(directory: &Path, plan: &str, out: &str, arguments: &[&str]) -> Command {
     std::fs::write(directory.join("plan.toml"), plan).unwrap();
     let fmu = packed_for_tests().to_str().unwrap();
@@ -36,7 +35,7 @@ fn text(directory: &Path, file: &str) -> String {
     std::fs::read_to_string(directory.join(file)).unwrap()
 }
 
-/// Rows of a CSV file as name → text.
+/// Returns the rows of a CSV file as maps from name to text.
 fn rows(directory: &Path, file: &str) -> Vec<HashMap<String, String>> {
     let mut reader = csv::Reader::from_path(directory.join(file)).unwrap();
     reader.deserialize().map(|row| row.unwrap()).collect()

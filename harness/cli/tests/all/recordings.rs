@@ -24,13 +24,14 @@ fn hubslosh(folder: &Path, arguments: &[&str]) -> Result<String, String> {
     }
 }
 
-/// Rows of a table as name → text.
+/// Returns the rows of a table as maps from name to text.
 fn rows(path: &Path) -> Vec<HashMap<String, String>> {
     let mut reader = csv::Reader::from_path(path).unwrap();
     reader.deserialize().map(|row| row.unwrap()).collect()
 }
 
-/// Columns of a table of features in which a recording and the run it was made from must be the same.
+/// Columns of the table of features that must be the same for a recording and for the run from which it was
+/// made.
 const SAME: [&str; 22] = [
     "fill_m",
     "amplitude_nm",

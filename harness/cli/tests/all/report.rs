@@ -7,10 +7,9 @@ use std::sync::LazyLock;
 
 use pack::packed_for_tests;
 
-/// Rows of a table as name → text.
+/// Rows of a table as maps from name to text.
 type Rows = Vec<HashMap<String, String>>;
 
-/// Runs a plan into `directory`/c.
 fn campaign(directory: &Path, plan: &str) {
     std::fs::write(directory.join("plan.toml"), plan).unwrap();
     let done = Command::new(env!("CARGO_BIN_EXE_hubslosh"))
@@ -36,7 +35,7 @@ const SWEEPS: &str = "title = \"Sweeps & <models>\"\n\
     [set]\nimu.enabled = true\n\
     [count]\nimu.seed = 1\n";
 
-/// Ten of the thesis's sweeps: 10 cm, noise on; made once for all tests here.
+/// Results of ten sweeps of the thesis (10 cm, gyro noise on), made once for all tests in this file.
 static TEN: LazyLock<(String, Rows, Rows)> = LazyLock::new(|| {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
@@ -46,7 +45,7 @@ static TEN: LazyLock<(String, Rows, Rows)> = LazyLock::new(|| {
     (page(directory), rows(directory, "features.csv"), rows(directory, "features_spa.csv"))
 });
 
-/// A figure of the five runs of a model, by torque.
+/// Returns a feature of the five runs of a model in the order of the torque.
 fn figure(table: &Rows, model: &str, name: &str) -> Vec<f64> {
     let rows = table.iter().filter(|row| row["model"] == model);
     rows.map(|row| row[name].parse().unwrap_or(f64::NAN)).collect()
@@ -126,7 +125,7 @@ fn one_linear_model_fits_ever_less_of_a_spherical_liquid() {
     assert!(coherence[0] > 0.5 && (0.15..0.35).contains(&coherence[4]), "{coherence:?}");
 }
 
-/// The cells of the row of the thesis's numbers that begins so.
+/// Returns the cells of the row that begins with `quantity` in the report's table of the thesis's numbers.
 fn row_of<'a>(page: &'a str, quantity: &str) -> Vec<&'a str> {
     let row = page.split("<tr>").find(|row| row.starts_with(&format!("<td>{quantity}")));
     let row = row.unwrap_or_else(|| panic!("no row for {quantity}"));
@@ -181,7 +180,7 @@ fn the_page_is_well_formed_and_has_every_figure() {
     assert!(places > 10 && figures(page).matches("\"traces\":").count() == places, "{places}");
 }
 
-/// The specifications of the figures, JSON.
+/// Returns the specifications of the figures, JSON.
 fn figures(page: &str) -> &str {
     let json = page.split("id=\"figures\">").nth(1).expect("the figures");
     json.split("</script>").next().unwrap()
@@ -191,7 +190,7 @@ fn specifications(page: &str) -> Vec<serde_json::Value> {
     serde_json::from_str(figures(page)).unwrap()
 }
 
-/// The page without its scripts.
+/// Returns the page without its scripts.
 fn text_of(page: &str) -> String {
     let pieces = page.split("<script").enumerate();
     let without = |(i, piece): (usize, &str)| match i {
@@ -253,7 +252,8 @@ fn draws_have_histograms_and_scatter() {
     assert!(rho.len() == 2 && rho[1] < -0.95, "{rho:?}");
 }
 
-/// Every element that is opened is closed, in order; attributes are quoted; no stray markup.
+/// Asserts that every element that is opened is closed in order, that attributes are quoted, and that there
+/// is no stray markup.
 fn well_formed(page: &str) {
     let page = &text_of(page);
     let mut open = Vec::new();
@@ -342,7 +342,7 @@ fn along_a_profiles_number_the_axis_says_what_it_is() {
     assert!(!axes.iter().any(|axis| axis.starts_with("profile.")), "{axes:?}");
 }
 
-/// Titles of all x axes.
+/// Returns the titles of all x axes.
 fn axes(page: &str) -> Vec<String> {
     let figures = specifications(page);
     let panels = figures.iter().flat_map(|figure| figure["panels"].as_array().unwrap());

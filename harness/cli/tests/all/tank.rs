@@ -14,7 +14,8 @@ fn tank(arguments: &[&str]) -> (bool, String, String) {
     (done.status.success(), text(done.stdout), text(done.stderr))
 }
 
-/// Half a sphere: lambda_1 R and m_1/m_liq of Budiansky's case (1960); the hinges are its centre.
+/// Compares half a sphere with lambda_1 R and m_1/m_liq of Budiansky (1960); all hinges are at the sphere's
+/// centre.
 #[test]
 fn a_half_full_sphere_has_its_published_first_mode() {
     let folder = tempfile::tempdir().unwrap();
@@ -44,8 +45,8 @@ fn a_bad_tank_is_refused_in_a_sentence_and_leaves_no_file() {
     assert!(!out.exists());
 }
 
-/// The cylinder of the bench from its drawing through a set file and an SSV, against its dimensions:
-/// the same motion. Masses and lengths agree to 1e-11; 1e-9 rad/s is some 1e-8 of the rates.
+/// The bench's cylinder moves in the same way from a drawing (through a set file and an SSV) and from its
+/// dimensions. Masses and lengths agree to 1e-11; 1e-9 rad/s is about 1e-8 of the rates.
 #[test]
 fn a_tanks_parameters_drive_the_fmu_as_its_dimensions_do() {
     let folder = tempfile::tempdir().unwrap();
@@ -138,8 +139,9 @@ fn parameters_of_the_six_axis_fmus_have_their_names() {
     }
 }
 
-/// Omega_1^2 = 21.4397 at Bo = 10 and 30 degrees (the table's value), as the frequency that the FMU computes from the
-/// file; on the bench the same wetting liquid softens its surface, and the command names what the FMU cannot model.
+/// The file reproduces Omega_1^2 = 21.4397 at Bo = 10 and 30 degrees (the table's value) in the frequency
+/// that the FMU computes. On the bench the same wetting liquid softens the surface (a negative stiffness),
+/// and the command says that the FMU cannot model this.
 #[test]
 fn a_curved_meniscus_reaches_the_fmu_and_what_it_cannot_take_is_told() {
     let folder = tempfile::tempdir().unwrap();
@@ -194,7 +196,7 @@ fn a_curved_meniscus_reaches_the_fmu_and_what_it_cannot_take_is_told() {
     }
 }
 
-/// Half a sphere of 1 m is its volume's half and 2094.395 kg of water; --sweep takes both, too.
+/// Half a sphere of 1 m is half of its volume and 2094.395 kg of water; --sweep takes all three forms.
 #[test]
 fn a_fill_is_given_in_metres_in_per_cent_or_by_mass() {
     let folder = tempfile::tempdir().unwrap();
@@ -224,8 +226,8 @@ fn a_fill_is_given_in_metres_in_per_cent_or_by_mass() {
     }
 }
 
-/// Without gravity the table's frequencies are 0; a file holds what capillarity leaves, and no damping ratio, which
-/// would hold at no specific force.
+/// Without gravity the table's frequencies are 0. A file has only the stiffness by capillarity, and no
+/// damping ratio, because there is no specific force at which it would hold.
 #[test]
 fn at_no_gravity_only_capillarity_is_left() {
     let folder = tempfile::tempdir().unwrap();
@@ -255,7 +257,8 @@ fn at_no_gravity_only_capillarity_is_left() {
     }
 }
 
-/// In a sphere of 1 m at 1e-6 m/s² the first order in capillarity is a multiple of what it corrects.
+/// In a sphere of 1 m at 1e-6 m/s² the first-order effect of capillarity is a multiple of the value that it
+/// corrects, so the file is written only with --force.
 #[test]
 fn a_stiffness_far_outside_of_its_formula_is_written_with_force_alone() {
     let folder = tempfile::tempdir().unwrap();
@@ -312,8 +315,9 @@ fn set_files_that_are_none_are_refused_in_a_sentence() {
     }
 }
 
-/// Omega_1^2 rho R^3/sigma at Bo = 3.6 and 30 degrees is between 9.1 and 21.4, the rows of the meniscus table at Bo 3 and 10, in
-/// table, picture and JSON; gravity alone makes 6.6. A sphere has no such formula: no frequency, in words and as null.
+/// Omega_1^2 rho R^3/sigma at Bo = 3.6 and 30 degrees is between 9.1 and 21.4 (rows Bo = 3 and 10 of the
+/// meniscus table) in table, picture and JSON; gravity alone gives 6.6. For a sphere there is no formula: the
+/// frequency is stated as unknown, and is null in JSON.
 #[test]
 fn frequencies_are_those_with_surface_tension_where_it_is_given() {
     let folder = tempfile::tempdir().unwrap();

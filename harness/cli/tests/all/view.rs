@@ -20,7 +20,7 @@ fn said(output: &Output) -> String {
 const RUN: [&str; 5] =
     ["run", "--profile", "exp-sweep:amplitude=0.1,duration=20", "--set", "tank.d=200mm"];
 
-/// Data that the page draws.
+/// Returns the data that the page draws, and asserts that the page loads nothing from elsewhere.
 fn drawn(directory: &Path, file: &str) -> serde_json::Value {
     let page = std::fs::read_to_string(directory.join(file)).unwrap();
     for word in [" src=\"", "<link", "@import", "url(http"] {
@@ -76,14 +76,15 @@ fn what_cannot_be_drawn_is_refused_and_leaves_no_page() {
     assert!(!directory.join("run.html").exists());
 }
 
-/// The kept rows of a column of the page.
+/// Returns the stored rows of a column of the page.
 fn column(run: &serde_json::Value, name: &str) -> Vec<f64> {
     let text = run["columns"][name].as_str().unwrap_or_else(|| panic!("no {name}"));
     let bytes = Base64::decode_vec(text).unwrap();
     bytes.chunks(4).map(|b| f64::from(f32::from_le_bytes(b.try_into().unwrap()))).collect()
 }
 
-/// Every slosh model, three modes, shaken by a sweep over the first two; the page holds numbers of 32 bits.
+/// Every slosh model is shaken with three modes by a sweep over the first two. The page stores numbers of 32
+/// bits.
 #[test]
 fn the_modes_that_are_drawn_add_up_at_the_wall_to_the_wave_height_of_the_fmu() {
     let directory = tempfile::tempdir().unwrap();
@@ -196,7 +197,8 @@ fn the_surface_that_is_drawn_in_a_sphere_moves_its_liquid_as_far_as_the_pendulum
     }
 }
 
-/// `hubslosh tank` writes for HubSlosh the modes along the first length as those along the tangent, y of the tank.
+/// In HubSlosh's parameters `hubslosh tank` puts the modes along a box's first length in the tangential
+/// direction, the y of the tank.
 #[test]
 fn a_box_on_the_bench_lies_with_its_first_length_along_the_tangent() {
     let directory = tempfile::tempdir().unwrap();
@@ -244,7 +246,7 @@ fn a_run_of_a_tank_that_drains_records_by_default_what_its_page_needs() {
     assert!(liquid[0] - liquid[liquid.len() - 1] > 0.1);
 }
 
-/// HTML takes no `</script>` for the end of the element after `<!--<script`.
+/// After `<!--<script`, HTML does not take `</script>` for the end of the element.
 #[test]
 fn a_unit_that_is_markup_leaves_the_page_whole() {
     const UNIT: &str = "<!--<script></script>&\u{2028}";

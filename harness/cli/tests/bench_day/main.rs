@@ -32,7 +32,7 @@ fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
-/// Rows of `features.csv`, by column.
+/// Returns the rows of `features.csv` as maps from column to text.
 fn features(directory: &Path) -> Vec<HashMap<String, String>> {
     let mut reader = csv::Reader::from_path(directory.join("out/features.csv")).unwrap();
     reader.deserialize().map(|row| row.unwrap()).collect()
@@ -183,7 +183,8 @@ fn a_missing_file_has_a_message_and_its_chapter_says_so() {
     assert!(said.contains("day.toml is needed"), "{said}");
 }
 
-/// 50 ppm made every sweep "another profile, or the torque's sign", and 3 % of lost rows were too many.
+/// In earlier versions a clock 50 ppm off was refused as "another profile, or the torque's sign", and 3 % of
+/// lost rows were too many.
 #[test]
 fn a_clock_300_ppm_off_and_lost_rows_change_no_feature_beyond_its_interval() {
     let folder = tempfile::tempdir().unwrap();

@@ -10,7 +10,7 @@
 #[path = "../../src/set_file.rs"]
 mod set_file;
 
-/// Warnings of `set_file`.
+/// Stands for the terminal of the command, which `set_file` warns.
 mod terminal {
     pub fn warn(_: impl std::fmt::Display) {}
 }
@@ -29,12 +29,11 @@ use report::view;
 use signals::recording::{self, Between, Columns, Signal, Wanted};
 use signals::table::{self, Table};
 
-/// Time that an input may take, s.
+/// Time limit of one input, s.
 const LIMIT: u64 = 10;
-/// Memory that the process may take, kB.
 const MEMORY: u64 = 1_000_000;
 
-/// Texts that are put into files of text.
+/// Texts that are inserted into text files.
 const TOKENS: [&str; 22] = [
     "1e308",
     "-1e308",
@@ -60,7 +59,7 @@ const TOKENS: [&str; 22] = [
     "../",
 ];
 
-/// A file with some changes.
+/// Returns one of the seeds with some random changes.
 fn mutated(seeds: &[Vec<u8>], dice: &mut Rng) -> Vec<u8> {
     let mut bytes = seeds[dice.usize(..seeds.len())].clone();
     for _ in 0..dice.usize(1..6) {
@@ -100,21 +99,21 @@ fn mutated(seeds: &[Vec<u8>], dice: &mut Rng) -> Vec<u8> {
     bytes
 }
 
-/// Largest memory of the process so far, kB; 0 where that is not known.
+/// Returns the largest memory of the process so far, kB; 0 if the system does not tell.
 fn memory() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
     line.and_then(|rest| rest.split_whitespace().next()?.parse().ok()).unwrap_or(0)
 }
 
-/// Keeps an input that breaks something and returns its path.
+/// Keeps an input that breaks something, and returns its path.
 fn keep(name: &str, ending: &str, bytes: &[u8]) -> PathBuf {
     let path = std::env::temp_dir().join(format!("hubslosh-fuzz-{name}.{ending}"));
     std::fs::write(&path, bytes).unwrap();
     path
 }
 
-/// Hands `count` inputs to a reader, as files of that ending.
+/// Passes `count` mutated inputs to a reader, as files with this ending.
 fn fuzz(
     name: &'static str,
     ending: &'static str,
@@ -171,7 +170,6 @@ fn description() -> ModelDescription {
     ModelDescription::from_xml(xml).unwrap()
 }
 
-/// Files of a folder of the project, by ending.
 fn files(folder: &str, ending: &str) -> Vec<Vec<u8>> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(folder);
     let mut paths: Vec<PathBuf> =
@@ -261,7 +259,7 @@ fn tank(count: u64) {
     });
 }
 
-/// A run's names, values and parameters, from the bytes of a file: what a page shows of a file of others.
+/// Reads names, values and parameters of a run from a mutated file, and makes the page that shows them.
 fn page(count: u64) {
     let text = "time,omega,slosh_angle,slosh_angle_radial,tau_cmd,theta\n0,0.1,0,0,0.1,0\n0.02,0.1,0.1,0.1,0,0.1\n0.04,0,0.2,0,0,0.2\n";
     let description = description();
@@ -289,7 +287,6 @@ fn page(count: u64) {
     });
 }
 
-/// Inputs of the short form.
 const FEW: u64 = 300;
 
 macro_rules! targets {
@@ -300,7 +297,7 @@ macro_rules! targets {
         }
     )*
 
-        /// The long form, of the targets in HUBSLOSH_FUZZ_TARGETS or all.
+        /// Runs the long form of the targets in HUBSLOSH_FUZZ_TARGETS, or of all.
         #[test]
         #[ignore = "takes long: .ci/fuzz-readers"]
         fn campaign() {

@@ -13,12 +13,12 @@ use host::fmi2::PLATFORM;
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
-/// Bytes of memory that no process takes more than.
+/// Memory that no process may exceed, bytes.
 const MEMORY: i64 = 500 << 20;
-/// Bytes of temporary files that there are never more of.
+/// Size that temporary files together may never exceed, bytes.
 const DISK: u64 = 100 << 20;
 
-/// The program, in a folder of its own with a folder for temporary files.
+/// Runs the program in a folder of its own, with a folder for temporary files.
 struct Sandbox {
     directory: tempfile::TempDir,
 }
@@ -38,7 +38,7 @@ impl Sandbox {
         self.path("temporary")
     }
 
-    /// Runs a command to its end; whatever it does, it leaves no process and no temporary file.
+    /// Runs a command to its end, and asserts that it leaves neither a process nor a temporary file.
     fn hubslosh(&self, arguments: &[&str]) -> Output {
         let temporary = self.temporary();
         let marker = format!("HOSTILE={}", self.directory.path().display());
@@ -77,7 +77,7 @@ impl Sandbox {
         output
     }
 
-    /// Runs a command that must fail with a message, and returns that.
+    /// Runs a command that must fail with a message, and returns the message.
     fn fails(&self, arguments: &[&str]) -> String {
         let output = self.hubslosh(arguments);
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -98,7 +98,7 @@ fn size(folder: &Path) -> u64 {
         .sum()
 }
 
-/// Processes that have a variable in their environment.
+/// Lists the processes with this variable in their environment.
 fn processes_with(marker: &str) -> Vec<String> {
     let folders = std::fs::read_dir("/proc").unwrap().flatten();
     let has = |folder: &PathBuf| {
@@ -108,7 +108,7 @@ fn processes_with(marker: &str) -> Vec<String> {
     folders.map(|entry| entry.path()).filter(has).map(|path| path.display().to_string()).collect()
 }
 
-/// No process that was waited for has taken more, since this program began.
+/// Asserts that no process that has ended since this program began has used more than [`MEMORY`].
 fn memory_was_enough() {
     use nix::sys::resource::{UsageWho, getrusage};
     let most = getrusage(UsageWho::RUSAGE_CHILDREN).unwrap().max_rss() << 10;
@@ -142,7 +142,7 @@ fn xml(variables: &str) -> Vec<u8> {
     format!("{HEAD}{STEPPING}{variables}{TAIL}").into_bytes()
 }
 
-/// Changes a field of four bytes in the central directory's (and the local) header of the first file.
+/// Changes the size of the first file in the central directory and in its local header.
 fn with_size(mut bytes: Vec<u8>, size: u32) -> Vec<u8> {
     let central = bytes.windows(4).position(|four| four == b"PK\x01\x02").unwrap();
     for at in [22, central + 24] {
@@ -255,12 +255,12 @@ fn hostile_archives_and_descriptions_are_refused_by_every_command() {
     memory_was_enough();
 }
 
-/// The FMU of hostile.c.
+/// Returns the FMU of hostile.c, which does the harm with this number in the call `when`.
 fn harmful(harm: u32, when: &str) -> Vec<u8> {
     packed(harm, when, xml(""))
 }
 
-/// One that does no harm, with another description.
+/// Returns the FMU of hostile.c without harm, but with another description.
 fn with_description(xml: Vec<u8>) -> Vec<u8> {
     packed(0, "AT_STEP", xml)
 }
@@ -281,7 +281,7 @@ fn packed(harm: u32, when: &str, xml: Vec<u8>) -> Vec<u8> {
     zipped(&vec![("modelDescription.xml", xml), (binary.as_str(), std::fs::read(out).unwrap())])
 }
 
-/// In the order of hostile.c.
+/// Names of the harms, in the order of hostile.c.
 const HARMS: [&str; 12] = [
     "exits with 0",
     "aborts",
@@ -296,10 +296,10 @@ const HARMS: [&str; 12] = [
     "starts processes and exits",
     "stops itself",
 ];
-/// Those that do no harm but to print, so that a run succeeds.
+/// Harm that only prints, so that a run succeeds.
 const LOUD: &str = "prints 1 GB";
 
-/// Runs every harmful binary, which does harm in a call (`when`), by every command.
+/// Runs every harmful FMU, which does its harm in the call `when`, by every command.
 fn ends_its_own_process(when: &str) {
     let sandbox = Sandbox::new();
     std::fs::write(sandbox.path("plan.toml"), "title = \"a\"\nprofile = \"zero:duration=1\"\n")

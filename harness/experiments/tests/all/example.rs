@@ -7,7 +7,8 @@ use host::fmu::Fmu;
 use pack::{packed_for_tests, packed_model_for_tests};
 use signals::table::Table;
 
-/// Largest difference of each column over the column's largest value, at the reference's rows.
+/// Returns the largest difference of each column over the column's largest value, at the rows of the
+/// reference.
 fn differences(answer: &Table, reference: &Table) -> Vec<(String, f64)> {
     let every = (answer.rows() - 1) / (reference.rows() - 1);
     let names = reference.names().iter();
@@ -23,7 +24,7 @@ fn differences(answer: &Table, reference: &Table) -> Vec<(String, f64)> {
         .collect()
 }
 
-/// Folder of the committed example.
+/// Returns the folder of the committed example.
 fn folder(example: &Example) -> PathBuf {
     pack::model(example.model).unwrap().example()
 }

@@ -44,7 +44,8 @@ fn white_noise_alone_has_no_bias_and_rounding_adds_to_it() {
     assert!((found.fit.noise.arw / found.specified.arw - 1.0).abs() < 0.05, "{}", found.text());
 }
 
-/// Flicker noise and rate random walk come back within their 95 % intervals, of which three seeds in four hold both.
+/// The fitted flicker noise and rate random walk are within their 95 % intervals; for three seeds in four
+/// both intervals contain the true value.
 #[test]
 fn flicker_noise_and_rate_random_walk_come_back() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();

@@ -17,7 +17,7 @@ const BEYOND: [&str; 7] = [
     "bench_damping",
 ];
 
-/// The runs that are made here: of many those with the largest torque, of draws every twentieth.
+/// Selects the runs to simulate: from many those with the largest torque, from random draws every twentieth.
 fn some<'a>(plan: &Plan, cases: &'a [Case]) -> Vec<&'a Case> {
     let largest = cases.iter().filter_map(|case| case.amplitude).fold(0.0, f64::max);
     match cases.len() {
@@ -27,7 +27,7 @@ fn some<'a>(plan: &Plan, cases: &'a [Case]) -> Vec<&'a Case> {
     }
 }
 
-/// Description of how a run leaves its model's range, in the words of the FMU and of the tables.
+/// Describes how a run leaves its model's range, in the words of the FMU and of the tables.
 fn beyond(fmu: &Fmu, case: &Case) -> Vec<String> {
     let run = case.run();
     let mut instance = run.initialise(fmu).unwrap();
@@ -40,11 +40,12 @@ fn beyond(fmu: &Fmu, case: &Case) -> Vec<String> {
     said.into_iter().map(|why| format!("{}: {why}", case.name)).collect()
 }
 
-/// Models of the liquid of the plan that seeks the onset of rotary slosh; a search takes seconds.
+/// Slosh models in the plan that seeks the onset of rotary slosh. The search takes seconds, so that this test
+/// replaces them.
 const MODELS: &str = r#"["linear", "planar", "spherical", "liquid"]"#;
 
-/// At least one run of a plan that says so leaves the range, and no run of the others does. The search for the onset of rotary slosh has
-/// the linear liquid alone, which leaves the range.
+/// At least one run of a plan that says so leaves the range, and no run of the other plans does. The search
+/// for the onset of rotary slosh is made with the linear liquid only, which leaves the range.
 #[test]
 fn built_in_plans_stay_in_their_models_range_or_say_that_they_leave_it() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();

@@ -138,7 +138,7 @@ fn a_camera_sees_a_tilted_plane_where_liquid_stands_still_under_a_constant_pull(
     assert!((last("p") - hydrostatic).abs() < 1e-3 * 1000.0 * 9.81 * rise, "{}", last("p"));
 }
 
-/// Every error of every kind of sensor, measured on its readings.
+/// Measures every error of every kind of sensor on its readings.
 #[test]
 fn noise_bias_scale_steps_rate_and_delay_are_those_that_are_asked_for() {
     let noises = [

@@ -6,7 +6,7 @@ use host::fmu::Fmu;
 use pack::{Fmi, packed_version_for_tests};
 use signals::table::Table;
 
-/// A craft with two tanks, as the FMU with scalars has it.
+/// Settings of a craft with two tanks, by the names of the FMU with scalars.
 const SCALARS: [(&str, &str); 6] = [
     ("tank[1].position[3]", "-0.55"),
     ("tank[2].position[3]", "0.45"),
@@ -16,10 +16,11 @@ const SCALARS: [(&str, &str); 6] = [
     ("tanks", "2"),
 ];
 
-/// Four signals of both tanks.
+/// Four signals of the two tanks.
 const COLUMNS: [&str; 4] = ["omega[1]", "tank[1].p[1,2]", "tank[2].p[2,2]", "tank[2].wave_height"];
 
-/// `tank[2].p[1,3]` is `tank.p[2,1,3]` where arrays are variables.
+/// Translates a name of the FMU with scalars to that of the FMU with arrays: `tank[2].p[1,3]` becomes
+/// `tank.p[2,1,3]`.
 fn in_arrays(name: &str) -> String {
     let Some((tank, rest)) = name.strip_prefix("tank[").and_then(|rest| rest.split_once("]."))
     else {

@@ -6,7 +6,8 @@ use experiments::weight::Tanks;
 use host::fmu::Fmu;
 use pack::packed_model_for_tests;
 
-/// Warnings for a run of `model` with these settings, `input` driven by rows, and this surface tension, N/m.
+/// Returns the warnings of a run of `model` with these settings, with `input` driven by rows and this surface
+/// tension, N/m.
 fn said(
     model: &str,
     settings: &[(&str, &str)],
@@ -35,8 +36,9 @@ fn said(
     tanks.without_weight(&run.drive(&mut instance, &columns, |_| {}).unwrap())
 }
 
-/// The default craft at rest, 1180 kg with 381.704 kg of water in a tank of R = 0.376618 (1.841184² − 1)/2 = 0.45005 m. At
-/// 60 N, 0.03842 m/s², Bo = 1000 0.03842 0.45005²/0.07213 = 107.9. A cut-off to 6 N gives a tenth of that, no thrust 0.
+/// The default craft at rest has 1180 kg, of which 381.704 kg are water in a tank of R = 0.376618 (1.841184²
+/// − 1)/2 = 0.45005 m. At 60 N, 0.03842 m/s², Bo = 1000 0.03842 0.45005²/0.07213 = 107.9. A cut-off to 6 N
+/// gives a tenth of that, no thrust gives 0.
 #[test]
 fn a_cut_off_of_thrust_is_told_with_the_numbers_of_a_hand_calculation() {
     let rest = [("init.omega[1]", "0"), ("init.omega[3]", "0")];

@@ -10,8 +10,8 @@ use host::binary::Binary;
 use pack::platforms::{PLATFORMS, Platform};
 use pack::{Fmi, MODELS, Model, release};
 
-/// The committed FMUs of this version. There are none between a new version's number and its
-/// release; then an older one must be there.
+/// Returns the committed FMUs of this version. Between a new version's number and its release there are none;
+/// then those of an older version must be there.
 fn released() -> Vec<(&'static Model, Fmi, PathBuf)> {
     let folder = pack::root().join("dist").join("release");
     let of = |model| Fmi::RELEASED.map(|fmi| (model, fmi, release::path(model, fmi, &folder)));
@@ -59,7 +59,7 @@ fn sbom_beside_the_release_is_its_own() {
     }
 }
 
-/// The tree keeps the files of one version; of the older ones it keeps the hashes.
+/// The source tree keeps the files of one version, and only the hashes of older ones.
 #[test]
 fn release_folder_holds_one_version_and_the_hashes_of_all() {
     let folder = pack::root().join("dist").join("release");
@@ -95,7 +95,7 @@ fn release_folder_holds_one_version_and_the_hashes_of_all() {
     assert_eq!(present.lines().find(absent), None, "sha256sum --check would fail");
 }
 
-/// A source tree of version 1.2.3 with a release of small files, and the wheels that CI has made.
+/// Makes a source tree of version 1.2.3 with a release of small files, and the wheels that CI has made.
 #[cfg(unix)]
 fn tree_with_a_release(folder: &Path) {
     let write = |name: &str, text: &str| {
@@ -125,7 +125,8 @@ fn tree_with_a_release(folder: &Path) {
     write("dist/release/SHA256SUMS.all", &sums);
 }
 
-/// Names of the gathered files, or what the script says.
+/// Runs the script that gathers the release files, and returns their names, or the script's message if it
+/// fails.
 #[cfg(unix)]
 fn gathered(tree: &Path, arguments: &[&str]) -> Result<BTreeSet<String>, String> {
     let mut command = Command::new("bash");

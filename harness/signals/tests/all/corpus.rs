@@ -13,20 +13,18 @@ use parquet::schema::types::{PrimitiveTypeBuilder, Type};
 use super::recording::{assert_close, column, read_text};
 
 const ROWS: usize = 40;
-/// 2026-01-31T12:00:00Z, s since 1970.
+/// Time of the first row, 2026-01-31T12:00:00Z, s since 1970.
 const BEGIN: i64 = 1_769_860_800;
 
-/// Time, ms.
 fn millis(k: usize) -> usize {
     20 * k
 }
 
-/// Torque command, mN·m.
 fn torque(k: usize) -> i64 {
     (37 * k % 200) as i64 - 100
 }
 
-/// Tenths of the rate in deg/s.
+/// Returns ten times the rate in deg/s, an integer.
 fn tenths(k: usize) -> i64 {
     (13 * k % 50) as i64 - 25
 }
@@ -44,12 +42,11 @@ fn seconds(k: usize) -> String {
     format!("{}.{:03}", millis(k) / 1000, millis(k) % 1000)
 }
 
-/// Clock time, from 12:00:00 on.
 fn clock(k: usize) -> String {
     format!("12:00:0{}.{:03}", millis(k) / 1000, millis(k) % 1000)
 }
 
-/// A head, and a line for each row.
+/// Returns a text with a head and one line for each row.
 fn lines(head: &str, line: impl Fn(usize) -> String) -> Vec<u8> {
     let mut text = String::from(head);
     for k in 0..ROWS {
@@ -66,12 +63,12 @@ fn crlf(text: &[u8]) -> Vec<u8> {
     String::from_utf8_lossy(text).replace('\n', "\r\n").into_bytes()
 }
 
-/// The time, the torque and the rate in columns of these names.
+/// Returns `--columns` for time, torque and rate in columns with these names.
 fn of(time: &str, tau: &str, omega: &str) -> String {
     format!("time={time},tau_cmd={tau},omega={omega}")
 }
 
-/// A Parquet file: an index of timestamps in ns or a time in s, torque in mN·m, rate in deg/s.
+/// Returns a Parquet file with an index of timestamps in ns or a time in s, torque in mN·m and rate in deg/s.
 fn parquet(time: &str, timestamps: bool) -> Vec<u8> {
     fn real(name: &str) -> PrimitiveTypeBuilder<'_> {
         Type::primitive_type_builder(name, Physical::DOUBLE)
@@ -111,7 +108,8 @@ fn parquet(time: &str, timestamps: bool) -> Vec<u8> {
     bytes
 }
 
-/// A file of a tool: its name, the file's ending and bytes, the columns, and the words of the refusal (`None`: it is read).
+/// A file as a tool writes it: the tool's name, the file's ending and bytes, the columns, and the words of
+/// the refusal (`None` if it must be read).
 type Case = (&'static str, &'static str, Vec<u8>, String, Option<&'static str>);
 
 fn spreadsheets() -> Vec<Case> {
@@ -456,7 +454,7 @@ fn programs() -> Vec<Case> {
     ]
 }
 
-/// Files with words before the rows or in them, after the tools' own.
+/// Returns files with words before or within the rows, in addition to the tools' own.
 fn with_words() -> Vec<Case> {
     let row = |k: usize| format!("{},{},{}", millis(k), torque(k), rate(k));
     let numbered = || of("#1:ms", "#2:mNm", "#3:deg/s");

@@ -70,7 +70,7 @@ const ANGLES: Units = &[
     ("arcsec", DEGREE / 3600.0),
 ];
 
-/// A signal with its units, and names that columns of it have.
+/// A signal with its units, and names of columns for it.
 type Kind = (&'static str, Units, &'static [&'static str]);
 
 const KINDS: [Kind; 4] = [
@@ -87,14 +87,14 @@ const KINDS: [Kind; 4] = [
 /// A column of a file.
 #[derive(Default)]
 struct Column {
-    /// Signal, or nothing for one that nobody asks for.
+    /// Signal, or empty for a column that is not read.
     signal: &'static str,
     header: String,
     below: String,
-    /// Entry of --columns.
+    /// Entry of --columns for this column.
     option: String,
     cells: Vec<String>,
-    /// Values in SI, where the file states the unit.
+    /// Values in SI, if the file states the unit.
     truth: Option<Vec<f64>>,
 }
 
@@ -102,13 +102,14 @@ fn pick<T: Copy>(dice: &mut Rng, all: &[T]) -> T {
     all[dice.usize(..all.len())]
 }
 
-/// A file: its columns, and true if nothing in it can be read in two ways and it must be read.
+/// A file: its columns, and true if it has only one reading, so that it must be read.
 struct File {
     columns: Vec<Column>,
     is_clear: bool,
 }
 
-/// Writes a unit behind a name as people do; false if another reader might not know it: capitals, or blanks that separate all.
+/// Writes a unit next to a name as people do. Returns false if a reader may not recognise it: capitals, or
+/// blanks that also separate columns.
 fn with_unit(dice: &mut Rng, name: &str, unit: &str) -> (String, bool) {
     let (header, fine) = match dice.u8(..12) {
         0 | 1 => (format!("{name} [{unit}]"), true),
@@ -133,7 +134,7 @@ fn with_unit(dice: &mut Rng, name: &str, unit: &str) -> (String, bool) {
     }
 }
 
-/// A column of numbers.
+/// Makes a column of numbers in a random unit and spelling; `si` are the values in SI.
 fn numbers(dice: &mut Rng, (signal, units, names): Kind, si: &[f64], clear: &mut bool) -> Column {
     let (unit, factor) = pick(dice, units);
     let name = pick(dice, names);
@@ -213,7 +214,7 @@ fn numbers(dice: &mut Rng, (signal, units, names): Kind, si: &[f64], clear: &mut
     column
 }
 
-/// Days since 1970 as year, month and day (the civil calendar by H. Hinnant).
+/// Returns days since 1970 as year, month and day (the civil calendar by H. Hinnant).
 fn civil(day: i64) -> (i64, i64, i64) {
     let z = day + 719_468;
     let era = z.div_euclid(146_097);
@@ -225,7 +226,7 @@ fn civil(day: i64) -> (i64, i64, i64) {
     (yoe + era * 400 + i64::from(month < 3), month, doy - (153 * mp + 2) / 5 + 1)
 }
 
-/// Columns of dates and clock times; the second is empty, or the rest of the seconds.
+/// Makes columns of dates and clock times. There may be a second column with the rest of a second.
 fn stamps(dice: &mut Rng, ms: &[i64], clear: &mut bool) -> Vec<Column> {
     const NAMES: [&str; 12] =
         ["Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec"];

@@ -9,7 +9,7 @@ const fn signal(name: &'static str, required: bool) -> Signal<'static> {
     Signal { name, required, between: Between::Held, unit: None }
 }
 
-/// The rate has the rows; the torque is held, the angle joined by lines.
+/// Signals of the tests: rows are those of the rate, the torque is held, the angle is interpolated linearly.
 const SIGNALS: [Signal; 3] = [
     signal("omega", true),
     signal("tau_cmd", true),
@@ -20,7 +20,7 @@ fn columns(text: &str) -> Columns {
     text.parse().unwrap()
 }
 
-/// Table and notes of reading a file.
+/// Reads a file and returns table and messages.
 fn read_file(path: &Path, columns: &Columns) -> Result<(Table, String), String> {
     let mut said = String::new();
     let table = read(path, &Wanted { signals: &SIGNALS, columns }, &mut |line| {
@@ -30,7 +30,7 @@ fn read_file(path: &Path, columns: &Columns) -> Result<(Table, String), String> 
     table.map(|table| (table, said)).map_err(|error| format!("{error:#}"))
 }
 
-/// The same of a text in a file of that ending.
+/// Reads a text as a file with this ending, and returns table and messages.
 pub fn read_text(ending: &str, text: &[u8], of: &str) -> Result<(Table, String), String> {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join(format!("a.{ending}"));
@@ -42,7 +42,7 @@ pub fn column<'a>(table: &'a Table, name: &str) -> &'a [f64] {
     table.column(name).unwrap()
 }
 
-/// Bit for bit but for a factor's rounding.
+/// Asserts that numbers agree except for the rounding of a factor.
 pub fn assert_close(found: &[f64], expected: &[f64], of: &str) {
     assert_eq!(found.len(), expected.len(), "{of}: {found:?}");
     for (found, expected) in found.iter().zip(expected) {
@@ -57,7 +57,7 @@ const TIME: [f64; 3] = [0.0, 0.02, 0.04];
 const TORQUE: [f64; 3] = [0.1, 0.25, -0.3];
 const RATE: [f64; 3] = [0.0, std::f64::consts::PI / 180.0, -1.5 * std::f64::consts::PI / 180.0];
 
-/// A plan for an FMU without inputs has times alone.
+/// A plan for an FMU without inputs has only times.
 #[test]
 fn a_table_of_times_alone_is_read() {
     let directory = tempfile::tempdir().unwrap();
@@ -175,12 +175,12 @@ fn a_torque_that_was_lost_for_long_leaves_a_gap() {
     );
 }
 
-/// A file of the tests' data.
+/// Returns the path of a file of test data.
 fn stored(name: &str) -> PathBuf {
     PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/all/data")).join(name)
 }
 
-/// `data/make_parquet.py` wrote them.
+/// The files were written by `data/make_parquet.py`.
 #[test]
 fn timestamps_of_a_parquet_file_are_seconds_from_the_first() {
     for name in ["ts_s", "ts_ms", "ts_us", "ts_ns", "pandas_ts", "polars_ts"] {
@@ -313,7 +313,7 @@ fn a_fault_is_named_with_line_column_and_what_is_allowed() {
     assert!(error.contains("; and 4 more (allowed"), "{error}");
 }
 
-/// Each of these was refused, or read wrongly, before.
+/// Earlier versions refused each of these files, or read it wrongly.
 #[test]
 fn files_of_loggers_and_spreadsheets_are_read_as_they_are_written() {
     let renamed = "time=t:ms,tau_cmd=T_cmd:mNm,omega=gyro z:deg/s";
@@ -477,7 +477,7 @@ fn times_printed_to_milliseconds_are_put_back_onto_their_grid() {
     assert!(said.contains("its times are printed to 1 ms: rows 30.303"), "{said}");
 }
 
-/// Writes a Parquet file of time, torque in mN·m and rate with a codec.
+/// Writes a Parquet file with time, torque in mN·m and rate, compressed by a codec.
 fn write_parquet(path: &Path, names: [&str; 3], codec: parquet::basic::Compression) {
     use parquet::{basic, data_type, file, schema::types::Type};
     let field = |name: &str| {

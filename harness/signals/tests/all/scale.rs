@@ -12,7 +12,7 @@ use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::Type;
 use signals::recording::{self, Between, Columns, Signal, Wanted};
 
-/// Units of times, ns.
+/// Units of times with their lengths, ns.
 const UNITS: [(&str, i64); 6] = [
     ("s", 1_000_000_000),
     ("ms", 1_000_000),
@@ -21,25 +21,23 @@ const UNITS: [(&str, i64); 6] = [
     ("min", 60_000_000_000),
     ("h", 3_600_000_000_000),
 ];
-/// Steps, ms.
 const STEPS: [i64; 7] = [1, 2, 10, 20, 25, 100, 250];
-/// 2026-01-31T12:00:00Z, s since 1970.
+/// Time of the first row, 2026-01-31T12:00:00Z, s since 1970.
 const BEGIN: i64 = 1_769_860_800;
-/// Largest share of files that may be refused: every one has a unit, a date or a clock time.
+/// Largest share of files that may be refused, although each of them states a unit, a date or a clock time.
 const REFUSED: f64 = 1e-3;
 
-/// A file with what is known of it.
+/// The correct reading of a generated file.
 #[derive(Clone, Default)]
 struct Truth {
-    /// Value of --columns.
     columns: String,
-    /// Times from the first, s; rows at the end may be cut off.
+    /// Times from the first one, s; rows at the end may be cut off.
     time: Vec<f64>,
     /// True if the file does not state the unit.
     is_unstated: bool,
 }
 
-/// Reads files that `make` has made, and compares; few may be refused.
+/// Reads `count` files from `make`, and compares them with their correct reading; few may be refused.
 fn judge(ending: &str, count: u64, make: fn(&mut Rng) -> (Vec<u8>, Truth)) {
     let seed = std::env::var("HUBSLOSH_FUZZ_SEED").ok().and_then(|seed| seed.parse().ok());
     let mut dice = Rng::with_seed(seed.unwrap_or(1));
@@ -91,7 +89,7 @@ fn judge(ending: &str, count: u64, make: fn(&mut Rng) -> (Vec<u8>, Truth)) {
     assert!(foreign < count / 2 && (ending == "parquet") == (foreign > 0), "{foreign} of {count}");
 }
 
-/// A whole number of ns in a unit.
+/// Formats a time in ns in a unit, exactly.
 fn number(ns: i64, unit: i64) -> String {
     match ns % unit {
         0 => (ns / unit).to_string(),
@@ -99,7 +97,6 @@ fn number(ns: i64, unit: i64) -> String {
     }
 }
 
-/// A clock time.
 fn clock(ns: i64) -> String {
     let ms = ns / 1_000_000;
     format!(
@@ -111,7 +108,7 @@ fn clock(ns: i64) -> String {
     )
 }
 
-/// A text in one of the ways of loggers.
+/// Returns a text file as loggers write it, with random layout.
 fn text(dice: &mut Rng) -> (Vec<u8>, Truth) {
     let (step, rows) = (STEPS[dice.usize(..STEPS.len())] * 1_000_000, dice.usize(5..40));
     let time = |k: usize| step * k as i64;
@@ -204,7 +201,7 @@ fn text(dice: &mut Rng) -> (Vec<u8>, Truth) {
     (out.into_bytes(), Truth { columns, time, is_unstated: false })
 }
 
-/// A Parquet file with times of a random type.
+/// Returns a Parquet file with times of a random type.
 fn columns(dice: &mut Rng) -> (Vec<u8>, Truth) {
     let (step, rows) = (STEPS[dice.usize(..STEPS.len())] * 1_000_000, dice.usize(5..40));
     let (unit, ns) = UNITS[dice.usize(..4)];
@@ -263,7 +260,7 @@ fn columns(dice: &mut Rng) -> (Vec<u8>, Truth) {
     (bytes, Truth { columns, time, is_unstated })
 }
 
-/// Files of the short form.
+/// Number of files in the short form of the test.
 const FEW: u64 = 1000;
 
 #[test]
@@ -276,7 +273,6 @@ fn times_of_a_parquet_file_are_read_in_their_unit_or_refused() {
     judge("parquet", FEW, columns);
 }
 
-/// The long form.
 #[test]
 #[ignore = "takes long: .ci/fuzz-readers"]
 fn scale_campaign() {
