@@ -75,6 +75,27 @@ def add_toctrees(app: Sphinx, docname: str, source: list[str]) -> None:
     source[0] += "\n" + "\n".join(trees)
 
 
+def add_terms(app: Sphinx, docname: str, source: list[str]) -> None:
+    """Make terms of the glossary's list, which the search finds by their names."""
+    if docname != "book/glossary":
+        return
+    item = re.compile(r"^\* \*\*([^*]+)\*\*: ([^\n]+(?:\n  [^\n]+)*)\n", re.MULTILINE)
+
+    def entry(found: re.Match) -> str:
+        return "\n".join(found[1].replace("\n ", "").split(", ")) + f"\n  {found[2]}\n\n"
+
+    items = re.compile(rf"(?:{item.pattern})+", re.MULTILINE)
+    source[0] = items.sub(
+        lambda found: f"```{{glossary}}\n{item.sub(entry, found[0])}```\n", source[0]
+    )
+
+
+def leave_out_of_search(app: Sphinx, docname: str, source: list[str]) -> None:
+    """Keep the history out of the search, which has every word of the book."""
+    if docname == "CHANGELOG":
+        source[0] = f"---\nnosearch: true\n---\n\n{source[0]}"
+
+
 RULES = ROOT / "harness" / "check" / "src" / "rules"
 RULE = re.compile(r'rule\("([\w.]+)", (\w+), "((?:\\.|[^"\\])*)", "((?:\\.|[^"\\])*)"')
 
@@ -112,4 +133,6 @@ def setup(app: Sphinx) -> None:
     """Connect the functions above."""
     app.connect("source-read", add_toctrees)
     app.connect("source-read", add_rules)
+    app.connect("source-read", add_terms)
+    app.connect("source-read", leave_out_of_search)
     app.add_html_math_renderer("mathml", (mathml, None), (mathml, None))
