@@ -33,6 +33,19 @@ ANSWERS = {
     "simulate": "#hubslosh.simulate",
     "check FMU": "check.html",
     "getting started": "start.html",
+    "OpenModelica": "host_setup.html#openmodelica",
+    "macOS": "hosts.html",
+    "spinner": "10_spinner/README.html",
+    "real time": "real_time.html",
+    "gyro": "gyro.html",
+    "Allan": "gyro.html",
+    "slosh frequency": "is_it_slosh.html",
+    "units": "conventions.html",
+    "resume": "campaign_howto.html",
+    "exit code": "check.html",
+    "FMU": "glossary.html#term-FMU",
+    "bob": "glossary.html#term-bob",
+    "draining tank": "glossary.html#term-draining-tank",
 }
 """Words that readers search for, and the end of an address among the first three hits."""
 HITS = 3
