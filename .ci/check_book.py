@@ -58,7 +58,7 @@ LOOKED_AT = (
 )
 
 
-def opened(browser: Browser, file: Path, width: int, scheme: str) -> Page:
+def open_page(browser: Browser, file: Path, width: int, scheme: str) -> Page:
     """Open a page; whatever comes from elsewhere than the book's folder is an error."""
     page = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme)
     fetched: list[str] = []
@@ -94,7 +94,7 @@ def main() -> None:
         for name in LOOKED_AT:
             for width in (1400, 500):
                 for scheme in ("light", "dark"):
-                    page = opened(browser, arguments.book / name, width, scheme)
+                    page = open_page(browser, arguments.book / name, width, scheme)
                     place = f"{name}, {width} px, {scheme}"
                     wide = page.evaluate("document.documentElement.scrollWidth")
                     assert wide <= width, f"{place}: {wide} px wide"

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from playwright.sync_api import Browser, Page
 
-from pages import chromium, opened
+from pages import chromium, open_page
 
 RANGE = "document.querySelector('.plot').layout.xaxis.range.map(Number)"
 
@@ -125,7 +125,7 @@ def main() -> None:
     with chromium() as browser, tempfile.TemporaryDirectory() as directory:
         has_view = (arguments.report.parent / "view.html").exists()
         shown = view(browser, arguments.report) if has_view else "nothing"
-        page = opened(browser, arguments.report, 1400)
+        page = open_page(browser, arguments.report, 1400)
         clicks(page)
         assert background(page) > 700
         assert not (faults := page.evaluate(FAULTS)), f"on a wide screen: {faults[:5]}"
@@ -144,12 +144,12 @@ def main() -> None:
         if arguments.pages:
             assert pages <= arguments.pages, f"{pages} pages of paper"
         page.close()
-        dark = opened(browser, arguments.report, 1400, "dark")
+        dark = open_page(browser, arguments.report, 1400, "dark")
         assert background(dark) < 150, "the page stays light in the dark"
         ink = "document.querySelector('.plot').layout.font.color"
         assert dark.evaluate(ink) == "#e6eaee", "the figures stay dark in the dark"
         dark.close()
-        phone = opened(browser, arguments.report, 400)
+        phone = open_page(browser, arguments.report, 400)
         width = phone.evaluate("document.documentElement.scrollWidth")
         assert width <= 400, f"text {width} px wide on a phone of 400 px"
         assert not (faults := phone.evaluate(FAULTS)), f"on a phone: {faults[:5]}"

@@ -27,7 +27,7 @@ from pathlib import Path
 from playwright.sync_api import Browser, Page
 
 import contrast
-from pages import chromium, opened
+from pages import chromium, open_page
 
 Row = dict[str, float]
 Vector = Sequence[float]
@@ -109,7 +109,7 @@ def bench(row: Row, sines: list[tuple[float, float]]) -> list[list[Drawn]]:
     radius, depth, arm = 0.163 / 2, 0.1, 0.225
     data = [cylinder(n, radius, depth) for n in range(len(sines))]
     p = [(x, y, -math.sqrt(1 - x * x - y * y)) for x, y in sines]
-    return [drawn(data, p, (arm, 0, 0), depth)]
+    return [draw_modes(data, p, (arm, 0, 0), depth)]
 
 
 def sweep(row: Row) -> list[list[Drawn]]:
@@ -146,10 +146,10 @@ def slew(row: Row) -> list[list[Drawn]]:
 def modes(row: Row, prefix: str, data: list[Mode], at: Vector, level: float) -> list[Drawn]:
     """Return a tank's modes by their directions p."""
     p = [[row[f"{prefix}.p[{n},{i}]"] for i in (1, 2, 3)] for n in range(1, len(data) + 1)]
-    return drawn(data, p, at, level)
+    return draw_modes(data, p, at, level)
 
 
-def drawn(data: list[Mode], p: Sequence[Vector], at: Vector, level: float) -> list[Drawn]:
+def draw_modes(data: list[Mode], p: Sequence[Vector], at: Vector, level: float) -> list[Drawn]:
     """Return a tank's modes by the pendulums' directions; the wall has all of them."""
     angles = [(math.asin(one[0]), math.asin(one[1])) for one in p]
     wall = [sum(mode.wave * a[i] for mode, a in zip(data, angles, strict=True)) for i in (0, 1)]
@@ -440,7 +440,7 @@ def hostile_unit(browser: Browser, binary: Path, fmu: Path, folder: Path) -> str
     drive = ["--profile", "sine:duration=10", "--columns", "theta,omega,slosh_angle"]
     subprocess.run([binary, "run", *drive, *of, run], check=True)
     subprocess.run([binary, "view", run, *of, file], check=True)
-    page = opened(browser, file, *VIEWS[0], reduced_motion="reduce")
+    page = open_page(browser, file, *VIEWS[0], reduced_motion="reduce")
     shown = page.evaluate("document.body.innerText")
     page.close()
     assert unit in shown, f"the page does not show the unit {unit}"
@@ -467,7 +467,7 @@ def main() -> None:
             reach = json.loads(found[1])["scene"]["geometry"]["reach"]
             worst = (0.0, 0.0)
             for instant, (width, scheme) in zip(case.instants, VIEWS, strict=True):
-                page = opened(browser, file, width, scheme, reduced_motion="reduce")
+                page = open_page(browser, file, width, scheme, reduced_motion="reduce")
                 assert not page.evaluate("hubsloshView.playing"), "it plays by itself"
                 row = min(data, key=lambda row: abs(row["time"] - instant))
                 worst = tuple(map(max, worst, compare(page, case, row, reach)))

@@ -25,7 +25,7 @@ from importers import fmutool_findings
 IN_FILES = ("zip", "xml", "bin")
 
 
-def of_fmpy(fmu: Path) -> bool:
+def passes_fmpy(fmu: Path) -> bool:
     """Return True if ``fmpy.validation.validate_fmu`` reports anything."""
     try:
         return bool(validate_fmu(str(fmu)))
@@ -33,12 +33,12 @@ def of_fmpy(fmu: Path) -> bool:
         return True
 
 
-def of_fmutool(fmu: Path) -> bool:
+def passes_fmutool(fmu: Path) -> bool:
     """Return True if ``fmutool -check`` reports anything."""
     return bool(fmutool_findings(fmu, 2))
 
 
-def of_vdmcheck(fmu: Path) -> bool:
+def passes_vdmcheck(fmu: Path) -> bool:
     """Return True if VDMCheck2 does not end with "No errors found."."""
     done = subprocess.run(
         [os.environ["VDMCHECK2"], fmu.resolve()], capture_output=True, text=True, check=False
@@ -46,9 +46,9 @@ def of_vdmcheck(fmu: Path) -> bool:
     return "No errors found." not in done.stdout.splitlines()
 
 
-TOOLS = {"`fmpy validate`": of_fmpy, "`fmutool -check`": of_fmutool}
+TOOLS = {"`fmpy validate`": passes_fmpy, "`fmutool -check`": passes_fmutool}
 if "VDMCHECK2" in os.environ:
-    TOOLS["VDMCheck2"] = of_vdmcheck
+    TOOLS["VDMCheck2"] = passes_vdmcheck
 
 
 def main() -> None:

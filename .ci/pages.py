@@ -22,7 +22,7 @@ def chromium() -> Iterator[Browser]:
         browser.close()
 
 
-def opened(browser: Browser, file: Path, width: int, scheme: str = "light", **more: str) -> Page:
+def open_page(browser: Browser, file: Path, width: int, scheme: str = "light", **more: str) -> Page:
     """Open a page and wait until it is drawn; anything fetched is an error."""
     page = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme, **more)
     faults: list[str] = []

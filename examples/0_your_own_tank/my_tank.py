@@ -48,7 +48,7 @@ def pointing_error(runs: dict[str, pd.DataFrame]) -> pd.Series:
     return 1e3 * np.degrees(runs["spherical"]["theta"] - runs["frozen"]["theta"])
 
 
-def answer(runs: dict[str, pd.DataFrame]) -> str:
+def summary(runs: dict[str, pd.DataFrame]) -> str:
     """Say what the liquid does after the manoeuvre."""
     end = max((time for time, torque in TORQUE if torque), default=0)
     late = runs["spherical"]["time"] > end
@@ -76,7 +76,7 @@ def figure(runs: dict[str, pd.DataFrame]) -> plt.Figure:
         ax.margins(x=0)
     top = pointing.get_xaxis_transform()
     pointing.text(end / 2, 0.96, "torque", transform=top, ha="center", va="top", color="0.4")
-    drawing.suptitle(answer(runs))
+    drawing.suptitle(summary(runs))
     return drawing
 
 
@@ -87,7 +87,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("my_tank.png"))
     args = parser.parse_args()
     runs = compare(args.fmu)
-    print(answer(runs))
+    print(summary(runs))
     save(figure(runs), args.out)
     print("wrote", args.out)
 

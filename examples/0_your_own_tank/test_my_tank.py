@@ -1,6 +1,6 @@
 """The statements of README about the manoeuvre."""
 
-from my_tank import MY_TANK, answer, compare
+from my_tank import MY_TANK, compare, summary
 
 
 def test_rigid_liquid_ends_at_rest_and_sloshing_liquid_does_not(fmu: str) -> None:
@@ -9,7 +9,7 @@ def test_rigid_liquid_ends_at_rest_and_sloshing_liquid_does_not(fmu: str) -> Non
     last = {liquid: run["omega"].iloc[-500:].abs().max() for liquid, run in runs.items()}
     assert last["frozen"] < 1e-12
     assert round(last["spherical"], 4) == 0.008
-    assert "±59 millidegrees" in answer(runs)
-    assert answer(runs).endswith("up to 5.8 mm")
+    assert "±59 millidegrees" in summary(runs)
+    assert summary(runs).endswith("up to 5.8 mm")
     assert runs["frozen"]["slosh_angle"].abs().max() == 0.0
     assert MY_TANK["friction.model"] == "none"

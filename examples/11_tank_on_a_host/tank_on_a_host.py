@@ -85,7 +85,7 @@ def lumped() -> tuple[float, np.ndarray, np.ndarray]:
     return mass, centre, inertia
 
 
-def whole(folder: Path | None) -> pd.DataFrame:
+def simulate_whole(folder: Path | None) -> pd.DataFrame:
     """Return what Spacecraft.fmu makes of host and tank together: the reference."""
     settings = body(MASS, CENTRE, INERTIA) | tank("tank[1]") | {"tanks": 1} | START
     return hubslosh.simulate(
@@ -266,7 +266,7 @@ def error(found: pd.DataFrame, reference: pd.DataFrame) -> float:
 
 def table(folder: Path | None) -> dict[str, dict[float, float]]:
     """Return the errors by host and step, of those hosts that are installed."""
-    reference = whole(folder)
+    reference = simulate_whole(folder)
     hosts = {"fmpy, host first": coupled, "libcosim (SSP)": in_libcosim, "Basilisk": on_basilisk}
     found: dict[str, dict[float, float]] = {}
     for name, run in hosts.items():
@@ -292,7 +292,7 @@ def main() -> None:
         pack_ssp(args.folder, args.ssp, STEPS[1])
     for name, errors in table(args.folder).items():
         print(f"| {name} | " + " | ".join(f"{errors[step]:.1e}" for step in STEPS) + " |")
-    reference = whole(args.folder)
+    reference = simulate_whole(args.folder)
     drawing, axes = plt.subplots(1, 2, figsize=(10, 3.4), layout="constrained")
     runs = {
         "bias on the lumped body": coupled(args.folder, STEPS[1]),

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from fmpy.ssp.ssd import read_ssd
-from tank_on_a_host import STEPS, coupled, error, pack_ssp, whole
+from tank_on_a_host import STEPS, coupled, error, pack_ssp, simulate_whole
 
 from hubslosh import FmuWarning
 
@@ -21,7 +21,7 @@ def both(spacecraft: str) -> Path | None:
 
 def test_the_lumped_coupling_converges_with_the_step(both: Path | None) -> None:
     """First order, on a tumbling host that is lighter than its tank."""
-    reference = whole(both)
+    reference = simulate_whole(both)
     errors = [error(coupled(both, step), reference) for step in STEPS[:3]]
     assert errors == pytest.approx([4.5e-4, 2.2e-4, 1.1e-4], rel=0.03)
 

@@ -82,7 +82,7 @@ def _ensure(directory: Path, requirements: Path, hashes: bool) -> Path:
             "-r",
             str(requirements),
         ],
-        f"the packages of {requirements} could not be installed; what pip says stands above",
+        f"the packages of {requirements} could not be installed (see the output of pip)",
     )
     stamp.write_text(made_from)
     return python

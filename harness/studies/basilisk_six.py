@@ -124,7 +124,7 @@ def rotation(q: Sequence[float]) -> np.ndarray:
     ])  # fmt: skip
 
 
-def of_mrp(sigma: np.ndarray) -> np.ndarray:
+def dcm_from_mrp(sigma: np.ndarray) -> np.ndarray:
     """Return the matrix from body to inertial axes of modified Rodrigues parameters."""
     s2 = sigma @ sigma
     return rotation(np.array([1 - s2, *(2 * sigma)]) / (1 + s2))
@@ -234,7 +234,7 @@ def basilisk(case: Case, integrator: str = "RKF78", step: float = 1e-3) -> Signa
         simulation.ConfigureStopTime(macros.sec2nano(end))
         simulation.ExecuteSimulation()
     return {
-        "attitude": np.array([of_mrp(sigma).ravel() for sigma in hub.sigma_BN]),
+        "attitude": np.array([dcm_from_mrp(sigma).ravel() for sigma in hub.sigma_BN]),
         "omega": hub.omega_BN_B,
         "position": hub.r_BN_N,
         "velocity": hub.v_BN_N,

@@ -153,14 +153,16 @@ class Craft:
             for part in range(parts):
                 v = u.copy()
 
-                def at(s: float, y: np.ndarray, part: int = part, v: np.ndarray = v) -> np.ndarray:
+                def rate_at(
+                    s: float, y: np.ndarray, part: int = part, v: np.ndarray = v
+                ) -> np.ndarray:
                     v[6:] = h - torque * (part + s) * d  # noqa: B023
                     return self.rate(y, v, -torque)  # noqa: B023
 
-                k1 = at(0.0, x)
-                k2 = at(0.5, x + d / 2 * k1)
-                k3 = at(0.5, x + d / 2 * k2)
-                k4 = at(1.0, x + d * k3)
+                k1 = rate_at(0.0, x)
+                k2 = rate_at(0.5, x + d / 2 * k1)
+                k3 = rate_at(0.5, x + d / 2 * k2)
+                k4 = rate_at(1.0, x + d * k3)
                 before = x[:3].copy()
                 x = x + d / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
                 angle = angle + d / 2 * (before + x[:3])
@@ -247,7 +249,7 @@ def deviation(name: str, start: dict[str, float]) -> float:
     return float(size.removesuffix("%")) / 100 * start.get(name, 1.0)
 
 
-def asked(start: dict[str, float], noise: dict[str, float], known_as: str) -> list[str]:
+def free_flags(start: dict[str, float], noise: dict[str, float], known_as: str) -> list[str]:
     """Return the flags of `hubslosh identify` and `design` but for files."""
     free = [f"craft.J{i}{i}={start[f'craft.J{i}{i}']}:200:2500" for i in "xyz"]
     free += [f"{name}={start[name]}:-1:1" for name in names("craft.r")]
@@ -311,7 +313,7 @@ def twin(
         table = measured(random, craft.fly(*manoeuvre(flight)), noise, errors, truth)
         table.to_csv(files[-1], index=False)
     result = folder / f"{kind}{seed}.json"
-    flags = [*asked(start, noise, known_as), *(["--drift"] if noise["drift"] else [])]
+    flags = [*free_flags(start, noise, known_as), *(["--drift"] if noise["drift"] else [])]
     command = [program, "-q", "identify", *files, "--fmu", fmu, *flags, "--out", result]
     before = os.times().children_user
     done = subprocess.run(command, check=False, capture_output=True, text=True)

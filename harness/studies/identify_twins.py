@@ -45,7 +45,7 @@ class Case:
     what: str = field(default="")
 
 
-def about(random: Generator, value: float) -> float:
+def draw_near(random: Generator, value: float) -> float:
     """Draw within 30 % of a value."""
     return float(value * random.uniform(0.7, 1.3))
 
@@ -58,8 +58,8 @@ def noisy(random: Generator, signal: np.ndarray, part: float) -> np.ndarray:
 def van_der_pol(random: Generator) -> Twin:
     """x0' = x1, x1' = mu (1 - x0²) x1 - x0, a few cycles of a relaxation oscillation."""
     truth = {
-        "mu": about(random, 1.0),
-        "x0@1": about(random, 2.0),
+        "mu": draw_near(random, 1.0),
+        "x0@1": draw_near(random, 2.0),
         "x1@1": random.uniform(-0.3, 0.3),
     }
     mu, t = truth["mu"], np.arange(0.0, 20.001, 0.05)
@@ -78,7 +78,11 @@ def van_der_pol(random: Generator) -> Twin:
 
 def bouncing_ball(random: Generator) -> Twin:
     """Parabolas from bounce to bounce; below 0.1 m/s the ball stays on the ground."""
-    truth = {"e": random.uniform(0.55, 0.9), "g": -about(random, 9.81), "h@1": about(random, 1.0)}
+    truth = {
+        "e": random.uniform(0.55, 0.9),
+        "g": -draw_near(random, 9.81),
+        "h@1": draw_near(random, 1.0),
+    }
     e, g, h0 = truth["e"], -truth["g"], truth["h@1"]
     pieces, at = [(0.0, h0, 0.0)], sqrt(2 * h0 / g)
     up = e * g * at
@@ -98,7 +102,7 @@ def bouncing_ball(random: Generator) -> Twin:
 
 def dahlquist(random: Generator) -> Twin:
     """Decay, x' = -k x."""
-    truth = {"k": about(random, 1.0), "x@1": about(random, 1.0)}
+    truth = {"k": draw_near(random, 1.0), "x@1": draw_near(random, 1.0)}
     time = np.arange(0.0, 5.0, 0.02)
     x = truth["x@1"] * np.exp(-truth["k"] * time)
     return Twin(pd.DataFrame({"time": time, "x": noisy(random, x, 0.05)}), truth)
@@ -106,7 +110,11 @@ def dahlquist(random: Generator) -> Twin:
 
 def orifice(random: Generator) -> Twin:
     """Drained tank, area h' = q - c sqrt(h) under an inflow in steps."""
-    truth = {"area": about(random, 1.0), "c": about(random, 0.5), "h@1": about(random, 1.0)}
+    truth = {
+        "area": draw_near(random, 1.0),
+        "c": draw_near(random, 0.5),
+        "h@1": draw_near(random, 1.0),
+    }
     time = np.arange(0.0, 40.0, 0.2)
     q = 0.3 + 0.3 * np.repeat(random.integers(0, 2, 20), 10)
     h, levels = truth["h@1"], []
@@ -130,9 +138,9 @@ def orifice(random: Generator) -> Twin:
 def hub(random: Generator) -> Twin:
     """I w' = tau - b w - c sgn(w): stick and slip under torque in steps, solved piece by piece."""
     truth = {
-        "hub.I": about(random, 0.3),
-        "friction.b": about(random, 0.04),
-        "friction.c": about(random, 0.02),
+        "hub.I": draw_near(random, 0.3),
+        "friction.b": draw_near(random, 0.04),
+        "friction.c": draw_near(random, 0.02),
         "bias(omega)@1": 1e-3 * random.normal(),
     }
     inertia, b, c, _ = truth.values()

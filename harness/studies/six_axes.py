@@ -95,7 +95,7 @@ def parameters(case: str) -> dict[str, float | str]:
     return p
 
 
-def count(program: Path, folder: Path, case: str, tolerance: float) -> float:
+def count_instructions(program: Path, folder: Path, case: str, tolerance: float) -> float:
     """Return the instructions of one fmi2DoStep, the mean of 1000."""
     values = parameters(case)
     if case == "hub":
@@ -127,7 +127,7 @@ def main() -> None:
         craft = step_cost.unpack(sys.argv[-1], Path(folder, "craft"))
         unit = math.nan
         for case, tolerance, what in [row for row in ROWS if row[0] in ("hub", "one") or not short]:
-            n = count(program, hub if case == "hub" else craft, case, tolerance)
+            n = count_instructions(program, hub if case == "hub" else craft, case, tolerance)
             unit = n if case == "hub" else unit
             print(f"| {what} | {n:,.0f} | {n / unit:.1f} |", flush=True)
             written = re.search(rf"^\| {re.escape(what)}.*?\| ([\d,]+) \|", page, re.MULTILINE)

@@ -22,7 +22,7 @@ NAMES = tuple(f"q[{i}]" for i in range(1, 5))
 Real = NDArray[np.float64]
 
 
-def _of(q: Any) -> Real:
+def _unit_quaternions(q: Any) -> Real:
     """Return quaternions as rows, of length 1; of a table its columns q[1], …, q[4]."""
     if hasattr(q, "columns"):
         if missing := [name for name in NAMES if name not in q.columns]:
@@ -40,7 +40,7 @@ def _of(q: Any) -> Real:
     return np.asarray(rows / length, float)
 
 
-def _like(q: Any, names: tuple[str, ...], values: Real) -> Any:
+def _as_given(q: Any, names: tuple[str, ...], values: Real) -> Any:
     """Return values as a table if ``q`` is one."""
     if not hasattr(q, "columns"):
         return values
@@ -85,11 +85,11 @@ def angles(q: "ArrayLike | pd.DataFrame") -> Any:
     """
     from scipy.spatial.transform import Rotation
 
-    rows = _of(q)
+    rows = _unit_quaternions(q)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # at a pitch of 90 degrees
         turned = Rotation.from_quat(rows, scalar_first=True).as_euler("ZYX")
-    return _like(q, ("roll", "pitch", "yaw"), turned[..., ::-1])
+    return _as_given(q, ("roll", "pitch", "yaw"), turned[..., ::-1])
 
 
 def quaternion(roll: ArrayLike = 0.0, pitch: ArrayLike = 0.0, yaw: ArrayLike = 0.0) -> Real:
@@ -148,16 +148,16 @@ def rotation_vector(q: "ArrayLike | pd.DataFrame") -> Any:
     Examples
     --------
     >>> from hubslosh import attitude
-    >>> attitude.rotation_vector(attitude.about((0, 0, 1), 0.2)).round(6)
+    >>> attitude.rotation_vector(attitude.axis_angle((0, 0, 1), 0.2)).round(6)
     array([0. , 0. , 0.2])
     """
     from scipy.spatial.transform import Rotation
 
-    turned = Rotation.from_quat(_of(q), scalar_first=True).as_rotvec()
-    return _like(q, ("angle[1]", "angle[2]", "angle[3]"), turned)
+    turned = Rotation.from_quat(_unit_quaternions(q), scalar_first=True).as_rotvec()
+    return _as_given(q, ("angle[1]", "angle[2]", "angle[3]"), turned)
 
 
-def about(axis: ArrayLike, angle: ArrayLike) -> Real:
+def axis_angle(axis: ArrayLike, angle: ArrayLike) -> Real:
     """Return the quaternion of a turn about an axis.
 
     Parameters
@@ -181,7 +181,7 @@ def about(axis: ArrayLike, angle: ArrayLike) -> Real:
     --------
     >>> import numpy as np
     >>> from hubslosh import attitude
-    >>> attitude.about((0, 1, 0), np.pi).round(6)
+    >>> attitude.axis_angle((0, 1, 0), np.pi).round(6)
     array([0., 0., 1., 0.])
     """
     unit = vector(axis, 3, "an axis")
@@ -225,9 +225,11 @@ def error(q: "ArrayLike | pd.DataFrame", wanted: "ArrayLike | pd.DataFrame") -> 
     """
     from scipy.spatial.transform import Rotation
 
-    mine, other = (Rotation.from_quat(_of(one), scalar_first=True) for one in (q, wanted))
+    mine, other = (
+        Rotation.from_quat(_unit_quaternions(one), scalar_first=True) for one in (q, wanted)
+    )
     turned = (mine.inv() * other).as_rotvec()
-    return _like(q, ("error[1]", "error[2]", "error[3]"), turned)
+    return _as_given(q, ("error[1]", "error[2]", "error[3]"), turned)
 
 
 def slew(
@@ -299,12 +301,12 @@ def slew(
     stop = end if stop is None else max(stop, end)
     time = np.append(np.arange(0.0, stop - 1e-9 * step, step), stop)
     t, w = np.clip(time - start, 0.0, duration), 2 * np.pi / duration
-    about(axis, 0.0)  # checks it
+    axis_angle(axis, 0.0)  # checks it
     unit = floats(axis) / np.linalg.norm(axis)
     turned = angle * (t - np.sin(w * t) / w) / duration
     rate = angle * (1 - np.cos(w * t)) / duration
     acceleration = angle * w * np.sin(w * t) / duration
-    table = {"time": time} | dict(zip(NAMES, about(axis, turned).T, strict=True))
+    table = {"time": time} | dict(zip(NAMES, axis_angle(axis, turned).T, strict=True))
     table |= {f"omega[{i + 1}]": rate * unit[i] for i in range(3)}
     units = {"time": "s"} | {f"omega[{i + 1}]": "rad/s" for i in range(3)}
     if inertia is not None:

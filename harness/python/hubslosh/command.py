@@ -41,9 +41,9 @@ def find_program(path: str | Path | None = None) -> Path:
         if built.is_file():
             return built
     raise FmuError(
-        "the program hubslosh was not found, which does this; it comes with the wheel of this "
-        "package, or is built from the project's source (cargo build --release): put it on PATH, "
-        "name it in the environment variable HUBSLOSH, or give program="
+        "the program hubslosh was not found. The wheel of this package contains it; in the "
+        "project's source, cargo build --release builds it. Put it on PATH, set the environment "
+        "variable HUBSLOSH to its path, or give program="
     )
 
 
@@ -60,10 +60,12 @@ def call(
     arguments: Sequence[str | Path],
     progress: Progress = False,
     codes: Sequence[int] = (0,),
+    names: Mapping[str, str] | None = None,
 ) -> Any:
     """Run a command of the program and return its result, or None if it has none.
 
     * ``codes``: Exit codes of a command that has done its work.
+    * ``names``: Names of temporary files in error messages, by their paths.
 
     KeyboardInterrupt, and whatever a function ``progress`` raises, ends the program and its guarded
     processes. The program removes what it has written by halves.
@@ -81,8 +83,8 @@ def call(
         )
     except OSError as error:
         raise FmuError(f"{program} cannot be started: {error}") from None
-    said: list[str] = []
-    reader = Thread(target=lambda: said.extend(child.stderr or ()), daemon=True)
+    printed: list[str] = []
+    reader = Thread(target=lambda: printed.extend(child.stderr or ()), daemon=True)
     line, result = Line(progress), None
     with child:
         reader.start()
@@ -101,7 +103,10 @@ def call(
             line.close()
     reader.join()
     if child.returncode not in codes or (child.returncode and result is None):
-        raise FmuError(f"hubslosh {command}: {''.join(said).strip().removeprefix('error: ')}")
+        text = "".join(printed).strip().removeprefix("error: ")
+        for temporary, name in (names or {}).items():
+            text = text.replace(temporary, name)
+        raise FmuError(f"hubslosh {command}: {text}")
     return result
 
 

@@ -10,23 +10,22 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import native, temporary
+from . import native
 from .arguments import caller, floats, vector
 from .fmu import Fmu, FmuError, FmuWarning, Parameters, Quantity
 from .linearization import LinearModel, linearize
 from .loop import Loop
 from .operating_point import OperatingPoint, rotation, trim
-from .quantities import DELAY, RESERVED, changed, full_names, of_mode
+from .quantities import DELAY, RESERVED, apply_changes, full_names, mode_quantity
 from .simulation import outputs_of, parameters_of
 from .tanks import (
-    Question,
     Tank,
+    TankCase,
     _from_z,
-    _given,
-    _toml,
-    checked_fill,
-    drawing,
+    _tank_source,
+    check_fill,
     fill_table,
+    read_drawing,
     solve,
 )
 
@@ -381,15 +380,15 @@ class Craft:
         key = ("drawing", name)
         if key not in self._known:
             try:
-                self._known[key] = drawing(_given(self.tanks[name].source))
+                self._known[key] = read_drawing(_tank_source(self.tanks[name].source))
             except FmuError as error:
                 raise FmuError(f"tank {name}: {error}") from None
         return self._known[key]
 
-    def _question(self, name: str, fill: Any, gravity: float) -> Question:
+    def _case(self, name: str, fill: Any, gravity: float) -> TankCase:
         of = self.tanks[name]
-        return Question(
-            _given(of.source), fill, of.modes, gravity, of.nu, of.sigma, of.contact_angle
+        return TankCase(
+            _tank_source(of.source), fill, of.modes, gravity, of.nu, of.sigma, of.contact_angle
         )
 
     def _solve(self, asked: Sequence[tuple[str, Any, float]]) -> list[Tank | None]:
@@ -400,8 +399,8 @@ class Craft:
         wanted = [key for key in dict.fromkeys(asked) if not _is_empty(key[1])]
         new = [key for key in wanted if key not in self._known]
         problems = []
-        questions = [self._question(*key) for key in new]
-        found = solve(questions, [self._drawing(key[0]) for key in new]) if new else []
+        cases = [self._case(*key) for key in new]
+        found = solve(cases, [self._drawing(key[0]) for key in new]) if new else []
         for key, one in zip(new, found, strict=True):
             try:
                 if isinstance(one, FmuError):
@@ -431,7 +430,7 @@ class Craft:
         if isinstance(fill, str) and fill.strip().endswith("%"):
             return float(fill.strip()[:-1]) / 100 * self._capacity(name).mass
         try:
-            return float(self._drawing(name).mass(checked_fill(fill)))
+            return float(self._drawing(name).mass(check_fill(fill)))
         except FmuError as error:
             raise FmuError(f"tank {name}: {error}") from None
 
@@ -494,7 +493,7 @@ class Craft:
         asked = []
         for of in every:
             for fill in of.values():
-                checked_fill(fill)
+                check_fill(fill)
             if self.gravity is None:
                 masses = (self._mass_of(name, fill) for name, fill in of.items())
                 acceleration = self._force() / (self.mass + sum(masses))
@@ -628,8 +627,8 @@ class Craft:
         }  # fmt: skip
         point, late = self._point(fill, parameters, trimmed=trimmed, **options)
         if late is not None:
-            raise FmuError(f"{DELAY} is a quantity of a loop; the parameters have none")
-        if not trimmed and (text := rotation(f"{self!r}, untrimmed,", point.left)):
+            raise FmuError(f"{DELAY} belongs to a loop, not to the craft: give it to Craft.loop")
+        if not trimmed and (text := rotation(f"{self!r}, untrimmed,", point.angular_acceleration)):
             warnings.warn(text, FmuWarning, stacklevel=2)
         return point.parameters
 
@@ -678,17 +677,17 @@ class Craft:
         **options: Any,
     ) -> tuple[OperatingPoint, float | None]:
         """Return the operating point at a fill, and the delay if the parameters have it."""
-        every, modes, late = self._given(fill, parameters, **options)
+        every, modes, late = self._resolve(fill, parameters, **options)
         return self._realised(every, modes, trimmed=trimmed), late
 
-    def _given(
+    def _resolve(
         self, fill: Fill, parameters: Parameters | None, **options: Any
     ) -> tuple[dict[str, Quantity], dict[str, Quantity], Any]:
         """Return untrimmed parameters, quantities of slosh modes and the delay, or None."""
         every = self._untrimmed(fill, **options)
         given = full_names(parameters_of(parameters), self.tanks)
         late = given.pop(DELAY, None)
-        modes = {name: given.pop(name) for name in list(given) if of_mode(name)}
+        modes = {name: given.pop(name) for name in list(given) if mode_quantity(name)}
         return every | given, modes, late
 
     def _realised(
@@ -711,7 +710,7 @@ class Craft:
             point = OperatingPoint(model, dict(every), none, none, tuple(self.tanks))
         # they leave the centre of mass where it is
         if modes or factors:
-            every = changed(model, point.parameters, modes, factors)
+            every = apply_changes(model, point.parameters, modes, factors)
             point = replace(point, parameters=every)
         return point
 
@@ -779,7 +778,7 @@ class Craft:
             key = (name, "table", tuple(between), tank.gravity)
             if key not in self._known:
                 try:
-                    asked = self._question(name, None, tank.gravity)
+                    asked = self._case(name, None, tank.gravity)
                     self._known[key], said = fill_table(asked, between)
                 except FmuError as error:
                     raise FmuError(f"tank {name}: {error}") from None
@@ -916,7 +915,7 @@ class Craft:
         """
         point, late = self._point(fill, parameters, rigid=rigid)
         if late is not None:
-            raise FmuError(f"{DELAY} is a quantity of a loop; a linear model of the craft has none")
+            raise FmuError(f"{DELAY} belongs to a loop, not to the craft: give it to Craft.loop")
         return linearize(point.model, point.parameters, inputs, outputs)
 
     def loop(
@@ -1131,21 +1130,23 @@ class Craft:
         named: dict[str, Any] = full_names(ranges, order)  # type: ignore[arg-type]
         if DELAY in named:
             raise FmuError(
-                "delay is a quantity of a loop, and the craft's (M, Δ) has none: give it to loop, "
-                "or let review vary it"
+                "delay belongs to a loop, not to the craft: give it to Craft.loop, or vary it by "
+                "Craft.review"
             )
         for name, of in named.items():
             if isinstance(of, str) and of == "interval":
-                mode = of_mode(name)
+                mode = mode_quantity(name)
                 tank = tanks.get(order[mode.tank - 1]) if mode and mode.tank <= len(order) else None
                 table = None if tank is None or mode is None else tank.modes
                 if table is None or mode is None or mode.kind != "zeta" or "zeta_low" not in table:
                     raise FmuError(f'{name}: "interval" is for zeta[n] of a tank with nu=')
-                row = table.iloc[mode.mode - 1]
+                row = table.iloc[mode.number - 1]
                 named[name] = (float(row["zeta_low"]), float(row["zeta_high"]))
         point, late = self._point(fill, parameters)
         if late is not None:
-            raise FmuError("delay is a quantity of a loop; an uncertain model has none")
+            raise FmuError(
+                "delay belongs to a loop, not to an uncertain model: give it to Craft.loop"
+            )
         return uncertain(point.parameters, named, outputs=outputs, model=point.model, **options)
 
     def columns(self, fill: Fill) -> list[str]:
@@ -1211,19 +1212,11 @@ class Craft:
         """
         from .viewing import view
 
-        with temporary.folder() as folder:
-            files: dict[int, Path] = {}
-            for number, (name, of) in enumerate(self.tanks.items(), 1):
-                given = _given(of.source)
-                if isinstance(given, Path):
-                    files[number] = given
-                    continue
-                files[number] = Path(folder) / f"tank{number}.toml"
-                text = "".join(f"{_toml(k)} = {_toml(v)}\n" for k, v in given.items())
-                if "name" not in given:
-                    text = f"name = {_toml(name)}\n{text}"
-                files[number].write_text(text, encoding="utf-8")
-            return view(run, out, tanks=files, **options)
+        sources: dict[int, Any] = {}
+        for number, (name, mounted) in enumerate(self.tanks.items(), 1):
+            given = mounted.source
+            sources[number] = {"name": name, **given} if isinstance(given, Mapping) else given
+        return view(run, out, tanks=sources, **options)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what a copy is made from, without what is computed again on demand."""

@@ -17,17 +17,17 @@ if TYPE_CHECKING:
     from .uncertainty import UncertainModel
 
 
-def _checked(table: Any, path: Any, ending: str) -> Path:
+def _check_table(table: Any, path: Any, ending: str) -> Path:
     import pandas as pd
 
     if isinstance(table, str | os.PathLike):
         raise FmuError(f"the table comes first, then the file: (table, {str(table)!r})")
     if not isinstance(table, pd.DataFrame):
         raise FmuError(f"a pandas.DataFrame is expected, not {type(table).__name__}")
-    return _named(path, ending)
+    return _check_path(path, ending)
 
 
-def _named(path: Any, ending: str) -> Path:
+def _check_path(path: Any, ending: str) -> Path:
     if not isinstance(path, str | os.PathLike):
         raise FmuError(f"the file's name is expected, not {path!r}")
     path = Path(path)
@@ -67,7 +67,7 @@ def to_csv(table: "pd.DataFrame", path: str | Path) -> None:
     >>> Path("run.csv").read_text().splitlines()[:2]
     ['time,omega', '0.0,0.0']
     """
-    path = _checked(table, path, ".csv")
+    path = _check_table(table, path, ".csv")
     with temporary.output(path) as new:
         table.to_csv(new, index=False)
 
@@ -99,7 +99,7 @@ def to_parquet(table: "pd.DataFrame", path: str | Path) -> None:
     >>> hubslosh.read_table(Path("run.parquet"), ["time"])["time"]
     array([0. , 0.5, 1. ])
     """
-    path = _checked(table, path, ".parquet")
+    path = _check_table(table, path, ".parquet")
     units = {f"unit:{name}": str(unit) for name, unit in table.attrs.get("units", {}).items()}
     write_table(path, _columns(table), units)
 
@@ -155,7 +155,7 @@ def to_mat(
         else:
             values = {name: of[0] if isinstance(of, tuple) else of for name, of in table.items()}
             units = {name: of[1] for name, of in table.items() if isinstance(of, tuple)}
-            arrays = _apart(values, units)
+            arrays = _distinct_names(values, units)
     elif (
         isinstance(table, list | tuple)
         and table
@@ -163,15 +163,15 @@ def to_mat(
     ):
         arrays = _family(table)
     else:
-        path = _checked(table, path, ".mat")
-        arrays = _apart(_columns(table), table.attrs.get("units", {}))
+        path = _check_table(table, path, ".mat")
+        arrays = _distinct_names(_columns(table), table.attrs.get("units", {}))
     from scipy.io import savemat
 
-    with temporary.output(_named(path, ".mat")) as new:
+    with temporary.output(_check_path(path, ".mat")) as new:
         savemat(new, arrays, oned_as="column", do_compression=False)
 
 
-def _apart(values: Mapping[str, Any], units: Mapping[str, str]) -> dict[str, Any]:
+def _distinct_names(values: Mapping[str, Any], units: Mapping[str, str]) -> dict[str, Any]:
     """Return values and units under MATLAB's names."""
     names = {name: re.sub(r"\W+", "_", name).strip("_") for name in values}
     twice = [name for name in names if list(names.values()).count(names[name]) > 1]
@@ -212,6 +212,6 @@ def _in_mat(values: Mapping[str, Any]) -> dict[str, Any]:
 
 def write_file(path: str | Path, ending: str, text: Callable[[], str]) -> None:
     """Write a text, which is made after the file's name was checked."""
-    path = _named(path, ending)
+    path = _check_path(path, ending)
     with temporary.output(path) as new:
         new.write_text(text(), encoding="utf-8")

@@ -442,7 +442,7 @@ def linearize(
     pairs = fmu.native.derivatives
     states = [by_reference.get(state) for _, state in pairs]
     if None in states:
-        raise FmuError(f"{fmu.name} has arrays of states: scalars alone")
+        raise FmuError(f"{fmu.name} has arrays of states; only scalar states are linearised")
     unknown = [derivative for derivative, _ in pairs]
     unknown += [fmu.variable(name).reference for name in names_out]
     known = [state for _, state in pairs] + [fmu.variable(name).reference for name in names_in]

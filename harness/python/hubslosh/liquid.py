@@ -265,11 +265,13 @@ class LiquidModes:
         m_0 = self.mass - masses.sum()
         r_0 = -(bobs @ masses) / m_0
 
-        def of_points(m: np.ndarray, r: np.ndarray) -> np.ndarray:
+        def points_inertia(m: np.ndarray, r: np.ndarray) -> np.ndarray:
             return np.einsum("n,in,in->", m, r, r) * np.eye(3) - np.einsum("n,in,jn->ij", m, r, r)
 
-        inertia = self.lid_inertia - of_points(np.array([self.mass]), center[:, None])
-        left = inertia - of_points(masses, bobs) - of_points(np.array([m_0]), r_0[:, None])
+        inertia = self.lid_inertia - points_inertia(np.array([self.mass]), center[:, None])
+        left = (
+            inertia - points_inertia(masses, bobs) - points_inertia(np.array([m_0]), r_0[:, None])
+        )
         axis = (place[0] + center[0], place[1] + center[1], place[2])
         name = f"tank[{number}]" if model == "Spacecraft" else "tank"
         values: dict[str, Value] = {

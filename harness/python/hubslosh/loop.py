@@ -114,9 +114,9 @@ class Loop:
         >>> hubslosh.Loop([[4.0]], 0.1, measured="theta").problems()
         []
         """
-        return self._examined()[0]
+        return self._examine()[0]
 
-    def _examined(self) -> tuple[list[str], LinearModel | None]:
+    def _examine(self) -> tuple[list[str], LinearModel | None]:
         """Return everything that is wrong with it, and the controller if it is linear."""
         controller = None
         found = out_of_range(period=self.period, latency=self.latency, delay=self.delay)
@@ -136,7 +136,7 @@ class Loop:
         for name in measured:
             if name in fmu.variables and fmu.kind(name) not in ("Real", "String"):
                 found.append(f"{name} is of type {fmu.kind(name)}: only Reals are measured")
-        found += [f"the command {name} is given twice" for name in _twice(commands)]
+        found += [f"the command {name} is given twice" for name in _repeated(commands)]
         if not commands:
             found.append("there is no command")
         if not found:
@@ -193,7 +193,7 @@ class Loop:
 
     def _must_be_linear(self) -> LinearModel:
         """Return the controller of a loop that is right, or raise FmuError."""
-        found, controller = self._examined()
+        found, controller = self._examine()
         if found:
             raise FmuError("; ".join(found))
         if controller is None:
@@ -411,7 +411,7 @@ class Loop:
                 raise FmuError(
                     "reference is for linear controllers; a function knows its own reference"
                 )
-            return _called(self.controller, command), measured
+            return _checked_law(self.controller, command), measured
         table = _reference(reference, measured, command)
         attitude = all(name in table for name in QUATERNION)
         # the scalar part, which a controller seldom has, is measured as well
@@ -518,7 +518,7 @@ def closed_loop(
     )  # fmt: skip
 
 
-def _twice(names: list[str]) -> list[str]:
+def _repeated(names: list[str]) -> list[str]:
     return [name for name in dict.fromkeys(names) if names.count(name) > 1]
 
 
@@ -538,7 +538,7 @@ def _points(
     return np.append(points.ravel(), grid[-1]), switch, wanted
 
 
-def _called(law: Law, command: list[str]) -> Callable[[int, float, list[float]], list[float]]:
+def _checked_law(law: Law, command: list[str]) -> Callable[[int, float, list[float]], list[float]]:
     """Return a function as a run calls it; what it returns is checked."""
     one = f"a finite number for {command[0]}"
     several = f"{len(command)} finite numbers ({', '.join(command)})"
@@ -552,7 +552,7 @@ def _called(law: Law, command: list[str]) -> Callable[[int, float, list[float]],
             values = np.array([np.nan])
         if values.shape != (len(command),) or not np.isfinite(values).all():
             raise FmuError(
-                f"the controller returned {returned!r} at t = {time:g} s; {expected} must come back"
+                f"the controller returned {returned!r} at t = {time:g} s; it must return {expected}"
             )
         return values.tolist()
 
@@ -669,13 +669,15 @@ def _from_control(system: Any) -> LinearModel:
         state_space = control.ss(system)
     except Exception as error:  # of several kinds
         raise FmuError(
-            f"the controller has no state space (is it improper, s alone in it?): {error}"
+            "the controller has no state space (an improper transfer function, such as s, has "
+            f"none): {error}"
         ) from None
     A, B, C, D = (np.asarray(getattr(state_space, m), float) for m in "ABCD")
     period = system.dt
     if len(A) and (period is None or period is True):
         raise FmuError(
-            "the controller's time base is not specified: dt=0 is continuous time, dt=0.1 a period"
+            "the controller's time base is not specified: dt=0 is continuous time, dt=0.1 a period "
+            "of 0.1 s"
         )
     if not len(A):
         period = 0

@@ -10,7 +10,7 @@ import pandas as pd
 from . import temporary
 from .command import call, find_program, settings_flags
 from .fmu import FmuError, fmu_path
-from .program import Free, Identification, Table, _asked, _file
+from .program import Free, Identification, Table, _files, _free_flags
 
 
 def posterior(
@@ -97,15 +97,15 @@ def posterior(
     with temporary.folder() as folder:
         result, points = Path(folder) / "result.json", Path(folder) / "points.csv"
         result.write_text(json.dumps(found.all), encoding="utf-8")
-        tables = [data] if isinstance(data, pd.DataFrame | str | Path) else list(data)
-        files = [_file(t, (), Path(folder) / f"data{k}.csv") for k, t in enumerate(tables, 1)]
-        flags = ["--fmu", str(fmu_path(fmu)), *_asked(free, inputs, outputs, prior or {})]
+        files, named = _files(data, (), Path(folder))
+        named |= {str(result): "found", str(points): "the samples"}
+        flags = ["--fmu", str(fmu_path(fmu)), *_free_flags(free, inputs, outputs, prior or {})]
         flags += [*settings_flags(settings), *arguments]
         flags += ["--points", str(points), "--found", str(result)]
 
         def log_likelihood(x: np.ndarray) -> np.ndarray:
             pd.DataFrame(x, columns=names).to_csv(points, index=False)
-            deviance = call(path, "identify", [*files, *flags])
+            deviance = call(path, "identify", [*files, *flags], names=named)
             return np.array([-np.inf if d is None else -0.5 * d for d in deviance])
 
         random = np.random.default_rng(seed)

@@ -35,7 +35,7 @@ class OperatingPoint:
         Parameters of the FMU at this point.
     shift : ndarray, shape (3,)
         Way of O, where the thrust acts, across the thrust to the centre of mass, body axes, m.
-    before : ndarray, shape (3,)
+    untrimmed_acceleration : ndarray, shape (3,)
         Angular acceleration before trimming, body axes, rad/s².
     tanks : tuple of str
         Names of the tanks in the FMU's order.
@@ -52,11 +52,11 @@ class OperatingPoint:
     model: str | Path
     parameters: dict[str, Quantity]
     shift: Vector
-    before: Vector
+    untrimmed_acceleration: Vector
     tanks: tuple[str, ...]
 
     @cached_property
-    def _left(self) -> tuple[Vector, dict[str, float]]:
+    def _remaining(self) -> tuple[Vector, dict[str, float]]:
         with Plant(self.model, self.parameters) as plant:
 
             def get(name: str, count: int = 3) -> Vector:
@@ -71,28 +71,30 @@ class OperatingPoint:
         return turning, across
 
     @property
-    def left(self) -> Vector:
-        """Angular acceleration that is left, body axes, rad/s²."""
-        return self._left[0]
+    def angular_acceleration(self) -> Vector:
+        """Angular acceleration after trimming, body axes, rad/s²."""
+        return self._remaining[0]
 
     @property
-    def across(self) -> dict[str, float]:
-        """Acceleration that is left across each tank's axis, m/s²; it moves liquid at rest."""
-        return self._left[1]
+    def lateral_acceleration(self) -> dict[str, float]:
+        """Acceleration across each tank's axis after trimming, m/s²; it moves liquid at rest."""
+        return self._remaining[1]
 
     def __repr__(self) -> str:
         """Return the angular acceleration that is left."""
-        return f"OperatingPoint({np.linalg.norm(self.left):.2g} rad/s² left)"
+        return f"OperatingPoint({np.linalg.norm(self.angular_acceleration):.2g} rad/s² left)"
 
     def __str__(self) -> str:
         """Return what trimming changed, and what is left, in a line each."""
         lines = [
             f"O, where the thrust acts, moves by {_row(self.shift)} m to the centre of mass",
-            f"angular acceleration: {np.linalg.norm(self.before):.4g} rad/s² before, "
-            f"{np.linalg.norm(self.left):.2g} rad/s² left",
+            f"angular acceleration: {np.linalg.norm(self.untrimmed_acceleration):.4g} rad/s² "
+            f"before, {np.linalg.norm(self.angular_acceleration):.2g} rad/s² left",
         ]
-        if self.across:
-            rest = ", ".join(f"{name} {value:.2g} m/s²" for name, value in self.across.items())
+        if self.lateral_acceleration:
+            rest = ", ".join(
+                f"{name} {value:.2g} m/s²" for name, value in self.lateral_acceleration.items()
+            )
             lines.append(f"left across the axis of each tank: {rest}")
         return "\n".join(lines)
 

@@ -79,7 +79,7 @@ def campaign(
         directory = Path(out) if out is not None else Path("dist") / Path(plan).stem
         arguments: list[str | Path] = ["--plan", plan, "--fmu", fmu_path(model)]
         arguments += ["--out", directory, *(["--force"] if force else [])]
-        call(path, "campaign", arguments, progress)
+        call(path, "campaign", arguments, progress, names={f"the plan {plan}": "the plan"})
     table = pd.read_csv(directory / "runs.csv")
     table.attrs["directory"] = directory
     return table
@@ -284,18 +284,27 @@ class Identification:
         return "\n".join([f"Identification, model {self.model}", *words, *lines[:most], *more])
 
 
-def _file(table: "Table", needed: Sequence[str], path: Path) -> Path:
-    """Return the file of a table, which is written if it is none."""
-    if not isinstance(table, pd.DataFrame):
-        return Path(table)
-    missing = [name for name in needed if name not in table.columns]
-    if missing:
-        raise FmuError(f"data has no column {', '.join(missing)}")
-    table.to_csv(path, index=False)
-    return path
+def _files(
+    data: "Table | Sequence[Table]", needed: Sequence[str], folder: Path
+) -> tuple[list[Path], dict[str, str]]:
+    """Write tables of recordings to a folder, and return all files and the names of those."""
+    tables = [data] if isinstance(data, pd.DataFrame | str | Path) else list(data)
+    files: list[Path] = []
+    names: dict[str, str] = {}
+    for k, table in enumerate(tables):
+        if not isinstance(table, pd.DataFrame):
+            files.append(Path(table))
+            continue
+        name = "data" if len(tables) == 1 else f"data[{k}]"
+        if missing := [column for column in needed if column not in table.columns]:
+            raise FmuError(f"{name} has no column {', '.join(missing)}")
+        files.append(folder / f"data{k + 1}.csv")
+        names[str(files[-1])] = name
+        table.to_csv(files[-1], index=False)
+    return files, names
 
 
-def _asked(
+def _free_flags(
     free: "Mapping[str, Free]",
     inputs: Sequence[str],
     outputs: Sequence[str],
@@ -400,11 +409,11 @@ def identify(
     (True, 0.038)
     """
     if any(argument.split("=")[0] == "--method" for argument in arguments):
-        raise FmuError("--method is given as method=")
+        raise FmuError("give method= instead of the flag --method")
     if free is None and (inputs or outputs or prior):
-        raise FmuError("inputs=, outputs= and prior= go with free=")
+        raise FmuError("inputs=, outputs= and prior= need free=")
     if free is not None and (model is not None or method != "bench"):
-        raise FmuError("free= fits any FMU by output error: model= and method= are not for it")
+        raise FmuError("free= cannot be combined with model= or method=")
     path = find_program(program)
     needed: Sequence[str] = ("time",) if method == "decay" else ("time", "tau_cmd", "omega")
     flags = ["--model", model] if model is not None else []
@@ -417,15 +426,13 @@ def identify(
             if any(a.split("=")[0] == "--columns" for a in arguments)
             else ("time", *inputs, *outputs)
         )
-        flags += _asked(free, inputs, outputs, prior or {})
+        flags += _free_flags(free, inputs, outputs, prior or {})
     flags += [*settings_flags(settings), *arguments]
     flags += [] if out is None else ["--out", str(out)]
     with temporary.folder() as folder:
-        tables = [data] if isinstance(data, pd.DataFrame | str | Path) else list(data)
-        files = [
-            _file(table, needed, Path(folder) / f"data{k}.csv") for k, table in enumerate(tables, 1)
-        ]
-        loaded: dict[str, Any] = call(path, "identify", [kind, *files, *flags], progress)
+        files, names = _files(data, needed, Path(folder))
+        asked = [kind, *files, *flags]
+        loaded: dict[str, Any] = call(path, "identify", asked, progress, names=names)
     estimates = {
         kind: {name: Estimated._read(found) for name, found in loaded[kind].items()}
         for kind in ("parameters", "measurement")

@@ -27,27 +27,27 @@ DELAY = "delay"
 RESERVED = re.compile(r"tank(\[\d\])?|craft|init|pivot|solver|delay|force|torque|omega|q")
 """Names that no tank of a `Craft` may have: parameters of the FMU begin with them."""
 
-_OF_A_MODE = re.compile(rf"tank\[(\d)\]\.({'|'.join(KINDS)})\[(\d)\]")
+_MODE_QUANTITY = re.compile(rf"tank\[(\d)\]\.({'|'.join(KINDS)})\[(\d)\]")
 _MOVES_THE_BOB = re.compile(r"(tank\[\d\])\.(length|hinge)(\[\d\])")
 
 
 @dataclass(frozen=True)
-class OfMode:
+class ModeQuantity:
     """A quantity of a slosh mode."""
 
     tank: int
     kind: str
-    mode: int
+    number: int
 
-    def of(self, kind: str) -> str:
+    def name(self, kind: str) -> str:
         """Return the FMU's name of a parameter of this mode."""
-        return f"tank[{self.tank}].{kind}[{self.mode}]"
+        return f"tank[{self.tank}].{kind}[{self.number}]"
 
 
-def of_mode(name: str) -> OfMode | None:
+def mode_quantity(name: str) -> ModeQuantity | None:
     """Return the quantity of a mode that a full name stands for."""
-    match = _OF_A_MODE.fullmatch(name)
-    return OfMode(int(match[1]), match[2], int(match[3])) if match else None
+    match = _MODE_QUANTITY.fullmatch(name)
+    return ModeQuantity(int(match[1]), match[2], int(match[3])) if match else None
 
 
 def full_name(name: str, tanks: Iterable[str]) -> str:
@@ -95,46 +95,53 @@ class Modes:
             return float(self.fmu.convert(name, self.given[name]))
         return float(self.fmu.variable(name).start or 0.0)
 
-    def problem(self, of: OfMode) -> str:
+    def problem(self, mode: ModeQuantity) -> str:
         """Return why a quantity does not exist; "" if it does."""
-        if of.tank > self.number("tanks") or of.mode > self.number(f"tank[{of.tank}].modes"):
+        if mode.tank > self.number("tanks") or mode.number > self.number(
+            f"tank[{mode.tank}].modes"
+        ):
             return "does not exist at this fill: its tank has no such mode"
-        if of.kind == "zeta":
+        if mode.kind == "zeta":
             return ""
-        if self.number(f"tank[{of.tank}].fill.points") or self.number(f"tank[{of.tank}].diameter"):
+        if self.number(f"tank[{mode.tank}].fill.points") or self.number(
+            f"tank[{mode.tank}].diameter"
+        ):
             return "follows from the tank's fill table or diameter, and cannot be given"
         planar = any(
-            self.number(f"tank[{of.tank}].direction[{n},{i}]")
-            for n in range(1, int(self.number(f"tank[{of.tank}].modes")) + 1)
+            self.number(f"tank[{mode.tank}].direction[{n},{i}]")
+            for n in range(1, int(self.number(f"tank[{mode.tank}].modes")) + 1)
             for i in (1, 2)
         )
-        if planar and of.kind in ("mass", "bob"):
+        if planar and mode.kind in ("mass", "bob"):
             return "is for tanks without planar modes; a box has its mass from its drawing"
         return ""
 
-    def value(self, of: OfMode) -> float:
+    def value(self, mode: ModeQuantity) -> float:
         """Return the value of a quantity."""
-        if of.kind == "bob":
-            return self.number(of.of("hinge")) - self._length(of)
-        if of.kind != "frequency":
-            return self.number(of.of(of.kind))
-        w2 = self._along(of.tank) / self._length(of)
-        w2 += self.number(of.of("k")) / self.number(of.of("mass"))
+        if mode.kind == "bob":
+            return self.number(mode.name("hinge")) - self._length(mode)
+        if mode.kind != "frequency":
+            return self.number(mode.name(mode.kind))
+        w2 = self._axial_force(mode.tank) / self._length(mode)
+        w2 += self.number(mode.name("k")) / self.number(mode.name("mass"))
         if not w2 > 0:
             raise FmuError(
-                f"{of.of('frequency')} does not exist: neither thrust ({self._along(of.tank):.3g} "
-                "m/s² along the tank's axis) nor surface tension holds the liquid"
+                f"{mode.name('frequency')} does not exist: neither thrust "
+                f"({self._axial_force(mode.tank):.3g} m/s² along the tank's axis) nor surface "
+                "tension holds the liquid"
             )
         return float(np.sqrt(w2)) / TURN
 
-    def _length(self, of: OfMode) -> float:
-        f, length = self.number(of.of("frequency")), self.number(of.of("length"))
+    def _length(self, mode: ModeQuantity) -> float:
+        f, length = self.number(mode.name("frequency")), self.number(mode.name("length"))
         if f > 0:
-            of_gravity = (TURN * f) ** 2 - self.number(of.of("k")) / self.number(of.of("mass"))
-            length = self.number(f"tank[{of.tank}].g_ref") / of_gravity
+            by_gravity = (TURN * f) ** 2 - self.number(mode.name("k")) / self.number(
+                mode.name("mass")
+            )
+            length = self.number(f"tank[{mode.tank}].g_ref") / by_gravity
         return length
 
-    def _along(self, tank: int) -> float:
+    def _axial_force(self, tank: int) -> float:
         """Return the specific force along a tank's axis in a craft that does not turn, m/s²."""
         with Plant(self.model, self.given) as plant:
             force = plant.get([f"specific_force[{i}]" for i in (1, 2, 3)])
@@ -143,34 +150,37 @@ class Modes:
         axis = 2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)
         return float(np.dot(axis, force))
 
-    def scale_frequency(self, of: OfMode, factor: float) -> None:
+    def scale_frequency(self, mode: ModeQuantity, factor: float) -> None:
         """Multiply a mode's frequency by a factor, at every thrust; its bob stays."""
         if not factor > 0:
-            raise FmuError(f"{of.of('frequency')} must be above 0 Hz")
-        length = self._length(of)
+            raise FmuError(f"{mode.name('frequency')} must be above 0 Hz")
+        length = self._length(mode)
         new = length / factor**2
-        changes = {"length": new, "k": self.number(of.of("k")) * factor**2, "frequency": 0.0}
-        changes["hinge"] = self.number(of.of("hinge")) + new - length
-        self.given |= {of.of(name): value for name, value in changes.items()}
+        changes = {"length": new, "k": self.number(mode.name("k")) * factor**2, "frequency": 0.0}
+        changes["hinge"] = self.number(mode.name("hinge")) + new - length
+        self.given |= {mode.name(name): value for name, value in changes.items()}
 
-    def set(self, of: OfMode, value: float) -> None:
+    def set(self, mode: ModeQuantity, value: float) -> None:
         """Change a quantity alone."""
-        if of.kind == "zeta":
-            self.given[of.of("zeta")] = value
-        elif of.kind == "frequency":
-            self.scale_frequency(of, value / self.value(of))
-        elif of.kind == "mass":
+        if mode.kind == "zeta":
+            self.given[mode.name("zeta")] = value
+        elif mode.kind == "frequency":
+            self.scale_frequency(mode, value / self.value(mode))
+        elif mode.kind == "mass":
             if not value > 0:
-                raise FmuError(f"{of.of('mass')} must be above 0 kg")
-            old, bob = self.number(of.of("mass")), self.value(OfMode(of.tank, "bob", of.mode))
-            self.given[of.of("k")] = self.number(of.of("k")) * value / old
-            self.given[of.of("mass")] = value
-            self._keep_at_rest(of.tank, [(old, bob), (-value, bob)])
+                raise FmuError(f"{mode.name('mass')} must be above 0 kg")
+            old, bob = (
+                self.number(mode.name("mass")),
+                self.value(ModeQuantity(mode.tank, "bob", mode.number)),
+            )
+            self.given[mode.name("k")] = self.number(mode.name("k")) * value / old
+            self.given[mode.name("mass")] = value
+            self._keep_at_rest(mode.tank, [(old, bob), (-value, bob)])
         else:
-            length, old, m = self._length(of), self.value(of), self.number(of.of("mass"))
-            self.given |= {of.of("hinge"): value + length, of.of("length"): length}
-            self.given[of.of("frequency")] = 0.0
-            self._keep_at_rest(of.tank, [(m, old), (-m, value)])
+            length, old, m = self._length(mode), self.value(mode), self.number(mode.name("mass"))
+            self.given |= {mode.name("hinge"): value + length, mode.name("length"): length}
+            self.given[mode.name("frequency")] = 0.0
+            self._keep_at_rest(mode.tank, [(m, old), (-m, value)])
 
     def _keep_at_rest(self, tank: int, points: list[tuple[float, float]]) -> None:
         """Add masses at heights to the rigid liquid; the dry craft lends it inertia."""
@@ -210,7 +220,7 @@ def rigid_rest(
     return m_0, H_0, I_0 - lent, lent
 
 
-def changed(
+def apply_changes(
     model: str | Path,
     given: Parameters,
     values: Parameters,
@@ -222,17 +232,17 @@ def changed(
     """
     modes, problems = Modes(model, given), []
     for name, value in values.items():
-        of = of_mode(name)
-        assert of is not None
-        if problem := modes.problem(of):
+        mode = mode_quantity(name)
+        assert mode is not None
+        if problem := modes.problem(mode):
             problems.append(f"{name} {problem}")
             continue
-        like = of.of("hinge" if of.kind == "bob" else of.kind)
-        modes.set(of, float(modes.fmu.convert(like, value)))
+        like = mode.name("hinge" if mode.kind == "bob" else mode.kind)
+        modes.set(mode, float(modes.fmu.convert(like, value)))
     if problems:
         raise FmuError("; ".join(problems))
     for name, factor in (factors or {}).items():
-        of = of_mode(name)
-        assert of is not None
-        modes.scale_frequency(of, factor)
+        mode = mode_quantity(name)
+        assert mode is not None
+        modes.scale_frequency(mode, factor)
     return modes.given

@@ -320,7 +320,7 @@ def _aligned(columns: list[Column]) -> tuple[list[str], list[list]]:
         if column.time is None:
             continue
         if not (np.diff(column.time) > 0).all():
-            raise FmuError(f"the times of {name} do not grow")
+            raise FmuError(f"the times of {name} do not increase")
         own = np.full(len(time), None, object)
         own[np.searchsorted(time, column.time)] = column.values
         header.append(name)

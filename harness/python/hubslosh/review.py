@@ -20,7 +20,7 @@ from .fmu import Fmu, FmuError, FmuWarning, Parameters, Quantity, did_you_mean
 from .linearization import LinearModel, linearize
 from .loop import Loop
 from .operating_point import rotation
-from .quantities import DELAY, Modes, OfMode, full_name, moves_the_bob, of_mode
+from .quantities import DELAY, ModeQuantity, Modes, full_name, mode_quantity, moves_the_bob
 from .sampling import draw
 from .short import ShortTable
 from .stabilisation import resonances
@@ -216,14 +216,14 @@ class Review:
                 verdicts.setdefault(worst, []).append(int(fill))
             hows = sorted(verdicts, key=SEVERITY.index)
             if len(hows) == 1 and (hows[0] != "unstable" or len(self.fills) == 1):
-                words = _stabilised(hows[0])
+                words = _verdict(hows[0])
             else:
-                words = ", ".join(f"{_stabilised(how)} at {self._at(verdicts[how])}"
+                words = ", ".join(f"{_verdict(how)} at {self._fill_text(verdicts[how])}"
                                   for how in hows)  # fmt: skip
             found.append((SEVERITY.index(hows[0]), str(mode), words))
         return {mode: words for _, mode, words in sorted(found, key=lambda row: row[0])}
 
-    def _at(self, fills: Sequence[int]) -> str:
+    def _fill_text(self, fills: Sequence[int]) -> str:
         """Return fills in words; those that follow one another as a span."""
         spans: list[list[int]] = []
         for fill in fills:
@@ -252,13 +252,13 @@ class Review:
         return [f"{', '.join(of)}: {how}{where}." for how, of in modes.items()]
 
     @property
-    def answer(self) -> str:
+    def summary(self) -> str:
         """The answer in a sentence."""
         table = self.points
         unstable = table[~table["stable"]]
-        count = _count(len(self.fills), "fill")
+        count = _plural(len(self.fills), "fill")
         all_of = f"all {count}" if len(self.fills) > 1 else count
-        points = _count(len(table), "point")
+        points = _plural(len(table), "point")
         if len(unstable):
             nominal = unstable[unstable["kind"] == "nominal"]
             if len(nominal):
@@ -290,7 +290,7 @@ class Review:
                 found |= quantity.values(self.worst.fill, float(share))
         return found
 
-    def _where(self, point: Point) -> str:
+    def _describe(self, point: Point) -> str:
         """Return fill and quantities of a point that are not nominal, in words."""
         words = [f"fill {self.fills[point.fill]}"]
         for quantity, share in zip(self.uncertain, point.shares, strict=True):
@@ -333,12 +333,12 @@ class Review:
     def __str__(self) -> str:
         """Return the answer, then what it rests on."""
         table = self.points
-        lines = [self.answer, *self.stabilisation()[:8]]
+        lines = [self.summary, *self.stabilisation()[:8]]
         stable = table[table["stable"]]
         if len(stable) < len(table):
             first = self.unstable().iloc[0]
             lines.append(
-                f"unstable: {len(table) - len(stable)} of {_count(len(table), 'point')}, fastest "
+                f"unstable: {len(table) - len(stable)} of {_plural(len(table), 'point')}, fastest "
                 f"{first['growth']:.3g} 1/s at fill {self.fills[int(first['fill'])]}"
             )
         for name, unit in (("phase_margin", "°"), ("gain_up", " dB"), ("delay_margin", " s")):
@@ -346,24 +346,24 @@ class Review:
             of = "" if len(stable) == len(table) else " of stable points"
             if len(stable):
                 lines.append(f"{name.replace('_', ' ')}{of}: {low:.3g} to {high:.3g}{unit}")
-        lines += [f"worst case: {self._where(self.worst)}", f"there {self.confirmation}"]
+        lines += [f"worst case: {self._describe(self.worst)}", f"there {self.confirmation}"]
         lines.append(self.suggestion.text)
         if self.uncertain:
             lines += ["uncertain: " + "; ".join(f"{u.name} {u.text}" for u in self.uncertain)]
         if self.warnings:
-            lines.append(f"{_count(len(self.warnings), 'warning')}, see .warnings")
+            lines.append(f"{_plural(len(self.warnings), 'warning')}, see .warnings")
         return "\n".join(line if len(line) < 500 else f"{line[:499]}…" for line in lines)
 
     def __repr__(self) -> str:
         """Return the answer."""
-        return f"Review({self.answer})"
+        return f"Review({self.summary})"
 
 
-def _count(number: int, what: str) -> str:
+def _plural(number: int, what: str) -> str:
     return f"{number} {what}" + ("" if number == 1 else "s")
 
 
-def _stabilised(how: str) -> str:
+def _verdict(how: str) -> str:
     words = {"unstable": "unstable", "neither": "stabilised by neither gain nor phase"}
     return words.get(how, f"{how.replace(' and', '- and')}-stabilised")
 
@@ -384,7 +384,7 @@ def review(
 ) -> Review:
     """Return the review of a loop; see `Craft.review`."""
     check_ranges(draws=draws, seed=seed, period=period)
-    space = _Space.of(
+    space = _Space.create(
         craft, controller, period, fills, damping, frequency, uncertain, parameters, options
     )
     count = len(space.uncertain)
@@ -487,7 +487,7 @@ class _Space:
     warnings: tuple[str, ...]
 
     @classmethod
-    def of(
+    def create(
         cls,
         craft: "Craft",
         controller: Any,
@@ -513,7 +513,7 @@ class _Space:
                     loop = craft.loop(controller, period, fill, parameters=parameters, **options)
                     if not loops:
                         loop._must_be_linear()
-                    every, modes, _ = craft._given(fill, parameters)
+                    every, modes, _ = craft._resolve(fill, parameters)
                     loops.append(loop)
                     given.append((every, modes))
                     tanks.append(craft.tank_at(fill))
@@ -521,7 +521,9 @@ class _Space:
                     problems.append(f"fills[{k}] = {fill!r}: {error}" if loops else str(error))
                     break
                 if not turns:
-                    turns = rotation("the nominal point", craft.trim(fill, parameters).left)
+                    turns = rotation(
+                        "the nominal point", craft.trim(fill, parameters).angular_acceleration
+                    )
         if problems:
             raise FmuError("; ".join(problems))
         said = tuple(dict.fromkeys([*(str(w.message) for w in caught), *filter(None, [turns])]))
@@ -529,7 +531,7 @@ class _Space:
         said = tuple({re.sub(r"= [\d.e+-]+", "", text): text for text in said}.values())
         for text in said:
             warnings.warn(text, FmuWarning, stacklevel=4)
-        ranges = _named(craft, uncertain or {})
+        ranges = _full_ranges(craft, uncertain or {})
         # a damping ratio that was given has no interval
         known = {*ranges, *given[0][1]}
         found = _damping(craft, tanks, known) if damping == "interval" else []
@@ -552,10 +554,10 @@ class _Space:
         modes = dict(modes)
         for quantity, share in zip(self.uncertain, shares, strict=True):
             for name, value in quantity.values(fill, float(share)).items() if share else ():
-                of = of_mode(name)
-                if of is None:
+                mode = mode_quantity(name)
+                if mode is None:
                     plain[name] = value
-                elif of.kind == "frequency":  # a mass that changes too moves it further
+                elif mode.kind == "frequency":  # a mass that changes too moves it further
                     factors[name] = value / quantity.ends[fill][name][1]
                 else:
                     modes[name] = value
@@ -584,7 +586,7 @@ def _list_of(fills: Any) -> list[Any]:
     return found
 
 
-def _named(craft: "Craft", given: Any) -> dict[str, tuple[str, Any]]:
+def _full_ranges(craft: "Craft", given: Any) -> dict[str, tuple[str, Any]]:
     """Return ranges with the names as they were given, by full names."""
     if not isinstance(given, Mapping):
         raise FmuError(f'uncertain must be ranges by name, such as {{"craft.mass": (1380, 1420)}}, '
@@ -641,9 +643,13 @@ def _frequencies(
         ends = []
         for loop in loops:
             modes = Modes(loop.model, loop.parameters)  # type: ignore[arg-type]
-            every = [OfMode(number, "frequency", n) for n in (1, 2, 3)]
-            every = [of for of in every if of.of("frequency") not in ranges]
-            here = {of.of("frequency"): modes.value(of) for of in every if not modes.problem(of)}
+            every = [ModeQuantity(number, "frequency", n) for n in (1, 2, 3)]
+            every = [mode for mode in every if mode.name("frequency") not in ranges]
+            here = {
+                mode.name("frequency"): modes.value(mode)
+                for mode in every
+                if not modes.problem(mode)
+            }
             ends.append({of: ((1 - part) * f, f, (1 + part) * f) for of, f in here.items()})
         if any(ends):
             found.append(Uncertain(f"frequency of {name}", f"± {100 * part:g}%", tuple(ends)))
@@ -664,13 +670,17 @@ def _quantities(
         if instead := moves_the_bob(full):
             problems.append(f"uncertain: {name} {instead}")
             continue
-        if of_mode(full) is None and full not in allowed:
+        if mode_quantity(full) is None and full not in allowed:
             problems.append(
                 f"uncertain has {name}, which is not a Real parameter of {fmu.name}, nor delay"
                 f"{did_you_mean(name, allowed)}"
             )
             continue
-        if (of := of_mode(full)) and "no such mode" not in (bad := _problem(loops[0], of)) and bad:
+        if (
+            (mode := mode_quantity(full))
+            and "no such mode" not in (bad := _problem(loops[0], mode))
+            and bad
+        ):
             problems.append(f"uncertain: {name} {bad}")
             continue
         nominals = [
@@ -695,22 +705,22 @@ def _quantities(
 
 
 def _unit(fmu: Fmu, name: str) -> str:
-    if of := of_mode(name):
-        return {"frequency": "Hz", "zeta": "", "mass": "kg", "bob": "m"}[of.kind]
+    if mode := mode_quantity(name):
+        return {"frequency": "Hz", "zeta": "", "mass": "kg", "bob": "m"}[mode.kind]
     return "s" if name == DELAY else fmu.unit(name).replace("1", "").replace(".", "·")
 
 
-def _problem(loop: Loop, of: OfMode) -> str:
-    return Modes(loop.model, loop.parameters).problem(of)  # type: ignore[arg-type]
+def _problem(loop: Loop, mode: ModeQuantity) -> str:
+    return Modes(loop.model, loop.parameters).problem(mode)  # type: ignore[arg-type]
 
 
 def _nominal(fmu: Fmu, loop: Loop, untrimmed: Parameters, name: str) -> float | None:
     """Return the nominal value; None if this fill does not have the mode."""
     if name == DELAY:
         return float(loop.delay)
-    if of := of_mode(name):
+    if mode := mode_quantity(name):
         modes = Modes(loop.model, loop.parameters)  # type: ignore[arg-type]
-        return None if modes.problem(of) else modes.value(of)
+        return None if modes.problem(mode) else modes.value(mode)
     if name in untrimmed:
         return float(fmu.convert(name, untrimmed[name]))
     if OF_A_MODE.match(name):

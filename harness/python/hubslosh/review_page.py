@@ -84,7 +84,7 @@ def page(review: "Review") -> str:
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f"<title>{html.escape(title)}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n<main>\n"
-        f'<h1>{html.escape(title)}</h1>\n<p class="answer{bad}">{html.escape(review.answer)}</p>\n'
+        f'<h1>{html.escape(title)}</h1>\n<p class="answer{bad}">{html.escape(review.summary)}</p>\n'
         f"{_facts(review)}\n"
         f'<div class="figures">\n{figures}\n</div>\n{_tables(review)}\n</main>\n</body>\n</html>\n'
     )

@@ -39,11 +39,11 @@ def review_plan(path: str | Path) -> Review:
         for name, of in _table(given, "tanks", {}).items():
             if isinstance(of, Mapping) and isinstance(of.get("source"), str):
                 of = {**of, "source": path.parent / of["source"]}
-            tanks[name] = _called(MountedTank, of, f"craft.tanks.{name}")
-        craft = _called(Craft, {**given, "tanks": tanks}, "craft")
+            tanks[name] = _call(MountedTank, of, f"craft.tanks.{name}")
+        craft = _call(Craft, {**given, "tanks": tanks}, "craft")
         plan["controller"] = _controller(plan.get("controller"), path.parent)
         arguments = {name: value for name, value in plan.items() if name != "craft"}
-        return _called(craft.review, arguments, "the plan")
+        return _call(craft.review, arguments, "the plan")
     except FmuError as error:
         raise FmuError(f"{path}: {error}") from None
 
@@ -58,7 +58,7 @@ def _table(of: Mapping[str, Any], name: str, default: dict[str, Any] = _MISSING)
     return found
 
 
-def _called(function: Callable[..., Any], given: Any, where: str) -> Any:
+def _call(function: Callable[..., Any], given: Any, where: str) -> Any:
     """Call a function with what stands in a table."""
     if not isinstance(given, Mapping):
         raise FmuError(f"{where} must be a table, not {given!r}")

@@ -185,9 +185,9 @@ def margins_and_gain(
         def delayed(more: float) -> LinearModel:
             return loop._gain(small, K, more)
 
-        return _margins(gain, modes, _moved(plant, modes), delayed), gain
+        return _margins(gain, modes, _controllable_modes(plant, modes), delayed), gain
     if parameters:
-        raise FmuError("parameters are for a Loop; this loop gain has none")
+        raise FmuError("parameters can be given with a Loop, not with a loop gain")
     gain = loop if isinstance(loop, LinearModel) else _loop_gain(loop)
     modes = gain._modes(LIGHT)
     return _margins(gain, modes, [modes] * gain.D.shape[1], None), gain
@@ -197,7 +197,7 @@ Modes = list[tuple[float, float, tuple[str, ...]]]
 """Frequency, damping ratio and states of each."""
 
 
-def _moved(plant: LinearModel, modes: Modes) -> list[Modes]:
+def _controllable_modes(plant: LinearModel, modes: Modes) -> list[Modes]:
     """Return, for each input, the modes that it moves and an output shows.
 
     Modes of one frequency go together: of two equal tanks an input moves a combination.
@@ -256,7 +256,9 @@ def _margins(
                 least_delay = min(least_delay, late)
             else:
                 row["gain_margin"] = -20 * np.log10(abs(L))
-            rows.append(row | {"delay_margin": late, "near": _near(row["frequency"], moved[i])})
+            rows.append(
+                row | {"delay_margin": late, "near": _nearby_modes(row["frequency"], moved[i])}
+            )
     columns = [
         "loop",
         "crossing",
@@ -376,7 +378,7 @@ def _band(gain: LinearModel, roots: list[NDArray[np.complex128]]) -> tuple[float
     return low, min(1e3 * size, (1 - 1e-7) * nyquist)
 
 
-def _near(frequency: float, modes: Modes) -> str:
+def _nearby_modes(frequency: float, modes: Modes) -> str:
     """Return the modes near a frequency, by name."""
     close = [mode for mode in modes if abs(mode[0] - frequency) <= NEAR * mode[0]]
     if not close:
@@ -424,7 +426,7 @@ def _exact_delay(
     """Return the delay at which an eigenvalue of L is -1, from its value without the hold."""
     period = gain.period or 0.0
 
-    def turned(delay: float) -> float:
+    def refined_delay(delay: float) -> float:
         """Return a better delay: the magnitude is 1 at w, and the phase is made up for."""
         nonlocal w
         cycles = int(delay / period)
@@ -433,10 +435,10 @@ def _exact_delay(
         return float(delay + phase / w)
 
     for _ in range(20):  # Steffensen's iteration
-        first = turned(delay)
+        first = refined_delay(delay)
         if abs(first - delay) <= CONVERGED * first:
             return first
-        second = turned(first)
+        second = refined_delay(first)
         if abs(second - first) <= CONVERGED * second:
             return second
         bend = second - 2 * first + delay

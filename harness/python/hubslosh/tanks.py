@@ -48,11 +48,11 @@ class Tank:
     all: dict[str, Any]
     gravity: float
     _solved: Any = field(repr=False)
-    _question: "Question" = field(repr=False)
+    _case: "TankCase" = field(repr=False)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Return what a copy in another process is solved from."""
-        return _solved_again, (self._question,)
+        return _solve_case, (self._case,)
 
     @cached_property
     def picture(self) -> str:
@@ -185,7 +185,11 @@ class Tank:
             if number not in (1, 2, 3, 4):
                 raise FmuError(f"the tank's number is 1 to 4, not {number!r}")
             prefix = f"tank[{number}]"
-            of = self._of_spacecraft if rigid or self.all["modes"] else self._parameters(model)
+            of = (
+                self._spacecraft_parameters
+                if rigid or self.all["modes"]
+                else self._parameters(model)
+            )
             found = {prefix + name.removeprefix("tank[1]"): value for name, value in of.items()}
         elif model == "SloshTank":
             prefix, found = "tank", self._parameters("SloshTank")
@@ -211,7 +215,7 @@ class Tank:
         return found
 
     @cached_property
-    def _of_spacecraft(self) -> "dict[str, Value]":
+    def _spacecraft_parameters(self) -> "dict[str, Value]":
         if not self.all["modes"]:  # a full tank has the parameters of rigid liquid alone
             return {"tank[1].I_z": 0.0}
         return self._parameters("Spacecraft")
@@ -220,19 +224,19 @@ class Tank:
         """Compute the parameters of Spacecraft, if it has modes, and return warnings."""
         if not self.all["modes"]:
             return list(self._solved.warnings())
-        found, said = self._solved.parameters("Spacecraft")
-        self.__dict__["_of_spacecraft"] = found
-        return list(said)
+        found, warned = self._solved.parameters("Spacecraft")
+        self.__dict__["_spacecraft_parameters"] = found
+        return list(warned)
 
     def _parameters(self, model: str) -> "dict[str, Value]":
-        found, said = self._solved.parameters(model)
-        for warning in said:
+        found, warned = self._solved.parameters(model)
+        for warning in warned:
             warnings.warn(warning, FmuWarning, stacklevel=4)
         return dict(found)
 
 
 @dataclass(frozen=True, eq=False)
-class Question:
+class TankCase:
     """A tank, its fill and its liquid."""
 
     source: "dict[str, Any] | Path"
@@ -247,39 +251,44 @@ class Question:
     contact_angle: float | None
 
 
-def drawing(source: "dict[str, Any] | Path") -> Any:
+def read_drawing(source: "dict[str, Any] | Path") -> Any:
     """Read a tank file, or what stands in one."""
     if isinstance(source, Path):
         return native.Tank.read(source)
-    return native.Tank.parse("".join(f"{_key(k)} = {_toml(v)}\n" for k, v in source.items()))
+    return native.Tank.parse(toml_of(source))
+
+
+def toml_of(source: Mapping[str, Any]) -> str:
+    """Return the text of a tank file with this content."""
+    return "".join(f"{_key(key)} = {_toml(value)}\n" for key, value in source.items())
 
 
 def solve(
-    questions: Sequence[Question], drawings: Sequence[Any] | None = None
+    cases: Sequence[TankCase], drawings: Sequence[Any] | None = None
 ) -> "list[Tank | FmuError]":
-    """Return what is found of each question, or its error; computed on all cores.
+    """Return what is found of each case, or its error; computed on all cores.
 
     * ``drawings``: What `drawing` has read for each.
     """
-    drawings = drawings or [drawing(asked.source) for asked in questions]
+    drawings = drawings or [read_drawing(case.source) for case in cases]
     found = native.solve(
         [
-            (tank, asked.fill, asked.modes, _liquid(asked))
-            for asked, tank in zip(questions, drawings, strict=True)
+            (tank, case.fill, case.modes, _liquid(case))
+            for case, tank in zip(cases, drawings, strict=True)
         ]
     )
     return [
-        one if isinstance(one, FmuError) else Tank(one.result(), float(asked.gravity), one, asked)
-        for asked, one in zip(questions, found, strict=True)
+        one if isinstance(one, FmuError) else Tank(one.result(), float(case.gravity), one, case)
+        for case, one in zip(cases, found, strict=True)
     ]
 
 
-def _liquid(asked: Question) -> Any:
-    return native.Liquid(asked.gravity, asked.nu, asked.sigma, asked.contact_angle)
+def _liquid(case: TankCase) -> Any:
+    return native.Liquid(case.gravity, case.nu, case.sigma, case.contact_angle)
 
 
-def _solved_again(question: Question) -> Tank:
-    (found,) = solve([question])
+def _solve_case(case: TankCase) -> Tank:
+    (found,) = solve([case])
     if isinstance(found, FmuError):
         raise found
     return found
@@ -342,7 +351,7 @@ def tank(
     if (fill is None) == (fill_mass is None):
         raise FmuError('give the fill: a height in m, "60%" of the volume, or fill_mass in kg')
     if fill is not None:
-        checked_fill(fill)
+        check_fill(fill)
     numbers = {
         "fill_mass": fill_mass, "modes": modes, "gravity": gravity, "nu": nu, "sigma": sigma,
         "contact_angle": contact_angle,
@@ -354,7 +363,7 @@ def tank(
         raise FmuError(f"modes must be a whole number from 1 on, not {modes!r}")
     amount = (float(fill_mass), "kg") if fill_mass is not None else fill
     (found,) = solve(
-        [Question(_given(source), amount, int(modes), gravity, nu, sigma, contact_angle)]
+        [TankCase(_tank_source(source), amount, int(modes), gravity, nu, sigma, contact_angle)]
     )
     if isinstance(found, FmuError):
         raise found
@@ -364,7 +373,7 @@ def tank(
 
 
 def fill_table(
-    asked: Question, between: Sequence[float | str]
+    case: TankCase, between: Sequence[float | str]
 ) -> "tuple[dict[str, Value], list[str]]":
     """Return the fill table of tank 1 of Spacecraft, which lets it drain, and warnings.
 
@@ -375,12 +384,12 @@ def fill_table(
     if len(ends) != 2:
         raise FmuError(f"between must be the lowest and the highest fill, not {between!r}")
     found: tuple[dict[str, Value], list[str]] = native.table(
-        drawing(asked.source), ends, asked.modes, _liquid(asked)
+        read_drawing(case.source), ends, case.modes, _liquid(case)
     )
     return found
 
 
-def _given(source: Any) -> "dict[str, Any] | Path":
+def _tank_source(source: Any) -> "dict[str, Any] | Path":
     """Return a tank's file, or what would stand in one."""
     if isinstance(source, Mapping):
         given = dict(source)
@@ -393,7 +402,7 @@ def _given(source: Any) -> "dict[str, Any] | Path":
     raise FmuError(f"a tank is a file or a dict of what stands in one, not {source!r}")
 
 
-def checked_fill(fill: Any) -> Any:
+def check_fill(fill: Any) -> Any:
     """Return a fill, or say what is wrong with it."""
     if isinstance(fill, str):
         right = fill.strip().endswith("%") and _is_number(fill.strip()[:-1])

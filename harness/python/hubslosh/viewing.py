@@ -7,15 +7,19 @@ import webbrowser
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from . import temporary
 from .arguments import check_table
 from .command import call, find_program
 from .fmu import DefinedUnit, Fmu, FmuError, Parameters, Quantity, fmu_path
+from .tanks import _tank_source, toml_of
 
 if TYPE_CHECKING:
     import pandas as pd
+
+Source = str | Path | Mapping[str, Any]
+"""A tank file, or a dict with its content."""
 
 HEIGHT = 760
 """Height of the page in a notebook, px."""
@@ -79,7 +83,7 @@ def view(
     *,
     model: str | Path | None = None,
     parameters: Parameters | None = None,
-    tanks: Sequence[str | Path] | Mapping[int, str | Path] = (),
+    tanks: Sequence[Source] | Mapping[int, Source] = (),
     start: float | None = None,
     stop: float | None = None,
     program: str | Path | None = None,
@@ -102,9 +106,9 @@ def view(
         FMU of the run; by default the model in ``.attrs`` of the table, or in the file.
     parameters : mapping, optional
         Parameters of the run in addition to those in ``.attrs`` of the table, or in the file.
-    tanks : sequence or mapping of files
-        Tank files (as for ``hubslosh tank``) with the contours to draw, in the order of the
-        tanks, or by the number of the tank from 1.
+    tanks : sequence or mapping
+        Tank files with the contours to draw, or dicts with their content, as for `tank`, in the
+        order of the tanks, or by the number of the tank from 1.
     start, stop : float, optional
         Ends of the part to show, s.
     program : str or Path, optional
@@ -148,11 +152,18 @@ def view(
             if isinstance(value, tuple) and isinstance(value[-1], DefinedUnit):
                 value = Fmu.open(model or "HubSlosh").convert(name, value)
             arguments += ["--set", f"{name}={_text(value)}"]
-        for number, tank in numbered.items():
-            arguments += ["--tank", f"{number}:{tank}"]
+        names = {} if isinstance(run, str | os.PathLike) else {str(file): "the run"}
+        for number, source in numbered.items():
+            drawn = _tank_source(source)
+            if isinstance(drawn, dict):
+                path_of_tank = Path(folder) / f"tank{number}.toml"
+                path_of_tank.write_text(toml_of(drawn), encoding="utf-8")
+                names[str(path_of_tank)] = f"tank {number}"
+                drawn = path_of_tank
+            arguments += ["--tank", f"{number}:{drawn}"]
         arguments += [] if start is None else ["--from", str(start)]
         arguments += [] if stop is None else ["--to", str(stop)]
-        call(path, "view", arguments)
+        call(path, "view", arguments, names=names)
         return View(page.read_text(encoding="utf-8"), None if out is None else Path(out))
 
 

@@ -105,10 +105,10 @@ WRONG = [
     lambda g: attitude.slew(1, 1, axis=5),
     lambda g: attitude.slew(1, 1, axis=(0, 0, 0)),
     lambda g: attitude.angles("x"),
-    lambda g: attitude.about("x", 1),
+    lambda g: attitude.axis_angle("x", 1),
     lambda g: attitude.error([1, 0, 0, 0], 5),
     lambda g: attitude.slew(1, 1, inertia="x"),
-    lambda g: attitude.about((0, 0, 1), "x"),
+    lambda g: attitude.axis_angle((0, 0, 1), "x"),
     lambda g: hubslosh.read_parameters(5),
     lambda g: hubslosh.to_csv(5, "a.csv"),
     lambda g: hubslosh.draw(5, 1),
@@ -165,7 +165,7 @@ def test_a_mask_is_not_ignored(given: SimpleNamespace) -> None:
         lambda: hubslosh.Craft(
             1.0, (1.0, 1.0, 1.0), tanks={"a": hubslosh.MountedTank({"density": 1.0}, one)}
         ),
-        lambda: attitude.about(one, 1.0),
+        lambda: attitude.axis_angle(one, 1.0),
         lambda: attitude.slew(1, 1, inertia=matrix),
         lambda: hubslosh.quantiles(TABLE, at=one / 100),
     ]

@@ -48,13 +48,13 @@ def test_the_error_is_what_is_left_to_turn_in_body_axes() -> None:
     left = attitude.error(q, wanted)
     for a, b, e in zip(q, wanted, left, strict=True):
         a, b = a / np.linalg.norm(a), b / np.linalg.norm(b)
-        step = attitude.about(e, np.linalg.norm(e))
+        step = attitude.axis_angle(e, np.linalg.norm(e))
         assert np.abs(matrix(a) @ matrix(step) - matrix(b)).max() < 1e-7  # sqrt of rounding near π
     assert (np.linalg.norm(left, axis=1) <= np.pi + 1e-12).all()
-    assert attitude.error([1, 0, 0, 0], attitude.about((0, 0, 1), 0.3)) == pytest.approx(
+    assert attitude.error([1, 0, 0, 0], attitude.axis_angle((0, 0, 1), 0.3)) == pytest.approx(
         [0, 0, 0.3]
     )
-    vector = attitude.rotation_vector(attitude.about((0, 2, 0), -0.4))
+    vector = attitude.rotation_vector(attitude.axis_angle((0, 2, 0), -0.4))
     assert vector == pytest.approx([0, -0.4, 0])
 
 
@@ -88,7 +88,7 @@ def test_what_is_no_attitude_is_refused() -> None:
     with pytest.raises(FmuError, match=r"no column q\[1\], q\[2\]"):
         attitude.angles(pd.DataFrame({"time": [0.0]}))
     with pytest.raises(FmuError, match="an axis must"):
-        attitude.about((0, 0, 0), 1)
+        attitude.axis_angle((0, 0, 0), 1)
     with pytest.raises(FmuError, match="must be numbers"):
         attitude.quaternion("x")
     with pytest.raises(FmuError, match="duration must be a positive"):

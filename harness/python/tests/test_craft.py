@@ -14,7 +14,7 @@ from fmpy import simulate_fmu
 
 import hubslosh
 from hubslosh import Craft, FmuError, FmuWarning, MountedTank, attitude
-from hubslosh.tanks import Question, drawing, solve
+from hubslosh.tanks import TankCase, read_drawing, solve
 
 SPHERE = {"density": 1440.0, "shape": {"sphere": {"radius": 0.5}}}
 CYLINDER = {"density": 875.0, "shape": {"cylinder": {"radius": 0.4, "height": 1.1}}}
@@ -228,7 +228,7 @@ def test_many_fills_are_solved_as_each_is(craft: Craft) -> None:
     # the mass without solving for modes is that with them
     for tank in (SPHERE, CYLINDER, {"density": 1.0, "box": [0.5, 0.8]}):
         for height in (0.1, 0.55, 1.0):
-            mass = drawing(tank).mass(height)
+            mass = read_drawing(tank).mass(height)
             assert mass == hubslosh.tank(tank, height, modes=1).mass
 
 
@@ -237,10 +237,10 @@ def test_ctrl_c_ends_the_calculation_of_tanks() -> None:
     # a process in the background of a shell ignores the signal
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     timer = threading.Timer(0.5, lambda: signal.raise_signal(signal.SIGINT))
-    question = Question(SPHERE, "50%", 3, 1.0, 1e-6, None, None)
+    case = TankCase(SPHERE, "50%", 3, 1.0, 1e-6, None, None)
     start = time.monotonic()
     timer.start()
     with pytest.raises(KeyboardInterrupt):
-        solve([question] * 10_000)
+        solve([case] * 10_000)
     signal.signal(signal.SIGINT, before)
     assert time.monotonic() - start < 30

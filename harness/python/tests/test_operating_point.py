@@ -9,7 +9,7 @@ import pytest
 
 import hubslosh
 from hubslosh import Craft, FmuError, FmuWarning, MountedTank
-from hubslosh.quantities import KINDS, Modes, OfMode
+from hubslosh.quantities import KINDS, ModeQuantity, Modes
 
 SPHERE = {"density": 1440.0, "shape": {"sphere": {"radius": 0.5}}}
 CYLINDER = {"density": 875.0, "shape": {"cylinder": {"radius": 0.4, "height": 1.1}}}
@@ -80,20 +80,28 @@ def test_trimming_leaves_no_rotation_and_says_what_is_left(craft: Craft) -> None
     }) as plant:  # fmt: skip
         turning = plant.get([f"omega_dot[{i}]" for i in (1, 2, 3)])
     assert turning == pytest.approx(np.linalg.solve(at.inertia, moment), rel=1e-9, abs=1e-12)
-    assert np.linalg.norm(point.before) > 0.01 and np.linalg.norm(point.left) < 1e-12
-    assert point.across == pytest.approx({"NTO": 0, "MMH": 0}, abs=1e-12)
+    assert (
+        np.linalg.norm(point.untrimmed_acceleration) > 0.01
+        and np.linalg.norm(point.angular_acceleration) < 1e-12
+    )
+    assert point.lateral_acceleration == pytest.approx({"NTO": 0, "MMH": 0}, abs=1e-12)
     assert "rad/s² before" in str(point) and "rad/s² left" in str(point)
     run = hubslosh.simulate(craft.model, craft.parameters("50%"), stop=20, outputs=["omega"])
     assert run[["omega[1]", "omega[2]", "omega[3]"]].abs().to_numpy().max() < 1e-12
     # what further parameters do is left, in numbers
     pushed = craft.trim("50%", {"torque[1]": 3.0})
-    assert np.linalg.norm(pushed.left) > 1e-3
-    with pytest.warns(FmuWarning, match=f"of {np.linalg.norm(pushed.left):.4g} rad/s² is left"):
+    assert np.linalg.norm(pushed.angular_acceleration) > 1e-3
+    with pytest.warns(
+        FmuWarning, match=f"of {np.linalg.norm(pushed.angular_acceleration):.4g} rad/s² is left"
+    ):
         craft.linearize("50%", parameters={"torque[1]": 3.0})
     leaning = replace(craft.tanks["NTO"], axis=(np.sin(0.1), 0, np.cos(0.1)))
     tilted = replace(craft, tanks={"NTO": leaning}).trim("50%")
     # liquid on the axis of a tank that leans is not at rest, and turns the craft
-    assert tilted.across["NTO"] > 0.02 and np.linalg.norm(tilted.left) > 1e-4
+    assert (
+        tilted.lateral_acceleration["NTO"] > 0.02
+        and np.linalg.norm(tilted.angular_acceleration) > 1e-4
+    )
 
 
 @pytest.mark.parametrize("name", ["NTO", "tank[1]"])
@@ -127,8 +135,8 @@ def test_every_method_takes_the_same_names(craft: Craft, name: str) -> None:
     )
     assert [u.name for u in found.uncertain] == list(shares)
     for call, words in {
-        lambda: craft.linearize("50%", parameters={"delay": 0.1}): "delay is a quantity of a loop",
-        lambda: craft.uncertain("50%", {"delay": (0, 1)}): "delay is a quantity of a loop",
+        lambda: craft.linearize("50%", parameters={"delay": 0.1}): "delay belongs to a loop",
+        lambda: craft.uncertain("50%", {"delay": (0, 1)}): "delay belongs to a loop",
         lambda: craft.linearize("50%", parameters={"NTO.zeta[1]": 0.1, "tank[1].zeta[1]": 0.1}):
             "are the same quantity",
         lambda: craft.loop(GAINS, PERIOD, "50%", parameters={"NTO.zeta[2]": 0.1}): "no such mode",
@@ -143,12 +151,12 @@ def test_every_method_takes_the_same_names(craft: Craft, name: str) -> None:
 
 def test_a_quantity_of_a_mode_changes_alone(craft: Craft) -> None:
     """Frequency, mass, bob: the others, and the liquid at rest, stay; with surface tension too."""
-    nominal, of = craft.parameters("50%"), OfMode(2, "frequency", 1)
-    assert nominal[of.of("k")] > 0
+    nominal, of = craft.parameters("50%"), ModeQuantity(2, "frequency", 1)
+    assert nominal[of.name("k")] > 0
 
     def state(parameters: dict) -> dict[str, float]:
         modes = Modes(craft.model, parameters)
-        found = {kind: modes.value(OfMode(2, kind, 1)) for kind in KINDS}
+        found = {kind: modes.value(ModeQuantity(2, kind, 1)) for kind in KINDS}
         names = ["mass", *(f"center_of_mass[{i}]" for i in (1, 2, 3))]
         names += [f"inertia[{i},{j}]" for i in (1, 2, 3) for j in (1, 2, 3)]
         with hubslosh.Plant(craft.model, parameters) as plant:

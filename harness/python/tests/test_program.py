@@ -327,7 +327,7 @@ def test_any_fmu_is_fitted_by_the_names_of_its_variables(
             outputs=["omega"],
             program=option(request, "--hubslosh"),
         )
-    with pytest.raises(FmuError, match="go with free="):
+    with pytest.raises(FmuError, match="need free="):
         hubslosh.identify(tables, fmu=fmu, outputs=["omega"])
 
 

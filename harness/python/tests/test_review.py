@@ -51,7 +51,7 @@ def test_margins_of_a_rigid_craft_are_those_of_a_double_integrator(craft: Craft)
     assert of_x["frequency"].to_numpy() == pytest.approx([crossing], rel=1e-7)
     phase = np.degrees(np.angle(-loop_gain(crossing)))
     assert of_x["phase_margin"].to_numpy() == pytest.approx([phase], rel=1e-7)
-    assert found.slosh.empty and "stable at 1 fill and 1 point;" in found.answer
+    assert found.slosh.empty and "stable at 1 fill and 1 point;" in found.summary
     assert found.points["phase_margin"].tolist() == [found.nominal[0].margins.phase_margin]
 
 
@@ -183,7 +183,7 @@ def test_an_unstable_worst_case_grows_as_predicted(craft: Craft) -> None:
         gains(4, 40), PERIOD, ["50%"], damping="nominal", frequency="nominal",
         parameters={"tank[1].zeta[1]": 0.0},
     )  # fmt: skip
-    assert "UNSTABLE at 1 of 1 fill: 50%" in found.answer
+    assert "UNSTABLE at 1 of 1 fill: 50%" in found.summary
     compared = found.confirmation
     assert compared.agrees and compared.growth > 0
     assert compared.frequency == pytest.approx(closed_form(craft, "50%")[2], rel=0.02)
@@ -198,7 +198,7 @@ def test_the_page_answers_first_and_needs_no_network(
     found.save(path)
     text = path.read_text(encoding="utf-8")
     body = re.sub(r"<[^>]+>", " ", text[text.index("</h1>") :])
-    assert " ".join(body.split()).startswith(html.escape(found.answer))
+    assert " ".join(body.split()).startswith(html.escape(found.summary))
     titles = re.findall(r"<h2>(.*?)</h2>", text)
     assert len(titles) == text.count("<figure>") + text.count("<section>")
     assert text.count("<figure>") == text.count("<svg ") == 11
@@ -287,8 +287,8 @@ def test_a_plan_is_the_same_call(craft: Craft, tmp_path: Path, capsys, monkeypat
         )
     monkeypatch.setattr(sys, "argv", ["review", str(tmp_path / "plan.toml")])
     main()
-    assert found.answer in capsys.readouterr().out
-    assert found.answer in (tmp_path / "plan.html").read_text(encoding="utf-8")
+    assert found.summary in capsys.readouterr().out
+    assert found.summary in (tmp_path / "plan.html").read_text(encoding="utf-8")
     for text, said in {
         PLAN.replace("period", "peroid"): "did you mean period",
         PLAN.replace("mass =", "maas ="): "craft has maas",
@@ -350,7 +350,7 @@ def test_a_frequency_that_is_lower_makes_the_loop_unstable(craft: Craft) -> None
     still = craft.review(gains(25, 300), PERIOD, ["30%"], frequency="nominal", **options)
     assert still.points["stable"].all() and still.uncertain == ()
     found = craft.review(gains(25, 300), PERIOD, ["30%"], **options)
-    assert "UNSTABLE at" in found.answer and "within the uncertainty" in found.answer
+    assert "UNSTABLE at" in found.summary and "within the uncertainty" in found.summary
     low = found.points.query("kind == 'one at a time' and `frequency of ox` == -1").iloc[0]
     assert not low["stable"] and low["growth"] > 0
     # an unstable point has no margins, and counts in no band
