@@ -160,7 +160,7 @@ fn name_faults(name: &str) -> Vec<&'static str> {
 
 pub fn readable(archive: &Archive, findings: &mut Findings) {
     if let Some(why) = &archive.broken {
-        findings.add("the archive", format!("its directory cannot be read: {why}"));
+        findings.add("the archive", why.clone());
     }
     for entry in &archive.entries {
         if let Some(why) = &entry.fault

@@ -16,7 +16,7 @@ pub fn well_formed(archive: &super::archive::Archive, findings: &mut Findings) {
                 // Files that are too large or have a DOCTYPE break `xml.size` or `xml.doctype`.
                 findings.skip("modelDescription.xml is not read to its end");
             } else if let Err(why) = read {
-                findings.add("modelDescription.xml", format!("line and column {why}"));
+                findings.add("modelDescription.xml", why.to_string());
             }
         }
     }

@@ -8,6 +8,7 @@ use anstream::AutoStream;
 use anyhow::Result;
 use clap::ColorChoice;
 use clap::builder::styling::{AnsiColor, Effects, Style, Styles};
+use files::input;
 use host::guard;
 
 /// Heading of the options that every command has, in its help.
@@ -78,6 +79,7 @@ pub fn color_of_arguments() -> ColorChoice {
 
 /// Prints an error to stderr in the style of clap's errors.
 pub fn error(text: impl std::fmt::Display) {
+    let text = input::without_error_numbers(&text.to_string());
     complain(format!("{} {text}\n", styled("error:", *Styles::styled().get_error())));
 }
 

@@ -67,6 +67,22 @@ pub fn text(path: &Path) -> Result<String> {
     })
 }
 
+/// Removes the numbers of the operating system's errors, `(os error 2)`, from a message, because the words before them say
+/// the same.
+pub fn without_error_numbers(message: &str) -> String {
+    let mut parts = message.split(" (os error ");
+    let mut text = parts.next().unwrap_or_default().to_string();
+    for part in parts {
+        match part.split_once(')') {
+            Some((number, rest)) if number.bytes().all(|byte| byte.is_ascii_digit()) => {
+                text += rest
+            }
+            _ => text += &format!(" (os error {part}"),
+        }
+    }
+    text
+}
+
 fn kind_of(metadata: &Metadata) -> &'static str {
     #[cfg(unix)]
     {
@@ -158,6 +174,15 @@ mod tests {
             check_replaceable(&output).unwrap();
             std::fs::remove_file(&output).unwrap();
         }
+    }
+
+    #[test]
+    fn messages_lose_the_numbers_of_the_systems_errors() {
+        let missing = format!("a: {}, b", std::io::Error::from_raw_os_error(2));
+        assert!(missing.contains("(os error 2)"));
+        let words = without_error_numbers(&missing);
+        assert!(words.starts_with("a: ") && words.ends_with(", b") && !words.contains("os error"));
+        assert_eq!(without_error_numbers("x (os error y"), "x (os error y");
     }
 
     #[cfg(unix)]

@@ -5,12 +5,13 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{BufReader, Read, Seek, SeekFrom, Write};
+use std::io::{BufReader, ErrorKind, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use files::input;
 use zip::read::Config;
+use zip::result::ZipError;
 // This part of the crate is marked as unstable. It is the only reader that shows repeated names; the lock
 // file pins its version.
 use zip::unstable::read::ZipIterable;
@@ -100,8 +101,25 @@ impl Archive {
         let file = input::open(path).with_context(|| format!("{name} cannot be opened"))?;
         let about = file.metadata().with_context(|| format!("{name} cannot be opened"))?;
         let mut archive = Archive { file, entries: Vec::new(), fault: None };
-        archive.fault = archive.read_directory(about.len()).err().map(|why| format!("{why:#}"));
+        archive.fault = archive.read_directory(about.len()).err().map(|why| archive.fault_of(&why));
         Ok(archive)
+    }
+
+    /// Returns why the list of files cannot be read, in words of somebody who does not know the format.
+    fn fault_of(&self, why: &anyhow::Error) -> String {
+        let Some(ZipError::InvalidArchive(what)) = why.downcast_ref() else {
+            return format!("{why:#}");
+        };
+        if !what.contains("EOCD") {
+            return format!("it is a damaged zip archive: {what}");
+        }
+        let mut start = [0; 2];
+        let mut file = &self.file;
+        let read = file.seek(SeekFrom::Start(0)).and_then(|_| file.read_exact(&mut start));
+        match read.is_ok() && &start == b"PK" {
+            true => "it is an incomplete zip archive: its end is missing, as after a download that stopped".into(),
+            false => "it is not a zip archive".into(),
+        }
     }
 
     fn read_directory(&mut self, size: u64) -> Result<()> {
@@ -140,7 +158,7 @@ impl Archive {
     /// The first of these conditions that is not fulfilled.
     pub fn check(&self) -> Result<()> {
         if let Some(why) = &self.fault {
-            bail!("it is not a zip archive that can be unpacked: {why}");
+            bail!("{why}");
         }
         let mut places: BTreeMap<String, &Entry> = BTreeMap::new();
         for entry in &self.entries {
@@ -177,7 +195,14 @@ impl Archive {
         let mut reader = BufReader::new(&self.file);
         let file = entry.zip.as_ref().with_reader(&mut reader, ZipReadOptions::new())?;
         // One byte more than the header says, to notice a longer file.
-        let size = std::io::copy(&mut file.take(said.saturating_add(1)), to)?;
+        let size = std::io::copy(&mut file.take(said.saturating_add(1)), to).map_err(|why| {
+            match why.kind() {
+                ErrorKind::InvalidInput | ErrorKind::InvalidData => {
+                    anyhow!("its compressed bytes are damaged")
+                }
+                _ => anyhow!(why),
+            }
+        })?;
         let relation = if size > said { "more" } else { "fewer" };
         ensure!(size == said, "it has {relation} bytes than its header says ({said})");
         Ok(())

@@ -709,7 +709,7 @@ impl ModelDescription {
     /// 3.0.2, section 2.4.7.2).
     pub(crate) fn from_xml_with(text: &str, set: &BTreeMap<u32, Value>) -> Result<Self> {
         let root = Element::parse(text.as_bytes())
-            .map_err(|why| anyhow!("modelDescription.xml, line and column {why}"))?;
+            .map_err(|why| anyhow!("modelDescription.xml: {why}"))?;
         ModelDescription::from_element(&root, set)
     }
 

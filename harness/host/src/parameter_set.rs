@@ -214,8 +214,7 @@ struct Identified {
 /// Reads the result of an identification: first `settings`, then the estimates in `parameters`, which
 /// override settings. The initial states of the recordings are not parameters of the FMU and are not read.
 fn from_json(text: &str) -> Result<ParameterSet> {
-    let none =
-        "it is not a result of hubslosh identify, or one of a --method without any parameters";
+    let none = "it is not a result of `hubslosh identify` with parameters of an FMU";
     let found: Identified = serde_json::from_str(text).context(none)?;
     let estimates =
         found.parameters.with_context(|| format!("it has no \"parameters\": {none}"))?;

@@ -21,7 +21,7 @@ pub const LONGEST_VALUE: usize = 1 << 20;
 /// Largest number of declared namespaces, because the time of a look-up grows with it.
 pub const MOST_NAMESPACES: usize = 100;
 
-/// Reason for refusing a file. All texts except `TooLarge` begin with line and column.
+/// Reason for refusing a file. All texts except `TooLarge` begin with `line 1, column 1: `.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Fault {
     Malformed(String),
@@ -68,15 +68,16 @@ impl Element {
             let before = &bytes[..error.valid_up_to()];
             let line = 1 + before.iter().filter(|byte| **byte == b'\n').count();
             let column = 1 + before.iter().rev().take_while(|byte| **byte != b'\n').count();
-            Fault::Malformed(format!("{line}:{column} it is not UTF-8"))
+            Fault::Malformed(format!("line {line}, column {column}: it is not UTF-8"))
         })?;
         if let Some(excess) = excess(text) {
             return Err(Fault::TooLarge(excess));
         }
         let document = Document::parse(text).map_err(|error| {
-            let (place, what) = (error.pos().to_string(), error.to_string());
-            let why =
-                format!("{place} {}", what.strip_suffix(&format!(" at {place}")).unwrap_or(&what));
+            let (at, what) = (error.pos(), error.to_string());
+            let what = what.strip_suffix(&format!(" at {at}")).unwrap_or(&what);
+            let what = what.replace("a root node", "an element");
+            let why = format!("line {}, column {}: {what}", at.row, at.col);
             match error {
                 Error::DtdDetected => Fault::Doctype(why),
                 _ => Fault::Malformed(why),
@@ -322,8 +323,11 @@ mod tests {
         for text in ["", "<a>", "<a></b>", "<a x=1/>", "<a>\n<b></a>", "\u{feff}", "<a>\u{1}</a>"] {
             assert!(Element::parse(text.as_bytes()).is_err(), "{text:?}");
         }
-        assert!(Element::parse(b"<a>\n<b></a>").unwrap_err().contains("2:"));
-        assert_eq!(Element::parse(b"<a\nx='\xff'/>").unwrap_err(), "2:4 it is not UTF-8");
+        assert!(Element::parse(b"<a>\n<b></a>").unwrap_err().starts_with("line 2, column "));
+        assert_eq!(
+            Element::parse(b"<a\nx='\xff'/>").unwrap_err(),
+            "line 2, column 4: it is not UTF-8"
+        );
     }
 
     #[test]

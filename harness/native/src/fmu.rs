@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use ::files::input;
 use host::description::{self, ModelDescription};
 use host::fmu::Interface;
 use pyo3::create_exception;
@@ -46,7 +47,7 @@ Make warnings errors:
 
 /// Converts an error of the host to the Python exception FmuError.
 pub fn error(why: impl Into<anyhow::Error>) -> PyErr {
-    FmuError::new_err(format!("{:#}", why.into()))
+    FmuError::new_err(input::without_error_numbers(&format!("{:#}", why.into())))
 }
 
 #[pyclass(frozen, get_all, module = "hubslosh")]

@@ -14,10 +14,9 @@ pub struct Problems(pub Vec<String>);
 /// Largest file of a tank or of a drawing, bytes.
 const LARGEST_FILE: u64 = 64 << 20;
 
-/// Reads the text of a regular file. A named pipe could block, and a device may never end.
+/// Reads the text of a regular file. A named pipe could block, and a device may never end. Errors do not name the file.
 pub(crate) fn read_text(path: &Path) -> Result<String, Problems> {
-    let problem =
-        |why: String| Problems::from(format!("Could not read {}: {why}.", path.display()));
+    let problem = |why: String| Problems::from(format!("it cannot be read: {why}"));
     let about = std::fs::metadata(path).map_err(|error| problem(error.to_string()))?;
     if !about.is_file() {
         return Err(problem("it is not a regular file".into()));

@@ -13,10 +13,10 @@ use crate::curve::{Curve, Point, Segment, cross, dot, sub};
 /// # Errors
 /// A file that cannot be read or has no path, a transform, rotated arcs, several subpaths.
 pub(crate) fn read(path: &Path, scale: f64) -> Result<Vec<Segment>, Problems> {
-    let text = crate::contour::read_text(path)?;
-    let data = first_path(&text).map_err(|problem| format!("{}: {problem}", path.display()))?;
-    segments(&data, scale)
-        .map_err(|problem| Problems::from(format!("{}: {problem}", path.display())))
+    let with_path = |problem: String| Problems::from(format!("{}: {problem}", path.display()));
+    let text = crate::contour::read_text(path).map_err(|why| with_path(why.to_string()))?;
+    let data = first_path(&text).map_err(with_path)?;
+    segments(&data, scale).map_err(with_path)
 }
 
 /// Returns the `d` of the first path.

@@ -111,7 +111,12 @@ impl AnalyseArgs {
             step.get_or_insert(each);
             let column = table.column(TAU_CMD).unwrap_or_default();
             let amplitude = column.iter().fold(0.0, |most: f64, tau| most.max(tau.abs()));
-            ensure!(amplitude > 0.0, "{}: tau_cmd is 0 N·m all along", path.display());
+            ensure!(
+                amplitude > 0.0,
+                "{}: the torque tau_cmd is 0 N·m in every row, so there is no response to analyse (--columns names the \
+                 column of the torque)",
+                path.display()
+            );
             runs.push_str("[[run]]\n");
             runs.push_str(&format!("recording = {}\n", text(&path.display().to_string())));
             let columns = self.columns.to_string();

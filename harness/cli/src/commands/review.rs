@@ -2,9 +2,9 @@
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
 
 /// Reviews the attitude controller of a craft over its fills and writes one page: margins, slosh modes, worst case.
 ///
@@ -36,10 +36,29 @@ impl ReviewArgs {
         };
         for python in &pythons {
             let mut command = Command::new(python);
-            command.args(&arguments).env("HUBSLOSH", &own);
-            match command.status() {
-                Ok(status) if status.success() => return Ok(()),
-                Ok(_) => bail!("{} has not made the review, see above", python.display()),
+            command.args(&arguments).env("HUBSLOSH", &own).stdout(Stdio::inherit());
+            match command.output() {
+                Ok(done) => {
+                    let printed = String::from_utf8_lossy(&done.stderr);
+                    if done.status.success() {
+                        eprint!("{printed}");
+                        return Ok(());
+                    }
+                    ensure!(
+                        !printed.contains("No module named 'hubslosh'"),
+                        "{} does not have the package hubslosh: pip install hubslosh there, or name another Python \
+                         by --python",
+                        python.display()
+                    );
+                    let (warnings, why) = match printed.strip_prefix("error: ") {
+                        Some(why) => ("", why),
+                        None => printed.split_once("\nerror: ").unwrap_or(("", &printed)),
+                    };
+                    if !warnings.is_empty() {
+                        eprintln!("{warnings}");
+                    }
+                    bail!("{}", why.trim());
+                }
                 Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
                 Err(error) => {
                     return Err(error)

@@ -476,14 +476,14 @@ impl Draft<'_> {
         let (missing, has_time) = (&self.columns.missing, self.columns.has("time"));
         ensure!(
             missing.is_empty() && has_time,
-            "{source} cannot be drawn: it has no {}.\nRecord what is drawn by `hubslosh run … --columns {}`; what it has: {}",
+            "{source} cannot be drawn: it has no {}.\nRecord the variables of a picture by `hubslosh run … --columns {}`, in Python by outputs=…; this run has: {}",
             if has_time { missing.join("; no ") } else { "time".into() },
             columns(run.description, run.parameters).join(","),
             run.table.names().join(", ")
         );
         ensure!(
             time.len() > 1,
-            "{source} cannot be drawn: it has {} row(s) (allowed: two or more)",
+            "{source} cannot be drawn: it has fewer than two rows ({})",
             time.len()
         );
         if let Some(k) = time.windows(2).position(|pair| pair[1] <= pair[0]) {

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::path::Path;
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, anyhow, bail, ensure};
 use chrono::DateTime;
 use files::{budget, bug, input};
 use parquet::basic::{Compression, ConvertedType, LogicalType, TimeUnit, Type as Physical};
@@ -195,14 +195,12 @@ pub fn read(
 
 /// Turns a panic of the Parquet library, which damaged files cause, into an error.
 fn guarded<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {
-    bug::caught(work).unwrap_or_else(|panic| {
-        bail!("it is damaged: the library that reads Parquet gave up: {panic}")
-    })
+    bug::caught(work).unwrap_or_else(|panic| bail!("it is a damaged Parquet file: {panic}"))
 }
 
 fn open(path: &Path) -> Result<SerializedFileReader<File>> {
     let file = input::open(path).context("it cannot be opened")?;
-    SerializedFileReader::new(file).context("it is not a complete Parquet file")
+    SerializedFileReader::new(file).map_err(|_| anyhow!("it is not a complete Parquet file"))
 }
 
 fn pairs(reader: &SerializedFileReader<File>) -> BTreeMap<String, String> {
