@@ -129,6 +129,10 @@ impl Settings {
             ("breaking_steepness", &tank.breaking_steepness),
             ("nonlinear_inertia", &tank.nonlinear_inertia),
             ("nonlinear_stiffness", &tank.nonlinear_stiffness),
+            ("nonlinear_inertia_2", &tank.nonlinear_inertia_2),
+            ("nonlinear_stiffness_2", &tank.nonlinear_stiffness_2),
+            ("rotary_inertia", &tank.rotary_inertia),
+            ("rotary_inertia_2", &tank.rotary_inertia_2),
             ("wave", &tank.wave),
         ] {
             self.reals(elements(&of(what), MODES), values);

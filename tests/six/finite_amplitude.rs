@@ -10,7 +10,9 @@ use std::f64::consts::TAU;
 use craft::{Craft, Inertia, Inputs, MODES, Parameters, Ramp, Tank, index};
 
 use super::component::{SloshTank, Spacecraft};
-use super::waves::{Moved, TOLERANCE, bench, circular, linear_frequency, planar, sideways};
+use super::waves::{
+    G, Moved, TOLERANCE, bench, bench_with_energy, circular, linear_frequency, planar, sideways,
+};
 
 /// Mass (kg) and moments of inertia (kg.m2) of the craft. Its weight is near the largest force that the FMU
 /// accepts.
@@ -151,6 +153,53 @@ fn forced_waves_near_resonance_are_those_of_potential_flow_in_both_fmus() {
         assert!(error < 0.15, "{ratio}: {aside} {across:?}");
         assert!((pull / force - 1.0).abs() < 0.05, "{ratio}: {pull} {force}");
         assert!(off < 1e-9, "{ratio}: {off:e}");
+    }
+}
+
+/// Returns the largest angle in degrees, its phase and the largest force over the weight of the liquid in the last of 120 periods of a
+/// tank that moves sideways by -stroke cos(w t), from rest, in a plane. The phase, degrees, is that of the first harmonic of
+/// the angle's sine.
+fn forced_in_a_plane(fill: f64, ratio: f64, stroke: f64) -> [f64; 3] {
+    let mut tank = bench_with_energy(fill);
+    tank.zeta[0] = 0.01;
+    let w = ratio * linear_frequency(&tank);
+    let (pieces, periods) = (100, 120);
+    let h = TAU / w / f64::from(pieces);
+    let a = |k: i32| stroke * w * w * (f64::from(k) * h * w).cos();
+    let mut moved = SloshTank::start(&tank);
+    let (mut angle, mut force, mut harmonic) = (0.0_f64, 0.0_f64, [0.0; 2]);
+    for k in 0..periods * pieces {
+        Moved::step(&mut moved, [a(k), (a(k + 1) - a(k)) / h], h);
+        if k < (periods - 1) * pieces {
+            continue;
+        }
+        let (x, phase) = (moved.bob()[0], f64::from(k + 1) * h * w);
+        harmonic = [harmonic[0] + x * phase.cos(), harmonic[1] - x * phase.sin()];
+        angle = angle.max(x.abs().asin().to_degrees());
+        force = force.max(moved.outputs_after_step().tank.force[0].abs());
+    }
+    let weight = (tank.m_0 + tank.mass[0]) * G;
+    [angle, harmonic[1].atan2(harmonic[0]).to_degrees(), force / weight]
+}
+
+/// Planar motion near resonance at a damping ratio of 0.01 on every mode, by fully nonlinear potential flow, computed for this
+/// project by a spectral method that marches in time: 29 to 40 modes, which agree within 0.3 %. Each row is h/R, the frequency
+/// over that of small waves, stroke over R, and the angle, phase and force of the flow. The third order errs by up to 14 %,
+/// 17 degrees and 21 %.
+#[test]
+fn forced_planar_waves_with_the_energy_terms_are_those_of_potential_flow() {
+    for (fill, ratio, stroke, angle, phase, force) in [
+        (0.5, 0.99, 0.004606, 12.50, 130.3, 0.1360),
+        (0.5, 1.0, 0.004630, 15.22, 69.7, 0.1568),
+        (0.5, 1.01, 0.004904, 11.93, 41.5, 0.1274),
+        (0.6, 1.0, 0.002580, 9.94, 69.0, 0.1006),
+        (0.65, 0.99, 0.003110, 12.79, 101.4, 0.1219),
+    ] {
+        let found = forced_in_a_plane(fill, ratio, stroke * 0.0815);
+        println!("{fill} {ratio}: {found:?}, flow {angle} {phase} {force}");
+        assert!((found[0] / angle - 1.0).abs() < 0.027, "{fill} {ratio}: {found:?}");
+        assert!((found[1] - phase).abs() < 3.0, "{fill} {ratio}: {found:?}");
+        assert!((found[2] / force - 1.0).abs() < 0.035, "{fill} {ratio}: {found:?}");
     }
 }
 

@@ -30,6 +30,7 @@
 //! ```text
 //! f  gains D q + P' m + 2 P e x q' in place of S q,   D = (S sigma)' - s_2 sigma^2 - t_2 tau^2 - 2 P w_e
 //! torque gains -m l^2 [(u P)' e + u P w x e]
+//! r'     becomes r' + S sigma q + T (q x r') m in the drag
 //! ```
 //!
 //! sigma' and tau' = (q x r' + w_e u)' belong to the newest order. m is perpendicular to n and d, so that H gains T/(1 + T u) m
@@ -132,8 +133,13 @@ struct HigherSeries {
     /// D and P'.
     inwards: Series,
     around: Series,
-    /// T at the start of the expansion, T/(1 + T u), and m.
-    inertia: f64,
+    /// q x r', S sigma and T (q x r'), and the rate in the drag.
+    turned: Series,
+    radial: Series,
+    tangential: Series,
+    rate: Vector,
+    /// S and T at the start of the expansion, T/(1 + T u), and m.
+    inertia: [f64; 2],
     share: f64,
     m: Vec3,
     /// Terms of the current order without the newest [a; w']: of D, P' and tau'.
@@ -153,18 +159,22 @@ impl HigherSeries {
             spin: ZERO,
             inwards: ZERO,
             around: ZERO,
-            inertia: 0.0,
+            turned: ZERO,
+            radial: ZERO,
+            tangential: ZERO,
+            rate: ZERO_VECTOR,
+            inertia: [0.0; 2],
             share: 0.0,
             m: [0.0; 3],
             known: [0.0; 3],
         })
     }
 
-    /// Starts an expansion at q and u.
-    fn start(&mut self, q: Vec3, u: f64) {
+    /// Starts an expansion at q and u, with S.
+    fn start(&mut self, q: Vec3, u: f64, s: f64) {
         self.u3[0] = u * u * u;
         let t = self.by.rotary_inertia(u);
-        self.inertia = t;
+        self.inertia = [s, t];
         self.share = t / f64::max(1.0 + t * u, 0.5 * LEAST_INERTIA);
         self.m = [-q[1], q[0], 0.0];
     }
@@ -177,7 +187,7 @@ impl HigherSeries {
         let order = (n + 1) as f64;
         self.turning[n] = w_e;
         // sigma = q.q', tau = q x q' + w_e u
-        let (mut inwards, mut twist) = ([0.0; 2], [0.0; 2]);
+        let (mut inwards, mut twist, mut relative) = ([0.0; 2], [0.0; 2], 0.0);
         // of order n, and of order n + 1 without what [a; w'] of order n decides
         for (k, last) in [n, n + 1].into_iter().enumerate() {
             for j in k..=last {
@@ -185,11 +195,15 @@ impl HigherSeries {
                 inwards[k] += a[0] * b[0] + a[1] * b[1];
                 twist[k] += a[0] * b[1] - a[1] * b[0];
             }
+            if k == 0 {
+                relative = twist[0];
+            }
             for j in k..=last {
                 twist[k] += u[j] * self.turning[last - j];
             }
         }
         (self.sigma[n], self.tau[n]) = (inwards[0], twist[0]);
+        self.turned[n] = relative;
         // S sigma of order n + 1 and T tau of orders n and n + 1, without coefficient 0 of S and T
         let (mut faster, mut swirls) = (0.0, [0.0; 2]);
         for j in 1..=n + 1 {
@@ -199,7 +213,7 @@ impl HigherSeries {
         for j in 1..=n {
             swirls[0] += by.rotary[1] * u[j] * self.tau[n - j];
         }
-        self.swirl[n] = self.inertia * self.tau[n] + swirls[0];
+        self.swirl[n] = self.inertia[1] * self.tau[n] + swirls[0];
         self.spin[n] = mul(n, u, &self.swirl);
         let inwards_known = order * faster
             - by.inertia * square(n, &self.sigma)
@@ -219,6 +233,23 @@ impl HigherSeries {
             f[0] + self.known[0] * r[0][0] - self.known[1] * r[0][1],
             f[1] + self.known[0] * r[0][1] + self.known[1] * r[0][0],
         ]
+    }
+
+    /// Sets coefficient n of the rate in the drag, after [`HigherSeries::expand`].
+    fn set_rate(&mut self, n: usize, r: &Vector, r_d: Vec3, u: &Series) {
+        let (mut radial, mut tangential) = (0.0, 0.0);
+        for j in 1..=n {
+            radial += self.by.inertia * u[j] * self.sigma[n - j];
+            tangential += self.by.rotary[1] * u[j] * self.turned[n - j];
+        }
+        self.radial[n] = self.inertia[0] * self.sigma[n] + radial;
+        self.tangential[n] = self.inertia[1] * self.turned[n] + tangential;
+        self.rate[n] = r_d;
+        for j in 0..=n {
+            let (s, t, at) = (self.radial[j], self.tangential[j], r[n - j]);
+            self.rate[n][0] += s * at[0] - t * at[1];
+            self.rate[n][1] += s * at[1] + t * at[0];
+        }
     }
 
     /// Returns T tau' of the newest order under Y and w_e'.
@@ -336,7 +367,7 @@ impl ConstrainedBob {
         self.v[0] = add(r_d, turned);
         self.ahead = [0.0; 3];
         if let Some(higher) = &mut self.higher {
-            higher.start(q, u);
+            higher.start(q, u, self.surface.inner_at(u));
         }
         self.set_normal(0);
         let n = self.n[0];
@@ -443,12 +474,18 @@ impl ConstrainedBob {
         let fall = add(turned.map(|pair| pair[1]), scale(self.inv_l, centripetal));
         self.fall = scale(-1.0, fall);
 
+        let mut by_higher = [0.0; 2];
+        if let Some(higher) = &mut self.higher {
+            self.in_tank[n] = w;
+            by_higher = higher.expand(n, w[2], &self.r, &self.r_d, &self.u);
+            higher.set_rate(n, &self.r, self.r_d[n], &self.u);
+        }
         // f without the newest multipliers.
         let mut f = if self.follows {
             self.drag_of(n);
             scale(1.0 / self.m, self.dragged[n])
         } else {
-            scale(self.c_m, self.r_d[n])
+            scale(self.c_m, self.higher.as_ref().map_or(self.r_d[n], |higher| higher.rate[n]))
         };
         f[0] += self.k_m * self.r[n][0];
         f[1] += self.k_m * self.r[n][1];
@@ -459,10 +496,8 @@ impl ConstrainedBob {
         }
         let normal = dot_from_1(n + 1, &self.n, &self.r_d);
         let mut inwards = 0.0;
-        if let Some(higher) = &mut self.higher {
-            self.in_tank[n] = w;
-            let more = higher.expand(n, w[2], &self.r, &self.r_d, &self.u);
-            (f[0], f[1]) = (f[0] + more[0], f[1] + more[1]);
+        if self.higher.is_some() {
+            (f[0], f[1]) = (f[0] + by_higher[0], f[1] + by_higher[1]);
             for (r, r_d) in self.r[1..=n + 1].iter().zip(self.r_d[..=n].iter().rev()) {
                 inwards += r[0] * r_d[0] + r[1] * r_d[1];
             }
@@ -527,7 +562,8 @@ impl ConstrainedBob {
         };
         self.drag.expand(n, chord2, space::square_of(n, &self.p_d));
         let mut dragged = [0.0; 3];
-        for (c, r_d) in self.drag.c[..=n].iter().zip(self.r_d[..=n].iter().rev()) {
+        let rate = self.higher.as_ref().map_or(&self.r_d, |higher| &higher.rate);
+        for (c, r_d) in self.drag.c[..=n].iter().zip(rate[..=n].iter().rev()) {
             for i in 0..3 {
                 dragged[i] += c * r_d[i];
             }
@@ -555,9 +591,13 @@ impl ConstrainedBob {
         self.v[n + 1] = scale(1.0 / (n + 1) as f64, rate);
     }
 
-    /// Returns coefficient n of the dissipated power, c l^2 |r'|^2, W.
+    /// Returns coefficient n of the dissipated power, c l^2 r'.(r' in the drag), W.
     pub fn dissipation(&self, n: usize) -> f64 {
         let l2 = self.l * self.l;
+        if let (Some(higher), false) = (&self.higher, self.follows) {
+            let power = dot_from_1(n, &self.r_d, &higher.rate) + dot(self.r_d[0], higher.rate[n]);
+            return self.m * self.c_m * l2 * power;
+        }
         if !self.follows {
             return self.m * self.c_m * l2 * space::square_of(n, &self.r_d);
         }
@@ -629,8 +669,9 @@ impl ConstrainedBob {
         if !self.follows {
             return 0.0;
         }
-        let end = largest(space::value(&self.r_d, n - 1, h));
-        let rate = f64::max(largest(self.r_d[0]) + largest(self.r_d[1]) * h, end);
+        let rates = self.higher.as_ref().map_or(&self.r_d, |higher| &higher.rate);
+        let end = largest(space::value(rates, n - 1, h));
+        let rate = f64::max(largest(rates[0]) + largest(rates[1]) * h, end);
         self.drag.defect(n - 1, h) * rate * h
     }
 

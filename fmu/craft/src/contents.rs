@@ -556,13 +556,18 @@ impl<T: Number> Contents<'_, T> {
                     sub(self.flow_wrench[1], scale(m[1], cross(rho, speed))),
                 ];
             }
-            let surface = on_surface.map(|(meridian, lift)| {
+            let mut squared = dot(moved, moved);
+            let surface = on_surface.map(|(meridian, mut lift)| {
+                if let Some((rate, more)) = meridian.inner_rate(p_d) {
+                    squared = squared + more;
+                    lift.inner = add(lift.inner, scale(drag * l[0] / m[0], rate));
+                }
                 centring = centring + m[0] * lift.energy;
                 known = add(known, scale(l[2] - l[0] * dot(p_d, p_d), p));
                 known = add(known, scale(lift.z_dd, e));
                 OnSurface { meridian, z: lift.z, inner: lift.inner, e, rotary: lift.rotary }
             });
-            self.dissipation = self.dissipation + drag * l[0] * l[0] * dot(moved, moved);
+            self.dissipation = self.dissipation + drag * l[0] * l[0] * squared;
             self.bobs[n] = Some(Swing {
                 m: m[0],
                 l: l[0],

@@ -66,6 +66,9 @@
 //! torque on the craft   rho x F - m l^2 [(u T tau)' e + u T tau w x e]
 //! ```
 //!
+//! Drag acts on E_i as on the bob, so that a wave decays as its energy does: phi gains nothing, i gains (c l/m) [S sigma p_perp +
+//! T (n.p') n] and the power c l^2 [S sigma^2 + T (n.p')^2].
+//!
 //! About the axis both parts of the torque by E_i cancel. [a; w'] acts on tau' by v = [n; rho x n - l u e], which adds m T/(1 +
 //! T u) v v^T to the mass matrix.
 //!
@@ -434,6 +437,20 @@ impl<T: Number> Meridian<T> {
                 *element = *element + m * share * more;
             }
         }
+    }
+
+    /// Returns the rate of E_i's part of the drag and its square, of coefficients beyond the third order.
+    pub fn inner_rate(&self, p_d: Vec3<T>) -> Option<(Vec3<T>, T)> {
+        self.surface.higher?;
+        let sigma = dot(self.p_perp, p_d);
+        let radial = self.surface.inner_of(self.u) * sigma;
+        let (mut rate, mut squared) = (scale(radial, self.p_perp), radial * sigma);
+        if let (Some((n, _)), Some(higher)) = (self.around, self.surface.higher) {
+            let turned = dot(n, p_d);
+            let tangential = higher.rotary_inertia(self.u) * turned;
+            (rate, squared) = (add(rate, scale(tangential, n)), squared + tangential * turned);
+        }
+        Some((rate, squared))
     }
 
     /// Returns n, if rotary motion has inertia.

@@ -1,5 +1,5 @@
 //! Closed formulas of slosh for models and harness. Liquid in an upright cylinder (`cylinder.rs`), to third order in
-//! the amplitude (`third_order.rs`), and with a tilted surface (`tilt.rs`). Damping by published correlations
+//! the amplitude (`third_order.rs`) and beyond (`energy_terms.rs`), and with a tilted surface (`tilt.rs`). Damping by published correlations
 //! (`damping.rs`), the ends of the slosh models (`limits.rs`), the range of linear theory (`regime.rs`), similarity numbers (`similarity.rs`), and interpolation of
 //! fill tables (`interpolation.rs`). SI units.
 
@@ -7,6 +7,7 @@
 
 pub mod cylinder;
 pub mod damping;
+pub mod energy_terms;
 pub mod interpolation;
 pub mod limits;
 pub mod regime;

@@ -42,6 +42,9 @@ Fill = Any
 """Fill of all tanks, or of each: by name or in their order. Of a tank: height, m; ``"60%"`` of its
 volume; ``(120, "kg")``; 0 if it is empty."""
 
+BEYOND_THIRD_ORDER = re.compile(r"\.(nonlinear_(inertia|stiffness)_2|rotary_inertia(_2)?)\[")
+"""Parameters of a tank's modes that tanks which drain or whose liquid detaches do not have."""
+
 MOST_TANKS = 4
 """Number of tanks that Spacecraft has."""
 
@@ -756,11 +759,18 @@ class Craft:
                     # liquid detaches from pendulums only
                     third = re.compile(rf"{re.escape(prefix)}\.nonlinear_(inertia|stiffness)\[")
                     found |= {key: 1.0 for key in found if third.match(key)}
+                    found = {key: x for key, x in found.items() if not BEYOND_THIRD_ORDER.search(key)}
         if mass_flow is not None:
             tables = self._draining(mass_flow, tanks, between)
             # the FMU warns of values that the table replaces
             replaced = {_without_point(name) for name in tables if ".fill." in name}
-            found = {n: value for n, value in found.items() if n not in replaced} | tables
+            draining = {name.partition(".")[0] for name in tables if ".fill." in name}
+
+            def is_replaced(name: str) -> bool:
+                own = name.partition(".")[0] in draining
+                return name in replaced or own and bool(BEYOND_THIRD_ORDER.search(name))
+
+            found = {n: value for n, value in found.items() if not is_replaced(n)} | tables
         return found
 
     def _draining(

@@ -45,6 +45,30 @@ pub struct Coefficients {
     pub series_limit: f64,
     /// True if the coefficients are interpolated over the fill across a pole of the third order.
     pub bridged: bool,
+    /// Coefficients that give the wave's energy, too, for a tank that keeps its liquid; `None` where they are not known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub energy: Option<Energy>,
+}
+
+/// Coefficients of a mode with the wave's energy (`formulas::energy_terms`), in place of those of the third order.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Energy {
+    /// s, `nonlinear_inertia` in the FMUs.
+    pub nonlinear_inertia: f64,
+    /// kappa, `nonlinear_stiffness` in the FMUs.
+    pub nonlinear_stiffness: f64,
+    /// s_2
+    pub nonlinear_inertia_2: f64,
+    /// kappa_2
+    pub nonlinear_stiffness_2: f64,
+    /// t
+    pub rotary_inertia: f64,
+    /// t_2
+    pub rotary_inertia_2: f64,
+    /// Angle above which the mode is out of range, rad.
+    pub angle_limit: f64,
+    /// Angle up to which the frequency was compared with potential flow, rad; the error is below 0.11 %.
+    pub frequency_limit: f64,
 }
 
 /// Source of the angle at which a mode is out of range.

@@ -211,7 +211,7 @@ pub fn parameters(
     let solved = |rows: &[ModalData], liquid: Liquid| {
         let with_modes = |row: &ModalData| {
             let row = ModalData { modes: row.modes[..modes].to_vec(), ..row.clone() };
-            ParameterSet::new(tank, &row, target, liquid)
+            ParameterSet::with_energy(tank, &row, target, liquid, false)
         };
         rows.iter().map(with_modes).collect::<Result<Vec<_>, _>>()
     };

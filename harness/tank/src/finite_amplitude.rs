@@ -12,10 +12,11 @@
 
 use core::f64::consts::PI;
 
+use formulas::energy_terms::energy_terms;
 use formulas::limits;
 use formulas::third_order::{BRIDGED, coefficients};
 
-use crate::coefficients::{Coefficients, FiniteAmplitude, LimitSource};
+use crate::coefficients::{Coefficients, Energy, FiniteAmplitude, LimitSource};
 use crate::contour::Wall;
 use crate::contour_waves;
 use crate::curve::Point;
@@ -73,6 +74,7 @@ impl Coefficients {
             swirl_limit: None,
             series_limit: (STEEPEST * wave / fine.second).abs().min(MOST_ANGLE),
             bridged: false,
+            energy: None,
         }
     }
 
@@ -104,6 +106,7 @@ impl Coefficients {
             angle_limit_from: LimitSource::PotentialFlow,
             frequency_limit: Some(limit.frequency),
             swirl_limit: limits::swirl_fold(fill),
+            energy: energy(fill),
             ..known
         }
     }
@@ -115,6 +118,22 @@ impl Coefficients {
         let exact = [self.planar, self.circular.unwrap_or(circular)];
         limits::shifted(self.angle_limit, limits::FORCED, shifts, exact)
     }
+}
+
+/// Returns the coefficients of an upright cylinder filled to h/R = `fill` that give the wave's energy.
+fn energy(fill: f64) -> Option<Energy> {
+    let (known, limit) = (energy_terms(fill)?, limits::cylinder_with_energy(fill)?);
+    let ([s, kappa], [s_2, kappa_2], [t, t_2]) = (known.pair, known.next, known.rotary);
+    Some(Energy {
+        nonlinear_inertia: s,
+        nonlinear_stiffness: kappa,
+        nonlinear_inertia_2: s_2,
+        nonlinear_stiffness_2: kappa_2,
+        rotary_inertia: t,
+        rotary_inertia_2: t_2,
+        angle_limit: limit.forced,
+        frequency_limit: limit.frequency,
+    })
 }
 
 /// Result of one truncation.

@@ -323,6 +323,18 @@ impl ParameterSet {
         target: Target,
         liquid: Liquid,
     ) -> Result<ParameterSet, Problems> {
+        ParameterSet::with_energy(tank, data, target, liquid, target != Target::HubSlosh)
+    }
+
+    /// [`ParameterSet::new`] with coefficients that give the wave's energy where they are known and `has_energy` is true;
+    /// tanks with a fill table and HubSlosh have those of the third order only.
+    pub(crate) fn with_energy(
+        tank: &Tank,
+        data: &ModalData,
+        target: Target,
+        liquid: Liquid,
+        has_energy: bool,
+    ) -> Result<ParameterSet, Problems> {
         let name = data.name.as_deref().unwrap_or("tank");
         let mut notes = vec![
             format!(
@@ -432,7 +444,10 @@ impl ParameterSet {
             .enumerate()
             .filter(|(_, (_, of_axis))| *of_axis == 0 && !is_linear)
             .filter_map(|(n, (axis, _))| Some((n + 1, [found.mode, found.mode_y][*axis]?)))
-            .filter(|(_, known)| known.series_limit >= finite_amplitude::LEAST_ANGLE)
+            .filter(|(_, known)| {
+                known.series_limit >= finite_amplitude::LEAST_ANGLE
+                    || has_energy && known.energy.is_some()
+            })
             .collect();
         // Without its coefficients a mode is a pendulum.
         let limits: Vec<(usize, [Option<f64>; 2])> = chosen
@@ -442,6 +457,9 @@ impl ParameterSet {
             .filter_map(|(n, (axis, _))| Some((n + 1, [found.mode, found.mode_y][*axis]?)))
             .map(|(n, known)| {
                 let angle = match third_order.iter().any(|(mode, _)| *mode == n) {
+                    true if has_energy => {
+                        known.energy.map_or(known.angle_limit, |of| of.angle_limit)
+                    }
                     true => known.angle_limit,
                     false => known.pendulum_limit(),
                 };
@@ -452,6 +470,14 @@ impl ParameterSet {
             notes.push("angle_limit is not known: in_range ends at 45 degrees alone".to_string());
         }
         for (n, known) in &third_order {
+            if let Some(energy) = known.energy.filter(|_| has_energy) {
+                notes.push(format!(
+                    "nonlinear_inertia[{n}] to rotary_inertia_2[{n}]: fully nonlinear potential flow in upright cylinders, frequency and \
+                     energy of the wave, for slosh angles up to {:.1} degrees (angle_limit)",
+                    energy.angle_limit.to_degrees()
+                ));
+                continue;
+            }
             notes.push(format!(
                 "nonlinear_inertia[{0}] = {1}, nonlinear_stiffness[{0}] = {2}: third order of potential flow, {3}, for slosh angles up \
                  to {4:.1} degrees (angle_limit, {5})",
@@ -493,11 +519,22 @@ impl ParameterSet {
                 }
             }
             for (n, known) in &third_order {
-                for (what, value) in [
+                let third = [
                     ("nonlinear_inertia", known.nonlinear_inertia),
                     ("nonlinear_stiffness", known.nonlinear_stiffness),
-                ] {
-                    values.push((format!("{prefix}.{what}[{n}]"), Value::Real(value)));
+                ];
+                let all = known.energy.filter(|_| has_energy).map(|energy| {
+                    [
+                        ("nonlinear_inertia", energy.nonlinear_inertia),
+                        ("nonlinear_stiffness", energy.nonlinear_stiffness),
+                        ("nonlinear_inertia_2", energy.nonlinear_inertia_2),
+                        ("nonlinear_stiffness_2", energy.nonlinear_stiffness_2),
+                        ("rotary_inertia", energy.rotary_inertia),
+                        ("rotary_inertia_2", energy.rotary_inertia_2),
+                    ]
+                });
+                for (what, value) in all.as_ref().map_or(&third[..], |all| &all[..]) {
+                    values.push((format!("{prefix}.{what}[{n}]"), Value::Real(*value)));
                 }
             }
         };

@@ -125,6 +125,20 @@ fn amplitude_section(text: &mut String, found: &FiniteAmplitude, waves: [f64; 2]
             known.angle_limit.to_degrees(),
             known.angle_limit_from.words()
         );
+        if let Some(energy) = &known.energy {
+            let _ = writeln!(
+                text,
+                "  with the wave's energy, for SloshTank and Spacecraft: s = {:.4}, kappa = {:.4}, s_2 = {:.4}, kappa_2 = {:.4}, t = {:.4}, \
+                 t_2 = {:.4}, in range up to {:.1} degrees",
+                energy.nonlinear_inertia,
+                energy.nonlinear_stiffness,
+                energy.nonlinear_inertia_2,
+                energy.nonlinear_stiffness_2,
+                energy.rotary_inertia,
+                energy.rotary_inertia_2,
+                energy.angle_limit.to_degrees()
+            );
+        }
         let _ = writeln!(
             text,
             "  omega^2 shifts by the part {:+.4} A^2 in planar motion{circular} (pendulum: -0.125 A^2, +0.5 A^2)",

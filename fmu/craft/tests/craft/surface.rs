@@ -362,6 +362,34 @@ fn bobs_move_by_lagrange_s_equations() {
     }
 }
 
+/// A wave with coefficients beyond the third order decays as its energy does: the dissipated power is 2 c/m times the kinetic
+/// energy, that within the liquid included.
+#[test]
+fn drag_acts_on_the_whole_kinetic_energy() {
+    for seed in 0..20 {
+        let mut random = Random::new(seed);
+        let mut tank = Tank { modes: 1, k: [0.0; MODES], ..random.tank() };
+        tank.damping_law = craft::DampingLaw::Constant;
+        tank.zeta_amplitude = [0.0; MODES];
+        tank.zeta_breaking = [0.0; MODES];
+        tank.zeta[0] = 0.01;
+        random.bend(&mut tank);
+        random.bend_further(&mut tank);
+        tank.p_0[0] = random.vector(1.0);
+        tank.p_dot_0[0] = random.vector(3.0);
+        let (u, p) = (TankInputs::default(), TankParameters { tank, ..TankParameters::default() });
+        let mut slosh = SloshTank::new(&p, &u, 0.0, 1e-9).unwrap();
+        let x = slosh.continuous_states();
+        let kinetic = Lagrangian { tank: &tank, n: 0, u: &u }.at([x[0], x[1]], [x[3], x[4]], 0.0);
+        let expected = 4.0 * 0.01 * f64::sqrt(tank.g_ref / tank.length[0]) * tank.mass[0] * kinetic;
+        let power = slosh.derivatives(&u)[6 * MODES];
+        // The Lagrangian has the bob below its hinge.
+        if x[2] < -0.1 {
+            assert!((power / expected - 1.0).abs() < 1e-12, "{seed}: {power} {expected}");
+        }
+    }
+}
+
 /// A wave does not feel a tank that turns about its axis: with and without the turn the bob is at the same place in inertial
 /// axes, and the tank gets no torque about the axis.
 #[test]

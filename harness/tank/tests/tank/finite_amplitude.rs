@@ -1,5 +1,6 @@
 //! Coefficients of the first mode at finite amplitude.
 
+use formulas::energy_terms::energy_terms;
 use hubslosh_tank::coefficients::{Coefficients, FiniteAmplitude, LimitSource};
 use hubslosh_tank::fill_table;
 use hubslosh_tank::finite_amplitude::of_tank;
@@ -143,13 +144,13 @@ fn files_for_the_fmus_have_the_limits() {
         })
     };
     let cylinder = "shape = { cylinder = { radius = 0.1, height = 2.0 } }";
-    for (target, prefix) in [
-        (Target::HubSlosh, "slosh.table"),
-        (Target::SloshTank, "tank"),
-        (Target::Spacecraft { tank: 2 }, "tank[2]"),
+    for (target, prefix, expected) in [
+        (Target::HubSlosh, "slosh.table", 10.72),
+        (Target::SloshTank, "tank", 15.5),
+        (Target::Spacecraft { tank: 2 }, "tank[2]", 15.5),
     ] {
         let angle = limit(cylinder, 0.05, target, &format!("{prefix}.angle_limit[1]")).unwrap();
-        assert!((angle.to_degrees() - 10.72).abs() < 0.01, "{angle}");
+        assert!((angle.to_degrees() - expected).abs() < 0.01, "{angle}");
         let swirl = format!("{prefix}.swirl_limit[1]");
         assert_eq!(limit(cylinder, 0.05, target, &swirl), None);
         let swirl = limit(cylinder, 0.25, target, &swirl).unwrap();
@@ -161,6 +162,58 @@ fn files_for_the_fmus_have_the_limits() {
     assert!(of_tank(cylinder, 0.01).unwrap().to_degrees() < 0.5);
     assert_eq!(of_tank("shape = { torus = { ring_radius = 1.0, tube_radius = 0.3 } }", 0.3), None);
     assert!(of_tank("box = [0.8, 0.5]", 0.4).is_some());
+}
+
+/// SloshTank and Spacecraft get the coefficients with the wave's energy at h/R 0.25 to 0.7, HubSlosh and tanks that drain those of
+/// the third order.
+#[test]
+fn files_have_the_energy_terms_where_they_are_known() {
+    let cylinder = tank("density = 1000.0\nshape = { cylinder = { radius = 0.1, height = 2.0 } }");
+    let coefficients = |set: &ParameterSet| -> Vec<(String, f64)> {
+        let number = |(name, value): &(String, Value)| match value {
+            Value::Real(x) if name.contains("nonlinear") || name.contains("rotary") => {
+                Some((name.clone(), *x))
+            }
+            _ => None,
+        };
+        set.values.iter().filter_map(number).collect()
+    };
+    for (fill, target, prefix, count) in [
+        // the series ends below 5 degrees
+        (0.024, Target::SloshTank, "tank", 0),
+        (0.025, Target::SloshTank, "tank", 6),
+        (0.05, Target::Spacecraft { tank: 2 }, "tank[2]", 6),
+        (0.0699, Target::SloshTank, "tank", 6),
+        (0.0701, Target::SloshTank, "tank", 2),
+        (0.05, Target::HubSlosh, "slosh.table", 2),
+    ] {
+        let data = cylinder.solve(fill, 2).unwrap();
+        let set = ParameterSet::new(&cylinder, &data, target, WATER).unwrap();
+        let found = coefficients(&set);
+        assert_eq!(found.len(), count, "{fill} {found:?}");
+        if count == 6 {
+            let known = energy_terms(data.fill / 0.1).unwrap();
+            let [[s, kappa], [s_2, kappa_2], [t, t_2]] = [known.pair, known.next, known.rotary];
+            let expected = [
+                ("nonlinear_inertia", s),
+                ("nonlinear_stiffness", kappa),
+                ("nonlinear_inertia_2", s_2),
+                ("nonlinear_stiffness_2", kappa_2),
+                ("rotary_inertia", t),
+                ("rotary_inertia_2", t_2),
+            ];
+            assert_eq!(found, expected.map(|(what, x)| (format!("{prefix}.{what}[1]"), x)));
+            assert!(set.notes.iter().any(|note| note.contains("frequency and energy")));
+        }
+    }
+    let swept = sweep(&cylinder, &[0.03, 0.05, 0.06], 1).unwrap();
+    let set = fill_table::parameters(&cylinder, &swept, None, Target::SloshTank, WATER).unwrap();
+    let found = coefficients(&set);
+    assert!(found.iter().all(|(name, _)| name.contains(".fill.nonlinear")), "{found:?}");
+    assert_eq!(found.len(), 6);
+    let limits = [1, 2, 3].map(|i| format!("tank.fill.angle_limit[1,{i}]"));
+    let all: Vec<_> = set.values.iter().filter(|(name, _)| limits.contains(name)).collect();
+    assert!(matches!(all[1].1, Value::Real(x) if (x.to_degrees() - 10.72).abs() < 0.01), "{all:?}");
 }
 
 /// Without sigma a tank whose Bond number may be below 100 is warned of: 1000 kg/m3, R = 0.1 m, 7.3e-5 m3/s2.
