@@ -246,6 +246,78 @@ fn collect(root: &Path, folder: &Path, found: &mut Vec<String>) {
     }
 }
 
+/// Functions of the harness, with the file, whose signature has a text for its error.
+fn textual_errors(file: &str, code: &str) -> Vec<String> {
+    let tokens = tokens(code);
+    let mut found = Vec::new();
+    for at in 0..tokens.len() {
+        if tokens[at] != "Result" || tokens.get(at + 1) != Some(&"<") {
+            continue;
+        }
+        // the arguments of the type, each as its tokens
+        let (mut depth, mut arguments) = (1, vec![Vec::new()]);
+        for token in &tokens[at + 2..] {
+            depth += i32::from(matches!(*token, "<" | "(" | "["));
+            depth -= i32::from(matches!(*token, ">" | ")" | "]"));
+            match (depth, *token) {
+                (0, _) => break,
+                (1, ",") => arguments.push(Vec::new()),
+                (_, token) => arguments.last_mut().expect("it begins with one").push(token),
+            }
+        }
+        let is_text = |error: &Vec<&str>| match error[..] {
+            ["String"] | ["&", "str"] => true,
+            ["&", "'", _, "str"] | ["Cow", ..] | ["Vec", "<", "String", ">"] => true,
+            _ => false,
+        };
+        if arguments.get(1).is_some_and(is_text) {
+            found.push(format!(
+                "{file}: Result<{}, {}>",
+                arguments[0].concat(),
+                arguments[1].concat()
+            ));
+        }
+    }
+    let texts = tokens.windows(4).filter(|window| window[..3] == ["type", "Err", "="]);
+    found.extend(texts.filter(|window| window[3] == "String").map(|_| format!("{file}: type Err")));
+    found
+}
+
+#[test]
+fn errors_of_the_harness_have_types() {
+    let mut found = Vec::new();
+    for (krate, _) in ONE_WAY.iter().filter(|(krate, _)| krate.starts_with("harness/")) {
+        let mut all = BTreeMap::new();
+        sources(&pack::root().join(krate).join("src"), &[], &mut all);
+        for (module, code) in all {
+            found.extend(textual_errors(&format!("{krate}/{}", module.join("/")), &code));
+        }
+    }
+    found.retain(|place| !TEXTUAL.iter().any(|file| place.starts_with(file)));
+    assert!(found.is_empty(), "a type with thiserror, or anyhow: {found:#?}");
+}
+
+/// Crates whose errors are still texts.
+const TEXTUAL: [&str; 1] = ["harness/identify/"];
+
+#[test]
+fn a_text_as_an_error_is_seen_in_every_form() {
+    for code in [
+        "fn f() -> Result<f64, String> {",
+        "fn f() -> anyhow::Result<Result<(), &'static str>> {",
+        "fn f(\n    a: f64,\n) -> Result<\n    Vec<(f64, f64)>,\n    String,\n> {",
+        "binary: Result<Binary, Vec<String>>,",
+        "type Err = String;",
+    ] {
+        assert_eq!(textual_errors("a", code).len(), 1, "{code}");
+    }
+    for code in
+        ["Result<String>", "Result<(String, String), Fault>", "Result<Result<String>, Fault>"]
+    {
+        assert_eq!(textual_errors("a", code), [""; 0], "{code}");
+    }
+}
+
 /// Crates in which modules of a folder must not use each other in a circle, with the modules that may.
 const ONE_WAY: [(&str, &[&str]); 23] = [
     ("fmu/plant", &[]),

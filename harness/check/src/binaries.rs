@@ -67,7 +67,7 @@ struct Placed {
     identifier: String,
     folder: String,
     kind: Option<Kind>,
-    binary: Result<Binary, String>,
+    binary: anyhow::Result<Binary>,
 }
 
 pub struct Binaries {
@@ -135,7 +135,7 @@ impl Binaries {
             };
             if let Some(n) = names.iter().position(is_file) {
                 let bytes = archive.file(name).unwrap_or_default();
-                let binary = Binary::read(bytes).map_err(|error| format!("{error:#}"));
+                let binary = Binary::read(bytes);
                 let identifier = identifiers[n].clone();
                 let folder = folder.to_string();
                 all.placed.push(Placed { name: name.into(), identifier, folder, kind, binary });
@@ -241,7 +241,7 @@ pub fn format(binaries: &Binaries, findings: &mut Findings) {
         let Some(kind) = placed.kind else { continue };
         looked = true;
         match &placed.binary {
-            Err(why) => findings.add(&placed.name, why.clone()),
+            Err(why) => findings.add(&placed.name, format!("{why:#}")),
             Ok(binary) if binary.kind != kind => findings.add(
                 &placed.name,
                 format!("it is for {} (allowed in {}: {kind})", binary.kind, placed.folder),

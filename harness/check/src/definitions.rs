@@ -11,7 +11,7 @@ pub fn well_formed(archive: &super::archive::Archive, findings: &mut Findings) {
     match archive.file("modelDescription.xml") {
         None => findings.skip("there is no modelDescription.xml that can be unpacked"),
         Some(bytes) => {
-            let read = Element::read(bytes);
+            let read = Element::parse(bytes);
             if let Err(Fault::TooLarge(_) | Fault::Doctype(_)) = read {
                 // Files that are too large or have a DOCTYPE break `xml.size` or `xml.doctype`.
                 findings.skip("modelDescription.xml is not read to its end");

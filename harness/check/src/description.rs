@@ -8,7 +8,7 @@ use std::str::FromStr;
 use super::findings::Findings;
 use host::causality::{Causality, Variability};
 use host::description::Type;
-use host::xml::Element;
+use host::xml::{Element, Fault};
 
 /// The parts of modelDescription.xml that rules need. Faults are not reported here but by the rules.
 pub struct Description {
@@ -199,7 +199,7 @@ impl Description {
     /// # Errors
     ///
     /// If the file is not well-formed XML; the text has the line.
-    pub fn read(bytes: &[u8]) -> Result<Description, String> {
+    pub fn read(bytes: &[u8]) -> Result<Description, Fault> {
         Ok(Description::new(Element::parse(bytes)?))
     }
 

@@ -46,7 +46,23 @@ enum Trial {
     /// The new states, and the estimated error divided by the allowed error.
     Done(DVector<f64>, f64),
     /// The FMU could not be evaluated at a stage (fmi2Discard, or values that are NaN or infinite).
-    Impossible(String),
+    Impossible(Impossible),
+}
+
+/// Reason why a step cannot be made as long as it was tried.
+#[derive(Debug, thiserror::Error)]
+enum Impossible {
+    #[error("the linearised system cannot be solved")]
+    Singular,
+    #[error("state {} becomes {value}", index + 1)]
+    State { index: usize, value: f64 },
+    #[error("derivative {} is {value}", index + 1)]
+    Derivative { index: usize, value: f64 },
+    /// fmi2Discard
+    #[error("{0}")]
+    Discarded(CallError),
+    #[error("the error of the step is {0:.1e} times what is allowed")]
+    Inexact(f64),
 }
 
 impl Session<'_> {
@@ -74,7 +90,7 @@ impl Session<'_> {
                 jacobian = Some(self.jacobian(t, &x)?);
             }
             // If no step is possible, the reason is that of the shortest step, which was tried last.
-            let mut why = String::new();
+            let mut why = None;
             loop {
                 // A step ends neither after `end` nor after a time event that the FMU has announced.
                 let limit = self.next_event().filter(|next| *next > t).unwrap_or(end).min(end);
@@ -82,11 +98,11 @@ impl Session<'_> {
                 let to = if last { limit } else { t + h };
                 let shortest = (SHORTEST * whole).max(4.0 * f64::EPSILON * t.abs());
                 if to - t < shortest && !last {
-                    return Err(self.diverges(t, &x, &why));
+                    return Err(self.diverges(t, &x, why));
                 }
                 let (x_new, error) = match self.trial(t, &x, to - t, jacobian.as_ref())? {
                     Trial::Impossible(reason) => {
-                        why = reason;
+                        why = Some(reason);
                         self.go_to(t, &x)?;
                         h = (to - t) / 4.0;
                         continue;
@@ -95,7 +111,7 @@ impl Session<'_> {
                 };
                 let factor = (0.8 * error.powf(-1.0 / 3.0)).clamp(0.2, 5.0);
                 if error > 1.0 {
-                    why = format!("the error of the step is {error:.1e} times what is allowed");
+                    why = Some(Impossible::Inexact(error));
                     self.go_to(t, &x)?;
                     h = (to - t) * factor;
                     continue;
@@ -137,7 +153,7 @@ impl Session<'_> {
             None => Some(b),
             Some(w) => w.solve(&b),
         };
-        let singular = || Trial::Impossible("the linearised system cannot be solved".into());
+        let singular = || Trial::Impossible(Impossible::Singular);
         let f0 = match self.derivatives_at(t, x)? {
             Ok(f) => f,
             Err(why) => return Ok(Trial::Impossible(why)),
@@ -166,9 +182,13 @@ impl Session<'_> {
 
     /// Evaluates the derivatives at (t, x). The inner error is the reason why the FMU cannot be evaluated
     /// there, for example fmi2Discard.
-    fn derivatives_at(&mut self, t: f64, x: &DVector<f64>) -> Result<Result<DVector<f64>, String>> {
-        if let Some(i) = x.iter().position(|x| !x.is_finite()) {
-            return Ok(Err(format!("state {} becomes {}", i + 1, x[i])));
+    fn derivatives_at(
+        &mut self,
+        t: f64,
+        x: &DVector<f64>,
+    ) -> Result<Result<DVector<f64>, Impossible>> {
+        if let Some(index) = x.iter().position(|x| !x.is_finite()) {
+            return Ok(Err(Impossible::State { index, value: x[index] }));
         }
         let mut f = DVector::zeros(x.len());
         let asked = self.try_go_to(t, x).and_then(|()| match x.len() {
@@ -178,11 +198,13 @@ impl Session<'_> {
         match asked {
             Ok(()) => {}
             // fmi2Discard means that the host should try a shorter step (section 2.1.3).
-            Err(error) if error.status == Status::Discard => return Ok(Err(error.to_string())),
+            Err(error) if error.status == Status::Discard => {
+                return Ok(Err(Impossible::Discarded(error)));
+            }
             Err(error) => return Err(error.into()),
         }
         Ok(match f.iter().position(|f| !f.is_finite()) {
-            Some(i) => Err(format!("derivative {} is {}", i + 1, f[i])),
+            Some(index) => Err(Impossible::Derivative { index, value: f[index] }),
             None => Ok(f),
         })
     }
@@ -234,7 +256,8 @@ impl Session<'_> {
         Ok(self.try_go_to(t, x)?)
     }
 
-    fn diverges(&self, t: f64, x: &DVector<f64>, why: &str) -> anyhow::Error {
+    fn diverges(&self, t: f64, x: &DVector<f64>, why: Option<Impossible>) -> anyhow::Error {
+        let why = why.map(|why| why.to_string()).unwrap_or_default();
         let largest = x.iter().copied().fold(0.0f64, |a, b| a.max(b.abs()));
         let why = format!(
             "the states cannot be followed past t = {t:?} s however short the step: {why} (largest \

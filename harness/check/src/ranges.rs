@@ -61,13 +61,13 @@ pub fn in_range(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 
 /// Sets `v` before initialisation and initialises. The inner error is the reason why the FMU refused the
 /// value.
-fn refusal(fmu: &FmuUnderTest, v: &Variable, value: &Reading) -> Result<Result<(), String>> {
+fn refusal(fmu: &FmuUnderTest, v: &Variable, value: &Reading) -> Result<Result<()>> {
     let mut session = fmu.session(fmu.first()?)?;
     fmu.doing(format!("setting {} to {value} and initialising", v.name));
     if let Err(error) = session.set(v, value) {
-        return Ok(Err(error.to_string()));
+        return Ok(Err(error.into()));
     }
-    Ok(session.initialise().map_err(|error| error.to_string()))
+    Ok(session.initialise())
 }
 
 pub fn limits_exact(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
@@ -133,7 +133,10 @@ pub fn items_known(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         let list = known.iter().map(i32::to_string).collect::<Vec<_>>().join(", ");
         for item in &known {
             if let Err(why) = refusal(fmu, v, &Reading::Integer(*item))?
-                && !fmu.variables().iter().any(|o| o.name != v.name && mentions(&why, &o.name))
+                && !fmu
+                    .variables()
+                    .iter()
+                    .any(|o| o.name != v.name && mentions(&why.to_string(), &o.name))
             {
                 findings
                     .add(v.place(), format!("{item} is an item of its type, but refused: {why}"));

@@ -103,7 +103,7 @@ pub fn size(archive: &Archive, findings: &mut Findings) {
     let Some(bytes) = archive.file(NAME) else {
         return findings.skip("there is no modelDescription.xml that can be unpacked");
     };
-    if let Err(Fault::TooLarge(why)) = Element::read(bytes) {
+    if let Err(Fault::TooLarge(why)) = Element::parse(bytes) {
         findings.add(NAME, why);
     }
 }

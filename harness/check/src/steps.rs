@@ -1,6 +1,6 @@
 //! Rules about steps of Co-Simulation (FMI 2.0.5, section 4.2).
 
-use anyhow::Result;
+use anyhow::{Result, anyhow};
 
 use super::dependencies::displaced;
 use super::description::Variable;
@@ -529,7 +529,7 @@ pub fn small(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let all: Vec<&Variable> = fmu.variables().iter().filter(continuous).collect();
     // Values before and after `count` steps of `h` with the inputs held, or the FMU's message. `None` if the
     // FMU ends the simulation.
-    type Ends = Option<Result<(Vec<f64>, Vec<f64>), String>>;
+    type Ends = Option<Result<(Vec<f64>, Vec<f64>)>>;
     let run = |h: f64, count: usize| -> Result<Ends> {
         let mut session = fmu.running(Interface::CoSimulation)?;
         session.advance(3)?;
@@ -542,7 +542,7 @@ pub fn small(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         for n in 1..=count {
             let end = start + n as f64 * h;
             if let Err(error) = session.go(end - session.time) {
-                return Ok(Some(Err(format!("step {n} of {h:.1e} s: {error}"))));
+                return Ok(Some(Err(anyhow!("step {n} of {h:.1e} s: {error}"))));
             }
             if session.is_ended() {
                 return Ok(None);

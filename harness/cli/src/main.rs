@@ -195,7 +195,7 @@ fn main() -> ExitCode {
     let code = match bug::caught(work) {
         Ok(code) => code,
         Err(panic) => {
-            let report = bug::report(&panic);
+            let report = bug::report(&panic.0);
             if guard::panics(&report) {
                 return ExitCode::FAILURE; // the parent of this guarded process prints the report
             }

@@ -45,9 +45,14 @@ fn message(payload: &(dyn Any + Send)) -> String {
     text.or_else(|| payload.downcast_ref::<String>().cloned()).unwrap_or("a panic".into())
 }
 
+/// A panic that was caught, with its message.
+#[derive(Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct Panicked(pub String);
+
 /// Runs `work`; the message of its panic if it panics. The first panic counts: a panic of a thread makes the thread that
 /// waits for it panic too.
-pub fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
+pub fn caught<T>(work: impl FnOnce() -> T) -> Result<T, Panicked> {
     let before = PANICS.lock().unwrap_or_else(PoisonError::into_inner).len();
     catch_unwind(AssertUnwindSafe(work)).map_err(|payload| {
         if let Some(listener) = LISTENER.get() {
@@ -60,10 +65,10 @@ pub fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
             true => Some(before.min(all.len().saturating_sub(1))),
             false => all.iter().position(|(_, kept)| kept.starts_with(&text)).or(own),
         };
-        match at.filter(|at| *at < all.len()) {
+        Panicked(match at.filter(|at| *at < all.len()) {
             Some(at) => all.remove(at).1,
             None => text,
-        }
+        })
     })
 }
 
@@ -89,7 +94,7 @@ mod tests {
     #[test]
     fn a_panic_becomes_a_message_that_blames_this_program() {
         assert_eq!(caught(|| 3), Ok(3));
-        let told = caught(|| -> i32 { panic!("row {} is odd", 7) }).unwrap_err();
+        let told = caught(|| -> i32 { panic!("row {} is odd", 7) }).unwrap_err().0;
         assert!(told.starts_with("row 7 is odd"), "{told}");
         let report = report(&told);
         assert!(report.starts_with("this is a bug of hubslosh") && report.contains("row 7 is odd"));

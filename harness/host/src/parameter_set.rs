@@ -275,7 +275,7 @@ fn keep_parameters_of_one_run(found: ParameterSet) -> ParameterSet {
 
 /// Reads the parameter set of SSP 1.0 and 2.0 ("SystemStructureParameterValues").
 fn from_ssv(text: &str) -> Result<ParameterSet> {
-    let root = Element::parse(text.as_bytes()).map_err(anyhow::Error::msg)?;
+    let root = Element::parse(text.as_bytes())?;
     ensure!(root.name == "ParameterSet", "its root is {}, not ParameterSet", root.name);
     let attribute = |element: &Element, name: &str| {
         element.get(name).map(String::from).with_context(|| {

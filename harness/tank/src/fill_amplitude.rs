@@ -65,9 +65,26 @@ fn fills(of: &[&AtFill]) -> String {
     all.join(", ")
 }
 
-/// Returns the columns of mode `n` (from 1) at ascending fills, and `Err` with a note if they are known at fewer than two
+/// The reason why a table has no columns of a mode, as a note.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "{PREFIX}s and kappa of mode {mode} are known at {known} of {fills} fills, so the table leaves them out, and the FMU \
+     takes a pendulum: {why}"
+)]
+pub(crate) struct TooFewFills {
+    mode: usize,
+    known: usize,
+    fills: usize,
+    why: String,
+}
+
+/// Returns the columns of mode `n` (from 1) at ascending fills, and `Err` if they are known at fewer than two
 /// fills. `between` are further fills, which show the errors between the points.
-pub(crate) fn columns(n: usize, points: &[AtFill], between: &[AtFill]) -> Result<Columns, String> {
+pub(crate) fn columns(
+    n: usize,
+    points: &[AtFill],
+    between: &[AtFill],
+) -> Result<Columns, TooFewFills> {
     let mut known: Vec<(f64, [f64; 2])> = points
         .iter()
         .chain(between)
@@ -77,13 +94,8 @@ pub(crate) fn columns(n: usize, points: &[AtFill], between: &[AtFill]) -> Result
     let (missing, found): (Vec<&AtFill>, Vec<&AtFill>) =
         points.iter().partition(|at| at.known(n).is_none());
     if found.len() < 2 {
-        let why = missing.first().map_or("", |at| at.reason());
-        return Err(format!(
-            "{PREFIX}s and kappa of mode {n} are known at {} of {} fills, so the table leaves them out, and the FMU takes a \
-             pendulum: {why}",
-            found.len(),
-            points.len()
-        ));
+        let why = missing.first().map_or("", |at| at.reason()).to_string();
+        return Err(TooFewFills { mode: n, known: found.len(), fills: points.len(), why });
     }
     let masses: Vec<f64> = known.iter().map(|(liquid, _)| *liquid).collect();
     let curves = [0, 1].map(|i| {

@@ -15,7 +15,7 @@ use names::sloshtank::tank::{
 };
 
 use crate::contour::Problems;
-use crate::fill_amplitude::{self, AtFill, Columns};
+use crate::fill_amplitude::{self, AtFill, Columns, TooFewFills};
 use crate::interpolation::Monotone;
 use crate::modal::ModalData;
 use crate::parameters::{Liquid, ParameterSet, Target, Value};
@@ -258,7 +258,7 @@ pub fn parameters(
                 set.warnings.extend(columns.warnings);
                 of_fills.push((n, columns.values));
             }
-            Err(note) => set.notes.push(note),
+            Err(too_few) => set.notes.push(too_few.to_string()),
         }
     }
     if liquid.nu.is_some() {
@@ -353,7 +353,10 @@ fn around(limits: Vec<Option<f64>>) -> Vec<Option<f64>> {
 const INERTIA: &str = "nonlinear_inertia[";
 
 /// Returns the numbers of modes with their third-order columns; see [`fill_amplitude::columns`].
-fn third_order(points: Vec<AtFill>, between: Vec<AtFill>) -> Vec<(usize, Result<Columns, String>)> {
+fn third_order(
+    points: Vec<AtFill>,
+    between: Vec<AtFill>,
+) -> Vec<(usize, Result<Columns, TooFewFills>)> {
     let numbers = points.iter().flat_map(|at| at.set.third_order.iter().map(|(n, _)| *n));
     // Mode 1 also where it is known nowhere, for the reason.
     let most = numbers.max().unwrap_or(1);

@@ -13,38 +13,54 @@ use crate::curve::{Curve, Point, Segment, cross, dot, sub};
 /// # Errors
 /// A file that cannot be read or has no path, a transform, rotated arcs, several subpaths.
 pub(crate) fn read(path: &Path, scale: f64) -> Result<Vec<Segment>, Problems> {
-    let with_path = |problem: String| Problems::from(format!("{}: {problem}", path.display()));
-    let text = crate::contour::read_text(path).map_err(|why| with_path(why.to_string()))?;
-    let data = first_path(&text).map_err(with_path)?;
-    segments(&data, scale).map_err(with_path)
+    let text = crate::contour::read_text(path)
+        .map_err(|why| Problems::from(format!("{}: {why}", path.display())))?;
+    let segments = first_path(&text).and_then(|data| segments(&data, scale));
+    segments.map_err(|fault| Problems::from(format!("{}: {fault}", path.display())))
+}
+
+/// Reason why a drawing cannot be read.
+#[derive(Debug, thiserror::Error)]
+enum Fault {
+    #[error("not well-formed: {0}.")]
+    Malformed(#[from] roxmltree::Error),
+    #[error("the element `{0}` has a transform; apply it in the drawing.")]
+    Transform(String),
+    #[error("contains no path.")]
+    NoPath,
+    #[error("the path is not valid: {0}.")]
+    Path(#[from] svgtypes::Error),
+    #[error("the path has several parts; one is needed.")]
+    Parts,
+    #[error("an arc has rotated axes; draw it as a curve.")]
+    Rotated,
 }
 
 /// Returns the `d` of the first path.
-fn first_path(text: &str) -> Result<String, String> {
+fn first_path(text: &str) -> Result<String, Fault> {
     // drawing programs write SVG's document type
     let options = roxmltree::ParsingOptions { allow_dtd: true, ..Default::default() };
-    let drawing = roxmltree::Document::parse_with_options(text, options)
-        .map_err(|error| format!("not well-formed: {error}."))?;
+    let drawing = roxmltree::Document::parse_with_options(text, options)?;
     for element in drawing.descendants().filter(roxmltree::Node::is_element) {
         let name = element.tag_name().name();
         if element.has_attribute("transform") {
-            return Err(format!("the element `{name}` has a transform; apply it in the drawing."));
+            return Err(Fault::Transform(name.into()));
         }
         if let ("path", Some(data)) = (name, element.attribute("d")) {
             return Ok(data.into());
         }
     }
-    Err("contains no path.".to_string())
+    Err(Fault::NoPath)
 }
 
-fn segments(data: &str, scale: f64) -> Result<Vec<Segment>, String> {
+fn segments(data: &str, scale: f64) -> Result<Vec<Segment>, Fault> {
     let mut segments: Vec<Segment> = Vec::new();
     // in the drawing's own coordinates
     let (mut here, mut start) = ([0.0, 0.0], [0.0, 0.0]);
     let mut control: Option<(Point, bool)> = None; // last control point, of a cubic
     let place = |p: Point| [scale * p[0], -scale * p[1]];
     for part in PathParser::from(data) {
-        let part = part.map_err(|error| format!("the path is not valid: {error}."))?;
+        let part = part?;
         let to = |abs: bool, x: f64, y: f64| if abs { [x, y] } else { [here[0] + x, here[1] + y] };
         // the last control point mirrored, for smooth curves
         let mirrored = |cubic: bool| match control {
@@ -55,7 +71,7 @@ fn segments(data: &str, scale: f64) -> Result<Vec<Segment>, String> {
         let end = match part {
             PathSegment::MoveTo { abs, x, y } => {
                 if !segments.is_empty() {
-                    return Err("the path has several parts; one is needed.".to_string());
+                    return Err(Fault::Parts);
                 }
                 start = to(abs, x, y);
                 here = start;
@@ -91,7 +107,7 @@ fn segments(data: &str, scale: f64) -> Result<Vec<Segment>, String> {
             }
             PathSegment::EllipticalArc { abs, rx, ry, x_axis_rotation, large_arc, sweep, x, y } => {
                 if x_axis_rotation != 0.0 && rx != ry {
-                    return Err("an arc has rotated axes; draw it as a curve.".to_string());
+                    return Err(Fault::Rotated);
                 }
                 let d = to(abs, x, y);
                 // y is mirrored, and so is the sense of rotation

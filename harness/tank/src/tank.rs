@@ -199,16 +199,17 @@ pub enum Fill {
     Mass(f64),
 }
 
+/// A text that is no [`Fill`].
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("`{0}` is neither a height in m (1.2) nor per cent of the volume (60%)")]
+pub struct NotAFill(String);
+
 /// Parses a height in m, or per cent of the volume: `1.2`, `60%`.
 impl core::str::FromStr for Fill {
-    type Err = String;
+    type Err = NotAFill;
 
-    fn from_str(text: &str) -> Result<Fill, String> {
-        let number = |text: &str| {
-            text.trim().parse().map_err(|_| {
-                format!("`{text}` is neither a height in m (1.2) nor per cent of the volume (60%)")
-            })
-        };
+    fn from_str(text: &str) -> Result<Fill, NotAFill> {
+        let number = |text: &str| text.trim().parse().map_err(|_| NotAFill(text.into()));
         match text.trim().strip_suffix('%') {
             Some(percent) => Ok(Fill::Share(number(percent)? / 100.0)),
             None => Ok(Fill::Height(number(text)?)),

@@ -210,7 +210,7 @@ pub fn name(binaries: &Binaries, findings: &mut Findings) {
 fn each(
     binaries: &Binaries,
     findings: &mut Findings,
-    look: impl Fn(&str, Option<Kind>, Result<Binary, String>, &mut Findings),
+    look: impl Fn(&str, Option<Kind>, anyhow::Result<Binary>, &mut Findings),
 ) {
     let placed = binaries.placed();
     if placed.is_empty() {
@@ -218,14 +218,14 @@ fn each(
     }
     for (name, _, kind) in placed {
         let bytes = binaries.archive.file(name).unwrap_or_default();
-        look(name, kind, Binary::read(bytes).map_err(|error| format!("{error:#}")), findings);
+        look(name, kind, Binary::read(bytes), findings);
     }
 }
 
 pub fn format(binaries: &Binaries, findings: &mut Findings) {
     each(binaries, findings, |name, kind, binary, findings| match (kind, binary) {
         (None, _) => {}
-        (Some(_), Err(why)) => findings.add(name, why),
+        (Some(_), Err(why)) => findings.add(name, format!("{why:#}")),
         (Some(kind), Ok(binary)) if binary.kind != kind => {
             findings.add(name, format!("it is for {} (allowed: {kind})", binary.kind));
         }

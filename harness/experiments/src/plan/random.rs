@@ -1,5 +1,5 @@
 use analysis::random::Random;
-use anyhow::{Result, bail};
+use anyhow::{Result, bail, ensure};
 use host::description::{ModelDescription, Type, Variable};
 
 use super::Named;
@@ -78,17 +78,9 @@ impl Family {
     ];
 
     /// Returns the distribution with these parameters and bounds, or the violated condition.
-    pub fn distribution(
-        &self,
-        [a, b]: [f64; 2],
-        (min, max): (f64, f64),
-    ) -> Result<Distribution, &'static str> {
-        if !(self.makes_sense)(a, b) {
-            return Err(self.rule);
-        }
-        if min >= max {
-            return Err("min must be less than max");
-        }
+    pub fn distribution(&self, [a, b]: [f64; 2], (min, max): (f64, f64)) -> Result<Distribution> {
+        ensure!((self.makes_sense)(a, b), "{}", self.rule);
+        ensure!(min < max, "min must be less than max");
         Ok(Distribution { kind: (self.kind)(a, b), min, max })
     }
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::convert::Infallible;
 use std::path::Path;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use maud::{Markup, PreEscaped, html};
 use pulldown_cmark::{CowStr, Event, Options, Parser, Tag, TagEnd};
 use pulldown_latex::config::{DisplayMode, RenderConfig};
@@ -118,7 +118,7 @@ impl Page {
                         return Some(Event::Start(Tag::Link { link_type, dest_url, title, id }));
                     }
                     Ok(None) => {}
-                    Err(fault) => all.faults.push(fault),
+                    Err(fault) => all.faults.push(fault.to_string()),
                 }
                 dropped = true;
                 None
@@ -153,11 +153,11 @@ impl Page {
 
     /// Returns the target of a link, or `None` if it leads out of the documentation. The inner error is a
     /// broken link.
-    fn target(&self, root: &Path, pages: &[Page], link: &str) -> Result<Option<String>, String> {
+    fn target(&self, root: &Path, pages: &[Page], link: &str) -> Result<Option<String>> {
         if link.contains("://") {
             return Ok(None);
         }
-        let dead = || format!("{}: the link {link} leads nowhere", self.path);
+        let dead = || anyhow!("{}: the link {link} leads nowhere", self.path);
         let (file, slug) = link.split_once('#').unwrap_or((link, ""));
         let path = if file.is_empty() { self.path.clone() } else { resolve(&self.path, file) };
         let Some(page) = pages.iter().find(|page| page.path == path) else {

@@ -13,7 +13,7 @@ use csv::ByteRecord;
 use files::{budget, input};
 
 use super::Header;
-use super::time::{Moment, Times, moment};
+use super::time::{self, Moment, Times, moment};
 use crate::parquet_file::Found;
 
 /// Number of lines from which separator and header are detected.
@@ -28,6 +28,33 @@ const COMMENTS: [&str; 3] = ["#", "%", "//"];
 /// Words for missing values, including those that C libraries and spreadsheets print for NaN.
 const MISSING: &str = "nan na n/a #n/a null none - -- nat -nan nan(ind) -nan(ind) 1.#qnan -1.#qnan 1.#ind -1.#ind #nv #div/0!";
 
+/// Reason why a field is not read, to stand after the field.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+enum Unreadable {
+    #[error(
+        "is read with a decimal {}, the lines above with a decimal {} (allowed: one of them in a file, and no separators of thousands)",
+        name(*.sign), name(*.before)
+    )]
+    Decimal { sign: char, before: char },
+    #[error(
+        "may be {whole}{rest} or {whole}.{rest} (allowed: numbers without separators of thousands, decimal points)"
+    )]
+    Thousands { whole: String, rest: String },
+    #[error(transparent)]
+    Time(#[from] time::Unreadable),
+    #[error("is a date or a clock time, where the lines above have numbers")]
+    TimeAmongNumbers,
+    #[error("is not a Boolean (allowed: true, false, 1, 0)")]
+    Boolean,
+    #[error("is not a number")]
+    Number,
+}
+
+/// Name of a decimal sign.
+fn name(sign: char) -> &'static str {
+    if sign == ',' { "comma" } else { "point" }
+}
+
 /// Value of a field.
 #[derive(Clone, Debug, PartialEq)]
 enum Value {
@@ -35,7 +62,7 @@ enum Value {
     Time(Moment),
     Missing,
     /// A number or a time that can be read in two ways, or in none; the field is the reason.
-    Ambiguous(String),
+    Ambiguous(Unreadable),
     Other,
 }
 
@@ -57,7 +84,7 @@ impl Value {
             Ok(None) => match moment(field) {
                 Ok(Some(moment)) => Value::Time(moment),
                 Ok(None) => Value::Other,
-                Err(reason) => Value::Ambiguous(reason),
+                Err(reason) => Value::Ambiguous(reason.into()),
             },
             Err(reason) => Value::Ambiguous(reason),
         }
@@ -69,7 +96,11 @@ impl Value {
 /// # Errors
 ///
 /// If it can be read in two ways, or has another decimal sign than the fields before.
-fn number(field: &str, separator: u8, decimal: &mut Option<char>) -> Result<Option<f64>, String> {
+fn number(
+    field: &str,
+    separator: u8,
+    decimal: &mut Option<char>,
+) -> Result<Option<f64>, Unreadable> {
     if !field.contains(|c: char| c.is_ascii_digit()) {
         return Ok(None);
     }
@@ -79,32 +110,25 @@ fn number(field: &str, separator: u8, decimal: &mut Option<char>) -> Result<Opti
     if let (Some(sign), Some(before)) = (sign, *decimal)
         && sign != before
     {
-        let name = |sign| if sign == ',' { "comma" } else { "point" };
-        return Err(format!(
-            "is read with a decimal {}, the lines above with a decimal {} (allowed: one of them in a file, and no separators of thousands)",
-            name(sign),
-            name(before)
-        ));
+        return Err(Unreadable::Decimal { sign, before });
     }
     // Quotes around a field with a comma show that the comma is not the separator: "1,234".
     if let (b',', Some((whole, rest)), None) = (separator, text.split_once(','), *decimal)
         && rest.len() == 3
         && (1..4).contains(&whole.trim_start_matches(['-', '+']).len())
     {
-        return Err(format!(
-            "may be {whole}{rest} or {whole}.{rest} (allowed: numbers without separators of thousands, decimal points)"
-        ));
+        return Err(Unreadable::Thousands { whole: whole.into(), rest: rest.into() });
     }
     *decimal = decimal.or(sign);
     Ok(value.is_finite().then_some(value))
 }
 
 /// Parses a Boolean as 1 or 0.
-fn truth(field: &str) -> Result<f64, String> {
+fn truth(field: &str) -> Result<f64, Unreadable> {
     match field.to_ascii_lowercase().as_str() {
         "true" => Ok(1.0),
         "false" => Ok(0.0),
-        _ => Err("is not a Boolean (allowed: true, false, 1, 0)".into()),
+        _ => Err(Unreadable::Boolean),
     }
 }
 
@@ -414,14 +438,12 @@ impl Layout {
                     Value::Number(number) if !is_time || stamps.is_empty() => Ok(number),
                     Value::Missing => Ok(f64::NAN),
                     Value::Time(moment) if is_time && (begins || !stamps.is_empty()) => {
-                        stamps.seconds(moment, field)
+                        stamps.seconds(moment, field).map_err(Unreadable::from)
                     }
-                    Value::Time(_) if is_time => {
-                        Err("is a date or a clock time, where the lines above have numbers".into())
-                    }
+                    Value::Time(_) if is_time => Err(Unreadable::TimeAmongNumbers),
                     Value::Other if booleans[k] => truth(field),
                     Value::Ambiguous(reason) => Err(reason),
-                    _ => Err("is not a number".into()),
+                    _ => Err(Unreadable::Number),
                 };
                 columns[k].push(parsed.unwrap_or_else(|reason| {
                     let field: String = field.chars().take(40).collect();

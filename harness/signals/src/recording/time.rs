@@ -11,6 +11,40 @@ use chrono::{DateTime, Datelike as _, NaiveDate, NaiveTime, Timelike as _};
 const SECOND: i64 = 1_000_000_000;
 const DAY: i64 = 86_400 * SECOND;
 
+/// Reason why a field is not read as a time, to stand after the field.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Unreadable {
+    #[error("has no date: there is no day {day} of month {month} in {year}")]
+    Day { day: u32, month: u32, year: i32 },
+    #[error("has no month: neither {0} nor {1} is one")]
+    Month(u32, u32),
+    #[error(
+        "ends in \"{0}\", which is no offset from UTC (allowed: Z, UTC, +01:00, +0100, AM, PM)"
+    )]
+    Offset(String),
+    #[error(
+        "is no time of day (allowed: hours, minutes and seconds: 0:00:00 to 23:59:59.999, 12:00:00 AM to 11:59:59 PM, and 3, 6 or \
+         9 digits after a fourth colon; in Excel the format hh:mm:ss.000; durations in seconds)"
+    )]
+    Clock,
+    #[error("has day and month in another order than the lines above")]
+    OtherOrder,
+    #[error(
+        "has another date than the lines above, in an order that two digits of the year do not show (allowed: years of four digits)"
+    )]
+    ShortYear,
+    #[error(
+        "may have the day first or the month, and no date of the file shows which (allowed: 2026-01-31 or 31.01.2026)"
+    )]
+    UnknownOrder,
+    #[error("is a date, where the lines above have none")]
+    DateAmongClocks,
+    #[error("is a clock time, where the lines above have dates")]
+    ClockAmongDates,
+    #[error("is a date in another form than those above")]
+    OtherForm,
+}
+
 /// A date, or a clock time without one.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Moment {
@@ -34,17 +68,16 @@ pub struct Ordered {
 
 impl Ordered {
     /// Returns the date in days since 1970; `day_first` says which of the two numbers is the day.
-    fn day(self, day_first: bool) -> Result<i64, String> {
+    fn day(self, day_first: bool) -> Result<i64, Unreadable> {
         let Ordered { first, second, year, .. } = self;
         let (day, month) = if day_first { (first, second) } else { (second, first) };
         days(year, month, day)
     }
 }
 
-fn days(year: i32, month: u32, day: u32) -> Result<i64, String> {
+fn days(year: i32, month: u32, day: u32) -> Result<i64, Unreadable> {
     let date = NaiveDate::from_ymd_opt(year, month, day);
-    let date =
-        date.ok_or(format!("has no date: there is no day {day} of month {month} in {year}"))?;
+    let date = date.ok_or(Unreadable::Day { day, month, year })?;
     Ok(i64::from(date.num_days_from_ce()) - 719_163) // 1 January 1970
 }
 
@@ -59,7 +92,7 @@ const WEEKDAYS: [&str; 7] = ["mon", "tue", "wed", "thu", "fri", "sat", "sun"];
 ///
 /// If it is one that cannot be read, or that can be read in two ways. The error is the reason, worded to
 /// follow the field.
-pub fn moment(field: &str) -> Result<Option<Moment>, String> {
+pub fn moment(field: &str) -> Result<Option<Moment>, Unreadable> {
     if field.len() < 4
         || field.len() > 60
         || !field.starts_with(|c: char| c.is_ascii_alphanumeric())
@@ -109,7 +142,7 @@ pub fn moment(field: &str) -> Result<Option<Moment>, String> {
 }
 
 /// Parses ISO 8601 without separators, such as 20260131T120000.020.
-fn basic(field: &str) -> Result<Option<Moment>, String> {
+fn basic(field: &str) -> Result<Option<Moment>, Unreadable> {
     let Some((day, clock)) = field.split_once(['T', ' ', '_']) else { return Ok(None) };
     let is_number = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
     let clock = clock.strip_suffix('Z').unwrap_or(clock);
@@ -126,7 +159,7 @@ fn basic(field: &str) -> Result<Option<Moment>, String> {
 }
 
 /// Splits a clock time into the time with its half of the day (am, pm) and the offset from UTC, ns.
-fn zoned(clock: &str) -> Result<Option<(String, i64)>, String> {
+fn zoned(clock: &str) -> Result<Option<(String, i64)>, Unreadable> {
     let end = clock.find(|c: char| !matches!(c, '0'..='9' | ':' | '.')).unwrap_or(clock.len());
     let (time, rest) = clock.split_at(end);
     let is_zone = |c: char| c.is_alphanumeric() || matches!(c, '+' | '-' | '−' | ':' | '.' | ' ');
@@ -147,10 +180,7 @@ fn zoned(clock: &str) -> Result<Option<(String, i64)>, String> {
         ("" | "z", _) => 0,
         (_, Ok(offset)) => i64::from(offset.offset().local_minus_utc()),
         _ => {
-            let rest = rest.trim();
-            return Err(format!(
-                "ends in \"{rest}\", which is no offset from UTC (allowed: Z, UTC, +01:00, +0100, AM, PM)"
-            ));
+            return Err(Unreadable::Offset(rest.trim().into()));
         }
     };
     Ok(Some((format!("{time}{half}"), offset * SECOND)))
@@ -158,7 +188,7 @@ fn zoned(clock: &str) -> Result<Option<(String, i64)>, String> {
 
 /// Parses a clock time to nanoseconds since midnight: `12:00:00.020`, `12:00:00:020`, `12:00:00.020pm` and,
 /// next to a date, `12:00`.
-fn clock_time(text: &str, has_date: bool) -> Result<Option<i64>, String> {
+fn clock_time(text: &str, has_date: bool) -> Result<Option<i64>, Unreadable> {
     let mut text = text.to_string();
     // Three, six or nine digits after a third colon are milli-, micro- or nanoseconds; two would be frames
     // of a film.
@@ -179,11 +209,7 @@ fn clock_time(text: &str, has_date: bool) -> Result<Option<i64>, String> {
             let seconds = i64::from(time.num_seconds_from_midnight());
             Ok(Some(seconds * SECOND + i64::from(time.nanosecond())))
         }
-        _ => Err(
-            "is no time of day (allowed: hours, minutes and seconds: 0:00:00 to 23:59:59.999, 12:00:00 AM to 11:59:59 PM, and 3, 6 or \
-             9 digits after a fourth colon; in Excel the format hh:mm:ss.000; durations in seconds)"
-                .into(),
-        ),
+        _ => Err(Unreadable::Clock),
     }
 }
 
@@ -194,7 +220,7 @@ enum Day {
     Either(Ordered),
 }
 
-fn date(text: &str) -> Result<Option<Day>, String> {
+fn date(text: &str) -> Result<Option<Day>, Unreadable> {
     let signs = [' ', '-', '/', '.', ','];
     let mut parts: Vec<&str> = text.split(signs).filter(|part| !part.is_empty()).collect();
     let starts = |part: &str, names: &[&str]| {
@@ -238,7 +264,7 @@ fn date(text: &str) -> Result<Option<Day>, String> {
                     return Ok(None);
                 };
                 if first.min(second) > 12 || first.max(second) > 31 || first.min(second) == 0 {
-                    return Err(format!("has no month: neither {first} nor {second} is one"));
+                    return Err(Unreadable::Month(first, second));
                 }
                 Ok(Some(Day::Either(Ordered { first, second, year, is_short: c.len() == 2 })))
             }
@@ -269,13 +295,13 @@ impl Times {
     /// # Errors
     ///
     /// If the time is of another kind than the first, or its date can be read in two ways.
-    pub fn seconds(&mut self, moment: Moment, field: &str) -> Result<f64, String> {
+    pub fn seconds(&mut self, moment: Moment, field: &str) -> Result<f64, Unreadable> {
         if let Moment::Ordered(Ordered { first, second, .. }, _) = moment
             && first.max(second) > 12
         {
             let day_first = first > 12;
             if *self.day_first.get_or_insert(day_first) != day_first {
-                return Err("has day and month in another order than the lines above".into());
+                return Err(Unreadable::OtherOrder);
             }
         }
         let (first, _) = self.first.get_or_insert_with(|| {
@@ -296,28 +322,17 @@ impl Times {
                 let days = if *day == other {
                     0
                 } else if day.is_short || other.is_short {
-                    return Err(
-                        "has another date than the lines above, in an order that two digits of the year do not show (allowed: years of \
-                         four digits)"
-                            .into(),
-                    );
+                    return Err(Unreadable::ShortYear);
                 } else if let Some(day_first) = self.day_first {
                     other.day(day_first)? - day.day(day_first)?
                 } else {
-                    return Err(
-                        "may have the day first or the month, and no date of the file shows which (allowed: 2026-01-31 or 31.01.2026)"
-                            .into(),
-                    );
+                    return Err(Unreadable::UnknownOrder);
                 };
                 i128::from(days) * i128::from(DAY) + i128::from(to - from)
             }
-            (Moment::Clock(_), _) => {
-                return Err("is a date, where the lines above have none".into());
-            }
-            (_, Moment::Clock(_)) => {
-                return Err("is a clock time, where the lines above have dates".into());
-            }
-            _ => return Err("is a date in another form than those above".into()),
+            (Moment::Clock(_), _) => return Err(Unreadable::DateAmongClocks),
+            (_, Moment::Clock(_)) => return Err(Unreadable::ClockAmongDates),
+            _ => return Err(Unreadable::OtherForm),
         };
         Ok(elapsed as f64 * 1e-9)
     }
@@ -336,13 +351,13 @@ mod tests {
     use super::*;
 
     /// Seconds from the first to each field.
-    fn column(fields: &[&str]) -> Result<Vec<f64>, String> {
+    fn column(fields: &[&str]) -> anyhow::Result<Vec<f64>> {
         let mut times = Times::default();
         fields
             .iter()
             .map(|field| match moment(field)? {
-                Some(moment) => times.seconds(moment, field),
-                None => Err("is not a time".into()),
+                Some(moment) => Ok(times.seconds(moment, field)?),
+                None => anyhow::bail!("is not a time"),
             })
             .collect()
     }

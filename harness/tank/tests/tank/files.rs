@@ -312,7 +312,7 @@ fn per_cent_of_the_volume_and_a_mass_are_the_heights_that_hold_them() {
     }
     assert_eq!("60%".parse(), Ok(Fill::Share(0.6)));
     assert_eq!("1.2".parse(), Ok(Fill::Height(1.2)));
-    assert!("1.2 m".parse::<Fill>().unwrap_err().contains("neither a height in m"));
+    assert!("1.2 m".parse::<Fill>().unwrap_err().to_string().contains("neither a height in m"));
 }
 
 /// Heights of a shape count from its lowest point, of a contour from the zero of its drawing. The test compares the
