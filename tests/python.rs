@@ -46,9 +46,9 @@ fn of_the_package() -> Command {
 
 #[test]
 fn fmpy_drives_the_fmu_as_the_harness_does() {
-    let both = Fmi::RELEASED
+    let fmus = Fmi::ALL
         .map(|fmi| MODELS.each_ref().map(|model| pack::packed_version_for_tests(model, fmi)));
-    let wheel = pack::wheel::for_tests(both.as_flattened());
+    let wheel = pack::wheel::for_tests(fmus.as_flattened());
     let tests = pack::root().join("harness/python");
     let mut command = of_the_package();
     command.args([Path::new("--wheel"), &wheel]).arg(&tests);

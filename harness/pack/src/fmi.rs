@@ -12,10 +12,8 @@ pub enum Fmi {
 }
 
 impl Fmi {
+    /// All kinds; releases and wheels contain each.
     pub const ALL: [Fmi; 3] = [Fmi::V2, Fmi::V3, Fmi::V3Arrays];
-
-    /// Kinds of FMU in releases and wheels.
-    pub const RELEASED: [Fmi; 2] = [Fmi::V2, Fmi::V3];
 
     /// Returns the folders under `binaries/` for a platform that is given by its folder in FMI 2.0. For a
     /// universal binary of macOS FMI 3.0 has two folders.

@@ -45,7 +45,7 @@ pub fn model(name: &str) -> Result<&'static Model> {
     })
 }
 
-/// Finds an FMU by its file name: `Spacecraft`, or `Spacecraft-fmi3` for FMI 3.0.
+/// Finds an FMU by its file name: `Spacecraft`, or `Spacecraft-fmi3` and `Spacecraft-fmi3-arrays` for FMI 3.0.
 pub fn named(name: &str) -> Option<(Model, Fmi)> {
     let fmi = Fmi::ALL.into_iter().rev().find(|fmi| name.ends_with(fmi.suffix()))?;
     let model = model(name.strip_suffix(fmi.suffix())?).ok()?;

@@ -1,4 +1,4 @@
-//! Makes the files of a release: each FMU for all platforms, in both versions of FMI, with its SBOM and the
+//! Makes the files of a release: each FMU for all platforms, of every kind ([`Fmi::ALL`]), with its SBOM and the
 //! report of its check; then the wheels' SBOM and the wheel for Linux. [`MANIFEST`] lists the SHA-256 of all
 //! files, [`PRESENT`] that of the files in the folder.
 
@@ -37,7 +37,7 @@ pub fn read(fmu: &Path, name: &str) -> Result<Vec<u8>> {
 }
 
 /// Returns the path of an FMU of the present version in `folder`: `NAME-VERSION.fmu`, for FMI 3.0
-/// `NAME-VERSION-fmi3.fmu`.
+/// `NAME-VERSION-fmi3.fmu` and `NAME-VERSION-fmi3-arrays.fmu`.
 pub fn path(model: &Model, fmi: Fmi, folder: &Path) -> PathBuf {
     fmi.path(folder, &format!("{}-{}", model.name, env!("CARGO_PKG_VERSION")))
 }
@@ -56,7 +56,7 @@ pub fn write(
         eprintln!("{}: {}", built.folder, built.binary);
     }
     let mut files = Vec::new();
-    for fmi in Fmi::RELEASED {
+    for fmi in Fmi::ALL {
         let fmu = path(model, fmi, folder);
         for (ending, bytes) in version_files(model, fmi, &all, &check)? {
             files.push((file_name(&fmu.with_extension(ending)), bytes));

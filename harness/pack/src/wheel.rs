@@ -1,4 +1,4 @@
-//! Builds the wheels of the Python package `hubslosh`, one for each platform, with the FMUs of both versions
+//! Builds the wheels of the Python package `hubslosh`, one for each platform, with the FMUs of all versions
 //! of FMI and the command `hubslosh` (packaging.python.org, "Binary distribution format"). The same files
 //! give the same bytes.
 //!
@@ -98,7 +98,7 @@ fn native() -> Result<Binaries> {
     let mut fmus = Files::new();
     let mut all = Vec::new();
     for model in MODELS {
-        for fmi in Fmi::RELEASED {
+        for fmi in Fmi::ALL {
             let fmu = fmi.path(made.path(), model.name);
             pack(&model, fmi, &fmu)?;
             fmus.push((file_name(&fmu), read(&fmu)?));
@@ -158,7 +158,7 @@ fn cross_one(
     for model in MODELS {
         let bytes = built(&Product::Fmu(&model))?;
         let binary = [Packed { folder: platform.folder, ending: platform.ending, bytes }];
-        for fmi in Fmi::RELEASED {
+        for fmi in Fmi::ALL {
             let fmu = fmi.path(made.path(), model.name);
             archive::write_small(&files_of_fmu(&model, fmi, &binary)?, &fmu)?;
             fmus.push((file_name(&fmu), archive::read(&fmu)?));

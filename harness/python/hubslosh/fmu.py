@@ -68,7 +68,8 @@ def fmu_path(model: str | Path) -> Path:
     """Return the file of an FMU by its name, for other simulators and tools.
 
     This package contains ``HubSlosh``, ``SloshTank`` and ``Spacecraft``, each for FMI 2.0 and,
-    with ``-fmi3`` at the end of its name, for FMI 3.0.
+    with ``-fmi3`` at the end of its name, for FMI 3.0. In ``-fmi3-arrays`` each vector and matrix
+    is one variable.
 
     Parameters
     ----------
@@ -109,10 +110,11 @@ def fmu_path(model: str | Path) -> Path:
             return path
     names = sorted({path.stem for folder in folders for path in folder.glob("*.fmu")})
     there = f'there is no FMU "{model}" here (there are: {", ".join(names) or "none"})'
-    if own := re.fullmatch(r"(HubSlosh|SloshTank|Spacecraft)(-fmi3)?", model):
+    if own := re.fullmatch(r"(HubSlosh|SloshTank|Spacecraft)(-fmi3)?(-arrays)?", model):
         raise FmuError(
             f"{there}; in the project's source, with Rust, this makes it: "
             f"cargo run --release -- pack --model {own[1]}{' --fmi 3' if own[2] else ''}"
+            f"{' --arrays' if own[3] else ''}"
         )
     raise FmuError(f"{there}{did_you_mean(model, names)}; for another FMU give its file, ….fmu")
 

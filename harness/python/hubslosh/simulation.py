@@ -338,7 +338,12 @@ def check_parameters(
         except FmuError as error:
             problems.append(str(error))
             continue
-        if variable.causality not in ("parameter", "input") or variable.variability == "constant":
+        if variable.causality == "structuralParameter":
+            problems.append(
+                f"{name} sizes arrays, which this package leaves as declared; take the FMU without "
+                f"-arrays in its name, or hubslosh run --set {name}={value}"
+            )
+        elif variable.causality not in ("parameter", "input") or variable.variability == "constant":
             problems.append(
                 f"{name} is computed by the FMU ({variable.causality}); it cannot be set"
             )

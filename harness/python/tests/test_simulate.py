@@ -257,3 +257,5 @@ def test_an_fmu_that_is_not_in_the_package_is_refused_with_the_way_to_it(
         hubslosh.fmu_path("Hubslosh")
     with pytest.raises(FmuError, match=r"pack --model SloshTank --fmi 3$"):
         hubslosh.fmu_path("SloshTank-fmi3")
+    with pytest.raises(FmuError, match=r"pack --model SloshTank --fmi 3 --arrays$"):
+        hubslosh.fmu_path("SloshTank-fmi3-arrays")

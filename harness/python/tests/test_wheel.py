@@ -64,7 +64,7 @@ def test_the_record_has_every_file_and_its_hash(wheel: Path) -> None:
             digest = base64.urlsafe_b64encode(hashlib.sha256(data).digest()).decode().rstrip("=")
             assert (hashed, int(size)) == (f"sha256={digest}", len(data)), name
     assert rows[-1] == [record, "", ""]
-    models = [f"{model}{fmi}" for model in MODELS for fmi in ("", "-fmi3")]
+    models = [f"{model}{fmi}" for model in MODELS for fmi in ("", "-fmi3", "-fmi3-arrays")]
     fmus = {f"hubslosh/fmus/{model}.fmu" for model in models}
     assert {"hubslosh/py.typed", *fmus} <= set(names)
     examples = {name for name in names if name.startswith("hubslosh/examples/")}
@@ -77,15 +77,18 @@ def test_the_fmus_of_fmi_3_are_found_by_name(installed: Path, tmp_path: Path) ->
     program = """
 from hubslosh import simulate
 for model in ("HubSlosh", "Spacecraft", "SloshTank"):
-    two, three = (simulate(model + fmi, stop=0.1) for fmi in ("", "-fmi3"))
+    two, three, arrays = (simulate(model + fmi, stop=0.1) for fmi in ("", "-fmi3", "-fmi3-arrays"))
     assert two.equals(three), model
-    print(three.attrs["model"])
+    shared = [name for name in two if name in arrays]
+    assert len(shared) > 10 and two[shared].equals(arrays[shared]), model
+    print(three.attrs["model"], arrays.attrs["model"])
 """
     done = subprocess.run(
         [installed, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
-    assert done.stdout.split() == [f"{model}-fmi3" for model in MODELS]
+    every = [f"{model}{fmi}" for model in MODELS for fmi in ("-fmi3", "-fmi3-arrays")]
+    assert done.stdout.split() == every
 
 
 def test_the_tag_is_of_this_machine_alone(wheel: Path) -> None:

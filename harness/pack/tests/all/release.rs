@@ -14,7 +14,7 @@ use pack::{Fmi, MODELS, Model, release};
 /// then those of an older version must be there.
 fn released() -> Vec<(&'static Model, Fmi, PathBuf)> {
     let folder = pack::root().join("dist").join("release");
-    let of = |model| Fmi::RELEASED.map(|fmi| (model, fmi, release::path(model, fmi, &folder)));
+    let of = |model| Fmi::ALL.map(|fmi| (model, fmi, release::path(model, fmi, &folder)));
     let fmus: Vec<_> = MODELS.iter().flat_map(of).collect();
     let missing: Vec<_> = fmus.iter().filter(|(.., fmu)| !fmu.exists()).collect();
     if missing.len() < fmus.len() {
