@@ -410,7 +410,7 @@ mod tests {
             (&["ab:cd"], "is not a time"),
         ] {
             let error = column(fields).unwrap_err();
-            assert!(error.contains(words), "{fields:?}: {error}");
+            assert!(error.to_string().contains(words), "{fields:?}: {error}");
         }
     }
 }
