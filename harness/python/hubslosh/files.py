@@ -4,7 +4,7 @@ import os
 import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 from . import temporary
 from .fmu import FmuError
@@ -14,7 +14,14 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from .linearization import LinearModel
-    from .uncertainty import UncertainModel
+
+
+@runtime_checkable
+class AsDict(Protocol):
+    """A model that returns its content by name, such as an `UncertainModel`."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return numbers, arrays, names and texts by name."""
 
 
 def _check_table(table: Any, path: Any, ending: str) -> Path:
@@ -105,7 +112,7 @@ def to_parquet(table: "pd.DataFrame", path: str | Path) -> None:
 
 
 def to_mat(
-    table: "pd.DataFrame | LinearModel | Sequence[LinearModel] | UncertainModel | Mapping",
+    table: "pd.DataFrame | LinearModel | Sequence[LinearModel] | AsDict | Mapping",
     path: str | Path,
 ) -> None:
     """Write a table or a model as .mat (version 5) for MATLAB and Octave.
@@ -143,11 +150,10 @@ def to_mat(
     True
     """
     from .linearization import LinearModel
-    from .uncertainty import UncertainModel
 
     if isinstance(table, LinearModel):
         arrays = _family([table])
-    elif isinstance(table, UncertainModel):
+    elif isinstance(table, AsDict):
         arrays = _in_mat(table.as_dict())
     elif isinstance(table, Mapping):
         if all(isinstance(model, LinearModel) for model in table.values()):

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from .arguments import MOST_FILLS, MOST_WORK, check_ranges
 from .files import write_file
@@ -21,17 +20,16 @@ from .linearization import LinearModel, linearize
 from .loop import Loop
 from .operating_point import rotation
 from .quantities import DELAY, ModeQuantity, Modes, full_name, mode_quantity, moves_the_bob
+from .review_point import Point, Vector
 from .sampling import draw
 from .short import ShortTable
 from .stabilisation import resonances
-from .stability import Margins, _largest, margins_and_gain
+from .stability import margins_and_gain
 from .suggestion import Suggestion, suggest
 from .worst_case import Confirmation, confirm, search
 
 if TYPE_CHECKING:
     from .craft import Craft, Fill
-
-Vector = NDArray[np.float64]
 
 OF_A_MODE = re.compile(r"tank\[\d\]\.(mass|length|hinge|k|zeta|wave)\[\d\]$")
 """Parameters that a tank without this mode does not have."""
@@ -58,33 +56,6 @@ class Uncertain:
             name: nominal + abs(share) * ((high if share > 0 else low) - nominal)
             for name, (low, nominal, high) in self.ends[fill].items()
         }
-
-
-@dataclass(frozen=True, eq=False)
-class Point:
-    """A point of the review that was evaluated."""
-
-    fill: int
-    """Index of the fill."""
-    shares: Vector
-    """Position of each uncertain quantity: -1 low end, 0 nominal, 1 high end."""
-    loop: Loop
-    """Loop at this point, its thrust through the centre of mass."""
-    margins: Margins
-    """Margins of the loop."""
-    gain: LinearModel
-    """Sampled loop gain."""
-
-    @property
-    def growth(self) -> float:
-        """Growth rate of the closed loop's least stable pole, 1/s."""
-        size = _largest(self.margins.poles, self.gain.period)
-        return float(np.log(size) / self.loop.period)
-
-    @property
-    def distance(self) -> float:
-        """Modulus margin of a stable loop; otherwise minus the growth rate, 1/s."""
-        return self.margins.modulus_margin if self.margins.stable else -self.growth
 
 
 @dataclass(frozen=True, eq=False, repr=False)

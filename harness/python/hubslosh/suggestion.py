@@ -13,7 +13,7 @@ from .loop import _tustin
 from .stability import LIGHT, _closed, _compiled, _largest
 
 if TYPE_CHECKING:
-    from .review import Point
+    from .review_point import Point
 
 DEAREST = 15.0
 """Largest loss of phase at the rigid crossover that a suggestion may cost, deg."""

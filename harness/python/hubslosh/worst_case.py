@@ -13,7 +13,7 @@ from .linearization import LinearModel
 from .stability import _closed
 
 if TYPE_CHECKING:
-    from .review import Point
+    from .review_point import Point
 
 Vector = NDArray[np.float64]
 Evaluate = Callable[[Iterable[tuple[int, Vector]]], "list[Point]"]

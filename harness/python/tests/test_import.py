@@ -57,6 +57,34 @@ def test_what_comes_on_first_use_is_what_type_checkers_see() -> None:
     assert isinstance(hubslosh.__version__, str)
 
 
+def imports(path: Path) -> set[str]:
+    """Return the modules of the package that a module imports, those of functions too.
+
+    Imports for type checkers are left out: no program runs them.
+    """
+    tree = ast.parse(path.read_text())
+    typing = [
+        inner
+        for node in ast.walk(tree)
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
+        for inner in ast.walk(node)
+    ]
+    found = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.level == 1 and node not in typing:
+            found |= {node.module} if node.module else {alias.name for alias in node.names}
+    return found
+
+
+def test_modules_import_each_other_one_way() -> None:
+    """A module that is left when those are gone that import no other one is in a circle."""
+    files = Path(hubslosh.__file__).parent.glob("*.py")
+    left = {file.stem: imports(file) for file in files if file.stem != "__init__"}
+    while free := {name for name, used in left.items() if not used & left.keys()}:
+        left = {name: used for name, used in left.items() if name not in free}
+    assert not left
+
+
 def test_every_name_is_in_the_books_reference() -> None:
     """``book/python.md`` lists each public name once; Sphinx makes its page from the docstring."""
     page = Path(__file__).parents[3] / "book" / "python.md"

@@ -56,7 +56,7 @@ pub fn terminals(archive: &Archive, findings: &mut Findings) {
     };
     let root = match Element::parse(&bytes) {
         Ok(root) => root,
-        Err(why) => return findings.add(FILE, why),
+        Err(why) => return findings.add(FILE, why.to_string()),
     };
     if root.name != "fmiTerminalsAndIcons" {
         findings.add(FILE, format!("its root is {} (allowed: fmiTerminalsAndIcons)", root.name));
@@ -83,7 +83,7 @@ pub fn layered_standards(archive: &Archive, findings: &mut Findings) {
         let root = match Element::parse(&bytes) {
             Ok(root) => root,
             Err(why) => {
-                findings.add(name, why);
+                findings.add(name, why.to_string());
                 continue;
             }
         };

@@ -1,0 +1,39 @@
+"""A point of a design review: a loop with its margins."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .linearization import LinearModel
+from .loop import Loop
+from .stability import Margins, _largest
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """A point of the review that was evaluated."""
+
+    fill: int
+    """Index of the fill."""
+    shares: Vector
+    """Position of each uncertain quantity: -1 low end, 0 nominal, 1 high end."""
+    loop: Loop
+    """Loop at this point, its thrust through the centre of mass."""
+    margins: Margins
+    """Margins of the loop."""
+    gain: LinearModel
+    """Sampled loop gain."""
+
+    @property
+    def growth(self) -> float:
+        """Growth rate of the closed loop's least stable pole, 1/s."""
+        size = _largest(self.margins.poles, self.gain.period)
+        return float(np.log(size) / self.loop.period)
+
+    @property
+    def distance(self) -> float:
+        """Modulus margin of a stable loop; otherwise minus the growth rate, 1/s."""
+        return self.margins.modulus_margin if self.margins.stable else -self.growth
