@@ -128,7 +128,8 @@ def check(machine: Machine, args: argparse.Namespace) -> None:
         sys.exit("error: the wheel has brought no command hubslosh")
     print(run(program, "--version")[0].strip(), "at", program)
     fmus = [Path(line).stem for line in run(program, "fmus")[0].splitlines()]
-    if sorted(fmus) != sorted(f"{name}{fmi}" for name in FMUS for fmi in ("", "-fmi3", "-fmi3-arrays")):
+    kinds = ("", "-fmi3", "-fmi3-arrays")
+    if sorted(fmus) != sorted(f"{name}{kind}" for name in FMUS for kind in kinds):
         sys.exit(f"error: the wheel has the FMUs {', '.join(fmus)}")
     for fmu in fmus:
         print(run(program, "check", fmu)[0].strip().splitlines()[-1])

@@ -265,10 +265,15 @@ fn textual_errors(file: &str, code: &str) -> Vec<String> {
                 (_, token) => arguments.last_mut().expect("it begins with one").push(token),
             }
         }
-        let is_text = |error: &Vec<&str>| match error[..] {
-            ["String"] | ["&", "str"] => true,
-            ["&", "'", _, "str"] | ["Cow", ..] | ["Vec", "<", "String", ">"] => true,
-            _ => false,
+        let is_text = |error: &Vec<&str>| {
+            matches!(
+                error[..],
+                ["String"]
+                    | ["&", "str"]
+                    | ["&", "'", _, "str"]
+                    | ["Cow", ..]
+                    | ["Vec", "<", "String", ">"]
+            )
         };
         if arguments.get(1).is_some_and(is_text) {
             found.push(format!(

@@ -759,7 +759,7 @@ class Craft:
                     # liquid detaches from pendulums only
                     third = re.compile(rf"{re.escape(prefix)}\.nonlinear_(inertia|stiffness)\[")
                     found |= {key: 1.0 for key in found if third.match(key)}
-                    found = {key: x for key, x in found.items() if not BEYOND_THIRD_ORDER.search(key)}
+                    found = {n: x for n, x in found.items() if not BEYOND_THIRD_ORDER.search(n)}
         if mass_flow is not None:
             tables = self._draining(mass_flow, tanks, between)
             # the FMU warns of values that the table replaces
@@ -768,7 +768,7 @@ class Craft:
 
             def is_replaced(name: str) -> bool:
                 own = name.partition(".")[0] in draining
-                return name in replaced or own and bool(BEYOND_THIRD_ORDER.search(name))
+                return name in replaced or (own and bool(BEYOND_THIRD_ORDER.search(name)))
 
             found = {n: value for n, value in found.items() if not is_replaced(n)} | tables
         return found
