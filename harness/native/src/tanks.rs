@@ -55,7 +55,9 @@ impl Amount {
     fn fill(&self) -> PyResult<Fill> {
         match self {
             Amount::Height(height) => Ok(Fill::Height(*height)),
-            Amount::Text(text) => text.parse().map_err(FmuError::new_err),
+            Amount::Text(text) => text
+                .parse()
+                .map_err(|why: hubslosh_tank::tank::NotAFill| FmuError::new_err(why.to_string())),
             Amount::Mass(mass, unit) if unit == "kg" => Ok(Fill::Mass(*mass)),
             Amount::Mass(_, unit) => {
                 Err(FmuError::new_err(format!("a fill is a mass in kg, not in {unit}")))

@@ -5,7 +5,6 @@
 use std::f64::consts::FRAC_PI_2;
 
 use craft::{DampingLaw, MODES, Ramp, Tank, TankInputs, TankParameters};
-use formulas::energy_terms::energy_terms;
 use formulas::{cylinder, third_order};
 
 use super::component::SloshTank;
@@ -32,15 +31,6 @@ pub fn bench(fill: f64) -> Tank {
     };
     (tank.mass[0], tank.length[0], tank.hinge[0]) = (pendulum.mass, pendulum.length, 0.0);
     (tank.nonlinear_inertia[0], tank.nonlinear_stiffness[0]) = (s, kappa);
-    tank
-}
-
-/// Returns the tank of `bench` with the coefficients that give the wave's energy.
-pub fn bench_with_energy(fill: f64) -> Tank {
-    let (mut tank, known) = (bench(fill), energy_terms(fill).unwrap());
-    [tank.nonlinear_inertia[0], tank.nonlinear_stiffness[0]] = known.pair;
-    [tank.nonlinear_inertia_2[0], tank.nonlinear_stiffness_2[0]] = known.next;
-    [tank.rotary_inertia[0], tank.rotary_inertia_2[0]] = known.rotary;
     tank
 }
 
