@@ -26,6 +26,7 @@ use crate::parameters::{Imu, MODES, Parameters, Wheel};
 use crate::slosh::{Angles, Liquid, SloshMode, with_modes};
 use crate::state::{Axial, Ranges, STATES, State, x};
 use crate::tank::{self, Calculated};
+use crate::wheel::{self, Piece};
 
 /// Hub, bearing, tank, wheel and gyro.
 #[derive(Clone, Debug)]
@@ -348,11 +349,15 @@ impl Plant {
         let state = &mut self.state;
         let (begin, elapsed) = (state.time, state.elapsed);
         let (mut t, mut steps, mut stopped) = (0.0, self.motion.steps(), None);
+        let mut level = None;
         while t < h {
             // A piece of zero length takes no step of the integrator but counts as one.
             steps.count(1, begin + t)?;
             let speed = state.x[x::WHEEL_SPEED];
-            let (length, torque, speed) = self.wheel.next(speed, inputs.tau_cmd.after(t), h - t);
+            let command = wheel::command_after(inputs.tau_cmd, t, level);
+            let piece = self.wheel.next(speed, command, h - t);
+            let Piece { length, torque, speed, .. } = piece;
+            level = piece.passed.or(level);
             let external = inputs.tau_ext.after(t);
             let tau =
                 Ramp { value: torque.value + external.value, slope: torque.slope + external.slope };

@@ -13,6 +13,27 @@ use alloc::vec::Vec;
 use crate::inputs::Ramp;
 use crate::parameters::Wheel;
 
+/// A part of a step along which the wheel's torque is linear in time.
+pub(crate) struct Piece {
+    /// s
+    pub length: f64,
+    pub torque: Ramp,
+    /// The rotor's speed at the end, rad/s.
+    pub speed: f64,
+    /// Limit of the torque, or zero, that the command passes at the end.
+    pub passed: Option<f64>,
+}
+
+/// Returns a command after `t`, when it has reached the level `passed`. Rounding may leave it before this level by an ulp,
+/// so that it would pass it again after no time, and again.
+pub(crate) fn command_after(command: Ramp, t: f64, passed: Option<f64>) -> Ramp {
+    let now = command.after(t);
+    match passed {
+        Some(level) if (level - now.value) / now.slope > 0.0 => Ramp { value: level, ..now },
+        _ => now,
+    }
+}
+
 impl Wheel {
     /// Lists problems of the combined parameters.
     pub(crate) fn problems(&self) -> Vec<String> {
@@ -47,20 +68,20 @@ impl Wheel {
         }
     }
 
-    /// Returns the next piece, at most `h` long: its length, its torque, and the rotor's speed
-    /// after it. The command is then `command.at(length)`.
-    pub(crate) fn next(&self, speed: f64, command: Ramp, h: f64) -> (f64, Ramp, f64) {
+    /// Returns the next piece, at most `h` long.
+    pub(crate) fn next(&self, speed: f64, command: Ramp, h: f64) -> Piece {
         let torque = self.torque(speed, command);
         if !self.enabled {
-            return (h, torque, speed - torque.integral(h) / self.inertia);
+            let speed = speed - torque.integral(h) / self.inertia;
+            return Piece { length: h, torque, speed, passed: None };
         }
         // The command passes one of its limits, or zero.
-        let mut length = h;
+        let (mut length, mut passed) = (h, None);
         if command.slope != 0.0 {
             for level in [-self.tau_max, 0.0, self.tau_max] {
                 let t = (level - command.value) / command.slope;
                 if t > 0.0 && t < length {
-                    length = t;
+                    (length, passed) = (t, Some(level));
                 }
             }
         }
@@ -73,9 +94,9 @@ impl Wheel {
             let turn = (speed - limit) * self.inertia;
             let root = libm::sqrt(f64::max(a * a + 2.0 * b * turn, 0.0));
             let t = 2.0 * turn / (a + root.copysign(turn));
-            return (t.max(0.0).min(length), torque, limit);
+            return Piece { length: t.max(0.0).min(length), torque, speed: limit, passed: None };
         }
-        (length, torque, end)
+        Piece { length, torque, speed: end, passed }
     }
 }
 
@@ -83,16 +104,30 @@ impl Wheel {
 mod tests {
     use super::*;
 
-    fn run(wheel: &Wheel, mut command: Ramp, h: f64) -> (f64, f64, usize) {
+    fn run(wheel: &Wheel, command: Ramp, h: f64) -> (f64, f64, usize) {
         let (mut speed, mut t, mut impulse, mut pieces) = (wheel.speed_0, 0.0, 0.0, 0);
+        let mut passed = None;
         while t < h {
-            let (length, torque, after) = wheel.next(speed, command, h - t);
-            impulse += torque.integral(length);
-            (speed, t, pieces) = (after, t + length, pieces + 1);
-            command.value = command.at(length);
-            assert!(pieces < 10, "a linear command has few pieces");
+            let now = command_after(command, t, passed);
+            let piece = wheel.next(speed, now, h - t);
+            impulse += piece.torque.integral(piece.length);
+            (speed, t, pieces) = (piece.speed, t + piece.length, pieces + 1);
+            passed = piece.passed.or(passed);
+            assert!(pieces < 10, "a linear command has few pieces: {command:?} at {t}");
         }
         (impulse, speed, pieces)
+    }
+
+    /// Of a hundred such commands some used to pass a limit again and again after no time, until the step was refused.
+    #[test]
+    fn a_command_passes_each_limit_once_however_it_is_rounded() {
+        let mut rng = fastrand::Rng::with_seed(1);
+        for _ in 0..100_000 {
+            let mut between = |low: f64, high: f64| low + (high - low) * rng.f64();
+            let w = Wheel { tau_max: between(0.01, 0.3), ..wheel() };
+            let command = Ramp { value: between(-0.5, 0.5), slope: between(-1.0, 1.0) };
+            run(&w, command, between(0.1, 3.0));
+        }
     }
 
     fn wheel() -> Wheel {
@@ -188,7 +223,7 @@ mod tests {
     #[test]
     fn a_piece_ends_where_the_command_passes_a_limit_or_zero() {
         let w = Wheel { inertia: 1.0, ..wheel() }; // far from its speed limits
-        let next = |command: Ramp| w.next(w.speed_0, command, 10.0).0;
+        let next = |command: Ramp| w.next(w.speed_0, command, 10.0).length;
         // From -0.5 N m at 0.1 N m/s: to -0.26 in 2.4 s, on to 0 in 2.6 s, on to 0.26.
         for (from, length) in [(-0.5, 2.4), (-0.26, 2.6), (0.0, 2.6)] {
             assert!((next(ramp(from, 0.1)) - length).abs() < 1e-12, "{from}");
@@ -210,12 +245,12 @@ mod tests {
             (ramp(-0.1, -0.02), w.speed_max),
             (ramp(0.0, -0.05), w.speed_max),
         ] {
-            let (length, torque, speed) = w.next(w.speed_0, command, 10.0);
+            let Piece { length, torque, speed, .. } = w.next(w.speed_0, command, 10.0);
             assert_eq!((torque, speed), (command, limit));
             let turned = command.integral(length) / w.inertia;
             assert!((w.speed_0 - turned - limit).abs() < 1e-12, "{command:?} {length}");
             // Before the limit the torque alone determines the rotor's speed.
-            let (all, _, before) = w.next(w.speed_0, command, length / 2.0);
+            let Piece { length: all, speed: before, .. } = w.next(w.speed_0, command, length / 2.0);
             assert_eq!(all, length / 2.0);
             let turned = command.integral(length / 2.0) / w.inertia;
             assert!((w.speed_0 - turned - before).abs() < 1e-12, "{command:?}");
@@ -228,7 +263,7 @@ mod tests {
         let command = ramp(5.0, -1.0);
         assert_eq!(w.torque(1e6, command), command);
         // 5 N m falling by 1 N m/s over 2 s: 8 N m s.
-        let (length, torque, speed) = w.next(100.0, command, 2.0);
+        let Piece { length, torque, speed, .. } = w.next(100.0, command, 2.0);
         assert_eq!((length, torque), (2.0, command));
         assert!((speed - (100.0 - 8.0 / w.inertia)).abs() < 1e-9);
     }
