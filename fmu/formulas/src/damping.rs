@@ -214,21 +214,22 @@ pub struct Estimate {
     pub interval_of_others: [f64; 2],
 }
 
-/// Estimates f of a tank whose wetted wall has these shapes in part; the rest of the wall has [`UNMEASURED`].
+/// Estimates f of a tank whose wetted wall has these shapes in part; the rest of the wall has [`UNMEASURED`]. `near` has
+/// these shapes and those that the wall is near.
 ///
 /// f is the mean over the wall: each shape's factor on its share, moved towards [`UNMEASURED`] by the weight of its
 /// correlation and where that is below the laminar layer. All modes have the same f.
 ///
 /// If the whole wall is one shape and its correlation agrees with [`UNMEASURED`] layers, the first mode's interval is
-/// the scatter of measured tanks. Otherwise it runs from the layer alone to 1.3 of the largest factor of all parts. It
-/// widens from one to the other while the shape's share falls to 95 %.
-pub fn estimate(parts: &[Part]) -> Estimate {
+/// the scatter of measured tanks. Otherwise it runs from the layer alone to 1.3 of the largest factor of all parts and
+/// near shapes. It widens from one to the other while the shape's share falls to 95 %.
+pub fn estimate(parts: &[Part], near: &[Part]) -> Estimate {
     let mean = |sum: f64, part: &Part| sum + part.share * (part.own() - UNMEASURED);
     let factor = match parts {
         [part] if part.is_measured() => part.factor,
         _ => parts.iter().fold(UNMEASURED, mean),
     };
-    let largest = parts.iter().fold(UNMEASURED, |largest, part| {
+    let largest = parts.iter().chain(near).fold(UNMEASURED, |largest, part| {
         let counts = f64::min(part.share / COUNTS, 1.0);
         largest.max(UNMEASURED + counts * (part.factor - UNMEASURED))
     });
@@ -586,7 +587,7 @@ mod tests {
 
     /// f of the first mode and its interval.
     fn numbers(parts: &[Part]) -> [f64; 3] {
-        let Estimate { factor, interval: [low, high], interval_of_others } = estimate(parts);
+        let Estimate { factor, interval: [low, high], interval_of_others } = estimate(parts, &[]);
         // those of the other modes reach from the layer on
         assert_eq!(interval_of_others[0], 1.0);
         assert!(interval_of_others[1] >= high);
@@ -608,7 +609,7 @@ mod tests {
             is_near(numbers(&[part(1.0, factor, 1.0)]), [factor, low, high]);
             assert_eq!(part(1.0, factor, 1.0).disagrees(), low == 1.0);
         }
-        let [low, high] = estimate(&[part(1.0, 1.5, 1.0)]).interval_of_others;
+        let [low, high] = estimate(&[part(1.0, 1.5, 1.0)], &[]).interval_of_others;
         is_near([low, high, 1.0], [1.0, 1.95, 1.0]);
     }
 

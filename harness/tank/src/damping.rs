@@ -65,24 +65,26 @@ pub fn of_tank(
             .into());
     }
     let effective = first.omega * first.omega / first.lambda;
-    let found = match (recognised, &data.wall) {
-        (Some(found), _) => Vec::from_iter(Nearest::whole(found, first, nu)),
-        (None, Some(wall)) => {
-            let parts = shape::parts(wall, data.fill).into_iter();
-            // Of a cone too wide for its correlation the factor has no meaning.
-            let counts = |part: &shape::Part| match part.found.measured() {
-                cone @ formula::Shape::Cone { .. } => {
-                    cone.correlation(nu, effective).is_some_and(|found| found.weight > 0.0)
-                }
-                _ => true,
-            };
-            let solve = |part: shape::Part| Nearest::solve(part.found, part.share, nu, effective);
-            parts.filter(counts).filter_map(solve).collect()
+    // Of a cone too wide for its correlation the factor has no meaning.
+    let counts = |part: &shape::Part| match part.found.measured() {
+        cone @ formula::Shape::Cone { .. } => {
+            cone.correlation(nu, effective).is_some_and(|found| found.weight > 0.0)
         }
-        (None, None) => Vec::new(),
+        _ => true,
     };
-    let parts: Vec<formula::Part> = found.iter().map(|nearest| nearest.part).collect();
-    let estimate = formula::estimate(&parts);
+    let solved = |parts: Vec<shape::Part>| -> Vec<Nearest> {
+        let solve = |part: shape::Part| Nearest::solve(part.found, part.share, nu, effective);
+        parts.into_iter().filter(counts).filter_map(solve).collect()
+    };
+    let (found, near) = match (recognised, &data.wall) {
+        (Some(found), _) => (Vec::from_iter(Nearest::whole(found, first, nu)), Vec::new()),
+        (None, Some(wall)) => {
+            (solved(shape::parts(wall, data.fill)), solved(shape::near(wall, data.fill)))
+        }
+        (None, None) => (Vec::new(), Vec::new()),
+    };
+    let [parts, close] = [&found, &near].map(|of| of.iter().map(|n| n.part).collect::<Vec<_>>());
+    let estimate = formula::estimate(&parts, &close);
     let correlation = measured.correlation(nu, effective).map(|correlation| correlation.zeta);
     // The correlation itself, not its quotient by the layer times the layer.
     let exact = correlation.filter(|_| found.iter().all(Nearest::is_measured));
@@ -123,7 +125,7 @@ pub fn of_tank(
             let layers = formula::UNMEASURED * first.laminar(nu);
             (whole.basis(estimate.factor, zeta, layers), Vec::new())
         }
-        _ => (mixture(&found, estimate.factor), found.iter().map(Nearest::shown).collect()),
+        _ => (mixture(&found, &near, estimate.factor), found.iter().map(Nearest::shown).collect()),
     };
     let taken = format!("{basis}; {ENDS}");
     Ok(Damping {
@@ -235,13 +237,22 @@ impl Nearest {
     }
 }
 
-/// Returns the basis of the damping of a wall that is no measured shape, or is one in part.
-fn mixture(found: &[Nearest], factor: f64) -> String {
+/// Returns the basis of the damping of a wall that is no measured shape, or is one in part, with the shapes that it is
+/// near.
+fn mixture(found: &[Nearest], near: &[Nearest], factor: f64) -> String {
     let unmeasured = formula::UNMEASURED;
     if found.is_empty() {
-        return format!(
+        let mut text = format!(
             "{unmeasured} laminar layers, as in measured cylinders: no measurements of this shape"
         );
+        for nearest in near.iter().filter(|nearest| nearest.part.disagrees()) {
+            text += &format!(
+                "; it is nearly a {}, whose correlation makes {:.2} layers, which the interval includes",
+                name_of(nearest.shape),
+                nearest.part.factor
+            );
+        }
+        return text;
     }
     let of_shape = |nearest: &Nearest| {
         let formula::Part { share, factor, weight } = nearest.part;

@@ -92,8 +92,30 @@ pub(crate) fn parts(wall: &Wall, fill: f64) -> Vec<Part> {
     found
 }
 
+/// Returns the measured shapes that the whole wetted wall is near, each with a share that falls from 1 on the shape to 0
+/// at a distance of [`NEAR`]. `fill` is the height of the free surface above the lowest point, m.
+pub(crate) fn near(wall: &Wall, fill: f64) -> Vec<Part> {
+    let points = sampled(wall, PLACES);
+    let Some(cut) = Cut::whole(&points, fill) else { return Vec::new() };
+    let widest = points.iter().fold(0.0, |widest: f64, p| widest.max(p[0]));
+    // not the size of a pool or of a pipe, in which every shape is near every other
+    let size = fill.min(widest);
+    let of_kind = |kind: Kind| {
+        let shape = kind.through(cut)?;
+        let farthest =
+            points.iter().fold(0.0, |far: f64, p| far.max(distance(&shape, *p, cut.bottom)));
+        let share = 1.0 - smooth_step(farthest / (NEAR * size));
+        (share > 0.0).then_some(Part { found: Recognised { shape, fill }, share })
+    };
+    KINDS.into_iter().filter_map(of_kind).collect()
+}
+
 /// Distance of the wall from a shape, over its size, from which the wall does not count as this shape.
 const FAR: f64 = 0.01;
+
+/// Distance of the wall from a shape, over depth or largest radius, from which the wall is not near this shape. A spheroid
+/// that is a few per cent off a sphere dissipates as much as the sphere.
+const NEAR: f64 = 0.1;
 
 /// Share of the wall below which a shape does not count.
 const LEAST: f64 = 0.02;
