@@ -49,7 +49,7 @@ fn the_models_and_what_they_are_made_of_need_no_standard_library() {
 /// only `formulas`, which contains no model.
 const HARNESS: [(&str, &[&str]); 14] = [
     ("files", &[]),
-    ("names", &[]),
+    ("names", &["formulas"]),
     ("host", &["files"]),
     ("signals", &["files"]),
     ("check", &["files", "host"]),
@@ -63,7 +63,7 @@ const HARNESS: [(&str, &[&str]); 14] = [
         &["files", "formulas", "host", "names", "signals", "analysis", "experiments", "report"],
     ),
     ("hubslosh-tank", &["formulas", "names"]),
-    ("hubslosh-native", &["analysis", "files", "host", "hubslosh-tank", "signals"]),
+    ("hubslosh-native", &["analysis", "files", "host", "hubslosh-tank", "names", "signals"]),
     (
         "hubslosh",
         &[

@@ -3,7 +3,6 @@
 pub mod campaign;
 pub mod example;
 pub mod gyro;
-pub mod limits;
 pub mod plan;
 pub mod profile;
 pub mod progress;

@@ -61,6 +61,7 @@ macro_rules! enumeration {
 }
 
 pub mod hubslosh;
+pub mod limits;
 pub mod sloshtank;
 pub mod spacecraft;
 

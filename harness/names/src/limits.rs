@@ -1,9 +1,9 @@
-//! Reasons for which the tanks of a run were out of the range of their model, each with its share of the time.
+//! Reasons for which the tanks of a run were out of the range of their model, each with its share of the time and its
+//! first time.
 
 use formulas::limits::LimitedBy;
-use host::description::ModelDescription;
-use names::{hubslosh, sloshtank, spacecraft};
-use signals::table::Table;
+
+use crate::{hubslosh, sloshtank, spacecraft};
 
 /// Variables that say by what a tank is limited.
 pub struct Limits {
@@ -12,14 +12,13 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// Finds the variables of an FMU by which its tanks say why they are out of range.
-    pub fn find(description: &ModelDescription) -> Limits {
+    /// Finds the variables of an FMU; `has` returns true for the name of one of its variables.
+    pub fn find(has: impl Fn(&str) -> bool) -> Limits {
         let several = (1..=spacecraft::MOST_TANKS)
             .map(|i| (spacecraft::tank::LIMITED_BY_KIND.at([i]), format!("tank {i}: ")));
         let one = [hubslosh::LIMITED_BY_KIND, sloshtank::tank::LIMITED_BY_KIND]
             .map(|name| (name.to_string(), String::new()));
-        let all = one.into_iter().chain(several);
-        Limits { tanks: all.filter(|(name, _)| description.variable(name).is_ok()).collect() }
+        Limits { tanks: one.into_iter().chain(several).filter(|(name, _)| has(name)).collect() }
     }
 
     /// Returns the columns that [`Limits::describe`] reads.
@@ -27,18 +26,21 @@ impl Limits {
         self.tanks.iter().map(|(name, _)| name.as_str())
     }
 
-    /// Returns a sentence for each tank that was out of range: the reasons with their shares of the time, the longest first.
-    /// A row holds until the next one.
-    pub fn describe(&self, table: &Table) -> Vec<String> {
+    /// Returns a sentence for each tank that was out of range: the reasons with their shares of the time and their first
+    /// times, the longest first. `column` returns the column with this name of a run's table. A row holds until the next
+    /// one.
+    pub fn describe<'t>(&self, column: impl Fn(&str) -> Option<&'t [f64]>) -> Vec<String> {
         let of_tank = |(name, tank): &(String, String)| {
-            let reasons = table.column(name)?;
-            let shares = shares(table.column("time")?, reasons);
-            let out: f64 = shares.iter().map(|(_, share)| share).sum();
-            let list: Vec<String> = shares
+            let found = reasons(column("time")?, column(name)?);
+            let out: f64 = found.iter().map(|(_, share, _)| share).sum();
+            let list: Vec<String> = found
                 .iter()
-                .map(|(reason, share)| format!("{} ({})", lower(reason.meaning()), percent(*share)))
+                .map(|(reason, share, first)| {
+                    let (share, first) = (percent(*share), (first * 1e3).round() / 1e3);
+                    format!("{} ({share}, first at {first} s)", lower(reason.meaning()))
+                })
                 .collect();
-            (out > 0.0).then(|| {
+            (!list.is_empty()).then(|| {
                 format!("{tank}out of range for {} of the time: {}", percent(out), list.join("; "))
             })
         };
@@ -46,8 +48,8 @@ impl Limits {
     }
 }
 
-/// Returns the reasons with their shares of the time, the longest first.
-fn shares(time: &[f64], reasons: &[f64]) -> Vec<(LimitedBy, f64)> {
+/// Returns the reasons with their shares of the time and their first times, s, the longest first.
+fn reasons(time: &[f64], numbers: &[f64]) -> Vec<(LimitedBy, f64, f64)> {
     let end = time.len();
     let span = match (time.first(), time.last()) {
         (Some(first), Some(last)) if last > first => last - first,
@@ -58,13 +60,14 @@ fn shares(time: &[f64], reasons: &[f64]) -> Vec<(LimitedBy, f64)> {
         true => (time[(i + 1).min(end - 1)] - time[i]) / span,
         false => 1.0 / end as f64,
     };
-    let mut all: Vec<(LimitedBy, f64)> = LimitedBy::ALL[1..]
+    let mut all: Vec<(LimitedBy, f64, f64)> = LimitedBy::ALL[1..]
         .iter()
-        .map(|reason| {
-            let rows = reasons.iter().enumerate().filter(|(_, x)| **x == f64::from(*reason as u8));
-            (*reason, rows.map(|(i, _)| lasts(i)).sum())
+        .filter_map(|reason| {
+            let number = f64::from(*reason as u8);
+            let rows: Vec<usize> =
+                (0..end.min(numbers.len())).filter(|i| numbers[*i] == number).collect();
+            Some((*reason, rows.iter().map(|i| lasts(*i)).sum(), time[*rows.first()?]))
         })
-        .filter(|(_, share)| *share > 0.0)
         .collect();
     all.sort_by(|a, b| b.1.total_cmp(&a.1));
     all
@@ -87,13 +90,39 @@ mod tests {
     use super::*;
 
     #[test]
-    fn reasons_have_their_shares_of_the_time() {
+    fn reasons_have_their_shares_of_the_time_and_their_first_times() {
         let time = [0.0, 1.0, 3.0, 4.0, 10.0];
-        let found = shares(&time, &[1.0, 2.0, 5.0, 2.0, 5.0]);
-        assert_eq!(found, [(LimitedBy::ThirdOrder, 0.8), (LimitedBy::Spin, 0.1)]);
-        assert_eq!(shares(&time, &[1.0; 5]), []);
-        assert_eq!(shares(&[2.0], &[8.0]), [(LimitedBy::Contact, 1.0)]);
+        let found = reasons(&time, &[1.0, 2.0, 5.0, 2.0, 5.0]);
+        assert_eq!(found, [(LimitedBy::ThirdOrder, 0.8, 1.0), (LimitedBy::Spin, 0.1, 3.0)]);
+        assert_eq!(reasons(&time, &[1.0; 5]), []);
+        assert_eq!(reasons(&[2.0], &[8.0]), [(LimitedBy::Contact, 1.0, 2.0)]);
+        // the last row, from which on nothing is known
+        assert_eq!(
+            reasons(&time, &[1.0, 1.0, 1.0, 1.0, 2.0]),
+            [(LimitedBy::ThirdOrder, 0.0, 10.0)]
+        );
         assert_eq!(percent(1e-5), "less than 0.1 %");
         assert_eq!(percent(0.123_45), "12.3 %");
+    }
+
+    #[test]
+    fn each_tank_that_was_out_of_range_has_a_sentence() {
+        let names = ["tank[1].limited_by_kind", "tank[2].limited_by_kind"];
+        let limits = Limits::find(|name| names.contains(&name));
+        assert_eq!(limits.needs().collect::<Vec<_>>(), names);
+        let (time, inside, outside) = ([0.0, 1.0, 4.0], [1.0; 3], [1.0, 5.0, 5.0]);
+        let words = limits.words(|name| match name {
+            "time" => Some(&time[..]),
+            name if name == names[0] => Some(&inside),
+            name if name == names[1] => Some(&outside),
+            _ => None,
+        });
+        assert_eq!(
+            words,
+            [
+                "tank 2: out of range for 75.0 % of the time: the tank turns about its axis so fast that the spin of the liquid \
+              matters (75.0 %, first at 1 s)"
+            ]
+        );
     }
 }

@@ -122,6 +122,11 @@ impl Fmu {
         &self.description
     }
 
+    /// Returns true if it has a variable of this name.
+    pub fn has(&self, name: &str) -> bool {
+        self.places.contains_key(name)
+    }
+
     /// Finds a variable by its name.
     pub fn variable(&self, name: &str) -> PyResult<&description::Variable> {
         match self.places.get(name) {

@@ -1,7 +1,7 @@
 //! The compiled half of the Python package `hubslosh`. It reads FMUs ([`fmu`]) and drives their instances by single calls
 //! ([`instance`]) or whole runs ([`run`]), with or without a controller ([`feedback`]). It also finds the [`crossings`]
-//! of loop gains, computes the modal parameters of [`tanks`], reads recordings and parameters, places [`files`], and stores
-//! the runs of a [`study`].
+//! of loop gains, computes the modal parameters of [`tanks`], says how runs left the [`limits`] of their model, reads
+//! recordings and parameters, places [`files`], and stores the runs of a [`study`].
 //!
 //! Every call of an FMU is made by the crate `host`, without Python's lock. Tables are arrays of numpy, through the buffer
 //! protocol; the package depends on the stable ABI alone, so that one library serves every Python from 3.11 on.
@@ -13,6 +13,7 @@ mod feedback;
 mod files;
 mod fmu;
 mod instance;
+mod limits;
 mod numbers;
 mod run;
 mod schedule;
@@ -30,6 +31,8 @@ mod _native {
     use crate::fmu::{Fmu, FmuError, FmuWarning, Variable};
     #[pymodule_export]
     use crate::instance::Instance;
+    #[pymodule_export]
+    use crate::limits::{limit_columns, out_of_range};
     #[pymodule_export]
     use crate::schedule::{History, check_interpolation, communication_points, pairing};
     #[pymodule_export]

@@ -19,6 +19,7 @@ from .run import Run
 from .short import names
 from .simulation import (
     History,
+    asked_of,
     check_outputs,
     check_parameters,
     histories_of,
@@ -376,7 +377,7 @@ class Loop:
         given = {name: history.after(points) for name, history in histories.items()}
         sloped = any(slopes.any() for _, slopes in given.values())
         start = {name: values[0] for name, (values, _) in given.items()}
-        asked = [name for name in columns if name not in (*command, *given)]
+        asked = asked_of(fmu, columns, (*command, *given))
         with Plant(
             self.model,
             every,
@@ -394,7 +395,7 @@ class Loop:
         commands[-1] = commands[-2]
         rows = {"time": points} | dict(zip(command, commands.T, strict=True))
         rows |= {name: values for name, (values, _) in given.items()} | recorded
-        return table_of(fmu, rows, wanted, self.model, every)
+        return table_of(fmu, rows, wanted, columns, self.model, every)
 
     def _controller(
         self,
@@ -496,7 +497,8 @@ def closed_loop(
     -------
     Run
         A table with the columns ``time``, the commands (as they are from this time on), the
-        inputs and ``outputs``. Units are in ``.attrs["units"]``.
+        inputs and ``outputs``. Units are in ``.attrs["units"]``. ``.out_of_range`` says which
+        tanks left the range of their model, why, when first, and for which share of the time.
 
     Raises
     ------

@@ -22,6 +22,23 @@ class Run(ShortTable):
     (3, {'time': 's', 'omega': 'rad/s'})
     """
 
+    @property
+    def out_of_range(self) -> list[str]:
+        """Sentences about the tanks that left the range of their model, one for each.
+
+        A sentence has the reasons with their shares of the time and their first times. The list is
+        empty if the whole run stayed in range, and for FMUs that do not tell. Of a part of a run
+        it is that of the whole run.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> run = hubslosh.simulate(parameters={"init.slosh_angle": 0.5}, stop=1, step=0.1)
+        >>> [text.split(":")[0] for text in run.out_of_range]
+        ['out of range for 80.0 % of the time']
+        """
+        return list(self.attrs.get("out_of_range", []))
+
     def view(self, out: str | Path | None = None, **options: Any) -> View:
         """Show the run in 3-D, with plots that follow the time; see `hubslosh.view`.
 

@@ -1,6 +1,6 @@
 """A simulation in one function: parameters and input histories in, a table out."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -98,7 +98,9 @@ def simulate(
     Run
         A pandas table with the columns ``time``, the inputs and ``outputs``; enumerations by
         number. Units are in ``.attrs["units"]``, and the simulated FMU and its parameters in
-        ``.attrs["model"]`` and ``.attrs["parameters"]``. ``.view()`` shows the run in 3-D.
+        ``.attrs["model"]`` and ``.attrs["parameters"]``. ``.out_of_range`` says which tanks left
+        the range of their model, why, when first, and for which share of the time. ``.view()``
+        shows the run in 3-D.
 
     Raises
     ------
@@ -163,7 +165,7 @@ def simulate(
     # without a slope the FMU has one call less to answer, and an FMU that cannot interpolate none
     sloped = any(slope.any() for _, slope in values.values())
     slopes = {name: slope for name, (_, slope) in values.items()} if sloped else None
-    asked = [name for name in columns if name not in given]
+    asked = asked_of(fmu, columns, given)
     with Plant(
         model,
         parameters,
@@ -173,25 +175,40 @@ def simulate(
         inputs={name: value[0] for name, value in given.items()},
     ) as plant:
         recorded = plant.run(points, given, slopes, asked)
-    table = table_of(fmu, {"time": points} | given | recorded, wanted, model, parameters)
+    rows_made = {"time": points} | given | recorded
+    table = table_of(fmu, rows_made, wanted, columns, model, parameters)
     table.attrs["rows"], table.attrs["inputs"] = native.pairing(hold)
     return table
+
+
+def asked_of(fmu: Fmu, columns: Sequence[str], given: Container[str]) -> list[str]:
+    """Return the variables to record for ``columns``, and to say how the run left its range."""
+    limits = [name for name in native.limit_columns(fmu.native) if name not in columns]
+    return [name for name in (*columns, *limits) if name not in given]
 
 
 def table_of(
     fmu: Fmu,
     columns: dict[str, Real],
     wanted: NDArray[np.bool_] | None,
+    asked: Sequence[str],
     model: str | Path,
     parameters: Parameters,
 ) -> Run:
-    """Return the wanted rows of a run (None: all) as its table."""
+    """Return the wanted rows of a run (None: all) as its table.
+
+    Of the variables that say why a tank is out of range, it has those that were ``asked`` for.
+    """
+    limits = [name for name in native.limit_columns(fmu.native) if name in columns]
+    read = {name: np.ascontiguousarray(columns[name], float) for name in ("time", *limits)}
+    columns = {name: of for name, of in columns.items() if name in asked or name not in limits}
     table = Run(columns, copy=False)
     if wanted is not None:
         table = table[wanted].reset_index(drop=True)
     units = {name: fmu.unit(name) for name in table.columns if name != "time"}
     table.attrs["units"] = {"time": "s"} | units
     table.attrs |= {"model": str(model), "parameters": dict(parameters)}
+    table.attrs["out_of_range"] = native.out_of_range(fmu.native, read)
     return table
 
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from .linearization import LinearModel
+from .run import Run
 from .stability import _closed
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ class Confirmation:
     """Predicted growth rate in the last run, 1/s."""
     simulated_growth: float
     """Growth rate in that simulation, 1/s."""
-    runs: dict[float, pd.DataFrame]
+    runs: dict[float, Run]
     """Simulated runs by their factor."""
 
     @property
@@ -68,8 +68,22 @@ class Confirmation:
             abs(self.growth), 1 / duration
         )
 
+    @property
+    def out_of_range(self) -> list[str]:
+        """Sentences about the tanks that left the range of their model in one of the runs."""
+        found = [
+            (f"with gain × {factor:.4g} " if self.command else "", text)
+            for factor, run in self.runs.items()
+            for text in run.out_of_range
+        ]
+        return [where + text for where, text in found]
+
     def __str__(self) -> str:
-        """Return the comparison in a sentence."""
+        """Return the comparison in a sentence, and how the runs left the range of their model."""
+        text = "; the simulation left the range of its model: " if self.out_of_range else ""
+        return self._comparison() + text + "; ".join(self.out_of_range)
+
+    def _comparison(self) -> str:
         verdict = "confirms" if self.agrees else "does NOT confirm"
         if self.command is None:
             pairs = (
@@ -180,9 +194,7 @@ def confirm(point: "Point") -> Confirmation:
     )  # fmt: skip
 
 
-def _compare(
-    point: "Point", command: str | None, factor: float
-) -> tuple[pd.DataFrame, complex, complex]:
+def _compare(point: "Point", command: str | None, factor: float) -> tuple[Run, complex, complex]:
     """Return a run, and the predicted and the simulated pole that decides stability (1/s)."""
     loop = point.loop
     _, commands = loop.names

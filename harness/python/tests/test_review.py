@@ -13,6 +13,7 @@ from scipy.optimize import brentq
 import hubslosh
 from hubslosh import Craft, FmuError, FmuWarning, MountedTank
 from hubslosh.review_plan import main, review_plan
+from hubslosh.worst_case import Confirmation
 
 SPHERE = {"density": 1440.0, "shape": {"sphere": {"radius": 0.5}}}
 DRY, INERTIA = 1000.0, 900.0
@@ -173,6 +174,17 @@ def test_the_search_finds_the_worst_corner(craft: Craft) -> None:
     assert found.worst_values()["craft.Jxx"] == pytest.approx(0.8 * INERTIA)
     assert found.confirmation.agrees and found.confirmation.command is not None
     assert found.confirmation.simulated_factor == pytest.approx(found.confirmation.factor, rel=0.01)
+
+
+def test_a_simulation_that_leaves_the_range_of_its_model_says_so(craft: Craft) -> None:
+    """A tank that spins fast, at the worst case: with the factor, in the review's own words."""
+    loop = craft.loop(gains(), PERIOD, "50%")
+    run = loop.simulate(5.0, {"init.omega[3]": 9.0}, outputs=[])
+    (sentence,) = [text for text in run.out_of_range if "tank 1" in text]
+    assert "spin of the liquid matters" in sentence
+    compared = Confirmation("torque[1]", 1.5, 1.5, 0.1, 0.1, 0.0, 0.0, {1.485: run})
+    assert compared.out_of_range[0] == f"with gain × 1.485 {sentence}"
+    assert f"left the range of its model: with gain × 1.485 {sentence}" in str(compared)
 
 
 def test_an_unstable_worst_case_grows_as_predicted(craft: Craft) -> None:

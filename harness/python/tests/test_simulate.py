@@ -2,6 +2,7 @@
 
 import _thread
 import signal
+import subprocess
 import threading
 import warnings
 from pathlib import Path
@@ -9,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from conftest import single_calls
+from conftest import option, single_calls
 from fmpy import simulate_fmu
 
 import hubslosh
@@ -28,6 +29,27 @@ def test_what_the_fmu_warns_of_is_a_warning(fmu: Path) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         simulate(fmu, stop=0.1)
+
+
+def test_a_run_says_how_it_left_the_range_of_its_model_in_the_words_of_the_command(
+    fmu: Path, request: pytest.FixtureRequest, tmp_path: Path
+) -> None:
+    """The reason, its share of the time and its first time; the table has no further columns."""
+    started = {"init.slosh_angle": 0.5}
+    run = simulate(fmu, started, stop=1, step=0.1, outputs="omega")
+    command = [option(request, "--hubslosh"), "run", "--fmu", fmu, "--step", "0.1"]
+    command += ["--profile", "zero:duration=1", "--set", "init.slosh_angle=0.5"]
+    command += ["--out", tmp_path / "run.csv"]
+    said = subprocess.run(command, capture_output=True, text=True, check=True).stderr
+    (sentence,) = run.out_of_range
+    assert f"the run left the range of its model: {sentence}\n" in said
+    assert sentence.endswith("above 45 degrees (80.0 %, first at 0 s)")
+    assert list(run) == ["time", "omega"] and run[run["time"] < 0.5].out_of_range == [sentence]
+    assert simulate(fmu, stop=1, step=0.1).out_of_range == []
+    kept = simulate(fmu, started, stop=1, step=0.1, outputs="limited_by_kind")
+    assert list(kept) == ["time", "limited_by_kind"] and kept.out_of_range == [sentence]
+    loop = hubslosh.Loop([[4.0, 2.0]], 0.1, model=fmu)
+    assert len(loop.simulate(1, started, outputs=[]).out_of_range) == 1
 
 
 def test_a_held_torque_gives_the_bits_of_fmpy(fmu: Path) -> None:

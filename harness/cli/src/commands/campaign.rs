@@ -225,12 +225,7 @@ pub fn drive(fmu: &Fmu, campaign: &Campaign, store: Store, chapters: Vec<Chapter
         done!("features: {}", file("features.csv").display());
     }
     done!("runs:     {}\nreport:   {}", file("runs.csv").display(), file("report.html").display());
-    let beyond: Vec<&str> = results
-        .outcomes
-        .iter()
-        .filter(|run| run.beyond_model().is_some())
-        .map(|run| run.case.name.as_str())
-        .collect();
+    let beyond: Vec<&str> = results.beyond_model().map(|(case, _)| case.name.as_str()).collect();
     if let Some(first) = beyond.first() {
         terminal::warn(format_args!(
             "{} of {all} runs left the range of their model, such as {first}; the report says how",

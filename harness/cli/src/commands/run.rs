@@ -5,7 +5,6 @@ use std::path::PathBuf;
 
 use anyhow::{Result, bail};
 use experiments::campaign::{Range, WAVE, stored_columns};
-use experiments::limits::Limits;
 use experiments::profile::{self, SAMPLE, Written};
 use experiments::rest;
 use experiments::run::{self, Run, driven, histories};
@@ -14,6 +13,7 @@ use experiments::weight::{Tanks, WATER_TENSION};
 use host::description::{ModelDescription, Type};
 use host::{guard, schedule};
 use names::hubslosh::{G_AXIAL, OMEGA, OMEGA_IMU, SLOSH_ANGLE, SLOSH_ANGLE_RADIAL};
+use names::limits::Limits;
 use report::view;
 
 use super::{DEFAULT_FMU, check_out, open_to_run, setting, write_out};
@@ -173,7 +173,7 @@ impl RunArgs {
                 "--tension is for the tanks of Spacecraft and SloshTank (the bench's is fluid.sigma)"
             );
         }
-        let limits = Limits::find(description);
+        let limits = Limits::find(|name| description.variable(name).is_ok());
         let forces = tanks.iter().flat_map(Tanks::needs).collect::<Vec<_>>();
         let sensors = Sensors::new(&self.sensors, description, &run.settings, run.step)?;
         let wave = range.as_ref().map(|_| WAVE);
@@ -210,7 +210,7 @@ impl RunArgs {
             })
             .flatten()
             .chain(tanks.iter().flat_map(|tanks| tanks.without_weight(&table)))
-            .chain(limits.describe(&table))
+            .chain(limits.describe(|name| table.column(name)))
             .collect();
         let driven = table.names().len() - columns.len();
         let table = sensors.recorded(table, driven + asked, "run", run.step)?;

@@ -30,6 +30,7 @@ use names::hubslosh::{
     ENERGY, F_RADIAL, F_TANGENTIAL, HEAT, OMEGA, OMEGA_IMU, SLOSH_ANGLE, SLOSH_ANGLE_RADIAL,
     STUCK_TIME, TAU_CMD, WAVE_HEIGHT, WORK, friction, hub, slosh, tank,
 };
+use names::limits::Limits;
 use rayon::prelude::*;
 use serde_json::json;
 use signals::table::{self, Table};
@@ -100,6 +101,18 @@ pub fn stored_columns(description: &ModelDescription, input: Option<&str>) -> Ve
     ["time".to_string()].into_iter().chain(input.map(String::from)).chain(outputs).collect()
 }
 
+/// Columns of a run's file: [`stored_columns`], and the numbers of the reasons for which its tanks are out of range.
+fn recorded_columns(description: &ModelDescription, input: Option<&str>) -> Vec<String> {
+    let mut columns = stored_columns(description, input);
+    let limits = limits_of(description);
+    columns.extend(limits.needs().map(String::from));
+    columns
+}
+
+fn limits_of(description: &ModelDescription) -> Limits {
+    Limits::find(|name| description.variable(name).is_ok())
+}
+
 /// A plan with the settings for its execution.
 #[derive(Clone, Debug)]
 pub struct Campaign {
@@ -111,6 +124,11 @@ pub struct Campaign {
     /// Directory of another campaign that the report compares with.
     pub compare: Option<PathBuf>,
     pub out: PathBuf,
+}
+
+/// Joins sentences about one run; `None` if there are none.
+pub(crate) fn joined(sentences: &[String]) -> Option<String> {
+    (!sentences.is_empty()).then(|| sentences.join("; "))
 }
 
 /// A failed run and the reason.
@@ -130,6 +148,8 @@ pub struct Unanalysed {
     pub tail: History,
     /// Largest slosh angle, rad, and its name; `None` without slosh angles.
     pub largest_angle: Option<(f64, String)>,
+    /// Sentences about the tanks that left the range of their model, one for each.
+    pub limits: Vec<String>,
     /// True if the run was read from a file, not simulated.
     pub reused: bool,
 }
@@ -138,6 +158,13 @@ impl Results {
     /// Returns the number of runs that were read from recordings.
     pub fn recordings(&self) -> usize {
         self.outcomes.iter().filter(|run| run.is_recording()).count()
+    }
+
+    /// Returns the runs that left the range of their model, with how they did.
+    pub fn beyond_model(&self) -> impl Iterator<Item = (&Case, String)> {
+        let analysed = self.outcomes.iter().map(|run| (&run.case, run.beyond_model()));
+        let others = self.unanalysed.iter().map(|run| (&run.case, joined(&run.limits)));
+        analysed.chain(others).filter_map(|(case, how)| Some((case, how?)))
     }
 
     /// Returns the number of runs that did not fail, and how many of them were reused.
@@ -212,7 +239,7 @@ impl Campaign {
         let steps: u64 = cases.iter().map(|case| case.run().steps() as u64).sum();
         let bytes = cases.iter().map(|case| {
             let run = case.run();
-            let columns = stored_columns(fmu.description(), run.input.as_deref()).len();
+            let columns = recorded_columns(fmu.description(), run.input.as_deref()).len();
             (run.steps() as u64 + 1).saturating_mul(8 * columns as u64)
         });
         let jobs = budget::jobs(self.jobs, bytes.max().unwrap_or(0))?;
@@ -282,7 +309,7 @@ impl Campaign {
         let cases = self.plan.cases(description)?;
         for case in cases.into_iter().filter(|case| case.recording.is_none()) {
             let run = case.run();
-            kept = stored_columns(description, run.input.as_deref());
+            kept = recorded_columns(description, run.input.as_deref());
             // signals for sensors are recorded with the rest; readings are computed when the run is read
             let sensors = Sensors::new(&case.sensors, description, &case.settings, case.step)?;
             for name in kept.iter().map(String::as_str).chain(sensors.needs()) {
@@ -353,7 +380,7 @@ impl Campaign {
         let tell = |outcome: &Outcome| {
             outcome.warnings.iter().for_each(|warning| warn(case, warning.clone()));
         };
-        let columns = stored_columns(fmu.description(), run.input.as_deref());
+        let columns = recorded_columns(fmu.description(), run.input.as_deref());
         let recipe = recipe::recipe(fmu, case, &columns);
         let put = |table: &Table, notes: &BTreeMap<String, String>| {
             store.add(&case.name, |path| table.write(path, notes))
@@ -441,7 +468,10 @@ impl Campaign {
             }
         };
         if !is_bench(fmu.description()) {
-            let columns: Vec<(&str, &[f64])> = columns[1..]
+            let limits = limits_of(fmu.description());
+            let drawn = columns.len() - limits.needs().count();
+            let limits = limits.describe(|name| table.column(name));
+            let columns: Vec<(&str, &[f64])> = columns[1..drawn]
                 .iter()
                 .filter_map(|name| Some((name.as_str(), table.column(name)?)))
                 .collect();
@@ -456,7 +486,8 @@ impl Campaign {
             });
             let largest = angles.max_by(|a, b| a.0.total_cmp(&b.0));
             let largest_angle = largest.map(|(angle, name)| (angle, name.to_string()));
-            let run = Unanalysed { case: case.clone(), history, tail, largest_angle, reused };
+            let case = case.clone();
+            let run = Unanalysed { case, history, tail, largest_angle, limits, reused };
             return Ok(Done::Unanalysed(Box::new(run)));
         }
         Ok(match Outcome::analyse(case, &run, &mut instance, &table, reused) {
@@ -490,12 +521,15 @@ impl Campaign {
             let row = FeatureRow::new(run, run.estimate(), &plan);
             (&run.case, None, row)
         });
-        let unanalysed = results.unanalysed.iter().map(|run| (&run.case, None));
-        let failed = results.failures.iter().map(|failure| (&failure.case, Some(failure)));
-        let others = unanalysed
-            .chain(failed)
-            .map(|(case, failure)| (case, failure, FeatureRow::unanalysed(case, &plan)));
-        let rows = analysed.chain(others).map(|(case, failure, row)| {
+        let unanalysed = results
+            .unanalysed
+            .iter()
+            .map(|run| (&run.case, None, FeatureRow::unanalysed(&run.case, &run.limits, &plan)));
+        let failed = results.failures.iter().map(|failure| {
+            let case = &failure.case;
+            (case, Some(failure), FeatureRow::unanalysed(case, &[], &plan))
+        });
+        let rows = analysed.chain(unanalysed).chain(failed).map(|(case, failure, row)| {
             let made_from = rows::record(&MadeFrom::new(case, failure, fmu))?;
             Ok([made_from, case.varied.clone(), rows::record(&row)?].concat())
         });

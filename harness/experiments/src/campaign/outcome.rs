@@ -346,6 +346,8 @@ pub struct Outcome {
     pub ending: Ending,
     /// Dominant force on the liquid if it is not gravity ([`Range::without_weight`]).
     pub weightless: Option<String>,
+    /// Sentence about the reasons for which the tank was out of range; empty if it was not.
+    pub limits: Vec<String>,
     pub reused: bool,
     /// Warnings about the rates that a gyro measured.
     pub warnings: Vec<String>,
@@ -734,6 +736,7 @@ impl Outcome {
             warnings: rates.warnings,
             case: case.clone(),
             weightless: range.without_weight(column(WAVE), table.column(G_AXIAL)),
+            limits: super::limits_of(instance.description()).words(|name| table.column(name)),
             range,
             linear,
             record,
@@ -790,8 +793,8 @@ impl Outcome {
     /// Describes how the run left the range of its model, if it did.
     pub fn beyond_model(&self) -> Option<String> {
         let how = [self.range.left(&[self.totals.peak_wave_height]), self.weightless.clone()];
-        let how: Vec<String> = how.into_iter().flatten().collect();
-        (!how.is_empty()).then(|| how.join("; "))
+        let how = how.into_iter().flatten().chain(self.limits.iter().cloned());
+        super::joined(&how.collect::<Vec<_>>())
     }
 
     /// Returns the features of the `spa` response, empty without one.

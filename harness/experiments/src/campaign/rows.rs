@@ -54,9 +54,10 @@ pub struct FeatureRow {
 }
 
 impl FeatureRow {
-    /// Returns the row of a run that was not analysed, with its identification only.
-    pub fn unanalysed(case: &Case, plan_sha256: &str) -> FeatureRow {
+    /// Returns the row of a run that was not analysed, with its identification, and how it left the range of its model.
+    pub fn unanalysed(case: &Case, limits: &[String], plan_sha256: &str) -> FeatureRow {
         FeatureRow {
+            beyond_model: super::joined(limits),
             model: case.model.clone(),
             fill_m: case.fill,
             amplitude_nm: case.amplitude,
@@ -111,7 +112,7 @@ impl FeatureRow {
             f_dip_std_hz: estimate.and_then(|(estimate, _)| estimate.deviations.f_dip),
             peak_rate_rad_s: Some(totals.peak_rate),
             peak_acceleration_rad_s2: Some(totals.peak_acceleration),
-            ..FeatureRow::unanalysed(&run.case, plan_sha256)
+            ..FeatureRow::unanalysed(&run.case, &[], plan_sha256)
         }
     }
 }

@@ -261,11 +261,8 @@ fn introduction(page: &Page, fmu: &Fmu, results: &Results) -> Markup {
     let count = results.outcomes.len() + results.unanalysed.len();
     let rate = first.map_or(0.0, |case| thousandths(1e3 / case.step) / 1e6);
     let (fmu, failures) = (fmu.description(), &results.failures);
-    let beyond: Vec<String> = results
-        .outcomes
-        .iter()
-        .filter_map(|run| Some(format!("{} ({})", run.case.name, run.beyond_model()?)))
-        .collect();
+    let beyond: Vec<String> =
+        results.beyond_model().map(|(case, how)| format!("{} ({how})", case.name)).collect();
     let groups = page.groups.iter().filter(|group| group.band().is_some());
     let result = result::sentence(page, results);
     let recorded = results.recordings();
@@ -311,7 +308,9 @@ fn introduction(page: &Page, fmu: &Fmu, results: &Results) -> Markup {
                     @if beyond.len() == 1 { "its" } @else { "their" } " model"
                 }
                 @if beyond.len() == 1 { ": " } @else { ", such as " }
-                (one) ". They are numerically correct but do not represent a real tank. The results table marks them."
+                (one) ". They are numerically correct but do not represent a real tank. "
+                @if results.unanalysed.is_empty() { "The results table marks them." }
+                @else { "In runs.csv the column beyond_model says how each run did." }
             }
         }
     }
@@ -325,11 +324,12 @@ fn link(file: &str, run: &Outcome) -> Markup {
         p {
             a href=(file) { b { "See a run move: " (run.case.name) } }
             @if radial > 0.0 {
-                ", that with the largest radial slosh angle (" (degrees(radial)) ")."
+                ". Of all runs, its liquid has the largest slosh angle across the plane of the hub's motion, "
+                (degrees(radial)) "."
             } @else {
-                ", that with the largest slosh angle (" (degrees(run.totals.peak_slosh_angle)) ")."
+                ". Of all runs, its liquid has the largest slosh angle, " (degrees(run.totals.peak_slosh_angle)) "."
             }
-            " Others: " code { "hubslosh view runs/NAME.parquet" } "."
+            " A page of any other run: " code { "hubslosh view runs/NAME.parquet" } "."
         }
     }
 }
