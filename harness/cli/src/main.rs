@@ -15,9 +15,7 @@ macro_rules! print {
 /// Prints a line about what was done, which is not a result; `--quiet` suppresses it.
 macro_rules! done {
     ($($arguments:tt)*) => {
-        if !crate::terminal::is_quiet() {
-            println!($($arguments)*);
-        }
+        crate::terminal::done(format_args!($($arguments)*))
     };
 }
 

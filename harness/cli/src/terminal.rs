@@ -2,7 +2,7 @@
 
 use std::io::{ErrorKind, Write};
 use std::sync::OnceLock;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use anstream::AutoStream;
 use anyhow::Result;
@@ -34,6 +34,7 @@ pub struct Terminal {
 
 static TERMINAL: OnceLock<Terminal> = OnceLock::new();
 static WARNINGS: AtomicUsize = AtomicUsize::new(0);
+static JSON: AtomicBool = AtomicBool::new(false);
 
 impl Terminal {
     /// Applies these settings from now on; only the first call has an effect.
@@ -142,10 +143,25 @@ pub fn print(text: String) {
     }
 }
 
-/// Prints a value as indented JSON to stdout.
+/// Prints a value as JSON. Lines about written files that follow go to stderr, so that stdout is the JSON alone.
 pub fn print_json(value: &impl serde::Serialize) -> Result<()> {
-    print(serde_json::to_string_pretty(value)? + "\n");
+    print_text_as_json(serde_json::to_string_pretty(value)? + "\n");
     Ok(())
+}
+
+/// Prints a text that is JSON, as [`print_json`] does.
+pub fn print_text_as_json(text: String) {
+    JSON.store(true, Ordering::Relaxed);
+    print(text);
+}
+
+/// Prints a line that names a written file, unless the command is quiet: to stdout, or to stderr after JSON.
+pub fn done(text: std::fmt::Arguments) {
+    match JSON.load(Ordering::Relaxed) {
+        _ if is_quiet() => {}
+        true => eprintln!("{text}"),
+        false => println!("{text}"),
+    }
 }
 
 /// Returns the program's stdout, which a guarded FMU cannot write to.

@@ -255,7 +255,7 @@ impl AnyFmuArgs {
             terminal::warn(warning);
         })?;
         if told.json {
-            println!("{}", serde_json::to_string_pretty(&bounds)?);
+            terminal::print_json(&bounds)?;
         } else {
             print_predicted(&bounds);
         }

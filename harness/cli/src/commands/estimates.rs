@@ -66,7 +66,7 @@ impl Out<'_> {
     ) -> Result<()> {
         self.save(text)?;
         if self.json {
-            print!("{text}");
+            terminal::print_text_as_json(text.into());
         } else if !terminal::has_reader() {
             tables();
         }

@@ -85,6 +85,22 @@ fn one_unknown_all_unknowns_at_bounds_and_no_input_are_answered() {
     assert!(bounds[0]["std"].is_null() && bounds[0]["not_determined"] == true, "{json}");
 }
 
+/// The names of written files used to follow it.
+#[test]
+fn json_that_is_printed_is_alone_on_stdout() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    record(folder, "data.csv", &["hub.I=0.5"]);
+    let fit = ["identify", "data.csv", "--free", "hub.I=0.55:0.3:2", "--inputs", "tau_cmd"];
+    let fit = [&fit[..], &["--outputs", "omega", "--tries", "0", "--set", "slosh.model=frozen"]];
+    let fit = [&fit.concat()[..], &["--out", "result.json", "--report", "page.html", "--json"]];
+    let plan = ["design", "--profile", "lin-sweep:duration=10", "--out", "t.csv", "--json"];
+    for command in [&fit.concat()[..], &plan] {
+        let said = hubslosh(folder, command).unwrap();
+        serde_json::from_str::<serde_json::Value>(&said).expect(&said);
+    }
+}
+
 #[test]
 fn what_cannot_be_written_or_means_nothing_is_refused_before_the_search() {
     let folder = tempfile::tempdir().unwrap();
