@@ -4,18 +4,15 @@ use plant::{
     Calculated, Contact, DampingLaw, FrictionModel, Inputs, Outputs, Plant, STATES, SloshModel,
     SloshSource, State, StepError, StoppedStep,
 };
-use runtime::Model;
+use runtime::Dynamics;
 use runtime::clock::Instant;
 use runtime::model::{StepEnd, StepFailure};
-use runtime::table::Table;
-
-use crate::table::{self, TABLE};
 
 /// The bench: hub, bearing, tank, wheel and gyro.
 #[derive(Clone, Debug)]
 pub struct HubSlosh {
     plant: Plant,
-    /// True after [`Model::apply_present_inputs`], so that outputs belong to the present inputs.
+    /// True after [`Dynamics::apply_present_inputs`], so that outputs belong to the present inputs.
     present: bool,
 }
 
@@ -125,10 +122,10 @@ impl Parameters {
             start.friction.model as i32,
             ("friction.kind", self.friction_kind),
         );
-        table::set_item(&mut p.slosh.model, &SloshModel::ALL, self.slosh_kind);
-        table::set_item(&mut p.slosh.source, &SloshSource::ALL, self.slosh_source_kind);
-        table::set_item(&mut p.slosh.damping_law, &DampingLaw::ALL, self.damping_law_kind);
-        table::set_item(&mut p.friction.model, &FrictionModel::ALL, self.friction_kind);
+        set_item(&mut p.slosh.model, &SloshModel::ALL, self.slosh_kind);
+        set_item(&mut p.slosh.source, &SloshSource::ALL, self.slosh_source_kind);
+        set_item(&mut p.slosh.damping_law, &DampingLaw::ALL, self.damping_law_kind);
+        set_item(&mut p.friction.model, &FrictionModel::ALL, self.friction_kind);
         for (flag, kind) in [
             (&mut p.slosh.zeta_from_correlation, self.zeta_from_correlation_kind),
             (&mut p.slosh.capillarity, self.capillarity_kind),
@@ -144,22 +141,24 @@ impl Parameters {
     }
 }
 
+pub(crate) fn set_item<T: Copy>(field: &mut T, items: &[T], number: i32) {
+    if let Some(item) = usize::try_from(number).ok().and_then(|n| items.get(n.checked_sub(1)?)) {
+        *field = *item;
+    }
+}
+
 fn failure(why: StepError) -> StepFailure {
     StepFailure { text: why.to_string(), shorter_may_succeed: why.shorter_may_succeed() }
 }
 
-/// Number of words that [`Model::save`] writes.
+/// Number of words that [`Dynamics::save`] writes.
 pub const SAVED_WORDS: usize = State::WORDS + 1 + StoppedStep::WORDS;
 
-impl Model for HubSlosh {
+impl Dynamics for HubSlosh {
     type Parameters = Parameters;
     type Inputs = Inputs;
     type Outputs = Outputs;
     type Discrete = Option<Contact>;
-
-    fn table() -> &'static Table<Self> {
-        &TABLE
-    }
 
     fn new(
         parameters: &Parameters,

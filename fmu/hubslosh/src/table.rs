@@ -16,8 +16,7 @@ use runtime::table::{About, Scalar, Table, scalar_count, scalars};
 use runtime::variable::Dimension::{Fixed, Sized};
 use runtime::variable::{Dimension, Enumeration, Item, Variable};
 
-use crate::HubSlosh;
-use crate::model::SAVED_WORDS;
+use crate::model::{HubSlosh, SAVED_WORDS, set_item};
 
 /// Table of the FMU's variables.
 pub static TABLE: Table<HubSlosh> = Table::new(
@@ -33,6 +32,12 @@ pub static TABLE: Table<HubSlosh> = Table::new(
     VARIABLES,
     &SCALARS,
 );
+
+impl runtime::Model for HubSlosh {
+    fn table() -> &'static Table<Self> {
+        &TABLE
+    }
+}
 
 static SCALARS: [Scalar<HubSlosh>; scalar_count(VARIABLES)] = scalars(VARIABLES);
 
@@ -664,12 +669,6 @@ static LIMITED_BY: Enumeration = Enumeration {
     description: "Reason why no slosh mode represents the liquid",
     items: &LIMITED_BY_ITEMS,
 };
-
-pub(crate) fn set_item<T: Copy>(field: &mut T, items: &[T], number: i32) {
-    if let Some(item) = usize::try_from(number).ok().and_then(|n| items.get(n.checked_sub(1)?)) {
-        *field = *item;
-    }
-}
 
 fn parts(ramp: &mut Ramp) -> [&mut f64; 2] {
     [&mut ramp.value, &mut ramp.slope]

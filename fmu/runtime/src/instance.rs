@@ -1628,6 +1628,7 @@ fn scalar<M: Model, V: Version>(call: &Call, reference: u32) -> Result<&'static 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::dynamics::Dynamics;
     use crate::tests::trays::Trays;
     use crate::v3::Fmi3;
 

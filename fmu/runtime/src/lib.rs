@@ -15,6 +15,7 @@
 pub mod c_abi;
 pub mod call;
 pub mod clock;
+pub mod dynamics;
 pub mod extent;
 pub mod hash;
 pub mod instance;
@@ -28,6 +29,7 @@ pub mod v3;
 pub mod variable;
 pub mod version;
 
+pub use dynamics::Dynamics;
 pub use model::Model;
 
 // The runtime's own tests use the FMU of tests/spring.

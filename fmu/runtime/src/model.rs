@@ -1,216 +1,34 @@
-//! The interface that a model implements to become an FMU.
+//! A model that can become an FMU: its dynamics, and the table of its variables.
 
-use std::fmt::Debug;
+pub use crate::dynamics::{Dynamics, Instant, StepEnd, StepFailure};
+use crate::table::{Scalar, Table};
+use crate::variable::Causality;
 
-pub use crate::clock::Instant;
-use crate::table::Table;
-
-/// Failure of a step.
-#[derive(Clone, Debug, PartialEq)]
-pub struct StepFailure {
-    /// Reason, as a sentence.
-    pub text: String,
-    /// True if a shorter step may succeed.
-    pub shorter_may_succeed: bool,
-}
-
-/// Creates a failure after which a shorter step may succeed, for example because a step takes too much work.
-impl From<&str> for StepFailure {
-    fn from(text: &str) -> StepFailure {
-        StepFailure { text: text.into(), shorter_may_succeed: true }
-    }
-}
-
-/// End of a step that stops at events.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum StepEnd {
-    /// The step has reached its end.
-    End,
-    /// The step has reached its end, where there is an event.
-    EventAtEnd,
-    /// There is an event before the end, this long after the start of the step, s.
-    Event(f64),
-}
-
-/// A dynamic system with inputs, parameters, continuous states and events.
-///
-/// A clone is a saved state, so a model must keep no data elsewhere. Times are in s. Functions that a smooth
-/// model without events does not need have a default.
-pub trait Model: Clone + Debug + Sized + 'static {
-    /// All parameters; the default has the start values.
-    type Parameters: Clone + Debug + Default;
-    /// All inputs, each with its present value and its slope over the step; the default has the start values
-    /// and slopes of 0.
-    type Inputs: Copy + Debug + Default;
-    /// Everything that follows from states and inputs at one instant. The same type holds the derivatives of
-    /// the outputs in a direction.
-    type Outputs: Copy + Debug;
-    /// Discrete values that inputs can change immediately; `()` for a model without events.
-    type Discrete: Default;
-
-    /// True if outputs depend not only on the inputs' values but also on their slopes.
-    const OUTPUTS_USE_SLOPES: bool = false;
-
-    /// The parameter that counts the elements to which the event indicators belong, with the same number of
-    /// indicators per element, in order.
-    const INDICATORS_OF: Option<&'static str> = None;
-
+/// [`Dynamics`] with the table of their variables.
+pub trait Model: Dynamics {
     /// Returns the table of variables and further contents of the model description.
     fn table() -> &'static Table<Self>;
+}
 
-    /// Creates the model at the start of the simulation, with the inputs at that time. `tolerance` is
-    /// relative.
-    ///
-    /// # Errors
-    ///
-    /// Everything that is wrong with combinations of parameters; single parameters are in their ranges.
-    fn new(
-        parameters: &Self::Parameters,
-        inputs: &Self::Inputs,
-        start_time: f64,
-        tolerance: f64,
-    ) -> Result<Self, Vec<String>>;
-
-    /// Lists where parameters and initial inputs are outside the range in which the model was verified, one
-    /// sentence each.
-    fn warnings(&self, parameters: &Self::Parameters, inputs: &Self::Inputs) -> Vec<String> {
-        let _ = (parameters, inputs);
-        Vec::new()
+impl<M: Model> Scalar<M> {
+    /// Returns the inputs and continuous states on which it depends without delay.
+    pub fn depends_on(&self) -> impl Iterator<Item = &'static Scalar<M>> {
+        let known = M::table()
+            .scalars
+            .iter()
+            .filter(|s| s.variable.causality == Causality::Input || s.variable.state.is_some());
+        known.filter(|s| self.names(self.variable.depends_on, s))
     }
 
-    /// Returns the reason why a parameter is not used although the part of the model that it describes is, as
-    /// "name = value" of the parameter that replaces it. `name` is the name in the table, `indices` are those
-    /// of the element, from 0 (empty for a scalar). Hosts get a warning about such parameters if they differ
-    /// from their start values. Parameters of parts that are switched off give no warning, because the same
-    /// parameters often serve several models.
-    fn overridden(parameters: &Self::Parameters, name: &str, indices: &[usize]) -> Option<String> {
-        let _ = (parameters, name, indices);
-        None
-    }
-
-    /// Appends the saved state except parameters and inputs: always
-    /// [`About::saved_words`](crate::table::About::saved_words) words.
-    fn save(&self, words: &mut Vec<u64>);
-
-    /// Restores a saved state with the same parameters. Returns `None` if the words are not a state.
-    fn resume(parameters: &Self::Parameters, words: &[u64], tolerance: f64) -> Option<Self>;
-
-    /// Advances by exactly `h` > 0 seconds while the inputs change with their slopes. After an error the
-    /// model is unchanged. It allocates no memory unless it fails.
-    fn step(&mut self, inputs: &Self::Inputs, h: f64) -> Result<(), StepFailure>;
-
-    /// Advances like [`Model::step`], but stops at the first event. A second step from there to the same end
-    /// with the same inputs gives a bit-identical result to the whole step.
-    fn step_to_event(&mut self, inputs: &Self::Inputs, h: f64) -> Result<StepEnd, StepFailure> {
-        self.step(inputs, h).map(|()| StepEnd::End)
-    }
-
-    /// Applies permanently the discrete changes that the present inputs cause, see
-    /// [`Model::apply_present_inputs`].
-    fn take_present_inputs(&mut self, inputs: &Self::Inputs) {
-        let _ = inputs;
-    }
-
-    /// Returns the outputs for the present states and the given inputs.
-    fn outputs(&mut self, inputs: &Self::Inputs) -> Self::Outputs;
-
-    /// Sets the slopes, over a step of size `h` (s), of inputs that follow from other inputs during the step,
-    /// for example a rate from its derivative; these inputs are declared by
-    /// [`Variable::follows_inputs`](crate::variable::Variable::follows_inputs). Returns true if there are
-    /// any.
-    fn set_dependent_slopes(inputs: &mut Self::Inputs, h: f64) -> bool {
-        let _ = (inputs, h);
-        false
-    }
-
-    /// Returns the continuous states in the model's own order (see `Variable::state`).
-    fn continuous_states(&self) -> &[f64];
-
-    /// Sets the continuous states from the host's integrator (Model Exchange).
-    fn set_continuous_states(&mut self, x: &[f64]);
-
-    /// Sets the present time of the host's clock.
-    fn set_time(&mut self, now: Instant);
-
-    /// Computes the derivatives of the continuous states.
-    fn derivatives(&mut self, inputs: &Self::Inputs, x_dot: &mut [f64]);
-
-    /// Computes derivatives in the direction of the states `dx` and of the input slopes in `along`: those of
-    /// the state derivatives are written to `dx_dot`, those of the outputs are returned. Discrete values and
-    /// the slopes of `inputs` are held constant.
-    fn directional_derivative(
-        &mut self,
-        inputs: &Self::Inputs,
-        along: &Self::Inputs,
-        dx: &[f64],
-        dx_dot: &mut [f64],
-    ) -> Self::Outputs;
-
-    /// Applies the discrete changes that the present inputs cause, before the model is evaluated. The result
-    /// is passed to [`Model::revert`] afterwards. If the host handles events, discrete values change only in
-    /// event mode, and neither function is called.
-    fn apply_present_inputs(&mut self, inputs: &Self::Inputs) -> Self::Discrete {
-        let _ = inputs;
-        Self::Discrete::default()
-    }
-
-    /// Reverts [`Model::apply_present_inputs`], so that reading outputs does not change the model.
-    fn revert(&mut self, before: Self::Discrete) {
-        let _ = before;
-    }
-
-    /// Applies changes of tunable parameters while the simulation runs.
-    fn tune(
-        &mut self,
-        parameters: &Self::Parameters,
-        inputs: &Self::Inputs,
-    ) -> Result<(), Vec<String>> {
-        let _ = (parameters, inputs);
-        Ok(())
-    }
-
-    /// Computes the event indicators, functions that change sign at events:
-    /// [`About::event_indicators`](crate::table::About::event_indicators) of them. With a reduced description
-    /// only the first ones are used ([`Model::INDICATORS_OF`]).
-    fn event_indicators(&mut self, inputs: &Self::Inputs, indicators: &mut [f64]) {
-        let _ = (inputs, indicators);
-    }
-
-    /// Handles the events that are due now. Returns true if continuous states have changed. After an error
-    /// nothing has changed.
-    fn handle_event(&mut self, inputs: &Self::Inputs) -> Result<bool, String> {
-        let _ = inputs;
-        Ok(false)
-    }
-
-    /// Returns the time of the next time event, s.
-    fn next_time_event(&self) -> Option<f64> {
-        None
-    }
-
-    /// Accepts a step of a Model Exchange host. Returns true if an event must be handled now.
-    ///
-    /// # Errors
-    ///
-    /// The reason why the states that the host has set are not valid.
-    fn accept_step(&mut self, inputs: &Self::Inputs) -> Result<bool, String> {
-        let _ = inputs;
-        Ok(false)
-    }
-
-    /// Returns a warning about the simulation so far, or about the steps of a Model Exchange host. It is
-    /// called after each step until there is a warning.
-    fn step_warning(&self) -> Option<&'static str> {
-        None
-    }
-
-    /// Returns the number of events since the start.
-    fn event_count(&self) -> i32 {
-        0
-    }
-
-    /// Describes the last event for the log: what happened, and when.
-    fn last_event(&self) -> String {
-        String::new()
+    /// Returns the inputs and parameters on which its initial value depends.
+    pub fn initial_depends_on(&self) -> impl Iterator<Item = &'static Scalar<M>> {
+        let known = M::table()
+            .scalars
+            .iter()
+            .filter(|s| matches!(s.variable.causality, Causality::Input | Causality::Parameter));
+        known.filter(|s| {
+            self.names(self.variable.depends_on, s)
+                || self.names(self.variable.initial_depends_on, s)
+        })
     }
 }

@@ -6,8 +6,8 @@
 use std::sync::OnceLock;
 
 use crate::call::CType;
+use crate::dynamics::Dynamics;
 use crate::hash::Hash;
-use crate::model::Model;
 use crate::unit::{self, Unit};
 use crate::variable::{Access, Causality, Dimension, Enumeration, Kind, Place, Value, Variable};
 
@@ -24,14 +24,14 @@ pub struct About {
     pub events: &'static str,
     /// Number of event indicators.
     pub event_indicators: usize,
-    /// Number of words that [`Model::save`] writes.
+    /// Number of words that [`Dynamics::save`] writes.
     pub saved_words: usize,
 }
 
 /// All data about a model's variables. It uses no heap memory, so that a host may load and unload the FMU any
 /// number of times.
 #[derive(Debug)]
-pub struct Table<M: Model> {
+pub struct Table<M: Dynamics> {
     /// Properties of the FMU as a whole.
     pub about: About,
     /// The variables.
@@ -68,7 +68,7 @@ pub const GUID_LENGTH: usize = 38;
 type Span = (usize, usize);
 
 /// Returns the range of the scalars of one kind: 'i' inputs, 'p' parameters, otherwise derivatives.
-const fn span<M: Model>(scalars: &[Scalar<M>], kind: char) -> Span {
+const fn span<M: Dynamics>(scalars: &[Scalar<M>], kind: char) -> Span {
     let (mut begin, mut end, mut n) = (0, 0, 0);
     while n < scalars.len() {
         let is_one = match kind {
@@ -93,7 +93,7 @@ const fn span<M: Model>(scalars: &[Scalar<M>], kind: char) -> Span {
 
 /// A scalar of the table.
 #[derive(Debug)]
-pub struct Scalar<M: Model> {
+pub struct Scalar<M: Dynamics> {
     /// Entry of the table.
     pub variable: &'static Variable<M>,
     /// Access of the entry, copied here because every call needs it.
@@ -113,15 +113,15 @@ pub struct Scalar<M: Model> {
 }
 
 // Derived implementations would require the same of M.
-impl<M: Model> Clone for Scalar<M> {
+impl<M: Dynamics> Clone for Scalar<M> {
     fn clone(&self) -> Self {
         *self
     }
 }
-impl<M: Model> Copy for Scalar<M> {}
+impl<M: Dynamics> Copy for Scalar<M> {}
 
 /// Returns the number of scalars of a table.
-pub const fn scalar_count<M: Model>(variables: &[Variable<M>]) -> usize {
+pub const fn scalar_count<M: Dynamics>(variables: &[Variable<M>]) -> usize {
     let (mut count, mut entry) = (0, 0);
     while entry < variables.len() {
         count += variables[entry].len();
@@ -131,7 +131,7 @@ pub const fn scalar_count<M: Model>(variables: &[Variable<M>]) -> usize {
 }
 
 /// Returns all scalars of a table; N is [`scalar_count`].
-pub const fn scalars<M: Model, const N: usize>(
+pub const fn scalars<M: Dynamics, const N: usize>(
     variables: &'static [Variable<M>],
 ) -> [Scalar<M>; N] {
     let first = Scalar {
@@ -173,11 +173,11 @@ pub const fn scalars<M: Model, const N: usize>(
 }
 
 /// Returns true for a discrete output, which changes only at events.
-const fn is_discrete<M: Model>(variable: &Variable<M>) -> bool {
+const fn is_discrete<M: Dynamics>(variable: &Variable<M>) -> bool {
     matches!(variable.access, Access::OutputInteger(_) | Access::OutputBoolean(_))
 }
 
-impl<M: Model> Scalar<M> {
+impl<M: Dynamics> Scalar<M> {
     /// Returns the name, with indices for the element of an array.
     pub fn name(&self) -> String {
         self.variable.element_name(self.element)
@@ -201,29 +201,8 @@ impl<M: Model> Scalar<M> {
         self.variable.start(&mut parameters, &mut inputs, self.element)
     }
 
-    /// Returns the inputs and continuous states on which it depends without delay.
-    pub fn depends_on(&self) -> impl Iterator<Item = &'static Scalar<M>> {
-        let known = M::table()
-            .scalars
-            .iter()
-            .filter(|s| s.variable.causality == Causality::Input || s.variable.state.is_some());
-        known.filter(|s| self.names(self.variable.depends_on, s))
-    }
-
-    /// Returns the inputs and parameters on which its initial value depends.
-    pub fn initial_depends_on(&self) -> impl Iterator<Item = &'static Scalar<M>> {
-        let known = M::table()
-            .scalars
-            .iter()
-            .filter(|s| matches!(s.variable.causality, Causality::Input | Causality::Parameter));
-        known.filter(|s| {
-            self.names(self.variable.depends_on, s)
-                || self.names(self.variable.initial_depends_on, s)
-        })
-    }
-
     /// Returns true if a list of dependencies contains `other`.
-    fn names(&self, names: &[&str], other: &Scalar<M>) -> bool {
+    pub(crate) fn names(&self, names: &[&str], other: &Scalar<M>) -> bool {
         let v = other.variable;
         names.iter().any(|name| match name.strip_suffix("[]") {
             Some(array) => array == v.name && self.element == other.element,
@@ -236,7 +215,7 @@ impl<M: Model> Scalar<M> {
     }
 }
 
-impl<M: Model> Table<M> {
+impl<M: Dynamics> Table<M> {
     /// Creates a model's table from the declared variables and their scalars.
     pub const fn new(
         about: About,
@@ -427,6 +406,7 @@ fn braced(hash: Hash) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::Model;
     use crate::spring::Spring;
 
     #[test]

@@ -1,7 +1,7 @@
 //! Variables of an FMU: the types from which a model's table is built.
 
 use crate::call::CType;
-use crate::model::Model;
+use crate::dynamics::Dynamics;
 
 /// The value of one scalar in the C interface. Enumerations are integers.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -161,7 +161,7 @@ impl Dimension {
 /// first and for a scalar.
 #[derive(Debug)]
 #[allow(missing_docs)]
-pub enum Access<M: Model> {
+pub enum Access<M: Dynamics> {
     /// Value and slope of an input.
     Input(fn(&mut M::Inputs, usize) -> [&mut f64; 2]),
     Output(fn(&M::Outputs, usize) -> f64),
@@ -187,7 +187,7 @@ pub enum Access<M: Model> {
 
 /// A scalar variable or an array.
 #[derive(Debug)]
-pub struct Variable<M: Model> {
+pub struct Variable<M: Dynamics> {
     /// Name. The element of an array has its indices, counted from 1, in the empty brackets of the name;
     /// further indices follow in brackets of their own. For example `tank[].p` with the shape 4, 3, 3 has the
     /// elements `tank[1].p[1,1]`, `tank[1].p[1,2]`, …
@@ -207,7 +207,7 @@ pub struct Variable<M: Model> {
     /// True if events can make this state discontinuous.
     pub reinit: bool,
     /// True if the slope of this input over a step follows from other inputs
-    /// ([`Model::set_dependent_slopes`]), whatever slope the host sets.
+    /// ([`Dynamics::set_dependent_slopes`]), whatever slope the host sets.
     pub follows_inputs: bool,
     /// True if this parameter can be set during the simulation.
     pub tunable: bool,
@@ -220,18 +220,18 @@ pub struct Variable<M: Model> {
 }
 
 // Derived implementations would require the same of M.
-impl<M: Model> Clone for Access<M> {
+impl<M: Dynamics> Clone for Access<M> {
     fn clone(&self) -> Self {
         *self
     }
 }
-impl<M: Model> Copy for Access<M> {}
-impl<M: Model> Clone for Variable<M> {
+impl<M: Dynamics> Copy for Access<M> {}
+impl<M: Dynamics> Clone for Variable<M> {
     fn clone(&self) -> Self {
         *self
     }
 }
-impl<M: Model> Copy for Variable<M> {}
+impl<M: Dynamics> Copy for Variable<M> {}
 
 /// Shortest time in which an input may cross its range, s, because values that follow from faster changes may
 /// overflow.
@@ -252,7 +252,7 @@ pub fn text(x: f64) -> String {
     if is_nan { "NaN".into() } else { format!("{x:?}") }
 }
 
-const fn variable<M: Model>(
+const fn variable<M: Dynamics>(
     name: &'static str,
     causality: Causality,
     kind: Kind,
@@ -279,7 +279,7 @@ const fn quantity(unit: &'static str) -> Kind {
     Kind::Real(Quantity { unit, display_unit: None, min: None, max: None, nominal: None })
 }
 
-impl<M: Model> Variable<M> {
+impl<M: Dynamics> Variable<M> {
     /// Declares an input with its value and slope.
     pub const fn input(
         name: &'static str,

@@ -4,11 +4,9 @@ use craft::{
     Coupling, Craft, DampingLaw, SloshTank, SloshTankOutputs, TANK_INPUTS, TANK_STATES, TankInputs,
     TankParameters, TankState,
 };
+use runtime::Dynamics;
 use runtime::clock::Instant;
 use runtime::model::StepFailure;
-use runtime::table::Table;
-
-use crate::table::TABLE;
 
 /// Limit of `coupling_ratio` for the warning. Coupling by the total wrench with extrapolation on both sides
 /// is stable up to 2/sqrt(3) - 1 = 0.155.
@@ -127,17 +125,13 @@ pub struct Inputs {
     pub omega_slope: [f64; 3],
 }
 
-impl runtime::Model for Model {
+impl Dynamics for Model {
     type Parameters = Parameters;
     type Inputs = Inputs;
     type Outputs = SloshTankOutputs;
     type Discrete = ();
 
     const OUTPUTS_USE_SLOPES: bool = true;
-
-    fn table() -> &'static Table<Self> {
-        &TABLE
-    }
 
     fn new(
         parameters: &Parameters,
@@ -299,7 +293,6 @@ impl runtime::Model for Model {
 
 #[cfg(test)]
 mod tests {
-    use runtime::Model as _;
 
     use super::*;
 

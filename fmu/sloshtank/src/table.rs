@@ -6,8 +6,7 @@ use runtime::table::{About, Scalar, Table, scalar_count, scalars};
 use runtime::variable::Dimension::{Fixed, Sized};
 use runtime::variable::{Dimension, Enumeration, Item, Variable};
 
-use crate::Model;
-use crate::model::Parameters;
+use crate::model::{Model, Parameters};
 
 /// Table of the FMU's variables.
 pub static TABLE: Table<Model> = Table::new(
@@ -23,6 +22,12 @@ pub static TABLE: Table<Model> = Table::new(
     VARIABLES,
     &SCALARS,
 );
+
+impl runtime::Model for Model {
+    fn table() -> &'static Table<Self> {
+        &TABLE
+    }
+}
 
 static SCALARS: [Scalar<Model>; scalar_count(VARIABLES)] = scalars(VARIABLES);
 

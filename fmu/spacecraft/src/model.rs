@@ -1,11 +1,9 @@
 use std::ops::{Deref, DerefMut};
 
 use craft::{DampingLaw, INPUTS, Inputs, Mount, Outputs, STATES, Spacecraft, State, TANKS};
+use runtime::Dynamics;
 use runtime::clock::Instant;
 use runtime::model::StepFailure;
-use runtime::table::Table;
-
-use crate::table::TABLE;
 
 #[derive(Clone, Debug)]
 pub struct Model {
@@ -142,7 +140,7 @@ impl Parameters {
     }
 }
 
-impl runtime::Model for Model {
+impl Dynamics for Model {
     type Parameters = Parameters;
     type Inputs = Inputs;
     type Outputs = Outputs;
@@ -151,10 +149,6 @@ impl runtime::Model for Model {
     // The slope of h_wheels is a torque on the craft.
     const OUTPUTS_USE_SLOPES: bool = true;
     const INDICATORS_OF: Option<&'static str> = Some("tanks");
-
-    fn table() -> &'static Table<Self> {
-        &TABLE
-    }
 
     fn new(
         parameters: &Parameters,
@@ -293,7 +287,6 @@ impl runtime::Model for Model {
 
 #[cfg(test)]
 mod tests {
-    use runtime::Model as _;
 
     use super::*;
 

@@ -9,8 +9,7 @@ use runtime::table::{About, Scalar, Table, scalar_count, scalars};
 use runtime::variable::Dimension::{Fixed, Sized, Used};
 use runtime::variable::{Dimension, Enumeration, Item, Variable};
 
-use crate::Model;
-use crate::model::Parameters;
+use crate::model::{Model, Parameters};
 
 /// Table of the FMU's variables.
 pub static TABLE: Table<Model> = Table::new(
@@ -25,6 +24,12 @@ pub static TABLE: Table<Model> = Table::new(
     VARIABLES,
     &SCALARS,
 );
+
+impl runtime::Model for Model {
+    fn table() -> &'static Table<Self> {
+        &TABLE
+    }
+}
 
 const DESCRIPTION: &str = "A rigid spacecraft in six degrees of freedom with up to four tanks of sloshing liquid, free or on an air bearing";
 

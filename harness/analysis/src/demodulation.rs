@@ -9,8 +9,9 @@
 //! [cycles]. U uses the same window, so the window's effect on amplitude and phase cancels in H.
 //! Harmonics due to friction rotate by many cycles within the window and average out.
 
+use crate::response::FrequencyResponse;
 use crate::sweep::Sweep;
-use crate::{Complex64, FrequencyResponse};
+use signals::fourier::Complex64;
 
 /// Smallest number of cycles in a window. With three cycles a Hann window still separates the sweep from
 /// other components.

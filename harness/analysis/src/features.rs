@@ -1,7 +1,8 @@
 //! Antiresonance and resonance of a frequency response (thesis 6.3.1).
 
 use crate::random::Random;
-use crate::{Complex64, FrequencyResponse};
+use crate::response::FrequencyResponse;
+use signals::fourier::Complex64;
 
 /// Features of a frequency response.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -162,7 +163,7 @@ fn vertex(response: &FrequencyResponse, level: &[f64], i: usize) -> (f64, f64) {
 mod tests {
     use super::Features;
     use crate::linear::Linear;
-    use crate::{BAND, logarithmic_grid};
+    use crate::response::{BAND, logarithmic_grid};
 
     #[test]
     fn features_of_the_exact_transfer_function_are_the_reference_values() {

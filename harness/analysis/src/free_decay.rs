@@ -22,9 +22,9 @@ use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::Complex64;
 use crate::least_squares::{differences, minimise, smallest};
 use crate::statistics::{deviation, mean};
+use signals::fourier::Complex64;
 
 /// Smallest number of periods from which frequency and damping are estimated.
 pub const LEAST_PERIODS: f64 = 5.0;

@@ -2,8 +2,9 @@
 //! period of 20 s in a spacecraft is resolved as well as slosh with 0.4 s on a bench. For the thesis's sweep, 1.25 to
 //! 3.5 Hz in 2700 s, they are 24 cycles, 200 s and 20 s.
 
+use crate::response::BAND;
 use crate::sweep::Sweep;
-use crate::{BAND, spa, welch};
+use crate::{spa, welch};
 
 /// Number of samples per cycle of the band's highest frequency that an estimate from a whole record needs.
 /// The thesis's sweep has 14.3.

@@ -24,6 +24,7 @@ pub mod off_axis;
 pub mod random;
 pub mod rational;
 pub mod residual;
+mod response;
 pub mod rest;
 pub mod rotary;
 pub mod sanathanan_koerner;
@@ -33,32 +34,5 @@ pub mod sweep;
 pub mod transfer_function;
 pub mod welch;
 
+pub use response::{BAND, FrequencyResponse, logarithmic_grid};
 pub use signals::fourier::Complex64;
-
-/// A complex frequency response on a grid of frequencies.
-#[derive(Clone, Debug, Default)]
-pub struct FrequencyResponse {
-    /// Frequencies, Hz, increasing.
-    pub frequency: Vec<f64>,
-    /// Rate over torque, (rad/s)/(N·m).
-    pub response: Vec<Complex64>,
-}
-
-impl FrequencyResponse {
-    pub fn decibels(&self) -> Vec<f64> {
-        self.response.iter().map(|h| 20.0 * h.norm().log10()).collect()
-    }
-
-    pub fn degrees(&self) -> Vec<f64> {
-        self.response.iter().map(|h| h.arg().to_degrees()).collect()
-    }
-}
-
-/// The thesis's band (6.3.1), Hz.
-pub const BAND: (f64, f64) = (1.25, 3.5);
-
-/// Returns `points` frequencies from one end of the band to the other, equally spaced in log f, Hz.
-pub fn logarithmic_grid((from, to): (f64, f64), points: usize) -> Vec<f64> {
-    let step = (to / from).ln() / (points - 1) as f64;
-    (0..points).map(|i| from * (i as f64 * step).exp()).collect()
-}

@@ -15,7 +15,8 @@ use std::f64::consts::TAU;
 use nalgebra::DMatrix;
 
 use crate::exponential::exponential;
-use crate::{Complex64, FrequencyResponse};
+use crate::response::FrequencyResponse;
+use signals::fourier::Complex64;
 
 /// Parameters of the linear model of hub and liquid.
 #[derive(Clone, Debug, Default)]
@@ -180,8 +181,9 @@ impl Linear {
 mod tests {
     use super::Linear;
     use crate::features::Features;
+    use crate::response::{BAND, logarithmic_grid};
     use crate::sweep::{Law, Sweep};
-    use crate::{BAND, demodulation, logarithmic_grid, spa};
+    use crate::{demodulation, spa};
     use std::f64::consts::TAU;
 
     #[test]

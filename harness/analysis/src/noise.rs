@@ -16,7 +16,7 @@
 use nalgebra::{SMatrix, SVector};
 use signals::fourier::Forward;
 
-use crate::Complex64;
+use signals::fourier::Complex64;
 
 /// Number of lines on either side, n.
 const SIDE: usize = 6;
@@ -82,8 +82,9 @@ mod tests {
     use super::power;
     use crate::features::Features;
     use crate::linear::Linear;
+    use crate::response::{BAND, logarithmic_grid};
     use crate::sweep::Sweep;
-    use crate::{BAND, demodulation, lengths, logarithmic_grid, spa};
+    use crate::{demodulation, lengths, spa};
 
     const STEP: f64 = 0.02;
 

@@ -13,7 +13,7 @@
 //! distance from the axis. The radial force of a planar wave, which is its centripetal force, is only at
 //! twice the sweep's frequency and causes no leakage. A circular wave has the fraction 1/2 on average.
 
-use crate::FrequencyResponse;
+use crate::response::FrequencyResponse;
 use crate::statistics::about_mean;
 
 /// Off-axis figures of a sweep.
@@ -92,7 +92,8 @@ pub fn leakage(radial: &FrequencyResponse, arm: f64) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::{OffAxis, of_rates};
-    use crate::{Complex64, FrequencyResponse};
+    use crate::response::FrequencyResponse;
+    use signals::fourier::Complex64;
 
     #[test]
     fn a_rate_of_a_tenth_about_each_other_axis_is_a_cef_of_a_fiftieth() {

@@ -17,8 +17,9 @@ use nalgebra::{DMatrix, DVector};
 use signals::fourier::Forward;
 
 use crate::features::{Deviations, Features};
+use crate::response::FrequencyResponse;
 use crate::sanathanan_koerner::{self, Coefficients, Line};
-use crate::{Complex64, FrequencyResponse};
+use signals::fourier::Complex64;
 
 /// Largest number of frequencies in a fit; of more frequencies an equally spaced selection is used.
 const POINTS: usize = 1500;
@@ -138,7 +139,7 @@ fn solved(mut a: DMatrix<f64>, b: DVector<f64>) -> Option<(DVector<f64>, (f64, S
 mod tests {
     use super::Rational;
     use crate::features::Features;
-    use crate::logarithmic_grid;
+    use crate::response::logarithmic_grid;
     use crate::sweep::Sweep;
     use crate::transfer_function::TransferFunction;
     use std::f64::consts::TAU;

@@ -1,9 +1,10 @@
 //! The thesis's linear model of a run, the quality of its fit, and its residual (6.3.2 to 6.3.5).
 
 use crate::features::Features;
+use crate::response::FrequencyResponse;
+use crate::statistics;
 use crate::transfer_function::{TransferFunction, fit_time};
 use crate::welch::{Segments, Spectra};
-use crate::{FrequencyResponse, statistics};
 
 /// A transfer function fitted to a run, and its residual.
 #[derive(Clone, Copy, Debug, PartialEq)]

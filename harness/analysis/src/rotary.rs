@@ -9,7 +9,8 @@
 //! outwards towards +θ). Under any other torque the same number follows from the angles in windows
 //! of time, by their angular momentum.
 
-use crate::{Complex64, FrequencyResponse};
+use crate::response::FrequencyResponse;
+use signals::fourier::Complex64;
 
 /// Swirl number above which motion counts as rotary; this is an ellipse with axes 1 : 3.7.
 pub const ROTARY: f64 = 0.5;
@@ -99,8 +100,8 @@ mod tests {
     use std::f64::consts::PI;
 
     use super::{Rotary, swirl};
-    use crate::Complex64;
-    use crate::FrequencyResponse;
+    use crate::response::FrequencyResponse;
+    use signals::fourier::Complex64;
 
     #[test]
     fn a_circle_swirls_by_one_and_a_line_not_at_all() {

@@ -10,7 +10,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::Complex64;
+use signals::fourier::Complex64;
 
 /// Spectra at one frequency: s = jω in a unit near the middle of the lines (for the condition of the
 /// equations), U and Y.
@@ -90,8 +90,8 @@ mod tests {
     use nalgebra::{DMatrix, DVector};
 
     use super::{Coefficients, Line, fit};
-    use crate::Complex64;
     use crate::least_squares::smallest;
+    use signals::fourier::Complex64;
 
     #[test]
     fn a_transfer_function_is_found_in_its_own_spectra_beside_a_transient() {

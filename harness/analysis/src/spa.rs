@@ -8,7 +8,9 @@
 
 use signals::fourier::{Forward, Inverse};
 
-use crate::{Complex64, FrequencyResponse, statistics};
+use crate::response::FrequencyResponse;
+use crate::statistics;
+use signals::fourier::Complex64;
 
 /// Longest lag for the thesis's band, s. `spa` resolves about 1/lag: 10 mHz need 100 s. 200 s hardly change the shape
 /// of the antiresonance, whose half-power width is 14 mHz.
@@ -153,7 +155,7 @@ fn transformed(lags: &[[f64; 3]], angles: [f64; TOGETHER]) -> [(Complex64, f64);
 #[cfg(test)]
 mod tests {
     use super::frequency_response;
-    use crate::Complex64;
+    use signals::fourier::Complex64;
 
     #[test]
     fn it_is_the_sum_of_its_definition() {

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::BAND;
+use crate::response::BAND;
 
 /// Torque A sin φ(t) whose frequency φ'/2π goes from f0 to f1, upwards or downwards.
 #[derive(Clone, Debug, PartialEq)]

@@ -17,9 +17,10 @@ use nalgebra::{DMatrix, DVector, Dyn, Matrix3, Matrix5, OMatrix, U6, Vector3, Ve
 use crate::exponential::exponential;
 use crate::features::Features;
 use crate::least_squares;
+use crate::response::FrequencyResponse;
 use crate::sanathanan_koerner::{self, Coefficients, Line};
 use crate::statistics::mean;
-use crate::{Complex64, FrequencyResponse};
+use signals::fourier::Complex64;
 
 /// A transfer function with three stable poles and two zeros; s in rad/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -318,7 +319,7 @@ impl LeastSquaresProblem<f64, Dyn, U6> for Problem<'_> {
 mod tests {
     use super::{TransferFunction, fit_time};
     use crate::linear::{Linear, Mode};
-    use crate::{BAND, logarithmic_grid};
+    use crate::response::{BAND, logarithmic_grid};
     use std::f64::consts::TAU;
 
     #[test]

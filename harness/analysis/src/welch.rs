@@ -14,7 +14,9 @@
 
 use signals::fourier::Forward;
 
-use crate::{Complex64, FrequencyResponse, statistics};
+use crate::response::FrequencyResponse;
+use crate::statistics;
+use signals::fourier::Complex64;
 
 /// Number of segments of a record, which is the default of MATLAB's `mscohere`, `cpsd` and `tfestimate`.
 pub const SEGMENTS: usize = 8;

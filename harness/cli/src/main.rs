@@ -271,7 +271,7 @@ fn carry_out(cli: Cli) -> u8 {
         Some(Command::Run(args)) => args.run(),
         Some(Command::View(args)) => args.run(),
         Some(Command::Variables(args)) => args.run(),
-        Some(Command::Completions(args)) => args.run(),
+        Some(Command::Completions(args)) => args.run(Cli::command()),
         Some(Command::Torque(args)) => args.run(),
         Some(Command::Campaign(args)) => args.run(),
         Some(Command::Analyse(args)) => args.run(),

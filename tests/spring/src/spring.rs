@@ -1,6 +1,6 @@
 //! A mass on a spring, m x'' = F - d x' - k x, by Runge-Kutta 4 in steps of 1 ms at most.
 
-use runtime::model::{Instant, Model, StepFailure};
+use runtime::model::{Dynamics, Instant, Model, StepFailure};
 use runtime::table::{About, Scalar, Table, scalar_count, scalars};
 use runtime::variable::Variable;
 
@@ -69,14 +69,16 @@ static TABLE: Table<Spring> = Table::new(
 );
 
 impl Model for Spring {
+    fn table() -> &'static Table<Self> {
+        &TABLE
+    }
+}
+
+impl Dynamics for Spring {
     type Parameters = Parameters;
     type Inputs = [f64; 2]; // the force and its slope, N, N/s
     type Outputs = f64; // the acceleration, m/s2
     type Discrete = ();
-
-    fn table() -> &'static Table<Self> {
-        &TABLE
-    }
 
     fn new(p: &Parameters, _: &[f64; 2], _: f64, _: f64) -> Result<Self, Vec<String>> {
         Ok(Spring { p: *p, x: [p.x0, 0.0] })

@@ -17,11 +17,13 @@ mod version;
 pub(crate) mod vessels;
 
 use crate::call::{Fault, Interface, Severity};
+use crate::dynamics::Dynamics;
 use crate::instance::Instance;
+use crate::model::Model;
+use crate::snapshot::to_bytes;
 use crate::spring::Spring;
 use crate::v2::{Fmi2, GET_BOOLEAN, GET_INTEGER, GET_REAL, SET_BOOLEAN, SET_INTEGER, SET_REAL};
 use crate::variable::{Kind, Value};
-use crate::{Model, snapshot::to_bytes};
 use vessels::{TABLE, Vessels};
 
 type Subject = Instance<Vessels, Fmi2>;

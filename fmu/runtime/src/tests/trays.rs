@@ -1,9 +1,9 @@
 //! Trays that fill: a model whose arrays are as long as one of its parameters says, x_i' = q_i, with an output whose
 //! derivatives vanish where all is 0.
 
-use crate::Model;
 use crate::clock::Instant;
 use crate::model::StepFailure;
+use crate::model::{Dynamics, Model};
 use crate::table::{About, Scalar, Table, scalar_count, scalars};
 use crate::variable::Dimension::{Fixed, Sized};
 use crate::variable::Variable;
@@ -69,14 +69,16 @@ static TABLE: Table<Trays> = Table::new(
 );
 
 impl Model for Trays {
+    fn table() -> &'static Table<Self> {
+        &TABLE
+    }
+}
+
+impl Dynamics for Trays {
     type Parameters = Parameters;
     type Inputs = Inputs;
     type Outputs = f64;
     type Discrete = ();
-
-    fn table() -> &'static Table<Self> {
-        &TABLE
-    }
 
     fn new(_: &Parameters, _: &Inputs, _: f64, _: f64) -> Result<Self, Vec<String>> {
         Ok(Trays { x: [1.0, 2.0, 4.0] })

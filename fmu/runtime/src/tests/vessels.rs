@@ -4,8 +4,8 @@
 //! x(h) = x e + q (1 - e) / k + s (h - (1 - e) / k) / k with e = exp(-k h). Above the height
 //! [`OPENS`] of the platform a valve opens, which spills half of the first vessel.
 
-use crate::Model;
 use crate::clock::Instant;
+use crate::model::{Dynamics, Model};
 use crate::model::{StepEnd, StepFailure};
 use crate::table::{About, Scalar, Table, scalar_count, scalars};
 use crate::variable::Dimension::Fixed;
@@ -149,16 +149,18 @@ fn failure(text: String) -> StepFailure {
 }
 
 impl Model for Vessels {
+    fn table() -> &'static Table<Self> {
+        &TABLE
+    }
+}
+
+impl Dynamics for Vessels {
     type Parameters = Parameters;
     type Inputs = Inputs;
     type Outputs = Outputs;
     type Discrete = bool;
 
     const OUTPUTS_USE_SLOPES: bool = true;
-
-    fn table() -> &'static Table<Self> {
-        &TABLE
-    }
 
     fn new(p: &Parameters, inputs: &Inputs, time: f64, _: f64) -> Result<Self, Vec<String>> {
         let [a, b] = p.level_0;

@@ -1,7 +1,6 @@
 //! `hubslosh completions`.
 
 use anyhow::Result;
-use clap::CommandFactory;
 
 /// Prints a script by which a shell completes commands and flags of hubslosh.
 #[derive(clap::Args)]
@@ -15,9 +14,10 @@ pub struct CompletionsArgs {
 }
 
 impl CompletionsArgs {
-    pub fn run(self) -> Result<()> {
+    /// Prints the script for `command`, the whole command line.
+    pub fn run(self, mut command: clap::Command) -> Result<()> {
         let mut script = Vec::new();
-        clap_complete::generate(self.shell, &mut crate::Cli::command(), "hubslosh", &mut script);
+        clap_complete::generate(self.shell, &mut command, "hubslosh", &mut script);
         print!("{}", String::from_utf8(script)?);
         Ok(())
     }
