@@ -1,7 +1,11 @@
 """Mass properties and margins at 20 fills against the same numbers put together by hand."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
+import certificate
+import check_certificate
 import design_review
 import numpy as np
 import pytest
@@ -87,3 +91,47 @@ def test_the_worst_case_of_the_review_is_confirmed_by_simulation(
     assert found.confirmation.agrees
     off = found.confirmation.simulated_factor / found.confirmation.factor
     assert off == pytest.approx(1, abs=0.01)
+
+
+def test_a_certificate_is_checked_by_numpy_alone_and_one_that_was_changed_is_refused(
+    spacecraft: str, tmp_path: Path
+) -> None:
+    """The size, a missing interval, another loop, and scalings that prove nothing."""
+    found = certificate.certificate("40%", replace(telecom.craft, model=spacecraft))
+    # µ is between both
+    assert found.size == pytest.approx(1.81, rel=0.01) and found.gap < 1.0401
+    found.save(tmp_path / "certificate.npz")
+    with np.load(tmp_path / "certificate.npz") as file:
+        kept = dict(file)
+    assert check_certificate.check(tmp_path / "certificate.npz") < 0
+
+    def checked(change: Callable[[dict[str, np.ndarray]], None]) -> float:
+        other = {name: value.copy() for name, value in kept.items()}
+        change(other)
+        np.savez(tmp_path / "changed.npz", **other)
+        return check_certificate.check(tmp_path / "changed.npz")
+
+    def enlarged(of: dict[str, np.ndarray]) -> None:
+        of["size"] *= 1.1
+        of["box_low"] = np.where(of["box_low"] > of["least"], 1.1 * of["box_low"], of["least"])
+        of["box_high"] *= 1.1
+
+    def without_a_row(of: dict[str, np.ndarray]) -> None:
+        rows = ("low", "high", "box_low", "box_high", "start", "stop", "first", "last")
+        of |= {name: np.delete(of[name], 5, axis=0) for name in rows}
+
+    def with_more_delay(of: dict[str, np.ndarray]) -> None:
+        of["delay"] += 5.0
+
+    for change in (enlarged, with_more_delay, lambda of: of["G"].fill(0)):
+        assert checked(change) > 0
+    for change, words in (
+        (without_a_row, "do not cover"),
+        (lambda of: of["D"].__imul__(-1), "not positive definite"),
+        (lambda of: of["G"].__imul__(1j), "not Hermitian"),
+        (lambda of: of["D"].__iadd__(1e-3), "does not commute"),
+        (lambda of: of["size"].__imul__(1.1), "do not cover"),
+        (lambda of: of["L_B"].__imul__(100), "unstable"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            checked(change)

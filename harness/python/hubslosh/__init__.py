@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from . import attitude, plot
+    from .certificate import Certificate
     from .checking import Checked, CheckedRule, Finding, check
     from .craft import Craft, MassProperties, MountedTank
     from .files import to_csv, to_mat, to_parquet
@@ -52,6 +53,7 @@ if TYPE_CHECKING:
 # numpy, pandas and scipy take 0.3 to 1.2 s to import: each module comes on the first use of
 # one of its names (PEP 562). The same as above, for Python itself; a test compares.
 _MODULES = {
+    "certificate": ("Certificate",),
     "checking": ("Checked", "CheckedRule", "Finding", "check"),
     "craft": ("Craft", "MassProperties", "MountedTank"),
     "files": ("to_csv", "to_mat", "to_parquet"),
@@ -83,6 +85,7 @@ _MODULE_OF = {name: module for module, names in _MODULES.items() for name in nam
 __all__ = [
     "COLUMNS",
     "TORQUE",
+    "Certificate",
     "Checked",
     "CheckedRule",
     "Craft",

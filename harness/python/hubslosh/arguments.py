@@ -18,7 +18,7 @@ SECONDS: dict[str, tuple[float, float]] = {
 WHOLE: Mapping[str, tuple[int, int]] = {
     "latency": (0, 1_000_000), "substeps": (1, 1_000_000), "draws": (0, 100_000),
     "runs": (1, 100_000_000), "run": (0, 100_000_000), "workers": (1, 4096),
-    "seed": (0, 2**63 - 1),
+    "seed": (0, 2**63 - 1), "most": (1, 1_000_000),
 }  # fmt: skip
 """Allowed whole numbers."""
 

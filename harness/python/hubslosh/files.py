@@ -216,8 +216,9 @@ def _in_mat(values: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def write_file(path: str | Path, ending: str, text: Callable[[], str]) -> None:
-    """Write a text, which is made after the file's name was checked."""
+def write_file(path: str | Path, ending: str, content: Callable[[], str | bytes]) -> None:
+    """Write a text or bytes, which are made after the file's name was checked."""
     path = _check_path(path, ending)
     with temporary.output(path) as new:
-        new.write_text(text(), encoding="utf-8")
+        made = content()
+        new.write_bytes(made.encode() if isinstance(made, str) else made)

@@ -1,0 +1,359 @@
+r"""Certificates of robust stability, over intervals of frequency and boxes of parameters.
+
+A loop that is stable at Δ = 0 stays stable in a box of Δ if no pole reaches the unit circle, that
+is if I - N(f) Δ is regular for each frequency f up to half the sampling rate and each Δ in the box.
+Scalings D and G show it (`scalings`) if X(f) < 0. One pair is tried on a whole interval of
+frequency. N is analytic in f, delay included, so X is a polynomial of degree `DEGREE` to rounding
+on a short interval. The values of a polynomial are convex combinations of its Bernstein
+coefficients. If these are below 0, X is on the whole interval. Otherwise the interval is halved;
+where no scalings exist at a single frequency, the box is.
+"""
+
+import io
+from dataclasses import dataclass
+from itertools import pairwise
+from math import comb
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .arguments import check_ranges
+from .fmu import FmuError
+from .scalings import Complex, Scalings, Vector, form, recentred
+from .uncertainty import corners
+
+if TYPE_CHECKING:
+    from .loop import Loop
+    from .uncertainty import UncertainModel, WorstCase
+
+DEGREE = 8
+"""Degree of the polynomials that stand for X on an interval."""
+
+REACH = 2.0
+"""Least sum of semi-axes of the ellipses around intervals, of half length 1, without a pole."""
+
+LOWEST = 1e-6
+"""Frequency over half the sampling rate that stands for 0."""
+
+REMAINDER = 0.01
+"""Largest remainder of a polynomial over the margin of X."""
+
+ROUNDING = 1e-9
+"""Least margin of X, whose D is scaled to a diagonal of 1."""
+
+HALVINGS = 8
+"""Number of times at which an interval is halved for the polynomials of one pair of scalings."""
+
+SIZES = (1.0, 1.2, 1.5, 2.0, 3.0, 5.0, 10.0)
+"""Factors by which the size is divided one after the other if it cannot be certified."""
+
+SMALLEST_BOX = 1e-3
+"""Least width of a box over that of the whole."""
+
+NODES = (1 - np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))) / 2
+"""Chebyshev's nodes between 0 and 1."""
+_TO_CHEBYSHEV = np.linalg.inv(np.polynomial.chebyshev.chebvander(2 * NODES - 1, DEGREE))
+_TO_BERNSTEIN = np.linalg.inv([
+    [comb(DEGREE, k) * x**k * (1 - x) ** (DEGREE - k) for k in range(DEGREE + 1)] for x in NODES
+])  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Certificate:
+    """Proof that a loop is stable for every Δ of a size; see `UncertainModel.certify`.
+
+    Parameters
+    ----------
+    size : float
+        The loop is stable for all ``|δ| ≤ size``; 1 is the end of the ranges. 0 if nothing was
+        proved.
+    worst : WorstCase
+        Smallest Δ found that makes the loop unstable.
+    least : dict of float
+        Lower ends of δ, by name, where quantities such as damping ratios cannot be below 0.
+    data : dict of ndarray
+        What `save` writes: the loop, intervals, boxes, D and G.
+    solved : int
+        Number of convex problems that were solved.
+
+    Examples
+    --------
+    A craft with one tank under a PD controller whose command is 0.2 s late:
+
+    >>> import numpy as np
+    >>> import hubslosh
+    >>> sphere = {"density": 1010, "shape": {"sphere": {"radius": 0.4}}}
+    >>> tanks = {"main": hubslosh.MountedTank(sphere, (0, 0, 0.2), modes=1, nu=1e-6)}
+    >>> craft = hubslosh.Craft(900, [400, 380, 300], tanks=tanks, thrust=500)
+    >>> loop = craft.loop(np.hstack([20 * np.eye(3), 80 * np.eye(3)]), 0.1, "50%", delay=0.2)
+    >>> model = craft.uncertain("50%", {"main.frequency[1]": "10%", "craft.Jxx": "5%"})
+    >>> found = model.certify(loop, largest=2)
+    >>> found.size, found.worst.size
+    (2, inf)
+    """
+
+    size: float
+    worst: "WorstCase"
+    least: dict[str, float]
+    data: dict[str, NDArray[Any]]
+    solved: int
+
+    @property
+    def mu(self) -> float:
+        """Upper bound of µ over all frequencies: 1 over the certified size."""
+        return 1 / self.size if self.size else np.inf
+
+    @property
+    def gap(self) -> float:
+        """Size of the worst case over the certified size; inf if either is missing."""
+        return self.worst.size / self.size if self.size else np.inf
+
+    def __repr__(self) -> str:
+        """Return the certified size, the worst case and the gap between them."""
+        if not self.size:
+            return f"Certificate: none was found with {self.solved} convex problems\n{self.worst!r}"
+        found = (
+            f"the worst case found has {self.worst.size:.4g}, {self.gap:.3f} times as much"
+            if np.isfinite(self.worst.size)
+            else "no worse case was found"
+        )
+        return (
+            f"Certificate: stable up to {self.size:.4g} times the ranges, µ ≤ {self.mu:.4g}; "
+            f"{found}\n  {len(self.data['low'])} intervals of frequency and boxes, "
+            f"{len(self.data['D'])} pairs of scalings, {self.solved} convex problems"
+        )
+
+    def save(self, path: str | Path) -> None:
+        """Write the certificate as .npz, so that it can be checked with NumPy alone.
+
+        Parameters
+        ----------
+        path : str or Path
+            File to write. Example 15 of the book checks it.
+
+        Raises
+        ------
+        FmuError
+            If the name does not end in .npz, the file cannot be written, or nothing was proved.
+        """
+        from .files import write_file
+
+        if not self.size:
+            raise FmuError("nothing was proved, so that there is nothing to save")
+
+        def content() -> bytes:
+            file = io.BytesIO()
+            np.savez_compressed(file, **self.data)  # type: ignore[arg-type]
+            return file.getvalue()
+
+        write_file(path, ".npz", content)
+
+
+class UnstableError(Exception):
+    """A Δ within the box at which the loop is unstable."""
+
+    def __init__(self, delta: Vector) -> None:
+        """Store Δ."""
+        super().__init__()
+        self.delta = delta
+
+
+class ExhaustedError(Exception):
+    """More convex problems would be needed than are allowed."""
+
+
+Pair = tuple[Complex, Complex]
+"""D and G."""
+
+Region = tuple[float, float, Vector, Vector]
+"""Ends of an interval of frequency, Hz, and of a box."""
+
+
+class _Search:
+    """Search of scalings for a loop, with what is known of it by frequency and box."""
+
+    def __init__(self, model: "UncertainModel", loop: "Loop") -> None:
+        self.model, self.loop = model, loop
+        self.scalings = Scalings(model.counts)
+        self.nyquist = 0.5 / loop.period
+        self.width = 0.0
+        self.pairs: list[Pair] = []
+        self.found: dict[tuple[float, bytes, bytes], tuple[float, int]] = {}
+        self.known: dict[tuple[float, float], Complex] = {}
+        self.poles: dict[bytes, NDArray[np.complex128]] = {}
+
+    def response(self, a: float, b: float) -> Complex:
+        """Return N at the nodes of an interval."""
+        if (a, b) not in self.known:
+            self.known[a, b] = self.model.closed(self.loop, a + (b - a) * NODES)
+        return self.known[a, b]
+
+    def own_poles(self, low: Vector, high: Vector) -> NDArray[np.complex128]:
+        """Return the poles in the middle of a box as complex frequencies, Hz."""
+        middle = (low + high) / 2
+        key = middle.tobytes()
+        if key not in self.poles:
+            z = self.model._poles(self.loop, middle)
+            if np.abs(z).max() > 1 + 1e-9:
+                raise UnstableError(middle)
+            # those that no input moves have no damping, and N does not have them
+            z = z[(np.abs(z) > 1e-12) & (np.abs(z) < 1 - 1e-9)]
+            self.poles[key] = np.log(z) / (2j * np.pi * self.loop.period)
+        return self.poles[key]
+
+    def proved(
+        self, region: Region, ends: tuple[Pair, Pair], part: tuple[float, float], halvings: int
+    ) -> list[tuple[float, float]] | None:
+        """Return the intervals on which polynomials show X < 0 in a region; None if it is not.
+
+        D and G are straight lines between the ends of the region, of which ``part`` is a part.
+        """
+        low, high = region[2:]
+        a, b = part
+        share = (a + (b - a) * NODES - region[0]) / (region[1] - region[0])
+        D, G = ((1 - share)[:, None, None] * first + share[:, None, None] * last
+                for first, last in zip(*ends, strict=True))  # fmt: skip
+        X = form(recentred(self.response(a, b), self.scalings.copies, low, high), D, G)
+        # D and G of physical units differ by many powers of ten; the signs of X stay
+        scale = 1 / np.sqrt(np.diag(D[DEGREE // 2]).real)
+        X = X * scale * scale[:, None]
+        margin = -np.linalg.eigvalsh(X)[:, -1].max()
+        if not margin > ROUNDING:
+            return None
+        away = (self.own_poles(low, high) - (a + b) / 2) / ((b - a) / 2)
+        axes = np.abs(away + np.sqrt(away - 1) * np.sqrt(away + 1))
+        if np.maximum(axes, 1 / axes).min(initial=np.inf) >= REACH:
+            last = np.abs(np.tensordot(_TO_CHEBYSHEV[-2:], X, 1)).sum(axis=0)
+            remainder = float(np.linalg.norm(last))
+            if remainder < REMAINDER * margin:
+                top = np.linalg.eigvalsh(np.tensordot(_TO_BERNSTEIN, X, 1))[:, -1].max()
+                if top < -2 * remainder:
+                    return [(a, b)]
+        if not halvings:
+            return None
+        middle, found = (a + b) / 2, []
+        for half in ((a, middle), (middle, b)):
+            pieces = self.proved(region, ends, half, halvings - 1)
+            if pieces is None:
+                return None
+            found += pieces
+        return found
+
+    def halved(self, region: Region) -> list[Region]:
+        """Return the two halves of a region's box along the quantity that helps most."""
+        a, b, low, high = region
+        if (high - low).max() < SMALLEST_BOX * self.width:
+            raise ExhaustedError
+        for corner in corners(len(low)):
+            at = np.where(corner > 0, high, low)
+            if np.abs(self.model._poles(self.loop, at)).max() > 1 + 1e-9:
+                raise UnstableError(at)
+        best: tuple[float, list[Region]] = (-np.inf, [])
+        for k in range(len(low)):
+            middle = (low[k] + high[k]) / 2
+            halves = [(low.copy(), high.copy()), (low.copy(), high.copy())]
+            halves[0][1][k] = halves[1][0][k] = middle
+            margins = sorted(self.margin((a + b) / 2, *half)[0] for half in halves)
+            if (merit := margins[0] + 0.1 * margins[1]) > best[0] or not best[1]:
+                best = merit, [(a, b, *half) for half in halves]
+        return best[1]
+
+    def margin(self, f: float, low: Vector, high: Vector) -> tuple[float, int]:
+        """Return the largest margin at a frequency, and the number of its scalings in `pairs`."""
+        key = f, low.tobytes(), high.tobytes()
+        if key not in self.found:
+            # 0 is a pole of the craft, though not of N
+            N = self.model.closed(self.loop, [max(f, LOWEST * self.nyquist)])[0]
+            margin, *pair = self.scalings.best(recentred(N, self.scalings.copies, low, high))
+            self.pairs.append((pair[0], pair[1]))
+            self.found[key] = margin, len(self.pairs) - 1
+        return self.found[key]
+
+    def certify(self, low: Vector, high: Vector, most: int) -> dict[str, NDArray[Any]]:
+        """Return intervals, boxes and scalings that prove a box; raises if that fails."""
+        self.width, self.pairs, self.found = float((high - low).max()), [], {}
+        edges = np.append(0.0, np.geomspace(self.nyquist / 1000, self.nyquist, 16))
+        stack = [(float(a), float(b), low, high) for a, b in pairwise(edges)]
+        rows: list[tuple[float, float, Vector, Vector, float, float, int, int]] = []
+        while stack:
+            region = stack.pop()
+            a, b, *box = region
+            if self.scalings.solved > most:
+                raise ExhaustedError
+            self.own_poles(*box)
+            first, last = self.margin(a, *box), self.margin(b, *box)
+            if min(first[0], last[0]) > ROUNDING and b - a > 1e-9 * self.nyquist:
+                ends = self.pairs[first[1]], self.pairs[last[1]]
+                if pieces := self.proved(region, ends, (a, b), HALVINGS):
+                    rows.extend((*piece, *box, a, b, first[1], last[1]) for piece in pieces)
+                else:
+                    middle = (a + b) / 2
+                    stack += [(middle, b, *box), (a, middle, *box)]
+            else:
+                stack += self.halved(region)
+        names = ("low", "high", "box_low", "box_high", "start", "stop", "first", "last")
+        columns = [np.array(column) for column in zip(*rows, strict=True)]
+        found = dict(zip(names, columns, strict=True))
+        used, numbers = np.unique([found["first"], found["last"]], return_inverse=True)
+        found["first"], found["last"] = numbers.reshape(2, -1)
+        return found | {
+            name: np.array([self.pairs[k][i] for k in used]) for i, name in enumerate("DG")
+        }
+
+
+def certify(
+    model: "UncertainModel", loop: "Loop", largest: float, gap: float, most: int
+) -> Certificate:
+    """Return a certificate near the worst case; see `UncertainModel.certify`."""
+    check_ranges(most=most)
+    if not gap > 1:
+        raise FmuError(f"gap = {gap!r} must be above 1, such as 1.05")
+    search = _Search(model, loop)
+    worst = model.worst_case(loop, largest)
+    least = model._least
+    least_named = {name: float(x) for name, x in zip(model.deltas, least, strict=True)
+                   if np.isfinite(x)}  # fmt: skip
+    data: dict[str, NDArray[Any]] = {}
+    size, solved = 0.0, 0
+    for factor in SIZES:
+        while True:
+            known = worst.size / gap if np.isfinite(worst.size) else largest
+            tried = min(known, largest) / factor
+            box = np.maximum(-tried, least), np.full(len(least), tried)
+            search.scalings.solved = 0
+            try:
+                data = search.certify(*box, most)
+                size = tried
+            except UnstableError as found:
+                size_found = float(np.abs(found.delta).max())
+                worst = model._limit(loop, found.delta / size_found, size_found)
+                worst = model._nearby(loop, worst)
+                continue
+            except ExhaustedError:
+                pass
+            finally:
+                solved += search.scalings.solved
+            break
+        if size:
+            break
+    if size:
+        data |= _saved(model, loop, size, least)
+    return Certificate(size, worst, least_named, data, solved)
+
+
+def _saved(
+    model: "UncertainModel", loop: "Loop", size: float, least: Vector
+) -> dict[str, NDArray[Any]]:
+    """Return what a check needs of the loop: M, the controller, and the loop gain at Δ = 0."""
+    K = loop._must_be_linear()
+    gain = loop._gain(model.at(np.zeros(len(least))), K)
+    systems = {"M": model.M, "K": K, "L": gain}
+    found = {f"{name}_{part}": matrix for name, system in systems.items()
+             for part, matrix in zip("ABCD", system, strict=True)}  # fmt: skip
+    late = loop.delay + loop.latency * loop.period
+    return found | {
+        "size": np.array(size), "least": least, "counts": np.array(model.counts),
+        "deltas": np.array(model.deltas), "period": np.array(loop.period), "delay": np.array(late),
+    }  # fmt: skip

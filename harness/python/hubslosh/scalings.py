@@ -1,0 +1,208 @@
+r"""D and G scalings of real, repeated parameters (Fan, Tits and Doyle 1991), by Clarabel.
+
+Δ is diagonal and real, each parameter in one block of copies. With Hermitian D > 0 and G that have
+a full block for each parameter, and thus commute with Δ,
+
+    X = N^H D N - D + j (G N - N^H G) < 0
+
+shows that I - N Δ is regular for all |δ| ≤ 1: (I - N Δ) v = 0 with w = Δ v, v = N w would give
+w^H X w = v^H D v - w^H D w ≥ 0, because the term with G vanishes for a real Δ.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .fmu import FmuError
+
+Complex = NDArray[np.complex128]
+Vector = NDArray[np.float64]
+
+FLOOR = 1e-6
+"""Least eigenvalue of D; its mean is 1, in coordinates in which |N| is balanced."""
+
+SMALLEST = 1e-3
+"""Bounds of µ below this are not resolved."""
+
+
+def solver() -> Any:
+    """Return the convex solver's package, or raise FmuError with the way to it."""
+    try:
+        import clarabel
+    except ModuleNotFoundError:
+        raise FmuError(
+            "bounds of µ and certificates need the package clarabel: pip install 'hubslosh[robust]'"
+        ) from None
+    return clarabel
+
+
+def adjoint(matrices: Complex) -> Complex:
+    """Return the conjugate transpose of each matrix."""
+    return np.swapaxes(matrices.conj(), -1, -2)
+
+
+def form(N: Complex, D: Complex, G: Complex) -> Complex:
+    """Return X = N^H D N - D + j (G N - N^H G) for each matrix N."""
+    half = adjoint(N) @ D @ N / 2 + 1j * (G @ N) - D / 2
+    return half + adjoint(half)
+
+
+def recentred(N: Complex, copies: NDArray[np.int64], low: Vector, high: Vector) -> Complex:
+    """Return N for a Δ of [-1, 1] that stands for a box of δ from ``low`` to ``high``."""
+    middle, radius = ((low + high) / 2)[copies], ((high - low) / 2)[copies]
+    found: Complex = np.linalg.solve(np.eye(len(middle)) - N * middle, N) * radius
+    return found
+
+
+class Scalings:
+    """Searches D and G for blocks of given sizes."""
+
+    def __init__(self, counts: Sequence[int]) -> None:
+        """Prepare the constraints; ``counts`` are the numbers of copies."""
+        self.clarabel = solver()
+        self.counts = tuple(int(count) for count in counts)
+        self.copies = np.repeat(np.arange(len(self.counts)), self.counts)
+        """Number of the parameter of each copy."""
+        self.solved = 0
+        """Number of convex problems that were solved."""
+        n, basis, start = sum(self.counts), [], 0
+        for count in self.counts:
+            for i in range(start, start + count):
+                for j in range(start, i + 1):
+                    for value in (1.0, 1j)[: 2 - (i == j)]:
+                        unit = np.zeros((n, n), complex)
+                        unit[i, j], unit[j, i] = value, np.conj(value)
+                        basis.append(unit)
+            start += count
+        self.basis = np.array(basis)
+        # D ≥ FLOOR in each block, and its trace is n; the last column is that of the margin
+        rows, bounds, self.cones, start = [], [], [], 0
+        for count in self.counts:
+            block = self.basis[:, start : start + count, start : start + count]
+            rows.append(-_triangle(block))
+            bounds.append(-FLOOR * _triangle(np.eye(count, dtype=complex)))
+            self.cones.append(self.clarabel.PSDTriangleConeT(2 * count))
+            start += count
+        rows.append(np.trace(self.basis, axis1=1, axis2=2).real[:, None])
+        bounds.append(np.array([float(n)]))
+        self.cones.append(self.clarabel.ZeroConeT(1))
+        # where N allows it, G makes the margin as large as one likes
+        bounds.append(np.array([1.0]))
+        self.cones.append(self.clarabel.NonnegativeConeT(1))
+        left = np.hstack(rows)
+        self.fixed = np.zeros((left.shape[1] + 1, 2 * len(basis) + 1))
+        self.fixed[:-1, : len(basis)] = left.T
+        self.fixed[-1, -1] = 1.0
+        self.bounds = np.concatenate(bounds)
+        settings = self.clarabel.DefaultSettings()
+        settings.verbose, settings.max_iter, settings.max_threads = False, 60, 1
+        # |N| is balanced already; what comes back is judged by its eigenvalues, not by tolerances
+        settings.equilibrate_enable = settings.chordal_decomposition_enable = False
+        settings.tol_gap_abs = settings.tol_gap_rel = 1e-3
+        settings.tol_feas = 1e-7
+        self.settings = settings
+
+    def best(self, N: Complex) -> tuple[float, Complex, Complex]:
+        """Return the margin -λmax(X), and D and G that make it largest.
+
+        A margin above 0 proves that I - N Δ is regular for all |δ| ≤ 1. It is 1 at most, where the
+        mean eigenvalue of D is 1 after balancing.
+        """
+        from scipy.sparse import csc_matrix
+
+        n, count = len(N), len(self.basis)
+        N, scale = _balanced(N)
+        turned = 1j * (self.basis @ N)
+        by_D = adjoint(N) @ self.basis @ N - self.basis
+        lmi = np.vstack([
+            _triangle(by_D), _triangle(turned + adjoint(turned)),
+            _triangle(np.eye(n, dtype=complex))[None],
+        ])  # fmt: skip
+        aim = np.zeros(2 * count + 1)
+        aim[-1] = -1.0
+        found = self.clarabel.DefaultSolver(
+            csc_matrix((len(aim), len(aim))), aim, csc_matrix(np.vstack([lmi.T, self.fixed])),
+            np.concatenate([np.zeros(lmi.shape[1]), self.bounds]),
+            [self.clarabel.PSDTriangleConeT(2 * n), *self.cones], self.settings,
+        ).solve()  # fmt: skip
+        self.solved += 1
+        x = np.array(found.x)
+        D, G = (np.tensordot(part, self.basis, 1) for part in (x[:count], x[count:-1]))
+        margin = -float(np.linalg.eigvalsh(form(N, D, G))[-1])
+        if not np.isfinite(margin) or np.linalg.eigvalsh(D)[0] <= 0:
+            margin = -np.inf
+        across = np.outer(scale, scale)
+        return margin, D / across, G / across
+
+    def largest(self, N: Complex, least: Vector, guess: float = 1.0) -> float:
+        """Return a size k so that I - N Δ is regular for all |δ| ≤ k with δ ≥ ``least``.
+
+        It is the largest that scalings prove, to 0.5 %, but at most 1/SMALLEST. A good guess saves
+        half of the convex problems.
+        """
+
+        def is_proved(log_size: float) -> bool:
+            size = np.exp(log_size)
+            low = np.maximum(-size, least)
+            whole = recentred(N, self.copies, low, np.full(len(least), size))
+            return log_size <= norm or self.best(whole)[0] > 0
+
+        if not N.any():
+            return 1 / SMALLEST
+        # the size below which the norm of N proves it
+        norm = -float(np.log(np.linalg.norm(_balanced(N)[0], 2))) - 1e-9
+        most, step = -float(np.log(SMALLEST)), 0.1
+        low = high = min(max(float(np.log(guess)), norm), most)
+        while is_proved(high):
+            low = high
+            if low >= most:
+                return 1 / SMALLEST
+            high, step = min(low + step, most), 2 * step
+        if low == high:
+            low = max(low - step, norm)
+            while not is_proved(low):
+                high, low, step = low, max(low - 2 * step, norm), 2 * step
+        while high - low > 5e-3:
+            middle = (low + high) / 2
+            low, high = (middle, high) if is_proved(middle) else (low, middle)
+        return float(np.exp(low))
+
+
+def mu_upper(N: Complex, counts: Sequence[int], least: Vector | None = None) -> float:
+    """Return an upper bound of µ of a matrix for real parameters in ``counts`` copies each.
+
+    ``least`` are lower ends of δ, where a range ends on one side.
+    """
+    ends = np.full(len(counts), -np.inf) if least is None else least
+    return 1 / Scalings(counts).largest(np.asarray(N, complex), ends)
+
+
+def _balanced(N: Complex) -> tuple[Complex, Vector]:
+    """Return N scaled so that rows and columns have the same size (Osborne), and the scale.
+
+    LAPACK's scales are powers of 2; these are continuous in N, and with them D and G.
+    """
+    sizes = np.abs(N) + 1e-9 * np.abs(N).max()
+    np.fill_diagonal(sizes, 0.0)
+    scale = np.ones(len(N))
+    for _ in range(30):
+        for k in range(len(N)):
+            row, column = np.linalg.norm(sizes[k]), np.linalg.norm(sizes[:, k])
+            share = np.sqrt(row / column) if row and column else 1.0
+            sizes[k] /= share
+            sizes[:, k] *= share
+            scale[k] *= share
+    return N * scale / scale[:, None], scale
+
+
+def _triangle(matrices: Complex) -> Vector:
+    """Return Hermitian matrices as the solver takes them: triangles of real symmetric ones."""
+    real, imaginary = matrices.real, matrices.imag
+    whole = np.concatenate([
+        np.concatenate([real, -imaginary], -1), np.concatenate([imaginary, real], -1)
+    ], -2)  # fmt: skip
+    column, row = np.tril_indices(whole.shape[-1])
+    found: Vector = whole[..., row, column] * np.where(row == column, 1.0, np.sqrt(2))
+    return found
