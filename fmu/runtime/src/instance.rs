@@ -897,8 +897,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Makes a step like [`Instance::do_step`] for a host that receives events; with `stops` it stops at
-    /// the first event.
+    /// Makes a step like [`Instance::do_step`] for a host that handles events between steps; with `stops` it
+    /// stops at the first event.
     #[inline(always)]
     pub fn step_to_event(&mut self, at: f64, h: f64, stops: bool) -> Result<StepInfo, Fault> {
         let call = self.check(V::DO_STEP)?;
