@@ -111,7 +111,7 @@ mod tests {
         let limits = Limits::find(|name| names.contains(&name));
         assert_eq!(limits.needs().collect::<Vec<_>>(), names);
         let (time, inside, outside) = ([0.0, 1.0, 4.0], [1.0; 3], [1.0, 5.0, 5.0]);
-        let words = limits.words(|name| match name {
+        let words = limits.describe(|name| match name {
             "time" => Some(&time[..]),
             name if name == names[0] => Some(&inside),
             name if name == names[1] => Some(&outside),

@@ -3,9 +3,7 @@
 //! Its output is a state: nothing passes through it at once, so that a loop with it has the same
 //! answer in whatever order a master reads and sets.
 
-use runtime::Model;
-use runtime::clock::Instant;
-use runtime::model::StepFailure;
+use runtime::model::{Dynamics, Instant, Model, StepFailure};
 use runtime::table::{About, Scalar, Table, scalar_count, scalars};
 use runtime::variable::Variable;
 
@@ -76,14 +74,16 @@ impl Controller {
 }
 
 impl Model for Controller {
+    fn table() -> &'static Table<Self> {
+        &TABLE
+    }
+}
+
+impl Dynamics for Controller {
     type Parameters = Parameters;
     type Inputs = Inputs;
     type Outputs = ();
     type Discrete = ();
-
-    fn table() -> &'static Table<Self> {
-        &TABLE
-    }
 
     fn new(p: &Parameters, _: &Inputs, _: f64, _: f64) -> Result<Self, Vec<String>> {
         Ok(Controller { p: *p, tau: [0.0] })

@@ -736,7 +736,7 @@ impl Outcome {
             warnings: rates.warnings,
             case: case.clone(),
             weightless: range.without_weight(column(WAVE), table.column(G_AXIAL)),
-            limits: super::limits_of(instance.description()).words(|name| table.column(name)),
+            limits: super::limits_of(instance.description()).describe(|name| table.column(name)),
             range,
             linear,
             record,
