@@ -47,12 +47,21 @@ pub(crate) struct Oblique {
 impl SloshModel {
     /// Returns true if a mode moves along one direction only.
     pub(crate) fn moves_along_one(self) -> bool {
-        matches!(self, SloshModel::Frozen | SloshModel::Linear | SloshModel::Planar)
+        match self {
+            SloshModel::Frozen | SloshModel::Linear | SloshModel::Planar => true,
+            SloshModel::Spherical | SloshModel::Liquid => false,
+        }
     }
 
     /// Returns the amplitude at the end of the model's range: an angle, rad, or displacement over length.
     pub(crate) fn largest_amplitude(self) -> f64 {
-        if self == SloshModel::Liquid { 1.0 } else { FRAC_PI_2 }
+        match self {
+            SloshModel::Frozen
+            | SloshModel::Linear
+            | SloshModel::Planar
+            | SloshModel::Spherical => FRAC_PI_2,
+            SloshModel::Liquid => 1.0,
+        }
     }
 
     /// Returns the shifts of omega^2 over the squared angle, in planar and in circular motion, of a mode with the
