@@ -37,6 +37,7 @@ myst_heading_anchors = 4
 default_role = "py:obj"
 templates_path = [str(ROOT / "book" / "_templates")]  # autosummary looks from the source folder
 numpydoc_show_class_members = False
+autodoc_typehints = "none"  # the docstrings have the types
 python_maximum_signature_line_length = 88
 html_math_renderer = "mathml"
 

@@ -92,10 +92,6 @@ def test_every_name_is_in_the_books_reference() -> None:
     assert sorted(listed) == sorted(hubslosh.__all__)
 
 
-PENDING: tuple[str, ...] = ()
-"""Modules whose docstrings do not yet have the form of numpydoc."""
-
-
 def public() -> Iterator[tuple[str, Any]]:
     """Yield name and value of each public function and class, of `attitude` and `plot` too."""
     for name in hubslosh.__all__:
@@ -105,8 +101,7 @@ def public() -> Iterator[tuple[str, Any]]:
             callable_here = inspect.isclass(value) or inspect.isfunction(value)
             if part.startswith("_") or not callable_here:
                 continue
-            module = value.__module__.rpartition(".")[2]
-            if module not in PENDING and (path == name or module == name):
+            if path == name or value.__module__ == f"hubslosh.{name}":
                 yield path, value
 
 

@@ -50,6 +50,7 @@ def test_a_table_without_what_moves_is_refused_by_the_columns(
     with pytest.raises(FmuError, match=r"theta \(or omega\).*slosh_angle") as error:
         hubslosh.view(run, out, program=option(request, "--hubslosh"))
     assert "--columns theta,omega,slosh_angle,slosh_angle_radial" in str(error.value)
+    assert "the run cannot be drawn" in str(error.value)  # not a temporary file
     assert not out.exists()
 
 
