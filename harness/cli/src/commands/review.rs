@@ -57,6 +57,12 @@ impl ReviewArgs {
                     if !warnings.is_empty() {
                         eprintln!("{warnings}");
                     }
+                    ensure!(
+                        !why.trim().is_empty(),
+                        "{} ended with {}",
+                        python.display(),
+                        done.status
+                    );
                     bail!("{}", why.trim());
                 }
                 Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}

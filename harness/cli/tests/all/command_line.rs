@@ -656,6 +656,58 @@ fn without_arguments_an_installed_command_prints_help_and_writes_nothing() {
 }
 
 #[test]
+fn damaged_files_are_refused_in_words_of_users() {
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    let whole = std::fs::read(packed_for_tests()).unwrap();
+    let write = |name: &str, bytes: &[u8]| std::fs::write(directory.join(name), bytes).unwrap();
+    write("text.fmu", b"not an archive");
+    write("cut.fmu", &whole[..3000]);
+    write("cut.parquet", b"PAR1 and no more");
+    write("cut.json", b"{");
+    write("text.ssv", b"text");
+    write("zero.csv", b"time,tau_cmd,omega\n0,0,0\n0.5,0,0\n1,0,0\n");
+    let cases: [(&[&str], &str); 8] = [
+        (
+            &["run", "--profile", "zero", "--out", "o.csv", "--fmu", "text.fmu"],
+            "it is not a zip archive",
+        ),
+        (&["run", "--profile", "zero", "--out", "o.csv", "--fmu", "cut.fmu"], "its end is missing"),
+        (&["run", "--input", "cut.parquet", "--out", "o.csv"], "it is not a complete Parquet file"),
+        (
+            &["run", "--profile", "zero", "--parameters", "cut.json", "--out", "o.csv"],
+            "it is not a result of `hubslosh identify`",
+        ),
+        (
+            &["run", "--profile", "zero", "--parameters", "text.ssv", "--out", "o.csv"],
+            "line 1, column 1",
+        ),
+        (
+            &["run", "--input", "none.csv", "--out", "o.csv"],
+            "none.csv cannot be used: it cannot be opened",
+        ),
+        (&["tank", "none.toml", "--fill", "1"], "none.toml: it cannot be read"),
+        (&["analyse", "zero.csv", "--out", "o"], "tau_cmd is 0 N·m in every row"),
+    ];
+    let fmu = packed_for_tests().to_str().unwrap();
+    for (arguments, words) in cases {
+        let fmu = if arguments.contains(&"--fmu") || arguments[0] == "tank" {
+            &[][..]
+        } else {
+            &["--fmu", fmu]
+        };
+        let output = hubslosh(directory, &[arguments, fmu].concat());
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(!output.status.success() && said.contains(words), "{arguments:?}: {said}");
+        for jargon in
+            ["EOCD", "EOF: ", "os error", "invalid Zip", "root node", "--method", "line and column"]
+        {
+            assert!(!said.contains(jargon), "{arguments:?}: {said}");
+        }
+    }
+}
+
+#[test]
 fn a_review_is_made_by_the_python_package() {
     let directory = tempfile::tempdir().unwrap();
     let review =
@@ -668,6 +720,7 @@ fn a_review_is_made_by_the_python_package() {
     if cfg!(unix) {
         let said = String::from_utf8(review("echo").stdout).unwrap();
         assert_eq!(said, "-m hubslosh.review_plan plan.toml --out plan.html\n");
+        refuses(directory.path(), || review("false"), &["false ended with"]);
     }
 }
 
