@@ -4,10 +4,11 @@
 use std::fmt;
 use std::path::Path;
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, anyhow, bail, ensure};
 use files::input;
 use serde::Deserialize;
 use serde::de::{Deserializer, MapAccess, Visitor};
+use serde_json::error::Category;
 use toml::de::{DeTable, DeValue};
 
 use crate::description::{BaseUnit, ModelDescription, Type, Value};
@@ -215,7 +216,12 @@ struct Identified {
 /// override settings. The initial states of the recordings are not parameters of the FMU and are not read.
 fn from_json(text: &str) -> Result<ParameterSet> {
     let none = "it is not a result of `hubslosh identify` with parameters of an FMU";
-    let found: Identified = serde_json::from_str(text).context(none)?;
+    let found: Identified = serde_json::from_str(text).map_err(|why| match why.classify() {
+        Category::Eof => anyhow!("{none}: the file ends too early, in line {}", why.line()),
+        // the shape that the library expects says nothing to a reader
+        Category::Data if why.to_string().contains("expected ") => anyhow!(none),
+        _ => anyhow!("{none}: {why}"),
+    })?;
     let estimates =
         found.parameters.with_context(|| format!("it has no \"parameters\": {none}"))?;
     let mut warnings = Vec::new();

@@ -6,6 +6,7 @@ It sends progress and results over its standard output as JSON text sequences (R
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -103,7 +104,8 @@ def call(
             line.close()
     reader.join()
     if child.returncode not in codes or (child.returncode and result is None):
-        text = "".join(printed).strip().removeprefix("error: ")
+        # notes and warnings come before
+        text = re.split(r"^error: ", "".join(printed), maxsplit=1, flags=re.MULTILINE)[-1].strip()
         for temporary, name in (names or {}).items():
             text = text.replace(temporary, name)
         raise FmuError(f"hubslosh {command}: {text}")

@@ -290,14 +290,14 @@ fn set_files_that_are_none_are_refused_in_a_sentence() {
             "<ParameterSet><Parameters><Parameter name='x'/></Parameters></ParameterSet>",
             "x has no value",
         ),
-        ("set.ssv", "<ParameterSet>", "set.ssv: 1:"),
+        ("set.ssv", "<ParameterSet>", "set.ssv: line 1, column "),
         (
             "set.ssv",
             "<ParameterSet><Parameters><Parameter name='x'><Real value='1'/></Parameter>\n<Parameter name='x'><Real \
              value='2'/></Parameter></Parameters></ParameterSet>",
             "set.ssv: line 2: x is given twice, first in line 1 (allowed: once)",
         ),
-        ("set.json", "{}", "it is not a result of hubslosh identify"),
+        ("set.json", "{}", "it is not a result of `hubslosh identify`"),
         ("set.json", r#"{"parameters": {"hub.I": 1}}"#, "hub.I has no number"),
     ] {
         let path = folder.path().join(name);
