@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from . import attitude, plot
-    from .certificate import Certificate
+    from .certificate import Certificate, WorstCase
     from .checking import Checked, CheckedRule, Finding, check
     from .craft import Craft, MassProperties, MountedTank
     from .files import to_csv, to_mat, to_parquet
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from .stability import Margins, margins
     from .tables import read_parameters, read_table, setting, write_table
     from .tanks import Tank, tank
-    from .uncertainty import UncertainModel, WorstCase, uncertain
+    from .uncertainty import UncertainModel, uncertain
     from .viewing import View, view
 
     __version__: str
@@ -53,7 +53,7 @@ if TYPE_CHECKING:
 # numpy, pandas and scipy take 0.3 to 1.2 s to import: each module comes on the first use of
 # one of its names (PEP 562). The same as above, for Python itself; a test compares.
 _MODULES = {
-    "certificate": ("Certificate",),
+    "certificate": ("Certificate", "WorstCase"),
     "checking": ("Checked", "CheckedRule", "Finding", "check"),
     "craft": ("Craft", "MassProperties", "MountedTank"),
     "files": ("to_csv", "to_mat", "to_parquet"),
@@ -77,7 +77,7 @@ _MODULES = {
     "stability": ("Margins", "margins"),
     "tables": ("read_parameters", "read_table", "setting", "write_table"),
     "tanks": ("Tank", "tank"),
-    "uncertainty": ("UncertainModel", "WorstCase", "uncertain"),
+    "uncertainty": ("UncertainModel", "uncertain"),
     "viewing": ("View", "view"),
 }
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}

@@ -10,23 +10,19 @@ where no scalings exist at a single frequency, the box is.
 """
 
 import io
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import pairwise, product
 from math import comb
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .arguments import check_ranges
 from .fmu import FmuError
 from .scalings import Complex, Scalings, Vector, form, recentred
-from .uncertainty import corners
-
-if TYPE_CHECKING:
-    from .loop import Loop
-    from .uncertainty import UncertainModel, WorstCase
+from .short import MOST
 
 DEGREE = 8
 """Degree of the polynomials that stand for X on an interval."""
@@ -61,6 +57,52 @@ _TO_BERNSTEIN = np.linalg.inv([
 
 
 @dataclass(frozen=True, eq=False)
+class WorstCase:
+    """Smallest Δ found that brings a loop to the limit of stability.
+
+    `UncertainModel.worst_case` returns it.
+
+    Attributes
+    ----------
+    delta : dict of str to float
+        Δ by name; ±1 is the end of a range. Empty if none was found.
+    size : float
+        Largest magnitude in Δ; inf if none was found.
+    frequency : float
+        Frequency of the oscillation that neither grows nor decays, Hz.
+    parameters : dict of str to float
+        Uncertain parameters at this Δ, by name, SI units.
+
+    Examples
+    --------
+    >>> from hubslosh import WorstCase
+    >>> case = WorstCase({"craft.mass": -2.0}, 2.0, 0.3, {"craft.mass": 800.0})
+    >>> case.mu
+    0.5
+    """
+
+    delta: "dict[str, float]"
+    size: float
+    frequency: float
+    parameters: "dict[str, float]"
+
+    @property
+    def mu(self) -> float:
+        """Lower bound of the structured singular value µ: 1 over the size of Δ."""
+        return 1 / self.size
+
+    def __repr__(self) -> str:
+        """Return size and frequency, then the parameters."""
+        if not np.isfinite(self.size):
+            return "WorstCase: none was found, the lower bound of µ is 0"
+        values = [f"\n  {name} = {x:.6g}" for name, x in self.parameters.items()]
+        left = len(values) - MOST
+        more = f"\n  and {left} more" if left > 0 else ""
+        first = f"WorstCase: unstable from {self.size:.4g} times the ranges on, µ ≥ {self.mu:.4g}"
+        return f"{first}, at {self.frequency:.5g} Hz{''.join(values[:MOST])}{more}"
+
+
+@dataclass(frozen=True, eq=False)
 class Certificate:
     """Proof that a loop is stable for every Δ of a size; see `UncertainModel.certify`.
 
@@ -91,11 +133,12 @@ class Certificate:
     >>> model = craft.uncertain("50%", {"main.frequency[1]": "10%", "craft.Jxx": "5%"})
     >>> found = model.certify(loop, largest=2)
     >>> found.size, found.worst.size
-    (2, inf)
+    (2.0, inf)
+    >>> found.save("certificate.npz")
     """
 
     size: float
-    worst: "WorstCase"
+    worst: WorstCase
     least: dict[str, float]
     data: dict[str, NDArray[Any]]
     solved: int
@@ -151,6 +194,13 @@ class Certificate:
         write_file(path, ".npz", content)
 
 
+def corners(count: int) -> Vector:
+    """Return all corners of a cube of ±1, but 64 drawn ones if there are more."""
+    if count <= 6:
+        return np.array(list(product((-1.0, 1.0), repeat=count)))
+    return np.random.default_rng(1).choice((-1.0, 1.0), (64, count))
+
+
 class UnstableError(Exception):
     """A Δ within the box at which the loop is unstable."""
 
@@ -171,37 +221,44 @@ Region = tuple[float, float, Vector, Vector]
 """Ends of an interval of frequency, Hz, and of a box."""
 
 
-class _Search:
-    """Search of scalings for a loop, with what is known of it by frequency and box."""
+class Search:
+    """Search of scalings for a loop, with what is known of it by frequency and box.
 
-    def __init__(self, model: "UncertainModel", loop: "Loop") -> None:
-        self.model, self.loop = model, loop
-        self.scalings = Scalings(model.counts)
-        self.nyquist = 0.5 / loop.period
+    ``response`` returns N at frequencies in Hz, ``poles`` those of the loop at a Δ in the z plane.
+    """
+
+    def __init__(
+        self, response: Callable[[Any], Complex], poles: Callable[[Vector], Complex],
+        counts: Sequence[int], period: float,
+    ) -> None:  # fmt: skip
+        """Prepare the scalings."""
+        self.closed, self.poles, self.period = response, poles, period
+        self.scalings = Scalings(counts)
+        self.nyquist = 0.5 / period
         self.width = 0.0
         self.pairs: list[Pair] = []
         self.found: dict[tuple[float, bytes, bytes], tuple[float, int]] = {}
         self.known: dict[tuple[float, float], Complex] = {}
-        self.poles: dict[bytes, NDArray[np.complex128]] = {}
+        self.own: dict[bytes, Complex] = {}
 
     def response(self, a: float, b: float) -> Complex:
         """Return N at the nodes of an interval."""
         if (a, b) not in self.known:
-            self.known[a, b] = self.model.closed(self.loop, a + (b - a) * NODES)
+            self.known[a, b] = self.closed(a + (b - a) * NODES)
         return self.known[a, b]
 
-    def own_poles(self, low: Vector, high: Vector) -> NDArray[np.complex128]:
+    def own_poles(self, low: Vector, high: Vector) -> Complex:
         """Return the poles in the middle of a box as complex frequencies, Hz."""
         middle = (low + high) / 2
         key = middle.tobytes()
-        if key not in self.poles:
-            z = self.model._poles(self.loop, middle)
+        if key not in self.own:
+            z = self.poles(middle)
             if np.abs(z).max() > 1 + 1e-9:
                 raise UnstableError(middle)
             # those that no input moves have no damping, and N does not have them
             z = z[(np.abs(z) > 1e-12) & (np.abs(z) < 1 - 1e-9)]
-            self.poles[key] = np.log(z) / (2j * np.pi * self.loop.period)
-        return self.poles[key]
+            self.own[key] = np.log(z) / (2j * np.pi * self.period)
+        return self.own[key]
 
     def proved(
         self, region: Region, ends: tuple[Pair, Pair], part: tuple[float, float], halvings: int
@@ -248,7 +305,7 @@ class _Search:
             raise ExhaustedError
         for corner in corners(len(low)):
             at = np.where(corner > 0, high, low)
-            if np.abs(self.model._poles(self.loop, at)).max() > 1 + 1e-9:
+            if np.abs(self.poles(at)).max() > 1 + 1e-9:
                 raise UnstableError(at)
         best: tuple[float, list[Region]] = (-np.inf, [])
         for k in range(len(low)):
@@ -265,7 +322,7 @@ class _Search:
         key = f, low.tobytes(), high.tobytes()
         if key not in self.found:
             # 0 is a pole of the craft, though not of N
-            N = self.model.closed(self.loop, [max(f, LOWEST * self.nyquist)])[0]
+            N = self.closed([max(f, LOWEST * self.nyquist)])[0]
             margin, *pair = self.scalings.best(recentred(N, self.scalings.copies, low, high))
             self.pairs.append((pair[0], pair[1]))
             self.found[key] = margin, len(self.pairs) - 1
@@ -301,59 +358,3 @@ class _Search:
         return found | {
             name: np.array([self.pairs[k][i] for k in used]) for i, name in enumerate("DG")
         }
-
-
-def certify(
-    model: "UncertainModel", loop: "Loop", largest: float, gap: float, most: int
-) -> Certificate:
-    """Return a certificate near the worst case; see `UncertainModel.certify`."""
-    check_ranges(most=most)
-    if not gap > 1:
-        raise FmuError(f"gap = {gap!r} must be above 1, such as 1.05")
-    search = _Search(model, loop)
-    worst = model.worst_case(loop, largest)
-    least = model._least
-    least_named = {name: float(x) for name, x in zip(model.deltas, least, strict=True)
-                   if np.isfinite(x)}  # fmt: skip
-    data: dict[str, NDArray[Any]] = {}
-    size, solved = 0.0, 0
-    for factor in SIZES:
-        while True:
-            known = worst.size / gap if np.isfinite(worst.size) else largest
-            tried = min(known, largest) / factor
-            box = np.maximum(-tried, least), np.full(len(least), tried)
-            search.scalings.solved = 0
-            try:
-                data = search.certify(*box, most)
-                size = tried
-            except UnstableError as found:
-                size_found = float(np.abs(found.delta).max())
-                worst = model._limit(loop, found.delta / size_found, size_found)
-                worst = model._nearby(loop, worst)
-                continue
-            except ExhaustedError:
-                pass
-            finally:
-                solved += search.scalings.solved
-            break
-        if size:
-            break
-    if size:
-        data |= _saved(model, loop, size, least)
-    return Certificate(size, worst, least_named, data, solved)
-
-
-def _saved(
-    model: "UncertainModel", loop: "Loop", size: float, least: Vector
-) -> dict[str, NDArray[Any]]:
-    """Return what a check needs of the loop: M, the controller, and the loop gain at Δ = 0."""
-    K = loop._must_be_linear()
-    gain = loop._gain(model.at(np.zeros(len(least))), K)
-    systems = {"M": model.M, "K": K, "L": gain}
-    found = {f"{name}_{part}": matrix for name, system in systems.items()
-             for part, matrix in zip("ABCD", system, strict=True)}  # fmt: skip
-    late = loop.delay + loop.latency * loop.period
-    return found | {
-        "size": np.array(size), "least": least, "counts": np.array(model.counts),
-        "deltas": np.array(model.deltas), "period": np.array(loop.period), "delay": np.array(late),
-    }  # fmt: skip

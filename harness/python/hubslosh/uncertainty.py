@@ -29,7 +29,6 @@ import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -37,20 +36,28 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .arguments import check_ranges, floats, names_of, out_of_range
+from .certificate import (
+    SIZES,
+    Certificate,
+    ExhaustedError,
+    Search,
+    UnstableError,
+    WorstCase,
+    corners,
+)
 from .fmu import FmuError, Parameters, Quantity, did_you_mean
 from .linearization import LinearModel
 from .loop import Loop
 from .operating_point import warn_of_rotation
 from .plant import Plant
 from .quantities import KINDS, TURN, moves_the_bob, rigid_rest
-from .short import MOST, names
+from .short import names
 from .simulation import parameters_of
 from .stability import _closed, minimal
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from .certificate import Certificate
     from .program import Identification
 
 Matrix = NDArray[np.float64]
@@ -460,52 +467,6 @@ def _reduced(M: Matrix, first: int, counts: list[int]) -> tuple[Matrix, list[int
 
 
 @dataclass(frozen=True, eq=False)
-class WorstCase:
-    """Smallest Δ found that brings a loop to the limit of stability.
-
-    `UncertainModel.worst_case` returns it.
-
-    Attributes
-    ----------
-    delta : dict of str to float
-        Δ by name; ±1 is the end of a range. Empty if none was found.
-    size : float
-        Largest magnitude in Δ; inf if none was found.
-    frequency : float
-        Frequency of the oscillation that neither grows nor decays, Hz.
-    parameters : dict of str to float
-        Uncertain parameters at this Δ, by name, SI units.
-
-    Examples
-    --------
-    >>> from hubslosh import WorstCase
-    >>> case = WorstCase({"craft.mass": -2.0}, 2.0, 0.3, {"craft.mass": 800.0})
-    >>> case.mu
-    0.5
-    """
-
-    delta: "dict[str, float]"
-    size: float
-    frequency: float
-    parameters: "dict[str, float]"
-
-    @property
-    def mu(self) -> float:
-        """Lower bound of the structured singular value µ: 1 over the size of Δ."""
-        return 1 / self.size
-
-    def __repr__(self) -> str:
-        """Return size and frequency, then the parameters."""
-        if not np.isfinite(self.size):
-            return "WorstCase: none was found, the lower bound of µ is 0"
-        values = [f"\n  {name} = {x:.6g}" for name, x in self.parameters.items()]
-        left = len(values) - MOST
-        more = f"\n  and {left} more" if left > 0 else ""
-        first = f"WorstCase: unstable from {self.size:.4g} times the ranges on, µ ≥ {self.mu:.4g}"
-        return f"{first}, at {self.frequency:.5g} Hz{''.join(values[:MOST])}{more}"
-
-
-@dataclass(frozen=True, eq=False)
 class UncertainModel:
     """Spacecraft with uncertain parameters as a linear fractional transformation y = F_u(M, Δ) u.
 
@@ -554,6 +515,8 @@ class UncertainModel:
     >>> loop = craft.loop(np.hstack([20 * np.eye(3), 80 * np.eye(3)]), 0.1, "50%", delay=1.0)
     >>> round(model.worst_case(loop).size, 3)
     0.787
+    >>> model.certify(loop).size > 0.75
+    True
     >>> model.closed(loop, [0.1, 0.2]).shape, model.mu_upper(loop, [0.1, 0.2]) < 1
     ((2, 6, 6), array([ True,  True]))
 
@@ -823,7 +786,7 @@ class UncertainModel:
 
     def certify(
         self, loop: Loop, largest: float = 3.0, *, gap: float = 1.04, most: int = 1000
-    ) -> "Certificate":
+    ) -> Certificate:
         """Return a proof that the loop is stable for all Δ up to a size near the worst case.
 
         The proof holds for all frequencies, not those of a grid: D and G scalings on intervals
@@ -854,9 +817,53 @@ class UncertainModel:
             If the loop does not fit the model or is unstable at Δ = 0, a number is out of range,
             or the package clarabel is missing.
         """
-        from .certificate import certify
+        check_ranges(most=most)
+        if not gap > 1:
+            raise FmuError(f"gap = {gap!r} must be above 1, such as 1.05")
+        K, least = self._controller(loop), self._least
+        search = Search(
+            lambda f: self.closed(loop, f), lambda delta: self._poles(loop, K, delta),
+            self.counts, loop.period,
+        )  # fmt: skip
+        worst = self.worst_case(loop, largest)
+        data: dict[str, NDArray[Any]] = {}
+        size, solved = 0.0, 0
+        for factor in SIZES:
+            while True:
+                known = worst.size / gap if np.isfinite(worst.size) else largest
+                tried = min(known, largest) / factor
+                box = np.maximum(-tried, least), np.full(len(least), tried)
+                search.scalings.solved = 0
+                try:
+                    data, size = search.certify(*box, most), tried
+                except UnstableError as found:
+                    end = float(np.abs(found.delta).max())
+                    worst = self._limit(loop, K, found.delta / end, end)
+                    worst = self._nearby(loop, K, worst)
+                    continue
+                except ExhaustedError:
+                    pass
+                finally:
+                    solved += search.scalings.solved
+                break
+            if size:
+                data |= self._checked(loop, K) | {"size": np.array(size)}
+                break
+        ends = {name: float(x) for name, x in zip(self.deltas, least, strict=True)
+                if np.isfinite(x)}  # fmt: skip
+        return Certificate(size, worst, ends, data, solved)
 
-        return certify(self, loop, largest, gap, most)
+    def _checked(self, loop: Loop, K: LinearModel) -> "dict[str, NDArray[Any]]":
+        """Return what a check needs of the loop: M, the controller, the loop gain at Δ = 0."""
+        gain = loop._gain(self.at(np.zeros(len(self.counts))), K)
+        systems = {"M": self.M, "K": K, "L": gain}
+        found = {f"{name}_{part}": matrix for name, system in systems.items()
+                 for part, matrix in zip("ABCD", system, strict=True)}  # fmt: skip
+        late = loop.delay + loop.latency * loop.period
+        return found | {
+            "least": self._least, "counts": np.array(self.counts), "deltas": np.array(self.deltas),
+            "period": np.array(loop.period), "delay": np.array(late),
+        }  # fmt: skip
 
     @property
     def _least(self) -> Matrix:
@@ -867,9 +874,9 @@ class UncertainModel:
                 found[k] = (share - 1) * self.center[name] / self.spread.loc[name, name]
         return found
 
-    def _poles(self, loop: Loop, delta: Matrix) -> NDArray[np.complex128]:
-        """Return the poles of the sampled loop at Δ."""
-        return _closed(loop._gain(self.at(delta), self._controller(loop)))
+    def _poles(self, loop: Loop, K: LinearModel, delta: Matrix) -> NDArray[np.complex128]:
+        """Return the poles of the sampled loop with the controller K at Δ."""
+        return _closed(loop._gain(self.at(delta), K))
 
     def worst_case(self, loop: Loop, largest: float = 3.0) -> WorstCase:
         """Return the smallest real Δ that a search finds at the limit of stability of a loop.
@@ -898,7 +905,7 @@ class UncertainModel:
             If the loop does not fit the model or is unstable at Δ = 0, or ``largest`` is out of
             range.
         """
-        self._controller(loop)
+        K = self._controller(loop)
         check_ranges(largest=largest)
 
         def signs(at: Matrix, pole: complex) -> Matrix:
@@ -907,13 +914,15 @@ class UncertainModel:
             for k in range(len(at)):
                 step = np.zeros(len(at))
                 step[k] = 1e-4
-                ends = [self._nearest(self._poles(loop, at + way * step), pole) for way in (1, -1)]
+                ends = [
+                    self._nearest(self._poles(loop, K, at + way * step), pole) for way in (1, -1)
+                ]
                 slopes.append(abs(ends[0]) - abs(ends[1]))
             size = max(np.abs(slopes), default=0.0)
             return np.where(np.abs(slopes) > 1e-6 * size, np.sign(slopes), 0.0)
 
         zero = np.zeros(len(self.counts))
-        start = self._poles(loop, zero)
+        start = self._poles(loop, K, zero)
         if np.abs(start).max() >= 1:
             raise FmuError("the loop is unstable at Δ = 0")
         light = start[(start.imag > 0) & (np.abs(start) > np.exp(-0.3 * np.abs(np.angle(start))))]
@@ -925,19 +934,19 @@ class UncertainModel:
                 if tuple(way) in seen or not way.any():
                     break
                 seen.add(tuple(way))
-                found = self._limit(loop, way, largest)
+                found = self._limit(loop, K, way, largest)
                 if not np.isfinite(found.size):
                     break
                 here = self.delta(found.delta)
                 best = min(best, found, key=lambda case: case.size)
-                every = self._poles(loop, here)
+                every = self._poles(loop, K, here)
                 follow = complex(every[np.argmax(np.abs(every))])
         for way in corners(len(zero)):
-            found = self._limit(loop, way, min(best.size, largest), steps=8)
+            found = self._limit(loop, K, way, min(best.size, largest), steps=8)
             best = min(best, found, key=lambda case: case.size)
-        return self._nearby(loop, best)
+        return self._nearby(loop, K, best)
 
-    def _nearby(self, loop: Loop, best: WorstCase) -> WorstCase:
+    def _nearby(self, loop: Loop, K: LinearModel, best: WorstCase) -> WorstCase:
         """Return a smaller Δ near one, by changes of its direction, if there is one."""
         step = 0.5 if np.isfinite(best.size) else 0.0
         while step > 0.05:
@@ -947,19 +956,21 @@ class UncertainModel:
                 way = np.where(delta <= self._least, -1.0, delta / best.size)
                 way = np.clip(way + step * move, -1.0, 1.0)
                 way /= np.abs(way).max()
-                best = min(best, self._limit(loop, way, 0.998 * best.size, steps=1),
+                best = min(best, self._limit(loop, K, way, 0.998 * best.size, steps=1),
                            key=lambda case: case.size)  # fmt: skip
             if best.size == start:
                 step /= 2
         return best
 
-    def _limit(self, loop: Loop, way: Matrix, largest: float, steps: int = 24) -> WorstCase:
+    def _limit(
+        self, loop: Loop, K: LinearModel, way: Matrix, largest: float, steps: int = 24
+    ) -> WorstCase:
         """Return the Δ along a direction, of largest component 1, at the limit of stability."""
 
         def outside(size: float) -> bool:
             # 1e-9: modes that no input moves have no damping there
             at = np.maximum(size * way, self._least)
-            return bool(np.abs(self._poles(loop, at)).max() > 1 + 1e-9)
+            return bool(np.abs(self._poles(loop, K, at)).max() > 1 + 1e-9)
 
         low, high = 0.0, largest
         for high in np.linspace(0, largest, steps + 1)[1:]:
@@ -975,7 +986,7 @@ class UncertainModel:
             middle = (low + high) / 2
             low, high = (low, middle) if outside(middle) else (middle, high)
         at = np.maximum(high * way, self._least)
-        every = self._poles(loop, at)
+        every = self._poles(loop, K, at)
         critical = every[np.argmax(np.abs(every))]
         named = dict(zip(self.deltas, at.tolist(), strict=True))
         frequency = abs(float(np.angle(critical))) / (TURN * loop.period)
@@ -1068,13 +1079,6 @@ class UncertainModel:
         named = [tuple(name.replace(".", "_") for name in of)
                  for of in (M.states, M.inputs, M.outputs)]  # fmt: skip
         return LinearModel(*M, *named).to_control()
-
-
-def corners(count: int) -> Matrix:
-    """Return all corners of a cube of ±1, but 64 drawn ones if there are more."""
-    if count <= 6:
-        return np.array(list(product((-1.0, 1.0), repeat=count)))
-    return np.random.default_rng(1).choice((-1.0, 1.0), (64, count))
 
 
 def _kind(name: str) -> str:
