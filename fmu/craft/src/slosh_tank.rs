@@ -742,7 +742,7 @@ impl TankMotion {
     /// and within bounds.
     ///
     /// # Errors
-    /// A bob is at the bound of its surface.
+    /// If a bob is at the bound of its surface.
     #[inline(never)]
     fn take_apart(&mut self, n: usize, h: f64, w: Vec3) -> Result<bool, StepError> {
         if let Some(bob) = self.beyond.take() {

@@ -212,7 +212,7 @@ impl Plant {
     /// Changes the friction law from here on.
     ///
     /// # Errors
-    /// All problems of the parameters; the plant is unchanged.
+    /// Lists all problems of the parameters; the plant is unchanged.
     pub fn set_friction(&mut self, p: &Friction, inputs: &Inputs) -> Result<(), Vec<String>> {
         let problems = Law::problems(p);
         if !problems.is_empty() {

@@ -147,8 +147,7 @@ impl Plant {
     /// then. `tolerance` is the allowed relative error of rates and angles.
     ///
     /// # Errors
-    /// The caller must check the ranges of single parameters. This function checks combinations and
-    /// returns all problems.
+    /// Lists all problems of combined parameters. The caller must check the ranges of single parameters.
     pub fn new(
         p: &Parameters,
         inputs: &Inputs,

@@ -83,7 +83,7 @@ impl Clock {
     ///
     /// # Errors
     ///
-    /// The reason why such a step is not allowed.
+    /// If such a step is not allowed; the text is the reason.
     #[inline(always)]
     pub fn check_step(&self, at: f64, h: f64) -> Result<(), String> {
         if !(is_finite(h) && h > 0.0) {
@@ -110,7 +110,7 @@ impl Clock {
     ///
     /// # Errors
     ///
-    /// The reason why it cannot be set.
+    /// If this time cannot be set; the text is the reason.
     pub fn check_time(&self, time: f64, goes_back: bool) -> Result<(), String> {
         if !is_finite(time) {
             return Err(format!("time = {} s (allowed: any finite number)", text(time)));

@@ -316,7 +316,7 @@ impl<M: Model, V: Version> Instance<M, V> {
                 None => reasons.push((why, vec![scalar.name()])),
             }
         }
-        /// More names would hide the reason.
+        /// Number of names in a message; more would hide the reason.
         const NAMED: usize = 6;
         warnings.extend(reasons.into_iter().map(|(why, names)| {
             let verb = if names.len() == 1 { "has" } else { "have" };
@@ -1361,7 +1361,7 @@ impl<M: Model, V: Version> Instance<M, V> {
     ///
     /// # Errors
     ///
-    /// Everything that is not allowed.
+    /// Lists everything that is not allowed.
     pub(crate) fn model_parameters(&self) -> Result<M::Parameters, Vec<String>> {
         let all = M::table().parameters().iter().zip(&self.parameters);
         let problem = |(scalar, value): (&Scalar<M>, &Value)| {

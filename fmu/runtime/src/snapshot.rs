@@ -107,7 +107,7 @@ pub fn to_bytes<M: Model, V: Version>(saved: &Instance<M, V>) -> Vec<u8> {
 ///
 /// # Errors
 ///
-/// The reason why the bytes are not a saved state of this model.
+/// If the bytes are not a saved state of this model; the text is the reason.
 pub fn from_bytes<M: Model, V: Version>(bytes: &[u8]) -> Result<Instance<M, V>, String> {
     let (table, size) = (M::table(), size::<M>());
     let model = table.about.model;

@@ -298,7 +298,7 @@ fn logger(functions: &fmi2CallbackFunctions, instance_name: Option<&str>) -> Opt
 ///
 /// # Errors
 ///
-/// The reason why the instance cannot be created.
+/// If the instance cannot be created; the text is the reason.
 fn interface<M: Model>(
     name: Option<String>,
     kind: fmi2Type,

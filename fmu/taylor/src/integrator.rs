@@ -58,7 +58,7 @@ impl Steps {
     /// Counts `number` steps, or work of the same cost, at `time`.
     ///
     /// # Errors
-    /// The limit is exceeded.
+    /// If the limit is exceeded.
     #[inline(always)]
     pub fn count(&mut self, number: usize, time: f64) -> Result<(), StepError> {
         self.taken += number;
@@ -159,7 +159,7 @@ pub trait Motion {
     /// the elapsed length.
     ///
     /// # Errors
-    /// The states are not finite, or the model is not valid there.
+    /// If the states are not finite, or the model is not valid there.
     fn take(
         &mut self,
         n: usize,

@@ -29,7 +29,7 @@ use ode_solvers::{Dop853, Dopri5, OutputType, SVector, System};
 
 const STEP: f64 = 0.02;
 const AMPLITUDE: f64 = 0.1;
-/// Number of steps of 20 ms in one piece whose time is measured.
+/// Number of steps of 20 ms in one piece of a run whose time is measured.
 const PIECE: usize = 500;
 
 /// Returns the torque at the knots of the exponential sweep from 1.25 to 3.5 Hz in 2700 s.

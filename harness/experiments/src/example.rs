@@ -71,7 +71,7 @@ pub const EXAMPLES: [Example; 3] = [
 /// Length of the example and its communication step, s.
 const STOP: f64 = 20.0;
 const STEP: f64 = 0.02;
-/// Number of steps per row of the reference.
+/// Number of communication steps per row of the reference.
 const EVERY: usize = 5;
 /// Tolerance of the reference. Results with the FMU's default tolerance are within 1e-6 of it.
 const TOLERANCE: f64 = 1e-12;
@@ -80,7 +80,7 @@ impl Example {
     /// Returns the example of the FMU.
     ///
     /// # Errors
-    /// The FMU has no example.
+    /// If the FMU has no example.
     pub fn for_fmu(fmu: &Fmu) -> Result<&'static Example> {
         let model = &fmu.description().model_name;
         let found = EXAMPLES.iter().find(|example| example.model == model);

@@ -296,7 +296,7 @@ impl Run {
     ///
     /// # Errors
     ///
-    /// One sentence about the value that is not allowed.
+    /// If a value is not allowed; the message is one sentence about it.
     pub fn check(&self) -> Result<()> {
         ensure!(
             self.stop > self.start() && self.stop.is_finite(),

@@ -3,31 +3,34 @@
 
 use anyhow::{Result, ensure};
 
-/// Rows of a table, steps of a run: 111 hours at 50 Hz.
+/// Largest number of rows of a table and of steps of a run: 111 hours at 50 Hz.
 pub const ROWS: usize = 20_000_000;
-/// Bytes of the numbers that are held at once: the bench's columns of the longest run, twice.
+/// Largest size of the numbers that are held at once, bytes: twice the bench's columns of the longest run.
 pub const BYTES: u64 = 4 << 30;
-/// Bytes of a text that is read as a whole: plans, parameter sets, results. A table has [`ROWS`] instead.
+/// Largest text that is read as a whole, bytes: plans, parameter sets, results. A table is limited by
+/// [`ROWS`] instead.
 pub const TEXT: u64 = 64 << 20;
-/// Bytes of the numbers that are read of one recording: three signals in [`ROWS`] rows.
+/// Largest size of the numbers that are read from one recording, bytes: three signals in [`ROWS`] rows.
 pub const RECORDING: u64 = 512 << 20;
-/// Bytes of numbers that a byte of a file may hold, beyond [`RECORDING`]: compressed tables of runs hold up to 10.
+/// Number of bytes of numbers that a file may contain per byte of its size, in addition to [`RECORDING`]:
+/// compressed tables of runs contain up to 10.
 pub const PER_BYTE: u64 = 32;
-/// Bytes that one file may take while it is decompressed, those that are passed over included.
+/// Largest size of one file while it is decompressed, bytes, including the parts that are skipped.
 pub const INFLATED: u64 = 2 << 30;
-/// Runs of a plan.
+/// Largest number of runs of a plan.
 pub const RUNS: usize = 100_000;
-/// Threads that work at once.
+/// Largest number of threads that work at the same time.
 pub const JOBS: usize = 512;
-/// Lines of a multisine.
+/// Largest number of lines of a multisine.
 pub const LINES: usize = 20_000;
-/// Sines of a multisine, all lines in all rows: half a minute.
+/// Largest number of sines to evaluate for a multisine, all lines in all rows: half a minute.
 pub const SINES: u64 = 2_000_000_000;
-/// Products of the frequency responses of one run, rows times frequencies: some ten seconds.
+/// Largest number of products for the frequency responses of one run, rows times frequencies: about ten
+/// seconds.
 pub const PRODUCTS: f64 = 4e9;
-/// Largest frequency of a torque, and the inverse of the least, Hz.
+/// Largest frequency of a torque, and the inverse of the smallest, Hz.
 pub const FREQUENCY: f64 = 1e9;
-/// Bytes of a run's name: file systems take 255 with an ending.
+/// Largest length of a run's name, bytes: file systems allow 255 with an ending.
 pub const NAME: usize = 200;
 
 /// Steps of length `step` (s) in `span` (s), the last perhaps shorter.

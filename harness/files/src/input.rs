@@ -30,7 +30,7 @@ pub fn open(path: &Path) -> Result<File> {
     Ok(file)
 }
 
-/// Files that [`read_so_far`] names at most.
+/// Largest number of files that [`read_so_far`] lists.
 const MOST_NAMED: usize = 20;
 
 static READ: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());

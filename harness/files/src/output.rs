@@ -19,7 +19,7 @@ pub enum Destination {
     Stream,
 }
 
-/// Symbolic links that are followed, as Linux follows them.
+/// Largest number of symbolic links that are followed, the same as on Linux.
 const LINKS: usize = 40;
 
 /// Finds the destination of an output. Symbolic links are followed, also to a file that does not exist yet.

@@ -9,7 +9,7 @@ use std::sync::{Mutex, MutexGuard, Once, PoisonError};
 use anyhow::{Context, Result};
 use tempfile::TempDir;
 
-/// Paths that a signal removes.
+/// Paths that are removed when a signal ends the program.
 static PATHS: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
 fn paths() -> MutexGuard<'static, BTreeSet<PathBuf>> {
@@ -51,11 +51,11 @@ pub fn uninterrupted<T>(work: impl FnOnce() -> T) -> T {
     work()
 }
 
-/// Prefix of our temporary folders.
+/// Prefix of the names of temporary folders.
 const PREFIX: &str = "hubslosh-";
-/// The file in such a folder that is locked as long as its program lives.
+/// Name of the file in such a folder that is locked as long as its program runs.
 const ALIVE: &str = "alive";
-/// Folder of the files within it.
+/// Name of the folder within it for the files.
 const FILES: &str = "files";
 
 /// A folder for temporary files.

@@ -25,8 +25,8 @@ pub const MOST_ENTRIES: usize = 20_000;
 pub const LONGEST_NAME: usize = 1024;
 /// Number of bytes to which the files of an archive may unpack in any case.
 pub const UNPACKED: u64 = 64 << 20;
-/// Number of bytes to which they may unpack in addition, per byte of the archive. Binaries usually compress
-/// to a third and descriptions to a twentieth.
+/// Number of additional bytes to which these files may unpack per byte of the archive. Binaries usually
+/// compress to a third and descriptions to a twentieth.
 pub const UNPACKED_PER_BYTE: u64 = 8;
 pub const DESCRIPTION: &str = "modelDescription.xml";
 

@@ -25,7 +25,7 @@ pub const MACOS: Version = Version(11, 0);
 /// Number of unexpected exports that a message names.
 const NAMED: usize = 8;
 
-/// Libraries that belong to glibc.
+/// Libraries that are part of glibc.
 const LINUX_LIBRARIES: [&str; 8] = [
     "ld-linux-aarch64.so.1",
     "ld-linux-x86-64.so.2",
@@ -36,8 +36,8 @@ const LINUX_LIBRARIES: [&str; 8] = [
     "librt.so.1",
     "libutil.so.1",
 ];
-/// Libraries that belong to Windows since version 8, in small letters. The run-time libraries of compilers do
-/// not belong to it.
+/// Libraries that come with Windows 8 and later, in lower case. The run-time libraries of compilers are not
+/// among them.
 const WINDOWS_LIBRARIES: [&str; 12] = [
     "advapi32.dll",
     "api-ms-win-core-synch-l1-2-0.dll",
@@ -52,7 +52,7 @@ const WINDOWS_LIBRARIES: [&str; 12] = [
     "userenv.dll",
     "ws2_32.dll",
 ];
-/// Libraries that belong to macOS.
+/// Libraries that come with macOS.
 const MACOS_LIBRARIES: [&str; 5] = [
     "/System/Library/Frameworks/CoreFoundation.framework/Versions/A/CoreFoundation",
     "/usr/lib/libSystem.B.dylib",

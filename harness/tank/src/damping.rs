@@ -27,7 +27,7 @@ const ENDS: &str = "use the low end for stability margins, check both ends for s
 /// area. So the ratio is continuous in the fill and in the shape of the tank.
 ///
 /// # Errors
-/// Without gravity and centring stiffness there is no natural frequency.
+/// If there is neither gravity nor centring stiffness, because there is no natural frequency then.
 pub fn of_tank(
     tank: &Tank,
     data: &ModalData,

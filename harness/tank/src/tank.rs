@@ -75,7 +75,7 @@ impl Shape {
     ///
     /// # Errors
     ///
-    /// Every dimension that is not allowed.
+    /// Lists every dimension that is not allowed.
     pub fn segments(&self) -> Result<Vec<Segment>, Problems> {
         let mut problems = Vec::new();
         let mut above = |name: &str, value: f64, limit: f64| {
@@ -227,7 +227,7 @@ impl Tank {
     /// Reads a file. Other files that it names are relative to it.
     ///
     /// # Errors
-    /// All problems of the file.
+    /// Lists all problems of the file.
     pub fn read(path: &Path) -> Result<Tank, Problems> {
         let text = crate::contour::read_text(path)?;
         Tank::parse(&text, path.parent().unwrap_or(Path::new("")))
@@ -236,7 +236,7 @@ impl Tank {
     /// Parses the text of a file; `folder` is the folder of the files that it names.
     ///
     /// # Errors
-    /// All problems of the file.
+    /// Lists all problems of the file.
     pub fn parse(text: &str, folder: &Path) -> Result<Tank, Problems> {
         let file: File =
             toml::from_str(text).map_err(|error| error.to_string().trim_end().to_string())?;
@@ -305,7 +305,7 @@ impl Tank {
     /// Creates a tank from a shape, with a liquid of `density`, kg/m³.
     ///
     /// # Errors
-    /// Every dimension outside its range.
+    /// Lists every dimension outside its range.
     pub fn of_shape(shape: Shape, density: f64) -> Result<Tank, Problems> {
         let geometry = revolution(shape.segments()?, Some(shape))?;
         Ok(Tank { name: None, density, geometry })
@@ -323,7 +323,7 @@ impl Tank {
     /// be 0 or the tank's whole capacity. A height is returned unchanged.
     ///
     /// # Errors
-    /// More than the tank holds, less than 0, or a part of a box, which is open at the top.
+    /// If it is more than the tank holds or less than 0, or a part of a box, which is open at the top.
     pub fn height_of(&self, fill: Fill) -> Result<f64, Problems> {
         let capacity = match &self.geometry {
             Geometry::Revolution { contour, .. } => Some(contour.capacity()),

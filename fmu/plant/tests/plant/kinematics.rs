@@ -77,7 +77,8 @@ fn derivatives(f: [f64; 5]) -> [f64; 2] {
     ]
 }
 
-/// Returns the outputs in the middle of five samples, and the samples from which differences are computed.
+/// Simulates five samples of a motion. Returns calculated parameters, the places of all masses at the samples,
+/// and the outputs at the middle one.
 fn sampled(p: &Parameters) -> (Calculated, [Place; 5], Outputs) {
     let inputs = Inputs { tau_cmd: Ramp::held(0.3), ..Inputs::default() };
     let mut plant = Plant::new(p, &inputs, 0.0, 1e-13).unwrap();

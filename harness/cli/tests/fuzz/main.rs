@@ -10,7 +10,7 @@
 #[path = "../../src/set_file.rs"]
 mod set_file;
 
-/// Stands for the terminal of the command, which `set_file` warns.
+/// Takes the place of the command's terminal, to which `set_file` writes warnings.
 mod terminal {
     pub fn warn(_: impl std::fmt::Display) {}
 }

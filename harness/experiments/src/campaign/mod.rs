@@ -227,7 +227,7 @@ impl Campaign {
     /// directory; [`Campaign::tables`] returns the tables.
     ///
     /// # Errors
-    /// There are no runs, or a run cannot be stored. A run that cannot be simulated is a failure
+    /// If there are no runs, or a run cannot be stored. A run that cannot be simulated is a failure
     /// among the results.
     pub fn execute(
         &self,
@@ -367,7 +367,7 @@ impl Campaign {
     /// Simulates or reads one run and analyses it.
     ///
     /// # Errors
-    /// The run cannot be stored, so no other run can.
+    /// If the run cannot be stored, so that no other run can.
     fn done(
         &self,
         fmu: &Fmu,

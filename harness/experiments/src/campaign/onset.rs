@@ -14,7 +14,7 @@ use crate::plan::{Case, Plan};
 use crate::profile::Written;
 use crate::progress::Progress;
 
-/// Distance of the frequencies, Hz.
+/// Distance between two frequencies of the search, Hz.
 const APART: f64 = 0.0025;
 const WITHIN: f64 = 0.0025;
 /// Steps of the grid by which the frequencies of a smaller torque may lie outside those of a larger one.

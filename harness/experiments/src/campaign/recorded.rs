@@ -25,24 +25,25 @@ const SIGNALS: [Signal; 4] = [
 
 /// Smallest correlation of the recorded torque with the torque of the plan.
 const LEAST_CORRELATION: f64 = 0.9;
-/// Largest part of the run that may be missing at its ends.
+/// Largest part of the run that may be missing in the recording at its ends.
 const MISSING: f64 = 0.5;
 /// Largest part of a record in gaps: lines join torque and rate alike, so that their ratio is hardly changed. Where 3 % of the rows are lost
 /// one by one, the gaps are 6 % of the record.
 const GAPS: f64 = 0.15;
 /// Largest relative difference of the recorder's clock from that of the torque.
 const FASTEST_CLOCK: f64 = 2e-3;
-/// Cycles by which such a difference shifts the torque at the end of a record, above which times are corrected.
+/// Shift of the torque at the end of a record that a wrong clock causes, in cycles, above which times are
+/// corrected.
 const SHIFT: f64 = 0.02;
 /// Cycles of a block in which the phase of a record is compared with the phase of the sweep.
 const BLOCK_CYCLES: f64 = 6.0;
-/// Comparisons, each with the clock of the one before.
+/// Number of times that the clock is estimated, each time starting from the result before.
 const ROUNDS: usize = 3;
 
 /// Reads a recording on an equally spaced grid. Returns its step, s, and the table.
 ///
 /// # Errors
-/// The recording cannot be used.
+/// If the recording cannot be used.
 pub fn read(recorded: &Recorded, done: &mut dyn FnMut(String)) -> Result<(f64, Table)> {
     let name = recorded.path.display().to_string();
     let table = recording::read(
@@ -57,7 +58,7 @@ pub fn read(recorded: &Recorded, done: &mut dyn FnMut(String)) -> Result<(f64, T
 /// Fails if rows of a recording that are `step` s apart cannot show the torque.
 ///
 /// # Errors
-/// The torque has frequencies of half of their rate or more.
+/// If the torque has frequencies of half of their rate or more.
 pub fn check_rows(path: &Path, step: f64, torque: &Torque) -> Result<()> {
     let Torque::Profile(profile) = torque else { return Ok(()) };
     let highest = profile.band().map_or(0.0, |band| band.1);
@@ -75,7 +76,7 @@ pub fn check_rows(path: &Path, step: f64, torque: &Torque) -> Result<()> {
 /// plan. The columns are those of a stored run, as far as the recording has them.
 ///
 /// # Errors
-/// The recording cannot be used, or has another torque.
+/// If the recording cannot be used, or has another torque.
 pub(super) fn table(
     case: &Case,
     recorded: &Recorded,

@@ -140,7 +140,7 @@ pub struct Recorded {
     pub columns: Columns,
 }
 
-/// Name used in place of the slosh model for a recording.
+/// Text that stands in place of the slosh model for a recording.
 pub const RECORDING: &str = "recording";
 
 /// One run of a plan.
@@ -229,7 +229,7 @@ impl Plan {
     /// Creates the thesis's sweeps for every combination of models, fills and amplitudes.
     ///
     /// # Errors
-    /// A setting is also varied.
+    /// If a setting is also varied.
     pub fn sweeps(sweeps: Sweeps) -> Result<Self> {
         let Sweeps { models, fills, amplitudes, profile, set, tolerance } = sweeps;
         let numbers = |values: Vec<f64>| values.iter().map(f64::to_string).collect();

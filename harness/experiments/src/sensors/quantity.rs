@@ -91,7 +91,7 @@ struct Modes {
     coordinate: Coordinate,
 }
 
-/// Variables that describe the motion of the tank.
+/// Variables that describe the motion of the tank on the hub.
 const MOTION: [&str; 7] =
     [THETA, OMEGA, OMEGA_DOT, tank::R, G_AXIAL, bench::TILT, bench::TILT_AZIMUTH];
 
