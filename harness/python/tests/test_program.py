@@ -269,7 +269,8 @@ def test_identification_gives_typed_estimates(
     twin = hubslosh.simulate(fmu, tmp_path / "result.json", inputs, outputs=["omega"])
     assert np.std(twin["omega"] - clean["omega"]) < 3e-5
     (tmp_path / "other.json").write_text("[]")
-    with pytest.raises(FmuError, match="not a result of `hubslosh identify` with parameters of an FMU$"):
+    reason = r"not a result of `hubslosh identify` with parameters of an FMU$"
+    with pytest.raises(FmuError, match=reason):
         hubslosh.simulate(fmu, tmp_path / "other.json", inputs)
 
 
