@@ -235,7 +235,7 @@ class Search:
         self.closed, self.poles, self.period = response, poles, period
         self.scalings = Scalings(counts)
         self.nyquist = 0.5 / period
-        self.width = 0.0
+        self.width = np.ones(len(counts))
         self.pairs: list[Pair] = []
         self.found: dict[tuple[float, bytes, bytes], tuple[float, int]] = {}
         self.known: dict[tuple[float, float], Complex] = {}
@@ -301,19 +301,23 @@ class Search:
     def halved(self, region: Region) -> list[Region]:
         """Return the two halves of a region's box along the quantity that helps most."""
         a, b, low, high = region
-        if (high - low).max() < SMALLEST_BOX * self.width:
+        if ((high - low) / self.width).max() < SMALLEST_BOX:
             raise ExhaustedError
         for corner in corners(len(low)):
             at = np.where(corner > 0, high, low)
             if np.abs(self.poles(at)).max() > 1 + 1e-9:
                 raise UnstableError(at)
+        share = (high - low) / self.width
+        # without a margin on either side no quantity is better than another: the widest
         best: tuple[float, list[Region]] = (-np.inf, [])
-        for k in range(len(low)):
+        for k in np.argsort(-share):
+            if share[k] < 0.2 * share.max():
+                break
             middle = (low[k] + high[k]) / 2
             halves = [(low.copy(), high.copy()), (low.copy(), high.copy())]
             halves[0][1][k] = halves[1][0][k] = middle
             margins = sorted(self.margin((a + b) / 2, *half)[0] for half in halves)
-            if (merit := margins[0] + 0.1 * margins[1]) > best[0] or not best[1]:
+            if (merit := margins[0] + 0.1 * margins[1]) > best[0] + ROUNDING or not best[1]:
                 best = merit, [(a, b, *half) for half in halves]
         return best[1]
 
@@ -330,7 +334,7 @@ class Search:
 
     def certify(self, low: Vector, high: Vector, most: int) -> dict[str, NDArray[Any]]:
         """Return intervals, boxes and scalings that prove a box; raises if that fails."""
-        self.width, self.pairs, self.found = float((high - low).max()), [], {}
+        self.width, self.pairs, self.found = high - low, [], {}
         edges = np.append(0.0, np.geomspace(self.nyquist / 1000, self.nyquist, 16))
         stack = [(float(a), float(b), low, high) for a, b in pairwise(edges)]
         rows: list[tuple[float, float, Vector, Vector, float, float, int, int]] = []
