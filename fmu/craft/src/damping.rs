@@ -299,8 +299,8 @@ impl Law {
         }
     }
 
-    /// Returns c at mass m and length l, from x and from [angle^2 + A_0^2, |p'|^2]. `zeta` replaces the mode's own damping
-    /// ratio.
+    /// Returns the damping coefficient c (kg/s) at mass m and length l, from the specific force x along the tank's axis
+    /// (m/s2) and from [angle^2 + A_0^2, |p'|^2]. `zeta` replaces the mode's own damping ratio.
     #[inline(always)]
     fn coefficient<T: Number>(
         &self,

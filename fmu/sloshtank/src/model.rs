@@ -26,7 +26,8 @@ const LUMP: &str = "the liquid leaves the tank's bottom and moves on as detached
 pub struct Model {
     tank: SloshTank,
     coupling_ratio: f64,
-    /// True while the present inputs are applied. In Co-Simulation `in_range` belongs to the present motion.
+    /// True while the present inputs are applied: outputs then evaluate the ranges with them, and otherwise have the
+    /// ranges of the last event.
     present: bool,
     /// True after a tank without a model of detached liquid has left its range.
     has_left_range: bool,

@@ -32,8 +32,8 @@ impl Drop for Registered {
     }
 }
 
-/// Removes what is registered, for a program that a signal ends now: whoever registers something
-/// from here on waits for that end.
+/// Removes all registered files and folders, before a signal ends the program. The registry stays
+/// locked, so a thread that would register another file waits until the program has ended.
 pub fn remove_all() {
     let paths = paths();
     for path in paths.iter() {
@@ -45,7 +45,8 @@ pub fn remove_all() {
     std::mem::forget(paths);
 }
 
-/// Lets no signal end the program meanwhile. `work` must not register anything.
+/// Runs `work`, and delays signals that would end the program until it returns. `work` must not
+/// register anything.
 pub fn uninterrupted<T>(work: impl FnOnce() -> T) -> T {
     let _held = paths();
     work()

@@ -512,7 +512,8 @@ fn compare_with_newton(
     }
 }
 
-/// (dry craft's Newton-Euler) [a; w'] = inputs + sum of the tanks' wrenches.
+/// The Newton-Euler equations of the dry craft hold: its mass matrix times [a; w'] is the inputs plus the sum of the
+/// tanks' wrenches.
 #[test]
 fn forces_on_the_dry_craft_balance() {
     for seed in 0..300 {

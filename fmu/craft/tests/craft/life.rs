@@ -431,7 +431,7 @@ fn principal_moments_that_no_body_has_are_refused() {
     );
 }
 
-/// Steps with anything at all: numbers, or an error and the old state.
+/// Steps with random parameters and inputs give finite states, or an error that leaves the state unchanged.
 #[test]
 fn random_steps_end_in_numbers_or_an_error() {
     let mut refused = 0;

@@ -435,7 +435,7 @@ fn closer(features: &Features, than: f64) -> bool {
     features.delta_f().is_some_and(|delta| delta < than)
 }
 
-/// Returns means of `count` neighbours, without an incomplete group at the end.
+/// Averages each group of `count` consecutive samples. An incomplete group at the end is left out.
 fn means(signal: &[f64], count: usize) -> Cow<'_, [f64]> {
     if count == 1 {
         return signal.into();

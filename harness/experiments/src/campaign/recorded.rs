@@ -236,7 +236,9 @@ impl Sought<'_> {
         product / f64::sqrt(squares * others)
     }
 
-    /// Returns the clock from the phases of the record against those by a clock that is nearly right; `None` if they determine none.
+    /// Estimates the clock by least squares: the phases of the record in blocks, against the phases
+    /// of the sweep at the times of `clock`, which is nearly right. Returns `None` if the blocks do
+    /// not determine a clock.
     fn refined(&self, record: &[f64], clock: Clock) -> Option<Clock> {
         let (from, to) = self.span;
         let rows = (BLOCK_CYCLES / self.sweep.band().0 / self.step).ceil() as usize;

@@ -16,7 +16,7 @@ pub struct Kind {
     pub name: &'static str,
     /// Description of the torque for readers of help and documentation.
     pub says: &'static str,
-    /// Parameters; one of them is `duration`.
+    /// Parameters of the torque. Every kind has the parameter `duration`.
     pub parameters: &'static [Parameter],
     /// Conditions on several parameters, each with the sentence that states it.
     pub(super) demands: &'static [Demand],

@@ -67,7 +67,7 @@ enum Value {
 }
 
 impl Value {
-    /// Returns true for a number or a time, also an ambiguous one.
+    /// Returns true if the field contains a number or a time, including one that is ambiguous.
     fn is_there(&self) -> bool {
         !matches!(self, Value::Missing | Value::Other)
     }
