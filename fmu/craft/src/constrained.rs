@@ -288,7 +288,7 @@ fn dot_from_1(n: usize, a: &Vector, b: &Vector) -> f64 {
     sum[0] + sum[1] + sum[2]
 }
 
-/// Returns the square of a across the axis.
+/// Returns coefficient n of the series of |a|^2 without the component along the axis (index 2).
 fn square_across(n: usize, a: &Vector) -> f64 {
     let mut sum = [0.0; 2];
     for (a, b) in a[..=n].iter().zip(a[..=n].iter().rev()) {

@@ -104,7 +104,7 @@ pub(crate) struct Onset {
     pub frequency: [f64; 2],
     /// Torques in ascending order, at least two; the search is between the first and the last, N·m.
     pub amplitude: Vec<f64>,
-    /// True if the plan has the dwells already.
+    /// True after [`Plan::dwell`] has replaced the search by dwells.
     found: bool,
     lines: Lines,
 }
