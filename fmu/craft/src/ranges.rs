@@ -25,7 +25,9 @@
 //! does not depend on the phase.
 
 use formulas::cylinder::XI;
-use formulas::limits::{LimitedBy, SpinLimit, cylinder, swirl_fold};
+use formulas::limits::{
+    FORCED, LimitedBy, SpinLimit, cylinder, cylinder_with_energy, shifted, swirl_fold,
+};
 use formulas::regime::Regime;
 use formulas::third_order;
 use taylor::vector::{Vec3, dot, rotation, unit_quaternion};
@@ -35,6 +37,7 @@ use crate::outputs::TankOutputs;
 use crate::parameters::Tank;
 use crate::sizes::{MODES, POINTS};
 use crate::state::{BallState, Ranges};
+use crate::surface::Higher;
 
 /// 2 b/a over 1 + (b/a)^2 of an ellipse with the semi-axes a and b = a/2.
 const ROTARY: f64 = 0.8;
@@ -234,7 +237,15 @@ impl Tank {
         }
         let fill = 2.0 * self.depth / self.diameter;
         let [s, kappa] = [self.nonlinear_inertia[n], self.nonlinear_stiffness[n]];
-        let own = cylinder(fill, third_order::shifts(s, kappa).map(Some)).forced;
+        let [planar, circular] = third_order::shifts(s, kappa);
+        let shifts = [planar, circular - 2.0 * self.rotary_inertia[n]].map(Some);
+        let own = match cylinder_with_energy(fill).filter(|_| self.higher(n) != Higher::default()) {
+            Some(limit) => {
+                let (s, kappa) = third_order::coefficients(fill);
+                shifted(limit.forced, FORCED, shifts, third_order::shifts(s, kappa))
+            }
+            None => cylinder(fill, shifts).forced,
+        };
         let own = [own, swirl_fold(fill).unwrap_or(0.0)];
         [0, 1].map(|i| if given[i] > 0.0 { given[i] } else { own[i] })
     }

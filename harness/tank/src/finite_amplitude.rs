@@ -40,9 +40,8 @@ const NEARLY_SQUARE: f64 = 0.1;
 /// from fully nonlinear flow.
 const MOST_ANGLE: f64 = 30.0 * PI / 180.0;
 /// Angle at which a mode leaves its range over the angle at which the second-order wave is [`STEEPEST`] of the first-order
-/// wave, for tanks that nobody has compared with fully nonlinear flow: the smallest ratio in upright cylinders, that of deep
-/// liquid; at h/R 0.3 it is 0.6.
-const ESTIMATED_SHARE: f64 = 0.43;
+/// wave, for tanks that nobody has compared with fully nonlinear flow: the smallest ratio in upright cylinders.
+const ESTIMATED_SHARE: f64 = 0.24;
 /// Largest second-order wave at the wall, over the first-order wave, for which the third order holds.
 const STEEPEST: f64 = 0.5;
 

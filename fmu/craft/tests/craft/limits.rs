@@ -162,7 +162,7 @@ fn rotary_motion_is_that_of_a_wide_ellipse_at_every_phase() {
 }
 
 /// A cylinder of known dimensions has limits without parameters: pendulums in the default depth end at 4.3 degrees, bobs of
-/// the third order at 18, swirl at 9.4.
+/// the third order at 9.3, swirl at 9.4.
 #[test]
 fn a_tank_of_known_dimensions_has_the_limits_of_potential_flow() {
     let still = Motion { axial: 9.81, spin: 0.0 };
@@ -181,9 +181,27 @@ fn a_tank_of_known_dimensions_has_the_limits_of_potential_flow() {
         [4.2, 4.4].map(|x| at([1.0; 2], x, false)),
         [LimitedBy::None, LimitedBy::ThirdOrder]
     );
-    assert_eq!([18.1, 18.3].map(|x| at(third, x, false)), [LimitedBy::None, LimitedBy::ThirdOrder]);
+    assert_eq!([9.2, 9.4].map(|x| at(third, x, false)), [LimitedBy::None, LimitedBy::ThirdOrder]);
     let folds = [LimitedBy::None, LimitedBy::SecondaryResonance];
-    assert_eq!([9.3, 9.5].map(|x| at(third, x, true)), folds);
+    assert_eq!([9.2, 9.5].map(|x| at(third, x, true)), folds);
+    // At h/R 0.5 the third order ends at 6.5 degrees, and with the wave's energy at 11.8.
+    for (has_energy, ends) in [(false, 6.5), (true, 11.8)] {
+        let limited = [0.99, 1.01].map(|factor| {
+            let mut tank = Tank { diameter: 0.2, depth: 0.05, g_ref: 9.81, ..Tank::default() };
+            let pair = formulas::third_order::coefficients(0.5).into();
+            let known = formulas::energy_terms::energy_terms(0.5).unwrap();
+            [tank.nonlinear_inertia[0], tank.nonlinear_stiffness[0]] =
+                if has_energy { known.pair } else { pair };
+            if has_energy {
+                [tank.nonlinear_inertia_2[0], tank.nonlinear_stiffness_2[0]] = known.next;
+                [tank.rotary_inertia[0], tank.rotary_inertia_2[0]] = known.rotary;
+            }
+            let (sin, cos) = f64::to_radians(factor * ends).sin_cos();
+            tank.p_0[0] = [sin, 0.0, -cos];
+            reason(&tank, still)
+        });
+        assert_eq!(limited, [LimitedBy::None, LimitedBy::ThirdOrder], "{has_energy}");
+    }
     // Given limits have priority, and tanks without dimensions have none.
     let mut tank = Tank { diameter: 0.2, depth: 0.1227, g_ref: 9.81, ..Tank::default() };
     tank.p_0[0] = [0.1f64.sin(), 0.0, -0.1f64.cos()];
