@@ -232,16 +232,20 @@ def test_intervals_of_a_sticking_hub(fmu: Path, program: Path, tmp_path: Path) -
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the study compiles a binary for Linux")
-@pytest.mark.parametrize("only", ["decay", "gyro"])
+@pytest.mark.parametrize("only", ["decay", "gyro", "tank", "design --free"])
 def test_intervals_of_four_draws(only: str, fmu: Path, program: Path, tmp_path: Path) -> None:
     """Every interval is given, and at most one of four misses the truth (by chance 1.4 %)."""
     bench = intervals.Bench(os.fspath(program), os.fspath(fmu), tmp_path)
     rows = list(intervals.census(bench, only, 4))
     assert rows
     for row in rows:
-        held, without = re.search(r"(\d) of 4 .* (\d) \|$", row).groups()  # type: ignore[union-attr]
+        found = re.search(r"(\d) of 4 .* (\d) \| ([^|]*) \|$", row)
+        assert found is not None, row
+        held, without, of_fit = found.groups()
         assert int(held) >= 3
         assert without == "0", row
+        # a width that was foretold is that of the fit
+        assert of_fit == "-" or abs(float(of_fit.split()[0]) - 1) < 0.2, row
 
 
 def test_check_of_many_variables(program: Path, tmp_path: Path) -> None:
