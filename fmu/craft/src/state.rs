@@ -10,7 +10,7 @@ use crate::sizes::{MODES, TANKS};
 /// Indices of the states in x. Units: 1, rad/s, m, m/s, J, J, 1 and 1/s for each bob, kg, J, then m and m/s for each
 /// tank's detached liquid.
 pub mod index {
-    use super::{MODES, TANKS};
+    use crate::sizes::{MODES, TANKS};
 
     /// Attitude, body to inertial, four numbers, scalar first.
     pub const Q: usize = 0;

@@ -5,7 +5,7 @@
 //! only a label for an instant, and a model that needs the time since the start adds up the step sizes.
 
 use crate::call::Interface;
-use crate::variable::{is_finite, text};
+use crate::number::{is_finite, text};
 
 /// Allowed drift of the clock of a host that accumulates step sizes, as a fraction of the time since the
 /// start: after 1e7 steps of 0.1 s such a clock is off by 2e-10.

@@ -14,8 +14,9 @@ use crate::call::{CType, Call, Events, Fault, InstanceState, Interface};
 use crate::clock::Clock;
 use crate::extent::Extent;
 use crate::model::{Model, StepEnd, StepFailure};
+use crate::number::{is_finite, text};
 use crate::table::{Layout, Scalar};
-use crate::variable::{Access, Causality, Value, Variable, is_finite, text};
+use crate::variable::{Access, Causality, Value, Variable};
 use crate::version::Version;
 
 /// Relative tolerance if the host gives none.

@@ -21,6 +21,7 @@ pub mod hash;
 pub mod instance;
 pub mod log;
 pub mod model;
+pub mod number;
 pub mod snapshot;
 pub mod table;
 pub mod unit;

@@ -2,6 +2,7 @@
 
 use crate::call::CType;
 use crate::dynamics::Dynamics;
+use crate::number::{is_finite, text};
 
 /// The value of one scalar in the C interface. Enumerations are integers.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -236,21 +237,6 @@ impl<M: Dynamics> Copy for Variable<M> {}
 /// Shortest time in which an input may cross its range, s, because values that follow from faster changes may
 /// overflow.
 const CROSSING: f64 = 1e-9;
-
-/// Returns true if x is finite. It tests the bits, because comparing with NaN would end the process of a host
-/// that traps invalid operations.
-#[inline]
-pub const fn is_finite(x: f64) -> bool {
-    const EXPONENT: u64 = f64::INFINITY.to_bits();
-    x.to_bits() & EXPONENT != EXPONENT
-}
-
-/// Formats a number for a message. Formatting compares numbers, which must not be done with NaN, see
-/// [`is_finite`].
-pub fn text(x: f64) -> String {
-    let is_nan = x.to_bits() << 1 > f64::INFINITY.to_bits() << 1;
-    if is_nan { "NaN".into() } else { format!("{x:?}") }
-}
 
 const fn variable<M: Dynamics>(
     name: &'static str,

@@ -1,8 +1,9 @@
 //! Allowed values of a variable, and messages for others.
 
 use super::*;
+use crate::number::{is_finite, text};
 use crate::variable::Dimension::Fixed;
-use crate::variable::{Enumeration, Item, Variable, is_finite, text};
+use crate::variable::{Enumeration, Item, Variable};
 use Value::{Boolean, Integer, Real};
 
 type V = Variable<Vessels>;

@@ -8,7 +8,7 @@ use super::references::time_reference;
 use super::types::*;
 use crate::c_abi::{array, array_mut, on_allowed};
 use crate::model::Model;
-use crate::variable::{is_finite, text as number};
+use crate::number::{is_finite, text as number};
 use crate::version::Version;
 
 /// Computes the derivative of the unknowns in a direction of the knowns.

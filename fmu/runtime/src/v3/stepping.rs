@@ -13,7 +13,7 @@ use crate::c_abi::{Component, array, array_mut, null, on, on_allowed};
 use crate::call::{Call, Fault, InstanceState};
 use crate::instance::StepInfo;
 use crate::model::Model;
-use crate::variable::is_finite;
+use crate::number::is_finite;
 use crate::version::Version;
 
 /// Leaves event mode, so that steps can follow.
