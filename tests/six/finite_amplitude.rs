@@ -211,6 +211,41 @@ fn forced_planar_waves_with_the_energy_terms_are_those_of_potential_flow() {
     }
 }
 
+/// Rotary motion at h/R 0.5 and 1.01 times the frequency of small waves, with a damping ratio of 0.01 on every mode, by the same
+/// potential flow in three dimensions (about 30 modes). The angles and phases, degrees, are those of the first harmonics along
+/// the stroke and across it. The third order errs by 8 % and 7 degrees.
+#[test]
+fn forced_rotary_waves_with_the_energy_terms_are_those_of_potential_flow() {
+    let mut tank = bench_with_energy(0.5);
+    tank.zeta[0] = 0.01;
+    let w = 1.01 * linear_frequency(&tank);
+    let stroke = 0.008227 * 0.0815;
+    let (sin, cos) = f64::to_radians(13.5).sin_cos();
+    (tank.p_0[0], tank.p_dot_0[0]) = ([0.0, -sin, -cos], [sin * w, 0.0, 0.0]);
+    let (pieces, periods) = (100, 160);
+    let h = TAU / w / f64::from(pieces);
+    let a = |k: i32| stroke * w * w * (f64::from(k) * h * w).cos();
+    let (mut moved, mut harmonic) = (SloshTank::start(&tank), [[0.0; 2]; 2]);
+    for k in 0..periods * pieces {
+        Moved::step(&mut moved, [a(k), (a(k + 1) - a(k)) / h], h);
+        if k < (periods - 1) * pieces {
+            continue;
+        }
+        let (p, (sin, cos)) = (moved.bob(), (f64::from(k + 1) * h * w).sin_cos());
+        for (i, harmonic) in harmonic.iter_mut().enumerate() {
+            let share = 2.0 * p[i] / f64::from(pieces);
+            *harmonic = [harmonic[0] + share * cos, harmonic[1] - share * sin];
+        }
+    }
+    for (found, (angle, phase)) in harmonic.into_iter().zip([(12.80, 103.9), (14.48, -136.7)]) {
+        let [re, im] = found;
+        let (size, turned) = (re.hypot(im).asin().to_degrees(), im.atan2(re).to_degrees());
+        println!("{size:.3} {angle}, {turned:.2} {phase}");
+        assert!((size / angle - 1.0).abs() < 0.02, "{size} {angle}");
+        assert!((turned - phase).abs() < 3.0, "{turned} {phase}");
+    }
+}
+
 /// The difference of both FMUs is the recoil, which falls as 1/M.
 #[test]
 fn a_lighter_craft_recoils_more_by_the_ratio_of_the_masses() {
