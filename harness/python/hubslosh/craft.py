@@ -16,7 +16,15 @@ from .fmu import Fmu, FmuError, FmuWarning, Parameters, Quantity
 from .linearization import LinearModel, linearize
 from .loop import Loop
 from .operating_point import OperatingPoint, rotation, trim
-from .quantities import DELAY, RESERVED, apply_changes, full_names, mode_quantity
+from .quantities import (
+    DELAY,
+    RESERVED,
+    Modes,
+    apply_changes,
+    full_names,
+    mode_quantity,
+    short_name,
+)
 from .simulation import outputs_of, parameters_of
 from .tanks import (
     Tank,
@@ -688,7 +696,7 @@ class Craft:
     ) -> tuple[dict[str, Quantity], dict[str, Quantity], Any]:
         """Return untrimmed parameters, quantities of slosh modes and the delay, or None."""
         every = self._untrimmed(fill, **options)
-        given = full_names(parameters_of(parameters), self.tanks)
+        given = full_names(parameters_of(parameters), Fmu.open(self.model), self.tanks)
         late = given.pop(DELAY, None)
         modes = {name: given.pop(name) for name in list(given) if mode_quantity(name)}
         return every | given, modes, late
@@ -713,7 +721,7 @@ class Craft:
             point = OperatingPoint(model, dict(every), none, none, tuple(self.tanks))
         # they leave the centre of mass where it is
         if modes or factors:
-            every = apply_changes(model, point.parameters, modes, factors)
+            every = apply_changes(model, point.parameters, modes, factors, self.tanks)
             point = replace(point, parameters=every)
         return point
 
@@ -1134,10 +1142,12 @@ class Craft:
         >>> craft.uncertain("50%", {"main.frequency[1]": "10%"}).deltas
         ('tank[1].frequency[1]',)
         """
-        from .uncertainty import uncertain
+        from .uncertainty import FACTOR, uncertain
 
         tanks, order = self.tank_at(fill), list(self.tanks)
-        named: dict[str, Any] = full_names(ranges, order)  # type: ignore[arg-type]
+        named: dict[str, Any] = full_names(
+            ranges, Fmu.open(self.model), order, [FACTOR]  # type: ignore[arg-type]
+        )  # fmt: skip
         if DELAY in named:
             raise FmuError(
                 "delay belongs to a loop, not to the craft: give it to Craft.loop, or vary it by "
@@ -1157,7 +1167,15 @@ class Craft:
             raise FmuError(
                 "delay belongs to a loop, not to an uncertain model: give it to Craft.loop"
             )
-        return uncertain(point.parameters, named, outputs=outputs, model=point.model, **options)
+        known = Modes(point.model, point.parameters)
+        problems = [
+            f"{short_name(name, order)} {problem}" for name in named
+            if (mode := mode_quantity(name)) and (problem := known.problem(mode))
+        ]  # fmt: skip
+        if problems:
+            raise FmuError("; ".join(problems))
+        model = uncertain(point.parameters, named, outputs=outputs, model=point.model, **options)
+        return replace(model, tanks=tuple(order))
 
     def columns(self, fill: Fill) -> list[str]:
         """Return the names of the variables by which `view` draws craft and liquid.

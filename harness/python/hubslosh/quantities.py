@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .fmu import Fmu, FmuError, Parameters, Quantity
+from .fmu import Fmu, FmuError, Parameters, Quantity, did_you_mean
 from .plant import Plant
 
 TURN = 2 * np.pi
@@ -26,6 +26,9 @@ DELAY = "delay"
 
 RESERVED = re.compile(r"tank(\[\d\])?|craft|init|pivot|solver|delay|force|torque|omega|q")
 """Names that no tank of a `Craft` may have: parameters of the FMU begin with them."""
+
+NO_MODE = "does not exist: its tank has no such mode"
+"""What is wrong with a quantity of a mode that the tank does not have."""
 
 _MODE_QUANTITY = re.compile(rf"tank\[(\d)\]\.({'|'.join(KINDS)})\[(\d)\]")
 _MOVES_THE_BOB = re.compile(r"(tank\[\d\])\.(length|hinge)(\[\d\])")
@@ -59,14 +62,48 @@ def full_name(name: str, tanks: Iterable[str]) -> str:
     return f"tank[{number}]{name.removeprefix(tank)}"
 
 
-def full_names(given: Parameters, tanks: Iterable[str]) -> dict[str, Quantity]:
-    """Return values by full names; a quantity that is given under both of its names is refused."""
+def short_name(name: str, tanks: Iterable[str]) -> str:
+    """Return a name with the name of its tank: ``NTO.zeta[1]`` for ``tank[1].zeta[1]``."""
+    for number, tank in enumerate(tanks, 1):
+        if name.startswith(prefix := f"tank[{number}]."):
+            return f"{tank}.{name.removeprefix(prefix)}"
+    return name
+
+
+def unknown(name: str, fmu: Fmu, tanks: Iterable[str], also: Iterable[str] = ()) -> str:
+    """Return what is wrong with a name that is no quantity of a craft; "" if it is one.
+
+    also: names beside those of the FMU, of slosh modes and of the delay.
+    """
+    tanks, also = list(tanks), [DELAY, *also]
+    full = full_name(name, tanks)
+    if full in also or mode_quantity(full) or full in fmu.variables:
+        return ""
+    numbers = [f"tank[{number}]." for number in range(1, len(tanks) + 1)]
+    known = [n for n in fmu.variables if n[:5] != "tank[" or n.startswith(tuple(numbers))]
+    known += [f"{number}bob[{n}]" for number in numbers for n in (1, 2, 3)]
+    short = [short_name(n, tanks) for n in known]
+    return f"the craft has no quantity {name}{did_you_mean(name, [*also, *short, *known])}"
+
+
+def full_names(
+    given: Parameters, fmu: Fmu, tanks: Iterable[str], also: Iterable[str] = ()
+) -> dict[str, Quantity]:
+    """Return values by full names.
+
+    Raises FmuError for names that are no quantities of a craft, see `unknown`, and for a quantity
+    that is given under both of its names.
+    """
     tanks, found = list(tanks), dict[str, Quantity]()
+    problems = [text for name in given if (text := unknown(str(name), fmu, tanks, also))]
     for name, value in given.items():
-        full = full_name(name, tanks)
+        full = full_name(str(name), tanks)
         if full in found:
-            raise FmuError(f"{name} and {full} are the same quantity: give it once")
+            both = (full, short_name(full, tanks))
+            problems.append(f"{' and '.join(both)} are the same quantity: give it once")
         found[full] = value
+    if problems:
+        raise FmuError("; ".join(problems))
     return found
 
 
@@ -100,7 +137,7 @@ class Modes:
         if mode.tank > self.number("tanks") or mode.number > self.number(
             f"tank[{mode.tank}].modes"
         ):
-            return "does not exist at this fill: its tank has no such mode"
+            return NO_MODE
         if mode.kind == "zeta":
             return ""
         if self.number(f"tank[{mode.tank}].fill.points") or self.number(
@@ -225,17 +262,19 @@ def apply_changes(
     given: Parameters,
     values: Parameters,
     factors: Mapping[str, float] | None = None,
+    tanks: Iterable[str] = (),
 ) -> dict[str, Quantity]:
     """Return parameters of Spacecraft with quantities of slosh modes, by full names, changed.
 
     factors: frequencies by their ratio to those of the parameters, whatever the thrust is.
+    tanks: names for messages.
     """
     modes, problems = Modes(model, given), []
     for name, value in values.items():
         mode = mode_quantity(name)
         assert mode is not None
         if problem := modes.problem(mode):
-            problems.append(f"{name} {problem}")
+            problems.append(f"{short_name(name, tanks)} {problem}")
             continue
         like = mode.name("hinge" if mode.kind == "bob" else mode.kind)
         modes.set(mode, float(modes.fmu.convert(like, value)))

@@ -15,11 +15,20 @@ import pandas as pd
 
 from .arguments import MOST_FILLS, MOST_WORK, check_ranges
 from .files import write_file
-from .fmu import Fmu, FmuError, FmuWarning, Parameters, Quantity, did_you_mean
+from .fmu import Fmu, FmuError, FmuWarning, Parameters, Quantity
 from .linearization import LinearModel, linearize
 from .loop import Loop
 from .operating_point import rotation
-from .quantities import DELAY, ModeQuantity, Modes, full_name, mode_quantity, moves_the_bob
+from .quantities import (
+    DELAY,
+    NO_MODE,
+    ModeQuantity,
+    Modes,
+    full_names,
+    mode_quantity,
+    moves_the_bob,
+    short_name,
+)
 from .review_point import Point, Vector
 from .sampling import draw
 from .short import ShortTable
@@ -507,7 +516,7 @@ class _Space:
         known = {*ranges, *given[0][1]}
         found = _damping(craft, tanks, known) if damping == "interval" else []
         found += _frequencies(craft, loops, frequency, ranges)
-        found += _quantities(loops, [every for every, _ in given], ranges)
+        found += _quantities(loops, [every for every, _ in given], ranges, craft.tanks)
         percent = all(isinstance(f, str) and f.strip().endswith("%") for f in fills)
         if percent:
             at = [float(fill.strip()[:-1]) for fill in fills]
@@ -562,13 +571,8 @@ def _full_ranges(craft: "Craft", given: Any) -> dict[str, tuple[str, Any]]:
     if not isinstance(given, Mapping):
         raise FmuError(f'uncertain must be ranges by name, such as {{"craft.mass": (1380, 1420)}}, '
                        f"not {given!r}")  # fmt: skip
-    found: dict[str, tuple[str, Any]] = {}
-    for name, range_ in given.items():
-        full = full_name(str(name), craft.tanks)
-        if full in found:
-            raise FmuError(f"uncertain: {name} and {found[full][0]} are the same: give it once")
-        found[full] = (str(name), range_)
-    return found
+    full = full_names(given, Fmu.open(craft.model), craft.tanks)
+    return dict(zip(full, ((str(name), range_) for name, range_ in given.items()), strict=True))
 
 
 def _damping(craft: "Craft", tanks: list[dict[str, Any]], given: Container[str]) -> list[Uncertain]:
@@ -631,6 +635,7 @@ def _quantities(
     loops: Sequence[Loop],
     given: Sequence[Parameters],
     ranges: Mapping[str, tuple[str, Any]],
+    tanks: Iterable[str],
 ) -> list[Uncertain]:
     """Return the quantities whose ranges were given, by full names; given: untrimmed parameters."""
     fmu = Fmu.open(loops[0].model)
@@ -638,28 +643,24 @@ def _quantities(
     allowed += [n for n in fmu.names("parameter", "structuralParameter") if fmu.kind(n) == "Real"]
     problems, found = [], []
     for full, (name, range_) in ranges.items():
+        shown = short_name(full, tanks)
         if instead := moves_the_bob(full):
-            problems.append(f"uncertain: {name} {instead}")
+            problems.append(f"uncertain: {shown} {instead}")
             continue
         if mode_quantity(full) is None and full not in allowed:
             problems.append(
-                f"uncertain has {name}, which is not a Real parameter of {fmu.name}, nor delay"
-                f"{did_you_mean(name, allowed)}"
+                f"uncertain has {shown}, which is not a Real parameter of {fmu.name}, nor delay"
             )
             continue
-        if (
-            (mode := mode_quantity(full))
-            and "no such mode" not in (bad := _problem(loops[0], mode))
-            and bad
-        ):
-            problems.append(f"uncertain: {name} {bad}")
+        if (mode := mode_quantity(full)) and (bad := _problem(loops[0], mode)) != NO_MODE and bad:
+            problems.append(f"uncertain: {shown} {bad}")
             continue
         nominals = [
             _nominal(fmu, loop, every, full) for loop, every in zip(loops, given, strict=True)
         ]
         ends, problem = _ends(range_, nominals)
         if problem:
-            problems.append(f"uncertain: {name} {problem}")
+            problems.append(f"uncertain: {shown} {problem}")
             continue
         if isinstance(range_, str):
             text = f"± {range_.strip().lstrip('±').strip()}"
@@ -720,7 +721,7 @@ def _ends(given: Any, nominals: list[float | None]) -> tuple[Ends, str]:
     known = [value for value in nominals if value is not None]
     allowed = 'allowed: (low, high), or a share of the nominal value such as "5%"'
     if not known:
-        return [], "exists at no fill: its tank does not have this mode"
+        return [], NO_MODE
     if isinstance(given, str):
         if (share := _share(given)) is None:
             return [], f"cannot be {given!r} ({allowed})"

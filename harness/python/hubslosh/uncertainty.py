@@ -50,7 +50,7 @@ from .linearization import LinearModel
 from .loop import Loop
 from .operating_point import warn_of_rotation
 from .plant import Plant
-from .quantities import KINDS, TURN, moves_the_bob, rigid_rest
+from .quantities import KINDS, TURN, full_name, moves_the_bob, rigid_rest
 from .short import names
 from .simulation import parameters_of
 from .stability import _closed, minimal
@@ -488,6 +488,8 @@ class UncertainModel:
         Name of the FMU, or its file.
     given : dict
         Parameters of the FMU at its operating point.
+    tanks : tuple of str
+        Names of the craft's tanks, by which `delta` takes quantities of their modes, too.
 
     Examples
     --------
@@ -537,6 +539,7 @@ class UncertainModel:
     _craft: _Craft
     _values: "dict[str, float]"
     _X_0: Matrix
+    tanks: tuple[str, ...] = ()
 
     @property
     def deltas(self) -> tuple[str, ...]:
@@ -577,10 +580,11 @@ class UncertainModel:
             If a name is not among `deltas`, or the numbers are too few, too many or not finite.
         """
         if isinstance(delta, Mapping):
-            if unknown := [name for name in delta if name not in self.deltas]:
+            given = {full_name(name, self.tanks): x for name, x in delta.items()}
+            if unknown := [name for name in given if name not in self.deltas]:
                 hint = did_you_mean(unknown[0], self.deltas)
                 raise FmuError(f"Δ has no {', '.join(unknown)}{hint}")
-            return np.array([float(delta.get(name, 0.0)) for name in self.deltas])
+            return np.array([float(given.get(name, 0.0)) for name in self.deltas])
         found = floats(delta)
         if found.shape != (len(self.counts),) or not np.isfinite(found).all():
             raise FmuError(f"Δ must be {len(self.counts)} finite numbers, not {delta!r}")

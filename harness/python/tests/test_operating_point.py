@@ -149,6 +149,45 @@ def test_every_method_takes_the_same_names(craft: Craft, name: str) -> None:
             call()
 
 
+WRONG = {
+    "NTO.frequence[1]": "no quantity NTO.frequence[1]; did you mean NTO.frequency[1]?",
+    "MH.zeta[1]": "the craft has no quantity MH.zeta[1]; did you mean MMH.zeta[1]?",
+    "craft.Jxw": "the craft has no quantity craft.Jxw; did you mean craft.Jxz?",
+    "dealy": "the craft has no quantity dealy; did you mean delay?",
+    "tank[1].frequency": "the craft has no quantity tank[1].frequency; did you mean",
+    "NTO.frequency[2]": "NTO.frequency[2] does not exist: its tank has no such mode",
+    "tank[1].bob[2]": "NTO.bob[2] does not exist: its tank has no such mode",
+    "tank[3].mass[1]": "tank[3].mass[1] does not exist: its tank has no such mode",
+}
+"""Names that no quantity of the craft has, and what every method says."""
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_every_method_says_the_same_of_a_wrong_name(craft: Craft, name: str) -> None:
+    """As a parameter, as a value of a study, and as a range."""
+    values, ranges = {name: 0.2}, {name: (0.1, 0.3)}
+    for call in (
+        lambda: craft.parameters("50%", parameters=values),
+        lambda: craft.trim("50%", values),
+        lambda: craft.linearize("50%", parameters=values),
+        lambda: craft.loop(GAINS, PERIOD, "50%", parameters=values),
+        lambda: craft.review(GAINS, PERIOD, ["50%"], parameters=values, draws=0),
+        lambda: craft.uncertain("50%", {"craft.Jxx": "5%"}, parameters=values),
+        lambda: craft.review(GAINS, PERIOD, ["50%"], uncertain=ranges, draws=0),
+        lambda: craft.uncertain("50%", ranges),
+    ):
+        with pytest.raises(FmuError) as told:
+            call()
+        assert WRONG[name] in str(told.value)
+
+
+def test_a_delta_has_the_names_of_tanks(craft: Craft) -> None:
+    """By name and by number."""
+    model = craft.uncertain("50%", {"NTO.frequency[1]": "5%", "craft.Jxx": "5%"})
+    for name in ("NTO.frequency[1]", "tank[1].frequency[1]"):
+        assert model.delta({name: 0.5}).tolist() == [0.5, 0.0]
+
+
 def test_a_quantity_of_a_mode_changes_alone(craft: Craft) -> None:
     """Frequency, mass, bob: the others, and the liquid at rest, stay; with surface tension too."""
     nominal, of = craft.parameters("50%"), ModeQuantity(2, "frequency", 1)

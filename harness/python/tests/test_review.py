@@ -337,7 +337,7 @@ def test_a_review_names_what_is_wrong(craft: Craft) -> None:
         ("craft.mass", "5"): 'such as "5%"',
         ("craft.mass", 5): 'such as "5%"',
         ("delay", "5%"): "is 0",
-        ("tank[1].mass[2]", "5%"): "exists at no fill",
+        ("tank[1].mass[2]", "5%"): "its tank has no such mode",
     }.items():
         given = dict([uncertain]) if isinstance(uncertain, tuple) else uncertain
         with pytest.raises(FmuError, match=text):
