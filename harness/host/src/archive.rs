@@ -198,7 +198,7 @@ impl Archive {
         let size = std::io::copy(&mut file.take(said.saturating_add(1)), to).map_err(|why| {
             match why.kind() {
                 ErrorKind::InvalidInput | ErrorKind::InvalidData => {
-                    anyhow!("its compressed bytes are damaged")
+                    anyhow!("its compressed bytes are damaged: {why}")
                 }
                 _ => anyhow!(why),
             }
