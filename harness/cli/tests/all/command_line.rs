@@ -666,7 +666,7 @@ fn damaged_files_are_refused_in_words_of_users() {
     write("cut.parquet", b"PAR1 and no more");
     write("cut.json", b"{");
     write("text.ssv", b"text");
-    write("zero.csv", b"time,tau_cmd,omega\n0,0,0\n0.5,0,0\n1,0,0\n");
+    write("zero.csv", b"time,tau_cmd,omega\n0,0,0\n0.1,0,0\n0.2,0,0\n");
     let cases: [(&[&str], &str); 8] = [
         (
             &["run", "--profile", "zero", "--out", "o.csv", "--fmu", "text.fmu"],

@@ -132,7 +132,7 @@ fn runs_made_by_another_importer_from_the_list_give_the_same_tables() {
         recorded.resize(columns.len(), Vec::new());
         for k in 0..time.len() {
             for (name, column) in columns.iter().zip(&mut recorded).skip(2) {
-                column.push(instance.real(name).unwrap());
+                column.push(instance.get(name).unwrap().number());
             }
             if k + 1 < time.len() {
                 instance.set_real(&reference, &[tau[k]]).unwrap();
