@@ -73,7 +73,7 @@ def short_name(name: str, tanks: Iterable[str]) -> str:
 def unknown(name: str, fmu: Fmu, tanks: Iterable[str], also: Iterable[str] = ()) -> str:
     """Return what is wrong with a name that is no quantity of a craft; "" if it is one.
 
-    also: names beside those of the FMU, of slosh modes and of the delay.
+    also: further names, in addition to the FMU's, those of slosh modes and the delay.
     """
     tanks, also = list(tanks), [DELAY, *also]
     full = full_name(name, tanks)
