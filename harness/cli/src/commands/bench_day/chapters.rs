@@ -317,83 +317,121 @@ fn preferential_direction(
         thinned(points).map(|(angle, a)| (wrapped(angle).to_degrees(), sign * a)).collect()
     };
     let angles = || (-90..=90).map(|k| 2.0 * f64::from(k));
-    let braking = |of: &Braking, sign: f64, degrees: f64| sign * of.at(degrees.to_radians());
-    let [ccw, cw] = [(ahead, -1.0), (back, 1.0)];
-    let fit = |(of, sign): (&Braking, f64)| -> Vec<(f64, f64)> {
-        angles().map(|angle| (angle, braking(of, sign, angle))).collect()
+    let ways = [("counter-clockwise", ahead, -1.0), ("clockwise", back, 1.0)];
+    let fit = |(_, of, sign): (&str, &Braking, f64)| -> Vec<(f64, f64)> {
+        angles().map(|angle| (angle, sign * of.at(angle.to_radians()))).collect()
     };
-    let differences: Vec<(f64, f64)> =
-        fit(ccw).into_iter().zip(fit(cw)).map(|((angle, a), (_, b))| (angle, a - b)).collect();
-    // The fits of the two directions are independent. The band is a confidence band for the whole curve of
-    // the difference, as those of the two fits are.
-    let band: Option<Vec<(f64, f64)>> = angles()
-        .map(|angle| {
-            let half = |braking: &Braking| braking.half_width(angle.to_radians());
-            Some((angle, half(ahead)?.hypot(half(back)?)))
-        })
+    // Each band is a confidence band for the whole curve. There is none if the decays are too few.
+    let bands: Option<Vec<Vec<f64>>> = ways
+        .iter()
+        .map(|(_, of, _)| angles().map(|angle| of.half_width(angle.to_radians())).collect())
         .collect();
-    let edges = |sign: f64| -> Vec<(f64, f64)> {
-        let both = band.iter().flatten().zip(&differences);
-        both.map(|((angle, half), (_, difference))| (*angle, difference + sign * half)).collect()
-    };
-    let (lower, upper) = (edges(-1.0), edges(1.0));
-    let beyond = lower.iter().zip(&upper).filter(|(l, u)| l.1 > 0.0 || u.1 < 0.0).count();
-    let shown = match &band {
-        None => format!(
-            "The decays have {} and {} parts of a revolution (needed for an interval: {LEAST_STRETCHES} in each direction), so the figures \
-             cannot tell friction that depends on the angle from scatter.",
-            ahead.stretches, back.stretches
-        ),
-        Some(_) if beyond == 0 => "The difference of the directions is nowhere outside its 95 % interval (dashed): the curves of these \
-             figures show scatter, not friction that depends on the angle or the direction."
-            .to_string(),
-        Some(band) => format!(
-            "The difference of the directions is outside its 95 % interval (dashed) over {:.0} % of the revolution.",
-            100.0 * beyond as f64 / band.len() as f64
-        ),
-    };
     let (x, y) = ("angle / deg", "deceleration / (rad/s²)");
-    let scatter = chart(
-        "Deceleration in free decay against the angle",
-        x,
-        y,
-        vec![
-            series("counter-clockwise", Style::Cloud, degrees(&ahead.points, -1.0)),
-            series("clockwise", Style::Cloud, degrees(&back.points, 1.0)),
-            series("counter-clockwise, fitted", Style::Line, fit(ccw)),
-            series("clockwise, fitted", Style::Line, fit(cw)),
-        ],
-    );
-    let difference = chart(
-        "Directional asymmetry against the angle",
-        x,
-        "counter-clockwise less clockwise / (rad/s²)",
-        vec![
-            series("difference of the fits", Style::Line, differences.iter().copied()),
-            series("95 % interval, lower end", Style::Dashed, lower.iter().copied()),
-            series("95 % interval, upper end", Style::Dashed, upper.iter().copied()),
-        ],
-    );
-    let round = |points: Vec<(f64, f64)>| {
-        points.into_iter().map(|(angle, a)| {
-            let (sin, cos) = angle.to_radians().sin_cos();
-            (a * cos, a * sin)
-        })
+    let clouds = ways.map(|(name, of, sign)| series(name, Style::Cloud, degrees(&of.points, sign)));
+    let scattered = |lines: Vec<Series>| {
+        let all = clouds.iter().cloned().chain(lines).collect();
+        chart("Deceleration in free decay against the angle", x, y, all)
     };
-    let polar = chart(
-        "Deceleration around the revolution",
-        "deceleration · cos θ / (rad/s²)",
-        "deceleration · sin θ / (rad/s²)",
-        vec![
-            series("counter-clockwise", Style::Line, round(fit(ccw))),
-            series("clockwise", Style::Line, round(fit(cw))),
-        ],
-    );
+    let (shown, illustrations) = match bands {
+        None => {
+            let text = format!(
+                "The decays have {} and {} parts of a revolution (needed for an interval: {LEAST_STRETCHES} in each direction), which \
+                 cannot tell friction that depends on the angle from scatter. Figures 5.11 and 5.12 of the thesis need more decays.",
+                ahead.stretches, back.stretches
+            );
+            let figure = illustration(
+                scattered(Vec::new()),
+                "5.10",
+                "One point for each row without torque.",
+            );
+            (text, vec![figure])
+        }
+        Some(bands) => {
+            let fits = ways.map(fit);
+            let [of_ahead, of_back] = &fits;
+            // The fits of the two directions are independent.
+            let edges = |sign: f64| -> Vec<(f64, f64)> {
+                let halves = bands[0].iter().zip(&bands[1]).map(|(a, b)| a.hypot(*b));
+                let both = of_ahead.iter().zip(of_back).zip(halves);
+                both.map(|((a, b), half)| (a.0, a.1 - b.1 + sign * half)).collect()
+            };
+            let [lower, difference, upper] = [-1.0, 0.0, 1.0].map(edges);
+            let beyond = lower.iter().zip(&upper).filter(|(l, u)| l.1 > 0.0 || u.1 < 0.0).count();
+            let text = match beyond {
+                0 => "The difference of the directions is nowhere outside its 95 % interval (dashed): the curves of these \
+                      figures show scatter, not friction that depends on the angle or the direction."
+                    .to_string(),
+                _ => format!(
+                    "The difference of the directions is outside its 95 % interval (dashed) over {:.0} % of the revolution.",
+                    100.0 * beyond as f64 / lower.len() as f64
+                ),
+            };
+            let round = |points: Vec<(f64, f64)>| {
+                points.into_iter().map(|(angle, a)| {
+                    let (sin, cos) = angle.to_radians().sin_cos();
+                    (a * cos, a * sin)
+                })
+            };
+            let names = ways.map(|(name, ..)| name);
+            let mut polar = Vec::new();
+            for ((name, fit), band) in names.iter().zip(&fits).zip(&bands) {
+                polar.push(series(name, Style::Line, round(fit.clone())));
+                for sign in [-1.0, 1.0] {
+                    let edge =
+                        fit.iter().zip(band).map(|((angle, a), half)| (*angle, a + sign * half));
+                    let which = if sign < 0.0 { "lower" } else { "upper" };
+                    let name = format!("{name}, 95 % band, {which} end");
+                    polar.push(series(&name, Style::Dashed, round(edge.collect())));
+                }
+            }
+            let lines = names.iter().zip(&fits).map(|(name, fit)| {
+                series(&format!("{name}, fitted"), Style::Line, fit.iter().copied())
+            });
+            let figures = vec![
+                illustration(
+                    scattered(lines.collect()),
+                    "5.10",
+                    "One point for each row without torque, and the fit with two harmonics of the angle.",
+                ),
+                illustration(
+                    chart(
+                        "Directional asymmetry against the angle",
+                        x,
+                        "counter-clockwise less clockwise / (rad/s²)",
+                        vec![
+                            series("difference of the fits", Style::Line, difference),
+                            series("95 % interval, lower end", Style::Dashed, lower),
+                            series("95 % interval, upper end", Style::Dashed, upper),
+                        ],
+                    ),
+                    "5.11",
+                    "Positive where the fit has stronger deceleration counter-clockwise.",
+                ),
+                Illustration {
+                    equal: true,
+                    ..illustration(
+                        chart(
+                            "Deceleration around the revolution",
+                            "deceleration · cos θ / (rad/s²)",
+                            "deceleration · sin θ / (rad/s²)",
+                            polar,
+                        ),
+                        "5.12",
+                        "Distance from the origin: the fitted deceleration at the angle θ, with the 95 % band of the whole curve.",
+                    )
+                },
+            ];
+            (text, figures)
+        }
+    };
     let verdict = match asymmetry {
         Some(p) if p.determined => {
             let [low, high] = p.interval.map(|end| 100.0 * end);
+            // two digits of the interval's width
+            let places = (1.0 - (high - low).log10().floor()).clamp(1.0, 6.0) as usize;
             let size = format!(
-                "Counter-clockwise dry friction is {:+.1} % from the mean of both directions (95 %: {low:.1} to {high:.1} %)",
+                "Counter-clockwise dry friction is {:+.places$} % from the mean of both directions (95 %: {low:.places$} to \
+                 {high:.places$} %)",
                 100.0 * p.value
             );
             match () {
@@ -415,26 +453,7 @@ fn preferential_direction(
             ),
             shown,
         ],
-        illustrations: vec![
-            illustration(
-                scatter,
-                "5.10",
-                "One point for each row without torque, and the fit with two harmonics of the angle.",
-            ),
-            illustration(
-                difference,
-                "5.11",
-                "Positive where the fit has stronger deceleration counter-clockwise.",
-            ),
-            Illustration {
-                equal: true,
-                ..illustration(
-                    polar,
-                    "5.12",
-                    "Distance from the origin: the fitted deceleration at the angle θ.",
-                )
-            },
-        ],
+        illustrations,
         ..Chapter::default()
     }
 }
