@@ -181,7 +181,7 @@ class Certificate:
         FmuError
             If the name does not end in .npz, the file cannot be written, or nothing was proved.
         """
-        from .files import write_file
+        from .temporary import write_file
 
         if not self.size:
             raise FmuError("nothing was proved, so that there is nothing to save")

@@ -2,7 +2,7 @@
 
 import os
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
@@ -31,16 +31,7 @@ def _check_table(table: Any, path: Any, ending: str) -> Path:
         raise FmuError(f"the table comes first, then the file: (table, {str(table)!r})")
     if not isinstance(table, pd.DataFrame):
         raise FmuError(f"a pandas.DataFrame is expected, not {type(table).__name__}")
-    return _check_path(path, ending)
-
-
-def _check_path(path: Any, ending: str) -> Path:
-    if not isinstance(path, str | os.PathLike):
-        raise FmuError(f"the file's name is expected, not {path!r}")
-    path = Path(path)
-    if path.suffix.lower() != ending:
-        raise FmuError(f"{path}: the name must end in {ending}")
-    return path
+    return temporary.check_path(path, ending)
 
 
 def _columns(table: "pd.DataFrame") -> dict[str, Any]:
@@ -173,7 +164,7 @@ def to_mat(
         arrays = _distinct_names(_columns(table), table.attrs.get("units", {}))
     from scipy.io import savemat
 
-    with temporary.output(_check_path(path, ".mat")) as new:
+    with temporary.output(temporary.check_path(path, ".mat")) as new:
         savemat(new, arrays, oned_as="column", do_compression=False)
 
 
@@ -214,11 +205,3 @@ def _in_mat(values: Mapping[str, Any]) -> dict[str, Any]:
         key: np.array(of, object) if isinstance(of, list) and of and isinstance(of[0], str) else of
         for key, of in values.items()
     }
-
-
-def write_file(path: str | Path, ending: str, content: Callable[[], str | bytes]) -> None:
-    """Write a text or bytes, which are made after the file's name was checked."""
-    path = _check_path(path, ending)
-    with temporary.output(path) as new:
-        made = content()
-        new.write_bytes(made.encode() if isinstance(made, str) else made)

@@ -14,7 +14,6 @@ import numpy as np
 import pandas as pd
 
 from .arguments import MOST_FILLS, MOST_WORK, check_ranges
-from .files import write_file
 from .fmu import Fmu, FmuError, FmuWarning, Parameters, Quantity
 from .linearization import LinearModel, linearize
 from .loop import Loop
@@ -35,6 +34,7 @@ from .short import ShortTable
 from .stabilisation import resonances
 from .stability import margins_and_gain
 from .suggestion import Suggestion, suggest
+from .temporary import write_file
 from .worst_case import Confirmation, confirm, search
 
 if TYPE_CHECKING:

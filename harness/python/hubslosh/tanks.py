@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from . import native
-from .files import write_file
 from .fmu import FmuError, FmuWarning
+from .temporary import write_file
 
 if TYPE_CHECKING:
     import pandas as pd

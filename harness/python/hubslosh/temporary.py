@@ -10,10 +10,10 @@ import shutil
 import stat
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 from .native import FmuError, destination, put
 
@@ -122,3 +122,21 @@ def _remove_dead(path: Path) -> None:
         dead = try_lock(file)
     if dead:
         shutil.rmtree(path, ignore_errors=True)
+
+
+def check_path(path: Any, ending: str) -> Path:
+    """Return the path of a file whose name must have this ending, such as ``.mat``."""
+    if not isinstance(path, str | os.PathLike):
+        raise FmuError(f"the file's name is expected, not {path!r}")
+    path = Path(path)
+    if path.suffix.lower() != ending:
+        raise FmuError(f"{path}: the name must end in {ending}")
+    return path
+
+
+def write_file(path: str | Path, ending: str, content: Callable[[], str | bytes]) -> None:
+    """Write a text or bytes, which are made after the file's name was checked."""
+    path = check_path(path, ending)
+    with output(path) as new:
+        made = content()
+        new.write_bytes(made.encode() if isinstance(made, str) else made)

@@ -1060,7 +1060,7 @@ class UncertainModel:
         FmuError
             If the name does not end in .json, or the file cannot be written.
         """
-        from .files import write_file
+        from .temporary import write_file
 
         every = {key: value.tolist() if hasattr(value, "tolist") else value
                  for key, value in self.as_dict().items()}  # fmt: skip
