@@ -161,7 +161,8 @@ class Package(WorkerPlugin):
 
     def __init__(self) -> None:
         """Read its files; the compiled half has the name that Python looks for."""
-        source, native = Path(hubslosh.__file__).parent, Path(hubslosh.native._native.__file__)
+        source = Path(hubslosh.__file__).parent
+        native = Path(str(sys.modules["hubslosh._native"].__file__))
         self.files = {file.name: file.read_bytes() for file in source.glob("*.py")}
         ending = ".pyd" if os.name == "nt" else ".abi3.so"
         self.files[f"_native{ending}"] = native.read_bytes()

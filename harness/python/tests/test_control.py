@@ -209,7 +209,7 @@ def test_what_is_wrong_with_a_loop_is_told(fmu: Path, spacecraft: Path) -> None:
             * control.ss(0.5 * np.eye(2), np.eye(2), np.eye(2), 0, 0.2),
             *loop[1:],
         ),
-        "is it improper": lambda: closed_loop(
+        "an improper transfer function": lambda: closed_loop(
             control.tf([1, 0], [1]), *loop[1:], measured=["omega"]
         ),
         "is not specified": lambda: closed_loop(

@@ -9,6 +9,7 @@ import pytest
 from conftest import option
 
 import hubslosh
+from hubslosh.craft import BEYOND_THIRD_ORDER
 
 SHAPES = {
     "cylinder": "cylinder = { radius = 0.5, height = 1.5 }",
@@ -43,7 +44,8 @@ def test_between_its_points_a_table_is_the_tank_s_own_parameters(
     table = hubslosh.read_parameters(parameters("--sweep", "2%,98%"))
     for fill in FILLS:
         own = hubslosh.read_parameters(parameters("--fill", f"{fill}%"))
-        # the table has the third-order coefficients of its largest fill
+        # a table has the third order alone
+        own = {name: value for name, value in own.items() if not BEYOND_THIRD_ORDER.search(name)}
         third_order = {name: value for name, value in table.items() if ".nonlinear_" in name}
         exact = swing({**own, **third_order})
         met = swing({**table, "tank.liquid_0": exact["mass"][0]})

@@ -19,11 +19,10 @@ impl Default for Parameters {
     }
 }
 
-/// A spring: displacement and velocity, and the parameters.
 #[derive(Clone, Debug)]
 pub struct Spring {
     p: Parameters,
-    x: [f64; 2],
+    x: [f64; 2], // displacement (m) and velocity (m/s)
 }
 
 impl Spring {

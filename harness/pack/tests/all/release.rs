@@ -114,7 +114,7 @@ fn tree_with_a_release(folder: &Path) {
         sums += &format!("{}  {name}\n", sha256(name.as_bytes()));
     };
     for model in ["HubSlosh", "Spacecraft", "SloshTank"] {
-        for name in ["", "-fmi3"].map(|fmi| format!("{model}-1.2.3{fmi}.fmu")) {
+        for name in ["", "-fmi3", "-fmi3-arrays"].map(|fmi| format!("{model}-1.2.3{fmi}.fmu")) {
             listed(&format!("dist/release/{name}"), &name);
         }
     }
@@ -147,7 +147,7 @@ fn release_files_are_those_of_the_manifest_and_a_missing_or_changed_one_fails() 
     let mut wanted: BTreeSet<String> =
         ["SHA256SUMS", "notes.md", "HubSlosh-1.2.3-fmi3.cdx.json"].map(String::from).into();
     for model in ["HubSlosh", "Spacecraft", "SloshTank"] {
-        wanted.extend(["", "-fmi3"].map(|fmi| format!("{model}-1.2.3{fmi}.fmu")));
+        wanted.extend(["", "-fmi3", "-fmi3-arrays"].map(|fmi| format!("{model}-1.2.3{fmi}.fmu")));
     }
     assert_eq!(found, wanted);
     let found = gathered(whole.path(), &["v1.2.3", "all", "wheels"]).unwrap();
