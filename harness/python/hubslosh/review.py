@@ -326,7 +326,7 @@ class Review:
             of = "" if len(stable) == len(table) else " of stable points"
             if len(stable):
                 lines.append(f"{name.replace('_', ' ')}{of}: {low:.3g} to {high:.3g}{unit}")
-        lines += [f"worst case: {self._describe(self.worst)}", f"there {self.confirmation}"]
+        lines += [f"worst case: {self._describe(self.worst)}", f"there {self.confirmation.summary}"]
         lines.append(self.suggestion.text)
         if self.uncertain:
             lines += ["uncertain: " + "; ".join(f"{u.name} {u.text}" for u in self.uncertain)]

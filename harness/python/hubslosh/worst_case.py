@@ -78,6 +78,12 @@ class Confirmation:
         ]
         return [where + text for where, text in found]
 
+    @property
+    def summary(self) -> str:
+        """The comparison in a sentence, and whether the runs left the range of their model."""
+        left = "; the simulation left the range of its model (confirmation.out_of_range)"
+        return self._comparison() + (left if self.out_of_range else "")
+
     def __str__(self) -> str:
         """Return the comparison in a sentence, and how the runs left the range of their model."""
         text = "; the simulation left the range of its model: " if self.out_of_range else ""

@@ -230,7 +230,7 @@ def test_what_is_wrong_with_a_loop_is_told(fmu: Path, spacecraft: Path) -> None:
         "a function knows its own reference": lambda: closed_loop(
             lambda t, y: 0.0, *loop[1:], reference=pd.DataFrame({"time": [0, 1], "theta": 0.0})
         ),
-        "the controller returned None at t = 0 s; a finite number": lambda: closed_loop(
+        "returned None at t = 0 s; it must return a finite number": lambda: closed_loop(
             lambda t, y: None, *loop[1:]
         ),
         "2 finite numbers \\(tau_cmd, tau_ext\\)": lambda: closed_loop(
