@@ -222,7 +222,7 @@ class Reader:
         source = ["--no-index", "--find-links", find_links] if find_links else []
         subprocess.run(
             [self.python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check",
-             *source, f"{wheel.absolute()}[plot,control]", "fmpy", "pyarrow"],
+             *source, f"{wheel.absolute()}[plot,control,robust]", "fmpy", "pyarrow"],
             check=True,
         )  # fmt: skip
         keep = ("SYSTEMROOT", "TEMP", "TMP", "TMPDIR", "LANG", "LC_ALL")
