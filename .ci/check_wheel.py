@@ -111,7 +111,7 @@ def check(machine: Machine, args: argparse.Namespace) -> None:
         if args.find_links is None
         else ["--no-index", "--find-links", args.find_links.absolute()]
     )
-    wheel = f"{args.wheel.absolute()}[plot,control]"
+    wheel = f"{args.wheel.absolute()}[plot,control,robust]"
     run(python, "-m", "pip", "install", "--disable-pip-version-check", *source, wheel)
     shutil.copytree(ROOT / "examples", machine.folder / "examples")
     tank = machine.folder / "examples" / "0_your_own_tank" / "my_tank.py"
