@@ -269,7 +269,7 @@ impl List {
 /// accelerations depend on nearly all parameters, and their lists would make up most of the file.
 const LONGEST: usize = 100;
 
-/// How a list of dependencies with more than [`LONGEST`] entries is written.
+/// Form in which a list of dependencies with more than [`LONGEST`] entries is written.
 #[derive(Clone, Copy, PartialEq)]
 enum Long {
     /// The list is left out, so that a host assumes a dependency on everything. However, the list of an

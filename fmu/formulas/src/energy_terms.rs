@@ -64,7 +64,7 @@ pub fn energy_terms(fill: f64) -> Option<EnergyTerms> {
         return None;
     }
     if let Some(row) = ROWS.iter().find(|row| row[0] == fill) {
-        return Some(of_row(row));
+        return Some(terms_from_row(row));
     }
     let last = ROWS.len() - 1;
     let i = ROWS.iter().position(|row| fill < row[0]).unwrap_or(last);
@@ -94,7 +94,7 @@ fn rotary([t, t_2]: [f64; 2]) -> [f64; 2] {
     [t / 2.0, t_2 / 3.0]
 }
 
-fn of_row(&[_, kappa, s, t, kappa_2, s_2, t_2, compared]: &[f64; 8]) -> EnergyTerms {
+fn terms_from_row(&[_, kappa, s, t, kappa_2, s_2, t_2, compared]: &[f64; 8]) -> EnergyTerms {
     EnergyTerms {
         pair: [s, kappa],
         next: [s_2, kappa_2],

@@ -118,7 +118,8 @@ mod tests {
         (impulse, speed, pieces)
     }
 
-    /// Of a hundred such commands some used to pass a limit again and again after no time, until the step was refused.
+    /// Rounding must not let a command pass the same limit twice: pieces of no length would then follow each other
+    /// until the step is refused.
     #[test]
     fn a_command_passes_each_limit_once_however_it_is_rounded() {
         let mut rng = fastrand::Rng::with_seed(1);

@@ -36,7 +36,7 @@ pub struct Instance<M: Model, V: Version> {
     pub(crate) interface: Interface,
     /// The party that handles events.
     pub(crate) events: Events,
-    /// Whether arrays are variables for the host, or their elements.
+    /// Form in which the host sees arrays: as variables, or as their elements.
     pub(crate) layout: Layout,
     /// The part of the variables that the host knows; `None` for all.
     pub(crate) extent: Option<Arc<Extent>>,

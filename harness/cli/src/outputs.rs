@@ -44,7 +44,7 @@ const INPUTS: [&str; 9] = ["fmu", "toml", "ssv", "csv", "tsv", "parquet", "mat",
 ///
 /// # Errors
 ///
-/// As described; the message names the option and its value.
+/// If an output is refused; the message names the option and its value.
 pub fn check(command: &clap::Command, matches: &ArgMatches) -> Result<()> {
     let Some((name, matches)) = matches.subcommand() else { return Ok(()) };
     let Some(command) = command.find_subcommand(name) else { return Ok(()) };

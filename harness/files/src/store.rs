@@ -35,7 +35,7 @@ const UNFINISHED: &str = ".unfinished";
 /// The table of all runs.
 const TABLE: &str = "runs.csv";
 
-/// What the runs of a folder belong to.
+/// Kind of folder: a campaign, or a study of `monte_carlo`.
 #[derive(Debug)]
 pub struct Kind {
     /// Noun in messages.

@@ -91,7 +91,7 @@ pub(crate) fn native_arguments(command: &mut Command) {
 ///
 /// # Errors
 ///
-/// As [`build`].
+/// If source or Cargo are missing, or the package does not compile.
 pub fn build_native(quiet: bool) -> Result<PathBuf> {
     let mut command = cargo();
     command.args(["rustc", "--locked"]);

@@ -55,7 +55,8 @@ pub fn write(folder: &Path) -> Result<PathBuf> {
 ///
 /// # Errors
 ///
-/// As [`write`]. If a binary would not run on every machine of its platform, nothing is written.
+/// If something cannot be built, read or written, or a binary would not run on every machine of its platform.
+/// Then no wheel is written.
 pub fn write_for(platforms: &[&Platform], folder: &Path) -> Result<Vec<PathBuf>> {
     check_folder(folder)?;
     let write = |binaries| write_one(folder, binaries, archive::write_small);

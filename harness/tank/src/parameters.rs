@@ -279,7 +279,8 @@ pub fn capillarity_of(tank: &Tank, data: &ModalData, liquid: Liquid) -> Option<m
 /// amplitude dependence of the first mode.
 ///
 /// # Errors
-/// As [`Tank::height_of`], [`Tank::solve`] and [`damping_of`].
+/// If the tank cannot hold the fill, the modes cannot be solved, or the damping has no estimate
+/// ([`Tank::height_of`], [`Tank::solve`], [`damping_of`]).
 pub fn solve(tank: &Tank, fill: Fill, modes: usize, liquid: Liquid) -> Result<ModalData, Problems> {
     let mut data = tank.solve(tank.height_of(fill)?, modes)?;
     data.capillarity = capillarity_of(tank, &data, liquid);

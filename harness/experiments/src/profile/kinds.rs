@@ -45,9 +45,9 @@ pub enum Allowed {
     NotZero,
     Positive,
     NotNegative,
-    /// From minus this to this.
+    /// Numbers whose magnitude is at most the limit.
     Within(f64),
-    /// Whole numbers from 0 to this.
+    /// Whole numbers from 0 to the limit.
     Whole(f64),
 }
 

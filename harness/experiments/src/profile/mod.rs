@@ -403,7 +403,8 @@ impl Torque {
     ///
     /// # Errors
     ///
-    /// As [`Torque::history`].
+    /// If the profile has more commands than allowed, or frequencies that the commands do not follow, as for
+    /// [`Torque::history`].
     pub fn count(&self, sample: f64, stop: f64, hold: bool) -> Result<usize> {
         Ok(match self {
             Torque::Rows { history, .. } => history.time().len(),

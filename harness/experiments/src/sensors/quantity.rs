@@ -132,7 +132,8 @@ impl Quantity {
     ///
     /// # Errors
     ///
-    /// As [`Quantity::wave`]; also if the height is above the liquid at rest.
+    /// If the FMU is not HubSlosh with an upright cylinder whose liquid moves, or the height is above the liquid at
+    /// rest.
     pub fn pressure(surface: &Surface, angle: f64, height: f64) -> Result<Self> {
         let (mut needs, modes) = surface.modes()?;
         let h = surface.number(tank::H)?;
@@ -146,7 +147,7 @@ impl Quantity {
     ///
     /// # Errors
     ///
-    /// As [`Quantity::wave`].
+    /// If the FMU is not HubSlosh with an upright cylinder whose liquid moves.
     pub fn camera(surface: &Surface) -> Result<Self> {
         let (needs, modes) = surface.modes()?;
         let plane = ["plane_radial".to_string(), "plane_tangential".into()];

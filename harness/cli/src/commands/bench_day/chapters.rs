@@ -133,7 +133,7 @@ fn missing_chapter(title: &str, kind: Kind, problems: &[String]) -> Chapter {
 /// `problems` and is left out.
 fn bench_recordings(day: &Day, kind: Kind, problems: &mut Vec<String>) -> Vec<Recording> {
     let mut all = Vec::new();
-    for item in day.of_kind(kind) {
+    for item in day.items_of_kind(kind) {
         let source = Source { columns: item.recorded.columns.clone(), trim: None };
         match reading::read(&item.recorded.path, &source, f64::INFINITY, &mut |line| {
             terminal::note(line)
@@ -479,7 +479,7 @@ fn at_rest(item: &Item) -> Result<Rest> {
 fn gyro(day: &Day, problems: &mut Vec<String>) -> Chapter {
     let title = "Gyro at rest (thesis 5.5)";
     let mut found = Vec::new();
-    for item in day.of_kind(Kind::Rest) {
+    for item in day.items_of_kind(Kind::Rest) {
         match at_rest(item) {
             Ok(rest) => found.push((item.recorded.path.display().to_string(), rest)),
             Err(error) => problems.push(format!("{error:#}")),

@@ -158,7 +158,7 @@ impl Day {
         Ok(Day { manifest, tolerances, items, settings })
     }
 
-    fn of_kind(&self, kind: Kind) -> impl Iterator<Item = &Item> {
+    fn items_of_kind(&self, kind: Kind) -> impl Iterator<Item = &Item> {
         self.items.iter().filter(move |item| item.kind == kind)
     }
 
@@ -171,7 +171,7 @@ impl Day {
             text(&self.manifest.title),
             text(&self.manifest.profile)
         );
-        let mut sweeps = self.of_kind(Kind::Sweep);
+        let mut sweeps = self.items_of_kind(Kind::Sweep);
         let step = sweeps.find_map(|item| recorded::read(&item.recorded, &mut |_| {}).ok());
         let Some((step, _)) = step else { bail!("no sweep of {MANIFEST} can be read") };
         plan.push_str(&format!("step = {:?}\n[set]\n", (step * 1e9).round() / 1e9));
@@ -181,7 +181,7 @@ impl Day {
             let value = if plain { value.clone() } else { text(value) };
             plan.push_str(&format!("{name} = {value}\n"));
         }
-        for item in self.of_kind(Kind::Sweep) {
+        for item in self.items_of_kind(Kind::Sweep) {
             let recording = text(&item.recorded.path.display().to_string());
             plan.push_str(&format!("[[run]]\nrecording = {recording}\n"));
             let columns = item.recorded.columns.to_string();
