@@ -308,7 +308,7 @@ fn introduction(page: &Page, fmu: &Fmu, results: &Results) -> Markup {
                     @if beyond.len() == 1 { "its" } @else { "their" } " model"
                 }
                 @if beyond.len() == 1 { ": " } @else { ", such as " }
-                (one) ". They are numerically correct but do not represent a real tank. "
+                (one) ". While a run is out of range, its results are numerically correct but do not represent a real tank. "
                 @if results.unanalysed.is_empty() { "The results table marks them." }
                 @else { "In runs.csv the column beyond_model says how each run did." }
             }
