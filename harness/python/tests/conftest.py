@@ -10,6 +10,8 @@ r"""Fixtures: the packed FMU and the harness's binary.
 
 import os
 import subprocess
+import sys
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -59,6 +61,30 @@ def option(request: pytest.FixtureRequest, name: str) -> Path:
 def fmu(request: pytest.FixtureRequest) -> Path:
     """Return the packed FMU."""
     return option(request, "--fmu")
+
+
+@pytest.fixture(scope="session")
+def wheel(request: pytest.FixtureRequest) -> Path:
+    """Return the wheel."""
+    return option(request, "--wheel")
+
+
+def run_with_wheel(arguments: list[str | Path], wheel: Path, folder: Path, request) -> str:
+    """Run Python in a folder with the wheel, matplotlib and the harness's binary."""
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(folder / "wheel")
+    surroundings = os.environ | {
+        "PYTHONPATH": str(folder / "wheel"),
+        "HUBSLOSH": str(option(request, "--hubslosh")),
+        "MPLBACKEND": "agg",
+        "MPLCONFIGDIR": str(folder),
+    }
+    done = subprocess.run(
+        [sys.executable, *arguments],
+        cwd=folder, env=surroundings, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
 
 
 @pytest.fixture(scope="session")

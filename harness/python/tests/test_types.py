@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from conftest import ROOT, TARGET, option
+from conftest import ROOT, TARGET, run_with_wheel
 
 import environment
 import hubslosh
@@ -52,19 +52,9 @@ def test_type_checkers_accept_scripts_of_users(checkers: Path, name: str, tmp_pa
 
 
 @pytest.mark.parametrize("script", USERS, ids=[script.stem for script in USERS])
-def test_a_script_of_a_user_runs(script: Path, tmp_path: Path, request) -> None:
-    """From the source tree, with the harness's binary."""
-    surroundings = os.environ | {
-        "PYTHONPATH": str(HERE.parent),
-        "HUBSLOSH": str(option(request, "--hubslosh")),
-        "MPLBACKEND": "agg",
-        "MPLCONFIGDIR": str(tmp_path),
-    }
-    done = subprocess.run(
-        [sys.executable, script], cwd=tmp_path, env=surroundings,
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
+def test_a_script_of_a_user_runs(script: Path, tmp_path: Path, wheel: Path, request) -> None:
+    """With the wheel, in a folder of its own."""
+    run_with_wheel([script], wheel, tmp_path, request)
 
 
 MISTAKES = {

@@ -3,17 +3,15 @@
 import base64
 import csv
 import hashlib
-import os
 import re
 import subprocess
-import sys
 import textwrap
 import zipfile
 from pathlib import Path
 
 import nbformat
 import pytest
-from conftest import ROOT, TARGET, option
+from conftest import ROOT, TARGET, run_with_wheel
 from nbclient import NotebookClient
 from packaging.tags import sys_tags
 from packaging.utils import parse_wheel_filename
@@ -23,12 +21,6 @@ import environment
 HERE = ROOT / "harness" / "python"
 MODELS = ("HubSlosh", "Spacecraft", "SloshTank")
 NOTEBOOKS = sorted((HERE / "notebooks").glob("*.ipynb"))
-
-
-@pytest.fixture(scope="module")
-def wheel(request: pytest.FixtureRequest) -> Path:
-    """Return the wheel."""
-    return option(request, "--wheel")
 
 
 @pytest.fixture(scope="module")
@@ -137,31 +129,13 @@ def test_the_examples_in_docstrings_give_what_they_show(
     wheel: Path, tmp_path: Path, request
 ) -> None:
     """In a folder of their own, with the wheel."""
-    run_with_wheel(DOCTESTS, wheel, tmp_path, request)
+    run_with_wheel(["-c", DOCTESTS], wheel, tmp_path, request)
 
 
 def run_pages(pages: tuple[str, ...], wheel: Path, folder: Path, request) -> str:
     """Run pages of the book as one program."""
     code = "\n".join(block for page in pages for block in python_in(ROOT / "book" / f"{page}.md"))
-    return run_with_wheel(code, wheel, folder, request)
-
-
-def run_with_wheel(code: str, wheel: Path, folder: Path, request) -> str:
-    """Run a program with the wheel, matplotlib and the harness's binary."""
-    with zipfile.ZipFile(wheel) as archive:
-        archive.extractall(folder / "wheel")
-    surroundings = os.environ | {
-        "PYTHONPATH": str(folder / "wheel"),
-        "HUBSLOSH": str(option(request, "--hubslosh")),
-        "MPLBACKEND": "agg",
-        "MPLCONFIGDIR": str(folder),
-    }
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=folder, env=surroundings, capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
+    return run_with_wheel(["-c", code], wheel, folder, request)
 
 
 def test_the_books_page_for_python_runs(wheel: Path, tmp_path: Path, request) -> None:
