@@ -92,13 +92,14 @@ fn random_craft_have_the_bits_of_the_crate() {
         let pieces: Vec<Inputs> = (0..COUNT / 25).map(|_| random.inputs()).collect();
         let input = |k: usize| {
             let (piece, t) = (pieces[k / 25], (k % 25) as f64 * STEP);
-            let at = |ramp: Ramp| Ramp { value: ramp.at(t), slope: ramp.slope };
+            let at = |ramp: Ramp| Ramp { value: ramp.value_at(t), slope: ramp.slope };
             let since = k as f64 * STEP;
             Inputs {
                 force: at(piece.force),
                 torque: at(piece.torque),
                 h_wheels: at(piece.h_wheels),
-                mass_flow: mass_flow.map(|flow| Line { value: flow.at(since), slope: flow.slope }),
+                mass_flow: mass_flow
+                    .map(|flow| Line { value: flow.value_at(since), slope: flow.slope }),
             }
         };
         compare(&format!("seed {seed}"), &p, input, COUNT);
@@ -175,7 +176,7 @@ fn random_tanks_have_the_bits_of_the_crate() {
         let flow = Line { value: random.between(1.0, 5.0), slope: 0.0 };
         let next = |k: usize, u: TankInputs| {
             let t = (k % 25) as f64 * STEP;
-            let at = |ramp: Ramp| Ramp { value: ramp.at(t), slope: ramp.slope };
+            let at = |ramp: Ramp| Ramp { value: ramp.value_at(t), slope: ramp.slope };
             let (a, omega_dot) = pieces[k / 25];
             TankInputs { a: at(a), omega_dot: at(omega_dot), ..u }
         };

@@ -170,7 +170,7 @@ impl Bob {
     /// Only the change is rotated back into tank axes. The matrix is orthogonal only to rounding,
     /// so a rotation there and back would shear direction and rate by the same 1e-16 in every step.
     #[inline(always)]
-    pub fn at(&self, x: &[f64; 6], n: usize, t: f64, w: Vec3) -> [f64; 6] {
+    pub fn state_at(&self, x: &[f64; 6], n: usize, t: f64, w: Vec3) -> [f64; 6] {
         let (p, v) = (space::value(&self.p, n, t), space::value(&self.v, n, t));
         let p_d = sub(v, cross(w, p));
         let dp = transposed_times(&self.axes, sub(p, self.p[0]));
@@ -197,7 +197,7 @@ impl Bob {
             - dot(self.p[0], self.centripetal);
         let (mut reaction, mut twist) = ([0.0; 3], [0.0; 3]);
         if self.follows {
-            self.drag_of::<N>();
+            self.set_drag::<N>();
             reaction = scale(l, self.dragged[N]);
             twist = scale(l, space::cross::<N>(&self.p, &self.dragged));
         } else if c > 0.0 {
@@ -249,7 +249,7 @@ impl Bob {
 
     /// Sets coefficient N of c p'.
     #[inline(never)]
-    fn drag_of<const N: usize>(&mut self) {
+    fn set_drag<const N: usize>(&mut self) {
         self.height[N] = dot(self.e, self.p[N]);
         // |p + e|^2 = 2 + 2 p.e. At order 0 this form avoids cancellation near rest.
         let chord2 = if N == 0 {
@@ -342,14 +342,14 @@ impl Bob {
 
     /// Returns p, p' and B as the number type `T`.
     fn state<T: Number>(&self) -> [Vec3<T>; 3] {
-        let of = |a: &Vector| [0, 1, 2].map(|i| T::of(a[0][i], a[1][i]));
+        let of = |a: &Vector| [0, 1, 2].map(|i| T::with_slope(a[0][i], a[1][i]));
         [of(&self.p), of(&self.p_d), of(&self.specific_force)]
     }
 
     /// Returns the force on the craft and its torque about O.
     pub fn wrench<T: Number>(&self) -> [Vec3<T>; 2] {
         let [p, p_d, _] = self.state::<T>();
-        let tension = T::of(self.tension[0], self.tension[1]) * self.m;
+        let tension = T::with_slope(self.tension[0], self.tension[1]) * self.m;
         self.at_hinge_and_bob(tension, p, p_d)
     }
 
@@ -373,7 +373,7 @@ impl Bob {
     fn at_hinge_and_bob<T: Number>(&self, tension: T, p: Vec3<T>, p_d: Vec3<T>) -> [Vec3<T>; 2] {
         let p_perp = self.perpendicular(p);
         let c = match self.follows {
-            true => T::of(self.drag.c[0], self.drag.c[1]),
+            true => T::with_slope(self.drag.c[0], self.drag.c[1]),
             false => T::constant(self.c),
         };
         let phi = [0, 1, 2].map(|i| (p_d[i] * c + p_perp[i] * self.k) * self.l);

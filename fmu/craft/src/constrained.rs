@@ -301,7 +301,7 @@ impl ConstrainedBob {
     /// Creates the bob of mode `mode` of tank number `index`, both from 0; `None` for a pendulum that swings in every
     /// direction.
     pub fn new(tank: &Tank, index: usize, mode: usize) -> Option<ConstrainedBob> {
-        let (surface, across) = (tank.surface(mode), tank.across(mode));
+        let (surface, across) = (tank.surface(mode), tank.plane_normal(mode));
         if surface.is_none() && across.is_none() {
             return None;
         }
@@ -468,7 +468,7 @@ impl ConstrainedBob {
         }
         self.set_normal(n + 1);
 
-        let turned = space::cross_pair_of(n, &self.w, &self.both);
+        let turned = space::cross_pair_coefficient(n, &self.w, &self.both);
         self.ahead = turned.map(|pair| pair[0]);
         let centripetal = transposed_times(&self.axes, times(w2, self.hinge));
         let fall = add(turned.map(|pair| pair[1]), scale(self.inv_l, centripetal));
@@ -482,7 +482,7 @@ impl ConstrainedBob {
         }
         // f without the newest multipliers.
         let mut f = if self.follows {
-            self.drag_of(n);
+            self.set_drag(n);
             scale(1.0 / self.m, self.dragged[n])
         } else {
             scale(self.c_m, self.higher.as_ref().map_or(self.r_d[n], |higher| higher.rate[n]))
@@ -516,7 +516,7 @@ impl ConstrainedBob {
         let known = self.force(self.known, 0.0);
         self.f[n] = known;
         let force = times(&self.axes, scale(self.m * self.l, known));
-        let mut arm = space::cross_of(n, &self.r, &self.f);
+        let mut arm = space::cross_coefficient(n, &self.r, &self.f);
         if let Some(higher) = &self.higher {
             let pull = higher.pull(self.known, 0.0, self.u[0]);
             arm = sub(arm, higher.couple(n, pull, &self.in_tank, &self.u));
@@ -551,7 +551,7 @@ impl ConstrainedBob {
 
     /// Sets coefficient n of c r'.
     #[inline(never)]
-    fn drag_of(&mut self, n: usize) {
+    fn set_drag(&mut self, n: usize) {
         self.p_d[n] = [self.r_d[n][0], self.r_d[n][1], (n + 1) as f64 * self.eta[n + 1]];
         // |p + e|^2 = 2 + 2 p.e. At order 0 this form avoids cancellation near rest.
         let chord2 = if n == 0 {
@@ -560,7 +560,7 @@ impl ConstrainedBob {
         } else {
             2.0 * self.eta[n]
         };
-        self.drag.expand(n, chord2, space::square_of(n, &self.p_d));
+        self.drag.expand(n, chord2, space::square_coefficient(n, &self.p_d));
         let mut dragged = [0.0; 3];
         let rate = self.higher.as_ref().map_or(&self.r_d, |higher| &higher.rate);
         for (c, r_d) in self.drag.c[..=n].iter().zip(rate[..=n].iter().rev()) {
@@ -599,14 +599,14 @@ impl ConstrainedBob {
             return self.m * self.c_m * l2 * power;
         }
         if !self.follows {
-            return self.m * self.c_m * l2 * space::square_of(n, &self.r_d);
+            return self.m * self.c_m * l2 * space::square_coefficient(n, &self.r_d);
         }
         l2 * (dot_from_1(n, &self.r_d, &self.dragged) + dot(self.r_d[0], self.dragged[n]))
     }
 
     /// Returns direction and rate at `t` after the start, tank axes, normalised, from the series up to order n. `w` is the
     /// craft's angular velocity at that time.
-    pub fn at(&self, n: usize, t: f64, w: Vec3) -> [f64; 6] {
+    pub fn state_at(&self, n: usize, t: f64, w: Vec3) -> [f64; 6] {
         let (r, v) = (space::value(&self.r, n, t), space::value(&self.v, n, t));
         let r_d = sub(v, cross(transposed_times(&self.axes, w), r));
         let u = r[0] * r[0] + r[1] * r[1];
@@ -626,9 +626,9 @@ impl ConstrainedBob {
     }
 
     /// Returns the message for a bob beyond the bound of its surface; `name` is that of the tank.
-    pub fn beyond(&self, name: &str) -> String {
+    pub fn bound_message(&self, name: &str) -> String {
         let higher = self.surface.higher().unwrap_or_default();
-        surface::beyond(self.coefficients, higher, self.mode, name)
+        surface::bound_message(self.coefficients, higher, self.mode, name)
     }
 
     /// Returns true if the drag depends on acceleration or amplitude.

@@ -146,7 +146,7 @@ pub struct Contents<'a, T> {
     shrinking: (T, [Vec3<T>; 2]),
 }
 
-pub fn vec_of<T: Number>(x: &[T], at: usize) -> Vec3<T> {
+pub fn vector_from<T: Number>(x: &[T], at: usize) -> Vec3<T> {
     [x[at], x[at + 1], x[at + 2]]
 }
 
@@ -175,7 +175,7 @@ impl MountedTank {
         let still = if !tank.is_axial() {
             let point = |bob: Bob| Rigid::new(bob.m, bob.at_rest(), &[[0.0; 3]; 3]);
             let bobs = (0..tank.modes).map(|n| point(Bob::new(tank, 0, n)));
-            Some([tank.rigid(), bobs.fold(tank.rigid(), |sum, bob| sum.and(&bob))])
+            Some([tank.rigid(), bobs.fold(tank.rigid(), |sum, bob| sum.combined_with(&bob))])
         } else {
             let s = add(d, scale(tank.h_0, e));
             let rigid = Rigid::axial(tank.m_0, s, tank.i_0, tank.i_z, e);
@@ -185,7 +185,7 @@ impl MountedTank {
     }
 
     /// Returns the liquid at rest as a rigid body; `None` if it drains.
-    pub fn still(&self) -> Option<&Rigid> {
+    pub fn rigid_at_rest(&self) -> Option<&Rigid> {
         self.still.as_ref().map(|[_, whole]| whole)
     }
 
@@ -202,7 +202,7 @@ impl MountedTank {
     /// Returns the liquid at rest as a rigid body. `liquid` matters only for tanks with a table.
     pub fn at_rest<T: Number>(&self, liquid: T) -> Rigid<T> {
         let MountedTank { tank, curves, .. } = self;
-        if let Some(whole) = self.still() {
+        if let Some(whole) = self.rigid_at_rest() {
             return whole.lift();
         }
         let constant_of = |x: f64| T::constant(x);
@@ -218,13 +218,13 @@ impl MountedTank {
             if place.is_some() {
                 m_0 = m_0 - m;
             }
-            bobs = bobs.and(&Rigid::axial(m, add(d, scale(h - l, e)), zero, zero, e));
+            bobs = bobs.combined_with(&Rigid::axial(m, add(d, scale(h - l, e)), zero, zero, e));
         }
         let [h_0, i_0, i_z] = match place {
             Some(place) => curves.rigid(place).map(|jet| jet[0]),
             None => [tank.h_0, tank.i_0, tank.i_z].map(constant_of),
         };
-        bobs.and(&Rigid::axial(m_0, add(d, scale(h_0, e)), i_0, i_z, e))
+        bobs.combined_with(&Rigid::axial(m_0, add(d, scale(h_0, e)), i_0, i_z, e))
     }
 
     /// Returns hinge, p and p' of mode n (from 0), projected into the plane of a planar mode.
@@ -248,7 +248,7 @@ impl MountedTank {
     ) -> Option<(Meridian<T>, Lift<T>)> {
         let across = self.across[n].map(constant);
         let surface = match changing {
-            Some([[s, ..], [kappa, ..]]) => Surface::of([s, kappa]),
+            Some([[s, ..], [kappa, ..]]) => Surface::from_coefficients([s, kappa]),
             None => self.surfaces[n]?.lift_to(),
         };
         let meridian = Meridian::new(surface, constant(self.e), p, across);
@@ -270,7 +270,7 @@ impl MountedTank {
     }
 
     /// Writes the bobs' p' and p'' in tank axes, six numbers each, under [a; w'].
-    pub fn put_rates<T: Number>(
+    pub fn write_rates<T: Number>(
         &self,
         contents: &Contents<'_, T>,
         [a, w_d]: [Vec3<T>; 2],
@@ -322,9 +322,9 @@ impl MountedTank {
     /// Projects the bobs of planar modes into their planes; x as in [`MountedTank::contents`].
     pub fn flatten(&self, x: &mut [f64]) {
         for n in 0..self.tank.modes {
-            let Some(b) = self.tank.across(n) else { continue };
+            let Some(b) = self.tank.plane_normal(n) else { continue };
             for at in [6 * n, 6 * n + 3] {
-                let flat = sub(vec_of(x, at), scale(dot(b, vec_of(x, at)), b));
+                let flat = sub(vector_from(x, at), scale(dot(b, vector_from(x, at)), b));
                 x[at..at + 3].copy_from_slice(&flat);
             }
         }
@@ -343,9 +343,9 @@ impl MountedTank {
         if self.tank.fill.points > 0
             && let Some([[s, ..], [kappa, ..]]) = self.curves.surface(n, self.curves.place(liquid))
         {
-            surface = Surface::of([s, kappa]);
+            surface = Surface::from_coefficients([s, kappa]);
         }
-        let [p, _] = on_sphere(vec_of(x, 6 * n), [0.0; 3]);
+        let [p, _] = on_sphere(vector_from(x, 6 * n), [0.0; 3]);
         surface.least_inertia(p[2], p[0] * p[0] + p[1] * p[1])
     }
 
@@ -356,7 +356,7 @@ impl MountedTank {
         let Some(n) = (0..MODES).find(is_near) else { return Ok(()) };
         let index = if tank > 0 { format!("[{tank}]") } else { String::new() };
         let now = Tank { liquid_0: liquid, ..self.tank }.resolve();
-        Err(StepError::Model(now.beyond(n, &format!("tank{index}"))))
+        Err(StepError::Model(now.bound_message(n, &format!("tank{index}"))))
     }
 
     /// Returns true if any bob is on a surface other than a sphere.
@@ -387,7 +387,7 @@ impl<T: Number> Swing<T> {
         match &self.surface {
             Some(surface) => {
                 let slid = surface.slide(self.acceleration(a, w_d), w_d);
-                let slowed = sub(self.acceleration(a, w_d), surface.meridian.along(slid));
+                let slowed = sub(self.acceleration(a, w_d), surface.meridian.apply_shear(slid));
                 let force = sub(self.phi, scale(self.m, slowed));
                 let mut torque = cross(self.rho, force);
                 if let Some(couple) = surface.couple(slid, w_d) {
@@ -417,7 +417,7 @@ impl<T: Number> Swing<T> {
 impl<T: Number> OnSurface<T> {
     /// Returns -l y under G and w'.
     fn slide(&self, g: Vec3<T>, w_d: Vec3<T>) -> Vec3<T> {
-        let mut force = add(self.meridian.back(g), self.inner);
+        let mut force = add(self.meridian.apply_shear_transposed(g), self.inner);
         if let (Some(rotary), Some(n)) = (&self.rotary, self.meridian.around()) {
             force = add(force, scale(rotary.pull(dot(self.e, w_d)), n));
         }
@@ -489,8 +489,8 @@ impl<T: Number> Contents<'_, T> {
             if drains {
                 m_0 = [m_0[0] - m[0], m_0[1] - m[1], m_0[2] - m[2]];
             }
-            let mut p = times(&axes, vec_of(x, 6 * n));
-            let mut p_d = times(&axes, vec_of(x, 6 * n + 3));
+            let mut p = times(&axes, vector_from(x, 6 * n));
+            let mut p_d = times(&axes, vector_from(x, 6 * n + 3));
             let mut hinge = add(d, scale(h[0], e));
             if mounted.planar {
                 [hinge, p, p_d] = mounted.guided(n, [hinge, p, p_d]);
@@ -515,7 +515,7 @@ impl<T: Number> Contents<'_, T> {
             let zeta = place.and_then(|place| curves.zeta(n, place));
             let drag = damping::coefficient(tank, n, [m[0], l[0]], zeta, dot(e, at_hinge), motion);
             let moved = match &on_surface {
-                Some((meridian, _)) => meridian.along(p_d),
+                Some((meridian, _)) => meridian.apply_shear(p_d),
                 None => p_d,
             };
             let phi = add(scale(drag * l[0], moved), scale(l[0] * k, p_perp));
@@ -828,7 +828,7 @@ pub trait Drains<const D: usize>: System<D> + Sized {
             let done = extrapolation::advance(self, x, (t, end), limits.tolerance, &mut pace);
             // A step that cannot pass the bound of a surface ends just before it.
             self.check_surfaces(x)?;
-            done.map_err(|why| why.after(begin))?;
+            done.map_err(|why| why.delayed(begin))?;
             self.normalise(x, end);
             for flow in self.outflows() {
                 x[flow.at] = flow.left(start[flow.at], end);
@@ -848,7 +848,7 @@ pub fn has_diverged(x: &[f64]) -> bool {
 /// Normalises directions and rates of bobs, from the first to the last index of the states.
 pub fn normalise_bobs(x: &mut [f64]) {
     for bob in x.chunks_exact_mut(6) {
-        let [p, p_d] = on_sphere(vec_of(bob, 0), vec_of(bob, 3));
+        let [p, p_d] = on_sphere(vector_from(bob, 0), vector_from(bob, 3));
         bob[..3].copy_from_slice(&p);
         bob[3..].copy_from_slice(&p_d);
     }

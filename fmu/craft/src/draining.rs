@@ -23,7 +23,7 @@ use taylor::vector::{
 };
 
 use crate::contents::{
-    Contents, Drains, MountedTank, Outflow, has_diverged, normalise_bobs, vec_of,
+    Contents, Drains, MountedTank, Outflow, has_diverged, normalise_bobs, vector_from,
 };
 use crate::motion::SCALE_TIME;
 use crate::outputs::{Now, TankNow};
@@ -46,13 +46,13 @@ pub struct Acting<T> {
 }
 
 impl Acting<f64> {
-    pub fn of(inputs: &Inputs, t: f64) -> Acting<f64> {
+    pub fn from_inputs(inputs: &Inputs, t: f64) -> Acting<f64> {
         let Inputs { force, torque, h_wheels, mass_flow } = inputs;
         Acting {
-            force: force.at(t),
-            torque: sub(torque.at(t), h_wheels.slope),
-            h_wheels: h_wheels.at(t),
-            flow: mass_flow.map(|flow| flow.at(t)),
+            force: force.value_at(t),
+            torque: sub(torque.value_at(t), h_wheels.slope),
+            h_wheels: h_wheels.value_at(t),
+            flow: mass_flow.map(|flow| flow.value_at(t)),
             flow_slope: mass_flow.map(|flow| flow.slope),
         }
     }
@@ -62,20 +62,20 @@ impl Acting<f64> {
     /// Returns inputs that are 0 except for the flows.
     fn flowing(flow: [f64; TANKS], slope: [f64; TANKS]) -> Acting<f64> {
         let lines = core::array::from_fn(|i| Line { value: flow[i], slope: slope[i] });
-        Acting::of(&Inputs { mass_flow: lines, ..Inputs::default() }, 0.0)
+        Acting::from_inputs(&Inputs { mass_flow: lines, ..Inputs::default() }, 0.0)
     }
 }
 
 impl Acting<Dual> {
     /// Returns the inputs with their derivatives in the direction du.
-    pub fn along(inputs: &Inputs, du: &[f64; INPUTS]) -> Acting<Dual> {
-        let now = Acting::of(inputs, 0.0);
-        let with = |x: Vec3, at: usize| [0, 1, 2].map(|i| Dual::of(x[i], du[at + i]));
+    pub fn with_directions(inputs: &Inputs, du: &[f64; INPUTS]) -> Acting<Dual> {
+        let now = Acting::from_inputs(inputs, 0.0);
+        let with = |x: Vec3, at: usize| [0, 1, 2].map(|i| Dual::with_slope(x[i], du[at + i]));
         Acting {
             force: with(now.force, 0),
             torque: with(now.torque, 3),
             h_wheels: with(now.h_wheels, 6),
-            flow: core::array::from_fn(|i| Dual::of(now.flow[i], du[9 + i])),
+            flow: core::array::from_fn(|i| Dual::with_slope(now.flow[i], du[9 + i])),
             flow_slope: now.flow_slope,
         }
     }
@@ -145,7 +145,7 @@ impl System<STATES> for Run<'_> {
         if self.moving().any(|part| has_diverged(&x[part])) || self.craft.is_beyond(x) {
             return [0.0; STATES];
         }
-        self.craft.rates(x, &Acting::of(self.inputs, t))
+        self.craft.rates(x, &Acting::from_inputs(self.inputs, t))
     }
 
     fn error_scale(
@@ -156,7 +156,7 @@ impl System<STATES> for Run<'_> {
         h: f64,
     ) -> [f64; STATES] {
         let time = h.min(SCALE_TIME);
-        let size = |at: usize| largest(vec_of(x, at)) + largest(vec_of(rate, at)) * time;
+        let size = |at: usize| largest(vector_from(x, at)) + largest(vector_from(rate, at)) * time;
         let turn = RATE_FLOOR + size(index::OMEGA);
         let (position, velocity) = (size(index::POSITION), size(index::VELOCITY));
         scales(turn, RATE_FLOOR + position, RATE_FLOOR + velocity, |at| turn + size(at))
@@ -321,7 +321,7 @@ impl Draining {
     fn at_rest<T: Number>(&self, x: &[T; STATES]) -> Rigid<T> {
         let liquids = self.tanks.iter().enumerate();
         liquids.fold(self.craft.lift::<T>(), |sum, (i, mounted)| {
-            sum.and(&mounted.at_rest(x[index::LIQUID + i]))
+            sum.combined_with(&mounted.at_rest(x[index::LIQUID + i]))
         })
     }
 
@@ -338,7 +338,7 @@ impl Draining {
         if !self.follows {
             return [zero; 2];
         }
-        let w = vec_of(x, index::OMEGA);
+        let w = vector_from(x, index::OMEGA);
         let whole = self.at_rest(x);
         let [centripetal, gyroscopic] = whole.inertial_wrench(zero, w, zero);
         let force = sub(acting.force, centripetal);
@@ -360,7 +360,7 @@ impl Draining {
         let zero = constant::<T>([0.0; 3]);
         let q = unit_quaternion([x[0], x[1], x[2], x[3]]);
         let axes = rotation(&q);
-        let w = vec_of(x, index::OMEGA);
+        let w = vector_from(x, index::OMEGA);
         let (of_pivot, by_pivot, _) = self.pivot.present(&axes, w);
         let [a_rigid, w_d_rigid] = self.rigid_motion(x, acting, of_pivot, &axes);
         for (i, (mounted, contents)) in self.tanks.iter().zip(contents.iter_mut()).enumerate() {
@@ -370,7 +370,7 @@ impl Draining {
             contents.insert(Contents::new(mounted)).evaluate(bobs, motion, flow);
         }
         let all = || contents.iter().flatten();
-        let rigid = all().fold(self.craft.lift::<T>(), |sum, tank| sum.and(&tank.rigid));
+        let rigid = all().fold(self.craft.lift::<T>(), |sum, tank| sum.combined_with(&tank.rigid));
         let [centripetal, gyroscopic] = rigid.inertial_wrench(zero, w, zero);
         let mut force = sub(acting.force, centripetal);
         let mut torque = sub(acting.torque, add(gyroscopic, cross(w, acting.h_wheels)));
@@ -384,7 +384,7 @@ impl Draining {
             tank.add_rods(&mut matrix);
         }
         let [a, w_d] = self.solve(&self.equations(matrix), [force, torque], &axes);
-        let velocity = transposed_times(&axes, vec_of(x, index::VELOCITY));
+        let velocity = transposed_times(&axes, vector_from(x, index::VELOCITY));
         Instant { q, axes, velocity, w, a, w_d, by_pivot }
     }
 
@@ -405,7 +405,7 @@ impl Draining {
         put(index::Q, &[dot(v, w) * -0.5, turned[0], turned[1], turned[2]]);
         put(index::OMEGA, &w_d);
         if self.mount == Mount::Free {
-            put(index::POSITION, &vec_of(x, index::VELOCITY));
+            put(index::POSITION, &vector_from(x, index::VELOCITY));
             put(index::VELOCITY, &times(&axes, a));
         }
         put(index::WORK, &[dot(acting.force, velocity) + dot(acting.torque, w)]);
@@ -421,7 +421,7 @@ impl Draining {
                 put(index::LIQUID + i, &[-acting.flow[i]]);
                 drained = drained + tank.drained(velocity, w, [a, w_d], on_pivot);
             }
-            mounted.put_rates(tank, [a, w_d], |at, numbers| put(index::bob(i, 0) + at, numbers));
+            mounted.write_rates(tank, [a, w_d], |at, numbers| put(index::bob(i, 0) + at, numbers));
         }
         put(index::DRAINED, &[drained]);
         rate
@@ -535,12 +535,12 @@ mod tests {
     }
 
     fn later(u: &Inputs, t: f64) -> Inputs {
-        let at = |ramp: &Ramp| Ramp { value: ramp.at(t), slope: ramp.slope };
+        let at = |ramp: &Ramp| Ramp { value: ramp.value_at(t), slope: ramp.slope };
         Inputs {
             force: at(&u.force),
             torque: at(&u.torque),
             h_wheels: at(&u.h_wheels),
-            mass_flow: u.mass_flow.map(|flow| Line { value: flow.at(t), slope: flow.slope }),
+            mass_flow: u.mass_flow.map(|flow| Line { value: flow.value_at(t), slope: flow.slope }),
         }
     }
 

@@ -41,7 +41,7 @@ pub(crate) trait Carrier {
     fn directions(&self, lump: usize) -> Directions;
 
     /// Returns the bobs of the lump's tank with their present motion, after [`Carrier::evaluate_at`].
-    fn bobs_of(&self, lump: usize) -> impl Iterator<Item = BobNow<f64>>;
+    fn bobs_beside(&self, lump: usize) -> impl Iterator<Item = BobNow<f64>>;
 
     /// Returns all bobs and lumps that move, after [`Carrier::evaluate_at`].
     fn points(&self) -> impl Iterator<Item = BobNow<f64>>;
@@ -59,7 +59,7 @@ pub(crate) trait Carrier {
     fn dissipated(&mut self) -> &mut f64;
 
     /// Applies an impulse about O to the carrier and everything attached to it. Returns the changes of V and w.
-    fn kick(&mut self, impulse: [Vec3; 2], t: f64) -> [Vec3; 2];
+    fn apply_impulse(&mut self, impulse: [Vec3; 2], t: f64) -> [Vec3; 2];
 
     /// Moves the carrier, if it can move.
     fn shift(&mut self, by: Vec3);
@@ -135,15 +135,15 @@ pub(crate) trait Carrier {
     /// the liquid, and the carrier takes over the shape's moment of momentum.
     fn leave(&mut self, lump: usize, t: f64) {
         let before = self.energy_with([0.0; 3]);
-        let center = self.lump(lump).center_of(&self.directions(lump));
-        let [rate, moment] = self.lump(lump).stirred(center, self.bobs_of(lump));
+        let center = self.lump(lump).common_center(&self.directions(lump));
+        let [rate, moment] = self.lump(lump).stirred(center, self.bobs_beside(lump));
         let numbers = self.lump(lump).numbers(center, rate);
         self.ball(lump).copy_from_slice(&numbers);
         for n in 0..MODES {
             self.bob(lump, n)[3..].fill(0.0);
         }
         *self.ball_state(lump) = BallState::Flying;
-        let [dv, _] = self.kick([[0.0; 3], moment], t);
+        let [dv, _] = self.apply_impulse([[0.0; 3], moment], t);
         self.evaluate_at(t);
         let loss = before - self.energy_with(dv);
         *self.dissipated() += loss;
@@ -182,7 +182,7 @@ pub(crate) trait Carrier {
         let share = -strayed.m / mass;
         self.ball(lump).copy_from_slice(&numbers);
         self.shift(scale(share, moved));
-        let [dv, _] = self.kick([[0.0; 3], lever], t);
+        let [dv, _] = self.apply_impulse([[0.0; 3], lever], t);
         self.evaluate_at(t);
         let loss = before - self.energy_with(dv);
         *self.dissipated() += loss;
@@ -199,7 +199,7 @@ pub(crate) trait Carrier {
         let struck = self.lump(lump);
         let (m, v_n) = (struck.m, struck.approach());
         let impulse = struck.impulse(self.factors(), e);
-        self.kick(impulse, t);
+        self.apply_impulse(impulse, t);
         let change = self.lump(lump).numbers([0.0; 3], scale(-1.0 / m, impulse[0]));
         let numbers = self.ball(lump);
         for i in 3..6 {
@@ -219,7 +219,7 @@ pub(crate) trait Carrier {
         let p = settling.hanging();
         // The parts move to their hinges, each with its velocity, so that the whole keeps its angular momentum about
         // the same centre of mass.
-        let moved = sub(settling.center_of(&p), settling.position());
+        let moved = sub(settling.common_center(&p), settling.position());
         let velocity = add(cross(w, settling.position()), settling.rate());
         let lever = scale(-settling.m, cross(moved, sub(velocity, of_center)));
         let left_with = settling.shape(&self.directions(lump)).inertia;
@@ -235,7 +235,7 @@ pub(crate) trait Carrier {
         }
         self.ball(lump).copy_from_slice(&at_rest);
         *self.ball_state(lump) = BallState::Settled;
-        let [dv, _] = self.kick([force, torque], t);
+        let [dv, _] = self.apply_impulse([force, torque], t);
         self.evaluate_at(t);
         let loss = before - self.energy_with(dv);
         *self.dissipated() += loss;

@@ -320,14 +320,14 @@ impl Lump {
     }
 
     /// Returns the common centre of the parts from O.
-    pub fn center_of(&self, p: &Directions) -> Vec3 {
+    pub fn common_center(&self, p: &Directions) -> Vec3 {
         let moment = self.parts(p).iter().fold([0.0; 3], |sum, (m, rho)| add(sum, scale(*m, *rho)));
         scale(1.0 / self.m, moment)
     }
 
     /// J_a: inertia of the shape with the rods along `p`, about its own centre.
     pub fn shape(&self, p: &Directions) -> Rigid {
-        let center = self.center_of(p);
+        let center = self.common_center(p);
         let around =
             |sum: Mat3, (m, rho): &(f64, Vec3)| Rigid::new(*m, sub(*rho, center), &sum).inertia;
         let inertia = self.parts(p).iter().fold(self.own, around);
@@ -337,7 +337,7 @@ impl Lump {
     /// Sets the derivative of [`Lump::shape`]'s inertia at the directions `p` along `dp`. The centre moves, too, but
     /// the first moment about it is 0, so its velocity drops out.
     pub fn seed_shape(&mut self, p: &Directions, dp: &Directions) {
-        let center = self.center_of(p);
+        let center = self.common_center(p);
         let mut slope = [[0.0; 3]; 3];
         for n in 0..self.modes {
             let arm = sub(self.bob_at(n, times(&self.axes, p[n])), center);
@@ -400,7 +400,7 @@ impl Lump {
 
     /// Returns position and rate at `t` after the start at `x`, from the series up to order n; `w` is the craft's
     /// angular velocity at that time.
-    pub fn at(&self, x: &[f64; 6], n: usize, t: f64, w: Vec3) -> [f64; 6] {
+    pub fn state_at(&self, x: &[f64; 6], n: usize, t: f64, w: Vec3) -> [f64; 6] {
         let (rho, u) = (space::value(&self.rho, n, t), space::value(&self.u, n, t));
         let rate = sub(u, cross(w, rho));
         let moved = transposed_times(&self.axes, sub(rho, self.rho[0]));
@@ -507,19 +507,22 @@ impl Lump {
         largest(self.u[n])
     }
 
-    fn of<T: Number>(a: &Vector) -> Vec3<T> {
-        [0, 1, 2].map(|i| T::of(a[0][i], a[1][i]))
+    fn value_and_slope<T: Number>(a: &Vector) -> Vec3<T> {
+        [0, 1, 2].map(|i| T::with_slope(a[0][i], a[1][i]))
     }
 
     /// Returns the force on the craft and its torque about O.
     pub fn wrench<T: Number>(&self) -> [Vec3<T>; 2] {
-        let force = Self::of::<T>(&self.force);
-        [force, cross(Self::of(&self.rho), force)]
+        let force = Self::value_and_slope::<T>(&self.force);
+        [force, cross(Self::value_and_slope(&self.rho), force)]
     }
 
     /// Returns G and G.G of a sliding lump.
     fn gradient<T: Number>(&self) -> (Vec3<T>, T) {
-        let g = times(&self.d.map(constant), sub(Self::of(&self.rho), constant(self.center)));
+        let g = times(
+            &self.d.map(constant),
+            sub(Self::value_and_slope(&self.rho), constant(self.center)),
+        );
         (g, dot(g, g))
     }
 
@@ -528,7 +531,8 @@ impl Lump {
         if !self.slides() {
             return [constant([0.0; 3]); 2];
         }
-        let (rho, x_d) = (Self::of::<T>(&self.rho), Self::of::<T>(&self.x_d));
+        let (rho, x_d) =
+            (Self::value_and_slope::<T>(&self.rho), Self::value_and_slope::<T>(&self.x_d));
         let (g, squared) = self.gradient::<T>();
         let twice = add(add(x_d, x_d), cross(w, rho));
         let bent = dot(x_d, times(&self.d.map(constant), x_d));
@@ -540,7 +544,7 @@ impl Lump {
     /// Returns m and u of m u u^T, the added mass of a sliding lump: m/G.G and [G; rho x G].
     pub fn added_mass<T: Number>(&self) -> Option<(T, [T; 6])> {
         let (g, squared) = self.gradient::<T>();
-        let along = || along_rod(g, Self::of::<T>(&self.rho));
+        let along = || along_rod(g, Self::value_and_slope::<T>(&self.rho));
         self.slides().then(|| (squared.recip() * self.m, along()))
     }
 
@@ -548,8 +552,8 @@ impl Lump {
     pub fn now<T: Number>(&self) -> BobNow<T> {
         BobNow {
             m: T::constant(self.m),
-            rho: Self::of(&self.rho),
-            rate: Self::of(&self.x_d),
+            rho: Self::value_and_slope(&self.rho),
+            rate: Self::value_and_slope(&self.x_d),
             hinge: constant(self.hinge),
             e: self.e,
             in_tank: constant([0.0; 3]),
@@ -756,7 +760,7 @@ impl Lump {
         }
         let value = |t: f64| {
             let motion = motion.map(|a| space::value(a, n - 1, t));
-            self.after(n, t).crossing(motion, crossing)
+            self.advanced(n, t).crossing(motion, crossing)
         };
         let root = t;
         for _ in 0..ITERATIONS {
@@ -776,7 +780,7 @@ impl Lump {
     }
 
     /// Returns the lump with its motion at `t` as coefficients 0, from the series up to order n.
-    fn after(&self, n: usize, t: f64) -> Lump {
+    fn advanced(&self, n: usize, t: f64) -> Lump {
         let mut then = self.clone();
         then.rho[0] = space::value(&self.rho, n, t);
         then.x_0 = add(self.x_0, sub(then.rho[0], self.rho[0]));
@@ -1046,7 +1050,7 @@ mod tests {
         lump.next(4, 1.0, [&ZERO_VECTOR; 3], core::iter::empty())
     }
 
-    fn is(found: Option<(f64, Due)>, t: f64, due: Due) {
+    fn assert_event(found: Option<(f64, Due)>, t: f64, due: Due) {
         let found = found.unwrap();
         assert!((found.0 - t).abs() < 1e-9 && found.1 == due, "{found:?} {t} {due:?}");
     }
@@ -1060,7 +1064,7 @@ mod tests {
         lump.x_d = along_x(&[2.0]);
         let excess = lump.excess(3);
         assert_eq!(excess[..3], [4.5 * 4.5 - 36.0, 2.0 * 4.5 * 4.0, 16.0]);
-        is(next(&lump), 0.375, Due::Drag);
+        assert_event(next(&lump), 0.375, Due::Drag);
         lump.squared[0] = 0.25;
         assert_eq!(next(&lump), None);
         lump.squared[0] = 1.0;
@@ -1080,10 +1084,10 @@ mod tests {
         lump.rho = along_x(&[0.0, 1.0]);
         for (x, t, due) in [(-0.25, 0.25, Due::Settle), (-0.75, 0.5, Due::Release)] {
             lump.x_0[0] = x;
-            is(next(&lump), t, due);
+            assert_event(next(&lump), t, due);
         }
         lump.pull[1] = 0.0;
-        is(next(&lump), 0.75, Due::Settle);
+        assert_event(next(&lump), 0.75, Due::Settle);
         // motion along the axis is not motion away from it
         (lump.x_d, lump.rho) = (along_z(&[1.0]), along_z(&[0.0, 1.0]));
         assert_eq!(next(&lump), None);
@@ -1097,10 +1101,10 @@ mod tests {
         let mut lump = lump(BallState::Flying);
         lump.x_0[2] = -0.5;
         lump.rho = along_z(&[0.0, 3.0]);
-        is(next(&lump), 0.5, Due::Impact);
+        assert_event(next(&lump), 0.5, Due::Impact);
         lump.x_0[2] = -1.0;
         lump.rho = along_z(&[0.0, 4.0]);
-        is(next(&lump), 0.5, Due::Impact);
+        assert_event(next(&lump), 0.5, Due::Impact);
         for (terms, at_once) in [
             (&[0.0, -4.0][..], true),
             (&[0.0, -1e-8], true),

@@ -42,7 +42,7 @@ use taylor::integrator::{self, Convergence, MAX_MAGNITUDE, Motion, RATE_FLOOR, S
 use taylor::series::{self, ORDER, Series, ZERO};
 use taylor::space::{
     self, Attitude, Pair, Vector, ZERO_ATTITUDE, ZERO_PAIR, ZERO_VECTOR, cross, cross_pair,
-    cross_ramp, dot_ramp, next, products, products_of, quaternion_rate, ramp,
+    cross_ramp, dot_ramp, next, product_coefficients, products, quaternion_rate, ramp,
 };
 use taylor::vector::{
     self, Mat3, Vec3, add, largest, part, rotation, scale, sub, times, transposed_times,
@@ -164,7 +164,7 @@ impl CraftMotion {
         // Only tanks in use: parameters of the others can be anything within their ranges.
         let tanks: Vec<Tank> = p.tank[..p.tanks].iter().map(Tank::resolve).collect();
         let liquids: Vec<Rigid> = tanks.iter().map(Tank::rigid).collect();
-        let rigid = liquids.iter().fold(p.craft.rigid(), |sum, tank| sum.and(tank));
+        let rigid = liquids.iter().fold(p.craft.rigid(), |sum, tank| sum.combined_with(tank));
         let modes = || {
             let tanks = tanks.iter().enumerate();
             tanks.flat_map(|(i, tank)| (0..tank.modes).map(move |n| (tank, i, n)))
@@ -197,7 +197,7 @@ impl CraftMotion {
             whole: rigid,
             along: vec![[[0.0; 3]; 2]; bobs.len() + constrained.len()],
             matrix: mass_matrix,
-            factors: Factors::of(&mass_matrix),
+            factors: Factors::new(&mass_matrix),
             force: [[0.0; 3]; 2],
             torque: [[0.0; 3]; 2],
             h: [[0.0; 3]; 2],
@@ -240,12 +240,12 @@ impl CraftMotion {
         let point = |m: f64, at: Vec3| Rigid::new(m, at, &[[0.0; 3]; 3]);
         let constrained = self.constrained.iter().map(|bob| point(bob.m, bob.at_rest()));
         let bobs = self.bobs.iter().map(|bob| point(bob.m, bob.at_rest())).chain(constrained);
-        self.whole = bobs.fold(self.rigid, |sum, bob| sum.and(&bob));
+        self.whole = bobs.fold(self.rigid, |sum, bob| sum.combined_with(&bob));
         let mut matrix = self.whole.mass_matrix();
         if self.mount == Mount::Pivot {
             hold_upper_rows(&mut matrix);
         }
-        let factors = Factors::of(&matrix);
+        let factors = Factors::new(&matrix);
         let constrained = self.constrained.iter().map(ConstrainedBob::along_axis);
         let axes = self.bobs.iter().map(Bob::along_axis).chain(constrained);
         for (along, axis) in self.along.iter_mut().zip(axes) {
@@ -258,7 +258,7 @@ impl CraftMotion {
         self.rigid = self.craft;
         for (liquid, tank) in self.liquids.iter_mut().zip(tanks.clone()) {
             *liquid = tank.rigid();
-            self.rigid = self.rigid.and(liquid);
+            self.rigid = self.rigid.combined_with(liquid);
         }
         self.mass_matrix = self.rigid.mass_matrix();
         for bob in &mut self.bobs {
@@ -394,7 +394,7 @@ impl CraftMotion {
             lump.seed_direction(dx[at..at + 6].try_into().unwrap(), self.w[0], dw);
             lump.seed_shape(&directions(x, lump.tank), &directions(dx, lump.tank));
         }
-        self.rates_of::<1>();
+        self.expand_rates::<1>();
     }
 
     /// Returns the rotation, rad, body axes, of coefficient 1 of the attitude: q_1 = q_0 o (0,
@@ -417,7 +417,7 @@ impl CraftMotion {
 
     /// Computes coefficient N of every quantity and N + 1 of the states.
     #[inline(always)]
-    fn rates_of<const N: usize>(&mut self) {
+    fn expand_rates<const N: usize>(&mut self) {
         // The pivot comes first. Between the sums below it would take registers from every craft, 4 % of a step.
         if self.on_springs {
             self.set_torque_of_pivot::<N>();
@@ -588,9 +588,9 @@ impl Motion for CraftMotion {
             self.arrange();
         }
         let Inputs { force, torque, h_wheels, .. } = &self.inputs;
-        self.force = [force.at(t), force.slope];
-        self.torque = [sub(torque.at(t), h_wheels.slope), torque.slope];
-        self.h = [h_wheels.at(t), h_wheels.slope];
+        self.force = [force.value_at(t), force.slope];
+        self.torque = [sub(torque.value_at(t), h_wheels.slope), torque.slope];
+        self.h = [h_wheels.value_at(t), h_wheels.slope];
         let x = &self.state.x;
         let q = unit_quaternion([x[0], x[1], x[2], x[3]]);
         self.q.set(0, q);
@@ -614,7 +614,7 @@ impl Motion for CraftMotion {
 
     #[inline(always)]
     fn rates(&mut self, n: usize) {
-        const RATES: [fn(&mut CraftMotion); ORDER] = at_each_order!(CraftMotion::rates_of);
+        const RATES: [fn(&mut CraftMotion); ORDER] = at_each_order!(CraftMotion::expand_rates);
         RATES[n](self)
     }
 
@@ -691,7 +691,7 @@ impl Motion for CraftMotion {
         let mut finite = x[..index::BOBS].iter().all(|x| x.abs() < MAX_MAGNITUDE);
         for bob in &self.bobs {
             let at = index::bob(bob.tank, bob.mode);
-            let moved = bob.at(x[at..at + 6].try_into().unwrap(), n, h, w);
+            let moved = bob.state_at(x[at..at + 6].try_into().unwrap(), n, h, w);
             finite &= moved.iter().all(|x| x.abs() < MAX_MAGNITUDE);
             x[at..at + 6].copy_from_slice(&moved);
         }
@@ -738,7 +738,7 @@ impl CraftMotion {
 
     #[inline(never)]
     fn set_axial_apart(&mut self, n: usize, [force, torque]: [Vec3; 2]) {
-        let w2 = twice_crossed(products_of(n, &self.w));
+        let w2 = twice_crossed(product_coefficients(n, &self.w));
         let along = &self.along[self.bobs.len()..];
         for (bob, [by_force, by_torque]) in self.constrained.iter_mut().zip(along) {
             let [e, _] = bob.along_axis();
@@ -751,7 +751,7 @@ impl CraftMotion {
     /// Adds coefficient n of force and torque of constrained bobs and lumps on the craft, about O.
     #[inline(never)]
     fn add_reactions_apart(&mut self, n: usize, [mut force, mut torque]: [Vec3; 2]) -> [Vec3; 2] {
-        let w2 = twice_crossed(products_of(n, &self.w));
+        let w2 = twice_crossed(product_coefficients(n, &self.w));
         for bob in &mut self.constrained {
             let [f, tau] = bob.reaction(n, self.w[n], &w2);
             (force, torque) = (add(force, f), add(torque, tau));
@@ -842,7 +842,7 @@ impl CraftMotion {
                 bobs.push(parked.remove(at));
             }
         }
-        self.rigid = self.liquids.iter().fold(self.craft, |sum, tank| sum.and(tank));
+        self.rigid = self.liquids.iter().fold(self.craft, |sum, tank| sum.combined_with(tank));
         self.mass_matrix = self.rigid.mass_matrix();
         self.freeze();
     }
@@ -856,17 +856,17 @@ impl CraftMotion {
     fn take_apart(&mut self, n: usize, h: f64, w: Vec3) -> Result<bool, StepError> {
         if let Some(bob) = self.beyond.take() {
             let bob = &self.constrained[bob];
-            return Err(StepError::Model(bob.beyond(&format!("tank[{}]", bob.tank + 1))));
+            return Err(StepError::Model(bob.bound_message(&format!("tank[{}]", bob.tank + 1))));
         }
         let (x, mut finite) = (&mut self.state.x, true);
         for bob in &self.constrained {
-            let moved = bob.at(n, h, w);
+            let moved = bob.state_at(n, h, w);
             finite &= moved.iter().all(|x| x.abs() < MAX_MAGNITUDE);
             x[index::bob(bob.tank, bob.mode)..][..6].copy_from_slice(&moved);
         }
         for lump in self.lumps.iter().filter(|lump| lump.is_loose()) {
             let at = index::ball(lump.tank);
-            let moved = lump.at(x[at..at + 6].try_into().unwrap(), n, h, w);
+            let moved = lump.state_at(x[at..at + 6].try_into().unwrap(), n, h, w);
             finite &= moved.iter().all(|x| x.abs() < MAX_MAGNITUDE);
             x[at..at + 6].copy_from_slice(&moved);
         }
@@ -952,7 +952,7 @@ impl Carrier for CraftMotion {
     #[inline(never)]
     fn evaluate_at(&mut self, t: f64) {
         self.start(t);
-        self.rates_of::<0>();
+        self.expand_rates::<0>();
     }
 
     fn lump(&self, lump: usize) -> &Lump {
@@ -975,7 +975,7 @@ impl Carrier for CraftMotion {
         directions(&self.state.x, self.lumps[lump].tank)
     }
 
-    fn bobs_of(&self, lump: usize) -> impl Iterator<Item = BobNow<f64>> {
+    fn bobs_beside(&self, lump: usize) -> impl Iterator<Item = BobNow<f64>> {
         let tank = self.lumps[lump].tank;
         self.bobs.iter().filter(move |bob| bob.tank == tank).map(Bob::now::<f64>)
     }
@@ -1001,7 +1001,7 @@ impl Carrier for CraftMotion {
         &mut self.state.x[index::DISSIPATED]
     }
 
-    fn kick(&mut self, impulse: [Vec3; 2], t: f64) -> [Vec3; 2] {
+    fn apply_impulse(&mut self, impulse: [Vec3; 2], t: f64) -> [Vec3; 2] {
         self.evaluate_at(t);
         let [dv, dw] = self.factors.solve(impulse);
         self.follow_impulse(dv, dw);

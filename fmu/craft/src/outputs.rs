@@ -104,7 +104,7 @@ pub struct Outputs {
 
 impl TankOutputs {
     /// Returns outputs of a tank's modes from their part of the states, or of a direction.
-    pub(crate) fn of_states(x: &[f64]) -> TankOutputs {
+    pub(crate) fn from_states(x: &[f64]) -> TankOutputs {
         let part = |n: usize, at: usize| {
             let at = 6 * n + at;
             [x[at], x[at + 1], x[at + 2]]
@@ -153,7 +153,7 @@ pub(crate) struct MassProperties<T> {
 }
 
 impl<T: Number> MassProperties<T> {
-    pub fn of(rigid: &Rigid<T>) -> MassProperties<T> {
+    pub fn from_rigid(rigid: &Rigid<T>) -> MassProperties<T> {
         let Rigid { mass, moment, inertia } = *rigid;
         MassProperties { mass, moment, inertia }
     }
@@ -170,7 +170,7 @@ impl<T: Number> MassProperties<T> {
         let is_something = self.mass.value() > 0.0;
         // The compiler would divide before it checks for mass, and hosts can trap divisions by 0.
         let divisor = core::hint::black_box(if is_something { self.mass.value() } else { 1.0 });
-        let share = T::of(divisor, self.mass.result()).recip();
+        let share = T::with_slope(divisor, self.mass.result()).recip();
         if is_something { scale(share, self.moment) } else { constant([0.0; 3]) }
     }
 
@@ -232,7 +232,7 @@ pub(crate) struct Now<T> {
 impl CraftMotion {
     /// Returns the craft at an instant from coefficients 0 and 1 of the motion.
     pub fn now<T: Number>(&self) -> Now<T> {
-        let of = |a: &[Vec3]| -> Vec3<T> { [0, 1, 2].map(|i| T::of(a[0][i], a[1][i])) };
+        let of = |a: &[Vec3]| -> Vec3<T> { [0, 1, 2].map(|i| T::with_slope(a[0][i], a[1][i])) };
         let (a, w, w_d) = (of(&self.a), of(&self.w), of(&self.w_d));
         let [q, dq] = [self.q.get(0), self.q.get(1)];
         let mut instant = Now {
@@ -241,7 +241,7 @@ impl CraftMotion {
             w_d,
             velocity: of(&self.drift),
             h_wheels: of(&self.h),
-            axes: rotation(&[0, 1, 2, 3].map(|i| T::of(q[i], dq[i]))),
+            axes: rotation(&[0, 1, 2, 3].map(|i| T::with_slope(q[i], dq[i]))),
             mount: self.mount,
             pivot: self.pivot,
             craft: self.craft,
@@ -249,7 +249,8 @@ impl CraftMotion {
         };
         for (i, liquid) in self.liquids.iter().enumerate() {
             let lump = self.lumps.iter().find(|lump| lump.tank == i && lump.is_loose());
-            let rigid = lump.map_or_else(|| liquid.lift(), |lump| liquid.along(&lump.shape_slope));
+            let rigid = lump
+                .map_or_else(|| liquid.lift(), |lump| liquid.with_inertia_slope(&lump.shape_slope));
             let mut wrench = rigid.inertial_wrench(a, w, w_d).map(|half| half.map(|x| -x));
             let mut bobs = [(); MODES].map(|()| None);
             for bob in self.bobs.iter().filter(|bob| bob.tank == i) {
@@ -284,10 +285,10 @@ impl<T: Number> Now<T> {
         let tanks = || self.tanks.iter().flatten();
         let bobs = || tanks().flat_map(|tank| tank.bobs.iter().flatten().chain(&tank.lump));
         let lifted = self.craft.lift::<T>();
-        let rigid = tanks().fold(lifted, |sum, tank| sum.and(&tank.rigid));
+        let rigid = tanks().fold(lifted, |sum, tank| sum.combined_with(&tank.rigid));
 
         let mut tank: [TankOutputs; TANKS] =
-            core::array::from_fn(|i| TankOutputs::of_states(&x[index::bob(i, 0)..]));
+            core::array::from_fn(|i| TankOutputs::from_states(&x[index::bob(i, 0)..]));
         for (i, tank) in tank.iter_mut().enumerate() {
             tank.ball_position = part(x, index::ball(i));
             tank.ball_velocity = part(x, index::ball(i) + 3);
@@ -306,7 +307,7 @@ impl<T: Number> Now<T> {
         let half = 0.5;
         let mut energy = (dot(velocity, velocity) * rigid.mass + dot(w, inner_angular)) * half
             + dot(velocity, inner);
-        let mut all = MassProperties::of(&rigid);
+        let mut all = MassProperties::from_rigid(&rigid);
         for bob in bobs() {
             let against_o = add(cross(w, bob.rho), bob.rate);
             all.add(bob.m, bob.rho);

@@ -353,7 +353,7 @@ impl Tank {
     pub(crate) fn surface(&self, n: usize) -> Option<Surface> {
         let [s, kappa] = [self.nonlinear_inertia[n], self.nonlinear_stiffness[n]];
         let surface = match self.fill.has_surface(n) {
-            true => Some(Surface::of([s, kappa])),
+            true => Some(Surface::from_coefficients([s, kappa])),
             false => Surface::new(s, kappa, self.higher(n)),
         };
         surface.filter(|_| n < self.modes)
@@ -374,9 +374,9 @@ impl Tank {
     }
 
     /// Returns the message for a bob of mode n (from 0) beyond the bound of its surface; `name` is that of the tank.
-    pub(crate) fn beyond(&self, n: usize, name: &str) -> String {
+    pub(crate) fn bound_message(&self, n: usize, name: &str) -> String {
         let pair = [self.nonlinear_inertia[n], self.nonlinear_stiffness[n]];
-        let text = surface::beyond(pair, self.higher(n), n, name);
+        let text = surface::bound_message(pair, self.higher(n), n, name);
         match self.fill.has_surface(n) {
             true => format!("{text}; {name}.fill gives them at {:?} kg", self.liquid_0),
             false => text,
@@ -385,7 +385,7 @@ impl Tank {
 
     /// Returns true if mode n (from 0) is planar, or its bob is not a pendulum.
     pub(crate) fn is_constrained(&self, n: usize) -> bool {
-        self.surface(n).is_some() || self.across(n).is_some()
+        self.surface(n).is_some() || self.plane_normal(n).is_some()
     }
 
     /// Returns true if outputs and derivatives are those of `contents.rs`: the tank can drain, or has planar modes or
@@ -401,7 +401,7 @@ impl Tank {
 
     /// Returns the unit vector b, tank axes, perpendicular to the plane in which the bob of mode n (from 0) swings; e x
     /// b is minus the mode's direction. Returns `None` if the mode swings in every direction.
-    pub(crate) fn across(&self, n: usize) -> Option<Vec3> {
+    pub(crate) fn plane_normal(&self, n: usize) -> Option<Vec3> {
         let [x, y] = self.direction[n];
         // Only directions longer than 1e-6 are accepted. The bound avoids a division by 0 that a
         // compiler may hoist above the check.
@@ -413,7 +413,7 @@ impl Tank {
     pub(crate) fn hinge_and_across(&self, n: usize) -> (Vec3, Option<Vec3>) {
         let axes = rotation(&unit_quaternion(self.q));
         let on_axis = add(self.position, scale(self.hinge[n], axes.map(|row| row[2])));
-        match self.across(n).map(|b| times(&axes, b)) {
+        match self.plane_normal(n).map(|b| times(&axes, b)) {
             Some(b) => (sub(on_axis, scale(self.arm[n], b)), Some(b)),
             None => (on_axis, None),
         }
@@ -477,17 +477,21 @@ impl Tank {
 
     /// Returns the inertia that craft and rigid liquid must have for bobs with s < 1 within 45 degrees, as a body of
     /// negative mass.
-    fn lent(&self) -> Rigid {
+    fn lent_inertia(&self) -> Rigid {
         let none = Rigid { mass: 0.0, moment: [0.0; 3], inertia: [[0.0; 3]; 3] };
         (0..self.modes).fold(none, |sum, n| {
             let lent = self.surface(n).map_or(0.0, |surface| surface.lent_inertia());
-            sum.and(&Rigid::new(-lent * self.mass[n], self.hinge_and_across(n).0, &none.inertia))
+            sum.combined_with(&Rigid::new(
+                -lent * self.mass[n],
+                self.hinge_and_across(n).0,
+                &none.inertia,
+            ))
         })
     }
 
     /// Returns direction and rate of the bob of mode n (from 0) at the start, tank axes.
     pub(crate) fn at_start(&self, n: usize) -> [Vec3; 2] {
-        let [p, p_d] = [self.p_0[n], self.p_dot_0[n]].map(|x| match self.across(n) {
+        let [p, p_d] = [self.p_0[n], self.p_dot_0[n]].map(|x| match self.plane_normal(n) {
             Some(b) => sub(x, scale(dot(b, x), b)),
             None => x,
         });
@@ -913,7 +917,10 @@ impl Tank {
                         "{name}.{what}[{i}] = {value:?} with {name}.fill (allowed: 0, because the table has coefficients of the third \
                          order only)"
                     ));
-                } else if value != 0.0 && what.starts_with("rotary") && self.across(n).is_some() {
+                } else if value != 0.0
+                    && what.starts_with("rotary")
+                    && self.plane_normal(n).is_some()
+                {
                     problems.0.push(format!(
                         "{name}.{what}[{i}] = {value:?} with {name}.direction[{i}] (allowed: 0, because a mode in a plane does not \
                          rotate)"
@@ -933,7 +940,7 @@ impl Tank {
             }
             problems.direction(&format!("{name}.p_0[{i}]"), &self.p_0[n]);
             if problems.0.len() == before
-                && let Some(b) = self.across(n)
+                && let Some(b) = self.plane_normal(n)
             {
                 let flat = sub(self.p_0[n], scale(dot(b, self.p_0[n]), b));
                 if largest(flat) < 1e-6 {
@@ -949,7 +956,7 @@ impl Tank {
             {
                 let [p, _] = self.at_start(n);
                 if libm::acos(-p[2].clamp(-1.0, 1.0)) >= surface.largest_angle() {
-                    problems.0.push(format!("{name}.p_0[{i}]: {}", self.beyond(n, name)));
+                    problems.0.push(format!("{name}.p_0[{i}]: {}", self.bound_message(n, name)));
                 }
             }
             problems.vector(&format!("{name}.p_dot_0[{i}]"), &self.p_dot_0[n], "1/s");
@@ -1143,7 +1150,7 @@ const SINGULAR: f64 = 1e-12;
 /// not searched, because realistic craft are singular only far outside the range of their modes.
 pub(crate) fn singular_where(body: Rigid, tanks: &[Tank]) -> Option<String> {
     let matrix = |rigid: fn(&Tank) -> Rigid| {
-        tanks.iter().fold(body, |sum, tank| sum.and(&rigid(tank))).mass_matrix()
+        tanks.iter().fold(body, |sum, tank| sum.combined_with(&rigid(tank))).mass_matrix()
     };
     let mut at_rest = matrix(Tank::rigid);
     tanks.iter().for_each(|tank| tank.add_planar_bobs(&mut at_rest, &[0.0; MODES]));
@@ -1154,7 +1161,7 @@ pub(crate) fn singular_where(body: Rigid, tanks: &[Tank]) -> Option<String> {
     let lends = |point: usize| {
         let lent = tanks.iter().fold(body, |sum, tank| {
             let tank = tank.at_point(point);
-            sum.and(&tank.rigid()).and(&tank.lent())
+            sum.combined_with(&tank.rigid()).combined_with(&tank.lent_inertia())
         });
         smallest_pivot(&lent.mass_matrix()) < SINGULAR
     };

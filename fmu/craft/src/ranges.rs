@@ -88,7 +88,7 @@ struct OverFill {
 
 impl OverFill {
     /// Returns a mode's limits, interpolated linearly. Between a known and an unknown one there is none.
-    fn at(&self, n: usize, liquid: f64) -> [f64; 2] {
+    fn limits_at(&self, n: usize, liquid: f64) -> [f64; 2] {
         let masses = &self.liquid[..self.points];
         let last = self.points - 2;
         let i = (0..last).find(|&i| liquid < masses[i + 1]).unwrap_or(last);
@@ -150,7 +150,7 @@ impl Bounds {
             true => out.wave_height / self.radius,
             false => 2.0 * libm::hypot(out.angle_x[0], out.angle_y[0]) / (XI[0] * XI[0] - 1.0),
         };
-        let regime = if upright { Regime::of(height) } else { Regime::Nonlinear };
+        let regime = if upright { Regime::from_ratio(height) } else { Regime::Nonlinear };
         let limited_by = self.reason(out, dot(omega, self.axis), liquid);
         Ranges { regime, limited_by, is_physical: upright && self.is_held(out.axial) }
     }
@@ -178,7 +178,7 @@ impl Bounds {
             let mode = &self.mode[n];
             let [mut angle, mut swirl] = [mode.angle, mode.swirl];
             if let Some(table) = &self.over_fill {
-                let [a, s] = table.at(n, liquid);
+                let [a, s] = table.limits_at(n, liquid);
                 (angle, swirl) = (if a > 0.0 { a } else { angle }, if s > 0.0 { s } else { swirl });
             }
             let ([x, y, _], [x_d, y_d, _]) = (out.p[n], out.p_dot[n]);

@@ -49,8 +49,8 @@ impl Rigid {
     }
 
     /// Returns the same body with the derivative `slope` of its inertia, kg m2.
-    pub fn along<T: Number>(&self, slope: &Mat3) -> Rigid<T> {
-        let element = |i: usize, j: usize| T::of(self.inertia[i][j], slope[i][j]);
+    pub fn with_inertia_slope<T: Number>(&self, slope: &Mat3) -> Rigid<T> {
+        let element = |i: usize, j: usize| T::with_slope(self.inertia[i][j], slope[i][j]);
         Rigid { inertia: [0, 1, 2].map(|i| [0, 1, 2].map(|j| element(i, j))), ..self.lift() }
     }
 }
@@ -69,7 +69,7 @@ impl<T: Number> Rigid<T> {
     }
 
     /// Returns both bodies as one rigid body: masses, moments and inertias added.
-    pub fn and(&self, b: &Rigid<T>) -> Rigid<T> {
+    pub fn combined_with(&self, b: &Rigid<T>) -> Rigid<T> {
         let mut sum = *self;
         sum.mass = sum.mass + b.mass;
         sum.moment = add(sum.moment, b.moment);
@@ -146,7 +146,7 @@ pub struct Factors<T = f64> {
 impl<T: Number> Factors<T> {
     /// Factorises a matrix. Only its lower triangle is read.
     #[inline(always)]
-    pub fn of(matrix: &Mat6<T>) -> Factors<T> {
+    pub fn new(matrix: &Mat6<T>) -> Factors<T> {
         let zero = T::constant(0.0);
         let mut factors = Factors { l: [[zero; 6]; 6], inverse: [zero; 6] };
         factors.set(matrix);
@@ -227,7 +227,7 @@ impl<M: Copy> Factors<M> {
 /// Returns the smallest element of D over the matrix's own diagonal. Returns 0 for a matrix that is not positive
 /// definite, or so nearly singular that its inverse exceeds [`LARGEST_INVERSE`].
 pub fn smallest_pivot(matrix: &Mat6) -> f64 {
-    let Factors { inverse, .. } = Factors::of(matrix);
+    let Factors { inverse, .. } = Factors::new(matrix);
     // NaN is outside the range.
     if !inverse.iter().all(|x| (0.0..=LARGEST_INVERSE).contains(x)) {
         return 0.0;
@@ -300,7 +300,7 @@ mod tests {
                 let hinge = [between(-1.0, 1.0), 0.3, -0.5];
                 add_rank_one(&mut matrix, 100.0, &along_rod(p, hinge));
             }
-            let factors = Factors::of(&matrix);
+            let factors = Factors::new(&matrix);
             assert!(smallest_pivot(&matrix) > 0.01);
             let x: [f64; 6] = core::array::from_fn(|_| between(-1.0, 1.0));
             let b = matrix.map(|row| (0..6).map(|i| row[i] * x[i]).sum::<f64>());
@@ -324,7 +324,7 @@ mod tests {
     #[test]
     fn the_largest_eigenvalue_of_a_rank_one_matrix_is_its_quadratic_form() {
         let own = [[910.0, 14.0, -9.0], [14.0, 860.0, 6.0], [-9.0, 6.0, 640.0]];
-        let factors = Factors::of(&Rigid::new(310.0, [0.1, -0.3, 0.21], &own).mass_matrix());
+        let factors = Factors::new(&Rigid::new(310.0, [0.1, -0.3, 0.21], &own).mass_matrix());
         let u = along_rod([0.36, 0.48, 0.8], [0.5, 0.7, -0.9]);
         let mut a = [[0.0; 6]; 6];
         add_rank_one(&mut a, 128.0, &u);

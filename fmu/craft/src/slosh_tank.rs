@@ -85,12 +85,12 @@ use taylor::extrapolation::System;
 use taylor::integrator::{self, MAX_MAGNITUDE, Motion, RATE_FLOOR, Steps};
 use taylor::number::{Dual, Number};
 use taylor::series::{self, ORDER, Series, ZERO};
-use taylor::space::{self, Pair, Vector, ZERO_PAIR, ZERO_VECTOR, products, products_of};
+use taylor::space::{self, Pair, Vector, ZERO_PAIR, ZERO_VECTOR, product_coefficients, products};
 use taylor::vector::{Mat3, Vec3, add, constant, cross, dot, largest, part, scale, sub, times};
 
 use crate::bob::{Bob, BobNow};
 use crate::constrained::ConstrainedBob;
-use crate::contents::{Drains, MountedTank, Outflow, has_diverged, normalise_bobs, vec_of};
+use crate::contents::{Drains, MountedTank, Outflow, has_diverged, normalise_bobs, vector_from};
 use crate::handover::Carrier;
 use crate::lump::{Directions, Due, Lump};
 use crate::motion::{SCALE_TIME, twice_crossed};
@@ -398,8 +398,8 @@ impl System<TANK_STATES> for Run<'_> {
             return [0.0; TANK_STATES];
         }
         let TankInputs { a, omega_dot, mass_flow, .. } = self.inputs;
-        let moved = [a.at(t), self.inputs.omega_at(t), omega_dot.at(t)];
-        draining_rates(self.mounted, x, &(moved, mass_flow.at(t)), mass_flow.slope)
+        let moved = [a.value_at(t), self.inputs.omega_at(t), omega_dot.value_at(t)];
+        draining_rates(self.mounted, x, &(moved, mass_flow.value_at(t)), mass_flow.slope)
     }
 
     fn error_scale(
@@ -411,7 +411,7 @@ impl System<TANK_STATES> for Run<'_> {
     ) -> [f64; TANK_STATES] {
         let turn = RATE_FLOOR + largest(self.inputs.omega_at(t));
         let time = h.min(SCALE_TIME);
-        scales(|at| turn + largest(vec_of(x, at)) + largest(vec_of(rate, at)) * time)
+        scales(|at| turn + largest(vector_from(x, at)) + largest(vector_from(rate, at)) * time)
     }
 }
 
@@ -441,7 +441,7 @@ fn draining_rates<T: Number>(
     let ([a, w, w_d], flow) = *acting;
     let contents = mounted.contents(x, [a, w, w_d], (x[LIQUID], flow, slope));
     let mut rate = [T::constant(0.0); TANK_STATES];
-    mounted.put_rates(&contents, [a, w_d], |at, numbers| {
+    mounted.write_rates(&contents, [a, w_d], |at, numbers| {
         rate[at..at + numbers.len()].copy_from_slice(numbers);
     });
     rate[DISSIPATED] = contents.dissipation;
@@ -452,17 +452,17 @@ fn draining_rates<T: Number>(
 }
 
 /// Returns values and derivatives along (dx, du).
-fn along(
+fn dual_arguments(
     x: &[f64; TANK_STATES],
     inputs: &TankInputs,
     dx: &[f64; TANK_STATES],
     du: &[f64; TANK_INPUTS],
 ) -> ([Dual; TANK_STATES], Acting<Dual>) {
     let TankInputs { a, omega, omega_dot, mass_flow } = inputs;
-    let with = |x: Vec3, at: usize| [0, 1, 2].map(|i| Dual::of(x[i], du[at + i]));
+    let with = |x: Vec3, at: usize| [0, 1, 2].map(|i| Dual::with_slope(x[i], du[at + i]));
     let motion = [with(a.value, 0), with(*omega, 3), with(omega_dot.value, 6)];
-    let x = core::array::from_fn(|i| Dual::of(x[i], dx[i]));
-    (x, (motion, Dual::of(mass_flow.value, du[9])))
+    let x = core::array::from_fn(|i| Dual::with_slope(x[i], dx[i]));
+    (x, (motion, Dual::with_slope(mass_flow.value, du[9])))
 }
 
 impl Motion for TankMotion {
@@ -470,8 +470,8 @@ impl Motion for TankMotion {
     fn start(&mut self, t: f64) {
         let by_impulses = if self.ball.is_some() { Some(self.start_ball()) } else { None };
         let TankInputs { a, omega_dot, .. } = &self.inputs;
-        (self.a[0], self.a[1]) = (a.at(t), a.slope);
-        (self.w_d[0], self.w_d[1]) = (omega_dot.at(t), omega_dot.slope);
+        (self.a[0], self.a[1]) = (a.value_at(t), a.slope);
+        (self.w_d[0], self.w_d[1]) = (omega_dot.value_at(t), omega_dot.slope);
         let mut turned = self.inputs.omega_at(t);
         if let Some(by_impulses) = by_impulses {
             turned = add(turned, by_impulses);
@@ -489,7 +489,7 @@ impl Motion for TankMotion {
 
     #[inline(always)]
     fn rates(&mut self, n: usize) {
-        const RATES: [fn(&mut TankMotion); ORDER] = at_each_order!(TankMotion::rates_of);
+        const RATES: [fn(&mut TankMotion); ORDER] = at_each_order!(TankMotion::expand_rates);
         RATES[n](self)
     }
 
@@ -542,7 +542,7 @@ impl Motion for TankMotion {
         let mut finite = x[DISSIPATED].abs() < MAX_MAGNITUDE && largest(w) < MAX_MAGNITUDE;
         for bob in &self.bobs {
             let at = 6 * bob.mode;
-            let moved = bob.at(x[at..at + 6].try_into().unwrap(), n, h, w);
+            let moved = bob.state_at(x[at..at + 6].try_into().unwrap(), n, h, w);
             finite &= moved.iter().all(|x| x.abs() < MAX_MAGNITUDE);
             x[at..at + 6].copy_from_slice(&moved);
         }
@@ -553,7 +553,7 @@ impl Motion for TankMotion {
             return Err(StepError::NotFinite { time: self.state.time + t });
         }
         if let Some(due) = self.ball.as_mut().and_then(|ball| ball.due.take()) {
-            self.answer(due, t);
+            self.perform_event(due, t);
         }
         Ok(ControlFlow::Continue(()))
     }
@@ -569,7 +569,7 @@ impl TankMotion {
     fn evaluate(&mut self, inputs: &TankInputs) {
         self.inputs = *inputs;
         self.start(0.0);
-        self.rates_of::<0>();
+        self.expand_rates::<0>();
     }
 
     fn evaluate_direction(
@@ -590,7 +590,7 @@ impl TankMotion {
             lump.seed_direction(dx[BALL..].try_into().unwrap(), self.w[0], dw);
             lump.seed_shape(&directions(&self.state.x), &directions(dx));
         }
-        self.rates_of::<1>();
+        self.expand_rates::<1>();
     }
 
     /// Advances the states by `h` > 0. After an error they are unusable.
@@ -603,7 +603,7 @@ impl TankMotion {
 
     /// Computes coefficient N of every quantity and N + 1 of the states.
     #[inline(always)]
-    fn rates_of<const N: usize>(&mut self) {
+    fn expand_rates<const N: usize>(&mut self) {
         self.w_both.set(N, self.w[N], self.w[N]);
         let w2 = twice_crossed(products::<N>(&self.w));
         let mut dissipation = 0.0;
@@ -640,12 +640,14 @@ impl TankMotion {
 
     /// Returns the quantities for the outputs, from coefficients 0 and 1.
     fn parts<T: Number>(&self) -> Parts<T> {
-        let of = |a: &[Vec3]| -> Vec3<T> { [0, 1, 2].map(|i| T::of(a[0][i], a[1][i])) };
+        let of = |a: &[Vec3]| -> Vec3<T> { [0, 1, 2].map(|i| T::with_slope(a[0][i], a[1][i])) };
         let (a, w, w_d) = (of(&self.a), of(&self.w), of(&self.w_d));
         let zero = constant::<T>([0.0; 3]);
         let lump = self.ball.as_ref().map(|ball| &ball.lump).filter(|lump| lump.is_loose());
-        let rigid =
-            lump.map_or_else(|| self.rigid.lift::<T>(), |lump| self.rigid.along(&lump.shape_slope));
+        let rigid = lump.map_or_else(
+            || self.rigid.lift::<T>(),
+            |lump| self.rigid.with_inertia_slope(&lump.shape_slope),
+        );
         let mut parts = Parts {
             motion: [a, w, w_d],
             wrench: rigid.inertial_wrench(a, w, w_d).map(|half| half.map(|x| -x)),
@@ -697,7 +699,7 @@ impl TankMotion {
     /// dissipation.
     #[inline(never)]
     fn rates_apart(&mut self, n: usize) -> f64 {
-        let w2 = twice_crossed(products_of(n, &self.w));
+        let w2 = twice_crossed(product_coefficients(n, &self.w));
         let (a, w_d, mut dissipation) = (self.a[n], self.w_d[n], 0.0);
         for bob in &mut self.constrained {
             if bob.follows() {
@@ -746,16 +748,16 @@ impl TankMotion {
     #[inline(never)]
     fn take_apart(&mut self, n: usize, h: f64, w: Vec3) -> Result<bool, StepError> {
         if let Some(bob) = self.beyond.take() {
-            return Err(StepError::Model(self.constrained[bob].beyond("tank")));
+            return Err(StepError::Model(self.constrained[bob].bound_message("tank")));
         }
         let (x, mut finite) = (&mut self.state.x, true);
         for bob in &self.constrained {
-            let moved = bob.at(n, h, w);
+            let moved = bob.state_at(n, h, w);
             finite &= moved.iter().all(|x| x.abs() < MAX_MAGNITUDE);
             x[6 * bob.mode..][..6].copy_from_slice(&moved);
         }
         if let Some(lump) = loose(&mut self.ball) {
-            let moved = lump.at(x[BALL..].try_into().unwrap(), n, h, w);
+            let moved = lump.state_at(x[BALL..].try_into().unwrap(), n, h, w);
             finite &= moved.iter().all(|x| x.abs() < MAX_MAGNITUDE);
             x[BALL..].copy_from_slice(&moved);
         }
@@ -785,7 +787,7 @@ impl TankMotion {
 
     /// Performs the event `due` at `t` after the start of the call.
     #[inline(never)]
-    fn answer(&mut self, due: Due, t: f64) {
+    fn perform_event(&mut self, due: Due, t: f64) {
         if self.loose().rest.is_none() {
             self.evaluate_at(t);
             let [a, w, w_d] = self.motion().map(|series| series[0]);
@@ -808,7 +810,7 @@ impl TankMotion {
             lump.start(self.state.x[BALL..].try_into().unwrap(), w);
         }
         let Some(rest) = self.ball.as_ref().and_then(|ball| ball.rest) else { return };
-        self.rates_of::<0>();
+        self.expand_rates::<0>();
         self.factorise();
         let turning = self.rigid().inertial_wrench([0.0; 3], w, [0.0; 3]);
         let loads = self.parts::<f64>().loads;
@@ -826,8 +828,8 @@ impl TankMotion {
         }
         let middle = t - h / 2.0;
         let TankInputs { a, omega_dot, .. } = &self.inputs;
-        let dv = scale(h, sub(self.a[0], a.at(middle)));
-        let dw = scale(h, sub(self.w_d[0], omega_dot.at(middle)));
+        let dv = scale(h, sub(self.a[0], a.value_at(middle)));
+        let dw = scale(h, sub(self.w_d[0], omega_dot.value_at(middle)));
         self.give(dv, dw);
     }
 
@@ -867,7 +869,7 @@ impl TankMotion {
             }
             self.next_of_ball(4, 0.0);
             let Some(due) = self.loose_mut().due.take() else { break };
-            self.answer(due, 0.0);
+            self.perform_event(due, 0.0);
             any = true;
         }
         self.forget();
@@ -916,7 +918,7 @@ impl Carrier for TankMotion {
     #[inline(never)]
     fn evaluate_at(&mut self, t: f64) {
         self.start(t);
-        self.rates_of::<0>();
+        self.expand_rates::<0>();
         self.factorise();
     }
 
@@ -940,7 +942,7 @@ impl Carrier for TankMotion {
         directions(&self.state.x)
     }
 
-    fn bobs_of(&self, _: usize) -> impl Iterator<Item = BobNow<f64>> {
+    fn bobs_beside(&self, _: usize) -> impl Iterator<Item = BobNow<f64>> {
         self.bobs.iter().map(Bob::now::<f64>)
     }
 
@@ -950,7 +952,7 @@ impl Carrier for TankMotion {
     }
 
     fn rigid(&self) -> Rigid {
-        self.loose().host.and(&self.rigid)
+        self.loose().host.combined_with(&self.rigid)
     }
 
     fn motion(&self) -> [&Vector; 3] {
@@ -965,7 +967,7 @@ impl Carrier for TankMotion {
         &mut self.state.x[DISSIPATED]
     }
 
-    fn kick(&mut self, impulse: [Vec3; 2], t: f64) -> [Vec3; 2] {
+    fn apply_impulse(&mut self, impulse: [Vec3; 2], t: f64) -> [Vec3; 2] {
         self.evaluate_at(t);
         let [dv, dw] = self.loose().factors.solve(impulse);
         self.give(dv, dw);
@@ -1024,7 +1026,7 @@ fn plus<T: Number>(a: [Vec3<T>; 2], b: [Vec3<T>; 2]) -> [Vec3<T>; 2] {
 
 /// Adds the bob's m u u^T to a matrix.
 fn add_added_mass<T: Number>(matrix: &mut [[T; 6]; 6], bob: &Bob) {
-    let p = [0, 1, 2].map(|i| T::of(bob.p[0][i], bob.p[1][i]));
+    let p = [0, 1, 2].map(|i| T::with_slope(bob.p[0][i], bob.p[1][i]));
     let c = cross(constant(bob.hinge), p);
     add_square(matrix, T::constant(bob.m), &[p[0], p[1], p[2], c[0], c[1], c[2]]);
 }
@@ -1089,14 +1091,14 @@ impl SloshTank {
         let bobs: Vec<Bob> = free.map(|n| Bob::new(&tank, 0, n)).collect();
         let constrained = (0..tank.modes).filter_map(|n| ConstrainedBob::new(&tank, 0, n));
         let constrained: Vec<_> = constrained.collect();
-        let lumped = (0..tank.modes).fold(rigid, |sum, n| sum.and(&tank.lumped(n)));
+        let lumped = (0..tank.modes).fold(rigid, |sum, n| sum.combined_with(&tank.lumped(n)));
         let ball = Lump::new(&tank, 0).map(|lump| {
             let host = p.host.unwrap_or_default().rigid();
             Loose {
                 lump,
                 parked: Vec::with_capacity(bobs.len()),
                 host,
-                factors: Factors::of(&host.mass_matrix()),
+                factors: Factors::new(&host.mass_matrix()),
                 turned: [0.0; 3],
                 rest: None,
                 due: None,
@@ -1205,7 +1207,7 @@ impl SloshTank {
         if ball.is_some() {
             return true;
         }
-        let [a, w, w_d] = [inputs.a.at(h), inputs.omega_at(h), inputs.omega_dot.at(h)];
+        let [a, w, w_d] = [inputs.a.value_at(h), inputs.omega_at(h), inputs.omega_dot.value_at(h)];
         let axial = self.first.map_or(0.0, |[hinge, e]| {
             let turning = add(cross(w_d, hinge), cross(w, cross(w, hinge)));
             dot(e, add(a, turning))
@@ -1311,10 +1313,10 @@ impl SloshTank {
 
     fn outputs_from<T: Number>(&self, x: &[f64; TANK_STATES], parts: Parts<T>) -> SloshTankOutputs {
         let Parts { motion: [a, w, w_d], rigid, wrench, loads, mut matrix, bobs, lump, .. } = parts;
-        let mut tank = TankOutputs::of_states(x);
+        let mut tank = TankOutputs::from_states(x);
         (tank.ball_position, tank.ball_velocity) = (part(x, BALL), part(x, BALL + 3));
         tank.ball_state = parts.ball_state;
-        let mut all = MassProperties::of(&rigid);
+        let mut all = MassProperties::from_rigid(&rigid);
         for bob in bobs.iter().flatten().chain(&lump) {
             all.add(bob.m, bob.rho);
         }
@@ -1381,7 +1383,7 @@ impl SloshTank {
         du: &[f64; TANK_INPUTS],
     ) -> [f64; TANK_STATES] {
         if let Some(mounted) = &self.draining {
-            let (x, acting) = along(&self.motion.state.x, inputs, dx, du);
+            let (x, acting) = dual_arguments(&self.motion.state.x, inputs, dx, du);
             let slope = inputs.mass_flow.slope;
             return draining_rates(mounted, &x, &acting, slope).map(Number::result);
         }
@@ -1397,7 +1399,7 @@ impl SloshTank {
         du: &[f64; TANK_INPUTS],
     ) -> SloshTankOutputs {
         if let Some(mounted) = &self.draining {
-            let (x, acting) = along(&self.motion.state.x, inputs, dx, du);
+            let (x, acting) = dual_arguments(&self.motion.state.x, inputs, dx, du);
             return self.draining_outputs(mounted, dx, &x, &acting, inputs.mass_flow.slope);
         }
         self.motion.evaluate_direction(inputs, dx, du);
@@ -1408,7 +1410,7 @@ impl SloshTank {
     /// Applies an impulse of the host to the bobs, which keep their velocities across their rods.
     /// The impulse changes the velocity of O by `dv`, m/s, and the host's angular velocity by `dw`,
     /// rad/s, host axes.
-    pub fn take_impulse(&mut self, dv: Vec3, dw: Vec3) {
+    pub fn apply_host_impulse(&mut self, dv: Vec3, dw: Vec3) {
         let TankMotion { state, bobs, constrained, .. } = &mut *self.motion;
         if let Some(mounted) = &self.draining {
             mounted.flatten(&mut state.x);
@@ -1439,7 +1441,7 @@ impl SloshTank {
         for bob in &self.motion.constrained {
             bob.add_inertia(&mut matrix);
         }
-        Some(largest_eigenvalue(&Factors::of(&host.rigid().mass_matrix()), &matrix))
+        Some(largest_eigenvalue(&Factors::new(&host.rigid().mass_matrix()), &matrix))
     }
 }
 

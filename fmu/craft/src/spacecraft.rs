@@ -133,8 +133,8 @@ impl Spacecraft {
         match done {
             Ok(()) => {
                 state.time = before.time + h;
-                state.h_wheels = inputs.h_wheels.at(h);
-                state.flow = inputs.mass_flow.map(|flow| flow.at(h));
+                state.h_wheels = inputs.h_wheels.value_at(h);
+                state.flow = inputs.mass_flow.map(|flow| flow.value_at(h));
             }
             Err(_) => *state = before,
         }
@@ -207,7 +207,7 @@ impl Spacecraft {
     pub fn outputs_held(&mut self, inputs: &Inputs) -> Outputs {
         let x = &self.motion.state.x;
         let mut outputs = if let Some(draining) = &self.draining {
-            draining.evaluate(x, &Acting::of(inputs, 0.0)).outputs(x)
+            draining.evaluate(x, &Acting::from_inputs(inputs, 0.0)).outputs(x)
         } else {
             self.motion.evaluate(inputs);
             self.motion.now::<f64>().outputs(&self.motion.state.x)
@@ -240,7 +240,7 @@ impl Spacecraft {
     /// reaction -h_w' to `torque`.
     pub fn derivatives(&mut self, inputs: &Inputs) -> [f64; STATES] {
         if let Some(draining) = &self.draining {
-            return draining.rates(&self.motion.state.x, &Acting::of(inputs, 0.0));
+            return draining.rates(&self.motion.state.x, &Acting::from_inputs(inputs, 0.0));
         }
         self.motion.evaluate(inputs);
         self.motion.state_rates::<0>(&self.motion.state.x)
@@ -254,7 +254,7 @@ impl Spacecraft {
         dx: &[f64; STATES],
         du: &[f64; INPUTS],
     ) -> [f64; STATES] {
-        if let Some((draining, x, acting)) = self.along(inputs, dx, du) {
+        if let Some((draining, x, acting)) = self.dual_arguments(inputs, dx, du) {
             return draining.rates(&x, &acting).map(Number::result);
         }
         self.motion.evaluate_direction(inputs, dx, split(du));
@@ -269,7 +269,7 @@ impl Spacecraft {
         dx: &[f64; STATES],
         du: &[f64; INPUTS],
     ) -> Outputs {
-        if let Some((draining, x, acting)) = self.along(inputs, dx, du) {
+        if let Some((draining, x, acting)) = self.dual_arguments(inputs, dx, du) {
             return draining.evaluate(&x, &acting).outputs(dx);
         }
         self.motion.evaluate_direction(inputs, dx, split(du));
@@ -277,15 +277,15 @@ impl Spacecraft {
     }
 
     /// Returns states and inputs of a draining craft with their derivatives.
-    fn along(
+    fn dual_arguments(
         &self,
         inputs: &Inputs,
         dx: &[f64; STATES],
         du: &[f64; INPUTS],
     ) -> Option<(&Draining, [Dual; STATES], Acting<Dual>)> {
         let x = &self.motion.state.x;
-        let along = core::array::from_fn(|i| Dual::of(x[i], dx[i]));
-        Some((self.draining.as_ref()?, along, Acting::along(inputs, du)))
+        let along = core::array::from_fn(|i| Dual::with_slope(x[i], dx[i]));
+        Some((self.draining.as_ref()?, along, Acting::with_directions(inputs, du)))
     }
 
     /// Applies the impulses of jumped inputs. Returns true if any input has jumped.

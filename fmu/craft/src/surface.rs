@@ -121,13 +121,13 @@ pub(crate) struct Surface<T = f64> {
 
 impl<T: Number> Surface<T> {
     /// Returns the surface with s and kappa, also that of a pendulum.
-    pub fn of([s, kappa]: [T; 2]) -> Surface<T> {
+    pub fn from_coefficients([s, kappa]: [T; 2]) -> Surface<T> {
         let one = T::constant(1.0);
         Surface { inertia: s - one, stiffness: kappa - one, higher: None }
     }
 
     /// Returns beta.
-    fn rise_of(&self, u: T) -> T {
+    fn slope_factor(&self, u: T) -> T {
         let rise = u * (self.stiffness * 0.5);
         match &self.higher {
             Some(higher) => rise + u * u * (0.375 * higher.stiffness),
@@ -136,7 +136,7 @@ impl<T: Number> Surface<T> {
     }
 
     /// Returns S.
-    fn inner_of(&self, u: T) -> T {
+    fn meridian_factor(&self, u: T) -> T {
         match &self.higher {
             Some(higher) => self.inertia + u * higher.inertia,
             None => self.inertia,
@@ -147,11 +147,11 @@ impl<T: Number> Surface<T> {
     pub fn meridian_inertia(&self, eta: T, u: T) -> T {
         let one = T::constant(1.0);
         let tilt = match self.higher {
-            Some(_) => one - self.rise_of(u) * eta,
+            Some(_) => one - self.slope_factor(u) * eta,
             None => one - u * eta * (self.stiffness * 0.5),
         };
         // eta^2 + u = 1
-        eta * eta * (one + u * self.inner_of(u)) + u * tilt * tilt
+        eta * eta * (one + u * self.meridian_factor(u)) + u * tilt * tilt
     }
 }
 
@@ -171,7 +171,7 @@ impl Surface {
 
     /// Returns S.
     pub fn inner_at(&self, u: f64) -> f64 {
-        self.inner_of(u)
+        self.meridian_factor(u)
     }
 
     /// Returns true if the bob moves on a sphere.
@@ -200,14 +200,14 @@ impl Surface {
 
     /// Returns beta: z' = l beta p_perp.p'.
     pub fn rise(&self, u: f64) -> f64 {
-        self.rise_of(u)
+        self.slope_factor(u)
     }
 
     /// Returns the surface of a mode, `None` for a pendulum.
     pub fn new(s: f64, kappa: f64, higher: Higher) -> Option<Surface> {
         let higher = (higher != Higher::default()).then_some(higher);
         let is_pendulum = s == 1.0 && kappa == 1.0 && higher.is_none();
-        (!is_pendulum).then(|| Surface { higher, ..Surface::of([s, kappa]) })
+        (!is_pendulum).then(|| Surface { higher, ..Surface::from_coefficients([s, kappa]) })
     }
 
     /// Returns the surface over a number type.
@@ -232,7 +232,7 @@ impl Surface {
             let eta = -libm::sqrt(1.0 - u);
             let inertia = self.meridian_inertia(eta, u);
             let [around, lent] = self.around(u);
-            let along = -self.inner_of(u) * eta * eta * u / inertia;
+            let along = -self.meridian_factor(u) * eta * eta * u / inertia;
             (inertia >= LEAST_INERTIA && around >= LEAST_INERTIA).then(|| along.max(lent))
         };
         (0..=64).map_while(at).fold(0.0, f64::max)
@@ -280,7 +280,7 @@ impl Surface {
 
 /// Returns the message for a bob of mode n (from 0) beyond the bound of its surface, with s and kappa; `name` is that of the
 /// tank.
-pub(crate) fn beyond([s, kappa]: [f64; 2], higher: Higher, n: usize, name: &str) -> String {
+pub(crate) fn bound_message([s, kappa]: [f64; 2], higher: Higher, n: usize, name: &str) -> String {
     let surface = Surface::new(s, kappa, higher);
     let most = surface.map_or(0.0, |surface| surface.largest_angle().to_degrees());
     if higher != Higher::default() {
@@ -367,8 +367,9 @@ impl<T: Number> Meridian<T> {
         let eta = dot(e, p);
         let p_perp = sub(p, scale(eta, e));
         let u = dot(p_perp, p_perp);
-        let beta = surface.rise_of(u);
-        let gamma = beta * (beta * eta - T::constant(2.0)) * eta + eta * eta * surface.inner_of(u);
+        let beta = surface.slope_factor(u);
+        let gamma =
+            beta * (beta * eta - T::constant(2.0)) * eta + eta * eta * surface.meridian_factor(u);
         let inertia = surface.meridian_inertia(eta, u).at_least(0.5 * LEAST_INERTIA);
         let around = surface.higher.filter(|higher| higher.rotary != [0.0; 2]).map(|higher| {
             let t = higher.rotary_inertia(u);
@@ -379,12 +380,12 @@ impl<T: Number> Meridian<T> {
     }
 
     /// Returns D x.
-    pub fn along(&self, x: Vec3<T>) -> Vec3<T> {
+    pub fn apply_shear(&self, x: Vec3<T>) -> Vec3<T> {
         add(x, scale(self.beta * dot(self.p_perp, x), self.e))
     }
 
     /// Returns D^T x.
-    pub fn back(&self, x: Vec3<T>) -> Vec3<T> {
+    pub fn apply_shear_transposed(&self, x: Vec3<T>) -> Vec3<T> {
         add(x, scale(self.beta * dot(self.e, x), self.p_perp))
     }
 
@@ -404,7 +405,7 @@ impl<T: Number> Meridian<T> {
 
     /// Returns N x.
     pub fn held(&self, x: Vec3<T>) -> Vec3<T> {
-        sub(x, self.along(self.free(self.back(x))))
+        sub(x, self.apply_shear(self.free(self.apply_shear_transposed(x))))
     }
 
     /// Returns the mass matrix of the bob, m J^T N J with J [a; w'] = a + w' x rho.
@@ -443,7 +444,7 @@ impl<T: Number> Meridian<T> {
     pub fn inner_rate(&self, p_d: Vec3<T>) -> Option<(Vec3<T>, T)> {
         self.surface.higher?;
         let sigma = dot(self.p_perp, p_d);
-        let radial = self.surface.inner_of(self.u) * sigma;
+        let radial = self.surface.meridian_factor(self.u) * sigma;
         let (mut rate, mut squared) = (scale(radial, self.p_perp), radial * sigma);
         if let (Some((n, _)), Some(higher)) = (self.around, self.surface.higher) {
             let turned = dot(n, p_d);

@@ -125,7 +125,7 @@ impl Curve {
         Curve(core::array::from_fn(|i| [y[i], slope[i], curvature[i]]))
     }
 
-    fn at<T: Number>(&self, at: Place<T>) -> Jet<T> {
+    fn evaluate<T: Number>(&self, at: Place<T>) -> Jet<T> {
         let Place { interval: i, t, h, .. } = at;
         let c = quintic(h, self.0[i], self.0[i + 1]);
         let first: [f64; 5] = core::array::from_fn(|k| (k + 1) as f64 * c[k + 1] / h);
@@ -185,29 +185,32 @@ impl FillCurves {
 
     /// Returns H_0, I_0 and I_z.
     pub fn rigid<T: Number>(&self, at: Place<T>) -> [Jet<T>; 3] {
-        [0, 1, 2].map(|k| self.rigid[k].at(at))
+        [0, 1, 2].map(|k| self.rigid[k].evaluate(at))
     }
 
     /// Returns the damping ratio of a mode at `g_ref`, if the table gives it.
     pub fn zeta<T: Number>(&self, n: usize, at: Place<T>) -> Option<T> {
-        self.modes[n].zeta.as_ref().map(|curve| curve.at(at)[0])
+        self.modes[n].zeta.as_ref().map(|curve| curve.evaluate(at)[0])
     }
 
     /// Returns s and kappa of a mode, if the table gives them.
     pub fn surface<T: Number>(&self, n: usize, at: Place<T>) -> Option<[Jet<T>; 2]> {
-        self.modes[n].surface.as_ref().map(|curves| curves.each_ref().map(|curve| curve.at(at)))
+        self.modes[n]
+            .surface
+            .as_ref()
+            .map(|curves| curves.each_ref().map(|curve| curve.evaluate(at)))
     }
 
     /// Returns mass, length and hinge height of a mode.
     pub fn mode<T: Number>(&self, n: usize, at: Place<T>) -> [Jet<T>; 3] {
         let ModeCurves { stiffness, bob, share, .. } = &self.modes[n];
-        let [k, k_d, k_dd] = stiffness.at(at);
+        let [k, k_d, k_dd] = stiffness.evaluate(at);
         let l = k.recip();
         let l_d = -(k_d * l * l);
         // from l k = 1: l'' k + 2 l' k' + l k'' = 0
         let length = [l, l_d, -((l_d * k_d * 2.0 + l * k_dd) * l)];
-        let b = bob.at(at);
-        let [r, r_d, r_dd] = share.at(at);
+        let b = bob.evaluate(at);
+        let [r, r_d, r_dd] = share.evaluate(at);
         let m = at.liquid;
         [
             [m * r, r + m * r_d, r_d * 2.0 + m * r_dd],
@@ -309,7 +312,7 @@ mod tests {
         let curves = table.curves(MODES);
         let all = |m: f64| {
             // derivative of the liquid's mass by itself
-            let at = curves.place(Dual::of(m, 1.0));
+            let at = curves.place(Dual::with_slope(m, 1.0));
             let modes = (0..MODES).flat_map(|n| curves.mode(n, at));
             let jets: Vec<_> = modes.chain(curves.rigid(at)).collect();
             let values: Vec<_> = jets.iter().map(|jet| jet[0].value()).collect();

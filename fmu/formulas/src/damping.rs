@@ -41,7 +41,7 @@ pub struct Mode {
 impl Mode {
     /// Returns mode `n` (from 0) of an upright cylinder at the specific force `g`, which includes the equivalent of a
     /// centring stiffness, k l/m.
-    pub fn of_cylinder(n: usize, radius: f64, depth: f64, g: f64) -> Mode {
+    pub fn from_cylinder(n: usize, radius: f64, depth: f64, g: f64) -> Mode {
         let lambda = XI[n] / radius * tanh(XI[n] * depth / radius);
         Mode { beta: cylinder_beta(n, radius, depth), lambda, omega: sqrt(g * lambda) }
     }
@@ -181,7 +181,7 @@ const BELOW: f64 = 0.8;
 impl Part {
     /// Returns the shape's own factor: by its correlation, from the layer itself down to [`BELOW`] passing into
     /// [`UNMEASURED`].
-    fn own(&self) -> f64 {
+    fn shape_factor(&self) -> f64 {
         let trusted = self.weight * smooth_step((self.factor - BELOW) / (1.0 - BELOW));
         UNMEASURED + trusted * (self.factor.max(1.0) - UNMEASURED)
     }
@@ -224,7 +224,7 @@ pub struct Estimate {
 /// the scatter of measured tanks. Otherwise it runs from the layer alone to 1.3 of the largest factor of all parts and
 /// near shapes. It widens from one to the other while the shape's share falls to 95 %.
 pub fn estimate(parts: &[Part], near: &[Part]) -> Estimate {
-    let mean = |sum: f64, part: &Part| sum + part.share * (part.own() - UNMEASURED);
+    let mean = |sum: f64, part: &Part| sum + part.share * (part.shape_factor() - UNMEASURED);
     let factor = match parts {
         [part] if part.is_measured() => part.factor,
         _ => parts.iter().fold(UNMEASURED, mean),
@@ -479,7 +479,7 @@ mod tests {
             let xi = XI[n];
             let wide = (xi * xi + 1.0) / (xi * xi - 1.0);
             for (depth, beta) in [(2.0, wide), (1.0, wide + xi / sinh(xi)), (1e4, wide)] {
-                let mode = Mode::of_cylinder(n, 2.0, depth, 3.0);
+                let mode = Mode::from_cylinder(n, 2.0, depth, 3.0);
                 assert!((mode.beta * 2.0 / beta - 1.0).abs() < 1e-15, "{n} {depth}");
                 assert_eq!(mode.beta, cylinder_beta(n, 2.0, depth));
                 let lambda = 0.5 * xi * tanh(0.5 * xi * depth);

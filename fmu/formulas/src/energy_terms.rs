@@ -70,14 +70,20 @@ pub fn energy_terms(fill: f64) -> Option<EnergyTerms> {
     let i = ROWS.iter().position(|row| fill < row[0]).unwrap_or(last);
     let column = |k: usize| {
         let at = |j: usize| features(&ROWS[j])[k];
-        between(libm::log(fill), i, |j| [libm::log(ROWS[j][0]), at(j)], fill <= ROWS[last][0])
+        interpolate_segment(
+            libm::log(fill),
+            i,
+            |j| [libm::log(ROWS[j][0]), at(j)],
+            fill <= ROWS[last][0],
+        )
     };
     let kappa = 1.0 + libm::exp(column(0));
     let kappa_2 = -libm::exp(column(1));
     let [fourth, circular_fourth] = [-libm::exp(column(4)), libm::exp(column(5))];
     let [planar, circular] = shifts_of_third_order(fill);
     let (planar, circular) = (planar + column(2), circular + column(3));
-    let compared = between(fill, i, |j| [ROWS[j][0], ROWS[j][7]], false).min(ROWS[last][7]);
+    let compared =
+        interpolate_segment(fill, i, |j| [ROWS[j][0], ROWS[j][7]], false).min(ROWS[last][7]);
     Some(EnergyTerms {
         pair: [2.0 * (0.375 * kappa - planar), kappa],
         next: [(PLANAR_STIFFNESS * kappa_2 - fourth) / PLANAR_INERTIA, kappa_2],
@@ -124,7 +130,7 @@ fn features(&[fill, kappa, s, t, kappa_2, s_2, t_2, _]: &[f64; 8]) -> [f64; 6] {
 
 /// Returns y at `x` between the points i - 1 and i by a cubic whose slopes are those of the parabola through the nearest three
 /// points, or by the line through both points.
-fn between(x: f64, i: usize, point: impl Fn(usize) -> [f64; 2], is_cubic: bool) -> f64 {
+fn interpolate_segment(x: f64, i: usize, point: impl Fn(usize) -> [f64; 2], is_cubic: bool) -> f64 {
     let [[x_0, y_0], [x_1, y_1]] = [point(i - 1), point(i)];
     let (h, secant) = (x_1 - x_0, (y_1 - y_0) / (x_1 - x_0));
     let share = (x - x_0) / h;

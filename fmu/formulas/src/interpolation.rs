@@ -20,7 +20,7 @@ pub fn derivatives(x: &[f64], y: &[f64], within: bool, slope: &mut [f64], curvat
     for i in 0..count {
         let first = i.saturating_sub(nearest / 2).min(count - nearest);
         let own = first..first + nearest;
-        (slope[i], curvature[i]) = of_polynomial(x[i], &x[own.clone()], &y[own]);
+        (slope[i], curvature[i]) = polynomial_derivatives(x[i], &x[own.clone()], &y[own]);
     }
     let secant = |j: usize| (y[j + 1] - y[j]) / (x[j + 1] - x[j]);
     let turning = |j: usize| j > 0 && j + 1 < count && secant(j - 1) * secant(j) < 0.0;
@@ -61,7 +61,7 @@ pub fn derivatives(x: &[f64], y: &[f64], within: bool, slope: &mut [f64], curvat
 
 /// Returns first and second derivative at `x0` of the polynomial through up to five points
 /// (Fornberg 1988).
-fn of_polynomial(x0: f64, x: &[f64], y: &[f64]) -> (f64, f64) {
+fn polynomial_derivatives(x0: f64, x: &[f64], y: &[f64]) -> (f64, f64) {
     let mut weights = [[0.0; 5]; 3];
     weights[0][0] = 1.0;
     let (mut c1, mut c4) = (1.0, x[0] - x0);
@@ -126,7 +126,7 @@ mod tests {
             for n in 1..count as i32 {
                 let y = X.map(|x| 1.5 + power(x - 0.7, n));
                 for x in [X[0], X[1], X[count - 1], 0.83] {
-                    let (first, second) = of_polynomial(x, &X[..count], &y[..count]);
+                    let (first, second) = polynomial_derivatives(x, &X[..count], &y[..count]);
                     let exact = f64::from(n) * power(x - 0.7, n - 1);
                     let bent =
                         if n < 2 { 0.0 } else { f64::from(n * (n - 1)) * power(x - 0.7, n - 2) };
@@ -148,7 +148,7 @@ mod tests {
                 let (slope, curvature) = found(X, y, within);
                 for i in 0..9 {
                     let own = [0, 0, 0, 1, 2, 3, 4, 4, 4][i];
-                    let expected = of_polynomial(X[i], &X[own..own + 5], &y[own..own + 5]);
+                    let expected = polynomial_derivatives(X[i], &X[own..own + 5], &y[own..own + 5]);
                     assert_eq!((slope[i], curvature[i]), expected, "{i}");
                 }
             }
@@ -227,7 +227,8 @@ mod tests {
             let (mut own, mut bent) = ([0.0; 8], [0.0; 8]);
             for i in 0..8 {
                 let first = [0, 0, 0, 1, 2, 3, 3, 3][i];
-                (own[i], bent[i]) = of_polynomial(x[i], &x[first..first + 5], &y[first..first + 5]);
+                (own[i], bent[i]) =
+                    polynomial_derivatives(x[i], &x[first..first + 5], &y[first..first + 5]);
             }
             for i in 2..6 {
                 let obeys = |j: usize| {

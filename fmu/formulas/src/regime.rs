@@ -15,7 +15,7 @@ pub enum Regime {
 
 impl Regime {
     /// Returns the class for a ratio of wave height to R; NaN counts as nonlinear.
-    pub fn of(ratio: f64) -> Regime {
+    pub fn from_ratio(ratio: f64) -> Regime {
         match ratio {
             ratio if ratio < 0.15 => Regime::Linear,
             ratio if ratio <= 0.25 => Regime::Transitional,
@@ -37,9 +37,12 @@ mod tests {
 
     #[test]
     fn regimes_end_at_0_15_and_0_25_of_the_radius() {
-        assert_eq!([0.1499, 0.15].map(Regime::of), [Regime::Linear, Regime::Transitional]);
-        assert_eq!([0.25, 0.2501].map(Regime::of), [Regime::Transitional, Regime::Nonlinear]);
-        assert_eq!(Regime::of(f64::NAN), Regime::Nonlinear);
+        assert_eq!([0.1499, 0.15].map(Regime::from_ratio), [Regime::Linear, Regime::Transitional]);
+        assert_eq!(
+            [0.25, 0.2501].map(Regime::from_ratio),
+            [Regime::Transitional, Regime::Nonlinear]
+        );
+        assert_eq!(Regime::from_ratio(f64::NAN), Regime::Nonlinear);
     }
 
     #[test]

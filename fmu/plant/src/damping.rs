@@ -106,7 +106,7 @@ impl Damping {
 
     /// Returns the specific force below which a ramp's factor is held.
     pub fn floor(g: Ramp, h: f64) -> f64 {
-        if g.slope == 0.0 { 0.0 } else { NEAR_ZERO * f64::max(g.value, g.at(h)) }
+        if g.slope == 0.0 { 0.0 } else { NEAR_ZERO * f64::max(g.value, g.value_at(h)) }
     }
 
     /// Writes the binomial series of the factor relative to its first value, along a ramp whose

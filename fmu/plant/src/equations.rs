@@ -119,7 +119,7 @@ impl Plant {
                 self.evaluate(inputs);
                 let net = self.motion.net[0];
                 let (against_backward, against_forward) =
-                    self.motion.law.holds(self.state.x[x::THETA]);
+                    self.motion.law.holding_torques(self.state.x[x::THETA]);
                 z[indicator::BREAK_AWAY_FORWARD] = against_forward - net;
                 z[indicator::BREAK_AWAY_BACKWARD] = against_backward + net;
             } else {

@@ -97,7 +97,7 @@ impl Imu {
         }
         if self.rrw > 0.0 {
             reading += gyro.walk;
-            gyro.walk += self.rrw / libm::sqrt(self.rate) * normals_of(self.seed, 1, gyro.next).0;
+            gyro.walk += self.rrw / libm::sqrt(self.rate) * normal_pair(self.seed, 1, gyro.next).0;
         }
         // Quantisation steps below rounding have no effect.
         let seen = reading.abs() < 1e16 * self.lsb;
@@ -114,7 +114,7 @@ impl Imu {
         let sigma = self.flicker * libm::sqrt(libm::log(RATIO) / core::f64::consts::PI);
         let mut time = SHORTEST;
         for (pair, stream) in all.as_chunks_mut::<2>().0.iter_mut().zip(2..) {
-            let (first, second) = normals_of(self.seed, stream, k);
+            let (first, second) = normal_pair(self.seed, stream, k);
             for (process, normal) in pair.iter_mut().zip([first, second]) {
                 let keep = keep(time);
                 *process = keep * *process + sigma * libm::sqrt(1.0 - keep * keep) * normal;
@@ -127,11 +127,11 @@ impl Imu {
 /// Returns two independent standard normal numbers for (seed, k): the Box-Muller transform of two
 /// uniform numbers from the SplitMix64 mixer.
 fn normals(seed: i32, k: u64) -> (f64, f64) {
-    normals_of(seed, 0, k)
+    normal_pair(seed, 0, k)
 }
 
 /// Returns [`normals`] of one of several independent streams of a seed.
-fn normals_of(seed: i32, stream: u64, k: u64) -> (f64, f64) {
+fn normal_pair(seed: i32, stream: u64, k: u64) -> (f64, f64) {
     let stream = mix(seed as u32 as u64 | stream << 32);
     let uniform = |j: u64| {
         let bits = mix(stream ^ mix(k.wrapping_mul(2).wrapping_add(j)));

@@ -318,7 +318,7 @@ impl Motion {
     /// Returns the time within `h` at which the torque exceeds the bearing's static friction, and
     /// the direction.
     fn time_of_break_away(&self, n: usize, h: f64) -> Option<(f64, Contact)> {
-        let (against_backward, against_forward) = self.law.holds(self.hub.theta[0]);
+        let (against_backward, against_forward) = self.law.holding_torques(self.hub.theta[0]);
         let root = |sign: f64, hold: f64| {
             let mut left = self.net.map(|x| -sign * x);
             left[0] += hold;
@@ -447,7 +447,7 @@ impl<const UNROLLED: bool, M: SloshMode> Stretch<'_, UNROLLED, M> {
 
     #[inline(always)]
     fn acting_at(&self, t: f64) -> (Ramp, Ramp) {
-        (self.acting.0.after(t), self.acting.1.after(t))
+        (self.acting.0.shifted(t), self.acting.1.shifted(t))
     }
 }
 
@@ -561,7 +561,7 @@ impl<const UNROLLED: bool, M: SloshMode> integrator::Motion for Stretch<'_, UNRO
             }
             let omega = |s| series::values([&motion.hub.omega], n, s)[0];
             let taken = self.imu.follow(&mut state.gyro, since_start, h, omega, steps.left());
-            steps.count(taken, *begin + self.t)?;
+            steps.add_steps(taken, *begin + self.t)?;
         }
         let varies = !UNROLLED && self.varies;
         let stuck = state.contact == Contact::Stuck;
@@ -577,7 +577,7 @@ impl<const UNROLLED: bool, M: SloshMode> integrator::Motion for Stretch<'_, UNRO
         state.x[x::THETA] = theta;
         state.x[x::OMEGA] = omega;
         for (i, (mode, q)) in modes.iter().zip(state.slosh_mut()).enumerate() {
-            *q = mode.at(n, h, omega, varies);
+            *q = mode.coordinates_at(n, h, omega, varies);
             if let Some(what) = mode.out_of_range(q) {
                 return Err(out_of_range(*begin + self.t + h, i, what));
             }

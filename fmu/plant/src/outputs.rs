@@ -128,7 +128,7 @@ impl Plant {
         let [tau_gravity, on_rigid]: [T; 2] = motion.gravity_torques();
         let mut tau_fluid = on_rigid - wd * self.i_0;
         let inertia = self.hub_inertia + self.i_0;
-        let stored = T::of(motion.law.energy(0), motion.law.energy(1));
+        let stored = T::with_slope(motion.law.energy(0), motion.law.energy(1));
         let mut energy = w * inertia * w * 0.5 + stored + motion.potential();
         let zero = T::constant(0.0);
         let mut tau_suspension = zero;
@@ -183,7 +183,7 @@ impl Plant {
             energy: energy.result(),
             momentum: plain(momentum),
             power_dissipated: plain(number(&motion.dissipation)),
-            tau_actuator: plain(T::of(actuator.value, actuator.slope)),
+            tau_actuator: plain(T::with_slope(actuator.value, actuator.slope)),
             wheel_speed: x[x::WHEEL_SPEED],
             work: x[x::WORK],
             work_axial: work_axial.result(),
@@ -219,7 +219,7 @@ impl Plant {
         du: &[f64; 3],
     ) -> Outputs {
         self.directional_derivative(inputs, dx, du);
-        let change = Dual::of(inputs.g_axial.value - self.state.axial.g, du[2]);
+        let change = Dual::with_slope(inputs.g_axial.value - self.state.axial.g, du[2]);
         let work_axial = self.work_axial_at(change, self.height());
         let tau_cmd = Ramp { value: inputs.tau_cmd.value, slope: du[0] };
         self.present::<Dual>(dx, tau_cmd, work_axial)
@@ -227,15 +227,15 @@ impl Plant {
 
     /// Updates the ranges among the outputs to the current outputs.
     pub fn update_ranges(&self, outputs: &mut Outputs) {
-        let Ranges { regime, baffle, limited_by } = self.ranges_of(outputs);
+        let Ranges { regime, baffle, limited_by } = self.evaluate_ranges(outputs);
         outputs.discrete.regime = regime;
         outputs.discrete.limited_by = limited_by;
         outputs.discrete.baffle_in_range = baffle;
     }
 
     /// Returns the ranges for the outputs, for which the equations must have been evaluated last.
-    pub(crate) fn ranges_of(&self, outputs: &Outputs) -> Ranges {
-        let regime = Regime::of(outputs.wave_height / self.radius);
+    pub(crate) fn evaluate_ranges(&self, outputs: &Outputs) -> Ranges {
+        let regime = Regime::from_ratio(outputs.wave_height / self.radius);
         let baffle = self.baffle.is_none_or(|range| range.contains(outputs.baffle_wave));
         let limited_by = with_modes!(&self.liquid, modes => {
             let modes = modes.iter().map(|mode| {

@@ -136,14 +136,14 @@ pub struct ModeTable {
 
 impl ModeTable {
     /// Returns radial and tangential component of a mode's direction.
-    pub(crate) fn along(&self, n: usize) -> [f64; 2] {
+    pub(crate) fn direction_components(&self, n: usize) -> [f64; 2] {
         let (sin, cos) = libm::sincos(self.direction[n]);
         [sin, cos]
     }
 
     /// Returns the pendulum length, m: as given, or from the frequency f at g_ref and the centring
     /// stiffness, (2 pi f)^2 = g_ref/l + k/m.
-    pub(crate) fn length_of(&self, n: usize) -> f64 {
+    pub(crate) fn pendulum_length(&self, n: usize) -> f64 {
         if self.length[n] > 0.0 {
             return self.length[n];
         }

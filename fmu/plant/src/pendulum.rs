@@ -224,7 +224,7 @@ impl Pendulum {
 
     /// Returns restoring specific force and viscous coefficient at the start of an expansion.
     pub fn restoring_and_drag<T: Number>(&self) -> [T; 2] {
-        [T::of(self.g[0], self.g[1]), T::of(self.c, self.c * self.course[1])]
+        [T::with_slope(self.g[0], self.g[1]), T::with_slope(self.c, self.c * self.course[1])]
     }
 
     /// Returns coefficient n of g a; `varies` is true if g changes.

@@ -117,7 +117,7 @@ impl StoppedStep {
     }
 
     /// Returns true if a step of length `h` from the current state continues the stopped step: same end, same inputs.
-    fn goes_on(&self, state: &State, inputs: &Inputs, h: f64, resolution: f64) -> bool {
+    fn is_continued_by(&self, state: &State, inputs: &Inputs, h: f64, resolution: f64) -> bool {
         let left = self.h - self.passed;
         let is_same = |a: f64, b: f64| (a - b).abs() <= resolution.max(rounding(self.h));
         let held = [inputs.tau_cmd, inputs.tau_ext, inputs.g_axial];
@@ -173,7 +173,7 @@ impl Plant {
         state.x[x::THETA] = p.init.theta;
         state.x[x::OMEGA] = p.init.omega;
         state.x[x::WHEEL_SPEED] = p.wheel.speed_0;
-        let mut plant = Plant::of_parameters(p, state, tolerance);
+        let mut plant = Plant::with_state(p, state, tolerance);
         if let Some(problem) = plant.liquid.start_problem(&p.init) {
             return Err(vec![problem]);
         }
@@ -207,10 +207,10 @@ impl Plant {
     /// Creates a plant that continues from a saved state of one with the same parameters, which
     /// pass [`Plant::problems`].
     pub fn resume(p: &Parameters, state: &State, tolerance: f64) -> Plant {
-        Plant::of_parameters(p, *state, tolerance)
+        Plant::with_state(p, *state, tolerance)
     }
 
-    fn of_parameters(p: &Parameters, state: State, tolerance: f64) -> Plant {
+    fn with_state(p: &Parameters, state: State, tolerance: f64) -> Plant {
         let calculated = Calculated::new(p, state.start_g);
         let i_0 = calculated.m_0 * p.tank.r * p.tank.r + p.tank.own_inertia;
         let mut wave = [0.0; MODES];
@@ -302,7 +302,8 @@ impl Plant {
     pub fn step_to_event(&mut self, inputs: &Inputs, h: f64) -> Result<StepEnd, StepError> {
         let (before, stopped) = (self.state, self.stopped.take());
         let (mut length, mut passed, mut begun) = (h, -1.0, 0.0);
-        let goes_on = |step: &StoppedStep| step.goes_on(&before, inputs, h, self.resolution);
+        let goes_on =
+            |step: &StoppedStep| step.is_continued_by(&before, inputs, h, self.resolution);
         if let Some(step) = stopped.filter(goes_on) {
             self.state = step.start;
             (length, passed, begun) = (step.h, step.passed, step.passed);
@@ -351,16 +352,16 @@ impl Plant {
         let mut level = None;
         while t < h {
             // A piece of zero length takes no step of the integrator but counts as one.
-            steps.count(1, begin + t)?;
+            steps.add_steps(1, begin + t)?;
             let speed = state.x[x::WHEEL_SPEED];
             let command = wheel::command_after(inputs.tau_cmd, t, level);
             let piece = self.wheel.next(speed, command, h - t);
             let Piece { length, torque, speed, .. } = piece;
             level = piece.passed.or(level);
-            let external = inputs.tau_ext.after(t);
+            let external = inputs.tau_ext.shifted(t);
             let tau =
                 Ramp { value: torque.value + external.value, slope: torque.slope + external.slope };
-            let acting = (tau, inputs.g_axial.after(t));
+            let acting = (tau, inputs.g_axial.shifted(t));
             let stop = Stop { offset: t, passed };
             let flow = with_modes!(&mut self.liquid, modes => self.motion.advance(
                 modes, state, acting, length, (&self.imu, stop), &mut steps,
@@ -385,13 +386,13 @@ impl Plant {
             state.set_clock((begin, elapsed), h);
         }
         state.axial.accepted = None;
-        state.axial.g = inputs.g_axial.at(reached);
+        state.axial.g = inputs.g_axial.value_at(reached);
         if !state.axial.is_finite() {
             return Err(StepError::NotFinite { time: state.time });
         }
         // The end of a step matches an instant of the gyro only to rounding.
         while self.imu.enabled && reached >= h && self.takes_sample() {
-            steps.count(1, begin + h)?;
+            steps.add_steps(1, begin + h)?;
             stopped = Some(h).filter(|_| passed < f64::INFINITY);
         }
         Ok(stopped.map_or(ControlFlow::Continue(()), ControlFlow::Break))
@@ -458,7 +459,7 @@ impl Plant {
     /// Returns the ranges of the current motion.
     pub(crate) fn present_ranges(&mut self, inputs: &Inputs) -> Ranges {
         let outputs = self.outputs_held(inputs);
-        self.ranges_of(&outputs)
+        self.evaluate_ranges(&outputs)
     }
 
     /// Gives the hub the contact for the current inputs, and returns the previous one for

@@ -93,7 +93,7 @@ pub(crate) fn problems(p: &Parameters) -> Vec<String> {
     if !problems.is_empty() {
         return problems;
     }
-    let length = |n: usize| table.length_of(n);
+    let length = |n: usize| table.pendulum_length(n);
     for n in (0..modes).filter(|n| length(*n).is_nan() || length(*n) <= 0.0) {
         problems.push(format!(
             "slosh.table.frequency[{0}] = {1} Hz (allowed: above the frequency of slosh.table.k[{0}] = {2} N/m alone)",
@@ -148,7 +148,7 @@ impl ModeTable {
         }
         let (mut half, mut cross, mut sum) = (0.0, 0.0, 0.0);
         for (n, m) in self.mass[..modes].iter().enumerate() {
-            let [x, t] = self.along(n);
+            let [x, t] = self.direction_components(n);
             (half, cross, sum) = (half + m * (x * x - t * t) / 2.0, cross + m * x * t, sum + m);
         }
         sum / 2.0 + libm::hypot(half, cross)
@@ -158,7 +158,7 @@ impl ModeTable {
     /// mode the smallest J = m [r_x^2 + 2 r_x l s + (r_t^2 + l^2) s^2] over s from -1 to 1.
     fn least_inertia(&self, modes: usize, r: f64) -> f64 {
         let of_mode = |n: usize| {
-            let ([n_x, n_t], l) = (self.along(n), self.length_of(n));
+            let ([n_x, n_t], l) = (self.direction_components(n), self.pendulum_length(n));
             let (r_x, r_t) = (r * n_x, r * n_t);
             let s = (-r_x * l / (r_t * r_t + l * l)).clamp(-1.0, 1.0);
             let j = r_x * r_x + 2.0 * r_x * l * s + (r_t * r_t + l * l) * s * s;
@@ -357,7 +357,7 @@ impl Calculated {
                 }
                 SloshSource::Table => {
                     all.mass[n] = slosh.table.mass[n];
-                    all.length[n] = slosh.table.length_of(n);
+                    all.length[n] = slosh.table.pendulum_length(n);
                     all.centring[n] = slosh.table.k[n] * all.length[n] / all.mass[n];
                     upright = all.length[n];
                 }
@@ -372,7 +372,7 @@ impl Calculated {
                 (_, true) => {
                     let mode = |n: usize| {
                         let g = g + all.centring[n];
-                        damping::Mode::of_cylinder(n, radius, tank.h, g).laminar(1.0)
+                        damping::Mode::from_cylinder(n, radius, tank.h, g).laminar(1.0)
                     };
                     all.damping[0] * mode(n) / mode(0)
                 }
@@ -400,7 +400,7 @@ impl Calculated {
                 _ => 2.0 * radius / (XI[n] * XI[n] - 1.0),
             };
             let along = match slosh.source {
-                SloshSource::Table => slosh.table.along(n),
+                SloshSource::Table => slosh.table.direction_components(n),
                 SloshSource::Geometry => [0.0, 1.0],
             };
             let [r_x, r_t] = along.map(|component| r * component);

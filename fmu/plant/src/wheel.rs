@@ -27,7 +27,7 @@ pub(crate) struct Piece {
 /// Returns a command after `t`, when it has reached the level `passed`. Rounding may leave it before this level by an ulp,
 /// so that it would pass it again after no time, and again.
 pub(crate) fn command_after(command: Ramp, t: f64, passed: Option<f64>) -> Ramp {
-    let now = command.after(t);
+    let now = command.shifted(t);
     match passed {
         Some(level) if (level - now.value) / now.slope > 0.0 => Ramp { value: level, ..now },
         _ => now,

@@ -40,15 +40,15 @@ struct Wheels {
 }
 
 impl Wheels {
-    fn see_torque(&mut self, inputs: &Inputs) {
+    fn record_torque(&mut self, inputs: &Inputs) {
         for i in 0..3 {
             self.torque[i] |= inputs.torque.value[i] != 0.0;
         }
     }
 
     /// Records a step in which h_wheels changed from `before` to its present value.
-    fn see_step(&mut self, before: [f64; 3], inputs: &Inputs) {
-        self.see_torque(inputs);
+    fn record_step(&mut self, before: [f64; 3], inputs: &Inputs) {
+        self.record_torque(inputs);
         for i in 0..3 {
             if inputs.h_wheels.value[i] != before[i] && !self.torque[i] {
                 self.moved[i] = self.moved[i].saturating_add(1);
@@ -56,7 +56,7 @@ impl Wheels {
         }
     }
 
-    fn lack_reaction(&self) -> bool {
+    fn is_reaction_missing(&self) -> bool {
         (0..3).any(|i| self.moved[i] >= 2 && !self.torque[i])
     }
 }
@@ -221,7 +221,7 @@ impl Dynamics for Model {
     }
 
     fn derivatives(&mut self, inputs: &Inputs, x_dot: &mut [f64]) {
-        self.wheels.see_torque(inputs);
+        self.wheels.record_torque(inputs);
         x_dot.copy_from_slice(&self.craft.derivatives(inputs));
     }
 
@@ -257,7 +257,7 @@ impl Dynamics for Model {
     }
 
     fn accept_step(&mut self, inputs: &Inputs) -> Result<bool, String> {
-        self.wheels.see_step(self.craft.state().h_wheels(), inputs);
+        self.wheels.record_step(self.craft.state().h_wheels(), inputs);
         self.craft.follow_inputs(inputs);
         self.craft.check_liquids().map_err(|why| why.to_string())?;
         let ranges = self.craft.ranges(inputs);
@@ -271,13 +271,13 @@ impl Dynamics for Model {
     }
 
     fn step_warning(&self) -> Option<&'static str> {
-        if self.has_left_range && !self.wheels.lack_reaction() {
+        if self.has_left_range && !self.wheels.is_reaction_missing() {
             return Some(OUT_OF_RANGE);
         }
-        if self.has_had_lump && !self.wheels.lack_reaction() {
+        if self.has_had_lump && !self.wheels.is_reaction_missing() {
             return Some(LUMP);
         }
-        self.wheels.lack_reaction().then_some(
+        self.wheels.is_reaction_missing().then_some(
             "h_wheels changes on an axis on which torque has always been 0. In Model Exchange the FMU does not know the \
              slope of an input, and without the wheels' reaction momentum and angular_momentum are wrong: add \
              -d(h_wheels)/dt to torque",

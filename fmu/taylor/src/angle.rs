@@ -78,7 +78,7 @@ mod tests {
         for (n, x) in series.iter_mut().enumerate() {
             *x = angle.expand(n, u.get(n).copied().unwrap_or(0.0));
         }
-        let slope = squared(Dual::of(u[0], u[1])).result();
+        let slope = squared(Dual::with_slope(u[0], u[1])).result();
         assert!((series[0] - squared(u[0])).abs() < 1e-16);
         assert!((series[1] - slope).abs() < 1e-15);
         let sum = series.iter().rev().fold(0.0, |sum, x| sum * 0.5 + x);

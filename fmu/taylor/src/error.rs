@@ -61,7 +61,7 @@ impl core::error::Error for StepError {}
 
 impl StepError {
     /// Returns the same error with its time shifted by `begin`.
-    pub fn after(mut self, begin: f64) -> StepError {
+    pub fn delayed(mut self, begin: f64) -> StepError {
         if let StepError::NotFinite { time } | StepError::TooManySteps { time, .. } = &mut self {
             *time += begin;
         }
@@ -81,9 +81,12 @@ mod tests {
             assert!(parts.iter().all(|part| text.contains(part)), "{text}");
         };
         says(StepError::Length { h: -1.5 }, &["-1.5 s", "above 0"]);
-        says(StepError::NotFinite { time: 2.5 }.after(1.0), &["t = 3.5 s", "inputs"]);
+        says(StepError::NotFinite { time: 2.5 }.delayed(1.0), &["t = 3.5 s", "inputs"]);
         let many = StepError::TooManySteps { time: 0.5, max_steps: 7, advice: ", or rest" };
-        says(many.after(1.0), &["t = 1.5 s", "solver.max_steps = 7", "solver.max_steps, or rest"]);
-        says(StepError::Model("the tank is empty".into()).after(1.0), &["the tank is empty"]);
+        says(
+            many.delayed(1.0),
+            &["t = 1.5 s", "solver.max_steps = 7", "solver.max_steps, or rest"],
+        );
+        says(StepError::Model("the tank is empty".into()).delayed(1.0), &["the tank is empty"]);
     }
 }

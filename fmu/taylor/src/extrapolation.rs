@@ -166,7 +166,7 @@ pub fn advance<const D: usize>(
             .error_scale(t, x, &first, end - t)
             .map(|scale| f64::max(STEP_SHARE * tolerance * scale, ROUNDING * f64::max(scale, 1.0)));
         loop {
-            pace.steps.count(1, t)?;
+            pace.steps.add_steps(1, t)?;
             let is_last = t + pace.h >= end;
             let h = if is_last { end - t } else { pace.h };
             let Trial { end: moved, best } = extrapolate(system, x, &first, (t, h), &allowed);

@@ -60,7 +60,7 @@ impl Steps {
     /// # Errors
     /// If the limit is exceeded.
     #[inline(always)]
-    pub fn count(&mut self, number: usize, time: f64) -> Result<(), StepError> {
+    pub fn add_steps(&mut self, number: usize, time: f64) -> Result<(), StepError> {
         self.taken += number;
         if self.taken > self.max { Err(self.too_many(time)) } else { Ok(()) }
     }
@@ -265,13 +265,13 @@ pub fn advance<M: Motion>(
 ) -> Result<ControlFlow<f64>, StepError> {
     let mut t = 0.0;
     while t < h {
-        steps.count(1, begin + t)?;
+        steps.add_steps(1, begin + t)?;
         motion.start(t);
         let left = h - t;
         let (n, mut length) = expand(motion, left, tolerance);
         while motion.defect(n, length) > DEFECT {
             length /= 2.0;
-            steps.count(1, begin + t)?;
+            steps.add_steps(1, begin + t)?;
         }
         // An event may be due immediately.
         let (length, moves) = match motion.event(n, length) {
@@ -567,10 +567,10 @@ mod tests {
         // Three steps of about 2 s.
         assert!(time > 9.0 && time < 20.0, "{time}");
         let mut steps = Steps::new(5, "");
-        steps.count(3, 0.0).unwrap();
+        steps.add_steps(3, 0.0).unwrap();
         assert_eq!(steps.left(), 2);
-        steps.count(2, 0.0).unwrap();
-        assert!(steps.count(1, 0.0).is_err());
+        steps.add_steps(2, 0.0).unwrap();
+        assert!(steps.add_steps(1, 0.0).is_err());
     }
 
     #[test]

@@ -17,7 +17,7 @@ pub trait Number:
     /// Returns a constant, whose derivative is 0.
     fn constant(value: f64) -> Self;
     /// Returns a quantity from coefficients 0 and 1 of its series.
-    fn of(value: f64, slope: f64) -> Self;
+    fn with_slope(value: f64, slope: f64) -> Self;
     /// Returns the value of a plain number, or the derivative of a dual number.
     fn result(self) -> f64;
     /// Returns the value, also of a dual number.
@@ -26,7 +26,7 @@ pub trait Number:
     /// compiler makes a choice of two quotients, and divides by a zero that was not chosen.
     fn at_least(self, floor: f64) -> Self {
         let slope = if self.value() < floor { 0.0 } else { self.result() };
-        Self::of(f64::max(self.value(), floor), slope)
+        Self::with_slope(f64::max(self.value(), floor), slope)
     }
     /// Returns itself over a divisor that is not negative, and 0 where the divisor is 0. The divisor is a maximum, not a
     /// choice: a compiler that computes both sides of a choice would divide by 0.
@@ -59,7 +59,7 @@ impl Number for f64 {
         value
     }
 
-    fn of(value: f64, _: f64) -> f64 {
+    fn with_slope(value: f64, _: f64) -> f64 {
         value
     }
 
@@ -162,7 +162,7 @@ impl Number for Dual {
         Dual { value, slope: 0.0 }
     }
 
-    fn of(value: f64, slope: f64) -> Dual {
+    fn with_slope(value: f64, slope: f64) -> Dual {
         Dual { value, slope }
     }
 
@@ -242,7 +242,7 @@ mod tests {
     fn a_dual_number_has_the_value_and_the_derivative_of_the_formula() {
         let (x, slope, h) = (0.8, 1.5, 1e-5);
         let at = |s: f64| formulas(x + slope * s);
-        for (i, dual) in formulas(Dual::of(x, slope)).iter().enumerate() {
+        for (i, dual) in formulas(Dual::with_slope(x, slope)).iter().enumerate() {
             assert_eq!(dual.value(), at(0.0)[i], "{i}");
             let expected = (at(h)[i] - at(-h)[i]) / (2.0 * h);
             // h^2 times the third derivative, and rounding over h.
@@ -252,17 +252,20 @@ mod tests {
 
     #[test]
     fn where_there_is_no_derivative_it_is_0() {
-        let zero = Dual::of(0.0, 1.0);
+        let zero = Dual::with_slope(0.0, 1.0);
         assert_eq!(zero.sqrt().result(), 0.0);
         assert_eq!(zero.hypot(zero).result(), 0.0);
         for end in [-1.0, 1.0, 1.0 + 1e-15] {
-            assert_eq!(Dual::of(end, 1.0).asin().result(), 0.0);
+            assert_eq!(Dual::with_slope(end, 1.0).asin().result(), 0.0);
             assert_eq!(
-                Dual::of(end, 1.0).asin().value(),
+                Dual::with_slope(end, 1.0).asin().value(),
                 end.signum() * core::f64::consts::FRAC_PI_2
             );
         }
-        let bounded = [Dual::of(0.05, 1.0).at_least(0.1), Dual::of(10.0, 1.0).clamp(-9.0, 9.0)];
+        let bounded = [
+            Dual::with_slope(0.05, 1.0).at_least(0.1),
+            Dual::with_slope(10.0, 1.0).clamp(-9.0, 9.0),
+        ];
         assert_eq!(bounded.map(|x| (x.value(), x.result())), [(0.1, 0.0), (9.0, 0.0)]);
         assert_eq!(Number::at_least(0.05, 0.1), 0.1);
         assert_eq!(Number::asin(-2.0f64), -core::f64::consts::FRAC_PI_2);
@@ -271,7 +274,7 @@ mod tests {
     #[test]
     fn of_a_plain_number_the_result_is_the_value() {
         assert_eq!(
-            (f64::of(2.0, 5.0), f64::constant(3.0), 4.0.result(), 4.0.value()),
+            (f64::with_slope(2.0, 5.0), f64::constant(3.0), 4.0.result(), 4.0.value()),
             (2.0, 3.0, 4.0, 4.0)
         );
         let dual = Dual::constant(3.0);

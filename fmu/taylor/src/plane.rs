@@ -22,7 +22,7 @@ pub const ZERO_VECTOR2: Vector2 = Vector2([[0.0; 2]; ORDER + 1]);
 
 /// Returns both components, like [`series::number`].
 pub fn numbers<T: Number>(a: &Vector2) -> [T; 2] {
-    [0, 1].map(|i| T::of(a[0][i], a[1][i]))
+    [0, 1].map(|i| T::with_slope(a[0][i], a[1][i]))
 }
 
 impl core::ops::Index<usize> for Vector2 {
@@ -77,7 +77,7 @@ pub fn mul_part_head(n: usize, a: &Series, b: &Vector2, i: usize) -> f64 {
 
 /// Returns coefficient n of (a_1 b_1, a_2 b_2).
 #[inline(always)]
-pub fn each(n: usize, a: &Vector2, b: &Vector2) -> [f64; 2] {
+pub fn component_products(n: usize, a: &Vector2, b: &Vector2) -> [f64; 2] {
     let (a, b) = (&a.0[..=n], &b.0[..=n]);
     sum_both(n, |j| [a[j][0] * b[n - j][0], a[j][1] * b[n - j][1]])
 }
@@ -96,7 +96,7 @@ pub fn squares(n: usize, a: &Vector2) -> [f64; 2] {
 /// Returns coefficient n of a.b.
 #[inline(always)]
 pub fn dot(n: usize, a: &Vector2, b: &Vector2) -> f64 {
-    let [x, y] = each(n, a, b);
+    let [x, y] = component_products(n, a, b);
     x + y
 }
 
@@ -140,7 +140,7 @@ mod tests {
                 assert_eq!(mul_part(n, &s, &a, i), scaled);
                 assert_eq!(scale_head(n, &s, &a)[i] + s[n] * a[0][i], scaled);
                 assert_eq!(mul_part_head(n, &s, &a, i) + s[n] * a[0][i], scaled);
-                assert_eq!(each(n, &a, &b)[i], plain(n, &|j, k| a[j][i] * b[k][i]));
+                assert_eq!(component_products(n, &a, &b)[i], plain(n, &|j, k| a[j][i] * b[k][i]));
                 assert_eq!(squares(n, &a)[i], plain(n, &|j, k| a[j][i] * a[k][i]));
             }
             assert_eq!(dot(n, &a, &b), plain(n, &|j, k| a[j][0] * b[k][0] + a[j][1] * b[k][1]));

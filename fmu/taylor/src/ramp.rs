@@ -19,7 +19,7 @@ impl Ramp {
 
     /// Returns the value after `t` seconds.
     #[inline(always)]
-    pub fn at(self, t: f64) -> f64 {
+    pub fn value_at(self, t: f64) -> f64 {
         self.value + self.slope * t
     }
 
@@ -29,8 +29,8 @@ impl Ramp {
     }
 
     /// Returns the same quantity with the origin of time shifted by `t`.
-    pub fn after(self, t: f64) -> Ramp {
-        Ramp { value: self.at(t), slope: self.slope }
+    pub fn shifted(self, t: f64) -> Ramp {
+        Ramp { value: self.value_at(t), slope: self.slope }
     }
 }
 
@@ -42,7 +42,7 @@ impl Ramp<Vec3> {
 
     /// Returns the value after `t` seconds.
     #[inline(always)]
-    pub fn at(&self, t: f64) -> Vec3 {
+    pub fn value_at(&self, t: f64) -> Vec3 {
         [0, 1, 2].map(|i| self.value[i] + self.slope[i] * t)
     }
 }
@@ -54,11 +54,11 @@ mod tests {
     #[test]
     fn a_ramp_is_linear_in_time() {
         let ramp = Ramp { value: 2.0, slope: 3.0 };
-        assert_eq!((ramp.at(2.0), ramp.integral(2.0)), (8.0, 10.0));
-        assert_eq!(ramp.after(2.0), Ramp { value: 8.0, slope: 3.0 });
+        assert_eq!((ramp.value_at(2.0), ramp.integral(2.0)), (8.0, 10.0));
+        assert_eq!(ramp.shifted(2.0), Ramp { value: 8.0, slope: 3.0 });
         assert_eq!(Ramp::<f64>::held(2.0), Ramp { value: 2.0, slope: 0.0 });
         let ramp = Ramp { value: [1.0, 2.0, 3.0], slope: [1.0, 0.0, -1.0] };
-        assert_eq!(ramp.at(2.0), [3.0, 2.0, 1.0]);
+        assert_eq!(ramp.value_at(2.0), [3.0, 2.0, 1.0]);
         assert_eq!(Ramp::<Vec3>::held([1.0; 3]), Ramp { value: [1.0; 3], slope: [0.0; 3] });
     }
 }

@@ -22,7 +22,7 @@ pub const ZERO: Series = [0.0; ORDER + 1];
 /// Returns the quantity at the start of an expansion. A number with a derivative takes coefficient 1 as the derivative
 /// along the direction.
 pub fn number<T: Number>(a: &Series) -> T {
-    T::of(a[0], a[1])
+    T::with_slope(a[0], a[1])
 }
 
 /// 1/n

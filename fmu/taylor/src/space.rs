@@ -104,7 +104,7 @@ pub fn products<const N: usize>(a: &Vector) -> [f64; 6] {
 }
 
 /// Returns the same as [`products`], as a loop over any order n.
-pub fn products_of(n: usize, a: &Vector) -> [f64; 6] {
+pub fn product_coefficients(n: usize, a: &Vector) -> [f64; 6] {
     let mut sum = [EMPTY; 6];
     for (a, b) in a[..=n].iter().zip(a[..=n].iter().rev()) {
         let terms = [a[0] * b[0], a[1] * b[1], a[2] * b[2], a[0] * b[1], a[0] * b[2], a[1] * b[2]];
@@ -181,7 +181,7 @@ pub fn cross_pair<const N: usize>(a: &Pair, b: &Pair) -> [[f64; 2]; 3] {
 }
 
 /// Returns the same as [`cross_pair`], as a loop over any order n.
-pub fn cross_pair_of(n: usize, a: &Pair, b: &Pair) -> [[f64; 2]; 3] {
+pub fn cross_pair_coefficient(n: usize, a: &Pair, b: &Pair) -> [[f64; 2]; 3] {
     let mut sum = [[EMPTY; 2]; 3];
     for ([ax, ay, az], [bx, by, bz]) in a.0[..=n].iter().zip(b.0[..=n].iter().rev()) {
         for k in 0..2 {
@@ -194,13 +194,13 @@ pub fn cross_pair_of(n: usize, a: &Pair, b: &Pair) -> [[f64; 2]; 3] {
 }
 
 /// Returns the same as [`cross`], as a loop over any order n.
-pub fn cross_of(n: usize, a: &Vector, b: &Vector) -> Vec3 {
+pub fn cross_coefficient(n: usize, a: &Vector, b: &Vector) -> Vec3 {
     let terms = a[..=n].iter().zip(b[..=n].iter().rev());
     terms.fold([EMPTY; 3], |sum, (a, b)| vector::add(sum, vector::cross(*a, *b)))
 }
 
 /// Returns the same as [`square_vector`], as a loop over any order n.
-pub fn square_of(n: usize, a: &Vector) -> f64 {
+pub fn square_coefficient(n: usize, a: &Vector) -> f64 {
     let terms = a[..=n].iter().zip(a[..=n].iter().rev());
     terms.fold(EMPTY, |sum, (a, b)| sum + vector::dot(*a, *b))
 }

@@ -183,7 +183,7 @@ mod tests {
     #[test]
     fn slopes_are_the_derivatives_of_what_they_belong_to() {
         let (q, dq) = ([0.9, -0.1, 0.5, 0.3], [0.2, 0.7, -0.4, 0.1]);
-        let dual = |x: f64, dx: f64| Dual::of(x, dx);
+        let dual = |x: f64, dx: f64| Dual::with_slope(x, dx);
         let exact = unit_quaternion([0, 1, 2, 3].map(|i| dual(q[i], dq[i])));
         let slope = unit_quaternion_slope(&unit_quaternion(q), &q, &dq);
         for i in 0..4 {

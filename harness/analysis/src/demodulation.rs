@@ -74,7 +74,7 @@ pub fn frequency_responses<const N: usize>(
     let mut results: [FrequencyResponse; N] = std::array::from_fn(|_| Default::default());
     let mut noise_gain = Vec::new();
     for &frequency in frequencies {
-        let Some(centre) = sweep.time_of(frequency) else { continue };
+        let Some(centre) = sweep.time_at_frequency(frequency) else { continue };
         let half = cycles(sweep, frequency) / frequency / 2.0;
         let from = time.partition_point(|&t| t < centre - half);
         let to = time.partition_point(|&t| t <= centre + half);

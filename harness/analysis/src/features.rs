@@ -45,7 +45,7 @@ impl Features {
         let first = f.partition_point(|f| !near(*f));
         let end = f.partition_point(|f| self.f_res.is_none_or(|top| *f < top + margin)).max(first);
         let (f, h, relative) = match relative.get(first..end) {
-            Some(relative) if self.any() => {
+            Some(relative) if self.has_any() => {
                 (&f[first..end], &response.response[first..end], relative)
             }
             _ => return Deviations::default(),
@@ -71,7 +71,7 @@ impl Features {
                 h + relative * h.norm() * error
             });
             let drawn = FrequencyResponse { response: drawn.collect(), frequency: f.to_vec() };
-            let found = Features::of(&drawn);
+            let found = Features::find(&drawn);
             let pairs = [(found.f_res, self.f_res), (found.f_dip, self.f_dip)];
             for (shifts, (new, old)) in shifts.iter_mut().zip(pairs) {
                 shifts.extend(new.zip(old).map(|(new, old)| (new - old).abs()));
@@ -93,12 +93,12 @@ impl Features {
     /// 1.25 Hz, where the hub's inertia dominates. The ripple behind the resonance may also be lower than the
     /// antiresonance. An end of the band is neither antiresonance nor resonance, and a rise of less than [`LEAST`] is
     /// not slosh.
-    pub fn of(response: &FrequencyResponse) -> Self {
-        Features::within(response, (f64::NEG_INFINITY, f64::INFINITY))
+    pub fn find(response: &FrequencyResponse) -> Self {
+        Features::find_within(response, (f64::NEG_INFINITY, f64::INFINITY))
     }
 
-    /// Finds the features between two frequencies, Hz; otherwise as [`Features::of`].
-    pub fn within(response: &FrequencyResponse, (from, to): (f64, f64)) -> Self {
+    /// Finds the features between two frequencies, Hz; otherwise as [`Features::find`].
+    pub fn find_within(response: &FrequencyResponse, (from, to): (f64, f64)) -> Self {
         let level = response.decibels();
         let first = response.frequency.partition_point(|f| *f < from);
         let end = response.frequency.partition_point(|f| *f <= to).max(first);
@@ -116,7 +116,7 @@ impl Features {
         }
     }
 
-    pub fn any(&self) -> bool {
+    pub fn has_any(&self) -> bool {
         self.f_dip.is_some() || self.f_res.is_some()
     }
 
@@ -173,7 +173,7 @@ mod tests {
             (Linear::bench_10_cm(0.0029757), 2.3431981, 2.4566022, 46.40),
             (Linear::bench_5_cm(0.0035842), 2.1329468, 2.2306922, 42.25),
         ] {
-            let features = Features::of(&plant.frequency_response(&logarithmic_grid(BAND, 2000)));
+            let features = Features::find(&plant.frequency_response(&logarithmic_grid(BAND, 2000)));
             assert!((features.f_dip.unwrap() - f_dip).abs() < 2e-5, "{features:?}");
             assert!((features.f_res.unwrap() - f_res).abs() < 2e-5, "{features:?}");
             assert!((features.notch_db.unwrap() - notch).abs() < 0.02, "{features:?}");
@@ -184,7 +184,7 @@ mod tests {
     fn a_ripple_behind_the_peak_that_goes_deeper_than_the_dip_is_no_dip() {
         let mut response =
             Linear::bench_10_cm(0.0029757).frequency_response(&logarithmic_grid(BAND, 2000));
-        let clean = Features::of(&response);
+        let clean = Features::find(&response);
         for (f, h) in response.frequency.iter().zip(&mut response.response) {
             // a trough of a beat 60 mHz above the resonance, 5 dB lower than the antiresonance
             *h *= 1.0 - 0.994 * (-((f - 2.52) / 0.004_f64).powi(2)).exp();
@@ -192,17 +192,17 @@ mod tests {
         let level = response.decibels();
         let deepest = (0..level.len()).min_by(|&a, &b| level[a].total_cmp(&level[b])).unwrap();
         assert!(response.frequency[deepest] > clean.f_res.unwrap());
-        assert_eq!(Features::of(&response), clean);
+        assert_eq!(Features::find(&response), clean);
     }
 
     #[test]
     fn a_band_without_rise_or_that_ends_too_early_has_no_features() {
         let hub = Linear { inertia: 0.4, friction: 0.04, arm: 0.2, ..Linear::default() };
         let grid = logarithmic_grid(BAND, 2000);
-        assert_eq!(Features::of(&hub.frequency_response(&grid)), Features::default());
+        assert_eq!(Features::find(&hub.frequency_response(&grid)), Features::default());
         // the band up to 2.4 Hz has the antiresonance but not the resonance
         let early = logarithmic_grid((1.25, 2.4), 2000);
-        let features = Features::of(&Linear::bench_10_cm(0.003).frequency_response(&early));
+        let features = Features::find(&Linear::bench_10_cm(0.003).frequency_response(&early));
         assert!(features.f_dip.is_some() && features.f_res.is_none(), "{features:?}");
         assert_eq!((features.notch_db, features.delta_f()), (None, None));
     }
@@ -211,7 +211,7 @@ mod tests {
     fn a_damped_resonance_is_found_though_the_band_edge_is_higher() {
         let plant = Linear::bench_10_cm(0.05);
         let response = plant.frequency_response(&logarithmic_grid(BAND, 2000));
-        let features = Features::of(&response);
+        let features = Features::find(&response);
         let resonance = features.f_res.unwrap();
         assert!(response.response[0].norm() > plant.response(resonance).norm());
         assert!((resonance - 2.5308065).abs() < 1e-4, "{features:?}");

@@ -104,8 +104,8 @@ fn model(time: &[f64], common: &[f64], own: &[f64], size: f64) -> Vec<f64> {
 impl FreeDecay {
     /// Fits all records of one oscillation. Returns `None` without records, or if a record has fewer than
     /// [`LEAST_PERIODS`] periods.
-    pub fn of(records: &[Record]) -> Option<FreeDecay> {
-        let starts: Vec<Start> = records.iter().map(Start::of).collect::<Option<_>>()?;
+    pub fn fit(records: &[Record]) -> Option<FreeDecay> {
+        let starts: Vec<Start> = records.iter().map(Start::fit).collect::<Option<_>>()?;
         let size = starts.iter().map(|start| start.amplitude).fold(0.0, f64::max);
         let mean_of = |get: &dyn Fn(&Start) -> f64| {
             let weight: f64 = starts.iter().map(|start| start.periods).sum();
@@ -274,7 +274,7 @@ const FINE: usize = 4;
 const LEAST_PART: f64 = 0.02;
 
 impl Start {
-    fn of(record: &Record) -> Option<Start> {
+    fn fit(record: &Record) -> Option<Start> {
         let Record { time, signal } = *record;
         let n = time.len();
         let seconds = time[n - 1] - time[0];
@@ -374,7 +374,7 @@ fn largest_line(time: &[f64], weighted: &[f64], low: f64, top: f64) -> Option<f6
     for (t, y) in time.iter().zip(weighted) {
         padded[((t - time[0]) / step).round() as usize] += y;
     }
-    let spectrum = signals::fourier::Forward::new(length).of(padded);
+    let spectrum = signals::fourier::Forward::new(length).transform(padded);
     let frequency = |k: usize| k as f64 / (length as f64 * step);
     let inside = (0..spectrum.len()).filter(|k| (low..=top).contains(&frequency(*k)));
     let best = inside.max_by(|a, b| spectrum[*a].norm_sqr().total_cmp(&spectrum[*b].norm_sqr()))?;
@@ -429,7 +429,7 @@ mod tests {
         // κ = 3 α/8. Both hold to first order in the amplitude squared: 0.2² α q below 1 %
         let (q, alpha) = (0.02, -0.05);
         let (time, signal) = oscillator(0.004, q, alpha, 0.3, 60.0);
-        let found = FreeDecay::of(&[Record { time: &time, signal: &signal }]).unwrap();
+        let found = FreeDecay::fit(&[Record { time: &time, signal: &signal }]).unwrap();
         let expected = 4.0 * q / (3.0 * std::f64::consts::PI);
         assert!((found.frequency.value / 2.3 - 1.0).abs() < 2e-5, "{found:?}");
         assert!((found.zeta.value / 0.004 - 1.0).abs() < 0.01, "{found:?}");
@@ -456,7 +456,7 @@ mod tests {
                         x + noise
                     })
                     .collect();
-                let found = FreeDecay::of(&[Record { time: &time, signal: &signal }]).unwrap();
+                let found = FreeDecay::fit(&[Record { time: &time, signal: &signal }]).unwrap();
                 let truth =
                     [(found.frequency, 1.7), (found.zeta, 0.006), (found.zeta_amplitude, 0.01)];
                 for (count, (value, truth)) in held.iter_mut().zip(truth) {
@@ -477,7 +477,7 @@ mod tests {
         }
         let clean = model(&time, &[1.7, 0.002, 0.0, 0.0], &[0.0, 0.4, 0.0, 0.0], 1.0);
         let signal: Vec<f64> = clean.iter().map(|x| x + 0.02 * random.normal()).collect();
-        let found = FreeDecay::of(&[Record { time: &time, signal: &signal }]).unwrap();
+        let found = FreeDecay::fit(&[Record { time: &time, signal: &signal }]).unwrap();
         let (frequency, zeta) = (found.frequency, found.zeta);
         assert!((frequency.value - 1.7).abs() < 4.0 * frequency.std, "{frequency:?}");
         assert!((zeta.value - 0.002).abs() < 4.0 * zeta.std && zeta.std < 1e-4, "{zeta:?}");
@@ -487,7 +487,7 @@ mod tests {
     fn four_periods_are_too_few_and_a_constant_is_no_oscillation() {
         let time: Vec<f64> = (0..200).map(|k| 0.02 * f64::from(k)).collect();
         let signal: Vec<f64> = time.iter().map(|t| (TAU * t).cos()).collect();
-        assert!(FreeDecay::of(&[Record { time: &time, signal: &signal }]).is_none());
-        assert!(FreeDecay::of(&[Record { time: &time, signal: &[1.0; 200] }]).is_none());
+        assert!(FreeDecay::fit(&[Record { time: &time, signal: &signal }]).is_none());
+        assert!(FreeDecay::fit(&[Record { time: &time, signal: &[1.0; 200] }]).is_none());
     }
 }

@@ -74,7 +74,7 @@ impl Noise {
     }
 
     /// Estimates the noise from a residual (rad/s) at these times by maximum likelihood.
-    pub fn of(time: &[f64], residual: &[f64], fresh: Option<&[bool]>) -> Self {
+    pub fn fit(time: &[f64], residual: &[f64], fresh: Option<&[bool]>) -> Self {
         let new = |fresh: &[bool]| fresh.iter().filter(|new| **new).count();
         let count = fresh.map_or(residual.len(), new) as f64;
         // σ_w follows from the other parameters; the search minimises −2 ln L.
@@ -147,7 +147,7 @@ mod tests {
                 y
             })
             .collect();
-        let found = Noise::of(&time, &residual, None);
+        let found = Noise::fit(&time, &residual, None);
         // 1/sqrt(2 N) = 0.2 %; the drift has 27 correlation times: 20 %, four of them
         assert!((found.white / white - 1.0).abs() < 0.01, "{found:?}");
         assert!((found.drift * found.white / drift).ln().abs() < 0.8, "{found:?}");

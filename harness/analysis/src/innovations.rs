@@ -61,7 +61,7 @@ impl Tests {
 
     /// Tests innovations `e` at `time` (s) under `inputs`, such as a torque; `white` is the standard deviation of the noise in the
     /// unit of the signal.
-    pub fn of(time: &[f64], inputs: &[&[f64]], e: &[f64], white: f64) -> Self {
+    pub fn run(time: &[f64], inputs: &[&[f64]], e: &[f64], white: f64) -> Self {
         let count = e.len() as f64;
         let middle = mean(e);
         let e: Vec<f64> = e.iter().map(|v| v - middle).collect();
@@ -129,7 +129,7 @@ fn worst(levels: &[(f64, f64)], n: f64) -> (f64, f64) {
 /// Returns the mean periodogram in bands from 0 to half the sampling frequency, the bands' width
 /// (Hz), and the number of lines in each.
 fn periodogram(e: &[f64], step: f64) -> (Vec<f64>, f64, f64) {
-    let spectrum = Forward::new(e.len()).of(e.to_vec());
+    let spectrum = Forward::new(e.len()).transform(e.to_vec());
     let bands = BANDS.min((spectrum.len() - 1) / FEWEST_LINES).max(1);
     let lines = (spectrum.len() - 1) / bands;
     let power = |k: usize| spectrum[k].norm_sqr() / e.len() as f64;
@@ -171,7 +171,7 @@ mod tests {
             let time: Vec<f64> = (0..rows).map(|k| 0.05 * f64::from(k)).collect();
             for _ in 0..100 {
                 let white: Vec<f64> = time.iter().map(|_| random.normal()).collect();
-                let tests = Tests::of(&time, &[], &white, 1.0);
+                let tests = Tests::run(&time, &[], &white, 1.0);
                 assert!(tests.passed(), "{rows}: {tests:?}");
             }
         }
@@ -183,16 +183,16 @@ mod tests {
         let time: Vec<f64> = (0..50_000).map(|k| 0.02 * f64::from(k)).collect();
         let torque: Vec<f64> = time.iter().map(|t| 0.1 * (t * (8.0 + 0.005 * t)).sin()).collect();
         let white: Vec<f64> = time.iter().map(|_| random.normal()).collect();
-        let tests = Tests::of(&time, &[&torque], &white, 1.0);
+        let tests = Tests::run(&time, &[&torque], &white, 1.0);
         assert!(tests.passed(), "{tests:?}");
         // a tenth of the noise, only in the band of the torque
         let leaking: Vec<f64> = white.iter().zip(&torque).map(|(e, t)| e + t).collect();
-        let tests = Tests::of(&time, &[&torque], &leaking, 1.0);
+        let tests = Tests::run(&time, &[&torque], &leaking, 1.0);
         assert!(tests.torque > 10.0 && !tests.passed(), "{tests:?}");
         // a burst of 20 s
         let mut burst = white.clone();
         burst[20_000..21_000].iter_mut().for_each(|e| *e *= 1.5);
-        let tests = Tests::of(&time, &[&torque], &burst, 1.0);
+        let tests = Tests::run(&time, &[&torque], &burst, 1.0);
         assert!(tests.in_time.0 > LIMIT && (tests.in_time.1 - 400.0).abs() < 1.0, "{tests:?}");
     }
 }

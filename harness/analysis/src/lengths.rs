@@ -29,7 +29,7 @@ pub struct Lengths {
 impl Lengths {
     /// Returns the lengths for a record of `duration` s, sampled every `step` s. `band` (Hz) contains the
     /// power of the torque, and `sweep` is the torque if it is a sweep.
-    pub fn of(band: (f64, f64), sweep: Option<&Sweep>, duration: f64, step: f64) -> Self {
+    pub fn for_record(band: (f64, f64), sweep: Option<&Sweep>, duration: f64, step: f64) -> Self {
         let middle = |(from, to): (f64, f64)| (from * to).sqrt();
         let slower = middle(BAND) / middle(band);
         let rate = sweep.map(|sweep| (sweep.f1 - sweep.f0).abs() / sweep.duration);
@@ -51,7 +51,7 @@ mod tests {
     fn the_thesis_has_its_own_lengths() {
         for law in [Law::Exponential, Law::Linear] {
             let sweep = Sweep { law, ..Sweep::THESIS };
-            let lengths = Lengths::of(sweep.band(), Some(&sweep), 2700.0, 0.02);
+            let lengths = Lengths::for_record(sweep.band(), Some(&sweep), 2700.0, 0.02);
             let expected = Lengths { lag: 200.0, segment: 20.0, decimation: 1 };
             assert_eq!(lengths.lag, expected.lag);
             assert!((lengths.segment - 20.0).abs() < 1e-12 && lengths.decimation == 1);
@@ -62,12 +62,12 @@ mod tests {
     #[test]
     fn a_slow_spacecraft_has_longer_ones_and_a_fast_sweep_fewer_cycles() {
         let slow = Sweep { f0: 0.01, f1: 0.3, duration: 40_000.0, ..Sweep::THESIS };
-        let lengths = Lengths::of(slow.band(), Some(&slow), 40_000.0, 0.1);
+        let lengths = Lengths::for_record(slow.band(), Some(&slow), 40_000.0, 0.1);
         // 200 s times sqrt(1.25 3.5)/sqrt(0.01 0.3); 10 Hz over 0.3 Hz is 33 samples a cycle
         assert!((lengths.lag - 7637.6).abs() < 0.1, "{lengths:?}");
         assert_eq!(lengths.decimation, 2);
         let fast = Sweep { duration: 2700.0, ..slow };
-        assert_eq!(Lengths::of(fast.band(), Some(&fast), 2700.0, 0.1).lag, 1350.0);
+        assert_eq!(Lengths::for_record(fast.band(), Some(&fast), 2700.0, 0.1).lag, 1350.0);
         assert_eq!(cycles(&fast, 0.045), 3.0);
     }
 }

@@ -276,7 +276,7 @@ mod tests {
                 demodulation::frequency_responses(&sweep, &time, &tau, [&omega], &grid).responses;
             assert_eq!(lock_in.frequency.len(), grid.len());
             let spa = spa::frequency_response(0.02, &tau, &omega, &grid, spa::LAG);
-            let (lock_in, spa) = (Features::of(&lock_in), Features::of(&spa));
+            let (lock_in, spa) = (Features::find(&lock_in), Features::find(&spa));
             // the whole-record estimate does not depend on direction: the bounds of the upward
             // sweep
             assert!((spa.f_dip.unwrap() - f_dip).abs() < 3e-4, "{law:?}: {spa:?}");
@@ -305,7 +305,7 @@ mod tests {
                     demodulation::frequency_responses(&sweep, &time, &tau, [&omega], &grid)
                         .responses;
                 let spa = spa::frequency_response(0.02, &tau, &omega, &grid, spa::LAG);
-                let (lock_in, spa) = (Features::of(&lock_in), Features::of(&spa));
+                let (lock_in, spa) = (Features::find(&lock_in), Features::find(&spa));
                 // the acceptance limit for the antiresonance is 2 mHz; both are several times
                 // better
                 assert!((lock_in.f_dip.unwrap() - f_dip).abs() < 3e-4, "{law:?}: {lock_in:?}");

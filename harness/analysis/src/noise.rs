@@ -32,7 +32,10 @@ pub fn power(step: f64, input: &[f64], output: &[f64], frequencies: &[f64]) -> V
     // N steps have N + 1 samples. N is usually a round number, whose transform is twice as fast.
     let count = input.len() / 2 * 2;
     let transform = Forward::new(count);
-    let (u, y) = (transform.of(input[..count].to_vec()), transform.of(output[..count].to_vec()));
+    let (u, y) = (
+        transform.transform(input[..count].to_vec()),
+        transform.transform(output[..count].to_vec()),
+    );
     let mut last: Option<(usize, f64)> = None;
     let at = |frequency: &f64| {
         let k = (frequency * step * count as f64).round() as usize;
@@ -118,7 +121,7 @@ mod tests {
         // a small one of the thesis's torques, at which the gyro's noise is seen; 24 noises
         let (sweep, torque, rate) = sweep(0.05);
         let near = logarithmic_grid((2.25, 2.6), 300);
-        let lag = lengths::Lengths::of(BAND, Some(&sweep), 2700.0, STEP).lag;
+        let lag = lengths::Lengths::for_record(BAND, Some(&sweep), 2700.0, STEP).lag;
         let time: Vec<f64> = (0..torque.len()).map(|k| k as f64 * STEP).collect();
         let mut found = vec![Vec::new(); 4];
         let mut stated = vec![Vec::new(); 4];
@@ -130,7 +133,7 @@ mod tests {
                 demodulation::frequency_responses(&sweep, &time, &torque, [&noisy[..]], &near);
             let [response] = &swept.responses;
             let deviation = demodulation::deviation(response, &residual, &swept.noise_gain);
-            let whole = spa::Estimate::of(STEP, &torque, &noisy, &near, lag);
+            let whole = spa::Estimate::new(STEP, &torque, &noisy, &near, lag);
             for (i, (response, deviation, slope)) in [
                 (response, deviation, demodulation::slope(&sweep, 2.4)),
                 (&whole.response, whole.deviation(&residual), whole.slope()),
@@ -138,7 +141,7 @@ mod tests {
             .into_iter()
             .enumerate()
             {
-                let features = Features::of(response);
+                let features = Features::find(response);
                 let std = features.deviations(response, &deviation, |_| slope);
                 found[2 * i].push(features.f_dip.unwrap());
                 found[2 * i + 1].push(features.f_res.unwrap());

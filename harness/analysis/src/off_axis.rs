@@ -29,7 +29,7 @@ pub struct OffAxis {
 
 impl OffAxis {
     /// Computes the figures from the forces (N) at every sample and the leakage over the sweep.
-    pub fn of(radial: &[f64], tangential: &[f64], leakage: &[f64]) -> Self {
+    pub fn from_forces(radial: &[f64], tangential: &[f64], leakage: &[f64]) -> Self {
         let (mut off, mut all) = (0.0, 0.0);
         let mut fractions: Vec<f64> = Vec::with_capacity(radial.len());
         for (r, t) in radial.iter().zip(tangential) {
@@ -59,9 +59,9 @@ impl OffAxis {
 /// leakage at the responses' frequencies first, and `None` without another rate.
 ///
 /// Each rate is used relative to its mean. Otherwise a gyro's bias would count as energy: a bias of 1 deg/s about x is
-/// larger than the rate of a bench about that axis. [`OffAxis::of`] keeps the means of the forces, because no sensor
+/// larger than the rate of a bench about that axis. [`OffAxis::from_forces`] keeps the means of the forces, because no sensor
 /// measures them and the centripetal force of a wave has a mean.
-pub fn of_rates(
+pub fn off_axis_from_rates(
     response: &FrequencyResponse,
     rate: &[f64],
     others: &[(&FrequencyResponse, &[f64])],
@@ -79,7 +79,7 @@ pub fn of_rates(
     let off: Vec<f64> = (0..rate.len())
         .map(|k| centred.iter().map(|other| other[k] * other[k]).sum::<f64>().sqrt())
         .collect();
-    let off_axis = OffAxis::of(&off, &about_mean(rate), &leakage);
+    let off_axis = OffAxis::from_forces(&off, &about_mean(rate), &leakage);
     (leakage, Some(off_axis))
 }
 
@@ -91,7 +91,7 @@ pub fn leakage(radial: &FrequencyResponse, arm: f64) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::{OffAxis, of_rates};
+    use super::{OffAxis, off_axis_from_rates};
     use crate::response::FrequencyResponse;
     use signals::fourier::Complex64;
 
@@ -103,14 +103,14 @@ mod tests {
         };
         let (all, x) = (response(2.0), response(0.2));
         let (rate, tenth) = ([1.0, -2.0, -1.0, 2.0], [0.1, 0.2, -0.1, -0.2]);
-        let (leakage, found) = of_rates(&all, &rate, &[(&x, &tenth), (&x, &tenth)]);
+        let (leakage, found) = off_axis_from_rates(&all, &rate, &[(&x, &tenth), (&x, &tenth)]);
         let found = found.unwrap();
         assert!(
             (found.median - 0.02 / 1.02).abs() < 1e-15
                 && (found.energy - 0.02 / 1.02).abs() < 1e-15
         );
         assert!(leakage.iter().all(|l| (l - 0.02f64.sqrt()).abs() < 1e-15));
-        assert_eq!(of_rates(&all, &rate, &[]), (Vec::new(), None));
+        assert_eq!(off_axis_from_rates(&all, &rate, &[]), (Vec::new(), None));
     }
 
     /// 0.1 rad/s about the axis and a twentieth about x and y, with a gyro's bias of up to 5 deg/s on each axis.
@@ -126,7 +126,7 @@ mod tests {
                 signal.iter().map(|w| w + bias.to_radians()).collect()
             };
             let [rate, x, y] = [(&rate, 0), (&x, 1), (&y, 2)].map(|(w, k)| biased(w, biases[k]));
-            of_rates(&none, &rate, &[(&none, &x), (&none, &y)]).1.unwrap()
+            off_axis_from_rates(&none, &rate, &[(&none, &x), (&none, &y)]).1.unwrap()
         };
         let without = found([0.0; 3]);
         // 2 * 0.05^2 over all three
@@ -147,11 +147,11 @@ mod tests {
     fn a_circling_force_is_half_off_the_axis_and_a_tangential_one_not_at_all() {
         let turn = |k: usize| (k as f64 * std::f64::consts::TAU / 1000.0).sin_cos();
         let (sine, cosine): (Vec<f64>, Vec<f64>) = (0..1000).map(turn).unzip();
-        let circle = OffAxis::of(&sine, &cosine, &[3.0, 4.0]);
+        let circle = OffAxis::from_forces(&sine, &cosine, &[3.0, 4.0]);
         // the median lies between two samples' fractions, 6e-3 apart there
         assert!((circle.energy - 0.5).abs() < 1e-12 && (circle.median - 0.5).abs() < 1e-2);
         assert!((circle.leakage - 12.5_f64.sqrt()).abs() < 1e-12);
-        let line = OffAxis::of(&[0.0; 1000], &cosine, &[]);
+        let line = OffAxis::from_forces(&[0.0; 1000], &cosine, &[]);
         assert_eq!(line, OffAxis::default());
     }
 }

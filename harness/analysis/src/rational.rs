@@ -54,7 +54,7 @@ impl Rational {
         let every = (bins.clone().count() / POINTS).max(1);
         let transform = Forward::new(count);
         let spectrum =
-            |signal: &[f64]| transform.of(signal.iter().map(|x| x / count as f64).collect());
+            |signal: &[f64]| transform.transform(signal.iter().map(|x| x / count as f64).collect());
         let (u, y) = (spectrum(torque), spectrum(rate));
         let unit = TAU * (from * to).sqrt();
         let lines: Vec<Line> = bins
@@ -80,7 +80,7 @@ impl Rational {
     /// column of the covariance's root is added to the coefficients.
     pub fn deviations(&self, frequencies: &[f64]) -> (Vec<f64>, Deviations) {
         let nominal = self.frequency_response(frequencies);
-        let found = Features::of(&nominal);
+        let found = Features::find(&nominal);
         let mut squares = vec![0.0; frequencies.len()];
         let mut moved = [Some(0.0), Some(0.0)];
         for column in &self.spread {
@@ -94,7 +94,7 @@ impl Rational {
                 let (h, nominal) = (response.response[i].norm(), nominal.response[i].norm());
                 *square += (h / nominal).ln().powi(2);
             }
-            let features = Features::of(&response);
+            let features = Features::find(&response);
             for (sum, (new, old)) in
                 moved.iter_mut().zip([(features.f_res, found.f_res), (features.f_dip, found.f_dip)])
             {
@@ -159,7 +159,7 @@ mod tests {
         let rate = tf.simulate(step, &torque);
         let band = (0.01, 0.3);
         let found = Rational::fit(step, &torque, &rate, band).unwrap();
-        let features = Features::of(&found.frequency_response(&logarithmic_grid(band, 2000)));
+        let features = Features::find(&found.frequency_response(&logarithmic_grid(band, 2000)));
         let (antiresonance, resonance) = (0.2752 / TAU, 0.2827 / TAU);
         // a separation of 1.1 mHz is little more than one period of the record; the error of a
         // thousandth of the frequency is due to sampling

@@ -24,7 +24,7 @@ impl ModelFit {
     /// Fits the model to the measured response and simulates it with the run's own torque. Signals are
     /// sampled every `step` s. Returns the fit together with the spectra of torque and residual in segments
     /// of `segment` s, or `None` without a response.
-    pub fn of(
+    pub fn fit(
         step: f64,
         segment: f64,
         torque: &[f64],
@@ -40,7 +40,7 @@ impl ModelFit {
         let residual: Vec<f64> = missing.iter().zip(&free).map(|(e, f)| e - f).collect();
         let answer: Vec<f64> = forced.iter().zip(&free).map(|(m, f)| mean + m + f).collect();
         let (skewness, kurtosis) = skewness_and_kurtosis(&residual);
-        let spectra = Spectra::of(step, torque, &residual, Segments::Seconds(segment));
+        let spectra = Spectra::estimate(step, torque, &residual, Segments::Seconds(segment));
         let fit = ModelFit {
             model,
             fit_frequency: model.fit_frequency(measured),

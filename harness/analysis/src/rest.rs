@@ -68,7 +68,7 @@ pub struct Chunk {
 impl Rest {
     /// Analyses samples `step` (s) apart, in chunks of `chunk` (s), with the autocorrelation up to the lag
     /// `lag` (s).
-    pub fn of(step: f64, samples: &[f64], chunk: f64, lag: f64) -> Rest {
+    pub fn analyse(step: f64, samples: &[f64], chunk: f64, lag: f64) -> Rest {
         let n = samples.len() as f64;
         let middle = (n - 1.0) / 2.0;
         let level = mean(samples);
@@ -118,7 +118,7 @@ impl Rest {
             kurtosis: moment(4) - 3.0,
             quantum,
             histogram: histogram(&sorted, sigma, quantum),
-            noise: Octaves::of(step, samples).describe(),
+            noise: Octaves::from_samples(step, samples).describe(),
             allan,
             quantiles,
             autocorrelation: autocorrelation(&detrended, (lag / step).round() as usize),
@@ -179,11 +179,11 @@ pub fn autocorrelation(signal: &[f64], lags: usize) -> Vec<f64> {
     let length = (signal.len() + lags + 1).next_power_of_two();
     let mut padded = signal.to_vec();
     padded.resize(length, 0.0);
-    let mut spectrum = Forward::new(length).of(padded);
+    let mut spectrum = Forward::new(length).transform(padded);
     for line in &mut spectrum {
         *line = (line.norm_sqr()).into();
     }
-    let sums = Inverse::new(length).of(spectrum);
+    let sums = Inverse::new(length).transform(spectrum);
     let power = sums[0].max(f64::MIN_POSITIVE);
     sums[..=lags].iter().map(|sum| sum / power).collect()
 }
@@ -266,7 +266,7 @@ mod tests {
         let mut random = Random::new(1, 0);
         let samples: Vec<f64> =
             (0..100_000).map(|k| 1e-3 + 1e-9 * f64::from(k) + 4e-4 * random.normal()).collect();
-        let rest = Rest::of(0.02, &samples, 100.0, 10.0);
+        let rest = Rest::analyse(0.02, &samples, 100.0, 10.0);
         // standard errors: mean of a line 4e-4/√1e5 = 1.3e-6, slope √12 σ/(n √n h) = 2.2e-9/s
         assert!((rest.mean - 1.05e-3).abs() < 4e-6 && (rest.trend - 5e-8).abs() < 7e-9, "{rest:?}");
         assert!((rest.deviation / 4e-4 - 1.0).abs() < 0.01);
@@ -289,7 +289,7 @@ mod tests {
         let step = 1.53e-4;
         let samples: Vec<f64> =
             (0..90_000).map(|_| (4.066e-4 * random.normal() / step).round() * step).collect();
-        let rest = Rest::of(0.02, &samples, 180.0, 1.0);
+        let rest = Rest::analyse(0.02, &samples, 180.0, 1.0);
         assert!((rest.quantum / step - 1.0).abs() < 1e-9);
         // (σ² + Δ²/12)/(Δ²/12), known to √(2/n) = 0.5 %
         let expected = 1.0 + 12.0 * (4.066e-4_f64 / step).powi(2);
@@ -308,7 +308,7 @@ mod tests {
         assert!((sum - 1.0).abs() < 0.01, "{sum}");
         // of an exponential distribution both say that it is not
         let skew: Vec<f64> = samples.iter().map(|x| (x / 4e-4).exp() * 1e-4).collect();
-        assert_eq!(Rest::of(0.02, &skew, 180.0, 1.0).not_normal(), [10, 10]);
+        assert_eq!(Rest::analyse(0.02, &skew, 180.0, 1.0).not_normal(), [10, 10]);
     }
 
     #[test]
@@ -316,7 +316,7 @@ mod tests {
         let mut random = Random::new(2, 0);
         let white: Vec<f64> = (0..50_001).map(|_| random.normal()).collect();
         let sums: Vec<f64> = white.windows(2).map(|x| x[0] + x[1]).collect();
-        let rest = Rest::of(1.0, &sums, 100.0, 3.0);
+        let rest = Rest::analyse(1.0, &sums, 100.0, 3.0);
         // standard error 1/√5e4 = 4.5e-3
         assert!(
             (rest.autocorrelation[1] - 0.5).abs() < 0.02 && rest.autocorrelation[2].abs() < 0.03

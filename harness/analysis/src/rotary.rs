@@ -46,7 +46,7 @@ pub fn swirl(radial: &FrequencyResponse, tangential: &FrequencyResponse, torque:
 
 impl Rotary {
     /// Summarises the swirl numbers at the frequencies (Hz) that a sweep passes at these times (s).
-    pub fn of(frequency: &[f64], time: &[f64], swirl: &[f64]) -> Self {
+    pub fn from_sweep(frequency: &[f64], time: &[f64], swirl: &[f64]) -> Self {
         let turning: Vec<usize> = (0..swirl.len()).filter(|&i| swirl[i].abs() > ROTARY).collect();
         // Each point represents the time up to half-way to its neighbours.
         let share = |i: usize| {
@@ -64,7 +64,7 @@ impl Rotary {
     /// Evaluates slosh angles (rad) at equal steps (s) of a liquid with this natural frequency (Hz), for any
     /// torque. In a window with the positions q and the velocities v the swirl number is Σ q × v / √(Σ q² Σ
     /// v²).
-    pub fn in_time(step: f64, frequency: f64, radial: &[f64], tangential: &[f64]) -> Self {
+    pub fn from_angles(step: f64, frequency: f64, radial: &[f64], tangential: &[f64]) -> Self {
         let length = (PERIODS / frequency / step).ceil() as usize;
         let window = |(x, y): (&[f64], &[f64])| {
             let (mut turned, mut position, mut velocity) = (0.0, 0.0, 0.0);
@@ -116,7 +116,7 @@ mod tests {
             response(&[Complex64::new(0.0, -1.0), one * 0.3, Complex64::new(0.0, 1e-4)]);
         let numbers = swirl(&radial, &tangential, 1.0);
         assert_eq!(numbers, [1.0, 0.0, 0.0]);
-        let rotary = Rotary::of(&[1.0, 2.0, 3.0], &[0.0, 10.0, 20.0], &numbers);
+        let rotary = Rotary::from_sweep(&[1.0, 2.0, 3.0], &[0.0, 10.0, 20.0], &numbers);
         assert_eq!((rotary.from, rotary.to, rotary.swirl), (Some(1.0), Some(1.0), 1.0));
         assert_eq!(rotary.time, 5.0);
     }
@@ -128,7 +128,7 @@ mod tests {
             let phase = |i: usize| 2.0 * PI * 2.3 * step * i as f64;
             let radial: Vec<f64> = (0..5000).map(|i| a * phase(i).cos()).collect();
             let tangential: Vec<f64> = (0..5000).map(|i| b * phase(i).sin()).collect();
-            Rotary::in_time(step, 2.3, &radial, &tangential)
+            Rotary::from_angles(step, 2.3, &radial, &tangential)
         };
         // 22 windows of 218 steps in 100 s
         let circle = run(0.1, 0.1);

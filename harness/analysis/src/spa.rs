@@ -28,7 +28,13 @@ pub struct Estimate {
 
 impl Estimate {
     /// Estimates the response and its uncertainty; the arguments are those of [`frequency_response`].
-    pub fn of(step: f64, input: &[f64], output: &[f64], frequencies: &[f64], lag: f64) -> Estimate {
+    pub fn new(
+        step: f64,
+        input: &[f64],
+        output: &[f64],
+        frequencies: &[f64],
+        lag: f64,
+    ) -> Estimate {
         let (response, power) = estimate(step, input, output, frequencies, lag);
         let duration = step * input.len() as f64;
         Estimate {
@@ -93,12 +99,12 @@ fn estimate(
         let mean = statistics::mean(signal);
         let mut padded: Vec<f64> = signal.iter().map(|v| v - mean).collect();
         padded.resize(length, 0.0);
-        forward.of(padded)
+        forward.transform(padded)
     };
     // Sum and difference of the covariances at +k and −k steps, multiplied by the Hann lag window: these are
     // the factors of cosine and sine. At 0 there is only one covariance.
     let tapered = |cross: Vec<Complex64>| -> Vec<(f64, f64)> {
-        let covariance = inverse.of(cross);
+        let covariance = inverse.transform(cross);
         let weight = |k: usize| (1.0 + (std::f64::consts::PI * k as f64 / lags as f64).cos()) / 2.0;
         let pair = |k: usize| match k {
             0 => (covariance[0], covariance[0]),

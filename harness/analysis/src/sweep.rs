@@ -56,7 +56,7 @@ impl Sweep {
     }
 
     /// Returns the time at which the sweep passes `frequency` (Hz), s, or `None` if it does not pass it.
-    pub fn time_of(&self, frequency: f64) -> Option<f64> {
+    pub fn time_at_frequency(&self, frequency: f64) -> Option<f64> {
         let Sweep { f0, f1, duration, .. } = *self;
         let t = match self.law {
             Law::Exponential => (frequency / f0).ln() * duration / (f1 / f0).ln(),
@@ -98,7 +98,7 @@ mod tests {
         for (law, cycles) in LAWS.into_iter().zip([5900.24, 6412.5]) {
             let sweep = Sweep { law, ..Sweep::THESIS };
             assert!((sweep.phase(2700.0) / TAU - cycles).abs() < 5e-3, "{law:?}");
-            let t = sweep.time_of(2.4).unwrap();
+            let t = sweep.time_at_frequency(2.4).unwrap();
             let f = (sweep.phase(t + 1e-3) - sweep.phase(t - 1e-3)) / 2e-3 / TAU;
             assert!((f - 2.4).abs() < 1e-7, "{law:?}: the frequency is the phase's derivative");
             assert!((sweep.frequency_at(t) - 2.4).abs() < 1e-12, "{law:?}");
@@ -112,7 +112,8 @@ mod tests {
             let (up, down) = (sweep(1.25, 3.5), sweep(3.5, 1.25));
             assert_eq!(down.band(), (1.25, 3.5));
             for f in [1.25, 2.0, 3.5] {
-                let (t_up, t_down) = (up.time_of(f).unwrap(), down.time_of(f).unwrap());
+                let (t_up, t_down) =
+                    (up.time_at_frequency(f).unwrap(), down.time_at_frequency(f).unwrap());
                 // rounding of times up to 100 s, of phases up to 1500 rad
                 assert!((t_up + t_down - 100.0).abs() < 1e-11, "{law:?}, {f} Hz");
                 assert!((up.rate_at(f) + down.rate_at(f)).abs() < 1e-15);

@@ -174,7 +174,7 @@ pub fn fit_time(measured: &[f64], model: &[f64]) -> f64 {
 /// Returns a start with lightly damped poles at the measured resonance and the zeros that fit best with them.
 /// It is needed because the weights of the other start may hide a narrow resonance.
 fn at_the_resonance(measured: &FrequencyResponse) -> Option<TransferFunction> {
-    let pole_omega = TAU * Features::of(measured).f_res?;
+    let pole_omega = TAU * Features::find(measured).f_res?;
     let (real_pole, pole_damping) = (0.01 * pole_omega, 0.01);
     let start =
         TransferFunction { numerator: [1.0, 0.0, 0.0], real_pole, pole_omega, pole_damping };

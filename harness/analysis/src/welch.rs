@@ -55,7 +55,7 @@ pub struct Spectra {
 
 impl Spectra {
     /// Estimates the spectra of two signals of equal length, sampled every `step` s.
-    pub fn of(step: f64, input: &[f64], output: &[f64], segments: Segments) -> Self {
+    pub fn estimate(step: f64, input: &[f64], output: &[f64], segments: Segments) -> Self {
         // With half overlap SEGMENTS segments of length L cover (SEGMENTS + 1) L/2.
         let longest = (2 * input.len() / (SEGMENTS + 1)).max(2);
         let length = match segments {
@@ -83,7 +83,7 @@ impl Spectra {
             let mut windowed: Vec<f64> =
                 signal.iter().zip(&window).map(|(x, w)| (x - mean) * w).collect();
             windowed.resize(padded, 0.0);
-            transform.of(windowed)
+            transform.transform(windowed)
         };
         let mut from = 0;
         while from + length <= input.len() {
@@ -124,12 +124,12 @@ impl Spectra {
     }
 
     /// Returns the element of `values` in the bin nearest to a frequency, Hz.
-    pub fn at(&self, values: &[f64], frequency: f64) -> f64 {
+    pub fn value_at(&self, values: &[f64], frequency: f64) -> f64 {
         values[((frequency / self.resolution).round() as usize).min(values.len() - 1)]
     }
 
     /// Returns frequencies (Hz) and values of the bins within a band, Hz.
-    pub fn within(&self, (from, to): (f64, f64), values: &[f64]) -> Vec<(f64, f64)> {
+    pub fn values_within(&self, (from, to): (f64, f64), values: &[f64]) -> Vec<(f64, f64)> {
         let bins = values.iter().enumerate().map(|(k, v)| (k as f64 * self.resolution, *v));
         bins.filter(|(f, _)| (from..=to).contains(f)).collect()
     }
@@ -166,12 +166,12 @@ mod tests {
     fn coherence_is_one_through_a_gain_and_one_eighth_between_strangers() {
         let (u, v) = (noise(1, 90_000), noise(77, 90_000));
         let gained: Vec<f64> = u.iter().map(|x| -3.0 * x).collect();
-        let through = Spectra::of(0.02, &u, &gained, RESPONSE);
+        let through = Spectra::estimate(0.02, &u, &gained, RESPONSE);
         assert!((through.mean_coherence(1.0, 20.0) - 1.0).abs() < 1e-12);
         assert!((through.h1((5.0, 5.1)).response[0].re + 3.0).abs() < 1e-9);
         // K averages of unrelated spectra have the mean coherence 1/K; half-overlapping
         // Hamming segments count as some 7 of 8.
-        let strangers = Spectra::of(0.02, &u, &v, RESPONSE).mean_coherence(1.0, 20.0);
+        let strangers = Spectra::estimate(0.02, &u, &v, RESPONSE).mean_coherence(1.0, 20.0);
         assert!((0.11..0.17).contains(&strangers), "{strangers}");
     }
 
@@ -179,9 +179,9 @@ mod tests {
     fn snr_is_the_ratio_of_the_powers() {
         let (u, v) = (noise(5, 900_000), noise(9, 900_000));
         let mixed: Vec<f64> = u.iter().zip(&v).map(|(u, v)| u + v / 10.0).collect();
-        let spectra = Spectra::of(0.02, &u, &mixed, RESPONSE);
+        let spectra = Spectra::estimate(0.02, &u, &mixed, RESPONSE);
         let snr = spectra.snr_db();
-        let bins = (1..200).map(|k| spectra.at(&snr, k as f64 * 0.1));
+        let bins = (1..200).map(|k| spectra.value_at(&snr, k as f64 * 0.1));
         let mean = bins.sum::<f64>() / 199.0;
         // 20 dB; the mean of a logarithm of few averages lies some 0.7 dB off.
         assert!((mean - 20.0).abs() < 1.5, "{mean}");
@@ -197,7 +197,8 @@ mod tests {
         let sweep = sine(|t| t + t * t / 2400.0);
         // its phase goes on by half a turn every 10 s against the sweep's: nothing in common
         let other = sine(|t| 1.05 * t + t * t / 2400.0);
-        let mean = |segments| Spectra::of(0.02, &sweep, &other, segments).mean_coherence(1.2, 1.8);
+        let mean =
+            |segments| Spectra::estimate(0.02, &sweep, &other, segments).mean_coherence(1.2, 1.8);
         let (short, long) = (mean(Segments::Seconds(SEGMENT)), mean(RESPONSE));
         assert!(short < 0.01 && long > 0.5, "{short}, {long}");
     }

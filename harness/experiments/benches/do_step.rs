@@ -86,7 +86,7 @@ fn best(mut run: impl FnMut() -> Duration) -> Duration {
 fn main() {
     let torque = Torque::Profile(SWEEP.parse().expect("a profile"));
     let steps = (DURATION / STEP).round() as usize;
-    let knots: Vec<f64> = (0..=steps).map(|k| torque.at(k as f64 * STEP)).collect();
+    let knots: Vec<f64> = (0..=steps).map(|k| torque.torque_at(k as f64 * STEP)).collect();
     let smooth = || Smooth { knots: knots.clone() };
 
     let rk4_time = best(|| {

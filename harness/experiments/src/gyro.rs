@@ -141,7 +141,7 @@ fn record(
         "the hub does not rest: leave its start, its torques and the friction of the bearing alone"
     );
     let readings = column(OMEGA_IMU);
-    Ok((allan::variances(run.step, readings), Octaves::of(run.step, readings)))
+    Ok((allan::variances(run.step, readings), Octaves::from_samples(run.step, readings)))
 }
 
 impl Characteristics {

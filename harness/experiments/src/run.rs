@@ -239,7 +239,8 @@ impl Run {
     /// during the run.
     pub fn course_bytes(&self) -> u64 {
         let all = [&self.torque].into_iter().chain(self.others.iter().map(|(_, other)| other));
-        let counts = all.map(|torque| torque.count(self.sample, self.stop, self.hold).unwrap_or(0));
+        let counts =
+            all.map(|torque| torque.row_count(self.sample, self.stop, self.hold).unwrap_or(0));
         // Each has time, value and slope, and a communication point; growing lists take twice as much.
         (counts.sum::<usize>() + self.steps()) as u64 * 100
     }
@@ -305,7 +306,7 @@ impl Run {
             self.stop
         );
         budget::steps(self.stop - self.start(), self.step)?;
-        self.torque.count(self.sample, self.stop, self.hold)?;
+        self.torque.row_count(self.sample, self.stop, self.hold)?;
         if let Some(tolerance) = self.tolerance {
             ensure!(
                 tolerance > 0.0 && tolerance.is_finite(),
@@ -342,7 +343,7 @@ impl Run {
             schedule::check_interpolation(fmu.description(), inputs, "--hold")?;
         }
         let first: Vec<f64> =
-            self.driven().iter().map(|(_, history)| history.at(self.start())).collect();
+            self.driven().iter().map(|(_, history)| history.torque_at(self.start())).collect();
         self.inputs(fmu.description())?.initialise(
             &mut instance,
             self.tolerance,

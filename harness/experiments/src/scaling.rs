@@ -318,7 +318,7 @@ mod tests {
     use formulas::similarity::Liquid;
     use formulas::similarity::froude;
 
-    fn of(what: &str) -> f64 {
+    fn figure(what: &str) -> f64 {
         thesis().into_iter().find(|f| f.what.starts_with(what)).expect(what).value
     }
 
@@ -341,7 +341,7 @@ mod tests {
             ("7.2.2 0.0125 N m, Bo_r", 1.669, 5e-4),
             ("7.2.2 0.0125 N m, D", 0.5772, 5e-5),
         ] {
-            assert!((of(what) - known).abs() <= digit, "{what}: {} not {known}", of(what));
+            assert!((figure(what) - known).abs() <= digit, "{what}: {} not {known}", figure(what));
         }
     }
 

@@ -126,13 +126,13 @@ impl Tanks {
     ) -> Result<Option<Tanks>> {
         let has = |name: &str| description.variable(name).is_ok();
         let (accelerometer, names) = match () {
-            () if has(&spacecraft::SPECIFIC_FORCE.at([1]))
-                && has(&spacecraft::tank::WAVE.at([1, 1])) =>
+            () if has(&spacecraft::SPECIFIC_FORCE.element([1]))
+                && has(&spacecraft::tank::WAVE.element([1, 1])) =>
             {
                 let used = integer(description, instance, spacecraft::TANKS)?;
                 ("specific_force", (1..=used).map(|i| format!("tank[{i}]")).collect())
             }
-            () if has(&sloshtank::A.at([1])) && has(&sloshtank::tank::WAVE.at([1])) => {
+            () if has(&sloshtank::A.element([1])) && has(&sloshtank::tank::WAVE.element([1])) => {
                 ("a", vec!["tank".to_string()])
             }
             () => return Ok(None),
@@ -149,14 +149,14 @@ impl Tanks {
     }
 
     /// Lists the variables that must be recorded.
-    pub fn needs(&self) -> Vec<String> {
+    pub fn required_variables(&self) -> Vec<String> {
         let host = [self.accelerometer, "omega", "omega_dot"].map(components).into_iter().flatten();
         let tanks = self.tanks.iter().flat_map(Tank::rates);
         if self.tanks.is_empty() { Vec::new() } else { host.chain(tanks).collect() }
     }
 
     /// Describes the tanks of a run in which weight does not dominate the liquid. The table must have the
-    /// variables of [`Tanks::needs`].
+    /// variables of [`Tanks::required_variables`].
     pub fn without_weight(&self, table: &Table) -> Vec<String> {
         self.tanks
             .iter()
@@ -292,8 +292,9 @@ mod tests {
 
     /// Warnings of the tanks for rows of the specific force along y, the angular acceleration about z, the rate about x and the first modes'
     /// rates along x.
-    fn said(tanks: &Tanks, rows: &[[f64; 5]]) -> Vec<String> {
-        let names: Vec<String> = ["time".to_string()].into_iter().chain(tanks.needs()).collect();
+    fn warnings(tanks: &Tanks, rows: &[[f64; 5]]) -> Vec<String> {
+        let names: Vec<String> =
+            ["time".to_string()].into_iter().chain(tanks.required_variables()).collect();
         let column = |name: &String| {
             let place = match name.as_str() {
                 "specific_force[2]" => 0,
@@ -313,26 +314,28 @@ mod tests {
     fn a_tank_s_numbers_are_those_of_its_hinge_and_of_all_its_modes() {
         let tanks = tank(true);
         // 0.02 m/s²: Bo = 1000 0.02 0.45²/0.072 = 56.3; 0.4 0.05 + 0.1 0.1 = 0.03 m/s: We = 5.6, Fr = 0.1
-        assert_eq!(said(&tanks, &[[0.02, 0.0, 0.0, 0.05, 0.1]; 2]), [""; 0]);
+        assert_eq!(warnings(&tanks, &[[0.02, 0.0, 0.0, 0.05, 0.1]; 2]), [""; 0]);
         // Cut off at O, what is left is ω' x = 0.004 1 m/s², less ω² 0.5 = 0.002 m/s²: Bo = 1000 0.002 0.45²/0.072 = 5.625.
         // The surface was at 0.4 0.2 m/s before: We = 1000 0.08² 0.45/0.072 = 40, Fr = 7.11.
         let omega = 0.004f64.sqrt();
         let rows = [[0.2, 0.0, 0.0, 0.2, 0.0], [0.0, 0.004, omega, 0.0, 0.0]];
-        let [cut] = <[String; 1]>::try_from(said(&tanks, &rows)).unwrap();
+        let [cut] = <[String; 1]>::try_from(warnings(&tanks, &rows)).unwrap();
         for words in ["tank[1]: Bond number 5.625, Weber number 40.000, Froude number 7.11"]
             .into_iter()
             .chain(["inertia", "; with tank[1].ball.travel above 0 it crosses", "R = 0.4500 m"])
         {
             assert!(cut.contains(words), "{words}: {cut}");
         }
-        let [without] = <[String; 1]>::try_from(said(&tank(false), &rows)).unwrap();
+        let [without] = <[String; 1]>::try_from(warnings(&tank(false), &rows)).unwrap();
         assert!(!without.contains("ball"), "{without}");
         // The bench's words where weight still rules: at 0.01 m/s², Bo = 28.1, and nothing moves.
-        let [low] = <[String; 1]>::try_from(said(&tanks, &[[0.01, 0.0, 0.0, 0.0, 0.0]])).unwrap();
+        let [low] =
+            <[String; 1]>::try_from(warnings(&tanks, &[[0.01, 0.0, 0.0, 0.0, 0.0]])).unwrap();
         assert!(low.contains("Bond number 28.125") && low.contains("curved"), "{low}");
         assert!(!low.contains("ball"), "{low}");
         // Reversed: it falls.
-        let [back] = <[String; 1]>::try_from(said(&tanks, &[[-0.01, 0.0, 0.0, 0.0, 0.0]])).unwrap();
+        let [back] =
+            <[String; 1]>::try_from(warnings(&tanks, &[[-0.01, 0.0, 0.0, 0.0, 0.0]])).unwrap();
         for words in ["Bond number -28.125", "Froude number infinite", "other end", "ball.travel"] {
             assert!(back.contains(words), "{words}: {back}");
         }

@@ -20,7 +20,7 @@ pub fn open(path: &Path) -> Result<File> {
     let kind = path.metadata()?;
     // before `File::open`, which waits until somebody writes to a named pipe
     if !kind.is_file() {
-        bail!("it is {} (allowed: a regular file)", kind_of(&kind));
+        bail!("it is {} (allowed: a regular file)", file_kind(&kind));
     }
     let file = File::open(path)?;
     let mut all = READ.lock().unwrap_or_else(PoisonError::into_inner);
@@ -83,7 +83,7 @@ pub fn without_error_numbers(message: &str) -> String {
     text
 }
 
-fn kind_of(metadata: &Metadata) -> &'static str {
+fn file_kind(metadata: &Metadata) -> &'static str {
     #[cfg(unix)]
     {
         use std::os::unix::fs::FileTypeExt;

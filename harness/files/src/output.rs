@@ -39,7 +39,7 @@ pub fn destination(path: &Path) -> Result<Destination> {
                 Destination::Stream
             });
         }
-        let folder = folder_of(&place).to_path_buf();
+        let folder = containing_folder(&place).to_path_buf();
         // these links open a descriptor; their text names a pipe, or a file that somebody else is writing
         if folder.canonicalize().is_ok_and(|folder| folder.starts_with("/proc")) {
             return Ok(Destination::Stream);
@@ -53,7 +53,7 @@ pub fn destination(path: &Path) -> Result<Destination> {
 }
 
 /// Returns the folder of a path; `.` for a bare name.
-fn folder_of(path: &Path) -> &Path {
+fn containing_folder(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
@@ -77,7 +77,7 @@ pub fn atomically<T>(path: &Path, write: impl FnOnce(&mut File) -> Result<T>) ->
     builder.prefix(".hubslosh-");
     #[cfg(unix)] // what any other program would give a new file; tempfile's 0600 is for secrets
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file = builder.tempfile_in(folder_of(&place)).with_context(cannot)?;
+    let mut file = builder.tempfile_in(containing_folder(&place)).with_context(cannot)?;
     let _registered = temporary::register(file.path());
     let result = write(file.as_file_mut()).with_context(cannot)?;
     file.as_file().sync_all().with_context(cannot)?;
@@ -90,7 +90,7 @@ pub fn atomically<T>(path: &Path, write: impl FnOnce(&mut File) -> Result<T>) ->
 ///
 /// # Errors
 /// If that fails; the message names `path`.
-pub fn put(draft: &Path, path: &Path) -> Result<()> {
+pub fn publish_draft(draft: &Path, path: &Path) -> Result<()> {
     let move_or_pour = || -> Result<()> {
         match destination(path)? {
             Destination::File(place) => match fs::rename(draft, &place) {
@@ -132,7 +132,7 @@ pub fn sha256(bytes: &[u8]) -> String {
 }
 
 /// Returns the SHA-256 of everything that can be read from `from`, which need not fit into memory.
-pub fn sha256_of(mut from: impl Read) -> Result<String> {
+pub fn hash_reader(mut from: impl Read) -> Result<String> {
     let (mut hash, mut buffer) = (Sha256::new(), vec![0; 1 << 16]);
     loop {
         match from.read(&mut buffer)? {
@@ -151,7 +151,7 @@ mod tests {
         // FIPS 180-4, the example of one block
         let expected = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
         assert_eq!(sha256(b"abc"), expected);
-        assert_eq!(sha256_of(&b"abc"[..]).unwrap(), expected);
+        assert_eq!(hash_reader(&b"abc"[..]).unwrap(), expected);
     }
 
     #[test]
@@ -186,7 +186,7 @@ mod tests {
             assert!(at(link).is_symlink() && !at(file).is_symlink());
             assert_eq!(fs::read_to_string(at(file)).unwrap(), link);
             fs::write(at("draft"), "draft").unwrap();
-            put(&at("draft"), &at(link)).unwrap();
+            publish_draft(&at("draft"), &at(link)).unwrap();
             assert_eq!(fs::read_to_string(at(file)).unwrap(), "draft");
             assert!(!at("draft").exists() && at(link).is_symlink());
         }
@@ -216,7 +216,7 @@ mod tests {
                 _ => {
                     let draft = directory.path().join("draft");
                     fs::write(&draft, &bytes).unwrap();
-                    put(&draft, &pipe).unwrap();
+                    publish_draft(&draft, &pipe).unwrap();
                     assert!(!draft.exists());
                 }
             }
@@ -245,7 +245,7 @@ mod tests {
         assert!(is_device());
         let draft = directory.path().join("draft");
         fs::write(&draft, "bytes").unwrap();
-        assert!(put(&draft, &full).is_err() && draft.exists() && is_device());
+        assert!(publish_draft(&draft, &full).is_err() && draft.exists() && is_device());
     }
 
     #[cfg(target_os = "linux")]

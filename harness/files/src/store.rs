@@ -23,7 +23,7 @@ use std::sync::{Mutex, PoisonError};
 use anyhow::{Context, Result, bail, ensure};
 
 use crate::input;
-use crate::output::{self, sha256, sha256_of};
+use crate::output::{self, hash_reader, sha256};
 use crate::temporary::{self, Registered};
 
 /// Folder of the stored runs.
@@ -79,12 +79,12 @@ pub const STUDY: &Kind = &Kind {
 
 impl Kind {
     /// Name of a run's file in the folder.
-    pub fn file_of(&self, run: &str) -> String {
+    pub fn run_file(&self, run: &str) -> String {
         format!("{RUNS}/{run}.{}", self.ending)
     }
 
     /// Returns true if a folder has a definition or runs of this kind.
-    fn owns(&self, path: &Path) -> bool {
+    fn is_present_in(&self, path: &Path) -> bool {
         let runs = fs::read_dir(path.join(RUNS)).into_iter().flatten().flatten();
         let is_run = |file: &Path| file.extension().is_some_and(|ending| ending == self.ending);
         path.join(self.definition).exists() || runs.map(|run| run.path()).any(|run| is_run(&run))
@@ -238,7 +238,13 @@ impl Store {
         definition: Option<Definition>,
     ) -> Result<Store> {
         let other = if kind.name == CAMPAIGN.name { STUDY } else { CAMPAIGN };
-        ensure!(!other.owns(path), "{} holds {}; {}", path.display(), other.noun, kind.elsewhere);
+        ensure!(
+            !other.is_present_in(path),
+            "{} holds {}; {}",
+            path.display(),
+            other.noun,
+            kind.elsewhere
+        );
         if let Some(definition) = &definition {
             definition.check(path, kind)?;
         }
@@ -281,7 +287,7 @@ impl Store {
             let text = definition.text.as_bytes();
             let is_there = fs::read(path.join(kind.definition)).is_ok_and(|there| there == text);
             match is_there {
-                true => store.list(kind.definition, sha256(text))?,
+                true => store.add_to_manifest(kind.definition, sha256(text))?,
                 false => store.write(kind.definition, |draft| output::write(draft, text))?,
             }
         }
@@ -295,12 +301,12 @@ impl Store {
 
     /// Path of a run's file.
     pub fn run(&self, run: &str) -> PathBuf {
-        self.path.join(self.kind.file_of(run))
+        self.path.join(self.kind.run_file(run))
     }
 
     /// Returns true if a run is in the manifest.
     pub fn lists(&self, run: &str) -> bool {
-        self.manifest().sums.contains_key(&self.kind.file_of(run))
+        self.manifest().sums.contains_key(&self.kind.run_file(run))
     }
 
     /// Returns the SHA-256 of a stored run, or `None` if it was never stored. A run without a line in the manifest is
@@ -313,8 +319,8 @@ impl Store {
         run: &str,
         is_ours: impl FnOnce(&Path) -> bool,
     ) -> Result<Option<String>, Damage> {
-        let sum = self.look(run, is_ours, |path| {
-            let sum = sha256_of(input::open(path)?)?;
+        let sum = self.read_checked(run, is_ours, |path| {
+            let sum = hash_reader(input::open(path)?)?;
             Ok((sum.clone(), sum))
         })?;
         Ok(sum)
@@ -329,17 +335,17 @@ impl Store {
             let bytes = input::bytes(path)?;
             Ok((sha256(&bytes), bytes))
         };
-        self.look(run, |_| true, read)
+        self.read_checked(run, |_| true, read)
     }
 
     /// Returns what `read` finds in the file of a stored run, if the SHA-256 that it returns too is the stored one.
-    fn look<T>(
+    fn read_checked<T>(
         &self,
         run: &str,
         is_ours: impl FnOnce(&Path) -> bool,
         read: impl FnOnce(&Path) -> Result<(String, T)>,
     ) -> Result<Option<T>, Damage> {
-        let (file, path) = (self.kind.file_of(run), self.run(run));
+        let (file, path) = (self.kind.run_file(run), self.run(run));
         if fs::symlink_metadata(&path).is_err() {
             return if self.lost.contains(&file) { Err(Damage::Missing) } else { Ok(None) };
         }
@@ -354,12 +360,12 @@ impl Store {
 
     /// Adds a run that another program has stored to the manifest.
     pub fn adopt(&self, run: &str, sum: String) -> Result<()> {
-        self.list(&self.kind.file_of(run), sum)
+        self.add_to_manifest(&self.kind.run_file(run), sum)
     }
 
     /// Stores a run, which `write` writes to the path that it gets. It is on the disk when this returns.
     pub fn add(&self, run: &str, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
-        let stored = self.write(&self.kind.file_of(run), write);
+        let stored = self.write(&self.kind.run_file(run), write);
         stored.with_context(|| format!("{} cannot be stored", self.run(run).display()))
     }
 
@@ -369,8 +375,8 @@ impl Store {
         input::check_replaceable(&place)?;
         let draft = self.unfinished.join(place.file_name().unwrap_or_default());
         write(&draft)?;
-        self.list(file, sha256(&fs::read(&draft)?))?;
-        output::put(&draft, &place)
+        self.add_to_manifest(file, sha256(&fs::read(&draft)?))?;
+        output::publish_draft(&draft, &place)
     }
 
     /// Publishes files by name, and the manifest. Removes files that were published earlier and are not now.
@@ -410,7 +416,7 @@ impl Store {
                 let _ = fs::remove_file(self.path.join(name));
             }
             for name in names {
-                output::put(&self.unfinished.join(name), &self.path.join(name))?;
+                output::publish_draft(&self.unfinished.join(name), &self.path.join(name))?;
             }
             Ok(())
         };
@@ -426,7 +432,7 @@ impl Store {
     }
 
     /// Adds a line to the manifest.
-    fn list(&self, file: &str, sum: String) -> Result<()> {
+    fn add_to_manifest(&self, file: &str, sum: String) -> Result<()> {
         let mut manifest = self.manifest();
         if manifest.sums.get(file) == Some(&sum) {
             return Ok(());
@@ -549,7 +555,7 @@ mod tests {
                 folder.check_text("c").unwrap().is_none() && folder.read("c").unwrap().is_none()
             );
             drop(folder);
-            let path = directory.path().join(kind.file_of("b"));
+            let path = directory.path().join(kind.run_file("b"));
             fs::write(&path, "3").unwrap();
             let folder = take(directory.path(), kind).unwrap();
             for damage in [folder.check_text("b").map(drop), folder.read("b").map(drop)] {
@@ -558,7 +564,7 @@ mod tests {
             fs::write(&path, "2").unwrap();
             assert!(folder.check_text("b").is_ok());
             // another program's run, verified from then on
-            let other = directory.path().join(kind.file_of("c"));
+            let other = directory.path().join(kind.run_file("c"));
             fs::write(&other, "other").unwrap();
             assert!(matches!(folder.read("c"), Err(Damage::Unlisted)));
             folder.adopt("c", folder.check_text("c").unwrap().unwrap()).unwrap();

@@ -237,7 +237,7 @@ impl Archive {
     pub fn hash(&self) -> Result<String> {
         let mut file = &self.file;
         file.seek(SeekFrom::Start(0))?;
-        files::output::sha256_of(file)
+        files::output::hash_reader(file)
     }
 
     /// Checks the archive and returns the text of modelDescription.xml.

@@ -10,7 +10,7 @@ pub struct Array<const D: usize>(&'static str);
 
 impl<const D: usize> Array<D> {
     /// Returns the name of the element at these indices, which count from 1, for example `tank[2].p[1,3]`.
-    pub fn at(self, indices: [usize; D]) -> String {
+    pub fn element(self, indices: [usize; D]) -> String {
         let (mut name, mut left) = (self.0.to_string(), &indices[..]);
         while let (Some(place), [index, rest @ ..]) = (name.find("[]"), left) {
             name.insert_str(place + 1, &index.to_string());
@@ -71,10 +71,10 @@ mod tests {
 
     #[test]
     fn elements_have_the_names_of_the_model_descriptions() {
-        assert_eq!(hubslosh::slosh::MASS.at([10]), "slosh.mass[10]");
-        assert_eq!(sloshtank::tank::P.at([1, 3]), "tank.p[1,3]");
-        assert_eq!(spacecraft::tank::M_0.at([4]), "tank[4].m_0");
-        assert_eq!(spacecraft::tank::P.at([2, 1, 3]), "tank[2].p[1,3]");
+        assert_eq!(hubslosh::slosh::MASS.element([10]), "slosh.mass[10]");
+        assert_eq!(sloshtank::tank::P.element([1, 3]), "tank.p[1,3]");
+        assert_eq!(spacecraft::tank::M_0.element([4]), "tank[4].m_0");
+        assert_eq!(spacecraft::tank::P.element([2, 1, 3]), "tank[2].p[1,3]");
     }
 
     #[test]

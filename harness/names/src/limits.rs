@@ -15,14 +15,14 @@ impl Limits {
     /// Finds the variables of an FMU; `has` returns true for the name of one of its variables.
     pub fn find(has: impl Fn(&str) -> bool) -> Limits {
         let several = (1..=spacecraft::MOST_TANKS)
-            .map(|i| (spacecraft::tank::LIMITED_BY_KIND.at([i]), format!("tank {i}: ")));
+            .map(|i| (spacecraft::tank::LIMITED_BY_KIND.element([i]), format!("tank {i}: ")));
         let one = [hubslosh::LIMITED_BY_KIND, sloshtank::tank::LIMITED_BY_KIND]
             .map(|name| (name.to_string(), String::new()));
         Limits { tanks: one.into_iter().chain(several).filter(|(name, _)| has(name)).collect() }
     }
 
     /// Returns the columns that [`Limits::describe`] reads.
-    pub fn needs(&self) -> impl Iterator<Item = &str> {
+    pub fn required_columns(&self) -> impl Iterator<Item = &str> {
         self.tanks.iter().map(|(name, _)| name.as_str())
     }
 
@@ -109,7 +109,7 @@ mod tests {
     fn each_tank_that_was_out_of_range_has_a_sentence() {
         let names = ["tank[1].limited_by_kind", "tank[2].limited_by_kind"];
         let limits = Limits::find(|name| names.contains(&name));
-        assert_eq!(limits.needs().collect::<Vec<_>>(), names);
+        assert_eq!(limits.required_columns().collect::<Vec<_>>(), names);
         let (time, inside, outside) = ([0.0, 1.0, 4.0], [1.0; 3], [1.0, 5.0, 5.0]);
         let words = limits.describe(|name| match name {
             "time" => Some(&time[..]),

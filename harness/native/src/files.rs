@@ -84,5 +84,5 @@ pub fn destination(path: PathBuf) -> PyResult<Option<PathBuf>> {
 /// Move a complete file to where the path of an output leads; a device or a pipe gets its bytes.
 #[pyfunction]
 pub fn put(py: Python, draft: PathBuf, path: PathBuf) -> PyResult<()> {
-    py.detach(|| output::put(&draft, &path)).map_err(error)
+    py.detach(|| output::publish_draft(&draft, &path)).map_err(error)
 }

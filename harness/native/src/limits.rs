@@ -15,7 +15,7 @@ fn limits_of(fmu: &Fmu) -> Limits {
 /// Return the names of the columns that `out_of_range` reads besides the time; none for other FMUs.
 #[pyfunction]
 pub fn limit_columns(fmu: &Fmu) -> Vec<String> {
-    limits_of(fmu).needs().map(String::from).collect()
+    limits_of(fmu).required_columns().map(String::from).collect()
 }
 
 /// Return a sentence for each tank that was out of the range of its model, from `time` (s) and the other columns.

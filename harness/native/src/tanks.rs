@@ -137,7 +137,7 @@ impl Tank {
     /// Return the mass of liquid at a fill, kg.
     fn mass(&self, py: Python, fill: Amount) -> PyResult<f64> {
         let fill = fill.fill()?;
-        py.detach(|| self.tank.mass(self.tank.height_of(fill)?)).map_err(|why| self.error(&why))
+        py.detach(|| self.tank.mass(self.tank.fill_height(fill)?)).map_err(|why| self.error(&why))
     }
 }
 
@@ -266,7 +266,7 @@ pub fn table<'py>(
     let (of, liquid) = (tank.clone_ref(py), *liquid.get());
     let found = in_threads(py, 1, move |_| {
         let tank = &of.get().tank;
-        let (low, high) = (tank.height_of(low)?, tank.height_of(high)?);
+        let (low, high) = (tank.fill_height(low)?, tank.fill_height(high)?);
         if low >= high {
             return Err(format!("The table's ends must ascend: {low} m, then {high} m.").into());
         }

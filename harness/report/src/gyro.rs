@@ -5,7 +5,7 @@ use analysis::rest::{Chunk, KOLMOGOROV, Rest};
 use experiments::gyro::Characteristics;
 use maud::html;
 
-use crate::page::{document, drawn, table};
+use crate::page::{document, render_chart, table};
 use crate::svg::{Axis, Chart, Series, Style};
 
 /// Draws the Allan deviations over the averaging time, as an SVG file.
@@ -57,7 +57,7 @@ fn series(points: Vec<(f64, f64)>, color: &str, style: Style, title: &str) -> Se
 pub fn page(rows: &[(String, String)], found: &Rest) -> String {
     let body = html! {
         (table(["statistic", "value"], rows.iter().map(|(name, value)| vec![name.clone(), value.clone()])))
-        @for (_, chart) in rest_charts(found) { (drawn(&chart)) }
+        @for (_, chart) in rest_charts(found) { (render_chart(&chart)) }
     };
     document("Gyro at rest", &body)
 }

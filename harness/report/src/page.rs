@@ -44,7 +44,7 @@ pub fn document(title: &str, body: &Markup) -> String {
 
 /// Embeds a chart that scrolls on a narrow screen, because its labels could not be read if it were made
 /// smaller.
-pub fn drawn(chart: &Chart) -> Markup {
+pub fn render_chart(chart: &Chart) -> Markup {
     html! { div class="scroll" { (PreEscaped(chart.svg())) } }
 }
 

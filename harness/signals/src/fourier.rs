@@ -31,7 +31,7 @@ impl Forward {
     /// # Panics
     ///
     /// If the signal has another length than the transform.
-    pub fn of(&self, mut signal: Vec<f64>) -> Vec<Complex64> {
+    pub fn transform(&self, mut signal: Vec<f64>) -> Vec<Complex64> {
         let mut spectrum = self.0.make_output_vec();
         self.0.process(&mut signal, &mut spectrum).expect("a signal of the transform's length");
         spectrum
@@ -53,7 +53,7 @@ impl Inverse {
     /// # Panics
     ///
     /// If the spectrum has another length.
-    pub fn of(&self, mut spectrum: Vec<Complex64>) -> Vec<f64> {
+    pub fn transform(&self, mut spectrum: Vec<Complex64>) -> Vec<f64> {
         let last = spectrum.len() - 1;
         spectrum[0].im = 0.0;
         if self.0.len().is_multiple_of(2) {

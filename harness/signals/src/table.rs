@@ -99,7 +99,7 @@ impl Table {
     /// # Panics
     ///
     /// If a column is not there.
-    pub fn only(&self, names: &[&str]) -> Table {
+    pub fn select(&self, names: &[&str]) -> Table {
         let column = |name: &&str| self.column(name).expect("a column of this table").to_vec();
         Table {
             names: names.iter().map(|n| n.to_string()).collect(),

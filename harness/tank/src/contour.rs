@@ -196,7 +196,7 @@ impl Contour {
             let count = samples(segment);
             let parameter =
                 |k: usize| segment.from + (segment.to - segment.from) * k as f64 / count as f64;
-            let below = |t: f64| segment.curve.at(t)[1] < z;
+            let below = |t: f64| segment.curve.point_at(t)[1] < z;
             for k in 0..count {
                 let mut ends = [parameter(k), parameter(k + 1)];
                 match ends.map(below) {
@@ -221,7 +221,7 @@ impl Contour {
                 let [from, to] = ends;
                 for (v, w) in rule.nodes.iter().zip(&rule.weights) {
                     let t = from + (to - from) * v;
-                    let (r, dz) = (segment.curve.at(t)[0], segment.curve.slope(t)[1]);
+                    let (r, dz) = (segment.curve.point_at(t)[0], segment.curve.slope(t)[1]);
                     volume += w * (to - from) * core::f64::consts::PI * r * r * dz;
                 }
             }
@@ -236,7 +236,7 @@ impl Contour {
 
     /// Returns the fill, m above the lowest point, below which the tank has this volume, m3. Returns 0 for no volume,
     /// and the largest fill for the tank's whole volume and more.
-    pub(crate) fn fill_of(&self, volume: f64) -> f64 {
+    pub(crate) fn fill_from_volume(&self, volume: f64) -> f64 {
         let depth = self.depth();
         if volume <= 0.0 {
             return 0.0;
@@ -302,7 +302,7 @@ impl Contour {
         }
         let (down, up) = self.contact_lines(z, fill)?;
         // Near a shoulder a small change of the fill changes the free surface.
-        let radius = |c: Crossing| self.segments[c.segment].curve.at(c.t)[0];
+        let radius = |c: Crossing| self.segments[c.segment].curve.point_at(c.t)[0];
         let radii =
             |(down, up): (Option<Crossing>, Crossing)| [down.map_or(-1.0, radius), radius(up)];
         let here = radii((down, up));
@@ -382,7 +382,7 @@ impl Contour {
                 let (mut a, mut b) = (parameter(k), parameter(k + 1));
                 let next = match k + 1 == count {
                     true => segment.end()[1],
-                    false => segment.curve.at(b)[1],
+                    false => segment.curve.point_at(b)[1],
                 };
                 let next_above = next >= z - level;
                 if next_above == above {
@@ -390,12 +390,12 @@ impl Contour {
                 }
                 if (next - z).abs() <= level {
                     a = b; // exactly at a sample, a joint above all
-                } else if (segment.curve.at(a)[1] - z).abs() <= level {
+                } else if (segment.curve.point_at(a)[1] - z).abs() <= level {
                     b = a;
                 }
                 for _ in 0..80 {
                     let middle = 0.5 * (a + b);
-                    if (segment.curve.at(middle)[1] >= z) == above {
+                    if (segment.curve.point_at(middle)[1] >= z) == above {
                         a = middle;
                     } else {
                         b = middle;
@@ -443,7 +443,7 @@ fn defect(segment: &Segment) -> Option<String> {
         let degrees = (segment.to - segment.from).to_degrees().abs();
         return Some(format!("an arc of {degrees:.1} degrees goes round more than once"));
     }
-    let outline: Vec<Point> = (0..=8).map(|k| segment.at(k as f64 / 8.0)).collect();
+    let outline: Vec<Point> = (0..=8).map(|k| segment.point_at(k as f64 / 8.0)).collect();
     let length: f64 = outline.windows(2).map(|p| norm(sub(p[1], p[0]))).sum();
     if length == 0.0 || !length.is_finite() {
         return Some("has no length".to_string());
@@ -483,7 +483,7 @@ fn samples(segment: &Segment) -> usize {
 /// around the lowest sample.
 fn extreme(segment: &Segment, sign: f64) -> (f64, f64) {
     let count = samples(segment);
-    let height = |s: f64| sign * segment.at(s.clamp(0.0, 1.0))[1];
+    let height = |s: f64| sign * segment.point_at(s.clamp(0.0, 1.0))[1];
     let step = 1.0 / count as f64;
     let lowest =
         (0..=count).min_by(|a, b| height(*a as f64 * step).total_cmp(&height(*b as f64 * step)));
@@ -511,7 +511,7 @@ impl Outline {
     fn new(segments: &[Segment]) -> Outline {
         let sampled = |s: &Segment| {
             let count = samples(s);
-            (0..=count).map(|k| s.at(k as f64 / count as f64)).collect()
+            (0..=count).map(|k| s.point_at(k as f64 / count as f64)).collect()
         };
         Outline { points: segments.iter().map(sampled).collect() }
     }
@@ -594,7 +594,7 @@ pub struct Volume {
 impl Volume {
     /// Computes the volume integrals of the liquid below the free surface, by Gauss's theorem along the wall. The
     /// volume is pi int r^2 dz; the others are similar.
-    pub fn of(wall: &Wall) -> Volume {
+    pub fn from_wall(wall: &Wall) -> Volume {
         let rule = Gauss::new(20);
         let base = wall.z_surface;
         let (mut volume, mut first, mut second, mut axial) = (0.0, 0.0, 0.0, 0.0);
@@ -608,7 +608,8 @@ impl Volume {
             for k in 0..pieces {
                 for (v, w) in rule.nodes.iter().zip(&rule.weights) {
                     let t = segment.from + step * (k as f64 + v);
-                    let ([r, z], dz) = (segment.curve.at(t), w * step * segment.curve.slope(t)[1]);
+                    let ([r, z], dz) =
+                        (segment.curve.point_at(t), w * step * segment.curve.slope(t)[1]);
                     let z = z - base;
                     let disc = core::f64::consts::PI * r * r * dz;
                     volume += disc;

@@ -36,7 +36,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::contour::Wall;
 use crate::gauss::Gauss;
-use crate::third_order::in_circle;
+use crate::third_order::circle_basis;
 
 /// Depth below the surface, over the largest radius, beyond which the liquid is at rest: 2e-5 of the
 /// motion of a cylinder's first mode.
@@ -145,7 +145,7 @@ impl Liquid {
             Boundary { points: Vec::new(), normals: Vec::new(), weights: Vec::new() };
         let scaled = |p: [f64; 2]| [p[0] / radius, (p[1] - wall.z_surface) / radius];
         let across = |p: &crate::curve::Segment| {
-            (0..=32).map(|i| p.at(f64::from(i) / 32.0)[0]).fold(0.0, f64::max)
+            (0..=32).map(|i| p.point_at(f64::from(i) / 32.0)[0]).fold(0.0, f64::max)
         };
         let widest = wall.segments.iter().map(across).fold(0.0, f64::max) / radius;
         let bottom = -DEEP * widest;
@@ -159,7 +159,7 @@ impl Liquid {
         };
         // From the contact line downwards.
         for segment in wall.segments.iter().rev() {
-            let height = |t: f64| scaled(segment.curve.at(t))[1];
+            let height = |t: f64| scaled(segment.curve.point_at(t))[1];
             let (mut from, to) = (segment.from, segment.to);
             let cut = height(from) < bottom;
             if cut {
@@ -174,10 +174,10 @@ impl Liquid {
             for (x, w) in rule.nodes.iter().zip(&rule.weights) {
                 let t = from + (to - from) * x;
                 let slope = segment.curve.slope(t).map(|d| d * (to - from) / radius);
-                add(scaled(segment.curve.at(t)), slope, *w);
+                add(scaled(segment.curve.point_at(t)), slope, *w);
             }
             if cut {
-                let end = scaled(segment.curve.at(from))[0];
+                let end = scaled(segment.curve.point_at(from))[0];
                 for (x, w) in rule.nodes.iter().zip(&rule.weights) {
                     add([end * x, bottom], [end, 0.0], *w);
                 }
@@ -242,7 +242,8 @@ impl Liquid {
     fn elevations(&self, m: usize, count: usize) -> DMatrix<f64> {
         let mut all = DMatrix::zeros(self.rho.len() + 1, count);
         for (i, rho) in self.rho.iter().chain(&[1.0]).enumerate() {
-            for (j, (f, _)) in in_circle(m as f64, rho * rho, count, 1.0).into_iter().enumerate() {
+            for (j, (f, _)) in circle_basis(m as f64, rho * rho, count, 1.0).into_iter().enumerate()
+            {
                 all[(i, j)] = f;
             }
         }

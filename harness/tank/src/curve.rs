@@ -82,7 +82,7 @@ const GAUSS8: [(f64, f64); 4] = [
 
 impl Curve {
     /// Returns the point at the parameter t.
-    pub fn at(&self, t: f64) -> Point {
+    pub fn point_at(&self, t: f64) -> Point {
         match *self {
             Curve::Line { from, to } => {
                 [from[0] + t * (to[0] - from[0]), from[1] + t * (to[1] - from[1])]
@@ -142,7 +142,7 @@ impl Curve {
                 })
             }
             Curve::Cassini { .. } | Curve::Cosine { .. } if dt.abs() > 0.1 => {
-                sub(self.at(t + dt), self.at(t))
+                sub(self.point_at(t + dt), self.point_at(t))
             }
             Curve::Cassini { .. } | Curve::Cosine { .. } => {
                 let mut sum = [0.0; 2];
@@ -197,12 +197,12 @@ impl Segment {
     /// Returns the first point, exactly on the axis if it is within rounding of it: cos(pi/2) is
     /// not 0 in floating point.
     pub fn start(&self) -> Point {
-        self.settle(self.curve.at(self.from))
+        self.settle(self.curve.point_at(self.from))
     }
 
     /// Returns the last point, exactly on the axis if it is within rounding of it.
     pub fn end(&self) -> Point {
-        self.settle(self.curve.at(self.to))
+        self.settle(self.curve.point_at(self.to))
     }
 
     fn settle(&self, p: Point) -> Point {
@@ -230,8 +230,8 @@ impl Segment {
     }
 
     /// Returns the point at the fraction `s` of the parameter.
-    pub fn at(&self, s: f64) -> Point {
-        self.curve.at(self.from + s * (self.to - self.from))
+    pub fn point_at(&self, s: f64) -> Point {
+        self.curve.point_at(self.from + s * (self.to - self.from))
     }
 
     /// Returns the angle through which the tangent turns, rad (an upper bound for ellipses).
@@ -269,11 +269,12 @@ mod tests {
         ];
         for curve in curves {
             // an eighth of the square of the interval times the third derivative, up to 40
-            let [before, after] = [0.3999, 0.4001].map(|t| curve.at(t));
+            let [before, after] = [0.3999, 0.4001].map(|t| curve.point_at(t));
             let slope = sub(after, before).map(|d| d / 2e-4);
             assert!(norm(sub(slope, curve.slope(0.4))) < 1e-6, "{curve:?}");
             for dt in [0.5, -0.09, 1e-3] {
-                let (chord, plain) = (curve.chord(0.4, dt), sub(curve.at(0.4 + dt), curve.at(0.4)));
+                let (chord, plain) =
+                    (curve.chord(0.4, dt), sub(curve.point_at(0.4 + dt), curve.point_at(0.4)));
                 assert!(norm(sub(chord, plain)) < 4e-16, "{curve:?} {dt}");
             }
             // at 1e-12 a difference of points would have only four digits

@@ -1,4 +1,4 @@
-//! Damping: one law for every tank and mode ([`of_tank`], by `formulas::damping`), the individual published
+//! Damping: one law for every tank and mode ([`tank_damping`], by `formulas::damping`), the individual published
 //! correlations, and ring baffles.
 //!
 //! Re = nu/sqrt(g R^3) throughout (an inverse Reynolds number), x = h/R is the fill, and zeta is
@@ -28,7 +28,7 @@ const ENDS: &str = "use the low end for stability margins, check both ends for s
 ///
 /// # Errors
 /// If there is neither gravity nor centring stiffness, because there is no natural frequency then.
-pub fn of_tank(
+pub fn tank_damping(
     tank: &Tank,
     data: &ModalData,
     nu: f64,
@@ -77,9 +77,11 @@ pub fn of_tank(
         parts.into_iter().filter(counts).filter_map(solve).collect()
     };
     let (found, near) = match (recognised, &data.wall) {
-        (Some(found), _) => (Vec::from_iter(Nearest::whole(found, first, nu)), Vec::new()),
+        (Some(found), _) => {
+            (Vec::from_iter(Nearest::from_whole_wall(found, first, nu)), Vec::new())
+        }
         (None, Some(wall)) => {
-            (solved(shape::parts(wall, data.fill)), solved(shape::near(wall, data.fill)))
+            (solved(shape::parts(wall, data.fill)), solved(shape::nearby_shapes(wall, data.fill)))
         }
         (None, None) => (Vec::new(), Vec::new()),
     };
@@ -125,13 +127,16 @@ pub fn of_tank(
             let layers = formula::UNMEASURED * first.laminar(nu);
             (whole.basis(estimate.factor, zeta, layers), Vec::new())
         }
-        _ => (mixture(&found, &near, estimate.factor), found.iter().map(Nearest::shown).collect()),
+        _ => (
+            mixture(&found, &near, estimate.factor),
+            found.iter().map(Nearest::to_damping_part).collect(),
+        ),
     };
     let taken = format!("{basis}; {ENDS}");
     Ok(Damping {
         nu,
         gravity,
-        shape: name_of(measured),
+        shape: shape_name(measured),
         correlation,
         parts,
         taken,
@@ -152,7 +157,7 @@ struct Nearest {
 
 impl Nearest {
     /// Creates the shape of the whole wall of a tank whose first mode is `first`.
-    fn whole(found: Recognised, first: formula::Mode, nu: f64) -> Option<Nearest> {
+    fn from_whole_wall(found: Recognised, first: formula::Mode, nu: f64) -> Option<Nearest> {
         let (shape, g) = (found.measured(), first.omega * first.omega / first.lambda);
         if shape != shape.at_measured_depth() {
             return Nearest::solve(found, 1.0, nu, g);
@@ -187,15 +192,15 @@ impl Nearest {
         self.at_depth && self.part.is_measured()
     }
 
-    fn shown(&self) -> DampingPart {
+    fn to_damping_part(&self) -> DampingPart {
         let formula::Part { share, factor, .. } = self.part;
-        DampingPart { shape: name_of(self.shape), share, factor }
+        DampingPart { shape: shape_name(self.shape), share, factor }
     }
 
     /// Returns the basis of the damping of a wall that is this shape, with the ratios by its correlation and by 1.45
     /// layers.
     fn basis(&self, factor: f64, correlation: f64, layers: f64) -> String {
-        let (name, unmeasured) = (name_of(self.shape), formula::UNMEASURED);
+        let (name, unmeasured) = (shape_name(self.shape), formula::UNMEASURED);
         let formula::Part { weight, .. } = self.part;
         let disagree = if self.part.disagrees() {
             ", more than measured tanks scatter: two estimates disagree"
@@ -231,7 +236,7 @@ impl Nearest {
         }
         format!(
             "{}, measured there; {unmeasured} laminar layers make {}{disagree}",
-            source_of(self.shape),
+            shape_source(self.shape),
             significant(layers)
         )
     }
@@ -248,7 +253,7 @@ fn mixture(found: &[Nearest], near: &[Nearest], factor: f64) -> String {
         for nearest in near.iter().filter(|nearest| nearest.part.disagrees()) {
             text += &format!(
                 "; it is nearly a {}, whose correlation makes {:.2} layers, which the interval includes",
-                name_of(nearest.shape),
+                shape_name(nearest.shape),
                 nearest.part.factor
             );
         }
@@ -260,7 +265,7 @@ fn mixture(found: &[Nearest], near: &[Nearest], factor: f64) -> String {
         format!(
             "{:.0} % of the wetted wall is a {}, whose correlation makes {factor:.2} layers{range}",
             100.0 * share,
-            name_of(nearest.shape)
+            shape_name(nearest.shape)
         )
     };
     let shapes: Vec<String> = found.iter().map(of_shape).collect();
@@ -284,10 +289,10 @@ fn solve_shape(found: Recognised, modes: usize) -> Option<ModalData> {
         shape => shape,
     };
     // The density does not matter for damping.
-    Tank::of_shape(whole, 1.0).ok()?.solve(found.fill, modes).ok()
+    Tank::from_shape(whole, 1.0).ok()?.solve(found.fill, modes).ok()
 }
 
-fn name_of(shape: formula::Shape) -> &'static str {
+fn shape_name(shape: formula::Shape) -> &'static str {
     match shape {
         formula::Shape::Cylinder { .. } => "upright cylinder",
         formula::Shape::Sphere { .. } => "sphere",
@@ -297,7 +302,7 @@ fn name_of(shape: formula::Shape) -> &'static str {
     }
 }
 
-fn source_of(shape: formula::Shape) -> &'static str {
+fn shape_source(shape: formula::Shape) -> &'static str {
     match shape {
         formula::Shape::Cylinder { radius, depth } if depth < 0.5 * radius => {
             "upright cylinder, shallow (Stephens, Leonard and Perry)"
@@ -340,7 +345,7 @@ impl Formula {
 /// 1959).
 ///
 /// Surface film, contact line and turbulence are not included. Measured cylinders have 1.4 to 1.5 times as
-/// much, see [`of_tank`].
+/// much, see [`tank_damping`].
 pub fn laminar(mode: &Mode, nu: f64, g: f64) -> Formula {
     let omega = (g * mode.lambda).sqrt();
     let layer = (2.0 * nu / omega).sqrt();

@@ -24,7 +24,7 @@ pub(crate) struct AtFill<'a> {
 
 impl<'a> AtFill<'a> {
     /// Returns the fills of solutions with their parameters.
-    pub fn all(rows: &[ModalData], sets: &'a [ParameterSet]) -> Vec<AtFill<'a>> {
+    pub fn from_rows(rows: &[ModalData], sets: &'a [ParameterSet]) -> Vec<AtFill<'a>> {
         let of = |(row, set): (&ModalData, &'a ParameterSet)| {
             let (fill, liquid) = (row.fill, row.m_liq);
             AtFill { fill, liquid, set }
@@ -32,7 +32,7 @@ impl<'a> AtFill<'a> {
         rows.iter().zip(sets).map(of).collect()
     }
 
-    fn known(&self, n: usize) -> Option<Coefficients> {
+    fn coefficients(&self, n: usize) -> Option<Coefficients> {
         self.set.third_order.iter().find(|(mode, _)| *mode == n).map(|(_, known)| *known)
     }
 
@@ -88,11 +88,11 @@ pub(crate) fn columns(
     let mut known: Vec<(f64, [f64; 2])> = points
         .iter()
         .chain(between)
-        .filter_map(|at| Some((at.liquid, coefficients(&at.known(n)?))))
+        .filter_map(|at| Some((at.liquid, coefficients(&at.coefficients(n)?))))
         .collect();
     known.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (missing, found): (Vec<&AtFill>, Vec<&AtFill>) =
-        points.iter().partition(|at| at.known(n).is_none());
+        points.iter().partition(|at| at.coefficients(n).is_none());
     if found.len() < 2 {
         let why = missing.first().map_or("", |at| at.reason()).to_string();
         return Err(TooFewFills { mode: n, known: found.len(), fills: points.len(), why });
@@ -100,11 +100,11 @@ pub(crate) fn columns(
     let masses: Vec<f64> = known.iter().map(|(liquid, _)| *liquid).collect();
     let curves = [0, 1].map(|i| {
         let y: Vec<f64> = known.iter().map(|(_, pair)| pair[i]).collect();
-        Monotone::within(&masses, &y)
+        Monotone::bounded(&masses, &y)
     });
-    let pair_at = |at: &AtFill| match at.known(n) {
+    let pair_at = |at: &AtFill| match at.coefficients(n) {
         Some(known) => coefficients(&known),
-        None => curves.each_ref().map(|curve| curve.at(at.liquid)),
+        None => curves.each_ref().map(|curve| curve.evaluate(at.liquid)),
     };
     let pairs: Vec<[f64; 2]> = points.iter().map(pair_at).collect();
     let values = [0, 1].map(|i| pairs.iter().map(|pair| pair[i]).collect::<Vec<f64>>());
@@ -114,7 +114,7 @@ pub(crate) fn columns(
          1 + |s| and 1 + |kappa|"
     )];
     for (at, [s, kappa]) in points.iter().zip(&pairs) {
-        let from = match at.known(n) {
+        let from = match at.coefficients(n) {
             Some(known) => format!(
                 "error {:.0e}, for slosh angles up to {:.0} degrees",
                 known.error,
@@ -139,10 +139,11 @@ pub(crate) fn columns(
         ));
     }
     let masses: Vec<f64> = points.iter().map(|at| at.liquid).collect();
-    let table = values.each_ref().map(|y| Monotone::within(&masses, y));
+    let table = values.each_ref().map(|y| Monotone::bounded(&masses, y));
     let off = |at: &AtFill| {
-        let exact = coefficients(&at.known(n)?);
-        let off = |i: usize| (table[i].at(at.liquid) - exact[i]).abs() / (1.0 + exact[i].abs());
+        let exact = coefficients(&at.coefficients(n)?);
+        let off =
+            |i: usize| (table[i].evaluate(at.liquid) - exact[i]).abs() / (1.0 + exact[i].abs());
         Some((off(0).max(off(1)), at.fill))
     };
     let worst = between.iter().filter_map(off).max_by(|a, b| a.0.total_cmp(&b.0));

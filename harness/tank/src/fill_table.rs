@@ -78,10 +78,10 @@ impl Curves {
         let taken = |y: &[f64]| points.iter().map(|i| y[*i]).collect::<Vec<_>>();
         let x = taken(&self.liquid);
         let mode = &self.modes[n];
-        let curves = mode.each_ref().map(|y| Monotone::within(&x, &taken(y)));
+        let curves = mode.each_ref().map(|y| Monotone::bounded(&x, &taken(y)));
         let mut worst = [0.0_f64; 3];
         for (i, liquid) in self.liquid.iter().enumerate() {
-            let [stiffness, bob, share] = curves.each_ref().map(|curve| curve.at(*liquid));
+            let [stiffness, bob, share] = curves.each_ref().map(|curve| curve.evaluate(*liquid));
             let hinge = bob + 1.0 / stiffness - mode[1][i] - 1.0 / mode[0][i];
             let off = [
                 (stiffness / mode[0][i]).sqrt() - 1.0,
@@ -112,7 +112,7 @@ fn bob(row: &ModalData, n: usize) -> f64 {
 }
 
 /// Returns the number of modes that carry liquid in all rows, at least one.
-fn carrying(rows: &[ModalData]) -> usize {
+fn count_carrying_modes(rows: &[ModalData]) -> usize {
     let most = rows.iter().map(|row| row.modes.len()).min().unwrap_or(0);
     let carries = |n: &usize| rows.iter().all(|row| row.modes[*n].m > 1e-6 * row.m_liq);
     (1..most.min(MODES)).take_while(carries).last().map_or(1, |n| n + 1)
@@ -139,7 +139,7 @@ pub fn place(tank: &Tank, low: f64, high: f64, modes: usize) -> Result<Placed, P
             .to_string()
             .into());
     }
-    let curves = Curves::new(&dense, carrying(&dense));
+    let curves = Curves::new(&dense, count_carrying_modes(&dense));
     let mut points: Vec<usize> =
         (0..POINTS).map(|i| (i * (CANDIDATES - 1) + (POINTS - 1) / 2) / (POINTS - 1)).collect();
     let mut best = curves.cost(&points);
@@ -207,7 +207,7 @@ pub fn parameters(
             .into());
     }
     let (first, last) = (&rows[0], &rows[rows.len() - 1]);
-    let modes = carrying(rows);
+    let modes = count_carrying_modes(rows);
     let solved = |rows: &[ModalData], liquid: Liquid| {
         let with_modes = |row: &ModalData| {
             let row = ModalData { modes: row.modes[..modes].to_vec(), ..row.clone() };
@@ -229,11 +229,13 @@ pub fn parameters(
     let limits = |what: &str, n: usize| -> Vec<Option<f64>> {
         sets.iter().map(|set| value(set, what, n)).collect()
     };
-    let limits: Vec<_> =
-        (1..=modes).map(|n| [around(limits("angle_limit", n)), limits("swirl_limit", n)]).collect();
+    let limits: Vec<_> = (1..=modes)
+        .map(|n| [fill_unknown_limits(limits("angle_limit", n)), limits("swirl_limit", n)])
+        .collect();
     let middle = between.map_or(&[][..], |between| &between.rows);
     let middle_sets = solved(middle, Liquid { nu: None, ..liquid })?;
-    let third_order = third_order(AtFill::all(rows, &sets), AtFill::all(middle, &middle_sets));
+    let third_order =
+        third_order(AtFill::from_rows(rows, &sets), AtFill::from_rows(middle, &middle_sets));
     let [low, high] = [sets.first(), sets.last()]
         .map(|set| set.and_then(|set| value(set, "k", 1)).unwrap_or(0.0));
     let mut set = sets.pop().unwrap_or_else(|| unreachable!("there are at least two rows"));
@@ -288,12 +290,12 @@ pub fn parameters(
         }
     }
     // parameters that the table replaces
-    let of_modes = (1..=modes).flat_map(|n| [MASS, LENGTH, HINGE].map(|array| array.at([n])));
-    let ratios_of_modes = (1..=modes).filter(|_| liquid.nu.is_some()).map(|n| ZETA.at([n]));
+    let of_modes = (1..=modes).flat_map(|n| [MASS, LENGTH, HINGE].map(|array| array.element([n])));
+    let ratios_of_modes = (1..=modes).filter(|_| liquid.nu.is_some()).map(|n| ZETA.element([n]));
     let of_modes = of_modes.chain(ratios_of_modes);
-    let coefficients =
-        (1..=modes).flat_map(|n| [NONLINEAR_INERTIA.at([n]), NONLINEAR_STIFFNESS.at([n])]);
-    let of_limits = (1..=modes).flat_map(|n| [ANGLE_LIMIT.at([n]), SWIRL_LIMIT.at([n])]);
+    let coefficients = (1..=modes)
+        .flat_map(|n| [NONLINEAR_INERTIA.element([n]), NONLINEAR_STIFFNESS.element([n])]);
+    let of_limits = (1..=modes).flat_map(|n| [ANGLE_LIMIT.element([n]), SWIRL_LIMIT.element([n])]);
     let of_modes = of_modes.chain(coefficients).chain(of_limits);
     let replaced = [M_0, H_0, I_0, I_Z].map(String::from).into_iter().chain(of_modes);
     let replaced: Vec<String> = replaced.map(|name| target.name(&name)).collect();
@@ -305,32 +307,32 @@ pub fn parameters(
     real(OUTLET, last.z_lowest);
     for (i, row) in rows.iter().enumerate() {
         let (at, rest) = (i + 1, row.rest(modes));
-        real(&fill::LIQUID.at([at]), row.m_liq);
-        real(&fill::H_0.at([at]), rest.height);
+        real(&fill::LIQUID.element([at]), row.m_liq);
+        real(&fill::H_0.element([at]), rest.height);
         // with the largest number of modes it may be below 0 by rounding
-        real(&fill::I_0.at([at]), rest.inertia.max(0.0));
-        real(&fill::I_Z.at([at]), row.i_eff_axis.unwrap_or(0.0));
+        real(&fill::I_0.element([at]), rest.inertia.max(0.0));
+        real(&fill::I_Z.element([at]), row.i_eff_axis.unwrap_or(0.0));
         for n in 0..modes {
             let mode = &row.modes[n];
-            real(&fill::MASS.at([n + 1, at]), mode.m);
-            real(&fill::LENGTH.at([n + 1, at]), mode.l);
-            real(&fill::HINGE.at([n + 1, at]), bob(row, n) + mode.l);
+            real(&fill::MASS.element([n + 1, at]), mode.m);
+            real(&fill::LENGTH.element([n + 1, at]), mode.l);
+            real(&fill::HINGE.element([n + 1, at]), bob(row, n) + mode.l);
             if liquid.nu.is_some() {
-                real(&fill::ZETA.at([n + 1, at]), ratios[i][n]);
+                real(&fill::ZETA.element([n + 1, at]), ratios[i][n]);
             }
         }
     }
     for (n, [s, kappa]) in of_fills {
         for (i, (s, kappa)) in s.into_iter().zip(kappa).enumerate() {
-            real(&fill::NONLINEAR_INERTIA.at([n, i + 1]), s);
-            real(&fill::NONLINEAR_STIFFNESS.at([n, i + 1]), kappa);
+            real(&fill::NONLINEAR_INERTIA.element([n, i + 1]), s);
+            real(&fill::NONLINEAR_STIFFNESS.element([n, i + 1]), kappa);
         }
     }
     for (n, [angle, swirl]) in limits.into_iter().enumerate() {
         for (i, (angle, swirl)) in angle.into_iter().zip(swirl).enumerate() {
             for (array, limit) in [(fill::ANGLE_LIMIT, angle), (fill::SWIRL_LIMIT, swirl)] {
                 if let Some(limit) = limit {
-                    real(&array.at([n + 1, i + 1]), limit);
+                    real(&array.element([n + 1, i + 1]), limit);
                 }
             }
         }
@@ -340,7 +342,7 @@ pub fn parameters(
 }
 
 /// Returns the limits over the fill with the smaller of the nearest known ones where a limit is not known.
-fn around(limits: Vec<Option<f64>>) -> Vec<Option<f64>> {
+fn fill_unknown_limits(limits: Vec<Option<f64>>) -> Vec<Option<f64>> {
     let nearest = |i: usize| {
         let below = limits[..i].iter().rev().find_map(|limit| *limit);
         let above = limits[i..].iter().find_map(|limit| *limit);

@@ -79,7 +79,12 @@ impl Coefficients {
 
     /// Returns the coefficients of an upright cylinder filled to h/R = `fill` with its limits. Across the poles both
     /// coefficients are bridged; the second-order wave is then interpolated, too.
-    fn of_cylinder(self, fill: f64, wave: f64, second: impl Fn(f64) -> f64) -> Coefficients {
+    fn cylinder_coefficients(
+        self,
+        fill: f64,
+        wave: f64,
+        second: impl Fn(f64) -> f64,
+    ) -> Coefficients {
         let mut known = self;
         let [low, high] = BRIDGED;
         if fill > low && fill < high {
@@ -146,7 +151,7 @@ struct Found {
 }
 
 impl Found {
-    fn of(overlaps: &Overlaps, depth: f64) -> Found {
+    fn from_overlaps(overlaps: &Overlaps, depth: f64) -> Found {
         let [planar, circular] = overlaps.shifts(depth);
         Found {
             equivalent: overlaps.equivalent(depth),
@@ -159,7 +164,7 @@ impl Found {
 
 /// Returns the amplitude dependence of a tank's first mode, solved as `data`. The coefficients do not depend on the
 /// specific force; they hold without surface tension.
-pub fn of_tank(tank: &Tank, data: &ModalData) -> FiniteAmplitude {
+pub fn amplitude_dependence(tank: &Tank, data: &ModalData) -> FiniteAmplitude {
     let (Some(mode), depth) = (data.modes.first(), data.fill) else {
         return FiniteAmplitude::default();
     };
@@ -167,7 +172,7 @@ pub fn of_tank(tank: &Tank, data: &ModalData) -> FiniteAmplitude {
     let [mode, mode_y] = match (&tank.geometry, &data.axes) {
         (Geometry::Box { length_x, length_y }, Some(axes)) => {
             let wave_y = axes.y.modes.first().map_or(mode.wave, |mode| mode.wave);
-            of_box([*length_x, *length_y], depth, [mode.wave, wave_y], &mut warnings)
+            box_coefficients([*length_x, *length_y], depth, [mode.wave, wave_y], &mut warnings)
         }
         _ => {
             let known = match (ring(data), &data.wall) {
@@ -175,11 +180,15 @@ pub fn of_tank(tank: &Tank, data: &ModalData) -> FiniteAmplitude {
                     let all = COUNTS.map(|count| Overlaps::round(inner, outer, count));
                     let all = all.each_ref();
                     match inner > 0.0 {
-                        true => of_overlaps(all, depth, mode.wave, &mut warnings),
-                        false => Some(of_cylinder(all, depth, outer, mode.wave, &mut warnings)),
+                        true => coefficients_from_overlaps(all, depth, mode.wave, &mut warnings),
+                        false => {
+                            Some(cylinder_coefficients(all, depth, outer, mode.wave, &mut warnings))
+                        }
                     }
                 }
-                (None, Some(wall)) => of_contour(wall, mode.wave, mode.lambda, &mut warnings),
+                (None, Some(wall)) => {
+                    contour_coefficients(wall, mode.wave, mode.lambda, &mut warnings)
+                }
                 (None, None) => None,
             };
             [known, None]
@@ -210,28 +219,29 @@ pub fn of_tank(tank: &Tank, data: &ModalData) -> FiniteAmplitude {
 }
 
 /// Returns the coefficients from two truncations of a section with vertical walls.
-fn of_overlaps(
+fn coefficients_from_overlaps(
     [rough, fine]: [&Overlaps; 2],
     depth: f64,
     wave: f64,
     warnings: &mut Vec<String>,
 ) -> Option<Coefficients> {
-    let mut known = Coefficients::new([rough, fine].map(|x| Found::of(x, depth)), wave);
+    let mut known = Coefficients::new([rough, fine].map(|x| Found::from_overlaps(x, depth)), wave);
     let excited = fine.secondary_resonance(depth);
     let detuned = |detuning| fine.detuned_equivalent(depth, detuning);
     known.bounded_near(excited, &detuned, warnings).then_some(known)
 }
 
 /// Returns the coefficients of an upright cylinder of this radius, m.
-fn of_cylinder(
+fn cylinder_coefficients(
     all: [&Overlaps; 2],
     depth: f64,
     radius: f64,
     wave: f64,
     warnings: &mut Vec<String>,
 ) -> Coefficients {
-    let known = Coefficients::new(all.map(|x| Found::of(x, depth)), wave);
-    let known = known.of_cylinder(depth / radius, wave, |fill| all[1].second_wave(fill * radius));
+    let known = Coefficients::new(all.map(|x| Found::from_overlaps(x, depth)), wave);
+    let known =
+        known.cylinder_coefficients(depth / radius, wave, |fill| all[1].second_wave(fill * radius));
     if known.bridged {
         warnings.push(format!(
             "finite amplitude: at h/R {:.3} s and kappa are interpolated between h/R {} and {}, because modes of the surface have \
@@ -291,11 +301,11 @@ fn ring(data: &ModalData) -> Option<[f64; 2]> {
         (r - outer).abs().min(to_inner).min((z - bottom).abs()) < SAME * size
     };
     let mut points =
-        wall.segments.iter().flat_map(|part| (0..=32).map(|i| part.at(f64::from(i) / 32.0)));
+        wall.segments.iter().flat_map(|part| (0..=32).map(|i| part.point_at(f64::from(i) / 32.0)));
     points.all(is_on).then_some([inner, outer])
 }
 
-fn of_box(
+fn box_coefficients(
     [length_x, length_y]: [f64; 2],
     depth: f64,
     waves: [f64; 2],
@@ -304,7 +314,7 @@ fn of_box(
     if length_x == length_y {
         let [side, diagonal] = [false, true].map(|diagonal| Overlaps::square(length_x, diagonal));
         let shifts = [&side, &diagonal].map(|overlaps| overlaps.shifts(depth)[0]);
-        let known = of_overlaps([&side; 2], depth, waves[0], warnings);
+        let known = coefficients_from_overlaps([&side; 2], depth, waves[0], warnings);
         if known.is_some() {
             warnings.push(format!(
                 "finite amplitude: in a square box omega^2 shifts by {:.4} A^2 in planar motion along a side, and by {:.4} A^2 along a \
@@ -316,7 +326,7 @@ fn of_box(
     }
     let known = [(length_x, waves[0]), (length_y, waves[1])].map(|(length, wave)| {
         let overlaps = Overlaps::rectangle(length);
-        of_overlaps([&overlaps; 2], depth, wave, warnings)
+        coefficients_from_overlaps([&overlaps; 2], depth, wave, warnings)
     });
     let difference = (length_x / length_y - 1.0).abs();
     if difference < NEARLY_SQUARE {
@@ -331,7 +341,7 @@ fn of_box(
 
 /// Computes the coefficients of a body of revolution with any wall; `lambda`, 1/m, is the first mode's by the boundary
 /// integral equation.
-fn of_contour(
+fn contour_coefficients(
     wall: &Wall,
     wave: f64,
     lambda: f64,

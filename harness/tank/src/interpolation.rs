@@ -18,7 +18,7 @@ impl Monotone {
     /// # Panics
     /// If there is no point, or `x` is not ascending.
     pub fn new(x: &[f64], y: &[f64]) -> Monotone {
-        Monotone::through(x, y, false)
+        Monotone::interpolate(x, y, false)
     }
 
     /// Interpolates like [`Monotone::new`], but stays between its two points everywhere, like the FMUs' tables: a
@@ -26,11 +26,11 @@ impl Monotone {
     ///
     /// # Panics
     /// The same as for [`Monotone::new`].
-    pub fn within(x: &[f64], y: &[f64]) -> Monotone {
-        Monotone::through(x, y, true)
+    pub fn bounded(x: &[f64], y: &[f64]) -> Monotone {
+        Monotone::interpolate(x, y, true)
     }
 
-    fn through(x: &[f64], y: &[f64], within: bool) -> Monotone {
+    fn interpolate(x: &[f64], y: &[f64], within: bool) -> Monotone {
         assert!(!x.is_empty() && x.len() == y.len() && x.windows(2).all(|w| w[0] < w[1]));
         let (mut slope, mut curvature) = (vec![0.0; x.len()], vec![0.0; x.len()]);
         derivatives(x, y, within, &mut slope, &mut curvature);
@@ -38,7 +38,7 @@ impl Monotone {
     }
 
     /// Returns the value at `x`; outside the points that of the nearest end.
-    pub fn at(&self, x: f64) -> f64 {
+    pub fn evaluate(&self, x: f64) -> f64 {
         let count = self.x.len();
         let x = x.clamp(self.x[0], self.x[count - 1]);
         if count == 1 {
@@ -65,7 +65,7 @@ mod tests {
             let curve = Monotone::new(&x, &y);
             (0..1000)
                 .map(|i| i as f64 / 1000.0)
-                .map(|x| (curve.at(x) - x.exp()).abs())
+                .map(|x| (curve.evaluate(x) - x.exp()).abs())
                 .fold(0.0, f64::max)
         };
         // halving the step reduces the error by 2^5 = 32 in the middle, by 2^4 near the ends
@@ -86,14 +86,17 @@ mod tests {
         for sign in [1.0, -1.0] {
             let y: Vec<f64> = y.iter().map(|y| sign * y).collect();
             let curve = Monotone::new(&x, &y);
-            let samples: Vec<f64> = (0..=30000).map(|i| sign * curve.at(i as f64 * 5e-5)).collect();
+            let samples: Vec<f64> =
+                (0..=30000).map(|i| sign * curve.evaluate(i as f64 * 5e-5)).collect();
             assert!(samples.windows(2).all(|w| w[1] >= w[0] - 1e-15));
             for &x in &x[1..10] {
                 // the difference of the second differences on both sides falls with their step,
                 // down to the rounding error of 1e-4
                 let jump = |h: f64| {
-                    let second =
-                        |c: f64| (curve.at(c + h) - 2.0 * curve.at(c) + curve.at(c - h)) / (h * h);
+                    let second = |c: f64| {
+                        (curve.evaluate(c + h) - 2.0 * curve.evaluate(c) + curve.evaluate(c - h))
+                            / (h * h)
+                    };
                     (second(x + h) - second(x - h)).abs()
                 };
                 assert!(jump(1e-5) < 0.2 * jump(1e-4) + 1e-4, "{x} {} {}", jump(1e-4), jump(1e-5));

@@ -115,7 +115,7 @@ fn meniscus_shift(bond: f64, contact_angle: f64) -> f64 {
         if cos > c6 {
             return difference[6] + (difference[6] - difference[5]) * (cos - c6) / (c6 - c5);
         }
-        Monotone::new(&cosines, &difference).at(cos)
+        Monotone::new(&cosines, &difference).evaluate(cos)
     };
     if bond > BOND[5] {
         let limit = -2.0 * XI * XI * cos;
@@ -123,7 +123,7 @@ fn meniscus_shift(bond: f64, contact_angle: f64) -> f64 {
     }
     let places: Vec<f64> = BOND.iter().map(|b| b.ln_1p()).collect();
     let values: Vec<f64> = (0..6).map(at_row).collect();
-    Monotone::new(&places, &values).at(bond.ln_1p())
+    Monotone::new(&places, &values).evaluate(bond.ln_1p())
 }
 
 /// Computes the first mode of an upright cylinder filled to `fill`, m, with a curved meniscus. The shift of Omega_1^2

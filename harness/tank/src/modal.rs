@@ -553,7 +553,7 @@ fn estimate(before: f64, last: f64) -> f64 {
 /// # Errors
 /// If the estimated error is above 1e-2.
 pub(crate) fn solve(wall: Wall, rho: f64, fill: f64, modes: usize) -> Result<ModalData, Problems> {
-    let volume = Volume::of(&wall);
+    let volume = Volume::from_wall(&wall);
     let modes = if wall.r_outer > 0.0 { modes } else { 0 };
     let pair = pair(&wall, &volume, rho, modes);
     let Some(Pair { better, error, error_beta }) = pair.filter(|p| p.error < WORST) else {
@@ -710,7 +710,7 @@ mod tests {
     fn errors_are_over_the_radius_of_the_free_surface() {
         let segments = vec![crate::curve::Segment::arc([0.0, 1.0], 1.0, -90.0, 90.0)];
         let wall = crate::contour::Contour::new(segments).unwrap().cut(1.99).unwrap();
-        let volume = Volume::of(&wall);
+        let volume = Volume::from_wall(&wall);
         let found = pair_on(&wall, &volume, 2.0, 3, false).unwrap();
         let mesh = Discretisation::new(&wall.segments, 3, 16, false);
         let [a, b, c, d] = orders(mesh.panel_count())
@@ -772,8 +772,8 @@ mod tests {
         };
         let (share, modes) = (between(0.1, 0.95), 1 + between(0.0, 5.0) as usize);
         let contour = crate::contour::Contour::new(segments).ok()?;
-        let wall = contour.cut(contour.fill_of(share * contour.capacity())).ok()?;
-        let volume = Volume::of(&wall);
+        let wall = contour.cut(contour.fill_from_volume(share * contour.capacity())).ok()?;
+        let volume = Volume::from_wall(&wall);
         let found = pair(&wall, &volume, 1.0, modes)?;
         let mesh = Discretisation::new(&wall.segments, modes, 16, false);
         // Beyond 20 points the rules for close points do not integrate better.

@@ -317,7 +317,8 @@ struct Piece {
 
 impl Piece {
     fn new(segment: &Segment, index: usize, from: f64, to: f64) -> Piece {
-        let points = core::array::from_fn(|i| segment.at(from + (to - from) * i as f64 / 8.0));
+        let points =
+            core::array::from_fn(|i| segment.point_at(from + (to - from) * i as f64 / 8.0));
         let length = points.windows(2).map(|p: &[Point]| norm(sub(p[1], p[0]))).sum();
         Piece { segment: index, from, to, points, length }
     }

@@ -221,7 +221,7 @@ fn springs(
 
 /// Returns axis and number of the modes of a box in Spacecraft, which has three: the first along each axis, and the
 /// second with the larger mass.
-fn along_both(axes: [&[modal::Mode]; 2]) -> Vec<(usize, usize)> {
+fn box_modes(axes: [&[modal::Mode]; 2]) -> Vec<(usize, usize)> {
     let mass = |axis: usize| axes[axis].get(1).map_or(0.0, |mode| mode.m);
     let mut chosen = vec![(0, 0), (1, 0)];
     if axes.iter().all(|modes| modes.len() > 1) {
@@ -241,7 +241,11 @@ pub fn surface_tension_warnings(data: &ModalData, liquid: Liquid) -> Vec<String>
 
 /// Returns the natural frequencies of a tank's modes with the surface tension and contact angle of the liquid, at its
 /// gravity; `None` without surface tension.
-pub fn capillarity_of(tank: &Tank, data: &ModalData, liquid: Liquid) -> Option<modal::Capillarity> {
+pub fn tank_capillarity(
+    tank: &Tank,
+    data: &ModalData,
+    liquid: Liquid,
+) -> Option<modal::Capillarity> {
     let sigma = liquid.sigma?;
     let fluid = Fluid { rho: data.rho, sigma, g: liquid.gravity };
     let curved = (fluid, liquid.contact_angle);
@@ -282,21 +286,21 @@ pub fn capillarity_of(tank: &Tank, data: &ModalData, liquid: Liquid) -> Option<m
 /// If the tank cannot hold the fill, the modes cannot be solved, or the damping has no estimate
 /// ([`Tank::height_of`], [`Tank::solve`], [`damping_of`]).
 pub fn solve(tank: &Tank, fill: Fill, modes: usize, liquid: Liquid) -> Result<ModalData, Problems> {
-    let mut data = tank.solve(tank.height_of(fill)?, modes)?;
-    data.capillarity = capillarity_of(tank, &data, liquid);
+    let mut data = tank.solve(tank.fill_height(fill)?, modes)?;
+    data.capillarity = tank_capillarity(tank, &data, liquid);
     if !data.modes.is_empty() {
-        data.finite_amplitude = Some(finite_amplitude::of_tank(tank, &data));
-        data.damping = liquid.nu.map(|nu| damping_of(tank, &data, nu, liquid)).transpose()?;
+        data.finite_amplitude = Some(finite_amplitude::amplitude_dependence(tank, &data));
+        data.damping = liquid.nu.map(|nu| tank_damping(tank, &data, nu, liquid)).transpose()?;
     }
     Ok(data)
 }
 
 /// Returns the damping of a tank's modes with the capillarity of the liquid, see
-/// [`damping::of_tank`].
+/// [`damping::tank_damping`].
 ///
 /// # Errors
 /// Without gravity and surface tension there is no natural frequency.
-pub fn damping_of(
+pub fn tank_damping(
     tank: &Tank,
     data: &ModalData,
     nu: f64,
@@ -308,7 +312,7 @@ pub fn damping_of(
     };
     let along_y = data.axes.as_ref().map_or(Vec::new(), |axes| stiffnesses(&axes.y.modes));
     let springs = [&stiffnesses(&data.modes)[..], &along_y[..]];
-    damping::of_tank(tank, data, nu, liquid.gravity, springs, liquid.sigma)
+    damping::tank_damping(tank, data, nu, liquid.gravity, springs, liquid.sigma)
 }
 
 impl ParameterSet {
@@ -387,7 +391,7 @@ impl ParameterSet {
             (Some(_), Target::HubSlosh) => {
                 (0..2).flat_map(|axis| (0..count).map(move |n| (axis, n))).collect()
             }
-            (Some(axes), _) => along_both([&axes.x.modes, &axes.y.modes]),
+            (Some(axes), _) => box_modes([&axes.x.modes, &axes.y.modes]),
             (None, _) => (0..count).map(|n| (0, n)).collect(),
         };
         let of_axes = [&data.modes[..count], both.map_or(&[], |axes| &axes.y.modes[..count])];
@@ -402,7 +406,7 @@ impl ParameterSet {
             Some(nu) => {
                 let found = match &data.damping {
                     Some(known) if liquid.damped(data) => known.clone(),
-                    _ => damping_of(tank, data, nu, liquid)?,
+                    _ => tank_damping(tank, data, nu, liquid)?,
                 };
                 notes.push(format!("damping ratio of mode 1: {}", found.taken));
                 let of_axes = [&found.modes, &found.modes_y];
@@ -425,7 +429,7 @@ impl ParameterSet {
             }
         };
         let known = data.finite_amplitude.clone();
-        let mut found = known.unwrap_or_else(|| finite_amplitude::of_tank(tank, data));
+        let mut found = known.unwrap_or_else(|| finite_amplitude::amplitude_dependence(tank, data));
         // Potential flow without surface tension gives them.
         let stiff = modes[0].m * modes[0].lambda * liquid.gravity * MOST_CAPILLARY;
         if springs[0].first().is_some_and(|spring| spring.abs() > stiff) {
@@ -550,7 +554,7 @@ impl ParameterSet {
             ));
             for n in first_across..=2 * count {
                 let radial = Value::Real(std::f64::consts::FRAC_PI_2);
-                values.push((slosh::table::DIRECTION.at([n]), radial));
+                values.push((slosh::table::DIRECTION.element([n]), radial));
             }
         }
         let mut real = |name: String, value: f64| values.push((name, Value::Real(value)));
@@ -607,7 +611,7 @@ impl ParameterSet {
                 if let Some(axes) = both {
                     real(target.name(DI_Y), axes.x.i_eff_cg - axes.y.i_eff_cg);
                     for (n, &(axis, _)) in chosen.iter().enumerate() {
-                        real(target.name(&DIRECTION.at([n + 1, axis + 1])), 1.0);
+                        real(target.name(&DIRECTION.element([n + 1, axis + 1])), 1.0);
                     }
                     notes.push(format!(
                         "planar modes along both lengths: m_0 = {:.6} kg is the liquid less the masses of all, each of which is \

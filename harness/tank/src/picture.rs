@@ -117,7 +117,7 @@ fn outline(segments: &[Segment]) -> Vec<Point> {
     let mut points = Vec::new();
     for segment in segments {
         let count = if matches!(segment.curve, Curve::Line { .. }) { 1 } else { 60 };
-        points.extend((0..=count).map(|i| segment.at(i as f64 / count as f64)));
+        points.extend((0..=count).map(|i| segment.point_at(i as f64 / count as f64)));
     }
     points
 }

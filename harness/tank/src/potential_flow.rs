@@ -648,7 +648,7 @@ mod tests {
             let along = mesh.along_wall(&u);
             for [r, z, speed] in &along {
                 let near = |s: &Segment| {
-                    (0..=4000).any(|i| norm(sub(s.at(i as f64 / 4000.0), [*r, *z])) < 1e-3)
+                    (0..=4000).any(|i| norm(sub(s.point_at(i as f64 / 4000.0), [*r, *z])) < 1e-3)
                 };
                 assert!(wall.iter().any(near), "({r}, {z})");
                 let direction = match wall[..] {
@@ -669,7 +669,12 @@ mod tests {
                 .iter()
                 .map(|s| {
                     (0..999)
-                        .map(|i| norm(sub(s.at((i + 1) as f64 / 999.0), s.at(i as f64 / 999.0))))
+                        .map(|i| {
+                            norm(sub(
+                                s.point_at((i + 1) as f64 / 999.0),
+                                s.point_at(i as f64 / 999.0),
+                            ))
+                        })
                         .sum::<f64>()
                 })
                 .sum();

@@ -45,9 +45,9 @@ impl Recognised {
 /// the free surface above the lowest point, m.
 pub(crate) fn recognise(wall: &Wall, fill: f64) -> Option<Recognised> {
     let points = sampled(wall, PLACES);
-    let cut = Cut::whole(&points, fill)?;
+    let cut = Cut::from_whole_wall(&points, fill)?;
     KINDS.into_iter().find_map(|kind| {
-        let shape = kind.through(cut)?;
+        let shape = kind.shape_through(cut)?;
         let fits = |p: &Point| distance(&shape, *p, cut.bottom) <= SAME * cut.size();
         points.iter().all(fits).then_some(Recognised { shape, fill })
     })
@@ -94,14 +94,14 @@ pub(crate) fn parts(wall: &Wall, fill: f64) -> Vec<Part> {
 
 /// Returns the measured shapes that the whole wetted wall is near, each with a share that falls from 1 on the shape to 0
 /// at a distance of [`NEAR`]. `fill` is the height of the free surface above the lowest point, m.
-pub(crate) fn near(wall: &Wall, fill: f64) -> Vec<Part> {
+pub(crate) fn nearby_shapes(wall: &Wall, fill: f64) -> Vec<Part> {
     let points = sampled(wall, PLACES);
-    let Some(cut) = Cut::whole(&points, fill) else { return Vec::new() };
+    let Some(cut) = Cut::from_whole_wall(&points, fill) else { return Vec::new() };
     let widest = points.iter().fold(0.0, |widest: f64, p| widest.max(p[0]));
     // not the size of a pool or of a pipe, in which every shape is near every other
     let size = fill.min(widest);
     let of_kind = |kind: Kind| {
-        let shape = kind.through(cut)?;
+        let shape = kind.shape_through(cut)?;
         let farthest =
             points.iter().fold(0.0, |far: f64, p| far.max(distance(&shape, *p, cut.bottom)));
         let share = 1.0 - smooth_step(farthest / (NEAR * size));
@@ -126,7 +126,7 @@ const SAMPLES: usize = 256;
 /// Returns `places` + 1 points on each segment.
 fn sampled(wall: &Wall, places: usize) -> Vec<Point> {
     let on = |part: &Segment| -> Vec<Point> {
-        (0..=places).map(|i| part.at(i as f64 / places as f64)).collect()
+        (0..=places).map(|i| part.point_at(i as f64 / places as f64)).collect()
     };
     wall.segments.iter().flat_map(on).collect()
 }
@@ -145,7 +145,7 @@ struct Cut {
 }
 
 impl Cut {
-    fn whole(points: &[Point], fill: f64) -> Option<Cut> {
+    fn from_whole_wall(points: &[Point], fill: f64) -> Option<Cut> {
         let (first, last) = (*points.first()?, *points.last()?);
         let on_axis = first[0] <= SAME * fill.max(last[0]);
         let inner = (!on_axis).then_some(first[0]);
@@ -170,7 +170,7 @@ enum Kind {
 
 impl Kind {
     /// Returns the shape through the lowest point and the contact lines.
-    fn through(self, cut: Cut) -> Option<Shape> {
+    fn shape_through(self, cut: Cut) -> Option<Shape> {
         let Cut { outer, depth, .. } = cut;
         match (self, cut.inner) {
             (Kind::Cylinder, None) => Some(Shape::Cylinder { radius: outer, height: depth }),
@@ -193,7 +193,7 @@ impl Kind {
 
     /// Returns the part of the wall that is of this kind, without regard to other kinds; `None` below [`LEAST`].
     fn part(self, points: &[Point], fill: f64) -> Option<Part> {
-        let whole = Cut::whole(points, fill)?;
+        let whole = Cut::from_whole_wall(points, fill)?;
         let lowest =
             (0..points.len()).rev().min_by(|a, b| points[*a][1].total_cmp(&points[*b][1]))?;
         let bands: Vec<f64> =
@@ -213,7 +213,7 @@ impl Kind {
             if cut.depth <= SAME * whole.size() {
                 break;
             }
-            let Some(shape) = self.through(cut) else { continue };
+            let Some(shape) = self.shape_through(cut) else { continue };
             let (limit, mut farthest) = (FAR * cut.size(), 0.0_f64);
             for p in &points[start..=level] {
                 farthest = farthest.max(distance(&shape, *p, cut.bottom));
@@ -243,12 +243,12 @@ impl Kind {
         if share <= LEAST {
             return None;
         }
-        let shape = self.with(size / share, ring / share, depth / share);
+        let shape = self.build(size / share, ring / share, depth / share);
         let found = Recognised { shape, fill: depth / share };
         Some(Part { found, share: (share - LEAST) / (1.0 - LEAST) })
     }
 
-    fn with(self, size: f64, ring: f64, depth: f64) -> Shape {
+    fn build(self, size: f64, ring: f64, depth: f64) -> Shape {
         match self {
             Kind::Cylinder => Shape::Cylinder { radius: size, height: depth },
             Kind::Cone => Shape::Cone { half_angle: size, height: depth },

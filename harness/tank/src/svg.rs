@@ -203,8 +203,8 @@ mod tests {
                 close(found.to - found.from, turn);
                 for i in 0..2 {
                     close(c[i], size * center[i]);
-                    close(found.curve.at(found.from)[i], size * p[i]);
-                    close(found.curve.at(found.to)[i], size * q[i]);
+                    close(found.curve.point_at(found.from)[i], size * p[i]);
+                    close(found.curve.point_at(found.to)[i], size * q[i]);
                 }
                 close(a_r, 2.0 * size);
                 close(a_z, size);

@@ -6,7 +6,7 @@ use crate::contour::Problems;
 use crate::finite_amplitude;
 use crate::interpolation::Monotone;
 use crate::modal::{ModalData, Mode, Rest, rest};
-use crate::parameters::{Liquid, damping_of};
+use crate::parameters::{Liquid, tank_damping};
 use crate::tank::Tank;
 
 /// Modal parameters at ascending fills.
@@ -48,15 +48,15 @@ impl Sweep {
     /// Those of [`damping_of`].
     pub fn damp(&mut self, tank: &Tank, nu: f64, liquid: Liquid) -> Result<(), Problems> {
         for row in self.rows.iter_mut().filter(|row| !row.modes.is_empty()) {
-            row.damping = Some(damping_of(tank, row, nu, liquid)?);
+            row.damping = Some(tank_damping(tank, row, nu, liquid)?);
         }
         Ok(())
     }
 
-    /// Computes the third-order coefficients of every row that has modes, see [`finite_amplitude::of_tank`].
+    /// Computes the third-order coefficients of every row that has modes, see [`finite_amplitude::amplitude_dependence`].
     pub fn add_third_order(&mut self, tank: &Tank) {
         for row in self.rows.iter_mut().filter(|row| !row.modes.is_empty()) {
-            row.finite_amplitude = Some(finite_amplitude::of_tank(tank, row));
+            row.finite_amplitude = Some(finite_amplitude::amplitude_dependence(tank, row));
         }
     }
 
@@ -229,11 +229,12 @@ impl Depletion {
     }
 
     /// Returns the parameters at a fill; outside the table's range those at its nearest end.
-    pub fn at(&self, fill: f64) -> AtFill {
+    pub fn parameters_at(&self, fill: f64) -> AtFill {
         let fill = fill.clamp(self.range[0], self.range[1]);
-        let [m_liq, z_cg, across, axial, inertia] = self.liquid.each_ref().map(|t| t.at(fill));
+        let [m_liq, z_cg, across, axial, inertia] =
+            self.liquid.each_ref().map(|t| t.evaluate(fill));
         let mode = |(i, table): (usize, &ModeTable)| {
-            let [l, m, m_h, m_h2, wave, beta] = table.0.each_ref().map(|t| t.at(fill));
+            let [l, m, m_h, m_h2, wave, beta] = table.0.each_ref().map(|t| t.evaluate(fill));
             // m h^2 follows from m and m h, unless m is too small to divide by
             let m_h2 = if m > 1e-6 { m_h * m_h / m } else { m_h2 };
             Mode::interpolated(i + 1, l, [m, m_h, m_h2].map(|x| x * m_liq), z_cg, m_liq, wave, beta)
@@ -254,11 +255,11 @@ impl Depletion {
     }
 
     /// Returns the fill with this mass of liquid, kg, within the table's range.
-    pub fn fill_of(&self, m_liq: f64) -> f64 {
+    pub fn fill_from_mass(&self, m_liq: f64) -> f64 {
         let [mut low, mut high] = self.range;
         for _ in 0..60 {
             let middle = 0.5 * (low + high);
-            if self.liquid[0].at(middle) < m_liq {
+            if self.liquid[0].evaluate(middle) < m_liq {
                 low = middle;
             } else {
                 high = middle;

@@ -306,7 +306,7 @@ impl Tank {
     ///
     /// # Errors
     /// Lists every dimension outside its range.
-    pub fn of_shape(shape: Shape, density: f64) -> Result<Tank, Problems> {
+    pub fn from_shape(shape: Shape, density: f64) -> Result<Tank, Problems> {
         let geometry = revolution(shape.segments()?, Some(shape))?;
         Ok(Tank { name: None, density, geometry })
     }
@@ -324,7 +324,7 @@ impl Tank {
     ///
     /// # Errors
     /// If it is more than the tank holds or less than 0, or a part of a box, which is open at the top.
-    pub fn height_of(&self, fill: Fill) -> Result<f64, Problems> {
+    pub fn fill_height(&self, fill: Fill) -> Result<f64, Problems> {
         let capacity = match &self.geometry {
             Geometry::Revolution { contour, .. } => Some(contour.capacity()),
             Geometry::Box { .. } => None,
@@ -360,7 +360,7 @@ impl Tank {
             .into());
         }
         Ok(match &self.geometry {
-            Geometry::Revolution { contour, .. } => contour.fill_of(volume),
+            Geometry::Revolution { contour, .. } => contour.fill_from_volume(volume),
             Geometry::Box { length_x, length_y } => volume / (length_x * length_y),
         })
     }
@@ -380,7 +380,7 @@ impl Tank {
             Geometry::Revolution { contour, .. } => contour.cut(fill).ok(),
         };
         match wall {
-            Some(wall) => Ok(self.density * Volume::of(&wall).volume),
+            Some(wall) => Ok(self.density * Volume::from_wall(&wall).volume),
             None => Ok(self.solve(fill, 1)?.m_liq),
         }
     }

@@ -95,11 +95,11 @@ impl Overlaps {
     /// number, radii in m.
     pub fn round(inner: f64, outer: f64, count: usize) -> Overlaps {
         let [first, mean, double] = [1.0, 0.0, 2.0].map(|nu| Radial::new(inner, outer, nu, count));
-        Overlaps::of_waves(&first, &mean, &double)
+        Overlaps::from_waves(&first, &mean, &double)
     }
 
     /// Returns the overlaps of psi = u(r) cos(nu theta) with the modes of the orders 0 and 2 nu.
-    fn of_waves(first: &Radial, mean: &Radial, double: &Radial) -> Overlaps {
+    fn from_waves(first: &Radial, mean: &Radial, double: &Radial) -> Overlaps {
         let psi = first.mode(0);
         let mut excited = Vec::new();
         for (waves, radial) in [(0, mean), (2, double)] {
@@ -163,7 +163,7 @@ impl Overlaps {
             };
         }
         let (first, double) = (radial(1.0), radial(2.0));
-        let overlaps = Overlaps::of_waves(&first, &axisymmetric, &double);
+        let overlaps = Overlaps::from_waves(&first, &axisymmetric, &double);
         let along = 2.0 * mean(&|phi| (nu * phi).sin() * phi.sin());
         Overlaps {
             fourth: [overlaps.fourth[0], None],
@@ -373,8 +373,8 @@ impl Radial {
             _ => (inner + (outer - inner) * s, outer - inner),
         };
         let basis = |s: f64| match inner {
-            0.0 => in_circle(nu, s.powi(4), size, outer),
-            _ => in_ring(s, size, outer - inner),
+            0.0 => circle_basis(nu, s.powi(4), size, outer),
+            _ => ring_basis(s, size, outer - inner),
         };
         let (mut r, mut weights) = (Vec::new(), Vec::new());
         let mut values = DMatrix::zeros(rule.nodes.len(), size);
@@ -428,7 +428,7 @@ impl Radial {
 
 /// Returns orthonormal functions in the circle and their derivatives by r. They are (r/R)^nu P_j^(0,nu)(2 x - 1) with
 /// x = (r/R)^2, by the recurrence DLMF 18.9.2.
-pub(crate) fn in_circle(nu: f64, x: f64, size: usize, outer: f64) -> Vec<(f64, f64)> {
+pub(crate) fn circle_basis(nu: f64, x: f64, size: usize, outer: f64) -> Vec<(f64, f64)> {
     let y = 2.0 * x - 1.0;
     let (mut p, mut slope) = ((1.0, 1.0 + 0.5 * (nu + 2.0) * (y - 1.0)), (0.0, 0.5 * (nu + 2.0)));
     let radius = x.sqrt();
@@ -452,7 +452,7 @@ pub(crate) fn in_circle(nu: f64, x: f64, size: usize, outer: f64) -> Vec<(f64, f
 }
 
 /// Returns Legendre polynomials over the width of a ring and their derivatives by r, at the part `s` of the width.
-fn in_ring(s: f64, size: usize, width: f64) -> Vec<(f64, f64)> {
+fn ring_basis(s: f64, size: usize, width: f64) -> Vec<(f64, f64)> {
     let (mut values, mut slopes) = (vec![0.0; size], vec![0.0; size]);
     legendre(s, &mut values);
     legendre_slopes(s, &mut slopes);

@@ -101,7 +101,7 @@ fn residuals(
     let zero = [0.0; 3];
     let mut balance = Balance { start, impulse: zero, angular: zero, scale: zero, worst: zero };
     let at = |u: &Inputs, t: f64| {
-        let moved = |ramp: &Ramp| Ramp { value: ramp.at(t), slope: ramp.slope };
+        let moved = |ramp: &Ramp| Ramp { value: ramp.value_at(t), slope: ramp.slope };
         Inputs {
             force: moved(&u.force),
             torque: moved(&u.torque),
@@ -142,7 +142,7 @@ fn residuals(
                 balance.look(&out, false, p);
             }
         }
-        held = Inputs { h_wheels: Ramp::held(u.h_wheels.at(STEP)), ..Inputs::default() };
+        held = Inputs { h_wheels: Ramp::held(u.h_wheels.value_at(STEP)), ..Inputs::default() };
     }
     for k in driven..end {
         craft.step(&held, STEP).unwrap();
@@ -221,7 +221,7 @@ fn random_craft(most: usize) {
         let thrust = p.craft.mass;
         let input = |k: usize| {
             let (piece, t) = (pieces[k / 25], (k % 25) as f64 * STEP);
-            let at = |ramp: Ramp| Ramp { value: ramp.at(t), slope: ramp.slope };
+            let at = |ramp: Ramp| Ramp { value: ramp.value_at(t), slope: ramp.slope };
             let mut force = at(piece.force);
             force.value[2] += thrust;
             Inputs {

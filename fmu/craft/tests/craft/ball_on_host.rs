@@ -82,7 +82,7 @@ impl Craft {
     /// Returns [a; w'] from the tank's bias and added mass.
     fn solve(&self, u: &Inputs, t: f64, w: V, bias: &[f64; 6], added: &[f64; 21]) -> Six {
         let (matrix, turning) = self.body(w);
-        let (f, tau) = (u.force.at(t), u.torque.at(t));
+        let (f, tau) = (u.force.value_at(t), u.torque.value_at(t));
         let loads = Six::from_fn(|i, _| if i < 3 { f[i] } else { tau[i - 3] });
         let right = loads - turning + Six::from_column_slice(bias);
         (matrix + Self::added(added)).lu().solve(&right).unwrap()

@@ -35,7 +35,7 @@ impl Row {
     }
 
     fn turn(&self, t: f64) -> Ramp {
-        Ramp { value: self.turn.at(t), slope: self.turn.slope }
+        Ramp { value: self.turn.value_at(t), slope: self.turn.slope }
     }
 }
 

@@ -31,12 +31,12 @@ fn attitude(q: &[f64]) -> UnitQuaternion<f64> {
 }
 
 pub fn after(u: &Inputs, t: f64) -> Inputs {
-    let at = |ramp: &Ramp| Ramp { value: ramp.at(t), slope: ramp.slope };
+    let at = |ramp: &Ramp| Ramp { value: ramp.value_at(t), slope: ramp.slope };
     Inputs {
         force: at(&u.force),
         torque: at(&u.torque),
         h_wheels: at(&u.h_wheels),
-        mass_flow: u.mass_flow.map(|flow| Line { value: flow.at(t), slope: flow.slope }),
+        mass_flow: u.mass_flow.map(|flow| Line { value: flow.value_at(t), slope: flow.slope }),
     }
 }
 
@@ -416,10 +416,10 @@ fn tank_alone(seed: u64, coupling: Coupling) -> (TankParameters, TankInputs) {
 }
 
 fn later(u: &TankInputs, t: f64) -> TankInputs {
-    let at = |ramp: &Ramp| Ramp { value: ramp.at(t), slope: ramp.slope };
+    let at = |ramp: &Ramp| Ramp { value: ramp.value_at(t), slope: ramp.slope };
     let turned =
         [0, 1, 2].map(|i| u.omega[i] + (u.omega_dot.value[i] + u.omega_dot.slope[i] * t / 2.0) * t);
-    let mass_flow = Line { value: u.mass_flow.at(t), slope: u.mass_flow.slope };
+    let mass_flow = Line { value: u.mass_flow.value_at(t), slope: u.mass_flow.slope };
     TankInputs { a: at(&u.a), omega: turned, omega_dot: at(&u.omega_dot), mass_flow }
 }
 

@@ -220,8 +220,8 @@ fn a_tank_s_directional_derivatives_are_those_by_differences() {
             let dx = tank.clone().derivatives(&u);
             moved.set_continuous_states(&std::array::from_fn(|i| x[i] + t * dx[i]));
             let omega = [0, 1, 2].map(|i| u.omega[i] + t * u.omega_dot.value[i]);
-            let ramp = |ramp: &Ramp| Ramp { value: ramp.at(t), slope: ramp.slope };
-            let flow = Line { value: u.mass_flow.at(t), slope: u.mass_flow.slope };
+            let ramp = |ramp: &Ramp| Ramp { value: ramp.value_at(t), slope: ramp.slope };
+            let flow = Line { value: u.mass_flow.value_at(t), slope: u.mass_flow.slope };
             let u =
                 TankInputs { a: ramp(&u.a), omega, omega_dot: ramp(&u.omega_dot), mass_flow: flow };
             flat_tank(&moved.outputs(&u))

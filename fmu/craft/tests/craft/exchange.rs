@@ -10,11 +10,11 @@ use super::random::Random;
 /// Returns the inputs after t as hosts pass them that integrate themselves: without slopes, and with the
 /// wheels' reaction in the torque.
 fn after(u: &Inputs, t: f64) -> Inputs {
-    let torque = u.torque.at(t);
+    let torque = u.torque.value_at(t);
     Inputs {
-        force: Ramp::held(u.force.at(t)),
+        force: Ramp::held(u.force.value_at(t)),
         torque: Ramp::held([0, 1, 2].map(|i| torque[i] - u.h_wheels.slope[i])),
-        h_wheels: Ramp::held(u.h_wheels.at(t)),
+        h_wheels: Ramp::held(u.h_wheels.value_at(t)),
         ..Inputs::default()
     }
 }

@@ -43,7 +43,7 @@ fn an_impulse_of_the_host_leaves_the_bobs_velocities_across_their_rods() {
         moved.step(&u, 5.0).unwrap();
         let liquid = moved.outputs(&u).liquid;
         let (before, dv, dw) = (moved.continuous_states(), random.vector(1.0), random.vector(1.0));
-        moved.take_impulse(dv, dw);
+        moved.apply_host_impulse(dv, dw);
         let after = moved.continuous_states();
         let at = |x: &[f64], i: usize| V::new(x[i], x[i + 1], x[i + 2]);
         for n in 0..tank.modes {

@@ -548,7 +548,7 @@ fn nothing_is_allocated_while_stepping() {
         for tank in [&mut tank, &mut planar] {
             tank.step(&u, 1.0).unwrap();
             tank.outputs(&u);
-            tank.take_impulse([0.1, 0.0, 0.0], [0.0, 0.1, 0.0]);
+            tank.apply_host_impulse([0.1, 0.0, 0.0], [0.0, 0.1, 0.0]);
             tank.directional_derivative(&u, &[1.0; TANK_STATES], &[1.0; craft::TANK_INPUTS]);
         }
     });

@@ -302,7 +302,7 @@ fn a_host_with_its_tanks_keeps_momentum_and_loses_the_energy_that_they_dissipate
 
 /// Returns the host's motion over a step that begins `t` later.
 fn later(u: &TankInputs, t: f64) -> TankInputs {
-    let at = |ramp: &Ramp| Ramp { value: ramp.at(t), slope: ramp.slope };
+    let at = |ramp: &Ramp| Ramp { value: ramp.value_at(t), slope: ramp.slope };
     let slope = u.omega_dot.slope;
     let omega = [0, 1, 2].map(|i| u.omega[i] + (u.omega_dot.value[i] + slope[i] * t / 2.0) * t);
     TankInputs { a: at(&u.a), omega, omega_dot: at(&u.omega_dot), ..*u }

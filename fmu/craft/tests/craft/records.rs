@@ -158,12 +158,14 @@ pub fn inputs(record: &Value, k: usize) -> Inputs {
 }
 
 pub fn at_end(inputs: &Inputs) -> Inputs {
-    let end = |ramp: &Ramp| Ramp { value: ramp.at(STEP), slope: ramp.slope };
+    let end = |ramp: &Ramp| Ramp { value: ramp.value_at(STEP), slope: ramp.slope };
     Inputs {
         force: end(&inputs.force),
         torque: end(&inputs.torque),
         h_wheels: end(&inputs.h_wheels),
-        mass_flow: inputs.mass_flow.map(|flow| Line { value: flow.at(STEP), slope: flow.slope }),
+        mass_flow: inputs
+            .mass_flow
+            .map(|flow| Line { value: flow.value_at(STEP), slope: flow.slope }),
     }
 }
 
@@ -180,7 +182,7 @@ pub fn motion(record: &Value, k: usize, omega: [f64; 3]) -> TankInputs {
 
 /// Returns the host's motion at the end of a step.
 pub fn motion_at_end(inputs: &TankInputs) -> TankInputs {
-    let end = |ramp: &Ramp| Ramp { value: ramp.at(STEP), slope: ramp.slope };
+    let end = |ramp: &Ramp| Ramp { value: ramp.value_at(STEP), slope: ramp.slope };
     let w_d = &inputs.omega_dot;
     let turned = [0, 1, 2].map(|i| (w_d.value[i] + w_d.slope[i] * STEP / 2.0) * STEP);
     TankInputs {

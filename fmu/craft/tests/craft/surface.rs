@@ -65,7 +65,7 @@ fn a_tank_s_motion_does_not_depend_on_its_steps() {
         let (a, omega_dot) = (ramp(), ramp());
         let u = TankInputs { a, omega: random.vector(0.5), omega_dot, ..TankInputs::default() };
         let later = |t: f64| {
-            let at = |ramp: &Ramp| Ramp { value: ramp.at(t), slope: ramp.slope };
+            let at = |ramp: &Ramp| Ramp { value: ramp.value_at(t), slope: ramp.slope };
             let slope = u.omega_dot.slope;
             let omega =
                 [0, 1, 2].map(|i| u.omega[i] + (u.omega_dot.value[i] + slope[i] * t / 2.0) * t);
@@ -258,9 +258,9 @@ impl Lagrangian<'_> {
 
     /// Returns L at q, q' and t.
     fn at(&self, q: [f64; 2], q_d: [f64; 2], t: f64) -> f64 {
-        let time = Dual::of(t, 1.0);
+        let time = Dual::with_slope(t, 1.0);
         let [l, h, _, _, kappa] = self.table(time);
-        let [x, y] = [0, 1].map(|i| Dual::of(q[i], q_d[i]));
+        let [x, y] = [0, 1].map(|i| Dual::with_slope(q[i], q_d[i]));
         let u = x * x + y * y;
         let one = Dual::constant(1.0);
         let kappa_2 = self.tank.nonlinear_stiffness_2[self.n];
@@ -283,7 +283,7 @@ impl Lagrangian<'_> {
         let around = tank.rotary_inertia[self.n] + tank.rotary_inertia_2[self.n] * u;
         let inner = 0.5 * (along * (l * sigma).powi(2) + around * (l * tau).powi(2));
         let centring = 0.5 * self.tank.k[self.n] / m * l * l * (q[0] * q[0] + q[1] * q[1]);
-        0.5 * speed.norm_squared() - Vector3::from(a.at(t)).dot(&rho) + inner - centring
+        0.5 * speed.norm_squared() - Vector3::from(a.value_at(t)).dot(&rho) + inner - centring
     }
 }
 

@@ -24,7 +24,7 @@ struct OneWay {
 }
 
 impl OneWay {
-    fn at(&self, theta: f64) -> f64 {
+    fn coefficient_at(&self, theta: f64) -> f64 {
         let [a1, b1, a2, b2] = self.harmonics;
         if self.harmonics == [0.0; 4] {
             return self.mean;
@@ -41,7 +41,8 @@ impl OneWay {
         }
         const POINTS: usize = 4096;
         let angle = |j: usize| core::f64::consts::TAU * j as f64 / POINTS as f64;
-        let lowest = (0..POINTS).map(|j| self.at(angle(j))).fold(f64::INFINITY, f64::min);
+        let lowest =
+            (0..POINTS).map(|j| self.coefficient_at(angle(j))).fold(f64::INFINITY, f64::min);
         // Between two points B falls below both by at most |B''| (spacing/2)^2 / 2.
         let [a1, b1, a2, b2] = self.harmonics.map(f64::abs);
         let bend = a1 + b1 + 4.0 * (a2 + b2);
@@ -104,8 +105,8 @@ impl DirectionalFactor {
     }
 
     /// Returns B- and B+ at an angle.
-    pub fn at(&self, theta: f64) -> (f64, f64) {
-        (self.backward.at(theta), self.forward.at(theta))
+    pub fn coefficient_at(&self, theta: f64) -> (f64, f64) {
+        (self.backward.coefficient_at(theta), self.forward.coefficient_at(theta))
     }
 
     pub fn depends_on_angle(&self) -> bool {
@@ -128,13 +129,13 @@ impl DirectionalFactor {
 
     /// Returns coefficient n of B in the hub's direction of rotation.
     pub fn coefficient(&self, n: usize, contact: Contact) -> f64 {
-        self.coefficient_of(n, self.one_way(contact))
+        self.series_coefficient(n, self.one_way(contact))
     }
 
     /// Returns coefficient n of (B+ + B-)/2 and (B+ - B-)/2.
     pub fn even_odd(&self, n: usize) -> (f64, f64) {
         let (forward, backward) =
-            (self.coefficient_of(n, &self.forward), self.coefficient_of(n, &self.backward));
+            (self.series_coefficient(n, &self.forward), self.series_coefficient(n, &self.backward));
         ((forward + backward) / 2.0, (forward - backward) / 2.0)
     }
 
@@ -143,7 +144,7 @@ impl DirectionalFactor {
     }
 
     #[inline(always)]
-    fn coefficient_of(&self, n: usize, one_way: &OneWay) -> f64 {
+    fn series_coefficient(&self, n: usize, one_way: &OneWay) -> f64 {
         match &self.trig {
             Some(trig) => one_way.coefficient(n, trig),
             None => series::constant(n, one_way.mean),
@@ -174,7 +175,7 @@ mod tests {
                 series
             });
             // Rounding of five terms.
-            assert!((one.at(theta) - expected).abs() < 1e-15, "{theta}");
+            assert!((one.coefficient_at(theta) - expected).abs() < 1e-15, "{theta}");
             assert!((one.coefficient(0, &series) - expected).abs() < 1e-15, "{theta}");
         }
     }

@@ -81,7 +81,7 @@ pub trait FrictionLaw {
 
     /// Returns the largest torques that the bearing holds at rest against a backward and a forward
     /// torque, N m (both >= 0).
-    fn holds(&self, _theta: f64) -> (f64, f64) {
+    fn holding_torques(&self, _theta: f64) -> (f64, f64) {
         (0.0, 0.0)
     }
 
@@ -193,9 +193,9 @@ macro_rules! laws {
                 }
             }
 
-            pub fn holds(&self, theta: f64) -> (f64, f64) {
+            pub fn holding_torques(&self, theta: f64) -> (f64, f64) {
                 match self {
-                    $(Law::$name(law) => law.holds(theta),)*
+                    $(Law::$name(law) => law.holding_torques(theta),)*
                 }
             }
 

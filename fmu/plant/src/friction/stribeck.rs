@@ -67,13 +67,13 @@ impl FrictionLaw for Stribeck {
         self.curve.convergence_radius(omega)
     }
 
-    fn holds(&self, theta: f64) -> (f64, f64) {
-        let ((backward, forward), dry) = (self.factor.at(theta), self.curve.at_rest());
+    fn holding_torques(&self, theta: f64) -> (f64, f64) {
+        let ((backward, forward), dry) = (self.factor.coefficient_at(theta), self.curve.at_rest());
         (dry * backward, dry * forward)
     }
 
     fn contact_at_rest(&self, [net, _]: [f64; 2], theta: f64, before: Contact) -> Contact {
-        let (against_backward, against_forward) = self.holds(theta);
+        let (against_backward, against_forward) = self.holding_torques(theta);
         // A hub that has just broken away is at the limit, to rounding.
         let limit = |hold: f64, from: Contact| {
             if before == from { hold * (1.0 - 1e-12) } else { hold }

@@ -151,7 +151,7 @@ pub trait SloshMode {
     fn mass_height(&mut self, n: usize, hub: &HubMotion) -> f64;
     /// Returns the coordinates at t, at the hub's rate `omega`, from the series up to order n. `varies` has the meaning
     /// of `ramp` above; without variation modes move along the tangent.
-    fn at(&self, n: usize, t: f64, omega: f64, varies: bool) -> [f64; 4];
+    fn coordinates_at(&self, n: usize, t: f64, omega: f64, varies: bool) -> [f64; 4];
     /// Returns mass times height above rest, kg m, and its rate.
     fn height<T: Number>(&self, hub: &HubMotion) -> [T; 2];
     /// Returns the force of the bob on the tank, N, radial and tangential.

@@ -186,7 +186,7 @@ impl SloshMode for Planar {
     }
 
     #[inline(always)]
-    fn at(&self, n: usize, t: f64, _: f64, varies: bool) -> [f64; 4] {
+    fn coordinates_at(&self, n: usize, t: f64, _: f64, varies: bool) -> [f64; 4] {
         let [al, al_d] = values([&self.al, &self.al_d], n, t);
         if varies { self.p.coordinates([al, al_d]) } else { [0.0, al, 0.0, al_d] }
     }

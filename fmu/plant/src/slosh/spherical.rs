@@ -38,8 +38,8 @@ use alloc::string::String;
 use taylor::angle::{self, SquaredAngle};
 use taylor::number::Number;
 use taylor::plane::{
-    self, Vector2, ZERO_VECTOR2, dot, each, mul_part, mul_part_head, numbers, scale, scale_head,
-    squares,
+    self, Vector2, ZERO_VECTOR2, component_products, dot, mul_part, mul_part_head, numbers, scale,
+    scale_head, squares,
 };
 use taylor::series::{Series, ZERO, constant, mul, mul_tail, next, number, square, values};
 
@@ -263,7 +263,7 @@ impl SloshMode for Spherical {
             self.tension_0[n] +=
                 inv_l * (mul_part(n, e_x, &self.dir, 0) + mul_part(n, e_y, &self.dir, 1));
         }
-        let [plus, minus] = each(n, &self.dir, &self.drag_swapped);
+        let [plus, minus] = component_products(n, &self.dir, &self.drag_swapped);
         // L and L p without the terms in the newest w', which J represents.
         let y_0 = self.dir[0][1];
         self.tension[n] = self.tension_0[n] - r_l * mul_part_head(n, &hub.omega_dot, &self.dir, 1);
@@ -336,7 +336,7 @@ impl SloshMode for Spherical {
     /// Computes the coordinates from the direction p: xi = p/k and k xi' = p' + v_z xi; k = 1 - p_z, above
     /// the horizontal by |p| = 1.
     #[inline(always)]
-    fn at(&self, n: usize, t: f64, omega: f64, _: bool) -> [f64; 4] {
+    fn coordinates_at(&self, n: usize, t: f64, omega: f64, _: bool) -> [f64; 4] {
         let [[x, y], [v_x, v_y]] = plane::values([&self.dir, &self.v], n, t);
         let [z, v_z] = values([&self.dir_z, &self.v_z], n, t);
         let inv_k = if z > 0.0 { (1.0 + z) / (x * x + y * y) } else { 1.0 / (1.0 - z) };
@@ -460,7 +460,7 @@ mod tests {
             assert!((x_dd - expected[0]).abs() < 1e-13 * size, "{x_dd} {}", expected[0]);
             assert!((y_dd - expected[1]).abs() < 1e-13 * size, "{y_dd} {}", expected[1]);
             // Back to the coordinates.
-            let back = mode.at(ORDER, 0.0, w, false);
+            let back = mode.coordinates_at(ORDER, 0.0, w, false);
             for (a, b) in back.iter().zip(q) {
                 assert!((a - b).abs() < 1e-13 * (1.0 + b.abs()), "{a} {b}");
             }

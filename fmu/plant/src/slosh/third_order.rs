@@ -219,7 +219,7 @@ impl SloshMode for ThirdOrder {
     }
 
     #[inline(always)]
-    fn at(&self, n: usize, t: f64, _: f64, _: bool) -> [f64; 4] {
+    fn coordinates_at(&self, n: usize, t: f64, _: f64, _: bool) -> [f64; 4] {
         let ([x, y], [x_d, y_d]) = (&self.q, &self.q_d);
         values([x, y, x_d, y_d], n, t)
     }

@@ -55,7 +55,7 @@ fn energy_balances_for_every_model_friction_and_damping() {
                         assert!(has_rim(slosh), "{error} {p:?}");
                         break;
                     }
-                    inputs.tau_cmd = Ramp::held(inputs.tau_cmd.at(h));
+                    inputs.tau_cmd = Ramp::held(inputs.tau_cmd.value_at(h));
                     energy.add(plant.outputs(&inputs));
                 }
                 assert!(energy.residual() < 1e-8, "{:.1e} {p:?}", energy.residual());
@@ -213,7 +213,7 @@ fn trajectory_does_not_depend_on_the_communication_step() {
                 while plant.time() < 10.0 {
                     let h = [0.02, 0.005, rng.f64() * 0.2 + 1e-6][cut].min(10.0 - plant.time());
                     plant.step(&inputs, h).unwrap();
-                    inputs.tau_cmd.value = ramp.at(plant.time());
+                    inputs.tau_cmd.value = ramp.value_at(plant.time());
                 }
                 runs.push(plant.outputs(&inputs));
             }

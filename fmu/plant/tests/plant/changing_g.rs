@@ -40,7 +40,7 @@ fn run(p: &Parameters, h: f64) -> Vec<Outputs> {
         let steps = (length / h).ceil().max(1.0);
         let h = length / steps;
         for k in 0..steps as usize {
-            let value = g.at(k as f64 * h);
+            let value = g.value_at(k as f64 * h);
             let torque = Ramp { value: 0.02 - 0.1 * k as f64 * h, slope: -0.1 };
             let inputs = Inputs {
                 g_axial: Ramp { value, slope: g.slope },
@@ -48,7 +48,7 @@ fn run(p: &Parameters, h: f64) -> Vec<Outputs> {
                 ..Inputs::default()
             };
             plant.step(&inputs, h).unwrap();
-            let g_axial = Ramp::held(inputs.g_axial.at(h).max(0.0));
+            let g_axial = Ramp::held(inputs.g_axial.value_at(h).max(0.0));
             all.push(plant.outputs(&Inputs { g_axial, ..inputs }));
         }
     }
@@ -180,7 +180,7 @@ fn ramps_to_zero_and_from_it_take_a_bounded_number_of_steps() {
         let (slope, h) = (-9.81 / 0.3, 0.3);
         let mut plant = Plant::new(&p, &at(9.81), 0.1, TOLERANCE).unwrap();
         plant.step(&inputs(9.81, slope), h).unwrap();
-        assert!((inputs(9.81, slope).g_axial.at(h)).abs() < 1e-14);
+        assert!((inputs(9.81, slope).g_axial.value_at(h)).abs() < 1e-14);
     }
 }
 

@@ -59,12 +59,12 @@ fn run(p: &Parameters, h: f64) -> Vec<Outputs> {
         for k in 0..steps as usize {
             let t = k as f64 * h;
             let inputs = Inputs {
-                g_axial: Ramp { value: g.at(t), slope: g.slope },
+                g_axial: Ramp { value: g.value_at(t), slope: g.slope },
                 tau_cmd: Ramp { value: 0.03 - 0.1 * t, slope: -0.1 },
                 ..Inputs::default()
             };
             plant.step(&inputs, h).unwrap();
-            all.push(plant.outputs(&at(inputs.g_axial.at(h).max(0.0))));
+            all.push(plant.outputs(&at(inputs.g_axial.value_at(h).max(0.0))));
         }
     }
     all

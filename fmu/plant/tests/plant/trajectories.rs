@@ -135,7 +135,7 @@ fn differences(name: &str, fill: &Fill, run: &Run, tolerance: f64) -> Vec<String
             // Halves, so that two events rarely share one.
             for _ in 0..2 {
                 plant.step(&inputs, step / 2.0).unwrap();
-                inputs.tau_cmd.value = inputs.tau_cmd.at(step / 2.0);
+                inputs.tau_cmd.value = inputs.tau_cmd.value_at(step / 2.0);
                 let o = plant.outputs(&inputs);
                 if o.discrete.event_count as usize == events.len() {
                     events.push((o.discrete.event_time, o.discrete.friction_mode));

@@ -56,7 +56,7 @@ fn angle(term: Term, lag: f64, time: f64) -> f64 {
 impl Covariance {
     /// Computes the tables for records of `count` samples `step` (s) apart, averages of `factors` samples
     /// (ascending), and these terms. `time` is the correlation time of the Gauss–Markov bias, s.
-    pub fn of(step: f64, count: usize, factors: &[usize], terms: &[Term], time: f64) -> Self {
+    pub fn new(step: f64, count: usize, factors: &[usize], terms: &[Term], time: f64) -> Self {
         let mut pairs = Vec::new();
         for (i, &m) in factors.iter().enumerate() {
             for (j, &n) in factors.iter().enumerate().skip(i) {

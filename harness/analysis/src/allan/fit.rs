@@ -97,7 +97,7 @@ struct Problem<'a> {
 
 impl Octaves {
     /// Computes the octaves of samples `step` (s) apart.
-    pub fn of(step: f64, samples: &[f64]) -> Octaves {
+    pub fn from_samples(step: f64, samples: &[f64]) -> Octaves {
         let longest = samples.len() / LONGEST;
         let factors: Vec<usize> =
             (0..usize::BITS).map(|k| 1 << k).take_while(|m| *m <= longest).collect();
@@ -187,7 +187,7 @@ impl Problem<'_> {
 
     fn tables(&self, time: f64) -> Covariance {
         let Octaves { step, count, .. } = *self.octaves;
-        Covariance::of(step, count, self.factors(), self.terms, time)
+        Covariance::new(step, count, self.factors(), self.terms, time)
     }
 
     fn modelled(&self, state: &State) -> DVector<f64> {
@@ -235,7 +235,7 @@ impl Problem<'_> {
 
     /// Iterates the generalized least squares until the weights are those of the result. If `fixed` is given,
     /// this coefficient keeps its value, and so does the correlation time.
-    fn settled(
+    fn iterate_weights(
         &self,
         mut state: State,
         fixed: Option<(usize, f64)>,
@@ -324,7 +324,7 @@ impl Problem<'_> {
         }
         let start = self.start()?;
         let mut tables = self.tables(start.time);
-        let state = self.settled(start, None, &mut tables)?;
+        let state = self.iterate_weights(start, None, &mut tables)?;
         let covariance = self.covariance(&tables, &state);
         let (.., spread) = self.unconstrained(&state, &covariance)?;
         let mut noise = Noise { bias_time: state.time, ..Noise::default() };
@@ -391,7 +391,7 @@ impl Problem<'_> {
     fn interval(&self, place: usize, state: &State, tables: &mut Covariance) -> Option<(f64, f64)> {
         // Distances of the unconstrained estimate from the ends of its 95 % range, if `value` is true.
         let mut beyond = |value: f64| -> Option<(f64, f64, f64)> {
-            let there = self.settled(state.clone(), Some((place, value)), tables);
+            let there = self.iterate_weights(state.clone(), Some((place, value)), tables);
             let there = there.unwrap_or_else(|| {
                 // With this value no other noise is left.
                 let mut alone = state.clone();
@@ -554,8 +554,9 @@ mod tests {
         }
         response.resize(length, 0.0);
         let forward = Forward::new(length);
-        let (a, b) = (forward.of(white), forward.of(response));
-        let filtered = Inverse::new(length).of(a.iter().zip(&b).map(|(a, b)| a * b).collect());
+        let (a, b) = (forward.transform(white), forward.transform(response));
+        let filtered =
+            Inverse::new(length).transform(a.iter().zip(&b).map(|(a, b)| a * b).collect());
         filtered[count..2 * count].iter().map(|value| value / length as f64).collect()
     }
 
@@ -596,7 +597,7 @@ mod tests {
     fn covered(noise: &Noise, draws: u64) -> ([u64; 3], u64) {
         let (mut held, mut described) = ([0; 3], 0);
         for seed in 0..draws {
-            let fit = Octaves::of(STEP, &record(noise, COUNT, seed)).describe().unwrap();
+            let fit = Octaves::from_samples(STEP, &record(noise, COUNT, seed)).describe().unwrap();
             described += u64::from(fit.fits && fit.bias_time.is_none());
             for (held, (term, estimate)) in held.iter_mut().zip(&fit.terms) {
                 let truth = noise.coefficient(*term).sqrt();
@@ -649,7 +650,9 @@ mod tests {
         ] {
             let draws = 100;
             let fits: Vec<Fit> = (0..draws)
-                .map(|seed| Octaves::of(STEP, &record(&noise, 1 << 14, seed)).fit(&terms, 0))
+                .map(|seed| {
+                    Octaves::from_samples(STEP, &record(&noise, 1 << 14, seed)).fit(&terms, 0)
+                })
                 .map(Option::unwrap)
                 .collect();
             for (place, term) in terms.iter().enumerate() {
@@ -685,11 +688,12 @@ mod tests {
     #[test]
     fn the_covariance_is_that_of_many_records() {
         // variance of each octave over 300 records: √(2/300) = 8 %; χ² of few degrees of freedom scatter more
-        let records: Vec<Octaves> =
-            (0..300).map(|seed| Octaves::of(STEP, &record(&ALL, 1 << 12, seed))).collect();
+        let records: Vec<Octaves> = (0..300)
+            .map(|seed| Octaves::from_samples(STEP, &record(&ALL, 1 << 12, seed)))
+            .collect();
         let factors = &records[0].factors;
         let terms = [Term::White, Term::Flicker, Term::Walk];
-        let tables = Covariance::of(STEP, 1 << 12, factors, &terms, 1.0);
+        let tables = Covariance::new(STEP, 1 << 12, factors, &terms, 1.0);
         let expected = tables.matrix(&terms.map(|term| ALL.coefficient(term)));
         let mean = Octaves::mean(&records).unwrap();
         let covariance = |i: usize, j: usize| {
@@ -715,28 +719,28 @@ mod tests {
     fn a_misfit_is_named_and_what_explains_it_is_found() {
         let bias = Noise { bias_instability: 1e-4, bias_time: 40.0, ..ALL };
         let bias = Noise { flicker: 0.0, rrw: 0.0, ..bias };
-        let fit = Octaves::of(STEP, &record(&bias, 1 << 17, 1)).describe().unwrap();
+        let fit = Octaves::from_samples(STEP, &record(&bias, 1 << 17, 1)).describe().unwrap();
         let Some(time) = fit.bias_time else { panic!("{fit:?}") };
         // 13,000 s are 330 correlation times
         assert!(fit.fits && (time.low..time.high).contains(&40.0), "{fit:?}");
         let ramp = Noise { ramp: 1e-6, ..ALL };
-        let fit = Octaves::of(STEP, &record(&ramp, COUNT, 2)).describe().unwrap();
+        let fit = Octaves::from_samples(STEP, &record(&ramp, COUNT, 2)).describe().unwrap();
         assert!(fit.fits && (fit.noise.ramp / 1e-6 - 1.0).abs() < 0.1, "{fit:?}");
         // a sine of 100 s is none of these
         let mut sine = record(&ALL, COUNT, 3);
         for (k, value) in sine.iter_mut().enumerate() {
             *value += 1e-4 * (0.0628 * STEP * k as f64).sin();
         }
-        let fit = Octaves::of(STEP, &sine).describe().unwrap();
+        let fit = Octaves::from_samples(STEP, &sine).describe().unwrap();
         assert!(!fit.fits && (10.0..200.0).contains(&fit.worst.tau), "{fit:?}");
         // means of two neighbours: a filter
         let smooth: Vec<f64> =
             record(&ALL, COUNT, 4).windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
-        let fit = Octaves::of(STEP, &smooth).describe().unwrap();
+        let fit = Octaves::from_samples(STEP, &smooth).describe().unwrap();
         assert!(fit.fits && fit.from > STEP && fit.bias_time.is_none(), "{fit:?}");
         assert!((fit.noise.arw / ALL.arw - 1.0).abs() < 0.03, "{fit:?}");
         // no noise at all
-        assert_eq!(Octaves::of(STEP, &[0.0; 1000]).describe(), None);
-        assert_eq!(Octaves::of(STEP, &[1.0, 2.0]).describe(), None);
+        assert_eq!(Octaves::from_samples(STEP, &[0.0; 1000]).describe(), None);
+        assert_eq!(Octaves::from_samples(STEP, &[1.0, 2.0]).describe(), None);
     }
 }

@@ -198,7 +198,7 @@ pub fn drive(fmu: &Fmu, campaign: &Campaign, store: Store, chapters: Vec<Chapter
     bar.finish_and_clear();
     let mut files = campaign.tables(fmu, &results)?;
     files.push(("plan.toml", campaign.plan.text.clone().into_bytes()));
-    let telling = report::campaign::run_to_view(&results);
+    let telling = report::campaign::most_swirling_run(&results);
     let shown = match telling {
         Some(run) => Some(view::page_of_stored_run(
             fmu.description(),

@@ -183,7 +183,7 @@ impl DesignArgs {
         };
         if let Some(profile) = &self.profile {
             let torque = profile.parse::<Written>()?.torque()?;
-            let (time, tau) = sampled(torque.span().1, &|t| torque.at(t))?;
+            let (time, tau) = sampled(torque.span().1, &|t| torque.torque_at(t))?;
             check_rows(&torque, &time, &tau)?;
             return Ok((time, tau, 1.0));
         }
@@ -218,7 +218,8 @@ impl DesignArgs {
             format!("lin-sweep:amplitude={peak:.4},f0={f0},f1={f1},duration={}", self.duration)
         };
         let profile = written(peak).parse::<Written>()?.torque()?;
-        let (factor, sweep) = bench.limited(time, time.iter().map(|&t| profile.at(t)).collect())?;
+        let (factor, sweep) =
+            bench.limited(time, time.iter().map(|&t| profile.torque_at(t)).collect())?;
         Ok(Sweep {
             profile: written(factor * peak),
             angle: design::slosh_angle(bench.fmu, &bench.setup, time, &sweep)?,
@@ -282,7 +283,7 @@ impl<'f> Bench<'f> {
         for name in identify::fit::bench::start::PARAMETERS {
             let unit =
                 fmu.description().variable(name)?.attributes().unit.clone().unwrap_or_default();
-            let damping = slosh::DAMPING.at([1]);
+            let damping = slosh::DAMPING.element([1]);
             let shown = if name == slosh::ZETA { &damping } else { name };
             unknowns.push(Unknown::positive(name, &unit, real(shown)?));
         }
@@ -522,9 +523,9 @@ impl DesignArgs {
 fn expected(real: &mut dyn FnMut(&str) -> Result<f64>, peak: f64) -> Result<Linear> {
     let arm = real(tank::R)?;
     let mode = Mode {
-        mass: real(&slosh::MASS.at([1]))?,
-        frequency: real(&slosh::FREQUENCY.at([1]))?,
-        damping: real(&slosh::DAMPING.at([1]))?,
+        mass: real(&slosh::MASS.element([1]))?,
+        frequency: real(&slosh::FREQUENCY.element([1]))?,
+        damping: real(&slosh::DAMPING.element([1]))?,
     };
     let inertia = real(hub::I)? + real(tank::M_0)? * arm * arm;
     let rate = peak / 3.0 / (inertia * std::f64::consts::TAU * mode.frequency);

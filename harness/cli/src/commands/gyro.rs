@@ -125,7 +125,7 @@ impl GyroArgs {
             path.display(),
             omega[0]
         );
-        let rest = Rest::of(step, omega, self.chunk, LAG);
+        let rest = Rest::analyse(step, omega, self.chunk, LAG);
         output::directory(&self.out)?;
         for (name, table) in tables(&rest) {
             table.write(&self.out.join(name), &BTreeMap::new())?;

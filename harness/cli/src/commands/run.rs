@@ -174,12 +174,14 @@ impl RunArgs {
             );
         }
         let limits = Limits::find(|name| description.variable(name).is_ok());
-        let forces = tanks.iter().flat_map(Tanks::needs).collect::<Vec<_>>();
+        let forces = tanks.iter().flat_map(Tanks::required_variables).collect::<Vec<_>>();
         let sensors = Sensors::new(&self.sensors, description, &run.settings, run.step)?;
         let wave = range.as_ref().map(|_| WAVE);
         let needs = wave.into_iter().chain(forces.iter().map(String::as_str));
-        let columns =
-            run.columns_with(&columns, needs.chain(limits.needs()).chain(sensors.needs()));
+        let columns = run.columns_with(
+            &columns,
+            needs.chain(limits.required_columns()).chain(sensors.required_variables()),
+        );
         // Memory for the table, its copy for `--columns`, and what is written: 25 characters for a number.
         let all = columns.len() + sensors.columns().len();
         guard::allow((run.steps() * (all + 3) * 50) as u64 + run.course_bytes());

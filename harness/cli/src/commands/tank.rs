@@ -130,7 +130,7 @@ impl TankArgs {
             }
             None => {
                 let fills: Result<Vec<f64>, _> =
-                    self.sweep.iter().map(|fill| tank.height_of(*fill)).collect();
+                    self.sweep.iter().map(|fill| tank.fill_height(*fill)).collect();
                 let fills = fills.with_context(read)?;
                 let (mut swept, between) = match fills[..] {
                     [low, high] if self.parameters.is_some() && low < high => {

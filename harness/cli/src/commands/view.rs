@@ -207,13 +207,13 @@ fn drawing(text: &str) -> Result<(usize, Drawing)> {
     let tank =
         Tank::read(path).map_err(|problems| anyhow::anyhow!("{}: {problems}", path.display()))?;
     let height =
-        |mass| tank.height_of(Fill::Mass(mass)).map_err(|problems| anyhow::anyhow!("{problems}"));
+        |mass| tank.fill_height(Fill::Mass(mass)).map_err(|problems| anyhow::anyhow!("{problems}"));
     let name = tank.name.clone().unwrap_or_else(|| path.display().to_string());
     Ok(match &tank.geometry {
         Geometry::Revolution { contour, .. } => {
             let mut points: Vec<[f64; 2]> = Vec::new();
             for segment in contour.segments() {
-                let ends = (0..=POINTS).map(|i| segment.at(i as f64 / POINTS as f64));
+                let ends = (0..=POINTS).map(|i| segment.point_at(i as f64 / POINTS as f64));
                 points.extend(ends.map(|p| [p[0].max(0.0), p[1]]));
             }
             points.dedup_by(|a, b| (a[0] - b[0]).hypot(a[1] - b[1]) < 1e-9);
@@ -226,7 +226,7 @@ fn drawing(text: &str) -> Result<(usize, Drawing)> {
                 .collect::<Result<_>>()?;
             let surfaces = Some(Box::new(move |mass, modes| {
                 let solved =
-                    tank.height_of(Fill::Mass(mass)).and_then(|fill| tank.solve(fill, modes));
+                    tank.fill_height(Fill::Mass(mass)).and_then(|fill| tank.solve(fill, modes));
                 let solved = solved.map_err(|problems| anyhow::anyhow!("{problems}"))?;
                 Ok(solved.modes.iter().map(|mode| equally_spaced(&mode.shape)).collect())
             }) as Box<view::Surfaces>);

@@ -76,7 +76,7 @@ const PARAMETERS: [&str; 7] =
 fn is_bench(description: &ModelDescription) -> bool {
     let has = |name: &str| description.variables.iter().any(|v| v.name == name);
     let has_all = |names: &[&str]| names.iter().all(|name| has(name));
-    has_all(&STORED[1..]) && has_all(&PARAMETERS) && has(&slosh::MASS.at([1]))
+    has_all(&STORED[1..]) && has_all(&PARAMETERS) && has(&slosh::MASS.element([1]))
 }
 
 /// Returns true if the variable is the slosh angle of a mode of a tank, `tank[1].angle_x[1]`.
@@ -104,12 +104,12 @@ pub fn stored_columns(description: &ModelDescription, input: Option<&str>) -> Ve
 /// Columns of a run's file: [`stored_columns`], and the numbers of the reasons for which its tanks are out of range.
 fn recorded_columns(description: &ModelDescription, input: Option<&str>) -> Vec<String> {
     let mut columns = stored_columns(description, input);
-    let limits = limits_of(description);
-    columns.extend(limits.needs().map(String::from));
+    let limits = warning_limits(description);
+    columns.extend(limits.required_columns().map(String::from));
     columns
 }
 
-fn limits_of(description: &ModelDescription) -> Limits {
+fn warning_limits(description: &ModelDescription) -> Limits {
     Limits::find(|name| description.variable(name).is_ok())
 }
 
@@ -127,7 +127,7 @@ pub struct Campaign {
 }
 
 /// Joins sentences about one run; `None` if there are none.
-pub(crate) fn joined(sentences: &[String]) -> Option<String> {
+pub(crate) fn join_sentences(sentences: &[String]) -> Option<String> {
     (!sentences.is_empty()).then(|| sentences.join("; "))
 }
 
@@ -163,7 +163,7 @@ impl Results {
     /// Returns the runs that left the range of their model, with how they did.
     pub fn beyond_model(&self) -> impl Iterator<Item = (&Case, String)> {
         let analysed = self.outcomes.iter().map(|run| (&run.case, run.beyond_model()));
-        let others = self.unanalysed.iter().map(|run| (&run.case, joined(&run.limits)));
+        let others = self.unanalysed.iter().map(|run| (&run.case, join_sentences(&run.limits)));
         analysed.chain(others).filter_map(|(case, how)| Some((case, how?)))
     }
 
@@ -312,7 +312,7 @@ impl Campaign {
             kept = recorded_columns(description, run.input.as_deref());
             // signals for sensors are recorded with the rest; readings are computed when the run is read
             let sensors = Sensors::new(&case.sensors, description, &case.settings, case.step)?;
-            for name in kept.iter().map(String::as_str).chain(sensors.needs()) {
+            for name in kept.iter().map(String::as_str).chain(sensors.required_variables()) {
                 if !columns.iter().any(|column| column == name) {
                     columns.push(name.to_string());
                 }
@@ -334,7 +334,7 @@ impl Campaign {
             }
             runs.push(json!({
                 "name": case.name,
-                "file": CAMPAIGN.file_of(&case.name),
+                "file": CAMPAIGN.run_file(&case.name),
                 "varied": self.plan.varied().into_iter().zip(&case.varied).collect::<BTreeMap<_, _>>(),
                 "settings": settings,
                 "profile": case.profile,
@@ -451,7 +451,7 @@ impl Campaign {
                 // time and the driven input are always columns
                 let others = columns[1 + usize::from(run.input.is_some())..].iter();
                 let others: Vec<&str> = others.map(String::as_str).collect();
-                let others = run.columns_with(&others, sensors.needs());
+                let others = run.columns_with(&others, sensors.required_variables());
                 let driven =
                     run.drive(&mut instance, &others, |steps| watch(Progress::Steps(steps)));
                 instance.take_warnings().into_iter().for_each(|warning| warn(case, warning));
@@ -468,8 +468,8 @@ impl Campaign {
             }
         };
         if !is_bench(fmu.description()) {
-            let limits = limits_of(fmu.description());
-            let drawn = columns.len() - limits.needs().count();
+            let limits = warning_limits(fmu.description());
+            let drawn = columns.len() - limits.required_columns().count();
             let limits = limits.describe(|name| table.column(name));
             let columns: Vec<(&str, &[f64])> = columns[1..drawn]
                 .iter()

@@ -45,7 +45,7 @@ pub fn seek_onset(
     jobs: usize,
     watch: &(dyn Fn(Progress) + Sync),
 ) -> Result<()> {
-    let Some(onset) = plan.sought() else { return Ok(()) };
+    let Some(onset) = plan.pending_onset() else { return Ok(()) };
     ensure!(is_bench(fmu.description()), "[onset] is possible only with HubSlosh (the bench)");
     let pool = rayon::ThreadPoolBuilder::new().num_threads(budget::jobs(jobs, 0)?).build()?;
     let ends = [onset.amplitude[0], onset.amplitude[onset.amplitude.len() - 1]];
@@ -83,7 +83,7 @@ fn dwell(fmu: &Fmu, case: &Case, frequency: f64, torque: f64) -> Result<Dwell> {
     let mut run = case.run();
     run.torque = profile.torque()?;
     let mut instance = run.initialise(fmu)?;
-    let natural = instance.real(&slosh::FREQUENCY.at([1]))?;
+    let natural = instance.real(&slosh::FREQUENCY.element([1]))?;
     let table = run.drive(&mut instance, &[SLOSH_ANGLE_RADIAL, SLOSH_ANGLE], |_| {})?;
     table.all_finite()?;
     let angles = table.column(SLOSH_ANGLE).unwrap_or_default();

@@ -55,7 +55,7 @@ pub(super) fn check_work(torque: &Torque, step: f64, rows: usize) -> Result<()> 
     let Torque::Profile(profile) = torque else { return Ok(()) };
     let Some(band) = profile.band() else { return Ok(()) };
     let (sweep, rows) = (profile.sweep(), rows as f64);
-    let lengths = Lengths::of(band, sweep, step * rows, step);
+    let lengths = Lengths::for_record(band, sweep, step * rows, step);
     let lags = lengths.lag / (step * lengths.decimation as f64);
     let windows = sweep.map_or(0.0, |sweep| {
         let window = |f: &f64| (demodulation::cycles(sweep, *f) / f / step).min(rows);
@@ -405,15 +405,15 @@ impl Estimate {
         resolution: f64,
         doubt: impl Fn(&Features) -> Option<Doubt>,
     ) -> Self {
-        let found = Features::within(&response, inner);
-        let doubt = if found.any() { doubt(&found) } else { None };
+        let found = Features::find_within(&response, inner);
+        let doubt = if found.has_any() { doubt(&found) } else { None };
         let features = if doubt.is_some() { Features::default() } else { found };
         let (deviation, deviations) = (Vec::new(), Deviations::default());
         Estimate { response, features, resolution, deviation, deviations, doubt }
     }
 
     /// Adds uncertainties; `slope` is the rate at which the error changes along a frequency.
-    fn with(self, deviation: Vec<f64>, slope: impl Fn(f64) -> f64) -> Self {
+    fn with_uncertainties(self, deviation: Vec<f64>, slope: impl Fn(f64) -> f64) -> Self {
         let deviations = self.features.deviations(&self.response, &deviation, slope);
         Estimate { deviation, deviations, ..self }
     }
@@ -436,7 +436,7 @@ fn closer(features: &Features, than: f64) -> bool {
 }
 
 /// Averages each group of `count` consecutive samples. An incomplete group at the end is left out.
-fn means(signal: &[f64], count: usize) -> Cow<'_, [f64]> {
+fn block_means(signal: &[f64], count: usize) -> Cow<'_, [f64]> {
     if count == 1 {
         return signal.into();
     }
@@ -492,16 +492,17 @@ impl Record {
     ) -> Option<Record> {
         let band = profile.band()?;
         let duration = step * tau.len() as f64;
-        let lengths = Lengths::of(band, profile.sweep(), duration, step);
-        let (tau, omega) = (means(tau, lengths.decimation), means(omega, lengths.decimation));
+        let lengths = Lengths::for_record(band, profile.sweep(), duration, step);
+        let (tau, omega) =
+            (block_means(tau, lengths.decimation), block_means(omega, lengths.decimation));
         let step = step * lengths.decimation as f64;
         let frequencies = logarithmic_grid(band, GRID_POINTS);
-        let spectra = Spectra::of(step, &tau, &omega, welch::RESPONSE);
+        let spectra = Spectra::estimate(step, &tau, &omega, welch::RESPONSE);
         let snr = spectra.snr_db();
         let noisy = |features: &Features| {
             // what the segments do not resolve looks like noise
             let resolved = !closer(features, RESOLVED / spectra.length);
-            resolved && features.f_res.is_some_and(|f| spectra.at(&snr, f) < LEAST_SNR)
+            resolved && features.f_res.is_some_and(|f| spectra.value_at(&snr, f) < LEAST_SNR)
         };
         let estimate = |response: FrequencyResponse, length: f64| {
             let resolution = 1.0 / length;
@@ -513,12 +514,12 @@ impl Record {
                 _ => None,
             })
         };
-        let spa = spa::Estimate::of(step, &tau, &omega, &frequencies, lengths.lag);
+        let spa = spa::Estimate::new(step, &tau, &omega, &frequencies, lengths.lag);
         let (deviation, slope) = (spa.deviation(unexplained), spa.slope());
-        let mut spa = estimate(spa.response, lengths.lag).with(deviation, |_| slope);
+        let mut spa = estimate(spa.response, lengths.lag).with_uncertainties(deviation, |_| slope);
         // after a sweep that was too fast to see anything while it passed, a second opinion
         let fast = profile.sweep().is_some() && !enough;
-        let mut rational = (fast || !enough && !spa.features.any())
+        let mut rational = (fast || !enough && !spa.features.has_any())
             .then(|| Rational::fit(step, &tau, &omega, band))
             .flatten()
             .map(|fitted| {
@@ -530,7 +531,7 @@ impl Record {
                 Estimate { deviation, deviations, ..estimate }
             });
         let extrema = spa.features.f_res.zip(spa.features.f_dip);
-        let fit = ModelFit::of(step, lengths.segment, &tau, &omega, &spa.response, &spa.features);
+        let fit = ModelFit::fit(step, lengths.segment, &tau, &omega, &spa.response, &spa.features);
         if let (true, Some(fitted), Some(delta)) = (fast, &mut rational, spa.features.delta_f()) {
             let apart = |get: fn(&Features) -> Option<f64>| {
                 let pair = get(&spa.features).zip(get(&fitted.features));
@@ -544,11 +545,11 @@ impl Record {
         Some(Record {
             h1: estimate(spectra.h1(band), spectra.length),
             snr_db: extrema.map(|(res, antiresonance)| {
-                [spectra.at(&snr, res), spectra.at(&snr, antiresonance)]
+                [spectra.value_at(&snr, res), spectra.value_at(&snr, antiresonance)]
             }),
-            snr_over_band: spectra.within(band, &snr),
+            snr_over_band: spectra.values_within(band, &snr),
             rational,
-            fit: fit.map(|(fit, spectra)| (fit, spectra.within(band, &spectra.coherence()))),
+            fit: fit.map(|(fit, spectra)| (fit, spectra.values_within(band, &spectra.coherence()))),
             spa,
         })
     }
@@ -594,8 +595,9 @@ impl Passing {
         let rotary = (!is_recording).then(|| {
             let swirl = rotary::swirl(&second, &third, sweep.amplitude.abs());
             let passed = &second.frequency;
-            let times: Vec<f64> = passed.iter().filter_map(|f| sweep.time_of(*f)).collect();
-            Rotary::of(passed, &times, &swirl)
+            let times: Vec<f64> =
+                passed.iter().filter_map(|f| sweep.time_at_frequency(*f)).collect();
+            Rotary::from_sweep(passed, &times, &swirl)
         });
         let (leakage, off_axis) = if is_recording {
             let [x, y] = rates.others.each_ref().map(Option::as_deref);
@@ -603,16 +605,18 @@ impl Passing {
                 .into_iter()
                 .filter_map(|(h, w)| Some((h, w?)))
                 .collect();
-            off_axis::of_rates(&rate, about_axis, &others)
+            off_axis::off_axis_from_rates(&rate, about_axis, &others)
         } else {
             let leakage = off_axis::leakage(&fourth, arm);
-            let off_axis = OffAxis::of(column(F_RADIAL), column(F_TANGENTIAL), &leakage);
+            let off_axis = OffAxis::from_forces(column(F_RADIAL), column(F_TANGENTIAL), &leakage);
             (leakage, Some(off_axis))
         };
         // where a window would begin before the sweep or end after it
         let whole = |f: f64| {
             let half = demodulation::cycles(sweep, f) / f / 2.0;
-            sweep.time_of(f).is_some_and(|t| t - half >= 0.0 && t + half <= sweep.duration)
+            sweep
+                .time_at_frequency(f)
+                .is_some_and(|t| t - half >= 0.0 && t + half <= sweep.duration)
         };
         let mut inner = rate.frequency.iter().copied().filter(|f| whole(*f));
         let inner = (
@@ -626,7 +630,7 @@ impl Passing {
             let fast = features.f_res.is_some_and(|f| closer(features, shift(f) / MOST_SHIFT));
             fast.then_some(Doubt::TooFast)
         })
-        .with(deviation, |f| demodulation::slope(sweep, f));
+        .with_uncertainties(deviation, |f| demodulation::slope(sweep, f));
         rate.resolution = moves(rate.features.f_res.unwrap_or((middle.0 * middle.1).sqrt()));
         (Passing { rate, off_axis, leakage }, rotary)
     }
@@ -635,7 +639,7 @@ impl Passing {
 /// Returns the rotary slosh of a stored run whose torque is not a sweep; `frequency` is the liquid's, Hz.
 pub(super) fn rotary_in_time(step: f64, frequency: f64, table: &Table) -> Rotary {
     let column = |name| table.column(name).unwrap_or_default();
-    Rotary::in_time(step, frequency, column(SLOSH_ANGLE_RADIAL), column(SLOSH_ANGLE))
+    Rotary::from_angles(step, frequency, column(SLOSH_ANGLE_RADIAL), column(SLOSH_ANGLE))
 }
 
 /// Returns the rate of the linear model under the torque of a run, in the rows of the result. A recording has its own rows.
@@ -719,7 +723,7 @@ impl Outcome {
         };
         let onset = rotary.and_then(|rotary| {
             let Torque::Profile(profile) = &run.torque else { return None };
-            profile.sweep()?.time_of(rotary.from?)
+            profile.sweep()?.time_at_frequency(rotary.from?)
         });
         let history = History::thin(column("time"), &all);
         Ok(Outcome {
@@ -736,7 +740,8 @@ impl Outcome {
             warnings: rates.warnings,
             case: case.clone(),
             weightless: range.without_weight(column(WAVE), table.column(G_AXIAL)),
-            limits: super::limits_of(instance.description()).describe(|name| table.column(name)),
+            limits: super::warning_limits(instance.description())
+                .describe(|name| table.column(name)),
             range,
             linear,
             record,
@@ -774,8 +779,8 @@ impl Outcome {
     pub fn estimate(&self) -> Option<(&Estimate, &'static str)> {
         let passing = self.passing.as_ref()?;
         match (&passing.rate.doubt, &self.record) {
-            (Some(_), Some(record)) if record.spa.features.any() => Some((&record.spa, "spa")),
-            (Some(_), Some(Record { rational: Some(fitted), .. })) if fitted.features.any() => {
+            (Some(_), Some(record)) if record.spa.features.has_any() => Some((&record.spa, "spa")),
+            (Some(_), Some(Record { rational: Some(fitted), .. })) if fitted.features.has_any() => {
                 Some((fitted, "transfer function"))
             }
             (Some(_), Some(record)) if record.spa.doubt == Some(Doubt::Nonlinear) => {
@@ -794,7 +799,7 @@ impl Outcome {
     pub fn beyond_model(&self) -> Option<String> {
         let how = [self.range.left(&[self.totals.peak_wave_height]), self.weightless.clone()];
         let how = how.into_iter().flatten().chain(self.limits.iter().cloned());
-        super::joined(&how.collect::<Vec<_>>())
+        super::join_sentences(&how.collect::<Vec<_>>())
     }
 
     /// Returns the features of the `spa` response, empty without one.
@@ -815,7 +820,7 @@ impl Outcome {
     /// Returns the liquid's regime at its largest wave; `None` for a recording, which has no wave.
     pub fn regime(&self) -> Option<&'static str> {
         let ratio = self.totals.peak_wave_height / self.range.radius;
-        (!ratio.is_nan()).then(|| match Regime::of(ratio) {
+        (!ratio.is_nan()).then(|| match Regime::from_ratio(ratio) {
             Regime::Linear => "linear",
             Regime::Transitional => "transitional",
             Regime::Nonlinear => "nonlinear",
@@ -866,7 +871,7 @@ impl Range {
                 tension: instance.real(fluid::SIGMA)?,
             },
             g: instance.real(G_AXIAL)?,
-            length: instance.real(&slosh::LENGTH.at([1]))?,
+            length: instance.real(&slosh::LENGTH.element([1]))?,
         }))
     }
 
@@ -926,20 +931,20 @@ pub(super) fn exact_linear(instance: &mut Instance) -> Result<Linear> {
     // Share of the modes' masses that is carried across the direction of the mode.
     let (mut modes, mut carried) = (Vec::new(), 0.0);
     for n in 1..=slosh::MOST_MODES {
-        let mass = real(&slosh::MASS.at([n]))?;
+        let mass = real(&slosh::MASS.element([n]))?;
         if mass <= 0.0 {
             continue;
         }
         // Versions before 0.5 have only tangential modes. A mode at an angle to the tangent has the arm r cos. To first order
         // it is a tangential mode of mass m cos^2, and its remaining mass moves with the tank.
-        let direction = real(&slosh::table::DIRECTION.at([n])).unwrap_or(0.0);
+        let direction = real(&slosh::table::DIRECTION.element([n])).unwrap_or(0.0);
         let across = mass * direction.sin().powi(2);
         carried += across;
         if mass - across > 1e-12 * mass {
             modes.push(Mode {
                 mass: mass - across,
-                frequency: real(&slosh::FREQUENCY.at([n]))?,
-                damping: real(&slosh::DAMPING.at([n]))?,
+                frequency: real(&slosh::FREQUENCY.element([n]))?,
+                damping: real(&slosh::DAMPING.element([n]))?,
             });
         }
     }

@@ -106,7 +106,10 @@ pub fn stored(
     let lacks_sensors = sensors.columns().iter().any(|column| !there.contains(column));
     let mut names: Vec<&str> = columns.iter().map(String::as_str).collect();
     if lacks_sensors {
-        let needs = sensors.needs().into_iter().filter(|name| !columns.iter().any(|c| c == name));
+        let needs = sensors
+            .required_variables()
+            .into_iter()
+            .filter(|name| !columns.iter().any(|c| c == name));
         names.extend(needs);
     }
     let table = Table::read(path, &names).map_err(|_| Unusable::Incomplete)?;

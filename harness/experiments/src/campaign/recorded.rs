@@ -97,7 +97,7 @@ pub(super) fn table(
             check_rows(&recorded.path, step, &case.torque)?;
             budget::table(budget::steps(to - from, step).with_context(|| name.to_string())?, 4)?;
             let sought = Sought { step, span: (from, to), sweep };
-            let (clock, correlation) = sought.found_in(torque);
+            let (clock, correlation) = sought.align(torque);
             ensure!(
                 !sought.is_reversed(torque, (clock, correlation)),
                 "{name}: its torque is {} with the other sign. A factor of -1 in the logger, or another sign of the amplitude, turns it",
@@ -189,7 +189,7 @@ impl Sought<'_> {
     /// A difference of 50 ppm moves the end of 2700 s by half a cycle, so the whole sweep correlates with no stretch of the record. The
     /// phase of the record against that of the sweep, unwrapped over blocks, is 2π f(t) (α + β t) + 2π n: the start that was
     /// missed by α, the clock by β, and n whole cycles.
-    fn found_in(&self, record: &[f64]) -> (Clock, f64) {
+    fn align(&self, record: &[f64]) -> (Clock, f64) {
         let (from, to) = self.span;
         let count = ((to - from) / self.step).round() as usize;
         let wanted: Vec<f64> =
@@ -214,7 +214,7 @@ impl Sought<'_> {
     fn is_reversed(&self, record: &[f64], (clock, correlation): (Clock, f64)) -> bool {
         let is_plain = clock.rate == 0.0 && correlation > LEAST_CORRELATION;
         let reversed: Vec<f64> = record.iter().map(|tau| -tau).collect();
-        !is_plain && self.found_in(&reversed).1 > correlation.max(LEAST_CORRELATION)
+        !is_plain && self.align(&reversed).1 > correlation.max(LEAST_CORRELATION)
     }
 
     /// Returns the time of the sweep, s, at a row of the record.
@@ -288,11 +288,11 @@ fn aligned(record: &[f64], wanted: &[f64]) -> (i64, f64) {
     let spectrum = |signal: &[f64]| {
         let mut padded = signal.to_vec();
         padded.resize(length, 0.0);
-        forward.of(padded)
+        forward.transform(padded)
     };
     let product =
         spectrum(record).iter().zip(&spectrum(wanted)).map(|(a, b)| a * b.conj()).collect();
-    let sums = Inverse::new(length).of(product);
+    let sums = Inverse::new(length).transform(product);
     let best = (0..length).max_by(|a, b| sums[*a].total_cmp(&sums[*b])).unwrap_or(0);
     let lag = if best < record.len() { best as i64 } else { best as i64 - length as i64 };
     let (mut product, mut squares, mut others) = (0.0, 0.0, 0.0);
@@ -324,9 +324,8 @@ mod tests {
         assert!(lag == 300 && correlation > 0.999_999, "{lag} {correlation}");
         let (lag, correlation) = aligned(&wanted[400..], &wanted);
         assert!(lag == -400 && correlation > 0.999_999, "{lag} {correlation}");
-        let found = |record: &[f64]| {
-            Sought { step: 0.02, span: (0.0, 100.0), sweep: &sweep }.found_in(record)
-        };
+        let found =
+            |record: &[f64]| Sought { step: 0.02, span: (0.0, 100.0), sweep: &sweep }.align(record);
         // nothing is changed where the clocks agree
         assert_eq!(found(&late).0, Clock { first: 300.0, rate: 0.0 });
         let reversed: Vec<f64> = wanted.iter().rev().copied().collect();
@@ -347,17 +346,17 @@ mod tests {
             let record: Vec<f64> = (0..135_900)
                 .map(|k| if is_lost(k) { 0.5 * (at(k.max(1) - 1) + at(k + 1)) } else { at(k) })
                 .collect();
-            let (clock, correlation) = sought.found_in(&record);
+            let (clock, correlation) = sought.align(&record);
             assert!(correlation > 0.99, "{rate} {clock:?} {correlation}");
             // a ppm of 2700 s is 2.7 ms: a hundredth of a cycle
             assert!((clock.rate - rate).abs() < 1e-6, "{rate} {clock:?}");
             assert!((clock.first - begins / 0.02).abs() < 0.2, "{rate} {clock:?}");
             let reversed: Vec<f64> = record.iter().map(|tau| -tau).collect();
             assert!(!sought.is_reversed(&record, (clock, correlation)));
-            assert!(sought.is_reversed(&reversed, sought.found_in(&reversed)), "{rate}");
+            assert!(sought.is_reversed(&reversed, sought.align(&reversed)), "{rate}");
         }
         let other = Sweep { duration: 2600.0, ..sweep };
         let record: Vec<f64> = (0..135_000).map(|k| other.torque(0.02 * f64::from(k))).collect();
-        assert!(sought.found_in(&record).1 < LEAST_CORRELATION);
+        assert!(sought.align(&record).1 < LEAST_CORRELATION);
     }
 }

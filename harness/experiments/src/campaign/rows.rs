@@ -7,7 +7,7 @@ use super::outcome::{Estimate, Outcome};
 use super::{Case, Failure};
 use analysis::features::Features;
 use files::input;
-use files::output::sha256_of;
+use files::output::hash_reader;
 
 /// A row of `features.csv`. Values that do not exist, or that the torque cannot show, are empty.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -57,7 +57,7 @@ impl FeatureRow {
     /// Returns the row of a run that was not analysed, with its identification, and how it left the range of its model.
     pub fn unanalysed(case: &Case, limits: &[String], plan_sha256: &str) -> FeatureRow {
         FeatureRow {
-            beyond_model: super::joined(limits),
+            beyond_model: super::join_sentences(limits),
             model: case.model.clone(),
             fill_m: case.fill,
             amplitude_nm: case.amplitude,
@@ -147,7 +147,7 @@ impl MadeFrom {
             stop_s: case.stop,
             tolerance: case.tolerance,
             recording: recording.map(|recording| recording.path.display().to_string()),
-            recording_sha256: file.and_then(|file| sha256_of(file).ok()),
+            recording_sha256: file.and_then(|file| hash_reader(file).ok()),
         }
     }
 }

@@ -74,7 +74,7 @@ pub(super) fn read(text: &str, problems: &mut Problems) -> Option<Plan> {
     if !errors.is_empty() {
         return None;
     }
-    reader.known("", table, &KEYS);
+    reader.check_keys("", table, &KEYS);
 
     let title = reader.text("", table, "title");
     let profile = reader.text("", table, "profile").and_then(|Named { name, value, lines }| {
@@ -157,7 +157,7 @@ struct Reader<'a> {
 
 impl Reader<'_> {
     fn lines(&self, span: Range<usize>) -> Lines {
-        Lines::one(1 + self.text[..span.start].matches('\n').count())
+        Lines::single(1 + self.text[..span.start].matches('\n').count())
     }
 
     fn add(&mut self, span: Range<usize>, problem: String) {
@@ -166,13 +166,13 @@ impl Reader<'_> {
     }
 
     /// Records that a value is not the expected one.
-    fn other(&mut self, value: &Spanned<DeValue>, expected: &str) {
+    fn add_unexpected(&mut self, value: &Spanned<DeValue>, expected: &str) {
         let written = self.text[value.span()].split_whitespace().collect::<Vec<_>>().join(" ");
         self.add(value.span(), format!("{expected}, not {written}"));
     }
 
     /// Records the keys of a table that have no meaning there.
-    fn known(&mut self, place: &str, table: &DeTable, keys: &[&str]) {
+    fn check_keys(&mut self, place: &str, table: &DeTable, keys: &[&str]) {
         for (key, _) in table {
             let name: &str = key.get_ref();
             if !keys.contains(&name) {
@@ -193,7 +193,7 @@ impl Reader<'_> {
     ) -> Option<Named<T>> {
         let read = T::deserialize(value.clone().into_deserializer()).ok().filter(allowed);
         if read.is_none() {
-            self.other(value, &format!("{place}{name} expects {expected}"));
+            self.add_unexpected(value, &format!("{place}{name} expects {expected}"));
         }
         Some(Named { name, value: read?, lines: self.lines(value.span()) })
     }
@@ -219,7 +219,7 @@ impl Reader<'_> {
         match table.get(key).map(|value| (value, value.get_ref())) {
             Some((_, DeValue::Table(inner))) => names(inner, &|_| false),
             Some((value, _)) => {
-                self.other(value, &format!("[{key}] must be a table"));
+                self.add_unexpected(value, &format!("[{key}] must be a table"));
                 Values::new()
             }
             None => Values::new(),
@@ -254,7 +254,7 @@ impl Reader<'_> {
         for (i, run) in runs.iter().enumerate() {
             let place = format!("[[run]] number {}: ", i + 1);
             let Some(table) = run.get_ref().as_table() else {
-                self.other(run, &format!("{place}it must be a table"));
+                self.add_unexpected(run, &format!("{place}it must be a table"));
                 continue;
             };
             let most = budget::NAME;
@@ -306,10 +306,10 @@ impl Reader<'_> {
     fn onset(&mut self, table: &DeTable, profile: Option<&Named<Written>>) -> Option<Onset> {
         let (header, value) = table.get_key_value("onset")?;
         let Some(inner) = value.get_ref().as_table() else {
-            self.other(value, "[onset] must be a table");
+            self.add_unexpected(value, "[onset] must be a table");
             return None;
         };
-        self.known("[onset] ", inner, &["frequency", "amplitude"]);
+        self.check_keys("[onset] ", inner, &["frequency", "amplitude"]);
         for key in ["frequency", "amplitude"].iter().filter(|key| !inner.contains_key(**key)) {
             self.add(header.span(), format!("[onset] has no {key}"));
         }
@@ -340,10 +340,10 @@ impl Reader<'_> {
     fn draws(&mut self, table: &DeTable) -> Option<Draws> {
         let (header, value) = table.get_key_value("random")?;
         let Some(table) = value.get_ref().as_table() else {
-            self.other(value, "[random] must be a table");
+            self.add_unexpected(value, "[random] must be a table");
             return None;
         };
-        self.known("[random] ", table, &["runs", "seed", "draw"]);
+        self.check_keys("[random] ", table, &["runs", "seed", "draw"]);
         for key in ["runs", "seed"].iter().filter(|key| !table.contains_key(**key)) {
             self.add(header.span(), format!("[random] has no {key}"));
         }
@@ -368,7 +368,7 @@ impl Reader<'_> {
     fn distribution(&mut self, place: &str, value: &Spanned<DeValue>) -> Option<Distribution> {
         let Some(table) = value.get_ref().as_table() else {
             let like = "{ distribution = \"normal\", mean = 1.0, deviation = 0.1 } or the like";
-            self.other(value, &format!("{place}it expects {like}"));
+            self.add_unexpected(value, &format!("{place}it expects {like}"));
             return None;
         };
         let kind = self.text(place, table, "distribution")?.value;
@@ -380,7 +380,7 @@ impl Reader<'_> {
             return None;
         };
         let [first, second] = family.parameters;
-        self.known(place, table, &["distribution", first, second, "min", "max"]);
+        self.check_keys(place, table, &["distribution", first, second, "min", "max"]);
         for key in [first, second].iter().filter(|key| !table.contains_key(**key)) {
             self.add(value.span(), format!("{place}{kind} expects {key}"));
         }

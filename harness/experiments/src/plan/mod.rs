@@ -15,7 +15,7 @@ use crate::profile::{Torque, Written};
 use crate::rounding::thousandths;
 use crate::run::{Run, driven};
 use crate::sensors::{Sensor, Sensors};
-use files::output::{sha256, sha256_of};
+use files::output::{hash_reader, sha256};
 use files::{budget, input};
 use host::causality::Causality;
 use host::description::{ModelDescription, Value, did_you_mean};
@@ -279,27 +279,27 @@ impl Plan {
 
     /// Checks that a name is only one of set, varied, listed, counted or drawn.
     fn each_name_once(&self, problems: &mut Problems) {
-        fn all<'a, T>(
+        fn names_in<'a, T>(
             named: &'a [Named<T>],
             place: &'static str,
         ) -> impl Iterator<Item = (&'a str, &'static str, &'a Lines)> {
             named.iter().map(move |one| (one.name.as_str(), place, &one.lines))
         }
         let mut owner: BTreeMap<&str, (&str, &Lines)> = BTreeMap::new();
-        let listed = self.listed.iter().flat_map(|run| all(&run.values, "[[run]]"));
+        let listed = self.listed.iter().flat_map(|run| names_in(&run.values, "[[run]]"));
         let named =
-            all(&self.set, "[set]")
-                .chain(all(&self.vary, "[vary]"))
+            names_in(&self.set, "[set]")
+                .chain(names_in(&self.vary, "[vary]"))
                 .chain(listed)
-                .chain(all(&self.count, "[count]"))
-                .chain(self.draws.iter().flat_map(|draws| all(&draws.draw, "[random.draw]")))
+                .chain(names_in(&self.count, "[count]"))
+                .chain(self.draws.iter().flat_map(|draws| names_in(&draws.draw, "[random.draw]")))
                 .chain(self.onset.iter().flat_map(|onset| {
                     [FREQUENCY, AMPLITUDE].map(|n| (n, "[onset]", &onset.lines))
                 }));
         for (name, place, lines) in named {
             match owner.insert(name, (place, lines)) {
                 Some((other, others)) if other != place => {
-                    let both = others.and(lines);
+                    let both = others.union(lines);
                     problems.add(&both, format!("{name} stands in {other} and in {place}"));
                 }
                 _ => {}
@@ -378,7 +378,7 @@ impl Plan {
     }
 
     /// Returns the onset that the plan still seeks.
-    pub(crate) fn sought(&self) -> Option<Onset> {
+    pub(crate) fn pending_onset(&self) -> Option<Onset> {
         self.onset.clone().filter(|onset| !onset.found)
     }
 
@@ -417,7 +417,10 @@ impl Plan {
     /// `[vary]` (the last varies fastest) and every draw. The error lists all problems of the plan. The FMU
     /// checks the values only when it runs.
     pub fn cases(&self, description: &ModelDescription) -> Result<Vec<Case>> {
-        ensure!(self.sought().is_none(), "only `hubslosh campaign` runs a plan with [onset]");
+        ensure!(
+            self.pending_onset().is_none(),
+            "only `hubslosh campaign` runs a plan with [onset]"
+        );
         let draws = self.draws.as_ref().map_or(1, |d| d.runs);
         let count = self
             .vary
@@ -495,7 +498,7 @@ impl Plan {
                 case.listed = run.name.clone().filter(|_| run.recording.is_none());
                 cases.push(case);
             }
-            if problems.count() > 20 {
+            if problems.len() > 20 {
                 break; // enough to go on with
             }
         }
@@ -511,7 +514,7 @@ impl Plan {
         problems: &mut Problems,
         values: &[Named<String>],
     ) -> Option<Case> {
-        let before = problems.count();
+        let before = problems.len();
         let Named { value: mut written, mut lines, .. } = self.profile.clone();
         if let Some(profile) = values.iter().find(|one| one.name == "profile") {
             written = problems.take(&profile.lines, profile.value.parse())?;
@@ -520,7 +523,7 @@ impl Plan {
         for one in values {
             if let Some(parameter) = one.name.strip_prefix("profile.") {
                 written.set(parameter, &one.value);
-                lines = lines.and(&one.lines);
+                lines = lines.union(&one.lines);
             }
         }
         let mut settings: Vec<(String, String)> = Vec::new();
@@ -538,7 +541,7 @@ impl Plan {
             let hash = written
                 .path()
                 .and_then(|path| input::open(path).ok())
-                .and_then(|file| sha256_of(file).ok());
+                .and_then(|file| hash_reader(file).ok());
             let torque = problems.take(&lines, written.torque())?;
             torques.insert(key.clone(), (Arc::new(torque), hash));
         }
@@ -599,7 +602,7 @@ impl Plan {
         let lines = self.stop.as_ref().map_or(lines, |stop| stop.lines.clone());
         let run = case.run();
         problems.take(&lines, run.check().and_then(|()| run.torque.check_rows(run.step, run.stop)));
-        (problems.count() == before).then_some(case)
+        (problems.len() == before).then_some(case)
     }
 
     /// Returns the run's own name, or `linear_100mm_12.5` (model, fill in mm, amplitude in mN·m) if
@@ -712,7 +715,7 @@ mod tests {
             .map(|(name, text)| {
                 let mut plan = Plan::parse(text).unwrap();
                 assert!(!plan.title.is_empty(), "{name}");
-                if let Some(onset) = plan.sought() {
+                if let Some(onset) = plan.pending_onset() {
                     let seeking = plan.seeking(&description()).unwrap().into_iter();
                     plan.dwell(seeking.map(|case| (case, 2.4, onset.amplitude.clone())).collect());
                 }

@@ -7,12 +7,12 @@ use anyhow::{Result, bail};
 pub(super) struct Lines(Vec<usize>);
 
 impl Lines {
-    pub fn one(line: usize) -> Self {
+    pub fn single(line: usize) -> Self {
         Lines(vec![line])
     }
 
     /// Returns the union of both sets of lines.
-    pub fn and(&self, other: &Lines) -> Self {
+    pub fn union(&self, other: &Lines) -> Self {
         let mut all = [&self.0[..], &other.0].concat();
         all.sort_unstable();
         all.dedup();
@@ -49,7 +49,7 @@ impl Problems {
         result.map_err(|error| self.add(lines, format!("{error:#}"))).ok()
     }
 
-    pub fn count(&self) -> usize {
+    pub fn len(&self) -> usize {
         self.0.len()
     }
 

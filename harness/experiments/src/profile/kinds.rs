@@ -187,7 +187,7 @@ pub const KINDS: &[Kind] = &[
             duration(20.0),
         ],
         demands: &[],
-        shape: |v| pieces([Piece::always(v.value("amplitude"))]),
+        shape: |v| pieces([Piece::constant(v.value("amplitude"))]),
     },
     Kind {
         name: "pulse",

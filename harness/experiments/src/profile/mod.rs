@@ -374,9 +374,9 @@ impl Torque {
     }
 
     /// Returns the torque at `t` (s), N·m; at a jump the value after it.
-    pub fn at(&self, t: f64) -> f64 {
+    pub fn torque_at(&self, t: f64) -> f64 {
         match self {
-            Torque::Profile(profile) => profile.shape.after(t),
+            Torque::Profile(profile) => profile.shape.torque_after(t),
             // Communication points k·H may lie one ulp before the row that they coincide with.
             Torque::Rows { history, .. } => history.near(t),
         }
@@ -405,7 +405,7 @@ impl Torque {
     ///
     /// If the profile has more commands than allowed, or frequencies that the commands do not follow, as for
     /// [`Torque::history`].
-    pub fn count(&self, sample: f64, stop: f64, hold: bool) -> Result<usize> {
+    pub fn row_count(&self, sample: f64, stop: f64, hold: bool) -> Result<usize> {
         Ok(match self {
             Torque::Rows { history, .. } => history.time().len(),
             Torque::Profile(profile) => match profile.commands(sample, stop, hold)? {
@@ -471,10 +471,10 @@ impl Profile {
 
     /// Makes the rows of the torque, as [`Torque::history`] describes them.
     fn history(&self, sample: f64, stop: f64, hold: bool) -> Result<History> {
-        let (mut time, mut values) = (vec![0.0], vec![self.shape.after(0.0)]);
+        let (mut time, mut values) = (vec![0.0], vec![self.shape.torque_after(0.0)]);
         let mut row = |t: f64| {
             time.push(t);
-            values.push(self.shape.after(t));
+            values.push(self.shape.torque_after(t));
         };
         let Some((intervals, parts)) = self.commands(sample, stop, hold)? else {
             let mut edges = self.shape.edges();
@@ -533,7 +533,7 @@ mod tests {
         let profile: Profile = "lin-sweep:amplitude=2,f0=0,f1=4,duration=8".parse().unwrap();
         let torque = Torque::Profile(profile.clone());
         for (t, tau) in [(0.0, 0.0), (1.0, 2.0), (2f64.sqrt(), 0.0), (2.0, 0.0)] {
-            assert!((torque.at(t) - tau).abs() < 1e-14, "{t} s");
+            assert!((torque.torque_at(t) - tau).abs() < 1e-14, "{t} s");
         }
         assert_eq!(profile.band(), Some((1.0, 4.0)));
         assert_eq!(profile.to_string().parse::<Profile>().unwrap(), profile);
@@ -617,14 +617,14 @@ mod tests {
             let mut largest = 0.0_f64;
             for k in 0..100_000 {
                 let t = 20.0 * (f64::from(k) + 0.5) / 100_000.0;
-                largest = largest.max((history.after(t).0 - torque.at(t)).abs());
+                largest = largest.max((history.after(t).0 - torque.torque_at(t)).abs());
             }
             assert!(largest <= error, "{text}: {largest}");
             // every command of 50 Hz is one of them, to the last bit, and none depends on when the run ends
             let early = torque.history(0.02, 7.333, false).unwrap();
             for k in 0..366 {
                 let t = f64::from(k) * 0.02;
-                assert_eq!(history.after(t).0, torque.at(t));
+                assert_eq!(history.after(t).0, torque.torque_at(t));
                 assert_eq!(history.after(t + 0.007), early.after(t + 0.007), "{text}");
             }
         }
@@ -657,7 +657,7 @@ mod tests {
     fn an_acceleration_step_is_inertia_times_acceleration() {
         let text = "acceleration-step:acceleration=0.5,inertia=0.4,start=1,width=2,duration=5";
         let torque = Torque::Profile(text.parse().unwrap());
-        assert_eq!([0.5, 1.0, 2.9, 3.0].map(|t| torque.at(t)), [0.0, 0.2, 0.2, 0.0]);
+        assert_eq!([0.5, 1.0, 2.9, 3.0].map(|t| torque.torque_at(t)), [0.0, 0.2, 0.2, 0.0]);
     }
 
     #[test]
@@ -668,8 +668,8 @@ mod tests {
         let torque = |rest: &str| {
             format!("file:path={}{rest}", path.display()).parse::<Written>().unwrap().torque()
         };
-        assert_eq!(torque("").unwrap().at(0.5), 1.0);
-        assert_eq!(torque(",hold=true").unwrap().at(0.5), 0.0);
+        assert_eq!(torque("").unwrap().torque_at(0.5), 1.0);
+        assert_eq!(torque(",hold=true").unwrap().torque_at(0.5), 0.0);
         let error = torque(",hold=maybe").unwrap_err().to_string();
         assert!(error.contains("hold expects true or false"), "{error}");
         let error = "file".parse::<Written>().unwrap().torque().unwrap_err().to_string();
@@ -679,9 +679,9 @@ mod tests {
     #[test]
     fn rows_are_joined_by_lines_or_held() {
         let rows = |held| Torque::rows(&[0.0, 1.0, 3.0], &[0.0, 2.0, 0.0], None, held).unwrap();
-        assert_eq!((rows(false).at(0.5), rows(false).at(2.0)), (1.0, 1.0));
-        assert_eq!((rows(true).at(0.5), rows(true).at(2.0)), (0.0, 2.0));
-        assert_eq!(rows(false).at(9.0), 0.0);
+        assert_eq!((rows(false).torque_at(0.5), rows(false).torque_at(2.0)), (1.0, 1.0));
+        assert_eq!((rows(true).torque_at(0.5), rows(true).torque_at(2.0)), (0.0, 2.0));
+        assert_eq!(rows(false).torque_at(9.0), 0.0);
         let held = rows(false).history(0.02, 3.0, true).unwrap().into_owned();
         assert_eq!(held, *rows(true).history(0.02, 3.0, false).unwrap());
     }

@@ -65,7 +65,7 @@ impl Noise {
 }
 
 impl Shape for Noise {
-    fn after(&self, t: f64) -> f64 {
+    fn torque_after(&self, t: f64) -> f64 {
         let sum: f64 = self
             .tones
             .iter()
@@ -95,8 +95,8 @@ pub struct DwellInNoise {
 }
 
 impl Shape for DwellInNoise {
-    fn after(&self, t: f64) -> f64 {
-        (self.dwell.after(t) + self.noise.after(t)).clamp(-self.limit, self.limit)
+    fn torque_after(&self, t: f64) -> f64 {
+        (self.dwell.torque_after(t) + self.noise.torque_after(t)).clamp(-self.limit, self.limit)
     }
 
     fn highest(&self, stop: f64) -> f64 {
@@ -116,7 +116,7 @@ mod tests {
     use std::f64::consts::TAU;
 
     fn samples(noise: &Noise, duration: f64, step: f64) -> Vec<f64> {
-        (0..(duration / step) as usize).map(|k| noise.after(k as f64 * step)).collect()
+        (0..(duration / step) as usize).map(|k| noise.torque_after(k as f64 * step)).collect()
     }
 
     #[test]
@@ -127,16 +127,16 @@ mod tests {
         let (mut clipped, mut power) = (0, 0.0);
         for k in 0..60_000 {
             let t = k as f64 * 0.01;
-            let sum = 0.1 * (TAU * 2.0 * t).sin() + noise.after(t);
-            assert!((both.at(t) - sum.clamp(-0.2, 0.2)).abs() < 1e-15);
+            let sum = 0.1 * (TAU * 2.0 * t).sin() + noise.torque_after(t);
+            assert!((both.torque_at(t) - sum.clamp(-0.2, 0.2)).abs() < 1e-15);
             clipped += usize::from(sum.abs() > 0.2);
-            power += noise.after(t).powi(2);
+            power += noise.torque_after(t).powi(2);
         }
         assert!(clipped > 0);
         // 600 s resolve 1.7 mHz, tones are 39 mHz apart: a fraction of a per cent
         assert!(((power / 60_000.0).sqrt() / 0.05 - 1.0).abs() < 0.01);
         let brown = Noise::new(0.05, (0.0, 20.0), -2.0, 1, 1.0);
-        assert!((0..100).all(|k| brown.after(k as f64).is_finite()));
+        assert!((0..100).all(|k| brown.torque_after(k as f64).is_finite()));
     }
 
     #[test]

@@ -8,7 +8,7 @@ use analysis::sweep::Sweep;
 /// A torque as a function of time; t in s, torque in N·m.
 pub trait Shape: Debug + Send + Sync {
     /// Returns the torque just after `t` (s), N·m; at a jump the new value.
-    fn after(&self, t: f64) -> f64;
+    fn torque_after(&self, t: f64) -> f64;
 
     /// Returns the highest frequency from 0 to `stop` (s), Hz; 0 if the torque is constant between its edges.
     fn highest(&self, stop: f64) -> f64;
@@ -31,7 +31,7 @@ pub trait Shape: Debug + Send + Sync {
 }
 
 impl Shape for Sweep {
-    fn after(&self, t: f64) -> f64 {
+    fn torque_after(&self, t: f64) -> f64 {
         self.torque(t)
     }
 
@@ -57,7 +57,7 @@ pub struct Dwell {
 }
 
 impl Shape for Dwell {
-    fn after(&self, t: f64) -> f64 {
+    fn torque_after(&self, t: f64) -> f64 {
         self.amplitude * (TAU * self.frequency * t).sin()
     }
 
@@ -85,13 +85,13 @@ impl Piece {
     }
 
     /// Makes a torque (N·m) that lasts for all times.
-    pub fn always(torque: f64) -> Piece {
+    pub fn constant(torque: f64) -> Piece {
         Piece { from: f64::NEG_INFINITY, to: f64::INFINITY, torque }
     }
 }
 
 impl Shape for Pieces {
-    fn after(&self, t: f64) -> f64 {
+    fn torque_after(&self, t: f64) -> f64 {
         // A communication point k·H may differ from the edge by one ulp.
         let slack = 1e-9 * (1.0 + t.abs());
         let now = self.0.iter().find(|piece| t >= piece.from - slack && t < piece.to - slack);

@@ -302,7 +302,7 @@ impl Sensors {
     }
 
     /// Lists the variables that a run must record for the sensors, each once.
-    pub fn needs(&self) -> Vec<&str> {
+    pub fn required_variables(&self) -> Vec<&str> {
         let mut needs: Vec<&str> = Vec::new();
         for name in self.0.iter().flat_map(|(_, quantity)| &quantity.needs) {
             if !needs.contains(&name.as_str()) {
@@ -331,7 +331,7 @@ impl Sensors {
         let names: Vec<String> =
             table.names()[..kept].iter().cloned().chain(self.columns()).collect();
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
-        Ok(self.read(table, run, step)?.only(&names))
+        Ok(self.read(table, run, step)?.select(&names))
     }
 
     /// Adds the readings of all sensors to a run's table. `run` is the name of the run; runs with the same

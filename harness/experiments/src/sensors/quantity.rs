@@ -125,7 +125,7 @@ impl Quantity {
     /// If the FMU is not HubSlosh with an upright cylinder whose liquid moves.
     pub fn wave(surface: &Surface, angle: f64) -> Result<Self> {
         let (needs, modes) = surface.modes()?;
-        Ok(Quantity { needs, channels: one("m"), rule: Rule::Wave { modes, angle } })
+        Ok(Quantity { needs, channels: single_value("m"), rule: Rule::Wave { modes, angle } })
     }
 
     /// Makes the pressure at an angle on the wall (rad) and a height over the bottom (m), Pa.
@@ -139,7 +139,11 @@ impl Quantity {
         let h = surface.number(tank::H)?;
         ensure!(height <= h, "height {height} m is above the liquid at rest, tank.h = {h} m");
         needs.extend([tank::H, fluid::RHO].into_iter().chain(MOTION).map(String::from));
-        Ok(Quantity { needs, channels: one("Pa"), rule: Rule::Pressure { modes, angle, height } })
+        Ok(Quantity {
+            needs,
+            channels: single_value("Pa"),
+            rule: Rule::Pressure { modes, angle, height },
+        })
     }
 
     /// Makes the surface as a camera sees it: the plane that fits best, and every mode, each as a height at
@@ -166,7 +170,11 @@ impl Quantity {
     pub fn acceleration(description: &ModelDescription, radius: f64, angle: f64) -> Result<Self> {
         let needs: Vec<String> = MOTION.map(String::from).into();
         present(description, &needs)?;
-        Ok(Quantity { needs, channels: one("m/s2"), rule: Rule::Acceleration { radius, angle } })
+        Ok(Quantity {
+            needs,
+            channels: single_value("m/s2"),
+            rule: Rule::Acceleration { radius, angle },
+        })
     }
 
     /// Computes the value of each channel from the values of the needed variables, in their order.
@@ -176,7 +184,8 @@ impl Quantity {
             Rule::Wave { modes, angle } => {
                 let angles = modes.angles(read);
                 let radius = modes.radius(read);
-                let wave = |(n, a): (usize, &[f64; 2])| wall(n, radius) * along(*a, *angle);
+                let wave =
+                    |(n, a): (usize, &[f64; 2])| wall(n, radius) * component_along(*a, *angle);
                 vec![angles.iter().enumerate().map(wave).sum()]
             }
             Rule::Pressure { modes, angle, height } => {
@@ -184,13 +193,13 @@ impl Quantity {
                 let rest = &read[modes.reads()..];
                 let (h, rho) = (rest[0], rest[1]);
                 let motion = &rest[2..];
-                let (g, a) = (motion[4], along(acceleration(motion, motion[3]), *angle));
+                let (g, a) = (motion[4], component_along(acceleration(motion, motion[3]), *angle));
                 let modal = |(n, angles): (usize, &[f64; 2])| {
                     let k = XI[n] / radius;
                     // cosh kz / cosh kh without overflow.
                     let falls = (k * (height - h)).exp() * (1.0 + (-2.0 * k * height).exp())
                         / (1.0 + (-2.0 * k * h).exp());
-                    wall(n, radius) * (g * along(*angles, *angle) + a) * falls
+                    wall(n, radius) * (g * component_along(*angles, *angle) + a) * falls
                 };
                 let modal: f64 = angles.iter().enumerate().map(modal).sum();
                 vec![rho * (g * (h - height) + modal - a * radius)]
@@ -206,7 +215,7 @@ impl Quantity {
                 [plane(0), plane(1)].into_iter().chain(each.iter().flatten().copied()).collect()
             }
             Rule::Acceleration { radius, angle } => {
-                vec![along(acceleration(read, *radius), *angle)]
+                vec![component_along(acceleration(read, *radius), *angle)]
             }
         }
     }
@@ -217,7 +226,7 @@ fn wall(n: usize, radius: f64) -> f64 {
     2.0 * radius / (XI[n] * XI[n] - 1.0)
 }
 
-fn along([radial, tangential]: [f64; 2], angle: f64) -> f64 {
+fn component_along([radial, tangential]: [f64; 2], angle: f64) -> f64 {
     radial * angle.cos() + tangential * angle.sin()
 }
 
@@ -232,7 +241,7 @@ fn acceleration(motion: &[f64], radius: f64) -> [f64; 2] {
     ]
 }
 
-fn one(unit: &str) -> Vec<(String, String)> {
+fn single_value(unit: &str) -> Vec<(String, String)> {
     vec![(String::new(), unit.into())]
 }
 
@@ -291,7 +300,7 @@ impl Surface<'_> {
         let mut needs = Vec::new();
         for n in 1..=count {
             use names::hubslosh::slosh::{LENGTH, Q_RADIAL, Q_TANGENTIAL};
-            needs.extend([Q_RADIAL, Q_TANGENTIAL, LENGTH].map(|array| array.at([n])));
+            needs.extend([Q_RADIAL, Q_TANGENTIAL, LENGTH].map(|array| array.element([n])));
         }
         needs.push(tank::D.into());
         present(self.description, &needs)?;

@@ -32,7 +32,7 @@ fn record(set: &[(&str, &str)], sensors: &[&str], columns: &[&str], seconds: f64
     let sensors: Vec<Sensor> = sensors.iter().map(|text| text.parse().unwrap()).collect();
     let sensors = Sensors::new(&sensors, fmu.description(), &run.settings, STEP).unwrap();
     let mut all = columns.to_vec();
-    all.extend(sensors.needs().into_iter().filter(|name| !columns.contains(name)));
+    all.extend(sensors.required_variables().into_iter().filter(|name| !columns.contains(name)));
     let mut instance = run.initialise(&fmu).unwrap();
     let table = run.drive(&mut instance, &all, |_| {}).unwrap();
     sensors.read(table, "run", STEP).unwrap()

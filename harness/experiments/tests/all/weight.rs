@@ -31,7 +31,7 @@ fn said(
     };
     let mut instance = run.initialise(&fmu).unwrap();
     let tanks = Tanks::read(fmu.description(), &mut instance, tension).unwrap().unwrap();
-    let needs = tanks.needs();
+    let needs = tanks.required_variables();
     let columns = run.columns_with(&["dissipated"], needs.iter().map(String::as_str));
     tanks.without_weight(&run.drive(&mut instance, &columns, |_| {}).unwrap())
 }

@@ -158,7 +158,7 @@ impl Twin {
         let (step, late) = (1.0 / self.rate, self.sensor_errors.delay);
         let rows = ((stop - start) * self.rate).round() as usize;
         let time: Vec<f64> = (0..=rows).map(|k| start + k as f64 * step).collect();
-        let tau: Vec<f64> = time.iter().map(|&t| torque.at(t)).collect();
+        let tau: Vec<f64> = time.iter().map(|&t| torque.torque_at(t)).collect();
         // the FMU hears the recorded torque late: its knots are shifted, there is no torque before the first
         let held = self.intersample == Intersample::ZeroOrderHold;
         let heard = if self.intersample == Intersample::BandLimited {
@@ -243,11 +243,11 @@ impl Twin {
             };
             let shift = if self.intersample == Intersample::BandLimited { late } else { 0.0 };
             (course.values[0], course.slopes[0]) = match held {
-                true => (heard.at(t), 0.0),
+                true => (heard.torque_at(t), 0.0),
                 false => {
                     let from = (t - shift).max(start);
-                    let now = heard.at(from);
-                    (now, (heard.at(from + (next - t)) - now) / (next - t))
+                    let now = heard.torque_at(from);
+                    (now, (heard.torque_at(from + (next - t)) - now) / (next - t))
                 }
             };
             if drags {
@@ -288,7 +288,7 @@ fn behind(torque: &Torque, rows: &[f64]) -> Result<Torque> {
         for part in 1..=LAG_PARTS {
             let t = if part == LAG_PARTS { ends[1] } else { ends[0] + part as f64 * h };
             // just before a step of a held torque
-            tau.push(lag.step(torque.at(t - 1e-9), h));
+            tau.push(lag.step(torque.torque_at(t - 1e-9), h));
             time.push(t);
         }
     }

@@ -206,7 +206,7 @@ impl Twin {
         let profile = |text: String| -> Box<dyn Fn(f64) -> f64> {
             let profile: Profile = text.parse().expect("a profile");
             let torque = experiments::profile::Torque::Profile(profile);
-            Box::new(move |t| torque.at(t))
+            Box::new(move |t| torque.torque_at(t))
         };
         match self.excitation {
             Excitation::Up => {

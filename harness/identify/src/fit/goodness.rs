@@ -48,7 +48,7 @@ pub fn outputs(problem: &Problem, motion: &Motion, x: &[f64], question: &Questio
         let inputs: Vec<Vec<f64>> =
             record.inputs.iter().map(|input| channel.picked(input)).collect();
         let inputs: Vec<&[f64]> = inputs.iter().map(Vec::as_slice).collect();
-        let tests = Tests::of(&time, &inputs, &e, white);
+        let tests = Tests::run(&time, &inputs, &e, white);
         let count = e.len() as f64;
         let measured = channel.picked(&record.outputs[channel.output]);
         let squares: f64 = residual.iter().map(|r| r * r).sum();

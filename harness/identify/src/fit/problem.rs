@@ -445,7 +445,7 @@ impl<'a> Problem<'a> {
             }
             // in units of its size, which may be any
             let unit: Vec<f64> = residual.iter().map(|r| r / rms).collect();
-            let found = Noise::of(&record.time, &unit, Some(&channel.sampled));
+            let found = Noise::fit(&record.time, &unit, Some(&channel.sampled));
             Noise { white: found.white * rms / lost.sqrt(), ..found }
         };
         let noises: Vec<Noise> = self.channels.par_iter().zip(&residuals).map(of).collect();

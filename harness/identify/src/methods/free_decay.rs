@@ -68,7 +68,7 @@ impl Method for FreeDecay {
         }
         let records: Vec<Record> =
             task.recordings.iter().map(|r| Record { time: &r.time, signal: &r.rate }).collect();
-        let found = free_decay::FreeDecay::of(&records).with_context(|| {
+        let found = free_decay::FreeDecay::fit(&records).with_context(|| {
             format!(
                 "{}: no decaying oscillation of at least {LEAST_PERIODS} periods is seen in {}",
                 task.recordings.iter().map(|r| r.name.as_str()).collect::<Vec<_>>().join(", "),

@@ -10,7 +10,7 @@ use host::fmu::Fmu;
 use maud::{Markup, html};
 use nalgebra::{DMatrix, DVector};
 use names::hubslosh::{FrictionModel, SloshModel, fluid, friction, hub, tank};
-use report::page::{axis_chart, drawn, series};
+use report::page::{axis_chart, render_chart, series};
 use report::svg::{Axis, Style};
 
 use super::braking::{Braking, FrictionPoint, harmonics_at};
@@ -317,7 +317,7 @@ fn friction_curve(found: &Identification) -> Markup {
         let torques = || within.iter().map(|p| p.torque);
         let top = 1.6 * torques().fold(0.0, f64::max);
         chart.y = Axis::linear(label, torques().chain([top]), 0.0, 5);
-        drawn(&chart)
+        render_chart(&chart)
     };
     html! {
         h2 { "Friction" }
@@ -335,7 +335,7 @@ fn braking_chart(all: &[Braking]) -> Markup {
         series(points, color, Style::Line, braking.direction)
     });
     let title = "Deceleration in free decay over the angle";
-    drawn(&axis_chart(title, "angle, rad", "rad/s²", lines.collect(), false))
+    render_chart(&axis_chart(title, "angle, rad", "rad/s²", lines.collect(), false))
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use analysis::rest;
 use analysis::statistics::{about_mean, variance};
 use analysis::welch::{Segments, Spectra};
 use maud::{Markup, html};
-use report::page::{axis_chart, document, drawn, series, table};
+use report::page::{axis_chart, document, render_chart, series, table};
 use report::svg::{Chart, Style};
 
 use crate::estimate::{Estimated, prose};
@@ -46,7 +46,7 @@ pub fn of<D>(found: &Identified<D>, sections: &Sections) -> String {
         (sections.figures)
         @for signals in &found.residuals {
             h2 { (signals.name) }
-            @for chart in charts(signals) { (drawn(&chart)) }
+            @for chart in charts(signals) { (render_chart(&chart)) }
         }
         @if !found.correlations.0.is_empty() { (correlations(found, sections.condition)) }
         (sections.last)
@@ -163,7 +163,8 @@ fn stretch(signals: &Residual) -> Chart {
 fn spectrum(signals: &Residual) -> Chart {
     let count = signals.time.len();
     let step = (signals.time[count - 1] - signals.time[0]) / (count - 1) as f64;
-    let spectra = Spectra::of(step, &signals.residual, &signals.measured, Segments::Seconds(20.0));
+    let spectra =
+        Spectra::estimate(step, &signals.residual, &signals.measured, Segments::Seconds(20.0));
     // the spectra's unit is arbitrary: Parseval's theorem fixes it
     let density = |bins: &[f64], total: f64| -> Vec<(f64, f64)> {
         let sum = bins.iter().sum::<f64>() * spectra.resolution;

@@ -2,7 +2,7 @@
 //! estimate, the others start at theirs, and all are searched.
 
 use maud::{Markup, html};
-use report::page::{COLORS, drawn, series, table};
+use report::page::{COLORS, render_chart, series, table};
 use report::svg::{Axis, Chart, Style};
 use serde::Serialize;
 
@@ -142,7 +142,7 @@ pub fn section(trials: &[Trial]) -> Markup {
     html! {
         h2 { "Sensitivity to the start" }
         (table(head, rows))
-        (drawn(&chart(trials)))
+        (render_chart(&chart(trials)))
     }
 }
 

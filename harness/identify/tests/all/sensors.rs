@@ -41,7 +41,7 @@ fn twin(sensor: &Sensor, column: &str) -> Record {
     let one = [sensor.clone()];
     let sensors = Sensors::new(&one, fmu.description(), &run.settings, STEP).unwrap();
     let mut instance = run.initialise(&fmu).unwrap();
-    let table = run.drive(&mut instance, &sensors.needs(), |_| {}).unwrap();
+    let table = run.drive(&mut instance, &sensors.required_variables(), |_| {}).unwrap();
     let table = sensors.read(table, "twin", STEP).unwrap();
     let of = |name: &str| table.column(name).unwrap().to_vec();
     Record {

@@ -6,7 +6,7 @@ use maud::{Markup, html};
 
 use super::colors;
 use super::figure::{Figure, Panel, numbers};
-use super::page::{Page, list_of};
+use super::page::{Page, sentence_with_names};
 
 const COMPARED: [(&str, &str, f64); 4] = [
     ("f_dip_hz", "antiresonance / mHz", 1e3),
@@ -68,7 +68,7 @@ pub(super) fn compare(
     let figure = add(vec![Figure {
         title: "This campaign less the other".into(),
         caption: html! {
-            (list_of("Largest differences", &largest)) (list_of("Only in this campaign", &alone))
+            (sentence_with_names("Largest differences", &largest)) (sentence_with_names("Only in this campaign", &alone))
         },
         columns: 2,
         height: 120 + 14 * results.outcomes.len(),

@@ -20,7 +20,7 @@ pub(super) const QUANTITIES: [Quantity; 4] = [
 ];
 
 /// Lists the parameters that are drawn at random: index among the varied parameters, and name.
-fn drawn<'a>(page: &Page<'a>) -> Vec<(usize, &'a str)> {
+fn random_parameters<'a>(page: &Page<'a>) -> Vec<(usize, &'a str)> {
     let grouping = page.plan.grouping();
     let drawn = page.plan.varied().into_iter().enumerate();
     drawn.filter(|(_, n)| !grouping.contains(n) && !n.ends_with("seed")).collect()
@@ -37,7 +37,7 @@ pub(super) fn ranked<'a>(page: &Page<'a>, group: &Group) -> Vec<(&'a str, [f64; 
     };
     // One standard deviation of the parameter changes the quantity by ρ times the quantity's own standard
     // deviation.
-    let mut ranked: Vec<(&str, [f64; 2], [f64; 2])> = drawn(page)
+    let mut ranked: Vec<(&str, [f64; 2], [f64; 2])> = random_parameters(page)
         .into_iter()
         .map(|(place, name)| {
             let each = [0, 1].map(|i| effect(place, QUANTITIES[i].2));
@@ -51,7 +51,7 @@ pub(super) fn ranked<'a>(page: &Page<'a>, group: &Group) -> Vec<(&'a str, [f64; 
 
 /// Plots the ranked sensitivities and the histograms of a group.
 pub(super) fn draws(page: &Page, group: &Group) -> Vec<Figure> {
-    let (drawn, ranked) = (drawn(page), ranked(page, group));
+    let (drawn, ranked) = (random_parameters(page), ranked(page, group));
     let names: Vec<&str> = ranked.iter().map(|row| row.0).collect();
     let bars = [0, 1].map(|i| {
         let text: Vec<String> = ranked.iter().map(|row| format!("ρ = {:.2}", row.2[i])).collect();

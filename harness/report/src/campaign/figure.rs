@@ -125,7 +125,7 @@ impl Figures {
         }
     }
 
-    pub fn list(&self) -> Markup {
+    pub fn table_of_figures(&self) -> Markup {
         html! {
             @for (title, number) in self.titles.iter().zip(1..) {
                 li { a href={ "#figure-" (number) } { (title) } }

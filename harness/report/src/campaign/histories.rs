@@ -11,7 +11,7 @@ use names::hubslosh::{OMEGA_IMU, SLOSH_ANGLE, SLOSH_ANGLE_RADIAL, TAU_CMD};
 
 /// Selects the runs of a group that are plotted over time: all if they are few, otherwise the first, the
 /// middle and the last.
-fn chosen<'a>(runs: &[&'a Outcome]) -> Vec<&'a Outcome> {
+fn plotted_runs<'a>(runs: &[&'a Outcome]) -> Vec<&'a Outcome> {
     match runs.len() {
         0..=4 => runs.to_vec(),
         n => vec![runs[0], runs[n / 2], runs[n - 1]],
@@ -20,7 +20,7 @@ fn chosen<'a>(runs: &[&'a Outcome]) -> Vec<&'a Outcome> {
 
 /// Plots torque, rate, slosh angles and rate residual of some runs of a group.
 pub(super) fn history(page: &Page, group: &Group) -> Figure {
-    let runs = chosen(&group.drawn);
+    let runs = plotted_runs(&group.drawn);
     let mut traces = Vec::new();
     let panels = [
         "torque / N·m",
@@ -68,7 +68,7 @@ pub(super) fn history(page: &Page, group: &Group) -> Figure {
 
 /// Plots rate and slosh angle after a manoeuvre. Each group has one colour and is represented by its middle
 /// run along the axis.
-pub(super) fn after(page: &Page) -> Figure {
+pub(super) fn motion_after_manoeuvre(page: &Page) -> Figure {
     let mut traces = Vec::new();
     let mut from = f64::INFINITY;
     for (i, group) in page.groups.iter().enumerate() {

@@ -41,7 +41,7 @@ const MOST_RUNS: usize = 6;
 
 /// Returns the run that is shown in 3-D: the one with the largest radial slosh angle, which has rotary slosh,
 /// or, if no run leaves its plane, the one with the largest slosh angle. Recordings are not considered.
-pub fn run_to_view(results: &Results) -> Option<&Outcome> {
+pub fn most_swirling_run(results: &Results) -> Option<&Outcome> {
     let simulated = results.outcomes.iter().filter(|run| !run.is_recording());
     let (radial, tangential) =
         (|run: &Outcome| run.totals.peak_radial_angle, |run: &Outcome| run.totals.peak_slosh_angle);
@@ -97,7 +97,7 @@ pub fn page(
                                 li { a href={ "#" (anchor(title)) } { (title) } }
                             }
                         }
-                        details { summary { "All figures" } ol { (figures.list()) } }
+                        details { summary { "All figures" } ol { (figures.table_of_figures()) } }
                     }
                     noscript {
                         p .warning { "The figures need JavaScript; the numbers are in the results table and in the files in the folder of this page." }
@@ -168,7 +168,7 @@ fn bench_sections<'a>(
         (axis, groups.iter().all(|g| manoeuvre(g.runs[0]).is_none()))
     {
         first.push(over_axis::residual_motion(page, axis));
-        first.push(histories::after(page));
+        first.push(histories::motion_after_manoeuvre(page));
     } else if let Some(axis) = axis {
         first.push(over_axis::slosh_angles(page, axis));
     } else if results.outcomes.len() > 1 {

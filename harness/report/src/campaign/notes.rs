@@ -19,7 +19,7 @@ pub(super) fn estimators(groups: &[Group]) -> Markup {
     let run = &groups[0].runs[0];
     let duration = run.case.run().steps() as f64 * run.case.step;
     let band = groups[0].band().unwrap_or(BAND);
-    let lag = Lengths::of(band, groups[0].sweep, duration, run.case.step).lag;
+    let lag = Lengths::for_record(band, groups[0].sweep, duration, run.case.step).lag;
     let rows: Vec<Markup> = groups.iter().filter_map(swept_row).collect();
     html! {
         p {

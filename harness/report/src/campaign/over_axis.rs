@@ -7,7 +7,7 @@ use maud::{Markup, html};
 
 use super::colors;
 use super::figure::{Figure, Label, Panel, dots, line};
-use super::page::{Axis, Group, Page, best, distinct, exact_features, list_of};
+use super::page::{Axis, Group, Page, best, distinct, exact_features, sentence_with_names};
 
 /// A quantity of a run that is plotted: label, how it is read from the run, whether its axis is logarithmic,
 /// and a level that is drawn for comparison.
@@ -99,7 +99,7 @@ pub(super) fn extrema(page: &Page, axis: &Axis) -> Figure {
             "Circles: antiresonance, where the liquid holds the hub still; diamonds: resonance, where hub and liquid swing against each other. "
             @if models.len() > 1 { "Lines: " (lines.join(", ")) ". " }
             "Thin and dotted: both of the exact linear plant with viscous friction. Bars: 95 % intervals, from the part of the rate that no linear response explains: gyro noise, dry friction, a nonlinear liquid (Methods). An upward sweep shows a narrow resonance late, so above the exact one (Methods)."
-            (list_of("Invalid, and not drawn", &untrusted))
+            (sentence_with_names("Invalid, and not drawn", &untrusted))
         },
         thesis: "7.1 and 7.2",
         height: 460,

@@ -123,7 +123,7 @@ fn exact_response(run: &Outcome) -> FrequencyResponse {
 }
 
 pub(super) fn exact_features(run: &Outcome) -> Features {
-    Features::of(&exact_response(run))
+    Features::find(&exact_response(run))
 }
 
 /// Returns the unit of a variable in typographic form.
@@ -256,7 +256,7 @@ pub(super) fn manoeuvre(run: &Outcome) -> Option<f64> {
 }
 
 /// Returns a sentence that names at most four `things`; empty if there are none.
-pub(super) fn list_of(what: &str, things: &[String]) -> String {
+pub(super) fn sentence_with_names(what: &str, things: &[String]) -> String {
     match things {
         [] => String::new(),
         few if few.len() <= 4 => format!(" {what}: {}.", few.join(", ")),
@@ -275,7 +275,7 @@ pub(super) fn distinct<T: PartialEq>(values: impl Iterator<Item = T>) -> Vec<T> 
     found
 }
 
-pub(super) fn torque_of(run: &Outcome) -> f64 {
+pub(super) fn torque_amplitude(run: &Outcome) -> f64 {
     run.case.amplitude.unwrap_or(0.0)
 }
 

@@ -35,7 +35,7 @@ pub(super) fn responses(page: &Page, group: &Group) -> Figure {
             &group.exact_response(),
         ));
     }
-    let near = near(group);
+    let near = band_around_resonance(group);
     let panel = |y: &str| Panel { log_x: true, range: near, ..Panel::new("frequency / Hz", y) };
     Figure {
         title: format!("Frequency response, {}", group.title()),
@@ -54,7 +54,7 @@ pub(super) fn responses(page: &Page, group: &Group) -> Figure {
 
 /// Returns the band (Hz) around the antiresonance and the resonance of both linear theory and every plotted
 /// run, because a nonlinear liquid or a bench has its resonance elsewhere than linear theory.
-fn near(group: &Group) -> Option<(f64, f64)> {
+fn band_around_resonance(group: &Group) -> Option<(f64, f64)> {
     let (from, to) = group.band().unwrap_or(BAND);
     let of_runs = group.drawn.iter().filter_map(|run| Some(best(run)?.0.features));
     let bands = group.exact.iter().copied().chain(of_runs).filter_map(|features| {
@@ -130,8 +130,11 @@ pub(super) fn fitted(page: &Page, group: &Group) -> Figure {
         let coherence = thinned(coherence, true);
         traces.push(line(2, &format!("{name}, measured"), color, "solid", &coherence));
     }
-    let panel =
-        |y: &str| Panel { log_x: true, range: near(group), ..Panel::new("frequency / Hz", y) };
+    let panel = |y: &str| Panel {
+        log_x: true,
+        range: band_around_resonance(group),
+        ..Panel::new("frequency / Hz", y)
+    };
     Figure {
         title: format!("Fitted transfer function and residual coherence, {}", group.title()),
         caption: html! { "A transfer function with three poles and two zeros (dashed) over the measured response of the smallest and the largest torque, and the coherence of what it leaves with the torque: 1 where the rest still follows the torque." },
@@ -177,7 +180,7 @@ pub(super) fn models(page: &Page) -> Vec<Figure> {
                 thesis: "7.5 and 7.6",
                 height: 340,
                 half: true,
-                panels: vec![Panel { log_x: true, range: near(groups[0]), ..Panel::new("frequency / Hz", "|H| / dB") }],
+                panels: vec![Panel { log_x: true, range: band_around_resonance(groups[0]), ..Panel::new("frequency / Hz", "|H| / dB") }],
                 traces,
                 ..Figure::default()
             }

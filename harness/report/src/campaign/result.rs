@@ -5,7 +5,7 @@ use experiments::profile::Torque;
 use names::hubslosh::SloshModel;
 
 use super::draws::moments;
-use super::page::{Axis, Group, Page, best, distinct, exact_features, manoeuvre, torque_of};
+use super::page::{Axis, Group, Page, best, distinct, exact_features, manoeuvre, torque_amplitude};
 use super::recordings;
 
 /// Features of one run's frequency response.
@@ -363,11 +363,12 @@ fn rotation(page: &Page) -> String {
     let count = |model: &str| {
         let runs = page.groups.iter().filter(|g| g.model == model).flat_map(|g| &g.runs);
         let rotary = runs.clone().filter(|run| run.rotary.is_some_and(|rotary| rotary.time > 0.0));
-        let first = rotary.clone().min_by(|a, b| torque_of(a).total_cmp(&torque_of(b)));
+        let first =
+            rotary.clone().min_by(|a, b| torque_amplitude(a).total_cmp(&torque_amplitude(b)));
         let which = first.map(|run| match (&run.case.listed, &*run.case.torque) {
             (None, Torque::Profile(profile)) => {
                 let at = profile.frequency().map(|f| format!(" at {f} Hz"));
-                format!("smallest torque {} N·m{}", torque_of(run), at.unwrap_or_default())
+                format!("smallest torque {} N·m{}", torque_amplitude(run), at.unwrap_or_default())
             }
             (name, _) => format!("run {}", name.as_deref().unwrap_or(&run.case.name)),
         });

@@ -9,7 +9,7 @@ use experiments::campaign::Outcome;
 use experiments::rounding::significant;
 use maud::{Markup, html};
 
-use super::page::{Group, cm, distinct, torque_of};
+use super::page::{Group, cm, distinct, torque_amplitude};
 
 const SMALLEST: f64 = 0.0125;
 const LARGEST: f64 = 0.25;
@@ -46,7 +46,7 @@ const NUMBERS: [Number; 8] = [
             let values = values_from(group, SMALLEST, separation)?;
             let steps = values.windows(2).zip(&group.runs[1..]);
             let largest = steps.max_by(|(a, _), (b, _)| (a[1] - a[0]).total_cmp(&(b[1] - b[0])))?;
-            Some(torque_of(largest.1))
+            Some(torque_amplitude(largest.1))
         },
     },
     Number {
@@ -109,13 +109,13 @@ const NUMBERS: [Number; 8] = [
         ours: |group| {
             let is_rotary =
                 |run: &&&Outcome| run.rotary.is_some_and(|rotary| rotary.from.is_some());
-            group.runs.iter().find(is_rotary).map(|run| torque_of(run))
+            group.runs.iter().find(is_rotary).map(|run| torque_amplitude(run))
         },
     },
 ];
 
 fn run_at<'a>(group: &'a Group, torque: f64) -> Option<&'a Outcome> {
-    group.runs.iter().copied().find(|run| (torque_of(run) - torque).abs() < 1e-9)
+    group.runs.iter().copied().find(|run| (torque_amplitude(run) - torque).abs() < 1e-9)
 }
 
 /// Evaluates `figure` for each run with at least this torque (N·m). Returns `None` if fewer than two runs
@@ -125,7 +125,7 @@ fn values_from(
     torque: f64,
     figure: fn(&Outcome) -> Option<f64>,
 ) -> Option<Vec<f64>> {
-    let runs = group.runs.iter().filter(|run| torque_of(run) > torque - 1e-9);
+    let runs = group.runs.iter().filter(|run| torque_amplitude(run) > torque - 1e-9);
     let values: Vec<f64> = runs.map(|run| figure(run)).collect::<Option<_>>()?;
     (values.len() > 1).then_some(values)
 }

@@ -264,7 +264,7 @@ pub(super) fn bench(parameters: &Parameters, drawing: Option<&Drawing>) -> Tank 
             };
             let m_liq = number(M_LIQ);
             let g = number(G_REF);
-            let of = |array: Array<1>, n: usize| number(&array.at([n + 1]));
+            let of = |array: Array<1>, n: usize| number(&array.element([n + 1]));
             let mass = |n: usize| of(MASS, n);
             let depth = radius * depth_over_radius(mass(0) / m_liq);
             let mut modes = Vec::new();
@@ -314,7 +314,8 @@ pub(super) fn bench(parameters: &Parameters, drawing: Option<&Drawing>) -> Tank 
             .iter()
             .enumerate()
             .map(|(n, mode)| {
-                let direction = |n: usize| number(&hubslosh::slosh::table::DIRECTION.at([n + 1]));
+                let direction =
+                    |n: usize| number(&hubslosh::slosh::table::DIRECTION.element([n + 1]));
                 Pendulum::from_formula((if is_table { order(n, direction) } else { n }, mode))
             })
             .collect(),
@@ -354,7 +355,7 @@ pub(super) fn tank(parameters: &Parameters, prefix: &str, drawing: Option<&Drawi
         for (n, mode) in modes.iter_mut().enumerate() {
             [mode.length, mode.hinge] = fill.mode(n, m_liq);
         }
-        radius = radius_of(&modes[0]);
+        radius = mode_radius(&modes[0]);
         level = fill.level(m_liq);
         // The first point as a cylinder: the liquid's centre is the mean of bottom and surface.
         let first = fill.levels[0];
@@ -379,7 +380,7 @@ pub(super) fn tank(parameters: &Parameters, prefix: &str, drawing: Option<&Drawi
         m_liq = number("m_0") + modes.iter().map(|m| m.mass).sum::<f64>();
         let moment = number("m_0") * number("H_0")
             + modes.iter().map(|m| m.mass * (m.hinge - m.length)).sum::<f64>();
-        radius = radius_of(&modes[0]);
+        radius = mode_radius(&modes[0]);
         let depth = radius * depth_over_radius(modes[0].mass / m_liq);
         (level, bottom) = (moment / m_liq + 0.5 * depth, moment / m_liq - 0.5 * depth);
         note = format!("Of {prefix} only modes are known: it is drawn as {DRAWN}.");
@@ -413,7 +414,7 @@ pub(super) fn tank(parameters: &Parameters, prefix: &str, drawing: Option<&Drawi
     }
 }
 
-fn radius_of(mode: &Pendulum) -> f64 {
+fn mode_radius(mode: &Pendulum) -> f64 {
     match mode.wave {
         wave if wave > 0.0 => 0.5 * wave * (XI[0] * XI[0] - 1.0),
         // The first mode of a deep cylinder has the pendulum length R/xi.

@@ -114,10 +114,10 @@ pub fn columns(
         }
         Some(Kind::Craft) => {
             let q = (1..=4).map(|i| format!("q[{i}]"));
-            q.chain(["omega", "slosh_force", "slosh_torque"].iter().flat_map(|n| three(n)))
+            q.chain(["omega", "slosh_force", "slosh_torque"].iter().flat_map(|n| vector(n)))
                 .collect()
         }
-        Some(Kind::Tank) => ["force", "torque"].iter().flat_map(|n| three(n)).collect(),
+        Some(Kind::Tank) => ["force", "torque"].iter().flat_map(|n| vector(n)).collect(),
         None => Vec::new(),
     };
     for (prefix, modes) in prefixes(&parameters) {
@@ -174,7 +174,7 @@ impl Columns<'_> {
 
     /// Takes the first list of columns that exists completely and returns its index; otherwise records what
     /// is missing.
-    fn need(&mut self, lists: &[Vec<String>]) -> Option<usize> {
+    fn require(&mut self, lists: &[Vec<String>]) -> Option<usize> {
         let found = (0..lists.len()).find(|i| self.take(&lists[*i]));
         if found.is_none() {
             let ways: Vec<String> = lists.iter().map(|list| list.join(", ")).collect();
@@ -186,7 +186,7 @@ impl Columns<'_> {
 
 /// Returns the names of the coordinates of mode `n` (from 1) of HubSlosh.
 fn coordinates(n: usize) -> [String; 2] {
-    [slosh::Q_RADIAL, slosh::Q_TANGENTIAL].map(|array| array.at([n]))
+    [slosh::Q_RADIAL, slosh::Q_TANGENTIAL].map(|array| array.element([n]))
 }
 
 /// Returns the radial and tangential slosh angles of HubSlosh's modes after the first, as far as they were
@@ -221,11 +221,11 @@ fn spread(values: &[f64]) -> Vec<f64> {
     (0..count).map(|i| low + step * i as f64).collect()
 }
 
-fn one(name: &str) -> Vec<String> {
+fn scalar(name: &str) -> Vec<String> {
     vec![name.to_string()]
 }
 
-fn three(name: &str) -> Vec<String> {
+fn vector(name: &str) -> Vec<String> {
     (1..=3).map(|i| format!("{name}[{i}]")).collect()
 }
 
@@ -272,8 +272,8 @@ pub fn page(run: &Run) -> Result<Page> {
         "{} {} · {} to {} s · {} rows",
         run.description.model_name,
         run.description.version,
-        shown(time[0]),
-        shown(time[time.len() - 1]),
+        rounded(time[0]),
+        rounded(time[time.len() - 1]),
         time.len(),
     );
     let html = markup(&run.title, &facts, kind, &page, &draft.notes);
@@ -311,7 +311,7 @@ impl Draft<'_> {
         match self.kind {
             Kind::Bench => {
                 motion["theta"] = json!(THETA);
-                if self.columns.need(&[one(THETA), one(OMEGA)]) == Some(1) {
+                if self.columns.require(&[scalar(THETA), scalar(OMEGA)]) == Some(1) {
                     let omega = table.column(OMEGA).unwrap_or_default();
                     self.derive(THETA.into(), integral(self.time(), omega));
                     self.notes.push("The hub's angle is the integral of omega by the trapezoidal rule from 0: theta is not in the table.".into());
@@ -323,7 +323,7 @@ impl Draft<'_> {
             }
             Kind::Craft => {
                 let q: Vec<String> = (1..=4).map(|i| format!("q[{i}]")).collect();
-                self.columns.need(std::slice::from_ref(&q));
+                self.columns.require(std::slice::from_ref(&q));
                 motion["q"] = json!(q);
                 self.notes.push(
                     "The view follows O; the faint circles are directions that do not turn.".into(),
@@ -382,9 +382,12 @@ impl Draft<'_> {
         let planar =
             [SloshModel::Linear.name(), SloshModel::Planar.name()].contains(&model.as_str());
         let both = vec![SLOSH_ANGLE_RADIAL.to_string(), SLOSH_ANGLE.to_string()];
-        let lists =
-            if planar && run.parameters_known { vec![both, one(SLOSH_ANGLE)] } else { vec![both] };
-        let found = self.columns.need(&lists);
+        let lists = if planar && run.parameters_known {
+            vec![both, scalar(SLOSH_ANGLE)]
+        } else {
+            vec![both]
+        };
+        let found = self.columns.require(&lists);
         let radial = (found == Some(0)).then_some(SLOSH_ANGLE_RADIAL);
         let mut modes = vec![json!({ "angles": [radial, SLOSH_ANGLE] })];
         let higher = higher_modes(run.table, &model, &tank.modes);
@@ -423,7 +426,7 @@ impl Draft<'_> {
             let p: Vec<String> = (1..=3).map(|i| format!("{prefix}.p[{n},{i}]")).collect();
             let angles: Vec<String> =
                 ["x", "y"].map(|axis| format!("{prefix}.angle_{axis}[{n}]")).to_vec();
-            match self.columns.need(&[p.clone(), angles.clone()]) {
+            match self.columns.require(&[p.clone(), angles.clone()]) {
                 Some(1) => json!({ "angles": angles }),
                 _ => json!({ "p": p }),
             }
@@ -435,7 +438,7 @@ impl Draft<'_> {
     fn drain(&mut self, tank: &Tank, moved: &mut Value) {
         let (prefix, Some(fill)) = (&tank.prefix, &tank.fill) else { return };
         let name = format!("{prefix}.liquid");
-        if self.columns.need(&[one(&name)]).is_none() {
+        if self.columns.require(&[scalar(&name)]).is_none() {
             return;
         }
         let liquid = self.run.table.column(&name).unwrap_or_default();
@@ -599,7 +602,7 @@ fn ordinal(n: usize) -> String {
 }
 
 /// Rounds a number to remove the errors of binary fractions.
-fn shown(value: f64) -> f64 {
+fn rounded(value: f64) -> f64 {
     (value * 1e6).round() / 1e6
 }
 

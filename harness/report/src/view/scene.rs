@@ -11,7 +11,7 @@ use serde_json::{Map, Value, json};
 use signals::table::Table;
 
 use super::geometry::{self, Outline, Parameters, Tank};
-use super::{Columns, Kind, three};
+use super::{Columns, Kind, vector};
 
 /// Angle of an arc at full length, rad.
 const FULL_ARC: f64 = 2.4;
@@ -80,17 +80,17 @@ pub fn scene(
     let (mut geometry, reach) = match kind {
         Kind::Bench => bench(&tanks[0], &mut arrows),
         Kind::Craft => craft(tanks, &mut arrows, notes),
-        Kind::Tank => alone(&tanks[0], &mut arrows),
+        Kind::Tank => host_tank_scene(&tanks[0], &mut arrows),
     };
     arrows.share_scales();
     geometry["reach"] = json!(reach);
-    geometry["tanks"] = tanks.iter().map(drawn).collect();
+    geometry["tanks"] = tanks.iter().map(tank_scene).collect();
     geometry["arrows"] = json!(arrows.drawn);
     json!({ "geometry": geometry, "arrows": arrows.of })
 }
 
 /// Converts a tank with its pendulums for the scene.
-fn drawn(tank: &Tank) -> Value {
+fn tank_scene(tank: &Tank) -> Value {
     let shape = match &tank.outline {
         Outline::Revolved(contour) => json!({ "contour": contour }),
         Outline::Box([a, b, bottom, top]) => json!({ "box": [a, b], "bottom": bottom, "top": top }),
@@ -163,7 +163,7 @@ fn craft(tanks: &[Tank], arrows: &mut Arrows, notes: &mut Vec<String>) -> (Value
     let at = |tank: &Tank| length(&tank.position) + tank.extent();
     let mut reach = tanks.iter().map(at).fold(0.0, f64::max);
     let size = geometry::craft_box(arrows.parameters);
-    let center = [1, 2, 3].map(|i| arrows.parameters.number(&spacecraft::craft::R.at([i])));
+    let center = [1, 2, 3].map(|i| arrows.parameters.number(&spacecraft::craft::R.element([i])));
     if let Some(size) = size {
         reach = reach.max(0.5 * length(&size) + length(&center));
         notes.push(
@@ -179,9 +179,9 @@ fn craft(tanks: &[Tank], arrows: &mut Arrows, notes: &mut Vec<String>) -> (Value
     let long = 0.8 * reach;
     let force = |at: [f64; 3], tip: bool| json!({ "kind": "force", "unit": "N", "length": long, "at": at, "tip": tip });
     let torque = json!({ "kind": "torque", "unit": "N·m", "length": long });
-    arrows.add("force", "force at O", force([0.0; 3], true), &three("force"));
-    arrows.add("torque", "torque about O", torque.clone(), &three("torque"));
-    let own = |tank: &Tank| three(&format!("{}.force", tank.prefix));
+    arrows.add("force", "force at O", force([0.0; 3], true), &vector("force"));
+    arrows.add("torque", "torque about O", torque.clone(), &vector("torque"));
+    let own = |tank: &Tank| vector(&format!("{}.force", tank.prefix));
     if tanks.len() > 1 && tanks.iter().flat_map(own).all(|name| arrows.columns.has(&name)) {
         for tank in tanks {
             let name = format!("{}.force", tank.prefix);
@@ -190,9 +190,9 @@ fn craft(tanks: &[Tank], arrows: &mut Arrows, notes: &mut Vec<String>) -> (Value
         }
     } else {
         let slosh = force([0.0; 3], false);
-        arrows.add("slosh_force", "liquid force at O", slosh, &three("slosh_force"));
+        arrows.add("slosh_force", "liquid force at O", slosh, &vector("slosh_force"));
     }
-    arrows.add("slosh_torque", "liquid torque about O", torque, &three("slosh_torque"));
+    arrows.add("slosh_torque", "liquid torque about O", torque, &vector("slosh_torque"));
     let geometry = json!({
         "body": { "size": size, "center": center },
         "from": [1.0, -1.25, 0.55], "axes": { "length": 0.85 * reach },
@@ -202,7 +202,7 @@ fn craft(tanks: &[Tank], arrows: &mut Arrows, notes: &mut Vec<String>) -> (Value
 
 /// Returns a tank on a host's craft, seen from its middle, with O and the arrows there, and the distance that
 /// contains it, m.
-fn alone(tank: &Tank, arrows: &mut Arrows) -> (Value, f64) {
+fn host_tank_scene(tank: &Tank, arrows: &mut Arrows) -> (Value, f64) {
     let [middle, half] = tank.middle_and_extent();
     let [x, y, z] = tank.position;
     let off = x.hypot(y).hypot(z + middle);
@@ -214,7 +214,7 @@ fn alone(tank: &Tank, arrows: &mut Arrows) -> (Value, f64) {
         ("a", "specific force at O", "acceleration", "m/s²"),
     ] {
         let arrow = json!({ "kind": kind, "unit": unit, "length": long });
-        arrows.add(name, label, arrow, &three(name));
+        arrows.add(name, label, arrow, &vector(name));
     }
     let geometry = json!({
         "from": [1.0, -1.25, 0.55], "axes": { "length": 0.5 * reach },

@@ -55,14 +55,14 @@ impl FromStr for Columns {
 
     /// Parses the items between commas. The error lists every item that is wrong.
     fn from_str(text: &str) -> Result<Self> {
-        Columns::parse(text.split(','), one)
+        Columns::parse(text.split(','), parse_signal)
     }
 }
 
 /// Parses `SIGNAL=COLUMN[:UNIT]` for a signal of the bench. The text after the last colon is the unit, which
 /// must fit the signal's quantity.
-fn one(item: &str) -> Result<(String, Column)> {
-    let (signal, column) = named(item)?;
+fn parse_signal(item: &str) -> Result<(String, Column)> {
+    let (signal, column) = parse_variable(item)?;
     let quantity = quantity(&signal)?;
     if let Some(unit) = &column.unit {
         ensure!(
@@ -75,7 +75,7 @@ fn one(item: &str) -> Result<(String, Column)> {
 }
 
 /// Parses `NAME=COLUMN[:UNIT]` for a signal of any name and a unit of any quantity.
-fn named(item: &str) -> Result<(String, Column)> {
+fn parse_variable(item: &str) -> Result<(String, Column)> {
     let Some((signal, column)) = item.split_once('=') else {
         bail!("\"{item}\" is not SIGNAL=COLUMN or SIGNAL=COLUMN:UNIT")
     };
@@ -107,7 +107,7 @@ impl Columns {
     ///
     /// Lists all items that are wrong.
     pub fn for_variables<'a>(items: impl IntoIterator<Item = &'a str>) -> Result<Self> {
-        Columns::parse(items, named)
+        Columns::parse(items, parse_variable)
     }
 
     fn parse<'a>(

@@ -72,7 +72,7 @@ impl Header {
         }
         let bare = bracketed(column).map_or(column, |(name, _)| name);
         let without_unit = |k: &usize| {
-            let stated = dimension.map(|dimension| unit::in_name(&self.full[*k], dimension));
+            let stated = dimension.map(|dimension| unit::find_unit(&self.full[*k], dimension));
             matches!(stated, Some(Ok(Some(unit))) if unit.is_last && unit.before == column)
         };
         let all = || 0..self.names.len();
@@ -99,7 +99,7 @@ impl Header {
         };
         let wanted = dimension(signal).filter(|_| self.full[place] != signal.name);
         let named = match wanted
-            .map(|(dimension, own)| (unit::in_name(&self.full[place], dimension), own))
+            .map(|(dimension, own)| (unit::find_unit(&self.full[place], dimension), own))
         {
             None | Some((Ok(None), _)) => None,
             Some((Ok(Some(stated)), own)) => Some((stated.text, stated.factor / own)),
@@ -219,7 +219,7 @@ const SHORT: f64 = 0.25;
 /// Lists every column of a file by its name there, with the position in `signals` of the signal that the
 /// column holds. A column holds the signal of its name, with or without a unit.
 pub fn assigned(path: &Path, signals: &[Signal]) -> Result<Vec<(String, Option<usize>)>> {
-    let file = opened(path, File::open)?;
+    let file = with_text_file(path, File::open)?;
     let header = file.header();
     let mut found: Vec<_> = header.full.iter().map(|name| (name.clone(), None)).collect();
     for (k, signal) in signals.iter().enumerate() {
@@ -240,7 +240,7 @@ pub fn assigned(path: &Path, signals: &[Signal]) -> Result<Vec<(String, Option<u
 pub fn read(path: &Path, wanted: &Wanted, done: &mut dyn FnMut(String)) -> Result<Table> {
     let name = path.display().to_string();
     let mut done = |words| done(format!("{name}: {words}"));
-    opened(path, |path| read_as(path, wanted, None, &mut done))
+    with_text_file(path, |path| read_as(path, wanted, None, &mut done))
 }
 
 /// Reads a recording if it is text in columns or Parquet; `None` for other kinds, which the Python package
@@ -275,7 +275,7 @@ pub fn read_inputs(
 ) -> Result<Table> {
     let name = path.display().to_string();
     let mut done = |words| done(format!("{name}: {words}"));
-    let table = opened(path, |path| read_as(path, wanted, Some(booleans), &mut done))?;
+    let table = with_text_file(path, |path| read_as(path, wanted, Some(booleans), &mut done))?;
     table.all_finite().map_err(|error| anyhow!("{name}, {error}"))?;
     Ok(table)
 }
@@ -304,7 +304,7 @@ impl File {
 
 /// Lets `work` read a file, or the text to which the Python package converts the file if it is of another
 /// kind.
-fn opened<T>(path: &Path, mut work: impl FnMut(&Path) -> Result<T>) -> Result<T> {
+fn with_text_file<T>(path: &Path, mut work: impl FnMut(&Path) -> Result<T>) -> Result<T> {
     let read = match work(path) {
         Err(error) if error.is::<Foreign>() => {
             foreign::converted(path, &error).and_then(|(_folder, text)| work(&text))
@@ -437,7 +437,7 @@ fn read_as(
     let mut seconds = origin.is_some();
     if let Some((whole, rest, factor)) = half {
         let part = columns.pop().unwrap_or_default();
-        if let Some((first, joined)) = joined(&columns[0], &part, *factor) {
+        if let Some((first, joined)) = join_seconds(&columns[0], &part, *factor) {
             columns[0] = joined;
             seconds = true;
             done(format!(
@@ -501,7 +501,7 @@ fn read_as(
 
 /// Joins whole seconds and the rest of a second (times `factor`, s) to one time. Returns the first whole
 /// second, from which the times count, and the times, s; `None` if the columns are something else.
-fn joined(whole: &[f64], part: &[f64], factor: f64) -> Option<(f64, Vec<f64>)> {
+fn join_seconds(whole: &[f64], part: &[f64], factor: f64) -> Option<(f64, Vec<f64>)> {
     let first = *whole.first()?;
     let fine =
         |(whole, part): (&f64, &f64)| whole.fract() == 0.0 && (0.0..1.0).contains(&(part * factor));
@@ -547,7 +547,7 @@ fn unstated<'a>(signal: &Signal<'a>) -> Option<&'a str> {
 /// Returns the dimension of a signal, and the value in SI of the unit in which it is wanted.
 fn dimension(signal: &Signal) -> Option<(Dimension, f64)> {
     match signal.unit {
-        Some(unit) => unit::dimension_of(unit),
+        Some(unit) => unit::parse_unit(unit),
         None => quantity(signal.name).ok().map(|quantity| (quantity.dimension(), 1.0)),
     }
 }

@@ -298,7 +298,7 @@ pub fn conversion(from: &str, to: &str) -> Option<f64> {
     if from == to {
         return Some(1.0);
     }
-    let (dimension, own) = dimension_of(to)?;
+    let (dimension, own) = parse_unit(to)?;
     match factors(from, dimension)[..] {
         [factor] => Some(factor / own),
         _ => None,
@@ -306,7 +306,7 @@ pub fn conversion(from: &str, to: &str) -> Option<f64> {
 }
 
 /// Returns dimension and value in SI of a unit of an FMU; `None` if it is unknown or ambiguous.
-pub(super) fn dimension_of(unit: &str) -> Option<Product> {
+pub(super) fn parse_unit(unit: &str) -> Option<Product> {
     match products(unit, false, false)[..] {
         [only] => Some(only),
         _ => None,
@@ -344,11 +344,11 @@ pub(super) enum Fault {
 /// # Errors
 ///
 /// If the name states a unit of another dimension, or two units.
-pub(super) fn in_name(name: &str, dimension: Dimension) -> Result<Option<Stated>, Fault> {
+pub(super) fn find_unit(name: &str, dimension: Dimension) -> Result<Option<Stated>, Fault> {
     let stated = |from: usize, to: usize, text: &str, factor: f64| Stated {
         text: text.trim().into(),
         factor,
-        before: before(&name[..from]).into(),
+        before: strip_unit(&name[..from]).into(),
         is_last: name[to..].trim().is_empty(),
     };
     let mut found: Vec<Stated> = Vec::new();
@@ -359,7 +359,7 @@ pub(super) fn in_name(name: &str, dimension: Dimension) -> Result<Option<Stated>
             [factor] => {
                 let found_here = stated(from, to, inside, factor);
                 // For example t_ms [s].
-                if let Ok(Some(also)) = in_name(&found_here.before, dimension)
+                if let Ok(Some(also)) = find_unit(&found_here.before, dimension)
                     && also.text.len() > 1
                     && also.factor != factor
                 {
@@ -448,7 +448,7 @@ fn may_be_unit(name: &str, text: &str, from: usize, is_last: bool, dimension: Di
 }
 
 /// Returns a name without the separators and the word "in" before its unit.
-fn before(name: &str) -> &str {
+fn strip_unit(name: &str) -> &str {
     let name = name.trim_end_matches(|c| BETWEEN.contains(&c) || ['[', '(', '{', '<'].contains(&c));
     let cut = name.strip_suffix(" in").unwrap_or(name);
     cut.trim_end_matches(|c| BETWEEN.contains(&c))
@@ -570,7 +570,7 @@ mod tests {
     fn an_index_of_a_variable_is_no_unit() {
         for name in ["omega[1]", "torque[3]", "q[4]", "tank[1].p[1,2]", "data(3)"] {
             for quantity in Quantity::ALL {
-                let found = in_name(name, quantity.dimension());
+                let found = find_unit(name, quantity.dimension());
                 assert!(matches!(found, Ok(None)), "{name} is no {quantity}");
             }
         }
@@ -658,7 +658,7 @@ mod tests {
     #[test]
     fn a_name_states_its_unit_in_many_ways() {
         let text = |name: &str, quantity: Quantity| {
-            in_name(name, quantity.dimension()).map(|found| found.map(|s| (s.before, s.text)))
+            find_unit(name, quantity.dimension()).map(|found| found.map(|s| (s.before, s.text)))
         };
         for (quantity, name, before, unit) in [
             (Rate, "gyro [deg/s]", "gyro", "deg/s"),

@@ -8,7 +8,7 @@ use signals::fourier::{Complex64, Forward, Inverse};
 fn a_transform_is_the_sum_of_its_definition_and_comes_back() {
     for length in [12, 15] {
         let signal: Vec<f64> = (0..length).map(|n| f64::from(n * n * 7 % 11) - 4.0).collect();
-        let spectrum = Forward::new(length as usize).of(signal.clone());
+        let spectrum = Forward::new(length as usize).transform(signal.clone());
         assert_eq!(spectrum.len(), length as usize / 2 + 1);
         for (k, line) in spectrum.iter().enumerate() {
             let turn = |n: usize| Complex64::cis(-TAU * (k * n) as f64 / f64::from(length));
@@ -16,7 +16,7 @@ fn a_transform_is_the_sum_of_its_definition_and_comes_back() {
             // fifteen terms below 7, each rounded twice
             assert!((line - sum).norm() < 1e-13, "line {k}: {line} instead of {sum}");
         }
-        let back = Inverse::new(length as usize).of(spectrum);
+        let back = Inverse::new(length as usize).transform(spectrum);
         for (found, x) in back.iter().zip(&signal) {
             assert!((found / f64::from(length) - x).abs() < 1e-14);
         }

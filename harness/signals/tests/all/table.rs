@@ -16,7 +16,7 @@ fn numbers_come_back_bit_for_bit_from_both_formats() {
         let path = directory.path().join(name);
         table().write(&path, &BTreeMap::from([("k".into(), "v".into())])).unwrap();
         let back = Table::read(&path, &["omega", "time"]).unwrap();
-        assert_eq!(back, table().only(&["omega", "time"]));
+        assert_eq!(back, table().select(&["omega", "time"]));
     }
     assert_eq!(metadata(&directory.path().join("a.parquet")).unwrap()["k"], "v");
 }

@@ -11,7 +11,7 @@ use formulas::energy_terms::{EnergyTerms, energy_terms};
 use formulas::limits;
 use formulas::third_order::{BRIDGED, coefficients, shifts};
 use hubslosh_tank::coefficients::LimitSource;
-use hubslosh_tank::finite_amplitude::of_tank;
+use hubslosh_tank::finite_amplitude::amplitude_dependence;
 
 use crate::common::tank;
 
@@ -160,7 +160,7 @@ fn the_estimated_limit_of_other_tanks_is_conservative_in_cylinders() {
                 "profile = [{{ line = [0, 0, 1, {bottom}] }}, {{ line = [1, {bottom}, 1, 3] }}]"
             );
             let tank = tank(&format!("density = 1000.0\n{wall}"));
-            of_tank(&tank, &tank.solve(fill, 1).unwrap()).mode.unwrap()
+            amplitude_dependence(&tank, &tank.solve(fill, 1).unwrap()).mode.unwrap()
         };
         let (flat, domed) = (limit_of(0.0), limit_of(1e-5));
         assert_eq!(flat.angle_limit_from, LimitSource::PotentialFlow);

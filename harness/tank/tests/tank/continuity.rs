@@ -2,7 +2,7 @@
 
 use crate::common::tank;
 use hubslosh_tank::modal::Damping;
-use hubslosh_tank::parameters::{Liquid, damping_of};
+use hubslosh_tank::parameters::{Liquid, tank_damping};
 use hubslosh_tank::{Tank, damping};
 
 /// Kinematic viscosity and specific force within the range of the sphere's correlation for the tanks below.
@@ -11,7 +11,7 @@ const SLOW: [f64; 2] = [1e-6, 0.3];
 fn at(tank: &Tank, fill: f64, [nu, gravity]: [f64; 2]) -> Damping {
     let data = tank.solve(fill, 1).unwrap();
     let liquid = Liquid { gravity, nu: Some(nu), sigma: None, contact_angle: 90.0 };
-    damping_of(tank, &data, nu, liquid).unwrap()
+    tank_damping(tank, &data, nu, liquid).unwrap()
 }
 
 fn of(shape: &str) -> Tank {

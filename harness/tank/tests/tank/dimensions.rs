@@ -3,7 +3,7 @@
 
 use crate::common::tank;
 use hubslosh_tank::damping::{self, Ring};
-use hubslosh_tank::parameters::{Liquid, damping_of};
+use hubslosh_tank::parameters::{Liquid, tank_damping};
 use hubslosh_tank::{ModalData, Mode, Tank};
 
 /// A tank of each kind, lengths behind an `@`, and its fill: closed forms, the integral equation, full, thin.
@@ -144,8 +144,8 @@ fn similar_tanks_have_the_same_damping_and_the_same_words_for_it() {
         for (nu, sigma, gravity) in [(1e-6, 0.07, 8.0), (1e-3, 0.07, 1e-3), (0.05, 0.5, 0.0)] {
             let liquid =
                 |sigma| Liquid { gravity, nu: None, sigma: Some(sigma), contact_angle: 90.0 };
-            let a = damping_of(tank, data, nu, liquid(sigma)).unwrap();
-            let b = damping_of(larger, scaled, 8.0 * nu, liquid(16.0 * sigma)).unwrap();
+            let a = tank_damping(tank, data, nu, liquid(sigma)).unwrap();
+            let b = tank_damping(larger, scaled, 8.0 * nu, liquid(16.0 * sigma)).unwrap();
             assert_eq!((a.shape, &a.taken), (b.shape, &b.taken));
             assert_eq!(a.warnings.len(), b.warnings.len());
             let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-12 * a.abs(), "{} {a} {b}", a);

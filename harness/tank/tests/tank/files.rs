@@ -258,7 +258,7 @@ fn a_full_closed_tank_has_no_modes_and_says_what_its_liquid_is() {
     let tank = tank("density = 1000.0\nshape = { sphere = { radius = 1.0 } }");
     let mass = 1000.0 * 4.0 / 3.0 * core::f64::consts::PI;
     for fill in [Fill::Height(2.0), Fill::Share(1.0), Fill::Mass(mass)] {
-        let data = tank.solve(tank.height_of(fill).unwrap(), 5).unwrap();
+        let data = tank.solve(tank.fill_height(fill).unwrap(), 5).unwrap();
         assert!(data.modes.is_empty() && data.rest.is_empty());
         assert!((data.m_liq / mass - 1.0).abs() < 1e-12 && (data.z_cg - 1.0).abs() < 1e-12);
         let text = table(&data, 9.80665);
@@ -288,18 +288,18 @@ fn per_cent_of_the_volume_and_a_mass_are_the_heights_that_hold_them() {
         let Geometry::Revolution { contour, .. } = &tank.geometry else { panic!() };
         for share in [0.03, 0.25, 0.5, 0.77, 0.98] {
             let volume = share * contour.capacity();
-            let height = tank.height_of(Fill::Share(share)).unwrap();
+            let height = tank.fill_height(Fill::Share(share)).unwrap();
             let data = tank.solve(height, 1).unwrap();
             assert!((data.m_liq / (800.0 * volume) - 1.0).abs() < 1e-10, "{text} {share}");
-            let same = tank.height_of(Fill::Mass(800.0 * volume)).unwrap();
+            let same = tank.fill_height(Fill::Mass(800.0 * volume)).unwrap();
             assert!((same / height - 1.0).abs() < 1e-12, "{text} {share}");
         }
     }
     let sphere = tank("density = 1000.0\nshape = { sphere = { radius = 1.0 } }");
-    assert!((sphere.height_of(Fill::Share(0.5)).unwrap() - 1.0).abs() < 1e-14);
-    assert_eq!(sphere.height_of(Fill::Share(0.0)), Ok(0.0));
+    assert!((sphere.fill_height(Fill::Share(0.5)).unwrap() - 1.0).abs() < 1e-14);
+    assert_eq!(sphere.fill_height(Fill::Share(0.0)), Ok(0.0));
     let open = tank("density = 1000.0\nbox = [0.5, 0.4]");
-    assert!((open.height_of(Fill::Mass(50.0)).unwrap() - 0.25).abs() < 1e-15);
+    assert!((open.fill_height(Fill::Mass(50.0)).unwrap() - 0.25).abs() < 1e-15);
     for (tank, fill, words) in [
         (&open, Fill::Share(0.5), "open at the top"),
         (&sphere, Fill::Share(1.01), "0 to 100 %"),
@@ -307,7 +307,7 @@ fn per_cent_of_the_volume_and_a_mass_are_the_heights_that_hold_them() {
         (&sphere, Fill::Mass(-1.0), "must be 0 or more"),
         (&sphere, Fill::Mass(5000.0), "more than the tank holds: 4188.790205 kg"),
     ] {
-        let said = tank.height_of(fill).unwrap_err().to_string();
+        let said = tank.fill_height(fill).unwrap_err().to_string();
         assert!(said.contains(words), "{said}");
     }
     assert_eq!("60%".parse(), Ok(Fill::Share(0.6)));
@@ -567,7 +567,8 @@ fn the_table_has_the_damping_of_every_mode_with_its_frequency_in_hertz() {
     let tank = tank("density = 1000.0\nbox = [0.8, 0.5]");
     let mut data = tank.solve(0.3, 2).unwrap();
     let liquid = Liquid { gravity: 9.81, nu: Some(1e-6), sigma: None, contact_angle: 90.0 };
-    data.damping = Some(hubslosh_tank::parameters::damping_of(&tank, &data, 1e-6, liquid).unwrap());
+    data.damping =
+        Some(hubslosh_tank::parameters::tank_damping(&tank, &data, 1e-6, liquid).unwrap());
     let damping = data.damping.clone().unwrap();
     let text = table(&data, 9.81);
     assert!(
@@ -714,7 +715,7 @@ fn parameters_are_those_of_the_liquid_and_not_of_the_result() {
     let tank = tank(text);
     let liquid = Liquid { gravity: 0.2, nu: Some(8.9e-7), sigma: Some(0.03), contact_angle: 90.0 };
     let whole = parameters::solve(&tank, Fill::Share(0.4), 2, liquid).unwrap();
-    let fill = tank.height_of(Fill::Share(0.4)).unwrap();
+    let fill = tank.fill_height(Fill::Share(0.4)).unwrap();
     let plain = tank.solve(fill, 2).unwrap();
     assert!(whole.damping.is_some() && plain.damping.is_none());
     for other in [

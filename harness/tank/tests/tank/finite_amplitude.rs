@@ -3,7 +3,7 @@
 use formulas::energy_terms::energy_terms;
 use hubslosh_tank::coefficients::{Coefficients, FiniteAmplitude, LimitSource};
 use hubslosh_tank::fill_table;
-use hubslosh_tank::finite_amplitude::of_tank;
+use hubslosh_tank::finite_amplitude::amplitude_dependence;
 use hubslosh_tank::interpolation::Monotone;
 use hubslosh_tank::parameters::{Liquid, ParameterSet, Target, Value, surface_tension_warnings};
 use hubslosh_tank::sweep::sweep;
@@ -13,7 +13,7 @@ use crate::common::tank;
 
 fn found(text: &str, fill: f64) -> FiniteAmplitude {
     let tank = tank(&format!("density = 1000.0\n{text}"));
-    of_tank(&tank, &tank.solve(fill, 1).unwrap())
+    amplitude_dependence(&tank, &tank.solve(fill, 1).unwrap())
 }
 
 fn known(text: &str, fill: f64) -> Coefficients {
@@ -156,12 +156,15 @@ fn files_for_the_fmus_have_the_limits() {
         let swirl = limit(cylinder, 0.25, target, &swirl).unwrap();
         assert!((swirl.to_degrees() - 10.4).abs() < 0.01, "{swirl}");
     }
-    let of_tank =
+    let amplitude_dependence =
         |text: &str, fill: f64| limit(text, fill, Target::SloshTank, "tank.angle_limit[1]");
     // s and kappa are left out at h/R 0.1.
-    assert!(of_tank(cylinder, 0.01).unwrap().to_degrees() < 0.5);
-    assert_eq!(of_tank("shape = { torus = { ring_radius = 1.0, tube_radius = 0.3 } }", 0.3), None);
-    assert!(of_tank("box = [0.8, 0.5]", 0.4).is_some());
+    assert!(amplitude_dependence(cylinder, 0.01).unwrap().to_degrees() < 0.5);
+    assert_eq!(
+        amplitude_dependence("shape = { torus = { ring_radius = 1.0, tube_radius = 0.3 } }", 0.3),
+        None
+    );
+    assert!(amplitude_dependence("box = [0.8, 0.5]", 0.4).is_some());
 }
 
 /// SloshTank and Spacecraft get the coefficients with the wave's energy at h/R 0.25 to 0.7, HubSlosh and tanks that drain those of
@@ -272,7 +275,7 @@ fn the_table_has_coefficients_waves_and_warnings() {
     let text = |text: &str, fill: f64| {
         let tank: Tank = tank(&format!("density = 1000.0\n{text}"));
         let mut data = tank.solve(fill, 1).unwrap();
-        data.finite_amplitude = Some(of_tank(&tank, &data));
+        data.finite_amplitude = Some(amplitude_dependence(&tank, &data));
         table(&data, 9.80665)
     };
     let cylinder = text("shape = { cylinder = { radius = 0.0815, height = 0.2 } }", 0.1);
@@ -306,7 +309,7 @@ fn files_for_the_fmus_have_the_coefficients_of_the_first_mode() {
     let cylinder =
         tank("density = 1000.0\nshape = { cylinder = { radius = 0.0815, height = 0.2 } }");
     let data = cylinder.solve(0.1, 3).unwrap();
-    let mode = of_tank(&cylinder, &data).mode.unwrap();
+    let mode = amplitude_dependence(&cylinder, &data).mode.unwrap();
     for (target, prefix) in [
         (Target::HubSlosh, "slosh.table"),
         (Target::SloshTank, "tank"),
@@ -322,7 +325,7 @@ fn files_for_the_fmus_have_the_coefficients_of_the_first_mode() {
     }
     let long = tank("density = 1000.0\nbox = [0.8, 0.5]");
     let data = long.solve(0.4, 3).unwrap();
-    let found = of_tank(&long, &data);
+    let found = amplitude_dependence(&long, &data);
     let set = ParameterSet::new(&long, &data, Target::SloshTank, WATER).unwrap();
     let names: Vec<String> = third_order_of(&set).into_iter().map(|(name, _)| name).collect();
     let expected =
@@ -374,7 +377,7 @@ fn a_draining_tank_has_the_coefficients_of_every_fill() {
     let set = fill_table::parameters(&sphere, &table, None, Target::SloshTank, WATER).unwrap();
     let [s, kappa] = columns(&set);
     for (i, row) in table.rows.iter().enumerate() {
-        let known = of_tank(&sphere, row).mode.unwrap();
+        let known = amplitude_dependence(&sphere, row).mode.unwrap();
         assert_eq!((s[i], kappa[i]), (known.nonlinear_inertia, known.nonlinear_stiffness));
         let words = format!("fill {} m: s = {:.4}", row.fill, known.nonlinear_inertia);
         assert!(
@@ -395,7 +398,7 @@ fn a_table_bounds_unknown_coefficients_by_their_neighbours_and_names_the_fills()
     let table = sweep(&sphere, &fills, 1).unwrap();
     let set = fill_table::parameters(&sphere, &table, None, Target::SloshTank, WATER).unwrap();
     let pair = |i: usize| {
-        let known = of_tank(&sphere, &table.rows[i]).mode;
+        let known = amplitude_dependence(&sphere, &table.rows[i]).mode;
         known.map(|known| [known.nonlinear_inertia, known.nonlinear_stiffness])
     };
     let columns = columns(&set);
@@ -450,15 +453,15 @@ fn a_placed_table_states_the_error_of_the_coefficients_between_its_points() {
         let set = fill_table::parameters(&tank, &placed.sweep, between, Target::SloshTank, WATER);
         let set = set.unwrap();
         let x: Vec<f64> = placed.sweep.rows.iter().map(|row| row.m_liq).collect();
-        let curves = columns(&set).map(|y| Monotone::within(&x, &y));
+        let curves = columns(&set).map(|y| Monotone::bounded(&x, &y));
         let mut worst = 0.0_f64;
         for share in [0.13, 0.29, 0.51, 0.77, 0.94] {
             let row = tank.solve(low + share * (high - low), 1).unwrap();
-            let known = of_tank(&tank, &row).mode.unwrap();
+            let known = amplitude_dependence(&tank, &row).mode.unwrap();
             for (curve, exact) in
                 curves.iter().zip([known.nonlinear_inertia, known.nonlinear_stiffness])
             {
-                let off = (curve.at(row.m_liq) - exact).abs() / (1.0 + exact.abs());
+                let off = (curve.evaluate(row.m_liq) - exact).abs() / (1.0 + exact.abs());
                 worst = worst.max(off);
             }
         }

@@ -4,7 +4,7 @@ use crate::common::solve;
 use hubslosh_tank::Tank;
 use hubslosh_tank::damping::{self, Ring};
 use hubslosh_tank::low_gravity::{self, Fluid};
-use hubslosh_tank::parameters::{Liquid, ParameterSet, Target, Value, damping_of};
+use hubslosh_tank::parameters::{Liquid, ParameterSet, Target, Value, tank_damping};
 use std::path::Path;
 
 const BENCH: &str = "shape = { cylinder = { radius = 0.0815, height = 0.3 } }";
@@ -383,7 +383,7 @@ fn damped(
     let text = format!("density = 1000.0\n{shape}");
     let tank = Tank::parse(&text, Path::new("")).unwrap();
     let data = tank.solve(fill, 3).unwrap();
-    damping_of(&tank, &data, nu, Liquid { gravity, nu: Some(nu), sigma, contact_angle: 90.0 })
+    tank_damping(&tank, &data, nu, Liquid { gravity, nu: Some(nu), sigma, contact_angle: 90.0 })
         .unwrap()
 }
 

@@ -3,7 +3,7 @@
 use crate::common::tank;
 use hubslosh_tank::fill_table::Between;
 use hubslosh_tank::interpolation::Monotone;
-use hubslosh_tank::parameters::{Liquid, Target, Value, damping_of};
+use hubslosh_tank::parameters::{Liquid, Target, Value, tank_damping};
 use hubslosh_tank::sweep::{Depletion, sweep};
 use hubslosh_tank::{Fill, ModalData, closed_form, fill_table};
 
@@ -19,7 +19,7 @@ fn interpolated_modes_are_those_between_the_fills() {
     let table = sweep(&tank, &fills(0.1, 1.9, 18), 3).unwrap();
     let depletion = Depletion::new(&table).unwrap();
     for fill in [0.35, 0.77, 1.21, 1.55] {
-        let (exact, at) = (tank.solve(fill, 3).unwrap(), depletion.at(fill));
+        let (exact, at) = (tank.solve(fill, 3).unwrap(), depletion.parameters_at(fill));
         assert!((at.m_liq / exact.m_liq - 1.0).abs() < 1e-4);
         for (a, b) in at.modes.iter().zip(&exact.modes) {
             assert!((a.l / b.l - 1.0).abs() < 1e-4, "{fill} {} {}", a.l, b.l);
@@ -33,7 +33,7 @@ fn interpolated_modes_are_those_between_the_fills() {
         assert!((at.rest.m_0 - exact.rest(3).m_0).abs() < 1e-3 * exact.m_liq);
         // the sphere's hinge is the centre, between the fills too
         assert!((at.modes[0].hinge.unwrap() - 1.0).abs() < 1e-3, "{:?}", at.modes[0].hinge);
-        assert!((depletion.fill_of(at.m_liq) - fill).abs() < 1e-9);
+        assert!((depletion.fill_from_mass(at.m_liq) - fill).abs() < 1e-9);
     }
 }
 
@@ -46,7 +46,7 @@ fn at_the_table_s_own_fills_nothing_is_interpolated() {
     let depletion = Depletion::new(&sweep(&tank, &all, 3).unwrap()).unwrap();
     assert_eq!(depletion.range(), [all[0], all[8]]);
     for (fill, asked) in [(all[0], 0.1), (all[3], all[3]), (all[6], all[6]), (all[8], 5.0)] {
-        let (exact, at) = (tank.solve(fill, 3).unwrap(), depletion.at(asked));
+        let (exact, at) = (tank.solve(fill, 3).unwrap(), depletion.parameters_at(asked));
         let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-9 * b.abs(), "{fill}: {a} {b}");
         assert_eq!(at.fill, fill);
         near(at.m_liq, exact.m_liq);
@@ -77,7 +77,7 @@ fn at_the_table_s_own_fills_nothing_is_interpolated() {
 fn interpolated_modes_are_monotone_and_leave_a_positive_rest() {
     let tank = tank("density = 1000.0\nshape = { sphere = { radius = 1.0 } }");
     let depletion = Depletion::new(&sweep(&tank, &fills(0.05, 1.95, 19), 3).unwrap()).unwrap();
-    let all: Vec<_> = fills(0.05, 1.95, 2000).iter().map(|f| depletion.at(*f)).collect();
+    let all: Vec<_> = fills(0.05, 1.95, 2000).iter().map(|f| depletion.parameters_at(*f)).collect();
     for pair in all.windows(2) {
         assert!(pair[1].modes[0].l < pair[0].modes[0].l && pair[1].m_liq > pair[0].m_liq);
         assert!(pair[1].z_cg > pair[0].z_cg);
@@ -169,7 +169,7 @@ fn a_sweep_has_the_damping_of_every_fill() {
             let cells = ["zeta", "zeta_low", "zeta_high"]
                 .map(|name| line[column(&format!("{name}_{n}"))].parse::<f64>().ok());
             let expected = (!row.modes.is_empty()).then(|| {
-                let mode = damping_of(&tank, row, 1e-6, liquid).unwrap().modes[n - 1];
+                let mode = tank_damping(&tank, row, 1e-6, liquid).unwrap().modes[n - 1];
                 [mode.zeta, mode.interval[0], mode.interval[1]]
             });
             match expected {
@@ -200,13 +200,13 @@ fn twelve_placed_points_are_enough_for_tanks_of_many_shapes() {
         "cone = { half_angle = 30, height = 1.0 }",
     ] {
         let tank = tank(&format!("density = 1000.0\nshape = {{ {shape} }}"));
-        let height = |share: f64| tank.height_of(Fill::Share(share)).unwrap();
+        let height = |share: f64| tank.fill_height(Fill::Share(share)).unwrap();
         let placed = fill_table::place(&tank, height(0.02), height(0.98), 3).unwrap();
         let rows = &placed.sweep.rows;
         assert_eq!(rows.len(), fill_table::POINTS);
         let x: Vec<f64> = rows.iter().map(|row| row.m_liq).collect();
         let curve = |f: &dyn Fn(&ModalData) -> f64| {
-            Monotone::within(&x, &rows.iter().map(f).collect::<Vec<_>>())
+            Monotone::bounded(&x, &rows.iter().map(f).collect::<Vec<_>>())
         };
         let hinge = |row: &ModalData| row.modes[0].hinge.unwrap();
         let stiffness = curve(&|row| 1.0 / row.modes[0].l);
@@ -215,9 +215,9 @@ fn twelve_placed_points_are_enough_for_tanks_of_many_shapes() {
         for fill in [0.031, 0.077, 0.152, 0.291, 0.443, 0.672, 0.879, 0.969] {
             let exact = tank.solve(height(fill), 3).unwrap();
             let (mode, m) = (&exact.modes[0], exact.m_liq);
-            let frequency = (stiffness.at(m) * mode.l).sqrt() - 1.0;
-            let mass = share.at(m) * m / mode.m - 1.0;
-            let height = (bob.at(m) + 1.0 / stiffness.at(m) - hinge(&exact)) / 0.5;
+            let frequency = (stiffness.evaluate(m) * mode.l).sqrt() - 1.0;
+            let mass = share.evaluate(m) * m / mode.m - 1.0;
+            let height = (bob.evaluate(m) + 1.0 / stiffness.evaluate(m) - hinge(&exact)) / 0.5;
             for (what, off) in [("frequency", frequency), ("mass", mass), ("hinge", height)] {
                 assert!(off.abs() < 5e-3, "{shape} at {fill}: {what} {off:.1e}");
             }
@@ -234,7 +234,7 @@ fn a_placed_table_states_the_errors_between_its_points() {
     let rows = &placed.sweep.rows;
     let x: Vec<f64> = rows.iter().map(|row| row.m_liq).collect();
     let curve =
-        |f: fn(&ModalData) -> f64| Monotone::within(&x, &rows.iter().map(f).collect::<Vec<_>>());
+        |f: fn(&ModalData) -> f64| Monotone::bounded(&x, &rows.iter().map(f).collect::<Vec<_>>());
     let hinge = |row: &ModalData| row.modes[0].hinge.unwrap();
     let stiffness = curve(|row| 1.0 / row.modes[0].l);
     let bob = curve(|row| row.modes[0].height.unwrap());
@@ -244,9 +244,9 @@ fn a_placed_table_states_the_errors_between_its_points() {
         let exact = closed_form::cylinder(0.5, fill, 1000.0, 1);
         let (mode, m) = (&exact.modes[0], exact.m_liq);
         let off = [
-            (stiffness.at(m) * mode.l).sqrt() - 1.0,
-            share.at(m) * m / mode.m - 1.0,
-            (bob.at(m) + 1.0 / stiffness.at(m) - hinge(&exact)) / 0.5,
+            (stiffness.evaluate(m) * mode.l).sqrt() - 1.0,
+            share.evaluate(m) * m / mode.m - 1.0,
+            (bob.evaluate(m) + 1.0 / stiffness.evaluate(m) - hinge(&exact)) / 0.5,
         ];
         found = std::array::from_fn(|k| found[k].max(off[k].abs()));
     }
@@ -259,10 +259,10 @@ fn a_placed_table_states_the_errors_between_its_points() {
     let even = sweep(&tank, &fills(0.03, 1.47, fill_table::POINTS - 1), 1).unwrap().rows;
     let x: Vec<f64> = even.iter().map(|row| row.m_liq).collect();
     let y: Vec<f64> = even.iter().map(|row| 1.0 / row.modes[0].l).collect();
-    let stiffness = Monotone::within(&x, &y);
+    let stiffness = Monotone::bounded(&x, &y);
     let off = |fill: f64| {
         let exact = closed_form::cylinder(0.5, fill, 1000.0, 1);
-        ((stiffness.at(exact.m_liq) * exact.modes[0].l).sqrt() - 1.0).abs()
+        ((stiffness.evaluate(exact.m_liq) * exact.modes[0].l).sqrt() - 1.0).abs()
     };
     let worst = fills(0.03, 1.47, 1000).into_iter().map(off).fold(0.0, f64::max);
     let placed = placed.between.error.into_iter().fold(0.0, f64::max);
@@ -371,7 +371,7 @@ fn the_parameters_state_the_errors_between_a_table_s_points() {
         assert_eq!(warned("3 points are few for this tank"), few, "{:?}", set.warnings);
         // the ratio of every fill
         for (i, row) in table.rows.iter().enumerate() {
-            let ratio = damping_of(&tank, row, 1e-6, liquid).unwrap().modes[0].zeta;
+            let ratio = tank_damping(&tank, row, 1e-6, liquid).unwrap().modes[0].zeta;
             let name = format!("tank.fill.zeta[1,{}]", i + 1);
             assert!(set.values.contains(&(name, Value::Real(ratio))), "{:?}", set.values);
         }

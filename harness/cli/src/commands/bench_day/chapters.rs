@@ -473,7 +473,7 @@ fn at_rest(item: &Item) -> Result<Rest> {
         item.recorded.path.display(),
         20.0 * LAG
     );
-    Ok(Rest::of(step, omega, CHUNK.min(seconds / CHUNKS), LAG))
+    Ok(Rest::analyse(step, omega, CHUNK.min(seconds / CHUNKS), LAG))
 }
 
 fn gyro(day: &Day, problems: &mut Vec<String>) -> Chapter {

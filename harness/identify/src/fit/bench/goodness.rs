@@ -18,7 +18,7 @@ pub fn tests_of(problem: &Problem, innovations: &[Vec<f64>]) -> Vec<Tests> {
             Signal::Rate => recording.of_fresh(x),
             Signal::Angle => recording.of_fresh_angle(x),
         };
-        Tests::of(&of(&recording.time), &[&of(&recording.torque)], &of(e), channel.noise.white)
+        Tests::run(&of(&recording.time), &[&of(&recording.torque)], &of(e), channel.noise.white)
     };
     problem.channels.iter().zip(innovations).map(one).collect()
 }

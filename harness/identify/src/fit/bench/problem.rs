@@ -285,7 +285,7 @@ impl<'a> Problem<'a> {
     /// Estimates each channel's noise from the residual of an answer.
     pub fn estimate_noise(&mut self, answer: &Answer) {
         let of = |(channel, residual): (&Channel, &Vec<f64>)| {
-            Noise::of(&self.recordings[channel.recording].time, residual, self.fresh(channel))
+            Noise::fit(&self.recordings[channel.recording].time, residual, self.fresh(channel))
         };
         let noises: Vec<Noise> = self.channels.par_iter().zip(&answer.residual).map(of).collect();
         self.channels.iter_mut().zip(noises).for_each(|(channel, noise)| channel.noise = noise);

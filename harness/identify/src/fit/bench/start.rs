@@ -51,7 +51,7 @@ pub const PARAMETERS: [&str; 8] = [
 
 /// Frequencies between which the torque has its power, Hz.
 pub fn excited_band(step: f64, torque: &[f64], rate: &[f64]) -> Option<(f64, f64)> {
-    let spectra = Spectra::of(step, torque, rate, welch::Segments::Seconds(60.0));
+    let spectra = Spectra::estimate(step, torque, rate, welch::Segments::Seconds(60.0));
     let total: f64 = spectra.input.iter().skip(1).sum();
     let reached = |part: f64| {
         let mut sum = 0.0;
@@ -301,7 +301,7 @@ pub fn balance(recording: &Recording, bench: Bench, band: (f64, f64)) -> Option<
     let transform = Forward::new(n);
     // Hann's window: what happened before the record and after it does not leak
     let window = |k: usize| 1.0 - (TAU * k as f64 / n as f64).cos();
-    let spectrum = |x: &[f64]| transform.of((0..n).map(|k| x[k] * window(k)).collect());
+    let spectrum = |x: &[f64]| transform.transform((0..n).map(|k| x[k] * window(k)).collect());
     let (t, w, s) = (spectrum(&torque), spectrum(&rate), spectrum(&signs));
     let width = 1.0 / (n as f64 * step);
     let (first, last) = ((0.9 * band.0 / width) as usize, (1.1 * band.1 / width) as usize);
@@ -388,7 +388,7 @@ pub fn balance(recording: &Recording, bench: Bench, band: (f64, f64)) -> Option<
 /// Returns a start from antiresonance, resonance and the inertia at the band's ends, for recordings that the transfer function
 /// does not fit (large amplitudes bend its peak). For b = 0, ω_p² = ω²(1 + m r²/I0).
 fn from_features(measured: &FrequencyResponse, bench: Bench) -> Option<Response> {
-    let features = Features::of(measured);
+    let features = Features::find(measured);
     let (f, fp) = (features.f_dip?, features.f_res?);
     let ratio = (fp / f).powi(2) - 1.0;
     // far from both, Ω/τ = (ω² − Ω²)/(jΩ I0 (ω_p² − Ω²))

@@ -129,7 +129,7 @@ impl Nominal {
         let start = Start {
             d: real(tank::D)?,
             h: real(tank::H)?,
-            zeta: real(&slosh::DAMPING.at([1]))?,
+            zeta: real(&slosh::DAMPING.element([1]))?,
             hub_inertia: real(hub::I)?,
             b: real(friction::B)?,
             c: real(friction::C)?,
@@ -137,7 +137,7 @@ impl Nominal {
             omega_s: real(friction::OMEGA_S)?,
         };
         let inertia = start.hub_inertia + bench.inertia(bench.liquid(start.d, start.h));
-        Ok(Nominal { bench, start, inertia, period: 1.0 / real(&slosh::FREQUENCY.at([1]))? })
+        Ok(Nominal { bench, start, inertia, period: 1.0 / real(&slosh::FREQUENCY.element([1]))? })
     }
 
     /// Longest mean time between rows with which this bench can be identified, s: a few rows a period.
