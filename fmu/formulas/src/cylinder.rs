@@ -12,10 +12,10 @@
 //!
 //! Source: Abramson, NASA SP-106 (1966), chapters 2 and 6; Dodge (2000).
 
-/// Number of modes with tabulated zeros.
 pub const MODES: usize = 10;
 
-/// Zeros xi_n of J1', the derivative of the Bessel function (17 digits).
+/// Zeros xi_n of J1', the derivative of the Bessel function J1, with 17 digits; `MODES` of them are
+/// tabulated.
 pub const XI: [f64; MODES] = [
     1.841_183_781_340_659_5,
     5.331_442_773_525_032_5,
@@ -29,20 +29,19 @@ pub const XI: [f64; MODES] = [
     30.601_922_972_669_094,
 ];
 
-/// One slosh mode as a pendulum with its hinge on the tank's axis.
+/// One slosh mode as a pendulum with its hinge on the tank's axis: `mass` in kg, `length` in m, `hinge` is
+/// its height above the bottom, m, and `wave` the elevation of the wave at the wall per slosh angle, 2
+/// R/(xi_n^2 - 1), m/rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pendulum {
-    /// Mass of the bob, kg.
     pub mass: f64,
-    /// Length, m.
     pub length: f64,
-    /// Height of the hinge above the bottom, m.
     pub hinge: f64,
-    /// Wall elevation per slosh angle, m/rad: 2 R/(xi_n^2 - 1).
     pub wave: f64,
 }
 
-/// Returns mode n, from 0 and below [`MODES`], of the mass `m_liq` of liquid.
+/// Returns the pendulum of mode `n`, which counts from 0 and is below [`MODES`], in a cylinder of diameter
+/// `d` filled to the height `h`, both m, with the mass `m_liq` of liquid, kg.
 pub fn pendulum(n: usize, d: f64, h: f64, m_liq: f64) -> Pendulum {
     let (xi, radius) = (XI[n], d / 2.0);
     let tanh = libm::tanh(2.0 * xi * h / d);
@@ -56,8 +55,9 @@ pub fn pendulum(n: usize, d: f64, h: f64, m_liq: f64) -> Pendulum {
     }
 }
 
-/// Returns the tank (d, h) with liquid of `density` whose first mode has this length and mass. From l and m above,
-/// d^4 = 8 xi^2 (xi^2 - 1) l m/(rho pi) and tanh(2 xi h/d) = d/(2 xi l). In a deep tank the length hardly depends on the
+/// Returns diameter and fill height, m, of the upright cylinder whose first mode has the pendulum `length`,
+/// m, and `mass`, kg, with a liquid of `density`, kg/m3. The equations of the module's head give d^4 = 8 xi^2
+/// (xi^2 - 1) l m/(rho pi) and tanh(2 xi h/d) = d/(2 xi l). In a deep tank the length hardly depends on the
 /// fill, so tanh is limited to 0.995.
 pub fn tank_of_first_mode(length: f64, mass: f64, density: f64) -> (f64, f64) {
     let xi = XI[0];
@@ -67,9 +67,9 @@ pub fn tank_of_first_mode(length: f64, mass: f64, density: f64) -> (f64, f64) {
     (d, h)
 }
 
-/// Returns the transverse inertia of the liquid under a lid about its centre, over its mass, m2.
+/// Returns the transverse inertia of liquid that fills a cylinder of diameter `d` and height `h`, m, under a
+/// lid, about its centre of mass and divided by its mass, m2.
 pub fn capped_inertia(d: f64, h: f64) -> f64 {
-    /// Number of zeros in the sum; an integral replaces the rest.
     const ZEROS: usize = 400;
     let radius = d / 2.0;
     let term = |xi: f64| libm::tanh(xi * h / d) / (xi * xi * xi * (xi * xi - 1.0));
@@ -81,7 +81,8 @@ pub fn capped_inertia(d: f64, h: f64) -> f64 {
     h * h / 12.0 - 0.75 * radius * radius + 16.0 * radius * radius * radius / h * (sum + rest)
 }
 
-/// Returns zero n of J1', from 1; beyond the table by McMahon's expansion (DLMF 10.21.20).
+/// Returns zero `n` of J1', which counts from 1. Zeros beyond the table come from McMahon's expansion (DLMF
+/// 10.21.20).
 fn zero(n: usize) -> f64 {
     if n <= MODES { XI[n - 1] } else { mcmahon(n) }
 }
@@ -93,9 +94,9 @@ fn mcmahon(n: usize) -> f64 {
     b - 7.0 / x - 4.0 * (7.0 * 16.0 + 82.0 * 4.0 - 9.0) / (3.0 * x * x * x)
 }
 
-/// Returns the rigid liquid for the modes in `kept`: mass, height of its centre of mass above the
-/// bottom, and transverse inertia about it. With each bob at its position of rest, mass, centre of
-/// mass and inertia of the whole liquid are exact.
+/// Returns mass, kg, height of the centre of mass above the bottom, m, and transverse inertia about it, kg
+/// m2, of the rigid liquid that remains when the modes `kept` are pendulums. The remainder is chosen so that
+/// mass, centre of mass and inertia of the whole liquid are exact while each bob is at its position of rest.
 pub fn rest(d: f64, h: f64, m_liq: f64, kept: &[Pendulum]) -> [f64; 3] {
     let z_liq = h / 2.0;
     let sum = |f: &dyn Fn(&Pendulum) -> f64| kept.iter().map(f).sum::<f64>();
@@ -112,8 +113,9 @@ pub fn rest(d: f64, h: f64, m_liq: f64, kept: &[Pendulum]) -> [f64; 3] {
 mod tests {
     use super::*;
 
-    /// R = 0.45 m, 0.6 m deep, 1000 kg/m3: values of ../../craft/tests/six.json, six digits. I_0, a
-    /// small difference of large numbers, comes from a shorter sum there.
+    /// The reference values are those of `fmu/craft/tests/six.json` to six digits, for R = 0.45 m, 0.6 m of
+    /// liquid and 1000 kg/m3. The sum for I_0 is shorter there, and I_0 is a small difference of large
+    /// numbers.
     #[test]
     fn a_cylinder_is_that_of_the_reference_records() {
         let m_liq = 1000.0 * core::f64::consts::PI * 0.45 * 0.45 * 0.6;
@@ -131,8 +133,8 @@ mod tests {
         }
     }
 
-    /// The fourth root of a product of order 1 has an error of some ulp, atanh near 1 of about 1/(1 - tanh^2) = 20
-    /// more.
+    /// The fourth root of a product of order 1 has an error of some ulp; atanh near 1 multiplies it by 1/(1 -
+    /// tanh^2) = 20.
     #[test]
     fn a_tank_is_found_again_from_its_first_mode() {
         for (d, h) in [(0.163, 0.1), (0.163, 0.05), (0.9, 0.3)] {
@@ -143,13 +145,11 @@ mod tests {
         }
     }
 
-    /// The wave at the wall for R = 0.0815 m: 2 R/(xi^2 - 1) = 0.163/2.38996.
     #[test]
     fn the_wave_of_the_first_mode_is_two_thirds_of_the_diameter_an_angle() {
         assert!((pendulum(0, 0.163, 0.1, 1.0).wave / 0.068202 - 1.0).abs() < 1e-5);
     }
 
-    /// J1' = J0 - J1/x changes its sign at the last digit of xi.
     #[test]
     fn the_table_holds_the_zeros_of_the_bessel_function_s_slope() {
         for xi in XI {
@@ -158,7 +158,8 @@ mod tests {
         }
     }
 
-    /// Values of mode 2 for R = 1 m, h = 1 m by hand, with tanh(xi_2) = 0.99995313 and tanh(xi_2/2) = 0.99037.
+    /// The expected values were computed by hand for R = 1 m and h = 1 m, with tanh(xi_2) = 0.99995313 and
+    /// tanh(xi_2/2) = 0.99037.
     #[test]
     fn the_second_mode_has_its_mass_length_and_hinge() {
         let second = pendulum(1, 2.0, 1.0, 3.0);
@@ -169,7 +170,6 @@ mod tests {
         near(second.wave, 2.0 / 27.424_282);
     }
 
-    /// The centre of mass of the whole liquid, from all modes: bobs and rigid liquid.
     #[test]
     fn bobs_and_rest_have_the_liquid_s_mass_and_centre() {
         let (d, h, m_liq) = (0.9, 0.6, 380.0);
@@ -181,7 +181,6 @@ mod tests {
         assert!((moment / (m_liq * h / 2.0) - 1.0).abs() < 1e-14);
     }
 
-    /// Only the uppermost few radii of liquid matter. Below, nothing changes and nothing overflows.
     #[test]
     fn a_deep_tank_s_pendulum_hangs_below_the_surface_as_in_any_deep_tank() {
         let [deep, deeper] = [20.0, 1e6].map(|h| (h, pendulum(0, 2.0, h, h)));
@@ -191,8 +190,6 @@ mod tests {
         assert!((below[0] - 1.0 / XI[0]).abs() < 1e-14 && (below[1] - 1.0 / XI[0]).abs() < 1e-9);
     }
 
-    /// If the length no longer determines the fill, the tank is taken to have tanh(2 xi h/d) = 0.995, where the limit
-    /// for deep liquid is 1.
     #[test]
     fn a_tank_too_deep_to_tell_is_taken_as_nearly_deep() {
         let Pendulum { mass, length, .. } = pendulum(0, 1.0, 5.0, 5000.0);
@@ -201,8 +198,9 @@ mod tests {
         assert!((libm::tanh(2.0 * XI[0] * h / d) - 0.995).abs() < 1e-15);
     }
 
-    /// A film has no height: the liquid turns like a disk, R^2/4. For a film the integral in place of the last zeros is
-    /// too small by 8/(12 pi end^3), end = 400 pi + 1.6. For a column h^2/12 - 3 R^2/4 remains.
+    /// A thin film has no height, so the liquid turns like a disk, with R^2/4; the integral that replaces the
+    /// last zeros of the sum is then too small by 8/(12 pi end^3), end = 400 pi + 1.6. In a long column
+    /// h^2/12 - 3 R^2/4 remains.
     #[test]
     fn the_capped_inertia_has_its_limits() {
         let film = capped_inertia(2.0, 1e-12);
@@ -217,7 +215,7 @@ mod tests {
         assert!((column / (1e8 / 12.0) - 1.0).abs() < 1e-7, "{column}");
     }
 
-    /// The next term of the expansion is of the order of 1e4/(8 b)^5: 1e-8 at the tenth zero.
+    /// The next term of McMahon's expansion is of the order of 1e4/(8 b)^5, which is 1e-8 at the tenth zero.
     #[test]
     fn mcmahon_s_zeros_continue_the_table() {
         let tenth = mcmahon(10);

@@ -20,101 +20,83 @@ use libm::{cosh, exp, log, pow, sinh, sqrt, tanh};
 
 use crate::cylinder::XI;
 
-/// f of a shape without measurements, from measured cylinders: 1.49 (Stephens) and 1.39 to 1.54
-/// (Mikishev and Dorozhkin).
+/// Factor f of a shape without measurements. It lies between the measured cylinders' 1.49 (Stephens) and 1.39
+/// to 1.54 (Mikishev and Dorozhkin).
 pub const UNMEASURED: f64 = 1.45;
 
-/// Relative scatter of measured tanks around a correlation.
 pub const SCATTER: f64 = 0.3;
 
-/// Parameters of a slosh mode for its damping.
+/// Parameters of a slosh mode on which its damping depends: the ratio `beta` of wall shear to volume, 1/m;
+/// `lambda`, 1/m, with which gravity alone gives the frequency sqrt(g lambda) (1/l of the pendulum); and the
+/// natural frequency `omega` with capillarity, rad/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mode {
-    /// Ratio of wall shear to volume, 1/m.
     pub beta: f64,
-    /// 1/l, 1/m; the frequency from gravity alone is sqrt(g lambda).
     pub lambda: f64,
-    /// Natural frequency with capillarity, rad/s.
     pub omega: f64,
 }
 
 impl Mode {
-    /// Returns mode `n` (from 0) of an upright cylinder at the specific force `g`, which includes the equivalent of a
-    /// centring stiffness, k l/m.
+    /// Returns mode `n`, which counts from 0, of an upright cylinder of this radius and depth, m. The
+    /// specific force `g`, m/s2, must include the equivalent of a centring stiffness, k l/m.
     pub fn from_cylinder(n: usize, radius: f64, depth: f64, g: f64) -> Mode {
         let lambda = XI[n] / radius * tanh(XI[n] * depth / radius);
         Mode { beta: cylinder_beta(n, radius, depth), lambda, omega: sqrt(g * lambda) }
     }
 
-    /// Returns the damping ratio of the laminar layer alone, f = 1.
     pub fn laminar(&self, nu: f64) -> f64 {
         laminar(self.beta, nu, self.omega)
     }
 }
 
-/// Shapes with measurements of the first mode's damping; lengths in m.
+/// Shapes of tanks for which the damping of the first mode was measured. Lengths are in m; `radius` of a cone
+/// is that of its free surface, and its half angle is in degrees. Cylinder and torus are upright, and the
+/// cone's apex is at the bottom.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shape {
-    /// Upright, with a flat bottom.
-    Cylinder {
-        radius: f64,
-        depth: f64,
-    },
-    Sphere {
-        radius: f64,
-        depth: f64,
-    },
-    /// Apex down, `radius` of the free surface, half angle in degrees.
-    Cone {
-        radius: f64,
-        half_angle: f64,
-    },
-    /// Axis upright.
-    Torus {
-        tube_radius: f64,
-        depth: f64,
-    },
-    /// Any other shape.
+    Cylinder { radius: f64, depth: f64 },
+    Sphere { radius: f64, depth: f64 },
+    Cone { radius: f64, half_angle: f64 },
+    Torus { tube_radius: f64, depth: f64 },
     Other,
 }
 
-/// Estimate of a first mode's damping from a correlation.
+/// Damping ratio `zeta` of a first mode by a correlation. Its `weight` against the general value of
+/// [`UNMEASURED`] laminar layers is 1 within the range of the measurements, and falls smoothly to 0 where a
+/// number is outside that range by the factor [`BEYOND`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Correlation {
-    /// Damping ratio.
     pub zeta: f64,
-    /// Weight of the correlation against [`UNMEASURED`] laminar layers: 1 within the range of the measurements, 0 far
-    /// outside ([`BEYOND`]), smooth between.
     pub weight: f64,
 }
 
-/// Factor by which a viscosity number may leave its measured range until the correlation has lost its weight.
 pub const BEYOND: f64 = 2.0;
 
-/// Half angle at which the cone's correlation has lost its weight, degrees. It is measured up to 45 degrees.
+/// Half angle, degrees, at which the cone's correlation has lost its weight, because cones were measured up
+/// to 45 degrees.
 const WIDEST: f64 = 50.0;
 
-/// Depth of an upright cylinder over its radius below which Stephens' formula holds alone in [`Shape::correlation`].
 const SHALLOW: f64 = 0.4;
 
-/// Returns 0 for t <= 0, 1 for t >= 1, and a cubic with a continuous slope between.
+/// Returns 0 for t <= 0, 1 for t >= 1, and in between the cubic that joins them with a continuous slope.
 pub fn smooth_step(t: f64) -> f64 {
     let t = t.clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
 }
 
-/// Returns the weight of a correlation that was measured for numbers from `low` to `high`.
 fn weight(number: f64, [low, high]: [f64; 2]) -> f64 {
     let outside = f64::max(low / number, number / high);
     1.0 - smooth_step(log(f64::max(outside, 1.0)) / log(BEYOND))
 }
 
 impl Shape {
-    /// Returns the published correlation of the first mode's damping ratio. `g` includes the equivalent of a centring
-    /// stiffness.
+    /// Returns the published correlation of the first mode's damping ratio at the viscosity `nu`, m2/s, and
+    /// the specific force `g`, m/s2, which must include the equivalent of a centring stiffness. `None` for a
+    /// shape without measurements.
     ///
-    /// Cylinder: Mikishev and Dorozhkin from h/R = 0.5 on. Below, where that falls under the laminar layer, Stephens,
-    /// Leonard and Perry. The two differ by 7 % at 0.5; from 0.4 to 0.5 one passes into the other.
+    /// The cylinder has Mikishev and Dorozhkin's formula from h/R = 0.5 on. For smaller fills that formula
+    /// gives less damping than the laminar layer, so Stephens, Leonard and Perry's is used there. Both differ
+    /// by 7 % at 0.5, and the result passes from one to the other between 0.4 ([`SHALLOW`]) and 0.5.
     pub fn correlation(&self, nu: f64, g: f64) -> Option<Correlation> {
         let (zeta, weight) = match *self {
             Shape::Cylinder { radius, depth } => {
@@ -143,8 +125,8 @@ impl Shape {
         Some(Correlation { zeta, weight })
     }
 
-    /// Returns the shape at the nearest depth that was measured: of a sphere 0.1 to 1.9 radii, of a torus 0.1 to 0.9
-    /// of its height.
+    /// Returns the shape with its depth moved to the nearest depth that was measured: 0.1 to 1.9 radii of a
+    /// sphere, and 0.1 to 0.9 of the height of a torus.
     #[must_use]
     pub fn at_measured_depth(self) -> Shape {
         match self {
@@ -160,69 +142,68 @@ impl Shape {
     }
 }
 
-/// A measured shape that the wetted wall of a tank has, wholly or in part.
+/// A measured shape that the wetted wall of a tank has, wholly or in part. `share` is its share of the wetted
+/// area, 0 to 1; `factor` is the damping ratio of the shape's first mode by its correlation over the ratio of
+/// the laminar layer at its wall; `weight` is [`Correlation::weight`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Part {
-    /// Share of the wetted wall that is of this shape, 1 if the whole wall is.
     pub share: f64,
-    /// Damping ratio of the shape's first mode by its correlation, over that of the laminar layer at its wall.
     pub factor: f64,
-    /// Weight of the correlation, see [`Correlation::weight`].
     pub weight: f64,
 }
 
-/// Share of the wall from which the interval holds a shape's correlation wholly, and share of other walls from which
-/// it is that of a mixture.
+/// Share of the wall from which on the interval of an estimate contains the shape's correlation entirely; if
+/// other shapes have at least this share, the interval is the one of a mixture.
 const COUNTS: f64 = 0.05;
 
-/// Factor below which a correlation does not count, because no wall has less than its laminar layer.
+/// Factor below which a correlation does not count, because no wall can have less damping than its laminar
+/// layer.
 const BELOW: f64 = 0.8;
 
 impl Part {
-    /// Returns the shape's own factor: by its correlation, from the layer itself down to [`BELOW`] passing into
-    /// [`UNMEASURED`].
+    /// Returns the factor over the laminar layer that the shape contributes: its correlation's factor, but at
+    /// least 1. Where the correlation's factor falls from 1 to [`BELOW`], the result passes into
+    /// [`UNMEASURED`], because no wall has less than its layer.
     fn shape_factor(&self) -> f64 {
         let trusted = self.weight * smooth_step((self.factor - BELOW) / (1.0 - BELOW));
         UNMEASURED + trusted * (self.factor.max(1.0) - UNMEASURED)
     }
 
-    /// Returns true if correlation and [`UNMEASURED`] laminar layers differ by more than the scatter of measured tanks.
+    /// Returns true if the correlation and the general value of [`UNMEASURED`] laminar layers differ by more
+    /// than measured tanks scatter.
     pub fn disagrees(&self) -> bool {
         let (low, high) = (self.factor.min(UNMEASURED), self.factor.max(UNMEASURED));
         high > (1.0 + SCATTER) * low
     }
 
-    /// Returns true within the range of the measurements if the correlation is not below the laminar layer.
     fn is_in_range(&self) -> bool {
         self.weight == 1.0 && self.factor >= 1.0
     }
 
-    /// Returns true if the part is the whole wetted wall and its shape's measured correlation applies.
     pub fn is_measured(&self) -> bool {
         self.share == 1.0 && self.is_in_range()
     }
 }
 
-/// A damping ratio and its expected interval, as multiples of the laminar layer.
+/// Damping ratios as multiples f of the laminar layer's: the expected value `factor`, which holds for all
+/// modes, and the expected intervals of the first mode and of the other modes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
-    /// f.
     pub factor: f64,
-    /// Expected interval of the first mode's f.
     pub interval: [f64; 2],
-    /// Expected interval of the other modes' f.
     pub interval_of_others: [f64; 2],
 }
 
-/// Estimates f of a tank whose wetted wall has these shapes in part; the rest of the wall has [`UNMEASURED`]. `near` has
-/// these shapes and those that the wall is near.
+/// Estimates the factor f of a tank whose wetted wall consists of the shapes `parts`; the rest of the wall
+/// has [`UNMEASURED`]. `near` lists these shapes and the shapes that the wall resembles.
 ///
-/// f is the mean over the wall: each shape's factor on its share, moved towards [`UNMEASURED`] by the weight of its
-/// correlation and where that is below the laminar layer. All modes have the same f.
+/// f is the mean over the wall. Each shape contributes its factor on its share, moved towards [`UNMEASURED`]
+/// as far as its correlation lacks weight or is below the laminar layer. All modes have the same f.
 ///
-/// If the whole wall is one shape and its correlation agrees with [`UNMEASURED`] layers, the first mode's interval is
-/// the scatter of measured tanks. Otherwise it runs from the layer alone to 1.3 of the largest factor of all parts and
-/// near shapes. It widens from one to the other while the shape's share falls to 95 %.
+/// If the whole wall is one shape and its correlation agrees with [`UNMEASURED`] layers, the first mode's
+/// interval is the scatter of measured tanks. Otherwise it runs from the laminar layer to 1.3 times the
+/// largest factor of all parts and near shapes. It widens from one to the other while the shape's share falls
+/// to 95 %.
 pub fn estimate(parts: &[Part], near: &[Part]) -> Estimate {
     let mean = |sum: f64, part: &Part| sum + part.share * (part.shape_factor() - UNMEASURED);
     let factor = match parts {
@@ -247,19 +228,19 @@ pub fn estimate(parts: &[Part], near: &[Part]) -> Estimate {
     Estimate { factor, interval, interval_of_others: wide }
 }
 
-/// Returns Re = nu/sqrt(g R^3).
 pub fn inverse_reynolds(radius: f64, nu: f64, g: f64) -> f64 {
     nu / sqrt(g * radius * radius * radius)
 }
 
-/// Returns the damping ratio of the laminar layer at the wetted wall of any tank: beta sqrt(nu/(8 omega)). `beta`, 1/m,
-/// depends on the mode's shape (cylinder: Case and Parkinson 1957, box: Keulegan 1959).
+/// Returns the damping ratio of the laminar layer at the wetted wall of any tank, beta sqrt(nu/(8 omega)).
+/// `beta`, 1/m, depends on the mode's shape (Case and Parkinson 1957 for the cylinder, Keulegan 1959 for the
+/// box).
 pub fn laminar(beta: f64, nu: f64, omega: f64) -> f64 {
     beta * sqrt(nu / (8.0 * omega))
 }
 
-/// Returns beta of mode `n` (from 0) of an upright cylinder, 1/m (Case and Parkinson, J. Fluid Mech. 2 (1957) 172):
-/// beta R = (xi^2 + 1)/(xi^2 - 1) + 2 xi (1 - x)/sinh(2 xi x).
+/// Returns beta of mode `n`, which counts from 0, of an upright cylinder, 1/m: beta R = (xi^2 + 1)/(xi^2 - 1)
+/// + 2 xi (1 - x)/sinh(2 xi x) (Case and Parkinson, J. Fluid Mech. 2 (1957) 172).
 pub fn cylinder_beta(n: usize, radius: f64, depth: f64) -> f64 {
     let (xi, x) = (XI[n], depth / radius);
     let u = 2.0 * xi * x;
@@ -267,8 +248,8 @@ pub fn cylinder_beta(n: usize, radius: f64, depth: f64) -> f64 {
     ((xi * xi + 1.0) / (xi * xi - 1.0) + shallow) / radius
 }
 
-/// Damping ratio of the first mode of an upright cylinder at any depth: [`mikishev_dorozhkin`] from h/R = 0.5 on,
-/// [`stephens`] below.
+/// Returns the damping ratio of the first mode of an upright cylinder by one formula at any depth:
+/// [`mikishev_dorozhkin`] from h/R = 0.5 on and [`stephens`] for smaller fills.
 pub fn cylinder(radius: f64, depth: f64, nu: f64, g: f64) -> f64 {
     if depth >= 0.5 * radius {
         mikishev_dorozhkin(radius, depth, nu, g)
@@ -277,15 +258,17 @@ pub fn cylinder(radius: f64, depth: f64, nu: f64, g: f64) -> f64 {
     }
 }
 
-/// Damping ratio of the first mode of an upright cylinder at 10 < Bo < 100, where the contact line dissipates more than
-/// at large Bond numbers. The formula `0.83 (nu^2/(g R^3))^(1/4) (1 + 8.2 Bo^(-3/5))` is quoted for drop-tower tests
-/// (Salzman, Labus and Masica, NASA TN D-4132). We could not obtain the report, so the value is only an upper bound.
+/// Returns an upper bound of the damping ratio of the first mode of an upright cylinder at Bond numbers of 10
+/// to 100, where the contact line dissipates more than at large ones. The formula `0.83 (nu^2/(g R^3))^(1/4)
+/// (1 + 8.2 Bo^(-3/5))` is quoted for drop-tower tests (Salzman, Labus and Masica, NASA TN D-4132). The
+/// report could not be obtained, so the value is not used as an estimate.
 pub fn low_bond_cylinder(radius: f64, nu: f64, g: f64, bond: f64) -> f64 {
     0.83 * sqrt(inverse_reynolds(radius, nu, g)) * (1.0 + 8.2 * pow(bond, -0.6))
 }
 
-/// Upright cylinder, Mikishev and Dorozhkin (Dodge 2000): 0.79 sqrt(Re) [1 + (0.318/sinh 1.84 x)
-/// (1 + (1 - x)/cosh 1.84 x)]. Below x = 0.5 it falls below the laminar layer.
+/// Returns the damping ratio of the first mode of an upright cylinder by Mikishev and Dorozhkin (Dodge 2000):
+/// 0.79 sqrt(Re) [1 + (0.318/sinh 1.84 x) (1 + (1 - x)/cosh 1.84 x)]. For x = h/R below 0.5 it is less than
+/// the laminar layer's.
 #[allow(clippy::approx_constant)] // 0.318 is the correlation's, not 1/pi
 pub fn mikishev_dorozhkin(radius: f64, depth: f64, nu: f64, g: f64) -> f64 {
     let x = depth / radius;
@@ -295,8 +278,9 @@ pub fn mikishev_dorozhkin(radius: f64, depth: f64, nu: f64, g: f64) -> f64 {
     0.79 * sqrt(inverse_reynolds(radius, nu, g)) * (1.0 + bottom)
 }
 
-/// Upright cylinder, Stephens, Leonard and Perry (NASA TN D-1367), 1.493 times the laminar layer at every depth:
-/// `(5.23/2 pi) sqrt(Re) tanh(1.84 x)^(-1/4) [1 + 2 (1 - x)/sinh 3.68 x]`.
+/// Returns the damping ratio of the first mode of an upright cylinder by Stephens, Leonard and Perry (NASA TN
+/// D-1367): `(5.23/2 pi) sqrt(Re) tanh(1.84 x)^(-1/4) [1 + 2 (1 - x)/sinh 3.68 x]`, which is 1.493 times the
+/// laminar layer's at every depth.
 pub fn stephens(radius: f64, depth: f64, nu: f64, g: f64) -> f64 {
     let x = depth / radius;
     let bracket = 1.0 + if x > 100.0 { 0.0 } else { 2.0 * (1.0 - x) / sinh(3.68 * x) };
@@ -304,61 +288,61 @@ pub fn stephens(radius: f64, depth: f64, nu: f64, g: f64) -> f64 {
     zeta / pow(tanh(1.84 * x), 0.25)
 }
 
-/// Returns B = 1e4 nu/sqrt(g D^3) of a sphere.
 pub fn sphere_number(radius: f64, nu: f64, g: f64) -> f64 {
     1e4 * inverse_reynolds(2.0 * radius, nu, g)
 }
 
-/// Sphere (after Mikishev and Dorozhkin, exponent of Sumner and Stofan, NASA TN D-1991). Up to half
-/// full (0.131/2 pi) B^0.359/x, above times x (1 + 0.46 (2 - x))/(1.46 (2 - x)). The formula is
-/// unbounded at both ends, so x is limited to 0.1 to 1.9.
+/// Returns the damping ratio of the first mode of a sphere by Mikishev and Dorozhkin, with the exponent of
+/// Sumner and Stofan (NASA TN D-1991): (0.131/2 pi) B^0.359/x up to half full, and above this value times x
+/// (1 + 0.46 (2 - x))/(1.46 (2 - x)), with B = 1e4 nu/sqrt(g D^3). The formula is unbounded at both ends, so
+/// x = h/R is limited to 0.1 to 1.9.
 pub fn sphere(radius: f64, depth: f64, nu: f64, g: f64) -> f64 {
     let x = (depth / radius).clamp(0.1, 1.9);
     let by_fill = if x <= 1.0 { 1.0 / x } else { (1.0 + 0.46 * (2.0 - x)) / (1.46 * (2.0 - x)) };
     0.131 / TAU * pow(sphere_number(radius, nu, g), 0.359) * by_fill
 }
 
-/// Cone with its apex down, `radius` of the free surface, `half_angle` b in degrees (fit of a
-/// figure by SLOSH-ML). (4.964/2 pi) C5 C4^(-1/2) sqrt(Re), C5 = 1.0037 + 0.0126 b, C4 = 1.001 -
-/// 0.0031 b - 0.0003 b^2. C4 falls to 0 at 53 degrees, so b is limited to 0 to 45.
+/// Returns the damping ratio of the first mode of a cone with its apex at the bottom, by a fit of SLOSH-ML to
+/// a figure: (4.964/2 pi) C5 C4^(-1/2) sqrt(Re) with C5 = 1.0037 + 0.0126 b and C4 = 1.001 - 0.0031 b -
+/// 0.0003 b^2. `radius` is that of the free surface, m, and b is `half_angle` in degrees. C4 falls to 0 at 53
+/// degrees, so b is limited to 0 to 45.
 pub fn cone(radius: f64, half_angle: f64, nu: f64, g: f64) -> f64 {
     let b = half_angle.clamp(0.0, 45.0);
     let (c5, c4) = (1.0037 + 0.0126 * b, 1.001 - 0.0031 * b - 0.0003 * b * b);
     4.964 / TAU * c5 / sqrt(c4) * sqrt(inverse_reynolds(radius, nu, g))
 }
 
-/// Returns Re of a torus over that of the one tank that was measured.
+/// Returns Re of a torus divided by Re_0 of the only torus that was measured.
 pub fn torus_number(tube_radius: f64, nu: f64, g: f64) -> f64 {
     inverse_reynolds(tube_radius, nu, g) / inverse_reynolds(0.0635, 3.3e-6, 9.81)
 }
 
-/// Torus, `tube_radius` a of its section (SLOSH-ML; one tank size was measured). sqrt(Re/Re_0)
-/// times (1.6629 y^4 - 3.7955 y^3 + 3.5583 y^2 - 1.6759 y + 0.3865)/2 pi, with y = h/2a. Re_0 =
-/// 3.3e-6/sqrt(9.81 0.0635^3).
+/// Returns the damping ratio of the first mode of a torus by SLOSH-ML, who measured one size of tank:
+/// sqrt(Re/Re_0) (1.6629 y^4 - 3.7955 y^3 + 3.5583 y^2 - 1.6759 y + 0.3865)/2 pi with y = h/2a, the radius a
+/// = `tube_radius` of the section, m, and Re_0 = 3.3e-6/sqrt(9.81 0.0635^3).
 pub fn torus(tube_radius: f64, depth: f64, nu: f64, g: f64) -> f64 {
     let y = 0.5 * depth / tube_radius;
     let fit = (((1.6629 * y - 3.7955) * y + 3.5583) * y - 1.6759) * y + 0.3865;
     sqrt(torus_number(tube_radius, nu, g)) * fit / TAU
 }
 
-/// Returns the part of an upright cylinder's section that a flat ring of `width` at the wall
-/// covers.
 pub fn covered(radius: f64, width: f64) -> f64 {
     let w = width / radius;
     w * (2.0 - w)
 }
 
-/// Returns the share of the surface's motion at a ring `depth` below it in an upright cylinder.
+/// Returns the factor exp(-1.84 d/R) by which the first mode's motion of the liquid at a ring `depth` below the
+/// surface of an upright cylinder is smaller than at the surface; both lengths in m.
 pub fn motion_at_ring(radius: f64, depth: f64) -> f64 {
     // The limit keeps divisions by this share finite.
     exp(-f64::min(1.84 * depth / radius, 100.0))
 }
 
-/// Ring baffle in an upright cylinder (Miles 1958): `2.83 exp(-4.60 d/R) alpha^(3/2) (eta/R)^(1/2)`, with the covered
-/// area alpha and the `amplitude` eta of the wave at the wall.
+/// Returns the damping ratio that a flat ring baffle adds in an upright cylinder (Miles 1958): `2.83
+/// exp(-4.60 d/R) alpha^(3/2) (eta/R)^(1/2)`, with the ring's share alpha of the section and the `amplitude`
+/// eta of the wave at the wall, m.
 ///
-/// The ratio grows with the root of the amplitude, so a constant damping ratio holds only at one
-/// amplitude.
+/// The ratio grows with the root of the amplitude, so a constant damping ratio holds only at one amplitude.
 pub fn miles_ring(radius: f64, depth: f64, width: f64, amplitude: f64) -> f64 {
     let alpha = covered(radius, width);
     2.83 * exp(-4.60 * depth / radius) * alpha * sqrt(alpha) * sqrt(amplitude / radius)
@@ -368,7 +352,8 @@ pub fn miles_ring(radius: f64, depth: f64, width: f64, amplitude: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Water in the bench's tank, R = 0.0815 m: Re = 9.1312e-7/sqrt(9.81 R^3); by hand, four digits.
+    /// Water in the bench's tank, R = 0.0815 m, has Re = 9.1312e-7/sqrt(9.81 R^3). The values were computed
+    /// by hand to four digits.
     #[test]
     fn correlations_have_their_published_coefficients() {
         let (r, nu, g) = (0.0815, 9.1312e-7, 9.81);
@@ -392,8 +377,8 @@ mod tests {
         );
     }
 
-    /// Shallow liquid, where sign and magnitude of every term matter: x = 0.2, 1 and 2. Twelve digits of the published
-    /// formula, evaluated by another program.
+    /// In shallow liquid sign and magnitude of every term matter. The values at x = 0.2, 1 and 2 are twelve
+    /// digits of the published formula, evaluated by another program.
     #[test]
     fn mikishev_and_dorozhkin_s_bottom_counts_in_shallow_liquid_and_changes_sign_above_the_radius()
     {
@@ -410,7 +395,6 @@ mod tests {
         assert_eq!(mikishev_dorozhkin(r, 1e4 * r, nu, g), 0.79 * sqrt(inverse_reynolds(r, nu, g)));
     }
 
-    /// For small x the bottom contributes twice its share: 2 (1 - x)/sinh 3.68 x.
     #[test]
     fn stephens_s_bottom_counts_in_shallow_liquid() {
         let deep = stephens(1.0, 5.0, 1e-6, 9.81);
@@ -422,8 +406,6 @@ mod tests {
         near(stephens(1.0, 1e4, 1e-6, 9.81) / deep, 1.0);
     }
 
-    /// A correlation without a stated end is constant beyond its data: for a sphere at 0.1 and 1.9 radii, for a cone at
-    /// 0 and 45 degrees.
     #[test]
     fn correlations_without_bound_are_held_at_their_ends() {
         let sphere = |x: f64| sphere(1.0, x, 1e-6, 9.81);
@@ -438,8 +420,6 @@ mod tests {
         assert!((both / (1.5077 / 1.2557 * sqrt(0.819 / 0.397)) - 1.0).abs() < 1e-12, "{both}");
     }
 
-    /// y = 1, full: the sum of the coefficients. Another tank follows from the measured tank's Re
-    /// by its root.
     #[test]
     fn the_torus_has_its_fit_and_grows_with_the_root_of_its_number() {
         let full = torus(0.0635, 2.0 * 0.0635, 3.3e-6, 9.81);
@@ -451,7 +431,6 @@ mod tests {
         assert!((quarter * TAU / (2.0 * fit) - 1.0).abs() < 1e-12);
     }
 
-    /// alpha = 0.19 at w/R = 0.1; by hand, four digits.
     #[test]
     fn the_ring_has_the_damping_of_miles() {
         let zeta = miles_ring(1.0, 0.1, 0.1, 0.04);
@@ -465,14 +444,11 @@ mod tests {
         assert!(motion_at_ring(1.0, 1e9) > 0.0);
     }
 
-    /// beta = 10/m, nu = 8e-6 m2/s, omega = 4 rad/s: 10 sqrt(2.5e-7).
     #[test]
     fn the_laminar_layer_grows_with_the_root_of_viscosity() {
         assert!((laminar(10.0, 8e-6, 4.0) - 5e-3).abs() < 1e-17);
     }
 
-    /// In waves as deep as the radius the bottom's bracket vanishes. At half the radius xi/sinh xi matters, and the
-    /// next mode has its own zero.
     #[test]
     fn a_cylinder_s_modes_rub_at_their_own_rate() {
         for n in [0, 1] {
@@ -500,7 +476,6 @@ mod tests {
         assert_eq!(cylinder(r, 0.99, nu, g), stephens(r, 0.99, nu, g));
     }
 
-    /// 8.2 (32)^(-3/5) = 8.2/8; nu^2/(g R^3) = 1e-8/4: its fourth root is 0.01/2^(1/2).
     #[test]
     fn a_low_bond_number_adds_its_contact_line() {
         let zeta = low_bond_cylinder(1.0, 1e-4, 4.0, 32.0);
@@ -510,8 +485,6 @@ mod tests {
         );
     }
 
-    /// Within its measurements a correlation has the weight 1, from twice as far on none, and half of it at the root of
-    /// two. The depth is limited, not weighed.
     #[test]
     fn a_correlation_loses_its_weight_outside_its_measurements() {
         let (r, g) = (2.0, 9.81);
@@ -585,7 +558,6 @@ mod tests {
         }
     }
 
-    /// f of the first mode and its interval.
     fn numbers(parts: &[Part]) -> [f64; 3] {
         let Estimate { factor, interval: [low, high], interval_of_others } = estimate(parts, &[]);
         // those of the other modes reach from the layer on
@@ -594,8 +566,6 @@ mod tests {
         [factor, low, high]
     }
 
-    /// Measured everywhere: the correlation, with the scatter if it agrees with 1.45 layers, otherwise from the layer to
-    /// 1.3 of the larger of both.
     #[test]
     fn a_measured_shape_has_its_correlation_and_the_scatter_where_two_estimates_agree() {
         for (factor, low, high) in [
@@ -613,8 +583,6 @@ mod tests {
         is_near([low, high, 1.0], [1.0, 1.95, 1.0]);
     }
 
-    /// Without a measured shape 1.45 layers; outside its measurements, and if it is far below the layer, the same, but
-    /// the interval holds the correlation.
     #[test]
     fn what_was_not_measured_has_1_45_layers() {
         is_near(numbers(&[]), [1.45, 1.0, 1.3 * 1.45]);
@@ -625,7 +593,8 @@ mod tests {
         is_near(numbers(&[part(1.0, 3.45, 0.25)]), [1.95, 1.0, 1.3 * 3.45]);
     }
 
-    /// A third of the wall has 4 layers, a half 1.15, the rest 1.45. The interval holds the largest of them.
+    /// A third of the wall has 4 layers, a half has 1.15 and the rest 1.45. The interval contains the largest
+    /// of them.
     #[test]
     fn a_wall_of_several_shapes_has_their_mean() {
         let parts = [part(1.0 / 3.0, 4.0, 1.0), part(0.5, 1.15, 1.0)];

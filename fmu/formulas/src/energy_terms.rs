@@ -17,11 +17,11 @@
 
 use crate::third_order;
 
-/// Fills h/R between which the coefficients are known.
 pub const DEPTHS: [f64; 2] = [0.25, third_order::BRIDGED[0]];
 
-/// h/R, kappa, s, t, kappa_2, s_2, t_2 and the largest slosh angle of the comparison, degrees. Here the frequency of a
-/// circular motion is omega^2 (1 + t A^2 + t_2 A^4) = (dz/dA)/A, so that t and t_2 are twice and three times those above.
+/// Rows of h/R, kappa, s, t, kappa_2, s_2, t_2 and the largest slosh angle of the comparison, degrees. The
+/// frequency of a circular motion is defined here as omega^2 (1 + t A^2 + t_2 A^4) = (dz/dA)/A, so that t and
+/// t_2 are twice and three times those of the equations above.
 const ROWS: [[f64; 8]; 7] = [
     [0.25, 111.6366, 67.2399, 48.6774, -3776.617, -2326.024, -1494.947, 8.0],
     [0.3, 38.3052, 21.5892, 15.4987, -429.434, -236.528, -188.836, 12.5],
@@ -32,21 +32,17 @@ const ROWS: [[f64; 8]; 7] = [
     [0.65, 2.1267, 2.1867, 0.6731, -4.250, -0.965, -2.221, 18.0],
 ];
 
-/// Coefficients at a depth.
+/// Coefficients of the first mode at one depth: `pair` is (s, kappa), `next` (s_2, kappa_2), `rotary` (t,
+/// t_2), and `compared` the largest slosh angle of the comparison with potential flow, rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EnergyTerms {
-    /// s and kappa.
     pub pair: [f64; 2],
-    /// s_2 and kappa_2.
     pub next: [f64; 2],
-    /// t and t_2.
     pub rotary: [f64; 2],
-    /// Largest slosh angle of the comparison with potential flow, rad.
     pub compared: f64,
 }
 
 impl EnergyTerms {
-    /// Returns the shifts of omega^2 per squared slosh angle, in planar and in circular motion.
     pub fn shifts(&self) -> [f64; 2] {
         let [s, kappa] = self.pair;
         let [planar, circular] = third_order::shifts(s, kappa);
@@ -56,9 +52,10 @@ impl EnergyTerms {
 
 /// Returns the coefficients at h/R = `fill`, `None` outside [`DEPTHS`].
 ///
-/// Between the rows kappa and kappa_2 are interpolated, and the shifts of frequency: those to third order by their difference
-/// from the third order of potential flow, which is known at every depth. The others follow, so that an error of the
-/// interpolation is one of the energy and not of the frequency. Beyond the last row the last two are extrapolated.
+/// Between the rows kappa, kappa_2 and the shifts of the frequency are interpolated, and the other
+/// coefficients follow from them. An error of the interpolation is therefore one of the energy and not of the
+/// frequency. The shifts to third order are interpolated as differences from the third order of potential
+/// flow, which is known at every depth. Beyond the last row the last two coefficients are extrapolated.
 pub fn energy_terms(fill: f64) -> Option<EnergyTerms> {
     if !(DEPTHS[0]..=DEPTHS[1]).contains(&fill) {
         return None;
@@ -92,7 +89,6 @@ pub fn energy_terms(fill: f64) -> Option<EnergyTerms> {
     })
 }
 
-/// Shares of kappa_2 and s_2 in the shift of omega^2 in planar motion over the fourth power of the angle.
 const PLANAR_STIFFNESS: f64 = 15.0 / 64.0;
 const PLANAR_INERTIA: f64 = 0.375;
 
@@ -114,8 +110,9 @@ fn shifts_of_third_order(fill: f64) -> [f64; 2] {
     third_order::shifts(s, kappa)
 }
 
-/// Returns the logarithms of kappa - 1 and -kappa_2, the differences of both shifts from the third order, and the logarithms
-/// of the shifts of the fourth power, which change their sign at no depth.
+/// Returns the six quantities of a row that are interpolated over the depth: the logarithms of kappa - 1 and
+/// -kappa_2, the differences of both shifts from the third order, and the logarithms of the shifts by the
+/// fourth power of the angle. Logarithms are possible because these do not change their sign.
 fn features(&[fill, kappa, s, t, kappa_2, s_2, t_2, _]: &[f64; 8]) -> [f64; 6] {
     let [planar, circular] = shifts_of_third_order(fill);
     [
@@ -128,8 +125,8 @@ fn features(&[fill, kappa, s, t, kappa_2, s_2, t_2, _]: &[f64; 8]) -> [f64; 6] {
     ]
 }
 
-/// Returns y at `x` between the points i - 1 and i by a cubic whose slopes are those of the parabola through the nearest three
-/// points, or by the line through both points.
+/// Returns y at `x` between the points i - 1 and i. With `is_cubic` it is a cubic whose slopes at both points
+/// are those of the parabola through the nearest three points; otherwise it is the straight line.
 fn interpolate_segment(x: f64, i: usize, point: impl Fn(usize) -> [f64; 2], is_cubic: bool) -> f64 {
     let [[x_0, y_0], [x_1, y_1]] = [point(i - 1), point(i)];
     let (h, secant) = (x_1 - x_0, (y_1 - y_0) / (x_1 - x_0));
@@ -153,7 +150,6 @@ fn interpolate_segment(x: f64, i: usize, point: impl Fn(usize) -> [f64; 2], is_c
 mod tests {
     use super::*;
 
-    /// The rows are met from both sides, and the coefficients end at 0.25 and 0.7.
     #[test]
     fn coefficients_are_those_of_the_rows_and_continuous() {
         for row in ROWS {
@@ -177,7 +173,6 @@ mod tests {
         assert!(energy_terms(0.7).is_some());
     }
 
-    /// To third order the frequencies are those of potential flow: within 0.05 A^2 from h/R 0.4 on.
     #[test]
     fn shifts_are_close_to_those_of_the_third_order() {
         for i in 0..=30 {

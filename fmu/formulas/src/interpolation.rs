@@ -5,14 +5,14 @@
 //! points they are limited so that the quintic's Bernstein coefficients are monotone. This is sufficient for a monotone
 //! curve.
 
-/// Writes slopes and second derivatives at points with ascending `x` into `slope` and `curvature`.
+/// Writes the slopes and second derivatives of a curve through points with ascending `x` into `slope` and
+/// `curvature`.
 ///
-/// With `within`, a turning point of the data is one of the curve, and the curve stays between its two points
-/// everywhere. Otherwise the intervals at a turning point are not limited, because the true maximum lies between
-/// points.
+/// With `within`, the curve stays between its two points in every interval, so that it turns where the data
+/// turn. Otherwise the intervals beside a turning point are not limited, because the true maximum lies
+/// between points.
 ///
-/// # Panics
-/// If the lengths of the slices differ.
+/// # Panics If the lengths of the slices differ.
 pub fn derivatives(x: &[f64], y: &[f64], within: bool, slope: &mut [f64], curvature: &mut [f64]) {
     let count = x.len();
     assert!([y.len(), slope.len(), curvature.len()] == [count; 3]);
@@ -59,8 +59,8 @@ pub fn derivatives(x: &[f64], y: &[f64], within: bool, slope: &mut [f64], curvat
     }
 }
 
-/// Returns first and second derivative at `x0` of the polynomial through up to five points
-/// (Fornberg 1988).
+/// Returns the first and second derivative at `x0` of the polynomial through up to five points, by Fornberg's
+/// recurrence (1988).
 fn polynomial_derivatives(x0: f64, x: &[f64], y: &[f64]) -> (f64, f64) {
     let mut weights = [[0.0; 5]; 3];
     weights[0][0] = 1.0;
@@ -88,8 +88,8 @@ fn polynomial_derivatives(x0: f64, x: &[f64], y: &[f64]) -> (f64, f64) {
     (sum(1), sum(2))
 }
 
-/// Returns the coefficients of the quintic between two points a distance `h` apart, in powers of t from 0 to 1, with
-/// `[value, slope, second derivative]` at both.
+/// Returns the coefficients, in powers of t from 0 to 1, of the quintic between two points a distance `h`
+/// apart, each given as `[value, slope, second derivative]`.
 pub fn quintic(h: f64, [y_0, d_0, s_0]: [f64; 3], [y_1, d_1, s_1]: [f64; 3]) -> [f64; 6] {
     let (rise, d_0, d_1) = (y_1 - y_0, d_0 * h, d_1 * h);
     let (s_0, s_1) = (0.5 * s_0 * h * h, 0.5 * s_1 * h * h);
@@ -109,14 +109,12 @@ mod tests {
 
     const X: [f64; 9] = [0.0, 0.3, 0.5, 1.1, 1.2, 1.9, 2.4, 2.7, 3.5];
 
-    /// Returns slopes and second derivatives at the points `x`.
     fn found<const N: usize>(x: [f64; N], y: [f64; N], within: bool) -> ([f64; N], [f64; N]) {
         let (mut slope, mut curvature) = ([0.0; N], [0.0; N]);
         derivatives(&x, &y, within, &mut slope, &mut curvature);
         (slope, curvature)
     }
 
-    /// Powers of x - 0.7, at any position and between points at unequal distances, up to the number of points.
     #[test]
     fn the_polynomial_through_the_points_has_their_derivatives() {
         let power = |x: f64, n: i32| {
@@ -137,8 +135,6 @@ mod tests {
         }
     }
 
-    /// Each point uses two neighbours on either side, or the five at an end, and no others. Smooth data are not
-    /// limited.
     #[test]
     fn derivatives_of_smooth_data_are_those_through_the_five_nearest_points() {
         let y = X.map(libm::exp);
@@ -162,8 +158,6 @@ mod tests {
         }
     }
 
-    /// The data's maximum lies between points. Near it the curve follows the parabola, unless it must stay within its
-    /// points and therefore turns at one.
     #[test]
     fn beside_a_turning_point_nothing_is_limited_unless_the_curve_is_to_stay_within_its_points() {
         let x = [0.0, 1.0, 2.0, 3.0, 4.0];
@@ -178,8 +172,9 @@ mod tests {
         }
     }
 
-    /// Returns the differences of the quintic's Bernstein coefficients between two points, over h. In the direction of
-    /// the rise they are d/5, d/5 + h s/20, the remainder, and the same from the right end.
+    /// Returns the differences of the quintic's Bernstein coefficients between two points, divided by h: d/5,
+    /// d/5 + h s/20, the remainder, and the same from the right end. If they all have the sign of the rise,
+    /// the curve is monotonic.
     fn steps(h: f64, [y_0, d_0, s_0]: [f64; 3], [y_1, d_1, s_1]: [f64; 3]) -> [f64; 5] {
         let secant = (y_1 - y_0) / h;
         let sign = if secant < 0.0 { -1.0 } else { 1.0 };
@@ -193,9 +188,8 @@ mod tests {
         .map(|step| sign * step)
     }
 
-    /// Data that jump by factors up to 1e4 and smoother data, rising and falling, and data that turn. Every coefficient
-    /// between two points rises with the data. Rounding is of the order of the largest value's last digit over the
-    /// smallest distance, 1e-11.
+    /// The data jump by factors up to 1e4, rise and fall smoothly, or turn. The tolerance is 1e-11: the last
+    /// digit of the largest value over the smallest distance.
     #[test]
     fn the_curve_rises_where_the_data_rise() {
         let mut seed = 1_u64;
@@ -253,7 +247,6 @@ mod tests {
         assert!(free > 20 && limited > 1000, "{free} {limited}");
     }
 
-    /// A corner after a constant stretch: in the rise both slopes are scaled to 0.95 of two and a half secants.
     #[test]
     fn steep_slopes_are_held_at_their_limits() {
         // secants 1 and 10 alternate; each slope at most 2.4 of the smaller one
@@ -274,7 +267,6 @@ mod tests {
         assert_eq!((curvature[0], curvature[1]), (0.0, 0.0));
     }
 
-    /// Value, slope and second derivative at t = 0 and 1, by x = h t: h = 1/2 and arbitrary numbers.
     #[test]
     fn a_quintic_has_what_is_given_at_its_ends() {
         let (left, right) = ([1.25, -0.5, 3.0], [2.0, 0.75, -1.5]);

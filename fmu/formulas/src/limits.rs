@@ -19,31 +19,22 @@ use crate::cylinder::XI;
 use crate::energy_terms::energy_terms;
 use crate::third_order;
 
-/// Reason why no pendulum represents the liquid.
+/// Reason why no pendulum represents the liquid. The descriptions of the items are in [`LimitedBy::ITEMS`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum LimitedBy {
-    /// The liquid is in range.
     #[default]
     None = 1,
-    /// The slosh angle is above the one at which the model's frequency or forced response is wrong.
     ThirdOrder = 2,
-    /// The wave is so steep that it breaks.
     Breaking = 3,
-    /// Rotary motion beyond the fold of its branch by a secondary resonance.
     SecondaryResonance = 4,
-    /// The tank turns about its axis so fast that the spin of the liquid matters.
     Spin = 5,
-    /// Surface tension matters, and the parameters do not hold for it.
     BondNumber = 6,
-    /// The tank has drained to the first point of its table.
     Empty = 7,
-    /// The liquid has lost contact with the bottom of its tank.
     Contact = 8,
 }
 
 impl LimitedBy {
-    /// All reasons, in the order of their numbers.
     pub const ALL: [LimitedBy; 8] = [
         LimitedBy::None,
         LimitedBy::ThirdOrder,
@@ -55,7 +46,7 @@ impl LimitedBy {
         LimitedBy::Contact,
     ];
 
-    /// Names and meanings of all reasons, in the order of their numbers.
+    /// Names and descriptions of all reasons, in the order of their numbers.
     pub const ITEMS: [(&str, &str); 8] = [
         ("none", "In range"),
         ("third_order", "Slosh angle above the limit of the amplitude model, or above 45 degrees"),
@@ -67,26 +58,26 @@ impl LimitedBy {
         ("contact", "The liquid leaves the bottom of its tank, or is detached"),
     ];
 
-    /// Returns the reason with this number.
     pub fn from_number(number: u8) -> Option<LimitedBy> {
         LimitedBy::ALL.into_iter().find(|reason| *reason as u8 == number)
     }
 
-    /// Returns the meaning of the reason.
     pub fn meaning(self) -> &'static str {
         LimitedBy::ITEMS[self as usize - 1].1
     }
 }
 
-/// Relative error of the frequency at the end of the amplitude model.
+/// Relative error of the frequency that a model of the amplitude dependence may have at the end of its range.
 pub const FREQUENCY: f64 = 3e-3;
-/// Relative error of the frequency, by shifts that are not those of the liquid, at which a forced response errs by 3 %.
+/// Relative error of the frequency by which a forced response errs by 3 %, if the error comes from shifts
+/// that are not those of the liquid.
 pub const FORCED: f64 = 8.5e-4;
 
-/// Slosh angles of planar motion in an upright cylinder, degrees, at which the frequency of the third order errs by
-/// [`FREQUENCY`] and a forced response by 3 %, at h/R. Rotary motion ends at larger angles, except by the fold. From h/R
-/// [`third_order::BRIDGED`] on the coefficients are bridged. `harness/tank/tests/tank/backbones.rs` computes the
-/// first of these from the backbones in `harness/tank/tests/backbones.csv`.
+/// Rows of h/R and two slosh angles of planar motion in an upright cylinder, degrees: the first where the
+/// frequency of the third order errs by [`FREQUENCY`], the second where a forced response errs by 3 %. Rotary
+/// motion ends at larger angles, except by the fold. In [`third_order::BRIDGED`] the coefficients are
+/// bridged. `harness/tank/tests/tank/backbones.rs` computes the first column from
+/// `harness/tank/tests/backbones.csv`.
 const THIRD_ORDER: [[f64; 3]; 12] = [
     [0.25, 4.41, 1.3],
     [0.3, 7.11, 2.4],
@@ -102,23 +93,24 @@ const THIRD_ORDER: [[f64; 3]; 12] = [
     [2.5, 22.06, 11.1],
 ];
 
-/// Slosh angles of rotary motion, degrees, at which its branch folds, at h/R. The first depth is that of the resonance.
-/// At h/R 1 and 2.5 the computation ends there.
+/// Rows of h/R and the slosh angle of rotary motion, degrees, at which its branch folds. The first depth is
+/// that of the secondary resonance. At h/R 1 and 2.5 the angle is the end of the computation, so the fold may
+/// be later.
 const FOLD: [[f64; 2]; 6] =
     [[0.8314, 0.5], [0.9, 4.6], [1.0, 7.0], [1.227, 9.4], [2.0, 10.8], [2.5, 10.4]];
 
-/// Slosh angles, rad, at which a model of the first mode ends.
+/// Slosh angles, rad, at which a model of the first mode ends: `frequency` where its frequency errs by
+/// [`FREQUENCY`], and `forced` where a forced response errs by 3 %.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AngleLimit {
-    /// Angle at which the model's frequency errs by [`FREQUENCY`].
     pub frequency: f64,
-    /// Angle at which a forced response of the model errs by 3 %.
     pub forced: f64,
 }
 
-/// Returns the limit of a model in an upright cylinder filled to h/R = `fill`, whose omega^2 shifts by these parts of the
-/// squared angle in planar and in circular motion: none for a linear mode, -1/8 and 1/2 for a pendulum. The difference
-/// from the shifts of the third order adds to that order's own error. A motion that the model does not have has `None`.
+/// Returns the limit of a model of the first mode in an upright cylinder filled to h/R = `fill`. `shifts` are
+/// the model's relative shifts of omega^2 per squared slosh angle in planar and in circular motion: 0 for a
+/// linear mode, -1/8 and 1/2 for a pendulum, and `None` for a motion that the model does not have. Their
+/// difference from the shifts of the third order adds to that order's own error.
 pub fn cylinder(fill: f64, shifts: [Option<f64>; 2]) -> AngleLimit {
     let (s, kappa) = third_order::coefficients(fill);
     let own = |error: f64, column: usize| {
@@ -127,20 +119,21 @@ pub fn cylinder(fill: f64, shifts: [Option<f64>; 2]) -> AngleLimit {
     AngleLimit { frequency: own(FREQUENCY, 1), forced: own(FORCED, 2) }
 }
 
-/// Slosh angles, degrees, at which a forced response of [`energy_terms`] errs by 3 %, at h/R. From h/R 0.6 on it errs by less
-/// up to 15 degrees.
+/// Rows of h/R and the slosh angle, degrees, at which a forced response of [`energy_terms`] errs by 3 %. From
+/// h/R 0.6 on it errs by less up to 15 degrees.
 const FORCED_ENERGY: [[f64; 2]; 7] =
     [[0.25, 1.7], [0.3, 2.9], [0.35, 4.8], [0.4, 7.7], [0.5, 11.8], [0.6, 15.0], [0.7, 15.0]];
 
-/// Returns the limit of a bob with the [`energy_terms`] of an upright cylinder filled to h/R = `fill`; `None` where there are
-/// none.
+/// Returns the limit of a bob with the [`energy_terms`] of an upright cylinder filled to h/R = `fill`, or
+/// `None` at depths without such coefficients.
 pub fn cylinder_with_energy(fill: f64) -> Option<AngleLimit> {
     let compared = energy_terms(fill)?.compared;
     Some(AngleLimit { frequency: compared, forced: interpolate(fill, FORCED_ENERGY).to_radians() })
 }
 
-/// Returns the slosh angle, rad, up to which a model errs by at most the part `error` of the frequency: `limit` if its
-/// shifts are the `exact` ones to third order, otherwise at most the angle at which the difference is that large.
+/// Returns the slosh angle, rad, up to which the frequency of a model errs by at most the fraction `error`.
+/// If the model's `shifts` are the `exact` ones to third order, this is `limit`. Otherwise it is at most the
+/// angle at which the difference of the shifts makes that error.
 pub fn shifted(limit: f64, error: f64, shifts: [Option<f64>; 2], exact: [f64; 2]) -> f64 {
     let off = shifts.iter().zip(exact);
     let off = off.filter_map(|(shift, exact)| Some((shift.as_ref()? - exact).abs()));
@@ -148,8 +141,8 @@ pub fn shifted(limit: f64, error: f64, shifts: [Option<f64>; 2], exact: [f64; 2]
     off.map(|off| libm::sqrt(2.0 * error / off.max(1e-9))).fold(limit, f64::min)
 }
 
-/// Returns a column of the table at h/R = `fill`, rad. Shallower liquid continues the power law of the first two rows,
-/// deeper liquid has the last row's value.
+/// Returns a column of [`THIRD_ORDER`] at h/R = `fill`, converted to rad. Shallower liquid continues the
+/// power law of the first two rows, and deeper liquid has the last row's value.
 fn degrees_at(fill: f64, column: usize) -> f64 {
     let [first, second] = [THIRD_ORDER[0], THIRD_ORDER[1]];
     let degrees = if fill < first[0] {
@@ -161,37 +154,35 @@ fn degrees_at(fill: f64, column: usize) -> f64 {
     degrees.to_radians()
 }
 
-/// Returns the slosh angle, rad, at which rotary motion in an upright cylinder folds by a secondary resonance; `None` in
-/// shallower liquid, which has none.
+/// Returns the slosh angle, rad, at which rotary motion in an upright cylinder folds because of a secondary
+/// resonance; `None` in liquid so shallow that it has none.
 pub fn swirl_fold(fill: f64) -> Option<f64> {
     (fill >= FOLD[0][0]).then(|| interpolate(fill, FOLD).to_radians())
 }
 
-/// Returns y at `x` between rows of x and y, constant beyond the last.
 fn interpolate<const N: usize>(x: f64, rows: [[f64; 2]; N]) -> f64 {
     let Some(i) = rows.iter().position(|row| x < row[0]) else { return rows[N - 1][1] };
     let [[x_0, y_0], [x_1, y_1]] = [rows[i.max(1) - 1], rows[i.max(1)]];
     y_0 + (y_1 - y_0) * (x - x_0) / (x_1 - x_0)
 }
 
-/// Largest Omega^2 R/g of a tank that spins about its axis, for which pendulums are used.
+/// Largest Omega^2 R/g at which a tank that spins about its axis is modelled by pendulums.
 pub const SPIN_NUMBER: f64 = 0.3;
 
-/// A tank's first mode for the limits by spin.
+/// Quantities of a tank's first mode that limit its spin: `factor` is 4 (1 + C_0), because the slower wave is
+/// among the inertial waves if this exceeds omega_0^2/Omega^2; `ratio` is R/l.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpinLimit {
-    /// 4 (1 + C_0): above omega_0^2/Omega^2 the slower wave is among the inertial waves.
     factor: f64,
-    /// R/l
     ratio: f64,
 }
 
 impl SpinLimit {
-    /// Creates the limits of a pendulum of this length in a tank with this radius of the free surface, m. A radius of 0
-    /// is one that is not known; the liquid is then taken as deep.
+    /// Creates the limits of a pendulum of this length in a tank with this radius of the free surface, m. If
+    /// the radius is unknown it is 0, and the liquid is taken as deep.
     ///
-    /// C_0 = (1 + 2kh/sinh 2kh)/((kR)^2 - 1) is the liquid's gyroscopic coefficient, 0.418 in deep liquid and 0.837 in
-    /// shallow liquid, with tanh kh = 1/(k l).
+    /// C_0 = (1 + 2kh/sinh 2kh)/((kR)^2 - 1) is the liquid's gyroscopic coefficient with tanh kh = 1/(k l):
+    /// 0.418 in deep liquid and 0.837 in shallow liquid.
     pub fn new(length: f64, radius: f64) -> SpinLimit {
         let deep = 1.0 / XI[0];
         let ratio = if radius > 0.0 { radius / length } else { XI[0] };
@@ -207,18 +198,17 @@ impl SpinLimit {
     }
 
     /// Returns true if liquid that turns with its tank at `rate`, rad/s, about its axis is beyond the limits;
-    /// `omega2`, 1/s^2, is the squared frequency without spin.
+    /// `omega2`, 1/s^2, is the squared natural frequency without spin.
     ///
-    /// Beyond 2 Omega/omega_0 = (1 + C_0)^(-1/2) a wave that runs with the spin is among the inertial waves of the liquid.
-    /// Beyond Omega^2 R/g = 0.3 even the gyroscopic formula errs by more than 2 %, and the surface is 0.075 R lower at
-    /// its centre.
+    /// Beyond 2 Omega/omega_0 = (1 + C_0)^(-1/2) a wave that runs with the spin is among the inertial waves
+    /// of the liquid. Beyond Omega^2 R/g = 0.3 even the gyroscopic formula errs by more than 2 %, and the
+    /// surface is 0.075 R lower at its centre.
     pub fn is_exceeded(&self, rate: f64, omega2: f64) -> bool {
         let rate2 = rate * rate;
         rate2 * self.factor > omega2 || rate2 * self.ratio > SPIN_NUMBER * omega2
     }
 }
 
-/// Bond number below which surface tension matters.
 pub const LOW_BOND: f64 = 100.0;
 
 #[cfg(test)]
@@ -234,7 +224,6 @@ mod tests {
         assert_eq!([0, 9, 255].map(LimitedBy::from_number), [None; 3]);
     }
 
-    /// Rows of the table are met, and values between them lie between theirs.
     #[test]
     fn limits_are_those_of_the_table() {
         let third = |fill: f64| {
@@ -253,8 +242,8 @@ mod tests {
         assert!(shallow[1] < 1.2 && shallow[2] < 0.5 && shallow[2] > 0.0, "{shallow:?}");
     }
 
-    /// Degrees at which a pendulum's frequency is 0.3 % from fully nonlinear flow, planar motion, are 1.6, 3.5, 8.3 and 7.8
-    /// at these depths: the next order changes them by at most 0.3.
+    /// From fully nonlinear flow, a pendulum's frequency of planar motion is off by 0.3 % at 1.6, 3.5, 8.3
+    /// and 7.8 degrees at these depths. The next order changes these angles by at most 0.3 degrees.
     #[test]
     fn a_pendulum_ends_where_the_third_order_parts_from_it() {
         for (fill, exact) in [(0.25, 1.6), (0.35, 3.5), (1.227, 8.3), (2.0, 7.8)] {
@@ -277,8 +266,7 @@ mod tests {
         assert_eq!(swirl_fold(9.0), swirl_fold(2.5));
     }
 
-    /// R 0.3 m, h 0.4 m, 5 m/s^2, 9 rad/s: 2 Omega/omega_0 = 3.3 and Omega^2 R/g = 4.86. C_0 is 0.418 in deep liquid, and
-    /// 2/(xi^2 - 1) = 0.837 in shallow liquid.
+    /// With R = 0.3 m, h = 0.4 m, 5 m/s2 and 9 rad/s, 2 Omega/omega_0 is 3.3 and Omega^2 R/g is 4.86.
     #[test]
     fn a_spinning_tank_leaves_its_range_at_the_inertial_waves_or_a_deep_paraboloid() {
         let limit = |fill: f64| {

@@ -1,20 +1,17 @@
 //! Range of linear slosh theory, by the wave height at the wall over the radius R of the free
 //! surface (Rubaga's thesis, 2.3.5, after Dodge).
 
-/// Amplitude class of a wave.
+/// Amplitude class of a wave by the ratio of its height at the wall to R. Linear theory holds below 0.15;
+/// above 0.25 heights and forces are only indications.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Regime {
-    /// Below 0.15 R: linear theory holds.
     Linear = 1,
-    /// From 0.15 R to 0.25 R.
     Transitional = 2,
-    /// Above 0.25 R: heights and forces are only indications.
     Nonlinear = 3,
 }
 
 impl Regime {
-    /// Returns the class for a ratio of wave height to R; NaN counts as nonlinear.
     pub fn from_ratio(ratio: f64) -> Regime {
         match ratio {
             ratio if ratio < 0.15 => Regime::Linear,
@@ -23,7 +20,6 @@ impl Regime {
         }
     }
 
-    /// Returns the class with this number; `None` if there is none.
     pub fn from_number(number: u8) -> Option<Regime> {
         [Regime::Linear, Regime::Transitional, Regime::Nonlinear]
             .into_iter()

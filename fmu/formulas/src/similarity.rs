@@ -1,4 +1,5 @@
-//! Similarity of a bench and a flight tank: Bond numbers and Froude's factors (Rubaga's thesis 2.5, 2.6, 7.2).
+//! Similarity of a bench and a flight tank: Bond numbers and Froude's factors (Rubaga's thesis 2.5, 2.6, 7.2). All
+//! quantities are in SI units.
 //!
 //! ```text
 //! Bo   = rho a R^2 / sigma          gravity or thrust against surface tension   (2.22, 2.27, 7.1)
@@ -11,65 +12,59 @@
 
 use libm::{cbrt, sqrt};
 
-/// A liquid's properties.
+/// A liquid's `density` rho, kg/m3, and surface `tension` sigma, N/m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Liquid {
-    /// Density rho, kg/m3.
     pub density: f64,
-    /// Surface tension sigma, N/m.
     pub tension: f64,
 }
 
 impl Liquid {
-    /// Returns Bo of an acceleration `a`, m/s2, in a tank of radius `radius`, m.
     pub fn bond(&self, a: f64, radius: f64) -> f64 {
         self.density * a * radius * radius / self.tension
     }
 
-    /// Returns Bo_i of an angular acceleration, rad/s2, in a tank at the distance `arm`, m, from
-    /// the axis. With the square of an angular rate it is Bo_c, with the radius as arm Bo_r.
+    /// Returns Bo_i of an angular acceleration, rad/s2, in a tank at the distance `arm`, m, from the axis.
+    /// With the square of an angular rate instead of the acceleration it is Bo_c; with the radius as the arm
+    /// it is Bo_r.
     pub fn rotational_bond(&self, alpha: f64, radius: f64, arm: f64) -> f64 {
         self.bond(alpha * arm, radius)
     }
 
-    /// Returns We of a velocity, m/s, over a length, m.
     pub fn weber(&self, velocity: f64, length: f64) -> f64 {
         self.density * velocity * velocity * length / self.tension
     }
 
-    /// Returns the time scale of surface tension over a length (m), s (2.29); not a period.
+    /// Returns the time scale sqrt(rho L^3/sigma) of surface tension over a length, m (equation 2.29). It is
+    /// not a period.
     pub fn capillary_time(&self, length: f64) -> f64 {
         sqrt(self.density * length * length * length / self.tension)
     }
 
-    /// Returns the acceleration, m/s2, with this Bond number in a tank of this radius, m.
     pub fn acceleration(&self, bond: f64, radius: f64) -> f64 {
         bond * self.tension / (self.density * radius * radius)
     }
 
-    /// Returns the radius, m, with this Bond number at this acceleration, m/s2 (7.2).
     pub fn radius(&self, bond: f64, a: f64) -> f64 {
         sqrt(bond * self.tension / (self.density * a))
     }
 
-    /// Returns the radius, m, with this Bo_r at this angular acceleration, rad/s2.
     pub fn radius_by_cube(&self, bond: f64, alpha: f64) -> f64 {
         cbrt(bond * self.tension / (self.density * alpha))
     }
 }
 
-/// Returns Fr of a velocity, m/s, over a length, m, at an acceleration, m/s2.
 pub fn froude_number(velocity: f64, acceleration: f64, length: f64) -> f64 {
     velocity * velocity / (acceleration * length)
 }
 
-/// Returns the time scale of gravity over a length (m), s (2.28).
+/// Returns the time scale sqrt(L/a) of gravity over a length, m (equation 2.28).
 pub fn gravity_time(acceleration: f64, length: f64) -> f64 {
     sqrt(length / acceleration)
 }
 
-/// Names the dominant force among gravity, surface tension and inertia (the thesis's 2.5): the largest of Bo, 1 and We. If inertia
-/// dominates, the liquid crosses the tank and no pendulum represents it.
+/// Names the dominant force among gravity, surface tension and inertia: the largest of Bo, 1 and We (the
+/// thesis's section 2.5). If inertia dominates, the liquid crosses the tank and no pendulum represents it.
 pub fn ruling_force(bond: f64, weber: f64) -> &'static str {
     match (bond > 1.0, weber > 1.0) {
         (_, true) if weber > bond => {
@@ -80,7 +75,8 @@ pub fn ruling_force(bond: f64, weber: f64) -> &'static str {
     }
 }
 
-/// Describes the behaviour of a liquid at a Bond number (the thesis's 2.5); the limits are approximate.
+/// Describes the behaviour of a liquid at a Bond number. The limits, from the thesis's section 2.5, are
+/// approximate.
 pub fn regime(bond: f64) -> &'static str {
     match bond {
         b if b > 1000.0 => "high g: flat surface, linear and weakly nonlinear models hold",
@@ -90,8 +86,8 @@ pub fn regime(bond: f64) -> &'static str {
     }
 }
 
-/// Describes the agility of a spacecraft with this angular acceleration, rad/s2 (the thesis's Table
-/// 2.2).
+/// Describes the agility of a spacecraft with this angular acceleration, rad/s2, in the words of the thesis's
+/// Table 2.2.
 pub fn agility(alpha: f64) -> &'static str {
     match alpha {
         a if a < 5e-5 => "low agility",
@@ -100,8 +96,9 @@ pub fn agility(alpha: f64) -> &'static str {
     }
 }
 
-/// Returns scale factors from model to full size: name, unit, factor. `lambda` is the ratio of lengths, `density` of
-/// densities, `gravity` of accelerations, each full size over model. The thesis's Table 2.3 has gravity = 1.
+/// Returns Froude's scale factors from model to full size, each with the quantity's name and unit. `lambda`
+/// is the ratio of lengths, `density` of densities and `gravity` of accelerations, each full size over model.
+/// The thesis's Table 2.3 has gravity = 1.
 pub fn froude(lambda: f64, density: f64, gravity: f64) -> [(&'static str, &'static str, f64); 10] {
     let volume = lambda * lambda * lambda;
     let force = volume * density * gravity;
@@ -120,8 +117,8 @@ pub fn froude(lambda: f64, density: f64, gravity: f64) -> [(&'static str, &'stat
     ]
 }
 
-/// Returns the ratio of the viscosities nu of full size and model for the same Reynolds number,
-/// which Froude scaling alone does not preserve.
+/// Returns the ratio of the kinematic viscosities of full size and model that would give both the same
+/// Reynolds number. Froude scaling alone does not preserve it.
 pub fn froude_viscosity(lambda: f64, gravity: f64) -> f64 {
     lambda * sqrt(lambda * gravity)
 }
@@ -130,7 +127,6 @@ pub fn froude_viscosity(lambda: f64, gravity: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// rho a R^2/sigma for numbers with an exact quotient.
     #[test]
     fn bond_numbers_and_what_has_them_are_inverse_to_each_other() {
         let liquid = Liquid { density: 1000.0, tension: 0.0625 };
@@ -143,7 +139,6 @@ mod tests {
         assert!((liquid.radius_by_cube(bond, 2.0) - 0.25).abs() < 1e-16);
     }
 
-    /// We/Fr = Bo, and the ratio of the times is the root of Bo; for numbers with exact roots.
     #[test]
     fn weber_froude_and_the_times_are_what_bond_s_number_says() {
         let liquid = Liquid { density: 1000.0, tension: 0.0625 };
@@ -159,7 +154,6 @@ mod tests {
         assert_eq!(rules, ["inertia", "gravity", "surface", "inertia"]);
     }
 
-    /// The thesis's limits, each included in its lower or upper range.
     #[test]
     fn regimes_and_agilities_change_at_their_limits() {
         let regimes = [1001.0, 1000.0, 31.0, 30.0, 1.1, 1.0].map(|bond| &regime(bond)[..5]);
@@ -168,7 +162,6 @@ mod tests {
         assert_eq!(agilities, ["low agility", "medium agility", "medium agility", "high agility"]);
     }
 
-    /// Powers of two give exact roots: lambda 4, densities 2, gravity 1/4.
     #[test]
     fn froude_s_factors_are_those_of_the_table() {
         let factors = froude(4.0, 2.0, 0.25).map(|(name, _, factor)| (name, factor));

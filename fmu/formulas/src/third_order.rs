@@ -25,15 +25,15 @@
 
 use crate::cylinder::XI;
 
-/// M = int J1(xi_1 r)^4 r dr/int J1^2 r dr.
+/// Integral M = int J1(xi_1 r)^4 r dr/int J1^2 r dr over the section.
 const M: f64 = 0.278_821_981_660_245_8;
 
-/// B = (2/((xi_1^2 - 1) J1(xi_1)))^2: squared amplitude of the wave per squared slosh angle.
+/// Squared amplitude of the wave per squared slosh angle, B = (2/((xi_1^2 - 1) J1(xi_1)))^2.
 const B: f64 = 2.068_401_064_148_324;
 
-/// xi and e = c^2/(n n_1) of the azimuthal numbers 0 and 2. The integrals are c = int J1^2 J r dr,
-/// n = int J^2 r dr, n_1 = int J1^2 r dr. The truncation changes s and kappa by less than 1e-4 from
-/// h/R 0.2 on.
+/// xi and e = c^2/(n n_1) of the excited modes with the azimuthal numbers 0 and 2, with the integrals c = int
+/// J1^2 J r dr, n = int J^2 r dr and n_1 = int J1^2 r dr. Leaving out higher modes changes s and kappa by
+/// less than 1e-4 from h/R 0.2 on.
 const EXCITED: [[(f64, f64); 8]; 2] = [
     [
         (3.831_705_970_207_513, 4.011_801_530_216_258e-2),
@@ -57,20 +57,20 @@ const EXCITED: [[(f64, f64); 8]; 2] = [
     ],
 ];
 
-/// Relative distance of 2 omega_1 from the frequency of an excited mode below which the third order
-/// is not valid.
+/// Relative distance of 2 omega_1 from the frequency of an excited mode within which the third order is not
+/// valid.
 const DETUNING: f64 = 0.01;
 
-/// Fills h/R between which the coefficients are bridged: modes (2,2) and (0,2) resonate with twice the frequency of mode
-/// 1 at 0.831 and 1.010.
+/// Range of fills h/R in which the coefficients are interpolated, because the modes (2,2) and (0,2) resonate
+/// with twice the frequency of mode 1 at 0.831 and 1.010.
 pub const BRIDGED: [f64; 2] = [0.70, 1.20];
 
 /// Returns s and kappa at h/R = `fill`.
 ///
-/// Between the fills [`BRIDGED`] the third order has poles, close to which it holds at very small amplitudes only. There
-/// both coefficients are interpolated linearly between those fills. Fully nonlinear potential flow at h/R 0.8 and 1.0
-/// has the frequencies of the bridged pair within 0.3 % up to 16 degrees, while a pendulum is 26 % low in a forced
-/// response at h/R 1.0.
+/// Within [`BRIDGED`] the third order has poles, and close to them it holds only at very small amplitudes.
+/// Both coefficients are therefore interpolated linearly between the ends of that range. In fully nonlinear
+/// potential flow at h/R 0.8 and 1.0 the frequencies are those of the interpolated coefficients within 0.3 %
+/// up to 16 degrees, whereas a pendulum is 26 % low in a forced response at h/R 1.0.
 pub fn coefficients(fill: f64) -> (f64, f64) {
     let [low, high] = BRIDGED;
     if fill <= low || fill >= high {
@@ -81,12 +81,14 @@ pub fn coefficients(fill: f64) -> (f64, f64) {
     (s_0 + (s_1 - s_0) * share, kappa_0 + (kappa_1 - kappa_0) * share)
 }
 
-/// Returns the shifts of omega^2 per squared slosh angle, in planar and in circular motion.
+/// Returns the relative shifts of omega^2 per squared slosh angle in planar and in circular motion, 3 kappa/8
+/// - s/2 and kappa/2.
 pub fn shifts(s: f64, kappa: f64) -> [f64; 2] {
     [0.375 * kappa - 0.5 * s, 0.5 * kappa]
 }
 
-/// Returns s and kappa of the third order at h/R = `fill`, with its poles.
+/// Returns s and kappa of the third order at h/R = `fill` without the interpolation of [`coefficients`], so
+/// that they have poles.
 pub fn unbridged(fill: f64) -> (f64, f64) {
     let t_1 = XI[0] * libm::tanh(XI[0] * fill);
     let k2 = XI[0] * XI[0];
@@ -108,8 +110,8 @@ pub fn unbridged(fill: f64) -> (f64, f64) {
     (1.5 * circular - 2.0 * planar, 2.0 * circular)
 }
 
-/// Returns azimuthal number and number, from 1, of the excited mode whose frequency is twice that
-/// of the first mode within [`DETUNING`] at h/R = `fill`, if there is one.
+/// Returns azimuthal number and radial number, which counts from 1, of the excited mode whose frequency is
+/// twice that of the first mode within [`DETUNING`] at h/R = `fill`, if there is one.
 pub fn secondary_resonance(fill: f64) -> Option<(usize, usize)> {
     let t_1 = XI[0] * libm::tanh(XI[0] * fill);
     EXCITED.iter().enumerate().find_map(|(azimuth, modes)| {
@@ -125,7 +127,6 @@ pub fn secondary_resonance(fill: f64) -> Option<(usize, usize)> {
 mod tests {
     use super::*;
 
-    /// The bench, to the last digit of the figures.
     #[test]
     fn shifts_of_the_bench_are_those_of_potential_flow() {
         for (fill, planar, circular) in [(0.10, -0.429, 0.367), (0.05, -0.257, 0.421)] {
@@ -136,9 +137,10 @@ mod tests {
         }
     }
 
-    /// Twelve digits of the same shifts by Lagrange's averaged function. Its stationary values come from solving for
-    /// the excited modes, with integrals by Gauss's rule and Bessel functions by their integral. The test covers signs
-    /// and magnitudes of every term, also close to the resonance at 0.15.
+    /// The expected values are twelve digits of the same shifts by another method, Lagrange's averaged
+    /// function: its stationary values follow from solving for the excited modes, with integrals by Gauss's
+    /// rule and Bessel functions by their integral. They check sign and magnitude of every term, also close
+    /// to the resonance at 0.15.
     #[test]
     fn coefficients_are_those_of_the_averaged_lagrangian() {
         for (fill, s, kappa) in [
@@ -154,7 +156,6 @@ mod tests {
         }
     }
 
-    /// Fills at which twice the first mode's frequency is 0.95 % from that of (0, 1), (2, 2), (0, 2), and 1.05 %.
     #[test]
     fn a_secondary_resonance_ends_one_per_cent_off() {
         for (near, beyond, mode) in [

@@ -30,11 +30,11 @@
 
 use crate::cylinder::XI;
 
-/// Number of modes of each azimuthal number in the sums. The truncation error relative to c is below 1e-6 for mode 1
-/// and 0.003 for mode 10 (from h/R 0.2 on).
+/// Number of modes of each azimuthal number in the sums. Leaving out the others changes c by less than 1e-6
+/// of itself for mode 1 and by 0.003 for mode 10 (from h/R 0.2 on).
 const ZEROS: usize = 16;
 
-/// Zeros of J0' after 0, and of J2'.
+/// Zeros of J0' after 0, and of J2' below.
 const XI_0: [f64; ZEROS] = [
     3.831_705_970_207_512_5,
     7.015_586_669_815_619,
@@ -72,13 +72,15 @@ const XI_2: [f64; ZEROS] = [
     51.004_297_672_458_87,
 ];
 
-/// Returns the slope s of the surface up to which [`factors`] gives the frequency of the first mode within 1 % at h/R =
-/// `fill`. Half of this slope gives 0.15 %. If the slope reaches h/R, the bottom falls dry.
+/// Returns the slope s of the surface up to which [`factors`] gives the frequency of the first mode within 1
+/// % at h/R = `fill`. At half of this slope the error is 0.15 %. If the slope reaches h/R, the bottom falls
+/// dry.
 pub fn largest_slope(fill: f64) -> f64 {
     0.7 * f64::min(fill, 1.0)
 }
 
-/// Returns c of mode n, from 0 and below [`crate::cylinder::MODES`], at h/R = `fill`: along the slope and across it.
+/// Returns the coefficient c of mode `n`, which counts from 0 and is below [`crate::cylinder::MODES`], at h/R
+/// = `fill`, for motion along the slope and across it.
 pub fn coefficients(n: usize, fill: f64) -> [f64; 2] {
     let a2 = XI[n] * XI[n];
     let lambda = XI[n] * libm::tanh(XI[n] * fill);
@@ -106,11 +108,11 @@ pub fn coefficients(n: usize, fill: f64) -> [f64; 2] {
     ]
 }
 
-/// Returns the factors on omega^2 of mode n at h/R = `fill`, along the slope of the surface and across it. The surface has
-/// the slope s, with unchanged g along the axis.
+/// Returns the factors on omega^2 of mode `n` at h/R = `fill` for motion along the slope of the surface and
+/// across it. The surface has the slope s, while g along the axis is unchanged.
 ///
-/// The factor is 1 + c s^2. For negative c it is 1/(1 - c s^2), which is equal to second order, more accurate beyond,
-/// and never negative.
+/// The factor is 1 + c s^2. For negative c it is 1/(1 - c s^2), which equals it to second order, is more
+/// accurate beyond, and never becomes negative.
 pub fn factors(n: usize, fill: f64, slope: f64) -> [f64; 2] {
     coefficients(n, fill).map(|c| {
         let x = c * slope * slope;
@@ -122,10 +124,10 @@ pub fn factors(n: usize, fill: f64, slope: f64) -> [f64; 2] {
 mod tests {
     use super::*;
 
-    /// Fill h/R, slope, and the change of Lambda relative to the upright tank, of the first mode along the slope and
-    /// across it. The values come from finite elements, `hubslosh.liquid_modes` (scikit-fem 12.0.2, gmsh 4.15.2,
-    /// resolution 14). The cylinder has R = 1 and the fill h cos + sin of the tilt. Two meshes differ by up to 4e-4;
-    /// upright they are within 1.4e-4 of tanh.
+    /// Rows of h/R, slope, and the change of Lambda relative to the upright tank, of the first mode along the
+    /// slope and across it. The values come from finite elements in three dimensions, `hubslosh.liquid_modes`
+    /// (scikit-fem 12.0.2, gmsh 4.15.2, resolution 14), for R = 1 and the fill h cos + sin of the tilt. Two
+    /// meshes differ by up to 4e-4; upright they are within 1.4e-4 of tanh.
     const FINITE_ELEMENTS: [(f64, f64, [f64; 2]); 12] = [
         (0.35, 0.0525, [-0.00382, -0.00129]),
         (0.35, 0.1225, [-0.02139, -0.00764]),
@@ -141,8 +143,8 @@ mod tests {
         (3.0, 0.7, [-0.15777, 0.10438]),
     ];
 
-    /// At small tilts the limit is the difference of the meshes, otherwise the stated errors of the frequency, half
-    /// those of Lambda.
+    /// At small tilts the tolerance is the difference of the two meshes, otherwise the stated error of the
+    /// frequency, which is half that of Lambda.
     #[test]
     fn frequencies_are_those_of_finite_elements_within_the_stated_errors() {
         for (fill, slope, change) in FINITE_ELEMENTS {
@@ -159,8 +161,8 @@ mod tests {
         }
     }
 
-    /// Changes relative to the upright tank of the second mode at the slope 0.2, with the same meshes. The meshes
-    /// differ by 0.009 of Lambda, equally upright and tilted.
+    /// The second mode's changes at the slope 0.2 come from the same meshes, which differ by 0.009 of Lambda
+    /// both upright and tilted.
     #[test]
     fn the_second_mode_changes_as_by_finite_elements() {
         for (fill, change) in [
@@ -173,8 +175,8 @@ mod tests {
         }
     }
 
-    /// The same sums without a closed form: Simpson integrals from the expansion of K and M. Their error is
-    /// (b/2000)^4/180.
+    /// The same sums are evaluated without a closed form, by Simpson's rule from the expansion of K and M,
+    /// whose error is (b/2000)^4/180.
     #[test]
     fn coefficients_are_those_of_the_perturbation_by_quadrature() {
         const N: usize = 2000;
@@ -219,9 +221,9 @@ mod tests {
         }
     }
 
-    /// Short waves do not reach the bottom. The surface is longer by the root of 1 + s^2 along the slope, and g is
-    /// larger by the same factor. For a wave with directions distributed as cos^2 of the angle, c = 1/2 - 3/8 and 1/2 -
-    /// 1/8, to the order of 1/xi. The truncation error of mode 10 is 0.003.
+    /// Short waves do not reach the bottom. The surface is longer by the root of 1 + s^2 along the slope, and
+    /// g is larger by the same factor. For waves whose directions are distributed as cos^2 of the angle, c is
+    /// 1/2 - 3/8 and 1/2 - 1/8, to the order of 1/xi. The truncation error of mode 10 is 0.003.
     #[test]
     fn high_modes_are_waves_on_a_longer_surface() {
         let [along, across] = coefficients(9, 2.0);
