@@ -11,20 +11,19 @@
 use crate::number::Number;
 use crate::series::{Series, ZERO, mul};
 
-/// Coefficients of u, u^2, ...
 const TERMS: [f64; 6] = [1.0, 1.0 / 12.0, 1.0 / 90.0, 1.0 / 560.0, 1.0 / 3150.0, 1.0 / 16_632.0];
 
-/// Returns the square of the angle, rad2, from the square of the chord of the unit circle.
+/// Returns the square of an angle, rad2, from the square of the chord that belongs to it on the unit circle.
 pub fn squared<T: Number>(chord2: T) -> T {
     let next = |sum: T, term: &f64| (sum + T::constant(*term)) * chord2;
     TERMS.iter().rev().fold(T::constant(0.0), next)
 }
 
-/// Square of the angle as a power series.
+/// Square of the angle whose squared chord on the unit circle is given as a power series. `sums` are those of
+/// Horner's rule; the last one is the square of the angle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SquaredAngle {
     chord2: Series,
-    /// The sums of Horner's rule; the last is the square of the angle.
     sums: [Series; TERMS.len()],
 }
 
@@ -35,7 +34,8 @@ impl Default for SquaredAngle {
 }
 
 impl SquaredAngle {
-    /// Returns coefficient n from that of the square of the chord.
+    /// Sets coefficient n of the sums from coefficient n of the squared chord, and returns coefficient n of
+    /// the squared angle, rad2.
     pub fn expand(&mut self, n: usize, chord2: f64) -> f64 {
         self.chord2[n] = chord2;
         let mut sum = 0.0;
@@ -69,7 +69,6 @@ mod tests {
         assert!((0.8..1.0).contains(&upside_down), "{upside_down}");
     }
 
-    /// For u = 0.3 + 0.2 t - 0.1 t^2: value and slope, and the sum of the series at t = 1/2.
     #[test]
     fn the_series_is_that_of_the_function() {
         let u = [0.3, 0.2, -0.1];

@@ -2,34 +2,29 @@
 
 use alloc::string::String;
 
-/// Reason for refusing a step; its text is for the user. The state is as before the step.
+/// Reason for refusing a step; its text is for the user. The state is then the same as before the step. Times
+/// are in s since the start of the call or, after [`StepError::delayed`], since another instant.
 #[derive(Clone, Debug, PartialEq)]
 pub enum StepError {
-    /// The step's length is not a finite number above 0.
     Length {
-        /// The length, s.
         h: f64,
     },
-    /// The motion is no longer finite, or the inputs are not finite.
     NotFinite {
-        /// Time of the failure, s.
         time: f64,
     },
-    /// The step needs more internal steps than `solver.max_steps`.
+    /// The step needs more internal steps than `solver.max_steps`, and has reached `time`. `advice` is a
+    /// remedy in this model other than shorter steps and a larger `solver.max_steps`.
     TooManySteps {
-        /// Time that the integrator reached, s.
         time: f64,
-        /// `solver.max_steps`.
         max_steps: usize,
-        /// Remedy in this model, other than shorter steps and a larger `solver.max_steps`.
         advice: &'static str,
     },
-    /// The motion left the range of the model; the text comes from the model.
     Model(String),
 }
 
 impl StepError {
-    /// Returns true if a shorter step may succeed: the motion itself is still within the model's range.
+    /// Returns true if a shorter step may succeed, because the motion itself is still within the model's
+    /// range.
     pub fn shorter_may_succeed(&self) -> bool {
         matches!(self, StepError::TooManySteps { .. } | StepError::NotFinite { .. })
     }
@@ -60,7 +55,8 @@ impl core::fmt::Display for StepError {
 impl core::error::Error for StepError {}
 
 impl StepError {
-    /// Returns the same error with its time shifted by `begin`.
+    /// Returns the same error with `begin`, s, added to its time, so that a time since the start of a stretch
+    /// becomes a time since the start of the call.
     pub fn delayed(mut self, begin: f64) -> StepError {
         if let StepError::NotFinite { time } | StepError::TooManySteps { time, .. } = &mut self {
             *time += begin;

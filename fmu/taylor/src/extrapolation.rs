@@ -8,50 +8,48 @@ use core::ops::Range;
 use crate::error::StepError;
 use crate::integrator::{MAX_MAGNITUDE, STEP_SHARE, Steps};
 
-/// A first-order system, x' = rates(t, x), that [`advance`] integrates.
+/// A first-order system x' = rates(t, x) that [`advance`] integrates. Times t are in s since the start of the
+/// call.
 pub trait System<const D: usize> {
-    /// Iterates over the states that are in use. The rates of all others are 0.
+    /// Iterates over the index ranges of the states that are in use. The rates of all others must be 0.
     fn moving(&self) -> impl Iterator<Item = Range<usize>> + Clone {
         core::iter::once(0..D)
     }
 
-    /// Returns the rates of the states, `t` after the start of the call.
     fn rates(&self, t: f64, x: &[f64; D]) -> [f64; D];
 
-    /// Returns the scale of a step's errors, from states and rates at its start t; `h` is the rest of the stretch.
+    /// Returns for each state the magnitude to which a step's error is relative, from states and rates at its
+    /// start `t`; `h` is the rest of the stretch, s.
     fn error_scale(&self, t: f64, x: &[f64; D], rate: &[f64; D], h: f64) -> [f64; D];
 }
 
-/// Largest number of columns of an extrapolation.
 const COLUMNS: usize = 8;
 
-/// Smallest error that a step is controlled to, relative to its scale and to 1 rad, rad/s, m, m/s. Below it,
-/// cancellation of large terms in the rates may dominate.
+/// Smallest error to which a step is controlled, relative to its scale and to 1 rad, rad/s, m or m/s. Below
+/// it, cancellation of large terms in the rates may dominate.
 const ROUNDING: f64 = 2e-14;
 
-/// Largest ratio of a step to the step before.
 const LONGER: f64 = 4.0;
 const SHORTER: f64 = 0.1;
 
-/// Errors below this value count as this value, without effect because of [`LONGER`]. It avoids 1/0 and powers of
-/// numbers near the largest, which end the process of a host that traps them.
+/// Smaller errors count as this value. Because of [`LONGER`] this has no effect on the step's length, but it
+/// avoids 1/0 and powers of numbers near the largest, which end the process of a host that traps them.
 const LEAST_ERROR: f64 = 1e-30;
 
-/// Returns the number of evaluations of the rates up to column k (from 0).
 fn work(k: usize) -> f64 {
     (1 + (k + 1) * (k + 2)) as f64
 }
 
-/// Result of one step of an extrapolation.
+/// Result of one step of an extrapolation: the states at its `end`, if two columns agree, and the length
+/// `best`, s, that needs the least work per second of motion.
 struct Trial<const D: usize> {
-    /// The states at the end of the step, if two columns agree.
     end: Option<[f64; D]>,
-    /// The length, s, with the least work per second.
     best: f64,
 }
 
-/// Advances x, whose rates at t are `first`, by `h`. Gragg's midpoint rule with 2, 4, ... 16 steps is extrapolated to
-/// zero step length until two columns agree to `allowed`. Gives up if the columns hardly converge.
+/// Advances x, whose rates at t are `first`, by `h` with Gragg's midpoint rule. Its results with 2, 4, ... 16
+/// substeps are extrapolated to substeps of zero length until two columns agree to `allowed`. Gives up if the
+/// columns hardly converge.
 fn extrapolate<const D: usize>(
     system: &impl System<D>,
     x: &[f64; D],
@@ -130,28 +128,26 @@ fn extrapolate<const D: usize>(
     Trial { end: None, best }
 }
 
-/// State that an extrapolation carries from one stretch of a call to the next.
+/// Length `h`, s, of the next step and the number of `steps` tried, which an extrapolation carries from one
+/// stretch of a call to the next.
 pub struct Pace {
-    /// The steps that the call has tried.
     steps: Steps,
-    /// Length of the next step, s.
     h: f64,
 }
 
 impl Pace {
-    /// Starts a call over `h`. The first step tries the whole length.
+    /// Starts a call over `h`, s. The first step tries the whole length.
     pub fn new(h: f64, steps: Steps) -> Pace {
         Pace { steps, h }
     }
 }
 
-/// Advances x from `begin` to `end` by extrapolation, in as many steps as the tolerance needs. The errors of the
-/// previous columns determine the length of a step, and the states at its start determine the scale. After a rejection
-/// steps grow again.
+/// Advances x from `begin` to `end`, s, by extrapolation, in as many steps as the tolerance needs. The errors
+/// of the previous columns determine the length of a step, and the states at its start determine the error
+/// scale. After a rejected step the following steps grow again.
 ///
-/// # Errors
-/// [`StepError::NotFinite`], [`StepError::TooManySteps`]; x is then unusable. Their time has the same origin as
-/// `begin`.
+/// # Errors [`StepError::NotFinite`], [`StepError::TooManySteps`]; x is then unusable. Their time has the
+/// same origin as `begin`.
 pub fn advance<const D: usize>(
     system: &impl System<D>,
     x: &mut [f64; D],
@@ -223,8 +219,7 @@ mod tests {
 
     const STEPS: Steps = Steps::new(100_000, "");
 
-    /// State at the far end of an ellipse with eccentricity 0.6 and semi-axis 1. One revolution
-    /// takes 2 pi.
+    /// State at the far end of an ellipse with eccentricity 0.6 and semi-axis 1, whose revolution takes 2 pi.
     const START: [f64; 4] = [1.6, 0.0, 0.0, 0.5];
 
     #[test]
@@ -256,7 +251,8 @@ mod tests {
         }
     }
 
-    /// A polynomial of the rule's own degree is exact to rounding, in three columns: 1 + 2 + 4 + 6 evaluations.
+    /// A polynomial of the rule's own degree is exact to rounding after three columns, which need 1 + 2 + 4 +
+    /// 6 evaluations.
     #[test]
     fn three_columns_are_enough_for_a_quartic() {
         struct Quartic(Cell<usize>);
@@ -282,7 +278,7 @@ mod tests {
         assert!((x[0] - 32.0).abs() < 1e-12, "{}", x[0]);
     }
 
-    /// x' = x with errors relative to `scale`; counts the steps begun.
+    /// The system x' = x with errors relative to `scale`; it counts the steps that have begun.
     struct Growth {
         scale: f64,
         starts: Cell<usize>,
@@ -299,8 +295,6 @@ mod tests {
         }
     }
 
-    /// With zero tolerance the allowed error is that of rounding, both for a large scale and for a
-    /// scale of 1.
     #[test]
     fn no_more_is_asked_for_than_rounding_allows() {
         for scale in [1e6, 1.0, 1e-6] {
@@ -313,7 +307,7 @@ mod tests {
         }
     }
 
-    /// With negligible error the steps are 1, 4, 16, ... milliseconds long, and the sixth reaches the end.
+    /// With negligible errors the steps are 1, 4, 16, ... milliseconds long, and the sixth reaches the end.
     #[test]
     fn a_step_is_at_most_four_times_as_long_as_the_one_before() {
         let system = Growth { scale: 1e6, starts: Cell::new(0) };

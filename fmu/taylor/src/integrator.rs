@@ -14,34 +14,32 @@ use crate::error::StepError;
 use crate::for_each_order;
 use crate::series::ORDER;
 
-/// Error of one step relative to the tolerance. The motion of the liquid damps a step's error
-/// within some thousand steps.
+/// Error of one step relative to the tolerance. A step may err by less than the whole motion, because errors
+/// of some thousand steps add up until the liquid's damping removes them.
 pub const STEP_SHARE: f64 = 1e-2;
 
-/// Floor of the error scale, rad/s. Smaller rates are negligible.
+/// Floor of the error scale, rad/s, because smaller rates are negligible.
 pub const RATE_FLOOR: f64 = 1e-6;
 
-/// Largest magnitude of a state. Above it energies and forces may overflow although the states do
-/// not.
+/// Largest magnitude of a state. Above it energies and forces may overflow although the states do not.
 pub const MAX_MAGNITUDE: f64 = 1e30;
 
 /// Longest expansion, s, so that its powers up to the highest order do not overflow.
 const LONGEST: f64 = 1e9;
 
-/// Lowest order that can show that a series has converged.
 const MIN_ORDER: usize = 5;
 
-/// Required reduction of a term over two orders before its decay is extrapolated.
+/// Ratio of two terms two orders apart below which the decay of a series may be extrapolated.
 const DECAY: f64 = 0.1;
 
 /// Tolerance of a predicted term over that of a computed term.
 const PREDICTED_SHARE: f64 = 0.25;
 
-/// Largest defect of a step over the allowed error of its terms. A step with a larger one is repeated with half the
-/// length.
+/// Largest defect of a step over the allowed error of its terms. A step with a larger one is repeated with
+/// half the length.
 const DEFECT: f64 = 10.0;
 
-/// Number of internal steps that one call may take, and number taken.
+/// Counter of the internal steps that one call has `taken` and may take at most (`max`).
 #[derive(Clone, Copy, Debug)]
 pub struct Steps {
     taken: usize,
@@ -50,15 +48,14 @@ pub struct Steps {
 }
 
 impl Steps {
-    /// Creates a counter for `max` steps. `advice` is the remedy if they do not suffice.
+    /// Creates a counter for `max` steps. `advice` is the remedy for the user if they do not suffice.
     pub const fn new(max: usize, advice: &'static str) -> Steps {
         Steps { taken: 0, max, advice }
     }
 
-    /// Counts `number` steps, or work of the same cost, at `time`.
+    /// Counts `number` more steps, or other work of the same cost, at `time`.
     ///
-    /// # Errors
-    /// If the limit is exceeded.
+    /// # Errors If the limit is exceeded.
     #[inline(always)]
     pub fn add_steps(&mut self, number: usize, time: f64) -> Result<(), StepError> {
         self.taken += number;
@@ -70,27 +67,26 @@ impl Steps {
         StepError::TooManySteps { time, max_steps: self.max, advice: self.advice }
     }
 
-    /// Returns the number of steps that may still be taken.
     pub fn left(&self) -> usize {
         self.max - self.taken
     }
 }
 
-/// Convergence criterion of a motion's series. A motion that starts at rest is even in time, so every second term is
-/// zero: at least two terms in succession must be negligible.
+/// Convergence criterion of a motion's series: either the given number of successive terms is negligible
+/// (`Terms`), or two are, the second of which is predicted from the decay of the terms before (`Decay`). One
+/// negligible term is not enough, because a motion that starts at rest is even in time, so that every second
+/// term is zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Convergence {
-    /// This many terms in succession are negligible.
     Terms(usize),
-    /// Two terms in succession are negligible, the second as predicted from the decay of the terms before.
     Decay,
 }
 
-/// Returns true if terms n + 1 and n are negligible, term n + 1 as predicted. The arguments are the ratios of terms n,
-/// n - 1, n - 2, n - 3 to their tolerance.
+/// Returns true if terms n and n + 1 are negligible, of which term n + 1 is predicted. The arguments are the
+/// ratios of terms n, n - 1, n - 2, n - 3 to their tolerance.
 ///
-/// The prediction takes the smaller of two reductions over two orders: t_(n+1) = t_(n-1)
-/// max(t_n/t_(n-2), t_(n-1)/t_(n-3)).
+/// The prediction takes the slower of two decays over two orders: t_(n+1) = t_(n-1) max(t_n/t_(n-2),
+/// t_(n-1)/t_(n-3)).
 #[inline(always)]
 fn are_negligible([now, one, two, three]: [f64; 4]) -> bool {
     let decays = now <= DECAY * two && one <= DECAY * three;
@@ -99,67 +95,62 @@ fn are_negligible([now, one, two, three]: [f64; 4]) -> bool {
     now <= 1.0 && (one <= 1.0 || decays && predicted)
 }
 
-/// A motion that can be expanded in a power series.
+/// A motion that can be expanded in a power series, as [`advance`] needs it. Lengths and times are in s.
 pub trait Motion {
-    /// Compiles expansions with the sums of every order written out: about twice as fast, larger
-    /// code.
+    /// True to compile expansions with the sums of every order written out, which is about twice as fast but
+    /// larger code.
     const UNROLLED: bool = true;
 
     /// Starts the expansion at the current states, `t` after the start of the call.
     fn start(&mut self, t: f64);
 
-    /// Computes coefficient n of every quantity from coefficients up to n of the states, and
-    /// coefficient n + 1 of the states.
+    /// Computes coefficient n of every quantity from coefficients up to n of the states, and then coefficient
+    /// n + 1 of the states.
     fn rates(&mut self, n: usize);
 
-    /// Sets the error scale of a step of length `h` from coefficients 0 and 1, with the relative
-    /// error `allowed`. Returns the time over which the series is valid, at most `h`, from
-    /// coefficients 0 to 2 of every quantity. A function with a rounded corner has singularities near
-    /// the real axis, which later coefficients may not show.
+    /// Sets the magnitudes to which errors of a step of length `h` are relative, from coefficients 0 and 1,
+    /// with the relative error `allowed`. Returns the time, at most `h`, over which the series is valid, from
+    /// coefficients 0 to 2 of every quantity. A function with a rounded corner has singularities near the
+    /// real axis, which later coefficients may not show.
     fn set_error_scale(&mut self, h: f64, allowed: f64) -> f64;
 
-    /// Returns the largest of the states' coefficients n relative to its allowed error.
+    /// Returns the largest of the states' coefficients n, each divided by its allowed error.
     fn coefficient_norm(&self, n: usize) -> f64;
 
-    /// Returns true if coefficient n times `power` is within its tolerance.
     #[inline(always)]
     fn is_negligible(&self, n: usize, power: f64) -> bool {
         self.coefficient_norm(n) * power <= 1.0
     }
 
-    /// Returns the convergence criterion of the series.
     #[inline(always)]
     fn convergence(&self) -> Convergence {
         Convergence::Decay
     }
 
-    /// Returns the highest order of an expansion.
     #[inline(always)]
     fn highest_order(&self) -> usize {
         ORDER
     }
 
-    /// Returns the error at `h` after the start of the expansion, relative to the allowed error, of
-    /// functions with rounded corners by their series up to order n. It is the difference from their
-    /// values there.
+    /// Returns the error at `h` after the start of the expansion, relative to the allowed error, of functions
+    /// with rounded corners. It is the difference between their series up to order n and their values.
     #[inline(always)]
     fn defect(&self, _n: usize, _h: f64) -> f64 {
         0.0
     }
 
-    /// Returns the time of the first event within `h` after the start of the expansion, from the
-    /// series up to order n.
+    /// Returns the time of the first event within `h` after the start of the expansion, from the series up to
+    /// order n, if there is one.
     #[inline(always)]
     fn event(&mut self, _n: usize, _h: f64) -> Option<f64> {
         None
     }
 
-    /// Advances the states by the series up to order n to `h` after the start of the expansion, which is `t` after the
-    /// start of the call. If an event was found last, it is there. Returns `Continue` if the call continues, otherwise
-    /// the elapsed length.
+    /// Advances the states to `h` after the start of the expansion, which is `t` after the start of the call,
+    /// by the series up to order n. If [`Motion::event`] found an event last, it is there. Returns `Continue`
+    /// if the call goes on, otherwise `Break` with the elapsed length.
     ///
-    /// # Errors
-    /// If the states are not finite, or the model is not valid there.
+    /// # Errors If the states are not finite, or the model is not valid there.
     fn take(
         &mut self,
         n: usize,
@@ -169,19 +160,16 @@ pub trait Motion {
     ) -> Result<ControlFlow<f64>, StepError>;
 }
 
-/// Progress of an expansion.
+/// Progress of an expansion of the length `h`, s, after order n: h^(n + 1) is `power`, `terms` are the last
+/// terms relative to their allowed errors, the newest first, and `negligible` is the number of successive
+/// negligible terms at the end.
 struct Progress {
-    /// Length of the expansion, s.
     h: f64,
-    /// h^(n + 1) after order n.
     power: f64,
-    /// The last terms relative to their allowed errors, the newest first.
     terms: [f64; 4],
-    /// Number of successive negligible terms at the end.
     negligible: usize,
 }
 
-/// Computes order n of an expansion. Returns true if it is enough.
 #[inline(always)]
 fn expand_order<M: Motion>(
     motion: &mut M,
@@ -221,8 +209,8 @@ fn expand_order<M: Motion>(
     }
 }
 
-/// Expands the motion up to `h` ahead. Returns the order and the length, at most `h`, at which the
-/// omitted terms are below the tolerance.
+/// Expands the motion up to `h` ahead. Returns the order and the length, at most `h`, for which the omitted
+/// terms are below the tolerance.
 #[inline(always)]
 fn expand<M: Motion>(motion: &mut M, h: f64, tolerance: f64) -> (usize, f64) {
     let mut progress =
@@ -250,11 +238,10 @@ fn expand<M: Motion>(motion: &mut M, h: f64, tolerance: f64) -> (usize, f64) {
     (highest, h.min(length(highest)).min(length(highest - 1)))
 }
 
-/// Advances the motion by exactly `h` > 0 from the time `begin`, unless the motion ends the call itself. In that case
-/// it returns the elapsed length. After an error the states are unusable.
+/// Advances the motion by exactly `h` > 0 from the time `begin`. If the motion ends the call itself
+/// ([`Motion::take`]), returns the elapsed length. After an error the states are unusable.
 ///
-/// # Errors
-/// See [`StepError`].
+/// # Errors See [`StepError`].
 #[inline(always)]
 pub fn advance<M: Motion>(
     motion: &mut M,
@@ -295,7 +282,7 @@ mod tests {
     use crate::root::first_root;
     use crate::series::{self, Series, ZERO};
 
-    /// x' = v, v' = -x between walls. At x = `wall`, if it is set, v changes its sign.
+    /// The oscillator x' = v, v' = -x between walls. At x = `wall`, if it is set, v changes its sign.
     struct Oscillator {
         now: [f64; 2],
         x: Series,
@@ -327,7 +314,7 @@ mod tests {
             advance(self, 7.0, h, tolerance, &mut Steps::new(100_000, "")).map(|_| ())
         }
 
-        /// Returns the largest difference from x = cos t, v = -sin t.
+        /// Returns the largest difference from the solution x = cos t, v = -sin t.
         fn error(&self, t: f64) -> f64 {
             f64::max((self.now[0] - t.cos()).abs(), (self.now[1] + t.sin()).abs())
         }
@@ -390,7 +377,6 @@ mod tests {
         }
     }
 
-    /// The same oscillator, compiled with the sums of every order written out.
     struct Unrolled(Oscillator);
 
     impl Motion for Unrolled {
@@ -437,7 +423,7 @@ mod tests {
         }
     }
 
-    /// Reads the order at which an expansion ends from n = 4, 5, ... with the terms 0.1^n/n!.
+    /// Reads off the order at which an expansion with the terms 0.1^n/n! ends, from n = 4 on.
     #[test]
     fn an_expansion_ends_when_its_terms_say_so() {
         let order = |convergence, tolerance: f64| {
@@ -477,7 +463,6 @@ mod tests {
         assert!(!are_negligible([0.0, f64::NAN, 0.0, 0.0]));
     }
 
-    /// An expansion with given terms.
     struct Given([f64; ORDER + 1]);
 
     impl Motion for Given {
@@ -546,7 +531,7 @@ mod tests {
         }
     }
 
-    /// Starting at x = 1, the wall at 1/2 is reached every 2 pi/3.
+    /// An oscillator that starts at x = 1 reaches the wall at 1/2 every 2 pi/3.
     #[test]
     fn an_event_ends_the_expansion_and_the_step_goes_on_from_there() {
         let mut motion = Oscillator { wall: Some(0.5), ..Oscillator::new(Convergence::Decay) };

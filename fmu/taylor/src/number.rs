@@ -3,8 +3,8 @@
 
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
-/// Number type of a formula: [`f64`] evaluates its value, [`Dual`] its derivative along a
-/// direction.
+/// Number type over which a formula is written once: [`f64`] evaluates its value, [`Dual`] its derivative
+/// along a direction.
 pub trait Number:
     Copy
     + Add<Output = Self>
@@ -14,43 +14,39 @@ pub trait Number:
     + Div<Output = Self>
     + Neg<Output = Self>
 {
-    /// Returns a constant, whose derivative is 0.
     fn constant(value: f64) -> Self;
-    /// Returns a quantity from coefficients 0 and 1 of its series.
+    /// Returns a quantity from coefficients 0 and 1 of its power series. A plain number drops the slope.
     fn with_slope(value: f64, slope: f64) -> Self;
-    /// Returns the value of a plain number, or the derivative of a dual number.
+    /// Returns the number that the formula was evaluated for: the value of an `f64`, the derivative of a
+    /// [`Dual`].
     fn result(self) -> f64;
-    /// Returns the value, also of a dual number.
+    /// Returns the value of both number types.
     fn value(self) -> f64;
-    /// Returns the larger of itself and a constant. The value is a maximum and no choice of two numbers: from 1/choice the
-    /// compiler makes a choice of two quotients, and divides by a zero that was not chosen.
+    /// Returns the larger of itself and a constant. The value is computed as a maximum, not as a choice of
+    /// two numbers, because a compiler turns 1/choice into a choice of two quotients and divides by a zero
+    /// that was not chosen.
     fn at_least(self, floor: f64) -> Self {
         let slope = if self.value() < floor { 0.0 } else { self.result() };
         Self::with_slope(f64::max(self.value(), floor), slope)
     }
-    /// Returns itself over a divisor that is not negative, and 0 where the divisor is 0. The divisor is a maximum, not a
-    /// choice: a compiler that computes both sides of a choice would divide by 0.
+    /// Returns itself over a divisor that is not negative, and 0 where the divisor is 0. The divisor is
+    /// replaced by a maximum, because a compiler that computes both sides of a choice would divide by 0.
     fn over_or_zero(self, divisor: Self) -> Self {
         let numerator = if divisor.value() > 0.0 { self } else { Self::constant(0.0) };
         numerator / divisor.at_least(f64::MIN_POSITIVE)
     }
-    /// Returns itself limited to two constant bounds.
     fn clamp(self, low: f64, high: f64) -> Self {
         if self.value() > high { Self::constant(high) } else { self.at_least(low) }
     }
-    /// Returns 1/self.
     fn recip(self) -> Self;
-    /// Returns the square root. The derivative is set to 0 at 0, where it does not exist.
+    /// Returns the square root. Its derivative is set to 0 at 0, where it does not exist.
     fn sqrt(self) -> Self;
-    /// Returns the sine.
     fn sin(self) -> Self;
-    /// Returns the exponential.
     fn exp(self) -> Self;
-    /// Returns the hyperbolic tangent.
     fn tanh(self) -> Self;
-    /// Returns the arc sine, rad. The derivative is set to 0 at +-1, where it does not exist.
+    /// Returns the arc sine, rad. Its derivative is set to 0 at +-1, where it does not exist.
     fn asin(self) -> Self;
-    /// Returns sqrt(self^2 + b^2). The derivative is set to 0 at 0, where it does not exist.
+    /// Returns sqrt(self^2 + b^2). Its derivative is set to 0 at 0, where it does not exist.
     fn hypot(self, b: Self) -> Self;
 }
 
@@ -100,7 +96,7 @@ impl Number for f64 {
     }
 }
 
-/// A value and its derivative along a direction: value + slope s + O(s^2).
+/// A value with its derivative along a direction: value + slope s + O(s^2).
 #[derive(Clone, Copy, Debug)]
 pub struct Dual {
     value: f64,
@@ -215,7 +211,7 @@ impl Number for Dual {
 mod tests {
     use super::*;
 
-    /// Uses every operation of a number, each with its own argument.
+    /// Returns the results of every operation of a number, each with its own argument.
     fn formulas<T: Number>(x: T) -> [T; 16] {
         let c = T::constant;
         [

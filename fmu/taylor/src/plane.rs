@@ -1,10 +1,11 @@
-//! Power series of vectors in the plane. Most rules treat both components equally, so that a
-//! processor computes both at once.
+//! Power series of vectors in the plane: functions return coefficient n of the result, as in `series.rs`. Most rules
+//! treat both components equally, so that a processor computes both at once.
 
 use crate::number::Number;
 use crate::series::{self, EMPTY, ORDER, Series};
 
-/// Returns the sum of `term(j)` over 0 <= j <= n, with the ends last; see `series.rs`.
+/// Returns the sum of `term(j)` over 0 <= j <= n with the newest coefficients, those of the ends, added last,
+/// as in `series.rs`.
 #[inline(always)]
 fn sum_both(n: usize, term: impl Fn(usize) -> [f64; 2]) -> [f64; 2] {
     let add = |a: [f64; 2], b: [f64; 2]| [a[0] + b[0], a[1] + b[1]];
@@ -17,10 +18,9 @@ fn sum_both(n: usize, term: impl Fn(usize) -> [f64; 2]) -> [f64; 2] {
 #[repr(align(16))]
 pub struct Vector2([[f64; 2]; ORDER + 1]);
 
-/// All coefficients zero.
 pub const ZERO_VECTOR2: Vector2 = Vector2([[0.0; 2]; ORDER + 1]);
 
-/// Returns both components, like [`series::number`].
+/// Returns both components at the start of an expansion as numbers, see [`series::number`].
 pub fn numbers<T: Number>(a: &Vector2) -> [T; 2] {
     [0, 1].map(|i| T::with_slope(a[0][i], a[1][i]))
 }
@@ -41,21 +41,21 @@ impl core::ops::IndexMut<usize> for Vector2 {
     }
 }
 
-/// Returns coefficient n of a b, with b a vector.
 #[inline(always)]
 pub fn scale(n: usize, a: &Series, b: &Vector2) -> [f64; 2] {
     let (a, b) = (&a[..=n], &b.0[..=n]);
     sum_both(n, |j| [a[j] * b[n - j][0], a[j] * b[n - j][1]])
 }
 
-/// Returns coefficient n of a b_i, with b a vector.
+/// Returns coefficient n of a b_i, the product of a number and component i of a vector.
 #[inline(always)]
 pub fn mul_part(n: usize, a: &Series, b: &Vector2, i: usize) -> f64 {
     let (a, b) = (&a[..=n], &b.0[..=n]);
     series::sum(n, |j| a[j] * b[n - j][i])
 }
 
-/// Returns coefficient n of a b, with b a vector, without its term a_n b_0.
+/// Returns coefficient n of a b, the product of a number and a vector, without its term a_n b_0, which may
+/// not be known yet.
 #[inline(always)]
 pub fn scale_head(n: usize, a: &Series, b: &Vector2) -> [f64; 2] {
     let mut sum = [EMPTY; 2];
@@ -65,7 +65,7 @@ pub fn scale_head(n: usize, a: &Series, b: &Vector2) -> [f64; 2] {
     sum
 }
 
-/// Returns coefficient n of a b_i, with b a vector, without its term a_n b_0.
+/// Returns coefficient n of a b_i without its term a_n b_0, see [`scale_head`].
 #[inline(always)]
 pub fn mul_part_head(n: usize, a: &Series, b: &Vector2, i: usize) -> f64 {
     let mut sum = EMPTY;
@@ -75,14 +75,13 @@ pub fn mul_part_head(n: usize, a: &Series, b: &Vector2, i: usize) -> f64 {
     sum
 }
 
-/// Returns coefficient n of (a_1 b_1, a_2 b_2).
+/// Returns coefficient n of the products of equal components, (a_1 b_1, a_2 b_2).
 #[inline(always)]
 pub fn component_products(n: usize, a: &Vector2, b: &Vector2) -> [f64; 2] {
     let (a, b) = (&a.0[..=n], &b.0[..=n]);
     sum_both(n, |j| [a[j][0] * b[n - j][0], a[j][1] * b[n - j][1]])
 }
 
-/// Returns coefficient n of (a_1^2, a_2^2).
 #[inline(always)]
 pub fn squares(n: usize, a: &Vector2) -> [f64; 2] {
     let mut half = [EMPTY; 2];
@@ -93,14 +92,13 @@ pub fn squares(n: usize, a: &Vector2) -> [f64; 2] {
     [2.0 * half[0] + middle[0], 2.0 * half[1] + middle[1]]
 }
 
-/// Returns coefficient n of a.b.
 #[inline(always)]
 pub fn dot(n: usize, a: &Vector2, b: &Vector2) -> f64 {
     let [x, y] = component_products(n, a, b);
     x + y
 }
 
-/// Returns the values at t of several vectors up to order n.
+/// Returns the values of several vectors' series up to order n at the time t.
 #[inline(always)]
 pub fn values<const K: usize>(a: [&Vector2; K], n: usize, t: f64) -> [[f64; 2]; K] {
     let n = n.min(ORDER);
@@ -119,7 +117,6 @@ mod tests {
     use super::*;
     use crate::series::{Series, ZERO};
 
-    /// Products of two cubics with small integer coefficients, which are exact.
     #[test]
     fn the_rules_are_the_product_rule() {
         let (mut a, mut b, mut s) = (ZERO_VECTOR2, ZERO_VECTOR2, ZERO);

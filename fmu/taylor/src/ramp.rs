@@ -2,45 +2,38 @@
 
 use crate::vector::Vec3;
 
-/// A number or a vector that is linear in time: `value + slope t`.
+/// A number or a vector that is linear in time: `value` now, plus `slope` (per second) times t, s.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Ramp<T = f64> {
-    /// Value now.
     pub value: T,
-    /// Rate of change, 1/s.
     pub slope: T,
 }
 
 impl Ramp {
-    /// Returns a quantity that is constant over the step.
     pub fn held(value: f64) -> Ramp {
         Ramp { value, slope: 0.0 }
     }
 
-    /// Returns the value after `t` seconds.
     #[inline(always)]
     pub fn value_at(self, t: f64) -> f64 {
         self.value + self.slope * t
     }
 
-    /// Returns the integral from 0 to `t`.
     pub fn integral(self, t: f64) -> f64 {
         (self.value + self.slope * t / 2.0) * t
     }
 
-    /// Returns the same quantity with the origin of time shifted by `t`.
+    /// Returns the same quantity with the origin of time shifted to `t`, s.
     pub fn shifted(self, t: f64) -> Ramp {
         Ramp { value: self.value_at(t), slope: self.slope }
     }
 }
 
 impl Ramp<Vec3> {
-    /// Returns a constant vector.
     pub fn held(value: Vec3) -> Ramp<Vec3> {
         Ramp { value, slope: [0.0; 3] }
     }
 
-    /// Returns the value after `t` seconds.
     #[inline(always)]
     pub fn value_at(&self, t: f64) -> Vec3 {
         [0, 1, 2].map(|i| self.value[i] + self.slope[i] * t)

@@ -2,23 +2,22 @@
 
 use crate::series::ORDER;
 
-/// Number of steps with one bound over the whole interval, before [`first_root`] uses bounds over
-/// parts of it.
+/// Number of steps with one bound over the whole interval, before [`first_root`] changes to bounds over parts
+/// of it.
 const COARSE_STEPS: usize = 200;
 
-/// Returns the first t in (0, h] at which the polynomial `a`, positive at t = 0, has
-/// fallen to zero, and `None` if it stays positive. `a` has at most 2 [`ORDER`] + 1 coefficients, as the product of two
-/// series.
+/// Returns the first t in (0, h] at which the polynomial `a`, positive at t = 0, has fallen to zero, and
+/// `None` if it stays positive. `a` has at most 2 [`ORDER`] + 1 coefficients, as the product of two series.
 ///
-/// At a point with the value f > 0 and the slope f', a bound M on |f''| over [0, h] gives f(t +
-/// s) >= f + f' s - M s^2 / 2. The root of that parabola is a step that cannot pass the first zero.
-/// The steps converge to it quadratically, like Newton's method.
+/// At a point with the value f > 0 and the slope f', a bound M on |f''| over [0, h] gives f(t + s) >= f + f'
+/// s - M s^2 / 2. The root of that parabola is a step that cannot pass the first zero. The steps converge to
+/// it quadratically, like Newton's method.
 ///
-/// M is tight enough if the terms a_n h^n decay, like those of a converged series. If they grow, these steps become too
-/// short. Then the polynomial is expanded about t, and M is a bound over a part of the interval about as long as the
-/// step. Such a step is at least a fixed share of the distance to the nearest complex root, so the number of steps
-/// grows with the logarithm of the accuracy. The search ends only with a root, to rounding, or with the proof that
-/// there is none up to h.
+/// M is tight enough if the terms a_n h^n decay, like those of a converged series. If they grow, these steps
+/// become too short. Then the polynomial is expanded about t, and M is a bound over a part of the interval
+/// about as long as the step. Such a step is at least a fixed share of the distance to the nearest complex
+/// root, so the number of steps grows with the logarithm of the accuracy. The search ends only with a root,
+/// to rounding, or with the proof that there is none up to h.
 pub fn first_root(a: &[f64], h: f64) -> Option<f64> {
     let (mut power, mut lowest) = (1.0, a[0]);
     for x in &a[1..] {
@@ -61,8 +60,8 @@ pub fn first_root(a: &[f64], h: f64) -> Option<f64> {
     first_root_from(t, a, h)
 }
 
-/// Returns the same as [`first_root`] for a polynomial without a zero before `t`, with bounds over parts of the
-/// interval.
+/// Returns the same as [`first_root`] for a polynomial without a zero before `t`, with bounds over parts of
+/// the interval.
 #[cold]
 fn first_root_from(mut t: f64, a: &[f64], h: f64) -> Option<f64> {
     if a.iter().any(|x| !x.is_finite()) {
@@ -92,8 +91,8 @@ fn first_root_from(mut t: f64, a: &[f64], h: f64) -> Option<f64> {
     }
 }
 
-/// Returns a length up to which the polynomial `a` with a[0] > 0 has no zero, at least a fixed share of the longest
-/// such length. Returns more than `left` if there is no zero up to `left`.
+/// Returns a length up to which the polynomial `a` with a[0] > 0 has no zero; it is at least a fixed share of
+/// the longest such length. If there is no zero up to `left`, the length is more than `left`.
 fn step_before_zero(a: &[f64], left: f64) -> f64 {
     let slope = a.get(1).copied().unwrap_or(0.0);
     let (mut length, mut longest): (f64, f64) = (left, 0.0);
@@ -150,7 +149,8 @@ mod tests {
         assert_eq!(first_root(&[f64::NAN, 1.0], 1.0), None);
     }
 
-    /// For h = 3 the last term of 1 - t^18 is 4e8 times the first, for h = 1e9 1e162 times.
+    /// For h = 3 the last term of 1 - t^18 is 4e8 times the first one, for h = 1e9 it is 1e162 times as
+    /// large.
     #[test]
     fn where_terms_grow_the_first_root_is_found_as_well() {
         let mut a = [0.0; 19];
@@ -166,7 +166,7 @@ mod tests {
         assert!((root - 1e-2).abs() < 2e-6, "{root}");
     }
 
-    /// The rounding of the value, 1e-16, separates a tangency from above and one additional root.
+    /// The rounding of the value, 1e-16, decides between no root and a double root.
     #[test]
     fn a_minimum_just_above_zero_is_no_root_and_one_just_below_is() {
         for h in [1.0, 10.0, 1e3] {
@@ -189,8 +189,8 @@ mod tests {
         }
     }
 
-    /// Compares polynomials of degree 8 with samples: no root is missed, and every result is a root. The terms decay,
-    /// like those of a series, or grow up to 8^8.
+    /// Compares polynomials of degree 8 with samples: no root is missed, and every result is a root. The
+    /// terms decay, like those of a converged series, or grow up to 8^8.
     #[test]
     fn no_sample_before_the_first_root_is_below_zero() {
         let mut seed = 1u64;

@@ -1,5 +1,8 @@
 //! Power series in time: x(t) = x_0 + x_1 t + x_2 t^2 + ...
 //!
+//! A function such as `mul(n, a, b)` returns coefficient n of the result, here of the product a b, from the
+//! coefficients up to n of its arguments.
+//!
 //! Equations of motion are written once, as rules for coefficient n of each quantity from the
 //! coefficients up to n of the quantities on which it depends. Order 0 of a rule is the quantity
 //! itself at an instant. All orders together are the Taylor expansion for the integrator. Order 1
@@ -10,22 +13,19 @@
 
 use crate::number::Number;
 
-/// Highest order in use.
 pub const ORDER: usize = 18;
 
-/// Coefficients 0 to [`ORDER`].
+/// Coefficients 0 to [`ORDER`] of a quantity's power series in time.
 pub type Series = [f64; ORDER + 1];
 
-/// All coefficients zero.
 pub const ZERO: Series = [0.0; ORDER + 1];
 
-/// Returns the quantity at the start of an expansion. A number with a derivative takes coefficient 1 as the derivative
-/// along the direction.
+/// Returns the quantity at the start of an expansion as a number. A [`Dual`](crate::number::Dual) takes
+/// coefficient 1 as its derivative along the direction.
 pub fn number<T: Number>(a: &Series) -> T {
     T::with_slope(a[0], a[1])
 }
 
-/// 1/n
 pub(crate) const RECIPROCAL: [f64; ORDER + 2] = {
     let (mut table, mut n) = ([0.0; ORDER + 2], 1);
     while n <= ORDER + 1 {
@@ -44,7 +44,7 @@ pub fn constant(n: usize, a: f64) -> f64 {
     if n == 0 { a } else { 0.0 }
 }
 
-/// Returns coefficient n + 1 of x from coefficient n of x'.
+/// Returns coefficient n + 1 of x from coefficient n of its rate x'.
 #[inline(always)]
 pub fn next(n: usize, rate: f64) -> f64 {
     rate * RECIPROCAL[n + 1]
@@ -54,25 +54,25 @@ pub fn next(n: usize, rate: f64) -> f64 {
 // and a processor adds up the rest while it waits for them. In rules that are loops, slices avoid a
 // bounds check of every index.
 
-/// Start value of a sum. Adding -0 never changes a value, so the compiler can drop the addition. Adding +0 turns -0
-/// into +0.
+/// Start value of a sum. Adding -0 never changes a value, so the compiler can drop the addition, whereas +0
+/// turns -0 into +0.
 pub(crate) const EMPTY: f64 = -0.0;
 
-/// Returns the sum of `term(j)` over 0 <= j <= n, with the ends last.
+/// Returns the sum of `term(j)` over 0 <= j <= n, with the newest coefficients, those of the ends, added
+/// last.
 #[inline(always)]
 pub(crate) fn sum(n: usize, term: impl Fn(usize) -> f64) -> f64 {
     let sum = (1..n).fold(EMPTY, |sum, j| sum + term(j)) + term(0);
     if n == 0 { sum } else { sum + term(n) }
 }
 
-/// Returns coefficient n of a b: sum of a_j b_(n-j).
 #[inline(always)]
 pub fn mul(n: usize, a: &Series, b: &Series) -> f64 {
     let (a, b) = (&a[..=n], &b[..=n]);
     sum(n, |j| a[j] * b[n - j])
 }
 
-/// Returns coefficient n of a b without its term a_0 b_n.
+/// Returns coefficient n of a b without its term a_0 b_n, for rules in which b_n is not known yet.
 #[inline(always)]
 pub fn mul_tail(n: usize, a: &Series, b: &Series) -> f64 {
     let mut sum = EMPTY;
@@ -82,7 +82,6 @@ pub fn mul_tail(n: usize, a: &Series, b: &Series) -> f64 {
     sum
 }
 
-/// Returns coefficient n of a^2.
 #[inline(always)]
 pub fn square(n: usize, a: &Series) -> f64 {
     if n == 0 {
@@ -96,7 +95,8 @@ pub fn square(n: usize, a: &Series) -> f64 {
     2.0 * (half + a[0] * a[n]) + middle
 }
 
-/// Returns coefficient n of a^(1/2) from coefficient n of a and the root's own ones below n. a_0 is above 0.
+/// Returns coefficient n of a^(1/2) from coefficient n of a, with a_0 above 0, and the coefficients of `root`
+/// below n.
 pub fn sqrt(n: usize, a: f64, root: &Series) -> f64 {
     if n == 0 {
         return libm::sqrt(a);
@@ -105,14 +105,14 @@ pub fn sqrt(n: usize, a: f64, root: &Series) -> f64 {
     (a - both) / (2.0 * root[0])
 }
 
-/// Returns coefficient n of (ramp) a, where the ramp is `ramp[0] + ramp[1] t`.
+/// Returns coefficient n of the product of `a` and the linear function `ramp[0] + ramp[1] t`.
 #[inline(always)]
 pub fn mul_ramp(n: usize, ramp: &[f64; 2], a: &Series) -> f64 {
     if n == 0 { ramp[0] * a[0] } else { ramp[0] * a[n] + ramp[1] * a[n - 1] }
 }
 
-/// Returns coefficient n >= 1 of f, where f' = g u', from u's coefficient n and g's below n; `u_d`
-/// stores the coefficients of u'.
+/// Returns coefficient n >= 1 of f, where f' = g u', from coefficient n of u and coefficients below n of g.
+/// `u_d` stores the coefficients of u'.
 #[inline(always)]
 pub fn chain(n: usize, u: f64, u_d: &mut Series, g: &Series) -> f64 {
     u_d[n - 1] = n as f64 * u;
@@ -123,15 +123,16 @@ pub fn chain(n: usize, u: f64, u_d: &mut Series, g: &Series) -> f64 {
     before * RECIPROCAL[n] + u * g[0]
 }
 
-/// Returns coefficient n of (sin a, cos a), from a's coefficient n and theirs below n; `a_d` stores
-/// the coefficients of a'.
+/// Returns coefficient n of (sin a, cos a) from coefficient n of a and the coefficients below n of both
+/// results. `a_d` stores the coefficients of a'.
 #[inline(always)]
 pub fn sin_cos(n: usize, a: f64, a_d: &mut Series, s: &Series, c: &Series) -> (f64, f64) {
     if n == 0 { libm::sincos(a) } else { (chain(n, a, a_d, c), -chain(n, a, a_d, s)) }
 }
 
-/// Returns a time, s, over which x_0 + x_1 t + x_2 t^2 stays within `distance` > 0 of x_0, also for complex t; infinity if
-/// it does not change. For a linear x it is the longest such time. `slope` and `bend` are |x_1| and |x_2|.
+/// Returns a time, s, over which x_0 + x_1 t + x_2 t^2 stays within `distance` > 0 of x_0, also for complex
+/// t; infinity if x does not change. For a linear x it is the longest such time. `slope` and `bend` are |x_1|
+/// and |x_2|.
 pub fn time_within(distance: f64, slope: f64, bend: f64) -> f64 {
     let speed = slope + libm::sqrt(slope * slope + 4.0 * bend * distance);
     if speed > 0.0 { 2.0 * distance / speed } else { f64::INFINITY }
@@ -151,7 +152,7 @@ macro_rules! for_each_order {
     };
 }
 
-/// The functions `$T::$f::<N>` for N = 0, 1, ... [`ORDER`] - 1, as an array.
+/// Makes an array of the functions `$T::$f::<N>` for N = 0, 1, ... [`ORDER`] - 1.
 #[macro_export]
 macro_rules! at_each_order {
     ($T:ident :: $f:ident) => {
@@ -162,7 +163,6 @@ macro_rules! at_each_order {
     };
 }
 
-/// Returns the values at t of several series up to order n.
 #[inline(always)]
 pub fn values<const K: usize>(a: [&Series; K], n: usize, t: f64) -> [f64; K] {
     let n = n.min(ORDER);
@@ -175,7 +175,7 @@ pub fn values<const K: usize>(a: [&Series; K], n: usize, t: f64) -> [f64; K] {
     sums
 }
 
-/// Returns the integrals from 0 to t of several series up to order n.
+/// Returns the integrals of several series up to order n from 0 to the time t.
 #[inline(always)]
 pub fn integrals<const K: usize>(a: [&Series; K], n: usize, t: f64) -> [f64; K] {
     let n = n.min(ORDER);
@@ -192,7 +192,6 @@ pub fn integrals<const K: usize>(a: [&Series; K], n: usize, t: f64) -> [f64; K] 
 mod tests {
     use super::*;
 
-    /// u(t) = 0.3 + t - t^2/2
     fn u(n: usize) -> f64 {
         [0.3, 1.0, -0.5].get(n).copied().unwrap_or(0.0)
     }
@@ -232,7 +231,6 @@ mod tests {
         assert!((values([&c], ORDER, 0.1)[0] - f64::cos(0.395)).abs() < ULPS);
     }
 
-    /// Products of two cubics with small integer coefficients, which are exact.
     #[test]
     fn the_rules_are_the_product_rule() {
         let (mut a, mut b) = (ZERO, ZERO);

@@ -1,4 +1,5 @@
-//! Power series of vectors in space and of quaternions.
+//! Power series of vectors in space and of quaternions. Functions return coefficient N of the result, for example
+//! `cross` that of the vector product; functions named `…_coefficient` do it in a loop over any order n.
 //!
 //! The rules are the product (Cauchy) rule. Each sum has its newest coefficients last, as in `series.rs`. The order N
 //! is a constant parameter of a rule. The compiler then writes sums of vectors out before it inlines them, which saves
@@ -7,48 +8,41 @@
 use crate::series::{EMPTY, ORDER, RECIPROCAL, Series};
 use crate::vector::{self, Vec3};
 
-/// Coefficients 0 to [`ORDER`] of a vector.
 pub type Vector = [Vec3; ORDER + 1];
 
-/// All coefficients zero.
 pub const ZERO_VECTOR: Vector = [[0.0; 3]; ORDER + 1];
 
-/// Returns coefficient N + 1 of x from coefficient N of x'.
 #[inline(always)]
 pub fn next<const N: usize>(rate: Vec3) -> Vec3 {
     vector::scale(RECIPROCAL[N + 1], rate)
 }
 
-/// Coefficients of two vectors that most rules treat equally: `[n][i]` is component i of both, so
-/// that a processor computes both at once, from aligned memory.
+/// Coefficients of two vectors that most rules treat equally: `[n][i]` is component i of both, so that a
+/// processor computes both at once, from aligned memory.
 #[derive(Clone, Debug)]
 #[repr(align(16))]
 pub struct Pair([[[f64; 2]; 3]; ORDER + 1]);
 
-/// Both vectors zero.
 pub const ZERO_PAIR: Pair = Pair([[[0.0; 2]; 3]; ORDER + 1]);
 
 impl Pair {
-    /// Sets coefficient n of both vectors.
     #[inline(always)]
     pub fn set(&mut self, n: usize, a: Vec3, b: Vec3) {
         self.0[n] = [[a[0], b[0]], [a[1], b[1]], [a[2], b[2]]];
     }
 
-    /// Returns coefficient n of both vectors.
     #[inline(always)]
     pub fn get(&self, n: usize) -> [Vec3; 2] {
         let [x, y, z] = self.0[n];
         [[x[0], y[0], z[0]], [x[1], y[1], z[1]]]
     }
 
-    /// Sets coefficient n + 1 of both from coefficient n of their rates.
+    /// Sets coefficient n + 1 of both vectors from coefficient n of their rates.
     #[inline(always)]
     pub fn set_next(&mut self, n: usize, rates: [[f64; 2]; 3]) {
         self.0[n + 1] = rates.map(|pair| pair.map(|rate| rate * RECIPROCAL[n + 1]));
     }
 
-    /// Returns the values at t of both series up to order n.
     #[inline(always)]
     pub fn value(&self, n: usize, t: f64) -> [Vec3; 2] {
         let mut sum = self.0[n];
@@ -62,7 +56,6 @@ impl Pair {
     }
 }
 
-/// Returns coefficient N of a.a.
 #[inline(always)]
 pub fn square_vector<const N: usize>(a: &Vector) -> f64 {
     let mut half = [EMPTY; 3];
@@ -75,7 +68,7 @@ pub fn square_vector<const N: usize>(a: &Vector) -> f64 {
     2.0 * (half[0] + half[1] + half[2]) + middle
 }
 
-/// Returns coefficient N of the six different products of components: xx, yy, zz, xy, xz, yz.
+/// Returns coefficient N of the six different products of a vector's components: xx, yy, zz, xy, xz, yz.
 #[inline(always)]
 pub fn products<const N: usize>(a: &Vector) -> [f64; 6] {
     // Terms j and N - j together: 2 a_j b_(N-j) for a square, a_j b_(N-j) + a_(N-j) b_j for the
@@ -103,7 +96,7 @@ pub fn products<const N: usize>(a: &Vector) -> [f64; 6] {
     sum
 }
 
-/// Returns the same as [`products`], as a loop over any order n.
+/// Returns the same as [`products`] as a loop over any order n, which is smaller code.
 pub fn product_coefficients(n: usize, a: &Vector) -> [f64; 6] {
     let mut sum = [EMPTY; 6];
     for (a, b) in a[..=n].iter().zip(a[..=n].iter().rev()) {
@@ -115,7 +108,6 @@ pub fn product_coefficients(n: usize, a: &Vector) -> [f64; 6] {
     sum
 }
 
-/// Returns coefficient N of a b, with b a vector.
 #[inline(always)]
 pub fn scale<const N: usize>(a: &Series, b: &Vector) -> Vec3 {
     let mut sum = scale_head::<N>(a, b);
@@ -125,7 +117,7 @@ pub fn scale<const N: usize>(a: &Series, b: &Vector) -> Vec3 {
     sum
 }
 
-/// Returns coefficient N of a b, with b a vector, without its term a_N b_0.
+/// Returns coefficient N of a b, with b a vector, without its term a_N b_0, which may not be known yet.
 #[inline(always)]
 pub fn scale_head<const N: usize>(a: &Series, b: &Vector) -> Vec3 {
     let mut sum = [EMPTY; 3];
@@ -137,7 +129,7 @@ pub fn scale_head<const N: usize>(a: &Series, b: &Vector) -> Vec3 {
     sum
 }
 
-/// Returns coefficient N of a.b without its term a_0.b_N.
+/// Returns coefficient N of the scalar product a.b without its term a_0.b_N.
 #[inline(always)]
 pub fn dot_tail<const N: usize>(a: &Vector, b: &Vector) -> f64 {
     let mut sum = [EMPTY; 3];
@@ -149,7 +141,6 @@ pub fn dot_tail<const N: usize>(a: &Vector, b: &Vector) -> f64 {
     sum[0] + sum[1] + sum[2]
 }
 
-/// Returns coefficient N of a x b.
 #[inline(always)]
 pub fn cross<const N: usize>(a: &Vector, b: &Vector) -> Vec3 {
     let mut sum = [EMPTY; 3];
@@ -162,10 +153,9 @@ pub fn cross<const N: usize>(a: &Vector, b: &Vector) -> Vec3 {
     sum
 }
 
-/// Returns coefficient N of a x b and of c x d as a pair, for the pairs (a, c) and (b, d). The
-/// result stays a pair, because a compiler would otherwise vectorise across the components. The
-/// function is not inlined: its lanes would be regrouped with the surrounding code, which takes a
-/// tenth more instructions.
+/// Returns coefficient N of a x b and of c x d as a pair, for the pairs (a, c) and (b, d). The result stays a
+/// pair, because a compiler would otherwise vectorise across the components. The function is not inlined: its
+/// lanes would be regrouped with the surrounding code, which takes a tenth more instructions.
 #[inline(never)]
 pub fn cross_pair<const N: usize>(a: &Pair, b: &Pair) -> [[f64; 2]; 3] {
     let mut sum = [[EMPTY; 2]; 3];
@@ -180,7 +170,6 @@ pub fn cross_pair<const N: usize>(a: &Pair, b: &Pair) -> [[f64; 2]; 3] {
     sum
 }
 
-/// Returns the same as [`cross_pair`], as a loop over any order n.
 pub fn cross_pair_coefficient(n: usize, a: &Pair, b: &Pair) -> [[f64; 2]; 3] {
     let mut sum = [[EMPTY; 2]; 3];
     for ([ax, ay, az], [bx, by, bz]) in a.0[..=n].iter().zip(b.0[..=n].iter().rev()) {
@@ -193,68 +182,61 @@ pub fn cross_pair_coefficient(n: usize, a: &Pair, b: &Pair) -> [[f64; 2]; 3] {
     sum
 }
 
-/// Returns the same as [`cross`], as a loop over any order n.
 pub fn cross_coefficient(n: usize, a: &Vector, b: &Vector) -> Vec3 {
     let terms = a[..=n].iter().zip(b[..=n].iter().rev());
     terms.fold([EMPTY; 3], |sum, (a, b)| vector::add(sum, vector::cross(*a, *b)))
 }
 
-/// Returns the same as [`square_vector`], as a loop over any order n.
 pub fn square_coefficient(n: usize, a: &Vector) -> f64 {
     let terms = a[..=n].iter().zip(a[..=n].iter().rev());
     terms.fold(EMPTY, |sum, (a, b)| sum + vector::dot(*a, *b))
 }
 
-/// Returns coefficient N of a + a' t.
+/// Returns coefficient N of the linear function `a[0] + a[1] t`.
 #[inline(always)]
 pub fn ramp<const N: usize>(a: &[Vec3; 2]) -> Vec3 {
     if N < 2 { a[N] } else { [0.0; 3] }
 }
 
-/// Returns coefficient N of a.b, where a is `ramp[0] + ramp[1] t`.
+/// Returns coefficient N of the scalar product of the linear function `ramp[0] + ramp[1] t` and b.
 #[inline(always)]
 pub fn dot_ramp<const N: usize>(ramp: &[Vec3; 2], b: &Vector) -> f64 {
     let first = vector::dot(ramp[0], b[N]);
     if N == 0 { first } else { first + vector::dot(ramp[1], b[N - 1]) }
 }
 
-/// Returns coefficient N of a x b, where b is `ramp[0] + ramp[1] t`.
+/// Returns coefficient N of the vector product of a and the linear function `ramp[0] + ramp[1] t`.
 #[inline(always)]
 pub fn cross_ramp<const N: usize>(a: &Vector, ramp: &[Vec3; 2]) -> Vec3 {
     let first = vector::cross(a[N], ramp[0]);
     if N == 0 { first } else { vector::add(first, vector::cross(a[N - 1], ramp[1])) }
 }
 
-/// Coefficients of a quaternion (a, b, c, d), stored as the pairs whose multiples by the components
-/// of w give its rate: (-b, a), (c, d), (-d, c), (a, b).
+/// Coefficients of a quaternion (a, b, c, d), stored as the pairs whose multiples by the components of w give
+/// its rate: (-b, a), (c, d), (-d, c), (a, b).
 #[derive(Clone, Debug)]
 #[repr(align(16))]
 pub struct Attitude([[[f64; 2]; 4]; ORDER + 1]);
 
-/// All coefficients zero.
 pub const ZERO_ATTITUDE: Attitude = Attitude([[[0.0; 2]; 4]; ORDER + 1]);
 
 impl Attitude {
-    /// Sets coefficient n of the quaternion.
     #[inline(always)]
     pub fn set(&mut self, n: usize, [a, b, c, d]: [f64; 4]) {
         self.0[n] = [[-b, a], [c, d], [-d, c], [a, b]];
     }
 
-    /// Sets coefficient n + 1 from coefficient n of its rate.
     #[inline(always)]
     pub fn set_next(&mut self, n: usize, rate: [f64; 4]) {
         self.set(n + 1, rate.map(|rate| rate * RECIPROCAL[n + 1]));
     }
 
-    /// Returns coefficient n of the quaternion.
     #[inline(always)]
     pub fn get(&self, n: usize) -> [f64; 4] {
         let [_, [c, d], _, [a, b]] = self.0[n];
         [a, b, c, d]
     }
 
-    /// Returns the value at t of the series up to order n.
     #[inline(always)]
     pub fn value(&self, n: usize, t: f64) -> [f64; 4] {
         let mut sum = self.get(n);
@@ -268,8 +250,8 @@ impl Attitude {
     }
 }
 
-/// Returns coefficient N of q' = q o (0, w)/2 (Hamilton's product), where `w` is the pair (w, w).
-/// The function is not inlined, for the same reason as `cross_pair`.
+/// Returns coefficient N of q' = q o (0, w)/2 (Hamilton's product), where `w` is the pair (w, w). The
+/// function is not inlined, for the same reason as [`cross_pair`].
 #[inline(never)]
 pub fn quaternion_rate<const N: usize>(q: &Attitude, w: &Pair) -> [f64; 4] {
     // Not `EMPTY`: a body at rest has the rate 0, not -0.
@@ -284,7 +266,6 @@ pub fn quaternion_rate<const N: usize>(q: &Attitude, w: &Pair) -> [f64; 4] {
     [0.5 * ab[0], 0.5 * ab[1], 0.5 * cd[0], 0.5 * cd[1]]
 }
 
-/// Returns the value at t of the series up to order n.
 #[inline(always)]
 pub fn value<const D: usize>(a: &[[f64; D]; ORDER + 1], n: usize, t: f64) -> [f64; D] {
     a[..=n].iter().rev().fold([0.0; D], |mut sum, x| {
@@ -301,7 +282,7 @@ mod tests {
     use crate::for_each_order;
     use crate::series::ZERO;
 
-    /// At a constant rate, q' = q o (0, w)/2 and y' = -w x y have closed forms.
+    /// At a constant rate the equations q' = q o (0, w)/2 and y' = -w x y have closed solutions.
     #[test]
     fn a_constant_rate_turns_attitude_and_components_by_rodrigues_formula() {
         let rate = [0.3, -0.8, 0.5];
@@ -370,7 +351,6 @@ mod tests {
         assert_eq!(cross_ramp::<2>(&b, &line), second);
     }
 
-    /// Products of two cubics with small integer coefficients, which are exact.
     #[test]
     fn the_rules_are_the_product_rule() {
         let a: [Vec3; 4] = [[1.0, 2.0, -1.0], [3.0, 0.0, 2.0], [0.0, -2.0, 5.0], [4.0, 1.0, 1.0]];

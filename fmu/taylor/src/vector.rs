@@ -1,84 +1,73 @@
-//! Vectors of three components, matrices and rotations, over values or derivatives.
+//! Column vectors of three components, matrices by rows, and unit quaternions with the scalar first, over values or
+//! derivatives.
 
 use crate::number::Number;
 
-/// A column vector of three components.
 pub type Vec3<T = f64> = [T; 3];
 
-/// A matrix by rows.
 pub type Mat3<T = f64> = [[T; 3]; 3];
 
-/// A unit quaternion, scalar first.
 pub type Quaternion<T = f64> = [T; 4];
 
-/// Returns three components of an array from index `at` on.
+/// Returns three components of an array from index `at` on as a vector.
 #[inline(always)]
 pub fn part(x: &[f64], at: usize) -> Vec3 {
     [x[at], x[at + 1], x[at + 2]]
 }
 
-/// Returns a + b.
 #[inline(always)]
 pub fn add<T: Number>(a: Vec3<T>, b: Vec3<T>) -> Vec3<T> {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
-/// Returns a - b.
 #[inline(always)]
 pub fn sub<T: Number>(a: Vec3<T>, b: Vec3<T>) -> Vec3<T> {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
-/// Returns the number a times the vector b.
 #[inline(always)]
 pub fn scale<T: Number>(a: T, b: Vec3<T>) -> Vec3<T> {
     [a * b[0], a * b[1], a * b[2]]
 }
 
-/// Returns the scalar product a.b.
 #[inline(always)]
 pub fn dot<T: Number>(a: Vec3<T>, b: Vec3<T>) -> T {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// Returns the vector product a x b.
 #[inline(always)]
 pub fn cross<T: Number>(a: Vec3<T>, b: Vec3<T>) -> Vec3<T> {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// Returns the matrix A times the column b.
 #[inline(always)]
 pub fn times<T: Number>(a: &Mat3<T>, b: Vec3<T>) -> Vec3<T> {
     [dot(a[0], b), dot(a[1], b), dot(a[2], b)]
 }
 
-/// Returns the transposed matrix A^T times the column b.
 #[inline(always)]
 pub fn transposed_times<T: Number>(a: &Mat3<T>, b: Vec3<T>) -> Vec3<T> {
     [0, 1, 2].map(|i| a[0][i] * b[0] + a[1][i] * b[1] + a[2][i] * b[2])
 }
 
-/// Returns a constant vector.
 pub fn constant<T: Number>(a: Vec3) -> Vec3<T> {
     a.map(T::constant)
 }
 
-/// Returns the magnitude of the largest component. Unlike `f64::max` it does not lose a NaN, which
-/// ends the step.
+/// Returns the magnitude of the largest component. Unlike `f64::max` it does not lose a NaN, which must end
+/// the step.
 #[inline(always)]
 pub fn largest(a: Vec3) -> f64 {
     let larger = |a: f64, b: f64| if b > a { b } else { a };
     larger(larger(a[0].abs(), a[1].abs()), a[2].abs())
 }
 
-/// Returns the length of a vector.
 #[inline(always)]
 pub fn norm<T: Number>(a: Vec3<T>) -> T {
     dot(a, a).sqrt()
 }
 
-/// Returns the matrix of a rotation. With q from frame B to frame A, it maps components in B to
+/// Returns the matrix of a rotation. If q turns from frame B to frame A, the matrix maps components in B to
 /// components in A.
 #[inline(always)]
 pub fn rotation<T: Number>(q: &Quaternion<T>) -> Mat3<T> {
@@ -101,7 +90,7 @@ pub fn unit_quaternion<T: Number>(q: Quaternion<T>) -> Quaternion<T> {
     q.map(|x| x * share)
 }
 
-/// Returns the derivative of q/|q| in the direction dq, for the unit quaternion `unit` = q/|q|.
+/// Returns the derivative of q/|q| in the direction dq, where `unit` is q/|q|.
 pub fn unit_quaternion_slope(unit: &Quaternion, q: &Quaternion, dq: &Quaternion) -> Quaternion {
     let dot = |a: &Quaternion, b: &Quaternion| (0..4).map(|i| a[i] * b[i]).sum::<f64>();
     let (along, size) = (dot(unit, dq), libm::sqrt(dot(q, q)));
@@ -148,7 +137,6 @@ mod tests {
         assert_eq!(constant::<f64>(A), A);
     }
 
-    /// Quarter turns about each axis, and Rodrigues' formula about an oblique one.
     #[test]
     fn a_quaternion_turns_by_its_angle_about_its_axis() {
         let turned = |axis: Vec3, angle: f64, x: Vec3| {
@@ -179,7 +167,6 @@ mod tests {
         assert!(norm(sub(sub(B, p_d), scale(dot(p, B), p))) < 1e-15);
     }
 
-    /// Compares the derivatives by hand with those of the formula over dual numbers.
     #[test]
     fn slopes_are_the_derivatives_of_what_they_belong_to() {
         let (q, dq) = ([0.9, -0.1, 0.5, 0.3], [0.2, 0.7, -0.4, 0.1]);
