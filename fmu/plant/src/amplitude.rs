@@ -32,54 +32,45 @@
 
 use taylor::series::{Series, ZERO, mul_ramp, sqrt, square, time_within, values};
 
-/// A_0, rad.
 const FLOOR: f64 = 1e-4;
 
-/// Lower bound of W, as a part of 1/l times 1 m/s2: without restoring force there is no drag.
+/// Lower bound of W, as a multiple of 1/l times 1 m/s2, because without restoring force there is no drag.
 const WEIGHTLESS: f64 = 1e-6;
 
-/// delta: range of steepness over which the onset of breaking is rounded.
 const ROUNDED: f64 = 0.02;
 
-/// Waves of one mode that break.
+/// Waves of one mode that break: zeta_b is `zeta` (0 if waves do not break), s_b is `onset`, and `steepness`
+/// is sigma, 1/rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Breaking {
-    /// zeta_b; 0: waves do not break.
     pub zeta: f64,
-    /// s_b
     pub onset: f64,
-    /// sigma, 1/rad
     pub steepness: f64,
 }
 
 impl Breaking {
-    /// Waves that do not break.
     const NONE: Breaking = Breaking { zeta: 0.0, onset: 0.0, steepness: 0.0 };
 }
 
-/// Growth of one mode's drag with amplitude.
+/// Growth of one mode's drag with its amplitude, with the series of the quantities in the equations above.
+/// `zeta` is zeta_A, 1/rad; `w_floor` is a constant added to W, 1/s2; `w` is W and its rate. The `share` of
+/// the other drag, viscous or a baffle's, and the gains of both growing parts are relative to the whole drag
+/// at the start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Growth {
-    /// True if the drag depends on the amplitude.
     pub acts: bool,
-    /// zeta_A, 1/rad
     zeta: f64,
     breaking: Breaking,
-    /// Constant added to W, 1/s2.
     w_floor: f64,
-    /// W and its rate.
     w: [f64; 2],
-    /// |q|^2 + A_0^2, u, u^(1/2)
     q2: Series,
     u: Series,
     root: Series,
-    /// omega_n, y, (y^2 + delta^2 W)^(1/2)
     omega: Series,
     excess: Series,
     rounded: Series,
     /// Viscous drag relative to its value at the start of the expansion.
     pub viscous: Series,
-    /// Share of the other drag, viscous or a baffle's, in the whole at the start; 2 m zeta_A and m zeta_b over the whole.
     share: f64,
     gain: f64,
     gain_breaking: f64,
@@ -108,14 +99,13 @@ impl Default for Growth {
 }
 
 impl Growth {
-    /// Creates the growth for a mode of length `l`, m.
     pub fn new(zeta: f64, breaking: Breaking, l: f64) -> Growth {
         let acts = zeta > 0.0 || breaking.zeta > 0.0;
         Growth { acts, zeta, breaking, w_floor: WEIGHTLESS / l, ..Growth::default() }
     }
 
-    /// Starts an expansion with W along `w`, at [|q|^2, |q'|^2], with the other drag coefficient `c`, whose viscous
-    /// part runs along `viscous`. Returns the coefficient of both.
+    /// Starts an expansion with W and its rate `w`, at [|q|^2, |q'|^2]. `c` is the other drag coefficient,
+    /// whose viscous part follows `viscous`. Returns the coefficient of both together.
     pub fn start(&mut self, w: [f64; 2], at: [f64; 2], m: f64, c: f64, viscous: Series) -> f64 {
         self.w = [w[0] + self.w_floor, w[1]];
         self.viscous = viscous;
@@ -130,8 +120,8 @@ impl Growth {
         both
     }
 
-    /// Returns coefficient n of the drag relative to its value at the start, from those of [|q|^2, |q'|^2] and of the
-    /// relative other drag.
+    /// Returns coefficient n of the drag relative to its value at the start, from coefficient n of [|q|^2,
+    /// |q'|^2] and of the relative other drag.
     pub fn expand(&mut self, n: usize, [q2, v2]: [f64; 2], other: f64) -> f64 {
         self.q2[n] = q2 + if n == 0 { FLOOR * FLOOR } else { 0.0 };
         self.u[n] = mul_ramp(n, &self.w, &self.q2) + v2;
@@ -143,8 +133,8 @@ impl Growth {
         drag
     }
 
-    /// Returns the time over which the series converge, s, from coefficients 0 to 2: u = 0, W = 0 and y = +-i delta W^(1/2)
-    /// are singularities.
+    /// Returns the time, s, over which the series converge, from coefficients 0 to 2. Singularities are at u
+    /// = 0, W = 0 and y = +-i delta W^(1/2).
     pub fn convergence_radius(&self) -> f64 {
         let of = |distance: f64, x: &Series| time_within(distance, x[1].abs(), x[2].abs());
         let time = of(self.u[0], &self.u);
@@ -156,8 +146,9 @@ impl Growth {
         time.min(time_within(self.w[0], self.w[1].abs(), 0.0)).min(corner)
     }
 
-    /// Returns the relative drag `h` after the start of the expansion, and u. u comes from its series up
-    /// to order n, the rest from u and the relative other drag.
+    /// Returns the relative drag at `h` after the start of the expansion, and u. u comes from its series up
+    /// to order n, and the drag from u and the relative other drag, so that its difference from the drag's
+    /// series is the error of the latter.
     pub fn drag_at(&self, n: usize, h: f64, other: f64) -> [f64; 2] {
         let u = values([&self.u], n, h)[0].max(0.0);
         let root = libm::sqrt(u);
@@ -174,7 +165,6 @@ impl Growth {
         [drag, u]
     }
 
-    /// Returns coefficient n of c_b/(m zeta_b) from that of u^(1/2).
     fn expand_breaking(&mut self, n: usize) -> f64 {
         let Breaking { onset, steepness, .. } = self.breaking;
         let w = if n < 2 { self.w[n] } else { 0.0 };

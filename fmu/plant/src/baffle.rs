@@ -31,37 +31,32 @@ use taylor::series::{Series, ZERO, mul_ramp, time_within, values};
 
 use crate::parameters::{Parameters, Ring, SloshSource};
 
-/// Range of the wave times exp(-1.84 d/R) over the ring's width in which the law holds.
+/// Range, over the ring's width, of the wave times exp(-1.84 d/R) in which the law holds.
 const STROKE: core::ops::RangeInclusive<f64> = 0.64..=6.4;
 
-/// A_0 over the amplitude at which the range begins; it adds 2e-4 of the damping there.
+/// A_0 as a share of the amplitude at which the range begins; it adds 2e-4 of the damping there.
 const FLOOR: f64 = 0.03;
 
-/// Lower bound of W, as a part of 1/l times 1 m/s2: without restoring force there is no drag.
+/// Lower bound of W, as a multiple of 1/l times 1 m/s2, because without restoring force there is no drag.
 const WEIGHTLESS: f64 = 1e-6;
 
-/// A ring baffle and its drag on one mode.
+/// A ring baffle and its drag on one mode, with the series of the quantities in the equations above. `zeta`
+/// is Z, the damping ratio at a slosh angle of 1 rad, 0 without a baffle; `floor2` is A_0^2; `w_floor` is a
+/// constant added to W, 1/s2; `w` is W and its rate. `viscous` is relative to its value at the start of the
+/// expansion, and `gain` is 2 m Z over the whole drag coefficient there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Baffle {
-    /// Z, the damping ratio at a slosh angle of 1 rad; 0 without a baffle.
     pub zeta: f64,
-    /// A_0^2
     floor2: f64,
-    /// Constant added to W, 1/s2.
     w_floor: f64,
-    /// W and its rate.
     w: [f64; 2],
-    /// |q|^2 + A_0^2, |q'|^2, the bracket, u, u^(1/4)
     q2: Series,
     v2: Series,
     sum: Series,
     u: Series,
     root: Series,
-    /// Viscous drag relative to its value at the start of the expansion, and its share of the whole
-    /// at the start.
     viscous: Series,
     share: f64,
-    /// 2 m Z over the whole drag coefficient at the start.
     gain: f64,
 }
 
@@ -84,7 +79,6 @@ impl Default for Baffle {
     }
 }
 
-/// Lists errors in the parameters of the baffle.
 pub(crate) fn problems(p: &Parameters) -> Vec<String> {
     let (width, depth) = (p.baffle.width, p.baffle.depth);
     let mut problems = Vec::new();
@@ -106,8 +100,8 @@ pub(crate) fn problems(p: &Parameters) -> Vec<String> {
     problems
 }
 
-/// Lists warnings about a ring baffle for which Miles's formula does not hold: a wide ring, or a tank
-/// given by a table of modes.
+/// Lists warnings about a ring baffle for which Miles's formula does not hold: a wide ring, or a tank given
+/// by a table of modes.
 pub(crate) fn warnings(p: &Parameters) -> Vec<String> {
     let mut warnings = Vec::new();
     if p.baffle.width <= 0.0 {
@@ -129,17 +123,16 @@ pub(crate) fn warnings(p: &Parameters) -> Vec<String> {
     warnings
 }
 
-/// Range of the baffle's law.
+/// Range of the baffle's law; `stroke` is the liquid's stroke at the ring over its width, per wave amplitude,
+/// 1/m.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Range {
-    /// Stroke over the ring's width per wave amplitude, 1/m.
     stroke: f64,
     depth: f64,
     covers_little: bool,
 }
 
 impl Range {
-    /// Creates the range; `None` without a baffle.
     pub fn new(p: &Parameters) -> Option<Range> {
         let Ring { width, depth } = p.baffle;
         let radius = p.tank.d / 2.0;
@@ -151,7 +144,6 @@ impl Range {
         (width > 0.0).then(range)
     }
 
-    /// Returns true for a wave of this amplitude at the wall, m.
     pub fn contains(&self, amplitude: f64) -> bool {
         STROKE.contains(&(amplitude * self.stroke))
             // d = eta is inside the range, independent of rounding.
@@ -161,8 +153,8 @@ impl Range {
 }
 
 impl Baffle {
-    /// Creates the baffle for the first mode, whose wave at the wall is `wave` per angle, m/rad,
-    /// and whose length is `l`, m.
+    /// Creates the baffle of the first mode, whose wave at the wall is `wave` per angle, m/rad, and whose
+    /// pendulum has the length `l`, m.
     pub fn new(p: &Parameters, wave: f64, l: f64) -> Baffle {
         let (radius, Ring { width, depth }) = (p.tank.d / 2.0, p.baffle);
         let zeta = miles_ring(radius, depth, width, wave);
@@ -170,7 +162,7 @@ impl Baffle {
         Baffle { zeta, floor2: floor * floor, w_floor: WEIGHTLESS / l, ..Baffle::default() }
     }
 
-    /// Returns the amplitude of the motion, rad, and its damping ratio, at W = `w` and [|q|^2,
+    /// Returns the amplitude of the motion, rad, and the baffle's damping ratio, at W = `w` and [|q|^2,
     /// |q'|^2].
     pub fn present<T: Number>(&self, w: T, [q2, v2]: [T; 2]) -> (T, T) {
         let w = w + T::constant(self.w_floor);
@@ -178,8 +170,8 @@ impl Baffle {
         (amplitude, amplitude.sqrt() * self.zeta)
     }
 
-    /// Starts an expansion with W along `w`, at [|q|^2, |q'|^2], with the viscous drag coefficient
-    /// `c` that runs along `viscous`. Returns the coefficient of both.
+    /// Starts an expansion with W and its rate `w`, at [|q|^2, |q'|^2], with the viscous drag coefficient
+    /// `c`, which follows `viscous`. Returns the coefficient of both together.
     pub fn start(&mut self, w: [f64; 2], at: [f64; 2], m: f64, c: f64, viscous: Series) -> f64 {
         self.w = [w[0] + self.w_floor, w[1]];
         self.viscous = viscous;
@@ -190,7 +182,7 @@ impl Baffle {
         both
     }
 
-    /// Returns coefficient n of the drag relative to its value at the start, from those of [|q|^2,
+    /// Returns coefficient n of the drag relative to its value at the start, from coefficient n of [|q|^2,
     /// |q'|^2].
     pub fn expand(&mut self, n: usize, [q2, v2]: [f64; 2]) -> f64 {
         self.q2[n] = q2 + if n == 0 { self.floor2 } else { 0.0 };
@@ -207,15 +199,16 @@ impl Baffle {
         self.share * self.viscous[n] + self.gain * self.root[n]
     }
 
-    /// Returns the time over which the series converge, s, from coefficients 0 to 2: W = 0 and a bracket of 0 are
-    /// singularities.
+    /// Returns the time, s, over which the series converge, from coefficients 0 to 2. Singularities are at W
+    /// = 0 and where the bracket is 0.
     pub fn convergence_radius(&self) -> f64 {
         let sum = time_within(self.sum[0], self.sum[1].abs(), self.sum[2].abs());
         sum.min(time_within(self.w[0], self.w[1].abs(), 0.0))
     }
 
-    /// Returns the relative drag `h` after the start of the expansion, from the bracket and the viscous drag by their
-    /// series up to order n, and the bracket.
+    /// Returns the relative drag and the bracket at `h` after the start of the expansion. Both come from the
+    /// series of the bracket and of the viscous drag up to order n, so that the error of the drag's own
+    /// series follows.
     pub fn drag_at(&self, n: usize, h: f64) -> [f64; 2] {
         let [sum, viscous] = values([&self.sum, &self.viscous], n, h);
         let (sum, w) = (sum.max(0.0), f64::max(self.w[0] + self.w[1] * h, 0.0));

@@ -17,32 +17,28 @@ use crate::parameters::{DampingLaw, MODES, Parameters, SloshSource};
 use crate::pendulum::Pendulum;
 use crate::tank::Calculated;
 
-/// Share of the largest g on a ramp below which the factor is replaced by its mean, because its
-/// power series converge only up to g = 0. The time below this share is so short that the error, of
-/// second order in the time, is below rounding.
+/// Share of the largest g on a ramp below which the factor is replaced by its mean, because its power series
+/// converge only up to g = 0. The time below this share is so short that the error, of second order in the
+/// time, is below rounding.
 const NEAR_ZERO: f64 = 1e-6;
 
 /// Largest step as a share of the series' radius of convergence, the time to g = 0.
 const SHARE_OF_RADIUS: f64 = 0.5;
 
-/// Highest order of an expansion along which the damping changes.
 pub const RAMP_ORDER: usize = 10;
 
-/// Drag factor c/c_0 of every mode as a function of g.
+/// Drag factor c/c_0 of every mode as a function of g, with g_0 (`reference`, m/s2), the exponent p, the
+/// damping ratios `zeta` at g_0 and the restoring specific forces a_n (`centring`, m/s2).
 #[derive(Clone, Debug)]
 pub struct Damping {
-    /// g_0, m/s2
     reference: f64,
-    /// p
     exponent: f64,
-    /// Damping ratios at g_0.
     zeta: [f64; MODES],
-    /// a_n, m/s2
     centring: [f64; MODES],
 }
 
 impl Damping {
-    /// Creates the damping. `calculated` belongs to the specific force `reference`, at which every
+    /// Creates the damping. `calculated` must belong to the specific force `reference`, m/s2, at which every
     /// mode has a restoring force.
     pub fn new(p: &Parameters, calculated: &Calculated, reference: f64) -> Damping {
         let by_correlation =
@@ -57,14 +53,13 @@ impl Damping {
         Damping { reference, exponent, zeta, centring }
     }
 
-    /// Returns (g + a)/(g_0 + a) to the power p.
     fn power(&self, g: f64, a: f64) -> f64 {
         let root = libm::sqrt(f64::max(g + a, 0.0) / (self.reference + a));
         if self.exponent == 0.25 { libm::sqrt(root) } else { root }
     }
 
-    /// Returns the damping ratio of mode `n` at g. Returns 0 without restoring force, and near that
-    /// point if the ratio overflows, because it has no meaning there.
+    /// Returns the damping ratio of mode `n` at g. It is 0 without restoring force, and where it overflows
+    /// close to that point, because it has no meaning there.
     pub fn ratio(&self, n: usize, g: f64) -> f64 {
         let (zeta, a) = (self.zeta[n], self.centring[n]);
         match self.exponent == 0.25 {
@@ -74,16 +69,15 @@ impl Damping {
         }
     }
 
-    /// Returns the derivative of the damping ratio by g, s2/m.
     pub fn slope_of_ratio(&self, n: usize, g: f64) -> f64 {
         let x = g + self.centring[n];
         let changes = x > 0.0 && self.exponent == 0.25;
         if changes { finite_or_zero(-self.ratio(n, g) / (4.0 * x)) } else { 0.0 }
     }
 
-    /// Gives mode `n` its restoring specific force and the series of its damping from here on.
-    /// Returns the time, s, for which the series holds. If g + a is below `floor`, the factor is
-    /// its mean until the ramp ends or g + a reaches twice `floor`.
+    /// Gives the pendulum of mode `n` its restoring specific force and the series of its damping from here
+    /// on. Returns the time, s, for which the series holds. If g + a is below `floor`, the factor is its mean
+    /// until the ramp ends or g + a reaches twice `floor`.
     pub fn expand(&self, n: usize, g: Ramp, floor: f64, pendulum: &mut Pendulum) -> f64 {
         let a = self.centring[n];
         let x = g.value + a;
@@ -104,20 +98,20 @@ impl Damping {
         reach
     }
 
-    /// Returns the specific force below which a ramp's factor is held.
+    /// Returns the specific force, m/s2, below which the factor is held while g follows a ramp for `h`
+    /// seconds.
     pub fn floor(g: Ramp, h: f64) -> f64 {
         if g.slope == 0.0 { 0.0 } else { NEAR_ZERO * f64::max(g.value, g.value_at(h)) }
     }
 
-    /// Writes the binomial series of the factor relative to its first value, along a ramp whose
-    /// slope over its first value is `relative`.
+    /// Writes the binomial series of the factor relative to its first value into `c`. `relative` is the
+    /// ramp's slope over its first value, 1/s.
     fn series(&self, relative: f64, c: &mut Series) {
         for n in 0..RAMP_ORDER {
             c[n + 1] = c[n] * relative * (self.exponent - n as f64) / (n + 1) as f64;
         }
     }
 
-    /// Returns the mean of the factor over g from `from` to `to`.
     fn mean(&self, from: f64, to: f64, a: f64) -> f64 {
         let integral = |g: f64| f64::max(g + a, 0.0) * self.power(g, a) / (1.0 + self.exponent);
         if from == to { self.power(from, a) } else { (integral(to) - integral(from)) / (to - from) }

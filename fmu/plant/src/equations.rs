@@ -19,8 +19,8 @@ use crate::plant::Plant;
 use crate::slosh::{SloshMode, with_modes};
 use crate::state::{Accepted, Axial, INDICATORS, STATES, State, indicator, x};
 
-/// Largest number of gyro samples due at once. A host that has passed more of them ignores time
-/// events.
+/// Largest number of gyro samples that are taken at one instant. A host that has passed more of them ignores
+/// time events.
 const SAMPLES_AT_ONCE: f64 = 1e6;
 
 impl Plant {
@@ -29,13 +29,13 @@ impl Plant {
         &self.state.x
     }
 
-    /// Sets the continuous states from the host.
+    /// Sets the continuous states from the host, by the indices in [`x`].
     pub fn set_continuous_states(&mut self, x: &[f64; STATES]) {
         self.state.x = *x;
     }
 
-    /// Sets the host's time, s, and the time since the start if the host integrates. Times of the host that differ by at most
-    /// `resolution` are the same.
+    /// Sets the host's time, s, and, if the host integrates, the time since the start, s. Times of the host
+    /// that differ by at most `resolution`, s, count as the same.
     pub fn set_time(&mut self, time: f64, since_start: Option<f64>, resolution: f64) {
         (self.state.time, self.resolution) = (time, resolution);
         if let Some(elapsed) = since_start {
@@ -50,9 +50,9 @@ impl Plant {
         self.coefficients(0, -torque.value / self.wheel.inertia).map(unsigned_zero)
     }
 
-    /// Returns the derivative of x' in the direction (dx, du), du = [tau_cmd, tau_ext, g_axial]:
-    /// coefficient 1 of x' along x + dx s, u + du s. The contact and the wheel's state (blocked, at
-    /// its torque limit or free) are held.
+    /// Returns the derivative of x' in the direction (dx, du) with du = [tau_cmd, tau_ext, g_axial]:
+    /// coefficient 1 of x' along x + dx s, u + du s. The contact and the wheel's state (blocked, at its
+    /// torque limit or free) are held.
     pub fn directional_derivative(
         &mut self,
         inputs: &Inputs,
@@ -81,7 +81,6 @@ impl Plant {
         self.coefficients(1, -torque.slope / self.wheel.inertia)
     }
 
-    /// Returns coefficient n of x' from the series.
     fn coefficients(&self, n: usize, wheel: f64) -> [f64; STATES] {
         let motion = &self.motion;
         let mut derivatives = [0.0; STATES];
@@ -103,15 +102,14 @@ impl Plant {
         derivatives
     }
 
-    /// Returns the event indicators, by the indices in [`indicator`]: functions that are positive
-    /// between events and cross zero at events. They are 1 where the event cannot happen, and never
-    /// 0, so that a host's root finder sees no crossing right after an event.
+    /// Returns the event indicators, by the indices in [`indicator`]: functions that are positive between
+    /// events and cross zero at events. They are 1 where the event cannot happen, and never 0, so that a
+    /// host's root finder sees no crossing right after an event.
     pub fn event_indicators(&mut self, inputs: &Inputs) -> [f64; INDICATORS] {
         let just_positive = |z: f64| if z == 0.0 { f64::MIN_POSITIVE } else { z };
         self.indicators(inputs).map(just_positive)
     }
 
-    /// Returns the event indicators, exactly 0 at an event.
     fn indicators(&mut self, inputs: &Inputs) -> [f64; INDICATORS] {
         let mut z = [1.0; INDICATORS];
         if self.motion.law.switches_at_rest() {
@@ -137,12 +135,11 @@ impl Plant {
         z
     }
 
-    /// Performs everything that is due at the current instant. It puts a hub that has just stopped
-    /// exactly at rest, determines its new contact, keeps the rotor within its speeds, takes the
-    /// gyro's samples, and updates the regime. Returns true if continuous states have changed.
+    /// Performs everything that is due at the current instant. It puts a hub that has just stopped exactly at
+    /// rest, determines its new contact, keeps the rotor within its speeds, takes the gyro's samples, and
+    /// updates the regime. Returns true if continuous states have changed.
     ///
-    /// # Errors
-    /// [`StepError::Model`], [`StepError::NotFinite`]; the plant is unchanged.
+    /// # Errors [`StepError::Model`], [`StepError::NotFinite`]; the plant is unchanged.
     pub fn take_event(&mut self, inputs: &Inputs) -> Result<bool, StepError> {
         let (before, time) = (self.state, self.state.time);
         let period = 1.0 / self.imu.rate;
@@ -188,8 +185,9 @@ impl Plant {
         self.state.record_contact(contact, time);
     }
 
-    /// Returns true if an event is overdue that no indicator showed in the host's last step. The host has integrated
-    /// past a change of the contact or past a speed limit of the rotor, or the wave has reached another regime.
+    /// Returns true if an event is overdue that no indicator showed in the host's last step: the host has
+    /// integrated past a change of the contact or past a speed limit of the rotor, or the wave has reached
+    /// another regime.
     pub fn is_event_overdue(&mut self, inputs: &Inputs) -> bool {
         let z = self.indicators(inputs);
         let lasting = [
@@ -203,16 +201,15 @@ impl Plant {
             || self.present_ranges(inputs) != self.state.ranges
     }
 
-    /// Returns the number of contact changes since the start, the time of the last one (s), and the
-    /// contact (-1 slipping backwards, 0 stuck, 1 slipping forwards).
+    /// Returns the number of contact changes since the start, the time of the last one, s, and the number of
+    /// the present [`Contact`].
     pub fn last_contact(&self) -> (i32, f64, i32) {
         (self.state.event_count, self.state.event_time, self.state.contact as i32)
     }
 
     /// Changes the friction law from here on.
     ///
-    /// # Errors
-    /// Lists all problems of the parameters; the plant is unchanged.
+    /// # Errors Lists all problems of the parameters; the plant is unchanged.
     pub fn set_friction(&mut self, p: &Friction, inputs: &Inputs) -> Result<(), Vec<String>> {
         let problems = Law::problems(p);
         if !problems.is_empty() {
@@ -224,14 +221,13 @@ impl Plant {
         Ok(())
     }
 
-    /// Adds the work of a changing g_axial since the last accepted step. Call it when the host's
-    /// integrator has accepted a step.
+    /// Adds the work of a changing g_axial since the last accepted step. A host that integrates itself must
+    /// call it when its integrator has accepted a step.
     ///
-    /// The inputs' derivatives are unknown here. The rule is exact to fourth order in the step if
-    /// g_axial is linear in time, otherwise to second order.
+    /// The inputs' derivatives are unknown here. The rule is exact to fourth order in the step if g_axial is
+    /// linear in time, otherwise to second order.
     ///
-    /// # Errors
-    /// [`StepError::NotFinite`]; the plant is unchanged.
+    /// # Errors [`StepError::NotFinite`]; the plant is unchanged.
     pub fn accept_step(&mut self, inputs: &Inputs) -> Result<(), StepError> {
         let work = self.work_axial(inputs);
         self.evaluate(inputs);
@@ -247,8 +243,7 @@ impl Plant {
 
     /// Refuses states from the host that are outside the models' range.
     ///
-    /// # Errors
-    /// [`StepError::Model`]
+    /// # Errors [`StepError::Model`] names the mode and the reason.
     pub fn check_range(&self) -> Result<(), StepError> {
         let time = self.state.time;
         with_modes!(&self.liquid, modes => {
@@ -266,7 +261,7 @@ impl Plant {
         self.next_sample().map(|due| self.state.time + due)
     }
 
-    /// Takes the gyro's next sample if it is due where the host is. Returns true if it was.
+    /// Takes the gyro's next sample if it is due at the host's present time. Returns true if it was.
     pub(crate) fn takes_sample(&mut self) -> bool {
         let is_due = |due| self.imu.is_due(due, self.resolution);
         let takes = self.next_sample().is_some_and(is_due);
@@ -277,7 +272,6 @@ impl Plant {
         takes
     }
 
-    /// Returns the delay until the gyro's next sample, s.
     fn next_sample(&self) -> Option<f64> {
         let State { gyro, elapsed, .. } = &self.state;
         self.imu.enabled.then(|| self.imu.due(gyro.next, elapsed[0]))
@@ -291,7 +285,6 @@ mod tests {
     use crate::parameters::{FrictionModel, Parameters, SloshSource};
     use crate::slosh_model::SloshModel;
 
-    /// Returns true if the model's coordinates are lengths, not angles.
     fn is_a_length(slosh: SloshModel) -> bool {
         slosh == SloshModel::Liquid
     }
@@ -300,8 +293,8 @@ mod tests {
         plant_with(slosh, friction, |_| {})
     }
 
-    /// Sets a tilted bench, a suspension line, a ring baffle, amplitude damping, and a hundred times water's surface
-    /// tension.
+    /// Sets a tilted bench, a suspension line, a ring baffle, amplitude damping, and a hundred times water's
+    /// surface tension.
     fn every_option(p: &mut Parameters) {
         (p.bench.tilt, p.bench.tilt_azimuth) = (0.1, 0.7);
         (p.hub.imbalance, p.hub.imbalance_angle) = (0.4, 2.0);
@@ -311,12 +304,12 @@ mod tests {
         p.slosh.zeta_amplitude = 0.05;
     }
 
-    /// Sets waves that break, from below the motion of these tests to within the rounded corner.
+    /// Sets waves that break. Their onset is below the motion of these tests, or the motion is within the
+    /// rounded corner.
     fn breaking_waves(p: &mut Parameters) {
         (p.slosh.zeta_breaking, p.slosh.breaking_steepness) = (0.3, 0.8);
     }
 
-    /// Sets modes in any direction, if the model allows it.
     fn every_direction(p: &mut Parameters) {
         every_option(p);
         (p.slosh.source, p.baffle.width) = (SloshSource::Table, 0.0);
@@ -327,7 +320,6 @@ mod tests {
         (table.direction[0], table.direction[1]) = (0.6, -1.2);
     }
 
-    /// Sets a table with another third order than a pendulum's.
     fn third_order(p: &mut Parameters) {
         every_option(p);
         breaking_waves(p);
@@ -395,8 +387,8 @@ mod tests {
         }
     }
 
-    /// A host whose step has passed a speed limit of the rotor must handle an event, which returns the rotor to the
-    /// limit.
+    /// A host whose step has passed a speed limit of the rotor must handle an event, which returns the rotor
+    /// to the limit.
     #[test]
     fn a_rotor_beyond_its_speed_limits_is_an_overdue_event() {
         let mut p = Parameters::default();
@@ -483,7 +475,6 @@ mod tests {
         compare_output_derivatives(breaking_waves);
     }
 
-    /// Lists every continuous output with its name.
     fn continuous(outputs: &Outputs) -> Vec<(&'static str, f64)> {
         macro_rules! all {
             ($($name:ident),*) => {{
@@ -654,7 +645,7 @@ mod tests {
         }
     }
 
-    /// A damaged saved state may hold any work. The state after a step can be saved again.
+    /// A damaged saved state may hold any work. The state after a step must be one that can be saved again.
     #[test]
     fn work_through_g_axial_beyond_all_magnitudes_is_refused() {
         let (mut plant, inputs) = plant(SloshModel::Linear, FrictionModel::Viscous);

@@ -3,46 +3,38 @@
 use taylor::number::Number;
 use taylor::series::{Series, ZERO, mul_ramp, number};
 
-/// Motion of the hub as input to liquid and bearing.
+/// Motion of the hub as seen by liquid and bearing: the series of theta, w, w^2 and w' (rad, s), the specific
+/// force `g` along the tank's axis, m/s2, with its rate, and the time `damping_reach`, s, for which the
+/// series of the damping is valid.
 #[derive(Clone, Debug)]
 pub struct HubMotion {
-    /// theta, rad
     pub theta: Series,
-    /// w, rad/s
     pub omega: Series,
-    /// w^2
     pub omega2: Series,
-    /// w', rad/s2
     pub omega_dot: Series,
-    /// Specific force along the tank's axis, m/s2, and its rate.
     pub g: [f64; 2],
-    /// Time over which the series of the damping is valid, s.
     pub damping_reach: f64,
     pub tilt: Tilt,
 }
 
-/// Gravity across the axis of a tilted bench. In the hub's frame, with the tangent t of the tilt
-/// and the azimuth phi of the lateral component,
+/// Gravity across the axis of a tilted bench. In the hub's frame, with the tangent t of the tilt and the
+/// azimuth phi of the lateral component,
 ///
 /// ```text
-/// e = g d,   d = t (cos(phi - theta), sin(phi - theta))
+/// e = g d, d = t (cos(phi - theta), sin(phi - theta))
 /// ```
 ///
-/// where g is the specific force along the axis. A mass M at the position X has the energy -M e.X,
-/// and d' = w (d_y, -d_x).
+/// where g is the specific force along the axis. A mass M at the position X has the energy -M e.X, and d' = w
+/// (d_y, -d_x).
 #[derive(Clone, Debug)]
 pub struct Tilt {
-    /// t
     pub tangent: f64,
-    /// phi, rad
     pub azimuth: f64,
-    /// d and e
     pub direction: [Series; 2],
     pub e: [Series; 2],
 }
 
 impl Tilt {
-    /// An upright bench.
     const NONE: Tilt = Tilt { tangent: 0.0, azimuth: 0.0, direction: [ZERO; 2], e: [ZERO; 2] };
 
     /// Sets coefficient n of d and e, from coefficients up to n of theta.
@@ -80,12 +72,12 @@ impl Tilt {
         -(0..=n).map(term).sum::<f64>()
     }
 
-    /// Returns e at the start of an expansion, m/s2.
     pub fn now<T: Number>(&self) -> [T; 2] {
         [number(&self.e[0]), number(&self.e[1])]
     }
 
-    /// Returns -d.X and its rate, m, m/s, for a position X with the rate X' in the frame of a hub that turns with `w`.
+    /// Returns -d.X, m, and its rate, m/s, for a position X with the rate X' in the frame of a hub that turns
+    /// with `w`.
     pub fn height_now<T: Number>(&self, [x, y]: [T; 2], [x_d, y_d]: [T; 2], w: T) -> [T; 2] {
         let [d_x, d_y]: [T; 2] = [number(&self.direction[0]), number(&self.direction[1])];
         [-(x * d_x + y * d_y), -(x_d * d_x + y_d * d_y + w * (x * d_y - y * d_x))]
@@ -93,7 +85,6 @@ impl Tilt {
 }
 
 impl HubMotion {
-    /// A hub at rest, weightless.
     pub const REST: HubMotion = HubMotion {
         theta: ZERO,
         omega: ZERO,

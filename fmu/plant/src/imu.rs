@@ -17,30 +17,25 @@ use crate::parameters::Imu;
 /// Part of a sampling period by which a sample may be early, besides the resolution of the host's clock.
 const SLACK: f64 = 1e-6;
 
-/// Number of processes of the flicker noise.
 pub(crate) const FLICKERS: usize = 8;
-/// Ratio of the correlation times of successive processes.
 const RATIO: f64 = 6.0;
-/// Shortest correlation time, s. At 0.1 s the white noise of a gyro is far larger than the flicker noise.
+/// Shortest correlation time of the flicker noise, s. At 0.1 s the white noise of a gyro is far larger than
+/// the flicker noise.
 const SHORTEST: f64 = 0.1;
 
-/// State of the gyro.
+/// State of the gyro: the index `next` of its next sample (sample k is taken k / rate after the start), the
+/// value `held` until then, and for the next sample the bias, the rate random walk and the processes of the
+/// flicker noise, all in rad/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Gyro {
-    /// Index of the next sample; sample k is taken k / rate after the start.
     pub next: u64,
-    /// Bias of the next sample, rad/s.
     pub bias: f64,
-    /// Value that the gyro holds until the next sample, rad/s.
     pub held: f64,
-    /// Rate random walk of the next sample, rad/s.
     pub walk: f64,
-    /// Processes of the flicker noise of the next sample, rad/s.
     pub flicker: [f64; FLICKERS],
 }
 
 impl Imu {
-    /// Returns the gyro before its first sample, with a bias from its stationary distribution.
     pub(crate) fn start(&self) -> Gyro {
         let (spread, _) = normals(self.seed, u64::MAX);
         let bias = self.bias_instability / 0.664 * spread;
@@ -51,9 +46,9 @@ impl Imu {
         gyro
     }
 
-    /// Takes the samples that fall due within `length` from `since_start` on, both s, but at most
-    /// one more than `allowed`. `omega` is the hub's rate as a function of the time within
-    /// `length`. Returns the number of samples.
+    /// Takes the samples that fall due within `length` from `since_start` on, both s, but at most one more
+    /// than `allowed`. `omega` is the hub's rate as a function of the time within `length`. Returns the
+    /// number of samples.
     pub(crate) fn follow(
         &self,
         gyro: &mut Gyro,
@@ -78,14 +73,13 @@ impl Imu {
         k as f64 / self.rate - since_start
     }
 
-    /// Returns true if a sample that is due after `due`, s, can be taken now, where the host looks in: a host's clock has a
-    /// `resolution`, and communication points and time events match sampling instants only to rounding.
+    /// Returns true if a sample that is due after `due`, s, can be taken now. A host's clock has a
+    /// `resolution`, and its communication points and time events match sampling instants only to rounding.
     #[inline(always)]
     pub(crate) fn is_due(&self, due: f64, resolution: f64) -> bool {
         due <= SLACK / self.rate + resolution
     }
 
-    /// Takes the next sample of the rate `omega`.
     pub(crate) fn sample(&self, gyro: &mut Gyro, omega: f64) {
         let (white, drift) = normals(self.seed, gyro.next);
         let mut reading = omega + gyro.bias + self.arw * libm::sqrt(self.rate) * white;
@@ -108,8 +102,8 @@ impl Imu {
         gyro.next += 1;
     }
 
-    /// Moves the processes of the flicker noise by sample k; `keep` is the part of a process that remains, by its
-    /// correlation time, s.
+    /// Moves all processes of the flicker noise by sample `k`; `keep` returns the part of a process that
+    /// remains, from its correlation time, s.
     fn each_flicker(&self, all: &mut [f64; FLICKERS], k: u64, keep: impl Fn(f64) -> f64) {
         let sigma = self.flicker * libm::sqrt(libm::log(RATIO) / core::f64::consts::PI);
         let mut time = SHORTEST;
@@ -124,13 +118,12 @@ impl Imu {
     }
 }
 
-/// Returns two independent standard normal numbers for (seed, k): the Box-Muller transform of two
-/// uniform numbers from the SplitMix64 mixer.
+/// Returns two independent standard normal numbers for (seed, k): the Box-Muller transform of two uniform
+/// numbers from the SplitMix64 mixer.
 fn normals(seed: i32, k: u64) -> (f64, f64) {
     normal_pair(seed, 0, k)
 }
 
-/// Returns [`normals`] of one of several independent streams of a seed.
 fn normal_pair(seed: i32, stream: u64, k: u64) -> (f64, f64) {
     let stream = mix(seed as u32 as u64 | stream << 32);
     let uniform = |j: u64| {
@@ -199,12 +192,12 @@ mod tests {
         }
     }
 
-    /// Returns a gyro without noise, bias and quantisation.
     fn clean(rate: f64) -> Imu {
         Imu { rate, arw: 0.0, bias_instability: 0.0, lsb: 0.0, ..Imu::default() }
     }
 
-    /// Mean Allan variance of readings at rest of seeds 0 to `seeds`, at averages of m samples.
+    /// Returns the mean Allan variance of readings at rest over the seeds 0 to `seeds`, for averages of m
+    /// samples.
     fn allan_variance(imu: Imu, seeds: i32, m: usize) -> f64 {
         let mut sum = 0.0;
         for seed in 0..seeds {
@@ -273,8 +266,8 @@ mod tests {
         }
     }
 
-    /// The reading is rate plus bias plus a multiple of the normal number of (seed, k). The bias continues with the
-    /// other normal number.
+    /// A reading is the rate plus the bias plus a multiple of the normal number of (seed, k); the bias
+    /// continues with the pair's other number.
     #[test]
     fn a_reading_is_rate_bias_and_the_seed_s_own_noise() {
         let imu = Imu { arw: 1e-3, bias_instability: 0.664e-3, bias_time: 0.1, ..clean(25.0) };
@@ -311,8 +304,6 @@ mod tests {
         assert!((product / first - (-1.0f64).exp()).abs() < 0.02, "{}", product / first);
     }
 
-    /// The generator's published first outputs for the states 0 and 1234567 (Vigna's splitmix64.c), and a fixed noise
-    /// for a seed.
     #[test]
     fn numbers_are_those_of_splitmix64_and_the_same_for_good() {
         assert_eq!(mix(0), 0xE220_A839_7B1D_CDAF);

@@ -41,17 +41,14 @@ use formulas::tilt::{factors, largest_slope};
 use crate::parameters::{Parameters, SloshSource};
 use crate::slosh_model::{Oblique, SloshModel};
 
-/// Direction of gravity relative to the axis of an upright cylinder.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Leaning {
-    /// s
     slope: f64,
-    /// n^2
     tangential: f64,
 }
 
-/// A mode: mass and length of its pendulum in the plant, and the length l/f of an upright pendulum with the same
-/// frequency.
+/// A mode on a tilted bench: mass and length of its pendulum in the plant, and the length l/f of an upright
+/// pendulum with the same frequency.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Mode {
     pub mass: f64,
@@ -60,7 +57,8 @@ pub(crate) struct Mode {
 }
 
 impl Leaning {
-    /// Returns the tilt of the bench at the start; `None` for an upright bench or a tank given by a table.
+    /// Returns the tilt of the bench at the start; `None` for an upright bench and for a tank given by a
+    /// table.
     pub fn from_parameters(p: &Parameters) -> Option<Leaning> {
         let leans = p.bench.tilt != 0.0 && p.slosh.source == SloshSource::Geometry;
         leans.then(|| {
@@ -69,14 +67,14 @@ impl Leaning {
         })
     }
 
-    /// Returns f of mode n, from 0, along the tangent and across it.
+    /// Returns f of mode `n`, which counts from 0, along the tangent and across it.
     fn factors(self, n: usize, fill: f64) -> [f64; 2] {
         let [along, across] = factors(n, fill, self.slope);
         let mixed = |part: f64| along * part + across * (1.0 - part);
         [mixed(self.tangential), mixed(1.0 - self.tangential)]
     }
 
-    /// Returns mode n, from 0, for the upright tank's pendulum.
+    /// Returns mode `n`, which counts from 0, for the pendulum `upright` of the upright tank.
     pub fn mode(self, n: usize, p: &Parameters, upright: &cylinder::Pendulum) -> Mode {
         let [f, _] = self.factors(n, 2.0 * p.tank.h / p.tank.d);
         let oblique = self.oblique(n, p);
@@ -84,8 +82,8 @@ impl Leaning {
         Mode { mass: upright.mass * f / oblique.share, length, upright: upright.length / f }
     }
 
-    /// Returns the frequency of mode 1's pendulum in the radial direction over the liquid's
-    /// frequency there.
+    /// Returns the frequency of mode 1's pendulum in the radial direction divided by the liquid's frequency
+    /// in that direction.
     fn radial_frequency(self, p: &Parameters) -> f64 {
         let fill = 2.0 * p.tank.h / p.tank.d;
         let [tangential, radial] = self.factors(0, fill);
@@ -94,14 +92,12 @@ impl Leaning {
         libm::sqrt(stiffness(turned) / stiffness(self) * tangential / radial)
     }
 
-    /// Returns F and M of mode n, from 0.
     fn oblique(self, n: usize, p: &Parameters) -> Oblique {
         let coefficients = p.slosh.third_order(n, 2.0 * p.tank.h / p.tank.d);
         p.slosh.model.oblique(self.slope, self.tangential, coefficients)
     }
 }
 
-/// Lists problems of the parameters with this tilt.
 pub(crate) fn problems(p: &Parameters) -> Vec<String> {
     let mut problems = Vec::new();
     let (Some(Leaning { slope, .. }), true) =
@@ -126,7 +122,6 @@ pub(crate) fn problems(p: &Parameters) -> Vec<String> {
 /// Relative error of a common frequency in the radial direction above which a warning follows.
 const APART: f64 = 0.01;
 
-/// Lists warnings about the modes with this tilt.
 pub(crate) fn warnings(p: &Parameters) -> Vec<String> {
     let mut warnings = Vec::new();
     let Some(leaning) = Leaning::from_parameters(p) else { return warnings };

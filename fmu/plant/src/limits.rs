@@ -19,21 +19,20 @@ use crate::parameters::{MODES, Parameters, SloshSource};
 use crate::slosh::Angles;
 use crate::tank::Calculated;
 
-/// 2 b/a over 1 + (b/a)^2 of an ellipse with the semi-axes a and b = a/2.
+/// 2 b/a over 1 + (b/a)^2 of an ellipse with the semi-axes a and b = a/2; wider ellipses count as rotary
+/// motion.
 const ROTARY: f64 = 0.8;
-/// Largest slosh angle of any mode, rad.
 const LARGEST: f64 = core::f64::consts::FRAC_PI_4;
 
-/// Limits of a plant's modes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Limits {
     mode: [ModeLimits; MODES],
     spin: SpinLimit,
-    /// Bond number over g, s2/m; 0 if it does not matter.
+    /// Bond number over g, s2/m; 0 if surface tension has no effect.
     bond_per_g: f64,
 }
 
-/// Slosh angles at which a mode is out of range, rad; 0 for those that are not known.
+/// Slosh angles at which a mode is out of range, rad; 0 if they are not known.
 #[derive(Clone, Copy, Debug, Default)]
 struct ModeLimits {
     angle: f64,
@@ -42,7 +41,6 @@ struct ModeLimits {
 }
 
 impl Limits {
-    /// Creates the limits of the modes in use.
     pub fn new(p: &Parameters, calculated: &Calculated) -> Limits {
         let (slosh, radius) = (&p.slosh, p.tank.d / 2.0);
         let mut mode = [ModeLimits::default(); MODES];
@@ -82,8 +80,8 @@ impl Limits {
         }
     }
 
-    /// Returns the reason why modes at these angles, with their squared frequencies, do not represent the liquid on a hub with
-    /// the rate `omega`.
+    /// Returns the reason, if any, why modes at these angles, with their squared frequencies, do not
+    /// represent the liquid on a hub with the rate `omega`, rad/s.
     pub fn reason(&self, modes: impl Iterator<Item = (Angles, f64, f64)>, omega: f64) -> LimitedBy {
         let mut reason = LimitedBy::None;
         for (n, (angles, omega2, l)) in modes.enumerate() {

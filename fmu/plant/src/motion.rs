@@ -22,7 +22,6 @@ use crate::slosh_model::SloshModel;
 use crate::state::{State, x};
 use crate::suspension::Suspension;
 
-/// Advice if the internal steps of a call do not suffice.
 const ADVICE: &str = ", with stribeck_smooth a larger friction.eps, with the gyro (its samples count as \
                       steps) a lower imu.rate";
 
@@ -32,25 +31,23 @@ pub(crate) fn out_of_range(time: f64, mode: usize, what: &str) -> StepError {
     StepError::Model(format!("slosh mode {number} left its range at t = {time} s: {what}"))
 }
 
-/// Events at which a step stops.
+/// Events at which a step stops. `offset` is the time from the start of the step to the current stretch, s;
+/// events up to `passed` seconds after the start of the step are ignored (infinity ignores all).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stop {
-    /// Time from the start of the step to the current stretch, s.
     pub offset: f64,
-    /// Time from the start of the step up to which events are passed over, s; infinity to pass over
-    /// all.
     pub passed: f64,
 }
 
 impl Stop {
-    /// Returns true if the step stops at an event `t` after the stretch's start.
     #[inline(always)]
     pub fn is_at(self, t: f64) -> bool {
         self.offset + t > self.passed
     }
 
-    /// Returns the time, at most `h` after `t` in the stretch, of the first gyro sample at which the step stops. The
-    /// stretch is `since_start` after the gyro's start. `allowed` samples from number `next` on may be passed.
+    /// Returns the time, at most `h` after `t` in the stretch, of the first gyro sample at which the step
+    /// stops. The stretch begins `since_start` after the gyro's start. `allowed` samples from number `next`
+    /// on may be passed.
     // Arguments by value: a reference would force all data of a stretch into memory.
     #[cold]
     fn at_sample(
@@ -65,43 +62,35 @@ impl Stop {
     }
 }
 
-/// The hub's equation with the power series of its terms: J w' = tau + tau_f + T, J = I0 + sum of
-/// J_i, T = sum of T_i over the modes.
+/// The hub's equation J w' = tau + tau_f + T with the power series of its terms, where J = I0 + sum of J_i
+/// and T = sum of T_i over the modes. `i0` is the inertia of hub and rigid liquid, kg m2; `imbalance` holds
+/// the static moments of the dry hub, radial and tangential, and of the rigid liquid, kg m; `tau` is the
+/// torque of wheel and environment over the step and `net` is tau + T, which the bearing must hold at rest, N
+/// m; `power` holds the power of the external torques and the power dissipated in bearing, suspension line
+/// and liquid, W.
 #[derive(Clone, Debug)]
 pub(crate) struct Motion {
-    /// Inertia of hub and rigid liquid, kg m2.
     pub i0: f64,
     pub law: Law,
     pub suspension: Suspension,
     pub damping: Damping,
-    /// True if drag or weight change along an expansion at constant g: amplitude-dependent drag, a tilted bench, or
-    /// modes in other directions than the tangent.
+    /// True if drag or weight change along an expansion at constant g: with amplitude-dependent drag, on a
+    /// tilted bench, and with modes in other directions than the tangent.
     pub varies: bool,
-    /// True if drag depends on amplitude: a baffle, or amplitude damping.
     with_amplitude: bool,
-    /// Static moments of the dry hub, radial and tangential, and of the rigid liquid, kg m.
     imbalance: [f64; 2],
     rigid_moment: f64,
-    /// The g and its rate set in the modes; NaN if none is set, or if it is valid only for an
-    /// instant.
+    /// The g and its rate set in the modes; NaN if none is set, or if it is valid only for an instant.
     g: [f64; 2],
-    /// The specific force below which damping is held, m/s2, see [`Damping::expand`].
     near_weightless: f64,
     tolerance: f64,
-    /// Internal steps and gyro samples that one call may take.
     max_steps: usize,
     pub hub: HubMotion,
-    /// Torque of wheel and environment over the step.
     tau: [f64; 2],
     inertia: Series,
-    /// 1/J at the start of the expansion
     inv_inertia: f64,
-    /// Torque of the bearing.
     pub tau_f: Series,
-    /// tau + T, the torque that the bearing must hold at rest.
     pub net: Series,
-    /// Power of the external torques, and power dissipated in bearing, suspension line and liquid,
-    /// W.
     pub power: Series,
     pub dissipation: Series,
 }
@@ -140,7 +129,6 @@ impl Motion {
         }
     }
 
-    /// Sets all quantities to the state, with the given torque and specific force.
     pub fn start<M: SloshMode>(&mut self, modes: &mut [M], state: &State, (tau, g): (Ramp, Ramp)) {
         self.hub.theta[0] = state.x[x::THETA];
         self.hub.omega[0] = state.x[x::OMEGA];
@@ -154,7 +142,7 @@ impl Motion {
         }
     }
 
-    /// Sets the specific force in the modes, and the drag from it and their motion.
+    /// Sets the specific force in the modes, and the drag that follows from it and from their motion.
     #[cold]
     fn set_axial<M: SloshMode>(&mut self, modes: &mut [M], g: Ramp) {
         self.hub.g = [g.value, g.slope];
@@ -172,25 +160,24 @@ impl Motion {
         }
     }
 
-    /// Returns coefficient n of the gravity torque on the dry hub of a tilted bench, N m.
     fn gravity_torque(&self, n: usize) -> f64 {
         let ([x, y], [e_x, e_y]) = (self.imbalance, &self.hub.tilt.e);
         x * e_y[n] - y * e_x[n]
     }
 
-    /// Returns the gravity torque on the dry hub and on the rigid liquid, N m.
+    /// Returns the gravity torques on the dry hub and on the rigid liquid of a tilted bench, N m.
     pub fn gravity_torques<T: Number>(&self) -> [T; 2] {
         let ([x, y], [e_x, e_y]): (_, [T; 2]) = (self.imbalance, self.hub.tilt.now());
         [e_y * x - e_x * y, e_y * self.rigid_moment]
     }
 
-    /// Returns the potential energy of the dry hub and of the rigid liquid, J.
     pub fn potential<T: Number>(&self) -> T {
         let ([x, y], [e_x, e_y]): (_, [T; 2]) = (self.imbalance, self.hub.tilt.now());
         -(e_x * (x + self.rigid_moment) + e_y * y)
     }
 
-    /// Returns mass times height of hub and liquid above rest, kg m, the potential energy over g, and its rate.
+    /// Returns mass times height of hub and liquid above rest, kg m, which is the potential energy over g,
+    /// and its rate.
     pub fn height<T: Number, M: SloshMode>(&self, modes: &[M]) -> [T; 2] {
         let ([x, y], still) = (self.imbalance, [T::constant(0.0); 2]);
         let moment = [x + self.rigid_moment, y].map(T::constant);
@@ -201,7 +188,6 @@ impl Motion {
             .fold(dry, |sum, mode: [T; 2]| [sum[0] + mode[0], sum[1] + mode[1]])
     }
 
-    /// Returns coefficient n of mass times height of hub and liquid above rest, kg m.
     fn mass_height<M: SloshMode>(&self, n: usize, modes: &mut [M]) -> f64 {
         let [x, y] = self.imbalance;
         let moment = |j| [series::constant(j, x + self.rigid_moment), series::constant(j, y)];
@@ -209,9 +195,9 @@ impl Motion {
             + self.hub.tilt.height(n, moment)
     }
 
-    /// Computes coefficient n of every quantity from coefficients up to n of the state, and
-    /// coefficient n + 1 of the state. `ramp` is true if specific force, drag or weight changes,
-    /// `hangs` if there is a suspension line.
+    /// Computes coefficient n of every quantity from coefficients up to n of the state, and coefficient n + 1
+    /// of the state. `ramp` is true if specific force, drag or weight changes, `hangs` if there is a
+    /// suspension line.
     #[inline(always)]
     pub fn derivatives<M: SloshMode>(
         &mut self,
@@ -267,15 +253,14 @@ impl Motion {
         }
     }
 
-    /// Computes order 0 of the derivatives if drag or weight vary.
     #[cold]
     #[inline(never)]
     pub fn derivatives_varying<M: SloshMode>(&mut self, modes: &mut [M], contact: Contact) {
         self.derivatives(0, (true, self.suspension.exists), modes, contact);
     }
 
-    /// Returns the contact from the hub's rate or, at rest, from the torque that the bearing would
-    /// have to hold.
+    /// Returns the contact from the hub's rate or, at rest, from the torque that the bearing would have to
+    /// hold.
     pub fn contact<M: SloshMode>(&mut self, modes: &mut [M], state: &State) -> Contact {
         let omega = state.x[x::OMEGA];
         if !self.law.switches_at_rest() || omega > 0.0 {
@@ -294,7 +279,6 @@ impl Motion {
         self.law.contact_at_rest(net, state.x[x::THETA], state.contact)
     }
 
-    /// Returns the internal steps that a new call may take.
     pub fn steps(&self) -> Steps {
         Steps::new(self.max_steps, ADVICE)
     }
@@ -315,8 +299,8 @@ impl Motion {
         first_root(&rate[behind..=n], h)
     }
 
-    /// Returns the time within `h` at which the torque exceeds the bearing's static friction, and
-    /// the direction.
+    /// Returns the time within `h` at which the torque exceeds the bearing's static friction, and the
+    /// direction of the motion that follows.
     fn time_of_break_away(&self, n: usize, h: f64) -> Option<(f64, Contact)> {
         let (against_backward, against_forward) = self.law.holding_torques(self.hub.theta[0]);
         let root = |sign: f64, hold: f64| {
@@ -334,9 +318,9 @@ impl Motion {
         }
     }
 
-    /// Advances the state by `h`, during which torque and specific force run along their ramps. The gyro takes the
-    /// samples that fall due, which count as steps. If it stops at an event, returns the elapsed time. After an error
-    /// the state is unusable.
+    /// Advances the state by `h`, s, during which torque and specific force follow their ramps. The gyro
+    /// takes the samples that fall due, which count as steps. If the step stops at an event, returns the
+    /// elapsed time. After an error the state is unusable.
     pub fn advance<M: SloshMode>(
         &mut self,
         modes: &mut [M],
@@ -361,8 +345,8 @@ impl Motion {
         !self.varies && !self.suspension.exists
     }
 
-    /// Works like [`Motion::advance`] for one slosh model; `UNROLLED` only for a constant specific force and
-    /// plain motion.
+    /// Does what [`Motion::advance`] does for one slosh model. `UNROLLED` is allowed only for a constant
+    /// specific force and plain motion ([`Motion::is_plain`]).
     #[inline(always)]
     fn advance_along<const UNROLLED: bool, M: SloshMode>(
         &mut self,
@@ -406,8 +390,8 @@ impl Motion {
         Ok(flow)
     }
 
-    /// Returns the integral of the liquid's mass times height over `length`, kg m s, from the
-    /// series of order n, for the work of a ramp of g.
+    /// Returns the integral of the liquid's mass times height over `length`, kg m s, from the series of order
+    /// n. The work of a ramp of g is its slope times this integral.
     #[cold]
     fn integral_of_mass_height<M: SloshMode>(&self, modes: &mut [M], n: usize, length: f64) -> f64 {
         let mut sum = ZERO;
@@ -419,23 +403,21 @@ impl Motion {
     }
 }
 
-/// One stretch of a step, along which torque and specific force are linear in time.
+/// One stretch of a step, along which torque and specific force (`acting`) are linear in time. It and the
+/// expansion after it start at `begin`, s; `event` is the new contact after an event at the expansion's end;
+/// `allowed` are the errors allowed for the rates of hub and liquid, rad/s, and for the friction law's own
+/// state.
 struct Stretch<'a, const UNROLLED: bool, M: SloshMode> {
     motion: &'a mut Motion,
     modes: &'a mut [M],
     state: &'a mut State,
-    /// Torque and specific force from the start of the stretch on.
     acting: (Ramp, Ramp),
     imu: &'a Imu,
     stop: Stop,
-    /// True if the specific force, the drag or the weight changes.
     varies: bool,
-    /// Start of the stretch, and of the expansion after it, s.
     begin: f64,
     t: f64,
-    /// New contact after the event at the expansion's end.
     event: Option<Contact>,
-    /// Allowed errors of the rates of hub and liquid, rad/s, and of the friction law's own state.
     allowed: [f64; 3],
 }
 
@@ -607,7 +589,7 @@ impl<const UNROLLED: bool, M: SloshMode> integrator::Motion for Stretch<'_, UNRO
     }
 }
 
-/// Returns the larger of two magnitudes. A NaN may get lost; it ends the step elsewhere.
+/// Returns the larger of two magnitudes. A NaN may get lost here, because it ends the step elsewhere.
 #[inline(always)]
 fn larger(a: f64, b: f64) -> f64 {
     if b > a { b } else { a }

@@ -11,88 +11,59 @@ use crate::plant::Plant;
 use crate::slosh::{Angles, SloshMode, with_modes};
 use crate::state::{Ranges, STATES, x};
 
-/// The plant's outputs at one instant, or their derivatives.
+/// The plant's outputs at one instant, or their derivatives along a direction. The fields have the names,
+/// units and signs of the FMU's outputs, which its variable table describes; `wave` is the radial and
+/// tangential part of the wave, m, and `baffle_wave` the amplitude at the wall of the first mode's
+/// oscillation, m, 0 without a baffle. The energy balance is energy - energy(0) = work + work_axial - heat.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
 pub struct Outputs {
-    /// Hub angle, rad, not wrapped.
     pub theta: f64,
-    /// Hub rate, rad/s.
     pub omega: f64,
-    /// Hub acceleration, rad/s2.
     pub omega_dot: f64,
-    /// Tangential slosh angle of mode 1, positive towards +theta, rad.
     pub slosh_angle: f64,
-    /// Rate of `slosh_angle`, rad/s.
     pub slosh_rate: f64,
-    /// Radial slosh angle of mode 1, positive outwards, rad.
     pub slosh_angle_radial: f64,
-    /// Rate of `slosh_angle_radial`, rad/s.
     pub slosh_rate_radial: f64,
-    /// Friction torque of the bearing on the hub, N m.
     pub tau_friction: f64,
-    /// Torque of the whole liquid (sloshing and rigid) on the hub, N m.
     pub tau_fluid: f64,
-    /// Gravity torque on the dry hub of a tilted bench, N m.
     pub tau_gravity: f64,
-    /// Torque of the suspension line on the hub, N m.
     pub tau_suspension: f64,
-    /// Force of the whole liquid on the tank along +theta, N.
     pub f_tangential: f64,
-    /// Force of the whole liquid on the tank outwards, N.
     pub f_radial: f64,
-    /// Wave height at the tank's wall by linear theory, m.
     pub wave_height: f64,
-    /// Radial and tangential part of the wave, m.
     pub wave: [f64; 2],
-    /// Amplitude at the wall of the first mode's oscillation, m; 0 without a baffle.
     pub baffle_wave: f64,
-    /// Reading of the gyro, rad/s.
     pub omega_imu: f64,
-    /// Kinetic and potential energy of hub, suspension line and liquid, J.
     pub energy: f64,
-    /// Angular momentum of hub and liquid about the bearing's axis, kg m2/s.
     pub momentum: f64,
-    /// Power dissipated in bearing, suspension line and liquid, W.
     pub power_dissipated: f64,
-    /// Torque of the actuator on the hub within the wheel's limits, N m.
     pub tau_actuator: f64,
-    /// Absolute rate of the wheel's rotor, rad/s.
     pub wheel_speed: f64,
-    /// Work of tau_actuator and tau_ext on the hub since the start, J.
     pub work: f64,
-    /// Work done on the liquid by changes of g_axial since the start, J: energy - energy(0) =
-    /// work + work_axial - heat.
     pub work_axial: f64,
-    /// Energy dissipated in bearing, suspension line and liquid since the start, J.
     pub heat: f64,
-    /// Time spent stuck since the start, s.
     pub stuck_time: f64,
-    /// Damping ratio of the first mode by the baffle, at the current motion.
     pub baffle_zeta: f64,
-    /// Outputs that change only at events.
     pub discrete: Discrete,
 }
 
-/// The outputs that are constant between events.
+/// The outputs that are constant between events: contact, ranges and their reasons, as the FMU's variable
+/// table describes them. `friction_mode` is the number of the [`Contact`] under set-valued friction and 1
+/// under other laws; `event_time`, s, is 0 in a derivative.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
 pub struct Discrete {
-    /// True while dry friction holds the hub at rest.
     pub stuck: bool,
-    /// Amplitude class of the wave.
     pub regime: Regime,
-    /// Reason why the slosh modes do not represent the liquid.
     pub limited_by: LimitedBy,
-    /// True within the range of the baffle's drag law, and without a baffle.
     pub baffle_in_range: bool,
-    /// Set-valued friction: -1 slipping backwards, 0 stuck, 1 slipping forwards; other laws: 1.
     pub friction_mode: i32,
-    /// Number of changes of `friction_mode` since the start.
     pub event_count: i32,
-    /// Time of the last change, s; 0 in a derivative.
     pub event_time: f64,
 }
 
-/// Returns +0 for either zero and any other value unchanged: a plant at rest has no direction.
+/// Returns +0 for either zero and any other value unchanged, because a plant at rest has no direction.
 pub(crate) fn unsigned_zero(x: f64) -> f64 {
     x + 0.0
 }
@@ -107,15 +78,15 @@ impl Plant {
         outputs
     }
 
-    /// Returns [`Plant::outputs`] with contact and regime as of the last event.
+    /// Returns [`Plant::outputs`] with contact and regime as they were after the last event.
     pub fn outputs_held(&mut self, inputs: &Inputs) -> Outputs {
         let work_axial = self.work_axial(inputs);
         self.evaluate(inputs);
         self.present(&self.state.x, inputs.tau_cmd, work_axial)
     }
 
-    /// Returns the outputs, or their derivatives along a direction. `x` is the states or the direction, for which the
-    /// equations must have been evaluated last, with `tau_cmd`.
+    /// Returns the outputs, or their derivatives along a direction. `x` holds the states or the direction for
+    /// which the equations must have been evaluated last, with `tau_cmd`.
     fn present<T: Number>(&self, x: &[f64; STATES], tau_cmd: Ramp, work_axial: T) -> Outputs {
         let (state, motion) = (&self.state, &self.motion);
         let hub = &motion.hub;
@@ -202,16 +173,15 @@ impl Plant {
         }
     }
 
-    /// Returns the viscous damping ratio of mode `n` at the current g_axial, and its rate along
-    /// g_axial's slope, 1/s. Both are 0 for unused modes and at g_axial = 0.
+    /// Returns the viscous damping ratio of mode `n` at the current g_axial, and its rate along g_axial's
+    /// slope, 1/s. Both are 0 for unused modes and at g_axial = 0.
     pub fn damping_ratio(&self, n: usize, inputs: &Inputs) -> [f64; 2] {
         let (damping, g) = (&self.motion.damping, inputs.g_axial);
         [damping.ratio(n, g.value), damping.slope_of_ratio(n, g.value) * g.slope]
     }
 
-    /// Returns the exact derivative of the outputs in the direction (dx, du). Discrete outputs keep
-    /// their current values; contact and wheel are held. The amplitude of a wave has no derivative
-    /// at 0.
+    /// Returns the exact derivative of the outputs in the direction (dx, du). Discrete outputs keep their
+    /// current values; contact and wheel are held. The amplitude of a wave has no derivative at 0.
     pub fn output_derivatives(
         &mut self,
         inputs: &Inputs,

@@ -6,9 +6,9 @@ use crate::parameters::{Parameters, SloshSource};
 use crate::slosh_model::SloshModel;
 
 impl Parameters {
-    /// Returns why the value of a parameter is not used although its part of the model is in use; `None` if it is used,
-    /// or if that part is switched off. `name` is the FMU's, with `_kind` for the integer twin of a Boolean. The
-    /// integer twins must be applied already.
+    /// Returns the reason why the value of a parameter is not used although its part of the model is in use;
+    /// `None` if it is used, or if that part is switched off. `name` is the FMU's, with `_kind` for the
+    /// integer twin of a Boolean. The integer twins must be applied before.
     pub fn overridden(&self, name: &str) -> Option<String> {
         let slosh = &self.slosh;
         if slosh.model == SloshModel::Frozen {

@@ -7,7 +7,6 @@
 
 use crate::slosh_model::SloshModel;
 
-/// All parameters of the plant.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 #[allow(missing_docs)]
 pub struct Parameters {
@@ -24,7 +23,6 @@ pub struct Parameters {
     pub solver: Solver,
 }
 
-/// The rigid hub with the dry tank.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct Hub {
@@ -46,7 +44,6 @@ pub struct Tank {
     pub own_inertia: f64,
 }
 
-/// The liquid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct Fluid {
@@ -55,38 +52,38 @@ pub struct Fluid {
     pub sigma: f64,
 }
 
-/// Source of the modal parameters.
+/// Source of the modal parameters: the dimensions of an upright cylinder, or a table of modes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
+#[allow(missing_docs)]
 pub enum SloshSource {
-    /// Upright cylinder given by its dimensions.
     Geometry = 1,
-    /// A table of modes.
     Table = 2,
 }
 
 impl SloshSource {
-    /// All sources in the order of their numbers.
+    /// All items in the order of their numbers.
     pub const ALL: [SloshSource; 2] = [SloshSource::Geometry, SloshSource::Table];
 }
 
 /// The largest number of slosh modes.
 pub const MODES: usize = 10;
 
-/// Dependence of a mode's drag coefficient c on its natural frequency omega_n.
+/// Dependence of a mode's drag coefficient c on its natural frequency omega_n. `Laminar`, c ~ omega_n^(1/2),
+/// is that of a laminar layer at the wall, for bare tanks. `ConstantRatio`, c ~ omega_n, keeps the damping
+/// ratio, for a measured or specified ratio. `BySource` is `Laminar` if the damping ratio comes from the
+/// correlation and `ConstantRatio` if it is given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
+#[allow(missing_docs)]
 pub enum DampingLaw {
-    /// c ~ omega_n^(1/2): a laminar layer at the wall, for bare tanks.
     Laminar = 1,
-    /// c ~ omega_n: constant damping ratio, for a measured or specified ratio.
     ConstantRatio = 2,
-    /// Laminar if the damping ratio comes from the correlation, constant ratio if it is given.
     BySource = 3,
 }
 
 impl DampingLaw {
-    /// All laws in the order of their numbers.
+    /// All items in the order of their numbers.
     pub const ALL: [DampingLaw; 3] =
         [DampingLaw::Laminar, DampingLaw::ConstantRatio, DampingLaw::BySource];
 }
@@ -108,11 +105,15 @@ pub struct Slosh {
     pub breaking_steepness: f64,
 }
 
-/// Modes of a tank of any shape; 0 for values that are not given.
+/// Modes of a tank of any shape; 0 stands for values that are not given. `nonlinear_inertia` and
+/// `nonlinear_stiffness` are the coefficients s and kappa of the third order in the amplitude, 1 and 1 for a
+/// pendulum. `angle_limit` and `swirl_limit` are the slosh angles, rad, above which a mode, and its rotary
+/// motion, is out of range. `direction` is the angle from the tangent, positive outwards, rad, of the
+/// direction in which a mode moves its mass. `one_axis` is true if the table holds only the modes along one
+/// axis of a tank that also has modes across it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct ModeTable {
-    /// True if the table holds only the modes along one axis of a tank that has others across it.
     pub one_axis: bool,
     pub m_liq: f64,
     pub g_ref: f64,
@@ -124,25 +125,21 @@ pub struct ModeTable {
     pub zeta: [f64; MODES],
     pub wave: [f64; MODES],
     pub wave_number: [f64; MODES],
-    /// Coefficients s and kappa of the third order in the amplitude; 1 and 1 for a pendulum.
     pub nonlinear_inertia: [f64; MODES],
     pub nonlinear_stiffness: [f64; MODES],
-    /// Slosh angles, rad, above which a mode, and its rotary motion, is out of range; 0 if they are not known.
     pub angle_limit: [f64; MODES],
     pub swirl_limit: [f64; MODES],
-    /// Angle of the direction in which a mode moves its mass, from the tangent, positive outwards, rad.
     pub direction: [f64; MODES],
 }
 
 impl ModeTable {
-    /// Returns radial and tangential component of a mode's direction.
     pub(crate) fn direction_components(&self, n: usize) -> [f64; 2] {
         let (sin, cos) = libm::sincos(self.direction[n]);
         [sin, cos]
     }
 
-    /// Returns the pendulum length, m: as given, or from the frequency f at g_ref and the centring
-    /// stiffness, (2 pi f)^2 = g_ref/l + k/m.
+    /// Returns the pendulum length, m: as given, or from the frequency f at g_ref and the centring stiffness
+    /// k, (2 pi f)^2 = g_ref/l + k/m.
     pub(crate) fn pendulum_length(&self, n: usize) -> f64 {
         if self.length[n] > 0.0 {
             return self.length[n];
@@ -160,8 +157,8 @@ pub struct Ring {
     pub depth: f64,
 }
 
-/// Attitude of the bench: its axis is tilted by `tilt`; the component of gravity across the axis points to
-/// `tilt_azimuth`.
+/// Attitude of the bench: its axis is tilted by `tilt`, and the component of gravity across the axis points
+/// to `tilt_azimuth`.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 #[allow(missing_docs)]
 pub struct Bench {
@@ -169,24 +166,22 @@ pub struct Bench {
     pub tilt_azimuth: f64,
 }
 
-/// Friction laws of the bearing. Their files describe when to choose which.
+/// Friction laws of the bearing: viscous friction b omega; a Stribeck curve with sgn(omega) smoothed to
+/// tanh(omega / eps), or set-valued so that the hub can stick; and LuGre, with bristles that deflect before
+/// they slide. Their files describe when to choose which one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
+#[allow(missing_docs)]
 pub enum FrictionModel {
-    /// Bearing without friction.
     None = 1,
-    /// Viscous friction b omega.
     Viscous = 2,
-    /// Stribeck curve with sgn(omega) smoothed to tanh(omega / eps).
     StribeckSmooth = 3,
-    /// Stribeck curve as a set-valued law: the hub can stick.
     Stribeck = 4,
-    /// LuGre: bristles that deflect before they slide.
     Lugre = 5,
 }
 
 impl FrictionModel {
-    /// All laws in the order of their numbers.
+    /// All items in the order of their numbers.
     pub const ALL: [FrictionModel; 5] = [
         FrictionModel::None,
         FrictionModel::Viscous,
@@ -196,8 +191,8 @@ impl FrictionModel {
     ];
 }
 
-/// Friction of the bearing. `harmonics_forward` and `harmonics_backward` are the coefficients of
-/// cos theta, sin theta, cos 2 theta, sin 2 theta.
+/// Friction of the bearing. `harmonics_forward` and `harmonics_backward` are the coefficients of cos theta,
+/// sin theta, cos 2 theta, sin 2 theta.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct Friction {
@@ -226,7 +221,6 @@ pub struct Init {
     pub slosh_rate_radial: f64,
 }
 
-/// The reaction wheel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct Wheel {
@@ -238,7 +232,6 @@ pub struct Wheel {
     pub tau_max: f64,
 }
 
-/// The rate gyro on the hub.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct Imu {
@@ -253,8 +246,8 @@ pub struct Imu {
     pub seed: i32,
 }
 
-/// Limits of the integrator. `max_steps` is the number of internal steps and gyro samples that one
-/// call may take.
+/// Limits of the integrator. `max_steps` is the number of internal steps and gyro samples that one call may
+/// take.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct Solver {
@@ -376,7 +369,7 @@ impl Default for Imu {
 }
 
 impl Default for Solver {
-    /// Allows so many steps that a step of one mode takes at most a fraction of a second, and of ten
+    /// Allows so many steps that a step with one mode takes at most a fraction of a second, and one with ten
     /// spherical modes about six seconds.
     fn default() -> Self {
         Solver { max_steps: 200_000 }

@@ -10,46 +10,44 @@ use crate::amplitude::Growth;
 use crate::baffle::Baffle;
 use crate::parameters::Init;
 
-/// Largest angle between the start of mode 1 and its direction, rad, as rounding of decimals causes
-/// it.
+/// Largest angle, rad, between the start of mode 1 and its direction that counts as rounding of decimals.
 const ALONG: f64 = 1e-6;
 
 /// Largest step as a share of the time to the nearest singularity of the drag's power series.
 const SHARE_OF_RADIUS: f64 = 0.5;
 
 /// One slosh mode as a pendulum with its hinge on the tank's axis.
+///
+/// - `m`, `l`: mass of the bob, kg, and length, m, with `inv_l` = 1/l.
+/// - `c`: viscous coefficient of the bob relative to the tank, N s/m, with `c_m` = c/m; `c_0` is that at the
+///   reference g, and `course` is c over its value at the start of the expansion.
+/// - `r`: distance of the hinge from the bearing axis, m.
+/// - `along`: unit vector (n_x, n_t), radial and tangential, of the motion in models that move along one
+///   direction, with `r_x` = r n_x, `r_t` = r n_t and `r_l` = r_t/l; (0, 1) is the tangent.
+/// - `wave`: elevation of the wave at the wall per slosh angle, m/rad, 2 R/(xi_n^2 - 1) in a cylinder.
+/// - `spring`, `s`, `l_s`, `l2_s`: coefficient h of the quartic spring, 1/m2, and coefficient s of the inertia
+///   that grows with the amplitude, with l/s and l^2/s; only `third_order.rs` uses them.
+/// - `g`, `omega_n`: restoring specific force g + a_n, m/s2, with its rate, and sqrt((g + a_n)/l), rad/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pendulum {
-    /// Mass of the bob, kg.
     pub m: f64,
-    /// Length, m.
     pub l: f64,
-    /// Viscous coefficient of the bob relative to the tank, N s/m, now and at the reference g.
     pub c: f64,
     pub c_0: f64,
-    /// Distance of the hinge from the bearing axis, m.
     pub r: f64,
-    /// Direction of the bob's motion, radial and tangential, a unit vector, for models that move along one direction;
-    /// (0, 1) is the tangent. r_x = r n_x and r_t = r n_t.
     pub along: [f64; 2],
     pub r_x: f64,
     pub r_t: f64,
-    /// c/m, r_t/l and 1/l: quotients that every order of every step needs.
     pub c_m: f64,
     pub r_l: f64,
     pub inv_l: f64,
-    /// Wall elevation per slosh angle, m/rad: a_n = 2 R / (xi_n^2 - 1) in a cylinder.
     pub wave: f64,
-    /// Coefficient h of the quartic spring, 1/m2 (`third_order.rs` only).
     pub spring: f64,
-    /// Coefficient of the inertia that grows with the amplitude, l/s and l^2/s (`third_order.rs` only).
     pub s: f64,
     pub l_s: f64,
     pub l2_s: f64,
-    /// Restoring specific force g + a_n, m/s2, and its rate; sqrt((g + a_n)/l), rad/s.
     pub g: [f64; 2],
     pub omega_n: f64,
-    /// c relative to its value at the start of the expansion.
     pub course: Series,
     pub baffle: Baffle,
     pub growth: Growth,
@@ -84,27 +82,25 @@ impl Default for Pendulum {
 }
 
 impl Pendulum {
-    /// Sets the restoring specific force and its rate.
     pub fn set_restoring(&mut self, g: [f64; 2]) {
         self.g = g;
         self.omega_n = libm::sqrt(f64::max(g[0], 0.0) / self.l);
     }
 
-    /// Sets the viscous coefficient, `factor` times that at the reference g, and its further
-    /// course.
+    /// Sets the viscous coefficient, `factor` times that at the reference g, and its further course.
     pub fn set_damping(&mut self, factor: f64, course: Series) {
         self.c = factor * self.c_0;
         self.c_m = self.c / self.m;
         self.course = course;
     }
 
-    /// Returns true if the drag depends on the amplitude of the motion.
     #[inline(always)]
     pub fn follows_amplitude(&self) -> bool {
         self.baffle.zeta > 0.0 || self.growth.acts
     }
 
-    /// Adds the drag of the baffle and the amplitude-dependent drag, at [|q|^2, |q'|^2], squares of angle and rate.
+    /// Adds the drag of the baffle and the amplitude-dependent drag at [|q|^2, |q'|^2], the squares of angle
+    /// and rate.
     pub fn add_amplitude_drag(&mut self, at: [f64; 2]) {
         let w = self.g.map(|g| g * self.inv_l);
         if self.baffle.zeta > 0.0 {
@@ -117,15 +113,15 @@ impl Pendulum {
         self.course[0] = 1.0;
     }
 
-    /// Sets coefficient n of the course of the drag from those of [|q|^2, |q'|^2].
+    /// Sets coefficient n of the course of the drag from coefficient n of [|q|^2, |q'|^2].
     pub fn expand_drag(&mut self, n: usize, at: [f64; 2]) {
         let Pendulum { baffle, growth, .. } = self;
         let other = if baffle.zeta > 0.0 { baffle.expand(n, at) } else { growth.viscous[n] };
         self.course[n] = if growth.acts { growth.expand(n, at, other) } else { other };
     }
 
-    /// Returns the time over which the series of the amplitude-dependent drag converge reliably, s, from coefficients 0 to
-    /// 2.
+    /// Returns the time, s, over which the series of the amplitude-dependent drag converge reliably, from
+    /// coefficients 0 to 2.
     pub fn convergence_radius(&self) -> f64 {
         let baffle =
             if self.baffle.zeta > 0.0 { self.baffle.convergence_radius() } else { f64::INFINITY };
@@ -134,8 +130,8 @@ impl Pendulum {
         SHARE_OF_RADIUS * baffle.min(growth)
     }
 
-    /// Returns the error of the bob's rate, rad/s, that the series of its amplitude-dependent drag cause up to order n and
-    /// `h` after the start of the expansion.
+    /// Returns the error of the bob's rate, rad/s, that the series of its amplitude-dependent drag up to
+    /// order n cause at `h` after the start of the expansion.
     pub fn defect(&self, n: usize, h: f64) -> f64 {
         let Pendulum { baffle, growth, course, .. } = self;
         let [mut drag, mut rate2] = [0.0; 2];
@@ -150,13 +146,13 @@ impl Pendulum {
         self.c_m * off * libm::sqrt(rate2) * h
     }
 
-    /// Returns true if the bob moves in another direction than the tangent.
     #[inline(always)]
     pub fn is_askew(&self) -> bool {
         self.along[0] != 0.0
     }
 
-    /// Returns why mode 1 cannot start as `init` asks: it moves along its direction, and the start is not along it.
+    /// Returns the reason, if any, why mode 1 cannot start as `init` asks: it moves along its direction, and
+    /// the start is not along it.
     pub fn start_problem(&self, init: &Init) -> Option<String> {
         let [x, t] = self.along;
         let starts = [
@@ -181,7 +177,6 @@ impl Pendulum {
         })
     }
 
-    /// Returns radial and tangential part of a quantity along the bob's direction.
     #[inline(always)]
     pub fn spread<T: Number>(&self, a: T) -> [T; 2] {
         let [x, t] = self.along;
@@ -202,32 +197,29 @@ impl Pendulum {
         if self.is_askew() { [x * q_x + t * q_y, x * x_d + t * y_d] } else { [q_y, y_d] }
     }
 
-    /// Returns coefficient n of a_x n_x + a_t n_t, for a vector a.
+    /// Returns coefficient n of a_x n_x + a_t n_t, the component of a vector a along the bob's direction.
     #[inline(always)]
     pub fn component(&self, n: usize, [a_x, a_t]: &[Series; 2]) -> f64 {
         self.along[0] * a_x[n] + self.along[1] * a_t[n]
     }
 
-    /// Returns coefficient n of (a_x n_x + a_t n_t) b.
     #[inline(always)]
     pub fn component_times(&self, n: usize, [a_x, a_t]: &[Series; 2], b: &Series) -> f64 {
         let radial = if self.is_askew() { self.along[0] * mul(n, a_x, b) } else { 0.0 };
         radial + self.along[1] * mul(n, a_t, b)
     }
 
-    /// Returns coefficient n of (a_x n_t - a_t n_x) b.
+    /// Returns coefficient n of (a_x n_t - a_t n_x) b, the component across the bob's direction times b.
     #[inline(always)]
     pub fn across_times(&self, n: usize, [a_x, a_t]: &[Series; 2], b: &Series) -> f64 {
         let tangential = if self.is_askew() { self.along[0] * mul(n, a_t, b) } else { 0.0 };
         self.along[1] * mul(n, a_x, b) - tangential
     }
 
-    /// Returns restoring specific force and viscous coefficient at the start of an expansion.
     pub fn restoring_and_drag<T: Number>(&self) -> [T; 2] {
         [T::with_slope(self.g[0], self.g[1]), T::with_slope(self.c, self.c * self.course[1])]
     }
 
-    /// Returns coefficient n of g a; `varies` is true if g changes.
     #[inline(always)]
     pub fn weight(&self, n: usize, varies: bool, a: &Series) -> f64 {
         if varies { mul_ramp(n, &self.g, a) } else { self.g[0] * a[n] }

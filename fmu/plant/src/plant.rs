@@ -28,16 +28,15 @@ use crate::state::{Axial, Ranges, STATES, State, x};
 use crate::tank::{self, Calculated};
 use crate::wheel::{self, Piece};
 
-/// Hub, bearing, tank, wheel and gyro.
+/// Hub, bearing, tank, wheel and gyro, with their state and the series of the equations of motion.
 #[derive(Clone, Debug)]
 pub struct Plant {
     calculated: Calculated,
     pub(crate) hub_inertia: f64,
-    /// Mass and inertia of the rigid liquid, kg, kg m2; distance of the tank, m.
+    /// Mass and inertia of the rigid liquid, kg, kg m2, and distance of the tank, m.
     pub(crate) m_0: f64,
     pub(crate) i_0: f64,
     pub(crate) r: f64,
-    /// Wall elevation per slosh angle of each mode, m/rad, and the tank's radius, m.
     pub(crate) wave: [f64; MODES],
     pub(crate) radius: f64,
     pub(crate) baffle: Option<Range>,
@@ -47,41 +46,37 @@ pub struct Plant {
     pub(crate) motion: Box<Motion>,
     pub(crate) liquid: Liquid,
     pub(crate) state: State,
-    /// Times of the host that differ by less are the same, s.
+    /// Times of the host that differ by less than this, s, are the same.
     pub(crate) resolution: f64,
-    /// The step that has stopped at an event, until it is continued.
     pub(crate) stopped: Option<StoppedStep>,
 }
 
-/// End of a step that stops at events.
+/// The way in which a step that may stop at events has ended: at its `End`, at its end together with an
+/// event, or before its end at an event this long after the beginning, s.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
 pub enum StepEnd {
-    /// The end of the step.
     End,
-    /// The end of the step, with an event there.
     EventAtEnd,
-    /// An event before the end, this long after the beginning, s.
     Event(f64),
 }
 
-/// A step that has stopped at an event. To continue it, the plant repeats it from its start and passes this event. The
-/// motion is thus bit-identical whether a host stops at events or not.
+/// A step that has stopped at an event. To continue it, the plant repeats it from its `start` and passes this
+/// event, so that the motion is bit-identical whether a host stops at events or not. `h` is the length of the
+/// step and `passed` the elapsed time, s; `inputs` are tau_cmd, tau_ext and g_axial during the step; `time`
+/// and `x` belong to the event.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StoppedStep {
-    /// State at the start of the step.
     start: State,
-    /// Length of the step, and elapsed time, s.
     h: f64,
     passed: f64,
-    /// Inputs during the step: tau_cmd, tau_ext, g_axial.
     inputs: [f64; 3],
-    /// Time and states at the event.
     time: f64,
     x: [f64; STATES],
 }
 
 impl StoppedStep {
-    /// Number of words of a saved state.
+    /// Number of words of a saved step.
     pub const WORDS: usize = State::WORDS + 6 + STATES;
 
     /// Returns the stopped step as words, for saving.
@@ -116,7 +111,8 @@ impl StoppedStep {
         })
     }
 
-    /// Returns true if a step of length `h` from the current state continues the stopped step: same end, same inputs.
+    /// Returns true if a step of length `h` from the current state continues the stopped step: it has the
+    /// same end and the same inputs.
     fn is_continued_by(&self, state: &State, inputs: &Inputs, h: f64, resolution: f64) -> bool {
         let left = self.h - self.passed;
         let is_same = |a: f64, b: f64| (a - b).abs() <= resolution.max(rounding(self.h));
@@ -129,7 +125,6 @@ impl StoppedStep {
     }
 }
 
-/// Returns the rounding errors of durations within a step of length `h`, s.
 fn rounding(h: f64) -> f64 {
     4.0 * f64::EPSILON * h
 }
@@ -143,11 +138,11 @@ impl Plant {
         problems
     }
 
-    /// Creates a plant at the start of its motion, at `start_time` (s), with the inputs that act
-    /// then. `tolerance` is the allowed relative error of rates and angles.
+    /// Creates a plant at the start of its motion, at `start_time` (s), with the inputs that act then.
+    /// `tolerance` is the allowed relative error of rates and angles.
     ///
-    /// # Errors
-    /// Lists all problems of combined parameters. The caller must check the ranges of single parameters.
+    /// # Errors Lists all problems of combined parameters. The caller must check the ranges of single
+    /// parameters.
     pub fn new(
         p: &Parameters,
         inputs: &Inputs,
@@ -198,14 +193,14 @@ impl Plant {
         Ok(plant)
     }
 
-    /// Lists where parameters and specific force are outside the known range of the models, one
-    /// sentence each.
+    /// Lists where parameters and specific force are outside the known range of the models, one sentence
+    /// each.
     pub fn warnings(p: &Parameters, inputs: &Inputs) -> Vec<String> {
         tank::warnings(p, inputs.g_axial.value)
     }
 
-    /// Creates a plant that continues from a saved state of one with the same parameters, which
-    /// pass [`Plant::problems`].
+    /// Creates a plant that continues from a saved state of a plant with the same parameters, which pass
+    /// [`Plant::problems`].
     pub fn resume(p: &Parameters, state: &State, tolerance: f64) -> Plant {
         Plant::with_state(p, *state, tolerance)
     }
@@ -265,7 +260,7 @@ impl Plant {
         &self.state
     }
 
-    /// Restores a saved state of this plant or of one with the same parameters.
+    /// Restores a saved state of this plant or of a plant with the same parameters.
     pub fn set_state(&mut self, state: &State) {
         self.state = *state;
     }
@@ -282,8 +277,7 @@ impl Plant {
 
     /// Advances by exactly `h` > 0 seconds, with the inputs along their ramps.
     ///
-    /// # Errors
-    /// See [`StepError`]; the plant is unchanged.
+    /// # Errors See [`StepError`]; the plant is unchanged.
     pub fn step(&mut self, inputs: &Inputs, h: f64) -> Result<(), StepError> {
         let before = self.state;
         let done = self.advance(inputs, h, f64::INFINITY);
@@ -293,12 +287,11 @@ impl Plant {
         done.map(|_| ())
     }
 
-    /// Works like [`Plant::step`], but stops at the first event: the hub sticks or slips, the wheel reaches a limit,
-    /// the gyro takes a sample. A step from there to the same end with the same inputs continues as if it had not
-    /// stopped.
+    /// Advances as [`Plant::step`] does, but stops at the first event: the hub sticks or slips, the wheel
+    /// reaches a limit, or the gyro takes a sample. A step from there to the same end with the same inputs
+    /// continues as if it had not stopped.
     ///
-    /// # Errors
-    /// The same as for [`Plant::step`].
+    /// # Errors The same as for [`Plant::step`].
     pub fn step_to_event(&mut self, inputs: &Inputs, h: f64) -> Result<StepEnd, StepError> {
         let (before, stopped) = (self.state, self.stopped.take());
         let (mut length, mut passed, mut begun) = (h, -1.0, 0.0);
@@ -334,8 +327,9 @@ impl Plant {
         Ok(StepEnd::Event(passed - begun))
     }
 
-    /// Works like [`Plant::step`], but an error leaves the state unusable, and the step stops at the first event later
-    /// than `passed` seconds after its start. Returns the time of that event after the start, s.
+    /// Advances as [`Plant::step`] does, but an error leaves the state unusable, and the step stops at the
+    /// first event later than `passed` seconds after its start. Returns the time of that event after the
+    /// start, s.
     #[inline(always)]
     fn advance(
         &mut self,
@@ -398,10 +392,9 @@ impl Plant {
         Ok(stopped.map_or(ControlFlow::Continue(()), ControlFlow::Break))
     }
 
-    /// Returns the work of changes of g_axial since the start, J, including the current one. A jump
-    /// does the work of g_axial's change times the liquid's mass times height. For a host that
-    /// integrates itself, the work since its last accepted step comes from Hermite's rule, with
-    /// g_axial linear in time.
+    /// Returns the work of changes of g_axial since the start, J, including the current one. A jump does the
+    /// work of g_axial's change times the liquid's mass times height. For a host that integrates itself, the
+    /// work since its last accepted step comes from Hermite's rule, with g_axial linear in time.
     pub(crate) fn work_axial(&mut self, inputs: &Inputs) -> f64 {
         let last = self.state.axial;
         let change = inputs.g_axial.value - last.g;
@@ -428,13 +421,12 @@ impl Plant {
         c(last.work) + change * mean
     }
 
-    /// Returns mass times height of hub and liquid above rest, kg m, and its rate, at the last evaluation of the
-    /// equations.
+    /// Returns mass times height of hub and liquid above rest, kg m, and its rate, at the last evaluation of
+    /// the equations.
     pub(crate) fn height<T: Number>(&self) -> [T; 2] {
         with_modes!(&self.liquid, modes => self.motion.height(modes))
     }
 
-    /// Evaluates the equations at the current instant.
     pub(crate) fn evaluate(&mut self, inputs: &Inputs) {
         let tau_actuator = self.wheel.torque(self.state.x[x::WHEEL_SPEED], inputs.tau_cmd);
         let tau = Ramp::held(tau_actuator.value + inputs.tau_ext.value);
@@ -450,21 +442,19 @@ impl Plant {
         });
     }
 
-    /// Returns the contact from the hub's rate or, at rest, from the torques.
     pub(crate) fn present_contact(&mut self, inputs: &Inputs) -> Contact {
         self.evaluate(inputs);
         with_modes!(&mut self.liquid, modes => self.motion.contact(modes, &self.state))
     }
 
-    /// Returns the ranges of the current motion.
     pub(crate) fn present_ranges(&mut self, inputs: &Inputs) -> Ranges {
         let outputs = self.outputs_held(inputs);
         self.evaluate_ranges(&outputs)
     }
 
     /// Gives the hub the contact for the current inputs, and returns the previous one for
-    /// [`Plant::revert_contact`]. Torque that has changed since the last step may already have
-    /// broken the hub away, or may undo a break-away of this instant.
+    /// [`Plant::revert_contact`]. Torque that has changed since the last step may already have broken the hub
+    /// away, or may undo a break-away of this instant.
     pub fn apply_present_contact(&mut self, inputs: &Inputs) -> Contact {
         let before = self.state.contact;
         if self.omega() == 0.0 {
@@ -473,7 +463,8 @@ impl Plant {
         before
     }
 
-    /// Works like [`Plant::apply_present_contact`], but permanently: the next step begins with this contact.
+    /// Does what [`Plant::apply_present_contact`] does, but permanently: the next step begins with this
+    /// contact.
     pub fn take_present_contact(&mut self, inputs: &Inputs) {
         if self.omega() == 0.0 {
             let (contact, time) = (self.present_contact(inputs), self.state.time);
@@ -481,7 +472,7 @@ impl Plant {
         }
     }
 
-    /// Undoes [`Plant::apply_present_contact`].
+    /// Undoes [`Plant::apply_present_contact`], whose result is `before`.
     pub fn revert_contact(&mut self, before: Contact) {
         self.state.contact = before;
     }

@@ -37,7 +37,6 @@ models! {
     Liquid = 5, "liquid", "Modes to third order in their amplitude: of an upright cylinder mode 1 from potential flow, of other tanks by slosh.table";
 }
 
-/// F and M of a pendulum that hangs obliquely (`leaning.rs`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Oblique {
     pub stiffness: f64,
@@ -45,7 +44,6 @@ pub(crate) struct Oblique {
 }
 
 impl SloshModel {
-    /// Returns true if a mode moves along one direction only.
     pub(crate) fn moves_along_one(self) -> bool {
         match self {
             SloshModel::Frozen | SloshModel::Linear | SloshModel::Planar => true,
@@ -53,7 +51,8 @@ impl SloshModel {
         }
     }
 
-    /// Returns the amplitude at the end of the model's range: an angle, rad, or displacement over length.
+    /// Returns the amplitude at the end of the model's range: an angle, rad, or a displacement over the
+    /// length.
     pub(crate) fn largest_amplitude(self) -> f64 {
         match self {
             SloshModel::Frozen
@@ -64,8 +63,8 @@ impl SloshModel {
         }
     }
 
-    /// Returns the shifts of omega^2 over the squared angle, in planar and in circular motion, of a mode with the
-    /// coefficients s and kappa; `None` for a motion that the model does not have.
+    /// Returns the relative shifts of omega^2 per squared angle, in planar and in circular motion, of a mode
+    /// with the coefficients s and kappa; `None` for a motion that the model does not have.
     pub(crate) fn shifts(self, s: f64, kappa: f64) -> [Option<f64>; 2] {
         match self {
             SloshModel::Frozen | SloshModel::Linear => [Some(0.0), None],
@@ -75,8 +74,8 @@ impl SloshModel {
         }
     }
 
-    /// Returns F and M of a pendulum with the coefficients s and kappa that hangs obliquely by the slope `slope`, whose
-    /// tangential part, squared, is `n2`.
+    /// Returns F and M of a pendulum with the coefficients s and kappa that hangs obliquely by the slope
+    /// `slope`, whose tangential part, squared, is `n2`.
     pub(crate) fn oblique(self, slope: f64, n2: f64, (s, kappa): (f64, f64)) -> Oblique {
         let s2 = slope * slope;
         match self {
@@ -100,8 +99,8 @@ impl SloshModel {
     }
 }
 
-/// Returns u of u (1 + H u^2) = s by Newton's method. For a softening spring it is the solution nearest to 0, if one
-/// exists.
+/// Returns the solution u of u (1 + H u^2) = s by Newton's method. For a softening spring it is the solution
+/// nearest to 0, if one exists.
 fn rest(spring: f64, slope: f64) -> f64 {
     let mut u = if spring > 0.0 { slope } else { 0.0 };
     for _ in 0..60 {

@@ -8,61 +8,49 @@ use taylor::integrator::MAX_MAGNITUDE;
 use crate::contact::Contact;
 use crate::imu::{FLICKERS, Gyro};
 
-/// Indices of the continuous states in x. A new one is a new constant before [`x::SLOSH`].
+/// Indices of the continuous states in x: hub angle `THETA`, rad, and rate `OMEGA`, rad/s; `WORK` of
+/// tau_actuator and tau_ext and dissipated `HEAT` since the start, J; `STUCK_TIME`, s; absolute rate
+/// `WHEEL_SPEED` of the rotor, rad/s; deflection `BRISTLE` of LuGre friction, rad. A new state is a new
+/// constant before [`x::SLOSH`].
+#[allow(missing_docs)]
 pub mod x {
     use crate::parameters::MODES;
 
-    /// Hub angle, rad.
     pub const THETA: usize = 0;
-    /// Hub rate, rad/s.
     pub const OMEGA: usize = 1;
-    /// Work of tau_actuator and tau_ext since the start, J.
     pub const WORK: usize = 2;
-    /// Energy dissipated since the start, J.
     pub const HEAT: usize = 3;
-    /// Time spent stuck since the start, s.
     pub const STUCK_TIME: usize = 4;
-    /// Absolute rate of the wheel's rotor, rad/s.
     pub const WHEEL_SPEED: usize = 5;
-    /// Deflection of the bearing's bristles (LuGre friction), rad.
     pub const BRISTLE: usize = 6;
-    /// First of the slosh coordinates: q_x, q_y, q_x', q_y' of mode 1, then of mode 2, … Their unit
-    /// depends on the slosh model. Unused modes stay at 0.
+    /// First of the slosh coordinates: q_x, q_y, q_x', q_y' of mode 1, then of mode 2, … Their unit depends
+    /// on the slosh model. Unused modes stay at 0.
     pub const SLOSH: usize = 7;
-    /// Number of continuous states.
     pub const COUNT: usize = SLOSH + 4 * MODES;
 }
 
 /// Number of continuous states.
 pub const STATES: usize = x::COUNT;
 
-/// Indices of the event indicators: functions that are positive between events and cross zero at
-/// them.
+/// Indices of the event indicators: functions that are positive between events and cross zero at them. The
+/// hub comes to rest or, stuck, breaks away; the command passes a torque limit of the wheel or changes its
+/// sign; the rotor reaches its highest or lowest speed.
+#[allow(missing_docs)]
 pub mod indicator {
-    /// The hub comes to rest.
     pub const REST: usize = 0;
-    /// A stuck hub breaks away forwards.
     pub const BREAK_AWAY_FORWARD: usize = 1;
-    /// A stuck hub breaks away backwards.
     pub const BREAK_AWAY_BACKWARD: usize = 2;
-    /// The command passes the wheel's torque limit.
     pub const TORQUE_MAX: usize = 3;
-    /// The command passes minus the wheel's torque limit.
     pub const TORQUE_MIN: usize = 4;
-    /// The command to the wheel changes its sign.
     pub const TORQUE_SIGN: usize = 5;
-    /// The rotor reaches its highest speed.
     pub const SPEED_MAX: usize = 6;
-    /// The rotor reaches its lowest speed.
     pub const SPEED_MIN: usize = 7;
-    /// Number of event indicators.
     pub const COUNT: usize = 8;
 }
 
 /// Number of event indicators.
 pub const INDICATORS: usize = indicator::COUNT;
 
-/// Validity ranges of the motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Ranges {
     pub regime: Regime,
@@ -74,44 +62,39 @@ pub(crate) struct Ranges {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct State {
     pub(crate) time: f64,
-    /// The continuous states, by the indices in [`x`].
     pub(crate) x: [f64; STATES],
     pub(crate) contact: Contact,
-    /// Ranges of the motion since the last event, for hosts that integrate themselves.
     pub(crate) ranges: Ranges,
     pub(crate) event_count: i32,
     pub(crate) event_time: f64,
-    /// Time since the start, s, and what rounding has taken from it. It is the sum of the steps' lengths, because a host's clock
-    /// may be off by rounding, may drift, or start at 1e9 s.
+    /// Time since the start, s, and its rounding error. It is the sum of the steps' lengths, because a host's
+    /// clock may be off by rounding, may drift, or start at 1e9 s.
     pub(crate) elapsed: [f64; 2],
-    /// g_axial at the start, to which the slosh damping belongs.
+    /// g_axial at the start, m/s2, for which the slosh damping is given.
     pub(crate) start_g: f64,
     pub(crate) axial: Axial,
     pub(crate) gyro: Gyro,
 }
 
-/// Work done by a changing g_axial.
+/// Work done by a changing g_axial since the start, J, and the g_axial, m/s2, up to which it is known.
+/// `accepted` is the last accepted step of a host that integrates itself; after a step of the plant's own it
+/// is empty, because g_axial then changes at an instant.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub(crate) struct Axial {
-    /// Work since the start, J, and the g_axial up to which it is known, m/s2.
     pub work: f64,
     pub g: f64,
-    /// The last accepted step of a host that integrates itself. After a step of the plant's own there is none: g_axial then
-    /// changes at an instant.
     pub accepted: Option<Accepted>,
 }
 
-/// The liquid at the end of an accepted step.
+/// The liquid at the end of an accepted step: mass times height, kg m, and its rate.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub(crate) struct Accepted {
     pub time: f64,
-    /// Mass times height, kg m, and its rate.
     pub mass_height: f64,
     pub rate: f64,
 }
 
 impl Axial {
-    /// Returns true if all values and their squares are finite.
     pub(crate) fn is_finite(&self) -> bool {
         let Accepted { time, mass_height, rate } = self.accepted.unwrap_or_default();
         [self.work, self.g, time, mass_height, rate].iter().all(|x| x.abs() < MAX_MAGNITUDE)
@@ -122,7 +105,6 @@ impl State {
     /// Number of words of a saved state.
     pub const WORDS: usize = 2 + Self::REALS;
 
-    /// Number of words that are real numbers; the last of them are x.
     const REALS: usize = 13 + FLICKERS + STATES;
 
     /// Returns the state as words, for saving.
@@ -213,17 +195,15 @@ impl State {
         })
     }
 
-    /// Returns the coordinates of each slosh mode, see `slosh`.
     pub(crate) fn slosh(&self) -> &[[f64; 4]] {
         self.x[x::SLOSH..].as_chunks().0
     }
 
-    /// Returns [`State::slosh`], mutable.
     pub(crate) fn slosh_mut(&mut self) -> &mut [[f64; 4]] {
         self.x[x::SLOSH..].as_chunks_mut().0
     }
 
-    /// Moves the clock to `t` after `begin`, a time of the host and the time since the start, s.
+    /// Moves the clock to `t` after `begin`, which is a time of the host and the time since the start, s.
     pub(crate) fn set_clock(&mut self, begin: (f64, [f64; 2]), t: f64) {
         let (time, [before, rest]) = begin;
         self.time = time + t;

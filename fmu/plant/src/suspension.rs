@@ -19,7 +19,6 @@ pub(crate) struct Suspension {
     k: f64,
     theta_0: f64,
     c: f64,
-    /// True if the hub hangs from a line.
     pub exists: bool,
 }
 
@@ -29,13 +28,11 @@ impl Suspension {
         Suspension { k, theta_0, c, exists: k > 0.0 || c > 0.0 }
     }
 
-    /// Returns coefficient n of tau_s.
     #[inline(always)]
     pub fn torque(&self, n: usize, hub: &HubMotion) -> f64 {
         -self.k * (hub.theta[n] - constant(n, self.theta_0)) - self.c * hub.omega[n]
     }
 
-    /// Returns coefficient n of c w^2.
     #[inline(always)]
     pub fn dissipation(&self, n: usize, hub: &HubMotion) -> f64 {
         self.c * hub.omega2[n]

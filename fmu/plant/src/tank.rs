@@ -27,28 +27,24 @@ use crate::parameters::{MODES, ModeTable, Parameters, Slosh, SloshSource};
 use crate::pendulum::Pendulum;
 use crate::slosh_model::SloshModel;
 
-/// Values calculated from the parameters; 0 for unused modes.
+/// Values calculated from the parameters; 0 for unused modes. `m_liq` and `m_0` are the masses of the whole
+/// and of the rigid liquid, kg, and `bond` is the Bond number rho g R^2 / sigma. Each mode has the pendulum's
+/// mass, kg, and length, m (on a tilted bench those of oblique pendulums with the frequencies), its natural
+/// frequency, Hz (on an upright bench sqrt((g + a)/l) / 2 pi), its damping ratio, and the increase of g
+/// equivalent to the centring stiffness, a_n, m/s2.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
+#[allow(missing_docs)]
 pub struct Calculated {
-    /// Mass of the whole liquid, kg.
     pub m_liq: f64,
-    /// Mass of the rigid liquid, kg.
     pub m_0: f64,
-    /// Bond number rho g R^2 / sigma.
     pub bond: f64,
-    /// Pendulum masses, kg.
     pub mass: [f64; MODES],
-    /// Pendulum lengths, m; on a tilted bench those of oblique pendulums with the frequencies.
     pub length: [f64; MODES],
-    /// Natural frequencies, Hz; on an upright bench sqrt((g + a)/l) / 2 pi.
     pub frequency: [f64; MODES],
-    /// Damping ratios.
     pub damping: [f64; MODES],
-    /// Increase of g equivalent to the centring stiffness, a_n, m/s2.
     pub centring: [f64; MODES],
 }
 
-/// Lists problems of a table of modes.
 pub(crate) fn problems(p: &Parameters) -> Vec<String> {
     let (slosh, table) = (&p.slosh, &p.slosh.table);
     let mut problems = baffle::problems(p);
@@ -136,7 +132,6 @@ pub(crate) fn problems(p: &Parameters) -> Vec<String> {
 }
 
 impl ModeTable {
-    /// Returns true if a mode moves in another direction than the tangent.
     pub(crate) fn is_askew(&self, modes: usize) -> bool {
         self.direction[..modes].iter().any(|direction| *direction != 0.0)
     }
@@ -154,8 +149,8 @@ impl ModeTable {
         sum / 2.0 + libm::hypot(half, cross)
     }
 
-    /// Returns the smallest inertia of the liquid at the distance r in the model `planar`, kg m2: m_0 r^2 and of each
-    /// mode the smallest J = m [r_x^2 + 2 r_x l s + (r_t^2 + l^2) s^2] over s from -1 to 1.
+    /// Returns the smallest inertia of the liquid at the distance r in the model `planar`, kg m2: m_0 r^2 and
+    /// of each mode the smallest J = m [r_x^2 + 2 r_x l s + (r_t^2 + l^2) s^2] over s from -1 to 1.
     fn least_inertia(&self, modes: usize, r: f64) -> f64 {
         let of_mode = |n: usize| {
             let ([n_x, n_t], l) = (self.direction_components(n), self.pendulum_length(n));
@@ -168,7 +163,6 @@ impl ModeTable {
     }
 }
 
-/// Lists warnings about the parameters at the specific force `g`.
 pub(crate) fn warnings(p: &Parameters, g: f64) -> Vec<String> {
     let (slosh, radius) = (&p.slosh, p.tank.d / 2.0);
     let geometry = slosh.source == SloshSource::Geometry;
@@ -222,13 +216,12 @@ pub(crate) fn warnings(p: &Parameters, g: f64) -> Vec<String> {
 }
 
 impl Slosh {
-    /// Returns true if a mode's damping ratio depends on its amplitude.
     pub(crate) fn damping_grows(&self) -> bool {
         self.zeta_amplitude > 0.0 || self.zeta_breaking > 0.0
     }
 
-    /// Returns the breaking of mode `n`, from 0, whose wave at the wall is `wave` per angle, m/rad. Without a wave number
-    /// in the table, it is that of an upright cylinder of this radius.
+    /// Returns the breaking of mode `n`, which counts from 0, whose wave at the wall is `wave` per angle,
+    /// m/rad. If the table gives no wave number, it is that of an upright cylinder of this radius, m.
     pub(crate) fn breaking(&self, n: usize, wave: f64, radius: f64) -> Breaking {
         let k = match self.source {
             SloshSource::Table if self.table.wave_number[n] > 0.0 => self.table.wave_number[n],
@@ -237,8 +230,8 @@ impl Slosh {
         Breaking { zeta: self.zeta_breaking, onset: self.breaking_steepness, steepness: k * wave }
     }
 
-    /// Returns s and kappa of mode `n`, from 0, in a tank filled to h/R = `fill`. The modes of an upright cylinder after
-    /// the first, and all modes of the other models, have those of a pendulum.
+    /// Returns s and kappa of mode `n`, which counts from 0, in a tank filled to h/R = `fill`. The modes of
+    /// an upright cylinder after the first, and all modes of the other models, have those of a pendulum.
     pub(crate) fn third_order(&self, n: usize, fill: f64) -> (f64, f64) {
         match self.source {
             _ if self.model != SloshModel::Liquid => (1.0, 1.0),
@@ -251,8 +244,8 @@ impl Slosh {
     }
 }
 
-/// Refuses the model `liquid` if the inertia of a mode falls with the amplitude. The kinetic energy of hub and liquid
-/// would then be indefinite at amplitudes that depend on the hub.
+/// Refuses the model `liquid` if the inertia of a mode falls with the amplitude, because the kinetic energy
+/// of hub and liquid would then be indefinite at amplitudes that depend on the hub.
 fn inertia_problems(p: &Parameters) -> impl Iterator<Item = String> {
     let (fill, slosh) = (2.0 * p.tank.h / p.tank.d, p.slosh);
     let falling =
@@ -274,7 +267,6 @@ fn inertia_problems(p: &Parameters) -> impl Iterator<Item = String> {
 /// h/R below which waves are shallow: s turns negative and both coefficients grow without bound.
 const SHALLOW: f64 = 0.4;
 
-/// Returns a warning if the third-order coefficients at h/R = `fill` are not valid.
 fn third_order_warning(fill: f64) -> Option<String> {
     let (s, kappa) = coefficients(fill);
     if fill < SHALLOW {
@@ -293,7 +285,6 @@ fn third_order_warning(fill: f64) -> Option<String> {
     })
 }
 
-/// Returns a warning if waves break at every amplitude or at none that the model reaches.
 fn breaking_warning(p: &Parameters, calculated: &Calculated) -> Option<String> {
     let Slosh { zeta_breaking, breaking_steepness: onset, .. } = p.slosh;
     if zeta_breaking <= 0.0 {
@@ -324,8 +315,8 @@ impl Calculated {
     /// Calculates the modal parameters at the specific force `g` along the tank's axis, m/s2.
     ///
     /// The correlation covers the first mode. Each higher mode has the same multiple of its own laminar layer
-    /// (`formulas::damping`). Without restoring force (g = 0, no centring stiffness) there is no frequency. The damping
-    /// ratio has no meaning there and is reported as 0.
+    /// (`formulas::damping`). Without restoring force (g = 0, no centring stiffness) there is no frequency.
+    /// The damping ratio has no meaning there and is reported as 0.
     pub fn new(p: &Parameters, g: f64) -> Calculated {
         let Parameters { tank, fluid, slosh, .. } = p;
         let radius = tank.d / 2.0;
@@ -387,8 +378,8 @@ impl Calculated {
         all
     }
 
-    /// Returns the pendulums in use. Their viscous coefficients c = 2 zeta omega_n m belong to the
-    /// `g` of [`Calculated::new`]; `damping.rs` has them at another.
+    /// Returns the pendulums in use. Their viscous coefficients c = 2 zeta omega_n m belong to the `g` of
+    /// [`Calculated::new`]; `damping.rs` has them at other values.
     pub fn pendulums(&self, p: &Parameters) -> impl Iterator<Item = Pendulum> {
         let radius = p.tank.d / 2.0;
         let (r, slosh, p) = (p.tank.r, p.slosh, *p);

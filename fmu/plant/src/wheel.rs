@@ -13,19 +13,17 @@ use alloc::vec::Vec;
 use crate::inputs::Ramp;
 use crate::parameters::Wheel;
 
-/// A part of a step along which the wheel's torque is linear in time.
+/// A part of a step along which the wheel's torque is linear in time: its length, s, the rotor's speed at its
+/// end, rad/s, and the torque limit, or zero, that the command passes there.
 pub(crate) struct Piece {
-    /// s
     pub length: f64,
     pub torque: Ramp,
-    /// The rotor's speed at the end, rad/s.
     pub speed: f64,
-    /// Limit of the torque, or zero, that the command passes at the end.
     pub passed: Option<f64>,
 }
 
-/// Returns a command after `t`, when it has reached the level `passed`. Rounding may leave it before this level by an ulp,
-/// so that it would pass it again after no time, and again.
+/// Returns a command after `t`, when it has reached the level `passed`. Rounding may leave it before this
+/// level by an ulp, so that it would pass it again after no time, and again.
 pub(crate) fn command_after(command: Ramp, t: f64, passed: Option<f64>) -> Ramp {
     let now = command.shifted(t);
     match passed {
@@ -35,7 +33,6 @@ pub(crate) fn command_after(command: Ramp, t: f64, passed: Option<f64>) -> Ramp 
 }
 
 impl Wheel {
-    /// Lists problems of the combined parameters.
     pub(crate) fn problems(&self) -> Vec<String> {
         if self.speed_min <= self.speed_0 && self.speed_0 <= self.speed_max {
             return Vec::new();
@@ -47,8 +44,8 @@ impl Wheel {
         )]
     }
 
-    /// Returns the torque on the hub, N m, at a command and rotor speed, and its slope from now on.
-    /// The slope of a command at a limit decides whether it is within or beyond the limit.
+    /// Returns the torque on the hub, N m, at a command and rotor speed, and its slope from now on. The slope
+    /// of a command at a limit decides whether it is within or beyond the limit.
     pub(crate) fn torque(&self, speed: f64, command: Ramp) -> Ramp {
         let Ramp { value, slope } = command;
         if !self.enabled {
@@ -68,7 +65,6 @@ impl Wheel {
         }
     }
 
-    /// Returns the next piece, at most `h` long.
     pub(crate) fn next(&self, speed: f64, command: Ramp, h: f64) -> Piece {
         let torque = self.torque(speed, command);
         if !self.enabled {
@@ -118,8 +114,8 @@ mod tests {
         (impulse, speed, pieces)
     }
 
-    /// Rounding must not let a command pass the same limit twice: pieces of no length would then follow each other
-    /// until the step is refused.
+    /// Rounding must not let a command pass the same limit twice, because pieces of no length would then
+    /// follow each other until the step is refused.
     #[test]
     fn a_command_passes_each_limit_once_however_it_is_rounded() {
         let mut rng = fastrand::Rng::with_seed(1);
@@ -135,8 +131,6 @@ mod tests {
         Wheel { enabled: true, ..Wheel::default() }
     }
 
-    /// The slope of a command at a limit, or at 0, decides whether it is within or beyond: at the ends of the speed and
-    /// torque ranges.
     #[test]
     fn a_command_at_a_limit_is_judged_by_where_it_goes() {
         let w = wheel();
@@ -193,8 +187,6 @@ mod tests {
         assert_eq!([low, high, low - 1e-6, high + 1e-6].map(wrong), [false, false, true, true]);
     }
 
-    /// The slope of a command at a limit, or at zero with the rotor at its speed limit, decides
-    /// whether it is beyond the limit.
     #[test]
     fn a_command_at_a_limit_is_within_or_beyond_it_by_its_slope() {
         let w = wheel();
@@ -233,8 +225,8 @@ mod tests {
         assert_eq!(next(ramp(0.0, 0.0)), 10.0);
     }
 
-    /// I_w (W_0 - W) = a t + b t^2/2: the rotor meets its limit at the right time, on a ramp and with a constant
-    /// torque.
+    /// I_w (W_0 - W) = a t + b t^2/2: the rotor meets its limit at the right time, on a ramp and with a
+    /// constant torque.
     #[test]
     fn the_rotor_reaches_its_speed_limit_when_the_impulse_has_done_it() {
         let w = Wheel { speed_0: 100.0, speed_min: 20.0, speed_max: 150.0, ..wheel() };

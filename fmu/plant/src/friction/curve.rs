@@ -8,23 +8,20 @@ use taylor::series::{self, Series, ZERO};
 
 use crate::parameters::Friction;
 
-/// Rate over w_s up to which the excess is above 1e-4 of d, so that every usual tolerance sees its
-/// terms.
+/// Rate over w_s up to which the excess over Coulomb friction is above 1e-4 of d, so that every usual
+/// tolerance sees its terms.
 const VISIBLE: f64 = 3.0;
 
-/// Rate over w_s beyond which the excess is below 1e-12 of d.
+/// Rate over w_s beyond which that excess is below 1e-12 of d.
 const FLAT: f64 = 5.3;
 
 #[derive(Clone, Debug)]
 pub struct StribeckCurve {
     c: f64,
     d: f64,
-    /// 1/w_s^2
     inv_omega_s2: f64,
-    /// u' with u = -(w/w_s)^2, and e = exp u
     u_d: Series,
     e: Series,
-    /// T_C(w)
     pub torque: Series,
 }
 
@@ -34,11 +31,11 @@ impl StribeckCurve {
         StribeckCurve { c: p.c, d: p.d, inv_omega_s2, u_d: ZERO, e: ZERO, torque: ZERO }
     }
 
-    /// Returns the time over which a series of T_C in w converges reliably, s, from w, w' and w''.
+    /// Returns the time, s, over which a series of T_C in w converges reliably, from w, w' and w''.
     ///
-    /// Far from rest, exp(-v^2), v = w/w_s, is so small that no tolerance sees its terms, but they grow before they
-    /// decay. Over dv the term of order n is (2 v dv)^n/n!, the largest at n = 2 v dv. Either the curve is still flat
-    /// at the end, or the terms decay from order 5 on.
+    /// Far from rest exp(-v^2), v = w/w_s, is so small that no tolerance sees its terms, but they grow before
+    /// they decay. Over dv the term of order n is (2 v dv)^n/n!, the largest at n = 2 v dv. Either the curve
+    /// is still flat at the end, or the terms decay from order 5 on.
     pub fn convergence_radius(&self, omega: &Series) -> f64 {
         let [v, v1, v2] =
             [omega[0], omega[1], omega[2]].map(|w| w.abs() * libm::sqrt(self.inv_omega_s2));
@@ -49,12 +46,10 @@ impl StribeckCurve {
         series::time_within(dv, v1, v2)
     }
 
-    /// Returns the dry friction at rest, T_C(0), N m.
     pub fn at_rest(&self) -> f64 {
         self.c + self.d
     }
 
-    /// Sets coefficient n of T_C from that of w^2.
     #[inline(always)]
     pub fn expand(&mut self, n: usize, omega2: &Series) {
         let u = -omega2[n] * self.inv_omega_s2;

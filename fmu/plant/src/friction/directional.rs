@@ -15,11 +15,11 @@ use taylor::series::{self, Series, ZERO};
 use crate::contact::Contact;
 use crate::parameters::Friction;
 
-/// B+-(theta) in one direction.
+/// The factor B+-(theta) in one direction: its mean and the coefficients of cos theta, sin theta, cos 2
+/// theta, sin 2 theta.
 #[derive(Clone, Copy, Debug)]
 struct OneWay {
     mean: f64,
-    /// Coefficients of cos theta, sin theta, cos 2 theta, sin 2 theta.
     harmonics: [f64; 4],
 }
 
@@ -34,7 +34,7 @@ impl OneWay {
         self.mean + a1 * c1 + b1 * s1 + a2 * c2 + b2 * s2
     }
 
-    /// Returns a lower bound of B over all angles, exact to 2e-6 of the harmonics' size.
+    /// Returns a lower bound of B over all angles, which is low by at most 2e-6 of the harmonics' size.
     fn lowest(&self) -> f64 {
         if self.harmonics == [0.0; 4] {
             return self.mean;
@@ -49,7 +49,6 @@ impl OneWay {
         lowest - bend * (angle(1) / 2.0) * (angle(1) / 2.0) / 2.0
     }
 
-    /// Returns coefficient n of B in one direction.
     #[inline(always)]
     fn coefficient(&self, n: usize, trig: &[Series; 4]) -> f64 {
         let mean = series::constant(n, self.mean);
@@ -58,15 +57,14 @@ impl OneWay {
     }
 }
 
-/// B of both directions, with the power series of the angle's harmonics.
+/// The factor B of both directions, with the series of the angle's harmonics. `trig` holds cos and sin of
+/// theta and of 2 theta in the order of `OneWay::harmonics`, if B depends on the angle; `angles_d` are theta'
+/// and 2 theta'.
 #[derive(Clone, Debug)]
 pub struct DirectionalFactor {
     forward: OneWay,
     backward: OneWay,
-    /// cos and sin of theta and 2 theta in turn, as in `OneWay::harmonics`. Present only if B
-    /// depends on the angle.
     trig: Option<Box<[Series; 4]>>,
-    /// theta' and 2 theta'
     angles_d: [Series; 2],
 }
 
@@ -79,7 +77,7 @@ impl DirectionalFactor {
         DirectionalFactor { forward, backward, trig, angles_d: [ZERO; 2] }
     }
 
-    /// Lists problems of the combined parameters: dry friction must not drive the hub.
+    /// Lists problems of the combined parameters: dry friction must not drive the hub at any angle.
     pub fn problems(p: &Friction) -> Vec<String> {
         let factor = DirectionalFactor::new(p);
         let directions = [(factor.forward, "forward", '+'), (factor.backward, "backward", '-')];
@@ -96,7 +94,7 @@ impl DirectionalFactor {
             .collect()
     }
 
-    /// Returns the bounds of B over both directions and all angles.
+    /// Returns the smallest and the largest B over both directions and all angles.
     pub fn bounds(&self) -> (f64, f64) {
         let both = [self.forward, self.backward];
         let mirrored = both.map(|b| OneWay { mean: -b.mean, harmonics: b.harmonics.map(|h| -h) });
@@ -104,7 +102,6 @@ impl DirectionalFactor {
         (lowest(both), -lowest(mirrored))
     }
 
-    /// Returns B- and B+ at an angle.
     pub fn coefficient_at(&self, theta: f64) -> (f64, f64) {
         (self.backward.coefficient_at(theta), self.forward.coefficient_at(theta))
     }
@@ -113,12 +110,11 @@ impl DirectionalFactor {
         self.trig.is_some()
     }
 
-    /// Returns B of the hub's direction of rotation, without its harmonics.
+    /// Returns B of the hub's direction of rotation without its harmonics.
     pub fn mean(&self, contact: Contact) -> f64 {
         self.one_way(contact).mean
     }
 
-    /// Sets coefficient n of cos and sin. Call it before reading coefficients of B.
     pub fn expand(&mut self, n: usize, theta: &Series) {
         let Some(trig) = &mut self.trig else { return };
         let [c1, s1, c2, s2] = &mut **trig;
@@ -127,12 +123,10 @@ impl DirectionalFactor {
         (s2[n], c2[n]) = series::sin_cos(n, 2.0 * theta[n], twice_d, s2, c2);
     }
 
-    /// Returns coefficient n of B in the hub's direction of rotation.
     pub fn coefficient(&self, n: usize, contact: Contact) -> f64 {
         self.series_coefficient(n, self.one_way(contact))
     }
 
-    /// Returns coefficient n of (B+ + B-)/2 and (B+ - B-)/2.
     pub fn even_odd(&self, n: usize) -> (f64, f64) {
         let (forward, backward) =
             (self.series_coefficient(n, &self.forward), self.series_coefficient(n, &self.backward));
@@ -158,7 +152,6 @@ mod tests {
 
     use super::*;
 
-    /// At 45 degrees cos 2 theta is 0 and sin 2 theta 1; at 90 degrees cos 2 theta is -1.
     #[test]
     fn each_harmonic_has_its_sign_where_the_hub_rests_and_where_it_turns() {
         let one = OneWay { mean: 1.1, harmonics: [0.04, -0.03, 0.02, 0.01] };
@@ -180,7 +173,6 @@ mod tests {
         }
     }
 
-    /// One harmonic of size 1 has its minimum on a sample or halfway between two, where B is below both.
     #[test]
     fn the_lower_bound_is_below_the_lowest_factor_by_no_more_than_2e_6_of_its_harmonics() {
         let half = core::f64::consts::PI / 4096.0;

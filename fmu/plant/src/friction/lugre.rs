@@ -51,9 +51,7 @@ pub struct Lugre {
     sigma1: f64,
     curve: StribeckCurve,
     factor: DirectionalFactor,
-    /// sigma_0/g_min, the inverse scale of the deflection
     inv_deflection: f64,
-    /// B, g, w/g, w z/g
     present: Series,
     g: Series,
     rate_over_g: Series,
@@ -144,14 +142,14 @@ impl FrictionLaw for Lugre {
         [*z] = series::values([&self.z], n, t);
     }
 
-    /// Returns the coefficient relative to the largest deflection: torques then have the tolerance of the dry
-    /// friction.
+    /// Returns the coefficient of the deflection relative to the largest deflection, so that torques have the
+    /// same tolerance as dry friction.
     fn coefficient_norm(&self, n: usize) -> f64 {
         self.z[n].abs() * self.inv_deflection
     }
 
-    /// Returns the contact that the net torque causes together with the bristle's torque -sigma_0 z, which
-    /// also acts at rest.
+    /// Returns the contact that follows from the net torque together with the bristle's torque -sigma_0 z,
+    /// which also acts at rest.
     fn contact_at_rest(&self, [net, slope]: [f64; 2], _: f64, before: Contact) -> Contact {
         let torque = net - self.sigma0 * self.z[0];
         match if torque != 0.0 { torque } else { slope } {
@@ -163,7 +161,6 @@ impl FrictionLaw for Lugre {
     }
 }
 
-/// Returns the smallest and largest g at any rate and angle, N m.
 fn bounds(p: &Friction) -> (f64, f64) {
     let (lowest, highest) = DirectionalFactor::new(p).bounds();
     (p.c * lowest, (p.c + p.d) * highest)

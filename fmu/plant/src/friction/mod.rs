@@ -19,36 +19,32 @@ use crate::hub::HubMotion;
 use crate::parameters::{Friction, FrictionModel};
 use directional::DirectionalFactor;
 
-/// A friction law as a set of power series in time. It may have one state of its own and may switch at w = 0.
+/// A friction law as a set of power series in time. It may have one state of its own, for example the
+/// deflection of bristles, and may switch at w = 0.
 pub trait FrictionLaw {
-    /// True if the law switches at w = 0, so that this instant must be located. Otherwise the
-    /// contact is always [`Contact::Forward`].
+    /// True if the law switches at w = 0, so that this instant must be located. Otherwise the contact is
+    /// always [`Contact::Forward`].
     const SWITCHES_AT_REST: bool = false;
 
-    /// True if the law can hold the hub exactly at rest.
     const STICKS: bool = false;
 
-    /// Number of negligible terms in succession that show convergence. One term may vanish by
-    /// symmetry.
     const NEGLIGIBLE_TERMS: usize = 2;
 
-    /// Creates the law from its parameters.
     fn new(p: &Friction) -> Self;
 
-    /// Lists problems of the law's combined parameters.
     fn problems(_p: &Friction) -> Vec<String> {
         Vec::new()
     }
 
-    /// Sets coefficient n of the law's own state: 0 its value, 1 its direction for a partial
-    /// derivative.
+    /// Sets coefficient n of the law's own state: 0 is its value, 1 its direction for a partial derivative.
     fn set_state(&mut self, _n: usize, _z: f64) {}
 
-    /// Returns coefficient n of tau_f while the hub is not stuck, from coefficients up to n of
-    /// theta, w, w^2 and the law's own state. Sets coefficient n + 1 of that state.
+    /// Returns coefficient n of tau_f while the hub is not stuck, from coefficients up to n of theta, w, w^2
+    /// and the law's own state. Sets coefficient n + 1 of that state.
     fn torque(&mut self, n: usize, contact: Contact, hub: &HubMotion) -> f64;
 
-    /// Returns coefficient n of the bearing's dissipated power, W, after `torque`.
+    /// Returns coefficient n of the bearing's dissipated power, W. [`FrictionLaw::torque`] must have computed
+    /// coefficient n before.
     #[inline(always)]
     fn dissipation(&self, n: usize, tau_f: &Series, omega: &Series) -> f64 {
         -series::mul(n, tau_f, omega)
@@ -59,34 +55,33 @@ pub trait FrictionLaw {
         0.0
     }
 
-    /// Returns coefficient n, 0 or 1, of the derivative of the law's own state.
     fn derivative(&self, _n: usize) -> f64 {
         0.0
     }
 
-    /// Advances the law's own state z by `t`, from the series up to order n.
+    /// Advances the law's own state z by `t` seconds with its series up to order n.
     fn advance(&self, _n: usize, _t: f64, _z: &mut f64) {}
 
-    /// Returns the magnitude of coefficient n of the law's own state, relative to its allowed error.
+    /// Returns the magnitude of coefficient n of the law's own state over its allowed error.
     #[inline(always)]
     fn coefficient_norm(&self, _n: usize) -> f64 {
         0.0
     }
 
-    /// Returns the time over which the series of tau_f can converge, s, from w, w' and w'', for
-    /// laws whose coefficients do not show it.
+    /// Returns the time, s, over which the series of tau_f converges, from w, w' and w'', for laws whose
+    /// coefficients do not show it.
     fn convergence_radius(&self, _omega: &Series) -> f64 {
         f64::INFINITY
     }
 
-    /// Returns the largest torques that the bearing holds at rest against a backward and a forward
-    /// torque, N m (both >= 0).
+    /// Returns the largest torques, N m, that the bearing holds at rest against a backward and a forward
+    /// torque; both are positive or 0.
     fn holding_torques(&self, _theta: f64) -> (f64, f64) {
         (0.0, 0.0)
     }
 
-    /// Returns the contact of a hub at w = 0 that had the contact `before`. `net` is the torque
-    /// without friction and, unless the law sticks, its rate, with the hub held.
+    /// Returns the contact of a hub at w = 0 that had the contact `before`. `net` is the torque without
+    /// friction and, unless the law sticks, its rate, with the hub held.
     fn contact_at_rest(&self, _net: [f64; 2], _theta: f64, _before: Contact) -> Contact {
         Contact::Forward
     }
@@ -110,7 +105,6 @@ macro_rules! laws {
                 }
             }
 
-            /// Lists problems of the combined parameters.
             pub fn problems(p: &Friction) -> Vec<String> {
                 let mut problems = DirectionalFactor::problems(p);
                 problems.extend(match p.model {

@@ -25,12 +25,10 @@ pub struct Stribeck {
     b: f64,
     curve: StribeckCurve,
     factor: DirectionalFactor,
-    /// sgn(w) B of the current direction; only order 0 if it does not depend on the angle
     present: Series,
 }
 
 impl Stribeck {
-    /// Returns coefficient n of sgn(w) T_C B if B depends on the angle.
     // One copy for all slosh models.
     #[inline(never)]
     fn dry_by_angle(&mut self, n: usize, contact: Contact, theta: &Series) -> f64 {

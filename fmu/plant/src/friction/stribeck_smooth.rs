@@ -25,21 +25,17 @@ pub struct StribeckSmooth {
     eps: f64,
     curve: StribeckCurve,
     factor: DirectionalFactor,
-    /// v' with v = w/eps, t = tanh v, sech2 = 1 - t^2
     v_d: Series,
     t: Series,
     sech2: Series,
-    /// (B+ + B-)/2, (B+ - B-)/2 and their blend
     even: Series,
     odd: Series,
     blend: Series,
-    /// T times the blend
     sign: Series,
 }
 
 impl FrictionLaw for StribeckSmooth {
-    /// One term may vanish by symmetry. For tanh(w/eps) starting at w = w' = 0, three in succession
-    /// vanish.
+    /// One term may vanish by symmetry. For tanh(w/eps) from w = w' = 0 three successive terms vanish.
     const NEGLIGIBLE_TERMS: usize = 4;
 
     fn new(p: &Friction) -> StribeckSmooth {
@@ -76,9 +72,9 @@ impl FrictionLaw for StribeckSmooth {
         -self.b * hub.omega[n] - series::mul(n, &self.curve.torque, &self.sign)
     }
 
-    /// Returns the time to half the distance to the nearest poles of tanh, which are sqrt(v^2 + (pi/2)^2)
-    /// from v = w/eps. Away from 0 tanh is so flat that its coefficients do not show the poles. T_C has its
-    /// own limit.
+    /// Returns the time, s, to half the distance to the nearest poles of tanh, which are sqrt(v^2 + (pi/2)^2)
+    /// from v = w/eps. Away from 0 tanh is so flat that its coefficients do not show the poles. T_C has a
+    /// limit of its own.
     fn convergence_radius(&self, omega: &Series) -> f64 {
         let [v, v1, v2] = [omega[0], omega[1], omega[2]].map(|x| (x / self.eps).abs());
         let half = libm::sqrt(v * v + 2.4674) / 2.0;

@@ -8,7 +8,6 @@ use crate::contact::Contact;
 use crate::hub::HubMotion;
 use crate::parameters::Friction;
 
-/// A bearing without friction.
 #[derive(Clone, Debug)]
 pub struct Free;
 

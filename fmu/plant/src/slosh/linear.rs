@@ -40,11 +40,9 @@ use crate::pendulum::Pendulum;
 #[derive(Clone, Debug)]
 pub struct Linear {
     p: Pendulum,
-    /// al, al', al''
     al: Series,
     al_d: Series,
     al_dd: Series,
-    /// g al, and al' times the course of the damping
     g_al: Series,
     drag: Series,
 }
@@ -148,7 +146,7 @@ impl SloshMode for Linear {
             * if ramp { mul(n, &self.drag, &self.al_d) } else { square(n, &self.al_d) }
     }
 
-    /// Returns coefficient n of m l al^2/2, and the height of the bob on a tilted bench times m.
+    /// Returns coefficient n of m l al^2/2 plus, on a tilted bench, m times the height of the bob.
     #[inline(always)]
     fn mass_height(&mut self, n: usize, hub: &HubMotion) -> f64 {
         let Pendulum { m, l, r, along: [n_x, n_t], .. } = self.p;
@@ -171,8 +169,9 @@ impl SloshMode for Linear {
         [al * al * (m * l) * 0.5 + tilted[0] * m, al * al_d * (m * l) + tilted[1] * m]
     }
 
-    /// Returns the force. Tangential: -m (r w' + l al'' n_t). Radial, from the bob's position (r + l al n_x,
-    /// l al n_t): -m l al'' n_x and, of second order in the motion, m (r w^2 + 2 w l al' n_t + w' l al n_t).
+    /// Returns the force on the tank. The tangential component is -m (r w' + l al'' n_t). The radial one
+    /// follows from the bob's position (r + l al n_x, l al n_t): -m l al'' n_x and, of second order in the
+    /// motion, m (r w^2 + 2 w l al' n_t + w' l al n_t).
     fn force<T: Number>(&self, hub: &HubMotion) -> [T; 2] {
         let Pendulum { m, l, r, .. } = self.p;
         let [w, wd]: [T; 2] = [number(&hub.omega), number(&hub.omega_dot)];
@@ -183,7 +182,8 @@ impl SloshMode for Linear {
         [radial + e_x * m - al_dd * (m * l * n_x), e_y * m - (wd * r + al_dd * l * n_t) * m]
     }
 
-    /// Returns r F_y. In the linear model the force acts at the hinge, gravity of a tilted bench at the bob.
+    /// Returns r F_y, because in the linear model the force acts at the hinge; gravity of a tilted bench acts
+    /// at the bob.
     fn torque<T: Number>(&self, hub: &HubMotion) -> T {
         let Pendulum { m, l, r, .. } = self.p;
         let ([_, f_y], [e_x, e_y]): ([T; 2], [T; 2]) = (self.force(hub), hub.tilt.now());

@@ -31,7 +31,6 @@ use planar::Planar;
 use spherical::Spherical;
 use third_order::ThirdOrder;
 
-/// The slosh modes in use, for the chosen model.
 #[derive(Clone, Debug)]
 pub(crate) enum Liquid {
     Linear(Vec<Linear>),
@@ -40,7 +39,6 @@ pub(crate) enum Liquid {
     ThirdOrder(Vec<ThirdOrder>),
 }
 
-/// Evaluates an expression with the modes of the model in use.
 macro_rules! with_modes {
     ($liquid:expr, $modes:ident => $do:expr) => {{
         use $crate::slosh::Liquid;
@@ -55,7 +53,6 @@ macro_rules! with_modes {
 pub(crate) use with_modes;
 
 impl Liquid {
-    /// Creates the modes at rest.
     pub fn new(p: &Parameters, calculated: &Calculated) -> Liquid {
         fn modes<M: SloshMode>(p: &Parameters, calculated: &Calculated) -> Vec<M> {
             calculated.pendulums(p).map(|pendulum| M::new(&pendulum)).collect()
@@ -69,32 +66,27 @@ impl Liquid {
         }
     }
 
-    /// Returns why the motion cannot start with these parameters, if it cannot.
     pub fn start_problem(&self, init: &Init) -> Option<String> {
         with_modes!(self, modes => modes.first().and_then(|mode| mode.start_problem(init)))
     }
 }
 
-/// Contribution of a mode to the hub's equation.
+/// Contribution of a mode to the hub's equation: inertia J, kg m2, and torque T, N m.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct HubReaction {
-    /// Inertia J, kg m2.
     pub j: f64,
-    /// Torque T, N m.
     pub t: f64,
 }
 
-/// Mode displacement as angles with sin(angle) = displacement / l.
+/// Displacement of a mode as angles with sin(angle) = displacement / l, radial and tangential, rad, and their
+/// rates, rad/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Angles<T = f64> {
-    /// Radial and tangential angle, rad.
     pub angle: [T; 2],
-    /// Rates of the angles, rad/s.
     pub rate: [T; 2],
 }
 
 impl<T: Number> Angles<T> {
-    /// Returns the angles of a mode at rest.
     pub fn zero() -> Angles<T> {
         let zero = [T::constant(0.0); 2];
         Angles { angle: zero, rate: zero }
@@ -103,54 +95,43 @@ impl<T: Number> Angles<T> {
 
 /// One slosh mode as a set of power series in time.
 ///
-/// Functions over [`Number`] hold at the start of an expansion: they return the value, or the derivative along the
-/// seeded direction.
+/// Functions over [`Number`] hold at the start of an expansion: they return the value, or the derivative
+/// along the seeded direction. `ramp` is true if g changes along the expansion.
 pub trait SloshMode {
-    /// Compiles steps with a single mode and constant g with the sums of every order written out:
+    /// True to compile steps with a single mode and constant g with the sums of every order written out:
     /// twice as fast, 40 to 100 KB of code.
     const UNROLLED: bool = false;
-    /// True if J has coefficients beyond order 0.
     const MOVES_INERTIA: bool = true;
-    /// Creates the mode at rest; `start` sets its motion.
     fn new(pendulum: &Pendulum) -> Self;
-    /// Returns why the motion cannot start with these parameters, if it cannot.
+    /// Returns the reason, if any, why the motion cannot start with these parameters.
     fn start_problem(&self, _init: &Init) -> Option<String> {
         None
     }
-    /// Returns the pendulum of the mode.
     fn pendulum(&self) -> &Pendulum;
-    /// Returns [`SloshMode::pendulum`], mutable.
     fn pendulum_mut(&mut self) -> &mut Pendulum;
-    /// Returns the squares of angle and angular rate after `start`, rad2, rad2/s2; of [`ThirdOrder`] those of
-    /// displacement over length.
+    /// Returns the squares of angle and angular rate, rad2, rad2/s2, after `start`. `ThirdOrder` has
+    /// displacement over length instead of the angle.
     fn amplitude2<T: Number>(&self) -> [T; 2];
-    /// Returns coordinates from angles with sin(angle) = displacement/l and their rates.
     fn coordinates(&self, at: &Angles) -> [f64; 4];
-    /// Returns the angles from the coordinates.
     fn angles<T: Number>(&self) -> Angles<T>;
     /// Sets the coordinates at the start of the expansion; w must be known to order 0.
     fn start(&mut self, q: &[f64; 4], hub: &HubMotion);
-    /// Sets the direction, coefficient 1 of the coordinates, for a partial derivative; w must be
-    /// known to order 1.
+    /// Sets the direction of a partial derivative as coefficient 1 of the coordinates; w must be known to
+    /// order 1.
     fn seed_direction(&mut self, dq: &[f64; 4], hub: &HubMotion);
-    /// Returns coefficient n, 0 or 1, of q_x', q_y', q_x'', q_y''.
     fn derivatives(&self, n: usize, hub: &HubMotion) -> [f64; 4];
-    /// Returns coefficient n of J and T, from coefficients up to n of q, q' and w. `ramp` is true
-    /// if g changes along the expansion.
+    /// Returns coefficient n of J and T, from coefficients up to n of q, q' and w.
     fn hub_reaction(&mut self, n: usize, ramp: bool, hub: &HubMotion) -> HubReaction;
-    /// Computes coefficient n of q'' and n + 1 of q and q', after `hub_reaction`, with w' known up
-    /// to n.
+    /// Computes coefficient n of q'' and n + 1 of q and q', after `hub_reaction`, with w' known up to n.
     fn accelerate(&mut self, n: usize, varies: bool, hub: &HubMotion);
-    /// Returns the scale of the motion for the tolerance, rad/s.
     fn error_scale(&self) -> f64;
-    /// Returns the magnitude of coefficient `n` of the rates, rad/s.
     fn coefficient_norm(&self, n: usize) -> f64;
     /// Returns coefficient n of the mode's dissipated power, W, after `hub_reaction`.
     fn dissipation(&mut self, n: usize, ramp: bool) -> f64;
-    /// Returns coefficient n of mass times height above rest, kg m: the potential energy over g.
+    /// Returns coefficient n of mass times height above rest, kg m, which is the potential energy over g.
     fn mass_height(&mut self, n: usize, hub: &HubMotion) -> f64;
-    /// Returns the coordinates at t, at the hub's rate `omega`, from the series up to order n. `varies` has the meaning
-    /// of `ramp` above; without variation modes move along the tangent.
+    /// Returns the coordinates at `t`, s, at the hub's rate `omega`, from the series up to order n. `varies`
+    /// is true if g, drag or weight change along the expansion; otherwise the modes move along the tangent.
     fn coordinates_at(&self, n: usize, t: f64, omega: f64, varies: bool) -> [f64; 4];
     /// Returns mass times height above rest, kg m, and its rate.
     fn height<T: Number>(&self, hub: &HubMotion) -> [T; 2];
@@ -158,11 +139,10 @@ pub trait SloshMode {
     fn force<T: Number>(&self, hub: &HubMotion) -> [T; 2];
     /// Returns the torque of the bob on the hub, N m.
     fn torque<T: Number>(&self, hub: &HubMotion) -> T;
-    /// Returns kinetic and potential energy, J.
     fn energy<T: Number>(&self, hub: &HubMotion) -> T;
     /// Returns the angular momentum about the bearing axis, kg m2/s.
     fn momentum<T: Number>(&self, hub: &HubMotion) -> T;
-    /// Returns why the coordinates are outside the model's range, if they are.
+    /// Returns the reason, if any, why the coordinates are outside the model's range.
     fn out_of_range(&self, _q: &[f64; 4]) -> Option<&'static str> {
         None
     }

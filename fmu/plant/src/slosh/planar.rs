@@ -48,13 +48,10 @@ pub struct Planar {
     al: Series,
     al_d: Series,
     al_dd: Series,
-    /// al' times the course of the damping
     drag: Series,
-    /// al' in the form that `sin_cos` keeps
     slope: Series,
     s: Series,
     c: Series,
-    /// s c_, w al', al'^2, w^2 s c_, p
     sc: Series,
     w_al_d: Series,
     al_d2: Series,
@@ -176,7 +173,6 @@ impl SloshMode for Planar {
             * if ramp { mul(n, &self.drag, &self.al_d) } else { square(n, &self.al_d) }
     }
 
-    /// Returns coefficient n of 2 m l sin^2(al/2), whose rate is m l s al'.
     #[inline(always)]
     fn mass_height(&mut self, n: usize, hub: &HubMotion) -> f64 {
         let Pendulum { m, l, r, along: [n_x, n_t], .. } = self.p;
@@ -201,7 +197,8 @@ impl SloshMode for Planar {
         [half * 2.0 * half * (m * l) + tilted[0] * m, s * al_d * (m * l) + tilted[1] * m]
     }
 
-    /// Returns -m times the bob's acceleration at (r + u n_x, u n_t). The plane's guide takes up the force across it.
+    /// Returns -m times the bob's acceleration at (r + u n_x, u n_t). The plane's guide carries the force
+    /// across it.
     fn force<T: Number>(&self, hub: &HubMotion) -> [T; 2] {
         let Pendulum { m, l, r, .. } = self.p;
         let [s, c, ad, al_dd] = [&self.s, &self.c, &self.al_d, &self.al_dd].map(number::<T>);

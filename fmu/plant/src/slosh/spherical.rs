@@ -51,38 +51,31 @@ use crate::pendulum::Pendulum;
 #[derive(Clone, Debug)]
 pub struct Spherical {
     p: Pendulum,
-    /// Coordinates, 1 + |xi|^2, k, xi.xi' and k xi.xi': orders 0 and 1 only.
     xi: Vector2,
     xi_d: Vector2,
     sum: Series,
     k: Series,
     rho: Series,
     k_rho: Series,
-    /// Direction of the bob, horizontal and upwards.
     dir: Vector2,
     dir_z: Series,
-    /// p' horizontal; the upward component is v_z.
     dir_d: Vector2,
-    /// p' times the course of the damping: horizontal with exchanged components, and upwards.
+    /// The rate p' times the course of the damping: horizontal with exchanged components, and upwards.
     drag_swapped: Vector2,
     drag_z: Series,
     v: Vector2,
     v_z: Series,
     v_d: Vector2,
     v_z_d: Series,
-    /// v_z^2
     v_z2: Series,
-    /// Square of the angle from the vertical, for drag that depends on the amplitude.
     angle2: SquaredAngle,
-    /// L_0, L
     tension_0: Series,
     tension: Series,
-    /// Newest coefficient of L p without that of L
     pulled: [f64; 2],
 }
 
 impl Spherical {
-    /// Sets coefficient n of direction and velocity from those of the coordinates: p' = k xi' - v_z
+    /// Sets coefficient n of direction and velocity from coefficient n of the coordinates: p' = k xi' - v_z
     /// xi, v_z = k^2 xi.xi'.
     #[inline(always)]
     fn place(&mut self, n: usize, hub: &HubMotion) {
@@ -100,7 +93,7 @@ impl Spherical {
         self.v[n] = [along[0] - back[0] - turned[1], along[1] - back[1] + turned[0]];
     }
 
-    /// Returns coefficient n of k xi'' = p'' + 2 v_z xi' + v_z' xi, p'' = v' - w' R p - w R p'.
+    /// Returns coefficient n of k xi'' = p'' + 2 v_z xi' + v_z' xi, with p'' = v' - w' R p - w R p'.
     fn k_xi_dd(&self, n: usize, hub: &HubMotion) -> [f64; 2] {
         let [x, y] = scale(n, &hub.omega_dot, &self.dir);
         let [x_d, y_d] = scale(n, &hub.omega, &self.dir_d);
@@ -110,7 +103,6 @@ impl Spherical {
         [0, 1].map(|i| dir_dd[i] + 2.0 * twice[i] + once[i])
     }
 
-    /// Returns coefficient n of |p'|^2 times the course of the damping.
     fn drag_power(&self, n: usize) -> f64 {
         let horizontal = |i: usize| {
             (0..=n).map(|j| self.dir_d[j][i] * self.drag_swapped[n - j][1 - i]).sum::<f64>()
@@ -118,21 +110,18 @@ impl Spherical {
         horizontal(0) + horizontal(1) + mul(n, &self.v_z, &self.drag_z)
     }
 
-    /// Returns the bob's horizontal position in the hub's frame, m: X, Y.
     fn bob<T: Number>(&self) -> [T; 2] {
         let Pendulum { l, r, .. } = self.p;
         let [x, y]: [T; 2] = numbers(&self.dir);
         [T::constant(r) + x * l, y * l]
     }
 
-    /// Returns the bob's inertial velocity in the hub's frame, m/s: X, Y, Z.
     fn velocity<T: Number>(&self, hub: &HubMotion) -> [T; 3] {
         let Pendulum { l, r, .. } = self.p;
         let [v_x, v_y]: [T; 2] = numbers(&self.v);
         [v_x * l, v_y * l + number::<T>(&hub.omega) * r, number::<T>(&self.v_z) * l]
     }
 
-    /// Returns 1 + p_z = |xi|^2 k, without cancellation near rest.
     fn above_rest<T: Number>(&self) -> T {
         let [xi_1, xi_2]: [T; 2] = numbers(&self.xi);
         number::<T>(&self.k) * (xi_1 * xi_1 + xi_2 * xi_2)
@@ -311,7 +300,6 @@ impl SloshMode for Spherical {
         largest(self.v[n]).max(self.v_z[n].abs())
     }
 
-    /// Returns coefficient n of c l^2 |p'|^2.
     #[inline(always)]
     fn dissipation(&mut self, n: usize, ramp: bool) -> f64 {
         let speed2 = if ramp {
@@ -323,7 +311,8 @@ impl SloshMode for Spherical {
         self.p.c * self.p.l * self.p.l * speed2
     }
 
-    /// Returns coefficient n of m l (1 + p_z), with 1 + p_z = |xi|^2 k, which has no cancellation near rest.
+    /// Returns coefficient n of m l (1 + p_z), with 1 + p_z = |xi|^2 k, because this form has no cancellation
+    /// near rest.
     #[inline(always)]
     fn mass_height(&mut self, n: usize, hub: &HubMotion) -> f64 {
         let [xi_1, xi_2] = self.xi[0];
@@ -333,8 +322,8 @@ impl SloshMode for Spherical {
         m * l * height + m * hub.tilt.height(n, place)
     }
 
-    /// Computes the coordinates from the direction p: xi = p/k and k xi' = p' + v_z xi; k = 1 - p_z, above
-    /// the horizontal by |p| = 1.
+    /// Computes the coordinates from the direction p: xi = p/k and k xi' = p' + v_z xi. The factor k = 1 -
+    /// p_z comes from |p| = 1 if the bob is above the horizontal.
     #[inline(always)]
     fn coordinates_at(&self, n: usize, t: f64, omega: f64, _: bool) -> [f64; 4] {
         let [[x, y], [v_x, v_y]] = plane::values([&self.dir, &self.v], n, t);
@@ -353,7 +342,6 @@ impl SloshMode for Spherical {
         [0, 1].map(|i| above[i] * (m * l) + tilted[i] * m)
     }
 
-    /// Returns the rod's tension along p and the drag.
     fn force<T: Number>(&self, _: &HubMotion) -> [T; 2] {
         let Pendulum { m, l, .. } = self.p;
         let (tension, [_, c]) = (number::<T>(&self.tension), self.p.restoring_and_drag::<T>());
@@ -361,7 +349,7 @@ impl SloshMode for Spherical {
         [0, 1].map(|i| tension * (m * l) * p[i] + c * l * p_d[i])
     }
 
-    /// Returns the torque: the tension acts at the hinge, the drag at the bob.
+    /// Returns the torque, of the tension at the hinge and of the drag at the bob.
     fn torque<T: Number>(&self, hub: &HubMotion) -> T {
         let (Pendulum { l, r, .. }, [_, c]) = (self.p, self.p.restoring_and_drag::<T>());
         let [[x, y], [x_d, y_d]] = [&self.dir, &self.dir_d].map(numbers::<T>);
@@ -398,7 +386,7 @@ mod tests {
     use super::*;
     use taylor::series::ORDER;
 
-    /// Returns Lagrange's equations of the bob in xi, with v = xi' + w R xi and rho = xi.xi':
+    /// Returns xi'' by Lagrange's equations of the bob in xi, with v = xi' + w R xi and rho = xi.xi':
     ///
     /// ```text
     /// xi'' = B + A w'
@@ -422,7 +410,6 @@ mod tests {
         })
     }
 
-    /// tan(angle/2) is 1e3 at 0.115 degrees from straight up.
     #[test]
     fn a_bob_that_stands_straight_up_is_out_of_range() {
         let mode = Spherical::new(&Pendulum::default());
@@ -433,8 +420,8 @@ mod tests {
         }
     }
 
-    /// The direction p and its velocity v describe the same motion as the coordinates, for angles between hanging and
-    /// 20 degrees from straight up.
+    /// The direction p and its velocity v must describe the same motion as the coordinates, for angles
+    /// between hanging and 20 degrees from straight up.
     #[test]
     fn direction_and_velocity_move_as_lagrange_has_the_coordinates() {
         let mut rng = fastrand::Rng::with_seed(3);

@@ -29,27 +29,20 @@ pub struct ThirdOrder {
     q: [Series; 2],
     q_d: [Series; 2],
     q_dd: [Series; 2],
-    /// q' times the course of the damping
     drag: [Series; 2],
-    /// r + x
     arm: Series,
-    /// N, a, mu and the factor g l (1 + h |q|^2) before g
     n: Series,
     a: [Series; 2],
     mu: Series,
     spring: Series,
-    /// r y/N, and w' times r y/N
     lever: Series,
     push: Series,
-    /// -(c/m) q' + a - mu q
     b: [Series; 2],
-    /// q.q', and q.q' times the course of the damping (dissipation); |q|^2 (height)
     rise: Series,
     drag_rise: Series,
     q2: Series,
 }
 
-/// Returns both components as numbers.
 fn pair<T: Number>(a: &[Series; 2]) -> [T; 2] {
     [number(&a[0]), number(&a[1])]
 }
@@ -208,7 +201,6 @@ impl SloshMode for ThirdOrder {
         c * (power.0 + s * power.1 / (l * l))
     }
 
-    /// Returns coefficient n of m (|q|^2/2 + h |q|^4/4)/l.
     #[inline(always)]
     fn mass_height(&mut self, n: usize, hub: &HubMotion) -> f64 {
         let Pendulum { m, l, r, spring, .. } = self.p;
@@ -285,7 +277,8 @@ impl SloshMode for ThirdOrder {
 mod tests {
     use super::*;
 
-    /// The range ends at a displacement of one length. A softening spring ends at a tenth of its stiffness.
+    /// The range ends at a displacement of one length. A softening spring ends it where a tenth of its
+    /// stiffness is left.
     #[test]
     fn a_mass_leaves_its_range_at_its_length_or_where_the_spring_is_nearly_gone() {
         let outside = |spring: f64, q: [f64; 2]| {
