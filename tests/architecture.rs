@@ -100,24 +100,29 @@ fn the_harness_never_links_a_model_and_its_packages_depend_one_way() {
     }
 }
 
-/// Otherwise `cargo run`, or a test that builds the program, would compile again what `cargo test` has
-/// compiled.
+/// Otherwise `cargo run`, a test that builds the program or `pack::build_native` would compile again what
+/// `cargo test` has compiled.
 #[test]
-fn tests_turn_on_no_feature_of_what_the_program_is_made_of() {
-    let packages = |edges: &str| -> BTreeSet<String> {
+fn tests_and_the_python_package_turn_on_no_feature_of_what_the_program_is_made_of() {
+    let packages = |edges: &str, selection: &[&str]| -> BTreeSet<String> {
         let mut tree = Command::new(env!("CARGO"));
         tree.current_dir(pack::root()).args(["tree", "--locked", "--offline", "--edges", edges]);
+        tree.args(selection);
         tree.args(["--prefix", "none", "--no-dedupe", "--format", "{p}: {f};"]);
         let said = run(&mut tree, "cargo does not say what this is made of");
         said.lines().filter_map(|line| Some(line.split_once(';')?.0.into())).collect()
     };
     let name = |package: &String| package.split(": ").next().unwrap_or_default().to_string();
-    let program = packages("normal,build");
+    let program = packages("normal,build", &[]);
     let names: BTreeSet<String> = program.iter().map(name).collect();
-    let mut tested = packages("normal,build,dev");
+    let mut tested = packages("normal,build,dev", &[]);
     tested.retain(|package| names.contains(&name(package)));
     assert!(names.len() > 100);
     assert_eq!(tested, program);
+    let both = ["--package", "hubslosh", "--package", "hubslosh-native"];
+    let native = packages("normal,build", &both);
+    let more: Vec<&String> = native.difference(&program).collect();
+    assert!(more.is_empty(), "{more:?}");
 }
 
 #[test]
