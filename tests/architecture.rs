@@ -153,11 +153,11 @@ fn unsafe_code_stands_in_the_files_of_the_c_interface() {
         "fmu/runtime/src/tests/v3.rs",
         "fmu/runtime/src/tests/v3_arrays.rs",
         "fmu/runtime/src/v2.rs",
+        "fmu/runtime/src/v3.rs",
         "fmu/runtime/src/v3/dependencies.rs",
         "fmu/runtime/src/v3/derivatives.rs",
         "fmu/runtime/src/v3/life.rs",
         "fmu/runtime/src/v3/model_exchange.rs",
-        "fmu/runtime/src/v3/states.rs",
         "fmu/runtime/src/v3/stepping.rs",
         "fmu/runtime/src/v3/values.rs",
         "harness/host/src/c_abi.rs", // and its submodules

@@ -335,6 +335,90 @@ pub fn silence_panics() {
     }
 }
 
+// ---- Functions that both versions have ----
+
+/// Returns the filter for the log categories that the host names.
+pub unsafe fn filter<M: Model>(
+    call: &Call,
+    categories: *const *const c_char,
+    count: usize,
+) -> Result<Filter, Fault> {
+    let mut names = Vec::new();
+    for category in unsafe { array(call, "categories", categories, count)? } {
+        names.push(unsafe { text(*category) }.ok_or_else(|| null(call, "categories[]"))?);
+    }
+    Filter::from_categories(&names, M::table()).map_err(|why| call.error(why))
+}
+
+/// Fills an array of the host by `body`.
+pub unsafe fn fill<M: Model, V: Version>(
+    handle: *mut c_void,
+    call: &'static Call,
+    (name, pointer, length): (&str, *mut f64, usize),
+    body: impl FnOnce(&mut Instance<M, V>, &mut [f64]) -> Result<(), Fault>,
+) -> Status {
+    unsafe {
+        on_allowed::<M, V>(handle, call, |component| {
+            body(&mut component.instance, array_mut(call, name, pointer, length)?)
+        })
+    }
+}
+
+/// Accepts a step of the host's integrator, and tells the host whether an event must be handled now. `B` is
+/// the version's Boolean.
+pub unsafe fn completed_step<M: Model, V: Version, B: From<bool>>(
+    handle: *mut c_void,
+    enter_event_mode: *mut B,
+    terminate: *mut B,
+) -> Status {
+    let call = V::COMPLETED_STEP;
+    unsafe {
+        on_allowed::<M, V>(handle, call, |component| {
+            let enter = place(call, "enterEventMode", enter_event_mode)?;
+            let terminate = place(call, "terminateSimulation", terminate)?;
+            *enter = component.instance.completed_integrator_step()?.into();
+            *terminate = false.into();
+            component.log.report_step_warning(&component.instance);
+            Ok(())
+        })
+    }
+}
+
+/// Defines the C functions of one version of FMI: each as a function that is generic in the model, and
+/// together as a macro that exports them for one model under their C names. The exported macro is needed
+/// because each FMU must define these symbols itself. The first token is `$`.
+macro_rules! c_functions {
+    ($d:tt $export:ident, $version:ident; $(
+        $(#[$doc:meta])*
+        fn $name:ident($($argument:ident: $type:ty),*) $(-> $result:ty)? = $body:expr;
+    )*) => {
+        $(
+            $(#[$doc])*
+            pub unsafe fn $name<M: Model>($($argument: $type),*) $(-> $result)? {
+                #[allow(unused_unsafe)]
+                unsafe { $body }
+            }
+        )*
+
+        /// Exports the functions of this version of FMI for a model, under their C names and as Rust
+        /// functions of the module in which the macro is used.
+        #[macro_export]
+        macro_rules! $export {
+            ($d model:ty) => {
+                $(
+                    #[allow(missing_docs, non_snake_case, unsafe_code)]
+                    #[allow(clippy::missing_safety_doc, clippy::too_many_arguments)]
+                    #[unsafe(no_mangle)]
+                    pub unsafe extern "C" fn $name($($argument: $type),*) $(-> $result)? {
+                        unsafe { $crate::$version::$name::<$d model>($($argument),*) }
+                    }
+                )*
+            };
+        }
+    };
+}
+pub(crate) use c_functions;
+
 // ---- Saved states ----
 
 /// Marks a live saved state.
@@ -391,47 +475,64 @@ pub unsafe fn save_state<M: Model, V: Version>(
     Ok(())
 }
 
-/// Writes a saved state to `size` bytes of the host.
-///
-/// # Errors
-///
-/// If `size` is too small.
-pub unsafe fn serialize<M: Model, V: Version>(
-    call: &Call,
-    saved: &Instance<M, V>,
-    bytes: *mut u8,
-    size: usize,
-) -> Result<(), Fault> {
-    let saved = snapshot::to_bytes(saved);
-    if size < saved.len() {
-        return Err(
-            call.error(format_args!("size is {size}; a saved state takes {} bytes", saved.len()))
-        );
+/// Writes the number of bytes of a serialised state to `size`.
+pub unsafe fn serialized_size<M: Model, V: Version>(
+    handle: *mut c_void,
+    call: &'static Call,
+    (name, saved): (&str, *mut c_void),
+    size: *mut usize,
+) -> Status {
+    unsafe {
+        on_allowed::<M, V>(handle, call, |_| {
+            saved_state::<M, V>(call, name, saved)?;
+            *place(call, "size", size)? = snapshot::size::<M>();
+            Ok(())
+        })
     }
-    let room = unsafe { array_mut(call, "serializedState", bytes, size)? };
-    room[..saved.len()].copy_from_slice(&saved);
-    Ok(())
 }
 
-/// Restores a saved state from bytes. Its variables must be those of `like`. The handle is written and never
-/// read, because the host need not have initialised it.
-pub unsafe fn deserialize<M: Model, V: Version>(
-    call: &Call,
-    like: &Instance<M, V>,
-    (bytes, size): (*const u8, usize),
-    (name, handle): (&str, *mut *mut c_void),
-) -> Result<(), Fault> {
-    if handle.is_null() {
-        return Err(null(call, name));
-    }
+/// Serialises a saved state into an array of the host, which is refused if it is too short.
+pub unsafe fn serialize<M: Model, V: Version>(
+    handle: *mut c_void,
+    call: &'static Call,
+    (name, saved): (&str, *mut c_void),
+    (bytes, size): (*mut u8, usize),
+) -> Status {
     unsafe {
-        let bytes = array(call, "serializedState", bytes, size)?;
-        let mut saved = snapshot::from_bytes::<M, V>(bytes).map_err(|why| call.error(why))?;
-        like.check_layout(call, &saved)?;
-        saved.extent = like.extent.clone(); // bytes do not have its start values
-        ptr::write(handle, new_state(saved));
+        on_allowed::<M, V>(handle, call, |_| {
+            let saved = snapshot::to_bytes(saved_state::<M, V>(call, name, saved)?);
+            let needed = saved.len();
+            if size < needed {
+                let why = format_args!("size is {size}; a saved state takes {needed} bytes");
+                return Err(call.error(why));
+            }
+            array_mut(call, "serializedState", bytes, size)?[..needed].copy_from_slice(&saved);
+            Ok(())
+        })
     }
-    Ok(())
+}
+
+/// Restores a saved state from bytes, whose variables must be those of the instance. The handle of the new
+/// state is written and never read, because the host need not have initialised it.
+pub unsafe fn deserialize<M: Model, V: Version>(
+    handle: *mut c_void,
+    call: &'static Call,
+    (bytes, size): (*const u8, usize),
+    (name, to): (&str, *mut *mut c_void),
+) -> Status {
+    unsafe {
+        on_allowed::<M, V>(handle, call, |component| {
+            if to.is_null() {
+                return Err(null(call, name));
+            }
+            let bytes = array(call, "serializedState", bytes, size)?;
+            let mut saved = snapshot::from_bytes::<M, V>(bytes).map_err(|why| call.error(why))?;
+            component.instance.check_layout(call, &saved)?;
+            saved.extent = component.instance.extent.clone(); // bytes do not have its start values
+            ptr::write(to, new_state(saved));
+            Ok(())
+        })
+    }
 }
 
 /// Frees a saved state and sets the handle to NULL; NULL is allowed. fmusim (0.0.39) passes the state itself

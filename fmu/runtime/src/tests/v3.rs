@@ -348,7 +348,7 @@ fn a_number_sign_is_doubled_and_a_percent_sign_is_not() {
 
 #[test]
 fn the_version_is_3_0() {
-    assert_eq!(unsafe { text(fmi3GetVersion()) }, Some("3.0".into()));
+    assert_eq!(unsafe { text(fmi3GetVersion::<Spring>()) }, Some("3.0".into()));
 }
 
 #[test]

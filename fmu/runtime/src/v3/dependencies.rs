@@ -3,23 +3,23 @@
 #![allow(unsafe_code)]
 
 use super::calls::*;
-use super::elements::wrong_variable;
+use super::elements::{check_numbers, wrong_variable};
 use super::references::wrong_reference;
 use super::types::*;
-use crate::c_abi::{Component, array_mut, on_allowed, place};
+use crate::c_abi::{Component, array_mut, on_allowed};
 use crate::call::{Call, Fault};
 use crate::model::Model;
 use crate::variable::Causality;
 
 /// Dependency of one element of a variable on an element of another.
-struct Dependency {
+pub(super) struct Dependency {
     element: usize,
     independent: fmi3ValueReference,
     independent_element: usize,
 }
 
 /// Finds the scalars on which a variable depends in the present state, and how.
-fn dependencies<M: Model>(
+pub(super) fn dependencies<M: Model>(
     component: &mut Component<M, Fmi3>,
     call: &Call,
     reference: u32,
@@ -58,55 +58,30 @@ fn dependencies<M: Model>(
     Ok(all)
 }
 
-/// Returns the number of dependencies of a variable.
-pub unsafe fn fmi3GetNumberOfVariableDependencies<M: Model>(
-    instance: fmi3Instance,
-    valueReference: fmi3ValueReference,
-    nDependencies: *mut usize,
-) -> fmi3Status {
-    let call = &NUMBER_OF_DEPENDENCIES;
-    unsafe {
-        on_allowed::<M, Fmi3>(instance, call, |component| {
-            let count = place(call, "nDependencies", nDependencies)?;
-            *count = dependencies(component, call, valueReference)?.len();
-            Ok(())
-        })
-    }
-}
-
 /// Returns the dependencies of a variable: those of its initial value until the end of initialization mode,
 /// then the present ones.
-pub unsafe fn fmi3GetVariableDependencies<M: Model>(
+pub(super) unsafe fn write_dependencies<M: Model>(
     instance: fmi3Instance,
     dependent: fmi3ValueReference,
-    elementIndicesOfDependent: *mut usize,
-    independents: *mut fmi3ValueReference,
-    elementIndicesOfIndependents: *mut usize,
-    dependencyKinds: *mut fmi3DependencyKind,
-    nDependencies: usize,
+    (elements, independents): (*mut usize, *mut fmi3ValueReference),
+    (independent_elements, kinds): (*mut usize, *mut fmi3DependencyKind),
+    n: usize,
 ) -> fmi3Status {
     let call = &DEPENDENCIES;
     unsafe {
         on_allowed::<M, Fmi3>(instance, call, |component| {
             let all = dependencies(component, call, dependent)?;
-            if all.len() != nDependencies {
-                return Err(call.error(format_args!(
-                    "nDependencies = {nDependencies} (allowed: {})",
-                    all.len()
-                )));
-            }
-            let n = nDependencies;
-            let elements =
-                array_mut(call, "elementIndicesOfDependent", elementIndicesOfDependent, n)?;
+            check_numbers(call, "nDependencies", n, all.len())?;
+            let elements = array_mut(call, "elementIndicesOfDependent", elements, n)?;
             let independents = array_mut(call, "independents", independents, n)?;
             let independent_elements =
-                array_mut(call, "elementIndicesOfIndependents", elementIndicesOfIndependents, n)?;
+                array_mut(call, "elementIndicesOfIndependents", independent_elements, n)?;
             for (n, dependency) in all.iter().enumerate() {
                 elements[n] = dependency.element;
                 independents[n] = dependency.independent;
                 independent_elements[n] = dependency.independent_element;
             }
-            array_mut(call, "dependencyKinds", dependencyKinds, n)?.fill(fmi3Dependent);
+            array_mut(call, "dependencyKinds", kinds, n)?.fill(fmi3Dependent);
             Ok(())
         })
     }

@@ -12,28 +12,24 @@ use crate::number::{is_finite, text as number};
 use crate::version::Version;
 
 /// Computes the derivative of the unknowns in a direction of the knowns.
-pub unsafe fn fmi3GetDirectionalDerivative<M: Model>(
+pub(super) unsafe fn directional_derivative<M: Model>(
     instance: fmi3Instance,
-    unknowns: *const fmi3ValueReference,
-    nUnknowns: usize,
-    knowns: *const fmi3ValueReference,
-    nKnowns: usize,
-    seed: *const fmi3Float64,
-    nSeed: usize,
-    sensitivity: *mut fmi3Float64,
-    nSensitivity: usize,
+    (unknowns, n_unknowns): References,
+    (knowns, n_knowns): References,
+    (seed, n_seed): (*const fmi3Float64, usize),
+    (sensitivity, n_sensitivity): (*mut fmi3Float64, usize),
 ) -> fmi3Status {
     let call = Fmi3::DIRECTIONAL_DERIVATIVE;
     unsafe {
         on_allowed::<M, Fmi3>(instance, call, |component| {
-            let unknowns = array(call, "unknowns", unknowns, nUnknowns)?;
+            let unknowns = array(call, "unknowns", unknowns, n_unknowns)?;
             let unknowns = scalars_of(component, call, unknowns)?;
-            let knowns = array(call, "knowns", knowns, nKnowns)?;
+            let knowns = array(call, "knowns", knowns, n_knowns)?;
             let knowns = scalars_of(component, call, knowns)?;
-            check_numbers(call, "nSeed", nSeed, knowns.len())?;
-            check_numbers(call, "nSensitivity", nSensitivity, unknowns.len())?;
-            let seed = array(call, "seed", seed, nSeed)?;
-            let answers = array_mut(call, "sensitivity", sensitivity, nSensitivity)?;
+            check_numbers(call, "nSeed", n_seed, knowns.len())?;
+            check_numbers(call, "nSensitivity", n_sensitivity, unknowns.len())?;
+            let seed = array(call, "seed", seed, n_seed)?;
+            let answers = array_mut(call, "sensitivity", sensitivity, n_sensitivity)?;
             // The independent variable is left out of the knowns, because everything depends on it only
             // through states and inputs.
             let time = time_reference::<M>();
@@ -51,27 +47,23 @@ pub unsafe fn fmi3GetDirectionalDerivative<M: Model>(
 
 /// Computes the derivative of a weighted sum of the unknowns with respect to each known, each as a
 /// directional derivative.
-pub unsafe fn fmi3GetAdjointDerivative<M: Model>(
+pub(super) unsafe fn adjoint_derivative<M: Model>(
     instance: fmi3Instance,
-    unknowns: *const fmi3ValueReference,
-    nUnknowns: usize,
-    knowns: *const fmi3ValueReference,
-    nKnowns: usize,
-    seed: *const fmi3Float64,
-    nSeed: usize,
-    sensitivity: *mut fmi3Float64,
-    nSensitivity: usize,
+    (unknowns, n_unknowns): References,
+    (knowns, n_knowns): References,
+    (seed, n_seed): (*const fmi3Float64, usize),
+    (sensitivity, n_sensitivity): (*mut fmi3Float64, usize),
 ) -> fmi3Status {
     let call = &ADJOINT_DERIVATIVE;
     unsafe {
         on_allowed::<M, Fmi3>(instance, call, |component| {
-            let unknowns = array(call, "unknowns", unknowns, nUnknowns)?;
+            let unknowns = array(call, "unknowns", unknowns, n_unknowns)?;
             let unknowns = scalars_of(component, call, unknowns)?;
-            let knowns = array(call, "knowns", knowns, nKnowns)?;
+            let knowns = array(call, "knowns", knowns, n_knowns)?;
             let knowns = scalars_of(component, call, knowns)?;
-            check_numbers(call, "nSeed", nSeed, unknowns.len())?;
-            check_numbers(call, "nSensitivity", nSensitivity, knowns.len())?;
-            let seed = array(call, "seed", seed, nSeed)?;
+            check_numbers(call, "nSeed", n_seed, unknowns.len())?;
+            check_numbers(call, "nSensitivity", n_sensitivity, knowns.len())?;
+            let seed = array(call, "seed", seed, n_seed)?;
             for weight in seed {
                 if !is_finite(*weight) {
                     let weight = number(*weight);
@@ -80,7 +72,7 @@ pub unsafe fn fmi3GetAdjointDerivative<M: Model>(
                     );
                 }
             }
-            let answers = array_mut(call, "sensitivity", sensitivity, nSensitivity)?;
+            let answers = array_mut(call, "sensitivity", sensitivity, n_sensitivity)?;
             let mut column = vec![0.0; unknowns.len()];
             for (known, answer) in knowns.iter().zip(answers) {
                 *answer = 0.0;

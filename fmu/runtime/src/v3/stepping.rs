@@ -16,32 +16,21 @@ use crate::model::Model;
 use crate::number::is_finite;
 use crate::version::Version;
 
-/// Leaves event mode, so that steps can follow.
-pub unsafe fn fmi3EnterStepMode<M: Model>(instance: fmi3Instance) -> fmi3Status {
-    unsafe {
-        on::<M, Fmi3>(instance, &ENTER_STEP, |component| {
-            component.instance.enter_step_mode(&ENTER_STEP)
-        })
-    }
-}
-
 /// Computes the time derivatives of outputs at the end of the last step; only order 1 is supported.
-pub unsafe fn fmi3GetOutputDerivatives<M: Model>(
+pub(super) unsafe fn output_derivatives<M: Model>(
     instance: fmi3Instance,
-    valueReferences: *const fmi3ValueReference,
-    nValueReferences: usize,
+    (references, count): References,
     orders: *const fmi3Int32,
-    values: *mut fmi3Float64,
-    nValues: usize,
+    (values, value_count): (*mut fmi3Float64, usize),
 ) -> fmi3Status {
     let call = Fmi3::GET_OUTPUT_DERIVATIVES;
     unsafe {
         on_allowed::<M, Fmi3>(instance, call, |component| {
-            let references = array(call, "valueReferences", valueReferences, nValueReferences)?;
-            let orders = array(call, "orders", orders, nValueReferences)?;
+            let references = array(call, "valueReferences", references, count)?;
+            let orders = array(call, "orders", orders, count)?;
             let (mut scalars, mut orders) = (Cow::Borrowed(references), Cow::Borrowed(orders));
             match &component.host.arrays {
-                None => check_count(call, nValueReferences, nValues)?,
+                None => check_count(call, count, value_count)?,
                 Some(arrays) => {
                     let each = references.iter().zip(orders.iter());
                     let each = each.flat_map(|(r, order)| {
@@ -50,10 +39,10 @@ pub unsafe fn fmi3GetOutputDerivatives<M: Model>(
                     let each: Vec<i32> = each.collect();
                     scalars = Cow::Owned(expand::<M>(arrays, call, references)?);
                     orders = Cow::Owned(each);
-                    check_elements(component, call, references, scalars.len(), nValues)?;
+                    check_elements(component, call, references, scalars.len(), value_count)?;
                 }
             }
-            let places = array_mut(call, "values", values, nValues)?;
+            let places = array_mut(call, "values", values, value_count)?;
             if component.instance.state() == InstanceState::Intermediate {
                 for reference in scalars.iter() {
                     check_intermediate(component, call, *reference, Phase::Get)?;
@@ -120,12 +109,13 @@ unsafe fn intermediate_update<M: Model>(
     Ok(Wish { early_return: Some(at).filter(|_| requested != 0 && can_return) })
 }
 
+/// Places for the results of fmi3DoStep.
 #[derive(Clone, Copy)]
-struct Answers {
-    event: *mut fmi3Boolean,
-    terminate: *mut fmi3Boolean,
-    early: *mut fmi3Boolean,
-    last: *mut fmi3Float64,
+pub(super) struct Answers {
+    pub(super) event: *mut fmi3Boolean,
+    pub(super) terminate: *mut fmi3Boolean,
+    pub(super) early: *mut fmi3Boolean,
+    pub(super) last: *mut fmi3Float64,
 }
 
 impl Answers {
@@ -160,23 +150,11 @@ impl Answers {
 /// Makes one step. If the host allows early return, the step stops at an event and sets
 /// `eventHandlingNeeded`, which is also set for an event at the end of the step. The FMU keeps no past, so
 /// `noSetFMUStatePriorToCurrentPoint` has no effect.
-pub unsafe fn fmi3DoStep<M: Model>(
+pub(super) unsafe fn do_step<M: Model>(
     instance: fmi3Instance,
-    currentCommunicationPoint: fmi3Float64,
-    communicationStepSize: fmi3Float64,
-    _noSetFMUStatePriorToCurrentPoint: fmi3Boolean,
-    eventHandlingNeeded: *mut fmi3Boolean,
-    terminateSimulation: *mut fmi3Boolean,
-    earlyReturn: *mut fmi3Boolean,
-    lastSuccessfulTime: *mut fmi3Float64,
+    (at, h): (fmi3Float64, fmi3Float64),
+    answers: Answers,
 ) -> fmi3Status {
-    let (at, h) = (currentCommunicationPoint, communicationStepSize);
-    let answers = Answers {
-        event: eventHandlingNeeded,
-        terminate: terminateSimulation,
-        early: earlyReturn,
-        last: lastSuccessfulTime,
-    };
     let mut looks_in = false;
     let status = unsafe {
         on::<M, Fmi3>(instance, Fmi3::DO_STEP, |component| {

@@ -24,6 +24,9 @@ pub type fmi3Byte = u8;
 pub type fmi3Binary = *const fmi3Byte;
 pub type fmi3Clock = bool;
 
+/// An array of value references, and their number.
+pub(super) type References = (*const fmi3ValueReference, usize);
+
 pub type fmi3Status = c_abi::Status;
 pub const fmi3OK: fmi3Status = c_abi::OK;
 pub const fmi3Warning: fmi3Status = c_abi::WARNING;

@@ -1,8 +1,6 @@
 //! Reading and setting variables by type, also within steps. There are no values for clocks and binary
 //! variables.
 
-// The standard documents these names.
-#![allow(missing_docs)]
 #![allow(unsafe_code)]
 
 use super::calls::*;
@@ -11,7 +9,6 @@ use super::host::Phase;
 use super::references::{Extra, extra, wrong_reference};
 use super::types::*;
 use crate::c_abi::{Component, array, array_mut, on_allowed};
-use crate::call::states::*;
 use crate::call::{CType, Call, Fault, InstanceState};
 use crate::model::Model;
 use crate::table::Scalar;
@@ -20,10 +17,10 @@ use crate::version::Version;
 
 /// Reads the variables of all references and converts each value to its C type by `as_c`.
 #[inline]
-unsafe fn get<M: Model, T>(
+pub(super) unsafe fn get<M: Model, T>(
     instance: fmi3Instance,
     call: &'static Call,
-    (references, count): (*const fmi3ValueReference, usize),
+    (references, count): References,
     (values, value_count): (*mut T, usize),
     as_c: impl Fn(Value) -> Option<T>,
 ) -> fmi3Status {
@@ -126,10 +123,10 @@ pub(super) fn check_intermediate<M: Model>(
 
 /// Sets the variables of all references; each value is converted from its C type by `from_c`.
 #[inline]
-unsafe fn set<M: Model, T: Copy>(
+pub(super) unsafe fn set<M: Model, T: Copy>(
     instance: fmi3Instance,
     call: &'static Call,
-    (references, count): (*const fmi3ValueReference, usize),
+    (references, count): References,
     (values, value_count): (*const T, usize),
     from_c: impl Fn(T) -> Value,
 ) -> fmi3Status {
@@ -206,39 +203,6 @@ fn set_ends<M: Model>(
     Ok(())
 }
 
-/// Defines functions that read or set variables of one type by `$access`, with a conversion to or from the C
-/// type.
-macro_rules! accessors {
-    ($($(#[$doc:meta])* $name:ident($values:ty): $access:ident, $call:expr, $convert:expr;)*) => {$(
-        $(#[$doc])*
-        pub unsafe fn $name<M: Model>(
-            instance: fmi3Instance,
-            valueReferences: *const fmi3ValueReference,
-            nValueReferences: usize,
-            values: $values,
-            nValues: usize,
-        ) -> fmi3Status {
-            let (references, values) = ((valueReferences, nValueReferences), (values, nValues));
-            unsafe { $access::<M, _>(instance, $call, references, values, $convert) }
-        }
-    )*};
-}
-
-accessors! {
-    fmi3GetFloat64(*mut fmi3Float64): get, &GET_FLOAT64, Value::real;
-    fmi3GetInt32(*mut fmi3Int32): get, &GET_INT32, Value::integer;
-    fmi3GetInt64(*mut fmi3Int64): get, &GET_INT64, |value| value.integer().map(i64::from);
-    /// Reads Booleans as 0 or 1.
-    fmi3GetBoolean(*mut fmi3Boolean): get, &GET_BOOLEAN, |value| value.boolean().map(u8::from);
-    fmi3SetFloat64(*const fmi3Float64): set, &SET_FLOAT64, Value::Real;
-    fmi3SetInt32(*const fmi3Int32): set, &SET_INT32, Value::Integer;
-    /// Sets enumerations. A value that does not fit an i32 becomes 0, which is not an item of any
-    /// enumeration.
-    fmi3SetInt64(*const fmi3Int64): set, &SET_INT64, |n| Value::Integer(i32::try_from(n).unwrap_or(0));
-    /// Sets Booleans; every value except 0 is true.
-    fmi3SetBoolean(*const fmi3Boolean): set, &SET_BOOLEAN, |b| Value::Boolean(b != 0);
-}
-
 /// Checks the arguments of a function for a type that no variable has: it succeeds without references and
 /// otherwise fails.
 fn check_no_variable<M: Model>(
@@ -260,10 +224,10 @@ fn check_no_variable<M: Model>(
 }
 
 /// Performs a function for a type that no variable has.
-unsafe fn access_no_variable<M: Model>(
+pub(super) unsafe fn access_no_variable<M: Model>(
     instance: fmi3Instance,
     call: &'static Call,
-    (references, count): (*const fmi3ValueReference, usize),
+    (references, count): References,
     value_count: usize,
 ) -> fmi3Status {
     unsafe {
@@ -275,22 +239,20 @@ unsafe fn access_no_variable<M: Model>(
 }
 
 /// Reads structural parameters, which exist only in the layout with arrays.
-pub unsafe fn fmi3GetUInt64<M: Model>(
+pub(super) unsafe fn get_sizes<M: Model>(
     instance: fmi3Instance,
-    valueReferences: *const fmi3ValueReference,
-    nValueReferences: usize,
-    values: *mut fmi3UInt64,
-    nValues: usize,
+    (references, count): References,
+    (values, value_count): (*mut fmi3UInt64, usize),
 ) -> fmi3Status {
     let call = &GET_UINT64;
     unsafe {
         on_allowed::<M, Fmi3>(instance, call, |component| {
-            let references = array(call, "valueReferences", valueReferences, nValueReferences)?;
+            let references = array(call, "valueReferences", references, count)?;
             if component.host.arrays.is_none() {
-                return check_no_variable(component, call, references, nValues);
+                return check_no_variable(component, call, references, value_count);
             }
-            let found = array_values(component, call, references, nValues)?;
-            let places = array_mut(call, "values", values, nValues)?;
+            let found = array_values(component, call, references, value_count)?;
+            let places = array_mut(call, "values", values, value_count)?;
             for (value, place) in found.into_iter().zip(places) {
                 *place = match value {
                     Value::Integer(n) => u64::try_from(n).unwrap_or(0),
@@ -303,135 +265,23 @@ pub unsafe fn fmi3GetUInt64<M: Model>(
 }
 
 /// Sets structural parameters, which exist only in the layout with arrays.
-pub unsafe fn fmi3SetUInt64<M: Model>(
+pub(super) unsafe fn set_sizes<M: Model>(
     instance: fmi3Instance,
-    valueReferences: *const fmi3ValueReference,
-    nValueReferences: usize,
-    values: *const fmi3UInt64,
-    nValues: usize,
+    (references, count): References,
+    (values, value_count): (*const fmi3UInt64, usize),
 ) -> fmi3Status {
     let call = &SET_UINT64;
     unsafe {
         on_allowed::<M, Fmi3>(instance, call, |component| {
-            let references = array(call, "valueReferences", valueReferences, nValueReferences)?;
+            let references = array(call, "valueReferences", references, count)?;
             if component.host.arrays.is_none() {
-                return check_no_variable(component, call, references, nValues);
+                return check_no_variable(component, call, references, value_count);
             }
             // A value above the largest integer is above the largest size.
             let size = |n: &u64| Value::Integer(i32::try_from(*n).unwrap_or(i32::MAX));
-            let values = array(call, "values", values, nValues)?;
+            let values = array(call, "values", values, value_count)?;
             let values: Vec<_> = values.iter().map(size).collect();
             set_arrays(component, call, references, &values)
-        })
-    }
-}
-
-/// Defines functions for types that no variable has.
-macro_rules! accessors_without_variables {
-    ($($name:ident($value:ty), $allowed:expr;)*) => {$(
-        /// Succeeds without references and otherwise fails, because no variable has this type.
-        pub unsafe fn $name<M: Model>(
-            instance: fmi3Instance,
-            valueReferences: *const fmi3ValueReference,
-            nValueReferences: usize,
-            _values: $value,
-            nValues: usize,
-        ) -> fmi3Status {
-            static CALL: Call = Call::new(stringify!($name), $allowed);
-            let references = (valueReferences, nValueReferences);
-            unsafe { access_no_variable::<M>(instance, &CALL, references, nValues) }
-        }
-    )*};
-}
-
-accessors_without_variables! {
-    fmi3GetFloat32(*mut fmi3Float32), GET;
-    fmi3GetInt8(*mut i8), GET;
-    fmi3GetUInt8(*mut u8), GET;
-    fmi3GetInt16(*mut i16), GET;
-    fmi3GetUInt16(*mut u16), GET;
-    fmi3GetUInt32(*mut u32), GET;
-    fmi3GetString(*mut fmi3String), GET;
-    fmi3SetFloat32(*const fmi3Float32), SET;
-    fmi3SetInt8(*const i8), SET;
-    fmi3SetUInt8(*const u8), SET;
-    fmi3SetInt16(*const i16), SET;
-    fmi3SetUInt16(*const u16), SET;
-    fmi3SetUInt32(*const u32), SET;
-    fmi3SetString(*const fmi3String), SET;
-}
-
-/// Succeeds without references and otherwise fails, because no variable is binary.
-pub unsafe fn fmi3GetBinary<M: Model>(
-    instance: fmi3Instance,
-    valueReferences: *const fmi3ValueReference,
-    nValueReferences: usize,
-    _valueSizes: *mut usize,
-    _values: *mut fmi3Binary,
-    nValues: usize,
-) -> fmi3Status {
-    static CALL: Call = Call::new("fmi3GetBinary", GET);
-    unsafe {
-        access_no_variable::<M>(instance, &CALL, (valueReferences, nValueReferences), nValues)
-    }
-}
-
-/// Succeeds without references and otherwise fails, because no variable is binary.
-pub unsafe fn fmi3SetBinary<M: Model>(
-    instance: fmi3Instance,
-    valueReferences: *const fmi3ValueReference,
-    nValueReferences: usize,
-    _valueSizes: *const usize,
-    _values: *const fmi3Binary,
-    nValues: usize,
-) -> fmi3Status {
-    static CALL: Call = Call::new("fmi3SetBinary", SET);
-    unsafe {
-        access_no_variable::<M>(instance, &CALL, (valueReferences, nValueReferences), nValues)
-    }
-}
-
-/// Defines functions for clocks, of which there are none.
-macro_rules! clock_functions {
-    ($($name:ident($($argument:ident: $type:ty),*);)*) => {$(
-        /// Succeeds without references and otherwise fails, because there are no clocks.
-        pub unsafe fn $name<M: Model>(
-            instance: fmi3Instance,
-            valueReferences: *const fmi3ValueReference,
-            nValueReferences: usize,
-            $($argument: $type),*
-        ) -> fmi3Status {
-            static CALL: Call = Call::new(stringify!($name), ANY);
-            let _ = ($($argument,)*);
-            let references = (valueReferences, nValueReferences);
-            unsafe { access_no_variable::<M>(instance, &CALL, references, nValueReferences) }
-        }
-    )*};
-}
-
-clock_functions! {
-    fmi3GetClock(values: *mut fmi3Clock);
-    fmi3SetClock(values: *const fmi3Clock);
-    fmi3GetIntervalDecimal(intervals: *mut fmi3Float64, qualifiers: *mut fmi3IntervalQualifier);
-    fmi3GetIntervalFraction(counters: *mut fmi3UInt64, resolutions: *mut fmi3UInt64, qualifiers: *mut fmi3IntervalQualifier);
-    fmi3GetShiftDecimal(shifts: *mut fmi3Float64);
-    fmi3GetShiftFraction(counters: *mut fmi3UInt64, resolutions: *mut fmi3UInt64);
-    fmi3SetIntervalDecimal(intervals: *const fmi3Float64);
-    fmi3SetIntervalFraction(counters: *const fmi3UInt64, resolutions: *const fmi3UInt64);
-    fmi3SetShiftDecimal(shifts: *const fmi3Float64);
-    fmi3SetShiftFraction(counters: *const fmi3UInt64, resolutions: *const fmi3UInt64);
-}
-
-/// Fails, because there are no model partitions.
-pub unsafe fn fmi3ActivateModelPartition<M: Model>(
-    instance: fmi3Instance,
-    _clockReference: fmi3ValueReference,
-    _activationTime: fmi3Float64,
-) -> fmi3Status {
-    static CALL: Call = Call::new("fmi3ActivateModelPartition", ANY);
-    unsafe {
-        on_allowed::<M, Fmi3>(instance, &CALL, |_| {
-            Err(CALL.error("this FMU has no Scheduled Execution"))
         })
     }
 }
