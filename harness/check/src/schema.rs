@@ -24,13 +24,13 @@ pub enum Written {
 
 use Written::*;
 
-/// An element of the schema. Its name is `parent/name` if elements of this name differ between parents.
+/// Elements of the schema with the same attributes and children. `names` has their names, separated by
+/// spaces; a name is `parent/name` if elements of this name differ between parents.
 pub struct Kind {
-    name: &'static str,
+    names: &'static str,
     needed: Attributes,
-    optional: Attributes,
-    /// Optional attributes that several elements have in common.
-    shared: Attributes,
+    /// Optional attributes, in the order in which findings list them.
+    optional: [Attributes; 3],
     children: Children,
 }
 
@@ -59,26 +59,45 @@ pub(crate) const DEPENDENCY: Written =
     Words(&["dependent", "constant", "fixed", "tunable", "discrete"]);
 const TYPES: &[&str] = &["Real", "Integer", "Boolean", "String", "Enumeration"];
 
-/// Creates an element of the table without shared attributes.
+/// Creates an entry of the table.
 pub const fn kind(
-    name: &'static str,
+    names: &'static str,
     needed: Attributes,
     optional: Attributes,
     children: Children,
 ) -> Kind {
-    Kind { name, needed, optional, shared: &[], children }
+    Kind { names, needed, optional: [&[], optional, &[]], children }
 }
 
 impl Kind {
-    /// Adds optional attributes that several elements have in common.
-    pub const fn and(self, shared: Attributes) -> Kind {
-        Kind { shared, ..self }
+    /// Adds optional attributes before those of [`kind`].
+    pub const fn and(mut self, shared: Attributes) -> Kind {
+        self.optional[0] = shared;
+        self
+    }
+
+    /// Adds optional attributes after those of [`kind`].
+    pub const fn then(mut self, more: Attributes) -> Kind {
+        self.optional[2] = more;
+        self
     }
 
     fn attributes(&self) -> impl Iterator<Item = &'static (&'static str, Written)> {
-        self.needed.iter().chain(self.shared).chain(self.optional)
+        self.needed.iter().chain(self.optional.into_iter().flatten())
+    }
+
+    fn is_named(&self, name: &str) -> bool {
+        self.names.split(' ').any(|own| own == name)
     }
 }
+
+/// Attributes of BaseUnit in both versions.
+#[rustfmt::skip]
+pub const BASE_UNIT: Attributes = &[("kg", Int), ("m", Int), ("s", Int), ("A", Int), ("K", Int), ("mol", Int),
+    ("cd", Int), ("rad", Int), ("factor", Double), ("offset", Double)];
+/// Attributes of DefaultExperiment in both versions.
+pub const EXPERIMENT: Attributes =
+    &[("startTime", Double), ("stopTime", Double), ("tolerance", Double), ("stepSize", Double)];
 
 #[rustfmt::skip]
 static KINDS: &[Kind] = &[
@@ -109,10 +128,7 @@ static KINDS: &[Kind] = &[
     kind("File", &[("name", Text)], &[], Sequence(&[])),
     kind("UnitDefinitions", &[], &[], Many(&["Unit"])),
     kind("Unit", &[("name", Text)], &[], Choice(&[], &["BaseUnit", "DisplayUnit"])),
-    kind("BaseUnit", &[],
-        &[("kg", Int), ("m", Int), ("s", Int), ("A", Int), ("K", Int), ("mol", Int), ("cd", Int),
-          ("rad", Int), ("factor", Double), ("offset", Double)],
-        Sequence(&[])),
+    kind("BaseUnit", &[], BASE_UNIT, Sequence(&[])),
     kind("DisplayUnit", &[("name", Text)], &[("factor", Double), ("offset", Double)], Sequence(&[])),
     kind("TypeDefinitions", &[], &[], Many(&["SimpleType"])),
     kind("SimpleType", &[("name", Text)], &[("description", Text)], Choice(TYPES, &[])),
@@ -121,17 +137,13 @@ static KINDS: &[Kind] = &[
           ("min", Double), ("max", Double), ("nominal", Double), ("unbounded", Boolean)],
         Sequence(&[])),
     kind("SimpleType/Integer", &[], &[("quantity", Text), ("min", Int), ("max", Int)], Sequence(&[])),
-    kind("SimpleType/Boolean", &[], &[], Sequence(&[])),
-    kind("SimpleType/String", &[], &[], Sequence(&[])),
+    kind("SimpleType/Boolean SimpleType/String", &[], &[], Sequence(&[])),
     kind("SimpleType/Enumeration", &[], &[("quantity", Text)], Many(&["Item"])),
     kind("Item", &[("name", Text), ("value", Int)], &[("description", Text)], Sequence(&[])),
     kind("LogCategories", &[], &[], Many(&["Category"])),
     kind("Category", &[("name", Text)], &[("description", Text)], Sequence(&[])),
-    kind("DefaultExperiment", &[],
-        &[("startTime", Double), ("stopTime", Double), ("tolerance", Double), ("stepSize", Double)],
-        Sequence(&[])),
-    kind("VendorAnnotations", &[], &[], Many(&["Tool"])),
-    kind("Annotations", &[], &[], Many(&["Tool"])),
+    kind("DefaultExperiment", &[], EXPERIMENT, Sequence(&[])),
+    kind("VendorAnnotations Annotations", &[], &[], Many(&["Tool"])),
     kind("Tool", &[("name", Text)], &[], Any),
     kind("ModelVariables", &[], &[], Many(&["ScalarVariable"])),
     kind("ScalarVariable", &[("name", Text), ("valueReference", Unsigned)],
@@ -152,9 +164,7 @@ static KINDS: &[Kind] = &[
         &[("quantity", Text), ("min", Int), ("max", Int), ("start", Int)],
         Sequence(&[])),
     kind("ModelStructure", &[], &[], Sequence(&["Outputs", "Derivatives", "InitialUnknowns"])),
-    kind("Outputs", &[], &[], Many(&["Unknown"])),
-    kind("Derivatives", &[], &[], Many(&["Unknown"])),
-    kind("InitialUnknowns", &[], &[], Many(&["Unknown"])),
+    kind("Outputs Derivatives InitialUnknowns", &[], &[], Many(&["Unknown"])),
     kind("Unknown", &[("index", Unsigned)],
         &[("dependencies", INDICES), ("dependenciesKind", DEPENDENCY)],
         Sequence(&[])),
@@ -162,7 +172,7 @@ static KINDS: &[Kind] = &[
 
 fn find(kinds: &'static [Kind], parent: &str, name: &str) -> Option<&'static Kind> {
     let full = format!("{parent}/{name}");
-    kinds.iter().find(|k| k.name == full).or_else(|| kinds.iter().find(|k| k.name == name))
+    kinds.iter().find(|k| k.is_named(&full)).or_else(|| kinds.iter().find(|k| k.is_named(name)))
 }
 
 pub const INDICES: Written = List(&Unsigned);
@@ -457,8 +467,8 @@ mod tests {
                     Many(names) | Sequence(names) | Ordered(names) => names.to_vec(),
                     Choice(a, b) => [a, b].concat(),
                 };
-                let parent = kind.name.rsplit('/').next().unwrap();
-                for name in names {
+                let parents = kind.names.split(' ').map(|name| name.rsplit('/').next().unwrap());
+                for (parent, name) in parents.flat_map(|p| names.iter().map(move |n| (p, n))) {
                     let name = name.trim_start_matches('!');
                     assert!(find(kinds, parent, name).is_some(), "{parent}/{name}");
                 }
