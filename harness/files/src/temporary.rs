@@ -53,7 +53,7 @@ pub fn uninterrupted<T>(work: impl FnOnce() -> T) -> T {
 }
 
 /// Prefix of the names of temporary folders.
-const PREFIX: &str = "hubslosh-";
+pub const PREFIX: &str = "hubslosh-";
 /// Name of the file in such a folder that is locked as long as its program runs.
 const ALIVE: &str = "alive";
 /// Name of the folder within it for the files.
@@ -84,9 +84,19 @@ impl Folder {
     /// programs that were killed.
     pub fn new() -> Result<Folder> {
         static SWEPT: Once = Once::new();
-        SWEPT.call_once(|| sweep(&std::env::temp_dir()));
+        SWEPT.call_once(|| sweep(&std::env::temp_dir(), PREFIX));
+        Folder::make(&std::env::temp_dir(), PREFIX)
+    }
+
+    /// Makes one in `parent`, with a name that begins with `prefix`, and removes those there of programs that were killed.
+    pub fn new_in(parent: &Path, prefix: &str) -> Result<Folder> {
+        sweep(parent, prefix);
+        Folder::make(parent, prefix)
+    }
+
+    fn make(parent: &Path, prefix: &str) -> Result<Folder> {
         let make = || -> std::io::Result<Folder> {
-            let directory = tempfile::Builder::new().prefix(PREFIX).tempdir()?;
+            let directory = tempfile::Builder::new().prefix(prefix).tempdir_in(parent)?;
             let registered = register(directory.path());
             // locked before it has its name, so that nobody finds it unlocked
             let draft = directory.path().join("draft");
@@ -99,9 +109,7 @@ impl Folder {
             let process = std::process::id();
             Ok(Folder { files, _alive: alive, directory, _registered: registered, process })
         };
-        make().with_context(|| {
-            format!("no temporary folder can be made in {}", std::env::temp_dir().display())
-        })
+        make().with_context(|| format!("no temporary folder can be made in {}", parent.display()))
     }
 
     /// Returns the path for the files.
@@ -111,9 +119,9 @@ impl Folder {
 }
 
 /// Removes the folders of programs that no longer live.
-fn sweep(parent: &Path) {
+fn sweep(parent: &Path, prefix: &str) {
     for entry in fs::read_dir(parent).into_iter().flatten().flatten() {
-        let ours = entry.file_name().to_string_lossy().starts_with(PREFIX);
+        let ours = entry.file_name().to_string_lossy().starts_with(prefix);
         let alive = entry.path().join(ALIVE);
         // of anything but a plain file, opening it could take for ever
         let is_file = || fs::symlink_metadata(&alive).is_ok_and(|found| found.is_file());
@@ -141,7 +149,7 @@ mod tests {
         File::create(dead.join(ALIVE)).unwrap();
         let held = File::create(living.join(ALIVE)).unwrap();
         held.lock().unwrap();
-        sweep(parent.path());
+        sweep(parent.path(), PREFIX);
         assert!(!dead.exists() && living.exists());
         assert!(other.exists(), "without the file it is not one of ours");
     }

@@ -1,8 +1,10 @@
 //! Files: parameters and recordings that are read, and places of outputs.
 
 use std::path::PathBuf;
+use std::sync::{Mutex, PoisonError};
 
 use ::files::output::{self, Destination};
+use ::files::temporary::{self, PREFIX};
 use host::description::Value;
 use host::parameter_set::ParameterSet;
 use pyo3::prelude::*;
@@ -85,4 +87,30 @@ pub fn destination(path: PathBuf) -> PyResult<Option<PathBuf>> {
 #[pyfunction]
 pub fn put(py: Python, draft: PathBuf, path: PathBuf) -> PyResult<()> {
     py.detach(|| output::publish_draft(&draft, &path)).map_err(error)
+}
+
+/// A temporary folder in `parent`, which is removed at the end of `with`, or after a kill when the next one is made there.
+#[pyclass(frozen, module = "hubslosh")]
+pub struct Folder(Mutex<Option<temporary::Folder>>, PathBuf);
+
+#[pymethods]
+impl Folder {
+    #[new]
+    fn new(py: Python, parent: PathBuf, hidden: bool) -> PyResult<Folder> {
+        let prefix = if hidden { format!(".{PREFIX}") } else { PREFIX.into() };
+        let made = py.detach(|| temporary::Folder::new_in(&parent, &prefix)).map_err(error)?;
+        let path = made.path().to_path_buf();
+        Ok(Folder(Mutex::new(Some(made)), path))
+    }
+
+    /// Return the path for the files.
+    fn __enter__(&self) -> PathBuf {
+        self.1.clone()
+    }
+
+    /// Remove the folder, unless this process is a fork of the one that made it.
+    #[pyo3(signature = (*_failure))]
+    fn __exit__(&self, _failure: &Bound<pyo3::types::PyTuple>) {
+        drop(self.0.lock().unwrap_or_else(PoisonError::into_inner).take());
+    }
 }

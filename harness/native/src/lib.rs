@@ -26,7 +26,7 @@ mod _native {
     #[pymodule_export]
     use crate::crossings::Model;
     #[pymodule_export]
-    use crate::files::{destination, put, read_parameters, read_recording};
+    use crate::files::{Folder, destination, put, read_parameters, read_recording};
     #[pymodule_export]
     use crate::fmu::{Fmu, FmuError, FmuWarning, Variable};
     #[pymodule_export]

@@ -1,90 +1,21 @@
-"""Temporary folders that go however the program ends; after a kill, at the next start.
-
-The scheme is that of the program ``hubslosh`` (``harness/files/src/temporary.rs``). A folder
-``hubslosh-…`` contains the folder ``files`` and a file ``alive``, which is locked while its process
-lives. Either program removes the folders of both.
-"""
+"""Temporary folders, which go however the program ends, and files that appear complete or not."""
 
 import os
-import shutil
-import stat
-import sys
 import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
-from .native import FmuError, destination, put
-
-PREFIX, ALIVE, FILES = "hubslosh-", "alive", "files"
-
-if sys.platform == "win32":
-    import msvcrt
-
-    def try_lock(file: BinaryIO) -> bool:
-        """Lock a file as ``std::fs::File::try_lock`` does; return whether nobody else has it."""
-        try:
-            file.seek(0)
-            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
-        except OSError:
-            return False
-        return True
-
-else:
-    import fcntl
-
-    def try_lock(file: BinaryIO) -> bool:
-        """Lock a file as ``std::fs::File::try_lock`` does; return whether nobody else has it."""
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return False
-        return True
+from .native import FmuError, Folder, destination, put
 
 
-class _Folder:
-    """A temporary folder and the lock that keeps it."""
+def folder(parent: Path | None = None, *, hidden: bool = False) -> Folder:
+    """Return a temporary folder for ``with``, by default in the system's; it goes at the end.
 
-    def __init__(self, parent: Path, prefix: str) -> None:
-        self.folder = Path(tempfile.mkdtemp(prefix=prefix, dir=parent))
-        draft = self.folder / "draft"
-        self._alive = draft.open("wb")
-        # Locked before it has its name, so that nobody finds it unlocked. Where there are no
-        # locks, nobody takes it for dead either.
-        with suppress(OSError):
-            try_lock(self._alive)
-        if sys.platform == "win32":
-            self._alive.close()
-            draft.replace(self.folder / ALIVE)
-            self._alive = (self.folder / ALIVE).open("r+b")
-            try_lock(self._alive)
-        else:
-            draft.replace(self.folder / ALIVE)
-        self.files = self.folder / FILES
-        self.files.mkdir()
-        self._process = os.getpid()
-
-    def remove(self) -> None:
-        self._alive.close()
-        if os.getpid() != self._process:
-            return  # a fork has it from its parent
-        shutil.rmtree(self.folder, ignore_errors=True)
-
-
-@contextmanager
-def folder(parent: Path | None = None, prefix: str = PREFIX) -> Iterator[Path]:
-    """Yield a temporary folder, by default in the system's; it goes at the end.
-
-    Folders there that killed processes have left are removed first.
+    Folders there that killed processes of Python or of the program have left are removed first.
     """
-    parent = Path(tempfile.gettempdir()) if parent is None else parent
-    sweep(parent, prefix)
-    made = _Folder(parent, prefix)
-    try:
-        yield made.files
-    finally:
-        made.remove()
+    return Folder(Path(tempfile.gettempdir()) if parent is None else parent, hidden)
 
 
 @contextmanager
@@ -94,34 +25,17 @@ def output(path: Path) -> Iterator[Path]:
     Links of ``path`` are followed. A plain file is replaced; a device or a pipe gets the bytes.
     """
     place = destination(path)
-    parent, prefix = (None, PREFIX) if place is None else (Path(place).parent, f".{PREFIX}")
+    # a device has no folder beside it
+    parent = None if place is None else Path(place).parent
+    if parent is not None and not parent.is_dir():
+        raise FmuError(f"{path} cannot be written: there is no folder {parent}")
     try:
-        with folder(parent, prefix) as there:
+        with folder(parent, hidden=parent is not None) as there:
             new = there / path.name
             yield new
             put(new, path)
     except OSError as error:
         raise FmuError(f"{path} cannot be written: {error}") from None
-
-
-def sweep(parent: Path, prefix: str = PREFIX) -> None:
-    """Remove the folders in ``parent`` whose processes no longer live."""
-    with suppress(OSError):
-        for path in parent.glob(f"{prefix}*"):
-            with suppress(OSError):
-                _remove_dead(path)
-
-
-def _remove_dead(path: Path) -> None:
-    alive = path / ALIVE
-    # Opening a pipe could take for ever; a link could lead elsewhere.
-    kinds = [os.lstat(each).st_mode for each in (path, alive)]
-    if not stat.S_ISDIR(kinds[0]) or not stat.S_ISREG(kinds[1]):
-        return
-    with alive.open("rb+") as file:
-        dead = try_lock(file)
-    if dead:
-        shutil.rmtree(path, ignore_errors=True)
 
 
 def check_path(path: Any, ending: str) -> Path:
