@@ -5,13 +5,15 @@ Each function draws into the axes it is given, or into a new figure, and returns
 
 import textwrap
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from .arguments import check_table
+from .curves import curves_of, draw_bode, draw_nichols, draw_nyquist
 from .fmu import FmuError, did_you_mean
+from .stability import _broken_at, band, frequencies, margins_and_gain
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -19,23 +21,22 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
+    from .curves import Curve, Curves
     from .linearization import LinearModel
+    from .stability import Margins
 
 # Okabe and Ito's palette: distinct for colour-blind readers
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 """Colours of series, in turn."""
 
-FLOOR = 80.0
-"""Attenuation down to which `margins` draws the loop gain, dB."""
 
-
-def _subplots(rows: int, **options: Any) -> "Sequence[Axes]":
-    """Return the axes of a new figure, one above the other."""
+def _subplots(rows: int, height: float | None = None, **options: Any) -> "Sequence[Axes]":
+    """Return the axes of a new figure of a height in inches, one above the other."""
     try:
         import matplotlib.pyplot as plt
     except ModuleNotFoundError:
         raise FmuError("plots need matplotlib: pip install matplotlib") from None
-    height = 1.2 + 1.9 * rows
+    height = 1.2 + 1.9 * rows if height is None else height
     _, axes = plt.subplots(
         rows, squeeze=False, figsize=(8, height), layout="constrained", **options
     )
@@ -213,8 +214,9 @@ def bode(
                 low = min(frame["frequency"].min() for frame in frames)
                 high = max(frame["frequency"].max() for frame in frames)
             else:
-                low, high = _band(*models)
-            line = _frequencies(response, low, high)
+                lows, highs = zip(*(band(model) for model in models), strict=True)
+                low, high = min(lows), max(highs)
+            line = frequencies(response, low, high, 2000)
             h = response.response(line)[:, 0, 0]
             # above the dots, which would hide it
             style: dict[str, Any] = {"color": color, "linewidth": 1.2, "zorder": 3}
@@ -231,38 +233,6 @@ def bode(
     if labels:
         gain.legend()
     return gain, phase
-
-
-def _band(*models: "LinearModel") -> tuple[float, float]:
-    """Return the band of the models' poles and zeros, Hz, from a fifth of the lowest one on."""
-    from scipy.linalg import eigvals
-
-    found, highest = [], np.inf
-    for model in models:
-        n = len(model.A)
-        system = np.block([[model.A, model.B[:, :1]], [model.C[:1], model.D[:1, :1]]])
-        with np.errstate(all="ignore"):
-            zeros = eigvals(system, np.diag([1.0] * n + [0.0]))
-        values = np.concatenate([model.poles, zeros[np.isfinite(zeros)]])
-        if model.period is not None:
-            values = np.log(values[values != 0].astype(complex)) / model.period
-            highest = min(highest, 0.5 / model.period)
-        sizes = np.abs(values) / (2 * np.pi)
-        found += [float(f) for f in sizes if 1e-6 < f < 1e6]
-    low, high = min(found, default=0.1) / 5, max(found, default=10.0) * 5
-    high = min(high, highest)
-    return min(low, high / 100), high
-
-
-def _frequencies(model: "LinearModel", low: float, high: float) -> np.ndarray:
-    """Return 2000 frequencies between two, Hz, and more about each lightly damped pole."""
-    line = [np.geomspace(low, high, 2000)]
-    for mode in model.modes(0.3).itertuples():
-        width = max(mode.zeta, 1e-6) * mode.frequency
-        about = width * np.concatenate([[0], np.geomspace(0.05, 50, 60)])
-        line.append(mode.frequency + np.concatenate([-about, about]))
-    every = np.unique(np.concatenate(line))
-    return every[(every >= low) & (every <= high)]
 
 
 def margins(
@@ -288,7 +258,7 @@ def margins(
     Returns
     -------
     sequence of matplotlib Axes
-        Axes of the gain (dB, down to -80 dB or the smallest gain margin) and of the phase (deg).
+        Axes of the gain (dB, around 0 dB and the gain margins) and of the phase (deg).
 
     Raises
     ------
@@ -303,78 +273,189 @@ def margins(
     >>> gain.get_title().partition(",")[0]
     'phase margin 45°'
     """
-    from .stability import _broken_at, margins_and_gain
-
-    found, loop_gain = margins_and_gain(loop, parameters)
-    table = found.crossings
-    known = table.loc[table["frequency"] > 0, "frequency"]
+    found, curves = _loop_curves(loop, parameters)
     gain, phase = _subplots(2, sharex=True) if axes is None else axes
-    lows, highs = zip(
-        *(_band(_broken_at(loop_gain, i)) for i in range(len(loop_gain.D))), strict=True
-    )
-    low = min(known.min() / 5 if len(known) else np.inf, max(lows))
-    high = max(known.max() * 2 if len(known) else 0, min(highs))
-    if loop_gain.period is not None:
-        high = min(high, 0.5 / loop_gain.period)
-    lowest, labels = 0.0, list[_Label]()
-    for i in range(len(loop_gain.D)):
-        one = _broken_at(loop_gain, i)
-        name = one.inputs[0] if one.inputs else "loop gain"
-        line = _frequencies(one, low, high)
-        h = one.response(line)[:, 0, 0]
-        angle = np.degrees(np.unwrap(np.angle(h)))
-        angle -= 360 * np.round((np.median(angle[: max(len(angle) // 4, 1)]) + 90) / 360)
-        lowest = min(lowest, angle.min())
-        style: dict[str, Any] = {"color": COLORS[i % len(COLORS)], "linewidth": 1.1}
-        gain.plot(line, 20 * np.log10(np.abs(h)), label=name, **style)
-        phase.plot(line, angle, **style)
-        for row in table[table["loop"] == name].itertuples():
-            if row.frequency <= 0:
-                continue
-            level = float(np.interp(row.frequency, line, angle))
+    draw_bode(gain, phase, curves)
+    labels = []
+    for curve, mark in _marks(found, curves):
+        # a gain crossing is a margin of phase, a phase crossing one of gain
+        ax, y = (phase, mark.phase) if mark.symbol == "o" else (gain, mark.decibels)
+        labels.append(_mark(ax, mark.frequency, y, mark.symbol, mark.text, curve.color))
+    _finish(gain, found, labels)
+    phase.grid(alpha=0.3, which="both")
+    return gain, phase
+
+
+def nichols(
+    loop: Any, parameters: Mapping[str, Any] | None = None, ax: "Axes | None" = None
+) -> "Axes":
+    """Draw the Nichols chart of a loop: gain over phase, for each command in its own colour.
+
+    Each loop gain is taken while the other loops are closed. A cross is -1, at all odd multiples of
+    180°; the contour around it has the distance 0.5 to -1. Dots and squares are the gain and phase
+    crossings of `hubslosh.margins`, with the smallest margins and those near slosh modes as labels.
+
+    Parameters
+    ----------
+    loop : Loop, LinearModel or system of python-control
+        The loop, as for `hubslosh.margins`.
+    parameters : mapping, optional
+        Parameters of the FMU in addition to the loop's own; only for a `Loop`.
+    ax : matplotlib Axes, optional
+        Axes to draw into; by default those of a new figure.
+
+    Returns
+    -------
+    matplotlib Axes
+        The axes: phase (deg) along x, gain (dB) along y.
+
+    Raises
+    ------
+    FmuError
+        If `hubslosh.margins` refuses the loop, or matplotlib is not installed.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> loop = hubslosh.Loop([[4.0, 2.0]], 0.1, parameters={"friction.model": "viscous"})
+    >>> hubslosh.plot.nichols(loop).get_ylabel()
+    'loop gain (dB)'
+    """
+    found, curves = _loop_curves(loop, parameters)
+    ax = _subplots(1, 5.5)[0] if ax is None else ax
+    draw_nichols(ax, curves)
+    labels = [
+        _mark(ax, mark.phase, mark.decibels, mark.symbol, mark.at, curve.color)
+        for curve, mark in _marks(found, curves)
+    ]
+    _finish(ax, found, labels)
+    return ax
+
+
+def nyquist(
+    loop: Any, parameters: Mapping[str, Any] | None = None, ax: "Axes | None" = None
+) -> "Axes":
+    """Draw the Nyquist plot of a loop near -1, for each command in its own colour.
+
+    Each loop gain is taken at positive frequencies, while the other loops are closed. A cross is
+    -1; the circle around it has the radius 0.5, the dotted circle is the unit circle. Dots and
+    squares are the gain and phase crossings of `hubslosh.margins`, with the smallest margins and
+    those near slosh modes as labels.
+
+    Parameters
+    ----------
+    loop : Loop, LinearModel or system of python-control
+        The loop, as for `hubslosh.margins`.
+    parameters : mapping, optional
+        Parameters of the FMU in addition to the loop's own; only for a `Loop`.
+    ax : matplotlib Axes, optional
+        Axes to draw into; by default those of a new figure.
+
+    Returns
+    -------
+    matplotlib Axes
+        The axes: real part along x, imaginary part along y.
+
+    Raises
+    ------
+    FmuError
+        If `hubslosh.margins` refuses the loop, or matplotlib is not installed.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> loop = hubslosh.Loop([[4.0, 2.0]], 0.1, parameters={"friction.model": "viscous"})
+    >>> hubslosh.plot.nyquist(loop).get_xlabel()
+    'Re L'
+    """
+    found, curves = _loop_curves(loop, parameters)
+    ax = _subplots(1, 7.0)[0] if ax is None else ax
+    draw_nyquist(ax, curves)
+    labels = []
+    for curve, mark in _marks(found, curves):
+        z = 10 ** (mark.decibels / 20) * np.exp(1j * np.radians(mark.phase))
+        labels.append(_mark(ax, z.real, z.imag, mark.symbol, mark.at, curve.color))
+    _finish(ax, found, labels)
+    return ax
+
+
+def _loop_curves(loop: Any, parameters: Mapping[str, Any] | None) -> "tuple[Margins, Curves]":
+    """Return the margins of a loop, and its loop gain at each command."""
+    found, gain = margins_and_gain(loop, parameters)
+    names = gain.inputs or ("loop gain",)
+    gains = [
+        (name, COLORS[i % len(COLORS)], "-", _broken_at(gain, i)) for i, name in enumerate(names)
+    ]
+    return found, curves_of(gains, found.crossings)
+
+
+class _Mark(NamedTuple):
+    """A crossing in a diagram: a dot where the gain is 0 dB, a square where the phase is ±180°."""
+
+    symbol: str
+    frequency: float
+    phase: float
+    decibels: float
+    text: str
+    """Margin; empty for a crossing without label."""
+
+    @property
+    def at(self) -> str:
+        """Margin and frequency."""
+        return f"{self.text} at {self.frequency:.3g} Hz" if self.text else ""
+
+
+def _marks(found: "Margins", curves: "Curves") -> "list[tuple[Curve, _Mark]]":
+    """Return the crossings of each curve; the smallest margins and those near slosh have texts.
+
+    The smallest margins come first, for their labels to find a place.
+    """
+    table = found.crossings[found.crossings["frequency"] > 0]
+    marks = []
+    for curve in curves.every:
+        for row in table[table["loop"] == curve.name].itertuples():
+            phase = float(np.interp(row.frequency, curve.frequency, curve.phase))
+            slosh = " slosh" if "slosh" in row.near else ""
             if row.crossing == "gain":
-                phase.plot(row.frequency, level, "o", color=style["color"], markersize=4)
-                if row.phase_margin != found.phase_margin and "slosh" not in row.near:
-                    continue
-                text = f"{row.phase_margin:.0f}°" + (" slosh" if "slosh" in row.near else "")
-                labels.append((phase, row.frequency, level, text, style["color"]))
+                shown = row.phase_margin == found.phase_margin or slosh
+                text, level = f"{row.phase_margin:.0f}°{slosh}", 0.0
+                ease = abs(row.phase_margin) / 45  # 6 dB and 45° are as good
             else:
-                gain.plot(row.frequency, -row.gain_margin, "s", color=style["color"], markersize=4)
-                if row.gain_margin not in found.gain_margins:
-                    continue
-                text = f"{row.gain_margin:.1f} dB"
-                labels.append((gain, row.frequency, -row.gain_margin, text, style["color"]))
-    gain.axhline(0, color="black", linewidth=0.8)
-    for turn in (-180, -540):
-        if turn == -180 or lowest < turn:
-            phase.axhline(turn, color="black", linewidth=0.8)
-    gain.set_xscale("log")
-    gain.set_xlim(low, high)
-    finite = [abs(margin) for margin in found.gain_margins if np.isfinite(margin)]
-    floor = -max(FLOOR, 1.2 * min(finite, default=0.0))
-    bottom, top = gain.get_ylim()
-    gain.set_ylim(max(bottom, floor), top)
-    phase.margins(y=0.15)
-    gain.set_ylabel("loop gain (dB)")
-    phase.set_ylabel("phase (deg)")
-    phase.set_xlabel("frequency (Hz)")
+                phase = 360 * np.round((phase - 180) / 360) + 180
+                shown = row.gain_margin in found.gain_margins
+                text, level = f"{row.gain_margin:.1f} dB", -row.gain_margin
+                ease = abs(row.gain_margin) / 6
+            symbol = "o" if row.crossing == "gain" else "s"
+            text = text.replace("-", "−") if shown else ""
+            marks.append((ease, curve, _Mark(symbol, row.frequency, phase, level, text)))
+    marks.sort(key=lambda row: row[0])
+    return [(curve, mark) for _, curve, mark in marks]
+
+
+def _mark(ax: "Axes", x: float, y: float, symbol: str, text: str, color: str) -> "_Label":
+    ax.plot(x, y, symbol, color=color, markersize=4)
+    return ax, x, y, text, color
+
+
+def _finish(ax: "Axes", found: "Margins", labels: "list[_Label]") -> None:
+    """Add the margins as title, the names of several commands, and the labels of crossings."""
     delay = f"delay margin {found.delay_margin:.3g} s" if found.stable else "UNSTABLE"
+    table = found.crossings
     crossed = table.loc[
         (table["crossing"] == "gain") & table["near"].str.contains("slosh"), "frequency"
     ]
     values = list(dict.fromkeys(f"{f:.3g}" for f in crossed))
     more = f" and {len(values) - 4} more" if len(values) > 4 else ""
-    slosh = ", ".join(values[:4]) + more
+    slosh = f"; slosh crosses 0 dB at {', '.join(values[:4])}{more} Hz" if values else ""
     margin = f"{found.phase_margin:.0f}°" if np.isfinite(found.phase_margin) else "none"
-    answer = f"phase margin {margin}, {delay}"
-    answer += f"; slosh crosses 0 dB at {slosh} Hz" if slosh else ""
-    gain.set_title("\n".join(textwrap.wrap(answer, 80)), fontsize=10)
-    for ax in (gain, phase):
-        ax.grid(alpha=0.3, which="both")
-    if len(loop_gain.D) > 1:
-        gain.legend()
-    _annotate(labels)
-    return gain, phase
+    title = f"phase margin {margin}, {delay}{slosh}"
+    wide = ax.get_window_extent().width * 72 / ax.figure.dpi / 5.5  # letters of 10 points
+    ax.set_title("\n".join(textwrap.wrap(title, int(wide))), fontsize=10)
+    ax.grid(alpha=0.3, which="both")
+    names = [line for line in ax.lines if not str(line.get_label()).startswith("_")]
+    if len(names) > 1:
+        ax.legend(fontsize=8)
+    _annotate([label for label in labels if label[3]])
 
 
 _Label = tuple[Any, float, float, str, str]
@@ -389,7 +470,7 @@ def _annotate(labels: list[_Label]) -> None:
     taken: list[tuple[float, float, float, float]] = []
     for ax, x, y, text, color in labels:
         at, unit = ax.transData.transform((x, y)), ax.figure.dpi / 72
-        width, height, box = 4.8 * len(text), 11.0, ax.bbox
+        width, height, box = 5.0 * len(text), 12.0, ax.bbox
         for dx, dy in ((4, 4), (4, -12), (-width - 4, 4), (-width - 4, -12), (4, 14), (4, -22)):
             left, low = at[0] + dx * unit, at[1] + dy * unit
             right, high = left + width * unit, low + height * unit
@@ -399,8 +480,14 @@ def _annotate(labels: list[_Label]) -> None:
                 for other in taken
             ):
                 taken.append((left, low, right, high))
-                ax.annotate(text, (x, y), (dx, dy), textcoords="offset points", fontsize=7,
-                            color=color)  # fmt: skip
+                ground = {
+                    "facecolor": ax.get_facecolor(),
+                    "alpha": 0.75,
+                    "pad": 0.5,
+                    "linewidth": 0,
+                }
+                ax.annotate(text, (x, y), (dx, dy), textcoords="offset points", fontsize=7.5,
+                            color=color, bbox=ground)  # fmt: skip
                 break
 
 

@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from .curves import Curves, curves_of, draw_bode, draw_nichols
 from .fmu import FmuError
 from .plot import COLORS
-from .stability import _broken_at, _compiled
-from .suggestion import frequencies
+from .stability import _broken_at
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,7 +34,7 @@ MOST_UNSTABLE = 12
 """Number of unstable points in their table."""
 
 GAINS = (-50.0, 40.0)
-"""Range of loop gain in diagrams, dB."""
+"""Range of the resonances' loop gain, dB."""
 
 STYLE = """
 :root { color-scheme: light dark; --paper: #fff; --ink: #1b1f24; --soft: #59636e; --line: #d3d9df;
@@ -310,11 +309,7 @@ def _modes(figure: "Figure", review: "Review", unit: str) -> None:
     _legend(figure)
 
 
-Curve = tuple[str, str, NDArray[np.float64], NDArray[np.complex128]]
-"""Name of the fill, colour, frequencies (Hz), loop gain."""
-
-
-def _curves(review: "Review") -> list[list[Curve]]:
+def _curves(review: "Review") -> list[Curves]:
     """Return the loop gains to draw, by command: at fills in equal steps, and at the worst case."""
     count = len(review.fills)
     chosen = sorted(set(np.linspace(0, count - 1, min(count, MOST_CURVES)).round().astype(int)))
@@ -322,26 +317,17 @@ def _curves(review: "Review") -> list[list[Curve]]:
     chosen = sorted({*chosen, *unstable[:MOST_CURVES]})
     points = [
         (review.fills[k] + (" unstable" if k in unstable else ""), _shade(k / max(count - 1, 1)),
-         review.nominal[k])
+         "-", review.nominal[k])
         for k in chosen
     ]  # fmt: skip
     worst = "worst case" + ("" if review.worst.margins.stable else ", unstable")
-    points.append((worst, INK, review.worst))
-    table = pd.concat([point.margins.crossings for _, _, point in points])
-    known = table.loc[table["frequency"] > 0, "frequency"]
-    period = review.worst.loop.period
-    high = 0.5 / period
-    low = min(known.min() / 3, high / 100) if len(known) else high / 1000
-    high = min(high, max(known.max() * 3, 10 * low)) if len(known) else high
+    points.append((worst, INK, "--", review.worst))
+    tables = [point.margins.crossings for *_, point in points]
     found = []
-    for i in range(len(review.worst.gain.D)):
-        curves = []
-        for name, color, point in points:
-            one = _broken_at(point.gain, i)
-            f = frequencies(one, low, high)
-            values = np.array(_compiled(one).response(2 * np.pi * f)).view(complex)
-            curves.append((name, color, f, values))
-        found.append(curves)
+    for i, name in enumerate(review.worst.gain.inputs):
+        gains = [(*words, _broken_at(point.gain, i)) for *words, point in points]
+        crossings = pd.concat([table[table["loop"] == name] for table in tables])
+        found.append(curves_of(gains, crossings))
     return found
 
 
@@ -352,76 +338,27 @@ def _shade(share: float) -> str:
     return f"#{r:02x}{g:02x}{b:02x}"
 
 
-def _decibels(curve: Curve) -> NDArray[np.float64]:
-    with np.errstate(divide="ignore"):
-        return 20 * np.log10(np.abs(curve[3]))
-
-
-def _phase(curve: Curve) -> NDArray[np.float64]:
-    """Return the unwrapped phase, deg; between -360° and 0° where the gain is last near 0 dB."""
-    phase = np.degrees(np.unwrap(np.angle(curve[3])))
-    above = np.flatnonzero(np.abs(curve[3]) >= 1)
-    return phase - 360 * (np.floor(phase[above[-1] if len(above) else 0] / 360) + 1)
-
-
-def _draw(ax: "Axes", x: Any, y: Any, curve: Curve, first: Curve) -> None:
-    worst = curve[0].startswith("worst case")
-    style: dict[str, Any] = {"linestyle": "--", "linewidth": 1.0} if worst else {"linewidth": 0.9}
-    ax.plot(x, y, color=curve[1], label=curve[0], **style)
-
-
-def _key(figure: "Figure", curves: list[Curve]) -> None:
+def _key(figure: "Figure") -> None:
     """Name the first and the last fill, unstable ones, and the worst case."""
     handles, labels = figure.axes[0].get_legend_handles_labels()
     unstable = [k for k, label in enumerate(labels[:-1]) if label.endswith("unstable")]
-    shown = sorted({0, (len(curves) - 2) // 2, len(curves) - 2, len(curves) - 1, *unstable[:4]})
+    last = len(labels) - 1
+    shown = sorted({0, (last - 1) // 2, last - 1, last, *unstable[:4]})
     figure.legend([handles[k] for k in shown], [labels[k] for k in shown],
                   loc="outside lower center",
                   ncols=2 if any("unstable" in label for label in labels) else 4)  # fmt: skip
 
 
-def _nichols(figure: "Figure", curves: list[Curve]) -> None:
-    ax = figure.subplots()
-    left, right = -270.0, -90.0
-    for curve in curves:
-        gain, phase = _decibels(curve), _phase(curve)
-        inside = (gain > GAINS[0]) & (gain < GAINS[1])
-        if inside.any():
-            left, right = min(left, phase[inside].min()), max(right, phase[inside].max())
-        _draw(ax, phase, gain, curve, curves[0])
-    left, right = max(90 * np.floor(left / 90), -720), min(90 * np.ceil(right / 90), 180)
-    circle = -1 + 0.5 * np.exp(1j * np.linspace(0, 2 * np.pi, 100))
-    for turn in (-720, -360, 0, 360):
-        ax.plot(np.degrees(np.angle(-circle)) - 180 + turn, 20 * np.log10(np.abs(circle)),
-                color=COLORS[1], linewidth=1)  # fmt: skip
-        ax.plot(-180 + turn, 0, "+", color=COLORS[1], markersize=9)
-    ticks = np.arange(left, right + 1, 90 if right - left <= 540 else 180)
-    ax.set(xlim=(left, right), ylim=GAINS, xticks=ticks)
-    ax.set(xlabel="phase (deg)", ylabel="loop gain (dB)")
-    ax.axhline(0, color=SOFT, linewidth=0.8)
-    _key(figure, curves)
+def _nichols(figure: "Figure", curves: Curves) -> None:
+    draw_nichols(figure.subplots(), curves)
+    _key(figure)
 
 
-def _bode(figure: "Figure", curves: list[Curve]) -> None:
+def _bode(figure: "Figure", curves: Curves) -> None:
     axes: Any = figure.subplots(2, sharex=True)
-    lows, highs = [], []
-    for curve in curves:
-        gain, phase = _decibels(curve), _phase(curve)
-        _draw(axes[0], curve[2], gain, curve, curves[0])
-        _draw(axes[1], curve[2], phase, curve, curves[0])
-        seen = phase[gain > GAINS[0]]
-        lows.append(seen.min(initial=-270))
-        highs.append(seen.max(initial=-90))
-    axes[0].axhline(0, color=SOFT, linewidth=0.8)
-    for turn in (-900, -540, -180, 180):
-        axes[1].axhline(turn, color=COLORS[1], linewidth=0.8, linestyle="--")
-    low, high = max(90 * np.floor(min(lows) / 90), -720), min(90 * np.ceil(max(highs) / 90), 180)
-    axes[0].set(xscale="log", ylim=GAINS, ylabel="loop gain (dB)")
-    axes[1].set(ylim=(low, high), ylabel="phase (deg)", xlabel="frequency (Hz)")
-    axes[1].set_yticks(np.arange(low, high + 1, 90 if high - low <= 540 else 180))
-    axes[1].set_xlim(curves[0][2][0], curves[0][2][-1])
+    draw_bode(*axes, curves)
     figure.align_ylabels(axes)
-    _key(figure, curves)
+    _key(figure)
 
 
 def _draws(figure: "Figure", drawn: pd.DataFrame) -> None:

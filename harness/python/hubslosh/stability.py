@@ -346,6 +346,37 @@ def _compiled(model: LinearModel) -> Any:
     return Model(*(np.ascontiguousarray(matrix, float) for matrix in model), model.period or 0.0)
 
 
+def band(model: LinearModel) -> tuple[float, float]:
+    """Return the band of the first input's and output's poles and zeros, Hz.
+
+    It reaches from a fifth of the lowest to five times the highest, at most to half the sampling
+    rate.
+    """
+    one = LinearModel(model.A, model.B[:, :1], model.C[:1], model.D[:1, :1], (), (), ())
+    values = np.concatenate([model.poles, _zeros(one)])
+    highest = np.inf
+    if model.period is not None:
+        values = np.log(values[values != 0].astype(complex)) / model.period
+        highest = 0.5 / model.period
+    found = [float(f) for f in np.abs(values) / (2 * np.pi) if 1e-6 < f < 1e6]
+    low, high = min(found, default=0.1) / 5, min(max(found, default=10.0) * 5, highest)
+    return min(low, high / 100), high
+
+
+def frequencies(model: LinearModel, low: float, high: float, count: int = 200) -> Matrix:
+    """Return ``count`` frequencies between two, Hz, and more about each lightly damped pole."""
+    lines = [np.geomspace(low, high * (1 - 1e-9), count)]
+    s = np.linalg.eigvals(model.A).astype(complex)
+    if model.period is not None:
+        s = np.log(s[np.abs(s) > 0.1]) / model.period
+    for pole in s[(s.imag > 0) & (-s.real < LIGHT * np.abs(s))]:
+        width = max(abs(pole.real), 1e-6 * abs(pole))
+        around = width * np.concatenate([[0], np.geomspace(0.1, 60, 24)])
+        lines.append(np.abs(pole.imag + np.concatenate([-around, around])) / (2 * np.pi))
+    every = np.unique(np.concatenate(lines))
+    return every[(every >= low) & (every <= high)]
+
+
 def _crossings(
     gain: LinearModel, closed: NDArray[np.complex128]
 ) -> "tuple[list[tuple[str, float, complex]], float]":

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .linearization import LinearModel
 from .loop import _tustin
-from .stability import LIGHT, _closed, _compiled, _largest
+from .stability import _closed, _compiled, _largest, frequencies
 
 if TYPE_CHECKING:
     from .review_point import Point
@@ -136,20 +136,6 @@ def _series(first: LinearModel, law: LinearModel) -> LinearModel:
         D=D @ first.D,
         states=(*first.states, *(f"filter[{i + 1}]" for i in range(m))),
     )
-
-
-def frequencies(model: LinearModel, low: float, high: float) -> NDArray[np.float64]:
-    """Return frequencies that resolve each lightly damped pole of a sampled model, Hz."""
-    assert model.period is not None
-    lines = [np.geomspace(low, high * (1 - 1e-9), 200)]
-    poles = np.linalg.eigvals(model.A).astype(complex)
-    s = np.log(poles[np.abs(poles) > 0.1]) / model.period
-    for pole in s[(s.imag > 0) & (-s.real < LIGHT * np.abs(s))]:
-        width = max(abs(pole.real), 1e-6 * abs(pole))
-        around = width * np.concatenate([[0], np.geomspace(0.1, 60, 24)])
-        lines.append(np.abs(pole.imag + np.concatenate([-around, around])) / (2 * np.pi))
-    every = np.unique(np.concatenate(lines))
-    return every[(every >= low) & (every <= high)]
 
 
 def _sampled(point: "Point") -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:

@@ -7,6 +7,7 @@ import subprocess
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -15,7 +16,7 @@ import pytest
 from conftest import ROOT, option
 
 import hubslosh
-from hubslosh import FmuError, FmuWarning, attitude, plot, tank
+from hubslosh import FmuError, FmuWarning, attitude, plot, stability, tank
 
 mpl.use("agg")
 SPHERE = {"density": 1008.0, "shape": {"sphere": {"radius": 0.35}}}
@@ -147,13 +148,13 @@ def test_every_plot_has_what_it_promises(fmu: Path) -> None:
     drawn, high = gain.lines[0].get_ydata(), np.abs(line - poles[-1]) < 0.05
     peak = abs(model.response(np.linspace(poles[-1] - 0.05, poles[-1] + 0.05, 100_001))).max()
     assert drawn[high].max() == pytest.approx(peak, rel=1e-3)
-    assert plot._band(model.sampled(0.1))[1] == 5.0
+    assert stability.band(model.sampled(0.1))[1] == 5.0
 
     loop = hubslosh.Loop([[0.4, 0.6]], 0.1, fmu, viscous, delay=0.02)
     gain, phase = plot.margins(loop)
     found = hubslosh.margins(loop)
-    dots = [line.get_xdata()[0] for line in phase.lines if line.get_marker() == "o"]
-    squares = [line.get_xdata()[0] for line in gain.lines if line.get_marker() == "s"]
+    dots = sorted(line.get_xdata()[0] for line in phase.lines if line.get_marker() == "o")
+    squares = sorted(line.get_xdata()[0] for line in gain.lines if line.get_marker() == "s")
     known = found.crossings.groupby("crossing")["frequency"].apply(list)
     assert dots == known["gain"] and squares == known["phase"]
 
@@ -184,8 +185,9 @@ def test_every_plot_has_what_it_promises(fmu: Path) -> None:
             call()
 
 
-def test_margins_of_three_axes_can_be_read(fmu: Path) -> None:
-    """The title fits, a zero does not set the scale, and no label covers another."""
+@pytest.fixture
+def three_axes(fmu: Path) -> hubslosh.Loop:
+    """Return a loop of three axes in which undamped slosh crosses 0 dB."""
     sphere = {"density": 1440.0, "shape": {"sphere": {"radius": 0.5}}}
     tanks = {
         "ox": hubslosh.MountedTank(sphere, (0, 0.6, 0.22)),
@@ -201,17 +203,65 @@ def test_margins_of_three_axes_can_be_read(fmu: Path) -> None:
     lag = hubslosh.LinearModel(
         -9.0 * np.eye(3), 9 * gains, np.eye(3), np.zeros((3, 6)), ("a", "b", "c"), (), ()
     )
-    gain, phase = plot.margins(craft.loop(lag, 0.1, "60%", delay=0.2, parameters=undamped))
+    return craft.loop(lag, 0.1, "60%", delay=0.2, parameters=undamped)
+
+
+def labels_of(*axes: Any) -> list[Any]:
+    """Return the boxes of labels, which do not overlap."""
+    labels = [text.get_window_extent() for ax in axes for text in ax.texts]
+    assert not any(a.overlaps(b) for k, a in enumerate(labels) for b in labels[:k])
+    return labels
+
+
+def test_margins_of_three_axes_can_be_read(three_axes: hubslosh.Loop) -> None:
+    """The title fits, a zero does not set the scale, and no label covers another."""
+    gain, phase = plot.margins(three_axes)
     figure = gain.figure
     figure.draw_without_rendering()
-    drawn = min(np.min(line.get_ydata()) for line in gain.lines)
-    assert drawn < -90 and gain.get_ylim()[0] >= -80
+    # curves fill the diagram
+    low, high = gain.get_ylim()
+    curves = [line for line in gain.lines if str(line.get_label()).startswith("torque")]
+    ends = {round(float(line.get_ydata()[k])) for line in curves for k in (0, -1)}
+    assert len(curves) == 3 and high - low <= 100 and ends
+    assert all(min(abs(end - low), abs(end - high)) <= 10 for end in ends), (ends, low, high)
     title = gain.title.get_window_extent()
     assert title.x0 >= 0 and title.x1 <= figure.bbox.width
     assert "slosh crosses 0 dB" in gain.get_title() and " more Hz" in gain.get_title()
-    labels = [text.get_window_extent() for ax in (gain, phase) for text in ax.texts]
-    assert len(labels) > 5
-    assert not any(a.overlaps(b) for k, a in enumerate(labels) for b in labels[:k])
+    assert len(labels_of(gain, phase)) > 5
+
+
+def test_nichols_and_nyquist_show_every_crossing_of_three_axes(three_axes: hubslosh.Loop) -> None:
+    """Crossings are the exact ones, on 0 dB and ±180°, in the colour of their command."""
+    found = hubslosh.margins(three_axes).crossings.query("frequency > 0")
+    nichols, nyquist = plot.nichols(three_axes), plot.nyquist(three_axes)
+    for ax in (nichols, nyquist):
+        ax.figure.draw_without_rendering()
+        legend = ax.get_legend()
+        assert [text.get_text() for text in legend.get_texts()] == [
+            f"torque[{i}]" for i in (1, 2, 3)
+        ]
+        title = ax.title.get_window_extent()
+        assert title.x0 >= 0 and title.x1 <= ax.figure.bbox.width
+        assert len(labels_of(ax)) > 3 and all(" at " in text.get_text() for text in ax.texts)
+    colors = {line.get_label(): line.get_color() for line in nichols.lines}
+    for symbol, kind in (("o", "gain"), ("s", "phase")):
+        rows = found[found["crossing"] == kind]
+        marks = [line for line in nichols.lines if line.get_marker() == symbol]
+        places = [line for line in nyquist.lines if line.get_marker() == symbol]
+        assert len(marks) == len(places) == len(rows) > 0
+        margins = rows[f"{'phase' if kind == 'gain' else 'gain'}_margin"].abs()
+        rows = rows.loc[margins.sort_values(kind="stable").index]
+        for mark, place, row in zip(marks, places, rows.itertuples(), strict=True):
+            (x,), (y,) = mark.get_xdata(), mark.get_ydata()
+            assert mark.get_color() == place.get_color() == colors[row.loop]
+            if kind == "gain":
+                wanted = np.exp(1j * np.radians(row.phase_margin - 180))
+                assert y == 0 and abs((x - 180 - row.phase_margin + 180) % 360 - 180) < 2
+            else:
+                wanted = -(10 ** (-row.gain_margin / 20))
+                assert (x, y) == ((x // 360) * 360 + 180, -row.gain_margin)
+            drawn = complex(place.get_xdata()[0], place.get_ydata()[0])
+            assert abs(drawn - wanted) < 0.03 * abs(wanted)
 
 
 SSV = """<?xml version="1.0" encoding="UTF-8"?>
