@@ -1018,7 +1018,9 @@ class Craft:
         *,
         damping: Literal["interval", "nominal"] = "interval",
         frequency: str = "10%",
+        inertia: str = "5%",
         uncertain: Mapping[str, Any] | None = None,
+        requirements: Mapping[str, Any] | None = None,
         draws: int = 200,
         seed: int = 1,
         measured: Sequence[str] | str = ("q[2]", "q[3]", "q[4]", "omega"),
@@ -1047,11 +1049,18 @@ class Craft:
             Range of the slosh frequencies of each tank, all its modes together, as a share of the
             nominal ones, such as "10%"; "nominal" does not vary them. The height of the slosh mass
             stays.
+        inertia : str
+            Range of the dry craft's inertia, all of it by one factor, as a share; "nominal" does
+            not vary it. A component in ``uncertain``, such as ``craft.Jxx``, takes its place.
         uncertain : mapping, optional
             Ranges by name: (low, high) in SI units, or a share of the nominal value such as "5%".
             Names are as for `parameters`, and "delay". If the frequency or damping ratio of a mode
             is named here, or its damping ratio is among ``parameters``, then ``frequency`` or
             ``damping`` of its tank does not vary it. ``craft.mass`` changes the acceleration.
+        requirements : mapping, optional
+            Least margins: "modulus_margin", "phase_margin" (deg), "gain_margin" (dB, up and down)
+            and "delay_margin" (s), each a number for all points or a mapping with "nominal" and
+            "all". An unstable point fails; see `Review.requirements`.
         draws : int
             Number of random points over all fills, uniform within the ranges.
         seed : int
@@ -1093,8 +1102,9 @@ class Craft:
 
         return review(
             self, controller, period, fills, damping=damping, frequency=frequency,
-            uncertain=uncertain, draws=draws, seed=seed, measured=measured, command=command,
-            latency=latency, delay=delay, parameters=parameters,
+            inertia=inertia, uncertain=uncertain, requirements=requirements, draws=draws, seed=seed,
+            measured=measured, command=command, latency=latency, delay=delay,
+            parameters=parameters,
         )  # fmt: skip
 
     def uncertain(

@@ -28,6 +28,7 @@ from .quantities import (
     moves_the_bob,
     short_name,
 )
+from .requirements import Requirement, judged, requirements_of
 from .review_point import Point, Vector
 from .sampling import draw
 from .short import ShortTable
@@ -53,7 +54,7 @@ class Uncertain:
     """A quantity of the review with its range."""
 
     name: str
-    """Its name as it was given, or "damping of" or "frequency of" a tank."""
+    """Its name as it was given, "damping of" or "frequency of" a tank, or "inertia of craft"."""
     text: str
     """Its range in words."""
     ends: tuple[dict[str, tuple[float, float, float]], ...]
@@ -107,6 +108,8 @@ class Review:
         A notch or roll-off that raises the smallest margin, with its cost in phase.
     warnings : tuple of str
         Warnings about the tanks, each for one of the fills where it applies.
+    limits : tuple of Requirement
+        Required margins, as `requirements` judges them.
 
     Examples
     --------
@@ -116,7 +119,10 @@ class Review:
     >>> tanks = {"main": hubslosh.MountedTank(sphere, (0, 0, 0.2), modes=1, nu=0.9e-6)}
     >>> craft = hubslosh.Craft(900, [400, 380, 300], tanks=tanks, thrust=500)
     >>> gains = np.hstack([2 * 10 * np.eye(3), 80 * np.eye(3)])
-    >>> review = craft.review(gains, 0.1, ["30%", "50%"], draws=5)
+    >>> limits = {"phase_margin": {"nominal": 40, "all": 30}, "gain_margin": 6}
+    >>> review = craft.review(gains, 0.1, ["30%", "50%"], draws=5, requirements=limits)
+    >>> review.passed, review.requirements()["passed"].tolist()
+    (True, [True, True, True])
     >>> len(review.unstable()), review.modes()
     (0, {'main mode 1': 'gain- and phase-stabilised'})
     >>> review.stabilisation()
@@ -124,7 +130,7 @@ class Review:
     >>> review.bands()["phase_margin_low"].round().tolist()
     [60.0, 59.0]
     >>> list(review.worst_values())
-    ['tank[1].zeta[1]', 'tank[1].frequency[1]']
+    ['tank[1].zeta[1]', 'tank[1].frequency[1]', 'craft.Jxx', 'craft.Jyy', 'craft.Jzz']
     >>> review.save("review.html"), len(review.html()) > 100_000
     (None, True)
     """
@@ -142,6 +148,7 @@ class Review:
     confirmation: Confirmation
     suggestion: Suggestion
     warnings: tuple[str, ...] = field(default=())
+    limits: tuple[Requirement, ...] = field(default=())
 
     def bands(self) -> pd.DataFrame:
         """Return the range of each margin at each fill, over all stable points.
@@ -177,6 +184,23 @@ class Review:
         """
         rows = self.points[~self.points["stable"]]
         return rows.sort_values("growth", ascending=False, kind="stable")
+
+    def requirements(self) -> pd.DataFrame:
+        """Return the verdict on each requirement, those that fail first.
+
+        Returns
+        -------
+        DataFrame
+            A row for each requirement: ``requirement`` in words, ``passed``, ``least`` (its least
+            margin; -inf if a point is unstable), ``fill`` (index, where that is), and the numbers
+            of ``failing`` and of all ``points`` for which it holds. An unstable point fails.
+        """
+        return judged(self.limits, self.points)
+
+    @property
+    def passed(self) -> bool:
+        """True if every point is stable and every requirement is met."""
+        return bool(self.points["stable"].all() and self.requirements()["passed"].all())
 
     def modes(self) -> dict[str, str]:
         """Return how each slosh mode is stabilised, in words, by its name; unstable ones first.
@@ -233,11 +257,30 @@ class Review:
 
     @property
     def summary(self) -> str:
-        """The answer in a sentence."""
+        """The answer in a sentence, and the verdict on the requirements in another."""
+        return " ".join([self._stability(), *self._failures()])
+
+    def _failures(self) -> list[str]:
+        """Return which requirements fail in a sentence; none without requirements."""
+        table = self.requirements()
+        failed = table[~table["passed"]]
+        if table.empty:
+            return []
+        if failed.empty:
+            return [f"It meets {_all_of(len(table), 'requirement')}."]
+        words = []
+        for row in failed.itertuples():
+            unit = next(limit.unit for limit in self.limits if str(limit) == row.requirement)
+            least = f"{row.least:.3g}{unit}" if np.isfinite(row.least) else "unstable"
+            words.append(f"{row.requirement} ({least} at fill {self.fills[row.fill]})")
+        return [
+            f"It FAILS {len(failed)} of {_plural(len(table), 'requirement')}: {'; '.join(words)}."
+        ]
+
+    def _stability(self) -> str:
         table = self.points
         unstable = table[~table["stable"]]
-        count = _plural(len(self.fills), "fill")
-        all_of = f"all {count}" if len(self.fills) > 1 else count
+        count, all_of = _plural(len(self.fills), "fill"), _all_of(len(self.fills), "fill")
         points = _plural(len(table), "point")
         if len(unstable):
             nominal = unstable[unstable["kind"] == "nominal"]
@@ -275,7 +318,7 @@ class Review:
         words = [f"fill {self.fills[point.fill]}"]
         for quantity, share in zip(self.uncertain, point.shares, strict=True):
             values = quantity.values(point.fill, float(share)) if share else {}
-            if quantity.name.startswith("frequency of") and values:
+            if quantity.name.startswith(("frequency of", "inertia of")) and values:
                 name, value = next(iter(values.items()))
                 change = value / quantity.ends[point.fill][name][1] - 1
                 words.append(f"{quantity.name} {100 * change:+.3g} %")
@@ -343,6 +386,10 @@ def _plural(number: int, what: str) -> str:
     return f"{number} {what}" + ("" if number == 1 else "s")
 
 
+def _all_of(number: int, what: str) -> str:
+    return ("all " if number > 1 else "") + _plural(number, what)
+
+
 def _verdict(how: str) -> str:
     words = {"unstable": "unstable", "neither": "stabilised by neither gain nor phase"}
     return words.get(how, f"{how.replace(' and', '- and')}-stabilised")
@@ -356,7 +403,9 @@ def review(
     *,
     damping: Literal["interval", "nominal"],
     frequency: str,
+    inertia: str,
     uncertain: Mapping[str, Any] | None,
+    requirements: Mapping[str, Any] | None,
     draws: int,
     seed: int,
     parameters: Parameters | None = None,
@@ -364,8 +413,10 @@ def review(
 ) -> Review:
     """Return the review of a loop; see `Craft.review`."""
     check_ranges(draws=draws, seed=seed, period=period)
+    limits = requirements_of(requirements)
+    shares = {"frequency": frequency, "inertia": inertia}
     space = _Space.create(
-        craft, controller, period, fills, damping, frequency, uncertain, parameters, options
+        craft, controller, period, fills, damping, shares, uncertain, parameters, options
     )
     count = len(space.uncertain)
     _check_work(len(space.loops) * (1 + 2 * count) + draws, space.loops[0])
@@ -404,7 +455,7 @@ def review(
     return Review(
         craft, space.names, space.at, space.unit, space.uncertain, _family(nominal), nominal,
         ShortTable(rows), table, worst, confirm(worst),
-        suggest(nominal, every, table), space.warnings,
+        suggest(nominal, every, table), space.warnings, limits,
     )  # fmt: skip
 
 
@@ -474,7 +525,7 @@ class _Space:
         period: float,
         fills: Any,
         damping: str,
-        frequency: str,
+        shares: dict[str, Any],
         uncertain: Any,
         parameters: Parameters | None,
         options: dict[str, Any],
@@ -515,7 +566,9 @@ class _Space:
         # a damping ratio that was given has no interval
         known = {*ranges, *given[0][1]}
         found = _damping(craft, tanks, known) if damping == "interval" else []
-        found += _frequencies(craft, loops, frequency, ranges)
+        parts = {name: _part(share, name) for name, share in shares.items()}
+        found += _frequencies(craft, loops, parts["frequency"], ranges)
+        found += _inertia([every for every, _ in given], parts["inertia"], ranges)
         found += _quantities(loops, [every for every, _ in given], ranges, craft.tanks)
         percent = all(isinstance(f, str) and f.strip().endswith("%") for f in fills)
         if percent:
@@ -601,20 +654,27 @@ def _damping(craft: "Craft", tanks: list[dict[str, Any]], given: Container[str])
     return found
 
 
-def _frequencies(
-    craft: "Craft", loops: Sequence[Loop], share: Any, ranges: Mapping[str, Any]
-) -> list[Uncertain]:
-    """Return the slosh frequencies of each tank, whose modes vary together."""
-    if share == "nominal":
-        return []
-    part = _share(share)
+def _part(share: Any, what: str) -> float:
+    """Return the part by which a quantity varies; 0 for "nominal"."""
+    part = 0.0 if share == "nominal" else _share(share)
     if part is None or part >= 1:
         raise FmuError(
-            'frequency must be a share of the nominal frequencies, such as "10%", or "nominal", '
-            f"not {share!r}"
+            f'{what} must be a share of the nominal value, such as "10%", or "nominal", not '
+            f"{share!r}"
         )
+    return part
+
+
+def _scaled(part: float, values: Mapping[str, float]) -> dict[str, tuple[float, float, float]]:
+    return {name: ((1 - part) * x, x, (1 + part) * x) for name, x in values.items()}
+
+
+def _frequencies(
+    craft: "Craft", loops: Sequence[Loop], part: float, ranges: Mapping[str, Any]
+) -> list[Uncertain]:
+    """Return the slosh frequencies of each tank, whose modes vary together."""
     found = []
-    for number, name in enumerate(craft.tanks, 1):
+    for number, name in enumerate(craft.tanks if part else (), 1):
         ends = []
         for loop in loops:
             modes = Modes(loop.model, loop.parameters)  # type: ignore[arg-type]
@@ -625,10 +685,24 @@ def _frequencies(
                 for mode in every
                 if not modes.problem(mode)
             }
-            ends.append({of: ((1 - part) * f, f, (1 + part) * f) for of, f in here.items()})
+            ends.append(_scaled(part, here))
         if any(ends):
             found.append(Uncertain(f"frequency of {name}", f"± {100 * part:g}%", tuple(ends)))
     return found
+
+
+def _inertia(
+    given: Sequence[Parameters], part: float, ranges: Mapping[str, Any]
+) -> list[Uncertain]:
+    """Return the dry craft's inertia, all of it by one factor, unless a part has its own range."""
+    names = [f"craft.J{axes}" for axes in ("xx", "yy", "zz", "xy", "xz", "yz")]
+    if not part or any(name in ranges for name in names):
+        return []
+    ends = tuple(
+        _scaled(part, {name: float(every[name]) for name in names if every.get(name)})  # type: ignore[arg-type]
+        for every in given
+    )
+    return [Uncertain("inertia of craft", f"± {100 * part:g}%", ends)]
 
 
 def _quantities(

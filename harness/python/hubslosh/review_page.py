@@ -77,7 +77,7 @@ tr.bad td { color: var(--bad); font-weight: 600; }
 def page(review: "Review") -> str:
     """Return the page."""
     title = f"Design review over {len(review.fills)} fills and {len(review.points)} points"
-    bad = "" if review.points["stable"].all() else " bad"
+    bad = "" if review.passed else " bad"
     figures = "\n".join(_figures(review))
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
@@ -107,9 +107,11 @@ def _figures(review: "Review") -> Iterator[str]:
     from .fmu import Fmu
 
     unit = "fill (% of the volume)" if review.unit == "%" else "liquid (kg)"
+    limits = " Red: required of all points (dashed), of nominal points (dotted)."
     yield _figure(
         "How do the margins change as the tanks empty?",
-        f"Line: nominal. Band: all points within the uncertainty{_marked(review)}.",
+        f"Line: nominal. Band: all points within the uncertainty{_marked(review)}."
+        + limits * bool(review.limits),
         5.6, lambda figure: _margins(figure, review, unit),
     )  # fmt: skip
     if len(review.slosh):
@@ -196,6 +198,13 @@ def _figure(title: str, caption: str, height: float, draw: "Callable[[Figure], N
     )
 
 
+def _signs(margin: str, drawn: tuple[str, ...]) -> tuple[int, ...]:
+    """Return the signs with which a limit of a margin stands in a panel of these margins."""
+    if margin == "gain_margin":
+        return (1, -1) if "gain_up" in drawn else ()
+    return (1,) if margin in drawn else ()
+
+
 def _margins(figure: "Figure", review: "Review", unit: str) -> None:
     bands = review.bands().sort_values("at")
     axes: Any = figure.subplots(4, sharex=True)
@@ -209,6 +218,10 @@ def _margins(figure: "Figure", review: "Review", unit: str) -> None:
             )
             ax.fill_between(bands["at"], low, high, color=COLORS[0], alpha=0.25, linewidth=0)
             ax.plot(bands["at"], nominal, ".-", color=COLORS[0], markersize=4)
+        for limit in review.limits:
+            style = "--" if limit.points == "all" else ":"
+            for sign in _signs(limit.margin, names):
+                ax.axhline(sign * limit.limit, color=BAD, linewidth=0.9, linestyle=style)
         _mark_unstable(ax, bands)
         ax.set_ylabel(label)
         ax.margins(y=0.15)
@@ -413,7 +426,7 @@ def _tables(review: "Review") -> str:
     ]
     bad = sum(row["unstable"] > 0 for _, row in bands.iterrows())
     title = "What are the margins at each fill? Nominal (least to largest)"
-    parts = [_unstable_points(review), _table(title, head, rows, bad)]
+    parts = [_requirements(review), _unstable_points(review), _table(title, head, rows, bad)]
     if len(review.slosh):
         head = ("mode", "frequency, Hz", "ζ open, %", "ζ closed, %", "peak, dB", "stabilised by")
         rows, words = [], review.modes()
@@ -434,6 +447,20 @@ def _tables(review: "Review") -> str:
         items = "".join(f"<li>{html.escape(text)}</li>" for text in review.warnings[:8])
         parts.append(f"<section><h2>What do the tanks warn of?</h2><ul>{items}</ul></section>")
     return f'<div class="tables">{"".join(parts)}</div>'
+
+
+def _requirements(review: "Review") -> str:
+    """Return the table of requirements; nothing without them."""
+    rows, units = [], {str(limit): limit.unit for limit in review.limits}
+    for row in review.requirements().itertuples():
+        least = f"{row.least:.3g}{units[row.requirement]}" if row.least > -np.inf else "unstable"
+        points = f"{row.failing} of {row.points}"
+        verdict = "pass" if row.passed else "FAIL"
+        rows.append([row.requirement, verdict, least, review.fills[row.fill], points])
+    bad = sum(row[1] == "FAIL" for row in rows)
+    title = f"Which requirements are met? {len(rows) - bad} of {len(rows)}"
+    head = ("requirement", "verdict", "least", "at fill", "points that fail")
+    return _table(title, head, rows, bad) if rows else ""
 
 
 def _unstable(row: Any) -> str:

@@ -107,6 +107,8 @@ def main() -> None:
     except FmuError as error:
         sys.exit(f"error: {error}")
     print(f"{found}\n{out}")
+    if not found.requirements()["passed"].all():
+        sys.exit(f"error: {found.summary}")
 
 
 if __name__ == "__main__":

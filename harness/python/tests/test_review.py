@@ -40,7 +40,7 @@ def gains(kp: float = 40.0, kd: float = 400.0) -> np.ndarray:
 
 def test_margins_of_a_rigid_craft_are_those_of_a_double_integrator(craft: Craft) -> None:
     """Full tank: L(z) = kp T² (z + 1)/(2 J (z - 1)²) + kd T/(J (z - 1)) about each axis."""
-    found = craft.review(gains(), PERIOD, ["100%"], damping="nominal")
+    found = craft.review(gains(), PERIOD, ["100%"], damping="nominal", inertia="nominal")
     J = craft.mass_properties("100%").inertia[0, 0]
 
     def loop_gain(f: float) -> complex:
@@ -234,7 +234,7 @@ def test_the_suggested_filter_does_what_it_says(craft: Craft) -> None:
     """Slosh between hinge and bob: stable with the filter, as `margins` of its controller says."""
     craft = replace(craft, tanks={"ox": replace(craft.tanks["ox"], position=(0, 0, 0.62))})
     lightly = {"tank[1].zeta[1]": 5e-4}
-    still = {"damping": "nominal", "frequency": "nominal"}
+    still = {"damping": "nominal", "frequency": "nominal", "inertia": "nominal"}
     found = craft.review(gains(25, 300), PERIOD, ["50%"], parameters=lightly, **still)
     of = found.suggestion
     assert found.worst.distance == of.before < 0 < of.after
@@ -301,6 +301,11 @@ def test_a_plan_is_the_same_call(craft: Craft, tmp_path: Path, capsys, monkeypat
     main()
     assert found.summary in capsys.readouterr().out
     assert found.summary in (tmp_path / "plan.html").read_text(encoding="utf-8")
+    failing = PLAN.replace("draws = 2", 'draws = 2\nrequirements = {{ phase_margin = 80 }}')
+    plan(str(rows), failing)
+    with pytest.raises(SystemExit, match="error: .* FAILS 1 of 1 requirement: phase margin"):
+        main()
+    assert "FAILS 1 of 1" in (tmp_path / "plan.html").read_text(encoding="utf-8")
     for text, said in {
         PLAN.replace("period", "peroid"): "did you mean period",
         PLAN.replace("mass =", "maas ="): "craft has maas",
@@ -359,6 +364,7 @@ def test_a_frequency_that_is_lower_makes_the_loop_unstable(craft: Craft) -> None
     """Stable at each nominal frequency, unstable at -10 %, which is varied by default."""
     craft = replace(craft, tanks={"ox": replace(craft.tanks["ox"], position=(0, 0, 0.62))})
     options = {"damping": "nominal", "draws": 0, "parameters": {"ox.zeta[1]": 8e-4}}
+    options["inertia"] = "nominal"
     still = craft.review(gains(25, 300), PERIOD, ["30%"], frequency="nominal", **options)
     assert still.points["stable"].all() and still.uncertain == ()
     found = craft.review(gains(25, 300), PERIOD, ["30%"], **options)
@@ -374,12 +380,68 @@ def test_a_frequency_that_is_lower_makes_the_loop_unstable(craft: Craft) -> None
     assert found.confirmation.agrees and found.confirmation.growth > 0
 
 
+def test_inertia_varies_by_one_factor(craft: Craft) -> None:
+    """By 5 %, unless it is nominal or a component has a range: the ends are those of the factor."""
+    fixed = {"damping": "nominal", "frequency": "nominal", "draws": 0}
+    inertia = [[900.0, -20.0, 5.0], [-20.0, 900.0, 0.0], [5.0, 0.0, 700.0]]
+    craft = replace(craft, inertia=inertia)
+    found = craft.review(gains(), PERIOD, ["50%"], **fixed)
+    assert [u.name for u in found.uncertain] == ["inertia of craft"]
+    for share, factor in ((-1, 0.95), (1, 1.05)):
+        row = found.points.query(f"kind == 'one at a time' and `inertia of craft` == {share}")
+        scaled = replace(craft, inertia=factor * np.array(inertia))
+        wanted = hubslosh.margins(scaled.loop(gains(), PERIOD, "50%"))
+        assert row["modulus_margin"].tolist() == pytest.approx([wanted.modulus_margin], rel=1e-9)
+    nominal = craft.review(gains(), PERIOD, ["50%"], inertia="nominal", **fixed)
+    assert nominal.uncertain == ()
+    own = craft.review(gains(), PERIOD, ["50%"], uncertain={"craft.Jzz": "1%"}, **fixed)
+    assert [u.name for u in own.uncertain] == ["craft.Jzz"]
+
+
+def test_requirements_pass_or_fail(craft: Craft) -> None:
+    """Over nominal or all points; an unstable point fails, and failures come first everywhere."""
+    fills, fixed = ["30%", "50%"], {"damping": "nominal", "draws": 3}
+    plain = craft.review(gains(), PERIOD, fills, **fixed)
+    assert plain.requirements().empty and plain.passed and "requirement" not in plain.summary
+    least = plain.points["phase_margin"].min()
+    nominal = plain.points.query("kind == 'nominal'")["phase_margin"].min()
+    assert least < nominal
+    limits = {
+        "gain_margin": 1e-3,
+        "phase_margin": {"nominal": nominal - 1e-9, "all": (least + nominal) / 2},
+    }
+    found = craft.review(gains(), PERIOD, fills, requirements=limits, **fixed)
+    table = found.requirements()
+    assert table["passed"].tolist() == [False, True, True] and not found.passed
+    assert table["requirement"][0].startswith("phase margin of all points at least")
+    below = plain.points["phase_margin"] < (least + nominal) / 2
+    assert table.loc[0, ["least", "failing", "points"]].tolist() == [least, below.sum(), len(below)]
+    assert "FAILS 1 of 3 requirements: phase margin of all points" in found.summary
+    page = found.html()
+    assert 'class="answer bad"' in page and "Which requirements are met? 2 of 3" in page
+    met = craft.review(gains(), PERIOD, fills, requirements={"modulus_margin": 0.1}, **fixed)
+    assert met.passed and "It meets 1 requirement." in met.summary
+    unstable = craft.review(-gains(), PERIOD, ["50%"], requirements={"delay_margin": 1e-9}, **fixed)
+    assert unstable.requirements()["least"].tolist() == [-np.inf]
+    assert "(unstable at fill 50%)" in unstable.summary
+    for text, wrong in {
+        "must be limits by margin": "phase_margin",
+        "did you mean phase_margin": {"phase_margins": 30},
+        "phase_margin must be a number above 0": {"phase_margin": -1},
+        "a table of them, not '30'": {"phase_margin": "30"},
+        r"requirements\.gain_margin has every": {"gain_margin": {"every": 6}},
+    }.items():
+        with pytest.raises(FmuError, match=text):
+            craft.review(gains(), PERIOD, fills, requirements=wrong)
+
+
 def test_an_unstable_real_pole_is_the_worst_case(craft: Craft) -> None:
     """Positive attitude feedback about z: J s² + kd s + kp = 0 with kp < 0, and no oscillation."""
     law, J = gains(), craft.mass_properties("50%").inertia[2, 2]
     law[2] = 0
     law[2, 2], law[2, 5] = -2 * 200.0, 300.0
-    found = craft.review(law, 0.01, ["50%"], damping="nominal", frequency="nominal")
+    fixed = {"damping": "nominal", "frequency": "nominal", "inertia": "nominal"}
+    found = craft.review(law, 0.01, ["50%"], **fixed)
     expected = (-300 + np.sqrt(300**2 + 4 * J * 200)) / (2 * J)
     assert found.worst.growth == pytest.approx(expected, rel=0.01)
     compared = found.confirmation

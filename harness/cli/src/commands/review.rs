@@ -13,7 +13,7 @@ use anyhow::{Context, Result, bail, ensure};
 #[command(after_help = "Examples:\n  hubslosh review plan.toml\n  \
                   hubslosh review plan.toml --out review.html --python /usr/bin/python3")]
 pub struct ReviewArgs {
-    /// Plan with craft, controller, fills and ranges of uncertain parameters, .toml.
+    /// Plan with craft, controller, fills, ranges of uncertain parameters and requirements, .toml.
     #[arg(value_name = "PLAN")]
     plan: PathBuf,
     /// File for the page, .html [default: the name of the plan with .html].
