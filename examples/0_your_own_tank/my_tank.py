@@ -5,6 +5,7 @@ python examples/0_your_own_tank/my_tank.py
 
 import argparse
 from pathlib import Path
+from textwrap import fill
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -28,7 +29,7 @@ MY_TANK = {
 TORQUE = [(0, 10), (2, 10), (2, -10), (4, -10), (4, 0), (20, 0)]
 
 
-def compare(fmu: str = "HubSlosh") -> dict[str, pd.DataFrame]:
+def compare(fmu: str = "HubSlosh") -> dict[str, hubslosh.Run]:
     """Run the manoeuvre with rigid and with sloshing liquid."""
     inputs = pd.DataFrame(TORQUE, columns=["time", "tau_cmd"])
     return {
@@ -43,25 +44,27 @@ def compare(fmu: str = "HubSlosh") -> dict[str, pd.DataFrame]:
     }
 
 
-def pointing_error(runs: dict[str, pd.DataFrame]) -> pd.Series:
+def pointing_error(runs: dict[str, hubslosh.Run]) -> pd.Series:
     """Return by how much sloshing turns the craft away from where it would point, 0.001°."""
     return 1e3 * np.degrees(runs["spherical"]["theta"] - runs["frozen"]["theta"])
 
 
-def summary(runs: dict[str, pd.DataFrame]) -> str:
-    """Say what the liquid does after the manoeuvre."""
+def summary(runs: dict[str, hubslosh.Run]) -> str:
+    """Return what the liquid does after the manoeuvre, and whether the model holds for it."""
     end = max((time for time, torque in TORQUE if torque), default=0)
     late = runs["spherical"]["time"] > end
     error, wave = pointing_error(runs)[late], 1e3 * runs["spherical"]["wave_height"][late]
     # the swing about its own middle: a torque that ends at rest may still leave another angle
     swing = (error.max() - error.min()) / 2
-    return (
+    answer = (
         f"After the manoeuvre the liquid swings the craft by ±{swing:.0f} millidegrees,\n"
         f"with a wave of up to {wave.max():.1f} mm"
     )
+    # if the liquid moves too much for the model, the numbers above are not to be trusted
+    return "\n".join([answer, *(fill(text, 80) for text in runs["spherical"].out_of_range)])
 
 
-def figure(runs: dict[str, pd.DataFrame]) -> plt.Figure:
+def figure(runs: dict[str, hubslosh.Run]) -> plt.Figure:
     """Draw pointing error and wave, with the answer above them."""
     drawing, (pointing, wave) = plt.subplots(2, figsize=(8, 5), sharex=True, layout="constrained")
     time = runs["spherical"]["time"]

@@ -1,5 +1,7 @@
 """The statements of README about the manoeuvre."""
 
+import my_tank
+import pytest
 from my_tank import MY_TANK, compare, summary
 
 
@@ -13,3 +15,11 @@ def test_rigid_liquid_ends_at_rest_and_sloshing_liquid_does_not(fmu: str) -> Non
     assert summary(runs).endswith("up to 5.8 mm")
     assert runs["frozen"]["slosh_angle"].abs().max() == 0.0
     assert MY_TANK["friction.model"] == "none"
+
+
+def test_the_summary_says_if_the_liquid_leaves_the_range_of_its_model(
+    fmu: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A hundredth of the thrust makes the wave so large that the picture must not be trusted."""
+    monkeypatch.setattr(my_tank, "MY_TANK", MY_TANK | {"g_axial": 0.1})
+    assert "out of range for" in summary(compare(fmu))

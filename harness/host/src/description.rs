@@ -901,7 +901,7 @@ impl ModelDescription {
             },
             Type::String => Ok(Value::String(text.into())),
             Type::Binary | Type::Clock => {
-                bail!("{name} is a {:?}, of which this host exchanges no values", variable.kind)
+                bail!("{name} is of type {:?}, which this host does not set", variable.kind)
             }
             Type::Enumeration => {
                 let items = self.items(variable);
@@ -920,9 +920,15 @@ impl ModelDescription {
 }
 
 /// Returns "; did you mean …?" with at most three of `names` that are similar to `wrong`, or an empty text.
+///
+/// A name without its group, such as `rho` for `fluid.rho`, counts as the most similar.
 pub fn did_you_mean<'a>(wrong: &str, names: impl Iterator<Item = &'a str>) -> String {
+    let likeness = |name: &str| match name.rsplit_once('.') {
+        Some((_, last)) if last.eq_ignore_ascii_case(wrong) => 1.0,
+        _ => strsim::jaro_winkler(&wrong.to_lowercase(), &name.to_lowercase()),
+    };
     let mut near: Vec<(f64, &str)> = names
-        .map(|name| (strsim::jaro_winkler(&wrong.to_lowercase(), &name.to_lowercase()), name))
+        .map(|name| (likeness(name), name))
         .filter(|(likeness, _)| *likeness > 0.75)
         .collect();
     near.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -1085,5 +1091,7 @@ mod tests {
         let d = ModelDescription::from_xml(XML).unwrap();
         let error = d.variable("slosh.modle").unwrap_err().to_string();
         assert!(error.contains("did you mean \"slosh.model\""), "{error}");
+        let error = d.variable("enabled").unwrap_err().to_string();
+        assert_eq!(error, "the FMU has no variable \"enabled\"; did you mean \"wheel.enabled\"?");
     }
 }

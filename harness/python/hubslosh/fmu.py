@@ -120,8 +120,13 @@ def fmu_path(model: str | Path) -> Path:
 
 
 def did_you_mean(wrong: str, names: Iterable[str]) -> str:
-    """Return "; did you mean …?" with the most similar name, or nothing."""
-    close = difflib.get_close_matches(str(wrong), list(names), n=1)
+    """Return "; did you mean …?" with the most similar name, or nothing.
+
+    A name without its group, such as ``rho`` for ``fluid.rho``, counts as the most similar.
+    """
+    known = list(names)
+    close = [name for name in known if name.rpartition(".")[2] == str(wrong)]
+    close = close or difflib.get_close_matches(str(wrong), known, n=1)
     return f"; did you mean {close[0]}?" if close else ""
 
 
