@@ -279,7 +279,7 @@ def box_transient() -> tuple[list[Row], str]:
     rows = [
         Row(
             name,
-            f"{len(ratio)} crests and troughs above 20 mm: median of ours over measured",
+            f"{len(ratio)} crests and troughs above 20 mm: median of computed over measured height",
             "nonlinear",
             "1",
             1.0,
@@ -290,7 +290,8 @@ def box_transient() -> tuple[list[Row], str]:
         ),
         share(
             name,
-            f"{len(ratio)} crests and troughs above 20 mm: share within 20 %",
+            f"{len(ratio)} crests and troughs above 20 mm: "
+            "share within 20 % of the measured height",
             "nonlinear",
             np.abs(ratio - 1) <= 0.2,
             most(len(ratio)),
@@ -441,7 +442,7 @@ def cylinder_heights() -> tuple[list[Row], str]:
         rows += [
             Row(
                 name,
-                f"peak heights of 9 {words} motions: median of ours over measured",
+                f"peak heights of 9 {words} motions: median of computed over measured height",
                 "nonlinear",
                 "1",
                 1.0,
@@ -451,7 +452,7 @@ def cylinder_heights() -> tuple[list[Row], str]:
             ),
             share(
                 name,
-                f"peak heights of 9 {words} motions: share within 20 %",
+                f"peak heights of 9 {words} motions: share within 20 % of the measured height",
                 "nonlinear",
                 np.abs(off[among]) <= 0.2,
                 most(int(among.sum())),
@@ -733,7 +734,7 @@ def markdown(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
 def page(rows: list[Row], cfd: list[tuple[float, float, float]]) -> str:
     """Return the page: the template with the results in it."""
     results = markdown(
-        ("experiment", "quantity", "measured", "ours", "result"),
+        ("experiment", "quantity", "measured", "computed", "result"),
         [
             (
                 row.experiment,
@@ -752,14 +753,15 @@ def page(rows: list[Row], cfd: list[tuple[float, float, float]]) -> str:
         "failures": str(sum(not row.passed for row in rows)),
         "results": results,
         "kinds": markdown(
-            ("of what", "pass"),
+            ("compared quantities", "comparisons that pass"),
             [
                 (KINDS[kind], f"{sum(row.passed for row in those)} of {len(those)}")
                 for kind, those in of.items()
             ],
         ),
         "computed": markdown(
-            ("h/L", "CFD", "ours"), [(f"{h:.2f}", f"{w:.4f}", f"{ours:.4f}") for h, w, ours in cfd]
+            ("h/L", "CFD", "`hubslosh tank`"),
+            [(f"{h:.2f}", f"{w:.4f}", f"{ours:.4f}") for h, w, ours in cfd],
         ),
     }
     text = TEMPLATE.read_text(encoding="utf-8")
