@@ -45,7 +45,7 @@ def caller() -> int:
 
 
 def out_of_range(**values: Any) -> list[str]:
-    """Return which arguments are outside their allowed range, by name, in words."""
+    """Return a sentence for each argument that is outside its allowed range."""
     found = []
     for name, value in values.items():
         is_number = isinstance(value, int | float | np.integer | np.floating)
@@ -85,7 +85,7 @@ def floats(values: Any) -> NDArray[np.float64]:
 
 
 def names_of(names: Any, what: str, problems: list[str]) -> list[str]:
-    """Return names of variables as a list, a single one too; what is wrong goes to ``problems``."""
+    """Return one name or several as a list of names; errors are appended to ``problems``."""
     if isinstance(names, str):
         return [names]
     try:
@@ -100,7 +100,7 @@ def names_of(names: Any, what: str, problems: list[str]) -> list[str]:
 
 
 def not_numbers(**values: Any) -> list[str]:
-    """Return which arguments are neither numbers nor None."""
+    """Return a sentence for each argument that is neither a number nor None."""
     kinds = (int, float, np.integer, np.floating)
     return [
         f"{name} must be a number, not {value!r}"
@@ -136,7 +136,7 @@ def column_of(table: Any, name: Any, what: str, problems: list[str]) -> np.ndarr
 
 
 def vector(values: Any, length: int, what: str) -> np.ndarray:
-    """Return so many finite numbers as an array."""
+    """Return ``values`` as an array of ``length`` finite numbers."""
     try:
         found = floats(values)
     except FmuError as error:

@@ -195,7 +195,7 @@ class Certificate:
 
 
 def corners(count: int) -> Vector:
-    """Return all corners of a cube of ±1, but 64 drawn ones if there are more."""
+    """Return all corners of a cube of ±1, or 64 random corners if it has more than 64."""
     if count <= 6:
         return np.array(list(product((-1.0, 1.0), repeat=count)))
     return np.random.default_rng(1).choice((-1.0, 1.0), (64, count))
@@ -211,7 +211,7 @@ class UnstableError(Exception):
 
 
 class ExhaustedError(Exception):
-    """More convex problems would be needed than are allowed."""
+    """Raised if a proof needs more convex problems than are allowed."""
 
 
 Pair = tuple[Complex, Complex]
@@ -222,9 +222,10 @@ Region = tuple[float, float, Vector, Vector]
 
 
 class Search:
-    """Search of scalings for a loop, with what is known of it by frequency and box.
+    """Search for scalings D and G that prove a loop stable; it keeps what it has computed.
 
-    ``response`` returns N at frequencies in Hz, ``poles`` those of the loop at a Δ in the z plane.
+    ``response`` returns N, the closed loop's response from the outputs to the inputs of Δ, at
+    frequencies in Hz. ``poles`` returns the closed loop's poles in the z plane for a given Δ.
     """
 
     def __init__(
@@ -242,13 +243,13 @@ class Search:
         self.own: dict[bytes, Complex] = {}
 
     def response(self, a: float, b: float) -> Complex:
-        """Return N at the nodes of an interval."""
+        """Return the closed loop's response N at the nodes of a frequency interval."""
         if (a, b) not in self.known:
             self.known[a, b] = self.closed(a + (b - a) * NODES)
         return self.known[a, b]
 
     def own_poles(self, low: Vector, high: Vector) -> Complex:
-        """Return the poles in the middle of a box as complex frequencies, Hz."""
+        """Return the closed loop's poles in the middle of a box of Δ, as complex Hz."""
         middle = (low + high) / 2
         key = middle.tobytes()
         if key not in self.own:
@@ -263,9 +264,10 @@ class Search:
     def proved(
         self, region: Region, ends: tuple[Pair, Pair], part: tuple[float, float], halvings: int
     ) -> list[tuple[float, float]] | None:
-        """Return the intervals on which polynomials show X < 0 in a region; None if it is not.
+        """Return the frequency intervals on which polynomials prove X < 0; None if they do not.
 
-        D and G are straight lines between the ends of the region, of which ``part`` is a part.
+        D and G are interpolated linearly between the ends of the region, and ``part`` is the part
+        of the region to prove.
         """
         low, high = region[2:]
         a, b = part
@@ -299,7 +301,7 @@ class Search:
         return found
 
     def halved(self, region: Region) -> list[Region]:
-        """Return the two halves of a region's box along the quantity that helps most."""
+        """Return a region with its box cut in two along the quantity that helps the proof most."""
         a, b, low, high = region
         if ((high - low) / self.width).max() < SMALLEST_BOX:
             raise ExhaustedError

@@ -115,7 +115,7 @@ class Checked:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """Findings of all rules."""
+        """Findings of all rules in one tuple, in the order of the rules."""
         return tuple(finding for rule in self.rules for finding in rule.findings)
 
     def __repr__(self) -> str:

@@ -12,7 +12,7 @@ Matrix = NDArray[np.float64]
 
 @dataclass
 class Linear:
-    """u = C x + D e + f, then x = A x + B e, with the error e = r - y of what is measured."""
+    """Sampled controller u = C x + D e + f, x⁺ = A x + B e, with the control error e = r - y."""
 
     A: Matrix
     B: Matrix

@@ -21,7 +21,7 @@ class AsDict(Protocol):
     """A model that returns its content by name, such as an `UncertainModel`."""
 
     def as_dict(self) -> dict[str, Any]:
-        """Return numbers, arrays, names and texts by name."""
+        """Return the model's content as a dictionary: numbers, arrays, names and texts."""
 
 
 def _check_table(table: Any, path: Any, ending: str) -> Path:

@@ -17,10 +17,10 @@ TOLERANCES = (0.05, 0.01)
 
 
 def impulse(masses: Vector, omegas: Vector, zetas: Vector, time: Vector) -> NDArray[np.float64]:
-    """Force (N) of each mode on a tank after an impulse of 1 m/s of the tank, a row a mode.
+    """Return the force (N) of each mode on a tank whose speed jumps by 1 m/s; one row a mode.
 
-    l a'' + 2 zeta omega l a' + g a = -u for u an impulse, F = m (g a + 2 zeta omega l a') (4.16 to
-    4.21 of Rubaga's thesis).
+    The angle a follows l a'' + 2 zeta omega l a' + g a = -u with the tank's acceleration u, and the
+    force is F = m (g a + 2 zeta omega l a') (Rubaga's thesis, equations 4.16 to 4.21).
     """
     omegas, zetas = omegas[:, None], zetas[:, None]
     damped = omegas * np.sqrt(1 - zetas**2)

@@ -136,13 +136,13 @@ def is_spacecraft(fmu: Fmu) -> bool:
 
 
 def warn_of_rotation(what: str, turning: Any) -> None:
-    """Warn if the craft of a linear model turns faster and faster, with its acceleration."""
+    """Warn if the craft has an angular acceleration at the point where it is linearised."""
     if text := rotation(what, turning):
         warnings.warn(text, FmuWarning, stacklevel=caller())
 
 
 def rotation(what: str, turning: Any) -> str:
-    """Return what is wrong with a point at which the craft turns faster; "" if it does not."""
+    """Return a warning if the craft has an angular acceleration at a point; otherwise ""."""
     size = float(np.linalg.norm(turning))
     if size <= LEFT:
         return ""

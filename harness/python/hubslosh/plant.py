@@ -25,7 +25,7 @@ COLUMNS = ("omega", "omega_imu", "slosh_angle", "slosh_angle_radial")
 
 
 class RunError(FmuError):
-    """A run that stopped on its way.
+    """Error of a run that stopped before its end.
 
     Parameters
     ----------
@@ -62,8 +62,8 @@ _STARTS = {"HubSlosh": ["init.slosh_angle"]}
 class Instance:
     """An instance of an FMU, from fmi2Instantiate to fmi2FreeInstance; variables by name.
 
-    Use it in a ``with`` statement. Calls from several threads follow one another. The package's
-    FMUs start at rest here: what moves was asked for.
+    Use it in a ``with`` statement. Calls from several threads wait for one another. FMUs of this
+    package start at rest, unless parameters set a motion.
     """
 
     def __init__(self, fmu: Fmu, *, exchange: bool = False) -> None:

@@ -127,7 +127,7 @@ class Modes:
         self.model, self.fmu, self.given = model, Fmu.open(model), dict(given)
 
     def number(self, name: str) -> float:
-        """Return a parameter's value, which may be the FMU's own."""
+        """Return a parameter's value: the one that is given, otherwise the FMU's start value."""
         if name in self.given:
             return float(self.fmu.convert(name, self.given[name]))
         return float(self.fmu.variable(name).start or 0.0)
@@ -198,7 +198,7 @@ class Modes:
         self.given |= {mode.name(name): value for name, value in changes.items()}
 
     def set(self, mode: ModeQuantity, value: float) -> None:
-        """Change a quantity alone."""
+        """Set one quantity of a mode; its other quantities and the liquid as a whole stay."""
         if mode.kind == "zeta":
             self.given[mode.name("zeta")] = value
         elif mode.kind == "frequency":
@@ -242,10 +242,11 @@ class Modes:
 def rigid_rest(
     m_0: float, H_0: float, I_0: float, more_y: float, points: Iterable[tuple[float, float]]
 ) -> tuple[float, float, float, float]:
-    """Return mass, height and inertia of a rigid liquid with masses added at heights.
+    """Return mass, height and inertia of the rigid liquid after masses at heights are added to it.
 
-    Also the inertia across the axis, 0 or below, that the dry craft has to lend because the
-    liquid's own, as in a sphere, would be negative; both are rigid.
+    The fourth result is 0 or negative: an inertia across the axis that is taken from the dry
+    craft, because the rigid liquid's own would be negative, as in a sphere. Both are rigid, so the
+    sum acts the same.
     """
     moment = m_0 * H_0
     inertia = I_0 + moment * H_0

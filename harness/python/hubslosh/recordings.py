@@ -202,7 +202,7 @@ def _excel(path: Path) -> Iterator[Column]:
 
 
 class Kind(NamedTuple):
-    """A kind of file."""
+    """A file format that `read_recording` knows."""
 
     name: str
     start: bytes

@@ -460,7 +460,7 @@ def review(
 
 
 def row_of(point: Point, uncertain: Iterable[Uncertain]) -> dict[str, Any]:
-    """Return the numbers of a point."""
+    """Return a point as a row of `Review.points`."""
     found = point.margins
     down, up = found.gain_margins
     margins = {

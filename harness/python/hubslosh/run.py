@@ -27,8 +27,8 @@ class Run(ShortTable):
         """Sentences about the tanks that left the range of their model, one for each.
 
         A sentence has the reasons with their shares of the time and their first times. The list is
-        empty if the whole run stayed in range, and for FMUs that do not tell. Of a part of a run
-        it is that of the whole run.
+        empty if the whole run stayed in range, and for FMUs without such a variable. For a part
+        of a run it is about the whole run.
 
         Examples
         --------

@@ -28,7 +28,7 @@ SMALLEST = 1e-3
 
 
 def solver() -> Any:
-    """Return the convex solver's package, or raise FmuError with the way to it."""
+    """Return the package of the convex solver; FmuError says how to install it if it is missing."""
     try:
         import clarabel
     except ModuleNotFoundError:

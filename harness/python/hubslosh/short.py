@@ -10,7 +10,7 @@ MOST = 10
 
 
 class ShortTable(pd.DataFrame):
-    """A pandas.DataFrame that prints in ten rows and eight columns; notebooks show it as ever."""
+    """A pandas.DataFrame that prints in ten rows and eight columns; notebooks show it as usual."""
 
     @property
     def _constructor(self) -> Any:

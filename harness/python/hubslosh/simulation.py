@@ -182,7 +182,7 @@ def simulate(
 
 
 def asked_of(fmu: Fmu, columns: Sequence[str], given: Container[str]) -> list[str]:
-    """Return the variables to record for ``columns``, and to say how the run left its range."""
+    """Return the variables to record: ``columns``, and those that say if a tank is in range."""
     limits = [name for name in native.limit_columns(fmu.native) if name not in columns]
     return [name for name in (*columns, *limits) if name not in given]
 
@@ -195,9 +195,9 @@ def table_of(
     model: str | Path,
     parameters: Parameters,
 ) -> Run:
-    """Return the wanted rows of a run (None: all) as its table.
+    """Return a run as a table with the ``wanted`` rows, or with all rows if that is None.
 
-    Of the variables that say why a tank is out of range, it has those that were ``asked`` for.
+    Variables that say why a tank is out of range are columns only if ``asked`` names them.
     """
     limits = [name for name in native.limit_columns(fmu.native) if name in columns]
     read = {name: np.ascontiguousarray(columns[name], float) for name in ("time", *limits)}
@@ -259,7 +259,7 @@ def outputs_of(
 
 
 def too_many_rows(start: float, stop: float, step: float) -> list[str]:
-    """Return what is wrong with that many rows, if they are more than a computer should hold."""
+    """Return an error message in a list if there are more than `MOST_ROWS` rows; otherwise []."""
     rows = (stop - start) / step
     if rows <= MOST_ROWS:
         return []

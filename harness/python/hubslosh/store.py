@@ -69,9 +69,9 @@ class Store:
         self._store.close()
 
     def rows(self, draws: list[dict[str, Any]]) -> dict[int, dict[str, Any]]:
-        """Return the results of each stored run by number; warn of those that cannot be used.
+        """Return the results of the stored runs by their numbers; warn of runs that cannot be used.
 
-        ``draws`` has the values that the seed gives.
+        ``draws`` are the values that the seed gives; a stored run must have the same.
         """
         found, damaged = {}, []
         for run, drawn in enumerate(draws):

@@ -27,7 +27,7 @@ WORST = 5
 
 @dataclass(frozen=True, eq=False)
 class Suggestion:
-    """The filter, on all commands, that raises the least distance most; or that there is none."""
+    """The notch or roll-off that raises the smallest modulus margin most, if any raises it."""
 
     text: str
     """The suggestion in a sentence."""
@@ -46,7 +46,7 @@ class Suggestion:
 def suggest(
     nominal: "Sequence[Point]", every: "Sequence[Point]", slosh: pd.DataFrame
 ) -> Suggestion:
-    """Return the best of some notches at the mode that shows most, and of some roll-offs."""
+    """Try notches at the slosh mode with the highest peak, and roll-offs, and return the best."""
     worst = sorted(every, key=lambda point: point.distance)[:WORST]
     points = list({id(point): point for point in [*nominal, *worst]}.values())
     grids = [_sampled(point) for point in points]

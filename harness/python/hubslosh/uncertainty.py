@@ -719,10 +719,11 @@ class UncertainModel:
         return K
 
     def closed(self, loop: Loop, frequency: ArrayLike) -> NDArray[np.complex128]:
-        """Return the response N of the closed loop from inputs to outputs of Δ.
+        """Return the response N of the closed loop from the outputs to the inputs of Δ.
 
-        The images of the hold around the sampling rate, 1e-6 of the loop gain at slosh frequencies
-        in the book's example, are those at Δ = 0.
+        The hold also makes images of each frequency around multiples of the sampling rate. Their
+        part of the loop gain, 1e-6 at the slosh frequencies of the book's example, is taken at
+        Δ = 0.
 
         Parameters
         ----------

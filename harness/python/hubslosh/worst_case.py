@@ -117,10 +117,11 @@ def _decibel(factor: float) -> str:
 
 
 def search(evaluate: Evaluate, points: "Sequence[Point]") -> "list[Point]":
-    """Return further points on the way to the worst one, the one with the least distance.
+    """Search the point with the smallest modulus margin, and return all points on the way.
 
-    From the corner that the single ranges point to, and from the worst points so far, coordinates
-    change by a step that is halved when no change is worse. It finds a local minimum.
+    The search starts at the corner to which the effects of single ranges point, and at the worst
+    points so far. It changes one coordinate at a time, by a step that is halved when no change
+    makes the point worse, so that it finds a local minimum.
     """
     found: list[Point] = list(points)
     count = len(points[0].shares)
