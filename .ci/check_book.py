@@ -46,6 +46,15 @@ ANSWERS = {
     "FMU": "glossary.html#term-FMU",
     "bob": "glossary.html#term-bob",
     "draining tank": "glossary.html#term-draining-tank",
+    "zero gravity": "glossary.html#term-zero-gravity",
+    "microgravity": "glossary.html#term-microgravity",
+    "hydrazine": "glossary.html#term-hydrazine",
+    "spherical tank": "glossary.html#term-spherical-tank",
+    "two tanks": "glossary.html#term-two-tanks",
+    "step size": "glossary.html#term-step-size",
+    "transfer function": "glossary.html#term-transfer-function",
+    "phase margin": "spacecraft.html",
+    "licence": "index.html",
 }
 """Words that readers search for, and the end of an address among the first three hits."""
 HITS = 3

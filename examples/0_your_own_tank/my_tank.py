@@ -14,7 +14,8 @@ import pandas as pd
 import hubslosh
 from hubslosh.plot import COLORS, save
 
-# Any parameter by its name: in SI units, or with a unit. The list: `hubslosh variables`.
+# An upright cylinder on a craft that turns about one axis. Any parameter by its name, in SI units
+# or with a unit; `hubslosh variables` lists them.
 MY_TANK = {
     "hub.I": 40.0,  # kg·m², craft and dry tank about the axis of rotation
     "tank.d": (600, "mm"),  # inner diameter
