@@ -149,10 +149,10 @@ pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) ->
         (_, Some(d))
             if !["CoSimulation", "ModelExchange"].iter().any(|i| d.interface(i).is_some()) =>
         {
-            Err("it offers neither Co-Simulation nor Model Exchange, which alone are called".into())
+            Err("it offers neither Co-Simulation nor Model Exchange, and the check calls no other interface".into())
         }
         (_, Some(d)) if d.has_clocks() && d.interface("ModelExchange").is_none() => {
-            Err("it has clocks, with which Co-Simulation is not called".into())
+            Err("it has clocks, and the check does not call Co-Simulation of FMUs with clocks".into())
         }
         (_, Some(_)) if !libraries.is_callable() => {
             Err(format!("it has no library for this platform, {}", host::fmi3::PLATFORM))
@@ -229,7 +229,8 @@ fn packed(root: &Element) -> Result<(temporary::Folder, PathBuf)> {
     let path = folder.path().join("description");
     let mut bytes = Vec::new();
     root.pack(&mut bytes);
-    std::fs::write(&path, bytes).context("the description cannot be handed to the rules")?;
+    std::fs::write(&path, bytes)
+        .context("the model description cannot be written for the processes of the rules")?;
     Ok((folder, path))
 }
 

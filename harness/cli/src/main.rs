@@ -224,7 +224,7 @@ fn guarded(cli: &Cli) -> Result<u8> {
         None => drop(fmu::find(Path::new(DEFAULT_FMU))?),
     }
     let limits = cli.limits()?;
-    let program = std::env::current_exe().context("this program cannot find itself")?;
+    let program = std::env::current_exe().context("the path of this program cannot be found")?;
     let arguments = [guard::OPTION.into()].into_iter().chain(std::env::args_os().skip(1));
     let outcome = guard::run(&program, arguments, &limits, Output::Shown, |_| {})?;
     match outcome.cause {

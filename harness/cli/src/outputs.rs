@@ -90,7 +90,10 @@ pub fn check(command: &clap::Command, matches: &ArgMatches) -> Result<()> {
         let other =
             outputs[..k].iter().find(|(_, other, _)| file.is_some() && place(other) == file);
         if let Some((other, _, _)) = other {
-            anyhow::bail!("{} is to be two files at once (--{other}, --{option})", path.display());
+            anyhow::bail!(
+                "{} is named for two outputs (--{other}, --{option}); give each a file of its own",
+                path.display()
+            );
         }
     }
     Ok(())

@@ -927,10 +927,8 @@ pub fn did_you_mean<'a>(wrong: &str, names: impl Iterator<Item = &'a str>) -> St
         Some((_, last)) if last.eq_ignore_ascii_case(wrong) => 1.0,
         _ => strsim::jaro_winkler(&wrong.to_lowercase(), &name.to_lowercase()),
     };
-    let mut near: Vec<(f64, &str)> = names
-        .map(|name| (likeness(name), name))
-        .filter(|(likeness, _)| *likeness > 0.75)
-        .collect();
+    let mut near: Vec<(f64, &str)> =
+        names.map(|name| (likeness(name), name)).filter(|(likeness, _)| *likeness > 0.75).collect();
     near.sort_by(|a, b| b.0.total_cmp(&a.0));
     let near: Vec<String> = near.iter().take(3).map(|(_, name)| format!("\"{name}\"")).collect();
     match near.len() {

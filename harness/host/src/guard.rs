@@ -534,8 +534,9 @@ static GUARDED: OnceLock<Guarded> = OnceLock::new();
 ///
 /// If it was not started by [`run`].
 pub fn enter() -> Result<()> {
-    let (channel, [call, memory, file], pipe) =
-        channel::Process::take().context("this is for hubslosh alone")?;
+    let (channel, [call, memory, file], pipe) = channel::Process::take().context(
+        "this command is internal: hubslosh starts it to run an FMU in a process of its own",
+    )?;
     let limits = Limits { call: Duration::from_millis(call), total: None, memory, file };
     #[cfg(unix)]
     let streams = match pipe {
@@ -543,7 +544,9 @@ pub fn enter() -> Result<()> {
         None => None,
     };
     #[cfg(not(unix))]
-    let None::<File> = pipe else { bail!("a pipe cannot be handed over here") };
+    let None::<File> = pipe else {
+        bail!("this system cannot pass the pipe to the process that runs the FMU")
+    };
     #[cfg(unix)]
     restrict(rustix::process::Resource::Core, 0);
     let guarded = Guarded {
@@ -555,7 +558,7 @@ pub fn enter() -> Result<()> {
     #[cfg(target_os = "linux")]
     rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::KILL))?;
     if GUARDED.set(guarded).is_err() {
-        bail!("it is guarded already");
+        bail!("the FMU is in a guarded process already");
     }
     bug::set_listener(bug::Listener {
         panics: |report| send(PANICS, report.as_bytes()),

@@ -89,7 +89,9 @@ pub fn describe(xml: &str, limits: &[Limit], starts: &BTreeMap<String, String>) 
         }
     }
     if let Some(name) = left.keys().next() {
-        bail!("the description has no parameter {name} (allowed: those within the sizes)");
+        bail!(
+            "the description has no parameter {name} (allowed: parameters of its tanks and modes)"
+        );
     }
     // The derivative may come before its state.
     for node in variables.descendants().filter(|node| node.has_attribute("derivative")) {

@@ -185,7 +185,9 @@ fn linear(
     let states = of.getattr("A")?.len()?;
     let quaternion: Option<[usize; 4]> = of.getattr("quaternion")?.extract()?;
     if quaternion.is_some_and(|places| places.iter().any(|place| *place >= measured)) {
-        return Err(PyValueError::new_err("quaternion: a place beyond what is measured"));
+        return Err(PyValueError::new_err(
+            "quaternion: an index is not below the number of measurements",
+        ));
     }
     Ok(Linear {
         x: vec![0.0; states],

@@ -195,7 +195,7 @@ fn checked(liquid: Liquid) -> Result<parameters::Liquid, Problems> {
     let gravity = liquid.0.gravity;
     if gravity > 0.0 && gravity < 1e-9 {
         let text = format!(
-            "gravity = {gravity:e}: for parameters 0, or 1e-9 or more, which the FMUs take as g_ref"
+            "gravity = {gravity:e} m/s² (allowed for parameters of an FMU: 0, or at least 1e-9, because it becomes g_ref)"
         );
         return Err(text.into());
     }

@@ -37,7 +37,7 @@ pub fn write(out: &Path) -> Result<()> {
         Err(error) if error.kind() != ErrorKind::NotFound => Err(error).context("book/api")?,
         _ => {}
     }
-    let built = tempfile::tempdir().context("there is no place for temporary files")?;
+    let built = tempfile::tempdir().context("no temporary folder can be made")?;
     let site = built.path().join("site");
     let done = Command::new(python)
         .current_dir(&root)

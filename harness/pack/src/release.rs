@@ -135,7 +135,7 @@ fn version_files(
     all: &[Built],
     check: impl Fn(&Path) -> Result<String>,
 ) -> Result<[(&'static str, Vec<u8>); 3]> {
-    let made = tempfile::tempdir().context("there is no place for temporary files")?;
+    let made = tempfile::tempdir().context("no temporary folder can be made")?;
     let fmu = path(model, fmi, made.path());
     pack_built(model, fmi, all, &fmu)?;
     let bytes = std::fs::read(&fmu).with_context(|| format!("{} cannot be read", fmu.display()))?;

@@ -95,7 +95,7 @@ pub fn for_tests(fmus: &[&Path]) -> PathBuf {
 
 /// Builds the binaries for the platform on which this program runs; the command is this program.
 fn native() -> Result<Binaries> {
-    let made = tempfile::tempdir().context("there is no place for temporary files")?;
+    let made = tempfile::tempdir().context("no temporary folder can be made")?;
     let mut fmus = Files::new();
     let mut all = Vec::new();
     for model in MODELS {
@@ -107,7 +107,8 @@ fn native() -> Result<Binaries> {
         all.push(Binary::read(&read(&build(model.package, true)?)?)?);
     }
     let library = read(&build_native(true)?)?;
-    let command = read(&std::env::current_exe().context("this program cannot find itself")?)?;
+    let command =
+        read(&std::env::current_exe().context("the path of this program cannot be found")?)?;
     all.push(Binary::read(&library)?);
     all.push(Binary::read(&command)?);
     Ok(Binaries {
@@ -141,7 +142,7 @@ fn cross_one(
     target: &Target,
     faults: &mut Vec<String>,
 ) -> Result<Binaries> {
-    let made = tempfile::tempdir().context("there is no place for temporary files")?;
+    let made = tempfile::tempdir().context("no temporary folder can be made")?;
     let mut read = Vec::new();
     let mut built = |product: &Product| -> Result<Vec<u8>> {
         let bytes = toolchain.build(product, platform, target)?;

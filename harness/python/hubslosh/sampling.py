@@ -228,7 +228,7 @@ def _one(outcome: Outcome, values: dict[str, Any]) -> dict[str, Any]:
             f'outcome must return numbers by name, such as {{"error": 0.1}}, not {found!r}'
         ) from None
     if FAILED in numbers:
-        raise FmuError(f"outcome returns {FAILED}, the column for what the FMU says")
+        raise FmuError(f"outcome returns {FAILED}, a column that the table needs for errors")
     return numbers
 
 

@@ -252,7 +252,7 @@ class TankCase:
 
 
 def read_drawing(source: "dict[str, Any] | Path") -> Any:
-    """Read a tank file, or what stands in one."""
+    """Read a tank file, or a dictionary with the content of a tank file."""
     if isinstance(source, Path):
         return native.Tank.read(source)
     return native.Tank.parse(toml_of(source))
@@ -266,9 +266,9 @@ def toml_of(source: Mapping[str, Any]) -> str:
 def solve(
     cases: Sequence[TankCase], drawings: Sequence[Any] | None = None
 ) -> "list[Tank | FmuError]":
-    """Return what is found of each case, or its error; computed on all cores.
+    """Compute each tank on all cores, and return its result or its error.
 
-    * ``drawings``: What `drawing` has read for each.
+    ``drawings`` are the results of `read_drawing` for the cases, if they are known already.
     """
     drawings = drawings or [read_drawing(case.source) for case in cases]
     found = native.solve(
@@ -399,11 +399,11 @@ def _tank_source(source: Any) -> "dict[str, Any] | Path":
         return given
     if isinstance(source, str | Path):
         return Path(source)
-    raise FmuError(f"a tank is a file or a dict of what stands in one, not {source!r}")
+    raise FmuError(f"a tank is a tank file, or a dict with the content of one, not {source!r}")
 
 
 def check_fill(fill: Any) -> Any:
-    """Return a fill, or say what is wrong with it."""
+    """Return a fill; raise FmuError if it is neither a height, a percentage nor a mass."""
     if isinstance(fill, str):
         right = fill.strip().endswith("%") and _is_number(fill.strip()[:-1])
     elif isinstance(fill, tuple):
@@ -441,7 +441,7 @@ def _toml(value: Any) -> str:
         return repr(value)
     if isinstance(value, Sequence):
         return f"[{', '.join(_toml(v) for v in value)}]"
-    raise FmuError(f"{value!r} cannot stand in a tank file")
+    raise FmuError(f"{value!r} is no value for a tank file (allowed: numbers, texts, lists)")
 
 
 def _from_z(axis: Sequence[float]) -> list[float]:

@@ -86,7 +86,7 @@ def test_what_is_wrong_with_a_tank_is_told(tmp_path: Path) -> None:
         "give the fill": lambda: tank(SPHERE),
         r'a height in m, or a text such as "60%"': lambda: tank(SPHERE, fill="60"),
         "modes must be a number, not 'two'": lambda: tank(SPHERE, fill=0.3, modes="two"),
-        "a tank is a file or a dict": lambda: tank(3, fill=0.3),
+        "a tank is a tank file, or a dict": lambda: tank(3, fill=0.3),
         "^density is missing": lambda: tank({"shape": {"sphere": {"radius": 1}}}, fill=0.3),
         "3 m.*0.7": lambda: tank(SPHERE, fill=3.0),
         "no_such.toml": lambda: tank("no_such.toml", fill=0.3),
@@ -98,7 +98,7 @@ def test_what_is_wrong_with_a_tank_is_told(tmp_path: Path) -> None:
         "number is 1 to 4, not 5": lambda: full.parameters("Spacecraft", 5),
         "no parameters of a tank for 'Craft'": lambda: full.parameters("Craft"),
         "must end in .svg": lambda: full.save("tank.png"),
-        "cannot stand in a tank file": lambda: tank({"density": object()}, fill=0.3),
+        "is no value for a tank file": lambda: tank({"density": object()}, fill=0.3),
     }
     for sentence, call in wrong.items():
         with pytest.raises(FmuError, match=sentence):

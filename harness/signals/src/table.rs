@@ -218,7 +218,8 @@ impl Table {
         let mut writer = SerializedFileWriter::new(file, Arc::new(schema), Arc::new(properties))?;
         let mut group = writer.next_row_group()?;
         for (name, values) in self.names.iter().zip(&self.columns) {
-            let mut column = group.next_column()?.context("fewer columns than names")?;
+            let mut column =
+                group.next_column()?.context("it has fewer columns than names in its header")?;
             let typed = column.typed::<DoubleType>();
             if self.gaps.contains(name) {
                 let levels: Vec<i16> = values.iter().map(|v| i16::from(!v.is_nan())).collect();

@@ -59,8 +59,8 @@ pub fn tank_damping(
         return Err("There are no modes to be damped.".to_string().into());
     };
     if first.omega <= 0.0 {
-        return Err("A damping ratio holds at a specific force, and at 0 m/s² there is none: give the one that it is to \
-                    hold at, the surface tension, or no viscosity."
+        return Err("A damping ratio depends on the acceleration along the tank's axis, and is not defined at 0 m/s² without surface \
+                    tension: give an acceleration above 0, give the surface tension, or leave out the viscosity."
             .to_string()
             .into());
     }

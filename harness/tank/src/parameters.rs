@@ -368,8 +368,8 @@ impl ParameterSet {
             .into());
         }
         if liquid.gravity == 0.0 && liquid.nu.is_some() {
-            return Err("A damping ratio holds at a specific force, and at 0 m/s² there is none: give the one that it \
-                        is to hold at, or no viscosity."
+            return Err("A damping ratio depends on the acceleration along the tank's axis, and is not defined at 0 m/s²: \
+                        give an acceleration above 0, or leave out the viscosity."
                 .to_string()
                 .into());
         }

@@ -21,7 +21,8 @@ use super::{RunsArgs, bench_day, campaign, open, setting};
     hubslosh analyse up.mat --profile lin-sweep:f0=1,f1=4,duration=600 --set tank.h=0.08 --model spherical\n  \
     hubslosh analyse --plan bench.toml\n  \
     hubslosh analyse --bench-day tuesday --out dist/tuesday\n\n\
-    In a plan a [[run]] with recording = \"FILE\" (and columns = \"…\") is read; it is simulated too.")]
+    If a [[run]] of the plan has recording = \"FILE\" (and columns = \"…\"), the recording is analysed, and the run is\n\
+    simulated for comparison.")]
 pub struct AnalyseArgs {
     /// Recordings: text in columns or Parquet; also .mat, HDF5, TDMS, MDF4 and .xlsx if the Python package is installed.
     #[arg(value_name = "RECORDING", required_unless_present_any = ["plan", "bench_day"])]

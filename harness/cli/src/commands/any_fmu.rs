@@ -30,9 +30,9 @@ pub struct AnyFmuArgs {
     /// Prior knowledge of an unknown: its mean and standard deviation.
     #[arg(long, value_name = "NAME=MEAN:STD,…")]
     prior: Vec<String>,
-    /// Standard deviations of known values, which widen the intervals: of a value that is set, relative (0.5% or 0.005)
-    /// or absolute (5mm; ±0.1 in the unit of the variable); of the scale of an input or output, scale(NAME); of the
-    /// clock, scale(time). 0 is exact.
+    /// Standard deviations of known values, which widen the intervals. NAME is a value that --set gives, scale(NAME) the
+    /// scale of an input or output, scale(time) the rate of the clock. SIZE is relative (0.5% or 0.005), for a value also
+    /// absolute (5mm, or ±0.1 in the unit of the variable); 0 means exact.
     #[arg(long = "tolerance", value_name = "NAME=SIZE,…")]
     pub tolerances: Vec<String>,
     /// Inputs of the FMU that the recordings drive.

@@ -57,8 +57,8 @@ pub struct CampaignArgs {
     force: bool,
     #[command(flatten)]
     pub runs: RunsArgs,
-    /// Directory for runs, tables and report.html [default: dist/campaign; if flags change the campaign, dist/campaign_
-    /// and these flags; with --plan, dist/ and the name of the plan].
+    /// Directory for runs, tables and report.html [default: dist/campaign, followed by the flags if they change the
+    /// campaign; with --plan, dist/ and the name of the plan].
     #[arg(long, value_name = "DIRECTORY")]
     out: Option<PathBuf>,
     /// Directory of another campaign, whose runs the report compares with the runs of this campaign.

@@ -24,8 +24,8 @@ pub struct CheckArgs {
     /// File for the report as JUnit XML, with a test case for each rule.
     #[arg(long, value_name = "FILE")]
     junit: Option<PathBuf>,
-    /// File for the report as JSON, with an object for each rule. Without a file, which must then be the last flag, the
-    /// JSON is printed.
+    /// File for the report as JSON, with an object for each rule. If no file follows the flag, the JSON is printed; the
+    /// flag must then be the last one.
     #[arg(long, value_name = "FILE", num_args = 0..=1)]
     json: Option<Option<PathBuf>>,
     /// File for the findings as SARIF 2.1.0, which code hosts show.
@@ -80,7 +80,8 @@ impl CheckArgs {
         let limit = Duration::try_from_secs_f64(self.limit).ok().filter(|limit| !limit.is_zero());
         let limit =
             limit.with_context(|| format!("--limit {} (allowed: above 0 s)", self.limit))?;
-        let program = std::env::current_exe().context("this program cannot find itself")?;
+        let program =
+            std::env::current_exe().context("the path of this program cannot be found")?;
         let options = Options { program, only: self.only.clone(), limit };
         let bar = progress::rules_bar()?;
         let report = check(fmu, &options, |rules| {

@@ -191,7 +191,7 @@ impl DesignArgs {
         let [f0, f1] = self.band[..] else { bail!("--band needs two frequencies, Hz") };
         ensure!(
             f1 <= 0.5 / STEP,
-            "--band ends at {f1} Hz (allowed: up to {} Hz, half of what rows {STEP} s apart show)",
+            "--band ends at {f1} Hz (allowed: up to {} Hz, half the sampling rate of rows {STEP} s apart)",
             0.5 / STEP
         );
         design::check_rows(self.period, (f0, f1), peak, budget::steps(self.duration, STEP)?)?;

@@ -56,7 +56,7 @@ impl ReleaseArgs {
 ///
 /// If the check finds errors; the message is the report.
 fn checked(fmu: &Path) -> Result<String> {
-    let program = std::env::current_exe().context("this program cannot find itself")?;
+    let program = std::env::current_exe().context("the path of this program cannot be found")?;
     let options = Options { program, only: vec![], limit: Duration::from_secs(60) };
     let bar = progress::rules_bar()?;
     let mut report = check::check(fmu, &options, |rules| {

@@ -26,7 +26,7 @@ pub struct ReviewArgs {
 
 impl ReviewArgs {
     pub fn run(self) -> Result<()> {
-        let own = std::env::current_exe().context("this program cannot find itself")?;
+        let own = std::env::current_exe().context("the path of this program cannot be found")?;
         let out = self.out.unwrap_or_else(|| self.plan.with_extension("html"));
         let mut arguments = vec![OsString::from("-m"), "hubslosh.review_plan".into()];
         arguments.extend([self.plan.into_os_string(), "--out".into(), out.into_os_string()]);

@@ -189,7 +189,7 @@ impl TankArgs {
         let Some(path) = &self.parameters else { return Ok(None) };
         ensure!(
             self.gravity == 0.0 || self.gravity >= 1e-9,
-            "--gravity {:e}: for --parameters 0, or 1e-9 or more, which the FMUs take as g_ref",
+            "--gravity {:e} m/s² (allowed with --parameters: 0, or at least 1e-9, because it becomes the FMU's parameter g_ref)",
             self.gravity
         );
         let target = match self.model {

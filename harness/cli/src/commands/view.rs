@@ -69,7 +69,7 @@ impl ViewArgs {
             Some(fmu) => fmu.clone(),
             None => notes.get("model").map(PathBuf::from).or_else(|| find_model(&there)).with_context(|| {
                 format!(
-                    "{}: its columns are of no FMU of this project ({}): name the FMU that made it by --fmu",
+                    "{}: no FMU of this project has its columns as variables ({}): name the FMU of the run by --fmu",
                     self.run.display(),
                     there.join(", ")
                 )

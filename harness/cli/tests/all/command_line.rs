@@ -294,7 +294,7 @@ fn what_stands_twice_is_refused() {
     let tank = pack::root().join("harness/tank/examples/capsule.toml");
     let flags = ["tank", tank.to_str().unwrap(), "--fill", "0.5", "--out", "t.toml"];
     let same = || hubslosh(directory, &[&flags[..], &["--parameters", "t.toml"]].concat());
-    refuses(directory, same, &["t.toml is to be two files at once"]);
+    refuses(directory, same, &["t.toml is named for two outputs"]);
 }
 
 #[test]

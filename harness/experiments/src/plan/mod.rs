@@ -1040,7 +1040,8 @@ mod tests {
         let text = "profile = \"zero\"\n[random]\nruns = 1\nseed = 1\n[random.draw]\n\
             tank.h = { distribution = \"uniform\", from = -2, to = -1 }\n";
         let error = Plan::parse(text).unwrap().cases(&description()).unwrap_err().to_string();
-        let expected = "line 6: [random.draw] tank.h: 10000 draws, none within 0.0001 to 100";
+        let expected = "line 6: [random.draw] tank.h: none of 10000 random values lies within 0.0001 to 100; \
+            change the distribution or the limits";
         assert_eq!(error, expected);
     }
 

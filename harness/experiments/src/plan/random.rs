@@ -148,6 +148,8 @@ impl Distribution {
                 return Ok(value.to_string());
             }
         }
-        bail!("{MOST_DRAWS} draws, none within {min} to {max}")
+        bail!(
+            "none of {MOST_DRAWS} random values lies within {min} to {max}; change the distribution or the limits"
+        )
     }
 }

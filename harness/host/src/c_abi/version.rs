@@ -755,7 +755,7 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
     pub fn get(&mut self, name: &str) -> Result<Value> {
         let variable = self.fmu.description.variable(name)?;
         if matches!(variable.kind(), Type::Binary | Type::Clock) {
-            bail!("{name} is a {:?}, of which this host reads no values", variable.kind());
+            bail!("{name} is of type {:?}, which this host does not read", variable.kind());
         }
         Ok(self.value(variable)?)
     }

@@ -168,7 +168,10 @@ impl Process {
         let mut attached = RecvAncillaryBuffer::new(&mut space);
         let mut into = [IoSliceMut::new(&mut request)];
         let read = recvmsg(&end, &mut into, &mut attached, RecvFlags::empty())?.bytes;
-        anyhow::ensure!(read == REQUEST_BYTES, "the request is incomplete");
+        anyhow::ensure!(
+            read == REQUEST_BYTES,
+            "the request to the process that runs the FMU is incomplete"
+        );
         rustix::stdio::dup2_stdin(File::open("/dev/null")?)?;
         let mut pipe = None;
         for message in attached.drain() {

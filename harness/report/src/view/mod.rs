@@ -353,7 +353,7 @@ impl Draft<'_> {
         };
         if let Some(number) = self.run.drawings.keys().find(|n| **n == 0 || **n > tanks.len()) {
             anyhow::bail!(
-                "--tank {number}: the run has {} tank(s) (allowed: 1 to that)",
+                "--tank {number}: the run has {} tank(s) (allowed: numbers from 1 to the number of tanks)",
                 tanks.len()
             );
         }
