@@ -18,7 +18,7 @@ import tempfile
 from collections import defaultdict
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from math import exp, log, sqrt
+from math import exp, inf, log, sqrt
 from pathlib import Path
 
 import numpy as np
@@ -222,6 +222,45 @@ def run(case: Case, twin: Twin, program: str, folder: str) -> dict:
     return json.loads(result.read_text(encoding="utf-8"))
 
 
+class Tally:
+    """Errors of the estimates of twins over their standard deviations.
+
+    A result that does not fit states itself that its intervals cannot be trusted: it is counted
+    apart.
+    """
+
+    def __init__(self) -> None:
+        """Begin without twins."""
+        self.seen: dict[str, list[tuple[bool, float, float]]] = defaultdict(list)
+        self.refused: list[int] = []
+        self.unfit: list[int] = []
+
+    def add(self, seed: int, found: dict | str, truth: dict[str, float]) -> None:
+        """Count the result of a twin; words are a refusal."""
+        if isinstance(found, str):
+            self.refused.append(seed)
+            return
+        if not (found["fits"] and found["converged"]):
+            self.unfit.append(seed)
+            return
+        for unknown, e in (found["parameters"] | found["measurement"]).items():
+            if unknown in truth and e["std"]:
+                low, high = (inf if end is None else end for end in e["interval"])
+                error = (e["value"] - truth[unknown]) / e["std"]
+                self.seen[unknown].append((low <= truth[unknown] <= high, error, e["std"]))
+
+    def rows(self) -> list[str]:
+        """Return a row of a table in Markdown for each unknown."""
+        rows = []
+        for unknown, each in self.seen.items():
+            inside, off, std = (np.array(column, dtype=float) for column in zip(*each, strict=True))
+            rows.append(
+                f"| `{unknown}` | {int(inside.sum())} of {len(each)} "
+                f"| {sqrt((off**2).mean()):.2f} | {abs(off).max():.1f} | {np.median(std):.1e} |"
+            )
+        return rows
+
+
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -237,33 +276,19 @@ def main() -> None:
         case = CASES[name]
         if case.fmu.endswith(".fmu"):
             case.fmu = str(arguments.folder / case.fmu)
-        seen: dict[str, list[tuple[bool, float, float]]] = defaultdict(list)
-        refused, unfit, last = [], [], ""
+        tally, last = Tally(), ""
         with tempfile.TemporaryDirectory() as folder:
             for seed in range(arguments.first, arguments.first + arguments.twins):
                 twin = case.make(default_rng(seed))
                 try:
                     found = run(case, twin, arguments.program, folder)
                 except subprocess.CalledProcessError as error:
-                    refused.append(seed)
-                    last = error.stderr.decode()[-200:]
-                    continue
-                if not (found["fits"] and found["converged"]):
-                    unfit.append(seed)
-                for unknown, e in (found["parameters"] | found["measurement"]).items():
-                    low, high = e["interval"]
-                    truth = twin.truth[unknown]
-                    seen[unknown].append(
-                        (low <= truth <= high, (e["value"] - truth) / e["std"], e["std"])
-                    )
-        for unknown, rows in seen.items():
-            inside, off, std = (np.array(column, dtype=float) for column in zip(*rows, strict=True))
-            print(
-                f"| {name} | `{unknown}` | {int(inside.sum())} of {len(rows)} "
-                f"| {sqrt((off**2).mean()):.2f} | {abs(off).max():.1f} | {np.median(std):.1e} |"
-            )
+                    found = last = error.stderr.decode()[-200:]
+                tally.add(seed, found, twin.truth)
+        print("\n".join(f"| {name} {row}" for row in tally.rows()))
         print(
-            f"<!-- {name}: {case.what}; does not fit: {unfit}; refused: {refused} {last} -->",
+            f"<!-- {name}: {case.what}; does not fit: {tally.unfit}; "
+            f"refused: {tally.refused} {last} -->",
             flush=True,
         )
 
