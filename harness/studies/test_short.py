@@ -26,6 +26,7 @@ import compare_releases
 import damping_over_fill
 import design_times
 import flight_twin
+import foreign_plants
 import identify_twins
 import intervals
 import large_fmu
@@ -229,6 +230,37 @@ def test_intervals_of_a_sticking_hub(fmu: Path, program: Path, tmp_path: Path) -
         row = next(line for line in section.splitlines() if f"`{unknown}`" in line)
         median = float(row.strip("| ").split("|")[-1])
         assert 0.5 < np.median(deviations) / median < 2
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the study compiles a plant for Linux")
+@pytest.mark.parametrize("liquid", foreign_plants.LIQUIDS)
+def test_the_foreign_plant_without_effects_is_hubslosh(
+    liquid: str, fmu: Path, tmp_path: Path
+) -> None:
+    """Rates under a sweep with stops of the hub, to 1e-7 of the largest: far below a gyro's noise.
+
+    The plant has another integrator and other states than the FMU.
+    """
+    import hubslosh
+
+    setup = foreign_plants.draw(default_rng(1), 60.0)
+    setup = replace(setup, liquid=liquid, hold="linear", gravity=9.81)
+    setup.torque = foreign_plants.sweep(0.05, 1.5, 3.6, 60.0)
+    rows = np.arange(0.0, 60.001, 0.02)
+    _, rates = setup.move(foreign_plants.compile_plant(os.fspath(tmp_path)), rows)
+    inputs = pd.DataFrame({"time": rows, "tau_cmd": setup.torque(rows)})
+    more = {
+        "slosh.model": liquid,
+        "slosh.zeta_from_correlation": False,
+        "tank.r": setup.arm,
+        "fluid.rho": setup.density,
+    }
+    run = hubslosh.simulate(
+        fmu, setup.parameters | more, inputs, outputs=["omega", "stuck"], tolerance=1e-10
+    )
+    assert run["stuck"].any()
+    largest = abs(run["omega"]).max()
+    np.testing.assert_allclose(rates[::20], run["omega"], rtol=0, atol=1e-7 * largest)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the study compiles a binary for Linux")
