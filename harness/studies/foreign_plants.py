@@ -472,7 +472,7 @@ def plants(arguments: argparse.Namespace, plant: ctypes.CDLL, folder: Path) -> N
                 PLANTS[name].change(setup, random, amplitude)
                 twin = setup.record(plant, random)
                 options = ["--model", arguments.models or "linear", *setup.arguments]
-                path = folder / f"{re.sub('[^a-z0-9]+', '_', name)}_{amplitude}_{seed}.csv"
+                path = folder / f"{re.sub('[^a-z0-9]+', '_', name.lower())}_{amplitude}_{seed}.csv"
                 found, seconds = run(arguments.program, twin, options, path)
                 if isinstance(found, str):
                     cells = ["refused", found.splitlines()[-1], "", f"{seconds:.0f}", ""]
