@@ -457,6 +457,12 @@ def judge(found: dict, plant: Plant, twin: Twin) -> list[str]:
     return faults
 
 
+def options_of(setup: Setup, seed: int, models: str | None) -> list[str]:
+    """Return the options of a user, who knows of even seeds how the torque runs between rows."""
+    hold = ["--torque", setup.hold] if seed % 2 == 0 else []
+    return ["--model", models or setup.liquid, *hold, *setup.arguments]
+
+
 def plants(arguments: argparse.Namespace, plant: ctypes.CDLL, folder: Path) -> None:
     """Print a row for each bench outside the model."""
     print("| bench | amplitude, N·m | seed | fits | named | runs | CPU, s | wrong |")
@@ -471,14 +477,14 @@ def plants(arguments: argparse.Namespace, plant: ctypes.CDLL, folder: Path) -> N
                 setup.torque = sweep(amplitude, 1.5, 3.6, setup.duration)
                 PLANTS[name].change(setup, random, amplitude)
                 twin = setup.record(plant, random)
-                options = ["--model", arguments.models or "linear", *setup.arguments]
+                options = options_of(setup, seed, arguments.models)
                 path = folder / f"{re.sub('[^a-z0-9]+', '_', name.lower())}_{amplitude}_{seed}.csv"
                 found, seconds = run(arguments.program, twin, options, path)
                 if isinstance(found, str):
                     cells = ["refused", found.splitlines()[-1], "", f"{seconds:.0f}", ""]
                 else:
                     faults = "; ".join(judge(found, PLANTS[name], twin))
-                    runs = str(found["fit"]["simulations"])
+                    runs = f"{found['fit']['simulations']:.0f}"
                     cause = "; ".join(named(found)) or "unknown" * (not found["fits"])
                     cells = [str(found["fits"]), cause, runs, f"{seconds:.0f}", faults]
                 print("|", " | ".join([name, str(amplitude), str(seed), *cells]), "|", flush=True)
@@ -493,9 +499,7 @@ def twins(arguments: argparse.Namespace, plant: ctypes.CDLL, folder: Path) -> No
         habit = list(HABITS)[(seed - 1) % len(HABITS)] if arguments.habits else "plain"
         setup = replace(setup, **HABITS.get(habit, {}))
         twin = setup.record(plant, random)
-        options = ["--model", arguments.models or setup.liquid, *setup.arguments]
-        if seed % 2 == 0:
-            options += ["--torque", setup.hold]
+        options = options_of(setup, seed, arguments.models)
         found, cpu = run(arguments.program, twin, options, folder / f"twin_{seed}.csv")
         tally.add(seed, found, twin.truth)
         seconds.append(cpu)
@@ -505,7 +509,7 @@ def twins(arguments: argparse.Namespace, plant: ctypes.CDLL, folder: Path) -> No
             runs.append(found["fit"]["simulations"])
             wrong = ", ".join(beyond(found, twin.truth, {}))
             result = "fits" if found["fits"] else f"does not fit {named(found)}"
-            result += f", {runs[-1]} runs" + f", beyond {WRONG:.0f} σ: {wrong}" * bool(wrong)
+            result += f", {runs[-1]:.0f} runs" + f", beyond {WRONG:.0f} σ: {wrong}" * bool(wrong)
         print(f"* {seed}, {habit}, {setup.hold}, {setup.liquid}: {result}, {cpu:.1f} s", flush=True)
     print("\n| parameter | inside its 95 % interval | rms of error/σ | largest | median σ |")
     print("| --- | --- | --- | --- | --- |")
