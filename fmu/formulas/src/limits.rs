@@ -197,6 +197,12 @@ impl SpinLimit {
         SpinLimit { factor: 4.0 * (1.0 + gyroscopic), ratio }
     }
 
+    /// Returns C_0. A wave of the first mode has the frequencies C_0 Omega +- sqrt(C_0^2 Omega^2 + omega_0^2) seen from the tank,
+    /// to the first order in Omega; a pendulum, which does not take part in the spin, has them with C_0 = 1.
+    pub fn gyroscopic_coefficient(&self) -> f64 {
+        self.factor / 4.0 - 1.0
+    }
+
     /// Returns true if liquid that turns with its tank at `rate`, rad/s, about its axis is beyond the limits;
     /// `omega2`, 1/s^2, is the squared natural frequency without spin.
     ///

@@ -176,6 +176,21 @@ impl Contour {
         self.bottom
     }
 
+    /// Returns the lowest point as its height, m, and its smallest radius, m.
+    pub(crate) fn lowest(&self) -> (f64, f64) {
+        let outline = Outline::new(&self.segments);
+        let points = || outline.points.iter().flatten();
+        let low = points().map(|p| p[1]).fold(f64::MAX, f64::min);
+        let flat = points().filter(|p| p[1] - low < LEVEL * self.size);
+        (self.bottom, flat.map(|p| p[0]).fold(f64::MAX, f64::min))
+    }
+
+    /// Returns the largest radius, m.
+    pub(crate) fn largest_radius(&self) -> f64 {
+        let outline = Outline::new(&self.segments);
+        outline.points.iter().flatten().map(|p| p[0]).fold(0.0, f64::max)
+    }
+
     /// Returns the largest fill, m above the lowest point: the end of the outer wall.
     pub fn depth(&self) -> f64 {
         let end = self.segments[self.segments.len() - 1].end();
@@ -185,48 +200,95 @@ impl Contour {
         (if start == end { self.top } else { brim }) - self.bottom
     }
 
-    /// Returns the volume below `fill`, m above the lowest point, m3, of all pools together: pi int r^2 dz along the
-    /// wall, up the outer and down the inner one.
+    /// Returns the volume below `fill`, m above the lowest point, m3, of all pools together.
     fn volume_below(&self, fill: f64) -> f64 {
         let z = self.bottom + fill;
+        let surface = |height: f64| if height < z { 0.0 } else { f64::INFINITY };
+        let [volume] = self.integrate_wetted(surface, &[], |[r, _], _| [r * r]);
+        core::f64::consts::PI * volume
+    }
+
+    /// Returns the integral of `density` dz along the wetted wall, up the outer wall and down the inner one.
+    ///
+    /// At the height z the liquid reaches inwards to the radius whose square is `surface(z)`, m2: infinity above a level
+    /// surface, 0 below it. `density` has the point (r, z) of the wall and that square. `kinks` are heights at which the
+    /// slope of `surface` jumps.
+    pub(crate) fn integrate_wetted<const N: usize>(
+        &self,
+        surface: impl Fn(f64) -> f64,
+        kinks: &[f64],
+        density: impl Fn(Point, f64) -> [f64; N],
+    ) -> [f64; N] {
         // exact for r^2 dz of lines and cubics; for an arc in 128 pieces the error is 1e-15
         let rule = Gauss::new(5);
-        let mut volume = 0.0;
-        for segment in &self.segments {
-            let count = samples(segment);
-            let parameter =
-                |k: usize| segment.from + (segment.to - segment.from) * k as f64 / count as f64;
-            let below = |t: f64| segment.curve.point_at(t)[1] < z;
-            for k in 0..count {
-                let mut ends = [parameter(k), parameter(k + 1)];
-                match ends.map(below) {
-                    [true, true] => {}
-                    [false, false] => continue,
-                    [first_below, _] => {
-                        let [mut wet, mut dry] = ends;
-                        if !first_below {
-                            (wet, dry) = (dry, wet);
-                        }
-                        for _ in 0..60 {
-                            let middle = 0.5 * (wet + dry);
-                            if below(middle) {
-                                wet = middle;
-                            } else {
-                                dry = middle;
-                            }
-                        }
-                        ends[usize::from(first_below)] = wet;
-                    }
-                }
-                let [from, to] = ends;
-                for (v, w) in rule.nodes.iter().zip(&rule.weights) {
-                    let t = from + (to - from) * v;
-                    let (r, dz) = (segment.curve.point_at(t)[0], segment.curve.slope(t)[1]);
-                    volume += w * (to - from) * core::f64::consts::PI * r * r * dz;
+        let mut sum = [0.0; N];
+        for (segment, [from, to]) in self.wetted_pieces(&surface, kinks) {
+            for (v, w) in rule.nodes.iter().zip(&rule.weights) {
+                let t = from + (to - from) * v;
+                let (point, dz) = (segment.curve.point_at(t), segment.curve.slope(t)[1]);
+                let values = density(point, surface(point[1]));
+                for (sum, value) in sum.iter_mut().zip(values) {
+                    *sum += w * (to - from) * dz * value;
                 }
             }
         }
-        volume
+        sum
+    }
+
+    /// Returns the height of the highest point of the wall that is wet, m from the contour's own zero; the lowest point
+    /// of the tank if none is. `surface` is that of [`Contour::integrate_wetted`].
+    pub(crate) fn highest_wetted(&self, surface: impl Fn(f64) -> f64) -> f64 {
+        let pieces = self.wetted_pieces(&surface, &[]);
+        let ends = pieces.iter().flat_map(|(segment, ends)| ends.map(|t| segment.curve.point_at(t)[1]));
+        ends.fold(self.bottom, f64::max)
+    }
+
+    /// Returns the number of separate parts of the wall that are wet. `surface` is that of [`Contour::integrate_wetted`].
+    pub(crate) fn count_pools(&self, surface: impl Fn(f64) -> f64) -> usize {
+        let pieces = self.wetted_pieces(&surface, &[]);
+        let mut pools = usize::from(!pieces.is_empty());
+        for pair in pieces.windows(2) {
+            let [end, start] = [(pair[0].0, pair[0].1[1]), (pair[1].0, pair[1].1[0])]
+                .map(|(segment, t)| segment.curve.point_at(t));
+            pools += usize::from(norm(sub(start, end)) > JOINED * self.size);
+        }
+        pools
+    }
+
+    /// Returns the short pieces of the wall that are wet, in their order, each as segment and range of its parameter.
+    fn wetted_pieces(
+        &self,
+        surface: impl Fn(f64) -> f64,
+        kinks: &[f64],
+    ) -> Vec<(&Segment, [f64; 2])> {
+        let mut pieces = Vec::new();
+        for segment in &self.segments {
+            // A curved surface may meet a straight wall twice.
+            let count = samples(segment).max(8);
+            let parameter =
+                |k: usize| segment.from + (segment.to - segment.from) * k as f64 / count as f64;
+            let at = |t: f64| segment.curve.point_at(t);
+            let is_wet = |t: f64| at(t)[0] * at(t)[0] >= surface(at(t)[1]);
+            let mut ends: Vec<f64> = (0..=count).map(parameter).collect();
+            for kink in kinks {
+                let is_above = |t: f64| at(t)[1] > *kink;
+                for k in (1..ends.len()).rev() {
+                    if is_above(ends[k - 1]) != is_above(ends[k]) {
+                        ends.insert(k, boundary(ends[k - 1], ends[k], is_above));
+                    }
+                }
+            }
+            for pair in ends.windows(2) {
+                let (from, to) = (pair[0], pair[1]);
+                match [from, to].map(is_wet) {
+                    [true, true] => pieces.push((segment, [from, to])),
+                    [true, false] => pieces.push((segment, [from, boundary(from, to, is_wet)])),
+                    [false, true] => pieces.push((segment, [boundary(to, from, is_wet), to])),
+                    [false, false] => {}
+                }
+            }
+        }
+        pieces
     }
 
     /// Returns the volume of the whole tank up to the largest fill, m3.
@@ -477,6 +539,21 @@ fn samples(segment: &Segment) -> usize {
         Curve::Cubic { .. } => 8,
         _ => 128,
     }
+}
+
+/// Returns the place between two, at whose first `holds` is true or false and at whose second it is not, where it
+/// changes, by bisection.
+fn boundary(first: f64, second: f64, holds: impl Fn(f64) -> bool) -> f64 {
+    let (mut near, mut far, here) = (first, second, holds(first));
+    for _ in 0..60 {
+        let middle = 0.5 * (near + far);
+        if holds(middle) == here {
+            near = middle;
+        } else {
+            far = middle;
+        }
+    }
+    near
 }
 
 /// Returns the minimum of `sign` z on a segment and its position as a fraction of the parameter, by golden section

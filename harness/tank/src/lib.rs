@@ -10,7 +10,7 @@
 //! * [`sweep`]: tables over the fill and their [`interpolation`]
 //! * [`fill_table`]: such tables for FMUs whose tanks drain
 //! * [`table()`], [`picture`]: to read and to look at; [`parameters`]: files for the FMUs
-//! * [`damping`], [`low_gravity`], [`third_order`]: effects beyond the modal parameters;
+//! * [`damping`], [`low_gravity`], [`third_order`], [`spin`]: effects beyond the modal parameters;
 //!   `shape`: recognises measured shapes
 
 pub mod closed_form;
@@ -32,6 +32,7 @@ pub mod picture;
 mod potential_flow;
 mod ring;
 mod shape;
+pub mod spin;
 mod spline;
 mod svg;
 pub mod sweep;

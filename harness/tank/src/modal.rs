@@ -19,6 +19,7 @@ use serde::Serialize;
 use crate::coefficients::FiniteAmplitude;
 use crate::contour::{Problems, Volume, Wall};
 use crate::potential_flow::{Discretisation, Solution};
+use crate::spin::Spin;
 
 /// Share of the liquid's mass below which a mode has no height.
 const MASSLESS: f64 = 1e-9;
@@ -282,6 +283,9 @@ pub struct ModalData {
     /// Amplitude dependence of the first mode, see [`crate::finite_amplitude`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub finite_amplitude: Option<FiniteAmplitude>,
+    /// The liquid in steady rotation with the tank, if a rate is given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub spin: Option<Spin>,
     /// The wetted wall.
     #[serde(skip)]
     pub wall: Option<Wall>,
@@ -404,6 +408,7 @@ impl ModalData {
             capillarity: None,
             damping: None,
             finite_amplitude: None,
+            spin: None,
             wall: None,
         }
     }

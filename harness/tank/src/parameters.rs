@@ -398,6 +398,16 @@ impl ParameterSet {
         let modes: Vec<modal::Mode> =
             chosen.iter().map(|&(axis, n)| of_axes[axis][n].clone()).collect();
         let (mut warnings, mut unknown) = (Vec::new(), Vec::new());
+        if let Some(spin) = &data.spin {
+            notes.push(format!(
+                "the parameters are those of the liquid at rest; turning with the tank at {} rad/s its centre of mass is at z = {:.6} m \
+                 and its inertia about the axis {} kg·m²",
+                significant(spin.omega),
+                spin.z_cg,
+                significant(spin.i_axis)
+            ));
+            warnings.extend(spin.warnings.iter().map(|warning| format!("spin: {warning}")));
+        }
         let springs = of_axes.map(|all| match all {
             [] => Vec::new(),
             _ => springs(tank, data, all, liquid, &mut notes, &mut warnings, &mut unknown),

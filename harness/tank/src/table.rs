@@ -4,6 +4,7 @@ use core::fmt::Write as _;
 
 use crate::coefficients::FiniteAmplitude;
 use crate::modal::{Axis, Capillarity, Damping, ModalData, Mode, Rest};
+use crate::spin::Spin;
 
 /// Formats a length in m to 1e-9 m without trailing zeros; fills from a volume have 17 digits.
 pub(crate) fn short(length: f64) -> String {
@@ -71,12 +72,58 @@ pub fn table(data: &ModalData, gravity: f64) -> String {
     if let Some(damping) = &data.damping {
         damping_section(&mut text, damping);
     }
+    if let Some(spin) = &data.spin {
+        spin_section(&mut text, spin);
+    }
     let _ = writeln!(
         text,
         "\nestimated error {:.0e}, of I_0 {:.0e}, of beta {:.0e} (relative to the result, the liquid's mass, R)",
         data.error, data.error_i_0, data.error_beta
     );
     text
+}
+
+fn spin_section(text: &mut String, spin: &Spin) {
+    let _ = writeln!(
+        text,
+        "\nturning with the tank at {} rad/s under {} m/s² along the axis",
+        significant(spin.omega),
+        significant(spin.gravity)
+    );
+    let apex = match spin.z_apex {
+        Some(apex) => format!("z = {apex:.6} m on the axis, "),
+        None if spin.r_dry > 0.0 => format!("floor dry within {:.6} m, ", spin.r_dry),
+        None => String::new(),
+    };
+    let _ = writeln!(
+        text,
+        "  surface               {apex}outer wall wet up to z = {:.6} m",
+        spin.z_wall
+    );
+    let _ = writeln!(text, "  centre of mass        z = {:.6} m", spin.z_cg);
+    let _ = writeln!(
+        text,
+        "  inertia about the axis                 {} kg·m²",
+        significant(spin.i_axis)
+    );
+    let _ =
+        writeln!(text, "  inertia across it, about the centre    {} kg·m²", significant(spin.i_cg));
+    let number = |value: Option<f64>| value.map_or("-".to_string(), |value| format!("{value:.3}"));
+    let _ = writeln!(
+        text,
+        "  Omega^2 R/g = {}, 2 Omega/omega of mode 1 = {}",
+        number(spin.flatness),
+        number(spin.ratio)
+    );
+    if let Some([against, along]) = spin.frequencies {
+        let _ = writeln!(
+            text,
+            "  mode 1 seen from the tank: {against:.4} Hz against the spin, {along:.4} Hz with it"
+        );
+    }
+    for warning in &spin.warnings {
+        let _ = writeln!(text, "  warning: {warning}");
+    }
 }
 
 fn capillarity_section(text: &mut String, capillarity: &Capillarity) {

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use anyhow::{Context, Result, bail, ensure};
 use files::output;
 use hubslosh_tank::parameters::{self, Liquid, ParameterSet, Target};
+use hubslosh_tank::spin::spin;
 use hubslosh_tank::{Fill, Problems, Tank, fill_table, picture, sweep, table};
 
 use crate::terminal;
@@ -22,6 +23,7 @@ use crate::terminal;
     hubslosh tank tank.toml --sweep 2%,98% --model SloshTank --nu 1e-6 --parameters draining.toml\n  \
     hubslosh tank harness/tank/examples/bench.toml --fill 0.1 --modes 1 --gravity 0.5 --sigma 0.073 \\\n      \
     --contact-angle 5 --parameters coast.toml\n  \
+    hubslosh tank harness/tank/examples/bench.toml --fill 0.1 --spin 3 --gravity 5\n  \
     hubslosh run --set-file tank-1.2.toml --profile exp-sweep:amplitude=0.1 --out sweep.parquet\n\n\
     The format of TANK.toml is described in harness/tank/README.md.")]
 pub struct TankArgs {
@@ -77,6 +79,11 @@ pub struct TankArgs {
     /// the centring stiffness of the first mode then include the meniscus at --gravity and --sigma.
     #[arg(long, value_name = "DEGREES", default_value_t = 90.0, requires = "sigma")]
     contact_angle: f64,
+    /// Rate at which tank and liquid turn about the axis of the tank, rad/s. The result then has the surface, the centre of
+    /// mass and the inertias of the turning liquid, and says how far the modes, which are those of the liquid at rest, are
+    /// off. Takes --gravity as the thrust along the axis.
+    #[arg(long, value_name = "NUMBER", conflicts_with = "sweep")]
+    spin: Option<f64>,
     /// Writes --parameters although a centring stiffness is far outside the range of its formula.
     #[arg(long, requires = "parameters")]
     force: bool,
@@ -115,7 +122,10 @@ impl TankArgs {
         let (text, json, picture, as_table) = match self.fill.or(self.fill_mass.map(Fill::Mass)) {
             Some(fill) => {
                 let data = parameters::solve(&tank, fill, self.modes, self.liquid());
-                let data = data.with_context(read)?;
+                let mut data = data.with_context(read)?;
+                if let Some(omega) = self.spin {
+                    data.spin = Some(spin(&tank, &data, omega, self.gravity).with_context(read)?);
+                }
                 // The table is for a given surface tension, and `--parameters` has its own warning.
                 let has_table = !(self.json || self.out.is_some()) && data.capillarity.is_some();
                 if self.parameters.is_none() && !has_table {

@@ -10,5 +10,6 @@ mod formulas;
 mod physics;
 mod pictures;
 mod reference;
+mod spin;
 mod sweeps;
 mod third_order;

@@ -1,0 +1,179 @@
+//! Liquid that turns with its tank.
+
+use core::f64::consts::{PI, TAU};
+
+use hubslosh_tank::spin::{Spin, spin};
+use hubslosh_tank::tank::Shape;
+use hubslosh_tank::{Fill, Tank};
+
+const RHO: f64 = 1000.0;
+
+/// Returns the liquid of a tank filled to a share of its volume, with g = 1 m/s² or 0 m/s² (`weightless`) and
+/// Omega^2 R/g = `flatness` for R = 1 m.
+fn turned(shape: Shape, share: f64, flatness: f64, weightless: bool) -> (f64, Spin) {
+    let tank = Tank::from_shape(shape, RHO).unwrap();
+    let data = tank.solve(tank.fill_height(Fill::Share(share)).unwrap(), 1).unwrap();
+    let gravity = if weightless { 0.0 } else { 1.0 };
+    (data.m_liq, spin(&tank, &data, flatness.sqrt(), gravity).unwrap())
+}
+
+fn close(found: f64, expected: f64, error: f64) {
+    assert!((found - expected).abs() <= error, "{found} is not {expected} within {error}");
+}
+
+/// Closed forms of the paraboloid in an upright cylinder of radius 1 m that neither bares the floor nor reaches the lid.
+#[test]
+fn in_a_cylinder_the_surface_is_its_closed_form() {
+    for (h, beta) in [(0.5, 0.1), (0.5, 1.0), (1.0, 0.3), (1.0, 2.0), (2.0, 5.0)] {
+        let shape = Shape::Cylinder { radius: 1.0, height: 4.0 };
+        let (m, found) = turned(shape, h / 4.0, beta, false);
+        close(found.z_cg, h / 2.0 + beta * beta / (96.0 * h), 1e-12);
+        close(found.i_axis / m, 0.5 * (1.0 + beta / (12.0 * h)), 1e-12);
+        close(found.z_apex.unwrap(), h - beta / 4.0, 1e-12);
+        close(found.z_wall, h + beta / 4.0, 1e-9);
+    }
+}
+
+/// Without thrust the surface is a cylinder about the axis: r_i^2 = R^2 - V/(pi H) in a cylinder, R^2 (1 - f^(2/3)) in a sphere.
+#[test]
+fn weightless_liquid_lies_at_the_wall() {
+    let (m, found) = turned(Shape::Cylinder { radius: 1.0, height: 2.0 }, 0.3, 1.0, true);
+    close(found.r_dry, 0.7_f64.sqrt(), 1e-12);
+    close(found.i_axis / m, 0.5 * (1.0 + 0.7), 1e-12);
+    close(found.z_cg, 1.0, 1e-12);
+    assert!(!found.in_range && found.flatness.is_none() && found.ratio.is_none(), "{found:?}");
+    for share in [0.25_f64, 0.5, 0.9] {
+        let (m, found) = turned(Shape::Sphere { radius: 1.0 }, share, 1.0, true);
+        let inner = 1.0 - share.powf(2.0 / 3.0);
+        close(found.i_axis / m, inner + 0.4 * (1.0 - inner), 1e-9);
+        close(found.z_cg, 1.0, 1e-9);
+    }
+}
+
+/// The liquid of a sphere whose two poles are dry is in balance in the frame that turns: each part of the wall pushes through the
+/// centre, so that z_cg = -g/Omega^2 from it, whatever the fill.
+#[test]
+fn in_a_sphere_with_dry_poles_the_centre_of_mass_balances_thrust_and_spin() {
+    for (share, flatness) in [(0.25, 5.0), (0.25, 10.0), (0.5, 5.0), (0.5, 30.0)] {
+        let (_, found) = turned(Shape::Sphere { radius: 1.0 }, share, flatness, false);
+        assert!(found.r_dry > 0.0 || found.z_apex.is_none());
+        close(found.z_cg - 1.0, -1.0 / flatness, 1e-9);
+    }
+}
+
+/// Equilibria of a sphere that a program of its own, by quadrature of the section, found to 8 digits: share of the volume,
+/// Omega^2 R/g, then z_cg/R from the centre, I_axis/(m R^2), I_cg/(m R^2), height of the apex and of the wall line.
+#[test]
+fn in_a_sphere_the_surface_is_that_of_another_program() {
+    let rows = [
+        (0.25, 0.3, [-0.577_874_03, 0.346_950_23, 0.199_213_78, -0.414_933_79, -0.276_392_74]),
+        (0.5, 0.3, [-0.373_605_43, 0.418_646_04, 0.269_741_70, -0.074_860_93, 0.074_310_76]),
+        (0.5, 1.0, [-0.360_624_53, 0.459_115_41, 0.299_408_68, -0.245_338_76, 0.228_544_86]),
+        (0.9, 5.0, [-0.072_042_86, 0.433_480_19, 0.382_786_34, 0.101_423_93, 0.839_504_48]),
+    ];
+    for (share, flatness, [z_cg, i_axis, i_cg, apex, wall]) in rows {
+        let (m, found) = turned(Shape::Sphere { radius: 1.0 }, share, flatness, false);
+        close(found.z_cg - 1.0, z_cg, 2e-8);
+        close(found.i_axis / m, i_axis, 2e-8);
+        close(found.i_cg / m, i_cg, 2e-8);
+        close(found.z_apex.unwrap() - 1.0, apex, 2e-8);
+        close(found.z_wall - 1.0, wall, 2e-8);
+    }
+}
+
+/// The mass is that at rest for every contour, and at a spin of almost 0 so are centre of mass and inertias.
+#[test]
+fn a_slow_spin_changes_nothing() {
+    let shapes = [
+        Shape::DomedCylinder { radius: 0.7, height: 1.0, bottom: -0.2, top: 0.3 },
+        Shape::Annulus { inner_radius: 0.3, outer_radius: 1.0, height: 1.0 },
+        Shape::Torus { ring_radius: 0.8, tube_radius: 0.3 },
+        Shape::Cone { half_angle: 40.0, height: 1.0 },
+    ];
+    for shape in shapes {
+        let tank = Tank::from_shape(shape, RHO).unwrap();
+        let data = tank.solve(tank.fill_height(Fill::Share(0.6)).unwrap(), 1).unwrap();
+        let found = spin(&tank, &data, 1e-5, 9.81).unwrap();
+        close(found.z_cg, data.z_cg, 1e-7);
+        close(found.i_axis / data.i_frozen_axis, 1.0, 1e-7);
+        close(found.i_cg / data.i_frozen_cg, 1.0, 1e-7);
+        assert!(found.in_range && found.warnings.is_empty(), "{shape:?}: {found:?}");
+    }
+}
+
+/// Frequencies of a solution for all rates, seen from the tank in sqrt(g/R): against the spin and with it.
+#[test]
+fn the_frequencies_are_those_of_the_rotating_liquid() {
+    let rows = [
+        (1.0, 0.1, [1.491_836, 1.182_808], 0.007),
+        (0.25, 0.1, [1.180_696, 0.702_227], 0.04),
+        (1.0, 0.3, [1.626_519, 1.105_629], 0.025),
+        (2.0, 0.3, [1.629_31, 1.171_45], 0.024),
+    ];
+    for (h, flatness, expected, error) in rows {
+        let shape = Shape::Cylinder { radius: 1.0, height: 4.0 };
+        let (_, found) = turned(shape, h / 4.0, flatness, false);
+        for (f, l) in found.frequencies.unwrap().into_iter().zip(expected) {
+            close(f * TAU / l, 1.0, error);
+        }
+    }
+}
+
+/// A spinner of radius 0.3 m, filled 0.4 m, at 5 m/s² and 9 rad/s: the liquid at rest has 5.09 kg·m² about the axis, the spinning one
+/// 6.38 kg·m², and its surface touches a lid at 0.6 m.
+#[test]
+fn a_spinner_beyond_the_model_is_out_of_range() {
+    let tank = Tank::from_shape(Shape::Cylinder { radius: 0.3, height: 0.6 }, RHO).unwrap();
+    let data = tank.solve(0.4, 1).unwrap();
+    let found = spin(&tank, &data, 9.0, 5.0).unwrap();
+    close(found.i_axis, 6.38, 0.005);
+    close(found.z_apex.unwrap(), 0.06, 0.005);
+    close(found.flatness.unwrap(), 4.86, 1e-12);
+    close(found.ratio.unwrap(), 3.3, 0.05);
+    let has_no_mode = found.warnings.iter().any(|warning| warning.contains("inertial waves"));
+    assert!(!found.in_range && has_no_mode, "{:?}", found.warnings);
+    let slow = spin(&tank, &data, 0.2, 5.0).unwrap();
+    assert!(slow.in_range && slow.warnings.is_empty(), "{:?}", slow.warnings);
+    let faster = spin(&tank, &data, 1.5, 5.0).unwrap();
+    assert!(faster.in_range && faster.warnings[0].contains("pendulum"), "{:?}", faster.warnings);
+}
+
+/// The mass of the turned liquid, by an integral of its own over the radius: 2 pi int r (z_surface - z_floor) dr.
+#[test]
+fn an_annulus_bares_its_floor_at_the_inner_wall() {
+    let shape = Shape::Annulus { inner_radius: 0.4, outer_radius: 1.0, height: 3.0 };
+    let (m, found) = turned(shape, 0.1, 3.0, false);
+    // z = (r^2 - r_dry^2) Omega^2/(2 g) above the floor, from r_dry to the wall
+    assert!(found.r_dry > 0.4 && !found.in_range, "{found:?}");
+    let u = 1.0 - found.r_dry * found.r_dry;
+    close(RHO * PI * 1.5 * u * u / 2.0, m, 1e-9 * m);
+    close(found.z_wall, 1.5 * u, 1e-9);
+}
+
+/// Thrown outwards, the liquid of a bowl below a wider chamber would lie in both.
+#[test]
+fn liquid_in_two_pools_is_refused() {
+    let hourglass = "density = 1000\nprofile = [{ line = [0, 0, 0.5, 0] }, { line = [0.5, 0, 0.5, 0.5] }, \
+                     { line = [0.5, 0.5, 1.5, 0.5] }, { line = [1.5, 0.5, 1.5, 1.5] }]";
+    let tank = Tank::parse(hourglass, ".".as_ref()).unwrap();
+    let data = tank.solve(0.4, 1).unwrap();
+    assert!(spin(&tank, &data, 0.5, 9.81).unwrap().in_range);
+    let error = spin(&tank, &data, 2.0, 9.81).unwrap_err();
+    assert!(error.to_string().contains("separate pools"), "{error}");
+}
+
+#[test]
+fn what_cannot_spin_is_refused() {
+    let cylinder = Tank::from_shape(Shape::Cylinder { radius: 0.3, height: 0.6 }, RHO).unwrap();
+    let data = cylinder.solve(0.4, 1).unwrap();
+    for omega in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        let error = spin(&cylinder, &data, omega, 5.0).unwrap_err();
+        assert!(error.to_string().contains("above 0"), "{error}");
+    }
+    let square = Tank::parse("density = 1000\nbox = [0.4, 0.4]", ".".as_ref()).unwrap();
+    let data = square.solve(0.2, 1).unwrap();
+    assert!(spin(&square, &data, 1.0, 5.0).unwrap_err().to_string().contains("box"));
+    let sphere = Tank::from_shape(Shape::Sphere { radius: 0.3 }, RHO).unwrap();
+    let full = sphere.solve(0.6, 1).unwrap();
+    assert!(spin(&sphere, &full, 1.0, 5.0).unwrap_err().to_string().contains("full"));
+}
