@@ -64,7 +64,7 @@ fn main() -> Result<()> {
         let (start, stop) = torque.span();
         let rows = ((stop - start) * 50.0).round() as usize;
         let time: Vec<f64> = (0..=rows).map(|k| start + k as f64 * 0.02).collect();
-        let tau: Vec<f64> = time.iter().map(|&t| torque.at(t)).collect();
+        let tau: Vec<f64> = time.iter().map(|&t| torque.torque_at(t)).collect();
         let rms = (tau.iter().map(|t| t * t).sum::<f64>() / tau.len() as f64).sqrt();
         println!("{torque_text}: {rms:.4} N.m rms");
         let recording = [Recording::of("plan", time, tau, vec![0.0; rows + 1])];

@@ -239,7 +239,8 @@ impl Contour {
     /// of the tank if none is. `surface` is that of [`Contour::integrate_wetted`].
     pub(crate) fn highest_wetted(&self, surface: impl Fn(f64) -> f64) -> f64 {
         let pieces = self.wetted_pieces(&surface, &[]);
-        let ends = pieces.iter().flat_map(|(segment, ends)| ends.map(|t| segment.curve.point_at(t)[1]));
+        let ends =
+            pieces.iter().flat_map(|(segment, ends)| ends.map(|t| segment.curve.point_at(t)[1]));
         ends.fold(self.bottom, f64::max)
     }
 
