@@ -40,61 +40,52 @@ use taylor::vector::{
 use crate::damping::Drag;
 use crate::parameters::Tank;
 
-/// Values of one bob for the outputs.
+/// Values of one bob for the outputs, body axes: position `rho` from O and velocity relative to the tank,
+/// hinge from O and direction of the tank's axis, and p in tank axes. `centring` is the energy of the
+/// centring stiffness, J; `spin` is the angular momentum beyond that of a point mass, if there is any.
 pub(crate) struct BobNow<T> {
     pub m: T,
-    /// Position from O, and velocity relative to the tank.
     pub rho: Vec3<T>,
     pub rate: Vec3<T>,
-    /// Position of the hinge from O, and direction of the tank's axis.
     pub hinge: Vec3<T>,
     pub e: Vec3,
-    /// p in tank axes.
     pub in_tank: Vec3<T>,
     pub wave: f64,
-    /// Energy of the centring stiffness.
     pub centring: T,
-    /// Angular momentum beyond that of a point mass, if there is any.
     pub spin: Option<Vec3<T>>,
 }
 
-/// One bob: its parameters and the power series of its motion.
+/// One bob that is a pendulum: its parameters and the power series of its motion, in body axes. `tank` and
+/// `mode` count from 0. `follows` is true if c depends on acceleration or amplitude; the series of c and c p'
+/// are then in use. The fields after the series are the terms of the current order that do not depend on [a;
+/// w'] of this order.
 #[derive(Clone, Debug)]
 pub struct Bob {
-    /// Tank and mode of the bob, from 0.
     pub tank: usize,
     pub mode: usize,
     pub m: f64,
     pub l: f64,
     c: f64,
     k: f64,
-    /// True if c depends on acceleration or amplitude. The series of c and c p' are then in use.
     follows: bool,
     drag: Drag,
     dragged: Vector,
-    /// c/m, k/m, 1/l
     c_m: f64,
     k_m: f64,
     inv_l: f64,
     e: Vec3,
     pub hinge: Vec3,
-    /// Elevation at the wall per slosh angle, m/rad.
     pub wave: f64,
-    /// Tank axes to body axes.
     axes: Mat3,
     pub p: Vector,
     v: Vector,
-    /// p and v
     both: Pair,
     p_d: Vector,
     v_d: Vector,
-    /// B: at the hinge, m/s^2, body axes
+    /// The specific force B at the hinge, m/s^2, body axes.
     pub specific_force: Vector,
-    /// T/m
     tension: Series,
-    /// p.e
     height: Series,
-    /// Terms of the current order that do not depend on [a; w'] of this order.
     turned: [[f64; 2]; 3],
     centripetal: Vec3,
     p_perp: Vec3,
@@ -103,7 +94,7 @@ pub struct Bob {
 }
 
 impl Bob {
-    /// Creates the bob of mode `mode` of tank number `index`, both from 0.
+    /// Creates the bob of mode `mode` of tank number `index`, which both count from 0.
     pub fn new(tank: &Tank, index: usize, mode: usize) -> Bob {
         let axes = rotation(&unit_quaternion(tank.q));
         let e = axes.map(|row| row[2]);
@@ -142,8 +133,8 @@ impl Bob {
         }
     }
 
-    /// Starts an expansion at direction and rate (tank axes, six numbers) while the craft rotates
-    /// with `w`. Normalises both first.
+    /// Starts an expansion at direction and rate (tank axes, six numbers) while the craft rotates with `w`.
+    /// Both are normalised first.
     #[inline(always)]
     pub fn start(&mut self, x: &[f64; 6], w: Vec3) {
         let p = times(&self.axes, [x[0], x[1], x[2]]);
@@ -154,8 +145,8 @@ impl Bob {
         self.both.set(0, p, self.v[0]);
     }
 
-    /// Sets coefficient 1 of direction and velocity to their derivatives along `dx` (of the six
-    /// numbers `x`) and `dw` (of the angular velocity).
+    /// Sets coefficient 1 of direction and velocity to their derivatives along `dx` (of the six numbers `x`)
+    /// and `dw` (of the angular velocity).
     pub fn seed_direction(&mut self, x: &[f64; 6], dx: &[f64; 6], w: Vec3, dw: Vec3) {
         let body = |x: &[f64], i: usize| times(&self.axes, [x[i], x[i + 1], x[i + 2]]);
         let [dp, dp_d] = on_sphere_slope(body(x, 0), body(x, 3), body(dx, 0), body(dx, 3));
@@ -164,11 +155,11 @@ impl Bob {
         self.both.set(1, dp, self.v[1]);
     }
 
-    /// Returns direction and rate at `t` after the start at `x` in tank axes, normalised, from the
-    /// series up to order n. `w` is the craft's angular velocity at that time.
+    /// Returns direction and rate at `t` after the start at `x` in tank axes, normalised, from the series up
+    /// to order n. `w` is the craft's angular velocity at that time.
     ///
-    /// Only the change is rotated back into tank axes. The matrix is orthogonal only to rounding,
-    /// so a rotation there and back would shear direction and rate by the same 1e-16 in every step.
+    /// Only the change is rotated back into tank axes. The matrix is orthogonal only to rounding, so a
+    /// rotation there and back would shear direction and rate by the same 1e-16 in every step.
     #[inline(always)]
     pub fn state_at(&self, x: &[f64; 6], n: usize, t: f64, w: Vec3) -> [f64; 6] {
         let (p, v) = (space::value(&self.p, n, t), space::value(&self.v, n, t));
@@ -182,9 +173,8 @@ impl Bob {
         [p[0], p[1], p[2], p_d[0], p_d[1], p_d[2]]
     }
 
-    /// Returns coefficient N of force and torque about O on the craft without the terms in [a; w']
-    /// of this order. `w` is the pair (w, w), `w2` is coefficient N of the matrix of y -> w x (w x
-    /// y).
+    /// Returns coefficient N of force and torque about O on the craft without the terms in [a; w'] of this
+    /// order. `w` is the pair (w, w), and `w2` is coefficient N of the matrix of y -> w x (w x y).
     #[inline(always)]
     pub fn reaction<const N: usize>(&mut self, w: &Pair, w2: &Mat3) -> [Vec3; 2] {
         let Bob { m, l, c, k, .. } = *self;
@@ -225,29 +215,26 @@ impl Bob {
         [force, add(cross(self.hinge, force), scale(l, twist))]
     }
 
-    /// Sets coefficient N of the specific force along the tank's axis at the hinge, which the drag
-    /// follows.
+    /// Sets coefficient N of the specific force along the tank's axis at the hinge, on which the drag
+    /// depends.
     #[inline(always)]
     pub fn set_axial<const N: usize>(&mut self, x: f64) {
         self.drag.set_axial(N, x);
     }
 
-    /// Returns true if the drag depends on acceleration or amplitude.
     pub fn follows(&self) -> bool {
         self.follows
     }
 
-    /// Returns e and P x e, the direction along the tank's axis at the hinge.
+    /// Returns e and P x e, the direction of the tank's axis at the hinge in six dimensions.
     pub fn along_axis(&self) -> [Vec3; 2] {
         [self.e, cross(self.hinge, self.e)]
     }
 
-    /// Returns the position of the bob at rest from O.
     pub fn at_rest(&self) -> Vec3 {
         sub(self.hinge, scale(self.l, self.e))
     }
 
-    /// Sets coefficient N of c p'.
     #[inline(never)]
     fn set_drag<const N: usize>(&mut self) {
         self.height[N] = dot(self.e, self.p[N]);
@@ -262,8 +249,8 @@ impl Bob {
         self.dragged[N] = space::scale::<N>(&self.drag.c, &self.p_d);
     }
 
-    /// Sets coefficient N of tension and drag and N + 1 of direction and velocity, from coefficient
-    /// N of [a; w'].
+    /// Sets coefficient N of tension and drag and N + 1 of direction and velocity, from coefficient N of [a;
+    /// w'].
     #[inline(always)]
     pub fn accelerate<const N: usize>(&mut self, a: Vec3, w_d: Vec3) {
         let at_hinge = add(a, cross(w_d, self.hinge));
@@ -286,7 +273,6 @@ impl Bob {
         [self.p[N + 1], self.v[N + 1]] = self.both.get(N + 1);
     }
 
-    /// Returns coefficient N of the dissipated power, c l^2 |p'|^2, W.
     #[inline(always)]
     pub fn dissipation<const N: usize>(&self) -> f64 {
         if self.follows {
@@ -300,8 +286,8 @@ impl Bob {
         }
     }
 
-    /// Returns coefficient N (0 or 1) of the rates of the six numbers (tank axes): p', and p'' =
-    /// v' - w' x p - w x p'.
+    /// Returns coefficient N (0 or 1) of the rates of the six numbers (tank axes): p', and p'' = v' - w' x p
+    /// - w x p'.
     pub fn rates<const N: usize>(&self, w: &Vector, w_d: &Vector) -> [f64; 6] {
         let turned = add(space::cross::<N>(w_d, &self.p), space::cross::<N>(w, &self.p_d));
         let p_dd = sub(self.v_d[N], turned);
@@ -310,8 +296,8 @@ impl Bob {
         [p_d[0], p_d[1], p_d[2], p_dd[0], p_dd[1], p_dd[2]]
     }
 
-    /// Scale of v for error control, 1/s: rate of the swing plus the rate that gravity or centring
-    /// gives to the angle.
+    /// Returns the scale of v for error control, 1/s: the rate of the swing plus the rate that gravity or
+    /// centring gives to the angle.
     #[inline(always)]
     pub fn rate_scale(&self) -> f64 {
         let stiffness = largest(self.specific_force[0]) * self.inv_l + self.k_m;
@@ -319,12 +305,13 @@ impl Bob {
         largest(self.p_d[0]) + libm::sqrt(stiffness) * largest(off_axis)
     }
 
-    /// Returns the time over which the series of the drag converge reliably, s, from coefficients 0 to 2.
+    /// Returns the time, s, over which the series of the drag converge reliably, from coefficients 0 to 2.
     pub fn convergence_radius(&self) -> f64 {
         if self.follows { self.drag.convergence_radius() } else { f64::INFINITY }
     }
 
-    /// Returns the error of v, 1/s, that the series of the drag cause up to order n and `h` after the start of the expansion.
+    /// Returns the error of v, 1/s, that the series of the drag up to order n cause at `h` after the start of
+    /// the expansion.
     pub fn defect(&self, n: usize, h: f64) -> f64 {
         if !self.follows {
             return 0.0;
@@ -334,27 +321,25 @@ impl Bob {
         self.drag.defect(n - 1, h) * rate * h
     }
 
-    /// Magnitude of coefficient n of v.
     #[inline(always)]
     pub fn coefficient_norm(&self, n: usize) -> f64 {
         largest(self.v[n])
     }
 
-    /// Returns p, p' and B as the number type `T`.
     fn state<T: Number>(&self) -> [Vec3<T>; 3] {
         let of = |a: &Vector| [0, 1, 2].map(|i| T::with_slope(a[0][i], a[1][i]));
         [of(&self.p), of(&self.p_d), of(&self.specific_force)]
     }
 
-    /// Returns the force on the craft and its torque about O.
+    /// Returns the force on the craft and its torque about O, body axes.
     pub fn wrench<T: Number>(&self) -> [Vec3<T>; 2] {
         let [p, p_d, _] = self.state::<T>();
         let tension = T::with_slope(self.tension[0], self.tension[1]) * self.m;
         self.at_hinge_and_bob(tension, p, p_d)
     }
 
-    /// Returns the wrench at a = 0 and w' = 0, with the tension T_0 = m (l |v|^2 - p.(w x (w x
-    /// P))) - k l |p_perp|^2.
+    /// Returns the wrench at a = 0 and w' = 0, with the tension T_0 = m (l |v|^2 - p.(w x (w x P))) - k l
+    /// |p_perp|^2.
     pub fn bias<T: Number>(&self, w: Vec3<T>) -> [Vec3<T>; 2] {
         let [p, p_d, _] = self.state::<T>();
         let v = add(p_d, cross(w, p));
@@ -382,7 +367,6 @@ impl Bob {
         [force, add(cross(constant(self.hinge), force), twist)]
     }
 
-    /// Values that the outputs need.
     pub fn now<T: Number>(&self) -> BobNow<T> {
         let [p, p_d, _] = self.state::<T>();
         let p_perp = self.perpendicular(p);
@@ -399,9 +383,9 @@ impl Bob {
         }
     }
 
-    /// Updates the rate for an impulse that changes the craft's velocity by dV (of O) and dw, body axes. The bob keeps
-    /// its velocity across the rod: l p' changes by -(1 - p p^T)(dV + dw x rho). `x` is the six numbers at the start of the
-    /// expansion.
+    /// Updates the rate for an impulse that changes the craft's velocity by dV (of O) and dw, body axes. The
+    /// bob keeps its velocity across the rod: l p' changes by -(1 - p p^T)(dV + dw x rho). `x` is the six
+    /// numbers at the start of the expansion.
     pub fn after_impulse(&self, x: &mut [f64; 6], dv: Vec3, dw: Vec3) {
         let p = self.p[0];
         let rho = add(self.hinge, scale(self.l, p));

@@ -55,10 +55,14 @@ use crate::parameters::Tank;
 use crate::rigid::{Mat6, add_rank_one, along_rod};
 use crate::surface::{self, Higher, LEAST_INERTIA, Surface};
 
-/// One bob: its parameters and the power series of its motion, in tank axes.
+/// One bob that is guided in a plane or moves on another surface than a sphere: its parameters and the power
+/// series of its motion, in tank axes, with the symbols above. `tank` and `mode` count from 0. `follows` is
+/// true if c depends on acceleration or amplitude; the series of c and c r' are then in use. `across` is b of
+/// a planar mode, `coefficients` are s and kappa, and `highest` is the value of eta at which the model ends,
+/// if it does. The last fields are the terms of the current order that do not depend on [a; w'] of this
+/// order.
 #[derive(Clone, Debug)]
 pub(crate) struct ConstrainedBob {
-    /// Tank and mode of the bob, from 0.
     pub tank: usize,
     pub mode: usize,
     pub m: f64,
@@ -66,26 +70,18 @@ pub(crate) struct ConstrainedBob {
     inv_l: f64,
     c_m: f64,
     k_m: f64,
-    /// True if c depends on acceleration or amplitude. The series of c and c r' are then in use.
     follows: bool,
     drag: Drag,
     dragged: Vector,
-    /// p'
     p_d: Vector,
-    /// Tank axes to body axes, and the hinge from O, body axes.
     axes: Mat3,
     pub hinge: Vec3,
-    /// b of a planar mode.
     across: Option<Vec3>,
     surface: Surface,
-    /// s and kappa
     coefficients: [f64; 2],
     higher: Option<Box<HigherSeries>>,
-    /// eta at which the model ends, if it does.
     highest: Option<f64>,
-    /// w, of use with the terms beyond the third order.
     in_tank: Vector,
-    /// w and w; r from coefficient 1 on and V.
     w: Pair,
     both: Pair,
     r: Vector,
@@ -94,55 +90,44 @@ pub(crate) struct ConstrainedBob {
     u: Series,
     u2: Series,
     eta: Series,
-    /// beta eta
     slope: Series,
     n: Vector,
-    /// T and S
     tension: Series,
     inner: Series,
     f: Vector,
-    /// n.n, n.q/n.n, (s - 1) n.n/I and d at the start of the expansion.
     n2: f64,
     ratio: f64,
     share: f64,
     d: Vec3,
-    /// Terms of the current order that do not depend on [a; w'] of this order: -w x V - w x (w x P)/l, Y, what [n; q; b]
-    /// contribute to the multipliers, f without these, and w x r of the next order without the newest w.
     fall: Vec3,
     known: Vec3,
     multipliers: [f64; 2],
     rest: Vec3,
     ahead: Vec3,
-    /// B/l at the start of the expansion.
     specific_force: Vec3,
 }
 
-/// Series of the terms beyond the third order.
+/// Series of the terms beyond the third order, with the symbols above; `known` are the terms of D, P' and
+/// tau' of the current order without the newest [a; w'].
 #[derive(Clone, Debug)]
 struct HigherSeries {
     by: Higher,
-    /// u^3 and beta
     u3: Series,
     beta: Series,
-    /// w_e, sigma, tau, P and u P.
     turning: Series,
     sigma: Series,
     tau: Series,
     swirl: Series,
     spin: Series,
-    /// D and P'.
     inwards: Series,
     around: Series,
-    /// q x r', S sigma and T (q x r'), and the rate in the drag.
     turned: Series,
     radial: Series,
     tangential: Series,
     rate: Vector,
-    /// S and T at the start of the expansion, T/(1 + T u), and m.
     inertia: [f64; 2],
     share: f64,
     m: Vec3,
-    /// Terms of the current order without the newest [a; w']: of D, P' and tau'.
     known: [f64; 3],
 }
 
@@ -170,7 +155,7 @@ impl HigherSeries {
         })
     }
 
-    /// Starts an expansion at q and u, with S.
+    /// Starts an expansion at q and u; `s` is S there.
     fn start(&mut self, q: Vec3, u: f64, s: f64) {
         self.u3[0] = u * u * u;
         let t = self.by.rotary_inertia(u);
@@ -179,8 +164,8 @@ impl HigherSeries {
         self.m = [-q[1], q[0], 0.0];
     }
 
-    /// Computes the terms of order n from r to order n + 1, r' and w_e to order n, and u to order n + 1. Returns the sum of
-    /// the known terms in f.
+    /// Computes the terms of order n from r to order n + 1, r' and w_e to order n, and u to order n + 1.
+    /// Returns the sum of the known terms in f.
     #[inline(never)]
     fn expand(&mut self, n: usize, w_e: f64, r: &Vector, r_d: &Vector, u: &Series) -> [f64; 2] {
         let HigherSeries { by, .. } = *self;
@@ -252,12 +237,11 @@ impl HigherSeries {
         }
     }
 
-    /// Returns T tau' of the newest order under Y and w_e'.
     fn pull(&self, y: Vec3, w_e_d: f64, u: f64) -> f64 {
         self.share * (self.known[2] + dot(self.m, y) + w_e_d * u)
     }
 
-    /// Sets coefficient n of D and P' from S sigma' and T tau' of the newest order.
+    /// Sets coefficient n of D and P' from S sigma' (`inner`) and T tau' (`pull`) of the newest order.
     fn set(&mut self, n: usize, inner: f64, pull: f64) {
         (self.inwards[n], self.around[n]) = (self.known[0] + inner, self.known[1] + pull);
     }
@@ -277,7 +261,6 @@ impl HigherSeries {
     }
 }
 
-/// Returns the sum of a_j.b_(n-j) from j = 1 on.
 fn dot_from_1(n: usize, a: &Vector, b: &Vector) -> f64 {
     let mut sum = [0.0; 3];
     for (a, b) in a[1..=n].iter().zip(b[..n].iter().rev()) {
@@ -298,8 +281,8 @@ fn square_across(n: usize, a: &Vector) -> f64 {
 }
 
 impl ConstrainedBob {
-    /// Creates the bob of mode `mode` of tank number `index`, both from 0; `None` for a pendulum that swings in every
-    /// direction.
+    /// Creates the bob of mode `mode` of tank number `index`, which both count from 0; `None` for a pendulum
+    /// that swings in every direction, which is a [`Bob`](crate::bob::Bob).
     pub fn new(tank: &Tank, index: usize, mode: usize) -> Option<ConstrainedBob> {
         let (surface, across) = (tank.surface(mode), tank.plane_normal(mode));
         if surface.is_none() && across.is_none() {
@@ -353,8 +336,8 @@ impl ConstrainedBob {
         })
     }
 
-    /// Starts an expansion at direction and rate (tank axes, six numbers) while the craft rotates with `w`. Normalises both
-    /// first.
+    /// Starts an expansion at direction and rate (tank axes, six numbers) while the craft rotates with `w`.
+    /// Both are normalised first.
     #[inline(never)]
     pub fn start(&mut self, x: &[f64; 6], w: Vec3) {
         let [p, p_d] = self.projected([x[0], x[1], x[2]], [x[3], x[4], x[5]]);
@@ -378,7 +361,7 @@ impl ConstrainedBob {
         self.d = sub(q, scale(self.ratio, n));
     }
 
-    /// Returns direction and rate on the unit sphere, and in the plane of a planar mode.
+    /// Projects direction and rate onto the unit sphere and, for a planar mode, into its plane.
     #[inline(never)]
     fn projected(&self, p: Vec3, p_d: Vec3) -> [Vec3; 2] {
         let flat = |x: Vec3| match self.across {
@@ -388,7 +371,6 @@ impl ConstrainedBob {
         on_sphere(flat(p), flat(p_d))
     }
 
-    /// Sets coefficient n of beta eta and of the normal from those of r, u and eta.
     #[inline(never)]
     fn set_normal(&mut self, n: usize) {
         self.n[n] = [self.r[n][0], self.r[n][1], self.eta[n]];
@@ -411,12 +393,10 @@ impl ConstrainedBob {
         self.n[n][1] -= bent[1];
     }
 
-    /// Returns the position of the bob from O at the start of the expansion.
     fn place(&self) -> Vec3 {
         add(self.hinge, scale(self.l, times(&self.axes, self.r[0])))
     }
 
-    /// Returns H x.
     fn held(&self, x: Vec3) -> Vec3 {
         let n = self.n[0];
         let mut held = scale(dot(n, x) / self.n2, n);
@@ -427,7 +407,7 @@ impl ConstrainedBob {
         }
     }
 
-    /// Adds m J^T H J, J [a; w'] = a + w' x rho, to the craft's mass matrix.
+    /// Adds m J^T H J, with J [a; w'] = a + w' x rho, to the craft's mass matrix.
     pub fn add_inertia(&self, matrix: &mut Mat6) {
         let rho = self.place();
         let across = self.across.map(|b| (1.0, b));
@@ -445,8 +425,8 @@ impl ConstrainedBob {
         }
     }
 
-    /// Returns coefficient n of force and torque about O on the craft without the terms in [a; w'] of this order. `w` is
-    /// coefficient n of the angular velocity, `w2` that of the matrix of y -> w x (w x y).
+    /// Returns coefficient n of force and torque about O on the craft without the terms in [a; w'] of this
+    /// order. `w` is coefficient n of the angular velocity, and `w2` that of the matrix of y -> w x (w x y).
     #[inline(never)]
     pub fn reaction(&mut self, n: usize, w: Vec3, w2: &Mat3) -> [Vec3; 2] {
         let w = transposed_times(&self.axes, w);
@@ -525,7 +505,6 @@ impl ConstrainedBob {
         [force, add(cross(self.hinge, force), twist)]
     }
 
-    /// Returns T and S under Y.
     fn multipliers(&self, y: Vec3) -> [f64; 2] {
         let [normal, inwards] = self.multipliers;
         let normal = normal + dot(self.n[0], y);
@@ -534,7 +513,6 @@ impl ConstrainedBob {
         [normal / self.n2 - self.ratio * inner, inner]
     }
 
-    /// Returns f under Y, and under w_e' beyond what Y has of it.
     fn force(&self, y: Vec3, w_e_d: f64) -> Vec3 {
         let [tension, inner] = self.multipliers(y);
         let mut f = add(self.rest, scale(tension, self.n[0]));
@@ -549,7 +527,6 @@ impl ConstrainedBob {
         }
     }
 
-    /// Sets coefficient n of c r'.
     #[inline(never)]
     fn set_drag(&mut self, n: usize) {
         self.p_d[n] = [self.r_d[n][0], self.r_d[n][1], (n + 1) as f64 * self.eta[n + 1]];
@@ -591,7 +568,6 @@ impl ConstrainedBob {
         self.v[n + 1] = scale(1.0 / (n + 1) as f64, rate);
     }
 
-    /// Returns coefficient n of the dissipated power, c l^2 r'.(r' in the drag), W.
     pub fn dissipation(&self, n: usize) -> f64 {
         let l2 = self.l * self.l;
         if let (Some(higher), false) = (&self.higher, self.follows) {
@@ -604,8 +580,8 @@ impl ConstrainedBob {
         l2 * (dot_from_1(n, &self.r_d, &self.dragged) + dot(self.r_d[0], self.dragged[n]))
     }
 
-    /// Returns direction and rate at `t` after the start, tank axes, normalised, from the series up to order n. `w` is the
-    /// craft's angular velocity at that time.
+    /// Returns direction and rate at `t` after the start, tank axes, normalised, from the series up to order
+    /// n. `w` is the craft's angular velocity at that time.
     pub fn state_at(&self, n: usize, t: f64, w: Vec3) -> [f64; 6] {
         let (r, v) = (space::value(&self.r, n, t), space::value(&self.v, n, t));
         let r_d = sub(v, cross(transposed_times(&self.axes, w), r));
@@ -617,7 +593,8 @@ impl ConstrainedBob {
         [p[0], p[1], p[2], p_d[0], p_d[1], p_d[2]]
     }
 
-    /// Returns the first time within `h` at which the bob reaches the bound of its surface, from the series up to order n.
+    /// Returns the first time within `h` at which the bob reaches the bound of its surface, from the series
+    /// up to order n.
     pub fn bound(&self, n: usize, h: f64) -> Option<f64> {
         let highest = self.highest?;
         let mut below = self.eta.map(|eta| -eta);
@@ -625,46 +602,45 @@ impl ConstrainedBob {
         first_root(&below[..=n], h)
     }
 
-    /// Returns the message for a bob beyond the bound of its surface; `name` is that of the tank.
+    /// Returns the message for a bob beyond the bound of its surface; `name` is the tank's name in the FMU.
     pub fn bound_message(&self, name: &str) -> String {
         let higher = self.surface.higher().unwrap_or_default();
         surface::bound_message(self.coefficients, higher, self.mode, name)
     }
 
-    /// Returns true if the drag depends on acceleration or amplitude.
     pub fn follows(&self) -> bool {
         self.follows
     }
 
-    /// Sets coefficient n of the specific force along the tank's axis at the hinge, which the drag follows.
+    /// Sets coefficient n of the specific force along the tank's axis at the hinge, on which the drag
+    /// depends.
     pub fn set_axial(&mut self, n: usize, x: f64) {
         self.drag.set_axial(n, x);
     }
 
-    /// Returns e and P x e, the direction along the tank's axis at the hinge.
+    /// Returns e and P x e, the direction of the tank's axis at the hinge in six dimensions.
     pub fn along_axis(&self) -> [Vec3; 2] {
         let e = self.axes.map(|row| row[2]);
         [e, cross(self.hinge, e)]
     }
 
-    /// Returns the position of the bob at rest from O.
     pub fn at_rest(&self) -> Vec3 {
         sub(self.hinge, scale(self.l, self.along_axis()[0]))
     }
 
-    /// Returns the scale of V for error control, 1/s, as of a pendulum.
     pub fn rate_scale(&self) -> f64 {
         let stiffness = largest(self.specific_force) + self.k_m;
         let [x, y, _] = self.r[0];
         largest(self.r_d[0]) + libm::sqrt(stiffness) * f64::max(x.abs(), y.abs())
     }
 
-    /// Returns the time over which the series of the drag converge reliably, s, from coefficients 0 to 2.
+    /// Returns the time, s, over which the series of the drag converge reliably, from coefficients 0 to 2.
     pub fn convergence_radius(&self) -> f64 {
         if self.follows { self.drag.convergence_radius() } else { f64::INFINITY }
     }
 
-    /// Returns the error of V, 1/s, that the series of the drag cause up to order n and `h` after the start of the expansion.
+    /// Returns the error of V, 1/s, that the series of the drag up to order n cause at `h` after the start of
+    /// the expansion.
     pub fn defect(&self, n: usize, h: f64) -> f64 {
         if !self.follows {
             return 0.0;
@@ -675,13 +651,12 @@ impl ConstrainedBob {
         self.drag.defect(n - 1, h) * rate * h
     }
 
-    /// Magnitude of coefficient n of V.
     pub fn coefficient_norm(&self, n: usize) -> f64 {
         largest(self.v[n])
     }
 
-    /// Updates the rate for an impulse that changes the craft's velocity by dV (of O) and dw, body axes: l r' changes by
-    /// -(1 - H)(dV + dw x rho). `x` is the six numbers at the start of the expansion.
+    /// Updates the rate for an impulse that changes the craft's velocity by dV (of O) and dw, body axes: l r'
+    /// changes by -(1 - H)(dV + dw x rho). `x` is the six numbers at the start of the expansion.
     pub fn after_impulse(&self, x: &mut [f64; 6], dv: Vec3, dw: Vec3) {
         let kick = transposed_times(&self.axes, add(dv, cross(dw, self.place())));
         let mut change = scale(-self.inv_l, sub(kick, self.held(kick)));

@@ -73,7 +73,9 @@ use crate::state::Line;
 use crate::surface::{LEAST_INERTIA, Lift, Meridian, Rotary, Surface};
 use crate::table::{FillCurves, Jet};
 
-/// A tank in its mounting position.
+/// A tank in its mounting position, with what does not change during a run. `still` holds the rigid liquid
+/// and all liquid at rest of a tank that does not drain; the surfaces of the modes are those at the start
+/// where the table gives them.
 #[derive(Clone, Debug)]
 pub struct MountedTank {
     pub tank: Tank,
@@ -81,23 +83,22 @@ pub struct MountedTank {
     axes: Mat3,
     e: Vec3,
     d: Vec3,
-    /// True if there are planar modes; their b, body axes.
     planar: bool,
     across: [Option<Vec3>; MODES],
-    /// True if a bob is on a surface other than a sphere; the surfaces of all modes, as at the start where the table
-    /// gives them.
     curved: bool,
     surfaces: [Option<Surface>; MODES],
-    /// The rigid liquid and all liquid at rest of a tank that does not drain.
     still: Option<[Rigid; 2]>,
 }
 
-/// Returns a constant with its derivatives, which are 0.
+/// Returns a constant as a [`Jet`], with derivatives of 0.
 fn jet<T: Number>(x: f64) -> Jet<T> {
     [x, 0.0, 0.0].map(T::constant)
 }
 
-/// A bob with the terms of its equation that do not contain [a; w'].
+/// A bob with the terms of its equation that do not contain [a; w']: `u` is [p; P x p], `phi` and `g` (G
+/// without a + w' x rho) are those of the equations above, and `centring` is the energy of the centring
+/// stiffness. The rates belong to the changing mass of liquid: m', the velocity h' e + l' p of the rod's far
+/// end for a bob at rest on it, and `centring_d` = k l l' |p_perp|^2.
 pub struct Swing<T> {
     m: T,
     l: T,
@@ -105,44 +106,35 @@ pub struct Swing<T> {
     p_d: Vec3<T>,
     rho: Vec3<T>,
     rho_d: Vec3<T>,
-    /// [p; P x p]
     u: [T; 6],
     t_0: T,
-    /// phi, and G without a + w' x rho
     phi: Vec3<T>,
     known: Vec3<T>,
-    /// Energy of the centring stiffness.
     centring: T,
-    /// m', and the velocity of the rod's far end for a bob at rest on it, h' e + l' p.
     m_d: T,
     end_rate: Vec3<T>,
-    /// k l l' |p_perp|^2
     centring_d: T,
     surface: Option<OnSurface<T>>,
 }
 
-/// Terms of a bob on a surface other than a sphere.
 struct OnSurface<T> {
     meridian: Meridian<T>,
-    /// z, and i.
     z: T,
     inner: Vec3<T>,
     e: Vec3<T>,
     rotary: Option<Rotary<T>>,
 }
 
-/// A tank's contents at an instant.
+/// A tank's contents at an instant. The flow within the tank has the momenta K and L (`flow_momentum`) and
+/// acts on the craft with `flow_wrench` about O; `dissipation` is in W; `shrinking` holds m_0', S_0' and I_0'
+/// w of the rigid liquid.
 pub struct Contents<'a, T> {
     mounted: &'a MountedTank,
     pub rigid: Rigid<T>,
-    /// Force and torque about O from the flow within the tank.
     flow_wrench: [Vec3<T>; 2],
-    /// K and L.
     pub flow_momentum: [Vec3<T>; 2],
     bobs: [Option<Swing<T>>; MODES],
-    /// Power dissipated, W.
     pub dissipation: T,
-    /// m_0', S_0' and I_0' w of the rigid liquid.
     shrinking: (T, [Vec3<T>; 2]),
 }
 
@@ -184,22 +176,20 @@ impl MountedTank {
         MountedTank { still, ..mounted }
     }
 
-    /// Returns the liquid at rest as a rigid body; `None` if it drains.
+    /// Returns the liquid at rest as a rigid body; `None` if the tank drains.
     pub fn rigid_at_rest(&self) -> Option<&Rigid> {
         self.still.as_ref().map(|[_, whole]| whole)
     }
 
-    /// Returns the number of modes.
     pub fn modes(&self) -> usize {
         self.tank.modes
     }
 
-    /// Returns true if the drag of any mode depends on acceleration or amplitude.
     pub fn follows(&self) -> bool {
         (0..self.tank.modes).any(|n| self.tank.follows(n))
     }
 
-    /// Returns the liquid at rest as a rigid body. `liquid` matters only for tanks with a table.
+    /// Returns the liquid at rest as a rigid body. `liquid`, kg, has an effect only in tanks with a table.
     pub fn at_rest<T: Number>(&self, liquid: T) -> Rigid<T> {
         let MountedTank { tank, curves, .. } = self;
         if let Some(whole) = self.rigid_at_rest() {
@@ -227,7 +217,7 @@ impl MountedTank {
         bobs.combined_with(&Rigid::axial(m_0, add(d, scale(h_0, e)), i_0, i_z, e))
     }
 
-    /// Returns hinge, p and p' of mode n (from 0), projected into the plane of a planar mode.
+    /// Returns hinge, p and p' of mode `n`, which counts from 0, projected into the plane of a planar mode.
     // A separate function: craft without planar modes then take fewer instructions.
     #[inline(never)]
     fn guided<T: Number>(&self, n: usize, [hinge, p, p_d]: [Vec3<T>; 3]) -> [Vec3<T>; 3] {
@@ -236,8 +226,8 @@ impl MountedTank {
         [sub(hinge, b.map(|b| b * self.tank.arm[n])), p, p_d]
     }
 
-    /// Returns surface and height of the bob of mode n (from 0) from l with its derivatives, and p, p' and w. `changing` has s
-    /// and kappa with their derivatives if the table gives them.
+    /// Returns surface and height of the bob of mode `n`, which counts from 0, from l with its derivatives,
+    /// and p, p' and w. `changing` has s and kappa with their derivatives if the table gives them.
     #[inline(never)]
     fn on_surface<T: Number>(
         &self,
@@ -256,8 +246,9 @@ impl MountedTank {
         Some((meridian, lift))
     }
 
-    /// Returns the contents. x: p and p' of each mode, tank axes. `a` and `w_d` give the acceleration along the tank that
-    /// the drag follows. The mass of liquid, the flow and its slope matter only for tanks with a table.
+    /// Returns the contents at p and p' of each mode, `x`, tank axes. `a` and `w_d` give the acceleration
+    /// along the tank on which the drag depends. The mass of liquid, the flow and its slope have an effect
+    /// only in tanks with a table.
     pub fn contents<T: Number>(
         &self,
         x: &[T],
@@ -269,7 +260,7 @@ impl MountedTank {
         contents
     }
 
-    /// Writes the bobs' p' and p'' in tank axes, six numbers each, under [a; w'].
+    /// Writes the bobs' p' and p'' in tank axes, six numbers each, under the acceleration [a; w'].
     pub fn write_rates<T: Number>(
         &self,
         contents: &Contents<'_, T>,
@@ -293,7 +284,6 @@ impl MountedTank {
         }
     }
 
-    /// Returns the bobs' values for the outputs.
     pub fn bobs_now<T: Number>(&self, contents: &Contents<'_, T>) -> [Option<BobNow<T>>; MODES] {
         let axes: Mat3<T> = self.axes.map(constant);
         let mut bobs = [(); MODES].map(|()| None);
@@ -319,7 +309,7 @@ impl MountedTank {
         bobs
     }
 
-    /// Projects the bobs of planar modes into their planes; x as in [`MountedTank::contents`].
+    /// Projects the bobs of planar modes into their planes; `x` as in [`MountedTank::contents`].
     pub fn flatten(&self, x: &mut [f64]) {
         for n in 0..self.tank.modes {
             let Some(b) = self.tank.plane_normal(n) else { continue };
@@ -330,14 +320,15 @@ impl MountedTank {
         }
     }
 
-    /// Returns true if a bob is where the inertia along its meridian is too small; x as in [`MountedTank::contents`].
-    /// `liquid` matters only for tanks with a table.
+    /// Returns true if a bob is where the inertia along its meridian is too small for the model; `x` and
+    /// `liquid` as in [`MountedTank::contents`].
     #[inline(never)]
     pub fn is_beyond(&self, x: &[f64], liquid: f64) -> bool {
         (0..MODES).any(|n| self.least_inertia(n, x, liquid) < LEAST_INERTIA)
     }
 
-    /// Returns the smaller inertia, along the meridian or across it, of the bob of mode n (from 0), relative to a pendulum's.
+    /// Returns the smaller inertia, along the meridian or across it, of the bob of mode `n`, which counts
+    /// from 0, relative to a pendulum's.
     fn least_inertia(&self, n: usize, x: &[f64], liquid: f64) -> f64 {
         let Some(mut surface) = self.surfaces[n] else { return 1.0 };
         if self.tank.fill.points > 0
@@ -349,8 +340,9 @@ impl MountedTank {
         surface.least_inertia(p[2], p[0] * p[0] + p[1] * p[1])
     }
 
-    /// Refuses bobs at angles at which the inertia along their meridian is too small. `tank` is the tank's number from 1, 0
-    /// if the system has only one. The slack recognises a step that could not pass the bound.
+    /// Refuses bobs at angles at which the inertia along their meridian is too small. `tank` is the tank's
+    /// number, which counts from 1, or 0 if the system has only one tank. The slack recognises a step that
+    /// could not pass the bound.
     pub fn check_surfaces(&self, x: &[f64], liquid: f64, tank: usize) -> Result<(), StepError> {
         let is_near = |n: &usize| self.least_inertia(*n, x, liquid) < LEAST_INERTIA * (1.0 + 1e-6);
         let Some(n) = (0..MODES).find(is_near) else { return Ok(()) };
@@ -359,30 +351,27 @@ impl MountedTank {
         Err(StepError::Model(now.bound_message(n, &format!("tank{index}"))))
     }
 
-    /// Returns true if any bob is on a surface other than a sphere.
     pub fn is_curved(&self) -> bool {
         self.curved
     }
 
-    /// Returns true if the tank's liquid follows a table.
     pub fn drains(&self) -> bool {
         self.tank.fill.points > 0
     }
 }
 
 impl<T: Number> Swing<T> {
-    /// Returns T under [a; w'].
     fn tension(&self, a: Vec3<T>, w_d: Vec3<T>) -> T {
         let u = self.u;
         self.t_0 - self.m * (dot([u[0], u[1], u[2]], a) + dot([u[3], u[4], u[5]], w_d))
     }
 
-    /// Returns G under [a; w'].
     fn acceleration(&self, a: Vec3<T>, w_d: Vec3<T>) -> Vec3<T> {
         add(add(a, cross(w_d, self.rho)), self.known)
     }
 
-    /// Returns force and torque about O on the craft under [a; w'], without the guide of a pendulum in a plane.
+    /// Returns force and torque about O on the craft under [a; w'], without the guide of a pendulum in a
+    /// plane.
     fn wrench(&self, a: Vec3<T>, w_d: Vec3<T>) -> [Vec3<T>; 2] {
         match &self.surface {
             Some(surface) => {
@@ -399,7 +388,6 @@ impl<T: Number> Swing<T> {
         }
     }
 
-    /// Returns force and torque about O on the craft at a = w' = 0.
     fn load(&self) -> [Vec3<T>; 2] {
         if self.surface.is_some() {
             return self.wrench(constant([0.0; 3]), constant([0.0; 3]));
@@ -407,7 +395,6 @@ impl<T: Number> Swing<T> {
         self.wrench_at(self.t_0)
     }
 
-    /// Returns force and torque about O on the craft at the tension T of a rod.
     fn wrench_at(&self, tension: T) -> [Vec3<T>; 2] {
         let force = add(scale(tension, self.p), self.phi);
         [force, cross(self.rho, force)]
@@ -415,7 +402,6 @@ impl<T: Number> Swing<T> {
 }
 
 impl<T: Number> OnSurface<T> {
-    /// Returns -l y under G and w'.
     fn slide(&self, g: Vec3<T>, w_d: Vec3<T>) -> Vec3<T> {
         let mut force = add(self.meridian.apply_shear_transposed(g), self.inner);
         if let (Some(rotary), Some(n)) = (&self.rotary, self.meridian.around()) {
@@ -424,7 +410,7 @@ impl<T: Number> OnSurface<T> {
         self.meridian.free(force)
     }
 
-    /// Returns the couple on the craft over m, at -l y, `slid`.
+    /// Returns the couple on the craft over m, from -l y, `slid`.
     fn couple(&self, slid: Vec3<T>, w_d: Vec3<T>) -> Option<Vec3<T>> {
         let (rotary, n) = (self.rotary.as_ref()?, self.meridian.around()?);
         Some(rotary.couple(dot(n, slid), dot(self.e, w_d), self.e))
@@ -437,7 +423,6 @@ impl<T: Number> OnSurface<T> {
 }
 
 impl<T: Number> Contents<'_, T> {
-    /// Creates contents without bobs or motion.
     pub fn new(mounted: &MountedTank) -> Contents<'_, T> {
         let zero = constant::<T>([0.0; 3]);
         let none = T::constant(0.0);
@@ -452,7 +437,8 @@ impl<T: Number> Contents<'_, T> {
         }
     }
 
-    /// Evaluates new contents in place, without copies of them; see [`MountedTank::contents`].
+    /// Evaluates new contents in place, without copies of them; see [`MountedTank::contents`] for the
+    /// arguments.
     pub fn evaluate(
         &mut self,
         x: &[T],
@@ -661,7 +647,6 @@ impl<T: Number> Contents<'_, T> {
         }
     }
 
-    /// Iterates over the pendulums of planar modes and their b.
     fn planar(&self) -> impl Iterator<Item = (&Swing<T>, Vec3<T>)> {
         let across = self.bobs.iter().zip(&self.mounted.across);
         let pendulums = across.filter_map(|(bob, b)| Some((bob.as_ref()?, (*b)?)));
@@ -669,7 +654,7 @@ impl<T: Number> Contents<'_, T> {
         pendulums.map(|(bob, b)| (bob, constant(b)))
     }
 
-    /// Adds the guiding forces of planar modes under [a; w'].
+    /// Adds the guiding forces of planar modes under [a; w'] to a force and torque.
     #[inline(never)]
     fn add_guides(&self, sum: [Vec3<T>; 2], [a, w_d]: [Vec3<T>; 2]) -> [Vec3<T>; 2] {
         let guides = self.planar().map(|(bob, b)| {
@@ -680,8 +665,7 @@ impl<T: Number> Contents<'_, T> {
         guides.fold(sum, |sum, guide| [add(sum[0], guide[0]), add(sum[1], guide[1])])
     }
 
-    /// Returns force and torque about O on the craft at a = w' = 0, without the rigid liquid's
-    /// inertia.
+    /// Returns force and torque about O on the craft at a = w' = 0, without the rigid liquid's inertia.
     pub fn loads(&self) -> [Vec3<T>; 2] {
         let bobs = self.bobs.iter().flatten().map(Swing::load);
         let sum =
@@ -692,7 +676,6 @@ impl<T: Number> Contents<'_, T> {
         }
     }
 
-    /// Returns force and torque about O on the craft.
     pub fn wrench(&self, a: Vec3<T>, w: Vec3<T>, w_d: Vec3<T>) -> [Vec3<T>; 2] {
         let rigid = self.rigid.inertial_wrench(a, w, w_d);
         let bobs = self.bobs.iter().flatten().map(|bob| bob.wrench(a, w_d));
@@ -704,7 +687,8 @@ impl<T: Number> Contents<'_, T> {
         [sub(sum[0], rigid[0]), sub(sum[1], rigid[1])]
     }
 
-    /// Returns drained', W, at the velocity `v` of O. On a pivot, where the energy contains the potential a.S, v is 0.
+    /// Returns the power drained', W, at the velocity `v` of O. On a pivot, where the energy contains the
+    /// potential a.S, v is 0.
     pub fn drained(&self, v: Vec3<T>, w: Vec3<T>, [a, w_d]: [Vec3<T>; 2], on_pivot: bool) -> T {
         let half = 0.5;
         let (m_0_d, [s_d, turning]) = self.shrinking;
@@ -729,14 +713,13 @@ impl<T: Number> Contents<'_, T> {
     }
 }
 
-/// The outflow of a tank over one step.
+/// The outflow of a tank over one step. `at` is the index of the mass of liquid among the states; `tank` is
+/// the tank's number, which counts from 1, or 0 if the system has only one.
 #[derive(Clone, Copy)]
 pub struct Outflow<'a> {
     pub mounted: &'a MountedTank,
     pub flow: Line,
-    /// Index of the mass of liquid among the states.
     pub at: usize,
-    /// Number of the tank, from 1; 0 if the system has only one.
     pub tank: usize,
 }
 
@@ -771,7 +754,7 @@ impl Outflow<'_> {
         Ok(())
     }
 
-    /// Returns the first time after `t` at which the tank passes a point of its table, at most `h`.
+    /// Returns the first time after `t`, but at most `h`, at which the tank passes a point of its table.
     fn next_point(&self, liquid: f64, t: f64, h: f64) -> f64 {
         let (flow, mut next) = (self.flow, h);
         for point in self.mounted.tank.fill.masses() {
@@ -799,18 +782,17 @@ impl Outflow<'_> {
     }
 }
 
-/// A system with tanks that drain.
 pub trait Drains<const D: usize>: System<D> + Sized {
-    /// Normalises quaternions and directions.
+    /// Normalises the quaternion and the directions of the bobs.
     fn normalise(&self, x: &mut [f64; D], t: f64);
 
-    /// Iterates over the outflows of its tanks.
     fn outflows(&self) -> impl Iterator<Item = Outflow<'_>>;
 
     /// Refuses bobs beyond the bounds of their surfaces.
     fn check_surfaces(&self, x: &[f64; D]) -> Result<(), StepError>;
 
-    /// Advances the states by `h` from the time `begin`.
+    /// Advances the states by `h` from the time `begin`, in stretches that end where a tank passes a point of
+    /// its table.
     fn advance(
         &self,
         x: &mut [f64; D],
@@ -839,8 +821,8 @@ pub trait Drains<const D: usize>: System<D> + Sized {
     }
 }
 
-/// Returns true if a trial step of an extrapolation was so long that rates would overflow; the step is then rejected without
-/// evaluating them.
+/// Returns true if a trial step of an extrapolation was so long that rates would overflow; the step is then
+/// rejected without evaluating them.
 pub fn has_diverged(x: &[f64]) -> bool {
     x.iter().any(|x| x.abs() > 1e50)
 }
@@ -858,8 +840,8 @@ pub fn normalise_bobs(x: &mut [f64]) {
 mod tests {
     use super::*;
 
-    /// A flow of 2 - t kg/s reverses at 2 s. It passes a point 1.5 kg below at 2 t - t^2/2 = 1.5, which is at 1 s and
-    /// again at 3 s. A flow of 1 + t kg/s passes it at 1 s and does not return.
+    /// A flow of 2 - t kg/s reverses at 2 s. It passes a point 1.5 kg below at 2 t - t^2/2 = 1.5, which is at
+    /// 1 s and again at 3 s. A flow of 1 + t kg/s passes it at 1 s and does not return.
     #[test]
     fn a_point_of_the_table_is_passed_again_after_the_flow_turns() {
         let tank = Tank::default();
@@ -887,8 +869,9 @@ mod tests {
         assert_eq!(passes(4.0, -2.0, 1.0, 103.0), 3.0);
     }
 
-    /// Liquid may be at the ends of its table, to rounding, and may flow while it stays between them. A flow of 1 - t kg/s
-    /// has drained half a kilogram when it reverses after a second, and has returned 4 kg after 4 s.
+    /// Liquid may be at the ends of its table, to rounding, and may flow while it stays between them. A flow
+    /// of 1 - t kg/s has drained half a kilogram when it reverses after a second, and has returned 4 kg after
+    /// 4 s.
     #[test]
     fn a_flow_goes_on_while_the_liquid_is_within_its_table() {
         let tank = Tank::default();

@@ -38,26 +38,21 @@ use taylor::series::{Series, ZERO, constant, mul, mul_tail, sqrt, time_within, v
 use crate::parameters::{DampingLaw, Tank};
 use formulas::cylinder::XI;
 
-/// A_0, rad.
 const SMALLEST: f64 = 1e-4;
 
-/// delta.
 const CORNER: f64 = 0.02;
 
-/// Breaking of a mode's waves.
+/// Breaking of a mode's waves: zeta_b, the steepness s_b at which it `begins` with sqrt(s_b^2 + delta^2), and
+/// k a/A, 1/rad.
 #[derive(Clone, Copy, Debug)]
 struct Breaking {
-    /// zeta_b
     zeta: f64,
-    /// s_b, and sqrt(s_b^2 + delta^2).
     begins: f64,
     root: f64,
-    /// k a/A, 1/rad
     steepness: f64,
 }
 
 impl Breaking {
-    /// Returns the breaking of mode `n` of a tank, if its waves break.
     fn new(tank: &Tank, n: usize) -> Option<Breaking> {
         let begins = tank.breaking_steepness[n];
         (tank.zeta_breaking[n] > 0.0).then(|| Breaking {
@@ -72,15 +67,13 @@ impl Breaking {
 /// Largest step as a share of the time to the nearest singularity of a power series.
 const SHARE_OF_RADIUS: f64 = 0.5;
 
-/// The power series of w f(k a).
+/// The power series of w f(k a), with those of the products in it.
 #[derive(Clone, Debug)]
 struct Excess {
     law: Breaking,
-    /// w, w d, sqrt((w d)^2 + (w delta)^2)
     w: Series,
     above: Series,
     root: Series,
-    /// w k a, the divisor, the quotient
     steep: Series,
     divisor: Series,
     quotient: Series,
@@ -92,7 +85,7 @@ impl Excess {
         Excess { law, w, above, root, steep, divisor, quotient }
     }
 
-    /// Returns coefficient n from those of w^2 and w A.
+    /// Returns coefficient n from the coefficients n of w^2 and w A.
     fn expand(&mut self, n: usize, w2: f64, speed: f64) -> f64 {
         let Breaking { begins, steepness, .. } = self.law;
         self.w[n] = sqrt(n, w2, &self.w);
@@ -113,7 +106,7 @@ impl Excess {
         0.5 * (self.steep[n] + mul(n, &self.steep, &self.quotient))
     }
 
-    /// Returns the time over which the series converges, s, from coefficients 0 to 2: w d = +-i w delta is a
+    /// Returns the time, s, over which the series converges, from coefficients 0 to 2: w d = +-i w delta is a
     /// singularity.
     fn convergence_radius(&self) -> f64 {
         let Excess { root, above, w, .. } = self;
@@ -122,44 +115,35 @@ impl Excess {
     }
 }
 
-/// Data of one mode's drag in a tank with constant contents.
+/// One mode's drag in a tank with constant contents, with the series of its law. `growth` is 2 m zeta_A,
+/// kg/rad; `c_ref` is c at g_ref without its dependence on the amplitude, N s/m; `w2_ref` is w_ref^2 and
+/// `floor2` is a_f^2. `instant` is the same law at an instant, with m and l, to check the series.
 #[derive(Clone, Debug)]
 pub struct Drag {
     law: DampingLaw,
-    /// 2 m zeta_A, kg/rad
     growth: f64,
-    /// c at g_ref without its dependence on the amplitude, N s/m
     c_ref: f64,
     inv_l: f64,
     k_m: f64,
-    /// w_ref^2
     w2_ref: f64,
-    /// a_f^2
     floor2: f64,
-    /// x, sqrt(x^2 + a_f^2), a_+ (or for x < 0 first its divisor), w^2, (w/w_ref)^q
     x: Series,
     root: Series,
     divisor: Series,
     above: Series,
     w2: Series,
     power: Series,
-    /// Square of the angle, the same + A_0^2, w^2 A^2, w A
     angle2: SquaredAngle,
     tilt2: Series,
     speed2: Series,
     speed: Series,
-    /// The same at an instant, with m and l.
     instant: (Law, [f64; 2]),
-    /// 2 m zeta_b w f(k a), if waves break; 2 m.
     excess: Option<Excess>,
     twice_m: f64,
-    /// True if c depends on the amplitude.
     grows: bool,
-    /// c, N s/m
     pub c: Series,
 }
 
-/// Returns the exponent q of a law.
 fn exponent(law: DampingLaw) -> f64 {
     match law {
         DampingLaw::Laminar => 0.5,
@@ -169,7 +153,6 @@ fn exponent(law: DampingLaw) -> f64 {
 }
 
 impl Drag {
-    /// Creates the drag of mode `n` of a tank.
     pub fn new(tank: &Tank, n: usize) -> Drag {
         let (m, l) = (tank.mass[n], tank.length[n]);
         let floor = tank.smallest_acceleration();
@@ -199,13 +182,12 @@ impl Drag {
         }
     }
 
-    /// Sets coefficient n of x.
     #[inline(always)]
     pub fn set_axial(&mut self, n: usize, x: f64) {
         self.x[n] = x;
     }
 
-    /// Returns coefficient n of c, from those of x, of |p + e|^2 and of |p'|^2.
+    /// Returns coefficient n of c, from the coefficients n of x, of |p + e|^2 and of |p'|^2.
     pub fn expand(&mut self, n: usize, chord2: f64, rate2: f64) -> f64 {
         let square = mul(n, &self.x, &self.x) + constant(n, self.floor2);
         self.root[n] = sqrt(n, square, &self.root);
@@ -240,11 +222,11 @@ impl Drag {
         self.c[n]
     }
 
-    /// Returns the time over which the series of c converge reliably, s, from coefficients 0 to 2.
+    /// Returns the time, s, over which the series of c converge reliably, from coefficients 0 to 2.
     ///
-    /// The roots in a_+ and in A have singularities where x = +-i a_f and where w^2 A^2 = 0. Thrust that crosses zero
-    /// passes close by the first. On both sides a_+ is almost linear in x, or almost 0, so its coefficients do not show
-    /// the singularity.
+    /// The roots in a_+ and in A have singularities where x = +-i a_f and where w^2 A^2 = 0. Thrust that
+    /// crosses zero passes close by the first. On both sides a_+ is almost linear in x, or almost 0, so its
+    /// coefficients do not show the singularity.
     pub fn convergence_radius(&self) -> f64 {
         let [_, slope, bend] = [0, 1, 2].map(|n| self.x[n].abs());
         let mut time = time_within(self.root[0], slope, bend);
@@ -256,7 +238,7 @@ impl Drag {
         SHARE_OF_RADIUS * time.min(excess)
     }
 
-    /// Returns the difference, 1/s, that c/m by its series up to order n has from c/m at that instant, `h` after the
+    /// Returns the difference, 1/s, between c/m by its series up to order n and c/m itself, at `h` after the
     /// start of the expansion.
     pub fn defect(&self, n: usize, h: f64) -> f64 {
         let (law, size) = self.instant;
@@ -270,7 +252,6 @@ impl Drag {
     }
 }
 
-/// The law of one mode at an instant.
 #[derive(Clone, Copy, Debug)]
 pub struct Law {
     law: DampingLaw,
@@ -279,13 +260,11 @@ pub struct Law {
     breaking: Option<Breaking>,
     k: f64,
     g_ref: f64,
-    /// a_f
     floor: f64,
     follows: bool,
 }
 
 impl Law {
-    /// Creates the law of mode `n` of a tank.
     pub fn new(tank: &Tank, n: usize) -> Law {
         Law {
             law: tank.damping_law,
@@ -299,8 +278,8 @@ impl Law {
         }
     }
 
-    /// Returns the damping coefficient c (kg/s) at mass m and length l, from the specific force x along the tank's axis
-    /// (m/s2) and from [angle^2 + A_0^2, |p'|^2]. `zeta` replaces the mode's own damping ratio.
+    /// Returns the damping coefficient c (kg/s) at mass m and length l, from the specific force x along the
+    /// tank's axis (m/s2) and from [angle^2 + A_0^2, |p'|^2]. `zeta` replaces the mode's own damping ratio.
     #[inline(always)]
     fn coefficient<T: Number>(
         &self,
@@ -346,8 +325,8 @@ impl Law {
     }
 }
 
-/// Returns c of mode `n` of a tank in which mass m and length l change, from x, |p + e|^2 and |p'|^2. `zeta` replaces
-/// the tank's own damping ratio.
+/// Returns c of mode `n` of a tank in which mass m and length l change, from x, |p + e|^2 and |p'|^2. `zeta`
+/// replaces the tank's own damping ratio.
 pub fn coefficient<T: Number>(
     tank: &Tank,
     n: usize,

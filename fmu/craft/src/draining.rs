@@ -33,15 +33,13 @@ use crate::rigid::{Factors, Mat6, Rigid};
 use crate::sizes::{MODES, TANKS};
 use crate::state::{BallState, INPUTS, Inputs, Line, STATES, State, index};
 
-/// Inputs of the craft over a number type.
+/// Inputs of the craft at an instant, over a number type: force at O, torque less that of the wheels, tau -
+/// h_w', the wheels' momentum, and the outflow of each tank with its slope.
 pub struct Acting<T> {
     pub force: Vec3<T>,
-    /// tau - h_w'
     pub torque: Vec3<T>,
     pub h_wheels: Vec3<T>,
-    /// Outflow of each tank.
     pub flow: [T; TANKS],
-    /// Slope.
     pub flow_slope: [f64; TANKS],
 }
 
@@ -59,7 +57,6 @@ impl Acting<f64> {
 }
 
 impl Acting<f64> {
-    /// Returns inputs that are 0 except for the flows.
     fn flowing(flow: [f64; TANKS], slope: [f64; TANKS]) -> Acting<f64> {
         let lines = core::array::from_fn(|i| Line { value: flow[i], slope: slope[i] });
         Acting::from_inputs(&Inputs { mass_flow: lines, ..Inputs::default() }, 0.0)
@@ -67,7 +64,7 @@ impl Acting<f64> {
 }
 
 impl Acting<Dual> {
-    /// Returns the inputs with their derivatives in the direction du.
+    /// Returns the inputs with their derivatives in the direction `du`.
     pub fn with_directions(inputs: &Inputs, du: &[f64; INPUTS]) -> Acting<Dual> {
         let now = Acting::from_inputs(inputs, 0.0);
         let with = |x: Vec3, at: usize| [0, 1, 2].map(|i| Dual::with_slope(x[i], du[at + i]));
@@ -80,7 +77,8 @@ impl Acting<Dual> {
         }
     }
 }
-/// A craft with at least one tank that can drain, or has planar modes or other bobs than pendulums.
+/// A craft with at least one tank that can drain, or with planar modes or other bobs than pendulums.
+/// `follows` is true if any drag depends on acceleration or amplitude.
 #[derive(Clone, Debug)]
 pub struct Draining {
     craft: Rigid,
@@ -88,28 +86,26 @@ pub struct Draining {
     gravity: Vec3,
     pivot: Pivot,
     tanks: Vec<MountedTank>,
-    /// True if any drag follows acceleration or amplitude.
     follows: bool,
 }
 
-/// The system for [a; w'].
+/// The system of equations for [a; w']: the factors of its matrix, in which on a pivot the upper rows hold a,
+/// and its right-hand side.
 #[derive(Clone, Debug)]
 struct Equations<T> {
     matrix: Mat6<T>,
-    /// Factors of the matrix; on a pivot with the upper rows replaced, which hold a.
     factors: Factors<T>,
 }
 
-/// The craft at an instant, its equations solved.
+/// The craft at an instant, with its equations solved. `velocity` is that of O, body axes; `by_pivot` is the
+/// power that the pivot dissipates, W.
 struct Instant<T> {
     q: Quaternion<T>,
     axes: Mat3<T>,
-    /// Velocity of O, body axes.
     velocity: Vec3<T>,
     w: Vec3<T>,
     a: Vec3<T>,
     w_d: Vec3<T>,
-    /// Power that the pivot dissipates, W.
     by_pivot: T,
 }
 
@@ -119,7 +115,8 @@ pub struct Run<'a> {
     pub inputs: &'a Inputs,
 }
 
-/// Scales for error control: 1 for attitude and directions, and those of rate, position, velocity and the bobs' rates.
+/// Returns the scales for error control: 1 for attitude and directions, and those of rate, position, velocity
+/// and the bobs' rates.
 fn scales(turn: f64, position: f64, velocity: f64, swing: impl Fn(usize) -> f64) -> [f64; STATES] {
     // Work, energies and liquid follow from the other states.
     let mut scale = [f64::INFINITY; STATES];
@@ -183,7 +180,8 @@ impl Drains<STATES> for Run<'_> {
 }
 
 impl Draining {
-    /// Creates the equations; `None` if all tanks keep their liquid and have pendulums that swing in every direction.
+    /// Creates the equations; `None` if all tanks keep their liquid and have pendulums that swing in every
+    /// direction.
     pub fn new(p: &Parameters) -> Option<Draining> {
         let tanks = &p.tank[..p.tanks];
         if !tanks.iter().any(Tank::has_contents) {
@@ -200,7 +198,6 @@ impl Draining {
         })
     }
 
-    /// Returns the tanks at the current masses of liquid.
     pub fn tanks<'a>(&'a self, x: &'a [f64; STATES]) -> [Tank; TANKS] {
         core::array::from_fn(|i| match self.tanks.get(i) {
             Some(mounted) => Tank { liquid_0: x[index::LIQUID + i], ..mounted.tank }.resolve(),
@@ -208,7 +205,6 @@ impl Draining {
         })
     }
 
-    /// Returns true if any tank follows a table.
     pub fn drains(&self) -> bool {
         self.tanks.iter().any(MountedTank::drains)
     }
@@ -227,7 +223,7 @@ impl Draining {
         self.check_surfaces(x)
     }
 
-    /// Iterates over the tanks with surfaces other than spheres and their numbers from 0.
+    /// Iterates over the tanks with surfaces other than spheres, with their numbers, which count from 0.
     fn curved(&self) -> impl Iterator<Item = (usize, &MountedTank)> {
         self.tanks.iter().enumerate().filter(|(_, mounted)| mounted.is_curved())
     }
@@ -243,8 +239,8 @@ impl Draining {
         })
     }
 
-    /// Applies a change of the flows to `flow`. Where a flow jumps, the momentum of the flow within the tank jumps by
-    /// an impulse, and its change of energy counts as drained. Returns true if a flow jumps.
+    /// Applies a change of the flows to `flow`. Where a flow jumps, the momentum of the flow within the tank
+    /// jumps by an impulse, and its change of energy counts as drained. Returns true if a flow jumps.
     pub fn set_flow(&self, state: &mut State, flow: &[Line; TANKS]) -> bool {
         let now = flow.map(|flow| flow.value);
         if now == state.flow {
@@ -271,8 +267,8 @@ impl Draining {
         true
     }
 
-    /// Accounts for the impulse of the wheels that has changed the state from `before`. Where liquid flows, the impulse
-    /// also does work on the rods' moving ends, as T does in drained' (`contents.rs`).
+    /// Accounts for the impulse of the wheels that has changed the state from `before`. Where liquid flows,
+    /// the impulse also does work on the rods' moving ends, as T does in drained' (`contents.rs`).
     pub fn drain_by_impulse(&self, before: &State, state: &mut State) {
         if state.flow != [0.0; TANKS] {
             let work = state.x[index::WORK] - before.x[index::WORK];
@@ -280,13 +276,11 @@ impl Draining {
         }
     }
 
-    /// Returns the total energy, J.
     fn energy(&self, state: &State) -> f64 {
         let acting = Acting::flowing(state.flow, [0.0; TANKS]);
         self.evaluate(&state.x, &acting).outputs(&state.x).energy
     }
 
-    /// Returns the equations of motion with a mass matrix.
     fn equations<T: Number>(&self, matrix: Mat6<T>) -> Equations<T> {
         let mut held = matrix;
         if self.mount == Mount::Pivot {
@@ -300,7 +294,6 @@ impl Draining {
         Equations { matrix, factors: Factors::definite_or_zero(&held) }
     }
 
-    /// Solves the equations of motion for [a; w']; on a pivot a is given.
     fn solve<T: Number>(
         &self,
         Equations { matrix, factors }: &Equations<T>,
@@ -317,7 +310,6 @@ impl Draining {
         factors.solve([force, torque])
     }
 
-    /// Returns craft and liquids at rest as one rigid body.
     fn at_rest<T: Number>(&self, x: &[T; STATES]) -> Rigid<T> {
         let liquids = self.tanks.iter().enumerate();
         liquids.fold(self.craft.lift::<T>(), |sum, (i, mounted)| {
@@ -325,7 +317,7 @@ impl Draining {
         })
     }
 
-    /// Returns [a; w'] of craft and liquids at rest as one rigid body, if any drag follows it
+    /// Returns [a; w'] of craft and liquids at rest as one rigid body, if any drag depends on it
     /// (`damping.rs`).
     fn rigid_motion<T: Number>(
         &self,
@@ -349,7 +341,6 @@ impl Draining {
         self.solve(&self.equations(whole.mass_matrix()), [force, torque], axes)
     }
 
-    /// Solves the equations of motion, and evaluates the tanks' contents.
     #[inline(always)]
     fn solve_instant<'a, T: Number>(
         &'a self,
@@ -388,7 +379,6 @@ impl Draining {
         Instant { q, axes, velocity, w, a, w_d, by_pivot }
     }
 
-    /// Returns the rates of the states x under the acting forces and flows.
     pub fn rates<T: Number>(&self, x: &[T; STATES], acting: &Acting<T>) -> [T; STATES] {
         let mut contents = [const { None }; TANKS];
         let Instant { q, axes, velocity, w, a, w_d, by_pivot } =
@@ -469,7 +459,6 @@ mod tests {
     use crate::parameters::{DampingLaw, Limits, MAX_STEPS};
     use crate::state::Ramp;
 
-    /// A run that counts the evaluations of its equations.
     struct Counted<'a> {
         run: Run<'a>,
         evaluations: &'a Cell<usize>,
@@ -506,8 +495,8 @@ mod tests {
         }
     }
 
-    /// Returns a craft with one to three draining tanks with slosh, rotated and off the axis. The craft starts at rest
-    /// at the origin, so position and velocity begin at 0.
+    /// Returns a craft with one to three draining tanks with slosh, rotated and off the axis. It starts at
+    /// rest at the origin, so position and velocity begin at 0.
     fn draining_craft(seed: u64) -> (Parameters, Inputs) {
         let mut rng = fastrand::Rng::with_seed(seed);
         let mut size = |size: f64| size * (2.0 * rng.f64() - 1.0);
@@ -558,8 +547,8 @@ mod tests {
         (x, evaluations.get())
     }
 
-    /// Asserts that long and short steps of a craft end in the same state, and that long steps take
-    /// at most twice the work.
+    /// Asserts that long and short steps of a craft end in the same state, and that long steps take at most
+    /// twice the work.
     fn compare_lengths_of_steps(seed: u64, tolerances: &[f64]) {
         let (p, u) = draining_craft(seed);
         let (exact, _) = run(&p, &u, 1.0, 1e-14);
@@ -581,7 +570,8 @@ mod tests {
         }
     }
 
-    /// Covers all tolerances. Rounding limits the tightest one. Sixteen craft at every tolerance, below, take a minute.
+    /// One craft covers all tolerances, of which rounding limits the tightest; the sixteen craft below would
+    /// take a minute at every tolerance.
     #[test]
     fn a_long_step_of_a_draining_craft_ends_where_its_pieces_do_for_at_most_twice_their_work() {
         for seed in 0..4 {

@@ -13,31 +13,29 @@ use crate::rigid::{Factors, Rigid};
 use crate::sizes::MODES;
 use crate::state::BallState;
 
-/// Carrier of tanks whose liquid can detach. `lump` is the number of its lump, `t` is the time since the start of the
-/// call, s. Vectors are in body axes.
+/// Carrier of tanks whose liquid can detach: the spacecraft, or the host's craft of a SloshTank. `lump` is
+/// the number of a detached liquid, `t` is the time since the start of the call, s. Vectors are in body axes.
 pub(crate) trait Carrier {
-    /// Everything that a change may alter.
+    /// Copy of everything that a change may alter, to undo it.
     type Memory;
 
     fn memory(&self) -> Self::Memory;
 
     fn restore(&mut self, memory: &Self::Memory);
 
-    /// Computes all quantities of the equations of motion at the time `t`, s.
+    /// Computes all quantities of the equations of motion at the time `t`.
     fn evaluate_at(&mut self, t: f64);
 
     fn lump(&self, lump: usize) -> &Lump;
 
-    /// Returns the state of the detached liquid: settled, flying, or on the wall.
     fn ball_state(&mut self, lump: usize) -> &mut BallState;
 
-    /// Returns the six numbers of the detached liquid (position and velocity) among the states.
+    /// Returns the six numbers of the detached liquid, position and velocity, among the states.
     fn ball(&mut self, lump: usize) -> &mut [f64];
 
-    /// Returns the six numbers of a bob (direction p and velocity v) of the lump's tank among the states.
+    /// Returns the six numbers of a bob of the lump's tank, direction p and velocity v, among the states.
     fn bob(&mut self, lump: usize, n: usize) -> &mut [f64];
 
-    /// Returns the directions of the bobs of the lump's tank, unit vectors.
     fn directions(&self, lump: usize) -> Directions;
 
     /// Returns the bobs of the lump's tank with their present motion, after [`Carrier::evaluate_at`].
@@ -52,16 +50,15 @@ pub(crate) trait Carrier {
     /// Returns the acceleration a, the angular velocity w and the angular acceleration w' of the carrier.
     fn motion(&self) -> [&Vector; 3];
 
-    /// Factors of the mass matrix with everything attached to the carrier.
+    /// Returns the factors of the mass matrix with everything attached to the carrier.
     fn factors(&self) -> &Factors;
 
-    /// Returns the energy dissipated since the start, J.
     fn dissipated(&mut self) -> &mut f64;
 
-    /// Applies an impulse about O to the carrier and everything attached to it. Returns the changes of V and w.
+    /// Applies an impulse about O to the carrier and everything attached to it. Returns the changes of V and
+    /// w.
     fn apply_impulse(&mut self, impulse: [Vec3; 2], t: f64) -> [Vec3; 2];
 
-    /// Moves the carrier, if it can move.
     fn shift(&mut self, by: Vec3);
 
     /// Returns true if the wall presses on the lump in its current state.
@@ -104,8 +101,8 @@ pub(crate) trait Carrier {
         self.lump(lump).may_settle(a, w, w_d)
     }
 
-    /// Returns the kinetic energy and that of the centring springs in a frame in which O moves with `v`, body axes,
-    /// after [`Carrier::evaluate_at`]. In this frame nothing cancels, however fast the carrier is.
+    /// Returns the kinetic energy and that of the centring springs in a frame in which O moves with `v`, body
+    /// axes, after [`Carrier::evaluate_at`]. In this frame nothing cancels, however fast the carrier is.
     fn energy_with(&self, v: Vec3) -> f64 {
         let (w, rigid) = (self.motion()[1][0], self.rigid());
         let spin = dot(w, times(&rigid.inertia, w));
@@ -168,8 +165,8 @@ pub(crate) trait Carrier {
         self.strike(lump, e, t);
     }
 
-    /// Moves a lump that a host has integrated through the wall back onto the wall. Keeps its velocity, the common
-    /// centre of mass and the angular momentum.
+    /// Moves a lump that a host has integrated through the wall back onto the wall. Its velocity, the common
+    /// centre of mass and the angular momentum stay as they are.
     fn bring_to_wall(&mut self, lump: usize, t: f64) {
         let before = self.energy_with([0.0; 3]);
         let (mass, of_center) = self.drift_of_center();

@@ -70,16 +70,13 @@ use crate::state::BallState;
 /// Cosine of the largest angle from the axis at which a bob represents liquid.
 pub(crate) const COS_45: f64 = core::f64::consts::FRAC_1_SQRT_2;
 
-/// Largest coefficient of the liquid's place whose square is formed, m.
+/// Largest coefficient of the liquid's place, m, whose square is formed, so that squares do not overflow.
 const LARGEST_COEFFICIENT: f64 = 1e75;
-/// Value of f within which the lump touches the wall.
 const TOUCHING: f64 = 1e-10;
-/// Value of f' below which the lump moves neither from nor towards the wall, 1/s.
 const RESTING: f64 = 1e-9;
-/// Value of f'' below which nothing presses the lump to the wall, 1/s2, relative to the terms of
-/// f''.
+/// Value of f'', relative to its terms, 1/s2, below which nothing presses the lump to the wall.
 const PRESSING: f64 = 1e-9;
-/// Distance over which the slope of an event function at an event is taken, relative to the event's time.
+/// Distance from an event, relative to its time, over which the slope of an event function is taken.
 const NEAR: f64 = 1e-6;
 /// Largest change of an event's time in an iteration, relative to it, and number of iterations.
 const FAR: f64 = 0.1;
@@ -87,44 +84,41 @@ const ITERATIONS: usize = 4;
 /// Square of the sine of 30 degrees, the largest swing at which the pendulums take over the liquid.
 const SWING: f64 = 0.25;
 
-/// Event of a tank's liquid.
+/// Event of a tank's liquid: it leaves the bottom, meets the wall, is no longer pressed to it (`Release`), is
+/// pressed strongly enough for the drag, or is taken over by the pendulums (`Settle`). At `Look` a condition
+/// has changed that is not sufficient alone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Due {
-    /// The liquid leaves the bottom.
     Leave,
-    /// The lump meets the wall.
     Impact,
-    /// Nothing presses the lump to the wall any more.
     Release,
-    /// The wall force is large enough for the drag.
     Drag,
-    /// The pendulums take over the liquid.
     Settle,
-    /// A condition has changed that is not sufficient alone.
     Look,
 }
 
-/// Function that crosses zero at an event.
+/// Function that crosses zero at an event. `Exact` stands for functions whose series are as exact as the
+/// motion's: the wall force and the bobs' mean cosine. `Axial` is the specific force along the axis over its
+/// lower limit, `Passage` half of the derivative of the square of the distance from the axis, and `Excess`
+/// the wall force over that for drag.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Crossing {
-    /// A function whose series is as exact as the motion's: the wall force, the bobs' mean cosine, or none.
     Exact,
-    /// f
     Contact,
-    /// Specific force along the axis over its lower limit.
     Axial,
-    /// Half of the derivative of the square of the distance from the axis.
     Passage,
-    /// Wall force over that for drag.
     Excess,
-    /// A condition of [`Lump::settling`].
     Settling(usize),
 }
 
-/// The directions of a tank's bobs, tank axes.
 pub(crate) type Directions = [Vec3; MODES];
 
-/// One tank's detached liquid and the series of its motion; body axes.
+/// One tank's detached liquid and the series of its motion, body axes, with the symbols above. `drag` is d,
+/// 1/s; `axes` turns tank axes to body axes; the surface within reach has its centre at `height` on the
+/// tank's axis and the semi-axes `half` along it and `across`; `gyration` is R_p. `shares` are the modes'
+/// shares of the modal mass, and l_s is the length whose inverse is the mean of 1/l by these shares. The
+/// liquid leaves the bottom below the specific force `lowest` along the axis and comes back above `floor`,
+/// m/s2.
 #[derive(Clone, Debug)]
 pub(crate) struct Lump {
     pub tank: usize,
@@ -133,26 +127,19 @@ pub(crate) struct Lump {
     pub m: f64,
     restitution: f64,
     contact_speed: f64,
-    /// d, 1/s
     drag: f64,
-    /// Rotation from tank to body axes, direction of the tank's axis, and the tank's origin from O.
     axes: Mat3,
     e: Vec3,
     origin: Vec3,
-    /// Centre of the surface within reach, on the tank's axis and from O; its semi-axes a and b.
     height: f64,
     center: Vec3,
     half: f64,
     radius: f64,
     d: Mat3,
-    /// R_p
     gyration: f64,
-    /// Hinge of mode 1.
     hinge: Vec3,
-    /// Each mode's share of the modal mass, and the length l_s whose inverse is the mean of 1/l by these shares.
     shares: [f64; MODES],
     swing_length: f64,
-    /// The rigid liquid, its mass, centre from O, and inertia about its centre.
     pub rigid: Rigid,
     m_0: f64,
     s: Vec3,
@@ -161,8 +148,6 @@ pub(crate) struct Lump {
     masses: [f64; MODES],
     lengths: [f64; MODES],
     hinges: [Vec3; MODES],
-    /// Limits of the specific force along the axis: the liquid leaves below `lowest` and comes back
-    /// above `floor`.
     lowest: f64,
     floor: f64,
 
@@ -174,44 +159,37 @@ pub(crate) struct Lump {
     squared: Series,
     pull: Series,
     force: Vector,
-    /// a + w' x rho
     specific: Vector,
-    /// u + x', and w x (u + x')
     sum: Vector,
     turned: Vector,
-    /// w x u
     u_turned: Vec3,
-    /// Derivative of the shape's inertia J_a along the seeded direction, kg m2, body axes; 0 in an expansion over time.
+    /// Derivative of the shape's inertia J_a along the seeded direction, kg m2, body axes; 0 in an expansion
+    /// over time.
     pub shape_slope: Mat3,
-    /// Terms of the current order that do not depend on [a; w'] of this order.
     known_pull: f64,
     known_force: Vec3,
     known_specific: Vec3,
 }
 
-/// Sum over k from `first` to n of a_k . b_(n-k).
 fn dots(a: &Vector, b: &Vector, first: usize, n: usize) -> f64 {
     (first..=n).map(|k| dot(a[k], b[n - k])).sum()
 }
 
-/// Sum over k from `first` to n of b_(n-k) x a_k.
 fn crosses(b: &Vector, a: &Vector, first: usize, n: usize) -> Vec3 {
     (first..=n).fold([0.0; 3], |sum, k| add(sum, cross(b[n - k], a[k])))
 }
 
-/// Sum over k from `first` to n of s_(n-k) a_k.
 fn scaled(s: &Series, a: &Vector, first: usize, n: usize) -> Vec3 {
     (first..=n).fold([0.0; 3], |sum, k| add(sum, scale(s[n - k], a[k])))
 }
 
-/// Coefficient n of a product.
 fn product(a: &Series, b: &Series, n: usize) -> f64 {
     (0..=n).map(|k| a[k] * b[n - k]).sum()
 }
 
 impl Lump {
-    /// Creates the lump of tank `index`, from 0, whose derived parameters are resolved. Returns
-    /// `None` without a model of detached liquid.
+    /// Creates the lump of tank number `index`, which counts from 0 and whose derived parameters are
+    /// resolved. Returns `None` without a model of detached liquid.
     pub fn new(tank: &Tank, index: usize) -> Option<Lump> {
         let surface = tank.ball_surface()?;
         let axes = rotation(&unit_quaternion(tank.q));
@@ -280,7 +258,7 @@ impl Lump {
         })
     }
 
-    /// Returns the position of the settled liquid's centre, at rest; tank axes.
+    /// Returns position and velocity of the centre of the settled liquid at rest, tank axes.
     pub fn at_rest(&self) -> [f64; 6] {
         [0.0, 0.0, self.height - self.half, 0.0, 0.0, 0.0]
     }
@@ -290,12 +268,12 @@ impl Lump {
         self.state != BallState::Settled
     }
 
-    /// Returns d while drag acts, 1/s, otherwise 0.
     fn drag(&self) -> f64 {
         if self.state == BallState::Sliding { self.drag } else { 0.0 }
     }
 
-    /// Returns true if drag acts. With d = 0 a released lump would alternate between sliding and light by rounding.
+    /// Returns true if drag acts. With d = 0 a released lump would alternate between sliding and light by
+    /// rounding.
     pub fn drags(&self) -> bool {
         self.drag() > 0.0
     }
@@ -304,8 +282,7 @@ impl Lump {
         matches!(self.state, BallState::Sliding | BallState::Light | BallState::Held)
     }
 
-    /// Returns masses and positions from O of the rigid liquid and the bobs, with the rods along
-    /// `p`.
+    /// Returns masses and positions from O of the rigid liquid and the bobs, with the rods along `p`.
     fn parts(&self, p: &Directions) -> [(f64, Vec3); MODES + 1] {
         core::array::from_fn(|i| match i {
             0 => (self.m_0, self.s),
@@ -314,18 +291,17 @@ impl Lump {
         })
     }
 
-    /// Position of bob n from O, with its rod along `p`, body axes.
     fn bob_at(&self, n: usize, p: Vec3) -> Vec3 {
         add(self.hinges[n], scale(self.lengths[n], p))
     }
 
-    /// Returns the common centre of the parts from O.
     pub fn common_center(&self, p: &Directions) -> Vec3 {
         let moment = self.parts(p).iter().fold([0.0; 3], |sum, (m, rho)| add(sum, scale(*m, *rho)));
         scale(1.0 / self.m, moment)
     }
 
-    /// J_a: inertia of the shape with the rods along `p`, about its own centre.
+    /// Returns the rigid body with the inertia J_a of the liquid's shape with the rods along `p`, about its
+    /// own centre.
     pub fn shape(&self, p: &Directions) -> Rigid {
         let center = self.common_center(p);
         let around =
@@ -334,8 +310,8 @@ impl Lump {
         Rigid { mass: 0.0, moment: [0.0; 3], inertia }
     }
 
-    /// Sets the derivative of [`Lump::shape`]'s inertia at the directions `p` along `dp`. The centre moves, too, but
-    /// the first moment about it is 0, so its velocity drops out.
+    /// Sets the derivative of [`Lump::shape`]'s inertia at the directions `p` along `dp`. The centre moves,
+    /// too, but the first moment about it is 0, so its velocity drops out.
     pub fn seed_shape(&mut self, p: &Directions, dp: &Directions) {
         let center = self.common_center(p);
         let mut slope = [[0.0; 3]; 3];
@@ -353,8 +329,7 @@ impl Lump {
         self.shape_slope = slope;
     }
 
-    /// Returns the lump's six numbers for its centre at `rho` from O moving with `rate` relative to
-    /// the tank.
+    /// Returns the lump's six numbers for its centre at `rho` from O moving with `rate` relative to the tank.
     pub fn numbers(&self, rho: Vec3, rate: Vec3) -> [f64; 6] {
         let at = transposed_times(&self.axes, sub(rho, self.origin));
         let rate = transposed_times(&self.axes, rate);
@@ -372,8 +347,8 @@ impl Lump {
         [at[0], at[1], at[2] + self.height, rate[0], rate[1], rate[2]]
     }
 
-    /// Starts an expansion at position and rate (tank axes, six numbers) while the craft rotates with `w`. Moves both
-    /// of a sliding lump onto the wall first.
+    /// Starts an expansion at position and rate (tank axes, six numbers) while the craft rotates with `w`. A
+    /// sliding lump is first moved onto the wall, with its velocity along it.
     pub fn start(&mut self, x: &[f64; 6], w: Vec3) {
         let x = if self.slides() { self.on_wall(x) } else { *x };
         self.x_0 = times(&self.axes, [x[0], x[1], x[2] - self.height]);
@@ -383,8 +358,8 @@ impl Lump {
         self.u[0] = add(self.x_d[0], cross(w, self.rho[0]));
     }
 
-    /// Sets coefficient 1 of position and velocity to their derivatives along `dx` (of the six numbers) and `dw` (of
-    /// the angular velocity); for a sliding lump at numbers on the wall.
+    /// Sets coefficient 1 of position and velocity to their derivatives along `dx` (of the six numbers) and
+    /// `dw` (of the angular velocity). The numbers of a sliding lump must be on the wall.
     pub fn seed_direction(&mut self, dx: &[f64; 6], w: Vec3, dw: Vec3) {
         let mut at = times(&self.axes, part(dx, 0));
         let mut rate = times(&self.axes, part(dx, 3));
@@ -398,8 +373,8 @@ impl Lump {
         self.u[1] = add(rate, add(cross(dw, self.rho[0]), cross(w, at)));
     }
 
-    /// Returns position and rate at `t` after the start at `x`, from the series up to order n; `w` is the craft's
-    /// angular velocity at that time.
+    /// Returns position and rate at `t` after the start at `x`, from the series up to order n; `w` is the
+    /// craft's angular velocity at that time.
     pub fn state_at(&self, x: &[f64; 6], n: usize, t: f64, w: Vec3) -> [f64; 6] {
         let (rho, u) = (space::value(&self.rho, n, t), space::value(&self.u, n, t));
         let rate = sub(u, cross(w, rho));
@@ -411,7 +386,8 @@ impl Lump {
         if self.slides() { self.on_wall(&x) } else { x }
     }
 
-    /// Returns coefficient n of force and torque about O on the craft without the terms in [a; w'] of this order.
+    /// Returns coefficient n of force and torque about O on the craft without the terms in [a; w'] of this
+    /// order.
     pub fn reaction(&mut self, n: usize, w: &Vector, w_d: &Vector) -> [Vec3; 2] {
         self.x_d[n] = sub(self.u[n], crosses(w, &self.rho, 0, n));
         self.u_turned = crosses(w, &self.u, 0, n);
@@ -442,29 +418,26 @@ impl Lump {
         [self.known_force, torque]
     }
 
-    /// Returns n and rho x n of a sliding lump at the start of the expansion, its direction in the mass matrix.
+    /// Returns n and rho x n of a sliding lump at the start of the expansion, which is its direction in the
+    /// mass matrix.
     pub fn along_normal(&self) -> Option<[f64; 6]> {
         self.slides().then(|| along_rod(self.outwards(), self.rho[0]))
     }
 
-    /// Returns n at the start of the expansion.
     pub fn outwards(&self) -> Vec3 {
         let g = times(&self.d, self.x_0);
         scale(1.0 / libm::sqrt(dot(g, g)), g)
     }
 
-    /// Returns the position from O at the start of the expansion.
     pub fn position(&self) -> Vec3 {
         self.rho[0]
     }
 
-    /// Returns x' at the start of the expansion.
     pub fn rate(&self) -> Vec3 {
         self.x_d[0]
     }
 
-    /// Sets coefficient n of the forces and n + 1 of position and velocity, from coefficient n of
-    /// [a; w'].
+    /// Sets coefficient n of the forces and n + 1 of position and velocity, from coefficient n of [a; w'].
     pub fn accelerate(&mut self, n: usize, a: Vec3, w_d: Vec3) {
         let specific = add(a, cross(w_d, self.rho[0]));
         if self.slides() {
@@ -481,14 +454,12 @@ impl Lump {
         self.rho[n + 1] = self.x_d[n].map(|x| x / order);
     }
 
-    /// Returns coefficient n of the dissipated power, m d |x'|^2, W.
     pub fn dissipation(&self, n: usize) -> f64 {
         let drag = self.drag();
         if drag > 0.0 { self.m * drag * dots(&self.x_d, &self.x_d, 0, n) } else { 0.0 }
     }
 
-    /// Returns coefficient n (0 or 1) of the rates of the six numbers: x', x'' = u' - w' x rho - w
-    /// x x'.
+    /// Returns coefficient n (0 or 1) of the rates of the six numbers: x', and x'' = u' - w' x rho - w x x'.
     pub fn rates(&self, n: usize, w: &Vector, w_d: &Vector) -> [f64; 6] {
         let u_d = scale((n + 1) as f64, self.u[n + 1]);
         let turned = add(crosses(w_d, &self.rho, 0, n), crosses(w, &self.x_d, 0, n));
@@ -497,12 +468,11 @@ impl Lump {
         [x_d[0], x_d[1], x_d[2], x_dd[0], x_dd[1], x_dd[2]]
     }
 
-    /// Scale of u within the time `t`, m/s.
+    /// Returns the scale of u within the time `t`, m/s, for error control.
     pub fn speed_scale(&self, w: Vec3, t: f64) -> f64 {
         largest(self.x_d[0]) + self.half * largest(w) + largest(self.u[1]) * t
     }
 
-    /// Magnitude of coefficient n of u.
     pub fn coefficient_norm(&self, n: usize) -> f64 {
         largest(self.u[n])
     }
@@ -511,13 +481,12 @@ impl Lump {
         [0, 1, 2].map(|i| T::with_slope(a[0][i], a[1][i]))
     }
 
-    /// Returns the force on the craft and its torque about O.
     pub fn wrench<T: Number>(&self) -> [Vec3<T>; 2] {
         let force = Self::value_and_slope::<T>(&self.force);
         [force, cross(Self::value_and_slope(&self.rho), force)]
     }
 
-    /// Returns G and G.G of a sliding lump.
+    /// Returns the gradient G of a sliding lump's surface and G.G.
     fn gradient<T: Number>(&self) -> (Vec3<T>, T) {
         let g = times(
             &self.d.map(constant),
@@ -526,7 +495,7 @@ impl Lump {
         (g, dot(g, g))
     }
 
-    /// Returns the wrench at a = 0 and w' = 0 (also in N).
+    /// Returns the wrench at a = 0 and w' = 0, also in N.
     pub fn bias<T: Number>(&self, w: Vec3<T>) -> [Vec3<T>; 2] {
         if !self.slides() {
             return [constant([0.0; 3]); 2];
@@ -541,14 +510,13 @@ impl Lump {
         [force, cross(rho, force)]
     }
 
-    /// Returns m and u of m u u^T, the added mass of a sliding lump: m/G.G and [G; rho x G].
+    /// Returns m/G.G and u = [G; rho x G] of m u u^T, the added mass of a sliding lump.
     pub fn added_mass<T: Number>(&self) -> Option<(T, [T; 6])> {
         let (g, squared) = self.gradient::<T>();
         let along = || along_rod(g, Self::value_and_slope::<T>(&self.rho));
         self.slides().then(|| (squared.recip() * self.m, along()))
     }
 
-    /// Returns values for the outputs.
     pub fn now<T: Number>(&self) -> BobNow<T> {
         BobNow {
             m: T::constant(self.m),
@@ -563,8 +531,8 @@ impl Lump {
         }
     }
 
-    /// Applies an impulse on the craft to the lump's rate. In flight the lump keeps its velocity, on the wall its
-    /// velocity along the wall.
+    /// Applies an impulse on the craft to the lump's rate. In flight the lump keeps its velocity, on the wall
+    /// its velocity along the wall.
     pub fn after_impulse(&self, x: &mut [f64], dv: Vec3, dw: Vec3) {
         let mut kick = add(dv, cross(dw, self.rho[0]));
         if self.slides() {
@@ -586,18 +554,16 @@ impl Lump {
         u.map(|half| scale((1.0 + e) * mu * self.approach(), half))
     }
 
-    /// Returns v_n at the start of the expansion, m/s.
     pub fn approach(&self) -> f64 {
         dot(self.outwards(), self.x_d[0]).max(0.0)
     }
 
-    /// Returns the coefficient of restitution, and the speed after an impact below which the lump may stay on the wall,
-    /// m/s.
+    /// Returns the coefficient of restitution, and the speed after an impact below which the lump may stay on
+    /// the wall, m/s.
     pub fn restitution(&self) -> (f64, f64) {
         (self.restitution, self.contact_speed)
     }
 
-    /// Returns true if the lump is pressed to the wall.
     pub fn is_pressed(&self) -> bool {
         self.pull[0] > 0.0
     }
@@ -609,8 +575,8 @@ impl Lump {
         [[x, y, -libm::sqrt((1.0 - x * x - y * y).max(0.0))]; MODES]
     }
 
-    /// Returns the impulse on the craft when the tank catches the parts of the lump, and the bobs' rates p' afterwards.
-    /// All parts move with `rate` relative to the tank, with rods along `p`.
+    /// Returns the impulse on the craft when the tank catches the parts of the lump, and the bobs' rates p'
+    /// afterwards. All parts move with `rate` relative to the tank, with rods along `p`.
     pub fn caught(&self, p: &Directions, rate: Vec3) -> ([Vec3; 2], Directions) {
         let mut impulse = scale(self.m_0, rate);
         let mut torque = cross(self.s, impulse);
@@ -627,8 +593,8 @@ impl Lump {
         ([impulse, torque], rates)
     }
 
-    /// Returns the momentum of the bobs' motion in the tank over the liquid's mass, and its moment about the liquid's
-    /// centre.
+    /// Returns the momentum of the bobs' motion in the tank over the liquid's mass, and its moment about the
+    /// liquid's centre.
     pub fn stirred(&self, center: Vec3, bobs: impl Iterator<Item = BobNow<f64>>) -> [Vec3; 2] {
         bobs.fold([[0.0; 3]; 2], |[rate, moment], bob| {
             let momentum = scale(bob.m, bob.rate);
@@ -637,8 +603,7 @@ impl Lump {
         })
     }
 
-    /// Returns the coefficients below n of the specific force along the tank at the hinge of mode
-    /// 1.
+    /// Returns the coefficients below n of the specific force along the tank at the hinge of mode 1.
     fn axial(&self, n: usize, a: &Vector, w: &Vector, w_d: &Vector) -> Series {
         let turned = cross(self.hinge, self.e);
         let height = dot(self.e, self.hinge);
@@ -654,8 +619,9 @@ impl Lump {
         axial
     }
 
-    /// Returns the coefficients below n of three quantities, each with the magnitude of its rounding terms: the remaining swing,
-    /// thrust along the tank, depth below the surface's centre. All must be positive before the pendulums take over the liquid.
+    /// Returns the coefficients below n of three quantities, each with the magnitude of its rounding terms:
+    /// the remaining swing, thrust along the tank, depth below the surface's centre. All must be positive
+    /// before the pendulums take over the liquid.
     fn settling(&self, n: usize, a: &Vector, w: &Vector, w_d: &Vector) -> [(Series, f64); 3] {
         let mut thrust = self.axial(n, a, w, w_d);
         thrust[0] -= self.floor;
@@ -683,8 +649,8 @@ impl Lump {
         [(swing, of_swing), (thrust, of_thrust), (depth, 1e-10 * self.half)]
     }
 
-    /// Returns the next event of the liquid within `h` after the start of the expansion up to order n, with its time.
-    /// `bobs` are those of the tank.
+    /// Returns the next event of the liquid within `h` after the start of the expansion up to order n, with
+    /// its time. `bobs` are those of the tank.
     pub fn next<'a>(
         &self,
         n: usize,
@@ -744,9 +710,9 @@ impl Lump {
         }
     }
 
-    /// Returns the time of an event near the root `t` of its function's series. Coefficient k of a product of series is up
-    /// to 2^k times those of its factors, so the series up to order n is less exact than the motion, from whose values
-    /// at the event this time comes.
+    /// Returns the time of an event near the root `t` of its function's series. Coefficient k of a product of
+    /// series is up to 2^k times those of its factors, so the series up to order n is less exact than the
+    /// motion, from whose values at the event this time comes.
     fn polish(
         &self,
         mut t: f64,
@@ -791,7 +757,6 @@ impl Lump {
         then
     }
 
-    /// Returns the value of an event function at a, w and w'.
     fn crossing(&self, motion: [Vec3; 3], crossing: Crossing) -> f64 {
         let [a, w, w_d] = motion.map(|x| {
             let mut vector = ZERO_VECTOR;
@@ -810,8 +775,8 @@ impl Lump {
         }
     }
 
-    /// Returns the coefficients up to n of the mean cosine of the bobs' angles from the axis, by modal mass, minus cos
-    /// 45 degrees.
+    /// Returns the coefficients up to n of the mean cosine of the bobs' angles from the axis, by modal mass,
+    /// minus cos 45 degrees.
     fn upright<'a>(&self, bobs: impl Iterator<Item = &'a Bob>, n: usize) -> Series {
         let mut upright = ZERO;
         for bob in bobs {
@@ -850,8 +815,8 @@ impl Lump {
         first_root(&f[..=2 * n], h)
     }
 
-    /// Returns true if a lump on or outside the wall moves or is pressed outwards. `f` has coefficients 0 to 2 of f,
-    /// and `x_2` is coefficient 2 of the position.
+    /// Returns true if a lump on or outside the wall moves or is pressed outwards. `f` has coefficients 0 to
+    /// 2 of f, and `x_2` is coefficient 2 of the position.
     fn meets_wall(&self, f: [f64; 3], x_2: Vec3) -> bool {
         if f[0] > TOUCHING || f[1] > RESTING {
             return false;
@@ -863,10 +828,10 @@ impl Lump {
         f[1] < -RESTING || f[2] < -PRESSING * size
     }
 
-    /// Returns f for hosts that integrate themselves, after order 0 of the expansion. It is below zero only if an
-    /// impact is due. After an impact the lump may be outside by rounding and move inwards, or be on the wall and not
-    /// pressed. The value is above zero there, so that a host that compares signs does not miss a bounce shorter than
-    /// its step.
+    /// Returns f for hosts that integrate themselves, after order 0 of the expansion. It is below zero only
+    /// if an impact is due. After an impact the lump may be outside by rounding and move inwards, or be on
+    /// the wall and not pressed. The value is above zero there, so that a host that compares signs does not
+    /// miss a bounce shorter than its step.
     fn distance_to_wall(&self, w: &Vector, w_d: &Vector) -> f64 {
         let (x, x_d, g) = (self.x_0, self.x_d[0], times(&self.d, self.x_0));
         let f = 1.0 - dot(x, g);
@@ -879,13 +844,13 @@ impl Lump {
         if self.meets_wall([f, -2.0 * dot(g, x_d), -bent], x_2) { f } else { TOUCHING }
     }
 
-    /// Returns true if a host that has integrated up to here has passed an event, judged by the current indicators.
+    /// Returns true if a host that has integrated up to here has passed an event, judged by the current
+    /// indicators.
     pub fn is_overdue(&self, [leaves, ends]: [f64; 2]) -> bool {
         // After the passage nearest to the axis, this indicator of a held lump stays below zero.
         leaves <= 0.0 || ends < 0.0 && self.state != BallState::Held
     }
 
-    /// Returns true if a host has integrated the lump through the wall.
     pub fn is_outside(&self) -> bool {
         1.0 - dot(self.x_0, times(&self.d, self.x_0)) < -TOUCHING
     }
@@ -896,8 +861,8 @@ impl Lump {
         add(self.center, scale(1.0 / size, self.x_0))
     }
 
-    /// Returns the coefficients below n of (wall force^2/(twice the drag)^2 - 1) times (twice the drag)^2, with the
-    /// drag that would act.
+    /// Returns the coefficients below n of (wall force^2/(twice the drag)^2 - 1) times (twice the drag)^2,
+    /// with the drag that would act.
     fn excess(&self, n: usize) -> Series {
         let (mut pull, mut excess) = (ZERO, ZERO);
         for (k, x) in pull.iter_mut().enumerate().take(n) {
@@ -911,7 +876,6 @@ impl Lump {
         excess
     }
 
-    /// Returns the time of the closest approach to the tank's axis.
     fn next_passage(&self, n: usize, h: f64) -> Option<f64> {
         let x = |k: usize| if k == 0 { self.x_0 } else { self.rho[k] };
         let across = |y: Vec3| sub(y, scale(dot(self.e, y), self.e));
@@ -951,8 +915,9 @@ impl Lump {
         self.settling(1, a, w, w_d).iter().all(|(x, fine)| x[0] > -fine)
     }
 
-    /// Returns functions that cross zero at events, for hosts that integrate themselves; `bobs` are those of the tank.
-    /// The indicators cross where [`Lump::next`] finds the event, with directions of unit length, which a host's need not be.
+    /// Returns functions that cross zero at events, for hosts that integrate themselves; `bobs` are those of
+    /// the tank. The indicators cross where [`Lump::next`] finds the event, with directions of unit length,
+    /// which a host's need not be.
     pub fn indicators<'a>(
         &self,
         [a, w, w_d]: [&Vector; 3],
@@ -982,8 +947,8 @@ impl Lump {
     }
 }
 
-/// Returns the time within h at which the series of a, up to order n, rises through zero. At h = 0, for hosts that have
-/// found the event themselves, returns 0 if a is positive.
+/// Returns the time within h at which the series of a, up to order n, rises through zero. At h = 0, for hosts
+/// that have found the event themselves, returns 0 if a is positive.
 fn rise(a: &Series, n: usize, h: f64) -> Option<f64> {
     let size = a[..n].iter().rev().fold(0.0, |sum, x| sum * h.min(1.0) + x.abs());
     let below = a.map(|x| -x);
@@ -997,7 +962,7 @@ fn rise(a: &Series, n: usize, h: f64) -> Option<f64> {
 mod tests {
     use super::*;
 
-    /// Checks t - 1/4, 1/4 - t, t - 1/4 from far below, and a series that only touches zero.
+    /// The series are t - 1/4, 1/4 - t, t - 1/4 from far below, and one that only touches zero.
     #[test]
     fn a_series_rises_where_it_passes_zero_from_below() {
         let of = |terms: &[f64]| {
@@ -1019,7 +984,7 @@ mod tests {
         assert_eq!([1e-9, -1e-9].map(|a| rise(&of(&[a, 1.0]), 2, 0.0)), [Some(0.0), None]);
     }
 
-    /// Detached liquid of the default tank at the bottom, in a surface 2 m high and 2 m wide.
+    /// Returns detached liquid of the default tank at the bottom, in a surface 2 m high and 2 m wide.
     fn lump(state: BallState) -> Lump {
         let mut tank = Tank::default();
         tank.ball.travel = 0.6;
@@ -1031,7 +996,6 @@ mod tests {
         lump
     }
 
-    /// The x component of a vector's coefficients.
     fn along_x(terms: &[f64]) -> Vector {
         let mut vector = ZERO_VECTOR;
         for (n, term) in terms.iter().enumerate() {
@@ -1044,8 +1008,7 @@ mod tests {
         along_x(terms).map(|[x, y, z]| [z, y, x])
     }
 
-    /// Returns the next event within a second of a lump without specific force, which no pendulum
-    /// takes over.
+    /// Returns the next event within a second of a lump without specific force, which no pendulum takes over.
     fn next(lump: &Lump) -> Option<(f64, Due)> {
         lump.next(4, 1.0, [&ZERO_VECTOR; 3], core::iter::empty())
     }
@@ -1055,8 +1018,9 @@ mod tests {
         assert!((found.0 - t).abs() < 1e-9 && found.1 == due, "{found:?} {t} {due:?}");
     }
 
-    /// The wall force N |n| must be twice the drag m d |x'|: 2 x 5 kg x 0.3 1/s x 2 m/s are 6 N. If it rises from 4.5 N
-    /// by 4 N/s, this happens after 0.375 s. No event is due if drag already acts, or if |n| is a half.
+    /// The wall force N |n| must be twice the drag m d |x'|: 2 x 5 kg x 0.3 1/s x 2 m/s are 6 N. If it rises
+    /// from 4.5 N by 4 N/s, this happens after 0.375 s. No event is due if drag already acts, or if |n| is a
+    /// half.
     #[test]
     fn a_light_lump_drags_from_twice_its_drag_on() {
         let mut lump = lump(BallState::Light);
@@ -1075,7 +1039,8 @@ mod tests {
         assert_eq!(lump.excess(3)[1], 36.0 - 36.0);
     }
 
-    /// A wall force of 1 N that falls by 2 N/s vanishes after 0.5 s. The lump passes the axis after 0.25 or 0.75 s.
+    /// A wall force of 1 N that falls by 2 N/s vanishes after 0.5 s. The lump passes the axis after 0.25 or
+    /// 0.75 s.
     #[test]
     fn of_release_and_passage_the_earlier_is_due() {
         let mut lump = lump(BallState::Held);
@@ -1093,9 +1058,9 @@ mod tests {
         assert_eq!(next(&lump), None);
     }
 
-    /// A lump halfway down with 3 m/s reaches the top in half a second, as does one that leaves the wall with 4 m/s.
-    /// The impact is immediate if the lump moves into the wall or rests there and is pressed. A lump that
-    /// falls away from rest never meets the wall.
+    /// A lump halfway down with 3 m/s reaches the top in half a second, as does one that leaves the wall with
+    /// 4 m/s. The impact is immediate if the lump moves into the wall or rests there and is pressed. A lump
+    /// that falls away from rest never meets the wall.
     #[test]
     fn a_lump_in_flight_meets_the_wall_before_it() {
         let mut lump = lump(BallState::Flying);
@@ -1121,8 +1086,6 @@ mod tests {
         assert_eq!(next(&lump), Some((0.0, Due::Impact)));
     }
 
-    /// The scale is 2 m/s plus the speeds from 3 rad/s over half of the surface's height and from 5 m/s² in a tenth of
-    /// a second.
     #[test]
     fn a_lump_s_speed_is_measured_by_all_that_moves_it() {
         let mut lump = lump(BallState::Flying);

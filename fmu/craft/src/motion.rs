@@ -59,17 +59,18 @@ use crate::rigid::{Factors, Mat6, Rigid, add_rank_one, along_rod};
 
 use crate::state::{BallState, Inputs, STATES, State, index};
 
-/// Longest time over which a rate scale is estimated, s. In a step much longer than this, rates
-/// change.
+/// Longest time over which a rate scale is estimated, s, because rates change in a step much longer than
+/// this.
 pub const SCALE_TIME: f64 = 0.1;
 
-/// Returns coefficient n of the matrix of y -> w x (w x y) = (w w^T - |w|^2 1) y, from that of w w^T.
+/// Returns coefficient n of the matrix of y -> w x (w x y) = (w w^T - |w|^2 1) y, from coefficient n of w
+/// w^T.
 #[inline(always)]
 pub fn twice_crossed([xx, yy, zz, xy, xz, yz]: [f64; 6]) -> Mat3 {
     [[-yy - zz, xy, xz], [xy, -xx - zz, yz], [xz, yz, -xx - yy]]
 }
 
-/// Returns w x (I w) from w w^T, linear in its components.
+/// Returns w x (I w) from w w^T, in which it is linear.
 #[inline(always)]
 fn gyroscopic(inertia: &Mat3, [xx, yy, zz, xy, xz, yz]: [f64; 6]) -> Vec3 {
     let columns = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
@@ -77,8 +78,8 @@ fn gyroscopic(inertia: &Mat3, [xx, yy, zz, xy, xz, yz]: [f64; 6]) -> Vec3 {
     [element(2, 1) - element(1, 2), element(0, 2) - element(2, 0), element(1, 0) - element(0, 1)]
 }
 
-/// Replaces the upper half of a matrix so that the solution's upper half equals that of the
-/// right-hand side: a on a pivot.
+/// Replaces the upper half of a matrix so that the solution's upper half equals that of the right-hand side,
+/// which is a on a pivot.
 #[inline(always)]
 fn hold_upper_rows(matrix: &mut Mat6) {
     for i in 0..3 {
@@ -89,7 +90,11 @@ fn hold_upper_rows(matrix: &mut Mat6) {
     }
 }
 
-/// The craft at its current state and the series of its motion.
+/// The craft at its current state and the series of its motion. `craft` is the dry craft, `parked` the bobs
+/// of tanks whose liquid has detached, and `whole` craft and liquids at rest as one rigid body, on whose
+/// motion along the tanks the bobs' drag depends. M is `matrix`; `w_both` is (w, w); `torque` is tau - h_w'.
+/// The fields with `allowed` are 1 over the allowed errors of attitude, rate, the bobs' v, velocity, and the
+/// lumps' u.
 #[derive(Clone, Debug)]
 pub struct CraftMotion {
     pub state: State,
@@ -97,65 +102,46 @@ pub struct CraftMotion {
     pub mount: Mount,
     gravity: Vec3,
     pub pivot: Pivot,
-    /// True if the pivot has stiffness, damping or friction; its dry friction about each axis, if any; Z; and the
-    /// current coefficients of the torque and its dissipation.
     on_springs: bool,
     rubbing: Vec<Rubbing>,
     upright: Vector,
     of_pivot: Vec3,
     loss_of_pivot: f64,
-    /// The dry craft, the same with the rigid liquids, and each tank's rigid liquid.
     pub craft: Rigid,
     pub rigid: Rigid,
     mass_matrix: Mat6,
     pub liquids: Vec<Rigid>,
     pub bobs: Vec<Bob>,
-    /// Bobs that are not pendulums or are guided in a plane.
     constrained: Vec<ConstrainedBob>,
-    /// Bobs of the tanks whose liquid has detached.
     parked: Vec<Bob>,
-    /// Detached liquid of each tank that models it.
     pub lumps: Vec<Lump>,
-    /// True if any liquid is detached, or any bob is constrained.
     any_apart: bool,
-    /// True if an expansion may end with an event.
     has_events: bool,
     /// Index of the constrained bob that reaches the bound of its surface at the end of the expansion.
     beyond: Option<usize>,
     /// Lump and event at the end of the expansion.
     due: Option<(usize, Due)>,
-    /// True if any bob's drag follows the acceleration.
     follows: bool,
-    /// Craft and liquids at rest as one rigid body, and the part of its motion along each bob's tank (on a pivot from
-    /// [a; torque], else from [force; torque]).
     whole: Rigid,
     along: Vec<[Vec3; 2]>,
-    /// M at the start of the expansion, and its factors.
     matrix: Mat6,
     factors: Factors,
     force: [Vec3; 2],
-    /// tau - h_w'
     torque: [Vec3; 2],
     pub h: [Vec3; 2],
     pub q: Attitude,
     pub w: Vector,
-    /// (w, w)
     w_both: Pair,
     pub w_d: Vector,
     pub a: Vector,
     gain: Vector,
-    /// gain and path
     travel: Pair,
     pub drift: Vector,
-    /// drift + gain
     speed: Vector,
     pub work: Series,
     pub dissipation: Series,
-    /// 1 over the allowed errors of attitude, rate, the bobs' v, and velocity
     inv_allowed: [f64; 4],
-    /// 1 over the allowed error of the lumps' u.
     lumps_allowed: f64,
-    /// The longest pendulum, m.
     longest: f64,
 }
 
@@ -235,7 +221,8 @@ impl CraftMotion {
         motion
     }
 
-    /// Sets up craft and liquids at rest as one rigid body. The bobs' drag follows its acceleration along their tanks.
+    /// Sets up craft and liquids at rest as one rigid body. The bobs' drag depends on its acceleration along
+    /// their tanks.
     fn freeze(&mut self) {
         let point = |m: f64, at: Vec3| Rigid::new(m, at, &[[0.0; 3]; 3]);
         let constrained = self.constrained.iter().map(|bob| point(bob.m, bob.at_rest()));
@@ -307,9 +294,9 @@ impl CraftMotion {
         self.factors.solve([force, torque])
     }
 
-    /// Applies a change of the wheels' momentum to `h`. A jump turns the craft by an impulse, [dV;
-    /// dw] = M^-1 [0; -dh], l dp' = -(1 - p p^T)(dV + dw x rho), work -dh.(w + dw/2). Returns true
-    /// if the momentum jumps.
+    /// Applies a change of the wheels' momentum to `h`. A jump turns the craft by an impulse, [dV; dw] = M^-1
+    /// [0; -dh], l dp' = -(1 - p p^T)(dV + dw x rho), work -dh.(w + dw/2). Returns true if the momentum
+    /// jumps.
     pub fn set_wheels(&mut self, h: Vec3) -> bool {
         if h == self.state.h_wheels {
             return false;
@@ -350,7 +337,6 @@ impl CraftMotion {
         }
     }
 
-    /// Evaluates the equations at the current instant.
     pub fn evaluate(&mut self, inputs: &Inputs) {
         self.inputs = *inputs;
         self.evaluate_at(0.0);
@@ -397,8 +383,7 @@ impl CraftMotion {
         self.expand_rates::<1>();
     }
 
-    /// Returns the rotation, rad, body axes, of coefficient 1 of the attitude: q_1 = q_0 o (0,
-    /// turn)/2.
+    /// Returns the rotation, rad, body axes, of coefficient 1 of the attitude: q_1 = q_0 o (0, turn)/2.
     fn turn(&self) -> Vec3 {
         let [a, x, y, z] = self.q.get(0);
         let [b, v @ ..] = self.q.get(1);
@@ -415,7 +400,6 @@ impl CraftMotion {
         integrator::advance(self, begin, h, limits.tolerance, &mut limits.steps()).map(|_| ())
     }
 
-    /// Computes coefficient N of every quantity and N + 1 of the states.
     #[inline(always)]
     fn expand_rates<const N: usize>(&mut self) {
         // The pivot comes first. Between the sums below it would take registers from every craft, 4 % of a step.
@@ -482,7 +466,6 @@ impl CraftMotion {
         self.dissipation[N] = dissipation;
     }
 
-    /// Computes coefficient N of the pivot's torque and dissipation and N + 1 of Z.
     #[inline(never)]
     fn set_torque_of_pivot<const N: usize>(&mut self) {
         let ww = products::<N>(&self.w);
@@ -495,8 +478,8 @@ impl CraftMotion {
         self.upright[N + 1] = next::<N>(cross::<N>(&self.upright, &self.w));
     }
 
-    /// Computes coefficient N of the specific force along each tank at the hinges, e.(a + w' x P + w x (w x P)), of
-    /// craft and liquids as one rigid body.
+    /// Computes coefficient N of the specific force along each tank at the hinges, e.(a + w' x P + w x (w x
+    /// P)), of craft and liquids as one rigid body.
     #[inline(never)]
     fn set_axial<const N: usize>(&mut self) {
         let ww = products::<N>(&self.w);
@@ -525,7 +508,6 @@ impl CraftMotion {
         }
     }
 
-    /// Returns the time over which the series of the bobs' drag are valid, s.
     #[inline(never)]
     fn drag_convergence_radius(&self) -> f64 {
         let constrained = self.constrained.iter().map(ConstrainedBob::convergence_radius);
@@ -544,7 +526,6 @@ impl CraftMotion {
         all.fold(0.0, f64::max) * self.inv_allowed[2]
     }
 
-    /// Returns the time over which the series of the pivot's dry friction are valid, s.
     #[inline(never)]
     fn friction_convergence_radius(&self) -> f64 {
         let about = |(i, rubbing): (usize, &Rubbing)| {
@@ -553,7 +534,6 @@ impl CraftMotion {
         self.rubbing.iter().enumerate().map(about).fold(f64::INFINITY, f64::min)
     }
 
-    /// Returns coefficient N (0 or 1) of x'.
     pub fn state_rates<const N: usize>(&self, x: &[f64; STATES]) -> [f64; STATES] {
         let mut rate = [0.0; STATES];
         let mut put = |at: usize, numbers: &[f64]| {
@@ -770,8 +750,8 @@ impl CraftMotion {
         [force, torque]
     }
 
-    /// Computes coefficient n of the accelerations of constrained bobs and lumps from those of the craft. Adds their
-    /// dissipation.
+    /// Computes coefficient n of the accelerations of constrained bobs and lumps from those of the craft.
+    /// Returns the dissipation with theirs added.
     #[inline(never)]
     fn accelerate_apart(&mut self, n: usize, mut dissipation: f64) -> f64 {
         for bob in &mut self.constrained {
@@ -809,7 +789,7 @@ impl CraftMotion {
         lumps.chain(bobs).fold(0.0, |most, norm| if norm > most { norm } else { most })
     }
 
-    /// Sets up rigid liquids and bobs for the states of the liquids. Does not allocate.
+    /// Sets up rigid liquids and bobs for the states of the liquids (settled or detached). Does not allocate.
     fn arrange(&mut self) {
         let mut changed = false;
         for lump in &mut self.lumps {
@@ -847,11 +827,10 @@ impl CraftMotion {
         self.freeze();
     }
 
-    /// Advances the states of constrained bobs and lumps by a step of length h. Returns true if they are finite and within
-    /// bounds.
+    /// Advances the states of constrained bobs and lumps by a step of length h. Returns true if they are
+    /// finite and within bounds.
     ///
-    /// # Errors
-    /// If a bob is at the bound of its surface.
+    /// # Errors If a bob is at the bound of its surface.
     #[inline(never)]
     fn take_apart(&mut self, n: usize, h: f64, w: Vec3) -> Result<bool, StepError> {
         if let Some(bob) = self.beyond.take() {
@@ -873,7 +852,8 @@ impl CraftMotion {
         Ok(finite)
     }
 
-    /// Returns the time of the first event of detached liquid, or of a constrained bob that reaches the bound of its surface.
+    /// Returns the time of the first event of detached liquid, or of a constrained bob that reaches the bound
+    /// of its surface.
     #[inline(never)]
     fn next_event(&mut self, n: usize, h: f64) -> Option<f64> {
         let mut first = self.next_of_lumps(n, h);
@@ -903,8 +883,8 @@ impl CraftMotion {
         first
     }
 
-    /// Performs all events that are due now, for hosts that integrate themselves. Returns true if
-    /// there were any.
+    /// Performs all events that are due now, for hosts that integrate themselves. Returns true if there were
+    /// any.
     pub fn take_due(&mut self, inputs: &Inputs) -> bool {
         self.inputs = *inputs;
         let mut any = false;
@@ -922,7 +902,6 @@ impl CraftMotion {
         any
     }
 
-    /// Writes functions that cross zero at events, two per tank.
     pub fn indicators(&mut self, inputs: &Inputs, indicators: &mut [f64]) {
         indicators.fill(1.0);
         if self.lumps.is_empty() {
@@ -1021,7 +1000,6 @@ impl Carrier for CraftMotion {
     }
 }
 
-/// Returns the directions of a tank's bobs.
 fn directions(x: &[f64; STATES], tank: usize) -> Directions {
     core::array::from_fn(|n| part(x, index::bob(tank, n)))
 }

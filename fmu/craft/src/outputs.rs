@@ -27,83 +27,58 @@ use crate::rigid::Rigid;
 use crate::sizes::{MODES, TANKS};
 use crate::state::{BallState, Ranges, STATES, index};
 
-/// Outputs of one tank.
+/// Outputs of one tank, with the names, units and axes of the FMUs' outputs `tank[].…`, which their variable
+/// tables describe. Force and torque are those of the tank's whole liquid on the craft, body axes, about O.
+/// Directions `p` and angles, sin(angle_x) = p_x, are in tank axes. `ball_position` is the liquid's centre at
+/// rest while it is settled.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
 pub struct TankOutputs {
-    /// Force of the tank's whole liquid on the craft, N, body axes.
     pub force: Vec3,
-    /// Torque of the tank's whole liquid about O, N m, body axes.
     pub torque: Vec3,
-    /// Unit vector from hinge to bob of each mode, tank axes.
     pub p: [Vec3; MODES],
-    /// Rate of `p`, 1/s, tank axes.
     pub p_dot: [Vec3; MODES],
-    /// Slosh angle of each mode, rad: sin(angle_x) = p_x, tank axes.
     pub angle_x: [f64; MODES],
-    /// Slosh angle of each mode, rad: sin(angle_y) = p_y, tank axes.
     pub angle_y: [f64; MODES],
-    /// Wave height at the wall, all modes together, m.
     pub wave_height: f64,
-    /// Specific force along the tank's axis at the hinge of mode 1, m/s2; 0 without modes.
     pub axial: f64,
-    /// Ranges in which the pendulums represent the liquid.
     pub ranges: Ranges,
-    /// State of the detached liquid.
     pub ball_state: BallState,
-    /// Centre of the detached liquid from the tank's origin, m, tank axes; while settled, the liquid's centre at rest.
     pub ball_position: Vec3,
-    /// Velocity of the detached liquid relative to the tank, m/s, tank axes.
     pub ball_velocity: Vec3,
 }
 
-/// Outputs of the craft at one instant.
+/// Outputs of the craft at one instant, with the names, units and axes of the FMU's outputs, which its
+/// variable table describes: the motion of O, the force and torque of all liquids on the craft about O,
+/// momenta in inertial axes (the angular momentum about the centre of mass, on a pivot about O), the terms of
+/// the energy balance since the start, J, and the mass properties with the bobs as point masses at their
+/// current positions. Tanks that are not in use have zero force.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
 pub struct Outputs {
-    /// Attitude, body to inertial, scalar first.
     pub q: Quaternion,
-    /// Angular velocity, rad/s, body axes.
     pub omega: Vec3,
-    /// Angular acceleration, rad/s2, body axes.
     pub omega_dot: Vec3,
-    /// Specific force at O as an accelerometer measures it, m/s2, body axes.
     pub specific_force: Vec3,
-    /// Position of O, m, inertial (freely falling) axes.
     pub position: Vec3,
-    /// Velocity of O, m/s, inertial axes.
     pub velocity: Vec3,
-    /// Force of all liquids on the craft, N, body axes.
     pub slosh_force: Vec3,
-    /// Torque of all liquids on the craft about O, N m, body axes.
     pub slosh_torque: Vec3,
-    /// Torque of the pivot's stiffness and damping on the craft, N m, body axes.
     pub pivot_torque: Vec3,
-    /// Momentum of craft and liquids, kg m/s, inertial axes.
     pub momentum: Vec3,
-    /// Angular momentum of craft, wheels and liquids about their centre of mass (on a pivot: about
-    /// O), N m s, inertial axes.
     pub angular_momentum: Vec3,
-    /// Kinetic energy without the wheels' spin, plus energy of the centring stiffness (on a pivot
-    /// also of gravity and the pivot's stiffness), J.
     pub energy: f64,
-    /// Work of force and torque since the start, J.
     pub work: f64,
-    /// Energy dissipated by the liquids and the pivot since the start, J.
     pub dissipated: f64,
-    /// Energy lost with the outflow since the start, J.
     pub drained: f64,
-    /// Mass of craft and liquids, kg.
     pub mass: f64,
-    /// Centre of mass of craft and liquids from O, m, body axes.
     pub center_of_mass: Vec3,
-    /// Inertia of craft and liquids about their centre of mass, with the bobs as point masses at
-    /// their current positions, kg m2, body axes.
     pub inertia: Mat3,
-    /// The tanks; those not in use have zero force.
     pub tank: [TankOutputs; TANKS],
 }
 
 impl TankOutputs {
-    /// Returns outputs of a tank's modes from their part of the states, or of a direction.
+    /// Returns the outputs of a tank's modes from their part of the states, or of a direction.
     pub(crate) fn from_states(x: &[f64]) -> TankOutputs {
         let part = |n: usize, at: usize| {
             let at = 6 * n + at;
@@ -158,14 +133,12 @@ impl<T: Number> MassProperties<T> {
         MassProperties { mass, moment, inertia }
     }
 
-    /// Adds a point mass at rho.
     pub fn add(&mut self, m: T, rho: Vec3<T>) {
         self.mass = self.mass + m;
         self.moment = add(self.moment, scale(m, rho));
         self.inertia = add_matrices(self.inertia, point_inertia(m, rho));
     }
 
-    /// Returns the centre of mass from O, or 0 without any mass.
     pub fn center(&self) -> Vec3<T> {
         let is_something = self.mass.value() > 0.0;
         // The compiler would divide before it checks for mass, and hosts can trap divisions by 0.
@@ -174,7 +147,6 @@ impl<T: Number> MassProperties<T> {
         if is_something { scale(share, self.moment) } else { constant([0.0; 3]) }
     }
 
-    /// Returns the inertia about the centre of mass.
     pub fn inertia(&self) -> Mat3 {
         add_matrices(self.inertia, point_inertia(-self.mass, self.center())).map(result)
     }
@@ -184,7 +156,6 @@ fn result<T: Number>(a: Vec3<T>) -> Vec3 {
     a.map(T::result)
 }
 
-/// Returns m (|s|^2 1 - s s^T).
 fn point_inertia<T: Number>(m: T, s: Vec3<T>) -> Mat3<T> {
     let s2 = dot(s, s);
     let row = |i: usize| {
@@ -197,34 +168,29 @@ fn add_matrices<T: Number>(a: Mat3<T>, b: Mat3<T>) -> Mat3<T> {
     [add(a[0], b[0]), add(a[1], b[1]), add(a[2], b[2])]
 }
 
-/// One tank at an instant.
+/// One tank at an instant, for the outputs. `rigid` is the rigid liquid about O, `wrench` force and torque
+/// about O on the craft, `flow_momentum` momentum and moment of momentum about O of the flow within the tank
+/// (`draining.rs`), and `lump` the detached liquid, if any.
 pub(crate) struct TankNow<T> {
-    /// The rigid liquid about O.
     pub rigid: Rigid<T>,
-    /// Force and torque about O on the craft.
     pub wrench: [Vec3<T>; 2],
-    /// Momentum and moment of momentum about O of the flow within the tank (draining.rs).
     pub flow_momentum: [Vec3<T>; 2],
     pub bobs: [Option<BobNow<T>>; MODES],
-    /// The detached liquid, if any.
     pub lump: Option<BobNow<T>>,
     pub ball_state: BallState,
 }
 
-/// The craft at an instant, or its derivative along a direction.
+/// The craft at an instant, or its derivative along a direction. `velocity` is that of O in body axes, `axes`
+/// turns body axes to inertial ones, and the pivot of a free craft has no stiffness and damping.
 pub(crate) struct Now<T> {
     pub a: Vec3<T>,
     pub w: Vec3<T>,
     pub w_d: Vec3<T>,
-    /// Velocity of O, body axes.
     pub velocity: Vec3<T>,
     pub h_wheels: Vec3<T>,
-    /// Body to inertial.
     pub axes: Mat3<T>,
     pub mount: Mount,
-    /// The pivot, without stiffness and damping on a free craft.
     pub pivot: Pivot,
-    /// The dry craft.
     pub craft: Rigid,
     pub tanks: [Option<TankNow<T>>; TANKS],
 }
@@ -279,7 +245,6 @@ impl CraftMotion {
 }
 
 impl<T: Number> Now<T> {
-    /// Returns the outputs; `x` is the states, or the direction.
     pub fn outputs(&self, x: &[f64; STATES]) -> Outputs {
         let Now { w, velocity, .. } = *self;
         let tanks = || self.tanks.iter().flatten();

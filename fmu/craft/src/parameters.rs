@@ -18,34 +18,28 @@ use crate::sizes::{MODES, POINTS, TANKS};
 use crate::surface::{self, Higher, Surface};
 use crate::table::{FillTable, LIGHTEST, SHORTEST};
 
-/// Symmetric inertia tensor, kg m2: the matrix of J = integral of (|s|^2 1 - s s^T) dm.
+/// Symmetric inertia tensor, kg m2: the matrix of J = integral of (|s|^2 1 - s s^T) dm, so that `xy` is
+/// -integral of x y dm.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
 pub struct Inertia {
-    /// Moment about x.
     pub xx: f64,
-    /// Moment about y.
     pub yy: f64,
-    /// Moment about z.
     pub zz: f64,
-    /// Element xy, -integral of x y dm.
     pub xy: f64,
-    /// Element xz, -integral of x z dm.
     pub xz: f64,
-    /// Element yz, -integral of y z dm.
     pub yz: f64,
 }
 
 impl Inertia {
-    /// The matrix by rows.
+    /// Returns the matrix by rows.
     pub fn matrix(&self) -> [[f64; 3]; 3] {
         let Inertia { xx, yy, zz, xy, xz, yz } = *self;
         [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
     }
 
-    /// Returns the principal moments in ascending order, kg m2: eigenvalues of a symmetric matrix by the roots of its
-    /// cubic.
-    ///
-    /// Source: Smith, Communications of the ACM 4 (1961).
+    /// Returns the principal moments in ascending order, kg m2: eigenvalues of a symmetric matrix by the
+    /// roots of its cubic (Smith, Communications of the ACM 4 (1961)).
     fn principal_moments(&self) -> [f64; 3] {
         let Inertia { xx, yy, zz, xy, xz, yz } = *self;
         let mean = (xx + yy + zz) / 3.0;
@@ -65,33 +59,30 @@ impl Inertia {
     }
 }
 
-/// The craft without its liquids, its wheels not rotating.
+/// The craft without its liquids, its wheels not rotating: `mass`, kg, centre of mass `r` from O, m, and
+/// inertia `j` about the centre of mass, body axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
 pub struct Craft {
-    /// Mass, kg, > 0.
     pub mass: f64,
-    /// Centre of mass from O, m, body axes.
     pub r: Vec3,
-    /// Inertia about the centre of mass, body axes.
     pub j: Inertia,
 }
 
 impl Craft {
-    /// Returns the craft as a rigid body.
     pub(crate) fn rigid(&self) -> Rigid {
         Rigid::new(self.mass, self.r, &self.j.matrix())
     }
 }
 
-/// Mounting of the craft.
+/// Mounting of the craft. In free flight gravity has no effect, because position and velocity refer to a
+/// freely falling frame. On a pivot O rests on a bearing in uniform gravity, and the craft turns about it,
+/// freely unless the pivot has stiffness, damping or friction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
+#[allow(missing_docs)]
 pub enum Mount {
-    /// Free flight. Gravity has no effect, because position and velocity refer to a freely falling
-    /// frame.
     Free = 1,
-    /// O rests on a bearing in uniform gravity. The craft turns about it, freely unless the pivot has stiffness,
-    /// damping or friction.
     Pivot = 2,
 }
 
@@ -100,15 +91,16 @@ impl Mount {
     pub const ALL: [Mount; 2] = [Mount::Free, Mount::Pivot];
 }
 
-/// Dependence of a mode's drag coefficient c on its natural frequency w, and thus on the acceleration along the tank.
+/// Dependence of a mode's drag coefficient c on its natural frequency w, and thus on the acceleration along
+/// the tank. `Laminar`, c ~ w^(1/2), is that of a laminar layer at the wall, for bare tanks. `ConstantRatio`,
+/// c ~ w, keeps the damping ratio, for a measured or specified ratio. `Constant` is for dissipation outside a
+/// laminar layer, for example in a diaphragm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
+#[allow(missing_docs)]
 pub enum DampingLaw {
-    /// c ~ w^(1/2): a laminar layer at the wall, for bare tanks.
     Laminar = 1,
-    /// c ~ w: constant damping ratio, for a measured or specified ratio.
     ConstantRatio = 2,
-    /// Constant c, for dissipation that is not in a laminar layer, for example in a diaphragm.
     Constant = 3,
 }
 
@@ -118,21 +110,17 @@ impl DampingLaw {
         [DampingLaw::Laminar, DampingLaw::ConstantRatio, DampingLaw::Constant];
 }
 
-/// Model of detached liquid, one body that crosses the tank (`lump.rs`).
+/// Model of detached liquid, one body that crosses the tank (`lump.rs`); its parameters are those of the
+/// FMUs, `tank[].ball.…`. Without `travel` there is no such model. If `radius` is 0 it follows from the
+/// pendulums: the surface that bounds the liquid's centre then has, at the bottom, the curvature of the path
+/// of their common centre.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
 pub struct Ball {
-    /// Distance along the axis from the settled liquid's centre at the bottom to that at the top,
-    /// m. 0: no model of detached liquid.
     pub travel: f64,
-    /// Largest distance of the liquid's centre from the axis, m. 0: the radius follows from the pendulums; the surface that
-    /// bounds the centre then has, at the bottom, the curvature of the path of their common centre.
     pub radius: f64,
-    /// Coefficient of restitution of an impact on the wall, 0 to 1.
     pub restitution: f64,
-    /// Speed after an impact below which detached liquid that is pressed to the wall stays on it,
-    /// m/s.
     pub contact_speed: f64,
-    /// Rate at which the speed along the wall decays while the liquid slides there, 1/s.
     pub drag: f64,
 }
 
@@ -142,124 +130,71 @@ impl Default for Ball {
     }
 }
 
-/// Surface that the centre of detached liquid can reach.
+/// Surface that the centre of detached liquid can reach: its centre at `height` on the tank's axis and its
+/// semi-axes a (`half`) along the axis and b (`across`), m. `gyration` is R_p, m, and `mass` the liquid's
+/// mass, kg.
 pub(crate) struct BallSurface {
-    /// The liquid's mass, kg.
     pub mass: f64,
-    /// R_p, m.
     pub gyration: f64,
-    /// Position of the surface's centre on the tank's axis, m.
     pub height: f64,
-    /// Semi-axes of the surface along the tank's axis and across it, a and b, m.
     pub half: f64,
     pub radius: f64,
 }
 
-/// One tank: rigid liquid and pendulums, in the tank's own axes. Its z axis is the tank's
-/// axis; liquid at rest hangs towards -z.
+/// One tank: rigid liquid and pendulums, in the tank's own axes. Its z axis is the tank's axis; liquid at
+/// rest hangs towards -z. The fields are the FMUs' parameters `tank[].…`, whose variable tables give
+/// meanings, units and ranges; quaternions and directions are normalised on reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
 pub struct Tank {
-    /// The tank's origin from O, m, body axes.
     pub position: Vec3,
-    /// Attitude of the tank: tank axes to body axes, scalar first; normalised on reading.
     pub q: Quaternion,
-    /// Diameter of an upright cylinder, m. Above 0, potential flow gives m_0, H_0, I_0 and each
-    /// mode's mass, length, hinge and wave from `diameter`, `depth` and `density`; the tank's
-    /// origin is then the centre of its bottom.
     pub diameter: f64,
-    /// Fill height of the liquid in the cylinder, m.
     pub depth: f64,
-    /// Density of the liquid, kg/m3.
     pub density: f64,
-    /// Mass of the rigid liquid, kg.
     pub m_0: f64,
-    /// Height of the rigid liquid's centre of mass on the tank's axis, m.
     pub h_0: f64,
-    /// Inertia of the rigid liquid across the axis about its own centre of mass, kg m2.
     pub i_0: f64,
-    /// Inertia of the rigid liquid about the axis, kg m2.
     pub i_z: f64,
-    /// Offset of the rigid liquid's centre of mass from the axis, x and y, m, tank axes.
     pub r_0: [f64; 2],
-    /// Inertia of the rigid liquid about the tank's y axis minus `i_0`, which is then that about x, kg m2.
     pub di_y: f64,
-    /// Products of inertia of the rigid liquid, elements xy, xz and yz, tank axes, kg m2.
     pub products: [f64; 3],
-    /// Number of modes, 0 to [`MODES`].
     pub modes: usize,
-    /// Specific force along the axis at which `zeta` and `frequency` hold, m/s2, > 0.
     pub g_ref: f64,
-    /// Mass of the bob, kg.
     pub mass: [f64; MODES],
-    /// Length of the pendulum, m.
     pub length: [f64; MODES],
-    /// Natural frequency with the tank held, Hz, at `g_ref`. Above 0 it replaces the length: (2 pi
-    /// f)^2 = g_ref/l + k/m.
     pub frequency: [f64; MODES],
-    /// Height of the hinge on the tank's axis, m.
     pub hinge: [f64; MODES],
-    /// Direction in which the mode moves its mass, x and y, tank axes; normalised on reading. If it is not 0, 0, the
-    /// mode is planar: its bob swings in the plane of this direction and the tank's axis and moves with the tank across
-    /// it.
     pub direction: [[f64; 2]; MODES],
-    /// Distance of that plane from the tank's axis, m: lever arm of a momentum in the direction.
     pub arm: [f64; MODES],
-    /// Centring stiffness (capillarity, diaphragm), N/m.
     pub k: [f64; MODES],
-    /// Damping ratio at `g_ref`.
     pub zeta: [f64; MODES],
-    /// Dependence of the drag on the specific force along the axis.
     pub damping_law: DampingLaw,
-    /// Specific force along the axis, m/s2, around which the drag stops following it (`damping.rs`); 0: 1e-4 of
-    /// `g_ref`.
     pub g_floor: f64,
-    /// Growth of the damping ratio with the amplitude, 1/rad.
     pub zeta_amplitude: [f64; MODES],
-    /// Growth of the damping ratio with the steepness k a beyond `breaking_steepness`, where waves break (`damping.rs`).
     pub zeta_breaking: [f64; MODES],
-    /// Steepness k a at which waves begin to break.
     pub breaking_steepness: [f64; MODES],
-    /// Coefficient s of the mode's inertia at finite amplitude, 1 for a pendulum (`surface.rs`).
     pub nonlinear_inertia: [f64; MODES],
-    /// Coefficient kappa of the mode's stiffness at finite amplitude, 1 for a pendulum (`surface.rs`).
     pub nonlinear_stiffness: [f64; MODES],
-    /// Coefficient s_2 of the mode's inertia beyond the third order, 0 for a pendulum and in tanks with a fill table.
     pub nonlinear_inertia_2: [f64; MODES],
-    /// Coefficient kappa_2 of the mode's stiffness beyond the third order, likewise.
     pub nonlinear_stiffness_2: [f64; MODES],
-    /// Coefficient t of the inertia of the mode's rotary motion, likewise.
     pub rotary_inertia: [f64; MODES],
-    /// Coefficient t_2 of the inertia of the mode's rotary motion, likewise.
     pub rotary_inertia_2: [f64; MODES],
-    /// Slosh angle above which the mode is out of range, rad; 0 if it is not known (`ranges.rs`).
     pub angle_limit: [f64; MODES],
-    /// Slosh angle above which rotary motion of the mode is out of range because its branch folds, rad; 0 if it is not
-    /// known.
     pub swirl_limit: [f64; MODES],
-    /// Specific force along the axis, m/s2, below which surface tension matters that the parameters do not include; 0 if it
-    /// is not known.
     pub g_bond: f64,
-    /// Elevation of the surface at the wall per slosh angle, m/rad.
     pub wave: [f64; MODES],
-    /// Table of modes and rigid liquid over the mass of liquid. With points in it the tank can drain, and the table
-    /// gives m_0, h_0, i_0, i_z, mass, length and hinge. It gives zeta of modes for which it is not 0, and s and kappa of
-    /// modes for which they are not 1.
     pub fill: FillTable,
-    /// Mass of liquid at the start, kg, in a tank that can drain.
     pub liquid_0: f64,
-    /// Height of the outlet on the tank's axis, m.
     pub outlet: f64,
-    /// Model of detached liquid, for a free craft.
     pub ball: Ball,
-    /// Unit vector from hinge to bob at the start, tank axes; normalised on reading.
     pub p_0: [Vec3; MODES],
-    /// Rate of `p_0`, 1/s, tank axes; only its tangential part is used.
     pub p_dot_0: [Vec3; MODES],
 }
 
 impl Tank {
-    /// Returns the tank with modes and rigid liquid from its diameter, and lengths from its frequencies, if these are
-    /// given.
+    /// Returns the tank with modes and rigid liquid computed from its diameter, and with lengths from its
+    /// frequencies, if these are given.
     pub(crate) fn resolve(&self) -> Tank {
         let mut tank = *self;
         let modes = self.modes.min(MODES);
@@ -304,8 +239,8 @@ impl Tank {
         tank
     }
 
-    /// Returns the rigid liquid: m_0 on the axis at height H_0, J_0 = I_0 1 + (I_z - I_0) e e^T. Without axial symmetry
-    /// r_0 and dI_y and the products are added.
+    /// Returns the rigid liquid: m_0 on the axis at height H_0, with J_0 = I_0 1 + (I_z - I_0) e e^T. Without
+    /// axial symmetry r_0, dI_y and the products are added.
     pub(crate) fn rigid(&self) -> Rigid {
         let axes = rotation(&unit_quaternion(self.q));
         let mut center = add(self.position, scale(self.h_0, axes.map(|row| row[2])));
@@ -315,7 +250,6 @@ impl Tank {
         Rigid::new(self.m_0, center, &self.own_inertia())
     }
 
-    /// Returns J_0, kg m2, body axes.
     pub(crate) fn own_inertia(&self) -> Mat3 {
         let axes = rotation(&unit_quaternion(self.q));
         let e = axes.map(|row| row[2]);
@@ -337,19 +271,17 @@ impl Tank {
         own
     }
 
-    /// Returns true if the liquid moves equally in every direction across the axis.
     pub(crate) fn is_axial(&self) -> bool {
         let rigid = self.r_0 == [0.0; 2] && self.di_y == 0.0 && self.products == [0.0; 3];
         rigid && !self.is_planar()
     }
 
-    /// Returns true if any mode is planar.
     pub(crate) fn is_planar(&self) -> bool {
         self.direction[..self.modes.min(MODES)].iter().any(|direction| *direction != [0.0; 2])
     }
 
-    /// Returns the surface of mode n (from 0), `None` for a pendulum. A mode that is a pendulum at some fills of its table
-    /// only has a surface at every fill.
+    /// Returns the surface of mode `n`, which counts from 0; `None` for a pendulum. A mode that is a pendulum
+    /// at only some fills of its table has a surface at every fill.
     pub(crate) fn surface(&self, n: usize) -> Option<Surface> {
         let [s, kappa] = [self.nonlinear_inertia[n], self.nonlinear_stiffness[n]];
         let surface = match self.fill.has_surface(n) {
@@ -359,7 +291,6 @@ impl Tank {
         surface.filter(|_| n < self.modes)
     }
 
-    /// Returns the coefficients of mode n (from 0) beyond the third order.
     pub(crate) fn higher(&self, n: usize) -> Higher {
         Higher {
             inertia: self.nonlinear_inertia_2[n],
@@ -368,12 +299,12 @@ impl Tank {
         }
     }
 
-    /// Returns true if any mode has other coefficients than a pendulum.
     pub(crate) fn has_surface(&self) -> bool {
         (0..MODES).any(|n| self.surface(n).is_some())
     }
 
-    /// Returns the message for a bob of mode n (from 0) beyond the bound of its surface; `name` is that of the tank.
+    /// Returns the message for a bob of mode `n`, which counts from 0, beyond the bound of its surface;
+    /// `name` is the tank's.
     pub(crate) fn bound_message(&self, n: usize, name: &str) -> String {
         let pair = [self.nonlinear_inertia[n], self.nonlinear_stiffness[n]];
         let text = surface::bound_message(pair, self.higher(n), n, name);
@@ -383,24 +314,24 @@ impl Tank {
         }
     }
 
-    /// Returns true if mode n (from 0) is planar, or its bob is not a pendulum.
+    /// Returns true if mode `n`, which counts from 0, is planar, or its bob is not a pendulum.
     pub(crate) fn is_constrained(&self, n: usize) -> bool {
         self.surface(n).is_some() || self.plane_normal(n).is_some()
     }
 
-    /// Returns true if outputs and derivatives are those of `contents.rs`: the tank can drain, or has planar modes or
-    /// other coefficients of the third order than pendulums.
+    /// Returns true if outputs and derivatives are those of `contents.rs`: the tank can drain, or has planar
+    /// modes or other coefficients of the third order than pendulums.
     pub(crate) fn has_contents(&self) -> bool {
         self.fill.points > 0 || self.is_planar() || self.has_surface()
     }
 
-    /// Returns the mass of the whole liquid, kg.
     pub(crate) fn whole_mass(&self) -> f64 {
         self.mass[..self.modes].iter().fold(self.m_0, |sum, m| sum + m)
     }
 
-    /// Returns the unit vector b, tank axes, perpendicular to the plane in which the bob of mode n (from 0) swings; e x
-    /// b is minus the mode's direction. Returns `None` if the mode swings in every direction.
+    /// Returns the unit vector b, tank axes, perpendicular to the plane in which the bob of mode `n` swings,
+    /// which counts from 0; e x b is minus the mode's direction. Returns `None` if the mode swings in every
+    /// direction.
     pub(crate) fn plane_normal(&self, n: usize) -> Option<Vec3> {
         let [x, y] = self.direction[n];
         // Only directions longer than 1e-6 are accepted. The bound avoids a division by 0 that a
@@ -409,7 +340,7 @@ impl Tank {
         (self.direction[n] != [0.0; 2]).then(|| [-y / size, x / size, 0.0])
     }
 
-    /// Returns the hinge of mode n (from 0) from O, m, and b of a planar mode; body axes.
+    /// Returns the hinge of mode `n`, which counts from 0, from O, m, and b of a planar mode; body axes.
     pub(crate) fn hinge_and_across(&self, n: usize) -> (Vec3, Option<Vec3>) {
         let axes = rotation(&unit_quaternion(self.q));
         let on_axis = add(self.position, scale(self.hinge[n], axes.map(|row| row[2])));
@@ -419,14 +350,14 @@ impl Tank {
         }
     }
 
-    /// Returns the hinge of mode n (from 0) from O, m, and the tank's axis; body axes.
+    /// Returns the hinge of mode `n`, which counts from 0, from O, m, and the tank's axis; body axes.
     pub(crate) fn hinge_and_axis(&self, n: usize) -> [Vec3; 2] {
         let e = rotation(&unit_quaternion(self.q)).map(|row| row[2]);
         [self.hinge_and_across(n).0, e]
     }
 
-    /// Returns the body that represents the bob of mode n (from 0) for hosts that solve with a constant matrix
-    /// (`slosh_tank.rs`).
+    /// Returns the body that represents the bob of mode `n`, which counts from 0, for hosts that solve with a
+    /// constant matrix (`slosh_tank.rs`).
     pub(crate) fn lumped(&self, n: usize) -> Rigid {
         let (m, l) = (self.mass[n], self.length[n]);
         let (hinge, across) = self.hinge_and_across(n);
@@ -443,8 +374,8 @@ impl Tank {
         Rigid::new(2.0 * m, hinge, &own)
     }
 
-    /// Adds the inertia of planar modes' bobs, perpendicular to their planes and along their rods, with rods at
-    /// `angles` (rad) from their positions at rest.
+    /// Adds the inertia of planar modes' bobs, perpendicular to their planes and along their rods, with rods
+    /// at `angles` (rad) from their positions at rest.
     fn add_planar_bobs(&self, matrix: &mut Mat6, angles: &[f64; MODES]) {
         let e = rotation(&unit_quaternion(self.q)).map(|row| row[2]);
         for n in 0..self.modes {
@@ -458,8 +389,8 @@ impl Tank {
         }
     }
 
-    /// Returns the smallest contribution of the rigid liquid: for detached liquid the inertia that rotates with the
-    /// tank, for a draining tank the rigid liquid of the emptiest state.
+    /// Returns the smallest contribution of the rigid liquid: for detached liquid the inertia that rotates
+    /// with the tank, for a draining tank the rigid liquid of the emptiest state.
     fn least_rigid(&self) -> Rigid {
         if self.ball.travel > 0.0 {
             return Rigid { mass: 0.0, moment: [0.0; 3], inertia: self.own_inertia() };
@@ -467,7 +398,8 @@ impl Tank {
         self.at_point(0).rigid()
     }
 
-    /// Returns the tank at a point of its table (from 0), itself where the table has no such point.
+    /// Returns the tank at a point of its table, which counts from 0, or the tank itself if the table has no
+    /// such point.
     fn at_point(&self, point: usize) -> Tank {
         match self.fill.masses().get(point) {
             Some(&liquid_0) => Tank { liquid_0, ..*self }.resolve(),
@@ -475,8 +407,8 @@ impl Tank {
         }
     }
 
-    /// Returns the inertia that craft and rigid liquid must have for bobs with s < 1 within 45 degrees, as a body of
-    /// negative mass.
+    /// Returns the inertia that craft and rigid liquid must have for bobs with s < 1 within 45 degrees, as a
+    /// body of negative mass.
     fn lent_inertia(&self) -> Rigid {
         let none = Rigid { mass: 0.0, moment: [0.0; 3], inertia: [[0.0; 3]; 3] };
         (0..self.modes).fold(none, |sum, n| {
@@ -489,7 +421,7 @@ impl Tank {
         })
     }
 
-    /// Returns direction and rate of the bob of mode n (from 0) at the start, tank axes.
+    /// Returns direction and rate of the bob of mode `n`, which counts from 0, at the start, tank axes.
     pub(crate) fn at_start(&self, n: usize) -> [Vec3; 2] {
         let [p, p_d] = [self.p_0[n], self.p_dot_0[n]].map(|x| match self.plane_normal(n) {
             Some(b) => sub(x, scale(dot(b, x), b)),
@@ -498,14 +430,14 @@ impl Tank {
         on_sphere(p, p_d)
     }
 
-    /// Returns the specific force along the axis below which mode n (from 0) does not represent liquid, m/s2. The
-    /// tolerance separates reversed thrust from thrust that is off.
+    /// Returns the specific force along the axis below which mode `n`, which counts from 0, does not
+    /// represent liquid, m/s2. The tolerance separates reversed thrust from thrust that is off.
     pub(crate) fn lowest(&self, n: usize) -> f64 {
         -self.smallest_acceleration() - self.k[n] * self.length[n] / self.mass[n]
     }
 
-    /// Returns the surface that the detached liquid's centre can reach, for a tank with derived parameters resolved;
-    /// `None` without a model of detached liquid.
+    /// Returns the surface that the detached liquid's centre can reach, for a tank with derived parameters
+    /// resolved; `None` without a model of detached liquid.
     pub(crate) fn ball_surface(&self) -> Option<BallSurface> {
         if self.ball.travel <= 0.0 || self.modes == 0 {
             return None;
@@ -522,56 +454,47 @@ impl Tank {
         Some(BallSurface { mass, gyration, height: moment / mass + half, half, radius })
     }
 
-    /// Returns a_f, m/s2.
     pub(crate) fn smallest_acceleration(&self) -> f64 {
         if self.g_floor > 0.0 { self.g_floor } else { 1e-4 * self.g_ref }
     }
 
-    /// Returns true if the drag of mode n (from 0) depends on acceleration or amplitude.
     pub(crate) fn follows(&self, n: usize) -> bool {
         let is_viscous = self.zeta[n] > 0.0 || self.fill.has_zeta(n);
         let by_acceleration = self.damping_law != DampingLaw::Constant && is_viscous;
         by_acceleration || self.zeta_amplitude[n] > 0.0 || self.zeta_breaking[n] > 0.0
     }
 
-    /// Returns c = 2 zeta m sqrt(g_ref/l + k/m) of mode n (from 0), at g_ref, N s/m.
+    /// Returns c = 2 zeta m sqrt(g_ref/l + k/m) of mode `n`, which counts from 0, at g_ref, N s/m.
     pub fn drag(&self, n: usize) -> f64 {
         let (m, l) = (self.mass[n], self.length[n]);
         2.0 * self.zeta[n] * m * libm::sqrt(self.g_ref / l + self.k[n] / m)
     }
 }
 
-/// Initial motion.
+/// Initial motion: attitude from body to inertial axes, scalar first, normalised on reading; angular velocity
+/// relative to the inertial frame, rad/s, body axes; position, m, and velocity, m/s, of O in inertial axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
 pub struct Init {
-    /// Attitude, body to inertial, scalar first; normalised on reading.
     pub q: Quaternion,
-    /// Angular velocity relative to the inertial frame, rad/s, body axes.
     pub omega: Vec3,
-    /// Position of O, m, inertial axes.
     pub position: Vec3,
-    /// Velocity of O, m/s, inertial axes.
     pub velocity: Vec3,
 }
 
-/// All parameters and initial conditions of a [`Spacecraft`](crate::Spacecraft).
+/// All parameters and initial conditions of a [`Spacecraft`](crate::Spacecraft). `gravity`, m/s2, inertial
+/// axes, and `pivot` have an effect only with [`Mount::Pivot`]. `tanks` is the number of tanks, 0 to
+/// [`TANKS`], and `max_steps` the largest number of internal steps in one step, at least 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
 pub struct Parameters {
-    /// The craft without its liquids.
     pub craft: Craft,
-    /// Support of the craft.
     pub mount: Mount,
-    /// Gravity for [`Mount::Pivot`], m/s2, inertial axes. Without effect on a free craft.
     pub gravity: Vec3,
-    /// Stiffness, damping and friction of the pivot. Without effect on a free craft.
     pub pivot: Pivot,
-    /// Number of tanks, 0 to [`TANKS`].
     pub tanks: usize,
-    /// The tanks.
     pub tank: [Tank; TANKS],
-    /// Initial motion.
     pub init: Init,
-    /// Largest number of internal steps in one step, at least 1.
     pub max_steps: usize,
 }
 
@@ -586,8 +509,8 @@ impl Default for Craft {
     }
 }
 
-/// The default tank, an upright cylinder of R = 0.45 m with its bottom at -0.3 m, filled with water
-/// 0.1, 0.2, ... 1.2 m deep, with one mode: values from `formulas::cylinder`.
+/// The default tank, an upright cylinder of R = 0.45 m with its bottom at -0.3 m, filled with water 0.1, 0.2,
+/// ... 1.2 m deep, with one mode: values from `formulas::cylinder`.
 #[rustfmt::skip]
 const CYLINDER: FillTable = FillTable {
     points: POINTS,
@@ -691,37 +614,30 @@ impl Default for Parameters {
 
 /// Upper limit of masses, inertias and stiffnesses, so that squares and products do not overflow.
 const HEAVIEST: f64 = 1e12;
-/// Upper limit of lengths, speeds and accelerations.
 const FARTHEST: f64 = 1e9;
 
-/// Largest ratio of a principal moment to the sum of the others: 1 for a plate, with a margin for moments given to four
-/// digits.
+/// Largest ratio of a principal moment to the sum of the others: 1 for a plate, with a margin for moments
+/// given to four digits.
 const PLATE: f64 = 1.0 + 1e-3;
 
 /// Range of tolerances, from rounding to where error control loses its meaning.
 const TOLERANCES: core::ops::RangeInclusive<f64> = 1e-14..=1e-1;
 
-/// Returns the problem of a tolerance, if there is one.
 pub(crate) fn tolerance_problem(tolerance: f64) -> Option<String> {
     let (low, high) = (TOLERANCES.start(), TOLERANCES.end());
     let is_wrong = !TOLERANCES.contains(&tolerance);
     is_wrong.then(|| format!("tolerance = {tolerance:?} (allowed: {low:?} to {high:?})"))
 }
 
-/// Error in a bound on steps, if there is one.
 pub(crate) const MAX_STEPS: usize = 100_000;
 
-/// Limits of one call.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Limits {
-    /// Relative error.
     pub tolerance: f64,
-    /// Internal steps.
     pub max_steps: usize,
 }
 
 impl Limits {
-    /// Returns the counter at the start of a call.
     pub fn steps(&self) -> Steps {
         let advice = ", or check for a very short pendulum (length) or a very stiff one (k)";
         // Under a fuzzer's sanitizer each step of twelve modes is slow.
@@ -734,7 +650,6 @@ pub(crate) fn steps_problem(max_steps: usize) -> Option<String> {
     (max_steps == 0).then(|| "solver.max_steps = 0 (allowed: 1 and above)".into())
 }
 
-/// Problems found so far.
 struct Problems(Vec<String>);
 
 impl Problems {
@@ -966,7 +881,6 @@ impl Tank {
         }
     }
 
-    /// Returns the coefficients of mode n (from 0) beyond the third order with their names.
     fn beyond_third_order(&self, n: usize) -> [(&'static str, f64); 4] {
         [
             ("nonlinear_inertia_2", self.nonlinear_inertia_2[n]),
@@ -1064,7 +978,7 @@ impl Tank {
         }
     }
 
-    /// Returns all problems of a tank on a host; `name` is `tank`.
+    /// Returns all problems of a tank on a host; `name` is its name in messages.
     pub(crate) fn problems(&self, name: &str) -> Vec<String> {
         let mut problems = Problems(Vec::new());
         self.find_problems(name, &mut problems);
@@ -1129,7 +1043,7 @@ impl Craft {
         }
     }
 
-    /// Returns all problems of a host's mass properties; `name` is `host`.
+    /// Returns all problems of a host's mass properties; `name` is its name in messages.
     pub(crate) fn problems(&self, name: &str) -> Vec<String> {
         let mut problems = Problems(Vec::new());
         self.find_problems(name, &mut problems);
@@ -1145,9 +1059,10 @@ impl Craft {
 /// Smallest pivot below which a mass matrix counts as singular.
 const SINGULAR: f64 = 1e-12;
 
-/// Returns where the mass matrix of a body with the liquid of `tanks` is singular, as words that follow "is singular".
-/// Returns `None` if it is regular with planar modes at rest and with detached liquid. Other angles of planar modes are
-/// not searched, because realistic craft are singular only far outside the range of their modes.
+/// Returns the reason why the mass matrix of a body with the liquid of `tanks` is singular, as words that
+/// follow "is singular". Returns `None` if it is regular with planar modes at rest and with detached liquid.
+/// Other angles of planar modes are not searched, because realistic craft are singular only far outside the
+/// range of their modes.
 pub(crate) fn singular_where(body: Rigid, tanks: &[Tank]) -> Option<String> {
     let matrix = |rigid: fn(&Tank) -> Rigid| {
         tanks.iter().fold(body, |sum, tank| sum.combined_with(&rigid(tank))).mass_matrix()

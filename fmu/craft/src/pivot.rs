@@ -21,27 +21,24 @@ use taylor::series::{self, Series, ZERO};
 use taylor::space::{Vector, products};
 use taylor::vector::{Mat3, Vec3};
 
-/// Stiffness, damping and dry friction of the pivot, body axes.
+/// Stiffness against tilt about x and y, N m/rad, damping coefficient about each axis, N m s/rad, and dry
+/// friction of the pivot, body axes.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
+#[allow(missing_docs)]
 pub struct Pivot {
-    /// Stiffness against tilt about x and y, N m/rad.
     pub k: [f64; 2],
-    /// Damping coefficient about each axis, N m s/rad.
     pub c: Vec3,
-    /// Dry friction.
     pub friction: PivotFriction,
 }
 
-/// Dry friction about each axis.
+/// Dry friction about each axis: Coulomb torque `c` and excess `d` of the static friction torque, N m,
+/// Stribeck speed `omega_s` and width `eps` of the smoothed sign, rad/s, both above 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
 pub struct PivotFriction {
-    /// Coulomb torque about each axis, N m.
     pub c: Vec3,
-    /// Excess of the static friction torque, N m.
     pub d: Vec3,
-    /// Stribeck speed, rad/s, > 0.
     pub omega_s: f64,
-    /// Width of the smoothed sign, rad/s, > 0.
     pub eps: f64,
 }
 
@@ -52,12 +49,10 @@ impl Default for PivotFriction {
 }
 
 impl PivotFriction {
-    /// Returns true if there is dry friction.
     pub(crate) fn acts(&self) -> bool {
         self.c.iter().chain(&self.d).any(|torque| *torque > 0.0)
     }
 
-    /// Returns r at an instant, N m.
     fn present<T: Number>(&self, w: Vec3<T>) -> Vec3<T> {
         core::array::from_fn(|i| {
             let v = w[i] * (1.0 / self.omega_s);
@@ -74,8 +69,8 @@ impl Pivot {
         k != [0.0; 2] || c != [0.0; 3] || friction.acts()
     }
 
-    /// Returns coefficient N of torque (N m) and dissipation (W) without dry friction, from Z and w, with the products
-    /// of w's components.
+    /// Returns coefficient N of torque (N m) and dissipation (W) without dry friction, from Z and w, with the
+    /// products of w's components.
     #[inline(always)]
     pub(crate) fn load<const N: usize>(&self, z: &Vector, w: &Vector, ww: [f64; 6]) -> (Vec3, f64) {
         let [_, _, _, xy, xz, yz] = products::<N>(z);
@@ -88,8 +83,8 @@ impl Pivot {
         (torque, c[0] * ww[0] + c[1] * ww[1] + c[2] * ww[2])
     }
 
-    /// Returns torque, N m, dissipation, W, and energy, J, at an instant; `axes` is body to
-    /// inertial.
+    /// Returns torque, N m, dissipation, W, and energy, J, at an instant; `axes` turns body axes to inertial
+    /// ones.
     pub(crate) fn present<T: Number>(&self, axes: &Mat3<T>, w: Vec3<T>) -> (Vec3<T>, T, T) {
         let [x, y, z] = axes[2];
         let Pivot { k: [k_x, k_y], c, friction } = *self;
@@ -110,27 +105,25 @@ impl Pivot {
     }
 }
 
-/// Dry friction about one axis as power series.
+/// Dry friction about one axis as power series: those of w, of u' and e = exp u with u = -(w/w_s)^2, of v'
+/// and t = tanh v with v = w/eps, of 1 - t^2, and of C + D e and r.
 #[derive(Clone, Debug)]
 pub(crate) struct Rubbing {
     c: f64,
     d: f64,
     inv_omega_s: f64,
     inv_eps: f64,
-    /// w; u' and e = exp u with u = -(w/w_s)^2; v' and t = tanh v with v = w/eps; 1 - t^2
     w: Series,
     u_d: Series,
     e: Series,
     v_d: Series,
     t: Series,
     sech2: Series,
-    /// C + D e, and r
     curve: Series,
     r: Series,
 }
 
 impl Rubbing {
-    /// Creates the dry friction about axis i, from 0.
     pub(crate) fn new(p: &PivotFriction, i: usize) -> Rubbing {
         Rubbing {
             c: p.c[i],
@@ -148,7 +141,7 @@ impl Rubbing {
         }
     }
 
-    /// Returns coefficient n of r and of r w, from that of w.
+    /// Returns coefficient n of r and of r w, from coefficient n of w.
     pub(crate) fn expand(&mut self, n: usize, w: f64) -> (f64, f64) {
         self.w[n] = w;
         let u = -series::square(n, &self.w) * self.inv_omega_s * self.inv_omega_s;
@@ -163,13 +156,13 @@ impl Rubbing {
         (self.r[n], series::mul(n, &self.r, &self.w))
     }
 
-    /// Returns the time over which the series converges reliably, s, from w, w' and w''/2.
+    /// Returns the time, s, over which the series converges reliably, from w, w' and w''/2.
     ///
-    /// tanh has its nearest poles at the distance sqrt(v^2 + (pi/2)^2) from v = w/eps. Away from 0 it is so flat that
-    /// its coefficients do not show the poles, so the method uses half of this distance. exp(-v^2), v = w/w_s, has no
-    /// poles. Beyond v = 3 its terms are too small for any tolerance but grow before they decay: over dv the term of
-    /// order n is (2 v dv)^n/n!. The limit keeps the term below 1e-12 at the end as well, beyond v = 5.3, or makes the
-    /// terms decay from order 5 on.
+    /// tanh has its nearest poles at the distance sqrt(v^2 + (pi/2)^2) from v = w/eps. Away from 0 it is so
+    /// flat that its coefficients do not show the poles, so the method uses half of this distance. exp(-v^2),
+    /// v = w/w_s, has no poles. Beyond v = 3 its terms are too small for any tolerance but grow before they
+    /// decay: over dv the term of order n is (2 v dv)^n/n!. The limit keeps the term below 1e-12 at the end
+    /// as well, beyond v = 5.3, or makes the terms decay from order 5 on.
     pub(crate) fn convergence_radius(&self, w: [f64; 3]) -> f64 {
         if self.c + self.d == 0.0 {
             return f64::INFINITY;
@@ -201,8 +194,8 @@ mod tests {
     const Z: Vec3 = [0.25, -0.5, 0.75];
     const W: Vec3 = [0.5, -1.0, 2.0];
 
-    /// Values by hand: Z x (5/4, -3/2, 0) = (9/8, 15/16, 1/4), c w = (1/4, -1/4, 4), c w^2 = 1/8 + 1/4 + 8, 2 U = 3/4 +
-    /// 5/16.
+    /// The values are by hand: Z x (5/4, -3/2, 0) = (9/8, 15/16, 1/4), c w = (1/4, -1/4, 4), c w^2 = 1/8 +
+    /// 1/4 + 8, 2 U = 3/4 + 5/16.
     #[test]
     fn torque_dissipation_and_energy_are_those_of_spring_and_damper_about_each_axis() {
         let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], Z];
@@ -238,8 +231,6 @@ mod tests {
         }
     }
 
-    /// Each axis has its own curve: at w = w_s = 10 eps the torque is (C + D/e) tanh 10, with its
-    /// dissipation.
     #[test]
     fn dry_friction_acts_against_each_axis_by_its_own_curve() {
         let friction =
@@ -265,8 +256,8 @@ mod tests {
         }
     }
 
-    /// Half of the distance to the nearest pole of tanh, v = i pi/2, by v'' t^2/2 alone and by v' t. With D, from w = 4
-    /// w_s on, 2.5/4 of w_s if this is shorter.
+    /// Half of the distance to the nearest pole of tanh, v = i pi/2, by v'' t^2/2 alone and by v' t. With D,
+    /// from w = 4 w_s on, it is 2.5/4 of w_s if this is shorter.
     #[test]
     fn series_of_dry_friction_reach_half_the_way_to_the_pole() {
         let friction = PivotFriction { c: [1.0; 3], d: [0.0; 3], omega_s: 0.1, eps: 0.01 };

@@ -39,45 +39,42 @@ use crate::sizes::{MODES, POINTS};
 use crate::state::{BallState, Ranges};
 use crate::surface::Higher;
 
-/// 2 b/a over 1 + (b/a)^2 of an ellipse with the semi-axes a and b = a/2.
+/// 2 b/a over 1 + (b/a)^2 of an ellipse with the semi-axes a and b = a/2; wider ellipses count as rotary
+/// motion.
 const ROTARY: f64 = 0.8;
 
-/// Mass of liquid at which a tank is empty, relative to the first point of its fill table; a host's rounding.
+/// Mass of liquid at which a tank is empty, relative to the first point of its fill table, with a host's
+/// rounding.
 const EMPTY: f64 = 1.0 + 1e-9;
 
 /// Bounds of a tank's ranges. For a draining tank they belong to its initial contents, except `over_fill`.
+/// `radius` is R, m, 0 if no wave is given; `lowest` is the lower bound of x per mode, below which the liquid
+/// leaves the bottom; `g_floor` is the smallest x in w^2, m/s2; `axis` is the tank's axis in axes of the
+/// craft or host.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Bounds {
     modes: usize,
-    /// R, m; 0 if no wave is given.
     radius: f64,
-    /// Lower bound of x, per mode. Below it the liquid leaves the bottom.
     lowest: [f64; MODES],
     mode: [ModeBounds; MODES],
-    /// Limits over the mass of liquid, of a tank that can drain.
     over_fill: Option<OverFill>,
-    /// Smallest x in w^2, m/s2.
     g_floor: f64,
     g_bond: f64,
     spin: SpinLimit,
-    /// The tank's axis, axes of the craft or host.
     axis: Vec3,
 }
 
-/// Bounds of a mode; 0 for those that are not known.
+/// Bounds of a mode; 0 for those that are not known. The angles are in rad: of slosh, of rotary motion, and
+/// the one at which waves begin to break. `inv_l` is 1/l, 1/m, and `k_m` is k/m, 1/s2.
 #[derive(Clone, Copy, Debug)]
 struct ModeBounds {
-    /// Slosh angles, rad.
     angle: f64,
     swirl: f64,
-    /// Angle at which waves begin to break, rad.
     breaking: f64,
-    /// 1/l, 1/m, and k/m, 1/s2.
     inv_l: f64,
     k_m: f64,
 }
 
-/// Limits of the slosh angles at the points of a fill table.
 #[derive(Clone, Copy, Debug)]
 struct OverFill {
     points: usize,
@@ -87,7 +84,8 @@ struct OverFill {
 }
 
 impl OverFill {
-    /// Returns a mode's limits, interpolated linearly. Between a known and an unknown one there is none.
+    /// Returns a mode's limits, interpolated linearly over the mass of liquid. Between a known and an unknown
+    /// limit there is none.
     fn limits_at(&self, n: usize, liquid: f64) -> [f64; 2] {
         let masses = &self.liquid[..self.points];
         let last = self.points - 2;
@@ -103,7 +101,6 @@ impl OverFill {
 }
 
 impl Bounds {
-    /// Creates the bounds of a tank whose derived parameters are resolved.
     pub fn new(tank: &Tank) -> Bounds {
         let radius = tank.wave[0] * (XI[0] * XI[0] - 1.0) / 2.0;
         let of_mode = |n: usize| {
@@ -138,7 +135,8 @@ impl Bounds {
         }
     }
 
-    /// Returns the ranges for a tank's outputs, at the angular velocity `omega`, rad/s, and mass of liquid, kg.
+    /// Returns the ranges for a tank's outputs, at the angular velocity `omega`, rad/s, and mass of liquid,
+    /// kg.
     pub fn classify(&self, out: &TankOutputs, omega: Vec3, liquid: f64) -> Ranges {
         if out.ball_state != BallState::Settled {
             let limited_by = LimitedBy::Contact;
@@ -202,8 +200,8 @@ impl Bounds {
         if reason == LimitedBy::None && !upright { LimitedBy::ThirdOrder } else { reason }
     }
 
-    /// Returns true if the motion is physical: the liquid stays at the bottom and the bobs are within 45 degrees of the axis, from the bobs' p_z
-    /// and the specific force along the axis.
+    /// Returns true if the motion is physical: the liquid stays at the bottom and the bobs are within 45
+    /// degrees of the axis, from the bobs' p_z and the specific force along the axis.
     pub fn contain(&self, heights: [f64; MODES], axial: f64) -> bool {
         self.is_held(axial) && self.are_upright(heights)
     }
@@ -212,10 +210,11 @@ impl Bounds {
         self.lowest[..self.modes].iter().all(|lowest| axial >= *lowest)
     }
 
-    /// Returns the event indicator of a tank without a model of detached liquid, m/s2: it is negative where the specific force
-    /// `axial` along the tank no longer holds the liquid of every mode at the bottom, and never 0.
+    /// Returns the event indicator of a tank without a model of detached liquid, m/s2: it is negative where
+    /// the specific force `axial` along the tank no longer holds the liquid of every mode at the bottom, and
+    /// never 0.
     pub fn held_indicator(&self, axial: f64) -> f64 {
-        /// Smallest indicator of liquid that is held: at rest without thrust the margin is 0.
+        /// Smallest indicator of liquid that is held, because at rest without thrust the margin is 0.
         const HELD: f64 = 1e-9;
         let margins = self.lowest[..self.modes].iter().map(|lowest| axial - lowest);
         let margin = margins.fold(1.0 / HELD, f64::min);
@@ -228,8 +227,9 @@ impl Bounds {
 }
 
 impl Tank {
-    /// Returns the slosh angles at which mode `n`, from 0, and its rotary motion leave their range, rad; 0 if they are not
-    /// known. Mode 1 of a cylinder of known dimensions has those of potential flow.
+    /// Returns the slosh angles, rad, at which mode `n`, which counts from 0, and its rotary motion leave
+    /// their range; 0 if they are not known. Mode 1 of a cylinder of known dimensions has those of potential
+    /// flow.
     fn limits(&self, n: usize) -> [f64; 2] {
         let given = [self.angle_limit[n], self.swirl_limit[n]];
         if n > 0 || self.diameter <= 0.0 {

@@ -12,17 +12,13 @@ use core::ops::Mul;
 use taylor::number::Number;
 use taylor::vector::{Mat3, Vec3, add, constant, cross, dot, scale, times};
 
-/// A symmetric 6 x 6 matrix.
 pub type Mat6<T = f64> = [[T; 6]; 6];
 
-/// Mass, first and second moment about O.
+/// Mass m, kg, first moment S = m s, kg m, and second moment I, kg m2, of a rigid body about O.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rigid<T = f64> {
-    /// kg
     pub mass: T,
-    /// S = m s, kg m
     pub moment: Vec3<T>,
-    /// I about O, kg m2
     pub inertia: Mat3<T>,
 }
 
@@ -39,7 +35,6 @@ impl Rigid {
         Rigid { mass: m, moment: scale(m, s), inertia }
     }
 
-    /// Returns the same body with another number type.
     pub fn lift<T: Number>(&self) -> Rigid<T> {
         Rigid {
             mass: T::constant(self.mass),
@@ -56,8 +51,8 @@ impl Rigid {
 }
 
 impl<T: Number> Rigid<T> {
-    /// Creates a body of mass m at s with the inertia i_0 across and i_z about the axis e, about
-    /// its centre of mass.
+    /// Creates a body of mass m at s with the inertia i_0 across and i_z about the axis e, about its centre
+    /// of mass.
     pub fn axial(m: T, s: Vec3<T>, i_0: T, i_z: T, e: Vec3<T>) -> Rigid<T> {
         let s2 = dot(s, s);
         let element = |i: usize, j: usize| {
@@ -68,7 +63,6 @@ impl<T: Number> Rigid<T> {
         Rigid { mass: m, moment: scale(m, s), inertia }
     }
 
-    /// Returns both bodies as one rigid body: masses, moments and inertias added.
     pub fn combined_with(&self, b: &Rigid<T>) -> Rigid<T> {
         let mut sum = *self;
         sum.mass = sum.mass + b.mass;
@@ -79,7 +73,7 @@ impl<T: Number> Rigid<T> {
         sum
     }
 
-    /// Returns M for the unknowns a, w'.
+    /// Returns the mass matrix M for the unknowns a, w'.
     pub fn mass_matrix(&self) -> Mat6<T> {
         let [x, y, z] = self.moment;
         let [i_x, i_y, i_z] = self.inertia;
@@ -94,8 +88,8 @@ impl<T: Number> Rigid<T> {
         ]
     }
 
-    /// Returns force and torque about O that the body's motion requires: M [a; w'] + [w x (w x S);
-    /// w x (I w)].
+    /// Returns force and torque about O that the body's motion requires: M [a; w'] + [w x (w x S); w x (I
+    /// w)].
     pub fn inertial_wrench(&self, a: Vec3<T>, w: Vec3<T>, w_d: Vec3<T>) -> [Vec3<T>; 2] {
         let Rigid { mass, moment: s, inertia } = *self;
         let force = add(a.map(|x| x * mass), add(cross(w_d, s), cross(w, cross(w, s))));
@@ -104,8 +98,7 @@ impl<T: Number> Rigid<T> {
     }
 }
 
-/// Adds m u u^T, u = [p; P x p]: the inertia of a bob at the end of its rod, which acts only along
-/// the rod.
+/// Adds m u u^T, u = [p; P x p]: the inertia of a bob at the end of its rod, which acts only along the rod.
 #[inline(always)]
 pub fn add_rank_one(matrix: &mut Mat6, m: f64, u: &[f64; 6]) {
     for i in 0..6 {
@@ -126,25 +119,23 @@ pub fn along_rod<T: Number>(p: Vec3<T>, hinge: Vec3<T>) -> [T; 6] {
     [p[0], p[1], p[2], c[0], c[1], c[2]]
 }
 
-/// Largest inverse of mass (1/kg) and inertia (1/(kg m2)). Products of it with masses up to 1e12 kg
-/// and arms up to 1e9 m do not overflow.
+/// Largest inverse of mass (1/kg) and inertia (1/(kg m2)). Products of it with masses up to 1e12 kg and arms
+/// up to 1e9 m do not overflow.
 const LARGEST_INVERSE: f64 = 1e30;
 
-/// Smallest divisor, so that the factors of any matrix are finite. Its inverse is above
-/// [`LARGEST_INVERSE`].
+/// Smallest divisor, so that the factors of any matrix are finite. Its inverse is above [`LARGEST_INVERSE`].
 const SMALLEST_DIVISOR: f64 = 0.5 / LARGEST_INVERSE;
 
-/// Factorisation L D L^T of a symmetric positive definite matrix; L has ones on its diagonal.
+/// Factorisation L D L^T of a symmetric positive definite matrix; L has ones on its diagonal and is used only
+/// below it, and `inverse` is 1/D.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Factors<T = f64> {
-    /// Entries below L's diagonal. The other entries are not used.
     l: Mat6<T>,
-    /// 1/D
     inverse: [T; 6],
 }
 
 impl<T: Number> Factors<T> {
-    /// Factorises a matrix. Only its lower triangle is read.
+    /// Factorises a matrix, of which only the lower triangle is read.
     #[inline(always)]
     pub fn new(matrix: &Mat6<T>) -> Factors<T> {
         let zero = T::constant(0.0);
@@ -153,9 +144,9 @@ impl<T: Number> Factors<T> {
         factors
     }
 
-    /// Factorises a matrix that may be far from positive definite, because a host whose integration diverges hands over any
-    /// states. If the matrix is not positive definite, all factors are 0 and [`Factors::solve`] returns 0: products of the
-    /// true factors could overflow.
+    /// Factorises a matrix that may be far from positive definite, because a host whose integration diverges
+    /// hands over any states. If the matrix is not positive definite, all factors are 0 and
+    /// [`Factors::solve`] returns 0: products of the true factors could overflow.
     pub fn definite_or_zero(matrix: &Mat6<T>) -> Factors<T> {
         let zero = T::constant(0.0);
         let none = Factors { l: [[zero; 6]; 6], inverse: [zero; 6] };
@@ -170,7 +161,8 @@ impl<T: Number> Factors<T> {
         factors
     }
 
-    /// Factorises another matrix in place. Copies of matrices would take a fortieth of a step's instructions.
+    /// Factorises another matrix in place, because copies of matrices would take a fortieth of a step's
+    /// instructions.
     #[inline(always)]
     pub fn set(&mut self, matrix: &Mat6<T>) {
         for j in 0..6 {
@@ -224,8 +216,8 @@ impl<M: Copy> Factors<M> {
     }
 }
 
-/// Returns the smallest element of D over the matrix's own diagonal. Returns 0 for a matrix that is not positive
-/// definite, or so nearly singular that its inverse exceeds [`LARGEST_INVERSE`].
+/// Returns the smallest element of D over the matrix's own diagonal. Returns 0 for a matrix that is not
+/// positive definite, or so nearly singular that its inverse exceeds [`LARGEST_INVERSE`].
 pub fn smallest_pivot(matrix: &Mat6) -> f64 {
     let Factors { inverse, .. } = Factors::new(matrix);
     // NaN is outside the range.
@@ -237,8 +229,8 @@ pub fn smallest_pivot(matrix: &Mat6) -> f64 {
 }
 
 impl Factors {
-    /// Returns L^-1 b with each row divided by the root of its pivot. It turns M_a into the
-    /// symmetric matrix with the eigenvalues of M^-1 M_a.
+    /// Returns L^-1 b with each row divided by the root of its pivot. It turns M_a into the symmetric matrix
+    /// with the eigenvalues of M^-1 M_a.
     fn half_solve(&self, b: &[f64; 6]) -> [f64; 6] {
         let mut x = *b;
         for i in 1..6 {
@@ -250,8 +242,8 @@ impl Factors {
     }
 }
 
-/// Returns the largest eigenvalue of M^-1 A, both symmetric, M given by its factors: Jacobi
-/// rotations of the similar symmetric matrix.
+/// Returns the largest eigenvalue of M^-1 A, both symmetric, M given by its factors: Jacobi rotations of the
+/// similar symmetric matrix.
 pub fn largest_eigenvalue(m: &Factors, a: &Mat6) -> f64 {
     let rows = a.map(|row| m.half_solve(&row));
     let mut b: Mat6 = core::array::from_fn(|i| m.half_solve(&rows.map(|row| row[i])));
@@ -286,7 +278,6 @@ pub fn largest_eigenvalue(m: &Factors, a: &Mat6) -> f64 {
 mod tests {
     use super::*;
 
-    /// Solves with a craft's matrix with a few bobs for a known vector.
     #[test]
     fn solving_undoes_multiplying() {
         let mut rng = fastrand::Rng::with_seed(5);
@@ -320,7 +311,6 @@ mod tests {
         assert!(smallest_pivot(&matrix) < 1e-12);
     }
 
-    /// The eigenvalues of M^-1 A for A = m u u^T are m u.M^-1 u and five times 0.
     #[test]
     fn the_largest_eigenvalue_of_a_rank_one_matrix_is_its_quadratic_form() {
         let own = [[910.0, 14.0, -9.0], [14.0, 860.0, 6.0], [-9.0, 6.0, 640.0]];

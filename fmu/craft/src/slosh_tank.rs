@@ -103,31 +103,32 @@ use crate::rigid::{Factors, Mat6, Rigid, add_rank_one, along_rod, largest_eigenv
 use crate::sizes::MODES;
 use crate::state::{BallState, Line, Ramp, Ranges, has_direction};
 
-/// Number of continuous states of a tank: p and p' of each mode, the dissipated energy and the mass of liquid. Then follow
-/// position (m) and rate (m/s) of the detached liquid from the tank's origin, tank axes.
+/// Number of continuous states of a tank: p and p' of each mode, the dissipated energy and the mass of
+/// liquid. Then follow position (m) and rate (m/s) of the detached liquid from the tank's origin, tank axes.
 pub const TANK_STATES: usize = 6 * MODES + 8;
 
 /// Number of a tank's inputs: a, omega, omega_dot, mass_flow.
 pub const TANK_INPUTS: usize = 10;
 
-/// Elements of a symmetric 6 x 6 matrix: the upper triangle by rows.
+/// Number of elements of a symmetric 6 x 6 matrix: the upper triangle by rows.
 pub const TRIANGLE: usize = 21;
 
 const DISSIPATED: usize = 6 * MODES;
 const LIQUID: usize = DISSIPATED + 1;
 const BALL: usize = LIQUID + 1;
 
-/// Meaning of `bias` and `added_mass`.
+/// Meaning of the outputs `bias` and `added_mass` of a tank.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Coupling {
     /// Wrench at a = w' = 0 and the current added mass, for hosts that solve with both.
     Split = 1,
-    /// Constant matrix M of the rigid liquid and each bob at its hinge, and the wrench + M [a; w'] at the given a, w'. For hosts
-    /// that add a constant to the matrix that they solve with.
+    /// Constant matrix M of the rigid liquid and each bob at its hinge, and the wrench + M [a; w'] at the
+    /// given a, w'. For hosts that add a constant to the matrix that they solve with.
     Lumped = 2,
-    /// The same matrix and wrench as `Lumped`, for hosts that are plain rigid bodies with M in their mass, centre of mass and
-    /// inertia. bias also contains the centrifugal and gyroscopic terms of M, w x (w x S) and w x (I w).
+    /// The same matrix and wrench as `Lumped`, for hosts that are plain rigid bodies with M in their mass,
+    /// centre of mass and inertia. bias also contains the centrifugal and gyroscopic terms of M, w x (w x S)
+    /// and w x (I w).
     RigidBody = 3,
 }
 
@@ -136,17 +137,16 @@ impl Coupling {
     pub const ALL: [Coupling; 3] = [Coupling::Split, Coupling::Lumped, Coupling::RigidBody];
 }
 
-/// All parameters and initial conditions of a [`SloshTank`].
+/// All parameters and initial conditions of a [`SloshTank`]. Position and attitude of `tank` are relative to
+/// the host's O and axes. `host` are the mass properties of the host without this tank, which
+/// [`SloshTank::coupling_ratio`] and the impulses of detached liquid need. `max_steps` is the largest number
+/// of internal steps in one step, at least 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
 pub struct TankParameters {
-    /// The tank; position and attitude are relative to the host's O and axes.
     pub tank: Tank,
-    /// Use of `bias` and `added_mass` by the host.
     pub coupling: Coupling,
-    /// Mass properties of the host without this tank, for [`SloshTank::coupling_ratio`] and for the impulses of
-    /// detached liquid, which require them.
     pub host: Option<Craft>,
-    /// Largest number of internal steps in one step, at least 1.
     pub max_steps: usize,
 }
 
@@ -197,8 +197,8 @@ impl TankParameters {
         all.into_iter().filter(|(is_so, _)| *is_so).map(|(_, said)| said).collect()
     }
 
-    /// Returns the problem of rigid liquid without axial symmetry whose mass is negative in total or whose inertia is
-    /// not positive.
+    /// Returns the problem of rigid liquid without axial symmetry whose mass is negative in total or whose
+    /// inertia is not positive.
     fn uneven_problem(&self) -> Option<String> {
         let tank = self.tank.resolve();
         let mass = tank.whole_mass();
@@ -219,16 +219,15 @@ impl TankParameters {
     }
 }
 
-/// The host's motion over one step; host axes.
+/// The host's motion over one step, host axes: specific force `a` at O, m/s2, angular velocity now, rad/s,
+/// whose slope is `omega_dot`, rad/s2, and mass flow out of the tank, kg/s, which is negative for inflow and
+/// without effect in a tank without a fill table.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
+#[allow(missing_docs)]
 pub struct TankInputs {
-    /// Specific force at O, m/s2.
     pub a: Ramp,
-    /// Angular velocity now, rad/s. Its slope is omega_dot.
     pub omega: Vec3,
-    /// Angular acceleration, rad/s2.
     pub omega_dot: Ramp,
-    /// Mass flow out of the tank, kg/s, negative for inflow. Without effect in a tank without a fill table.
     pub mass_flow: Line,
 }
 
@@ -241,41 +240,34 @@ impl TankInputs {
     }
 }
 
-/// Outputs of the tank at one instant.
+/// Outputs of the tank at one instant. Force and torque on the host are about O. `bias`, N and N m, and
+/// `added_mass`, kg, kg m, kg m2, the upper triangle by rows, are explained at [`Coupling`]. `impulse` is the
+/// sum of the impulses of detached liquid on the host since the start, N s, and about O, N m s, each in the
+/// host's axes at its time; the host adds M_host^-1 times its change to its velocity and rate. It is 0 in
+/// derivatives. `liquid` is the mass of liquid as a state of a draining tank, kg. Mass, centre of mass from O
+/// and inertia about it are those of the whole liquid, with the bobs as point masses at their current
+/// positions, host axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
 pub struct SloshTankOutputs {
-    /// Force and torque about O on the host, and the modes.
     pub tank: TankOutputs,
-    /// Bias, N and N m; see [`Coupling`].
     pub bias: [f64; 6],
-    /// Added mass, kg, kg m, kg m2: upper triangle by rows; see [`Coupling`].
     pub added_mass: [f64; TRIANGLE],
-    /// Sum of the impulses of detached liquid on the host since the start, N s, and about O, N m s, each in the host's
-    /// axes at its time. The host adds M_host^-1 times the change to its velocity and rate. 0 in derivatives.
     pub impulse: [f64; 6],
-    /// Energy dissipated by the liquid since the start, J.
     pub dissipated: f64,
-    /// Mass of the whole liquid as a state of a draining tank, kg.
     pub liquid: f64,
-    /// Mass of the whole liquid, kg.
     pub mass: f64,
-    /// Centre of mass of the whole liquid from O, m, host axes.
     pub center_of_mass: Vec3,
-    /// Inertia of the whole liquid about its centre of mass, with the bobs as point masses at their
-    /// current positions, kg m2, host axes.
     pub inertia: Mat3,
 }
 
-/// The tank's memory.
+/// Everything that a saved state of the tank needs besides parameters and inputs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TankState {
     time: f64,
     x: [f64; TANK_STATES],
-    /// Ranges of the motion since the last event, for hosts that integrate themselves.
     ranges: Ranges,
-    /// State of the detached liquid.
     ball: BallState,
-    /// [`SloshTankOutputs::impulse`].
     impulse: [f64; 6],
 }
 
@@ -283,7 +275,6 @@ impl TankState {
     /// Number of words of a saved state.
     pub const WORDS: usize = Self::REALS + 2;
 
-    /// Number of words that are real numbers; ranges and state of the liquid follow.
     const REALS: usize = 7 + TANK_STATES;
 
     /// Returns the state as words, for saving.
@@ -311,47 +302,40 @@ impl TankState {
     }
 }
 
-/// The tank at its current state and the series of its motion.
+/// The tank at its current state and the series of its motion. `constrained` are the bobs that are not
+/// pendulums or are guided in a plane, and `beyond` is the one of them that reaches the bound of its surface
+/// at the end of the expansion. `w_both` is (w, w); `inv_allowed` is 1 over the allowed error of v.
 #[derive(Clone, Debug)]
 struct TankMotion {
     state: TankState,
     inputs: TankInputs,
     rigid: Rigid,
     bobs: Vec<Bob>,
-    /// Bobs that are not pendulums or are guided in a plane, and the one of them that reaches the bound of its surface at
-    /// the end of the expansion.
     constrained: Vec<ConstrainedBob>,
     beyond: Option<usize>,
-    /// True if the tank models detached liquid or has constrained bobs.
     is_apart: bool,
     a: Vector,
     w: Vector,
-    /// (w, w)
     w_both: Pair,
     w_d: Vector,
     dissipation: Series,
-    /// 1 over the allowed error of v
     inv_allowed: f64,
-    /// Data of the model of detached liquid, if the tank has one.
     ball: Option<Loose>,
 }
 
-/// Additional data of a tank that models detached liquid.
+/// Additional data of a tank that models detached liquid: the bobs while they are not in use (`parked`), the
+/// host without the tank, the factors of its matrix with everything of the tank that is attached to it, the
+/// change of w by impulses that the host has not applied yet (`turned`), and the other forces on the host
+/// from before the first change within a step (`rest`).
 #[derive(Clone, Debug)]
 struct Loose {
     lump: Lump,
-    /// The bobs, while they are not in use.
     parked: Vec<Bob>,
-    /// The host without the tank, and the factors of its matrix with everything of the tank that is attached to it.
     host: Rigid,
     factors: Factors,
-    /// Change of w by impulses that the host has not applied yet.
     turned: Vec3,
-    /// The other forces on the host, from before the first change within a step.
     rest: Option<[Vec3; 2]>,
-    /// Event at the end of the expansion.
     due: Option<Due>,
-    /// 1 over the allowed error of the detached liquid's u.
     inv_allowed: f64,
 }
 
@@ -361,13 +345,10 @@ pub struct SloshTank {
     motion: Box<TankMotion>,
     coupling: Coupling,
     host: Option<Craft>,
-    /// M of [`Coupling::Lumped`].
     lumped: Rigid,
-    /// Equations of a tank that can drain, or has planar modes or other bobs than pendulums.
     draining: Option<Box<MountedTank>>,
     limits: Limits,
     bounds: ranges::Bounds,
-    /// Hinge of the first mode from O and the tank's axis.
     first: Option<[Vec3; 2]>,
 }
 
@@ -377,10 +358,8 @@ struct Run<'a> {
     inputs: &'a TankInputs,
 }
 
-/// a, w, w', outflow.
 type Acting<T> = ([Vec3<T>; 3], T);
 
-/// Scales for error control: 1 for directions, and those of the bobs' rates.
 fn scales(swing: impl Fn(usize) -> f64) -> [f64; TANK_STATES] {
     // The dissipated energy and the liquid follow from the other states, and such a tank has no
     // detached liquid.
@@ -451,7 +430,7 @@ fn draining_rates<T: Number>(
     rate
 }
 
-/// Returns values and derivatives along (dx, du).
+/// Returns states and inputs of the tank with their derivatives along (dx, du).
 fn dual_arguments(
     x: &[f64; TANK_STATES],
     inputs: &TankInputs,
@@ -559,7 +538,6 @@ impl Motion for TankMotion {
     }
 }
 
-/// Returns the detached liquid, if the tank has any and it is loose.
 #[inline(always)]
 fn loose(ball: &mut Option<Loose>) -> Option<&mut Lump> {
     ball.as_mut().map(|ball| &mut ball.lump).filter(|lump| lump.is_loose())
@@ -601,7 +579,6 @@ impl TankMotion {
         integrator::advance(self, begin, h, limits.tolerance, &mut limits.steps()).map(|_| ())
     }
 
-    /// Computes coefficient N of every quantity and N + 1 of the states.
     #[inline(always)]
     fn expand_rates<const N: usize>(&mut self) {
         self.w_both.set(N, self.w[N], self.w[N]);
@@ -638,7 +615,6 @@ impl TankMotion {
         rate
     }
 
-    /// Returns the quantities for the outputs, from coefficients 0 and 1.
     fn parts<T: Number>(&self) -> Parts<T> {
         let of = |a: &[Vec3]| -> Vec3<T> { [0, 1, 2].map(|i| T::with_slope(a[0][i], a[1][i])) };
         let (a, w, w_d) = (of(&self.a), of(&self.w), of(&self.w_d));
@@ -678,7 +654,8 @@ impl TankMotion {
 
 // Detached liquid (lump.rs, handover.rs), apart from the equations of a tank without it.
 impl TankMotion {
-    /// Sets up rigid liquid and bobs for the liquid's state. Does not allocate. Returns the change of w.
+    /// Sets up rigid liquid and bobs for the liquid's state (settled or detached). Does not allocate. Returns
+    /// the change of w.
     #[inline(never)]
     fn start_ball(&mut self) -> Vec3 {
         let Some(ball) = &mut self.ball else { return [0.0; 3] };
@@ -740,11 +717,10 @@ impl TankMotion {
         }
     }
 
-    /// Advances the states of constrained bobs and detached liquid by a step of length h. Returns true if they are finite
-    /// and within bounds.
+    /// Advances the states of constrained bobs and detached liquid by a step of length h. Returns true if
+    /// they are finite and within bounds.
     ///
-    /// # Errors
-    /// If a bob is at the bound of its surface.
+    /// # Errors If a bob is at the bound of its surface.
     #[inline(never)]
     fn take_apart(&mut self, n: usize, h: f64, w: Vec3) -> Result<bool, StepError> {
         if let Some(bob) = self.beyond.take() {
@@ -764,7 +740,8 @@ impl TankMotion {
         Ok(finite)
     }
 
-    /// Returns the time of the first event of detached liquid, or of a constrained bob that reaches the bound of its surface.
+    /// Returns the time of the first event of detached liquid, or of a constrained bob that reaches the bound
+    /// of its surface.
     #[inline(never)]
     fn next_event(&mut self, n: usize, h: f64) -> Option<f64> {
         let mut first = self.next_of_ball(n, h);
@@ -798,7 +775,8 @@ impl TankMotion {
         self.change(0, due, t);
     }
 
-    /// Sets up detached liquid at the start of an expansion. After a change it holds a and w' of the host's response.
+    /// Sets up detached liquid at the start of an expansion. After a change it holds a and w' of the host's
+    /// response.
     #[inline(never)]
     fn start_apart(&mut self) {
         let w = self.w[0];
@@ -855,8 +833,8 @@ impl TankMotion {
         ball.factors.set(&matrix);
     }
 
-    /// Performs all events that are due now, for hosts that integrate themselves. Returns true if
-    /// there were any.
+    /// Performs all events that are due now, for hosts that integrate themselves. Returns true if there were
+    /// any.
     fn take_due(&mut self, inputs: &TankInputs) -> bool {
         self.inputs = *inputs;
         self.forget();
@@ -876,14 +854,12 @@ impl TankMotion {
         any
     }
 
-    /// Marks all impulses as applied by the host.
     fn forget(&mut self) {
         if let Some(ball) = &mut self.ball {
             (ball.turned, ball.rest, ball.due) = ([0.0; 3], None, None);
         }
     }
 
-    /// Returns the state of the detached liquid.
     fn state_of_ball(&self) -> BallState {
         if self.ball.is_some() { self.state.ball } else { BallState::Settled }
     }
@@ -897,13 +873,11 @@ impl TankMotion {
     }
 }
 
-/// Returns the directions of a tank's bobs.
 fn directions(x: &[f64; TANK_STATES]) -> Directions {
     core::array::from_fn(|n| part(x, 6 * n))
 }
 
 impl Carrier for TankMotion {
-    /// The state and the change of w.
     type Memory = (TankState, Vec3);
 
     fn memory(&self) -> (TankState, Vec3) {
@@ -1002,20 +976,15 @@ impl TankMotion {
     }
 }
 
-/// Quantities from which the outputs are computed.
+/// Quantities from which the outputs are computed: the `wrench` on the host about O, the `loads`, which are
+/// the wrench at a = w' = 0 without the rigid liquid, and the added mass M_a.
 struct Parts<T> {
-    /// a, w, w'
     motion: [Vec3<T>; 3],
-    /// The rigid liquid.
     rigid: Rigid<T>,
-    /// Wrench on the host about O.
     wrench: [Vec3<T>; 2],
-    /// The same at a = w' = 0, without the rigid liquid.
     loads: [Vec3<T>; 2],
-    /// M_a
     matrix: Mat6<T>,
     bobs: [Option<BobNow<T>>; MODES],
-    /// The detached liquid, if any.
     lump: Option<BobNow<T>>,
     ball_state: BallState,
 }
@@ -1024,14 +993,12 @@ fn plus<T: Number>(a: [Vec3<T>; 2], b: [Vec3<T>; 2]) -> [Vec3<T>; 2] {
     [add(a[0], b[0]), add(a[1], b[1])]
 }
 
-/// Adds the bob's m u u^T to a matrix.
 fn add_added_mass<T: Number>(matrix: &mut [[T; 6]; 6], bob: &Bob) {
     let p = [0, 1, 2].map(|i| T::with_slope(bob.p[0][i], bob.p[1][i]));
     let c = cross(constant(bob.hinge), p);
     add_square(matrix, T::constant(bob.m), &[p[0], p[1], p[2], c[0], c[1], c[2]]);
 }
 
-/// Adds m u u^T to a matrix.
 fn add_square<T: Number>(matrix: &mut [[T; 6]; 6], m: T, u: &[T; 6]) {
     for i in 0..6 {
         for j in 0..6 {
@@ -1050,8 +1017,8 @@ fn triangle<T: Number>(matrix: &[[T; 6]; 6]) -> [f64; TRIANGLE] {
 }
 
 impl SloshTank {
-    /// Creates a tank at the start of its motion, at `start_time` (s). `tolerance` is the allowed relative error of
-    /// directions and rates, 1e-14 to 0.1. Returns all problems of refused parameters.
+    /// Creates a tank at the start of its motion, at `start_time` (s). `tolerance` is the allowed relative
+    /// error of directions and rates, 1e-14 to 0.1. Returns all problems of refused parameters.
     pub fn new(
         p: &TankParameters,
         inputs: &TankInputs,
@@ -1082,7 +1049,7 @@ impl SloshTank {
         Ok(tank)
     }
 
-    /// Creates a tank that continues from a saved state of one with the same parameters, which
+    /// Creates a tank that continues from a saved state of a tank with the same parameters, which
     /// [`SloshTank::new`] has accepted.
     pub fn resume(p: &TankParameters, state: &TankState, tolerance: f64) -> SloshTank {
         let tank = p.tank.resolve();
@@ -1148,13 +1115,13 @@ impl SloshTank {
         &self.motion.state
     }
 
-    /// Restores a saved state of this tank or of one with the same parameters.
+    /// Restores a saved state of this tank or of a tank with the same parameters.
     pub fn set_state(&mut self, state: &TankState) {
         self.motion.state = *state;
     }
 
-    /// Advances by exactly `h` > 0 seconds, with the inputs along their ramps. After an error the
-    /// tank is unchanged.
+    /// Advances by exactly `h` > 0 seconds, with the inputs along their ramps. After an error the tank is
+    /// unchanged.
     pub fn step(&mut self, inputs: &TankInputs, h: f64) -> Result<(), StepError> {
         if !(h > 0.0 && h.is_finite()) {
             return Err(StepError::Length { h });
@@ -1186,7 +1153,7 @@ impl SloshTank {
         self.bounds.classify(&outputs.tank, inputs.omega, self.motion.state.x[LIQUID])
     }
 
-    /// Returns the ranges as of the last event.
+    /// Returns the ranges as they were after the last event.
     pub fn ranges_held(&self) -> Ranges {
         self.motion.state.ranges
     }
@@ -1196,12 +1163,13 @@ impl SloshTank {
         self.motion.ball.is_some()
     }
 
-    /// Returns true if the liquid is detached.
+    /// Returns true if the liquid is detached at present.
     pub fn has_lump(&self) -> bool {
         self.motion.state_of_ball() != BallState::Settled
     }
 
-    /// Returns true if the motion is physical at the end of the last step, of length `h`. Detached liquid always is.
+    /// Returns true if the motion is physical at the end of the last step, of length `h`. Detached liquid
+    /// always is.
     pub fn is_physical_after(&self, inputs: &TankInputs, h: f64) -> bool {
         let TankMotion { state, ball, .. } = &*self.motion;
         if ball.is_some() {
@@ -1215,9 +1183,10 @@ impl SloshTank {
         self.bounds.contain(core::array::from_fn(|n| state.x[6 * n + 2]), axial)
     }
 
-    /// Returns functions of states and inputs that cross zero at events: at the end of the liquid's current state, and
-    /// at the end of its sliding on the wall. In a tank without a model of detached liquid the first crosses zero where the
-    /// thrust no longer holds the liquid at the bottom, at which the tank leaves its range, and the second is 1.
+    /// Returns functions of states and inputs that cross zero at events: at the end of the liquid's current
+    /// state, and at the end of its sliding on the wall. In a tank without a model of detached liquid the
+    /// first crosses zero where the thrust no longer holds the liquid at the bottom, at which the tank leaves
+    /// its range, and the second is 1.
     pub fn event_indicators(&mut self, inputs: &TankInputs) -> [f64; 2] {
         if !self.has_ball() {
             let axial = self.outputs_held(inputs).tank.axial;
@@ -1228,15 +1197,16 @@ impl SloshTank {
         self.motion.loose().lump.indicators([a, w, w_d], bobs.iter())
     }
 
-    /// Returns true if a host that integrates itself has passed an event of the liquid, whatever the indicators of its
-    /// last steps were.
+    /// Returns true if a host that integrates itself has passed an event of the liquid, whatever the
+    /// indicators of its last steps were.
     pub fn is_event_overdue(&mut self, inputs: &TankInputs) -> bool {
         let now = self.event_indicators(inputs);
         self.has_ball() && self.motion.loose().lump.is_overdue(now)
     }
 
-    /// Performs all events that are due: liquid leaves the bottom, meets the wall or settles, and the ranges become
-    /// those of the current motion. Returns true if continuous states have changed. After an error nothing has changed.
+    /// Performs all events that are due: liquid leaves the bottom, meets the wall or settles, and the ranges
+    /// become those of the current motion. Returns true if continuous states have changed. After an error
+    /// nothing has changed.
     pub fn take_event(&mut self, inputs: &TankInputs) -> Result<bool, StepError> {
         let before = self.motion.state;
         let changed = self.has_ball() && self.motion.take_due(inputs);
@@ -1269,7 +1239,7 @@ impl SloshTank {
         outputs
     }
 
-    /// Returns [`SloshTank::outputs`] with the ranges as of the last event.
+    /// Returns [`SloshTank::outputs`] with the ranges as they were after the last event.
     pub fn outputs_held(&mut self, inputs: &TankInputs) -> SloshTankOutputs {
         let x = self.motion.state.x;
         if let Some(mounted) = &self.draining {
@@ -1349,8 +1319,8 @@ impl SloshTank {
         }
     }
 
-    /// Returns x: p and p' of each mode, the dissipated energy, J, and the mass of liquid, kg. Then follow position, m, and rate,
-    /// m/s, of the detached liquid. Vectors are in tank axes.
+    /// Returns x: p and p' of each mode, the dissipated energy, J, and the mass of liquid, kg. Then follow
+    /// position, m, and rate, m/s, of the detached liquid. Vectors are in tank axes.
     pub fn continuous_states(&self) -> [f64; TANK_STATES] {
         self.motion.state.x
     }
@@ -1374,8 +1344,8 @@ impl SloshTank {
         self.motion.state_rates::<0>()
     }
 
-    /// Returns the exact derivative of x' in the direction (dx, du), with du of a, omega, omega_dot, mass_flow. The
-    /// slope of mass_flow is held.
+    /// Returns the exact derivative of x' in the direction (dx, du), with du of a, omega, omega_dot,
+    /// mass_flow. The slope of mass_flow is held.
     pub fn directional_derivative(
         &mut self,
         inputs: &TankInputs,
@@ -1407,9 +1377,8 @@ impl SloshTank {
         SloshTankOutputs { impulse: [0.0; 6], ..self.outputs_from(dx, parts) }
     }
 
-    /// Applies an impulse of the host to the bobs, which keep their velocities across their rods.
-    /// The impulse changes the velocity of O by `dv`, m/s, and the host's angular velocity by `dw`,
-    /// rad/s, host axes.
+    /// Applies an impulse of the host to the bobs, which keep their velocities across their rods. The impulse
+    /// changes the velocity of O by `dv`, m/s, and the host's angular velocity by `dw`, rad/s, host axes.
     pub fn apply_host_impulse(&mut self, dv: Vec3, dw: Vec3) {
         let TankMotion { state, bobs, constrained, .. } = &mut *self.motion;
         if let Some(mounted) = &self.draining {
@@ -1426,11 +1395,11 @@ impl SloshTank {
         self.motion.follow_impulse(dv, dw);
     }
 
-    /// Returns the largest eigenvalue lambda of M_host^-1 M_a at the current directions; `None` if
-    /// the host's mass properties are unknown.
+    /// Returns the largest eigenvalue lambda of M_host^-1 M_a at the current directions; `None` if the host's
+    /// mass properties are unknown.
     ///
-    /// A host that uses the total wrench one step late diverges, at any step, above 1 (held
-    /// values), 1/3 (Gauss-Seidel, linear extrapolation) or 0.155 (Jacobi, linear extrapolation).
+    /// A host that uses the total wrench one step late diverges, at any step, above 1 (held values), 1/3
+    /// (Gauss-Seidel, linear extrapolation) or 0.155 (Jacobi, linear extrapolation).
     pub fn coupling_ratio(&mut self) -> Option<f64> {
         let host = self.host?;
         self.motion.start(0.0);
@@ -1450,8 +1419,8 @@ mod tests {
     use super::*;
     use taylor::ramp::Ramp;
 
-    /// Upright under 9.81 m/s2 along its axis the tank is physical. After 2 s of 30 m/s2 across it, the pendulum has
-    /// passed 45 degrees. At 1 m/s2 downwards the specific force has the wrong sign.
+    /// Upright under 9.81 m/s2 along its axis the tank is physical. After 2 s of 30 m/s2 across it, the
+    /// pendulum has passed 45 degrees. At 1 m/s2 downwards the specific force has the wrong sign.
     #[test]
     fn a_tank_is_physical_while_its_bobs_are_upright_and_the_force_holds_them() {
         let after = |a: [f64; 3], h: f64| {

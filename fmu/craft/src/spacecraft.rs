@@ -21,17 +21,14 @@ use crate::state::{BallState, INPUTS, Inputs, Ranges, STATES, State, index};
 #[derive(Clone, Debug)]
 pub struct Spacecraft {
     motion: Box<CraftMotion>,
-    /// Equations for draining tanks, planar modes or other bobs than pendulums, if there are any.
     draining: Option<Box<Draining>>,
     limits: Limits,
-    /// Bounds of the tanks in use.
     bounds: Vec<ranges::Bounds>,
 }
 
 impl Spacecraft {
-    /// Creates a craft at the start of its motion, at `start_time` (s), with the inputs that act
-    /// then. `tolerance` is the allowed relative error of rates, directions and attitude, 1e-14 to
-    /// 0.1.
+    /// Creates a craft at the start of its motion, at `start_time` (s), with the inputs that act then.
+    /// `tolerance` is the allowed relative error of rates, directions and attitude, 1e-14 to 0.1.
     ///
     /// Returns all problems of refused parameters.
     pub fn new(
@@ -82,7 +79,7 @@ impl Spacecraft {
         Ok(craft)
     }
 
-    /// Creates a craft that continues from a saved state of one with the same parameters, which
+    /// Creates a craft that continues from a saved state of a craft with the same parameters, which
     /// [`Spacecraft::new`] has accepted.
     pub fn resume(p: &Parameters, state: &State, tolerance: f64) -> Spacecraft {
         let draining = Draining::new(p).map(Box::new);
@@ -107,14 +104,14 @@ impl Spacecraft {
         &self.motion.state
     }
 
-    /// Restores a saved state of this craft or of one with the same parameters.
+    /// Restores a saved state of this craft or of a craft with the same parameters.
     pub fn set_state(&mut self, state: &State) {
         self.motion.state = *state;
     }
 
-    /// Advances by exactly `h` > 0 seconds, with the inputs along their ramps. A jump of `h_wheels`
-    /// or `mass_flow` since the last step acts as an impulse at the beginning. After an error the
-    /// craft is unchanged.
+    /// Advances by exactly `h` > 0 seconds, with the inputs along their ramps. A jump of `h_wheels` or
+    /// `mass_flow` since the last step acts as an impulse at the beginning. After an error the craft is
+    /// unchanged.
     pub fn step(&mut self, inputs: &Inputs, h: f64) -> Result<(), StepError> {
         if !(h > 0.0 && h.is_finite()) {
             return Err(StepError::Length { h });
@@ -141,8 +138,8 @@ impl Spacecraft {
         done
     }
 
-    /// Returns the outputs under the inputs' current values, after the effect of a jump of
-    /// `h_wheels` or `mass_flow` since the last step.
+    /// Returns the outputs under the inputs' current values, after the effect of a jump of `h_wheels` or
+    /// `mass_flow` since the last step.
     pub fn outputs(&mut self, inputs: &Inputs) -> Outputs {
         // The state is large, and most calls find no jump.
         let may_jump =
@@ -166,7 +163,7 @@ impl Spacecraft {
         outputs.tank.map(|tank| tank.ranges)
     }
 
-    /// Returns the ranges as of the last event.
+    /// Returns the ranges as they were after the last event.
     pub fn ranges_held(&self) -> [Ranges; TANKS] {
         self.motion.state.ranges
     }
@@ -180,8 +177,8 @@ impl Spacecraft {
         self.motion.lumps.iter().any(|lump| lump.tank == tank)
     }
 
-    /// Returns true if the motion of every tank without a model of detached liquid is physical after a step. The liquid's directions at the
-    /// end and the accelerations during the step decide.
+    /// Returns true if the motion of every tank without a model of detached liquid is physical after a step.
+    /// The liquid's directions at the end and the accelerations during the step decide.
     pub fn is_physical(&self) -> bool {
         let CraftMotion { bobs, state, .. } = &*self.motion;
         self.bounds.iter().enumerate().filter(|(i, _)| !self.has_ball(*i)).all(|(i, limits)| {
@@ -195,7 +192,6 @@ impl Spacecraft {
         })
     }
 
-    /// Updates the ranges among the outputs to the current outputs.
     fn update_ranges(&self, outputs: &mut Outputs) {
         let (omega, x) = (outputs.omega, &self.motion.state.x);
         for (i, (tank, limits)) in outputs.tank.iter_mut().zip(&self.bounds).enumerate() {
@@ -218,7 +214,7 @@ impl Spacecraft {
         outputs
     }
 
-    /// Returns x; see [`index`].
+    /// Returns the continuous states x by the indices in [`index`].
     pub fn continuous_states(&self) -> [f64; STATES] {
         self.motion.state.x
     }
@@ -233,11 +229,10 @@ impl Spacecraft {
         self.motion.state.x = *x;
     }
 
-    /// Returns x'. Quaternion, directions and their rates are normalised first; those in x keep
-    /// their length.
+    /// Returns x'. Quaternion, directions and their rates are normalised first; those in x keep their length.
     ///
-    /// `h_wheels` acts by w x h_w and by its slope. A host that does not know the slope adds the
-    /// reaction -h_w' to `torque`.
+    /// `h_wheels` acts by w x h_w and by its slope. A host that does not know the slope adds the reaction
+    /// -h_w' to `torque`.
     pub fn derivatives(&mut self, inputs: &Inputs) -> [f64; STATES] {
         if let Some(draining) = &self.draining {
             return draining.rates(&self.motion.state.x, &Acting::from_inputs(inputs, 0.0));
@@ -246,8 +241,8 @@ impl Spacecraft {
         self.motion.state_rates::<0>(&self.motion.state.x)
     }
 
-    /// Returns the exact derivative of x' in the direction (dx, du), with du of force, torque,
-    /// h_wheels: coefficient 1 of x' along x + dx s, u + du s. Slopes of the inputs are held.
+    /// Returns the exact derivative of x' in the direction (dx, du), with du of force, torque, h_wheels:
+    /// coefficient 1 of x' along x + dx s, u + du s. Slopes of the inputs are held.
     pub fn directional_derivative(
         &mut self,
         inputs: &Inputs,
@@ -261,8 +256,8 @@ impl Spacecraft {
         self.motion.state_rates::<1>(dx)
     }
 
-    /// Returns the exact derivative of the outputs in the direction (dx, du). At slosh angles of 90
-    /// degrees, which have no derivative, it is 0.
+    /// Returns the exact derivative of the outputs in the direction (dx, du). At slosh angles of 90 degrees,
+    /// which have no derivative, it is 0.
     pub fn output_derivatives(
         &mut self,
         inputs: &Inputs,
@@ -276,7 +271,7 @@ impl Spacecraft {
         self.motion.now::<Dual>().outputs(dx)
     }
 
-    /// Returns states and inputs of a draining craft with their derivatives.
+    /// Returns states and inputs of a draining craft with their derivatives in the direction (dx, du).
     fn dual_arguments(
         &self,
         inputs: &Inputs,
@@ -288,7 +283,6 @@ impl Spacecraft {
         Some((self.draining.as_ref()?, along, Acting::with_directions(inputs, du)))
     }
 
-    /// Applies the impulses of jumped inputs. Returns true if any input has jumped.
     fn take_jumps(&mut self, inputs: &Inputs) -> bool {
         let Some(draining) = self.draining.as_ref().filter(|craft| craft.drains()) else {
             return self.motion.set_wheels(inputs.h_wheels.value);
@@ -310,9 +304,10 @@ impl Spacecraft {
         !lumps.is_empty() && state.ball.iter().any(|state| *state != BallState::Settled)
     }
 
-    /// Writes event indicators, two for each tank: one crosses zero at the end of the liquid's current state, one at the end of
-    /// its sliding on the wall. In a tank without a model of detached liquid the first crosses zero where the thrust no longer
-    /// holds the liquid at the bottom, at which the tank leaves its range. Where there is no such event they are 1.
+    /// Writes event indicators, two for each tank: one crosses zero at the end of the liquid's current state,
+    /// one at the end of its sliding on the wall. In a tank without a model of detached liquid the first
+    /// crosses zero where the thrust no longer holds the liquid at the bottom, at which the tank leaves its
+    /// range. Where there is no such event they are 1.
     pub fn event_indicators(&mut self, inputs: &Inputs, indicators: &mut [f64]) {
         self.motion.indicators(inputs, indicators);
         if (0..self.bounds.len()).all(|i| self.has_ball(i)) {
@@ -326,8 +321,9 @@ impl Spacecraft {
         }
     }
 
-    /// Returns true if a host that integrates itself has passed an event of a liquid, whatever the indicators of its last steps
-    /// were. The liquid is then outside its wall and moves outwards, must leave bottom or wall, or may settle.
+    /// Returns true if a host that integrates itself has passed an event of a liquid, whatever the indicators
+    /// of its last steps were. The liquid is then outside its wall and moves outwards, must leave bottom or
+    /// wall, or may settle.
     pub fn is_event_overdue(&mut self, inputs: &Inputs) -> bool {
         let mut now = [1.0; 2 * TANKS];
         self.motion.indicators(inputs, &mut now);
@@ -335,9 +331,9 @@ impl Spacecraft {
         self.motion.lumps.iter().any(|lump| lump.is_overdue(at(lump.tank)))
     }
 
-    /// Performs all events that are due: a jump of `h_wheels` or `mass_flow` acts as an impulse, and liquid leaves the
-    /// bottom, meets the wall or settles. Returns true if continuous states have changed. After an error nothing has
-    /// changed.
+    /// Performs all events that are due: a jump of `h_wheels` or `mass_flow` acts as an impulse, and liquid
+    /// leaves the bottom, meets the wall or settles. Returns true if continuous states have changed. After an
+    /// error nothing has changed.
     pub fn take_event(&mut self, inputs: &Inputs) -> Result<bool, StepError> {
         let before = self.motion.state;
         let mut changed = self.take_jumps(inputs);
@@ -358,8 +354,8 @@ impl Spacecraft {
         self.draining.as_ref().map_or(Ok(()), |it| it.check(x))
     }
 
-    /// Records that `h_wheels` and `mass_flow` have changed continuously, without an impulse. Hosts
-    /// that integrate themselves call it after each of their steps.
+    /// Records that `h_wheels` and `mass_flow` have changed continuously, without an impulse. Hosts that
+    /// integrate themselves call it after each of their steps.
     pub fn follow_inputs(&mut self, inputs: &Inputs) {
         self.motion.state.h_wheels = inputs.h_wheels.value;
         self.motion.state.flow = inputs.mass_flow.map(|flow| flow.value);

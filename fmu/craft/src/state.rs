@@ -7,42 +7,35 @@ use taylor::vector::Vec3;
 
 use crate::sizes::{MODES, TANKS};
 
-/// Indices of the states in x. Units: 1, rad/s, m, m/s, J, J, 1 and 1/s for each bob, kg, J, then m and m/s for each
-/// tank's detached liquid.
+/// Indices of the states in x: attitude `Q` from body to inertial axes, four numbers, scalar first; angular
+/// velocity `OMEGA`, rad/s, body axes; `POSITION`, m, and `VELOCITY`, m/s, of O in inertial axes; `WORK` of
+/// force and torque and energy `DISSIPATED` by the liquids since the start, J; from `BOBS` on direction p and
+/// rate p', 1/s, of each of the [`MODES`] modes of each tank, tank axes; from `LIQUID` on the mass of liquid
+/// in each tank, kg; energy `DRAINED` with the outflow, J; from `BALLS` on position, m, and rate, m/s, of
+/// each tank's detached liquid from the tank's origin, tank axes. States that are not in use stay at rest.
+#[allow(missing_docs)]
 pub mod index {
     use crate::sizes::{MODES, TANKS};
 
-    /// Attitude, body to inertial, four numbers, scalar first.
     pub const Q: usize = 0;
-    /// Angular velocity, three numbers, body axes.
     pub const OMEGA: usize = 4;
-    /// Position of O, three numbers, inertial axes.
     pub const POSITION: usize = 7;
-    /// Velocity of O, three numbers, inertial axes.
     pub const VELOCITY: usize = 10;
-    /// Work of force and torque since the start.
     pub const WORK: usize = 13;
-    /// Energy dissipated by the liquids since the start.
     pub const DISSIPATED: usize = 14;
-    /// The bobs: direction p and rate p' of each of the [`MODES`] modes of each tank, tank axes.
-    /// Bobs that are not in use stay at rest.
     pub const BOBS: usize = 15;
 
-    /// The mass of liquid in each tank, kg; used in tanks that can drain.
     pub const LIQUID: usize = BOBS + 6 * TANKS * MODES;
-    /// Energy lost with the outflow since the start, J.
     pub const DRAINED: usize = LIQUID + TANKS;
 
-    /// Detached liquid: for each tank position from the tank's origin, m, and rate, m/s, tank axes. Used in tanks that
-    /// model it.
     pub const BALLS: usize = DRAINED + 1;
 
-    /// Returns the index of the detached liquid's position and rate; tank from 0.
+    /// Returns the index of the detached liquid's position and rate; `tank` counts from 0.
     pub const fn ball(tank: usize) -> usize {
         BALLS + 6 * tank
     }
 
-    /// Returns the index of a bob's direction and rate; tank and mode from 0.
+    /// Returns the index of a bob's direction and rate; `tank` and `mode` count from 0.
     pub const fn bob(tank: usize, mode: usize) -> usize {
         BOBS + 6 * (tank * MODES + mode)
     }
@@ -60,31 +53,28 @@ pub type Ramp = taylor::ramp::Ramp<Vec3>;
 /// A number that is linear in time: `value + slope t`.
 pub type Line = taylor::ramp::Ramp;
 
-/// Inputs of the craft over one step; body axes.
+/// Inputs of the craft over one step, body axes. `force`, N, acts at O, where the bearing of a pivot takes it
+/// up; `torque`, N m, is about O. `h_wheels` is the angular momentum of the wheels relative to the body, N m
+/// s. Its slope turns the craft by -h_w', and a jump from one step to the next turns it by an impulse; both
+/// conserve the total angular momentum. `mass_flow` out of each tank, kg/s, is negative for inflow and has no
+/// effect in a tank without a fill table. A jump from one step to the next starts the flow within the tank by
+/// an impulse.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
+#[allow(missing_docs)]
 pub struct Inputs {
-    /// Force at O, N. On a pivot the bearing takes it up.
     pub force: Ramp,
-    /// Torque about O, N m.
     pub torque: Ramp,
-    /// Angular momentum of the wheels relative to the body, N m s. Its slope turns the craft by
-    /// -h_w'. A jump from one step to the next turns it by an impulse. Both conserve total angular
-    /// momentum.
     pub h_wheels: Ramp,
-    /// Mass flow out of each tank, kg/s, negative for inflow. Without effect in a tank without a fill table. A jump
-    /// from one step to the next starts the flow within the tank by an impulse.
     pub mass_flow: [Line; TANKS],
 }
 
-/// Ranges of a tank's motion.
+/// Ranges of a tank's motion. The motion `is_physical` if the liquid is held at the tank's bottom and every
+/// bob is within 45 degrees of the axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs)]
 pub struct Ranges {
-    /// Amplitude class of the wave.
     pub regime: Regime,
-    /// Reason why the pendulums do not represent the liquid, if they do not.
     pub limited_by: LimitedBy,
-    /// True if the liquid is held at the tank's bottom, and every bob is within 45 degrees of the axis. Otherwise the
-    /// motion is not physical.
     pub is_physical: bool,
 }
 
@@ -100,12 +90,10 @@ impl Ranges {
         self.limited_by == LimitedBy::None
     }
 
-    /// Returns the ranges as a word, for saving.
     pub(crate) fn to_word(self) -> u64 {
         self.regime as u64 | (self.limited_by as u64) << 8 | u64::from(self.is_physical) << 16
     }
 
-    /// Reads the ranges from a word.
     pub(crate) fn from_word(word: u64) -> Option<Ranges> {
         let regime = Regime::from_number(word as u8)?;
         let limited_by = LimitedBy::from_number((word >> 8) as u8)?;
@@ -127,11 +115,11 @@ pub enum BallState {
     Flying = 2,
     /// Detached liquid that slides on the wall with drag.
     Sliding = 3,
-    /// The `Sliding` state without drag, because the wall force is so small that the drag's reaction would move the wall away
-    /// from the liquid.
+    /// The `Sliding` state without drag, because the wall force is so small that the drag's reaction would
+    /// move the wall away from the liquid.
     Light = 4,
-    /// The `Light` state after a hand-over to the pendulums that would have raised the energy. The pendulums try again when
-    /// the liquid is nearest to the tank's axis.
+    /// The `Light` state after a hand-over to the pendulums that would have raised the energy. The pendulums
+    /// try again when the liquid is nearest to the tank's axis.
     Held = 5,
 }
 
@@ -146,17 +134,15 @@ impl BallState {
     ];
 }
 
-/// Everything that a saved state of the craft needs besides parameters and inputs.
+/// Everything that a saved state of the craft needs besides parameters and inputs. It includes the wheels'
+/// momentum and the outflows that the motion already contains.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct State {
     pub(crate) time: f64,
     pub(crate) x: [f64; STATES],
-    /// The wheels' momentum and the outflows that the motion already includes.
     pub(crate) h_wheels: Vec3,
     pub(crate) flow: [f64; TANKS],
-    /// Ranges of the tanks' motion since the last event, for hosts that integrate themselves.
     pub(crate) ranges: [Ranges; TANKS],
-    /// States of the tanks' liquids.
     pub(crate) ball: [BallState; TANKS],
 }
 
@@ -164,7 +150,6 @@ impl State {
     /// Number of words of a saved state.
     pub const WORDS: usize = Self::REALS + 2 * TANKS;
 
-    /// Number of words that are real numbers; the ranges follow.
     const REALS: usize = 4 + TANKS + STATES;
 
     /// Returns the wheels' momentum that the motion already includes, N m s.
@@ -212,7 +197,6 @@ impl State {
     }
 }
 
-/// Returns true if a quaternion or a vector can be normalised.
 pub(crate) fn has_direction(x: &[f64]) -> bool {
     x.iter().any(|x| x.abs() > 1.0 / MAX_MAGNITUDE)
 }

@@ -87,46 +87,38 @@ use crate::table::Jet;
 /// Smallest inertia along the meridian, relative to a pendulum's, at which the model is used.
 pub(crate) const LEAST_INERTIA: f64 = 0.5;
 
-/// Angle between the checks of [`Surface::largest_angle`], rad.
 const ANGLE_STEP: f64 = core::f64::consts::PI / 1800.0;
 
-/// Coefficients of a mode beyond the third order; all 0 for none.
+/// Coefficients s_2, kappa_2, t and t_2 of a mode beyond the third order; all 0 for none.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Higher {
-    /// s_2
     pub inertia: f64,
-    /// kappa_2
     pub stiffness: f64,
-    /// t and t_2
     pub rotary: [f64; 2],
 }
 
 impl Higher {
-    /// Returns T.
     pub fn rotary_inertia<T: Number>(&self, u: T) -> T {
         T::constant(self.rotary[0]) + u * self.rotary[1]
     }
 }
 
-/// The coefficients of a mode.
+/// The coefficients s - 1 and kappa - 1 of a mode, which are 0 for a pendulum, and those beyond the third
+/// order; `None` if all of these are 0, which leaves the terms out.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Surface<T = f64> {
-    /// s - 1
     inertia: T,
-    /// kappa - 1
     stiffness: T,
-    /// `None` if all are 0, which leaves the terms out.
     higher: Option<Higher>,
 }
 
 impl<T: Number> Surface<T> {
-    /// Returns the surface with s and kappa, also that of a pendulum.
+    /// Returns the surface with s and kappa, also if it is that of a pendulum.
     pub fn from_coefficients([s, kappa]: [T; 2]) -> Surface<T> {
         let one = T::constant(1.0);
         Surface { inertia: s - one, stiffness: kappa - one, higher: None }
     }
 
-    /// Returns beta.
     fn slope_factor(&self, u: T) -> T {
         let rise = u * (self.stiffness * 0.5);
         match &self.higher {
@@ -135,7 +127,6 @@ impl<T: Number> Surface<T> {
         }
     }
 
-    /// Returns S.
     fn meridian_factor(&self, u: T) -> T {
         match &self.higher {
             Some(higher) => self.inertia + u * higher.inertia,
@@ -156,25 +147,20 @@ impl<T: Number> Surface<T> {
 }
 
 impl Surface {
-    /// The surface of a pendulum.
     pub const SPHERE: Surface = Surface { inertia: 0.0, stiffness: 0.0, higher: None };
 
-    /// Returns the coefficients beyond the third order, if there are any.
     pub fn higher(&self) -> Option<Higher> {
         self.higher
     }
 
-    /// Returns s - 1.
     pub fn inner(&self) -> f64 {
         self.inertia
     }
 
-    /// Returns S.
     pub fn inner_at(&self, u: f64) -> f64 {
         self.meridian_factor(u)
     }
 
-    /// Returns true if the bob moves on a sphere.
     pub fn is_sphere(&self) -> bool {
         self.stiffness == 0.0 && self.higher.is_none()
     }
@@ -184,7 +170,6 @@ impl Surface {
         0.125 * self.stiffness
     }
 
-    /// Returns z/l.
     pub fn lift(&self, u: f64) -> f64 {
         let lift = self.lift_of_square() * u * u;
         match &self.higher {
@@ -198,25 +183,23 @@ impl Surface {
         0.5 * self.stiffness
     }
 
-    /// Returns beta: z' = l beta p_perp.p'.
+    /// Returns beta, with which z' = l beta p_perp.p'.
     pub fn rise(&self, u: f64) -> f64 {
         self.slope_factor(u)
     }
 
-    /// Returns the surface of a mode, `None` for a pendulum.
     pub fn new(s: f64, kappa: f64, higher: Higher) -> Option<Surface> {
         let higher = (higher != Higher::default()).then_some(higher);
         let is_pendulum = s == 1.0 && kappa == 1.0 && higher.is_none();
         (!is_pendulum).then(|| Surface { higher, ..Surface::from_coefficients([s, kappa]) })
     }
 
-    /// Returns the surface over a number type.
     pub fn lift_to<T: Number>(&self) -> Surface<T> {
         let [inertia, stiffness] = [self.inertia, self.stiffness].map(T::constant);
         Surface { inertia, stiffness, higher: self.higher }
     }
 
-    /// Returns the largest distance of the bob from its hinge within 45 degrees, over l, or more.
+    /// Returns an upper bound of the distance of the bob from its hinge within 45 degrees, over l.
     pub fn reach(&self) -> f64 {
         let reach = 1.0 + self.stiffness.abs() / 32.0;
         match &self.higher {
@@ -225,7 +208,8 @@ impl Surface {
         }
     }
 
-    /// Returns minus the smallest eigenvalue of N within 45 degrees and the bound of the model, or 0. It is at most 1.
+    /// Returns minus the smallest eigenvalue of N within 45 degrees and the bound of the model, or 0. It is
+    /// at most 1.
     pub fn lent_inertia(&self) -> f64 {
         let at = |k: u32| {
             let u = 0.5 * f64::from(k) / 64.0;
@@ -238,25 +222,25 @@ impl Surface {
         (0..=64).map_while(at).fold(0.0, f64::max)
     }
 
-    /// Returns the inertia across the meridian, relative to a pendulum's, and minus the eigenvalue of N there.
+    /// Returns the inertia across the meridian, relative to a pendulum's, and minus the eigenvalue of N
+    /// there.
     fn around(&self, u: f64) -> [f64; 2] {
         let Some(higher) = &self.higher else { return [1.0, 0.0] };
         let more = higher.rotary_inertia(u) * u;
         [1.0 + more, -more / f64::max(1.0 + more, 0.5 * LEAST_INERTIA)]
     }
 
-    /// Returns the smaller one of the inertias along the meridian and across it, relative to a pendulum's.
     pub fn least_inertia(&self, eta: f64, u: f64) -> f64 {
         f64::min(self.meridian_inertia(eta, u), self.around(u)[0])
     }
 
-    /// Returns true if the inertia along the meridian is large enough at an angle from the axis, rad.
     fn holds(&self, angle: f64) -> bool {
         let (sin, cos) = libm::sincos(angle);
         self.least_inertia(-cos, sin * sin) >= LEAST_INERTIA
     }
 
-    /// Returns the smallest angle from the axis at which the model ends, rad, rounded down to tenths of a degree.
+    /// Returns the smallest angle from the axis at which the model ends, rad, rounded down to tenths of a
+    /// degree.
     pub fn largest_angle(&self) -> f64 {
         let angle = |k: u32| ANGLE_STEP * f64::from(k);
         (0..=1800).map(angle).take_while(|angle| self.holds(*angle)).fold(0.0, f64::max)
@@ -278,8 +262,8 @@ impl Surface {
     }
 }
 
-/// Returns the message for a bob of mode n (from 0) beyond the bound of its surface, with s and kappa; `name` is that of the
-/// tank.
+/// Returns the message for a bob of mode `n`, which counts from 0, beyond the bound of its surface, with s
+/// and kappa; `name` is the tank's.
 pub(crate) fn bound_message([s, kappa]: [f64; 2], higher: Higher, n: usize, name: &str) -> String {
     let surface = Surface::new(s, kappa, higher);
     let most = surface.map_or(0.0, |surface| surface.largest_angle().to_degrees());
@@ -306,49 +290,43 @@ pub(crate) fn bound_message([s, kappa]: [f64; 2], higher: Higher, n: usize, name
     )
 }
 
-/// The surface at the bob.
+/// The surface at the bob, with the symbols above: `eased` is gamma/(1 + gamma u), `across` is b of a planar
+/// mode, and `around` holds n and T/(1 + T u).
 pub(crate) struct Meridian<T> {
     surface: Surface<T>,
     p: Vec3<T>,
     e: Vec3<T>,
     pub p_perp: Vec3<T>,
-    /// u, eta, beta
     u: T,
     eta: T,
     beta: T,
-    /// gamma/(1 + gamma u)
     eased: T,
-    /// b of a planar mode.
     across: Option<Vec3<T>>,
-    /// n and T/(1 + T u).
     around: Option<(Vec3<T>, T)>,
 }
 
-/// z with its derivatives, the last one without y.
+/// The height z with its derivatives, the last one without y, and the terms of E_i: i and E_i/m (`inner`),
+/// the power -[(s - 1) l l' + s' l^2/2] sigma^2 that E_i/m gains beyond the work of the bob (`energy_d`), and
+/// the rate [(kappa - 1) l]' u^2/8 of z of a bob at rest.
 pub(crate) struct Lift<T> {
     pub z: T,
     pub z_d: T,
     pub z_dd: T,
-    /// i, and E_i/m.
     pub inner: Vec3<T>,
     pub energy: T,
-    /// -[(s - 1) l l' + s' l^2/2] sigma^2, the power that E_i/m gains beyond the work of the bob.
     pub energy_d: T,
-    /// [(kappa - 1) l]' u^2/8, the rate of z of a bob at rest.
     pub z_at_rest: T,
-    /// Rotary motion, if it has inertia.
     pub rotary: Option<Rotary<T>>,
 }
 
-/// Rotary motion with inertia beyond that of the bob.
+/// Rotary motion with inertia beyond that of the bob: `lever` is l u T; `inertia` is l T, with the known
+/// terms 2 w_e sigma and 2 t_2 l sigma tau of l (T tau)' = l T (n.y + w_e' u + 2 w_e sigma) + 2 t_2 l sigma
+/// tau; `spin` is l^2 u T tau, with 2 l^2 T tau sigma.
 pub(crate) struct Rotary<T> {
-    /// l u T
     lever: T,
-    /// l T, 2 w_e sigma and 2 t_2 l sigma tau: l (T tau)' = l T (n.y + w_e' u + 2 w_e sigma) + 2 t_2 l sigma tau.
     inertia: T,
     turning: T,
     growing: T,
-    /// l^2 u T tau, and 2 l^2 T tau sigma.
     spin: T,
     swept: T,
     u: T,
@@ -379,17 +357,14 @@ impl<T: Number> Meridian<T> {
         Meridian { surface, p, e, p_perp, u, eta, beta, eased: gamma / inertia, across, around }
     }
 
-    /// Returns D x.
     pub fn apply_shear(&self, x: Vec3<T>) -> Vec3<T> {
         add(x, scale(self.beta * dot(self.p_perp, x), self.e))
     }
 
-    /// Returns D^T x.
     pub fn apply_shear_transposed(&self, x: Vec3<T>) -> Vec3<T> {
         add(x, scale(self.beta * dot(self.e, x), self.p_perp))
     }
 
-    /// Returns M^-1 Pi x.
     pub fn free(&self, x: Vec3<T>) -> Vec3<T> {
         let mut x = sub(x, scale(dot(self.p, x), self.p));
         if let Some(b) = self.across {
@@ -403,7 +378,6 @@ impl<T: Number> Meridian<T> {
         }
     }
 
-    /// Returns N x.
     pub fn held(&self, x: Vec3<T>) -> Vec3<T> {
         sub(x, self.apply_shear(self.free(self.apply_shear_transposed(x))))
     }
@@ -424,7 +398,8 @@ impl<T: Number> Meridian<T> {
         columns
     }
 
-    /// Adds to the mass matrix of the bob what v has beyond [n; rho x n], - l u e: tau is taken against inertial axes.
+    /// Adds to the mass matrix of the bob the terms by which v differs from [n; rho x n], - l u e, because
+    /// tau is taken against inertial axes.
     pub fn add_rotary(&self, [m, l]: [T; 2], rho: Vec3<T>, matrix: &mut [[T; 6]; 6]) {
         let Some((n, share)) = self.around else { return };
         let arm = cross(rho, n);
@@ -454,13 +429,12 @@ impl<T: Number> Meridian<T> {
         Some((rate, squared))
     }
 
-    /// Returns n, if rotary motion has inertia.
     pub fn around(&self) -> Option<Vec3<T>> {
         self.around.map(|(n, _)| n)
     }
 
-    /// Returns the bob's height and the terms of E_i at the rate p', with l and its derivatives, and those of s and kappa
-    /// if they change.
+    /// Returns the bob's height and the terms of E_i at the rate p', with l and its derivatives, and those of
+    /// s and kappa if they change.
     pub fn lift(
         &self,
         [l, l_d, l_dd]: Jet<T>,
@@ -501,7 +475,8 @@ impl<T: Number> Meridian<T> {
         }
         lift
     }
-    /// Adds the terms of the coefficients beyond the third order, which a tank has that keeps its liquid.
+    /// Adds the terms of the coefficients beyond the third order, which only tanks that keep their liquid
+    /// have.
     #[inline(never)]
     fn lift_higher(
         &self,
@@ -560,7 +535,6 @@ impl<T: Number> Rotary<T> {
         [0, 1, 2].map(|i| -(along * e[i] + turned[i]))
     }
 
-    /// Returns the angular momentum about the axis over m.
     pub fn spin(&self) -> T {
         self.spin
     }

@@ -16,73 +16,62 @@ use taylor::number::Number;
 
 use crate::sizes::{MODES, POINTS};
 
-/// Shortest pendulum, m; shorter ones are too stiff.
+/// Shortest pendulum, m, because shorter ones make the equations too stiff.
 pub(crate) const SHORTEST: f64 = 1e-6;
-/// Lightest bob, kg; lighter ones have no effect.
+/// Lightest bob, kg, because lighter ones have no effect.
 pub(crate) const LIGHTEST: f64 = 1e-9;
 
-/// Modes and rigid liquid at some masses of the liquid.
+/// Modes and rigid liquid at some masses of the liquid: the FMUs' parameters `tank[].fill.…`, whose variable
+/// tables give meanings and units. `points` is 0 for a tank whose liquid stays, otherwise 2 to [`POINTS`];
+/// `liquid` increases. The damping ratio `zeta` of a mode that is 0 at all points, s and kappa that are 1 at
+/// all points, and limits that are 0 at all points are those of the tank at every fill.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
 pub struct FillTable {
-    /// Number of points: 0 for a tank whose liquid stays, otherwise 2 to [`POINTS`].
     pub points: usize,
-    /// Mass of the whole liquid, kg, increasing.
     pub liquid: [f64; POINTS],
-    /// Height of the rigid liquid's centre of mass on the tank's axis, m.
     pub h_0: [f64; POINTS],
-    /// Inertia of the rigid liquid across the axis about its own centre of mass, kg m2.
     pub i_0: [f64; POINTS],
-    /// Inertia of the rigid liquid about the axis, kg m2.
     pub i_z: [f64; POINTS],
-    /// Mass of each mode's bob, kg.
     pub mass: [[f64; POINTS]; MODES],
-    /// Length of each mode's pendulum, m.
     pub length: [[f64; POINTS]; MODES],
-    /// Height of each mode's hinge, m.
     pub hinge: [[f64; POINTS]; MODES],
-    /// Damping ratio of each mode at `g_ref`; 0 at all points of a mode for `Tank::zeta` at every fill.
     pub zeta: [[f64; POINTS]; MODES],
-    /// Coefficient s of each mode's inertia at finite amplitude (`surface.rs`). If s and kappa of a mode are 1 at all
-    /// points, those of the tank hold at every fill.
     pub nonlinear_inertia: [[f64; POINTS]; MODES],
-    /// Coefficient kappa of each mode's stiffness at finite amplitude.
     pub nonlinear_stiffness: [[f64; POINTS]; MODES],
-    /// `Tank::angle_limit` of each mode; 0 at all points of a mode for that of the tank at every fill.
     pub angle_limit: [[f64; POINTS]; MODES],
-    /// `Tank::swirl_limit` of each mode, likewise.
     pub swirl_limit: [[f64; POINTS]; MODES],
 }
 
 impl FillTable {
-    /// Returns the masses at the points in use.
+    /// Returns the masses of liquid at the points in use, kg.
     pub fn masses(&self) -> &[f64] {
         &self.liquid[..self.points]
     }
 
-    /// Returns true if the table gives the damping ratio of mode `n` (from 0).
     pub(crate) fn has_zeta(&self, n: usize) -> bool {
         self.zeta[n][..self.points].iter().any(|zeta| *zeta > 0.0)
     }
 
-    /// Returns true if the table gives s and kappa of mode `n` (from 0).
     pub(crate) fn has_surface(&self, n: usize) -> bool {
         let columns = [&self.nonlinear_inertia[n], &self.nonlinear_stiffness[n]];
         columns.iter().any(|column| column.iter().take(self.points).any(|x| *x != 1.0))
     }
 
-    /// Returns true if the table gives the limit `field`, `angle_limit` or `swirl_limit`, of mode `n` (from 0) at every fill.
+    /// Returns true if the table gives the limit `field`, `angle_limit` or `swirl_limit`, of mode `n`, which
+    /// counts from 0, at every fill.
     pub(crate) fn limits_everywhere(&self, field: &str, n: usize) -> bool {
         let column = if field == "angle_limit" { self.angle_limit[n] } else { self.swirl_limit[n] };
         self.points > 0 && column[..self.points].iter().all(|limit| *limit > 0.0)
     }
 
-    /// Returns mass, length and hinge height of mode `n`, from 0, at this mass of liquid, kg.
+    /// Returns mass, kg, length and hinge height, m, of mode `n`, which counts from 0, at this mass of
+    /// liquid, kg.
     pub fn mode(&self, n: usize, liquid: f64) -> [f64; 3] {
         let curves = self.curves(n + 1);
         curves.mode(n, curves.place(liquid)).map(|jet| jet[0])
     }
 
-    /// Returns interpolated curves of a draining tank with `modes` modes.
     pub(crate) fn curves(&self, modes: usize) -> FillCurves {
         let curve = |y: [f64; POINTS]| Curve::new(self.masses(), y);
         let of_mode = |n: usize| {
@@ -113,7 +102,6 @@ impl FillTable {
 /// A quantity and its first two derivatives, by the mass of liquid or by time.
 pub(crate) type Jet<T> = [T; 3];
 
-/// A quantity at the points of a table, with slopes and second derivatives there.
 #[derive(Clone, Copy, Debug)]
 struct Curve([[f64; 3]; POINTS]);
 
@@ -134,7 +122,6 @@ impl Curve {
     }
 }
 
-/// Returns the sum of c_k t^k.
 fn polynomial<T: Number>(c: &[f64], t: T) -> T {
     c.iter().rev().fold(T::constant(0.0), |sum, c| sum * t + T::constant(*c))
 }
@@ -148,7 +135,6 @@ struct ModeCurves {
     surface: Option<[Curve; 2]>,
 }
 
-/// A table with its curves.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FillCurves {
     points: usize,
@@ -157,8 +143,7 @@ pub(crate) struct FillCurves {
     modes: [ModeCurves; MODES],
 }
 
-/// Position of a mass of liquid in a table: interval, position in the interval from 0 to 1, and its
-/// width.
+/// Position of a mass of liquid in a table: interval, position in the interval from 0 to 1, and its width.
 #[derive(Clone, Copy)]
 pub(crate) struct Place<T> {
     liquid: T,
@@ -183,7 +168,6 @@ impl FillCurves {
         Place { liquid, interval, t: (liquid - T::constant(masses[interval])) * (1.0 / h), h }
     }
 
-    /// Returns H_0, I_0 and I_z.
     pub fn rigid<T: Number>(&self, at: Place<T>) -> [Jet<T>; 3] {
         [0, 1, 2].map(|k| self.rigid[k].evaluate(at))
     }
@@ -201,7 +185,6 @@ impl FillCurves {
             .map(|curves| curves.each_ref().map(|curve| curve.evaluate(at)))
     }
 
-    /// Returns mass, length and hinge height of a mode.
     pub fn mode<T: Number>(&self, n: usize, at: Place<T>) -> [Jet<T>; 3] {
         let ModeCurves { stiffness, bob, share, .. } = &self.modes[n];
         let [k, k_d, k_dd] = stiffness.evaluate(at);
@@ -226,8 +209,8 @@ mod tests {
     use alloc::vec::Vec;
     use taylor::number::Dual;
 
-    /// Random monotone data, also with constant stretches: no slope has the wrong sign, and the
-    /// values and both derivatives agree on both sides of a point.
+    /// Random monotone data, also with constant stretches: no slope has the wrong sign, and the values and
+    /// both derivatives agree on both sides of a point.
     #[test]
     fn interpolation_is_monotone_and_has_two_continuous_derivatives() {
         let mut rng = fastrand::Rng::with_seed(3);
@@ -281,7 +264,6 @@ mod tests {
         }
     }
 
-    /// 25 fills between each two of twelve points, from a sixth of the radius to three radii.
     #[test]
     fn a_cylinder_is_met_between_the_points() {
         let (d, r) = (0.9, 0.45);
@@ -305,7 +287,6 @@ mod tests {
         }
     }
 
-    /// Beyond the ends of its table a tank keeps its properties, and the remaining liquid changes nothing.
     #[test]
     fn beyond_the_ends_of_its_table_a_tank_is_as_it_is_there() {
         let table = FillTable { points: 3, ..crate::Tank::default().fill };
