@@ -29,7 +29,6 @@ pub struct Entry {
     link: bool,
     /// Bytes of the file if [`is_read`] is true for its name, otherwise empty.
     content: Vec<u8>,
-    /// Reason why this entry cannot be unpacked.
     fault: Option<String>,
 }
 
@@ -160,7 +159,7 @@ fn name_faults(name: &str) -> Vec<&'static str> {
 
 pub fn readable(archive: &Archive, findings: &mut Findings) {
     if let Some(why) = &archive.broken {
-        findings.add("the archive", why.clone());
+        findings.at("the archive").add(why.clone());
     }
     for entry in &archive.entries {
         if let Some(why) = &entry.fault
@@ -168,11 +167,11 @@ pub fn readable(archive: &Archive, findings: &mut Findings) {
             && !entry.encrypted
             && is_common(entry.method)
         {
-            findings.add(&entry.name, format!("it cannot be unpacked: {why}"));
+            findings.at(&entry.name).add(format!("it cannot be unpacked: {why}"));
         }
     }
     if archive.entries.is_empty() && archive.broken.is_none() {
-        findings.add("the archive", "it is empty");
+        findings.at("the archive").add("it is empty");
     }
 }
 
@@ -183,14 +182,13 @@ fn is_common(method: CompressionMethod) -> bool {
 pub fn methods(archive: &Archive, findings: &mut Findings) {
     for entry in &archive.entries {
         if entry.encrypted {
-            findings.add(&entry.name, "it is encrypted (allowed: no encryption)");
+            findings.at(&entry.name).add("it is encrypted (allowed: no encryption)");
         }
         if !is_common(entry.method) {
             let method = format!("{:?}", entry.method);
-            findings.add(
-                &entry.name,
-                format!("it is compressed by {method} (allowed: stored, deflated)"),
-            );
+            findings
+                .at(&entry.name)
+                .add(format!("it is compressed by {method} (allowed: stored, deflated)"));
         }
     }
 }
@@ -200,17 +198,16 @@ pub fn names(archive: &Archive, findings: &mut Findings) {
         let faults = name_faults(&entry.name);
         if !faults.is_empty() {
             let faults = faults.join(", ");
-            findings.add(
-                entry.name.escape_debug().to_string(),
-                format!("the name {faults} (allowed: relative names with \"/\" between the parts)"),
-            );
+            findings.at(entry.name.escape_debug().to_string()).add(format!(
+                "the name {faults} (allowed: relative names with \"/\" between the parts)"
+            ));
         }
     }
 }
 
 pub fn links(archive: &Archive, findings: &mut Findings) {
     for entry in archive.entries.iter().filter(|entry| entry.link) {
-        findings.add(&entry.name, "it is a symbolic link (allowed: files and folders)");
+        findings.at(&entry.name).add("it is a symbolic link (allowed: files and folders)");
     }
 }
 
@@ -226,15 +223,12 @@ pub fn duplicates(archive: &Archive, findings: &mut Findings) {
         }
     }
     for names in seen.into_values().filter(|names| names.len() > 1) {
-        findings.add(
-            names[0],
-            format!(
+        findings.at(names[0]).add(format!(
                 "{} entries have this place on Windows or macOS: {} (allowed: names that differ in more than \
                  capitals, full stops and spaces at the end, and what follows a colon)",
                 names.len(),
                 names.join(", ")
-            ),
-        );
+            ));
     }
 }
 
@@ -251,16 +245,15 @@ pub fn description(archive: &Archive, findings: &mut Findings) {
         0 => String::new(),
         _ => format!("; there is {}", elsewhere.join(", ")),
     };
-    findings.add(NAME, format!("it is not at the root of the archive{hint}"));
+    findings.at(NAME).add(format!("it is not at the root of the archive{hint}"));
 }
 
 pub fn description_first(archive: &Archive, findings: &mut Findings) {
     let place = archive.entries.iter().position(|entry| entry.name == "modelDescription.xml");
     if let Some(place) = place.filter(|place| *place > 0) {
-        findings.add(
-            "modelDescription.xml",
-            format!("it is entry {} of the archive (allowed: the first)", place + 1),
-        );
+        findings
+            .at("modelDescription.xml")
+            .add(format!("it is entry {} of the archive (allowed: the first)", place + 1));
     }
 }
 
@@ -269,9 +262,9 @@ pub fn documentation(archive: &Archive, findings: &mut Findings) {
         None if archive.entries.iter().any(|entry| entry.name == INDEX) => {
             findings.skip("it cannot be unpacked");
         }
-        None => findings.add(INDEX, "it is missing"),
+        None => findings.at(INDEX).add("it is missing"),
         Some(page) if page.iter().all(u8::is_ascii_whitespace) => {
-            findings.add(INDEX, "it is empty");
+            findings.at(INDEX).add("it is empty");
         }
         Some(_) => {}
     }
@@ -279,7 +272,7 @@ pub fn documentation(archive: &Archive, findings: &mut Findings) {
 
 pub fn licenses(archive: &Archive, findings: &mut Findings) {
     if archive.below("documentation/licenses/").next().is_none() {
-        findings.add("documentation/licenses/", "no licence is in it");
+        findings.at("documentation/licenses/").add("no licence is in it");
     }
 }
 
@@ -300,6 +293,7 @@ pub fn folders_of(version: &str, allowed: &[&str], archive: &Archive, findings: 
     let allowed = allowed.join(", ");
     for name in unknown {
         findings
-            .add(name, format!("FMI {version} has no such file or folder (allowed: {allowed})"));
+            .at(name)
+            .add(format!("FMI {version} has no such file or folder (allowed: {allowed})"));
     }
 }

@@ -74,14 +74,18 @@ pub fn arrays(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             FmuUnderTest::name(interface)
         ));
         for beside in session.instance.writes_beside(&lists) {
-            findings.add(
-                format!("{}, {} ({})", beside.call, beside.array, FmuUnderTest::name(interface)),
-                format!(
+            findings
+                .at(format!(
+                    "{}, {} ({})",
+                    beside.call,
+                    beside.array,
+                    FmuUnderTest::name(interface)
+                ))
+                .add(format!(
                     "{} (allowed: to write as many values as the call says, into what is to be \
                      written)",
                     beside.fault
-                ),
-            );
+                ));
         }
     }
     Ok(())

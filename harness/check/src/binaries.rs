@@ -1,8 +1,11 @@
 use super::archive::Archive;
 use super::description::Description;
 use super::findings::Findings;
+use super::v3;
 use host::binary::{Binary, Kind};
 use host::fmi2::{Fmu, PLATFORM};
+use host::fmi3;
+use host::xml::Element;
 
 /// Folders under `binaries/` in FMI 2.0, the file ending of the binary in each, and the format that this
 /// check can read (`None`: not read). Names with 32 and 64 are for x86; other processors have platform tuples
@@ -55,7 +58,7 @@ pub(crate) fn tuple(folder: &str) -> Option<(&'static str, Option<Kind>)> {
 
 /// An interface that the description declares, with the functions that its binary must export.
 struct Declared {
-    interface: &'static str,
+    interface: String,
     identifier: String,
     /// Functions that the binary of this interface must export.
     wanted: Vec<&'static str>,
@@ -71,7 +74,6 @@ struct Placed {
 }
 
 pub struct Binaries {
-    /// Binaries in the folders where hosts look for them.
     placed: Vec<Placed>,
     /// Number of binaries with the model's name in folders whose names vendors have invented.
     of_vendors: usize,
@@ -81,28 +83,55 @@ pub struct Binaries {
     declared: Vec<Declared>,
     has_sources: bool,
     described: bool,
+    own_folder: &'static str,
+}
+
+/// Returns an interface with the `wanted` functions; `None` if it has no modelIdentifier.
+fn declare(element: &Element, wanted: Vec<&'static str>) -> Option<Declared> {
+    let identifier = element.get("modelIdentifier")?.to_string();
+    Some(Declared { interface: element.name.to_string(), identifier, wanted })
 }
 
 impl Binaries {
-    /// Reads the headers of all binaries in the archive and compares their names with the interfaces of
+    /// Reads the headers of all binaries of an FMU 2.0 and compares their names with the interfaces of
     /// `description`.
     pub fn new(archive: &Archive, description: Option<&Description>) -> Binaries {
-        let interfaces = description.into_iter().flat_map(|d| {
-            let exchange = d.model_exchange.as_ref();
-            let stepping = d.co_simulation.as_ref();
-            let exchange = exchange.map(|e| ("ModelExchange", e, Fmu::exchange_symbols()));
-            let stepping = stepping.map(|e| ("CoSimulation", e, Fmu::step_symbols()));
-            exchange.into_iter().chain(stepping)
+        let common = Fmu::symbols();
+        let declared = description.map(|d| {
+            let exchange = d.model_exchange.iter().map(|e| (e, Fmu::exchange_symbols()));
+            let stepping = d.co_simulation.iter().map(|e| (e, Fmu::step_symbols()));
+            let all = exchange.chain(stepping);
+            all.filter_map(|(e, own)| declare(e, [common.clone(), own].concat())).collect()
         });
-        let declared: Vec<Declared> = interfaces
-            .filter_map(|(interface, element, own)| {
-                Some(Declared {
-                    interface,
-                    identifier: element.get("modelIdentifier")?.to_string(),
-                    wanted: [Fmu::symbols(), own].concat(),
-                })
-            })
-            .collect();
+        Binaries::read(archive, declared, platform, PLATFORM)
+    }
+
+    /// Reads the headers of all libraries of an FMU 3.0, as [`Binaries::new`] does.
+    pub fn of_fmi3(archive: &Archive, description: &v3::Description) -> Binaries {
+        let interfaces = description.interfaces();
+        let declared = interfaces.filter_map(|e| declare(e, fmi3::Fmu::symbols())).collect();
+        let mut all = Binaries::read(archive, Some(declared), tuple, fmi3::PLATFORM);
+        all.has_sources = archive.below("sources/buildDescription.xml").next().is_some();
+        // Static libraries have other endings.
+        let is_vendors = |name: &&str| {
+            let folder = name.split('/').nth(1).unwrap_or_default();
+            let is_old = PLATFORMS[..6].iter().any(|(old, ..)| *old == folder);
+            !is_old && (tuple(folder).is_none() || name.ends_with(".a") || name.ends_with(".lib"))
+        };
+        all.of_vendors = archive.below("binaries/").filter(is_vendors).count();
+        all
+    }
+
+    /// `declared` has the interfaces, or `None` without a description. `platform` returns file ending and
+    /// format for the name of a folder, and `own_folder` is the folder for the platform of this check.
+    fn read(
+        archive: &Archive,
+        declared: Option<Vec<Declared>>,
+        platform: fn(&str) -> Option<(&'static str, Option<Kind>)>,
+        own_folder: &'static str,
+    ) -> Binaries {
+        let described = declared.is_some();
+        let declared = declared.unwrap_or_default();
         let mut identifiers: Vec<&str> = declared.iter().map(|d| d.identifier.as_str()).collect();
         identifiers.sort_unstable();
         identifiers.dedup();
@@ -113,7 +142,8 @@ impl Binaries {
             elsewhere: Vec::new(),
             declared,
             has_sources: archive.below("sources/").next().is_some(),
-            described: description.is_some(),
+            described,
+            own_folder,
         };
         for name in archive.below("binaries/") {
             let parts: Vec<&str> = name.split('/').collect();
@@ -148,20 +178,25 @@ impl Binaries {
 
     /// Returns the name of the binary for the platform on which this check runs.
     pub fn own(&self) -> Option<&str> {
-        self.placed.iter().find(|p| p.folder == PLATFORM).map(|p| p.name.as_str())
+        self.placed.iter().find(|p| p.folder == self.own_folder).map(|p| p.name.as_str())
+    }
+
+    /// Returns the folder of binaries for the platform on which this check runs.
+    pub fn own_folder(&self) -> &'static str {
+        self.own_folder
     }
 
     /// Lists the names and contents of the binaries that could be parsed.
-    fn read(&self) -> impl Iterator<Item = (&str, &Binary)> {
+    fn readable(&self) -> impl Iterator<Item = (&str, &Binary)> {
         self.placed.iter().filter_map(|p| Some((p.name.as_str(), p.binary.as_ref().ok()?)))
     }
 
     /// Calls `look` for each binary that could be parsed. The rule is skipped if there is none.
     fn each(&self, findings: &mut Findings, look: impl Fn(&str, &Binary, &mut Findings)) {
-        if self.read().next().is_none() {
+        if self.readable().next().is_none() {
             findings.skip("no binary can be read here");
         }
-        for (name, binary) in self.read() {
+        for (name, binary) in self.readable() {
             look(name, binary, findings);
         }
     }
@@ -172,14 +207,14 @@ pub fn present(binaries: &Binaries, findings: &mut Findings) {
         return findings.skip("without a description nobody knows what the binary is called");
     }
     if binaries.placed.is_empty() && binaries.of_vendors == 0 && !binaries.has_sources {
-        let known = PLATFORMS.map(|(known, ..)| known).join(", ");
-        findings.add(
-            "binaries/",
-            format!(
-                "no platform has a binary of the model's name, and there are no sources (platforms: \
-                 {known}, other platform tuples, names of vendors)"
-            ),
-        );
+        let known = match binaries.own_folder == PLATFORM {
+            true => PLATFORMS.map(|(known, ..)| known).join(", ") + ", other platform tuples",
+            false => "platform tuples such as x86_64-linux".into(),
+        };
+        findings.at("binaries/").add(format!(
+            "no platform has a binary of the model's name, and there are no sources (platforms: {known}, names \
+             of vendors)"
+        ));
     }
 }
 
@@ -194,13 +229,10 @@ pub fn each_interface(binaries: &Binaries, findings: &mut Findings) {
         for Declared { interface, identifier, .. } in &binaries.declared {
             let mut here = binaries.placed.iter().filter(|p| p.folder == folder);
             if !here.any(|p| p.identifier == *identifier) {
-                findings.add(
-                    format!("binaries/{folder}/{identifier}{ending}"),
-                    format!(
-                        "it is missing: modelIdentifier of {interface} is \"{identifier}\" (allowed: \
+                findings.at(format!("binaries/{folder}/{identifier}{ending}")).add(format!(
+                    "it is missing: modelIdentifier of {interface} is \"{identifier}\" (allowed: \
                          where one interface has its binary, so has the other)"
-                    ),
-                );
+                ));
             }
         }
     }
@@ -211,11 +243,8 @@ pub fn this_platform(binaries: &Binaries, findings: &mut Findings) {
         return findings.skip("without a description nobody knows what the binary is called");
     }
     if binaries.own().is_none() {
-        findings.add(
-            format!("binaries/{PLATFORM}"),
-            "no binary is called here, so that no rule of calls is checked (allowed: a binary of this platform, or a \
-             check on one of the FMU's platforms)",
-        );
+        findings.at(format!("binaries/{}", binaries.own_folder)).add("no binary is called here, so that no rule of calls is checked (allowed: a binary of this platform, or a \
+             check on one of the FMU's platforms)");
     }
 }
 
@@ -225,12 +254,9 @@ pub fn name(binaries: &Binaries, findings: &mut Findings) {
     for (name, expected) in &binaries.elsewhere {
         let folder = name.rsplit_once('/').map_or("", |(folder, _)| folder);
         if binaries.described && empty(folder) {
-            findings.add(
-                name,
-                format!(
-                    "no host finds it: its name is not modelIdentifier and ending ({expected})"
-                ),
-            );
+            findings.at(name).add(format!(
+                "no host finds it: its name is not modelIdentifier and ending ({expected})"
+            ));
         }
     }
 }
@@ -241,16 +267,15 @@ pub fn format(binaries: &Binaries, findings: &mut Findings) {
         let Some(kind) = placed.kind else { continue };
         looked = true;
         match &placed.binary {
-            Err(why) => findings.add(&placed.name, format!("{why:#}")),
-            Ok(binary) if binary.kind != kind => findings.add(
-                &placed.name,
-                format!("it is for {} (allowed in {}: {kind})", binary.kind, placed.folder),
-            ),
+            Err(why) => findings.at(&placed.name).add(format!("{why:#}")),
+            Ok(binary) if binary.kind != kind => findings
+                .at(&placed.name)
+                .add(format!("it is for {} (allowed in {}: {kind})", binary.kind, placed.folder)),
             Ok(_) => {}
         }
     }
     if !looked {
-        findings.skip("no binary for 64 bits");
+        findings.skip("there is no binary whose format is known here");
     }
 }
 
@@ -263,7 +288,7 @@ pub fn symbols(binaries: &Binaries, findings: &mut Findings) {
         let mut seen = std::collections::BTreeSet::new();
         wanted.retain(|symbol| seen.insert(*symbol));
         if let Some(fault) = binary.lacking(&wanted) {
-            findings.add(name, fault);
+            findings.at(name).add(fault);
         }
     });
 }
@@ -271,7 +296,7 @@ pub fn symbols(binaries: &Binaries, findings: &mut Findings) {
 pub fn extra_symbols(binaries: &Binaries, findings: &mut Findings) {
     binaries.each(findings, |name, binary, findings| {
         if let Some(fault) = binary.surplus() {
-            findings.add(name, fault);
+            findings.at(name).add(fault);
         }
     });
 }
@@ -279,7 +304,7 @@ pub fn extra_symbols(binaries: &Binaries, findings: &mut Findings) {
 pub fn system(binaries: &Binaries, findings: &mut Findings) {
     binaries.each(findings, |name, binary, findings| {
         for fault in binary.loading_faults() {
-            findings.add(name, fault);
+            findings.at(name).add(fault);
         }
     });
 }

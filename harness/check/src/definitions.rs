@@ -16,7 +16,7 @@ pub fn well_formed(archive: &super::archive::Archive, findings: &mut Findings) {
                 // Files that are too large or have a DOCTYPE break `xml.size` or `xml.doctype`.
                 findings.skip("modelDescription.xml is not read to its end");
             } else if let Err(why) = read {
-                findings.add("modelDescription.xml", why.to_string());
+                findings.at("modelDescription.xml").add(why.to_string());
             }
         }
     }
@@ -24,23 +24,20 @@ pub fn well_formed(archive: &super::archive::Archive, findings: &mut Findings) {
 
 pub fn fmi_version(d: &Description, findings: &mut Findings) {
     if let Some(other) = d.other_version() {
-        return findings.add(
-            "fmiVersion",
-            format!(
-                "\"{other}\": this is not FMI 2.0, and no other rule is checked (allowed: \"2.0\")"
-            ),
-        );
+        return findings.at("fmiVersion").add(format!(
+            "\"{other}\": this is not FMI 2.0, and no other rule is checked (allowed: \"2.0\")"
+        ));
     }
     match d.root.get("fmiVersion") {
         Some("2.0") => {}
-        Some(other) => findings.add("fmiVersion", format!("\"{other}\" (allowed: \"2.0\")")),
-        None => findings.add("fmiVersion", "it is missing (allowed: \"2.0\")"),
+        Some(other) => findings.at("fmiVersion").add(format!("\"{other}\" (allowed: \"2.0\")")),
+        None => findings.at("fmiVersion").add("it is missing (allowed: \"2.0\")"),
     }
 }
 
 pub fn guid(d: &Description, findings: &mut Findings) {
     if d.root.get("guid").is_none_or(|guid| guid.trim().is_empty()) {
-        findings.add("guid", "it is missing or empty");
+        findings.at("guid").add("it is missing or empty");
     }
 }
 
@@ -48,16 +45,15 @@ pub fn date(d: &Description, findings: &mut Findings) {
     if let Some(date) = d.root.get("generationDateAndTime")
         && !(date.len() == 20 && date.ends_with('Z') && date.as_bytes().get(10) == Some(&b'T'))
     {
-        findings.add(
-            "generationDateAndTime",
-            format!("\"{date}\" (allowed: in UTC, like 2026-01-31T12:00:00Z)"),
-        );
+        findings
+            .at("generationDateAndTime")
+            .add(format!("\"{date}\" (allowed: in UTC, like 2026-01-31T12:00:00Z)"));
     }
 }
 
 pub fn interfaces(d: &Description, findings: &mut Findings) {
     if d.interfaces().next().is_none() {
-        findings.add("fmiModelDescription", "neither ModelExchange nor CoSimulation is there");
+        findings.at("fmiModelDescription").add("neither ModelExchange nor CoSimulation is there");
     }
 }
 
@@ -76,13 +72,10 @@ pub(crate) fn identifiers<'d>(
         let is_identifier = first.is_some_and(|c| c.is_ascii_alphabetic() || c == '_')
             && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
         if !is_identifier {
-            findings.add(
-                format!("line {}, {}", interface.line, interface.name),
-                format!(
-                    "modelIdentifier=\"{name}\" (allowed: letters, digits and _, no digit first: \
+            findings.at(format!("line {}, {}", interface.line, interface.name)).add(format!(
+                "modelIdentifier=\"{name}\" (allowed: letters, digits and _, no digit first: \
                      it becomes part of a C name)"
-                ),
-            );
+            ));
         }
     }
 }
@@ -90,10 +83,9 @@ pub(crate) fn identifiers<'d>(
 pub fn capabilities(d: &Description, findings: &mut Findings) {
     for interface in d.interfaces() {
         if interface.flag("canSerializeFMUstate") && !interface.flag("canGetAndSetFMUstate") {
-            findings.add(
-                format!("line {}, {}", interface.line, interface.name),
-                "canSerializeFMUstate without canGetAndSetFMUstate",
-            );
+            findings
+                .at(format!("line {}, {}", interface.line, interface.name))
+                .add("canSerializeFMUstate without canGetAndSetFMUstate");
         }
     }
     let first = d.model_exchange.as_ref().zip(d.co_simulation.as_ref());
@@ -107,7 +99,9 @@ pub fn capabilities(d: &Description, findings: &mut Findings) {
         ];
         for flag in SHARED {
             if exchange.flag(flag) != stepping.flag(flag) {
-                findings.add(flag, "one binary, but the two interfaces say different things of it");
+                findings
+                    .at(flag)
+                    .add("one binary, but the two interfaces say different things of it");
             }
         }
     }
@@ -117,10 +111,9 @@ pub fn state_capability(d: &Description, findings: &mut Findings) {
     for interface in d.interfaces() {
         for flag in ["canGetAndSetFMUstate", "canSerializeFMUstate"] {
             if !interface.flag(flag) {
-                findings.add(
-                    format!("line {}, {}", interface.line, interface.name),
-                    format!("{flag} is not true"),
-                );
+                findings
+                    .at(format!("line {}, {}", interface.line, interface.name))
+                    .add(format!("{flag} is not true"));
             }
         }
     }
@@ -133,12 +126,12 @@ pub fn default_experiment(d: &Description, findings: &mut Findings) {
     let Some(stop) = number("stopTime").filter(|stop| *stop >= start) else { return };
     let place = format!("line {}, DefaultExperiment", experiment.line);
     if stop == start {
-        findings.add(place, format!("stopTime={stop} (allowed: above startTime {start})"));
+        findings.at(place).add(format!("stopTime={stop} (allowed: above startTime {start})"));
     } else if let Some(step) = number("stepSize").filter(|step| *step > stop - start) {
-        findings.add(
-            place,
-            format!("stepSize={step} (allowed: at most stopTime - startTime = {})", stop - start),
-        );
+        findings.at(place).add(format!(
+            "stepSize={step} (allowed: at most stopTime - startTime = {})",
+            stop - start
+        ));
     }
 }
 
@@ -156,10 +149,9 @@ pub(crate) fn experiment_numbers<'d>(
         if let Some(x) = experiment.number(name)
             && !(x.is_finite() && (x > 0.0 || name.ends_with("Time")))
         {
-            findings.add(
-                format!("line {}, DefaultExperiment", experiment.line),
-                format!("{name}={x} (allowed: finite, steps and tolerances above 0)"),
-            );
+            findings
+                .at(format!("line {}, DefaultExperiment", experiment.line))
+                .add(format!("{name}={x} (allowed: finite, steps and tolerances above 0)"));
         }
     }
     Some(experiment)
@@ -175,10 +167,9 @@ pub fn stop_time(d: &Description, findings: &mut Findings) {
 pub(crate) fn stop_before_start(experiment: &Element, findings: &mut Findings) {
     let start = experiment.number("startTime").unwrap_or(0.0);
     if let Some(stop) = experiment.number("stopTime").filter(|stop| *stop < start) {
-        findings.add(
-            format!("line {}, DefaultExperiment", experiment.line),
-            format!("stopTime={stop} is before startTime={start} (allowed: after it)"),
-        );
+        findings
+            .at(format!("line {}, DefaultExperiment", experiment.line))
+            .add(format!("stopTime={stop} is before startTime={start} (allowed: after it)"));
     }
 }
 
@@ -200,10 +191,9 @@ pub(crate) fn unique_names(
             if let Some(value) = element.get(attribute)
                 && !seen.insert(value)
             {
-                findings.add(
-                    format!("line {}, {what}", element.line),
-                    format!("the {attribute} \"{value}\" is there already"),
-                );
+                findings
+                    .at(format!("line {}, {what}", element.line))
+                    .add(format!("the {attribute} \"{value}\" is there already"));
             }
         }
     };
@@ -261,6 +251,6 @@ pub fn types(d: &Description, findings: &mut Findings) {
     });
     let used: BTreeSet<&str> = d.variables.iter().map(|v| v.name.as_str()).collect();
     for name in types.keys().filter(|name| used.contains(*name)) {
-        findings.add(format!("SimpleType \"{name}\""), "a variable has the same name");
+        findings.at(format!("SimpleType \"{name}\"")).add("a variable has the same name");
     }
 }

@@ -11,6 +11,7 @@ use anyhow::Result;
 
 use super::description::{Unknown, Variable};
 use super::findings::Findings;
+use super::loaded::skip;
 use super::under_test::{FmuUnderTest, Interface, Life, Reading, Session, UnderTest, start_value};
 use super::values::items;
 use host::causality::Causality;
@@ -105,7 +106,6 @@ fn has_moved(v: &Variable, a: &Reading, b: &Reading) -> bool {
 /// Dependencies that were observed by changing one known variable at a time.
 struct Seen {
     pairs: BTreeSet<(usize, usize)>,
-    /// Pairs whose values differ in at least one bit.
     traces: BTreeSet<(usize, usize)>,
     /// Known variables (inputs and states) whose value could be changed.
     moved: BTreeSet<usize>,
@@ -151,8 +151,7 @@ impl Seen {
                 .filter(|(u, k)| *u == unknown.index && u != k && !declared.contains(k));
             let missing: Vec<_> = missing.map(|(_, k)| name(fmu, *k)).collect();
             if !missing.is_empty() {
-                findings.add(
-                    format!("line {}, {}", unknown.line, name(fmu, unknown.index)),
+                findings.at(format!("line {}, {}", unknown.line, name(fmu, unknown.index))).add(
                     format!("{when} it changes with {}, which is not declared", missing.join(", ")),
                 );
             }
@@ -171,17 +170,14 @@ fn read(session: &mut Session, variables: &[&Variable]) -> Result<Vec<Reading>> 
 pub fn running(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let d = fmu.description();
     let lists: Vec<&Unknown> = d.outputs.iter().chain(&d.derivatives).collect();
-    if let Some(seen) = watch(fmu, findings, &BTreeSet::new())? {
-        seen.report(fmu, &lists, "while running", findings);
-    }
+    watch(fmu, &BTreeSet::new())?.report(fmu, &lists, "while running", findings);
     Ok(())
 }
 
 pub fn feedthrough(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let d = fmu.description();
     if !fmu.interfaces().contains(&Interface::ModelExchange) {
-        findings.skip("in Co-Simulation an output may wait for the next step to follow its inputs");
-        return Ok(());
+        return skip("in Co-Simulation an output may wait for the next step to follow its inputs");
     }
     let is_input = |index: usize| d.at(index).is_some_and(|v| v.causality == Causality::Input);
     let declared: BTreeSet<(usize, usize)> = d
@@ -190,37 +186,29 @@ pub fn feedthrough(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         .flat_map(|u| u.dependencies.iter().flatten().map(|known| (u.index, *known)))
         .filter(|(_, known)| is_input(*known))
         .collect();
-    let Some(seen) = watch(fmu, findings, &declared)? else { return Ok(()) };
+    let seen = watch(fmu, &declared)?;
     for (output, input) in declared.iter().filter(|pair| !seen.traces.contains(pair)) {
         if seen.moved.contains(input) {
             let (output, input) = (name(fmu, *output), name(fmu, *input));
-            findings.add(
-                format!("Outputs, {output}"),
-                format!(
-                    "it is declared to depend on the input {input}, but at {} different starts it \
+            findings.at(format!("Outputs, {output}")).add(format!(
+                "it is declared to depend on the input {input}, but at {} different starts it \
                      never changed with it: hosts see an algebraic loop where there is none",
-                    seen.starts
-                ),
-            );
+                seen.starts
+            ));
         }
     }
     Ok(())
 }
 
 /// Changes inputs and states one by one, from many initial points, and returns the observed dependencies of
-/// outputs and derivatives. Stops early when all pairs of `wanted` have been observed. Returns `None`, and
-/// skips the rule, if there is nothing to observe.
-fn watch(
-    fmu: &FmuUnderTest,
-    findings: &mut Findings,
-    wanted: &BTreeSet<(usize, usize)>,
-) -> Result<Option<Seen>> {
+/// outputs and derivatives. Stops early when all pairs of `wanted` have been observed. Skips the rule if
+/// there is nothing to observe.
+fn watch(fmu: &FmuUnderTest, wanted: &BTreeSet<(usize, usize)>) -> Result<Seen> {
     let d = fmu.description();
     let lists: Vec<&Unknown> = d.outputs.iter().chain(&d.derivatives).collect();
     let unknowns: Vec<&Variable> = lists.iter().filter_map(|u| d.at(u.index)).collect();
     if unknowns.is_empty() {
-        findings.skip("it has neither outputs nor derivatives");
-        return Ok(None);
+        return skip("it has neither outputs nor derivatives");
     }
     let exchange = fmu.interfaces().contains(&Interface::ModelExchange);
     let interface = if exchange { Interface::ModelExchange } else { fmu.first()? };
@@ -275,7 +263,7 @@ fn watch(
             break;
         }
     }
-    Ok(Some(seen))
+    Ok(seen)
 }
 
 /// Returns another allowed value for `v`, about `share` of its magnitude away, or `None` if its bounds leave
@@ -293,8 +281,7 @@ pub fn initial(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let lists: Vec<&Unknown> = d.initial_unknowns.iter().collect();
     let unknowns: Vec<&Variable> = lists.iter().filter_map(|u| d.at(u.index)).collect();
     if unknowns.is_empty() {
-        findings.skip("it has no InitialUnknowns");
-        return Ok(());
+        return skip("it has no InitialUnknowns");
     }
     let knowns: Vec<_> = fmu.variables().iter().filter(|v| v.is_set_by_hosts()).collect();
     let interface = fmu.first()?;
@@ -333,8 +320,9 @@ pub fn directional(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     if !fmu.interfaces().contains(&Interface::ModelExchange)
         || !fmu.can(Interface::ModelExchange, "providesDirectionalDerivative")
     {
-        findings.skip("providesDirectionalDerivative is not declared for Model Exchange, which alone gives access to the states");
-        return Ok(());
+        return skip(
+            "providesDirectionalDerivative is not declared for Model Exchange, which alone gives access to the states",
+        );
     }
     let unknowns: Vec<&Variable> = d
         .outputs
@@ -361,7 +349,7 @@ pub fn directional(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         let given = match given {
             Ok(given) => given,
             Err(error) => {
-                findings.add(v.place(), error.to_string());
+                findings.at(v.place()).add(error.to_string());
                 continue;
             }
         };
@@ -395,13 +383,10 @@ pub fn directional(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             }
             let difference = (above[n] - below[n]) / (2.0 * h);
             if (given[n] - difference).abs() > AGREE * difference.abs() + 10.0 * rounding {
-                findings.add(
-                    format!("d {} / d {}", unknown.name, v.name),
-                    format!(
-                        "fmi2GetDirectionalDerivative gives {}, differences {difference}",
-                        given[n]
-                    ),
-                );
+                findings.at(format!("d {} / d {}", unknown.name, v.name)).add(format!(
+                    "fmi2GetDirectionalDerivative gives {}, differences {difference}",
+                    given[n]
+                ));
             }
         }
     }

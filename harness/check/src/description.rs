@@ -44,7 +44,6 @@ pub struct Common {
     pub name: String,
     /// Value reference; 0 if the attribute is missing or not a number.
     pub reference: u32,
-    /// Causality as written, or the standard's default "local".
     pub causality: Causality,
     /// Variability as written, or the standard's default for this causality and type.
     pub variability: Variability,
@@ -64,7 +63,6 @@ pub struct Common {
 /// empty list means that `initial` must not be written.
 pub(crate) type Initials = fn(&Causality, &Variability) -> Option<&'static [&'static str]>;
 
-/// An element Unknown of ModelStructure.
 #[derive(Clone, Debug)]
 pub struct Unknown {
     pub line: u64,
@@ -166,7 +164,7 @@ pub(crate) fn each<'v, V: Deref<Target = Common> + 'v>(
 ) {
     for variable in variables {
         if let Some(text) = wrong(variable) {
-            findings.add(variable.place(), text);
+            findings.at(variable.place()).add(text);
         }
     }
 }

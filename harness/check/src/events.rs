@@ -15,6 +15,7 @@ use super::dependencies::randomised;
 use super::description::Variable;
 use super::exchange::continuous;
 use super::findings::Findings;
+use super::loaded::skip;
 use super::under_test::{FmuUnderTest, Interface, Life, STEPS, Session, Sight};
 
 /// Number of initial points: the first one as declared, the others with parameters drawn at random.
@@ -25,9 +26,7 @@ const ROUNDING: f64 = 1e-9;
 const NEARLY_DUE: f64 = 1e-6;
 
 pub fn missed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    if continuous(fmu, findings)?.is_none() {
-        return Ok(());
-    }
+    continuous(fmu)?;
     let (mut vary, mut step_event) = (false, None);
     for start in 0..STARTS {
         let mut session = randomised(fmu, Interface::ModelExchange, start)?;
@@ -38,26 +37,20 @@ pub fn missed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         let missed = missed_event(&mut session, &mut vary);
         step_event = step_event.or(session.step_event());
         if let Ok(Some((time, name, change))) = missed {
-            findings.add(
-                format!("event mode at t = {time:?} s, start {start}"),
-                format!(
-                    "{name} goes from {change}: an event of which the host is not told (allowed: an \
+            findings.at(format!("event mode at t = {time:?} s, start {start}")).add(format!(
+                "{name} goes from {change}: an event of which the host is not told (allowed: an \
                      event indicator changes its sign, nextEventTime is reached, or \
                      fmi2CompletedIntegratorStep sets enterEventMode)"
-                ),
-            );
+            ));
             return Ok(());
         }
     }
     if let (Some((time, name, change)), false) = (step_event, vary) {
-        findings.add(
-            "fmi2GetEventIndicators",
-            format!(
+        findings.at("fmi2GetEventIndicators").add(format!(
                 "none of the event indicators ever changes, but at t = {time:?} s {name} goes from {change}: \
                  fmi2CompletedIntegratorStep asks for this event only after it has passed (allowed: an indicator that changes \
                  its sign, so that the host finds the time)"
-            ),
-        );
+            ));
     }
     Ok(())
 }
@@ -108,12 +101,9 @@ fn missed_event<'f>(
 }
 
 pub fn values_changed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    if continuous(fmu, findings)?.is_none() {
-        return Ok(());
-    }
+    continuous(fmu)?;
     if fmu.states().is_empty() {
-        findings.skip("it has no continuous states");
-        return Ok(());
+        return skip("it has no continuous states");
     }
     for start in 0..STARTS {
         let mut session = randomised(fmu, Interface::ModelExchange, start)?;
@@ -123,15 +113,12 @@ pub fn values_changed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
         // Failures to get this far are reported by `exchange.run`.
         let _ = session.advance(2 * STEPS);
         if let Some((time, n, before, after)) = session.hidden_jump() {
-            findings.add(
-                format!("the event at t = {time:?} s, start {start}"),
-                format!(
+            findings.at(format!("the event at t = {time:?} s, start {start}")).add(format!(
                     "{} goes from {before:?} to {after:?}, and valuesOfContinuousStatesChanged of \
                      fmi2NewDiscreteStates is false (allowed: true, or the host goes on from its own \
                      states)",
                     fmu.states()[n].1.name
-                ),
-            );
+                ));
             return Ok(());
         }
     }
@@ -139,16 +126,14 @@ pub fn values_changed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
 }
 
 pub fn nominals(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let Some(mut session) = continuous(fmu, findings)? else { return Ok(()) };
+    let mut session = continuous(fmu)?;
     let states = fmu.states();
     let declared = |v: &Variable| v.typed.number("nominal").is_some();
     if !states.iter().any(|(_, state)| declared(state)) {
-        findings.skip("no continuous state has a nominal");
-        return Ok(());
+        return skip("no continuous state has a nominal");
     }
     if session.nominals_changed() {
-        findings.skip("nominalsOfContinuousStatesChanged: they are others than at the start");
-        return Ok(());
+        return skip("nominalsOfContinuousStatesChanged: they are others than at the start");
     }
     let mut nominals = vec![f64::NAN; states.len()];
     fmu.doing("fmi2GetNominalsOfContinuousStates");
@@ -156,14 +141,11 @@ pub fn nominals(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     for ((_, state), given) in states.iter().zip(nominals) {
         let written = state.nominal();
         if declared(state) && (given - written).abs() > ROUNDING * written {
-            findings.add(
-                state.place(),
-                format!(
-                    "nominal={written:?} in modelDescription.xml, but \
+            findings.at(state.place()).add(format!(
+                "nominal={written:?} in modelDescription.xml, but \
                      fmi2GetNominalsOfContinuousStates gives {given:?} (allowed: the same: hosts \
                      weigh errors by the one or the other)"
-                ),
-            );
+            ));
         }
     }
     Ok(())

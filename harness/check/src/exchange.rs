@@ -4,56 +4,51 @@ use anyhow::Result;
 
 use super::findings::Findings;
 use super::life::expect_refusal;
+use super::loaded::skip;
 use super::under_test::{FmuUnderTest, Interface, Life, Reading, STEPS, Session, UnderTest};
 
 /// Returns an instance in continuous-time mode, or skips the rule if the FMU has no Model Exchange.
-pub fn continuous<'f>(
-    fmu: &'f FmuUnderTest,
-    findings: &mut Findings,
-) -> Result<Option<Session<'f>>> {
+pub fn continuous(fmu: &FmuUnderTest) -> Result<Session<'_>> {
     if !fmu.interfaces().contains(&Interface::ModelExchange) {
-        findings.skip("it offers no Model Exchange");
-        return Ok(None);
+        return skip("it offers no Model Exchange");
     }
-    fmu.running(Interface::ModelExchange).map(Some)
+    fmu.running(Interface::ModelExchange)
 }
 
 pub fn run(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let Some(mut session) = continuous(fmu, findings)? else { return Ok(()) };
+    let mut session = continuous(fmu)?;
     session.advance(2 * STEPS)?;
     let readings = session.readings()?;
     for (v, reading) in fmu.variables().iter().zip(readings) {
         if let Reading::Real(x) = reading
             && !x.is_finite()
         {
-            findings.add(v.place(), format!("it is {x} after {} steps", 2 * STEPS));
+            findings.at(v.place()).add(format!("it is {x} after {} steps", 2 * STEPS));
         }
     }
     Ok(())
 }
 
-pub fn event_iteration(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+pub fn event_iteration(fmu: &FmuUnderTest, _: &mut Findings) -> Result<()> {
     // Other failures are reported by other rules.
-    let Some(mut session) = continuous(fmu, findings)? else { return Ok(()) };
+    let mut session = continuous(fmu)?;
     session.advance(2 * STEPS)
 }
 
 pub fn next_event_time(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let Some(mut session) = continuous(fmu, findings)? else { return Ok(()) };
+    let mut session = continuous(fmu)?;
     session.advance(2 * STEPS)?;
     if let Some((time, next)) = session.past_event() {
-        findings.add(
-            format!("fmi2NewDiscreteStates at t = {time:?} s"),
-            format!("nextEventTime is {next:?} (allowed: a later time, if nextEventTimeDefined)"),
-        );
+        findings.at(format!("fmi2NewDiscreteStates at t = {time:?} s")).add(format!(
+            "nextEventTime is {next:?} (allowed: a later time, if nextEventTimeDefined)"
+        ));
     }
     Ok(())
 }
 
 pub fn terminate_simulation(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     if !fmu.interfaces().contains(&Interface::ModelExchange) {
-        findings.skip("it offers no Model Exchange");
-        return Ok(());
+        return skip("it offers no Model Exchange");
     }
     let mut session = fmu.session(Interface::ModelExchange)?;
     session.initialise()?;
@@ -61,7 +56,7 @@ pub fn terminate_simulation(fmu: &FmuUnderTest, findings: &mut Findings) -> Resu
 }
 
 pub fn vectors(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let Some(mut session) = continuous(fmu, findings)? else { return Ok(()) };
+    let mut session = continuous(fmu)?;
     let (nx, ni) = (fmu.states().len(), session.indicators());
     for moved in [false, true] {
         if moved {
@@ -88,8 +83,11 @@ pub fn vectors(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             let fits = |x: f64| x.is_finite() && (!above_0 || x > 0.0);
             if let Some(n) = values.iter().position(|x| !fits(*x)) {
                 let allowed = if above_0 { "finite, above 0" } else { "finite" };
-                findings
-                    .add(call, format!("element {} is {} (allowed: {allowed})", n + 1, values[n]));
+                findings.at(call).add(format!(
+                    "element {} is {} (allowed: {allowed})",
+                    n + 1,
+                    values[n]
+                ));
             }
         }
         if !findings.list.is_empty() {
@@ -100,7 +98,7 @@ pub fn vectors(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 }
 
 pub fn lengths(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let Some(mut session) = continuous(fmu, findings)? else { return Ok(()) };
+    let mut session = continuous(fmu)?;
     let (nx, ni) = (fmu.states().len(), session.indicators());
     let place = |call: &str, n: usize, right: usize| {
         let place = format!("{call} with room for {n} numbers instead of {right}");
@@ -121,11 +119,10 @@ pub fn lengths(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 }
 
 pub fn variables(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let Some(mut session) = continuous(fmu, findings)? else { return Ok(()) };
+    let mut session = continuous(fmu)?;
     let states = fmu.states();
     if states.is_empty() {
-        findings.skip("it has no continuous states");
-        return Ok(());
+        return skip("it has no continuous states");
     }
     session.advance(3)?;
     let (mut x, mut dx) = (vec![0.0; states.len()], vec![0.0; states.len()]);
@@ -138,10 +135,10 @@ pub fn variables(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         {
             let read = session.get(v)?;
             if !read.is_identical(&Reading::Real(vector)) {
-                findings.add(
-                    v.place(),
-                    format!("it reads {read}, but {call} gives {vector:?} in place {}", n + 1),
-                );
+                findings.at(v.place()).add(format!(
+                    "it reads {read}, but {call} gives {vector:?} in place {}",
+                    n + 1
+                ));
             }
         }
     }

@@ -27,16 +27,13 @@ pub struct Finding {
     pub severity: Severity,
     /// Location of the fault: a file, line, variable or call.
     pub place: String,
-    /// Description of the fault and of the allowed values.
     pub text: String,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Findings {
     pub(crate) severity: Severity,
-    /// The first findings, at most [`KEPT`].
     pub list: Vec<Finding>,
-    /// Number of findings beyond [`KEPT`].
     pub more: usize,
     pub skipped: Option<String>,
     /// Identifier of the rule that reports the fault which made this rule impossible to check.
@@ -59,31 +56,9 @@ impl Findings {
         }
     }
 
-    pub fn add(&mut self, place: impl Into<String>, text: impl Into<String>) {
-        if self.list.len() >= KEPT {
-            self.more += 1;
-            return;
-        }
-        self.list.push(Finding { severity: self.severity, place: place.into(), text: text.into() });
-    }
-
-    /// Adds a finding that is an error even if the rule is only a warning.
-    pub fn fail(&mut self, place: impl Into<String>, text: impl Into<String>) {
-        let finding = Finding { severity: Severity::Error, place: place.into(), text: text.into() };
-        if self.list.len() >= KEPT {
-            self.list.pop(); // an error shows, however many warnings there are
-            self.more += 1;
-        }
-        self.list.push(finding);
-    }
-
-    /// Adds a finding that is only a warning even if the rule is an error.
-    pub fn warn(&mut self, place: impl Into<String>, text: impl Into<String>) {
-        let kept = self.list.len();
-        self.add(place, text);
-        if let Some(last) = self.list.get_mut(kept) {
-            last.severity = Severity::Warning;
-        }
+    /// Returns the place of a finding, which is then added with a text.
+    pub fn at(&mut self, place: impl Into<String>) -> At<'_> {
+        At { findings: self, place: place.into() }
     }
 
     pub(crate) fn has_error(&self) -> bool {
@@ -107,5 +82,41 @@ impl Findings {
     pub fn skip_for(&mut self, rule: &str, why: impl Into<String>) {
         self.skip(why);
         self.reported_by = Some(rule.into());
+    }
+}
+
+pub struct At<'f> {
+    findings: &'f mut Findings,
+    place: String,
+}
+
+impl At<'_> {
+    pub fn add(self, text: impl Into<String>) {
+        let severity = self.findings.severity;
+        self.push(severity, text.into());
+    }
+
+    /// Adds a finding that is an error even if the rule is only a warning.
+    pub fn fail(self, text: impl Into<String>) {
+        self.push(Severity::Error, text.into());
+    }
+
+    /// Adds a finding that is only a warning even if the rule is an error.
+    pub fn warn(self, text: impl Into<String>) {
+        self.push(Severity::Warning, text.into());
+    }
+
+    fn push(self, severity: Severity, text: String) {
+        let At { findings, place } = self;
+        if findings.list.len() >= KEPT {
+            findings.more += 1;
+            // An error replaces a warning, so that it shows however many warnings there are.
+            let is_hidden = severity == Severity::Error && !findings.has_error();
+            if !is_hidden {
+                return;
+            }
+            findings.list.pop();
+        }
+        findings.list.push(Finding { severity, place, text });
     }
 }

@@ -58,7 +58,6 @@ enum Impossible {
     State { index: usize, value: f64 },
     #[error("derivative {} is {value}", index + 1)]
     Derivative { index: usize, value: f64 },
-    /// fmi2Discard
     #[error("{0}")]
     Discarded(CallError),
     #[error("the error of the step is {0:.1e} times what is allowed")]

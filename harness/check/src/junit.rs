@@ -144,8 +144,8 @@ mod tests {
                 time: Duration::ZERO,
             })
             .collect();
-        outcomes[0].findings.fail("a\u{1}b", "<&\"]]>");
-        outcomes[1].findings.add("c", "d");
+        outcomes[0].findings.at("a\u{1}b").fail("<&\"]]>");
+        outcomes[1].findings.at("c").add("d");
         outcomes[2].findings.skip("e");
         let report = Report { path: "x.fmu".into(), outcomes, unchecked: None, bug: None };
         let mut out = Vec::new();

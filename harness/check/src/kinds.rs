@@ -28,14 +28,11 @@ struct Pair<'d> {
 
 impl Pair<'_> {
     fn report(&self, findings: &mut Findings, a: Factor, b: Factor, when: &str) {
-        findings.add(
-            format!("line {}, {}, {}", self.line, self.list, self.unknown.name),
-            format!(
+        findings.at(format!("line {}, {}, {}", self.line, self.list, self.unknown.name)).add(format!(
                 "dependenciesKind of {} is {}, but the factor is {:.6e} and {:.6e} {when} (allowed: \
                  one factor, or \"dependent\")",
                 self.known.name, self.kind, a.value, b.value
-            ),
-        );
+            ));
     }
 }
 

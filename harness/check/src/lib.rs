@@ -49,7 +49,6 @@ use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
 use files::temporary;
-use host::fmi2::PLATFORM;
 use host::xml::Element;
 use rayon::prelude::*;
 
@@ -130,12 +129,13 @@ pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) ->
         Some(Err(why)) => Err(format!("modelDescription.xml cannot be read: {why}")),
         None => Err("there is no modelDescription.xml that can be unpacked".to_string()),
     };
-    let binaries = Binaries::new(&archive, description.as_ref().ok().copied());
-
     // FMI 3 has rules of its own. A file of FMI 1 breaks one rule, which says so.
     let third = description.as_ref().ok().filter(|d| d.is_fmi3());
     let third = third.map(|d| v3::Description::new(d.root.clone()));
-    let libraries = v3::Binaries::new(&archive, third.as_ref());
+    let binaries = match &third {
+        Some(description) => Binaries::of_fmi3(&archive, description),
+        None => Binaries::new(&archive, description.as_ref().ok().copied()),
+    };
     let is_foreign = description.as_ref().is_ok_and(|d| d.other_version().is_some());
     let is_wanted = |rule: &&'static Rule| match is_foreign && third.is_none() {
         true => rule.id == "xml.fmi_version",
@@ -154,11 +154,8 @@ pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) ->
         (_, Some(d)) if d.has_clocks() && d.interface("ModelExchange").is_none() => {
             Err("it has clocks, and the check does not call Co-Simulation of FMUs with clocks".into())
         }
-        (_, Some(_)) if !libraries.is_callable() => {
-            Err(format!("it has no library for this platform, {}", host::fmi3::PLATFORM))
-        }
-        (_, None) if binaries.own().is_none() => {
-            Err(format!("it has no binary for this platform, {PLATFORM}"))
+        _ if binaries.own().is_none() => {
+            Err(format!("it has no binary for this platform, {}", binaries.own_folder()))
         }
         (Ok(description), _) => Ok(&description.root),
     };
@@ -181,7 +178,6 @@ pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) ->
                 Some(description) => check(description, &mut findings),
                 None => findings.skip("it is not an FMU 3.0"),
             },
-            (Check::Binaries3(check), _) => check(&libraries, &mut findings),
             (Check::Calls(_) | Check::Calls3(_), _) => {
                 match &callable {
                     Ok((_, description)) => {
@@ -212,7 +208,7 @@ pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) ->
         {
             outcomes.retain(|outcome| outcome.rule.id != rule.id);
             let mut findings = Findings::new(rule.severity);
-            findings.fail("the archive", format!("it cannot be opened as an FMU: {why}"));
+            findings.at("the archive").fail(format!("it cannot be opened as an FMU: {why}"));
             outcomes.push(Outcome { rule, findings, time: Duration::ZERO });
         }
         let place = |outcome: &Outcome| table.iter().position(|rule| rule.id == outcome.rule.id);
@@ -309,7 +305,7 @@ fn restore_unreported_faults(outcomes: &mut [Outcome]) {
         if findings.reported_by.as_deref().is_some_and(|rule| silent.contains(&rule))
             && let Some(why) = findings.skipped.take()
         {
-            findings.add("a run of this rule", why);
+            findings.at("a run of this rule").add(why);
         }
     }
 }

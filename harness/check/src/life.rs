@@ -4,7 +4,7 @@
 use anyhow::Result;
 
 use super::findings::Findings;
-use super::loaded::{Life, Readings, STEPS, UnderTest, Unusable};
+use super::loaded::{Life, Readings, STEPS, UnderTest, Unusable, skip};
 use super::under_test::{FmuUnderTest, Interface, Reading, Session, Stage};
 use host::fmi2::{CallError, Callbacks, HostState, Instance, Instantiation, Status, file_uri};
 
@@ -12,7 +12,7 @@ use host::fmi2::{CallError, Callbacks, HostState, Instance, Instantiation, Statu
 /// two binaries can the second one still be broken here.
 pub fn opens<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
     for why in fmu.broken() {
-        findings.add("the binary of one interface", why);
+        findings.at("the binary of one interface").add(why);
     }
     Ok(())
 }
@@ -22,7 +22,7 @@ pub fn types_platform(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
     for binary in fmu.binaries() {
         let answer = binary.types_platform();
         if answer != "default" {
-            findings.add("fmi2GetTypesPlatform", format!("{answer:?} (allowed: \"default\")"));
+            findings.at("fmi2GetTypesPlatform").add(format!("{answer:?} (allowed: \"default\")"));
         }
     }
     Ok(())
@@ -36,7 +36,7 @@ pub fn version<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
         // FMI 3.0 has bug-fix versions such as 3.0.1.
         let is_fixed = F::NUMBER == "3.0" && answer.starts_with("3.0.");
         if answer != F::NUMBER && !is_fixed {
-            findings.add(&call, format!("{answer:?} (allowed: {:?})", F::NUMBER));
+            findings.at(&call).add(format!("{answer:?} (allowed: {:?})", F::NUMBER));
         }
     }
     Ok(())
@@ -48,7 +48,7 @@ pub fn instance<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
     }
     if fmu.interfaces().is_empty() {
         let call = format!("{}Instantiate", F::FMI);
-        findings.add(call, "the binary lacks the functions of the declared interface");
+        findings.at(call).add("the binary lacks the functions of the declared interface");
     }
     Ok(())
 }
@@ -76,7 +76,7 @@ pub fn again(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     for run in &runs[1..] {
         if let Some(text) = fmu.session(fmu.first()?)?.difference(run, &runs[0]) {
             is_deterministic(fmu, fmu.first()?)?;
-            findings.add("loading it again", text);
+            findings.at("loading it again").add(text);
         }
     }
     Ok(())
@@ -94,10 +94,11 @@ pub fn guid(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 
 fn expect_null(findings: &mut Findings, place: &str, answer: Result<Instance, CallError>) {
     match answer {
-        Ok(_) => findings.add(place, "it gives an instance (allowed: NULL)"),
+        Ok(_) => findings.at(place).add("it gives an instance (allowed: NULL)"),
         Err(error) if error.messages.is_empty() => {
             findings
-                .add(place, "NULL without a word to the logger (allowed: a message that says why)");
+                .at(place)
+                .add("NULL without a word to the logger (allowed: a message that says why)");
         }
         Err(_) => {}
     }
@@ -112,7 +113,7 @@ pub fn arguments_null(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
     if let Err(error) = answer
         && fmu.description().co_simulation.is_some()
     {
-        findings.add(place, error.to_string());
+        findings.at(place).add(error.to_string());
     }
     // No host may pass these arguments, so that the standard does not say what happens.
     for (what, with) in [
@@ -130,8 +131,7 @@ pub fn arguments_null(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
 pub fn resources(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let resources = fmu.directory().join("resources");
     if !resources.is_dir() {
-        findings.skip("it has no resources");
-        return Ok(());
+        return skip("it has no resources");
     }
     let interface = fmu.first()?;
     let run = |location: Option<&str>| -> Result<Vec<Reading>> {
@@ -169,11 +169,13 @@ pub fn resources(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         let place = format!("fmi2Instantiate with the resource location {location}");
         match run(Some(&location)) {
             Ok(values) if is_same(&values, &usual) => {}
-            Ok(_) => findings.add(place, format!("other values than usual (allowed: {allowed})")),
+            Ok(_) => {
+                findings.at(place).add(format!("other values than usual (allowed: {allowed})"))
+            }
             Err(error) => match error.downcast::<Unusable>() {
                 Ok(unusable) if unusable.rule.is_empty() => return Err(unusable.into()),
-                Ok(unusable) => findings.add(place, format!("{unusable} (allowed: {allowed})")),
-                Err(error) => findings.add(place, format!("{error:#} (allowed: {allowed})")),
+                Ok(unusable) => findings.at(place).add(format!("{unusable} (allowed: {allowed})")),
+                Err(error) => findings.at(place).add(format!("{error:#} (allowed: {allowed})")),
             },
         }
     }
@@ -193,10 +195,7 @@ fn refuse_as_usual(fmu: &FmuUnderTest, interface: Interface) -> Result<bool> {
 
 pub fn callbacks(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let interface = fmu.first()?;
-    if !fmu.can(interface, "canNotUseMemoryManagementFunctions") {
-        findings.skip("canNotUseMemoryManagementFunctions is not declared");
-        return Ok(());
-    }
+    fmu.require(interface, "canNotUseMemoryManagementFunctions")?;
     refuse_as_usual(fmu, interface)?;
     let place = "fmi2Instantiate with NULL for the memory functions";
     fmu.doing(place);
@@ -208,7 +207,7 @@ pub fn callbacks(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     {
         Ok(()) => {}
         Err(error) => {
-            findings.add(place, format!("{error} (allowed: an instance that initialises)"))
+            findings.at(place).add(format!("{error} (allowed: an instance that initialises)"))
         }
     }
     // Hosts must pass a logger. Without one the FMU may refuse, but should not crash.
@@ -219,7 +218,7 @@ pub fn callbacks(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             .map_or(Ok(()), |instance| initialise_and_refuse(fmu, instance))
     });
     if let Err(error) = answer {
-        findings.add(fmu.now(), format!("{error} (allowed: no instance, or one that works)"));
+        findings.at(fmu.now()).add(format!("{error} (allowed: no instance, or one that works)"));
     }
     Ok(())
 }
@@ -246,7 +245,9 @@ pub fn copies(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         && error.messages.is_empty()
         && logs
     {
-        findings.add(fmu.now(), "no message reaches the logger (allowed: a copy of the callbacks)");
+        findings
+            .at(fmu.now())
+            .add("no message reaches the logger (allowed: a copy of the callbacks)");
     }
     Ok(())
 }
@@ -267,10 +268,9 @@ pub fn null(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         });
         for (call, status) in answers {
             if !matches!(status, Status::Error | Status::Fatal) {
-                findings.add(
-                    format!("{call} with the instance NULL"),
-                    format!("fmi2{status:?} (allowed: fmi2Error)"),
-                );
+                findings
+                    .at(format!("{call} with the instance NULL"))
+                    .add(format!("fmi2{status:?} (allowed: fmi2Error)"));
             }
         }
     }
@@ -293,7 +293,7 @@ pub fn instances<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
         let readings = one.readings()?;
         if let Some(text) = one.difference(&readings, &alone) {
             is_deterministic(fmu, using)?;
-            findings.add(format!("{}, two instances in turn", F::name(using)), text);
+            findings.at(format!("{}, two instances in turn", F::name(using))).add(text);
         }
         drop(two);
         one.advance(1)?;
@@ -304,7 +304,7 @@ pub fn instances<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
 pub fn deterministic<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
     for using in fmu.uses() {
         if let Some(text) = differs_when_run_again(fmu, using)? {
-            findings.add(format!("{}, the same run again", F::name(using)), text);
+            findings.at(format!("{}, the same run again", F::name(using))).add(text);
         }
     }
     Ok(())
@@ -346,7 +346,7 @@ pub fn reset<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
         for (fresh, again) in fresh.iter().zip(&again) {
             if let Some(text) = session.difference(again, fresh) {
                 is_deterministic(fmu, using)?;
-                findings.add(format!("{}, a run after {call}", F::name(using)), text);
+                findings.at(format!("{}, a run after {call}", F::name(using))).add(text);
                 break;
             }
         }
@@ -381,11 +381,11 @@ pub fn reset_anywhere(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
             let place = format!("fmi2Reset, {from} ({})", FmuUnderTest::name(interface));
             fmu.doing(&place);
             if let Err(error) = session.instance.reset() {
-                findings.add(place, error.to_string());
+                findings.at(place).add(error.to_string());
                 continue;
             }
             if let Err(error) = session.initialise() {
-                findings.add(place, format!("it cannot be initialised again: {error}"));
+                findings.at(place).add(format!("it cannot be initialised again: {error}"));
             }
         }
     }
@@ -407,7 +407,7 @@ pub fn terminate<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
         if F::NUMBER == "2.0"
             && let Some(text) = session.difference(&after, &before)
         {
-            findings.add(format!("after {call} ({})", F::name(using)), text);
+            findings.at(format!("after {call} ({})", F::name(using))).add(text);
         }
     }
     Ok(())
@@ -465,14 +465,15 @@ pub fn order(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 /// Adds a finding unless the call is refused with fmi2Error and a message that says why.
 pub fn expect_refusal(findings: &mut Findings, place: String, answer: Result<(), CallError>) {
     match answer {
-        Ok(()) => findings.add(place, "it is accepted (allowed: fmi2Error and a message)"),
+        Ok(()) => findings.at(place).add("it is accepted (allowed: fmi2Error and a message)"),
         Err(error) if error.status == Status::Fatal => {
-            findings.add(place, format!("{error} (allowed: fmi2Error, the instance lives on)"));
+            findings.at(place).add(format!("{error} (allowed: fmi2Error, the instance lives on)"));
         }
         Err(error) if error.messages.iter().all(|m| m.text.trim().is_empty()) => {
             // The standard requires only the error, so that a missing message is a warning.
             findings
-                .warn(place, format!("{error} (expected: fmi2Error and a message that says why)"));
+                .at(place)
+                .warn(format!("{error} (expected: fmi2Error and a message that says why)"));
         }
         Err(_) => {}
     }
@@ -487,7 +488,6 @@ fn ordinary_lives(fmu: &FmuUnderTest, interface: Interface) -> Result<()> {
     refuse_as_usual(fmu, interface).map(|_| ())
 }
 
-/// `host.silent`: the parent process compares what this process prints.
 pub fn silent(fmu: &FmuUnderTest, _: &mut Findings) -> Result<()> {
     for interface in fmu.interfaces() {
         ordinary_lives(fmu, interface)?;
@@ -529,7 +529,7 @@ pub fn untouched(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                 "environment variables" => String::new(),
                 _ => format!(": {before} before, {after} after"),
             };
-            findings.add("the host's process", format!("it changes the {name}{values}"));
+            findings.at("the host's process").add(format!("it changes the {name}{values}"));
         }
     }
     Ok(())

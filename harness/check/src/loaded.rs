@@ -16,7 +16,6 @@ use host::xml::Element;
 use super::findings::Findings;
 use super::trace::{self, Crash};
 
-/// Number of communication steps of a short run.
 pub const STEPS: usize = 20;
 /// Time limit for a call whose effect the standard leaves open, because it may never return.
 const PATIENCE: Duration = Duration::from_secs(3);
@@ -38,6 +37,11 @@ impl std::fmt::Display for Unusable {
 
 impl std::error::Error for Unusable {}
 
+/// Ends a rule that does not apply to the FMU, for example because the FMU lacks a capability.
+pub fn skip<T>(why: impl Into<String>) -> Result<T> {
+    Err(Unusable { rule: "", why: why.into() }.into())
+}
+
 /// The loaded binaries of an FMU, with a record of the call that is being made.
 pub struct Loaded<V: Version> {
     /// One binary, or two if modelIdentifier differs between the interfaces.
@@ -46,7 +50,6 @@ pub struct Loaded<V: Version> {
     interfaces: Vec<(Interface, usize)>,
     /// The interfaces whose binary cannot be loaded: interface, modelIdentifier and reason.
     broken: Vec<(Interface, String, String)>,
-    /// Time after which rules create no more instances.
     pub deadline: Instant,
     doing: RefCell<String>,
     crash: RefCell<Crash>,
@@ -135,7 +138,8 @@ impl<V: Version> Loaded<V> {
         guard::spawn(move || {
             if waiting.recv_timeout(PATIENCE) == Err(RecvTimeoutError::Timeout) {
                 found
-                    .add(place, format!("no end after {PATIENCE:?} (allowed: every call returns)"));
+                    .at(place)
+                    .add(format!("no end after {PATIENCE:?} (allowed: every call returns)"));
                 // If the findings cannot be written, the time limit of the parent process reports the hang.
                 let _ = trace::done(found);
                 std::process::exit(0);
@@ -189,7 +193,6 @@ impl<V: Version> Loaded<V> {
         self.broken.iter().map(|(.., why)| &why[..])
     }
 
-    /// Returns the interfaces that can be called, Co-Simulation first.
     pub fn interfaces(&self) -> Vec<Interface> {
         self.interfaces.iter().map(|(interface, _)| *interface).collect()
     }
@@ -215,7 +218,6 @@ impl<V: Version> Loaded<V> {
     }
 }
 
-/// Returns the name of the interface's element in modelDescription.xml.
 fn element(interface: Interface) -> &'static str {
     match interface {
         Interface::CoSimulation => "CoSimulation",
@@ -240,23 +242,19 @@ pub trait UnderTest: Deref<Target = Loaded<Self::Version>> {
     type Session<'f>: Life<'f, Self::Version>
     where
         Self: 'f;
-    /// Prefix of function names, "fmi2" or "fmi3".
     const FMI: &'static str;
     const NUMBER: &'static str;
 
     /// Word for a saved state in the names of functions and capabilities, "FMUstate" or "FMUState".
     const STATE: &'static str;
 
-    /// Returns the root element of modelDescription.xml.
     fn root(&self) -> &Element;
 
     /// Lists the ways in which the FMU declares that it can be used.
     fn uses(&self) -> Vec<Self::Use>;
 
-    /// Returns the name of a use in findings.
     fn name(using: Self::Use) -> &'static str;
 
-    /// Returns the interface to which a use belongs.
     fn interface(using: Self::Use) -> Interface;
 
     /// Creates an instance for one interface of the FMU under test.
@@ -274,11 +272,18 @@ pub trait UnderTest: Deref<Target = Loaded<Self::Version>> {
     fn can(&self, interface: Interface, flag: &str) -> bool {
         self.root().child(element(interface)).is_some_and(|element| element.flag(flag))
     }
+
+    /// Skips the rule unless the element of `interface` declares the capability `flag`.
+    fn require(&self, interface: Interface, flag: &str) -> Result<()> {
+        match self.can(interface, flag) {
+            true => Ok(()),
+            false => skip(format!("{flag} is not declared")),
+        }
+    }
 }
 
 /// Life cycle of an instance, in the order of the standard's state machine.
 pub trait Life<'f, V: Version + 'f> {
-    /// Value of a variable as read from the FMU.
     type Reading;
     /// The host's own state (for example time), which a saved FMU state does not contain.
     type Mark;

@@ -3,6 +3,7 @@
 use anyhow::Result;
 
 use super::findings::Findings;
+use super::loaded::skip;
 use super::under_test::{FmuUnderTest, Interface, Life, STEPS, UnderTest};
 use host::c_abi::foreign_environments;
 use host::fmi2::{Instantiation, Message, Status};
@@ -25,13 +26,10 @@ pub fn percent(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let echoes: Vec<_> = told.iter().filter(|m| m.text.contains("{a")).collect();
     for message in &echoes {
         if !message.text.contains(TEXT) {
-            findings.add(
-                &place,
-                format!(
-                    "it arrives as {:?} (allowed: format \"%s\", the text as argument)",
-                    message.text
-                ),
-            );
+            findings.at(&place).add(format!(
+                "it arrives as {:?} (allowed: format \"%s\", the text as argument)",
+                message.text
+            ));
         }
     }
     if echoes.is_empty() {
@@ -44,13 +42,12 @@ pub fn categories<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> 
     let declared: Vec<&str> =
         fmu.root().list("LogCategories").filter_map(|c| c.get("name")).collect();
     if declared.is_empty() {
-        findings.skip("no categories are declared");
-        return Ok(());
+        return skip("no categories are declared");
     }
     let (messages, uncategorised) = fmu.complaints()?;
     if uncategorised > 0 {
         let all = declared.join(", ");
-        findings.add("a message", format!("its category is NULL (declared: {all})"));
+        findings.at("a message").add(format!("its category is NULL (declared: {all})"));
     }
     let mut unknown: Vec<String> = messages
         .into_iter()
@@ -61,7 +58,7 @@ pub fn categories<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> 
     unknown.dedup();
     for category in unknown {
         let all = declared.join(", ");
-        findings.add("a message", format!("its category is {category:?} (declared: {all})"));
+        findings.at("a message").add(format!("its category is {category:?} (declared: {all})"));
     }
     Ok(())
 }
@@ -82,7 +79,7 @@ pub fn text(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         } else {
             continue;
         };
-        findings.add(format!("the message {text:?}"), fault);
+        findings.at(format!("the message {text:?}")).add(fault);
     }
     Ok(())
 }
@@ -113,10 +110,12 @@ pub fn quiet(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         let mut messages = ordinary(fmu, interface, changing)?;
         messages.retain(|message| !changing || message.status == Status::Ok);
         if let Some(message) = messages.first() {
-            findings.add(
-                format!("an ordinary run, {inputs}, loggingOn ({})", FmuUnderTest::name(interface)),
-                format!("{} messages, the first {:?}", messages.len(), message.text),
-            );
+            findings
+                .at(format!(
+                    "an ordinary run, {inputs}, loggingOn ({})",
+                    FmuUnderTest::name(interface)
+                ))
+                .add(format!("{} messages, the first {:?}", messages.len(), message.text));
         }
     }
     Ok(())
@@ -131,13 +130,10 @@ pub fn environment(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             findings.skip("it logs nothing");
         }
         0 => {}
-        n => findings.add(
-            "the logger",
-            format!(
+        n => findings.at("the logger").add(format!(
                 "{n} calls have another componentEnvironment than that given to fmi2Instantiate (allowed: the same \
                  pointer; fmi2Component is not it)"
-            ),
-        ),
+            )),
     }
     Ok(())
 }
@@ -151,7 +147,7 @@ pub fn switch(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         let place = format!("fmi2SetDebugLogging({on}, {set:?})");
         fmu.doing(&place);
         if let Err(error) = session.instance.set_debug_logging(on, set) {
-            findings.add(place, error.to_string());
+            findings.at(place).add(error.to_string());
         }
     }
     Ok(())

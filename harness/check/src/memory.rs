@@ -9,9 +9,9 @@ use std::time::{Duration, Instant};
 use anyhow::Result;
 
 use super::findings::Findings;
+use super::loaded::skip;
 use super::under_test::{FmuUnderTest, Interface, Life, UnderTest};
 
-/// Largest number of calls in a window.
 const MOST: usize = 500;
 /// Time limit for the first window; the other windows have the same number of calls.
 const LONGEST: Duration = Duration::from_millis(500);
@@ -59,8 +59,7 @@ fn leak_per_call(mut call: impl FnMut() -> Result<()>) -> Result<Option<u64>> {
 
 pub fn memory(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     if writable_memory().is_none() {
-        findings.skip("this system does not tell how much memory a process has");
-        return Ok(());
+        return skip("this system does not tell how much memory a process has");
     }
     for interface in fmu.interfaces() {
         look(fmu, interface, findings)?;
@@ -79,12 +78,9 @@ fn look(fmu: &FmuUnderTest, interface: Interface, findings: &mut Findings) -> Re
     if let Some(bytes) = leak_per_call(step)?
         && bytes >= PER_STEP
     {
-        findings.add(
-            format!("steps ({name})"),
-            format!(
-                "the process grows by {bytes} bytes with each (allowed: {PER_STEP}, for a history)"
-            ),
-        );
+        findings.at(format!("steps ({name})")).add(format!(
+            "the process grows by {bytes} bytes with each (allowed: {PER_STEP}, for a history)"
+        ));
     }
     if fmu.can(interface, "canGetAndSetFMUstate") {
         let state = || -> Result<()> {
@@ -93,10 +89,9 @@ fn look(fmu: &FmuUnderTest, interface: Interface, findings: &mut Findings) -> Re
         };
         fmu.doing("fmi2GetFMUstate and fmi2FreeFMUstate");
         if let Some(bytes) = leak_per_call(state)? {
-            findings.add(
-                format!("fmi2FreeFMUstate ({name})"),
-                format!("{bytes} bytes stay behind with each state (allowed: none)"),
-            );
+            findings
+                .at(format!("fmi2FreeFMUstate ({name})"))
+                .add(format!("{bytes} bytes stay behind with each state (allowed: none)"));
         }
     }
     drop(session);
@@ -114,10 +109,9 @@ fn look(fmu: &FmuUnderTest, interface: Interface, findings: &mut Findings) -> Re
         Ok(())
     };
     if let Some(bytes) = leak_per_call(instance)? {
-        findings.add(
-            format!("fmi2FreeInstance ({name})"),
-            format!("{bytes} bytes stay behind with each instance (allowed: none)"),
-        );
+        findings
+            .at(format!("fmi2FreeInstance ({name})"))
+            .add(format!("{bytes} bytes stay behind with each instance (allowed: none)"));
     }
     Ok(())
 }

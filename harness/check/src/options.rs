@@ -6,6 +6,5 @@ pub struct Options {
     pub program: PathBuf,
     /// Rules, or groups of rules such as `steps`, to check; empty for all.
     pub only: Vec<String>,
-    /// Time limit for the calls of one rule.
     pub limit: Duration,
 }

@@ -57,15 +57,12 @@ pub fn windows_names(archive: &Archive, findings: &mut Findings) {
             .flat_map(|(_, part)| windows_faults(part))
             .collect();
         if !faults.is_empty() {
-            findings.add(
-                entry.name.escape_debug().to_string(),
-                format!(
-                    "{} (allowed: names without < > : \" | ? *, that end with another character \
+            findings.at(entry.name.escape_debug().to_string()).add(format!(
+                "{} (allowed: names without < > : \" | ? *, that end with another character \
                      than a full stop or a space and are none of CON, PRN, AUX, NUL, COM1 to COM9 \
                      and LPT1 to LPT9, with or without an extension)",
-                    faults.join(", ")
-                ),
-            );
+                faults.join(", ")
+            ));
         }
     }
 }
@@ -78,26 +75,19 @@ pub fn path_length(archive: &Archive, findings: &mut Findings) {
         // Windows counts UTF-16 units.
         let length = entry.name.encode_utf16().count();
         if longest > LONGEST_PART {
-            findings.fail(
-                place,
-                format!("a part of the path has {longest} bytes (allowed: {LONGEST_PART})"),
-            );
+            findings
+                .at(place)
+                .fail(format!("a part of the path has {longest} bytes (allowed: {LONGEST_PART})"));
         } else if length > LONGEST_PATH {
-            findings.fail(
-                place,
-                format!(
-                    "the path has {length} characters, more than Windows opens at all \
+            findings.at(place).fail(format!(
+                "the path has {length} characters, more than Windows opens at all \
                      ({LONGEST_PATH}; allowed: {PORTABLE_PATH})"
-                ),
-            );
+            ));
         } else if length > PORTABLE_PATH {
-            findings.add(
-                place,
-                format!(
-                    "the path has {length} characters (allowed: {PORTABLE_PATH}; with the temporary \
+            findings.at(place).add(format!(
+                "the path has {length} characters (allowed: {PORTABLE_PATH}; with the temporary \
                      folder in front Windows opens {LONGEST_PATH})"
-                ),
-            );
+            ));
         }
     }
 }
@@ -115,13 +105,10 @@ pub fn file_and_folder(archive: &Archive, findings: &mut Findings) {
             if let Some(file) = files.get(folder)
                 && told.insert(folder.to_string())
             {
-                findings.add(
-                    *file,
-                    format!(
-                        "it is a file, and a folder that holds {} (allowed: one of the two)",
-                        entry.name
-                    ),
-                );
+                findings.at(*file).add(format!(
+                    "it is a file, and a folder that holds {} (allowed: one of the two)",
+                    entry.name
+                ));
             }
         }
     }
@@ -166,12 +153,9 @@ pub fn capitals(archive: &Archive, findings: &mut Findings) {
         // If the correct name also exists, the two are duplicates, which is another rule.
         let is_there = |name: &String| archive.entries.iter().any(|e| e.name == *name);
         if let Some(right) = standard_spelling(&entry.name).filter(|right| !is_there(right)) {
-            findings.add(
-                &entry.name,
-                format!(
-                    "hosts on Linux do not find it: FMI writes {right} (allowed: these capitals)"
-                ),
-            );
+            findings.at(&entry.name).add(format!(
+                "hosts on Linux do not find it: FMI writes {right} (allowed: these capitals)"
+            ));
         }
     }
 }

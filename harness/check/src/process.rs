@@ -21,7 +21,6 @@ use super::trace::{self, Answer, Crash};
 use super::under_test::FmuUnderTest;
 use super::{life, v3};
 
-/// The hidden subcommand of `hubslosh` that checks one rule.
 pub const SUBCOMMAND: &str = "check-calls";
 /// Number of rules with endless calls after which no further rules of calls are run.
 const HANGS: usize = 2;
@@ -43,15 +42,12 @@ pub struct SoFar {
     hung: AtomicUsize,
     /// Reason why the binary cannot be loaded, which is the same for all rules.
     lost: OnceLock<String>,
-    /// Report of a panic in this program's own code.
     pub bug: OnceLock<String>,
 }
 
-/// Location of the unpacked FMU whose binary is called.
 #[derive(Clone, Copy, Debug)]
 pub struct Unpacked<'a> {
     pub path: &'a Path,
-    /// Folder into which the FMU is unpacked.
     pub directory: &'a Path,
     /// File with the parsed description ([`Element::pack`]), because parsing a large modelDescription.xml
     /// takes longer than most rules.
@@ -77,7 +73,9 @@ pub fn check(
             so_far.hung.fetch_add(1, Ordering::Relaxed);
         }
         Ok(false) => {}
-        Err(error) => findings.fail("hubslosh", format!("the calls could not be made: {error:#}")),
+        Err(error) => {
+            findings.at("hubslosh").fail(format!("the calls could not be made: {error:#}"))
+        }
     }
 }
 
@@ -163,10 +161,10 @@ fn run(
                     String::from_utf8_lossy(bytes).chars().take(PRINTED).collect()
                 };
                 if !stdout.is_empty() {
-                    findings.fail("stdout", format!("it prints {:?}", start(stdout)));
+                    findings.at("stdout").fail(format!("it prints {:?}", start(stdout)));
                 }
                 if !stderr.is_empty() {
-                    findings.add("stderr", format!("it prints {:?}", start(stderr)));
+                    findings.at("stderr").add(format!("it prints {:?}", start(stderr)));
                 }
             }
         }
@@ -183,9 +181,9 @@ fn report_crash(findings: &mut Findings, doing: String, text: String, crash: Cra
     match crash {
         Crash::Error => {
             findings.stopped_at = Some(doing.clone());
-            findings.fail(doing, text);
+            findings.at(doing).fail(text);
         }
-        Crash::Open => findings.add(doing, text),
+        Crash::Open => findings.at(doing).add(text),
         Crash::ReportedBy(rule) => findings.skip_for(&rule, format!("{doing}: {text}")),
     }
 }
@@ -215,11 +213,11 @@ pub fn check_in_child(id: &str, fmu: Unpacked, limit: Duration) -> Result<()> {
         }
         _ => {
             findings.stopped_at = Some(now.clone());
-            findings.add(now, format!("{error:#}"));
+            findings.at(now).add(format!("{error:#}"));
         }
     };
     let lost = |error: anyhow::Error, findings: &mut Findings| match rule.id == OPENS {
-        true => findings.add("the binary", format!("{error:#}")),
+        true => findings.at("the binary").add(format!("{error:#}")),
         false => findings.skip(format!("it cannot be loaded: {error:#}")),
     };
     match rule.check {

@@ -8,6 +8,7 @@ use anyhow::Result;
 use super::dependencies::randomised;
 use super::description::Variable;
 use super::findings::Findings;
+use super::loaded::skip;
 use super::under_test::{FmuUnderTest, Life, Reading, STEPS, Session, UnderTest, start_value};
 use super::values::{items, mentions};
 use host::description::Type;
@@ -21,8 +22,7 @@ pub fn in_range(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         |v: &&Variable| v.bounds() != (f64::NEG_INFINITY, f64::INFINITY) && !v.is_set_by_hosts();
     let all: Vec<&Variable> = fmu.variables().iter().filter(bounded).collect();
     if all.is_empty() {
-        findings.skip("nothing that the FMU computes has a min or a max");
-        return Ok(());
+        return skip("nothing that the FMU computes has a min or a max");
     }
     let mut told = BTreeSet::new();
     for interface in fmu.interfaces() {
@@ -44,14 +44,11 @@ pub fn in_range(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                     _ => 0.0,
                 };
                 if (x < min - slack(min) || x > max + slack(max)) && told.insert(v.index) {
-                    findings.add(
-                        v.place(),
-                        format!(
-                            "it is {x} after {step} steps of an ordinary run ({}) (allowed by its min \
+                    findings.at(v.place()).add(format!(
+                        "it is {x} after {step} steps of an ordinary run ({}) (allowed by its min \
                              and max: {min} to {max})",
-                            FmuUnderTest::name(interface)
-                        ),
-                    );
+                        FmuUnderTest::name(interface)
+                    ));
                 }
             }
         }
@@ -71,7 +68,6 @@ fn refusal(fmu: &FmuUnderTest, v: &Variable, value: &Reading) -> Result<Result<(
 }
 
 pub fn limits_exact(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    /// Relative distance of a value just outside a bound.
     const JUST: f64 = 1e-6;
     /// Distance from a bound at which an Integer is outside any reasonable range.
     const FAR: f64 = 1000.0;
@@ -103,13 +99,10 @@ pub fn limits_exact(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                 continue;
             }
             if refusal(fmu, v, &at(near))?.is_ok() {
-                findings.add(
-                    v.place(),
-                    format!(
-                        "{near} is accepted, and {far} refused: the binary's range is wider than \
+                findings.at(v.place()).add(format!(
+                    "{near} is accepted, and {far} refused: the binary's range is wider than \
                          {name}={bound} says (allowed: the same range)"
-                    ),
-                );
+                ));
             }
         }
     }
@@ -123,8 +116,7 @@ pub fn items_known(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let all: Vec<&Variable> =
         fmu.variables().iter().filter(|v| v.kind == Type::Enumeration).collect();
     if all.is_empty() {
-        findings.skip("it has no enumerations");
-        return Ok(());
+        return skip("it has no enumerations");
     }
     fmu.chose_values();
     for v in all.iter().filter(|v| v.is_set_by_hosts() && start_value(v).is_some()) {
@@ -139,28 +131,25 @@ pub fn items_known(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                     .any(|o| o.name != v.name && mentions(&why.to_string(), &o.name))
             {
                 findings
-                    .add(v.place(), format!("{item} is an item of its type, but refused: {why}"));
+                    .at(v.place())
+                    .add(format!("{item} is an item of its type, but refused: {why}"));
             }
         }
         // Reported are types with further items; a type that accepts any number is reported by another rule.
         let beyond = last.saturating_add(1000);
         let takes_any = refusal(fmu, v, &Reading::Integer(beyond))?.is_ok();
         if takes_any {
-            findings.add(
-                v.place(),
-                format!("{beyond} is accepted, and no item of its type (allowed: {list})"),
-            );
+            findings
+                .at(v.place())
+                .add(format!("{beyond} is accepted, and no item of its type (allowed: {list})"));
             continue;
         }
         for other in first.saturating_sub(1)..=last.saturating_add(3) {
             if !known.contains(&other) && refusal(fmu, v, &Reading::Integer(other))?.is_ok() {
-                findings.fail(
-                    v.place(),
-                    format!(
-                        "{other} is accepted, and no item of its type in modelDescription.xml has \
+                findings.at(v.place()).fail(format!(
+                    "{other} is accepted, and no item of its type in modelDescription.xml has \
                          this value (items: {list})"
-                    ),
-                );
+                ));
             }
         }
     }
@@ -178,13 +167,10 @@ pub fn items_known(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                 && told.insert(v.index)
             {
                 let list = known.iter().map(i32::to_string).collect::<Vec<_>>().join(", ");
-                findings.fail(
-                    v.place(),
-                    format!(
-                        "it is {value}, and no item of its type in modelDescription.xml has this \
+                findings.at(v.place()).fail(format!(
+                    "it is {value}, and no item of its type in modelDescription.xml has this \
                          value (items: {list})"
-                    ),
-                );
+                ));
             }
         }
     };

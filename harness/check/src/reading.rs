@@ -8,7 +8,6 @@ use super::findings::Findings;
 
 const NAME: &str = "modelDescription.xml";
 
-/// A document type declaration (`<!DOCTYPE …>`).
 pub struct Doctype {
     pub line: usize,
     pub text: String,
@@ -73,11 +72,11 @@ pub fn utf8(archive: &Archive, findings: &mut Findings) {
     match encoding(bytes) {
         Some(encoding) if encoding.eq_ignore_ascii_case("UTF-8") => {}
         Some(other) => findings
-            .fail(format!("{NAME}, line 1"), format!("encoding=\"{other}\" (allowed: \"UTF-8\")")),
-        None => findings.warn(
-            format!("{NAME}, line 1"),
-            "no encoding is declared (allowed: <?xml version=\"1.0\" encoding=\"UTF-8\"?>)",
-        ),
+            .at(format!("{NAME}, line 1"))
+            .fail(format!("encoding=\"{other}\" (allowed: \"UTF-8\")")),
+        None => findings
+            .at(format!("{NAME}, line 1"))
+            .warn("no encoding is declared (allowed: <?xml version=\"1.0\" encoding=\"UTF-8\"?>)"),
     }
 }
 
@@ -88,14 +87,11 @@ pub fn doctype(archive: &Archive, findings: &mut Findings) {
     if let Some(doctype) = Doctype::find(bytes) {
         let start: String = doctype.text.chars().take(80).collect();
         let danger = doctype.danger();
-        findings.add(
-            format!("{NAME}, line {}", doctype.line),
-            format!(
-                "{:?}: {danger} (allowed: no document type declaration and no entities but &lt; \
+        findings.at(format!("{NAME}, line {}", doctype.line)).add(format!(
+            "{:?}: {danger} (allowed: no document type declaration and no entities but &lt; \
                  &gt; &amp; &quot; &apos; and character references)",
-                start
-            ),
-        );
+            start
+        ));
     }
 }
 
@@ -104,7 +100,7 @@ pub fn size(archive: &Archive, findings: &mut Findings) {
         return findings.skip("there is no modelDescription.xml that can be unpacked");
     };
     if let Err(Fault::TooLarge(why)) = Element::parse(bytes) {
-        findings.add(NAME, why);
+        findings.at(NAME).add(why);
     }
 }
 

@@ -32,7 +32,6 @@ impl Report {
         more + self.all().filter(|(_, finding)| finding.severity == severity).count()
     }
 
-    /// Iterates over all stored findings, each with its rule.
     pub fn all(&self) -> impl Iterator<Item = (&'static Rule, &Finding)> {
         self.outcomes.iter().flat_map(|o| o.findings.list.iter().map(move |f| (o.rule, f)))
     }

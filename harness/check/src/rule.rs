@@ -28,7 +28,6 @@ pub(crate) const fn rule(
     Rule { id, title, source, severity, check }
 }
 
-/// The function that checks a rule, by its input.
 pub enum Check {
     Archive(fn(&Archive, &mut Findings)),
     Description(fn(&Description, &mut Findings)),
@@ -37,7 +36,6 @@ pub enum Check {
     /// a finding.
     Calls(fn(&FmuUnderTest, &mut Findings) -> Result<()>),
     Description3(fn(&v3::Description, &mut Findings)),
-    Binaries3(fn(&v3::Binaries, &mut Findings)),
     Calls3(fn(&v3::Subject, &mut Findings) -> Result<()>),
 }
 

@@ -15,10 +15,8 @@ pub enum Written {
     Double,
     Time,
     Long,
-    /// Any number of such values, separated by spaces.
     List(&'static Written),
     OneOf(&'static [&'static str]),
-    /// Any number of these words, separated by spaces.
     Words(&'static [&'static str]),
 }
 
@@ -59,7 +57,6 @@ pub(crate) const DEPENDENCY: Written =
     Words(&["dependent", "constant", "fixed", "tunable", "discrete"]);
 const TYPES: &[&str] = &["Real", "Integer", "Boolean", "String", "Enumeration"];
 
-/// Creates an entry of the table.
 pub const fn kind(
     names: &'static str,
     needed: Attributes,
@@ -70,13 +67,11 @@ pub const fn kind(
 }
 
 impl Kind {
-    /// Adds optional attributes before those of [`kind`].
     pub const fn and(mut self, shared: Attributes) -> Kind {
         self.optional[0] = shared;
         self
     }
 
-    /// Adds optional attributes after those of [`kind`].
     pub const fn then(mut self, more: Attributes) -> Kind {
         self.optional[2] = more;
         self
@@ -91,11 +86,9 @@ impl Kind {
     }
 }
 
-/// Attributes of BaseUnit in both versions.
 #[rustfmt::skip]
 pub const BASE_UNIT: Attributes = &[("kg", Int), ("m", Int), ("s", Int), ("A", Int), ("K", Int), ("mol", Int),
     ("cd", Int), ("rad", Int), ("factor", Double), ("offset", Double)];
-/// Attributes of DefaultExperiment in both versions.
 pub const EXPERIMENT: Attributes =
     &[("startTime", Double), ("stopTime", Double), ("tolerance", Double), ("stepSize", Double)];
 
@@ -197,7 +190,6 @@ impl Written {
         }
     }
 
-    /// Describes the allowed values for a finding.
     fn allowed(self) -> String {
         match self {
             Text => "any text".into(),
@@ -265,7 +257,7 @@ pub fn structure(description: &Description, findings: &mut Findings) {
 /// Checks the tree below `root` against the elements of `kinds`, the table of one FMI version.
 pub fn structure_by(kinds: &'static [Kind], root: &Element, findings: &mut Findings) {
     if root.name != "fmiModelDescription" {
-        return findings.add(place(root), "the root element is not fmiModelDescription");
+        return findings.at(place(root)).add("the root element is not fmiModelDescription");
     }
     elements(kinds, "", root, findings);
 }
@@ -286,15 +278,14 @@ fn elements(kinds: &'static [Kind], parent: &str, element: &Element, findings: &
         {
             let all: Vec<_> = kind.attributes().map(|(name, _)| *name).collect();
             let all = if all.is_empty() { "none".to_string() } else { all.join(", ") };
-            findings.add(
-                place(element),
-                format!("the schema has no attribute {attribute} (allowed: {all})"),
-            );
+            findings
+                .at(place(element))
+                .add(format!("the schema has no attribute {attribute} (allowed: {all})"));
         }
     }
     for (name, _) in kind.needed {
         if element.get(name).is_none() {
-            findings.add(place(element), format!("the attribute {name} is missing"));
+            findings.at(place(element)).add(format!("the attribute {name} is missing"));
         }
     }
     children(kind, element, findings);
@@ -311,10 +302,9 @@ fn children(kind: &Kind, element: &Element, findings: &mut Findings) {
             0 => "nothing".to_string(),
             _ => allowed.join(", ").replace('!', ""),
         };
-        findings.add(
-            place(child),
-            format!("it is not allowed in {} (allowed: {allowed})", element.name),
-        );
+        findings
+            .at(place(child))
+            .add(format!("it is not allowed in {} (allowed: {allowed})", element.name));
     };
     match kind.children {
         Any => {}
@@ -323,14 +313,11 @@ fn children(kind: &Kind, element: &Element, findings: &mut Findings) {
             for child in &element.children {
                 match names.iter().position(|name| *name == child.name) {
                     None => unknown(child, names, findings),
-                    Some(at) if at < reached => findings.add(
-                        place(child),
-                        format!(
-                            "it stands after {} (allowed order: {})",
-                            names[reached],
-                            names.join(", ")
-                        ),
-                    ),
+                    Some(at) if at < reached => findings.at(place(child)).add(format!(
+                        "it stands after {} (allowed order: {})",
+                        names[reached],
+                        names.join(", ")
+                    )),
                     Some(at) => reached = at,
                 }
             }
@@ -338,7 +325,9 @@ fn children(kind: &Kind, element: &Element, findings: &mut Findings) {
         Many(names) => {
             if element.children.is_empty() {
                 let one = if let [name] = names { name } else { "element" };
-                findings.add(place(element), format!("it is empty (allowed: one {one} or more)"));
+                findings
+                    .at(place(element))
+                    .add(format!("it is empty (allowed: one {one} or more)"));
             }
             for child in element.children.iter().filter(|c| !names.contains(&&*c.name)) {
                 unknown(child, names, findings);
@@ -354,24 +343,21 @@ fn children(kind: &Kind, element: &Element, findings: &mut Findings) {
                     continue;
                 };
                 if seen.contains(&&*child.name) {
-                    findings.add(place(child), "it is there twice (allowed: once)");
+                    findings.at(place(child)).add("it is there twice (allowed: once)");
                 } else if at < reached && child.name != "ModelExchange" {
                     // The two interfaces may come in any order.
-                    findings.add(
-                        place(child),
-                        format!(
-                            "it stands after {} (allowed order: {})",
-                            names[reached].trim_start_matches('!'),
-                            names.join(", ").replace('!', "")
-                        ),
-                    );
+                    findings.at(place(child)).add(format!(
+                        "it stands after {} (allowed order: {})",
+                        names[reached].trim_start_matches('!'),
+                        names.join(", ").replace('!', "")
+                    ));
                 }
                 reached = reached.max(at);
                 seen.push(&child.name);
             }
             for name in names.iter().filter_map(|name| name.strip_prefix('!')) {
                 if !seen.contains(&name) {
-                    findings.add(place(element), format!("the element {name} is missing"));
+                    findings.at(place(element)).add(format!("the element {name} is missing"));
                 }
             }
         }
@@ -379,10 +365,10 @@ fn children(kind: &Kind, element: &Element, findings: &mut Findings) {
             let chosen = element.children.iter().filter(|child| choice.contains(&&*child.name));
             let count = chosen.count();
             if !choice.is_empty() && count != 1 {
-                findings.add(
-                    place(element),
-                    format!("{count} types are given (allowed: one of {})", choice.join(", ")),
-                );
+                findings.at(place(element)).add(format!(
+                    "{count} types are given (allowed: one of {})",
+                    choice.join(", ")
+                ));
             }
             let all = [choice, rest].concat();
             let mut reached = 0;
@@ -391,10 +377,9 @@ fn children(kind: &Kind, element: &Element, findings: &mut Findings) {
                     None => unknown(child, &all, findings),
                     // The type element comes first, whichever type it is.
                     Some(at) if at.max(choice.len().saturating_sub(1)) < reached => {
-                        findings.add(
-                            place(child),
-                            format!("it stands too late (allowed order: {})", all.join(", ")),
-                        );
+                        findings
+                            .at(place(child))
+                            .add(format!("it stands too late (allowed order: {})", all.join(", ")));
                     }
                     Some(at) => reached = reached.max(at.max(choice.len().saturating_sub(1))),
                 }
@@ -418,7 +403,7 @@ fn value(kinds: &'static [Kind], parent: &str, element: &Element, findings: &mut
     for (name, written) in kind.attributes() {
         if let Some(value) = element.get(name).filter(|value| !written.fits(value)) {
             let allowed = written.allowed();
-            findings.add(place(element), format!("{name}=\"{value}\" (allowed: {allowed})"));
+            findings.at(place(element)).add(format!("{name}=\"{value}\" (allowed: {allowed})"));
         }
     }
     if !matches!(kind.children, Any) {

@@ -47,7 +47,6 @@ fn rolls_back<F: UnderTest>(fmu: &F, using: F::Use) -> Result<()> {
     }
 }
 
-/// `states.rollback`, and in FMI 3.0 `states.restore`.
 pub fn rollback<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
     let call = |verb: &str| format!("{}{verb}{}", F::FMI, F::STATE);
     for using in with(fmu, SAVE, findings) {
@@ -63,11 +62,11 @@ pub fn rollback<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
         let restored = session.readings()?;
         let set = format!("after {} ({})", call("Set"), F::name(using));
         if let Some(text) = session.difference(&restored, &before) {
-            findings.add(format!("right {set}"), text);
+            findings.at(format!("right {set}")).add(text);
         }
         let second = continued::<F>(&mut session, &here)?;
         if let Some(text) = session.difference(&second, &first) {
-            findings.add(format!("{STEPS} steps {set}"), text);
+            findings.at(format!("{STEPS} steps {set}")).add(text);
         }
         fmu.doing(call("Free"));
         session.instance().free_state(state)?;
@@ -88,7 +87,9 @@ pub fn handle(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         let second = continued::<FmuUnderTest>(&mut session, &here)?;
         if let Some(text) = session.difference(&second, &first) {
             rolls_back(fmu, interface)?;
-            findings.add(format!("a handle used again ({})", FmuUnderTest::name(interface)), text);
+            findings
+                .at(format!("a handle used again ({})", FmuUnderTest::name(interface)))
+                .add(text);
         }
         session.instance.free_state(state)?;
         fmu.doing("fmi2FreeFMUstate of NULL");
@@ -106,10 +107,9 @@ pub fn bytes(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             fmu.doing("fmi2SerializeFMUstate");
             let bytes = session.instance.serialize(&state)?;
             if session.instance.serialize(&state)? != bytes {
-                findings.add(
-                    "fmi2SerializeFMUstate",
-                    "the same state gives other bytes the second time",
-                );
+                findings
+                    .at("fmi2SerializeFMUstate")
+                    .add("the same state gives other bytes the second time");
             }
             session.instance.free_state(state)?;
             let here = session.mark();
@@ -132,7 +132,7 @@ pub fn bytes(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             if let Some(text) = other.difference(&second, &first) {
                 let place = format!("{} ({})", fmu.now(), FmuUnderTest::name(interface));
                 rolls_back(fmu, interface)?;
-                findings.add(place, text);
+                findings.at(place).add(text);
             }
             other.instance.free_state(state)?;
         }
@@ -176,20 +176,20 @@ pub fn garbage(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                 }
             };
             if accepted {
-                findings.add(place, "it is accepted (allowed: fmi2Error)");
+                findings.at(place).add("it is accepted (allowed: fmi2Error)");
                 break;
             }
             // After an error the FMU may refuse to be read.
             if let Ok(after) = session.readings()
                 && let Some(text) = session.difference(&after, &before)
             {
-                findings.add(place, format!("it is refused, but {text}"));
+                findings.at(place).add(format!("it is refused, but {text}"));
             }
         }
         let mut session = fmu.running(interface)?;
         fmu.doing("fmi2SetFMUstate(NULL)");
         if session.instance.set_state_null().is_ok() {
-            findings.add(fmu.now(), "it is accepted (allowed: fmi2Error)");
+            findings.at(fmu.now()).add("it is accepted (allowed: fmi2Error)");
         }
     }
     Ok(())
@@ -210,7 +210,7 @@ pub fn modes(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                 session.instance.free_state(state).and(set)
             });
             if let Err(error) = done {
-                findings.add(place, error.to_string());
+                findings.at(place).add(error.to_string());
             }
         }
     }

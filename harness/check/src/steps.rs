@@ -6,6 +6,7 @@ use super::dependencies::displaced;
 use super::description::Variable;
 use super::findings::Findings;
 use super::life::expect_refusal;
+use super::loaded::skip;
 use super::under_test::{
     FmuUnderTest, Interface, Life, Reading, STEPS, Session, UnderTest, Unusable,
 };
@@ -13,41 +14,27 @@ use host::causality::Causality;
 use host::fmi2::{CallError, Status};
 
 /// Returns an initialised instance for Co-Simulation, or skips the rule if the FMU has no Co-Simulation.
-fn stepping<'f>(fmu: &'f FmuUnderTest, findings: &mut Findings) -> Result<Option<Session<'f>>> {
+fn stepping(fmu: &FmuUnderTest) -> Result<Session<'_>> {
     if !fmu.interfaces().contains(&Interface::CoSimulation) {
-        findings.skip("it offers no Co-Simulation");
-        return Ok(None);
+        return skip("it offers no Co-Simulation");
     }
-    fmu.running(Interface::CoSimulation).map(Some)
+    fmu.running(Interface::CoSimulation)
 }
 
 /// Returns an instance for Co-Simulation after three ordinary steps. If they fail, other rules report it.
-fn after_three_steps<'f>(
-    fmu: &'f FmuUnderTest,
-    findings: &mut Findings,
-) -> Result<Option<Session<'f>>> {
-    if let Some(mut session) = stepping(fmu, findings)? {
-        session.advance(3)?;
-        if session.is_ended() {
-            let why = "it asks for the end of the simulation in its first steps".into();
-            return Err(Unusable { rule: "steps.terminated", why }.into());
-        }
+fn after_three_steps(fmu: &FmuUnderTest) -> Result<Session<'_>> {
+    let mut session = stepping(fmu)?;
+    session.advance(3)?;
+    if session.is_ended() {
+        let why = "it asks for the end of the simulation in its first steps".into();
+        return Err(Unusable { rule: "steps.terminated", why }.into());
     }
-    stepping(fmu, findings)
-}
-
-/// Returns true if the FMU accepts steps of any size; otherwise skips the rule.
-fn variable_steps(fmu: &FmuUnderTest, findings: &mut Findings) -> bool {
-    let can = fmu.can(Interface::CoSimulation, "canHandleVariableCommunicationStepSize");
-    if !can {
-        findings.skip("canHandleVariableCommunicationStepSize is not declared");
-    }
-    can
+    stepping(fmu)
 }
 
 pub fn run(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     const LONG: usize = 200;
-    let Some(mut session) = stepping(fmu, findings)? else { return Ok(()) };
+    let mut session = stepping(fmu)?;
     for _ in 0..LONG {
         if session.is_ended() {
             break;
@@ -60,7 +47,7 @@ pub fn run(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             true => " (allowed: fmi2Discard only with fmi2Terminated; two hosts try for ever)",
             false => "",
         };
-        findings.add(fmu.now(), format!("{error}{allowed}"));
+        findings.at(fmu.now()).add(format!("{error}{allowed}"));
         return Ok(());
     }
     let readings = session.readings()?;
@@ -69,7 +56,8 @@ pub fn run(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             && !x.is_finite()
         {
             findings
-                .add(v.place(), format!("it is {x} after {LONG} steps, which all returned fmi2OK"));
+                .at(v.place())
+                .add(format!("it is {x} after {LONG} steps, which all returned fmi2OK"));
         }
     }
     Ok(())
@@ -78,7 +66,7 @@ pub fn run(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 pub fn size(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     for h in [0.0, -0.01, f64::INFINITY, f64::NAN] {
         // After an error the FMU may refuse every call, so that each step size needs a new instance.
-        let Some(mut session) = after_three_steps(fmu, findings)? else { return Ok(()) };
+        let mut session = after_three_steps(fmu)?;
         session.advance(3)?;
         let before = session.readings()?;
         let place = format!("fmi2DoStep with communicationStepSize = {h:?}");
@@ -95,7 +83,7 @@ pub fn size(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             && let Ok(after) = session.readings()
             && let Some(text) = session.difference(&after, &before)
         {
-            findings.add(&place, format!("it is refused, but {text}"));
+            findings.at(&place).add(format!("it is refused, but {text}"));
         }
     }
     Ok(())
@@ -103,7 +91,7 @@ pub fn size(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 
 pub fn point(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     for off in [2.0, -1.0, f64::NAN] {
-        let Some(mut session) = after_three_steps(fmu, findings)? else { return Ok(()) };
+        let mut session = after_three_steps(fmu)?;
         session.advance(3)?;
         let wrong = session.time + off * session.step;
         let place = format!("fmi2DoStep from {wrong:?} s, {:?} s being reached", session.time);
@@ -116,7 +104,7 @@ pub fn point(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 
 pub fn wobble(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     const LONG: usize = 200;
-    let Some(mut session) = after_three_steps(fmu, findings)? else { return Ok(()) };
+    let mut session = after_three_steps(fmu)?;
     let (start, h) = (session.time, session.step);
     for n in 0..LONG {
         // n·h and t + h differ by rounding; some hosts pass the first and some the second.
@@ -132,7 +120,7 @@ pub fn wobble(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             if session.has_terminated(&error) {
                 break;
             }
-            findings.add(fmu.now(), format!("{error} (allowed: some ulps either way)"));
+            findings.at(fmu.now()).add(format!("{error} (allowed: some ulps either way)"));
             return Ok(());
         }
     }
@@ -147,9 +135,9 @@ pub fn start_time(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             let mut session = fmu.session(interface)?;
             let place = format!("start time {start} s ({})", FmuUnderTest::name(interface));
             if let Err(error) = session.initialise_at(start, None, fmu.experiment().tolerance) {
-                findings.add(place, error.to_string());
+                findings.at(place).add(error.to_string());
             } else if let Err(error) = session.advance(STEPS) {
-                findings.add(place, error.to_string());
+                findings.at(place).add(error.to_string());
             }
         }
     }
@@ -157,19 +145,16 @@ pub fn start_time(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 }
 
 pub fn stop_time(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    if after_three_steps(fmu, findings)?.is_none() {
-        return Ok(());
-    }
+    after_three_steps(fmu)?;
     let experiment = fmu.experiment();
     let stop = experiment.start + STEPS as f64 * experiment.step;
     let mut session = fmu.session(Interface::CoSimulation)?;
     session.initialise_at(experiment.start, Some(stop), experiment.tolerance)?;
     // The sum of the steps differs from the stop time by rounding.
     if let Err(error) = session.advance(STEPS) {
-        findings.add(
-            fmu.now(),
-            format!("{error} (the stop time is {stop:?} s; rounding must be forgiven)"),
-        );
+        findings
+            .at(fmu.now())
+            .add(format!("{error} (the stop time is {stop:?} s; rounding must be forgiven)"));
         return Ok(());
     }
     let place = format!("fmi2DoStep past the stop time {stop} s");
@@ -202,7 +187,7 @@ pub fn tolerance(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         let of_this = fails.iter().filter(|(i, ..)| *i == interface);
         if of_this.clone().count() < 3 {
             for (_, place, error) in of_this {
-                findings.add(place, error.to_string());
+                findings.at(place).add(error.to_string());
             }
         }
     }
@@ -213,14 +198,10 @@ pub fn cut(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     /// Allowed multiple of the tolerance, because the errors of many steps add up and the tolerance is for
     /// one step.
     const SLACK: f64 = 1e3;
-    let Some(session) = after_three_steps(fmu, findings)? else { return Ok(()) };
-    drop(session);
-    if !variable_steps(fmu, findings) {
-        return Ok(());
-    }
+    after_three_steps(fmu)?;
+    fmu.require(Interface::CoSimulation, STEP_SIZES)?;
     let Some(tolerance) = fmu.experiment().tolerance else {
-        findings.skip("no tolerance is suggested");
-        return Ok(());
+        return skip("no tolerance is suggested");
     };
     // The same inputs, held constant during each long step.
     let run = |parts: usize| -> Result<(Vec<f64>, Vec<f64>)> {
@@ -250,13 +231,10 @@ pub fn cut(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             let allowed = SLACK * tolerance * scale[n].max(1e-3 * v.nominal());
             let off = (whole[n] - cut[n]).abs();
             if off > allowed {
-                findings.add(
-                    v.place(),
-                    format!(
+                findings.at(v.place()).add(format!(
                         "{} after {STEPS} steps, {} after {} shorter ones: {off:.1e} off (allowed: {allowed:.1e})",
                         whole[n], cut[n], parts * STEPS
-                    ),
-                );
+                    ));
             }
         }
         if !findings.list.is_empty() {
@@ -274,9 +252,7 @@ pub fn lag(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     /// Fraction of this change by which a value may differ from that of one step earlier and still count as
     /// the same.
     const SAME: f64 = 0.02;
-    let Some(session) = after_three_steps(fmu, findings)? else { return Ok(()) };
-    let usual = session.step;
-    drop(session);
+    let usual = after_three_steps(fmu)?.step;
     let states: Vec<&Variable> = fmu.states().into_iter().map(|(_, state)| state).collect();
     let is_state = |v: &Variable| states.iter().any(|state| state.index == v.index);
     let is_watched = |v: &&Variable| {
@@ -309,8 +285,7 @@ pub fn lag(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         Err(error) => match error.downcast::<Unusable>() {
             Ok(unusable) => return Err(unusable.into()),
             Err(_) => {
-                findings.skip("it refuses steps of half and of twice the usual size");
-                return Ok(());
+                return skip("it refuses steps of half and of twice the usual size");
             }
         },
     };
@@ -334,8 +309,8 @@ pub fn lag(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                 time - 0.5 * step
             );
             match is_state(v) || v.causality == Causality::Independent {
-                true => findings.fail(v.place(), text),
-                false => findings.add(v.place(), text),
+                true => findings.at(v.place()).fail(text),
+                false => findings.at(v.place()).add(text),
             }
         }
     }
@@ -343,12 +318,11 @@ pub fn lag(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 }
 
 pub fn inputs(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let Some(mut session) = after_three_steps(fmu, findings)? else { return Ok(()) };
+    let mut session = after_three_steps(fmu)?;
     let inputs: Vec<_> =
         fmu.variables().iter().filter(|v| v.causality == Causality::Input && v.is_real()).collect();
     if inputs.is_empty() {
-        findings.skip("it has no Real inputs");
-        return Ok(());
+        return skip("it has no Real inputs");
     }
     for v in &inputs {
         let mut session = fmu.running(Interface::CoSimulation)?;
@@ -357,7 +331,7 @@ pub fn inputs(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             session.set(v, &Reading::Real(f64::NAN)).is_err() || session.go(session.step).is_err()
         });
         if !refused {
-            findings.add(place, "fmi2OK (allowed: fmi2Error and a message)");
+            findings.at(place).add("fmi2OK (allowed: fmi2Error and a message)");
         }
     }
     let can = fmu.can(Interface::CoSimulation, "canInterpolateInputs");
@@ -366,7 +340,7 @@ pub fn inputs(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         fmu.doing(&place);
         let set = session.instance.set_real_input_derivatives(&[v.reference], &[1], &[0.0]);
         if let Err(error) = set {
-            findings.add(place, format!("{error}, but canInterpolateInputs is declared"));
+            findings.at(place).add(format!("{error}, but canInterpolateInputs is declared"));
         }
     }
     Ok(())
@@ -378,13 +352,8 @@ pub fn input_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<
     /// If the difference between a held input and one with a slope is below this fraction of the held input's
     /// effect, the FMU ignores the slope.
     const IGNORED: f64 = 0.05;
-    if after_three_steps(fmu, findings)?.is_none() {
-        return Ok(());
-    }
-    if !fmu.can(Interface::CoSimulation, "canInterpolateInputs") {
-        findings.skip("canInterpolateInputs is not declared");
-        return Ok(());
-    }
+    after_three_steps(fmu)?;
+    fmu.require(Interface::CoSimulation, "canInterpolateInputs")?;
     let computed = |v: &&Variable| v.is_continuous() && !v.is_set_by_hosts();
     let computed: Vec<&Variable> = fmu.variables().iter().filter(computed).collect();
     let mut any = false;
@@ -442,14 +411,11 @@ pub fn input_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<
         }
     }
     for (input, first) in ignored.into_iter().filter(|_| !acts) {
-        findings.add(
-            format!("fmi2SetRealInputDerivatives of {}", input.name),
-            format!(
-                "fmi2OK, but {} and what else follows this input within a step do not follow its \
+        findings.at(format!("fmi2SetRealInputDerivatives of {}", input.name)).add(format!(
+            "fmi2OK, but {} and what else follows this input within a step do not follow its \
                  slope (allowed: a derivative that acts, since canInterpolateInputs is declared)",
-                first.name
-            ),
-        );
+            first.name
+        ));
     }
     if !any {
         findings.skip("it has no continuous inputs that can be moved");
@@ -458,12 +424,11 @@ pub fn input_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<
 }
 
 pub fn output_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let Some(mut session) = after_three_steps(fmu, findings)? else { return Ok(()) };
+    let mut session = after_three_steps(fmu)?;
     let interface = fmu.description().co_simulation.as_ref();
     let order = interface.and_then(|i| i.number("maxOutputDerivativeOrder")).unwrap_or(0.0);
     if order < 1.0 {
-        findings.skip("maxOutputDerivativeOrder is 0");
-        return Ok(());
+        return skip("maxOutputDerivativeOrder is 0");
     }
     let outputs = &fmu.outputs;
     let references: Vec<u32> = outputs.iter().map(|v| v.reference).collect();
@@ -475,7 +440,7 @@ pub fn output_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result
         &vec![1; outputs.len()],
         &mut declared,
     )?;
-    if !fmu.can(Interface::CoSimulation, "canHandleVariableCommunicationStepSize") {
+    if !fmu.can(Interface::CoSimulation, STEP_SIZES) {
         return Ok(());
     }
     // Differences over two short steps with held inputs. Where the two disagree, the output is not smooth.
@@ -503,27 +468,22 @@ pub fn output_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result
                 declared[n]
             );
             match declared[n] * at_start < 0.0 && at_start.abs() > rounding {
-                true => findings.fail(v.place(), format!("{text}: the sign is wrong")),
-                false => findings.add(v.place(), text),
+                true => findings.at(v.place()).fail(format!("{text}: the sign is wrong")),
+                false => findings.at(v.place()).add(text),
             }
         }
     }
     Ok(())
 }
 
-const VARIABLE: &str = "canHandleVariableCommunicationStepSize is declared";
+const STEP_SIZES: &str = "canHandleVariableCommunicationStepSize";
 
 pub fn small(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     /// Step sizes that are tried instead of the usual one, s.
     const SMALL: [f64; 2] = [4e-4, 1e-5];
-    /// Largest number of steps in one run.
     const MOST: f64 = 5000.0;
-    let Some(session) = after_three_steps(fmu, findings)? else { return Ok(()) };
-    let usual = session.step;
-    drop(session);
-    if !variable_steps(fmu, findings) {
-        return Ok(());
-    }
+    let usual = after_three_steps(fmu)?.step;
+    fmu.require(Interface::CoSimulation, STEP_SIZES)?;
     let experiment = fmu.experiment();
     let continuous = |v: &&Variable| v.is_continuous() && !v.is_set_by_hosts();
     let all: Vec<&Variable> = fmu.variables().iter().filter(continuous).collect();
@@ -562,7 +522,9 @@ pub fn small(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         let (_, small) = match run(time / count, count as usize)? {
             Some(Ok(ends)) => ends,
             Some(Err(why)) => {
-                findings.add("fmi2DoStep", format!("{why} (allowed: fmi2OK, since {VARIABLE})"));
+                findings
+                    .at("fmi2DoStep")
+                    .add(format!("{why} (allowed: fmi2OK, since {STEP_SIZES} is declared)"));
                 break;
             }
             None => continue,
@@ -574,18 +536,15 @@ pub fn small(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             // The accuracy of the two runs is the subject of steps.cut.
             let stays = (small[n] - before[n]).abs() <= 0.05 * moved.abs();
             if moved.abs() > visible && stays {
-                findings.add(
-                    v.place(),
-                    format!(
+                findings.at(v.place()).add(format!(
                         "its value goes from {} to {} in {steps} steps of {:.1e} s, but to {} in {count} steps of {:.1e} s over \
-                         the same time (required: results that do not depend on the step, since {VARIABLE})",
+                         the same time (required: results that do not depend on the step, since {STEP_SIZES} is declared)",
                         before[n],
                         usually[n],
                         time / steps,
                         small[n],
                         time / count
-                    ),
-                );
+                    ));
             }
         }
         if !findings.list.is_empty() {
@@ -596,13 +555,11 @@ pub fn small(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 }
 
 pub fn output_derivative_order(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let Some(session) = after_three_steps(fmu, findings)? else { return Ok(()) };
-    drop(session);
+    after_three_steps(fmu)?;
     let interface = fmu.description().co_simulation.as_ref();
     let most = interface.and_then(|i| i.number("maxOutputDerivativeOrder")).unwrap_or(0.0);
     if most < 1.0 {
-        findings.skip("maxOutputDerivativeOrder is 0");
-        return Ok(());
+        return skip("maxOutputDerivativeOrder is 0");
     }
     let outputs = &fmu.outputs;
     for order in 1..=most.min(10.0) as i32 {
@@ -620,17 +577,16 @@ pub fn output_derivative_order(fmu: &FmuUnderTest, findings: &mut Findings) -> R
                 Ok(()) if !value[0].is_finite() => format!("it is {}", value[0]),
                 Ok(()) => continue,
             };
-            findings.add(
-                place,
-                format!("{fault} (allowed: fmi2OK up to maxOutputDerivativeOrder={most})"),
-            );
+            findings
+                .at(place)
+                .add(format!("{fault} (allowed: fmi2OK up to maxOutputDerivativeOrder={most})"));
         }
     }
     Ok(())
 }
 
 pub fn terminated(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let Some(mut session) = stepping(fmu, findings)? else { return Ok(()) };
+    let mut session = stepping(fmu)?;
     report_early_end(&mut session, findings)
 }
 
@@ -657,9 +613,9 @@ pub fn report_early_end(session: &mut Session, findings: &mut Findings) -> Resul
          at that time, or for a reason that a user can see)"
     );
     if session.count <= 1 {
-        findings.fail(place, text);
+        findings.at(place).fail(text);
     } else if experiment.stop.is_some() {
-        findings.add(place, text);
+        findings.at(place).add(text);
     }
     Ok(())
 }

@@ -22,17 +22,16 @@ fn compare(
         let place = format!("line {}, {list}, {}", unknown.line, d.name_of(unknown.index));
         // An index out of range is reported by another rule.
         if d.at(unknown.index).is_some() && !expected.contains(&unknown.index) {
-            findings.add(&place, format!("it is not allowed here (allowed: {why})"));
+            findings.at(&place).add(format!("it is not allowed here (allowed: {why})"));
         }
         if !seen.insert(unknown.index) {
-            findings.add(&place, "it is listed already");
+            findings.at(&place).add("it is listed already");
         }
     }
     for missing in expected.difference(&seen) {
-        findings.add(
-            format!("{list}, {}", d.name_of(*missing)),
-            format!("it is missing (required: {why})"),
-        );
+        findings
+            .at(format!("{list}, {}", d.name_of(*missing)))
+            .add(format!("it is missing (required: {why})"));
     }
 }
 
@@ -55,19 +54,19 @@ pub fn derivatives(d: &Description, findings: &mut Findings) {
         let Some(v) = d.at(unknown.index) else { continue };
         let place = format!("line {}, Derivatives, {}", unknown.line, v.name);
         let Some(state) = v.derivative_of() else {
-            findings.add(&place, "it has no attribute derivative, so its state is unknown");
+            findings.at(&place).add("it has no attribute derivative, so its state is unknown");
             continue;
         };
         if !seen.insert(unknown.index) {
-            findings.add(&place, "it is listed already");
+            findings.at(&place).add("it is listed already");
         } else if let Some(other) = taken.insert(state, &v.name) {
-            findings.add(&place, format!("{other} is the derivative of the same state"));
+            findings.at(&place).add(format!("{other} is the derivative of the same state"));
         }
         if let Some(state) =
             d.at(state).filter(|state| !(v.is_continuous() && state.is_continuous()))
         {
             let text = format!("it and its state {} must be continuous Reals", state.name);
-            findings.add(&place, text);
+            findings.at(&place).add(text);
         }
     }
 }
@@ -97,15 +96,16 @@ pub fn initial_unknowns(d: &Description, findings: &mut Findings) {
     compare(d, findings, "InitialUnknowns", &d.initial_unknowns, &expected, why);
     for pair in d.initial_unknowns.windows(2) {
         if pair[1].index < pair[0].index {
-            findings.add(
-                format!("line {}, InitialUnknowns, {}", pair[1].line, d.name_of(pair[1].index)),
-                format!("index {} after {} (required: ascending)", pair[1].index, pair[0].index),
-            );
+            findings
+                .at(format!("line {}, InitialUnknowns, {}", pair[1].line, d.name_of(pair[1].index)))
+                .add(format!(
+                    "index {} after {} (required: ascending)",
+                    pair[1].index, pair[0].index
+                ));
         }
     }
 }
 
-/// Returns the three lists of ModelStructure with their names.
 fn lists(d: &Description) -> [(&'static str, &[Unknown]); 3] {
     [
         ("Outputs", &d.outputs),
@@ -120,10 +120,10 @@ pub fn indices_in_range(d: &Description, findings: &mut Findings) {
         for unknown in unknowns {
             let place = format!("line {}, {list}", unknown.line);
             if d.at(unknown.index).is_none() {
-                findings.add(&place, format!("index {} (allowed: 1 to {count})", unknown.index));
+                findings.at(&place).add(format!("index {} (allowed: 1 to {count})", unknown.index));
             }
             for index in unknown.dependencies.iter().flatten().filter(|i| d.at(**i).is_none()) {
-                findings.add(&place, format!("dependency {index} (allowed: 1 to {count})"));
+                findings.at(&place).add(format!("dependency {index} (allowed: 1 to {count})"));
             }
         }
     }
@@ -137,22 +137,23 @@ pub fn dependencies(d: &Description, findings: &mut Findings) {
             let dependencies = unknown.dependencies.as_deref().unwrap_or_default();
             if let Some(kinds) = &unknown.kinds {
                 if unknown.dependencies.is_none() {
-                    findings.add(&place, "dependenciesKind without dependencies");
+                    findings.at(&place).add("dependenciesKind without dependencies");
                 } else if kinds.len() != dependencies.len() {
                     let (kinds, all) = (kinds.len(), dependencies.len());
-                    findings.add(&place, format!("{all} dependencies, but {kinds} kinds of them"));
+                    findings
+                        .at(&place)
+                        .add(format!("{all} dependencies, but {kinds} kinds of them"));
                 }
                 let odd = kinds.iter().find(|k| !matches!(k.as_str(), "dependent" | "constant"));
                 if let Some(odd) = odd.filter(|_| initial) {
-                    findings.add(
-                        &place,
-                        format!("dependenciesKind {odd} (allowed: dependent, constant)"),
-                    );
+                    findings
+                        .at(&place)
+                        .add(format!("dependenciesKind {odd} (allowed: dependent, constant)"));
                 }
             }
             let distinct: BTreeSet<_> = dependencies.iter().collect();
             if distinct.len() < dependencies.len() {
-                findings.add(&place, "a dependency is listed twice");
+                findings.at(&place).add("a dependency is listed twice");
             }
         }
     }
@@ -180,7 +181,8 @@ pub fn dependencies_known(d: &Description, findings: &mut Findings) {
                     false => "inputs, continuous states, the independent variable",
                 };
                 findings
-                    .add(&place, format!("it cannot depend on {} (allowed: {allowed})", v.name));
+                    .at(&place)
+                    .add(format!("it cannot depend on {} (allowed: {allowed})", v.name));
             }
         }
     }
@@ -188,8 +190,7 @@ pub fn dependencies_known(d: &Description, findings: &mut Findings) {
 
 pub fn dependencies_written(d: &Description, findings: &mut Findings) {
     for unknown in d.outputs.iter().filter(|unknown| unknown.dependencies.is_none()) {
-        findings.add(
-            format!("line {}, Outputs, {}", unknown.line, d.name_of(unknown.index)),
+        findings.at(format!("line {}, Outputs, {}", unknown.line, d.name_of(unknown.index))).add(
             "no attribute dependencies: that means it depends on everything (write \
              dependencies=\"\" where there is no feedthrough)",
         );

@@ -16,12 +16,10 @@ pub enum Crash {
     ReportedBy(String),
 }
 
-/// A message to the parent process.
 #[derive(Serialize, Deserialize)]
 pub(super) enum Answer {
     /// The next call, and the meaning of a crash in it.
     Doing(String, Crash),
-    /// All findings; this is the last message.
     Done(Findings),
 }
 

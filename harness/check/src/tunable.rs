@@ -64,14 +64,16 @@ pub fn can_be_set(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                 fmu.doing(&place);
                 if let Err(error) = set_between_steps(&mut session, v, &value)? {
                     if value.is_identical(&start) || is_allowed(fmu, interface, v, &value)? {
-                        findings.add(place, format!("{error} (allowed: fmi2OK)"));
+                        findings.at(place).add(format!("{error} (allowed: fmi2OK)"));
                         break;
                     }
                     continue;
                 }
                 let read = session.get(v)?;
                 if !read.is_identical(&value) {
-                    findings.add(place, format!("it reads {read} afterwards (allowed: {value})"));
+                    findings
+                        .at(place)
+                        .add(format!("it reads {read} afterwards (allowed: {value})"));
                     break;
                 }
             }
@@ -139,7 +141,7 @@ pub fn acts(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                  acts)",
                 FmuUnderTest::name(interface)
             );
-            findings.add(v.place(), text);
+            findings.at(v.place()).add(text);
         }
     }
     if !any {

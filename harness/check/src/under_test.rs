@@ -31,7 +31,6 @@ const IMMEDIATE: usize = 3;
 const ASKED: usize = 20;
 /// Relative change of a state at an event below which it is rounding.
 const JUMP: f64 = 1e-9;
-/// Nominal value of a state that declares none.
 const UNKNOWN_NOMINAL: f64 = 1e-3;
 
 pub struct FmuUnderTest {
@@ -197,13 +196,11 @@ impl FmuUnderTest {
         self.make(is_once, || binary.instantiate_with(with))
     }
 
-    /// Returns the arguments of an ordinary call of fmi2Instantiate.
     pub fn arguments(&self, interface: Interface) -> Result<Instantiation<'_>> {
         let plain = self.binary(interface)?.instantiation("check");
         Ok(Instantiation { kind: kind(interface), ..plain })
     }
 
-    /// Creates an instance with the arguments `with`.
     pub fn session_with(&self, interface: Interface, with: &Instantiation) -> Result<Session<'_>> {
         let instance = self
             .instantiate(interface, with)?
@@ -351,7 +348,6 @@ impl Stage {
     }
 }
 
-/// Returns the value of `fmi2Type` for an interface.
 pub fn kind(interface: Interface) -> i32 {
     match interface {
         Interface::CoSimulation => CO_SIMULATION,
@@ -370,13 +366,11 @@ pub struct Session<'f> {
     /// Number of steps so far, from which the changing inputs follow.
     pub count: usize,
     next_event: Option<f64>,
-    /// Nominal values of the continuous states.
     nominals: Vec<f64>,
     /// Time and function by which the FMU has requested the end of the simulation.
     ended: Option<(f64, &'static str)>,
     /// The first time at which nextEventTime was in the past, and this nextEventTime, s.
     past_event: Option<(f64, f64)>,
-    /// Number of immediately successive events.
     immediate_events: usize,
     /// Result of the last event iteration: whether states, and whether their nominals, have changed.
     values_changed: bool,
@@ -500,7 +494,6 @@ impl<'f> Session<'f> {
         self.fmu.description.states().len()
     }
 
-    /// Returns the nominal value of a state.
     pub(super) fn nominal(&self, state: usize) -> f64 {
         self.nominals.get(state).copied().unwrap_or(UNKNOWN_NOMINAL)
     }
@@ -537,7 +530,6 @@ impl<'f> Session<'f> {
         self.step_event.clone()
     }
 
-    /// Enters event mode, iterates, and returns to continuous-time mode.
     pub(super) fn event(&mut self) -> Result<()> {
         let n = self.states();
         let before = self.read_states(n)?;
@@ -634,7 +626,6 @@ impl<'f> Session<'f> {
         root.number("numberOfEventIndicators").unwrap_or(0.0) as usize
     }
 
-    /// Reads one variable by the function for its type.
     pub fn get(&mut self, v: &Variable) -> Called<Reading> {
         let reference = [v.reference];
         Ok(match v.kind {
@@ -670,7 +661,6 @@ impl<'f> Session<'f> {
         }
     }
 
-    /// Reads a Real in an ordinary run.
     pub fn real(&mut self, v: &Variable) -> Result<f64> {
         Ok(if let Reading::Real(x) = self.read(v)? { x } else { f64::NAN })
     }

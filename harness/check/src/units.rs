@@ -259,7 +259,7 @@ pub fn numbers(d: &Description, findings: &mut Findings) {
                 let Some(x) = child.number(attribute) else { continue };
                 if !x.is_finite() || (not_0 && x == 0.0) {
                     let allowed = if not_0 { "finite, not 0" } else { "finite" };
-                    findings.add(&place, format!("{attribute}={x} (allowed: {allowed})"));
+                    findings.at(&place).add(format!("{attribute}={x} (allowed: {allowed})"));
                 }
             }
         }
@@ -281,14 +281,11 @@ pub fn base_units(d: &Description, findings: &mut Findings) {
         if let Some(first) = meant.first()
             && !meant.iter().any(|m| fits(&m))
         {
-            findings.add(
-                format!("line {}, Unit \"{name}\"", unit.line),
-                format!(
-                    "BaseUnit says {}, but the unit of that name has {} (allowed: what the name says)",
-                    written.text(),
-                    first.text()
-                ),
-            );
+            findings.at(format!("line {}, Unit \"{name}\"", unit.line)).add(format!(
+                "BaseUnit says {}, but the unit of that name has {} (allowed: what the name says)",
+                written.text(),
+                first.text()
+            ));
         }
     }
 }
@@ -321,14 +318,11 @@ pub fn display_units(d: &Description, findings: &mut Findings) {
                 .map(|(f, t)| (f.factor / t.factor, (f.offset - t.offset) / t.factor))
                 .collect();
             let Some((right, shift)) = expected.first().copied() else {
-                findings.add(
-                    place,
-                    format!(
-                        "the units \"{shown_name}\" ({}) and \"{name}\" ({}) have different dimensions",
-                        to[0].text(),
-                        from[0].text()
-                    ),
-                );
+                findings.at(place).add(format!(
+                    "the units \"{shown_name}\" ({}) and \"{name}\" ({}) have different dimensions",
+                    to[0].text(),
+                    from[0].text()
+                ));
                 continue;
             };
             let fits = |(f, o): &(f64, f64)| {
@@ -337,13 +331,10 @@ pub fn display_units(d: &Description, findings: &mut Findings) {
             if !expected.iter().any(fits) {
                 let inverted = agree(factor * right, 1.0);
                 let hint = if inverted { "; it is inverted" } else { "" };
-                findings.add(
-                    place,
-                    format!(
-                        "factor={factor} offset={offset}{hint} (allowed: factor={right} \
+                findings.at(place).add(format!(
+                    "factor={factor} offset={offset}{hint} (allowed: factor={right} \
                          offset={shift}, for shown = factor * value + offset)"
-                    ),
-                );
+                ));
             }
         }
     }
@@ -371,15 +362,12 @@ pub fn derivative_units(d: &Description, findings: &mut Findings) {
         let fits =
             |w: &Unit| expected.iter().any(|e| e.measures_like(w) && agree(e.factor, w.factor));
         if !written.iter().any(fits) {
-            findings.add(
-                v.place(),
-                format!(
-                    "it is the derivative of {}, in \"{of_state}\", but has the unit \
+            findings.at(v.place()).add(format!(
+                "it is the derivative of {}, in \"{of_state}\", but has the unit \
                      \"{of_derivative}\" (allowed: \"{of_state}\" per second: {})",
-                    state.name,
-                    expected[0].text()
-                ),
-            );
+                state.name,
+                expected[0].text()
+            ));
         }
     }
 }

@@ -54,10 +54,9 @@ pub fn start(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             }
             let Ok(value) = session.get(v) else { continue }; // values.readable tells
             if !has_digits_of(&value, start) && wrong.insert(v.index) {
-                findings.add(
-                    v.place(),
-                    format!("start {start} in modelDescription.xml, {value} in the binary {when}"),
-                );
+                findings.at(v.place()).add(format!(
+                    "start {start} in modelDescription.xml, {value} in the binary {when}"
+                ));
             }
         }
     };
@@ -84,7 +83,7 @@ pub fn readable(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                 Ok(_) => continue,
             };
             if told.insert(v.index) {
-                findings.add(v.place(), fault);
+                findings.at(v.place()).add(fault);
             }
         }
     };
@@ -105,14 +104,14 @@ pub fn booleans(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     for v in all {
         fmu.doing(format!("reading and setting {}", v.name));
         if let Reading::Boolean(value @ (..=-1 | 2..)) = session.get(v)? {
-            findings.fail(v.place(), format!("it reads as {value} (allowed: 0 and 1)"));
+            findings.at(v.place()).fail(format!("it reads as {value} (allowed: 0 and 1)"));
         }
         if v.is_set_by_hosts() && session.set(v, &Reading::Boolean(2)).is_ok() {
             match session.get(v)? {
                 Reading::Boolean(1) => {}
-                other => {
-                    findings.add(v.place(), format!("set to 2, which is true, it reads {other:?}"))
-                }
+                other => findings
+                    .at(v.place())
+                    .add(format!("set to 2, which is true, it reads {other:?}")),
             }
         }
     }
@@ -126,10 +125,9 @@ pub fn round_trip(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         fmu.doing(format!("setting {} to {start}", v.name));
         // As in hosts that set every start value before fmi2SetupExperiment.
         if let Err(error) = fresh.set(v, &start) {
-            findings.add(
-                v.place(),
-                format!("its own start value is refused when instantiated: {error}"),
-            );
+            findings
+                .at(v.place())
+                .add(format!("its own start value is refused when instantiated: {error}"));
         }
         let mut tried = vec![start.clone()];
         tried.extend(other_value(fmu, v, &start));
@@ -142,7 +140,7 @@ pub fn round_trip(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             }
             let read = session.get(v)?;
             if !read.is_identical(&value) {
-                findings.add(v.place(), format!("set to {value}, it reads {read}"));
+                findings.at(v.place()).add(format!("set to {value}, it reads {read}"));
                 break;
             }
         }
@@ -173,7 +171,6 @@ pub fn other_value(fmu: &FmuUnderTest, v: &Variable, start: &Reading) -> Option<
     }
 }
 
-/// Lists the values of an enumeration's items.
 pub fn items(fmu: &FmuUnderTest, v: &Variable) -> Vec<i32> {
     let declared = v.typed.get("declaredType");
     let types = fmu.description().root.list("TypeDefinitions");
@@ -188,7 +185,8 @@ pub fn nothing(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     for (call, status) in session.instance.nothing_null() {
         if status != host::fmi2::Status::Ok {
             findings
-                .add(format!("{call} with nvr = 0"), format!("fmi2{status:?} (allowed: fmi2OK)"));
+                .at(format!("{call} with nvr = 0"))
+                .add(format!("fmi2{status:?} (allowed: fmi2OK)"));
         }
     }
     Ok(())
@@ -295,14 +293,11 @@ pub fn fixed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     for (place, is_taken) in accepted {
         match refused {
             // The binary accepts it, so that this parameter is tunable there.
-            Some(other) if is_taken => findings.fail(
-                place,
-                format!(
-                    "it is accepted as tunable parameters are, while {other} is refused (allowed: \
+            Some(other) if is_taken => findings.at(place).fail(format!(
+                "it is accepted as tunable parameters are, while {other} is refused (allowed: \
                      fmi2Error, or variability=\"tunable\")"
-                ),
-            ),
-            _ => findings.add(place, "it is accepted (allowed: fmi2Error and a message)"),
+            )),
+            _ => findings.at(place).add("it is accepted (allowed: fmi2Error and a message)"),
         }
     }
     if !any {
@@ -367,19 +362,17 @@ pub fn limits(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             if let Some(why) = try_at(bound)?
                 && !settable(fmu).any(|(o, _)| o.name != v.name && mentions(&why, &o.name))
             {
-                findings.add(
-                    v.place(),
-                    format!("{bound} is allowed by min and max, but refused: {why}"),
-                );
+                findings
+                    .at(v.place())
+                    .add(format!("{bound} is allowed by min and max, but refused: {why}"));
             }
             if outside.is_finite()
                 && (v.kind == Type::Real || i32::try_from(outside as i64).is_ok())
                 && try_at(outside)?.is_none()
             {
-                findings.add(
-                    v.place(),
-                    format!("{outside} is outside min and max ({min} to {max}), but accepted"),
-                );
+                findings.at(v.place()).add(format!(
+                    "{outside} is outside min and max ({min} to {max}), but accepted"
+                ));
             }
         }
     }
@@ -412,8 +405,7 @@ pub fn not_a_number(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                     || session.go(session.step).is_err()
             });
             if !refused {
-                findings.add(
-                    place,
+                findings.at(place).add(
                     "it is accepted without error (allowed: fmi2Error at the step at the latest)",
                 );
                 break;
@@ -429,10 +421,9 @@ pub fn no_warning(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         session.advance(STEPS)?;
         session.readings()?;
         if let Some(call) = session.instance.take_warning() {
-            findings.add(
-                format!("an ordinary run ({})", FmuUnderTest::name(interface)),
-                format!("{call} returns fmi2Warning (allowed: fmi2OK)"),
-            );
+            findings
+                .at(format!("an ordinary run ({})", FmuUnderTest::name(interface)))
+                .add(format!("{call} returns fmi2Warning (allowed: fmi2OK)"));
         }
     }
     Ok(())

@@ -11,9 +11,9 @@ pub fn names(d: &Description, findings: &mut Findings) {
     let mut seen: BTreeMap<&str, u64> = BTreeMap::new();
     for v in &d.variables {
         if v.name.is_empty() {
-            findings.add(v.place(), "the name is empty");
+            findings.at(v.place()).add("the name is empty");
         } else if let Some(line) = seen.insert(&v.name, v.line) {
-            findings.add(v.place(), format!("line {line} has the same name"));
+            findings.at(v.place()).add(format!("line {line} has the same name"));
         }
     }
 }
@@ -181,7 +181,6 @@ pub fn initial(d: &Description, findings: &mut Findings) {
     d.each(findings, |v| wrong_initial(v, initials));
 }
 
-/// Returns what is wrong with the attribute `initial`.
 pub(crate) fn wrong_initial(v: &Common, initials: Initials) -> Option<String> {
     let written = v.written.get("initial")?;
     // A forbidden combination of causality and variability is reported by another rule.
@@ -285,23 +284,23 @@ pub fn aliases(d: &Description, findings: &mut Findings) {
         let place = format!("valueReference {}, {}", first.reference, names.join(" = "));
         let settable = set.iter().filter(|v| v.is_set_by_hosts()).count();
         if settable > 1 {
-            findings.add(&place, format!("{settable} of them are set by hosts (allowed: one)"));
+            findings.at(&place).add(format!("{settable} of them are set by hosts (allowed: one)"));
         }
         let started = set
             .iter()
             .filter(|v| v.typed.get("start").is_some() && v.variability != Variability::Constant);
         if settable <= 1 && started.count() > 1 {
-            findings.add(&place, "several of them have a start value (allowed: one)");
+            findings.at(&place).add("several of them have a start value (allowed: one)");
         }
         if set.iter().any(|v| v.typed.get("unit") != first.typed.get("unit")) {
-            findings.add(&place, "one value, but several units");
+            findings.at(&place).add("one value, but several units");
         }
         let constant = |v: &Variable| v.variability == Variability::Constant;
         if set.iter().any(|v| constant(v) != constant(first)) {
-            findings.add(&place, "one value, but constant and not constant");
+            findings.at(&place).add("one value, but constant and not constant");
         }
         if set.iter().any(|v| v.kind != first.kind) {
-            findings.add(&place, "one value, but several types");
+            findings.at(&place).add("one value, but several types");
         }
     }
 }
@@ -310,10 +309,12 @@ pub fn independent(d: &Description, findings: &mut Findings) {
     let all: Vec<_> =
         d.variables.iter().filter(|v| v.causality == Causality::Independent).collect();
     if all.len() > 1 {
-        findings.add(all[1].place(), format!("{} independent variables (allowed: one)", all.len()));
+        findings
+            .at(all[1].place())
+            .add(format!("{} independent variables (allowed: one)", all.len()));
     }
     for v in all.iter().filter(|v| v.kind != Type::Real) {
-        findings.add(v.place(), "the independent variable is not a Real");
+        findings.at(v.place()).add("the independent variable is not a Real");
     }
 }
 

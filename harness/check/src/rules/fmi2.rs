@@ -9,7 +9,6 @@ use crate::{
     variables,
 };
 
-/// Every rule, group by group.
 #[rustfmt::skip]
 pub static RULES: &[Rule] = &[
     rule("zip.readable", Error, "the file is a whole zip archive; every file unpacks, checksums, sizes and both headers of each agree", "2.3", Archive(archive::readable)),

@@ -1,12 +1,11 @@
 //! The rules for FMUs 3.0, by the text of FMI 3.0.2. Those of the archive and of reading XML are shared with FMI 2.0.
 
 use crate::findings::Severity::{Error, Warning};
-use crate::rule::Check::{Archive, Binaries3, Calls3, Description3};
+use crate::rule::Check::{Archive, Binaries, Calls3, Description3};
 use crate::rule::{Rule, rule};
 use crate::v3::{archive, calls, definitions, schema, steps, structure, variables};
 use crate::{life, log, portable, reading};
 
-/// Every rule for FMI 3.0, group by group.
 #[rustfmt::skip]
 pub static RULES: &[Rule] = &[
     rule("zip.readable", Error, "the file is a whole zip archive; every file unpacks, checksums, sizes and both headers of each agree", "2.5", Archive(crate::archive::readable)),
@@ -62,12 +61,12 @@ pub static RULES: &[Rule] = &[
     rule("xml.dependencies", Error, "each dependency is listed once and has its kind, of those allowed for the unknown", "2.4.8", Description3(structure::dependencies)),
     rule("xml.dependencies_known", Error, "dependencies are on knowns", "2.4.8", Description3(structure::dependencies_known)),
 
-    rule("bin.present", Error, "there is a library of the model's name for a platform tuple or in a vendor's folder, or sources", "2.5", Binaries3(archive::present)),
-    rule("bin.tuples", Error, "folders are platform tuples, not the names of FMI 2.0", "2.5.1.4.1", Binaries3(archive::tuples)),
-    rule("bin.name", Error, "libraries are called modelIdentifier and the platform's ending", "2.5.1.4", Binaries3(archive::name)),
-    rule("bin.format", Error, "libraries are for the platform whose folder they are in", "2.5.1.4.1", Binaries3(archive::format)),
-    rule("bin.symbols", Error, "all 75 functions are exported", "2.5", Binaries3(archive::symbols)),
-    rule("bin.this_platform", Warning, "there is a library for the platform of the check; without it no calls are made", "what is not called is not checked", Binaries3(archive::this_platform)),
+    rule("bin.present", Error, "there is a library of the model's name for a platform tuple or in a vendor's folder, or sources", "2.5", Binaries(crate::binaries::present)),
+    rule("bin.tuples", Error, "folders are platform tuples, not the names of FMI 2.0", "2.5.1.4.1", Archive(archive::tuples)),
+    rule("bin.name", Error, "libraries are called modelIdentifier and the platform's ending", "2.5.1.4", Binaries(crate::binaries::name)),
+    rule("bin.format", Error, "libraries are for the platform whose folder they are in", "2.5.1.4.1", Binaries(crate::binaries::format)),
+    rule("bin.symbols", Error, "all 75 functions are exported", "2.5", Binaries(crate::binaries::symbols)),
+    rule("bin.this_platform", Warning, "there is a library for the platform of the check; without it no calls are made", "what is not called is not checked", Binaries(crate::binaries::this_platform)),
 
     rule("load.opens", Error, "the library for this platform can be loaded", "2.5.1.4", Calls3(life::opens)),
     rule("load.version", Error, "fmi3GetVersion says 3.0", "2.2.5", Calls3(life::version)),

@@ -11,7 +11,6 @@ const ROUNDING: f64 = 1e-9;
 /// Relative change of a derivative below which it may come from an iterative solver.
 const ITERATED: f64 = 1e-2;
 
-/// Values of all quantities that an event may change.
 pub struct Sight {
     states: Vec<f64>,
     derivatives: Vec<f64>,

@@ -6,7 +6,7 @@ use anyhow::Result;
 use super::subject::Subject;
 use super::subject::{STEPS, Session, Use, start_values};
 use crate::findings::Findings;
-use crate::loaded::{Life as _, UnderTest as _};
+use crate::loaded::{Life as _, UnderTest as _, skip};
 use crate::{life, states};
 use host::c_abi::{CallError, Status, foreign_environments};
 use host::causality::{Causality, Variability};
@@ -19,12 +19,9 @@ pub fn token(subject: &Subject, findings: &mut Findings) -> Result<()> {
         with.token = Some("{another token of another FMU}");
         subject.doing("making an instance with another instantiationToken");
         match subject.instantiate(&with)? {
-            Ok(_) => findings.add(
-                subject.now(),
-                "it gives an instance (allowed: NULL for a token that is not that of modelDescription.xml)",
-            ),
+            Ok(_) => findings.at(subject.now()).add("it gives an instance (allowed: NULL for a token that is not that of modelDescription.xml)"),
             Err(CallError { messages, .. }) if messages.is_empty() => {
-                findings.warn(subject.now(), "it gives none and says nothing (allowed: a message)");
+                findings.at(subject.now()).warn("it gives none and says nothing (allowed: a message)");
             }
             Err(_) => {}
         }
@@ -41,7 +38,7 @@ pub fn callbacks(subject: &Subject, findings: &mut Findings) -> Result<()> {
         match subject.instantiate(&with)? {
             Ok(_) => {}
             Err(error) => {
-                findings.add(subject.now(), error.to_string());
+                findings.at(subject.now()).add(error.to_string());
                 continue;
             }
         }
@@ -69,7 +66,7 @@ pub fn readable(subject: &Subject, findings: &mut Findings) -> Result<()> {
         for v in subject.readable() {
             subject.doing(format!("reading {}", v.name));
             if let Err(error) = session.get(v) {
-                findings.add(v.place(), format!("{} ({error})", using.name()));
+                findings.at(v.place()).add(format!("{} ({error})", using.name()));
             }
         }
     }
@@ -88,13 +85,10 @@ pub fn start(subject: &Subject, findings: &mut Findings) -> Result<()> {
             (a, b) => a != b,
         });
         if let Some(i) = differ {
-            findings.add(
-                v.place(),
-                format!(
-                    "it is {:?} in initialization mode and {:?} in modelDescription.xml",
-                    values[i], starts[i]
-                ),
-            );
+            findings.at(v.place()).add(format!(
+                "it is {:?} in initialization mode and {:?} in modelDescription.xml",
+                values[i], starts[i]
+            ));
         }
     }
     Ok(())
@@ -135,7 +129,7 @@ pub fn set(subject: &Subject, findings: &mut Findings) -> Result<()> {
         if let Err(error) = session.instance.set_values(v.c_type, v.reference, &values) {
             // A model may refuse a value for its own reasons, but must say why.
             if error.messages.is_empty() {
-                findings.add(v.place(), format!("{error} (allowed: a message)"));
+                findings.at(v.place()).add(format!("{error} (allowed: a message)"));
             }
             continue;
         }
@@ -145,10 +139,12 @@ pub fn set(subject: &Subject, findings: &mut Findings) -> Result<()> {
         }
         let read = session.read(v)?;
         if let Some(i) = (0..values.len()).find(|i| read[*i] != values[*i]) {
-            findings.add(
-                v.place(),
-                format!("element {} was set to {:?} and is {:?}", i + 1, values[i], read[i]),
-            );
+            findings.at(v.place()).add(format!(
+                "element {} was set to {:?} and is {:?}",
+                i + 1,
+                values[i],
+                read[i]
+            ));
         }
     }
     Ok(())
@@ -166,10 +162,10 @@ pub fn type_mismatch(subject: &Subject, findings: &mut Findings) -> Result<()> {
             _ => ("fmi3GetFloat64", session.instance.fetch(&[v.reference], &mut vec![0.0f64; n])),
         });
         if answer.is_ok() {
-            findings.add(
-                v.place(),
-                format!("{call} of this {} returns fmi3OK (allowed: fmi3Error)", v.written.name),
-            );
+            findings.at(v.place()).add(format!(
+                "{call} of this {} returns fmi3OK (allowed: fmi3Error)",
+                v.written.name
+            ));
         }
     }
     Ok(())
@@ -178,13 +174,12 @@ pub fn type_mismatch(subject: &Subject, findings: &mut Findings) -> Result<()> {
 pub fn unknown(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let last = subject.description.variables.iter().map(|v| v.reference).max().unwrap_or(0);
     let Some(unknown) = last.checked_add(1000) else {
-        findings.skip("no value reference is left");
-        return Ok(());
+        return skip("no value reference is left");
     };
     let mut session = subject.running(subject.plain_uses()[0])?;
     subject.doing(format!("fmi3GetFloat64 of valueReference {unknown}, which no variable has"));
     if session.instance.fetch(&[unknown], &mut [0.0f64]).is_ok() {
-        findings.add(subject.now(), "it returns fmi3OK (allowed: fmi3Error)");
+        findings.at(subject.now()).add("it returns fmi3OK (allowed: fmi3Error)");
     }
     Ok(())
 }
@@ -203,17 +198,13 @@ pub fn counts(subject: &Subject, findings: &mut Findings) -> Result<()> {
                 session.instance.fetch(&[v.reference], &mut values[..told])
             });
             if values[told..].iter().any(|x| x.to_bits() != CANARY.to_bits()) {
-                findings.add(
-                    v.place(),
-                    format!("fmi3GetFloat64 with nValues = {told} writes more values than that"),
-                );
+                findings.at(v.place()).add(format!(
+                    "fmi3GetFloat64 with nValues = {told} writes more values than that"
+                ));
             } else if told < n && answer.is_ok() {
-                findings.warn(
-                    v.place(),
-                    format!(
-                        "fmi3GetFloat64 of its {n} values with nValues = {told} returns fmi3OK"
-                    ),
-                );
+                findings.at(v.place()).warn(format!(
+                    "fmi3GetFloat64 of its {n} values with nValues = {told} returns fmi3OK"
+                ));
             }
         }
     }
@@ -229,7 +220,7 @@ pub fn booleans(subject: &Subject, findings: &mut Findings) -> Result<()> {
         let mut bytes = vec![0xa5; v.length()];
         session.instance.fetch_boolean(&[v.reference], &mut bytes)?;
         if let Some(byte) = bytes.iter().find(|byte| **byte > 1) {
-            findings.add(v.place(), format!("fmi3GetBoolean writes {byte} (allowed: 0, 1)"));
+            findings.at(v.place()).add(format!("fmi3GetBoolean writes {byte} (allowed: 0, 1)"));
         }
     }
     if !any {
@@ -259,10 +250,7 @@ pub fn fixed(subject: &Subject, findings: &mut Findings) -> Result<()> {
         let set =
             subject.left_open(place, findings, || session.instance.give(&[v.reference], &moved));
         if set.is_ok() && session.read(v)? != before {
-            findings.add(
-                v.place(),
-                "it is fixed, and fmi3SetFloat64 after initialization changes it (allowed: fmi3Error)",
-            );
+            findings.at(v.place()).add("it is fixed, and fmi3SetFloat64 after initialization changes it (allowed: fmi3Error)");
         }
     }
     if !any {
@@ -300,18 +288,15 @@ pub fn serialize(subject: &Subject, findings: &mut Findings) -> Result<()> {
         session.advance(STEPS)?;
         let again = session.readings()?;
         if let Some(text) = session.difference(&again, &first) {
-            findings.add(format!("{}, from a serialised state", using.name()), text);
+            findings.at(format!("{}, from a serialised state", using.name())).add(text);
         }
         if let Some(half) = bytes.len().checked_div(2).filter(|half| *half > 0) {
             subject.doing("fmi3DeserializeFMUState of half the bytes");
             if let Ok(wrong) = session.instance.deserialize(&bytes[..half]) {
-                findings.add(
-                    using.name(),
-                    format!(
-                        "{half} of {} bytes are taken for a state (allowed: fmi3Error)",
-                        bytes.len()
-                    ),
-                );
+                findings.at(using.name()).add(format!(
+                    "{half} of {} bytes are taken for a state (allowed: fmi3Error)",
+                    bytes.len()
+                ));
                 session.instance.free_state(wrong)?;
             }
         }
@@ -342,13 +327,10 @@ pub fn log_environment(subject: &Subject, findings: &mut Findings) -> Result<()>
                 findings.skip("it calls no callback");
             }
         }
-        n => findings.add(
-            "the callbacks",
-            format!(
+        n => findings.at("the callbacks").add(format!(
                 "{n} calls have another instanceEnvironment than that given when the instance was made (allowed: the \
                  same pointer; fmi3Instance is not it)"
-            ),
-        ),
+            )),
     }
     Ok(())
 }
@@ -359,7 +341,9 @@ pub fn log_errors(subject: &Subject, findings: &mut Findings) -> Result<()> {
         && error.status == Status::Error
         && error.messages.is_empty()
     {
-        findings.add(subject.now(), "it returns fmi3Error and says nothing (allowed: a message)");
+        findings
+            .at(subject.now())
+            .add("it returns fmi3Error and says nothing (allowed: a message)");
     }
     Ok(())
 }
@@ -367,17 +351,16 @@ pub fn log_errors(subject: &Subject, findings: &mut Findings) -> Result<()> {
 // ---------------------------------------------------------------- Model Exchange
 
 /// Returns an initialised instance for Model Exchange, or skips the rule if the FMU has no Model Exchange.
-fn exchanging<'s>(subject: &'s Subject, findings: &mut Findings) -> Result<Option<Session<'s>>> {
+fn exchanging(subject: &Subject) -> Result<Session<'_>> {
     if subject.binary(Interface::ModelExchange).is_err() {
-        findings.skip("it offers no Model Exchange");
-        return Ok(None);
+        return skip("it offers no Model Exchange");
     }
-    subject.running(Use::EXCHANGE).map(Some)
+    subject.running(Use::EXCHANGE)
 }
 
 pub fn exchange_counts(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let d = &subject.description;
-    let Some(mut session) = exchanging(subject, findings)? else { return Ok(()) };
+    let mut session = exchanging(subject)?;
     let length = |r: u32| d.at(r).map_or(0, super::description::Variable::length);
     let states: usize = d.states().into_iter().map(length).sum();
     let indicators = d.unknowns("EventIndicator").filter_map(|u| u.reference);
@@ -398,7 +381,8 @@ pub fn exchange_counts(subject: &Subject, findings: &mut Findings) -> Result<()>
     ] {
         if own != declared {
             findings
-                .add(call, format!("it says {own}; the elements {list} have {declared} values"));
+                .at(call)
+                .add(format!("it says {own}; the elements {list} have {declared} values"));
         }
     }
     Ok(())
@@ -406,7 +390,7 @@ pub fn exchange_counts(subject: &Subject, findings: &mut Findings) -> Result<()>
 
 pub fn exchange_vectors(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let d = &subject.description;
-    let Some(mut session) = exchanging(subject, findings)? else { return Ok(()) };
+    let mut session = exchanging(subject)?;
     session.advance(3)?;
     let derivatives: Vec<u32> =
         d.unknowns("ContinuousStateDerivative").filter_map(|u| u.reference).collect();
@@ -430,10 +414,9 @@ pub fn exchange_vectors(subject: &Subject, findings: &mut Findings) -> Result<()
                 if let (Value::Real(a), Some(b)) = (&value, of.next())
                     && a.to_bits() != b.to_bits()
                 {
-                    findings.add(
-                        call,
-                        format!("it has {b:?} in the place of {}, which is {a:?}", v.name),
-                    );
+                    findings
+                        .at(call)
+                        .add(format!("it has {b:?} in the place of {}, which is {a:?}", v.name));
                 }
             }
         }
@@ -442,11 +425,10 @@ pub fn exchange_vectors(subject: &Subject, findings: &mut Findings) -> Result<()
 }
 
 pub fn states_set(subject: &Subject, findings: &mut Findings) -> Result<()> {
-    let Some(mut session) = exchanging(subject, findings)? else { return Ok(()) };
+    let mut session = exchanging(subject)?;
     let n = session.instance.number_of_states()?;
     if n == 0 {
-        findings.skip("it has no continuous states");
-        return Ok(());
+        return skip("it has no continuous states");
     }
     let mut x = vec![0.0; n];
     session.instance.continuous_states(&mut x)?;
@@ -455,27 +437,27 @@ pub fn states_set(subject: &Subject, findings: &mut Findings) -> Result<()> {
     session.instance.set_continuous_states(&moved)?;
     session.instance.continuous_states(&mut x)?;
     if let Some(i) = (0..n).find(|i| x[*i].to_bits() != moved[*i].to_bits()) {
-        findings.add(
-            "fmi3SetContinuousStates",
-            format!("state {} was set to {:?} and is {:?}", i + 1, moved[i], x[i]),
-        );
+        findings.at("fmi3SetContinuousStates").add(format!(
+            "state {} was set to {:?} and is {:?}",
+            i + 1,
+            moved[i],
+            x[i]
+        ));
     }
     Ok(())
 }
 
 pub fn indicators(subject: &Subject, findings: &mut Findings) -> Result<()> {
-    let Some(mut session) = exchanging(subject, findings)? else { return Ok(()) };
+    let mut session = exchanging(subject)?;
     let nz = session.instance.number_of_indicators()?;
     if nz == 0 {
-        findings.skip("it has no event indicators");
-        return Ok(());
+        return skip("it has no event indicators");
     }
     session.advance(10 * STEPS)?;
     if let Some((time, i)) = session.zero_indicator {
-        findings.add(
-            format!("event indicator {}, t = {time:?} s", i + 1),
-            "it is 0 after event mode (allowed: on the side on which the model is)",
-        );
+        findings
+            .at(format!("event indicator {}, t = {time:?} s", i + 1))
+            .add("it is 0 after event mode (allowed: on the side on which the model is)");
     }
     Ok(())
 }

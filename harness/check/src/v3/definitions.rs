@@ -12,22 +12,21 @@ use host::xml::Element;
 pub fn fmi_version(d: &Description, findings: &mut Findings) {
     let version = d.root.get("fmiVersion").unwrap_or_default();
     if version != "3.0" {
-        findings.add("fmiVersion", format!("\"{version}\" (allowed: \"3.0\")"));
+        findings.at("fmiVersion").add(format!("\"{version}\" (allowed: \"3.0\")"));
     }
 }
 
 pub fn token(d: &Description, findings: &mut Findings) {
     if d.root.get("instantiationToken").is_none_or(|token| token.trim().is_empty()) {
-        findings.add("instantiationToken", "it is missing or empty");
+        findings.at("instantiationToken").add("it is missing or empty");
     }
 }
 
 pub fn interfaces(d: &Description, findings: &mut Findings) {
     if d.interfaces().next().is_none() {
-        findings.add(
-            "fmiModelDescription",
-            "none of ModelExchange, CoSimulation and ScheduledExecution is there",
-        );
+        findings
+            .at("fmiModelDescription")
+            .add("none of ModelExchange, CoSimulation and ScheduledExecution is there");
     }
 }
 
@@ -44,23 +43,22 @@ pub fn capabilities(d: &Description, findings: &mut Findings) {
         let place = format!("line {}, {}", interface.line, interface.name);
         for (flag, needed) in NEEDS {
             if interface.flag(flag) && !interface.flag(needed) {
-                findings.add(&place, format!("{flag} without {needed}"));
+                findings.at(&place).add(format!("{flag} without {needed}"));
             }
         }
         if let Some(step) =
             interface.number("fixedInternalStepSize").filter(|h| h.is_nan() || *h <= 0.0)
         {
-            findings.add(&place, format!("fixedInternalStepSize={step} (allowed: above 0)"));
+            findings.at(&place).add(format!("fixedInternalStepSize={step} (allowed: above 0)"));
         }
     }
     let clocks = d.variables.iter().any(|v| v.kind == Type::Clock);
     if let Some(stepping) =
         d.interface("CoSimulation").filter(|e| clocks && !e.flag("hasEventMode"))
     {
-        findings.add(
-            format!("line {}, CoSimulation", stepping.line),
-            "it has clocks, but not hasEventMode: clocks need event mode",
-        );
+        findings
+            .at(format!("line {}, CoSimulation", stepping.line))
+            .add("it has clocks, but not hasEventMode: clocks need event mode");
     }
     let mut flags: BTreeMap<(&str, &str), (&str, bool)> = BTreeMap::new();
     for interface in d.interfaces() {
@@ -71,7 +69,7 @@ pub fn capabilities(d: &Description, findings: &mut Findings) {
             if said != interface.flag(flag) {
                 let text =
                     format!("one binary, but {first} and {} say different things", interface.name);
-                findings.add(flag, text);
+                findings.at(flag).add(text);
             }
         }
     }
@@ -83,7 +81,6 @@ pub fn default_experiment(d: &Description, findings: &mut Findings) {
     }
 }
 
-/// Returns the child elements named Item of a type.
 pub(super) fn items(of: &Element) -> Vec<&Element> {
     of.children.iter().filter(|c| c.name == "Item").collect()
 }
@@ -120,10 +117,9 @@ pub fn units(d: &Description, findings: &mut Findings) {
                 if let Some(x) = part.number(name)
                     && (!x.is_finite() || (name == "factor" && x == 0.0))
                 {
-                    findings.add(
-                        format!("line {}, {}", part.line, part.name),
-                        format!("{name}={x} (allowed: finite, factors not 0)"),
-                    );
+                    findings
+                        .at(format!("line {}, {}", part.line, part.name))
+                        .add(format!("{name}={x} (allowed: finite, factors not 0)"));
                 }
             }
         }

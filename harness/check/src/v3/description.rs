@@ -22,7 +22,6 @@ pub struct Variable {
     read: Common,
     /// Type of the function that reads and sets the variable.
     pub c_type: CType,
-    /// Start values as text, one for each element.
     pub starts: Vec<String>,
     /// Sizes of an array, computed with the start values of structural parameters; empty for a scalar.
     pub dimensions: Vec<usize>,
@@ -98,7 +97,6 @@ impl Description {
         self.variables.iter().any(|v| v.kind == Type::Clock)
     }
 
-    /// Reads the description from its parsed tree.
     pub fn new(root: Element) -> Description {
         let types: BTreeMap<&str, &Element> =
             root.list("TypeDefinitions").filter_map(|t| Some((t.get("name")?, t))).collect();
@@ -112,7 +110,6 @@ impl Description {
         Description { variables, structure, root }
     }
 
-    /// Returns the first variable with this value reference.
     pub fn at(&self, reference: u32) -> Option<&Variable> {
         self.variables.iter().find(|v| v.reference == reference)
     }

@@ -11,6 +11,5 @@ pub mod structure;
 pub mod subject;
 pub mod variables;
 
-pub use self::archive::Binaries;
 pub use self::description::{Description, Variable};
 pub use self::subject::Subject;

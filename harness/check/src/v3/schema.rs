@@ -23,14 +23,12 @@ const INSIDE_TEXT: schema::Children = Ordered(&["Annotations", "Dimension", "Sta
 mod long {
     use super::*;
 
-    /// Elements of ModelVariables; each is a type of variable.
     pub const TYPES: &[&str] = &["Float32", "Float64", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32",
         "Int64", "UInt64", "Boolean", "String", "Binary", "Enumeration", "Clock"];
 
     const CAUSALITY: Written = OneOf(&["parameter", "calculatedParameter", "input", "output", "local",
         "independent", "structuralParameter"]);
 
-    /// Attributes of all variables except clocks.
     pub const OF_ALL: Attributes = &[("description", Text), ("causality", CAUSALITY), ("variability", VARIABILITY),
         ("initial", INITIAL), ("canHandleMultipleSetPerTimeInstant", Boolean), ("clocks", INDICES),
         ("intermediateUpdate", Boolean), ("previous", Unsigned), ("declaredType", Text)];
@@ -44,7 +42,6 @@ mod long {
         ("intervalCounter", LONGS), ("shiftCounter", LONGS), ("causality", CAUSALITY), ("variability", VARIABILITY),
         ("canHandleMultipleSetPerTimeInstant", Boolean), ("clocks", INDICES), ("declaredType", Text)];
 
-    /// Attributes of the three interfaces.
     pub const INTERFACE: Attributes = &[("needsExecutionTool", Boolean), ("canBeInstantiatedOnlyOncePerProcess", Boolean),
         ("canGetAndSetFMUState", Boolean), ("canSerializeFMUState", Boolean), ("providesDirectionalDerivatives", Boolean),
         ("providesAdjointDerivatives", Boolean), ("providesPerElementDependencies", Boolean)];

@@ -7,7 +7,7 @@ use super::description::Variable;
 use super::subject::Subject;
 use super::subject::{STEPS, Session, Use};
 use crate::findings::Findings;
-use crate::loaded::{Life as _, UnderTest as _};
+use crate::loaded::{Life as _, UnderTest as _, skip};
 use host::causality::{Causality, Variability};
 use host::description::{CType, Value};
 use host::fmi3::{Interface, Step, UNWRITTEN, Update};
@@ -53,12 +53,11 @@ fn faults(using: Use, step: &Step, from: f64, h: f64) -> Vec<String> {
     faults
 }
 
-fn stepping(subject: &Subject, findings: &mut Findings) -> bool {
-    let is_there = subject.binary(Interface::CoSimulation).is_ok();
-    if !is_there {
-        findings.skip("it offers no Co-Simulation");
+fn require_stepping(subject: &Subject) -> Result<()> {
+    match subject.binary(Interface::CoSimulation) {
+        Ok(_) => Ok(()),
+        Err(_) => skip("it offers no Co-Simulation"),
     }
-    is_there
 }
 
 fn stepping_uses(subject: &Subject) -> Vec<Use> {
@@ -67,14 +66,10 @@ fn stepping_uses(subject: &Subject) -> Vec<Use> {
 }
 
 /// Returns the uses in which the host handles events; skips the rule if there are none.
-fn uses_with_events(subject: &Subject, findings: &mut Findings) -> Vec<Use> {
-    let uses = subject.uses().into_iter();
-    let uses: Vec<Use> =
-        uses.filter(|u| u.event_mode || u.interface == Interface::ModelExchange).collect();
-    if uses.is_empty() {
-        findings.skip("it has no event mode");
-    }
-    uses
+fn uses_with_events(subject: &Subject) -> Result<Vec<Use>> {
+    let mut uses = subject.uses();
+    uses.retain(|u| u.event_mode || u.interface == Interface::ModelExchange);
+    if uses.is_empty() { skip("it has no event mode") } else { Ok(uses) }
 }
 
 /// Number of steps in a run that should contain events.
@@ -88,10 +83,9 @@ pub fn runs(subject: &Subject, findings: &mut Findings) -> Result<()> {
             let wrong = |(_, x): &&(String, f64)| !x.is_finite();
             let outputs = outputs(&mut session, false)?;
             if let Some((name, x)) = outputs.iter().find(wrong) {
-                findings.add(
-                    format!("{name}, t = {:?} s ({})", session.time, using.name()),
-                    format!("it is {x} after a step that returned fmi3OK (allowed: finite)"),
-                );
+                findings
+                    .at(format!("{name}, t = {:?} s ({})", session.time, using.name()))
+                    .add(format!("it is {x} after a step that returned fmi3OK (allowed: finite)"));
                 break;
             }
         }
@@ -104,9 +98,7 @@ pub fn iterates(subject: &Subject, _: &mut Findings) -> Result<()> {
 }
 
 pub fn answers(subject: &Subject, findings: &mut Findings) -> Result<()> {
-    if !stepping(subject, findings) {
-        return Ok(());
-    }
+    require_stepping(subject)?;
     let is_clock =
         |v: &&Variable| v.causality == Causality::Independent && v.c_type == CType::Float64;
     let clock = subject.readable().find(is_clock).cloned();
@@ -130,7 +122,7 @@ pub fn answers(subject: &Subject, findings: &mut Findings) -> Result<()> {
             for fault in all {
                 let kind = fault.split_whitespace().take(2).collect::<Vec<_>>().join(" ");
                 if !told.contains(&kind) {
-                    findings.add(format!("{}, step from {from:?} s", using.name()), fault);
+                    findings.at(format!("{}, step from {from:?} s", using.name())).add(fault);
                     told.push(kind);
                 }
             }
@@ -146,15 +138,13 @@ pub fn answers(subject: &Subject, findings: &mut Findings) -> Result<()> {
 }
 
 pub fn wrong(subject: &Subject, findings: &mut Findings) -> Result<()> {
-    if !stepping(subject, findings) {
-        return Ok(());
-    }
+    require_stepping(subject)?;
     let mut session = subject.running(Use::PLAIN)?;
     session.advance(1)?;
     let place = "fmi3DoStep with a communicationStepSize below 0";
     let (time, h) = (session.time, -session.h);
     if subject.left_open(place, findings, || session.instance.do_step(time, h)).is_ok() {
-        findings.add(place, "it returns fmi3OK (allowed: fmi3Error)");
+        findings.at(place).add("it returns fmi3OK (allowed: fmi3Error)");
     }
     Ok(())
 }
@@ -162,7 +152,7 @@ pub fn wrong(subject: &Subject, findings: &mut Findings) -> Result<()> {
 // ---------------------------------------------------------------- events
 
 pub fn event_answers(subject: &Subject, findings: &mut Findings) -> Result<()> {
-    for using in uses_with_events(subject, findings) {
+    for using in uses_with_events(subject)? {
         let mut session = subject.session(using)?;
         session.enter_initialization()?;
         session.instance.exit_initialization_mode()?;
@@ -179,18 +169,16 @@ pub fn event_answers(subject: &Subject, findings: &mut Findings) -> Result<()> {
                 if byte > 1 {
                     let what =
                         if byte == UNWRITTEN { "is not written" } else { "is neither 0 nor 1" };
-                    findings.add(
-                        format!("{}, fmi3UpdateDiscreteStates", using.name()),
-                        format!("{name} {what}"),
-                    );
+                    findings
+                        .at(format!("{}, fmi3UpdateDiscreteStates", using.name()))
+                        .add(format!("{name} {what}"));
                 }
             }
             let passed = |next: f64| next.is_nan() || next <= session.time;
             if info.next_event_defined == 1 && passed(info.next_event_time) {
-                findings.add(
-                    format!("{}, t = {:?} s", using.name(), session.time),
-                    format!("nextEventTime is {:?} (allowed: later)", info.next_event_time),
-                );
+                findings
+                    .at(format!("{}, t = {:?} s", using.name(), session.time))
+                    .add(format!("nextEventTime is {:?} (allowed: later)", info.next_event_time));
             }
             if session.ended || !findings.list.is_empty() {
                 break;
@@ -214,7 +202,7 @@ pub fn event_answers(subject: &Subject, findings: &mut Findings) -> Result<()> {
 }
 
 pub fn idempotent(subject: &Subject, findings: &mut Findings) -> Result<()> {
-    for using in uses_with_events(subject, findings) {
+    for using in uses_with_events(subject)? {
         let mut session = subject.running(using)?;
         session.advance(STEPS)?;
         if session.ended {
@@ -231,10 +219,12 @@ pub fn idempotent(subject: &Subject, findings: &mut Findings) -> Result<()> {
             && !clocks
             && info.terminate != 1
         {
-            findings.add(
-                format!("{}, another fmi3UpdateDiscreteStates at the same instant", using.name()),
-                text,
-            );
+            findings
+                .at(format!(
+                    "{}, another fmi3UpdateDiscreteStates at the same instant",
+                    using.name()
+                ))
+                .add(text);
         }
     }
     Ok(())
@@ -261,14 +251,11 @@ pub fn discrete_held(subject: &Subject, findings: &mut Findings) -> Result<()> {
             for (v, before) in discrete.iter().zip(&before) {
                 let after = session.read(v)?;
                 if after != *before {
-                    findings.add(
-                        v.place(),
-                        format!(
+                    findings.at(v.place()).add(format!(
                             "it is {before:?} before and {after:?} after fmi3DoStep from {from:?} s ({}; allowed: \
                              discrete variables change in event mode alone)",
                             using.name()
-                        ),
-                    );
+                        ));
                     return Ok(());
                 }
             }
@@ -304,9 +291,7 @@ fn outputs(session: &mut Session, continuous: bool) -> Result<Vec<(String, f64)>
 const SAME: f64 = 1e-3;
 
 pub fn same_trajectory(subject: &Subject, findings: &mut Findings) -> Result<()> {
-    if !stepping(subject, findings) {
-        return Ok(());
-    }
+    require_stepping(subject)?;
     let mut plain = subject.running(Use::PLAIN)?;
     let mut reference = Vec::new();
     let until = |session: &Session, k: usize| session.subject.start() + (k + 1) as f64 * session.h;
@@ -338,10 +323,9 @@ pub fn same_trajectory(subject: &Subject, findings: &mut Findings) -> Result<()>
                 .zip(expected)
                 .find(|((name, a), (_, b))| (a - b).abs() > SAME * size(name));
             if let Some(((name, a), (_, b))) = far {
-                findings.add(
-                    format!("{}, t = {to:?} s", using.name()),
-                    format!("{name} is {a:?}, and {b:?} in plain Co-Simulation"),
-                );
+                findings
+                    .at(format!("{}, t = {to:?} s", using.name()))
+                    .add(format!("{name} is {a:?}, and {b:?} in plain Co-Simulation"));
                 break;
             }
         }
@@ -351,22 +335,18 @@ pub fn same_trajectory(subject: &Subject, findings: &mut Findings) -> Result<()>
 
 // ---------------------------------------------------------------- intermediate update
 
-fn updating(subject: &Subject, findings: &mut Findings) -> bool {
+fn require_updates(subject: &Subject) -> Result<()> {
     let stepping = Interface::CoSimulation;
-    let is =
-        subject.binary(stepping).is_ok() && subject.can(stepping, "providesIntermediateUpdate");
-    if !is {
-        findings.skip("providesIntermediateUpdate is not declared");
+    match subject.binary(stepping) {
+        Ok(_) => subject.require(stepping, "providesIntermediateUpdate"),
+        Err(_) => skip("providesIntermediateUpdate is not declared"),
     }
-    is
 }
 
 const UPDATING: Use = Use { updates: true, ..Use::PLAIN };
 
 pub fn intermediate_time(subject: &Subject, findings: &mut Findings) -> Result<()> {
-    if !updating(subject, findings) {
-        return Ok(());
-    }
+    require_updates(subject)?;
     let mut session = subject.running(UPDATING)?;
     let mut last = f64::NEG_INFINITY;
     for k in 0..STEPS {
@@ -398,27 +378,21 @@ pub fn intermediate_time(subject: &Subject, findings: &mut Findings) -> Result<(
             }),
         )?;
         if let Some(text) = wrong {
-            findings.add(format!("step from {from:?} s by {h:?} s"), text);
+            findings.at(format!("step from {from:?} s by {h:?} s")).add(text);
             return Ok(());
         }
     }
     if session.instance.updates() == 0 {
-        findings.add(
-            "intermediateUpdate",
-            "it is never called, although providesIntermediateUpdate is true",
-        );
+        findings
+            .at("intermediateUpdate")
+            .add("it is never called, although providesIntermediateUpdate is true");
     }
     Ok(())
 }
 
 pub fn intermediate_early_return(subject: &Subject, findings: &mut Findings) -> Result<()> {
-    if !updating(subject, findings) {
-        return Ok(());
-    }
-    if !subject.can(Interface::CoSimulation, "canReturnEarlyAfterIntermediateUpdate") {
-        findings.skip("canReturnEarlyAfterIntermediateUpdate is not declared");
-        return Ok(());
-    }
+    require_updates(subject)?;
+    subject.require(Interface::CoSimulation, "canReturnEarlyAfterIntermediateUpdate")?;
     let using = Use { early_return: true, ..UPDATING };
     let mut session = subject.running(using)?;
     let (from, h) = (session.time, 10.0 * session.h);
@@ -435,21 +409,17 @@ pub fn intermediate_early_return(subject: &Subject, findings: &mut Findings) -> 
     )?;
     match asked {
         None => findings.skip("it offers no early return in a step of ten communication steps"),
-        Some(time) if step.early_return != 1 => findings.add(
-            format!("step from {from:?} s by {h:?} s"),
-            format!(
+        Some(time) if step.early_return != 1 => {
+            findings.at(format!("step from {from:?} s by {h:?} s")).add(format!(
                 "an early return was asked for at {time:?} s, and earlyReturn is {}",
                 step.early_return
-            ),
-        ),
+            ))
+        }
         Some(time) if !(step.last_time <= from + h && step.last_time >= time - 1e-9 * h) => {
-            findings.add(
-                format!("step from {from:?} s by {h:?} s"),
-                format!(
-                    "lastSuccessfulTime is {:?} after an early return asked for at {time:?} s",
-                    step.last_time
-                ),
-            )
+            findings.at(format!("step from {from:?} s by {h:?} s")).add(format!(
+                "lastSuccessfulTime is {:?} after an early return asked for at {time:?} s",
+                step.last_time
+            ))
         }
         Some(_) => {}
     }
@@ -463,20 +433,16 @@ pub fn intermediate_early_return(subject: &Subject, findings: &mut Findings) -> 
 /// input's rate (a wheel's torque is minus the rate of its momentum), and held inputs have no rate for any
 /// step size.
 pub fn intermediate_inputs(subject: &Subject, findings: &mut Findings) -> Result<()> {
-    if !updating(subject, findings) {
-        return Ok(());
-    }
+    require_updates(subject)?;
     let inputs: Vec<Variable> =
         subject.inputs().filter(|v| v.written.flag("intermediateUpdate")).cloned().collect();
     if inputs.is_empty() {
-        findings.skip("no input has intermediateUpdate");
-        return Ok(());
+        return skip("no input has intermediateUpdate");
     }
     const FINE: usize = 64;
     let fixed = subject.description.interface("CoSimulation");
     if fixed.is_some_and(|e| !e.flag("canHandleVariableCommunicationStepSize")) {
-        findings.skip("its communication step is fixed");
-        return Ok(());
+        return skip("its communication step is fixed");
     }
     for v in &inputs {
         let (min, max) = v.bounds();
@@ -517,13 +483,10 @@ pub fn intermediate_inputs(subject: &Subject, findings: &mut Findings) -> Result
             // Direct feedthrough shows the value that was set last, whatever the FMU does with it.
             let effect = (held - right).abs();
             if effect > 1e-9 * right.abs().max(1e-9) && (along - right).abs() > 0.6 * effect {
-                findings.add(
-                    v.place(),
-                    format!(
+                findings.at(v.place()).add(format!(
                         "set in intermediate update along a line, {name} is {along:?}; held it is {held:?}, along the \
                          line with steps {FINE} times as short {right:?} (allowed: nearer to the last)"
-                    ),
-                );
+                    ));
             }
         }
     }
@@ -573,22 +536,17 @@ fn displaced(
     Ok(real(&values))
 }
 
-fn deriving(subject: &Subject, flag: &str, findings: &mut Findings) -> Option<Use> {
+fn require_derivatives(subject: &Subject, flag: &str) -> Result<Use> {
     // In Model Exchange derivatives follow immediately from states and inputs.
     if subject.binary(Interface::ModelExchange).is_err() {
-        findings.skip(
+        return skip(
             "it offers no Model Exchange, where derivatives can be compared with differences",
         );
-        return None;
     }
-    if !subject.can(Interface::ModelExchange, flag) {
-        findings.skip(format!("{flag} is not declared"));
-        return None;
-    }
-    Some(Use::EXCHANGE)
+    subject.require(Interface::ModelExchange, flag)?;
+    Ok(Use::EXCHANGE)
 }
 
-/// A central difference quotient.
 struct Difference {
     quotient: f64,
     /// Part of the quotient that may come from rounding of the two values.
@@ -609,9 +567,7 @@ impl Difference {
 }
 
 pub fn directional(subject: &Subject, findings: &mut Findings) -> Result<()> {
-    let Some(using) = deriving(subject, "providesDirectionalDerivatives", findings) else {
-        return Ok(());
-    };
+    let using = require_derivatives(subject, "providesDirectionalDerivatives")?;
     let mut session = subject.running(using)?;
     session.advance(2)?;
     for (unknown, knowns) in pairs(subject) {
@@ -655,13 +611,10 @@ pub fn directional(subject: &Subject, findings: &mut Findings) -> Result<()> {
                     last = wider;
                 }
                 for i in wrong {
-                    findings.add(
-                        unknown.place(),
-                        format!(
-                            "its derivative by {} is {:?}, and {:?} by central differences",
-                            known.name, own[i], last[i].quotient
-                        ),
-                    );
+                    findings.at(unknown.place()).add(format!(
+                        "its derivative by {} is {:?}, and {:?} by central differences",
+                        known.name, own[i], last[i].quotient
+                    ));
                 }
             }
         }
@@ -670,12 +623,9 @@ pub fn directional(subject: &Subject, findings: &mut Findings) -> Result<()> {
 }
 
 pub fn adjoint(subject: &Subject, findings: &mut Findings) -> Result<()> {
-    let Some(using) = deriving(subject, "providesAdjointDerivatives", findings) else {
-        return Ok(());
-    };
+    let using = require_derivatives(subject, "providesAdjointDerivatives")?;
     if !subject.can(using.interface, "providesDirectionalDerivatives") {
-        findings.skip("there are no directional derivatives to compare with");
-        return Ok(());
+        return skip("there are no directional derivatives to compare with");
     }
     let mut session = subject.running(using)?;
     session.advance(2)?;
@@ -706,14 +656,11 @@ pub fn adjoint(subject: &Subject, findings: &mut Findings) -> Result<()> {
                     )?[j];
                     let error = (back - forward).abs();
                     if error.is_nan() || error > 1e-12 * forward.abs().max(1e-12) {
-                        findings.add(
-                            unknown.place(),
-                            format!(
+                        findings.at(unknown.place()).add(format!(
                                 "by {} the adjoint derivative is {back:?}, the directional one {forward:?} \
                                  (allowed: the transpose)",
                                 known.name
-                            ),
-                        );
+                            ));
                     }
                 }
             }
@@ -734,10 +681,9 @@ fn follows(after: f64, before: f64) -> bool {
 
 pub fn declared(subject: &Subject, findings: &mut Findings) -> Result<()> {
     if subject.binary(Interface::ModelExchange).is_err() {
-        findings.skip(
+        return skip(
             "it offers no Model Exchange, where a value follows from states and inputs at once",
         );
-        return Ok(());
     }
     let d = &subject.description;
     let states = d.states();
@@ -768,13 +714,10 @@ pub fn declared(subject: &Subject, findings: &mut Findings) -> Result<()> {
                 subject.doing(format!("moving {} and reading {}", known.name, v.name));
                 let after = displaced(&mut session, v, known, &base, element, by)?;
                 if after.iter().zip(&before).any(|(a, b)| follows(*a, *b)) {
-                    findings.add(
-                        format!("line {}, {}, {}", unknown.line, unknown.list, v.name),
-                        format!(
+                    findings.at(format!("line {}, {}, {}", unknown.line, unknown.list, v.name)).add(format!(
                             "it follows {}, which is not among its dependencies: {before:?} becomes {after:?}",
                             known.name
-                        ),
-                    );
+                        ));
                     break;
                 }
             }
@@ -788,8 +731,7 @@ pub fn elements(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let using =
         uses.into_iter().find(|u| subject.can(u.interface, "providesPerElementDependencies"));
     let Some(using) = using else {
-        findings.skip("providesPerElementDependencies is not declared");
-        return Ok(());
+        return skip("providesPerElementDependencies is not declared");
     };
     let d = &subject.description;
     let mut session = subject.running(using)?;
@@ -802,16 +744,13 @@ pub fn elements(subject: &Subject, findings: &mut Findings) -> Result<()> {
         for one in session.instance.dependencies(reference)? {
             let length = d.at(one.independent).map(Variable::length);
             if !listed.contains(&one.independent) {
-                findings.add(
-                    v.place(),
-                    format!(
-                        "it depends on valueReference {}, which is not declared",
-                        one.independent
-                    ),
-                );
+                findings.at(v.place()).add(format!(
+                    "it depends on valueReference {}, which is not declared",
+                    one.independent
+                ));
             } else if one.element > v.length() || length.is_none_or(|n| one.independent_element > n)
             {
-                findings.add(v.place(), format!("{one:?} names an element that is not there"));
+                findings.at(v.place()).add(format!("{one:?} names an element that is not there"));
             }
         }
     }

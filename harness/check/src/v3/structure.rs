@@ -25,17 +25,16 @@ fn compare(
     for unknown in d.unknowns(list) {
         let Some(reference) = unknown.reference else { continue };
         if d.at(reference).is_some_and(|v| !allowed(v)) {
-            findings.add(place(d, unknown), format!("it is not allowed here (allowed: {why})"));
+            findings.at(place(d, unknown)).add(format!("it is not allowed here (allowed: {why})"));
         }
         if !seen.insert(reference) {
-            findings.add(place(d, unknown), "it is listed already");
+            findings.at(place(d, unknown)).add("it is listed already");
         }
     }
     for missing in needed.difference(&seen) {
-        findings.add(
-            format!("{list}, {}", d.name_of(Some(*missing))),
-            format!("it is missing (required: {why})"),
-        );
+        findings
+            .at(format!("{list}, {}", d.name_of(Some(*missing))))
+            .add(format!("it is missing (required: {why})"));
     }
 }
 
@@ -60,7 +59,9 @@ pub fn derivatives(d: &Description, findings: &mut Findings) {
             && let Some(other) =
                 taken.insert(state, v.name.clone()).filter(|other| *other != v.name)
         {
-            findings.add(place(d, unknown), format!("{other} is the derivative of the same state"));
+            findings
+                .at(place(d, unknown))
+                .add(format!("{other} is the derivative of the same state"));
         }
     }
 }
@@ -99,10 +100,9 @@ pub fn structure_references(d: &Description, findings: &mut Findings) {
         let all =
             unknown.reference.into_iter().chain(unknown.dependencies.iter().flatten().copied());
         for reference in all.filter(|r| d.at(*r).is_none()) {
-            findings.add(
-                format!("line {}, {}", unknown.line, unknown.list),
-                format!("no variable has the valueReference {reference}"),
-            );
+            findings
+                .at(format!("line {}, {}", unknown.line, unknown.list))
+                .add(format!("no variable has the valueReference {reference}"));
         }
     }
 }
@@ -113,14 +113,14 @@ pub fn dependencies(d: &Description, findings: &mut Findings) {
         let listed = unknown.dependencies.as_deref().unwrap_or_default();
         let distinct: BTreeSet<_> = listed.iter().collect();
         if distinct.len() < listed.len() {
-            findings.add(&place, "a dependency is listed twice");
+            findings.at(&place).add("a dependency is listed twice");
         }
         let Some(kinds) = &unknown.kinds else { continue };
         if unknown.dependencies.is_none() {
-            findings.add(&place, "dependenciesKind without dependencies");
+            findings.at(&place).add("dependenciesKind without dependencies");
         } else if kinds.len() != listed.len() {
             let (kinds, all) = (kinds.len(), listed.len());
-            findings.add(&place, format!("{all} dependencies, but {kinds} kinds of them"));
+            findings.at(&place).add(format!("{all} dependencies, but {kinds} kinds of them"));
         }
         let is_float = unknown.reference.and_then(|r| d.at(r)).is_none_or(|v| v.is_real());
         for kind in kinds {
@@ -131,7 +131,7 @@ pub fn dependencies(d: &Description, findings: &mut Findings) {
             };
             if !fits {
                 let allowed = if is_float { "dependent, constant" } else { "dependent" };
-                findings.add(&place, format!("dependenciesKind {kind} (allowed: {allowed})"));
+                findings.at(&place).add(format!("dependenciesKind {kind} (allowed: {allowed})"));
             }
         }
     }
@@ -164,10 +164,9 @@ pub fn dependencies_known(d: &Description, findings: &mut Findings) {
                     "inputs, continuous and discrete states, parameters, the independent variable"
                 }
             };
-            findings.add(
-                place(d, unknown),
-                format!("it cannot depend on {} (allowed: {allowed})", v.name),
-            );
+            findings
+                .at(place(d, unknown))
+                .add(format!("it cannot depend on {} (allowed: {allowed})", v.name));
         }
     }
 }

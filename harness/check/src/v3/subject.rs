@@ -152,12 +152,10 @@ impl Subject {
         })
     }
 
-    /// Iterates over the variables whose values rules read.
     pub fn readable(&self) -> impl Iterator<Item = &Variable> {
         self.description.variables.iter().filter(|v| v.is_exchanged())
     }
 
-    /// Iterates over the continuous Float64 inputs, which rules stimulate.
     pub fn inputs(&self) -> impl Iterator<Item = &Variable> {
         let float = host::description::CType::Float64;
         let all = self.description.variables.iter();
@@ -256,7 +254,6 @@ pub struct Session<'s> {
 }
 
 impl Session<'_> {
-    /// Enters initialization mode with the FMU's suggested tolerance.
     pub fn enter_initialization(&mut self) -> Result<()> {
         self.subject.doing("fmi3EnterInitializationMode");
         let tolerance = self.subject.number("tolerance").filter(|t| *t > 0.0);
@@ -329,12 +326,10 @@ impl Session<'_> {
         Ok(info)
     }
 
-    /// Calls fmi3DoStep and updates the time from its results.
     pub fn raw_step(&mut self, h: f64) -> Called<Step> {
         self.raw_step_hearing(h, None)
     }
 
-    /// Calls fmi3DoStep with a callback for intermediate updates.
     pub fn raw_step_hearing(&mut self, h: f64, within: Option<&mut Within>) -> Called<Step> {
         self.subject.doing(format!(
             "fmi3DoStep from {:?} s by {h:?} s ({})",
@@ -515,7 +510,6 @@ impl<'f> Life<'f, Fmi3> for Session<'f> {
     }
 }
 
-/// Formats a value for a finding, with all digits.
 fn shown(value: &Value) -> String {
     match value {
         Value::Real(x) => format!("{x:?}"),

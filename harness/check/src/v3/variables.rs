@@ -17,12 +17,11 @@ pub fn names(d: &Description, findings: &mut Findings) {
         let aliases = aliases.map(|alias| (alias.get("name").unwrap_or_default(), alias.line));
         for (name, line) in [(v.name.as_str(), v.line)].into_iter().chain(aliases) {
             if name.is_empty() {
-                findings.add(format!("line {line}"), "the name is empty");
+                findings.at(format!("line {line}")).add("the name is empty");
             } else if let Some(other) = seen.insert(name, line) {
-                findings.add(
-                    format!("line {line}, {name}"),
-                    format!("line {other} has the same name (allowed: unique over variables and aliases)"),
-                );
+                findings.at(format!("line {line}, {name}")).add(format!(
+                    "line {other} has the same name (allowed: unique over variables and aliases)"
+                ));
             }
         }
     }
@@ -36,14 +35,11 @@ pub fn references(d: &Description, findings: &mut Findings) {
     let mut seen: BTreeMap<u32, &str> = BTreeMap::new();
     for v in &d.variables {
         if let Some(other) = seen.insert(v.reference, &v.name) {
-            findings.add(
-                v.place(),
-                format!(
+            findings.at(v.place()).add(format!(
                     "{other} has the same valueReference, {} (allowed: one variable each; an alias is an \
                      element Alias)",
                     v.reference
-                ),
-            );
+                ));
         }
     }
 }
@@ -91,18 +87,18 @@ pub fn independent(d: &Description, findings: &mut Findings) {
         d.variables.iter().filter(|v| v.causality == Causality::Independent).collect();
     if all.len() != 1 {
         findings
-            .add("ModelVariables", format!("{} independent variables (allowed: one)", all.len()));
+            .at("ModelVariables")
+            .add(format!("{} independent variables (allowed: one)", all.len()));
     }
     for v in all {
         if !v.is_real() {
-            findings.add(v.place(), "the independent variable is not a Float64 or Float32");
+            findings.at(v.place()).add("the independent variable is not a Float64 or Float32");
         }
         for attribute in ["initial", "start", "min", "max"] {
             if v.written.get(attribute).is_some() {
-                findings.add(
-                    v.place(),
-                    format!("the independent variable has {attribute} (allowed: none)"),
-                );
+                findings
+                    .at(v.place())
+                    .add(format!("the independent variable has {attribute} (allowed: none)"));
             }
         }
     }
@@ -137,19 +133,15 @@ pub fn clocks(d: &Description, findings: &mut Findings) {
             let list: Vec<Option<&Variable>> =
                 clocks.split_whitespace().map(|r| d.at(r.parse().ok()?)).collect();
             if list.is_empty() || list.iter().any(|c| c.is_none_or(|c| c.kind != Type::Clock)) {
-                findings.add(
-                    v.place(),
-                    format!("clocks=\"{clocks}\" (allowed: value references of clocks)"),
-                );
+                findings
+                    .at(v.place())
+                    .add(format!("clocks=\"{clocks}\" (allowed: value references of clocks)"));
             }
             if !matches!(v.variability, Variability::Discrete | Variability::Tunable) {
-                findings.add(
-                    v.place(),
-                    format!(
-                        "clocks with variability {} (allowed: discrete, tunable)",
-                        v.variability
-                    ),
-                );
+                findings.at(v.place()).add(format!(
+                    "clocks with variability {} (allowed: discrete, tunable)",
+                    v.variability
+                ));
             }
         }
         let Some(text) = v.written.get("previous") else { continue };
@@ -161,19 +153,16 @@ pub fn clocks(d: &Description, findings: &mut Findings) {
                 && of.causality != Causality::Input
         });
         if !fits {
-            findings.add(
-                v.place(),
-                format!(
+            findings.at(v.place()).add(format!(
                     "previous=\"{text}\" (allowed: another discrete variable of the same type that is no \
                      input)"
-                ),
-            );
+                ));
         }
         if clocks.is_none() || v.variability != Variability::Discrete {
-            findings.add(v.place(), "previous of a variable that is not clocked and discrete");
+            findings.at(v.place()).add("previous of a variable that is not clocked and discrete");
         }
         if let Some(other) = previous.insert(text.trim(), &v.name) {
-            findings.add(v.place(), format!("{other} has the same previous"));
+            findings.at(v.place()).add(format!("{other} has the same previous"));
         }
     }
 }
@@ -184,13 +173,15 @@ pub fn dimensions(d: &Description, findings: &mut Findings) {
             let place = format!("line {}, Dimension of {}", dimension.line, v.name);
             match (dimension.get("start"), dimension.get("valueReference")) {
                 (Some(_), Some(_)) => {
-                    findings.add(place, "start and valueReference (allowed: one of them)");
+                    findings.at(place).add("start and valueReference (allowed: one of them)");
                 }
                 (None, None) => {
-                    findings.add(place, "neither start nor valueReference (allowed: one of them)");
+                    findings
+                        .at(place)
+                        .add("neither start nor valueReference (allowed: one of them)");
                 }
                 (Some(start), None) if start.trim() == "0" => {
-                    findings.add(place, "start=0 (allowed: above 0)");
+                    findings.at(place).add("start=0 (allowed: above 0)");
                 }
                 (Some(_), None) => {}
                 (None, Some(reference)) => {
@@ -201,18 +192,14 @@ pub fn dimensions(d: &Description, findings: &mut Findings) {
                                 || of.variability == Variability::Constant)
                     });
                     if !fits {
-                        findings.add(
-                            place,
-                            format!(
+                        findings.at(place).add(format!(
                                 "valueReference={reference} (allowed: a structural parameter or a constant, of \
                                  type UInt64)"
-                            ),
-                        );
+                            ));
                     } else if of.is_some_and(|of| of.starts.first().is_none_or(|s| s == "0")) {
-                        findings.add(
-                            place,
-                            format!("valueReference={reference} has no start above 0 (required)"),
-                        );
+                        findings.at(place).add(format!(
+                            "valueReference={reference} has no start above 0 (required)"
+                        ));
                     }
                 }
             }
