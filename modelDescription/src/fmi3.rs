@@ -19,7 +19,6 @@ use crate::{
     type_definitions, unit, unknown, unknowns, variability, with_type_attributes,
 };
 
-/// Returns the path of the committed XML.
 pub fn path<M: Model>(layout: Layout) -> PathBuf {
     folder::<M>().join(match layout {
         Layout::Scalars => "fmi3/modelDescription.xml",
@@ -131,7 +130,6 @@ fn array<M: Model>(v: &'static Variable<M>) -> Element {
     entry_element(Layout::Arrays, v, named, &description, own).holding(v.shape.iter().map(size))
 }
 
-/// Finds an entry of the table by its name.
 fn entry<M: Model>(name: &str) -> Option<&'static Variable<M>> {
     M::table().variables.iter().find(|v| v.name == name)
 }

@@ -11,7 +11,6 @@ use sha2::{Digest, Sha256};
 pub const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/icon");
 pub const SIZE: u32 = 512;
 
-/// Draws the picture from the text of the SVG.
 #[cfg(feature = "icon")]
 pub fn draw(svg: &str) -> Result<resvg::tiny_skia::Pixmap, resvg::usvg::Error> {
     use resvg::{tiny_skia, usvg};

@@ -316,7 +316,6 @@ fn unknowns<M: Model>(
     unknowns.into_iter().map(one).collect()
 }
 
-/// Returns an element of ModelStructure with its dependencies.
 fn unknown(
     element: &'static str,
     attribute: &'static str,

@@ -19,7 +19,6 @@ use zip::{CompressionMethod, ZipReadOptions, read::OwnedZipFileEntry};
 
 use crate::xml;
 
-/// Largest number of entries in an archive.
 pub const MOST_ENTRIES: usize = 20_000;
 /// Longest name of an entry, bytes. Windows opens paths of up to 259 characters.
 pub const LONGEST_NAME: usize = 1024;
@@ -30,7 +29,6 @@ pub const UNPACKED: u64 = 64 << 20;
 pub const UNPACKED_PER_BYTE: u64 = 8;
 pub const DESCRIPTION: &str = "modelDescription.xml";
 
-/// An entry in the directory of the archive.
 pub struct Entry {
     /// Name as it stands in the archive; bytes that are not UTF-8 are replaced.
     pub name: String,
@@ -79,7 +77,6 @@ pub fn place(name: &str) -> String {
     name.trim_end_matches('/').split('/').map(part).collect::<Vec<_>>().join("/")
 }
 
-/// An archive whose directory has been read.
 pub struct Archive {
     file: File,
     /// Entries in the order of the zip directory, with repeated names, up to the first fault.
@@ -208,7 +205,6 @@ impl Archive {
         Ok(())
     }
 
-    /// Unpacks a file of the archive into memory.
     pub fn content(&self, entry: &Entry) -> Result<Vec<u8>> {
         let mut content = Vec::new();
         self.copy(entry, &mut content)?;
@@ -240,7 +236,6 @@ impl Archive {
         files::output::hash_reader(file)
     }
 
-    /// Checks the archive and returns the text of modelDescription.xml.
     pub fn description(&self) -> Result<String> {
         self.check()?;
         let entry = self.entries.iter().find(|entry| entry.name == DESCRIPTION);

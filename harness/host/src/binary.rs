@@ -22,7 +22,6 @@ pub const GLIBC: Version = Version(2, 17);
 /// Newest version of macOS that a binary may need: the first one for both architectures.
 pub const MACOS: Version = Version(11, 0);
 
-/// Number of unexpected exports that a message names.
 const NAMED: usize = 8;
 
 /// Libraries that are part of glibc.
@@ -52,7 +51,6 @@ const WINDOWS_LIBRARIES: [&str; 12] = [
     "userenv.dll",
     "ws2_32.dll",
 ];
-/// Libraries that come with macOS.
 const MACOS_LIBRARIES: [&str; 5] = [
     "/System/Library/Frameworks/CoreFoundation.framework/Versions/A/CoreFoundation",
     "/usr/lib/libSystem.B.dylib",
@@ -61,7 +59,6 @@ const MACOS_LIBRARIES: [&str; 5] = [
     "/usr/lib/libiconv.2.dylib",
 ];
 
-/// Major and minor version.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Version(pub u32, pub u32);
 
@@ -71,7 +68,6 @@ impl fmt::Display for Version {
     }
 }
 
-/// Format of a binary.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     Linux,
@@ -100,7 +96,6 @@ pub struct Binary {
     pub architectures: Vec<&'static str>,
     /// Names of the libraries that the loader must find.
     pub libraries: Vec<String>,
-    /// Folders in which the binary tells the loader to search.
     pub search_paths: Vec<String>,
     /// Newest version of glibc (Linux) or macOS that the binary needs.
     pub needs: Option<Version>,

@@ -19,11 +19,9 @@ use crate::symbol::readable;
 
 pub mod version;
 
-/// `fmi2Status` and `fmi3Status`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Status {
     Ok,
-    /// The call succeeded, with a message that the user should read.
     Warning,
     /// The FMU refused the step, because it cannot compute it.
     Discard,
@@ -46,7 +44,6 @@ impl From<c_int> for Status {
     }
 }
 
-/// Collects the messages of one instance.
 #[derive(Default)]
 struct Sink {
     messages: Mutex<Vec<Message>>,
@@ -63,7 +60,6 @@ static SINKS: Mutex<BTreeMap<usize, Arc<Sink>>> = Mutex::new(BTreeMap::new());
 static FOREIGN: AtomicUsize = AtomicUsize::new(0);
 
 thread_local! {
-    /// Environment of the instance that this thread called last.
     static CALLED: Cell<usize> = const { Cell::new(0) };
 }
 
@@ -99,7 +95,6 @@ impl Environment {
         Arc::as_ptr(&self.sink) as usize
     }
 
-    /// Returns the environment pointer for the FMU.
     pub(crate) fn pointer(&self) -> *mut c_void {
         Arc::as_ptr(&self.sink).cast_mut().cast()
     }
@@ -110,7 +105,6 @@ impl Environment {
         CALLED.set(self.address());
     }
 
-    /// Returns the messages since the last call of this function.
     pub(crate) fn take(&self) -> Vec<Message> {
         std::mem::take(&mut *self.sink.lock())
     }
@@ -186,7 +180,6 @@ pub(crate) fn pointer(text: &Option<CString>) -> *const c_char {
     text.as_ref().map_or(null(), |text| text.as_ptr())
 }
 
-/// A message that an FMU has logged.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Message {
     pub status: Status,
@@ -210,7 +203,6 @@ pub struct CallError {
     pub call: &'static str,
     /// The status, or `Error` if a function returned NULL instead of an instance.
     pub status: Status,
-    /// Messages that the FMU logged during the call.
     pub messages: Vec<Message>,
 }
 
@@ -284,7 +276,6 @@ pub(crate) use functions;
 /// State of the process that an FMU shares with its host and must not change.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct HostState {
-    /// Rounding mode, exception masks, and flushing of subnormal numbers to zero.
     pub float_control: u32,
     pub locale: String,
     /// Hash of the installed signal handlers; 0 on systems without them.
@@ -332,14 +323,11 @@ fn files_below(folder: &Path) -> Vec<PathBuf> {
     below.collect()
 }
 
-/// A loaded library of an FMU.
 pub(crate) struct Loaded {
     pub library: Library,
     /// SHA-256 of the file, in hexadecimal digits.
     pub hash: String,
-    /// Parts of the process state that loading the library has changed.
     pub changed: Vec<&'static str>,
-    /// Path within the FMU.
     pub binary: String,
 }
 
@@ -416,7 +404,6 @@ fn needs(error: &str) -> &'static str {
     }
 }
 
-/// Lists the functions of `symbols` that a library does not export.
 pub(crate) fn lacking(library: &Library, symbols: &[&'static str]) -> Vec<&'static str> {
     let is_there = |symbol: &&&str| {
         // SAFETY: only asked whether the symbol is there.

@@ -15,7 +15,6 @@ use crate::archive::Archive;
 use crate::causality::{Causality, Variability};
 use crate::xml::Element;
 
-/// The root element `fmiModelDescription`.
 #[derive(Clone, Debug)]
 pub struct ModelDescription {
     /// FMI version, for example "2.0" or "3.0".
@@ -34,7 +33,6 @@ pub struct ModelDescription {
     pub model_exchange: Option<Interface>,
     pub units: Vec<Unit>,
     pub types: Vec<SimpleType>,
-    /// Suggested start and stop time, tolerance and step.
     pub default_experiment: DefaultExperiment,
     /// The variables in the order of the file. The elements of an array follow each other in row-major order.
     pub variables: Vec<Variable>,
@@ -47,7 +45,6 @@ pub struct ModelDescription {
     elements: BTreeMap<u32, ArrayElement>,
 }
 
-/// An array variable of FMI 3.0.
 #[derive(Clone, Debug)]
 pub struct Array {
     pub length: usize,
@@ -58,15 +55,12 @@ pub struct Array {
     pub(crate) is_resized: bool,
 }
 
-/// Position of an element in an array.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ArrayElement {
     pub array: u32,
-    /// Row-major index, from 0.
     pub index: usize,
 }
 
-/// The element `CoSimulation` or `ModelExchange`.
 #[derive(Clone, Debug)]
 pub struct Interface {
     pub model_identifier: String,
@@ -77,7 +71,6 @@ pub struct Interface {
     pub directional_derivatives: bool,
 }
 
-/// The element `DefaultExperiment`.
 #[derive(Clone, Debug, Default)]
 pub struct DefaultExperiment {
     pub start_time: Option<f64>,
@@ -97,10 +90,8 @@ pub struct Unit {
 /// The element `BaseUnit` of FMI and SSP: value in SI base units = `factor` · value + `offset`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BaseUnit {
-    /// Exponents of the base units [`BaseUnit::NAMES`].
     pub exponents: [i32; 8],
     pub factor: f64,
-    /// Offset in SI base units.
     pub offset: f64,
 }
 
@@ -130,21 +121,17 @@ impl BaseUnit {
 pub struct DisplayUnit {
     pub name: String,
     pub factor: f64,
-    /// Offset in the display unit.
     pub offset: f64,
 }
 
 #[derive(Clone, Debug)]
 pub struct SimpleType {
-    /// Name that variables use as `declaredType`.
     pub name: String,
-    /// Unit of those variables of this type that declare none.
     pub unit: Option<String>,
     /// Items, if the type is an enumeration.
     pub items: Vec<Item>,
 }
 
-/// Item of an enumeration.
 #[derive(Clone, Debug)]
 pub struct Item {
     pub name: String,
@@ -173,16 +160,12 @@ pub struct Variable {
 pub struct Attributes {
     pub start: Option<String>,
     pub unit: Option<String>,
-    /// Unit in which users prefer to read the value.
     pub display_unit: Option<String>,
-    /// Smallest value, as written.
     pub min: Option<String>,
-    /// Largest value, as written.
     pub max: Option<String>,
     pub declared_type: Option<String>,
 }
 
-/// Type of a variable, as users see it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Type {
     Real,
@@ -190,9 +173,7 @@ pub enum Type {
     Boolean,
     String,
     Enumeration,
-    /// Bytes, which this host does not exchange.
     Binary,
-    /// A clock, which this host does not exchange.
     Clock,
 }
 
@@ -272,7 +253,6 @@ impl Value {
         }
     }
 
-    /// Returns the value as a start attribute has it.
     fn text(&self) -> String {
         match self {
             Value::Real(x) => x.to_string(),
@@ -310,7 +290,6 @@ fn short(text: &str) -> String {
     }
 }
 
-/// Reads elements and collects everything that is wrong with them.
 #[derive(Default)]
 struct Reader {
     is_fmi3: bool,
@@ -521,7 +500,6 @@ impl Reader {
         }
     }
 
-    /// Reads a variable of FMI 3.0 and its start values.
     fn variable3(
         &mut self,
         element: &Element,
@@ -631,7 +609,6 @@ const LONGEST_NAME: usize = 1024;
 /// Largest number of types, and of items of one type. They are limited because each declaredType is searched
 /// among all types.
 const MOST_TYPES: usize = 5000;
-/// Largest number of elements of all arrays together.
 const MOST_ELEMENTS: usize = 100_000;
 const NAMED: usize = 20;
 
@@ -671,7 +648,6 @@ impl ModelDescription {
         self.elements.get(&reference).copied()
     }
 
-    /// Returns the array with this value reference.
     pub fn array(&self, reference: u32) -> Option<&Array> {
         self.arrays.get(&reference)
     }
@@ -680,7 +656,6 @@ impl ModelDescription {
         self.arrays.iter().map(|(reference, array)| (*reference, array))
     }
 
-    /// Sets the start values of an array, one for each element.
     pub(crate) fn set_starts(&mut self, array: u32, values: &[Value]) {
         let texts: Vec<String> = values.iter().map(Value::text).collect();
         for variable in &mut self.variables {
@@ -713,7 +688,6 @@ impl ModelDescription {
         ModelDescription::from_element(&root, set)
     }
 
-    /// Reads the description from the parsed file, as [`ModelDescription::from_xml_with`] does.
     pub(crate) fn from_element(root: &Element, set: &BTreeMap<u32, Value>) -> Result<Self> {
         // Checked first, because an FMU of another version would otherwise be reported as incomplete.
         let version = root.get("fmiVersion").unwrap_or("2.0");
@@ -800,7 +774,6 @@ impl ModelDescription {
         variable.attributes.unit.as_ref().or_else(declared).map_or("", String::as_str)
     }
 
-    /// Returns the units in which users may also enter a variable.
     pub fn display_units(&self, variable: &Variable) -> &[DisplayUnit] {
         let own = self.unit(variable);
         let defined = self.units.iter().find(|unit| unit.name == own);

@@ -11,12 +11,9 @@ use crate::description::{ModelDescription, Type, Value, Variable};
 use crate::exchange;
 use crate::fmu::Instance;
 
-/// The inputs that a host sets during a run.
 pub struct Inputs {
-    /// Value references of the Reals, and their positions among the inputs.
     references: Vec<u32>,
     places: Vec<usize>,
-    /// The inputs that are not Reals, with their positions.
     discrete: Vec<(usize, Variable)>,
     /// True if the FMU accepts slopes of inputs.
     sloped: bool,
@@ -33,7 +30,6 @@ const JUMP: f64 = 1e-9;
 
 /// Values of the inputs between two communication points, in the order of the inputs.
 pub struct Course<'a> {
-    /// Values at the communication point.
     pub values: &'a mut [f64],
     /// Time derivatives until the next communication point, per s. They are ignored if the FMU cannot
     /// interpolate or the inputs are held.
@@ -157,7 +153,6 @@ impl Inputs {
         Ok(())
     }
 
-    /// Selects the Reals among the values of all inputs.
     fn reals<'a>(&self, values: &'a [f64]) -> Cow<'a, [f64]> {
         match self.discrete.is_empty() {
             true => Cow::Borrowed(values),

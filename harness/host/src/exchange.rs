@@ -18,7 +18,6 @@ use crate::fmu::Instance;
 const LOCATED: f64 = 1e-13;
 /// Smallest distance of two events, as a fraction of the distance between two rows.
 const APART: f64 = 1e-6;
-/// Largest number of steps between two rows by default.
 pub const MOST_STEPS: usize = 100_000;
 
 const C: [f64; 6] = [0.0, 0.2, 0.3, 0.8, 8.0 / 9.0, 1.0];
@@ -42,7 +41,6 @@ const E: [f64; 7] = [
     22.0 / 525.0,
     -1.0 / 40.0,
 ];
-/// Weights of the fifth term of the continuous extension.
 const D: [f64; 7] = [
     -12715105075.0 / 11282082432.0,
     0.0,
@@ -53,7 +51,6 @@ const D: [f64; 7] = [
     69997945.0 / 29380423.0,
 ];
 
-/// A simulation of an initialised instance by the host's solver.
 pub struct Run<I> {
     instance: I,
     t: f64,
@@ -97,7 +94,6 @@ impl<'fmu, I: DerefMut<Target = Instance<'fmu>>> Run<I> {
         &mut self.instance
     }
 
-    /// Sets inputs that are not Reals, which is an event.
     pub fn change(&mut self, set: impl FnOnce(&mut Instance<'fmu>) -> Called) -> Result<()> {
         self.instance.enter_event_mode()?;
         set(&mut self.instance)?;

@@ -24,7 +24,6 @@ use crate::xml::Element;
 
 pub mod guarded;
 
-/// An FMU 2.0 whose binary is loaded.
 pub type Fmu = version::Fmu<Fmi2>;
 pub type Instance<'fmu> = version::Instance<'fmu, Fmi2>;
 
@@ -509,9 +508,7 @@ impl Drop for Given {
     }
 }
 
-/// fmi2Type for an instance that the host integrates.
 pub const MODEL_EXCHANGE: i32 = 0;
-/// fmi2Type for an instance that integrates itself.
 pub const CO_SIMULATION: i32 = 1;
 
 /// fmi2StatusKind that asks whether the FMU requests the end of the simulation.
@@ -521,18 +518,13 @@ pub const TERMINATED: i32 = 3;
 #[derive(Clone, Debug)]
 pub struct Instantiation<'a> {
     pub name: Option<&'a str>,
-    /// fmi2Type: [`CO_SIMULATION`] or [`MODEL_EXCHANGE`].
     pub kind: i32,
-    /// GUID that the host expects.
     pub guid: Option<&'a str>,
-    /// URI of the folder with the unpacked resources.
     pub resources: Option<&'a str>,
     pub callbacks: Callbacks,
-    /// Value of loggingOn.
     pub logging: bool,
 }
 
-/// Callbacks that are passed to fmi2Instantiate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Callbacks {
     Full,
@@ -560,7 +552,6 @@ impl<'fmu> Instance<'fmu> {
         self.fmu.own.events.as_ref().expect("the FMU exports the functions of model exchange")
     }
 
-    /// Calls fmi2SetupExperiment: times in s, `tolerance` is relative.
     pub fn setup_experiment(
         &mut self,
         tolerance: Option<f64>,

@@ -24,7 +24,6 @@ use crate::causality::Causality;
 use crate::description::{CType, Value};
 use crate::xml::Element;
 
-/// An FMU 3.0 whose binary is loaded.
 pub type Fmu = version::Fmu<Fmi3>;
 pub type Instance<'fmu> = version::Instance<'fmu, Fmi3>;
 
@@ -146,10 +145,8 @@ pub trait Exchanged: Copy + Default {
     #[allow(private_interfaces)]
     fn calls(functions: &Functions) -> (Function<Get<Self>>, Function<Set<Self>>);
 
-    /// Converts a number of this type to a [`Value`].
     fn value(self) -> Value;
 
-    /// Converts a [`Value`] that is within the bounds of this type.
     fn from_value(value: &Value) -> Self;
 }
 
@@ -221,17 +218,14 @@ macro_rules! numbers {
 
 // ---------------------------------------------------------------- callbacks
 
-/// Callbacks and results of an instance's steps.
 pub struct Stepping {
     component: Cell<Component>,
     functions: *const Functions,
     /// Valid during one call of fmi3DoStep, otherwise NULL.
     within: Cell<*mut Within<'static>>,
-    /// Number of calls of intermediateUpdate.
     updates: Cell<usize>,
     /// Memory for the inputs of a step, which is used again in every step.
     line: Cell<Line>,
-    /// The pointer that the FMU passes back to intermediateUpdate.
     environment: *mut c_void,
 }
 
@@ -288,13 +282,9 @@ extern "C" fn intermediate_update(
 /// A point within a step at which the FMU has called intermediateUpdate (section 4.2.2).
 pub struct Update<'a> {
     pub time: f64,
-    /// intermediateVariableSetRequested: inputs may be set.
     pub set_requested: bool,
-    /// intermediateVariableGetAllowed: variables may be read.
     pub get_allowed: bool,
-    /// intermediateStepFinished: the FMU's solver has finished a step of its own.
     pub step_finished: bool,
-    /// canReturnEarly: the host may request an early return.
     pub can_return_early: bool,
     stepping: &'a Stepping,
 }
@@ -600,9 +590,7 @@ type Nobody = fn(&Update) -> Option<f64>;
 pub struct Instantiation<'a> {
     pub name: Option<&'a str>,
     pub interface: Interface,
-    /// instantiationToken that the host expects.
     pub token: Option<&'a str>,
-    /// Path of the folder with the unpacked resources.
     pub resources: Option<&'a str>,
     pub logging: bool,
     pub event_mode: bool,
@@ -644,7 +632,6 @@ pub struct EventInfo {
 pub struct Dependency {
     /// Element of the dependent variable, from 1; 0 means all elements.
     pub element: usize,
-    /// Value reference of the independent variable.
     pub independent: u32,
     /// Element of the independent variable, from 1; 0 means all elements.
     pub independent_element: usize,
@@ -660,12 +647,10 @@ impl<'fmu> Instance<'fmu> {
         self.fmu.own.stepping.as_ref().expect("the FMU exports the functions of co-simulation")
     }
 
-    /// Returns how often the FMU has called intermediateUpdate.
     pub fn updates(&self) -> usize {
         self.kept.updates.get()
     }
 
-    /// Calls fmi3EnterInitializationMode: times in s, `tolerance` is relative.
     pub fn enter_initialization_mode(
         &mut self,
         tolerance: Option<f64>,
@@ -716,7 +701,6 @@ impl<'fmu> Instance<'fmu> {
         self.do_step_hearing(time, step, None)
     }
 
-    /// Calls fmi3DoStep; `within` is called for each intermediate update.
     pub fn do_step_hearing(
         &mut self,
         time: f64,
@@ -819,8 +803,6 @@ impl<'fmu> Instance<'fmu> {
         Ok(answer)
     }
 
-    /// Calls fmi3GetVariableDependencies for as many dependencies as fmi3GetNumberOfVariableDependencies
-    /// returns.
     pub fn dependencies(&mut self, reference: u32) -> Called<Vec<Dependency>> {
         let mut n = 0;
         self.call(self.functions().number_of_dependencies, |f, c| unsafe {

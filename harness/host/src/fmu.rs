@@ -65,7 +65,6 @@ impl Fmu {
         Fmu::open_for(interface, path, settings)
     }
 
-    /// Opens a packed FMU for one interface; `settings` as in [`Fmu::open_with`].
     pub fn open_for(
         interface: Interface,
         path: impl AsRef<Path>,
@@ -130,7 +129,6 @@ macro_rules! passed_on {
 }
 
 passed_on! {
-    /// Returns the messages since the last call of this function.
     take_messages() -> Vec<Message>;
     /// Returns the texts of the warnings since the last call, and drops all other messages.
     take_warnings() -> Vec<String>;
@@ -143,7 +141,6 @@ passed_on! {
     free_state(state: State) -> Called;
     get_real(references: &[u32], values: &mut [f64]) -> Called;
     set_real(references: &[u32], values: &[f64]) -> Called;
-    /// Reads a variable of the FMU's description.
     value(variable: &Variable) -> Called<Value>;
     /// Sets a variable or one element of an array. The other elements keep the values that were set last, or
     /// their start values.
@@ -236,12 +233,10 @@ impl<'fmu> Instance<'fmu> {
         }
     }
 
-    /// Updates the discrete states once, in event mode.
     pub fn update_discrete_states(&mut self) -> Called<Updated> {
         each!(Instance, self, instance => Version::update(instance))
     }
 
-    /// Returns the numbers of continuous states and of event indicators.
     pub fn sizes(&mut self) -> Called<(usize, usize)> {
         each!(Instance, self, instance => Version::sizes(instance))
     }

@@ -33,9 +33,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail};
 use files::{bug, temporary};
 
-/// The argument with which `hubslosh` becomes a guarded process.
 pub const OPTION: &str = "--guarded";
-/// Default time limit for one call of an FMU.
 pub const CALL: Duration = Duration::from_secs(8);
 /// Default limit of the memory that an FMU may allocate, bytes.
 pub const MEMORY: u64 = 320 << 20;
@@ -51,7 +49,6 @@ pub const FLOOD_SHOWN: u64 = 4 << 30;
 
 #[derive(Clone, Debug)]
 pub struct Limits {
-    /// Time limit for one call of an FMU.
     pub call: Duration,
     /// Time limit for the whole process, if there is one.
     pub total: Option<Duration>,
@@ -62,10 +59,8 @@ pub struct Limits {
     pub file: u64,
 }
 
-/// Reason for the end of a process.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Cause {
-    /// The process called [`done`] with this code.
     Done(u8),
     Ended(ExitStatus),
     /// The process was killed because a call of the FMU did not return in time.
@@ -99,10 +94,8 @@ impl Outcome {
     }
 }
 
-/// Treatment of a process's output.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Output {
-    /// The output is stored for the parent.
     Kept,
     /// The process writes to the parent's stdout and stderr; the output of the FMU's binary goes to stderr.
     Shown,
@@ -112,7 +105,6 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Identifiers of the guarded processes that are running.
 static RUNNING: Mutex<BTreeSet<u32>> = Mutex::new(BTreeSet::new());
 
 /// Runs a program that calls [`enter`], until it and all processes that it has started have ended. `hear`
@@ -243,9 +235,7 @@ fn watch(
 /// Longest time between the end of the connection and the end of the process.
 const CLOSED: Duration = Duration::from_secs(1);
 
-/// Interval at which temporary files and shared memory are measured.
 const COUNTING: Duration = Duration::from_millis(50);
-/// Largest number of files and folders that are measured.
 const COUNTED: usize = 100_000;
 
 /// Returns the disk space of the files below a folder, bytes.
@@ -403,7 +393,6 @@ fn kill_descendants(_: &Path) -> bool {
     false
 }
 
-/// Messages from a process.
 struct News<F> {
     channel: channel::Parent,
     hear: F,
@@ -421,11 +410,9 @@ const ALIVE: u8 = b'.';
 const ENDLESS: u8 = b'!';
 /// The first binary is loaded. Content: size of the temporary files, bytes.
 const LOADS: u8 = b'+';
-/// An answer for the caller of [`run`].
 const ANSWER: u8 = b'>';
 /// Our code has panicked. Content: the report.
 const PANICS: u8 = b'?';
-/// Our code has caught its panic.
 const CATCHES: u8 = b'-';
 /// The work is done. Content: the exit code.
 const DONE: u8 = b'=';
@@ -716,7 +703,6 @@ fn restrict(resource: rustix::process::Resource, bytes: u64) {
     let _ = rustix::process::setrlimit(resource, limit);
 }
 
-/// The limits with which this process was started.
 #[cfg(unix)]
 static GIVEN: Mutex<std::collections::BTreeMap<u32, Option<u64>>> =
     Mutex::new(std::collections::BTreeMap::new());

@@ -18,21 +18,18 @@ use crate::xml::Element;
 pub struct ParameterSet {
     /// Parameters in the order of the file; each name occurs once.
     pub parameters: Vec<Parameter>,
-    /// Reasons why the values may be wrong.
     pub warnings: Vec<String>,
 }
 
 #[derive(Clone, Debug)]
 pub struct Parameter {
     pub name: String,
-    /// Value in `unit`.
     pub value: Value,
     /// Unit in the file; without one the value is in the unit of the FMU's variable.
     pub unit: Option<Unit>,
     line: u64,
 }
 
-/// Unit of a parameter in a file.
 #[derive(Clone, Debug)]
 pub struct Unit {
     pub name: String,
@@ -122,7 +119,6 @@ fn once(parameters: Vec<Parameter>) -> Result<ParameterSet> {
     Ok(ParameterSet { parameters, warnings: Vec::new() })
 }
 
-/// Reads TOML. Nested tables become names with dots.
 fn from_toml(text: &str) -> Result<ParameterSet> {
     fn flatten(
         prefix: &str,
@@ -198,7 +194,6 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for Entries<T> {
     }
 }
 
-/// The parts of an identification's result that are used here.
 #[derive(Deserialize)]
 struct Identified {
     parameters: Option<Entries<serde_json::Value>>,
@@ -279,7 +274,6 @@ fn keep_parameters_of_one_run(found: ParameterSet) -> ParameterSet {
     ParameterSet { parameters, warnings }
 }
 
-/// Reads the parameter set of SSP 1.0 and 2.0 ("SystemStructureParameterValues").
 fn from_ssv(text: &str) -> Result<ParameterSet> {
     let root = Element::parse(text.as_bytes())?;
     ensure!(root.name == "ParameterSet", "its root is {}, not ParameterSet", root.name);

@@ -12,13 +12,10 @@ use roxmltree::{Document, Node};
 
 pub const START_VALUES: &str = "resources/start_values.txt";
 
-/// Limit of a parameter that determines the size of arrays.
 #[derive(Clone, Copy, Debug)]
 pub struct Limit<'a> {
     pub parameter: &'a str,
-    /// Largest value of the parameter in the reduced description.
     pub size: usize,
-    /// Largest value of the parameter in the full description.
     pub most: usize,
     /// True if each element has event indicators of its own.
     pub has_indicators: bool,
@@ -26,7 +23,6 @@ pub struct Limit<'a> {
     pub arrays: &'a [(&'a str, usize)],
 }
 
-/// A model description with part of the variables.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Part {
     pub xml: String,
@@ -177,7 +173,6 @@ fn is_indicator(name: &str) -> Option<usize> {
     name.strip_prefix("event_indicator[")?.strip_suffix(']')?.parse().ok()
 }
 
-/// Returns the number of event indicators within the limits.
 fn indicators(root: &Node, limits: &[Limit]) -> usize {
     let named = |node: &Node| node.attribute("name").and_then(is_indicator).is_some();
     let all = match root.attribute("numberOfEventIndicators") {
@@ -193,11 +188,9 @@ fn child<'a>(root: &Node<'a, 'a>, name: &str) -> Result<Node<'a, 'a>> {
     found.with_context(|| format!("modelDescription.xml has no {name}"))
 }
 
-/// Replacements of ranges in a text.
 struct Edits(Vec<(Range<usize>, String)>);
 
 impl Edits {
-    /// Removes an element and the white space before it.
     fn remove(&mut self, xml: &str, node: &Node) {
         let range = node.range();
         let begin = xml[..range.start].trim_end().len();

@@ -139,7 +139,6 @@ impl Cursor<'_> {
     }
 }
 
-/// Communication points of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Schedule {
     /// Times, ascending, s.

@@ -4,7 +4,6 @@ use std::fmt::{self, Write};
 
 use cpp_demangle::{DemangleOptions, Symbol};
 
-/// Number of characters of a name that are shown.
 const LONGEST: usize = 60;
 
 /// The beginning of a name. Writing fails when it is full, because short symbols of C++ may have extremely

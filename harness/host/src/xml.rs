@@ -4,13 +4,11 @@ use std::borrow::Cow;
 
 use roxmltree::{Document, Error, Node};
 
-/// Largest nesting depth; a model description has eight levels.
 pub const DEEPEST: usize = 256;
 /// Largest file, bytes. This and the next two limits allow a hundred thousand variables, whose description
 /// has 27 MB and takes 0.6 GB of memory.
 pub const LONGEST: usize = 32 << 20;
 pub const MOST: usize = 400_000;
-/// Largest number of attributes of all elements together.
 pub const MOST_ATTRIBUTES: usize = 1_000_000;
 /// Largest number of attributes of one element; FMI uses up to 13.
 pub const MOST_OF_ONE: usize = 200;
@@ -162,7 +160,6 @@ impl Element {
         matches!(self.get(attribute).map(str::trim), Some("true" | "1"))
     }
 
-    /// Returns the first child element with this name.
     pub fn child(&self, name: &str) -> Option<&Element> {
         self.children.iter().find(|child| child.name == name)
     }

@@ -16,13 +16,11 @@ use crate::fmi::Fmi;
 /// because some hosts expect that.
 pub type Files = Vec<(String, Vec<u8>)>;
 
-/// Highest compression level of Deflate.
 const QUICK: i64 = 9;
 /// Above 9 the crate `zip` uses Zopfli, with one iteration per level above that. Five iterations would make a
 /// binary smaller by 0.2 % and take a third longer.
 const SMALL: i64 = 10;
 
-/// A binary that is packed into an FMU.
 pub struct Packed {
     pub folder: &'static str,
     pub ending: &'static str,
@@ -30,13 +28,11 @@ pub struct Packed {
 }
 
 impl Packed {
-    /// Reads the binary for the platform on which this program runs.
     pub fn native(binary: &Path) -> Result<Packed> {
         let bytes = read(binary)?;
         Ok(Packed { folder: PLATFORM, ending: std::env::consts::DLL_SUFFIX, bytes })
     }
 
-    /// Returns the binary's path in an FMU 2.0 with this modelIdentifier.
     pub fn name(&self, identifier: &str) -> String {
         format!("binaries/{}/{identifier}{}", self.folder, self.ending)
     }

@@ -18,7 +18,6 @@ use files::output::sha256;
 use host::description::ModelDescription;
 use serde_json::json;
 
-/// Licence of the project's own parts, SPDX.
 const OWN: &str = "MIT OR Apache-2.0";
 pub const OWN_TEXTS: [&str; 2] = ["LICENSE-MIT", "LICENSE-APACHE"];
 
@@ -28,14 +27,11 @@ pub struct Component {
     /// Version; `None` if it is the version of the tool that linked it.
     pub version: Option<String>,
     pub licence: String,
-    /// Files with the text of the licence, in `documentation/licenses/`.
     pub texts: Vec<String>,
     pub purl: String,
     /// SHA-256 of the package, if Cargo.lock has it.
     pub sha256: Option<String>,
-    /// Source and purpose of the component.
     pub origin: String,
-    /// Folders under `binaries/` whose binary contains the component.
     pub platforms: BTreeSet<&'static str>,
 }
 
@@ -55,9 +51,7 @@ const STANDARD: [(&str, &str); 10] = [
 ];
 const STANDARD_TEXT: &str = "rust-standard-library.txt";
 
-/// A run-time library that a linker adds to a binary.
 struct RunTime {
-    /// Text that reveals the library in a binary, reversed by [`backwards`].
     mark: &'static [u8],
     name: &'static str,
     licence: &'static str,
@@ -176,7 +170,6 @@ pub fn linked(package: &str, binaries: &[Packed]) -> Result<Vec<Component>> {
     Ok(all)
 }
 
-/// Lists the package and all crates that Cargo links into it.
 fn crates(package: &str, platforms: &BTreeSet<&'static str>) -> Result<Vec<Component>> {
     let root = project::root();
     let metadata = MetadataCommand::new()
@@ -273,7 +266,6 @@ fn standard_crates(bytes: &[u8]) -> Result<BTreeSet<(String, String)>> {
     Ok(all)
 }
 
-/// Returns the text of `documentation/licenses/license.txt`: the linked components and their licences.
 pub fn licence_note(description: &ModelDescription, components: &[Component]) -> String {
     let mut note = format!(
         "{} {}\nSPDX-License-Identifier: {OWN}\n\n\
@@ -358,7 +350,6 @@ pub fn notices(binary: &[u8], folder: &'static str) -> Result<String> {
     Ok(notices)
 }
 
-/// Reads the files of a crate that are licences or notices.
 fn texts_in(folder: &Path) -> Result<Vec<Vec<u8>>> {
     const BEGINNINGS: [&str; 5] = ["LICENSE", "LICENCE", "COPYING", "NOTICE", "UNLICENSE"];
     let mut found = Vec::new();
@@ -373,7 +364,6 @@ fn texts_in(folder: &Path) -> Result<Vec<Vec<u8>>> {
     Ok(found)
 }
 
-/// Returns the SBOM of an FMU (CycloneDX 1.6).
 pub fn sbom(
     model: &Model,
     fmi: Fmi,
@@ -416,9 +406,7 @@ pub fn sbom_of_wheel(
     Ok(product.sbom(&linked_in_wheel(binary)?))
 }
 
-/// The product that an SBOM describes.
 struct Product<'a> {
-    /// Component type of CycloneDX.
     kind: &'static str,
     name: &'a str,
     version: &'a str,

@@ -12,7 +12,6 @@ pub enum Fmi {
 }
 
 impl Fmi {
-    /// All kinds; releases and wheels contain each.
     pub const ALL: [Fmi; 3] = [Fmi::V2, Fmi::V3, Fmi::V3Arrays];
 
     /// Returns the folders under `binaries/` for a platform that is given by its folder in FMI 2.0. For a
@@ -32,7 +31,6 @@ impl Fmi {
         }
     }
 
-    /// Returns the icon's name in the archive.
     pub fn icon(self) -> &'static str {
         match self {
             Fmi::V2 => "model.png",
@@ -40,7 +38,6 @@ impl Fmi {
         }
     }
 
-    /// Returns the suffix of the FMU's file name.
     pub fn suffix(self) -> &'static str {
         match self {
             Fmi::V2 => "",

@@ -41,7 +41,6 @@ pub fn pack_all(model: &Model, fmi: Fmi, out: &Path) -> Result<Vec<Built>> {
     Ok(all)
 }
 
-/// Packs binaries that were built for all platforms.
 fn pack_built(model: &Model, fmi: Fmi, all: &[Built], out: &Path) -> Result<()> {
     let binaries: Vec<_> = all
         .iter()

@@ -11,16 +11,13 @@ use toml::{Table, Value};
 use crate::archive::read;
 use crate::root;
 
-/// Name of the Python package and of its command.
 pub const PACKAGE: &str = "hubslosh";
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 pub const REPOSITORY: &str = env!("CARGO_PKG_REPOSITORY");
-/// Files with the project's licence.
 pub const LICENSES: [&str; 2] = ["LICENSE-APACHE", "LICENSE-MIT"];
 /// File with the licences and notices of everything that is linked into a wheel's command.
 pub const NOTICES: &str = "THIRD-PARTY.txt";
 
-/// Returns the text of METADATA and PKG-INFO.
 pub fn text() -> Result<String> {
     let project = read(&root().join("harness/python/pyproject.toml"))?;
     let readme = String::from_utf8(read(&root().join("README.md"))?).context("README.md")?;

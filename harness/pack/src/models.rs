@@ -9,7 +9,6 @@ use crate::archive::read;
 use crate::fmi::Fmi;
 use crate::project::root;
 
-/// Folder of the layered standard FMI-LS-REF in an FMU.
 pub const REFERENCES: &str = "extra/org.fmi-standard.fmi-ls-ref";
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,18 +16,15 @@ pub struct Model {
     /// The `modelIdentifier`. The folder `modelDescription/<name>` has everything that is packed with the
     /// binary: `modelDescription.xml`, `documentation/` and, if it exists, `extra/`.
     pub name: &'static str,
-    /// Cargo package whose cdylib is the binary.
     pub package: &'static str,
 }
 
-/// All FMUs of this project.
 pub const MODELS: [Model; 3] = [
     Model { name: "HubSlosh", package: "hubslosh-fmu" },
     Model { name: "Spacecraft", package: "spacecraft-fmu" },
     Model { name: "SloshTank", package: "sloshtank-fmu" },
 ];
 
-/// The FMU that is packed by default.
 pub const HUBSLOSH: &Model = &MODELS[0];
 
 /// Finds an FMU by its name.
@@ -63,7 +59,6 @@ impl Model {
         read(&self.folder().join(file))
     }
 
-    /// Returns the folder with everything that is packed with the binary.
     pub fn folder(&self) -> PathBuf {
         root().join("modelDescription").join(self.name)
     }
@@ -75,7 +70,6 @@ impl Model {
         self.folder().join(REFERENCES)
     }
 
-    /// Returns the path of the SBOM in the FMU.
     pub fn sbom(&self) -> String {
         format!("documentation/licenses/{}.cdx.json", self.name)
     }

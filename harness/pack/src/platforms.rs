@@ -24,27 +24,21 @@ pub struct Platform {
     pub ending: &'static str,
     /// Build targets. If there are several, their binaries are joined into a universal binary.
     pub targets: &'static [Target],
-    /// Programs that the build needs in addition to Rust.
     tools: &'static [Tool],
-    /// The program that builds: Cargo, or one with the same arguments.
     cargo: Cargo,
-    /// Arguments for the linker.
     link: &'static [&'static str],
 }
 
-/// An operating system on one processor.
 #[derive(Debug)]
 pub struct Target {
     pub triple: &'static str,
     /// Suffix of the triple for `cargo-zigbuild`: the oldest glibc.
     suffix: &'static str,
-    /// Name in [`Binary::architectures`].
     pub architecture: &'static str,
 }
 
 #[derive(Clone, Copy, Debug)]
 enum Cargo {
-    /// With the default linker of the target.
     Plain,
     /// With Zig as the linker, which includes the symbols of every glibc and of macOS.
     Zig,
@@ -132,12 +126,10 @@ pub fn platform(folder: &str) -> Result<&'static Platform> {
     })
 }
 
-/// A binary for one platform that has been built and checked.
 pub struct Built {
     pub folder: &'static str,
     pub ending: &'static str,
     pub bytes: Vec<u8>,
-    /// Imports and exports of the binary.
     pub binary: Binary,
 }
 
@@ -179,19 +171,15 @@ pub fn refuse(faults: &[String]) -> Result<()> {
     Ok(())
 }
 
-/// The library or program that is built.
 pub enum Product<'a> {
     Fmu(&'a Model),
     Native,
     Command,
 }
 
-/// The build tools on this machine.
 pub struct Toolchain {
     root: PathBuf,
-    /// PATH with `target/tools/bin` in front.
     path: OsString,
-    /// Folder of the Rust installation in use.
     sysroot: PathBuf,
     /// Source of the standard library, for targets whose compiled library is not installed.
     source: Option<PathBuf>,
@@ -199,7 +187,6 @@ pub struct Toolchain {
 }
 
 impl Toolchain {
-    /// Finds the build tools on this machine.
     pub fn find() -> Result<Self> {
         let root = project::root();
         let tools = root.join("target").join("tools");
@@ -235,7 +222,6 @@ impl Toolchain {
         })
     }
 
-    /// Builds a product for one target and returns the binary.
     pub fn build(
         &self,
         product: &Product,
@@ -257,7 +243,6 @@ impl Toolchain {
         all.map(|fault| format!("\n  {}: {fault}", platform.folder)).collect()
     }
 
-    /// Folders of this machine that no binary may contain.
     fn private(&self) -> Vec<String> {
         let folders = [self.root.to_string_lossy().into_owned(), self.home.clone()];
         folders.into_iter().filter(|folder| folder.len() > 1).collect()
@@ -310,7 +295,6 @@ impl Toolchain {
         )
     }
 
-    /// Returns the command that builds the binary for one target.
     fn command(&self, product: &Product, platform: &Platform, target: &Target) -> Command {
         let mut command = match platform.cargo {
             Cargo::Plain => project::cargo(),

@@ -35,7 +35,6 @@ pub fn needs_source(what: &str) -> Result<()> {
     Ok(())
 }
 
-/// Cargo profile for the binaries of FMUs.
 const PROFILE: &str = "fmu";
 
 /// Builds the cdylib of a package of this workspace, with the profile of FMUs, for the platform on which this

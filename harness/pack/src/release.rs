@@ -25,7 +25,6 @@ pub const MANIFEST: &str = "SHA256SUMS.all";
 /// half 2.3. The two FMUs 3.0 of a model repeat the binary of its FMU 2.0, because a zip archive cannot share it.
 pub const LARGEST_WHEEL: u64 = 20_000_000;
 
-/// Reads one file of an FMU or wheel.
 pub fn read(fmu: &Path, name: &str) -> Result<Vec<u8>> {
     let cannot = || format!("{name} in {} cannot be read", fmu.display());
     let file = std::fs::File::open(fmu).with_context(cannot)?;

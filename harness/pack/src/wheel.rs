@@ -20,23 +20,15 @@ use crate::metadata::{self, PACKAGE, VERSION};
 use crate::platforms::{self, Platform, Product, Target, Toolchain};
 use crate::{Fmi, MODELS, build, build_native, components, files as files_of_fmu, pack, root};
 
-/// Tags of the oldest supported Python and of the stable ABI.
 const ABI: &str = "cp311-abi3";
 
-/// Path of the SBOM in `.dist-info` (PEP 770).
 const SBOM: &str = "sboms/hubslosh.cdx.json";
 
-/// The binaries of a wheel.
 struct Binaries {
-    /// Folder under `binaries/` of the FMUs.
     folder: &'static str,
-    /// Names and contents of the packed FMUs.
     fmus: Files,
-    /// Name and content of the package's compiled half.
     native: (&'static str, Vec<u8>),
-    /// Name and content of the command.
     command: Option<(String, Vec<u8>)>,
-    /// Properties of the libraries and the command.
     read: Vec<Binary>,
 }
 
@@ -282,7 +274,6 @@ pub fn examples(folder: &Path) -> Result<Files> {
     Ok(files)
 }
 
-/// Returns the path of the SBOM in a wheel.
 pub fn sbom_name() -> String {
     format!("{PACKAGE}-{VERSION}.dist-info/{SBOM}")
 }

@@ -70,19 +70,16 @@ pub(crate) trait Setter<T> {
     unsafe fn set(self, component: Component, references: &[u32], values: &[T]) -> c_int;
 }
 
-/// Interfaces of FMI that this host supports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Interface {
     CoSimulation,
     ModelExchange,
 }
 
-/// Result of one update of the discrete states in event mode.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Updated {
     /// The host must update the discrete states again.
     pub again: bool,
-    /// The FMU requests the end of the simulation.
     pub terminate: bool,
     /// Time of the next time event, s.
     pub next_event: Option<f64>,
@@ -96,7 +93,6 @@ pub trait Version: Sized {
     /// `fmi2Boolean` or `fmi3Boolean`. It is not `bool`, because a byte that is neither 0 nor 1 must not
     /// become a `bool`.
     type Boolean: Copy + Default + PartialEq + From<bool>;
-    /// Data that this version stores with each instance.
     type Kept;
 
     /// Returns the names of the functions that a binary must export. `steps`: the FMU has Co-Simulation;
@@ -133,7 +129,6 @@ pub trait Version: Sized {
     /// Enters (`enters`) or leaves configuration mode, in which structural parameters may be set.
     fn configure(instance: &mut Instance<'_, Self>, enters: bool) -> Called;
 
-    /// Makes a step of `step` seconds from `time` with constant inputs.
     fn step(instance: &mut Instance<'_, Self>, time: f64, step: f64) -> Called;
 
     /// Sets the time derivatives of inputs, per s, if this version has a call for that.
@@ -152,10 +147,8 @@ pub trait Version: Sized {
 
     fn enter_event_mode(instance: &mut Instance<'_, Self>) -> Called;
 
-    /// Updates the discrete states, in event mode.
     fn update(instance: &mut Instance<'_, Self>) -> Called<Updated>;
 
-    /// Returns the numbers of continuous states and of event indicators.
     fn sizes(instance: &mut Instance<'_, Self>) -> Called<(usize, usize)>;
 
     /// Reads the `count` values of a variable or an array with this value reference.
@@ -186,7 +179,6 @@ pub struct Fmu<V: Version> {
     pub(crate) common: Common<V::Boolean>,
     pub(crate) exchange: Option<Exchange<V::Boolean>>,
     pub(crate) own: V,
-    /// Interface of the instances that [`Fmu::instantiate`] creates.
     pub(crate) interface: Interface,
     pub(crate) resources: Option<String>,
     hash: String,
@@ -200,7 +192,6 @@ pub struct Fmu<V: Version> {
     /// Value references of the Float64 inputs, and of elements of input arrays, that an FMU 3.0 accepts
     /// within a step; ascending.
     pub(crate) taken: Vec<u32>,
-    /// Structural parameters by value reference, which [`Fmu::instantiate`] sets in every instance.
     structural: BTreeMap<u32, Value>,
     // Dropped in this order: first the library, then its files.
     library: Option<Library>,
@@ -414,7 +405,6 @@ impl<V: Version> Fmu<V> {
         &self.path
     }
 
-    /// Returns the result of fmi2GetVersion or fmi3GetVersion.
     pub fn version(&self) -> String {
         // SAFETY: takes nothing, returns a constant string.
         unsafe { copied((self.common.get_version.call)()) }
@@ -478,7 +468,6 @@ impl<V: Version> Fmu<V> {
     }
 }
 
-/// Reads and checks modelDescription.xml in an archive.
 pub(crate) fn described(archive: &Archive, path: &Path) -> Result<(String, ModelDescription)> {
     let name = path.display();
     let text = archive.description().with_context(|| format!("{name} is not an FMU"))?;
@@ -507,7 +496,6 @@ fn taken(description: &ModelDescription) -> Vec<u32> {
     taken
 }
 
-/// Results of completedIntegratorStep.
 #[derive(Clone, Copy, Debug)]
 pub struct CompletedStep {
     pub enter_event_mode: bool,
@@ -548,7 +536,6 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         self.fmu
     }
 
-    /// Returns the messages since the last call of this function.
     pub fn take_messages(&self) -> Vec<Message> {
         self.environment.take()
     }
@@ -596,7 +583,6 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         }
     }
 
-    /// Calls a function that has no argument other than the instance.
     pub(crate) fn plain(&self, function: Function<Call>) -> Called {
         // SAFETY: plain call on a live instance.
         self.call(function, |f, c| unsafe { f(c) })
@@ -607,7 +593,6 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         self.call(function, |f, c| unsafe { f(c, x.as_mut_ptr(), x.len()) })
     }
 
-    /// Calls a function that writes values into a slice.
     pub(crate) fn read<T>(
         &self,
         function: Function<impl Getter<T>>,
@@ -618,7 +603,6 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         self.call(function, |f, c| unsafe { f.get(c, references, values) })
     }
 
-    /// Calls a function that reads values from a slice.
     pub(crate) fn write<T>(
         &self,
         function: Function<impl Setter<T>>,
@@ -629,7 +613,6 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         self.call(function, |f, c| unsafe { f.set(c, references, values) })
     }
 
-    /// Calls a function that returns `count` texts and copies them.
     pub(crate) fn read_texts(
         &self,
         function: Function<impl Getter<*const c_char>>,
@@ -709,7 +692,6 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         Ok(())
     }
 
-    /// Reads a variable, or an element of an array.
     pub fn value(&mut self, variable: &Variable) -> Called<Value> {
         let description = &self.fmu.description;
         let (reference, length, index) = match description.element(variable.reference) {
@@ -793,26 +775,22 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
 
     // ------------------------------------------------ snapshots
 
-    /// Saves the state in a new handle.
     pub fn get_state(&mut self) -> Called<FmuState> {
         let mut state = FmuState(null_mut());
         self.get_state_into(&mut state)?;
         Ok(state)
     }
 
-    /// Saves the state in an existing handle.
     pub fn get_state_into(&mut self, state: &mut FmuState) -> Called {
         // SAFETY: NULL or a handle from this FMU.
         self.call(self.fmu.common.get_fmu_state, |f, c| unsafe { f(c, &mut state.0) })
     }
 
-    /// Restores a saved state of this instance.
     pub fn set_state(&mut self, state: &FmuState) -> Called {
         // SAFETY: a handle from this FMU.
         self.call(self.fmu.common.set_fmu_state, |f, c| unsafe { f(c, state.0) })
     }
 
-    /// Frees a saved state of this instance.
     pub fn free_state(&mut self, mut state: FmuState) -> Called {
         // SAFETY: a handle from this FMU, gone after this call.
         self.call(self.fmu.common.free_fmu_state, |f, c| unsafe { f(c, &mut state.0) })

@@ -6,7 +6,6 @@ use crate::c_abi::version::{GetVector, State};
 
 /// Size of the margin on either side of an array, bytes.
 const MARGIN: usize = 1024;
-/// Content of the margins, which no FMU writes by chance.
 const FILL: u64 = 0xa5c3_5a3c_a53c_5ac3;
 
 /// An array between its margins, aligned for every C type of FMI.
@@ -18,14 +17,12 @@ struct Guarded {
 }
 
 impl Guarded {
-    /// Creates an array for `count` values that the FMU writes.
     fn output<T>(count: usize) -> Guarded {
         let bytes = count * size_of::<T>();
         let words = vec![FILL; 2 * MARGIN / 8 + bytes.div_ceil(8)];
         Guarded { words, bytes, input: None }
     }
 
-    /// Creates an array with values that the FMU reads.
     fn input<T: Copy>(values: &[T]) -> Guarded {
         let mut array = Guarded::output::<T>(values.len());
         // SAFETY: there is room for them, and the two do not overlap.
@@ -71,30 +68,21 @@ impl Guarded {
 /// A write outside an array, or into an array that may only be read.
 #[derive(Clone, Debug)]
 pub struct Beside {
-    /// Name of the C function.
     pub call: &'static str,
-    /// The array's name in the standard and its number of values.
     pub array: String,
     pub fault: String,
 }
 
-/// Arguments for the calls of [`Instance::writes_beside`].
 #[derive(Clone, Debug, Default)]
 pub struct Lists {
-    /// Value references of Reals to read.
     pub reals: Vec<u32>,
-    /// Value references of Integers and Enumerations.
     pub integers: Vec<u32>,
-    /// Value references of Booleans.
     pub booleans: Vec<u32>,
-    /// Value references of Strings.
     pub strings: Vec<u32>,
-    /// Value references and values of Reals that may be set now.
     pub inputs: Vec<(u32, f64)>,
     /// Unknowns of directional derivatives; empty if the FMU does not provide them.
     pub unknowns: Vec<u32>,
     pub knowns: Vec<u32>,
-    /// Outputs whose time derivatives the FMU provides.
     pub outputs: Vec<u32>,
     /// Number of continuous states, if they may be read now.
     pub states: Option<usize>,
@@ -267,7 +255,6 @@ impl Instance<'_> {
     }
 }
 
-/// Adds the faults of a call's arrays to `found`.
 fn note(found: &mut Vec<Beside>, call: &'static str, n: usize, arrays: &[(&str, &Guarded)]) {
     for (name, array) in arrays {
         if let Some(fault) = array.fault() {

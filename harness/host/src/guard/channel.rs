@@ -36,17 +36,14 @@ pub struct Parent {
     bytes: Vec<u8>,
     /// Bytes without the nonce have arrived.
     pub is_forged: bool,
-    /// No process has the other end open any more.
     pub is_closed: bool,
 }
 
-/// The end of the guarded process.
 pub struct Process {
     end: Mutex<End>,
     nonce: [u8; NONCE],
 }
 
-/// Number of integers in a request.
 pub const REQUEST: usize = 3;
 const REQUEST_BYTES: usize = NONCE + 8 * REQUEST;
 

@@ -9,10 +9,8 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::page::{Gathered, Page};
 
-/// Files for the folder `documentation/` of an FMU.
 pub struct Documentation {
     pub page: String,
-    /// Names and contents of the figures.
     pub figures: BTreeMap<String, Vec<u8>>,
 }
 

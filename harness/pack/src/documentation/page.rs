@@ -11,7 +11,6 @@ use pulldown_latex::config::{DisplayMode, RenderConfig};
 
 #[derive(Debug)]
 pub struct Page {
-    /// Path from the project's root, with `/`.
     pub path: String,
     /// Name for anchors, for example `hubslosh-model` for `modelDescription/HubSlosh/documentation/model.md`.
     pub name: String,
@@ -22,19 +21,14 @@ pub struct Page {
 
 #[derive(Debug)]
 pub struct Heading {
-    /// Level; 1 for the page's title.
     pub level: usize,
     pub title: String,
-    /// Anchor that GitHub derives from the heading.
     pub slug: String,
 }
 
-/// Figures and faults that are collected while pages are rendered.
 #[derive(Debug, Default)]
 pub struct Gathered {
-    /// File name and content of each figure.
     pub figures: BTreeMap<String, Vec<u8>>,
-    /// Broken links, missing figures, and equations that cannot be parsed.
     pub faults: Vec<String>,
 }
 
@@ -202,7 +196,6 @@ impl Page {
     }
 }
 
-/// Parses Markdown with the extensions that the pages use.
 fn events(text: &str) -> impl Iterator<Item = Event<'_>> {
     Parser::new_ext(text, Options::ENABLE_TABLES | Options::ENABLE_MATH)
 }
@@ -236,7 +229,6 @@ fn headings(text: &str) -> Vec<Heading> {
     all
 }
 
-/// Converts a heading to the anchor that GitHub gives it.
 fn slug(title: &str) -> String {
     let kept = title.to_lowercase();
     let kept = kept.chars().filter(|c| c.is_alphanumeric() || " -_".contains(*c));
