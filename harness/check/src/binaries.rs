@@ -25,16 +25,19 @@ pub const PLATFORMS: [(&str, &str, Option<Kind>); 7] = [
 const ARCHITECTURES: [&str; 8] =
     ["aarch32", "aarch64", "riscv32", "riscv64", "x86", "x86_64", "ppc32", "ppc64"];
 
+/// File ending of the binaries in a folder, and their format if this check can read it.
+type Form = (&'static str, Option<Kind>);
+
 /// Returns the file ending of the binary in `folder` and its readable format, or `None` for a folder whose
 /// name a vendor has invented.
-fn platform(folder: &str) -> Option<(&'static str, Option<Kind>)> {
+fn platform(folder: &str) -> Option<Form> {
     let known = PLATFORMS.iter().find(|(known, ..)| *known == folder);
     known.map(|(_, ending, kind)| (*ending, *kind)).or_else(|| tuple(folder))
 }
 
 /// Returns the file ending and the readable format of the binary in the folder of a platform tuple, for
 /// example `x86_64-linux`.
-pub(crate) fn tuple(folder: &str) -> Option<(&'static str, Option<Kind>)> {
+pub(crate) fn tuple(folder: &str) -> Option<Form> {
     // architecture-system or architecture-system-ABI
     let mut parts = folder.splitn(3, '-');
     let (architecture, system) = (parts.next()?, parts.next()?);
@@ -127,7 +130,7 @@ impl Binaries {
     fn read(
         archive: &Archive,
         declared: Option<Vec<Declared>>,
-        platform: fn(&str) -> Option<(&'static str, Option<Kind>)>,
+        platform: fn(&str) -> Option<Form>,
         own_folder: &'static str,
     ) -> Binaries {
         let described = declared.is_some();
