@@ -54,7 +54,7 @@ ANSWERS = {
     "step size": "glossary.html#term-step-size",
     "transfer function": "glossary.html#term-transfer-function",
     "phase margin": "spacecraft.html",
-    "licence": "index.html",
+    "licence": "documentation/index.html#licence",
 }
 """Words that readers search for, and the end of an address among the first three hits."""
 HITS = 3

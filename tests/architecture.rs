@@ -311,7 +311,7 @@ fn errors_of_the_harness_have_types() {
 const TEXTUAL: [&str; 1] = ["harness/identify/"];
 
 #[test]
-fn a_text_as_an_error_is_seen_in_every_form() {
+fn errors_made_from_text_are_found_in_every_form() {
     for code in [
         "fn f() -> Result<f64, String> {",
         "fn f() -> anyhow::Result<Result<(), &'static str>> {",
@@ -554,7 +554,7 @@ const NAMED_AT_HOME: [&str; 17] = [
 ];
 
 #[test]
-fn modules_import_nothing_from_the_root_of_their_crate() {
+fn modules_do_not_import_from_the_root_of_their_crate() {
     for krate in NAMED_AT_HOME {
         let mut all = BTreeMap::new();
         sources(&pack::root().join(krate).join("src"), &[], &mut all);
@@ -581,7 +581,7 @@ fn modules_of_a_crate_use_each_other_one_way() {
 }
 
 #[test]
-fn a_circle_is_seen_however_its_modules_name_each_other() {
+fn circular_imports_are_found_in_every_form() {
     let crate_of = |files: &[(&str, &str)]| -> BTreeMap<Module, String> {
         let module =
             |path: &str| path.split('/').filter(|s| !s.is_empty()).map(String::from).collect();

@@ -357,7 +357,7 @@ fn refusal<T>(called: Result<T, CallError>) -> (Status, String) {
 }
 
 #[test]
-fn a_size_is_set_in_configuration_mode_alone_and_what_it_sizes_starts_anew() {
+fn array_sizes_are_set_only_in_configuration_mode_and_reset_the_arrays() {
     let craft = Opened::new(pack::model("Spacecraft").unwrap(), Fmi::V3Arrays);
     let tanks = craft.variable("tanks").reference;
     let position = craft.variable("tank.position").reference;
@@ -474,7 +474,7 @@ fn a_saved_state_brings_its_sizes_and_is_not_of_the_other_fmu() {
 }
 
 #[test]
-fn derivatives_and_dependencies_of_arrays_are_those_of_their_elements_by_rows() {
+fn derivatives_and_dependencies_of_arrays_equal_those_of_their_elements_by_rows() {
     for case in cases() {
         let opened = [Fmi::V3Arrays, Fmi::V3].map(|fmi| Opened::new(case.model, fmi));
         let mut two = set_up(&case, [&opened[0], &opened[1]], Interface::CoSimulation);
@@ -592,7 +592,7 @@ fn inputs_of_arrays_ramp_by_intermediate_update_as_scalars_do() {
 }
 
 #[test]
-fn each_element_of_an_array_says_of_itself_what_the_scalar_says() {
+fn array_elements_have_the_attributes_of_the_scalar_variables() {
     for model in &MODELS {
         let read = |fmi: Fmi| {
             let archive = Archive::open(packed_version_for_tests(model, fmi)).unwrap();
@@ -765,7 +765,7 @@ fn a_part_of_the_variables_refuses_more_tanks_and_states_of_the_whole() {
 }
 
 #[test]
-fn start_values_that_are_not_those_of_the_description_are_refused() {
+fn start_values_that_differ_from_the_description_are_refused() {
     let (part, folder) = part_of_spacecraft(&[("craft.mass", "900.0")]);
     let archive = Archive::open(&folder.path().join("part.fmu")).unwrap();
     let resources = folder.path().join("resources");

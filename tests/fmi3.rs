@@ -69,7 +69,7 @@ for output in ["tank.p[1,1]"] if name == "SloshTank" else outputs:
 "#;
 
 #[test]
-fn fmpy_finds_no_fault_in_fmi_3_and_gets_the_bits_of_fmi_2_whatever_it_is_told_of_events() {
+fn fmpy_finds_no_fault_in_fmi_3_and_gets_the_bits_of_fmi_2_in_every_event_configuration() {
     for model in &MODELS {
         let said = run(
             Command::new(python())

@@ -54,7 +54,7 @@ for kind in ("CoSimulation", "ModelExchange"):
 "#;
 
 #[test]
-fn a_second_fmu_costs_a_table_and_a_model() {
+fn a_minimal_fmu_needs_only_a_table_and_a_model() {
     let fmu = packed();
     let report = run(
         Command::new(harness()).arg("check").arg(&fmu),
@@ -66,7 +66,7 @@ fn a_second_fmu_costs_a_table_and_a_model() {
 }
 
 #[test]
-fn the_second_fmu_takes_at_most_150_lines() {
+fn a_minimal_fmu_on_the_runtime_takes_at_most_150_lines() {
     let folder = pack::root().join("tests/spring/src");
     let lines: usize = ["lib.rs", "spring.rs"]
         .map(|name| std::fs::read_to_string(folder.join(name)).unwrap().lines().count())

@@ -7,7 +7,7 @@ from spinner import OBLATE, PROLATE, mean_growth, nutation, nutation_pole
 from hubslosh import FmuWarning
 
 
-def test_the_nutation_pole_is_that_of_an_independent_formulation(spacecraft: str) -> None:
+def test_the_nutation_pole_equals_that_of_an_independent_formulation(spacecraft: str) -> None:
     """Nine digits are known of the prolate craft's."""
     assert nutation_pole(spacecraft, PROLATE) == pytest.approx(0.002551418 + 0.468308812j, abs=1e-9)
     assert nutation_pole(spacecraft, OBLATE).real == pytest.approx(-0.0023893, abs=5e-8)

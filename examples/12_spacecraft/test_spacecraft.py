@@ -39,7 +39,7 @@ def test_margins_name_the_slosh_that_simulation_shows(spacecraft: str) -> None:
     assert np.argmax(spectrum) / (len(swing) * 0.1) == pytest.approx(0.113, abs=0.006)
 
 
-def test_runs_at_random_are_those_of_the_readme(spacecraft: str) -> None:
+def test_random_runs_have_the_numbers_of_the_readme(spacecraft: str) -> None:
     """The nominal slew, and six of the 200."""
     mine = replace(loop, model=spacecraft)
     nominal = after_slew({}, mine)

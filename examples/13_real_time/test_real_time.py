@@ -15,7 +15,7 @@ def test_every_cycle_is_made_once_and_its_lateness_counted(fmu: str) -> None:
     assert lines(table)[0].startswith("300 cycles of 1 ms, ")
 
 
-def test_the_controller_in_the_other_process_turns_the_hub(fmu: str) -> None:
+def test_a_controller_in_another_process_turns_the_hub(fmu: str) -> None:
     """A torque answers a state that is some cycles old; the hub goes towards the wanted angle."""
     table = run(fmu, 1000)
     answered = table["age"][table["age"] >= 0]

@@ -23,7 +23,7 @@ PLACES = {"NTO": (0.06, 0.42, 0.2), "MMH": (-0.05, -0.62, 0.1)}
 pytestmark = pytest.mark.filterwarnings("ignore:(tank|damping).*outside the measured")
 
 
-def test_mass_properties_and_margins_are_those_by_hand(spacecraft: str) -> None:
+def test_mass_properties_and_margins_equal_a_hand_calculation(spacecraft: str) -> None:
     """1e-12 of mass, centre of mass and inertia; 1e-9 of every crossing and margin."""
     craft = replace(telecom.craft, model=spacecraft)
     for fill in telecom.FILLS:
@@ -93,7 +93,7 @@ def test_the_worst_case_of_the_review_is_confirmed_by_simulation(
     assert off == pytest.approx(1, abs=0.01)
 
 
-def test_a_certificate_is_checked_by_numpy_alone_and_one_that_was_changed_is_refused(
+def test_a_certificate_is_checked_by_numpy_and_a_changed_one_is_refused(
     spacecraft: str, tmp_path: Path
 ) -> None:
     """The size, a missing interval, another loop, and scalings that prove nothing."""

@@ -44,7 +44,7 @@ def test_a_profile_is_the_integral_of_its_acceleration(name: str) -> None:
     assert angle[-1] == ANGLE and np.all(angle[time >= DURATION[name]] == pytest.approx(ANGLE))
 
 
-def test_settling_times_and_errors_are_those_of_readme(runs: dict) -> None:
+def test_settling_times_and_errors_have_the_numbers_of_the_readme(runs: dict) -> None:
     """The smoothed slew takes 1.2 s longer and is settled 7 s earlier."""
     settled = {key: round(settling_time(run, key[0]), 1) for key, run in runs.items()}
     assert settled == SETTLED

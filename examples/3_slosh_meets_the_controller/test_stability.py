@@ -50,7 +50,7 @@ def test_a_design_simulated_grows_or_decays_as_its_margin_says(full: Bench, name
     assert (rate < 0) == (margins(full, cycle, bandwidth, filter).gain > 0)
 
 
-def test_a_short_delay_damps_the_liquid_and_a_notch_takes_that_away(fmu: str, full: Bench) -> None:
+def test_a_short_delay_damps_slosh_and_a_notch_removes_this_damping(fmu: str, full: Bench) -> None:
     """Phase stabilisation: 0.3 % of its own, 4.4 % under PD, 0.7 % with the notch."""
     open_loop = full.linear.poles
     slosh = open_loop[open_loop.imag > 0][0]
@@ -87,7 +87,7 @@ def test_dry_friction_masks_the_instability_up_to_the_predicted_amplitude(
     assert threshold(full, 0.25) == pytest.approx(predicted, rel=0.02)
 
 
-def test_spherical_pendulums_settle_at_the_predicted_amplitude_or_turn(
+def test_spherical_pendulums_reach_the_predicted_amplitude_or_rotary_slosh(
     full: Bench,
 ) -> None:
     """In the plane within 10 %; above some 0.172 Hz the liquid leaves the plane.

@@ -18,7 +18,7 @@ def test_the_wheel_gives_its_torque_until_it_has_no_more_speed(fmu: str) -> None
     assert rpm.min() == pytest.approx(200, abs=1e-9) and rpm.max() <= 3000
 
 
-def test_what_holds_leaves_an_error_and_what_is_smoothed_creeps(fmu: str) -> None:
+def test_dry_friction_leaves_an_error_and_smoothed_friction_creeps(fmu: str) -> None:
     """README's table, to its digits."""
     table = summary(fmu).round(4)
     errors = table.drop(columns="stuck (%)").to_numpy()

@@ -5,7 +5,7 @@ from distributed import Client
 from monte_carlo import STOP, draws, one, study
 
 
-def test_dask_and_processes_give_what_single_runs_give(fmu: str) -> None:
+def test_dask_and_processes_give_the_results_of_single_runs(fmu: str) -> None:
     """16 draws, 4 of them in processes, bit for bit; both outcomes of each question are there."""
     with Client(
         processes=False, n_workers=1, threads_per_worker=1, dashboard_address=None

@@ -11,7 +11,7 @@ GROWTH = {
 
 
 @pytest.mark.parametrize(("z", "expected"), GROWTH.items())
-def test_poles_from_the_fmus_derivatives_are_those_of_the_closed_form(
+def test_poles_from_the_fmus_derivatives_equal_those_of_the_closed_form(
     spacecraft: str, z: float, expected: float
 ) -> None:
     """Five digits are known; first order in the gains leaves 0.2 %."""
@@ -20,7 +20,7 @@ def test_poles_from_the_fmus_derivatives_are_those_of_the_closed_form(
     assert craft.predicted_growth == pytest.approx(expected, rel=2.5e-3)
 
 
-def test_the_zone_ends_where_the_closed_form_says(spacecraft: str) -> None:
+def test_the_danger_zone_ends_at_the_closed_form(spacecraft: str) -> None:
     """To 1 mm: the two ends move with the second order of the gains."""
     assert zone(spacecraft) == pytest.approx(predicted_zone(), abs=1e-3)
 
@@ -32,7 +32,7 @@ def test_the_simulated_loop_grows_as_its_poles_say(spacecraft: str, z: float) ->
     assert found == pytest.approx(growth(spacecraft, Craft(z)), rel=0.01)
 
 
-def test_the_damping_needed_is_the_predicted_one(spacecraft: str) -> None:
+def test_the_required_damping_equals_the_prediction(spacecraft: str) -> None:
     """5 % from the boundary the loop is stable or not."""
     needed = Craft(0.5).damping_needed
     assert growth(spacecraft, Craft(0.5, zeta=0.95 * needed)) > 0

@@ -12,7 +12,7 @@ def after(run) -> float:
     return float(np.degrees(run.loc[run["time"] >= DURATION, "error"].abs().max()))
 
 
-def test_inertias_are_those_of_all_liquid_and_of_the_rigid_part(spacecraft: str) -> None:
+def test_inertias_equal_those_of_all_liquid_and_of_the_rigid_part(spacecraft: str) -> None:
     """Closed forms; the pendulums hang on the roll axis' side and take no part at first."""
     rigid = hubslosh.linearize(spacecraft, parameters(False), ["torque[1]"], ["omega[1]"])
     assert 1 / rigid.B[0, 0] == pytest.approx(RIGID, rel=1e-12)

@@ -39,7 +39,7 @@ def campaign(program: Path, fmu: Path, tmp_path_factory) -> Path:
     return directory / "out"
 
 
-def test_every_feature_is_found_again_from_the_definitions(campaign: Path) -> None:
+def test_every_feature_is_reproduced_from_its_definition(campaign: Path) -> None:
     """Within the tolerances of ``check_analysis``, for linear and for rotary slosh."""
     assert check_analysis.compare(campaign, analyse) == []
     with (campaign / "features.csv").open(newline="") as file:
@@ -50,7 +50,7 @@ def test_every_feature_is_found_again_from_the_definitions(campaign: Path) -> No
     assert rows[0]["rotary_from_hz"] == ""
 
 
-def test_a_wrong_feature_is_seen(campaign: Path) -> None:
+def test_a_wrong_feature_is_detected(campaign: Path) -> None:
     """An antiresonance 4 mHz off, and one that is missing."""
     path = campaign / "features_spa.csv"
     text = path.read_text(encoding="utf-8")

@@ -133,7 +133,7 @@ def test_a_refused_run_and_one_that_kills_its_workers_leave_the_others_alone(
     assert len(made) == 4
 
 
-def test_what_is_wrong_is_said_before_a_worker_starts(monkeypatch, capsys, fmu, tmp_path) -> None:
+def test_errors_are_reported_before_a_worker_starts(monkeypatch, capsys, fmu, tmp_path) -> None:
     """Plan, program, number of workers: one sentence each, and nothing made."""
     monkeypatch.chdir(tmp_path)
     for flags, words in (

@@ -150,7 +150,7 @@ def test_damping_of_the_bench(case, fmu: Path, monkeypatch: pytest.MonkeyPatch) 
     assert row in (page[:start] if case[2] == 0.05 else page[start:])
 
 
-def test_the_motion_is_that_of_the_last_release(
+def test_the_motion_equals_that_of_the_last_release(
     fmu: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:
     """Every model and friction law of 0.1.0 for 300 s, and sweeps of 300 s.
@@ -181,7 +181,7 @@ def test_errors_of_work_and_precision(
         assert error == pytest.approx(float(printed), abs=1.01 * half_digit(printed))
 
 
-def test_a_flight_tells_slosh(fmu: Path, program: Path, tmp_path: Path) -> None:
+def test_a_flight_identifies_slosh(fmu: Path, program: Path, tmp_path: Path) -> None:
     """Seed 1 with the good gyro, all rows of the table in book/flight.md.
 
     Beyond the printed digits estimates may differ by 0.1 of their standard deviations, and these by
@@ -292,7 +292,7 @@ def test_check_of_many_variables(program: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.filterwarnings("ignore:tank.*outside the measured")
-def test_the_times_of_a_design_count_what_was_made(
+def test_the_times_of_a_design_review_count_its_tasks(
     fmu: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A row for each step; the loop's file gives the same loop."""

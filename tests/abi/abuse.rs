@@ -606,7 +606,7 @@ fn no_allowed_value_of_sloshtank_raises_a_floating_point_exception() {
 #[cfg(target_os = "linux")]
 #[test]
 #[ignore = "minutes: .ci/run --nightly"]
-fn lives_traps_and_allowed_values_all_in_both_versions() {
+fn abuse_tests_run_for_both_versions_of_fmi() {
     std::thread::scope(|scope| {
         for fmi in VERSIONS {
             for model in &pack::MODELS {
@@ -807,7 +807,7 @@ fn states<M: runtime::Model>() {
 }
 
 #[test]
-fn noise_in_saved_states_is_refused_or_gives_an_instance_like_any_other() {
+fn damaged_saved_states_are_refused_or_give_a_valid_instance() {
     states::<HubSlosh::HubSlosh>();
     states::<Spacecraft::Model>();
     states::<SloshTank::Model>();
@@ -821,7 +821,7 @@ fn values<M: runtime::Model>(runs: usize) {
 }
 
 #[test]
-fn any_values_end_in_numbers_or_in_an_error() {
+fn any_values_give_finite_results_or_an_error() {
     values::<HubSlosh::HubSlosh>(1000);
     // Stiff ones use up the integrator's steps: half a second each.
     values::<Spacecraft::Model>(50);

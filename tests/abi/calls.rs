@@ -352,7 +352,7 @@ fn callbacks_name_and_guid_need_not_outlive_fmi2_instantiate() {
 }
 
 #[test]
-fn unusual_names_are_fine() {
+fn unusual_instance_names_are_accepted() {
     let fmu = open();
     for name in ["%s%n", "Ünwucht 液", &"x".repeat(10_000)] {
         fmu.instantiate(name).unwrap();
@@ -425,7 +425,7 @@ fn messages_come_in_the_categories_asked_for() {
 }
 
 #[test]
-fn stick_and_slip_are_told_to_those_who_ask() {
+fn stick_and_slip_are_logged_on_request() {
     let fmu = open();
     let mut instance = stepping(&fmu, &[("init.omega", "0.1"), ("slosh.model", "frozen")]);
     instance.set_debug_logging(true, &["logEvents"]).unwrap();
@@ -502,7 +502,7 @@ fn calls_in_the_wrong_state_are_refused_with_call_and_state() {
 }
 
 #[test]
-fn anything_can_be_set_before_and_after_setup_experiment_inputs_too() {
+fn parameters_and_inputs_can_be_set_before_and_after_setup_experiment() {
     let fmu = open();
     let mut instance = fmu.instantiate("one").unwrap();
     instance.set("tau_cmd", "0.01").unwrap();
@@ -569,7 +569,7 @@ fn every_boolean_that_is_not_0_is_true_and_reads_1() {
 // ---- Parameters and inputs ----
 
 #[test]
-fn all_bad_parameters_are_reported_at_once_and_can_be_mended() {
+fn all_wrong_parameters_are_reported_at_once_and_can_be_corrected() {
     let fmu = open();
     let mut instance = fmu.instantiate("one").unwrap();
     let bad = [("tank.h", "-1"), ("tank.d", "NaN"), ("init.theta", "inf"), ("slosh.modes", "11")];
@@ -699,7 +699,7 @@ fn the_time_of_the_start_does_not_matter() {
 }
 
 #[test]
-fn an_experiment_that_makes_no_sense_is_refused() {
+fn an_experiment_with_invalid_times_is_refused() {
     let fmu = open();
     let mut instance = fmu.instantiate("one").unwrap();
     refused(instance.setup_experiment(None, f64::NAN, None), &["startTime"]);
@@ -709,7 +709,7 @@ fn an_experiment_that_makes_no_sense_is_refused() {
 }
 
 #[test]
-fn a_run_that_diverges_is_an_error_and_never_rubbish() {
+fn a_diverging_run_is_an_error() {
     let fmu = open();
     // So fast, and for so long, that no number of steps is enough.
     let mut instance = stepping(&fmu, &[("slosh.model", "frozen"), ("tau_cmd", "1e12")]);
@@ -775,7 +775,7 @@ fn reset_from_every_state_is_a_fresh_instance_bit_for_bit() {
 }
 
 #[test]
-fn a_terminated_instance_can_still_be_read() {
+fn values_of_a_terminated_instance_can_still_be_read() {
     let fmu = open();
     let mut instance = stepping(&fmu, LIVELY);
     drive(&mut instance, 0.0);

@@ -294,7 +294,7 @@ fn check(
 /// Tests every slosh model with every friction law while the hub slips, a stuck hub, and the wheel at the
 /// limits of its torque and of its speed.
 #[test]
-fn derivatives_of_hubslosh_are_transposed_and_those_of_differences_in_slip_in_stick_and_at_the_wheels_limits()
+fn adjoint_and_directional_derivatives_of_hubslosh_equal_differences_in_slip_stick_and_at_wheel_limits()
  {
     let fmu = open("HubSlosh");
     let mut rng = Rng::with_seed(73);
@@ -379,7 +379,7 @@ fn derivatives_of_hubslosh_are_transposed_and_those_of_differences_in_slip_in_st
 
 /// Tests a free craft and one on a pivot, with one to three tanks of one to three modes.
 #[test]
-fn derivatives_of_spacecraft_are_transposed_and_those_of_differences() {
+fn adjoint_and_directional_derivatives_of_spacecraft_equal_differences() {
     let fmu = open("Spacecraft");
     let mut rng = Rng::with_seed(74);
     for (mount, tanks, modes) in [("free", 1, 1), ("pivot", 1, 2), ("free", 3, 3), ("pivot", 2, 1)]
@@ -424,7 +424,7 @@ fn of_craft(name: &str) -> f64 {
 
 /// Adds the tank's wrench to the host, as a host does, with the tank's masses added to the host's.
 #[test]
-fn derivatives_of_sloshtank_are_transposed_and_those_of_differences() {
+fn adjoint_and_directional_derivatives_of_sloshtank_equal_differences() {
     let fmu = open("SloshTank");
     let mut rng = Rng::with_seed(75);
     for (coupling, modes) in [("split", 1), ("lumped", 2), ("rigid_body", 3)] {

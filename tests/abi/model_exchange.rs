@@ -199,7 +199,7 @@ fn compare(
 /// At 15 rad/s, order 4 with 0.5 ms is late by omega (omega h)^4/120 = 4e-10 rad per second, 1e-8 after 20 s.
 /// Forces are some newtons, slosh rates some rad/s.
 #[test]
-fn a_host_that_integrates_meets_co_simulation_with_stick_and_slip() {
+fn a_model_exchange_host_equals_co_simulation_with_stick_and_slip() {
     for model in ["frozen", "linear", "planar", "spherical", "liquid"] {
         let settings = [
             ("slosh.model", model),
@@ -217,7 +217,7 @@ fn a_host_that_integrates_meets_co_simulation_with_stick_and_slip() {
 
 /// Tests two modes with the friction laws that do not stick.
 #[test]
-fn a_host_that_integrates_meets_co_simulation_with_every_friction() {
+fn a_model_exchange_host_equals_co_simulation_with_every_friction_law() {
     for friction in ["none", "viscous", "stribeck_smooth"] {
         let settings = [
             ("slosh.model", "spherical"),
@@ -255,7 +255,7 @@ fn wheel_and_gyro_are_events_of_model_exchange() {
 
 /// Large waves leave the linear regime; this is a step event, which is noticed at the end of a step.
 #[test]
-fn regime_changes_at_events_alone() {
+fn the_regime_changes_only_at_events() {
     let fmu = open();
     let settings = [("slosh.model", "planar"), ("init.slosh_angle", "0.5"), ("tau_cmd", "0.02")];
     let mut host = Host::new(&fmu, &settings);
@@ -288,7 +288,7 @@ fn regime_changes_at_events_alone() {
 
 /// A host without root finding that uses Euler's method at 50 us agrees to first order.
 #[test]
-fn euler_meets_co_simulation_to_first_order() {
+fn euler_in_model_exchange_converges_to_co_simulation_with_first_order() {
     let fmu = open();
     let settings = [("init.omega", "0.08"), ("init.slosh_angle", "0.3")];
     let mut own = set_up(&fmu, host::fmi2::CO_SIMULATION, &settings);
@@ -486,7 +486,7 @@ fn openmodelica_up_to_1_27_gets_the_motion_of_the_parameters_it_sets() {
 
 /// A host that leaves out the start value of an input sets 0; OpenModelica does so after the initialization.
 #[test]
-fn a_weightless_tank_that_nothing_restores_is_warned_of_when_the_motion_begins() {
+fn a_warning_names_a_weightless_tank_without_restoring_force() {
     let fmu = open();
     let said = |instance: &mut Instance| {
         let texts = instance.take_messages().into_iter().map(|message| message.text);
@@ -601,7 +601,7 @@ fn after_initialization_the_order_of_setting_and_reading_does_not_matter() {
 }
 
 #[test]
-fn an_event_that_is_refused_leaves_the_parameters_to_be_mended() {
+fn a_refused_event_leaves_the_parameters_to_be_corrected() {
     let fmu = open();
     let mut with = fmu.instantiation("one");
     with.kind = MODEL_EXCHANGE;

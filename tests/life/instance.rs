@@ -157,7 +157,7 @@ fn inputs_set_in_initialization_mode_count_from_the_start() {
 }
 
 #[test]
-fn all_bad_parameters_are_reported_at_once_and_can_be_mended() {
+fn all_wrong_parameters_are_reported_at_once_and_can_be_corrected() {
     let mut instance = fresh();
     set(
         &mut instance,
@@ -239,7 +239,7 @@ fn unknown_and_mistyped_references_are_refused_with_name_and_type() {
 }
 
 #[test]
-fn experiment_that_makes_no_sense_is_refused() {
+fn an_experiment_with_wrong_times_is_refused() {
     let mut instance = fresh();
     let before = to_bytes(&instance);
     assert!(instance.setup_experiment(None, f64::NAN, None).is_err());
@@ -253,7 +253,7 @@ fn experiment_that_makes_no_sense_is_refused() {
 }
 
 #[test]
-fn steps_that_make_no_sense_are_refused_and_change_nothing() {
+fn invalid_steps_are_refused_and_change_nothing() {
     let mut instance = stepping_from(0.0, Some(1.0), &[("init.omega", Value::Real(0.1))]);
     instance.do_step(0.0, 0.25).unwrap();
     let before = to_bytes(&instance);
@@ -626,7 +626,7 @@ fn parameters_in_saved_bytes_that_do_not_go_together_are_refused() {
 /// A step of 1 us shows the derivative up to (1 us)^2 of the third derivative, which is at most 1e3/s^3 of a
 /// signal's size here, and up to the rounding 1e-16 / 1e-6.
 #[test]
-fn output_derivatives_are_how_the_outputs_move_on() {
+fn output_derivatives_equal_differences_of_the_outputs() {
     for slosh_model in items("slosh.model") {
         let mut instance = lively(slosh_model, 4);
         instance.do_step(0.0, 0.3).unwrap();
@@ -779,7 +779,7 @@ fn check_directional_derivatives(rng: &mut fastrand::Rng, slosh_model: i32, fric
 /// The tested derivatives are known: sqrt(g/l)/2 pi by g, theta by its start value, and the hub's
 /// acceleration by the torque, which is the inverse of the inertia of hub and liquid if nothing else moves.
 #[test]
-fn directional_derivatives_in_initialization_mode_are_by_inputs_and_parameters() {
+fn directional_derivatives_in_initialization_mode_are_with_respect_to_inputs_and_parameters() {
     let mut instance = fresh();
     set(
         &mut instance,
@@ -814,7 +814,7 @@ fn directional_derivatives_in_initialization_mode_are_by_inputs_and_parameters()
 }
 
 #[test]
-fn directional_derivatives_of_what_has_none_are_refused() {
+fn directional_derivatives_of_variables_without_any_are_refused() {
     let mut instance = lively(4, 4);
     let mut answer = [0.0];
     let [omega, stuck, height, mass] =
@@ -876,7 +876,7 @@ fn a_state_of_the_other_interface_is_refused() {
 
 /// The model description declares these dependencies, and an importer breaks algebraic loops by them.
 #[test]
-fn no_variable_follows_an_input_at_once_that_it_does_not_list() {
+fn no_output_depends_directly_on_an_input_that_it_does_not_list() {
     for slosh_model in items("slosh.model") {
         for friction_model in items("friction.model") {
             // Moving, and stuck right at the start.
@@ -909,7 +909,7 @@ fn no_variable_follows_an_input_at_once_that_it_does_not_list() {
 
 /// The same must hold for the values at the start and the parameters.
 #[test]
-fn no_variable_starts_from_a_parameter_that_it_does_not_list() {
+fn no_initial_value_depends_on_a_parameter_that_it_does_not_list() {
     let base: &[(&str, Value)] = &[
         ("init.omega", Value::Real(0.3)),
         ("init.slosh_angle", Value::Real(0.2)),
@@ -997,7 +997,7 @@ fn no_variable_starts_from_a_parameter_that_it_does_not_list() {
 /// The same must hold for continuous states: a host's solver may leave entries of the Jacobian that are not
 /// listed at 0.
 #[test]
-fn no_variable_follows_a_continuous_state_that_it_does_not_list() {
+fn no_variable_depends_on_a_continuous_state_that_it_does_not_list() {
     for slosh_model in items("slosh.model") {
         for friction_model in items("friction.model") {
             for enabled in [true, false] {
@@ -1049,7 +1049,7 @@ fn no_variable_follows_a_continuous_state_that_it_does_not_list() {
 
 /// OpenModelica's import, ecos and libcosim set no enumerations; OMSimulator sets none called model.
 #[test]
-fn kinds_choose_what_the_enumerations_choose() {
+fn integer_kinds_have_the_effect_of_the_enumerations() {
     for (kind, model) in [("slosh.kind", "slosh.model"), ("friction.kind", "friction.model")] {
         for n in items(model) {
             let motion = |name: &str| {
@@ -1075,7 +1075,7 @@ fn kinds_choose_what_the_enumerations_choose() {
 
 /// OpenModelica up to 1.27 sets Booleans to noise.
 #[test]
-fn kinds_decide_whatever_the_booleans_say() {
+fn integer_kinds_override_the_booleans() {
     for name in ["slosh.zeta_from_correlation", "slosh.capillarity", "wheel.enabled", "imu.enabled"]
     {
         let kind = format!("{name}_kind");

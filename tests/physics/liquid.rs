@@ -10,7 +10,7 @@ use super::free_oscillation::shifts;
 /// Ten times the plant's eight excited modes of each azimuthal number change s and kappa by less than 1e-4 of
 /// themselves. Next to a secondary resonance both grow without bound, and so does this difference.
 #[test]
-fn coefficients_of_the_model_are_those_of_potential_flow() {
+fn coefficients_of_the_model_equal_those_of_potential_flow() {
     let all = Overlaps::new(60);
     for i in 0..290 {
         let fill = 0.2 + 0.02 * f64::from(i);

@@ -42,7 +42,7 @@ fn run(p: &Parameters) -> Vec<Outputs> {
 /// contour through the boundary integral equation. Masses and lengths agree to 1e-11, and the motion over 10
 /// s to the integrator's tolerance times the growth of a small change in rotary motion.
 #[test]
-fn table_of_the_old_cylinder_gives_the_old_motion() {
+fn a_table_of_modes_of_a_cylinder_gives_the_motion_of_the_cylinder() {
     for model in [SloshModel::Linear, SloshModel::Planar, SloshModel::Spherical] {
         let mut p = Parameters::default();
         p.slosh.model = model;

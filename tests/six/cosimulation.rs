@@ -264,7 +264,7 @@ fn total_wrench_diverges(lambda: f64, order: Order, h: f64) -> bool {
 
 /// Tests values within 3 % of the limits on either side, at both steps.
 #[test]
-fn total_wrench_diverges_above_the_limits_of_lambda_whatever_the_step() {
+fn coupling_by_total_force_and_torque_diverges_above_the_limit_of_the_inertia_ratio() {
     let limits = [
         (GaussSeidelHeld, 1.0),
         (JacobiHeld, 1.0),
@@ -280,7 +280,7 @@ fn total_wrench_diverges_above_the_limits_of_lambda_whatever_the_step() {
 }
 
 #[test]
-fn a_host_that_would_diverge_is_warned() {
+fn a_warning_names_a_coupling_that_would_diverge() {
     let tank = Tank::default();
     let warning = |lambda: f64, coupling: Coupling| {
         let host = Some(parameters(ratio(tank) / lambda, tank).craft);

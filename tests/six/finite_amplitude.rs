@@ -139,7 +139,7 @@ fn forced(ratio: f64, stroke: f64, heavy: f64) -> ([f64; 3], f64) {
 /// A pendulum misses these series of potential flow by up to a factor of two. In the last one the motion
 /// across decays. The force has the error of the angle and an error of 2 % because there is only one mode.
 #[test]
-fn forced_waves_near_resonance_are_those_of_potential_flow_in_both_fmus() {
+fn forced_waves_near_resonance_equal_those_of_potential_flow_in_both_fmus() {
     for (ratio, stroke, along, across, force) in [
         (0.985, 0.18097e-3, 17.18, Some(0.798), 1.977),
         (1.0019, 0.10677e-3, 8.21, Some(1.02), 0.996),
@@ -195,7 +195,7 @@ fn forced_in_a_plane(fill: f64, ratio: f64, stroke: f64) -> [f64; 3] {
 /// over that of small waves, stroke over R, and the angle, phase and force of the flow. The third order errs by up to 14 %,
 /// 17 degrees and 21 %.
 #[test]
-fn forced_planar_waves_with_the_energy_terms_are_those_of_potential_flow() {
+fn forced_planar_waves_with_the_energy_terms_equal_those_of_potential_flow() {
     for (fill, ratio, stroke, angle, phase, force) in [
         (0.5, 0.99, 0.004606, 12.50, 130.3, 0.1360),
         (0.5, 1.0, 0.004630, 15.22, 69.7, 0.1568),
@@ -215,7 +215,7 @@ fn forced_planar_waves_with_the_energy_terms_are_those_of_potential_flow() {
 /// potential flow in three dimensions (about 30 modes). The angles and phases, degrees, are those of the first harmonics along
 /// the stroke and across it. The third order errs by 8 % and 7 degrees.
 #[test]
-fn forced_rotary_waves_with_the_energy_terms_are_those_of_potential_flow() {
+fn forced_rotary_waves_with_the_energy_terms_equal_those_of_potential_flow() {
     let mut tank = bench_with_energy(0.5);
     tank.zeta[0] = 0.01;
     let w = 1.01 * linear_frequency(&tank);

@@ -16,7 +16,7 @@ use super::records::{STEP, at_end, motion_at_end};
 /// Directly after a step the outputs are limits from the left: they include the torque of wheels that have
 /// accelerated, and the rate of a host that has turned.
 #[test]
-fn outputs_after_a_step_are_those_at_its_end() {
+fn outputs_after_a_step_hold_at_its_end() {
     for seed in 0..10 {
         let mut random = Random::new(seed);
         let p = random.parameters();
@@ -108,7 +108,7 @@ fn random_steps(count: usize, seed: u64) -> usize {
 }
 
 #[test]
-fn random_steps_end_in_numbers_or_a_clear_error() {
+fn random_steps_give_finite_results_or_a_clear_error_message() {
     let refused = random_steps(20_000, 7);
     assert!((500..10_000).contains(&refused), "{refused}");
 }
@@ -116,7 +116,7 @@ fn random_steps_end_in_numbers_or_a_clear_error() {
 /// The long form of the same test, which `.ci/run` calls.
 #[test]
 #[ignore = "a minute: .ci/run --nightly"]
-fn a_million_random_steps_end_in_numbers_or_a_clear_error() {
+fn a_million_random_steps_give_finite_results_or_a_clear_error() {
     random_steps(1_000_000, 8);
 }
 
@@ -159,7 +159,7 @@ fn with_kind<M: runtime::Model>(
 }
 
 #[test]
-fn a_kind_is_its_enumeration_for_hosts_that_set_none() {
+fn an_integer_kind_equals_its_enumeration_for_hosts_that_set_none() {
     type Craft = ::Spacecraft::Model;
     type Tank = ::SloshTank::Model;
     // On a pivot an accelerometer reads minus gravity.
@@ -182,7 +182,7 @@ fn a_kind_is_its_enumeration_for_hosts_that_set_none() {
 /// A host that integrates itself moves the wheels and applies no torque: there is one warning, however many
 /// steps follow.
 #[test]
-fn wheels_that_move_without_a_torque_in_model_exchange_are_warned_of_once() {
+fn a_warning_names_wheels_that_move_without_a_torque_once_in_model_exchange() {
     let fmu = load("Spacecraft");
     let mut with = fmu.instantiation("one");
     with.kind = MODEL_EXCHANGE;
@@ -206,7 +206,7 @@ fn wheels_that_move_without_a_torque_in_model_exchange_are_warned_of_once() {
 
 /// The FMU computes flight, impacts, sliding and both hand-overs bit-identical to the crate.
 #[test]
-fn liquid_that_leaves_its_bottom_moves_through_the_packed_fmu_as_in_the_crate() {
+fn detached_liquid_moves_in_the_packed_fmu_as_in_the_crate() {
     let mut p = Parameters::default();
     p.tank[0].ball.travel = 0.6;
     (p.tank[0].ball.drag, p.tank[0].ball.contact_speed) = (0.2, 0.05);
@@ -232,7 +232,7 @@ fn liquid_that_leaves_its_bottom_moves_through_the_packed_fmu_as_in_the_crate() 
 
 /// The same holds for a tank on another simulator's craft, and for the impulses that the craft receives.
 #[test]
-fn liquid_that_leaves_its_bottom_gives_its_host_the_impulses_of_the_crate() {
+fn detached_liquid_gives_its_host_the_impulses_of_the_crate() {
     let mut p = TankParameters { host: Some(Parameters::default().craft), ..Default::default() };
     p.tank.ball.travel = 0.6;
     (p.tank.ball.drag, p.tank.ball.contact_speed) = (0.2, 0.05);

@@ -51,7 +51,7 @@ fn missing(rows: &[String]) -> Vec<&str> {
 }
 
 #[test]
-fn every_test_that_the_checklist_names_is_there() {
+fn every_test_that_the_checklist_names_exists() {
     let rows = rows("checklist.md", "| demand");
     assert!(rows.len() >= 40, "{} rows are left", rows.len());
     for row in rows.iter().filter(|row| !row.starts_with("| **")) {
@@ -61,7 +61,7 @@ fn every_test_that_the_checklist_names_is_there() {
 }
 
 #[test]
-fn every_test_that_the_page_of_verification_names_is_there() {
+fn every_test_that_the_page_of_verification_names_exists() {
     let rows = rows("verification.md", "| claim");
     assert!(rows.len() >= 50, "{} rows are left", rows.len());
     for row in &rows {

@@ -93,7 +93,7 @@ fn an_input_follows_others_exactly_where_the_model_sets_its_slope<M: Model>() {
 }
 
 #[test]
-fn inputs_without_intermediate_update_are_those_whose_slopes_the_model_sets() {
+fn only_inputs_whose_slopes_the_model_sets_lack_intermediate_update() {
     an_input_follows_others_exactly_where_the_model_sets_its_slope::<HubSlosh::HubSlosh>();
     an_input_follows_others_exactly_where_the_model_sets_its_slope::<Spacecraft::Model>();
     an_input_follows_others_exactly_where_the_model_sets_its_slope::<SloshTank::Model>();
@@ -149,7 +149,7 @@ fn the_structure_is_as_in_fmi_2<M: Model>() {
 }
 
 #[test]
-fn the_structure_of_fmi_3_is_that_of_fmi_2_with_event_indicators() {
+fn the_structure_of_fmi_3_equals_that_of_fmi_2_with_event_indicators() {
     the_structure_is_as_in_fmi_2::<HubSlosh::HubSlosh>();
     the_structure_is_as_in_fmi_2::<Spacecraft::Model>();
     the_structure_is_as_in_fmi_2::<SloshTank::Model>();
@@ -266,7 +266,7 @@ fn capabilities_are_shown<M: Model>() {
 }
 
 #[test]
-fn capabilities_of_fmi_3_are_those_that_tests_show_and_all_else_is_as_in_fmi_2() {
+fn every_declared_capability_of_fmi_3_has_a_test() {
     capabilities_are_shown::<HubSlosh::HubSlosh>();
     capabilities_are_shown::<Spacecraft::Model>();
     capabilities_are_shown::<SloshTank::Model>();

@@ -101,7 +101,7 @@ fn parameters<M: Model>() -> [usize; 2] {
 }
 
 #[test]
-fn numbers_of_variables_in_the_documentation_are_those_of_the_tables() {
+fn numbers_of_variables_in_the_documentation_equal_those_of_the_tables() {
     let [spacecraft, small] = parameters::<Spacecraft::Model>();
     let [hub, _] = parameters::<HubSlosh::HubSlosh>();
     let [tank, _] = parameters::<SloshTank::Model>();

@@ -98,7 +98,7 @@ fn start_values_are_within_min_and_max() {
 }
 
 #[test]
-fn causality_decides_on_variability_initial_and_start() {
+fn causality_determines_variability_initial_and_start() {
     for (variable, kind) in variables() {
         let name = variable.get("name").unwrap();
         let moving = if kind.name == "Real" { "continuous" } else { "discrete" };
@@ -330,7 +330,7 @@ fn every_name_in_the_table_s_dependencies_means_something() {
 
 /// Programs and scripts of other people use these names; more may be added.
 #[test]
-fn names_that_others_build_on_are_there() {
+fn variable_names_that_others_use_exist() {
     let names = "tau_cmd tau_ext g_axial theta omega omega_dot slosh_angle slosh_rate \
         slosh_angle_radial tau_friction tau_fluid F_tangential F_radial wave_height omega_imu \
         slosh_rate_radial energy momentum power_dissipated tau_actuator wheel_speed stuck regime \

@@ -843,7 +843,7 @@ mod tests {
     /// A flow of 2 - t kg/s reverses at 2 s. It passes a point 1.5 kg below at 2 t - t^2/2 = 1.5, which is at
     /// 1 s and again at 3 s. A flow of 1 + t kg/s passes it at 1 s and does not return.
     #[test]
-    fn a_point_of_the_table_is_passed_again_after_the_flow_turns() {
+    fn a_tank_passes_a_point_of_its_table_again_after_the_flow_reverses() {
         let tank = Tank::default();
         let mut mounted = MountedTank::new(&tank);
         mounted.tank.fill.points = 2;
@@ -873,7 +873,7 @@ mod tests {
     /// of 1 - t kg/s has drained half a kilogram when it reverses after a second, and has returned 4 kg after
     /// 4 s.
     #[test]
-    fn a_flow_goes_on_while_the_liquid_is_within_its_table() {
+    fn a_tank_drains_as_long_as_the_liquid_is_within_its_fill_table() {
         let tank = Tank::default();
         let mut mounted = MountedTank::new(&tank);
         mounted.tank.fill.points = 2;

@@ -573,7 +573,7 @@ mod tests {
     /// One craft covers all tolerances, of which rounding limits the tightest; the sixteen craft below would
     /// take a minute at every tolerance.
     #[test]
-    fn a_long_step_of_a_draining_craft_ends_where_its_pieces_do_for_at_most_twice_their_work() {
+    fn a_long_step_of_a_draining_craft_equals_short_steps_at_most_twice_as_costly() {
         for seed in 0..4 {
             let other = [1e-4, 1e-6, 1e-8, 1e-10][seed as usize % 4];
             compare_lengths_of_steps(seed, &[other, 1e-12]);
@@ -582,7 +582,7 @@ mod tests {
 
     #[test]
     #[ignore = "minutes: .ci/run --nightly"]
-    fn long_steps_of_draining_craft_end_where_their_pieces_do_at_every_tolerance() {
+    fn long_steps_of_draining_craft_equal_short_steps_at_every_tolerance() {
         for seed in 0..16 {
             compare_lengths_of_steps(seed, &[1e-4, 1e-6, 1e-8, 1e-10, 1e-12]);
         }

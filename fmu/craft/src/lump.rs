@@ -1022,7 +1022,7 @@ mod tests {
     /// from 4.5 N by 4 N/s, this happens after 0.375 s. No event is due if drag already acts, or if |n| is a
     /// half.
     #[test]
-    fn a_light_lump_drags_from_twice_its_drag_on() {
+    fn drag_of_light_detached_liquid_begins_where_the_wall_force_is_twice_the_drag() {
         let mut lump = lump(BallState::Light);
         (lump.pull[0], lump.pull[1], lump.squared[0]) = (4.5, 4.0, 1.0);
         lump.x_d = along_x(&[2.0]);
@@ -1042,7 +1042,7 @@ mod tests {
     /// A wall force of 1 N that falls by 2 N/s vanishes after 0.5 s. The lump passes the axis after 0.25 or
     /// 0.75 s.
     #[test]
-    fn of_release_and_passage_the_earlier_is_due() {
+    fn the_earlier_of_release_and_settling_is_the_next_event() {
         let mut lump = lump(BallState::Held);
         (lump.pull[0], lump.pull[1]) = (1.0, -2.0);
         lump.x_d = along_x(&[1.0]);
@@ -1062,7 +1062,7 @@ mod tests {
     /// 4 m/s. The impact is immediate if the lump moves into the wall or rests there and is pressed. A lump
     /// that falls away from rest never meets the wall.
     #[test]
-    fn a_lump_in_flight_meets_the_wall_before_it() {
+    fn detached_liquid_hits_the_wall_in_front_of_it() {
         let mut lump = lump(BallState::Flying);
         lump.x_0[2] = -0.5;
         lump.rho = along_z(&[0.0, 3.0]);
@@ -1087,7 +1087,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lump_s_speed_is_measured_by_all_that_moves_it() {
+    fn the_speed_scale_of_detached_liquid_adds_the_speeds_of_all_its_motions() {
         let mut lump = lump(BallState::Flying);
         lump.x_d = along_x(&[-2.0]);
         lump.u = along_z(&[7.0, 5.0]);

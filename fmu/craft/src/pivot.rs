@@ -197,7 +197,7 @@ mod tests {
     /// The values are by hand: Z x (5/4, -3/2, 0) = (9/8, 15/16, 1/4), c w = (1/4, -1/4, 4), c w^2 = 1/8 +
     /// 1/4 + 8, 2 U = 3/4 + 5/16.
     #[test]
-    fn torque_dissipation_and_energy_are_those_of_spring_and_damper_about_each_axis() {
+    fn pivot_torque_energy_and_dissipation_equal_those_of_a_spring_and_a_damper_about_each_axis() {
         let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], Z];
         let (torque, dissipation, energy) = PIVOT.present(&axes, W);
         assert_eq!(torque, [1.125 - 0.25, 0.9375 + 0.25, 0.25 - 4.0]);
@@ -259,7 +259,7 @@ mod tests {
     /// Half of the distance to the nearest pole of tanh, v = i pi/2, by v'' t^2/2 alone and by v' t. With D,
     /// from w = 4 w_s on, it is 2.5/4 of w_s if this is shorter.
     #[test]
-    fn series_of_dry_friction_reach_half_the_way_to_the_pole() {
+    fn power_series_of_dry_friction_are_used_up_to_half_the_distance_to_the_nearest_pole() {
         let friction = PivotFriction { c: [1.0; 3], d: [0.0; 3], omega_s: 0.1, eps: 0.01 };
         let way = 0.5 * libm::sqrt(2.4674);
         let rubbing = Rubbing::new(&friction, 0);

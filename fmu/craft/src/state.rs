@@ -207,7 +207,7 @@ mod tests {
     use crate::{Parameters, Spacecraft};
 
     #[test]
-    fn words_are_the_state_unless_a_number_is_too_large_or_a_direction_has_no_length() {
+    fn saved_words_restore_the_state_unless_a_number_is_too_large_or_a_direction_has_no_length() {
         let inputs = Inputs::default();
         let craft = Spacecraft::new(&Parameters::default(), &inputs, 0.0, 1e-8).unwrap();
         let words = craft.state().to_words();

@@ -240,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn derivatives_are_those_by_differences() {
+    fn derivatives_equal_finite_differences() {
         let default = crate::Tank::default().fill;
         let curves = FillTable { points: POINTS, ..default }.curves(MODES);
         let all = |m: f64| {
@@ -265,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cylinder_is_met_between_the_points() {
+    fn a_fill_table_reproduces_a_cylinder_between_its_points() {
         let (d, r) = (0.9, 0.45);
         let mass = |h: f64| 1000.0 * core::f64::consts::PI * r * r * h;
         let depth = |i: f64| r * (1.0 / 6.0 + (17.0 / 6.0) * (i / (POINTS - 1) as f64).powf(1.5));
@@ -288,7 +288,7 @@ mod tests {
     }
 
     #[test]
-    fn beyond_the_ends_of_its_table_a_tank_is_as_it_is_there() {
+    fn beyond_the_ends_of_its_fill_table_a_tank_keeps_the_end_values() {
         let table = FillTable { points: 3, ..crate::Tank::default().fill };
         let curves = table.curves(MODES);
         let all = |m: f64| {

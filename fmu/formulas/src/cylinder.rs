@@ -117,7 +117,7 @@ mod tests {
     /// liquid and 1000 kg/m3. The sum for I_0 is shorter there, and I_0 is a small difference of large
     /// numbers.
     #[test]
-    fn a_cylinder_is_that_of_the_reference_records() {
+    fn the_cylinder_equals_the_reference_records() {
         let m_liq = 1000.0 * core::f64::consts::PI * 0.45 * 0.45 * 0.6;
         let kept = [pendulum(0, 0.9, 0.6, m_liq)];
         let [m_0, h_0, i_0] = rest(0.9, 0.6, m_liq, &kept);
@@ -136,7 +136,7 @@ mod tests {
     /// The fourth root of a product of order 1 has an error of some ulp; atanh near 1 multiplies it by 1/(1 -
     /// tanh^2) = 20.
     #[test]
-    fn a_tank_is_found_again_from_its_first_mode() {
+    fn tank_dimensions_are_recovered_from_the_first_mode() {
         for (d, h) in [(0.163, 0.1), (0.163, 0.05), (0.9, 0.3)] {
             let m_liq = 700.0 * core::f64::consts::PI * d * d / 4.0 * h;
             let Pendulum { mass, length, .. } = pendulum(0, d, h, m_liq);
@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn the_wave_of_the_first_mode_is_two_thirds_of_the_diameter_an_angle() {
+    fn wave_height_per_slosh_angle_of_mode_1_is_two_thirds_of_the_diameter() {
         assert!((pendulum(0, 0.163, 0.1, 1.0).wave / 0.068202 - 1.0).abs() < 1e-5);
     }
 
@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn bobs_and_rest_have_the_liquid_s_mass_and_centre() {
+    fn modes_and_rigid_liquid_together_have_the_liquids_mass_and_centre() {
         let (d, h, m_liq) = (0.9, 0.6, 380.0);
         let kept: [Pendulum; 3] = core::array::from_fn(|n| pendulum(n, d, h, m_liq));
         let [m_0, h_0, _] = rest(d, h, m_liq, &kept);
@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tank_too_deep_to_tell_is_taken_as_nearly_deep() {
+    fn a_fill_that_the_mode_cannot_determine_becomes_a_nearly_deep_tank() {
         let Pendulum { mass, length, .. } = pendulum(0, 1.0, 5.0, 5000.0);
         let (d, h) = tank_of_first_mode(length, mass, 1000.0);
         assert!((d / 0.995 - 1.0).abs() < 1e-14);

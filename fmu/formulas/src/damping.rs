@@ -380,8 +380,8 @@ mod tests {
     /// In shallow liquid sign and magnitude of every term matter. The values at x = 0.2, 1 and 2 are twelve
     /// digits of the published formula, evaluated by another program.
     #[test]
-    fn mikishev_and_dorozhkin_s_bottom_counts_in_shallow_liquid_and_changes_sign_above_the_radius()
-    {
+    fn the_bottom_term_of_mikishev_and_dorozhkin_matters_in_shallow_liquid_and_changes_sign_above_the_radius()
+     {
         let (r, nu, g) = (0.0815, 9.1312e-7, 9.81);
         for (x, zeta) in [
             (0.2, 0.006928328365141964),
@@ -396,7 +396,7 @@ mod tests {
     }
 
     #[test]
-    fn stephens_s_bottom_counts_in_shallow_liquid() {
+    fn the_bottom_term_of_stephens_matters_in_shallow_liquid() {
         let deep = stephens(1.0, 5.0, 1e-6, 9.81);
         let near = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-4, "{a} {b}");
         // x = 1/2: sinh 1.84 = 3.06896, tanh 0.92 = 0.72590
@@ -407,7 +407,7 @@ mod tests {
     }
 
     #[test]
-    fn correlations_without_bound_are_held_at_their_ends() {
+    fn correlations_are_held_at_the_ends_of_their_range() {
         let sphere = |x: f64| sphere(1.0, x, 1e-6, 9.81);
         assert_eq!((sphere(0.01), sphere(1.99)), (sphere(0.1), sphere(1.9)));
         assert!(sphere(0.11) < sphere(0.1) && sphere(1.89) != sphere(1.9));
@@ -450,7 +450,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cylinder_s_modes_rub_at_their_own_rate() {
+    fn each_mode_of_a_cylinder_has_its_own_wall_friction() {
         for n in [0, 1] {
             let xi = XI[n];
             let wide = (xi * xi + 1.0) / (xi * xi - 1.0);
@@ -584,7 +584,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_not_measured_has_1_45_layers() {
+    fn unmeasured_shapes_have_1_45_times_the_laminar_damping() {
         is_near(numbers(&[]), [1.45, 1.0, 1.3 * 1.45]);
         is_near(numbers(&[part(1.0, 3.0, 0.0)]), [1.45, 1.0, 3.9]);
         is_near(numbers(&[part(1.0, 0.8, 1.0)]), [1.45, 1.0, 1.3 * 1.45]);
@@ -596,7 +596,7 @@ mod tests {
     /// A third of the wall has 4 layers, a half has 1.15 and the rest 1.45. The interval contains the largest
     /// of them.
     #[test]
-    fn a_wall_of_several_shapes_has_their_mean() {
+    fn a_wall_of_several_shapes_has_the_mean_of_their_damping() {
         let parts = [part(1.0 / 3.0, 4.0, 1.0), part(0.5, 1.15, 1.0)];
         is_near(numbers(&parts), [4.0 / 3.0 + 0.5 * 1.15 + 1.45 / 6.0, 1.0, 5.2]);
         // a share below 5 % moves the end of the interval in proportion

@@ -151,7 +151,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn coefficients_are_those_of_the_rows_and_continuous() {
+    fn coefficients_equal_the_table_rows_and_are_continuous() {
         for row in ROWS {
             let at = energy_terms(row[0]).unwrap();
             assert_eq!((at.pair, at.next), ([row[2], row[1]], [row[5], row[4]]));

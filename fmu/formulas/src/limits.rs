@@ -222,7 +222,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_reason_has_its_number_and_no_other_number_is_one() {
+    fn limit_reasons_and_their_numbers_are_one_to_one() {
         for (i, reason) in LimitedBy::ALL.into_iter().enumerate() {
             assert_eq!(reason as usize, i + 1);
             assert_eq!(LimitedBy::from_number(reason as u8), Some(reason));
@@ -231,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn limits_are_those_of_the_table() {
+    fn limits_equal_those_of_the_table() {
         let third = |fill: f64| {
             let (s, kappa) = third_order::coefficients(fill);
             cylinder(fill, third_order::shifts(s, kappa).map(Some))
@@ -251,7 +251,7 @@ mod tests {
     /// From fully nonlinear flow, a pendulum's frequency of planar motion is off by 0.3 % at 1.6, 3.5, 8.3
     /// and 7.8 degrees at these depths. The next order changes these angles by at most 0.3 degrees.
     #[test]
-    fn a_pendulum_ends_where_the_third_order_parts_from_it() {
+    fn the_range_of_a_pendulum_ends_where_the_third_order_differs_from_it() {
         for (fill, exact) in [(0.25, 1.6), (0.35, 3.5), (1.227, 8.3), (2.0, 7.8)] {
             let limit = cylinder(fill, [Some(-0.125), Some(0.5)]).frequency.to_degrees();
             assert!((limit - exact).abs() < 0.3, "{fill}: {limit} {exact}");

@@ -42,7 +42,7 @@ mod tests {
     }
 
     #[test]
-    fn a_regime_has_its_number_and_no_other_number_is_one() {
+    fn regimes_and_their_numbers_are_one_to_one() {
         for regime in [Regime::Linear, Regime::Transitional, Regime::Nonlinear] {
             assert_eq!(Regime::from_number(regime as u8), Some(regime));
         }

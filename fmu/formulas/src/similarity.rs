@@ -128,7 +128,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bond_numbers_and_what_has_them_are_inverse_to_each_other() {
+    fn bond_number_and_tank_size_are_inverse_functions() {
         let liquid = Liquid { density: 1000.0, tension: 0.0625 };
         let bond = liquid.bond(0.5, 0.25);
         assert_eq!(bond, 500.0);
@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn weber_froude_and_the_times_are_what_bond_s_number_says() {
+    fn weber_and_froude_numbers_and_times_follow_from_the_bond_number() {
         let liquid = Liquid { density: 1000.0, tension: 0.0625 };
         let (v, a, l) = (0.5, 0.25, 0.25);
         let (we, fr, bo) = (liquid.weber(v, l), froude_number(v, a, l), liquid.bond(a, l));
@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn froude_s_factors_are_those_of_the_table() {
+    fn froude_s_factors_equal_those_of_the_table() {
         let factors = froude(4.0, 2.0, 0.25).map(|(name, _, factor)| (name, factor));
         let expected = [
             ("length", 4.0),

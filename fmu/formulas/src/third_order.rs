@@ -128,7 +128,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn shifts_of_the_bench_are_those_of_potential_flow() {
+    fn shifts_of_the_bench_equal_those_of_potential_flow() {
         for (fill, planar, circular) in [(0.10, -0.429, 0.367), (0.05, -0.257, 0.421)] {
             let (s, kappa) = coefficients(fill / 0.0815);
             assert!((0.375 * kappa - 0.5 * s - planar).abs() < 6e-4, "{s} {kappa}");
@@ -142,7 +142,7 @@ mod tests {
     /// rule and Bessel functions by their integral. They check sign and magnitude of every term, also close
     /// to the resonance at 0.15.
     #[test]
-    fn coefficients_are_those_of_the_averaged_lagrangian() {
+    fn coefficients_equal_those_of_the_averaged_lagrangian() {
         for (fill, s, kappa) in [
             (0.2, -38.74226735998278, 22.32712645333884),
             (0.6135, 1.1444681651736963, 0.8416439361254805),
@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn a_secondary_resonance_ends_one_per_cent_off() {
+    fn a_secondary_resonance_ends_one_per_cent_away_from_its_depth() {
         for (near, beyond, mode) in [
             ([0.131207, 0.171408], [0.128838, 0.173340], (0, 1)),
             ([0.781046, 0.892573], [0.776228, 0.899858], (2, 2)),

@@ -146,7 +146,7 @@ mod tests {
     /// At small tilts the tolerance is the difference of the two meshes, otherwise the stated error of the
     /// frequency, which is half that of Lambda.
     #[test]
-    fn frequencies_are_those_of_finite_elements_within_the_stated_errors() {
+    fn frequencies_equal_those_of_finite_elements_within_the_stated_errors() {
         for (fill, slope, change) in FINITE_ELEMENTS {
             let part = slope / largest_slope(fill);
             let allowed = match part {
@@ -178,7 +178,7 @@ mod tests {
     /// The same sums are evaluated without a closed form, by Simpson's rule from the expansion of K and M,
     /// whose error is (b/2000)^4/180.
     #[test]
-    fn coefficients_are_those_of_the_perturbation_by_quadrature() {
+    fn coefficients_equal_those_of_the_perturbation_by_quadrature() {
         const N: usize = 2000;
         let integral = |f: &dyn Fn(f64) -> f64| {
             let h = 1.0 / N as f64;
@@ -231,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn an_upright_tank_is_as_it_was_and_no_frequency_is_ever_negative() {
+    fn zero_tilt_changes_nothing_and_no_frequency_is_negative() {
         assert_eq!(factors(0, 1.0, 0.0), [1.0; 2]);
         for fill in [0.02, 0.2, 1.0, 50.0] {
             for n in 0..crate::cylinder::MODES {
@@ -243,7 +243,7 @@ mod tests {
     }
 
     #[test]
-    fn zeros_are_those_of_the_bessel_functions_slopes() {
+    fn zeros_equal_those_of_the_derivative_of_the_bessel_function() {
         for (b, b_2) in XI_0.into_iter().zip(XI_2) {
             assert!(libm::j1(b * (1.0 - 1e-15)) * libm::j1(b * (1.0 + 1e-15)) < 0.0, "{b}");
             // J2' = J1 - 2 J2/x

@@ -186,7 +186,7 @@ fn a_host_that_handles_events_gets_the_same_motion_to_the_last_bit() {
 }
 
 #[test]
-fn a_host_that_forbids_early_return_gets_the_same_motion_and_is_told_at_the_end() {
+fn a_host_that_forbids_early_return_gets_the_same_motion_and_learns_of_events_at_the_end() {
     let expected = trajectory();
     let mut three: Three = initialised(Events::Reported, LIVELY);
     handle(&mut three);
@@ -209,7 +209,7 @@ fn a_host_that_forbids_early_return_gets_the_same_motion_and_is_told_at_the_end(
 }
 
 #[test]
-fn a_host_that_ignores_what_it_is_told_gets_the_same_motion() {
+fn a_host_that_ignores_event_information_gets_the_same_motion() {
     let expected = trajectory();
     let mut three: Three = initialised(Events::Reported, LIVELY);
     handle(&mut three);
@@ -340,7 +340,7 @@ fn reset_is_a_fresh_instance_however_events_are_handled() {
 }
 
 #[test]
-fn states_are_set_in_no_mode_of_co_simulation() {
+fn continuous_states_cannot_be_set_in_co_simulation() {
     let mut three: Three = initialised(Events::Reported, LIVELY);
     let omega = [reference::<Fmi3>("omega")];
     assert_eq!(three.state(), InstanceState::Event);
@@ -386,7 +386,7 @@ fn work_of_g_and_the_gyro_are_the_same_on_every_clock_of_a_host() {
 
 /// The energy of a line that is twisted by 1e308 rad is not finite.
 #[test]
-fn a_start_too_large_for_the_equations_is_refused_with_the_parameter() {
+fn an_initial_state_too_large_for_the_equations_is_refused_by_the_name_of_its_parameter() {
     fn refused<V: Version>() {
         let mut instance =
             Instance::<Model, V>::with_events(Interface::CoSimulation, Events::InStep);

@@ -390,7 +390,7 @@ mod tests {
     /// A host whose step has passed a speed limit of the rotor must handle an event, which returns the rotor
     /// to the limit.
     #[test]
-    fn a_rotor_beyond_its_speed_limits_is_an_overdue_event() {
+    fn a_rotor_beyond_its_speed_limit_makes_an_event_due_at_once() {
         let mut p = Parameters::default();
         p.wheel.enabled = true;
         let inputs = Inputs::default();
@@ -586,7 +586,7 @@ mod tests {
     }
 
     #[test]
-    fn samples_that_are_due_are_taken_and_no_host_can_ask_for_endless_many() {
+    fn gyro_samples_that_are_due_are_taken_up_to_a_limit() {
         let mut p = Parameters::default();
         p.imu.enabled = true;
         p.imu.rate = 1e4;
@@ -678,7 +678,7 @@ mod tests {
     }
 
     #[test]
-    fn a_host_that_integrates_itself_meets_the_plants_own_steps() {
+    fn a_model_exchange_host_reproduces_co_simulation_of_the_plant() {
         // Runge-Kutta 4 at 0.1 ms: (omega_2 h)^4 = 4e-11 per step; 1e-9 over 0.2 s.
         for slosh in SloshModel::ALL {
             let (mut plant, inputs) = plant(slosh, FrictionModel::Viscous);

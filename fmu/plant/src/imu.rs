@@ -305,7 +305,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_are_those_of_splitmix64_and_the_same_for_good() {
+    fn random_numbers_equal_splitmix64() {
         assert_eq!(mix(0), 0xE220_A839_7B1D_CDAF);
         assert_eq!(mix(1_234_567), 6_457_827_717_110_365_317);
         let [(a, b), (c, d)] = [normals(1, 0), normals(-3, 12)];

@@ -432,7 +432,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn shallow_liquid_and_secondary_resonances_are_warned_of() {
+    fn warnings_name_shallow_liquid_and_secondary_resonances() {
         assert!(third_order_warning(0.3).is_some_and(|text| text.contains("shallow")));
         assert!(third_order_warning(SHALLOW).is_none());
         for fill in [0.71, 0.831, 1.01, 1.19] {

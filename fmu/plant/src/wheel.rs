@@ -117,7 +117,7 @@ mod tests {
     /// Rounding must not let a command pass the same limit twice, because pieces of no length would then
     /// follow each other until the step is refused.
     #[test]
-    fn a_command_passes_each_limit_once_however_it_is_rounded() {
+    fn a_torque_command_passes_each_limit_once_despite_rounding() {
         let mut rng = fastrand::Rng::with_seed(1);
         for _ in 0..100_000 {
             let mut between = |low: f64, high: f64| low + (high - low) * rng.f64();
@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn a_command_at_a_limit_is_judged_by_where_it_goes() {
+    fn a_torque_command_at_a_limit_is_within_or_beyond_it_by_its_direction() {
         let w = wheel();
         let none = Ramp { value: 0.0, slope: 0.0 };
         for (speed, blocked) in [(w.speed_min, 1.0), (w.speed_max, -1.0)] {
@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn momentum_on_the_hub_is_what_the_rotor_lost_until_it_saturates() {
+    fn the_hub_gains_the_momentum_that_the_rotor_loses_until_saturation() {
         let w = wheel();
         // 0.1 N m brakes the rotor from 1600 to 200 rpm in 3.3 s; after that the torque is 0.
         let (impulse, speed, _) = run(&w, Ramp { value: 0.1, slope: 0.0 }, 10.0);
@@ -214,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn a_piece_ends_where_the_command_passes_a_limit_or_zero() {
+    fn an_integration_piece_ends_where_the_command_passes_a_limit_or_zero() {
         let w = Wheel { inertia: 1.0, ..wheel() }; // far from its speed limits
         let next = |command: Ramp| w.next(w.speed_0, command, 10.0).length;
         // From -0.5 N m at 0.1 N m/s: to -0.26 in 2.4 s, on to 0 in 2.6 s, on to 0.26.
@@ -251,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn an_actuator_without_a_wheel_gives_what_it_is_told_and_counts_the_reaction() {
+    fn an_actuator_without_a_wheel_gives_the_commanded_torque_and_sums_its_reaction() {
         let w = Wheel { enabled: false, ..wheel() };
         let command = ramp(5.0, -1.0);
         assert_eq!(w.torque(1e6, command), command);

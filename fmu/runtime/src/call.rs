@@ -283,7 +283,7 @@ mod tests {
     use crate::version::Version;
 
     #[test]
-    fn states_stand_at_their_number() {
+    fn numbers_of_instance_states_match_their_order() {
         for (n, state) in InstanceState::ALL.iter().enumerate() {
             assert_eq!(*state as usize, n);
         }

@@ -1635,7 +1635,7 @@ mod tests {
 
     /// Levels have the nominal value 5 m, inputs 4 m/s: aside by up to a hundredth of it, inputs upwards, within their range.
     #[test]
-    fn points_close_by_differ_in_every_state_and_input_by_a_share_of_its_size() {
+    fn nearby_points_for_differences_move_every_state_and_input_by_a_share_of_its_size() {
         let moved = |share: f64, point: u64, q: f64| {
             let mut instance = Instance::<Trays, Fmi3>::new(Interface::ModelExchange);
             instance.enter_initialization_mode().unwrap();

@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn no_category_means_all() {
+    fn an_empty_list_of_log_categories_means_all() {
         assert_eq!(spring_filter(&[]), Ok(Filter::ALL));
     }
 
@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn why_calls_fail_is_told_to_those_who_ask_for_nothing_else() {
+    fn errors_are_logged_even_if_no_category_is_requested() {
         assert_eq!(Filter::NONE.with_errors(), Filter::ERRORS);
         assert_eq!(Filter::ALL.with_errors(), Filter::ALL);
         let events = Filter { events: true, ..Filter::NONE }.with_errors();
@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn events_are_for_those_who_ask() {
+    fn events_are_logged_only_on_request() {
         assert!(!Filter::FAILURES.wants(Topic::Event));
     }
 

@@ -410,14 +410,14 @@ mod tests {
     use crate::spring::Spring;
 
     #[test]
-    fn value_references_lead_back_to_their_names() {
+    fn value_references_and_names_are_one_to_one() {
         for (n, scalar) in Spring::table().scalars.iter().enumerate() {
             assert_eq!(Spring::table().find(&scalar.name()), Some(n as u32));
         }
     }
 
     #[test]
-    fn guid_has_the_form_of_one_and_no_description_in_it() {
+    fn the_guid_has_the_right_form_and_does_not_depend_on_descriptions() {
         let guid = Spring::table().guid();
         let dashes: Vec<_> = guid.match_indices('-').map(|(n, _)| n).collect();
         assert_eq!((guid.len(), dashes), (38, vec![9, 14, 19, 24]));

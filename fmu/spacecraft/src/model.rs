@@ -322,7 +322,7 @@ mod tests {
     }
 
     #[test]
-    fn wheels_that_move_without_a_torque_are_warned_of_and_no_others() {
+    fn a_warning_names_wheels_that_move_without_a_torque() {
         let sine = |t: f64| f64::sin(3.0 * t);
         let reaction = |t: f64| -3.0 * f64::cos(3.0 * t);
         assert!(is_warned(sine, |_| 0.0, false));

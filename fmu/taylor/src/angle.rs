@@ -58,7 +58,7 @@ mod tests {
     use crate::number::Dual;
 
     #[test]
-    fn the_root_is_the_angle_within_3e_7_to_45_degrees_and_smooth_to_180() {
+    fn the_approximate_angle_is_exact_to_3e_7_up_to_45_degrees_and_smooth_to_180() {
         for (degrees, allowed) in [(1e-6, 1e-15), (30.0, 3e-9), (45.0, 3e-7), (90.0, 6e-4)] {
             let angle = f64::to_radians(degrees);
             let u = 4.0 * (angle / 2.0).sin().powi(2);
@@ -70,7 +70,7 @@ mod tests {
     }
 
     #[test]
-    fn the_series_is_that_of_the_function() {
+    fn the_series_equals_that_of_the_function() {
         let u = [0.3, 0.2, -0.1];
         let mut angle = SquaredAngle::default();
         let mut series = ZERO;

@@ -71,7 +71,7 @@ mod tests {
     use alloc::string::ToString;
 
     #[test]
-    fn every_error_says_what_and_when() {
+    fn every_solver_error_names_its_cause_and_time() {
         let says = |error: StepError, parts: &[&str]| {
             let text = error.to_string();
             assert!(parts.iter().all(|part| text.contains(part)), "{text}");

@@ -223,7 +223,7 @@ mod tests {
     const START: [f64; 4] = [1.6, 0.0, 0.0, 0.5];
 
     #[test]
-    fn a_revolution_ends_where_it_began_and_costs_more_where_more_is_asked() {
+    fn a_revolution_returns_to_its_start_and_costs_more_at_smaller_tolerance() {
         let mut works = [0; 4];
         for (k, tolerance) in [1e-4, 1e-6, 1e-8, 1e-10].into_iter().enumerate() {
             let (orbit, mut x) = (Orbit::new(), START);
@@ -239,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn a_call_in_stretches_ends_where_it_does_in_one() {
+    fn several_short_calls_equal_one_long_call() {
         let (mut x, mut y) = (START, START);
         let mut pace = Pace::new(3.0, STEPS);
         for (from, to) in [(0.0, 0.5), (0.5, 0.6), (0.6, 3.0)] {
@@ -296,7 +296,7 @@ mod tests {
     }
 
     #[test]
-    fn no_more_is_asked_for_than_rounding_allows() {
+    fn with_zero_tolerance_the_allowed_error_is_rounding() {
         for scale in [1e6, 1.0, 1e-6] {
             let system = Growth { scale, starts: Cell::new(0) };
             let mut x = [f64::max(scale, 1.0)];
@@ -316,7 +316,7 @@ mod tests {
     }
 
     #[test]
-    fn what_grows_beyond_all_numbers_or_takes_too_many_steps_is_an_error() {
+    fn overflow_and_too_many_steps_are_errors() {
         let orbit = Orbit { growth: 10.0, ..Orbit::new() };
         let run = |steps: Steps| {
             advance(&orbit, &mut START.clone(), (0.0, 9.0), 1e-8, &mut Pace::new(9.0, steps))

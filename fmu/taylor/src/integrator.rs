@@ -446,7 +446,7 @@ mod tests {
     }
 
     #[test]
-    fn two_terms_are_negligible_or_the_second_is_foretold() {
+    fn a_series_ends_when_its_next_two_terms_are_negligible_or_predicted_to_be() {
         // Both are computed.
         assert!(are_negligible([1.0, 1.0, 9.0, 9.0]));
         assert!(!are_negligible([1.1, 0.1, 9.0, 9.0]));
@@ -494,7 +494,7 @@ mod tests {
     }
 
     #[test]
-    fn terms_count_from_the_second_on_and_an_end_at_no_time_is_refused() {
+    fn the_decay_of_terms_counts_from_the_second_term_and_a_zero_step_is_refused() {
         let mut terms = [0.0; ORDER + 1];
         // The decay from term 2 to term 4 is known at order 5.
         terms[2..6].copy_from_slice(&[60.0, 30.0, 3.0, 0.1]);
@@ -520,7 +520,7 @@ mod tests {
     }
 
     #[test]
-    fn orders_compiled_apart_give_the_same_bits() {
+    fn separately_compiled_orders_give_the_same_bits() {
         let mut loops = Oscillator::new(Convergence::Decay);
         let mut apart = Unrolled(Oscillator::new(Convergence::Decay));
         for h in [0.01, 0.3, 9.0] {
@@ -559,7 +559,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_finite_is_refused_by_the_motion_or_by_its_length() {
+    fn values_that_are_not_finite_are_refused() {
         let mut motion = Oscillator { now: [f64::NAN, 0.0], ..Oscillator::new(Convergence::Decay) };
         assert_eq!(motion.advance(1.0, 1e-8), Err(StepError::NotFinite { time: 0.5 }));
         let mut motion = Oscillator::new(Convergence::Decay);
@@ -570,7 +570,7 @@ mod tests {
     }
 
     #[test]
-    fn an_expansion_over_ages_stays_within_numbers() {
+    fn a_power_series_over_a_very_long_step_stays_finite() {
         let mut motion = Oscillator { now: [0.0, 0.0], ..Oscillator::new(Convergence::Terms(2)) };
         motion.start(0.0);
         assert_eq!(expand(&mut motion, 1e300, 1e-8), (5, LONGEST));

@@ -268,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn of_a_plain_number_the_result_is_the_value() {
+    fn functions_of_plain_numbers_return_plain_values() {
         assert_eq!(
             (f64::with_slope(2.0, 5.0), f64::constant(3.0), 4.0.result(), 4.0.value()),
             (2.0, 3.0, 4.0, 4.0)

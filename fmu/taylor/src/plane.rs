@@ -118,7 +118,7 @@ mod tests {
     use crate::series::{Series, ZERO};
 
     #[test]
-    fn the_rules_are_the_product_rule() {
+    fn series_products_follow_the_product_rule() {
         let (mut a, mut b, mut s) = (ZERO_VECTOR2, ZERO_VECTOR2, ZERO);
         let (x, y) = (
             [[1.0, 2.0], [3.0, 0.0], [0.0, -2.0], [4.0, 1.0]],
@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn values_and_numbers_are_those_of_both_components() {
+    fn both_components_of_a_pair_keep_their_values() {
         let mut a = ZERO_VECTOR2;
         (a[0], a[1], a[2]) = ([1.0, -1.0], [2.0, 3.0], [0.5, 4.0]);
         assert_eq!(values([&a, &a], ORDER, 2.0), [[7.0, 21.0]; 2]);

@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn roots_of_lines_parabolas_and_cubics_are_theirs() {
+    fn roots_of_lines_parabolas_and_cubics_are_exact() {
         assert_eq!(first_root(&[2.0, -1.0], 3.0), Some(2.0));
         assert_eq!(first_root(&[2.0, -1.0], 2.0), Some(2.0));
         assert_eq!(first_root(&[2.0, -1.0], 1.9), None);
@@ -152,7 +152,7 @@ mod tests {
     /// For h = 3 the last term of 1 - t^18 is 4e8 times the first one, for h = 1e9 it is 1e162 times as
     /// large.
     #[test]
-    fn where_terms_grow_the_first_root_is_found_as_well() {
+    fn the_first_root_is_found_also_for_growing_terms() {
         let mut a = [0.0; 19];
         (a[0], a[18]) = (1.0, -1.0);
         for h in [1.2, 3.0, 10.0, 1e9] {

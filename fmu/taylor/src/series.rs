@@ -232,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn the_rules_are_the_product_rule() {
+    fn series_products_follow_the_product_rule() {
         let (mut a, mut b) = (ZERO, ZERO);
         a[..4].copy_from_slice(&[1.0, 3.0, -2.0, 4.0]);
         b[..4].copy_from_slice(&[2.0, -1.0, 5.0, 1.0]);
@@ -253,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn values_and_integrals_are_those_of_the_polynomial_that_is_left() {
+    fn values_and_integrals_of_a_series_equal_those_of_its_polynomial() {
         let mut a = ZERO;
         a[..3].copy_from_slice(&[1.0, 2.0, 3.0]);
         assert_eq!(values([&a], ORDER, 2.0), [17.0]);

@@ -312,7 +312,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pair_keeps_both_vectors() {
+    fn a_pair_of_vector_series_keeps_both_vectors() {
         let (a, b) = ([1.0, 2.0, 3.0], [-1.0, 0.5, 4.0]);
         let mut both = ZERO_PAIR;
         both.set(0, a, b);
@@ -326,7 +326,7 @@ mod tests {
     }
 
     #[test]
-    fn an_attitude_keeps_its_quaternions() {
+    fn the_series_of_an_attitude_keeps_its_quaternions() {
         let mut q = ZERO_ATTITUDE;
         q.set(0, [1.0, 2.0, 3.0, 4.0]);
         q.set_next(0, [1.0, -1.0, 2.0, 0.0]);
@@ -352,7 +352,7 @@ mod tests {
     }
 
     #[test]
-    fn the_rules_are_the_product_rule() {
+    fn series_products_follow_the_product_rule() {
         let a: [Vec3; 4] = [[1.0, 2.0, -1.0], [3.0, 0.0, 2.0], [0.0, -2.0, 5.0], [4.0, 1.0, 1.0]];
         let b: [Vec3; 4] = [[2.0, -3.0, 1.0], [1.0, 1.0, 0.0], [-1.0, 4.0, 2.0], [0.0, 2.0, -3.0]];
         let (mut x, mut y, mut s) = (ZERO_VECTOR, ZERO_VECTOR, ZERO);

@@ -204,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn an_alternating_signal_is_seen_by_odd_averages_alone() {
+    fn an_alternating_signal_appears_only_in_averages_of_odd_length() {
         // +1, −1, ...: means of odd m are ±1/m, those of even m nothing
         let samples: Vec<f64> = (0..1000).map(|k| if k % 2 == 0 { 1.0 } else { -1.0 }).collect();
         for point in variances(1.0, &samples) {

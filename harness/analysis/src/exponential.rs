@@ -36,7 +36,7 @@ mod tests {
 
     /// A decay that is fast enough leaves exactly 0.
     #[test]
-    fn a_huge_matrix_has_an_exponential_too() {
+    fn the_exponential_of_a_huge_matrix_is_finite() {
         assert_eq!(
             exponential_by_nalgebra(Matrix2::new(-1e300, 0.0, 0.0, 0.0)),
             Matrix2::new(0.0, 0.0, 0.0, 1.0)

@@ -181,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn a_ripple_behind_the_peak_that_goes_deeper_than_the_dip_is_no_dip() {
+    fn a_deep_ripple_above_the_resonance_is_not_taken_for_the_antiresonance() {
         let mut response =
             Linear::bench_10_cm(0.0029757).frequency_response(&logarithmic_grid(BAND, 2000));
         let clean = Features::find(&response);

@@ -133,7 +133,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_noise_put_in_is_estimated_and_its_innovations_are_white() {
+    fn the_simulated_noise_is_estimated_and_its_innovations_are_white() {
         let mut random = crate::random::Random::new(3, 1);
         let time: Vec<f64> = (0..135_000).map(|k| 0.02 * f64::from(k)).collect();
         let keep = (-0.02f64 / 100.0).exp();

@@ -48,7 +48,7 @@ mod tests {
     use crate::sweep::{Law, Sweep};
 
     #[test]
-    fn the_thesis_has_its_own_lengths() {
+    fn the_thesis_sweep_has_the_window_lengths_of_the_thesis() {
         for law in [Law::Exponential, Law::Linear] {
             let sweep = Sweep { law, ..Sweep::THESIS };
             let lengths = Lengths::for_record(sweep.band(), Some(&sweep), 2700.0, 0.02);

@@ -187,7 +187,7 @@ mod tests {
     use std::f64::consts::TAU;
 
     #[test]
-    fn a_torque_that_jumps_between_steps_is_no_slope() {
+    fn a_torque_jump_is_not_taken_for_a_slope() {
         // a free hub: 0.2 N·m for a second, 0 for a second, -0.2 for a third; edges between samples
         // 0.1 s apart
         let hub = Linear { inertia: 0.4, arm: 0.2, ..Linear::default() };

@@ -145,7 +145,7 @@ mod tests {
     use std::f64::consts::TAU;
 
     #[test]
-    fn a_record_too_short_to_resolve_them_still_tells_antiresonance_from_resonance() {
+    fn a_short_record_still_separates_antiresonance_from_resonance() {
         // 800 kg m2: poles of the same plant as zeros and poles of a transfer function
         let tf = TransferFunction {
             numerator: [1.0 / 800.0, 2.0 * 0.004 * 0.2752 / 800.0, 0.2752 * 0.2752 / 800.0],
@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_transfer_function_misfits() {
+    fn a_response_that_is_no_transfer_function_does_not_fit() {
         let mut random = crate::random::Random::new(7, 0);
         let mut noise = || (0..4000).map(|_| random.normal()).collect::<Vec<_>>();
         let (u, y) = (noise(), noise());

@@ -262,7 +262,7 @@ mod tests {
     use crate::random::Random;
 
     #[test]
-    fn white_normal_noise_on_a_line_is_told_as_that() {
+    fn white_normal_noise_on_a_line_is_recognised() {
         let mut random = Random::new(1, 0);
         let samples: Vec<f64> =
             (0..100_000).map(|k| 1e-3 + 1e-9 * f64::from(k) + 4e-4 * random.normal()).collect();
@@ -325,7 +325,7 @@ mod tests {
     }
 
     #[test]
-    fn the_normal_quantiles_are_those_of_the_tables() {
+    fn the_normal_quantiles_equal_those_of_the_tables() {
         for (part, x) in
             [(0.5, 0.0), (0.975, 1.959_963_984_540_054), (1e-6, -4.753_424_308_822_899)]
         {

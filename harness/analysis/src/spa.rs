@@ -164,7 +164,7 @@ mod tests {
     use signals::fourier::Complex64;
 
     #[test]
-    fn it_is_the_sum_of_its_definition() {
+    fn the_spectral_estimate_equals_its_definition() {
         // noise through a short filter; 40 samples, lags up to 9 samples, summed by definition
         let step = 0.1;
         let u: Vec<f64> = (0..40u32).map(|k| f64::from(k * k * 7919 % 101) / 50.0 - 1.0).collect();

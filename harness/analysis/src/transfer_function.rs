@@ -323,7 +323,7 @@ mod tests {
     use std::f64::consts::TAU;
 
     #[test]
-    fn the_exact_linear_model_is_found_again() {
+    fn a_fit_recovers_the_exact_linear_model() {
         // Poles and zeros of the 10 cm bench to 15 digits by an independent calculation.
         let plant = Linear::bench_10_cm(0.002_975_693_092_229);
         let measured = plant.frequency_response(&logarithmic_grid(BAND, 2000));
@@ -369,7 +369,7 @@ mod tests {
     }
 
     #[test]
-    fn a_free_answer_is_found_again_from_the_whole_signal() {
+    fn a_fit_recovers_a_free_response_from_the_whole_signal() {
         // 2700 s of a slowly turning pair with a slow real pole; and a pair of equal real poles
         for (pole_damping, real_pole) in [(2e-5, 1e-4), (1.0, 0.1)] {
             let tf = TransferFunction {

@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn coherence_is_one_through_a_gain_and_one_eighth_between_strangers() {
+    fn coherence_is_one_for_a_gain_and_one_eighth_for_independent_noise() {
         let (u, v) = (noise(1, 90_000), noise(77, 90_000));
         let gained: Vec<f64> = u.iter().map(|x| -3.0 * x).collect();
         let through = Spectra::estimate(0.02, &u, &gained, RESPONSE);
@@ -188,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sweep_and_a_stranger_are_coherent_only_if_too_few_segments_see_each_frequency() {
+    fn a_sweep_and_independent_noise_seem_coherent_only_with_too_few_segments() {
         // 1 to 2 Hz at the thesis's rate: six segments of 20 s see each frequency, or one of 267 s
         let sine = |turns: fn(f64) -> f64| -> Vec<f64> {
             let time = (0..60_000).map(|k| k as f64 * 0.02);

@@ -135,7 +135,7 @@ mod tests {
     use host::xml::Element;
 
     #[test]
-    fn every_rule_is_a_case_and_any_text_can_be_told() {
+    fn every_rule_is_a_junit_case_and_any_text_is_escaped() {
         let mut outcomes: Vec<_> = RULES
             .iter()
             .map(|rule| Outcome {

@@ -165,7 +165,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn windows_cannot_hold_devices_trailing_dots_and_its_own_characters() {
+    fn file_names_that_windows_cannot_have_are_found() {
         for wrong in ["CON", "nul.txt", "com1", "LPT9.a.b", "a.", "a ", "a?b", "a:b", "aux .c"] {
             assert!(!windows_faults(wrong).is_empty(), "{wrong}");
         }

@@ -259,7 +259,7 @@ mod tests {
     const CHILD: &str = "process_of_the_rule";
 
     #[test]
-    fn a_panic_of_our_own_code_is_no_fault_of_the_fmu() {
+    fn a_panic_of_hubslosh_is_not_reported_as_a_fault_of_the_fmu() {
         let program = std::env::current_exe().unwrap();
         if std::env::args().any(|argument| argument == CHILD) {
             files::bug::keep_panics();
@@ -269,7 +269,7 @@ mod tests {
         }
         let folder = tempfile::tempdir().unwrap();
         let script = folder.path().join("hubslosh");
-        let name = "process::tests::a_panic_of_our_own_code_is_no_fault_of_the_fmu";
+        let name = "process::tests::a_panic_of_hubslosh_is_not_reported_as_a_fault_of_the_fmu";
         let text = format!("#!/bin/sh\nexec '{}' --exact {name} {CHILD}\n", program.display());
         std::fs::write(&script, text).unwrap();
         std::fs::set_permissions(&script, std::fs::Permissions::from_mode(0o700)).unwrap();

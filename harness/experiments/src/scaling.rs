@@ -357,7 +357,7 @@ mod tests {
     }
 
     #[test]
-    fn froude_factors_are_those_of_table_2_3_and_keep_the_froude_number() {
+    fn froude_factors_equal_those_of_table_2_3_and_keep_the_froude_number() {
         let (lambda, density) = (4.0, 1.2);
         let factors = froude(lambda, density, 1.0);
         let of = |name: &str| factors.iter().find(|f| f.0 == name).expect(name).2;

@@ -311,7 +311,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tank_s_numbers_are_those_of_its_hinge_and_of_all_its_modes() {
+    fn a_tank_s_numbers_equal_those_of_its_hinge_and_of_all_its_modes() {
         let tanks = tank(true);
         // 0.02 m/s²: Bo = 1000 0.02 0.45²/0.072 = 56.3; 0.4 0.05 + 0.1 0.1 = 0.03 m/s: We = 5.6, Fr = 0.1
         assert_eq!(warnings(&tanks, &[[0.02, 0.0, 0.0, 0.05, 0.1]; 2]), [""; 0]);
@@ -342,7 +342,7 @@ mod tests {
     }
 
     #[test]
-    fn a_liquid_is_told_by_its_least_ruling_weight() {
+    fn a_weightless_liquid_is_reported_with_its_smallest_bond_number() {
         // water in the bench's tank
         let contents = Contents { liquid: WATER, radius: 0.0815 };
         let numbers = |rows: &[(f64, f64)]| contents.without_weight(rows.iter().copied());

@@ -108,7 +108,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_too_much_is_refused_with_what_is_allowed() {
+    fn sizes_above_a_budget_are_refused_with_the_allowed_size() {
         assert_eq!(steps(2700.0, 0.02).unwrap(), 135_000);
         assert_eq!(steps(1.0, 0.3).unwrap(), 4);
         assert!(reading(ROWS, 3, 0).is_ok() && reading(ROWS, 20, 1 << 30).is_ok());

@@ -200,7 +200,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn an_input_is_protected_under_all_its_names() {
+    fn an_input_file_is_not_overwritten_through_another_name_or_link() {
         let directory = tempfile::tempdir().unwrap();
         let at = |name: &str| directory.path().join(name);
         std::fs::write(at("input.csv"), "input").unwrap();

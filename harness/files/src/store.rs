@@ -669,7 +669,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_that_was_cut_off_is_none_and_the_next_start_writes_the_manifest_anew() {
+    fn a_truncated_manifest_line_is_ignored_and_written_anew() {
         let directory = tempfile::tempdir().unwrap();
         let take = || take(directory.path(), CAMPAIGN).unwrap();
         take().add_text("a", "1");
@@ -682,7 +682,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_published_is_in_the_manifest_and_what_is_not_is_gone() {
+    fn published_files_are_in_the_manifest_and_others_are_removed() {
         let directory = tempfile::tempdir().unwrap();
         let publish = |files: Vec<(&str, Vec<u8>)>| {
             take(directory.path(), CAMPAIGN).unwrap().publish(files).unwrap()
@@ -698,7 +698,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_campaigns_is_left_alone_whatever_the_manifest_says() {
+    fn files_that_are_not_the_campaigns_own_are_left_alone_whatever_the_manifest_says() {
         let directory = tempfile::tempdir().unwrap();
         let out = directory.path().join("out");
         fs::create_dir(&out).unwrap();

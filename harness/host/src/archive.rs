@@ -304,7 +304,7 @@ mod tests {
     }
 
     #[test]
-    fn archives_beyond_the_budgets_or_with_ways_out_are_refused_before_anything_is_written() {
+    fn archives_that_are_too_large_or_leave_their_folder_are_refused_before_writing() {
         let zeros = vec![0; (UNPACKED + (1 << 20)) as usize];
         let many: Vec<String> = (0..=MOST_ENTRIES).map(|n| n.to_string()).collect();
         let many: Vec<(&str, &[u8])> = many.iter().map(|name| (name.as_str(), &[][..])).collect();

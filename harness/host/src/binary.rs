@@ -456,7 +456,7 @@ mod tests {
     }
 
     #[test]
-    fn every_fault_is_told_at_once() {
+    fn all_faults_of_a_binary_are_reported_at_once() {
         let mut linux = good(Kind::Linux);
         linux.libraries.push("libgcc_s.so.1".into());
         linux.needs = glibc_version("GLIBC_2.34");
@@ -516,7 +516,7 @@ mod tests {
     }
 
     #[test]
-    fn rubbish_is_no_binary() {
+    fn random_bytes_are_not_a_binary() {
         for bytes in
             [&b""[..], b"MZ", b"\x7fELF\x02\x01\x01", &[0xca, 0xfe, 0xba, 0xbe, 0, 0, 0, 9]]
         {

@@ -288,7 +288,7 @@ mod tests {
     }
 
     #[test]
-    fn a_packed_element_is_the_same_element_and_what_is_none_is_refused() {
+    fn a_packed_xml_element_is_restored_and_other_bytes_are_refused() {
         let text = "<a b='\u{b0}&#10;'>\n<c/>text<c d='' e='1'><f g='2'/></c></a>";
         let root = Element::parse(text.as_bytes()).unwrap();
         let mut bytes = Vec::new();
@@ -307,7 +307,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_well_formed_is_an_error_with_its_line() {
+    fn xml_that_is_not_well_formed_is_an_error_with_its_line() {
         for text in ["", "<a>", "<a></b>", "<a x=1/>", "<a>\n<b></a>", "\u{feff}", "<a>\u{1}</a>"] {
             assert!(Element::parse(text.as_bytes()).is_err(), "{text:?}");
         }
@@ -361,7 +361,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_are_those_of_xml() {
+    fn numbers_equal_those_of_xml() {
         assert_eq!(double(" 1.5e3 "), Some(1500.0));
         assert_eq!(double("-INF"), Some(f64::NEG_INFINITY));
         for wrong in ["1,5", "inf", "nan", "infinity", "0x10", "", "1.0d"] {

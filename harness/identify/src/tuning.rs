@@ -19,7 +19,7 @@ pub const KERNEL_HALF: isize = 24;
 pub const KERNEL_SHAPE: f64 = 7.9;
 
 // Gaps of the torque: `input/gaps.rs`.
-// Tests: `lost_samples_of_a_sweep_are_foretold`, `lost_rows_of_a_sweep_are_filled_and_those_of_noise_cut_the_recording`.
+// Tests: `lost_samples_of_a_sweep_are_predicted`, `lost_rows_of_a_sweep_are_interpolated_and_lost_rows_of_noise_split_the_recording`.
 /// Spacing of the torque's samples, in usual ones, from which on some were lost.
 pub const LOST_SPACING: f64 = 1.75;
 /// Longest gap that is filled, s.
@@ -45,7 +45,7 @@ pub const EVEN_GRID: f64 = 0.02;
 pub const WHEEL_WINDOW: f64 = 0.1;
 
 // Reading: `input/reading.rs`.
-// Tests: `each_fault_has_a_sentence_of_its_own`, `twenty_spikes_are_told_and_left_out`.
+// Tests: `each_fault_has_a_sentence_of_its_own`, `twenty_spikes_are_reported_and_left_out`.
 /// Time after the beginning of a part that is already moving in which no sensor is fitted, s: a sensor that is late shows
 /// what happened before the part's first torque.
 pub const LATE_SENSOR: f64 = 0.1;
@@ -79,7 +79,7 @@ pub const ON_CLOCK: f64 = 0.98;
 pub const SLOWEST_GYRO: usize = 100;
 
 // Sensor faults: `input/sensor_faults.rs`.
-// Tests: `each_fault_is_named`, `a_sound_gyro_has_no_faults`, `a_hub_at_rest_is_no_fault`, `a_range_that_one_end_shows_is_that_of_the_other`.
+// Tests: `each_fault_is_named`, `a_sound_gyro_has_no_faults`, `a_hub_at_rest_is_no_fault`, `a_clipping_limit_at_one_end_of_the_range_holds_at_the_other`.
 /// Fewest values at an end of the range that are clipped, and how many times as many they are as equal values just inside it.
 pub const CLIPPED: (usize, f64) = (20, 4.0);
 /// Width of that inside, in units of the noise.
@@ -100,7 +100,7 @@ pub const REPEATS: (usize, f64) = (10, 3.0);
 pub const SENSOR_ROUNDING: f64 = 1e-9;
 
 // Spikes: `input/spikes.rs`.
-// Tests: `spikes_are_found_alone_and_side_by_side_and_noise_is_none`, `more_than_one_value_in_a_hundred_is_no_spike`, `a_step_of_the_torque_makes_no_spike`.
+// Tests: `single_and_adjacent_spikes_are_found_and_noise_is_not_a_spike`, `more_than_one_value_in_a_hundred_is_no_spike`, `a_step_of_the_torque_makes_no_spike`.
 /// Deviations of r beyond which a value is a spike; of 135,000 rows of noise none is in 10¹⁴ recordings.
 pub const SPIKE_BEYOND: f64 = 10.0;
 /// Spikes at most, of all values: more are noise of another kind, which no row should be left out for.
@@ -141,7 +141,7 @@ pub const SLOPE_PROBES: [f64; 3] = [1e-2, 1e-3, 1e-4];
 pub const FINEST_TOLERANCE: f64 = 1e-13;
 
 // Effects outside the FMU: `model/bench/effect.rs`.
-// Tests: `lags_of_a_sine_are_those_of_its_frequency_response`.
+// Tests: `lags_of_a_sine_equal_those_of_its_frequency_response`.
 /// Fewest and most parts of the way from knot to knot: lines between points of a lagged torque act as the curve does to 1e-3 at 2.4 Hz
 /// and 50 knots a second.
 pub const LAG_PARTS: (f64, f64) = (3.0, 8.0);
@@ -172,7 +172,7 @@ pub const SHALLOWEST: f64 = 0.02;
 pub const RANGE_MARGIN: f64 = 0.06;
 
 // Directions of derivatives: `fit/decomposition.rs`.
-// Tests: `what_is_not_finite_is_named_and_no_iteration_hangs`, `parameters_that_no_output_tells_apart_are_named_as_a_set_in_words_and_json`.
+// Tests: `values_that_are_not_finite_are_named_and_no_iteration_hangs`, `parameters_that_no_output_tells_apart_are_named_as_a_set_in_words_and_json`.
 /// Limit of nalgebra's iterations; n columns take about 2 n.
 pub const EIGEN_ITERATIONS: usize = 10_000;
 /// Eigenvalue over the largest one up to which a direction counts as flat: the recordings do not show it.
@@ -198,7 +198,7 @@ pub const BIC_ALIKE: f64 = 2.0;
 pub const CONVERGED: f64 = 0.5;
 
 // Derivatives of any FMU: `fit/problem.rs`.
-// Tests: `no_interval_is_given_where_the_errors_of_the_fmus_own_solver_decide`, `a_hub_in_closed_form_comes_back_within_its_intervals`.
+// Tests: `no_interval_is_given_where_the_errors_of_the_fmus_own_solver_decide`, `intervals_contain_the_true_values_of_a_hub_in_closed_form`.
 /// Change of the outputs by a difference to either side, in units of the noise's norm of one degree of freedom.
 pub const MOVE: f64 = 0.5;
 /// Bounds of the differences' steps, in units of an unknown's reach.
@@ -213,7 +213,7 @@ pub const WIDER: (f64, f64) = (8.0, 0.2);
 pub const OUTPUT_JUMP: (f64, f64) = (8.0, 20.0);
 
 // Search of any FMU: `fit/search.rs`.
-// Tests: `a_hub_in_closed_form_comes_back_within_its_intervals`, `what_no_recording_says_is_not_determined_and_a_bound_in_the_way_is_named`.
+// Tests: `intervals_contain_the_true_values_of_a_hub_in_closed_form`, `parameters_without_information_are_not_determined_and_bounds_are_named`.
 /// A search has ended where the distance to the minimum, in standard deviations, is below this.
 pub const DECREMENT: f64 = 0.02;
 /// Windows of a search from afar, as parts of the recordings.
@@ -224,7 +224,7 @@ pub const WINDOW_NOISE: f64 = 0.03;
 pub const BAD_START: f64 = 1.5;
 
 // Derivatives and search of the bench: `fit/bench/problem.rs` and its folder.
-// Tests: `sensitivities_are_those_of_smaller_and_larger_steps`, `after_its_noise_is_renewed_a_minimum_is_of_that_noise`, `starts_forty_percent_off_end_at_the_minimum_of_the_datas_own`, `the_minimum_is_found_along_the_bent_valley_of_the_gyros_scale`.
+// Tests: `sensitivities_equal_those_of_smaller_and_larger_steps`, `after_its_noise_is_renewed_a_minimum_is_of_that_noise`, `starts_forty_percent_off_end_at_the_minimum_of_the_datas_own`, `the_minimum_is_found_along_the_bent_valley_of_the_gyros_scale`.
 /// Change of the answer by a difference, in units of the noise's norm of one degree of freedom.
 pub const BENCH_MOVE: f64 = 0.3;
 /// Drift of a MEMS gyro (the thesis's LSM6DS3), until the recording's own is known. Without it the slow
@@ -262,7 +262,7 @@ pub const SHORTEST_GROWTH: f64 = 0.05;
 pub const WINDOW_PRIOR: f64 = 0.5;
 
 // Attempts: `fit/bench/search.rs`.
-// Tests: `what_the_loudest_part_has_against_a_stribeck_speed_the_whole_has_too`, `what_the_torque_between_rows_cannot_be_costs_few_simulations`.
+// Tests: `a_stribeck_speed_that_the_loudest_part_rejects_is_rejected_by_the_whole_recording`, `impossible_intersample_behaviours_cost_few_simulations`.
 /// Mean square of the innovations below which a model may be near its minimum; noise has 1.
 pub const NEARLY_NOISE: f64 = 1.5;
 /// Share of the sum of squares that remains after the steps of one set of sensitivities that lead far.
@@ -278,7 +278,7 @@ pub const FREQUENCY_FINENESS: f64 = 1e-3;
 pub const LATEST_DELAY: f64 = 0.05;
 
 // Intersample behaviour: `fit/bench/between.rs`.
-// Tests: `what_the_torque_between_rows_cannot_be_costs_few_simulations`, `a_delay_of_half_a_row_is_a_finding_where_it_is_known`, `no_model_error_makes_the_rate_come_before_the_torque`.
+// Tests: `impossible_intersample_behaviours_cost_few_simulations`, `a_delay_of_half_a_row_is_a_finding_where_it_is_known`, `no_model_error_makes_the_rate_come_before_the_torque`.
 /// Standard deviations below zero at which a delay counts as acausal.
 pub const ACAUSAL: f64 = 3.0;
 /// Difference of two channels' time stamps that is negligible, in rows.
@@ -293,7 +293,7 @@ pub const LOST_RIVAL: f64 = 10.0;
 pub const FORESEEN: f64 = 1.0;
 
 // The friction's shape: `fit/bench/friction.rs`.
-// Tests: `along_the_frictions_flat_valley_the_interval_is_that_of_the_likelihood`, `ends_that_the_likelihood_does_not_have_are_open`, `the_end_of_an_interval_beyond_its_last_point_is_that_of_the_parabola`, `a_point_of_the_profile_that_went_astray_ends_no_interval`.
+// Tests: `along_the_frictions_flat_valley_the_interval_equals_that_of_the_likelihood`, `ends_that_the_likelihood_does_not_have_are_open`, `the_end_of_an_interval_beyond_the_last_profile_point_follows_a_parabola`, `a_point_of_the_profile_that_went_astray_ends_no_interval`.
 /// ω_s over the fastest speed of the recording.
 pub const STRIBECK_GRID: [f64; 6] = [0.1, 0.3, 0.7, 1.5, 4.0, 15.0];
 /// Relative standard deviation of d or ω_s beyond which a minimum may be one of several.
@@ -334,7 +334,7 @@ pub const PROFILE_BETWEEN: usize = 8;
 pub const POOR_FIT: f64 = 90.0;
 
 // Profile of any FMU: `uncertainty/profile.rs`.
-// Tests: `what_no_recording_says_is_not_determined_and_a_bound_in_the_way_is_named`, `coverage_of_a_hundred_twins_of_each_kind`.
+// Tests: `parameters_without_information_are_not_determined_and_bounds_are_named`, `coverage_of_a_hundred_twins_of_each_kind`.
 /// Part by which √Δ may differ from that of a parabola.
 pub const PARABOLIC: f64 = 0.1;
 /// Largest distance to search for an end, in standard deviations.
@@ -359,7 +359,7 @@ pub const OUTPUT_ROUNDING: f64 = 1e-12;
 pub const DIRECTION_PART: f64 = 1e-2;
 
 // Sources of uncertainty: `uncertainty/bench/sources.rs`.
-// Tests: `a_push_and_a_free_decay_do_not_determine_the_preferential_direction`, `a_hub_turns_one_way_if_nearly_all_of_its_path_does`, `a_hub_that_turns_both_ways_is_not_taken_for_one_that_turns_one_way`, `parameters_come_back_and_coulomb_and_stribeck_friction_as_their_sum`.
+// Tests: `a_push_and_a_free_decay_do_not_determine_the_preferential_direction`, `a_hub_turns_one_way_if_nearly_all_of_its_path_does`, `a_hub_that_turns_both_ways_is_not_taken_for_one_that_turns_one_way`, `identify_finds_all_parameters_and_the_sum_of_coulomb_and_stribeck_friction`.
 /// Standard deviation of the friction's asymmetry above which the recordings do not show it.
 pub const ONE_WAY: f64 = 0.3;
 /// Part of a hub's path against its main direction above which it turns both ways.
@@ -397,7 +397,7 @@ pub const CAUSE_LEAST: f64 = 0.05;
 pub const ACTUATOR_LIMIT: f64 = 0.9;
 
 // Deep tanks: `uncertainty/bench/deep_tank.rs`.
-// Tests: `in_a_shallow_tank_the_intervals_are_those_of_first_order`, `the_fill_of_a_tank_without_a_bottom_is_known_from_below`.
+// Tests: `in_a_shallow_tank_the_intervals_equal_those_of_first_order`, `the_fill_of_a_tank_without_a_bottom_is_known_from_below`.
 /// Standard deviation of ln h beyond which first order will not do.
 pub const DEEP: f64 = 0.05;
 /// Draws: the quantiles' own error is a fiftieth of a standard deviation.
@@ -406,7 +406,7 @@ pub const DEEP_DRAWS: usize = 20_000;
 pub const FEWEST_DRAWS: usize = 400;
 
 // Design of experiments: `uncertainty/bench/design.rs`.
-// Tests: `d_optimal_power_stands_around_the_slosh_and_tells_more`, `a_multisine_has_odd_lines_alone_and_its_peak`.
+// Tests: `d_optimal_power_is_near_the_slosh_frequency_and_reduces_uncertainty`, `a_multisine_has_only_odd_lines_and_the_given_peak`.
 /// Odd lines in a group, of which one is left out.
 pub const LINE_GROUP: usize = 4;
 /// Share of the power that is always spread over all lines. It excites the resonance of a slightly different plant, and shows
@@ -430,7 +430,7 @@ pub const SEEN_SENSITIVITY: f64 = 1e-2;
 pub const MISSING_LIMIT: f64 = 4.0;
 
 // Study of starts: `words/start_study.rs`.
-// Tests: `an_end_that_is_lower_is_a_doubt`.
+// Tests: `a_lower_minimum_from_another_start_makes_the_result_doubtful`.
 /// Difference of two sums of squares, in variances of the noise, up to which two ends are one minimum. The 95 % interval of an unknown
 /// ends at 3.84.
 pub const SAME_MINIMUM: f64 = 0.5;
@@ -452,7 +452,7 @@ pub const PAGE_STRETCH: f64 = 8.0;
 pub const PAGE_LAGS: usize = 200;
 
 // Words on any FMU: `any_fmu/mod.rs`.
-// Tests: `what_no_recording_says_is_not_determined_and_a_bound_in_the_way_is_named`, `a_prior_holds_what_it_knows_better_than_the_recordings`.
+// Tests: `parameters_without_information_are_not_determined_and_bounds_are_named`, `a_prior_holds_what_it_knows_better_than_the_recordings`.
 /// Correlation from which on two estimates are named as a pair.
 pub const PAIR_CORRELATION: f64 = 0.98;
 /// Part of the prior's standard deviation that is left where the recordings say nothing.
@@ -470,7 +470,7 @@ pub const GOES_ON: usize = 3;
 pub const STUDY_REACH: f64 = 3.0;
 
 // Friction runs: `methods/friction.rs`.
-// Tests: `friction_of_three_sets_of_runs_ends_in_no_false_minimum`, `recordings_that_show_no_friction_are_refused_with_what_to_do`, `scatter_of_decays_is_no_preferential_direction_and_a_tenth_of_friction_is_one`.
+// Tests: `friction_of_three_sets_of_runs_ends_in_no_false_minimum`, `recordings_that_show_no_friction_are_refused_with_what_to_do`, `scatter_of_decays_is_not_a_preferential_direction_and_ten_per_cent_of_friction_is`.
 /// Rows that are closer are taken together for the measured friction, s.
 pub const BLOCK: f64 = 0.01;
 /// Blocks of the shortest recording.

@@ -489,7 +489,7 @@ mod tests {
     }
 
     #[test]
-    fn the_search_does_not_find_its_own_words() {
+    fn the_search_for_crates_does_not_find_its_own_text() {
         for words in [
             "/rust/depsaddr2lineApache-2.0 OR MIT/x",
             "/rust/deps",

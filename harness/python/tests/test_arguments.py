@@ -123,7 +123,7 @@ def given(fmu: Path) -> SimpleNamespace:
     return SimpleNamespace(run=hubslosh.simulate(fmu, VISCOUS, SWEEP), model=model, fmu=fmu)
 
 
-def test_wrong_arguments_are_told_in_our_words(given: SimpleNamespace) -> None:
+def test_wrong_arguments_are_reported_by_messages_of_the_package(given: SimpleNamespace) -> None:
     """Every call of the list, each a mistake that somebody makes."""
     for call in WRONG:
         with pytest.raises(FmuError) as error:
@@ -131,7 +131,7 @@ def test_wrong_arguments_are_told_in_our_words(given: SimpleNamespace) -> None:
         assert "there is no FMU" not in str(error.value)  # it would hide what is looked for
 
 
-def test_one_name_and_a_file_of_parameters_are_taken(
+def test_a_single_name_and_a_file_of_parameters_are_accepted(
     given: SimpleNamespace, tmp_path: Path
 ) -> None:
     """Lists of names and mappings give bit-identical results."""
@@ -148,7 +148,7 @@ def test_one_name_and_a_file_of_parameters_are_taken(
     assert (model.A == hubslosh.linearize(given.fmu, values, ["tau_cmd"], ["omega"]).A).all()
 
 
-def test_a_mask_is_not_ignored(given: SimpleNamespace) -> None:
+def test_masked_arrays_are_refused(given: SimpleNamespace) -> None:
     """NumPy would take what lies under the mask."""
     one = np.ma.array([1.0, 99.0, 3.0], mask=[False, True, False])
     matrix = np.ma.array(np.diag([3.0, 3.0, 3.0]), mask=np.eye(3) > 0)

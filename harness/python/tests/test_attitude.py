@@ -26,7 +26,7 @@ def matrix(q: np.ndarray) -> np.ndarray:
     return (w**2 - v @ v) * np.eye(3) + 2 * np.outer(v, v) + 2 * w * cross
 
 
-def test_angles_are_those_of_three_turns() -> None:
+def test_angles_equal_those_of_three_turns() -> None:
     """Yaw, pitch, roll by matrices; there and back; rows of them."""
     random = np.random.default_rng(1)
     roll, yaw = random.uniform(-np.pi, np.pi, (2, 20))
@@ -41,7 +41,7 @@ def test_angles_are_those_of_three_turns() -> None:
     ]  # fmt: skip
 
 
-def test_the_error_is_what_is_left_to_turn_in_body_axes() -> None:
+def test_the_attitude_error_is_the_remaining_rotation_in_body_axes() -> None:
     """From q by the rotation vector to the wanted attitude; the short way."""
     random = np.random.default_rng(2)
     q, wanted = random.standard_normal((2, 20, 4))
@@ -58,7 +58,7 @@ def test_the_error_is_what_is_left_to_turn_in_body_axes() -> None:
     assert vector == pytest.approx([0, -0.4, 0])
 
 
-def test_a_slew_is_what_a_rigid_craft_does_under_its_torque(fmu: Path) -> None:
+def test_a_rigid_craft_follows_the_slew_under_its_torque(fmu: Path) -> None:
     """Spacecraft.fmu without liquid, about no principal axis; torque on lines 0.05 s apart.
 
     Chords of a sine with a period of 20 s leave (0.05 · 2π/20)²/8 = 3e-5 of the torque.
@@ -79,7 +79,7 @@ def test_a_slew_is_what_a_rigid_craft_does_under_its_torque(fmu: Path) -> None:
     assert turned == pytest.approx(0.5 * np.array([2, 2, 1]) / 3, abs=1e-5)
 
 
-def test_what_is_no_attitude_is_refused() -> None:
+def test_invalid_attitudes_are_refused() -> None:
     """Sizes, zeros, tables without a quaternion."""
     with pytest.raises(FmuError, match="four numbers"):
         attitude.angles([1, 0, 0])

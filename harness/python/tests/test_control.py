@@ -198,7 +198,7 @@ def test_margins_of_the_spacecraft_name_slosh(spacecraft: Path) -> None:
     assert "slosh of tank 1" in str(found) and "closed loop: stable" in str(found)
 
 
-def test_what_is_wrong_with_a_loop_is_told(fmu: Path, spacecraft: Path) -> None:
+def test_errors_of_a_loop_are_reported_in_words(fmu: Path, spacecraft: Path) -> None:
     """Sizes, kinds, periods, references; never a TypeError."""
     loop = (GAINS, PERIOD, 1.0, fmu, VISCOUS)
     wrong = {

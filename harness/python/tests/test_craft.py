@@ -86,7 +86,7 @@ def test_rigid_mass_properties_are_sums_by_hand(craft: Craft) -> None:
 
 
 @pytest.mark.parametrize("fill", ["3%", {"ox": (120.0, "kg"), "fuel": 0.7}, ("100%", 0)])
-def test_effective_mass_properties_are_the_fmu_s_own(craft: Craft, fill) -> None:
+def test_effective_mass_properties_equal_the_fmus(craft: Craft, fill) -> None:
     """Sloshing and rigid liquid alike, at rest."""
     mine = craft.mass_properties(fill)
     shift = craft.trim(fill).shift
@@ -101,7 +101,7 @@ def test_effective_mass_properties_are_the_fmu_s_own(craft: Craft, fill) -> None
         assert values[4:].reshape(3, 3) == pytest.approx(mine.inertia, rel=1e-9, abs=1e-7)
 
 
-def test_loop_and_linear_model_are_those_of_parameters_by_hand(craft: Craft) -> None:
+def test_loop_and_linear_model_equal_those_of_explicit_parameters(craft: Craft) -> None:
     """Margins and matrices equal those of the same numbers, put together from `tank`."""
     fill, gains = "60%", np.hstack([20 * np.eye(3), 300 * np.eye(3)])
     mass = craft.mass_properties(fill).mass
@@ -190,7 +190,7 @@ def test_the_viewer_draws_a_loop_with_the_craft_s_columns(
     assert "tank[2].angle_y[1]" in run and "tank[1].angle_x[2]" in run
 
 
-def test_a_craft_names_everything_that_is_wrong_with_it(craft: Craft) -> None:
+def test_all_errors_of_a_craft_are_reported_at_once(craft: Craft) -> None:
     """At once where it can; a fill where it is asked for."""
     bad = MountedTank(SPHERE, (0, 0), axis=(0, 0, 0), modes=4)
     with pytest.raises(FmuError) as error:

@@ -13,7 +13,7 @@ import environment
 REQUIREMENTS = sorted(Path(environment.__file__).parent.glob("requirements*.in"))
 
 
-def test_those_who_want_one_environment_at_once_get_one_that_works(tmp_path: Path) -> None:
+def test_simultaneous_requests_for_one_environment_get_a_working_one(tmp_path: Path) -> None:
     """One process makes it, the others wait."""
     requirements = tmp_path / "requirements.txt"
     requirements.write_text("# nothing\n")
@@ -29,7 +29,7 @@ def test_those_who_want_one_environment_at_once_get_one_that_works(tmp_path: Pat
     subprocess.run([said[0], "-m", "pip", "check"], check=True)
 
 
-def test_a_package_without_its_hash_is_refused(tmp_path: Path) -> None:
+def test_a_package_without_a_hash_is_refused(tmp_path: Path) -> None:
     """A wheel that is there, and nothing else wrong with it."""
     wheel = tmp_path / "thing-1-py3-none-any.whl"
     wheel.touch()

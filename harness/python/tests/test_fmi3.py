@@ -110,7 +110,7 @@ def test_a_controller_in_the_loop_gives_the_bits_of_fmi_2(fmu: Path) -> None:
     assert np.abs(first["omega"]).max() > 0.05
 
 
-def test_what_an_fmu_3_refuses_is_said_in_its_own_words(fmu: Path) -> None:
+def test_errors_of_an_fmu_3_are_passed_on(fmu: Path) -> None:
     """A value out of its range, a step that fails, a model that does not start."""
     with pytest.raises(FmuError, match=r"fmi3.*tank\.h"):
         simulate(three(fmu), {"tank.h": -1.0}, stop=0.1)
@@ -146,7 +146,9 @@ def test_a_linear_model_has_the_bits_of_fmi_2(fmu: Path, model: str) -> None:
 
 @pytest.mark.parametrize("hold", [False, True])
 @pytest.mark.parametrize("model", INPUTS)
-def test_one_call_gives_the_bits_of_single_calls(fmu: Path, model: str, hold: bool) -> None:
+def test_one_compiled_call_gives_the_bits_of_single_calls(
+    fmu: Path, model: str, hold: bool
+) -> None:
     """Outputs of all types, inputs in lines set within steps."""
     inputs = pd.DataFrame({"time": TIME} | INPUTS[model])
     path = three(fmu, model)

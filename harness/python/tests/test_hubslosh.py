@@ -52,20 +52,22 @@ def test_the_program_drives_the_fmu_and_writes_a_table(fmu: Path, tmp_path: Path
         ({"theta": 1.0}, "theta is computed"),
     ],
 )
-def test_wrong_settings_are_told_in_a_sentence(fmu: Path, settings: dict, sentence: str) -> None:
+def test_wrong_settings_raise_a_one_sentence_error(
+    fmu: Path, settings: dict, sentence: str
+) -> None:
     """The FMU's own words where it has any."""
     with pytest.raises(FmuError) as told:
         Plant(fmu, settings)
     assert sentence in str(told.value)
 
 
-def test_a_torque_that_is_no_number_is_refused(fmu: Path) -> None:
+def test_a_torque_that_is_not_a_number_is_refused(fmu: Path) -> None:
     """NaN stops the run where it stands."""
     with pytest.raises(FmuError, match="tau_cmd"):
         drive(fmu, [0, 1, 2], [0, float("nan"), 0])
 
 
-def test_a_missing_fmu_is_told(tmp_path: Path) -> None:
+def test_a_missing_fmu_raises_an_error_with_the_way_to_build_it(tmp_path: Path) -> None:
     """With the command that makes it."""
     with pytest.raises(FmuError, match="pack makes it"):
         Plant(tmp_path / "none.fmu")

@@ -36,7 +36,7 @@ def test_importing_the_package_imports_nothing_large() -> None:
     assert after & LARGE <= {"numpy", "pandas", "pyarrow"}
 
 
-def test_what_comes_on_first_use_is_what_type_checkers_see() -> None:
+def test_lazily_imported_names_are_those_that_type_checkers_know() -> None:
     """The imports under TYPE_CHECKING, the names by module, and ``__all__``."""
     tree = ast.parse(Path(hubslosh.__file__).read_text())
     imported = {

@@ -76,7 +76,7 @@ def test_imbalance_is_what_gravity_pulls_at_on_a_bench_that_leans(fmu: Path) -> 
     assert torque == pytest.approx(expected, rel=1e-12)
 
 
-def test_all_that_is_wrong_is_said_at_once() -> None:
+def test_all_faults_are_reported_at_once() -> None:
     """Each part with its name and what is allowed."""
     parts = {"a": {"mass": -1.0}, "b": {"mass": 1.0, "box": 0.3}, "c": {"mass": 1, "bx": 1}}
     with pytest.raises(FmuError) as said:

@@ -14,7 +14,7 @@ VISCOUS = {"friction.model": "viscous"}
 FRICTION_B = 0.03793  # N·m·s/rad, the default of friction.b
 
 
-def test_antiresonance_and_gain_are_those_of_the_parts(fmu: Path) -> None:
+def test_antiresonance_and_gain_follow_from_the_masses(fmu: Path) -> None:
     """Zeros of omega over torque are the slosh mode on a fixed hub; at 0 Hz friction alone holds.
 
     1e-12: both are the same numbers but for rounding.
@@ -32,7 +32,7 @@ def test_antiresonance_and_gain_are_those_of_the_parts(fmu: Path) -> None:
     assert model.response(0.0)[0, 0, 0] == pytest.approx(1 / FRICTION_B, rel=1e-12)
 
 
-def test_unused_states_leave_no_trace(fmu: Path) -> None:
+def test_unused_states_do_not_appear_in_linear_models(fmu: Path) -> None:
     """With all states the response is the same; the default has those that an output sees."""
     few = linearize(fmu, VISCOUS)
     every = linearize(fmu, VISCOUS, all_states=True)
@@ -41,7 +41,7 @@ def test_unused_states_leave_no_trace(fmu: Path) -> None:
     assert np.allclose(few.response(frequency), every.response(frequency), rtol=1e-9, atol=1e-12)
 
 
-def test_the_exponential_is_that_of_scipy() -> None:
+def test_the_exponential_equals_that_of_scipy() -> None:
     """Also of stiff, of large and of defective matrices; 1e-12 of the largest element."""
     random = np.random.default_rng(5)
     cases = [random.normal(size=(n, n)) * size for n in (1, 6, 25) for size in (1e-6, 0.3, 8.0)]
@@ -51,7 +51,7 @@ def test_the_exponential_is_that_of_scipy() -> None:
         assert np.abs(exponential(matrix) - exact).max() < 1e-12 * np.abs(exact).max()
 
 
-def test_it_can_be_had_for_control(fmu: Path) -> None:
+def test_linear_models_convert_to_python_control(fmu: Path) -> None:
     """Names and poles are the same."""
     model = linearize(fmu, VISCOUS, ["tau_cmd"], ["omega"])
     system = model.to_control()
@@ -59,14 +59,14 @@ def test_it_can_be_had_for_control(fmu: Path) -> None:
     assert np.sort_complex(system.poles()) == pytest.approx(np.sort_complex(model.poles))
 
 
-def test_a_hub_that_is_held_is_warned_of(fmu: Path) -> None:
+def test_linearising_a_stuck_hub_brings_a_warning(fmu: Path) -> None:
     """Set-valued friction at rest: no torque moves it."""
     with pytest.warns(UserWarning, match="held by dry friction"):
         model = linearize(fmu, {"friction.model": "stribeck"}, ["tau_cmd"], ["omega"])
     assert not model.B.any()
 
 
-def test_wrong_names_are_told(fmu: Path) -> None:
+def test_wrong_names_raise_errors_with_suggestions(fmu: Path) -> None:
     """All of them."""
     with pytest.raises(FmuError, match=r"no variable tau; .*omega is not an input of HubSlosh"):
         linearize(fmu, VISCOUS, inputs=["tau", "omega"])
@@ -126,7 +126,7 @@ def test_a_sweep_shows_the_linear_model(fmu: Path, sweep: pd.DataFrame, hold: bo
         (lambda d: d, {"band": (20, 21)}, "no power between 20 and 21 Hz"),
     ],
 )
-def test_what_cannot_be_estimated_is_told(sweep, change, arguments: dict, sentence: str) -> None:
+def test_impossible_estimates_raise_errors(sweep, change, arguments: dict, sentence: str) -> None:
     """In a sentence."""
     with pytest.raises(FmuError) as told:
         frequency_response(change(sweep), **arguments)

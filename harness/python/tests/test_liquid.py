@@ -268,7 +268,7 @@ def test_small_tilts_change_frequencies_by_their_square() -> None:
     assert (upright - twice) / (upright - small) == pytest.approx(4, rel=0.1)
 
 
-def test_a_tilted_cylinder_is_that_of_perturbation_theory() -> None:
+def test_a_tilted_cylinder_equals_that_of_perturbation_theory() -> None:
     """At h/R = 1, to the second order: `fmu/formulas/src/tilt.rs`, whose Λ is ω² over g cos t.
 
     The meshes are good to 4e-4 of λ, upright and tilted alike to 1e-4; the fourth order is below.
@@ -325,7 +325,7 @@ def test_stated_errors_hold() -> None:
         ({"step": "nowhere.step"}, 0.1, "nowhere.step: no such file"),
     ],
 )
-def test_what_makes_no_sense_is_refused_in_words(shape: dict, fill: float, words: str) -> None:
+def test_invalid_tanks_are_refused_in_words(shape: dict, fill: float, words: str) -> None:
     """Each says what is allowed."""
     with pytest.raises(FmuError, match=words):
         liquid_modes(shape, fill)

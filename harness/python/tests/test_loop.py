@@ -89,7 +89,7 @@ def test_substeps_add_rows_and_inputs_run_along_their_lines(fmu: Path) -> None:
     assert coarse["omega"].abs().max() > 1e-3
 
 
-def test_all_that_is_wrong_is_told_at_once(fmu: Path) -> None:
+def test_all_faults_of_a_loop_are_reported_at_once(fmu: Path) -> None:
     """Names, signs, and what has no meaning."""
     inputs = pd.DataFrame({"time": [0.0, 1.0], "tau_cmd": [0.0, 0.0]})
     with pytest.raises(FmuError) as error:

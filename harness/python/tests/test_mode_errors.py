@@ -14,7 +14,7 @@ OMEGAS = 2 * np.pi * np.array([2.3436, 4.0318, 5.1035])  # rad/s
 ZETAS = np.array([0.01, 0.02, 0.05])
 
 
-def test_the_impulse_response_is_that_of_the_matrix_exponential() -> None:
+def test_the_impulse_response_equals_that_of_the_matrix_exponential() -> None:
     """C exp(A t) B of the thesis's state space (4.16 to 4.21), mode by mode."""
     time = np.linspace(0, 3, 40)
     forces = modes.impulse(MASSES, OMEGAS, ZETAS, time)
@@ -28,7 +28,7 @@ def test_the_impulse_response_is_that_of_the_matrix_exponential() -> None:
         np.testing.assert_allclose(force, exact, atol=1e-11 * m * w)
 
 
-def test_the_response_is_that_of_the_fmu(fmu: Path) -> None:
+def test_the_response_equals_that_of_the_fmu(fmu: Path) -> None:
     """Force over the tank's acceleration of the linearised FMU, with three of its modes."""
     settings = {"slosh.modes": 3, "friction.model": "none", "init.slosh_angle": 0.0}
     model = hubslosh.linearize(fmu, settings, "tau_cmd", ["F_tangential", "omega_dot"])

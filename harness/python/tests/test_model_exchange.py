@@ -119,7 +119,7 @@ def test_cvode_finds_the_motion_of_co_simulation_when_it_is_violent(fmu: Path, m
         assert difference(found, expected, name) <= allowed, name
 
 
-def test_what_parts_them_is_the_error_of_cvode(fmu: Path) -> None:
+def test_the_difference_to_co_simulation_is_cvodes_error(fmu: Path) -> None:
     """It falls with CVODE's tolerance: 100 times less asked for, at least 10 times less there."""
     expected = co_simulation(fmu, start_values("spherical"), tau())
     coarse, fine = (

@@ -30,7 +30,7 @@ def largest_rate(fmu: Path):
     return outcome
 
 
-def test_a_draw_depends_on_seed_and_run_alone() -> None:
+def test_a_draw_depends_only_on_seed_and_run() -> None:
     """Not on the number of runs, nor on names that follow; distributions are what they say."""
     table = monte_carlo(RANGES, 400, 7)
     pd.testing.assert_frame_equal(monte_carlo(RANGES, 10, 7), table[:10])
@@ -43,7 +43,9 @@ def test_a_draw_depends_on_seed_and_run_alone() -> None:
     assert stats.binomtest(int((table["slosh.model"] == "planar").sum()), 400).pvalue > 1e-3
 
 
-def test_a_study_gives_what_single_runs_give_however_it_is_made(fmu: Path, tmp_path: Path) -> None:
+def test_a_study_gives_the_results_of_single_runs_with_any_workers(
+    fmu: Path, tmp_path: Path
+) -> None:
     """In threads, stopped and gone on with, on dask: the same bits."""
     outcome = largest_rate(fmu)
     table = monte_carlo(RANGES, 12, 1, outcome)
@@ -90,7 +92,9 @@ def test_a_study_gives_what_single_runs_give_however_it_is_made(fmu: Path, tmp_p
         monte_carlo(RANGES | {"tank.h": (0.04, 0.1)}, 4, 2, outcome, folder=tmp_path)
 
 
-def test_a_mistake_ends_a_study_after_the_runs_that_were_done(tmp_path: Path, monkeypatch) -> None:
+def test_a_programming_error_ends_a_study_after_the_finished_runs(
+    tmp_path: Path, monkeypatch
+) -> None:
     """Also where the thread that collects them comes late, as on a busy machine."""
 
     def outcome(values: dict) -> dict[str, float]:
@@ -105,7 +109,9 @@ def test_a_mistake_ends_a_study_after_the_runs_that_were_done(tmp_path: Path, mo
     assert stored == [0, 1, 2, 4, 5, 6, 7]
 
 
-def test_threads_find_files_where_they_are(fmu: Path, tmp_path: Path, monkeypatch) -> None:
+def test_threads_keep_the_working_directory_for_files(
+    fmu: Path, tmp_path: Path, monkeypatch
+) -> None:
     """Loading a library changes the working directory for all threads: once, and back again."""
     monkeypatch.chdir(tmp_path)
     Path("mine.fmu").write_bytes(fmu.read_bytes())
@@ -120,7 +126,9 @@ def test_threads_find_files_where_they_are(fmu: Path, tmp_path: Path, monkeypatc
     assert table["here"].all() and "refused" not in table and Path.cwd() == tmp_path
 
 
-def test_a_refused_run_is_a_row_and_a_mistake_ends_the_study(fmu: Path, tmp_path: Path) -> None:
+def test_a_refused_run_is_a_row_and_a_programming_error_ends_the_study(
+    fmu: Path, tmp_path: Path
+) -> None:
     """A negative depth is refused by the FMU; an outcome without numbers is a mistake."""
     ranges = {"tank.h": (-0.1, 0.1)}
 

@@ -62,7 +62,7 @@ def test_every_method_linearises_at_the_same_trimmed_point(craft: Craft) -> None
     assert abs(untrimmed.delay_margin / by_loop.delay_margin - 1) > 0.01
 
 
-def test_trimming_leaves_no_rotation_and_says_what_is_left(craft: Craft) -> None:
+def test_trimming_removes_rotation_and_prints_the_remaining_accelerations(craft: Craft) -> None:
     """The moment of the thrust over the inertia before, by hand; 0 after, also in a run."""
     point = craft.trim("50%")
     at = craft.mass_properties("50%")
@@ -163,7 +163,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("name", WRONG)
-def test_every_method_says_the_same_of_a_wrong_name(craft: Craft, name: str) -> None:
+def test_every_method_reports_a_wrong_name_in_the_same_words(craft: Craft, name: str) -> None:
     """As a parameter, as a value of a study, and as a range."""
     values, ranges = {name: 0.2}, {name: (0.1, 0.3)}
     for call in (
@@ -188,7 +188,7 @@ def test_a_delta_has_the_names_of_tanks(craft: Craft) -> None:
         assert model.delta({name: 0.5}).tolist() == [0.5, 0.0]
 
 
-def test_a_quantity_of_a_mode_changes_alone(craft: Craft) -> None:
+def test_a_quantity_of_a_mode_changes_without_the_others(craft: Craft) -> None:
     """Frequency, mass, bob: the others, and the liquid at rest, stay; with surface tension too."""
     nominal, of = craft.parameters("50%"), ModeQuantity(2, "frequency", 1)
     assert nominal[of.name("k")] > 0
@@ -235,7 +235,7 @@ def test_a_used_craft_and_its_results_can_be_pickled(craft: Craft) -> None:
         assert str(pickle.loads(pickle.dumps(thing))) == str(thing)
 
 
-def test_names_of_tanks_do_not_hide_parameters(craft: Craft) -> None:
+def test_names_of_tanks_must_not_hide_parameters(craft: Craft) -> None:
     """The longest name counts; names with which parameters of the FMU begin are refused."""
     tanks = {"A": craft.tanks["NTO"], "A.B": craft.tanks["MMH"]}
     both = replace(craft, tanks=tanks)
@@ -247,7 +247,7 @@ def test_names_of_tanks_do_not_hide_parameters(craft: Craft) -> None:
 
 
 @pytest.mark.parametrize("largest", [0, np.nan, 1e9, "3"])
-def test_a_worst_case_has_a_budget(craft: Craft, largest: object) -> None:
+def test_the_cost_of_a_worst_case_search_is_limited(craft: Craft, largest: object) -> None:
     """The search ends at a multiple of the ranges that makes sense."""
     model = craft.uncertain("50%", {"craft.Jxx": "5%"})
     with pytest.raises(FmuError, match=r"largest must be a number from 0\.001 to 1000"):

@@ -100,7 +100,7 @@ def test_every_public_object_prints_in_20_lines(made: dict[str, Callable[[], Any
             assert max(len(line) for line in text.splitlines()) <= 300, f"{name}:\n{text}"
 
 
-def test_what_is_printed_of_a_loop_s_margins_are_the_least(made: dict[str, Callable]) -> None:
+def test_printed_margins_of_a_loop_are_the_smallest(made: dict[str, Callable]) -> None:
     """Verdict, margins, the crossings with the least margins, and how many are left out."""
     found = made["Margins"]()
     text = str(found)

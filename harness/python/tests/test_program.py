@@ -28,7 +28,7 @@ slosh.model = ["linear", "spherical"]
 """
 
 
-def test_a_campaign_comes_back_as_a_table(fmu: Path, tmp_path: Path, request) -> None:
+def test_campaign_returns_a_table(fmu: Path, tmp_path: Path, request) -> None:
     """A row per run, and the report in the same folder."""
     binary = option(request, "--hubslosh")
     table = hubslosh.campaign(PLAN, tmp_path / "out", model=fmu, program=binary)
@@ -54,7 +54,7 @@ def test_the_package_runs_commands_of_the_program(request) -> None:
         assert (said.stdout, said.stderr) == (own.stdout, own.stderr)
 
 
-def test_a_recording_comes_back_as_a_row_beside_the_model(
+def test_analyse_returns_a_row_for_a_recording_and_for_the_model(
     fmu: Path, tmp_path: Path, request
 ) -> None:
     """A logger's file: other names, milliseconds, semicolons, decimal commas."""
@@ -83,7 +83,7 @@ def test_a_recording_comes_back_as_a_row_beside_the_model(
     assert np.ptp(found["fit_freq_pct"]) < 1e-4
 
 
-def test_units_are_those_of_the_command_line(fmu: Path, request) -> None:
+def test_units_equal_those_of_the_command_line(fmu: Path, request) -> None:
     """Every variable takes the same units in both, by the same factors."""
     command = [option(request, "--hubslosh"), "variables", "--json", "--fmu", fmu]
     listed = json.loads(subprocess.run(command, capture_output=True, check=True).stdout)
@@ -102,14 +102,14 @@ def test_units_are_those_of_the_command_line(fmu: Path, request) -> None:
     assert opened.convert("tank.h", "50 mm") == opened.convert("tank.h", "50mm") == 0.05
 
 
-def test_what_the_program_refuses_is_told_in_its_words(fmu: Path, tmp_path: Path, request) -> None:
+def test_errors_of_the_command_are_passed_on(fmu: Path, tmp_path: Path, request) -> None:
     """A plan that is none."""
     binary = option(request, "--hubslosh")
     with pytest.raises(FmuError, match=r"(?s)hubslosh campaign: .*sewer"):
         hubslosh.campaign("sewer=1\n", tmp_path, model=fmu, program=binary)
 
 
-def test_a_missing_program_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_command_raises_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     """With how to get it."""
     monkeypatch.setenv("PATH", "")
     monkeypatch.setenv("CARGO_TARGET_DIR", "nowhere")
@@ -196,14 +196,14 @@ def test_ctrl_c_ends_an_identification_and_its_processes(
     assert not living()
 
 
-def test_the_method_of_an_identification_is_an_argument() -> None:
+def test_the_method_of_identify_is_an_argument() -> None:
     """An unknown flag: the error lists those that exist."""
     for flags in (["--method", "acceleration"], ["--method=friction"]):
         with pytest.raises(FmuError, match="method="):
             hubslosh.identify("data.csv", None, *flags)
 
 
-def test_every_method_gives_the_same_kind_of_answer(
+def test_every_method_of_identify_returns_the_same_type(
     fmu: Path, tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:
     """A sweep over a rigid liquid: friction and inertia."""

@@ -123,7 +123,7 @@ def _columns(name: str, prefix: str) -> str:
 
 
 @pytest.mark.parametrize(("name", "write", "prefix"), WRITERS)
-def test_every_kind_of_file_is_the_same_table(
+def test_every_file_format_gives_the_same_table(
     name: str, write: Write, prefix: str, tmp_path: Path
 ) -> None:
     """Time, torque and rate in SI, whatever clock and units the file has."""
@@ -158,7 +158,7 @@ def test_every_reader_has_a_file_that_tests_it() -> None:
     assert all(endings & set(kind.endings) for kind in KINDS)
 
 
-def test_the_program_has_the_package_read_what_it_does_not(
+def test_the_command_lets_the_package_read_other_file_formats(
     request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """One answer from files of several kinds; without the package the program says what to do."""
@@ -209,7 +209,7 @@ def test_signals_with_clocks_of_their_own_keep_them(tmp_path: Path) -> None:
     assert len(table) == len(rate) + len(torque)
 
 
-def test_a_dimension_that_is_not_stated_is_stated_or_refused(tmp_path: Path) -> None:
+def test_a_signal_without_unit_is_announced_or_refused(tmp_path: Path) -> None:
     """Integers as times, rates without a unit: the rules of text hold for every kind."""
     from scipy.io import savemat
 
@@ -221,7 +221,7 @@ def test_a_dimension_that_is_not_stated_is_stated_or_refused(tmp_path: Path) -> 
     assert any("omega, no unit stated, taken as rad/s" in note for note in table.attrs["notes"])
 
 
-def test_what_cannot_be_read_is_refused_with_its_cause(tmp_path: Path) -> None:
+def test_unreadable_files_are_refused_with_a_reason(tmp_path: Path) -> None:
     """Damaged files, wrong kinds, columns of different length."""
     from scipy.io import savemat
 

@@ -38,7 +38,7 @@ def gains(kp: float = 40.0, kd: float = 400.0) -> np.ndarray:
     return np.hstack([2 * kp * np.eye(3), kd * np.eye(3)])
 
 
-def test_margins_of_a_rigid_craft_are_those_of_a_double_integrator(craft: Craft) -> None:
+def test_margins_of_a_rigid_craft_equal_those_of_a_double_integrator(craft: Craft) -> None:
     """Full tank: L(z) = kp T² (z + 1)/(2 J (z - 1)²) + kd T/(J (z - 1)) about each axis."""
     found = craft.review(gains(), PERIOD, ["100%"], damping="nominal", inertia="nominal")
     J = craft.mass_properties("100%").inertia[0, 0]
@@ -273,7 +273,9 @@ nu = 3e-7
 """
 
 
-def test_a_plan_is_the_same_call(craft: Craft, tmp_path: Path, capsys, monkeypatch) -> None:
+def test_a_plan_file_equals_the_call_in_python(
+    craft: Craft, tmp_path: Path, capsys, monkeypatch
+) -> None:
     """Gains, matrices and a function in a file; the page has the plan's name."""
     (tmp_path / "ox.toml").write_text("density = 1440.0\nshape = { sphere = { radius = 0.5 } }\n")
     law = (
@@ -360,7 +362,7 @@ def test_a_review_names_what_is_wrong(craft: Craft) -> None:
         review(damping="low")
 
 
-def test_a_frequency_that_is_lower_makes_the_loop_unstable(craft: Craft) -> None:
+def test_a_lower_slosh_frequency_makes_the_loop_unstable(craft: Craft) -> None:
     """Stable at each nominal frequency, unstable at -10 %, which is varied by default."""
     craft = replace(craft, tanks={"ox": replace(craft.tanks["ox"], position=(0, 0, 0.62))})
     options = {"damping": "nominal", "draws": 0, "parameters": {"ox.zeta[1]": 8e-4}}
@@ -493,7 +495,7 @@ def test_the_page_shows_what_is_unstable_first(craft: Craft) -> None:
     assert (np.diff(growth) <= 0).all() and found.worst.growth == growth[0]
 
 
-def test_a_review_has_a_budget(craft: Craft) -> None:
+def test_the_cost_of_a_review_is_limited(craft: Craft) -> None:
     """Times, counts and sizes outside their ranges are refused in words, at once."""
     for (name, value), words in {
         ("period", 1e-9): "period must be a number of seconds from 1e-06 to 1e.06, not 1e-09",

@@ -157,7 +157,7 @@ def pulses() -> dict[str, tuple[np.ndarray, np.ndarray]]:
 @pytest.mark.parametrize("hold", [False, True])
 @pytest.mark.parametrize("step", [0.02, 0.005, 0.0333])
 @pytest.mark.parametrize("name", pulses())
-def test_a_history_acts_alike_in_both_doors_with_any_step(
+def test_an_input_history_acts_the_same_in_python_and_on_the_command_line(
     fmu: Path, harness: Harness, tmp_path: Path, name: str, step: float, hold: bool
 ) -> None:
     """Times, inputs and outputs have the same bits, and the step only chooses rows."""
@@ -206,7 +206,7 @@ def test_the_table_of_a_profile_acts_as_the_profile(
     assert np.abs(ours["omega"]).max() > 1e-4
 
 
-def test_both_doors_refuse_slopes_for_an_fmu_that_cannot_interpolate(
+def test_python_and_the_command_refuse_slopes_for_an_fmu_that_cannot_interpolate(
     fmu: Path, request: pytest.FixtureRequest, tmp_path: Path
 ) -> None:
     """The same sentence; each names its own way to held inputs."""

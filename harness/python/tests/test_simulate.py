@@ -22,7 +22,7 @@ TORQUE = 0.05 * np.sin(2 * np.pi * 2.4 * TIME)  # N·m, near the slosh frequency
 TABLE = pd.DataFrame({"time": TIME, "tau_cmd": TORQUE})
 
 
-def test_what_the_fmu_warns_of_is_a_warning(fmu: Path) -> None:
+def test_warnings_of_the_fmu_become_python_warnings(fmu: Path) -> None:
     """At a hundredth of g capillarity counts; on the ground it does not."""
     with pytest.warns(FmuWarning, match="the Bond number is 9.2"):
         simulate(fmu, {"g_axial": 0.1}, stop=0.1)
@@ -72,7 +72,9 @@ def test_a_held_torque_gives_the_bits_of_fmpy(fmu: Path) -> None:
 
 @pytest.mark.parametrize("hold", [False, True])
 @pytest.mark.parametrize("model", ["linear", "spherical"])
-def test_one_call_gives_the_bits_of_single_calls(fmu: Path, model: str, hold: bool) -> None:
+def test_one_compiled_call_gives_the_bits_of_single_calls(
+    fmu: Path, model: str, hold: bool
+) -> None:
     """Three inputs with slopes or held; outputs of all types, in a mixed order."""
     inputs = TABLE.assign(tau_ext=0.01 * np.cos(3 * TIME), g_axial=9.81 + 0.5 * np.sin(TIME))
     columns = ["stuck", "omega", "regime", "tau_fluid", "event_count", "theta"]
@@ -84,7 +86,7 @@ def test_one_call_gives_the_bits_of_single_calls(fmu: Path, model: str, hold: bo
     assert np.array_equal(whole.to_numpy(float), single.to_numpy(float))
 
 
-def test_steps_between_rows_and_rows_between_steps_change_nothing(fmu: Path) -> None:
+def test_steps_between_rows_and_rows_between_steps_do_not_change_results(fmu: Path) -> None:
     """The torque is the same lines, whatever the step; 1e-9 is ten times the solver's tolerance.
 
     50 ms is not a multiple of the rows' 20 ms, 7 ms divides nothing.
@@ -132,7 +134,7 @@ def test_the_slope_of_a_torque_history_is_used(fmu: Path) -> None:
     assert np.array_equal(ours["omega"], theirs["omega"])
 
 
-def test_everything_wrong_is_said_at_once(fmu: Path) -> None:
+def test_all_faults_of_a_call_are_reported_at_once(fmu: Path) -> None:
     """Columns by name, parameters, units, outputs, times."""
     inputs = pd.DataFrame({"time": [0.0, 2.0, 1.0], "tau": [0.0, 0.0, 0.0], "g_axial": [9.0] * 3})
     parameters = {"tank.height": 1, "tank.h": (5, "inch"), "theta": 1.0, "slosh.model": "conical"}
@@ -174,14 +176,16 @@ def test_everything_wrong_is_said_at_once(fmu: Path) -> None:
         ({"parameters": {"tank.h": 0.0}}, "tank.h"),
     ],
 )
-def test_wrong_arguments_are_told_in_a_sentence(fmu: Path, arguments: dict, sentence: str) -> None:
+def test_wrong_arguments_raise_a_one_sentence_error(
+    fmu: Path, arguments: dict, sentence: str
+) -> None:
     """One at a time."""
     with pytest.raises(FmuError) as told:
         simulate(fmu, **arguments)
     assert sentence in str(told.value)
 
 
-def test_the_most_rows_are_those_of_the_command_line() -> None:
+def test_the_limit_of_rows_equals_that_of_the_command_line() -> None:
     """One number for both."""
     budget = Path(__file__).parents[2] / "files" / "src" / "budget.rs"
     assert f"pub const ROWS: usize = {simulation.MOST_ROWS:_};" in budget.read_text()
@@ -202,7 +206,7 @@ def test_a_run_that_stops_says_where_and_keeps_what_it_has(fmu: Path) -> None:
     assert np.array_equal(error.columns["omega"], good)
 
 
-def test_an_unknown_model_is_told(tmp_path: Path) -> None:
+def test_an_unknown_model_raises_an_error_with_suggestions(tmp_path: Path) -> None:
     """Opens an FMU by name and by file, and refuses a file that is not an FMU."""
     with pytest.raises(FmuError, match='no FMU "HubSlush" here'):
         simulate("HubSlush")

@@ -92,7 +92,7 @@ def test_held_input_half_a_step_early_has_no_delay(fmu: Path) -> None:
     assert difference(early, exact) < 0.03
 
 
-def test_fmpy_still_allots_nine_derivatives(fmu: Path) -> None:
+def test_fmpy_still_allocates_nine_derivatives(fmu: Path) -> None:
     """With fmpy 0.3.32, its latest, ``set_input_derivatives`` needs exactly nine inputs.
 
     When this fails, fmpy has been repaired: drop the fixture `repaired`, and let fmpy_example.py

@@ -341,7 +341,7 @@ def test_campaigns_and_studies_judge_a_folder_alike(doors: dict[str, Door], tmp_
         assert sorted(tmp_path.joinpath(other).rglob("*")) == before
 
 
-def test_what_cannot_be_stored_is_refused_before_the_first_run(tmp_path: Path) -> None:
+def test_values_that_cannot_be_stored_are_refused_before_the_first_run(tmp_path: Path) -> None:
     """Values without a text, and texts as results, which read like numbers."""
     with pytest.raises(FmuError, match=r"law has .*of type function.* cannot store"):
         monte_carlo({"law": [not_called]}, 2, 1, not_called, folder=tmp_path)

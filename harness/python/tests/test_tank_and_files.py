@@ -79,7 +79,7 @@ def test_a_tank_swings_in_the_fmu_with_its_frequency(fmu: Path) -> None:
     assert not any("mass[1]" in name for name in rigid)
 
 
-def test_what_is_wrong_with_a_tank_is_told(tmp_path: Path) -> None:
+def test_errors_of_a_tank_are_reported_in_words(tmp_path: Path) -> None:
     """In our words, and in the program's."""
     full = tank(SPHERE, fill=0.3, modes=1)
     wrong = {
@@ -107,7 +107,7 @@ def test_what_is_wrong_with_a_tank_is_told(tmp_path: Path) -> None:
         tank(SPHERE, fill=0.3, sigma=0.07, contact_angle=5.0, gravity=9.81).parameters()
 
 
-def test_tables_come_back_from_files_with_every_digit(tmp_path: Path) -> None:
+def test_tables_are_read_back_from_files_with_every_digit(tmp_path: Path) -> None:
     """The table first, then the file."""
     from scipy.io import loadmat
 
@@ -137,7 +137,7 @@ def test_tables_come_back_from_files_with_every_digit(tmp_path: Path) -> None:
             call()
 
 
-def test_every_plot_has_what_it_promises(fmu: Path) -> None:
+def test_every_plot_has_the_elements_of_its_docstring(fmu: Path) -> None:
     """A band from the poles, crossings, panels in degrees, quantiles."""
     viscous = {"friction.model": "viscous"}
     model = hubslosh.linearize(fmu, viscous, ["tau_cmd"], ["omega"])

@@ -76,7 +76,7 @@ def test_every_draw_is_the_linear_model_of_the_fmu(spacecraft: Path) -> None:
     assert model.values(deltas[0])["tank[2].frequency[1]"] == pytest.approx(0.215, rel=1e-12)
 
 
-def test_repetitions_are_those_of_the_derivation(spacecraft: Path) -> None:
+def test_repetitions_equal_those_of_the_derivation(spacecraft: Path) -> None:
     """With the surface at rest; one axis alone needs half of a mode's."""
     still = {"tank[1].g_ref": 0.3, "force[3]": 470.0, "tank[1].position[3]": -0.3}
     ranges = {f"tank[1].{kind}[1]": "5%" for kind in ("frequency", "zeta", "mass", "bob")}
@@ -92,7 +92,7 @@ def test_repetitions_are_those_of_the_derivation(spacecraft: Path) -> None:
     assert pitch.counts == (2, 1, 1, 2, 1, 1)
 
 
-def test_capillarity_alone_holds_a_surface(spacecraft: Path) -> None:
+def test_surface_tension_without_gravity_gives_a_stable_mode(spacecraft: Path) -> None:
     """Without thrust the frequency is that of the centring stiffness, at every length."""
     start = {"tank[1].k[1]": 3.0, "tank[1].g_ref": 1e-3}
     ranges = {"tank[1].frequency[1]": "20%", "tank[1].mass[1]": "5%"}
@@ -218,7 +218,7 @@ def test_a_fit_that_the_model_cannot_take_is_refused_by_name(spacecraft: Path) -
         uncertain(STILL, {"tank[1].frequency[1]": "5%"}, covariance=found, model=spacecraft)
 
 
-def test_files_give_the_model_back(spacecraft: Path, tmp_path: Path) -> None:
+def test_saved_files_restore_the_uncertain_model(spacecraft: Path, tmp_path: Path) -> None:
     """By scipy, json and python-control."""
     model = uncertain(POINT, RANGES, model=spacecraft)
     hubslosh.to_mat(model, tmp_path / "craft.mat")
@@ -272,7 +272,7 @@ def test_models_families_and_parameters_as_mat(spacecraft: Path, tmp_path: Path)
 
 
 @pytest.mark.filterwarnings("ignore:at the start a tank leaves its range")
-def test_what_is_wrong_is_told_at_once(spacecraft: Path) -> None:
+def test_all_faults_of_an_uncertain_model_are_reported_at_once(spacecraft: Path) -> None:
     """Names, ranges, signals; craft that have no such model."""
     ranges = {"tank[1].frequence[1]": "5%", "craft.mass": (2, 1), "tank[1].zeta[1]": "150%"}
     with pytest.raises(FmuError) as told:
@@ -382,7 +382,7 @@ def test_the_upper_bound_of_two_parameters_is_near_the_truth() -> None:
     assert len(ratios) > 6 and np.median(ratios) < 1.05
 
 
-def test_without_the_solver_the_way_to_it_is_told(
+def test_without_the_solver_the_error_says_how_to_install_it(
     danger: tuple[UncertainModel, Loop], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The package clarabel is an extra."""
@@ -414,7 +414,7 @@ def test_no_draw_within_a_certificate_is_unstable(danger: tuple[UncertainModel, 
         model.certify(loop, gap=1)
 
 
-def test_a_certificate_that_is_not_found_is_told(
+def test_a_failed_certificate_is_reported(
     danger: tuple[UncertainModel, Loop], tmp_path: Path
 ) -> None:
     """One convex problem is too few for any size."""

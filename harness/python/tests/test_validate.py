@@ -12,7 +12,7 @@ def test_the_validator_finds_no_problems(fmu: Path) -> None:
     assert validate_fmu(str(fmu)) == []
 
 
-def test_the_command_says_so_too(fmu: Path) -> None:
+def test_the_command_hubslosh_check_finds_no_problems_either(fmu: Path) -> None:
     """Calls the command as a user does."""
     command = [sys.executable, "-m", "fmpy", "validate", str(fmu)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)

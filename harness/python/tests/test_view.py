@@ -41,7 +41,7 @@ def test_a_table_is_shown_with_the_parameters_it_was_made_with(fmu: Path, reques
     assert shown(part.html)["time"]["count"] == (run["time"] < 1.0).sum()
 
 
-def test_a_table_without_what_moves_is_refused_by_the_columns(
+def test_a_table_without_the_columns_of_the_motion_is_refused(
     fmu: Path, tmp_path: Path, request
 ) -> None:
     """All that is missing at once, and how it is recorded; no half page."""

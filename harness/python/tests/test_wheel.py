@@ -83,7 +83,7 @@ for model in ("HubSlosh", "Spacecraft", "SloshTank"):
     assert done.stdout.split() == every
 
 
-def test_the_tag_is_of_this_machine_alone(wheel: Path) -> None:
+def test_the_wheel_tag_names_only_this_machine(wheel: Path) -> None:
     """Tags in the file's name and in the wheel's metadata agree."""
     tags = parse_wheel_filename(wheel.name)[3]
     assert set(tags) & set(sys_tags())
@@ -200,7 +200,7 @@ for places in ({"a": (0, 0, 0.2)}, {"a": (0.4, 0, 0.2), "b": (-0.4, 0, 0.2)}):
     assert done.returncode == 0, done.stderr
 
 
-def test_what_needs_another_package_says_which(installed: Path, tmp_path: Path) -> None:
+def test_functions_that_need_another_package_name_it(installed: Path, tmp_path: Path) -> None:
     """Plots and control are extras."""
     code = (
         "import hubslosh, pandas\n"
@@ -238,6 +238,6 @@ def test_a_notebook_runs(
     assert any("image/png" in output.get("data", {}) for output in outputs), "it draws something"
 
 
-def test_there_are_notebooks() -> None:
+def test_notebooks_exist() -> None:
     """The list above is not empty by mistake."""
     assert len(NOTEBOOKS) == 3

@@ -587,7 +587,7 @@ mod tests {
 
     /// Lines whose slope grows with the third power of the radius are others than those with the first.
     #[test]
-    fn results_do_not_depend_on_the_lines_of_the_elevation() {
+    fn results_do_not_depend_on_the_grid_of_the_surface_elevation() {
         let cone = wall(vec![Segment::line([0.0, 0.0], [1.0, 2.0])], 1.3);
         for wall in [cone, sphere(0.4), sphere(1.4)] {
             let [a, b] = [1, 3].map(|lines| waves(&wall, 20, lines, 0.0).unwrap());
@@ -612,7 +612,7 @@ mod tests {
     /// Luke's functional of the first and the second order, without any expansion: the integrals over the liquid run along
     /// the lines up to the surface, with the sphere's true wall. Its fourth order in the amplitude is L_4.
     #[test]
-    fn fourth_order_is_that_of_the_functional_itself() {
+    fn fourth_order_terms_equal_those_of_the_functional() {
         let (fill, degree, count) = (0.7, 14, 7);
         let shape = sphere(fill);
         let liquid = Liquid::new(&shape, degree).unwrap();

@@ -58,7 +58,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn smooth_data_are_met_to_the_fifth_order() {
+    fn smooth_data_are_interpolated_to_fifth_order() {
         let error = |count: usize| {
             let x: Vec<f64> = (0..=count).map(|i| i as f64 / count as f64).collect();
             let y: Vec<f64> = x.iter().map(|x| x.exp()).collect();

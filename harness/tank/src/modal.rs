@@ -674,7 +674,7 @@ mod tests {
     /// Returns twice each difference over its scale: lambda and beta themselves, the liquid's 5 kg for masses, R = 2 m
     /// for moments and waves, both for inertias.
     #[test]
-    fn each_quantity_s_difference_counts_over_what_its_error_is_stated_of() {
+    fn each_stated_error_is_relative_to_its_reference_quantity() {
         let approximation = |change: &dyn Fn(&mut Mode)| {
             let surface = Surface { shape: vec![[2.0, 0.5]], ..Surface::default() };
             let mut mode = Mode::new(1, 4.0, [3.0, 0.75, 0.25], 0.0, 5.0, surface, 8.0);

@@ -610,7 +610,7 @@ mod tests {
     /// r cos theta is a uniform flow, with int [u_s^2 + u^2/r^2] r ds by hand over the free surfaces and the walls.
     /// Near the step's inner edge the last 1e-6 of a panel counts three times, as for a flow around the edge.
     #[test]
-    fn the_gradient_of_a_uniform_flow_is_that_of_the_surface_it_is_taken_on() {
+    fn the_surface_gradient_of_a_uniform_flow_is_exact() {
         let (sin, cos) = 20f64.to_radians().sin_cos();
         let around = |t: f64| {
             let (sin, cos) = t.to_radians().sin_cos();

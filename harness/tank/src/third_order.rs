@@ -466,7 +466,7 @@ mod tests {
     /// Abramowitz and Stegun, table 9.5, to more digits. The zero of J0' at 0 does not belong to a mode. Rounding is that of
     /// the largest eigenvalue, about 1e6.
     #[test]
-    fn wave_numbers_of_the_circle_are_those_of_the_tables() {
+    fn wave_numbers_of_the_circle_equal_those_of_the_tables() {
         for (nu, known) in [
             (0.0, [3.831_705_970_207_512, 7.015_586_669_815_619, 10.173_468_135_062_722]),
             (1.0, [1.841_183_781_340_659, 5.331_442_773_525_033, 8.536_316_366_346_285]),

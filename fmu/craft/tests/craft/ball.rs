@@ -187,7 +187,7 @@ fn bounces_are_a_geometric_series_that_ends_at_rest() {
 }
 
 #[test]
-fn thrust_that_comes_back_brings_the_liquid_back_to_its_pendulum() {
+fn thrust_that_returns_turns_detached_liquid_into_a_pendulum_again() {
     let p = craft();
     let forward = thrust(600.0);
     let mut craft = Spacecraft::new(&p, &forward, 0.0, 1e-9).unwrap();
@@ -285,7 +285,7 @@ fn momentum_is_exact_and_energy_never_grows_over_300_s_in_six_axes() {
 }
 
 #[test]
-fn the_choice_of_communication_step_does_not_matter() {
+fn results_do_not_depend_on_the_communication_step() {
     for seed in 0..6 {
         let p = askew(&mut Random::new(seed));
         let mut random = Random::new(seed + 200);
@@ -385,18 +385,18 @@ fn move_alike(seeds: impl Iterator<Item = u64>) {
 /// Impact times came from a product of two series that was cut at their order, and left out how far inside its wall the liquid
 /// starts. Runs with these seeds were off by up to 2e-2 m.
 #[test]
-fn detached_liquid_moves_alike_for_every_communication_step() {
+fn detached_liquid_moves_the_same_with_every_communication_step() {
     move_alike([0, 13, 17, 81, 88, 133, 157, 171, 177].into_iter());
 }
 
 #[test]
 #[ignore = "minutes: .ci/run --nightly"]
-fn detached_liquid_of_two_hundred_random_thrusts_moves_alike_for_every_communication_step() {
+fn detached_liquid_under_two_hundred_random_thrusts_moves_the_same_with_every_communication_step() {
     move_alike(0..200);
 }
 
 #[test]
-fn a_ball_regime_whose_liquid_stays_changes_no_bit() {
+fn allowing_detached_liquid_changes_no_bit_while_the_liquid_stays() {
     let forward = Inputs { torque: Ramp::held([3.0, -2.0, 1.0]), ..thrust(700.0) };
     let mut p = Parameters::default();
     let mut without = Spacecraft::new(&p, &forward, 0.0, 1e-7).unwrap();
@@ -549,7 +549,7 @@ fn loose(random: &mut Random, slides: [bool; 2]) -> (Parameters, Spacecraft) {
 const CASES: [[bool; 2]; 3] = [[false, false], [false, true], [true, true]];
 
 #[test]
-fn rates_are_those_of_newtons_laws_with_the_walls_force_as_an_unknown() {
+fn rates_equal_newtons_law_with_the_walls_force_as_an_unknown() {
     for seed in 0..12 {
         let mut random = Random::new(seed);
         let slides = CASES[seed as usize % 3];
@@ -574,7 +574,7 @@ fn rates_are_those_of_newtons_laws_with_the_walls_force_as_an_unknown() {
 
 /// Along states that leave the wall: position and rate are brought to it first.
 #[test]
-fn derivatives_along_a_direction_are_those_of_the_rates_and_outputs() {
+fn directional_derivatives_equal_differences_of_rates_and_outputs() {
     for seed in 0..12 {
         let mut random = Random::new(seed + 50);
         let (_, mut craft) = loose(&mut random, CASES[seed as usize % 3]);
@@ -702,7 +702,7 @@ impl Simulator {
 }
 
 #[test]
-fn a_second_simulator_sees_the_same_flight_and_the_same_impacts() {
+fn an_independent_simulator_has_the_same_flight_and_the_same_impacts() {
     for seed in 0..5 {
         let mut random = Random::new(seed);
         let mut p = askew(&mut random);
@@ -782,7 +782,7 @@ fn a_second_simulator_sees_the_same_flight_and_the_same_impacts() {
 }
 
 #[test]
-fn hand_overs_keep_momenta_and_the_centre_of_mass_and_cost_energy() {
+fn detachment_and_settling_keep_momenta_and_the_centre_of_mass_and_dissipate_energy() {
     let mut settled = 0;
     for seed in 0..10 {
         let mut random = Random::new(seed);
@@ -865,7 +865,7 @@ fn a_saved_state_of_a_lump_continues_bit_for_bit() {
 
 /// Runge-Kutta at 1 ms and a bisection where an indicator changes its sign, as hosts of Model Exchange do it.
 #[test]
-fn a_host_that_integrates_itself_meets_the_crafts_own_impacts_and_hand_overs() {
+fn a_model_exchange_host_finds_the_impacts_and_settling_times_of_co_simulation() {
     let mut p = craft();
     p.tank[0].position = [0.2, 0.1, -0.4];
     p.tank[0].ball.contact_speed = 0.05;
@@ -944,7 +944,7 @@ fn a_host_that_integrates_itself_meets_the_crafts_own_impacts_and_hand_overs() {
 }
 
 #[test]
-fn what_a_ball_regime_cannot_be_combined_with_is_refused() {
+fn options_that_do_not_go_with_detached_liquid_are_refused() {
     let problems = |change: fn(&mut Parameters)| {
         let mut p = craft();
         change(&mut p);
@@ -1004,7 +1004,7 @@ fn what_a_ball_regime_cannot_be_combined_with_is_refused() {
 }
 
 #[test]
-fn random_craft_and_steps_of_any_length_end_in_numbers() {
+fn random_craft_and_steps_of_any_length_give_finite_results() {
     // 1335 grazes a wall where forces of 1 kN cancel. Without losses (e = 1) bounces need not end.
     for seed in (0..40).chain([1335]) {
         let mut random = Random::new(seed + 1000);

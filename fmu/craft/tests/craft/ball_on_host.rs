@@ -326,7 +326,7 @@ fn off(a: [f64; 3], b: [f64; 3]) -> f64 {
 /// exchanges the liquid's states as in Model Exchange. Without thrust the Spacecraft's outputs show the initial
 /// momentum.
 #[test]
-fn a_host_that_integrates_itself_moves_as_the_spacecraft_does_and_keeps_momenta_and_energy() {
+fn a_host_that_integrates_slosh_tank_moves_as_spacecraft_and_keeps_momenta_and_energy() {
     let (mut seen, mut impulses) = ([0; 6], 0);
     for seed in 0..6 {
         let p = one(&mut Random::new(seed));
@@ -386,7 +386,7 @@ fn a_host_that_integrates_itself_moves_as_the_spacecraft_does_and_keeps_momenta_
 /// Motion along the axis does not rotate the host, so the lag of the host within a step is known. Two steps a second
 /// give the host the same velocity as a Spacecraft, through a reversal, bounces and settling at both ends.
 #[test]
-fn on_the_axis_the_host_s_velocity_is_exact_at_any_communication_step() {
+fn on_the_axis_the_host_s_velocity_is_exact_for_any_communication_step() {
     let mut p = Parameters { tanks: 1, ..Parameters::default() };
     p.tank[0].ball.travel = 0.6;
     p.tank[0].damping_law = craft::DampingLaw::Constant;
@@ -427,7 +427,7 @@ fn on_the_axis_the_host_s_velocity_is_exact_at_any_communication_step() {
 /// dissipated energy are of second order in the communication step. Attitude and position lag behind the impulses within a step,
 /// and with the attitude the direction of the momentum: of first order.
 #[test]
-fn a_host_that_exchanges_at_communication_points_comes_to_the_spacecraft_s_motion() {
+fn a_host_that_exchanges_at_communication_points_converges_to_the_spacecraft_s_motion() {
     let errors = |steps: usize| {
         let mut sum = [0.0; 5];
         for seed in 0..6 {
@@ -496,7 +496,7 @@ const STATES: [BallState; 4] =
     [BallState::Settled, BallState::Flying, BallState::Sliding, BallState::Light];
 
 #[test]
-fn force_and_torque_of_a_lump_are_bias_less_added_mass_times_the_acceleration() {
+fn force_and_torque_of_detached_liquid_equal_bias_minus_added_mass_times_acceleration() {
     for seed in 0..8 {
         for ball in STATES {
             let (mut tank, u) = placed(seed, ball);
@@ -512,7 +512,7 @@ fn force_and_torque_of_a_lump_are_bias_less_added_mass_times_the_acceleration() 
 }
 
 #[test]
-fn derivatives_along_a_direction_are_those_of_the_rates_and_outputs() {
+fn directional_derivatives_equal_differences_of_rates_and_outputs() {
     for seed in 0..8 {
         for ball in STATES {
             let (mut tank, u) = placed(seed, ball);
@@ -591,7 +591,7 @@ fn a_saved_state_continues_bit_for_bit_and_a_refused_step_changes_none() {
 }
 
 #[test]
-fn a_ball_regime_whose_liquid_stays_changes_no_bit() {
+fn allowing_detached_liquid_changes_no_bit_while_the_liquid_stays() {
     let u = TankInputs {
         a: Ramp { value: [0.3, -0.2, 9.0], slope: [0.1, 0.0, 0.0] },
         omega: [0.02, 0.1, 0.05],
@@ -616,7 +616,7 @@ fn a_ball_regime_whose_liquid_stays_changes_no_bit() {
 }
 
 #[test]
-fn what_the_ball_regime_needs_of_a_host_is_asked_for() {
+fn inputs_that_detached_liquid_needs_from_a_host_are_required() {
     let p = alone(&one(&mut Random::new(0)));
     let said = |change: fn(&mut TankParameters)| {
         let mut p = p;
@@ -637,7 +637,7 @@ fn what_the_ball_regime_needs_of_a_host_is_asked_for() {
 }
 
 #[test]
-fn random_tanks_on_hosts_end_in_numbers_and_allocate_nothing() {
+fn random_tanks_on_hosts_give_finite_results_without_allocation() {
     for seed in 0..40 {
         let mut random = Random::new(seed + 500);
         let mut p = one(&mut random);

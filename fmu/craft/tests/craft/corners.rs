@@ -286,40 +286,40 @@ fn draining_craft_of(seed: u64, way: Way) -> Vec<f64> {
 }
 
 #[test]
-fn dry_friction_of_a_pivot_moves_a_craft_within_the_tolerance() {
+fn dry_friction_of_a_pivot_keeps_the_solver_tolerance() {
     keep_the_tolerance(0..20, craft_on_a_pivot_of);
 }
 
 #[test]
-fn thrust_that_crosses_zero_moves_planar_modes_within_the_tolerance() {
+fn thrust_that_crosses_zero_keeps_the_solver_tolerance_for_planar_modes() {
     keep_the_tolerance(0..15, planar_craft_of);
 }
 
 #[test]
-fn thrust_that_crosses_zero_moves_a_draining_tank_within_the_tolerance() {
+fn thrust_that_crosses_zero_keeps_the_solver_tolerance_for_a_draining_tank() {
     keep_the_tolerance(0..15, draining_tank_of);
 }
 
 #[test]
-fn thrust_that_crosses_zero_moves_a_draining_craft_within_the_tolerance() {
+fn thrust_that_crosses_zero_keeps_the_solver_tolerance_for_a_draining_craft() {
     keep_the_tolerance(0..10, draining_craft_of);
 }
 
 /// The drag's a_+ has singularities at +-i a_f/x' from the instant at which x crosses zero. Steps that did not see them were off
 /// by up to 400 tolerances.
 #[test]
-fn thrust_that_crosses_zero_moves_a_tank_within_the_tolerance() {
+fn thrust_that_crosses_zero_keeps_the_solver_tolerance_for_a_tank() {
     keep_the_tolerance(0..40, tank_of);
 }
 
 #[test]
-fn thrust_that_crosses_zero_moves_a_craft_within_the_tolerance() {
+fn thrust_that_crosses_zero_keeps_the_solver_tolerance_for_a_craft() {
     keep_the_tolerance(0..25, craft_of);
 }
 
 #[test]
 #[ignore = "minutes: .ci/run --nightly"]
-fn thrust_of_a_thousand_random_tables_moves_tanks_and_craft_within_the_tolerance() {
+fn a_thousand_random_thrust_histories_keep_the_solver_tolerance() {
     keep_the_tolerance(0..1000, tank_of);
     keep_the_tolerance(0..1000, craft_of);
     keep_the_tolerance(0..500, craft_on_a_pivot_of);
@@ -331,7 +331,7 @@ fn thrust_of_a_thousand_random_tables_moves_tanks_and_craft_within_the_tolerance
 /// Runge-Kutta steps of 0.2 ms with Newton's law (independent.rs): neither these series nor these formulas. In a step, a_+ bends
 /// by up to its slope, so the rates are exact to 1e-7.
 #[test]
-fn thrust_that_crosses_zero_moves_a_craft_as_another_integrator_and_newtons_law_do() {
+fn thrust_that_crosses_zero_moves_a_craft_as_newtons_law_with_another_integrator() {
     for seed in [1, 6, 9, 30] {
         let mut r = Random::new(seed);
         let mut p = parameters(&mut r);

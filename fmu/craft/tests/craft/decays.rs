@@ -90,7 +90,7 @@ fn rounded(x: f64) -> f64 {
 
 /// A'/A = -omega (zeta + zeta_A A + zeta_b max(0, k a - s_b)) to 0.3 rad; 1 % is what a pendulum's own nonlinearity may take.
 #[test]
-fn free_oscillations_lose_zeta_plus_zeta_a_times_amplitude_and_what_breaking_adds() {
+fn damping_of_free_oscillations_is_the_sum_of_zeta_amplitude_damping_and_breaking() {
     for (zeta_a, zeta_b, begins) in
         [(0.012, 0.0, 0.0), (0.05, 0.0, 0.0), (0.0, 0.04, 0.3), (0.02, 0.08, 0.0)]
     {
@@ -170,7 +170,7 @@ fn regimes_end_at_waves_of_0_15_and_0_25_radii_and_a_pushed_back_tank_is_out_of_
 /// as high a wave of the second, are 0.126 R, and 0.15 rad of both 0.188 R. If a tank's waves are not given, the first
 /// angle uses that of a cylinder.
 #[test]
-fn the_regime_is_that_of_all_modes_waves_together_and_a_cylinder_s_where_no_wave_is_given() {
+fn the_regime_follows_from_the_waves_of_all_modes_together() {
     let with = |wave: [f64; MODES], angle: f64| {
         let mut tank = Tank { modes: 2, wave, ..tank(angle) };
         tank.p_0[1] = tank.p_0[0];
@@ -187,7 +187,7 @@ fn the_regime_is_that_of_all_modes_waves_together_and_a_cylinder_s_where_no_wave
 
 /// Every bob of every tank within 45 degrees of its axis, or not: what a step's end is asked is what the outputs show.
 #[test]
-fn a_step_ends_out_of_range_where_any_bob_of_any_tank_does() {
+fn a_step_ends_out_of_range_if_any_pendulum_of_any_tank_does() {
     let mut found = [0; 2];
     for (tank, mode) in [(0, 0), (0, 1), (1, 0), (1, 1), (3, 0), (3, 1)] {
         for angle in [0.6, 1.0f64] {
@@ -219,7 +219,7 @@ fn a_step_ends_out_of_range_where_any_bob_of_any_tank_does() {
 
 /// Under thrust along the first tank and against the second: there k l/m has to be more than 1.3 m/s2.
 #[test]
-fn each_tank_s_range_is_that_of_the_acceleration_along_its_own_axis() {
+fn each_tank_s_range_equals_that_of_the_acceleration_along_its_own_axis() {
     for (k, holds) in [(500.0, false), (800.0, true)] {
         let mut p = Parameters { tanks: 2, ..Parameters::default() };
         p.tank = [0.0, 0.0, 0.0, 0.0].map(|angle| Tank { k: [k; MODES], ..tank(angle) });
@@ -236,7 +236,7 @@ fn each_tank_s_range_is_that_of_the_acceleration_along_its_own_axis() {
 /// The drag does not depend on how a, w' or w produce the acceleration at the hinge. The test reads the contribution of
 /// zeta to p'' at 2 m/s2 along the tank.
 #[test]
-fn drag_follows_the_acceleration_at_the_hinge_whatever_makes_it() {
+fn drag_follows_the_acceleration_at_the_hinge_from_every_cause() {
     let position = [0.7, -0.4, 0.2];
     let tank = Tank { position, p_dot_0: [[0.5, 0.2, 0.0]; MODES], ..tank(0.1) };
     let hinge = V::new(0.7, -0.4, 0.2 + tank.hinge[0]);
@@ -271,7 +271,7 @@ fn drag_follows_the_acceleration_at_the_hinge_whatever_makes_it() {
 /// A point of its table is the default tank: one that could drain, and does not, and one that cannot have the same
 /// drag, though the two are written apart. On a pivot and free, under every law, with thrust to both sides.
 #[test]
-fn a_tank_that_could_drain_has_the_drag_of_one_that_cannot() {
+fn a_tank_that_could_drain_has_the_same_drag_as_a_constant_fill() {
     for (seed, law) in DampingLaw::ALL.into_iter().cycle().take(12).enumerate() {
         let mut random = super::random::Random::new(seed as u64);
         let mut p = Parameters { tanks: 2, ..random.parameters() };
@@ -303,7 +303,7 @@ fn a_tank_that_could_drain_has_the_drag_of_one_that_cannot() {
 /// rate^2. The sine of the angle would give 8 % less at 0.7 rad at rest. Draining tanks and planar modes have their own
 /// equations.
 #[test]
-fn the_amplitude_of_the_damping_is_the_angle_not_its_sine() {
+fn amplitude_damping_grows_with_the_slosh_angle_not_with_its_sine() {
     let (zeta_a, zeta_b, begins) = (0.05, 0.04, 0.6);
     for angle in [0.05_f64, 0.4, 0.7] {
         for rate in [1e-3, 3.0] {
@@ -335,7 +335,7 @@ fn the_amplitude_of_the_damping_is_the_angle_not_its_sine() {
 /// Waves below the steepness lose next to nothing by breaking. At every angle and rate the power is positive or 0, alone and
 /// in a tank that could drain.
 #[test]
-fn breaking_never_drives_and_waves_below_its_steepness_do_not_break() {
+fn breaking_only_dissipates_and_only_above_its_steepness() {
     for begins in [0.0, 0.3, 0.66, 10.0] {
         for angle in [0.0_f64, 1e-9, 1e-4, 0.1, 0.4, 1.5] {
             for rate in [1e-9, 1e-3, 1.0] {

@@ -63,7 +63,7 @@ pub fn momenta(out: &Outputs) -> [V; 2] {
 
 /// Over two seconds, integrals by Lobatto's rule of five points: with and without modes.
 #[test]
-fn momentum_and_angular_momentum_leave_with_the_outflow() {
+fn outflowing_liquid_takes_its_momentum_and_angular_momentum_along() {
     for (seed, modes) in
         [(0, 0), (1, 0), (2, 1), (3, 2), (4, 3), (5, 1), (20, 3), (21, 1), (40, 3), (41, 1)]
     {
@@ -105,7 +105,7 @@ fn momentum_and_angular_momentum_leave_with_the_outflow() {
 /// The momentum shown is that of Newton and Euler: m V + w x S + S' + f r_out, S' by differences of
 /// the centre of mass shown.
 #[test]
-fn momentum_is_that_of_the_mass_that_moves() {
+fn momentum_counts_only_the_mass_that_moves() {
     for seed in (0..6).chain(20..23).chain(40..43) {
         let (p, u) = draining_craft(seed, 1 + seed as usize % 3);
         let e = 1e-3;
@@ -225,7 +225,7 @@ fn a_tank_that_drains_at_rest_takes_long_steps() {
 
 /// Without flow the second formulation is the first, whatever the drag follows.
 #[test]
-fn a_tank_with_a_table_that_does_not_drain_is_a_tank_without() {
+fn a_fill_table_without_outflow_changes_nothing() {
     for seed in 0..4 {
         let (mut p, mut u) = draining_craft(seed, 2);
         for (n, tank) in p.tank.iter_mut().enumerate() {
@@ -271,7 +271,7 @@ fn a_tank_with_a_table_that_does_not_drain_is_a_tank_without() {
 
 /// Rates by differences, along a direction of states and inputs at once, flows and fills included.
 #[test]
-fn directional_derivatives_of_draining_craft_are_those_by_differences() {
+fn directional_derivatives_of_draining_craft_equal_finite_differences() {
     for seed in (0..8).chain(20..24).chain(40..44) {
         let (mut p, u) = draining_craft(seed, 1 + seed as usize % 3);
         // As a host gives them that integrates itself: without slopes.
@@ -432,7 +432,7 @@ fn later(u: &TankInputs, t: f64) -> TankInputs {
 /// S' and S'' by differences of mass and centre of mass that the tank shows; what leaves takes
 /// f (V + w x r_out) with it.
 #[test]
-fn a_draining_tank_s_force_is_newton_s() {
+fn the_force_of_a_draining_tank_follows_newtons_law() {
     for seed in 0..16 {
         let (p, u) = tank_alone(seed, Coupling::Split);
         // Error e^6 S^(8) against 1e-16 S/e^2, swings of up to 20 rad/s.
@@ -471,7 +471,7 @@ fn a_draining_tank_s_force_is_newton_s() {
 /// whole craft, and the tanks' bobs have those of the craft's bobs. Force and torque match Newton's
 /// and Euler's laws.
 #[test]
-fn tanks_that_drain_on_a_rigid_body_are_the_craft() {
+fn draining_tanks_on_a_rigid_body_move_as_spacecraft() {
     for seed in (0..12).chain(20..26).chain(40..44) {
         let (p, u) = draining_craft(seed, seed as usize % 4);
         let mut craft = Spacecraft::new(&p, &u, 0.0, 1e-10).unwrap();
@@ -571,7 +571,7 @@ impl Rigid {
 
 /// In every mode of coupling, while it drains; M of the lumped modes stays that of the start.
 #[test]
-fn a_draining_tank_s_wrench_is_bias_less_added_mass_times_acceleration() {
+fn force_and_torque_of_a_draining_tank_equal_bias_minus_added_mass_times_acceleration() {
     for seed in 0..16 {
         for coupling in Coupling::ALL {
             let (p, u) = tank_alone(seed, coupling);

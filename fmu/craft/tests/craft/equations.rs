@@ -119,7 +119,7 @@ fn somewhere(seed: u64) -> (Random, Parameters, Spacecraft, Inputs) {
 
 /// Along a direction of every kind of state and input at once, of the size of 1 for each.
 #[test]
-fn directional_derivatives_are_those_by_differences() {
+fn directional_derivatives_equal_finite_differences() {
     for seed in 0..90 {
         let (mut random, p, mut craft, u) = somewhere(seed);
         let (mut dx, du): ([f64; STATES], _) = (random.vector(1.0), random.vector(100.0));
@@ -148,7 +148,7 @@ fn directional_derivatives_are_those_by_differences() {
 }
 
 #[test]
-fn a_tank_s_directional_derivatives_are_those_by_differences() {
+fn directional_derivatives_of_a_tank_equal_finite_differences() {
     for seed in 0..90 {
         let mut random = Random::new(seed);
         let mut p = TankParameters { tank: random.tank(), ..TankParameters::default() };

@@ -435,7 +435,7 @@ fn default_case() -> Case {
 
 /// Before 0.6.0 an impact of case 12 in mid-air made an error of 0.01 with steps of 0.5 s.
 #[test]
-fn impacts_are_those_of_an_independent_simulator_at_any_communication_step() {
+fn impacts_equal_those_of_an_independent_simulator_at_any_communication_step() {
     for (seed, case) in (0..13).map(|seed| (seed, case(seed))).chain([(13, default_case())]) {
         let mut simulator = Simulator::new(&case);
         simulator.go(case.end);
@@ -678,7 +678,7 @@ fn without_location(case: &Case, seed: u64) -> f64 {
 }
 
 #[test]
-fn a_host_of_model_exchange_that_locates_no_events_keeps_the_liquid_in_the_tank() {
+fn liquid_stays_in_the_tank_in_a_model_exchange_host_that_locates_no_events() {
     for (seed, case) in (0..6).map(|seed| (seed, case(seed))).chain([(6, default_case())]) {
         without_location(&case, seed);
     }
@@ -750,7 +750,7 @@ fn compare_hosts(first: u64, count: u64) -> Figures {
 }
 
 #[test]
-fn random_craft_have_the_same_impacts_in_every_host() {
+fn co_simulation_and_model_exchange_find_the_same_impacts_of_random_craft() {
     let figures = compare_hosts(100, 6);
     assert!(figures.problems.is_empty(), "{figures:#?}");
     assert!(figures.craft > 3 && figures.impacts > 10, "{figures:?}");
@@ -759,7 +759,7 @@ fn random_craft_have_the_same_impacts_in_every_host() {
 /// The night's run: the seed is HUBSLOSH_EVENTS_SEED, if that is set.
 #[test]
 #[ignore = "minutes: .ci/run --nightly"]
-fn two_hundred_random_craft_have_the_same_impacts_in_every_host() {
+fn co_simulation_and_model_exchange_find_the_same_impacts_of_two_hundred_random_craft() {
     let seed = std::env::var("HUBSLOSH_EVENTS_SEED").map_or(1, |seed| seed.parse().unwrap());
     let figures = compare_hosts(1_000 * seed, 200);
     println!("seed {seed}: {figures:#?}");

@@ -47,7 +47,7 @@ pub fn runge_kutta(
 /// move at 30 and 60 1/s:
 /// (30 h)^4/120 of what they do leaves 1e-11. In a quarter of a second these turn by one to two turns.
 #[test]
-fn a_host_that_integrates_itself_meets_the_crafts_own_steps() {
+fn a_model_exchange_host_reproduces_co_simulation_of_a_craft() {
     for seed in 0..20 {
         let mut random = Random::new(seed);
         let mut p = random.parameters();
@@ -163,7 +163,7 @@ type V3 = nalgebra::Vector3<f64>;
 
 /// The same integrator with the same steps around both: what remains is rounding.
 #[test]
-fn tanks_on_a_host_that_takes_the_split_in_every_stage_are_the_spacecraft() {
+fn tanks_on_a_host_that_splits_inertia_in_every_stage_move_as_spacecraft() {
     for seed in 0..26 {
         let mut random = Random::new(seed);
         let mut p = random.parameters();

@@ -75,7 +75,7 @@ fn an_impulse_of_the_host_leaves_the_bobs_velocities_across_their_rods() {
 /// keeps P and H. Its work is what energy and `drained` gain: rods whose ends the flow moves work, too, as much as while
 /// the wheels turn within 0.1 us.
 #[test]
-fn a_jump_of_the_wheels_keeps_momentum_and_energy_of_a_craft_that_has_drained_and_does() {
+fn a_jump_of_the_wheels_keeps_momentum_and_energy_of_a_draining_craft() {
     let (mut by_rods, h) = (0.0_f64, 1e-7);
     for seed in (0..6).chain(21..24).chain(41..44) {
         let (p, u) = draining_craft(seed, seed as usize % 4);

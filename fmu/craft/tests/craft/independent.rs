@@ -442,7 +442,7 @@ fn assert_close(got: &[f64], want: &[f64], size: f64, tolerance: f64, what: &str
 const ROUNDING: f64 = 1e-11;
 
 #[test]
-fn accelerations_and_wrenches_are_those_of_newtons_law_with_the_pulls_as_unknowns() {
+fn accelerations_forces_and_torques_follow_newtons_law_with_the_rod_forces_as_unknowns() {
     for seed in 0..300 {
         compare_with_newton(seed, anywhere(seed));
     }
@@ -450,7 +450,7 @@ fn accelerations_and_wrenches_are_those_of_newtons_law_with_the_pulls_as_unknown
 
 /// Planar modes among others, off the axis, in tanks whose rigid liquid is not alike all around it.
 #[test]
-fn planar_modes_are_those_of_newtons_law_with_what_holds_them_as_unknowns() {
+fn planar_modes_follow_newtons_law_with_the_guiding_forces_as_unknowns() {
     for seed in 0..300 {
         let craft = anywhere_with(seed, Random::make_planar);
         if craft.1.tanks > 0 {
@@ -461,7 +461,7 @@ fn planar_modes_are_those_of_newtons_law_with_what_holds_them_as_unknowns() {
 
 /// Bobs on other surfaces than spheres, some in planes, with the force of the surface as unknown.
 #[test]
-fn bobs_on_surfaces_are_those_of_newtons_law_with_the_surface_as_a_constraint() {
+fn bobs_on_surfaces_follow_newtons_law_with_the_surface_as_a_constraint() {
     let mut compared = 0;
     for seed in 0..300 {
         let change = |random: &mut Random, tank: &mut Tank| {
@@ -587,7 +587,7 @@ fn acceleration(u: &TankInputs) -> DVector<f64> {
 }
 
 #[test]
-fn wrench_is_bias_less_added_mass_times_acceleration() {
+fn force_and_torque_equal_bias_minus_added_mass_times_acceleration() {
     for coupling in Coupling::ALL {
         for seed in 0..200 {
             let (p, mut tank, u) = tank_anywhere(seed, coupling);
@@ -616,7 +616,7 @@ fn wrench_is_bias_less_added_mass_times_acceleration() {
 
 /// M_a is what the wrench loses by [a; w'] under drag that does not follow them, column by column; so is it symmetric.
 #[test]
-fn added_mass_is_the_wrench_s_derivative_with_acceleration() {
+fn added_mass_is_the_derivative_of_force_and_torque_by_acceleration() {
     for seed in 0..50 {
         let (_, mut tank, u) = tank_anywhere(seed, Coupling::Split);
         let m = symmetric(&tank.outputs(&u).added_mass);
@@ -633,7 +633,7 @@ fn added_mass_is_the_wrench_s_derivative_with_acceleration() {
 /// With each bob lumped at its hinge, of planar modes twice, the constant matrix exceeds M_a whatever the
 /// directions, so that the loop that is left is a contraction. Less than twice does not.
 #[test]
-fn lumped_matrix_is_constant_and_never_below_the_added_mass() {
+fn the_lumped_inertia_matrix_is_constant_and_at_least_the_added_mass() {
     let mut tight = 0;
     for seed in 0..100 {
         let (p, mut split, u) = tank_anywhere(seed, Coupling::Split);
@@ -668,7 +668,7 @@ fn lumped_matrix_is_constant_and_never_below_the_added_mass() {
 /// A tank alone, moved as the craft moves by Newton's law with the pulls as unknowns: its wrench, and its bobs' p''. The drag is
 /// held: there it follows the motion of the rigid craft, here the motion given.
 #[test]
-fn a_tank_alone_has_the_wrench_and_the_bobs_of_newtons_law() {
+fn a_single_tank_follows_newtons_law() {
     for seed in 0..300 {
         let planar = |random: &mut Random, tank: &mut Tank| {
             if seed % 3 > 0 {
@@ -711,7 +711,7 @@ fn a_tank_alone_has_the_wrench_and_the_bobs_of_newtons_law() {
 /// The craft's own wrench of a tank is that of the tank alone under the craft's motion. The drag is held: it follows the
 /// motion of the rigid craft in the one, the motion given in the other.
 #[test]
-fn a_tank_alone_under_the_crafts_motion_is_the_tank_in_the_craft() {
+fn a_single_tank_under_the_crafts_motion_moves_as_the_tank_in_the_craft() {
     for seed in 0..100 {
         let (_, p, x, u) = anywhere(seed);
         let mut craft = Spacecraft::new(&p, &u, 0.0, 1e-9).unwrap();

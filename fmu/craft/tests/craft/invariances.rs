@@ -194,7 +194,7 @@ fn the_order_of_the_tanks_does_not_matter() {
 }
 
 #[test]
-fn a_bob_may_be_cut_in_two() {
+fn two_equal_half_bobs_move_as_one_bob() {
     for seed in 0..8 {
         let (_, mut p, knots) = random_craft(seed);
         for tank in &mut p.tank {

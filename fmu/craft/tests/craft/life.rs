@@ -15,7 +15,7 @@ fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
 
 /// One step of two seconds, or random pieces of it.
 #[test]
-fn the_choice_of_communication_step_does_not_matter() {
+fn results_do_not_depend_on_the_communication_step() {
     for seed in 0..26 {
         let mut random = Random::new(seed);
         let (mut p, u) = (random.parameters(), random.inputs());
@@ -40,7 +40,7 @@ fn the_choice_of_communication_step_does_not_matter() {
 
 /// Against a run at 1e-13, over a record that swings at 60 degrees and one with everything.
 #[test]
-fn the_tolerance_is_kept() {
+fn errors_stay_within_the_solver_tolerance() {
     for name in ["conical", "four_tanks", "wheels", "rotary"] {
         let record = record(name);
         let run = |tolerance: f64| {
@@ -63,7 +63,7 @@ fn the_tolerance_is_kept() {
 /// In a craft at rest the scale of a step's errors begins at 0 and grows with the motion. The craft is spun up by 1
 /// rad/s2, so that a stiffly held bob, too light to affect the craft, begins to swing at 10 rad/s.
 #[test]
-fn the_tolerance_is_kept_from_rest() {
+fn errors_stay_within_the_solver_tolerance_from_rest() {
     let mut p = Parameters::default();
     (p.tank[0].mass[0], p.tank[0].k[0]) = (1e-3, 0.1);
     let torque = Ramp::held([900.0, 300.0, 600.0]);
@@ -84,7 +84,7 @@ fn the_tolerance_is_kept_from_rest() {
 /// Runs a draining tank, alone and on a craft, over one step of 5 s and compares with runs at 1e-13. The limit is a
 /// hundred times the tolerance, the allowed error of one internal step.
 #[test]
-fn the_tolerance_is_kept_while_tanks_drain() {
+fn errors_stay_within_the_solver_tolerance_while_tanks_drain() {
     for seed in 0..4 {
         let mut random = Random::new(seed);
         let tank = draining_tank(&mut random, 2);
@@ -157,7 +157,7 @@ fn a_saved_state_continues_bit_for_bit() {
 }
 
 #[test]
-fn words_that_are_no_state_are_refused() {
+fn saved_data_that_is_no_state_is_refused() {
     let craft = Spacecraft::new(&Parameters::default(), &Inputs::default(), 0.0, 1e-9).unwrap();
     let good = craft.state().to_words();
     for at in 0..State::WORDS {
@@ -245,7 +245,7 @@ fn jumps_of_the_wheels_keep_angular_momentum_and_balance_energy() {
 
 /// A continuous change is not a jump.
 #[test]
-fn followed_wheels_give_no_impulse() {
+fn a_continuous_change_of_the_wheels_momentum_gives_no_impulse() {
     let p = Parameters::default();
     let mut craft = Spacecraft::new(&p, &Inputs::default(), 0.0, 1e-9).unwrap();
     let before = craft.continuous_states();
@@ -433,7 +433,7 @@ fn principal_moments_that_no_body_has_are_refused() {
 
 /// Steps with random parameters and inputs give finite states, or an error that leaves the state unchanged.
 #[test]
-fn random_steps_end_in_numbers_or_an_error() {
+fn random_steps_give_finite_results_or_an_error() {
     let mut refused = 0;
     let mut random = Random::new(7);
     for _ in 0..200 {
@@ -556,7 +556,7 @@ fn nothing_is_allocated_while_stepping() {
 }
 
 #[test]
-fn a_flow_that_cannot_be_is_refused() {
+fn an_impossible_outflow_is_refused() {
     let (mut p, mut u) = (Parameters::default(), Inputs::default());
     let flow = |value: f64| [value, 0.0, 0.0, 0.0].map(|value| Line { value, slope: 0.0 });
     // A tank without a table stays as it is.
@@ -645,7 +645,7 @@ fn a_tank_goes_on_from_a_saved_state_bit_for_bit() {
 }
 
 #[test]
-fn what_a_tank_dissipates_adds_up_over_steps_of_any_length() {
+fn dissipated_energy_adds_up_over_steps_of_any_length() {
     let (mut long, inputs) = swinging_tank();
     let mut short = long.clone();
     long.step(&inputs, 2.0).unwrap();

@@ -96,7 +96,7 @@ impl Case {
 
 /// 1,000 random tanks inside of all limits are in range, and 1,000 beyond each limit are out of range for that reason.
 #[test]
-fn a_tank_is_out_of_range_beyond_each_limit_and_inside_of_none() {
+fn a_tank_is_out_of_range_beyond_each_of_its_limits_only() {
     for seed in 0..1000 {
         let case = Case::new(seed);
         let found = reason(&case.tank, case.motion);
@@ -145,7 +145,7 @@ fn a_tank_is_out_of_range_beyond_each_limit_and_inside_of_none() {
 /// Swirl is distinguished from planar motion at every phase: an ellipse with semi-axes in a ratio of 0.6 swirls, one of 0.4 does
 /// not.
 #[test]
-fn rotary_motion_is_that_of_a_wide_ellipse_at_every_phase() {
+fn a_wide_ellipse_counts_as_rotary_motion_at_every_phase() {
     for (ratio, expected) in [(0.6, LimitedBy::SecondaryResonance), (0.4, LimitedBy::None)] {
         for step in 0..100 {
             let mut case = Case::new(step);

@@ -55,7 +55,7 @@ fn assert_same(got: (f64, [f64; 3], [[f64; 3]; 3]), want: &Body) {
 }
 
 #[test]
-fn mass_properties_are_those_of_all_bodies_together() {
+fn mass_properties_equal_those_of_all_bodies_together() {
     for seed in 0..20 {
         let mut random = Random::new(seed);
         let (p, u) = (random.parameters(), random.inputs());

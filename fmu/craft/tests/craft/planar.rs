@@ -42,7 +42,7 @@ fn craft(tank: Tank) -> Parameters {
 /// A craft with a box that moves in a plane of symmetry has, at any amplitude, the motion of a craft with an
 /// axisymmetric tank. The mode along the other axis is then rigid at its position at rest.
 #[test]
-fn in_a_plane_of_symmetry_the_mode_across_is_rigid_liquid() {
+fn in_a_plane_of_symmetry_the_mode_across_the_plane_moves_as_rigid_liquid() {
     for along in [0, 1] {
         let (planar, across) = (a_box(), 1 - along);
         let mut around = Tank { modes: 1, direction: Default::default(), ..planar };
@@ -136,7 +136,7 @@ fn a_box_at_rest_under_gravity_has_two_frequencies() {
 }
 
 #[test]
-fn what_is_alike_all_around_is_refused_with_what_is_not_by_both_names() {
+fn options_of_axisymmetric_tanks_are_refused_with_asymmetric_ones_by_both_names() {
     type Change = fn(&mut Tank);
     let axial: [(&str, Change); 3] = [
         ("diameter", |tank| tank.diameter = 0.9),
@@ -168,7 +168,7 @@ fn what_is_alike_all_around_is_refused_with_what_is_not_by_both_names() {
 
 /// Rigid liquid below 0 goes with planar modes alone, and the whole has to have inertia.
 #[test]
-fn rigid_liquid_below_0_is_allowed_with_planar_modes_as_long_as_the_whole_is_not() {
+fn negative_rigid_mass_is_allowed_with_planar_modes_if_the_total_inertia_is_positive() {
     let mut p = craft(a_box());
     assert_eq!(p.problems(), [""; 0]);
     p.tank[0].m_0 = -3000.0;
@@ -311,7 +311,7 @@ fn later(u: &TankInputs, t: f64) -> TankInputs {
 /// One step of 2 s ends where its pieces do and where Runge-Kutta's does on the tank's own derivatives, whatever the drag follows.
 /// A mass flow has no effect.
 #[test]
-fn a_tank_s_steps_are_those_of_a_host_that_integrates_it() {
+fn co_simulation_of_a_tank_equals_a_host_that_integrates_it() {
     for seed in 0..8 {
         let mut random = Random::new(seed);
         let mut p = TankParameters { tank: random.tank(), ..TankParameters::default() };
@@ -386,7 +386,7 @@ fn a_box_on_a_host_has_two_frequencies_and_two_masses() {
 
 /// Liquid of less than no mass, and a host that it leaves without inertia.
 #[test]
-fn a_tank_whose_liquid_is_less_than_nothing_is_refused() {
+fn a_tank_with_negative_total_liquid_mass_is_refused() {
     let mut p = TankParameters { tank: a_box(), ..TankParameters::default() };
     p.host = Some(craft(a_box()).craft);
     for coupling in Coupling::ALL {

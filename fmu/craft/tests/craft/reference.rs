@@ -82,7 +82,7 @@ fn compare(d: &mut Deviations, record: &Value, sample: usize, out: &Outputs) {
 }
 
 #[test]
-fn spacecraft_meets_the_reference_records() {
+fn spacecraft_equals_the_reference_records() {
     let mut excess = Vec::new();
     for record in &records("craft") {
         let mut craft = spacecraft(record, 1e-13);
@@ -113,7 +113,7 @@ fn compare_tank(d: &mut Deviations, record: &Value, sample: usize, out: &SloshTa
 }
 
 #[test]
-fn slosh_tank_meets_the_reference_records() {
+fn slosh_tank_equals_the_reference_records() {
     let mut excess = Vec::new();
     for record in &records("tank") {
         let mut tank = slosh_tank(record, 1e-13);

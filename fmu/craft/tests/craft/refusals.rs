@@ -65,7 +65,7 @@ fn said(p: &Parameters, (name, place, ..): &Number, value: f64) -> Option<String
 }
 
 #[test]
-fn numbers_are_taken_to_the_ends_of_their_ranges_and_refused_beyond() {
+fn parameters_are_accepted_up_to_the_ends_of_their_ranges_and_refused_beyond() {
     let cylinder = {
         let mut p = craft();
         p.tank[0].diameter = 0.9;
@@ -95,7 +95,7 @@ fn numbers_are_taken_to_the_ends_of_their_ranges_and_refused_beyond() {
 }
 
 #[test]
-fn what_a_craft_does_not_have_or_use_is_not_looked_at() {
+fn parameters_of_unused_tanks_and_modes_are_not_checked() {
     let mut p = craft();
     p.tank[2].m_0 = -1.0; // there are two tanks
     p.tank[0].mass[2] = -1.0; // of two modes
@@ -122,7 +122,7 @@ fn directions_need_a_length_above_a_millionth() {
 }
 
 #[test]
-fn a_velocity_is_refused_on_a_pivot_alone() {
+fn an_initial_velocity_is_refused_only_on_a_pivot() {
     let mut p = craft();
     p.init.velocity = [0.0, 1.0, 0.0];
     assert_eq!(p.problems(), [""; 0]);
@@ -211,7 +211,7 @@ fn a_frequency_must_leave_a_length() {
 }
 
 #[test]
-fn a_table_of_the_fill_rises_and_holds_its_bobs() {
+fn a_fill_table_must_rise_and_contain_the_modal_masses() {
     let with = |change: fn(&mut Tank)| {
         let mut p = craft();
         p.tank[0].fill.points = 3;

@@ -84,7 +84,7 @@ fn mass_centre_of_mass_and_inertia_are_right_whatever_the_modes() {
 /// m, c, k to 0 in proportion: the rest of the craft moves as without, with an error in
 /// proportion to m.
 #[test]
-fn bobs_without_mass_are_witnesses() {
+fn bobs_without_mass_move_without_effect_on_the_craft() {
     let mut without = Parameters::default();
     without.tank[0].modes = 0;
     let want = after_ten_seconds(&without);
@@ -126,7 +126,7 @@ fn a_pendulum_without_length_is_a_mass_at_its_hinge() {
 
 /// M_a of a tank without rigid liquid has the rank of its modes.
 #[test]
-fn a_tank_of_pendulums_alone_is_allowed() {
+fn a_tank_without_rigid_liquid_is_allowed() {
     let mut p = Parameters::default();
     (p.tank[0].m_0, p.tank[0].i_0, p.tank[0].modes) = (0.0, 0.0, 2);
     after_ten_seconds(&p);
@@ -148,7 +148,7 @@ fn a_tank_of_pendulums_alone_is_allowed() {
 /// The bob straight up, where stereographic coordinates fail, is a place like any other: the
 /// motion through it keeps its energy.
 #[test]
-fn a_bob_passes_straight_up() {
+fn a_bob_swings_through_the_upright_position() {
     let mut p = Parameters::default();
     p.tank[0].zeta[0] = 0.0;
     p.tank[0].p_0[0] = [0.0, 0.0, 1.0];
@@ -209,7 +209,7 @@ fn a_rigid_body_without_tanks_precesses_by_euler() {
 /// On a pivot nothing but the angular momentum about O counts: the same as a free craft of
 /// infinite mass at O, which accelerates by -g.
 #[test]
-fn a_pivot_is_a_free_craft_with_all_the_mass_of_the_world_at_o() {
+fn a_pivot_moves_as_a_free_craft_with_a_very_large_mass_at_o() {
     for seed in 0..5 {
         let mut random = Random::new(seed);
         let mut p = random.parameters();

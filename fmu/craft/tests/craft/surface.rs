@@ -25,7 +25,7 @@ fn resting(tank: Tank) -> (SloshTank, TankInputs) {
 
 /// Expected: (3 kappa/8 - s/2) A^2 and (kappa/2) A^2. Halving A divides what is left by 16.
 #[test]
-fn frequencies_shift_as_the_coefficients_say_and_the_rest_is_of_fourth_order() {
+fn frequencies_shift_as_s_and_kappa_predict_up_to_fourth_order() {
     for (s, kappa) in [(1.0, 1.0), (1.408, 0.734), (1.0, 8.0), (-3.0, 0.5), (1.0, 0.25), (0.0, 1.0)]
     {
         let mut tank = bench(1.227);
@@ -104,7 +104,7 @@ fn a_tank_s_motion_does_not_depend_on_its_steps() {
 
 /// Coefficients of a pendulum leave the power series in place: the same bits as without them.
 #[test]
-fn a_surface_that_is_nearly_a_sphere_moves_as_a_pendulum() {
+fn coefficients_near_one_move_as_a_pendulum() {
     let mut tank = Random::new(3).tank();
     (tank.modes, tank.k[0]) = (1, 0.0);
     let ends = [1.0, 1.0 + 1e-13].map(|s| {
@@ -300,7 +300,7 @@ const DIFFERENCES: [(f64, f64); 6] = [
 /// The motion of a tank's bobs satisfies Lagrange's equations d(dL/dq')/dt = dL/dq, by differences of L and along the
 /// motion. Liquid flows so fast that s' and kappa' matter, or has coefficients beyond the third order.
 #[test]
-fn bobs_move_by_lagrange_s_equations() {
+fn bobs_with_s_and_kappa_follow_lagrange_s_equations() {
     for seed in 0..36 {
         let mut random = Random::new(seed);
         let mut tank = draining_tank(&mut random, 1 + seed as usize % 3);
@@ -436,7 +436,7 @@ fn angles_at_which_the_inertia_of_rotary_motion_vanishes_are_refused() {
 }
 
 #[test]
-fn coefficients_beyond_the_third_order_are_refused_where_no_equation_has_them() {
+fn coefficients_beyond_the_third_order_are_refused_with_planar_modes_and_fill_tables() {
     let mut p = TankParameters::default();
     p.tank.rotary_inertia[0] = 0.5;
     p.tank.direction[0] = [1.0, 0.0];
@@ -454,7 +454,7 @@ fn coefficients_beyond_the_third_order_are_refused_where_no_equation_has_them() 
 
 /// A table with the same s and kappa at all points is a tank with them.
 #[test]
-fn a_table_with_one_pair_at_every_fill_is_a_tank_with_this_pair() {
+fn a_fill_table_with_constant_s_and_kappa_moves_as_a_tank_with_these_values() {
     for seed in 0..6 {
         let mut random = Random::new(seed);
         let mut tank = draining_tank(&mut random, 1 + seed as usize % 3);
@@ -540,7 +540,7 @@ fn a_bound_that_reaches_the_bob_while_the_tank_drains_is_refused() {
 }
 
 #[test]
-fn coefficients_of_a_table_are_checked_by_their_names_and_replace_those_of_the_tank() {
+fn s_and_kappa_of_a_fill_table_replace_those_of_the_tank_and_are_checked() {
     let mut p = Parameters { tanks: 1, ..Parameters::default() };
     let tank = &mut p.tank[0];
     tank.fill.points = 3;

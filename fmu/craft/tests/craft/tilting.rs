@@ -201,7 +201,7 @@ fn a_stiff_pivot_tends_to_a_hub_that_only_turns() {
 
 /// Far above eps the sign is 1 to the last bit: I w' = -C until the platform stops, from 2 rad/s after 2 I/C = 16 s.
 #[test]
-fn coulomb_friction_slows_a_platform_by_its_torque_over_the_inertia_and_lets_it_lie() {
+fn coulomb_friction_stops_a_platform_and_holds_it() {
     let mut p = platform();
     p.pivot.friction = PivotFriction { c: [0.0, 0.0, 0.05], ..PivotFriction::default() };
     p.init.omega = [0.0, 0.0, 2.0];
@@ -225,7 +225,7 @@ fn coulomb_friction_slows_a_platform_by_its_torque_over_the_inertia_and_lets_it_
 /// integrated by classical Runge-Kutta in steps of eps I/(C + D)/20, whose error is below 1e-9 rad/s (a twentieth of it
 /// with half the step).
 #[test]
-fn a_platform_that_rubs_under_a_swinging_torque_follows_the_law_of_stribeck() {
+fn a_platform_under_an_oscillating_torque_follows_stribecks_law() {
     let (mut p, i_z, tau, w) = (platform(), 0.4, 0.12, 3.0);
     let friction =
         PivotFriction { c: [0.0, 0.0, 0.03], d: [0.0, 0.0, 0.02], omega_s: 0.05, eps: 5e-3 };
@@ -260,7 +260,7 @@ fn a_platform_that_rubs_under_a_swinging_torque_follows_the_law_of_stribeck() {
 }
 
 #[test]
-fn a_free_craft_takes_no_notice_of_the_pivot() {
+fn pivot_parameters_do_not_change_a_free_craft() {
     let run = |pivot: Pivot| {
         let p = Parameters { pivot, ..Parameters::default() };
         let mut craft = start(&p);
@@ -277,7 +277,7 @@ fn a_free_craft_takes_no_notice_of_the_pivot() {
 /// `hubslosh analyse` finds 0.0419 from the rates of a sweep at 0.0125 N m. With 0.003 it finds 0.125 of 0.135: a sweep
 /// smooths the tip of the antiresonance, 0.014 Hz wide, over which the rate is divided.
 #[test]
-fn the_leakage_of_the_books_platform_is_that_of_its_linear_equations() {
+fn the_leakage_of_the_books_platform_equals_that_of_its_linear_equations() {
     let j = Inertia { xx: 0.22, yy: 0.25, zz: 0.304, xy: 0.0, xz: 0.004, yz: -0.006 };
     let mut p = Parameters {
         craft: Craft { mass: 12.0, r: [-0.039, 0.0, 0.05], j },

@@ -423,7 +423,7 @@ mod tests {
     /// The direction p and its velocity v must describe the same motion as the coordinates, for angles
     /// between hanging and 20 degrees from straight up.
     #[test]
-    fn direction_and_velocity_move_as_lagrange_has_the_coordinates() {
+    fn direction_and_velocity_follow_lagranges_equations() {
         let mut rng = fastrand::Rng::with_seed(3);
         let mut between = |low: f64, high: f64| low + rng.f64() * (high - low);
         for _ in 0..1000 {

@@ -280,7 +280,7 @@ mod tests {
     /// The range ends at a displacement of one length. A softening spring ends it where a tenth of its
     /// stiffness is left.
     #[test]
-    fn a_mass_leaves_its_range_at_its_length_or_where_the_spring_is_nearly_gone() {
+    fn the_third_order_model_ends_at_a_displacement_of_one_length_or_at_a_tenth_of_its_stiffness() {
         let outside = |spring: f64, q: [f64; 2]| {
             let mode = ThirdOrder::new(&Pendulum { spring, ..Pendulum::default() });
             mode.out_of_range(&[q[0], q[1], 0.0, 0.0]).is_some()

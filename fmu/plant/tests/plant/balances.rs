@@ -109,7 +109,7 @@ fn momentum_is_constant_without_torque_and_friction() {
 }
 
 #[test]
-fn momentum_grows_by_the_torque_alone_however_the_liquid_damps() {
+fn momentum_changes_only_by_torque_whatever_the_damping_of_the_liquid() {
     let mut p = bench(SloshModel::Spherical, FrictionModel::None);
     p.slosh.zeta_from_correlation = false;
     p.slosh.zeta = 0.1;
@@ -182,7 +182,7 @@ fn hub_equation_holds_between_the_outputs() {
 }
 
 #[test]
-fn stuck_hub_is_exactly_at_rest() {
+fn a_stuck_hub_is_exactly_at_rest() {
     let mut p = bench(SloshModel::Linear, FrictionModel::Stribeck);
     // 1 mrad pulls with 1.7 mN m, together 3.7 mN m of the 5.9 mN m that hold.
     p.init.slosh_angle = 0.001;
@@ -255,7 +255,7 @@ fn nonlinear_models_approach_the_linear_one_quadratically() {
 }
 
 #[test]
-fn a_vanishing_liquid_leaves_the_frozen_model() {
+fn liquid_of_vanishing_mass_moves_as_the_frozen_model() {
     let run = |slosh, rho| {
         let mut p = bench(slosh, FrictionModel::Stribeck);
         p.fluid.rho = rho;
@@ -288,7 +288,7 @@ fn friction_that_would_drive_the_hub_is_refused() {
 }
 
 #[test]
-fn a_bearing_with_a_preferred_direction_holds_less_in_it() {
+fn a_bearing_with_a_preferential_direction_holds_less_torque_in_that_direction() {
     // Breaks away at (c + d)(1 -+ eta): 4.737 and 7.105 mN m.
     let mut p = bench(SloshModel::Frozen, FrictionModel::Stribeck);
     p.friction.asymmetry = -0.2;
@@ -367,7 +367,7 @@ fn gyro_reads_the_same_at_any_communication_step() {
 const RANDOM_STEPS: usize = if cfg!(debug_assertions) { 200 } else { 1_000 };
 
 #[test]
-fn random_steps_end_in_numbers_or_in_a_clear_error() {
+fn random_steps_give_finite_results_or_a_clear_error() {
     let from =
         |name: &str, otherwise| std::env::var(name).map_or(otherwise, |s| s.parse().unwrap());
     let count = from("HUBSLOSH_RANDOM_STEPS", RANDOM_STEPS);

@@ -89,7 +89,7 @@ fn energy_balances_with_the_work_of_a_changing_g() {
 /// A jump of g does the work of mass times height of hub and liquid. The energy uses gravity's components across the
 /// axis, and both give the same result, also for the derivatives.
 #[test]
-fn a_jump_of_g_on_a_leaning_bench_works_on_the_height_that_the_energy_has() {
+fn a_jump_of_g_on_a_tilted_bench_does_the_work_of_the_change_in_height() {
     for slosh in SloshModel::ALL {
         let mut p = bench(slosh, FrictionModel::Viscous);
         (p.bench.tilt, p.bench.tilt_azimuth) = (0.1, 0.7);
@@ -130,7 +130,7 @@ fn motion_under_ramps_does_not_depend_on_the_communication_step() {
 /// Runge-Kutta 4 with 20 µs steps on the linear pendulum, hub held by its inertia, c written
 /// out: another way to the same motion.
 #[test]
-fn damping_on_a_ramp_through_zero_is_that_of_the_formula() {
+fn damping_follows_its_formula_while_g_ramps_through_zero() {
     let mut p = bench(SloshModel::Linear, FrictionModel::None);
     (p.slosh.zeta_from_correlation, p.slosh.zeta) = (false, 0.2);
     p.hub.inertia = 1e9; // does not move
@@ -207,7 +207,7 @@ fn measured_zeta(p: &Parameters, g_start: f64, g: f64) -> f64 {
 }
 
 #[test]
-fn damping_after_a_change_of_g_is_that_of_a_plant_started_there() {
+fn damping_after_a_change_of_g_equals_a_start_at_the_new_g() {
     for correlation in [true, false] {
         let mut p = bench(SloshModel::Linear, FrictionModel::None);
         p.hub.inertia = 1e9;
@@ -229,7 +229,7 @@ fn damping_after_a_change_of_g_is_that_of_a_plant_started_there() {
 }
 
 #[test]
-fn a_start_without_specific_force_gets_its_damping_later() {
+fn a_start_at_zero_g_gets_its_damping_when_g_acts() {
     for correlation in [true, false] {
         let mut p = bench(SloshModel::Linear, FrictionModel::None);
         p.hub.inertia = 1e9;
@@ -245,7 +245,7 @@ fn a_start_without_specific_force_gets_its_damping_later() {
 }
 
 #[test]
-fn derivatives_along_g_are_those_of_the_changing_damping() {
+fn derivatives_along_g_equal_those_of_the_changing_damping() {
     for slosh in SLOSHING {
         let mut p = bench(slosh, FrictionModel::Viscous);
         p.init.slosh_rate = 1.0;
@@ -323,7 +323,7 @@ fn residual_of_a_host(p: &Parameters, h: f64, g: impl Fn(f64) -> f64) -> f64 {
 }
 
 #[test]
-fn work_of_a_changing_g_is_booked_at_the_steps_a_host_accepts() {
+fn work_of_a_changing_g_is_added_at_accepted_steps_only() {
     for (slosh, tilt) in SLOSHING.into_iter().flat_map(|slosh| [(slosh, 0.0), (slosh, 0.1)]) {
         let mut p = bench(slosh, FrictionModel::Viscous);
         (p.bench.tilt, p.bench.tilt_azimuth) = (tilt, 0.7);

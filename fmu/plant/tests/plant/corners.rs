@@ -139,12 +139,12 @@ fn keep_the_tolerance(seeds: impl Iterator<Item = u64>) {
 /// tolerance (case 1651). A command that a wheel's limit rounds never ended the step (case 52). Near zero specific force the drag of
 /// growing and breaking waves has singularities that no radius of convergence was declared for (cases 234, 1040, 1224).
 #[test]
-fn drag_that_grows_keeps_the_tolerance_where_specific_force_vanishes() {
+fn amplitude_damping_keeps_the_solver_tolerance_where_g_vanishes() {
     keep_the_tolerance((0..60).chain([234, 1040, 1224, 1651]));
 }
 
 #[test]
 #[ignore = "minutes: .ci/run --nightly"]
-fn two_thousand_random_tables_move_benches_within_the_tolerance() {
+fn two_thousand_random_torque_histories_keep_the_solver_tolerance() {
     keep_the_tolerance(0..2000);
 }

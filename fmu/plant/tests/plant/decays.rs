@@ -166,7 +166,7 @@ fn breaking_waves_decay_to_their_onset_by_the_closed_form() {
 /// zeta + zeta_b max(0, k a - s_b) from each decrement, 0.1 of steepness away from the corner, where its rounding makes
 /// 1 % of zeta. A nonlinear model's amplitude varies within a period by the share A^2/16 of a pendulum's.
 #[test]
-fn waves_lose_more_above_their_breaking_steepness_in_every_model() {
+fn breaking_adds_damping_above_the_steepness_in_every_model() {
     for model in SloshModel::ALL.into_iter().filter(|model| *model != SloshModel::Frozen) {
         let (zeta_b, onset) = (0.05, 0.3);
         let mut p = held(model);
@@ -227,7 +227,7 @@ fn a_vanishing_amplitude_leaves_the_viscous_damping() {
 
 /// A = angle in the plane of the tangent, where the sine would be 6 % less: of `zeta_amplitude` and of a ring.
 #[test]
-fn the_spherical_pendulum_loses_as_the_planar_one_at_large_angles() {
+fn spherical_and_planar_pendulums_have_equal_damping_at_large_angles() {
     for (zeta_a, width) in [(0.05, 0.0), (0.0, 0.01)] {
         let dissipated = [SloshModel::Planar, SloshModel::Spherical].map(|model| {
             let mut p = held(model);

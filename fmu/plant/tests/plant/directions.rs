@@ -159,7 +159,7 @@ impl Newton<'_> {
 
 /// Runge-Kutta at 0.1 ms, 14 rad/s: (14e-4)^4/120 of the motion a radian, 1e-12 after three seconds; angles of up to 40 degrees.
 #[test]
-fn guides_forces_as_unknowns_move_hub_and_bobs_as_the_planar_model_does() {
+fn newtons_law_with_guide_forces_moves_hub_and_bobs_as_the_planar_model() {
     for tilt in [0.0, 0.1] {
         let mut p = askew(SloshModel::Planar, FrictionModel::Viscous);
         (p.bench.tilt, p.bench.tilt_azimuth) = (tilt, 0.7);
@@ -207,7 +207,7 @@ fn inertia(p: &Parameters, be: f64) -> [f64; 3] {
 /// g l (1 - cos be) and Omega^2 = V''/(m l^2). For a hub so heavy that w is constant this is g/(l cos be) - w^2 cos^2
 /// be.
 #[test]
-fn a_radial_mode_stands_where_thrown_and_swings_there_at_the_frequency_in_closed_form() {
+fn a_radial_mode_keeps_its_direction_and_swings_at_the_closed_form_frequency() {
     for (hub, shift) in [(0.1, 1.0), (1e6, -1.0)] {
         let mut p = bench(SloshModel::Planar, FrictionModel::None);
         (p.slosh.source, p.slosh.modes, p.hub.inertia) = (SloshSource::Table, 1, hub);
@@ -292,7 +292,7 @@ fn equal_modes_at_right_angles_are_one_mode_along_the_tangent() {
 }
 
 #[test]
-fn directions_are_refused_where_they_mean_nothing() {
+fn directions_of_modes_are_refused_for_models_without_them() {
     let refused = |change: fn(&mut Parameters)| {
         let mut p = askew(SloshModel::Planar, FrictionModel::None);
         change(&mut p);
@@ -361,7 +361,7 @@ fn a_start_is_along_the_direction_of_mode_1_or_refused() {
 }
 
 #[test]
-fn a_radial_start_without_effect_is_warned_of() {
+fn a_radial_initial_angle_without_effect_brings_a_warning() {
     for (model, direction, warned) in [
         (SloshModel::Linear, 0.0, true),
         (SloshModel::Planar, 0.0, true),

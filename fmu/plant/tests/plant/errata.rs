@@ -67,7 +67,7 @@ fn extremum(system: &([[f64; 4]; 4], [f64; 4]), low: f64, high: f64, sign: f64) 
 }
 
 #[test]
-fn a1_a2_peak_lies_above_the_dip() {
+fn errata_a1_a2_the_resonance_lies_above_the_antiresonance() {
     // Exact transfer function of the corrected equations (17-digit roots of its slope).
     // With the printed sign of 4.29 the resonance lies below the antiresonance (2.2255, 2.0326 Hz).
     for (h, antiresonance, resonance) in
@@ -87,7 +87,7 @@ fn a1_a2_peak_lies_above_the_dip() {
 }
 
 #[test]
-fn a1_energy_and_momentum_of_a_released_liquid_do_not_grow() {
+fn errata_a1_energy_and_momentum_of_released_liquid_do_not_grow() {
     let mut p = bench(SloshModel::Linear, FrictionModel::None);
     p.slosh.zeta_from_correlation = false;
     p.slosh.zeta = 0.0;
@@ -106,7 +106,7 @@ fn a1_energy_and_momentum_of_a_released_liquid_do_not_grow() {
 }
 
 #[test]
-fn a2_a3_slowly_pushed_liquid_pushes_back_with_its_whole_mass() {
+fn errata_a2_a3_slowly_accelerated_liquid_reacts_with_its_whole_mass() {
     // Quasi-static acceleration: F = -m_liq r w'. The printed D = sum m_i - m_0 leaves
     // the modal masses out (-1.33 instead of -2.09 kg at 10 cm).
     let mut p = bench(SloshModel::Linear, FrictionModel::None);
@@ -123,7 +123,7 @@ fn a2_a3_slowly_pushed_liquid_pushes_back_with_its_whole_mass() {
 }
 
 #[test]
-fn a4_friction_brakes() {
+fn errata_a4_friction_opposes_the_motion() {
     let mut p = bench(SloshModel::Frozen, FrictionModel::Viscous);
     p.init.omega = 1.0;
     let inputs = Inputs::default();
@@ -136,7 +136,7 @@ fn a4_friction_brakes() {
 }
 
 #[test]
-fn a6_a7_a8_rate_has_two_zeros_three_poles_and_the_gain_one_over_b() {
+fn errata_a6_a7_a8_the_transfer_function_has_two_zeros_three_poles_and_the_gain_one_over_b() {
     // The printed 6.7 has a third zero at s = 0, so no steady rate under a torque.
     let system = linear_system(0.10, true);
     assert!((gain(&system, 1e-9) * 0.03793 - 1.0).abs() < 1e-9);
@@ -146,7 +146,7 @@ fn a6_a7_a8_rate_has_two_zeros_three_poles_and_the_gain_one_over_b() {
 }
 
 #[test]
-fn a9_a_circling_pendulum_hardens() {
+fn errata_a9_the_frequency_of_circular_motion_rises_with_amplitude() {
     // On a hub too heavy to move: w^2 = (g/l)/cos(angle) exactly, so the frequency grows
     // by A^2/4, A = sin(angle). The operator printed in 2.20 would soften it.
     let mut p = bench(SloshModel::Spherical, FrictionModel::None);
@@ -168,7 +168,7 @@ fn a9_a_circling_pendulum_hardens() {
 }
 
 #[test]
-fn a10_a11_a_displaced_bob_swings_back_at_the_root_of_g_over_l() {
+fn errata_a10_a11_a_displaced_bob_swings_at_the_root_of_g_over_l() {
     let mut p = bench(SloshModel::Linear, FrictionModel::None);
     p.hub.inertia = 1e12;
     p.slosh.zeta_from_correlation = false;
@@ -182,7 +182,7 @@ fn a10_a11_a_displaced_bob_swings_back_at_the_root_of_g_over_l() {
 }
 
 #[test]
-fn b6_b7_b8_modes_have_the_exact_roots() {
+fn errata_b6_b7_b8_modes_have_the_exact_roots() {
     // Thesis Table 4.1 recomputed with the exact zeros of J1', rho = 1000, g = 9.81, to
     // the digits given. Its rounded roots make m_4 0.87 % high and f_10 0.13 % low.
     for (h, m_liq, m1, l1, f1, m4, f10, zeta) in [

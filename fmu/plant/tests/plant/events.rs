@@ -49,7 +49,7 @@ fn after_a_break_away_no_event_is_overdue() {
 /// Without torque and bristles a LuGre hub at rest keeps the sense in which it has turned last; a torque
 /// gives it another.
 #[test]
-fn a_lugre_hub_at_rest_turns_where_the_torque_goes() {
+fn a_lugre_hub_at_rest_moves_in_the_direction_of_the_torque() {
     let p = bench(SloshModel::Frozen, FrictionModel::Lugre);
     let mut plant = Plant::new(&p, &torque(0.0), 0.0, 1e-9).unwrap();
     let mut contact_under = |inputs: &Inputs, omega: f64| {
@@ -236,7 +236,7 @@ fn a_step_stops_at_each_sample_of_the_gyro() {
 /// Stick and slip under a swinging liquid, a wheel that saturates, a gyro's samples: with stops and without, to the last bit;
 /// and as often as it may be.
 #[test]
-fn going_on_after_events_ends_as_the_whole_step_does() {
+fn continuing_after_events_equals_one_whole_step() {
     for slosh in SloshModel::ALL {
         let mut p = bench(slosh, FrictionModel::Stribeck);
         (p.imu.enabled, p.wheel.enabled) = (true, true);
@@ -301,7 +301,7 @@ fn after_a_stop_another_step_begins_anew() {
 
 /// Finite, and stopped within the step.
 #[test]
-fn words_that_are_no_stopped_step_are_refused() {
+fn saved_data_of_no_stopped_step_is_refused() {
     let mut p = bench(SloshModel::Linear, FrictionModel::Viscous);
     p.imu.enabled = true;
     let inputs = torque(0.01);
@@ -330,7 +330,7 @@ fn words_that_are_no_stopped_step_are_refused() {
 
 /// On an error the plant is where it was, and so is the step that has stopped.
 #[test]
-fn a_step_that_fails_leaves_the_stopped_one() {
+fn a_failed_step_keeps_the_stopped_step() {
     let mut p = bench(SloshModel::Linear, FrictionModel::Viscous);
     (p.imu.enabled, p.solver.max_steps) = (true, 20);
     let inputs = torque(0.01);

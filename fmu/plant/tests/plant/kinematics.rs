@@ -102,7 +102,7 @@ fn assert_near(got: f64, want: f64, size: f64, what: &str) {
 }
 
 #[test]
-fn forces_momentum_and_energy_are_those_of_the_masses_at_their_places() {
+fn forces_momentum_and_energy_equal_those_of_the_masses_at_their_places() {
     for slosh in SloshModel::ALL {
         let p = moving(slosh);
         let (known, places, o) = sampled(&p);

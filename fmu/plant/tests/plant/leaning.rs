@@ -109,7 +109,7 @@ fn free_decays_on_a_leaning_bench_have_the_frequencies_of_finite_elements() {
 /// Stated and measured frequency agree to the square of 1e-4 rad and the measurement's 1e-7. Models with one direction are tested
 /// obliquely to the slope.
 #[test]
-fn the_stated_frequency_is_that_of_a_free_decay() {
+fn the_stated_frequency_equals_that_of_a_free_decay() {
     for model in SLOSHING {
         let oblique = model != SloshModel::Liquid;
         for beta in [0.0, FRAC_PI_2, 0.6] {
@@ -132,7 +132,7 @@ fn the_stated_frequency_is_that_of_a_free_decay() {
 /// A torque immediately accelerates the hub and the mass that does not slosh: I + r^2 (m_liq - sum of m f), in every
 /// model. A planar bob, which cannot move radially, adds its distance from the axis.
 #[test]
-fn the_mass_that_does_not_slosh_at_once_follows_the_hub() {
+fn rigid_liquid_follows_the_hub() {
     for model in SLOSHING {
         for beta in [0.0, FRAC_PI_2, 0.6] {
             let mut p = leaning(model, 0.3, beta);
@@ -192,7 +192,7 @@ fn a_surface_that_reaches_the_bottom_is_refused_unless_the_liquid_is_rigid() {
 }
 
 #[test]
-fn large_tilts_and_one_pendulum_for_two_frequencies_are_warned_of() {
+fn warnings_name_large_tilts_and_one_pendulum_for_two_frequencies() {
     let warnings = |model, s| Plant::warnings(&leaning(model, s, 0.0), &at(0.0));
     let said = |model, s, text: &str| warnings(model, s).iter().any(|said| said.contains(text));
     for model in SLOSHING {

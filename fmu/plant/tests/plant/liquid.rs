@@ -9,7 +9,7 @@ use plant::{Inputs, Parameters, Plant, SloshModel, SloshSource};
 const SAMPLE: f64 = 1e-3;
 
 #[test]
-fn a_pendulum_has_the_shifts_of_a_pendulum() {
+fn s_and_kappa_of_1_give_the_frequency_shift_of_a_pendulum() {
     let found = shifts(SloshModel::Spherical, 0.10, SAMPLE);
     assert!((found[0] / -0.125 - 1.0).abs() < 0.01, "{found:?}");
     assert!((found[1] / 0.5 - 1.0).abs() < 0.01, "{found:?}");
@@ -18,7 +18,7 @@ fn a_pendulum_has_the_shifts_of_a_pendulum() {
 /// With the inertia s and the spring kappa of the third order: planar 3 kappa/8 - s/2, circular kappa/2.
 /// `tests/physics/liquid.rs` compares with potential flow at the two depths.
 #[test]
-fn a_liquid_has_the_shifts_of_the_third_order() {
+fn the_liquid_model_has_the_frequency_shifts_of_the_third_order() {
     for (depth, potential_flow) in [(0.10, [-0.4285, 0.3671]), (0.05, [-0.2566, 0.4208])] {
         let found = shifts(SloshModel::Liquid, depth, SAMPLE);
         let (s, kappa) = coefficients(depth / 0.0815);
@@ -42,7 +42,7 @@ fn table(mut p: Parameters, s: f64, kappa: f64) -> Parameters {
 
 /// Coefficients of a table, with soft and hard springs: the shifts are those of the same expansion at any s and kappa.
 #[test]
-fn coefficients_of_a_table_give_their_shifts() {
+fn s_and_kappa_of_a_table_give_their_frequency_shifts() {
     for (s, kappa) in [(1.0, 1.0), (1.4, 0.73), (0.3, 2.0), (3.0, 1.2), (1.0, -0.8)] {
         let p = table(held(SloshModel::Liquid, 0.1), s, kappa);
         let found = shifts_of(p, SAMPLE);
@@ -55,7 +55,7 @@ fn coefficients_of_a_table_give_their_shifts() {
 
 /// A pendulum's coefficients are a warning in the model that is meant for a tank's own.
 #[test]
-fn coefficients_of_a_table_are_asked_for() {
+fn the_liquid_model_requires_s_and_kappa_of_a_table() {
     let warnings = |p: &Parameters| Plant::warnings(p, &Inputs::default());
     let p = table(held(SloshModel::Liquid, 0.1), 1.0, 1.0);
     assert!(warnings(&p)[0].contains("frequency of a pendulum"), "{:?}", warnings(&p));

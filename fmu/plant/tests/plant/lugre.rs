@@ -22,7 +22,7 @@ fn torque(value: f64) -> Inputs {
 const G_MAX: f64 = 0.003498 + 0.002423;
 
 #[test]
-fn energy_balances_and_the_bearing_never_gives_any() {
+fn energy_balances_and_the_bearing_never_adds_energy() {
     for slosh in SloshModel::ALL {
         for (sigma0, asymmetry) in [(30.0, 0.0), (1000.0, 0.05)] {
             let mut p = bench(slosh);
@@ -97,7 +97,7 @@ fn dissipation_is_never_negative_up_to_the_largest_sigma1_and_no_further() {
 }
 
 #[test]
-fn stiff_bristles_approach_the_set_valued_law() {
+fn stiff_lugre_bristles_approach_the_set_valued_law() {
     // A sine that the hub follows with stops: sliding, reversal, rest.
     let run = |model: FrictionModel, sigma0: f64| {
         let mut p = bench(SloshModel::Linear);
@@ -252,7 +252,7 @@ fn break_away_takes_less_torque_the_faster_it_rises() {
 }
 
 #[test]
-fn a_hub_under_less_torque_than_break_away_stays_at_a_deflection() {
+fn a_lugre_hub_below_break_away_torque_stays_at_a_deflection() {
     let mut p = bench(SloshModel::Frozen);
     p.friction.sigma0 = 200.0;
     let mut plant = Plant::new(&p, &torque(0.0), 0.0, TOLERANCE).unwrap();
@@ -271,7 +271,7 @@ fn a_hub_under_less_torque_than_break_away_stays_at_a_deflection() {
 }
 
 #[test]
-fn steps_are_as_short_as_the_bristles_are_stiff_and_no_shorter() {
+fn step_length_follows_the_bristle_stiffness() {
     // Sliding at 0.05 rad/s for 1 s with a relaxation time from 0.1 s to 0.1 ms. The number of
     // internal steps grows with the stiffness, by at most about one per ten relaxation times.
     for sigma0 in [1.0, 100.0, 10_000.0] {
@@ -287,7 +287,7 @@ fn steps_are_as_short_as_the_bristles_are_stiff_and_no_shorter() {
 
 /// Runge-Kutta 4 with the reversals located by bisection on the indicator.
 #[test]
-fn a_host_that_locates_the_reversals_meets_the_plants_own_steps() {
+fn a_model_exchange_host_that_locates_reversals_reproduces_co_simulation() {
     let mut p = bench(SloshModel::Spherical);
     p.friction.sigma0 = 30.0;
     p.init.slosh_angle = 0.1;

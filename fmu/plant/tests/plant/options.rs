@@ -362,7 +362,7 @@ fn parameters_that_others_replace_say_which_do() {
 }
 
 #[test]
-fn low_bond_numbers_are_warned_of() {
+fn warnings_name_low_bond_numbers() {
     let mut p = bench(SloshModel::Linear, FrictionModel::None);
     p.init.slosh_angle_radial = 0.0;
     assert!(Plant::warnings(&p, &at(9.81)).is_empty());
@@ -413,7 +413,7 @@ fn dry_friction_of_a_turning_hub_depends_on_direction_and_angle() {
 
 /// Breaking needs both of its parameters, and a steepness that the model reaches: 1.541 at an amplitude of 1.
 #[test]
-fn breaking_without_effect_or_threshold_is_warned_of() {
+fn warnings_name_breaking_parameters_without_effect() {
     let mut p = bench(SloshModel::Liquid, FrictionModel::None);
     p.slosh.breaking_steepness = 0.66;
     assert_eq!(Plant::warnings(&p, &at(9.81)), [""; 0]);

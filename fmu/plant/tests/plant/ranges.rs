@@ -36,7 +36,7 @@ fn regimes_end_at_waves_of_0_15_and_0_25_radii() {
 
 /// The stroke at the ring, eta exp(-1.84 d/R), is 0.64 to 6.4 widths; the ring stays covered.
 #[test]
-fn the_rings_law_holds_between_its_strokes_and_under_water() {
+fn the_law_of_ring_baffles_holds_within_its_range_of_strokes_and_depths() {
     let within = |width: f64, depth: f64, wave: f64| {
         let mut p = bench(SloshModel::Linear, FrictionModel::None);
         (p.baffle.width, p.baffle.depth) = (width, depth);
@@ -58,7 +58,7 @@ fn the_rings_law_holds_between_its_strokes_and_under_water() {
 }
 
 #[test]
-fn what_leaves_the_range_of_a_formula_is_warned_of() {
+fn warnings_name_formulas_outside_their_range() {
     let mut p = bench(SloshModel::Linear, FrictionModel::None);
     let warnings = |p: &Parameters, g: f64| Plant::warnings(p, &at(g));
     assert!(warnings(&p, 9.81).is_empty());
@@ -159,7 +159,7 @@ fn a_liquid_whose_inertia_falls_with_the_amplitude_is_refused() {
 /// Every reason has a plant that shows it, next to one that does not. The bench's cylinder has h/R = 1.227: shifts of omega^2
 /// by -0.429 and +0.367 of the squared angle.
 #[test]
-fn a_plant_says_by_what_it_is_limited() {
+fn the_output_limited_by_names_the_limit_that_was_passed() {
     let reason = |p: &Parameters, g: f64| {
         let o = Plant::new(p, &at(g), 0.0, 1e-9).unwrap().outputs(&at(g));
         o.discrete.limited_by

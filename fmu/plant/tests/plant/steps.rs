@@ -54,7 +54,7 @@ fn states_are_as_exact_as_the_tolerance_says() {
 
 /// Angle, rate and energies of a hub without liquid and friction under a ramp of torque are polynomials of time.
 #[test]
-fn where_series_end_a_long_step_takes_as_many_internal_ones_as_a_short_one() {
+fn internal_steps_are_the_same_for_long_and_short_communication_steps() {
     let p = bench(SloshModel::Frozen, FrictionModel::None);
     let inputs = Inputs { tau_cmd: Ramp { value: 0.01, slope: 1e-3 }, ..Inputs::default() };
     let [short, long] = [0.02, 1e4].map(|h| steps(&p, &inputs, 1e-9, h));
@@ -107,7 +107,7 @@ fn a_small_motion_takes_no_more_steps_than_a_large_one() {
 /// On a hub too heavy to move: in full swing the rate is what errors are compared with, where the liquid turns what the angle
 /// will make of it.
 #[test]
-fn liquid_that_turns_takes_no_more_steps_than_liquid_in_full_swing() {
+fn rotary_slosh_takes_no_more_internal_steps_than_planar_slosh() {
     for slosh in SloshModel::ALL {
         let mut p = bench(slosh, FrictionModel::None);
         p.hub.inertia = 1e9;
@@ -123,7 +123,7 @@ fn liquid_that_turns_takes_no_more_steps_than_liquid_in_full_swing() {
 
 /// Stribeck's excess is 1e-30 and less at eight times its speed: a long step from there to rest must not miss it.
 #[test]
-fn a_long_step_from_a_fast_hub_to_rest_meets_short_ones() {
+fn a_long_step_from_a_fast_hub_to_rest_equals_short_steps() {
     for friction in [FrictionModel::Stribeck, FrictionModel::StribeckSmooth] {
         for (omega, torque) in [(0.7, -0.3), (1.5, -0.5), (0.5, -0.2)] {
             let mut p = bench(SloshModel::Frozen, friction);

@@ -25,7 +25,7 @@ fn inertia(p: &Parameters) -> f64 {
 }
 
 #[test]
-fn a_line_without_stiffness_and_damping_changes_no_bit() {
+fn a_suspension_line_without_stiffness_and_damping_changes_no_bit() {
     for slosh in SLOSH {
         for friction in FRICTION {
             let run = |theta_0: f64| {
@@ -44,7 +44,7 @@ fn a_line_without_stiffness_and_damping_changes_no_bit() {
 
 /// k (theta - theta_0)^2/2 = 0.25 (0.1)^2 J plus I w^2/2, and -k (theta - theta_0) - c w = -0.05 - 0.02 N m.
 #[test]
-fn the_line_s_torque_and_energy_are_those_of_its_twist() {
+fn the_line_s_torque_and_energy_equal_those_of_its_twist() {
     let mut p = frozen(FrictionModel::None);
     (p.hub.c, p.init.omega) = (0.1, 0.2);
     let outputs = plant(&p).outputs(&Inputs::default());

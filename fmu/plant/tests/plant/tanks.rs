@@ -64,7 +64,7 @@ fn table_of_a_cylinder_moves_as_the_cylinder_does() {
 }
 
 #[test]
-fn a_frequency_stands_for_a_length() {
+fn a_slosh_frequency_in_the_table_determines_the_pendulum_length() {
     let mut p = sphere();
     p.slosh.table.k = [0.0; plant::MODES];
     p.slosh.table.k[0] = 2.0;
@@ -81,7 +81,7 @@ fn a_frequency_stands_for_a_length() {
 }
 
 #[test]
-fn a_table_that_is_no_tank_is_refused_with_everything_that_is_wrong() {
+fn an_impossible_table_of_modes_is_refused_with_all_its_faults() {
     let good = sphere();
     let refused = |change: fn(&mut Parameters)| {
         let mut p = good;

@@ -191,16 +191,16 @@ fn check(model: &str, tolerance: f64) {
 }
 
 #[test]
-fn linear_model_meets_the_reference_at_tolerance_1e_10() {
+fn linear_model_equals_the_reference_at_tolerance_1e_10() {
     check("linear", 1e-10);
 }
 
 #[test]
-fn planar_model_meets_the_reference() {
+fn planar_model_equals_the_reference() {
     check("planar", 1e-11);
 }
 
 #[test]
-fn spherical_model_meets_the_reference() {
+fn spherical_model_equals_the_reference() {
     check("spherical", 1e-11);
 }

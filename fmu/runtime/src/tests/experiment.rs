@@ -83,7 +83,7 @@ fn instance_goes_through_the_states_of_its_interface() {
 }
 
 #[test]
-fn parameters_that_do_not_go_together_end_initialization_with_all_that_is_wrong() {
+fn contradicting_parameters_end_initialization_with_all_faults_named() {
     let mut instance = fresh(CS);
     set(&mut instance, "start.level[1]", 90.0).unwrap();
     set(&mut instance, "start.level[2]", 90.0).unwrap();
@@ -171,7 +171,7 @@ const LOOK: [&str; 3] = ["GetDerivatives", "GetEventIndicators", "GetContinuousS
 /// The state machines of FMI 2.0.1 (sections 3.2.3 and 4.2.4), state by state. In addition this FMU allows
 /// event mode to be entered once more, time and states to be set in it, and a step that failed to be ended.
 #[test]
-fn calls_allowed_in_each_state_are_those_of_the_standard() {
+fn calls_allowed_in_each_state_equal_those_of_the_standard() {
     use InstanceState::*;
     let both = |state, interface| -> Vec<&str> {
         let mut all = ALWAYS.to_vec();

@@ -44,7 +44,7 @@ fn failures_come_with_status_and_category() {
 }
 
 #[test]
-fn events_are_told_to_those_who_ask_with_the_last_one_and_their_number() {
+fn events_are_logged_on_request_with_the_last_one_and_their_number() {
     let (mut log, lines) = log();
     let mut instance = started(CS, &[("z", 3.0)]);
     set(&mut instance, "z", 1.0).unwrap();
@@ -64,7 +64,7 @@ fn events_are_told_to_those_who_ask_with_the_last_one_and_their_number() {
 
 /// Warnings concern the model that begins to move, with its parameters, its states and the present inputs.
 #[test]
-fn warnings_are_of_the_model_that_begins_to_move() {
+fn warnings_concern_the_parameters_at_the_start_of_the_motion() {
     let mut instance = fresh(ME);
     set(&mut instance, "leak", 6.0).unwrap();
     set(&mut instance, "start.level[2]", 8.0).unwrap();
@@ -109,7 +109,7 @@ fn parameters_without_effect_that_differ_from_their_start_values_are_named_with_
 }
 
 #[test]
-fn the_host_is_warned_once_of_how_it_drives_the_model() {
+fn a_warning_about_the_hosts_inputs_comes_once() {
     let (mut log, lines) = log();
     let mut instance = continuous(&[]);
     log.report_step_warning(&instance);

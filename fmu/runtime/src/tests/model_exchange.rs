@@ -71,7 +71,7 @@ fn derivatives_that_are_not_finite_are_discarded() {
 }
 
 #[test]
-fn discrete_changes_happen_at_events_alone() {
+fn discrete_changes_happen_only_at_events() {
     let mut instance = continuous(&[("inspection", 5.0)]);
     set(&mut instance, "z", 3.0).unwrap();
     assert_eq!(get(&mut instance, "open"), Ok(Value::Boolean(false)));
@@ -101,7 +101,7 @@ fn discrete_changes_happen_at_events_alone() {
 /// Before the motion a variable depends on the values from which it starts. Later it depends on states and
 /// inputs, as far as they have an effect at present: without a leak a rate depends only on the inflow.
 #[test]
-fn dependencies_are_what_counts_at_present_of_what_is_declared() {
+fn dependencies_are_the_declared_ones_that_matter_at_present() {
     let of = |instance: &mut Subject, name: &str| {
         let scalar = &TABLE.scalars[reference(name) as usize];
         instance.dependencies(&GET_REAL, scalar).unwrap()
@@ -132,7 +132,7 @@ fn outputs_follow_what_the_host_sets() {
 }
 
 #[test]
-fn states_that_mean_nothing_end_the_simulation() {
+fn meaningless_continuous_states_end_the_simulation() {
     let mut instance = continuous(&[]);
     instance.set_continuous_states(&[-2.0, 1.0]).unwrap();
     assert_eq!(

@@ -44,7 +44,7 @@ const CLOSED: [Value; 3] = [Value::Boolean(false), Value::Integer(0), Value::Int
 const OPENED: [Value; 3] = [Value::Boolean(true), Value::Integer(1), Value::Integer(2)];
 
 #[test]
-fn what_is_discrete_is_shown_as_it_was_until_the_host_handles_the_event() {
+fn discrete_outputs_keep_their_value_until_the_host_handles_the_event() {
     let mut host = stepping(Events::Reported, 0.0, &[("inspection", 5.0)]);
     assert_eq!(shown(&mut host), CLOSED);
     let quiet = StepInfo { event: false, early: false };
@@ -122,7 +122,7 @@ fn a_step_stops_at_an_event_if_the_host_allows_it_and_inputs_with_it() {
 /// The slack of a time before the last event is 1e-9 of the time since the start, plus 8 roundings of the
 /// largest time.
 #[test]
-fn time_may_go_back_to_the_last_event_but_for_rounding_errors() {
+fn time_may_go_back_to_the_last_event_at_most() {
     for (start, last, slack) in [
         (0.0, 1000.0, 1e-6),
         (-2000.0, -1000.0, 1e-6),
@@ -209,7 +209,7 @@ fn a_step_is_discarded_where_a_shorter_one_may_succeed() {
 }
 
 #[test]
-fn events_are_handled_as_the_interface_says_or_told_in_co_simulation() {
+fn events_are_handled_by_the_interface_or_reported_in_co_simulation() {
     let allowed = |interface| Events::ALL.map(|events| Fmi3::allows(interface, events));
     assert_eq!(allowed(CS), [true, false, true]);
     assert_eq!(allowed(ME), [false, true, false]);

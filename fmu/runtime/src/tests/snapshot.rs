@@ -95,7 +95,7 @@ fn a_state_reads_back_as_itself() {
 }
 
 #[test]
-fn a_state_goes_on_as_the_instance_would_have() {
+fn a_restored_state_continues_as_the_instance_would_have() {
     let mut instance = eventful();
     let mut again = fresh(CS);
     again.restore(&read(&to_bytes(&instance)).unwrap()).unwrap();
@@ -149,7 +149,7 @@ fn patched(bytes: &[u8], place: usize, new: &[u8]) -> Vec<u8> {
 }
 
 #[test]
-fn bytes_that_are_no_state_are_refused_and_say_why() {
+fn bytes_that_are_no_saved_state_are_refused_with_a_reason() {
     let bytes = to_bytes(&eventful());
     let why = |bytes: &[u8]| read(bytes).map(|_| ()).unwrap_err();
     assert_eq!(why(&[]), "the saved state is cut off");
@@ -178,7 +178,7 @@ fn bytes_that_are_no_state_are_refused_and_say_why() {
 }
 
 #[test]
-fn damaged_states_with_a_good_checksum_are_refused_and_say_why() {
+fn damaged_saved_states_with_a_valid_checksum_are_refused_with_a_reason() {
     let bytes = to_bytes(&eventful());
     let why = |place: usize, new: &[u8]| {
         let message = read(&patched(&bytes, place, new)).map(|_| ()).unwrap_err();
@@ -215,7 +215,7 @@ fn damaged_states_with_a_good_checksum_are_refused_and_say_why() {
 }
 
 #[test]
-fn a_model_that_is_not_there_is_saved_as_zeros() {
+fn an_instance_before_initialization_saves_zeros_for_its_model() {
     let bytes = to_bytes(&fresh(CS));
     assert!(bytes[WORDS..bytes.len() - CHECKSUM].iter().all(|byte| *byte == 0));
     assert_eq!(bytes[FLAGS], 0);

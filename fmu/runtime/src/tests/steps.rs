@@ -152,7 +152,7 @@ fn a_step_that_is_refused_keeps_the_slopes() {
 }
 
 #[test]
-fn a_rate_given_as_an_input_moves_the_input_that_it_is_the_rate_of() {
+fn an_input_that_is_the_rate_of_another_input_moves_it() {
     let mut instance = started(CS, &[("z", 1.0), ("w", 0.5)]);
     instance.do_step(0.0, 0.5).unwrap();
     assert_eq!(real(&mut instance, "z"), 1.25);
@@ -167,7 +167,7 @@ fn a_rate_given_as_an_input_moves_the_input_that_it_is_the_rate_of() {
 /// Outputs at the end of a step are limits from the left, with the slopes of that step. A new value or slope
 /// of any input begins the next step, without those slopes.
 #[test]
-fn past_slopes_are_seen_until_an_input_is_set() {
+fn input_slopes_of_the_last_step_are_kept_until_an_input_is_set() {
     let ramped = || {
         let mut instance = started(CS, &[]);
         slope(&mut instance, "q[1]", 2.0).unwrap();
@@ -253,7 +253,7 @@ fn derivatives_of_outputs_follow_states_and_slopes() {
 
 /// Between steps, outputs show the valve as the present inputs make it, but the model itself is not changed.
 #[test]
-fn what_present_inputs_change_at_once_is_seen_and_undone() {
+fn outputs_show_the_effect_of_present_inputs_without_a_change_of_the_model() {
     let mut instance = started(CS, &[]);
     set(&mut instance, "z", 3.0).unwrap();
     assert_eq!(get(&mut instance, "open"), Ok(Value::Boolean(true)));
@@ -270,7 +270,7 @@ fn what_present_inputs_change_at_once_is_seen_and_undone() {
 }
 
 #[test]
-fn the_model_is_told_the_hosts_time_before_each_step() {
+fn the_model_receives_the_hosts_time_before_each_step() {
     // Due at 100.5 s and half of the slack: the host is later than that.
     let mut instance = fresh(CS);
     set(&mut instance, "inspection", 100.5 + 0.5e-7).unwrap();

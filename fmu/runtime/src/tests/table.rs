@@ -51,7 +51,7 @@ fn a_table_knows_its_inputs_parameters_and_states() {
 }
 
 #[test]
-fn start_values_are_those_of_the_model() {
+fn start_values_equal_those_of_the_model() {
     use Value::{Boolean, Integer, Real};
     let starts = [
         Real(0.5),
@@ -84,7 +84,7 @@ fn dependencies_are_named_by_array_element_or_beginning() {
 }
 
 #[test]
-fn units_and_enumerations_are_those_in_use() {
+fn only_used_units_and_enumerations_are_declared() {
     let units: Vec<_> = TABLE.units().map(|unit| unit.name).collect();
     assert_eq!(units, ["m", "s", "1/s", "1/s2", "m/s"]);
     let enumerations: Vec<_> = TABLE.enumerations().iter().map(|e| e.name).collect();
@@ -160,7 +160,7 @@ static OTHER_NAME: Enumeration = Enumeration {
 /// The GUID changes with everything on which a host, and therefore its model description, depends, and with
 /// nothing else.
 #[test]
-fn guid_changes_with_whatever_a_host_depends_on() {
+fn the_guid_changes_with_everything_that_a_host_depends_on() {
     let guid = |about: About, variables: Vec<Variable<Vessels>>| {
         Table::new(about, variables.leak(), &[]).guid().to_string()
     };

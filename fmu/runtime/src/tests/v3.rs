@@ -168,7 +168,7 @@ fn a_ramp_by_intermediate_update_is_the_input_derivative_of_fmi_2_to_the_last_bi
 }
 
 #[test]
-fn an_early_return_that_the_host_asks_for_is_where_it_wants_if_it_may() {
+fn an_early_return_happens_at_the_time_that_the_host_requests_if_it_is_allowed() {
     let (instance, host) = stepping(true);
     host.lock().unwrap().force = Some(1.0);
     host.lock().unwrap().wish = Some(0.25);
@@ -425,7 +425,7 @@ fn adjoint_derivatives_are_the_transposed_directional_ones() {
 }
 
 #[test]
-fn dependencies_are_those_of_the_start_until_it_is_over_and_then_those_declared() {
+fn dependencies_are_those_of_the_start_during_initialization_and_the_declared_ones_afterwards() {
     let host = Mutex::new(TestHost::default());
     unsafe {
         let instance = model_exchange(&host);

@@ -103,7 +103,7 @@ fn wrong_counts_types_and_references_of_arrays_are_described() {
 /// Arrays whose size changes get their start values again; everything else keeps its values, and everything
 /// if the number of trays is unchanged.
 #[test]
-fn another_size_starts_what_it_sizes_anew() {
+fn changing_the_size_of_an_array_resets_its_elements() {
     let lines = Lines::default();
     let instance = made(&lines);
     let rows = |n: u64| unsafe {
@@ -140,7 +140,7 @@ fn another_size_starts_what_it_sizes_anew() {
 
 /// Scalars 1 to 24 (k), time and two indicators can be read one by one as Float64.
 #[test]
-fn behind_the_table_s_scalars_are_time_and_the_event_indicators() {
+fn time_and_event_indicators_follow_the_scalars_of_the_table() {
     let lines = Lines::default();
     let token = c_string(Trays::table().token(Layout::Scalars));
     let environment = std::ptr::from_ref(&lines).cast_mut().cast();

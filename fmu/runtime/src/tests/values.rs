@@ -97,7 +97,7 @@ fn references_of_another_type_or_of_none_are_refused() {
 }
 
 #[test]
-fn setting_is_all_or_nothing() {
+fn setting_several_values_succeeds_or_fails_as_a_whole() {
     let mut instance = started(CS, &[]);
     let both = references(["q[1]", "q[2]"]);
     let why = unchanged(&mut instance, |i| i.set(&SET_REAL, &both, |n| Real([5.0, 11.0][n])));
@@ -112,7 +112,7 @@ fn setting_is_all_or_nothing() {
 }
 
 #[test]
-fn wrong_parameters_are_told_all_together_when_initialization_ends() {
+fn all_wrong_parameters_are_reported_when_initialization_ends() {
     let mut instance = fresh(CS);
     set(&mut instance, "start.level[1]", -1.0).unwrap();
     set_integer(&mut instance, "number", 6).unwrap();
@@ -166,7 +166,7 @@ fn only_inputs_and_tunable_parameters_are_set_in_motion() {
 }
 
 #[test]
-fn model_refuses_a_tuned_parameter_with_all_that_is_set_beside_it() {
+fn refusing_a_tuned_parameter_refuses_the_whole_call() {
     let mut instance = started(CS, &[("z", 3.0)]);
     let both = references(["q[1]", "leak"]);
     let why = unchanged(&mut instance, |i| i.set(&SET_REAL, &both, |n| Real([5.0, 200.0][n])));
@@ -176,7 +176,7 @@ fn model_refuses_a_tuned_parameter_with_all_that_is_set_beside_it() {
 }
 
 #[test]
-fn directional_derivatives_are_those_of_the_equations() {
+fn directional_derivatives_equal_those_of_the_equations() {
     let mut instance = started(CS, &[]);
     let unknowns = references([
         "der(level[1])",
@@ -218,7 +218,7 @@ fn directional_derivatives_are_those_of_the_equations() {
 }
 
 #[test]
-fn in_initialization_mode_knowns_are_inputs_and_parameters() {
+fn in_initialization_mode_derivatives_are_by_inputs_and_parameters() {
     let mut instance = fresh(CS);
     set(&mut instance, "q[1]", 4.0).unwrap();
     instance.enter_initialization_mode().unwrap();
@@ -256,7 +256,7 @@ fn after_a_step_that_failed_the_last_values_can_be_read() {
 
 /// A leak of 1e300 1/s empties a level of 1e20 m at a rate that exceeds all numbers.
 #[test]
-fn what_is_no_number_is_an_error_that_names_it_and_what_it_is_computed_from() {
+fn a_nan_or_infinite_value_is_an_error_that_names_the_variable_and_its_inputs() {
     let mut instance = started(ME, &[]);
     instance.enter_event_mode().unwrap();
     set(&mut instance, "leak", 1e300).unwrap();

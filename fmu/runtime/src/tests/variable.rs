@@ -24,7 +24,7 @@ fn why(variable: &V, value: Value) -> String {
 }
 
 #[test]
-fn finite_numbers_are_told_by_their_bits() {
+fn finite_numbers_are_recognised_by_their_bits() {
     for x in [0.0, -0.0, 1.0, -1e308, f64::MAX, f64::MIN_POSITIVE, 5e-324] {
         assert!(is_finite(x), "{x}");
     }
@@ -125,7 +125,7 @@ fn rates_are_bounded_by_the_range() {
 }
 
 #[test]
-fn properties_of_a_quantity_are_those_given() {
+fn quantities_keep_their_given_properties() {
     let plain = a_real("m");
     assert_eq!((plain.unit(), plain.min(), plain.nominal_value()), ("m", None, 1.0));
     let rich = a_real("kg").range(-2.0, 3.0).nominal(7.0).display_unit("g");

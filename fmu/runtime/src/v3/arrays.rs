@@ -220,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn a_scalar_knows_its_array_and_its_place_there_unless_it_is_beyond() {
+    fn a_scalar_has_an_array_and_an_index_within_its_size() {
         let arrays = Arrays::new::<Trays>(&parameters(2));
         let places = [1, 2, 3, 4, 11, 15, 16, 18, 19, 20, 21, 22, 23, 24].map(|n| arrays.place(n));
         let (level, square, rows, w, m, k) = (1, 2, 5, 6, 7, 8);

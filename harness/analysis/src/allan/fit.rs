@@ -608,7 +608,7 @@ mod tests {
     }
 
     #[test]
-    fn the_noise_put_in_is_within_its_intervals() {
+    fn intervals_of_the_allan_fit_contain_the_simulated_noise() {
         // a binomial of 40 draws at 0.95 is below 33 once in 3,000 times
         let (held, described) = covered(&ALL, 40);
         assert!(held.iter().all(|count| *count >= 33) && described >= 37, "{held:?} {described}");
@@ -638,7 +638,7 @@ mod tests {
     }
 
     #[test]
-    fn each_interval_holds_the_truth_shows_a_term_that_is_there_and_has_a_width() {
+    fn each_interval_contains_the_true_value_and_detects_a_term_that_exists() {
         let white = Noise { flicker: 0.0, rrw: 0.0, ..ALL };
         let bias = Noise { bias_instability: 5e-5, bias_time: 5.0, ..white };
         let basic = [Term::White, Term::Flicker, Term::Walk];
@@ -686,7 +686,7 @@ mod tests {
     }
 
     #[test]
-    fn the_covariance_is_that_of_many_records() {
+    fn the_covariance_equals_that_of_many_records() {
         // variance of each octave over 300 records: √(2/300) = 8 %; χ² of few degrees of freedom scatter more
         let records: Vec<Octaves> = (0..300)
             .map(|seed| Octaves::from_samples(STEP, &record(&ALL, 1 << 12, seed)))
@@ -716,7 +716,7 @@ mod tests {
     }
 
     #[test]
-    fn a_misfit_is_named_and_what_explains_it_is_found() {
+    fn a_misfit_of_the_noise_model_is_named_with_its_cause() {
         let bias = Noise { bias_instability: 1e-4, bias_time: 40.0, ..ALL };
         let bias = Noise { flicker: 0.0, rrw: 0.0, ..bias };
         let fit = Octaves::from_samples(STEP, &record(&bias, 1 << 17, 1)).describe().unwrap();

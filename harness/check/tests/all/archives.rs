@@ -10,7 +10,7 @@ use zip::{CompressionMethod, ZipWriter};
 use crate::common::{XML, binary, breaks, broken, look, ours, with, xml, zipped};
 
 #[test]
-fn archives_that_hosts_stumble_over_are_told() {
+fn archives_that_break_hosts_are_reported() {
     const DEFLATED: CompressionMethod = CompressionMethod::Deflated;
     let whole = zipped(ours(), DEFLATED);
     let renamed = |from: &str, to: &str| {

@@ -139,7 +139,7 @@ const MISBEHAVIOURS: &[(&str, &str)] = &[
 
 #[cfg(target_os = "linux")]
 #[test]
-fn binaries_that_misbehave_are_told_by_the_rule_that_is_meant() {
+fn binaries_that_misbehave_are_reported_by_the_intended_rule() {
     let rules: BTreeSet<&str> = MISBEHAVIOURS.iter().map(|(_, rule)| *rule).collect();
     let rules: Vec<&str> = rules.into_iter().collect();
     // without a misbehaviour the library around ours is as good as ours
@@ -166,7 +166,7 @@ fn severities(word: &str, rule: &str) -> (Vec<Severity>, String) {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn what_the_standard_forbids_is_an_error_and_what_it_leaves_open_is_none() {
+fn calls_that_the_standard_forbids_are_errors_and_calls_that_it_leaves_open_are_not() {
     for (word, rule, meant) in [
         ("opposite_slopes", "steps.output_derivatives", Severity::Error),
         ("true_is_two", "values.booleans", Severity::Error),
@@ -227,7 +227,7 @@ another GUID | <fmiModelDescription | guid="{ | guid="{x | load.instance
 "#;
 
 #[test]
-fn descriptions_that_do_not_fit_the_binary_are_told() {
+fn descriptions_that_do_not_fit_the_binary_are_reported() {
     // theta and omega
     let references = {
         let text = xml();
@@ -314,7 +314,7 @@ fn descriptions_that_do_not_fit_the_binary_are_told() {
 }
 
 #[test]
-fn an_fmu_that_gives_no_instance_is_told_once() {
+fn an_fmu_that_gives_no_instance_is_reported_once() {
     let report = look(
         &changed("<fmiModelDescription", "guid=\"{", "guid=\"{x"),
         &["load", "life", "values", "steps"],

@@ -28,7 +28,7 @@ fn our_own_fmu_keeps_every_rule() {
 }
 
 #[test]
-fn binaries_that_no_host_can_use_are_told() {
+fn binaries_that_no_host_can_use_are_reported() {
     let name = binary();
     let ours = ours().iter().find(|(n, _)| *n == name).unwrap().1.clone();
     let at = |text: &[u8]| ours.windows(text.len()).position(|w| w == text).unwrap();
@@ -131,7 +131,7 @@ fn binaries_that_no_host_can_use_are_told() {
 }
 
 #[test]
-fn a_check_that_calls_nothing_says_so() {
+fn a_check_without_calls_says_so() {
     let mut files = ours().clone();
     let name = binary();
     files.iter_mut().find(|(n, _)| *n == name).unwrap().0 =

@@ -149,7 +149,7 @@ fn line(list: &str, n: usize) -> String {
 }
 
 #[test]
-fn documents_made_to_harm_and_elements_out_of_order_break_their_rules() {
+fn malicious_xml_and_elements_out_of_order_break_their_rules() {
     let mut no_order = xml();
     let [types, categories] =
         ["  <TypeDefinitions>", "  <LogCategories>"].map(|word| no_order.find(word).unwrap());
@@ -202,7 +202,7 @@ fn lists_of_unknowns_name_each_unknown_once_and_in_order() {
 /// FMI 2.0.5, section 2.2.7: any variable may name the variable whose derivative it is. Only Derivatives makes states of
 /// them (2.2.8). Dymola and JModelica write the attribute for outputs, inputs and dummy derivatives, too.
 #[test]
-fn the_attribute_derivative_alone_makes_no_state() {
+fn the_attribute_derivative_without_other_signs_makes_no_state() {
     let of = |variable: &str, index: &str| {
         let derivative = format!("<Real derivative=\"{index}\"");
         changed(&format!("name=\"{variable}\""), "<Real", &derivative)

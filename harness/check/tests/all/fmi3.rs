@@ -90,7 +90,7 @@ dependenciesKind="fixed fixed" | dependenciesKind="fixed" | xml.dependencies
 "#;
 
 #[test]
-fn a_wrong_word_in_the_description_of_an_fmu_3_is_told() {
+fn a_wrong_attribute_in_the_description_of_an_fmu_3_is_reported() {
     let mut files = files(0);
     let mut wrong = Vec::new();
     for [from, to, rule] in cases(STATIC) {
@@ -120,7 +120,7 @@ fn co_simulation_of_an_fmu_with_clocks_is_not_called() {
 }
 
 #[test]
-fn a_wrong_archive_of_an_fmu_3_is_told() {
+fn a_wrong_archive_of_an_fmu_3_is_reported() {
     let without_fault = files(0);
     let manifest = |name: &str| {
         format!(
@@ -209,7 +209,7 @@ const BEHAVIOUR: &[(u32, &str)] = &[
 ];
 
 #[test]
-fn an_fmu_3_that_misbehaves_is_told_by_the_rule_that_is_meant() {
+fn an_fmu_3_that_misbehaves_is_reported_by_the_intended_rule() {
     let mut wrong = Vec::new();
     for (mutant, rule) in BEHAVIOUR {
         let report = report(&files(*mutant), &[rule]);
@@ -235,7 +235,7 @@ fn a_reset_is_not_blamed_for_runs_that_always_differ() {
 
 /// The first interface's library cannot be loaded; the other interface is checked nevertheless.
 #[test]
-fn one_interface_that_cannot_be_loaded_is_told_and_the_other_is_called() {
+fn an_interface_that_cannot_be_loaded_is_reported_and_the_other_is_checked() {
     let mut files = files(0);
     files[0].1 = XML
         .replace(

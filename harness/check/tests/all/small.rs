@@ -123,7 +123,7 @@ fn good_fmus_get_no_finding_however_stiff_and_whatever_they_offer() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_model_without_a_solution_is_told_as_that_and_by_one_rule() {
+fn a_model_without_a_solution_is_reported_by_one_rule() {
     let definitions = &["-DMODEL_EXCHANGE", "-DBLOWS_UP"];
     let small = Small { definitions, rate: 10.0, experiment: USUAL };
     let report = look(&small.packed(), &["life", "exchange", "values", "states"]);
@@ -153,7 +153,7 @@ fn stepped(definitions: &[&str], experiment: &str, only: &[&str]) -> Report {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn outputs_that_lag_by_one_step_are_told_and_delays_are_not() {
+fn outputs_that_lag_by_one_step_are_reported_and_intended_delays_are_not() {
     // x after 1.5 s is 11 % too large
     let experiment = "startTime=\"0\" stopTime=\"10\" stepSize=\"0.1\"";
     for (habit, severity) in [
@@ -194,7 +194,7 @@ fn resources_are_found_by_any_file_uri() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_message_of_no_category_is_told() {
+fn a_log_message_without_category_is_reported() {
     let report = stepped(&["-DNO_CATEGORY"], USUAL, &["log"]);
     assert_eq!(broken(&report), BTreeSet::from(["log.categories"]), "{}", report.text());
     assert!(report.text().contains("its category is NULL"), "{}", report.text());
@@ -215,7 +215,7 @@ fn a_crash_in_every_step_is_one_finding() {
 /// value that the check sets.
 #[cfg(target_os = "linux")]
 #[test]
-fn a_fault_is_told_by_its_own_rule_and_as_severe_as_it_is() {
+fn a_fault_is_reported_by_its_own_rule_with_its_severity() {
     let mut wrong = Vec::new();
     for (fault, groups, errors, warnings) in [
         (

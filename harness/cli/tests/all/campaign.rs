@@ -217,7 +217,7 @@ fn the_runs_of_a_plan_with_sensors_have_their_readings_and_are_reused() {
 }
 
 #[test]
-fn a_liquid_without_weight_is_told_in_the_tables_and_at_the_end() {
+fn a_weightless_liquid_is_reported_in_the_tables_and_at_the_end() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     // Bond number 1000 · 0.1 · 0.0815²/0.072 = 9.2

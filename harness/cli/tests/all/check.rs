@@ -57,7 +57,7 @@ fn hubslosh(arguments: &[&str]) -> Output {
 }
 
 #[test]
-fn the_command_tells_people_by_text_and_machines_by_exit_code_and_junit() {
+fn check_reports_by_text_exit_code_and_junit() {
     let directory = tempfile::tempdir().unwrap();
     let good = packed_for_tests().to_str().unwrap();
     let (bad, junit) = (directory.path().join("bad.fmu"), directory.path().join("junit.xml"));

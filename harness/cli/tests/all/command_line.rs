@@ -113,7 +113,7 @@ fn a_torque_file_gives_the_same_motion_as_csv_and_as_parquet() {
 }
 
 #[test]
-fn an_unknown_name_brings_the_nearest() {
+fn an_unknown_name_brings_a_suggestion() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     refuses(
@@ -157,7 +157,7 @@ fn a_tank_without_liquid_is_refused_in_the_fmus_own_words() {
 }
 
 #[test]
-fn what_no_machine_can_hold_is_refused() {
+fn runs_beyond_any_memory_are_refused() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let fmu = packed_for_tests().to_str().unwrap();
@@ -251,7 +251,7 @@ fn a_number_that_no_machine_can_hold_is_refused_before_anything_is_allocated() {
 }
 
 #[test]
-fn a_plan_that_nothing_can_be_learnt_from_is_refused() {
+fn an_experiment_without_information_is_refused() {
     let directory = tempfile::tempdir().unwrap();
     let fmu = packed_for_tests().to_str().unwrap();
     for (plan, words) in [
@@ -270,7 +270,7 @@ fn a_plan_that_nothing_can_be_learnt_from_is_refused() {
 }
 
 #[test]
-fn what_the_fmu_warns_of_is_told() {
+fn warnings_of_the_fmu_are_printed() {
     let directory = tempfile::tempdir().unwrap();
     let said = |arguments: &[&str]| {
         let done = short_run(directory.path(), arguments);
@@ -283,7 +283,7 @@ fn what_the_fmu_warns_of_is_told() {
 }
 
 #[test]
-fn what_stands_twice_is_refused() {
+fn a_parameter_or_output_given_twice_is_refused() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     std::fs::write(directory.join("in.csv"), "time,tau_cmd,tau_cmd\n0,1,2\n1,1,2\n").unwrap();
@@ -316,7 +316,7 @@ fn a_torque_file_without_the_columns_names_those_missing_and_those_there() {
 }
 
 #[test]
-fn a_torque_that_is_no_number_is_named_by_file_and_row() {
+fn a_torque_that_is_not_a_number_is_named_by_file_and_row() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     for (text, word) in [
@@ -473,7 +473,7 @@ fn a_table_goes_to_stdout_and_a_closed_pipe_ends_the_program_quietly() {
 }
 
 #[test]
-fn variables_are_listed_with_what_one_needs_to_set_them() {
+fn variables_are_listed_with_unit_range_and_meaning() {
     let fmu = packed_for_tests().to_str().unwrap();
     let list = |arguments: &[&str]| {
         let done = hubslosh(Path::new("."), &[&["variables", "--fmu", fmu], arguments].concat());

@@ -257,7 +257,7 @@ fn a_campaign_follows_its_torque_or_names_the_step_that_it_needs() {
 }
 
 #[test]
-fn design_refuses_a_profile_that_its_rows_do_not_follow() {
+fn design_refuses_a_profile_that_changes_too_fast_for_its_rows() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let fmu = packed_for_tests().to_str().unwrap();

@@ -179,7 +179,7 @@ fn a_large_campaign_keeps_the_curves_of_some_runs_and_the_numbers_of_all() {
 }
 
 #[test]
-fn a_second_campaign_in_a_directory_hears_who_holds_it() {
+fn a_second_campaign_in_a_directory_is_refused_with_the_name_of_the_first() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let plan = "title = \"Second\"\nprofile = \"sine:duration=0.2\"\n";

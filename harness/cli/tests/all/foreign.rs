@@ -48,7 +48,7 @@ fn an_fmu_3_runs_as_its_closed_solution_with_inputs_along_lines() {
 /// Without Co-Simulation the host integrates. The clock, which the host does not activate, is named in a
 /// message.
 #[test]
-fn an_fmu_with_model_exchange_alone_runs_as_its_closed_solution() {
+fn an_fmu_with_only_model_exchange_runs_as_its_closed_solution() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("Model3.fmu");
     let xml = std::fs::read_to_string(concat!(

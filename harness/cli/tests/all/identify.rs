@@ -39,7 +39,7 @@ fn record(folder: &Path, name: &str, settings: &[&str]) {
 }
 
 #[test]
-fn what_was_identified_is_fed_back_to_a_run() {
+fn run_takes_parameters_from_identify() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     record(folder, "data.csv", &["hub.I=0.5"]);
@@ -61,7 +61,7 @@ fn what_was_identified_is_fed_back_to_a_run() {
 }
 
 #[test]
-fn one_unknown_all_unknowns_at_bounds_and_no_input_are_answered() {
+fn identify_handles_one_unknown_unknowns_at_bounds_and_no_input() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     record(folder, "data.csv", &["hub.I=0.5"]);
@@ -87,7 +87,7 @@ fn one_unknown_all_unknowns_at_bounds_and_no_input_are_answered() {
 
 /// The names of written files used to follow it.
 #[test]
-fn json_that_is_printed_is_alone_on_stdout() {
+fn printed_json_is_the_only_content_of_stdout() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     record(folder, "data.csv", &["hub.I=0.5"]);
@@ -102,7 +102,7 @@ fn json_that_is_printed_is_alone_on_stdout() {
 }
 
 #[test]
-fn what_cannot_be_written_or_means_nothing_is_refused_before_the_search() {
+fn outputs_that_cannot_be_written_are_refused_before_the_search() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     record(folder, "data.csv", &[]);
@@ -126,7 +126,7 @@ fn what_cannot_be_written_or_means_nothing_is_refused_before_the_search() {
 }
 
 #[test]
-fn friction_runs_are_fed_back_to_a_run() {
+fn run_takes_friction_from_identify_friction() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     record(folder, "data.csv", &["fluid.rho=1e-6"]);
@@ -192,7 +192,7 @@ fn a_removed_option_names_what_replaces_it() {
 
 /// `identify FILE` means `identify bench FILE`, and with --free `identify fmu FILE`.
 #[test]
-fn a_command_without_a_kind_of_recording_has_the_usual_one() {
+fn identify_without_a_kind_means_bench() {
     let folder = tempfile::tempdir().unwrap();
     let parsed = |arguments: &[&str]| {
         let all = [&["--parse-only", "identify"], arguments, &["--out", "a.json"]].concat();

@@ -355,7 +355,7 @@ fn an_output_follows_links_and_is_written_to_a_pipe() {
 }
 
 #[test]
-fn what_is_driven_stands_once_in_the_table() {
+fn a_driven_input_is_one_column_of_the_table() {
     let directory = tempfile::tempdir().unwrap();
     let fmu = packed_for_tests().to_str().unwrap();
     let run = ["run", "--fmu", fmu, "--profile", "zero", "--stop", "0.1", "--out", "-"];

@@ -86,7 +86,7 @@ fn a_killed_campaign_goes_on_where_it_stopped() {
 }
 
 #[test]
-fn runs_made_by_another_importer_from_the_list_give_the_same_tables() {
+fn runs_by_another_importer_give_the_same_tables() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let plan = SWEEPS.replace("DURATION", "60");
@@ -157,7 +157,7 @@ fn runs_made_by_another_importer_from_the_list_give_the_same_tables() {
 }
 
 #[test]
-fn a_stored_run_of_another_recipe_is_simulated_again_and_why_is_said() {
+fn a_stored_run_with_other_parameters_is_simulated_again_with_a_reason() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let plan = "profile = \"sine:duration=1\"\n[[run]]\nname = \"a\"\nhub.I = 0.3\n";
@@ -182,7 +182,7 @@ fn a_stored_run_of_another_recipe_is_simulated_again_and_why_is_said() {
 }
 
 #[test]
-fn what_a_torque_cannot_show_stays_empty() {
+fn features_that_the_torque_does_not_excite_stay_empty() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     std::fs::write(directory.join("torque.csv"), "time,tau_cmd\n1,0\n2,0.1\n3,0\n").unwrap();
@@ -226,7 +226,7 @@ fn a_failed_run_is_a_row_with_its_reason() {
 }
 
 #[test]
-fn a_wrong_plan_makes_nothing_and_says_everything() {
+fn a_wrong_plan_writes_nothing_and_reports_every_fault() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let plan = "profile = \"sine:frequncy=1\"\n[set]\ntank.hh = 1\n";

@@ -58,7 +58,7 @@ const SAME: [&str; 22] = [
 ];
 
 #[test]
-fn a_twin_shows_the_features_of_its_run_to_the_last_digit_and_other_forms_of_it_the_same() {
+fn a_recording_of_a_run_has_the_features_of_the_run_in_every_file_format() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let fmu = packed_for_tests();
@@ -270,7 +270,7 @@ fn a_recorded_gyro_at_rest_is_characterised() {
 }
 
 #[test]
-fn a_free_decay_of_30_s_tells_frequency_damping_and_its_growth() {
+fn a_free_decay_of_30_s_determines_frequency_damping_and_its_growth() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let mut random = Random::new(2, 0);

@@ -305,7 +305,7 @@ fn a_spacecraft_under_low_thrust_gets_its_antiresonance_and_resonance_to_a_hundr
 }
 
 #[test]
-fn a_run_that_leaves_its_models_range_is_said() {
+fn the_report_names_runs_that_leave_the_range_of_the_model() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let run = |model: &str| {
@@ -326,7 +326,7 @@ fn a_run_that_leaves_its_models_range_is_said() {
 }
 
 #[test]
-fn along_a_profiles_number_the_axis_says_what_it_is() {
+fn axes_of_varied_profile_parameters_have_names() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     campaign(

@@ -35,7 +35,7 @@ fn a_half_full_sphere_has_its_published_first_mode() {
 }
 
 #[test]
-fn a_bad_tank_is_refused_in_a_sentence_and_leaves_no_file() {
+fn an_invalid_tank_is_refused_in_a_sentence_without_a_file() {
     let folder = tempfile::tempdir().unwrap();
     let (file, out) = (folder.path().join("bad.toml"), folder.path().join("result.json"));
     std::fs::write(&file, "density = 1000\nprofile = [{ line = [0, 0, 1, 0] }]\n").unwrap();
@@ -143,7 +143,7 @@ fn parameters_of_the_six_axis_fmus_have_their_names() {
 /// that the FMU computes. On the bench the same wetting liquid softens the surface (a negative stiffness),
 /// and the command says that the FMU cannot model this.
 #[test]
-fn a_curved_meniscus_reaches_the_fmu_and_what_it_cannot_take_is_told() {
+fn a_curved_meniscus_reaches_the_fmu_and_values_that_it_cannot_take_are_reported() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_string();
     let text = "density = 1000\nshape = { cylinder = { radius = 0.1, height = 3 } }\n";
@@ -188,7 +188,7 @@ fn a_curved_meniscus_reaches_the_fmu_and_what_it_cannot_take_is_told() {
     assert!(frequency("9.81") > 2.0, "the FMU takes the file");
     for (gravity, angle, words) in [
         ("9.81", "200", "--contact-angle 200 (allowed: 0 to 180)"),
-        ("1e-10", "30", "1e-9 or more"),
+        ("1e-10", "30", "at least 1e-9"),
     ] {
         std::fs::remove_file(path("set.toml")).unwrap_or_default();
         let (ok, said) = written(gravity, angle);
@@ -229,7 +229,7 @@ fn a_fill_is_given_in_metres_in_per_cent_or_by_mass() {
 /// Without gravity the table's frequencies are 0. A file has only the stiffness by capillarity, and no
 /// damping ratio, because there is no specific force at which it would hold.
 #[test]
-fn at_no_gravity_only_capillarity_is_left() {
+fn without_gravity_only_surface_tension_restores() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_string();
     let text = "density = 1000\nshape = { cylinder = { radius = 0.1, height = 3 } }\n";
@@ -260,7 +260,7 @@ fn at_no_gravity_only_capillarity_is_left() {
 /// In a sphere of 1 m at 1e-6 m/s² the first-order effect of capillarity is a multiple of the value that it
 /// corrects, so the file is written only with --force.
 #[test]
-fn a_stiffness_far_outside_of_its_formula_is_written_with_force_alone() {
+fn a_stiffness_far_outside_its_formula_is_written_only_with_the_option_force() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_string();
     std::fs::write(path("a.toml"), "density = 1000\nshape = { sphere = { radius = 1 } }\n")
@@ -277,7 +277,7 @@ fn a_stiffness_far_outside_of_its_formula_is_written_with_force_alone() {
 }
 
 #[test]
-fn set_files_that_are_none_are_refused_in_a_sentence() {
+fn invalid_parameter_files_are_refused_in_a_sentence() {
     let folder = tempfile::tempdir().unwrap();
     for (name, text, words) in [
         ("set.txt", "a = 1", "must end in .toml, .ssv or .json"),
@@ -319,7 +319,7 @@ fn set_files_that_are_none_are_refused_in_a_sentence() {
 /// meniscus table) in table, picture and JSON; gravity alone gives 6.6. For a sphere there is no formula: the
 /// frequency is stated as unknown, and is null in JSON.
 #[test]
-fn frequencies_are_those_with_surface_tension_where_it_is_given() {
+fn frequencies_include_surface_tension_where_it_is_given() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_string();
     let shape = |shape: &str| {

@@ -53,7 +53,7 @@ fn a_run_as_it_is_recorded_by_default_becomes_a_page_that_knows_its_parameters()
 }
 
 #[test]
-fn what_cannot_be_drawn_is_refused_and_leaves_no_page() {
+fn runs_that_cannot_be_drawn_are_refused_without_a_page() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let columns = ["--columns", "wave_height", "--out", "run.parquet"];

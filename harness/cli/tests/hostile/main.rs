@@ -372,7 +372,7 @@ fn a_binary_that_does_harm_in_a_step_ends_its_own_process_and_every_command_says
 }
 
 #[test]
-fn a_forged_answer_is_not_believed() {
+fn forged_messages_of_an_fmu_are_refused() {
     const FORGE: u32 = 19;
     let sandbox = Sandbox::new();
     for when in ["AT_LOAD", "AT_STEP"] {
@@ -402,7 +402,7 @@ fn temporary_files_and_shared_memory_count_against_the_budget() {
 }
 
 #[test]
-fn what_loading_changes_for_the_host_is_told() {
+fn changes_of_the_process_by_loading_an_fmu_are_reported() {
     const FLUSH: u32 = 13;
     let sandbox = Sandbox::new();
     std::fs::write(sandbox.path("a.fmu"), harmful(FLUSH, "AT_LOAD")).unwrap();

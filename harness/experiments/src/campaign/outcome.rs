@@ -979,7 +979,7 @@ mod tests {
     }
 
     #[test]
-    fn a_liquid_without_weight_is_told_by_its_numbers() {
+    fn a_weightless_liquid_is_reported_with_its_numbers() {
         // water in the bench's tank, mode 1 at 10 cm
         let range = Range {
             model: "spherical".into(),

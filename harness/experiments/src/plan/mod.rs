@@ -816,7 +816,7 @@ mod tests {
     }
 
     #[test]
-    fn the_sweeps_of_the_command_line_are_those_of_the_plan_they_leave() {
+    fn the_sweeps_of_the_command_line_equal_those_of_the_written_plan() {
         let sweeps = |set: &[(&str, &str)]| {
             let set = set.iter().map(|(name, value)| (name.to_string(), value.to_string()));
             Plan::sweeps(Sweeps {
@@ -1036,7 +1036,7 @@ mod tests {
     }
 
     #[test]
-    fn bounds_that_nothing_falls_into_are_named() {
+    fn limits_that_no_random_value_meets_are_named() {
         let text = "profile = \"zero\"\n[random]\nruns = 1\nseed = 1\n[random.draw]\n\
             tank.h = { distribution = \"uniform\", from = -2, to = -1 }\n";
         let error = Plan::parse(text).unwrap().cases(&description()).unwrap_err().to_string();

@@ -11,7 +11,7 @@ fn recording(hours: f64, records: usize, settings: &[(&str, &str)]) -> Recording
 }
 
 #[test]
-fn random_walk_and_bias_instability_come_back() {
+fn simulated_random_walk_and_bias_instability_are_estimated() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let none = Noise::default();
     let bench = Noise { arw: 5.75e-5, bias_instability: 5.21e-5, bias_time: 100.0, ..none };
@@ -30,7 +30,7 @@ fn random_walk_and_bias_instability_come_back() {
 }
 
 #[test]
-fn white_noise_alone_has_no_bias_and_rounding_adds_to_it() {
+fn white_noise_has_no_bias_instability_and_rounding_adds_noise() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let quiet = ("imu.bias_instability", "0");
     let found = recording(0.5, 2, &[quiet]).characterise(&fmu, &|_| {}).unwrap();
@@ -47,7 +47,7 @@ fn white_noise_alone_has_no_bias_and_rounding_adds_to_it() {
 /// The fitted flicker noise and rate random walk are within their 95 % intervals; for three seeds in four
 /// both intervals contain the true value.
 #[test]
-fn flicker_noise_and_rate_random_walk_come_back() {
+fn simulated_flicker_noise_and_rate_random_walk_are_estimated() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let set = [
         ("imu.rate", "10"),
@@ -65,7 +65,7 @@ fn flicker_noise_and_rate_random_walk_come_back() {
 }
 
 #[test]
-fn what_cannot_be_characterised_is_said() {
+fn a_gyro_record_that_cannot_be_analysed_is_refused_with_a_reason() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     for (hours, settings, words) in [
         (0.1, &[][..], "0.83 h or more"),

@@ -140,7 +140,7 @@ fn a_camera_sees_a_tilted_plane_where_liquid_stands_still_under_a_constant_pull(
 
 /// Measures every error of every kind of sensor on its readings.
 #[test]
-fn noise_bias_scale_steps_rate_and_delay_are_those_that_are_asked_for() {
+fn sensors_have_the_requested_noise_bias_scale_quantisation_rate_and_delay() {
     let noises = [
         ("gauge", "", 2e-4),
         ("pressure", "height=0.03,", 5.0),
@@ -224,7 +224,7 @@ fn missing_readings_are_missing_in_files() {
 }
 
 #[test]
-fn what_is_wrong_with_a_sensor_is_said_with_what_is_allowed() {
+fn errors_of_sensors_say_what_is_allowed() {
     let said = |text: &str| format!("{:#}", text.parse::<Sensor>().unwrap_err());
     let cases = [
         ("gauge", "(allowed: NAME=KIND:key=value,…)"),

@@ -61,7 +61,7 @@ fn spacecraft(fmi: Fmi, settings: &[(String, String)]) -> anyhow::Result<Fmu> {
 }
 
 #[test]
-fn a_structural_parameter_sizes_arrays_and_the_motion_is_that_of_scalars_to_the_last_bit() {
+fn arrays_sized_by_a_structural_parameter_give_the_motion_of_scalars_to_the_last_bit() {
     let set = settings(&SCALARS);
     let scalars = spacecraft(Fmi::V3, &set).unwrap();
     let expected = record(&scalars, &run(set), &COLUMNS);
@@ -100,7 +100,7 @@ fn arrays_have_the_declared_size_where_no_setting_says_another() {
 }
 
 #[test]
-fn sizes_that_the_fmu_refuses_and_sizes_that_come_too_late_are_told_with_what_is_allowed() {
+fn array_sizes_that_are_refused_are_reported_with_allowed_values() {
     let wrong = |value: &str| {
         let error = spacecraft(Fmi::V3Arrays, &settings(&[("tanks", value)]));
         format!("{:#}", error.err().expect("it is refused"))

@@ -40,7 +40,7 @@ fn said(
 /// − 1)/2 = 0.45005 m. At 60 N, 0.03842 m/s², Bo = 1000 0.03842 0.45005²/0.07213 = 107.9. A cut-off to 6 N
 /// gives a tenth of that, no thrust gives 0.
 #[test]
-fn a_cut_off_of_thrust_is_told_with_the_numbers_of_a_hand_calculation() {
+fn a_thrust_cut_off_is_reported_with_the_numbers_of_a_hand_calculation() {
     let rest = [("init.omega[1]", "0"), ("init.omega[3]", "0")];
     let (times, water) = ([0.0, 10.0, 20.0], 0.07213);
     let of = |values: &[f64]| said("Spacecraft", &rest, ("force[3]", &times, values), water);
@@ -62,7 +62,7 @@ fn a_cut_off_of_thrust_is_told_with_the_numbers_of_a_hand_calculation() {
 /// A tank of 0.9 m by its diameter at 0.1 m/s² along its axis, Bo = 280.7, then 0.002: Bo = 5.61. Its bob starts with 0.2 1/s:
 /// V = 0.37657 m 0.2 1/s, We = 1000 V² 0.45/0.07213 = 35.39.
 #[test]
-fn slosh_tank_s_host_is_told_of_a_cut_off_by_the_acceleration_that_it_gives() {
+fn a_thrust_cut_off_of_slosh_tank_is_recognised_from_its_acceleration_input() {
     let settings = [("tank.diameter", "0.9"), ("a[1]", "0"), ("tank.p_dot_0[1,1]", "0.2")];
     let (times, water) = ([0.0, 5.0, 10.0], 0.07213);
     let of = |values: &[f64]| said("SloshTank", &settings, ("a[3]", &times, values), water);

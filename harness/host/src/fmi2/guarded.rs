@@ -268,7 +268,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_byte_beside_an_array_is_seen_and_one_inside_is_not() {
+    fn writing_beside_an_array_is_a_fault_and_writing_inside_is_none() {
         let mut array = Guarded::output::<c_int>(3);
         // SAFETY: inside the array.
         unsafe { array.pointer::<c_int>().add(2).write(7) };

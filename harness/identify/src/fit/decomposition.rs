@@ -132,7 +132,7 @@ mod tests {
     use crate::fit::covariance::Covariance;
 
     #[test]
-    fn what_is_not_finite_is_named_and_no_iteration_hangs() {
+    fn values_that_are_not_finite_are_named_and_no_iteration_hangs() {
         let names = ["hub.I", "friction.d"].map(String::from);
         let line = DMatrix::from_fn(5, 2, |k, j| if j == 0 { 1.0 } else { k as f64 - 2.0 });
         for (entry, words) in [

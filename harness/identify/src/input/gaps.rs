@@ -244,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn lost_samples_of_a_sweep_are_foretold() {
+    fn lost_samples_of_a_sweep_are_predicted() {
         let values: Vec<f64> = (0..4000).map(|k| sweep(100.0 + 0.02 * f64::from(k))).collect();
         for lost in [1, 10, 50] {
             let found = fill(&values[1000..1250], &values[1250 + lost..1500 + lost], lost).unwrap();

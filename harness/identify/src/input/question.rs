@@ -314,7 +314,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_asked_is_read_from_text() {
+    fn options_of_identify_are_read_from_text() {
         let free: Free = "tank[1].mass[1]@each=2:0.5:inf".parse().unwrap();
         assert_eq!((free.name.as_str(), free.each), ("tank[1].mass[1]", true));
         assert_eq!((free.start, free.bounds), (2.0, Some((0.5, f64::INFINITY))));

@@ -520,7 +520,7 @@ mod tests {
     }
 
     #[test]
-    fn running_means_are_those_of_every_stretch() {
+    fn running_means_equal_the_mean_of_each_window() {
         let x: Vec<f64> = (0..50).map(|k| f64::from(k * k % 17)).collect();
         for width in [1, 3, 50] {
             let expected: Vec<f64> = x.windows(width).map(mean).collect();
@@ -553,7 +553,7 @@ mod tests {
     }
 
     #[test]
-    fn lost_rows_of_a_sweep_are_filled_and_those_of_noise_cut_the_recording() {
+    fn lost_rows_of_a_sweep_are_interpolated_and_lost_rows_of_noise_split_the_recording() {
         let mut random = analysis::random::Random::new(1, 0);
         let noise: Vec<f64> = (0..15_000).map(|_| 4e-4 * random.normal()).collect();
         let noisy = |mut recording: Recording| {

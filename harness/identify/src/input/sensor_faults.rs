@@ -282,7 +282,7 @@ mod tests {
     /// A gyro with a bias reaches one end of its range in each cycle, and the other one in few. It comes back from each by less than
     /// five standard deviations of its noise.
     #[test]
-    fn a_range_that_one_end_shows_is_that_of_the_other() {
+    fn a_clipping_limit_at_one_end_of_the_range_holds_at_the_other() {
         let mut random = Random::new(5, 0);
         let time: Vec<f64> = (0..10_000).map(|k| 0.02 * f64::from(k)).collect();
         let mut gyro = |bias: f64| -> Vec<f64> {

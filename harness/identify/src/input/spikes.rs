@@ -194,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn spikes_are_found_alone_and_side_by_side_and_noise_is_none() {
+    fn single_and_adjacent_spikes_are_found_and_noise_is_not_a_spike() {
         assert_eq!(found(&[]), []);
         let spikes = [(300, 0.02), (4000, -0.5), (4001, -0.4), (9000, 3.0), (9002, 0.01)];
         let found = found(&spikes);

@@ -391,7 +391,7 @@ mod tests {
     }
 
     #[test]
-    fn scatter_of_decays_is_no_preferential_direction_and_a_tenth_of_friction_is_one() {
+    fn scatter_of_decays_is_not_a_preferential_direction_and_ten_per_cent_of_friction_is() {
         let of = |cosine: f64| (0..100).filter(|seed| differ(*seed, cosine)).count();
         // 95 % for the whole curve: 5 of 100 expected, 12 are three standard deviations more
         assert!(of(0.0) <= 12, "{}", of(0.0));

@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn an_end_that_is_lower_is_a_doubt() {
+    fn a_lower_minimum_from_another_start_makes_the_result_doubtful() {
         let trial = |more: f64| Trial {
             name: "tank.d".into(),
             start: 2.0,

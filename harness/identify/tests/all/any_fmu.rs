@@ -72,7 +72,7 @@ fn found(question: &Question) -> Identification {
 }
 
 #[test]
-fn a_hub_in_closed_form_comes_back_within_its_intervals() {
+fn intervals_contain_the_true_values_of_a_hub_in_closed_form() {
     let found = found(&question(&FREE));
     assert!(found.converged && found.fits == Some(true), "{:?}", found.verdict);
     let truth = [
@@ -214,7 +214,7 @@ fn an_fmu_3_is_identified_through_its_events() {
 }
 
 #[test]
-fn what_no_recording_says_is_not_determined_and_a_bound_in_the_way_is_named() {
+fn parameters_without_information_are_not_determined_and_bounds_are_named() {
     // the stiffness of a law that is not chosen does nothing; the inertia is wanted beyond its bound
     let asked =
         ["hub.I=0.2:0.1:0.3", "friction.b=0.02:0:1", "init.omega@each=0", "friction.sigma0=1e3"];
@@ -238,7 +238,7 @@ fn a_prior_holds_what_it_knows_better_than_the_recordings() {
 
 /// For a linear model with known noise, the predicted bound equals the standard deviation of a fit.
 #[test]
-fn what_is_foreseen_is_what_a_fit_states() {
+fn predicted_standard_deviations_equal_those_of_the_fit() {
     let at_truth = ["hub.I=0.35:0.1:1", "friction.b=0.05:0:1", "init.omega@each=0"];
     let question = question(&at_truth);
     let model = Model::open(packed_for_tests(), question.solver).unwrap();
@@ -364,7 +364,7 @@ fn a_minimum_that_is_worse_than_the_start_is_left() {
 
 /// The minimum lies six standard deviations beyond a bound: too few for the tests of the residual.
 #[test]
-fn a_minimum_that_a_bound_holds_does_not_fit_without_a_word() {
+fn a_minimum_at_a_bound_is_reported_in_the_verdict() {
     let free = found(&question(&FREE));
     let e = &free.parameters["friction.b"];
     let (low, start) = (e.value + 6.0 * e.std, e.value + 9.0 * e.std);

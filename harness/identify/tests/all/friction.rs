@@ -137,7 +137,7 @@ fn friction_of_eighteen_more_runs_ends_in_no_false_minimum() {
 
 /// A preferential direction in the other way comes back with its sign.
 #[test]
-fn the_preferential_direction_comes_back_in_either_way() {
+fn identify_finds_the_preferential_direction_in_both_directions() {
     assert_eq!(wrong(&SETS[0], 2, 0.002, -ASYMMETRY), [""; 0]);
 }
 
@@ -198,7 +198,7 @@ fn recordings_that_show_no_friction_are_refused_with_what_to_do() {
 
 /// A push and the free decay after it: c and d go with 1 + asymmetry alone.
 #[test]
-fn a_hub_that_turns_one_way_determines_the_friction_of_that_way_alone() {
+fn a_hub_that_turns_one_way_determines_the_friction_in_that_direction_only() {
     for way in [1.0, -1.0] {
         let found = fit(&[push(1, way)], &options()).unwrap();
         assert!(found.fits == Some(true), "{:?}", found.verdict);

@@ -89,7 +89,7 @@ fn comes_back(sensor: &str, column: &str, noise: f64) {
 }
 
 #[test]
-fn a_twin_comes_back_through_a_late_wave_gauge_with_a_bias() {
+fn identify_finds_the_parameters_of_a_simulated_bench_with_a_late_wave_gauge() {
     comes_back(
         "wave=gauge:angle=60deg,rate=25,delay=0.04,scale=1.01,noise=2e-4,bias=3e-4",
         "wave",
@@ -98,11 +98,11 @@ fn a_twin_comes_back_through_a_late_wave_gauge_with_a_bias() {
 }
 
 #[test]
-fn a_twin_comes_back_through_the_force_on_its_tank() {
+fn identify_finds_the_parameters_of_a_simulated_bench_with_a_force_sensor() {
     comes_back("load=force:noise=5e-3,bias=0.01", "load", 5e-3);
 }
 
 #[test]
-fn a_twin_comes_back_through_a_camera() {
+fn identify_finds_the_parameters_of_a_simulated_bench_with_a_camera() {
     comes_back("view=camera:rate=10,delay=0.1,noise=5e-4", "view.plane_tangential", 5e-4);
 }

@@ -235,7 +235,7 @@ fn a_finer_tolerance_and_the_hosts_solver_give_intervals_that_hold_the_truth() {
 }
 
 #[test]
-fn what_is_foreseen_is_refused_where_the_solver_decides_and_is_the_stated_uncertainty_else() {
+fn predictions_are_refused_where_solver_errors_decide() {
     let fmu = Adaptive::new(&["-DTOLERANCE=1e-3", "-DROUGH", "-DMODEL_EXCHANGE"]);
     let at_truth = TRUTH.map(|(name, value)| format!("{name}={value}").parse().unwrap()).to_vec();
     let question = |solver| Question { free: at_truth.clone(), ..question(solver) };

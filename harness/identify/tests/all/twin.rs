@@ -57,7 +57,7 @@ fn of_any_torque() -> Options {
 }
 
 #[test]
-fn parameters_come_back_and_coulomb_and_stribeck_friction_as_their_sum() {
+fn identify_finds_all_parameters_and_the_sum_of_coulomb_and_stribeck_friction() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let found = identify(&fmu, &[sweep(&fmu, LONG, &[])], &of_any_torque(), &mut |_| {}).unwrap();
     assert!(found.converged && found.fits == Some(true), "{:?}", found.verdict);
@@ -82,7 +82,7 @@ fn parameters_come_back_and_coulomb_and_stribeck_friction_as_their_sum() {
 
 /// A given start makes the parameter an unknown, as for any parameter that is not estimated by default.
 #[test]
-fn damping_that_grows_with_the_amplitude_comes_back() {
+fn identify_finds_damping_that_grows_with_the_amplitude() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let recordings = [sweep(&fmu, SHORT, &[("slosh.zeta_amplitude", "0.02")])];
     let starts = vec![("slosh.zeta_amplitude".to_string(), 0.005)];
@@ -101,7 +101,7 @@ const BREAKS: [(&str, &str); 2] =
 
 #[test]
 #[ignore = "half a minute: .ci/run --nightly"]
-fn damping_by_waves_that_break_comes_back() {
+fn identify_finds_the_damping_of_breaking_waves() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let torque = SHORT.replace("0.1", "0.25");
     let of = |settings: &[(&str, &str)], breaking: bool| {
@@ -253,7 +253,7 @@ fn a_tolerance_that_nonlinear_slosh_shows_is_no_misfit() {
 /// The motion is so slow that the friction curve is nearly straight. The minimum is at 0.02 rad/s; a quadratic there would
 /// exclude the truth by fourteen standard deviations.
 #[test]
-fn along_the_frictions_flat_valley_the_interval_is_that_of_the_likelihood() {
+fn along_the_frictions_flat_valley_the_interval_equals_that_of_the_likelihood() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let slow = "lin-sweep:amplitude=0.025,duration=600,f0=1.8,f1=3";
     let recordings = [sweep(&fmu, slow, &[])];
@@ -312,7 +312,7 @@ fn a_delay_of_half_a_row_is_a_finding_where_it_is_known() {
 /// from linear torque long before its minimum is known to a hundredth. It then stops: a sweep of 2700 s takes nine simulations in
 /// all, and one at the end.
 #[test]
-fn what_the_torque_between_rows_cannot_be_costs_few_simulations() {
+fn impossible_intersample_behaviours_cost_few_simulations() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let recordings = [sweep(&fmu, "lin-sweep:amplitude=0.1,duration=200,f0=2,f1=2.8", &[])];
     let perfect = |options: Options| Options { sensor_errors: false, gyro_scale: 0.0, ..options };
@@ -335,7 +335,7 @@ fn what_the_torque_between_rows_cannot_be_costs_few_simulations() {
 /// speed, the fit does not try it on the whole recording. The loudest part underestimates the evidence: at the speed that it
 /// rejects least, the sum of squares of the whole recording grows by more.
 #[test]
-fn what_the_loudest_part_has_against_a_stribeck_speed_the_whole_has_too() {
+fn a_stribeck_speed_that_the_loudest_part_rejects_is_rejected_by_the_whole_recording() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let recordings = [sweep(&fmu, "lin-sweep:amplitude=0.1,duration=1000,f0=1.8,f1=3", &[])];
     let mut lines = Vec::new();
@@ -404,7 +404,7 @@ fn a_drag_that_the_model_lacks_is_named_with_its_size() {
 }
 
 #[test]
-fn twenty_spikes_are_told_and_left_out() {
+fn twenty_spikes_are_reported_and_left_out() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let mut recording = sweep(&fmu, SHORT, &[]);
     let rows: Vec<usize> = (0..20).map(|k| 700 + 701 * k).collect();
@@ -605,7 +605,7 @@ fn a_recording_with_an_encoder_is_described_as_one_without() {
 }
 
 #[test]
-fn sensitivities_are_those_of_smaller_and_larger_steps() {
+fn sensitivities_equal_those_of_smaller_and_larger_steps() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let recordings = [sweep(&fmu, SHORT, &[])];
     let names = [("tank.d", "m", 0.163), ("slosh.zeta", "1", 0.003), ("friction.c", "N.m", 0.0035)];

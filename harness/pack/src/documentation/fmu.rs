@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn every_dead_link_and_missing_figure_is_named() {
+    fn dead_links_and_missing_figures_are_named() {
         let folder = folder(&[(
             "index.md",
             "# A\n\n[1](gone.md) [2](#nothing) ![3](none.svg) [4](index.md#a)\n",

@@ -154,7 +154,7 @@ mod tests {
     use super::{correlation, histogram};
 
     #[test]
-    fn what_goes_together_correlates_by_one_and_what_is_constant_not_at_all() {
+    fn correlation_is_one_for_proportional_columns_and_undefined_for_constants() {
         let line: Vec<(f64, f64)> = (0..10).map(|i| (f64::from(i), 3.0 - f64::from(i))).collect();
         assert!((correlation(&line) + 1.0).abs() < 1e-12);
         assert_eq!(correlation(&[(1.0, 2.0), (2.0, 2.0)]), 0.0);

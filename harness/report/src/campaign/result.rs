@@ -495,7 +495,7 @@ mod tests {
     const TORQUE: &str = "torque amplitude";
 
     #[test]
-    fn swirl_is_said_with_where_it_begins_and_how_far_the_linear_model_holds_below() {
+    fn the_report_states_where_rotary_slosh_begins_and_up_to_where_the_linear_model_holds() {
         let all = [
             series("linear", "5 cm fill", &[(50.0, 2.0, 3.0, false), (100.0, 2.0, 3.0, false)]),
             series("spherical", "5 cm fill", &[(50.0, 2.01, 2.97, false), (100.0, 2.0, 3.4, true)]),
@@ -510,7 +510,7 @@ mod tests {
     }
 
     #[test]
-    fn swirl_from_the_first_run_on_says_nothing_of_below() {
+    fn rotary_slosh_in_the_first_run_gives_no_statement_below_it() {
         let all = [series("spherical", "", &[(50.0, 2.0, 2.9, true), (100.0, 0.0, 0.0, true)])];
         assert_eq!(
             describe_responses(&all, TORQUE, " mN·m"),
@@ -552,7 +552,7 @@ mod tests {
     }
 
     #[test]
-    fn one_linear_model_is_said_to_stay_or_to_move() {
+    fn the_report_states_whether_one_linear_model_fits_all_torques() {
         let stays = [series("linear", "", &[(50.0, 2.0, 3.0, false), (100.0, 2.0, 3.002, false)])];
         assert_eq!(
             describe_responses(&stays, TORQUE, " mN·m"),
@@ -568,7 +568,7 @@ mod tests {
     }
 
     #[test]
-    fn runs_without_a_trusted_response_say_nothing_or_that() {
+    fn runs_without_a_valid_response_give_no_statement() {
         let none = [series("linear", "", &[(1.0, 0.0, 0.0, false), (2.0, 0.0, 0.0, false)])];
         assert_eq!(describe_responses(&none, TORQUE, ""), "");
         assert_eq!(describe_responses(&[series("spherical", "", &[])], TORQUE, ""), "");

@@ -393,7 +393,7 @@ mod tests {
     }
 
     #[test]
-    fn what_can_be_read_in_two_ways_or_in_none_is_refused_with_its_cause() {
+    fn ambiguous_and_unreadable_times_are_refused_with_a_reason() {
         for (fields, words) in [
             (&["01/02/2026 23:59:59", "02/02/2026 00:00:01"][..], "the day first or the month"),
             (&["26/01/31 23:59:59", "26/02/01 00:00:01"], "two digits of the year"),

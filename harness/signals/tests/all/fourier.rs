@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use signals::fourier::{Complex64, Forward, Inverse};
 
 #[test]
-fn a_transform_is_the_sum_of_its_definition_and_comes_back() {
+fn a_fourier_transform_equals_its_definition_and_is_inverted() {
     for length in [12, 15] {
         let signal: Vec<f64> = (0..length).map(|n| f64::from(n * n * 7 % 11) - 4.0).collect();
         let spectrum = Forward::new(length as usize).transform(signal.clone());

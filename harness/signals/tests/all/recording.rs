@@ -59,7 +59,7 @@ const RATE: [f64; 3] = [0.0, std::f64::consts::PI / 180.0, -1.5 * std::f64::cons
 
 /// A plan for an FMU without inputs has only times.
 #[test]
-fn a_table_of_times_alone_is_read() {
+fn a_table_with_only_times_is_read() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("a.csv");
     for text in ["time\n0\n0.02\n0.04\n", "time [s]\n0\n20e-3\n0.04", "\"time\"\n0\n0.02\n0.04\n"] {
@@ -412,7 +412,7 @@ fn a_field_that_can_be_read_in_two_ways_is_refused_with_its_line() {
 }
 
 #[test]
-fn a_file_without_times_is_read_at_a_stated_rate_alone() {
+fn a_file_without_times_is_read_only_with_a_stated_rate() {
     let text = "tau_cmd,omega\n0.1,0\n0.25,1\n-0.3,2\n";
     let error = read_text("csv", text.as_bytes(), "").unwrap_err();
     assert!(error.contains("; --rate HZ takes equally spaced rows without times)"), "{error}");
@@ -442,7 +442,7 @@ fn a_file_without_times_is_read_at_a_stated_rate_alone() {
 }
 
 #[test]
-fn seconds_and_nanoseconds_are_one_time_unless_each_is_one() {
+fn columns_of_seconds_and_nanoseconds_form_one_time() {
     let rows = "0,0,0\n0,20000000,1\n0,40000000,2\n";
     for (head, of) in [
         ("sec,nanosec,omega", "tau_cmd=omega"),

@@ -10,7 +10,7 @@ fn table() -> Table {
 }
 
 #[test]
-fn numbers_come_back_bit_for_bit_from_both_formats() {
+fn numbers_are_read_back_bit_for_bit_from_both_formats() {
     let directory = tempfile::tempdir().unwrap();
     for name in ["a.csv", "a.parquet"] {
         let path = directory.path().join(name);

@@ -709,7 +709,7 @@ fn a_file_of_points_joins_at_most_201_by_lines() {
 
 /// A result with its damping gives the same file as one without, and the file of another liquid's damping is its own.
 #[test]
-fn parameters_are_those_of_the_liquid_and_not_of_the_result() {
+fn parameters_belong_to_the_liquid_and_not_to_the_result() {
     let text = "density = 875.0\n\
         shape = { domed_cylinder = { radius = 0.45, height = 0.9, bottom = 0.45, top = 0.45 } }\n";
     let tank = tank(text);
@@ -734,7 +734,7 @@ fn parameters_are_those_of_the_liquid_and_not_of_the_result() {
 
 /// Bit for bit, at every fill; also of a full tank.
 #[test]
-fn the_mass_is_that_of_the_solution() {
+fn the_mass_equals_that_of_the_solution() {
     for text in [
         "shape = { sphere = { radius = 0.4 } }",
         "shape = { cylinder = { radius = 0.4, height = 0.8 } }",

@@ -32,7 +32,7 @@ fn refused(text: &str, fill: f64, why: &str) {
 /// degrees and the frequency over that of small waves. The computation has no expansion in the steepness. At 8 degrees the
 /// fifth order adds 3e-4.
 #[test]
-fn backbones_of_the_bench_are_those_of_fully_nonlinear_flow() {
+fn backbones_of_the_bench_equal_those_of_fully_nonlinear_flow() {
     for (fill, planar, circular) in [
         (0.1, [(4.0, 0.998962), (8.0, 0.995954)], [(4.0, 1.00091), (6.0, 1.00208)]),
         (0.05, [(4.0, 0.999368), (8.0, 0.997373)], [(4.0, 1.00104), (6.0, 1.00238)]),
@@ -74,7 +74,7 @@ fn both_methods_agree_within_their_errors() {
 
 /// Lengths scale, coefficients do not; a capsule is a sphere up to its tangent.
 #[test]
-fn coefficients_are_those_of_the_shape_alone() {
+fn coefficients_depend_only_on_the_shape() {
     let sphere = known("shape = { sphere = { radius = 1.0 } }", 0.7);
     let small = known("shape = { sphere = { radius = 0.01 } }", 0.007);
     let capsule =
@@ -90,7 +90,7 @@ fn coefficients_are_those_of_the_shape_alone() {
 
 /// A ring with walls that lean, a nearly full sphere, where the error is large, and secondary resonances.
 #[test]
-fn what_is_not_known_is_refused_with_its_reason() {
+fn unknown_coefficients_are_refused_with_a_reason() {
     refused("shape = { torus = { ring_radius = 1.0, tube_radius = 0.3 } }", 0.3, "ring of liquid");
     refused("shape = { sphere = { radius = 1.0 } }", 1.95, "are known to");
     refused("shape = { sphere = { radius = 1.0 } }", 1.12, "mode (2,2)");
@@ -425,7 +425,7 @@ fn a_table_bounds_unknown_coefficients_by_their_neighbours_and_names_the_fills()
 
 /// A torus has no coefficients at all, and a sphere with one known fill none to interpolate.
 #[test]
-fn a_table_without_two_known_fills_has_pendulums_and_says_why() {
+fn a_fill_table_with_fewer_than_two_known_fills_uses_pendulums_with_a_reason() {
     for (shape, fills, why) in [
         ("torus = { ring_radius = 1.0, tube_radius = 0.3 }", [0.2, 0.3], "ring of liquid"),
         ("sphere = { radius = 0.1 }", [0.112, 0.14], "mode (2,2)"),

@@ -54,7 +54,7 @@ fn deviation(
 /// test holds it to (waves, extrapolated to the contact line, 1e-8). And the error that it states
 /// must not be less than the true one.
 #[test]
-fn every_reference_tank_is_met_within_the_stated_error() {
+fn every_reference_tank_is_reproduced_within_the_stated_error() {
     for case in reference().iter().filter(|case| case["kind"] == "revolution") {
         let name = &case["name"];
         let data = tank(&toml(case)).solve(number(&case["fill"]), 5).unwrap();
@@ -109,7 +109,7 @@ fn massless_modes_have_no_height_and_keep_their_moment() {
 
 /// Both axes of the box; closed forms, so 1e-11 is the digits written.
 #[test]
-fn the_reference_box_is_met_on_both_axes() {
+fn the_reference_box_is_reproduced_on_both_axes() {
     let cases = reference();
     let case = cases.iter().find(|c| c["kind"] == "box").unwrap();
     let data = tank(&toml(case)).solve(number(&case["fill"]), 5).unwrap();
@@ -134,7 +134,7 @@ fn the_reference_box_is_met_on_both_axes() {
 
 /// The closed form of the annular cylinder, its sum of 100 terms with the tail: 1e-11 of m R^2.
 #[test]
-fn the_reference_annulus_is_met_in_closed_form() {
+fn the_reference_annulus_is_reproduced_in_closed_form() {
     let cases = reference();
     let case = cases.iter().find(|c| c["name"] == "annulus_half").unwrap();
     let shape = "shape = { annulus = { inner_radius = 0.5, outer_radius = 1.0, height = 1.0 } }";

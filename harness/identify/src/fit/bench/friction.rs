@@ -555,7 +555,7 @@ mod tests {
     }
 
     #[test]
-    fn the_end_of_an_interval_beyond_its_last_point_is_that_of_the_parabola() {
+    fn the_end_of_an_interval_beyond_the_last_profile_point_follows_a_parabola() {
         let middle = on_a_parabola(0.0);
         for side in [-1.0, 1.0] {
             let end = end_beyond(&middle, &on_a_parabola(1.75 * side), 100.0).unwrap();

@@ -66,7 +66,7 @@ mod tests {
 
     /// A sine under a lag: amplitude 1/√(1 + (ΩT)²), phase −atan ΩT.
     #[test]
-    fn lags_of_a_sine_are_those_of_its_frequency_response() {
+    fn lags_of_a_sine_equal_those_of_its_frequency_response() {
         let (w, lag, h) = (15.0_f64, 0.03, 0.02);
         let time: Vec<f64> = (0..2000).map(|k| h * f64::from(k)).collect();
         // lines through a sine act as a sine that is smaller by sinc²

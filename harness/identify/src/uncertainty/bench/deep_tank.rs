@@ -180,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn d_h_and_i_come_back_from_what_a_recording_shows_of_them() {
+    fn diameter_fill_and_inertia_follow_from_the_quantities_that_a_recording_determines() {
         for values in [[0.163, 0.05, 0.32], [0.163, 0.1, 0.32], [0.126, 0.13, 0.25]] {
             let back = Seen::values(BENCH, Seen::of(BENCH, values).logarithms()).unwrap();
             for (value, back) in values.iter().zip(back) {
@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn in_a_shallow_tank_the_intervals_are_those_of_first_order() {
+    fn in_a_shallow_tank_the_intervals_equal_those_of_first_order() {
         let values = [0.163, 0.05, 0.32];
         let mean = Seen::of(BENCH, values).logarithms();
         let by_t = 1e-4;

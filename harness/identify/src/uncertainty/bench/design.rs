@@ -309,7 +309,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_multisine_has_odd_lines_alone_and_its_peak() {
+    fn a_multisine_has_only_odd_lines_and_the_given_peak() {
         let torque = Multisine::new(100.0, (1.25, 3.5), 0.25, 1).unwrap();
         assert!(torque.lines.iter().chain(&torque.detection).all(|k| k % 2 == 1));
         assert!(torque.detection.len() >= torque.lines.len() / LINE_GROUP);
@@ -322,7 +322,7 @@ mod tests {
     }
 
     #[test]
-    fn d_optimal_power_stands_around_the_slosh_and_tells_more() {
+    fn d_optimal_power_is_near_the_slosh_frequency_and_reduces_uncertainty() {
         let plant = Linear { friction: 0.1, ..Linear::bench_10_cm(0.003) };
         let frequencies: Vec<f64> = (125..350).step_by(2).map(|k| f64::from(k) / 100.0).collect();
         let shares = d_optimal(&plant, &frequencies);

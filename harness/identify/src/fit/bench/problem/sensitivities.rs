@@ -3,7 +3,7 @@
 //! Sensitivities to s, b and δ are exact: −ω, −1 and s ω'. Those to the FMU's parameters are
 //! differences. The step moves the whole answer by [`BENCH_MOVE`] standard deviations of its noise:
 //! small against curvature and large against the integrator's tolerance
-//! (`sensitivities_are_those_of_smaller_and_larger_steps` in tests/twin.rs).
+//! (`sensitivities_equal_those_of_smaller_and_larger_steps` in tests/twin.rs).
 //!
 //! Along a valley large sensitivities cancel: c and d of the friction are 0.9999 correlated, and differences that are right to 1
 //! % say nothing about c − d. So differences are taken along the directions L = V S⁻¹ of earlier sensitivities J = U S Vᵀ. These
