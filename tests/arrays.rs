@@ -682,7 +682,7 @@ const STARTS: [(&str, f64); 5] = [
 ];
 
 #[test]
-fn a_part_of_the_variables_starts_and_moves_as_the_whole_where_that_is_set() {
+fn an_fmu_with_fewer_variables_moves_as_the_full_fmu() {
     let text = STARTS.map(|(name, x)| (name, x.to_string()));
     let (part, _folder) = part_of_spacecraft(&text.each_ref().map(|(n, x)| (*n, &**x)));
     let whole = Opened::new(pack::model("Spacecraft").unwrap(), Fmi::V3);
@@ -742,7 +742,7 @@ fn a_part_of_the_variables_starts_and_moves_as_the_whole_where_that_is_set() {
 }
 
 #[test]
-fn a_part_of_the_variables_refuses_more_tanks_and_states_of_the_whole() {
+fn an_fmu_with_fewer_variables_refuses_more_tanks_and_states_of_the_full_fmu() {
     let (part, _folder) = part_of_spacecraft(&[]);
     let mut run = part.instance(Interface::CoSimulation);
     let tanks = part.variable("tanks").reference;

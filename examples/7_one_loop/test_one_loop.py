@@ -30,7 +30,7 @@ def test_fmpy_and_the_harness_give_one_answer(
     assert difference(in_fmpy(folder, fmu, slopes), theirs) <= TOLERANCE
 
 
-def test_slopes_make_another_loop(folder: Path) -> None:
+def test_input_slopes_change_the_loop(folder: Path) -> None:
     """So a host that sets slopes can't be compared with one that does not: they differ by 20 %."""
     held, slopes = (pd.read_csv(folder / f"loop_{name}.csv") for name in ("held", "slopes"))
     assert difference(held, slopes) > 0.1
@@ -46,7 +46,7 @@ def test_the_error_goes_with_the_square_of_a_fixed_step(fmu: str, folder: Path) 
     assert errors == pytest.approx([6.6e-4, 1.9e-4], rel=0.02)
 
 
-def test_the_master_that_goes_back_makes_half_the_steps(fmu: str, folder: Path) -> None:
+def test_a_master_that_repeats_steps_makes_half_the_steps(fmu: str, folder: Path) -> None:
     """4,416 steps, two thirds of them rolled back or halves, at the error of 8,000 fixed ones."""
     rows, steps = adaptive(fmu, folder, 1e-5)
     error = np.abs(rows[:, 1:] - exact(fmu, rows[:, 0])).max()

@@ -279,7 +279,7 @@ fn instances_in_several_threads_give_the_same_bits() {
 
 /// The FMU leaves rounding to nearest, subnormal numbers and the working directory unchanged.
 #[test]
-fn host_s_arithmetic_and_directory_are_left_alone() {
+fn floating_point_state_and_working_directory_of_the_host_are_unchanged() {
     let arithmetic = || {
         let [one, three, small] = [1.0, 3.0, f64::MIN_POSITIVE].map(std::hint::black_box);
         [one / three, -one / three, small / three, 2.5f64.round_ties_even()].map(f64::to_bits)
@@ -360,7 +360,7 @@ fn unusual_instance_names_are_accepted() {
 }
 
 #[test]
-fn no_function_minds_a_null_instance() {
+fn every_function_handles_a_null_instance() {
     let fmu = open();
     fmu.free_null_instance();
     for (call, status) in fmu.calls_with_null_instance() {
@@ -529,7 +529,7 @@ fn setup_experiment_may_be_left_out() {
 }
 
 #[test]
-fn nothing_to_get_or_set_is_fine_with_null_and_something_is_not() {
+fn null_pointers_are_accepted_only_for_zero_values_to_get_or_set() {
     let fmu = open();
     let mut instance = stepping(&fmu, &[]);
     instance.get_real_null(0).unwrap();
@@ -654,7 +654,7 @@ fn steps_of_no_positive_length_are_refused_and_change_nothing() {
 
 /// Hosts compute n h or add up h; both differ from the exact time by a few ulps.
 #[test]
-fn communication_point_may_wobble_by_rounding_and_is_landed_on_exactly() {
+fn communication_points_off_by_rounding_are_reached_exactly() {
     let fmu = open();
     let h = 0.1;
     for start in [0.0, -100.0, 1e6] {
@@ -722,7 +722,7 @@ fn a_diverging_run_is_an_error() {
 }
 
 #[test]
-fn the_last_step_can_be_asked_about() {
+fn the_status_of_the_last_step_can_be_queried() {
     let fmu = open();
     let mut instance = stepping(&fmu, &[]);
     instance.do_step(0.0, 0.25).unwrap();

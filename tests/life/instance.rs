@@ -271,7 +271,7 @@ fn invalid_steps_are_refused_and_change_nothing() {
 
 /// Hosts compute n h or add up h. Both differ from the exact time by some ulps, and so does the stop time.
 #[test]
-fn communication_points_may_wobble_by_rounding() {
+fn communication_points_may_be_off_by_rounding() {
     let h = 0.1;
     for start in [0.0, 1e6] {
         let mut added = start;

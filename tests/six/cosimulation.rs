@@ -344,7 +344,7 @@ fn growth(share: f64, order: Order, h: f64) -> (f64, f64) {
 const LIGHT: f64 = 300.0 / 1180.0;
 
 #[test]
-fn the_split_makes_the_slosh_mode_grow_as_its_delay_says() {
+fn splitting_a_step_makes_the_slosh_mode_grow_by_the_delay_of_the_split() {
     for (share, order, h) in [
         (1.0, GaussSeidelHeld, 0.02),
         (1.0, GaussSeidelHeld, 0.05),

@@ -94,7 +94,7 @@ fn periodic_waves_have_the_frequencies_of_potential_flow_in_both_fmus() {
 }
 
 #[test]
-fn waves_on_circles_close_after_the_period_of_their_frequency_in_both_fmus() {
+fn waves_on_circles_have_the_predicted_frequency_in_both_fmus() {
     fn end<T: Moved>(tank: &Tank, a: f64, w: f64) -> f64 {
         let mut moved = T::start(tank);
         let start = moved.bob();

@@ -15,7 +15,7 @@ fn committed(path: impl AsRef<Path>) -> Vec<u8> {
 }
 
 #[test]
-fn description_and_page_of_variables_are_what_the_table_says() {
+fn model_description_and_page_of_variables_equal_the_table() {
     up_to_date::<HubSlosh::HubSlosh>();
     up_to_date::<Spacecraft::Model>();
     up_to_date::<SloshTank::Model>();

@@ -39,7 +39,7 @@ fn unknowns(list: &str) -> Vec<Element> {
 }
 
 #[test]
-fn committed_file_is_what_the_table_says() {
+fn the_committed_model_description_equals_the_table() {
     assert!(
         committed() == model_description::xml::<HubSlosh::HubSlosh>().unwrap(),
         "modelDescription.xml is out of date: run `cargo run --release -p model-description`"
@@ -47,12 +47,12 @@ fn committed_file_is_what_the_table_says() {
 }
 
 #[test]
-fn guid_is_the_binarys() {
+fn the_guid_equals_that_of_the_binary() {
     assert_eq!(root().get("guid"), Some(TABLE.guid()));
 }
 
 #[test]
-fn start_values_are_the_binarys_to_the_last_bit() {
+fn start_values_equal_those_of_the_binary_to_the_last_bit() {
     let mut fresh = HubSlosh::instance(Interface::CoSimulation);
     let mut count = 0;
     for (variable, kind) in variables() {

@@ -60,7 +60,7 @@ mod tests {
     }
 
     #[test]
-    fn a_slow_spacecraft_has_longer_ones_and_a_fast_sweep_fewer_cycles() {
+    fn a_slow_spacecraft_has_longer_windows_and_a_fast_sweep_fewer_cycles() {
         let slow = Sweep { f0: 0.01, f1: 0.3, duration: 40_000.0, ..Sweep::THESIS };
         let lengths = Lengths::for_record(slow.band(), Some(&slow), 40_000.0, 0.1);
         // 200 s times sqrt(1.25 3.5)/sqrt(0.01 0.3); 10 Hz over 0.3 Hz is 33 samples a cycle

@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn a_circling_force_is_half_off_the_axis_and_a_tangential_one_not_at_all() {
+    fn half_of_a_circling_force_is_off_axis_and_none_of_a_tangential_force() {
         let turn = |k: usize| (k as f64 * std::f64::consts::TAU / 1000.0).sin_cos();
         let (sine, cosine): (Vec<f64>, Vec<f64>) = (0..1000).map(turn).unzip();
         let circle = OffAxis::from_forces(&sine, &cosine, &[3.0, 4.0]);

@@ -104,7 +104,7 @@ mod tests {
     use signals::fourier::Complex64;
 
     #[test]
-    fn a_circle_swirls_by_one_and_a_line_not_at_all() {
+    fn the_swirl_number_is_one_for_a_circle_and_zero_for_a_line() {
         let response = |values: &[Complex64]| FrequencyResponse {
             frequency: vec![2.0; values.len()],
             response: values.to_vec(),

@@ -324,7 +324,7 @@ mod tests {
 
     /// Each to half a unit of the last digit that is known.
     #[test]
-    fn numbers_of_the_thesis_come_out_corrected() {
+    fn numbers_of_the_thesis_are_reproduced_with_their_corrections() {
         for (what, known, digit) in [
             ("7.2.1 Bond number", 902.3, 0.05),
             ("5.1.2", 418.4, 0.05),

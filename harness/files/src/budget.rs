@@ -134,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn jobs_hold_no_more_than_the_budget_together() {
+    fn parallel_jobs_together_stay_within_the_budget() {
         assert_eq!(jobs(8, BYTES / 3).unwrap(), 3);
         assert_eq!(jobs(8, BYTES * 2).unwrap(), 1);
         assert_eq!(jobs(8, 0).unwrap(), 8);

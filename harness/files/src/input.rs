@@ -177,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn messages_lose_the_numbers_of_the_systems_errors() {
+    fn messages_omit_the_numbers_of_system_errors() {
         let missing = format!("a: {}, b", std::io::Error::from_raw_os_error(2));
         assert!(missing.contains("(os error 2)"));
         let words = without_error_numbers(&missing);

@@ -528,7 +528,7 @@ mod tests {
     }
 
     #[test]
-    fn one_program_holds_a_folder_and_the_next_hears_of_it() {
+    fn a_folder_in_use_is_refused_with_the_process_that_holds_it() {
         for kind in KINDS {
             let directory = tempfile::tempdir().unwrap();
             let held = take(directory.path(), kind).unwrap();
@@ -542,7 +542,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stored_run_is_what_was_stored_or_the_manifest_says_so() {
+    fn a_stored_run_that_was_changed_is_found_by_the_manifest() {
         for kind in KINDS {
             let directory = tempfile::tempdir().unwrap();
             let folder = take(directory.path(), kind).unwrap();

@@ -139,7 +139,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_folder_of_a_dead_program_is_swept_and_that_of_a_living_one_is_not() {
+    fn temporary_folders_of_ended_programs_are_removed_and_others_stay() {
         let parent = tempfile::tempdir().unwrap();
         let [dead, living, other] = ["hubslosh-dead", "hubslosh-living", "hubslosh-other"]
             .map(|name| parent.path().join(name));
@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn a_dropped_folder_is_gone() {
+    fn a_dropped_temporary_folder_is_removed() {
         let folder = Folder::new().unwrap();
         let path = folder.path().to_path_buf();
         fs::write(path.join("a"), "a").unwrap();

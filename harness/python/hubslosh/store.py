@@ -47,7 +47,7 @@ def encoded(value: Any) -> Any:
 
 
 def decoded(value: Any) -> float:
-    """Return a number from its JSON."""
+    """Return the number that `encoded` has written as JSON; NaN and infinite ones too."""
     return float(value["float"] if isinstance(value, dict) else value)
 
 

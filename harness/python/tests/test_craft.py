@@ -212,7 +212,7 @@ def test_all_errors_of_a_craft_are_reported_at_once(craft: Craft) -> None:
     assert len(str(craft).splitlines()) <= 10
 
 
-def test_many_fills_are_solved_as_each_is(craft: Craft) -> None:
+def test_many_fills_at_once_are_solved_as_single_fills(craft: Craft) -> None:
     """On all cores in one call, bit for bit; also after a copy to another process."""
     fills = ["20%", ("35%", 0.4), {"ox": (120.0, "kg"), "fuel": 0}, "100%"]
     apart = replace(craft)

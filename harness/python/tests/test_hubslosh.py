@@ -73,7 +73,7 @@ def test_a_missing_fmu_raises_an_error_with_the_way_to_build_it(tmp_path: Path) 
         Plant(tmp_path / "none.fmu")
 
 
-def test_a_file_of_parameters_is_as_good_as_a_mapping(fmu: Path, tmp_path: Path) -> None:
+def test_a_file_of_parameters_equals_a_mapping(fmu: Path, tmp_path: Path) -> None:
     """TOML and SSV, as ``hubslosh tank --parameters`` writes them: the same run to the last bit."""
     start = {"slosh.table.m_liq": 2.0, "slosh.table.mass[1]": 0.5, "slosh.table.length[1]": 0.05}
     start |= {"slosh.source": "table", "init.slosh_angle": 0.1}

@@ -29,7 +29,7 @@ def test_rows_of_the_thesis_do_not_add_up_to_its_total() -> None:
     assert found["share"].sum() == pytest.approx(1)
 
 
-def test_every_shape_is_the_sum_of_its_points() -> None:
+def test_the_inertia_of_every_shape_equals_the_sum_over_its_points() -> None:
     """A body cut into n x n x n points: within 1/n^2 of the closed form, off the axis too."""
     n, mass, at = 60, 3.0, np.array([0.2, -0.1])
     u = (np.arange(n) + 0.5) / n - 0.5
@@ -54,7 +54,7 @@ def test_every_shape_is_the_sum_of_its_points() -> None:
         assert found == pytest.approx(points, rel=1 / n**2), shape
 
 
-def test_imbalance_is_what_gravity_pulls_at_on_a_bench_that_leans(fmu: Path) -> None:
+def test_imbalance_gives_the_gravity_torque_of_a_tilted_bench(fmu: Path) -> None:
     """The FMU's torque of gravity on the dry hub: that on the parts, one by one."""
     parts = {
         "plate": {"mass": 2.0, "box": (0.5, 0.3)},

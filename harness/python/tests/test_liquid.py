@@ -78,7 +78,7 @@ def ritz(surface: tuple[complex, complex], wall: list[tuple[np.ndarray, ...]]) -
         ({"sphere": {"radius": 0.5}}, lambda h: h * h * (3 - 2 * h)),
     ],
 )
-def test_per_cent_of_the_volume_are_the_height_that_holds_them(
+def test_a_fill_in_per_cent_equals_the_height_of_that_volume(
     shape: dict, volume: Callable[[float], float]
 ) -> None:
     """Against closed forms: parts of the volume below a height."""
@@ -87,7 +87,7 @@ def test_per_cent_of_the_volume_are_the_height_that_holds_them(
     assert volume(found.surface) == pytest.approx(0.4, abs=1e-4)
 
 
-def test_an_upright_cylinder_is_its_closed_forms() -> None:
+def test_an_upright_cylinder_equals_its_closed_forms() -> None:
     """λ, mass, bob, wave and inertia to 1e-4: what the issue asks of this path, not its limit."""
     r, h, rho = 0.5, 0.6, 900.0
     found = liquid_modes({"cylinder": {"radius": r, "height": 2}}, h, density=rho, modes=2)
@@ -112,7 +112,7 @@ def test_an_upright_cylinder_is_its_closed_forms() -> None:
     assert abs(found.lid_inertia[2, 2]) < 1e-6 * inertia
 
 
-def test_a_sphere_is_what_the_axisymmetric_solver_gives(
+def test_a_sphere_equals_the_axisymmetric_solver(
     request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Another discretisation, of a curve in place of a volume, whose own error is 1e-9."""
@@ -286,7 +286,7 @@ def test_a_tilted_cylinder_equals_that_of_perturbation_theory() -> None:
     assert across == pytest.approx(0.23149 * slope**2, abs=3e-4)
 
 
-def test_a_solid_of_a_cad_system_is_the_shape_that_it_draws(tmp_path: Path) -> None:
+def test_a_cad_solid_equals_the_shape_that_it_draws(tmp_path: Path) -> None:
     """A box by its dimensions, and the same written as STEP."""
     import gmsh
 

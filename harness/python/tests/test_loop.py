@@ -41,7 +41,7 @@ def test_the_sampled_model_is_exact_at_the_sampling_instants(fmu: Path) -> None:
     assert np.allclose(model.to_control()(z)[1, 0], model.response(f)[:, 1, 0], rtol=1e-9)
 
 
-def test_the_loop_is_a_drive_with_a_held_torque(fmu: Path) -> None:
+def test_a_loop_equals_a_drive_with_a_held_torque(fmu: Path) -> None:
     """The same calls as a run with the torque that the law gave: same bits, whatever the model."""
     parameters = {"slosh.model": "spherical", "init.slosh_angle": (5, "deg")}
     seen = []

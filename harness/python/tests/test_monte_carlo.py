@@ -154,7 +154,7 @@ def test_a_refused_run_is_a_row_and_a_programming_error_ends_the_study(
         assert part in str(error.value), part
 
 
-def test_quantiles_have_intervals_that_hold_as_often_as_they_say() -> None:
+def test_intervals_of_quantiles_have_their_stated_coverage() -> None:
     """Over 600 samples of 50: the interval of a median then holds in 96.7 %, ± 0.7 %."""
     random = np.random.default_rng(1)
     inside = 0

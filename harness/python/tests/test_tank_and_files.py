@@ -30,7 +30,7 @@ def program(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> 
     return path
 
 
-def test_a_tank_is_what_the_command_line_gives(program: Path, tmp_path: Path) -> None:
+def test_tank_equals_the_command_line(program: Path, tmp_path: Path) -> None:
     """The same file, fill and modes: result, picture and parameters."""
     file = ROOT / "harness" / "tank" / "examples" / "capsule.toml"
     mine = tank(file, fill="40%", modes=2, gravity=3.0, nu=1e-6)

@@ -225,7 +225,7 @@ mod tests {
     /// another kind. (1, 0), (2, 1) ends with the slope (1, 1), so the next control point is (3, 2). Horizontal and
     /// vertical lines keep the other coordinate. The test covers absolute and relative commands, with y down.
     #[test]
-    fn short_commands_of_a_path_are_the_long_ones() {
+    fn short_svg_commands_equal_the_long_ones() {
         let read = |path: &str| segments(path, 0.5).unwrap();
         let start = "M 1 5 ";
         for (short, long) in [

@@ -146,7 +146,7 @@ fn ranges(k: f64, thrust: f64, angle: f64) -> Ranges {
 
 /// Wave over radius is 0.837 of the angle: 0.15 at 0.179 rad, 0.25 at 0.299.
 #[test]
-fn regimes_end_at_waves_of_0_15_and_0_25_radii_and_a_pushed_back_tank_is_out_of_range() {
+fn regimes_end_at_waves_of_0_15_and_0_25_radii_and_reversed_thrust_is_out_of_range() {
     let seen = [0.0, 0.178, 0.181, 0.297, 0.301, 0.8, 3.0].map(|angle| ranges(0.0, 2000.0, angle));
     use Regime::{Linear, Nonlinear, Transitional};
     let expected = [

@@ -112,7 +112,7 @@ fn a_jump_of_the_wheels_keeps_momentum_and_energy_of_a_draining_craft() {
 
 /// The table bounds the mass of liquid that a host integrates.
 #[test]
-fn liquids_beyond_their_tables_are_refused() {
+fn liquid_masses_beyond_the_fill_table_are_refused() {
     let mut random = Random::new(1);
     let mut p = Parameters { tanks: 2, ..random.parameters() };
     p.tank[1] = draining_tank(&mut random, 1);

@@ -188,7 +188,7 @@ fn negative_rigid_mass_is_allowed_with_planar_modes_if_the_total_inertia_is_posi
 /// 10 kg of craft carry a box whose m_0 is -120 kg: at rest both modes carry the craft along the axis, at 90 degrees none does.
 /// Earlier versions found the craft regular and its inputs wrong once it moved. A craft in which the rigid part is enough is accepted.
 #[test]
-fn a_craft_that_is_singular_only_beyond_the_range_of_its_modes_is_allowed() {
+fn a_craft_with_a_singular_mass_matrix_only_beyond_the_range_of_its_modes_is_allowed() {
     let light = |mass: f64| {
         let mut p = craft(a_box());
         p.craft.mass = mass;
@@ -210,7 +210,7 @@ fn a_craft_that_is_singular_only_beyond_the_range_of_its_modes_is_allowed() {
 
 /// A craft without inertia about its own axis has that of the liquid in a tank off the axis, but not while the liquid flies.
 #[test]
-fn a_craft_that_is_singular_without_its_liquid_is_refused_where_the_liquid_may_leave() {
+fn a_craft_with_a_singular_mass_matrix_without_liquid_is_refused_if_the_liquid_may_detach() {
     let mut p = Parameters::default();
     p.craft.r = [0.0; 3];
     p.craft.j = Inertia { xx: 900.0, yy: 900.0, zz: 0.0, xy: 0.0, xz: 0.0, yz: 0.0 };

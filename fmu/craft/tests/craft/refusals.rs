@@ -134,7 +134,7 @@ fn an_initial_velocity_is_refused_only_on_a_pivot() {
 
 /// Each pair of axes alone: |J_ij|^2 up to J_ii J_jj. A rod has exactly that: J = (0, 1, 1) along x, turned.
 #[test]
-fn products_of_inertia_need_moments_to_match() {
+fn products_of_inertia_need_moments_of_inertia_large_enough() {
     let with = |[xx, yy, zz, xy, xz, yz]: [f64; 6]| {
         let mut p = craft();
         p.craft.j = Inertia { xx, yy, zz, xy, xz, yz };
@@ -190,7 +190,7 @@ fn products_of_inertia_need_moments_to_match() {
 
 /// (2 pi f)^2 = g/l + k/m needs f above the stiffness's own frequency.
 #[test]
-fn a_frequency_must_leave_a_length() {
+fn a_slosh_frequency_must_give_a_pendulum_length() {
     let mut p = craft();
     let tank = &mut p.tank[0];
     (tank.mass[0], tank.k[0]) = (100.0, 400.0); // 2 rad/s alone
@@ -258,7 +258,7 @@ fn a_host_without_inertia_about_an_axis_is_refused() {
 
 /// Numbers that would be refused, or divided by, in a tank in use.
 #[test]
-fn unused_tanks_points_and_modes_are_never_evaluated() {
+fn unused_tanks_modes_and_table_points_are_never_evaluated() {
     let step = |p: &Parameters| {
         let mut craft = Spacecraft::new(p, &Inputs::default(), 0.0, 1e-8).unwrap();
         craft.step(&Inputs::default(), 0.5).unwrap();

@@ -285,7 +285,7 @@ fn predicted_growth(z: f64) -> f64 {
 
 /// Growth rates worked out apart from this code, five digits.
 #[test]
-fn growth_of_the_slosh_pole_in_an_attitude_loop_is_as_given() {
+fn the_growth_rate_of_the_slosh_pole_in_an_attitude_loop_equals_the_analytic_one() {
     for (z, expected) in [
         (-1.60, -3.1726e-2),
         (-0.45, -7.9994e-3),
@@ -341,7 +341,7 @@ fn damping_that_stabilises_is_predicted_to_5_percent() {
 /// A prolate spinner with liquid at +-x: its nutation grows by what the liquid dissipates. The
 /// eigenvalue, from a linearisation apart from this code: 0.002551418 +- 0.468308812 i.
 #[test]
-fn nutation_of_a_prolate_spinner_grows_at_the_given_rate() {
+fn nutation_of_a_prolate_spinner_grows_at_the_analytic_rate() {
     let mut p = parameters(&record("spinner"));
     p.init.omega = [0.0, 0.0, 1.1];
     let u = Inputs::default();

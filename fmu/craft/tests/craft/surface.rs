@@ -47,7 +47,7 @@ fn frequencies_shift_as_s_and_kappa_predict_up_to_fourth_order() {
 
 /// One step ends where its pieces do, and where Runge-Kutta's does on the tank's own derivatives.
 #[test]
-fn a_tank_s_motion_does_not_depend_on_its_steps() {
+fn the_motion_of_a_tank_does_not_depend_on_the_communication_step() {
     for seed in 0..8 {
         let mut random = Random::new(seed);
         let mut p = TankParameters { tank: random.tank(), ..TankParameters::default() };
@@ -393,7 +393,7 @@ fn drag_acts_on_the_whole_kinetic_energy() {
 /// A wave does not feel a tank that turns about its axis: with and without the turn the bob is at the same place in inertial
 /// axes, and the tank gets no torque about the axis.
 #[test]
-fn a_wave_in_a_tank_that_turns_about_its_axis_stays_the_same() {
+fn a_wave_is_unchanged_in_a_tank_that_turns_about_its_axis() {
     let mut tank = bench(0.5);
     [tank.nonlinear_inertia[0], tank.nonlinear_inertia_2[0]] = [3.02, -0.65];
     [tank.nonlinear_stiffness[0], tank.nonlinear_stiffness_2[0]] = [4.11, -6.6];

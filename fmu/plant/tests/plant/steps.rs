@@ -36,7 +36,7 @@ fn steps(p: &Parameters, inputs: &Inputs, tolerance: f64, h: f64) -> usize {
 }
 
 #[test]
-fn states_are_as_exact_as_the_tolerance_says() {
+fn errors_of_states_stay_within_the_solver_tolerance() {
     for slosh in SloshModel::ALL {
         for friction in FrictionModel::ALL {
             let (p, inputs) = start(slosh, friction);

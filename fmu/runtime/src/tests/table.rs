@@ -133,7 +133,7 @@ fn a_units_exponents_follow_from_its_name() {
 }
 
 #[test]
-fn display_units_are_what_people_read() {
+fn display_units_are_common_units() {
     let of = |name: &str| unit::find(name).unwrap().display_units;
     assert_eq!(of("m"), [("mm", 1e3)]);
     for (turn, name) in [(360.0, "deg/s"), (3600.0 * 360.0, "deg/h"), (60.0, "rpm")] {
@@ -242,7 +242,7 @@ fn inputs_that_do_not_stand_together_are_refused() {
 
 /// Only the description with arrays names the parameters that determine their sizes.
 #[test]
-fn token_with_arrays_changes_with_what_sizes_them() {
+fn token_with_arrays_changes_with_structural_parameters() {
     let tokens = |shape: &'static [Dimension]| {
         let mut variables = TABLE.variables.to_vec();
         variables[0] = variables[0].shape(shape);

@@ -274,7 +274,7 @@ fn counts_types_and_references_are_checked_before_anything_is_written() {
 }
 
 #[test]
-fn time_is_a_variable_behind_the_table_s() {
+fn time_is_a_variable_after_those_of_the_table() {
     let (instance, _host) = stepping(false);
     let (mut time, reference) = (0.0, time_reference::<Spring>());
     step(instance, 0.0, 0.125);

@@ -26,7 +26,7 @@ fn features(directory: &Path) -> Vec<std::collections::HashMap<String, String>> 
 }
 
 #[test]
-fn with_viscous_friction_the_dip_is_where_the_exact_transfer_function_has_it() {
+fn with_viscous_friction_the_antiresonance_equals_that_of_the_exact_transfer_function() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     for sweep in ["exponential", "linear"] {
@@ -49,7 +49,7 @@ fn with_viscous_friction_the_dip_is_where_the_exact_transfer_function_has_it() {
 }
 
 #[test]
-fn files_have_the_names_and_columns_others_build_on_and_a_second_start_finds_them() {
+fn campaign_files_keep_their_names_and_columns_and_are_reused() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let short = ["--fills", "0.1", "--amplitudes", "0.0125,0.25"];

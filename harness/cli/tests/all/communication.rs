@@ -125,7 +125,7 @@ fn a_sine_of_49_hz_in_a_file_acts_with_any_step() {
 }
 
 #[test]
-fn profiles_act_with_any_step() {
+fn profiles_act_the_same_with_any_output_step() {
     let folder = tempfile::tempdir().unwrap();
     let follows = |profile: &str, integral: &dyn Fn(f64) -> f64, within: f64| {
         follows(folder.path(), &["--profile", profile], integral, within);

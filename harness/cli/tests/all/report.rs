@@ -57,7 +57,7 @@ fn spread(values: &[f64]) -> f64 {
 }
 
 #[test]
-fn a_linear_liquid_keeps_dip_and_peak_from_0_05_newton_metres_on() {
+fn a_linear_liquid_keeps_antiresonance_and_resonance_from_0_05_newton_metres_on() {
     let (_, swept, spa) = &*TEN;
     for table in [swept, spa] {
         for name in ["f_dip_hz", "f_res_hz"] {
@@ -75,7 +75,7 @@ fn a_linear_liquid_keeps_dip_and_peak_from_0_05_newton_metres_on() {
 }
 
 #[test]
-fn a_spherical_liquid_softens_in_its_plane_and_turns_from_0_15_newton_metres_on() {
+fn a_spherical_liquid_softens_in_planar_slosh_and_becomes_rotary_from_0_15_newton_metres_on() {
     let (_, swept, spa) = &*TEN;
     let of = |name| figure(swept, "spherical", name);
     let resonance = of("f_res_hz");
@@ -99,7 +99,7 @@ fn a_spherical_liquid_softens_in_its_plane_and_turns_from_0_15_newton_metres_on(
 }
 
 #[test]
-fn at_5_cm_the_liquid_turns_from_0_125_newton_metres_on() {
+fn at_5_cm_rotary_slosh_begins_at_0_125_newton_metres() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let vary = "[vary]\nslosh.model = [\"spherical\"]\ntank.h = [0.05]\nprofile.amplitude = [0.1, 0.125]\n";

@@ -555,7 +555,7 @@ mod tests {
     use super::{CURVES, keeps_curves};
 
     #[test]
-    fn the_runs_with_curves_are_all_or_spread_over_the_plan_and_never_many() {
+    fn reports_keep_the_curves_of_a_limited_number_of_runs() {
         for runs in [1, 2, CURVES - 1, CURVES, CURVES + 1, 2 * CURVES + 7, 100_000] {
             let kept: Vec<usize> = (0..runs).filter(|i| keeps_curves(*i, runs)).collect();
             assert!(kept.len() <= CURVES + 1, "{runs}: {}", kept.len());

@@ -143,7 +143,7 @@ mod tests {
     use super::{Dwell, Found, WITHIN, search};
 
     #[test]
-    fn the_onset_is_the_tip_of_the_range_of_rotary_slosh() {
+    fn the_onset_is_the_smallest_torque_with_rotary_slosh() {
         // a leaning tongue: from 0.06 N·m at 2.4 Hz, wider with the torque
         let dwell = |frequency: f64, torque: f64| {
             let (low, high) = (2.4 - 0.8 * (torque - 0.06), 2.4 + 0.3 * (torque - 0.06));

@@ -333,7 +333,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sweep_is_found_by_a_clock_that_is_off_and_over_lost_rows() {
+    fn a_sweep_is_found_despite_clock_errors_and_lost_rows() {
         let sweep = Sweep::THESIS;
         let sought = Sought { step: 0.02, span: (0.0, 2700.0), sweep: &sweep };
         for (rate, begins) in [(5e-5, 5.13), (-3e-4, 5.13), (1e-3, 0.0), (3e-4, -400.0)] {

@@ -983,7 +983,7 @@ mod tests {
     }
 
     #[test]
-    fn an_unknown_plan_brings_the_built_in_ones() {
+    fn an_unknown_plan_lists_the_built_in_ones() {
         let error = Plan::read("thesis_model").unwrap_err().to_string();
         assert!(error.contains("did you mean \"thesis_models\""), "{error}");
     }

@@ -578,7 +578,7 @@ mod tests {
     }
 
     #[test]
-    fn edges_are_rows_wherever_they_lie() {
+    fn edges_of_a_profile_are_rows_at_their_exact_times() {
         let text = "bang-stop-bang:amplitude=0.1,start=0.1,bang=0.3,stop=0.5,duration=2";
         let torque = Torque::Profile(text.parse().unwrap());
         let history = torque.history(0.02, 2.0, false).unwrap();

@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn a_seed_is_one_noise_and_another_seed_another() {
+    fn noise_depends_on_its_seed() {
         let of = |seed| Noise::new(0.05, (1.25, 3.5), 0.0, seed, 0.26);
         assert_eq!(of(1), of(1));
         let (a, b) = (samples(&of(1), 10.0, 0.1), samples(&of(2), 10.0, 0.1));

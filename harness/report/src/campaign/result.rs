@@ -519,7 +519,7 @@ mod tests {
     }
 
     #[test]
-    fn swirl_that_ends_again_is_between() {
+    fn rotary_slosh_that_ends_again_is_stated_between_two_torques() {
         let points = [
             (1.0, 2.0, 3.0, false),
             (2.0, 2.0, 3.0, true),

@@ -567,7 +567,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_index_of_a_variable_is_no_unit() {
+    fn an_index_of_a_variable_is_not_read_as_a_unit() {
         for name in ["omega[1]", "torque[3]", "q[4]", "tank[1].p[1,2]", "data(3)"] {
             for quantity in Quantity::ALL {
                 let found = find_unit(name, quantity.dimension());

@@ -202,7 +202,7 @@ fn impossible_fills_are_described() {
 /// A gap of 1e-6 of the size is closed, and a free surface within 1e-6 of a shoulder is refused: of the tank's own size. The
 /// largest is 100 m.
 #[test]
-fn small_tanks_and_large_ones_are_judged_alike() {
+fn checks_of_contours_do_not_depend_on_the_size_of_the_tank() {
     for c in [0.01, 1.0, 50.0] {
         let parsed = |gap: f64| {
             let text = format!(
@@ -339,7 +339,7 @@ fn table_and_file_state_where_heights_count_from() {
 
 /// The whole tank is drawn once and cut at any fill; it equals the contour drawn to that fill.
 #[test]
-fn a_tank_is_cut_at_its_fill() {
+fn the_wetted_contour_ends_at_the_fill() {
     let whole = solve("shape = { torus = { ring_radius = 1.0, tube_radius = 0.4 } }", 0.5, 3);
     // asin(0.25) = 14.4775 degrees above the equator on both sides
     let angle = 0.25f64.asin().to_degrees();
@@ -686,7 +686,7 @@ fn a_table_at_0_gravity_says_that_frequencies_are_0_where_there_are_any() {
 
 /// Wherever the drawing's zero is, a metre of height is one.
 #[test]
-fn a_tank_drawn_far_above_its_zero_is_no_large_one() {
+fn a_tank_drawn_far_above_its_zero_does_not_count_as_large() {
     let far = solve("profile = [{ line = [0, 80, 1, 80] }, { line = [1, 80, 1, 81] }]", 0.5, 1);
     assert!((far.m_liq / (500.0 * core::f64::consts::PI) - 1.0).abs() < 1e-12);
 }

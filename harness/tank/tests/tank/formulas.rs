@@ -73,7 +73,7 @@ fn laminar_layer_is_the_known_one_in_cylinder_and_box() {
 
 /// Sphere: both branches meet at half full; 2 to 4.5 laminar layers up to there.
 #[test]
-fn sphere_is_continuous_and_flags_its_ends() {
+fn damping_of_a_sphere_is_continuous_and_names_the_ends_of_its_range() {
     let zeta = |x: f64| damping::sphere(0.1, 0.1 * x, 1e-6, 9.81);
     assert!((zeta(1.0 - 1e-9).zeta / zeta(1.0 + 1e-9).zeta - 1.0).abs() < 1e-8);
     for x in [0.3, 0.6, 1.0] {
@@ -598,7 +598,7 @@ fn a_ring_in_any_tank_covers_a_part_of_the_section_at_its_own_depth() {
 
 /// If the words on a correlation's damping name the other estimate, they state its number, to three digits at least.
 #[test]
-fn the_words_of_a_damping_have_the_number_that_was_not_taken() {
+fn the_description_of_a_damping_ratio_names_the_value_that_was_not_used() {
     let number = |taken: &str, before: &str| -> f64 {
         let Some((_, rest)) = taken.split_once(before) else { panic!("{taken}") };
         let end = rest.find(|c: char| !"0123456789.e-".contains(c)).unwrap_or(rest.len());
@@ -726,7 +726,7 @@ fn a_box_with_two_lengths_has_planar_modes_that_keep_mass_centre_and_inertia() {
 /// A spheroid almost as high as it is wide. Up to a fifth of the difference is its distance from the sphere through
 /// bottom and contact line. The test covers the size of a model and of a launcher.
 #[test]
-fn a_drawing_is_a_shape_to_a_millionth_of_its_size() {
+fn a_drawing_counts_as_a_shape_within_a_millionth_of_its_size() {
     for size in [1.0 / 64.0, 16.0] {
         for (off, shape) in [(0.8e-6, "sphere"), (2e-5, "other")] {
             let wide = size * (1.0 + off);

@@ -146,7 +146,7 @@ fn a_cone_of_45_degrees_has_one_mode() {
 
 /// The fixed mass is positive for any number of modes: it is the added mass with pressure 0 on the surface.
 #[test]
-fn rest_is_positive_for_any_number_of_modes() {
+fn rigid_liquid_is_positive_for_any_number_of_modes() {
     for case in reference() {
         let data = tank(&toml(&case)).solve(case["fill"].as_f64().unwrap(), 20).unwrap();
         for modes in 0..=20 {

@@ -25,7 +25,7 @@ fn the_documentation_s_figure_is_the_one_that_is_drawn() {
 
 /// A tank with a dome, its modes and its sweep, as somebody has looked at them.
 #[test]
-fn a_tank_and_its_sweep_look_as_before() {
+fn pictures_of_a_tank_and_its_sweep_are_unchanged() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/common_bulkhead.toml");
     let tank = Tank::read(&path).unwrap();
     let depth = tank.depth().unwrap();
