@@ -341,10 +341,13 @@ def slow_clipped_gyro(setup: Setup, random: Generator, _: float) -> None:
 
 
 def wrong_fill(option: str, known: str) -> Callable[[Setup, Generator, float], None]:
-    """Return a change that states a fill 10 % too high."""
+    """Return a change that states a fill 50 % too high.
+
+    Much smaller errors are no misfit: the torque's tolerance of 1 % is 5 to 9 % of the fill.
+    """
 
     def change(setup: Setup, *_: object) -> None:
-        setup.arguments += [option, f"tank.h={1.1 * setup.parameters['tank.h']:.5f}{known}"]
+        setup.arguments += [option, f"tank.h={1.5 * setup.parameters['tank.h']:.5f}{known}"]
 
     return change
 
