@@ -10,14 +10,14 @@ use crate::curve::Segment;
 use crate::gauss::Gauss;
 use crate::modal::{Axes, Axis, ModalData, Mode, Surface, WallSpeed, rest};
 
-/// Number of terms in the sums over all modes; [`tail`] estimates the remaining terms.
+/// Number of terms in the sums over all modes; [`tail`] estimates the rest of the sum.
 const TERMS: usize = 400;
-/// Error of the closed forms: the tails of the sums and rounding.
+/// Error of the closed forms from the tails of the sums and from rounding.
 const ERROR: f64 = 1e-11;
 
-/// Returns the sum of tanh(k h/2)/k^5 over the wave numbers beyond `last`, `step` apart, by the midpoint rule in
-/// reverse, (1/step) int dk, with u = 1/k. The terms fall as k^-5 for large k h and as k^-4 for small k h. In shallow
-/// liquid the terms after 400 add 4e-10 m R^2.
+/// Returns the sum of tanh(k h/2)/k^5 over the wave numbers beyond `last`, `step` apart, by the midpoint rule
+/// in reverse, (1/step) int dk, with u = 1/k. The terms fall as k^-5 for large k h and as k^-4 for small k h.
+/// In shallow liquid the terms after 400 add 4e-10 m R^2.
 fn tail(last: f64, step: f64, h: f64) -> f64 {
     let end = 1.0 / (last + 0.5 * step);
     let rule = Gauss::new(20);
@@ -33,8 +33,7 @@ fn y1_slope(x: f64) -> f64 {
     libm::y0(x) - libm::y1(x) / x
 }
 
-/// Returns the first `count` zeros xi_n of J1', by Newton's method (J1'' = -J1'/x - (1 - 1/x^2)
-/// J1).
+/// Returns the first `count` zeros xi_n of J1', by Newton's method with J1'' = -J1'/x - (1 - 1/x^2) J1.
 pub fn zeros_of_j1_slope(count: usize) -> Vec<f64> {
     let zero = |n: usize| {
         // McMahon: b - 7/(8 b), b = (n - 1/4) pi (DLMF 10.21.20)
@@ -49,8 +48,8 @@ pub fn zeros_of_j1_slope(count: usize) -> Vec<f64> {
     (1..=count).map(zero).collect()
 }
 
-/// Returns a mode of a tank with vertical walls and a flat bottom: lambda = k tanh(k h), bob at h -
-/// (2/k) tanh(k h/2), with the wave number k.
+/// Returns a mode with the wave number k, 1/m, of a tank with vertical walls and a flat bottom: lambda = k
+/// tanh(k h), and its bob is at the height h - (2/k) tanh(k h/2).
 fn upright_mode(n: usize, k: f64, h: f64, m: f64, m_liq: f64, surface: Surface, beta: f64) -> Mode {
     let lambda = k * (k * h).tanh();
     let height = h - 2.0 / k * (0.5 * k * h).tanh();
@@ -65,8 +64,8 @@ fn upright_mode(n: usize, k: f64, h: f64, m: f64, m_liq: f64, surface: Surface, 
     )
 }
 
-/// Returns the shape of a mode of wave number k, sampled over the surface, and its speed along the
-/// outer wall: sinh(k z)/sinh(k h).
+/// Returns the shape of a mode of wave number k, sampled over the surface, and its speed along the outer
+/// wall, sinh(k z)/sinh(k h).
 fn sampled([inner, outer]: [f64; 2], k: f64, h: f64, elevation: impl Fn(f64) -> f64) -> Surface {
     let count = 200;
     let radius = |i: usize| inner + (outer - inner) * i as f64 / count as f64;
@@ -85,13 +84,10 @@ fn sampled([inner, outer]: [f64; 2], k: f64, h: f64, elevation: impl Fn(f64) -> 
     }
 }
 
-/// Ratios such as sinh(x)/cosh(y) for 0 <= x <= 2 y without overflow: values over cosh(kh)^2.
+/// Ratios such as sinh(x)/cosh(y) for 0 <= x <= 2 y without overflow: all values are over cosh(kh)^2.
 struct Hyperbolic {
-    /// 1/cosh(kh)^2
     floor: f64,
-    /// sinh(2 kh)/(4 k cosh(kh)^2) = tanh(kh)/(2 k)
     half_tanh: f64,
-    /// h/(2 cosh(kh)^2)
     half_height: f64,
 }
 
@@ -105,9 +101,11 @@ impl Hyperbolic {
 
 /// Solves an upright circular cylinder of radius `radius` filled to `h`, m; `rho` in kg/m³.
 ///
-///   m_n/m_liq = 2 R tanh(kh)/(xi (xi^2 - 1) h),  k = xi/R,  wave 2 R/(xi^2 - 1)
-///   I_eff/m_liq = h^2/12 - 3 R^2/4 + (16 R^3/h) sum tanh(k h/2)/(xi^3 (xi^2 - 1))
-///   beta R = (xi^2 + 1)/(xi^2 - 1) + 2 xi (1 - h/R)/sinh(2 xi h/R)   (Case and Parkinson 1957)
+/// ```text
+/// m_n/m_liq = 2 R tanh(kh)/(xi (xi^2 - 1) h), k = xi/R, wave 2 R/(xi^2 - 1)
+/// I_eff/m_liq = h^2/12 - 3 R^2/4 + (16 R^3/h) sum tanh(k h/2)/(xi^3 (xi^2 - 1))
+/// beta R = (xi^2 + 1)/(xi^2 - 1) + 2 xi (1 - h/R)/sinh(2 xi h/R) (Case and Parkinson 1957)
+/// ```
 pub fn cylinder(radius: f64, h: f64, rho: f64, modes: usize) -> ModalData {
     let (r, m_liq) = (radius, rho * PI * radius * radius * h);
     let xi = zeros_of_j1_slope(TERMS.max(modes));
@@ -134,7 +132,7 @@ pub fn cylinder(radius: f64, h: f64, rho: f64, modes: usize) -> ModalData {
     upright([0.0, r], h, rho, m_liq, inertias, (0..modes).map(of_mode).collect(), wall)
 }
 
-/// Returns the zeros k of C'(R_i), C(r) = J1(k r) Y1'(k R) - Y1(k r) J1'(k R), 1/m.
+/// Returns the first `count` zeros k, 1/m, of C'(R_i) with C(r) = J1(k r) Y1'(k R) - Y1(k r) J1'(k R).
 pub fn annular_wave_numbers(inner: f64, outer: f64, count: usize) -> Vec<f64> {
     let slope = |k: f64| {
         j1_slope(k * inner) * y1_slope(k * outer) - y1_slope(k * inner) * j1_slope(k * outer)
@@ -167,8 +165,10 @@ pub fn annular_wave_numbers(inner: f64, outer: f64, count: usize) -> Vec<f64> {
 
 /// Solves an upright annular cylinder between the radii `inner` and `outer`, filled to `h`, m.
 ///
-///   A = [r C]/k^2,  N = [(r^2 - 1/k^2) C^2]/2  (from R_i to R),  m_n = rho pi lambda A^2/N
-///   I_eff = rho pi {(R^2 - R_i^2) h^3/12 - (3/4) h (R^4 - R_i^4) + sum (8 A^2/(N k)) tanh(k h/2)}
+/// ```text
+/// A = [r C]/k^2, N = [(r^2 - 1/k^2) C^2]/2 (from R_i to R), m_n = rho pi lambda A^2/N
+/// I_eff = rho pi {(R^2 - R_i^2) h^3/12 - (3/4) h (R^4 - R_i^4) + sum (8 A^2/(N k)) tanh(k h/2)}
+/// ```
 pub fn annulus(inner: f64, outer: f64, h: f64, rho: f64, modes: usize) -> ModalData {
     let (ri, ro) = (inner, outer);
     let area = ro * ro - ri * ri;
@@ -230,8 +230,8 @@ pub fn annulus(inner: f64, outer: f64, h: f64, rho: f64, modes: usize) -> ModalD
     upright([ri, ro], h, rho, m_liq, inertias, (0..modes).map(of_mode).collect(), wall)
 }
 
-/// Returns the result for a tank of revolution with vertical walls; `inertias` are rigid across and
-/// about the axis, and effective.
+/// Returns the result for a tank of revolution with vertical walls; `inertias` are rigid across and about the
+/// axis, and effective.
 fn upright(
     [r_inner, r_outer]: [f64; 2],
     h: f64,
@@ -252,9 +252,11 @@ fn upright(
 
 /// Solves a box, `length` along the motion and `width` across it, filled to `h`, m, along one axis.
 ///
-///   k = (2 n - 1) pi/a,  m_n/m_liq = 8 tanh(kh)/(a^2 h k^3),  wave 4/(a k^2)
-///   I_eff/m_liq = h^2/12 - a^2/4 + (64/(a^2 h)) sum tanh(k h/2)/k^5
-///   beta = 2/a + 2/w + 2 k (1 - 2 h/a)/sinh(2 k h)                  (Keulegan 1959)
+/// ```text
+/// k = (2 n - 1) pi/a, m_n/m_liq = 8 tanh(kh)/(a^2 h k^3), wave 4/(a k^2)
+/// I_eff/m_liq = h^2/12 - a^2/4 + (64/(a^2 h)) sum tanh(k h/2)/k^5
+/// beta = 2/a + 2/w + 2 k (1 - 2 h/a)/sinh(2 k h) (Keulegan 1959)
+/// ```
 pub fn box_axis(length: f64, width: f64, h: f64, rho: f64, modes: usize) -> Axis {
     let a = length;
     let m_liq = rho * a * width * h;
@@ -281,9 +283,8 @@ pub fn box_axis(length: f64, width: f64, h: f64, rho: f64, modes: usize) -> Axis
     }
 }
 
-/// Returns the effective inertia per mass of a full rectangle a x b that rotates in its plane about
-/// its centre: b^2/12 - a^2/4 + (64/(a^2 b)) sum tanh(k b/2)/k^5, k = (2 n - 1) pi/a. It is
-/// symmetric in a and b.
+/// Returns the effective inertia per mass of a full rectangle a x b that rotates in its plane about its
+/// centre: b^2/12 - a^2/4 + (64/(a^2 b)) sum tanh(k b/2)/k^5, k = (2 n - 1) pi/a. It is symmetric in a and b.
 fn effective(a: f64, b: f64) -> f64 {
     let sum: f64 = (0..TERMS)
         .map(|n| {
@@ -295,14 +296,12 @@ fn effective(a: f64, b: f64) -> f64 {
     b * b / 12.0 - 0.25 * a * a + 64.0 / (a * a * b) * sum
 }
 
-/// Returns the inertia of the liquid that rotates with a box of `length_x` x `length_y` about its
-/// vertical axis, filled to `h`, kg·m²: `tank.I_own` in HubSlosh. The twisting modes of the surface
-/// count as rigid.
+/// Returns the inertia of the liquid that rotates with a box of `length_x` x `length_y` about its vertical
+/// axis, filled to `h`, kg·m²: `tank.I_own` in HubSlosh. The twisting modes of the surface count as rigid.
 pub fn box_yaw_inertia(length_x: f64, length_y: f64, h: f64, rho: f64) -> f64 {
     rho * length_x * length_y * h * effective(length_x, length_y)
 }
 
-/// Solves a box of `length_x` x `length_y`, filled to `h`, m.
 pub fn rectangular(length_x: f64, length_y: f64, h: f64, rho: f64, modes: usize) -> ModalData {
     let x = box_axis(length_x, length_y, h, rho, modes);
     let y = box_axis(length_y, length_x, h, rho, modes);

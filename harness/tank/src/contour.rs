@@ -7,14 +7,13 @@ use core::fmt;
 use crate::curve::{Curve, Point, Segment, cross, dot, norm, sub};
 use crate::gauss::Gauss;
 
-/// All problems of an input, one sentence each.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Problems(pub Vec<String>);
 
-/// Largest file of a tank or of a drawing, bytes.
 const LARGEST_FILE: u64 = 64 << 20;
 
-/// Reads the text of a regular file. A named pipe could block, and a device may never end. Errors do not name the file.
+/// Reads the text of a regular file, because a named pipe could block and a device may never end. Errors do
+/// not name the file.
 pub(crate) fn read_text(path: &Path) -> Result<String, Problems> {
     let problem = |why: String| Problems::from(format!("it cannot be read: {why}"));
     let about = std::fs::metadata(path).map_err(|error| problem(error.to_string()))?;
@@ -45,12 +44,11 @@ impl From<String> for Problems {
 pub(crate) const LARGEST: f64 = 100.0;
 /// Largest distance of the ends of two segments that are joined, over the tank's size.
 const JOINED: f64 = 1e-6;
-/// Largest difference of equal heights, over the tank's size.
 const LEVEL: f64 = 1e-9;
 
-/// The generating curve of a whole tank in the half plane (r, z), lengths in m. It runs from the
-/// axis, or from the top of an inner wall, along the bottom and up the outer wall to its top, with
-/// r to the right and z up, counter-clockwise around the liquid.
+/// The generating curve of a whole tank in the half plane (r, z), lengths in m. It runs from the axis, or
+/// from the top of an inner wall, along the bottom and up the outer wall to its top, with r to the right and
+/// z up, counter-clockwise around the liquid.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Contour {
     segments: Vec<Segment>,
@@ -59,26 +57,22 @@ pub struct Contour {
     size: f64,
 }
 
-/// The wetted part of a contour.
+/// The wetted part of a contour: its segments from the axis or the inner contact line to the outer contact
+/// line, the outer and inner radius of the free surface, m (the inner one is 0 if the surface reaches the
+/// axis), and the height of the surface, m, from the contour's own zero.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Wall {
-    /// Segments from the axis or the inner contact line to the outer contact line.
     pub segments: Vec<Segment>,
-    /// Outer radius of the free surface, m.
     pub r_outer: f64,
-    /// Inner radius of the free surface, m; 0 if it reaches the axis.
     pub r_inner: f64,
-    /// Height of the free surface, m, from the contour's own zero.
     pub z_surface: f64,
 }
 
-/// Distance from the free surface, over the tank's size, within which a horizontal part of the wall
-/// is refused.
+/// Distance from the free surface, over the tank's size, within which a horizontal part of the wall is
+/// refused.
 const SHOULDER: f64 = 1e-6;
-/// Smallest allowed sine of the wall's angle with the free surface.
 const STEEP: f64 = 1e-3;
 
-/// Crossing of a contour with a height.
 #[derive(Clone, Copy, Debug)]
 struct Crossing {
     segment: usize,
@@ -87,10 +81,9 @@ struct Crossing {
 }
 
 impl Contour {
-    /// Checks the segments.
+    /// Creates a contour from its segments.
     ///
-    /// # Errors
-    /// All defects: values that are not finite, radii below 0, segments without length, gaps,
+    /// # Errors All defects: values that are not finite, radii below 0, segments without length, gaps,
     /// self-crossing, clockwise order, a size above 100 m.
     pub fn new(segments: Vec<Segment>) -> Result<Contour, Problems> {
         let mut problems = Vec::new();
@@ -166,12 +159,10 @@ impl Contour {
         Ok(Contour { segments: from_the_top(segments, size), bottom, top, size })
     }
 
-    /// Returns all segments in the order of the contour.
     pub fn segments(&self) -> &[Segment] {
         &self.segments
     }
 
-    /// Returns the height of the lowest point, m, from the contour's own zero.
     pub fn bottom(&self) -> f64 {
         self.bottom
     }
@@ -191,7 +182,7 @@ impl Contour {
         outline.points.iter().flatten().map(|p| p[0]).fold(0.0, f64::max)
     }
 
-    /// Returns the largest fill, m above the lowest point: the end of the outer wall.
+    /// Returns the largest fill, m above the lowest point, which is the end of the outer wall.
     pub fn depth(&self) -> f64 {
         let end = self.segments[self.segments.len() - 1].end();
         let start = self.segments[0].start();
@@ -292,13 +283,12 @@ impl Contour {
         pieces
     }
 
-    /// Returns the volume of the whole tank up to the largest fill, m3.
     pub fn capacity(&self) -> f64 {
         self.volume_below(self.depth())
     }
 
-    /// Returns the fill, m above the lowest point, below which the tank has this volume, m3. Returns 0 for no volume,
-    /// and the largest fill for the tank's whole volume and more.
+    /// Returns the fill, m above the lowest point, below which the tank has this volume, m3. Returns 0 for no
+    /// volume, and the largest fill for the tank's whole volume and more.
     pub(crate) fn fill_from_volume(&self, volume: f64) -> f64 {
         let depth = self.depth();
         if volume <= 0.0 {
@@ -319,7 +309,8 @@ impl Contour {
         0.5 * (low + high)
     }
 
-    /// Returns the whole wall if the tank can be full: the wall ends at the axis or at its start.
+    /// Returns the whole wall if the tank can be full, which means that the wall ends at the axis or at its
+    /// start.
     pub(crate) fn closed(&self) -> Option<Wall> {
         let (start, end) = (self.segments[0].start(), self.segments[self.segments.len() - 1].end());
         let on_axis = start[0] <= LEVEL * self.size && end[0] <= LEVEL * self.size;
@@ -334,8 +325,7 @@ impl Contour {
 
     /// Returns the wetted wall at `fill`, m above the lowest point.
     ///
-    /// # Errors
-    /// A fill that is not positive or above the top, separate pools, a free surface at a horizontal
+    /// # Errors A fill that is not positive or above the top, separate pools, a free surface at a horizontal
     /// part of the wall or of zero width.
     pub fn cut(&self, fill: f64) -> Result<Wall, Problems> {
         if !fill.is_finite() {
@@ -409,7 +399,6 @@ impl Contour {
         Ok(Wall { segments: wall, r_outer: end[0], r_inner, z_surface: z })
     }
 
-    /// Returns the inner and the outer contact line at height z.
     fn contact_lines(&self, z: f64, fill: f64) -> Result<(Option<Crossing>, Crossing), Problems> {
         let crossings = self.crossings(z);
         // Above the brim of an inner wall only a shoulder matters.
@@ -431,8 +420,8 @@ impl Contour {
         }
     }
 
-    /// Returns all positions where the contour passes through the height z, in its order. A point
-    /// exactly at z counts as above.
+    /// Returns all positions where the contour passes through the height z, in its order. A point exactly at
+    /// z counts as above.
     fn crossings(&self, z: f64) -> Vec<Crossing> {
         let mut found: Vec<Crossing> = Vec::new();
         let level = LEVEL * self.size;
@@ -481,7 +470,7 @@ fn shoulder(fill: f64) -> Problems {
     .into()
 }
 
-/// Returns the defect of a single segment.
+/// Returns the defect of a single segment, as words for a message.
 fn defect(segment: &Segment) -> Option<String> {
     let numbers: Vec<f64> = match segment.curve {
         Curve::Line { from, to } => vec![from[0], from[1], to[0], to[1]],
@@ -533,7 +522,6 @@ fn from_the_top(segments: Vec<Segment>, size: f64) -> Vec<Segment> {
     turned
 }
 
-/// Returns the number of intervals for sampling a segment.
 fn samples(segment: &Segment) -> usize {
     match segment.curve {
         Curve::Line { .. } => 1,
@@ -603,8 +591,8 @@ impl Outline {
         r.1.max(z.1 - z.0)
     }
 
-    /// Returns the area to the left of the contour, closed along the axis or straight from end to
-    /// start.
+    /// Returns the area to the left of the contour, which is closed along the axis or straight from end to
+    /// start; it is negative for clockwise order.
     fn area(&self) -> f64 {
         let all: Vec<Point> = self.points.iter().flatten().copied().collect();
         let (first, last) = (all[0], all[all.len() - 1]);
@@ -619,7 +607,6 @@ impl Outline {
         0.5 * sum
     }
 
-    /// Returns a crossing of two parts: their segments and the point.
     fn crossing(&self) -> Option<(usize, usize, Point)> {
         let lines: Vec<(usize, Point, Point)> = self
             .points
@@ -656,22 +643,20 @@ impl Outline {
     }
 }
 
-/// Volume integrals of the liquid.
+/// Volume integrals of the liquid: its volume, m3, the height of its centre, m, from the contour's own zero,
+/// and the rigid inertias per density, m5, across the axis, int (x^2 + (z - z_cg)^2) dV, and about it, int
+/// r^2 dV.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Volume {
-    /// Volume, m3.
     pub volume: f64,
-    /// Height of the centre, m, from the contour's own zero.
     pub z_cg: f64,
-    /// int (x^2 + (z - z_cg)^2) dV, m5: rigid inertia across the axis per density.
     pub across: f64,
-    /// int r^2 dV, m5: rigid inertia about the axis per density.
     pub axial: f64,
 }
 
 impl Volume {
-    /// Computes the volume integrals of the liquid below the free surface, by Gauss's theorem along the wall. The
-    /// volume is pi int r^2 dz; the others are similar.
+    /// Computes the volume integrals of the liquid below the free surface, by Gauss's theorem along the wall:
+    /// the volume is pi int r^2 dz, and the others are similar.
     pub fn from_wall(wall: &Wall) -> Volume {
         let rule = Gauss::new(20);
         let base = wall.z_surface;
@@ -706,7 +691,6 @@ impl Volume {
 mod tests {
     use super::*;
 
-    /// The minimum -R at -90 degrees is between two samples of one arc, and at the ends of others.
     #[test]
     fn the_lowest_and_the_highest_point_of_a_curve_are_between_its_samples() {
         for (from, to) in [(-100.0, 63.0), (-123.4, 120.0), (-90.0, 90.0)] {
@@ -720,8 +704,8 @@ mod tests {
         }
     }
 
-    /// Two walls that lean towards each other, a micrometre apart at the brim, and the tip of a cone. In a tank of 1.5
-    /// m a free surface has a width from 1.5 micrometres on.
+    /// The cases are two walls that lean towards each other, a micrometre apart at the brim, and the tip of a
+    /// cone. In a tank of 1.5 m a free surface has a width from 1.5 micrometres on.
     #[test]
     fn a_free_surface_without_width_is_refused_with_its_width() {
         let gap = |width: f64| {
@@ -742,8 +726,8 @@ mod tests {
         assert!((tip(2e-6).unwrap().r_outer - 2e-6).abs() < 1e-15);
     }
 
-    /// A ring is closed if its ends agree to 1e-6 of its size, for a model's tank and a large one. It then begins at
-    /// its top. The axis counts as reached to 1e-9.
+    /// A ring is closed if its ends agree to 1e-6 of its size, for a model's tank and a large one. It then
+    /// begins at its top. The axis counts as reached to 1e-9.
     #[test]
     fn a_tank_is_closed_to_a_share_of_its_size() {
         for size in [1.0 / 64.0, 1.0, 16.0] {

@@ -38,28 +38,26 @@ use crate::contour::Wall;
 use crate::gauss::Gauss;
 use crate::third_order::circle_basis;
 
-/// Depth below the surface, over the largest radius, beyond which the liquid is at rest: 2e-5 of the
-/// motion of a cylinder's first mode.
+/// Depth below the surface, over the largest radius, beyond which the liquid is at rest: a cylinder's first
+/// mode has 2e-5 of its motion there.
 const DEEP: f64 = 3.0;
 
-/// Smallest eigenvalue of the kinetic energy's matrix over the largest for a combination of harmonics
-/// that is not rounding noise.
+/// Smallest eigenvalue of the kinetic energy's matrix over the largest for a combination of harmonics that is
+/// not rounding noise.
 const NOISE: f64 = 1e-13;
 
-/// Periodic waves of the first mode. Lengths are over the radius of the surface.
+/// Periodic waves of the first mode, with lengths over the radius of the surface: lambda_1 = omega_1^2/g, the
+/// relative shifts of omega^2 per squared slosh angle in planar and circular motion, the second-order
+/// elevation at the wall of planar motion per squared slosh angle when it is largest there, and the modes
+/// that the square of the first mode excites, each with azimuthal number, number from 1, and lambda.
 #[derive(Clone, Debug)]
 pub(crate) struct Waves {
-    /// lambda_1 = omega_1^2/g.
     pub lambda: f64,
-    /// Relative shifts of omega^2 per squared slosh angle, planar and circular.
     pub shifts: [f64; 2],
-    /// Second-order elevation at the wall of planar motion per squared slosh angle when it is largest there.
     pub second_wave: f64,
-    /// Azimuthal number, number from 1 and lambda of modes that the square of the first mode excites.
     pub excited: Vec<([usize; 2], f64)>,
 }
 
-/// Harmonics of one azimuthal number at points, one a column.
 struct Fields {
     u: DMatrix<f64>,
     r: DMatrix<f64>,
@@ -69,7 +67,7 @@ struct Fields {
 }
 
 impl Fields {
-    /// Computes u_n = s^-n |x|^n P_n^m at the points (r, z), n from m (from 1 for m = 0) to `degree`.
+    /// Computes u_n = s^-n |x|^n P_n^m at the points (r, z), for n from m (from 1 for m = 0) to `degree`.
     fn new(m: usize, degree: usize, scale: f64, points: &[[f64; 2]]) -> Fields {
         let first = m.max(1);
         let count = degree + 1 - first;
@@ -115,20 +113,19 @@ impl Fields {
     }
 }
 
-/// Points with weights r ds and normals.
 struct Boundary {
     points: Vec<[f64; 2]>,
     normals: Vec<[f64; 2]>,
     weights: Vec<f64>,
 }
 
-/// The liquid at rest, over the radius of the surface, z from the surface.
+/// The liquid at rest, over the radius of the surface, z from the surface. The harmonics are centred half way
+/// to the bottom, and `wall` holds the slope and the curvature of the wall at the contact line, dR/dz and
+/// d^2R/dz^2.
 struct Liquid {
     boundary: Boundary,
-    /// Height of the harmonics' centre, half way to the bottom, and the largest distance from it.
     centre: f64,
     size: f64,
-    /// Slope and curvature of the wall at the contact line, dR/dz and d^2R/dz^2.
     wall: [f64; 2],
     rho: Vec<f64>,
     weights: Vec<f64>,
@@ -250,21 +247,20 @@ impl Liquid {
         all
     }
 
-    /// int f_i u_k rho drho
+    /// Returns the integrals int f_i u_k rho drho over the surface.
     fn coupling(&self, f: &DMatrix<f64>, u: &DMatrix<f64>) -> DMatrix<f64> {
         DMatrix::from_fn(f.ncols(), u.ncols(), |i, k| self.integral(|q| f[(q, i)] * u[(q, k)]))
     }
 }
 
-/// Function of azimuth and phase.
 type Wave = fn(f64, f64) -> f64;
 
-/// Shapes of a motion over azimuth and phase; `None` for a field that it does not excite.
+/// Shapes of a motion over azimuth and phase, for one azimuthal number `m`; `None` for a field that the
+/// motion does not excite. `double` holds the elevation at 2 omega, the potential, and the potential's
+/// derivative by theta.
 struct Shape {
-    /// Azimuthal number of the field.
     m: usize,
     mean: Option<Wave>,
-    /// Elevation at 2 omega, potential, and the potential's derivative by theta.
     double: Option<[Wave; 3]>,
 }
 
@@ -318,20 +314,16 @@ fn average(f: impl Fn(f64, f64) -> f64) -> f64 {
     (0..144).map(|i| f(angle(i / 12), angle(i % 12))).sum::<f64>() / 144.0
 }
 
-/// The first mode at the surface's points, and what the higher orders need of it.
+/// The first mode at the surface's points, and the quantities of it that the higher orders need: its
+/// elevation f with int f^2 rho drho = 1; (U w)_z and (U w)_zz along the lines; U_r, U_z and U/r; ((U_r^2 +
+/// U_z^2) w)_z and (U^2/r^2 w)_z along the lines; w_z and w_zz; and the slope dr/dz of the lines.
 struct First {
     lambda: f64,
-    /// Elevation with int f^2 rho drho = 1.
     f: Vec<f64>,
-    /// (U w)_z, (U w)_zz along the lines.
     along: [Vec<f64>; 2],
-    /// U_r, U_z, U/r.
     gradient: [Vec<f64>; 3],
-    /// ((U_r^2 + U_z^2) w)_z, (U^2/r^2 w)_z along the lines.
     energy: [Vec<f64>; 2],
-    /// w_z, w_zz along the lines.
     w: [Vec<f64>; 2],
-    /// Slope of the lines, dr/dz.
     slope: Vec<f64>,
 }
 
@@ -350,16 +342,17 @@ impl Second {
     }
 }
 
-/// Combinations e of harmonics, one a column, with orthonormal kinetic energies, and their values at the surface.
+/// Combinations e of harmonics, one a column, with orthonormal kinetic energies, and their values at the
+/// surface.
 struct Harmonics {
     #[cfg_attr(not(test), allow(dead_code))]
     e: DMatrix<f64>,
     surface: Fields,
 }
 
-/// Computes the waves with solid harmonics up to `degree`. The lines' slope grows with the power `lines` of the radius,
-/// an odd number. `detuning` is added to 1 as a factor of 2 omega in the response of the second order, see
-/// `third_order.rs`. Returns `None` for a liquid with a hole.
+/// Computes the waves with solid harmonics up to `degree`. The slope of the lines grows with the power
+/// `lines` of the radius, an odd number. `detuning` is added to 1 as a factor of 2 omega in the response of
+/// the second order, see `third_order.rs`. Returns `None` for a liquid with a hole.
 pub(crate) fn waves(wall: &Wall, degree: usize, lines: i32, detuning: f64) -> Option<Waves> {
     let liquid = Liquid::new(wall, degree)?;
     let count = degree / 2;
@@ -458,7 +451,6 @@ impl First {
         first
     }
 
-    /// Returns a field of the second order.
     fn second(
         &self,
         liquid: &Liquid,
@@ -566,7 +558,8 @@ mod tests {
         wall(vec![Segment::arc([0.0, 1.0], 1.0, -90.0, 90.0)], fill)
     }
 
-    /// 1e-5: what the harmonics leave out at degree 24, and the depth beyond which the liquid is at rest.
+    /// The tolerance of 1e-5 covers what the harmonics leave out at degree 24, and the depth beyond which the
+    /// liquid is at rest.
     #[test]
     fn cylinders_have_the_waves_of_vertical_walls() {
         let overlaps = crate::third_order::Overlaps::round(0.0, 0.5, 20);
@@ -585,7 +578,6 @@ mod tests {
         }
     }
 
-    /// Lines whose slope grows with the third power of the radius are others than those with the first.
     #[test]
     fn results_do_not_depend_on_the_grid_of_the_surface_elevation() {
         let cone = wall(vec![Segment::line([0.0, 0.0], [1.0, 2.0])], 1.3);
@@ -598,9 +590,9 @@ mod tests {
         }
     }
 
-    /// Shallow liquid in a paraboloid oscillates as a whole with a frequency that does not depend on its amplitude,
-    /// planar or circular (Thacker, J. Fluid Mech. 107 (1981) 499), to the leading order in 1/depth. In a
-    /// cylinder of this depth the shifts are 1e6.
+    /// Shallow liquid in a paraboloid oscillates as a whole with a frequency that does not depend on its
+    /// amplitude, planar or circular (Thacker, J. Fluid Mech. 107 (1981) 499), to the leading order in
+    /// 1/depth. In a cylinder of this depth the shifts are 1e6.
     #[test]
     fn shallow_liquid_in_a_bowl_keeps_its_frequency() {
         for fill in [1e-3, 1e-2] {
@@ -609,8 +601,9 @@ mod tests {
         }
     }
 
-    /// Luke's functional of the first and the second order, without any expansion: the integrals over the liquid run along
-    /// the lines up to the surface, with the sphere's true wall. Its fourth order in the amplitude is L_4.
+    /// Luke's functional of the first and the second order is evaluated without any expansion: the integrals
+    /// over the liquid run along the lines up to the surface, with the sphere's true wall. Its fourth order
+    /// in the amplitude is L_4.
     #[test]
     fn fourth_order_terms_equal_those_of_the_functional() {
         let (fill, degree, count) = (0.7, 14, 7);

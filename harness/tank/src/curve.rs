@@ -2,7 +2,6 @@
 
 use core::f64::consts::TAU;
 
-/// A point or vector (r, z), m.
 pub type Point = [f64; 2];
 
 pub(crate) fn sub(a: Point, b: Point) -> Point {
@@ -25,51 +24,22 @@ pub(crate) fn cross(a: Point, b: Point) -> f64 {
     a[0] * b[1] - a[1] * b[0]
 }
 
-/// Shapes of a segment. Each has its own parameter t.
+/// Shapes of a segment, lengths in m. Each has its own parameter t.
+///
+/// - `Line`: straight from one point to the other, t = 0..1.
+/// - `Ellipse`: center + (a_r cos t, a_z sin t), t the eccentric angle in rad; a circle has a_r = a_z.
+/// - `Cassini`: oval about (0, zc), a > c, with the foci at the distance c from its centre. At the polar
+///   angle t, rad, the distance rho from the centre follows from rho^2 = c^2 cos 2t + sqrt(a^4 - c^4 sin^2
+///   2t).
+/// - `Cosine`: r = r0 + r1 cos(pi p), p and z linear in t = 0..1.
+/// - `Cubic`: c_0 + c_1 t + c_2 t^2 + c_3 t^3, t = 0..1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Curve {
-    /// Straight from one point to the other, t = 0..1.
-    Line {
-        /// Point at t = 0.
-        from: Point,
-        /// Point at t = 1.
-        to: Point,
-    },
-    /// center + (a_r cos t, a_z sin t), t the eccentric angle in rad. A circle has a_r = a_z.
-    Ellipse {
-        /// Centre.
-        center: Point,
-        /// Semi-axis along r, m.
-        a_r: f64,
-        /// Semi-axis along z, m.
-        a_z: f64,
-    },
-    /// Oval of Cassini about (0, zc), a > c. At the polar angle t, rad, the distance rho from the centre follows from
-    /// rho^2 = c^2 cos 2t + sqrt(a^4 - c^4 sin^2 2t).
-    Cassini {
-        /// Height of the centre, m.
-        zc: f64,
-        /// Root of the product of the distances to the foci, m.
-        a: f64,
-        /// Distance of the foci from the centre, m.
-        c: f64,
-    },
-    /// r = r0 + r1 cos(pi p), p and z linear in t = 0..1.
-    Cosine {
-        /// Mean radius, m.
-        r0: f64,
-        /// Amplitude, m.
-        r1: f64,
-        /// Heights at t = 0 and 1, m.
-        z: [f64; 2],
-        /// p at t = 0 and 1.
-        p: [f64; 2],
-    },
-    /// Cubic polynomial c_0 + c_1 t + c_2 t^2 + c_3 t^3, t = 0..1.
-    Cubic {
-        /// Coefficients.
-        c: [Point; 4],
-    },
+    Line { from: Point, to: Point },
+    Ellipse { center: Point, a_r: f64, a_z: f64 },
+    Cassini { zc: f64, a: f64, c: f64 },
+    Cosine { r0: f64, r1: f64, z: [f64; 2], p: [f64; 2] },
+    Cubic { c: [Point; 4] },
 }
 
 /// Nodes and weights of the Gauss rule of 8 points on -1..1, positive half (DLMF 3.5.15).
@@ -81,7 +51,6 @@ const GAUSS8: [(f64, f64); 4] = [
 ];
 
 impl Curve {
-    /// Returns the point at the parameter t.
     pub fn point_at(&self, t: f64) -> Point {
         match *self {
             Curve::Line { from, to } => {
@@ -104,7 +73,6 @@ impl Curve {
         }
     }
 
-    /// Returns the derivative by t.
     pub fn slope(&self, t: f64) -> Point {
         match *self {
             Curve::Line { from, to } => sub(to, from),
@@ -125,8 +93,9 @@ impl Curve {
         }
     }
 
-    /// Returns at(t + dt) - at(t), to full relative accuracy for any dt. Both kernels of the
-    /// integral equation need it, because differences of coordinates lose all digits near a corner.
+    /// Returns the vector from the point at t to the point at t + dt, to full relative accuracy for any dt.
+    /// Both kernels of the integral equation need it, because differences of coordinates lose all digits near
+    /// a corner.
     pub fn chord(&self, t: f64, dt: f64) -> Point {
         match *self {
             Curve::Line { from, to } => [dt * (to[0] - from[0]), dt * (to[1] - from[1])],
@@ -167,40 +136,36 @@ fn cassini(a: f64, c: f64, t: f64) -> (f64, f64) {
     (rho, slope / (2.0 * rho))
 }
 
-/// A curve between two values of its parameter, in the direction from the first to the second.
+/// A curve between two values of its parameter, in the direction from the first to the second, which may be
+/// less than the first.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Segment {
     pub curve: Curve,
     pub from: f64,
-    /// Parameter at the end; may be less than `from`.
     pub to: f64,
 }
 
 impl Segment {
-    /// Creates a straight line.
     pub fn line(from: Point, to: Point) -> Segment {
         Segment { curve: Curve::Line { from, to }, from: 0.0, to: 1.0 }
     }
 
-    /// Creates the arc of an ellipse between two eccentric angles in degrees; a_r = a_z is a
-    /// circle.
+    /// Creates the arc of an ellipse between two eccentric angles in degrees; a_r = a_z is a circle.
     pub fn ellipse(center: Point, a_r: f64, a_z: f64, deg0: f64, deg1: f64) -> Segment {
         let (from, to) = (deg0.to_radians(), deg1.to_radians());
         Segment { curve: Curve::Ellipse { center, a_r, a_z }, from, to }
     }
 
-    /// Creates the arc of a circle between two angles in degrees.
     pub fn arc(center: Point, radius: f64, deg0: f64, deg1: f64) -> Segment {
         Segment::ellipse(center, radius, radius, deg0, deg1)
     }
 
-    /// Returns the first point, exactly on the axis if it is within rounding of it: cos(pi/2) is
-    /// not 0 in floating point.
+    /// Returns the first point. It is exactly on the axis if it is within rounding of it, because cos(pi/2)
+    /// is not 0 in floating point.
     pub fn start(&self) -> Point {
         self.settle(self.curve.point_at(self.from))
     }
 
-    /// Returns the last point, exactly on the axis if it is within rounding of it.
     pub fn end(&self) -> Point {
         self.settle(self.curve.point_at(self.to))
     }
@@ -210,7 +175,6 @@ impl Segment {
         [if p[0].abs() < 1e-14 * size { 0.0 } else { p[0] }, p[1]]
     }
 
-    /// Returns a length of the order of the segment's, m.
     pub fn size(&self) -> f64 {
         match self.curve {
             Curve::Line { from, to } => norm(sub(to, from)),
@@ -229,7 +193,6 @@ impl Segment {
         [sign * slope[0] / length, sign * slope[1] / length]
     }
 
-    /// Returns the point at the fraction `s` of the parameter.
     pub fn point_at(&self, s: f64) -> Point {
         self.curve.point_at(self.from + s * (self.to - self.from))
     }
@@ -248,7 +211,6 @@ impl Segment {
         total.min(TAU)
     }
 
-    /// Returns the part between two values of the curve's parameter.
     pub(crate) fn part(&self, from: f64, to: f64) -> Segment {
         Segment { curve: self.curve, from, to }
     }

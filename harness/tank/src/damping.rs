@@ -15,19 +15,17 @@ use crate::shape::{self, Recognised};
 use crate::table::significant;
 use crate::tank::{Geometry, Shape, Tank};
 
-/// Advice on the ends of an interval.
 const ENDS: &str = "use the low end for stability margins, check both ends for settling times";
 
-/// Computes the damping of a tank solved as `data`, for a liquid of kinematic viscosity `nu`, m2/s, at the specific
-/// force `gravity`, m/s². `springs` are the modes' centring stiffnesses, N/m, along each axis of a box; empty for none.
-/// `sigma`, N/m, if known, is used for low Bond numbers.
+/// Computes the damping of a tank solved as `data`, for a liquid of kinematic viscosity `nu`, m2/s, at the
+/// specific force `gravity`, m/s². `springs` are the modes' centring stiffnesses, N/m, along each axis of a
+/// box; empty for none. `sigma`, N/m, if known, is used for low Bond numbers.
 ///
-/// A contour that is a sphere, an upright cylinder, a cone or a torus, to 1e-6 of its size over the wetted part, has
-/// the damping of that shape. If only a part of the wall is such a shape, the factor over the laminar layer is a mean by
-/// area. So the ratio is continuous in the fill and in the shape of the tank.
+/// A contour that is a sphere, an upright cylinder, a cone or a torus, to 1e-6 of its size over the wetted
+/// part, has the damping of that shape. If only a part of the wall is such a shape, the factor over the
+/// laminar layer is a mean by area. So the ratio is continuous in the fill and in the shape of the tank.
 ///
-/// # Errors
-/// If there is neither gravity nor centring stiffness, because there is no natural frequency then.
+/// # Errors If there is neither gravity nor centring stiffness, because there is no natural frequency then.
 pub fn tank_damping(
     tank: &Tank,
     data: &ModalData,
@@ -146,11 +144,10 @@ pub fn tank_damping(
     })
 }
 
-/// A measured shape that the wetted wall is, wholly or in part.
+/// A measured shape that the wetted wall is, wholly or in part, at the nearest depth that was measured.
+/// `at_depth` is false if the tank has another depth.
 struct Nearest {
-    /// The shape at the nearest depth that was measured.
     shape: formula::Shape,
-    /// False if the depth was not measured.
     at_depth: bool,
     part: formula::Part,
 }
@@ -165,7 +162,8 @@ impl Nearest {
         Nearest::new(shape, 1.0, nu, g, first.laminar(nu))
     }
 
-    /// Creates the shape of a share of the wall, at the specific force `g`, by solving for the shape's own layer.
+    /// Creates the shape of a share of the wall, at the specific force `g`, by solving for the shape's own
+    /// layer.
     fn solve(found: Recognised, share: f64, nu: f64, g: f64) -> Option<Nearest> {
         let shape = found.measured().at_measured_depth();
         let fill = match shape {
@@ -187,7 +185,6 @@ impl Nearest {
         Some(Nearest { shape, at_depth: true, part })
     }
 
-    /// Returns true if the wall is this shape, within the range of its measurements.
     fn is_measured(&self) -> bool {
         self.at_depth && self.part.is_measured()
     }
@@ -197,8 +194,8 @@ impl Nearest {
         DampingPart { shape: shape_name(self.shape), share, factor }
     }
 
-    /// Returns the basis of the damping of a wall that is this shape, with the ratios by its correlation and by 1.45
-    /// layers.
+    /// Returns a sentence about the damping of a wall that is this shape, with the ratios by its correlation
+    /// and by 1.45 layers.
     fn basis(&self, factor: f64, correlation: f64, layers: f64) -> String {
         let (name, unmeasured) = (shape_name(self.shape), formula::UNMEASURED);
         let formula::Part { weight, .. } = self.part;
@@ -242,8 +239,8 @@ impl Nearest {
     }
 }
 
-/// Returns the basis of the damping of a wall that is no measured shape, or is one in part, with the shapes that it is
-/// near.
+/// Returns a sentence about the damping of a wall that is no measured shape, or is one in part, with the
+/// shapes that it is near.
 fn mixture(found: &[Nearest], near: &[Nearest], factor: f64) -> String {
     let unmeasured = formula::UNMEASURED;
     if found.is_empty() {
@@ -280,7 +277,6 @@ fn mixture(found: &[Nearest], near: &[Nearest], factor: f64) -> String {
     )
 }
 
-/// Solves for a shape's own modes at its fill.
 fn solve_shape(found: Recognised, modes: usize) -> Option<ModalData> {
     let whole = match found.shape {
         // The cone is open above the fill.
@@ -315,7 +311,6 @@ fn shape_source(shape: formula::Shape) -> &'static str {
     }
 }
 
-/// Lists the ranges that a shape's correlation leaves, one sentence each.
 fn outside(shape: formula::Shape, nu: f64, g: f64) -> Vec<String> {
     match shape {
         formula::Shape::Sphere { radius, depth } => sphere(radius, depth, nu, g).outside,
@@ -325,11 +320,10 @@ fn outside(shape: formula::Shape, nu: f64, g: f64) -> Vec<String> {
     }
 }
 
-/// A damping ratio, with the ranges that its formula leaves.
+/// A damping ratio, with one sentence for each range of its formula that the tank is outside of.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Formula {
     pub zeta: f64,
-    /// One sentence for each range that the formula leaves; empty inside.
     pub outside: Vec<String>,
 }
 
@@ -364,13 +358,12 @@ pub fn mikishev_dorozhkin(radius: f64, fill: f64, nu: f64, g: f64) -> Formula {
     Formula::new(formula::mikishev_dorozhkin(radius, fill, nu, g), &[(x >= 0.5, text)])
 }
 
-/// Computes the damping ratio of an upright cylinder by Stephens, Leonard and Perry: 1.493 times the laminar
-/// layer at every depth.
+/// Computes the damping ratio of an upright cylinder by Stephens, Leonard and Perry, which is 1.493 times the
+/// laminar layer's at every depth.
 pub fn stephens(radius: f64, fill: f64, nu: f64, g: f64) -> Formula {
     Formula::new(formula::stephens(radius, fill, nu, g), &[])
 }
 
-/// Computes the damping ratio of a sphere, see [`formula::sphere`].
 pub fn sphere(radius: f64, fill: f64, nu: f64, g: f64) -> Formula {
     let (x, b) = (fill / radius, formula::sphere_number(radius, nu, g));
     Formula::new(
@@ -390,7 +383,6 @@ pub fn cone(radius: f64, half_angle: f64, nu: f64, g: f64) -> Formula {
     Formula::new(formula::cone(radius, half_angle, nu, g), &[(known, text)])
 }
 
-/// Computes the damping ratio of a torus; `tube_radius` is that of its section.
 pub fn torus(tube_radius: f64, fill: f64, nu: f64, g: f64) -> Formula {
     let (y, scale) = (0.5 * fill / tube_radius, formula::torus_number(tube_radius, nu, g));
     Formula::new(
@@ -412,9 +404,8 @@ pub struct Ring {
     pub width: f64,
 }
 
-/// Checks the ranges of the square-root law: 2 < UT/D < 20 with D = 2 w, ring under the wave's
-/// trough, small part of the section covered. `reach` is the decay of the wave from the surface to
-/// the ring.
+/// Checks the ranges of the square-root law: 2 < UT/D < 20 with D = 2 w, ring under the wave's trough, small
+/// part of the section covered. `reach` is the decay of the wave from the surface to the ring.
 fn ring_ranges(ring: Ring, amplitude: f64, reach: f64, covered: f64) -> Vec<(bool, String)> {
     let Ring { depth, width } = ring;
     let stroke = amplitude / width * reach;
@@ -434,7 +425,7 @@ fn ring_ranges(ring: Ring, amplitude: f64, reach: f64, covered: f64) -> Vec<(boo
 }
 
 /// Computes the damping ratio of a ring baffle in an upright cylinder, for the `amplitude` (m) of the wave at
-/// the wall: see [`formula::miles_ring`].
+/// the wall, by [`formula::miles_ring`].
 pub fn miles_ring(radius: f64, ring: Ring, amplitude: f64) -> Formula {
     let Ring { depth, width } = ring;
     let (reach, covered) =
@@ -466,8 +457,8 @@ pub fn ring(data: &ModalData, ring: Ring, amplitude: f64) -> Option<Formula> {
     Some(Formula::new(zeta, &ring_ranges(ring, amplitude, at.ratio, w * (2.0 - w))))
 }
 
-/// Returns the part of a full ring's damping that a sector has: int |cos theta|^(5/2) dtheta/2.8756
-/// between two angles from the direction of slosh, rad. A half ring has half.
+/// Returns the part of a full ring's damping that a sector has: int |cos theta|^(5/2) dtheta/2.8756 between
+/// two angles from the direction of slosh, rad. A half ring has half.
 pub fn sector(from: f64, to: f64) -> f64 {
     let rule = crate::gauss::Gauss::new(24);
     let part = |a: f64, b: f64| -> f64 {

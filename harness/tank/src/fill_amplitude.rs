@@ -13,17 +13,14 @@ use crate::table::{short, significant};
 /// Largest error between two points, over 1 + |s| or 1 + |kappa|, without a warning.
 const LARGEST: f64 = 0.05;
 
-/// A fill with the parameters of the tank there.
+/// A fill, m above the lowest point, with its mass of liquid, kg, and the parameters of the tank there.
 pub(crate) struct AtFill<'a> {
-    /// Height of the surface above the lowest point, m.
     pub fill: f64,
-    /// Mass of the liquid, kg.
     pub liquid: f64,
     pub set: &'a ParameterSet,
 }
 
 impl<'a> AtFill<'a> {
-    /// Returns the fills of solutions with their parameters.
     pub fn from_rows(rows: &[ModalData], sets: &'a [ParameterSet]) -> Vec<AtFill<'a>> {
         let of = |(row, set): (&ModalData, &'a ParameterSet)| {
             let (fill, liquid) = (row.fill, row.m_liq);
@@ -36,7 +33,7 @@ impl<'a> AtFill<'a> {
         self.set.third_order.iter().find(|(mode, _)| *mode == n).map(|(_, known)| *known)
     }
 
-    /// Returns why the coefficients are not known.
+    /// Returns the reason why the coefficients are not known, as words for a note.
     fn reason(&self) -> &str {
         let mut reasons = self.set.notes.iter().rev().filter_map(|note| note.strip_prefix(PREFIX));
         let reason = reasons.next().unwrap_or("no formula is known for this mode");
@@ -47,10 +44,9 @@ impl<'a> AtFill<'a> {
 /// Beginning of the notes about finite amplitude in the parameters of one fill.
 pub(crate) const PREFIX: &str = "finite amplitude: ";
 
-/// Columns of a mode, s and kappa at the points of a table.
+/// Columns of a mode, s and kappa at the points of a table, with notes about their source, errors and gaps.
 pub(crate) struct Columns {
     pub values: [Vec<f64>; 2],
-    /// Source, errors and gaps.
     pub notes: Vec<String>,
     pub warnings: Vec<String>,
 }
@@ -59,13 +55,11 @@ fn coefficients(known: &Coefficients) -> [f64; 2] {
     [known.nonlinear_inertia, known.nonlinear_stiffness]
 }
 
-/// Returns fills in words.
 fn fills(of: &[&AtFill]) -> String {
     let all: Vec<String> = of.iter().map(|at| short(at.fill)).collect();
     all.join(", ")
 }
 
-/// The reason why a table has no columns of a mode, as a note.
 #[derive(Debug, thiserror::Error)]
 #[error(
     "{PREFIX}s and kappa of mode {mode} are known at {known} of {fills} fills, so the table leaves them out, and the FMU \
@@ -78,8 +72,8 @@ pub(crate) struct TooFewFills {
     why: String,
 }
 
-/// Returns the columns of mode `n` (from 1) at ascending fills, and `Err` if they are known at fewer than two
-/// fills. `between` are further fills, which show the errors between the points.
+/// Returns the columns of mode `n`, which counts from 1, at ascending fills, and `Err` if they are known at
+/// fewer than two fills. `between` are further fills, which show the errors between the points.
 pub(crate) fn columns(
     n: usize,
     points: &[AtFill],

@@ -23,28 +23,24 @@ use crate::sweep::{self, Sweep};
 use crate::table::{short, significant};
 use crate::tank::Tank;
 
-/// Number of fills among which points are chosen.
 const CANDIDATES: usize = 97;
 
 /// Unit of the errors: 0.5 % of a frequency, a mass or the largest radius of the surface.
 const LIMIT: f64 = 5e-3;
 
-/// Fills of a table between two ends, m above the lowest point, with their errors.
+/// Fills of a table between two ends, m above the lowest point: the rows of the table and its errors between
+/// them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Placed {
-    /// The rows of the table.
     pub sweep: Sweep,
-    /// Its errors between them.
     pub between: Between,
 }
 
-/// Solutions between the points of a table.
+/// Solutions `rows` near the middle between each two points of a table, and the largest `error` that the
+/// first mode has between points: frequency and mass relative, hinge over the largest radius of the surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Between {
-    /// Largest errors between the points for the first mode: frequency and mass relative, hinge over the largest radius
-    /// of the surface.
     pub error: [f64; 3],
-    /// A solution near the middle between each two points.
     pub rows: Vec<ModalData>,
 }
 
@@ -93,8 +89,8 @@ impl Curves {
         worst
     }
 
-    /// Cost function: the largest error of the first mode and those of the other modes weighted by their share of its
-    /// mass.
+    /// Returns the cost of a choice of points: the largest error of the first mode plus those of the other
+    /// modes, weighted by their share of its mass.
     fn cost(&self, points: &[usize]) -> f64 {
         let heaviest = |n: usize| self.modes[n][2].iter().copied().fold(0.0, f64::max);
         let of = |n: usize| {
@@ -105,8 +101,7 @@ impl Curves {
     }
 }
 
-/// Returns the height of the bob, or of the liquid's centre for a mode without mass, which has no
-/// bob.
+/// Returns the height of the bob, or of the liquid's centre for a mode without mass, which has no bob.
 fn bob(row: &ModalData, n: usize) -> f64 {
     row.modes[n].height.unwrap_or(row.z_cg)
 }
@@ -120,8 +115,7 @@ fn count_carrying_modes(rows: &[ModalData]) -> usize {
 
 /// Places [`POINTS`] fills between two, m above the lowest point, including the ends.
 ///
-/// # Errors
-/// Ends without a free surface, and the errors of [`Tank::solve`].
+/// # Errors Ends without a free surface, and the errors of [`Tank::solve`].
 pub fn place(tank: &Tank, low: f64, high: f64, modes: usize) -> Result<Placed, Problems> {
     // denser near the ends, where the surface of a closed tank gets narrow and the modes change
     // most
@@ -175,11 +169,11 @@ pub fn place(tank: &Tank, low: f64, high: f64, modes: usize) -> Result<Placed, P
     Ok(Placed { sweep: Sweep { rows: of(&points) }, between })
 }
 
-/// Returns the parameters of a tank that can drain: those at its largest fill, where it starts, and its table.
+/// Returns the parameters of a tank that can drain: those at its largest fill, where it starts, and its
+/// table.
 ///
-/// # Errors
-/// Those of [`ParameterSet::new`], a HubSlosh target, whose tank does not drain, and fewer than two fills or more than
-/// [`POINTS`].
+/// # Errors Those of [`ParameterSet::new`], a HubSlosh target, whose tank does not drain, and fewer than two
+/// fills or more than [`POINTS`].
 pub fn parameters(
     tank: &Tank,
     sweep: &Sweep,
@@ -341,7 +335,7 @@ pub fn parameters(
     Ok(set)
 }
 
-/// Returns the limits over the fill with the smaller of the nearest known ones where a limit is not known.
+/// Replaces each unknown limit over the fill by the smaller of the nearest known ones.
 fn fill_unknown_limits(limits: Vec<Option<f64>>) -> Vec<Option<f64>> {
     let nearest = |i: usize| {
         let below = limits[..i].iter().rev().find_map(|limit| *limit);
@@ -351,7 +345,6 @@ fn fill_unknown_limits(limits: Vec<Option<f64>>) -> Vec<Option<f64>> {
     (0..limits.len()).map(|i| limits[i].or_else(|| nearest(i))).collect()
 }
 
-/// Beginning of the note about the coefficients of one fill.
 const INERTIA: &str = "nonlinear_inertia[";
 
 /// Returns the numbers of modes with their third-order columns; see [`fill_amplitude::columns`].

@@ -24,33 +24,29 @@ use crate::modal::ModalData;
 use crate::tank::{Geometry, Tank};
 use crate::third_order::{DETUNING, Overlaps};
 
-/// Largest stated error of s and kappa, over 1 + |s| or 1 + |kappa|.
 const WORST: f64 = 0.05;
 /// Largest distance of a vertical wall and a flat bottom from the tank's, over its size.
 const SAME: f64 = 1e-6;
-/// Rounding, the lower limit of an estimate.
 const ROUNDING: f64 = 1e-7;
-/// Excited modes of each azimuthal number, of two truncations.
 const COUNTS: [usize; 2] = [10, 20];
-/// Degrees of the harmonics of two truncations.
 const DEGREES: [usize; 2] = [18, 24];
 /// Difference of a box's lengths, relative, below which the modes along both exchange energy.
 const NEARLY_SQUARE: f64 = 0.1;
-/// Largest angle of the third order's validity, rad. At 26 degrees the circular wave of a cylinder with h/R 0.613 is 4 %
-/// from fully nonlinear flow.
+/// Largest angle of the third order's validity, rad. At 26 degrees the circular wave of a cylinder with h/R
+/// 0.613 is 4 % from fully nonlinear flow.
 const MOST_ANGLE: f64 = 30.0 * PI / 180.0;
-/// Angle at which a mode leaves its range over the angle at which the second-order wave is [`STEEPEST`] of the first-order
-/// wave, for tanks that nobody has compared with fully nonlinear flow: the smallest ratio in upright cylinders.
+/// Angle at which a mode leaves its range over the angle at which the second-order wave is [`STEEPEST`] of
+/// the first-order wave, for tanks that nobody has compared with fully nonlinear flow: the smallest ratio in
+/// upright cylinders.
 const ESTIMATED_SHARE: f64 = 0.24;
 /// Largest second-order wave at the wall, over the first-order wave, for which the third order holds.
 const STEEPEST: f64 = 0.5;
 
-/// Meaning of missing coefficients.
 const ASSUMED: &str = "without them the FMUs take a pendulum (s = kappa = 1: omega^2 shifts by -0.125 A^2 in planar and by \
     +0.5 A^2 in circular motion). That is an assumption: a deep upright cylinder has -0.45 A^2 and +0.36 A^2";
 
-/// Angle below which the end of the third order's validity is a warning, rad. Files for the FMUs leave such coefficients
-/// out.
+/// Angle below which the end of the third order's validity is a warning, rad. Files for the FMUs leave such
+/// coefficients out.
 pub(crate) const LEAST_ANGLE: f64 = 5.0 * PI / 180.0;
 
 impl Coefficients {
@@ -77,8 +73,8 @@ impl Coefficients {
         }
     }
 
-    /// Returns the coefficients of an upright cylinder filled to h/R = `fill` with its limits. Across the poles both
-    /// coefficients are bridged; the second-order wave is then interpolated, too.
+    /// Returns the coefficients of an upright cylinder filled to h/R = `fill` with its limits. Across the
+    /// poles both coefficients are bridged; the second-order wave is then interpolated, too.
     fn cylinder_coefficients(
         self,
         fill: f64,
@@ -124,7 +120,6 @@ impl Coefficients {
     }
 }
 
-/// Returns the coefficients of an upright cylinder filled to h/R = `fill` that give the wave's energy.
 fn energy(fill: f64) -> Option<Energy> {
     let (known, limit) = (energy_terms(fill)?, limits::cylinder_with_energy(fill)?);
     let ([s, kappa], [s_2, kappa_2], [t, t_2]) = (known.pair, known.next, known.rotary);
@@ -140,10 +135,8 @@ fn energy(fill: f64) -> Option<Energy> {
     })
 }
 
-/// Result of one truncation.
 #[derive(Clone, Copy, Debug)]
 struct Found {
-    /// s and kappa.
     equivalent: [f64; 2],
     planar: f64,
     circular: Option<f64>,
@@ -162,8 +155,8 @@ impl Found {
     }
 }
 
-/// Returns the amplitude dependence of a tank's first mode, solved as `data`. The coefficients do not depend on the
-/// specific force; they hold without surface tension.
+/// Returns the amplitude dependence of a tank's first mode, solved as `data`. The coefficients do not depend
+/// on the specific force; they hold without surface tension.
 pub fn amplitude_dependence(tank: &Tank, data: &ModalData) -> FiniteAmplitude {
     let (Some(mode), depth) = (data.modes.first(), data.fill) else {
         return FiniteAmplitude::default();
@@ -231,7 +224,6 @@ fn coefficients_from_overlaps(
     known.bounded_near(excited, &detuned, warnings).then_some(known)
 }
 
-/// Returns the coefficients of an upright cylinder of this radius, m.
 fn cylinder_coefficients(
     all: [&Overlaps; 2],
     depth: f64,
@@ -261,8 +253,8 @@ fn cylinder_coefficients(
 }
 
 impl Coefficients {
-    /// Returns whether s and kappa are bounded although a mode has nearly twice the frequency of mode 1, and counts its
-    /// share in them as an error. `detuned` gives them for another frequency of the second order.
+    /// Returns true if s and kappa are bounded although a mode has nearly twice the frequency of mode 1, and
+    /// adds its share in them to the error. `detuned` gives them for another frequency of the second order.
     fn bounded_near(
         &mut self,
         excited: Option<[usize; 2]>,
@@ -339,8 +331,8 @@ fn box_coefficients(
     known
 }
 
-/// Computes the coefficients of a body of revolution with any wall; `lambda`, 1/m, is the first mode's by the boundary
-/// integral equation.
+/// Computes the coefficients of a body of revolution with any wall; `lambda`, 1/m, is the first mode's by the
+/// boundary integral equation.
 fn contour_coefficients(
     wall: &Wall,
     wave: f64,

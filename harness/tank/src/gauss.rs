@@ -1,6 +1,6 @@
 //! Gauss-Legendre quadrature and Legendre polynomials on 0..1.
 
-/// Computes the Legendre polynomials P_0..P_(n-1) at 2 v - 1, v in 0..1.
+/// Computes the Legendre polynomials P_0..P_(n-1) at 2 v - 1, with v in 0..1.
 pub(crate) fn legendre(v: f64, values: &mut [f64]) {
     let x = 2.0 * v - 1.0;
     let (mut p0, mut p1) = (1.0, x);
@@ -11,7 +11,6 @@ pub(crate) fn legendre(v: f64, values: &mut [f64]) {
     }
 }
 
-/// Computes the derivatives by v of the same polynomials.
 pub(crate) fn legendre_slopes(v: f64, slopes: &mut [f64]) {
     let mut values = vec![0.0; slopes.len()];
     legendre(v, &mut values);
@@ -22,7 +21,6 @@ pub(crate) fn legendre_slopes(v: f64, slopes: &mut [f64]) {
     }
 }
 
-/// Gauss rule of `n` points: nodes in 0..1, ascending, and weights.
 #[derive(Clone, Debug)]
 pub(crate) struct Gauss {
     pub(crate) nodes: Vec<f64>,

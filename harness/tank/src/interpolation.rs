@@ -2,8 +2,8 @@
 
 use formulas::interpolation::{derivatives, quintic};
 
-/// Piecewise quintic through (x_i, y_i), twice continuously differentiable: [`formulas::interpolation`]. It is not
-/// limited at a turning point of the data, because the true maximum lies between the points.
+/// Piecewise quintic through (x_i, y_i), twice continuously differentiable ([`formulas::interpolation`]). It
+/// is not limited at a turning point of the data, because the true maximum lies between the points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Monotone {
     x: Vec<f64>,
@@ -15,17 +15,15 @@ pub struct Monotone {
 impl Monotone {
     /// Interpolates points with ascending `x`; one point gives a constant.
     ///
-    /// # Panics
-    /// If there is no point, or `x` is not ascending.
+    /// # Panics If there is no point, or `x` is not ascending.
     pub fn new(x: &[f64], y: &[f64]) -> Monotone {
         Monotone::interpolate(x, y, false)
     }
 
-    /// Interpolates like [`Monotone::new`], but stays between its two points everywhere, like the FMUs' tables: a
-    /// turning point of the data is one of the curve.
+    /// Interpolates like [`Monotone::new`], but stays between its two points everywhere, as the FMUs' tables
+    /// do, so that it turns where the data turn.
     ///
-    /// # Panics
-    /// The same as for [`Monotone::new`].
+    /// # Panics The same as for [`Monotone::new`].
     pub fn bounded(x: &[f64], y: &[f64]) -> Monotone {
         Monotone::interpolate(x, y, true)
     }
@@ -37,7 +35,7 @@ impl Monotone {
         Monotone { x: x.to_vec(), y: y.to_vec(), slope, curvature }
     }
 
-    /// Returns the value at `x`; outside the points that of the nearest end.
+    /// Returns the value at `x`; outside the points it is the value at the nearest end.
     pub fn evaluate(&self, x: f64) -> f64 {
         let count = self.x.len();
         let x = x.clamp(self.x[0], self.x[count - 1]);
@@ -77,8 +75,8 @@ mod tests {
         );
     }
 
-    /// Data with a jump, a plateau, and a turning point. The curve rises wherever they rise, and
-    /// two derivatives are continuous everywhere.
+    /// The data have a jump, a plateau, and a turning point. The curve rises wherever they rise, and two
+    /// derivatives are continuous everywhere.
     #[test]
     fn curve_is_monotone_where_data_are_and_twice_differentiable() {
         let x = [0.0, 0.1, 0.2, 0.5, 0.6, 0.61, 0.9, 1.0, 1.3, 1.4, 1.5];

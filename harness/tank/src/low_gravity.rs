@@ -17,39 +17,36 @@ pub struct Fluid {
 }
 
 impl Fluid {
-    /// Returns the Bond number rho g R^2/sigma.
     pub fn bond(&self, radius: f64) -> f64 {
         self.rho * self.g * radius * radius / self.sigma
     }
 }
 
-/// A mode with capillarity.
+/// A mode with capillarity: the square of its natural frequency, 1/s², and the centring `spring` at the bob,
+/// N/m, which is slightly negative for a wetting liquid at a large Bond number. `outside` has one sentence
+/// for each range of the formula that the tank is outside of. `unknown` is true if the formula does not apply
+/// to this tank and its contribution exceeds 10 % of omega^2.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Capillary {
-    /// Square of the natural frequency, 1/s².
     pub omega2: f64,
-    /// Centring spring at the bob, N/m. Slightly negative for a wetting liquid at a large Bond number.
     pub spring: f64,
-    /// One sentence for each range that the formula leaves; empty inside.
     pub outside: Vec<String>,
-    /// True if the formula does not apply to this tank and its contribution exceeds 10 % of
-    /// omega^2.
     pub unknown: bool,
 }
 
 /// Largest share of capillarity in omega^2 of a mode whose shape it changes.
 const LARGEST_SHARE: f64 = 0.1;
 
-/// Returns the specific force, m/s², below which [`flat`] is not known for a mode whose shape changes; `tension` is
-/// sigma/rho.
+/// Returns the specific force, m/s², below which [`flat`] is not known for a mode whose shape changes;
+/// `tension` is sigma/rho.
 pub fn least_gravity(mode: &Mode, tension: f64) -> f64 {
     tension * mode.surface_gradient / LARGEST_SHARE
 }
 
-/// Computes capillarity for a flat surface (contact angle 90 degrees) with a contact line free to
-/// slide at a vertical wall: omega_n^2 = g lambda_n [1 + (sigma/(rho g)) K_n], K_n = int_F
-/// (phi_r^2 + phi^2/r^2) r dr/N_n. It is exact where phi_n does not change, in cylinders, annuli (K = k^2)
-/// and boxes, and of first order in the capillary part elsewhere.
+/// Computes capillarity for a flat surface (contact angle 90 degrees) with a contact line free to slide at a
+/// vertical wall: omega_n^2 = g lambda_n [1 + (sigma/(rho g)) K_n], K_n = int_F (phi_r^2 + phi^2/r^2) r
+/// dr/N_n. It is exact where phi_n does not change, in cylinders, annuli (K = k^2) and boxes, and of first
+/// order in the capillary part elsewhere.
 pub fn flat(mode: &Mode, fluid: Fluid) -> Capillary {
     let added = fluid.sigma / fluid.rho * mode.lambda * mode.surface_gradient;
     let gravity = fluid.g * mode.lambda;
@@ -69,15 +66,13 @@ pub fn flat(mode: &Mode, fluid: Fluid) -> Capillary {
     Capillary { omega2: gravity + added, spring: mode.m * added, outside, unknown }
 }
 
-/// First zero of J1'.
 const XI: f64 = formulas::cylinder::XI[0];
-/// Bond numbers of the table's rows.
 const BOND: [f64; 6] = [0.0, 1.0, 3.0, 10.0, 30.0, 100.0];
-/// Contact angles of its columns, degrees.
 const ANGLE: [f64; 7] = [90.0, 75.0, 60.0, 45.0, 30.0, 15.0, 5.0];
-/// Omega_1^2 = omega_1^2 rho R^3/sigma of a deep cylinder with a curved meniscus, constant contact
-/// angle and free line. The values come from the capillary eigenproblem on the static meniscus,
-/// with errors of 1e-6 in both limits, and are given to their digits.
+/// Omega_1^2 = omega_1^2 rho R^3/sigma of a deep cylinder with a curved meniscus, constant contact angle and
+/// free line, for the Bond numbers `BOND` (rows) and contact angles `ANGLE`, degrees (columns). The values
+/// come from the capillary eigenproblem on the static meniscus, with errors of 1e-6 in both limits, and are
+/// given to their digits.
 const TABLE: [[f64; 7]; 6] = [
     [6.2415, 5.7952, 5.2173, 4.5463, 3.8352, 3.1642, 2.8263],
     [8.0827, 7.5726, 6.9609, 6.2873, 5.6101, 5.0195, 4.7587],
@@ -87,20 +82,19 @@ const TABLE: [[f64; 7]; 6] = [
     [190.3599, 188.8619, 187.4498, 186.2136, 185.2381, 184.6017, 184.4012],
 ];
 
-/// Returns Omega_1^2 = omega_1^2 rho R^3/sigma of a deep upright cylinder, contact angle in degrees.
+/// Returns Omega_1^2 = omega_1^2 rho R^3/sigma of a deep upright cylinder at a contact angle in degrees.
 pub fn cylinder_omega2(bond: f64, contact_angle: f64) -> f64 {
     flat_omega2(bond) + meniscus_shift(bond, contact_angle)
 }
 
-/// Returns Omega_1^2 under a flat surface, contact angle 90 degrees.
 fn flat_omega2(bond: f64) -> f64 {
     XI * bond + XI.powi(3)
 }
 
 /// Returns the shift of Omega_1^2 by the curved meniscus, relative to the flat surface.
 ///
-/// The table is interpolated in cos(angle) and ln(1 + Bo), so that 90 degrees is exact. Beyond Bo = 100 the shift
-/// approaches its limit -2 xi^2 cos(angle) as 1/Bo (shape derivative of the eigenvalue).
+/// The table is interpolated in cos(angle) and ln(1 + Bo), so that 90 degrees is exact. Beyond Bo = 100 the
+/// shift approaches its limit -2 xi^2 cos(angle) as 1/Bo (shape derivative of the eigenvalue).
 fn meniscus_shift(bond: f64, contact_angle: f64) -> f64 {
     let cosine = |angle: f64| if angle == 90.0 { 0.0 } else { angle.to_radians().cos() };
     let cos = cosine(contact_angle);
@@ -126,9 +120,9 @@ fn meniscus_shift(bond: f64, contact_angle: f64) -> f64 {
     Monotone::new(&places, &values).evaluate(bond.ln_1p())
 }
 
-/// Computes the first mode of an upright cylinder filled to `fill`, m, with a curved meniscus. The shift of Omega_1^2
-/// of the deep cylinder's meniscus, times tanh(xi h/R), is added to [`flat`]. At 90 degrees, and without surface
-/// tension, the result is exactly [`flat`]. Outside 0 to 90 degrees the nearer end is used.
+/// Computes the first mode of an upright cylinder filled to `fill`, m, with a curved meniscus. The shift of
+/// Omega_1^2 of the deep cylinder's meniscus, times tanh(xi h/R), is added to [`flat`]. At 90 degrees, and
+/// without surface tension, the result is exactly [`flat`]. Outside 0 to 90 degrees the nearer end is used.
 pub fn cylinder(
     mode: &Mode,
     radius: f64,

@@ -21,266 +21,227 @@ use crate::contour::{Problems, Volume, Wall};
 use crate::potential_flow::{Discretisation, Solution};
 use crate::spin::Spin;
 
-/// Share of the liquid's mass below which a mode has no height.
 const MASSLESS: f64 = 1e-9;
 
-/// One mode.
+/// One mode; number `n` is 1 for the lowest frequency. Heights are in m from the contour's own zero.
+///
+/// - `lambda` = omega_n^2/g, 1/m, and times the outer radius of the free surface (`lambda_r`) or the length
+///   of the box (`lambda_l`); `l` = 1/lambda is the pendulum's length, m.
+/// - `m`, `m_ratio`: slosh mass, kg, and over the mass of the liquid.
+/// - `height`, `hinge`: spring-mass or pendulum's bob at rest, and the hinge l above it; `None` if the mass
+///   is below 1e-9 of the liquid's. `m_h` and `m_h2` are m h, kg m, and m h^2, kg·m², with h = H - z_cg.
+/// - `wave`, `wave_inner`: elevation of the surface at the outer and the inner wall per angle of the
+///   pendulum, m/rad; `wave_peak` is the largest elevation anywhere (first mode only), at the radius
+///   `r_peak`, m; `shape` has (r, m/rad) from the axis or inner wall outwards.
+/// - `beta` = int_W |grad phi|^2 dS / int |grad phi|^2 dV, 1/m, for the damping by the laminar layer at the
+///   wall.
+/// - `surface_gradient` = int_F (phi_r^2 + phi^2/r^2) r dr/N, 1/m2: the contribution of capillarity to the
+///   stiffness.
+/// - `vertical_wall`: true if the walls are vertical at the free surface; `upright`: true if the bottom is
+///   flat, too, so that capillarity does not change phi_n.
+/// - `wall`: speed of the liquid along the outer wall over that of the surface at the wall.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Mode {
-    /// Number, 1 for the lowest frequency.
     pub n: usize,
-    /// lambda_n = omega_n^2/g, 1/m.
     pub lambda: f64,
-    /// lambda_n times the outer radius of the free surface.
     #[serde(rename = "lambda_R", skip_serializing_if = "Option::is_none")]
     pub lambda_r: Option<f64>,
-    /// lambda_n times the length of the box.
     #[serde(rename = "lambda_L", skip_serializing_if = "Option::is_none")]
     pub lambda_l: Option<f64>,
-    /// Slosh mass, kg.
     pub m: f64,
-    /// Slosh mass over the mass of the liquid.
     pub m_ratio: f64,
-    /// Length of the pendulum, m: 1/lambda_n.
     pub l: f64,
-    /// Height of the spring-mass, or of the pendulum's bob at rest, m from the contour's own zero;
-    /// `None` if m_n < 1e-9 m_liq.
     #[serde(rename = "H")]
     pub height: Option<f64>,
-    /// Height of the pendulum's hinge, m: H_n + l_n.
     pub hinge: Option<f64>,
-    /// Elevation of the surface at the outer wall per angle of the pendulum, m/rad.
     pub wave: f64,
-    /// Elevation of the surface at the inner wall per angle of the pendulum, m/rad.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub wave_inner: Option<f64>,
-    /// beta_n = int_W |grad phi|^2 dS / int |grad phi|^2 dV, 1/m, for the damping by the laminar
-    /// layer at the wall.
     pub beta: f64,
-    /// Largest elevation per angle anywhere on the surface, m/rad (first mode only).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub wave_peak: Option<f64>,
-    /// Radius of the largest elevation, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub r_peak: Option<f64>,
-    /// m_n h_n with h_n = H_n - z_cg, kg m.
     #[serde(skip)]
     pub m_h: f64,
-    /// m_n h_n^2, kg·m².
     #[serde(skip)]
     pub m_h2: f64,
-    /// Elevation per angle along the surface: (r, m/rad), from the axis or inner wall outwards.
     #[serde(skip)]
     pub shape: Vec<[f64; 2]>,
-    /// int_F (phi_r^2 + phi^2/r^2) r dr/N, 1/m2: the contribution of capillarity to the stiffness.
     #[serde(skip)]
     pub surface_gradient: f64,
-    /// True if the walls are vertical at the free surface.
     #[serde(skip)]
     pub vertical_wall: bool,
-    /// True if the tank has vertical walls and a flat bottom, so that capillarity does not change
-    /// phi_n.
     #[serde(skip)]
     pub upright: bool,
-    /// Speed of the liquid along the outer wall over that of the surface at the wall.
     #[serde(skip)]
     pub wall: Vec<WallSpeed>,
 }
 
-/// Speed along the outer wall at one place.
+/// Speed |phi_s|/(lambda phi(R_F)) along the outer wall at one place, r and z in m, z from the contour's own
+/// zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WallSpeed {
-    /// Radius, m.
     pub r: f64,
-    /// Height, m from the contour's own zero.
     pub z: f64,
-    /// |phi_s|/(lambda phi(R_F)).
     pub ratio: f64,
 }
 
-/// Fixed mass when the first `modes` modes are pendulums.
+/// Fixed mass, kg, when the first `modes` modes are pendulums, with its height, m from the contour's own
+/// zero, which can lie outside the tank, and its inertia across the axis about its own centre, kg·m².
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Rest {
     pub modes: usize,
-    /// Fixed mass, kg.
     pub m_0: f64,
-    /// Height of the fixed mass, m from the contour's own zero. It can lie outside the tank.
     #[serde(rename = "H_0")]
     pub height: f64,
-    /// Inertia of the fixed mass across the axis about its own centre, kg·m².
     #[serde(rename = "I_0")]
     pub inertia: f64,
 }
 
-/// Modal parameters along one horizontal axis of a box.
+/// Modal parameters along one horizontal axis of a box: inertias of the liquid about its centre of mass,
+/// kg·m², rigid and under a lid, the modes, and the fixed mass after 1, 2, ... modes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Axis {
-    /// Inertia of the rigid liquid about its centre of mass, kg·m².
     #[serde(rename = "I_frozen_cg")]
     pub i_frozen_cg: f64,
-    /// Effective inertia of the liquid under a lid about its centre of mass, kg·m².
     #[serde(rename = "I_eff_cg")]
     pub i_eff_cg: f64,
-    /// The modes.
     pub modes: Vec<Mode>,
-    /// Fixed mass after 1, 2, ... modes.
     pub rest: Vec<Rest>,
 }
 
-/// Both horizontal axes of a box.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Axes {
     pub x: Axis,
     pub y: Axis,
 }
 
-/// Damping of a tank's modes with smooth walls.
+/// Damping of a tank's modes with smooth walls, at the kinematic viscosity `nu`, m2/s, and the specific force
+/// `gravity` along the axis, m/s². `shape` is the measured shape of the wetted wall, or `other`, and `parts`
+/// are the measured shapes of parts of the wall if the whole wall is none. `correlation` is the first mode's
+/// damping from the shape's correlation, if it has one, and `taken` explains the value that was chosen. Modes
+/// are in the order of their frequency; a box has `modes` along its first and `modes_y` along its second
+/// length.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Damping {
-    /// Kinematic viscosity, m2/s.
     pub nu: f64,
-    /// Specific force along the axis at which the damping holds, m/s².
     pub gravity: f64,
-    /// Measured shape of the wetted wall, or `other`.
     pub shape: &'static str,
-    /// Damping of the first mode from the shape's correlation, if it has one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub correlation: Option<f64>,
-    /// Measured shapes of parts of the wetted wall, if the whole wall is none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub parts: Vec<DampingPart>,
-    /// Basis of the first mode's damping, with the reason.
     pub taken: String,
-    /// The modes, in the order of their frequency. Of a box, those along its first length.
     pub modes: Vec<ModeDamping>,
-    /// Damping of a box's modes along its second length.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub modes_y: Vec<ModeDamping>,
-    /// Formulas used outside their range, one sentence each.
     pub warnings: Vec<String>,
 }
 
-/// A measured shape of a part of the wetted wall.
+/// A measured shape of a part of the wetted wall: its share of the area, and the factor of its correlation
+/// over the laminar layer at its wall.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct DampingPart {
     pub shape: &'static str,
-    /// Share of the area of the wetted wall.
     pub share: f64,
-    /// Damping ratio by the shape's correlation over that of the laminar layer at its wall.
     pub factor: f64,
 }
 
-/// Natural frequencies with surface tension.
+/// Natural frequencies with surface tension `sigma`, N/m, a contact angle between surface and wall, degrees
+/// (90 is a flat surface), and the specific force `gravity` along the axis, m/s². `bond` is rho g R^2/sigma
+/// with the free surface's outer radius; a box, and a liquid without surface tension, have none. Modes are in
+/// the order of [`ModalData::modes`], those along a box's second length in `modes_y`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Capillarity {
-    /// Surface tension, N/m.
     pub sigma: f64,
-    /// Contact angle between surface and wall, degrees; 90 is a flat surface.
     pub contact_angle: f64,
-    /// Specific force along the axis at which the frequencies hold, m/s².
     pub gravity: f64,
-    /// Bond number rho g R^2/sigma with the free surface's outer radius; `None` for a box or without surface tension.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bond: Option<f64>,
-    /// The modes, in the order of [`ModalData::modes`]; for a box those along its first length.
     pub modes: Vec<CapillaryMode>,
-    /// Modes along the second length of a box.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub modes_y: Vec<CapillaryMode>,
-    /// Ranges that a formula leaves, one sentence each.
     pub warnings: Vec<String>,
 }
 
-/// One mode with surface tension.
+/// One mode with surface tension: natural frequency, rad/s, and centring stiffness at the bob, N/m, which is
+/// negative for a meniscus that softens the surface; `None` where no formula holds.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct CapillaryMode {
-    /// Natural frequency, rad/s; `None` where no formula holds.
     pub omega: Option<f64>,
-    /// Centring stiffness at the bob, N/m, negative for a meniscus that softens the surface; `None` where no formula
-    /// holds.
     pub k: Option<f64>,
 }
 
-/// The damping of one mode.
+/// The damping of one mode: natural frequency with capillarity, rad/s, damping ratio with its expected
+/// interval, and the ratio by the laminar layer at the wall alone.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ModeDamping {
-    /// Natural frequency with capillarity, rad/s.
     pub omega: f64,
-    /// Damping ratio.
     pub zeta: f64,
-    /// Expected interval of the damping ratio.
     pub interval: [f64; 2],
-    /// Damping by the laminar layer at the wall alone.
     pub laminar: f64,
 }
 
-/// Modal parameters of a tank at one fill.
+/// Modal parameters of a tank at one fill. Heights are in m from the contour's own zero, except `fill`, the
+/// height of the free surface above the lowest point.
+///
+/// - `kind`: `revolution` or `box`; `rho`: density, kg/m³.
+/// - `r_surface`, `r_inner`: outer and inner radius of the free surface, m; the inner one is 0 if the surface
+///   reaches the axis. `length_x`, `length_y`: lengths of a box, m.
+/// - `m_liq`, `z_cg`, `z_lowest`: mass of the liquid, kg, height of its centre of mass, and height of the
+///   tank's lowest point, which is 0 for shapes and boxes.
+/// - `i_frozen_cg`, `i_frozen_axis`: inertia of the rigid liquid across the axis about its centre of mass and
+///   about the axis, kg·m².
+/// - `i_eff_cg`, `i_eff_axis`: the same of the liquid under a lid; about the axis it is the inertia of the
+///   liquid that rotates with the tank, 0 in a tank of revolution.
+/// - `modes`: in the order of their frequencies, for a box those along its first length; `axes` has both.
+///   `rest`: fixed mass after 1, 2, ... modes.
+/// - `capillarity`, `damping`: if surface tension and viscosity are known. `finite_amplitude`: see
+///   [`crate::finite_amplitude`].
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ModalData {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
-    /// `revolution` or `box`.
     pub kind: &'static str,
-    /// Density, kg/m³.
     pub rho: f64,
-    /// Height of the free surface above the lowest point, m.
     pub fill: f64,
-    /// Outer radius of the free surface, m.
     #[serde(rename = "R_surface", skip_serializing_if = "Option::is_none")]
     pub r_surface: Option<f64>,
-    /// Inner radius of the free surface, m; 0 if it reaches the axis.
     #[serde(rename = "R_inner", skip_serializing_if = "Option::is_none")]
     pub r_inner: Option<f64>,
-    /// First length of a box, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub length_x: Option<f64>,
-    /// Second length, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub length_y: Option<f64>,
-    /// Mass of the liquid, kg.
     pub m_liq: f64,
-    /// Height of the liquid's centre of mass, m from the contour's own zero.
     pub z_cg: f64,
-    /// Height of the tank's lowest point, m from the contour's own zero; 0 for shapes and boxes, whose heights count
-    /// from their lowest point.
     pub z_lowest: f64,
-    /// Inertia of the rigid liquid across the axis about its centre of mass, kg·m².
     #[serde(rename = "I_frozen_cg")]
     pub i_frozen_cg: f64,
-    /// Inertia of the rigid liquid about the axis, kg·m².
     #[serde(rename = "I_frozen_axis")]
     pub i_frozen_axis: f64,
-    /// Effective inertia about the axis, kg·m²: the inertia of the liquid that rotates with the
-    /// tank (0 in a tank of revolution).
     #[serde(rename = "I_eff_axis", skip_serializing_if = "Option::is_none")]
     pub i_eff_axis: Option<f64>,
-    /// Effective inertia of the liquid under a lid, across the axis, about its centre of mass, kg·m².
     #[serde(rename = "I_eff_cg")]
     pub i_eff_cg: f64,
-    /// The modes, in the order of their frequencies; for a box those along its first length.
     pub modes: Vec<Mode>,
-    /// Fixed mass after 1, 2, ... modes.
     pub rest: Vec<Rest>,
-    /// Both axes of a box.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub axes: Option<Axes>,
-    /// Estimated error of all values except beta and I_0. It is relative for lambda and l, and otherwise a part of:
-    /// m_liq for masses; m_liq R for m_n H_n and m_0 H_0; m_liq R^2 for inertias; R for waves and z_cg. R is the outer
-    /// radius of the free surface.
+    /// Estimated error of all values except beta and I_0. It is relative for lambda and l, and otherwise a
+    /// part of: m_liq for masses; m_liq R for m_n H_n and m_0 H_0; m_liq R^2 for inertias; R for waves and
+    /// z_cg. R is the outer radius of the free surface.
     pub error: f64,
-    /// Estimated error of I_0, as a part of m_liq R^2. The fixed mass of a shallow dish is far above it, and its lever
-    /// arm multiplies the error of m_0.
+    /// Estimated error of I_0, as a part of m_liq R^2. The fixed mass of a shallow dish is far above it, and
+    /// its lever arm multiplies the error of m_0.
     #[serde(rename = "error_I_0")]
     pub error_i_0: f64,
-    /// Estimated relative error of beta.
     pub error_beta: f64,
-    /// Natural frequencies with surface tension, if it is known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub capillarity: Option<Capillarity>,
-    /// Damping, if the liquid's viscosity is known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub damping: Option<Damping>,
-    /// Amplitude dependence of the first mode, see [`crate::finite_amplitude`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub finite_amplitude: Option<FiniteAmplitude>,
     /// The liquid in steady rotation with the tank, if a rate is given.
@@ -291,14 +252,12 @@ pub struct ModalData {
     pub wall: Option<Wall>,
 }
 
-/// A mode at the free surface and the wall.
+/// A mode at the free surface and the wall, with the quantities of [`Mode`]: shape (r, elevation per angle)
+/// from the axis or inner wall outwards, and the largest elevation per angle as (r, m/rad).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Surface {
-    /// (r, elevation per angle), from the axis or inner wall outwards.
     pub(crate) shape: Vec<[f64; 2]>,
-    /// Largest elevation per angle: (r, m/rad).
     pub(crate) peak: Option<[f64; 2]>,
-    /// The same as in [`Mode`].
     pub(crate) gradient: f64,
     pub(crate) vertical_wall: bool,
     pub(crate) upright: bool,
@@ -359,8 +318,8 @@ impl Mode {
         mode
     }
 
-    /// Returns the speed along the outer wall at the height z, m from the contour's own zero. If several positions have
-    /// this height, the one nearest to the surface counts; `None` if none has.
+    /// Returns the speed along the outer wall at the height z, m from the contour's own zero. If several
+    /// positions have this height, the one nearest to the surface counts; `None` if none has.
     pub fn wall_speed(&self, z: f64) -> Option<WallSpeed> {
         let pair = self.wall.windows(2).find(|p| (p[0].z - z) * (p[1].z - z) <= 0.0)?;
         let (a, b) = (pair[0], pair[1]);
@@ -371,8 +330,8 @@ impl Mode {
 }
 
 impl ModalData {
-    /// Creates the result. `inertias`: rigid across the axis about the centre of mass, rigid about
-    /// the axis, effective.
+    /// Creates the result. `inertias` are rigid across the axis about the centre of mass, rigid about the
+    /// axis, and effective.
     pub(crate) fn new(
         kind: &'static str,
         rho: f64,
@@ -413,8 +372,8 @@ impl ModalData {
         }
     }
 
-    /// Sets the errors. The error of I_0 = I_eff - (sum m_n h_n)^2/m_0 - sum m_n h_n^2 follows by propagation. Its
-    /// derivatives by I_eff, sum m_n h_n and m_0 are 1, 2 h_0 and h_0^2.
+    /// Sets the errors. The error of I_0 = I_eff - (sum m_n h_n)^2/m_0 - sum m_n h_n^2 follows by
+    /// propagation. Its derivatives by I_eff, sum m_n h_n and m_0 are 1, 2 h_0 and h_0^2.
     pub(crate) fn set_error(&mut self, error: f64, error_beta: f64) {
         (self.error, self.error_beta) = (error, error_beta);
         let axes = self.axes.iter().flat_map(|axes| axes.x.rest.iter().chain(&axes.y.rest));
@@ -429,8 +388,9 @@ impl ModalData {
         self.error_i_0 = error * (1.0 + lever).powi(2);
     }
 
-    /// Returns natural frequencies, Hz, at the specific force `gravity`, m/s²; for a box along its first or (`along_y`)
-    /// second length. With surface tension they are those of [`Capillarity`], `None` where no formula holds.
+    /// Returns natural frequencies, Hz, at the specific force `gravity`, m/s²; for a box along its first or
+    /// (`along_y`) second length. With surface tension they are those of [`Capillarity`], `None` where no
+    /// formula holds.
     pub fn frequencies(&self, gravity: f64, along_y: bool) -> Vec<Option<f64>> {
         let omegas: Vec<Option<f64>> = match (&self.capillarity, &self.axes) {
             (Some(found), _) => {
@@ -446,7 +406,7 @@ impl ModalData {
         omegas.iter().map(|omega| omega.map(|omega| omega / core::f64::consts::TAU)).collect()
     }
 
-    /// Describes the origin of heights.
+    /// Describes for the user from which point heights count.
     pub fn origin(&self) -> String {
         if self.z_lowest.abs() < 1e-9 {
             return "z = 0 is the tank's lowest point, z up".to_string();
@@ -459,15 +419,14 @@ impl ModalData {
 
     /// Returns the fixed mass when the first `modes` modes are pendulums.
     ///
-    /// # Panics
-    /// If there are fewer modes.
+    /// # Panics If there are fewer modes.
     pub fn rest(&self, modes: usize) -> Rest {
         rest(self.m_liq, self.z_cg, self.i_eff_cg, &self.modes[..modes])
     }
 }
 
-/// Returns m_0 = m_liq - sum m_n; m_0 H_0 = m_liq z_cg - sum m_n H_n; I_0 = I_eff - m_0 H_0^2 - sum m_n H_n^2, with all
-/// heights from z_cg.
+/// Returns the fixed mass m_0 = m_liq - sum m_n with m_0 H_0 = m_liq z_cg - sum m_n H_n and I_0 = I_eff - m_0
+/// H_0^2 - sum m_n H_n^2, with all heights from z_cg.
 pub(crate) fn rest(m_liq: f64, z_cg: f64, i_eff_cg: f64, modes: &[Mode]) -> Rest {
     let m_0 = m_liq - modes.iter().map(|m| m.m).sum::<f64>();
     let h_0 = if m_0 == 0.0 { 0.0 } else { -modes.iter().map(|m| m.m_h).sum::<f64>() / m_0 };
@@ -475,14 +434,13 @@ pub(crate) fn rest(m_liq: f64, z_cg: f64, i_eff_cg: f64, modes: &[Mode]) -> Rest
     Rest { modes: modes.len(), m_0, height: z_cg + h_0, inertia: i_eff_cg - m_0 * h_0 * h_0 - m_h2 }
 }
 
-/// Modes and effective inertia from one discretisation.
 struct Approximation {
     modes: Vec<Mode>,
     i_eff: f64,
 }
 
-/// Returns the orders of the discretisations that are compared. With `panels` panels the largest
-/// one has at most about 800 unknowns. The first serves only to estimate the error.
+/// Returns the orders of the discretisations that are compared. With `panels` panels the largest one has at
+/// most about 800 unknowns. The first serves only to estimate the error.
 fn orders(panels: usize) -> [usize; 4] {
     match panels {
         0..=24 => [12, 16, 20, 24],
@@ -493,26 +451,21 @@ fn orders(panels: usize) -> [usize; 4] {
     }
 }
 
-/// Error estimate above which a finer discretisation is tried.
 const WANTED: f64 = 2e-7;
-/// Error estimate above which finer panels are tried.
 const ENOUGH: f64 = 1e-6;
-/// Largest estimated error of a valid result.
 const WORST: f64 = 1e-2;
-/// Rounding, the lower limit of an estimate.
 const ROUNDING: f64 = 1e-10;
-/// Rounding for beta, whose integrand is not smooth at corners.
+/// Rounding for beta, which is larger than elsewhere because its integrand is not smooth at corners.
 const ROUNDING_BETA: f64 = 1e-6;
 
-/// The best approximation and its estimated errors.
 struct Pair {
     better: Approximation,
     error: f64,
     error_beta: f64,
 }
 
-/// Returns the best approximation on the usual panels, or on finer ones if these are not accurate
-/// enough.
+/// Returns the best approximation and its estimated errors, on the usual panels, or on finer ones if these
+/// are not accurate enough.
 fn pair(wall: &Wall, volume: &Volume, rho: f64, modes: usize) -> Option<Pair> {
     let usual = pair_on(wall, volume, rho, modes, false);
     if usual.as_ref().is_some_and(|pair| pair.error < ENOUGH) {
@@ -544,19 +497,18 @@ fn pair_on(wall: &Wall, volume: &Volume, rho: f64, modes: usize, fine: bool) -> 
     })
 }
 
-/// Estimates the error from the last two differences between discretisations. It is their geometric mean with the last
-/// counted twice, or the last if that is larger. Convergence is irregular: two discretisations may agree by chance, so
-/// the last difference alone is not a bound. The more suddenly the difference falls, the farther the mean stays above
-/// it.
+/// Estimates the error from the last two differences between discretisations. It is their geometric mean with
+/// the last counted twice, or the last if that is larger. Convergence is irregular: two discretisations may
+/// agree by chance, so the last difference alone is not a bound. The more suddenly the difference falls, the
+/// farther the mean stays above it.
 fn estimate(before: f64, last: f64) -> f64 {
     last.max((before * last * last).cbrt())
 }
 
-/// Solves for the first `modes` modes of a liquid of density `rho` above `wall`. A full closed tank, whose `wall` has
-/// no free surface, has no modes and only the effective inertia.
+/// Solves for the first `modes` modes of a liquid of density `rho` above `wall`. A full closed tank, whose
+/// `wall` has no free surface, has no modes and only the effective inertia.
 ///
-/// # Errors
-/// If the estimated error is above 1e-2.
+/// # Errors If the estimated error is above 1e-2.
 pub(crate) fn solve(wall: Wall, rho: f64, fill: f64, modes: usize) -> Result<ModalData, Problems> {
     let volume = Volume::from_wall(&wall);
     let modes = if wall.r_outer > 0.0 { modes } else { 0 };
@@ -579,10 +531,9 @@ pub(crate) fn solve(wall: Wall, rho: f64, fill: f64, modes: usize) -> Result<Mod
     Ok(data)
 }
 
-/// Returns twice the largest differences between two discretisations, as defined at
-/// [`ModalData::error`]. The factor is needed because weak corners converge only with the fourth
-/// power of the order. With orders 12 and 16 the error of the finer one is then 0.46 of the
-/// difference, with 20 and 24 0.93.
+/// Returns twice the largest differences between two discretisations, as defined at [`ModalData::error`]. The
+/// factor is needed because weak corners converge only with the fourth power of the order. With orders 12 and
+/// 16 the error of the finer one is then 0.46 of the difference, with 20 and 24 0.93.
 fn difference(a: &Approximation, b: &Approximation, r: f64, m_liq: f64) -> (f64, f64) {
     let mut error = (a.i_eff - b.i_eff).abs() / (m_liq * r * r);
     let mut error_beta: f64 = 0.0;
@@ -603,7 +554,6 @@ fn difference(a: &Approximation, b: &Approximation, r: f64, m_liq: f64) -> (f64,
     (2.0 * error, 2.0 * error_beta)
 }
 
-/// Computes modal parameters from the solution at one discretisation.
 fn approximate(
     mesh: &Discretisation,
     wall: &Wall,
@@ -671,8 +621,8 @@ fn approximate(
 mod tests {
     use super::*;
 
-    /// Returns twice each difference over its scale: lambda and beta themselves, the liquid's 5 kg for masses, R = 2 m
-    /// for moments and waves, both for inertias.
+    /// Each difference is doubled and divided by its scale: lambda and beta themselves, the liquid's 5 kg for
+    /// masses, R = 2 m for moments and waves, both for inertias.
     #[test]
     fn each_stated_error_is_relative_to_its_reference_quantity() {
         let approximation = |change: &dyn Fn(&mut Mode)| {
@@ -709,8 +659,6 @@ mod tests {
         assert!((ratios.1.0 - 2.0 / 3.0).abs() < 1e-15 && (ratios.1.1 - 2.0 / 3.0).abs() < 1e-15);
     }
 
-    /// In a sphere filled up to a surface of 0.14 m, errors are parts of that radius, not of the
-    /// tank's.
     #[test]
     fn errors_are_relative_to_the_radius_of_the_free_surface() {
         let segments = vec![crate::curve::Segment::arc([0.0, 1.0], 1.0, -90.0, 90.0)];
@@ -732,9 +680,9 @@ mod tests {
         assert!((found.error / expected - 1.0).abs() < 1e-6, "{:e} {expected:e}", found.error);
     }
 
-    /// Solves random contours of lines, splines and ellipses with corners, fills and numbers of modes. Compares with
-    /// the result on panels of half the length, which has no point in common. Contours that the halved panels do not
-    /// resolve cannot serve as a reference.
+    /// Solves random contours of lines, splines and ellipses with corners, fills and numbers of modes.
+    /// Compares with the result on panels of half the length, which has no point in common. Contours that the
+    /// halved panels do not resolve cannot serve as a reference.
     fn errors_over_stated_ones(seeds: core::ops::Range<u64>) -> Vec<f64> {
         seeds.filter_map(error_over_stated_one).collect()
     }
@@ -797,8 +745,8 @@ mod tests {
         (off(&rough) < 1.0).then_some(ratio)
     }
 
-    /// With twice the last difference alone the error would be 0.74 (seed 7) and 0.99 (114) of the stated one, which
-    /// leaves no margin.
+    /// With twice the last difference alone the error would be 0.74 (seed 7) and 0.99 (114) of the stated
+    /// one, which leaves no margin.
     #[test]
     fn stated_errors_hold_for_random_contours() {
         for seeds in [6..8, 114..115] {

@@ -2,15 +2,14 @@
 
 use crate::curve::{Curve, Point, Segment, add, cross, dot, norm, sub};
 
-/// A corner of the boundary, by the index of the segment that starts at it.
 pub(crate) type Corner = usize;
 
-/// Part of a segment with its own coordinate v = 0..1. Counted from the segment's `end` (or start),
-/// the curve's parameter is s = s0 + length v^gamma.
+/// Part of a segment with its own coordinate v = 0..1. Counted from the segment's `end` (or start), the
+/// curve's parameter is s = s0 + length v^gamma.
 ///
-/// At a corner of interior angle al the velocity potential behaves as rho^(pi/al), rho the
-/// distance. With gamma > 1 it is a smooth function of v, and so are the singular parts of all
-/// kernels.
+/// At a corner of interior angle al the velocity potential behaves as rho^(pi/al), rho the distance. With
+/// gamma > 1 it is a smooth function of v, and so are the singular parts of all kernels. `nu` is the exponent
+/// pi/al at the corner, if gamma > 1.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Panel {
     pub(crate) segment: usize,
@@ -18,42 +17,38 @@ pub(crate) struct Panel {
     s0: f64,
     length: f64,
     pub(crate) gamma: f64,
-    /// Exponent nu of rho^nu at the corner, if gamma > 1.
     pub(crate) nu: f64,
 }
 
-/// A point of the boundary with the data for the integral equation.
+/// A point of the boundary with the data for the integral equation: unit normal `n` out of the liquid,
+/// `speed` ds/dv, m, the curve's parameter with its distances from the segment's ends, and the nearer end
+/// with the vector from there.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BoundaryPoint {
     pub(crate) p: Point,
-    /// Unit normal out of the liquid.
     pub(crate) n: Point,
-    /// ds/dv, m.
     pub(crate) speed: f64,
     segment: usize,
-    /// Curve's parameter, its distance from the segment's start and from its end.
     t: f64,
     from_start: f64,
     to_end: f64,
-    /// The nearer end of the segment, and the vector from there.
     corner: Corner,
     offset: Point,
 }
 
-/// Segments of the wall, then of the free surface, counter-clockwise in (r, z).
+/// Segments of the wall, then of the free surface, counter-clockwise in (r, z). `surface` is the index of the
+/// free surface, or the number of segments without one; `ends` are exact on the axis; `grading` holds (gamma,
+/// nu) at the start and the end of every segment.
 #[derive(Clone, Debug)]
 pub(crate) struct Boundary {
     pub(crate) segments: Vec<Segment>,
-    /// Index of the free surface among the segments, or their number without one.
     pub(crate) surface: usize,
-    /// Starts and ends, exact on the axis.
     ends: Vec<[Point; 2]>,
-    /// (gamma, nu) at the start and the end of every segment.
     grading: Vec<[(f64, f64); 2]>,
 }
 
 impl Boundary {
-    /// Creates the boundary from `wall`, from the axis or the inner contact line to the outer one,
+    /// Creates the boundary from `wall`, which runs from the axis or the inner contact line to the outer one,
     /// cut at the free surface.
     pub(crate) fn new(wall: &[Segment]) -> Boundary {
         let mut segments = wall.to_vec();
@@ -89,7 +84,6 @@ impl Boundary {
         Boundary { segments, surface, ends, grading }
     }
 
-    /// Returns the point at `v` of a panel.
     pub(crate) fn point(&self, panel: &Panel, v: f64) -> BoundaryPoint {
         let segment = &self.segments[panel.segment];
         let (power, slope) = if panel.gamma == 1.0 {
@@ -140,8 +134,8 @@ impl Boundary {
         }
     }
 
-    /// Returns the fraction s of the panel (v^gamma, also outside 0..1) whose point is nearest to
-    /// x, and the distance over the panel's local ds. `w` is x minus the start of the panel.
+    /// Returns the fraction s of the panel (v^gamma, also outside 0..1) whose point is nearest to x, and the
+    /// distance over the panel's local ds. `w` is x minus the start of the panel.
     pub(crate) fn foot(&self, panel: &Panel, w: Point) -> [f64; 2] {
         let segment = &self.segments[panel.segment];
         let run = (segment.to - segment.from).signum();
@@ -169,10 +163,10 @@ impl Boundary {
         corner == 0 && self.ends[0][0][0] == 0.0
     }
 
-    /// Cuts the boundary into panels over which the solution is smooth. No panel turns by more than
-    /// 60 degrees. None is long compared with the free surface, its distance from the surface, the
-    /// gap to another part of the boundary, or its neighbour. The panels must resolve `modes`
-    /// modes. A `fine` cut is for contours whose details the usual one does not resolve.
+    /// Cuts the boundary into panels over which the solution is smooth. No panel turns by more than 60
+    /// degrees. None is long compared with the free surface, its distance from the surface, the gap to
+    /// another part of the boundary, or its neighbour. The panels must resolve `modes` modes. A `fine` cut is
+    /// for contours whose details the usual one does not resolve.
     pub(crate) fn panels(&self, modes: usize, fine: bool) -> Vec<Panel> {
         // A thin layer or a cusp would take too many panels, so the gap has less weight then.
         let (width, many) = if fine { (0.6 * WIDTH, 2 * MANY) } else { (WIDTH, MANY) };
@@ -185,7 +179,6 @@ impl Boundary {
         self.panels_for(modes, f64::INFINITY, width, many).unwrap_or_default()
     }
 
-    /// Cuts each panel in two.
     #[cfg(test)]
     pub(crate) fn halved(panels: &[Panel]) -> Vec<Panel> {
         let halves = |panel: &Panel| {
@@ -199,7 +192,7 @@ impl Boundary {
         panels.iter().flat_map(halves).collect()
     }
 
-    /// Returns `None` if panels at most `gap` times as long as their distance from another part
+    /// Returns panels at most `gap` times as long as their distance from another part, or `None` if they
     /// would number more than `many`. Panels on the surface are at most `width` of its width.
     fn panels_for(&self, modes: usize, gap: f64, width: f64, many: usize) -> Option<Vec<Panel>> {
         // The n-th mode has n half waves on the surface.
@@ -280,19 +273,15 @@ impl Boundary {
     }
 }
 
-/// Number of segments above which a contour counts as a curve given point by point.
 const FEW: usize = 12;
-/// Number of panels that is exceeded only if the contour has many segments.
 const MANY: usize = 36;
-/// Longest panel on the free surface over the surface's width, for up to five modes.
 const WIDTH: f64 = 0.35;
-/// gamma at an apex on the axis: the exponents there are between 0.8 and 2 except for very slender
-/// cones.
+/// gamma at an apex on the axis: the exponents there are between 0.8 and 2 except for very slender cones.
 const APEX: f64 = 4.0;
 
-/// Returns gamma at a corner between two directions of travel, and nu = pi/al. gamma is a whole
-/// number, so that the curve is an analytic function of v, and gamma nu is at least 6. A contour of
-/// `many` short segments turns little at each. Such weak corners need no panels of their own.
+/// Returns gamma at a corner between two directions of travel, and nu = pi/al. gamma is a whole number, so
+/// that the curve is an analytic function of v, and gamma nu is at least 6. A contour of `many` short
+/// segments turns little at each. Such weak corners need no panels of their own.
 fn grading_at(before: Point, after: Point, many: bool) -> (f64, f64) {
     let turn = cross(before, after).atan2(dot(before, after));
     let nu = core::f64::consts::PI / (core::f64::consts::PI - turn);
@@ -305,7 +294,6 @@ fn grading_at(before: Point, after: Point, many: bool) -> (f64, f64) {
     (gamma, nu)
 }
 
-/// A candidate for a panel: fractions of a segment's parameter.
 #[derive(Clone, Debug)]
 struct Piece {
     segment: usize,
@@ -339,7 +327,6 @@ mod tests {
         vec![Segment::arc([0.0, 0.0], 0.8, -90.0, 20.0)]
     }
 
-    /// An inner corner on the floor.
     fn step() -> Vec<Segment> {
         vec![
             Segment::line([0.0, 0.3], [0.4, 0.3]),
@@ -353,9 +340,9 @@ mod tests {
         vec![Segment::arc([1.1, 0.2], 0.5, -200.0, 20.0)]
     }
 
-    /// A right angle of the liquid, pi/2, has nu = 2, a re-entrant one, 3 pi/2, has nu = 2/3. At a jump of the
-    /// curvature rho^2 log rho is smooth in the cube of v. A cusp has the largest gamma. Weak corners of many segments
-    /// count less.
+    /// A right angle of the liquid, pi/2, has nu = 2, a re-entrant one, 3 pi/2, has nu = 2/3. At a jump of
+    /// the curvature rho^2 log rho is smooth in the cube of v. A cusp has the largest gamma. Weak corners of
+    /// many segments count less.
     #[test]
     fn corners_are_graded_by_their_angle() {
         let at = |degrees: f64, many: bool| {
@@ -382,8 +369,8 @@ mod tests {
         assert_eq!(at(1.0, false).0, 6.0);
     }
 
-    /// Points begin and end with the panels, one panel after the other. ds/dv is the slope of their distance, the
-    /// normal is perpendicular and outwards, and lengths add up.
+    /// Points begin and end with the panels, one panel after the other. ds/dv is the slope of their distance,
+    /// the normal is perpendicular and outwards, and lengths add up.
     #[test]
     fn panels_follow_one_another_along_the_whole_boundary() {
         let cap = 0.8 * 20f64.to_radians().cos();
@@ -429,8 +416,6 @@ mod tests {
         }
     }
 
-    /// Near a corner positions differ by v^gamma, far below the resolution of coordinates, on one wall and across the
-    /// corner.
     #[test]
     fn differences_next_to_a_corner_keep_their_digits() {
         let boundary = Boundary::new(&step());
@@ -457,8 +442,9 @@ mod tests {
         }
     }
 
-    /// The foot of a point near an arc is at the angle of the point, and its distance is measured along the arc; near a
-    /// line, along the line. Each of the four steps reduces the error by the ratio of distance to radius, 1e-1.
+    /// The foot of a point near an arc is at the angle of the point, and its distance is measured along the
+    /// arc; near a line, along the line. Each of the four steps reduces the error by the ratio of distance to
+    /// radius, 1e-1.
     #[test]
     fn the_foot_of_a_point_is_the_nearest_of_the_panel() {
         for wall in [sphere(), ring(), step()] {
@@ -478,8 +464,8 @@ mod tests {
         }
     }
 
-    /// 60 degrees per panel, 1.05 rad: a full sphere has only three panels, because they are close neither to each
-    /// other nor to a surface.
+    /// A full sphere has only three panels of 60 degrees, because they are close neither to each other nor to
+    /// a surface.
     #[test]
     fn a_full_sphere_has_three_panels() {
         let boundary = Boundary::new(&[Segment::arc([0.0, 0.0], 1.0, -90.0, 90.0)]);
@@ -492,8 +478,6 @@ mod tests {
         }
     }
 
-    /// A panel is at most three times as long as its neighbour. In a ring the last panel and the first are neighbours,
-    /// too.
     #[test]
     fn panels_change_their_length_gradually() {
         let fine = [

@@ -19,30 +19,26 @@ use crate::table::{short, significant};
 use crate::tank::{Fill, Geometry, Shape, Tank};
 use crate::{damping, modal};
 
-/// Largest share of capillarity in the stiffness of mode 1 at which the coefficients of finite amplitude hold.
+/// Largest share of capillarity in the stiffness of mode 1 at which the coefficients of finite amplitude
+/// hold.
 const MOST_CAPILLARY: f64 = 0.1;
 
-/// Surface tension over density, m3/s2, of a liquid whose surface tension is not given: that of water, the largest of common
-/// liquids (hydrazine 6.6e-5, MMH 3.9e-5, liquid hydrogen 2.8e-5, NTO 1.9e-5, liquid oxygen 1.2e-5).
+/// Surface tension over density, m3/s2, of a liquid whose surface tension is not given: that of water, the
+/// largest of common liquids (hydrazine 6.6e-5, MMH 3.9e-5, liquid hydrogen 2.8e-5, NTO 1.9e-5, liquid oxygen
+/// 1.2e-5).
 const LARGEST_TENSION: f64 = 7.3e-5;
 
-/// The FMU that the parameters are for.
+/// The FMU that the parameters are for. HubSlosh gets a table of modes (`slosh.source = table`) and keeps the
+/// tank's position on the hub, `tank.r`; in Spacecraft the tank has a number from 1 to 4.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Target {
-    /// `HubSlosh.fmu`: a table of modes (`slosh.source = table`). The tank's position on the hub,
-    /// `tank.r`, does not change.
     HubSlosh,
-    /// `SloshTank.fmu`.
     SloshTank,
-    /// `Spacecraft.fmu`, tank 1 to 4.
-    Spacecraft {
-        /// Number of the tank.
-        tank: usize,
-    },
+    Spacecraft { tank: usize },
 }
 
 impl Target {
-    /// Returns the target's name of a variable of SloshTank's tank, `tank.mass[1]`.
+    /// Returns the target's name of a variable of SloshTank's tank, such as `tank.mass[1]`.
     pub(crate) fn name(self, of_sloshtank: &str) -> String {
         match self {
             Target::Spacecraft { tank } => {
@@ -53,23 +49,21 @@ impl Target {
     }
 }
 
-/// Properties of the liquid other than its density.
+/// Properties of the liquid other than its density: the specific force `gravity` along the axis at which
+/// damping ratios and stiffnesses hold, m/s², at least 0; kinematic viscosity `nu`, m2/s, without which the
+/// damping ratios are not set; surface tension `sigma`, N/m, without which there is no centring stiffness;
+/// and the angle between surface and wall in the liquid, degrees (90 is a flat surface).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Liquid {
-    /// Specific force along the axis at which damping ratios and stiffnesses hold, m/s²; at least
-    /// 0.
     pub gravity: f64,
-    /// Kinematic viscosity, m2/s. Without it the damping ratios are not set.
     pub nu: Option<f64>,
-    /// Surface tension, N/m; without it there is no centring stiffness.
     pub sigma: Option<f64>,
-    /// Angle between surface and wall in the liquid, degrees; 90 is a flat surface.
     pub contact_angle: f64,
 }
 
 impl Liquid {
-    /// Returns a warning if no surface tension is given and it may matter: with [`LARGEST_TENSION`] the Bond number is
-    /// below [`LOW_BOND`].
+    /// Returns a warning if no surface tension is given and it may have an effect, because with
+    /// [`LARGEST_TENSION`] the Bond number is below [`LOW_BOND`].
     fn missing_tension(&self, data: &ModalData) -> Option<String> {
         let bond = self.gravity * half_width(data).powi(2) / LARGEST_TENSION;
         let matters = self.sigma.is_none() && self.gravity > 0.0 && bond < LOW_BOND;
@@ -81,8 +75,8 @@ impl Liquid {
         })
     }
 
-    /// Returns the specific force along the axis, m/s2, below which the stiffnesses of the modes miss surface tension; `None`
-    /// if they hold down to 0.
+    /// Returns the specific force along the axis, m/s2, below which the stiffnesses of the modes miss surface
+    /// tension; `None` if they hold down to 0.
     fn lowest_gravity(&self, data: &ModalData) -> Option<f64> {
         let mode = data.modes.first()?;
         match self.sigma {
@@ -94,7 +88,8 @@ impl Liquid {
         }
     }
 
-    /// Returns whether `data` was solved with this viscosity at this gravity, surface tension and contact angle.
+    /// Returns true if `data` was solved with this viscosity at this gravity, surface tension and contact
+    /// angle.
     fn damped(&self, data: &ModalData) -> bool {
         let damping = data.damping.as_ref().map(|of| (of.nu, of.gravity));
         let surface = data.capillarity.as_ref().map(|of| (of.sigma, of.contact_angle));
@@ -103,42 +98,36 @@ impl Liquid {
     }
 }
 
-/// Returns the radius of a tank's free surface, of a box half its shorter length, m.
+/// Returns the radius of a tank's free surface, or half the shorter length of a box, m.
 fn half_width(data: &ModalData) -> f64 {
     let lengths = [data.length_x, data.length_y].into_iter().flatten();
     data.r_surface.unwrap_or_else(|| 0.5 * lengths.fold(f64::INFINITY, f64::min))
 }
 
-/// A parameter's value.
+/// Value of a parameter: a quantity in SI units, a number, a Boolean, or an item of an enumeration.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
-    /// A quantity in SI units.
     Real(f64),
-    /// An integer.
     Integer(i64),
-    /// A Boolean.
     Boolean(bool),
-    /// An item of an enumeration.
     Item(&'static str),
 }
 
-/// Parameters under the names of an FMU's variables.
+/// Parameters under the names of an FMU's variables, with lines for the user about the source and accuracy of
+/// the values (`notes`), omitted values (`warnings`), and values far outside the range of their formula,
+/// which nobody should use unseen (`unknown`). `third_order` lists the modes, which count from 1, whose
+/// coefficients are among the `values`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParameterSet {
-    /// Source and accuracy of the values, one line each.
     pub notes: Vec<String>,
-    /// Omitted or unknown values, one line each.
     pub warnings: Vec<String>,
-    /// Values far outside the range of their formula, which nobody should use unseen, one line each.
     pub unknown: Vec<String>,
-    /// Names and values.
     pub values: Vec<(String, Value)>,
-    /// Numbers of modes, from 1, with the third-order coefficients that stand in `values`.
     pub third_order: Vec<(usize, Coefficients)>,
 }
 
-/// Adds capillarity to the modes: that of a flat surface and, for the first mode of an upright cylinder, that of the
-/// meniscus at the contact angle.
+/// Adds capillarity to the modes: that of a flat surface and, for the first mode of an upright cylinder, that
+/// of the meniscus at the contact angle.
 fn with_capillarity(
     tank: &Tank,
     data: &ModalData,
@@ -183,7 +172,7 @@ fn with_capillarity(
     all
 }
 
-/// Returns the centring stiffnesses of the modes, N/m. The FMUs accept none below 0.
+/// Returns the centring stiffnesses of the modes, N/m, of which the FMUs accept none below 0.
 fn springs(
     tank: &Tank,
     data: &ModalData,
@@ -219,8 +208,8 @@ fn springs(
     all.iter().map(|capillary| capillary.spring).collect()
 }
 
-/// Returns axis and number of the modes of a box in Spacecraft, which has three: the first along each axis, and the
-/// second with the larger mass.
+/// Returns axis and number of the three modes that a box has in Spacecraft: the first along each axis, and
+/// the second with the larger mass.
 fn box_modes(axes: [&[modal::Mode]; 2]) -> Vec<(usize, usize)> {
     let mass = |axis: usize| axes[axis].get(1).map_or(0.0, |mode| mode.m);
     let mut chosen = vec![(0, 0), (1, 0)];
@@ -230,8 +219,8 @@ fn box_modes(axes: [&[modal::Mode]; 2]) -> Vec<(usize, usize)> {
     chosen
 }
 
-/// Returns warnings about the surface tension of a tank's modes: the ranges that its formulas leave, or that it is not given
-/// although it matters.
+/// Returns warnings about the surface tension of a tank's modes: the ranges that its formulas leave, or that
+/// it is not given although it has an effect.
 pub fn surface_tension_warnings(data: &ModalData, liquid: Liquid) -> Vec<String> {
     match &data.capillarity {
         Some(found) => found.warnings.clone(),
@@ -239,8 +228,8 @@ pub fn surface_tension_warnings(data: &ModalData, liquid: Liquid) -> Vec<String>
     }
 }
 
-/// Returns the natural frequencies of a tank's modes with the surface tension and contact angle of the liquid, at its
-/// gravity; `None` without surface tension.
+/// Returns the natural frequencies of a tank's modes with the surface tension and contact angle of the
+/// liquid, at its gravity; `None` without surface tension.
 pub fn tank_capillarity(
     tank: &Tank,
     data: &ModalData,
@@ -279,12 +268,11 @@ pub fn tank_capillarity(
     })
 }
 
-/// Solves a tank at a fill, and adds what depends on the liquid's other properties: capillarity, damping, and the
-/// amplitude dependence of the first mode.
+/// Solves a tank at a fill, and adds what depends on the liquid's other properties: capillarity, damping, and
+/// the amplitude dependence of the first mode.
 ///
-/// # Errors
-/// If the tank cannot hold the fill, the modes cannot be solved, or the damping has no estimate
-/// ([`Tank::height_of`], [`Tank::solve`], [`damping_of`]).
+/// # Errors If the tank cannot hold the fill, the modes cannot be solved, or the damping has no estimate
+/// ([`Tank::fill_height`], [`Tank::solve`], [`tank_damping`]).
 pub fn solve(tank: &Tank, fill: Fill, modes: usize, liquid: Liquid) -> Result<ModalData, Problems> {
     let mut data = tank.solve(tank.fill_height(fill)?, modes)?;
     data.capillarity = tank_capillarity(tank, &data, liquid);
@@ -295,11 +283,9 @@ pub fn solve(tank: &Tank, fill: Fill, modes: usize, liquid: Liquid) -> Result<Mo
     Ok(data)
 }
 
-/// Returns the damping of a tank's modes with the capillarity of the liquid, see
-/// [`damping::tank_damping`].
+/// Returns the damping of a tank's modes with the capillarity of the liquid, see [`damping::tank_damping`].
 ///
-/// # Errors
-/// Without gravity and surface tension there is no natural frequency.
+/// # Errors Without gravity and surface tension there is no natural frequency.
 pub fn tank_damping(
     tank: &Tank,
     data: &ModalData,
@@ -316,11 +302,10 @@ pub fn tank_damping(
 }
 
 impl ParameterSet {
-    /// Returns the parameters of a tank solved as `data`, with as many modes as both the tank and
-    /// the FMU have.
+    /// Returns the parameters of a tank solved as `data`, with as many modes as both the tank and the FMU
+    /// have.
     ///
-    /// # Errors
-    /// A tank that the FMU cannot represent: number above four, or full; damping ratios without a
+    /// # Errors A tank that the FMU cannot represent: number above four, or full; damping ratios without a
     /// specific force.
     pub fn new(
         tank: &Tank,
@@ -331,8 +316,9 @@ impl ParameterSet {
         ParameterSet::with_energy(tank, data, target, liquid, target != Target::HubSlosh)
     }
 
-    /// [`ParameterSet::new`] with coefficients that give the wave's energy where they are known and `has_energy` is true;
-    /// tanks with a fill table and HubSlosh have those of the third order only.
+    /// Does what [`ParameterSet::new`] does, with coefficients that give the wave's energy where they are
+    /// known and `has_energy` is true. Tanks with a fill table and HubSlosh have only those of the third
+    /// order.
     pub(crate) fn with_energy(
         tank: &Tank,
         data: &ModalData,
@@ -648,13 +634,11 @@ impl ParameterSet {
         Ok(ParameterSet { notes, warnings, unknown, values, third_order })
     }
 
-    /// Returns notes and warnings as comments for the head of a file.
     fn comments(&self) -> impl Iterator<Item = String> {
         let warnings = self.warnings.iter().map(|warning| format!("warning: {warning}"));
         self.notes.iter().cloned().chain(warnings)
     }
 
-    /// Returns the parameters as TOML.
     pub fn to_toml(&self) -> String {
         let mut text = String::new();
         for note in self.comments() {

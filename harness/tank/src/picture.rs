@@ -10,9 +10,8 @@ use crate::table::significant;
 use crate::tank::{Geometry, Tank};
 use crate::third_order::Overlaps;
 
-/// Colours of the modes, distinct also for colour-blind readers (Okabe and Ito).
+/// Colours of the modes, which colour-blind readers can tell apart (Okabe and Ito).
 const COLOURS: [&str; 5] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#8a6d00"];
-/// Number of modes drawn.
 const DRAWN: usize = 5;
 const LIQUID: &str = "#dcecf7";
 const INK: &str = "#222";
@@ -83,7 +82,6 @@ impl Frame {
     }
 }
 
-/// Returns about `count` round values within a range.
 fn ticks([from, to]: [f64; 2], count: usize) -> Vec<f64> {
     let raw = (to - from) / count.max(2) as f64;
     let power = 10f64.powf(raw.log10().floor());
@@ -112,7 +110,6 @@ fn page(width: f64, height: f64, title: &str, content: &str) -> String {
     )
 }
 
-/// Returns points of segments, close enough to look smooth.
 fn outline(segments: &[Segment]) -> Vec<Point> {
     let mut points = Vec::new();
     for segment in segments {
@@ -210,8 +207,8 @@ fn draw_tank(svg: &mut String, frame: &Frame, section: &Section) {
     }
 }
 
-/// Draws the free surface displaced by each mode, on both sides of the axis; the largest elevation
-/// is `height`.
+/// Draws the free surface displaced by each mode, on both sides of the axis; the largest elevation is
+/// `height`.
 fn draw_modes(svg: &mut String, frame: &Frame, section: &Section, modes: &[Mode], height: f64) {
     for (mode, colour) in modes.iter().take(DRAWN).zip(COLOURS) {
         let peak = mode.shape.iter().map(|p| p[1].abs()).fold(0.0, f64::max);
@@ -234,9 +231,9 @@ fn draw_modes(svg: &mut String, frame: &Frame, section: &Section, modes: &[Mode]
     }
 }
 
-/// Draws the tank in section with its liquid and the free surface in each mode, with equal largest elevations. For
-/// modes with more than 1 % of the mass it draws the pendulum's hinge and bob if they lie in the drawing. `gravity`,
-/// m/s², gives the frequencies if the result has none with surface tension.
+/// Draws the tank in section with its liquid and the free surface in each mode, with equal largest
+/// elevations. For modes with more than 1 % of the mass it draws the pendulum's hinge and bob if they lie in
+/// the drawing. `gravity`, m/s², gives the frequencies if the result has none with surface tension.
 pub fn tank(tank: &Tank, data: &ModalData, gravity: f64) -> String {
     let section = section(tank, data);
     let margin = 0.16 * section.wall.iter().map(|p| p[0]).fold(0.0, f64::max);
@@ -311,7 +308,6 @@ pub fn tank(tank: &Tank, data: &ModalData, gravity: f64) -> String {
     page(x + 280.0, (frame.top + frame.height + 60.0).max(y + 20.0), &title, &svg)
 }
 
-/// Formats a value with three significant digits.
 fn three_digits(value: f64) -> String {
     if value == 0.0 {
         return "0".into();
@@ -320,8 +316,8 @@ fn three_digits(value: f64) -> String {
     if places == 12 { format!("{value:.2e}") } else { format!("{value:.places$}") }
 }
 
-/// Draws a sweep over the fill: the tank on the left, and frequencies, mass ratios and hinges of
-/// the modes at the same height of the free surface.
+/// Draws a sweep over the fill: the tank on the left, and frequencies, mass ratios and hinges of the modes at
+/// the same height of the free surface.
 pub fn sweep(tank: &Tank, sweep: &Sweep, gravity: f64) -> String {
     let rows: Vec<&ModalData> = sweep.rows.iter().filter(|r| !r.modes.is_empty()).collect();
     let Some(last) = rows.last() else { return page(200.0, 60.0, "sweep", "") };
@@ -408,9 +404,9 @@ pub fn sweep(tank: &Tank, sweep: &Sweep, gravity: f64) -> String {
     page(left, 70.0 + chart_height + 60.0, &title, &svg)
 }
 
-/// Draws the amplitude dependence of an upright cylinder's first frequency over the depth: planar and circular shifts
-/// of omega^2 per squared slosh angle, and those of a pendulum. The third order has poles at the secondary resonances.
-/// Points mark the bench's fills, 5 and 10 cm.
+/// Draws the amplitude dependence of an upright cylinder's first frequency over the depth: planar and
+/// circular shifts of omega^2 per squared slosh angle, and those of a pendulum. The third order has poles at
+/// the secondary resonances. Points mark the bench's fills, 5 and 10 cm.
 pub fn third_order(overlaps: &Overlaps) -> String {
     let frame =
         Frame { left: 80.0, top: 96.0, width: 620.0, height: 360.0, x: [0.1, 2.0], y: [-1.0, 1.0] };
@@ -473,7 +469,6 @@ pub fn third_order(overlaps: &Overlaps) -> String {
 mod tests {
     use super::*;
 
-    /// Ticks are 1, 2 or 5 times a power of ten apart, include round ends, and are at most as many as requested.
     #[test]
     fn ticks_are_round_and_reach_both_ends() {
         for unit in [1e-9, 1e-3, 1.0, 1e6] {

@@ -21,7 +21,9 @@ use crate::gauss::{Gauss, legendre, legendre_slopes};
 use crate::panel::{Boundary, BoundaryPoint, Panel};
 use crate::ring::potential;
 
-/// A boundary cut into panels with `order` Gauss points each.
+/// A boundary cut into panels with `order` Gauss points each. `surface` is the index of the first point on
+/// the free surface; `projection` turns values at the points of a panel into coefficients of Legendre
+/// polynomials, [k * order + j].
 #[derive(Debug)]
 pub(crate) struct Discretisation {
     boundary: Boundary,
@@ -29,65 +31,57 @@ pub(crate) struct Discretisation {
     order: usize,
     rule: Gauss,
     points: Vec<BoundaryPoint>,
-    /// Index of the first point on the free surface.
     surface: usize,
-    /// Projects values at the points of a panel onto Legendre polynomials: [k * order + j].
     projection: Vec<f64>,
 }
 
-/// Solutions at the boundary's points.
+/// Solutions at the boundary's points: lambda_n, 1/m, ascending; phi_n with int phi_n^2 r ds = 1 over F; and
+/// psi.
 #[derive(Debug)]
 pub(crate) struct Solution {
-    /// lambda_n, 1/m, ascending.
     pub(crate) lambda: Vec<f64>,
-    /// phi_n at all points, sum over F of phi_n^2 r ds = 1.
     pub(crate) phi: Vec<Vec<f64>>,
-    /// psi at all points.
     pub(crate) psi: Vec<f64>,
 }
 
-/// A part [v0, v1] of a panel with points for integration over it.
+/// A part [v0, v1] of a panel with points for integration over it, and the panel's Legendre polynomials at
+/// them, one after the other.
 struct Part {
     v0: f64,
     v1: f64,
     points: Vec<BoundaryPoint>,
     weights: Vec<f64>,
-    /// Legendre polynomials of the panel at the points, one after the other.
     values: Vec<f64>,
     halves: Option<[usize; 2]>,
 }
 
-/// Number of points of the rule on a part of a panel.
 const PART: usize = 16;
 /// Sum of semi-axes of the Bernstein ellipse outside which x is far from a part.
 const FAR: f64 = 2.3;
 /// The same limit for a whole panel, which then uses its own points.
 const FAR_WHOLE: f64 = 3.0;
-/// Number of iterations for the eigenvectors. The slowest error component falls by about a third in
-/// each.
+/// Number of iterations for the eigenvectors. The slowest error component falls by about a third in each.
 const ITERATIONS: usize = 30;
-/// Number of points of the rule on each side of a point of its own panel, and the power with which
-/// the rule absorbs the logarithm.
+/// Number of points of the rule on each side of a point of its own panel, and the power with which the rule
+/// absorbs the logarithm.
 const OWN: usize = 20;
 const OWN_POWER: i32 = 5;
-/// Longest interval of v for that rule: the density is a polynomial of degree order - 1.
+/// Longest interval of v for that rule, because the density is a polynomial of degree order - 1.
 const OWN_LENGTH: f64 = 0.2;
 
 impl Discretisation {
-    /// Discretises the liquid above a wall for `modes` modes. The wall runs from the axis or the
-    /// inner contact line to the outer one. `fine` uses more and shorter panels.
+    /// Discretises the liquid above a wall for `modes` modes. The wall runs from the axis or the inner
+    /// contact line to the outer one. `fine` uses more and shorter panels.
     pub(crate) fn new(wall: &[Segment], modes: usize, order: usize, fine: bool) -> Discretisation {
         let boundary = Boundary::new(wall);
         let panels = boundary.panels(modes, fine);
         Discretisation::on_panels(boundary, panels, order)
     }
 
-    /// Returns the same panels with another number of points.
     pub(crate) fn with_order(&self, order: usize) -> Discretisation {
         Discretisation::on_panels(self.boundary.clone(), self.panels.clone(), order)
     }
 
-    /// Returns panels of half the length.
     #[cfg(test)]
     pub(crate) fn halved(&self, order: usize) -> Discretisation {
         Discretisation::on_panels(self.boundary.clone(), Boundary::halved(&self.panels), order)
@@ -123,12 +117,10 @@ impl Discretisation {
         }
     }
 
-    /// Returns the number of unknowns.
     pub(crate) fn len(&self) -> usize {
         self.points.len()
     }
 
-    /// Returns the weight r ds of every point.
     pub(crate) fn weights(&self) -> Vec<f64> {
         let weight =
             |(i, x): (usize, &BoundaryPoint)| x.p[0] * x.speed * self.rule.weights[i % self.order];
@@ -144,14 +136,12 @@ impl Discretisation {
         self.points.iter().map(|x| (x.p[1] - z0) * x.n[0] - x.p[0] * x.n[1]).collect()
     }
 
-    /// Returns the range of the points on the free surface.
     pub(crate) fn on_surface(&self) -> core::ops::Range<usize> {
         self.surface..self.points.len()
     }
 
-    /// Solves for the first `modes` modes, and psi for the normal velocity `pitch`. Returns `None`
-    /// if the matrix cannot be solved. For m = 1 the operator is regular, so this happens only with
-    /// unusable panels.
+    /// Solves for the first `modes` modes, and psi for the normal velocity `pitch`. Returns `None` if the
+    /// matrix cannot be solved. For m = 1 the operator is regular, so this happens only with unusable panels.
     pub(crate) fn solve(&self, modes: usize, pitch: &[f64]) -> Option<Solution> {
         let count = self.len();
         let surface = self.on_surface();
@@ -321,8 +311,8 @@ impl Discretisation {
         Part { v0, v1, points, weights, values, halves: None }
     }
 
-    /// Returns the preimages of the point x and of its mirror image behind the axis in the complex plane of a panel's
-    /// v. The kernels are singular at both. Returns `None` far from the panel.
+    /// Returns the preimages of the point x and of its mirror image behind the axis in the complex plane of a
+    /// panel's v. The kernels are singular at both. Returns `None` far from the panel.
     fn preimages(
         &self,
         panel: &Panel,
@@ -350,7 +340,6 @@ impl Discretisation {
         [find(self.boundary.difference(&ends[0], x)), find(sub([-x.p[0], x.p[1]], start))]
     }
 
-    /// Returns rules over the own panel for each of its points.
     fn own_rules(&self) -> Vec<OwnRule> {
         let (side, rest) = (Gauss::new(OWN), Gauss::new(PART));
         let mut rules = Vec::with_capacity(self.order);
@@ -405,9 +394,10 @@ impl Discretisation {
         basis.iter().enumerate().map(|(k, value)| value * coefficient(k)).sum()
     }
 
-    /// Returns int [u_s^2 + u^2/r^2] r ds over the free surface or the wall, with u given at all points. Near a corner
-    /// u_s behaves as rho^(nu - 1), and division of du/dv by ds/dv loses all digits. The integral over the last 1e-6 of
-    /// the panel therefore follows from the exponent (1 if nu > 1, where u_s has a limit).
+    /// Returns int [u_s^2 + u^2/r^2] r ds over the free surface or the wall, with u given at all points. Near
+    /// a corner u_s behaves as rho^(nu - 1), and division of du/dv by ds/dv loses all digits. The integral
+    /// over the last 1e-6 of the panel therefore follows from the exponent (1 if nu > 1, where u_s has a
+    /// limit).
     pub(crate) fn gradient(&self, u: &[f64], on_surface: bool) -> f64 {
         let rule = Gauss::new(24);
         let mut slopes = vec![0.0; self.order];
@@ -439,8 +429,8 @@ impl Discretisation {
         total
     }
 
-    /// Returns (r, z, |u_s|) along the wall from the outer contact line, with u given at all points. Positions near
-    /// corners, where u_s has no limit or no digits, are left out.
+    /// Returns (r, z, |u_s|) along the wall from the outer contact line, with u given at all points.
+    /// Positions near corners, where u_s has no limit or no digits, are left out.
     pub(crate) fn along_wall(&self, u: &[f64]) -> Vec<[f64; 3]> {
         let mut slopes = vec![0.0; self.order];
         let mut all = Vec::new();
@@ -463,7 +453,7 @@ impl Discretisation {
         all
     }
 
-    /// Returns position and value of the largest |u| on the free surface: (r, u).
+    /// Returns radius and value of the largest |u| on the free surface, with the sign of u.
     pub(crate) fn surface_peak(&self, u: &[f64]) -> [f64; 2] {
         let step = 1.0 / 16.0;
         let mut best = [0.0; 2];
@@ -489,9 +479,8 @@ impl Discretisation {
         best
     }
 
-    /// Returns a function given at all points, along the free surface: (r, value), with `dense`
-    /// intervals per panel. It runs from the outer contact line to the axis or inner contact line,
-    /// including both ends.
+    /// Returns a function given at all points along the free surface as (r, value), with `dense` intervals
+    /// per panel. It runs from the outer contact line to the axis or inner contact line, including both ends.
     pub(crate) fn along_surface(&self, u: &[f64], dense: usize) -> Vec<[f64; 2]> {
         let first = self.surface / self.order;
         let mut all = Vec::new();
@@ -515,7 +504,6 @@ impl Discretisation {
     }
 }
 
-/// Orthonormalises by Gram-Schmidt under the given weights, twice.
 fn orthonormalise(basis: &mut DMatrix<f64>, weights: &[f64]) {
     let product = |a: &[f64], b: &[f64]| -> f64 {
         a.iter().zip(b).zip(weights).map(|((a, b), w)| a * b * w).sum()
@@ -540,9 +528,8 @@ struct OwnRule {
     values: Vec<f64>,
 }
 
-/// Returns the sum of the semi-axes of the ellipse with foci at the ends of [v0, v1] through a
-/// point of the complex plane, over the half length. The error of Gauss with n points falls as its
-/// power -2n.
+/// Returns the sum of the semi-axes of the ellipse with foci at the ends of [v0, v1] through a point of the
+/// complex plane, over the half length. The error of Gauss with n points falls as its power -2n.
 fn bernstein(point: [f64; 2], v0: f64, v1: f64) -> f64 {
     let half = 0.5 * (v1 - v0);
     let x = (point[0] - 0.5 * (v0 + v1)) / half;
@@ -557,8 +544,6 @@ mod tests {
     use crate::curve::dot;
     use nalgebra::DVector;
 
-    /// Returns a bowl, a cylinder with an inner corner on its floor, and a ring, each with a free
-    /// surface.
     fn walls() -> [Vec<Segment>; 3] {
         [
             vec![Segment::arc([0.0, 0.1], 0.8, -90.0, 20.0)],
@@ -572,15 +557,14 @@ mod tests {
         ]
     }
 
-    /// Harmonic functions with cos theta: r, r z and r (4 z^2 - r^2), with their gradients.
     const HARMONIC: [fn(Point) -> (f64, Point); 3] = [
         |[r, _]| (r, [1.0, 0.0]),
         |[r, z]| (r * z, [z, r]),
         |[r, z]| (r * (4.0 * z * z - r * r), [4.0 * z * z - 3.0 * r * r, 8.0 * r * z]),
     ];
 
-    /// Checks Green's third identity to the error of 16 points per panel. At the step's inner edge, where r behaves as
-    /// v^9, the cubic is a polynomial of degree 27.
+    /// Green's third identity holds to the error of 16 points per panel. At the step's inner edge, where r
+    /// behaves as v^9, the cubic is a polynomial of degree 27.
     #[test]
     fn harmonic_functions_satisfy_the_integral_equation() {
         for wall in walls() {
@@ -607,8 +591,9 @@ mod tests {
         }
     }
 
-    /// r cos theta is a uniform flow, with int [u_s^2 + u^2/r^2] r ds by hand over the free surfaces and the walls.
-    /// Near the step's inner edge the last 1e-6 of a panel counts three times, as for a flow around the edge.
+    /// r cos theta is a uniform flow, with int [u_s^2 + u^2/r^2] r ds by hand over the free surfaces and the
+    /// walls. Near the step's inner edge the last 1e-6 of a panel counts three times, as for a flow around
+    /// the edge.
     #[test]
     fn the_surface_gradient_of_a_uniform_flow_is_exact() {
         let (sin, cos) = 20f64.to_radians().sin_cos();
@@ -631,8 +616,8 @@ mod tests {
         }
     }
 
-    /// Checks the radius along surface and wall, and the speed of the uniform flow along the wall, |dr/ds|. Division by
-    /// ds/dv has an error of 1e-5 nearest to corners.
+    /// Checks the radius along surface and wall, and the speed of the uniform flow along the wall, |dr/ds|.
+    /// Division by ds/dv has an error of 1e-5 nearest to corners.
     #[test]
     fn values_along_the_boundary_are_at_their_places() {
         for wall in walls() {
@@ -683,7 +668,6 @@ mod tests {
         }
     }
 
-    /// r (1 - r^2/(3 b^2)) is largest at b, 2 b/3; of either sign.
     #[test]
     fn the_surface_s_largest_elevation_is_found_between_points() {
         for (wall, b) in walls().iter().zip([0.5, 0.61, 1.2]) {
@@ -701,8 +685,6 @@ mod tests {
         }
     }
 
-    /// For 1..3 with centre 2, the points 1.25 on the real axis and 0.75 on the imaginary axis are on the ellipse with
-    /// semi-axes 5/4 and 3/4.
     #[test]
     fn bernstein_s_ellipse_has_its_foci_at_the_ends() {
         for point in [[2.0 + 1.25, 0.0], [2.0 - 1.25, 0.0], [2.0, 0.75], [2.0, -0.75]] {
@@ -711,8 +693,8 @@ mod tests {
         assert_eq!([bernstein([1.0, 0.0], 1.0, 3.0), bernstein([2.5, 0.0], 1.0, 3.0)], [1.0; 2]);
     }
 
-    /// Checks int v^k log|v - x| dv for k = 0 and 1, and of the polynomials themselves. 20 points on each side of x,
-    /// stretched by the fifth power, have an error of 1e-12 of the logarithm.
+    /// Checks int v^k log|v - x| dv for k = 0 and 1, and of the polynomials themselves. 20 points on each
+    /// side of x, stretched by the fifth power, have an error of 1e-12 of the logarithm.
     #[test]
     fn the_own_panel_s_rules_integrate_a_logarithm() {
         let mesh = Discretisation::new(&walls()[0], 3, 12, false);
@@ -744,9 +726,9 @@ mod tests {
         }
     }
 
-    /// Checks the preimages of a point and of its image behind the axis in a panel's own v. v^gamma is the foot point
-    /// on the panel plus i times the distance over the length. The preimages are closer than the rule of the panel's
-    /// own points allows.
+    /// Checks the preimages of a point and of its image behind the axis in a panel's own v. v^gamma is the
+    /// foot point on the panel plus i times the distance over the length. The preimages are closer than the
+    /// rule of the panel's own points allows.
     #[test]
     fn a_point_s_preimage_is_the_root_of_its_place() {
         let (mut graded, mut plain, mut far) = (0, 0, 0);

@@ -13,7 +13,6 @@
 /// Number of terms of the series in 1/chi^2. At chi = 3 the truncation error is below 1e-16.
 const TERMS: usize = 17;
 
-/// Coefficients of F(5/4, 3/4; 2; x), DLMF 15.2.1.
 const SERIES: [f64; TERMS] = {
     let mut c = [1.0; TERMS];
     let mut j = 1;
@@ -64,8 +63,7 @@ pub(crate) fn legendre_q(x: f64) -> (f64, f64) {
     (chi * k * big_k - 2.0 / k * big_e, 0.5 * k * (big_k - chi / x * big_e))
 }
 
-/// Returns g(x, y) and dg/dn at y. `r` and `ry` are the radii of x and y, `d` = y - x, `n` the
-/// normal at y.
+/// Returns g(x, y) and dg/dn at y. `r` and `ry` are the radii of x and y, `d` = y - x, `n` the normal at y.
 pub(crate) fn potential(r: f64, ry: f64, d: [f64; 2], n: [f64; 2]) -> (f64, f64) {
     let rr = r * ry;
     let x = (d[0] * d[0] + d[1] * d[1]) / (2.0 * rr);
@@ -79,8 +77,8 @@ pub(crate) fn potential(r: f64, ry: f64, d: [f64; 2], n: [f64; 2]) -> (f64, f64)
 mod tests {
     use super::*;
 
-    /// Q = int_0^pi cos t/sqrt(2 chi - 2 cos t) dt. The trapezoidal rule converges geometrically
-    /// for a periodic integrand. At chi >= 1.05 it is exact to rounding with 2000 points.
+    /// The reference is Q = int_0^pi cos t/sqrt(2 chi - 2 cos t) dt by the trapezoidal rule, which converges
+    /// geometrically for a periodic integrand: at chi >= 1.05 it is exact to rounding with 2000 points.
     #[test]
     fn legendre_function_is_its_integral() {
         for x in [0.05, 0.5, 1.0, 1.9999, 2.0001, 5.0, 100.0] {

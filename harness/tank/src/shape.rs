@@ -12,20 +12,16 @@ use crate::tank::Shape;
 /// Largest distance of the wetted wall from a shape, over its size.
 const SAME: f64 = 1e-6;
 
-/// Number of positions compared on each segment.
 const PLACES: usize = 64;
 
-/// A shape with measured damping, its wetted part, and its fill.
+/// A shape with measured damping, large enough for the fill, and the fill, m above the lowest point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Recognised {
-    /// The shape, large enough for the fill.
     pub shape: Shape,
-    /// Fill, m above the lowest point.
     pub fill: f64,
 }
 
 impl Recognised {
-    /// Returns the shape for the damping formulas.
     pub fn measured(&self) -> damping::Shape {
         let depth = self.fill;
         match self.shape {
@@ -41,8 +37,8 @@ impl Recognised {
     }
 }
 
-/// Recognises a wetted wall as a sphere, upright cylinder, cone or torus. `fill` is the height of
-/// the free surface above the lowest point, m.
+/// Recognises a wetted wall as a sphere, upright cylinder, cone or torus. `fill` is the height of the free
+/// surface above the lowest point, m.
 pub(crate) fn recognise(wall: &Wall, fill: f64) -> Option<Recognised> {
     let points = sampled(wall, PLACES);
     let cut = Cut::from_whole_wall(&points, fill)?;
@@ -53,21 +49,21 @@ pub(crate) fn recognise(wall: &Wall, fill: f64) -> Option<Recognised> {
     })
 }
 
-/// A measured shape of a part of the wetted wall, up from the lowest point.
+/// A measured shape of a part of the wetted wall, up from the lowest point, with the depth of liquid up to
+/// which the wall is of this shape, and its share of the wetted area.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Part {
-    /// The shape, with the depth of liquid up to which the wall is of this shape.
     pub found: Recognised,
-    /// Share of the area of the wetted wall.
     pub share: f64,
 }
 
-/// Returns the measured shapes of which a wetted wall is in part. `fill` is the height of the free surface above the
-/// lowest point, m.
+/// Returns the measured shapes of which a wetted wall is in part. `fill` is the height of the free surface
+/// above the lowest point, m.
 ///
-/// The wall up to some height is compared with the sphere, cylinder, cone or torus through its lowest point and the
-/// contact line that it would have there. It counts as this shape within 1e-6 of its size, and not at all from [`FAR`]
-/// on. A smooth step between makes the result continuous in the fill and in the shape of the tank.
+/// The wall up to some height is compared with the sphere, cylinder, cone or torus through its lowest point
+/// and the contact line that it would have there. It counts as this shape within 1e-6 of its size, and not at
+/// all from [`FAR`] on. A smooth step between makes the result continuous in the fill and in the shape of the
+/// tank.
 pub(crate) fn parts(wall: &Wall, fill: f64) -> Vec<Part> {
     let places = (SAMPLES / wall.segments.len()).clamp(2, PLACES);
     let points = sampled(wall, places);
@@ -92,8 +88,8 @@ pub(crate) fn parts(wall: &Wall, fill: f64) -> Vec<Part> {
     found
 }
 
-/// Returns the measured shapes that the whole wetted wall is near, each with a share that falls from 1 on the shape to 0
-/// at a distance of [`NEAR`]. `fill` is the height of the free surface above the lowest point, m.
+/// Returns the measured shapes that the whole wetted wall is near, each with a share that falls from 1 on the
+/// shape to 0 at a distance of [`NEAR`]. `fill` is the height of the free surface above the lowest point, m.
 pub(crate) fn nearby_shapes(wall: &Wall, fill: f64) -> Vec<Part> {
     let points = sampled(wall, PLACES);
     let Some(cut) = Cut::from_whole_wall(&points, fill) else { return Vec::new() };
@@ -113,17 +109,14 @@ pub(crate) fn nearby_shapes(wall: &Wall, fill: f64) -> Vec<Part> {
 /// Distance of the wall from a shape, over its size, from which the wall does not count as this shape.
 const FAR: f64 = 0.01;
 
-/// Distance of the wall from a shape, over depth or largest radius, from which the wall is not near this shape. A spheroid
-/// that is a few per cent off a sphere dissipates as much as the sphere.
+/// Distance of the wall from a shape, over depth or largest radius, from which the wall is not near this
+/// shape. A spheroid that is a few per cent off a sphere dissipates as much as the sphere.
 const NEAR: f64 = 0.1;
 
-/// Share of the wall below which a shape does not count.
 const LEAST: f64 = 0.02;
 
-/// Number of samples of the whole wall for [`parts`].
 const SAMPLES: usize = 256;
 
-/// Returns `places` + 1 points on each segment.
 fn sampled(wall: &Wall, places: usize) -> Vec<Point> {
     let on = |part: &Segment| -> Vec<Point> {
         (0..=places).map(|i| part.point_at(i as f64 / places as f64)).collect()
@@ -131,16 +124,14 @@ fn sampled(wall: &Wall, places: usize) -> Vec<Point> {
     wall.segments.iter().flat_map(on).collect()
 }
 
-/// The lower part of a wall, below a level.
+/// The lower part of a wall, below a level: the radii of its contact lines, m (no inner one if the wall
+/// begins on the axis), the height of its lowest point, m from the contour's own zero, and the depth at the
+/// level, m.
 #[derive(Clone, Copy)]
 struct Cut {
-    /// Radius of the inner contact line, m; `None` if the wall begins on the axis.
     inner: Option<f64>,
-    /// Radius of the outer contact line, m.
     outer: f64,
-    /// Height of the lowest point, m, from the contour's own zero.
     bottom: f64,
-    /// Depth at the level, m.
     depth: f64,
 }
 
@@ -169,7 +160,6 @@ enum Kind {
 }
 
 impl Kind {
-    /// Returns the shape through the lowest point and the contact lines.
     fn shape_through(self, cut: Cut) -> Option<Shape> {
         let Cut { outer, depth, .. } = cut;
         match (self, cut.inner) {
@@ -191,7 +181,8 @@ impl Kind {
         }
     }
 
-    /// Returns the part of the wall that is of this kind, without regard to other kinds; `None` below [`LEAST`].
+    /// Returns the part of the wall that is of this kind, without regard to other kinds; `None` below
+    /// [`LEAST`].
     fn part(self, points: &[Point], fill: f64) -> Option<Part> {
         let whole = Cut::from_whole_wall(points, fill)?;
         let lowest =
@@ -268,7 +259,6 @@ fn dimensions(shape: &Shape) -> [f64; 2] {
     }
 }
 
-/// Returns the radius at which the line between two points has the height z.
 fn crossing(a: Point, b: Point, z: f64) -> f64 {
     a[0] + (z - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
 }

@@ -8,16 +8,13 @@ use crate::curve::{Curve, Point, Segment, cross, dot, norm, sub};
 /// Angle between straight pieces, rad, above which the curve keeps a corner.
 const CORNER: f64 = 0.7;
 
-/// Number of points above which points are thinned out.
 const MANY: usize = 100;
 
-/// Fits cubic splines through the points, twice continuously differentiable between corners. A
-/// point where the polyline turns by more than 40 degrees is a corner. At the axis the curve is
-/// horizontal. At its other ends and at corners its third derivative is constant over two intervals
-/// (not-a-knot).
+/// Fits cubic splines through the points, twice continuously differentiable between corners. A point where
+/// the polyline turns by more than 40 degrees is a corner. At the axis the curve is horizontal. At its other
+/// ends and at corners its third derivative is constant over two intervals (not-a-knot).
 ///
-/// # Errors
-/// Two equal points in succession.
+/// # Errors Two equal points in succession.
 pub(crate) fn spline(points: &[Point]) -> Result<Vec<Segment>, Problems> {
     let same: Vec<String> = points
         .windows(2)
@@ -119,8 +116,7 @@ fn smooth(points: &[Point], segments: &mut Vec<Segment>) {
 mod tests {
     use super::*;
 
-    /// Returns value and first three derivatives by arc length of the polyline at both ends of
-    /// every piece.
+    /// Returns value and first three derivatives by arc length of the polyline at both ends of every piece.
     fn derivatives(points: &[Point]) -> Vec<[[Point; 4]; 2]> {
         let pieces = spline(points).unwrap();
         let one = |(segment, p): (&Segment, &[Point])| {
@@ -148,7 +144,6 @@ mod tests {
         assert!(norm(sub(a, b)) < 1e-10 * (1.0 + norm(b)), "{a:?} {b:?}");
     }
 
-    /// Points at unequal distances, none at the axis.
     const POINTS: [Point; 6] =
         [[1.0, 0.0], [1.3, 0.2], [1.4, 0.5], [1.35, 0.9], [1.1, 1.2], [0.9, 1.3]];
 

@@ -7,11 +7,11 @@ use svgtypes::{PathParser, PathSegment};
 use crate::contour::Problems;
 use crate::curve::{Curve, Point, Segment, cross, dot, sub};
 
-/// Reads the first `<path>` of a drawing, with the axis at x = 0, y downwards, and `scale` m per unit. Supports lines,
-/// cubic and quadratic curves, and arcs with unrotated axes. Leaves out lines that close the path along the axis.
+/// Reads the first `<path>` of a drawing, with the axis at x = 0, y downwards, and `scale` m per unit.
+/// Supports lines, cubic and quadratic curves, and arcs with unrotated axes. Leaves out lines that close the
+/// path along the axis.
 ///
-/// # Errors
-/// A file that cannot be read or has no path, a transform, rotated arcs, several subpaths.
+/// # Errors A file that cannot be read or has no path, a transform, rotated arcs, several subpaths.
 pub(crate) fn read(path: &Path, scale: f64) -> Result<Vec<Segment>, Problems> {
     let text = crate::contour::read_text(path)
         .map_err(|why| Problems::from(format!("{}: {why}", path.display())))?;
@@ -19,7 +19,6 @@ pub(crate) fn read(path: &Path, scale: f64) -> Result<Vec<Segment>, Problems> {
     segments.map_err(|fault| Problems::from(format!("{}: {fault}", path.display())))
 }
 
-/// Reason why a drawing cannot be read.
 #[derive(Debug, thiserror::Error)]
 enum Fault {
     #[error("not well-formed: {0}.")]
@@ -36,7 +35,6 @@ enum Fault {
     Rotated,
 }
 
-/// Returns the `d` of the first path.
 fn first_path(text: &str) -> Result<String, Fault> {
     // drawing programs write SVG's document type
     let options = roxmltree::ParsingOptions { allow_dtd: true, ..Default::default() };
@@ -147,14 +145,12 @@ fn bezier([a, b, c, d]: [Point; 4]) -> Segment {
     Segment { curve: Curve::Cubic { c: coefficients }, from: 0.0, to: 1.0 }
 }
 
-/// Returns a quadratic curve as a cubic one.
 fn raised([a, b, c]: [Point; 3]) -> Segment {
     let third = |p: Point, q: Point| [(p[0] + 2.0 * q[0]) / 3.0, (p[1] + 2.0 * q[1]) / 3.0];
     bezier([a, third(a, b), third(c, b), c])
 }
 
-/// Creates the arc between two points of an ellipse, `up` counter-clockwise (SVG 2, appendix
-/// B.2.4).
+/// Creates the arc between two points of an ellipse, `up` counter-clockwise (SVG 2, appendix B.2.4).
 fn arc(p: Point, q: Point, rx: f64, ry: f64, large: bool, up: bool) -> Segment {
     let (rx, ry) = (rx.abs(), ry.abs());
     // on the unit circle
@@ -184,8 +180,8 @@ mod tests {
     use super::*;
     use core::f64::consts::{PI, TAU};
 
-    /// Between (2, 0) and (0, 1) of an ellipse of 2 by 1 there are four arcs. They are a quarter and three quarters,
-    /// about one of two centres and in either direction.
+    /// Between (2, 0) and (0, 1) of an ellipse of 2 by 1 there are four arcs. They are a quarter and three
+    /// quarters, about one of two centres and in either direction.
     #[test]
     fn the_four_arcs_between_two_points_have_their_turns_and_centres() {
         let (p, q) = ([2.0, 0.0], [0.0, 1.0]);
@@ -221,9 +217,10 @@ mod tests {
         assert!((found.to - found.from - PI).abs() < 1e-15);
     }
 
-    /// A smooth curve begins with the mirrored last control point, or with its own start if the previous curve is of
-    /// another kind. (1, 0), (2, 1) ends with the slope (1, 1), so the next control point is (3, 2). Horizontal and
-    /// vertical lines keep the other coordinate. The test covers absolute and relative commands, with y down.
+    /// A smooth curve begins with the mirrored last control point, or with its own start if the previous
+    /// curve is of another kind. (1, 0), (2, 1) ends with the slope (1, 1), so the next control point is (3,
+    /// 2). Horizontal and vertical lines keep the other coordinate. The test covers absolute and relative
+    /// commands, with y down.
     #[test]
     fn short_svg_commands_equal_the_long_ones() {
         let read = |path: &str| segments(path, 0.5).unwrap();

@@ -9,10 +9,10 @@ use crate::modal::{ModalData, Mode, Rest, rest};
 use crate::parameters::{Liquid, tank_damping};
 use crate::tank::Tank;
 
-/// Modal parameters at ascending fills.
+/// Modal parameters at ascending fills, one row each. Without liquid or without a free surface a row has no
+/// modes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sweep {
-    /// One result for each fill. Without liquid or without a free surface it has no modes.
     pub rows: Vec<ModalData>,
 }
 
@@ -20,8 +20,7 @@ pub struct Sweep {
 ///
 /// A fill of 0 or without a free surface gives a row without modes.
 ///
-/// # Errors
-/// Lists the problems of all fills; also if the fills do not ascend.
+/// # Errors Lists the problems of all fills; also if the fills do not ascend.
 pub fn sweep(tank: &Tank, fills: &[f64], modes: usize) -> Result<Sweep, Problems> {
     let mut problems = Vec::new();
     if fills.is_empty() {
@@ -42,10 +41,7 @@ pub fn sweep(tank: &Tank, fills: &[f64], modes: usize) -> Result<Sweep, Problems
 }
 
 impl Sweep {
-    /// Computes the damping of every row that has modes, see [`damping_of`].
-    ///
-    /// # Errors
-    /// Those of [`damping_of`].
+    /// Computes the damping of every row that has modes, with the errors of [`tank_damping`].
     pub fn damp(&mut self, tank: &Tank, nu: f64, liquid: Liquid) -> Result<(), Problems> {
         for row in self.rows.iter_mut().filter(|row| !row.modes.is_empty()) {
             row.damping = Some(tank_damping(tank, row, nu, liquid)?);
@@ -53,17 +49,18 @@ impl Sweep {
         Ok(())
     }
 
-    /// Computes the third-order coefficients of every row that has modes, see [`finite_amplitude::amplitude_dependence`].
+    /// Computes the third-order coefficients of every row that has modes, see
+    /// [`finite_amplitude::amplitude_dependence`].
     pub fn add_third_order(&mut self, tank: &Tank) {
         for row in self.rows.iter_mut().filter(|row| !row.modes.is_empty()) {
             row.finite_amplitude = Some(finite_amplitude::amplitude_dependence(tank, row));
         }
     }
 
-    /// Returns comma-separated values with a heading; columns of modes that a row lacks are empty. Units SI;
-    /// H and hinge from the contour's own zero. Damping ratios with the ends of their intervals, and the third-order
-    /// coefficients of mode 1 with their error and the largest angle of their validity, rad, have columns if any row has
-    /// them. The columns are empty where they are not known.
+    /// Returns comma-separated values with a heading; columns of modes that a row lacks are empty. Units are
+    /// SI; H and hinge count from the contour's own zero. Damping ratios with the ends of their intervals,
+    /// and the third-order coefficients of mode 1 with their error and the largest angle of their validity,
+    /// rad, have columns if any row has them. The columns are empty where they are not known.
     pub fn to_csv(&self) -> String {
         let modes = self.rows.iter().map(|r| r.modes.len()).max().unwrap_or(0);
         let is_damped = self.rows.iter().any(|row| row.damping.is_some());
@@ -143,51 +140,42 @@ impl Sweep {
     }
 }
 
-/// Modal parameters of a tank that empties, as functions of the fill with two continuous derivatives, monotone wherever
-/// the table is (see [`Monotone`]). Where the wall has a corner or a jump of curvature, the true functions are less
-/// smooth. The error there is that of the fills' spacing.
+/// Modal parameters of a tank that empties, as functions of the fill with two continuous derivatives,
+/// monotone wherever the table is (see [`Monotone`]). Where the wall has a corner or a jump of curvature, the
+/// true functions are less smooth. The error there is that of the fills' spacing.
 ///
-/// Interpolation covers m_liq, z_cg, the pendulums' l_n, and, over m_liq, the masses m_n, m_n h_n (H is unbounded for
-/// small m), the rigid inertias and I_0. m_0, H_0 and I_eff follow from these, so that mass and moment are those of the
-/// liquid and I_0 stays positive.
+/// Interpolation covers m_liq, z_cg, the pendulums' l_n, and, over m_liq, the masses m_n, m_n h_n (H is
+/// unbounded for small m), the rigid inertias and I_0. m_0, H_0 and I_eff follow from these, so that mass and
+/// moment are those of the liquid and I_0 stays positive.
 #[derive(Clone, Debug)]
 pub struct Depletion {
     range: [f64; 2],
-    /// m_liq, z_cg, rigid inertias across and about the axis over m_liq, I_0 over m_liq.
     liquid: [Monotone; 5],
     modes: Vec<ModeTable>,
 }
 
-/// l, m, m h, m h^2 (over m_liq), wave, beta of one mode.
+/// Curves of one mode: l, m, m h, m h^2 (over m_liq), wave, beta.
 #[derive(Clone, Debug)]
 struct ModeTable([Monotone; 6]);
 
-/// Modal parameters at one fill, interpolated.
+/// Modal parameters at one fill, interpolated, with the names and units of [`ModalData`]. The modes have no
+/// shapes, and `rest` is the fixed mass when all these modes are pendulums.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AtFill {
-    /// Height of the free surface above the lowest point, m.
     pub fill: f64,
-    /// Mass of the liquid, kg.
     pub m_liq: f64,
-    /// Height of its centre of mass, m.
     pub z_cg: f64,
-    /// Rigid inertia across the axis about the centre of mass, kg·m².
     pub i_frozen_cg: f64,
-    /// Rigid inertia about the axis, kg·m².
     pub i_frozen_axis: f64,
-    /// Effective inertia across the axis about the centre of mass, kg·m².
     pub i_eff_cg: f64,
-    /// The modes; their shapes are empty.
     pub modes: Vec<Mode>,
-    /// Fixed mass when all these modes are pendulums.
     pub rest: Rest,
 }
 
 impl Depletion {
     /// Creates the functions from the rows of a sweep that have modes.
     ///
-    /// # Errors
-    /// If fewer than two rows have modes.
+    /// # Errors If fewer than two rows have modes.
     pub fn new(sweep: &Sweep) -> Result<Depletion, Problems> {
         let rows: Vec<&ModalData> = sweep.rows.iter().filter(|r| !r.modes.is_empty()).collect();
         if rows.len() < 2 {
@@ -223,12 +211,11 @@ impl Depletion {
         })
     }
 
-    /// Returns the smallest and largest fill of the table, m.
     pub fn range(&self) -> [f64; 2] {
         self.range
     }
 
-    /// Returns the parameters at a fill; outside the table's range those at its nearest end.
+    /// Returns the parameters at a fill, m; outside the table's range those at its nearest end.
     pub fn parameters_at(&self, fill: f64) -> AtFill {
         let fill = fill.clamp(self.range[0], self.range[1]);
         let [m_liq, z_cg, across, axial, inertia] =

@@ -6,19 +6,18 @@ use crate::coefficients::FiniteAmplitude;
 use crate::modal::{Axis, Capillarity, Damping, ModalData, Mode, Rest};
 use crate::spin::Spin;
 
-/// Formats a length in m to 1e-9 m without trailing zeros; fills from a volume have 17 digits.
+/// Formats a length in m to 1e-9 m without trailing zeros, because fills from a volume have 17 digits.
 pub(crate) fn short(length: f64) -> String {
     format!("{length:.9}").trim_end_matches('0').trim_end_matches('.').to_string()
 }
 
-/// Formats a number to seven digits, without rounding noise.
 pub(crate) fn significant(value: f64) -> String {
     let rounded: f64 = format!("{value:.6e}").parse().unwrap_or(value);
     if rounded == 0.0 { "0".into() } else { rounded.to_string() }
 }
 
-/// Returns the result as text: liquid, modes, rigid liquid, and the error. `gravity`, m/s², gives the frequencies if
-/// the result has none with surface tension.
+/// Returns the result as text: liquid, modes, rigid liquid, and the error. `gravity`, m/s², gives the
+/// frequencies if the result has none with surface tension.
 pub fn table(data: &ModalData, gravity: f64) -> String {
     let mut text = String::new();
     let name = data.name.as_deref().unwrap_or("tank");

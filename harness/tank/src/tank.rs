@@ -10,7 +10,6 @@ use crate::curve::{Curve, Point, Segment};
 use crate::modal::{self, ModalData};
 use crate::spline::spline;
 
-/// Contents of the file.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
@@ -26,7 +25,6 @@ struct File {
     shape: Option<Shape>,
 }
 
-/// One entry of `profile`.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum Entry {
@@ -37,45 +35,32 @@ enum Entry {
     Cosine([f64; 6]),
 }
 
-/// A tank given by its dimensions, m and degrees. Its lowest point is at z = 0.
+/// A tank given by its dimensions, m and degrees, with its lowest point at z = 0.
+///
+/// - `Cylinder`: upright, with flat ends. `Annulus`: upright, with a flat bottom.
+/// - `Spheroid`: ellipsoid of revolution about the vertical axis.
+/// - `Cone`: apex at the bottom, open at the top.
+/// - `DomedCylinder`: elliptical domes; `bottom` and `top` are their heights, 0 for flat ends; below 0 the
+///   bottom bulges into the tank.
+/// - `Torispherical`: heads with a spherical crown and a toroidal knuckle.
+/// - `Torus`: ring with a circular section, its axis vertical.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Shape {
-    /// Upright circular cylinder with flat ends.
     Cylinder { radius: f64, height: f64 },
-    /// Sphere.
     Sphere { radius: f64 },
-    /// Ellipsoid of revolution about the vertical axis.
-    Spheroid {
-        radius: f64,
-        /// Half of its height.
-        half_height: f64,
-    },
-    /// Cone with its apex at the bottom, open at the top.
+    Spheroid { radius: f64, half_height: f64 },
     Cone { half_angle: f64, height: f64 },
-    /// Cylinder with elliptical domes.
-    DomedCylinder {
-        radius: f64,
-        height: f64,
-        /// Depth of the bottom dome; 0 is flat, below 0 it bulges into the tank.
-        bottom: f64,
-        /// Height of the top dome; 0 is flat.
-        top: f64,
-    },
-    /// Cylinder with torispherical heads: a spherical crown and a toroidal knuckle.
+    DomedCylinder { radius: f64, height: f64, bottom: f64, top: f64 },
     Torispherical { radius: f64, height: f64, crown_radius: f64, knuckle_radius: f64 },
-    /// Upright annular cylinder with a flat bottom.
     Annulus { inner_radius: f64, outer_radius: f64, height: f64 },
-    /// Ring with a circular section, its axis vertical.
     Torus { ring_radius: f64, tube_radius: f64 },
 }
 
 impl Shape {
     /// Returns the generating curve.
     ///
-    /// # Errors
-    ///
-    /// Lists every dimension that is not allowed.
+    /// # Errors Lists every dimension that is not allowed.
     pub fn segments(&self) -> Result<Vec<Segment>, Problems> {
         let mut problems = Vec::new();
         let mut above = |name: &str, value: f64, limit: f64| {
@@ -166,40 +151,31 @@ impl Shape {
     }
 }
 
-/// Shape of a tank.
+/// Shape of a tank: a body of revolution, with the shape from which it was built, if any, or a box that is
+/// open at the top, lengths in m.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Geometry {
-    /// A body of revolution.
-    Revolution {
-        contour: Contour,
-        /// The shape from which it was built, if any.
-        shape: Option<Shape>,
-    },
-    /// A box, lengths in m; open at the top.
+    Revolution { contour: Contour, shape: Option<Shape> },
     Box { length_x: f64, length_y: f64 },
 }
 
-/// A tank and its liquid.
+/// A tank and its liquid, whose density is in kg/m³.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tank {
     pub name: Option<String>,
-    /// Density of the liquid, kg/m³.
     pub density: f64,
     pub geometry: Geometry,
 }
 
-/// Amount of liquid in a tank.
+/// Amount of liquid in a tank: height of the free surface above the tank's lowest point, m; part of the
+/// tank's volume, 1 for a full tank; or mass of the liquid, kg.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Fill {
-    /// Height of the free surface above the tank's lowest point, m.
     Height(f64),
-    /// Part of the tank's volume, 1 for a full tank.
     Share(f64),
-    /// Mass of the liquid, kg.
     Mass(f64),
 }
 
-/// A text that is no [`Fill`].
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("`{0}` is neither a height in m (1.2) nor per cent of the volume (60%)")]
 pub struct NotAFill(String);
@@ -217,26 +193,23 @@ impl core::str::FromStr for Fill {
     }
 }
 
-/// Largest number of segments; each takes panels of its own.
+/// Largest number of segments, because each takes panels of its own.
 const MOST_SEGMENTS: usize = 200;
 
-/// The largest number of modes.
 pub const MOST_MODES: usize = 20;
 
 impl Tank {
-    /// Reads a file. Other files that it names are relative to it.
+    /// Reads the file of a tank. Other files that it names are relative to it.
     ///
-    /// # Errors
-    /// Lists all problems of the file.
+    /// # Errors Lists all problems of the file.
     pub fn read(path: &Path) -> Result<Tank, Problems> {
         let text = crate::contour::read_text(path)?;
         Tank::parse(&text, path.parent().unwrap_or(Path::new("")))
     }
 
-    /// Parses the text of a file; `folder` is the folder of the files that it names.
+    /// Parses the text of a tank's file; `folder` is the folder of the files that it names.
     ///
-    /// # Errors
-    /// Lists all problems of the file.
+    /// # Errors Lists all problems of the file.
     pub fn parse(text: &str, folder: &Path) -> Result<Tank, Problems> {
         let file: File =
             toml::from_str(text).map_err(|error| error.to_string().trim_end().to_string())?;
@@ -304,8 +277,7 @@ impl Tank {
 
     /// Creates a tank from a shape, with a liquid of `density`, kg/m³.
     ///
-    /// # Errors
-    /// Lists every dimension outside its range.
+    /// # Errors Lists every dimension outside its range.
     pub fn from_shape(shape: Shape, density: f64) -> Result<Tank, Problems> {
         let geometry = revolution(shape.segments()?, Some(shape))?;
         Ok(Tank { name: None, density, geometry })
@@ -319,11 +291,11 @@ impl Tank {
         }
     }
 
-    /// Returns the height of the free surface above the lowest point, m, at a fill. A part of the volume and a mass may
-    /// be 0 or the tank's whole capacity. A height is returned unchanged.
+    /// Returns the height of the free surface above the lowest point, m, at a fill. A part of the volume and
+    /// a mass may be 0 or the tank's whole capacity. A height is returned unchanged.
     ///
-    /// # Errors
-    /// If it is more than the tank holds or less than 0, or a part of a box, which is open at the top.
+    /// # Errors If it is more than the tank holds or less than 0, or a part of a box, which is open at the
+    /// top.
     pub fn fill_height(&self, fill: Fill) -> Result<f64, Problems> {
         let capacity = match &self.geometry {
             Geometry::Revolution { contour, .. } => Some(contour.capacity()),
@@ -365,11 +337,10 @@ impl Tank {
         })
     }
 
-    /// Returns the mass of the liquid at `fill`, m above the lowest point, kg: that of [`Tank::solve`], without solving
-    /// for modes where these take time.
+    /// Returns the mass of the liquid at `fill`, m above the lowest point, kg, which is the mass of
+    /// [`Tank::solve`], without solving for modes where these take time.
     ///
-    /// # Errors
-    /// A fill outside the tank.
+    /// # Errors A fill outside the tank.
     pub fn mass(&self, fill: f64) -> Result<f64, Problems> {
         let wall = match &self.geometry {
             Geometry::Revolution {
@@ -385,14 +356,13 @@ impl Tank {
         }
     }
 
-    /// Solves for the modal parameters at `fill`, m above the lowest point, with `modes` modes. A full closed tank has
-    /// no free surface and no modes.
+    /// Solves for the modal parameters at `fill`, m above the lowest point, with `modes` modes. A full closed
+    /// tank has no free surface and no modes.
     ///
-    /// Cylinders and annuli given by their dimensions, and boxes, have a closed form. The boundary
-    /// integral equation solves all others.
+    /// Cylinders and annuli given by their dimensions, and boxes, have a closed form. The boundary integral
+    /// equation solves all others.
     ///
-    /// # Errors
-    /// A fill outside the tank, a number of modes that is not 1 to [`MOST_MODES`].
+    /// # Errors A fill outside the tank, a number of modes that is not 1 to [`MOST_MODES`].
     pub fn solve(&self, fill: f64, modes: usize) -> Result<ModalData, Problems> {
         let mut problems = Vec::new();
         if !(1..=MOST_MODES).contains(&modes) {
@@ -452,7 +422,6 @@ impl Tank {
         self.described(data)
     }
 
-    /// Adds the tank's name and the height of its lowest point.
     fn described(&self, mut data: ModalData) -> ModalData {
         data.name.clone_from(&self.name);
         if let Geometry::Revolution { contour, shape: None } = &self.geometry {
@@ -461,8 +430,8 @@ impl Tank {
         data
     }
 
-    /// Returns the result for the full closed tank, without free surface and modes; `None` if
-    /// `fill` is not full.
+    /// Returns the result for the full closed tank, without free surface and modes; `None` if `fill` is not
+    /// full.
     fn full(&self, fill: f64) -> Option<ModalData> {
         let Geometry::Revolution { contour, .. } = &self.geometry else { return None };
         if (fill / contour.depth() - 1.0).abs() > 1e-9 {
@@ -515,7 +484,7 @@ fn segment(entry: &Entry) -> Segment {
     }
 }
 
-/// Reads two columns r, z in m. A first line without numbers is a heading, `#` begins a comment.
+/// Reads two columns r, z in m. A first line without numbers is a heading, and `#` begins a comment.
 fn read_points(path: &Path) -> Result<Vec<Point>, Problems> {
     let mut reader = csv::ReaderBuilder::new()
         .has_headers(false)

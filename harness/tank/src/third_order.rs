@@ -50,38 +50,36 @@ use nalgebra::{DMatrix, Matrix2, Vector2};
 
 use crate::gauss::{Gauss, legendre, legendre_slopes};
 
-/// Relative distance of 2 omega_1 from the frequency of an excited mode below which the third order
-/// is not valid.
+/// Relative distance of 2 omega_1 from the frequency of an excited mode below which the third order is not
+/// valid.
 pub const DETUNING: f64 = 0.01;
 
-/// A mode that the square of the first mode excites.
+/// A mode that the square of the first mode excites, with its wave number `kappa`, 1/m.
+///
+/// - `mode` names it: azimuthal number and number from 1 in round sections, half waves over the angle and
+///   number from 1 in sectors, half waves along the motion and across it in boxes.
+/// - `planar`, `circular`: squared projections on chi over N and the first mode's N. The first is that of
+///   (X^2 + Y^2)/2, which excites the frequency 0. The second, at 2 omega, is that of (X^2 - Y^2)/2 plus that
+///   of X Y.
+/// - `at_wall`: C chi/N at the wall, planar motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Excited {
-    /// Name of the mode. Round sections: azimuthal number, and number from 1. Sectors: half waves over
-    /// the angle, and number from 1. Boxes: half waves along the motion and across it.
     pub mode: [usize; 2],
-    /// Wave number kappa, 1/m.
     pub kappa: f64,
-    /// Squared projections on chi over N and the first mode's N, for planar motion. The first is that of (X^2 + Y^2)/2,
-    /// which excites the frequency 0. The second, at 2 omega, is that of (X^2 - Y^2)/2 plus that of X Y.
     pub planar: [f64; 2],
-    /// The same for circular motion.
     pub circular: [f64; 2],
-    /// C chi/N at the wall, planar motion.
     pub at_wall: f64,
 }
 
-/// The first mode and the modes that its square excites: independent of the depth.
+/// The first mode and the modes that its square excites, independent of the depth. `k` is the first mode's
+/// wave number, 1/m, and `amplitude` is a per slosh angle, m: int psi x/int psi^2, with x along the motion.
+/// `fourth` is int psi^4/int psi^2 of planar motion and 2 int [(X^2 - Y^2)^2/4 + X^2 Y^2]/int psi^2 of
+/// circular motion, `None` if the section has none.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Overlaps {
-    /// Wave number k of the first mode, 1/m.
     pub k: f64,
-    /// int psi^4/int psi^2 of planar motion. For circular motion 2 int [(X^2 - Y^2)^2/4 + X^2 Y^2]/int psi^2, `None` if the
-    /// section has none.
     pub fourth: [Option<f64>; 2],
-    /// Amplitude a per slosh angle, m: int psi x/int psi^2, with x along the motion.
     pub amplitude: f64,
-    /// The excited modes.
     pub excited: Vec<Excited>,
 }
 
@@ -91,8 +89,8 @@ impl Overlaps {
         Overlaps::round(0.0, 1.0, count)
     }
 
-    /// Computes the overlaps of a circular (`inner` = 0) or annular section with `count` modes of each azimuthal
-    /// number, radii in m.
+    /// Computes the overlaps of a circular (`inner` = 0) or annular section with `count` modes of each
+    /// azimuthal number, radii in m.
     pub fn round(inner: f64, outer: f64, count: usize) -> Overlaps {
         let [first, mean, double] = [1.0, 0.0, 2.0].map(|nu| Radial::new(inner, outer, nu, count));
         Overlaps::from_waves(&first, &mean, &double)
@@ -130,8 +128,9 @@ impl Overlaps {
         }
     }
 
-    /// Computes the overlaps of a sector of `angle`, rad, between the radii `inner` and `outer`, m, with `count` modes of
-    /// each number of half waves over the angle. Motion along the bisector, or `across` it.
+    /// Computes the overlaps of a sector of `angle`, rad, between the radii `inner` and `outer`, m, with
+    /// `count` modes of each number of half waves over the angle, for motion along the bisector or `across`
+    /// it.
     pub fn sector(inner: f64, outer: f64, angle: f64, across: bool, count: usize) -> Overlaps {
         let half = Gauss::new(40);
         // the mean over the angle
@@ -172,7 +171,7 @@ impl Overlaps {
         }
     }
 
-    /// Returns the overlaps of a box for motion along `length`, m; with another length across it.
+    /// Returns the overlaps of a box for motion along `length`, m, with another length across it.
     pub fn rectangle(length: f64) -> Overlaps {
         let k = PI / length;
         Overlaps {
@@ -189,7 +188,8 @@ impl Overlaps {
         }
     }
 
-    /// Returns the overlaps of a square box, for planar motion along its sides or (`diagonal`) along a diagonal.
+    /// Returns the overlaps of a square box, for planar motion along its sides or (`diagonal`) along a
+    /// diagonal.
     pub fn square(length: f64, diagonal: bool) -> Overlaps {
         let k = PI / length;
         let double = [([2, 0], [0.5, 0.25]), ([0, 2], [0.0, 0.25])];
@@ -216,14 +216,14 @@ impl Overlaps {
         }
     }
 
-    /// Returns the relative shifts of omega^2 per squared slosh angle, planar and circular, at a depth, m. The shift is 0
-    /// for a motion that the section does not have.
+    /// Returns the relative shifts of omega^2 per squared slosh angle, planar and circular, at a depth, m.
+    /// The shift is 0 for a motion that the section does not have.
     pub fn shifts(&self, depth: f64) -> [f64; 2] {
         self.detuned_shifts(depth, 0.0)
     }
 
-    /// Returns the shifts if the frequency of 2 omega in the response of the excited modes were higher by the part
-    /// `detuning`: close to a pole the result is another.
+    /// Returns the shifts if the frequency of 2 omega in the response of the excited modes were higher by the
+    /// part `detuning`. A large difference shows that a pole is close.
     pub(crate) fn detuned_shifts(&self, depth: f64, detuning: f64) -> [f64; 2] {
         let [t_1, _, b] = self.wave(depth);
         let k2 = self.k * self.k;
@@ -250,7 +250,6 @@ impl Overlaps {
         self.detuned_equivalent(depth, 0.0)
     }
 
-    /// Returns s and kappa from [`Overlaps::detuned_shifts`].
     pub(crate) fn detuned_equivalent(&self, depth: f64, detuning: f64) -> [f64; 2] {
         let [planar, circular] = self.detuned_shifts(depth, detuning);
         if self.fourth[1].is_none() {
@@ -260,8 +259,8 @@ impl Overlaps {
         [0.75 * kappa - 2.0 * planar, kappa]
     }
 
-    /// Returns the second-order elevation at the wall per squared slosh angle, m, when planar motion has its largest
-    /// elevation there. It adds to the crest and subtracts from the trough.
+    /// Returns the second-order elevation at the wall per squared slosh angle, m, when planar motion has its
+    /// largest elevation there. It adds to the crest and subtracts from the trough.
     pub fn second_wave(&self, depth: f64) -> f64 {
         let [_, _, b] = self.wave(depth);
         let of = |mode: &Excited| {
@@ -295,7 +294,8 @@ impl Overlaps {
         }
     }
 
-    /// Returns the excited mode whose frequency is twice that of the first mode within [`DETUNING`] at a depth, m.
+    /// Returns the excited mode whose frequency is twice that of the first mode within [`DETUNING`] at a
+    /// depth, m.
     pub fn secondary_resonance(&self, depth: f64) -> Option<[usize; 2]> {
         let [t_1, ..] = self.wave(depth);
         let near = |mode: &&Excited| {
@@ -305,8 +305,8 @@ impl Overlaps {
         self.excited.iter().find(near).map(|mode| mode.mode)
     }
 
-    /// Returns the depths, m, at which an excited mode has twice the frequency of the first, in ascending order, with
-    /// the mode. Near these depths the third order is not valid.
+    /// Returns the depths, m, at which an excited mode has twice the frequency of the first, in ascending
+    /// order, with the mode. Near these depths the third order is not valid.
     pub fn resonances(&self) -> Vec<(f64, [usize; 2])> {
         let mut found = Vec::new();
         for mode in &self.excited {
@@ -331,7 +331,8 @@ impl Overlaps {
     }
 }
 
-/// Equations of an excited mode per C: t, the source of the mean elevation, and matrix and vector of (p_2, f).
+/// Equations of an excited mode per C: t, the source of the mean elevation, and matrix and vector of (p_2,
+/// f).
 struct Response {
     t: f64,
     elevated: f64,
@@ -349,17 +350,15 @@ fn stationary(m: Matrix2<f64>, v: Vector2<f64>) -> f64 {
     -0.5 * v.dot(&(inverse(m) * v))
 }
 
-/// Radial parts u of the modes of order nu, by Galerkin's method: (r u')'/r + (kappa^2 - nu^2/r^2) u = 0. At the walls
-/// u' = 0; int u^2 r dr = 1. A constant is not a mode.
+/// Radial parts u of the modes of order nu, by Galerkin's method: (r u')'/r + (kappa^2 - nu^2/r^2) u = 0 with
+/// u' = 0 at the walls and int u^2 r dr = 1, where a constant is not a mode. `r` and `weights` (with r dr)
+/// are those of the quadrature, m; `kappa` are the wave numbers, 1/m, ascending; `values` has u at the nodes,
+/// one mode a column, and `at_wall` u at the outer wall.
 struct Radial {
-    /// Nodes of the quadrature, m, and weights with r dr.
     r: Vec<f64>,
     weights: Vec<f64>,
-    /// Wave numbers, 1/m, ascending.
     kappa: Vec<f64>,
-    /// u at the nodes, one mode a column.
     values: DMatrix<f64>,
-    /// u at the outer wall.
     at_wall: Vec<f64>,
 }
 
@@ -415,19 +414,18 @@ impl Radial {
         }
     }
 
-    /// u of a mode at the nodes, in the sense of a positive value at the outer wall.
+    /// Returns u of a mode at the nodes, with a positive value at the outer wall.
     fn mode(&self, n: usize) -> Vec<f64> {
         self.values.column(n).iter().copied().collect()
     }
 
-    /// Returns int f r dr.
     fn integral(&self, f: impl Fn(usize) -> f64) -> f64 {
         self.weights.iter().enumerate().map(|(i, w)| w * f(i)).sum()
     }
 }
 
-/// Returns orthonormal functions in the circle and their derivatives by r. They are (r/R)^nu P_j^(0,nu)(2 x - 1) with
-/// x = (r/R)^2, by the recurrence DLMF 18.9.2.
+/// Returns orthonormal functions in the circle and their derivatives by r. They are (r/R)^nu P_j^(0,nu)(2 x -
+/// 1) with x = (r/R)^2, by the recurrence DLMF 18.9.2.
 pub(crate) fn circle_basis(nu: f64, x: f64, size: usize, outer: f64) -> Vec<(f64, f64)> {
     let y = 2.0 * x - 1.0;
     let (mut p, mut slope) = ((1.0, 1.0 + 0.5 * (nu + 2.0) * (y - 1.0)), (0.0, 0.5 * (nu + 2.0)));
@@ -451,7 +449,8 @@ pub(crate) fn circle_basis(nu: f64, x: f64, size: usize, outer: f64) -> Vec<(f64
     all
 }
 
-/// Returns Legendre polynomials over the width of a ring and their derivatives by r, at the part `s` of the width.
+/// Returns Legendre polynomials over the width of a ring and their derivatives by r, at the part `s` of the
+/// width.
 fn ring_basis(s: f64, size: usize, width: f64) -> Vec<(f64, f64)> {
     let (mut values, mut slopes) = (vec![0.0; size], vec![0.0; size]);
     legendre(s, &mut values);
@@ -463,8 +462,8 @@ fn ring_basis(s: f64, size: usize, width: f64) -> Vec<(f64, f64)> {
 mod tests {
     use super::*;
 
-    /// Abramowitz and Stegun, table 9.5, to more digits. The zero of J0' at 0 does not belong to a mode. Rounding is that of
-    /// the largest eigenvalue, about 1e6.
+    /// The reference is table 9.5 of Abramowitz and Stegun, to more digits. The zero of J0' at 0 does not
+    /// belong to a mode. The tolerance is the rounding of the largest eigenvalue, about 1e6.
     #[test]
     fn wave_numbers_of_the_circle_equal_those_of_the_tables() {
         for (nu, known) in [
