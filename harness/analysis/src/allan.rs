@@ -31,14 +31,11 @@ use std::f64::consts::{LN_2, PI};
 /// Flat part of the Allan deviation of flicker noise over B; the FMU's bias has sigma = B/0.664.
 pub const FLICKER: f64 = 0.664;
 
-/// Number of averaging times per decade.
 const PER_DECADE: f64 = 15.0;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point {
-    /// Averaging time, s.
     pub tau: f64,
-    /// Allan variance, in the unit of the signal squared.
     pub variance: f64,
 }
 
@@ -51,7 +48,6 @@ pub fn variances(step: f64, samples: &[f64]) -> Vec<Point> {
     overlapping(step, samples, factors(samples.len() / LONGEST))
 }
 
-/// Returns the overlapping Allan variance for averages of `factors` samples each.
 fn overlapping(step: f64, samples: &[f64], factors: impl IntoIterator<Item = usize>) -> Vec<Point> {
     // sums[k] is the sum of the first k samples
     let mut sums = vec![0.0; samples.len() + 1];
@@ -70,7 +66,6 @@ fn overlapping(step: f64, samples: &[f64], factors: impl IntoIterator<Item = usi
         .collect()
 }
 
-/// Returns integers from 1 to `last`, at most [`PER_DECADE`] per decade, equally spaced in the logarithm.
 fn factors(last: usize) -> Vec<usize> {
     let count = ((last.max(1) as f64).log10() * PER_DECADE).floor() as usize;
     let mut factors: Vec<usize> =
@@ -105,20 +100,17 @@ impl Term {
     }
 }
 
-/// Parameters of a gyro's noise; a term that is absent is 0.
+/// Parameters of a gyro's noise; a term that is absent is 0. They are the angle random walk N, rad/s/√Hz
+/// (`arw`), the bias instability B of flicker noise, rad/s, the rate random walk K, rad/s/√s (`rrw`), the
+/// rate ramp R, rad/s², and a Gauss–Markov bias with its bias instability, rad/s, which is 0.664 times its
+/// standard deviation, and its correlation time T, s, which has no meaning without such a bias.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise {
-    /// Angle random walk N, rad/s/√Hz.
     pub arw: f64,
-    /// Bias instability B of flicker noise, rad/s.
     pub flicker: f64,
-    /// Rate random walk K, rad/s/√s.
     pub rrw: f64,
-    /// Rate ramp R, rad/s².
     pub ramp: f64,
-    /// Bias instability of a Gauss–Markov bias, rad/s; its standard deviation is this value divided by 0.664.
     pub bias_instability: f64,
-    /// Correlation time T of the Gauss–Markov bias, s; without such a bias it has no meaning.
     pub bias_time: f64,
 }
 
@@ -140,7 +132,6 @@ impl Noise {
         }
     }
 
-    /// Returns the parameter that belongs to a term, so that it can be set.
     fn parameter(&mut self, term: Term) -> &mut f64 {
         match term {
             Term::White => &mut self.arw,
@@ -151,7 +142,6 @@ impl Noise {
         }
     }
 
-    /// Returns the terms that are not 0.
     pub fn terms(&self) -> Vec<Term> {
         let all = [Term::White, Term::Flicker, Term::Walk, Term::Ramp, Term::Markov];
         all.into_iter().filter(|term| self.coefficient(*term) > 0.0).collect()

@@ -17,12 +17,11 @@ use signals::fourier::Complex64;
 /// other components.
 pub const LEAST_CYCLES: f64 = 3.0;
 
-/// Length of the window in cycles for a slow sweep. 24 cycles are 10 s at 2.4 Hz, in which the thesis's sweep moves by
-/// 9 mHz. This is small compared with the 14 mHz half-power width of the slosh at 10 cm, and long enough to separate
-/// the harmonics of a sticking bearing from the sweep.
+/// Length of the window in cycles for a slow sweep. 24 cycles are 10 s at 2.4 Hz, in which the thesis's sweep
+/// moves by 9 mHz. This is small compared with the 14 mHz half-power width of the slosh at 10 cm, and long
+/// enough to separate the harmonics of a sticking bearing from the sweep.
 pub const CYCLES: f64 = 24.0;
 
-/// Largest relative change of the sweep's frequency within a window.
 const MOST_MOVE: f64 = 0.015;
 
 /// Returns the number of cycles in the window at a frequency, Hz: 24, or fewer if the sweep would change by
@@ -32,12 +31,11 @@ pub fn cycles(sweep: &Sweep, frequency: f64) -> f64 {
     slow.clamp(LEAST_CYCLES, CYCLES)
 }
 
-/// Frequency responses with the data from which their uncertainty follows.
+/// Frequency responses, one for each output, with the data from which their uncertainty follows: `noise_gain`
+/// is the variance of H for a noise of unit power spectral density in the output, Σ|w|²/(h |U|²), at the
+/// responses' frequencies.
 pub struct Demodulated<const N: usize> {
-    /// One response for each output.
     pub responses: [FrequencyResponse; N],
-    /// Variance of H for a noise of unit power spectral density in the output, Σ|w|²/(h |U|²), at
-    /// the responses' frequencies.
     pub noise_gain: Vec<f64>,
 }
 
@@ -60,8 +58,8 @@ pub fn slope(sweep: &Sweep, frequency: f64) -> f64 {
     std::f64::consts::TAU / 3f64.sqrt() / (window * sweep.rate_at(frequency).abs())
 }
 
-/// Returns the frequency responses of `outputs` to `input`, sampled at `time` (s, equal steps), while `sweep` passes
-/// each of `frequencies` (Hz). Leaves out frequencies that the sweep does not pass.
+/// Returns the frequency responses of `outputs` to `input`, sampled at `time` (s, equal steps), while `sweep`
+/// passes each of `frequencies` (Hz). Leaves out frequencies that the sweep does not pass.
 pub fn frequency_responses<const N: usize>(
     sweep: &Sweep,
     time: &[f64],

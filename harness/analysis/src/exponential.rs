@@ -34,7 +34,6 @@ mod tests {
         exponential(matrix, matrix.abs().sum(), |matrix| matrix.exp())
     }
 
-    /// A decay that is fast enough leaves exactly 0.
     #[test]
     fn the_exponential_of_a_huge_matrix_is_finite() {
         assert_eq!(

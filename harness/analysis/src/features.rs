@@ -4,14 +4,12 @@ use crate::random::Random;
 use crate::response::FrequencyResponse;
 use signals::fourier::Complex64;
 
-/// Features of a frequency response.
+/// Features of a frequency response: the frequencies of the local maximum of |H|, the resonance, and of the
+/// local minimum, the antiresonance, Hz, and the height of one over the other, dB.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Features {
-    /// Frequency of the local maximum of |H|, Hz.
     pub f_res: Option<f64>,
-    /// Frequency of the local minimum of |H|, Hz.
     pub f_dip: Option<f64>,
-    /// Height of the resonance over the antiresonance, dB.
     pub notch_db: Option<f64>,
 }
 
@@ -85,14 +83,13 @@ impl Features {
         Deviations { f_res, f_dip }
     }
 
-    /// Finds antiresonance and resonance: the two ends of the largest rise of |H| (in dB) with
-    /// frequency.
+    /// Finds antiresonance and resonance: the two ends of the largest rise of |H| (in dB) with frequency.
     ///
-    /// The result equals the thesis's definition, smallest and largest |H| in the band (its 6.9 and 6.10), where that
-    /// definition works. It also works where that definition fails: a damped resonance is lower than the band's edge at
-    /// 1.25 Hz, where the hub's inertia dominates. The ripple behind the resonance may also be lower than the
-    /// antiresonance. An end of the band is neither antiresonance nor resonance, and a rise of less than [`LEAST`] is
-    /// not slosh.
+    /// The result equals the thesis's definition, smallest and largest |H| in the band (its 6.9 and 6.10),
+    /// where that definition works. It also works where that definition fails: a damped resonance is lower
+    /// than the band's edge at 1.25 Hz, where the hub's inertia dominates. The ripple behind the resonance
+    /// may also be lower than the antiresonance. An end of the band is neither antiresonance nor resonance,
+    /// and a rise of less than [`LEAST`] is not slosh.
     pub fn find(response: &FrequencyResponse) -> Self {
         Features::find_within(response, (f64::NEG_INFINITY, f64::INFINITY))
     }
@@ -120,7 +117,6 @@ impl Features {
         self.f_dip.is_some() || self.f_res.is_some()
     }
 
-    /// Returns the separation f_res − f_dip of resonance and antiresonance, Hz.
     pub fn delta_f(&self) -> Option<f64> {
         Some(self.f_res? - self.f_dip?)
     }
@@ -128,11 +124,10 @@ impl Features {
 
 /// Number of simulated errors, which determines a standard deviation to 7 %.
 const DRAWS: usize = 100;
-/// Number of waves of which a simulated error consists.
 const WAVES: usize = 8;
 
-/// Smallest rise from antiresonance to resonance that counts, dB. A tank damped to ζ = 0.05 still
-/// rises by 3.9 dB.
+/// Smallest rise from antiresonance to resonance that counts, dB. A tank damped to ζ = 0.05 still rises by
+/// 3.9 dB.
 pub const LEAST: f64 = 1.0;
 
 /// Returns the indices of the lowest and the highest value between which a sequence rises most; `None` if it
@@ -149,8 +144,8 @@ fn largest_rise(level: &[f64]) -> Option<(usize, usize)> {
     best
 }
 
-/// Returns the vertex of the parabola through the extremum's three points (dB over log f):
-/// frequency in Hz and level in dB. The grid is equally spaced in log f.
+/// Returns the vertex of the parabola through the extremum's three points (dB over log f): frequency in Hz
+/// and level in dB. The grid is equally spaced in log f.
 fn vertex(response: &FrequencyResponse, level: &[f64], i: usize) -> (f64, f64) {
     let (a, b, c) = (level[i - 1], level[i], level[i + 1]);
     let offset = 0.5 * (a - c) / (a - 2.0 * b + c);

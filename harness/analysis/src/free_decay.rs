@@ -26,15 +26,13 @@ use crate::least_squares::{differences, minimise, smallest};
 use crate::statistics::{deviation, mean};
 use signals::fourier::Complex64;
 
-/// Smallest number of periods from which frequency and damping are estimated.
 pub const LEAST_PERIODS: f64 = 5.0;
 
-/// A record of a free decay.
+/// A record of a free decay: the oscillating signal in any unit U, at increasing times, s, which need not be
+/// equally spaced.
 #[derive(Clone, Copy, Debug)]
 pub struct Record<'a> {
-    /// Times, s, increasing; they need not be equally spaced.
     pub time: &'a [f64],
-    /// The oscillating signal, in any unit U.
     pub signal: &'a [f64],
 }
 
@@ -45,32 +43,27 @@ pub struct Value {
 }
 
 /// Estimates from all records of one oscillation: frequency f (Hz), damping ratio ζ, ζ_A (1/U) and κ (1/U²).
+/// `constant` is ζ if it is assumed equal at all amplitudes, `amplitudes` are those at the beginning and the
+/// end of each record, U, `residuals` are in U with the root mean square `residual` (`residual_constant` if ζ
+/// is constant), and `other` is the largest other oscillation in the residual: frequency, Hz, and amplitude,
+/// U.
 #[derive(Clone, Debug)]
 pub struct FreeDecay {
     pub frequency: Value,
     pub zeta: Value,
     pub zeta_amplitude: Value,
     pub hardening: Value,
-    /// Damping ratio ζ if it is assumed equal at all amplitudes.
     pub constant: f64,
-    /// Amplitude at the beginning and the end of each record, U.
     pub amplitudes: Vec<[f64; 2]>,
-    /// Number of periods in each record.
     pub periods: Vec<f64>,
-    /// Residuals of each record, U.
     pub residuals: Vec<Vec<f64>>,
-    /// Root mean square of the residual, U.
     pub residual: f64,
-    /// Root mean square of the residual if ζ is constant, U.
     pub residual_constant: f64,
-    /// Largest other oscillation in the residual: frequency, Hz, and amplitude, U.
     pub other: (f64, f64),
-    /// True if the search ended at a minimum.
     pub converged: bool,
 }
 
-/// Number of unknowns common to all records: f, ζ, ζ_A, κ, the last two in units of the largest
-/// amplitude.
+/// Number of unknowns common to all records: f, ζ, ζ_A, κ, the last two in units of the largest amplitude.
 const COMMON: usize = 4;
 /// Number of unknowns of one record: ln A₀, φ₀, x₀, s.
 const OWN: usize = 4;
@@ -202,17 +195,15 @@ impl FreeDecay {
         })
     }
 
-    /// Returns the damping ratio ζ + ζ_A A at the amplitude A, U.
     pub fn zeta_at(&self, amplitude: f64) -> f64 {
         self.zeta.value + self.zeta_amplitude.value * amplitude
     }
 }
 
-/// Properties of the residual's spectrum.
+/// Properties of the residual's spectrum: the power near the frequency, expressed as the variance of white
+/// noise of equal power, and frequency, Hz, and amplitude of the largest line.
 struct Beside {
-    /// Power near the frequency, expressed as the variance of white noise of equal power.
     power: f64,
-    /// Frequency, Hz, and amplitude of the largest line.
     other: (f64, f64),
 }
 
@@ -220,7 +211,6 @@ struct Beside {
 /// neighbourhood of f.
 const TAKEN: usize = 2;
 const SIDE: usize = 12;
-/// Number of frequencies at which lines of the residual are searched.
 const LINES: usize = 400;
 
 fn beside(time: &[f64], residual: &[f64], frequency: f64) -> Beside {
@@ -256,7 +246,6 @@ fn beside(time: &[f64], residual: &[f64], frequency: f64) -> Beside {
 /// Row of a phasor: time, ∫A, ∫A², A and φ.
 type Row = (f64, f64, f64, f64, f64);
 
-/// Start values of the search.
 struct Start {
     frequency: f64,
     zeta: f64,
@@ -268,7 +257,6 @@ struct Start {
     periods: f64,
 }
 
-/// Number of points per line spacing 1/T in the search for the largest line.
 const FINE: usize = 4;
 /// The phasor is not used where its amplitude is below this fraction of the largest amplitude.
 const LEAST_PART: f64 = 0.02;
@@ -386,8 +374,8 @@ mod tests {
     use super::*;
     use crate::random::Random;
 
-    /// Integrates A'' by its own equation, RK4, with quadratic and linear damping and a cubic spring, independent of
-    /// the formula above.
+    /// Integrates A'' by its own equation, RK4, with quadratic and linear damping and a cubic spring,
+    /// independent of the formula above.
     fn oscillator(
         zeta: f64,
         quadratic: f64,

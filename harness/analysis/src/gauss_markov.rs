@@ -9,30 +9,27 @@
 //! filter turns sensitivities of the rate into sensitivities of the innovations. Least squares of
 //! the innovations is then maximum likelihood, and slow drift is not mistaken for a signal.
 
-/// Smallest white noise, rad/s or rad. Simulated recordings have less, but their differences are solver errors, which
-/// are not random.
+/// Smallest white noise, rad/s or rad. Simulated recordings have less, but their differences are solver
+/// errors, which are not random.
 pub const FLOOR: f64 = 1e-6;
 
-/// White noise and a Gauss–Markov bias.
+/// White noise of the standard deviation σ_w and a Gauss–Markov bias: `drift` is σ_b/σ_w and `time` the
+/// correlation time T of the bias, s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise {
     pub white: f64,
-    /// σ_b/σ_w.
     pub drift: f64,
-    /// T, correlation time of the drift, s.
     pub time: f64,
 }
 
-/// Gains of the whitening filter for the rows of one recording.
+/// Whitening filter for the rows of one recording: for each row φ of the preceding step, the Kalman gain K,
+/// and 1/sqrt(innovation variance); `log_variance` is Σ ln(innovation variance).
 pub struct Whitening {
-    /// For each row: φ of the preceding step, Kalman gain K, and 1/sqrt(innovation variance).
     rows: Vec<[f64; 3]>,
-    /// Σ ln(innovation variance).
     log_variance: f64,
 }
 
 impl Noise {
-    /// Creates white noise of the standard deviation `sigma` without drift.
     pub fn white(sigma: f64) -> Self {
         Noise { white: sigma, drift: 0.0, time: 100.0 }
     }

@@ -16,51 +16,47 @@ use signals::fourier::Forward;
 
 use crate::statistics::{mean, median};
 
-/// Number of lags of the whiteness test.
 pub const LAGS: usize = 50;
-/// Number of rows in a window, 20 s at 50 Hz.
+/// Number of rows in a window, which is 20 s at 50 Hz.
 pub const WINDOW: usize = 1000;
-/// Number of bands of the periodogram.
 const BANDS: usize = 100;
-/// Smallest number of lines in a band.
 const FEWEST_LINES: usize = 4;
-/// Limit of each test in standard deviations: the chance of exceeding it is 1e-6 for one test and
-/// about 1e-4 for about a hundred tests.
+/// Limit of each test in standard deviations: the chance of exceeding it is 1e-6 for one test and about 1e-4
+/// for about a hundred tests.
 pub const LIMIT: f64 = 5.0;
 
-/// Results of the tests, in standard deviations of what chance would give.
+/// Results of the tests, in standard deviations of the results that chance would give.
+///
+/// - `whiteness`: result of the whiteness test.
+/// - `in_time`, `in_frequency`: largest excess of the power in a time window or a frequency band, with its
+///   time, s, or frequency, Hz.
+/// - `torque`, `torque_squared`: largest cross-correlation with an input, or with its square, over lags up to
+///   2 s.
+/// - `excess`: root mean square of the residual above the noise in the worst band, rad/s.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Tests {
-    /// Result of the whiteness test.
     pub whiteness: f64,
-    /// Largest excess of the power in a time window, and the time of the window, s.
     pub in_time: (f64, f64),
-    /// Largest excess of the power in a frequency band, and the frequency of the band, Hz.
     pub in_frequency: (f64, f64),
-    /// Largest cross-correlation with an input over lags up to 2 s.
     pub torque: f64,
-    /// Largest cross-correlation with the square of an input over lags up to 2 s.
     pub torque_squared: f64,
-    /// Root mean square of the residual above the noise in the worst band, rad/s.
     #[serde(rename = "left")]
     pub excess: f64,
 }
 
 impl Tests {
-    /// Returns true if all tests are passed.
     pub fn passed(&self) -> bool {
         self.worst() < LIMIT
     }
 
-    /// Returns the largest of the test results.
     pub fn worst(&self) -> f64 {
         [self.whiteness, self.in_time.0, self.in_frequency.0, self.torque, self.torque_squared]
             .into_iter()
             .fold(0.0, f64::max)
     }
 
-    /// Tests innovations `e` at `time` (s) under `inputs`, such as a torque; `white` is the standard deviation of the noise in the
-    /// unit of the signal.
+    /// Tests innovations `e` at `time` (s) under `inputs`, such as a torque; `white` is the standard
+    /// deviation of the noise in the unit of the signal.
     pub fn run(time: &[f64], inputs: &[&[f64]], e: &[f64], white: f64) -> Self {
         let count = e.len() as f64;
         let middle = mean(e);
@@ -126,8 +122,8 @@ fn worst(levels: &[(f64, f64)], n: f64) -> (f64, f64) {
         .fold((0.0, 0.0), |a, b| if b.0 > a.0 { b } else { a })
 }
 
-/// Returns the mean periodogram in bands from 0 to half the sampling frequency, the bands' width
-/// (Hz), and the number of lines in each.
+/// Returns the mean periodogram in bands from 0 to half the sampling frequency, the bands' width (Hz), and
+/// the number of lines in each.
 fn periodogram(e: &[f64], step: f64) -> (Vec<f64>, f64, f64) {
     let spectrum = Forward::new(e.len()).transform(e.to_vec());
     let bands = BANDS.min((spectrum.len() - 1) / FEWEST_LINES).max(1);
@@ -141,8 +137,8 @@ fn periodogram(e: &[f64], step: f64) -> (Vec<f64>, f64, f64) {
     (bands, lines as f64 / (e.len() as f64 * step), lines as f64)
 }
 
-/// Returns the largest cross-correlation of e with an input over lags from 0 to 2 s, in standard
-/// deviations for white e and any input.
+/// Returns the largest cross-correlation of e with an input over lags from 0 to 2 s, in standard deviations
+/// for white e and any input.
 pub fn crossed(e: &[f64], input: &[f64], step: f64) -> f64 {
     let mean = mean(input);
     let lags = ((2.0 / step) as usize).min(e.len() / 2);
@@ -163,7 +159,6 @@ pub fn crossed(e: &[f64], input: &[f64], step: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// About one record in 10,000 exceeds the limit by chance.
     #[test]
     fn white_noise_passes_in_short_records_too() {
         let mut random = crate::random::Random::new(7, 0);

@@ -5,12 +5,11 @@ pub type Residuals<'a> = &'a dyn Fn(&[f64]) -> Vec<f64>;
 /// Function that returns the derivatives of the residuals at x, one row per residual; `None` ends the search.
 pub type Derivatives<'a> = &'a dyn Fn(&[f64]) -> Option<DMatrix<f64>>;
 
-/// Minimum of the sum of squares.
+/// Minimum of the sum of squares. `converged` is false if the search reached its limit of iterations.
 #[derive(Clone, Debug)]
 pub struct Minimum {
     pub x: Vec<f64>,
     pub cost: f64,
-    /// True if the search ended at a minimum, false if it reached its limit of iterations.
     pub converged: bool,
     pub reason: String,
 }

@@ -9,20 +9,19 @@ use crate::{spa, welch};
 /// Number of samples per cycle of the band's highest frequency that an estimate from a whole record needs.
 /// The thesis's sweep has 14.3.
 const SAMPLES: f64 = 14.0;
-/// Longest lag as a fraction of the record.
 const MOST_LAG: f64 = 0.5;
 
 /// Lengths for estimates from a whole record, s.
+///
+/// - `lag`: longest lag of [`spa`], with the same number of cycles at the band's centre as 200 s of the
+///   thesis's sweep, and at most half of the record. Its resolution is 1/lag.
+/// - `segment`: length of the segments for coherence. For a sweep, six half-overlapping segments cover each
+///   frequency, L = sqrt(1/(3 rate)). For noise, a segment has as many cycles as 20 s of the thesis's sweep.
+/// - `decimation`: number of samples that are averaged to one, in torque and rate alike.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lengths {
-    /// Longest lag of [`spa`]: the same number of cycles at the band's centre as 200 s of the
-    /// thesis's sweep, and at most half of the record. Its resolution is 1/lag.
     pub lag: f64,
-    /// Length of the segments for coherence. For a sweep, six half-overlapping segments cover each
-    /// frequency, L = sqrt(1/(3 rate)). For noise, a segment has as many cycles as 20 s of the
-    /// thesis's sweep.
     pub segment: f64,
-    /// Number of samples that are averaged to one, in torque and rate alike.
     pub decimation: usize,
 }
 

@@ -18,32 +18,26 @@ use crate::exponential::exponential;
 use crate::response::FrequencyResponse;
 use signals::fourier::Complex64;
 
-/// Parameters of the linear model of hub and liquid.
+/// Parameters of the linear model of hub and liquid: inertia I0 of hub and rigid liquid about the axis,
+/// kg·m², viscous friction b, N·m·s, torsional stiffness k of the suspension line, N·m/rad, distance r of the
+/// tank from the axis, m, and for each mode mass m, kg, pendulum length and damping ratio ζ.
 #[derive(Clone, Debug, Default)]
 pub struct Linear {
-    /// I0, hub and rigid liquid about the axis, kg·m².
     pub inertia: f64,
-    /// b, viscous friction, N·m·s.
     pub friction: f64,
-    /// k, torsional stiffness of the suspension line, N·m/rad.
     pub stiffness: f64,
-    /// r, distance of the tank from the axis, m.
     pub arm: f64,
     pub modes: Vec<Mode>,
 }
 
 #[derive(Clone, Copy, Debug)]
 pub struct Mode {
-    /// m, kg.
     pub mass: f64,
     pub frequency: f64,
-    /// ζ.
     pub damping: f64,
 }
 
-/// Relative difference below which two steps count as equal.
 const SAME: f64 = 1e-9;
-/// Largest number of matrix exponentials that are stored.
 const FLOWS: usize = 1000;
 
 impl Linear {
@@ -62,16 +56,16 @@ impl Linear {
         (s * (slosh + self.inertia) + self.friction + self.stiffness / s).inv()
     }
 
-    /// Simulates the rate, rad/s, for a torque (N·m) that is linear between samples `step` s apart,
-    /// from an initial rate and liquid at rest.
+    /// Simulates the rate, rad/s, for a torque (N·m) that is linear between samples `step` s apart, from an
+    /// initial rate and liquid at rest.
     pub fn simulate(&self, step: f64, torque: &[f64], start: f64) -> Vec<f64> {
         let slope = |pair: &[f64]| (pair[1] - pair[0]) / step;
         let slopes: Vec<f64> = torque.windows(2).map(slope).chain([0.0]).collect();
         self.propagate(&|_| step, torque, &slopes, start)
     }
 
-    /// Simulates the rate at the times `time` (s) for a torque given by its value (N·m) there and its slope (N·m/s)
-    /// until the next.
+    /// Simulates the rate at the times `time` (s) for a torque given by its value (N·m) there and its slope
+    /// (N·m/s) until the next.
     pub fn simulate_ramps(
         &self,
         time: &[f64],
@@ -83,9 +77,10 @@ impl Linear {
         self.propagate(&step, torque, slopes, start)
     }
 
-    /// Simulates the rate for a torque given by its value (N·m) at the beginning of each step and its slope (N·m/s) over
-    /// the step. `step` is the length of each, s. The matrix exponential of the state and the input's value and slope makes it
-    /// exact. The state is ω, y = l α and y' for each mode, and the angle from the start.
+    /// Simulates the rate for a torque given by its value (N·m) at the beginning of each step and its slope
+    /// (N·m/s) over the step. `step` is the length of each, s. The matrix exponential of the state and the
+    /// input's value and slope makes it exact. The state is ω, y = l α and y' for each mode, and the angle
+    /// from the start.
     fn propagate(
         &self,
         step: &dyn Fn(usize) -> f64,
@@ -145,7 +140,6 @@ impl Linear {
         rates
     }
 
-    /// Returns the response at these frequencies, Hz.
     pub fn frequency_response(&self, frequencies: &[f64]) -> FrequencyResponse {
         FrequencyResponse {
             frequency: frequencies.to_vec(),
@@ -226,8 +220,8 @@ mod tests {
         }
     }
 
-    /// Integrates the linear bench, driven by a sweep sampled at 50 Hz and joined by lines, with
-    /// RK4 in 2.5 ms (phase error over a whole sweep: 2e-5 rad). Returns time, torque and rate.
+    /// Integrates the linear bench, driven by a sweep sampled at 50 Hz and joined by lines, with RK4 in 2.5
+    /// ms (phase error over a whole sweep: 2e-5 rad). Returns time, torque and rate.
     fn swept(plant: &Linear, sweep: &Sweep) -> [Vec<f64>; 3] {
         let mode = plant.modes[0];
         let (w, r) = (TAU * mode.frequency, plant.arm);

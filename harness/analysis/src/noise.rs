@@ -18,7 +18,6 @@ use signals::fourier::Forward;
 
 use signals::fourier::Complex64;
 
-/// Number of lines on either side, n.
 const SIDE: usize = 6;
 const LINES: usize = 2 * SIDE + 1;
 /// Number of unknowns: b0, b1, b2, t0, t1, t2, a.

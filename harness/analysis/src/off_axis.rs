@@ -16,14 +16,13 @@
 use crate::response::FrequencyResponse;
 use crate::statistics::about_mean;
 
-/// Off-axis figures of a sweep.
+/// Off-axis figures of a sweep: the median over the samples of the fraction F_r²/(F_r² + F_t²), 0 to 1, as in
+/// the thesis; the fraction of the whole record, Σ F_r² / Σ (F_r² + F_t²); and the root mean square of the
+/// leakage over the frequencies.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct OffAxis {
-    /// Median of the fraction over the samples, 0 to 1, as in the thesis.
     pub median: f64,
-    /// Σ F_r² / Σ (F_r² + F_t²), 0 to 1: the fraction of the whole record.
     pub energy: f64,
-    /// Root mean square of the leakage over the frequencies.
     pub leakage: f64,
 }
 
@@ -54,13 +53,13 @@ impl OffAxis {
     }
 }
 
-/// Computes the figures for a platform that may tilt, from its rates (rad/s) about the hub's axis and about other axes,
-/// each with its response to the torque. As in the thesis, CEF = Σω_i²/(Σω_i² + ω²) and L = √(Σ|H_i|²)/|H|. Returns the
-/// leakage at the responses' frequencies first, and `None` without another rate.
+/// Computes the figures for a platform that may tilt, from its rates (rad/s) about the hub's axis and about
+/// other axes, each with its response to the torque. As in the thesis, CEF = Σω_i²/(Σω_i² + ω²) and L =
+/// √(Σ|H_i|²)/|H|. Returns the leakage at the responses' frequencies first, and `None` without another rate.
 ///
-/// Each rate is used relative to its mean. Otherwise a gyro's bias would count as energy: a bias of 1 deg/s about x is
-/// larger than the rate of a bench about that axis. [`OffAxis::from_forces`] keeps the means of the forces, because no sensor
-/// measures them and the centripetal force of a wave has a mean.
+/// Each rate is used relative to its mean. Otherwise a gyro's bias would count as energy: a bias of 1 deg/s
+/// about x is larger than the rate of a bench about that axis. [`OffAxis::from_forces`] keeps the means of
+/// the forces, because no sensor measures them and the centripetal force of a wave has a mean.
 pub fn off_axis_from_rates(
     response: &FrequencyResponse,
     rate: &[f64],
@@ -83,8 +82,8 @@ pub fn off_axis_from_rates(
     (leakage, Some(off_axis))
 }
 
-/// Returns the leakage at each frequency, from the radial force's response to the torque (N per N·m) and
-/// the tank's distance from the axis, m.
+/// Returns the leakage at each frequency, from the radial force's response to the torque (N per N·m) and the
+/// tank's distance from the axis, m.
 pub fn leakage(radial: &FrequencyResponse, arm: f64) -> Vec<f64> {
     radial.response.iter().map(|h| arm * h.norm()).collect()
 }
@@ -113,7 +112,8 @@ mod tests {
         assert_eq!(off_axis_from_rates(&all, &rate, &[]), (Vec::new(), None));
     }
 
-    /// 0.1 rad/s about the axis and a twentieth about x and y, with a gyro's bias of up to 5 deg/s on each axis.
+    /// The rates are 0.1 rad/s about the axis and a twentieth about x and y, with a gyro's bias of up to 5
+    /// deg/s on each axis.
     #[test]
     fn a_bias_of_up_to_5_deg_s_on_any_axis_does_not_change_the_cross_axis_energy_fraction() {
         let wave = |size: f64, phase: f64| -> Vec<f64> {

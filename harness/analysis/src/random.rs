@@ -6,7 +6,6 @@ use std::f64::consts::TAU;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::Rng;
 
-/// A stream of random numbers.
 pub struct Random(Pcg64);
 
 impl Random {

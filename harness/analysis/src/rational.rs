@@ -23,24 +23,19 @@ use signals::fourier::Complex64;
 
 /// Largest number of frequencies in a fit; of more frequencies an equally spaced selection is used.
 const POINTS: usize = 1500;
-/// Smallest number of frequencies.
 const LEAST: usize = 20;
-/// Number of iterations; ten are enough for convergence.
 const ROUNDS: usize = 20;
 
-/// Six coefficients for each of the nine unknowns.
 type Spread = [[f64; 6]; 9];
 
-/// The fitted transfer function.
+/// The fitted transfer function, with s in units of the band's centre `unit`, rad/s. `misfit` is the root
+/// mean square of the fit's residual, relative to |Y|; `spread` is the square root of the covariance of
+/// numerator and denominator, with one column for each unknown of the fit.
 #[derive(Clone, Debug)]
 pub struct Rational {
-    /// Centre of the band, rad/s, which is the unit of s.
     unit: f64,
     coefficients: Coefficients,
-    /// Root mean square of the fit's residual, relative to |Y|.
     pub misfit: f64,
-    /// Square root of the covariance of numerator and denominator, with one column for each unknown of the
-    /// fit.
     spread: Spread,
 }
 

@@ -6,17 +6,15 @@ use crate::statistics;
 use crate::transfer_function::{TransferFunction, fit_time};
 use crate::welch::{Segments, Spectra};
 
-/// A transfer function fitted to a run, and its residual.
+/// A transfer function fitted to a run, and its residual: skewness, kurtosis (3 for Gaussian noise), and the
+/// mean coherence with the torque between antiresonance and resonance, `None` if one of them is missing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ModelFit {
     pub model: TransferFunction,
     pub fit_frequency: f64,
     pub fit_time: f64,
-    /// Mean coherence of residual and torque between antiresonance and resonance; `None` if one of them is
-    /// missing.
     pub coherence: Option<f64>,
     pub skewness: f64,
-    /// Kurtosis of the residual; it is 3 for Gaussian noise.
     pub kurtosis: f64,
 }
 

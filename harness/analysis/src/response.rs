@@ -2,12 +2,10 @@
 
 use signals::fourier::Complex64;
 
-/// A complex frequency response on a grid of frequencies.
+/// A complex frequency response, rate over torque in (rad/s)/(N·m), on a grid of increasing frequencies, Hz.
 #[derive(Clone, Debug, Default)]
 pub struct FrequencyResponse {
-    /// Frequencies, Hz, increasing.
     pub frequency: Vec<f64>,
-    /// Rate over torque, (rad/s)/(N·m).
     pub response: Vec<Complex64>,
 }
 
@@ -21,7 +19,6 @@ impl FrequencyResponse {
     }
 }
 
-/// The thesis's band (6.3.1), Hz.
 pub const BAND: (f64, f64) = (1.25, 3.5);
 
 /// Returns `points` frequencies from one end of the band to the other, equally spaced in log f, Hz.

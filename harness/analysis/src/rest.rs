@@ -7,55 +7,46 @@ use signals::fourier::{Forward, Inverse};
 use crate::allan::{self, Fit, Octaves, Point};
 use crate::statistics::{deviation, mean, variance};
 
-/// Number of quantiles compared.
 const QUANTILES: usize = 200;
 const CHUNKS: usize = 1000;
 /// Largest magnitude in the histogram, and the usual width of its bins, in standard deviations.
 const BINS: (f64, f64) = (5.0, 0.1);
-/// Limit of [`Chunk::kolmogorov`] that normal noise exceeds with a probability of 5 % (Stephens, J. Am. Stat. Assoc. 69, 1974, table 1A,
-/// case 3: mean and variance estimated).
+/// Limit of [`Chunk::kolmogorov`] that normal noise exceeds with a probability of 5 % (Stephens, J. Am. Stat.
+/// Assoc. 69, 1974, table 1A, case 3: mean and variance estimated).
 pub const KOLMOGOROV: f64 = 0.895;
 
-/// Statistics of a record at rest.
+/// Statistics of a record of a gyro at rest.
+///
+/// - `mean`: the gyro's bias, rad/s; `trend`: slope of the line that fits best, rad/s².
+/// - `deviation` (rad/s), `skewness` and excess `kurtosis`: of the samples after subtraction of this line.
+/// - `quantum`: smallest change of the reading, rad/s, which is its quantisation.
+/// - `histogram`: centre of the bin and density of the samples without the line, divided by their standard
+///   deviation.
+/// - `quantiles`: pairs of a standard normal quantile and the same quantile of these samples.
+/// - `autocorrelation`: at lags of 0, 1, … steps.
+/// - `allan`: Allan variances, (rad/s)²; `noise`: the noise that was fitted to them ([`Octaves::describe`]).
 #[derive(Clone, Debug)]
 pub struct Rest {
     pub step: f64,
     pub count: usize,
-    /// Mean, rad/s, which is the gyro's bias.
     pub mean: f64,
-    /// Slope of the line that fits best, rad/s².
     pub trend: f64,
-    /// Standard deviation of the samples after subtraction of this line, rad/s.
     pub deviation: f64,
-    /// Skewness of the samples after subtraction of the line; 0 for a normal distribution.
     pub skewness: f64,
-    /// Excess kurtosis of the samples after subtraction of the line; 0 for a normal distribution.
     pub kurtosis: f64,
-    /// Smallest change of the reading, rad/s, which is its quantisation.
     pub quantum: f64,
-    /// Histogram of the samples without the line, divided by their standard deviation: centre of the bin, and
-    /// density.
     pub histogram: Vec<(f64, f64)>,
-    /// Allan variances of the samples, (rad/s)².
     pub allan: Vec<Point>,
-    /// The noise that was fitted to the Allan variances ([`Octaves::describe`]).
     pub noise: Option<Fit>,
-    /// Pairs of a standard normal quantile and the same quantile of the samples without the line, divided by
-    /// their standard deviation.
     pub quantiles: Vec<(f64, f64)>,
-    /// Autocorrelation of the samples without the line, at lags of 0, 1, … steps.
     pub autocorrelation: Vec<f64>,
-    /// Consecutive chunks.
     pub chunks: Vec<Chunk>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Chunk {
-    /// Beginning of the chunk, s.
     pub from: f64,
-    /// Mean of the samples without the record's line, rad/s.
     pub mean: f64,
-    /// Variance of the samples without the record's line, (rad/s)².
     pub variance: f64,
     /// Kolmogorov–Smirnov distance of the readings from the normal distribution with their mean and variance,
     /// multiplied by √n − 0.01 + 0.85/√n (Stephens). Quantisation alone makes it Δ √n/(2σ√(2π)).
@@ -132,8 +123,8 @@ impl Rest {
         12.0 * (self.deviation / self.quantum).powi(2)
     }
 
-    /// Returns how many chunks exceed [`KOLMOGOROV`], by the distance at the readings and by the distance
-    /// between their levels.
+    /// Returns the numbers of chunks that exceed [`KOLMOGOROV`], by the distance at the readings and by the
+    /// distance between their levels.
     pub fn not_normal(&self) -> [usize; 2] {
         let count =
             |of: fn(&Chunk) -> f64| self.chunks.iter().filter(|c| of(c) > KOLMOGOROV).count();
@@ -166,7 +157,6 @@ impl Rest {
         ]
     }
 
-    /// Returns the number of samples of a chunk.
     pub fn chunk_length(&self) -> usize {
         self.chunks.get(1).map_or(self.count, |second| (second.from / self.step).round() as usize)
     }
@@ -193,12 +183,10 @@ fn normal(x: f64) -> f64 {
     0.5 * libm::erfc(-x / std::f64::consts::SQRT_2)
 }
 
-/// Returns Stephens's modification of the distance for `n` samples.
 fn modified(distance: f64, n: f64) -> f64 {
     distance * (n.sqrt() - 0.01 + 0.85 / n.sqrt())
 }
 
-/// Computes [`Chunk::kolmogorov`], the test of normality, from samples.
 fn kolmogorov(samples: &[f64]) -> f64 {
     let mut sorted = samples.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
@@ -210,7 +198,6 @@ fn kolmogorov(samples: &[f64]) -> f64 {
     modified(distance.fold(0.0, f64::max), n)
 }
 
-/// Computes [`Chunk::between_levels`] from samples with the quantisation `quantum`.
 fn between_levels(samples: &[f64], quantum: f64) -> f64 {
     let mut sorted = samples.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
@@ -282,7 +269,8 @@ mod tests {
         assert!(off.fold(0.0, f64::max) < 0.03);
     }
 
-    /// Noise of 0.4 mrad/s in steps of 0.15 mrad/s, as the thesis's gyro has it: the readings are not normal, the noise is.
+    /// The thesis's gyro has noise of 0.4 mrad/s in steps of 0.15 mrad/s: the readings are not normal, the
+    /// noise is.
     #[test]
     fn quantised_normal_noise_is_normal_between_its_levels() {
         let mut random = Random::new(3, 0);

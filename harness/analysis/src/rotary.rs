@@ -19,19 +19,15 @@ pub const ROTARY: f64 = 0.5;
 /// swirl number meaningless.
 pub const LEAST: f64 = 0.02;
 
-/// Length of the time windows, in slosh periods.
 const PERIODS: f64 = 10.0;
 
-/// Rotary motion in a run.
+/// Rotary motion in a run: its duration, s, the swirl number with the largest magnitude, and for a sweep the
+/// first and last frequency with rotary slosh, Hz.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Rotary {
-    /// First frequency of a sweep with rotary slosh, Hz; `None` under any other torque.
     pub from: Option<f64>,
-    /// Last frequency of a sweep with rotary slosh, Hz; `None` under any other torque.
     pub to: Option<f64>,
-    /// Time in rotary slosh, s.
     pub time: f64,
-    /// Swirl number with the largest magnitude in the run.
     pub swirl: f64,
 }
 
@@ -90,7 +86,6 @@ impl Rotary {
     }
 }
 
-/// Returns the swirl number with the largest magnitude.
 fn largest(swirl: &[f64]) -> f64 {
     swirl.iter().fold(0.0, |m: f64, s| if s.abs() > m.abs() { *s } else { m })
 }

@@ -13,26 +13,24 @@ use nalgebra::{DMatrix, DVector};
 use signals::fourier::Complex64;
 
 /// Spectra at one frequency: s = jω in a unit near the middle of the lines (for the condition of the
-/// equations), U and Y.
+/// equations), U and Y, and the divisor `scale` that weights the equation.
 #[derive(Clone, Copy, Debug)]
 pub struct Line {
     pub s: Complex64,
     pub input: Complex64,
     pub output: Complex64,
-    /// Divisor that weights the equation.
     pub scale: f64,
 }
 
-/// Coefficients of B/A, with s in the unit of the lines. The numerator is b2, b1, b0.
+/// Coefficients of B/A, with s in the unit of the lines: the numerator b2, b1, b0 and the denominator a2, a1,
+/// a0, in which the coefficient of s³ is 1.
 #[derive(Clone, Copy, Debug)]
 pub struct Coefficients {
     pub numerator: [f64; 3],
-    /// a2, a1, a0; the coefficient of s³ is 1.
     pub denominator: [f64; 3],
 }
 
 impl Coefficients {
-    /// Evaluates the transfer function B(s)/A(s).
     pub fn response(&self, s: Complex64) -> Complex64 {
         let [b2, b1, b0] = self.numerator;
         (b2 * s * s + b1 * s + b0) / self.denominator_at(s)

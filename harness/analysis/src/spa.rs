@@ -12,22 +12,20 @@ use crate::response::FrequencyResponse;
 use crate::statistics;
 use signals::fourier::Complex64;
 
-/// Longest lag for the thesis's band, s. `spa` resolves about 1/lag: 10 mHz need 100 s. 200 s hardly change the shape
-/// of the antiresonance, whose half-power width is 14 mHz.
+/// Longest lag for the thesis's band, s. `spa` resolves about 1/lag: 10 mHz need 100 s. 200 s hardly change
+/// the shape of the antiresonance, whose half-power width is 14 mHz.
 pub const LAG: f64 = 200.0;
 
-/// A frequency response with the data from which its uncertainty follows.
+/// A frequency response with the data from which its uncertainty follows; `input` is the two-sided power
+/// spectral density of the input at the response's frequencies, its unit squared times s.
 pub struct Estimate {
     pub response: FrequencyResponse,
-    /// Two-sided power spectral density of the input at the response's frequencies, its unit
-    /// squared times s.
     pub input: Vec<f64>,
     lag: f64,
     duration: f64,
 }
 
 impl Estimate {
-    /// Estimates the response and its uncertainty; the arguments are those of [`frequency_response`].
     pub fn new(
         step: f64,
         input: &[f64],
@@ -45,12 +43,11 @@ impl Estimate {
         }
     }
 
-    /// Returns the standard deviation of |H| relative to |H| (and of the phase, rad), from the
-    /// power that the response does not explain. The window averages T/∫w² = T/(3M/4) independent
-    /// lines:
+    /// Returns the standard deviation of |H| relative to |H| (and of the phase, rad), from the power that the
+    /// response does not explain. The window averages T/∫w² = T/(3M/4) independent lines:
     ///
     /// ```text
-    /// var |H| / |H|² = Φ_v / (2 n |H|² Φ_uu),   n = 4 T / (3 M)
+    /// var |H| / |H|² = Φ_v / (2 n |H|² Φ_uu), n = 4 T / (3 M)
     /// ```
     ///
     /// (Ljung, *System Identification*, 2nd ed., 1999, equations 6.59 and 6.60).
@@ -69,8 +66,8 @@ impl Estimate {
     }
 }
 
-/// Returns the frequency response of `output` to `input`, sampled every `step` s, at `frequencies`
-/// (Hz), with lags up to `lag` s. Means are removed first.
+/// Returns the frequency response of `output` to `input`, sampled every `step` s, at `frequencies` (Hz), with
+/// lags up to `lag` s. Means are removed first.
 pub fn frequency_response(
     step: f64,
     input: &[f64],
@@ -82,7 +79,6 @@ pub fn frequency_response(
     FrequencyResponse { response, frequency: frequencies.to_vec() }
 }
 
-/// Returns the response, and the power spectral density of the input.
 fn estimate(
     step: f64,
     input: &[f64],
@@ -133,8 +129,8 @@ fn estimate(
     response.map(|(h, power)| (h, power * unit)).unzip()
 }
 
-/// Number of frequencies summed together. Each sum waits for the previous one; sixteen independent
-/// sums keep the processor busy and are six times as fast.
+/// Number of frequencies summed together. Each sum waits for the previous one; sixteen independent sums keep
+/// the processor busy and are six times as fast.
 const TOGETHER: usize = 16;
 
 /// Returns Σ even cos kφ + j odd sin kφ divided by Σ auto cos kφ, and the latter sum, for each angle φ per

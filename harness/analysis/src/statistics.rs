@@ -2,19 +2,16 @@ pub fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// Subtracts the arithmetic mean from the values.
 pub fn about_mean(values: &[f64]) -> Vec<f64> {
     let mean = mean(values);
     values.iter().map(|v| v - mean).collect()
 }
 
-/// Returns the mean square about the mean.
 pub fn variance(values: &[f64]) -> f64 {
     let mean = mean(values);
     values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len() as f64
 }
 
-/// Returns the root mean square about the mean.
 pub fn deviation(values: &[f64]) -> f64 {
     variance(values).sqrt()
 }
@@ -26,7 +23,6 @@ pub fn correlation(a: &[f64], b: &[f64]) -> f64 {
     product / a.len() as f64 / (deviation(a) * deviation(b))
 }
 
-/// Returns the largest magnitude; 0 without values.
 pub fn peak(values: &[f64]) -> f64 {
     values.iter().fold(0.0, |largest: f64, v| largest.max(v.abs()))
 }
@@ -43,8 +39,9 @@ pub fn median(values: &[f64]) -> Option<f64> {
     quantile(values, 0.5)
 }
 
-/// Returns the standard deviation of a signal's white noise from its third differences, in which a motion of a few
-/// hertz almost vanishes. The result is at least the rounding to the smallest step of the signal, step/√12.
+/// Returns the standard deviation of a signal's white noise from its third differences, in which a motion of
+/// a few hertz almost vanishes. The result is at least the rounding to the smallest step of the signal,
+/// step/√12.
 pub fn noise_level(signal: &[f64]) -> f64 {
     let third = signal.windows(4).map(|y| y[3] - 3.0 * y[2] + 3.0 * y[1] - y[0]);
     let squares: Vec<f64> = third.map(|d| d * d).collect();

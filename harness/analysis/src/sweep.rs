@@ -4,23 +4,22 @@ use std::f64::consts::TAU;
 
 use crate::response::BAND;
 
-/// Torque A sin φ(t) whose frequency φ'/2π goes from f0 to f1, upwards or downwards.
+/// Torque A sin φ(t) whose frequency φ'/2π goes from f0 to f1, Hz, upwards or downwards, in the duration T,
+/// s.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sweep {
     pub amplitude: f64,
     pub f0: f64,
     pub f1: f64,
-    /// Duration T, s.
     pub duration: f64,
     pub law: Law,
 }
 
-/// Laws of a sweep's frequency over time.
+/// Laws of a sweep's frequency over time: f = f0 e^{at} with a = ln(f1/f0)/T (Rubaga's thesis 5.1.4), or f =
+/// f0 + s t with s = (f1 − f0)/T.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Law {
-    /// f = f0 e^{at}, a = ln(f1/f0)/T (Rubaga's thesis 5.1.4).
     Exponential,
-    /// f = f0 + s t, s = (f1 − f0)/T.
     Linear,
 }
 
@@ -29,7 +28,6 @@ impl Sweep {
     pub const THESIS: Sweep =
         Sweep { amplitude: 0.1, f0: BAND.0, f1: BAND.1, duration: 2700.0, law: Law::Exponential };
 
-    /// Returns the torque at `t` (s), N·m.
     pub fn torque(&self, t: f64) -> f64 {
         self.amplitude * self.phase(t).sin()
     }
@@ -46,7 +44,6 @@ impl Sweep {
         }
     }
 
-    /// Returns the frequency at `t`, Hz: f0 e^{at}, or f0 + s t.
     pub fn frequency_at(&self, t: f64) -> f64 {
         let Sweep { f0, f1, duration, .. } = *self;
         match self.law {

@@ -22,15 +22,13 @@ use crate::sanathanan_koerner::{self, Coefficients, Line};
 use crate::statistics::mean;
 use signals::fourier::Complex64;
 
-/// A transfer function with three stable poles and two zeros; s in rad/s.
+/// A transfer function with three stable poles and two zeros, s in rad/s: the real pole has the rate p, 1/s,
+/// and the pole pair the natural frequency ω, rad/s, and the damping ratio ζ.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TransferFunction {
     pub numerator: [f64; 3],
-    /// Rate p of the real pole, 1/s.
     pub real_pole: f64,
-    /// Natural frequency ω of the pole pair, rad/s.
     pub pole_omega: f64,
-    /// Damping ratio ζ of the pole pair.
     pub pole_damping: f64,
 }
 
@@ -53,12 +51,10 @@ impl TransferFunction {
         [p + 2.0 * z * w, w * w + 2.0 * z * w * p, w * w * p]
     }
 
-    /// Returns the natural frequency of the pole pair, Hz.
     pub fn pole_frequency(&self) -> f64 {
         self.pole_omega / TAU
     }
 
-    /// Evaluates the transfer function H at a frequency, Hz.
     pub fn response(&self, frequency: f64) -> Complex64 {
         let s = Complex64::new(0.0, TAU * frequency);
         let [b2, b1, b0] = self.numerator;
@@ -195,7 +191,6 @@ fn at_the_resonance(measured: &FrequencyResponse) -> Option<TransferFunction> {
     Some(TransferFunction { numerator, ..start })
 }
 
-/// Number of iterations for the start.
 const ROUNDS: usize = 30;
 
 /// Returns a start from Sanathanan and Koerner's iteration with U = 1 and Y = H.
@@ -246,8 +241,8 @@ fn stable_poles([c2, c1, c0]: [f64; 3]) -> Option<(f64, f64, f64)> {
     (root.is_finite() && w.is_finite()).then_some((root.abs().max(least), w, damping))
 }
 
-/// The search: its variables are b2, b1, b0 in units of `unit`, which is the ω of the start, then ln p, ln ω,
-/// ln ζ.
+/// The search, with the variables b2, b1, b0 in units of `unit`, which is the ω of the start, then ln p, ln
+/// ω, ln ζ.
 struct Problem<'a> {
     measured: &'a FrequencyResponse,
     unit: f64,

@@ -29,32 +29,25 @@ pub enum Segments {
     Longest,
 }
 
-/// Length of segments for coherence in the thesis's band, s.
 pub const SEGMENT: f64 = 20.0;
 
-/// Segments for the H1 estimate and the signal-to-noise ratio.
 pub const RESPONSE: Segments = Segments::Longest;
 
 /// Each segment is padded with zeros to this multiple of its length, so that several bins lie even between
 /// antiresonance and resonance.
 const PADDING: usize = 4;
 
-/// Averaged auto- and cross-spectra of two signals, in an arbitrary common unit.
+/// Averaged auto- and cross-spectra of two signals U and Y, in an arbitrary common unit: |U|², |Y|² and
+/// conj(U) Y per bin. The bins are `resolution` Hz apart; a segment is `length` s long.
 pub struct Spectra {
-    /// Distance of the bins, Hz.
     pub resolution: f64,
-    /// Length of a segment, s.
     pub length: f64,
-    /// |U|² per bin.
     pub input: Vec<f64>,
-    /// |Y|² per bin.
     pub output: Vec<f64>,
-    /// conj(U) Y per bin.
     pub cross: Vec<Complex64>,
 }
 
 impl Spectra {
-    /// Estimates the spectra of two signals of equal length, sampled every `step` s.
     pub fn estimate(step: f64, input: &[f64], output: &[f64], segments: Segments) -> Self {
         // With half overlap SEGMENTS segments of length L cover (SEGMENTS + 1) L/2.
         let longest = (2 * input.len() / (SEGMENTS + 1)).max(2);
@@ -123,12 +116,10 @@ impl Spectra {
         self.coherence().into_iter().map(|c| 10.0 * (c / (1.0 - c)).log10()).collect()
     }
 
-    /// Returns the element of `values` in the bin nearest to a frequency, Hz.
     pub fn value_at(&self, values: &[f64], frequency: f64) -> f64 {
         values[((frequency / self.resolution).round() as usize).min(values.len() - 1)]
     }
 
-    /// Returns frequencies (Hz) and values of the bins within a band, Hz.
     pub fn values_within(&self, (from, to): (f64, f64), values: &[f64]) -> Vec<(f64, f64)> {
         let bins = values.iter().enumerate().map(|(k, v)| (k as f64 * self.resolution, *v));
         bins.filter(|(f, _)| (from..=to).contains(f)).collect()
@@ -152,7 +143,6 @@ impl Spectra {
 mod tests {
     use super::{RESPONSE, SEGMENT, Segments, Spectra};
 
-    /// White noise, even in ±1: the multiplicative generator of MINSTD.
     fn noise(seed: u64, count: usize) -> Vec<f64> {
         let mut state = seed;
         let mut next = || {

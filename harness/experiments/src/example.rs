@@ -16,24 +16,22 @@ use host::fmu::Fmu;
 use names::hubslosh::TAU_CMD;
 use signals::table::Table;
 
-/// The example of an FMU of this project.
 #[derive(Clone, Copy, Debug)]
 pub struct Example {
     pub model: &'static str,
-    /// Driven inputs: name, amplitude, time function.
     inputs: &'static [(&'static str, f64, Course)],
 }
 
 /// Time function of an input; t in s, largest value 1.
 type Course = fn(t: f64) -> f64;
 
-/// A sine below the slosh frequency of the bench that grows and fades within ten seconds, then no torque. The hub slips,
-/// reverses and comes to rest while the liquid still loads it.
+/// A sine below the slosh frequency of the bench that grows and fades within ten seconds, then no torque. The
+/// hub slips, reverses and comes to rest while the liquid still loads it.
 const BENCH: Course = |t| swell(t) * (TAU * 2.0 * t).sin();
-/// A constant thrust.
 const THRUST: Course = |_| 1.0;
-/// Sines near the slosh frequency of the default tank under that thrust, 0.42 Hz with the tank held. They grow and fade
-/// within ten seconds, then the liquid oscillates freely. No two are in phase, so that no output stays 0.
+/// Sines near the slosh frequency of the default tank under that thrust, 0.42 Hz with the tank held. They
+/// grow and fade within ten seconds, then the liquid oscillates freely. No two are in phase, so that no
+/// output stays 0.
 const NEAR_SLOSH: Course = |t| swell(t) * (TAU * 0.4 * t).sin();
 const BELOW_SLOSH: Course = |t| swell(t) * (TAU * 0.25 * t).sin();
 const SLOW: Course = |t| swell(t) * (TAU * 0.1 * t).cos();
@@ -42,8 +40,8 @@ fn swell(t: f64) -> f64 {
     (t / 2.0).min((10.0 - t) / 2.0).clamp(0.0, 1.0)
 }
 
-/// The examples, one for each FMU. 2340 N give the default craft with its liquid, 1562 kg, an acceleration of 1.5 m/s²,
-/// for which its tank's damping holds.
+/// The examples, one for each FMU. 2340 N give the default craft with its liquid, 1562 kg, an acceleration of
+/// 1.5 m/s², for which its tank's damping holds.
 pub const EXAMPLES: [Example; 3] = [
     Example { model: "HubSlosh", inputs: &[(TAU_CMD, 0.1, BENCH)] },
     Example {
@@ -68,19 +66,13 @@ pub const EXAMPLES: [Example; 3] = [
     },
 ];
 
-/// Length of the example and its communication step, s.
 const STOP: f64 = 20.0;
 const STEP: f64 = 0.02;
-/// Number of communication steps per row of the reference.
 const EVERY: usize = 5;
 /// Tolerance of the reference. Results with the FMU's default tolerance are within 1e-6 of it.
 const TOLERANCE: f64 = 1e-12;
 
 impl Example {
-    /// Returns the example of the FMU.
-    ///
-    /// # Errors
-    /// If the FMU has no example.
     pub fn for_fmu(fmu: &Fmu) -> Result<&'static Example> {
         let model = &fmu.description().model_name;
         let found = EXAMPLES.iter().find(|example| example.model == model);
@@ -132,8 +124,8 @@ impl Example {
     }
 }
 
-/// Drives the FMU with the inputs of a file. `hold` holds them over each step, like a host that
-/// does not set slopes.
+/// Drives the FMU with the inputs of a file. `hold` holds them over each step, like a host that does not set
+/// slopes.
 pub fn replay(fmu: &Fmu, input: &Path, tolerance: Option<f64>, hold: bool) -> Result<Table> {
     let description = fmu.description();
     let mut others = histories(description, input, None, hold, false, &mut |_| {})?;
@@ -171,7 +163,6 @@ fn thinned(description: &ModelDescription, answer: &Table) -> Table {
     Table::new(names.into_iter().map(String::from).collect(), columns)
 }
 
-/// Returns `x` with this number of decimals.
 fn round(x: f64, decimals: i32) -> f64 {
     let unit = 10f64.powi(decimals);
     (x * unit).round() / unit

@@ -14,35 +14,33 @@ use host::fmu::Fmu;
 use names::hubslosh::{OMEGA, OMEGA_IMU, imu};
 use signals::table::Table;
 
-/// Largest number of records; more would take days.
 const MOST_RECORDS: usize = 10_000;
-/// Shortest record in correlation times of the bias, so that the maximum (at 1.89) is visible. The
-/// longest averaging time is a tenth of the record.
+/// Shortest record in correlation times of the bias, so that the maximum (at 1.89) is visible. The longest
+/// averaging time is a tenth of the record.
 const LEAST_TIMES: f64 = 30.0;
 
-/// A recording to simulate.
+/// A recording to simulate; `settings` are start values by FMU name, as text, except `imu.enabled` and
+/// `imu.seed`.
 #[derive(Clone, Debug)]
 pub struct Recording {
-    /// Start values by FMU name, as text; not `imu.enabled` and `imu.seed`.
     pub settings: Vec<(String, String)>,
     pub hours: f64,
     pub records: usize,
 }
 
-/// Specified and estimated noise.
+/// Specified and estimated noise of a gyro. The specified N includes the quantisation noise of `imu.lsb`,
+/// lsb/√(12 rate). The specified terms are fitted to the mean of the records' Allan variances, `points`,
+/// (rad/s)².
 #[derive(Clone, Debug)]
 pub struct Characteristics {
-    /// Specified noise; N includes the quantisation noise of `imu.lsb`, lsb/√(12 rate).
     pub specified: Noise,
-    /// Fit of the specified terms to the mean of the records' Allan variances.
     pub fit: Fit,
-    /// The mean of the records' Allan variances, (rad/s)².
     pub points: Vec<Point>,
 }
 
 impl Recording {
-    /// Simulates the records, several in parallel, and analyses them. Fails if the hub does not
-    /// rest, if the gyro has no noise, or if the records are too short for its bias.
+    /// Simulates the records, several in parallel, and analyses them. Fails if the hub does not rest, if the
+    /// gyro has no noise, or if the records are too short for its bias.
     pub fn characterise(
         &self,
         fmu: &Fmu,
@@ -106,7 +104,6 @@ impl Recording {
         Characteristics::estimate(specified, &records)
     }
 
-    /// Returns one record, sampled at the gyro's own instants.
     fn run(&self, seed: usize, step: f64, stop: f64) -> Result<Run> {
         let ours = [(imu::ENABLED, "true".to_string()), (imu::SEED, seed.to_string())];
         let ours = ours.map(|(name, value)| (name.to_string(), value));
@@ -126,7 +123,6 @@ impl Recording {
     }
 }
 
-/// Returns the Allan variances of one record.
 fn record(
     run: &Run,
     fmu: &Fmu,
@@ -173,7 +169,6 @@ impl Characteristics {
         ]
     }
 
-    /// Returns specified and estimated values as lines of text.
     pub fn text(&self) -> String {
         let mut text = format!(
             "{:22}{:>12}{:>12}{:>12}{:>16}\n",

@@ -5,8 +5,8 @@ use host::description::ModelDescription;
 use host::fmu::{Fmu, Instance};
 use names::hubslosh;
 
-/// Names the parameters that make an FMU move although nothing is set: HubSlosh begins with the liquid
-/// displaced, so that a first plot in any host shows something. The value 0 is at rest.
+/// Returns the names of the parameters that make an FMU move although nothing is set. HubSlosh begins with
+/// the liquid displaced, so that a first plot in any host shows something; the value 0 is at rest.
 pub fn moving_starts(description: &ModelDescription) -> Vec<String> {
     match description.model_name.as_str() {
         "HubSlosh" => vec![hubslosh::init::SLOSH_ANGLE.into()],
@@ -16,9 +16,7 @@ pub fn moving_starts(description: &ModelDescription) -> Vec<String> {
 
 /// Creates an instance in which all [`moving_starts`] are 0, so that only the settings move it.
 ///
-/// # Errors
-///
-/// If the FMU refuses a call.
+/// # Errors If the FMU refuses a call.
 pub fn instantiate<'fmu>(fmu: &'fmu Fmu, name: &str) -> Result<Instance<'fmu>> {
     let mut instance = fmu.instantiate(name)?;
     for start in moving_starts(fmu.description()) {

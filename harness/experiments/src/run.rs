@@ -19,24 +19,24 @@ use signals::recording::{self, Between, Columns, Signal, Wanted};
 use signals::table::Table;
 
 /// A simulation of an FMU.
+///
+/// - `settings`: start values by FMU name, as text, set in this order.
+/// - `input`: name of the input that `torque` drives, if any; `others` are further inputs by FMU name, each
+///   with its history in the input's unit.
+/// - `sample`: time between the commands of a profile, s; see [`Torque::history`].
+/// - `tolerance`: relative tolerance for the FMU's solver; `None` for the FMU's own.
+/// - `hold`: true if inputs are held from row to row, and a profile from command to command; false for
+///   straight lines.
 #[derive(Clone, Debug)]
 pub struct Run {
-    /// Start values by FMU name, as text; set in this order.
     pub settings: Vec<(String, String)>,
-    /// Name of the input that the torque drives; `None` if no input is driven.
     pub input: Option<String>,
-    /// The torque command.
     pub torque: Torque,
-    /// Further inputs by FMU name, each with its history in the input's unit.
     pub others: Vec<(String, Torque)>,
     pub step: f64,
-    /// Time between the commands of a profile, s; see [`Torque::history`].
     pub sample: f64,
     pub stop: f64,
-    /// Relative tolerance for the FMU's solver; `None`: the FMU's own.
     pub tolerance: Option<f64>,
-    /// True if inputs are held from row to row, and a profile from command to command; false for straight
-    /// lines.
     pub hold: bool,
 }
 
@@ -46,9 +46,7 @@ pub const TORQUE: &str = TAU_CMD;
 /// Returns the name of the input that the torque drives: `chosen` if given, otherwise [`TORQUE`], otherwise
 /// the FMU's only Real input. Returns `None` if the FMU has no input.
 ///
-/// # Errors
-///
-/// If the input does not exist, or several inputs are possible.
+/// # Errors If the input does not exist, or several inputs are possible.
 pub fn driven(description: &ModelDescription, chosen: Option<&str>) -> Result<Option<String>> {
     if let Some(name) = chosen {
         let variable = description.variable(name)?;
@@ -78,9 +76,7 @@ pub const SLOPE: &str = "tau_slope";
 /// `chosen`, else [`TORQUE`], else the file's first. `done` receives messages about the units in which the
 /// columns are read.
 ///
-/// # Errors
-///
-/// If the file has no such column, or other columns. The error lists all problems of the columns.
+/// # Errors If the file has no such column, or other columns. The error lists all problems of the columns.
 pub fn histories(
     description: &ModelDescription,
     path: &Path,
@@ -181,7 +177,6 @@ pub fn histories(
         .collect()
 }
 
-/// Returns true for a variable that a host sets before a run.
 fn is_settable(variable: &Variable) -> bool {
     matches!(
         variable.causality,
@@ -220,7 +215,6 @@ pub fn parameters(
         .collect()
 }
 
-/// Number of steps between two reports of progress.
 const REPORT_EVERY: usize = 1024;
 
 impl Run {
@@ -245,7 +239,6 @@ impl Run {
         (counts.sum::<usize>() + self.steps()) as u64 * 100
     }
 
-    /// Returns the histories of the torque and of the other inputs, and the communication points.
     fn course(&self) -> Result<(Vec<Cow<'_, History>>, Schedule)> {
         let others = self.others.iter().map(|(_, other)| other);
         let histories = [&self.torque]
@@ -262,9 +255,7 @@ impl Run {
     /// (N·m) and `tau_slope`, its derivative until the next point (N·m/s). The schedule says which points are
     /// rows of the result.
     ///
-    /// # Errors
-    ///
-    /// If the profile takes too many commands.
+    /// # Errors If the profile takes too many commands.
     pub fn torque_table(&self) -> Result<(Table, Schedule)> {
         let (histories, schedule) = self.course()?;
         let mut torque = histories[0].cursor();
@@ -280,13 +271,11 @@ impl Run {
         Ok((Table::new(names, columns), schedule))
     }
 
-    /// Returns every driven input with its history, that of the torque first.
     fn driven(&self) -> Vec<(&str, &Torque)> {
         let first = self.input.iter().map(|name| (name.as_str(), &self.torque));
         first.chain(self.others.iter().map(|(name, history)| (name.as_str(), history))).collect()
     }
 
-    /// Returns the driven inputs in the form that the FMU's instance takes.
     fn inputs(&self, description: &ModelDescription) -> Result<Inputs> {
         let driven = self.driven();
         let names: Vec<&str> = driven.iter().map(|(name, _)| *name).collect();
@@ -295,9 +284,7 @@ impl Run {
 
     /// Checks stop time, step, tolerance and inputs.
     ///
-    /// # Errors
-    ///
-    /// If a value is not allowed; the message is one sentence about it.
+    /// # Errors If a value is not allowed; the message is one sentence about it.
     pub fn check(&self) -> Result<()> {
         ensure!(
             self.stop > self.start() && self.stop.is_finite(),
@@ -318,9 +305,7 @@ impl Run {
 
     /// Creates an instance with the start values set, ready for the first step.
     ///
-    /// # Errors
-    ///
-    /// If [`Run::check`] fails, or the FMU refuses a setting.
+    /// # Errors If [`Run::check`] fails, or the FMU refuses a setting.
     pub fn initialise<'fmu>(&self, fmu: &'fmu Fmu) -> Result<Instance<'fmu>> {
         self.check()?;
         let mut instance = rest::instantiate(fmu, "run")?;
@@ -379,9 +364,7 @@ impl Run {
     /// [`Run::step`] seconds; [`schedule::ROWS`] says which values of inputs and outputs a row pairs.
     /// `progress` receives the number of rows since its last call.
     ///
-    /// # Errors
-    ///
-    /// If the FMU refuses a call, or a recorded value is not finite.
+    /// # Errors If the FMU refuses a call, or a recorded value is not finite.
     pub fn drive(
         &self,
         instance: &mut Instance,
@@ -439,11 +422,11 @@ impl Run {
     }
 }
 
-/// Reads the recorded variables of each type with one call.
+/// Reads the recorded variables of each type with one call; `places` are the columns of the values, reals
+/// first, then the others.
 struct Recorder {
     reals: Vec<u32>,
     others: Vec<Variable>,
-    /// Column of each value: reals first, then the others.
     places: Vec<usize>,
     values: Vec<f64>,
     columns: Vec<Vec<f64>>,

@@ -14,9 +14,7 @@ use formulas::similarity::{self, Liquid, agility, froude_viscosity, regime};
 
 use crate::rounding::significant;
 
-/// Water at 25 degC, as in the thesis's 7.2.1.
 pub const WATER: Liquid = Liquid { density: 997.0, tension: 0.072 };
-/// Water with rounded values, as in the thesis's 7.2.2.
 pub const ROUND_WATER: Liquid = Liquid { density: 1000.0, tension: 0.072 };
 /// Liquid oxygen at its boiling point, 90 K (the thesis says -200 degC).
 pub const OXYGEN: Liquid = Liquid { density: 1141.0, tension: 0.0132 };
@@ -25,9 +23,7 @@ pub const BENCH: (f64, f64) = (0.0815, 0.225);
 
 /// Checks that all values are positive numbers.
 ///
-/// # Errors
-///
-/// Names all that are not.
+/// # Errors Names all that are not.
 fn positive(values: &[(&str, f64)]) -> Result<()> {
     let wrong: Vec<String> = values
         .iter()
@@ -42,25 +38,21 @@ fn positive(values: &[(&str, f64)]) -> Result<()> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Found {
     pub text: String,
-    /// The same numbers, SI.
     pub json: Value,
 }
 
-/// Known quantity of the flight tank.
+/// Known quantity of the flight tank: the radius, m, from which the acceleration is computed, or the
+/// acceleration, m/s² or rad/s², from which the radius is computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Flight {
-    /// Radius, m; the acceleration is computed.
     Radius(f64),
-    /// Acceleration, m/s² or rad/s²; the radius is computed.
     Acceleration(f64),
 }
 
 /// Computes the Bond number of the bench's liquid at the acceleration `a` (m/s²) in a tank of `radius` (m),
 /// and the flight tank with `liquid` that has the same Bond number.
 ///
-/// # Errors
-///
-/// If a value is not positive.
+/// # Errors If a value is not positive.
 pub fn bond(
     bench: Liquid,
     (a, radius): (f64, f64),
@@ -103,9 +95,7 @@ pub fn bond(
 /// Computes Bond, Weber and Froude numbers of a liquid that moves at `velocity` (m/s), and names the dominant
 /// force. Also computes the times that gravity and surface tension take over the radius (thesis 2.28, 2.29).
 ///
-/// # Errors
-///
-/// If a value is not positive.
+/// # Errors If a value is not positive.
 pub fn numbers(liquid: Liquid, (a, radius): (f64, f64), velocity: f64) -> Result<Found> {
     positive(&[
         ("density", liquid.density),
@@ -144,9 +134,7 @@ pub fn numbers(liquid: Liquid, (a, radius): (f64, f64), velocity: f64) -> Result
 /// Computes the bench's rotational Bond numbers at the angular acceleration `alpha` (rad/s²) and rate `omega`
 /// (rad/s), and the tanks that have the same numbers at the angular acceleration `target` in flight.
 ///
-/// # Errors
-///
-/// If a value is not positive.
+/// # Errors If a value is not positive.
 pub fn rotation(
     liquid: Liquid,
     (radius, arm): (f64, f64),
@@ -195,9 +183,7 @@ pub fn rotation(
 /// Computes the factors of Froude similarity (the thesis's Table 2.3) for the ratios of length, density and
 /// gravity of full size to model.
 ///
-/// # Errors
-///
-/// If a ratio is not positive, or a factor overflows.
+/// # Errors If a ratio is not positive, or a factor overflows.
 pub fn froude(lambda: f64, density: f64, gravity: f64) -> Result<Found> {
     positive(&[("lambda", lambda), ("density ratio", density), ("gravity ratio", gravity)])?;
     let factors = similarity::froude(lambda, density, gravity);
@@ -301,7 +287,6 @@ pub fn thesis() -> Vec<Comparison> {
     ]
 }
 
-/// Formats [`thesis`] as a table, and for programs.
 pub fn thesis_found() -> Found {
     let json = json!(thesis());
     let line = |f: Comparison| {
@@ -322,7 +307,7 @@ mod tests {
         thesis().into_iter().find(|f| f.what.starts_with(what)).expect(what).value
     }
 
-    /// Each to half a unit of the last digit that is known.
+    /// The tolerance of each number is half a unit of the last digit that is known.
     #[test]
     fn numbers_of_the_thesis_are_reproduced_with_their_corrections() {
         for (what, known, digit) in [

@@ -15,25 +15,24 @@ const LEAST_BOND: f64 = 30.0;
 /// Surface tension of water at 24 degC, N/m: HubSlosh's start value of `fluid.sigma`.
 pub const WATER_TENSION: f64 = 0.07213;
 
-/// A liquid in a tank of a given radius, m.
 #[derive(Clone, Copy, Debug)]
 pub struct Contents {
     pub liquid: Liquid,
     pub radius: f64,
 }
 
-/// Bond and Weber number of the row in which weight dominates least.
+/// Bond and Weber number of the row in which weight dominates least. The Bond number is negative if the
+/// specific force points out of the liquid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Weightless {
-    /// Negative if the specific force points out of the liquid.
     bond: f64,
     weber: f64,
 }
 
 impl Contents {
-    /// Returns the state of the liquid in the row in which weight dominates least, if weight does not dominate there. The rows
-    /// are specific force towards the bottom, m/s², and speed of the surface, m/s. A row's Weber number uses the radius and
-    /// the highest speed up to it.
+    /// Returns the state of the liquid in the row in which weight dominates least, if weight does not
+    /// dominate there. The rows are specific force towards the bottom, m/s², and speed of the surface, m/s. A
+    /// row's Weber number uses the radius and the highest speed up to it.
     pub fn without_weight(&self, rows: impl IntoIterator<Item = (f64, f64)>) -> Option<Weightless> {
         let (mut speed, mut worst) = (0.0f64, None::<(f64, Weightless)>);
         for (g, v) in rows {
@@ -51,7 +50,8 @@ impl Contents {
 }
 
 impl Weightless {
-    /// Returns true if the liquid leaves the tank's bottom: inertia dominates, or the dominant force points out of the liquid.
+    /// Returns true if the liquid leaves the tank's bottom: inertia dominates, or the dominant force points
+    /// out of the liquid.
     fn leaves(self) -> bool {
         self.bond < -1.0 || ruling_force(self.bond, self.weber).starts_with("inertia")
     }
@@ -79,31 +79,28 @@ impl std::fmt::Display for Weightless {
     }
 }
 
-/// A tank of Spacecraft or SloshTank.
+/// A tank of Spacecraft or SloshTank: the prefix of its variables' names (`tank[1]`, `tank`), the hinge of
+/// mode 1 relative to O, m, and the direction out of the liquid, in axes of craft or host, and the wall
+/// elevation per slosh angle of each mode, m. `has_ball` is true if the FMU models detached liquid, but not
+/// in this tank.
 #[derive(Clone, Debug)]
 struct Tank {
-    /// Prefix of variables' names: `tank[1]`, `tank`.
     name: String,
     contents: Contents,
-    /// Position of the hinge of mode 1 relative to O, m, in axes of craft or host; the next field is the
-    /// direction out of the liquid.
     hinge: [f64; 3],
     upwards: [f64; 3],
-    /// Wall elevation per slosh angle of each mode, m.
     wave: Vec<f64>,
-    /// True if the FMU models detached liquid, but not in this tank.
     has_ball: bool,
 }
 
-/// The tanks of Spacecraft or SloshTank in which only weight holds the liquid.
+/// The tanks of Spacecraft or SloshTank in which only weight holds the liquid. `accelerometer` is the
+/// specific force at O: `specific_force`, or SloshTank's input `a`.
 #[derive(Clone, Debug)]
 pub struct Tanks {
     tanks: Vec<Tank>,
-    /// Specific force at O: `specific_force`, or SloshTank's input `a`.
     accelerometer: &'static str,
 }
 
-/// Returns the names of the three components of a vector variable.
 fn components(name: &str) -> [String; 3] {
     [1, 2, 3].map(|i| format!("{name}[{i}]"))
 }
@@ -116,9 +113,7 @@ impl Tanks {
     /// without modes, with unknown dimensions (`wave` = 0), and those whose liquid a stiffness k holds are
     /// left out.
     ///
-    /// # Errors
-    ///
-    /// If the tension is not positive, or a variable cannot be read.
+    /// # Errors If the tension is not positive, or a variable cannot be read.
     pub fn read(
         description: &ModelDescription,
         instance: &mut Instance,
@@ -148,7 +143,6 @@ impl Tanks {
         Ok(Some(Tanks { tanks, accelerometer }))
     }
 
-    /// Lists the variables that must be recorded.
     pub fn required_variables(&self) -> Vec<String> {
         let host = [self.accelerometer, "omega", "omega_dot"].map(components).into_iter().flatten();
         let tanks = self.tanks.iter().flat_map(Tank::rates);
@@ -215,7 +209,6 @@ impl Tank {
         Ok(Some(Tank { name, contents, hinge, upwards, wave, has_ball }))
     }
 
-    /// Lists the rates of the modes' directions across the tank's axis, 1/s.
     fn rates(&self) -> Vec<String> {
         let modes = 1..=self.wave.len();
         modes.flat_map(|n| [1, 2].map(|i| format!("{}.p_dot[{n},{i}]", self.name))).collect()
@@ -275,7 +268,8 @@ mod tests {
 
     const WATER: Liquid = Liquid { density: 1000.0, tension: 0.072 };
 
-    /// A tank of radius 0.45 m at 1 m along x, its axis along y (a quarter turn about -x), its hinge 0.5 m up that.
+    /// Returns a tank of radius 0.45 m at 1 m along x, with its axis along y (a quarter turn about -x) and
+    /// its hinge 0.5 m up that axis.
     fn tank(has_ball: bool) -> Tanks {
         let upwards = third_axis([1.0, -1.0, 0.0, 0.0]);
         assert_eq!(upwards, [0.0, 1.0, 0.0]);
@@ -290,8 +284,8 @@ mod tests {
         Tanks { tanks: vec![tank], accelerometer: "specific_force" }
     }
 
-    /// Warnings of the tanks for rows of the specific force along y, the angular acceleration about z, the rate about x and the first modes'
-    /// rates along x.
+    /// Returns the warnings of the tanks for rows of the specific force along y, the angular acceleration
+    /// about z, the rate about x and the first modes' rates along x.
     fn warnings(tanks: &Tanks, rows: &[[f64; 5]]) -> Vec<String> {
         let names: Vec<String> =
             ["time".to_string()].into_iter().chain(tanks.required_variables()).collect();

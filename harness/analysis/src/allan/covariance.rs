@@ -24,7 +24,8 @@ const RANGE: usize = 2;
 /// Largest ratio of two averaging times whose estimates count as correlated.
 const RATIO: usize = 32;
 
-/// Tables of C_mn for coefficients of 1, for all pairs of averaging times.
+/// Tables of the covariance C_mn for coefficients of 1, for all pairs of averaging times: the number of pairs
+/// of differences at each lag over M_m M_n, the scale 1/(2 τ_m² τ_n²), and C_mn at each lag for each term.
 pub(super) struct Covariance {
     terms: Vec<Term>,
     size: usize,
@@ -33,11 +34,8 @@ pub(super) struct Covariance {
 
 struct Pair {
     places: (usize, usize),
-    /// Number of pairs of differences at each lag, divided by M_m M_n.
     counts: Vec<f64>,
-    /// 1/(2 τ_m² τ_n²).
     scale: f64,
-    /// C_mn at each lag, for each term.
     of_terms: Vec<Vec<f64>>,
 }
 

@@ -14,12 +14,10 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use super::covariance::Covariance;
 use super::{LONGEST, Noise, Term, overlapping};
 
-/// Standard normal quantile of a 95 % interval.
 const NORMAL: f64 = 1.96;
 /// Standard normal quantile of the fit's χ² above which the fit is rejected; noise that fits exceeds it once
 /// in 1,000 records.
 const MISFIT: f64 = 3.1;
-/// Largest number of iterations of the estimate and of each tested value of an interval.
 const ITERATIONS: usize = 12;
 /// Largest number of short averaging times that may be left out of the fit, and the longest of them, s.
 const LEFT_OUT: (usize, f64) = (8, 2.0);
@@ -31,16 +29,14 @@ const BEYOND: usize = 2;
 /// distinguished from white noise.
 const SHORTEST: f64 = 10.0;
 
-/// Overlapping Allan variances of one record, or the means of several, at 1, 2, 4, … samples up to a tenth of a record.
+/// Overlapping Allan variances of one record, or the means of several, at 1, 2, 4, … samples up to a tenth of
+/// a record. `step` is the time between samples, s, `count` the number of samples per record, and `factors`
+/// the numbers of samples per average.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Octaves {
-    /// Time between samples, s.
     step: f64,
-    /// Number of samples per record.
     count: usize,
-    /// Number of records.
     records: usize,
-    /// Number of samples per average.
     factors: Vec<usize>,
     variances: Vec<f64>,
 }
@@ -48,7 +44,8 @@ pub struct Octaves {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
     pub value: f64,
-    /// Lower end of the interval; 0 if the record does not show the term, NaN if no value could be tested.
+    /// Lower end of the 95 % interval; 0 if the record does not show the term, NaN if no value could be
+    /// tested.
     pub low: f64,
     /// Upper end of the interval; infinite if the record is too short, NaN if no value could be tested.
     pub high: f64,
@@ -56,19 +53,17 @@ pub struct Estimate {
     pub error: f64,
 }
 
-/// The averaging time at which a fit deviates most.
+/// The averaging time, s, at which a fit deviates most, with the ratio of the record's Allan deviation to
+/// that of the fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outlier {
-    /// Averaging time, s.
     pub tau: f64,
-    /// Ratio of the record's Allan deviation to that of the fit.
     pub ratio: f64,
 }
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fit {
     pub noise: Noise,
-    /// Estimates of the fitted parameters, in the units of [`Noise`].
     pub terms: Vec<(Term, Estimate)>,
     /// Estimate of the Gauss–Markov bias's correlation time, s, if it is fitted.
     pub bias_time: Option<Estimate>,
@@ -76,7 +71,7 @@ pub struct Fit {
     pub from: f64,
     /// Misfit χ² and its degrees of freedom.
     pub chi_squared: (f64, usize),
-    /// True if the misfit is one that 999 of 1,000 records with this noise would have at most.
+    /// True if at most one of 1,000 records with this noise would have a larger misfit.
     pub fits: bool,
     pub worst: Outlier,
 }
@@ -96,7 +91,6 @@ struct Problem<'a> {
 }
 
 impl Octaves {
-    /// Computes the octaves of samples `step` (s) apart.
     pub fn from_samples(step: f64, samples: &[f64]) -> Octaves {
         let longest = samples.len() / LONGEST;
         let factors: Vec<usize> =
@@ -145,7 +139,6 @@ impl Octaves {
         Some(found.unwrap_or(first))
     }
 
-    /// Returns the averaging time of octave `k`, s.
     fn tau(&self, k: usize) -> f64 {
         self.factors.get(k).map_or(f64::INFINITY, |m| *m as f64 * self.step)
     }
@@ -226,7 +219,6 @@ impl Problem<'_> {
         states.min_by(|(_, a), (_, b)| a.total_cmp(b)).map(|(state, _)| state)
     }
 
-    /// Returns the shortest and the longest correlation time that the fit allows, s.
     fn times(&self) -> Option<(f64, f64)> {
         let taus = self.taus();
         let (first, last) = (taus.first()?, taus.last()?);
@@ -457,7 +449,6 @@ impl Problem<'_> {
     }
 }
 
-/// Number of bisections for one end of an interval.
 const BISECTIONS: usize = 14;
 /// Ratio of successive values that are tested below an estimate, and the smallest tested value relative to
 /// the estimate.
@@ -539,12 +530,12 @@ mod tests {
     use super::*;
     use crate::random::Random;
 
-    /// Time between samples of the records, s.
     const STEP: f64 = 0.1;
 
-    /// Flicker noise of bias instability 1: white noise filtered with (1 − z⁻¹)^(−1/2), whose impulse response is a
-    /// recursion (N. J. Kasdin, *Discrete simulation of colored noise and stochastic processes and 1/f^α power law noise
-    /// generation*, Proc. IEEE 83, 1995). The first half, where the filter starts, is dropped.
+    /// Returns flicker noise of bias instability 1: white noise filtered with (1 − z⁻¹)^(−1/2), whose impulse
+    /// response is a recursion (N. J. Kasdin, *Discrete simulation of colored noise and stochastic processes
+    /// and 1/f^α power law noise generation*, Proc. IEEE 83, 1995). The first half, where the filter starts,
+    /// is dropped.
     fn flicker(count: usize, random: &mut Random) -> Vec<f64> {
         let length = 4 * count;
         let white = (0..2 * count).map(|_| random.normal()).chain(vec![0.0; 2 * count]).collect();
@@ -560,7 +551,6 @@ mod tests {
         filtered[count..2 * count].iter().map(|value| value / length as f64).collect()
     }
 
-    /// A record of known noise.
     fn record(noise: &Noise, count: usize, seed: u64) -> Vec<f64> {
         let mut random = Random::new(seed, 7);
         let slow = match noise.flicker {
@@ -582,7 +572,7 @@ mod tests {
             .collect()
     }
 
-    /// Flicker dominates from 20 to 200 s.
+    /// Noise in which flicker dominates from 20 to 200 s.
     const ALL: Noise = Noise {
         arw: 1e-4,
         flicker: 3.4e-5,
@@ -593,7 +583,7 @@ mod tests {
     };
     const COUNT: usize = 1 << 16;
 
-    /// Counts, for N, B and K, the records whose interval holds the truth, and whose fit describes them.
+    /// Counts, for N, B and K, the records whose interval contains the truth, and whose fit describes them.
     fn covered(noise: &Noise, draws: u64) -> ([u64; 3], u64) {
         let (mut held, mut described) = ([0; 3], 0);
         for seed in 0..draws {
@@ -631,7 +621,7 @@ mod tests {
         }
     }
 
-    /// The median of the widths of intervals that end, as parts of the truth.
+    /// Returns the median of the widths of the finite intervals, as parts of the truth.
     fn median(mut widths: Vec<f64>) -> f64 {
         widths.sort_by(f64::total_cmp);
         widths.get(widths.len() / 2).copied().unwrap_or(f64::NAN)

@@ -48,10 +48,9 @@ use crate::rest;
 use crate::run::Run;
 use crate::sensors::Sensors;
 
-/// Columns of a stored run of the bench, SI units, at every communication point from the torque's
-/// start to the stop time. Other columns may follow. The first six are for plots. Wave height,
-/// energy, work, dissipated energy, stuck time and the liquid's force on the tank are for the
-/// tables.
+/// Columns of a stored run of the bench, SI units, at every communication point from the torque's start to
+/// the stop time. Other columns may follow. The first six are for plots. Wave height, energy, work,
+/// dissipated energy, stuck time and the liquid's force on the tank are for the tables.
 pub const STORED: [&str; 13] = [
     "time",
     TAU_CMD,
@@ -68,18 +67,16 @@ pub const STORED: [&str; 13] = [
     F_RADIAL,
 ];
 
-/// Parameters of the bench that the analysis needs.
 const PARAMETERS: [&str; 7] =
     [slosh::MODEL, tank::H, tank::D, tank::R, tank::M_0, hub::I, friction::B];
 
-/// Returns true if the FMU has the variables that the bench's analysis needs.
 fn is_bench(description: &ModelDescription) -> bool {
     let has = |name: &str| description.variables.iter().any(|v| v.name == name);
     let has_all = |names: &[&str]| names.iter().all(|name| has(name));
     has_all(&STORED[1..]) && has_all(&PARAMETERS) && has(&slosh::MASS.element([1]))
 }
 
-/// Returns true if the variable is the slosh angle of a mode of a tank, `tank[1].angle_x[1]`.
+/// Returns true if the variable is the slosh angle of a mode of a tank, for example `tank[1].angle_x[1]`.
 pub fn is_slosh_angle(name: &str) -> bool {
     name.starts_with("tank") && (name.contains(".angle_x[") || name.contains(".angle_y["))
 }
@@ -101,7 +98,8 @@ pub fn stored_columns(description: &ModelDescription, input: Option<&str>) -> Ve
     ["time".to_string()].into_iter().chain(input.map(String::from)).chain(outputs).collect()
 }
 
-/// Columns of a run's file: [`stored_columns`], and the numbers of the reasons for which its tanks are out of range.
+/// Lists the columns of a run's file: [`stored_columns`], and the variables with the reasons for which its
+/// tanks are out of range.
 fn recorded_columns(description: &ModelDescription, input: Option<&str>) -> Vec<String> {
     let mut columns = stored_columns(description, input);
     let limits = warning_limits(description);
@@ -113,15 +111,14 @@ fn warning_limits(description: &ModelDescription) -> Limits {
     Limits::find(|name| description.variable(name).is_ok())
 }
 
-/// A plan with the settings for its execution.
+/// A plan with the settings for its execution. `force` simulates stored runs again; `jobs` is the number of
+/// runs simulated and analysed in parallel, 0 for the number of cores; `compare` is the directory of another
+/// campaign that the report compares with.
 #[derive(Clone, Debug)]
 pub struct Campaign {
     pub plan: Plan,
-    /// True to simulate stored runs again.
     pub force: bool,
-    /// Number of runs simulated and analysed in parallel; 0 for the number of cores.
     pub jobs: usize,
-    /// Directory of another campaign that the report compares with.
     pub compare: Option<PathBuf>,
     pub out: PathBuf,
 }
@@ -131,36 +128,32 @@ pub(crate) fn join_sentences(sentences: &[String]) -> Option<String> {
     (!sentences.is_empty()).then(|| sentences.join("; "))
 }
 
-/// A failed run and the reason.
 #[derive(Clone, Debug)]
 pub struct Failure {
     pub case: Case,
     pub reason: String,
 }
 
-/// A run of an FMU that is not the bench.
+/// A run of an FMU that is not the bench, with its stored columns. These are thinned, except the last rows in
+/// `tail`, and empty for most runs of a large campaign ([`keeps_curves`]).
 #[derive(Clone, Debug)]
 pub struct Unanalysed {
     pub case: Case,
-    /// Stored columns, thinned; empty for most runs of a large campaign ([`keeps_curves`]).
     pub history: History,
-    /// Last rows of the run, not thinned; as `history`.
     pub tail: History,
     /// Largest slosh angle, rad, and its name; `None` without slosh angles.
     pub largest_angle: Option<(f64, String)>,
     /// Sentences about the tanks that left the range of their model, one for each.
     pub limits: Vec<String>,
-    /// True if the run was read from a file, not simulated.
     pub reused: bool,
 }
 
 impl Results {
-    /// Returns the number of runs that were read from recordings.
     pub fn recordings(&self) -> usize {
         self.outcomes.iter().filter(|run| run.is_recording()).count()
     }
 
-    /// Returns the runs that left the range of their model, with how they did.
+    /// Returns the runs that left the range of their model, each with a description.
     pub fn beyond_model(&self) -> impl Iterator<Item = (&Case, String)> {
         let analysed = self.outcomes.iter().map(|run| (&run.case, run.beyond_model()));
         let others = self.unanalysed.iter().map(|run| (&run.case, join_sentences(&run.limits)));
@@ -175,8 +168,8 @@ impl Results {
     }
 }
 
-/// Number of runs whose curves are kept for the report. The others keep only numbers, which bounds the memory of a
-/// campaign.
+/// Number of runs whose curves are kept for the report. The others keep only numbers, which bounds the memory
+/// of a campaign.
 pub const CURVES: usize = 400;
 
 /// Returns true if the curves of run `i` of `runs` are kept. The kept runs are spread over the plan and
@@ -185,7 +178,6 @@ pub fn keeps_curves(i: usize, runs: usize) -> bool {
     i.is_multiple_of(runs.div_ceil(CURVES).max(1)) || i + 1 == runs
 }
 
-/// Outcome of one run.
 enum Done {
     Analysed(Box<Outcome>),
     Unanalysed(Box<Unanalysed>),
@@ -208,7 +200,6 @@ impl Done {
 #[derive(Clone, Debug, Default)]
 pub struct Results {
     pub outcomes: Vec<Outcome>,
-    /// Runs of another FMU, which are not analysed.
     pub unanalysed: Vec<Unanalysed>,
     pub failures: Vec<Failure>,
 }
@@ -216,18 +207,15 @@ pub struct Results {
 impl Campaign {
     /// Locks the results directory for this campaign.
     ///
-    /// # Errors
-    ///
-    /// If another process holds it, or the directory belongs to something else.
+    /// # Errors If another process holds it, or the directory belongs to something else.
     pub fn take(&self) -> Result<Store> {
         Store::take(&self.out, CAMPAIGN, &format!("the plan \"{}\"", self.plan.title), None)
     }
 
-    /// Simulates all runs that are not stored yet and analyses all of them. Stores the runs in the
-    /// directory; [`Campaign::tables`] returns the tables.
+    /// Simulates all runs that are not stored yet and analyses all of them. Stores the runs in the directory;
+    /// [`Campaign::tables`] returns the tables.
     ///
-    /// # Errors
-    /// If there are no runs, or a run cannot be stored. A run that cannot be simulated is a failure
+    /// # Errors If there are no runs, or a run cannot be stored. A run that cannot be simulated is a failure
     /// among the results.
     pub fn execute(
         &self,
@@ -275,12 +263,10 @@ impl Campaign {
         Ok(collected)
     }
 
-    /// Returns true if the directory contains the results of another plan.
     pub fn holds_another(&self) -> bool {
         files::input::text(&self.plan_file()).is_ok_and(|text| text != self.plan.text)
     }
 
-    /// Returns the path of the copy of the plan in the results directory.
     pub fn plan_file(&self) -> PathBuf {
         self.out.join("plan.toml")
     }
@@ -299,9 +285,9 @@ impl Campaign {
         )
     }
 
-    /// Returns the expanded runs for simulation by another program. Each has its name, its file in the campaign's
-    /// directory, settings, the torque (as text for `hubslosh torque`) and times. It also has the metadata that the
-    /// analysis requires in its Parquet file.
+    /// Returns the expanded runs for simulation by another program. Each has its name, its file in the
+    /// campaign's directory, settings, the torque (as text for `hubslosh torque`) and times. It also has the
+    /// metadata that the analysis requires in its Parquet file.
     pub fn list(&self, fmu: &Fmu) -> Result<serde_json::Value> {
         let description = fmu.description();
         let (mut columns, mut kept) = (Vec::<String>::new(), Vec::new());
@@ -366,8 +352,7 @@ impl Campaign {
 
     /// Simulates or reads one run and analyses it.
     ///
-    /// # Errors
-    /// If the run cannot be stored, so that no other run can.
+    /// # Errors If the run cannot be stored, because then no other run can be stored either.
     fn done(
         &self,
         fmu: &Fmu,
@@ -499,9 +484,9 @@ impl Campaign {
         })
     }
 
-    /// Returns the tables with their names: `features.csv`, and `features_spa.csv` and `features_h1.csv` with the
-    /// same columns from the `spa` and H1 responses. `runs.csv` has every run, also failed ones, with its settings
-    /// and all features. Without a run of the bench there is only `runs.csv`.
+    /// Returns the tables with their names: `features.csv`, and `features_spa.csv` and `features_h1.csv` with
+    /// the same columns from the `spa` and H1 responses. `runs.csv` has every run, also failed ones, with its
+    /// settings and all features. Without a run of the bench there is only `runs.csv`.
     pub fn tables(&self, fmu: &Fmu, results: &Results) -> Result<Vec<(&'static str, Vec<u8>)>> {
         let plan = sha256(self.plan.text.as_bytes());
         let header = rows::columns::<FeatureRow>()?;
@@ -540,7 +525,8 @@ impl Campaign {
     }
 }
 
-/// Writes a CSV table row by row: the rows of a large campaign as strings would take more memory than its results.
+/// Writes a CSV table row by row, because the rows of a large campaign as strings would take more memory than
+/// its results.
 fn written(header: &[String], rows: impl Iterator<Item = Result<Vec<String>>>) -> Result<Vec<u8>> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     writer.write_record(header)?;

@@ -14,31 +14,28 @@ use crate::plan::{Case, Plan};
 use crate::profile::Written;
 use crate::progress::Progress;
 
-/// Distance between two frequencies of the search, Hz.
 const APART: f64 = 0.0025;
 const WITHIN: f64 = 0.0025;
 /// Steps of the grid by which the frequencies of a smaller torque may lie outside those of a larger one.
 const MARGIN: usize = 3;
 
-/// Result of one dwell.
 #[derive(Clone, Copy)]
 struct Dwell {
     rotary: bool,
-    /// Largest slosh angle, rad.
     angle: f64,
 }
 
-/// Result of a search.
+/// Result of a search: the frequency of the onset, Hz, and the largest torque without and smallest torque
+/// with rotary slosh, N·m. Without rotary slosh there are no torques, and the frequency is that of the
+/// largest slosh angle.
 #[derive(Debug, PartialEq)]
 struct Found {
-    /// Frequency of the onset; without one, that of the largest slosh angle, Hz.
     frequency: f64,
-    /// Largest torque without and smallest torque with rotary slosh, N·m; `None` without rotary slosh.
     torques: Option<[f64; 2]>,
 }
 
-/// Replaces the `[onset]` of a plan by dwells at the onset; does nothing for a plan without it. `jobs` dwells are
-/// simulated in parallel; 0 for the number of cores.
+/// Replaces the `[onset]` of a plan by dwells at the onset; does nothing for a plan without it. `jobs` dwells
+/// are simulated in parallel; 0 for the number of cores.
 pub fn seek_onset(
     plan: &mut Plan,
     fmu: &Fmu,
@@ -93,7 +90,7 @@ fn dwell(fmu: &Fmu, case: &Case, frequency: f64, torque: f64) -> Result<Dwell> {
     })
 }
 
-/// Seeks the onset between two frequencies (Hz) and two torques (N·m).
+/// Searches the onset between two frequencies (Hz) and two torques (N·m).
 fn search(
     band: [f64; 2],
     [mut low, mut high]: [f64; 2],

@@ -32,25 +32,24 @@ use names::hubslosh::{
 };
 use signals::table::Table;
 
-/// Number of frequencies of the responses: 1.2 mHz apart at the antiresonance of the thesis's
+/// Number of frequencies of the responses, which are 1.2 mHz apart at the antiresonance of the thesis's
 /// sweep.
 const GRID_POINTS: usize = 2000;
 
 /// Separation of antiresonance and resonance that counts as resolved, in units of the resolution.
 const RESOLVED: f64 = 3.0;
-/// Largest residual of a valid transfer function: a tenth of the rate's power does not follow from
-/// the torque.
+/// Largest residual of a valid transfer function: a tenth of the rate's power does not follow from the
+/// torque.
 const MOST_MISFIT: f64 = 0.3;
-/// Largest valid shift of the resonance by a passing sweep, and difference of two estimates from a
-/// whole record, as parts of the separation. The shift is 0.6 times the root of the sweep's rate if
-/// the resonance is narrower.
+/// Largest valid shift of the resonance by a passing sweep, and difference of two estimates from a whole
+/// record, as parts of the separation. The shift is 0.6 times the root of the sweep's rate if the resonance
+/// is narrower.
 const MOST_SHIFT: f64 = 0.25;
 
-/// Smallest valid signal-to-noise ratio at a resonance, dB.
 const LEAST_SNR: f64 = 0.0;
 
-/// Fails if the frequency responses of a run of `rows` rows take more work than [`budget::PRODUCTS`]. If the band begins far
-/// below one cycle in the whole run, the windows of most frequencies hold all rows.
+/// Fails if the frequency responses of a run of `rows` rows take more work than [`budget::PRODUCTS`]. If the
+/// band begins far below one cycle in the whole run, the windows of most frequencies hold all rows.
 pub(super) fn check_work(torque: &Torque, step: f64, rows: usize) -> Result<()> {
     let Torque::Profile(profile) = torque else { return Ok(()) };
     let Some(band) = profile.band() else { return Ok(()) };
@@ -74,27 +73,27 @@ pub(super) fn check_work(torque: &Torque, step: f64, rows: usize) -> Result<()> 
 }
 
 /// Maxima and totals of a run; NaN where a recording has no value.
+///
+/// - `peak_slosh_angle`, rad; `peak_rate`, rad/s: of |gyro rate minus bias|, where the bias is the mean under
+///   a sweep or noise.
+/// - `peak_acceleration`, rad/s²: from central differences of the gyro's rate, as in Rubaga's thesis (7.2.2).
+/// - `gyro_errors`: true if the gyro's errors were on, so that its reading differs from the rate.
+/// - `max_energy_residual`: largest |E(t) − E(0) − work + heat| over the energy throughput Σ|Δwork| + heat.
+/// - `stuck`: time in stiction, s.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Totals {
-    /// Largest |slosh_angle|, rad.
     pub peak_slosh_angle: f64,
     pub peak_radial_angle: f64,
     pub peak_wave_height: f64,
-    /// Largest |gyro rate minus bias|, rad/s; the bias is the mean under a sweep or noise.
     pub peak_rate: f64,
-    /// Largest |angular acceleration|, rad/s², from central differences of the gyro's rate, as in Rubaga's thesis
-    /// (7.2.2).
     pub peak_acceleration: f64,
-    /// True if the gyro's errors were on, so that its reading differs from the rate.
     pub gyro_errors: bool,
-    /// Largest |E(t) − E(0) − work + heat| over the energy throughput Σ|Δwork| + heat.
     pub max_energy_residual: f64,
-    /// Time in stiction, s.
     pub stuck: f64,
 }
 
 impl Totals {
-    /// Returns the totals of a recording; NaN for signals that only a simulation has.
+    /// Returns the totals of a recording, which are NaN for signals that only a simulation has.
     fn from_recording(table: &Table, rates: &Rates) -> Self {
         Totals {
             peak_slosh_angle: f64::NAN,
@@ -129,20 +128,19 @@ impl Totals {
     }
 }
 
-/// Rates measured by a gyro, minus their biases, rad/s.
+/// Rates measured by a gyro, minus their biases, rad/s: about the hub's axis, and about x and y if a
+/// recording has them. `bias` is that about the hub's axis, 0 for a gyro without errors; `warnings` are about
+/// the means of the rates.
 struct Rates {
     about_axis: Vec<f64>,
-    /// Rates about x and y, if a recording has them.
     others: [Option<Vec<f64>>; 2],
-    /// Bias about the hub's axis, rad/s; 0 for a gyro without errors.
     bias: f64,
-    /// Warnings about the means of the rates.
     warnings: Vec<String>,
 }
 
-/// Mean of a rate over its deviation above which it is reported: it would add 1 % to the energy of the rate.
+/// Mean of a rate over its deviation above which it is reported, because it would add 1 % to the energy of
+/// the rate.
 const NOTABLE_MEAN: f64 = 0.1;
-/// Number of parts of a record whose means are compared.
 const PARTS: usize = 8;
 
 impl Rates {
@@ -177,7 +175,6 @@ impl Rates {
     }
 }
 
-/// Returns a warning about a rate's mean over a record, or about its drift.
 fn notable_mean(name: &str, rate: &[f64]) -> Option<String> {
     let (mean, deviation) = (statistics::mean(rate), statistics::deviation(rate));
     let parts: Vec<f64> =
@@ -203,26 +200,22 @@ fn notable_mean(name: &str, rate: &[f64]) -> Option<String> {
     })
 }
 
-/// Returns the largest slope of a signal by central differences.
 fn peak_slope(time: &[f64], signal: &[f64]) -> f64 {
     let slopes = time.windows(3).zip(signal.windows(3)).map(|(t, y)| (y[2] - y[0]) / (t[2] - t[0]));
     slopes.fold(0.0, |most, slope| f64::max(most, slope.abs()))
 }
 
-/// Signals of a run, thinned for plots: the smallest and the largest value of each of at most
+/// Signals of a run by name, thinned for plots: the smallest and the largest value of each of at most
 /// [`History::STRETCHES`] stretches, in the order of time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct History {
     pub time: Vec<f64>,
-    /// Names and values.
     pub signals: Vec<(String, Vec<f64>)>,
 }
 
 impl History {
-    /// Largest number of stretches.
     pub const STRETCHES: usize = 300;
 
-    /// Creates the history from columns of equal length.
     pub fn thin(time: &[f64], columns: &[(&str, &[f64])]) -> History {
         let length = time.len().div_ceil(Self::STRETCHES);
         if length <= 2 {
@@ -257,14 +250,13 @@ impl History {
     }
 }
 
-/// Residual motion at a run's end.
+/// Residual motion at a run's end: the largest |rate|, rad/s, and |slosh_angle|, rad, after the manoeuvre, or
+/// in the last fifth of the run. `manoeuvre` is the time at which the torque ends, s, if the run continues
+/// without torque.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Ending {
-    /// Time at which the torque ends, s, if the run continues without torque: a manoeuvre.
     pub manoeuvre: Option<f64>,
-    /// Largest |rate| after the manoeuvre, or in the last fifth of the run, rad/s.
     pub rate: Option<f64>,
-    /// Largest |slosh_angle| there, rad.
     pub slosh_angle: Option<f64>,
 }
 
@@ -288,13 +280,12 @@ fn manoeuvre(torque: &Curve) -> Option<f64> {
     (end < 0.9 * whole).then_some(end)
 }
 
-/// Path of the surface's crest seen from above, in two short stretches of a run: time, s, and
-/// angles outwards and towards +θ, rad.
+/// Path of the surface's crest seen from above, in two short stretches of a run: around the largest wave, and
+/// around the onset of rotary slosh if there is one. Points are time, s, and angles outwards and towards +θ,
+/// rad.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SloshPath {
-    /// Points of the largest wave.
     pub largest: Vec<[f64; 3]>,
-    /// Points around the onset of rotary slosh, if there is one.
     pub onset: Option<Vec<[f64; 3]>>,
 }
 
@@ -327,7 +318,6 @@ impl SloshPath {
 #[derive(Clone, Debug)]
 pub struct Outcome {
     pub case: Case,
-    /// Model, tank and fill.
     pub range: Range,
     /// Exact linear plant with viscous friction for the run, from the FMU's calculated parameters.
     pub linear: Linear,
@@ -338,10 +328,9 @@ pub struct Outcome {
     pub passing: Option<Passing>,
     /// Rotary slosh; `None` for a recording, which has no angles of the liquid.
     pub rotary: Option<Rotary>,
-    /// Torque, rate, slosh angles, and the residual: the rate minus its bias and minus that of the exact linear plant
-    /// under the same torque.
+    /// Torque, rate, slosh angles, and the residual, which is the rate minus its bias and minus the rate of
+    /// the exact linear plant under the same torque.
     pub history: History,
-    /// The crest's path seen from above.
     pub path: SloshPath,
     pub ending: Ending,
     /// Dominant force on the liquid if it is not gravity ([`Range::without_weight`]).
@@ -349,7 +338,6 @@ pub struct Outcome {
     /// Sentence about the reasons for which the tank was out of range; empty if it was not.
     pub limits: Vec<String>,
     pub reused: bool,
-    /// Warnings about the rates that a gyro measured.
     pub warnings: Vec<String>,
 }
 
@@ -359,14 +347,11 @@ pub struct Estimate {
     pub response: FrequencyResponse,
     /// Antiresonance and resonance; none if they are not valid.
     pub features: Features,
-    /// Frequency resolution at the resonance, Hz.
     pub resolution: f64,
-    /// Relative standard deviation of the magnitude, and of the phase, rad, from the part of the
-    /// rate that no linear response explains; empty if unknown.
+    /// Relative standard deviation of the magnitude, and of the phase, rad, from the part of the rate that no
+    /// linear response explains; empty if unknown.
     pub deviation: Vec<f64>,
-    /// Standard deviations of the features.
     pub deviations: Deviations,
-    /// Reason for rejecting its features, if they are rejected.
     pub doubt: Option<Doubt>,
 }
 
@@ -377,11 +362,10 @@ pub enum Doubt {
     TooFast,
     /// The record, or its lags or segments, is too short to separate them.
     TooShort,
-    /// There is more noise than signal at the resonance.
     Noise,
-    /// Two estimates of one linear response differ by more than a quarter of the separation. After a fast sweep a
-    /// nonlinear liquid oscillates freely, at a frequency that depends on its amplitude. No linear response to the
-    /// torque represents this motion.
+    /// Two estimates of one linear response differ by more than a quarter of the separation. After a fast
+    /// sweep a nonlinear liquid oscillates freely, at a frequency that depends on its amplitude. No linear
+    /// response to the torque represents this motion.
     Nonlinear,
 }
 
@@ -397,8 +381,8 @@ impl std::fmt::Display for Doubt {
 }
 
 impl Estimate {
-    /// Creates an estimate from a response with the features between two frequencies, Hz; `doubt`
-    /// is the reason to reject them.
+    /// Creates an estimate from a response with the features between two frequencies, Hz; `doubt` returns the
+    /// reason to reject them, if any.
     fn new(
         response: FrequencyResponse,
         inner: (f64, f64),
@@ -412,7 +396,8 @@ impl Estimate {
         Estimate { response, features, resolution, deviation, deviations, doubt }
     }
 
-    /// Adds uncertainties; `slope` is the rate at which the error changes along a frequency.
+    /// Adds uncertainties; `slope` returns the rate at which the error changes along a frequency, relative to
+    /// the error, 1/Hz.
     fn with_uncertainties(self, deviation: Vec<f64>, slope: impl Fn(f64) -> f64) -> Self {
         let deviations = self.features.deviations(&self.response, &deviation, slope);
         Estimate { deviation, deviations, ..self }
@@ -429,8 +414,8 @@ impl Estimate {
     }
 }
 
-/// Returns true if antiresonance and resonance are closer than the resolution `than`, Hz; false if
-/// either is missing.
+/// Returns true if antiresonance and resonance are closer than the resolution `than`, Hz; false if either is
+/// missing.
 fn closer(features: &Features, than: f64) -> bool {
     features.delta_f().is_some_and(|delta| delta < than)
 }
@@ -444,42 +429,37 @@ fn block_means(signal: &[f64], count: usize) -> Cow<'_, [f64]> {
     signal.chunks_exact(count).map(mean).collect::<Vec<_>>().into()
 }
 
-/// Values over frequency, Hz.
 pub type Curve = Vec<(f64, f64)>;
 
 /// Estimates from the whole record.
 #[derive(Clone, Debug)]
 pub struct Record {
-    /// Estimate by `spa`.
     pub spa: Estimate,
-    /// Estimate by Welch's H1.
     pub h1: Estimate,
-    /// Signal-to-noise ratio of the rate at resonance and antiresonance of `spa`, dB, from its
-    /// coherence with the torque; `None` if there are no such.
+    /// Signal-to-noise ratio of the rate at resonance and antiresonance of `spa`, dB, from its coherence with
+    /// the torque; `None` if `spa` has no valid ones.
     pub snr_db: Option<[f64; 2]>,
-    /// The same, dB, over the band.
     pub snr_over_band: Curve,
-    /// A fitted transfer function, if neither `spa` nor H1 nor the passing sweep is to be trusted.
+    /// A fitted transfer function, if neither `spa` nor H1 nor the passing sweep is valid.
     pub rational: Option<Estimate>,
-    /// The thesis's linear model, fitted to the `spa` response, and over the band the coherence of
-    /// its residual with the torque; `None` if nothing can be fitted.
+    /// The thesis's linear model, fitted to the `spa` response, and over the band the coherence of its
+    /// residual with the torque; `None` if nothing can be fitted.
     pub fit: Option<(ModelFit, Curve)>,
 }
 
 /// Estimates while a sweep passes, by sweep-synchronous demodulation.
 #[derive(Clone, Debug)]
 pub struct Passing {
-    /// Response of the rate.
     pub rate: Estimate,
-    /// Share of the liquid's force off the axis; for a recording, of the hub's rates, if it has more than one.
+    /// Share of the liquid's force off the axis; for a recording, of the hub's rates, if it has more than
+    /// one.
     pub off_axis: Option<OffAxis>,
-    /// The leakage at the frequencies of `rate`; empty where it is not known.
     pub leakage: Vec<f64>,
 }
 
 impl Record {
     /// Estimates the frequency response from the whole record of torque `tau` (N·m) and rate `omega` (rad/s).
-    /// `enough` is true if there is a trusted estimate already, which makes a fitted transfer function
+    /// `enough` is true if there is a valid estimate already, which makes a fitted transfer function
     /// unnecessary. `unexplained` is the power that no linear response explains, at the frequencies of the
     /// responses.
     fn estimate(
@@ -642,7 +622,8 @@ pub(super) fn rotary_in_time(step: f64, frequency: f64, table: &Table) -> Rotary
     Rotary::from_angles(step, frequency, column(SLOSH_ANGLE_RADIAL), column(SLOSH_ANGLE))
 }
 
-/// Returns the rate of the linear model under the torque of a run, in the rows of the result. A recording has its own rows.
+/// Returns the rate of the linear model under the torque of a run, in the rows of the result. A recording has
+/// its own rows.
 fn modelled(
     run: &Run,
     case: &Case,
@@ -768,7 +749,6 @@ impl Outcome {
         self
     }
 
-    /// Returns true if the outcome has its curves ([`Outcome::without_curves`]).
     pub fn has_curves(&self) -> bool {
         !self.history.time.is_empty()
     }
@@ -790,7 +770,6 @@ impl Outcome {
         }
     }
 
-    /// Returns the features of [`Outcome::estimate`], empty without an estimate.
     pub fn features(&self) -> Features {
         self.estimate().map_or(Features::default(), |(estimate, _)| estimate.features)
     }
@@ -802,12 +781,10 @@ impl Outcome {
         super::join_sentences(&how.collect::<Vec<_>>())
     }
 
-    /// Returns the features of the `spa` response, empty without one.
     pub fn spa_features(&self) -> Features {
         self.record.as_ref().map_or(Features::default(), |record| record.spa.features)
     }
 
-    /// Returns the linear model that was fitted to the `spa` response.
     pub fn fit(&self) -> Option<ModelFit> {
         Some(self.record.as_ref()?.fit.as_ref()?.0)
     }
@@ -827,29 +804,25 @@ impl Outcome {
         })
     }
 
-    /// Returns true for a recording, false for a simulation.
     pub fn is_recording(&self) -> bool {
         self.case.recording.is_some()
     }
 }
 
-/// The variable that tells whether the liquid is in its model's range.
+/// The variable that shows whether the liquid is in its model's range.
 pub const WAVE: &str = WAVE_HEIGHT;
 
-/// The range in which a model of the liquid means something.
+/// Quantities that determine the range in which a model of the liquid is valid: radius of the tank, m, fill,
+/// m (`None` if the modes come from a table, which does not state it), density and surface tension of the
+/// liquid, `g_axial` at the start, m/s², and the length of mode 1, m (0 if nothing sloshes). `model` is the
+/// value of `slosh.model`.
 #[derive(Clone, Debug)]
 pub struct Range {
-    /// Value of `slosh.model`, by name.
     pub model: String,
-    /// Radius of the tank, m.
     pub radius: f64,
-    /// Fill, m; `None` if the modes come from a table, which knows of none.
     pub fill: Option<f64>,
-    /// The liquid's density and surface tension.
     pub liquid: Liquid,
-    /// `g_axial` at the start, m/s².
     pub g: f64,
-    /// Length of mode 1, m; 0 if nothing sloshes.
     pub length: f64,
 }
 
@@ -875,9 +848,9 @@ impl Range {
         }))
     }
 
-    /// Returns the dominant force on the liquid, if it is not gravity, at the smallest specific force of a run with these wave
-    /// heights, m. Bond, Weber and Froude numbers use the tank's radius and the fastest wave before, V = η √(g/l) (thesis
-    /// 2.5). `g` is `g_axial` at each row, m/s², of a run that drives it.
+    /// Returns the dominant force on the liquid, if it is not gravity, at the smallest specific force of a
+    /// run with these wave heights, m. Bond, Weber and Froude numbers use the tank's radius and the fastest
+    /// wave before, V = η √(g/l) (thesis 2.5). `g` is `g_axial` at each row, m/s², of a run that drives it.
     pub fn without_weight(&self, waves: &[f64], g: Option<&[f64]>) -> Option<String> {
         if self.length <= 0.0 {
             return None;
@@ -890,8 +863,9 @@ impl Range {
         contents.without_weight(rows).map(|numbers| numbers.to_string())
     }
 
-    /// Describes how a run with these wave heights, m, left the range of its model. A linear liquid leaves it in waves above
-    /// a quarter of the tank's radius (thesis 2.3.5), any liquid if a trough would be below the tank's bottom.
+    /// Describes how a run with these wave heights, m, left the range of its model. A linear liquid leaves it
+    /// in waves above a quarter of the tank's radius (thesis 2.3.5), any liquid if a trough would be below
+    /// the tank's bottom.
     pub fn left(&self, waves: &[f64]) -> Option<String> {
         let wave = waves.iter().fold(0.0, |most: f64, wave| most.max(wave.abs()));
         let mm = |length: f64| format!("{:.1} mm", length * 1e3);

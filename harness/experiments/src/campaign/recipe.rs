@@ -11,7 +11,7 @@ use crate::run::{self, Run};
 use crate::sensors::Sensors;
 use signals::table::{self, Table};
 
-/// Version of the format; raised when stored runs of an older program have another meaning.
+/// Version of the format. It is raised when stored runs of an older program have another meaning.
 const FORMAT: &str = "1";
 
 /// Returns everything that determines a run's numbers. Two runs with the same recipe are the same run, independent of
@@ -55,35 +55,26 @@ pub fn recipe(fmu: &Fmu, case: &Case, columns: &[String]) -> BTreeMap<String, St
     recipe
 }
 
-/// A stored run.
+/// A stored run. `lacks_sensors` is true if the table has the signals for the sensors but not their readings,
+/// because another program wrote it.
 pub struct Stored {
-    /// Columns.
     pub table: Table,
-    /// The table has the signals for the sensors but not their readings, because another program wrote it.
     pub lacks_sensors: bool,
 }
 
 /// Reason why a stored run is simulated again.
 #[derive(Debug, thiserror::Error)]
 pub enum Unusable {
-    /// It is not what was stored.
     #[error(transparent)]
     Damaged(Damage),
-    /// It cannot be read.
     #[error("file incomplete")]
     Incomplete,
-    /// It ends early, or late.
+    /// The run ends early, or late: the file has `rows` rows and the whole run `expected`.
     #[error("file incomplete, {rows} rows of {expected}")]
-    Rows {
-        /// Rows of the file.
-        rows: usize,
-        /// Rows of the whole run.
-        expected: usize,
-    },
-    /// It has readings of sensors that the plan does not have.
+    Rows { rows: usize, expected: usize },
+    /// The run has readings of sensors that the plan does not have.
     #[error("it has sensors")]
     Sensors,
-    /// It has another recipe.
     #[error("{0}")]
     Differs(String),
 }
@@ -120,7 +111,6 @@ pub fn stored(
     Ok(Stored { table, lacks_sensors })
 }
 
-/// Number of parameters that a message names if several differ.
 const NAMED: usize = 3;
 
 /// Describes in one line how a stored run differs from the wanted one; `None` if it does not.
@@ -167,12 +157,10 @@ fn difference(
     None
 }
 
-/// States why a stored run cannot be reused.
 pub fn because(case: &Case, why: &Unusable) -> String {
     format!("re-running {}: {why}", case.name)
 }
 
-/// States that a stored run comes from another program.
 pub fn unverified(case: &Case) -> String {
     format!(
         "reusing {}: another program stored it, and it has no line in {MANIFEST} yet",

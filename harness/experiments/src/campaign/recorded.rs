@@ -15,7 +15,8 @@ use signals::table::Table;
 use crate::plan::{Case, Recorded};
 use crate::profile::Torque;
 
-/// Signals read from a recording: the rate defines the rows; torque and rates about the other axes are interpolated linearly.
+/// Signals read from a recording: the rate defines the rows; torque and rates about the other axes are
+/// interpolated linearly.
 const SIGNALS: [Signal; 4] = [
     Signal { name: "omega", required: true, between: Between::Line, unit: None },
     Signal { name: "tau_cmd", required: true, between: Between::Line, unit: None },
@@ -27,8 +28,8 @@ const SIGNALS: [Signal; 4] = [
 const LEAST_CORRELATION: f64 = 0.9;
 /// Largest part of the run that may be missing in the recording at its ends.
 const MISSING: f64 = 0.5;
-/// Largest part of a record in gaps: lines join torque and rate alike, so that their ratio is hardly changed. Where 3 % of the rows are lost
-/// one by one, the gaps are 6 % of the record.
+/// Largest part of a record in gaps: lines join torque and rate alike, so that their ratio is hardly changed.
+/// Where 3 % of the rows are lost one by one, the gaps are 6 % of the record.
 const GAPS: f64 = 0.15;
 /// Largest relative difference of the recorder's clock from that of the torque.
 const FASTEST_CLOCK: f64 = 2e-3;
@@ -42,8 +43,7 @@ const ROUNDS: usize = 3;
 
 /// Reads a recording on an equally spaced grid. Returns its step, s, and the table.
 ///
-/// # Errors
-/// If the recording cannot be used.
+/// # Errors If the recording cannot be used.
 pub fn read(recorded: &Recorded, done: &mut dyn FnMut(String)) -> Result<(f64, Table)> {
     let name = recorded.path.display().to_string();
     let table = recording::read(
@@ -55,10 +55,9 @@ pub fn read(recorded: &Recorded, done: &mut dyn FnMut(String)) -> Result<(f64, T
         .with_context(|| format!("{name} cannot be used"))
 }
 
-/// Fails if rows of a recording that are `step` s apart cannot show the torque.
+/// Checks that rows of a recording that are `step` s apart can show the torque.
 ///
-/// # Errors
-/// If the torque has frequencies of half of their rate or more.
+/// # Errors If the torque has frequencies of half of the rows' rate or more.
 pub fn check_rows(path: &Path, step: f64, torque: &Torque) -> Result<()> {
     let Torque::Profile(profile) = torque else { return Ok(()) };
     let highest = profile.band().map_or(0.0, |band| band.1);
@@ -72,11 +71,10 @@ pub fn check_rows(path: &Path, step: f64, torque: &Torque) -> Result<()> {
     Ok(())
 }
 
-/// Reads the recording of a run. Time counts from the torque's beginning, found by correlation with the torque of the
-/// plan. The columns are those of a stored run, as far as the recording has them.
+/// Reads the recording of a run. Time counts from the torque's beginning, found by correlation with the
+/// torque of the plan. The columns are those of a stored run, as far as the recording has them.
 ///
-/// # Errors
-/// If the recording cannot be used, or has another torque.
+/// # Errors If the recording cannot be used, or has another torque.
 pub(super) fn table(
     case: &Case,
     recorded: &Recorded,
@@ -165,30 +163,30 @@ pub(super) fn table(
     Ok((step, Table::new(names, columns)))
 }
 
-/// The recorder's clock against that of the torque.
+/// The recorder's clock against that of the torque: the row of the record at which the torque begins,
+/// possibly before the first or between two, and the relative difference `rate` (1 + rate recorded seconds
+/// are a second of the torque).
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Clock {
-    /// Row of the record at which the torque begins, possibly before the first or between two.
     first: f64,
-    /// Relative difference: 1 + rate recorded seconds are a second of the torque.
     rate: f64,
 }
 
-/// A sweep that is sought in a record.
+/// A sweep that is searched in a record whose rows are `step` s apart; `span` is the first and last time of
+/// the sweep, s.
 struct Sought<'t> {
-    /// Time between rows of the record, s.
     step: f64,
-    /// First and last time, s.
     span: (f64, f64),
     sweep: &'t Sweep,
 }
 
 impl Sought<'_> {
-    /// Finds the sweep in a record, with the clock's difference, and its correlation coefficient there.
+    /// Finds the sweep in a record. Returns the recorder's clock and the correlation coefficient of record
+    /// and sweep there.
     ///
-    /// A difference of 50 ppm moves the end of 2700 s by half a cycle, so the whole sweep correlates with no stretch of the record. The
-    /// phase of the record against that of the sweep, unwrapped over blocks, is 2π f(t) (α + β t) + 2π n: the start that was
-    /// missed by α, the clock by β, and n whole cycles.
+    /// A difference of 50 ppm moves the end of 2700 s by half a cycle, so the whole sweep correlates with no
+    /// stretch of the record. The phase of the record against that of the sweep, unwrapped over blocks, is 2π
+    /// f(t) (α + β t) + 2π n: the start that was missed by α, the clock by β, and n whole cycles.
     fn align(&self, record: &[f64]) -> (Clock, f64) {
         let (from, to) = self.span;
         let count = ((to - from) / self.step).round() as usize;
@@ -209,15 +207,14 @@ impl Sought<'_> {
         if found > correlation { (clock, found) } else { (whole, correlation) }
     }
 
-    /// Returns true if the sweep of the other sign explains a record better. Half a cycle is a delay and a clock that are off, to a correlation
-    /// of more than 0.9, so a clock that is off is compared with it.
+    /// Returns true if the sweep of the other sign explains a record better. Half a cycle is a delay and a
+    /// clock that are off, to a correlation of more than 0.9, so a clock that is off is compared with it.
     fn is_reversed(&self, record: &[f64], (clock, correlation): (Clock, f64)) -> bool {
         let is_plain = clock.rate == 0.0 && correlation > LEAST_CORRELATION;
         let reversed: Vec<f64> = record.iter().map(|tau| -tau).collect();
         !is_plain && self.align(&reversed).1 > correlation.max(LEAST_CORRELATION)
     }
 
-    /// Returns the time of the sweep, s, at a row of the record.
     fn time(&self, clock: Clock, row: usize) -> f64 {
         self.span.0 + (row as f64 - clock.first) * self.step / (1.0 + clock.rate)
     }
@@ -236,9 +233,9 @@ impl Sought<'_> {
         product / f64::sqrt(squares * others)
     }
 
-    /// Estimates the clock by least squares: the phases of the record in blocks, against the phases
-    /// of the sweep at the times of `clock`, which is nearly right. Returns `None` if the blocks do
-    /// not determine a clock.
+    /// Estimates the clock by least squares: the phases of the record in blocks, against the phases of the
+    /// sweep at the times of `clock`, which is nearly right. Returns `None` if the blocks do not determine a
+    /// clock.
     fn refined(&self, record: &[f64], clock: Clock) -> Option<Clock> {
         let (from, to) = self.span;
         let rows = (BLOCK_CYCLES / self.sweep.band().0 / self.step).ceil() as usize;
@@ -280,8 +277,8 @@ impl Sought<'_> {
     }
 }
 
-/// Returns the row of a record at which a signal begins, possibly before the first row, and the correlation coefficient
-/// of the two where they overlap.
+/// Returns the row of a record at which a signal begins, possibly before the first row, and the correlation
+/// coefficient of the two where they overlap.
 fn aligned(record: &[f64], wanted: &[f64]) -> (i64, f64) {
     let length = (record.len() + wanted.len()).next_power_of_two();
     let forward = Forward::new(length);

@@ -54,7 +54,8 @@ pub struct FeatureRow {
 }
 
 impl FeatureRow {
-    /// Returns the row of a run that was not analysed, with its identification, and how it left the range of its model.
+    /// Returns the row of a run that was not analysed, with its identification, and how it left the range of
+    /// its model.
     pub fn unanalysed(case: &Case, limits: &[String], plan_sha256: &str) -> FeatureRow {
         FeatureRow {
             beyond_model: super::join_sentences(limits),
@@ -133,7 +134,6 @@ pub struct MadeFrom {
 }
 
 impl MadeFrom {
-    /// Returns the row of a run, with the reason if it failed.
     pub fn new(case: &Case, failure: Option<&Failure>, fmu: &host::fmu::Fmu) -> MadeFrom {
         let recording = case.recording.as_ref();
         let file = recording.and_then(|recording| input::open(&recording.path).ok());
@@ -152,7 +152,6 @@ impl MadeFrom {
     }
 }
 
-/// Returns the names of a row's columns.
 pub fn columns<Row: Serialize + Default>() -> Result<Vec<String>> {
     let [names, _] = names_and_values(&Row::default())?;
     Ok(names)

@@ -17,7 +17,6 @@ use crate::profile::Written;
 use crate::sensors::Sensor;
 use signals::recording::Columns;
 
-/// A single value.
 #[derive(Deserialize)]
 #[serde(untagged)]
 enum Scalar {
@@ -62,7 +61,7 @@ const KEYS: [&str; 14] = [
     "sensor",
 ];
 
-/// Reads the plan from a text; `None` with `problems` that prevent it.
+/// Reads the plan from a text; returns `None` with `problems` that prevent it.
 pub(super) fn read(text: &str, problems: &mut Problems) -> Option<Plan> {
     let (table, errors) = DeTable::parse_recoverable(text);
     let table = table.get_ref();
@@ -133,8 +132,8 @@ pub(super) fn read(text: &str, problems: &mut Problems) -> Option<Plan> {
 
 type Values<'t, 'i> = Vec<(String, &'t Spanned<DeValue<'i>>)>;
 
-/// Returns values by name. In TOML `tank.h = 1` is a table in a table; here it is the name
-/// `tank.h`. Tables that `is_value` accepts are values.
+/// Returns values by name. In TOML `tank.h = 1` is a table in a table; here it is the name `tank.h`. Tables
+/// that `is_value` accepts are values.
 fn names<'t, 'i>(table: &'t DeTable<'i>, is_value: &dyn Fn(&DeTable) -> bool) -> Values<'t, 'i> {
     let mut all = Values::new();
     for (key, value) in table {
@@ -149,7 +148,6 @@ fn names<'t, 'i>(table: &'t DeTable<'i>, is_value: &dyn Fn(&DeTable) -> bool) ->
     all
 }
 
-/// Reads values and records problems.
 struct Reader<'a> {
     text: &'a str,
     problems: &'a mut Problems,
@@ -183,7 +181,6 @@ impl Reader<'_> {
         }
     }
 
-    /// Returns a value of the expected type.
     fn value<T: DeserializeOwned>(
         &mut self,
         place: &str,
@@ -198,7 +195,6 @@ impl Reader<'_> {
         Some(Named { name, value: read?, lines: self.lines(value.span()) })
     }
 
-    /// Returns the value of a key, if it exists and has the expected type.
     fn take<T: DeserializeOwned>(
         &mut self,
         place: &str,
@@ -214,7 +210,6 @@ impl Reader<'_> {
         self.take(place, table, key, "a text in quotes", |_| true)
     }
 
-    /// Returns the names in the table at a key, if there is one.
     fn names<'t, 'i>(&mut self, table: &'t DeTable<'i>, key: &str) -> Values<'t, 'i> {
         match table.get(key).map(|value| (value, value.get_ref())) {
             Some((_, DeValue::Table(inner))) => names(inner, &|_| false),
@@ -226,7 +221,6 @@ impl Reader<'_> {
         }
     }
 
-    /// Returns the values of the expected type.
     fn named<T: DeserializeOwned>(
         &mut self,
         place: &str,
@@ -272,7 +266,6 @@ impl Reader<'_> {
         listed
     }
 
-    /// Reads the recording of a run, if the plan names one.
     fn recording(&mut self, place: &str, table: &DeTable) -> Option<Recorded> {
         let columns = self.text(place, table, "columns");
         let columns = match columns {
@@ -302,7 +295,6 @@ impl Reader<'_> {
         texts.iter().filter_map(|one| new(one, self.problems)).collect()
     }
 
-    /// Reads the range in which the plan seeks the onset of rotary slosh.
     fn onset(&mut self, table: &DeTable, profile: Option<&Named<Written>>) -> Option<Onset> {
         let (header, value) = table.get_key_value("onset")?;
         let Some(inner) = value.get_ref().as_table() else {

@@ -25,16 +25,14 @@ use signals::recording::Columns;
 use self::problems::{Lines, Problems};
 use self::random::Draws;
 
-/// Slosh models of the default campaign: the model of the thesis's synthetic data, and the model
-/// closest to its bench.
+/// Slosh models of the default campaign: the model of the thesis's synthetic data, and the model closest to
+/// its bench.
 pub const MODELS: [&str; 2] = [SloshModel::Linear.name(), SloshModel::Spherical.name()];
-/// The thesis's fills, m.
 pub const FILLS: [f64; 2] = [0.05, 0.10];
 /// The thesis's amplitudes, N·m (its Table 5.2 and chapter 7).
 pub const AMPLITUDES: [f64; 11] =
     [0.0125, 0.025, 0.05, 0.075, 0.1, 0.125, 0.15, 0.175, 0.2, 0.225, 0.25];
 
-/// Plans that come with the program: their names and texts.
 pub const BUILT_IN: &[(&str, &str)] = &[
     ("thesis", include_str!("../../../campaigns/thesis.toml")),
     ("thesis_models", include_str!("../../../campaigns/thesis_models.toml")),
@@ -54,13 +52,11 @@ pub const BUILT_IN: &[(&str, &str)] = &[
     ("slew", include_str!("../../../campaigns/slew.toml")),
 ];
 
-/// Step of a plan without one: the thesis's IMU at 50 Hz, s.
+/// Step of a plan without one, s: the thesis's IMU at 50 Hz.
 const STEP: f64 = 0.02;
 /// Variables of the file names `<model>_<fill>mm_<amplitude>`, which the interface fixes.
 const NAMING: [&str; 3] = [slosh::MODEL, tank::H, AMPLITUDE];
-/// Name of a profile's amplitude in a plan.
 pub const AMPLITUDE: &str = "profile.amplitude";
-/// Name of a profile's frequency in a plan.
 const FREQUENCY: &str = "profile.frequency";
 
 /// Value for a name in a plan file: an FMU variable, `profile`, `profile.PARAMETER`.
@@ -77,7 +73,6 @@ impl<T> Named<T> {
     }
 }
 
-/// Plan of a campaign.
 #[derive(Clone, Debug)]
 pub struct Plan {
     pub title: String,
@@ -97,34 +92,30 @@ pub struct Plan {
     sensors: Vec<Sensor>,
 }
 
-/// Range in which a plan seeks the onset of rotary slosh, and further torques of its dwells there.
+/// Range in which a plan seeks the onset of rotary slosh: the smallest and largest frequency, Hz, and at
+/// least two torques in ascending order, N·m. The search is between the first and the last torque; all are
+/// dwells at the onset. `found` is true after [`Plan::dwell`] has replaced the search by dwells.
 #[derive(Clone, Debug)]
 pub(crate) struct Onset {
-    /// Smallest and largest frequency, Hz.
     pub frequency: [f64; 2],
-    /// Torques in ascending order, at least two; the search is between the first and the last, N·m.
     pub amplitude: Vec<f64>,
-    /// True after [`Plan::dwell`] has replaced the search by dwells.
     found: bool,
     lines: Lines,
 }
 
-/// Sweeps of the bench from 1.25 to 3.5 Hz in 2700 s.
+/// Sweeps of the bench from 1.25 to 3.5 Hz in 2700 s. `models` are values of `slosh.model`, `profile` is
+/// `exp-sweep` or `lin-sweep`, `set` holds the settings of every run by FMU name, and `tolerance` is the
+/// relative tolerance of the FMU's solver (`None` for the FMU's own).
 #[derive(Clone, Debug)]
 pub struct Sweeps {
-    /// Values of `slosh.model`, by name.
     pub models: Vec<String>,
     pub fills: Vec<f64>,
     pub amplitudes: Vec<f64>,
-    /// Name of the profile, `exp-sweep` or `lin-sweep`.
     pub profile: &'static str,
-    /// Settings of every run, by FMU name.
     pub set: Vec<(String, String)>,
-    /// Relative tolerance of the FMU's solver; `None`: the FMU's own.
     pub tolerance: Option<f64>,
 }
 
-/// One `[[run]]`.
 #[derive(Clone, Debug, Default)]
 struct Listed {
     name: Option<String>,
@@ -132,44 +123,37 @@ struct Listed {
     recording: Option<Recorded>,
 }
 
-/// A recording of a run, and the columns of its signals.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recorded {
     pub path: PathBuf,
-    /// Columns and units.
     pub columns: Columns,
 }
 
 /// Text that stands in place of the slosh model for a recording.
 pub const RECORDING: &str = "recording";
 
-/// One run of a plan.
+/// One run of a plan. `listed` is the name of its `[[run]]`, if the plan gives one; `varied` are the values
+/// of the varied names, in the order of [`Plan::varied`], empty where a `[[run]]` does not set one; `model`,
+/// `fill` (m) and `amplitude` (N·m) are those of `slosh.model`, `tank.h` and the profile, if they exist.
+/// `settings` are start values by FMU name.
 #[derive(Clone, Debug)]
 pub struct Case {
     pub name: String,
-    /// The name of its `[[run]]`, if the plan gives one.
     pub listed: Option<String>,
-    /// Values of the varied names, in the order of [`Plan::varied`]; empty where a `[[run]]` does
-    /// not set one.
     pub varied: Vec<String>,
-    /// Value of `slosh.model`, by name, if the FMU has it.
     pub model: Option<String>,
-    /// Fill (`tank.h`), m, if the FMU has it.
     pub fill: Option<f64>,
-    /// The profile's `amplitude`, N·m, if it has one.
     pub amplitude: Option<f64>,
     pub profile: String,
     pub torque: Arc<Torque>,
     /// SHA-256 of the torque's file, if it comes from one.
     pub torque_sha256: Option<String>,
-    /// Input that the torque drives, if any.
     pub input: Option<String>,
-    /// Start values by FMU name.
     pub settings: Vec<(String, String)>,
     /// Time between the rows of the result, and between the commands of the profile, s.
     pub step: f64,
     pub stop: f64,
-    /// Relative tolerance of the FMU's solver; `None`: the FMU's own.
+    /// Relative tolerance of the FMU's solver; `None` for the FMU's own.
     pub tolerance: Option<f64>,
     /// True if the torque is held over each step.
     pub hold: bool,
@@ -179,7 +163,6 @@ pub struct Case {
 }
 
 impl Case {
-    /// Returns the run that the case describes.
     pub fn run(&self) -> Run {
         Run {
             settings: self.settings.clone(),
@@ -196,7 +179,6 @@ impl Case {
 }
 
 impl Plan {
-    /// Reads a plan file, or the built-in plan of that name.
     pub fn read(file: &str) -> Result<Self> {
         let built_in = BUILT_IN.iter().find(|(name, _)| *name == file);
         let text = match (input::text(Path::new(file)), built_in) {
@@ -228,8 +210,7 @@ impl Plan {
 
     /// Creates the thesis's sweeps for every combination of models, fills and amplitudes.
     ///
-    /// # Errors
-    /// If a setting is also varied.
+    /// # Errors If a setting is also varied.
     pub fn sweeps(sweeps: Sweeps) -> Result<Self> {
         let Sweeps { models, fills, amplitudes, profile, set, tolerance } = sweeps;
         let numbers = |values: Vec<f64>| values.iter().map(f64::to_string).collect();
@@ -326,8 +307,8 @@ impl Plan {
         names
     }
 
-    /// Returns the number with the most values in the plan, which is the axis of figures; of
-    /// several the last. Returns `None` without one, or if values are drawn at random.
+    /// Returns the number with the most values in the plan, which is the axis of figures; of several the
+    /// last. Returns `None` without one, or if values are drawn at random.
     pub fn axis(&self) -> Option<&str> {
         self.axis_of_vary().or_else(|| self.axis_of_listed())
     }
@@ -353,8 +334,8 @@ impl Plan {
         most.map(|vary| vary.name.as_str()).filter(|_| !self.is_random())
     }
 
-    /// Converts values with a unit (`50 mm`) to numbers in the FMU's unit. Unreadable values stay, and [`Plan::cases`]
-    /// refuses them.
+    /// Converts values with a unit (`50 mm`) to numbers in the FMU's unit. Unreadable values stay, and
+    /// [`Plan::cases`] refuses them.
     pub fn convert_units(&mut self, description: &ModelDescription) {
         let convert = |name: &str, text: &mut String| {
             let variable = description.variable(name).ok();
@@ -372,17 +353,14 @@ impl Plan {
         }
     }
 
-    /// Returns the settings of every run by FMU name.
     pub fn set(&self) -> impl Iterator<Item = (&str, &str)> {
         self.set.iter().map(|set| (set.name.as_str(), set.value.as_str()))
     }
 
-    /// Returns the onset that the plan still seeks.
     pub(crate) fn pending_onset(&self) -> Option<Onset> {
         self.onset.clone().filter(|onset| !onset.found)
     }
 
-    /// Returns a case for each onset that the plan seeks.
     pub(crate) fn seeking(&self, description: &ModelDescription) -> Result<Vec<Case>> {
         Plan { onset: None, ..self.clone() }.cases(description)
     }
@@ -408,7 +386,6 @@ impl Plan {
         self.onset.iter_mut().for_each(|onset| onset.found = true);
     }
 
-    /// Returns true if values are drawn at random.
     pub fn is_random(&self) -> bool {
         self.draws.is_some()
     }
@@ -605,9 +582,9 @@ impl Plan {
         (problems.len() == before).then_some(case)
     }
 
-    /// Returns the run's own name, or `linear_100mm_12.5` (model, fill in mm, amplitude in mN·m) if
-    /// nothing else is varied. Otherwise the name consists of the varied values, as
-    /// `d_0.111_amplitude_0.1`. Draws have numbers.
+    /// Returns the run's own name, or `linear_100mm_12.5` (model, fill in mm, amplitude in mN·m) if nothing
+    /// else is varied. Otherwise the name consists of the varied values, as `d_0.111_amplitude_0.1`. Draws
+    /// have numbers.
     fn name(&self, run: &Listed, case: &Case, draw: usize, taken: &mut BTreeSet<String>) -> String {
         let mut parts = match &run.name {
             // a named run with further variation: only the variation is added
@@ -691,7 +668,7 @@ mod tests {
 
     use super::{AMPLITUDES, BUILT_IN, Case, FILLS, MODELS, Plan, Sweeps};
 
-    /// The FMU's own description, without the FMU.
+    /// Reads the FMU's own description, so that the test needs no FMU.
     fn description() -> ModelDescription {
         let path = concat!(
             env!("CARGO_MANIFEST_DIR"),

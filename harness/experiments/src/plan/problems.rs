@@ -11,7 +11,6 @@ impl Lines {
         Lines(vec![line])
     }
 
-    /// Returns the union of both sets of lines.
     pub fn union(&self, other: &Lines) -> Self {
         let mut all = [&self.0[..], &other.0].concat();
         all.sort_unstable();
@@ -19,7 +18,6 @@ impl Lines {
         Lines(all)
     }
 
-    /// Returns the lines as words that begin a message.
     fn prefix(&self) -> String {
         match &self.0[..] {
             [] => String::new(),
@@ -32,7 +30,7 @@ impl Lines {
     }
 }
 
-/// Problems, each recorded only once.
+/// Problems of a plan with their lines, each recorded only once.
 #[derive(Default)]
 pub(super) struct Problems(Vec<(Lines, String)>);
 

@@ -6,7 +6,6 @@ use super::Named;
 use super::problems::Problems;
 use crate::profile::Written;
 
-/// Largest number of draws until a number lies within its bounds.
 const MOST_DRAWS: usize = 10_000;
 
 #[derive(Clone, Debug)]
@@ -16,8 +15,7 @@ pub(super) struct Draws {
     pub draw: Vec<Named<Distribution>>,
 }
 
-/// Source of a random value. Values outside `min` to `max` or the bounds of the variable are drawn
-/// again.
+/// Source of a random value. Values outside `min` to `max` or the bounds of the variable are drawn again.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Distribution {
     kind: Kind,
@@ -35,20 +33,18 @@ enum Kind {
         from: f64,
         to: f64,
     },
-    /// `deviation` is that of the natural logarithm.
+    /// Lognormal distribution, whose `deviation` is that of the natural logarithm.
     Lognormal {
         median: f64,
         deviation: f64,
     },
 }
 
-/// Distributions of a kind.
 pub(super) struct Family {
     pub name: &'static str,
     pub parameters: [&'static str; 2],
     kind: fn(f64, f64) -> Kind,
     makes_sense: fn(f64, f64) -> bool,
-    /// Condition that the parameters must meet.
     rule: &'static str,
 }
 
@@ -86,8 +82,8 @@ impl Family {
 }
 
 impl Draws {
-    /// Returns the values of draw `number`. Every draw has its own stream, so that it does not
-    /// depend on the number of runs.
+    /// Returns the values of draw `number`. Every draw has its own stream, so that it does not depend on the
+    /// number of runs.
     pub fn draw(
         &self,
         description: &ModelDescription,

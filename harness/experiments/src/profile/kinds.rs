@@ -10,49 +10,46 @@ use super::Values;
 use super::noise::{DwellInNoise, Noise};
 use super::shape::{Dwell, Piece, Pieces, Shape};
 
-/// A kind of torque history. Times in s, frequencies in Hz, torques in N·m.
+/// A kind of torque history, with times in s, frequencies in Hz and torques in N·m. `says` describes it for
+/// readers of help and documentation; every kind has the parameter `duration`; `demands` are conditions on
+/// several parameters; `shape` makes the torque from values that are allowed.
 #[derive(Debug)]
 pub struct Kind {
     pub name: &'static str,
-    /// Description of the torque for readers of help and documentation.
     pub says: &'static str,
-    /// Parameters of the torque. Every kind has the parameter `duration`.
     pub parameters: &'static [Parameter],
-    /// Conditions on several parameters, each with the sentence that states it.
     pub(super) demands: &'static [Demand],
-    /// Makes the torque from values that are allowed.
     pub(super) shape: fn(&Values) -> Arc<dyn Shape>,
 }
 
-/// A condition, and the sentence that states it.
 pub(super) type Demand = (fn(&Values) -> bool, &'static str);
 
-/// A parameter of a profile or a sensor: its name, default, unit (empty without one) and label on axes.
+/// A parameter of a profile or a sensor: its name, default, unit (empty without one), label on axes, and
+/// allowed values.
 #[derive(Clone, Copy, Debug)]
 pub struct Parameter {
     pub name: &'static str,
     pub default: f64,
     pub unit: &'static str,
     pub label: &'static str,
-    /// Allowed values.
     pub allowed: Allowed,
 }
 
-/// Allowed values of a parameter; all must be finite.
+/// Allowed values of a parameter, which must all be finite: numbers whose magnitude is at most the limit
+/// (`Within`), whole numbers from 0 to the limit (`Whole`), and others.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Allowed {
     Any,
     NotZero,
     Positive,
     NotNegative,
-    /// Numbers whose magnitude is at most the limit.
     Within(f64),
-    /// Whole numbers from 0 to the limit.
     Whole(f64),
 }
 
 impl Allowed {
-    /// States what is wrong with a value, worded to follow the parameter's name; `None` for an allowed value.
+    /// Returns a description of the error of a value, worded to follow the parameter's name; `None` for an
+    /// allowed value.
     pub(super) fn fault(self, value: f64) -> Option<String> {
         let (met, demand) = match self {
             Allowed::Any => (true, String::new()),
@@ -116,15 +113,13 @@ const fn sweep_from(first: Allowed) -> [Parameter; 4] {
         duration(Sweep::THESIS.duration),
     ]
 }
-/// Condition that the frequencies of a sweep differ.
 const MOVES: Demand = (|v| v.value("f0") != v.value("f1"), "f0 and f1 are equal; use sine");
-/// Condition on frequencies: beyond this range the phase of a sine has no valid digits.
+/// Condition on frequencies, because beyond this range the phase of a sine has no valid digits.
 const BAND: Demand = (
     |v| ["f0", "f1"].iter().all(|name| (1.0 / FREQUENCY..=FREQUENCY).contains(&v.value(name))),
     "f0 and f1 must be from 1e-9 to 1e9 Hz",
 );
 
-/// Condition on a band that may begin at 0 Hz.
 const BAND_FROM_ZERO: Demand = (
     |v| {
         let band = 1.0 / FREQUENCY..=FREQUENCY;
@@ -150,7 +145,6 @@ fn pieces(list: impl Into<Vec<Piece>>) -> Arc<dyn Shape> {
     Arc::new(Pieces(list.into()))
 }
 
-/// All profiles except [`FILE`].
 pub const KINDS: &[Kind] = &[
     Kind {
         name: "exp-sweep",

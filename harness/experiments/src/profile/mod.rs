@@ -40,9 +40,7 @@ pub struct Values<'a> {
 impl Values<'_> {
     /// Returns the value of a parameter.
     ///
-    /// # Panics
-    ///
-    /// If the kind has no such parameter.
+    /// # Panics If the kind has no such parameter.
     pub fn value(&self, name: &str) -> f64 {
         self.get(name).unwrap_or_else(|| panic!("{} has no {name}", self.kind.name))
     }
@@ -66,7 +64,6 @@ impl Kind {
     }
 }
 
-/// Lists every profile with its defaults and description, for `--help`.
 pub fn help() -> String {
     let all = KINDS.iter().map(|kind| (kind.written(&kind.defaults()), kind.says));
     all.chain([(FILE.0.into(), FILE.1)])
@@ -74,7 +71,6 @@ pub fn help() -> String {
         .collect()
 }
 
-/// Lists every profile as a Markdown table for the documentation.
 pub fn table() -> String {
     let mut text =
         String::from("| profile, with its defaults | torque | units |\n| --- | --- | --- |\n");
@@ -88,7 +84,6 @@ pub fn table() -> String {
     text
 }
 
-/// Lists the profiles with numeric parameters as JSON, for programs.
 pub fn list() -> Vec<serde_json::Value> {
     let parameter =
         |p: &kinds::Parameter| json!({ "name": p.name, "unit": p.unit, "default": p.default });
@@ -157,7 +152,6 @@ impl Written {
         &self.name
     }
 
-    /// Sets a parameter, in place of the value in the text.
     pub fn set(&mut self, key: &str, value: &str) {
         self.pairs.retain(|(k, _)| k != key);
         self.pairs.push((key.into(), value.into()));
@@ -165,9 +159,8 @@ impl Written {
 
     /// Makes the torque; a file is read.
     ///
-    /// # Errors
-    ///
-    /// If there is no such profile, a parameter is unknown or not allowed, or the file cannot be read.
+    /// # Errors If there is no such profile, a parameter is unknown or not allowed, or the file cannot be
+    /// read.
     pub fn torque(&self) -> Result<Torque> {
         if self.name == "file" { self.file() } else { Ok(Torque::Profile(self.profile()?)) }
     }
@@ -192,7 +185,6 @@ impl Written {
         Torque::read(path, held)
     }
 
-    /// Returns true if a parameter takes only integers.
     pub fn is_whole(&self, key: &str) -> bool {
         let kind = KINDS.iter().find(|kind| kind.name == self.name);
         let parameter = kind.and_then(|kind| kind.parameters.iter().find(|p| p.name == key));
@@ -277,12 +269,10 @@ impl Profile {
         Values { kind: self.kind, values: &self.values }.get(name)
     }
 
-    /// Returns the description of a parameter, if the profile has it.
     pub fn parameter(&self, name: &str) -> Option<&'static Parameter> {
         self.kind.parameters.iter().find(|parameter| parameter.name == name)
     }
 
-    /// Returns the length of the profile, s.
     pub fn duration(&self) -> f64 {
         self.get("duration").unwrap_or(0.0)
     }
@@ -295,7 +285,6 @@ impl Profile {
         self.get("frequency")
     }
 
-    /// Returns the sweep, if the profile is one.
     pub fn sweep(&self) -> Option<&Sweep> {
         self.shape.sweep()
     }
@@ -327,20 +316,17 @@ pub fn cycles(error: f64) -> f64 {
 #[derive(Clone, Debug)]
 pub enum Torque {
     Profile(Profile),
-    /// Rows of time (s) and torque (N·m).
+    /// Rows of time (s) and torque (N·m), each held until the next row, or joined by straight lines.
     Rows {
         history: History,
-        /// True if each row holds until the next; false for straight lines between rows.
         held: bool,
     },
 }
 
 impl Torque {
-    /// Reads the columns `time` (s) and `tau_cmd` (N·m) of a file. `held`: see [`Torque::Rows`].
+    /// Reads the columns `time` (s) and `tau_cmd` (N·m) of a file; the rows are `held` or joined by lines.
     ///
-    /// # Errors
-    ///
-    /// If the file cannot be read as a history of inputs.
+    /// # Errors If the file cannot be read as a history of inputs.
     pub fn read(path: &Path, held: bool) -> Result<Self> {
         let signal =
             Signal { name: TAU_CMD, required: true, between: Between::Missing, unit: None };
@@ -354,15 +340,12 @@ impl Torque {
     /// Makes a torque from rows of time (s) and torque (N·m). With `slopes` (N·m/s) the torque follows each
     /// row's slope until the next row, and may jump there.
     ///
-    /// # Errors
-    ///
-    /// If there are no rows, or the times do not ascend.
+    /// # Errors If there are no rows, or the times do not ascend.
     pub fn rows(time: &[f64], tau: &[f64], slopes: Option<&[f64]>, held: bool) -> Result<Self> {
         let slopes = slopes.map(<[f64]>::to_vec);
         Ok(Torque::Rows { history: History::new(time.to_vec(), tau.to_vec(), slopes, held)?, held })
     }
 
-    /// Returns the first and the last time, s.
     pub fn span(&self) -> (f64, f64) {
         match self {
             Torque::Profile(profile) => (0.0, profile.duration()),
@@ -387,10 +370,8 @@ impl Torque {
     /// lines between those would differ from it by more than 2.5 % of the amplitude, `sample` is divided so
     /// that they differ by at most 0.1 %. Held rows are never divided.
     ///
-    /// # Errors
-    ///
-    /// If there would be more than [`budget::ROWS`] rows, or the profile has frequencies above half of the
-    /// rate of held rows.
+    /// # Errors If there would be more than [`budget::ROWS`] rows, or the profile has frequencies above half
+    /// of the rate of held rows.
     pub fn history(&self, sample: f64, stop: f64, hold: bool) -> Result<Cow<'_, History>> {
         match self {
             Torque::Rows { history, .. } if hold => Ok(Cow::Owned(history.held())),
@@ -401,10 +382,8 @@ impl Torque {
 
     /// Returns the number of rows of [`Torque::history`] without making them.
     ///
-    /// # Errors
-    ///
-    /// If the profile has more commands than allowed, or frequencies that the commands do not follow, as for
-    /// [`Torque::history`].
+    /// # Errors If the profile has more commands than allowed, or frequencies that the commands do not
+    /// follow, as for [`Torque::history`].
     pub fn row_count(&self, sample: f64, stop: f64, hold: bool) -> Result<usize> {
         Ok(match self {
             Torque::Rows { history, .. } => history.time().len(),
@@ -417,9 +396,7 @@ impl Torque {
 
     /// Checks that rows `step` s apart can represent the torque.
     ///
-    /// # Errors
-    ///
-    /// If its highest frequency is half of the rows' rate or more.
+    /// # Errors If its highest frequency is half of the rows' rate or more.
     pub fn check_rows(&self, step: f64, stop: f64) -> Result<()> {
         let Torque::Profile(profile) = self else { return Ok(()) };
         let highest = profile.shape.highest(stop);
@@ -469,7 +446,6 @@ impl Profile {
         Ok(Some((intervals, parts as usize)))
     }
 
-    /// Makes the rows of the torque, as [`Torque::history`] describes them.
     fn history(&self, sample: f64, stop: f64, hold: bool) -> Result<History> {
         let (mut time, mut values) = (vec![0.0], vec![self.shape.torque_after(0.0)]);
         let mut row = |t: f64| {
@@ -527,7 +503,8 @@ mod tests {
         }
     }
 
-    /// φ = π f1 t²/T: with 4 Hz and 8 s a quarter cycle by t = 1 s, the first whole one by 2 s, at 1 Hz.
+    /// With φ = π f1 t²/T, 4 Hz and 8 s, a quarter cycle ends at t = 1 s and the first whole one at 2 s, at 1
+    /// Hz.
     #[test]
     fn a_linear_sweep_begins_at_zero_hertz() {
         let profile: Profile = "lin-sweep:amplitude=2,f0=0,f1=4,duration=8".parse().unwrap();
@@ -570,7 +547,6 @@ mod tests {
         }
     }
 
-    /// Rows of a profile, each with its value.
     fn rows(text: &str, sample: f64, stop: f64, hold: bool) -> Vec<(f64, f64)> {
         let torque = Torque::Profile(text.parse().unwrap());
         let history = torque.history(sample, stop, hold).unwrap();
@@ -601,7 +577,8 @@ mod tests {
         assert_eq!(rows(pulse, 0.02, 1.0, false), [(0.0, 2.0), (1.0, 0.0)]);
     }
 
-    /// The thesis's sweeps are commanded at 50 Hz; a line of 0.02 s differs from 3.5 Hz by (0.44)²/8 = 2.4 % of the amplitude.
+    /// The thesis's sweeps are commanded at 50 Hz; a line of 0.02 s differs from 3.5 Hz by (0.44)²/8 = 2.4 %
+    /// of the amplitude.
     #[test]
     fn lines_between_commands_follow_a_profile_of_any_frequency() {
         for (text, count, error) in [

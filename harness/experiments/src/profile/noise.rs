@@ -16,19 +16,16 @@ use analysis::random::Random;
 /// so that the estimate has no gaps.
 pub const TONES: usize = 512;
 
-/// A noise torque. `rms` is the root mean square before the limit, `limit` the torque at which it is clipped,
-/// both in N·m.
+/// A noise torque in the band from `f0`, which may be 0, to `f1`, Hz. `rms` is the root mean square before
+/// the limit and `limit` the torque at which it is clipped, both in N·m. The power density is ∝ f^exponent: 0
+/// is white, −1 pink, −2 brown.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Noise {
     pub rms: f64,
-    /// Lower end of the band, Hz; may be 0.
     pub f0: f64,
-    /// Upper end of the band, Hz.
     pub f1: f64,
-    /// Power density ∝ f^exponent: 0 white, −1 pink, −2 brown.
     pub exponent: f64,
     pub seed: u64,
-    /// Largest torque, N·m; the noise is clipped there.
     pub limit: f64,
     tones: Vec<Tone>,
 }

@@ -7,13 +7,12 @@ use analysis::sweep::Sweep;
 
 /// A torque as a function of time; t in s, torque in N·m.
 pub trait Shape: Debug + Send + Sync {
-    /// Returns the torque just after `t` (s), N·m; at a jump the new value.
+    /// Returns the torque just after `t`; at a jump this is the new value.
     fn torque_after(&self, t: f64) -> f64;
 
     /// Returns the highest frequency from 0 to `stop` (s), Hz; 0 if the torque is constant between its edges.
     fn highest(&self, stop: f64) -> f64;
 
-    /// Returns the times at which the torque jumps, s.
     fn edges(&self) -> Vec<f64> {
         Vec::new()
     }
@@ -24,7 +23,6 @@ pub trait Shape: Debug + Send + Sync {
         None
     }
 
-    /// Returns the sweep, if the torque is one.
     fn sweep(&self) -> Option<&Sweep> {
         None
     }
@@ -70,7 +68,6 @@ impl Shape for Dwell {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pieces(pub Vec<Piece>);
 
-/// A constant torque (N·m) from one time to another, s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Piece {
     from: f64,
@@ -79,12 +76,10 @@ pub struct Piece {
 }
 
 impl Piece {
-    /// Makes a torque (N·m) from `start` for `width` seconds.
     pub fn new(start: f64, width: f64, torque: f64) -> Piece {
         Piece { from: start, to: start + width, torque }
     }
 
-    /// Makes a torque (N·m) that lasts for all times.
     pub fn constant(torque: f64) -> Piece {
         Piece { from: f64::NEG_INFINITY, to: f64::INFINITY, torque }
     }

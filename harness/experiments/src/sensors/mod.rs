@@ -22,17 +22,16 @@ use crate::profile::{Allowed, Parameter, Written, parameter};
 use crate::run;
 use signals::table::Table;
 
-/// A kind of sensor, with a description of the measured quantity for readers (`says`).
+/// A kind of sensor. `says` describes the measured quantity for readers; `parameters` come in addition to
+/// [`ERRORS`]; `unit` is that of the readings, empty if it is that of the variable; `of` is the variable that
+/// the sensor reads unless `of=NAME` names another, where the outer `None` is for kinds that do not read a
+/// variable.
 #[derive(Debug)]
 pub struct Kind {
     pub name: &'static str,
     pub says: &'static str,
-    /// Parameters in addition to [`ERRORS`].
     pub parameters: &'static [Parameter],
-    /// Unit of the readings; empty if it is that of the variable.
     pub unit: &'static str,
-    /// Variable that the sensor reads unless `of=NAME` names another; the outer `None` if the kind does not
-    /// read a variable.
     of: Option<Option<&'static str>>,
 }
 
@@ -44,7 +43,6 @@ const ANGLE: Parameter = parameter(
     Allowed::Any,
 );
 
-/// All kinds of sensors.
 pub const KINDS: &[Kind] = &[
     Kind {
         name: "gauge",
@@ -103,10 +101,8 @@ pub const KINDS: &[Kind] = &[
     },
 ];
 
-/// Placeholder for the unit of a sensor's readings.
 const READING: &str = "its unit";
 
-/// Parameters of the errors that any sensor can have.
 pub const ERRORS: [Parameter; 7] = [
     parameter("rate", 0.0, "Hz", "samples a second; 0: one a row", Allowed::NotNegative),
     parameter("noise", 0.0, READING, "standard deviation of a sample", Allowed::NotNegative),
@@ -128,17 +124,16 @@ pub struct Sensor {
     errors: Errors,
 }
 
-/// Values of [`ERRORS`]; the unit of noise, bias and quantum is the sensor's.
+/// Values of [`ERRORS`]; the unit of noise, bias and quantum is the sensor's. `noise` is the standard
+/// deviation of a sample, `scale` the reading divided by the quantity, and `delay` the time between sampling
+/// and reading, s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Errors {
     pub rate: f64,
-    /// Standard deviation of a sample.
     pub noise: f64,
     pub bias: f64,
-    /// Reading divided by the quantity.
     pub scale: f64,
     pub quantum: f64,
-    /// Time between sampling and reading, s.
     pub delay: f64,
     pub seed: u64,
 }
@@ -157,9 +152,7 @@ impl FromStr for Sensor {
 impl Sensor {
     /// Makes a sensor with the name of its column from `KIND:key=value,…`.
     ///
-    /// # Errors
-    ///
-    /// Lists everything that is wrong with it.
+    /// # Errors Lists everything that is wrong with it.
     pub fn new(name: &str, text: &str) -> Result<Self> {
         let plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '.';
         ensure!(
@@ -203,9 +196,7 @@ impl Sensor {
 
     /// Returns the quantity that the sensor measures in an FMU with these settings.
     ///
-    /// # Errors
-    ///
-    /// If the FMU has no such quantity.
+    /// # Errors If the FMU has no such quantity.
     pub fn quantity(
         &self,
         description: &ModelDescription,
@@ -236,7 +227,6 @@ impl Sensor {
         }
     }
 
-    /// Returns true if a column has the name of one of the sensor's channels.
     pub fn has(&self, column: &str) -> bool {
         let rest = column.strip_prefix(&self.name);
         rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
@@ -265,16 +255,13 @@ impl Sensor {
     }
 }
 
-/// Several sensors of one FMU, each with the quantity that it measures.
 #[derive(Debug, Default)]
 pub struct Sensors(Vec<(Sensor, Quantity)>);
 
 impl Sensors {
     /// Makes the sensors of a run with these settings, whose rows are `step` seconds apart.
     ///
-    /// # Errors
-    ///
-    /// Lists everything that is wrong with them.
+    /// # Errors Lists everything that is wrong with them.
     pub fn new(
         sensors: &[Sensor],
         description: &ModelDescription,
@@ -301,7 +288,6 @@ impl Sensors {
         Ok(Sensors(bound))
     }
 
-    /// Lists the variables that a run must record for the sensors, each once.
     pub fn required_variables(&self) -> Vec<&str> {
         let mut needs: Vec<&str> = Vec::new();
         for name in self.0.iter().flat_map(|(_, quantity)| &quantity.needs) {
@@ -312,7 +298,6 @@ impl Sensors {
         needs
     }
 
-    /// Lists the names of the sensors' columns.
     pub fn columns(&self) -> Vec<String> {
         let one = |(sensor, quantity): &(Sensor, Quantity)| {
             let names = quantity.channels.iter().map(|(channel, _)| sensor.column(channel));
@@ -324,9 +309,7 @@ impl Sensors {
     /// Returns the first `kept` columns of a run's table and the readings of [`Sensors::read`], without the
     /// columns that were recorded only for the sensors.
     ///
-    /// # Errors
-    ///
-    /// If the table lacks a variable that they need.
+    /// # Errors If the table lacks a variable that they need.
     pub fn recorded(&self, table: Table, kept: usize, run: &str, step: f64) -> Result<Table> {
         let names: Vec<String> =
             table.names()[..kept].iter().cloned().chain(self.columns()).collect();
@@ -337,9 +320,7 @@ impl Sensors {
     /// Adds the readings of all sensors to a run's table. `run` is the name of the run; runs with the same
     /// seed but different names have different noise.
     ///
-    /// # Errors
-    ///
-    /// If the table lacks a variable that they need.
+    /// # Errors If the table lacks a variable that they need.
     pub fn read(&self, table: Table, run: &str, step: f64) -> Result<Table> {
         let mut columns = Vec::new();
         for (sensor, quantity) in &self.0 {
@@ -362,7 +343,6 @@ impl Sensors {
         Ok(columns.into_iter().fold(table, |table, (name, column)| table.with_gaps(&name, column)))
     }
 
-    /// Returns the text of each sensor by its name, for a file's metadata.
     pub fn texts(&self) -> BTreeMap<&str, &str> {
         self.0.iter().map(|(sensor, _)| (sensor.name.as_str(), sensor.text.as_str())).collect()
     }
@@ -371,9 +351,7 @@ impl Sensors {
 impl Sensor {
     /// Converts period and delay to numbers of rows: from sample to sample, and from a sample to its reading.
     ///
-    /// # Errors
-    ///
-    /// If one is not a multiple of the step.
+    /// # Errors If one is not a multiple of the step.
     fn rows(&self, step: f64) -> Result<[usize; 2]> {
         let whole = |what: &str, seconds: f64| {
             let rows = seconds / step;
@@ -393,7 +371,6 @@ impl Sensor {
     }
 }
 
-/// Lists every kind with its defaults and description, for `--help`.
 pub fn help() -> String {
     let written = |parameters: &[Parameter]| {
         let pairs = parameters.iter().map(|p| match p.unit {

@@ -27,12 +27,11 @@ use names::hubslosh::{
     self, G_AXIAL, OMEGA, OMEGA_DOT, SloshModel, SloshSource, THETA, bench, fluid, tank,
 };
 
-/// Measured quantity of one sensor.
+/// Measured quantity of one sensor, computed from the Real variables `needs` of the FMU. Each channel has the
+/// ending of the column's name, and the unit.
 #[derive(Clone, Debug)]
 pub struct Quantity {
-    /// Variables of the FMU from which the quantity is computed, all Real.
     pub needs: Vec<String>,
-    /// Channels: the ending of the column's name, and the unit.
     pub channels: Vec<(String, String)>,
     rule: Rule,
 }
@@ -46,14 +45,13 @@ enum Rule {
     Acceleration { radius: f64, angle: f64 },
 }
 
-/// Meaning of the coordinates `slosh.q_radial`, `slosh.q_tangential` of a mode of HubSlosh.
+/// Meaning of the coordinates `slosh.q_radial`, `slosh.q_tangential` of a mode of HubSlosh: slosh angle, rad;
+/// tangent of half the angle from the vertical, times the direction (`Stereographic`); or displacement of the
+/// pendulum's bob, m.
 #[derive(Clone, Copy, Debug)]
 pub enum Coordinate {
-    /// Slosh angle, rad.
     Angle,
-    /// Tangent of half the angle from the vertical, times the direction.
     Stereographic,
-    /// Displacement of the pendulum's bob, m.
     Displacement,
 }
 
@@ -91,16 +89,13 @@ struct Modes {
     coordinate: Coordinate,
 }
 
-/// Variables that describe the motion of the tank on the hub.
 const MOTION: [&str; 7] =
     [THETA, OMEGA, OMEGA_DOT, tank::R, G_AXIAL, bench::TILT, bench::TILT_AZIMUTH];
 
 impl Quantity {
     /// Makes the quantity that a Real variable of the FMU is. `unit` is the unit that the variable must have.
     ///
-    /// # Errors
-    ///
-    /// If there is no such variable, or it has another unit.
+    /// # Errors If there is no such variable, or it has another unit.
     pub fn variable(
         description: &ModelDescription,
         name: &str,
@@ -120,9 +115,7 @@ impl Quantity {
 
     /// Makes the wave at an angle on the wall (rad), m.
     ///
-    /// # Errors
-    ///
-    /// If the FMU is not HubSlosh with an upright cylinder whose liquid moves.
+    /// # Errors If the FMU is not HubSlosh with an upright cylinder whose liquid moves.
     pub fn wave(surface: &Surface, angle: f64) -> Result<Self> {
         let (needs, modes) = surface.modes()?;
         Ok(Quantity { needs, channels: single_value("m"), rule: Rule::Wave { modes, angle } })
@@ -130,10 +123,8 @@ impl Quantity {
 
     /// Makes the pressure at an angle on the wall (rad) and a height over the bottom (m), Pa.
     ///
-    /// # Errors
-    ///
-    /// If the FMU is not HubSlosh with an upright cylinder whose liquid moves, or the height is above the liquid at
-    /// rest.
+    /// # Errors If the FMU is not HubSlosh with an upright cylinder whose liquid moves, or the height is
+    /// above the liquid at rest.
     pub fn pressure(surface: &Surface, angle: f64, height: f64) -> Result<Self> {
         let (mut needs, modes) = surface.modes()?;
         let h = surface.number(tank::H)?;
@@ -149,9 +140,7 @@ impl Quantity {
     /// Makes the surface as a camera sees it: the plane that fits best, and every mode, each as a height at
     /// the wall, m.
     ///
-    /// # Errors
-    ///
-    /// If the FMU is not HubSlosh with an upright cylinder whose liquid moves.
+    /// # Errors If the FMU is not HubSlosh with an upright cylinder whose liquid moves.
     pub fn camera(surface: &Surface) -> Result<Self> {
         let (needs, modes) = surface.modes()?;
         let plane = ["plane_radial".to_string(), "plane_tangential".into()];
@@ -164,9 +153,7 @@ impl Quantity {
     /// Makes the specific force of a point of the hub in the direction of an angle (rad), from radial
     /// outwards towards tangential, m/s².
     ///
-    /// # Errors
-    ///
-    /// If the FMU is not HubSlosh.
+    /// # Errors If the FMU is not HubSlosh.
     pub fn acceleration(description: &ModelDescription, radius: f64, angle: f64) -> Result<Self> {
         let needs: Vec<String> = MOTION.map(String::from).into();
         present(description, &needs)?;
@@ -177,7 +164,6 @@ impl Quantity {
         })
     }
 
-    /// Computes the value of each channel from the values of the needed variables, in their order.
     pub fn values(&self, read: &[f64]) -> Vec<f64> {
         match &self.rule {
             Rule::Itself => vec![read[0]],
@@ -221,7 +207,7 @@ impl Quantity {
     }
 }
 
-/// Returns the elevation at the wall per slosh angle of mode n, counted from 0, m.
+/// Returns the elevation at the wall per slosh angle of mode `n`, which counts from 0, m.
 fn wall(n: usize, radius: f64) -> f64 {
     2.0 * radius / (XI[n] * XI[n] - 1.0)
 }
@@ -246,7 +232,6 @@ fn single_value(unit: &str) -> Vec<(String, String)> {
 }
 
 impl Modes {
-    /// Returns the number of values that belong to the modes.
     fn reads(&self) -> usize {
         3 * self.count + 1
     }
@@ -255,7 +240,6 @@ impl Modes {
         0.5 * read[3 * self.count]
     }
 
-    /// Returns the slosh angles of all modes, radial and tangential, rad.
     fn angles(&self, read: &[f64]) -> Vec<[f64; 2]> {
         let angle = |mode: &[f64]| self.coordinate.angles([mode[0], mode[1]], mode[2]);
         read[..3 * self.count].chunks_exact(3).map(angle).collect()
@@ -278,7 +262,7 @@ impl Surface<'_> {
         Ok(self.text(name)?.parse()?)
     }
 
-    /// Returns the item of an enumeration, or that of its integer twin `kind`, which hosts set that cannot
+    /// Returns the item of an enumeration, or that of its integer twin `kind`, which is for hosts that cannot
     /// set enumerations.
     fn choice(&self, name: &str, kind: &str) -> Result<String> {
         let number: i64 = self.text(kind)?.parse()?;
@@ -308,7 +292,6 @@ impl Surface<'_> {
     }
 }
 
-/// Checks that the FMU has all these variables.
 fn present(description: &ModelDescription, names: &[String]) -> Result<()> {
     for name in names {
         description.variable(name).with_context(|| format!("it needs {name} of HubSlosh"))?;
