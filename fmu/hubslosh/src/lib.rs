@@ -12,10 +12,8 @@ pub use model::{HubSlosh, Parameters};
 use runtime::call::Interface;
 use runtime::v2::Fmi2;
 
-/// An instance of the FMU.
 pub type Instance = runtime::instance::Instance<HubSlosh, Fmi2>;
 
-/// One scalar of the FMU's variables.
 pub type Scalar = runtime::table::Scalar<HubSlosh>;
 
 /// Creates an instance as a host would through FMI 2.0, for hosts and tests in Rust.
@@ -32,7 +30,6 @@ pub fn from_bytes(bytes: &[u8]) -> Result<Instance, String> {
     runtime::snapshot::from_bytes(bytes)
 }
 
-/// The functions of FMI 2.0 that the binary exports.
 pub mod fmi2 {
     // Parameter types of the standard's header.
     pub use runtime::v2::*;
@@ -40,7 +37,6 @@ pub mod fmi2 {
     runtime::export_fmi2!(crate::HubSlosh);
 }
 
-/// The functions of FMI 3.0 that the binary exports.
 pub mod fmi3 {
     pub use runtime::v3::*;
 

@@ -26,19 +26,17 @@ impl HubSlosh {
     }
 }
 
-/// The plant's parameters, together with integer twins of enumerations (for hosts that cannot set them) and
-/// of Booleans (for hosts that misread them). By default the liquid is released at [`START_ANGLE`].
+/// The plant's parameters, together with integer twins, whose names end in `_kind`: of enumerations, for
+/// hosts that cannot set them (the number of the item, or 0 to use the enumeration), and of Booleans, for
+/// hosts that misread them (1 for false, 2 for true, or 0 to use the Boolean). By default the liquid is
+/// released at [`START_ANGLE`].
 #[derive(Clone, Debug)]
 pub struct Parameters {
     plant: plant::Parameters,
-    /// Integer twin of the enumeration `slosh.model`: number of the item, or 0 to use the enumeration. The
-    /// next fields are twins in the same way.
     pub slosh_kind: i32,
     pub slosh_source_kind: i32,
     pub damping_law_kind: i32,
     pub friction_kind: i32,
-    /// Integer twin of the Boolean `slosh.zeta_from_correlation`: 1 for false, 2 for true, 0 to use the
-    /// Boolean. The next fields are twins in the same way.
     pub zeta_from_correlation_kind: i32,
     pub capillarity_kind: i32,
     pub one_axis_kind: i32,

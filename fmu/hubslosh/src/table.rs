@@ -18,7 +18,6 @@ use runtime::variable::{Dimension, Enumeration, Item, Variable};
 
 use crate::model::{HubSlosh, SAVED_WORDS, set_item};
 
-/// Table of the FMU's variables.
 pub static TABLE: Table<HubSlosh> = Table::new(
     About {
         model: "HubSlosh",
@@ -602,7 +601,6 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
         .depends_on(&["g_axial"]).initial_depends_on(LIQUID_MODES),
 ];
 
-/// The models of the liquid.
 static SLOSH_MODEL_ITEMS: [Item; SloshModel::ITEMS.len()] = Item::list(SloshModel::ITEMS);
 
 static SLOSH_MODEL: Enumeration = Enumeration {
@@ -611,7 +609,6 @@ static SLOSH_MODEL: Enumeration = Enumeration {
     items: &SLOSH_MODEL_ITEMS,
 };
 
-/// Source of the modal parameters.
 static SLOSH_SOURCE: Enumeration = Enumeration {
     name: "SloshSource",
     description: "Sources of the modal parameters",
@@ -621,7 +618,6 @@ static SLOSH_SOURCE: Enumeration = Enumeration {
     ],
 };
 
-/// Dependence of damping on the natural frequency.
 static DAMPING_LAW: Enumeration = Enumeration {
     name: "DampingLaw",
     description: "Drag coefficient c of a mode as a function of its natural frequency omega",
@@ -635,7 +631,6 @@ static DAMPING_LAW: Enumeration = Enumeration {
     ],
 };
 
-/// The laws of friction.
 static FRICTION_MODEL: Enumeration = Enumeration {
     name: "FrictionModel",
     description: "Friction laws of the bearing",
@@ -651,7 +646,6 @@ static FRICTION_MODEL: Enumeration = Enumeration {
     ],
 };
 
-/// Amplitude class of the wave.
 static REGIME: Enumeration = Enumeration {
     name: "Regime",
     description: "Amplitude class of the wave at the wall, R being the tank's radius",

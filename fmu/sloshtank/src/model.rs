@@ -12,12 +12,10 @@ use runtime::model::StepFailure;
 /// is stable up to 2/sqrt(3) - 1 = 0.155.
 const LIMIT: f64 = 0.15;
 
-/// Warning that is logged once per run.
 const OUT_OF_RANGE: &str = "the tank leaves its range (tank.in_range). Thrust pulls the tank off its liquid and nothing \
                             centres the liquid, or a bob is more than 45 degrees from the axis. Results are not \
                             physical from here on";
 
-/// Warning that is logged once per run.
 const LUMP: &str = "the liquid leaves the tank's bottom and moves on as detached liquid (tank.ball.state). Times and \
                     momenta of crossings are valid. Impact forces, and the motion after an impact, are right only to an \
                     order of magnitude. The host must apply impulse";
@@ -43,16 +41,14 @@ impl Model {
     }
 }
 
-/// The tank's parameters, with counts as integers for FMI.
+/// The tank's parameters, with counts as integers for FMI. `coupling_kind` is the integer twin of the
+/// enumeration `coupling`, for hosts that cannot set enumerations; 0 to use the enumeration.
 #[derive(Clone, Debug)]
 pub struct Parameters {
     tank: TankParameters,
-    /// Integer twin of the enumeration `coupling`, for hosts that cannot set enumerations; 0 to use the
-    /// enumeration.
     pub coupling_kind: i32,
     pub damping_law_kind: i32,
     pub modes: i32,
-    /// Number of points of the tank's fill table.
     pub points: i32,
     pub host: Craft,
 }
@@ -122,7 +118,6 @@ impl Parameters {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Inputs {
     pub tank: TankInputs,
-    /// The slope of omega, rad/s2.
     pub omega_slope: [f64; 3],
 }
 

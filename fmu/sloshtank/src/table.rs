@@ -8,7 +8,6 @@ use runtime::variable::{Dimension, Enumeration, Item, Variable};
 
 use crate::model::{Model, Parameters};
 
-/// Table of the FMU's variables.
 pub static TABLE: Table<Model> = Table::new(
     About {
         model: "SloshTank",
@@ -69,7 +68,6 @@ const DISSIPATED: usize = 6 * MODES;
 const LIQUID: usize = DISSIPATED + 1;
 const BALL: usize = LIQUID + 1;
 
-/// Returns the item of [`BALL_STATE`].
 fn ball_state(state: BallState) -> i32 {
     match state {
         BallState::Settled => 1,

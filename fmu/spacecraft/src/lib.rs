@@ -9,7 +9,6 @@ pub mod table;
 
 pub use model::Model;
 
-/// The functions of FMI 2.0 that the binary exports.
 pub mod fmi2 {
     // Parameter types of the standard's header.
     pub use runtime::v2::*;
@@ -17,7 +16,6 @@ pub mod fmi2 {
     runtime::export_fmi2!(crate::Model);
 }
 
-/// The functions of FMI 3.0 that the binary exports.
 pub mod fmi3 {
     pub use runtime::v3::*;
 

@@ -18,24 +18,21 @@ pub struct Model {
     has_had_lump: bool,
 }
 
-/// Warning that is logged once per run.
 const OUT_OF_RANGE: &str = "a tank leaves its range (tank[].in_range). Thrust pulls the tank off its liquid and nothing \
                             centres the liquid, or a bob is more than 45 degrees from the axis. Results for this tank \
                             are not physical from here on";
 
-/// Warning that is logged once per run.
 const LUMP: &str = "the liquid of a tank leaves the bottom and moves on as detached liquid (tank[].ball.state). Times \
                     and momenta of crossings are valid. Impact forces, and the motion after an impact, are right only \
                     to an order of magnitude";
 
 /// Detects a Model Exchange host that omits the wheels' reaction −h_w' from the torque: h_wheels changes
-/// about an axis about which torque has always been 0.
+/// about an axis about which torque has always been 0. `torque` is true for each axis about which torque has
+/// been different from 0; `moved` counts the steps in which h_wheels changed without torque. One such step
+/// may be the end of a ramp whose torque has already ended.
 #[derive(Clone, Copy, Debug, Default)]
 struct Wheels {
-    /// True for each axis about which torque has been different from 0.
     torque: [bool; 3],
-    /// Number of steps in which h_wheels changed without torque. One such step may be the end of a ramp whose
-    /// torque has already ended.
     moved: [u8; 3],
 }
 
@@ -61,19 +58,16 @@ impl Wheels {
     }
 }
 
-/// The craft's parameters, with counts as integers for FMI.
+/// The craft's parameters, with counts as integers for FMI. `mount_kind` and `damping_law_kind` are the
+/// integer twins of the enumerations `mount` and `tank[].damping_law`, for hosts that cannot set
+/// enumerations; 0 to use the enumeration.
 #[derive(Clone, Debug)]
 pub struct Parameters {
     craft: craft::Parameters,
-    /// Integer twin of the enumeration `mount`, for hosts that cannot set enumerations; 0 to use the
-    /// enumeration.
     pub mount_kind: i32,
-    /// Integer twins of `tank[].damping_law`.
     pub damping_law_kind: [i32; TANKS],
     pub tanks: i32,
-    /// Number of slosh modes of each tank.
     pub modes: [i32; TANKS],
-    /// Number of points of each tank's fill table.
     pub points: [i32; TANKS],
 }
 

@@ -11,7 +11,6 @@ use runtime::variable::{Dimension, Enumeration, Item, Variable};
 
 use crate::model::{Model, Parameters};
 
-/// Table of the FMU's variables.
 pub static TABLE: Table<Model> = Table::new(
     About {
         model: "Spacecraft",
@@ -119,18 +118,15 @@ const fn place(n: usize) -> (usize, usize, usize) {
     (n / (3 * MODES), n / 3 % MODES, n % 3)
 }
 
-/// Returns the index of the same element among the continuous states.
 fn bob(n: usize) -> usize {
     let (tank, mode, axis) = place(n);
     index::bob(tank, mode) + axis
 }
 
-/// Returns the index among the continuous states of element `n` of `tank[].ball.position`.
 fn ball(n: usize) -> usize {
     index::ball(n / 3) + n % 3
 }
 
-/// Returns the item of [`BALL_STATE`].
 fn ball_state(state: BallState) -> i32 {
     match state {
         BallState::Settled => 1,

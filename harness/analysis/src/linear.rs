@@ -18,9 +18,9 @@ use crate::exponential::exponential;
 use crate::response::FrequencyResponse;
 use signals::fourier::Complex64;
 
-/// Parameters of the linear model of hub and liquid: inertia I0 of hub and rigid liquid about the axis,
-/// kg·m², viscous friction b, N·m·s, torsional stiffness k of the suspension line, N·m/rad, distance r of the
-/// tank from the axis, m, and for each mode mass m, kg, pendulum length and damping ratio ζ.
+/// Parameters of the linear model of hub and liquid: inertia I0 of hub and rigid liquid about the axis, kg·m²,
+/// viscous friction b, N·m·s, torsional stiffness k of the suspension line, N·m/rad, and distance r of the tank
+/// from the axis, m. Each mode has its mass m, kg, its natural frequency and its damping ratio ζ.
 #[derive(Clone, Debug, Default)]
 pub struct Linear {
     pub inertia: f64,

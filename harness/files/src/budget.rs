@@ -17,26 +17,22 @@ pub const RECORDING: u64 = 512 << 20;
 pub const PER_BYTE: u64 = 32;
 /// Largest size of one file while it is decompressed, bytes, including the parts that are skipped.
 pub const INFLATED: u64 = 2 << 30;
-/// Largest number of runs of a plan.
 pub const RUNS: usize = 100_000;
-/// Largest number of threads that work at the same time.
 pub const JOBS: usize = 512;
-/// Largest number of lines of a multisine.
 pub const LINES: usize = 20_000;
-/// Largest number of sines to evaluate for a multisine, all lines in all rows: half a minute.
+/// Largest number of sines to evaluate for a multisine, all lines in all rows, which takes half a minute.
 pub const SINES: u64 = 2_000_000_000;
 /// Largest number of products for the frequency responses of one run, rows times frequencies: about ten
 /// seconds.
 pub const PRODUCTS: f64 = 4e9;
 /// Largest frequency of a torque, and the inverse of the smallest, Hz.
 pub const FREQUENCY: f64 = 1e9;
-/// Largest length of a run's name, bytes: file systems allow 255 with an ending.
+/// Largest length of a run's name, bytes, because file systems allow 255 with an ending.
 pub const NAME: usize = 200;
 
-/// Steps of length `step` (s) in `span` (s), the last perhaps shorter.
+/// Returns the number of steps of length `step` (s) in `span` (s), the last perhaps shorter.
 ///
-/// # Errors
-/// If there are more than [`ROWS`], or if the numbers make none.
+/// # Errors If there are more than [`ROWS`], or if the numbers make none.
 pub fn steps(span: f64, step: f64) -> Result<usize> {
     ensure!(
         step > 0.0 && step.is_finite(),
@@ -56,10 +52,9 @@ pub fn steps(span: f64, step: f64) -> Result<usize> {
     Ok(if whole { exact.round() } else { exact.ceil() } as usize)
 }
 
-/// Bytes of a table of numbers.
+/// Returns the size of a table of numbers, bytes.
 ///
-/// # Errors
-/// If it has more than [`ROWS`], or takes more than [`BYTES`].
+/// # Errors If it has more than [`ROWS`], or takes more than [`BYTES`].
 pub fn table(rows: usize, columns: usize) -> Result<u64> {
     ensure!(rows <= ROWS + 1, "{rows} rows (allowed: at most {ROWS})");
     let bytes = (rows as u64).saturating_mul(columns as u64).saturating_mul(8);
@@ -73,11 +68,11 @@ pub fn table(rows: usize, columns: usize) -> Result<u64> {
     Ok(bytes)
 }
 
-/// Bytes of the numbers that are read of a file of `size` bytes: a small file that claims to hold much is damaged or
-/// made to harm.
+/// Returns the size of the numbers that are read from a file of `size` bytes. A small file that claims to
+/// hold much is damaged or made to harm.
 ///
-/// # Errors
-/// If [`table`] fails, or the numbers take more than [`RECORDING`] and than [`PER_BYTE`] times the file.
+/// # Errors If [`table`] fails, or the numbers take more than [`RECORDING`] and than [`PER_BYTE`] times the
+/// file.
 pub fn reading(rows: usize, columns: usize, size: u64) -> Result<u64> {
     let bytes = table(rows, columns)?;
     let most = RECORDING.max(size.saturating_mul(PER_BYTE));
@@ -92,10 +87,10 @@ pub fn reading(rows: usize, columns: usize, size: u64) -> Result<u64> {
     Ok(bytes)
 }
 
-/// Threads for `wanted` jobs at once (0: as many as the machine has cores) that hold `bytes` each.
+/// Returns the number of threads for `wanted` jobs at once (0 for as many as the machine has cores) that hold
+/// `bytes` each.
 ///
-/// # Errors
-/// If more than [`JOBS`] are wanted.
+/// # Errors If more than [`JOBS`] are wanted.
 pub fn jobs(wanted: usize, bytes: u64) -> Result<usize> {
     ensure!(wanted <= JOBS, "{wanted} runs at once (allowed: 1 to {JOBS})");
     let cores = std::thread::available_parallelism().map_or(1, usize::from).min(JOBS);

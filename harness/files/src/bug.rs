@@ -8,14 +8,12 @@ use std::thread::{self, ThreadId};
 
 use crate::input;
 
-/// Messages of panics, with the thread and the place in the source.
 static PANICS: Mutex<Vec<(ThreadId, String)>> = Mutex::new(Vec::new());
 
-/// Functions that hear of the panics of this process.
+/// Functions that are called at panics of this process: `panics` with the report before the panic unwinds,
+/// because a panic that cannot unwind ends the process, and `catches` when [`caught`] has caught it.
 pub struct Listener {
-    /// Takes the report of a panic before it unwinds, because a panic that cannot unwind ends the process.
     pub panics: fn(&str),
-    /// Hears that [`caught`] has caught the panic.
     pub catches: fn(),
 }
 
@@ -26,7 +24,7 @@ pub fn set_listener(listener: Listener) {
     let _ = LISTENER.set(listener);
 }
 
-/// Has panics kept for [`caught`] in place of printed.
+/// Keeps the messages of panics for [`caught`] instead of printing them.
 pub fn keep_panics() {
     std::panic::set_hook(Box::new(|panic| {
         let place = panic.location().map(|at| format!(" ({}:{})", at.file(), at.line()));
@@ -45,13 +43,12 @@ fn message(payload: &(dyn Any + Send)) -> String {
     text.or_else(|| payload.downcast_ref::<String>().cloned()).unwrap_or("a panic".into())
 }
 
-/// A panic that was caught, with its message.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct Panicked(pub String);
 
-/// Runs `work`; the message of its panic if it panics. The first panic counts: a panic of a thread makes the thread that
-/// waits for it panic too.
+/// Runs `work`; returns the message of its panic if it panics. The first panic counts, because a panic of a
+/// thread makes the thread that waits for it panic too.
 pub fn caught<T>(work: impl FnOnce() -> T) -> Result<T, Panicked> {
     let before = PANICS.lock().unwrap_or_else(PoisonError::into_inner).len();
     catch_unwind(AssertUnwindSafe(work)).map_err(|payload| {
@@ -72,8 +69,8 @@ pub fn caught<T>(work: impl FnOnce() -> T) -> Result<T, Panicked> {
     })
 }
 
-/// Formats the message of a panic for the user: the panic itself, the files that had been read, and the request
-/// to report it as a bug.
+/// Formats the message of a panic for the user: the panic itself, the files that had been read, and the
+/// request to report it as a bug.
 pub fn report(panic: &str) -> String {
     let read = input::read_so_far();
     let files = match read.is_empty() {

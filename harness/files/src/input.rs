@@ -14,8 +14,7 @@ use crate::budget;
 
 /// Opens a regular file for reading; a symbolic link to one counts as one.
 ///
-/// # Errors
-/// If the file cannot be opened or is not a regular file. The message does not repeat the path.
+/// # Errors If the file cannot be opened or is not a regular file. The message does not repeat the path.
 pub fn open(path: &Path) -> Result<File> {
     let kind = path.metadata()?;
     // before `File::open`, which waits until somebody writes to a named pipe
@@ -30,7 +29,6 @@ pub fn open(path: &Path) -> Result<File> {
     Ok(file)
 }
 
-/// Largest number of files that [`read_so_far`] lists.
 const MOST_NAMED: usize = 20;
 
 static READ: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
@@ -43,8 +41,7 @@ pub fn read_so_far() -> Vec<String> {
 
 /// Reads a file of at most [`budget::TEXT`] bytes.
 ///
-/// # Errors
-/// If the file cannot be read, is not a regular file or is too large.
+/// # Errors If the file cannot be read, is not a regular file or is too large.
 pub fn bytes(path: &Path) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     open(path)?.take(budget::TEXT + 1).read_to_end(&mut bytes)?;
@@ -58,8 +55,7 @@ pub fn bytes(path: &Path) -> Result<Vec<u8>> {
 
 /// Reads a text of at most [`budget::TEXT`] bytes in UTF-8.
 ///
-/// # Errors
-/// If [`bytes`] fails, or the text is not UTF-8.
+/// # Errors If [`bytes`] fails, or the text is not UTF-8.
 pub fn text(path: &Path) -> Result<String> {
     String::from_utf8(bytes(path)?).map_err(|error| {
         let at = error.utf8_error().valid_up_to();
@@ -67,8 +63,8 @@ pub fn text(path: &Path) -> Result<String> {
     })
 }
 
-/// Removes the numbers of the operating system's errors, `(os error 2)`, from a message, because the words before them say
-/// the same.
+/// Removes the numbers of the operating system's errors, `(os error 2)`, from a message, because the words
+/// before them say the same.
 pub fn without_error_numbers(message: &str) -> String {
     let mut parts = message.split(" (os error ");
     let mut text = parts.next().unwrap_or_default().to_string();
@@ -101,8 +97,8 @@ fn file_kind(metadata: &Metadata) -> &'static str {
     if metadata.is_dir() { "a directory" } else { "a special file" }
 }
 
-/// Identity of a file, the same for all its paths and links. Elsewhere than on Unix a second hard link counts as
-/// another file.
+/// Identity of a file, which is the same for all its paths and links. On systems other than Unix a second
+/// hard link counts as another file.
 #[derive(PartialEq)]
 struct Identity(#[cfg(unix)] (u64, u64), #[cfg(not(unix))] PathBuf);
 
@@ -117,7 +113,8 @@ fn identity(path: &Path) -> Option<Identity> {
     path.canonicalize().ok().map(Identity)
 }
 
-/// A protected input. The file stays open: otherwise a new file could get the number of an input that was deleted.
+/// A protected input. The file stays open, because otherwise a new file could get the number of an input that
+/// was deleted.
 struct Protected {
     identity: Identity,
     path: PathBuf,
@@ -126,7 +123,8 @@ struct Protected {
 
 static PROTECTED: Mutex<Vec<Protected>> = Mutex::new(Vec::new());
 
-/// Protects an input: from now on no output of this process replaces the file. A path without a file is ignored.
+/// Protects an input: from now on no output of this process replaces the file. A path without a file is
+/// ignored.
 pub fn protect(path: &Path) {
     if !path.is_file() {
         return;
@@ -140,10 +138,10 @@ pub fn protect(path: &Path) {
     }
 }
 
-/// Fails if `path` leads to a protected input: by the same name, a relative path, a symbolic link or a hard link.
+/// Fails if `path` leads to a protected input: by the same name, a relative path, a symbolic link or a hard
+/// link.
 ///
-/// # Errors
-/// If it does; the message names both paths.
+/// # Errors If it does; the message names both paths.
 pub fn check_replaceable(path: &Path) -> Result<()> {
     let Some(identity) = identity(path) else { return Ok(()) };
     let all = PROTECTED.lock().unwrap_or_else(PoisonError::into_inner);

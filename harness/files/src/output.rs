@@ -10,7 +10,6 @@ use sha2::{Digest, Sha256};
 
 use crate::{input, temporary};
 
-/// Destination to which the path of an output leads.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Destination {
     /// A plain file at this path, which may not exist yet: the output replaces it as a whole.
@@ -19,13 +18,11 @@ pub enum Destination {
     Stream,
 }
 
-/// Largest number of symbolic links that are followed, the same as on Linux.
 const LINKS: usize = 40;
 
 /// Finds the destination of an output. Symbolic links are followed, also to a file that does not exist yet.
 ///
-/// # Errors
-/// If the path leads to a directory, or its links lead in a circle.
+/// # Errors If the path leads to a directory, or its links lead in a circle.
 pub fn destination(path: &Path) -> Result<Destination> {
     let name = path.display();
     let mut place = path.to_path_buf();
@@ -57,9 +54,9 @@ fn containing_folder(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// Writes an output through `write`, completely or not at all. A plain file is replaced when its successor is on the disk, so
-/// that neither an error nor a power cut leaves half of it; a device or a pipe receives the bytes when all of them exist. A
-/// protected input ([`input::protect`]) is never written to.
+/// Writes an output through `write`, completely or not at all. A plain file is replaced when its successor is
+/// on the disk, so that neither an error nor a power cut leaves half of it; a device or a pipe receives the
+/// bytes when all of them exist. A protected input ([`input::protect`]) is never written to.
 pub fn atomically<T>(path: &Path, write: impl FnOnce(&mut File) -> Result<T>) -> Result<T> {
     input::check_replaceable(path)?;
     let cannot = || format!("{} cannot be written", path.display());
@@ -85,11 +82,10 @@ pub fn atomically<T>(path: &Path, write: impl FnOnce(&mut File) -> Result<T>) ->
     Ok(result)
 }
 
-/// Moves a complete file to where the path of an output leads: it takes the place of a plain file, and its bytes go to a device or
-/// a pipe.
+/// Moves a complete file to where the path of an output leads: it takes the place of a plain file, and its
+/// bytes go to a device or a pipe.
 ///
-/// # Errors
-/// If that fails; the message names `path`.
+/// # Errors If that fails; the message names `path`.
 pub fn publish_draft(draft: &Path, path: &Path) -> Result<()> {
     let move_or_pour = || -> Result<()> {
         match destination(path)? {
@@ -110,7 +106,6 @@ pub fn publish_draft(draft: &Path, path: &Path) -> Result<()> {
     move_or_pour().with_context(|| format!("{} cannot be written", path.display()))
 }
 
-/// Writes the rest of a file to a device or a pipe.
 fn pour(draft: &mut File, path: &Path) -> io::Result<()> {
     io::copy(draft, &mut File::options().append(true).open(path)?).map(drop)
 }
@@ -120,13 +115,11 @@ pub fn write(path: &Path, bytes: impl AsRef<[u8]>) -> Result<()> {
     atomically(path, |file| Ok(file.write_all(bytes.as_ref())?))
 }
 
-/// Makes a directory and those above it.
 pub fn directory(path: &Path) -> Result<()> {
     std::fs::create_dir_all(path)
         .with_context(|| format!("the directory {} cannot be made", path.display()))
 }
 
-/// Returns the SHA-256 of `bytes` in hexadecimal digits.
 pub fn sha256(bytes: &[u8]) -> String {
     base16ct::lower::encode_string(&Sha256::digest(bytes))
 }
@@ -197,7 +190,6 @@ mod tests {
         assert!(error.ends_with("cannot be written: it is a directory"), "{error}");
     }
 
-    /// The file of the same kind as before.
     #[cfg(unix)]
     #[test]
     fn a_pipe_gets_all_bytes_and_stays_a_pipe() {
@@ -225,7 +217,7 @@ mod tests {
         }
     }
 
-    /// A copy of `/dev/full`, which takes no byte; only root can make one.
+    /// The device is a copy of `/dev/full`, which takes no byte; only root can make one.
     #[cfg(target_os = "linux")]
     #[test]
     fn a_device_is_written_to_and_its_error_is_reported() {

@@ -26,34 +26,26 @@ use crate::input;
 use crate::output::{self, hash_reader, sha256};
 use crate::temporary::{self, Registered};
 
-/// Folder of the stored runs.
 pub const RUNS: &str = "runs";
-/// The hashes of all files.
 pub const MANIFEST: &str = "manifest.sha256";
 const LOCK: &str = ".lock";
 const UNFINISHED: &str = ".unfinished";
-/// The table of all runs.
 const TABLE: &str = "runs.csv";
 
-/// Kind of folder: a campaign, or a study of `monte_carlo`.
+/// Kind of folder: a campaign, or a study of `monte_carlo`. Messages use `name`, `noun` (with its article,
+/// for readers who do not know the kind) and `elsewhere`, the advice if the folder is taken. The file
+/// `definition` determines which runs there are. `is_published` is true for names of files that are published
+/// with the last run; no other file is removed, whatever the manifest lists.
 #[derive(Debug)]
 pub struct Kind {
-    /// Noun in messages.
     name: &'static str,
-    /// Noun with its article, as who does not know the kind reads it.
     noun: &'static str,
-    /// The file that defines which runs there are.
     definition: &'static str,
-    /// Ending of a run's file.
     ending: &'static str,
-    /// Advice if the folder is taken.
     elsewhere: &'static str,
-    /// Returns true for names of files that are published with the last run. No other file is removed, whatever the
-    /// manifest lists.
     is_published: fn(&str) -> bool,
 }
 
-/// The runs of a plan.
 pub const CAMPAIGN: &Kind = &Kind {
     name: "campaign",
     noun: "a campaign",
@@ -67,7 +59,6 @@ pub const CAMPAIGN: &Kind = &Kind {
     },
 };
 
-/// The runs of `monte_carlo`.
 pub const STUDY: &Kind = &Kind {
     name: "study",
     noun: "a study of monte_carlo",
@@ -78,12 +69,10 @@ pub const STUDY: &Kind = &Kind {
 };
 
 impl Kind {
-    /// Name of a run's file in the folder.
     pub fn run_file(&self, run: &str) -> String {
         format!("{RUNS}/{run}.{}", self.ending)
     }
 
-    /// Returns true if a folder has a definition or runs of this kind.
     fn is_present_in(&self, path: &Path) -> bool {
         let runs = fs::read_dir(path.join(RUNS)).into_iter().flatten().flatten();
         let is_run = |file: &Path| file.extension().is_some_and(|ending| ending == self.ending);
@@ -91,41 +80,34 @@ impl Kind {
     }
 }
 
-/// Reason why a stored run cannot be reused.
 #[derive(Debug, thiserror::Error)]
 pub enum Damage {
-    /// It was stored, and is not there.
     #[error("its file is missing")]
     Missing,
-    /// It is not what was stored.
     #[error("its SHA-256 is not that in {MANIFEST}; it is damaged, or another program replaced it")]
     Changed,
-    /// Nothing tells what was stored.
     #[error("it has no line in {MANIFEST}, which is damaged; nothing verifies the run")]
     Unlisted,
-    /// It cannot be read.
     #[error("{0}")]
     Unreadable(anyhow::Error),
 }
 
-/// Text of a definition, and the check of a definition that is in the folder already.
+/// Text of a definition, and a function that fails if the text of a definition in the folder defines other
+/// runs.
 #[derive(Clone, Copy)]
 pub struct Definition<'a> {
-    /// Content of the definition's file.
     pub text: &'a str,
-    /// Fails if this text defines other runs.
     pub compare: &'a dyn Fn(&str) -> Result<()>,
 }
 
-/// A locked folder; dropping this unlocks it.
+/// A locked folder; dropping this unlocks it. `lost` are files that are in the manifest, but not in the
+/// folder; `is_new` is true if the folder had no manifest, so that all runs come from other programs.
 #[derive(Debug)]
 pub struct Store {
     path: PathBuf,
     kind: &'static Kind,
     unfinished: PathBuf,
-    /// Files that are in the manifest, but not in the folder.
     lost: BTreeSet<String>,
-    /// True if the folder had no manifest, so that all runs come from other programs.
     is_new: bool,
     manifest: Mutex<Manifest>,
     process: u32,
@@ -133,23 +115,21 @@ pub struct Store {
     _lock: File,
 }
 
-/// The hashes of the files, by name, and the manifest file.
+/// The hashes of the files, by name, and the manifest file, which is `None` after publication, and after a
+/// line that could not be written.
 #[derive(Debug)]
 struct Manifest {
-    /// `None` after publication, and after a line that could not be written.
     file: Option<File>,
     sums: BTreeMap<String, String>,
 }
 
-/// Returns the file's lines in the format of `sha256sum`.
 fn lines(sums: &BTreeMap<String, String>) -> String {
     sums.iter().map(|(name, sum)| format!("{sum}  {name}\n")).collect()
 }
 
 /// Returns the last hash of each name. A line that a kill has cut off does not count.
 ///
-/// # Errors
-/// Another line is not in the format of a manifest.
+/// # Errors Another line is not in the format of a manifest.
 fn sums(text: &str) -> Result<BTreeMap<String, String>> {
     let whole = text.rfind('\n').map_or("", |end| &text[..=end]);
     let pair = |(row, line): (usize, &str)| {
@@ -166,10 +146,8 @@ fn sums(text: &str) -> Result<BTreeMap<String, String>> {
     whole.lines().enumerate().map(pair).collect()
 }
 
-/// Number of characters of a damaged line in a message.
 const SHOWN: usize = 120;
 
-/// Returns true if nothing was ever stored in a folder.
 fn has_no_runs(path: &Path) -> bool {
     match fs::read_dir(path.join(RUNS)) {
         Ok(mut runs) => runs.next().is_none(),
@@ -177,10 +155,10 @@ fn has_no_runs(path: &Path) -> bool {
     }
 }
 
-/// Reads a folder's manifest. `is_used`: a program has locked the folder before.
+/// Reads a folder's manifest. `is_used` is true if a program has locked the folder before.
 ///
-/// # Errors
-/// Nothing verifies the stored runs: the manifest is damaged, or it is missing although the folder is used.
+/// # Errors Nothing verifies the stored runs: the manifest is damaged, or it is missing although the folder
+/// is used.
 fn read_manifest(path: &Path, is_used: bool) -> Result<BTreeMap<String, String>> {
     let place = path.join(MANIFEST);
     let read = || -> Result<BTreeMap<String, String>> {
@@ -225,12 +203,11 @@ impl Definition<'_> {
 }
 
 impl Store {
-    /// Creates the folder if it does not exist, and locks it. Other programs that want to lock it get `about` as the
-    /// reason. The definition of a campaign is published with its tables, so it has none here.
+    /// Creates the folder if it does not exist, and locks it. Other programs that want to lock it get `about`
+    /// as the reason. The definition of a campaign is published with its tables, so it has none here.
     ///
-    /// # Errors
-    /// Another program has locked the folder, it belongs to runs of another kind or of another definition, or its
-    /// manifest is damaged. Nothing in it has changed then, except for the lock.
+    /// # Errors Another program has locked the folder, it belongs to runs of another kind or of another
+    /// definition, or its manifest is damaged. Nothing in it has changed then, except for the lock.
     pub fn take(
         path: &Path,
         kind: &'static Kind,
@@ -294,26 +271,23 @@ impl Store {
         Ok(store)
     }
 
-    /// Path of the folder.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Path of a run's file.
     pub fn run(&self, run: &str) -> PathBuf {
         self.path.join(self.kind.run_file(run))
     }
 
-    /// Returns true if a run is in the manifest.
     pub fn lists(&self, run: &str) -> bool {
         self.manifest().sums.contains_key(&self.kind.run_file(run))
     }
 
-    /// Returns the SHA-256 of a stored run, or `None` if it was never stored. A run without a line in the manifest is
-    /// accepted if the folder is new, or if `is_ours` does not recognise its file as one of HubSlosh.
+    /// Returns the SHA-256 of a stored run, or `None` if it was never stored. A run without a line in the
+    /// manifest is accepted if the folder is new, or if `is_ours` does not recognise its file as one of
+    /// HubSlosh.
     ///
-    /// # Errors
-    /// The file is not the stored one.
+    /// # Errors The file is not the stored one.
     pub fn check(
         &self,
         run: &str,
@@ -328,8 +302,7 @@ impl Store {
 
     /// Returns the bytes of a stored run that only HubSlosh writes, or `None` if it was never stored.
     ///
-    /// # Errors
-    /// The file is not the stored one.
+    /// # Errors The file is not the stored one.
     pub fn read(&self, run: &str) -> Result<Option<Vec<u8>>, Damage> {
         let read = |path: &Path| {
             let bytes = input::bytes(path)?;
@@ -338,7 +311,8 @@ impl Store {
         self.read_checked(run, |_| true, read)
     }
 
-    /// Returns what `read` finds in the file of a stored run, if the SHA-256 that it returns too is the stored one.
+    /// Returns the value that `read` extracts from the file of a stored run, if the SHA-256 that it also
+    /// returns is the stored one.
     fn read_checked<T>(
         &self,
         run: &str,
@@ -358,7 +332,6 @@ impl Store {
         }
     }
 
-    /// Adds a run that another program has stored to the manifest.
     pub fn adopt(&self, run: &str, sum: String) -> Result<()> {
         self.add_to_manifest(&self.kind.run_file(run), sum)
     }
@@ -431,7 +404,6 @@ impl Store {
         self.manifest.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Adds a line to the manifest.
     fn add_to_manifest(&self, file: &str, sum: String) -> Result<()> {
         let mut manifest = self.manifest();
         if manifest.sums.get(file) == Some(&sum) {
@@ -462,7 +434,6 @@ impl Drop for Store {
     }
 }
 
-/// Locks a folder.
 fn hold(path: &Path, kind: &Kind, about: &str) -> Result<File> {
     let place = path.join(LOCK);
     let name = place.display();
@@ -510,7 +481,6 @@ mod tests {
         Ok(())
     }
 
-    /// A folder of this kind; a study is defined by "A".
     fn take(path: &Path, kind: &'static Kind) -> Result<Store> {
         let definition = Definition { text: "A", compare: &same };
         Store::take(path, kind, "here", (kind.name == STUDY.name).then_some(definition))
@@ -521,7 +491,6 @@ mod tests {
             self.add(run, |path| Ok(fs::write(path, text)?)).unwrap();
         }
 
-        /// Checks a run; files of other programs begin with "other".
         fn check_text(&self, run: &str) -> Result<Option<String>, Damage> {
             self.check(run, |path| !fs::read_to_string(path).unwrap().starts_with("other"))
         }

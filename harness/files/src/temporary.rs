@@ -9,18 +9,16 @@ use std::sync::{Mutex, MutexGuard, Once, PoisonError};
 use anyhow::{Context, Result};
 use tempfile::TempDir;
 
-/// Paths that are removed when a signal ends the program.
 static PATHS: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
 fn paths() -> MutexGuard<'static, BTreeSet<PathBuf>> {
     PATHS.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A file or folder that a signal removes as long as this lives.
+/// A file or folder that a signal removes while this value exists.
 #[derive(Debug)]
 pub struct Registered(PathBuf);
 
-/// Has a signal remove a file or folder.
 pub fn register(path: &Path) -> Registered {
     paths().insert(path.to_path_buf());
     Registered(path.to_path_buf())
@@ -32,8 +30,8 @@ impl Drop for Registered {
     }
 }
 
-/// Removes all registered files and folders, before a signal ends the program. The registry stays
-/// locked, so a thread that would register another file waits until the program has ended.
+/// Removes all registered files and folders, before a signal ends the program. The registry stays locked, so
+/// a thread that would register another file waits until the program has ended.
 pub fn remove_all() {
     let paths = paths();
     for path in paths.iter() {
@@ -45,21 +43,18 @@ pub fn remove_all() {
     std::mem::forget(paths);
 }
 
-/// Runs `work`, and delays signals that would end the program until it returns. `work` must not
-/// register anything.
+/// Runs `work`, and delays signals that would end the program until it returns. `work` must not register
+/// anything.
 pub fn uninterrupted<T>(work: impl FnOnce() -> T) -> T {
     let _held = paths();
     work()
 }
 
-/// Prefix of the names of temporary folders.
 pub const PREFIX: &str = "hubslosh-";
-/// Name of the file in such a folder that is locked as long as its program runs.
+/// Name of the file in a temporary folder that is locked as long as its program runs.
 const ALIVE: &str = "alive";
-/// Name of the folder within it for the files.
 const FILES: &str = "files";
 
-/// A folder for temporary files.
 #[derive(Debug)]
 pub struct Folder {
     files: PathBuf,
@@ -70,7 +65,7 @@ pub struct Folder {
     process: u32,
 }
 
-/// A fork has the folder from the process that made it, and leaves it alone.
+/// A forked process has the folder from the process that made it, and leaves it alone.
 impl Drop for Folder {
     fn drop(&mut self) {
         if std::process::id() != self.process {
@@ -80,7 +75,7 @@ impl Drop for Folder {
 }
 
 impl Folder {
-    /// Makes one in the system's folder for temporary files. The first of a program removes those of
+    /// Makes one in the system's folder for temporary files. The first one of a program removes those of
     /// programs that were killed.
     pub fn new() -> Result<Folder> {
         static SWEPT: Once = Once::new();
@@ -112,13 +107,12 @@ impl Folder {
         make().with_context(|| format!("no temporary folder can be made in {}", parent.display()))
     }
 
-    /// Returns the path for the files.
     pub fn path(&self) -> &Path {
         &self.files
     }
 }
 
-/// Removes the folders of programs that no longer live.
+/// Removes the folders of programs that have ended.
 fn sweep(parent: &Path, prefix: &str) {
     for entry in fs::read_dir(parent).into_iter().flatten().flatten() {
         let ours = entry.file_name().to_string_lossy().starts_with(prefix);

@@ -4,7 +4,6 @@
 //! The harness does not link the models. Instead model-description writes one module per FMU from its
 //! variable table, so that a misspelt or renamed variable does not compile.
 
-/// Name of an array variable with `D` indices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Array<const D: usize>(&'static str);
 
@@ -24,15 +23,14 @@ impl<const D: usize> Array<D> {
     }
 }
 
-/// A parameter that determines how many elements of arrays are used.
+/// A parameter that determines how many elements of arrays are used; `most` is its largest value.
+/// `has_indicators` is true if each element has event indicators of its own. `arrays` lists the arrays that
+/// the parameter sizes, each with the position of this dimension among its indices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Size {
     pub parameter: &'static str,
-    /// Largest value of the parameter.
     pub most: usize,
-    /// True if each element has event indicators of its own.
     pub has_indicators: bool,
-    /// The arrays that the parameter sizes, each with the position of this dimension among its indices.
     pub arrays: &'static [(&'static str, usize)],
 }
 

@@ -5,9 +5,8 @@ use formulas::limits::LimitedBy;
 
 use crate::{hubslosh, sloshtank, spacecraft};
 
-/// Variables that say by what a tank is limited.
+/// Variables that show by what a tank is limited: the name of each, and words before the reason in messages.
 pub struct Limits {
-    /// Name of the variable, and words before the reason.
     tanks: Vec<(String, String)>,
 }
 
@@ -21,14 +20,13 @@ impl Limits {
         Limits { tanks: one.into_iter().chain(several).filter(|(name, _)| has(name)).collect() }
     }
 
-    /// Returns the columns that [`Limits::describe`] reads.
     pub fn required_columns(&self) -> impl Iterator<Item = &str> {
         self.tanks.iter().map(|(name, _)| name.as_str())
     }
 
-    /// Returns a sentence for each tank that was out of range: the reasons with their shares of the time and their first
-    /// times, the longest first. `column` returns the column with this name of a run's table. A row holds until the next
-    /// one.
+    /// Returns a sentence for each tank that was out of range: the reasons with their shares of the time and
+    /// their first times, the longest first. `column` returns the column with this name of a run's table. A
+    /// row holds until the next one.
     pub fn describe<'t>(&self, column: impl Fn(&str) -> Option<&'t [f64]>) -> Vec<String> {
         let of_tank = |(name, tank): &(String, String)| {
             let found = reasons(column("time")?, column(name)?);
@@ -48,7 +46,6 @@ impl Limits {
     }
 }
 
-/// Returns the reasons with their shares of the time and their first times, s, the longest first.
 fn reasons(time: &[f64], numbers: &[f64]) -> Vec<(LimitedBy, f64, f64)> {
     let end = time.len();
     let span = match (time.first(), time.last()) {

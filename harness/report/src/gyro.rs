@@ -8,7 +8,6 @@ use maud::html;
 use crate::page::{document, render_chart, table};
 use crate::svg::{Axis, Chart, Series, Style};
 
-/// Draws the Allan deviations over the averaging time, as an SVG file.
 pub fn allan_deviations(gyro: &Characteristics) -> String {
     let curve = |of: &dyn Fn(&Point) -> f64| -> Vec<(f64, f64)> {
         gyro.points.iter().map(|point| (point.tau, of(point).sqrt())).collect()
@@ -62,7 +61,6 @@ pub fn page(rows: &[(String, String)], found: &Rest) -> String {
     document("Gyro at rest", &body)
 }
 
-/// Draws the charts of a recording at rest, each with its file name.
 pub fn rest_charts(rest: &Rest) -> [(&'static str, Chart); 6] {
     let chart = |title: &str, x: Axis, y: Axis, series: Vec<Series>, legend: bool| Chart {
         title: title.into(),

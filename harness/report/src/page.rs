@@ -2,7 +2,6 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use crate::svg::{Axis, Chart, Series, Style};
 
-/// Style sheet of the page.
 const STYLE: &str = "
 :root{color-scheme:light dark;--ink:#1c1c1e;--paper:#fff;--soft:#6b6b70;--rule:#d8d8dc;--a:#0b62c4;--b:#c2410c;--c:#15803d;--d:#7e22ce;--warn:#fde8d7}
 @media(prefers-color-scheme:dark){:root{--ink:#e8e8ea;--paper:#16171a;--soft:#a0a0a8;--rule:#3a3b40;--a:#6cb1ff;--b:#ff9a5c;--c:#5fd38d;--d:#c79bff;--warn:#4a2a12}}
@@ -22,7 +21,6 @@ details{margin:.6rem 0}summary{cursor:pointer}
 /// Names of colours for [`series`], for curves of the same kind.
 pub const COLORS: [&str; 5] = ["a", "b", "c", "d", "soft"];
 
-/// Returns an HTML page. The title is also its first heading.
 pub fn document(title: &str, body: &Markup) -> String {
     let page = html! {
         (DOCTYPE)
@@ -48,7 +46,6 @@ pub fn render_chart(chart: &Chart) -> Markup {
     html! { div class="scroll" { (PreEscaped(chart.svg())) } }
 }
 
-/// Renders a table that scrolls if it is wider than the page.
 pub fn table<'a>(
     head: impl IntoIterator<Item = &'a str>,
     rows: impl IntoIterator<Item = Vec<String>>,
@@ -63,7 +60,6 @@ pub fn table<'a>(
     }
 }
 
-/// Creates a chart as wide as the page; `logarithmic` is for the y axis.
 pub fn axis_chart(title: &str, x: &str, y: &str, series: Vec<Series>, logarithmic: bool) -> Chart {
     let points = || series.iter().flat_map(|s| &s.points);
     Chart {

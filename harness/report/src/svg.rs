@@ -8,13 +8,9 @@ use maud::{Markup, html};
 #[derive(Clone, Debug)]
 pub struct Axis {
     pub label: String,
-    /// Value at the left or lower end.
     pub from: f64,
-    /// Value at the right or upper end.
     pub to: f64,
-    /// True for a logarithmic axis.
     pub logarithmic: bool,
-    /// Values that are labelled.
     pub ticks: Vec<f64>,
 }
 
@@ -49,12 +45,10 @@ impl Axis {
         Axis { label: label.into(), from, to, logarithmic: true, ticks }
     }
 
-    /// Creates a logarithmic axis from end to end with the given ticks.
     pub fn logarithmic(label: &str, (from, to): (f64, f64), ticks: &[f64]) -> Self {
         Axis { label: label.into(), from, to, logarithmic: true, ticks: ticks.to_vec() }
     }
 
-    /// Returns the position of a value along the axis, 0 to 1.
     fn place(&self, value: f64) -> f64 {
         if self.logarithmic {
             (value / self.from).ln() / (self.to / self.from).ln()
@@ -72,7 +66,6 @@ fn range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
     if low > high { (0.0, 1.0) } else { (low, high) }
 }
 
-/// Rounds up to 1, 2 or 5 times a power of ten.
 fn round_step(step: f64) -> f64 {
     let power = 10f64.powf(step.max(1e-300).log10().floor());
     [1.0, 2.0, 5.0, 10.0]
@@ -91,14 +84,13 @@ pub enum Style {
     Cloud,
 }
 
-/// A curve of a chart.
+/// A curve of a chart. Points that are NaN or infinite are left out; the title is shown when the pointer
+/// rests on the curve.
 #[derive(Clone, Debug)]
 pub struct Series {
-    /// Points; those that are NaN or infinite are left out.
     pub points: Vec<(f64, f64)>,
     pub color: String,
     pub style: Style,
-    /// Shown when the pointer rests on the curve.
     pub title: String,
 }
 
@@ -106,17 +98,13 @@ pub struct Series {
 pub struct Chart {
     /// Title, which is also the text for screen readers.
     pub title: String,
-    /// Width and height, px.
     pub size: (f64, f64),
     pub x: Axis,
     pub y: Axis,
-    /// Curves; later ones are drawn on top.
     pub series: Vec<Series>,
-    /// True to show the titles of the curves in the upper right corner.
     pub legend: bool,
 }
 
-/// Style of a stand-alone file, with a white background.
 const STYLE: &str = "svg { background: #ffffff; font: 11px system-ui, sans-serif }\
     text { fill: #1d2733 } .title { font-size: 12.5px; font-weight: 600 }\
     .grid { stroke: #dde3ea; stroke-width: .7; fill: none }\
@@ -131,7 +119,6 @@ impl Chart {
         self.drawing(None)
     }
 
-    /// Returns the chart as an SVG file with a style of its own.
     pub fn file(&self) -> String {
         self.drawing(Some(STYLE))
     }
@@ -244,7 +231,6 @@ pub(crate) fn simplified(points: &[(f64, f64)], tolerance: f64) -> Vec<(f64, f64
     points.iter().zip(kept).filter(|(_, kept)| *kept).map(|(point, _)| *point).collect()
 }
 
-/// Formats the number of a tick with as many digits as its axis needs.
 fn number(value: f64, axis: &Axis) -> Markup {
     let written = if axis.logarithmic && !(1e-3..1e4).contains(&value.abs()) {
         let exponent = value.log10().round() as i32;

@@ -22,11 +22,9 @@ impl fmt::Display for Foreign {
 
 impl std::error::Error for Foreign {}
 
-/// Advice for users without the Python package.
 const ADVICE: &str = "the Python package reads .mat (5 and 7.3), HDF5, TDMS, MDF4, .xlsx and every type of Parquet: \
     pip install 'hubslosh[recordings]', then python3 -m hubslosh.recordings FILE FILE.csv writes text that is read here";
 
-/// Kind of a file, detected from its first bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     Text,
@@ -35,9 +33,7 @@ pub enum Kind {
 
 /// Detects the kind of a file from its first bytes.
 ///
-/// # Errors
-///
-/// [`Foreign`] if it is neither text nor Parquet.
+/// # Errors [`Foreign`] if it is neither text nor Parquet.
 pub fn kind(path: &Path) -> Result<Kind> {
     const PACKED: [(&[u8], &str); 3] = [
         (b"\x1f\x8b", "it is compressed with gzip: unpack it first (gunzip)"),
@@ -65,10 +61,8 @@ pub fn kind(path: &Path) -> Result<Kind> {
 /// Converts a file to text in columns with the Python package. The folder of the text is deleted when the
 /// returned value is dropped.
 ///
-/// # Errors
-///
-/// If no Python with the package is found, or the package cannot read the file; `why` is the reason that the
-/// file was not read here.
+/// # Errors If no Python with the package is found, or the package cannot read the file; `why` is the reason
+/// that the file was not read here.
 pub fn converted(path: &Path, why: &anyhow::Error) -> Result<(Folder, PathBuf)> {
     let folder = Folder::new()?;
     let out = folder.path().join("recording.csv");

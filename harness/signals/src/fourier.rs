@@ -10,27 +10,23 @@ use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 
 pub use realfft::num_complex::Complex64;
 
-/// Returns the planner, which keeps what was prepared for each length: preparing a transform takes longer
-/// than computing one.
+/// Returns the planner, which keeps its preparations for each length, because preparing a transform takes
+/// longer than computing it.
 fn planner() -> MutexGuard<'static, RealFftPlanner<f64>> {
     static PLANNER: LazyLock<Mutex<RealFftPlanner<f64>>> = LazyLock::new(Default::default);
     PLANNER.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Transform of a signal to its spectrum.
 pub struct Forward(Arc<dyn RealToComplex<f64>>);
 
 impl Forward {
-    /// Prepares the transform for signals of `length` samples.
     pub fn new(length: usize) -> Self {
         Forward(planner().plan_fft_forward(length))
     }
 
     /// Returns the spectrum of a signal, N/2 + 1 lines.
     ///
-    /// # Panics
-    ///
-    /// If the signal has another length than the transform.
+    /// # Panics If the signal has another length than the transform.
     pub fn transform(&self, mut signal: Vec<f64>) -> Vec<Complex64> {
         let mut spectrum = self.0.make_output_vec();
         self.0.process(&mut signal, &mut spectrum).expect("a signal of the transform's length");
@@ -42,7 +38,6 @@ impl Forward {
 pub struct Inverse(Arc<dyn ComplexToReal<f64>>);
 
 impl Inverse {
-    /// Prepares the transform for signals of `length` samples.
     pub fn new(length: usize) -> Self {
         Inverse(planner().plan_fft_inverse(length))
     }
@@ -50,9 +45,7 @@ impl Inverse {
     /// Returns N times the signal of a spectrum of N/2 + 1 lines. Imaginary parts of line 0 and, if N is
     /// even, of the last line are ignored, because a real signal has none.
     ///
-    /// # Panics
-    ///
-    /// If the spectrum has another length.
+    /// # Panics If the spectrum has another length.
     pub fn transform(&self, mut spectrum: Vec<Complex64>) -> Vec<f64> {
         let last = spectrum.len() - 1;
         spectrum[0].im = 0.0;

@@ -20,20 +20,17 @@ use files::{budget, input};
 
 use crate::parquet_file;
 
-/// Named columns of equal length.
+/// Named columns of equal length; `gaps` are the names of the columns in which NaN marks missing values.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Table {
     names: Vec<String>,
     columns: Vec<Vec<f64>>,
-    /// Names of the columns in which NaN marks missing values.
     gaps: BTreeSet<String>,
 }
 
 /// Returns true for the name of a Parquet file, false for a CSV file.
 ///
-/// # Errors
-///
-/// If the name has another ending.
+/// # Errors If the name has another ending.
 fn is_parquet(path: &Path) -> Result<bool> {
     match path.extension().and_then(|e| e.to_str()).map(str::to_lowercase).as_deref() {
         Some("csv") => Ok(false),
@@ -44,9 +41,7 @@ fn is_parquet(path: &Path) -> Result<bool> {
 
 /// Checks that a table can be written to `path`.
 ///
-/// # Errors
-///
-/// If its name ends neither in .csv nor in .parquet.
+/// # Errors If its name ends neither in .csv nor in .parquet.
 pub fn check_ending(path: &Path) -> Result<()> {
     is_parquet(path).map(drop)
 }
@@ -54,9 +49,7 @@ pub fn check_ending(path: &Path) -> Result<()> {
 impl Table {
     /// Makes a table from columns with their names.
     ///
-    /// # Panics
-    ///
-    /// If the columns are not equally long, or names and columns differ in number.
+    /// # Panics If the columns are not equally long, or names and columns differ in number.
     pub fn new(names: Vec<String>, columns: Vec<Vec<f64>>) -> Self {
         assert_eq!(names.len(), columns.len());
         assert!(columns.windows(2).all(|pair| pair[0].len() == pair[1].len()));
@@ -65,9 +58,7 @@ impl Table {
 
     /// Adds a column in which NaN marks missing values; the file then has an empty field or a null there.
     ///
-    /// # Panics
-    ///
-    /// If it has another number of rows than the table.
+    /// # Panics If it has another number of rows than the table.
     pub fn with_gaps(mut self, name: &str, column: Vec<f64>) -> Table {
         assert_eq!(column.len(), self.rows());
         self.names.push(name.into());
@@ -88,7 +79,6 @@ impl Table {
         &self.columns
     }
 
-    /// Returns the values of the column `name`; `None` if there is none.
     pub fn column(&self, name: &str) -> Option<&[f64]> {
         let index = self.names.iter().position(|n| n == name)?;
         Some(&self.columns[index])
@@ -96,9 +86,7 @@ impl Table {
 
     /// Returns a table with only the columns `names`, in this order.
     ///
-    /// # Panics
-    ///
-    /// If a column is not there.
+    /// # Panics If a column does not exist.
     pub fn select(&self, names: &[&str]) -> Table {
         let column = |name: &&str| self.column(name).expect("a column of this table").to_vec();
         Table {
@@ -110,9 +98,8 @@ impl Table {
 
     /// Reads the columns `wanted` from a file, which may have others.
     ///
-    /// # Errors
-    ///
-    /// If the file cannot be read, a column is missing or there twice, or a value is not a finite number.
+    /// # Errors If the file cannot be read, a column is missing or exists twice, or a value is not a finite
+    /// number.
     pub fn read(path: &Path, wanted: &[&str]) -> Result<Table> {
         let name = path.display();
         let read = if is_parquet(path)? { read_parquet } else { read_csv };
@@ -123,9 +110,7 @@ impl Table {
 
     /// Checks that all values are finite, except missing ones in columns with gaps.
     ///
-    /// # Errors
-    ///
-    /// Names the first value that is not.
+    /// # Errors Names the first value that is not.
     pub fn all_finite(&self) -> Result<()> {
         for (column, values) in self.names.iter().zip(&self.columns) {
             let gaps = self.gaps.contains(column);
@@ -151,9 +136,7 @@ impl Table {
     /// Writes the table to a CSV or Parquet file, replacing the file as a whole. `metadata` are a Parquet
     /// file's key-value pairs; a CSV file has none.
     ///
-    /// # Errors
-    ///
-    /// If a value is neither finite nor missing, or the file cannot be written.
+    /// # Errors If a value is neither finite nor missing, or the file cannot be written.
     pub fn write(&self, path: &Path, metadata: &BTreeMap<String, String>) -> Result<()> {
         let is_parquet = is_parquet(path)?;
         atomically(path, |file| match is_parquet {
@@ -164,9 +147,7 @@ impl Table {
 
     /// Writes the table as CSV.
     ///
-    /// # Errors
-    ///
-    /// If a value is neither finite nor missing, or the file cannot be written.
+    /// # Errors If a value is neither finite nor missing, or the file cannot be written.
     pub fn write_csv(&self, file: impl Write) -> Result<()> {
         self.check()?;
         let mut out = BufWriter::new(file);
@@ -238,15 +219,13 @@ impl Table {
 
 /// Returns the key-value metadata of a Parquet file.
 ///
-/// # Errors
-///
-/// If the file is not complete.
+/// # Errors If the file is not complete.
 pub fn metadata(path: &Path) -> Result<BTreeMap<String, String>> {
     parquet_file::metadata(path).with_context(|| format!("{} cannot be used", path.display()))
 }
 
-/// Returns true if HubSlosh wrote a table in Parquet. The file names our library, which importers in other languages do
-/// not use.
+/// Returns true if HubSlosh wrote a table in Parquet. The file names our library, which importers in other
+/// languages do not use.
 pub fn is_ours(path: &Path) -> bool {
     let writer = parquet_file::writer(path).ok().flatten();
     writer.is_none_or(|writer| writer.starts_with("parquet-rs"))
@@ -254,9 +233,7 @@ pub fn is_ours(path: &Path) -> bool {
 
 /// Lists the names of the columns of a file.
 ///
-/// # Errors
-///
-/// If the file cannot be read or has no header.
+/// # Errors If the file cannot be read or has no header.
 pub fn names(path: &Path) -> Result<Vec<String>> {
     let names = match is_parquet(path)? {
         true => parquet_file::names(path),
@@ -276,9 +253,7 @@ fn header(path: &Path) -> Result<(csv::Reader<File>, Vec<String>)> {
 
 /// Finds the position of each wanted column.
 ///
-/// # Errors
-///
-/// Lists the columns that are missing, and those that are there twice.
+/// # Errors Lists the columns that are missing, and those that exist twice.
 fn positions(there: &[String], wanted: &[&str]) -> Result<Vec<usize>> {
     let count = |name: &&&str| there.iter().filter(|other| other.trim() == **name).count();
     let listed = |of: fn(usize) -> bool| {

@@ -10,9 +10,10 @@ pub static THREE_LICENSE: &str = include_str!("../three/LICENSE");
 /// The global `HubSloshScene`: bench or spacecraft with liquid (`scene/README.md`); needs [`THREE`].
 pub static SCENE: &str = include_str!("../scene/scene.js");
 
-/// Escapes JSON so that it can stand in a script element of any page or in a script: no text in it ends the element
-/// (`</script`), keeps the end from being seen (`<!--<script`: HTML, 13.2.5.20), becomes an entity, or ends a line of
-/// JavaScript. JSON has these characters in strings alone, so its value stays the same.
+/// Escapes JSON so that it can stand in a script element of any page or in a script: no text in it ends the
+/// element (`</script`), prevents the end from being seen (`<!--<script`: HTML, 13.2.5.20), becomes an
+/// entity, or ends a line of JavaScript. JSON has these characters only in strings, so its value stays the
+/// same.
 pub fn json_in_script(json: &str) -> String {
     let mut text = String::with_capacity(json.len());
     for c in json.chars() {
@@ -52,7 +53,8 @@ mod tests {
         );
     }
 
-    /// esbuild takes what `used.js` names and nothing else: a name that is missing there fails in the browser.
+    /// esbuild includes only the names in `used.js`, so that a name that is missing there fails in the
+    /// browser.
     #[test]
     fn the_bundle_has_every_name_that_the_scene_uses() {
         let exported = include_str!("../three/used.js");

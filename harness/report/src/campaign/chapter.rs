@@ -8,23 +8,19 @@ use crate::svg::{Chart, Style};
 #[derive(Clone, Debug, Default)]
 pub struct Chapter {
     pub title: String,
-    /// Paragraphs before the figures.
     pub text: Vec<String>,
-    /// Rows of a table, the first of which is the heading; empty for no table.
     pub table: Vec<Vec<String>>,
     pub illustrations: Vec<Illustration>,
 }
 
-/// A figure of a chapter.
+/// A figure of a chapter: the chart, whose colours are replaced by those of the page, a caption that states
+/// what the figure shows, and the numbers of the figures in Rubaga's thesis that show the same for its bench.
+/// `equal` is true if both axes have the same scale.
 #[derive(Clone, Debug)]
 pub struct Illustration {
-    /// The chart. Its colours are replaced by those of the page.
     pub chart: Chart,
-    /// Caption: the statement that the figure makes.
     pub caption: String,
-    /// Numbers of the figures in Rubaga's thesis that show the same for its bench.
     pub thesis: &'static str,
-    /// True if both axes have the same scale.
     pub equal: bool,
 }
 

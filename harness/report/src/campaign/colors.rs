@@ -15,17 +15,14 @@ const VIRIDIS: [[f64; 3]; 8] = [
     [170.0, 205.0, 40.0],
 ];
 
-/// Returns the colour of item `i` of an unordered set; the colours repeat after eight items.
 pub(super) fn category(i: usize) -> &'static str {
     CATEGORIES[i % CATEGORIES.len()]
 }
 
-/// Returns the marker of item `i`, which changes each time the colours repeat.
 pub(super) fn symbol(i: usize) -> &'static str {
     ["circle", "square", "diamond", "cross"][i / CATEGORIES.len() % 4]
 }
 
-/// Returns the line style of item `i`: its name in plotly and in words.
 pub(super) fn line(i: usize) -> (&'static str, &'static str) {
     const LINES: [(&str, &str); 5] = [
         ("solid", "solid"),
@@ -37,7 +34,6 @@ pub(super) fn line(i: usize) -> (&'static str, &'static str) {
     LINES[i % LINES.len()]
 }
 
-/// Returns the line style of item `i`, which changes each time the colours repeat.
 pub(super) fn dash(i: usize) -> &'static str {
     ["solid", "dash", "dot", "dashdot", "longdash", "longdashdot"][i / CATEGORIES.len() % 6]
 }

@@ -9,7 +9,7 @@ use super::colors;
 use super::figure::{Figure, Panel, numbers};
 use super::page::{Group, Page, best};
 
-/// Name and unit of a result, and how it is read from a run.
+/// Name and unit of a result, and the function that reads it from a run.
 type Quantity = (&'static str, &'static str, fn(&Outcome) -> Option<f64>);
 
 pub(super) const QUANTITIES: [Quantity; 4] = [
@@ -49,7 +49,6 @@ pub(super) fn ranked<'a>(page: &Page<'a>, group: &Group) -> Vec<(&'a str, [f64; 
     ranked
 }
 
-/// Plots the ranked sensitivities and the histograms of a group.
 pub(super) fn draws(page: &Page, group: &Group) -> Vec<Figure> {
     let (drawn, ranked) = (random_parameters(page), ranked(page, group));
     let names: Vec<&str> = ranked.iter().map(|row| row.0).collect();
@@ -122,7 +121,6 @@ pub(super) fn draws(page: &Page, group: &Group) -> Vec<Figure> {
     vec![first, second, third]
 }
 
-/// Returns the centres of the bins and the number of values in each.
 fn histogram(values: &[f64]) -> (Vec<f64>, Vec<usize>) {
     const BINS: usize = 24;
     let (low, high) = values.iter().fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(*v), h.max(*v)));
@@ -134,7 +132,6 @@ fn histogram(values: &[f64]) -> (Vec<f64>, Vec<usize>) {
     ((0..BINS).map(|i| low + (i as f64 + 0.5) * width).collect(), counts)
 }
 
-/// Returns mean and standard deviation; both are 0 without values.
 pub(super) fn moments(values: &[f64]) -> (f64, f64) {
     match values {
         [] => (0.0, 0.0),

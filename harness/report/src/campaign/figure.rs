@@ -6,23 +6,21 @@ use serde_json::{Value, json};
 use crate::svg::simplified;
 use experiments::rounding::significant;
 
-/// A figure of one or more panels with a common legend.
+/// A figure of one or more panels with a common legend, `columns` of them in a row on a wide screen. The
+/// caption states what the figure shows; `thesis` holds the numbers of the figures in Rubaga's thesis that
+/// show the same for its bench, for example `7.1 and 7.2`. `half` figures take half of the page's width on a
+/// wide screen; the panels of `shared` figures zoom together along x. `labels` at the right ends of the lines
+/// in the first panel replace a legend.
 pub(super) struct Figure {
     pub title: String,
-    /// Caption: the statement that the figure makes.
     pub caption: Markup,
-    /// Numbers of the figures in Rubaga's thesis that show the same for its bench, for example `7.1 and 7.2`.
     pub thesis: &'static str,
-    /// Number of panels in a row on a wide screen.
     pub columns: usize,
     pub height: usize,
-    /// True if the figure takes half of the page's width on a wide screen.
     pub half: bool,
-    /// True if the panels zoom together along x.
     pub shared: bool,
     pub panels: Vec<Panel>,
     pub traces: Vec<Value>,
-    /// Labels at the right ends of the lines in the first panel, which replace a legend.
     pub labels: Vec<Label>,
 }
 
@@ -32,7 +30,8 @@ pub(super) struct Label {
     pub color: String,
 }
 
-/// Axes of a panel; `equal` gives both the same scale.
+/// Axes of a panel; `equal` gives both the same scale, and `range` is the initial range of x (`None` shows
+/// all data).
 #[derive(Clone, Default)]
 pub(super) struct Panel {
     pub x: String,
@@ -40,7 +39,6 @@ pub(super) struct Panel {
     pub log_x: bool,
     pub log_y: bool,
     pub equal: bool,
-    /// Initial range of x; `None` shows all data.
     pub range: Option<(f64, f64)>,
 }
 
@@ -202,7 +200,7 @@ pub(super) fn dots(
     trace
 }
 
-/// Selects the points of a curve that are needed to draw it at the usual size. `log` says that the x axis is
+/// Selects the points of a curve that are needed to draw it at the usual size. `log` is true if the x axis is
 /// logarithmic.
 pub(super) fn thinned(points: &[(f64, f64)], log: bool) -> Vec<(f64, f64)> {
     let finite = |p: &&(f64, f64)| p.0.is_finite() && p.1.is_finite();

@@ -18,7 +18,6 @@ fn plotted_runs<'a>(runs: &[&'a Outcome]) -> Vec<&'a Outcome> {
     }
 }
 
-/// Plots torque, rate, slosh angles and rate residual of some runs of a group.
 pub(super) fn history(page: &Page, group: &Group) -> Figure {
     let runs = plotted_runs(&group.drawn);
     let mut traces = Vec::new();
@@ -97,7 +96,6 @@ pub(super) fn motion_after_manoeuvre(page: &Page) -> Figure {
     }
 }
 
-/// Plots all runs of a plan that has no axis in the same panels.
 pub(super) fn compared(page: &Page) -> Figure {
     let runs =
         || page.groups.iter().flat_map(|group| group.drawn.iter().map(move |run| (group, run)));
@@ -145,7 +143,6 @@ pub(super) fn compared(page: &Page) -> Figure {
     }
 }
 
-/// Plots the path of the wave's crest seen from above and over time, if the slosh leaves its plane.
 pub(super) fn paths(page: &Page, group: &Group) -> Vec<Figure> {
     let radial = |run: &Outcome| run.totals.peak_radial_angle;
     let Some(last) = group.drawn.iter().copied().max_by(|a, b| radial(a).total_cmp(&radial(b)))

@@ -27,7 +27,6 @@ use self::figure::{Figure, Figures};
 pub(crate) use self::page::printed;
 use self::page::{Group, Page, Varied, axis, best, groups, manoeuvre, runs};
 
-/// plotly.js, as the global `Plotly`.
 pub(crate) static PLOTLY: &str = include_str!("plotly/plotly-cartesian.min.js");
 
 pub(crate) static PLOTLY_LICENSE: &str = include_str!("plotly/LICENSE");
@@ -36,7 +35,6 @@ pub(crate) static PLOTLY_LICENSE: &str = include_str!("plotly/LICENSE");
 /// missing.
 const MOST_GROUPS: usize = 24;
 
-/// Largest number of runs of other FMUs that get figures.
 const MOST_RUNS: usize = 6;
 
 /// Returns the run that is shown in 3-D: the one with the largest radial slosh angle, which has rotary slosh,
@@ -130,13 +128,11 @@ fn data<'a>(campaign: &'a Campaign, fmu: &Fmu, results: &'a Results) -> Page<'a>
     }
 }
 
-/// Returns true if the runs are sweeps over the thesis's frequency band with several torques.
 fn repeats_the_thesis(page: &Page) -> bool {
     let band = !page.groups.is_empty() && page.groups.iter().all(|g| g.band() == Some(BAND));
     band && page.axis.as_ref().is_some_and(|axis| axis.name == "torque amplitude")
 }
 
-/// Converts a title to an anchor for links.
 fn anchor(title: &str) -> String {
     title.to_lowercase().replace(|c: char| !c.is_ascii_alphanumeric(), "-")
 }
@@ -230,7 +226,6 @@ fn bench_sections<'a>(
     sections
 }
 
-/// Returns the sections about runs of an FMU other than the bench.
 fn general_sections<'a>(
     fmu: &Fmu,
     results: &Results,
@@ -316,7 +311,6 @@ fn introduction(page: &Page, fmu: &Fmu, results: &Results) -> Markup {
     }
 }
 
-/// Returns the link to the page that shows one run.
 fn link(file: &str, run: &Outcome) -> Markup {
     let radial = run.totals.peak_radial_angle;
     let degrees = |angle: f64| format!("{:.1}°", angle.to_degrees());
@@ -334,7 +328,6 @@ fn link(file: &str, run: &Outcome) -> Markup {
     }
 }
 
-/// Returns the summary of a group: ranges of the antiresonance and the resonance of its runs.
 fn card(page: &Page, group: &Group) -> Markup {
     let over = |get: &dyn Fn(&Features) -> Option<f64>| {
         let found = group.runs.iter().filter_map(|run| get(&best(run)?.0.features));
@@ -377,7 +370,6 @@ fn format_distinct(value: f64, other: f64) -> String {
     format!("{value:.places$}")
 }
 
-/// Describes the torque profiles of the runs, without the parameters that are varied.
 fn torques(results: &Results) -> String {
     let analysed = results.outcomes.iter().map(|run| &run.case);
     let cases = analysed.chain(results.unanalysed.iter().map(|run| &run.case));

@@ -104,7 +104,8 @@ fn swept_row(group: &Group) -> Option<Markup> {
     })
 }
 
-/// Largest number of rows in the table of results; a browser would need seconds to lay out a longer table.
+/// Largest number of rows in the table of results, because a browser would need seconds to lay out a longer
+/// table.
 const MOST_ROWS: usize = 2000;
 
 pub(super) fn table(page: &Page, results: &Results) -> Markup {
@@ -188,7 +189,6 @@ pub(super) fn table(page: &Page, results: &Results) -> Markup {
     }
 }
 
-/// Returns the table cells for one estimate of a run's features.
 fn cells(estimate: Option<&Estimate>) -> Markup {
     let features = estimate.map_or(Features::default(), |estimate| estimate.features);
     let columns = [

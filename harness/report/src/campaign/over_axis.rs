@@ -9,8 +9,8 @@ use super::colors;
 use super::figure::{Figure, Label, Panel, dots, line};
 use super::page::{Axis, Group, Page, best, distinct, exact_features, sentence_with_names};
 
-/// A quantity of a run that is plotted: label, how it is read from the run, whether its axis is logarithmic,
-/// and a level that is drawn for comparison.
+/// A quantity of a run that is plotted: label, the function that reads it from a run, whether its axis is
+/// logarithmic, and a level that is drawn for comparison.
 struct Quantity<'a> {
     label: &'a str,
     of: &'a dyn Fn(&Outcome) -> Option<f64>,
@@ -114,7 +114,6 @@ pub(super) fn extrema(page: &Page, axis: &Axis) -> Figure {
 /// they are too many to be read.
 fn labels(mut ends: Vec<(f64, String, &str, &str)>) -> Vec<Label> {
     const MOST: usize = 12;
-    /// Labels closer than this fraction of the axis are merged.
     const TOGETHER: f64 = 0.03;
     ends.sort_by(|a, b| a.1.cmp(&b.1).then(a.0.total_cmp(&b.0)));
     let span = ends.iter().map(|end| end.0).fold(f64::MIN, f64::max)
@@ -137,7 +136,6 @@ fn labels(mut ends: Vec<(f64, String, &str, &str)>) -> Vec<Label> {
     labels.into_iter().map(label).collect()
 }
 
-/// Plots the residual rate and slosh angle after the end of a manoeuvre's torque.
 pub(super) fn residual_motion(page: &Page, axis: &Axis) -> Figure {
     let rate = |run: &Outcome| Some(1e3 * run.ending.rate?);
     let angle = |run: &Outcome| Some(run.ending.slosh_angle?.to_degrees());
@@ -274,7 +272,6 @@ pub(super) fn out_of_the_plane(page: &Page, axis: &Axis) -> Figure {
     )
 }
 
-/// Plots each quantity in a panel of its own, with one series for each group.
 fn small<'a>(
     page: &Page,
     axis: &Axis,

@@ -7,19 +7,17 @@ use experiments::profile::Torque;
 use host::fmu::Fmu;
 use names::hubslosh::{slosh, tank};
 
-/// Runs that differ only in the parameter along the axis, and in parameters drawn at random.
+/// Runs that differ only in the parameter along the axis, and in parameters drawn at random. `fill` is in m,
+/// `None` if it is drawn at random or is the axis; `others` are further differences from the other groups,
+/// for example `tank.d 111 mm`. `drawn` are the runs whose time histories are stored, and `exact` are the
+/// features of each run's exact linear response, evaluated on a grid over its band.
 pub(super) struct Group<'a> {
     pub model: &'a str,
-    /// Fill height, m; `None` if it is drawn at random or is the axis.
     pub fill: Option<f64>,
-    /// Further differences from the other groups, for example `tank.d 111 mm`.
     pub others: Vec<String>,
     pub runs: Vec<&'a Outcome>,
-    /// Runs whose time histories are stored.
     pub drawn: Vec<&'a Outcome>,
-    /// The sweep of the first run, if it is one.
     pub sweep: Option<&'a Sweep>,
-    /// Features of each run's exact linear response, evaluated on a grid over its band.
     pub exact: Vec<Features>,
 }
 
@@ -41,7 +39,6 @@ impl Group<'_> {
         band(self.runs[0])
     }
 
-    /// Computes the exact linear response of the first run on a grid over its band.
     pub fn exact_response(&self) -> FrequencyResponse {
         exact_response(self.runs[0])
     }
@@ -60,18 +57,15 @@ impl Axis {
         Some((value * self.scale * 1e9).round() / 1e9)
     }
 
-    /// Returns the suffix of a value on this axis: a space and the unit, or nothing.
     pub fn unit(&self) -> &str {
         self.label.find(" / ").map_or("", |at| &self.label[at + 2..])
     }
 }
 
-/// Campaign, groups and axis, which all figures use.
 pub(super) struct Page<'a> {
     pub plan: &'a Plan,
     pub groups: Vec<Group<'a>>,
     pub axis: Option<Axis>,
-    /// All varied parameters in the order of the plan; `None` for one that cannot be displayed.
     pub varied: Vec<Option<Varied>>,
 }
 
@@ -86,7 +80,6 @@ impl Page<'_> {
     }
 }
 
-/// Largest number of curves in one figure of frequency responses.
 pub(super) const MOST_CURVES: usize = 24;
 
 /// Returns the estimate from which the run's headline values are taken, and its name: for a sweep the one in
@@ -95,13 +88,11 @@ pub(super) fn best(run: &Outcome) -> Option<(&Estimate, &'static str)> {
     run.estimate().or_else(|| Some((&run.record.as_ref()?.spa, "spa")))
 }
 
-/// Returns the level in dB over the frequency, estimated while the sweep passes.
 pub(super) fn passing(run: &Outcome) -> Curve {
     let response = run.passing.as_ref().map(|passing| &passing.rate.response);
     response.map_or(Curve::new(), |r| zip(&r.frequency, &r.decibels()))
 }
 
-/// Returns the sweep that drives a run, or `None` for other torques.
 pub(super) fn sweep(run: &Outcome) -> Option<&Sweep> {
     match &*run.case.torque {
         Torque::Profile(profile) => profile.sweep(),
@@ -109,7 +100,6 @@ pub(super) fn sweep(run: &Outcome) -> Option<&Sweep> {
     }
 }
 
-/// Returns the band in which a run has a frequency response, Hz.
 pub(super) fn band(run: &Outcome) -> Option<(f64, f64)> {
     match &*run.case.torque {
         Torque::Profile(profile) => profile.band(),
@@ -126,7 +116,6 @@ pub(super) fn exact_features(run: &Outcome) -> Features {
     Features::find(&exact_response(run))
 }
 
-/// Returns the unit of a variable in typographic form.
 pub(super) fn unit(fmu: &Fmu, name: &str) -> Option<String> {
     let unit = fmu.description().variable(name).ok()?.attributes().unit.clone()?;
     Some(printed(&unit))
@@ -138,10 +127,10 @@ pub(crate) fn printed(unit: &str) -> String {
 }
 
 /// A varied quantity as readers see it: a parameter of the torque profile has a label, a variable its name.
+/// `scale` is the factor from SI to the displayed unit.
 pub(super) struct Varied {
     pub name: String,
     pub unit: String,
-    /// Factor from SI to the displayed unit.
     pub scale: f64,
 }
 
@@ -246,7 +235,6 @@ pub(super) fn groups<'a>(plan: &Plan, fmu: &Fmu, results: &'a Results) -> Vec<Gr
     groups
 }
 
-/// Returns "1 run", "2 runs" and so on.
 pub(super) fn runs(count: usize) -> String {
     format!("{count} run{}", if count == 1 { "" } else { "s" })
 }
@@ -264,7 +252,6 @@ pub(super) fn sentence_with_names(what: &str, things: &[String]) -> String {
     }
 }
 
-/// Returns each value once, in the order of its first occurrence.
 pub(super) fn distinct<T: PartialEq>(values: impl Iterator<Item = T>) -> Vec<T> {
     let mut found = Vec::new();
     for value in values {
@@ -283,7 +270,6 @@ pub(super) fn zip(x: &[f64], y: &[f64]) -> Vec<(f64, f64)> {
     x.iter().copied().zip(y.iter().copied()).collect()
 }
 
-/// Converts a length in m to cm, rounded to a micrometre.
 pub(super) fn cm(length: f64) -> f64 {
     (length * 1e6).round() / 1e4
 }

@@ -6,13 +6,12 @@ use experiments::rounding::thousandths;
 
 type Value = (f64, Option<f64>);
 
-/// A feature that is compared: heading, how it is read from a run with its standard deviation, and number of
-/// digits.
+/// A feature that is compared: heading, the function that reads it from a run with its standard deviation,
+/// its number of digits, and factor, digits and unit of a difference.
 struct Feature {
     heading: [&'static str; 2],
     of: fn(&Outcome) -> Option<Value>,
     digits: usize,
-    /// Factor, digits and unit of a difference.
     difference: (f64, usize, &'static str),
 }
 
@@ -79,7 +78,6 @@ const FEATURES: [Feature; 9] = [
     },
 ];
 
-/// Returns true if two runs differ at most in the slosh model.
 fn same_run(a: &Outcome, b: &Outcome) -> bool {
     let close = |a: Option<f64>, b: Option<f64>| match (a, b) {
         (Some(a), Some(b)) => (a - b).abs() < 1e-9,

@@ -6,7 +6,6 @@ use super::colors;
 use super::figure::{Figure, Panel, line, number, numbers, thinned};
 use super::page::{Axis, Group, MOST_CURVES, Page, best, cm, distinct, passing, zip};
 
-/// Plots magnitude and phase of the runs of a group.
 pub(super) fn responses(page: &Page, group: &Group) -> Figure {
     let mut traces = Vec::new();
     let runs = group.drawn.iter().filter_map(|run| Some((run, best(run)?)));
@@ -188,15 +187,14 @@ pub(super) fn models(page: &Page) -> Vec<Figure> {
         .collect()
 }
 
-/// A quantity of a heat map: name, how it is read from a run, and the ends of the colour scale if they are
-/// fixed.
+/// A quantity of a heat map: name, the function that reads it from a run, and the ends of the colour scale if
+/// they are fixed.
 struct Quantity {
     label: &'static str,
     of: fn(&Outcome) -> Curve,
     ends: Option<(f64, f64)>,
 }
 
-/// Number of cells of a heat map along the frequency.
 const CELLS: usize = 120;
 
 /// Plots heat maps over frequency and the parameter that the plan varies (thesis figures 7.11 to 7.16).

@@ -8,16 +8,15 @@ use super::draws::moments;
 use super::page::{Axis, Group, Page, best, distinct, exact_features, manoeuvre, torque_amplitude};
 use super::recordings;
 
-/// Features of one run's frequency response.
+/// Features of one run's frequency response: the position of the run on the axis, in the unit of the axis,
+/// and antiresonance and resonance, also those of the exact linear plant, Hz. `swirls` is true if the slosh
+/// was rotary for some time.
 #[derive(Clone, Copy, Debug)]
 struct Point {
-    /// Position of the run on the axis, in the unit of the axis.
     x: f64,
     antiresonance: Option<f64>,
     resonance: Option<f64>,
-    /// Antiresonance and resonance of the exact linear plant, Hz.
     exact: [Option<f64>; 2],
-    /// True if the slosh was rotary for some time.
     swirls: bool,
 }
 
@@ -27,11 +26,11 @@ impl Point {
     }
 }
 
-/// The runs of one group in the order of the axis.
+/// The runs of one group in the order of the axis. `plant` describes differences from other groups apart from
+/// the model, for example `10 cm fill`.
 #[derive(Clone, Debug)]
 struct Series {
     model: String,
-    /// Differences from other groups apart from the model, for example `10 cm fill`.
     plant: String,
     points: Vec<Point>,
 }
@@ -96,7 +95,6 @@ pub(super) fn sentence(page: &Page, results: &Results) -> String {
     largest_angle_of_other_fmus(results)
 }
 
-/// Describes frequency responses of runs along an axis: how they move, and where the slosh becomes rotary.
 fn describe_responses(series: &[Series], name: &str, unit: &str) -> String {
     let mut sentences = Vec::new();
     let nonlinear: Vec<&Series> = series.iter().filter(|s| !s.is_linear()).collect();
@@ -249,7 +247,6 @@ fn describe_shifts(series: &[Series], name: &str, unit: &str, several: bool) -> 
     few(these.iter().filter_map(sentence).collect(), 3)
 }
 
-/// Describes the frequency responses of runs without an axis.
 fn describe_single_runs(series: &[Series]) -> String {
     let hertz = |f: Option<f64>| f.map_or("none".into(), |f| format!("{f:.4} Hz"));
     let of = |s: &Series| {
@@ -283,7 +280,6 @@ impl Series {
     }
 }
 
-/// Describes random draws by mean and standard deviation of each group.
 fn scatter(page: &Page) -> String {
     let of = |group: &Group| {
         let parts: Vec<String> = super::draws::QUANTITIES[..2]
@@ -310,7 +306,6 @@ fn scatter(page: &Page) -> String {
     finished(&few(page.groups.iter().filter_map(of).collect(), 3))
 }
 
-/// Returns short names of the groups: the model, and further differences if there are any.
 fn names(page: &Page) -> Vec<String> {
     let plants = distinct(page.groups.iter().map(Group::plant));
     let name = |group: &Group| match plants.len() {
@@ -320,7 +315,6 @@ fn names(page: &Page) -> Vec<String> {
     page.groups.iter().map(name).collect()
 }
 
-/// Describes the residual hub rate of each group after a manoeuvre.
 fn left_behind(page: &Page) -> String {
     let of = |group: &Group| {
         let rates = group.runs.iter().filter_map(|run| {
@@ -380,12 +374,10 @@ fn rotation(page: &Page) -> String {
     swirling(&models.map(count).collect::<Vec<_>>())
 }
 
-/// Number of runs of a model, and how many of them have rotary slosh.
 struct Swirling {
     model: String,
     runs: usize,
     rotary: usize,
-    /// Description of the run with rotary slosh and the smallest torque.
     which: Option<String>,
 }
 
@@ -405,7 +397,6 @@ fn swirling(models: &[Swirling]) -> String {
     }
 }
 
-/// Describes the largest slosh angles of runs without a frequency response, by model.
 fn largest_angle(page: &Page) -> String {
     let part = |model: &str| {
         let runs = page.groups.iter().filter(|g| g.model == model).flat_map(|g| &g.runs);
@@ -425,7 +416,6 @@ fn largest_angle(page: &Page) -> String {
     finished(&[format!("Largest slosh angle: {}", parts.join("; "))])
 }
 
-/// Describes the largest slosh angle of runs of an FMU other than the bench.
 fn largest_angle_of_other_fmus(results: &Results) -> String {
     let angles = results.unanalysed.iter().filter_map(|run| {
         let (angle, signal) = run.largest_angle.as_ref()?;
@@ -450,7 +440,6 @@ fn few(mut parts: Vec<String>, most: usize) -> Vec<String> {
     parts
 }
 
-/// Formats a number with two significant digits.
 fn format_two_digits(value: f64) -> String {
     let rounded = experiments::rounding::significant(value, 2);
     match rounded.abs() {
@@ -475,7 +464,7 @@ mod tests {
         swirling,
     };
 
-    /// A series with exact responses at 2 and 3 Hz: (x, antiresonance, resonance, rotary).
+    /// Returns a series with exact responses at 2 and 3 Hz from (x, antiresonance, resonance, rotary).
     fn series(model: &str, plant: &str, points: &[(f64, f64, f64, bool)]) -> Series {
         let known = |f: f64| (f > 0.0).then_some(f);
         let point = |&(x, a, r, swirls): &(f64, f64, f64, bool)| Point {

@@ -15,25 +15,24 @@ const SMALLEST: f64 = 0.0125;
 const LARGEST: f64 = 0.25;
 
 /// A number stated in the thesis.
+///
+/// - `quantity` is the quantity with its unit, `printed` the number as the thesis prints it.
+/// - `synthetic`: true if the number is about the synthetic data, whose liquid is linear, so that it is
+///   compared only with the linear model.
+/// - `agreeing`: range of values that agree with the thesis. It is the thesis's own range if it states one;
+///   otherwise ±15 % for an acceleration (because the thesis states neither the fill nor the filter of its
+///   gyro) and half a step between torques.
+/// - `ours` computes the quantity for a group of runs that differ only in torque; `None` if runs or estimates
+///   are missing.
 struct Number {
     section: &'static str,
-    /// The quantity and its unit.
     quantity: &'static str,
-    /// True if the number is about the synthetic data, whose liquid is linear, so that it is compared only
-    /// with the linear model.
     synthetic: bool,
-    /// The number as the thesis prints it.
     printed: &'static str,
-    /// Range of values that agree with the thesis. It is the thesis's own range if it states one; otherwise
-    /// ±15 % for an acceleration (because the thesis states neither the fill nor the filter of its gyro) and
-    /// half a step between torques.
     agreeing: [f64; 2],
-    /// Computes the quantity for a group of runs that differ only in torque; `None` if runs or estimates are
-    /// missing.
     ours: fn(&Group) -> Option<f64>,
 }
 
-/// Numbers in the order of the thesis's sections.
 const NUMBERS: [Number; 8] = [
     Number {
         section: "7.1.1, 8.1",

@@ -7,7 +7,6 @@ use serde_json::{Value, json};
 /// Largest number of values for the moving objects of one page. With 32 bits each this is 6.4 MB of text.
 const MOST_VALUES: usize = 1_200_000;
 
-/// Number of intervals of an envelope.
 const INTERVALS: usize = 4_000;
 
 /// Smallest number of frames per oscillation with which the animation shows it correctly.
@@ -15,7 +14,6 @@ const FEWEST_FRAMES: f64 = 8.0;
 
 /// Rule by which rows are thinned: one of `every` rows is kept.
 pub(super) struct Thinning {
-    /// Distance between the rows that are kept.
     pub every: usize,
 }
 
@@ -69,7 +67,6 @@ fn text(values: impl Iterator<Item = f64>) -> String {
     Base64::encode_string(&bytes)
 }
 
-/// Encodes the kept rows of a column in Base64.
 pub(super) fn thinned(values: &[f64], rows: &[usize]) -> String {
     text(rows.iter().map(|row| values[*row]))
 }
@@ -103,7 +100,6 @@ pub(super) fn envelope(time: &[f64], values: &[f64]) -> Value {
     })
 }
 
-/// Integrates a rate by the trapezoidal rule, from 0.
 pub(super) fn integral(time: &[f64], rate: &[f64]) -> Vec<f64> {
     let mut sum = 0.0;
     let steps = time.windows(2).zip(rate.windows(2));

@@ -39,7 +39,6 @@ impl Parameters<'_> {
         number.filter(|number| !number.is_nan()).unwrap_or(0.0)
     }
 
-    /// Returns the name of the item that an enumeration has.
     pub fn item(&self, name: &str) -> String {
         let Some((Value::Integer(n), text)) = self.value(name) else { return String::new() };
         let variable = self.description.variable(name).expect("it has a value");
@@ -56,17 +55,16 @@ impl Parameters<'_> {
         item.map_or_else(|| self.item(name), |item| item.name.clone())
     }
 
-    /// Returns the elements `name[1]` to `name[N]`.
     pub fn vector<const N: usize>(&self, name: &str) -> [f64; N] {
         std::array::from_fn(|i| self.number(&format!("{name}[{}]", i + 1)))
     }
 }
 
-/// Outline of a tank, m, in the axes of the tank.
+/// Outline of a tank, m, in the axes of the tank: a contour, or the side lengths of a box along x and y with
+/// the heights of bottom and top.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outline {
     Revolved(Vec<[f64; 2]>),
-    /// Side lengths along x and y, heights of bottom and top.
     Box([f64; 4]),
 }
 
@@ -75,13 +73,12 @@ pub enum Outline {
 /// that at the outer wall.
 pub type Surfaces = dyn Fn(f64, usize) -> anyhow::Result<Vec<Vec<f64>>>;
 
-/// Drawing of a tank that the user has given.
+/// Drawing of a tank that the user has given. `levels` are masses of liquid, kg, ascending, each with the
+/// height of the surface at rest, m; a box has no `surfaces`, because its modes are sines.
 pub struct Drawing {
     pub name: String,
     pub outline: Outline,
-    /// Masses of liquid, kg, ascending, each with the height of the surface at rest, m.
     pub levels: Vec<[f64; 2]>,
-    /// Surface shapes of the modes; `None` for a box, whose modes are sines.
     pub surfaces: Option<Box<Surfaces>>,
 }
 
@@ -102,14 +99,13 @@ fn line(points: &[[f64; 2]], x: f64) -> f64 {
     }
 }
 
-/// A slosh pendulum of a tank.
+/// A slosh pendulum of a tank; `order` is the index of the mode among the modes of its direction, from 0.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pendulum {
     pub mass: f64,
     pub length: f64,
     pub hinge: f64,
     pub wave: f64,
-    /// Index of the mode among the modes of its direction, from 0.
     pub order: usize,
 }
 
@@ -120,7 +116,6 @@ impl Pendulum {
     }
 }
 
-/// Returns the index of mode `n` among the modes of its direction, from 0.
 fn order<T: PartialEq>(n: usize, direction: impl Fn(usize) -> T) -> usize {
     (0..n).filter(|m| direction(*m) == direction(n)).count()
 }
@@ -130,16 +125,11 @@ pub(super) struct Tank {
     pub position: [f64; 3],
     pub q: [f64; 4],
     pub outline: Outline,
-    /// Height of the surface at rest at the start, m.
     pub level: f64,
-    /// Mass of liquid at the start, kg.
     pub liquid: f64,
     pub modes: Vec<Pendulum>,
-    /// Surface shapes of the modes (see [`Surfaces`]), if the user has drawn the tank and it does not drain.
     pub shapes: Vec<Vec<f64>>,
-    /// Interpolation table of a draining tank.
     pub fill: Option<Fill>,
-    /// Sentence about the source of the outline.
     pub note: String,
 }
 
@@ -177,17 +167,15 @@ impl Tank {
 }
 
 /// Modes and surface height of a draining tank as functions of the mass of liquid, interpolated as in the
-/// FMU.
+/// FMU: 1/l_n and h_n − l_n at the points, with slope and second derivative, and the height of the surface,
+/// m, by mass, kg.
 pub(super) struct Fill {
     masses: Vec<f64>,
-    /// 1/l_n and h_n − l_n at the points, with slope and second derivative.
     modes: Vec<[Vec<[f64; 3]>; 2]>,
-    /// Height of the surface (m) by mass (kg).
     levels: Vec<[f64; 2]>,
 }
 
 impl Fill {
-    /// Interpolates the height of the surface at rest, m, for a mass of liquid in kg.
     pub fn level(&self, liquid: f64) -> f64 {
         line(&self.levels, liquid)
     }
@@ -490,7 +478,8 @@ mod tests {
         points[1]
     }
 
-    /// The start values are the modes of a cylinder of 0.9 m, 0.6 m deep, its origin at mid-depth, in six digits.
+    /// The start values are the modes of a cylinder of 0.9 m, 0.6 m deep, its origin at mid-depth, in six
+    /// digits.
     #[test]
     fn modes_of_a_cylinder_are_drawn_as_that_cylinder() {
         let drawn = tank_with(&[]);
@@ -500,7 +489,7 @@ mod tests {
         }
     }
 
-    /// 0.1 to 1.2 m of the same cylinder; between the points the surface rises with the mass.
+    /// The table has 0.1 to 1.2 m of the same cylinder; between the points the surface rises with the mass.
     #[test]
     fn the_surface_of_a_draining_cylinder_is_where_its_liquid_ends() {
         let drawn = tank_with(&[("tank.fill.points", "12"), ("tank.liquid_0", "381.704")]);

@@ -29,26 +29,21 @@ use self::scene::scene;
 use crate::campaign::{PLOTLY, PLOTLY_LICENSE};
 
 pub struct Run<'a> {
-    /// Title of the page.
     pub title: String,
     pub source: String,
-    /// Description of the FMU that was simulated.
     pub description: &'a ModelDescription,
     /// Values of parameters by name, as text: all of them, or those that differ from the FMU's start values.
     pub parameters: &'a BTreeMap<String, String>,
     /// True if the parameters come from the run's file. Otherwise they are the FMU's start values and the
     /// user's settings.
     pub parameters_known: bool,
-    /// Tanks that the user has drawn, by number from 1.
     pub drawings: &'a BTreeMap<usize, Drawing>,
-    /// Columns of the run, which include `time`.
     pub table: &'a Table,
 }
 
-/// An HTML page and its warnings.
+/// An HTML page and its warnings, which are sentences about objects that are not drawn exactly.
 pub struct Page {
     pub html: String,
-    /// Sentences about objects that are not drawn exactly.
     pub warnings: Vec<String>,
 }
 
@@ -83,7 +78,6 @@ const BENCH_PANELS: [(&str, &[&str]); 7] = [
     ("Energy", &[ENERGY, WORK, HEAT]),
 ];
 
-/// Largest number of panels.
 const MOST_PANELS: usize = 8;
 
 /// Lists all columns that the page can use, in the order of a table, so that the user knows which columns to
@@ -150,7 +144,6 @@ fn prefixes(parameters: &Parameters) -> Vec<(String, usize)> {
         .collect()
 }
 
-/// The columns that the page uses, and those that are missing.
 #[derive(Default)]
 struct Columns<'a> {
     table: Option<&'a Table>,
@@ -172,8 +165,8 @@ impl Columns<'_> {
         there
     }
 
-    /// Takes the first list of columns that exists completely and returns its index; otherwise records what
-    /// is missing.
+    /// Takes the first list of columns that exists completely and returns its index; otherwise records the
+    /// missing columns.
     fn require(&mut self, lists: &[Vec<String>]) -> Option<usize> {
         let found = (0..lists.len()).find(|i| self.take(&lists[*i]));
         if found.is_none() {
@@ -184,7 +177,6 @@ impl Columns<'_> {
     }
 }
 
-/// Returns the names of the coordinates of mode `n` (from 1) of HubSlosh.
 fn coordinates(n: usize) -> [String; 2] {
     [slosh::Q_RADIAL, slosh::Q_TANGENTIAL].map(|array| array.element([n]))
 }
@@ -209,10 +201,8 @@ fn higher_modes(table: &Table, model: &str, modes: &[Pendulum]) -> Vec<[Vec<f64>
     recorded.collect()
 }
 
-/// Number of masses of liquid at which the surfaces of a draining tank are computed.
 const MASSES: usize = 9;
 
-/// Returns equidistant values from the smallest to the largest of `values`.
 fn spread(values: &[f64]) -> Vec<f64> {
     let [low, high] =
         [f64::min, f64::max].map(|of| values.iter().copied().reduce(of).unwrap_or(0.0));
@@ -231,10 +221,8 @@ fn vector(name: &str) -> Vec<String> {
 
 /// Returns the page that shows a run.
 ///
-/// # Errors
-///
-/// If the FMU is not one of this project's, columns are missing, or the table has fewer than two rows. The
-/// message says how to record the columns.
+/// # Errors If the FMU is not one of this project's, columns are missing, or the table has fewer than two
+/// rows. The message says how to record the columns.
 pub fn page(run: &Run) -> Result<Page> {
     let Some(kind) = kind(run.description) else {
         anyhow::bail!(
@@ -280,15 +268,14 @@ pub fn page(run: &Run) -> Result<Page> {
     Ok(Page { html, warnings: draft.warnings })
 }
 
-/// A page that is being assembled.
+/// A page that is being assembled, with columns that are computed from others, and remarks about the drawing
+/// for the page.
 struct Draft<'a> {
     run: &'a Run<'a>,
     kind: Kind,
     parameters: Parameters<'a>,
     columns: Columns<'a>,
-    /// Columns that are computed from others.
     derived: Vec<(String, Vec<f64>)>,
-    /// Remarks about the drawing, shown on the page.
     notes: Vec<String>,
     warnings: Vec<String>,
 }
@@ -336,12 +323,10 @@ impl Draft<'_> {
         motion
     }
 
-    /// Returns the user's drawing of tank `i`, counted from 0.
     fn drawing(&self, i: usize) -> Option<&'_ Drawing> {
         self.run.drawings.get(&(i + 1))
     }
 
-    /// Returns the tanks with their pendulums.
     fn tanks(&self) -> Result<Vec<Tank>> {
         let tanks: Vec<Tank> = match self.kind {
             Kind::Bench => vec![geometry::bench(&self.parameters, self.drawing(0))],
@@ -452,7 +437,6 @@ impl Draft<'_> {
         }
     }
 
-    /// Computes the surface shapes of the modes of a tank that the user has drawn.
     fn shape_surfaces(&self, i: usize, tank: &mut Tank, moved: &mut Value) -> Result<()> {
         let surfaces = self.drawing(i).and_then(|drawing| drawing.surfaces.as_ref());
         let Some(surfaces) = surfaces.filter(|_| !tank.modes.is_empty()) else { return Ok(()) };
@@ -473,7 +457,6 @@ impl Draft<'_> {
         Ok(())
     }
 
-    /// Returns an error if the table lacks columns, or its time does not increase.
     fn check(&self) -> Result<()> {
         let (run, source, time) = (self.run, &self.run.source, self.time());
         let (missing, has_time) = (&self.columns.missing, self.columns.has("time"));
@@ -518,7 +501,6 @@ impl Draft<'_> {
         }
     }
 
-    /// Returns the rows and columns of the page, and its plots.
     fn data(&mut self) -> Value {
         let (table, description) = (self.run.table, self.run.description);
         let time = table.column("time").unwrap_or_default();
@@ -606,7 +588,6 @@ fn rounded(value: f64) -> f64 {
     (value * 1e6).round() / 1e6
 }
 
-/// Returns titles and columns of the plots, in order.
 fn panels(kind: Kind, table: &Table) -> Vec<(String, Vec<String>)> {
     let moves = |name: &str| table.column(name).is_some_and(|values| peak(values) > 0.0);
     let mut left: Vec<&String> =

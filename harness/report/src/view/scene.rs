@@ -13,10 +13,8 @@ use signals::table::Table;
 use super::geometry::{self, Outline, Parameters, Tank};
 use super::{Columns, Kind, vector};
 
-/// Angle of an arc at full length, rad.
 const FULL_ARC: f64 = 2.4;
 
-/// Arrows and arcs, with the columns that they follow.
 struct Arrows<'a, 'c, 't> {
     parameters: &'a Parameters<'a>,
     table: &'a Table,
@@ -67,7 +65,6 @@ impl Arrows<'_, '_, '_> {
     }
 }
 
-/// Returns the objects of the scene and the columns that move them.
 pub fn scene(
     kind: Kind,
     parameters: &Parameters,
@@ -89,7 +86,6 @@ pub fn scene(
     json!({ "geometry": geometry, "arrows": arrows.of })
 }
 
-/// Converts a tank with its pendulums for the scene.
 fn tank_scene(tank: &Tank) -> Value {
     let shape = match &tank.outline {
         Outline::Revolved(contour) => json!({ "contour": contour }),

@@ -17,10 +17,8 @@ use parquet::schema::types::ColumnDescriptor;
 
 use crate::foreign::Foreign;
 
-/// Number of rows decoded at a time.
 const BATCH: usize = 1 << 16;
 
-/// Type of a column.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Kind {
     Real,
@@ -59,19 +57,16 @@ impl Kind {
     }
 }
 
-/// Columns that were read; NaN marks missing values.
+/// Columns that were read; NaN marks missing values. If the times are dates, `origin` is the date of the
+/// first row in RFC 3339, and the times count from that row, in seconds.
 pub struct Found {
     pub columns: Vec<Vec<f64>>,
-    /// Date of the first row in RFC 3339, if the times are dates. The times then count from that row, in
-    /// seconds.
     pub origin: Option<String>,
 }
 
 /// Lists the paths of the columns; `a.b` is the column b within the structure a.
 ///
-/// # Errors
-///
-/// If the file cannot be read.
+/// # Errors If the file cannot be read.
 pub fn names(path: &Path) -> Result<Vec<String>> {
     guarded(|| {
         let reader = open(path)?;
@@ -80,20 +75,13 @@ pub fn names(path: &Path) -> Result<Vec<String>> {
     })
 }
 
-/// Returns the key-value metadata.
-///
-/// # Errors
-///
-/// If the file is not complete.
 pub fn metadata(path: &Path) -> Result<BTreeMap<String, String>> {
     guarded(|| Ok(pairs(&open(path)?)))
 }
 
 /// Returns the name of the library that wrote the file, if the file has it.
 ///
-/// # Errors
-///
-/// If the file is not complete.
+/// # Errors If the file is not complete.
 pub fn writer(path: &Path) -> Result<Option<String>> {
     guarded(|| Ok(open(path)?.metadata().file_metadata().created_by().map(String::from)))
 }
@@ -102,10 +90,8 @@ pub fn writer(path: &Path) -> Result<Option<String>> {
 /// of the time among the selected ones, with the seconds of the unit that is stated for it: integers need
 /// one, and timestamps have their own. Columns at which `booleans` is true may hold true and false.
 ///
-/// # Errors
-///
-/// If the file cannot be read, or another unit is stated for timestamps than theirs; [`Foreign`] for types
-/// that are not read here.
+/// # Errors If the file cannot be read, or another unit is stated for timestamps than theirs; [`Foreign`] for
+/// types that are not read here.
 pub fn read(
     path: &Path,
     positions: impl Fn(&[String]) -> Result<Vec<usize>>,

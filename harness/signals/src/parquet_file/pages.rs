@@ -11,14 +11,11 @@ use files::budget;
 const LARGEST: u64 = 512 << 20;
 /// Longest page header that is accepted, bytes. A header is short, because its statistics are two numbers.
 const HEADER: u64 = 1 << 16;
-/// Deepest nesting of structures within a header.
 const DEEPEST: usize = 16;
 
 /// Checks the pages in the `length` bytes from `start` of a file with `size` bytes.
 ///
-/// # Errors
-///
-/// If a header is damaged, or the pages are larger than the memory budget.
+/// # Errors If a header is damaged, or the pages are larger than the memory budget.
 pub fn check(mut file: &File, start: u64, length: u64, size: u64) -> Result<()> {
     let end = start.checked_add(length).filter(|end| *end <= size);
     let end = end.context("it lies outside the file")?;

@@ -9,7 +9,7 @@ use anyhow::{Context, Error, Result, bail, ensure};
 
 use super::unit::Quantity;
 
-/// A column of a file. Its name is that in the file, or `#3` for the third column.
+/// A column of a file, by its name in the file, or `#3` for the third column.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Column {
     pub name: String,
@@ -23,7 +23,6 @@ pub struct Columns {
     rate: Option<f64>,
 }
 
-/// Signals that a recording of the bench may have, with their quantities.
 pub const SIGNALS: [(&str, Quantity); 10] = [
     ("time", Quantity::Time),
     ("tau_cmd", Quantity::Torque),
@@ -39,9 +38,7 @@ pub const SIGNALS: [(&str, Quantity); 10] = [
 
 /// Returns the quantity of a signal.
 ///
-/// # Errors
-///
-/// If no signal has this name.
+/// # Errors If no signal has this name.
 pub fn quantity(signal: &str) -> Result<Quantity> {
     let known = SIGNALS.iter().find(|(name, _)| *name == signal).map(|(_, quantity)| *quantity);
     known.with_context(|| {
@@ -103,9 +100,7 @@ impl Columns {
     /// Parses columns for the variables of an FMU, `NAME=COLUMN[:UNIT]`. Items are not split at commas,
     /// because names like `p[1,2]` contain them.
     ///
-    /// # Errors
-    ///
-    /// Lists all items that are wrong.
+    /// # Errors Lists all items that are wrong.
     pub fn for_variables<'a>(items: impl IntoIterator<Item = &'a str>) -> Result<Self> {
         Columns::parse(items, parse_variable)
     }
@@ -130,9 +125,7 @@ impl Columns {
 
     /// Sets the rate of files without times, in rows per second.
     ///
-    /// # Errors
-    ///
-    /// If the rate is not a positive number.
+    /// # Errors If the rate is not a positive number.
     pub fn with_rate(self, rate: Option<f64>) -> Result<Self> {
         if let Some(rate) = rate {
             ensure!(
@@ -153,12 +146,10 @@ impl Columns {
         self.by_signal.get(signal).cloned().unwrap_or_else(own)
     }
 
-    /// Returns true if the user named the signal's column.
     pub fn names(&self, signal: &str) -> bool {
         self.by_signal.contains_key(signal)
     }
 
-    /// Lists the signals whose columns were given.
     pub fn signals(&self) -> impl Iterator<Item = &str> {
         self.by_signal.keys().map(String::as_str)
     }

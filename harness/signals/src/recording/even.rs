@@ -6,28 +6,23 @@ use files::budget;
 use super::SHORT;
 use crate::table::Table;
 
-/// Fraction of the step by which a time may be off the grid and still count as on it.
 const OFF: f64 = 1e-3;
-/// Fraction of the rows that may be missing and are interpolated linearly.
 const MISSING: f64 = 0.01;
-/// Largest number of rows of the grid for each row of the table.
 const MOST_ROWS: f64 = 10.0;
 
 /// Puts a table on an even time grid, and returns the step, s, with the table. Rows on the grid keep their
 /// values; between them values are interpolated linearly, also over gaps as long as few rows are missing.
 /// `done` receives messages about that.
 ///
-/// # Errors
-///
-/// If time does not grow, or if too many rows are missing.
+/// # Errors If time does not grow, or if too many rows are missing.
 pub fn even(table: Table, done: &mut dyn FnMut(String)) -> Result<(f64, Table)> {
     even_with_gaps(table, MISSING, done)
 }
 
-/// Puts a table on an even grid as [`even`] does, but accepts that up to the share `most_missing` of the rows is missing.
+/// Puts a table on an even grid as [`even`] does, but accepts that up to the share `most_missing` of the rows
+/// is missing.
 ///
-/// # Errors
-/// If time does not grow, or if more rows are missing.
+/// # Errors If time does not grow, or if more rows are missing.
 pub fn even_with_gaps(
     table: Table,
     most_missing: f64,

@@ -30,18 +30,15 @@ use crate::foreign::{self, Foreign, Kind};
 use crate::parquet_file::{self, Found};
 use crate::table::Table;
 
-/// Names and units of a file's columns.
+/// Names and units of a file's columns: `full` are the names as they are in the file, `names` those without a
+/// unit in brackets at the end, and `row` the units from a row below the names.
 struct Header {
-    /// Names without a unit in brackets at the end.
     names: Vec<String>,
-    /// Names as they are in the file.
     full: Vec<String>,
-    /// Units from a row below the names; `None` for a column without one.
     row: Vec<Option<String>>,
 }
 
 impl Header {
-    /// Makes a header from the names of all columns and, if there is one, the row of units.
     fn from_names(names: Vec<String>, row: Option<&Vec<String>>) -> Header {
         let mut header = Header { names: Vec::new(), full: Vec::new(), row: Vec::new() };
         for (k, name) in names.into_iter().enumerate() {
@@ -163,34 +160,30 @@ fn bracketed(name: &str) -> Option<(&str, &str)> {
     (!bare.is_empty() && !number).then_some((bare, unit))
 }
 
-/// Treatment of a signal in rows without a value.
+/// Treatment of a signal in rows without a value: keep the last value, as for a command that is held;
+/// interpolate linearly from the last value to the next; or leave NaN.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Between {
-    /// Keep the last value, as for a command that is held.
     Held,
-    /// Interpolate linearly from the last value to the next.
     Line,
-    /// Leave NaN.
     Missing,
 }
 
-/// A signal that is to be read from a recording.
+/// A signal that is to be read from a recording: one of [`SIGNALS`], or a variable of an FMU. A file without
+/// a `required` signal is an error. `unit` is the unit in which the values are returned, and which is assumed
+/// where the file states none; `None` for SI.
 #[derive(Clone, Copy, Debug)]
 pub struct Signal<'a> {
-    /// One of [`SIGNALS`], or a variable of an FMU.
     pub name: &'a str,
-    /// True if a file without the signal is an error.
     pub required: bool,
-    /// Treatment of rows without a value.
     pub between: Between,
-    /// Unit in which the values are returned, and which is assumed where the file states none; `None`: SI.
     pub unit: Option<&'a str>,
 }
 
-/// Signals to read in addition to time.
+/// Signals to read in addition to time. The first one is the rows' signal, unless it may be missing
+/// ([`Between::Missing`]).
 #[derive(Clone, Copy, Debug)]
 pub struct Wanted<'a> {
-    /// The first one is the rows' signal, unless it may be missing ([`Between::Missing`]).
     pub signals: &'a [Signal<'a>],
     pub columns: &'a Columns,
 }
@@ -200,7 +193,7 @@ pub struct Wanted<'a> {
 const LATE: f64 = 1e6;
 /// Latest time that may have no stated unit, s since 1970: the year 5138. Milliseconds since 1970 are later.
 const LATEST: f64 = 1e11;
-/// Time between rows, s, above which a unit must be stated: slosh has periods of about a second.
+/// Time between rows, s, above which a unit must be stated, because slosh has periods of about a second.
 const SLOWEST: f64 = 1.0;
 /// Time between rows, s, below which a unit must be stated: no slosh is recorded at 20 kHz, but rows at 50 Hz
 /// with times in days are 2e-7 apart.
@@ -213,7 +206,6 @@ const LARGEST: f64 = 1e60;
 const LOST: f64 = 10.0;
 /// Spacing, in units of the usual one, above which a value must have been lost.
 const LATE_BY: f64 = 1.5;
-/// Gap that is completed in any signal, s.
 const SHORT: f64 = 0.25;
 
 /// Lists every column of a file by its name there, with the position in `signals` of the signal that the
@@ -231,12 +223,10 @@ pub fn assigned(path: &Path, signals: &[Signal]) -> Result<Vec<(String, Option<u
     Ok(found)
 }
 
-/// Reads a recording: `time` (s) and those of the wanted signals that are there, in SI units. `done` receives
-/// messages about what was converted or completed.
+/// Reads a recording: `time` (s) and the wanted signals that it has, in SI units. `done` receives messages
+/// about what was converted or completed.
 ///
-/// # Errors
-///
-/// If the file cannot be read so. The error lists all faults of its columns.
+/// # Errors If the file cannot be read so. The error lists all faults of its columns.
 pub fn read(path: &Path, wanted: &Wanted, done: &mut dyn FnMut(String)) -> Result<Table> {
     let name = path.display().to_string();
     let mut done = |words| done(format!("{name}: {words}"));
@@ -246,9 +236,7 @@ pub fn read(path: &Path, wanted: &Wanted, done: &mut dyn FnMut(String)) -> Resul
 /// Reads a recording if it is text in columns or Parquet; `None` for other kinds, which the Python package
 /// converts. `name` is the file's name in errors, because `path` may be temporary.
 ///
-/// # Errors
-///
-/// If the file cannot be read so. The error lists all faults of its columns.
+/// # Errors If the file cannot be read so. The error lists all faults of its columns.
 pub fn read_here(
     path: &Path,
     name: &Path,
@@ -264,9 +252,7 @@ pub fn read_here(
 /// Reads histories of inputs: `time` (s) and the signals, with all rows. Signals in `booleans` may be `true`
 /// and `false`, which become 1 and 0. Rows may be unevenly spaced, and each must have every value.
 ///
-/// # Errors
-///
-/// If the file cannot be read so.
+/// # Errors If the file cannot be read so.
 pub fn read_inputs(
     path: &Path,
     wanted: &Wanted,
@@ -280,7 +266,6 @@ pub fn read_inputs(
     Ok(table)
 }
 
-/// A file of a kind that is read here, with its header.
 enum File {
     Text(text::Layout),
     Parquet(Header),
@@ -512,9 +497,7 @@ fn join_seconds(whole: &[f64], part: &[f64], factor: f64) -> Option<(f64, Vec<f6
 
 /// Checks that times without a stated unit can be seconds.
 ///
-/// # Errors
-///
-/// If they look like milliseconds or days.
+/// # Errors If they look like milliseconds or days.
 fn plausible(time: &[f64]) -> Result<()> {
     if let Some(late) = time.iter().find(|t| t.abs() > LATEST) {
         bail!(
@@ -554,9 +537,7 @@ fn dimension(signal: &Signal) -> Option<(Dimension, f64)> {
 
 /// Returns the factor from `unit` to the unit in which a signal is wanted.
 ///
-/// # Errors
-///
-/// If `unit` is not a unit of the signal's quantity.
+/// # Errors If `unit` is not a unit of the signal's quantity.
 fn factor(signal: &Signal, unit: &str) -> Result<f64> {
     let Some(own) = signal.unit else {
         let quantity = quantity(signal.name)?;
@@ -572,9 +553,7 @@ fn factor(signal: &Signal, unit: &str) -> Result<f64> {
 /// Selects the rows with a value of the rows' signal, and completes the other signals there by their
 /// [`Between`].
 ///
-/// # Errors
-///
-/// If a gap is too long to complete.
+/// # Errors If a gap is too long to complete.
 fn complete(
     signals: &[Signal],
     mut columns: Vec<Vec<f64>>,

@@ -12,24 +12,21 @@ pub struct Grid {
     pub time: Vec<f64>,
 }
 
-/// Largest number of decimals of a printed time in s.
 const DECIMALS: i32 = 6;
-/// Fraction of the quantum by which a time may differ from a multiple of it: times since 1970 have only 52
-/// binary digits.
+/// Fraction of the quantum by which a time may differ from a multiple of it, because times since 1970 have
+/// only 52 binary digits.
 const OFF: f64 = 1e-2;
 /// Fraction of the quantum by which the spread of the stamps about the grid may exceed the quantum.
 const BEYOND: f64 = 0.02;
-/// Least number of rows from which a grid is estimated.
 const FEWEST: usize = 20;
 
-/// Relation between the times of a recording and an even grid.
+/// Relation between the times of a recording and an even grid: they are already even or no grid explains
+/// them; they are rounded times of a grid; or several rows share one time for the reason in the field, so
+/// that the true times are unknown.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Stamps {
-    /// The times are already even, or no grid explains them.
     AsTheyAre,
-    /// The times are rounded times of a grid.
     On(Grid),
-    /// Several rows share one time, so the true times are unknown; the field is the reason.
     Unknown(String),
 }
 
@@ -38,7 +35,6 @@ const LARGEST_ERROR: f64 = 1e-4;
 /// Fraction of rows with the same time as the row before, above which the times are not those of the rows.
 const SHARED: f64 = 0.05;
 
-/// Finds the even grid of which `time` (s) are rounded times.
 pub fn regular(time: &[f64]) -> Stamps {
     if time.len() < FEWEST || !time.iter().all(|t| t.is_finite()) {
         return Stamps::AsTheyAre;
@@ -97,9 +93,8 @@ fn grid(time: &[f64]) -> Option<(Grid, f64)> {
     Some((grid, uncertainty(&units, &counts, step) / step))
 }
 
-/// Returns by how much the step may differ from `step`, in quanta, such that a grid still explains all
-/// stamps. The spread of the stamps about the grid is a convex function of the step, which makes the bounds
-/// unique.
+/// Returns the largest difference from `step`, in quanta, at which a grid still explains all stamps. The
+/// spread of the stamps about the grid is a convex function of the step, which makes the bounds unique.
 fn uncertainty(units: &[f64], counts: &[f64], step: f64) -> f64 {
     let spread = |step: f64| {
         let off = units.iter().zip(counts).map(|(unit, count)| unit - step * count);
@@ -122,7 +117,6 @@ fn uncertainty(units: &[f64], counts: &[f64], step: f64) -> f64 {
     reach(1.0).max(reach(-1.0))
 }
 
-/// Formats a quantum (s) for messages, in s, ms or us.
 pub fn format_quantum(quantum: f64) -> String {
     match quantum {
         q if q >= 1.0 => format!("{q} s"),
@@ -131,7 +125,6 @@ pub fn format_quantum(quantum: f64) -> String {
     }
 }
 
-/// Returns the largest power of ten, s, of which all times are multiples.
 fn quantum(time: &[f64]) -> Option<f64> {
     (0..=DECIMALS).map(|k| 10_f64.powi(-k)).find(|quantum| {
         let off = |t: &f64| {
@@ -187,7 +180,8 @@ mod tests {
         }
     }
 
-    /// Whole seconds: of a minute the step is known to 0.03 %, of twenty minutes to the error of any clock.
+    /// From whole seconds the step of a minute is known to 0.03 %, and of twenty minutes to the error of any
+    /// clock.
     #[test]
     fn a_grid_counts_only_if_its_step_is_known() {
         let whole =

@@ -16,19 +16,15 @@ use super::Header;
 use super::time::{self, Moment, Times, moment};
 use crate::parquet_file::Found;
 
-/// Number of lines from which separator and header are detected.
 const SAMPLE: usize = 200;
-/// Number of faults that are reported one by one; the others are only counted.
 const NAMED: usize = 5;
-/// Separators, in the order in which they are preferred.
 const SEPARATORS: [(u8, &str); 4] =
     [(b';', "semicolons"), (b'\t', "tabs"), (b',', "commas"), (b' ', "blanks")];
-/// Prefixes of comment lines.
 const COMMENTS: [&str; 3] = ["#", "%", "//"];
 /// Words for missing values, including those that C libraries and spreadsheets print for NaN.
 const MISSING: &str = "nan na n/a #n/a null none - -- nat -nan nan(ind) -nan(ind) 1.#qnan -1.#qnan 1.#ind -1.#ind #nv #div/0!";
 
-/// Reason why a field is not read, to stand after the field.
+/// Reason why a field is not read, worded to follow the field.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 enum Unreadable {
     #[error(
@@ -50,12 +46,10 @@ enum Unreadable {
     Number,
 }
 
-/// Name of a decimal sign.
 fn name(sign: char) -> &'static str {
     if sign == ',' { "comma" } else { "point" }
 }
 
-/// Value of a field.
 #[derive(Clone, Debug, PartialEq)]
 enum Value {
     Number(f64),
@@ -67,7 +61,6 @@ enum Value {
 }
 
 impl Value {
-    /// Returns true if the field contains a number or a time, including one that is ambiguous.
     fn is_there(&self) -> bool {
         !matches!(self, Value::Missing | Value::Other)
     }
@@ -93,9 +86,7 @@ impl Value {
 
 /// Parses a field as a number; `None` if it is not one.
 ///
-/// # Errors
-///
-/// If it can be read in two ways, or has another decimal sign than the fields before.
+/// # Errors If it can be read in two ways, or has another decimal sign than the fields before.
 fn number(
     field: &str,
     separator: u8,
@@ -123,7 +114,6 @@ fn number(
     Ok(value.is_finite().then_some(value))
 }
 
-/// Parses a Boolean as 1 or 0.
 fn truth(field: &str) -> Result<f64, Unreadable> {
     match field.to_ascii_lowercase().as_str() {
         "true" => Ok(1.0),
@@ -138,7 +128,6 @@ struct Lines {
     reader: csv::Reader<File>,
     record: ByteRecord,
     separator: u8,
-    /// Lines so far.
     count: usize,
     comment: Vec<String>,
 }
@@ -197,21 +186,19 @@ impl Lines {
     }
 }
 
-/// First lines of a file, split by one of the separators.
+/// First lines of a file, split by one of the separators: number, fields and values of each line, the
+/// positions of the columns that hold text instead of numbers or times, and those of the rows of values in
+/// `lines`.
 struct Sample {
     separator: (u8, &'static str),
-    /// Line number, fields and values of each line.
     lines: Vec<(u64, Vec<String>, Vec<Value>)>,
     comment: Vec<String>,
     width: usize,
-    /// Positions of the columns that hold text instead of numbers or times.
     texts: Vec<usize>,
-    /// Positions in `lines` of the rows of values.
     rows: Vec<usize>,
 }
 
 impl Sample {
-    /// Reads the first lines of a file. Rows must have at least `least` fields.
     fn read(path: &Path, separator: (u8, &'static str), least: usize) -> Result<Sample> {
         let mut file = Lines::open(path, separator.0)?;
         let (mut lines, mut comment) = (Vec::new(), Vec::new());
@@ -255,25 +242,20 @@ impl Sample {
     }
 }
 
-/// Layout of a file, detected in its first lines.
+/// Layout of a file, detected in its first lines. `above` is the number of lines before the first row;
+/// `texts` is the end of the message that a column is missing, with the names of columns that hold text.
 pub(super) struct Layout {
     separator: u8,
-    /// Names and units of its columns.
     pub header: Header,
-    /// Number of lines before the first row.
     above: usize,
-    /// Notes on the detected layout.
     pub notes: Vec<String>,
-    /// End of the message that a column is missing: the names of columns that hold text.
     pub texts: String,
 }
 
 impl Layout {
     /// Detects the layout of a file: separator, header, units and first row.
     ///
-    /// # Errors
-    ///
-    /// If no separator gives rows of numbers.
+    /// # Errors If no separator gives rows of numbers.
     pub fn detect(path: &Path) -> Result<Self> {
         // A table of times alone has one column.
         let mut tried = Vec::new();
@@ -386,9 +368,7 @@ impl Layout {
     /// Reads the columns at the positions `places`. If `times`, the first one is the time and may hold dates
     /// and clock times. `true` and `false` are allowed where `booleans` is true. NaN marks missing values.
     ///
-    /// # Errors
-    ///
-    /// If a field is not a number, or can be read in two ways; the error names the lines.
+    /// # Errors If a field is not a number, or can be read in two ways; the error names the lines.
     pub fn read(
         &self,
         path: &Path,

@@ -7,11 +7,10 @@
 
 use chrono::{DateTime, Datelike as _, NaiveDate, NaiveTime, Timelike as _};
 
-/// Nanoseconds of a second and of a day.
 const SECOND: i64 = 1_000_000_000;
 const DAY: i64 = 86_400 * SECOND;
 
-/// Reason why a field is not read as a time, to stand after the field.
+/// Reason why a field is not read as a time, worded to follow the field.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Unreadable {
     #[error("has no date: there is no day {day} of month {month} in {year}")]
@@ -45,29 +44,27 @@ pub enum Unreadable {
     OtherForm,
 }
 
-/// A date, or a clock time without one.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Moment {
     /// Nanoseconds since 1970, UTC unless the text has another offset.
     Date(i64),
-    /// Nanoseconds since midnight.
     Clock(i64),
     /// A date with an unknown order of day and month, and nanoseconds since its midnight.
     Ordered(Ordered, i64),
 }
 
-/// A date such as 3/4/2026, in which day or month may be first.
+/// A date such as 3/4/2026, in which day or month may be first. A year with two digits (`is_short`) may also
+/// be first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ordered {
     first: u32,
     second: u32,
     year: i32,
-    /// True for a year with two digits, which may also be first.
     is_short: bool,
 }
 
 impl Ordered {
-    /// Returns the date in days since 1970; `day_first` says which of the two numbers is the day.
+    /// Returns the date in days since 1970; `day_first` is true if the first of the two numbers is the day.
     fn day(self, day_first: bool) -> Result<i64, Unreadable> {
         let Ordered { first, second, year, .. } = self;
         let (day, month) = if day_first { (first, second) } else { (second, first) };
@@ -81,17 +78,14 @@ fn days(year: i32, month: u32, day: u32) -> Result<i64, Unreadable> {
     Ok(i64::from(date.num_days_from_ce()) - 719_163) // 1 January 1970
 }
 
-/// First letters of the English names of months.
 const MONTHS: [&str; 12] =
     ["jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec"];
 const WEEKDAYS: [&str; 7] = ["mon", "tue", "wed", "thu", "fri", "sat", "sun"];
 
 /// Parses a field as a date or a clock time; `None` if it is neither.
 ///
-/// # Errors
-///
-/// If it is one that cannot be read, or that can be read in two ways. The error is the reason, worded to
-/// follow the field.
+/// # Errors If it is one that cannot be read, or that can be read in two ways. The error is the reason,
+/// worded to follow the field.
 pub fn moment(field: &str) -> Result<Option<Moment>, Unreadable> {
     if field.len() < 4
         || field.len() > 60
@@ -213,9 +207,7 @@ fn clock_time(text: &str, has_date: bool) -> Result<Option<i64>, Unreadable> {
     }
 }
 
-/// A date, or one in which day and month can be read in two ways.
 enum Day {
-    /// Days since 1970.
     Known(i64),
     Either(Ordered),
 }
@@ -273,18 +265,16 @@ fn date(text: &str) -> Result<Option<Day>, Unreadable> {
     }
 }
 
-/// Converts the times of a column to seconds from the first one.
+/// Converts the times of a column to seconds from the first one. `last` is the last clock time plus the days
+/// that have passed, ns; `day_first` is unknown until a date shows the order of day and month.
 #[derive(Default)]
 pub struct Times {
     first: Option<(Moment, String)>,
-    /// Last clock time plus the days that have passed, ns.
     last: i64,
-    /// True if days stand before months; unknown until a date shows the order.
     day_first: Option<bool>,
 }
 
 impl Times {
-    /// Returns true as long as no time has been converted.
     pub fn is_empty(&self) -> bool {
         self.first.is_none()
     }
@@ -292,9 +282,7 @@ impl Times {
     /// Returns the seconds from the first time to this one. `field` is the text, which messages repeat. A
     /// clock time that jumps back by more than half a day has passed midnight.
     ///
-    /// # Errors
-    ///
-    /// If the time is of another kind than the first, or its date can be read in two ways.
+    /// # Errors If the time is of another kind than the first, or its date can be read in two ways.
     pub fn seconds(&mut self, moment: Moment, field: &str) -> Result<f64, Unreadable> {
         if let Moment::Ordered(Ordered { first, second, .. }, _) = moment
             && first.max(second) > 12
@@ -350,7 +338,6 @@ impl Times {
 mod tests {
     use super::*;
 
-    /// Seconds from the first to each field.
     fn column(fields: &[&str]) -> anyhow::Result<Vec<f64>> {
         let mut times = Times::default();
         fields

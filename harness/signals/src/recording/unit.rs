@@ -8,7 +8,6 @@
 
 use std::fmt;
 
-/// Quantity of a signal, which decides how its unit is read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     Time,
@@ -25,10 +24,10 @@ use Quantity::{Acceleration, Angle, Force, Length, Rate, Time, Torque};
 /// Exponents of kg, m, s and rad.
 pub(super) type Dimension = [i8; 4];
 
-/// Standard gravity, m/s² (BIPM, The International System of Units, 3rd CGPM 1901).
 const GRAVITY: f64 = 9.80665;
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
-/// The force of a pound under standard gravity, N (0.453 592 37 kg, the international yard and pound agreement of 1959).
+/// Force of a pound under standard gravity, N (0.453 592 37 kg, the international yard and pound agreement of
+/// 1959).
 const POUND: f64 = 0.453_592_37 * GRAVITY;
 
 /// A symbol: its name, its dimension, its value in SI, and the prefixes that it takes.
@@ -67,11 +66,9 @@ const PREFIXES: [(&str, &str, f64); 5] = [
     ("k", "kilo", 1e3),
 ];
 
-/// Words and the symbols for them, in lower case and in the singular.
 const WORDS: &str = "sec=s second=s msec=ms milli=ms usec=us micro=us nsec=ns nano=ns min=min minute=min hr=h hour=h day=d rad=rad \
     radian=rad deg=deg degree=deg rev=rev revolution=rev newton=N meter=m metre=m inch=in foot=ft lb=lbf oz=ozf";
 
-/// Dimension and value in SI of a product of symbols.
 type Product = (Dimension, f64);
 
 /// Finds the symbol `name`, also with a prefix. With `fold` the case of letters does not count, which may
@@ -150,15 +147,14 @@ fn times(a: Product, b: Product, exponent: i8) -> Product {
     (dimension, factor)
 }
 
-/// A run of letters within a unit, with its exponent.
+/// A run of letters within a unit, with its exponent. `is_soft` is true if the sign before it may stand for a
+/// product or for a quotient, as in `deg_s`.
 struct Term {
     letters: String,
     exponent: i8,
-    /// True if the sign before it may stand for a product or for a quotient, as in `deg_s`.
     is_soft: bool,
 }
 
-/// Splits a unit into terms; `None` if the text is not a unit.
 fn terms(text: &str) -> Option<Vec<Term>> {
     let text = text.replace('°', "deg").replace(['µ', 'μ', 'Μ'], "u").replace('″', "arcsec");
     let mut found: Vec<Term> = Vec::new();
@@ -313,37 +309,30 @@ pub(super) fn parse_unit(unit: &str) -> Option<Product> {
     }
 }
 
-/// Signs that separate the words of a column's name.
 const BETWEEN: [char; 11] = ['_', '.', ' ', '-', ',', ':', '/', '(', ')', '[', ']'];
 /// Units at the end of a name that often have another meaning: minimum, input, revision.
 const OFTEN_OTHERS: [&str; 5] = ["min", "in", "rev", "raw", "counts"];
 
-/// A unit found in the name of a column: its text, its value in SI (`factor`), and the beginning of the name
-/// before it.
+/// A unit found in the name of a column: its text, its value in SI (`factor`), the beginning of the name
+/// before it, and whether it is the end of the name.
 #[derive(Debug, PartialEq)]
 pub(super) struct Stated {
     pub text: String,
     pub factor: f64,
     pub before: String,
-    /// True if the unit is the end of the name.
     pub is_last: bool,
 }
 
-/// Reason why the unit in a name cannot be used.
 #[derive(Debug, PartialEq)]
 pub(super) enum Fault {
-    /// The unit belongs to another quantity.
     Foreign(String),
-    /// The name states two different units.
     Two(String, String),
 }
 
 /// Finds the unit of a dimension within the name of a column: `gyro [deg/s]`, `gyro{deg/s} z`, `gyro_dps`,
 /// `gyroDegPerSec`, `gyro in deg/s`, `time_ms_boot`, `TIME_US`.
 ///
-/// # Errors
-///
-/// If the name states a unit of another dimension, or two units.
+/// # Errors If the name states a unit of another dimension, or two units.
 pub(super) fn find_unit(name: &str, dimension: Dimension) -> Result<Option<Stated>, Fault> {
     let stated = |from: usize, to: usize, text: &str, factor: f64| Stated {
         text: text.trim().into(),
@@ -454,7 +443,6 @@ fn strip_unit(name: &str) -> &str {
     cut.trim_end_matches(|c| BETWEEN.contains(&c))
 }
 
-/// Finds the positions of texts in brackets.
 fn brackets(name: &str) -> Vec<(usize, usize)> {
     let mut found = Vec::new();
     for (open, close) in [('[', ']'), ('(', ')'), ('{', '}'), ('<', '>')] {
@@ -509,7 +497,6 @@ fn parted(text: &str) -> String {
 impl Quantity {
     const ALL: [Quantity; 7] = [Time, Torque, Rate, Angle, Acceleration, Length, Force];
 
-    /// Returns the exponents of kg, m, s and rad.
     pub(super) fn dimension(self) -> Dimension {
         match self {
             Time => [0, 0, 1, 0],
