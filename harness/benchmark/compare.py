@@ -121,8 +121,7 @@ def table(rows: Iterable[dict[str, str]]) -> str:
         needed = "24 of 24" if intervals else f"{specified['digits']:g}"
         agreed = kept[case, "HubSlosh"]["agreement"]
         cells.append("–" if agreed == "nan" else agreed)
-        title = f"[{specified['title']}]({case}/page.md)"
-        lines.append(f"| {title} | {needed} | {' | '.join(cells)} |")
+        lines.append(f"| `{case}` | {needed} | {' | '.join(cells)} |")
     return "\n".join(lines)
 
 

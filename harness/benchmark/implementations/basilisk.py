@@ -49,12 +49,13 @@ def bob(craft, pendulum) -> np.ndarray:
     return frame @ [np.cos(phi) * c, np.sin(phi) * c, -np.sin(theta)]
 
 
-def run(case: str) -> np.ndarray:
-    """Return the rows of a case."""
+def run(case: str, integrator: str = "RKF78", step: float | None = None) -> np.ndarray:
+    """Return the rows of a case; integrator: its name in Basilisk. step: s."""
     p = cases.parameters(case)
+    step = step or STEP[case]
     simulation = SimulationBaseClass.SimBaseClass()
     process = simulation.CreateNewProcess("process")
-    process.addTask(simulation.CreateNewTask("task", macros.sec2nano(STEP[case])))
+    process.addTask(simulation.CreateNewTask("task", macros.sec2nano(step)))
     craft = spacecraft.Spacecraft()
     craft.hub.mHub = p["mass"]
     craft.hub.r_BcB_B = column(p["center"])
@@ -67,7 +68,7 @@ def run(case: str) -> np.ndarray:
     )
     swing = sum(tank["m"] * tank["l"] * tank["p_dot_0"] for tank in p["tank"])
     craft.hub.v_CN_NInit = column((np.cross(p["omega_0"], first) + swing) / total)
-    craft.setIntegrator(svIntegrators.svIntegratorRKF78(craft))
+    craft.setIntegrator(getattr(svIntegrators, f"svIntegrator{integrator}")(craft))
     pendulums = [pendulum_of(tank) for tank in p["tank"]]
     for pendulum in pendulums:
         craft.addStateEffector(pendulum)
