@@ -303,7 +303,7 @@ def test_a_plan_file_equals_the_call_in_python(
     main()
     assert found.summary in capsys.readouterr().out
     assert found.summary in (tmp_path / "plan.html").read_text(encoding="utf-8")
-    failing = PLAN.replace("draws = 2", 'draws = 2\nrequirements = {{ phase_margin = 80 }}')
+    failing = PLAN.replace("draws = 2", "draws = 2\nrequirements = {{ phase_margin = 80 }}")
     plan(str(rows), failing)
     with pytest.raises(SystemExit, match="error: .* FAILS 1 of 1 requirement: phase margin"):
         main()
