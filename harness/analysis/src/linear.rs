@@ -20,7 +20,7 @@ use signals::fourier::Complex64;
 
 /// Parameters of the linear model of hub and liquid: inertia I0 of hub and rigid liquid about the axis, kg·m²,
 /// viscous friction b, N·m·s, torsional stiffness k of the suspension line, N·m/rad, and distance r of the tank
-/// from the axis, m. Each mode has its mass m, kg, its natural frequency and its damping ratio ζ.
+/// from the axis, m. Each mode has its mass m, kg, its natural frequency, Hz, and its damping ratio ζ.
 #[derive(Clone, Debug, Default)]
 pub struct Linear {
     pub inertia: f64,
