@@ -9,7 +9,7 @@
 /// `curvature`.
 ///
 /// With `within`, the curve stays between its two points in every interval, so that it turns where the data
-/// turn. Otherwise the intervals beside a turning point are not limited, because the true maximum lies
+/// turn. Otherwise the intervals next to a turning point are not limited, because the true maximum lies
 /// between points.
 ///
 /// # Panics If the lengths of the slices differ.
