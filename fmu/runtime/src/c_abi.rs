@@ -47,9 +47,9 @@ fn status(severity: Severity) -> Status {
 pub type Logger = Box<dyn Fn(Status, &CStr, &CStr)>;
 
 /// Sends messages to the host's logger.
+#[allow(missing_docs)]
 pub struct Log {
     logger: Option<Logger>,
-    /// Filter of the log.
     pub filter: Filter,
     /// True after the warning about the host's steps, which is given only once.
     step_warned: bool,
@@ -154,7 +154,7 @@ pub unsafe fn array<'a, T>(
         return Ok(&[]);
     }
     if pointer.is_null() {
-        return Err(null(call, name));
+        return Err(null_argument(call, name));
     }
     Ok(unsafe { std::slice::from_raw_parts(pointer, length) })
 }
@@ -170,7 +170,7 @@ pub unsafe fn array_mut<'a, T>(
         return Ok(&mut []);
     }
     if pointer.is_null() {
-        return Err(null(call, name));
+        return Err(null_argument(call, name));
     }
     Ok(unsafe { std::slice::from_raw_parts_mut(pointer, length) })
 }
@@ -181,11 +181,11 @@ pub unsafe fn array_mut<'a, T>(
 ///
 /// If the pointer is NULL.
 pub unsafe fn place<'a, T>(call: &Call, name: &str, pointer: *mut T) -> Result<&'a mut T, Fault> {
-    unsafe { pointer.as_mut() }.ok_or_else(|| null(call, name))
+    unsafe { pointer.as_mut() }.ok_or_else(|| null_argument(call, name))
 }
 
 /// Returns the fault for an argument that must not be NULL.
-pub fn null(call: &Call, name: &str) -> Fault {
+pub fn null_argument(call: &Call, name: &str) -> Fault {
     call.error(format_args!("argument {name} is NULL"))
 }
 
@@ -210,11 +210,10 @@ const LOWEST_ADDRESS: usize = 1024;
 
 /// The object to which a component handle points.
 #[repr(C)]
+#[allow(missing_docs)]
 pub struct Component<M: Model, V: Version> {
     mark: u64,
-    /// The instance with its state.
     pub instance: Instance<M, V>,
-    /// The log of the instance.
     pub log: Log,
     /// Data about the host that this version of FMI needs.
     pub host: V::Host<M>,
@@ -238,7 +237,6 @@ unsafe fn is_live<T, M: Model, V: Version>(handle: *mut c_void, kind: u64) -> bo
         && unsafe { ptr::read(handle.cast::<u64>()) } == mark::<M, V>(kind, handle)
 }
 
-/// Frees the object to which a live handle points.
 unsafe fn free<T>(handle: *mut c_void) {
     unsafe {
         // The mark is cleared, so that a later call with this handle is an error as long as the memory is
@@ -260,7 +258,7 @@ pub unsafe fn free_component<M: Model, V: Version>(handle: *mut c_void) {
 /// Runs `body` on the component behind a handle. A fault is logged and becomes the returned status; a panic
 /// makes the instance unusable.
 #[inline]
-pub unsafe fn on<M: Model, V: Version>(
+pub unsafe fn perform<M: Model, V: Version>(
     handle: *mut c_void,
     call: &'static Call,
     body: impl FnOnce(&mut Component<M, V>) -> Result<(), Fault>,
@@ -286,10 +284,10 @@ pub unsafe fn on<M: Model, V: Version>(
     status(fault.severity)
 }
 
-/// Runs `body` like [`on`], but only if the instance state allows the call. It is for calls that must not
+/// Runs `body` like [`perform`], but only if the instance state allows the call. It is for calls that must not
 /// look at their arguments otherwise.
 #[inline]
-pub unsafe fn on_allowed<M: Model, V: Version>(
+pub unsafe fn perform_if_allowed<M: Model, V: Version>(
     handle: *mut c_void,
     call: &'static Call,
     body: impl FnOnce(&mut Component<M, V>) -> Result<(), Fault>,
@@ -298,12 +296,12 @@ pub unsafe fn on_allowed<M: Model, V: Version>(
         component.instance.check(call)?;
         body(component)
     };
-    unsafe { on(handle, call, if_allowed) }
+    unsafe { perform(handle, call, if_allowed) }
 }
 
-/// Runs `body` like [`on`], and logs warnings about initial parameters and inputs if the simulation starts
+/// Runs `body` like [`perform`], and logs warnings about initial parameters and inputs if the simulation starts
 /// with this call.
-pub unsafe fn on_start<M: Model, V: Version>(
+pub unsafe fn perform_start<M: Model, V: Version>(
     handle: *mut c_void,
     call: &'static Call,
     body: impl FnOnce(&mut Component<M, V>) -> Result<(), Fault>,
@@ -316,7 +314,7 @@ pub unsafe fn on_start<M: Model, V: Version>(
         }
         Ok(())
     };
-    unsafe { on(handle, call, with_warnings) }
+    unsafe { perform(handle, call, with_warnings) }
 }
 
 fn panic_text(payload: &(dyn Any + Send)) -> &str {
@@ -345,7 +343,7 @@ pub unsafe fn filter<M: Model>(
 ) -> Result<Filter, Fault> {
     let mut names = Vec::new();
     for category in unsafe { array(call, "categories", categories, count)? } {
-        names.push(unsafe { text(*category) }.ok_or_else(|| null(call, "categories[]"))?);
+        names.push(unsafe { text(*category) }.ok_or_else(|| null_argument(call, "categories[]"))?);
     }
     Filter::from_categories(&names, M::table()).map_err(|why| call.error(why))
 }
@@ -358,7 +356,7 @@ pub unsafe fn fill<M: Model, V: Version>(
     body: impl FnOnce(&mut Instance<M, V>, &mut [f64]) -> Result<(), Fault>,
 ) -> Status {
     unsafe {
-        on_allowed::<M, V>(handle, call, |component| {
+        perform_if_allowed::<M, V>(handle, call, |component| {
             body(&mut component.instance, array_mut(call, name, pointer, length)?)
         })
     }
@@ -373,7 +371,7 @@ pub unsafe fn completed_step<M: Model, V: Version, B: From<bool>>(
 ) -> Status {
     let call = V::COMPLETED_STEP;
     unsafe {
-        on_allowed::<M, V>(handle, call, |component| {
+        perform_if_allowed::<M, V>(handle, call, |component| {
             let enter = place(call, "enterEventMode", enter_event_mode)?;
             let terminate = place(call, "terminateSimulation", terminate)?;
             *enter = component.instance.completed_integrator_step()?.into();
@@ -421,7 +419,6 @@ pub(crate) use c_functions;
 
 // ---- Saved states ----
 
-/// Marks a live saved state.
 const STATE: u64 = 0x5374_6174_6548_7562;
 
 /// The object to which a handle of a saved state points.
@@ -449,7 +446,7 @@ pub unsafe fn saved_state<'a, M: Model, V: Version>(
     handle: *mut c_void,
 ) -> Result<&'a mut Instance<M, V>, Fault> {
     if handle.is_null() {
-        return Err(null(call, name));
+        return Err(null_argument(call, name));
     }
     if !unsafe { is_live::<SavedState<M, V>, M, V>(handle, STATE) } {
         return Err(call.error(format_args!("argument {name} is not a saved state of this FMU")));
@@ -483,7 +480,7 @@ pub unsafe fn serialized_size<M: Model, V: Version>(
     size: *mut usize,
 ) -> Status {
     unsafe {
-        on_allowed::<M, V>(handle, call, |_| {
+        perform_if_allowed::<M, V>(handle, call, |_| {
             saved_state::<M, V>(call, name, saved)?;
             *place(call, "size", size)? = snapshot::size::<M>();
             Ok(())
@@ -499,7 +496,7 @@ pub unsafe fn serialize<M: Model, V: Version>(
     (bytes, size): (*mut u8, usize),
 ) -> Status {
     unsafe {
-        on_allowed::<M, V>(handle, call, |_| {
+        perform_if_allowed::<M, V>(handle, call, |_| {
             let saved = snapshot::to_bytes(saved_state::<M, V>(call, name, saved)?);
             let needed = saved.len();
             if size < needed {
@@ -521,9 +518,9 @@ pub unsafe fn deserialize<M: Model, V: Version>(
     (name, to): (&str, *mut *mut c_void),
 ) -> Status {
     unsafe {
-        on_allowed::<M, V>(handle, call, |component| {
+        perform_if_allowed::<M, V>(handle, call, |component| {
             if to.is_null() {
-                return Err(null(call, name));
+                return Err(null_argument(call, name));
             }
             let bytes = array(call, "serializedState", bytes, size)?;
             let mut saved = snapshot::from_bytes::<M, V>(bytes).map_err(|why| call.error(why))?;
@@ -583,7 +580,7 @@ mod tests {
         ];
         for (says, panics) in all {
             let status = unsafe {
-                on::<Spring, Fmi2>(c, Fmi2::RESET, |_| {
+                perform::<Spring, Fmi2>(c, Fmi2::RESET, |_| {
                     panics();
                     Ok(())
                 })

@@ -45,12 +45,11 @@ impl Events {
 /// The state of an instance in the state machine of the standard.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
+#[allow(missing_docs)]
 pub enum InstanceState {
-    /// After instantiation or reset.
     Instantiated = 0,
     /// Initialization mode: parameters and inputs are set, and initial values can be read.
     Initialization = 1,
-    /// Ready for a step (Co-Simulation).
     Stepping = 2,
     /// In event mode, at an event that the host handles.
     Event = 3,
@@ -175,16 +174,6 @@ impl Call {
         Call { name, allowed, c_type: None, only_in: None }
     }
 
-    /// Marks the function as one that reads or sets values of a type.
-    pub(crate) const fn with_type(self, c_type: CType) -> Call {
-        Call { c_type: Some(c_type), ..self }
-    }
-
-    /// Restricts the function to instances of one interface.
-    pub(crate) const fn only_in(self, interface: Interface) -> Call {
-        Call { only_in: Some(interface), ..self }
-    }
-
     /// Checks that the call is allowed.
     ///
     /// # Errors
@@ -255,14 +244,28 @@ impl Call {
     }
 }
 
+/// Creates a call that reads or sets values of a type.
+pub(crate) const fn typed(c_type: CType, name: &'static str, allowed: u16) -> Call {
+    Call { c_type: Some(c_type), ..Call::new(name, allowed) }
+}
+
+/// Restricts a call to Co-Simulation.
+pub(crate) const fn cs(call: Call) -> Call {
+    Call { only_in: Some(Interface::CoSimulation), ..call }
+}
+
+/// Restricts a call to Model Exchange.
+pub(crate) const fn me(call: Call) -> Call {
+    Call { only_in: Some(Interface::ModelExchange), ..call }
+}
+
 /// Severity of a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs)]
 pub enum Severity {
-    /// The result cannot be computed.
     Discard,
     /// The call was refused or has failed.
     Error,
-    /// The instance is unusable.
     Fatal,
 }
 

@@ -6,8 +6,8 @@ pub use crate::clock::Instant;
 
 /// Failure of a step.
 #[derive(Clone, Debug, PartialEq)]
+#[allow(missing_docs)]
 pub struct StepFailure {
-    /// Reason, as a sentence.
     pub text: String,
     /// True if a shorter step may succeed.
     pub shorter_may_succeed: bool,
@@ -22,8 +22,8 @@ impl From<&str> for StepFailure {
 
 /// End of a step that stops at events.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
 pub enum StepEnd {
-    /// The step has reached its end.
     End,
     /// The step has reached its end, where there is an event.
     EventAtEnd,

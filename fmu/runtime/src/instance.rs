@@ -31,10 +31,10 @@ pub const MAX_STATE: f64 = 1e30;
 ///
 /// A clone is a saved state, because an instance consists of nothing else.
 #[derive(Debug)]
+#[allow(missing_docs)]
 pub struct Instance<M: Model, V: Version> {
     version: PhantomData<V>,
     pub(crate) interface: Interface,
-    /// The party that handles events.
     pub(crate) events: Events,
     /// Form in which the host sees arrays: as variables, or as their elements.
     pub(crate) layout: Layout,
@@ -378,11 +378,11 @@ impl<M: Model, V: Version> Instance<M, V> {
             (None, Access::Output(get), Some(_), None) => {
                 finite(call, scalar, get(self.outputs(call)?, scalar.element))
             }
-            _ => self.get_any(call, scalar),
+            _ => self.compute_value(call, scalar),
         }
     }
 
-    fn get_any(&mut self, call: &Call, scalar: &Scalar<M>) -> Result<Value, Fault> {
+    fn compute_value(&mut self, call: &Call, scalar: &Scalar<M>) -> Result<Value, Fault> {
         let element = scalar.element;
         if let Access::Input(ramp) = scalar.access {
             return Ok(Value::Real(*ramp(&mut self.inputs, element)[0]));
@@ -445,7 +445,7 @@ impl<M: Model, V: Version> Instance<M, V> {
             let value = value(0);
             let scalar = self.check_set(call, *reference, value)?;
             if matches!(scalar.access, Access::Input(_)) {
-                self.put(scalar, value);
+                self.store(scalar, value);
                 return Ok(());
             }
         }
@@ -458,7 +458,7 @@ impl<M: Model, V: Version> Instance<M, V> {
             self.tune(call, references, &value)?;
         }
         for (n, reference) in references.iter().enumerate() {
-            self.put(scalar::<M, V>(call, *reference)?, value(n));
+            self.store(scalar::<M, V>(call, *reference)?, value(n));
         }
         Ok(())
     }
@@ -482,12 +482,11 @@ impl<M: Model, V: Version> Instance<M, V> {
             if before != Some(start) && !is_named {
                 lost.push(scalar.variable);
             }
-            self.put(scalar, start);
+            self.store(scalar, start);
         }
         lost
     }
 
-    /// Updates the discrete values that the host sees.
     fn show_discrete(&mut self, call: &Call) -> Result<(), Fault> {
         let outputs = *self.outputs(call)?;
         self.shown.clear();
@@ -504,13 +503,13 @@ impl<M: Model, V: Version> Instance<M, V> {
 
     /// Sets an input or a parameter, and drops results that depend on it.
     #[inline(always)]
-    fn put(&mut self, scalar: &Scalar<M>, value: Value) {
+    fn store(&mut self, scalar: &Scalar<M>, value: Value) {
         match (scalar.access, value) {
             (Access::Input(ramp), Value::Real(x)) => {
                 self.drop_past_slopes();
                 *ramp(&mut self.inputs, scalar.element)[0] = x;
             }
-            _ => self.put_any(scalar, value),
+            _ => self.store_parameter(scalar, value),
         }
         self.outputs = None;
         if !self.is_running() {
@@ -519,7 +518,7 @@ impl<M: Model, V: Version> Instance<M, V> {
     }
 
     /// Sets a parameter, or a continuous state if the host may set single states.
-    fn put_any(&mut self, scalar: &Scalar<M>, value: Value) {
+    fn store_parameter(&mut self, scalar: &Scalar<M>, value: Value) {
         match value {
             Value::Real(x) if V::SETS_STATES && scalar.state.is_some() => {
                 if let (Some(model), Some(place)) = (&mut self.model, scalar.state()) {
@@ -611,7 +610,6 @@ impl<M: Model, V: Version> Instance<M, V> {
         )))
     }
 
-    /// Passes changed tunable parameters to the running model.
     fn tune(
         &mut self,
         call: &Call,
@@ -703,7 +701,7 @@ impl<M: Model, V: Version> Instance<M, V> {
             return self.initial_derivative(call, unknowns, (knowns, direction), answers);
         }
         let mut along = self.inputs;
-        hold::<M>(&mut along);
+        hold_inputs::<M>(&mut along);
         self.scratch[0].fill(0.0);
         for (reference, d) in knowns.iter().zip(direction) {
             let scalar = scalar::<M, V>(call, *reference)?;
@@ -783,7 +781,6 @@ impl<M: Model, V: Version> Instance<M, V> {
         if scalar.state.is_some() || !has_derivative {
             return Ok(declared.into_iter().map(V::reference).collect());
         }
-        /// Distances of the points, in nominal values.
         const NEAR: f64 = 1e-3;
         const POINTS: u64 = 4;
         let mut depends = vec![false; declared.len()];
@@ -795,7 +792,7 @@ impl<M: Model, V: Version> Instance<M, V> {
             }
             for (known, depends) in declared.iter().zip(&mut depends).filter(|(_, is)| !**is) {
                 let mut along = near.inputs;
-                hold::<M>(&mut along);
+                hold_inputs::<M>(&mut along);
                 near.scratch[0].fill(0.0);
                 match (known.access, known.state()) {
                     (Access::Input(ramp), _) => *ramp(&mut along, known.element)[1] = 1.0,
@@ -856,7 +853,7 @@ impl<M: Model, V: Version> Instance<M, V> {
             let scalar = scalar::<M, V>(call, *reference)?;
             check_direction(call, scalar, *d)?;
             let known = [Causality::Input, Causality::Parameter];
-            let value = match self.clone().get_any(call, scalar)? {
+            let value = match self.clone().compute_value(call, scalar)? {
                 Value::Real(x) if known.contains(&scalar.variable.causality) => x,
                 _ => {
                     return Err(call.error(format_args!(
@@ -874,10 +871,10 @@ impl<M: Model, V: Version> Instance<M, V> {
         let at = |s: f64| -> Result<Vec<f64>, Fault> {
             let mut moved = self.clone();
             for ((reference, x), d) in knowns.iter().zip(&start).zip(direction) {
-                moved.put(scalar::<M, V>(call, *reference)?, Value::Real(x + s * step * d));
+                moved.store(scalar::<M, V>(call, *reference)?, Value::Real(x + s * step * d));
             }
             let values = unknowns.iter().map(|reference| {
-                match moved.get_any(call, scalar::<M, V>(call, *reference)?)? {
+                match moved.compute_value(call, scalar::<M, V>(call, *reference)?)? {
                     Value::Real(x) => Ok(x),
                     _ => Err(call.error("wrong type")),
                 }
@@ -950,7 +947,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         let now = self.clock.at(at, h);
         let mut inputs = self.inputs;
         if M::OUTPUTS_USE_SLOPES && self.past_slopes {
-            hold::<M>(&mut inputs);
+            hold_inputs::<M>(&mut inputs);
         }
         let sloped = M::set_dependent_slopes(&mut inputs, h) || self.sloped;
         let mut after = inputs;
@@ -997,13 +994,12 @@ impl<M: Model, V: Version> Instance<M, V> {
     fn drop_past_slopes(&mut self) {
         if M::OUTPUTS_USE_SLOPES && self.past_slopes {
             self.past_slopes = false;
-            hold::<M>(&mut self.inputs);
+            hold_inputs::<M>(&mut self.inputs);
         }
     }
 
     // ---- Within a step: intermediate update ----
 
-    /// Enters the state of an intermediate update.
     pub(crate) fn enter_intermediate(&mut self) {
         self.state = InstanceState::Intermediate;
     }
@@ -1063,7 +1059,7 @@ impl<M: Model, V: Version> Instance<M, V> {
 
     /// Removes the slopes, so that the inputs are held.
     pub(crate) fn drop_ramps(&mut self) {
-        hold::<M>(&mut self.inputs);
+        hold_inputs::<M>(&mut self.inputs);
         self.sloped = false;
     }
 
@@ -1399,7 +1395,6 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Evaluates a function of the model, as [`query_model`] does.
     fn query<T>(
         &mut self,
         call: &Call,
@@ -1526,8 +1521,7 @@ fn follow_slopes<M: Model>(
     Ok(())
 }
 
-/// Sets the slopes of all inputs to 0.
-fn hold<M: Model>(inputs: &mut M::Inputs) {
+fn hold_inputs<M: Model>(inputs: &mut M::Inputs) {
     for scalar in M::table().inputs() {
         if let Access::Input(ramp) = scalar.access {
             *ramp(inputs, scalar.element)[1] = 0.0;
@@ -1561,7 +1555,6 @@ fn no_value<M: Model>(call: &Call, scalar: &Scalar<M>) -> Fault {
     call.error(format_args!("{} has no value", scalar.name()))
 }
 
-/// Checks that the input may have this derivative.
 #[inline(always)]
 fn check_slope<M: Model>(
     call: &Call,
@@ -1642,7 +1635,7 @@ mod tests {
             instance.exit_initialization_mode().unwrap();
             let inputs = INPUTS.map(|n| &Trays::table().scalars[n]);
             for scalar in inputs {
-                instance.put(scalar, Value::Real(q));
+                instance.store(scalar, Value::Real(q));
             }
             instance.move_aside(share, point);
             let x = instance.model.as_ref().unwrap().continuous_states();

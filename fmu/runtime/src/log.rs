@@ -13,21 +13,19 @@ use crate::version::Version;
 
 /// Topic of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs)]
 pub enum Topic {
-    /// An event of the model.
     Event,
     /// A parameter or state is outside the range in which the model was verified.
     Warning,
-    /// A call has failed.
     Failure(Severity),
 }
 
 /// A log category of the model description.
 #[derive(Clone, Debug)]
+#[allow(missing_docs)]
 pub struct Category {
-    /// Name in the standard.
     pub name: &'static str,
-    /// Description of its messages.
     pub description: String,
     /// Topic of the messages; `None` for all topics.
     pub topic: Option<Topic>,
@@ -44,7 +42,7 @@ const NAMES: [(&str, Option<Topic>); 6] = [
 ];
 
 /// Returns the categories of a model; one without events has no `logEvents`.
-fn names_of<M: Model>(table: &Table<M>) -> &'static [(&'static str, Option<Topic>)] {
+fn category_names<M: Model>(table: &Table<M>) -> &'static [(&'static str, Option<Topic>)] {
     if table.about.events.is_empty() { &NAMES[1..] } else { &NAMES }
 }
 
@@ -60,7 +58,7 @@ pub fn categories<M: Model, V: Version>(table: &Table<M>) -> Vec<Category> {
         }
         None => "All of the above".into(),
     };
-    let all = names_of(table).iter();
+    let all = category_names(table).iter();
     all.map(|&(name, topic)| Category { name, description: description(topic), topic }).collect()
 }
 
@@ -103,7 +101,7 @@ impl Filter {
     ///
     /// If names are unknown; the text lists them and the known ones.
     pub fn from_categories<M: Model>(names: &[String], table: &Table<M>) -> Result<Filter, String> {
-        let known = names_of(table);
+        let known = category_names(table);
         if names.is_empty() {
             return Ok(Filter::ALL);
         }

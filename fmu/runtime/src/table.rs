@@ -13,16 +13,15 @@ use crate::variable::{Access, Causality, Dimension, Enumeration, Kind, Place, Va
 
 /// Properties of the FMU as a whole.
 #[derive(Clone, Copy, Debug)]
+#[allow(missing_docs)]
 pub struct About {
     /// Name of the FMU: modelName, modelIdentifier and file name.
     pub model: &'static str,
     /// Version of the model and its table.
     pub version: &'static str,
-    /// Description of the FMU.
     pub description: &'static str,
     /// Description of events for the log; "" without events.
     pub events: &'static str,
-    /// Number of event indicators.
     pub event_indicators: usize,
     /// Number of words that [`Dynamics::save`] writes.
     pub saved_words: usize,
@@ -31,12 +30,11 @@ pub struct About {
 /// All data about a model's variables. It uses no heap memory, so that a host may load and unload the FMU any
 /// number of times.
 #[derive(Debug)]
+#[allow(missing_docs)]
 pub struct Table<M: Dynamics> {
     /// Properties of the FMU as a whole.
     pub about: About,
-    /// The variables.
     pub variables: &'static [Variable<M>],
-    /// All scalars, made by [`scalars`].
     pub scalars: &'static [Scalar<M>],
     inputs: Span,
     parameters: Span,
@@ -93,8 +91,8 @@ const fn span<M: Dynamics>(scalars: &[Scalar<M>], kind: char) -> Span {
 
 /// A scalar of the table.
 #[derive(Debug)]
+#[allow(missing_docs)]
 pub struct Scalar<M: Dynamics> {
-    /// Entry of the table.
     pub variable: &'static Variable<M>,
     /// Access of the entry, copied here because every call needs it.
     pub access: Access<M>,

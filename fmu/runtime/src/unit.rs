@@ -2,8 +2,8 @@
 
 /// A unit as a product of powers of SI base units, with its display units.
 #[derive(Debug)]
+#[allow(missing_docs)]
 pub struct Unit {
-    /// Name that variables use.
     pub name: &'static str,
     /// Exponents of kg, m, s, rad; `None` if they are not integers.
     pub base: Option<[i32; 4]>,

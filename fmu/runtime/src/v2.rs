@@ -23,11 +23,11 @@ use std::sync::Arc;
 
 use crate::c_abi::{
     self, Log, Logger, array, array_mut, c_functions, c_string, completed_step, deserialize, fill,
-    filter, free_component, free_state, new_component, on, on_allowed, on_start, place, save_state,
-    saved_state, serialize, serialized_size, text,
+    filter, free_component, free_state, new_component, perform, perform_if_allowed, perform_start,
+    place, save_state, saved_state, serialize, serialized_size, text,
 };
 use crate::call::states::*;
-use crate::call::{CType, Call, Events, Fault, InstanceState, Interface, Severity};
+use crate::call::{CType, Call, Events, Fault, InstanceState, Interface, Severity, cs, me, typed};
 use crate::extent::{Extent, folder_of_uri};
 use crate::instance::Instance;
 use crate::log::Filter;
@@ -91,20 +91,6 @@ pub struct fmi2CallbackFunctions {
 }
 
 // ---- Which functions there are, and when each may be called ----
-
-const fn typed(c_type: CType, name: &'static str, allowed: u16) -> Call {
-    Call::new(name, allowed).with_type(c_type)
-}
-
-/// Restricts a call to Co-Simulation.
-const fn cs(call: Call) -> Call {
-    call.only_in(Interface::CoSimulation)
-}
-
-/// Restricts a call to Model Exchange.
-const fn me(call: Call) -> Call {
-    call.only_in(Interface::ModelExchange)
-}
 
 /// Functions of FMI 2.0 with the instance states that allow them, as far as they are not in [`Version`].
 #[allow(missing_docs)]
@@ -316,7 +302,7 @@ unsafe fn get<M: Model, T>(
     as_c: impl Fn(Value) -> Option<T>,
 ) -> fmi2Status {
     unsafe {
-        on_allowed::<M, Fmi2>(c, call, |component| {
+        perform_if_allowed::<M, Fmi2>(c, call, |component| {
             let references = array(call, "vr", vr, nvr)?;
             let places = array_mut(call, "value", value, nvr)?;
             for (reference, place) in references.iter().zip(places) {
@@ -337,7 +323,7 @@ unsafe fn set<M: Model, T: Copy>(
     from_c: impl Fn(T) -> Value,
 ) -> fmi2Status {
     unsafe {
-        on_allowed::<M, Fmi2>(c, call, |component| {
+        perform_if_allowed::<M, Fmi2>(c, call, |component| {
             let references = array(call, "vr", vr, nvr)?;
             let values = array(call, "value", value, nvr)?;
             component.instance.set(call, references, |n| from_c(values[n]))
@@ -354,7 +340,7 @@ unsafe fn write_step_status<M: Model, T>(
     known: impl FnOnce(&Instance<M, Fmi2>) -> Option<T>,
 ) -> fmi2Status {
     unsafe {
-        on_allowed::<M, Fmi2>(c, call, |component| {
+        perform_if_allowed::<M, Fmi2>(c, call, |component| {
             let place = place(call, "value", value)?;
             let value = known(&component.instance);
             *place = value
@@ -373,7 +359,7 @@ fn fmi2GetVersion() -> fmi2String = c"2.0".as_ptr();
 
 /// Selects what is logged: off means nothing, and on without categories means everything.
 fn fmi2SetDebugLogging(c: fmi2Component, loggingOn: fmi2Boolean, nCategories: usize, categories: *const fmi2String) -> fmi2Status =
-    on_allowed::<M, Fmi2>(c, &SET_DEBUG_LOGGING, |component| {
+    perform_if_allowed::<M, Fmi2>(c, &SET_DEBUG_LOGGING, |component| {
         component.log.filter = match loggingOn {
             0 => Filter::NONE,
             _ => filter::<M>(&SET_DEBUG_LOGGING, categories, nCategories)?,
@@ -390,24 +376,24 @@ fn fmi2FreeInstance(c: fmi2Component) = free_component::<M, Fmi2>(c);
 fn fmi2SetupExperiment(c: fmi2Component, toleranceDefined: fmi2Boolean, tolerance: fmi2Real, startTime: fmi2Real, stopTimeDefined: fmi2Boolean, stopTime: fmi2Real) -> fmi2Status = {
     let tolerance = (toleranceDefined != 0).then_some(tolerance);
     let stop = (stopTimeDefined != 0).then_some(stopTime);
-    on::<M, Fmi2>(c, Fmi2::SETUP_EXPERIMENT, |component| {
+    perform::<M, Fmi2>(c, Fmi2::SETUP_EXPERIMENT, |component| {
         component.instance.setup_experiment(tolerance, startTime, stop)
     })
 };
 
 fn fmi2EnterInitializationMode(c: fmi2Component) -> fmi2Status =
-    on::<M, Fmi2>(c, Fmi2::ENTER_INITIALIZATION, |component| component.instance.enter_initialization_mode());
+    perform::<M, Fmi2>(c, Fmi2::ENTER_INITIALIZATION, |component| component.instance.enter_initialization_mode());
 
 /// Leaves initialization mode. Parameters are fixed from here on; in Model Exchange only from the next call
 /// that continues the simulation.
 fn fmi2ExitInitializationMode(c: fmi2Component) -> fmi2Status =
-    on_start::<M, Fmi2>(c, Fmi2::EXIT_INITIALIZATION, |component| component.instance.exit_initialization_mode());
+    perform_start::<M, Fmi2>(c, Fmi2::EXIT_INITIALIZATION, |component| component.instance.exit_initialization_mode());
 
 fn fmi2Terminate(c: fmi2Component) -> fmi2Status =
-    on_start::<M, Fmi2>(c, Fmi2::TERMINATE, |component| component.instance.terminate());
+    perform_start::<M, Fmi2>(c, Fmi2::TERMINATE, |component| component.instance.terminate());
 
 fn fmi2Reset(c: fmi2Component) -> fmi2Status =
-    on::<M, Fmi2>(c, Fmi2::RESET, |component| component.instance.reset());
+    perform::<M, Fmi2>(c, Fmi2::RESET, |component| component.instance.reset());
 
 // ---- Values ----
 
@@ -431,7 +417,7 @@ fn fmi2SetString(c: fmi2Component, vr: *const fmi2ValueReference, nvr: usize, va
 
 fn fmi2GetDirectionalDerivative(c: fmi2Component, vUnknown_ref: *const fmi2ValueReference, nUnknown: usize, vKnown_ref: *const fmi2ValueReference, nKnown: usize, dvKnown: *const fmi2Real, dvUnknown: *mut fmi2Real) -> fmi2Status = {
     let call = Fmi2::DIRECTIONAL_DERIVATIVE;
-    on_allowed::<M, Fmi2>(c, call, |component| {
+    perform_if_allowed::<M, Fmi2>(c, call, |component| {
         let unknowns = array(call, "vUnknown_ref", vUnknown_ref, nUnknown)?;
         let knowns = array(call, "vKnown_ref", vKnown_ref, nKnown)?;
         let direction = array(call, "dvKnown", dvKnown, nKnown)?;
@@ -444,15 +430,15 @@ fn fmi2GetDirectionalDerivative(c: fmi2Component, vUnknown_ref: *const fmi2Value
 
 /// Saves the state into the existing handle, or into a new one if it is NULL.
 fn fmi2GetFMUstate(c: fmi2Component, FMUstate: *mut fmi2FMUstate) -> fmi2Status =
-    on_allowed::<M, Fmi2>(c, &GET_STATE, |component| save_state(&GET_STATE, "FMUstate", FMUstate, &component.instance));
+    perform_if_allowed::<M, Fmi2>(c, &GET_STATE, |component| save_state(&GET_STATE, "FMUstate", FMUstate, &component.instance));
 /// Restores a saved state of this or another instance, in any instance state.
 fn fmi2SetFMUstate(c: fmi2Component, FMUstate: fmi2FMUstate) -> fmi2Status =
-    on_allowed::<M, Fmi2>(c, Fmi2::SET_STATE, |component| {
+    perform_if_allowed::<M, Fmi2>(c, Fmi2::SET_STATE, |component| {
         component.instance.restore(saved_state(Fmi2::SET_STATE, "FMUstate", FMUstate)?)
     });
 /// Frees a saved state and sets the handle to NULL; NULL is allowed.
 fn fmi2FreeFMUstate(c: fmi2Component, FMUstate: *mut fmi2FMUstate) -> fmi2Status =
-    on::<M, Fmi2>(c, &FREE_STATE, |_| free_state::<M, Fmi2>(&FREE_STATE, "FMUstate", FMUstate));
+    perform::<M, Fmi2>(c, &FREE_STATE, |_| free_state::<M, Fmi2>(&FREE_STATE, "FMUstate", FMUstate));
 fn fmi2SerializedFMUstateSize(c: fmi2Component, FMUstate: fmi2FMUstate, size: *mut usize) -> fmi2Status =
     serialized_size::<M, Fmi2>(c, &SERIALIZED_SIZE, ("FMUstate", FMUstate), size);
 fn fmi2SerializeFMUstate(c: fmi2Component, FMUstate: fmi2FMUstate, serializedState: *mut fmi2Byte, size: usize) -> fmi2Status =
@@ -463,13 +449,13 @@ fn fmi2DeSerializeFMUstate(c: fmi2Component, serializedState: *const fmi2Byte, s
 // ---- Model Exchange ----
 
 fn fmi2EnterEventMode(c: fmi2Component) -> fmi2Status =
-    on_start::<M, Fmi2>(c, Fmi2::ENTER_EVENT, |component| component.instance.enter_event_mode());
+    perform_start::<M, Fmi2>(c, Fmi2::ENTER_EVENT, |component| component.instance.enter_event_mode());
 
 /// Handles the events that are due, and tells the host whether it has changed states and when the next time
 /// event is.
 fn fmi2NewDiscreteStates(c: fmi2Component, eventInfo: *mut fmi2EventInfo) -> fmi2Status = {
     let call = Fmi2::NEW_DISCRETE_STATES;
-    on_start::<M, Fmi2>(c, call, |component| {
+    perform_start::<M, Fmi2>(c, call, |component| {
         component.instance.check(call)?;
         let place = place(call, "eventInfo", eventInfo)?;
         let before = component.instance.event_count();
@@ -486,7 +472,7 @@ fn fmi2NewDiscreteStates(c: fmi2Component, eventInfo: *mut fmi2EventInfo) -> fmi
 };
 
 fn fmi2EnterContinuousTimeMode(c: fmi2Component) -> fmi2Status =
-    on_start::<M, Fmi2>(c, Fmi2::ENTER_CONTINUOUS_TIME, |component| component.instance.enter_continuous_time_mode());
+    perform_start::<M, Fmi2>(c, Fmi2::ENTER_CONTINUOUS_TIME, |component| component.instance.enter_continuous_time_mode());
 
 /// Accepts a step of the host's integrator. The FMU keeps no past, so `noSetFMUStatePriorToCurrentPoint` has
 /// no effect.
@@ -494,11 +480,11 @@ fn fmi2CompletedIntegratorStep(c: fmi2Component, _noSetFMUStatePriorToCurrentPoi
     completed_step::<M, Fmi2, _>(c, enterEventMode, terminateSimulation);
 
 fn fmi2SetTime(c: fmi2Component, time: fmi2Real) -> fmi2Status =
-    on_start::<M, Fmi2>(c, Fmi2::SET_TIME, |component| component.instance.set_time(time));
+    perform_start::<M, Fmi2>(c, Fmi2::SET_TIME, |component| component.instance.set_time(time));
 
 fn fmi2SetContinuousStates(c: fmi2Component, x: *const fmi2Real, nx: usize) -> fmi2Status = {
     let call = Fmi2::SET_CONTINUOUS_STATES;
-    on_start::<M, Fmi2>(c, call, |component| {
+    perform_start::<M, Fmi2>(c, call, |component| {
         component.instance.check(call)?;
         component.instance.set_continuous_states(array(call, "x", x, nx)?)
     })
@@ -518,7 +504,7 @@ fn fmi2GetNominalsOfContinuousStates(c: fmi2Component, x_nominal: *mut fmi2Real,
 /// Sets the slopes of inputs for the next step.
 fn fmi2SetRealInputDerivatives(c: fmi2Component, vr: *const fmi2ValueReference, nvr: usize, order: *const fmi2Integer, value: *const fmi2Real) -> fmi2Status = {
     let call = Fmi2::SET_INPUT_DERIVATIVES;
-    on_allowed::<M, Fmi2>(c, call, |component| {
+    perform_if_allowed::<M, Fmi2>(c, call, |component| {
         let references = array(call, "vr", vr, nvr)?;
         let orders = array(call, "order", order, nvr)?;
         component.instance.set_input_derivatives(references, orders, array(call, "value", value, nvr)?)
@@ -528,7 +514,7 @@ fn fmi2SetRealInputDerivatives(c: fmi2Component, vr: *const fmi2ValueReference, 
 /// Computes the time derivatives of outputs at the end of the last step; only order 1 is supported.
 fn fmi2GetRealOutputDerivatives(c: fmi2Component, vr: *const fmi2ValueReference, nvr: usize, order: *const fmi2Integer, value: *mut fmi2Real) -> fmi2Status = {
     let call = Fmi2::GET_OUTPUT_DERIVATIVES;
-    on_allowed::<M, Fmi2>(c, call, |component| {
+    perform_if_allowed::<M, Fmi2>(c, call, |component| {
         let references = array(call, "vr", vr, nvr)?;
         let orders = array(call, "order", order, nvr)?;
         component.instance.output_derivatives(references, orders, array_mut(call, "value", value, nvr)?)
@@ -538,7 +524,7 @@ fn fmi2GetRealOutputDerivatives(c: fmi2Component, vr: *const fmi2ValueReference,
 /// Makes one step. The FMU keeps no past, so `noSetFMUStatePriorToCurrentPoint` has no effect.
 fn fmi2DoStep(c: fmi2Component, currentCommunicationPoint: fmi2Real, communicationStepSize: fmi2Real, _noSetFMUStatePriorToCurrentPoint: fmi2Boolean) -> fmi2Status = {
     let call = Fmi2::DO_STEP;
-    on::<M, Fmi2>(c, call, |component| {
+    perform::<M, Fmi2>(c, call, |component| {
         let before = component.instance.event_count();
         component.instance.do_step(currentCommunicationPoint, communicationStepSize)?;
         component.log.report_event(call, before, &component.instance);
@@ -549,7 +535,7 @@ fn fmi2DoStep(c: fmi2Component, currentCommunicationPoint: fmi2Real, communicati
 
 /// Refuses the call, because steps are never asynchronous.
 fn fmi2CancelStep(c: fmi2Component) -> fmi2Status =
-    on_allowed::<M, Fmi2>(c, &CANCEL_STEP, |_| {
+    perform_if_allowed::<M, Fmi2>(c, &CANCEL_STEP, |_| {
         Err(CANCEL_STEP.error("no step is running: fmi2DoStep returns when the step is done"))
     });
 

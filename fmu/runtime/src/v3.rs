@@ -49,8 +49,8 @@ use self::model_exchange::{fill_states, set_states, state_count, write_count};
 use self::stepping::{Answers, do_step, output_derivatives};
 use self::values::{access_no_variable, get, get_sizes, set, set_sizes};
 use crate::c_abi::{
-    c_functions, completed_step, deserialize, fill, filter, free_component, free_state, on,
-    on_allowed, on_start, place, save_state, saved_state, serialize, serialized_size,
+    c_functions, completed_step, deserialize, fill, filter, free_component, free_state, perform,
+    perform_if_allowed, perform_start, place, save_state, saved_state, serialize, serialized_size,
 };
 use crate::call::states::*;
 use crate::call::{Call, InstanceState, Interface};
@@ -68,7 +68,7 @@ fn fmi3GetVersion() -> fmi3String = c"3.0".as_ptr();
 
 /// Selects what is logged. Failures are always logged.
 fn fmi3SetDebugLogging(instance: fmi3Instance, loggingOn: fmi3Boolean, nCategories: usize, categories: *const fmi3String) -> fmi3Status =
-    on_allowed::<M, Fmi3>(instance, &SET_DEBUG_LOGGING, |component| {
+    perform_if_allowed::<M, Fmi3>(instance, &SET_DEBUG_LOGGING, |component| {
         let filter = filter::<M>(&SET_DEBUG_LOGGING, categories, nCategories)?;
         component.log.filter = if loggingOn == 0 { Filter::ERRORS } else { filter.with_errors() };
         Ok(())
@@ -103,19 +103,19 @@ fn fmi3FreeInstance(instance: fmi3Instance) = free_component::<M, Fmi3>(instance
 fn fmi3EnterInitializationMode(instance: fmi3Instance, toleranceDefined: fmi3Boolean, tolerance: fmi3Float64, startTime: fmi3Float64, stopTimeDefined: fmi3Boolean, stopTime: fmi3Float64) -> fmi3Status = {
     let tolerance = (toleranceDefined != 0).then_some(tolerance);
     let stop = (stopTimeDefined != 0).then_some(stopTime);
-    on::<M, Fmi3>(instance, Fmi3::ENTER_INITIALIZATION, |component| {
+    perform::<M, Fmi3>(instance, Fmi3::ENTER_INITIALIZATION, |component| {
         component.instance.setup_experiment(tolerance, startTime, stop)?;
         component.instance.enter_initialization_mode()
     })
 };
 fn fmi3ExitInitializationMode(instance: fmi3Instance) -> fmi3Status =
-    on_start::<M, Fmi3>(instance, Fmi3::EXIT_INITIALIZATION, |component| component.instance.exit_initialization_mode());
+    perform_start::<M, Fmi3>(instance, Fmi3::EXIT_INITIALIZATION, |component| component.instance.exit_initialization_mode());
 fn fmi3EnterEventMode(instance: fmi3Instance) -> fmi3Status =
-    on::<M, Fmi3>(instance, Fmi3::ENTER_EVENT, |component| component.instance.enter_event_mode());
+    perform::<M, Fmi3>(instance, Fmi3::ENTER_EVENT, |component| component.instance.enter_event_mode());
 fn fmi3Terminate(instance: fmi3Instance) -> fmi3Status =
-    on::<M, Fmi3>(instance, Fmi3::TERMINATE, |component| component.instance.terminate());
+    perform::<M, Fmi3>(instance, Fmi3::TERMINATE, |component| component.instance.terminate());
 fn fmi3Reset(instance: fmi3Instance) -> fmi3Status =
-    on::<M, Fmi3>(instance, Fmi3::RESET, |component| {
+    perform::<M, Fmi3>(instance, Fmi3::RESET, |component| {
         component.instance.reset()?;
         resize(component);
         Ok(())
@@ -193,17 +193,17 @@ fn fmi3GetVariableDependencies(instance: fmi3Instance, dependent: fmi3ValueRefer
 };
 /// Saves the state into the existing handle, or into a new one if it is NULL.
 fn fmi3GetFMUState(instance: fmi3Instance, FMUState: *mut fmi3FMUState) -> fmi3Status =
-    on_allowed::<M, Fmi3>(instance, &GET_STATE, |component| save_state(&GET_STATE, "FMUState", FMUState, &component.instance));
+    perform_if_allowed::<M, Fmi3>(instance, &GET_STATE, |component| save_state(&GET_STATE, "FMUState", FMUState, &component.instance));
 /// Restores a saved state of this or another instance, in any instance state.
 fn fmi3SetFMUState(instance: fmi3Instance, FMUState: fmi3FMUState) -> fmi3Status =
-    on_allowed::<M, Fmi3>(instance, Fmi3::SET_STATE, |component| {
+    perform_if_allowed::<M, Fmi3>(instance, Fmi3::SET_STATE, |component| {
         component.instance.restore(saved_state(Fmi3::SET_STATE, "FMUState", FMUState)?)?;
         resize(component);
         Ok(())
     });
 /// Frees a saved state and sets the handle to NULL; NULL is allowed.
 fn fmi3FreeFMUState(instance: fmi3Instance, FMUState: *mut fmi3FMUState) -> fmi3Status =
-    on::<M, Fmi3>(instance, &FREE_STATE, |_| free_state::<M, Fmi3>(&FREE_STATE, "FMUState", FMUState));
+    perform::<M, Fmi3>(instance, &FREE_STATE, |_| free_state::<M, Fmi3>(&FREE_STATE, "FMUState", FMUState));
 fn fmi3SerializedFMUStateSize(instance: fmi3Instance, FMUState: fmi3FMUState, size: *mut usize) -> fmi3Status =
     serialized_size::<M, Fmi3>(instance, &SERIALIZED_SIZE, ("FMUState", FMUState), size);
 fn fmi3SerializeFMUState(instance: fmi3Instance, FMUState: fmi3FMUState, serializedState: *mut fmi3Byte, size: usize) -> fmi3Status =
@@ -218,11 +218,11 @@ fn fmi3GetAdjointDerivative(instance: fmi3Instance, unknowns: *const fmi3ValueRe
 // ---- Configuration; clocks, of which there are none ----
 
 fn fmi3EnterConfigurationMode(instance: fmi3Instance) -> fmi3Status =
-    on::<M, Fmi3>(instance, &ENTER_CONFIGURATION, |component| {
+    perform::<M, Fmi3>(instance, &ENTER_CONFIGURATION, |component| {
         component.instance.configure(&ENTER_CONFIGURATION, InstanceState::Configuration)
     });
 fn fmi3ExitConfigurationMode(instance: fmi3Instance) -> fmi3Status =
-    on::<M, Fmi3>(instance, &EXIT_CONFIGURATION, |component| {
+    perform::<M, Fmi3>(instance, &EXIT_CONFIGURATION, |component| {
         component.instance.configure(&EXIT_CONFIGURATION, InstanceState::Instantiated)
     });
 fn fmi3GetIntervalDecimal(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, _intervals: *mut fmi3Float64, _qualifiers: *mut fmi3IntervalQualifier) -> fmi3Status =
@@ -246,12 +246,12 @@ fn fmi3SetShiftFraction(instance: fmi3Instance, valueReferences: *const fmi3Valu
 
 /// Does nothing, because fmi3UpdateDiscreteStates evaluates everything.
 fn fmi3EvaluateDiscreteStates(instance: fmi3Instance) -> fmi3Status =
-    on_allowed::<M, Fmi3>(instance, &EVALUATE_DISCRETE_STATES, |_| Ok(()));
+    perform_if_allowed::<M, Fmi3>(instance, &EVALUATE_DISCRETE_STATES, |_| Ok(()));
 /// Handles the events that are due, and tells the host whether it has changed states and when the next time
 /// event is.
 fn fmi3UpdateDiscreteStates(instance: fmi3Instance, discreteStatesNeedUpdate: *mut fmi3Boolean, terminateSimulation: *mut fmi3Boolean, nominalsOfContinuousStatesChanged: *mut fmi3Boolean, valuesOfContinuousStatesChanged: *mut fmi3Boolean, nextEventTimeDefined: *mut fmi3Boolean, nextEventTime: *mut fmi3Float64) -> fmi3Status = {
     let call = Fmi3::NEW_DISCRETE_STATES;
-    on_allowed::<M, Fmi3>(instance, call, |component| {
+    perform_if_allowed::<M, Fmi3>(instance, call, |component| {
         let need_update = place(call, "discreteStatesNeedUpdate", discreteStatesNeedUpdate)?;
         let terminate = place(call, "terminateSimulation", terminateSimulation)?;
         let nominals_changed = place(call, "nominalsOfContinuousStatesChanged", nominalsOfContinuousStatesChanged)?;
@@ -269,13 +269,13 @@ fn fmi3UpdateDiscreteStates(instance: fmi3Instance, discreteStatesNeedUpdate: *m
     })
 };
 fn fmi3EnterContinuousTimeMode(instance: fmi3Instance) -> fmi3Status =
-    on::<M, Fmi3>(instance, Fmi3::ENTER_CONTINUOUS_TIME, |component| component.instance.enter_continuous_time_mode());
+    perform::<M, Fmi3>(instance, Fmi3::ENTER_CONTINUOUS_TIME, |component| component.instance.enter_continuous_time_mode());
 /// Accepts a step of the host's integrator. The FMU keeps no past, so `noSetFMUStatePriorToCurrentPoint` has
 /// no effect.
 fn fmi3CompletedIntegratorStep(instance: fmi3Instance, _noSetFMUStatePriorToCurrentPoint: fmi3Boolean, enterEventMode: *mut fmi3Boolean, terminateSimulation: *mut fmi3Boolean) -> fmi3Status =
     completed_step::<M, Fmi3, _>(instance, enterEventMode, terminateSimulation);
 fn fmi3SetTime(instance: fmi3Instance, time: fmi3Float64) -> fmi3Status =
-    on::<M, Fmi3>(instance, Fmi3::SET_TIME, |component| component.instance.set_time(time));
+    perform::<M, Fmi3>(instance, Fmi3::SET_TIME, |component| component.instance.set_time(time));
 fn fmi3SetContinuousStates(instance: fmi3Instance, continuousStates: *const fmi3Float64, nContinuousStates: usize) -> fmi3Status =
     set_states::<M>(instance, (continuousStates, nContinuousStates));
 fn fmi3GetContinuousStateDerivatives(instance: fmi3Instance, derivatives: *mut fmi3Float64, nContinuousStates: usize) -> fmi3Status =
@@ -297,7 +297,7 @@ fn fmi3GetNumberOfContinuousStates(instance: fmi3Instance, nContinuousStates: *m
 // ---- Co-Simulation ----
 
 fn fmi3EnterStepMode(instance: fmi3Instance) -> fmi3Status =
-    on::<M, Fmi3>(instance, &ENTER_STEP, |component| component.instance.enter_step_mode(&ENTER_STEP));
+    perform::<M, Fmi3>(instance, &ENTER_STEP, |component| component.instance.enter_step_mode(&ENTER_STEP));
 fn fmi3GetOutputDerivatives(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, orders: *const fmi3Int32, values: *mut fmi3Float64, nValues: usize) -> fmi3Status =
     output_derivatives::<M>(instance, (valueReferences, nValueReferences), orders, (values, nValues));
 fn fmi3DoStep(instance: fmi3Instance, currentCommunicationPoint: fmi3Float64, communicationStepSize: fmi3Float64, _noSetFMUStatePriorToCurrentPoint: fmi3Boolean, eventHandlingNeeded: *mut fmi3Boolean, terminateSimulation: *mut fmi3Boolean, earlyReturn: *mut fmi3Boolean, lastSuccessfulTime: *mut fmi3Float64) -> fmi3Status = {
@@ -313,7 +313,7 @@ fn fmi3DoStep(instance: fmi3Instance, currentCommunicationPoint: fmi3Float64, co
 /// Fails, because there are no model partitions.
 fn fmi3ActivateModelPartition(instance: fmi3Instance, _clockReference: fmi3ValueReference, _activationTime: fmi3Float64) -> fmi3Status = {
     const CALL: &Call = &Call::new("fmi3ActivateModelPartition", ANY);
-    on_allowed::<M, Fmi3>(instance, CALL, |_| Err(CALL.error("this FMU has no Scheduled Execution")))
+    perform_if_allowed::<M, Fmi3>(instance, CALL, |_| Err(CALL.error("this FMU has no Scheduled Execution")))
 };
 
 }

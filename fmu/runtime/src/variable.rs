@@ -6,12 +6,11 @@ use crate::number::{is_finite, text};
 
 /// The value of one scalar in the C interface. Enumerations are integers.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
 pub enum Value {
-    /// A real number.
     Real(f64),
     /// An integer, or the number of an enumeration's item.
     Integer(i32),
-    /// A Boolean.
     Boolean(bool),
 }
 
@@ -46,40 +45,34 @@ impl Value {
 
 /// The role of a variable, as in FMI.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs)]
 pub enum Causality {
     /// Set by the host, at any time.
     Input,
-    /// A result to connect or plot.
     Output,
-    /// Internal value.
     Local,
     /// Set by the host before the end of initialization mode.
     Parameter,
-    /// Computed from the parameters.
     CalculatedParameter,
 }
 
 /// A real quantity with its unit, one of [`crate::unit::UNITS`].
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
 pub struct Quantity {
     /// Unit, SI; "" if it depends on parameters.
     pub unit: &'static str,
-    /// Unit for display.
     pub display_unit: Option<&'static str>,
-    /// Smallest value allowed.
     pub min: Option<f64>,
-    /// Largest value allowed.
     pub max: Option<f64>,
-    /// Order of magnitude.
     pub nominal: Option<f64>,
 }
 
 /// An item of an enumeration; the first item has the number 1.
 #[derive(Clone, Copy, Debug)]
+#[allow(missing_docs)]
 pub struct Item {
-    /// Name.
     pub name: &'static str,
-    /// Meaning of the item.
     pub description: &'static str,
 }
 
@@ -103,30 +96,20 @@ impl Item {
 
 /// An enumeration type.
 #[derive(Debug)]
+#[allow(missing_docs)]
 pub struct Enumeration {
-    /// Name of the type.
     pub name: &'static str,
-    /// Purpose of the enumeration.
     pub description: &'static str,
-    /// Items.
     pub items: &'static [Item],
 }
 
 /// A variable's type.
 #[derive(Clone, Copy, Debug)]
+#[allow(missing_docs)]
 pub enum Kind {
-    /// A quantity with a unit.
     Real(Quantity),
-    /// An integer.
-    Integer {
-        /// Smallest value allowed.
-        min: Option<i32>,
-        /// Largest value allowed.
-        max: Option<i32>,
-    },
-    /// A truth value.
+    Integer { min: Option<i32>, max: Option<i32> },
     Boolean,
-    /// Item of an enumeration.
     Enumeration(&'static Enumeration),
 }
 
@@ -135,8 +118,8 @@ pub type Place = fn(usize) -> usize;
 
 /// Length of an array along one dimension.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs)]
 pub enum Dimension {
-    /// Constant length.
     Fixed(usize),
     /// Length given by the integer parameter of this name, and the largest length. If every element is a
     /// variable of its own, the largest length always applies; if the array is one variable, the parameter is
@@ -182,22 +165,19 @@ pub enum Access<M: Dynamics> {
     Calculated(fn(&M, usize) -> f64),
     /// A continuous state that is not an output.
     State,
-    /// The derivative of a continuous state.
     Derivative(Place),
 }
 
 /// A scalar variable or an array.
 #[derive(Debug)]
+#[allow(missing_docs)]
 pub struct Variable<M: Dynamics> {
     /// Name. The element of an array has its indices, counted from 1, in the empty brackets of the name;
     /// further indices follow in brackets of their own. For example `tank[].p` with the shape 4, 3, 3 has the
     /// elements `tank[1].p[1,1]`, `tank[1].p[1,2]`, …
     pub name: &'static str,
-    /// Description with sign and frame.
     pub description: &'static str,
-    /// Causality.
     pub causality: Causality,
-    /// Type.
     pub kind: Kind,
     /// Access to its value in the model.
     pub access: Access<M>,
@@ -265,48 +245,68 @@ const fn quantity(unit: &'static str) -> Kind {
     Kind::Real(Quantity { unit, display_unit: None, min: None, max: None, nominal: None })
 }
 
-impl<M: Dynamics> Variable<M> {
+/// Defines functions that declare a variable: arguments between name and description, causality, type and
+/// access.
+macro_rules! declarations {
+    ($($(#[$doc:meta])* $function:ident($($argument:ident: $type:ty),*) =
+        $causality:ident, $kind:expr, $access:expr;)*) => {
+        impl<M: Dynamics> Variable<M> {
+            $(
+                $(#[$doc])*
+                pub const fn $function(
+                    name: &'static str,
+                    $($argument: $type,)*
+                    description: &'static str,
+                ) -> Self {
+                    variable(name, Causality::$causality, $kind, $access, description)
+                }
+            )*
+        }
+    };
+}
+
+const INTEGER: Kind = Kind::Integer { min: None, max: None };
+
+declarations! {
     /// Declares an input with its value and slope.
-    pub const fn input(
-        name: &'static str,
-        ramp: fn(&mut M::Inputs, usize) -> [&mut f64; 2],
-        unit: &'static str,
-        description: &'static str,
-    ) -> Self {
-        variable(name, Causality::Input, quantity(unit), Access::Input(ramp), description)
-    }
-
+    input(ramp: fn(&mut M::Inputs, usize) -> [&mut f64; 2], unit: &'static str) =
+        Input, quantity(unit), Access::Input(ramp);
     /// Declares an output; `get` reads element n from the model's outputs.
-    pub const fn output(
-        name: &'static str,
-        get: fn(&M::Outputs, usize) -> f64,
-        unit: &'static str,
-        description: &'static str,
-    ) -> Self {
-        variable(name, Causality::Output, quantity(unit), Access::Output(get), description)
-    }
-
+    output(get: fn(&M::Outputs, usize) -> f64, unit: &'static str) = Output, quantity(unit), Access::Output(get);
     /// Declares a real local variable; `get` reads element n from the model's outputs.
-    pub const fn local(
-        name: &'static str,
-        get: fn(&M::Outputs, usize) -> f64,
-        unit: &'static str,
-        description: &'static str,
-    ) -> Self {
-        variable(name, Causality::Local, quantity(unit), Access::Output(get), description)
-    }
-
+    local(get: fn(&M::Outputs, usize) -> f64, unit: &'static str) = Local, quantity(unit), Access::Output(get);
     /// Declares a real local variable that follows only from parameters and present inputs, with its rate for
     /// the inputs' slopes.
-    pub const fn local_of_inputs(
-        name: &'static str,
-        get: fn(&M, &M::Inputs, usize) -> [f64; 2],
-        unit: &'static str,
-        description: &'static str,
-    ) -> Self {
-        variable(name, Causality::Local, quantity(unit), Access::OfInputs(get), description)
-    }
+    local_of_inputs(get: fn(&M, &M::Inputs, usize) -> [f64; 2], unit: &'static str) =
+        Local, quantity(unit), Access::OfInputs(get);
+    /// Declares the derivative of a continuous state, whose name is "der(", the name of the state, and ")".
+    derivative(of: Place, unit: &'static str) = Local, quantity(unit), Access::Derivative(of);
+    /// Declares a Boolean local variable; `get` reads element n from the model's outputs.
+    local_boolean(get: fn(&M::Outputs, usize) -> bool) = Local, Kind::Boolean, Access::OutputBoolean(get);
+    /// Declares an integer local variable; `get` reads element n from the model's outputs.
+    local_integer(get: fn(&M::Outputs, usize) -> i32) = Local, INTEGER, Access::OutputInteger(get);
+    /// Declares a local variable that is an enumeration; `get` reads element n from the model's outputs.
+    local_enumeration(of: &'static Enumeration, get: fn(&M::Outputs, usize) -> i32) =
+        Local, Kind::Enumeration(of), Access::OutputInteger(get);
+    /// Declares a real parameter; `field` returns the place of element n in the model's parameters.
+    parameter(field: fn(&mut M::Parameters, usize) -> &mut f64, unit: &'static str) =
+        Parameter, quantity(unit), Access::Real(field);
+    /// Declares a Boolean parameter; `field` returns its place in the model's parameters.
+    switch(field: fn(&mut M::Parameters) -> &mut bool) = Parameter, Kind::Boolean, Access::Boolean(field);
+    /// Declares an integer parameter; `field` returns the place of element n in the model's parameters.
+    integer(field: fn(&mut M::Parameters, usize) -> &mut i32) = Parameter, INTEGER, Access::Integer(field);
+    /// Declares an integer parameter that the model stores in another type, which `get` and `set` convert.
+    count(get: fn(&M::Parameters, usize) -> i32, set: fn(&mut M::Parameters, usize, i32)) =
+        Parameter, INTEGER, Access::Choice { get, set };
+    /// Declares a parameter that is an enumeration; `get` and `set` convert the item to its number.
+    choice(of: &'static Enumeration, get: fn(&M::Parameters, usize) -> i32, set: fn(&mut M::Parameters, usize, i32)) =
+        Parameter, Kind::Enumeration(of), Access::Choice { get, set };
+    /// Declares a calculated parameter; `get` computes element n from the model with its parameters.
+    calculated(get: fn(&M, usize) -> f64, unit: &'static str) =
+        CalculatedParameter, quantity(unit), Access::Calculated(get);
+}
 
+impl<M: Dynamics> Variable<M> {
     /// Declares a continuous state that is not an output.
     pub const fn state(
         name: &'static str,
@@ -315,109 +315,6 @@ impl<M: Dynamics> Variable<M> {
         description: &'static str,
     ) -> Self {
         variable(name, Causality::Local, quantity(unit), Access::State, description).is_state(place)
-    }
-
-    /// Declares the derivative of a continuous state, whose name is "der(", the name of the state, and ")".
-    pub const fn derivative(
-        name: &'static str,
-        of: Place,
-        unit: &'static str,
-        description: &'static str,
-    ) -> Self {
-        variable(name, Causality::Local, quantity(unit), Access::Derivative(of), description)
-    }
-
-    /// Declares a Boolean local variable; `get` reads element n from the model's outputs.
-    pub const fn local_boolean(
-        name: &'static str,
-        get: fn(&M::Outputs, usize) -> bool,
-        description: &'static str,
-    ) -> Self {
-        variable(name, Causality::Local, Kind::Boolean, Access::OutputBoolean(get), description)
-    }
-
-    /// Declares an integer local variable; `get` reads element n from the model's outputs.
-    pub const fn local_integer(
-        name: &'static str,
-        get: fn(&M::Outputs, usize) -> i32,
-        description: &'static str,
-    ) -> Self {
-        let kind = Kind::Integer { min: None, max: None };
-        variable(name, Causality::Local, kind, Access::OutputInteger(get), description)
-    }
-
-    /// Declares a local variable that is an enumeration.
-    pub const fn local_enumeration(
-        name: &'static str,
-        of: &'static Enumeration,
-        get: fn(&M::Outputs, usize) -> i32,
-        description: &'static str,
-    ) -> Self {
-        let kind = Kind::Enumeration(of);
-        variable(name, Causality::Local, kind, Access::OutputInteger(get), description)
-    }
-
-    /// Declares a real parameter; `field` returns the place of element n in the model's parameters.
-    pub const fn parameter(
-        name: &'static str,
-        field: fn(&mut M::Parameters, usize) -> &mut f64,
-        unit: &'static str,
-        description: &'static str,
-    ) -> Self {
-        variable(name, Causality::Parameter, quantity(unit), Access::Real(field), description)
-    }
-
-    /// Declares a Boolean parameter; `field` returns its place in the model's parameters.
-    pub const fn switch(
-        name: &'static str,
-        field: fn(&mut M::Parameters) -> &mut bool,
-        description: &'static str,
-    ) -> Self {
-        variable(name, Causality::Parameter, Kind::Boolean, Access::Boolean(field), description)
-    }
-
-    /// Declares an integer parameter; `field` returns the place of element n in the model's parameters.
-    pub const fn integer(
-        name: &'static str,
-        field: fn(&mut M::Parameters, usize) -> &mut i32,
-        description: &'static str,
-    ) -> Self {
-        let kind = Kind::Integer { min: None, max: None };
-        variable(name, Causality::Parameter, kind, Access::Integer(field), description)
-    }
-
-    /// Declares an integer parameter that the model stores in another type.
-    pub const fn count(
-        name: &'static str,
-        get: fn(&M::Parameters, usize) -> i32,
-        set: fn(&mut M::Parameters, usize, i32),
-        description: &'static str,
-    ) -> Self {
-        let kind = Kind::Integer { min: None, max: None };
-        variable(name, Causality::Parameter, kind, Access::Choice { get, set }, description)
-    }
-
-    /// Declares a parameter that is an enumeration.
-    pub const fn choice(
-        name: &'static str,
-        of: &'static Enumeration,
-        get: fn(&M::Parameters, usize) -> i32,
-        set: fn(&mut M::Parameters, usize, i32),
-        description: &'static str,
-    ) -> Self {
-        let kind = Kind::Enumeration(of);
-        variable(name, Causality::Parameter, kind, Access::Choice { get, set }, description)
-    }
-
-    /// Declares a calculated parameter; `get` computes element n from the model with its parameters.
-    pub const fn calculated(
-        name: &'static str,
-        get: fn(&M, usize) -> f64,
-        unit: &'static str,
-        description: &'static str,
-    ) -> Self {
-        let access = Access::Calculated(get);
-        variable(name, Causality::CalculatedParameter, quantity(unit), access, description)
     }
 
     /// Sets the unit in which hosts show the variable by default.

@@ -2,7 +2,7 @@
 //! elsewhere, and events that the host handles in Co-Simulation, too.
 
 use super::*;
-use crate::call::{CType, Call, Events, InstanceState};
+use crate::call::{CType, Call, Events, InstanceState, typed};
 use crate::table::{Layout, Scalar};
 use crate::version::Version;
 
@@ -15,7 +15,7 @@ const fn call(name: &'static str) -> Call {
     Call::new(name, u16::MAX)
 }
 
-static GET_FLOAT: Call = call("otherGetFloat").with_type(CType::Real);
+static GET_FLOAT: Call = typed(CType::Real, "otherGetFloat", u16::MAX);
 
 #[rustfmt::skip]
 impl Version for Other {
@@ -34,10 +34,10 @@ impl Version for Other {
     const TERMINATE:              &'static Call = &call("otherTerminate");
     const RESET:                  &'static Call = &call("otherReset");
     const SET_STATE:              &'static Call = &call("otherSetState");
-    const DIRECTIONAL_DERIVATIVE: &'static Call = &call("otherDirectionalDerivative").with_type(CType::Real);
+    const DIRECTIONAL_DERIVATIVE: &'static Call = &typed(CType::Real, "otherDirectionalDerivative", u16::MAX);
 
-    const SET_INPUT_DERIVATIVES:  &'static Call = &call("otherSetInputDerivatives").with_type(CType::Real);
-    const GET_OUTPUT_DERIVATIVES: &'static Call = &call("otherGetOutputDerivatives").with_type(CType::Real);
+    const SET_INPUT_DERIVATIVES:  &'static Call = &typed(CType::Real, "otherSetInputDerivatives", u16::MAX);
+    const GET_OUTPUT_DERIVATIVES: &'static Call = &typed(CType::Real, "otherGetOutputDerivatives", u16::MAX);
     const DO_STEP:                &'static Call = &call("otherDoStep");
 
     const ENTER_EVENT:            &'static Call = &call("otherEnterEventMode");

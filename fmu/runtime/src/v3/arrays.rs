@@ -17,7 +17,6 @@ pub struct Arrays {
     scalars: Vec<u32>,
     /// End of each variable's elements in `scalars`.
     ends: Vec<usize>,
-    /// The C type of each variable.
     types: Vec<CType>,
     /// For each scalar its array and its position in it, counted from 1; position 0 is outside the present
     /// size.
@@ -106,7 +105,6 @@ fn first_derivative<M: Model>() -> usize {
     M::table().derivatives().first().map_or(0, |scalar| scalar.index as usize)
 }
 
-/// Returns the value of a parameter that sizes arrays.
 fn size_of<M: Model>(parameters: &[Value], name: &str) -> usize {
     let is_it = |scalar: &&Scalar<M>| scalar.variable.name == name;
     let slot = M::table().parameters().iter().find(is_it).map(|scalar| scalar.slot);

@@ -3,24 +3,10 @@
 use super::host::Host;
 use super::references::{scalar_reference, type_of, wrong_reference};
 use crate::call::states::*;
-use crate::call::{CType, Call, Events, InstanceState, Interface, Severity};
+use crate::call::{CType, Call, Events, InstanceState, Interface, Severity, cs, me, typed};
 use crate::model::Model;
 use crate::table::{Layout, Scalar};
 use crate::version::Version;
-
-pub(super) const fn typed(c_type: CType, name: &'static str, allowed: u16) -> Call {
-    Call::new(name, allowed).with_type(c_type)
-}
-
-/// Restricts a call to Co-Simulation.
-const fn cs(call: Call) -> Call {
-    call.only_in(Interface::CoSimulation)
-}
-
-/// Restricts a call to Model Exchange.
-const fn me(call: Call) -> Call {
-    call.only_in(Interface::ModelExchange)
-}
 
 /// Instance states in which values can be read and set.
 pub(super) const GET: u16 = ANY;

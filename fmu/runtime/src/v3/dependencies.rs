@@ -6,7 +6,7 @@ use super::calls::*;
 use super::elements::{check_numbers, wrong_variable};
 use super::references::wrong_reference;
 use super::types::*;
-use crate::c_abi::{Component, array_mut, on_allowed};
+use crate::c_abi::{Component, array_mut, perform_if_allowed};
 use crate::call::{Call, Fault};
 use crate::model::Model;
 use crate::variable::Causality;
@@ -69,7 +69,7 @@ pub(super) unsafe fn write_dependencies<M: Model>(
 ) -> fmi3Status {
     let call = &DEPENDENCIES;
     unsafe {
-        on_allowed::<M, Fmi3>(instance, call, |component| {
+        perform_if_allowed::<M, Fmi3>(instance, call, |component| {
             let all = dependencies(component, call, dependent)?;
             check_numbers(call, "nDependencies", n, all.len())?;
             let elements = array_mut(call, "elementIndicesOfDependent", elements, n)?;

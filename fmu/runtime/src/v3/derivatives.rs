@@ -6,7 +6,7 @@ use super::calls::*;
 use super::elements::{check_numbers, scalars_of};
 use super::references::time_reference;
 use super::types::*;
-use crate::c_abi::{array, array_mut, on_allowed};
+use crate::c_abi::{array, array_mut, perform_if_allowed};
 use crate::model::Model;
 use crate::number::{is_finite, text as number};
 use crate::version::Version;
@@ -21,7 +21,7 @@ pub(super) unsafe fn directional_derivative<M: Model>(
 ) -> fmi3Status {
     let call = Fmi3::DIRECTIONAL_DERIVATIVE;
     unsafe {
-        on_allowed::<M, Fmi3>(instance, call, |component| {
+        perform_if_allowed::<M, Fmi3>(instance, call, |component| {
             let unknowns = array(call, "unknowns", unknowns, n_unknowns)?;
             let unknowns = scalars_of(component, call, unknowns)?;
             let knowns = array(call, "knowns", knowns, n_knowns)?;
@@ -56,7 +56,7 @@ pub(super) unsafe fn adjoint_derivative<M: Model>(
 ) -> fmi3Status {
     let call = &ADJOINT_DERIVATIVE;
     unsafe {
-        on_allowed::<M, Fmi3>(instance, call, |component| {
+        perform_if_allowed::<M, Fmi3>(instance, call, |component| {
             let unknowns = array(call, "unknowns", unknowns, n_unknowns)?;
             let unknowns = scalars_of(component, call, unknowns)?;
             let knowns = array(call, "knowns", knowns, n_knowns)?;

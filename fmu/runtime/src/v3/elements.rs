@@ -22,7 +22,6 @@ pub(super) fn check_count(call: &Call, references: usize, values: usize) -> Resu
     )))
 }
 
-/// Checks the number of scalars of a derivative.
 pub(super) fn check_numbers(
     call: &Call,
     name: &str,
@@ -35,7 +34,6 @@ pub(super) fn check_numbers(
     Err(call.error(format_args!("{name} = {given} (allowed: {expected})")))
 }
 
-/// Returns the scalars of the host's value references.
 pub(super) fn scalars_of<'a, M: Model>(
     component: &Component<M, Fmi3>,
     call: &Call,
@@ -79,7 +77,6 @@ pub(super) fn wrong_variable<M: Model>(arrays: &Arrays, reference: u32) -> Strin
     }
 }
 
-/// Checks that there is one value for each element.
 pub(super) fn check_elements<M: Model>(
     component: &Component<M, Fmi3>,
     call: &Call,
@@ -90,7 +87,6 @@ pub(super) fn check_elements<M: Model>(
     if values == expected {
         return Ok(());
     }
-    /// Largest number of variables that a message names.
     const NAMED: usize = 4;
     let mut shapes: Vec<_> = references
         .iter()

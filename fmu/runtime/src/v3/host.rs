@@ -5,17 +5,16 @@ use super::types::*;
 use crate::model::Model;
 
 /// Data about the host that an instance of FMI 3.0 needs.
+#[allow(missing_docs)]
 pub struct Host<M: Model> {
     pub(super) environment: fmi3InstanceEnvironment,
     pub(super) intermediate_update: fmi3IntermediateUpdateCallback,
     pub(super) early_return_allowed: bool,
     pub(super) required: Vec<fmi3ValueReference>,
-    /// Present phase of an intermediate update.
     pub(super) phase: Phase,
     /// Values of the inputs at the end of the next part of the step, as far as they are set.
     pub(super) ends: M::Inputs,
     pub(super) set: Vec<fmi3ValueReference>,
-    /// Memory for event indicators.
     pub(super) indicators: Vec<f64>,
     pub(super) arrays: Option<Box<Arrays>>,
     /// The variables that the host requires within steps, by its own references.

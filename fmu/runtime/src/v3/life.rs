@@ -96,7 +96,6 @@ fn check_token<M: Model>(
     }
 }
 
-/// Arguments of an instance for Co-Simulation.
 pub(super) struct Stepping {
     pub(super) event_mode: bool,
     pub(super) early_return: bool,

@@ -5,20 +5,19 @@
 use super::calls::*;
 use super::elements::check_numbers;
 use super::types::*;
-use crate::c_abi::{Component, array, array_mut, on_allowed, place};
+use crate::c_abi::{Component, array, array_mut, perform_if_allowed, place};
 use crate::call::{Call, Fault};
 use crate::instance::Instance;
 use crate::model::Model;
 use crate::version::Version;
 
-/// Sets the continuous states that the host has integrated.
 pub(super) unsafe fn set_states<M: Model>(
     instance: fmi3Instance,
     (states, count): (*const fmi3Float64, usize),
 ) -> fmi3Status {
     let call = Fmi3::SET_CONTINUOUS_STATES;
     unsafe {
-        on_allowed::<M, Fmi3>(instance, call, |component| {
+        perform_if_allowed::<M, Fmi3>(instance, call, |component| {
             let states = array(call, "continuousStates", states, count)?;
             let Component { instance, host, .. } = component;
             let Some(arrays) = &host.arrays else { return instance.set_continuous_states(states) };
@@ -42,7 +41,7 @@ pub(super) unsafe fn fill_states<M: Model>(
     body: impl FnOnce(&mut Instance<M, Fmi3>, &mut [fmi3Float64]) -> Result<(), Fault>,
 ) -> fmi3Status {
     unsafe {
-        on_allowed::<M, Fmi3>(instance, call, |component| {
+        perform_if_allowed::<M, Fmi3>(instance, call, |component| {
             let room = array_mut(call, name, pointer, length)?;
             let Component { instance, host, .. } = component;
             let Some(arrays) = &host.arrays else { return body(instance, room) };
@@ -65,7 +64,7 @@ pub(super) unsafe fn write_count<M: Model>(
     count: impl FnOnce(&mut Component<M, Fmi3>) -> Result<usize, Fault>,
 ) -> fmi3Status {
     unsafe {
-        on_allowed::<M, Fmi3>(instance, call, |component| {
+        perform_if_allowed::<M, Fmi3>(instance, call, |component| {
             let place = place(call, name, pointer)?;
             *place = count(component)?;
             Ok(())

@@ -22,7 +22,6 @@ pub(crate) fn type_of<M: Model>(scalar: &Scalar<M>) -> CType {
     }
 }
 
-/// Returns the name of a type in FMI 3.0.
 pub(super) fn type_name(c_type: CType) -> &'static str {
     match c_type {
         CType::Real => "Float64",
@@ -45,7 +44,7 @@ pub(super) fn wrong_reference<M: Model>(
             let is = type_name(type_of(scalar));
             format!("{} (value reference {reference}) is of type {is}", scalar.name())
         }
-        None if extra::<M>(reference).is_some() => {
+        None if extra_variable::<M>(reference).is_some() => {
             let name = extra_name::<M>(reference).unwrap_or_default();
             match wanted {
                 Some(CType::Real) => {
@@ -63,16 +62,14 @@ pub(super) fn wrong_reference<M: Model>(
 
 /// A variable that is not in the table.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
 pub enum Extra {
-    /// The independent variable.
     Time,
-    /// An event indicator.
     Indicator(usize),
 }
 
-/// Returns the extra variable of a value reference.
 #[inline]
-pub(super) fn extra<M: Model>(reference: u32) -> Option<Extra> {
+pub(super) fn extra_variable<M: Model>(reference: u32) -> Option<Extra> {
     let beyond = (reference as usize).checked_sub(M::table().scalars.len() + 1)?;
     match beyond.checked_sub(1) {
         None => Some(Extra::Time),

@@ -9,7 +9,7 @@ use super::elements::{check_count, check_elements, expand};
 use super::host::Phase;
 use super::types::*;
 use super::values::check_intermediate;
-use crate::c_abi::{Component, array, array_mut, null, on, on_allowed};
+use crate::c_abi::{Component, array, array_mut, null_argument, perform, perform_if_allowed};
 use crate::call::{Call, Fault, InstanceState};
 use crate::instance::StepInfo;
 use crate::model::Model;
@@ -25,7 +25,7 @@ pub(super) unsafe fn output_derivatives<M: Model>(
 ) -> fmi3Status {
     let call = Fmi3::GET_OUTPUT_DERIVATIVES;
     unsafe {
-        on_allowed::<M, Fmi3>(instance, call, |component| {
+        perform_if_allowed::<M, Fmi3>(instance, call, |component| {
             let references = array(call, "valueReferences", references, count)?;
             let orders = array(call, "orders", orders, count)?;
             let (mut scalars, mut orders) = (Cow::Borrowed(references), Cow::Borrowed(orders));
@@ -53,7 +53,6 @@ pub(super) unsafe fn output_derivatives<M: Model>(
     }
 }
 
-/// Result of an intermediate update by the host.
 #[derive(Clone, Copy)]
 struct Wish {
     /// Time of the early return that the host requests, s.
@@ -70,7 +69,7 @@ unsafe fn intermediate_update<M: Model>(
     let call = Fmi3::DO_STEP;
     let mut prepared = None;
     let status = unsafe {
-        on::<M, Fmi3>(instance, call, |component| {
+        perform::<M, Fmi3>(instance, call, |component| {
             let host = &mut component.host;
             let Some(update) = host.intermediate_update else { return Ok(()) };
             (host.phase, host.ends) = (phase, M::Inputs::default());
@@ -101,7 +100,7 @@ unsafe fn intermediate_update<M: Model>(
         );
     }
     let status = unsafe {
-        on::<M, Fmi3>(instance, call, |component| component.instance.leave_intermediate(call))
+        perform::<M, Fmi3>(instance, call, |component| component.instance.leave_intermediate(call))
     };
     if status != fmi3OK {
         return Err(status);
@@ -109,7 +108,6 @@ unsafe fn intermediate_update<M: Model>(
     Ok(Wish { early_return: Some(at).filter(|_| requested != 0 && can_return) })
 }
 
-/// Places for the results of fmi3DoStep.
 #[derive(Clone, Copy)]
 pub(super) struct Answers {
     pub(super) event: *mut fmi3Boolean,
@@ -124,7 +122,7 @@ impl Answers {
     /// # Errors
     ///
     /// If a pointer is NULL.
-    unsafe fn begin(&self, call: &Call, time: f64) -> Result<(), Fault> {
+    unsafe fn initialise(&self, call: &Call, time: f64) -> Result<(), Fault> {
         let Answers { event, terminate, early, last } = *self;
         let flags = [
             ("eventHandlingNeeded", event),
@@ -141,7 +139,7 @@ impl Answers {
         }
         let flag = flags.iter().find(|(_, flag)| flag.is_null()).map(|(name, _)| *name);
         match flag.or(last.is_null().then_some("lastSuccessfulTime")) {
-            Some(name) => Err(null(call, name)),
+            Some(name) => Err(null_argument(call, name)),
             None => Ok(()),
         }
     }
@@ -155,31 +153,31 @@ pub(super) unsafe fn do_step<M: Model>(
     (at, h): (fmi3Float64, fmi3Float64),
     answers: Answers,
 ) -> fmi3Status {
-    let mut looks_in = false;
+    let mut has_updates = false;
     let status = unsafe {
-        on::<M, Fmi3>(instance, Fmi3::DO_STEP, |component| {
-            answers.begin(Fmi3::DO_STEP, component.instance.time())?;
+        perform::<M, Fmi3>(instance, Fmi3::DO_STEP, |component| {
+            answers.initialise(Fmi3::DO_STEP, component.instance.time())?;
             component.instance.check(Fmi3::DO_STEP)?;
-            looks_in = component.host.intermediate_update.is_some();
-            if looks_in {
+            has_updates = component.host.intermediate_update.is_some();
+            if has_updates {
                 return Ok(());
             }
             let (before, stops) =
                 (component.instance.event_count(), component.host.early_return_allowed);
             let step = component.instance.step_to_event(at, h, stops)?;
-            stepped(component, before, step, answers);
+            write_step_results(component, before, step, answers);
             Ok(())
         })
     };
-    if status != fmi3OK || !looks_in {
+    if status != fmi3OK || !has_updates {
         return status;
     }
-    unsafe { step_looked_into::<M>(instance, at, h, answers) }
+    unsafe { step_with_updates::<M>(instance, at, h, answers) }
 }
 
 /// Writes results and messages after a step; `before` is the number of events before it.
 #[inline(always)]
-unsafe fn stepped<M: Model>(
+unsafe fn write_step_results<M: Model>(
     component: &mut Component<M, Fmi3>,
     before: i32,
     step: StepInfo,
@@ -197,7 +195,7 @@ unsafe fn stepped<M: Model>(
 
 /// Makes one step with intermediate updates: at its start, when the host may set the inputs for its end and
 /// request an early return, and at its end.
-unsafe fn step_looked_into<M: Model>(
+unsafe fn step_with_updates<M: Model>(
     instance: fmi3Instance,
     at: f64,
     mut h: f64,
@@ -205,7 +203,7 @@ unsafe fn step_looked_into<M: Model>(
 ) -> fmi3Status {
     let (call, whole) = (Fmi3::DO_STEP, h);
     let checked = unsafe {
-        on::<M, Fmi3>(instance, call, |component| component.instance.check_step(call, at, h))
+        perform::<M, Fmi3>(instance, call, |component| component.instance.check_step(call, at, h))
     };
     if checked != fmi3OK {
         return checked;
@@ -215,7 +213,7 @@ unsafe fn step_looked_into<M: Model>(
         Err(status) => return status,
     };
     let ramps = unsafe {
-        on::<M, Fmi3>(instance, call, |component| {
+        perform::<M, Fmi3>(instance, call, |component| {
             let Component { instance, host, .. } = component;
             instance.ramp_to(call, &host.set, &host.ends, h)
         })
@@ -226,7 +224,7 @@ unsafe fn step_looked_into<M: Model>(
     // The return time may be anywhere in the step; a time before its start, and NaN, mean immediately.
     let (mut is_early, mut moves) = (false, true);
     let placed = unsafe {
-        on::<M, Fmi3>(instance, call, |component| {
+        perform::<M, Fmi3>(instance, call, |component| {
             let clock = &component.instance.clock;
             if let Some(time) = wish.early_return {
                 let is_late = time.to_bits() == f64::INFINITY.to_bits();
@@ -249,11 +247,11 @@ unsafe fn step_looked_into<M: Model>(
                 component.instance.drop_ramps();
                 Ok(())
             };
-            return unsafe { on::<M, Fmi3>(instance, call, drop_ramps) };
+            return unsafe { perform::<M, Fmi3>(instance, call, drop_ramps) };
         }
     }
     let status = unsafe {
-        on::<M, Fmi3>(instance, call, |component| {
+        perform::<M, Fmi3>(instance, call, |component| {
             let Component { instance, host, .. } = component;
             let before = instance.event_count();
             let step = instance.step_to_event(at, h, host.early_return_allowed);
@@ -264,7 +262,7 @@ unsafe fn step_looked_into<M: Model>(
                 Ok(_) => {}
                 Err(_) => instance.drop_ramps(),
             }
-            stepped(component, before, step?, answers);
+            write_step_results(component, before, step?, answers);
             Ok(())
         })
     };

@@ -24,7 +24,6 @@ pub type fmi3Byte = u8;
 pub type fmi3Binary = *const fmi3Byte;
 pub type fmi3Clock = bool;
 
-/// An array of value references, and their number.
 pub(super) type References = (*const fmi3ValueReference, usize);
 
 pub type fmi3Status = c_abi::Status;

@@ -6,9 +6,9 @@
 use super::calls::*;
 use super::elements::{check_count, check_elements, scalars_of, start_resized, wrong_variable};
 use super::host::Phase;
-use super::references::{Extra, extra, wrong_reference};
+use super::references::{Extra, extra_variable, wrong_reference};
 use super::types::*;
-use crate::c_abi::{Component, array, array_mut, on_allowed};
+use crate::c_abi::{Component, array, array_mut, perform_if_allowed};
 use crate::call::{CType, Call, Fault, InstanceState};
 use crate::model::Model;
 use crate::table::Scalar;
@@ -25,7 +25,7 @@ pub(super) unsafe fn get<M: Model, T>(
     as_c: impl Fn(Value) -> Option<T>,
 ) -> fmi3Status {
     unsafe {
-        on_allowed::<M, Fmi3>(instance, call, |component| {
+        perform_if_allowed::<M, Fmi3>(instance, call, |component| {
             let references = array(call, "valueReferences", references, count)?;
             if component.host.arrays.is_some() {
                 let found = array_values(component, call, references, value_count)?;
@@ -82,7 +82,7 @@ fn extra_value<M: Model>(
     reference: u32,
 ) -> Result<Value, Fault> {
     let Component { instance, host, .. } = component;
-    match extra::<M>(reference).filter(|_| call.c_type == Some(CType::Real)) {
+    match extra_variable::<M>(reference).filter(|_| call.c_type == Some(CType::Real)) {
         Some(Extra::Time) => Ok(Value::Real(instance.time())),
         Some(Extra::Indicator(n)) => {
             instance.indicators_for(call, &mut host.indicators)?;
@@ -131,7 +131,7 @@ pub(super) unsafe fn set<M: Model, T: Copy>(
     from_c: impl Fn(T) -> Value,
 ) -> fmi3Status {
     unsafe {
-        on_allowed::<M, Fmi3>(instance, call, |component| {
+        perform_if_allowed::<M, Fmi3>(instance, call, |component| {
             let references = array(call, "valueReferences", references, count)?;
             if component.host.arrays.is_some() {
                 let values = array(call, "values", values, value_count)?;
@@ -231,7 +231,7 @@ pub(super) unsafe fn access_no_variable<M: Model>(
     value_count: usize,
 ) -> fmi3Status {
     unsafe {
-        on_allowed::<M, Fmi3>(instance, call, |component| {
+        perform_if_allowed::<M, Fmi3>(instance, call, |component| {
             let references = array(call, "valueReferences", references, count)?;
             check_no_variable(component, call, references, value_count)
         })
@@ -246,7 +246,7 @@ pub(super) unsafe fn get_sizes<M: Model>(
 ) -> fmi3Status {
     let call = &GET_UINT64;
     unsafe {
-        on_allowed::<M, Fmi3>(instance, call, |component| {
+        perform_if_allowed::<M, Fmi3>(instance, call, |component| {
             let references = array(call, "valueReferences", references, count)?;
             if component.host.arrays.is_none() {
                 return check_no_variable(component, call, references, value_count);
@@ -272,7 +272,7 @@ pub(super) unsafe fn set_sizes<M: Model>(
 ) -> fmi3Status {
     let call = &SET_UINT64;
     unsafe {
-        on_allowed::<M, Fmi3>(instance, call, |component| {
+        perform_if_allowed::<M, Fmi3>(instance, call, |component| {
             let references = array(call, "valueReferences", references, count)?;
             if component.host.arrays.is_none() {
                 return check_no_variable(component, call, references, value_count);
