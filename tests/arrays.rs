@@ -132,7 +132,7 @@ impl Run<'_> {
     fn resize(&mut self, name: &str, size: usize) {
         let reference = self.opened.variable(name).reference;
         self.instance.enter_configuration_mode().unwrap();
-        self.instance.give(&[reference], &[size as u64]).unwrap();
+        self.instance.set_numbers(&[reference], &[size as u64]).unwrap();
         self.instance.exit_configuration_mode().unwrap();
         self.sizes.insert(reference, size);
     }
@@ -365,10 +365,10 @@ fn array_sizes_are_set_only_in_configuration_mode_and_reset_the_arrays() {
     let states = |tanks: usize| 4 + 3 + 3 + 3 + 3 + tanks * (1 + 3 * 6 + 6);
     assert_eq!(run.instance.number_of_states().unwrap(), states(1));
     let mut size = [0u64];
-    run.instance.fetch(&[tanks], &mut size).unwrap();
+    run.instance.get_numbers(&[tanks], &mut size).unwrap();
     assert_eq!(size, [1]);
     let start: Vec<f64> = vec![0.0, 0.0, -0.45];
-    run.instance.give(&[position], &[7.0, 8.0, 9.0]).unwrap();
+    run.instance.set_numbers(&[position], &[7.0, 8.0, 9.0]).unwrap();
     run.resize("tanks", 4);
     let said: Vec<_> = run.instance.take_messages();
     let said: Vec<_> = said.iter().map(|m| (&*m.category, m.status, &*m.text)).collect();
@@ -376,25 +376,25 @@ fn array_sizes_are_set_only_in_configuration_mode_and_reset_the_arrays() {
     assert_eq!(said, [("logStatusWarning", Status::Warning, text)], "nobody else is named");
     assert_eq!(run.instance.number_of_states().unwrap(), states(4));
     let mut there = vec![0.0; 12];
-    run.instance.fetch(&[position], &mut there).unwrap();
+    run.instance.get_numbers(&[position], &mut there).unwrap();
     assert_eq!(there[..3], start, "what was set before is gone");
     let far: Vec<f64> = (0..12).map(f64::from).collect();
-    run.instance.give(&[position], &far).unwrap();
+    run.instance.set_numbers(&[position], &far).unwrap();
     // The same size again changes nothing, and values that were beyond it do not come back.
     run.resize("tanks", 4);
-    run.instance.fetch(&[position], &mut there).unwrap();
+    run.instance.get_numbers(&[position], &mut there).unwrap();
     assert_eq!(there, far);
     run.resize("tanks", 1);
     run.resize("tanks", 2);
     let mut two = vec![0.0; 6];
-    run.instance.fetch(&[position], &mut two).unwrap();
+    run.instance.get_numbers(&[position], &mut two).unwrap();
     assert_eq!(two[..3], start);
     assert_ne!(two[3..], far[3..6]);
     run.initialise();
     let mut x = vec![0.0; states(2)];
     run.instance.continuous_states(&mut x).unwrap();
     run.instance.reset().unwrap();
-    run.instance.fetch(&[tanks], &mut size).unwrap();
+    run.instance.get_numbers(&[tanks], &mut size).unwrap();
     assert_eq!((size, run.instance.number_of_states().unwrap()), ([1], states(1)), "reset");
 }
 
@@ -407,7 +407,7 @@ fn wrong_sizes_counts_and_types_of_arrays_are_refused_in_words() {
         let mut run = craft.instance(Interface::CoSimulation);
         refusal(what(&mut run.instance))
     };
-    let (status, text) = said(&mut |i| i.give(&[tanks], &[2u64]));
+    let (status, text) = said(&mut |i| i.set_numbers(&[tanks], &[2u64]));
     assert_eq!(status, Status::Error);
     assert_eq!(
         text,
@@ -416,30 +416,30 @@ fn wrong_sizes_counts_and_types_of_arrays_are_refused_in_words() {
     for wrong in [5, u64::MAX] {
         let mut run = craft.instance(Interface::CoSimulation);
         run.instance.enter_configuration_mode().unwrap();
-        let (status, text) = refusal(run.instance.give(&[tanks], &[wrong]));
+        let (status, text) = refusal(run.instance.set_numbers(&[tanks], &[wrong]));
         assert_eq!(status, Status::Discard);
         assert!(text.contains("tanks = ") && text.contains("(allowed: 0 to 4)"), "{text}");
         // It can go on.
-        run.instance.give(&[tanks], &[3u64]).unwrap();
-        let (_, text) = refusal(run.instance.give(&[mass], &[1.0]));
+        run.instance.set_numbers(&[tanks], &[3u64]).unwrap();
+        let (_, text) = refusal(run.instance.set_numbers(&[mass], &[1.0]));
         assert!(text.contains("configuration mode"), "{text}");
     }
-    let (status, text) = said(&mut |i| i.give(&[mass], &[1.0]));
+    let (status, text) = said(&mut |i| i.set_numbers(&[mass], &[1.0]));
     assert_eq!(status, Status::Error);
     assert_eq!(text, "fmi3SetFloat64: nValues = 1 (allowed: 3, by rows: tank.mass[1,3])");
-    let (_, text) = said(&mut |i| i.fetch(&[reference("q"), mass], &mut [0.0; 8]));
+    let (_, text) = said(&mut |i| i.get_numbers(&[reference("q"), mass], &mut [0.0; 8]));
     assert_eq!(text, "fmi3GetFloat64: nValues = 8 (allowed: 7, by rows: q[4], tank.mass[1,3])");
-    let (_, text) = said(&mut |i| i.give(&[tanks], &[2i32]));
+    let (_, text) = said(&mut |i| i.set_numbers(&[tanks], &[2i32]));
     assert_eq!(text, format!("fmi3SetInt32: tanks (value reference {tanks}) is of type UInt64"));
-    let (_, text) = said(&mut |i| i.fetch(&[mass], &mut [0u64; 3]));
+    let (_, text) = said(&mut |i| i.get_numbers(&[mass], &mut [0u64; 3]));
     assert_eq!(
         text,
         format!("fmi3GetUInt64: tank.mass (value reference {mass}) is of type Float64")
     );
-    let (_, text) = said(&mut |i| i.fetch(&[mass], &mut [0u8; 3]));
+    let (_, text) = said(&mut |i| i.get_numbers(&[mass], &mut [0u8; 3]));
     assert!(text.ends_with(&format!("tank.mass (value reference {mass}) is of type Float64")));
     let most = craft.variables.len();
-    let (_, text) = said(&mut |i| i.fetch(&[0], &mut [0.0]));
+    let (_, text) = said(&mut |i| i.get_numbers(&[0], &mut [0.0]));
     assert_eq!(
         text,
         format!("fmi3GetFloat64: no variable has the value reference 0 (allowed: 1 to {most})")
@@ -583,7 +583,7 @@ fn inputs_of_arrays_ramp_by_intermediate_update_as_scalars_do() {
                 }
                 None
             };
-            instance.do_step_hearing(f64::from(n) * 0.1, 0.1, Some(&mut within)).unwrap();
+            instance.do_step_with_updates(f64::from(n) * 0.1, 0.1, Some(&mut within)).unwrap();
         }
         seen
     });

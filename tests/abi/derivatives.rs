@@ -70,7 +70,7 @@ struct Point<'a, 'fmu> {
 impl Point<'_, '_> {
     fn values(&mut self) -> Vec<f64> {
         let mut values = vec![f64::NAN; self.sides.unknowns.len()];
-        self.instance.fetch(&self.sides.unknowns, &mut values).unwrap();
+        self.instance.get_numbers(&self.sides.unknowns, &mut values).unwrap();
         values
     }
 
@@ -86,7 +86,7 @@ impl Point<'_, '_> {
 
     fn go(&mut self, to: &[f64], direction: &[f64]) {
         let n = self.sides.inputs;
-        self.instance.give(&self.sides.knowns[..n], &to[..n]).unwrap();
+        self.instance.set_numbers(&self.sides.knowns[..n], &to[..n]).unwrap();
         if direction[n..].iter().any(|d| *d != 0.0) {
             self.instance.set_continuous_states(&to[n..]).unwrap();
         }
@@ -276,14 +276,14 @@ fn check(
     let what = format!("Model Exchange, {settings:?}");
     expect(&mut instance, &what);
     let mut inputs = vec![0.0; sides.inputs];
-    instance.fetch(&sides.knowns[..sides.inputs], &mut inputs).unwrap();
+    instance.get_numbers(&sides.knowns[..sides.inputs], &mut inputs).unwrap();
     let x: Vec<f64> = inputs.iter().copied().chain(states).collect();
     let all: Vec<usize> = (0..x.len()).collect();
     Point { sides: &sides, instance, x, sizes: sizes.clone(), what }.check(rng, &all);
 
     let mut instance = stepped(fmu, settings);
     let mut x = vec![0.0; sides.knowns.len()];
-    instance.fetch(&sides.knowns, &mut x).unwrap();
+    instance.get_numbers(&sides.knowns, &mut x).unwrap();
     let what = format!("Co-Simulation, {settings:?}");
     expect(&mut instance, &what);
     let is_impulse = |name: &str| name.starts_with("h_wheels") || name.starts_with("mass_flow");

@@ -277,11 +277,16 @@ pub fn licenses(archive: &Archive, findings: &mut Findings) {
 }
 
 pub fn folders(archive: &Archive, findings: &mut Findings) {
-    folders_of("2.0", &AT_THE_TOP, archive, findings);
+    report_unknown_folders("2.0", &AT_THE_TOP, archive, findings);
 }
 
 /// Reports the names at the top level that FMI `version` does not allow.
-pub fn folders_of(version: &str, allowed: &[&str], archive: &Archive, findings: &mut Findings) {
+pub fn report_unknown_folders(
+    version: &str,
+    allowed: &[&str],
+    archive: &Archive,
+    findings: &mut Findings,
+) {
     let mut unknown: Vec<&str> = archive
         .entries
         .iter()

@@ -69,22 +69,17 @@ pub fn arrays(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             continue;
         }
         let lists = lists(&mut session)?;
-        fmu.doing(format!(
+        fmu.announce(format!(
             "calls with margins around their arrays ({})",
             FmuUnderTest::name(interface)
         ));
-        for beside in session.instance.writes_beside(&lists) {
+        for write in session.instance.find_stray_writes(&lists) {
             findings
-                .at(format!(
-                    "{}, {} ({})",
-                    beside.call,
-                    beside.array,
-                    FmuUnderTest::name(interface)
-                ))
+                .at(format!("{}, {} ({})", write.call, write.array, FmuUnderTest::name(interface)))
                 .add(format!(
                     "{} (allowed: to write as many values as the call says, into what is to be \
                      written)",
-                    beside.fault
+                    write.fault
                 ));
         }
     }

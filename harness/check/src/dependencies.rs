@@ -32,7 +32,7 @@ const ROUNDING: f64 = 1e-9;
 
 /// Returns an instance whose parameters, inputs and start values are drawn at random with the seed `attempt`.
 /// Attempt 0 keeps the declared values.
-pub fn randomised<'f>(
+pub fn random_session<'f>(
     fmu: &'f FmuUnderTest,
     interface: Interface,
     attempt: u64,
@@ -170,7 +170,7 @@ fn read(session: &mut Session, variables: &[&Variable]) -> Result<Vec<Reading>> 
 pub fn running(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let d = fmu.description();
     let lists: Vec<&Unknown> = d.outputs.iter().chain(&d.derivatives).collect();
-    watch(fmu, &BTreeSet::new())?.report(fmu, &lists, "while running", findings);
+    observe(fmu, &BTreeSet::new())?.report(fmu, &lists, "while running", findings);
     Ok(())
 }
 
@@ -186,7 +186,7 @@ pub fn feedthrough(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         .flat_map(|u| u.dependencies.iter().flatten().map(|known| (u.index, *known)))
         .filter(|(_, known)| is_input(*known))
         .collect();
-    let seen = watch(fmu, &declared)?;
+    let seen = observe(fmu, &declared)?;
     for (output, input) in declared.iter().filter(|pair| !seen.traces.contains(pair)) {
         if seen.moved.contains(input) {
             let (output, input) = (name(fmu, *output), name(fmu, *input));
@@ -203,7 +203,7 @@ pub fn feedthrough(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 /// Changes inputs and states one by one, from many initial points, and returns the observed dependencies of
 /// outputs and derivatives. Stops early when all pairs of `wanted` have been observed. Skips the rule if
 /// there is nothing to observe.
-fn watch(fmu: &FmuUnderTest, wanted: &BTreeSet<(usize, usize)>) -> Result<Seen> {
+fn observe(fmu: &FmuUnderTest, wanted: &BTreeSet<(usize, usize)>) -> Result<Seen> {
     let d = fmu.description();
     let lists: Vec<&Unknown> = d.outputs.iter().chain(&d.derivatives).collect();
     let unknowns: Vec<&Variable> = lists.iter().filter_map(|u| d.at(u.index)).collect();
@@ -211,14 +211,14 @@ fn watch(fmu: &FmuUnderTest, wanted: &BTreeSet<(usize, usize)>) -> Result<Seen> 
         return skip("it has neither outputs nor derivatives");
     }
     let exchange = fmu.interfaces().contains(&Interface::ModelExchange);
-    let interface = if exchange { Interface::ModelExchange } else { fmu.first()? };
+    let interface = if exchange { Interface::ModelExchange } else { fmu.first_interface()? };
     let inputs: Vec<_> =
         fmu.variables().iter().filter(|v| v.causality == Causality::Input).collect();
     let states = fmu.states();
     let mut seen = Seen::nothing();
     for attempt in 0..TRIES {
-        let mut session = randomised(fmu, interface, attempt)?;
-        fmu.doing(format!("initialising with other parameters, try {attempt}"));
+        let mut session = random_session(fmu, interface, attempt)?;
+        fmu.announce(format!("initialising with other parameters, try {attempt}"));
         // The FMU refused these parameters: the next attempt draws others.
         if session.initialise().is_err() || session.is_ended() {
             continue;
@@ -231,7 +231,7 @@ fn watch(fmu: &FmuUnderTest, wanted: &BTreeSet<(usize, usize)>) -> Result<Seen> 
         }
         // Two attempts with small changes alternate with two attempts with large changes.
         let share = if attempt / 2 % 2 == 0 { 1.0 / 1024.0 } else { 0.25 };
-        fmu.doing(format!("moving inputs one by one, try {attempt}"));
+        fmu.announce(format!("moving inputs one by one, try {attempt}"));
         let before = read(&mut session, &unknowns)?;
         for v in &inputs {
             let start = session.get(v)?;
@@ -243,7 +243,7 @@ fn watch(fmu: &FmuUnderTest, wanted: &BTreeSet<(usize, usize)>) -> Result<Seen> 
             }
         }
         if exchange && !states.is_empty() {
-            fmu.doing(format!("moving states one by one, try {attempt}"));
+            fmu.announce(format!("moving states one by one, try {attempt}"));
             let mut x = vec![0.0; states.len()];
             session.instance.continuous_states(&mut x)?;
             for (n, (_, state)) in states.iter().enumerate() {
@@ -284,16 +284,16 @@ pub fn initial(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         return skip("it has no InitialUnknowns");
     }
     let knowns: Vec<_> = fmu.variables().iter().filter(|v| v.is_set_by_hosts()).collect();
-    let interface = fmu.first()?;
+    let interface = fmu.first_interface()?;
     let mut seen = Seen::nothing();
     for attempt in 0..AT_LEAST {
-        let mut session = randomised(fmu, interface, attempt)?;
+        let mut session = random_session(fmu, interface, attempt)?;
         let begun = session.instance.setup_experiment(None, session.time, None);
         match begun.and_then(|()| session.instance.enter_initialization_mode()) {
             Err(_) if attempt > 0 => continue, // these parameters may have no solution
             done => done?,
         }
-        fmu.doing(format!("moving inputs and parameters in initialization mode, try {attempt}"));
+        fmu.announce(format!("moving inputs and parameters in initialization mode, try {attempt}"));
         let Ok(before) = read(&mut session, &unknowns) else { continue };
         let share = if attempt / 2 % 2 == 0 { 1.0 / 1024.0 } else { 0.25 };
         for v in &knowns {
@@ -343,7 +343,7 @@ pub fn directional(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         .map(|v| (*v, None))
         .chain(states.iter().enumerate().map(|(n, (_, state))| (*state, Some(n))));
     for (v, place) in knowns {
-        fmu.doing(format!("fmi2GetDirectionalDerivative along {}", v.name));
+        fmu.announce(format!("fmi2GetDirectionalDerivative along {}", v.name));
         let given =
             session.instance.get_directional_derivative(&references, &[v.reference], &[1.0]);
         let given = match given {

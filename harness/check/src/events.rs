@@ -11,12 +11,12 @@
 
 use anyhow::Result;
 
-use super::dependencies::randomised;
+use super::dependencies::random_session;
 use super::description::Variable;
 use super::exchange::continuous;
 use super::findings::Findings;
 use super::loaded::skip;
-use super::under_test::{FmuUnderTest, Interface, Life, STEPS, Session, Sight};
+use super::under_test::{FmuUnderTest, Interface, Life, Observed, STEPS, Session};
 
 /// Number of initial points: the first one as declared, the others with parameters drawn at random.
 const STARTS: u64 = 12;
@@ -29,7 +29,7 @@ pub fn missed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     continuous(fmu)?;
     let (mut vary, mut step_event) = (false, None);
     for start in 0..STARTS {
-        let mut session = randomised(fmu, Interface::ModelExchange, start)?;
+        let mut session = random_session(fmu, Interface::ModelExchange, start)?;
         // A start with parameters that the FMU refuses or cannot simulate is left out.
         if session.initialise().is_err() || session.is_ended() {
             continue;
@@ -74,7 +74,7 @@ fn missed_event<'f>(
         if session.is_ended() {
             break;
         }
-        session.go(session.step)?;
+        session.make_step(session.step)?;
         if session.is_ended() {
             break;
         }
@@ -83,17 +83,17 @@ fn missed_event<'f>(
         if session.next_event().is_some_and(|next| next - session.time < near) {
             continue;
         }
-        let before = Sight::read(session)?;
-        fmu.doing(format!("entering event mode at t = {:?} s, without an event", session.time));
+        let before = Observed::read(session)?;
+        fmu.announce(format!("entering event mode at t = {:?} s, without an event", session.time));
         session.event()?;
         if session.is_ended() {
             break;
         }
-        let after = Sight::read(session)?;
+        let after = Observed::read(session)?;
         let Some((name, change)) = before.change(&after, fmu) else { continue };
         // A variable that changes in every event mode counts events.
         session.event()?;
-        if !session.is_ended() && after.change(&Sight::read(session)?, fmu).is_none() {
+        if !session.is_ended() && after.change(&Observed::read(session)?, fmu).is_none() {
             return Ok(Some((session.time, name, change)));
         }
     }
@@ -106,7 +106,7 @@ pub fn values_changed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
         return skip("it has no continuous states");
     }
     for start in 0..STARTS {
-        let mut session = randomised(fmu, Interface::ModelExchange, start)?;
+        let mut session = random_session(fmu, Interface::ModelExchange, start)?;
         if session.initialise().is_err() {
             continue;
         }
@@ -136,7 +136,7 @@ pub fn nominals(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         return skip("nominalsOfContinuousStatesChanged: they are others than at the start");
     }
     let mut nominals = vec![f64::NAN; states.len()];
-    fmu.doing("fmi2GetNominalsOfContinuousStates");
+    fmu.announce("fmi2GetNominalsOfContinuousStates");
     session.instance.nominals(&mut nominals)?;
     for ((_, state), given) in states.iter().zip(nominals) {
         let written = state.nominal();

@@ -64,7 +64,7 @@ pub fn vectors(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         }
         let (mut x, mut dx, mut nominals, mut z) =
             (vec![f64::NAN; nx], vec![f64::NAN; nx], vec![f64::NAN; nx], vec![f64::NAN; ni]);
-        fmu.doing(format!("the vectors of {nx} states and {ni} event indicators"));
+        fmu.announce(format!("the vectors of {nx} states and {ni} event indicators"));
         // Hosts do not ask for states or indicators if there are none.
         if nx > 0 {
             session.instance.continuous_states(&mut x)?;
@@ -102,7 +102,7 @@ pub fn lengths(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let (nx, ni) = (fmu.states().len(), session.indicators());
     let place = |call: &str, n: usize, right: usize| {
         let place = format!("{call} with room for {n} numbers instead of {right}");
-        fmu.doing(&place);
+        fmu.announce(&place);
         place
     };
     let (mut x, mut z) = (vec![0.0; nx + 1], vec![0.0; ni + 1]);
@@ -126,7 +126,7 @@ pub fn variables(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     }
     session.advance(3)?;
     let (mut x, mut dx) = (vec![0.0; states.len()], vec![0.0; states.len()]);
-    fmu.doing("fmi2GetContinuousStates and fmi2GetDerivatives");
+    fmu.announce("fmi2GetContinuousStates and fmi2GetDerivatives");
     session.instance.continuous_states(&mut x)?;
     session.instance.derivatives(&mut dx)?;
     for (n, (derivative, state)) in states.iter().enumerate() {

@@ -71,7 +71,7 @@ pub fn write(report: &Report, out: &mut impl Write) -> Result<()> {
     let tests = cases.len();
     let failures = cases.iter().filter(|case| case.failure.is_some()).count();
     let skipped = cases.iter().filter(|case| case.skipped.is_some()).count();
-    let name = legal(&report.path.display().to_string());
+    let name = xml_characters(&report.path.display().to_string());
     let suite = TestSuite { name, tests, skipped, errors, failures, cases };
     let suites = TestSuites { name: "hubslosh check", tests, failures, errors, suite };
     let layout = xml::EmitterConfig::new().perform_indent(true).indent_string("  ");
@@ -83,7 +83,9 @@ fn case(outcome: &Outcome) -> TestCase {
     let rule = outcome.rule;
     let lines = |severity: Severity| {
         let of = outcome.findings.list.iter().filter(move |f| f.severity == severity);
-        legal(&of.map(|f| format!("{}: {}", f.place, f.text)).collect::<Vec<_>>().join("\n"))
+        xml_characters(
+            &of.map(|f| format!("{}: {}", f.place, f.text)).collect::<Vec<_>>().join("\n"),
+        )
     };
     let (errors, warnings) = (lines(Severity::Error), lines(Severity::Warning));
     let failed = !errors.is_empty();
@@ -96,7 +98,7 @@ fn case(outcome: &Outcome) -> TestCase {
             .findings
             .reason()
             .filter(|_| !failed)
-            .map(|why| Text { message: legal(&why), text: None }),
+            .map(|why| Text { message: xml_characters(&why), text: None }),
         failure: failed.then(|| Text {
             message: format!("{} [{}]", rule.title, rule.source),
             text: Some(errors),
@@ -112,14 +114,14 @@ fn unchecked(why: &str) -> TestCase {
         name: "check",
         class: "check",
         time: "0.000".into(),
-        error: Some(Text { message: legal(why), text: None }),
+        error: Some(Text { message: xml_characters(why), text: None }),
         failure: None,
         skipped: None,
         output: None,
     }
 }
 
-fn legal(text: &str) -> String {
+fn xml_characters(text: &str) -> String {
     let allowed = |c: &char| matches!(c, '\t' | '\n' | '\r' | ' '..='\u{fffd}' | '\u{10000}'..);
     text.chars().filter(allowed).collect()
 }

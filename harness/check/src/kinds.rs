@@ -9,7 +9,7 @@ use std::collections::BTreeSet;
 
 use anyhow::Result;
 
-use super::dependencies::randomised;
+use super::dependencies::random_session;
 use super::description::{Unknown, Variable};
 use super::findings::Findings;
 use super::under_test::{FmuUnderTest, Interface, Life, Reading, Session};
@@ -166,7 +166,7 @@ pub fn kinds(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         look(fmu, findings, &running, interface, false)?;
     }
     if !initial.is_empty() {
-        look(fmu, findings, &initial, fmu.first()?, true)?;
+        look(fmu, findings, &initial, fmu.first_interface()?, true)?;
     }
     Ok(())
 }
@@ -181,8 +181,8 @@ fn look(
     let mut wrong = BTreeSet::new();
     let mut always: Vec<Option<Factor>> = vec![None; pairs.len()];
     for start in 0..STARTS {
-        let mut session = randomised(fmu, interface, start)?;
-        fmu.doing(format!("measuring how unknowns follow knowns, start {start}"));
+        let mut session = random_session(fmu, interface, start)?;
+        fmu.announce(format!("measuring how unknowns follow knowns, start {start}"));
         let ready = if initializing {
             session
                 .instance

@@ -160,7 +160,7 @@ pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) ->
         (Ok(description), _) => Ok(&description.root),
     };
     let callable = match callable {
-        Ok(root) => Ok(packed(root)?),
+        Ok(root) => Ok(write_description(root)?),
         Err(why) => Err(why),
     };
     let so_far = process::SoFar::default();
@@ -220,7 +220,7 @@ pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) ->
 
 /// Writes the parsed description to a file in a temporary folder, from which the processes of the rules read
 /// it.
-fn packed(root: &Element) -> Result<(temporary::Folder, PathBuf)> {
+fn write_description(root: &Element) -> Result<(temporary::Folder, PathBuf)> {
     let folder = temporary::Folder::new()?;
     let path = folder.path().join("description");
     let mut bytes = Vec::new();

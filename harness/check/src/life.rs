@@ -18,7 +18,7 @@ pub fn opens<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
 }
 
 pub fn types_platform(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    fmu.doing("fmi2GetTypesPlatform");
+    fmu.announce("fmi2GetTypesPlatform");
     for binary in fmu.binaries() {
         let answer = binary.types_platform();
         if answer != "default" {
@@ -30,7 +30,7 @@ pub fn types_platform(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
 
 pub fn version<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
     let call = format!("{}GetVersion", F::FMI);
-    fmu.doing(&call);
+    fmu.announce(&call);
     for binary in fmu.binaries() {
         let answer = binary.version();
         // FMI 3.0 has bug-fix versions such as 3.0.1.
@@ -64,18 +64,18 @@ pub fn again(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let mut runs = Vec::new();
     for copy in ["one", "one", "two"] {
         let folder = tempfile::tempdir()?;
-        fmu.doing(format!("loading copy {copy} of the binary"));
+        fmu.announce(format!("loading copy {copy} of the binary"));
         let copied = fmu.copy(folder.path())?;
-        let interface = copied.first()?;
+        let interface = copied.first_interface()?;
         let mut session = copied.running(interface)?;
         session.advance(STEPS)?;
         runs.push(session.readings()?);
         drop(session);
-        fmu.doing(format!("unloading copy {copy} of the binary"));
+        fmu.announce(format!("unloading copy {copy} of the binary"));
     }
     for run in &runs[1..] {
-        if let Some(text) = fmu.session(fmu.first()?)?.difference(run, &runs[0]) {
-            is_deterministic(fmu, fmu.first()?)?;
+        if let Some(text) = fmu.session(fmu.first_interface()?)?.difference(run, &runs[0]) {
+            is_deterministic(fmu, fmu.first_interface()?)?;
             findings.at("loading it again").add(text);
         }
     }
@@ -83,11 +83,11 @@ pub fn again(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 }
 
 pub fn guid(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let interface = fmu.first()?;
+    let interface = fmu.first_interface()?;
     let wrong = format!("{}x", fmu.binary(interface)?.description().guid);
     let with = Instantiation { guid: Some(&wrong), ..fmu.arguments(interface)? };
     let place = "fmi2Instantiate with another GUID";
-    fmu.doing(place);
+    fmu.announce(place);
     expect_null(findings, place, fmu.instantiate(interface, &with)?);
     Ok(())
 }
@@ -105,11 +105,11 @@ fn expect_null(findings: &mut Findings, place: &str, answer: Result<Instance, Ca
 }
 
 pub fn arguments_null(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let interface = fmu.first()?;
+    let interface = fmu.first_interface()?;
     // The standard requires a URI, so that only an FMU that needs no resources can do without.
     let place = "fmi2Instantiate with the resource location NULL";
     let with = Instantiation { resources: None, ..fmu.arguments(interface)? };
-    let answer = fmu.left_open(place, findings, || fmu.instantiate(interface, &with))?;
+    let answer = fmu.with_open_effect(place, findings, || fmu.instantiate(interface, &with))?;
     if let Err(error) = answer
         && fmu.description().co_simulation.is_some()
     {
@@ -122,7 +122,8 @@ pub fn arguments_null(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
         ("the GUID NULL", Instantiation { guid: None, ..fmu.arguments(interface)? }),
     ] {
         let place = format!("fmi2Instantiate with {what}");
-        let answer = fmu.left_open(&place, findings, || fmu.instantiate(interface, &with))?;
+        let answer =
+            fmu.with_open_effect(&place, findings, || fmu.instantiate(interface, &with))?;
         expect_null(findings, &place, answer);
     }
     Ok(())
@@ -133,12 +134,12 @@ pub fn resources(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     if !resources.is_dir() {
         return skip("it has no resources");
     }
-    let interface = fmu.first()?;
+    let interface = fmu.first_interface()?;
     let run = |location: Option<&str>| -> Result<Vec<Reading>> {
         let mut session = match location {
             None => fmu.session(interface)?,
             Some(_) => {
-                fmu.doing("fmi2Instantiate with another resource location");
+                fmu.announce("fmi2Instantiate with another resource location");
                 let with = fmu.arguments(interface)?;
                 let with = Instantiation { resources: location, logging: false, ..with };
                 fmu.session_with(interface, &with)?
@@ -187,18 +188,18 @@ pub fn resources(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 fn refuse_as_usual(fmu: &FmuUnderTest, interface: Interface) -> Result<bool> {
     let mut session = fmu.running(interface)?;
     let answer = fmu.with_crash_reported_by("values.unknown", || {
-        fmu.doing("fmi2GetReal of an unknown value reference");
+        fmu.announce("fmi2GetReal of an unknown value reference");
         session.instance.get_real(&[u32::MAX], &mut [0.0])
     });
     Ok(answer.is_err_and(|error| !error.messages.is_empty()))
 }
 
 pub fn callbacks(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let interface = fmu.first()?;
+    let interface = fmu.first_interface()?;
     fmu.require(interface, "canNotUseMemoryManagementFunctions")?;
     refuse_as_usual(fmu, interface)?;
     let place = "fmi2Instantiate with NULL for the memory functions";
-    fmu.doing(place);
+    fmu.announce(place);
     let with = Instantiation { callbacks: Callbacks::Logger, ..fmu.arguments(interface)? };
     let made = fmu.instantiate(interface, &with)?;
     match made
@@ -213,40 +214,42 @@ pub fn callbacks(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     // Hosts must pass a logger. Without one the FMU may refuse, but should not crash.
     let with = Instantiation { callbacks: Callbacks::Empty, ..fmu.arguments(interface)? };
     let place = "fmi2Instantiate with callbacks that are all NULL";
-    let answer = fmu.left_open(place, findings, || {
+    let answer = fmu.with_open_effect(place, findings, || {
         fmu.instantiate(interface, &with)?
             .map_or(Ok(()), |instance| initialise_and_refuse(fmu, instance))
     });
     if let Err(error) = answer {
-        findings.at(fmu.now()).add(format!("{error} (allowed: no instance, or one that works)"));
+        findings
+            .at(fmu.last_call())
+            .add(format!("{error} (allowed: no instance, or one that works)"));
     }
     Ok(())
 }
 
 fn initialise_and_refuse(fmu: &FmuUnderTest, mut instance: Instance) -> Result<()> {
     let experiment = fmu.experiment();
-    fmu.doing("fmi2SetupExperiment to fmi2ExitInitializationMode without callbacks");
+    fmu.announce("fmi2SetupExperiment to fmi2ExitInitializationMode without callbacks");
     instance.setup_experiment(None, experiment.start, None)?;
     instance.enter_initialization_mode()?;
     instance.exit_initialization_mode()?;
-    fmu.doing("a refused call without callbacks");
+    fmu.announce("a refused call without callbacks");
     let _ = instance.get_real(&[u32::MAX], &mut [0.0]);
     Ok(())
 }
 
 pub fn copies(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let interface = fmu.first()?;
+    let interface = fmu.first_interface()?;
     let logs = refuse_as_usual(fmu, interface)?;
-    fmu.doing("fmi2Instantiate with callbacks that are wiped afterwards");
+    fmu.announce("fmi2Instantiate with callbacks that are wiped afterwards");
     let with = Instantiation { callbacks: Callbacks::Fleeting, ..fmu.arguments(interface)? };
     let mut instance = fmu.instantiate(interface, &with)??;
-    fmu.doing("a refused call after the callbacks' struct was wiped");
+    fmu.announce("a refused call after the callbacks' struct was wiped");
     if let Err(error) = instance.get_real(&[u32::MAX], &mut [0.0])
         && error.messages.is_empty()
         && logs
     {
         findings
-            .at(fmu.now())
+            .at(fmu.last_call())
             .add("no message reaches the logger (allowed: a copy of the callbacks)");
     }
     Ok(())
@@ -254,7 +257,7 @@ pub fn copies(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 
 /// `instantiate.free_null`: the rule is broken if the call crashes.
 pub fn free_null<F: UnderTest>(fmu: &F, _: &mut Findings) -> Result<()> {
-    fmu.doing(format!("{}FreeInstance(NULL)", F::FMI));
+    fmu.announce(format!("{}FreeInstance(NULL)", F::FMI));
     for binary in fmu.binaries() {
         binary.free_null_instance();
     }
@@ -263,7 +266,7 @@ pub fn free_null<F: UnderTest>(fmu: &F, _: &mut Findings) -> Result<()> {
 
 pub fn null(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     for binary in fmu.binaries() {
-        let answers = fmu.left_open("a call with the instance NULL", findings, || {
+        let answers = fmu.with_open_effect("a call with the instance NULL", findings, || {
             binary.calls_with_null_instance()
         });
         for (call, status) in answers {
@@ -337,8 +340,8 @@ pub fn reset<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
     for using in fmu.uses() {
         let fresh = history::<F>(&mut fmu.session(using)?)?;
         let mut session = fmu.session(using)?;
-        session.stray()?;
-        fmu.doing(format!("{call} after steps"));
+        session.leave_trajectory()?;
+        fmu.announce(format!("{call} after steps"));
         session.instance().reset()?;
         session.rewind();
         let again = history::<F>(&mut session)
@@ -374,12 +377,12 @@ pub fn reset_anywhere(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
             let mut session = fmu.session_in(interface, stage)?;
             if stage == Stage::Initialised {
                 fmu.with_crash_reported_by("values.unknown", || {
-                    fmu.doing("fmi2GetReal of an unknown value reference");
+                    fmu.announce("fmi2GetReal of an unknown value reference");
                     let _ = session.instance.get_real(&[u32::MAX], &mut [0.0]);
                 });
             }
             let place = format!("fmi2Reset, {from} ({})", FmuUnderTest::name(interface));
-            fmu.doing(&place);
+            fmu.announce(&place);
             if let Err(error) = session.instance.reset() {
                 findings.at(place).add(error.to_string());
                 continue;
@@ -398,9 +401,9 @@ pub fn terminate<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
         let mut session = fmu.running(using)?;
         session.advance(3)?;
         let before = session.readings()?;
-        fmu.doing(&call);
+        fmu.announce(&call);
         session.instance().terminate()?;
-        fmu.doing(format!("reading values after {call}"));
+        fmu.announce(format!("reading values after {call}"));
         let after = session.readings()?;
         // FMI 3.0 requires only that values can be read; Dymola's FMUs change them slightly in
         // fmi3Terminate.
@@ -454,7 +457,7 @@ pub fn order(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                 let state = stage.name();
                 let place =
                     format!("{call} in state \"{state}\" ({})", FmuUnderTest::name(interface));
-                let answer = fmu.left_open(&place, findings, || made(&mut session));
+                let answer = fmu.with_open_effect(&place, findings, || made(&mut session));
                 expect_refusal(findings, place, answer);
             }
         }
@@ -482,7 +485,7 @@ pub fn expect_refusal(findings: &mut Findings, place: String, answer: Result<(),
 fn ordinary_lives(fmu: &FmuUnderTest, interface: Interface) -> Result<()> {
     let mut session = fmu.running(interface)?;
     session.advance(STEPS)?;
-    fmu.doing("fmi2Terminate");
+    fmu.announce("fmi2Terminate");
     session.instance.terminate()?;
     drop(session);
     refuse_as_usual(fmu, interface).map(|_| ())

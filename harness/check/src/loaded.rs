@@ -110,7 +110,7 @@ impl<V: Version> Loaded<V> {
     }
 
     /// Announces the next call, so that a crash or a hang in it is reported with this text.
-    pub fn doing(&self, what: impl Into<String>) {
+    pub fn announce(&self, what: impl Into<String>) {
         let what = what.into();
         trace::doing(&what, self.crash.borrow().clone());
         *self.doing.borrow_mut() = what;
@@ -125,7 +125,7 @@ impl<V: Version> Loaded<V> {
     /// Makes calls whose effect the standard leaves open. A crash has the severity of the rule. If the calls
     /// take longer than [`PATIENCE`], the process writes the findings so far, adds that the calls do not
     /// return, and exits.
-    pub fn left_open<T>(
+    pub fn with_open_effect<T>(
         &self,
         what: impl Into<String>,
         findings: &Findings,
@@ -146,7 +146,7 @@ impl<V: Version> Loaded<V> {
             }
         });
         let answer = self.with_crash(Crash::Open, || {
-            self.doing(what);
+            self.announce(what);
             calls()
         });
         drop(returned);
@@ -164,12 +164,12 @@ impl<V: Version> Loaded<V> {
         let answer = calls();
         self.crash.replace(before);
         // The next call no longer has the special treatment.
-        self.doing(self.now());
+        self.announce(self.last_call());
         answer
     }
 
     /// Returns the text of the call that was announced last.
-    pub fn now(&self) -> String {
+    pub fn last_call(&self) -> String {
         let doing = self.doing.borrow();
         if doing.is_empty() { "a first call".into() } else { doing.clone() }
     }
@@ -266,7 +266,7 @@ pub trait UnderTest: Deref<Target = Loaded<Self::Version>> {
 
     /// Provokes errors and returns the messages that the FMU logs, and how many of them have the category
     /// NULL.
-    fn complaints(&self) -> Result<(Vec<Message>, usize)>;
+    fn provoke_messages(&self) -> Result<(Vec<Message>, usize)>;
 
     /// Returns true if the element of `interface` declares the capability `flag`.
     fn can(&self, interface: Interface, flag: &str) -> bool {
@@ -314,7 +314,7 @@ pub trait Life<'f, V: Version + 'f> {
     fn go_back(&mut self, to: &Self::Mark);
 
     /// Brings the instance away from its usual trajectory, so that a following reset has something to undo.
-    fn stray(&mut self) -> Result<()>;
+    fn leave_trajectory(&mut self) -> Result<()>;
 
     /// Returns the host's own state to the start, which is where the FMU is after a reset.
     fn rewind(&mut self);

@@ -9,12 +9,12 @@ use host::c_abi::foreign_environments;
 use host::fmi2::{Instantiation, Message, Status};
 
 pub fn percent(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let interface = fmu.first()?;
+    let interface = fmu.first_interface()?;
     // If the FMU uses the text as a printf format, %d prints some number and %% one sign; both are harmless.
     const TEXT: &str = "{a%db%%c}";
     let mut told = Vec::new();
     let place = format!("a message about {TEXT:?}");
-    fmu.doing(&place);
+    fmu.announce(&place);
     let with = Instantiation { name: Some(TEXT), guid: Some(TEXT), ..fmu.arguments(interface)? };
     if let Err(error) = fmu.instantiate(interface, &with)? {
         told.extend(error.messages);
@@ -44,7 +44,7 @@ pub fn categories<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> 
     if declared.is_empty() {
         return skip("no categories are declared");
     }
-    let (messages, uncategorised) = fmu.complaints()?;
+    let (messages, uncategorised) = fmu.provoke_messages()?;
     if uncategorised > 0 {
         let all = declared.join(", ");
         findings.at("a message").add(format!("its category is NULL (declared: {all})"));
@@ -64,7 +64,7 @@ pub fn categories<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> 
 }
 
 pub fn text(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let (messages, _) = fmu.complaints()?;
+    let (messages, _) = fmu.provoke_messages()?;
     if messages.is_empty() {
         findings.skip("it logs nothing");
     }
@@ -87,7 +87,7 @@ pub fn text(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 /// Simulates with loggingOn and returns the messages. `changing` says whether the inputs change or keep their
 /// start values.
 fn ordinary(fmu: &FmuUnderTest, interface: Interface, changing: bool) -> Result<Vec<Message>> {
-    fmu.doing("fmi2Instantiate, loggingOn");
+    fmu.announce("fmi2Instantiate, loggingOn");
     let with = fmu.arguments(interface)?;
     let mut session = fmu.session_with(interface, &with)?;
     session.initialise()?;
@@ -122,11 +122,11 @@ pub fn quiet(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 }
 
 pub fn environment(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let complaints = fmu.complaints();
+    let provoke_messages = fmu.provoke_messages();
     let runs = fmu.interfaces().into_iter().map(|interface| ordinary(fmu, interface, true));
     let runs: Result<Vec<_>> = runs.collect();
     match foreign_environments() {
-        0 if complaints?.0.is_empty() & runs?.iter().all(Vec::is_empty) => {
+        0 if provoke_messages?.0.is_empty() & runs?.iter().all(Vec::is_empty) => {
             findings.skip("it logs nothing");
         }
         0 => {}
@@ -139,13 +139,13 @@ pub fn environment(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 }
 
 pub fn switch(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let mut session = fmu.session(fmu.first()?)?;
+    let mut session = fmu.session(fmu.first_interface()?)?;
     let root = &fmu.description().root;
     let declared: Vec<&str> = root.list("LogCategories").filter_map(|c| c.get("name")).collect();
     let sets = declared.iter().map(std::slice::from_ref).chain([&[][..], &declared[..]]);
     for (set, on) in sets.flat_map(|set| [(set, true), (set, false)]) {
         let place = format!("fmi2SetDebugLogging({on}, {set:?})");
-        fmu.doing(&place);
+        fmu.announce(&place);
         if let Err(error) = session.instance.set_debug_logging(on, set) {
             findings.at(place).add(error.to_string());
         }

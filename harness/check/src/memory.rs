@@ -87,7 +87,7 @@ fn look(fmu: &FmuUnderTest, interface: Interface, findings: &mut Findings) -> Re
             let state = session.instance.get_state()?;
             Ok(session.instance.free_state(state)?)
         };
-        fmu.doing("fmi2GetFMUstate and fmi2FreeFMUstate");
+        fmu.announce("fmi2GetFMUstate and fmi2FreeFMUstate");
         if let Some(bytes) = leak_per_call(state)? {
             findings
                 .at(format!("fmi2FreeFMUstate ({name})"))

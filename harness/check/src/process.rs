@@ -228,9 +228,9 @@ pub fn check_in_child(id: &str, fmu: Unpacked, limit: Duration) -> Result<()> {
                 Ok(mut fmu) => {
                     fmu.before = before;
                     if let Err(error) = check(&fmu, &mut findings) {
-                        failed(error, fmu.now(), &mut findings);
+                        failed(error, fmu.last_call(), &mut findings);
                     }
-                    fmu.doing("unloading the binary");
+                    fmu.announce("unloading the binary");
                 }
             }
         }
@@ -238,9 +238,9 @@ pub fn check_in_child(id: &str, fmu: Unpacked, limit: Duration) -> Result<()> {
             Err(error) => lost(error, &mut findings),
             Ok(subject) => {
                 if let Err(error) = check(&subject, &mut findings) {
-                    failed(error, subject.now(), &mut findings);
+                    failed(error, subject.last_call(), &mut findings);
                 }
-                subject.doing("unloading the library");
+                subject.announce("unloading the library");
             }
         },
         _ => anyhow::bail!("{id} makes no calls"),

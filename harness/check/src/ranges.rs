@@ -5,12 +5,12 @@ use std::collections::BTreeSet;
 
 use anyhow::Result;
 
-use super::dependencies::randomised;
+use super::dependencies::random_session;
 use super::description::Variable;
 use super::findings::Findings;
 use super::loaded::skip;
 use super::under_test::{FmuUnderTest, Life, Reading, STEPS, Session, UnderTest, start_value};
-use super::values::{items, mentions};
+use super::values::{contains_name, items};
 use host::description::Type;
 
 /// Tolerance of min and max, relative to the bound or the nominal value, because an integrator may leave a
@@ -31,7 +31,7 @@ pub fn in_range(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             if step > 0 {
                 session.advance(1)?;
             }
-            fmu.doing(format!("reading what has a min or a max after {step} steps"));
+            fmu.announce(format!("reading what has a min or a max after {step} steps"));
             for v in &all {
                 let x = match session.get(v) {
                     Ok(Reading::Real(x)) => x,
@@ -59,8 +59,8 @@ pub fn in_range(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 /// Sets `v` before initialisation and initialises. The inner error is the reason why the FMU refused the
 /// value.
 fn refusal(fmu: &FmuUnderTest, v: &Variable, value: &Reading) -> Result<Result<()>> {
-    let mut session = fmu.session(fmu.first()?)?;
-    fmu.doing(format!("setting {} to {value} and initialising", v.name));
+    let mut session = fmu.session(fmu.first_interface()?)?;
+    fmu.announce(format!("setting {} to {value} and initialising", v.name));
     if let Err(error) = session.set(v, value) {
         return Ok(Err(error.into()));
     }
@@ -128,7 +128,7 @@ pub fn items_known(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                 && !fmu
                     .variables()
                     .iter()
-                    .any(|o| o.name != v.name && mentions(&why.to_string(), &o.name))
+                    .any(|o| o.name != v.name && contains_name(&why.to_string(), &o.name))
             {
                 findings
                     .at(v.place())
@@ -176,8 +176,8 @@ pub fn items_known(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     };
     // Runs with other parameters, and with one parameter far from its start value.
     for attempt in 0..STEPS as u64 {
-        let mut session = randomised(fmu, fmu.first()?, attempt)?;
-        fmu.doing(format!("initialising with other parameters, try {attempt}"));
+        let mut session = random_session(fmu, fmu.first_interface()?, attempt)?;
+        fmu.announce(format!("initialising with other parameters, try {attempt}"));
         if session.initialise().is_err() {
             continue;
         }
@@ -190,8 +190,8 @@ pub fn items_known(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     }
     for v in fmu.variables().iter().filter(|v| v.is_set_by_hosts() && v.is_real()) {
         for x in far_values(v) {
-            let mut session = fmu.session(fmu.first()?)?;
-            fmu.doing(format!("initialising with {} = {x:?}", v.name));
+            let mut session = fmu.session(fmu.first_interface()?)?;
+            fmu.announce(format!("initialising with {} = {x:?}", v.name));
             if session.set(v, &Reading::Real(x)).is_ok() && session.initialise().is_ok() {
                 look(&mut session);
                 if session.advance(1).is_ok() {

@@ -8,7 +8,7 @@ use super::under_test::{FmuUnderTest, Stage};
 
 /// Returns the uses whose interface declares the capability `can`, for example "canSerialize", to which the
 /// version's word for a state is appended. Skips the rule if there are none.
-pub fn with<F: UnderTest>(fmu: &F, can: &str, findings: &mut Findings) -> Vec<F::Use> {
+pub fn uses_with<F: UnderTest>(fmu: &F, can: &str, findings: &mut Findings) -> Vec<F::Use> {
     let flag = format!("{can}{}", F::STATE);
     let mut all = fmu.uses();
     all.retain(|using| fmu.can(F::interface(*using), &flag));
@@ -22,7 +22,7 @@ const SAVE: &str = "canGetAndSet";
 const SERIALIZE: &str = "canSerialize";
 
 /// Simulates some steps from the host's state at which the FMU state was saved, and returns the values.
-fn continued<'f, F: UnderTest + 'f>(
+fn continue_from<'f, F: UnderTest + 'f>(
     session: &mut F::Session<'f>,
     from: &Mark<'f, F>,
 ) -> Result<Readings<'f, F>> {
@@ -37,9 +37,9 @@ fn rolls_back<F: UnderTest>(fmu: &F, using: F::Use) -> Result<()> {
     let mut session = fmu.running(using)?;
     session.advance(3)?;
     let (state, here) = (session.instance().get_state()?, session.mark());
-    let first = continued::<F>(&mut session, &here)?;
+    let first = continue_from::<F>(&mut session, &here)?;
     session.instance().set_state(&state)?;
-    let second = continued::<F>(&mut session, &here)?;
+    let second = continue_from::<F>(&mut session, &here)?;
     session.instance().free_state(state)?;
     match session.difference(&second, &first) {
         None => Ok(()),
@@ -49,42 +49,42 @@ fn rolls_back<F: UnderTest>(fmu: &F, using: F::Use) -> Result<()> {
 
 pub fn rollback<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
     let call = |verb: &str| format!("{}{verb}{}", F::FMI, F::STATE);
-    for using in with(fmu, SAVE, findings) {
+    for using in uses_with(fmu, SAVE, findings) {
         let mut session = fmu.running(using)?;
         session.advance(3)?;
-        fmu.doing(call("Get"));
+        fmu.announce(call("Get"));
         let state = session.instance().get_state()?;
         let here = session.mark();
         let before = session.readings()?;
-        let first = continued::<F>(&mut session, &here)?;
-        fmu.doing(call("Set"));
+        let first = continue_from::<F>(&mut session, &here)?;
+        fmu.announce(call("Set"));
         session.instance().set_state(&state)?;
         let restored = session.readings()?;
         let set = format!("after {} ({})", call("Set"), F::name(using));
         if let Some(text) = session.difference(&restored, &before) {
             findings.at(format!("right {set}")).add(text);
         }
-        let second = continued::<F>(&mut session, &here)?;
+        let second = continue_from::<F>(&mut session, &here)?;
         if let Some(text) = session.difference(&second, &first) {
             findings.at(format!("{STEPS} steps {set}")).add(text);
         }
-        fmu.doing(call("Free"));
+        fmu.announce(call("Free"));
         session.instance().free_state(state)?;
     }
     Ok(())
 }
 
 pub fn handle(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    for interface in with(fmu, SAVE, findings) {
+    for interface in uses_with(fmu, SAVE, findings) {
         let mut session = fmu.running(interface)?;
         let mut state = session.instance.get_state()?;
         session.advance(3)?;
-        fmu.doing("fmi2GetFMUstate into a handle that is there already");
+        fmu.announce("fmi2GetFMUstate into a handle that is there already");
         session.instance.get_state_into(&mut state)?;
         let here = session.mark();
-        let first = continued::<FmuUnderTest>(&mut session, &here)?;
+        let first = continue_from::<FmuUnderTest>(&mut session, &here)?;
         session.instance.set_state(&state)?;
-        let second = continued::<FmuUnderTest>(&mut session, &here)?;
+        let second = continue_from::<FmuUnderTest>(&mut session, &here)?;
         if let Some(text) = session.difference(&second, &first) {
             rolls_back(fmu, interface)?;
             findings
@@ -92,19 +92,19 @@ pub fn handle(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                 .add(text);
         }
         session.instance.free_state(state)?;
-        fmu.doing("fmi2FreeFMUstate of NULL");
+        fmu.announce("fmi2FreeFMUstate of NULL");
         session.instance.free_state_null()?;
     }
     Ok(())
 }
 
 pub fn bytes(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    for interface in with(fmu, SERIALIZE, findings) {
+    for interface in uses_with(fmu, SERIALIZE, findings) {
         let (first, here, bytes) = {
             let mut session = fmu.running(interface)?;
             session.advance(3)?;
             let state = session.instance.get_state()?;
-            fmu.doing("fmi2SerializeFMUstate");
+            fmu.announce("fmi2SerializeFMUstate");
             let bytes = session.instance.serialize(&state)?;
             if session.instance.serialize(&state)? != bytes {
                 findings
@@ -113,7 +113,7 @@ pub fn bytes(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             }
             session.instance.free_state(state)?;
             let here = session.mark();
-            (continued::<FmuUnderTest>(&mut session, &here)?, here, bytes)
+            (continue_from::<FmuUnderTest>(&mut session, &here)?, here, bytes)
         };
         // Restored into an instance that has been simulated and into one that was neither set up nor
         // initialised.
@@ -122,15 +122,15 @@ pub fn bytes(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                 true => fmu.running(interface)?,
                 false => fmu.session(interface)?,
             };
-            fmu.doing(match lived {
+            fmu.announce(match lived {
                 true => "fmi2DeSerializeFMUstate in another instance",
                 false => "fmi2DeSerializeFMUstate and fmi2SetFMUstate in an instance without setup",
             });
             let state = other.instance.deserialize(&bytes)?;
             other.instance.set_state(&state)?;
-            let second = continued::<FmuUnderTest>(&mut other, &here)?;
+            let second = continue_from::<FmuUnderTest>(&mut other, &here)?;
             if let Some(text) = other.difference(&second, &first) {
-                let place = format!("{} ({})", fmu.now(), FmuUnderTest::name(interface));
+                let place = format!("{} ({})", fmu.last_call(), FmuUnderTest::name(interface));
                 rolls_back(fmu, interface)?;
                 findings.at(place).add(text);
             }
@@ -141,7 +141,7 @@ pub fn bytes(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 }
 
 pub fn garbage(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    for interface in with(fmu, SERIALIZE, findings) {
+    for interface in uses_with(fmu, SERIALIZE, findings) {
         let mut session = fmu.running(interface)?;
         session.advance(3)?;
         let state = session.instance.get_state()?;
@@ -166,7 +166,7 @@ pub fn garbage(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             let mut session = fmu.running(interface)?;
             session.advance(3)?;
             let before = session.readings()?;
-            fmu.doing(&place);
+            fmu.announce(&place);
             let accepted = match session.instance.deserialize(&bytes) {
                 Err(_) => false,
                 Ok(state) => {
@@ -187,16 +187,16 @@ pub fn garbage(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             }
         }
         let mut session = fmu.running(interface)?;
-        fmu.doing("fmi2SetFMUstate(NULL)");
+        fmu.announce("fmi2SetFMUstate(NULL)");
         if session.instance.set_state_null().is_ok() {
-            findings.at(fmu.now()).add("it is accepted (allowed: fmi2Error)");
+            findings.at(fmu.last_call()).add("it is accepted (allowed: fmi2Error)");
         }
     }
     Ok(())
 }
 
 pub fn modes(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    for interface in with(fmu, SAVE, findings) {
+    for interface in uses_with(fmu, SAVE, findings) {
         for stage in [Stage::Instantiated, Stage::Initialization, Stage::Terminated] {
             let mut session = fmu.session_in(interface, stage)?;
             let mode = stage.name();
@@ -204,7 +204,7 @@ pub fn modes(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                 "fmi2GetFMUstate and fmi2SetFMUstate, {mode} ({})",
                 FmuUnderTest::name(interface)
             );
-            fmu.doing(&place);
+            fmu.announce(&place);
             let done = session.instance.get_state().and_then(|state| {
                 let set = session.instance.set_state(&state);
                 session.instance.free_state(state).and(set)

@@ -40,14 +40,14 @@ pub fn run(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             break;
         }
         let done = session.stimulate().map_err(anyhow::Error::from);
-        let Err(error) = done.and_then(|()| session.go(session.step)) else { continue };
+        let Err(error) = done.and_then(|()| session.make_step(session.step)) else { continue };
         let discarded =
             error.downcast_ref::<CallError>().is_some_and(|error| error.status == Status::Discard);
         let allowed = match discarded {
             true => " (allowed: fmi2Discard only with fmi2Terminated; two hosts try for ever)",
             false => "",
         };
-        findings.at(fmu.now()).add(format!("{error}{allowed}"));
+        findings.at(fmu.last_call()).add(format!("{error}{allowed}"));
         return Ok(());
     }
     let readings = session.readings()?;
@@ -72,10 +72,10 @@ pub fn size(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         let place = format!("fmi2DoStep with communicationStepSize = {h:?}");
         let time = session.time;
         let answer = if h.is_finite() {
-            fmu.doing(&place);
+            fmu.announce(&place);
             session.instance.do_step(time, h)
         } else {
-            fmu.left_open(&place, findings, || session.instance.do_step(time, h))
+            fmu.with_open_effect(&place, findings, || session.instance.do_step(time, h))
         };
         let is_refused = answer.is_err();
         expect_refusal(findings, place.clone(), answer);
@@ -96,7 +96,8 @@ pub fn point(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         let wrong = session.time + off * session.step;
         let place = format!("fmi2DoStep from {wrong:?} s, {:?} s being reached", session.time);
         let step = session.step;
-        let answer = fmu.left_open(&place, findings, || session.instance.do_step(wrong, step));
+        let answer =
+            fmu.with_open_effect(&place, findings, || session.instance.do_step(wrong, step));
         expect_refusal(findings, place, answer);
     }
     Ok(())
@@ -115,12 +116,14 @@ pub fn wobble(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             _ => product.next_down(),
         };
         session.stimulate()?;
-        fmu.doing(format!("fmi2DoStep from {wobbled:?} s, {product:?} s by {h:?} s being meant"));
+        fmu.announce(format!(
+            "fmi2DoStep from {wobbled:?} s, {product:?} s by {h:?} s being meant"
+        ));
         if let Err(error) = session.instance.do_step(wobbled, h) {
             if session.has_terminated(&error) {
                 break;
             }
-            findings.at(fmu.now()).add(format!("{error} (allowed: some ulps either way)"));
+            findings.at(fmu.last_call()).add(format!("{error} (allowed: some ulps either way)"));
             return Ok(());
         }
     }
@@ -153,12 +156,12 @@ pub fn stop_time(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     // The sum of the steps differs from the stop time by rounding.
     if let Err(error) = session.advance(STEPS) {
         findings
-            .at(fmu.now())
+            .at(fmu.last_call())
             .add(format!("{error} (the stop time is {stop:?} s; rounding must be forgiven)"));
         return Ok(());
     }
     let place = format!("fmi2DoStep past the stop time {stop} s");
-    fmu.doing(&place);
+    fmu.announce(&place);
     let answer = session.instance.do_step(session.time, session.step);
     expect_refusal(findings, place, answer);
     Ok(())
@@ -214,7 +217,7 @@ pub fn cut(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             session.stimulate()?;
             for part in 1..=parts {
                 let end = start + session.step * (step as f64 + part as f64 / parts as f64);
-                session.go(end - session.time)?;
+                session.make_step(end - session.time)?;
                 session.time = end;
             }
             for (n, v) in fmu.outputs.iter().enumerate() {
@@ -267,7 +270,7 @@ pub fn lag(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         let (start, mut all) = (session.time, Vec::new());
         for n in 1..=count {
             let end = start + n as f64 * step;
-            session.go(end - session.time)?;
+            session.make_step(end - session.time)?;
             if session.is_ended() {
                 break;
             }
@@ -327,8 +330,9 @@ pub fn inputs(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     for v in &inputs {
         let mut session = fmu.running(Interface::CoSimulation)?;
         let place = format!("{} = NaN, then a step", v.name);
-        let refused = fmu.left_open(&place, findings, || {
-            session.set(v, &Reading::Real(f64::NAN)).is_err() || session.go(session.step).is_err()
+        let refused = fmu.with_open_effect(&place, findings, || {
+            session.set(v, &Reading::Real(f64::NAN)).is_err()
+                || session.make_step(session.step).is_err()
         });
         if !refused {
             findings.at(place).add("fmi2OK (allowed: fmi2Error and a message)");
@@ -337,7 +341,7 @@ pub fn inputs(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let can = fmu.can(Interface::CoSimulation, "canInterpolateInputs");
     for v in inputs.iter().filter(|v| can && v.is_continuous()) {
         let place = format!("fmi2SetRealInputDerivatives of {}", v.name);
-        fmu.doing(&place);
+        fmu.announce(&place);
         let set = session.instance.set_real_input_derivatives(&[v.reference], &[1], &[0.0]);
         if let Err(error) = set {
             findings.at(place).add(format!("{error}, but canInterpolateInputs is declared"));
@@ -378,13 +382,13 @@ pub fn input_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<
         // comes last.
         let end = |value: f64, slope: Option<f64>| -> Result<Vec<f64>> {
             let (mut session, _) = running()?;
-            fmu.doing(format!("a step with {} = {value:?}, its slope {slope:?}", input.name));
+            fmu.announce(format!("a step with {} = {value:?}, its slope {slope:?}", input.name));
             session.set(input, &Reading::Real(value))?;
             if let Some(slope) = slope {
                 let reference = [input.reference];
                 session.instance.set_real_input_derivatives(&reference, &[1], &[slope])?;
             }
-            session.go(session.step)?;
+            session.make_step(session.step)?;
             computed.iter().chain([&input]).map(|v| session.real(v)).collect()
         };
         let step = fmu.session(Interface::CoSimulation)?.step;
@@ -434,7 +438,7 @@ pub fn output_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result
     let references: Vec<u32> = outputs.iter().map(|v| v.reference).collect();
     session.advance(STEPS)?;
     let mut declared = vec![f64::NAN; outputs.len()];
-    fmu.doing("fmi2GetRealOutputDerivatives of every output");
+    fmu.announce("fmi2GetRealOutputDerivatives of every output");
     session.instance.get_real_output_derivatives(
         &references,
         &vec![1; outputs.len()],
@@ -451,7 +455,7 @@ pub fn output_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result
         session.instance.get_real(&references, &mut values)?;
         points.push(values);
         if n < 2 {
-            session.go(h)?;
+            session.make_step(h)?;
         }
     }
     for (n, v) in outputs.iter().enumerate() {
@@ -501,7 +505,7 @@ pub fn small(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         let start = session.time;
         for n in 1..=count {
             let end = start + n as f64 * h;
-            if let Err(error) = session.go(end - session.time) {
+            if let Err(error) = session.make_step(end - session.time) {
                 return Ok(Some(Err(anyhow!("step {n} of {h:.1e} s: {error}"))));
             }
             if session.is_ended() {
@@ -568,7 +572,7 @@ pub fn output_derivative_order(fmu: &FmuUnderTest, findings: &mut Findings) -> R
             let mut session = fmu.running(Interface::CoSimulation)?;
             session.advance(3)?;
             let place = format!("derivative {order} of {}", v.name);
-            fmu.doing(format!("fmi2GetRealOutputDerivatives, {place}"));
+            fmu.announce(format!("fmi2GetRealOutputDerivatives, {place}"));
             let mut value = [f64::NAN];
             let answer =
                 session.instance.get_real_output_derivatives(&[v.reference], &[order], &mut value);

@@ -61,7 +61,7 @@ pub fn can_be_set(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                     v.name,
                     FmuUnderTest::name(interface)
                 );
-                fmu.doing(&place);
+                fmu.announce(&place);
                 if let Err(error) = set_between_steps(&mut session, v, &value)? {
                     if value.is_identical(&start) || is_allowed(fmu, interface, v, &value)? {
                         findings.at(place).add(format!("{error} (allowed: fmi2OK)"));
@@ -122,7 +122,7 @@ pub fn acts(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             any = true;
             let Some(value) = other_value(fmu, v, &start) else { continue };
             fmu.chose_values();
-            fmu.doing(format!("runs with {} = {value}, set before and after", v.name));
+            fmu.announce(format!("runs with {} = {value}, set before and after", v.name));
             let change = Some((v, &value));
             let runs = (run(fmu, interface, change, None)?, run(fmu, interface, None, change)?);
             let (Some(before), Some(after)) = runs else { continue };

@@ -1,6 +1,6 @@
 //! The FMU 2.0 under test: loads it, calls it as a host does, and has shortcuts for the rules.
 
-mod sight;
+mod observed;
 
 use std::ops::Deref;
 use std::path::{Path, PathBuf};
@@ -18,7 +18,7 @@ use host::fmi2::{
 };
 use host::xml::Element;
 
-pub use self::sight::Sight;
+pub use self::observed::Observed;
 pub use super::loaded::{Life, STEPS, UnderTest, Unusable};
 pub use host::fmi3::Interface;
 
@@ -98,7 +98,7 @@ pub struct Experiment {
 
 impl FmuUnderTest {
     /// Returns the interface that most rules use: Co-Simulation if it can be called.
-    pub fn first(&self) -> Result<Interface> {
+    pub fn first_interface(&self) -> Result<Interface> {
         let why = || Unusable {
             rule: "load.instance",
             why: "it offers no interface that can be called".into(),
@@ -116,7 +116,7 @@ impl FmuUnderTest {
     ) -> Result<FmuUnderTest> {
         let root = &description.root;
         let mut loaded = Loaded::new(declared(root), deadline, |interface| {
-            Fmu::load_for(kind(interface), directory, path, root)
+            Fmu::load_for(Some(interface), directory, path, root)
         })?;
         // If only one of two binaries is missing, another rule reports it.
         let is_there = |identifier: &str| {
@@ -288,7 +288,7 @@ impl UnderTest for FmuUnderTest {
     }
 
     fn session(&self, interface: Interface) -> Result<Session<'_>> {
-        self.doing("fmi2Instantiate");
+        self.announce("fmi2Instantiate");
         let with = Instantiation { logging: false, ..self.arguments(interface)? };
         self.session_with(interface, &with)
     }
@@ -297,27 +297,27 @@ impl UnderTest for FmuUnderTest {
         self.session_in(interface, Stage::Initialised)
     }
 
-    fn complaints(&self) -> Result<(Vec<Message>, usize)> {
-        let interface = self.first()?;
+    fn provoke_messages(&self) -> Result<(Vec<Message>, usize)> {
+        let interface = self.first_interface()?;
         let mut all = Vec::new();
-        self.doing("fmi2Instantiate with another GUID");
+        self.announce("fmi2Instantiate with another GUID");
         let with = Instantiation { guid: Some("another"), ..self.arguments(interface)? };
         if let Err(error) = self.instantiate(interface, &with)? {
             all.extend(error.messages);
         }
         let mut session = self.session(interface)?;
-        self.doing("fmi2SetDebugLogging");
+        self.announce("fmi2SetDebugLogging");
         session
             .instance
             .set_debug_logging(true, &[])
             .map_err(|error| Unusable { rule: "log.switch", why: error.to_string() })?;
         self.with_crash_reported_by("life.order", || {
-            self.doing("fmi2ExitInitializationMode in state \"instantiated\"");
+            self.announce("fmi2ExitInitializationMode in state \"instantiated\"");
             let _ = session.instance.exit_initialization_mode();
         });
         if session.initialise().is_ok() {
             self.with_crash_reported_by("values.unknown", || {
-                self.doing("fmi2GetReal of an unknown value reference");
+                self.announce("fmi2GetReal of an unknown value reference");
                 let _ = session.instance.get_real(&[u32::MAX], &mut [0.0]);
             });
             let _ = session.advance(STEPS); // after an error an FMU may refuse all calls
@@ -402,17 +402,17 @@ impl<'f> Session<'f> {
         tolerance: Option<f64>,
     ) -> Result<()> {
         (self.ended, self.next_event) = (None, None);
-        self.fmu.doing(format!("fmi2SetupExperiment, startTime = {start}"));
+        self.fmu.announce(format!("fmi2SetupExperiment, startTime = {start}"));
         self.instance.setup_experiment(tolerance, start, stop)?;
         self.time = start;
-        self.fmu.doing("fmi2EnterInitializationMode");
+        self.fmu.announce("fmi2EnterInitializationMode");
         self.instance.enter_initialization_mode()?;
         self.leave_initialisation()
     }
 
     /// Calls fmi2ExitInitializationMode, and in Model Exchange goes on to continuous-time mode.
     pub fn leave_initialisation(&mut self) -> Result<()> {
-        self.fmu.doing("fmi2ExitInitializationMode");
+        self.fmu.announce("fmi2ExitInitializationMode");
         self.instance.exit_initialization_mode()?;
         match self.interface {
             Interface::CoSimulation => Ok(()),
@@ -427,13 +427,13 @@ impl<'f> Session<'f> {
         if self.is_ended() {
             return Ok(());
         }
-        self.fmu.doing("fmi2EnterContinuousTimeMode");
+        self.fmu.announce("fmi2EnterContinuousTimeMode");
         Ok(self.instance.enter_continuous_time_mode()?)
     }
 
     /// Calls fmi2NewDiscreteStates until no new iteration is requested.
     fn iterate_events(&mut self) -> Result<()> {
-        self.fmu.doing("fmi2NewDiscreteStates");
+        self.fmu.announce("fmi2NewDiscreteStates");
         (self.values_changed, self.nominals_changed) = (false, false);
         for _ in 0..ITERATIONS {
             let info = self.instance.new_discrete_states()?;
@@ -514,10 +514,10 @@ impl<'f> Session<'f> {
             return self.event();
         }
         self.asked += 1;
-        let before = Sight::read(self)?;
+        let before = Observed::read(self)?;
         self.event()?;
         if !self.is_ended()
-            && let Some((name, change)) = before.change(&Sight::read(self)?, self.fmu)
+            && let Some((name, change)) = before.change(&Observed::read(self)?, self.fmu)
         {
             self.step_event = Some((self.time, name.to_string(), change));
         }
@@ -585,9 +585,11 @@ impl<'f> Session<'f> {
                 break;
             }
             let done = prepare(self).map_err(anyhow::Error::from);
-            done.and_then(|()| self.go(self.step)).map_err(|error| match error.downcast() {
-                Ok(unusable) => Unusable { ..unusable },
-                Err(error) => Unusable { rule, why: error.to_string() },
+            done.and_then(|()| self.make_step(self.step)).map_err(|error| {
+                match error.downcast() {
+                    Ok(unusable) => Unusable { ..unusable },
+                    Err(error) => Unusable { rule, why: error.to_string() },
+                }
             })?;
         }
         Ok(())
@@ -603,8 +605,8 @@ impl<'f> Session<'f> {
 
     /// Makes one step of `h` seconds without changing the inputs. In Model Exchange the step may end earlier
     /// if the states change fast.
-    pub fn go(&mut self, h: f64) -> Result<()> {
-        self.fmu.doing(format!(
+    pub fn make_step(&mut self, h: f64) -> Result<()> {
+        self.fmu.announce(format!(
             "a step from {:?} s by {h:?} s ({})",
             self.time,
             FmuUnderTest::name(self.interface)
@@ -721,7 +723,7 @@ impl<'f> Life<'f, Fmi2> for Session<'f> {
     }
 
     /// Initialises with another start time, other parameters and another tolerance.
-    fn stray(&mut self) -> Result<()> {
+    fn leave_trajectory(&mut self) -> Result<()> {
         let fmu = self.fmu;
         for v in fmu.variables().iter().filter(|v| v.is_set_by_hosts() && v.is_real()) {
             let Some(Reading::Real(start)) = start_value(v) else { continue };

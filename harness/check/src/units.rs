@@ -246,7 +246,7 @@ fn number(element: &Element, attribute: &str, default: f64) -> Option<f64> {
 }
 
 /// Returns true if two factors agree in the three digits that authors usually write.
-fn agree(a: f64, b: f64) -> bool {
+fn is_equal(a: f64, b: f64) -> bool {
     (a - b).abs() <= 1e-3 * a.abs().max(b.abs())
 }
 
@@ -275,7 +275,7 @@ pub fn base_units(d: &Description, findings: &mut Findings) {
                 && written.has_radians_of(m)
                 // Authors write % with and without its factor of 0.01.
                 && (m.exponents == [0; 8]
-                    || agree(written.factor, m.factor)
+                    || is_equal(written.factor, m.factor)
                         && (written.offset - m.offset).abs() <= 1e-3 * m.offset.abs())
         };
         if let Some(first) = meant.first()
@@ -326,10 +326,10 @@ pub fn display_units(d: &Description, findings: &mut Findings) {
                 continue;
             };
             let fits = |(f, o): &(f64, f64)| {
-                agree(factor, *f) && (offset - o).abs() <= 1e-3 * o.abs().max(1e-9)
+                is_equal(factor, *f) && (offset - o).abs() <= 1e-3 * o.abs().max(1e-9)
             };
             if !expected.iter().any(fits) {
-                let inverted = agree(factor * right, 1.0);
+                let inverted = is_equal(factor * right, 1.0);
                 let hint = if inverted { "; it is inverted" } else { "" };
                 findings.at(place).add(format!(
                     "factor={factor} offset={offset}{hint} (allowed: factor={right} \
@@ -360,7 +360,7 @@ pub fn derivative_units(d: &Description, findings: &mut Findings) {
         }
         let expected: Vec<Unit> = all.iter().map(|u| u.times(second, -1)).collect();
         let fits =
-            |w: &Unit| expected.iter().any(|e| e.measures_like(w) && agree(e.factor, w.factor));
+            |w: &Unit| expected.iter().any(|e| e.measures_like(w) && is_equal(e.factor, w.factor));
         if !written.iter().any(fits) {
             findings.at(v.place()).add(format!(
                 "it is the derivative of {}, in \"{of_state}\", but has the unit \
@@ -387,10 +387,10 @@ mod tests {
         assert_eq!(one("W/(m2.K)").exponents, [1, 0, -3, 0, -1, 0, 0, 0]);
         assert_eq!(one("1/s").exponents[2], -1);
         assert_eq!(one("s-1"), one("1/s"));
-        assert!(agree(one("km/h").factor, 1.0 / 3.6));
-        assert!(agree(one("deg/h").factor, PI / 180.0 / 3600.0));
-        assert!(agree(one("mm2").factor, 1e-6) && agree(one("cm3").factor, 1e-6));
-        assert!(agree(one("mbar").factor, 100.0) && agree(one("kWh").factor, 3.6e6));
+        assert!(is_equal(one("km/h").factor, 1.0 / 3.6));
+        assert!(is_equal(one("deg/h").factor, PI / 180.0 / 3600.0));
+        assert!(is_equal(one("mm2").factor, 1e-6) && is_equal(one("cm3").factor, 1e-6));
+        assert!(is_equal(one("mbar").factor, 100.0) && is_equal(one("kWh").factor, 3.6e6));
         assert_eq!(one("min").factor, 60.0); // not a thousandth of an inch
         assert_eq!(one("kg").factor, 1.0);
         for unread in ["", "foo", "W/m2.K", "m/s/s", "m2/", "(m", "m)", "m^", "N m", "m2x"] {

@@ -18,8 +18,8 @@ fn settable(fmu: &FmuUnderTest) -> impl Iterator<Item = (&Variable, Reading)> {
 
 fn initializing<'f>(fmu: &'f FmuUnderTest) -> Result<Session<'f>> {
     // If initialisation fails, another rule reports it.
-    fmu.running(fmu.first()?)?;
-    let mut session = fmu.session(fmu.first()?)?;
+    fmu.running(fmu.first_interface()?)?;
+    let mut session = fmu.session(fmu.first_interface()?)?;
     session.instance.setup_experiment(None, session.time, None)?;
     session.instance.enter_initialization_mode()?;
     Ok(session)
@@ -61,10 +61,10 @@ pub fn start(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         }
     };
     let mut session = initializing(fmu)?;
-    fmu.doing("reading start values in initialization mode");
+    fmu.announce("reading start values in initialization mode");
     look(&mut session, "before initialisation", false);
     session.leave_initialisation()?;
-    fmu.doing("reading start values after initialisation");
+    fmu.announce("reading start values after initialisation");
     look(&mut session, "after initialisation", true);
     Ok(())
 }
@@ -74,7 +74,7 @@ pub fn readable(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let mut told = BTreeSet::new();
     let mut look = |session: &mut Session, when: &str| {
         for v in fmu.variables() {
-            fmu.doing(format!("reading {} {when}", v.name));
+            fmu.announce(format!("reading {} {when}", v.name));
             let fault = match session.get(v) {
                 Err(error) => error.to_string(),
                 Ok(Reading::Real(x)) if !x.is_finite() => {
@@ -102,7 +102,7 @@ pub fn booleans(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         findings.skip("it has no Booleans");
     }
     for v in all {
-        fmu.doing(format!("reading and setting {}", v.name));
+        fmu.announce(format!("reading and setting {}", v.name));
         if let Reading::Boolean(value @ (..=-1 | 2..)) = session.get(v)? {
             findings.at(v.place()).fail(format!("it reads as {value} (allowed: 0 and 1)"));
         }
@@ -120,9 +120,9 @@ pub fn booleans(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 
 pub fn round_trip(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let mut session = initializing(fmu)?;
-    let mut fresh = fmu.session(fmu.first()?)?;
+    let mut fresh = fmu.session(fmu.first_interface()?)?;
     for (v, start) in settable(fmu) {
-        fmu.doing(format!("setting {} to {start}", v.name));
+        fmu.announce(format!("setting {} to {start}", v.name));
         // As in hosts that set every start value before fmi2SetupExperiment.
         if let Err(error) = fresh.set(v, &start) {
             findings
@@ -133,7 +133,7 @@ pub fn round_trip(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         tried.extend(other_value(fmu, v, &start));
         tried.push(start);
         for value in tried {
-            fmu.doing(format!("setting {} to {value}", v.name));
+            fmu.announce(format!("setting {} to {value}", v.name));
             // The FMU may refuse a value other than the start value.
             if session.set(v, &value).is_err() {
                 continue;
@@ -181,8 +181,8 @@ pub fn items(fmu: &FmuUnderTest, v: &Variable) -> Vec<i32> {
 
 pub fn nothing(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let mut session = initializing(fmu)?;
-    fmu.doing("fmi2Get… and fmi2Set… with nvr = 0 and NULL pointers");
-    for (call, status) in session.instance.nothing_null() {
+    fmu.announce("fmi2Get… and fmi2Set… with nvr = 0 and NULL pointers");
+    for (call, status) in session.instance.calls_without_variables() {
         if status != host::fmi2::Status::Ok {
             findings
                 .at(format!("{call} with nvr = 0"))
@@ -227,9 +227,9 @@ fn refused(
     reference: u32,
     what: &str,
 ) -> Result<()> {
-    let mut session = fmu.running(fmu.first()?)?;
+    let mut session = fmu.running(fmu.first_interface()?)?;
     let place = format!("{name} of {what}");
-    fmu.doing(&place);
+    fmu.announce(&place);
     let answer = call(&mut session.instance, reference);
     expect_refusal(findings, place, answer);
     Ok(())
@@ -277,10 +277,10 @@ pub fn fixed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let (mut refused, mut accepted) = (None, Vec::new());
     for (v, start) in fixed {
         any = true;
-        let mut session = fmu.running(fmu.first()?)?;
+        let mut session = fmu.running(fmu.first_interface()?)?;
         session.advance(1)?;
         let place = format!("setting the fixed parameter {} after initialisation", v.name);
-        fmu.doing(&place);
+        fmu.announce(&place);
         let other = other_value(fmu, v, &start).unwrap_or(start);
         match session.set(v, &other) {
             Ok(()) => accepted.push((place, session.get(v)?.is_identical(&other))),
@@ -319,10 +319,10 @@ pub fn computed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         });
         let Some(v) = v else { continue };
         any = true;
-        let mut session = fmu.running(fmu.first()?)?;
+        let mut session = fmu.running(fmu.first_interface()?)?;
         let value = session.get(v)?;
         let place = format!("setting the {causality} {} after initialisation", v.name);
-        fmu.doing(&place);
+        fmu.announce(&place);
         let answer = session.set(v, &value);
         expect_refusal(findings, place, answer);
     }
@@ -346,8 +346,8 @@ pub fn limits(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                 _ => bound + outwards,
             };
             let try_at = |x: f64| -> Result<Option<String>> {
-                let mut session = fmu.session(fmu.first()?)?;
-                fmu.doing(format!("setting {} to {x:?} and initialising", v.name));
+                let mut session = fmu.session(fmu.first_interface()?)?;
+                fmu.announce(format!("setting {} to {x:?} and initialising", v.name));
                 let value = match v.kind {
                     Type::Real => Reading::Real(x),
                     _ => Reading::Integer(x as i32),
@@ -360,7 +360,7 @@ pub fn limits(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             // A refusal because of a contradiction with another parameter is allowed; the message then names
             // that parameter too.
             if let Some(why) = try_at(bound)?
-                && !settable(fmu).any(|(o, _)| o.name != v.name && mentions(&why, &o.name))
+                && !settable(fmu).any(|(o, _)| o.name != v.name && contains_name(&why, &o.name))
             {
                 findings
                     .at(v.place())
@@ -383,7 +383,7 @@ pub fn limits(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 }
 
 /// Returns true if `text` contains `name` as a whole word.
-pub fn mentions(text: &str, name: &str) -> bool {
+pub fn contains_name(text: &str, name: &str) -> bool {
     let part = |c: char| c.is_alphanumeric() || matches!(c, '_' | '.' | '[');
     text.match_indices(name).any(|(at, _)| {
         let (before, after) = (text[..at].chars().last(), text[at + name.len()..].chars().next());
@@ -397,12 +397,12 @@ pub fn not_a_number(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         settable(fmu).filter(|(v, _)| v.kind == Type::Real && v.causality != Causality::Input);
     for (v, _) in reals {
         for x in [f64::NAN, f64::INFINITY] {
-            let mut session = fmu.session(fmu.first()?)?;
+            let mut session = fmu.session(fmu.first_interface()?)?;
             let place = format!("{} = {x}, then a step", v.name);
-            let refused = fmu.left_open(&place, findings, || {
+            let refused = fmu.with_open_effect(&place, findings, || {
                 session.set(v, &Reading::Real(x)).is_err()
                     || session.initialise().is_err()
-                    || session.go(session.step).is_err()
+                    || session.make_step(session.step).is_err()
             });
             if !refused {
                 findings.at(place).add(

@@ -79,7 +79,7 @@ pub fn installed(file: &str) -> Option<PathBuf> {
 }
 
 /// Returns a folder of the Python package that came with this command, such as `examples`.
-pub fn came_with(folder: &str) -> Option<PathBuf> {
+pub fn shipped_folder(folder: &str) -> Option<PathBuf> {
     let packages = folders().into_iter().filter(|fmus| fmus.ends_with("hubslosh/fmus"));
     packages.map(|fmus| fmus.with_file_name(folder)).find(|path| path.is_dir())
 }

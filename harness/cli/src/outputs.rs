@@ -36,7 +36,6 @@ const OUTPUTS: [(&str, &str, &[&str]); 22] = [
     ("view", "out", &["html"]),
 ];
 
-/// Endings of files that commands read.
 const INPUTS: [&str; 9] = ["fmu", "toml", "ssv", "csv", "tsv", "parquet", "mat", "json", "svg"];
 
 /// Protects the inputs that the command line names, and refuses outputs that would replace one of them, that

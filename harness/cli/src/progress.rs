@@ -9,7 +9,6 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle, TermLike};
 
 use crate::terminal;
 
-/// Returns a bar for the steps of one run.
 pub fn steps_bar() -> Result<ProgressBar> {
     bar("{bar:40} {percent:>3} %  {elapsed} elapsed, {eta} left")
 }
@@ -19,12 +18,10 @@ pub fn runs_bar() -> Result<ProgressBar> {
     bar("{msg} {bar:40} {percent:>3} %  {elapsed} elapsed, {eta} left")
 }
 
-/// Returns a bar for the rules of a check.
 pub fn rules_bar() -> Result<ProgressBar> {
     bar("{bar:40} {pos} of {len} rules of calls  {elapsed} elapsed, {eta} left")
 }
 
-/// Returns a spinner for a search of unknown length.
 pub fn search_spinner() -> Result<ProgressBar> {
     let spinner = bar("{spinner} {elapsed}  {msg}")?;
     spinner.enable_steady_tick(std::time::Duration::from_millis(200));
@@ -123,7 +120,6 @@ impl TermLike for Messages {
     }
 }
 
-/// Updates a bar with the progress of a campaign.
 pub fn show(bar: &ProgressBar, news: Progress) {
     match news {
         Progress::Begins { runs, steps } => {

@@ -81,14 +81,14 @@ pub fn color_of_arguments() -> ColorChoice {
 /// Prints an error to stderr in the style of clap's errors.
 pub fn error(text: impl std::fmt::Display) {
     let text = input::without_error_numbers(&text.to_string());
-    complain(format!("{} {text}\n", styled("error:", *Styles::styled().get_error())));
+    complain(format!("{} {text}\n", with_style("error:", *Styles::styled().get_error())));
 }
 
 /// Prints a warning. With `--strict` a warning makes the exit code 1.
 pub fn warn(text: impl std::fmt::Display) {
     WARNINGS.fetch_add(1, Ordering::Relaxed);
     let style = AnsiColor::Yellow.on_default().effects(Effects::BOLD);
-    complain(format!("{} {text}\n", styled("warning:", style)));
+    complain(format!("{} {text}\n", with_style("warning:", style)));
 }
 
 /// Prints progress and results of work to stderr; `--quiet` suppresses it.
@@ -113,7 +113,7 @@ fn fails(why: &str) -> u8 {
     1
 }
 
-fn styled(word: &str, style: Style) -> String {
+fn with_style(word: &str, style: Style) -> String {
     if choice() != anstream::ColorChoice::Never {
         format!("{style}{word}{style:#}")
     } else {
@@ -149,7 +149,6 @@ pub fn print_json(value: &impl serde::Serialize) -> Result<()> {
     Ok(())
 }
 
-/// Prints a text that is JSON, as [`print_json`] does.
 pub fn print_text_as_json(text: String) {
     JSON.store(true, Ordering::Relaxed);
     print(text);

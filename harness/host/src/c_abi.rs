@@ -129,7 +129,7 @@ impl Sink {
 
 /// Returns the sink for messages with this environment. If no instance has this environment, the message is
 /// assigned to the instance that this thread called last, or to the only instance.
-fn sink_of(environment: *mut c_void) -> Option<Arc<Sink>> {
+fn find_sink(environment: *mut c_void) -> Option<Arc<Sink>> {
     let sinks = sinks();
     if let Some(sink) = sinks.get(&(environment as usize)) {
         return Some(sink.clone());
@@ -147,14 +147,14 @@ pub(crate) extern "C" fn log_message(
     category: *const c_char,
     text: *const c_char,
 ) {
-    let Some(sink) = sink_of(environment) else { return };
+    let Some(sink) = find_sink(environment) else { return };
     if category.is_null() {
         sink.uncategorised.fetch_add(1, Ordering::Relaxed);
     }
     let mut messages = sink.lock();
     if messages.len() < MESSAGES_KEPT {
         // SAFETY: terminated strings of the FMU, or of the shim.
-        let (category, text) = unsafe { (copied(category), copied(text)) };
+        let (category, text) = unsafe { (copy_text(category), copy_text(text)) };
         messages.push(Message { status: status.into(), category, text });
     }
 }
@@ -164,7 +164,7 @@ pub(crate) extern "C" fn log_message(
 /// # Safety
 ///
 /// The pointer is NULL or points to a terminated string.
-pub(crate) unsafe fn copied(text: *const c_char) -> String {
+pub(crate) unsafe fn copy_text(text: *const c_char) -> String {
     match text.is_null() {
         true => String::new(),
         false => unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned(),
@@ -371,7 +371,7 @@ pub(crate) fn load(
     let library = unsafe { Library::new(&path) }.map_err(|error| {
         // The loader's error names the undefined symbol in its cause.
         let error = format!("{:#}", anyhow::Error::new(error));
-        let needs = needs(&error);
+        let needs = explain_needs(&error);
         anyhow!(with_readable_symbol(&error))
             .context(format!("{binary} in {name} cannot be loaded{needs}"))
     })?;
@@ -393,7 +393,7 @@ fn with_readable_symbol(error: &str) -> String {
 
 /// Returns an explanation if the loader's message shows that the binary needs a Python interpreter in the
 /// host process; otherwise an empty text.
-fn needs(error: &str) -> &'static str {
+fn explain_needs(error: &str) -> &'static str {
     let symbol = error.split("undefined symbol: ").nth(1).unwrap_or_default();
     match symbol.trim_start_matches('_').starts_with("Py") {
         true => {
@@ -404,7 +404,7 @@ fn needs(error: &str) -> &'static str {
     }
 }
 
-pub(crate) fn lacking(library: &Library, symbols: &[&'static str]) -> Vec<&'static str> {
+pub(crate) fn missing_functions(library: &Library, symbols: &[&'static str]) -> Vec<&'static str> {
     let is_there = |symbol: &&&str| {
         // SAFETY: only asked whether the symbol is there.
         unsafe { library.get::<*const std::ffi::c_void>(**symbol) }.is_ok()
@@ -420,7 +420,7 @@ mod tests {
     fn a_binary_that_lacks_pythons_symbols_needs_a_python_host() {
         for symbol in ["_Py_NoneStruct", "PyExc_TypeError", "__Py_Dealloc"] {
             let error = format!("binaries/linux64/model.so: undefined symbol: {symbol}");
-            assert!(needs(&error).contains("needs a Python host"), "{symbol}");
+            assert!(explain_needs(&error).contains("needs a Python host"), "{symbol}");
         }
         for error in ["model.so: undefined symbol: cos", "model.so: file too short", "PyExc"] {
             assert_eq!(needs(error), "", "{error}");

@@ -283,7 +283,7 @@ impl Variable {
 }
 
 /// Returns a text in quotes; of a long text its beginning and its length.
-fn short(text: &str) -> String {
+fn quote_short(text: &str) -> String {
     match text.char_indices().nth(60) {
         None => format!("\"{text}\""),
         Some((at, _)) => format!("\"{}…\", {} bytes long", &text[..at], text.len()),
@@ -309,7 +309,7 @@ impl Reader {
     }
 
     /// Reads a required attribute with `read`; adds a problem if it is missing or not valid.
-    fn must<T: Default>(
+    fn required<T: Default>(
         &mut self,
         element: &Element,
         attribute: &str,
@@ -317,14 +317,15 @@ impl Reader {
     ) -> T {
         let text = element.get(attribute);
         text.and_then(read).unwrap_or_else(|| {
-            let why = text.map_or("is missing".into(), |text| format!("cannot be {}", short(text)));
+            let why =
+                text.map_or("is missing".into(), |text| format!("cannot be {}", quote_short(text)));
             self.problem(element, &format!("{attribute} {why}"));
             T::default()
         })
     }
 
     fn text(&mut self, element: &Element, attribute: &str) -> String {
-        self.must(element, attribute, |text| Some(text.to_string()))
+        self.required(element, attribute, |text| Some(text.to_string()))
     }
 
     fn interface(&mut self, element: &Element) -> Interface {
@@ -352,7 +353,7 @@ impl Reader {
         // Item values have 32 bits in FMI 2.0 and 64 bits in FMI 3.0.
         let is_fmi3 = self.is_fmi3;
         let fits = |n: &i64| is_fmi3 || i32::try_from(*n).is_ok();
-        let value = self.must(element, "value", |text| text.trim().parse().ok().filter(fits));
+        let value = self.required(element, "value", |text| text.trim().parse().ok().filter(fits));
         Item { name: self.text(element, "name"), value }
     }
 
@@ -411,8 +412,8 @@ impl Reader {
     ) -> Variable {
         let of = |name: &str| typed.and_then(|typed| typed.get(name)).map(String::from);
         Variable {
-            name: self.must(element, "name", |n| (n.len() <= LONGEST_NAME).then(|| n.into())),
-            reference: self.must(element, "valueReference", |text| text.trim().parse().ok()),
+            name: self.required(element, "name", |n| (n.len() <= LONGEST_NAME).then(|| n.into())),
+            reference: self.required(element, "valueReference", |text| text.trim().parse().ok()),
             causality: element.get("causality").map_or(Causality::Local, Causality::from),
             variability: Variability::from(""),
             description: element.get("description").unwrap_or_default().into(),
@@ -630,7 +631,7 @@ impl ModelDescription {
     ///
     /// If it is another version.
     pub fn check_version(&self) -> Result<()> {
-        let version = short(&self.fmi_version).replace('"', "");
+        let version = quote_short(&self.fmi_version).replace('"', "");
         ensure!(
             self.fmi_version == "2.0" || self.is_fmi3(),
             "it is of FMI version {version}; this host drives 2.0 and 3.0"
@@ -693,7 +694,7 @@ impl ModelDescription {
         let version = root.get("fmiVersion").unwrap_or("2.0");
         let is_fmi3 = version.starts_with("3.");
         if !is_fmi3 && !version.starts_with("2.") {
-            let version = short(version).replace('"', "");
+            let version = quote_short(version).replace('"', "");
             bail!("it is of FMI version {version}; this host drives 2.0 and 3.0");
         }
         let mut reader = Reader { is_fmi3, ..Reader::default() };
@@ -804,14 +805,14 @@ impl ModelDescription {
             base.exponents == known.exponents,
             "{name}: {unit} cannot be converted to {} (allowed: {})",
             if own.is_empty() { "a number without unit" } else { own },
-            self.units_of(variable)
+            self.unit_names(variable)
         );
         let si = base.factor * number + base.offset;
         Ok((si - known.offset) / known.factor)
     }
 
     /// Lists the names of the units in which a variable may be entered, for messages.
-    pub fn units_of(&self, variable: &Variable) -> String {
+    pub fn unit_names(&self, variable: &Variable) -> String {
         let own = self.unit(variable);
         let all = self.display_units(variable).iter().map(|shown| shown.name.as_str());
         let all: Vec<&str> = [own].into_iter().chain(all).filter(|unit| !unit.is_empty()).collect();
@@ -842,7 +843,9 @@ impl ModelDescription {
         }
         match own.is_empty() && display.is_empty() {
             true => bail!("{name} has no unit; it expects a number, not \"{text}\""),
-            false => bail!("{name} has no unit \"{unit}\" (allowed: {})", self.units_of(variable)),
+            false => {
+                bail!("{name} has no unit \"{unit}\" (allowed: {})", self.unit_names(variable))
+            }
         }
     }
 

@@ -17,10 +17,9 @@ pub use crate::c_abi::version::FmuState;
 use crate::c_abi::version::{
     self, Call, Common, Component, Exchange, Getter, Interface, Refs, Setter, Updated, Version,
 };
-use crate::c_abi::{self, Environment, Function, c_string, copied, functions, pointer};
+use crate::c_abi::{self, Environment, Function, c_string, copy_text, functions, pointer};
 pub use crate::c_abi::{CallError, Called, HostState, Message, Status};
 use crate::description::{CType, Value};
-use crate::xml::Element;
 
 pub mod guarded;
 
@@ -222,7 +221,7 @@ impl Version for Fmi2 {
     }
 
     fn enter_event_mode(instance: &mut Instance) -> Called {
-        instance.plain(instance.events().enter_event_mode)
+        instance.call_plain(instance.events().enter_event_mode)
     }
 
     fn update(instance: &mut Instance) -> Called<Updated> {
@@ -316,16 +315,6 @@ pub fn file_uri(folder: &Path) -> String {
 }
 
 impl Fmu {
-    /// Loads the binary of one interface, [`CO_SIMULATION`] or [`MODEL_EXCHANGE`], from an unpacked FMU with
-    /// the model description `root`. The two interfaces may have different binaries.
-    pub fn load_for(kind: i32, directory: &Path, path: &Path, root: &Element) -> Result<Self> {
-        let interface = match kind {
-            CO_SIMULATION => Interface::CoSimulation,
-            _ => Interface::ModelExchange,
-        };
-        Fmu::load_parsed(Some(interface), directory, path, root)
-    }
-
     /// Returns true if the binary exports all functions of Model Exchange.
     pub fn has_exchange(&self) -> bool {
         self.exchange.is_some() && self.own.events.is_some()
@@ -349,7 +338,7 @@ impl Fmu {
     /// Returns the result of fmi2GetTypesPlatform; "default" is the only one that the standard allows.
     pub fn types_platform(&self) -> String {
         // SAFETY: takes nothing, returns a constant string.
-        unsafe { copied((self.own.functions.get_types_platform.call)()) }
+        unsafe { copy_text((self.own.functions.get_types_platform.call)()) }
     }
 
     /// Returns the arguments that [`Fmu::instantiate`] uses, which tests of bad calls modify.
@@ -566,11 +555,11 @@ impl<'fmu> Instance<'fmu> {
     }
 
     pub fn enter_initialization_mode(&mut self) -> Called {
-        self.plain(self.functions().enter_initialization_mode)
+        self.call_plain(self.functions().enter_initialization_mode)
     }
 
     pub fn cancel_step(&mut self) -> Called {
-        self.plain(self.stepping().cancel_step)
+        self.call_plain(self.stepping().cancel_step)
     }
 
     /// Calls fmi2DoStep from `time` by `step`, s, with noSetFMUStatePriorToCurrentPoint true.
@@ -699,7 +688,7 @@ impl<'fmu> Instance<'fmu> {
     pub fn string_status(&mut self, kind: i32) -> Called<String> {
         let text = self.read_status(self.stepping().get_string_status, kind, null())?;
         // SAFETY: the FMU answered OK, so it points to a terminated string of the FMU.
-        Ok(unsafe { copied(text) })
+        Ok(unsafe { copy_text(text) })
     }
 
     // ------------------------------------------------ for tests of bad calls
@@ -718,7 +707,7 @@ impl<'fmu> Instance<'fmu> {
     }
 
     /// Calls the get and set functions of each type with no variables and NULL pointers, which must succeed.
-    pub fn nothing_null(&mut self) -> [(&'static str, Status); 8] {
+    pub fn calls_without_variables(&mut self) -> [(&'static str, Status); 8] {
         // SAFETY: see get_real_null.
         unsafe { self.functions().nothing(self.component) }
     }

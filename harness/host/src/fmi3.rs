@@ -22,7 +22,6 @@ use crate::c_abi::{
 };
 use crate::causality::Causality;
 use crate::description::{CType, Value};
-use crate::xml::Element;
 
 pub type Fmu = version::Fmu<Fmi3>;
 pub type Instance<'fmu> = version::Instance<'fmu, Fmi3>;
@@ -430,7 +429,7 @@ impl Version for Fmi3 {
             }
             None
         };
-        let done = instance.do_step_hearing(time, step, Some(&mut within))?;
+        let done = instance.do_step_with_updates(time, step, Some(&mut within))?;
         instance.kept.line.set(line);
         whole_step(instance, done)?;
         match refused {
@@ -444,7 +443,7 @@ impl Version for Fmi3 {
     }
 
     fn enter_event_mode(instance: &mut Instance) -> Called {
-        instance.plain(instance.functions().enter_event_mode)
+        instance.call_plain(instance.functions().enter_event_mode)
     }
 
     fn update(instance: &mut Instance) -> Called<Updated> {
@@ -466,7 +465,23 @@ impl Version for Fmi3 {
         reference: u32,
         count: usize,
     ) -> Called<Vec<Value>> {
-        instance.values(c_type, reference, count)
+        let reference = [reference];
+        Ok(numbers! { c_type, T => {
+                let mut values = vec![T::default(); count];
+                instance.get_numbers(&reference, &mut values)?;
+                values.into_iter().map(T::value).collect()
+            },
+            CType::Boolean => {
+                let mut values = vec![0; count];
+                instance.get_boolean_bytes(&reference, &mut values)?;
+                values.into_iter().map(|byte| Value::Boolean(byte != 0)).collect()
+            }
+            CType::String => {
+                instance.read_texts(instance.functions().get_string, &reference, count)?.into_iter().map(Value::String).collect()
+            }
+            // Values of these types are not exchanged: `ModelDescription::value` refuses them.
+            CType::Binary | CType::Clock => Vec::new(),
+        })
     }
 
     fn set_values(
@@ -475,30 +490,31 @@ impl Version for Fmi3 {
         reference: u32,
         values: &[Value],
     ) -> Called {
-        instance.set_values(c_type, reference, values)
+        let reference = [reference];
+        numbers! { c_type, T => {
+                instance.set_numbers(&reference, &values.iter().map(T::from_value).collect::<Vec<T>>())
+            },
+            CType::Boolean => {
+                let byte = |value: &Value| u8::from(*value == Value::Boolean(true));
+                instance.write(instance.functions().set_boolean, &reference, &values.iter().map(byte).collect::<Vec<u8>>())
+            }
+            CType::String => {
+                instance.write_texts(instance.functions().set_string, &reference, &values.iter().map(as_text).collect::<Vec<&str>>())
+            }
+            CType::Binary | CType::Clock => Ok(()),
+        }
     }
 
     fn reals(instance: &mut Instance, references: &[u32], values: &mut [f64]) -> Called {
-        instance.fetch(references, values)
+        instance.get_numbers(references, values)
     }
 
     fn set_reals(instance: &mut Instance, references: &[u32], values: &[f64]) -> Called {
-        instance.give(references, values)
+        instance.set_numbers(references, values)
     }
 }
 
 impl Fmu {
-    /// Loads the binary of one interface from an unpacked FMU with the model description `root`. The two
-    /// interfaces may have different binaries.
-    pub fn load_for(
-        interface: Option<Interface>,
-        directory: &Path,
-        path: &Path,
-        root: &Element,
-    ) -> Result<Self> {
-        Fmu::load_parsed(interface, directory, path, root)
-    }
-
     /// Lists the 75 functions that every FMU must export (section 2.5).
     pub fn symbols() -> Vec<&'static str> {
         let mut all = Fmi3::required_functions(true, true);
@@ -665,15 +681,15 @@ impl<'fmu> Instance<'fmu> {
     }
 
     pub fn enter_configuration_mode(&mut self) -> Called {
-        self.plain(self.functions().enter_configuration_mode)
+        self.call_plain(self.functions().enter_configuration_mode)
     }
 
     pub fn exit_configuration_mode(&mut self) -> Called {
-        self.plain(self.functions().exit_configuration_mode)
+        self.call_plain(self.functions().exit_configuration_mode)
     }
 
     pub fn enter_step_mode(&mut self) -> Called {
-        self.plain(self.stepping().enter_step_mode)
+        self.call_plain(self.stepping().enter_step_mode)
     }
 
     pub fn update_discrete_states(&mut self) -> Called<EventInfo> {
@@ -698,10 +714,10 @@ impl<'fmu> Instance<'fmu> {
     /// Calls fmi3DoStep from `time` by `step`, s, with noSetFMUStatePriorToCurrentPoint true and without a
     /// callback for points within the step.
     pub fn do_step(&mut self, time: f64, step: f64) -> Called<Step> {
-        self.do_step_hearing(time, step, None)
+        self.do_step_with_updates(time, step, None)
     }
 
-    pub fn do_step_hearing(
+    pub fn do_step_with_updates(
         &mut self,
         time: f64,
         step: f64,
@@ -731,17 +747,17 @@ impl<'fmu> Instance<'fmu> {
     // ------------------------------------------------ variables by reference
 
     /// Calls fmi3Get… for the type of the values; `values` has room for all elements of all variables.
-    pub fn fetch<T: Exchanged>(&mut self, references: &[u32], values: &mut [T]) -> Called {
+    pub fn get_numbers<T: Exchanged>(&mut self, references: &[u32], values: &mut [T]) -> Called {
         self.read(T::calls(self.functions()).0, references, values)
     }
 
     /// Calls fmi3Set… for the type of the values; `values` has all elements of all variables.
-    pub fn give<T: Exchanged>(&mut self, references: &[u32], values: &[T]) -> Called {
+    pub fn set_numbers<T: Exchanged>(&mut self, references: &[u32], values: &[T]) -> Called {
         self.write(T::calls(self.functions()).1, references, values)
     }
 
     /// Reads Booleans as bytes, of which only 0 and 1 are valid.
-    pub fn fetch_boolean(&mut self, references: &[u32], values: &mut [u8]) -> Called {
+    pub fn get_boolean_bytes(&mut self, references: &[u32], values: &mut [u8]) -> Called {
         self.read(self.functions().get_boolean, references, values)
     }
 
@@ -828,44 +844,6 @@ impl<'fmu> Instance<'fmu> {
 
     // ------------------------------------------------ variables as the description has them
 
-    /// Reads the `count` values of a variable or an array with this value reference.
-    pub fn values(&mut self, c_type: CType, reference: u32, count: usize) -> Called<Vec<Value>> {
-        let reference = [reference];
-        Ok(numbers! { c_type, T => {
-                let mut values = vec![T::default(); count];
-                self.fetch(&reference, &mut values)?;
-                values.into_iter().map(T::value).collect()
-            },
-            CType::Boolean => {
-                let mut values = vec![0; count];
-                self.fetch_boolean(&reference, &mut values)?;
-                values.into_iter().map(|byte| Value::Boolean(byte != 0)).collect()
-            }
-            CType::String => {
-                self.read_texts(self.functions().get_string, &reference, count)?.into_iter().map(Value::String).collect()
-            }
-            // Values of these types are not exchanged: `ModelDescription::value` refuses them.
-            CType::Binary | CType::Clock => Vec::new(),
-        })
-    }
-
-    /// Sets all values of a variable or an array with this value reference.
-    pub fn set_values(&mut self, c_type: CType, reference: u32, values: &[Value]) -> Called {
-        let reference = [reference];
-        numbers! { c_type, T => {
-                self.give(&reference, &values.iter().map(T::from_value).collect::<Vec<T>>())
-            },
-            CType::Boolean => {
-                let byte = |value: &Value| u8::from(*value == Value::Boolean(true));
-                self.write(self.functions().set_boolean, &reference, &values.iter().map(byte).collect::<Vec<u8>>())
-            }
-            CType::String => {
-                self.write_texts(self.functions().set_string, &reference, &values.iter().map(as_text).collect::<Vec<&str>>())
-            }
-            CType::Binary | CType::Clock => Ok(()),
-        }
-    }
-
     /// Calls fmi3FreeFMUState with a pointer to NULL, which must succeed.
     pub fn free_state_null(&mut self) -> Called {
         self.free_state(FmuState(null_mut()))
@@ -939,7 +917,7 @@ impl Line {
                     let length = description.array(element.array).map_or(0, |array| array.length);
                     let begin = self.values.len();
                     self.values.resize(begin + length, 0.0);
-                    instance.fetch(&[element.array], &mut self.values[begin..])?;
+                    instance.get_numbers(&[element.array], &mut self.values[begin..])?;
                     self.references.push(element.array);
                     begins.insert(element.array, begin);
                     begin

@@ -138,7 +138,7 @@ pub fn run<A: AsRef<OsStr>>(
     let request = [call, limits.memory, limits.file];
     let (channel, stdin) = channel::open(request, pipe, folder.path())?;
     command.stdin(stdin);
-    let mut news = News::new(channel, hear);
+    let mut news = Messages::new(channel, hear);
     #[cfg(unix)]
     std::os::unix::process::CommandExt::process_group(&mut command, 0);
     let shown = output == Output::Shown;
@@ -171,7 +171,7 @@ pub fn run<A: AsRef<OsStr>>(
 /// Waits until a process ends, or kills it when it exceeds a limit. Returns the reason for its end.
 fn watch(
     mut child: Child,
-    news: &mut News<impl FnMut(&[u8])>,
+    news: &mut Messages<impl FnMut(&[u8])>,
     started: Instant,
     limits: &Limits,
     files: &Path,
@@ -211,7 +211,7 @@ fn watch(
         {
             counted_at = now;
             let most = limits.memory;
-            if stored(files).saturating_sub(before) > most || shared(child.id()) > most {
+            if disk_usage(files).saturating_sub(before) > most || shared(child.id()) > most {
                 cause = Some(Cause::Hoard);
                 break;
             }
@@ -239,7 +239,7 @@ const COUNTING: Duration = Duration::from_millis(50);
 const COUNTED: usize = 100_000;
 
 /// Returns the disk space of the files below a folder, bytes.
-fn stored(folder: &Path) -> u64 {
+fn disk_usage(folder: &Path) -> u64 {
     let (mut folders, mut bytes, mut entries) = (vec![folder.to_path_buf()], 0, 0);
     while let Some(folder) = folders.pop() {
         for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
@@ -393,7 +393,7 @@ fn kill_descendants(_: &Path) -> bool {
     false
 }
 
-struct News<F> {
+struct Messages<F> {
     channel: channel::Parent,
     hear: F,
     heard_at: Instant,
@@ -417,11 +417,11 @@ const CATCHES: u8 = b'-';
 /// The work is done. Content: the exit code.
 const DONE: u8 = b'=';
 
-impl<F: FnMut(&[u8])> News<F> {
-    fn new(channel: channel::Parent, hear: F) -> News<F> {
+impl<F: FnMut(&[u8])> Messages<F> {
+    fn new(channel: channel::Parent, hear: F) -> Messages<F> {
         let heard_at = Instant::now();
         let (loaded, panic, done) = (None, None, None);
-        News { channel, hear, heard_at, loaded, is_endless: false, panic, done }
+        Messages { channel, hear, heard_at, loaded, is_endless: false, panic, done }
     }
 
     /// Waits for messages for at most `pause` and handles them. Returns false if none has arrived.
@@ -655,7 +655,7 @@ pub(crate) fn before_loading() {
     static ONCE: Once = Once::new();
     let Some(guarded) = GUARDED.get() else { return };
     ONCE.call_once(|| {
-        send(LOADS, &stored(&std::env::temp_dir()).to_le_bytes());
+        send(LOADS, &disk_usage(&std::env::temp_dir()).to_le_bytes());
         #[cfg(target_os = "linux")]
         {
             use rustix::process::Resource;

@@ -59,7 +59,7 @@ impl Element {
             let column = 1 + before.iter().rev().take_while(|byte| **byte != b'\n').count();
             Fault::Malformed(format!("line {line}, column {column}: it is not UTF-8"))
         })?;
-        if let Some(excess) = excess(text) {
+        if let Some(excess) = exceeded_budget(text) {
             return Err(Fault::TooLarge(excess));
         }
         let document = Document::parse(text).map_err(|error| {
@@ -173,7 +173,7 @@ impl Element {
 /// Returns the first limit that a file exceeds. This is checked before parsing, because the time of some
 /// parsers grows with the square of the depth or of the number of attributes. The file need not be
 /// well-formed; the parser checks that later.
-fn excess(text: &str) -> Option<String> {
+fn exceeded_budget(text: &str) -> Option<String> {
     let namespaces = text.matches("xmlns").count();
     if namespaces > MOST_NAMESPACES {
         return Some(format!("it declares {namespaces} namespaces (allowed: {MOST_NAMESPACES})"));

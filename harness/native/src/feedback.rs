@@ -104,7 +104,7 @@ impl Feedback {
     /// # Errors
     ///
     /// If an attribute is missing, or has another type or size.
-    pub fn of(feedback: &Bound<PyAny>, fmu: &Fmu, rows: usize) -> PyResult<Self> {
+    pub fn read(feedback: &Bound<PyAny>, fmu: &Fmu, rows: usize) -> PyResult<Self> {
         let references = |attribute: &str| -> PyResult<Vec<u32>> {
             let names: Vec<String> = feedback.getattr(attribute)?.extract()?;
             names.iter().map(|name| Ok(fmu.variable(name)?.reference)).collect()
@@ -130,7 +130,7 @@ impl Feedback {
             latency,
             on_the_way: vec![0.0; (latency + 1) * command.len()],
             now: vec![0.0; command.len()],
-            commands: Numbers::of(&feedback.getattr("commands")?, rows, command.len(), true)?,
+            commands: Numbers::borrow(&feedback.getattr("commands")?, rows, command.len(), true)?,
             command,
         })
     }

@@ -72,7 +72,7 @@ pub struct Variable {
 }
 
 impl Variable {
-    fn of(description: &ModelDescription, variable: &description::Variable) -> Variable {
+    fn describe(description: &ModelDescription, variable: &description::Variable) -> Variable {
         let unit = description.unit(variable);
         let defined = description.units.iter().find(|defined| defined.name == unit);
         let shown = description.display_units(variable).iter();
@@ -163,7 +163,7 @@ impl Fmu {
     #[getter]
     fn variables(&self) -> Vec<Variable> {
         let all = self.description.variables.iter();
-        all.map(|variable| Variable::of(&self.description, variable)).collect()
+        all.map(|variable| Variable::describe(&self.description, variable)).collect()
     }
 
     /// Start, stop and step that the FMU suggests, s.

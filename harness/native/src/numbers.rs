@@ -44,7 +44,12 @@ pub struct Numbers {
 }
 
 impl Numbers {
-    pub fn of(array: &Bound<PyAny>, rows: usize, width: usize, writes: bool) -> PyResult<Numbers> {
+    pub fn borrow(
+        array: &Bound<PyAny>,
+        rows: usize,
+        width: usize,
+        writes: bool,
+    ) -> PyResult<Numbers> {
         let array = PyBuffer::get(array)?;
         if array.item_count() != rows * width
             || !array.is_c_contiguous()

@@ -28,7 +28,7 @@ struct Columns<'fmu> {
 }
 
 impl<'fmu> Columns<'fmu> {
-    fn of(fmu: &'fmu Fmu, names: &[String]) -> PyResult<Columns<'fmu>> {
+    fn find(fmu: &'fmu Fmu, names: &[String]) -> PyResult<Columns<'fmu>> {
         let all = names.iter().map(|name| fmu.variable(name)).collect::<PyResult<Vec<_>>>()?;
         let (reals, mut others): (Vec<_>, Vec<_>) =
             all.into_iter().zip(0..).partition(|(variable, _)| variable.kind() == Type::Real);
@@ -107,16 +107,16 @@ impl<'fmu> Run<'fmu> {
         feedback: Option<&Bound<PyAny>>,
     ) -> PyResult<Run<'fmu>> {
         let (rows, width) = (time.len(), inputs.len());
-        let columns = Columns::of(fmu, inputs)?;
-        let slopes = slopes.map(|of| Numbers::of(of, rows, width, false)).transpose()?;
+        let columns = Columns::find(fmu, inputs)?;
+        let slopes = slopes.map(|of| Numbers::borrow(of, rows, width, false)).transpose()?;
         Ok(Run {
             slopes: slopes.map(|slopes| (slopes, columns.reals.clone())),
-            inputs: (columns, Numbers::of(values, rows, width, false)?),
+            inputs: (columns, Numbers::borrow(values, rows, width, false)?),
             outputs: (
-                Columns::of(fmu, outputs)?,
-                Numbers::of(recorded, rows, outputs.len(), true)?,
+                Columns::find(fmu, outputs)?,
+                Numbers::borrow(recorded, rows, outputs.len(), true)?,
             ),
-            feedback: feedback.map(|of| Feedback::of(of, fmu, rows)).transpose()?,
+            feedback: feedback.map(|of| Feedback::read(of, fmu, rows)).transpose()?,
             time,
         })
     }

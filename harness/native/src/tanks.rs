@@ -175,7 +175,7 @@ impl Solved {
         let of = self.tank.get();
         let found =
             py.detach(|| ParameterSet::new(&of.tank, &self.data, target, checked(self.liquid)?));
-        handed_over(py, found.map_err(|why| of.error(&why))?)
+        parameters_to_python(py, found.map_err(|why| of.error(&why))?)
     }
 }
 
@@ -202,7 +202,7 @@ fn checked(liquid: Liquid) -> Result<parameters::Liquid, Problems> {
     Ok(liquid.0)
 }
 
-fn handed_over(py: Python, set: ParameterSet) -> PyResult<Parameters> {
+fn parameters_to_python(py: Python, set: ParameterSet) -> PyResult<Parameters> {
     if !set.unknown.is_empty() {
         let text = format!("{} (without sigma k is 0)", set.unknown.join("; "));
         return Err(FmuError::new_err(text));
@@ -276,7 +276,7 @@ pub fn table<'py>(
         fill_table::parameters(tank, &placed.sweep, between, target, checked(liquid)?)
     })?;
     let set = found.into_iter().next().expect("one question has one answer");
-    handed_over(py, set.map_err(|why: Problems| tank.get().error(&why))?)
+    parameters_to_python(py, set.map_err(|why: Problems| tank.get().error(&why))?)
 }
 
 /// Returns `of(0)` to `of(count - 1)`, computed by one thread per core.

@@ -11,7 +11,7 @@ const ROUNDING: f64 = 1e-9;
 /// Relative change of a derivative below which it may come from an iterative solver.
 const ITERATED: f64 = 1e-2;
 
-pub struct Sight {
+pub struct Observed {
     states: Vec<f64>,
     derivatives: Vec<f64>,
     discrete: Vec<Reading>,
@@ -22,9 +22,9 @@ fn discrete(fmu: &FmuUnderTest) -> impl Iterator<Item = &Variable> {
     fmu.variables().iter().filter(computed).filter(|v| v.variability == Variability::Discrete)
 }
 
-impl Sight {
+impl Observed {
     /// Reads the present values of the continuous states, their derivatives and the discrete variables.
-    pub fn read(session: &mut Session) -> Result<Sight> {
+    pub fn read(session: &mut Session) -> Result<Observed> {
         let n = session.states();
         let (mut states, mut derivatives) = (vec![0.0; n], vec![0.0; n]);
         if n > 0 {
@@ -32,11 +32,11 @@ impl Sight {
             session.instance.derivatives(&mut derivatives)?;
         }
         let discrete = discrete(session.fmu).map(|v| session.read(v)).collect::<Result<_>>()?;
-        Ok(Sight { states, derivatives, discrete })
+        Ok(Observed { states, derivatives, discrete })
     }
 
     /// Describes the first quantity that differs in `after`: its name, and both values as text.
-    pub fn change<'f>(&self, after: &Sight, fmu: &'f FmuUnderTest) -> Option<(&'f str, String)> {
+    pub fn change<'f>(&self, after: &Observed, fmu: &'f FmuUnderTest) -> Option<(&'f str, String)> {
         let jumps = |a: f64, b: f64, share: f64, size: f64| {
             (a - b).abs() > share * a.abs().max(b.abs()).max(size)
         };

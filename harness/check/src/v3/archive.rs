@@ -1,5 +1,5 @@
 use crate::archive::Archive;
-use crate::archive::folders_of;
+use crate::archive::report_unknown_folders;
 use crate::findings::Findings;
 use host::xml::Element;
 
@@ -15,7 +15,7 @@ const AT_THE_TOP: [&str; 7] = [
 ];
 
 pub fn folders(archive: &Archive, findings: &mut Findings) {
-    folders_of("3.0", &AT_THE_TOP, archive, findings);
+    report_unknown_folders("3.0", &AT_THE_TOP, archive, findings);
 }
 
 fn has(archive: &Archive, name: &str) -> bool {

@@ -17,11 +17,11 @@ pub fn token(subject: &Subject, findings: &mut Findings) -> Result<()> {
     for using in subject.plain_uses() {
         let mut with = subject.instantiation(using)?;
         with.token = Some("{another token of another FMU}");
-        subject.doing("making an instance with another instantiationToken");
+        subject.announce("making an instance with another instantiationToken");
         match subject.instantiate(&with)? {
-            Ok(_) => findings.at(subject.now()).add("it gives an instance (allowed: NULL for a token that is not that of modelDescription.xml)"),
+            Ok(_) => findings.at(subject.last_call()).add("it gives an instance (allowed: NULL for a token that is not that of modelDescription.xml)"),
             Err(CallError { messages, .. }) if messages.is_empty() => {
-                findings.at(subject.now()).warn("it gives none and says nothing (allowed: a message)");
+                findings.at(subject.last_call()).warn("it gives none and says nothing (allowed: a message)");
             }
             Err(_) => {}
         }
@@ -34,11 +34,11 @@ pub fn callbacks(subject: &Subject, findings: &mut Findings) -> Result<()> {
         let mut with = subject.instantiation(using)?;
         with.logger = false;
         with.intermediate_update = false;
-        subject.doing("making an instance without callbacks, and a step");
+        subject.announce("making an instance without callbacks, and a step");
         match subject.instantiate(&with)? {
             Ok(_) => {}
             Err(error) => {
-                findings.at(subject.now()).add(error.to_string());
+                findings.at(subject.last_call()).add(error.to_string());
                 continue;
             }
         }
@@ -64,7 +64,7 @@ pub fn readable(subject: &Subject, findings: &mut Findings) -> Result<()> {
     for using in subject.plain_uses() {
         let mut session = subject.running(using)?;
         for v in subject.readable() {
-            subject.doing(format!("reading {}", v.name));
+            subject.announce(format!("reading {}", v.name));
             if let Err(error) = session.get(v) {
                 findings.at(v.place()).add(format!("{} ({error})", using.name()));
             }
@@ -125,7 +125,7 @@ pub fn set(subject: &Subject, findings: &mut Findings) -> Result<()> {
             }
         }
         let mut session = subject.session(using)?;
-        subject.doing(format!("setting {}", v.name));
+        subject.announce(format!("setting {}", v.name));
         if let Err(error) = session.instance.set_values(v.c_type, v.reference, &values) {
             // A model may refuse a value for its own reasons, but must say why.
             if error.messages.is_empty() {
@@ -155,11 +155,14 @@ pub fn type_mismatch(subject: &Subject, findings: &mut Findings) -> Result<()> {
     for v in subject.readable() {
         let n = v.length();
         let place = format!("reading {} by the call of another type", v.name);
-        let (call, answer) = subject.left_open(place, findings, || match v.c_type {
+        let (call, answer) = subject.with_open_effect(place, findings, || match v.c_type {
             CType::Float64 => {
-                ("fmi3GetInt32", session.instance.fetch(&[v.reference], &mut vec![0i32; n]))
+                ("fmi3GetInt32", session.instance.get_numbers(&[v.reference], &mut vec![0i32; n]))
             }
-            _ => ("fmi3GetFloat64", session.instance.fetch(&[v.reference], &mut vec![0.0f64; n])),
+            _ => (
+                "fmi3GetFloat64",
+                session.instance.get_numbers(&[v.reference], &mut vec![0.0f64; n]),
+            ),
         });
         if answer.is_ok() {
             findings.at(v.place()).add(format!(
@@ -177,9 +180,9 @@ pub fn unknown(subject: &Subject, findings: &mut Findings) -> Result<()> {
         return skip("no value reference is left");
     };
     let mut session = subject.running(subject.plain_uses()[0])?;
-    subject.doing(format!("fmi3GetFloat64 of valueReference {unknown}, which no variable has"));
-    if session.instance.fetch(&[unknown], &mut [0.0f64]).is_ok() {
-        findings.at(subject.now()).add("it returns fmi3OK (allowed: fmi3Error)");
+    subject.announce(format!("fmi3GetFloat64 of valueReference {unknown}, which no variable has"));
+    if session.instance.get_numbers(&[unknown], &mut [0.0f64]).is_ok() {
+        findings.at(subject.last_call()).add("it returns fmi3OK (allowed: fmi3Error)");
     }
     Ok(())
 }
@@ -194,8 +197,8 @@ pub fn counts(subject: &Subject, findings: &mut Findings) -> Result<()> {
         for told in [n, n.saturating_sub(1)] {
             let place = format!("fmi3GetFloat64 of {} with nValues = {told}", v.name);
             let mut values = vec![CANARY; n + 8];
-            let answer = subject.left_open(place, findings, || {
-                session.instance.fetch(&[v.reference], &mut values[..told])
+            let answer = subject.with_open_effect(place, findings, || {
+                session.instance.get_numbers(&[v.reference], &mut values[..told])
             });
             if values[told..].iter().any(|x| x.to_bits() != CANARY.to_bits()) {
                 findings.at(v.place()).add(format!(
@@ -218,7 +221,7 @@ pub fn booleans(subject: &Subject, findings: &mut Findings) -> Result<()> {
     for v in subject.readable().filter(|v| v.c_type == CType::Boolean) {
         any = true;
         let mut bytes = vec![0xa5; v.length()];
-        session.instance.fetch_boolean(&[v.reference], &mut bytes)?;
+        session.instance.get_boolean_bytes(&[v.reference], &mut bytes)?;
         if let Some(byte) = bytes.iter().find(|byte| **byte > 1) {
             findings.at(v.place()).add(format!("fmi3GetBoolean writes {byte} (allowed: 0, 1)"));
         }
@@ -247,8 +250,9 @@ pub fn fixed(subject: &Subject, findings: &mut Findings) -> Result<()> {
             .map(|x| if let Value::Real(x) = x { x + 0.125 * v.nominal() } else { 0.0 })
             .collect();
         let place = format!("setting the fixed parameter {} after initialisation", v.name);
-        let set =
-            subject.left_open(place, findings, || session.instance.give(&[v.reference], &moved));
+        let set = subject.with_open_effect(place, findings, || {
+            session.instance.set_numbers(&[v.reference], &moved)
+        });
         if set.is_ok() && session.read(v)? != before {
             findings.at(v.place()).add("it is fixed, and fmi3SetFloat64 after initialization changes it (allowed: fmi3Error)");
         }
@@ -270,18 +274,18 @@ pub fn restore(subject: &Subject, findings: &mut Findings) -> Result<()> {
 }
 
 pub fn serialize(subject: &Subject, findings: &mut Findings) -> Result<()> {
-    for using in states::with(subject, "canSerialize", findings) {
+    for using in states::uses_with(subject, "canSerialize", findings) {
         let mut session = subject.running(using)?;
         session.advance(5)?;
         let state = session.instance.get_state()?;
-        subject.doing("fmi3SerializeFMUState");
+        subject.announce("fmi3SerializeFMUState");
         let bytes = session.instance.serialize(&state)?;
         let mark = session.mark();
         // The calls go on even if the FMU has requested the end of the simulation, in both runs.
         session.go_back(&mark);
         session.advance(STEPS)?;
         let first = session.readings()?;
-        subject.doing("fmi3DeserializeFMUState");
+        subject.announce("fmi3DeserializeFMUState");
         let copy = session.instance.deserialize(&bytes)?;
         session.instance.set_state(&copy)?;
         session.go_back(&mark);
@@ -291,7 +295,7 @@ pub fn serialize(subject: &Subject, findings: &mut Findings) -> Result<()> {
             findings.at(format!("{}, from a serialised state", using.name())).add(text);
         }
         if let Some(half) = bytes.len().checked_div(2).filter(|half| *half > 0) {
-            subject.doing("fmi3DeserializeFMUState of half the bytes");
+            subject.announce("fmi3DeserializeFMUState of half the bytes");
             if let Ok(wrong) = session.instance.deserialize(&bytes[..half]) {
                 findings.at(using.name()).add(format!(
                     "{half} of {} bytes are taken for a state (allowed: fmi3Error)",
@@ -342,7 +346,7 @@ pub fn log_errors(subject: &Subject, findings: &mut Findings) -> Result<()> {
         && error.messages.is_empty()
     {
         findings
-            .at(subject.now())
+            .at(subject.last_call())
             .add("it returns fmi3Error and says nothing (allowed: a message)");
     }
     Ok(())
@@ -433,7 +437,7 @@ pub fn states_set(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let mut x = vec![0.0; n];
     session.instance.continuous_states(&mut x)?;
     let moved: Vec<f64> = x.iter().map(|x| x + 1e-3 * x.abs().max(1e-3)).collect();
-    subject.doing("fmi3SetContinuousStates");
+    subject.announce("fmi3SetContinuousStates");
     session.instance.set_continuous_states(&moved)?;
     session.instance.continuous_states(&mut x)?;
     if let Some(i) = (0..n).find(|i| x[*i].to_bits() != moved[*i].to_bits()) {

@@ -143,7 +143,7 @@ pub fn wrong(subject: &Subject, findings: &mut Findings) -> Result<()> {
     session.advance(1)?;
     let place = "fmi3DoStep with a communicationStepSize below 0";
     let (time, h) = (session.time, -session.h);
-    if subject.left_open(place, findings, || session.instance.do_step(time, h)).is_ok() {
+    if subject.with_open_effect(place, findings, || session.instance.do_step(time, h)).is_ok() {
         findings.at(place).add("it returns fmi3OK (allowed: fmi3Error)");
     }
     Ok(())
@@ -194,7 +194,7 @@ pub fn event_answers(subject: &Subject, findings: &mut Findings) -> Result<()> {
             if session.ended || session.events == events || steps >= LONG {
                 break;
             }
-            subject.doing(format!("event mode at {:?} s", session.time));
+            subject.announce(format!("event mode at {:?} s", session.time));
             session.instance.enter_event_mode()?;
         }
     }
@@ -355,7 +355,7 @@ pub fn intermediate_time(subject: &Subject, findings: &mut Findings) -> Result<(
         // As in `faults`: the FMU's own steps may not fit.
         let slack = 1e-2 * h;
         let mut wrong: Option<String> = None;
-        session.raw_step_hearing(
+        session.raw_step_with_updates(
             h,
             Some(&mut |update: &Update| {
                 let t = update.time;
@@ -397,7 +397,7 @@ pub fn intermediate_early_return(subject: &Subject, findings: &mut Findings) -> 
     let mut session = subject.running(using)?;
     let (from, h) = (session.time, 10.0 * session.h);
     let mut asked = None;
-    let step = session.raw_step_hearing(
+    let step = session.raw_step_with_updates(
         h,
         Some(&mut |update: &Update| {
             if update.can_return_early && asked.is_none() && update.time < from + h {
@@ -461,9 +461,9 @@ pub fn intermediate_inputs(subject: &Subject, findings: &mut Findings) -> Result
             let mut session = subject.running(if along { UPDATING } else { Use::PLAIN })?;
             let h = h / parts as f64;
             for _ in 0..steps * parts {
-                session.instance.give(&[v.reference], &at(session.time))?;
+                session.instance.set_numbers(&[v.reference], &at(session.time))?;
                 if along {
-                    session.raw_step_hearing(
+                    session.raw_step_with_updates(
                         h,
                         Some(&mut |update: &Update| {
                             if update.set_requested {
@@ -530,9 +530,9 @@ fn displaced(
 ) -> Result<Vec<f64>> {
     let mut moved = base.to_vec();
     moved[element] += by;
-    session.instance.give(&[known.reference], &moved)?;
+    session.instance.set_numbers(&[known.reference], &moved)?;
     let values = session.read(unknown)?;
-    session.instance.give(&[known.reference], base)?;
+    session.instance.set_numbers(&[known.reference], base)?;
     Ok(real(&values))
 }
 
@@ -576,7 +576,7 @@ pub fn directional(subject: &Subject, findings: &mut Findings) -> Result<()> {
             for element in 0..base.len() {
                 let mut seed = vec![0.0; base.len()];
                 seed[element] = 1.0;
-                subject.doing(format!(
+                subject.announce(format!(
                     "fmi3GetDirectionalDerivative of {} by {}",
                     unknown.name, known.name
                 ));
@@ -644,7 +644,7 @@ pub fn adjoint(subject: &Subject, findings: &mut Findings) -> Result<()> {
                 for (i, forward) in forward.iter().enumerate() {
                     let mut seed = vec![0.0; n];
                     seed[i] = 1.0;
-                    subject.doing(format!(
+                    subject.announce(format!(
                         "fmi3GetAdjointDerivative of {} by {}",
                         unknown.name, known.name
                     ));
@@ -711,7 +711,7 @@ pub fn declared(subject: &Subject, findings: &mut Findings) -> Result<()> {
             let before = real(&session.read(v)?);
             for element in 0..base.len() {
                 let by = 1e-2 * base[element].abs().max(known.nominal());
-                subject.doing(format!("moving {} and reading {}", known.name, v.name));
+                subject.announce(format!("moving {} and reading {}", known.name, v.name));
                 let after = displaced(&mut session, v, known, &base, element, by)?;
                 if after.iter().zip(&before).any(|(a, b)| follows(*a, *b)) {
                     findings.at(format!("line {}, {}, {}", unknown.line, unknown.list, v.name)).add(format!(
@@ -740,7 +740,7 @@ pub fn elements(subject: &Subject, findings: &mut Findings) -> Result<()> {
             continue;
         };
         let Some(v) = d.at(reference) else { continue };
-        subject.doing(format!("fmi3GetVariableDependencies of {}", v.name));
+        subject.announce(format!("fmi3GetVariableDependencies of {}", v.name));
         for one in session.instance.dependencies(reference)? {
             let length = d.at(one.independent).map(Variable::length);
             if !listed.contains(&one.independent) {

@@ -147,8 +147,8 @@ impl Subject {
     /// crashes, `values.unknown` reports it.
     pub fn refused(&self, session: &mut Session) -> Option<CallError> {
         self.with_crash_reported_by("values.unknown", || {
-            self.doing("fmi3GetFloat64 of a valueReference that no variable has");
-            session.instance.fetch(&[u32::MAX], &mut [0.0f64]).err()
+            self.announce("fmi3GetFloat64 of a valueReference that no variable has");
+            session.instance.get_numbers(&[u32::MAX], &mut [0.0f64]).err()
         })
     }
 
@@ -199,7 +199,7 @@ impl UnderTest for Subject {
     }
 
     fn session(&self, using: Use) -> Result<Session<'_>> {
-        self.doing(format!("making an instance for {}", using.name()));
+        self.announce(format!("making an instance for {}", using.name()));
         let instance = self
             .instantiate(&self.instantiation(using)?)?
             .map_err(|error| Unusable { rule: "load.instance", why: error.to_string() })?;
@@ -224,7 +224,7 @@ impl UnderTest for Subject {
         Ok(session)
     }
 
-    fn complaints(&self) -> Result<(Vec<Message>, usize)> {
+    fn provoke_messages(&self) -> Result<(Vec<Message>, usize)> {
         let mut session = self.running(self.plain_uses()[0])?;
         session.advance(2)?;
         let refused = self.refused(&mut session);
@@ -255,14 +255,14 @@ pub struct Session<'s> {
 
 impl Session<'_> {
     pub fn enter_initialization(&mut self) -> Result<()> {
-        self.subject.doing("fmi3EnterInitializationMode");
+        self.subject.announce("fmi3EnterInitializationMode");
         let tolerance = self.subject.number("tolerance").filter(|t| *t > 0.0);
         self.instance.enter_initialization_mode(tolerance, self.time, None).map_err(starts)
     }
 
     /// Leaves initialization mode and iterates events, so that the instance is ready for a step.
     pub fn leave_initialization(&mut self) -> Result<()> {
-        self.subject.doing("fmi3ExitInitializationMode");
+        self.subject.announce("fmi3ExitInitializationMode");
         self.instance.exit_initialization_mode().map_err(starts)?;
         if self.using.event_mode || self.using.interface == Interface::ModelExchange {
             self.leave_event()?;
@@ -279,11 +279,11 @@ impl Session<'_> {
         }
         match self.using.interface {
             Interface::CoSimulation => {
-                self.subject.doing("fmi3EnterStepMode");
+                self.subject.announce("fmi3EnterStepMode");
                 self.instance.enter_step_mode()?;
             }
             Interface::ModelExchange => {
-                self.subject.doing("fmi3EnterContinuousTimeMode");
+                self.subject.announce("fmi3EnterContinuousTimeMode");
                 self.instance.enter_continuous_time_mode()?;
             }
         }
@@ -292,7 +292,7 @@ impl Session<'_> {
 
     /// Calls fmi3UpdateDiscreteStates until no new iteration is requested.
     pub fn iterate(&mut self) -> Result<EventInfo> {
-        self.subject.doing("fmi3UpdateDiscreteStates");
+        self.subject.announce("fmi3UpdateDiscreteStates");
         for _ in 0..ITERATIONS {
             let info = self.instance.update_discrete_states()?;
             if info.terminate == 1 {
@@ -314,7 +314,7 @@ impl Session<'_> {
     /// Enters event mode, iterates, leaves it, and notes event indicators that are 0 afterwards.
     pub fn event(&mut self) -> Result<EventInfo> {
         self.events += 1;
-        self.subject.doing(format!("event mode at {:?} s", self.time));
+        self.subject.announce(format!("event mode at {:?} s", self.time));
         self.instance.enter_event_mode()?;
         let info = self.leave_event()?;
         if self.using.interface == Interface::ModelExchange && !self.ended {
@@ -327,17 +327,17 @@ impl Session<'_> {
     }
 
     pub fn raw_step(&mut self, h: f64) -> Called<Step> {
-        self.raw_step_hearing(h, None)
+        self.raw_step_with_updates(h, None)
     }
 
-    pub fn raw_step_hearing(&mut self, h: f64, within: Option<&mut Within>) -> Called<Step> {
-        self.subject.doing(format!(
+    pub fn raw_step_with_updates(&mut self, h: f64, within: Option<&mut Within>) -> Called<Step> {
+        self.subject.announce(format!(
             "fmi3DoStep from {:?} s by {h:?} s ({})",
             self.time,
             self.using.name()
         ));
         let step = match within {
-            Some(within) => self.instance.do_step_hearing(self.time, h, Some(within))?,
+            Some(within) => self.instance.do_step_with_updates(self.time, h, Some(within))?,
             None => self.instance.do_step(self.time, h)?,
         };
         self.ended |= step.terminate == 1;
@@ -386,7 +386,7 @@ impl Session<'_> {
                 return Ok(());
             }
             self.subject
-                .doing(format!("integrating from {:?} s by at most {longest:?} s", self.time));
+                .announce(format!("integrating from {:?} s by at most {longest:?} s", self.time));
             self.instance.event_indicators(&mut before)?;
             if n > 0 {
                 self.instance.continuous_states(&mut x)?;
@@ -420,7 +420,7 @@ impl Session<'_> {
     pub fn stimulate(&mut self, k: usize) -> Result<()> {
         for (n, v) in self.subject.inputs().enumerate() {
             let values = stimulus(v, k + 3 * n);
-            self.instance.give(&[v.reference], &values)?;
+            self.instance.set_numbers(&[v.reference], &values)?;
         }
         Ok(())
     }
@@ -488,7 +488,7 @@ impl<'f> Life<'f, Fmi3> for Session<'f> {
             0 => String::new(),
             n => format!(" ({n} more differ)"),
         };
-        Some(format!("{name} is {}, not {}{more}", shown(a), shown(b)))
+        Some(format!("{name} is {}, not {}{more}", value_text(a), value_text(b)))
     }
 
     fn mark(&self) -> (f64, usize, Option<f64>) {
@@ -500,7 +500,7 @@ impl<'f> Life<'f, Fmi3> for Session<'f> {
         self.ended = false;
     }
 
-    fn stray(&mut self) -> Result<()> {
+    fn leave_trajectory(&mut self) -> Result<()> {
         self.initialise()?;
         self.advance(STEPS)
     }
@@ -510,7 +510,7 @@ impl<'f> Life<'f, Fmi3> for Session<'f> {
     }
 }
 
-fn shown(value: &Value) -> String {
+fn value_text(value: &Value) -> String {
     match value {
         Value::Real(x) => format!("{x:?}"),
         Value::Integer(n) => n.to_string(),

@@ -83,7 +83,7 @@ pub struct PointsArgs {
 }
 
 /// Options that `identify --free` and `design --free` share with the other kinds of recordings.
-pub struct Told<'a> {
+pub struct Request<'a> {
     pub data: &'a [PathBuf],
     pub settings: &'a [(String, String)],
     pub columns: &'a str,
@@ -106,7 +106,7 @@ fn parsed<T>(read: impl Iterator<Item = Result<T>>, problems: &mut Vec<String>) 
     read.filter_map(|item| item.map_err(|error| problems.push(format!("{error:#}"))).ok()).collect()
 }
 
-impl Told<'_> {
+impl Request<'_> {
     /// Returns the settings as `NAME=VALUE`, as they were written after `--set`.
     fn texts(&self) -> Vec<String> {
         self.settings.iter().map(|(name, value)| format!("{name}={value}")).collect()
@@ -119,7 +119,7 @@ impl AnyFmuArgs {
         !self.free.is_empty()
     }
 
-    fn question(&self, told: &Told) -> Result<Question> {
+    fn question(&self, request: &Request) -> Result<Question> {
         let mut problems = Vec::new();
         let names = |flags: &[String]| -> Vec<String> {
             flags.iter().flat_map(|flag| list(flag)).map(String::from).collect()
@@ -135,7 +135,7 @@ impl AnyFmuArgs {
             free: read(&self.free, &mut problems),
             priors: read(&self.prior, &mut problems),
             tolerances: read(&self.tolerances, &mut problems),
-            settings: parsed(told.texts().iter().map(|text| text.parse()), &mut problems),
+            settings: parsed(request.texts().iter().map(|text| text.parse()), &mut problems),
             inputs: names(&self.inputs),
             held: names(&self.held),
             outputs: names(&self.outputs),
@@ -164,8 +164,8 @@ impl AnyFmuArgs {
         Ok(question)
     }
 
-    fn model(&self, told: &Told, question: &Question) -> Result<Model> {
-        let path = crate::fmu::find(told.fmu)?;
+    fn model(&self, request: &Request, question: &Question) -> Result<Model> {
+        let path = crate::fmu::find(request.fmu)?;
         let model = Model::open(&path, question.solver)?;
         for what in model.changed() {
             terminal::warn(format_args!(
@@ -178,13 +178,13 @@ impl AnyFmuArgs {
 
     /// Fits the unknowns to the recordings, writes the result to the files of `out` and prints it. With
     /// `--points` it writes −2 ln L at the given points instead.
-    pub fn identify(&self, told: &Told, points: &PointsArgs, out: &Out) -> Result<()> {
-        let question = self.question(told)?;
-        let model = self.model(told, &question)?;
-        let columns = Columns::for_variables(list(told.columns))?.with_rate(told.rate)?;
+    pub fn identify(&self, request: &Request, points: &PointsArgs, out: &Out) -> Result<()> {
+        let question = self.question(request)?;
+        let model = self.model(request, &question)?;
+        let columns = Columns::for_variables(list(request.columns))?.with_rate(request.rate)?;
         let mut notes = Vec::new();
         let mut records = Vec::new();
-        for path in told.data {
+        for path in request.data {
             records.push(Record::read(
                 path,
                 &question,
@@ -221,10 +221,10 @@ impl AnyFmuArgs {
 
     /// Predicts the standard deviations that a fit to recordings with these inputs would have (Cramér–Rao
     /// bound), and prints them. `noise` has items `OUTPUT=STD,…`, the noise of one row in the output's unit.
-    pub fn design(&self, told: &Told, noise: &[String]) -> Result<()> {
-        let question = self.question(told)?;
-        let model = self.model(told, &question)?;
-        let columns = Columns::for_variables(list(told.columns))?.with_rate(told.rate)?;
+    pub fn design(&self, request: &Request, noise: &[String]) -> Result<()> {
+        let question = self.question(request)?;
+        let model = self.model(request, &question)?;
+        let columns = Columns::for_variables(list(request.columns))?.with_rate(request.rate)?;
         let mut given = BTreeMap::new();
         for item in noise.iter().flat_map(|flag| list(flag)) {
             let (name, std) = super::setting(item)?;
@@ -245,7 +245,7 @@ impl AnyFmuArgs {
         let sizes: Vec<f64> = question.outputs.iter().map(|name| given[name]).collect();
         let alone = Question { outputs: Vec::new(), ..question.clone() };
         let mut records = Vec::new();
-        for path in told.data {
+        for path in request.data {
             let read = Record::read(path, &alone, model.description(), &columns, &mut |_| {})?;
             let outputs = vec![vec![0.0; read.time.len()]; question.outputs.len()];
             records.push(Record { outputs, ..read });
@@ -254,7 +254,7 @@ impl AnyFmuArgs {
         let bounds = foresee(&model, &question, &records, &sizes, &mut |warning| {
             terminal::warn(warning);
         })?;
-        if told.json {
+        if request.json {
             terminal::print_json(&bounds)?;
         } else {
             print_predicted(&bounds);

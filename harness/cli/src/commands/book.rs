@@ -27,7 +27,7 @@ pub struct BookArgs {
 
 impl BookArgs {
     pub fn run(self) -> Result<()> {
-        if fmu::came_with("fmus").is_some() || !pack::has_source() {
+        if fmu::shipped_folder("fmus").is_some() || !pack::has_source() {
             let address = book::address();
             ensure!(
                 self.out.is_none(),

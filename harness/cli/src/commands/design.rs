@@ -18,7 +18,7 @@ use names::hubslosh::{TAU_CMD, friction, hub, imu, slosh, tank, wheel};
 use serde_json::json;
 use signals::table::{self, Table};
 
-use super::any_fmu::{AnyFmuArgs, Told};
+use super::any_fmu::{AnyFmuArgs, Request};
 use super::{DEFAULT_FMU, estimates, open, setting};
 use crate::terminal;
 
@@ -110,7 +110,7 @@ impl DesignArgs {
             self.settings = nominal::with_damping(self.settings);
         }
         if self.any.is_asked() {
-            let told = Told {
+            let request = Request {
                 data: &self.data,
                 settings: &self.settings,
                 columns: &self.columns,
@@ -118,7 +118,7 @@ impl DesignArgs {
                 fmu: &self.fmu,
                 json: self.json,
             };
-            return self.any.design(&told, &self.noise);
+            return self.any.design(&request, &self.noise);
         }
         ensure!(
             self.any.tolerances.is_empty(),

@@ -20,7 +20,7 @@ pub struct ExamplesArgs {
 
 impl ExamplesArgs {
     pub fn run(self) -> Result<()> {
-        let found = fmu::came_with("examples").or_else(|| {
+        let found = fmu::shipped_folder("examples").or_else(|| {
             let source = ::pack::root().join("examples");
             source.is_dir().then_some(source)
         });

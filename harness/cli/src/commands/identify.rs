@@ -19,7 +19,7 @@ use identify::model::bench::unknown::Unknown;
 use identify::words::identified::Identified;
 use signals::recording::Columns;
 
-use super::any_fmu::{AnyFmuArgs, PointsArgs, Told};
+use super::any_fmu::{AnyFmuArgs, PointsArgs, Request};
 use super::estimates::{Out, print_estimates};
 use super::{DEFAULT_FMU, open, setting};
 use crate::terminal;
@@ -321,7 +321,6 @@ fn prior(text: &str) -> Result<(String, f64, f64)> {
     Ok((name, mean, deviation))
 }
 
-/// Parses the tolerances of known values of the bench, `NAME=SIZE`.
 fn tolerances(texts: &[String]) -> Result<Tolerances> {
     texts.iter().try_fold(Tolerances::default(), |all, text| all.with(text))
 }
@@ -361,8 +360,8 @@ impl FmuArgs {
         self.data.check()?;
         let DataArgs { data, columns, rate, json, .. } = &self.data;
         let (settings, fmu) = (&self.settings, &self.fmu);
-        let told = Told { data, settings, columns, rate: *rate, fmu, json: *json };
-        self.any.identify(&told, &self.points, &self.data.outputs())
+        let request = Request { data, settings, columns, rate: *rate, fmu, json: *json };
+        self.any.identify(&request, &self.points, &self.data.outputs())
     }
 }
 
@@ -496,7 +495,6 @@ impl DataArgs {
         Ok(())
     }
 
-    /// Returns the columns and times to read from the recordings.
     fn source(&self, trim: Option<(f64, f64)>) -> Result<Source> {
         let columns: Columns = self.columns.parse()?;
         Ok(Source { columns: columns.with_rate(self.rate)?, trim })

@@ -75,7 +75,6 @@ fn opened(fmu: Fmu) -> Result<Fmu> {
     Ok(fmu)
 }
 
-/// Parses the value of a flag `--set`, `NAME=VALUE`.
 fn setting(text: &str) -> Result<(String, String)> {
     let (name, value) = text
         .split_once('=')

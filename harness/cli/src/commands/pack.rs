@@ -179,7 +179,6 @@ fn fmi(text: &str) -> Result<Fmi> {
     }
 }
 
-/// Packs an FMU with the binary for this machine's platform.
 pub fn native(model: &Model, fmi: Fmi, out: &Path) -> Result<()> {
     pack::pack(model, fmi, out)?;
     done!("packed {}", out.display());

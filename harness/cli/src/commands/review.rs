@@ -32,7 +32,7 @@ impl ReviewArgs {
         arguments.extend([self.plan.into_os_string(), "--out".into(), out.into_os_string()]);
         let pythons = match self.python {
             Some(python) => vec![python],
-            None => pythons(&own),
+            None => python_candidates(&own),
         };
         for python in &pythons {
             let mut command = Command::new(python);
@@ -82,7 +82,7 @@ impl ReviewArgs {
 
 /// Returns the Python programs to try: that in the folder of this command (its environment), then those on
 /// PATH.
-fn pythons(own: &Path) -> Vec<PathBuf> {
+fn python_candidates(own: &Path) -> Vec<PathBuf> {
     let near = own.with_file_name(if cfg!(windows) { "python.exe" } else { "python3" });
     [near, "python3".into(), "python".into()].to_vec()
 }

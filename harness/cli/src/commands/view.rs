@@ -197,7 +197,6 @@ const POINTS: usize = 24;
 /// Number of radial steps at which the surface of a mode is given.
 const STEPS: usize = 80;
 
-/// Parses `--tank [N:]FILE` and reads the drawing of the tank.
 fn drawing(text: &str) -> Result<(usize, Drawing)> {
     let (number, path) = match text.split_once(':') {
         Some((number, path)) if number.parse::<usize>().is_ok() => (number.parse()?, path),

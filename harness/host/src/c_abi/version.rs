@@ -15,7 +15,8 @@ use files::temporary;
 use libloading::Library;
 
 use super::{
-    CallError, Called, Environment, Function, Loaded, Message, Status, copied, functions, lacking,
+    CallError, Called, Environment, Function, Loaded, Message, Status, copy_text, functions,
+    missing_functions,
 };
 use crate::archive::Archive;
 use crate::description::{CType, ModelDescription, Type, Value, Variable};
@@ -209,7 +210,7 @@ impl<V: Version> Fmu<V> {
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let archive = Archive::open(path)?;
-        let described = described(&archive, path)?;
+        let described = read_description(&archive, path)?;
         Fmu::from_archive(&archive, described, path, Interface::CoSimulation, &[])
     }
 
@@ -267,7 +268,7 @@ impl<V: Version> Fmu<V> {
 
     /// Loads the binary for a model description that is already parsed, because parsing a large one takes
     /// most of the time.
-    pub(crate) fn load_parsed(
+    pub fn load_for(
         interface: Option<Interface>,
         directory: &Path,
         path: &Path,
@@ -298,7 +299,7 @@ impl<V: Version> Fmu<V> {
             super::load(directory, path, V::PLATFORM, identifier)?;
         let needed =
             V::required_functions(stepping == Some(identifier), exchange == Some(identifier));
-        let lacking = lacking(&library, &needed);
+        let lacking = missing_functions(&library, &needed);
         if !lacking.is_empty() {
             bail!("{binary} in {name} lacks {}", lacking.join(", "));
         }
@@ -312,8 +313,8 @@ impl<V: Version> Fmu<V> {
                 Exchange::load(&library, V::NUMBER).ok(),
             )
         };
-        let (is_plain, plain) = plain(&description);
-        let taken = taken(&description);
+        let (is_plain, plain) = scalar_reals(&description);
+        let taken = intermediate_inputs(&description);
         Ok(Fmu {
             common,
             exchange,
@@ -375,8 +376,8 @@ impl<V: Version> Fmu<V> {
         for (array, values) in starts {
             description.set_starts(array, &values);
         }
-        (self.is_plain, self.plain) = plain(&description);
-        self.taken = taken(&description);
+        (self.is_plain, self.plain) = scalar_reals(&description);
+        self.taken = intermediate_inputs(&description);
         self.description = description;
         Ok(())
     }
@@ -407,7 +408,7 @@ impl<V: Version> Fmu<V> {
 
     pub fn version(&self) -> String {
         // SAFETY: takes nothing, returns a constant string.
-        unsafe { copied((self.common.get_version.call)()) }
+        unsafe { copy_text((self.common.get_version.call)()) }
     }
 
     /// Returns true if these Reals can be exchanged in one call, because all are scalars of type Float64.
@@ -468,7 +469,10 @@ impl<V: Version> Fmu<V> {
     }
 }
 
-pub(crate) fn described(archive: &Archive, path: &Path) -> Result<(String, ModelDescription)> {
+pub(crate) fn read_description(
+    archive: &Archive,
+    path: &Path,
+) -> Result<(String, ModelDescription)> {
     let name = path.display();
     let text = archive.description().with_context(|| format!("{name} is not an FMU"))?;
     let refused = || format!("{name} cannot be used");
@@ -479,7 +483,7 @@ pub(crate) fn described(archive: &Archive, path: &Path) -> Result<(String, Model
 
 /// Returns whether all Reals are scalars of type Float64, and the value references of those that are,
 /// ascending.
-fn plain(description: &ModelDescription) -> (bool, Vec<u32>) {
+fn scalar_reals(description: &ModelDescription) -> (bool, Vec<u32>) {
     let reals = description.variables.iter().filter(|v| v.kind() == Type::Real);
     let (plain, others): (Vec<&Variable>, Vec<&Variable>) = reals
         .partition(|v| v.c_type() == CType::Float64 && description.element(v.reference).is_none());
@@ -488,7 +492,7 @@ fn plain(description: &ModelDescription) -> (bool, Vec<u32>) {
     (others.is_empty(), plain)
 }
 
-fn taken(description: &ModelDescription) -> Vec<u32> {
+fn intermediate_inputs(description: &ModelDescription) -> Vec<u32> {
     let is_taken = |v: &&Variable| v.intermediate && v.c_type() == CType::Float64;
     let taken = description.variables.iter().filter(is_taken);
     let mut taken: Vec<u32> = taken.map(|v| v.reference).collect();
@@ -583,7 +587,7 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         }
     }
 
-    pub(crate) fn plain(&self, function: Function<Call>) -> Called {
+    pub(crate) fn call_plain(&self, function: Function<Call>) -> Called {
         // SAFETY: plain call on a live instance.
         self.call(function, |f, c| unsafe { f(c) })
     }
@@ -622,7 +626,7 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         let mut pointers: Vec<*const c_char> = vec![null(); count];
         self.read(function, references, &mut pointers)?;
         // SAFETY: the FMU answered OK, so each points to a terminated string of the FMU.
-        Ok(pointers.into_iter().map(|text| unsafe { copied(text) }).collect())
+        Ok(pointers.into_iter().map(|text| unsafe { copy_text(text) }).collect())
     }
 
     /// Calls a function of the FMU that sets texts, with `values` as strings of C.
@@ -646,16 +650,16 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
     }
 
     pub fn exit_initialization_mode(&mut self) -> Called {
-        self.plain(self.fmu.common.exit_initialization_mode)
+        self.call_plain(self.fmu.common.exit_initialization_mode)
     }
 
     pub fn terminate(&mut self) -> Called {
-        self.plain(self.fmu.common.terminate)
+        self.call_plain(self.fmu.common.terminate)
     }
 
     pub fn reset(&mut self) -> Called {
         self.arrays.borrow_mut().clear();
-        self.plain(self.fmu.common.reset)
+        self.call_plain(self.fmu.common.reset)
     }
 
     pub fn enter_event_mode(&mut self) -> Called {
@@ -732,6 +736,16 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         let set = V::set_values(self, variable.c_type(), element.array, &values);
         self.arrays.borrow_mut().insert(element.array, values);
         set
+    }
+
+    /// Reads the `count` values of a variable or an array with this value reference.
+    pub fn values(&mut self, c_type: CType, reference: u32, count: usize) -> Called<Vec<Value>> {
+        V::values(self, c_type, reference, count)
+    }
+
+    /// Sets all values of a variable or an array with this value reference.
+    pub fn set_values(&mut self, c_type: CType, reference: u32, values: &[Value]) -> Called {
+        V::set_values(self, c_type, reference, values)
     }
 
     pub fn get(&mut self, name: &str) -> Result<Value> {
@@ -832,7 +846,7 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
     ///
     /// If the FMU does not export the functions of Model Exchange; this holds for all calls of this section.
     pub fn enter_continuous_time_mode(&mut self) -> Called {
-        self.plain(self.exchange().enter_continuous_time_mode)
+        self.call_plain(self.exchange().enter_continuous_time_mode)
     }
 
     pub fn completed_integrator_step(&mut self) -> Called<CompletedStep> {

@@ -67,7 +67,7 @@ impl Guarded {
 
 /// A write outside an array, or into an array that may only be read.
 #[derive(Clone, Debug)]
-pub struct Beside {
+pub struct StrayWrite {
     pub call: &'static str,
     pub array: String,
     pub fault: String,
@@ -103,50 +103,50 @@ fn lengths(all: usize) -> Vec<usize> {
 impl Instance<'_> {
     /// Makes calls with margins around every array and returns the writes into the margins, whatever the
     /// status of the calls; for tests.
-    pub fn writes_beside(&mut self, lists: &Lists) -> Vec<Beside> {
+    pub fn find_stray_writes(&mut self, lists: &Lists) -> Vec<StrayWrite> {
         let mut found = Vec::new();
         self.begin_call();
-        self.values_beside(lists, &mut found);
-        self.derivatives_beside(lists, &mut found);
-        self.vectors_beside(lists, &mut found);
+        self.check_values(lists, &mut found);
+        self.check_derivatives(lists, &mut found);
+        self.check_vectors(lists, &mut found);
         if lists.serializes {
-            self.states_beside(&mut found);
+            self.check_states(&mut found);
         }
         self.calls.end();
         self.take_messages();
         found
     }
 
-    fn values_beside(&mut self, lists: &Lists, found: &mut Vec<Beside>) {
+    fn check_values(&mut self, lists: &Lists, found: &mut Vec<StrayWrite>) {
         let f = self.functions();
-        self.reads_beside(f.get_real, &lists.reals, found);
-        self.reads_beside(f.get_integer, &lists.integers, found);
-        self.reads_beside(f.get_boolean, &lists.booleans, found);
-        self.reads_beside(f.get_string, &lists.strings, found);
+        self.check_reads(f.get_real, &lists.reals, found);
+        self.check_reads(f.get_integer, &lists.integers, found);
+        self.check_reads(f.get_boolean, &lists.booleans, found);
+        self.check_reads(f.get_string, &lists.strings, found);
         let (references, values): (Vec<u32>, Vec<f64>) = lists.inputs.iter().copied().unzip();
         for n in lengths(references.len()) {
             let (mut vr, mut x) = (Guarded::input(&references[..n]), Guarded::input(&values[..n]));
             // SAFETY: arrays of n values each; so in all calls of this file.
             unsafe { (f.set_real.call)(self.component, vr.pointer(), n, x.pointer()) };
-            note(found, f.set_real.name, n, &[("vr", &vr), ("value", &x)]);
+            record_faults(found, f.set_real.name, n, &[("vr", &vr), ("value", &x)]);
         }
     }
 
-    fn reads_beside<T>(
+    fn check_reads<T>(
         &self,
         function: Function<Get<T>>,
         references: &[u32],
-        found: &mut Vec<Beside>,
+        found: &mut Vec<StrayWrite>,
     ) {
         for n in lengths(references.len()) {
             let (mut vr, mut x) = (Guarded::input(&references[..n]), Guarded::output::<T>(n));
-            // SAFETY: see values_beside.
+            // SAFETY: see check_values.
             unsafe { (function.call)(self.component, vr.pointer(), n, x.pointer()) };
-            note(found, function.name, n, &[("vr", &vr), ("value", &x)]);
+            record_faults(found, function.name, n, &[("vr", &vr), ("value", &x)]);
         }
     }
 
-    fn derivatives_beside(&mut self, lists: &Lists, found: &mut Vec<Beside>) {
+    fn check_derivatives(&mut self, lists: &Lists, found: &mut Vec<StrayWrite>) {
         let (f, c) = (self.functions().get_directional_derivative, self.component);
         for n in lengths(lists.unknowns.len()) {
             let m = lists.knowns.len();
@@ -154,7 +154,7 @@ impl Instance<'_> {
                 (Guarded::input(&lists.unknowns[..n]), Guarded::input(&lists.knowns));
             let (mut along, mut answer) =
                 (Guarded::input(&vec![1.0; m]), Guarded::output::<f64>(n));
-            // SAFETY: see values_beside.
+            // SAFETY: see check_values.
             unsafe {
                 (f.call)(
                     c,
@@ -172,7 +172,7 @@ impl Instance<'_> {
                 ("dvKnown", &along),
                 ("dvUnknown", &answer),
             ];
-            note(found, f.name, n, &arrays);
+            record_faults(found, f.name, n, &arrays);
         }
         let Some(stepping) = &self.fmu.own.stepping else { return };
         let f = stepping.get_real_output_derivatives;
@@ -180,14 +180,14 @@ impl Instance<'_> {
             let (mut vr, mut order) =
                 (Guarded::input(&lists.outputs[..n]), Guarded::input(&vec![1 as c_int; n]));
             let mut x = Guarded::output::<f64>(n);
-            // SAFETY: see values_beside.
+            // SAFETY: see check_values.
             unsafe { (f.call)(c, vr.pointer(), n, order.pointer(), x.pointer()) };
             let arrays = [("vr", &vr), ("order", &order), ("value", &x)];
-            note(found, f.name, n, &arrays);
+            record_faults(found, f.name, n, &arrays);
         }
     }
 
-    fn vectors_beside(&mut self, lists: &Lists, found: &mut Vec<Beside>) {
+    fn check_vectors(&mut self, lists: &Lists, found: &mut Vec<StrayWrite>) {
         let c = self.component;
         let (Some(f), Some(events)) = (&self.fmu.exchange, &self.fmu.own.events) else { return };
         let vectors: [(Function<GetVector>, Option<usize>); 4] = [
@@ -199,55 +199,60 @@ impl Instance<'_> {
         for (function, count) in vectors {
             let Some(n) = count else { continue };
             let mut x = Guarded::output::<f64>(n);
-            // SAFETY: see values_beside.
+            // SAFETY: see check_values.
             unsafe { (function.call)(c, x.pointer(), n) };
-            note(found, function.name, n, &[("the vector", &x)]);
+            record_faults(found, function.name, n, &[("the vector", &x)]);
         }
         if let Some(n) = lists.states.filter(|n| *n > 0) {
             let mut now = vec![0.0; n];
-            // SAFETY: see values_beside.
+            // SAFETY: see check_values.
             unsafe { (f.get_continuous_states.call)(c, now.as_mut_ptr(), n) };
             let mut x = Guarded::input(&now);
-            // SAFETY: see values_beside.
+            // SAFETY: see check_values.
             unsafe { (f.set_continuous_states.call)(c, x.pointer(), n) };
-            note(found, f.set_continuous_states.name, n, &[("x", &x)]);
+            record_faults(found, f.set_continuous_states.name, n, &[("x", &x)]);
         }
         if lists.states.is_some() {
             let (mut enter, mut end) = (Guarded::output::<c_int>(1), Guarded::output::<c_int>(1));
-            // SAFETY: see values_beside.
+            // SAFETY: see check_values.
             unsafe { (f.completed_integrator_step.call)(c, 1, enter.pointer(), end.pointer()) };
             let arrays = [("enterEventMode", &enter), ("terminateSimulation", &end)];
-            note(found, f.completed_integrator_step.name, 1, &arrays);
+            record_faults(found, f.completed_integrator_step.name, 1, &arrays);
             let mut info = Guarded::output::<EventInfo>(1);
-            // SAFETY: see values_beside; the host goes back to continuous-time mode.
+            // SAFETY: see check_values; the host goes back to continuous-time mode.
             unsafe {
                 (events.enter_event_mode.call)(c);
                 (events.new_discrete_states.call)(c, info.pointer());
                 (f.enter_continuous_time_mode.call)(c);
             }
-            note(found, events.new_discrete_states.name, 1, &[("fmi2EventInfo", &info)]);
+            record_faults(found, events.new_discrete_states.name, 1, &[("fmi2EventInfo", &info)]);
         }
     }
 
-    fn states_beside(&mut self, found: &mut Vec<Beside>) {
+    fn check_states(&mut self, found: &mut Vec<StrayWrite>) {
         let (f, c) = (&self.fmu.common, self.component);
         let Ok(state) = self.get_state() else { return };
         let mut size = Guarded::output::<usize>(1);
-        // SAFETY: see values_beside.
+        // SAFETY: see check_values.
         let status = unsafe { (f.serialized_fmu_state_size.call)(c, state.0, size.pointer()) };
-        note(found, f.serialized_fmu_state_size.name, 1, &[("size", &size)]);
+        record_faults(found, f.serialized_fmu_state_size.name, 1, &[("size", &size)]);
         let n = size.words[MARGIN / 8] as usize;
         if status == 0 && n < 1 << 30 {
             let mut bytes = Guarded::output::<u8>(n);
-            // SAFETY: see values_beside.
+            // SAFETY: see check_values.
             let status = unsafe { (f.serialize_fmu_state.call)(c, state.0, bytes.pointer(), n) };
-            note(found, f.serialize_fmu_state.name, n, &[("serializedState", &bytes)]);
+            record_faults(found, f.serialize_fmu_state.name, n, &[("serializedState", &bytes)]);
             if status == 0 {
                 let mut bytes = Guarded::input(&bytes.content());
                 let mut copy: State = null_mut();
-                // SAFETY: see values_beside.
+                // SAFETY: see check_values.
                 unsafe { (f.deserialize_fmu_state.call)(c, bytes.pointer(), n, &mut copy) };
-                note(found, f.deserialize_fmu_state.name, n, &[("serializedState", &bytes)]);
+                record_faults(
+                    found,
+                    f.deserialize_fmu_state.name,
+                    n,
+                    &[("serializedState", &bytes)],
+                );
                 let _ = self.free_state(FmuState(copy));
             }
         }
@@ -255,10 +260,15 @@ impl Instance<'_> {
     }
 }
 
-fn note(found: &mut Vec<Beside>, call: &'static str, n: usize, arrays: &[(&str, &Guarded)]) {
+fn record_faults(
+    found: &mut Vec<StrayWrite>,
+    call: &'static str,
+    n: usize,
+    arrays: &[(&str, &Guarded)],
+) {
     for (name, array) in arrays {
         if let Some(fault) = array.fault() {
-            found.push(Beside { call, array: format!("{name}, {n} long"), fault });
+            found.push(StrayWrite { call, array: format!("{name}, {n} long"), fault });
         }
     }
 }

@@ -37,7 +37,6 @@ const THESIS: [(&str, f64); 5] = [
 const CENTAUR: f64 = 2.0425;
 /// Standard gravity as in the thesis, m/s².
 const GRAVITY: f64 = 9.81;
-/// Largest number of points of a cloud in a figure.
 const POINTS: usize = 1500;
 /// Number of random starts for the fit of the friction law.
 const STARTS: usize = 8;
@@ -230,7 +229,7 @@ fn bond_number(day: &Day, fmu: &Fmu) -> Result<Chapter> {
 
 /// Thins points to at most [`POINTS`] by taking every n-th one, because a figure with all samples of a
 /// recording would be slow to draw.
-fn thinned(points: &[(f64, f64)]) -> impl Iterator<Item = (f64, f64)> + '_ {
+fn thin_out(points: &[(f64, f64)]) -> impl Iterator<Item = (f64, f64)> + '_ {
     points.iter().copied().step_by(points.len().div_ceil(POINTS).max(1))
 }
 
@@ -314,7 +313,7 @@ fn preferential_direction(
 ) -> Chapter {
     let wrapped = |angle: f64| (angle + PI).rem_euclid(TAU) - PI;
     let degrees = |points: &[(f64, f64)], sign: f64| -> Vec<(f64, f64)> {
-        thinned(points).map(|(angle, a)| (wrapped(angle).to_degrees(), sign * a)).collect()
+        thin_out(points).map(|(angle, a)| (wrapped(angle).to_degrees(), sign * a)).collect()
     };
     let angles = || (-90..=90).map(|k| 2.0 * f64::from(k));
     let ways = [("counter-clockwise", ahead, -1.0), ("clockwise", back, 1.0)];
