@@ -26,6 +26,7 @@ include_patterns = [
     "book/**.md",
     "book/api/*.rst",
     "examples/**README.md",
+    "harness/benchmark/*/page.md",
     "harness/**README.md",
     "modelDescription/*/documentation/*.md",
 ]
@@ -58,7 +59,7 @@ html_theme_options = {
 }
 
 PARTS = "index tutorials howto reference explanation developers"
-CONTENTS = [f"book/{name}" for name in PARTS.split()]
+CONTENTS = [*(f"book/{name}" for name in PARTS.split()), "harness/benchmark/README"]
 """Pages whose lists of links are the book's table of contents."""
 
 
