@@ -606,7 +606,7 @@ fn no_allowed_value_of_sloshtank_raises_a_floating_point_exception() {
 #[cfg(target_os = "linux")]
 #[test]
 #[ignore = "minutes: .ci/run --nightly"]
-fn abuse_tests_run_for_both_versions_of_fmi() {
+fn abuse_tests_run_in_both_versions_of_fmi() {
     std::thread::scope(|scope| {
         for fmi in VERSIONS {
             for model in &pack::MODELS {

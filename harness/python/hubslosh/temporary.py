@@ -25,7 +25,7 @@ def output(path: Path) -> Iterator[Path]:
     Links of ``path`` are followed. A plain file is replaced; a device or a pipe gets the bytes.
     """
     place = destination(path)
-    # a device has no folder beside it
+    # a device has no folder of its own next to it
     parent = None if place is None else Path(place).parent
     if parent is not None and not parent.is_dir():
         raise FmuError(f"{path} cannot be written: there is no folder {parent}")

@@ -44,7 +44,7 @@ def test_the_response_equals_that_of_the_fmu(fmu: Path) -> None:
     np.testing.assert_allclose(force / (arm * acceleration), mine, rtol=1e-9)
 
 
-def test_four_modes_have_an_error_of_one_per_cent_as_in_the_thesis_and_one_mode_suffices_in_the_band(
+def test_four_modes_err_by_one_per_cent_and_one_mode_suffices_in_the_band(
     fmu: Path,
 ) -> None:
     """Figure 4.4: n = 4 deviates less than 1 %, without damping; with the bench's a little more."""

@@ -305,7 +305,7 @@ def test_a_plan_file_equals_the_call_in_python(
     assert found.summary in (tmp_path / "plan.html").read_text(encoding="utf-8")
     failing = PLAN.replace("draws = 2", "draws = 2\nrequirements = {{ phase_margin = 80 }}")
     plan(str(rows), failing)
-    with pytest.raises(SystemExit, match="error: .* FAILS 1 of 1 requirement: phase margin"):
+    with pytest.raises(SystemExit, match=r"error: .* FAILS 1 of 1 requirement: phase margin"):
         main()
     assert "FAILS 1 of 1" in (tmp_path / "plan.html").read_text(encoding="utf-8")
     for text, said in {

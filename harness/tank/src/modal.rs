@@ -748,7 +748,7 @@ mod tests {
     /// With twice the last difference alone the error would be 0.74 (seed 7) and 0.99 (114) of the stated
     /// one, which leaves no margin.
     #[test]
-    fn stated_errors_hold_for_random_contours() {
+    fn stated_errors_bound_the_errors_of_random_contours() {
         for seeds in [6..8, 114..115] {
             for ratio in errors_over_stated_ones(seeds.clone()) {
                 assert!(ratio < 0.5, "{seeds:?}: {ratio}");
@@ -758,7 +758,7 @@ mod tests {
 
     #[test]
     #[ignore = "some minutes: .ci/run --nightly"]
-    fn stated_errors_hold_for_a_hundred_random_contours() {
+    fn stated_errors_bound_the_errors_of_a_hundred_random_contours() {
         let ratios = errors_over_stated_ones(0..115);
         let worst = ratios.iter().copied().fold(0.0, f64::max);
         println!("{} contours, the worst error is {worst:.2} of the stated one", ratios.len());

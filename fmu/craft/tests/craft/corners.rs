@@ -319,7 +319,7 @@ fn thrust_that_crosses_zero_keeps_the_solver_tolerance_for_a_craft() {
 
 #[test]
 #[ignore = "minutes: .ci/run --nightly"]
-fn a_thousand_random_thrust_histories_keep_the_solver_tolerance() {
+fn a_thousand_random_tables_of_thrust_keep_the_solver_tolerance() {
     keep_the_tolerance(0..1000, tank_of);
     keep_the_tolerance(0..1000, craft_of);
     keep_the_tolerance(0..500, craft_on_a_pivot_of);

@@ -145,6 +145,6 @@ fn amplitude_damping_keeps_the_solver_tolerance_where_g_vanishes() {
 
 #[test]
 #[ignore = "minutes: .ci/run --nightly"]
-fn two_thousand_random_torque_histories_keep_the_solver_tolerance() {
+fn two_thousand_random_tables_of_torque_keep_the_solver_tolerance() {
     keep_the_tolerance(0..2000);
 }

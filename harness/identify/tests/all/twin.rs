@@ -101,7 +101,7 @@ const BREAKS: [(&str, &str); 2] =
 
 #[test]
 #[ignore = "half a minute: .ci/run --nightly"]
-fn identify_finds_the_damping_of_breaking_waves() {
+fn damping_by_waves_that_break_comes_back() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let torque = SHORT.replace("0.1", "0.25");
     let of = |settings: &[(&str, &str)], breaking: bool| {
