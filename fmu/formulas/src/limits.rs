@@ -49,9 +49,15 @@ impl LimitedBy {
     /// Names and descriptions of all reasons, in the order of their numbers.
     pub const ITEMS: [(&str, &str); 8] = [
         ("none", "In range"),
-        ("third_order", "Slosh angle above the limit of the amplitude model, or above 45 degrees"),
+        (
+            "third_order",
+            "Slosh angle above angle_limit, up to which the amplitude model holds, or above 45 degrees",
+        ),
         ("breaking", "Waves so steep that they break: above breaking_steepness"),
-        ("secondary_resonance", "Swirl beyond the fold of its branch by a secondary resonance"),
+        (
+            "secondary_resonance",
+            "Rotary slosh above the angle swirl_limit, where a secondary resonance ends this motion",
+        ),
         ("spin", "The tank turns about its axis so fast that the spin of the liquid matters"),
         ("bond_number", "Surface tension matters, and the parameters do not include it"),
         ("empty", "The tank has drained to the first point of its fill table"),
