@@ -19,7 +19,7 @@ use std::path::Path;
 use crate::hash::Hash;
 use crate::model::Model;
 use crate::table::{GUID_LENGTH, Scalar, Table};
-use crate::variable::{Dimension, Value};
+use crate::variable::{Access, Causality, Dimension, Value};
 
 /// Name of the file of start values, in the folder of resources.
 pub const START_VALUES: &str = "start_values.txt";
@@ -37,6 +37,8 @@ pub struct Extent {
     places: Vec<usize>,
     indicators: usize,
     starts: Vec<Value>,
+    /// Start values of inputs that differ from those of the table, by their place in it.
+    inputs: Vec<(usize, f64)>,
 }
 
 impl Extent {
@@ -80,7 +82,7 @@ impl Extent {
                 *start = (*start).min(*size as i32);
             }
         }
-        Some(Extent { token: token.into(), sizes, places, indicators, starts })
+        Some(Extent { token: token.into(), sizes, places, indicators, starts, inputs: Vec::new() })
     }
 
     /// Reads the description's start values from the folder of resources, if they differ from those of the
@@ -113,11 +115,19 @@ impl Extent {
         let wrong = |n: usize, line: &str| {
             format!("{}, line {}: {line:?} is no start value here", file.display(), n + 1)
         };
-        let mut scalars = M::table().parameters().iter();
+        let mut scalars = M::table().scalars.iter().enumerate();
         for (n, line) in text.lines().enumerate() {
             let (name, value) = line.split_once(" = ").ok_or_else(|| wrong(n, line))?;
-            let scalar = scalars.find(|scalar| scalar.name() == name);
-            let start = scalar.and_then(|scalar| self.starts.get_mut(scalar.slot));
+            let scalar = scalars.find(|(_, scalar)| scalar.name() == name);
+            let (place, scalar) = scalar.ok_or_else(|| wrong(n, line))?;
+            if let Access::Input(_) = scalar.access {
+                let start =
+                    value.parse().ok().filter(|x| scalar.problem(Value::Real(*x)).is_none());
+                self.inputs.push((place, start.ok_or_else(|| wrong(n, line))?));
+                continue;
+            }
+            let is_parameter = scalar.variable.causality == Causality::Parameter;
+            let start = self.starts.get_mut(scalar.slot).filter(|_| is_parameter);
             let start = start.ok_or_else(|| wrong(n, line))?;
             let read = match start {
                 Value::Real(_) => value.parse().ok().map(Value::Real),
@@ -147,6 +157,11 @@ impl Extent {
     /// Returns the start values of the parameters, in the order of the table.
     pub fn starts(&self) -> &[Value] {
         &self.starts
+    }
+
+    /// Returns the start values of inputs that differ from those of the table, by their place in it.
+    pub fn inputs(&self) -> &[(usize, f64)] {
+        &self.inputs
     }
 
     /// Returns an error if `value` is too large for a parameter that sizes arrays, because the description

@@ -177,6 +177,9 @@ impl<M: Model, V: Version> Instance<M, V> {
     pub fn with_extent(mut self, extent: Option<Arc<Extent>>) -> Self {
         if let Some(extent) = &extent {
             self.parameters = extent.starts().to_vec();
+            for (place, start) in extent.inputs() {
+                self.put(&M::table().scalars[*place], Value::Real(*start));
+            }
         }
         self.extent = extent;
         self

@@ -10,6 +10,8 @@ use std::ops::Range;
 use anyhow::{Context, Result, bail, ensure};
 use roxmltree::{Document, Node};
 
+use crate::description::{ModelDescription, Value};
+
 pub const START_VALUES: &str = "resources/start_values.txt";
 
 #[derive(Clone, Copy, Debug)]
@@ -28,6 +30,27 @@ pub struct Part {
     pub xml: String,
     /// Content of [`START_VALUES`], if start values differ from those of the binary.
     pub start_values: Option<String>,
+}
+
+/// Returns the start values of `settings`, texts as a user writes them, by name in the format of FMI.
+///
+/// # Errors
+///
+/// If the description has no such variable, or a text is not a value of it.
+pub fn start_values(
+    description: &ModelDescription,
+    settings: impl IntoIterator<Item = (String, String)>,
+) -> Result<BTreeMap<String, String>> {
+    let start = |(name, text): (String, String)| {
+        let value = match description.value(description.variable(&name)?, &text)? {
+            Value::Real(x) => format!("{x:?}"),
+            Value::Integer(n) => n.to_string(),
+            Value::Boolean(b) => b.to_string(),
+            Value::String(text) => text,
+        };
+        Ok((name, value))
+    };
+    settings.into_iter().map(start).collect()
 }
 
 /// Returns the description with only the variables within the limits. `starts` has other start values of

@@ -5,8 +5,10 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use ::files::input;
+use host::archive::{Archive, DESCRIPTION};
 use host::description::{self, ModelDescription};
 use host::fmu::Interface;
+use host::part::{self, Limit, START_VALUES};
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyUserWarning};
 use pyo3::prelude::*;
@@ -183,6 +185,29 @@ impl Fmu {
     #[getter]
     fn derivatives(&self) -> Vec<(u32, u32)> {
         self.description.derivatives.clone()
+    }
+
+    /// Return the files of this Spacecraft, by their names in the archive, that change if it has fewer tanks and modes and other
+    /// start values, which are texts by name: the description and the start values.
+    fn part(
+        &self,
+        tanks: usize,
+        modes: usize,
+        starts: Vec<(String, String)>,
+    ) -> PyResult<Vec<(&'static str, String)>> {
+        let limits = names::spacecraft::SIZES.iter().map(|size| Limit {
+            parameter: size.parameter,
+            size: if size.parameter == "tanks" { tanks } else { modes },
+            most: size.most,
+            has_indicators: size.has_indicators,
+            arrays: size.arrays,
+        });
+        let starts = part::start_values(&self.description, starts).map_err(error)?;
+        let xml = Archive::open(&self.path).and_then(|archive| archive.description());
+        let limits: Vec<_> = limits.collect();
+        let part = part::describe(&xml.map_err(error)?, &limits, &starts).map_err(error)?;
+        let start_values = part.start_values.map(|text| (START_VALUES, text));
+        Ok([(DESCRIPTION, part.xml)].into_iter().chain(start_values).collect())
     }
 
     /// Unload the binaries that no instance uses, and remove their folders.

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from .certificate import Certificate, WorstCase
     from .checking import Checked, CheckedRule, Finding, check
     from .craft import Craft, MassProperties, MountedTank
+    from .engines import Engine
     from .files import to_csv, to_mat, to_parquet
     from .fitting import TransferFunction, fit
     from .fmu import Fmu, FmuError, FmuWarning, Quantity, Value, fmu_path
@@ -56,6 +57,7 @@ _MODULES = {
     "certificate": ("Certificate", "WorstCase"),
     "checking": ("Checked", "CheckedRule", "Finding", "check"),
     "craft": ("Craft", "MassProperties", "MountedTank"),
+    "engines": ("Engine",),
     "files": ("to_csv", "to_mat", "to_parquet"),
     "fitting": ("TransferFunction", "fit"),
     "fmu": ("Fmu", "FmuError", "FmuWarning", "Quantity", "Value", "fmu_path"),
@@ -89,6 +91,7 @@ __all__ = [
     "Checked",
     "CheckedRule",
     "Craft",
+    "Engine",
     "Estimated",
     "Finding",
     "Fmu",

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import native
 from .arguments import caller, floats, vector
+from .engines import Engine, pulse_history, resultant
 from .fmu import Fmu, FmuError, FmuWarning, Parameters, Quantity
 from .linearization import LinearModel, linearize
 from .loop import Loop
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from .review import Review
+    from .run import Run
     from .uncertainty import UncertainModel
     from .viewing import View
 
@@ -242,7 +244,7 @@ class Craft:
     tanks : mapping of MountedTank
         Up to four tanks by name. Their order gives the numbers of the FMU's tanks.
     thrust : float or sequence of float, shape (3,)
-        Force at O, body axes, N; a number is along z.
+        Force at O, body axes, N; a number is along z. For engines at other places see ``engines``.
     wheels : sequence of float, shape (3,)
         Angular momentum of the wheels relative to the body, body axes, N·m·s.
     gravity : float, optional
@@ -250,6 +252,9 @@ class Craft:
         thrust over mass at the fill.
     model : str or Path
         Name or file of the FMU, as for `simulate`.
+    engines : mapping of Engine
+        Engines by name. Those that burn act with ``thrust``; O of the FMU then lies on the line of
+        action of their resultant. A torque about this line, of engines that are canted, is left.
 
     Raises
     ------
@@ -279,6 +284,7 @@ class Craft:
     wheels: Sequence[float] = (0.0, 0.0, 0.0)
     gravity: float | None = None
     model: str | Path = "Spacecraft"
+    engines: Mapping[str, Engine] = field(default_factory=dict)
     _known: dict[Any, Any] = field(default_factory=dict, init=False)
     _said: list[str] = field(default_factory=list, init=False)
 
@@ -294,7 +300,16 @@ class Craft:
                 vector(getattr(self, name), 3, name)
             except FmuError as error:
                 problems.append(str(error))
-        for check in (self._inertia, self._force):
+        if not isinstance(self.engines, Mapping):
+            problems.append(f"engines must be Engine by name, not {self.engines!r}")
+        for name, engine in self.engines.items() if not problems else ():
+            wrong = (
+                engine.problems()
+                if isinstance(engine, Engine)
+                else [f"is not an Engine: {engine!r}"]
+            )
+            problems += [f"engine {name}: {problem}" for problem in wrong]
+        for check in (self._inertia, self._force) if not problems else (self._inertia,):
             try:
                 check()
             except FmuError as error:
@@ -333,10 +348,14 @@ class Craft:
             )
         return J
 
+    def _resultant(self) -> tuple[Vector, Vector, Vector]:
+        """Return force, a point on its line of action from O, and the torque left there."""
+        along_z = isinstance(self.thrust, int | float | np.number)
+        given = [0.0, 0.0, self.thrust] if along_z else self.thrust
+        return resultant(vector(given, 3, "thrust"), self.engines)
+
     def _force(self) -> Vector:
-        if isinstance(self.thrust, int | float | np.number):
-            return vector([0.0, 0.0, self.thrust], 3, "thrust")
-        return vector(self.thrust, 3, "thrust")
+        return self._resultant()[0]
 
     def fills(self, fill: Fill) -> dict[str, Any]:
         """Return the fill of each tank by name.
@@ -739,20 +758,22 @@ class Craft:
             raise FmuError("detach is for sloshing liquid in tanks that do not drain")
         if rigid and mass_flow is not None:
             raise FmuError("a tank that drains has sloshing liquid: rigid is for constant fills")
-        r, J, F = vector(self.center_of_mass, 3, ""), self._inertia(), self._force()
+        F, action, torque = self._resultant()
+        r, J = vector(self.center_of_mass, 3, "") - action, self._inertia()
         found: dict[str, Quantity] = {"craft.mass": float(self.mass), "tanks": len(self.tanks)}
         found |= {f"craft.r[{i + 1}]": float(x) for i, x in enumerate(r)}
         pairs = [(i, j) for i in range(3) for j in range(i, 3)]
         found |= {f"craft.J{'xyz'[i]}{'xyz'[j]}": float(J[i, j]) for i, j in pairs}
         found |= {f"force[{i + 1}]": float(x) for i, x in enumerate(F)}
+        found |= {f"torque[{i + 1}]": float(x) for i, x in enumerate(torque) if torque.any()}
         found |= {f"h_wheels[{i + 1}]": float(x) for i, x in enumerate(self.wheels)}
         tanks = self.tank_at(fill)
         for number, (name, of) in enumerate(self.tanks.items(), 1):
-            prefix = f"tank[{number}]"
+            prefix, place = f"tank[{number}]", vector(of.position, 3, "") - action
             if name in tanks:
                 whole = rigid or not tanks[name].all["modes"]  # a full tank has no surface
                 found |= tanks[name].parameters(
-                    "Spacecraft", number, position=of.position, rigid=whole
+                    "Spacecraft", number, position=place.tolist(), rigid=whole
                 )
             else:
                 empty = dict.fromkeys((f"{prefix}.{key}" for key in ("m_0", "H_0", "I_0")), 0.0)
@@ -1187,6 +1208,161 @@ class Craft:
         model = uncertain(point.parameters, named, outputs=outputs, model=point.model, **options)
         return replace(model, tanks=tuple(order))
 
+    def simulate(
+        self,
+        fill: Fill,
+        inputs: "pd.DataFrame | None" = None,
+        stop: float | None = None,
+        step: float | None = None,
+        outputs: Sequence[str] | str | None = None,
+        *,
+        parameters: Parameters | None = None,
+        **options: Any,
+    ) -> "Run":
+        """Return a simulation of the trimmed craft from a fill on; see `hubslosh.simulate`.
+
+        Parameters
+        ----------
+        fill : fill, mapping, or sequence of fills
+            Fill of the tanks, as for `fills`.
+        inputs : DataFrame, optional
+            Histories of inputs with the column ``time``, as for `hubslosh.simulate`; they replace
+            thrust, torque and wheels of the craft.
+        stop : float, optional
+            End of the simulation, s.
+        step : float, optional
+            Time between rows, s.
+        outputs : str or sequence of str, optional
+            Outputs to record.
+        parameters : mapping, optional
+            Further parameters, see `parameters`.
+        **options
+            ``start``, ``tolerance`` and ``hold``, as for `hubslosh.simulate`.
+
+        Returns
+        -------
+        Run
+            Time histories, SI units.
+
+        Raises
+        ------
+        FmuError
+            If an argument is wrong, or the FMU stops with an error.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> sphere = {"density": 1010, "shape": {"sphere": {"radius": 0.4}}}
+        >>> tanks = {"main": hubslosh.MountedTank(sphere, (0, 0, 0.2))}
+        >>> craft = hubslosh.Craft(900, [400, 380, 300], tanks=tanks, thrust=50)
+        >>> run = craft.simulate("60%", stop=1, parameters={"init.omega[1]": 0.01})
+        >>> float(run["q[1]"].iloc[-1].round(6))
+        0.999988
+        """
+        from .simulation import simulate
+
+        mine, replaced = (
+            self.parameters(fill, parameters=parameters),
+            getattr(inputs, "columns", ()),
+        )
+        given = {n: x for n, x in mine.items() if n not in replaced or n in (parameters or {})}
+        return simulate(self.model, given, inputs, stop, step, outputs, **options)
+
+    def pulses(self, fill: Fill, firing: Mapping[str, Any], stop: float) -> "pd.DataFrame":
+        """Return the history of force and torque of engines that fire in pulses.
+
+        Pulses have any length, within a cycle of a controller too: a row stands at each edge. Use
+        it with ``hold=True`` from the trimmed craft on, as `simulate` does.
+
+        Parameters
+        ----------
+        fill : fill, mapping, or sequence of fills
+            Fill of the tanks, as for `fills`.
+        firing : mapping
+            Pulses by engine: (start, end) of each, s, of any order, without overlap. Engines that
+            are not named burn throughout or not at all, as at the operating point.
+        stop : float
+            End of the history, s.
+
+        Returns
+        -------
+        DataFrame
+            Columns ``time`` (s), ``force[1]`` to ``force[3]`` (N) and ``torque[1]`` to
+            ``torque[3]`` (N·m), body axes.
+
+        Raises
+        ------
+        FmuError
+            If a fill, an engine or a pulse is wrong.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> roll = hubslosh.Engine((0.5, 0, 0), (0, 1, 0), 22, burns=False)
+        >>> craft = hubslosh.Craft(900, [400, 380, 300], engines={"roll": roll})
+        >>> table = craft.pulses(0, {"roll": [(0.25, 0.27)]}, stop=1)
+        >>> table[["time", "torque[3]"]].values.tolist()
+        [[0.0, 0.0], [0.25, 11.0], [0.27, 0.0], [1.0, 0.0]]
+        >>> run = craft.simulate(0, table, stop=1, hold=True)
+        >>> round(float(run["omega[3]"].iloc[-1]), 9)
+        0.000733333
+        """
+        shift = self.trim(fill).shift
+        F, action, torque = self._resultant()
+        # trimming moves the engines that burn together with O
+        wrenches = {
+            name: engine.wrench(action if engine.burns else action + shift)
+            for name, engine in self.engines.items()
+        }
+        on = [name for name, engine in self.engines.items() if engine.burns]
+        return pulse_history(np.concatenate([F, torque]), wrenches, on, firing, stop)
+
+    def export(
+        self, folder: str | Path, fill: Fill, *, parameters: Parameters | None = None
+    ) -> dict[str, Path]:
+        """Write the trimmed craft at a fill, at rest, as files for other tools.
+
+        ``craft.fmu`` has the binary of the craft's model and variables for its tanks and modes
+        only; it starts with the craft's values, so that a host needs to set nothing. ``craft.ssv``
+        has these values, ``craft.ssp`` both as a system (SSP 1.0), ``craft.mat`` the linear model
+        from ``torque`` to ``q`` and ``omega`` with parameters and inputs, and
+        ``craft_simulink.m`` builds a model in Simulink from them.
+
+        Parameters
+        ----------
+        folder : str or Path
+            Folder for the files, which is made; files with these names are replaced.
+        fill : fill, mapping, or sequence of fills
+            Fill of the tanks, as for `fills`.
+        parameters : mapping, optional
+            Further parameters, see `parameters`.
+
+        Returns
+        -------
+        dict of Path
+            Paths of the files by kind: "fmu", "ssv", "ssp", "mat" and "script".
+
+        Raises
+        ------
+        FmuError
+            If a fill or a parameter is wrong, or a file cannot be written.
+
+        Examples
+        --------
+        >>> import hubslosh
+        >>> sphere = {"density": 1010, "shape": {"sphere": {"radius": 0.4}}}
+        >>> tanks = {"main": hubslosh.MountedTank(sphere, (0, 0, 0.2))}
+        >>> craft = hubslosh.Craft(900, [400, 380, 300], tanks=tanks, thrust=50)
+        >>> files = craft.export("for_others", "60%")
+        >>> hubslosh.simulate(files["fmu"], stop=1).shape
+        (101, 34)
+        """
+        from .export import export
+
+        given = self.parameters(fill, parameters=parameters)
+        linear = self.linearize(fill, parameters=parameters)
+        return export(folder, self.model, given, linear)
+
     def columns(self, fill: Fill) -> list[str]:
         """Return the names of the variables by which `view` draws craft and liquid.
 
@@ -1271,7 +1447,9 @@ class Craft:
         lines = [
             f"Craft of {self.mass:g} kg dry, centre of mass {_row(self.center_of_mass)} m",
             f"inertia Jxx, Jyy, Jzz {_row(np.diag(J))}, {products} kg·m²",
-            f"thrust {_row(F)} N" + (f", wheels {_row(h)} N·m·s" if h.any() else ""),
+            f"thrust {_row(F)} N"
+            + (f" by {', '.join(self.engines)}" if self.engines else "")
+            + (f", wheels {_row(h)} N·m·s" if h.any() else ""),
         ]
         lines += [
             f"tank {number} {name}: {tank.describe()}"

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail, ensure};
-use host::description::{ModelDescription, Value};
-use host::part::Limit;
+use host::description::ModelDescription;
+use host::part::{Limit, start_values};
 use pack::platforms::{self, PLATFORMS, Platform};
 use pack::{Fmi, Model, sdist, wheel};
 
@@ -155,17 +155,7 @@ impl PackArgs {
         if let Some(path) = &self.parameters {
             let description = || ModelDescription::from_fmu(fmu);
             let settings = set_file::read(path, &description)?;
-            let description = description()?;
-            for (name, text) in settings {
-                let variable = description.variable(&name)?;
-                let value = match description.value(variable, &text)? {
-                    Value::Real(x) => format!("{x:?}"),
-                    Value::Integer(n) => n.to_string(),
-                    Value::Boolean(b) => b.to_string(),
-                    Value::String(text) => text,
-                };
-                starts.insert(name, value);
-            }
+            starts = start_values(&description()?, settings)?;
         }
         pack::part::pack(fmu, limits, &starts, fmu)
     }

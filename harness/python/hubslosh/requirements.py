@@ -1,0 +1,90 @@
+"""Requirements of a design review: least margins, judged over its points."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from .fmu import FmuError, did_you_mean
+from .short import ShortTable
+
+UNITS = {"modulus_margin": "", "phase_margin": "°", "gain_margin": " dB", "delay_margin": " s"}
+"""Margins that may be required, and their units. The gain margin is the smaller of up and down."""
+
+POINTS = ("nominal", "all")
+"""Points for which a requirement may hold: those without uncertainty, or all of them."""
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """A least margin of the nominal points or of all points."""
+
+    margin: str
+    points: str
+    limit: float
+
+    @property
+    def unit(self) -> str:
+        """Unit as it follows a number."""
+        return UNITS[self.margin]
+
+    def __str__(self) -> str:
+        """Return the requirement in words."""
+        what = self.margin.replace("_", " ")
+        return f"{what} of {self.points} points at least {self.limit:g}{self.unit}"
+
+
+def requirements_of(given: Any) -> tuple[Requirement, ...]:
+    """Return requirements from limits by margin: numbers, or tables of `POINTS`."""
+    if given is None:
+        return ()
+    example = '{"phase_margin": 30, "gain_margin": {"nominal": 6, "all": 3}}'
+    if not isinstance(given, Mapping):
+        raise FmuError(f"requirements must be limits by margin, such as {example}, not {given!r}")
+    found, problems = [], []
+    for margin, limits in given.items():
+        if margin not in UNITS:
+            hint = did_you_mean(str(margin), UNITS)
+            problems.append(f"requirements has {margin} (allowed: {', '.join(UNITS)}){hint}")
+            continue
+        for points, limit in (limits if isinstance(limits, Mapping) else {"all": limits}).items():
+            number = isinstance(limit, int | float | np.number) and not isinstance(limit, bool)
+            if points not in POINTS:
+                problems.append(f"requirements.{margin} has {points} (allowed: nominal, all)")
+            elif not (number and 0 < limit < np.inf):
+                problems.append(
+                    f"requirements.{margin} must be a number above 0, or a table of them, not "
+                    f"{limit!r}"
+                )
+            else:
+                found.append(Requirement(margin, points, float(limit)))
+    if problems:
+        raise FmuError("; ".join(problems))
+    return tuple(found)
+
+
+def judged(requirements: tuple[Requirement, ...], points: pd.DataFrame) -> ShortTable:
+    """Return a row for each requirement, those that fail first; see `Review.requirements`."""
+    margins = points[["modulus_margin", "delay_margin"]].copy()
+    margins["phase_margin"] = points["phase_margin"].abs()
+    margins["gain_margin"] = points[["gain_up", "gain_down"]].abs().min(axis=1)
+    margins = margins.where(points["stable"], -np.inf)  # an unstable point has no margin
+    rows = []
+    for one in requirements:
+        among = margins[points["kind"] == "nominal"] if one.points == "nominal" else margins
+        values = among[one.margin]
+        failing = int((values < one.limit).sum())
+        rows.append(
+            {
+                "requirement": str(one),
+                "passed": failing == 0,
+                "least": float(values.min()),
+                "fill": int(points.loc[values.idxmin(), "fill"]),
+                "failing": failing,
+                "points": len(values),
+            }
+        )
+    columns = ["requirement", "passed", "least", "fill", "failing", "points"]
+    return ShortTable(sorted(rows, key=lambda row: row["passed"]), columns=columns)

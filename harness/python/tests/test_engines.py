@@ -1,0 +1,117 @@
+"""Engines at a place: the operating point of their resultant, and pulses against the impulse."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import hubslosh
+from hubslosh import Craft, Engine, FmuError, MountedTank
+
+SPHERE = {"density": 1440.0, "shape": {"sphere": {"radius": 0.5}}}
+GAINS = np.hstack([80 * np.eye(3), 400 * np.eye(3)])
+INERTIA = np.array([[900.0, -20.0, 5.0], [-20.0, 850.0, 0.0], [5.0, 0.0, 700.0]])
+
+
+@pytest.fixture
+def craft(fmu: Path) -> Craft:
+    """Return a craft with a tank and a thrust at O that misses its centre of mass."""
+    tanks = {"ox": MountedTank(SPHERE, (0.1, 0.5, -0.2), modes=1, nu=3e-7)}
+    return Craft(1000.0, INERTIA, (0.1, 0.02, 1.0), tanks, 400.0, gravity=0.3,
+                 model=fmu.with_name("Spacecraft.fmu"))  # fmt: skip
+
+
+def test_an_engine_along_the_line_of_action_is_the_thrust(craft: Craft) -> None:
+    """At O itself, further along its line, split in two with one resultant: the same craft."""
+    plain = hubslosh.margins(craft.loop(GAINS, 0.05, "50%")).crossings
+    for engines in (
+        {"main": Engine((0, 0, 0), (0, 0, 2), 400)},
+        {"main": Engine((0, 0, -1.5), (0, 0, 1), 400)},
+        {
+            "left": Engine((0.3, 0, 0), (0, 0, 1), 200),
+            "right": Engine((-0.3, 0, 0), (0, 0, 1), 200),
+        },
+    ):
+        same = replace(craft, thrust=0.0, engines=engines)
+        assert same.parameters("50%") == pytest.approx(craft.parameters("50%"), abs=1e-12)
+        assert same.trim("50%").shift == pytest.approx(craft.trim("50%").shift, abs=1e-12)
+        found = hubslosh.margins(same.loop(GAINS, 0.05, "50%")).crossings
+        assert found["phase_margin"].to_numpy() == pytest.approx(
+            plain["phase_margin"].to_numpy(), rel=1e-9, nan_ok=True
+        )
+    # beside O it is the same craft with all else moved the other way
+    beside = replace(craft, thrust=0.0, engines={"main": Engine((0.2, -0.1, 0), (0, 0, 1), 400)})
+    moved = replace(
+        craft, center_of_mass=(-0.1, 0.12, 1.0),
+        tanks={"ox": replace(craft.tanks["ox"], position=(-0.1, 0.6, -0.2))},
+    )  # fmt: skip
+    assert beside.parameters("50%") == pytest.approx(moved.parameters("50%"), abs=1e-12)
+    assert beside.trim("50%").untrimmed_acceleration == pytest.approx(
+        moved.trim("50%").untrimmed_acceleration, rel=1e-9
+    )
+
+
+def test_canted_engines_leave_a_torque_about_their_line_of_action(craft: Craft) -> None:
+    """Four engines canted by 10° turn the craft about z, by the moment over the inertia."""
+    cant, r = np.radians(10), 0.6
+    engines = {}
+    for k in range(4):
+        c, s = np.cos(k * np.pi / 2), np.sin(k * np.pi / 2)
+        direction = (-s * np.sin(cant), c * np.sin(cant), np.cos(cant))
+        engines[f"e{k}"] = Engine((r * c, r * s, 0), direction, 100)
+    rigid = replace(craft, tanks={}, thrust=0.0, engines=engines)
+    point = rigid.trim(0)
+    moment = 4 * 100 * np.sin(cant) * r
+    expected = np.linalg.solve(INERTIA, [0, 0, moment])
+    assert point.angular_acceleration == pytest.approx(expected, rel=1e-9)
+    assert point.parameters["force[3]"] == pytest.approx(400 * np.cos(cant), rel=1e-12)
+
+
+def test_pulses_give_their_impulse_whatever_the_cycle(craft: Craft) -> None:
+    """A rigid craft: angular momentum about its centre, and linear momentum, by r × F dt."""
+    engines = {
+        "a": Engine((0.7, 0.2, 0.4), (0, 0.3, 1), 22.0, burns=False),
+        "b": Engine((-0.5, 0.6, 0.1), (1, 0, 0), 10.0, burns=False),
+    }
+    free = replace(craft, tanks={}, thrust=0.0, engines=engines)
+    firing = {"a": [(0.05, 0.062), (0.015, 0.02)], "b": [(0.0171, 0.0533)]}
+    table = free.pulses(0, firing, stop=0.5)
+    run = free.simulate(0, table, stop=0.5, hold=True, outputs=["omega", "velocity"])
+    burnt = {"a": 0.012 + 0.005, "b": 0.0533 - 0.0171}
+    total = sum(t * engines[n].wrench(np.array(free.center_of_mass)) for n, t in burnt.items())
+    omega = run[[f"omega[{i}]" for i in (1, 2, 3)]].iloc[-1].to_numpy()
+    # products of small rates count in the eighth digit
+    assert omega == pytest.approx(np.linalg.solve(INERTIA, total[3:]), rel=1e-3)
+    both = table[["time", "force[1]", "force[3]"]].to_numpy()
+    along = 22 / np.sqrt(1.09)
+    wanted = [[0, 0, 0], [0.015, 0, along], [0.0171, 10, along], [0.02, 10, 0], [0.05, 10, along],
+              [0.0533, 0, along], [0.062, 0, 0], [0.5, 0, 0]]  # fmt: skip
+    assert both == pytest.approx(np.array(wanted), abs=1e-12)
+    # a main engine that is named burns in its pulses only
+    main = replace(free, engines={"main": Engine((0.3, 0, 0), (0, 0, 1), 400)})
+    off = main.pulses(0, {"main": [(0, 0.25)]}, stop=0.5)
+    assert off["force[3]"].tolist() == [400.0, 0.0, 0.0]
+    assert off[[f"torque[{i}]" for i in (1, 2, 3)]].abs().to_numpy().max() < 1e-10
+
+
+def test_wrong_engines_and_pulses_are_named(craft: Craft) -> None:
+    """All of them at once, with what is allowed."""
+    with pytest.raises(FmuError, match=r"engine a: direction must not be zero; engine a: thrust"):
+        replace(craft, engines={"a": Engine((0, 0, 0), (0, 0, 0), -1)})
+    with pytest.raises(FmuError, match="engine a: is not an Engine: 5"):
+        replace(craft, engines={"a": 5})
+    with pytest.raises(FmuError, match="engines must be Engine by name"):
+        replace(craft, engines=[Engine((0, 0, 0), (0, 0, 1), 1)])
+    with_roll = replace(craft, engines={"roll": Engine((1, 0, 0), (0, 1, 0), 5, burns=False)})
+    for firing, text in {
+        "roll": "firing must be pulses by engine",
+        ("rol", ((0, 1),)): "did you mean roll",
+        ("roll", (0, 1, 2)): "pulses must be",
+        ("roll", ((0.2, 0.1),)): "must end after it starts",
+        ("roll", ((0.1, 0.3), (0.2, 0.4))): "without overlap",
+        ("roll", ((0.1, 3),)): "from 0 to stop = 1 s",
+    }.items():
+        given = dict([firing]) if isinstance(firing, tuple) else firing
+        with pytest.raises(FmuError, match=text):
+            with_roll.pulses("50%", given, stop=1)
