@@ -178,7 +178,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         if let Some(extent) = &extent {
             self.parameters = extent.starts().to_vec();
             for (place, start) in extent.inputs() {
-                self.put(&M::table().scalars[*place], Value::Real(*start));
+                self.store(&M::table().scalars[*place], Value::Real(*start));
             }
         }
         self.extent = extent;

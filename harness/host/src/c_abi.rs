@@ -423,7 +423,7 @@ mod tests {
             assert!(explain_needs(&error).contains("needs a Python host"), "{symbol}");
         }
         for error in ["model.so: undefined symbol: cos", "model.so: file too short", "PyExc"] {
-            assert_eq!(needs(error), "", "{error}");
+            assert_eq!(explain_needs(error), "", "{error}");
         }
     }
 }
