@@ -5,7 +5,7 @@
 needs Rust, dist/HubSlosh.fmu (``cargo run --release -- pack``), Python 3.11 or newer and, for
 the instruction counts, valgrind; the first run makes a virtual environment in the target
 directory and needs the network. It takes some ten minutes, most of them SciPy's. Better leave the
-machine alone meanwhile: times are compared with each other.
+machine alone meanwhile: times are compared with each other. Then it runs work_precision_six.py.
 
 All methods solve the same motion: an exponential sweep of 2700 s at 0.1 N·m and 10 cm fill, with
 the torque linear between knots 20 ms apart. They return the rate at every knot. The FMU has the
@@ -288,6 +288,11 @@ def main() -> None:
     ]
     (PAGES / "work_precision.md").write_text("\n".join(page))
     print(f"wrote {PAGES / 'work_precision.md'} and .svg")
+    sys.exit(
+        subprocess.run(
+            [sys.executable, Path(__file__).with_name("work_precision_six.py")]
+        ).returncode
+    )
 
 
 if __name__ == "__main__":
