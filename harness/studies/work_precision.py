@@ -257,7 +257,7 @@ def main() -> None:
         f"**At equal error the best other integrator tried needs {min(factors):.0f} to "
         f"{max(factors):.0f} times its time,**",
         "because the FMU's power series take long steps and dry friction is located as an event.",
-        "That is the bench; of a craft in [six axes](#six-axes), without friction, heyoka is as fast.",
+        "That is the bench; in [six axes](#six-axes), without friction, heyoka is as fast.",
         "",
         *(__doc__ or "").split("\n\n")[3].splitlines(),
         "",
