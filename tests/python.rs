@@ -1,7 +1,7 @@
 //! The FMU in Python's hands: runs the tests of `harness/python`, the studies' short forms and the examples with pytest,
 //! in a virtual environment of their own in the target directory.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use pack::{Fmi, MODELS};
@@ -19,6 +19,8 @@ fn pytest(arguments: &mut Command, sentence: &str) {
         arguments
             .args(["--quiet", "-p", "no:cacheprovider"])
             .args([Path::new("-c"), &settings])
+            // Other tests run on the other processors, where threads of NumPy's would only wait for each other.
+            .envs(["OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"].map(|name| (name, "1")))
             // the source tree stays as it is, and no process compiles a package again
             .env("PYTHONPYCACHEPREFIX", target().join("python").join("bytecode")),
         sentence,
@@ -30,9 +32,8 @@ fn pytest(arguments: &mut Command, sentence: &str) {
     println!("{last}");
 }
 
-/// Tests of `harness/python` that need no wheel. They run in parallel with the others, which would otherwise
-/// be one long test.
-const BESIDE: [&str; 2] = ["test_liquid.py", "test_model_exchange.py"];
+/// Tests of `harness/python` that need no wheel and take as long as the others: the two halves run in parallel.
+const BESIDE: [&str; 3] = ["test_liquid.py", "test_model_exchange.py", "test_review.py"];
 
 /// Returns the command for pytest with the options of the package's tests: FMU and command.
 fn of_the_package() -> Command {
@@ -44,37 +45,40 @@ fn of_the_package() -> Command {
     command
 }
 
-#[test]
-fn fmpy_drives_the_fmu_as_the_harness_does() {
+/// Packs a wheel with all FMUs.
+fn wheel() -> PathBuf {
     let fmus = Fmi::ALL
         .map(|fmi| MODELS.each_ref().map(|model| pack::packed_version_for_tests(model, fmi)));
-    let wheel = pack::wheel::for_tests(fmus.as_flattened());
+    pack::wheel::for_tests(fmus.as_flattened())
+}
+
+#[test]
+fn fmpy_drives_the_fmu_as_the_harness_does() {
     let tests = pack::root().join("harness/python");
     let mut command = of_the_package();
-    command.args([Path::new("--wheel"), &wheel]).arg(&tests);
+    command.args([Path::new("--wheel"), &wheel()]).arg(&tests);
     for file in BESIDE {
         command.arg("--ignore").arg(tests.join("tests").join(file));
     }
     pytest(&mut command, "the tests in Python failed");
 }
 
-/// Compares 22 sweeps of 45 minutes with each of six slosh models.
+/// Runs the tests of the package that take seconds each: type checkers, the code of pages, docstrings and
+/// notebooks with the wheel, 22 sweeps of 45 minutes with each of six slosh models.
 #[test]
-#[ignore = "minutes: cargo test --release --test tests -- --ignored all_sweeps_of_the_thesis"]
-fn fmpy_drives_all_sweeps_of_the_thesis() {
-    let file = pack::root().join("harness/python/tests/test_same_as_harness.py");
-    let test = format!(
-        "{}::test_a_whole_sweep_of_the_thesis_is_the_same_by_fmpy_and_by_the_harness",
-        file.display()
-    );
+#[ignore = "minutes: .ci/long-tests"]
+fn long_tests_of_the_package_pass() {
     pytest(
-        of_the_package().args(["--all-sweeps", &test]),
-        "a sweep driven by fmpy differs from the harness's",
+        of_the_package()
+            .args([Path::new("--wheel"), &wheel()])
+            .arg("--long")
+            .arg(pack::root().join("harness/python")),
+        "the long tests in Python failed",
     );
 }
 
 #[test]
-fn the_package_finds_modes_of_liquids_and_drives_model_exchange() {
+fn the_package_finds_modes_of_liquids_drives_model_exchange_and_reviews_craft() {
     let tests = pack::root().join("harness/python/tests");
     pytest(
         of_the_package().args(BESIDE.map(|file| tests.join(file))),
@@ -93,10 +97,10 @@ fn the_studies_compute_the_numbers_of_the_book() {
 /// Runs the long forms of the studies' tests; [`the_studies_compute_the_numbers_of_the_book`] runs the short
 /// ones.
 #[test]
-#[ignore = "half a minute: cargo test --release --test tests -- --ignored long_forms_of_the_studies"]
+#[ignore = "half a minute: .ci/long-tests"]
 fn long_forms_of_the_studies_compute_the_numbers_of_the_book() {
     let studies = pack::root().join("harness/studies");
-    pytest(of_the_package().arg("--whole").arg(studies), "a study failed");
+    pytest(of_the_package().arg("--long").arg(studies), "a study failed");
 }
 
 #[test]

@@ -25,18 +25,18 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     exe = "hubslosh.exe" if os.name == "nt" else "hubslosh"
     parser.addoption("--fmu", type=Path, default=ROOT / "dist" / "HubSlosh.fmu")
     parser.addoption("--hubslosh", type=Path, default=TARGET / "release" / exe)
-    parser.addoption("--whole", action="store_true", help="the tests of minutes")
+    parser.addoption("--long", action="store_true", help="only the tests that .ci/long-tests runs")
 
 
 def pytest_configure(config: pytest.Config) -> None:
     """Declare the marker of tests that take minutes."""
-    config.addinivalue_line("markers", "whole: takes minutes; --whole runs these tests alone")
+    config.addinivalue_line("markers", "long: takes minutes; --long (.ci/long-tests) runs it")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Keep either the short forms or the whole ones."""
-    whole = config.getoption("--whole")
-    items[:] = [item for item in items if (item.get_closest_marker("whole") is not None) == whole]
+    """Keep either the long tests or the short forms."""
+    long = config.getoption("--long")
+    items[:] = [item for item in items if (item.get_closest_marker("long") is not None) == long]
 
 
 @pytest.fixture(scope="session")

@@ -128,7 +128,7 @@ def test_tilt_slows_slosh_along_the_slope() -> None:
     assert slowed(0.5) == pytest.approx(float(shallow[1]), abs=0.05)
 
 
-@pytest.mark.whole
+@pytest.mark.long
 def test_tilt_slows_slosh_of_deeper_liquid() -> None:
     """The two other changes of the page, to their printed digits."""
     deeper = re.search(r"and −(\d+) to −(\d+) % in deeper liquid", " ".join(lines("liquid.md")))

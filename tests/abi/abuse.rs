@@ -3,8 +3,9 @@
 //!
 //! The hosts are C programs with the FMI's official headers, linked with the binary that users
 //! get, each compiled for FMI 2.0 and for 3.0 (`fmi.h`). What is tried with many values is divided between the versions,
-//! whose calls end in the same instance; `in_both_versions` tries everything with each, by hand. `.ci/valgrind` runs them under valgrind (it sets `HUBSLOSH_VALGRIND`), `.ci/fuzz` looks
-//! for bad bytes for as long as one likes.
+//! whose calls end in the same instance; `in_both_versions` tries everything with each, by hand. `.ci/valgrind` runs them
+//! under valgrind (it sets `HUBSLOSH_VALGRIND`). Random inputs are few here: `.ci/fuzz` gives each FMU a thousand and more of
+//! calls, clocks, saved states and values.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -585,8 +586,10 @@ fn no_allowed_value_of_hubslosh_raises_a_floating_point_exception() {
     }
 }
 
+/// In `cargo test` the six-axis equations are under traps in SloshTank.
 #[cfg(target_os = "linux")]
 #[test]
+#[ignore = "half a minute: .ci/long-tests"]
 fn no_allowed_value_of_spacecraft_raises_a_floating_point_exception() {
     for fmi in VERSIONS {
         no_allowed_value_traps("Spacecraft", fmi, PART);
@@ -801,7 +804,7 @@ fn noise(rng: &mut fastrand::Rng, longest: usize) -> Vec<u8> {
 
 fn states<M: runtime::Model>() {
     let mut rng = fastrand::Rng::with_seed(1);
-    for _ in 0..1000 {
+    for _ in 0..200 {
         hubslosh_fuzz::states::run::<M>(&noise(&mut rng, 60));
     }
 }
@@ -822,10 +825,10 @@ fn values<M: runtime::Model>(runs: usize) {
 
 #[test]
 fn any_values_give_finite_results_or_an_error() {
-    values::<HubSlosh::HubSlosh>(1000);
+    values::<HubSlosh::HubSlosh>(500);
     // Stiff ones use up the integrator's steps: half a second each.
-    values::<Spacecraft::Model>(50);
-    values::<SloshTank::Model>(50);
+    values::<Spacecraft::Model>(25);
+    values::<SloshTank::Model>(25);
 }
 
 /// Runs sequences of calls by hosts whose clocks differ (`fmu/fuzz/src/clocks.rs`).
@@ -843,7 +846,7 @@ fn clocks(sequences: [usize; 3]) {
 
 #[test]
 fn hosts_with_other_clocks_get_the_same_outputs() {
-    clocks([300, 30, 60]);
+    clocks([60, 6, 12]);
 }
 
 #[test]

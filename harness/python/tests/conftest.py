@@ -33,20 +33,23 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--fmu", type=Path, default=ROOT / "dist" / "HubSlosh.fmu")
     wheels = sorted((ROOT / "dist").glob("hubslosh-*.whl"))
     parser.addoption("--wheel", type=Path, default=wheels[-1] if wheels else ROOT / "dist" / "none")
-    parser.addoption("--all-sweeps", action="store_true")
     parser.addoption("--hubslosh", type=Path, default=TARGET / "release" / exe)
     parser.addoption("--octave", action="store_true", help="also the tests that need Octave")
+    parser.addoption("--long", action="store_true", help="only the tests that .ci/long-tests runs")
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Declare the marker of tests that need Octave, which not every machine has."""
+    """Declare the markers: Octave is not on every machine, and `cargo test` is for minutes."""
     config.addinivalue_line("markers", "octave: needs Octave; --octave (.ci/octave) runs it")
+    config.addinivalue_line("markers", "long: takes seconds; --long (.ci/long-tests) runs it")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out what needs Octave."""
+    """Leave out what needs Octave, and keep either the long tests or the others."""
     if not config.getoption("--octave"):
         items[:] = [item for item in items if item.get_closest_marker("octave") is None]
+    long = config.getoption("--long")
+    items[:] = [item for item in items if (item.get_closest_marker("long") is not None) == long]
 
 
 def option(request: pytest.FixtureRequest, name: str) -> Path:

@@ -13,6 +13,7 @@ import environment
 REQUIREMENTS = sorted(Path(environment.__file__).parent.glob("requirements*.in"))
 
 
+@pytest.mark.long
 def test_simultaneous_requests_for_one_environment_get_a_working_one(tmp_path: Path) -> None:
     """One process makes it, the others wait."""
     requirements = tmp_path / "requirements.txt"
@@ -29,6 +30,7 @@ def test_simultaneous_requests_for_one_environment_get_a_working_one(tmp_path: P
     subprocess.run([said[0], "-m", "pip", "check"], check=True)
 
 
+@pytest.mark.long
 def test_a_package_without_a_hash_is_refused(tmp_path: Path) -> None:
     """A wheel that is there, and nothing else wrong with it."""
     wheel = tmp_path / "thing-1-py3-none-any.whl"

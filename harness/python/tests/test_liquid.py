@@ -233,7 +233,7 @@ def test_spacecraft_has_the_modes_of_each_direction_and_what_they_turn(
     assert m @ [*z, values["tank[1].H_0"]] == pytest.approx(found.mass * found.center[2], rel=1e-9)
 
 
-@pytest.mark.parametrize("degrees", [10.0, 40.0])
+@pytest.mark.parametrize("degrees", [pytest.param(10.0, marks=pytest.mark.long), 40.0])
 def test_a_tilted_box_is_the_plane_problem_of_its_section(degrees: float) -> None:
     """Modes that do not vary across, by Ritz's method with polynomials on the tilted section."""
     a, depth, t = 0.4, 0.5, np.radians(degrees)
@@ -252,6 +252,7 @@ def test_a_tilted_box_is_the_plane_problem_of_its_section(degrees: float) -> Non
     assert abs(found.modes["direction"][0]) < 0.1
 
 
+@pytest.mark.long
 def test_small_tilts_change_frequencies_by_their_square() -> None:
     """Perturbation theory: the first order is 0 by symmetry, so 8° do four times what 4° do."""
 

@@ -31,6 +31,12 @@ bench's own motions that is below 1e-6 everywhere. A liquid that swings with 5 r
 MODELS = {"frozen": 1, "linear": 2, "planar": 3, "spherical": 4, "liquid": 5}
 
 
+def quickly(chosen: str) -> list:
+    """Return all models; the tests of all but one are long."""
+    long = pytest.mark.long
+    return [name if name == chosen else pytest.param(name, marks=long) for name in MODELS]
+
+
 def tau() -> np.ndarray:
     """Return a torque that changes twice a second, N·m, often less than the bearing holds."""
     levels = np.array([0.1, 0.0, -0.2, 0.004, 0.3, 0.0, 0.0, -0.3])
@@ -95,7 +101,7 @@ def co_simulation(fmu: Path, start: dict[str, float], torque: np.ndarray) -> dic
     return drive(fmu, TIME, torque, start, tolerance=1e-12, hold=True, columns=columns)
 
 
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", quickly("liquid"))
 def test_cvode_finds_the_motion_of_co_simulation_on_the_bench(fmu: Path, model: str) -> None:
     """Every signal to 1e-6 SI, from rest, through some 80 changes between stick and slip."""
     start = {"slosh.model": MODELS[model], "init.slosh_angle": 0.0}
@@ -107,7 +113,7 @@ def test_cvode_finds_the_motion_of_co_simulation_on_the_bench(fmu: Path, model: 
         assert difference(found, expected, name) <= 1e-6, name
 
 
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", quickly("spherical"))
 def test_cvode_finds_the_motion_of_co_simulation_when_it_is_violent(fmu: Path, model: str) -> None:
     """Stick and slip as CVODE's root finder sees them, from jump to jump of the torque."""
     start = start_values(model)

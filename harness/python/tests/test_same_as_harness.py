@@ -84,15 +84,10 @@ def test_a_sweep_of_five_minutes_gives_the_same_rate(
         assert np.abs(ours[name] - theirs[name]).max() <= 1e-12, name
 
 
-def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """Choose one sweep of the thesis, or all 22 with every slosh model."""
-    if "sweep" in metafunc.fixturenames:
-        sweeps = [("spherical", 0.1, 0.1)]
-        if metafunc.config.getoption("--all-sweeps"):
-            sweeps = itertools.product([*MODELS, "liquid"], FILLS, AMPLITUDES)
-        metafunc.parametrize("sweep", list(sweeps), ids=str)
-
-
+@pytest.mark.long
+@pytest.mark.parametrize(
+    "sweep", list(itertools.product([*MODELS, "liquid"], FILLS, AMPLITUDES)), ids=str
+)
 def test_a_whole_sweep_of_the_thesis_is_the_same_by_fmpy_and_by_the_harness(
     fmu: Path, harness: Harness, tmp_path: Path, sweep: tuple[str, float, float]
 ) -> None:

@@ -395,6 +395,7 @@ def killed(folder: str, seed: int) -> None:
     print(stored())
 
 
+@pytest.mark.long
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no fork")
 def test_a_study_killed_20_times_and_edited_once_equals_an_uninterrupted_one(
     tmp_path: Path,

@@ -42,6 +42,7 @@ def check(checkers: Path, name: str, scripts: list[Path], folder: Path) -> tuple
     return done.returncode, done.stdout + done.stderr
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["mypy", "pyright"])
 def test_type_checkers_accept_scripts_of_users(checkers: Path, name: str, tmp_path: Path) -> None:
     """A craft, margins, Monte Carlo, identification, a recording with figures: no complaint."""
@@ -50,6 +51,7 @@ def test_type_checkers_accept_scripts_of_users(checkers: Path, name: str, tmp_pa
     assert code == 0, output
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("script", USERS, ids=[script.stem for script in USERS])
 def test_a_script_of_a_user_runs(script: Path, tmp_path: Path, wheel: Path, request) -> None:
     """With the wheel, in a folder of its own."""
@@ -68,6 +70,7 @@ MISTAKES = {
 """Lines with a mistake, and the word that a type checker names."""
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["mypy", "pyright"])
 def test_type_checkers_find_mistakes_of_users(checkers: Path, name: str, tmp_path: Path) -> None:
     """In every line: no part of the package is Any by mistake."""

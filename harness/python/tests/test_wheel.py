@@ -64,6 +64,7 @@ def test_the_record_has_every_file_and_its_hash(wheel: Path) -> None:
     assert not any("/test_" in name or name.endswith((".svg", ".toml")) for name in examples)
 
 
+@pytest.mark.long
 def test_the_fmus_of_fmi_3_are_found_by_name(installed: Path, tmp_path: Path) -> None:
     """In a folder without the source, as a user has it; the rate has the bits of FMI 2.0."""
     program = """
@@ -101,6 +102,7 @@ def python_in(page: Path) -> list[str]:
     return [textwrap.dedent(block) for block in blocks]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("readme", [ROOT / "README.md", HERE / "README.md"])
 def test_the_code_in_a_readme_runs(installed: Path, tmp_path: Path, readme: Path) -> None:
     """With the wheel alone, in an empty directory."""
@@ -125,6 +127,7 @@ assert not found.failed and found.attempted > 100, found
 """Runs the examples of every docstring; none sees the names of its module."""
 
 
+@pytest.mark.long
 def test_the_examples_in_docstrings_give_what_they_show(
     wheel: Path, tmp_path: Path, request
 ) -> None:
@@ -138,6 +141,7 @@ def run_pages(pages: tuple[str, ...], wheel: Path, folder: Path, request) -> str
     return run_with_wheel(["-c", code], wheel, folder, request)
 
 
+@pytest.mark.long
 def test_the_books_page_for_python_runs(wheel: Path, tmp_path: Path, request) -> None:
     """All its blocks as one program."""
     said = run_pages(("python_howto",), wheel, tmp_path, request)
@@ -146,6 +150,7 @@ def test_the_books_page_for_python_runs(wheel: Path, tmp_path: Path, request) ->
         assert (tmp_path / file).stat().st_size > 1000, file
 
 
+@pytest.mark.long
 def test_the_books_pages_about_a_spacecraft_run(wheel: Path, tmp_path: Path, request) -> None:
     """The worked example, then the three questions."""
     pages = ("spacecraft", "which_damping", "how_many_modes", "is_it_slosh")
@@ -154,6 +159,7 @@ def test_the_books_pages_about_a_spacecraft_run(wheel: Path, tmp_path: Path, req
         assert (tmp_path / file).stat().st_size > 1000, file
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("model", "parameters", "moves"),
     [
@@ -178,6 +184,7 @@ def test_every_fmu_of_the_wheel_runs(
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.long
 def test_a_craft_of_one_or_two_tanks_is_made_uncertain(installed: Path, tmp_path: Path) -> None:
     """By the FMU of the wheel, which is the same for every craft."""
     code = """
@@ -200,6 +207,7 @@ for places in ({"a": (0, 0, 0.2)}, {"a": (0.4, 0, 0.2), "b": (-0.4, 0, 0.2)}):
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.long
 def test_functions_that_need_another_package_name_it(installed: Path, tmp_path: Path) -> None:
     """Plots and control are extras."""
     code = (
@@ -218,6 +226,7 @@ def test_functions_that_need_another_package_name_it(installed: Path, tmp_path: 
     assert "pip install matplotlib" in done.stdout and "pip install control" in done.stdout
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=[path.stem for path in NOTEBOOKS])
 def test_a_notebook_runs(
     wheel: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, path: Path

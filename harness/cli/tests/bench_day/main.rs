@@ -43,6 +43,7 @@ fn number(row: &HashMap<String, String>, name: &str) -> f64 {
 }
 
 #[test]
+#[ignore = "a minute of CPU time: .ci/long-tests"]
 fn a_day_of_logs_gives_the_chapters_and_every_number_is_within_its_interval() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();

@@ -26,12 +26,14 @@ fn is_described(seed: u64, held: &[&str]) {
 
 /// The twin's friction was stated in a wrong minimum, 69 standard deviations off: the sums of squares that were compared were of different noises.
 #[test]
+#[ignore = "ten seconds of CPU time: .ci/long-tests"]
 fn a_gentle_sweep_with_an_encoder_has_its_friction_in_the_intervals() {
     is_described(22, &[]);
 }
 
 /// It was refused for a point of the friction's profile where some combination of the unknowns has no influence.
 #[test]
+#[ignore = "ten seconds of CPU time: .ci/long-tests"]
 fn a_profile_that_cannot_be_followed_to_its_end_refuses_no_recording() {
     is_described(25, &[]);
 }
@@ -46,6 +48,7 @@ fn a_delay_is_not_sure_while_another_torque_between_rows_fits_as_well() {
 
 /// The search ended a standard deviation from the minimum, for that lies at a kink: dry friction stops the hub within the first row.
 #[test]
+#[ignore = "ten seconds of CPU time: .ci/long-tests"]
 fn an_initial_rate_that_friction_stops_at_once_leaves_the_minimum_a_minimum() {
     is_described(40, &[]);
 }
