@@ -285,7 +285,7 @@ fn variable(element: &Element, index: usize, types: &BTreeMap<&str, &Element>) -
     let (kind, typed) = typed.unwrap_or((Type::Real, Element::default()));
     let default = if kind == Type::Real { "continuous" } else { "discrete" };
     let mut read = Common::read(element, (kind, typed), types, default, initials);
-    read.written = element.alone();
+    read.written = element.without_children();
     Variable { index, read }
 }
 

@@ -24,7 +24,6 @@ pub const MACOS: Version = Version(11, 0);
 
 const NAMED: usize = 8;
 
-/// Libraries that are part of glibc.
 const LINUX_LIBRARIES: [&str; 8] = [
     "ld-linux-aarch64.so.1",
     "ld-linux-x86-64.so.2",
@@ -87,14 +86,12 @@ impl fmt::Display for Kind {
     }
 }
 
-/// Properties of a binary that are read without loading it.
 #[derive(Clone, Debug)]
 pub struct Binary {
     pub kind: Kind,
     pub size: usize,
     /// `x86_64` or `arm64`, in the order of the file.
     pub architectures: Vec<&'static str>,
-    /// Names of the libraries that the loader must find.
     pub libraries: Vec<String>,
     pub search_paths: Vec<String>,
     /// Newest version of glibc (Linux) or macOS that the binary needs.

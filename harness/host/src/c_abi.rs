@@ -47,7 +47,6 @@ impl From<c_int> for Status {
 #[derive(Default)]
 struct Sink {
     messages: Mutex<Vec<Message>>,
-    /// Number of messages whose category is NULL.
     uncategorised: AtomicUsize,
 }
 
@@ -73,7 +72,6 @@ pub fn foreign_environments() -> usize {
     FOREIGN.load(Ordering::Relaxed)
 }
 
-/// Counts a call of a callback with a pointer that is not an environment.
 pub(crate) fn count_foreign_environment() {
     FOREIGN.fetch_add(1, Ordering::Relaxed);
 }
@@ -109,7 +107,6 @@ impl Environment {
         std::mem::take(&mut *self.sink.lock())
     }
 
-    /// Returns the number of messages whose category is NULL.
     pub(crate) fn uncategorised(&self) -> usize {
         self.sink.uncategorised.load(Ordering::Relaxed)
     }
@@ -197,7 +194,6 @@ unsafe extern "C" {
     fn hubslosh_signal_handlers() -> u64;
 }
 
-/// A call that failed: the function, its status, and the messages of the FMU.
 #[derive(Clone, Debug)]
 pub struct CallError {
     pub call: &'static str,
@@ -207,7 +203,6 @@ pub struct CallError {
 }
 
 impl CallError {
-    /// Joins the FMU's messages to one line.
     pub fn text(&self) -> String {
         let prefix = format!("{}: ", self.call); // the FMU may name the call as well; once will do
         let text = |m: &Message| m.text.trim().trim_start_matches(&prefix).to_string();
@@ -325,7 +320,6 @@ fn files_below(folder: &Path) -> Vec<PathBuf> {
 
 pub(crate) struct Loaded {
     pub library: Library,
-    /// SHA-256 of the file, in hexadecimal digits.
     pub hash: String,
     pub changed: Vec<&'static str>,
     pub binary: String,

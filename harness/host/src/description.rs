@@ -21,15 +21,10 @@ pub struct ModelDescription {
     pub fmi_version: String,
     pub model_name: String,
     pub guid: String,
-    /// Version of the model; empty if it is missing.
     pub version: String,
-    /// Description of the model; empty if it is missing.
     pub description: String,
-    /// The tool that exported the FMU; empty if it is missing.
     pub generation_tool: String,
-    /// The element CoSimulation, if the FMU can integrate itself.
     pub co_simulation: Option<Interface>,
-    /// The element ModelExchange, if a host can integrate the FMU.
     pub model_exchange: Option<Interface>,
     pub units: Vec<Unit>,
     pub types: Vec<SimpleType>,
@@ -67,7 +62,6 @@ pub struct Interface {
     /// True if the FMU accepts derivatives of inputs (FMI 2.0) or new values of inputs within a step (FMI
     /// 3.0).
     pub can_interpolate_inputs: bool,
-    /// True if the FMU provides directional derivatives.
     pub directional_derivatives: bool,
 }
 
@@ -128,7 +122,6 @@ pub struct DisplayUnit {
 pub struct SimpleType {
     pub name: String,
     pub unit: Option<String>,
-    /// Items, if the type is an enumeration.
     pub items: Vec<Item>,
 }
 

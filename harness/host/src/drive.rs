@@ -15,9 +15,7 @@ pub struct Inputs {
     references: Vec<u32>,
     places: Vec<usize>,
     discrete: Vec<(usize, Variable)>,
-    /// True if the FMU accepts slopes of inputs.
     sloped: bool,
-    /// True if the inputs are held constant during each step.
     hold: bool,
     /// Relative tolerance of the host's solver; `None` if the FMU has Co-Simulation.
     exchange: Option<f64>,

@@ -142,7 +142,6 @@ impl<T> Setter<T> for Set<T> {
     }
 }
 
-/// The functions that only FMI 2.0 has.
 pub struct Fmi2 {
     functions: Functions,
     stepping: Option<StepFunctions>,
@@ -315,7 +314,6 @@ pub fn file_uri(folder: &Path) -> String {
 }
 
 impl Fmu {
-    /// Returns true if the binary exports all functions of Model Exchange.
     pub fn has_exchange(&self) -> bool {
         self.exchange.is_some() && self.own.events.is_some()
     }
@@ -700,7 +698,6 @@ impl<'fmu> Instance<'fmu> {
         self.call(self.functions().get_real, |f, c| unsafe { f(c, null(), count, null_mut()) })
     }
 
-    /// Calls fmi2SetReal with nvr = `count` and NULL pointers.
     pub fn set_real_null(&mut self, count: usize) -> Called {
         // SAFETY: see get_real_null.
         self.call(self.functions().set_real, |f, c| unsafe { f(c, null(), count, null()) })
@@ -712,14 +709,12 @@ impl<'fmu> Instance<'fmu> {
         unsafe { self.functions().nothing(self.component) }
     }
 
-    /// Calls fmi2SetString with NULL as the text.
     pub fn set_string_null(&mut self, reference: u32) -> Called {
         let text = null::<c_char>();
         // SAFETY: see get_real_null.
         self.call(self.functions().set_string, |f, c| unsafe { f(c, &reference, 1, &text) })
     }
 
-    /// Calls fmi2SetFMUstate with NULL in place of a state.
     pub fn set_state_null(&mut self) -> Called {
         self.set_state(&FmuState(null_mut()))
     }

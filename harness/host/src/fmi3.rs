@@ -119,7 +119,6 @@ functions! { ExchangeFunctions:
     number_of_continuous_states "fmi3GetNumberOfContinuousStates", Count;
 }
 
-/// Functions that an FMU must export and this host never calls.
 const UNCALLED: [&str; 15] = [
     "fmi3InstantiateScheduledExecution",
     "fmi3GetBinary",
@@ -337,7 +336,6 @@ impl<T> Setter<T> for Set<T> {
     }
 }
 
-/// The functions that only FMI 3.0 has.
 pub struct Fmi3 {
     functions: Functions,
     stepping: Option<StepFunctions>,
@@ -550,7 +548,6 @@ impl Fmu {
         }
     }
 
-    /// Instantiates the FMU with exactly these arguments.
     pub fn instantiate_with(&self, with: &Instantiation) -> Called<Instance<'_>> {
         let (name, token, resources) =
             (c_string(with.name), c_string(with.token), c_string(with.resources));
@@ -611,10 +608,8 @@ pub struct Instantiation<'a> {
     pub logging: bool,
     pub event_mode: bool,
     pub early_return: bool,
-    /// True if the callback intermediateUpdate is passed to the FMU.
     pub intermediate_update: bool,
     pub required: Vec<u32>,
-    /// True if the callback logMessage is passed to the FMU.
     pub logger: bool,
 }
 

@@ -50,7 +50,6 @@ pub const FLOOD_SHOWN: u64 = 4 << 30;
 #[derive(Clone, Debug)]
 pub struct Limits {
     pub call: Duration,
-    /// Time limit for the whole process, if there is one.
     pub total: Option<Duration>,
     /// Limit of memory beyond that in use when the first binary is loaded, bytes. The same number limits
     /// temporary files and shared memory.

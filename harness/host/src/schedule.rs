@@ -90,7 +90,6 @@ impl History {
         &self.time
     }
 
-    /// Returns true if the value is constant from each row to the next.
     pub fn is_held(&self) -> bool {
         self.slopes.iter().all(|slope| *slope == 0.0)
     }

@@ -139,8 +139,7 @@ impl Element {
         Some(Element { name, line, attributes, children })
     }
 
-    /// Returns a copy of the element without its children.
-    pub fn alone(&self) -> Element {
+    pub fn without_children(&self) -> Element {
         let Element { name, line, attributes, .. } = self;
         let (name, attributes) = (name.clone(), attributes.clone());
         Element { name, line: *line, attributes, children: Vec::new() }

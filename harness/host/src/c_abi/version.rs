@@ -88,7 +88,6 @@ pub struct Updated {
 
 /// A version of FMI: its C functions, and the order in which a host calls them.
 pub trait Version: Sized {
-    /// Folder of the binaries for the platform on which this program runs.
     const PLATFORM: &'static str;
     const NUMBER: usize;
     /// `fmi2Boolean` or `fmi3Boolean`. It is not `bool`, because a byte that is neither 0 nor 1 must not
@@ -152,7 +151,6 @@ pub trait Version: Sized {
 
     fn sizes(instance: &mut Instance<'_, Self>) -> Called<(usize, usize)>;
 
-    /// Reads the `count` values of a variable or an array with this value reference.
     fn values(
         instance: &mut Instance<'_, Self>,
         c_type: CType,
@@ -160,7 +158,6 @@ pub trait Version: Sized {
         count: usize,
     ) -> Called<Vec<Value>>;
 
-    /// Sets all values of a variable or an array with this value reference.
     fn set_values(
         instance: &mut Instance<'_, Self>,
         c_type: CType,
@@ -386,12 +383,10 @@ impl<V: Version> Fmu<V> {
         &self.description
     }
 
-    /// Returns the SHA-256 of the `.fmu` file, in hexadecimal digits.
     pub fn hash(&self) -> &str {
         &self.hash
     }
 
-    /// Returns the SHA-256 of the loaded binary, in hexadecimal digits.
     pub fn binary_hash(&self) -> &str {
         &self.binary_hash
     }
@@ -551,7 +546,6 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         warnings.map(|message| message.text.trim().to_string()).collect()
     }
 
-    /// Returns the number of messages whose category is NULL.
     pub fn uncategorised(&self) -> usize {
         self.environment.uncategorised()
     }
@@ -738,12 +732,10 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         set
     }
 
-    /// Reads the `count` values of a variable or an array with this value reference.
     pub fn values(&mut self, c_type: CType, reference: u32, count: usize) -> Called<Vec<Value>> {
         V::values(self, c_type, reference, count)
     }
 
-    /// Sets all values of a variable or an array with this value reference.
     pub fn set_values(&mut self, c_type: CType, reference: u32, values: &[Value]) -> Called {
         V::set_values(self, c_type, reference, values)
     }

@@ -84,11 +84,8 @@ pub struct Lists {
     pub unknowns: Vec<u32>,
     pub knowns: Vec<u32>,
     pub outputs: Vec<u32>,
-    /// Number of continuous states, if they may be read now.
     pub states: Option<usize>,
-    /// Number of event indicators, if they may be read now.
     pub indicators: Option<usize>,
-    /// True if the FMU can serialise states.
     pub serializes: bool,
 }
 
