@@ -3,7 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::description::Description;
+use super::description::{Common, Description};
 use super::findings::Findings;
 use host::xml::{Element, Fault};
 
@@ -211,26 +211,34 @@ pub(crate) fn unique_names(
 }
 
 pub fn units(d: &Description, findings: &mut Findings) {
-    let units: BTreeMap<&str, &Element> =
-        d.root.list("UnitDefinitions").filter_map(|unit| Some((unit.get("name")?, unit))).collect();
-    d.each(findings, |v| {
-        let unit = v.typed.get("unit");
-        let display_unit = v.typed.get("displayUnit");
-        let defined = |name: &str| units.get(name);
-        match (unit, display_unit) {
-            (None, Some(shown)) => Some(format!("displayUnit \"{shown}\" without a unit")),
-            (Some(unit), _) if defined(unit).is_none() => {
-                Some(format!("the unit \"{unit}\" is not among UnitDefinitions"))
-            }
-            (Some(unit), Some(shown)) => {
-                let all = defined(unit).into_iter().flat_map(|unit| &unit.children);
-                let mut all = all.filter(|c| c.name == "DisplayUnit").filter_map(|c| c.get("name"));
-                (shown != unit && !all.any(|name| name == shown))
-                    .then(|| format!("displayUnit \"{shown}\" is not defined for \"{unit}\""))
-            }
-            _ => None,
-        }
-    });
+    let units = unit_definitions(&d.root);
+    d.each(findings, |v| wrong_unit(v, v.typed.get("displayUnit"), &units));
+}
+
+/// Returns the elements `Unit` by name.
+pub(crate) fn unit_definitions(root: &Element) -> BTreeMap<&str, &Element> {
+    root.list("UnitDefinitions").filter_map(|unit| Some((unit.get("name")?, unit))).collect()
+}
+
+/// Returns what is wrong with the unit of a variable, or with one of the display units `shown` of the
+/// variable and its aliases.
+pub(crate) fn wrong_unit<'d>(
+    v: &Common,
+    shown: impl IntoIterator<Item = &'d str>,
+    units: &BTreeMap<&str, &Element>,
+) -> Option<String> {
+    let unit = v.typed.get("unit");
+    if let Some(unit) = unit.filter(|unit| !units.contains_key(unit)) {
+        return Some(format!("the unit \"{unit}\" is not among UnitDefinitions"));
+    }
+    shown.into_iter().find_map(|shown| {
+        let Some(unit) = unit else {
+            return Some(format!("displayUnit \"{shown}\" without a unit"));
+        };
+        let mut all = units[unit].children.iter().filter(|c| c.name == "DisplayUnit");
+        (shown != unit && !all.any(|c| c.get("name") == Some(shown)))
+            .then(|| format!("displayUnit \"{shown}\" is not defined for \"{unit}\""))
+    })
 }
 
 pub fn types(d: &Description, findings: &mut Findings) {

@@ -35,7 +35,7 @@ pub fn missed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             continue;
         }
         let missed = missed_event(&mut session, &mut vary);
-        step_event = step_event.or(session.step_event());
+        step_event = step_event.or(session.step_event.clone());
         if let Ok(Some((time, name, change))) = missed {
             findings.at(format!("event mode at t = {time:?} s, start {start}")).add(format!(
                 "{name} goes from {change}: an event of which the host is not told (allowed: an \
@@ -80,7 +80,7 @@ fn missed_event<'f>(
         }
         *vary |= session.read_indicators()? != indicators;
         let near = NEARLY_DUE * session.step;
-        if session.next_event().is_some_and(|next| next - session.time < near) {
+        if session.next_event.is_some_and(|next| next - session.time < near) {
             continue;
         }
         let before = Observed::read(session)?;
@@ -112,7 +112,7 @@ pub fn values_changed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
         }
         // Failures to get this far are reported by `exchange.run`.
         let _ = session.advance(2 * STEPS);
-        if let Some((time, n, before, after)) = session.hidden_jump() {
+        if let Some((time, n, before, after)) = session.hidden_jump {
             findings.at(format!("the event at t = {time:?} s, start {start}")).add(format!(
                     "{} goes from {before:?} to {after:?}, and valuesOfContinuousStatesChanged of \
                      fmi2NewDiscreteStates is false (allowed: true, or the host goes on from its own \
@@ -132,7 +132,7 @@ pub fn nominals(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     if !states.iter().any(|(_, state)| declared(state)) {
         return skip("no continuous state has a nominal");
     }
-    if session.nominals_changed() {
+    if session.nominals_changed {
         return skip("nominalsOfContinuousStatesChanged: they are others than at the start");
     }
     let mut nominals = vec![f64::NAN; states.len()];

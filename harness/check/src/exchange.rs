@@ -38,7 +38,7 @@ pub fn event_iteration(fmu: &FmuUnderTest, _: &mut Findings) -> Result<()> {
 pub fn next_event_time(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let mut session = continuous(fmu)?;
     session.advance(2 * STEPS)?;
-    if let Some((time, next)) = session.past_event() {
+    if let Some((time, next)) = session.past_event {
         findings.at(format!("fmi2NewDiscreteStates at t = {time:?} s")).add(format!(
             "nextEventTime is {next:?} (allowed: a later time, if nextEventTimeDefined)"
         ));

@@ -92,7 +92,7 @@ impl Session<'_> {
             let mut why = None;
             loop {
                 // A step ends neither after `end` nor after a time event that the FMU has announced.
-                let limit = self.next_event().filter(|next| *next > t).unwrap_or(end).min(end);
+                let limit = self.next_event.filter(|next| *next > t).unwrap_or(end).min(end);
                 let last = t + h * 1.01 >= limit;
                 let to = if last { limit } else { t + h };
                 let shortest = (SHORTEST * whole).max(4.0 * f64::EPSILON * t.abs());

@@ -3,124 +3,87 @@
 use std::io::Write;
 
 use anyhow::Result;
-use serde::Serialize;
+use xml::EmitterConfig;
+use xml::writer::{EventWriter, XmlEvent};
 
 use super::findings::Severity;
 use super::report::{Outcome, Report};
 
-#[derive(Serialize)]
-#[serde(rename = "testsuites")]
-struct TestSuites {
-    #[serde(rename = "@name")]
-    name: &'static str,
-    #[serde(rename = "@tests")]
-    tests: usize,
-    #[serde(rename = "@failures")]
-    failures: usize,
-    #[serde(rename = "@errors")]
-    errors: usize,
-    #[serde(rename = "testsuite")]
-    suite: TestSuite,
-}
-
-#[derive(Serialize)]
-struct TestSuite {
-    #[serde(rename = "@name")]
-    name: String,
-    #[serde(rename = "@tests")]
-    tests: usize,
-    #[serde(rename = "@skipped")]
-    skipped: usize,
-    #[serde(rename = "@errors")]
-    errors: usize,
-    #[serde(rename = "@failures")]
-    failures: usize,
-    #[serde(rename = "testcase")]
-    cases: Vec<TestCase>,
-}
-
-#[derive(Serialize)]
-struct TestCase {
-    #[serde(rename = "@name")]
-    name: &'static str,
-    #[serde(rename = "@classname")]
-    class: &'static str,
-    #[serde(rename = "@time")]
-    time: String,
-    error: Option<Text>,
-    failure: Option<Text>,
-    skipped: Option<Text>,
-    #[serde(rename = "system-out")]
-    output: Option<String>,
-}
-
-#[derive(Serialize)]
-struct Text {
-    #[serde(rename = "@message")]
-    message: String,
-    #[serde(rename = "#text")]
-    text: Option<String>,
-}
-
 /// Writes the report. Each rule is a test case, classed by the rule's group; errors fail the test case, and
 /// warnings are its output.
 pub fn write(report: &Report, out: &mut impl Write) -> Result<()> {
-    let mut cases: Vec<_> = report.outcomes.iter().map(case).collect();
-    cases.extend(report.unchecked.as_deref().map(unchecked));
-    let errors = cases.iter().filter(|case| case.error.is_some()).count();
-    let tests = cases.len();
-    let failures = cases.iter().filter(|case| case.failure.is_some()).count();
-    let skipped = cases.iter().filter(|case| case.skipped.is_some()).count();
+    let is_failed = |o: &&Outcome| o.findings.list.iter().any(|f| f.severity == Severity::Error);
+    let failures = report.outcomes.iter().filter(is_failed).count();
+    let is_skipped = |o: &&Outcome| !is_failed(o) && o.findings.skipped.is_some();
+    let skipped = report.outcomes.iter().filter(is_skipped).count();
+    let errors = usize::from(report.unchecked.is_some());
+    let tests = report.outcomes.len() + errors;
+    let [tests, skipped, errors, failures] =
+        [tests, skipped, errors, failures].map(|number| number.to_string());
+    let layout = EmitterConfig::new().perform_indent(true).indent_string("  ");
+    let mut xml = layout.create_writer(&mut *out);
+    let suites = XmlEvent::start_element("testsuites").attr("name", "hubslosh check");
+    let suites = suites.attr("tests", &tests).attr("failures", &failures).attr("errors", &errors);
+    xml.write(suites)?;
     let name = xml_characters(&report.path.display().to_string());
-    let suite = TestSuite { name, tests, skipped, errors, failures, cases };
-    let suites = TestSuites { name: "hubslosh check", tests, failures, errors, suite };
-    let layout = xml::EmitterConfig::new().perform_indent(true).indent_string("  ");
-    serde_xml_rs::SerdeXml::new().emitter(layout).to_writer(&mut *out, &suites)?;
+    let suite = XmlEvent::start_element("testsuite").attr("name", &name).attr("tests", &tests);
+    let suite = suite.attr("skipped", &skipped).attr("errors", &errors);
+    xml.write(suite.attr("failures", &failures))?;
+    for outcome in &report.outcomes {
+        let Outcome { rule, findings, time } = outcome;
+        let lines = |severity: Severity| {
+            let of = findings.list.iter().filter(move |f| f.severity == severity);
+            of.map(|f| format!("{}: {}", f.place, f.text)).collect::<Vec<_>>().join("\n")
+        };
+        let (errors, warnings) = (lines(Severity::Error), lines(Severity::Warning));
+        begin_case(&mut xml, rule.id, &format!("{:.3}", time.as_secs_f64()))?;
+        if !errors.is_empty() {
+            let message = format!("{} [{}]", rule.title, rule.source);
+            write_element(&mut xml, "failure", Some(&message), &errors)?;
+        } else if let Some(why) = findings.reason() {
+            write_element(&mut xml, "skipped", Some(&why), "")?;
+        }
+        if !warnings.is_empty() {
+            write_element(&mut xml, "system-out", None, &format!("warning: {warnings}"))?;
+        }
+        xml.write(XmlEvent::end_element())?;
+    }
+    // A separate test case, because viewers show a suite that is skipped as a whole as a success.
+    if let Some(why) = &report.unchecked {
+        begin_case(&mut xml, "check", "0.000")?;
+        write_element(&mut xml, "error", Some(why), "")?;
+        xml.write(XmlEvent::end_element())?;
+    }
+    xml.write(XmlEvent::end_element())?;
+    xml.write(XmlEvent::end_element())?;
     Ok(writeln!(out)?)
 }
 
-fn case(outcome: &Outcome) -> TestCase {
-    let rule = outcome.rule;
-    let lines = |severity: Severity| {
-        let of = outcome.findings.list.iter().filter(move |f| f.severity == severity);
-        xml_characters(
-            &of.map(|f| format!("{}: {}", f.place, f.text)).collect::<Vec<_>>().join("\n"),
-        )
-    };
-    let (errors, warnings) = (lines(Severity::Error), lines(Severity::Warning));
-    let failed = !errors.is_empty();
-    TestCase {
-        name: rule.id,
-        class: rule.id.split('.').next().unwrap_or_default(),
-        time: format!("{:.3}", outcome.time.as_secs_f64()),
-        error: None,
-        skipped: outcome
-            .findings
-            .reason()
-            .filter(|_| !failed)
-            .map(|why| Text { message: xml_characters(&why), text: None }),
-        failure: failed.then(|| Text {
-            message: format!("{} [{}]", rule.title, rule.source),
-            text: Some(errors),
-        }),
-        output: (!warnings.is_empty()).then(|| format!("warning: {warnings}")),
-    }
+fn begin_case(xml: &mut EventWriter<impl Write>, rule: &str, seconds: &str) -> Result<()> {
+    let group = rule.split('.').next().unwrap_or_default();
+    let case = XmlEvent::start_element("testcase").attr("name", rule);
+    Ok(xml.write(case.attr("classname", group).attr("time", seconds))?)
 }
 
-/// Returns a separate test case for the error that no rule was checked, because viewers show a suite that is
-/// skipped as a whole as a success.
-fn unchecked(why: &str) -> TestCase {
-    TestCase {
-        name: "check",
-        class: "check",
-        time: "0.000".into(),
-        error: Some(Text { message: xml_characters(why), text: None }),
-        failure: None,
-        skipped: None,
-        output: None,
+fn write_element(
+    xml: &mut EventWriter<impl Write>,
+    name: &str,
+    message: Option<&str>,
+    text: &str,
+) -> Result<()> {
+    let message = message.map(xml_characters);
+    let element = XmlEvent::start_element(name);
+    xml.write(match &message {
+        Some(message) => element.attr("message", message),
+        None => element,
+    })?;
+    if !text.is_empty() {
+        xml.write(XmlEvent::characters(&xml_characters(text)))?;
     }
+    Ok(xml.write(XmlEvent::end_element())?)
 }
 
+/// Returns a text without the characters that XML does not allow.
 fn xml_characters(text: &str) -> String {
     let allowed = |c: &char| matches!(c, '\t' | '\n' | '\r' | ' '..='\u{fffd}' | '\u{10000}'..);
     text.chars().filter(allowed).collect()

@@ -599,7 +599,7 @@ pub fn terminated(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 pub fn report_early_end(session: &mut Session, findings: &mut Findings) -> Result<()> {
     let experiment = session.fmu.experiment();
     session.advance(2 * STEPS)?;
-    let Some((time, call)) = session.ended() else { return Ok(()) };
+    let Some((time, call)) = session.ended else { return Ok(()) };
     let place = format!("{call} at t = {time:?} s");
     // Without a suggested stop time the model may have reached its own end.
     let suggested = match experiment.stop {

@@ -7,8 +7,32 @@ use host::causality::Causality;
 use super::description::{Description, Unknown, Variable};
 use super::findings::Findings;
 
-/// Reports entries of the list named `list` that are missing, repeated or not in `expected`; `why` describes
-/// the allowed entries.
+/// Reports entries of the list named `list` that are missing, repeated or not allowed; `why` describes the
+/// allowed entries. Each of `entries` is a place, the variable's index or value reference, and whether it is
+/// allowed; `name` returns the name of a variable.
+pub(crate) fn compare_list<K: Ord>(
+    findings: &mut Findings,
+    list: &str,
+    entries: impl Iterator<Item = (String, K, bool)>,
+    needed: &BTreeSet<K>,
+    name: impl Fn(&K) -> String,
+    why: &str,
+) {
+    let mut seen = BTreeSet::new();
+    for (place, key, is_allowed) in entries {
+        if !is_allowed {
+            findings.at(&place).add(format!("it is not allowed here (allowed: {why})"));
+        }
+        if !seen.insert(key) {
+            findings.at(place).add("it is listed already");
+        }
+    }
+    for missing in needed.difference(&seen) {
+        let place = format!("{list}, {}", name(missing));
+        findings.at(place).add(format!("it is missing (required: {why})"));
+    }
+}
+
 fn compare(
     d: &Description,
     findings: &mut Findings,
@@ -17,21 +41,35 @@ fn compare(
     expected: &BTreeSet<usize>,
     why: &str,
 ) {
-    let mut seen = BTreeSet::new();
-    for unknown in listed {
+    let entries = listed.iter().map(|unknown| {
         let place = format!("line {}, {list}, {}", unknown.line, d.name_of(unknown.index));
         // An index out of range is reported by another rule.
-        if d.at(unknown.index).is_some() && !expected.contains(&unknown.index) {
-            findings.at(&place).add(format!("it is not allowed here (allowed: {why})"));
+        let is_allowed = d.at(unknown.index).is_none() || expected.contains(&unknown.index);
+        (place, unknown.index, is_allowed)
+    });
+    compare_list(findings, list, entries, expected, |index| d.name_of(*index), why);
+}
+
+/// Reports a dependency that is listed twice, and dependenciesKind without as many dependencies.
+pub(crate) fn check_kinds<K: Ord>(
+    findings: &mut Findings,
+    place: &str,
+    dependencies: Option<&[K]>,
+    kinds: Option<&Vec<String>>,
+) {
+    let listed = dependencies.unwrap_or_default();
+    let all = listed.len();
+    match kinds.map(Vec::len) {
+        Some(_) if dependencies.is_none() => {
+            findings.at(place).add("dependenciesKind without dependencies");
         }
-        if !seen.insert(unknown.index) {
-            findings.at(&place).add("it is listed already");
+        Some(n) if n != all => {
+            findings.at(place).add(format!("{all} dependencies, but {n} kinds of them"));
         }
+        _ => {}
     }
-    for missing in expected.difference(&seen) {
-        findings
-            .at(format!("{list}, {}", d.name_of(*missing)))
-            .add(format!("it is missing (required: {why})"));
+    if listed.iter().collect::<BTreeSet<_>>().len() < all {
+        findings.at(place).add("a dependency is listed twice");
     }
 }
 
@@ -134,26 +172,13 @@ pub fn dependencies(d: &Description, findings: &mut Findings) {
         let initial = list == "InitialUnknowns";
         for unknown in unknowns {
             let place = format!("line {}, {list}, {}", unknown.line, d.name_of(unknown.index));
-            let dependencies = unknown.dependencies.as_deref().unwrap_or_default();
-            if let Some(kinds) = &unknown.kinds {
-                if unknown.dependencies.is_none() {
-                    findings.at(&place).add("dependenciesKind without dependencies");
-                } else if kinds.len() != dependencies.len() {
-                    let (kinds, all) = (kinds.len(), dependencies.len());
-                    findings
-                        .at(&place)
-                        .add(format!("{all} dependencies, but {kinds} kinds of them"));
-                }
-                let odd = kinds.iter().find(|k| !matches!(k.as_str(), "dependent" | "constant"));
-                if let Some(odd) = odd.filter(|_| initial) {
-                    findings
-                        .at(&place)
-                        .add(format!("dependenciesKind {odd} (allowed: dependent, constant)"));
-                }
-            }
-            let distinct: BTreeSet<_> = dependencies.iter().collect();
-            if distinct.len() < dependencies.len() {
-                findings.at(&place).add("a dependency is listed twice");
+            check_kinds(findings, &place, unknown.dependencies.as_deref(), unknown.kinds.as_ref());
+            let mut kinds = unknown.kinds.iter().flatten();
+            let odd = kinds.find(|k| !matches!(k.as_str(), "dependent" | "constant"));
+            if let Some(odd) = odd.filter(|_| initial) {
+                findings
+                    .at(&place)
+                    .add(format!("dependenciesKind {odd} (allowed: dependent, constant)"));
             }
         }
     }

@@ -365,23 +365,23 @@ pub struct Session<'f> {
     pub step: f64,
     /// Number of steps so far, from which the changing inputs follow.
     pub count: usize,
-    next_event: Option<f64>,
+    pub(super) next_event: Option<f64>,
     nominals: Vec<f64>,
     /// Time and function by which the FMU has requested the end of the simulation.
-    ended: Option<(f64, &'static str)>,
+    pub(super) ended: Option<(f64, &'static str)>,
     /// The first time at which nextEventTime was in the past, and this nextEventTime, s.
-    past_event: Option<(f64, f64)>,
+    pub(super) past_event: Option<(f64, f64)>,
     immediate_events: usize,
     /// Result of the last event iteration: whether states, and whether their nominals, have changed.
     values_changed: bool,
-    nominals_changed: bool,
+    pub(super) nominals_changed: bool,
     /// The first state that an event has changed although valuesOfContinuousStatesChanged was false: time,
     /// index, and both values.
-    hidden_jump: Option<(f64, usize, f64, f64)>,
+    pub(super) hidden_jump: Option<(f64, usize, f64, f64)>,
     /// Number of events requested only by fmi2CompletedIntegratorStep that were examined so far.
     asked: usize,
     /// The first of these events that has changed a value: time, name, and both values as text.
-    step_event: Option<(f64, String, String)>,
+    pub(super) step_event: Option<(f64, String, String)>,
 }
 
 /// State of the host that a saved FMU state does not contain.
@@ -475,21 +475,6 @@ impl<'f> Session<'f> {
         self.ended.is_some()
     }
 
-    /// Returns the time and the function by which the FMU requested the end of the simulation.
-    pub fn ended(&self) -> Option<(f64, &'static str)> {
-        self.ended
-    }
-
-    /// Returns the first time at which nextEventTime was in the past, and this nextEventTime, s.
-    pub fn past_event(&self) -> Option<(f64, f64)> {
-        self.past_event
-    }
-
-    /// Returns the time of the next event that the FMU has announced, s.
-    pub(super) fn next_event(&self) -> Option<f64> {
-        self.next_event
-    }
-
     pub(super) fn states(&self) -> usize {
         self.fmu.description.states().len()
     }
@@ -524,12 +509,6 @@ impl<'f> Session<'f> {
         Ok(())
     }
 
-    /// Returns the first event that only fmi2CompletedIntegratorStep requested and that changed a value:
-    /// time, name, and both values as text.
-    pub(super) fn step_event(&self) -> Option<(f64, String, String)> {
-        self.step_event.clone()
-    }
-
     pub(super) fn event(&mut self) -> Result<()> {
         let n = self.states();
         let before = self.read_states(n)?;
@@ -547,17 +526,6 @@ impl<'f> Session<'f> {
             self.hidden_jump.get_or_insert((self.time, i, before[i], after[i]));
         }
         Ok(())
-    }
-
-    /// Returns the first state that an event has changed although valuesOfContinuousStatesChanged was false:
-    /// time, index, and both values.
-    pub(super) fn hidden_jump(&self) -> Option<(f64, usize, f64, f64)> {
-        self.hidden_jump
-    }
-
-    /// Returns true if nominalsOfContinuousStatesChanged was set at the last event.
-    pub(super) fn nominals_changed(&self) -> bool {
-        self.nominals_changed
     }
 
     /// Sets all Real inputs to values that change from step to step.

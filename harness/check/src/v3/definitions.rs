@@ -4,7 +4,9 @@
 use std::collections::BTreeMap;
 
 use super::description::Description;
-use crate::definitions::{experiment_numbers, identifiers, stop_before_start, unique_names};
+use crate::definitions::{
+    experiment_numbers, identifiers, stop_before_start, unique_names, unit_definitions, wrong_unit,
+};
 use crate::findings::Findings;
 use host::description::Type;
 use host::xml::Element;
@@ -90,26 +92,11 @@ pub fn unique(d: &Description, findings: &mut Findings) {
 }
 
 pub fn units(d: &Description, findings: &mut Findings) {
-    let units: BTreeMap<&str, &Element> =
-        d.root.list("UnitDefinitions").filter_map(|unit| Some((unit.get("name")?, unit))).collect();
+    let units = unit_definitions(&d.root);
     d.each(findings, |v| {
-        let unit = v.typed.get("unit");
         let aliases = v.typed.children.iter().filter(|c| c.name == "Alias");
         let shown = v.typed.get("displayUnit").into_iter();
-        let shown = shown.chain(aliases.filter_map(|alias| alias.get("displayUnit")));
-        if let Some(unit) = unit.filter(|unit| !units.contains_key(unit)) {
-            return Some(format!("the unit \"{unit}\" is not among UnitDefinitions"));
-        }
-        for shown in shown {
-            let Some(unit) = unit else {
-                return Some(format!("displayUnit \"{shown}\" without a unit"));
-            };
-            let mut all = units[unit].children.iter().filter(|c| c.name == "DisplayUnit");
-            if shown != unit && !all.any(|c| c.get("name") == Some(shown)) {
-                return Some(format!("displayUnit \"{shown}\" is not defined for \"{unit}\""));
-            }
-        }
-        None
+        wrong_unit(v, shown.chain(aliases.filter_map(|alias| alias.get("displayUnit"))), &units)
     });
     for unit in units.values() {
         for part in &unit.children {

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::description::{Description, Unknown, Variable};
 use crate::findings::Findings;
+use crate::structure::{check_kinds, compare_list};
 use host::causality::{Causality, Variability};
 use host::description::Type;
 
@@ -21,21 +22,11 @@ fn compare(
     allowed: impl Fn(&Variable) -> bool,
     why: &str,
 ) {
-    let mut seen = BTreeSet::new();
-    for unknown in d.unknowns(list) {
-        let Some(reference) = unknown.reference else { continue };
-        if d.at(reference).is_some_and(|v| !allowed(v)) {
-            findings.at(place(d, unknown)).add(format!("it is not allowed here (allowed: {why})"));
-        }
-        if !seen.insert(reference) {
-            findings.at(place(d, unknown)).add("it is listed already");
-        }
-    }
-    for missing in needed.difference(&seen) {
-        findings
-            .at(format!("{list}, {}", d.name_of(Some(*missing))))
-            .add(format!("it is missing (required: {why})"));
-    }
+    let entries = d.unknowns(list).filter_map(|unknown| {
+        let reference = unknown.reference?;
+        Some((place(d, unknown), reference, d.at(reference).is_none_or(&allowed)))
+    });
+    compare_list(findings, list, entries, needed, |missing| d.name_of(Some(*missing)), why);
 }
 
 fn all(d: &Description, wanted: impl Fn(&Variable) -> bool) -> BTreeSet<u32> {
@@ -110,18 +101,8 @@ pub fn structure_references(d: &Description, findings: &mut Findings) {
 pub fn dependencies(d: &Description, findings: &mut Findings) {
     for unknown in &d.structure {
         let place = place(d, unknown);
-        let listed = unknown.dependencies.as_deref().unwrap_or_default();
-        let distinct: BTreeSet<_> = listed.iter().collect();
-        if distinct.len() < listed.len() {
-            findings.at(&place).add("a dependency is listed twice");
-        }
+        check_kinds(findings, &place, unknown.dependencies.as_deref(), unknown.kinds.as_ref());
         let Some(kinds) = &unknown.kinds else { continue };
-        if unknown.dependencies.is_none() {
-            findings.at(&place).add("dependenciesKind without dependencies");
-        } else if kinds.len() != listed.len() {
-            let (kinds, all) = (kinds.len(), listed.len());
-            findings.at(&place).add(format!("{all} dependencies, but {kinds} kinds of them"));
-        }
         let is_float = unknown.reference.and_then(|r| d.at(r)).is_none_or(|v| v.is_real());
         for kind in kinds {
             let fits = match kind.as_str() {
