@@ -4,6 +4,7 @@
 //! value, slope and a bound of the curvature show whether it can cross at all, and whether more than once; if more than
 //! once, the interval is halved. What the intervals bound is then evaluated from the state space itself.
 
+use nalgebra::{DMatrix, Schur};
 use num_complex::Complex64 as Complex;
 use pyo3::buffer::PyBuffer;
 use pyo3::exceptions::PyValueError;
@@ -210,84 +211,16 @@ impl Model {
     }
 }
 
-/// Returns the eigenvalues of a small matrix, row after row, by the QR algorithm with Wilkinson's shifts.
-fn eigenvalues(mut a: Vec<Complex>, n: usize) -> Vec<Complex> {
-    // Hessenberg form by elimination with pivots
-    for k in 1..n.saturating_sub(1) {
-        let size = |i: &usize| a[i * n + k - 1].norm_sqr();
-        let Some(pivot) = (k..n).max_by(|i, j| size(i).total_cmp(&size(j))) else { break };
-        if a[pivot * n + k - 1] == Complex::ZERO {
-            continue;
-        }
-        for j in 0..n {
-            a.swap(pivot * n + j, k * n + j);
-        }
-        for i in 0..n {
-            a.swap(i * n + pivot, i * n + k);
-        }
-        for i in k + 1..n {
-            let factor = a[i * n + k - 1] / a[k * n + k - 1];
-            for j in 0..n {
-                let x = factor * a[k * n + j];
-                a[i * n + j] -= x;
-            }
-            for j in 0..n {
-                let x = factor * a[j * n + i];
-                a[j * n + k] += x;
-            }
-        }
-    }
-    let mut found = Vec::with_capacity(n);
-    let (mut size, mut tries) = (n, 0);
-    while size > 0 {
-        let (m, last) = (size, (size - 1) * n + size - 1);
-        let small = |k: usize| {
-            let near = a[k * n + k].norm() + a[(k - 1) * n + k - 1].norm();
-            a[k * n + k - 1].norm() <= f64::EPSILON * near
-        };
-        let first = (1..m).rev().find(|k| small(*k)).unwrap_or(0);
-        if first == m - 1 || tries > 100 || !a[last].is_finite() {
-            found.push(a[last]);
-            (size, tries) = (m - 1, 0);
-            continue;
-        }
-        tries += 1;
-        let [p, q, r, s] = [last - n - 1, last - n, last - 1, last].map(|at| a[at]);
-        let half = (p - s) / 2.0;
-        let root = (half * half + q * r).sqrt();
-        let root = if (half.conj() * root).re < 0.0 { -root } else { root };
-        let mut shift = s - q * r / (half + root);
-        if tries % 10 == 0 || !shift.is_finite() {
-            shift = s + r.norm();
-        }
-        for k in first..m {
-            a[k * n + k] -= shift;
-        }
-        let mut turns = Vec::with_capacity(m);
-        for k in first..m - 1 {
-            let (x, y) = (a[k * n + k], a[(k + 1) * n + k]);
-            let length = (x.norm_sqr() + y.norm_sqr()).sqrt();
-            let (c, d) =
-                if length > 0.0 { (x / length, y / length) } else { (Complex::ONE, Complex::ZERO) };
-            turns.push((c, d));
-            for j in k..m {
-                let (x, y) = (a[k * n + j], a[(k + 1) * n + j]);
-                a[k * n + j] = c.conj() * x + d.conj() * y;
-                a[(k + 1) * n + j] = c * y - d * x;
-            }
-        }
-        for (k, (c, d)) in (first..m - 1).zip(turns) {
-            for i in first..(k + 2).min(m) {
-                let (x, y) = (a[i * n + k], a[i * n + k + 1]);
-                a[i * n + k] = x * c + y * d;
-                a[i * n + k + 1] = y * c.conj() - x * d.conj();
-            }
-        }
-        for k in first..m {
-            a[k * n + k] += shift;
-        }
-    }
-    found
+/// Returns the eigenvalues of a small matrix, row after row.
+fn eigenvalues(a: Vec<Complex>, n: usize) -> Vec<Complex> {
+    // The matrix is scaled, because the squares of very large numbers overflow.
+    let size = a.iter().map(|x| x.norm()).fold(f64::MIN_POSITIVE, f64::max);
+    let matrix = DMatrix::from_row_iterator(n, n, a.iter().map(|x| x / size));
+    let triangle = match Schur::try_new(matrix.clone(), f64::EPSILON, 1000) {
+        Some(schur) => schur.unpack().1,
+        None => matrix,
+    };
+    triangle.diagonal().iter().map(|x| x * size).collect()
 }
 
 /// Returns s = jω, or z = exp(jωT) for a model with the period T.
