@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from . import attitude, plot
     from .certificate import Certificate, WorstCase
     from .checking import Checked, CheckedRule, Finding, check
+    from .comparison import compare
     from .craft import Craft, MassProperties, MountedTank
     from .engines import Engine
     from .files import to_csv, to_mat, to_parquet
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
     from .operating_point import OperatingPoint
     from .plant import COLUMNS, TORQUE, Plant, RunError, drive
     from .program import Estimated, Identification, analyse, campaign, identify
+    from .project import Project
     from .recordings import read_recording
     from .review import Review
     from .run import Run
@@ -56,6 +58,7 @@ if TYPE_CHECKING:
 _MODULES = {
     "certificate": ("Certificate", "WorstCase"),
     "checking": ("Checked", "CheckedRule", "Finding", "check"),
+    "comparison": ("compare",),
     "craft": ("Craft", "MassProperties", "MountedTank"),
     "engines": ("Engine",),
     "files": ("to_csv", "to_mat", "to_parquet"),
@@ -70,6 +73,7 @@ _MODULES = {
     "operating_point": ("OperatingPoint",),
     "plant": ("COLUMNS", "TORQUE", "Plant", "RunError", "drive"),
     "program": ("Estimated", "Identification", "analyse", "campaign", "identify"),
+    "project": ("Project",),
     "recordings": ("read_recording",),
     "review": ("Review",),
     "run": ("Run",),
@@ -107,6 +111,7 @@ __all__ = [
     "MountedTank",
     "OperatingPoint",
     "Plant",
+    "Project",
     "Quantity",
     "Review",
     "Run",
@@ -123,6 +128,7 @@ __all__ = [
     "campaign",
     "check",
     "closed_loop",
+    "compare",
     "draw",
     "drive",
     "fit",

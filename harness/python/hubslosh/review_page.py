@@ -79,13 +79,20 @@ def page(review: "Review") -> str:
     title = f"Design review over {len(review.fills)} fills and {len(review.points)} points"
     bad = "" if review.passed else " bad"
     figures = "\n".join(_figures(review))
+    return document(
+        title,
+        f'<p class="answer{bad}">{html.escape(review.summary)}</p>\n{_facts(review)}\n'
+        f'<div class="figures">\n{figures}\n</div>\n{_tables(review)}',
+    )
+
+
+def document(title: str, body: str) -> str:
+    """Return a page with a title as its heading."""
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f"<title>{html.escape(title)}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n<main>\n"
-        f'<h1>{html.escape(title)}</h1>\n<p class="answer{bad}">{html.escape(review.summary)}</p>\n'
-        f"{_facts(review)}\n"
-        f'<div class="figures">\n{figures}\n</div>\n{_tables(review)}\n</main>\n</body>\n</html>\n'
+        f"<h1>{html.escape(title)}</h1>\n{body}\n</main>\n</body>\n</html>\n"
     )
 
 
@@ -108,21 +115,21 @@ def _figures(review: "Review") -> Iterator[str]:
 
     unit = "fill (% of the volume)" if review.unit == "%" else "liquid (kg)"
     limits = " Red: required of all points (dashed), of nominal points (dotted)."
-    yield _figure(
+    yield figure_of(
         "How do the margins change as the tanks empty?",
         f"Line: nominal. Band: all points within the uncertainty{_marked(review)}."
         + limits * bool(review.limits),
         5.6, lambda figure: _margins(figure, review, unit),
     )  # fmt: skip
     if len(review.slosh):
-        yield _figure(
+        yield figure_of(
             "Is each slosh mode stabilised by phase or by gain?",
             "A dot per nominal fill and command. Below 0 dB gain stabilises the mode; within ±90° "
             "closing the loop adds damping. In the upper outer parts neither does. Large crosses: "
             "the mode is unstable with all loops closed.",
             3.6, lambda figure: _stabilisation(figure, review),
         )  # fmt: skip
-        yield _figure(
+        yield figure_of(
             "Where are the slosh modes, and what does the loop do to their damping?",
             "Dots: pole with this loop open. Crosses: damping ratio with all loops closed; large "
             "ones are unstable.",
@@ -131,19 +138,19 @@ def _figures(review: "Review") -> Iterator[str]:
     commands = review.nominal[0].gain.inputs
     curves = _curves(review)
     for i, name in enumerate(commands):
-        yield _figure(
+        yield figure_of(
             f"How close does the loop of {name} come to −1?",
             "Nichols diagram. Cross: −1. Closed contour: modulus margin 0.5.",
             3.9, lambda figure, i=i: _nichols(figure, curves[i]),
         )  # fmt: skip
-        yield _figure(
+        yield figure_of(
             f"Which frequencies cross 0 dB in the loop of {name}?",
             "Bode diagram of the sampled loop gain, delay included. Dashed: −180°.",
             4.6, lambda figure, i=i: _bode(figure, curves[i]),
         )  # fmt: skip
     drawn = review.points.query("kind == 'draw'")
     if len(drawn) > 1:
-        yield _figure(
+        yield figure_of(
             "How likely is a small margin?",
             f"{len(drawn)} random points, uniform within the ranges, over all fills; an unstable "
             "one has the margin 0.",
@@ -151,7 +158,7 @@ def _figures(review: "Review") -> Iterator[str]:
         )  # fmt: skip
     found = review.confirmation
     unit_of = Fmu.open(review.craft.model).unit(commands[0]).replace(".", "·")
-    yield _figure(
+    yield figure_of(
         "Does the nonlinear craft agree at the worst case?",
         f"{_what_is_drawn(found)}, from a small rotation on. "
         f"{str(found)[0].upper()}{str(found)[1:]}.",
@@ -159,7 +166,7 @@ def _figures(review: "Review") -> Iterator[str]:
     )  # fmt: skip
 
 
-def _figure(title: str, caption: str, height: float, draw: "Callable[[Figure], None]") -> str:
+def figure_of(title: str, caption: str, height: float, draw: "Callable[[Figure], None]") -> str:
     """Return a figure as inline SVG in the page's colours."""
     try:
         import matplotlib
@@ -231,7 +238,7 @@ def _margins(figure: "Figure", review: "Review", unit: str) -> None:
             ax.set_ylim(min(low, 0), max(high, 0))
     axes[-1].set_xlabel(unit)
     figure.align_ylabels(axes)
-    _legend(figure, 1)
+    key_of(figure, 1)
 
 
 def _marked(review: "Review") -> str:
@@ -292,10 +299,10 @@ def _stabilisation(figure: "Figure", review: "Review") -> None:
         ax.text(x, y, text, ha="center", va="center", fontsize=9, color=SOFT)
     ax.set(xlim=(-187, 187), ylim=GAINS, xticks=range(-180, 181, 90))
     ax.set(xlabel="direction of the resonance, 0° away from −1 (deg)", ylabel="peak loop gain (dB)")
-    _legend(figure)
+    key_of(figure)
 
 
-def _legend(figure: "Figure", columns: int = 2) -> None:
+def key_of(figure: "Figure", columns: int = 2) -> None:
     """Put the legend below the axes, where it hides nothing."""
     handles, labels = figure.axes[0].get_legend_handles_labels()
     if handles:
@@ -319,7 +326,7 @@ def _modes(figure: "Figure", review: "Review", unit: str) -> None:
         axes[1].yaxis.set_major_formatter("{x:g}")
         axes[1].yaxis.set_minor_formatter("{x:g}")
     figure.align_ylabels(axes)
-    _legend(figure)
+    key_of(figure)
 
 
 def _curves(review: "Review") -> list[Curves]:
@@ -410,7 +417,7 @@ def _simulated(figure: "Figure", review: "Review", unit: str) -> None:
             ax.plot(times, peaks, "-", color=COLORS[k % len(COLORS)], label=text)
     name = found.command or "size of the command"
     ax.set(yscale="log", xlabel="time (s)", ylabel=f"{name} ({unit})")
-    _legend(figure)
+    key_of(figure)
 
 
 def _tables(review: "Review") -> str:
@@ -426,7 +433,7 @@ def _tables(review: "Review") -> str:
     ]
     bad = sum(row["unstable"] > 0 for _, row in bands.iterrows())
     title = "What are the margins at each fill? Nominal (least to largest)"
-    parts = [_requirements(review), _unstable_points(review), _table(title, head, rows, bad)]
+    parts = [_requirements(review), _unstable_points(review), table_of(title, head, rows, bad)]
     if len(review.slosh):
         head = ("mode", "frequency, Hz", "ζ open, %", "ζ closed, %", "peak, dB", "stabilised by")
         rows, words = [], review.modes()
@@ -436,13 +443,13 @@ def _tables(review: "Review") -> str:
             spans = [f"{c.min():.3g} to {c.max():.3g}" for c in columns]
             rows.append([mode, *spans, words[mode]])
         bad = sum(how.startswith("unstable") for how in words.values())
-        parts.append(_table("What do the slosh modes look like over all fills?", head, rows, bad))
+        parts.append(table_of("What do the slosh modes look like over all fills?", head, rows, bad))
     worst = review.worst
     rows = [["fill", review.fills[worst.fill], ""]]
     for quantity, share in zip(review.uncertain, worst.shares, strict=True):
         for name, value in quantity.values(worst.fill, float(share)).items() if share else ():
             rows.append([name, f"{value:.5g}", f"{quantity.ends[worst.fill][name][1]:.5g}"])
-    parts.append(_table("Where is the worst case?", ("quantity", "worst", "nominal"), rows))
+    parts.append(table_of("Where is the worst case?", ("quantity", "worst", "nominal"), rows))
     if review.warnings:
         items = "".join(f"<li>{html.escape(text)}</li>" for text in review.warnings[:8])
         parts.append(f"<section><h2>What do the tanks warn of?</h2><ul>{items}</ul></section>")
@@ -460,7 +467,7 @@ def _requirements(review: "Review") -> str:
     bad = sum(row[1] == "FAIL" for row in rows)
     title = f"Which requirements are met? {len(rows) - bad} of {len(rows)}"
     head = ("requirement", "verdict", "least", "at fill", "points that fail")
-    return _table(title, head, rows, bad) if rows else ""
+    return table_of(title, head, rows, bad) if rows else ""
 
 
 def _unstable(row: Any) -> str:
@@ -489,7 +496,7 @@ def _unstable_points(review: "Review") -> str:
     count = f"{len(table)} of {len(review.points)}"
     shown = f", the {MOST_UNSTABLE} fastest" if len(table) > MOST_UNSTABLE else ""
     title = f"Which points are unstable? {count}{shown}"
-    return _table(title, ("fill", "growth, 1/s", "doubles in, s", "where"), rows, len(rows))
+    return table_of(title, ("fill", "growth, 1/s", "doubles in, s", "where"), rows, len(rows))
 
 
 def _range(row: Any, name: str) -> str:
@@ -501,7 +508,7 @@ def _range(row: Any, name: str) -> str:
     return f"{nominal:.3g} ({low:.3g} to {high:.3g})"
 
 
-def _table(title: str, head: tuple[str, ...], rows: list[list[str]], bad: int = 0) -> str:
+def table_of(title: str, head: tuple[str, ...], rows: list[list[str]], bad: int = 0) -> str:
     """Return a table as HTML; its first ``bad`` rows are marked."""
     names = "".join(f"<th>{html.escape(name)}</th>" for name in head)
     text, marked = ' class="text"', ' class="bad"'

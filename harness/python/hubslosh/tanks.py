@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -260,7 +261,7 @@ def read_drawing(source: "dict[str, Any] | Path") -> Any:
 
 def toml_of(source: Mapping[str, Any]) -> str:
     """Return the text of a tank file with this content."""
-    return "".join(f"{_key(key)} = {_toml(value)}\n" for key, value in source.items())
+    return "".join(f"{toml_key(key)} = {_toml(value)}\n" for key, value in source.items())
 
 
 def solve(
@@ -422,14 +423,15 @@ def _is_number(value: Any) -> bool:
         return False
 
 
-def _key(key: Any) -> str:
-    return json.dumps(str(key))
+def toml_key(key: Any) -> str:
+    """Return a key as TOML has it."""
+    return str(key) if re.fullmatch(r"[A-Za-z0-9_-]+", str(key)) else json.dumps(str(key))
 
 
 def _toml(value: Any) -> str:
     """Return a value as TOML has it."""
     if isinstance(value, Mapping):
-        inner = ", ".join(f"{_key(k)} = {_toml(v)}" for k, v in value.items())
+        inner = ", ".join(f"{toml_key(k)} = {_toml(v)}" for k, v in value.items())
         return f"{{ {inner} }}"
     if isinstance(value, str | os.PathLike):
         return json.dumps(str(value), ensure_ascii=False)
@@ -441,7 +443,7 @@ def _toml(value: Any) -> str:
         return repr(value)
     if isinstance(value, Sequence):
         return f"[{', '.join(_toml(v) for v in value)}]"
-    raise FmuError(f"{value!r} is no value for a tank file (allowed: numbers, texts, lists)")
+    raise FmuError(f"{value!r} is no value for a TOML file (allowed: numbers, texts, lists)")
 
 
 def _from_z(axis: Sequence[float]) -> list[float]:

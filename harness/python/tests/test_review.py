@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 
 import hubslosh
 from hubslosh import Craft, FmuError, FmuWarning, MountedTank
-from hubslosh.review_plan import main, review_plan
+from hubslosh.project import Project, main
 from hubslosh.worst_case import Confirmation
 
 SPHERE = {"density": 1440.0, "shape": {"sphere": {"radius": 0.5}}}
@@ -294,7 +294,7 @@ def test_a_plan_file_equals_the_call_in_python(
         return file
 
     for controller in (str(rows), matrices, '"law.py:law"'):
-        found = review_plan(plan(controller))
+        (found,) = Project.read(plan(controller)).reviews().values()
         mine, theirs = (r.points.query("kind != 'search'") for r in (found, direct))
         assert mine["modulus_margin"].to_numpy() == pytest.approx(
             theirs["modulus_margin"].to_numpy(), rel=1e-9
@@ -316,11 +316,103 @@ def test_a_plan_file_equals_the_call_in_python(
         "period = 0.1": r"the table \[craft\] is missing",
     }.items():
         with pytest.raises(FmuError, match=said):
-            review_plan(plan("1", text))
+            Project.read(plan("1", text))
     with pytest.raises(FmuError, match=r"must be \"FILE\.py:NAME\""):
-        review_plan(plan('"none.py:law"'))
+        Project.read(plan('"none.py:law"'))
     with pytest.raises(FmuError, match="needs A, B, C and D"):
-        review_plan(plan("{ A = [[0.0]] }"))
+        Project.read(plan("{ A = [[0.0]] }"))
+
+
+def test_a_project_is_the_same_after_it_was_written_and_read(
+    craft: Craft, tmp_path: Path, monkeypatch
+) -> None:
+    """Gains, matrices, a file and transfer functions; masses, engines, a tank's file, cases."""
+    (tmp_path / "ox.toml").write_text("density = 1440.0\nshape = { sphere = { radius = 0.5 } }\n")
+    (tmp_path / "law.py").write_text(f"law = {gains().tolist()}\n")
+    craft = replace(
+        craft, thrust=(0.0, 0.0, 100.0), model=str(craft.model),
+        tanks={"main ox": replace(craft.tanks["ox"], source=tmp_path / "ox.toml", axis=(0, 0, 2))},
+        engines={"main": hubslosh.Engine((0, 0, -1), (0, 0, 1), 300.0)},
+    )  # fmt: skip
+    settings = {
+        "period": PERIOD, "fills": ["50%", (300, "kg")], "damping": "nominal", "draws": 2,
+        "uncertain": {"craft.Jxx": [850, 950]}, "requirements": {"phase_margin": {"all": 10}},
+    }  # fmt: skip
+    law = hubslosh.LinearModel(
+        np.array([[-1.0]]), np.zeros((1, 6)), np.zeros((3, 1)), gains(), (), (), ()
+    )
+    named = f"{tmp_path / 'law.py'}:law"
+    points = []
+    for controller, file in ((gains(), None), (law, None), (None, named)):
+        cases = {"little thrust": {"craft": {"thrust": 10.0}, "fills": ["30%"]}, "as it is": {}}
+        project = Project(craft, controller, settings, cases, controller_file=file)
+        (tmp_path / "other").mkdir(exist_ok=True)
+        project.save(tmp_path / "other" / "design.toml")
+        again = Project.read(tmp_path / "other" / "design.toml")
+        assert again.settings == settings and again.cases == cases and again.name == "design"
+        assert again.craft.parameters("50%") == craft.parameters("50%")
+        loop = craft.loop(gains(), PERIOD, "50%")
+        assert hubslosh.margins(again.loop("50%")).phase_margin == pytest.approx(
+            hubslosh.margins(loop).phase_margin, rel=1e-9
+        )
+        points.append(again)
+    found = points[-1].reviews()
+    assert list(found) == ["design, little thrust", "design, as it is"]
+    assert found["design, little thrust"].fills == ("30%",)
+    direct = craft.review(gains(), **settings).points
+    mine = found["design, as it is"].points
+    assert mine["modulus_margin"].tolist() == direct["modulus_margin"].tolist()
+    # (s + 2)/(s + 4) from each measurement to its command
+    plain = points[0]._text(tmp_path)
+    filters = "{ num = [[[1.0, 2.0]]], den = [[[1.0, 4.0]]] }"
+    (tmp_path / "one.toml").write_text(plain.replace(str(gains().tolist()), filters))
+    model = Project.read(tmp_path / "one.toml").controller
+    s = 2j * np.pi * 0.3
+    assert model.response(0.3)[0, 0, 0] == pytest.approx((s + 2) / (s + 4), rel=1e-12)
+    with pytest.raises(FmuError, match="has no form in a file"):
+        Project(craft, lambda _t, _y: 0.0, settings).save(tmp_path / "law.toml")
+    assert not (tmp_path / "law.toml").exists()
+    for text, said in {
+        "[cases.a]\nperiods = 1\n": "cases.a has periods .*did you mean period",
+        "[cases.a.craft]\ntanks = 1\n": "cases.a.craft has tanks",
+        "[cases]\na = 1\n": "cases.a must be a table",
+    }.items():
+        wrong = plain.partition("\n[cases")[0] + "\n" + text
+        (tmp_path / "wrong.toml").write_text(wrong)
+        with pytest.raises(FmuError, match=rf"wrong\.toml: {said}"):
+            Project.read(tmp_path / "wrong.toml")
+
+
+def test_two_designs_stand_on_one_page(craft: Craft, tmp_path: Path, capsys, monkeypatch) -> None:
+    """The worse one first and marked; the command compares two files."""
+    settings = {"period": PERIOD, "fills": ["30%", "60%"], "damping": "nominal", "draws": 2}
+    for name, factor in {"good": 1, "wrong sign": -1}.items():
+        Project(replace(craft, model=str(craft.model)), factor * gains(), settings).save(
+            tmp_path / f"{name}.toml"
+        )
+    files = [str(tmp_path / f"{name}.toml") for name in ("good", "wrong sign")]
+    out = tmp_path / "comparison.html"
+    monkeypatch.setattr(sys, "argv", ["review", *files])
+    main()
+    assert str(out) in capsys.readouterr().out
+    page = out.read_text(encoding="utf-8")
+    assert "Comparison of 2 designs" in page and page.count('class="answer') == 2
+    rows = page[page.index("What are the least margins") :]
+    assert (
+        rows.index("wrong sign") < rows.index("good") and '<tr class="bad"><td>wrong sign' in rows
+    )
+    assert page.count("<h2>How close does the loop of torque") == 3
+    found = {Path(f).stem: Project.read(f).reviews()[Path(f).stem] for f in files}
+    table = hubslosh.compare(found)
+    assert table["passed"].tolist() == [True, False] and table["unstable"].iloc[1] > 0
+    stable = found["good"].points
+    assert table.loc["good", "phase_margin"] == stable["phase_margin"].abs().min()
+    assert np.isnan(table.loc["wrong sign", "phase_margin"])
+    with pytest.raises(FmuError, match="two to 6 reviews by name"):
+        hubslosh.compare({"one": found["good"]})
+    monkeypatch.setattr(sys, "argv", ["review", files[0], files[0]])
+    with pytest.raises(SystemExit, match="two projects are named good"):
+        main()
 
 
 def test_a_review_names_what_is_wrong(craft: Craft) -> None:

@@ -8,15 +8,16 @@ use anyhow::{Context, Result, bail, ensure};
 
 /// Reviews the attitude controller of a craft over its fills and writes one page: margins, slosh modes, worst case.
 ///
-/// It needs a Python with the packages hubslosh and matplotlib.
+/// Several projects, or one with several cases, are compared on one page. The exit code is 1 if a requirement fails. It needs a Python with the packages hubslosh and matplotlib.
 #[derive(clap::Args)]
-#[command(after_help = "Examples:\n  hubslosh review plan.toml\n  \
-                  hubslosh review plan.toml --out review.html --python /usr/bin/python3")]
+#[command(after_help = "Examples:\n  hubslosh review project.toml\n  \
+                  hubslosh review first.toml second.toml --out comparison.html\n  \
+                  hubslosh review project.toml --out review.html --python /usr/bin/python3")]
 pub struct ReviewArgs {
-    /// Plan with craft, controller, fills, ranges of uncertain parameters and requirements, .toml.
-    #[arg(value_name = "PLAN")]
-    plan: PathBuf,
-    /// File for the page, .html [default: the name of the plan with .html].
+    /// Project with craft, controller, fills, ranges of uncertain parameters, requirements and cases, .toml.
+    #[arg(value_name = "PROJECT", required = true)]
+    projects: Vec<PathBuf>,
+    /// File for the page, .html [default: the name of the project with .html; of a comparison comparison.html beside the first].
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Python that has the package hubslosh [default: the Python next to this command, then python3 and python on PATH].
@@ -27,9 +28,10 @@ pub struct ReviewArgs {
 impl ReviewArgs {
     pub fn run(self) -> Result<()> {
         let own = std::env::current_exe().context("the path of this program cannot be found")?;
-        let out = self.out.unwrap_or_else(|| self.plan.with_extension("html"));
-        let mut arguments = vec![OsString::from("-m"), "hubslosh.review_plan".into()];
-        arguments.extend([self.plan.into_os_string(), "--out".into(), out.into_os_string()]);
+        let mut arguments = vec![OsString::from("-m"), "hubslosh.project".into()];
+        arguments.extend(self.projects.into_iter().map(PathBuf::into_os_string));
+        arguments
+            .extend(self.out.into_iter().flat_map(|out| ["--out".into(), out.into_os_string()]));
         let pythons = match self.python {
             Some(python) => vec![python],
             None => python_candidates(&own),
