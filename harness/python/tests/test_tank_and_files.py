@@ -98,7 +98,7 @@ def test_errors_of_a_tank_are_reported_in_words(tmp_path: Path) -> None:
         "number is 1 to 4, not 5": lambda: full.parameters("Spacecraft", 5),
         "no parameters of a tank for 'Craft'": lambda: full.parameters("Craft"),
         "must end in .svg": lambda: full.save("tank.png"),
-        "is no value for a tank file": lambda: tank({"density": object()}, fill=0.3),
+        "is no value for a TOML file": lambda: tank({"density": object()}, fill=0.3),
     }
     for sentence, call in wrong.items():
         with pytest.raises(FmuError, match=sentence):
