@@ -145,7 +145,8 @@ impl<M: Model, V: Version> Clone for Instance<M, V> {
 }
 
 impl<M: Model, V: Version> Instance<M, V> {
-    /// Creates an instance with the default handler of events.
+    /// Creates an instance for a host that does not choose who handles events: the host in Model Exchange, the
+    /// FMU within its steps in Co-Simulation.
     pub fn new(interface: Interface) -> Self {
         Instance::with_events(interface, V::events(interface))
     }
@@ -219,7 +220,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.state
     }
 
-    /// Returns the simulation time that has been reached, s.
+    /// Returns the simulation time that has been reached, s: the end of the last step, or in Model Exchange the
+    /// time that the host has set.
     pub fn time(&self) -> f64 {
         self.clock.time
     }
@@ -343,7 +345,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Ends the simulation; afterwards variables can still be read.
+    /// Ends the simulation. Afterwards the last values can still be read, and the instance can be reset; no
+    /// step is allowed.
     pub fn terminate(&mut self) -> Result<(), Fault> {
         let call = self.check(V::TERMINATE)?;
         self.leave_initialized(call)?;
@@ -351,7 +354,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Resets the instance to its state after instantiation.
+    /// Resets the instance to its state after instantiation: parameters and inputs have their start values
+    /// again, also those that the host has set. The layout of arrays and the reduced description stay.
     pub fn reset(&mut self) -> Result<(), Fault> {
         self.check(V::RESET)?;
         let (layout, extent) = (self.layout, self.extent.take());
@@ -631,7 +635,8 @@ impl<M: Model, V: Version> Instance<M, V> {
             .map_err(|problems| call.error(problems.join("; ")))
     }
 
-    /// Sets slopes of inputs for the next step only.
+    /// Sets slopes of inputs (unit of the input per s) for the next step only, in which the inputs change
+    /// linearly; afterwards they are held again. `orders` must be 1, because there are no higher derivatives.
     pub fn set_input_derivatives(
         &mut self,
         references: &[u32],
@@ -1124,7 +1129,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Leaves event mode, so that steps can follow.
+    /// Leaves event mode, so that steps can follow. `call` is the function of the FMI version, which decides in
+    /// which states this is allowed.
     pub fn enter_step_mode(&mut self, call: &'static Call) -> Result<(), Fault> {
         self.check(call)?;
         self.state = InstanceState::Stepping;
@@ -1160,7 +1166,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         })
     }
 
-    /// Sets the simulation time, s (Model Exchange).
+    /// Sets the simulation time, s, in Model Exchange. In FMI 2.0 a host may go back to any time, in FMI 3.0 not
+    /// before the last event; times that are NaN or infinite are refused.
     pub fn set_time(&mut self, time: f64) -> Result<(), Fault> {
         let call = self.check(V::SET_TIME)?;
         self.clock.check_time(time, !V::SETS_STATES).map_err(|why| call.error(why))?;
@@ -1202,7 +1209,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Reads the continuous states, in the host's order.
+    /// Reads the continuous states in the host's order, which is that of the derivatives in the model
+    /// description. The array must have as many elements as there are states.
     pub fn continuous_states(&mut self, states: &mut [f64]) -> Result<(), Fault> {
         let call = self.check(V::GET_CONTINUOUS_STATES)?;
         let places = self.places();
@@ -1239,7 +1247,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Computes the event indicators, which change sign at events.
+    /// Computes the event indicators, each of which changes its sign at an event. NaN and infinity are discarded,
+    /// because the host should then try a shorter step.
     pub fn event_indicators(&mut self, indicators: &mut [f64]) -> Result<(), Fault> {
         let call = self.check(V::GET_EVENT_INDICATORS)?;
         let count = match &self.extent {
@@ -1415,7 +1424,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.model.as_ref().and_then(M::step_warning)
     }
 
-    /// Returns the number of events since the start.
+    /// Returns the number of events since the start, by which callers notice that a step had events. It may
+    /// wrap around.
     #[inline]
     pub fn event_count(&self) -> i32 {
         self.model.as_ref().map_or(0, M::event_count)
