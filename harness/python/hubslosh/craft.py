@@ -1355,7 +1355,7 @@ class Craft:
         >>> craft = hubslosh.Craft(900, [400, 380, 300], tanks=tanks, thrust=50)
         >>> files = craft.export("for_others", "60%")
         >>> hubslosh.simulate(files["fmu"], stop=1).shape
-        (101, 34)
+        (51, 30)
         """
         from .export import export
 
