@@ -3,7 +3,7 @@
 //!
 //! The hosts are C programs with the FMI's official headers, linked with the binary that users
 //! get, each compiled for FMI 2.0 and for 3.0 (`fmi.h`). What is tried with many values is divided between the versions,
-//! whose calls end in the same instance; `abuse_tests_run_for_both_versions_of_fmi` tries everything with each. `.ci/valgrind` runs them
+//! whose calls end in the same instance; `abuse_tests_run_in_both_versions_of_fmi` tries everything with each. `.ci/valgrind` runs them
 //! under valgrind (it sets `HUBSLOSH_VALGRIND`). Random inputs are few here: `.ci/fuzz` gives each FMU a thousand and more of
 //! calls, clocks, saved states and values.
 
