@@ -12,10 +12,10 @@ mod fmu_twin;
 use analysis::gauss_markov::Noise;
 use anyhow::Result;
 use host::fmu::Fmu;
-use identify::fit::bench::problem::{Differences, Problem};
+use identify::bench::problem::{Differences, Problem};
+use identify::bench::simulate::{Intersample, Setup};
+use identify::bench::unknown::Unknown;
 use identify::input::recording::Recording;
-use identify::model::bench::simulate::{Intersample, Setup};
-use identify::model::bench::unknown::Unknown;
 
 const TRUTH: [(&str, &str, f64); 8] = [
     ("tank.d", "m", 0.163),

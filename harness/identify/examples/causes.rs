@@ -17,11 +17,11 @@ use analysis::statistics::peak;
 use anyhow::{Context, Result, bail};
 use fmu_twin::{SensorErrors, Twin, Unmodelled};
 use host::fmu::Fmu;
-use identify::fit::bench::options::Options;
+use identify::bench::options::Options;
+use identify::bench::simulate::Intersample;
 use identify::input::reading::prepare;
 use identify::input::recording::Recording;
 use identify::methods::output_error::identify;
-use identify::model::bench::simulate::Intersample;
 
 /// A way in which a bench leaves the model.
 struct Way {

@@ -33,14 +33,14 @@ use anyhow::{Context, Result, bail};
 use experiments::rest;
 use fmu_twin::{SensorErrors, Twin, Unmodelled};
 use host::fmu::Fmu;
-use identify::fit::bench::options::Options;
-use identify::fit::bench::start::PARAMETERS;
+use identify::bench::options::Options;
+use identify::bench::start::PARAMETERS;
 use identify::input::reading;
 use identify::input::tolerance::Tolerances;
 use identify::methods::identification::Identification;
 use identify::methods::output_error::identify;
 
-use identify::model::bench::simulate::Intersample;
+use identify::bench::simulate::Intersample;
 use identify::tuning::COARSEST;
 
 /// Command-line arguments.

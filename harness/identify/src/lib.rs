@@ -5,6 +5,8 @@
 //! [`tuning`] all constants that are chosen and not derived.
 
 pub mod any_fmu;
+pub mod bench;
+pub mod engine;
 pub mod estimate;
 pub mod fit;
 pub mod input;

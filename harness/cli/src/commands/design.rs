@@ -10,10 +10,9 @@ use experiments::profile::{self, COARSEST, Torque, Written};
 use files::budget;
 use host::fmu::Fmu;
 use host::schedule::History;
-use identify::model::bench::nominal;
-use identify::model::bench::simulate::{Intersample, Setup};
-use identify::model::bench::unknown::Unknown;
-use identify::uncertainty::bench::design::{self, Multisine, Wheel};
+use identify::bench::design::{self, Multisine, Wheel};
+use identify::bench::nominal;
+use identify::bench::simulate::{Intersample, Setup};
 use names::hubslosh::{TAU_CMD, friction, hub, imu, slosh, tank, wheel};
 use serde_json::json;
 use signals::table::{self, Table};
@@ -261,9 +260,8 @@ struct Bench<'f> {
     fmu: &'f Fmu,
     /// Settings of the FMU with its own damping, from the correlation or not.
     setup: Setup,
-    /// Settings in which the damping ratio is a free parameter, because it is an unknown of the fit.
-    fitted: Setup,
-    unknowns: Vec<Unknown>,
+    /// Delay, bias and asymmetry are predicted too.
+    sensor_errors: bool,
     noise: Noise,
     /// Largest slosh angle that `--slosh-angle` allows, rad.
     limit: Option<f64>,
@@ -277,25 +275,13 @@ impl<'f> Bench<'f> {
     ) -> Result<Self> {
         let intersample = Intersample::FirstOrderHold;
         let setup = Setup { settings: asked.settings.clone(), intersample };
-        let mut fitted = setup.clone();
-        fitted.settings.push((slosh::ZETA_FROM_CORRELATION.into(), "false".into()));
-        let mut unknowns = Vec::new();
-        for name in identify::fit::bench::start::PARAMETERS {
-            let unit =
-                fmu.description().variable(name)?.attributes().unit.clone().unwrap_or_default();
-            let damping = slosh::DAMPING.element([1]);
-            let shown = if name == slosh::ZETA { &damping } else { name };
-            unknowns.push(Unknown::positive(name, &unit, real(shown)?));
-        }
-        if asked.sensor_errors {
-            unknowns.extend([Unknown::asymmetry(), Unknown::delay(), Unknown::gyro_bias(0)]);
-        }
         let white = white_noise(real)?;
         // Gauss–Markov bias of IEEE Std 952: its standard deviation is the bias instability divided by
         // 0.664.
         let drift = real(imu::BIAS_INSTABILITY)? / 0.664 / white;
         let noise = Noise { white, drift, time: real(imu::BIAS_TIME)? };
-        Ok(Bench { fmu, setup, fitted, unknowns, noise, limit: asked.slosh_angle })
+        let sensor_errors = asked.sensor_errors;
+        Ok(Bench { fmu, setup, sensor_errors, noise, limit: asked.slosh_angle })
     }
 
     /// Reduces a torque until the liquid's angle stays within the limit, and returns the factor with the
@@ -314,14 +300,12 @@ impl<'f> Bench<'f> {
     /// If the plan has no more rows than unknowns, or the simulation fails.
     fn bounds(&self, time: &[f64], torque: &[f64]) -> Result<Bounds> {
         let rows = (time.to_vec(), torque.to_vec());
-        let unknowns = self.unknowns.clone();
         ensure!(
-            time.len() > unknowns.len(),
-            "the plan has {} rows at {STEP} s for {} unknowns (allowed: more rows than unknowns); a longer duration has more",
-            time.len(),
-            unknowns.len()
+            time.len() > COLUMNS,
+            "the plan has {} rows at {STEP} s (allowed: more than {COLUMNS}); a longer duration has more",
+            time.len()
         );
-        design::cramer_rao(self.fmu, self.fitted.clone(), rows, unknowns, self.noise)
+        design::cramer_rao(self.fmu, &self.setup.settings, rows, self.sensor_errors, self.noise)
     }
 }
 

@@ -5,7 +5,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail, ensure};
 use host::fmu::Fmu;
-use identify::fit::bench::options::Options;
+use identify::bench::nominal::{self, Nominal};
+use identify::bench::options::Options;
+use identify::bench::simulate::Intersample;
+use identify::bench::system::Target;
 use identify::input::reading::{self, Source};
 use identify::input::recording::Recording;
 use identify::input::tolerance::Tolerances;
@@ -13,9 +16,6 @@ use identify::methods::free_decay::FreeDecay;
 use identify::methods::friction::Friction;
 use identify::methods::output_error::OutputError;
 use identify::methods::{Method, Task};
-use identify::model::bench::nominal::{self, Nominal};
-use identify::model::bench::simulate::Intersample;
-use identify::model::bench::unknown::Unknown;
 use identify::words::identified::Identified;
 use signals::recording::Columns;
 
@@ -129,10 +129,6 @@ struct KnownArgs {
     /// Value from which the search starts, instead of one estimated from the data.
     #[arg(long = "start", value_name = "NAME=VALUE", value_parser = start_value)]
     starts: Vec<(String, f64)>,
-    /// Number of further starts for each parameter of tank and liquid, or of friction and inertia. They are between a
-    /// third and three times its estimate, one parameter at a time. The command reports how many end at the same minimum.
-    #[arg(long, value_name = "NUMBER", default_value_t = 0)]
-    start_study: usize,
     /// Intersample behaviour of the torque: linear (first-order hold), held (zero-order hold, as of a sampled controller)
     /// or smooth (band-limited, as of a sampled recording of a smooth torque) [default: the one that fits best].
     #[arg(long, value_name = "HOW", value_parser = ["linear", "held", "smooth"])]
@@ -373,12 +369,12 @@ impl BenchArgs {
             friction: self.friction.clone(),
             sensor_errors: !self.perfect,
             effects: [
-                (self.actuator_lag, Unknown::actuator_lag()),
-                (self.gyro_lag, Unknown::gyro_lag()),
-                (self.friction_drift, Unknown::friction_drift()),
+                (self.actuator_lag, Target::ActuatorLag),
+                (self.gyro_lag, Target::GyroLag),
+                (self.friction_drift, Target::FrictionDrift),
             ]
             .into_iter()
-            .filter_map(|(is_asked, unknown)| is_asked.then_some(unknown))
+            .filter_map(|(is_asked, effect)| is_asked.then_some(effect))
             .collect(),
             breaking: self.breaking,
             ..self.known.options()?
@@ -443,7 +439,6 @@ impl KnownArgs {
             settings: nominal::with_damping(self.settings.clone()),
             starts: self.starts.clone(),
             gyro_scale: self.gyro_scale,
-            start_study: self.start_study,
             tolerances: tolerances(&self.tolerances)?,
             ..Options::default()
         })

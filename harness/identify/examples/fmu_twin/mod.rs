@@ -9,9 +9,9 @@ use experiments::run::{Run, TORQUE};
 use host::drive::Inputs;
 use host::fmu::Fmu;
 
+use identify::bench::design::Multisine;
+use identify::bench::simulate::{Intersample, TORQUE_BESIDES};
 use identify::input::recording::Recording;
-use identify::model::bench::simulate::{Intersample, TORQUE_BESIDES};
-use identify::uncertainty::bench::design::Multisine;
 
 /// Errors of gyro and data link in addition to the FMU's own noise.
 #[derive(Clone, Copy, Debug)]

@@ -17,8 +17,8 @@ use anyhow::{Result, ensure};
 use formulas::cylinder::{Pendulum, pendulum};
 
 use analysis::least_squares::{differences, minimise};
+use identify::bench::nominal::Bench;
 use identify::input::recording::Recording;
-use identify::model::bench::nominal::Bench;
 
 /// Friction as it is known beforehand, SI.
 #[derive(Clone, Copy, Debug)]

@@ -18,9 +18,9 @@ mod fmu_twin;
 use experiments::profile::Torque;
 use fmu_twin::SensorErrors;
 use host::fmu::Fmu;
-use identify::fit::bench::options::Options;
+use identify::bench::nominal::Bench;
+use identify::bench::options::Options;
 use identify::methods::output_error::identify;
-use identify::model::bench::nominal::Bench;
 
 mod compensation;
 

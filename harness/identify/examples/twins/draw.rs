@@ -7,14 +7,14 @@ use analysis::statistics::mean;
 use anyhow::Result;
 use experiments::profile::Profile;
 use host::fmu::Fmu;
-use identify::fit::bench::options::Options;
+use identify::bench::design::Multisine;
+use identify::bench::options::Options;
+use identify::bench::simulate::Intersample;
 use identify::input::reading::{Source, prepare, read};
 use identify::input::recording::Recording;
 use identify::input::tolerance::Tolerances;
 use identify::methods::identification::Identification;
 use identify::methods::output_error;
-use identify::model::bench::simulate::Intersample;
-use identify::uncertainty::bench::design::Multisine;
 use signals::recording::Columns;
 
 use crate::bench::{Bearing, Bench, Drive, Liquid};

@@ -1,6 +1,5 @@
 //! Third stage: the sum of squares and the search for its minimum.
 
-pub mod bench;
 pub mod covariance;
 pub mod decomposition;
 pub mod evidence;

@@ -216,6 +216,11 @@ impl Recording {
         Recording { from_rest: self.from_rest, ..part }
     }
 
+    /// The first rows, with the start of the whole.
+    pub(crate) fn first_rows(&self, rows: usize) -> Recording {
+        Recording { from_rest: self.from_rest, ..self.rows(0, rows) }
+    }
+
     /// The part of `seconds` in which the hub moves most, after `run_in` more in which the model forgets how it began; those rows are not
     /// fitted. `None` where that is not a small part, where the beginning counts (it is not at rest), or an encoder's angle does.
     pub fn loudest(&self, seconds: f64, run_in: f64) -> Option<Recording> {

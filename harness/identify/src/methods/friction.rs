@@ -17,10 +17,10 @@ use super::braking::{Braking, FrictionPoint, harmonics_at};
 use super::identification::{Details, Identification};
 use super::output_error::{self, OutputError};
 use super::{Method, Needs, Task};
-use crate::fit::bench::options::Options;
+use crate::bench::nominal::{self, Nominal};
+use crate::bench::options::Options;
 use crate::input::plausible;
 use crate::input::recording::Recording;
-use crate::model::bench::nominal::{self, Nominal};
 use crate::news::News;
 use crate::tuning::{
     BLOCK, FEWEST_BLOCKS, FREE_TORQUE, FRICTION_BINS, FRICTION_POINTS, MOVING_POWER, MOVING_SPEED,

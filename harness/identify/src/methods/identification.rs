@@ -3,15 +3,58 @@
 use serde::Serialize;
 
 use super::braking::{Braking, FrictionPoint};
-use crate::fit::bench::candidate::ModelFit;
-use crate::fit::bench::start::Response;
-use crate::model::bench::nominal::Start;
-use crate::uncertainty::bench::budget::Effect;
-use crate::uncertainty::bench::cause::Cause;
-use crate::uncertainty::bench::missing::Missing;
-use crate::uncertainty::bench::sources::Combination;
+use crate::bench::causes::{Cause, Missing};
+use crate::bench::combination::Combination;
+use crate::bench::nominal::Start;
+use crate::bench::start::Response;
 use crate::words::identified::Identified;
-use crate::words::start_study::Trial;
+use analysis::innovations::Tests;
+
+/// One model's fit.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct ModelFit {
+    /// slosh.model.
+    pub model: String,
+    /// friction.model.
+    pub friction: String,
+    /// −2 ln L.
+    pub deviance: f64,
+    /// Bayesian information criterion; the smallest is the best.
+    pub bic: f64,
+    /// Fit in the time domain, %: 100 (1 − |y − ŷ|/|y − mean y|).
+    pub fit_pct: f64,
+    /// The search ended at a minimum.
+    pub converged: bool,
+    /// Distance to the minimum in standard deviations.
+    pub newton_decrement: f64,
+    /// Residual tests, for each recording.
+    pub tests: Vec<Tests>,
+    /// Fit of the recordings held back, %.
+    pub validation_pct: Vec<f64>,
+    /// The gyro's noise: white, rad/s.
+    pub noise_white: f64,
+    /// Simulations that were needed, of all recordings; those of a part of them count as that part.
+    pub simulations: f64,
+    /// True if neither noise nor a small effect explains the residual.
+    #[serde(skip)]
+    pub poor: bool,
+}
+
+impl ModelFit {
+    /// Description in one line.
+    pub fn line(&self) -> String {
+        format!(
+            "{} with {} friction: fit {:.3} %, BIC {:.1}, worst residual test {:.1} standard deviations, {:.0} \
+             simulations",
+            self.model,
+            self.friction,
+            self.fit_pct,
+            self.bic,
+            self.tests.iter().map(Tests::worst).fold(0.0, f64::max),
+            self.simulations
+        )
+    }
+}
 
 /// Results that only the output-error method has.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -22,9 +65,7 @@ pub struct Details {
     pub combinations: Vec<Combination>,
     /// Condition number of the sensitivities.
     pub condition: f64,
-    /// The error budget.
-    pub error_budget: Vec<Effect>,
-    /// Torques that the model lacks, if noise is left with them and their rivals lose.
+    /// A torque that the model lacks, if noise is left with it and its rivals lose.
     pub missing: Vec<Missing>,
     /// The cause of a misfit, if noise is left with it and its rivals lose.
     pub cause: Option<Cause>,
@@ -34,9 +75,6 @@ pub struct Details {
     pub frequency_response: Option<Response>,
     /// Starts from the data.
     pub start: Option<Start>,
-    /// Ends of searches from other starts, if requested.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub starts: Vec<Trial>,
     /// Braking over the angle in free decay, counter-clockwise and clockwise, of friction runs.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub braking: Vec<Braking>,

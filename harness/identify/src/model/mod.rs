@@ -1,6 +1,5 @@
 //! Second stage: unknowns, and the FMU's answer for their values.
 
-pub mod bench;
 pub mod overridden;
 pub mod simulate;
 pub mod unknown;

@@ -12,9 +12,9 @@ use host::exchange;
 use host::fmu::{Fmu, Instance, Interface};
 use names::hubslosh::solver::MAX_STEPS;
 
+use crate::bench::simulate::most_steps;
 use crate::input::question::{Question, Setting, Solver, real};
 use crate::input::record::Record;
-use crate::model::bench::simulate::most_steps;
 use crate::tuning::{
     COMPARED_FACTOR, COMPARED_STEPS, COMPARED_TOLERANCE, FINEST_TOLERANCE, HELD_STEPS, SLOPE_PROBES,
 };

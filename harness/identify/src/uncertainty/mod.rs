@@ -1,6 +1,5 @@
 //! Fourth stage: intervals, and causes of a misfit.
 
-pub mod bench;
 pub mod foresee;
 pub mod knowledge;
 pub mod likelihood;

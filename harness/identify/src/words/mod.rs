@@ -2,5 +2,4 @@
 
 pub mod identified;
 pub mod page;
-pub mod start_study;
 pub mod verdict;

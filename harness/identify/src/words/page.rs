@@ -8,11 +8,11 @@ use maud::{Markup, html};
 use report::page::{axis_chart, document, render_chart, series, table};
 use report::svg::{Chart, Style};
 
+use crate::bench::combination::Combination;
+use crate::bench::start;
 use crate::estimate::{Estimated, prose};
-use crate::fit::bench::start;
 use crate::input::recording::Recording;
 use crate::tuning::{PAGE_LAGS, PAGE_POINTS, PAGE_STRETCH};
-use crate::uncertainty::bench::sources::Combination;
 use crate::words::identified::{Identified, Residual};
 use crate::words::verdict::DOUBTS;
 

@@ -2,14 +2,13 @@
 
 use std::collections::BTreeMap;
 
+use crate::bench::causes::{Cause, Missing};
+use crate::bench::combination::Combination;
+use crate::engine::DECIDES;
 use crate::estimate::{Estimated, prose};
-use crate::fit::bench::candidate::ModelFit;
 use crate::fit::evidence::probabilities;
-use crate::tuning::{BIC_DECIDES, TOLD_DECREMENT};
-use crate::uncertainty::bench::budget::Effect;
-use crate::uncertainty::bench::cause::{Cause, Rivals, wins};
-use crate::uncertainty::bench::missing::{Missing, Torques};
-use crate::uncertainty::bench::sources::Combination;
+use crate::methods::identification::ModelFit;
+use crate::tuning::TOLD_DECREMENT;
 use analysis::innovations::{self, Tests};
 use names::hubslosh::{SloshModel, hub};
 
@@ -37,36 +36,26 @@ pub struct Question<'a> {
 
 /// Findings at the chosen model's minimum other than values.
 pub struct Findings {
-    /// Reasons for the choice of the torque's intersample behaviour, in words.
-    pub torque: Vec<String>,
-    /// Torques that the model lacks.
-    pub missing: Torques,
-    /// Effects that explain a misfit.
-    pub rivals: Rivals,
+    /// Reasons for the choice of the torque's behaviour between rows, in words.
+    pub torque: Option<String>,
+    /// Tests of each signal's residual.
+    pub tests: Vec<Tests>,
+    /// True if the residual asks for effects that were not estimated.
+    pub asks: bool,
+    /// Effects with each of which noise is left, in words.
+    pub alike: Vec<String>,
+    /// The torque that the model lacks, if it is the cause.
+    pub missing: Vec<Missing>,
+    /// The cause of a misfit.
+    pub cause: Option<Cause>,
     /// Doubts about recordings or model, in words.
     pub doubts: Vec<String>,
 }
 
 impl Findings {
-    /// Returns true if the model with this fit explains the recordings.
-    pub fn fits(&self, fit: &ModelFit) -> bool {
-        fit.tests.iter().all(Tests::passed) && self.missing.all.is_empty() && self.doubts.is_empty()
-    }
-
-    /// Returns the cause of a misfit, if its rivals lose.
-    pub fn cause(&self) -> Option<&Cause> {
-        let torques = Some(self.missing.gain()).filter(|_| self.missing.explain);
-        let second = self.rivals.get(1).map(|rival| rival.gain);
-        self.rivals.first().filter(|best| wins(best.gain, second) && wins(best.gain, torques))
-    }
-
-    /// Returns the torques that are missing, if their rivals lose.
-    pub fn missing(&self) -> &[Missing] {
-        let rival = self.rivals.first().map(|best| best.gain);
-        match self.missing.explain && wins(self.missing.gain(), rival) {
-            true => &self.missing.all,
-            false => &[],
-        }
+    /// Returns true if the model explains the recordings.
+    pub fn fits(&self) -> bool {
+        self.tests.iter().all(Tests::passed) && !self.asks && self.doubts.is_empty()
     }
 }
 
@@ -77,29 +66,27 @@ pub fn words(
     fit: &ModelFit,
     combinations: &[Combination],
     parameters: &BTreeMap<String, Estimated>,
-    budget: &[Effect],
 ) -> Vec<String> {
-    let (mut lines, fits) = (Vec::new(), findings.fits(fit));
+    let (mut lines, fits) = (Vec::new(), findings.fits());
     lines.extend(slosh(question, fits));
     lines.extend(friction(question.laws));
     lines.extend(findings.torque.iter().cloned());
     if !fits {
         let mut reasons: Vec<String> =
             fit.tests.iter().flat_map(|tests| failed(tests, "the torque")).collect();
-        reasons.extend(findings.missing().iter().map(Missing::words));
+        reasons.extend(findings.missing.iter().map(Missing::words));
         reasons.extend(findings.doubts.iter().cloned());
         if reasons.is_empty() {
-            let most = findings.missing.all.iter().map(|m| m.deviations).fold(0.0, f64::max);
-            reasons.push(format!("a torque that the model lacks acts on the hub ({most:.0} σ)"));
+            reasons.push("it asks for an effect that is not estimated".into());
         }
         lines.push(format!(
             "{DOES_NOT_FIT}: no model leaves only the gyro's noise as residual ({}). Values and intervals are those of the \
              nearest model and cannot be trusted: something acts on the bench that the models lack.",
             reasons.join("; ")
         ));
-        match findings.cause() {
+        match &findings.cause {
             Some(cause) => lines.push(cause.words()),
-            None if findings.missing().is_empty() => lines.push(unknown_cause(findings, fit)),
+            None if findings.missing.is_empty() => lines.push(unknown_cause(findings, fit)),
             None => {}
         }
     }
@@ -139,7 +126,6 @@ pub fn words(
             ));
         }
     }
-    lines.extend(modes(parameters, budget));
     lines
 }
 
@@ -150,14 +136,9 @@ fn unknown_cause(findings: &Findings, fit: &ModelFit) -> String {
         all.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or_default()
     };
     let ((in_frequency, f), (in_time, t)) = (worst(|t| t.in_frequency), worst(|t| t.in_time));
-    let mut alike: Vec<String> = findings.rivals.iter().map(|r| r.effect.clone()).collect();
-    if findings.missing.explain {
-        let torque = |m: &Missing| format!("a torque that follows {}", m.follows);
-        alike.extend(findings.missing.all.iter().map(torque));
-    }
-    let why = match alike.len() {
+    let why = match findings.alike.len() {
         0 => "no effect that was tried leaves noise alone".to_string(),
-        _ => format!("{} explain it about as well", alike.join(", ")),
+        _ => format!("{} explain it about as well", findings.alike.join(", ")),
     };
     format!(
         "The cause is unknown: {why}. The residual is largest around {f:.2} Hz ({in_frequency:.1} σ) and around {t:.1} s \
@@ -198,14 +179,14 @@ fn friction(laws: &[ModelFit]) -> Vec<String> {
     let one = |other: &ModelFit| {
         let gain = first.bic - other.bic;
         match gain {
-            g if g > BIC_DECIDES => {
+            g if g > DECIDES => {
                 format!(
                     "The friction is {}: its BIC is {g:.0} below that of {}.",
                     other.friction, first.friction
                 )
             }
             // what the other has more counts ln N a parameter; without that they are alike
-            _ if first.deviance - other.deviance > -BIC_DECIDES => format!(
+            _ if first.deviance - other.deviance > -DECIDES => format!(
                 "Cannot tell the friction's law: {} explains the data as well as {}, which has fewer unknowns and is used.",
                 other.friction, first.friction
             ),
@@ -216,24 +197,6 @@ fn friction(laws: &[ModelFit]) -> Vec<String> {
         }
     };
     laws[1..].iter().map(one).collect()
-}
-
-fn modes(parameters: &BTreeMap<String, Estimated>, budget: &[Effect]) -> Option<String> {
-    let modes = budget.iter().find(|e| e.source.starts_with("slosh modes"))?;
-    let large: Vec<String> = parameters
-        .iter()
-        .filter_map(|(name, p)| {
-            let change = modes.change.get(name)?;
-            (change.abs() > p.std).then(|| format!("{name} {}", p.change(*change)))
-        })
-        .collect();
-    (!large.is_empty()).then(|| {
-        format!(
-            "Slosh modes 2 to 4 are left out; with them the estimates would change by more than their \
-             standard deviation: {}. Set slosh.modes to include them.",
-            large.join(", ")
-        )
-    })
 }
 
 /// Names the failed tests of a residual, each with its standard deviations of chance; `input` names what may be correlated with it.

@@ -5,14 +5,14 @@ use std::collections::BTreeMap;
 use analysis::random::Random;
 use experiments::profile::Torque;
 use host::fmu::Fmu;
+use identify::bench::combination::Combination;
+use identify::bench::options::Options;
+use identify::bench::simulate::{Intersample, Setup};
 use identify::estimate::Estimated;
-use identify::fit::bench::options::Options;
 use identify::input::recording::Recording;
 use identify::input::tolerance::Tolerances;
 use identify::methods::friction;
 use identify::methods::identification::Identification;
-use identify::model::bench::simulate::{Intersample, Setup};
-use identify::uncertainty::bench::sources::Combination;
 use identify::words::verdict::DOES_NOT_FIT;
 use pack::packed_for_tests;
 
@@ -144,17 +144,6 @@ fn identify_finds_the_preferential_direction_in_both_directions() {
 #[test]
 fn a_bias_of_five_degrees_a_second_leads_to_no_false_minimum() {
     assert_eq!(wrong(&SETS[0], 4, 0.087, ASYMMETRY), [""; 0]);
-}
-
-#[test]
-fn searches_from_afar_end_at_the_same_minimum_or_higher() {
-    let options = Options { start_study: 2, ..options() };
-    let found = fit(&recordings(&SETS[2], 1, 0.0, ASYMMETRY), &options).unwrap();
-    let trials = &found.details.starts;
-    assert_eq!(trials.len(), 10);
-    assert!(trials.iter().all(|trial| trial.more.is_some_and(|more| more > -0.5)), "{trials:?}");
-    assert!(trials.iter().filter(|trial| trial.is_same()).count() >= 5, "{trials:?}");
-    assert!(found.verdict.iter().any(|line| line.contains("of 10 starts")), "{:?}", found.verdict);
 }
 
 /// The tank counts as empty unless its liquid is stated, and the verdict says so.

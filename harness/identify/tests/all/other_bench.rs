@@ -2,8 +2,8 @@
 //! have put there.
 
 use host::fmu::Fmu;
+use identify::bench::simulate::{Intersample, Setup};
 use identify::input::recording::Recording;
-use identify::model::bench::simulate::{Intersample, Setup};
 use pack::packed_for_tests;
 
 use crate::bench::{Bearing, Bench, Drive, Liquid};

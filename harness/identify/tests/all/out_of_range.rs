@@ -3,7 +3,7 @@
 use experiments::profile::Torque;
 use host::fmu::Fmu;
 use identify::any_fmu::identify;
-use identify::fit::bench::options::Options;
+use identify::bench::options::Options;
 use identify::input::question::{Question, Solver};
 use identify::input::recording::Recording;
 use identify::methods::free_decay::FreeDecay;

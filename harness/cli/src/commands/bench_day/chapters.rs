@@ -7,15 +7,14 @@ use analysis::rest::Rest;
 use anyhow::{Context, Result};
 use experiments::scaling::{OXYGEN, WATER};
 use host::fmu::Fmu;
+use identify::bench::nominal;
+use identify::bench::options::Options;
 use identify::estimate::{Estimated, prose};
-use identify::fit::bench::options::Options;
 use identify::input::reading::{self, Source};
 use identify::input::recording::Recording;
 use identify::methods::braking::Braking;
 use identify::methods::friction::{self as runs, LEAST_STRETCHES};
 use identify::methods::identification::Identification;
-use identify::model::bench::nominal;
-use identify::words::start_study;
 use names::hubslosh::{friction, hub, tank};
 use report::campaign::{Chapter, Illustration};
 use report::svg::{Axis, Chart, Series, Style};
@@ -38,8 +37,6 @@ const CENTAUR: f64 = 2.0425;
 /// Standard gravity as in the thesis, m/s².
 const GRAVITY: f64 = 9.81;
 const POINTS: usize = 1500;
-/// Number of random starts for the fit of the friction law.
-const STARTS: usize = 8;
 /// Largest rate of the friction curve near zero, in Stribeck speeds ω_s.
 const NEAR: f64 = 5.0;
 /// Longest lag of the gyro's autocorrelation, s. The next constants are the length of a chunk, s, as in the
@@ -67,7 +64,6 @@ pub fn chapters(
     settings.extend(runs::empty());
     let options = Options {
         settings,
-        start_study: STARTS,
         tolerances: day.tolerances,
         gyro_scale: day.manifest.gyro_scale,
         ..Options::default()
@@ -295,12 +291,6 @@ fn bearing(fitted: &Identification, is_used: bool) -> Chapter {
                 near,
                 "5.8",
                 "The same where the hub is slow: dry friction is largest when the hub begins to slip.",
-            ),
-            illustration(
-                start_study::chart(&fitted.details.starts),
-                "6.2 and 6.3",
-                "One unknown of the friction law at a time starts away from its estimate. Fits below 0.5 ended at the minimum, those above in another \
-                 one. The thesis does so with the tank's diameter and fill: hubslosh identify SWEEP --start-study 8 --report.",
             ),
         ],
     }

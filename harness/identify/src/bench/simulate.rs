@@ -9,9 +9,9 @@ use names::hubslosh::{
     G_AXIAL, OMEGA, OMEGA_DOT, SLOSH_ANGLE, TAU_CMD, TAU_EXT, THETA, friction, solver,
 };
 
+use crate::bench::effect::{self, Effects};
 use crate::input::clocks;
 use crate::input::recording::Recording;
-use crate::model::bench::effect::{self, Effects};
 use crate::tuning::{MOST_INTERNAL_STEPS, SAME_INSTANT};
 
 /// The FMU's input for a torque on the hub besides the actuator's.
@@ -57,31 +57,7 @@ pub enum Read {
     States,
 }
 
-/// Intersample behaviour: what the torque does between the rows of a recording (Ljung; Pintelon & Schoukens).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Intersample {
-    /// A line from row to row.
-    FirstOrderHold,
-    /// The row's value until the next.
-    ZeroOrderHold,
-    /// Band-limited interpolation of the samples: see [`smooth`].
-    BandLimited,
-}
-
-impl Intersample {
-    /// All, the likeliest first.
-    pub const ALL: [Intersample; 3] =
-        [Intersample::FirstOrderHold, Intersample::BandLimited, Intersample::ZeroOrderHold];
-
-    /// Returns the behaviour in words.
-    pub fn words(self) -> &'static str {
-        match self {
-            Intersample::FirstOrderHold => "linear between rows (first-order hold)",
-            Intersample::ZeroOrderHold => "held from row to row (zero-order hold)",
-            Intersample::BandLimited => "smooth between rows (band-limited)",
-        }
-    }
-}
+pub use crate::engine::problem::Hold as Intersample;
 
 /// Values that, joined by lines, act as the smooth signal does whose samples these are. Lines make sinc²(Ωh/2) of a sine at
 /// Ω, h the time between rows: 0.8 % less at 2.4 Hz and 50 Hz sampling. With δ² the second difference, which makes
@@ -284,6 +260,42 @@ impl Setup {
         }
         Ok(motion)
     }
+}
+
+/// A cubic between two rows from values and slopes at them, and its slope; beyond the ends the slope stays.
+fn hermite(time: &[f64], values: &[f64], slopes: &[f64], lead: f64) -> Vec<(f64, f64)> {
+    let last = time.len() - 1;
+    let mut row = 0;
+    let at = |t: f64| {
+        let t = t + lead;
+        while row + 1 < last && time[row + 1] <= t {
+            row += 1;
+        }
+        while row > 0 && time[row] > t {
+            row -= 1;
+        }
+        for (end, beyond) in [(0, t <= time[0]), (last, t >= time[last])] {
+            if beyond {
+                return (values[end] + slopes[end] * (t - time[end]), slopes[end]);
+            }
+        }
+        let h = time[row + 1] - time[row];
+        let u = (t - time[row]) / h;
+        let (a, b) = (values[row], values[row + 1]);
+        let (p, q) = (h * slopes[row], h * slopes[row + 1]);
+        let (c, d) = (3.0 * (b - a) - 2.0 * p - q, 2.0 * (a - b) + p + q);
+        (a + u * (p + u * (c + u * d)), (p + u * (2.0 * c + 3.0 * u * d)) / h)
+    };
+    time.iter().copied().map(at).collect()
+}
+
+/// Angle and rate of a motion `lead` (s) after the instants at which it was read.
+pub fn angle_and_rate_at(time: &[f64], motion: &Motion, lead: f64) -> [Vec<f64>; 2] {
+    if lead == 0.0 {
+        return [motion.angle.clone(), motion.rate.clone()];
+    }
+    let (angle, rate) = hermite(time, &motion.angle, &motion.rate, lead).into_iter().unzip();
+    [angle, rate]
 }
 
 #[cfg(test)]

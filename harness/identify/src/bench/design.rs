@@ -5,18 +5,22 @@ use std::f64::consts::TAU;
 use analysis::linear::Linear;
 use analysis::random::Random;
 use analysis::statistics::peak;
-use anyhow::{Result, ensure};
+use anyhow::{Result, bail, ensure};
 use files::budget;
 use host::fmu::Fmu;
 use nalgebra::Matrix5;
 
-use crate::fit::bench::problem::Problem;
+use crate::bench::nominal::Nominal;
+use crate::bench::options::Options;
+use crate::bench::problem;
+use crate::bench::simulate::Setup;
+use crate::engine::minimum::Minimum;
+use crate::engine::{Fit, Hold, Solution};
 use crate::input::recording::Recording;
-use crate::model::bench::simulate::Setup;
-use crate::model::bench::unknown::Unknown;
+use crate::input::tolerance::Tolerances;
 use crate::tuning::{ANGLE_ENOUGH, ANGLE_ROUNDS, LINE_GROUP, SPREAD_POWER};
 use analysis::gauss_markov::Noise;
-use names::hubslosh::friction;
+use names::hubslosh::{FrictionModel, SloshModel, slosh};
 
 /// A random-phase odd multisine with detection lines (Pintelon and Schoukens, System Identification,
 /// chapter 4): Σ a_k sin(2π k f_0 t + φ_k) over odd k, one of each group of [`LINE_GROUP`] left out at random.
@@ -268,40 +272,72 @@ pub fn merit(bounds: &[(String, f64, f64)]) -> f64 {
     analysis::statistics::mean(&logarithms).exp()
 }
 
-/// Standard deviation that no unbiased estimate can beat, for each unknown at its start, from a torque
-/// and a gyro's noise.
+/// Standard deviations that the engine would state for each unknown at its start, from a torque and a gyro's noise: the Cramér–Rao
+/// bound, with the engine's weak priors. `sensor_errors`: delay, bias and asymmetry are unknown too.
 ///
 /// # Errors
 /// If the hub does not turn, some combination of the unknowns has no influence on its rate, or the FMU refuses to run.
 pub fn cramer_rao(
     fmu: &Fmu,
-    setup: Setup,
+    settings: &[(String, String)],
     (time, torque): (Vec<f64>, Vec<f64>),
-    unknowns: Vec<Unknown>,
+    sensor_errors: bool,
     noise: Noise,
 ) -> Result<Vec<(String, f64, f64)>> {
-    let rate = vec![0.0; time.len()];
     let largest = peak(&torque);
-    let recording = [Recording::of("plan", time, torque, rate)];
-    let mut problem = Problem::new(fmu, setup, &recording, unknowns);
-    problem.channels[0].noise = noise;
-    let x = problem.start();
-    let values = problem.values(&x);
-    let of = |name: &str| problem.index(name).map_or(0.0, |place| values[place]);
+    let rate = vec![0.0; time.len()];
+    let recordings = [Recording::of("plan", time, torque, rate)];
+    let options = Options {
+        settings: settings.to_vec(),
+        sensor_errors,
+        gyro_scale: 0.0,
+        tolerances: Tolerances::NONE,
+        intersample: Some(Hold::FirstOrderHold),
+        ..Options::default()
+    };
+    let nominal = Nominal::of(fmu, settings, &[])?;
+    let pair = (SloshModel::Linear.name(), FrictionModel::Stribeck.name());
+    let model = settings.iter().find(|(name, _)| name == slosh::MODEL);
+    let pair = (model.map_or(pair.0, |(_, model)| model.as_str()), pair.1);
+    let (system, unknowns, starts) =
+        problem::system(fmu, &recordings, &options, pair, &[nominal.start])?;
+    let mut problem = problem::problem(&system, unknowns, starts, &options);
+    for signal in &mut problem.signals {
+        signal.white = noise.white;
+    }
+    let values = problem.starts[0].clone();
+    let motion =
+        problem.system.run(&values, 0, recordings[0].time.len(), problem.holds[0], true)?;
     ensure!(
-        problem.setup.run(fmu, &[], &recording[0], 0.0)?.rate.iter().any(|rate| *rate != 0.0),
+        motion.outputs[0].iter().any(|rate| *rate != 0.0),
         "the planned torque, up to {largest:.2e} N·m, does not turn the hub: nothing can be estimated. Dry friction holds up to \
          friction.c + friction.d = {:.2e} N·m (allowed: a larger torque).",
-        of(friction::C) + of(friction::D)
+        nominal.start.c + nominal.start.stribeck
     );
-    let (covariance, _) = problem.information(&x)?;
-    let deviation = |i: usize| covariance.x[(i, i)].sqrt();
-    Ok(problem
-        .unknowns
-        .iter()
-        .enumerate()
-        .map(|(i, u)| (u.quantity.name(), u.start, deviation(i) * u.scale.slope(x[i]).abs()))
-        .collect())
+    problem.signals[0].measured.clone_from(&motion.outputs[0]);
+    let mut fit = Fit::new(&problem);
+    fit.set(vec![noise], 1.0);
+    let point = fit.point(&fit.coordinates(&values), vec![motion]);
+    let free = fit.free.clone();
+    let mut minimum = Minimum { point, derivatives: None, decrement: 0.0, free };
+    let derivatives = fit.derivatives_at(&mut minimum)?;
+    let blind =
+        (0..fit.free.len()).find(|j| fit.free[*j] && derivatives.matrix.column(*j).norm() == 0.0);
+    if let Some(j) = blind {
+        bail!("{} has no influence on the rate under this torque", problem.unknowns[j].name);
+    }
+    let mut solution = Solution {
+        fit,
+        minimum,
+        profile: None,
+        rivals: Vec::new(),
+        tests: Vec::new(),
+        at_bound: Vec::new(),
+        starts: 1,
+    };
+    let found = solution.draw(false)?;
+    let row = |k: usize| (found.names[k].clone(), found.values[k], found.std(k));
+    Ok((0..found.names.len()).map(row).collect())
 }
 
 #[cfg(test)]

@@ -15,9 +15,9 @@ use formulas::cylinder::tank_of_first_mode;
 use names::hubslosh::{friction, hub, slosh, tank};
 use signals::fourier::Forward;
 
+use crate::bench::nominal::{Bench, Nominal, Start};
 use crate::input::plausible;
 use crate::input::recording::Recording;
-use crate::model::bench::nominal::{Bench, Nominal, Start};
 use crate::tuning::{DAMPINGS, FREQUENCY_FINENESS, LATEST_DELAY};
 
 /// Bench parameters from a frequency response.
@@ -187,8 +187,8 @@ pub fn from_data(
         all.push(mode.start(bench, rough));
         modes.retain(|other| !other.is_near(&mode));
     }
-    let Start { d, h, zeta, hub_inertia, .. } = nominal.start;
-    all.push(Start { d, h, zeta, hub_inertia, ..rough });
+    let Start { b, c, stribeck, omega_s, .. } = rough;
+    all.push(Start { b, c, stribeck, omega_s, ..nominal.start });
     Ok((responses.first().copied().or(Some(first)), all))
 }
 
@@ -249,6 +249,9 @@ impl Response {
             h,
             zeta: self.slosh_damping.clamp(1e-3, 0.1),
             hub_inertia: hub_inertia.max(0.2 * self.inertia),
+            length: bench.gravity / (TAU * self.slosh_frequency).powi(2),
+            mass_ratio: bench.inertia(self.slosh_mass) / self.inertia,
+            inertia: self.inertia,
             ..friction
         }
     }
@@ -441,7 +444,7 @@ fn friction(recordings: &[Recording]) -> Start {
     // the peak of a sine is π/2 times its mean
     let (b, omega_s) = (0.1 * torque / middle, 0.5 * PI * fastest);
     let (c, stribeck) = (0.55 * torque, 0.35 * torque);
-    Start { d: 0.0, h: 0.0, zeta: 0.003, hub_inertia: 0.0, b, c, stribeck, omega_s }
+    Start { zeta: 0.003, b, c, stribeck, omega_s, ..Start::default() }
 }
 
 /// Slope of the line through points (y, x, …), least squares; `None` where they do not tell.

@@ -5,11 +5,11 @@ use host::fmu::Fmu;
 use names::hubslosh::FrictionModel;
 use names::hubslosh::SloshModel::{Frozen, Linear, Planar, Spherical};
 
+use crate::bench::nominal::Nominal;
+use crate::bench::simulate::Intersample;
+use crate::bench::system::Target;
 use crate::input::recording::Recording;
 use crate::input::tolerance::Tolerances;
-use crate::model::bench::nominal::Nominal;
-use crate::model::bench::simulate::Intersample;
-use crate::model::bench::unknown::Unknown;
 
 /// Options of an identification.
 #[derive(Clone, Debug)]
@@ -26,8 +26,8 @@ pub struct Options {
     pub starts: Vec<(String, f64)>,
     /// True to estimate delay, gyro bias and friction asymmetry as well.
     pub sensor_errors: bool,
-    /// Effects of the bench that the FMU does not have and that are estimated: [`Unknown::actuator_lag`] and others.
-    pub effects: Vec<Unknown>,
+    /// Effects of the bench that the FMU does not have and that are estimated: [`Target::ActuatorLag`] and others.
+    pub effects: Vec<Target>,
     /// True to estimate the damping by waves that break, if the fit reaches them.
     pub breaking: bool,
     /// Standard deviation of the gyro's scale about 1, as its data sheet has it; 0: exactly 1.
@@ -38,8 +38,6 @@ pub struct Options {
     pub intersample: Option<Intersample>,
     /// True if the rate's time stamps may be early: a negative delay then raises no doubt.
     pub acausal: bool,
-    /// Number of other starts of each of the tank's parameters from which the chosen model is fitted again.
-    pub start_study: usize,
     /// Recordings that are simulated, not fitted.
     pub validation: Vec<Recording>,
 }
@@ -59,7 +57,6 @@ impl Default for Options {
             tolerances: Tolerances::default(),
             intersample: None,
             acausal: false,
-            start_study: 0,
             validation: Vec::new(),
         }
     }

@@ -21,9 +21,15 @@ pub struct Bench {
 }
 
 /// Start of a search: estimated values of the bench in the time domain; SI units.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 #[allow(missing_docs)]
 pub struct Start {
+    /// Length of the first mode's pendulum, m.
+    pub length: f64,
+    /// Inertia of the first mode's mass about the hub over the inertia that turns with the hub.
+    pub mass_ratio: f64,
+    /// Inertia that turns with the hub, without the first mode's mass, kg·m².
+    pub inertia: f64,
     pub d: f64,
     pub h: f64,
     pub zeta: f64,
@@ -35,6 +41,15 @@ pub struct Start {
 }
 
 impl Start {
+    /// The same with the first mode of its tank.
+    pub fn with_modes(self, bench: Bench) -> Self {
+        let liquid = bench.liquid(self.d, self.h);
+        let mode = pendulum(0, self.d, self.h, liquid);
+        let inertia = self.hub_inertia + bench.inertia(liquid - mode.mass);
+        let mass_ratio = bench.inertia(mode.mass) / inertia;
+        Start { length: mode.length, mass_ratio, inertia, ..self }
+    }
+
     /// Description in one line.
     pub fn line(&self) -> String {
         format!(
@@ -135,7 +150,9 @@ impl Nominal {
             c: real(friction::C)?,
             stribeck: real(friction::D)?,
             omega_s: real(friction::OMEGA_S)?,
+            ..Start::default()
         };
+        let start = start.with_modes(bench);
         let inertia = start.hub_inertia + bench.inertia(bench.liquid(start.d, start.h));
         Ok(Nominal { bench, start, inertia, period: 1.0 / real(&slosh::FREQUENCY.element([1]))? })
     }

@@ -1,0 +1,430 @@
+//! The answer of the engine about the bench: estimates, combinations, causes and words.
+
+use std::collections::BTreeMap;
+
+use analysis::statistics::{correlation, mean};
+use anyhow::Result;
+use formulas::cylinder::XI;
+use formulas::regime::Regime;
+use nalgebra::DMatrix;
+use names::hubslosh::{SloshModel, friction};
+
+use super::causes::{self, Cause, Missing};
+use super::combination::{self, Combination, ONE_WAY};
+use super::options::Options;
+use super::system::{BenchSystem, Target};
+use crate::engine::cause::{Effect, cause, effects};
+use crate::engine::draws::Derived;
+use crate::engine::hold::Rival;
+use crate::engine::minimum::places;
+use crate::engine::{Motion, Solution};
+use crate::estimate::Estimated;
+use crate::input::recording::Recording;
+use crate::input::tolerance::{self, Share};
+use crate::methods::identification::{Details, Identification, ModelFit};
+use crate::news::News;
+use crate::words::identified::{Identified, Residual};
+use crate::words::page::RATE;
+use crate::words::verdict::{self, Findings};
+
+/// Fit of a rate below which a minimum is taken for a wrong one, %.
+const POOR_FIT: f64 = 90.0;
+/// Distance to a minimum up to which a search has converged, standard deviations: the stated deviations contain it.
+const CONVERGED: f64 = 0.5;
+
+/// Fit of the rates, %: 100 (1 − |y − ŷ|/|y − mean y|).
+fn fit_pct(recordings: &[Recording], motion: &[Motion], solution: &Solution) -> f64 {
+    let residuals = solution.fit.residuals(&solution.minimum.point.z, motion);
+    let (mut left, mut all) = (0.0, 0.0);
+    for (signal, residual) in solution.fit.problem.signals.iter().zip(&residuals) {
+        if signal.output == 0 && signal.recording < recordings.len() {
+            left += signal.picked(residual).iter().map(|e| e * e).sum::<f64>();
+            let rate = signal.picked(&signal.measured);
+            let middle = mean(&rate);
+            all += rate.iter().map(|y| (y - middle).powi(2)).sum::<f64>();
+        }
+    }
+    100.0 * (1.0 - (left / all).sqrt())
+}
+
+/// One model's fit in numbers.
+pub fn summary(system: &BenchSystem, solution: &Solution, (model, law): (&str, &str)) -> ModelFit {
+    let fit = &solution.fit;
+    let point = &solution.minimum.point;
+    let deviance = fit.deviance(point);
+    let rows: usize =
+        fit.problem.signals.iter().map(|s| s.sampled.iter().filter(|s| **s).count()).sum();
+    let count = places(&fit.free).len();
+    let fit_pct = fit_pct(system.recordings, &point.motion, solution);
+    let first = &fit.problem.signals[0];
+    let residual = first.picked(&fit.residuals(&point.z, &point.motion)[0]);
+    let rms = (residual.iter().map(|e| e * e).sum::<f64>() / residual.len() as f64).sqrt();
+    ModelFit {
+        model: model.into(),
+        friction: law.into(),
+        deviance,
+        bic: deviance + count as f64 * (rows as f64).ln(),
+        fit_pct,
+        converged: solution.minimum.decrement < CONVERGED,
+        newton_decrement: solution.minimum.decrement,
+        tests: solution.tests.clone(),
+        validation_pct: Vec::new(),
+        noise_white: fit.noise[0].white,
+        simulations: fit.simulations(),
+        poor: fit_pct < POOR_FIT && rms > 2.0 * first.white,
+    }
+}
+
+/// Fit of recordings that are simulated with a result, and not fitted, %.
+///
+/// # Errors
+/// If the FMU refuses to run.
+pub fn validate(
+    system: &BenchSystem,
+    solution: &Solution,
+    validation: &[Recording],
+) -> Result<Vec<f64>> {
+    let values = solution.fit.values(&solution.minimum.point.z);
+    let one = |recording: &Recording| -> Result<f64> {
+        let own = BenchSystem {
+            recordings: std::slice::from_ref(recording),
+            settings: system.settings.clone(),
+            targets: system.targets.clone(),
+            derived: system.derived.clone(),
+            base: std::sync::OnceLock::new(),
+            ..*system
+        };
+        let rows = recording.time.len();
+        let motion = crate::engine::System::run(&own, &values, 0, rows, solution.fit.hold, false)?;
+        let rate = recording.of_fresh(&recording.rate);
+        let model = recording.of_fresh(&motion.outputs[0]);
+        let scale = 1.0 + own.value(&values, &Target::GyroScale).unwrap_or(0.0);
+        // the bias of another recording is its own
+        let off: Vec<f64> = rate.iter().zip(&model).map(|(y, w)| y - scale * w).collect();
+        let (middle, level) = (mean(&rate), mean(&off));
+        let left: f64 = off.iter().map(|e| (e - level).powi(2)).sum();
+        let all: f64 = rate.iter().map(|y| (y - middle).powi(2)).sum();
+        Ok(100.0 * (1.0 - (left / all).sqrt()))
+    };
+    validation.iter().map(one).collect()
+}
+
+/// A model that was fitted, with what it is.
+pub struct Fitted<'p> {
+    /// The bench's system.
+    pub system: &'p BenchSystem<'p>,
+    /// End of the search.
+    pub solution: Solution<'p>,
+    /// In numbers.
+    pub fit: ModelFit,
+}
+
+/// The answer from the chosen model; `near` are others that explain the recordings about as well, with the probability of each and
+/// that of the chosen one.
+///
+/// # Errors
+/// If the FMU refuses a run at the minimum.
+pub fn answer(
+    mut best: Fitted,
+    near: (f64, &mut [(f64, Fitted)]),
+    question: &verdict::Question,
+    options: &Options,
+    tell: &mut dyn FnMut(News),
+) -> Result<Identification> {
+    let (system, solution) = (best.system, &mut best.solution);
+    let motion = solution.minimum.point.motion.clone();
+    let _ = system.base.set(motion.clone());
+    let found = effects(solution, &mut |news| tell(news.clone()))?;
+    let full = solution.draw(true)?;
+    let own = solution.draw(false)?;
+    let full = match near.1 {
+        [] => full,
+        others => {
+            let mut all = vec![(near.0, full)];
+            for (probability, other) in others {
+                all.push((*probability, other.solution.draw(true)?));
+            }
+            let borrowed: Vec<(f64, &Derived)> = all.iter().map(|(p, d)| (*p, d)).collect();
+            Derived::mixed(&borrowed)
+        }
+    };
+    let rate = motion.iter().flat_map(|motion| motion.outputs[0].iter().copied());
+    let way = combination::way(rate);
+    let combinations = combination::combinations(&full, way);
+    let mut parameters = BTreeMap::new();
+    let mut measurement = BTreeMap::new();
+    for (k, name) in full.names.iter().enumerate() {
+        let estimated = estimated(system, solution, (&full, &own), k, &combinations);
+        match &system.targets[k] {
+            Target::Parameter(_)
+            | Target::Length
+            | Target::MassRatio
+            | Target::Inertia
+            | Target::Zeta => parameters.insert(name.clone(), estimated),
+            _ => measurement.insert(name.clone(), estimated),
+        };
+    }
+    let mut fit = best.fit.clone();
+    fit.simulations = solution.fit.simulations();
+    let findings = findings(system, solution, &found, options, question);
+    let fits = findings.fits();
+    let mut verdict = verdict::words(question, &findings, &fit, &combinations, &parameters);
+    verdict.extend(shares(&full, &own));
+    let slosh_angle = match fit.model == SloshModel::Frozen.name() {
+        true => 0.0,
+        false => motion
+            .iter()
+            .flat_map(|motion| &motion.others[0])
+            .fold(0.0_f64, |most, angle| most.max(angle.abs())),
+    };
+    verdict.extend(regime(&fit.model, slosh_angle));
+    let columns: Vec<&Vec<f64>> = full.columns.iter().collect();
+    let correlations =
+        columns.iter().map(|a| columns.iter().map(|b| correlation(a, b)).collect()).collect();
+    let details = Details {
+        combinations,
+        condition: condition(solution),
+        missing: findings.missing.clone(),
+        cause: findings.cause.clone(),
+        slosh_angle,
+        ..Details::default()
+    };
+    let converged = fit.converged && full.is_told();
+    Ok(Identification {
+        parameters,
+        measurement,
+        settings: system.settings.iter().cloned().collect(),
+        correlations: (full.names.clone(), correlations),
+        converged,
+        fits: Some(fits),
+        verdict,
+        residuals: residuals(system, solution),
+        ..Identified::new(Details { fit, ..details })
+    })
+}
+
+/// An estimate from its draws.
+fn estimated(
+    system: &BenchSystem,
+    solution: &Solution,
+    (full, own): (&Derived, &Derived),
+    k: usize,
+    combinations: &[Combination],
+) -> Estimated {
+    let name = &full.names[k];
+    let unknown = &solution.fit.problem.unknowns[k];
+    let (mut std, mut std_noise, mut interval) = (f64::NAN, f64::NAN, [f64::NAN; 2]);
+    if full.is_told() {
+        (std, interval) = (full.std(k), full.interval(k));
+    }
+    if own.is_told() {
+        std_noise = own.std(k);
+    }
+    let positive = unknown.log || unknown.bounds.0 >= 0.0;
+    if let Some((_, open)) = full.open.as_ref().filter(|(open, _)| open == name) {
+        if open[0] {
+            interval[0] = 0.0;
+        }
+        if open[1] {
+            interval[1] = f64::INFINITY;
+        }
+    }
+    let value = full.values[k];
+    // of a skew interval that of the longer side
+    let reach = interval.map(|end| (end - value).abs() / 1.96);
+    let reach = reach.into_iter().filter(|reach| reach.is_finite()).fold(0.0, f64::max);
+    std = if std.is_finite() { std.max(reach) } else { std };
+    let is_part = |c: &Combination| c.of.contains(name) && c.std < 0.5 * std;
+    let is_shown = match &system.targets[k] {
+        Target::Parameter(name) if name == friction::ASYMMETRY => std < ONE_WAY,
+        _ if !positive => true,
+        _ => interval[1].is_finite() && std < 0.5 * value.abs(),
+    };
+    let determined = is_shown && !combinations.iter().any(|c| c.name.contains("(1 ") && is_part(c));
+    Estimated { value, std, std_noise, interval, determined, unit: full.units[k].clone() }
+}
+
+/// What the chosen model's minimum shows besides values.
+fn findings(
+    system: &BenchSystem,
+    solution: &Solution,
+    found: &[Effect],
+    options: &Options,
+    question: &verdict::Question,
+) -> Findings {
+    let problem = solution.fit.problem;
+    let named = cause(found);
+    let mut doubts = question.doubts.to_vec();
+    if let Some(j) = solution.fit.delay() {
+        let (delay, step) = (solution.minimum.point.z[j], problem.recordings[0].step);
+        if !options.acausal && solution.fit.free[j] && delay < -0.05 * step {
+            doubts.push(format!(
+                "the rate comes {:.2} ms before the torque: check the time stamps and the torque between rows (--torque; \
+                 --acausal allows it)",
+                -1e3 * delay
+            ));
+        }
+    }
+    for j in &solution.at_bound {
+        let unknown = &problem.unknowns[*j];
+        let target = &system.targets[*j];
+        let is_own = matches!(target, Target::Parameter(_)) && !unknown.bent;
+        // friction may be 0
+        let is_zero = solution.minimum.point.z[*j] <= unknown.bounds.0 && unknown.bounds.0 == 0.0;
+        if is_own && !is_zero {
+            doubts.push(format!(
+                "{} = {:.4e} is at the end of the range that the FMU allows, {} to {}",
+                unknown.name,
+                unknown.value(solution.minimum.point.z[*j]),
+                unknown.bounds.0,
+                unknown.bounds.1
+            ));
+        }
+    }
+    if solution.fit.is_loud() {
+        let (noise, signal) = (&solution.fit.noise[0], &problem.signals[0]);
+        doubts.push(format!(
+            "the residual is {:.1} times what neighbouring rows show of noise",
+            noise.white / signal.white
+        ));
+    }
+    let missing: Vec<Missing> =
+        named.and_then(|e| causes::missing(system, e)).into_iter().collect();
+    let named: Option<Cause> = named.and_then(|effect| causes::cause(system, effect));
+    let alike = found.iter().filter(|e| e.fits).map(|e| causes::words(&system.targets[e.unknown]));
+    Findings {
+        torque: torque_words(solution),
+        tests: solution.tests.clone(),
+        asks: !found.is_empty(),
+        alike: alike.collect(),
+        missing,
+        cause: named,
+        doubts,
+    }
+}
+
+/// What the torque does between rows, in words.
+fn torque_words(solution: &Solution) -> Option<String> {
+    if solution.rivals.is_empty() {
+        return None;
+    }
+    let fit = &solution.fit;
+    let now = fit.hold.words();
+    let late = |delay: Option<f64>| {
+        delay.map_or(String::new(), |delay| format!(" with a delay of {:.2} ms", 1e3 * delay))
+    };
+    let own = fit.delay().filter(|j| fit.free[*j]).map(|j| solution.minimum.point.z[j]);
+    let near: Vec<&Rival> = solution.rivals.iter().filter(|r| r.is_near()).collect();
+    if !near.is_empty() {
+        let weights: Vec<f64> = near.iter().map(|r| (-0.5 * r.more).exp()).collect();
+        let sum = 1.0 + weights.iter().sum::<f64>();
+        let first = format!("{now}{} (probability {:.2})", late(own), 1.0 / sum);
+        let others = near.iter().zip(&weights).map(|(r, w)| {
+            format!("{}{} (probability {:.2})", r.hold.words(), late(r.delay), w / sum)
+        });
+        let each: Vec<String> = std::iter::once(first).chain(others).collect();
+        return Some(format!(
+            "Cannot tell what the torque does between rows: {}. The values are those of the first; their standard deviations \
+             include the others. --torque sets it.",
+            each.join(", ")
+        ));
+    }
+    let each = solution.rivals.iter().map(|r| {
+        let hold = r.hold.words();
+        match r.delay.filter(|_| r.early) {
+            Some(delay) => format!("{hold} would need a delay of {:.2} ms", 1e3 * delay),
+            None if r.lost => {
+                format!("{hold} was given up with a sum of squares {:.0} larger", r.more)
+            }
+            None => format!("{hold}{} changes the sum of squares by {:+.0}", late(r.delay), r.more),
+        }
+    });
+    Some(format!(
+        "The torque is taken as {now}: with all else free, {}. --torque sets it.",
+        each.collect::<Vec<_>>().join(", ")
+    ))
+}
+
+/// Returns the sentence on estimates whose uncertainty is due to tolerances more than to the recording.
+fn shares(full: &Derived, own: &Derived) -> Option<String> {
+    if !full.is_told() || !own.is_told() {
+        return None;
+    }
+    let mut all = Vec::new();
+    for (k, name) in full.names.iter().enumerate() {
+        let share = 1.0 - (own.std(k) / full.std(k)).powi(2);
+        let most = full
+            .tolerances
+            .iter()
+            .map(|(name, draws)| (name, correlation(draws, &full.columns[k]).abs()))
+            .filter(|(_, correlation)| correlation.is_finite())
+            .max_by(|a, b| a.1.total_cmp(&b.1));
+        if let Some((most, _)) = most {
+            all.push(Share { name: name.clone(), share, most: most.clone() });
+        }
+    }
+    let known: Vec<String> = full
+        .tolerances
+        .iter()
+        .map(|(name, draws)| {
+            format!("{name} {:.2} %", 100.0 * analysis::statistics::deviation(draws))
+        })
+        .collect();
+    tolerance::shares(&known, &all)
+}
+
+/// Returns a warning if the fit leaves the range of linear slosh: the wave at the wall, 2 α R/(ξ² − 1), relative to the radius R
+/// of an upright cylinder.
+fn regime(model: &str, angle: f64) -> Option<String> {
+    let wave = 2.0 * angle / (XI[0] * XI[0] - 1.0);
+    let (is, advice) = match Regime::of(wave) {
+        Regime::Nonlinear => ("nonlinear", "less torque is better known"),
+        Regime::Transitional if model == SloshModel::Linear.name() => {
+            ("between linear and nonlinear", "--model planar,spherical tells whether that matters")
+        }
+        _ => return None,
+    };
+    (model != SloshModel::Frozen.name()).then(|| {
+        format!(
+            "The slosh is {is}: the fit has a slosh angle up to {angle:.2} rad, a wave of {wave:.2} of the radius (linear up to 0.15, \
+             nonlinear from 0.25); {advice}."
+        )
+    })
+}
+
+/// Condition number of the sensitivities, with columns of unit length.
+fn condition(solution: &Solution) -> f64 {
+    let Some(found) = &solution.minimum.derivatives else { return f64::NAN };
+    let picked = found.matrix.select_columns(&places(&solution.fit.free));
+    let a: DMatrix<f64> = picked.tr_mul(&picked);
+    let scaled = DMatrix::from_fn(a.nrows(), a.ncols(), |i, j| {
+        a[(i, j)] / (a[(i, i)] * a[(j, j)]).sqrt().max(1e-300)
+    });
+    if scaled.iter().any(|v| !v.is_finite()) || scaled.is_empty() {
+        return f64::NAN;
+    }
+    let values = scaled.symmetric_eigen().eigenvalues;
+    (values.max() / values.min().max(1e-300)).sqrt()
+}
+
+fn residuals(system: &BenchSystem, solution: &Solution) -> Vec<Residual> {
+    let fit = &solution.fit;
+    let point = &solution.minimum.point;
+    let all = fit.residuals(&point.z, &point.motion);
+    let rates = fit.problem.signals.iter().zip(&all).zip(&fit.noise);
+    rates
+        .filter(|((signal, _), _)| signal.output == 0)
+        .map(|((signal, residual), noise)| {
+            let recording = &system.recordings[signal.recording];
+            Residual {
+                name: recording.name.clone(),
+                label: RATE.into(),
+                time: recording.time.clone(),
+                measured: recording.rate.clone(),
+                residual: residual.clone(),
+                noise: Some(noise.white),
+                torque: Some(recording.torque.clone()),
+            }
+        })
+        .collect()
+}

@@ -1,0 +1,131 @@
+//! Effects that a misfit asks for, in words, with the options that estimate them.
+
+use names::hubslosh::{hub, slosh, wheel};
+use serde::Serialize;
+
+use super::system::{BESIDES, BenchSystem, Target};
+use crate::engine::cause::Effect;
+use crate::estimate::prose;
+
+/// Cause of a misfit.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Cause {
+    /// Effect that acts, in words.
+    pub effect: String,
+    /// Flags of `hubslosh identify` that fit it.
+    pub flags: String,
+    /// Estimate of its size: name, value and unit.
+    pub size: Option<(String, f64, String)>,
+    /// Decrease of −2 ln L.
+    pub gain: f64,
+}
+
+impl Cause {
+    /// Returns the cause in words.
+    pub fn words(&self) -> String {
+        let size = self.size.as_ref().map_or(String::new(), |(name, value, unit)| {
+            let unit = if unit == "1" { String::new() } else { format!(" {}", prose(unit)) };
+            format!(" ({name} = {value:.3e}{unit})")
+        });
+        format!(
+            "The cause is {}: with it{size} the residual is noise, and no other effect that was tried explains it as well. {} fits it.",
+            self.effect, self.flags
+        )
+    }
+}
+
+/// A torque k φ that the model lacks.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Missing {
+    /// Meaning of φ.
+    pub follows: String,
+    /// k.
+    pub factor: f64,
+    /// Standard deviation of k.
+    pub std: f64,
+    /// Unit of k.
+    pub unit: String,
+    /// k over its standard deviation, without its sign.
+    pub deviations: f64,
+}
+
+impl Missing {
+    /// Returns the result in words.
+    pub fn words(&self) -> String {
+        format!(
+            "a torque that follows {} is missing, {:.2e} ± {:.1e} {} ({:.0} σ)",
+            self.follows,
+            self.factor,
+            self.std,
+            prose(&self.unit),
+            self.deviations
+        )
+    }
+}
+
+/// Returns an effect in words.
+pub fn words(target: &Target) -> String {
+    match target {
+        Target::ActuatorLag => "an actuator that lags its command",
+        Target::GyroLag => "a gyro with a low-pass filter",
+        Target::FrictionDrift => "friction that drifts",
+        Target::Limit => "an actuator that reaches its largest torque",
+        Target::Compliance => "a bearing that yields before it slips (presliding stiffness)",
+        Target::SecondMode => "the second slosh mode",
+        Target::Parameter(name) if name == hub::K => {
+            "a torque that turns the hub back, of a cable or of an imbalance on a tilted axis"
+        }
+        Target::Parameter(name) if name == slosh::ZETA_AMPLITUDE => {
+            "damping that grows with the amplitude"
+        }
+        Target::Besides(kind) => {
+            let follows = BESIDES.get(*kind).map_or("the motion", |one| one.follows);
+            return format!("a torque that follows {follows}");
+        }
+        _ => "an effect",
+    }
+    .into()
+}
+
+/// The cause that an effect is; `None` if it is a torque, which no option estimates.
+pub fn cause(system: &BenchSystem, effect: &Effect) -> Option<Cause> {
+    let target = &system.targets[effect.unknown];
+    let value = effect.size.0;
+    let start = |name: &str, value: f64| format!("--start {name}={value:.3}");
+    let limit = system.largest * (1.0 - value);
+    let (flags, size) = match target {
+        Target::ActuatorLag => ("--actuator-lag".into(), Some(("actuator_lag", value, "s"))),
+        Target::GyroLag => ("--gyro-lag".into(), Some(("gyro_lag", value, "s"))),
+        Target::FrictionDrift => ("--friction-drift".into(), Some(("friction_drift", value, "1"))),
+        Target::Limit => (
+            format!("--set {}=true {}", wheel::ENABLED, start(wheel::TAU_MAX, limit)),
+            Some((wheel::TAU_MAX, limit, "N.m")),
+        ),
+        Target::Compliance => (
+            "--friction stribeck,lugre".into(),
+            Some((names::hubslosh::friction::SIGMA0, 1.0 / value, "N.m/rad")),
+        ),
+        Target::SecondMode => (format!("--set {}=2", slosh::MODES), None),
+        Target::Parameter(name) => {
+            let unit = if name == hub::K { "N.m/rad" } else { "1" };
+            (start(name, value), Some((name.as_str(), value, unit)))
+        }
+        _ => return None,
+    };
+    let size = size.map(|(name, value, unit)| (name.to_string(), value, unit.to_string()));
+    Some(Cause { effect: words(target), flags, size, gain: effect.gain })
+}
+
+/// The torque that an effect is.
+pub fn missing(system: &BenchSystem, effect: &Effect) -> Option<Missing> {
+    let Target::Besides(kind) = &system.targets[effect.unknown] else { return None };
+    let one = BESIDES.get(*kind)?;
+    let (factor, std) = effect.size;
+    Some(Missing {
+        follows: one.follows.into(),
+        factor,
+        std,
+        unit: one.unit.into(),
+        deviations: (factor / std).abs(),
+    })
+}

@@ -1,0 +1,108 @@
+//! Two unknowns of which only a sum or a product is known.
+
+use analysis::statistics::{deviation, mean};
+use names::hubslosh::friction;
+use serde::Serialize;
+
+use crate::engine::draws::Derived;
+use crate::estimate::prose;
+
+/// Correlation above which two unknowns count as determined only if each is precise by itself.
+const ALIKE: f64 = 0.99;
+/// Relative standard deviation beyond which a correlated unknown is not known by itself.
+const VAGUE: f64 = 0.05;
+/// Standard deviation of the friction's asymmetry above which the recordings do not show it.
+pub const ONE_WAY: f64 = 0.25;
+/// Part of a hub's path against its main direction above which it turns both ways.
+const BOTH_WAYS: f64 = 0.1;
+
+/// Two unknowns of which only a sum or a product is known.
+#[derive(Clone, Debug, Serialize)]
+pub struct Combination {
+    /// `a + b`, or `a (1 + b)`.
+    pub name: String,
+    /// The two.
+    pub of: [String; 2],
+    /// Value of the combination.
+    pub value: f64,
+    /// Standard deviation.
+    pub std: f64,
+    /// Unit.
+    pub unit: String,
+    /// Their correlation.
+    pub correlation: f64,
+}
+
+impl Combination {
+    /// Returns the combination in words.
+    pub fn words(&self) -> String {
+        format!(
+            "{} and {} cannot be distinguished (correlation {:.4}); only {} = {:.6} ± {:.6} {} is determined.",
+            self.of[0],
+            self.of[1],
+            self.correlation,
+            self.name,
+            self.value,
+            self.std,
+            prose(&self.unit)
+        )
+    }
+}
+
+/// Returns the direction of a hub that turns one way alone (1: counter-clockwise, −1: clockwise), from its rates. `None` if it rests,
+/// or if more than [`BOTH_WAYS`] of its path leads the other way.
+pub fn way(rates: impl Iterator<Item = f64>) -> Option<f64> {
+    let (mut forwards, mut backwards) = (0.0, 0.0);
+    rates.for_each(|rate| *if rate < 0.0 { &mut backwards } else { &mut forwards } += rate.abs());
+    let (way, along, against) =
+        if backwards > forwards { (-1.0, backwards, forwards) } else { (1.0, forwards, backwards) };
+    (along > 0.0 && against <= BOTH_WAYS * along).then_some(way)
+}
+
+/// The combinations that draws show. Of a hub that turns one `way`, c (1 ± asymmetry) and d (1 ± asymmetry).
+pub fn combinations(draws: &Derived, way: Option<f64>) -> Vec<Combination> {
+    let place = |name: &str| draws.place(name);
+    let mut found = Vec::new();
+    let mut add = |i: usize, j: usize, name: String, values: Vec<f64>| {
+        let [a, b] = [&draws.columns[i], &draws.columns[j]];
+        found.push(Combination {
+            name,
+            of: [draws.names[i].clone(), draws.names[j].clone()],
+            value: mean(&values),
+            std: deviation(&values),
+            unit: draws.units[i].clone(),
+            correlation: analysis::statistics::correlation(a, b),
+        });
+    };
+    let is_vague = |i: usize| draws.std(i) > VAGUE * draws.values[i].abs();
+    let asymmetry = place(friction::ASYMMETRY).filter(|a| draws.std(*a) > ONE_WAY);
+    if let (Some(way), Some(a)) = (way, asymmetry) {
+        let sign = if way > 0.0 { '+' } else { '-' };
+        for i in [friction::C, friction::D].iter().filter_map(|name| place(name)) {
+            let pairs = draws.columns[i].iter().zip(&draws.columns[a]);
+            let values = pairs.map(|(c, a)| c * (1.0 + way * a)).collect();
+            add(i, a, format!("{} (1 {sign} {})", draws.names[i], friction::ASYMMETRY), values);
+        }
+    } else if let (Some(c), Some(d)) = (place(friction::C), place(friction::D)) {
+        let [a, b] = [&draws.columns[c], &draws.columns[d]];
+        let correlation = analysis::statistics::correlation(a, b);
+        if correlation < -ALIKE && is_vague(c) && is_vague(d) {
+            let values = a.iter().zip(b).map(|(c, d)| c + d).collect();
+            add(c, d, format!("{} + {}", friction::C, friction::D), values);
+        }
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_hub_turns_one_way_if_nearly_all_of_its_path_does() {
+        assert_eq!(way([1.0, 2.0, -0.1].into_iter()), Some(1.0));
+        assert_eq!(way([-1.0, -2.0, 0.1].into_iter()), Some(-1.0));
+        assert_eq!(way([1.0, -1.0].into_iter()), None);
+        assert_eq!(way([0.0, 0.0].into_iter()), None);
+    }
+}

@@ -1,0 +1,525 @@
+//! The bench's unknowns, signals and starts for one slosh model and friction law.
+
+use std::sync::OnceLock;
+
+use analysis::gauss_markov::FLOOR;
+use analysis::statistics::{deviation, noise_level, peak};
+use anyhow::{Result, ensure};
+use host::causality::Causality;
+use host::description::Type;
+use host::fmu::Fmu;
+use names::hubslosh::{FrictionModel, SloshModel, fluid, friction, hub, init, slosh, tank};
+
+use super::system::{BESIDES, BenchSystem, Target};
+use crate::bench::breaking;
+use crate::bench::nominal::{self, Nominal, Start};
+use crate::bench::options::Options;
+use crate::engine::{Drift, Hold, Part, Problem, Recorded, Role, Signal, Unknown};
+use crate::input::recording::Recording;
+use crate::model::overridden::{near, refuse};
+use crate::model::unknown::range;
+
+/// Output of the gyro, and of the encoder.
+const RATE: usize = 0;
+const ANGLE: usize = 1;
+
+/// Drift of a MEMS gyro (the thesis's LSM6DS3).
+const GYRO_DRIFT: Drift = Drift { size: 0.2, time: 100.0, width: 0.7 };
+/// An encoder's angle integrates what the model leaves of the rate, whatever that is.
+const ENCODER_DRIFT: Drift = Drift { size: 1.0, time: 100.0, width: 6.0 };
+/// Standard deviation of a delay beforehand, and its ends, s.
+const DELAY: (f64, f64, f64) = (0.05, -0.2, 0.5);
+/// Prior of the dry friction's asymmetry: it is small against 1.
+const ASYMMETRY: f64 = 0.5;
+/// Standard deviation of each of b, c and d beforehand, over its start.
+const FRICTION_WIDTH: f64 = 10.0;
+/// Standard deviation of ln ω_s beforehand, and how far it may be from its start.
+const SPEED: (f64, f64) = (1.5, 30.0);
+/// Widest factor of a known value.
+const WIDEST: (f64, f64) = (0.6, 1.6);
+
+/// Unknowns with what they are to the bench, in groups.
+struct List<'a> {
+    fmu: &'a Fmu,
+    unknowns: Vec<Unknown>,
+    targets: Vec<Target>,
+}
+
+impl List<'_> {
+    fn add(&mut self, target: Target, unknown: Unknown) {
+        self.targets.push(target);
+        self.unknowns.push(unknown);
+    }
+
+    fn range(&self, name: &str) -> (f64, f64) {
+        let found = self.fmu.description().variable(name).map(range);
+        found.map_or((f64::NEG_INFINITY, f64::INFINITY), Into::into)
+    }
+
+    fn unit(&self, name: &str) -> String {
+        let description = self.fmu.description();
+        description.variable(name).map_or("1".into(), |v| description.unit(v).to_string())
+    }
+
+    /// A positive parameter of the FMU in its logarithm.
+    fn parameter(&self, name: &str, start: f64) -> Unknown {
+        let (low, high) = self.range(name);
+        let bounds = (low.max(1e-6 * start), high.min(1e6 * start));
+        Unknown::positive(name, &self.unit(name), Role::Run(None), start, bounds)
+    }
+
+    /// A parameter that may be 0, in its value.
+    fn from_zero(&self, name: &str, start: f64) -> Unknown {
+        let (low, high) = self.range(name);
+        let bounds = (low.max(0.0), high);
+        Unknown::linear(name, &self.unit(name), Role::Run(None), (start, start), bounds)
+    }
+}
+
+/// The bench with one slosh model and friction law, from these starts.
+///
+/// # Errors
+/// If an option names what cannot be estimated.
+pub fn system<'a>(
+    fmu: &'a Fmu,
+    recordings: &'a [Recording],
+    options: &Options,
+    (model, law): (&str, &str),
+    starts: &[Start],
+) -> Result<(BenchSystem<'a>, Vec<Unknown>, Vec<Vec<f64>>)> {
+    let nominal = Nominal::of(fmu, &options.settings, &[])?;
+    let is_set = |name: &str| options.settings.iter().any(|(n, _)| n == name);
+    let known = |name: &str| options.known.iter().find(|(n, ..)| n == name);
+    let frozen = model == SloshModel::Frozen.name();
+    // the FMU's own parameters where tank, hub or modes are set or known
+    let shapes = [tank::D, tank::H, hub::I];
+    let other = |name: &&String| name.starts_with("slosh.") && *name != slosh::MODEL;
+    let by_modes = !frozen
+        && !shapes.iter().any(|name| is_set(name) || known(name).is_some())
+        && !options.settings.iter().map(|(name, _)| name).any(|name| other(&name));
+    let given = |name: &str| options.starts.iter().find(|(n, _)| n == name).map(|(_, v)| *v);
+    let start_of = |start: &Start| -> Start {
+        let own = Start {
+            d: given(tank::D).unwrap_or(start.d),
+            h: given(tank::H).unwrap_or(start.h),
+            zeta: given(slosh::ZETA).unwrap_or(start.zeta),
+            hub_inertia: given(hub::I).unwrap_or(start.hub_inertia),
+            b: given(friction::B).unwrap_or(start.b),
+            c: given(friction::C).unwrap_or(start.c),
+            stribeck: given(friction::D).unwrap_or(start.stribeck),
+            omega_s: given(friction::OMEGA_S).unwrap_or(start.omega_s),
+            ..*start
+        };
+        if shapes.iter().any(|name| given(name).is_some()) {
+            own.with_modes(nominal.bench)
+        } else {
+            own
+        }
+    };
+    let mut all: Vec<Start> = starts.iter().map(start_of).collect();
+    if !options.starts.is_empty() {
+        all.extend_from_slice(starts);
+    }
+    let first = all[0];
+    let mut list = List { fmu, unknowns: Vec::new(), targets: Vec::new() };
+    if !frozen && by_modes {
+        let within = |value: f64, by: f64| (value / by, value * by);
+        let length = Unknown::positive(
+            tank::D,
+            "m",
+            Role::Run(None),
+            first.length,
+            within(first.length, 10.0),
+        );
+        list.add(Target::Length, length);
+        let ratio = first.mass_ratio.clamp(0.01, 1.0);
+        list.add(
+            Target::MassRatio,
+            Unknown::positive(tank::H, "m", Role::Run(None), ratio, (0.002, 3.0)),
+        );
+        let zeta = list.parameter(slosh::ZETA, first.zeta);
+        list.add(Target::Zeta, Unknown { bounds: (1e-5, 0.9), ..zeta });
+        let inertia = Unknown::positive(
+            hub::I,
+            "kg.m2",
+            Role::Run(None),
+            first.inertia,
+            within(first.inertia, 20.0),
+        );
+        list.add(Target::Inertia, inertia);
+    } else {
+        let own = [
+            (tank::D, first.d, !frozen),
+            (tank::H, first.h, !frozen),
+            (slosh::ZETA, first.zeta, !frozen),
+        ];
+        let inertia = if first.hub_inertia > 0.0 { first.hub_inertia } else { 0.3 };
+        for (name, start, used) in own.into_iter().chain([(hub::I, inertia, true)]) {
+            if used && !is_set(name) {
+                let unknown = list.parameter(name, start);
+                list.add(Target::Parameter(name.into()), unknown);
+            }
+        }
+    }
+    let viscous = law != FrictionModel::None.name();
+    let dry = viscous && law != FrictionModel::Viscous.name();
+    for (name, start, used) in [
+        (friction::B, first.b, viscous),
+        (friction::C, first.c, dry),
+        (friction::D, first.stribeck, dry),
+    ] {
+        if used && !is_set(name) {
+            let unknown = list.from_zero(name, start).with_prior(start, FRICTION_WIDTH * start);
+            list.add(Target::Parameter(name.into()), unknown);
+        }
+    }
+    if dry && !is_set(friction::OMEGA_S) {
+        let start = first.omega_s;
+        let unknown = list.parameter(friction::OMEGA_S, start).with_prior(start.ln(), SPEED.0);
+        let bounds = (start / SPEED.1, start * SPEED.1);
+        let bent = !is_set(friction::D);
+        list.add(Target::Parameter(friction::OMEGA_S.into()), Unknown { bounds, bent, ..unknown });
+    }
+    if law == FrictionModel::Lugre.name() && !is_set(friction::SIGMA0) {
+        // stiffer bristles move less than 1/100 of what a gyro of this kind sees
+        let unknown = list.parameter(friction::SIGMA0, 100.0);
+        list.add(
+            Target::Parameter(friction::SIGMA0.into()),
+            Unknown { bounds: (0.1, 1000.0), ..unknown },
+        );
+    }
+    // parameters that are estimated because a start or something known of them is given
+    for name in options.starts.iter().map(|s| &s.0).chain(options.known.iter().map(|k| &k.0)) {
+        let there = list.unknowns.iter().any(|u| u.name == *name);
+        let unused = [
+            tank::D,
+            tank::H,
+            slosh::ZETA,
+            friction::B,
+            friction::C,
+            friction::D,
+            friction::OMEGA_S,
+        ];
+        if there || is_set(name) || name == friction::ASYMMETRY || unused.contains(&name.as_str()) {
+            continue;
+        }
+        let variable = fmu.description().variable(name)?;
+        ensure!(
+            variable.causality == Causality::Parameter && variable.kind() == Type::Real,
+            "{name} cannot be estimated: it is not a parameter with a real value"
+        );
+        let start = given(name).or(known(name).map(|k| k.1)).unwrap_or(1.0);
+        ensure!(start > 0.0, "{name}: only positive parameters can be estimated");
+        let unknown = list.from_zero(name, start);
+        list.add(Target::Parameter(name.clone()), unknown);
+    }
+    for (name, mean, std) in &options.known {
+        if let Some(unknown) = list.unknowns.iter_mut().find(|u| u.name == *name) {
+            let std = if unknown.log { std / mean } else { *std };
+            unknown.prior = Some((unknown.coordinate(*mean), std));
+            unknown.start = given(name).unwrap_or(*mean);
+        }
+    }
+    let has_encoder = recordings.iter().any(|r| r.angle.is_some());
+    if options.sensor_errors {
+        if dry && !is_set(friction::ASYMMETRY) {
+            let one = Unknown::linear(
+                friction::ASYMMETRY,
+                "1",
+                Role::Run(None),
+                (0.0, 0.1),
+                (-0.98, 0.98),
+            );
+            list.add(Target::Parameter(friction::ASYMMETRY.into()), one.with_prior(0.0, ASYMMETRY));
+        }
+        let (std, low, high) = DELAY;
+        let delay = |name: &str, output| {
+            let role = Role::Delay(output);
+            Unknown::linear(name, "s", role, (0.0, 0.01), (low, high)).with_prior(0.0, std)
+        };
+        list.add(Target::Delay, delay("delay", RATE));
+        if has_encoder {
+            list.add(Target::AngleDelay, delay("angle_delay", ANGLE));
+        }
+        for k in 0..recordings.len() {
+            let bias = bias(&format!("gyro_bias[{}]", k + 1), "rad/s", (RATE, k), 0.0);
+            list.add(Target::GyroBias, bias);
+        }
+    }
+    for (k, recording) in recordings.iter().enumerate() {
+        if let Some(angle) = &recording.angle {
+            let offset = bias(&format!("angle_offset[{}]", k + 1), "rad", (ANGLE, k), angle[0]);
+            list.add(Target::AngleOffset, offset);
+        }
+    }
+    for target in &options.effects {
+        list.add(target.clone(), effect(target, Part::Free));
+    }
+    if options.breaking && !frozen {
+        let (begins, std) = breaking::BEGINS;
+        if !is_set(slosh::ZETA_BREAKING) {
+            let growth = list.from_zero(slosh::ZETA_BREAKING, 0.04).with_prior(0.04, 0.2);
+            list.add(Target::Parameter(slosh::ZETA_BREAKING.into()), growth);
+        }
+        if !is_set(slosh::BREAKING_STEEPNESS) {
+            let onset = list.from_zero(slosh::BREAKING_STEEPNESS, begins).with_prior(begins, std);
+            list.add(
+                Target::Parameter(slosh::BREAKING_STEEPNESS.into()),
+                Unknown { reach: 0.1, ..onset },
+            );
+        }
+    }
+    for (k, recording) in recordings.iter().enumerate().filter(|(_, r)| !r.from_rest) {
+        let role = Role::Run(Some(k));
+        let (rate, spread) = (recording.first_rate(), deviation(&recording.rate));
+        let one = |name: &str, unit: &str, start: (f64, f64), bounds| {
+            Unknown::linear(&format!("{name}[{}]", k + 1), unit, role, start, bounds)
+        };
+        let omega = one(init::OMEGA, "rad/s", (rate, spread), (-1e3, 1e3)).with_prior(rate, spread);
+        list.add(Target::Initial(k, init::OMEGA.into()), omega);
+        if !frozen {
+            let angle = one(init::SLOSH_ANGLE, "rad", (0.0, 0.1), (-1.4, 1.4));
+            list.add(Target::Initial(k, init::SLOSH_ANGLE.into()), angle.with_prior(0.0, 0.5));
+            let speed = one(init::SLOSH_RATE, "rad/s", (0.0, 1.0), (-100.0, 100.0));
+            list.add(Target::Initial(k, init::SLOSH_RATE.into()), speed.with_prior(0.0, 7.0));
+        }
+    }
+    // with an encoder the rate's scale shows, and where slosh is not linear: without it no residual would be noise
+    let nonlinear = !frozen && model != SloshModel::Linear.name();
+    if options.gyro_scale > 0.0 {
+        let std = options.gyro_scale;
+        let scale =
+            Unknown::linear("gyro_scale", "1", Role::Gain(RATE, RATE), (0.0, std), (-0.5, 1.0));
+        let part = if nonlinear || has_encoder { Part::Free } else { Part::Tolerance };
+        list.add(Target::GyroScale, Unknown { part, ..scale.with_prior(0.0, std) });
+    }
+    let derived: Vec<(String, String)> =
+        list.unknowns.iter().map(|u| (u.name.clone(), u.unit.clone())).collect();
+    let is_recorded = recordings.iter().any(|r| r.gravity.is_some());
+    let tolerances = options.tolerances;
+    let run = Role::Run(None);
+    for (target, name, std, role) in [
+        (Target::Torque, "torque", tolerances.torque, run),
+        (Target::Clock, "clock", tolerances.clock, run),
+        (
+            Target::Gravity,
+            names::hubslosh::G_AXIAL,
+            if is_recorded { 0.0 } else { tolerances.gravity },
+            run,
+        ),
+        (Target::Arm, tank::R, tolerances.arm, run),
+        (
+            Target::Density,
+            fluid::RHO,
+            tolerances.density,
+            if by_modes { Role::Derived } else { run },
+        ),
+    ] {
+        if std > 0.0 && !is_told(name, options) {
+            let one = Unknown::positive(name, "1", role, 1.0, WIDEST).with_prior(0.0, std);
+            let part = Part::Tolerance;
+            list.add(target, Unknown { part, reach: std, ..one });
+        }
+    }
+    candidates(&mut list, options, frozen, law);
+    let mut settings = vec![
+        (slosh::MODEL.to_string(), model.to_string()),
+        (slosh::ZETA_FROM_CORRELATION.to_string(), "false".to_string()),
+        (friction::MODEL.to_string(), law.to_string()),
+    ];
+    if law == FrictionModel::Lugre.name() {
+        // the bristles' damping is no more than a bearing with little viscous friction allows
+        settings.push((friction::SIGMA1.into(), "0".into()));
+    }
+    let chosen = |name: &str| matches!(name, slosh::MODEL | friction::MODEL);
+    settings.extend(options.settings.iter().filter(|(name, _)| !chosen(name)).cloned());
+    let List { unknowns, targets, .. } = list;
+    refuse_overridden(fmu, &settings, &unknowns, &targets)?;
+    let values = |start: &Start| -> Vec<f64> {
+        let of = |(unknown, target): (&Unknown, &Target)| match target {
+            Target::Length => start.length,
+            Target::MassRatio => start.mass_ratio,
+            Target::Inertia => start.inertia,
+            Target::Zeta => start.zeta,
+            Target::Parameter(name) if known(name).is_none() => match name.as_str() {
+                tank::D => start.d,
+                tank::H => start.h,
+                slosh::ZETA => start.zeta,
+                hub::I if start.hub_inertia > 0.0 => start.hub_inertia,
+                friction::B => start.b,
+                friction::C => start.c,
+                friction::D => start.stribeck,
+                friction::OMEGA_S => start.omega_s,
+                _ => unknown.start,
+            },
+            _ => unknown.start,
+        };
+        unknowns.iter().zip(&targets).map(of).collect()
+    };
+    let starts = all.iter().map(values).collect();
+    let system = BenchSystem {
+        fmu,
+        recordings,
+        settings,
+        bench: nominal.bench,
+        targets,
+        derived,
+        largest: recordings.iter().map(|r| peak(&r.torque)).fold(0.0, f64::max),
+        base: OnceLock::new(),
+    };
+    Ok((system, unknowns, starts))
+}
+
+/// Returns true if a prior of the same value makes its tolerance one too many.
+fn is_told(name: &str, options: &Options) -> bool {
+    options.known.iter().any(|(known, ..)| known == name)
+        || options.starts.iter().any(|(s, _)| s == name)
+}
+
+fn bias(name: &str, unit: &str, (output, recording): (usize, usize), start: f64) -> Unknown {
+    let role = Role::Bias(output, Some(recording));
+    Unknown::linear(name, unit, role, (start, 1e-2), (f64::NEG_INFINITY, f64::INFINITY))
+}
+
+/// An effect that the FMU does not have, as an unknown.
+pub fn effect(target: &Target, part: Part) -> Unknown {
+    let run = Role::Run(None);
+    let lag = |name: &str| Unknown::linear(name, "s", run, (0.0, 0.02), (0.0, 1.0));
+    let unknown = match target {
+        Target::ActuatorLag => lag("actuator_lag"),
+        Target::GyroLag => lag("gyro_lag"),
+        Target::FrictionDrift => {
+            Unknown::linear("friction_drift", "1", run, (0.0, 0.3), (-0.95, 5.0))
+        }
+        Target::Limit => Unknown::linear("limit", "1", run, (0.0, 0.2), (0.0, 0.7)),
+        Target::Compliance => {
+            Unknown::linear("compliance", "rad/(N.m)", run, (0.0, 1e-2), (0.0, 10.0))
+        }
+        Target::SecondMode => Unknown::linear("second mode", "1", run, (0.0, 1.0), (0.0, 3.0)),
+        Target::Besides(kind) => {
+            let Some(one) = BESIDES.get(*kind) else { return lag("lag") };
+            let free = (f64::NEG_INFINITY, f64::INFINITY);
+            Unknown::linear(one.follows, one.unit, run, (0.0, 1e-2), free)
+        }
+        _ => Unknown::linear("effect", "1", run, (0.0, 1.0), (0.0, 1.0)),
+    };
+    let start = if part == Part::Free { unknown.reach } else { 0.0 };
+    Unknown { part, start, ..unknown }
+}
+
+/// Effects that a misfit may ask for.
+fn candidates(list: &mut List, options: &Options, frozen: bool, law: &str) {
+    let is_set = |name: &str| options.settings.iter().any(|(n, _)| n == name);
+    let add = |list: &mut List, target: Target| {
+        if !list.targets.contains(&target) {
+            let unknown = effect(&target, Part::Candidate);
+            list.add(target, unknown);
+        }
+    };
+    add(list, Target::ActuatorLag);
+    add(list, Target::GyroLag);
+    add(list, Target::FrictionDrift);
+    if !is_set(names::hubslosh::wheel::TAU_MAX) {
+        add(list, Target::Limit);
+    }
+    if law == FrictionModel::Stribeck.name() {
+        add(list, Target::Compliance);
+    }
+    if !frozen && !is_set(slosh::MODES) {
+        add(list, Target::SecondMode);
+    }
+    let parameters = [(hub::K, 0.02, true), (slosh::ZETA_AMPLITUDE, 0.02, !frozen)];
+    for (name, reach, used) in parameters {
+        let target = Target::Parameter(name.into());
+        if used && !is_set(name) && !list.targets.contains(&target) {
+            let unknown = list.from_zero(name, 0.0);
+            list.add(target, Unknown { part: Part::Candidate, reach, ..unknown });
+        }
+    }
+    if list.fmu.description().variable(names::hubslosh::TAU_EXT).is_ok() {
+        (0..BESIDES.len()).for_each(|kind| add(list, Target::Besides(kind)));
+    }
+}
+
+/// Refuses unknowns that have no effect because of the settings.
+fn refuse_overridden(
+    fmu: &Fmu,
+    settings: &[(String, String)],
+    unknowns: &[Unknown],
+    targets: &[Target],
+) -> Result<()> {
+    let parameters = unknowns.iter().zip(targets).filter_map(|(unknown, target)| match target {
+        Target::Parameter(name) if unknown.part == Part::Free => {
+            let value = unknown.start;
+            Some((name.clone(), near(value, (f64::MIN, f64::MAX), value.abs()).to_string()))
+        }
+        _ => None,
+    });
+    let parameters: Vec<_> = parameters.collect();
+    let settings = [settings, &parameters].concat();
+    // what the FMU refuses here, the search tells
+    let warnings = nominal::warnings(fmu, &settings).unwrap_or_default();
+    parameters.iter().try_for_each(|(name, _)| refuse(name, &warnings))
+}
+
+/// The engine's problem for a system.
+pub fn problem<'a>(
+    system: &'a BenchSystem,
+    unknowns: Vec<Unknown>,
+    starts: Vec<Vec<f64>>,
+    options: &Options,
+) -> Problem<'a> {
+    let mut signals = Vec::new();
+    let mut recordings = Vec::new();
+    for (k, recording) in system.recordings.iter().enumerate() {
+        let rows = recording.time.len();
+        let all = |mask: &Option<Vec<bool>>| mask.clone().unwrap_or_else(|| vec![true; rows]);
+        signals.push(Signal {
+            recording: k,
+            output: RATE,
+            measured: recording.rate.clone(),
+            sampled: all(&recording.fresh),
+            white: recording.rate_noise().max(FLOOR),
+            drift: Some(GYRO_DRIFT),
+        });
+        if let Some(angle) = &recording.angle {
+            signals.push(Signal {
+                recording: k,
+                output: ANGLE,
+                measured: angle.clone(),
+                sampled: all(&recording.angle_fresh),
+                white: noise_level(&recording.of_fresh_angle(angle)).max(FLOOR),
+                drift: Some(ENCODER_DRIFT),
+            });
+        }
+        recordings.push(Recorded {
+            name: recording.name.clone(),
+            time: recording.time.clone(),
+            inputs: vec![recording.torque.clone()],
+            step: recording.torque_step(),
+        });
+    }
+    let holds = match options.intersample {
+        Some(hold) => vec![hold],
+        None => guessed(system.recordings),
+    };
+    Problem { system, recordings, signals, unknowns, starts, holds, acausal: options.acausal }
+}
+
+/// Behaviours between rows, the likeliest first: a torque that seldom changes is held. One where it makes no difference.
+fn guessed(recordings: &[Recording]) -> Vec<Hold> {
+    let square = |x: f64| x * x;
+    let varies = |recording: &Recording| {
+        let changes: f64 = recording.torque.windows(2).map(|t| square(t[1] - t[0])).sum();
+        changes > 1e-4 * recording.torque.iter().map(|t| square(*t)).sum::<f64>()
+    };
+    if !recordings.iter().any(varies) {
+        return vec![Hold::FirstOrderHold];
+    }
+    let torque = &recordings[0].torque;
+    let same = torque.windows(2).filter(|pair| pair[0] == pair[1]).count();
+    let first =
+        if 5 * same > 4 * torque.len() { Hold::ZeroOrderHold } else { Hold::FirstOrderHold };
+    let others = Hold::ALL.into_iter().filter(|hold| *hold != first);
+    std::iter::once(first).chain(others).collect()
+}

@@ -1,0 +1,340 @@
+//! The FMU of the bench as a system.
+//!
+//! The unknowns of the search are what a recording shows: length l and mass ratio μ = m r²/J of the first slosh mode, its damping ratio,
+//! and the inertia J that turns with the hub without that mode's mass. The FMU takes them as a table of modes. Tank and hub are
+//! functions of draws:
+//!
+//! ```text
+//! m = μ J/r²,  d⁴ = 8ξ²(ξ² − 1) l m/(π ρ),  T = d/(2ξ l) = tanh(2ξ h/d),  I = J − r² (ρ π d² h/4 − m)
+//! ```
+//!
+//! In d, h and I the likelihood has a long bent valley, for in a deep tank T hardly depends on h. Where tank, hub or modes are set or
+//! known, the FMU's own parameters are the unknowns.
+
+use std::f64::consts::PI;
+use std::sync::OnceLock;
+
+use anyhow::Result;
+use formulas::cylinder::XI;
+use host::fmu::Fmu;
+use names::hubslosh::{FrictionModel, SloshSource, friction, hub, slosh, tank, wheel};
+
+use crate::bench::effect::Effects;
+use crate::bench::nominal::Bench;
+use crate::bench::simulate::{self, Read, Setup};
+use crate::engine::{Hold, Motion, System};
+use crate::input::recording::Recording;
+
+/// What an unknown is to the bench.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Target {
+    /// A parameter of the FMU.
+    Parameter(String),
+    /// A start of a recording that does not begin at rest.
+    Initial(usize, String),
+    /// l, m.
+    Length,
+    /// μ.
+    MassRatio,
+    /// J, kg·m².
+    Inertia,
+    /// Damping ratio of the mode.
+    Zeta,
+    /// Delay of the rate, s.
+    Delay,
+    /// Delay of the angle, s.
+    AngleDelay,
+    /// Time constant of the actuator, s.
+    ActuatorLag,
+    /// Time constant of the gyro's filter, s.
+    GyroLag,
+    /// Relative change of the friction over a recording.
+    FrictionDrift,
+    /// Error of the gyro's scale.
+    GyroScale,
+    /// Reading of the gyro at rest, rad/s.
+    GyroBias,
+    /// Reading of the encoder at angle 0, rad.
+    AngleOffset,
+    /// Torque that acts over the recorded one.
+    Torque,
+    /// True time over the recorded one.
+    Clock,
+    /// g_axial over its value.
+    Gravity,
+    /// tank.r over its value.
+    Arm,
+    /// fluid.rho over its value.
+    Density,
+    /// Part of the largest command by which the actuator's limit is below it.
+    Limit,
+    /// Compliance of the bearing before it slips, rad/(N·m).
+    Compliance,
+    /// Mass of the second mode over that of an upright cylinder's.
+    SecondMode,
+    /// Size of a torque that follows the motion.
+    Besides(usize),
+}
+
+/// A row of the bench's motion.
+pub struct Row {
+    /// Time from the recording's first row, s.
+    pub time: f64,
+    /// Commanded, N·m.
+    pub torque: f64,
+    /// Angle of the hub, rad.
+    pub angle: f64,
+    /// Rate of the hub, rad/s.
+    pub rate: f64,
+    /// Slosh angle, rad.
+    pub slosh_angle: f64,
+}
+
+/// A torque that follows the motion: in words, with the unit of its factor.
+pub struct Besides {
+    /// What it follows.
+    pub follows: &'static str,
+    /// Unit of the factor.
+    pub unit: &'static str,
+    /// The torque at a row for a factor of 1.
+    pub torque: fn(&Row) -> f64,
+}
+
+/// Torques that a bench may have besides.
+pub const BESIDES: [Besides; 7] = [
+    Besides { follows: "the rate", unit: "N.m.s/rad", torque: |row| row.rate },
+    Besides {
+        follows: "the rate's square against the motion",
+        unit: "N.m.s2/rad2",
+        torque: |row| row.rate * row.rate.abs(),
+    },
+    Besides { follows: "the angle", unit: "N.m/rad", torque: |row| row.angle },
+    Besides {
+        follows: "the angle's square",
+        unit: "N.m/rad2",
+        torque: |row| row.angle * row.angle,
+    },
+    Besides { follows: "the slosh angle", unit: "N.m/rad", torque: |row| row.slosh_angle },
+    Besides { follows: "time", unit: "N.m/s", torque: |row| row.time },
+    Besides {
+        follows: "the commanded torque's square with its sign",
+        unit: "1/(N.m)",
+        torque: |row| row.torque * row.torque.abs(),
+    },
+];
+
+/// The FMU with recordings.
+pub struct BenchSystem<'a> {
+    /// The FMU.
+    pub fmu: &'a Fmu,
+    /// The recordings.
+    pub recordings: &'a [Recording],
+    /// Settings.
+    pub settings: Vec<(String, String)>,
+    /// Known values.
+    pub bench: Bench,
+    /// What each unknown is.
+    pub targets: Vec<Target>,
+    /// What is derived: names and units.
+    pub derived: Vec<(String, String)>,
+    /// Largest command, N·m.
+    pub largest: f64,
+    /// Motion that the torques of [`BESIDES`] follow.
+    pub base: OnceLock<Vec<Motion>>,
+}
+
+/// Largest T of a tank: its liquid is then deeper than its diameter three times.
+const DEEPEST: f64 = 0.999_99;
+
+/// Tank and hub with these modes: d, h, I; `None`: there is none.
+fn tank_of(length: f64, mass: f64, inertia: f64, bench: Bench) -> Option<[f64; 3]> {
+    let xi = XI[0];
+    let d = diameter(length, mass, bench);
+    let t = d / (2.0 * xi * length);
+    let h = (t < DEEPEST).then(|| t.atanh() * d / (2.0 * xi))?;
+    let hub = inertia - bench.inertia(bench.liquid(d, h) - mass);
+    (hub > 0.0).then_some([d, h, hub])
+}
+
+/// d of a tank with this mode.
+fn diameter(length: f64, mass: f64, bench: Bench) -> f64 {
+    let xi = XI[0];
+    (8.0 * xi * xi * (xi * xi - 1.0) * length * mass / (PI * bench.density)).powf(0.25)
+}
+
+impl BenchSystem<'_> {
+    /// Value of an unknown, if it is one.
+    pub fn value(&self, values: &[f64], target: &Target) -> Option<f64> {
+        self.targets.iter().position(|other| other == target).map(|k| values[k])
+    }
+
+    /// Known values with their tolerances.
+    fn bench(&self, values: &[f64]) -> Bench {
+        let of = |target: &Target| self.value(values, target).unwrap_or(1.0);
+        let Bench { arm, density, gravity } = self.bench;
+        Bench { arm: arm * of(&Target::Arm), density: density * of(&Target::Density), gravity }
+    }
+
+    /// The torque besides along a recording.
+    fn besides(&self, values: &[f64], recording: usize) -> Option<Vec<f64>> {
+        let base = self.base.get()?;
+        let sizes: Vec<(usize, f64)> = self
+            .targets
+            .iter()
+            .zip(values)
+            .filter_map(|(target, value)| match target {
+                Target::Besides(kind) if *value != 0.0 => Some((*kind, *value)),
+                _ => None,
+            })
+            .collect();
+        if sizes.is_empty() {
+            return None;
+        }
+        let (motion, recorded) = (&base[recording], &self.recordings[recording]);
+        let row = |k: usize| Row {
+            time: recorded.time[k] - recorded.time[0],
+            torque: recorded.torque[k],
+            angle: motion.others[1][k],
+            rate: motion.outputs[0][k],
+            slosh_angle: motion.others[0][k],
+        };
+        let torque = |k: usize| {
+            let row = row(k);
+            sizes.iter().map(|(kind, size)| size * (BESIDES[*kind].torque)(&row)).sum()
+        };
+        Some((0..recorded.time.len()).map(torque).collect())
+    }
+}
+
+impl System for BenchSystem<'_> {
+    fn run(
+        &self,
+        values: &[f64],
+        recording: usize,
+        rows: usize,
+        hold: Hold,
+        whole: bool,
+    ) -> Result<Motion> {
+        let bench = self.bench(values);
+        let mut settings = self.settings.clone();
+        let mut reals: Vec<(String, f64)> = Vec::new();
+        let mut set = |name: &str, value: &str| settings.push((name.into(), value.into()));
+        let mut effects = Effects::default();
+        let of = |target: &Target| self.value(values, target);
+        let mode = of(&Target::Length).zip(of(&Target::MassRatio)).zip(of(&Target::Inertia));
+        if let Some(((length, ratio), inertia)) = mode {
+            let mass = ratio * inertia / bench.inertia(1.0);
+            let second = of(&Target::SecondMode).unwrap_or(0.0);
+            let zeta = of(&Target::Zeta).unwrap_or(0.0);
+            set(slosh::SOURCE, SloshSource::Table.name());
+            reals.push((slosh::table::LENGTH.at([1]), length));
+            reals.push((slosh::table::MASS.at([1]), mass));
+            reals.push((slosh::table::ZETA.at([1]), zeta));
+            reals.push((hub::I.into(), inertia));
+            reals.push((tank::D.into(), diameter(length, mass, bench)));
+            let mut liquid = mass;
+            if second != 0.0 {
+                // of a deep cylinder the second mode's mass is 3 % of the first's
+                let other = second * 0.03 * mass;
+                set(slosh::MODES, "2");
+                reals.push((slosh::table::LENGTH.at([2]), length * XI[0] / XI[1]));
+                reals.push((slosh::table::MASS.at([2]), other));
+                reals.push((slosh::table::ZETA.at([2]), zeta));
+                liquid += other;
+            }
+            reals.push((slosh::table::M_LIQ.into(), liquid));
+        } else if of(&Target::SecondMode).is_some_and(|second| second != 0.0) {
+            set(slosh::MODES, "2");
+        }
+        for (target, &value) in self.targets.iter().zip(values) {
+            match target {
+                Target::Parameter(name) => reals.push((name.clone(), value)),
+                Target::Initial(of, name) if *of == recording => reals.push((name.clone(), value)),
+                Target::ActuatorLag => effects.actuator_lag = value,
+                Target::GyroLag => effects.gyro_lag = value,
+                Target::FrictionDrift => effects.friction_drift = value,
+                Target::Arm => reals.push((tank::R.into(), bench.arm)),
+                Target::Density => reals.push((names::hubslosh::fluid::RHO.into(), bench.density)),
+                Target::Limit if value > 0.0 => {
+                    set(wheel::ENABLED, "true");
+                    reals.push((wheel::TAU_MAX.into(), self.largest * (1.0 - value)));
+                }
+                Target::Compliance if value > 0.0 => {
+                    set(friction::MODEL, FrictionModel::Lugre.name());
+                    set(friction::SIGMA1, "0");
+                    reals.push((friction::SIGMA0.into(), 1.0 / value));
+                }
+                _ => {}
+            }
+        }
+        let besides = self.besides(values, recording);
+        effects.torque = besides.as_deref();
+        let torque = of(&Target::Torque).unwrap_or(1.0);
+        let clock = of(&Target::Clock).unwrap_or(1.0);
+        let gravity = of(&Target::Gravity).unwrap_or(1.0);
+        let all = &self.recordings[recording];
+        let is_plain = torque == 1.0 && clock == 1.0;
+        let mut own;
+        let acting = if rows == all.time.len() && is_plain {
+            all
+        } else {
+            own = all.first_rows(rows);
+            own.torque.iter_mut().for_each(|value| *value *= torque);
+            let first = own.time[0];
+            own.time.iter_mut().for_each(|t| *t = first + clock * (*t - first));
+            &own
+        };
+        if all.gravity.is_none() && gravity != 1.0 {
+            reals.push((names::hubslosh::G_AXIAL.into(), self.bench.gravity * gravity));
+        }
+        let setup = Setup { settings, intersample: hold };
+        let reals: Vec<(&str, f64)> = reals.iter().map(|(name, v)| (name.as_str(), *v)).collect();
+        let delay = of(&Target::Delay).unwrap_or(0.0);
+        let read = if whole { Read::All } else { Read::States };
+        let found = setup.run_under(self.fmu, &reals, acting, delay, &effects, read)?;
+        let mut motion = Motion::default();
+        if acting.angle.is_some() {
+            let lead = delay - of(&Target::AngleDelay).unwrap_or(delay);
+            let [angle, rate] = simulate::angle_and_rate_at(&acting.time, &found, lead);
+            motion.outputs = vec![found.rate, angle];
+            if whole {
+                motion.slopes = vec![found.acceleration, rate];
+                motion.others = vec![found.slosh_angle, found.angle];
+            }
+        } else {
+            motion.outputs = vec![found.rate];
+            if whole {
+                motion.slopes = vec![found.acceleration];
+                motion.others = vec![found.slosh_angle, found.angle];
+            }
+        }
+        Ok(motion)
+    }
+
+    fn derived(&self) -> Vec<(String, String)> {
+        self.derived.clone()
+    }
+
+    fn derive(&self, values: &[f64]) -> Option<Vec<f64>> {
+        let of = |target: &Target| self.value(values, target);
+        let bench = self.bench(values);
+        let mode = of(&Target::Length).zip(of(&Target::MassRatio)).zip(of(&Target::Inertia));
+        let shape = match mode {
+            Some(((length, ratio), inertia)) => {
+                Some(tank_of(length, ratio * inertia / bench.inertia(1.0), inertia, bench)?)
+            }
+            None => None,
+        };
+        let mut all = Vec::with_capacity(self.derived.len());
+        for (target, value) in self.targets.iter().zip(values).take(self.derived.len()) {
+            all.push(match (target, shape) {
+                (Target::Length, Some([d, ..])) => d,
+                (Target::MassRatio, Some([_, h, _])) => h,
+                (Target::Inertia, Some([.., inertia])) => inertia,
+                (Target::GyroScale, _) => 1.0 + value,
+                _ => *value,
+            });
+        }
+        Some(all)
+    }
+}

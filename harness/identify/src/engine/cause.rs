@@ -1,0 +1,157 @@
+//! Effects that a misfit asks for: a score test (Lagrange multiplier; Rao 1948, Engle 1984) of each candidate, then fits of the best.
+//!
+//! Under a small effect of size x the residuals move by x v. Of v the unknowns and the tolerances can take what lies in the span of
+//! their derivatives J; of the rest v' the size that the residual e asks for, and its standard deviation, are
+//!
+//! ```text
+//! x = −v'·e/|v'|²,   σ_x = 1/|v'|
+//! ```
+//!
+//! x/σ_x is normal if the effect is absent. A general test spreads over hundreds of rows or bands what this test gathers in one
+//! number: an estimate can be off by ten standard deviations without a sign in a general test. The candidates with the largest
+//! scores are fitted with all unknowns, from the recordings' own noise, for the noise of a misfit hides what it is made of.
+
+use analysis::innovations::{LIMIT, Tests};
+use anyhow::Result;
+use nalgebra::DVector;
+use rayon::prelude::*;
+
+use super::minimum::{Curvature, End, places};
+use super::problem::Part;
+use super::{DECIDES, ENDS, Fit, Solution};
+use crate::news::News;
+
+/// Candidates that are fitted.
+const FITTED: usize = 3;
+/// Part of a candidate's reach by which the answer is differenced.
+const STEP: f64 = 1e-2;
+/// Part of a candidate's change that the unknowns must leave for it to be seen: theirs are differences, good to a thousandth.
+const SEEN: f64 = 1e-2;
+
+/// A candidate that the recordings ask for.
+#[derive(Clone, Copy, Debug)]
+pub struct Effect {
+    /// Number of the unknown.
+    pub unknown: usize,
+    /// Its size, and the standard deviation of that.
+    pub size: (f64, f64),
+    /// Decrease of −2 ln L.
+    pub gain: f64,
+    /// True if noise is left with it.
+    pub fits: bool,
+}
+
+/// Size, standard deviation and score of a candidate, at first order.
+struct Score {
+    unknown: usize,
+    size: f64,
+    std: f64,
+    score: f64,
+}
+
+/// Returns the effects that a solution's residual asks for, the largest gain first. Without a score beyond chance nothing is fitted.
+///
+/// # Errors
+/// If the system refuses the minimum. A candidate that it refuses is left out.
+pub fn effects(solution: &Solution, news: &mut dyn FnMut(&News)) -> Result<Vec<Effect>> {
+    let problem = solution.fit.problem;
+    let candidates =
+        places(&problem.unknowns.iter().map(|u| u.part == Part::Candidate).collect::<Vec<bool>>());
+    if candidates.is_empty() {
+        return Ok(Vec::new());
+    }
+    let mut fit = Fit::new(problem);
+    (fit.hold, fit.free) = (solution.fit.hold, solution.fit.free.clone());
+    fit.set(solution.fit.noise.clone(), 1.0);
+    let mut base = solution.minimum.clone();
+    if !solution.is_noise() {
+        fit.limit_noise();
+        let z = base.point.z.clone();
+        base = fit.minimise(&z, &solution.fit.free, None, End::new(6, ENDS.0))?;
+    }
+    let known: Vec<bool> = problem
+        .unknowns
+        .iter()
+        .zip(&fit.free)
+        .map(|(u, free)| *free || u.part == Part::Tolerance)
+        .collect();
+    let jacobian = fit.derivatives(&base.point, &known)?.matrix;
+    let covariance = Curvature::new(&jacobian, places(&known)).covariance(known.len());
+    let rest = |v: &DVector<f64>| v - &jacobian * (&covariance * jacobian.tr_mul(v));
+    let one = |&unknown: &usize| -> Option<Score> {
+        let mut z = base.point.z.clone();
+        let step = STEP * problem.unknowns[unknown].reach;
+        z[unknown] += step;
+        let there = fit.at(&z).ok()?;
+        let change = (there.e - &base.point.e) / step;
+        let seen = rest(&change);
+        let norm = seen.norm();
+        if !(norm.is_finite() && norm > SEEN * change.norm()) {
+            return None;
+        }
+        let score = -seen.dot(&base.point.e) / norm;
+        let (low, high) = fit.ends[unknown];
+        let is_possible = score > 0.0 && high > 0.0 || score < 0.0 && low < 0.0;
+        is_possible.then_some(Score { unknown, size: score / norm, std: 1.0 / norm, score })
+    };
+    let mut scores: Vec<Score> = candidates.par_iter().filter_map(one).collect();
+    scores.sort_by(|a, b| b.score.abs().total_cmp(&a.score.abs()));
+    let said: Vec<String> = scores
+        .iter()
+        .map(|s| format!("{} {:.1}", problem.unknowns[s.unknown].name, s.score))
+        .collect();
+    news(&News::Detail(format!("scores of effects that are not estimated: {}", said.join(", "))));
+    let before = {
+        let mut own = Fit::new(problem);
+        own.hold = fit.hold;
+        own.set(fit.noise.clone(), 1.0);
+        own.renew_noise(&base.point);
+        own.deviance(&own.point(&base.point.z, base.point.motion.clone()))
+    };
+    let chance = DECIDES + (base.point.e.len() as f64).ln();
+    let noise = fit.noise.clone();
+    let mut found = Vec::new();
+    for score in scores.iter().take(FITTED).filter(|s| s.score.abs() >= LIMIT) {
+        let j = score.unknown;
+        fit.set(noise.clone(), 1.0);
+        let mut free = fit.free.clone();
+        free[j] = true;
+        let mut z = base.point.z.clone();
+        z[j] = score.size.clamp(fit.ends[j].0, fit.ends[j].1);
+        let Ok(first) = fit.minimise(&z, &free, None, End::new(8, ENDS.0)) else { continue };
+        fit.renew_noise(&first.point);
+        let z = first.point.z.clone();
+        let Ok(mut other) = fit.minimise(&z, &free, None, End::new(6, ENDS.0 * 0.2)) else {
+            continue;
+        };
+        fit.renew_noise(&other.point);
+        let there = fit.point(&other.point.z, other.point.motion.clone());
+        let gain = before - fit.deviance(&there);
+        let fits = fit.tests(&there).iter().all(Tests::passed) && !fit.is_loud();
+        let std = fit.derivatives_at(&mut other).map_or(score.std, |found| {
+            let covariance = Curvature::new(&found.matrix, places(&free)).covariance(free.len());
+            covariance[(j, j)].sqrt()
+        });
+        let size = (there.z[j], std);
+        news(&News::Detail(format!(
+            "with {} = {:.3e} ± {:.1e}, −2 ln L falls by {gain:.1}, and {}",
+            problem.unknowns[j].name,
+            size.0,
+            size.1,
+            if fits { "noise is left" } else { "more than noise is left" }
+        )));
+        if gain > chance {
+            found.push(Effect { unknown: j, size, gain, fits });
+        }
+    }
+    found.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    Ok(found)
+}
+
+/// Returns the effect that is the cause: noise is left with it, and no other effect with which noise is left explains the
+/// recordings about as well.
+pub fn cause(effects: &[Effect]) -> Option<&Effect> {
+    let mut fitting = effects.iter().filter(|effect| effect.fits);
+    let first = fitting.next()?;
+    fitting.next().is_none_or(|second| first.gain > second.gain + DECIDES).then_some(first)
+}

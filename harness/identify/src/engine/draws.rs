@@ -1,0 +1,299 @@
+//! Intervals as quantiles of draws.
+//!
+//! Along the profile a point of deviance Δ counts exp(−Δ/2). Given that, the other unknowns are normal about the minimum over them,
+//! tolerances among them by their priors and one derivative each. Draws outside of the bounds, and those of which there is no such
+//! system, are refused. What is asked for is derived from each draw, so no valley is bent too much, and no interval leaves what is
+//! possible.
+
+use analysis::random::Random;
+use anyhow::Result;
+use nalgebra::{DMatrix, DVector};
+
+use super::minimum::{Curvature, places};
+use super::problem::{Part, Role};
+use super::profile::{Curve, OPEN, Point};
+use super::{Fit, Solution};
+
+/// Draws: the quantiles' own error is a fiftieth of a standard deviation.
+const DRAWS: usize = 20_000;
+/// Fewer than this say nothing.
+const FEWEST: usize = 400;
+/// Places of the profile's coordinate between which draws are spread evenly.
+const PLACES: usize = 400;
+
+/// What is derived from the unknowns, with its draws.
+#[derive(Clone, Debug, Default)]
+pub struct Derived {
+    /// Names.
+    pub names: Vec<String>,
+    /// Units.
+    pub units: Vec<String>,
+    /// Values at the minimum.
+    pub values: Vec<f64>,
+    /// Draws of each.
+    pub columns: Vec<Vec<f64>>,
+    /// The same of the tolerances' coordinates, over their standard deviations, with their names.
+    pub tolerances: Vec<(String, Vec<f64>)>,
+    /// True for the ends that the profile's range left open, of the quantity with that name.
+    pub open: Option<(String, [bool; 2])>,
+}
+
+/// A point with what is needed to draw about it.
+struct Place {
+    at: f64,
+    rise: f64,
+    z: Vec<f64>,
+    /// Maps independent normal numbers to steps.
+    spread: DMatrix<f64>,
+    /// Mean of each signal's residual.
+    means: Vec<f64>,
+}
+
+impl Solution<'_> {
+    /// Draws what is derived, with or without the tolerances.
+    ///
+    /// # Errors
+    /// If the system refuses a derivative.
+    pub fn draw(&mut self, with_tolerances: bool) -> Result<Derived> {
+        let unknowns = &self.fit.problem.unknowns;
+        let n = unknowns.len();
+        let is_known: Vec<bool> = unknowns.iter().map(|u| u.part == Part::Tolerance).collect();
+        let is_known: Vec<bool> = match with_tolerances {
+            true => is_known,
+            false => vec![false; n],
+        };
+        let tolerances = self.fit.derivatives(&self.minimum.point, &is_known)?;
+        let means = self.fit.derivatives_at(&mut self.minimum)?.means + &tolerances.means;
+        let bent = self.profile.as_ref().map(|(j, _)| *j);
+        let whole = Point { at: 0.0, minimum: self.minimum.clone() };
+        let points = match &self.profile {
+            Some((_, points)) => points.clone(),
+            None => vec![whole],
+        };
+        let least = points.iter().map(|p| p.minimum.point.cost).fold(f64::INFINITY, f64::min);
+        let mut places_of: Vec<Place> = Vec::new();
+        for mut point in points {
+            if places_of.last().is_some_and(|last| point.at - last.at < 1e-9) {
+                continue;
+            }
+            let Ok(found) = self.fit.derivatives_at(&mut point.minimum) else { continue };
+            let mut jacobian = found.matrix;
+            let mut which = point.minimum.free.clone();
+            for j in places(&is_known) {
+                jacobian.column_mut(j).copy_from(&tolerances.matrix.column(j));
+                which[j] = true;
+            }
+            if let Some(j) = bent {
+                which[j] = false;
+            }
+            places_of.push(Place {
+                at: point.at,
+                rise: point.minimum.point.cost - least,
+                spread: spread(&jacobian, &which),
+                means: self.fit.mean_residuals(&point.minimum.point),
+                z: point.minimum.point.z,
+            });
+        }
+        Ok(self.drawn(&places_of, &means, &is_known, bent))
+    }
+
+    fn drawn(
+        &self,
+        all: &[Place],
+        means: &DMatrix<f64>,
+        is_known: &[bool],
+        bent: Option<usize>,
+    ) -> Derived {
+        let (fit, problem) = (&self.fit, self.fit.problem);
+        let unknowns = &problem.unknowns;
+        let n = unknowns.len();
+        let mut random = Random::new(1, 61);
+        let x: Vec<f64> = all.iter().map(|p| p.at).collect();
+        let curve = |y: Vec<f64>| Curve::new(&x, &y);
+        // roots of the rises are nearly lines
+        let lowest = all.iter().enumerate().min_by(|a, b| a.1.rise.total_cmp(&b.1.rise));
+        let lowest = lowest.map_or(0, |(k, _)| k);
+        let root =
+            |(k, p): (usize, &Place)| p.rise.max(0.0).sqrt() * if k < lowest { -1.0 } else { 1.0 };
+        let roots = curve(all.iter().enumerate().map(root).collect());
+        let middle: Vec<Curve> =
+            (0..n).map(|j| curve(all.iter().map(|p| p.z[j]).collect())).collect();
+        let residual: Vec<Curve> = (0..problem.signals.len())
+            .map(|s| curve(all.iter().map(|p| p.means[s]).collect()))
+            .collect();
+        let (low, high) = (x[0], x[x.len() - 1]);
+        let width = (high - low) / PLACES as f64;
+        let mut sums = Vec::with_capacity(PLACES);
+        let mut sum = 0.0;
+        for k in 0..PLACES {
+            sum += (-0.5 * roots.at(low + (k as f64 + 0.5) * width).powi(2)).exp();
+            sums.push(sum);
+        }
+        let near: Vec<&super::hold::Rival> = self.rivals.iter().filter(|r| r.is_near()).collect();
+        let weights: Vec<f64> = near.iter().map(|r| (-0.5 * r.more).exp()).collect();
+        let total = 1.0 + weights.iter().sum::<f64>();
+        let names = problem.system.derived();
+        let mut found = Derived {
+            names: names.iter().map(|(name, _)| name.clone()).collect(),
+            units: names.iter().map(|(_, unit)| unit.clone()).collect(),
+            columns: vec![Vec::with_capacity(DRAWS); names.len()],
+            tolerances: places(is_known)
+                .into_iter()
+                .map(|j| (unknowns[j].name.clone(), Vec::new()))
+                .collect(),
+            ..Derived::default()
+        };
+        // of a recording a gyro's bias is the mean of its drift too
+        let biases: Vec<(usize, usize)> = (0..n)
+            .filter_map(|j| {
+                let Role::Bias(output, Some(recording)) = unknowns[j].role else { return None };
+                let of = |s: &super::Signal| (s.output, s.recording) == (output, recording);
+                Some((j, problem.signals.iter().position(of)?))
+            })
+            .collect();
+        for _ in 0..DRAWS {
+            let place = match all.len() {
+                1 => low,
+                _ => {
+                    let part = random.uniform() * sum;
+                    let k = sums.partition_point(|s| *s < part).min(PLACES - 1);
+                    low + (k as f64 + random.uniform()) * width
+                }
+            };
+            let closest =
+                all.iter().min_by(|a, b| (a.at - place).abs().total_cmp(&(b.at - place).abs()));
+            let Some(closest) = closest else { break };
+            let normal = DVector::from_fn(closest.spread.ncols(), |_, _| random.normal());
+            let step = &closest.spread * normal;
+            let mut z: Vec<f64> = (0..n).map(|j| middle[j].at(place) + step[j]).collect();
+            if let Some(j) = bent {
+                z[j] = place;
+            }
+            let mut pick = random.uniform() * total - 1.0;
+            let mut shift = None;
+            for (rival, weight) in near.iter().zip(&weights) {
+                if pick > 0.0 && pick <= *weight {
+                    shift = Some(&rival.shift);
+                }
+                pick -= weight;
+            }
+            if let Some(shift) = shift {
+                z.iter_mut().zip(shift).for_each(|(z, by)| *z += by);
+            }
+            let refused = (0..n).any(|j| {
+                (fit.free[j] || is_known[j])
+                    && !(fit.ends[j].0 - 1e-12..=fit.ends[j].1 + 1e-12).contains(&z[j])
+            });
+            let mut values = fit.values(&z);
+            for (j, s) in &biases {
+                let moved: f64 = (0..n).filter(|i| i != j).map(|i| step[i] * means[(*s, i)]).sum();
+                let rows = problem.signals[*s].sampled.iter().filter(|r| **r).count() as f64;
+                let own = fit.noise[*s].white / rows.sqrt() * random.normal();
+                values[*j] = middle[*j].at(place) + residual[*s].at(place) - moved + own;
+                if let Some(shift) = shift {
+                    values[*j] += shift[*j];
+                }
+            }
+            let Some(derived) = problem.system.derive(&values).filter(|_| !refused) else {
+                continue;
+            };
+            found.columns.iter_mut().zip(derived).for_each(|(column, v)| column.push(v));
+            for ((_, column), j) in found.tolerances.iter_mut().zip(places(is_known)) {
+                column.push(z[j]);
+            }
+        }
+        let mut values = fit.values(&self.minimum.point.z);
+        let own = fit.mean_residuals(&self.minimum.point);
+        for (j, s) in &biases {
+            values[*j] += own[*s];
+        }
+        let median = |column: &Vec<f64>| analysis::statistics::median(column).unwrap_or(f64::NAN);
+        found.values = match problem.system.derive(&values) {
+            Some(values) => values,
+            None => found.columns.iter().map(median).collect(),
+        };
+        if let (Some(j), [first, .., last]) = (bent, all) {
+            let open = [first.rise < OPEN, last.rise < OPEN];
+            found.open = Some((unknowns[j].name.clone(), open));
+        }
+        found
+    }
+}
+
+/// Maps independent normal numbers to steps of the unknowns `which` with the covariance of derivatives.
+fn spread(jacobian: &DMatrix<f64>, which: &[bool]) -> DMatrix<f64> {
+    let curvature = Curvature::new(jacobian, places(which));
+    let (vectors, inverse) = curvature.spread();
+    let k = curvature.which.len();
+    let mut all = DMatrix::zeros(which.len(), k);
+    for (i, &row) in curvature.which.iter().enumerate() {
+        for c in 0..k {
+            all[(row, c)] = vectors[(i, c)] * inverse[c].sqrt() * curvature.scale[i];
+        }
+    }
+    all
+}
+
+impl Fit<'_> {
+    /// Mean of each signal's residual.
+    fn mean_residuals(&self, point: &super::fit::Point) -> Vec<f64> {
+        let residuals = self.residuals(&point.z, &point.motion);
+        let mean = |(signal, r): (&super::Signal, &Vec<f64>)| {
+            analysis::statistics::mean(&signal.picked(r))
+        };
+        self.problem.signals.iter().zip(&residuals).map(mean).collect()
+    }
+}
+
+impl Derived {
+    /// Returns true if there are enough draws for quantiles.
+    pub fn is_told(&self) -> bool {
+        self.columns.first().is_some_and(|column| column.len() >= FEWEST)
+    }
+
+    /// Place of a quantity.
+    pub fn place(&self, name: &str) -> Option<usize> {
+        self.names.iter().position(|other| other == name)
+    }
+
+    /// Standard deviation of a quantity's draws.
+    pub fn std(&self, k: usize) -> f64 {
+        analysis::statistics::deviation(&self.columns[k])
+    }
+
+    /// The 95 % interval of a quantity.
+    pub fn interval(&self, k: usize) -> [f64; 2] {
+        let mut sorted = self.columns[k].clone();
+        sorted.sort_by(f64::total_cmp);
+        let at = |part: f64| {
+            let place = part * (sorted.len() - 1) as f64;
+            let (k, rest) = (place as usize, place.fract());
+            sorted[k] + rest * (sorted[(k + 1).min(sorted.len() - 1)] - sorted[k])
+        };
+        [at(0.025), at(0.975)]
+    }
+
+    /// Correlation of two columns of draws.
+    pub fn correlation(a: &[f64], b: &[f64]) -> f64 {
+        analysis::statistics::correlation(a, b)
+    }
+
+    /// Draws of models that explain the recordings about as well, each by its probability, from the draws of each.
+    pub fn mixed(all: &[(f64, &Derived)]) -> Derived {
+        let Some((_, first)) = all.first() else { return Derived::default() };
+        let mut mixed = Derived {
+            columns: vec![Vec::new(); first.names.len()],
+            tolerances: Vec::new(),
+            ..(*first).clone()
+        };
+        for (probability, other) in all {
+            let count = (probability * DRAWS as f64) as usize;
+            for (k, name) in first.names.iter().enumerate() {
+                let column = other.place(name).unwrap_or(k);
+                let from = &other.columns[column];
+                mixed.columns[k].extend(from.iter().take(count));
+            }
+        }
+        mixed
+    }
+}

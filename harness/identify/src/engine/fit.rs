@@ -1,0 +1,383 @@
+//! The sum of squares of a problem, and its derivatives.
+
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+
+use analysis::gauss_markov::{Noise, Whitening};
+use analysis::innovations::Tests;
+use anyhow::Result;
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::problem::{Hold, Motion, Part, Problem, Role, Signal, Unknown};
+use super::{FIRST_STEP, MOVE, STEPS};
+
+/// A problem with the state of its search: the noise of its signals, and what its inputs do between rows.
+pub struct Fit<'p> {
+    /// The problem.
+    pub problem: &'p Problem<'p>,
+    /// Noise of each signal.
+    pub noise: Vec<Noise>,
+    /// Behaviour between rows.
+    pub hold: Hold,
+    /// Factor by which the noise counts.
+    pub inflation: f64,
+    /// Part of each recording that is fitted, from its beginning.
+    pub part: f64,
+    /// Unknowns that are estimated.
+    pub free: Vec<bool>,
+    /// Least and largest coordinates.
+    pub ends: Vec<(f64, f64)>,
+    steps: Vec<f64>,
+    filters: Vec<Whitening>,
+    driven: AtomicUsize,
+}
+
+/// The answer at coordinates z.
+#[derive(Clone, Debug)]
+pub struct Point {
+    /// Coordinates.
+    pub z: Vec<f64>,
+    /// Motion of each recording.
+    pub motion: Vec<Motion>,
+    /// Residuals over their standard deviation, then priors.
+    pub e: DVector<f64>,
+    /// Sum of their squares.
+    pub cost: f64,
+}
+
+/// Derivatives of the residuals.
+#[derive(Clone, Debug)]
+pub struct Derivatives {
+    /// Of the stacked residuals, a column an unknown; 0 of those that were not asked for.
+    pub matrix: DMatrix<f64>,
+    /// Means of the derivatives of each signal's reading.
+    pub means: DMatrix<f64>,
+}
+
+impl<'p> Fit<'p> {
+    /// The fit before its first search.
+    pub fn new(problem: &'p Problem<'p>) -> Self {
+        let unknowns = &problem.unknowns;
+        let end = |u: &Unknown, value: f64| match u.log {
+            true if value <= 0.0 => f64::NEG_INFINITY,
+            _ => u.coordinate(value),
+        };
+        let mut fit = Fit {
+            problem,
+            noise: problem.signals.iter().map(Signal::first_noise).collect(),
+            hold: problem.holds[0],
+            inflation: 1.0,
+            part: 1.0,
+            free: unknowns.iter().map(|u| u.part == Part::Free).collect(),
+            ends: unknowns.iter().map(|u| (end(u, u.bounds.0), end(u, u.bounds.1))).collect(),
+            steps: unknowns.iter().map(|u| FIRST_STEP * u.reach).collect(),
+            filters: Vec::new(),
+            driven: AtomicUsize::new(0),
+        };
+        fit.renew_filters();
+        fit
+    }
+
+    /// Simulations so far; of a part of the recordings they count as that part.
+    pub fn simulations(&self) -> f64 {
+        let rows: usize = self.problem.recordings.iter().map(|r| r.time.len()).sum();
+        self.driven.load(Relaxed) as f64 / rows as f64
+    }
+
+    /// Takes noise over, and the part of the recordings that is fitted.
+    pub fn set(&mut self, noise: Vec<Noise>, part: f64) {
+        (self.noise, self.part) = (noise, part);
+        self.renew_filters();
+    }
+
+    fn renew_filters(&mut self) {
+        let filter = |(signal, noise): (&Signal, &Noise)| {
+            let rows = self.rows(signal.recording);
+            let time = &self.problem.recordings[signal.recording].time[..rows];
+            noise.whitening(time, Some(&signal.sampled[..rows]))
+        };
+        self.filters = self.problem.signals.iter().zip(&self.noise).map(filter).collect();
+    }
+
+    /// Rows of a recording that are fitted.
+    pub fn rows(&self, recording: usize) -> usize {
+        let all = self.problem.recordings[recording].time.len();
+        ((self.part * all as f64).ceil() as usize).clamp(2.min(all), all)
+    }
+
+    /// Coordinates of values, within the bounds.
+    pub fn coordinates(&self, values: &[f64]) -> Vec<f64> {
+        let all = self.problem.unknowns.iter().zip(values).zip(&self.ends);
+        all.map(|((u, value), ends)| u.coordinate(*value).clamp(ends.0, ends.1)).collect()
+    }
+
+    /// Values of coordinates.
+    pub fn values(&self, z: &[f64]) -> Vec<f64> {
+        self.problem.unknowns.iter().zip(z).map(|(u, z)| u.value(*z)).collect()
+    }
+
+    fn run(&self, z: &[f64], recording: usize, whole: bool) -> Result<Motion> {
+        let rows = self.rows(recording);
+        self.driven.fetch_add(rows, Relaxed);
+        self.problem.system.run(&self.values(z), recording, rows, self.hold, whole)
+    }
+
+    /// Returns the answer at z.
+    ///
+    /// # Errors
+    /// If the system refuses z, or answers with numbers that are not finite.
+    pub fn at(&self, z: &[f64]) -> Result<Point> {
+        let runs = (0..self.problem.recordings.len()).into_par_iter();
+        let motion = runs.map(|k| self.run(z, k, true)).collect::<Result<Vec<Motion>>>()?;
+        Ok(self.point(z, motion))
+    }
+
+    /// The answer where the motion is known.
+    pub fn point(&self, z: &[f64], motion: Vec<Motion>) -> Point {
+        let residuals = self.residuals(z, &motion);
+        let e = DVector::from_vec(self.stacked(residuals, z));
+        let cost = e.norm_squared();
+        let cost = if cost.is_finite() { cost } else { f64::INFINITY };
+        Point { z: z.to_vec(), motion, e, cost }
+    }
+
+    /// Measured less modelled, for each signal; 0 where nothing was read.
+    pub fn residuals(&self, z: &[f64], motion: &[Motion]) -> Vec<Vec<f64>> {
+        let values = self.values(z);
+        let of = |signal: &Signal| {
+            let motion = &motion[signal.recording];
+            let output = &motion.outputs[signal.output];
+            let mut residual: Vec<f64> = output
+                .iter()
+                .zip(signal.measured.iter().zip(&signal.sampled))
+                .map(|(model, (y, sampled))| if *sampled { y - model } else { 0.0 })
+                .collect();
+            for (unknown, value) in self.problem.unknowns.iter().zip(&values) {
+                if *value == 0.0 {
+                    continue;
+                }
+                if let Some(shape) = reading(unknown, signal, motion) {
+                    for (k, r) in
+                        residual.iter_mut().enumerate().filter(|(k, _)| signal.sampled[*k])
+                    {
+                        *r -= value * shape(k);
+                    }
+                }
+            }
+            residual
+        };
+        self.problem.signals.iter().map(of).collect()
+    }
+
+    /// Residuals of each signal over their standard deviation.
+    pub fn innovations(&self, mut residuals: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+        for (piece, filter) in residuals.iter_mut().zip(&self.filters) {
+            filter.apply(piece);
+            if self.inflation != 1.0 {
+                piece.iter_mut().for_each(|e| *e /= self.inflation);
+            }
+        }
+        residuals
+    }
+
+    fn stacked(&self, residuals: Vec<Vec<f64>>, z: &[f64]) -> Vec<f64> {
+        let mut all = self.innovations(residuals).concat();
+        for (unknown, z) in self.problem.unknowns.iter().zip(z) {
+            if let Some((mean, std)) = unknown.prior {
+                all.push((z - mean) / std);
+            }
+        }
+        all
+    }
+
+    /// −2 ln L of an answer but for a constant, with the noise that it leaves.
+    pub fn deviance(&self, point: &Point) -> f64 {
+        point.cost + self.filters.iter().map(Whitening::log_variance).sum::<f64>()
+    }
+
+    /// Returns the derivatives at an answer by the unknowns `which`, and makes the steps of their differences anew.
+    ///
+    /// # Errors
+    /// If the system refuses every step of an unknown.
+    pub fn derivatives(&mut self, at: &Point, which: &[bool]) -> Result<Derivatives> {
+        let n = at.z.len();
+        let columns: Vec<Option<Column>> = (0..n)
+            .into_par_iter()
+            .map(|j| which[j].then(|| self.column(at, j)).transpose())
+            .collect::<Result<_>>()?;
+        let rows = at.e.len();
+        let mut found = Derivatives {
+            matrix: DMatrix::zeros(rows, n),
+            means: DMatrix::zeros(self.problem.signals.len(), n),
+        };
+        for (j, column) in columns.into_iter().enumerate() {
+            let Some(Column { values, means, step }) = column else { continue };
+            found.matrix.column_mut(j).copy_from_slice(&values);
+            found.means.column_mut(j).copy_from_slice(&means);
+            self.steps[j] = step;
+        }
+        let priors = self.problem.unknowns.iter().filter(|u| u.prior.is_some()).count();
+        let mut row = rows - priors;
+        for (j, unknown) in self.problem.unknowns.iter().enumerate() {
+            if let Some((_, std)) = unknown.prior {
+                found.matrix[(row, j)] = 1.0 / std;
+                row += 1;
+            }
+        }
+        Ok(found)
+    }
+
+    fn column(&self, at: &Point, j: usize) -> Result<Column> {
+        let unknown = &self.problem.unknowns[j];
+        let slope_of = |z: f64| if unknown.log { z.exp() } else { 1.0 };
+        let whitened = |pieces: Vec<Vec<f64>>| {
+            let mean = |(piece, signal): (&Vec<f64>, &Signal)| {
+                let count = signal.sampled[..piece.len()].iter().filter(|s| **s).count();
+                -piece.iter().sum::<f64>() / count.max(1) as f64
+            };
+            let means = pieces.iter().zip(&self.problem.signals).map(mean).collect();
+            let mut values = self.innovations(pieces).concat();
+            values.resize(at.e.len(), 0.0);
+            (values, means)
+        };
+        let is_late = match unknown.role {
+            Role::Delay(output) => at.motion.iter().all(|m| m.slopes.len() > output),
+            _ => false,
+        };
+        if !matches!(unknown.role, Role::Run(_) | Role::Delay(_)) || is_late {
+            let of = |signal: &Signal| -> Vec<f64> {
+                let motion = &at.motion[signal.recording];
+                let rows = motion.outputs[signal.output].len();
+                match (unknown.role, reading(unknown, signal, motion)) {
+                    (Role::Delay(output), _) if output == signal.output => {
+                        let scale = self.scale(&at.z, output);
+                        motion.slopes[output].iter().map(|slope| scale * slope).collect()
+                    }
+                    (_, Some(shape)) => (0..rows).map(|k| -shape(k) * slope_of(at.z[j])).collect(),
+                    _ => vec![0.0; rows],
+                }
+            };
+            let pieces = self.problem.signals.iter().map(|s| masked(of(s), s)).collect();
+            let (values, means) = whitened(pieces);
+            return Ok(Column { values, means, step: self.steps[j] });
+        }
+        let base = self.residuals(&at.z, &at.motion);
+        let mut step = self.steps[j];
+        loop {
+            let (by, motion) = self.moved(at, j, step)?;
+            let mut z = at.z.clone();
+            z[j] += by;
+            let there = self.residuals(&z, &motion);
+            let pieces = there
+                .iter()
+                .zip(&base)
+                .map(|(a, b)| a.iter().zip(b).map(|(a, b)| (a - b) / by).collect::<Vec<f64>>());
+            let (values, means) = whitened(pieces.collect());
+            let norm = values.iter().map(|v| v * v).sum::<f64>().sqrt() * self.inflation;
+            let reach = unknown.reach;
+            let next = (MOVE / norm.max(1e-300)).clamp(STEPS.0 * reach, STEPS.1 * reach);
+            // once more where the step was far from what shows
+            let is_first = step == self.steps[j];
+            if !is_first || (0.05..20.0).contains(&(next / step)) || !norm.is_finite() {
+                return Ok(Column { values, means, step: next });
+            }
+            step = next;
+        }
+    }
+
+    /// Motion with one coordinate moved by a step, forwards or else backwards.
+    fn moved(&self, at: &Point, j: usize, step: f64) -> Result<(f64, Vec<Motion>)> {
+        let unknown = &self.problem.unknowns[j];
+        let to = |by: f64| -> Result<(f64, Vec<Motion>)> {
+            let mut z = at.z.clone();
+            z[j] += by;
+            let runs = (0..self.problem.recordings.len()).into_par_iter();
+            let one = |k: usize| match unknown.is_of(k) {
+                true => self.run(&z, k, false),
+                false => Ok(at.motion[k].clone()),
+            };
+            Ok((by, runs.map(one).collect::<Result<_>>()?))
+        };
+        let forwards = at.z[j] + step <= self.ends[j].1;
+        let (first, second) = if forwards { (step, -step) } else { (-step, step) };
+        to(first).or_else(
+            |error| if at.z[j] + second < self.ends[j].0 { Err(error) } else { to(second) },
+        )
+    }
+
+    /// Factor of an output in its reading.
+    fn scale(&self, z: &[f64], output: usize) -> f64 {
+        let own =
+            |(u, z): (&Unknown, &f64)| (u.role == Role::Gain(output, output)).then(|| u.value(*z));
+        1.0 + self.problem.unknowns.iter().zip(z).filter_map(own).sum::<f64>()
+    }
+
+    /// Tests for each signal whether the residual of an answer is noise.
+    pub fn tests(&self, point: &Point) -> Vec<Tests> {
+        let innovations = self.innovations(self.residuals(&point.z, &point.motion));
+        self.tests_of(&innovations)
+    }
+
+    /// Tests for each signal whether its innovations are noise.
+    pub fn tests_of(&self, innovations: &[Vec<f64>]) -> Vec<Tests> {
+        let all = self.problem.signals.iter().zip(innovations).zip(&self.noise);
+        let one = |((signal, e), noise): ((&Signal, &Vec<f64>), &Noise)| {
+            let recording = &self.problem.recordings[signal.recording];
+            let inputs: Vec<Vec<f64>> =
+                recording.inputs.iter().map(|input| signal.picked(input)).collect();
+            let inputs: Vec<&[f64]> = inputs.iter().map(Vec::as_slice).collect();
+            Tests::of(&signal.picked(&recording.time), &inputs, &signal.picked(e), noise.white)
+        };
+        all.map(one).collect()
+    }
+
+    /// Takes the noise of the residual at a point.
+    pub fn renew_noise(&mut self, point: &Point) {
+        let residuals = self.residuals(&point.z, &point.motion);
+        let of = |(signal, residual): (&Signal, &Vec<f64>)| {
+            let rows = residual.len();
+            let time = &self.problem.recordings[signal.recording].time[..rows];
+            signal.noise_of(time, residual)
+        };
+        let noise = self.problem.signals.par_iter().zip(&residuals).map(of).collect();
+        self.set(noise, self.part);
+    }
+}
+
+impl Signal {
+    /// Values of a signal in the rows with a value.
+    pub fn picked(&self, values: &[f64]) -> Vec<f64> {
+        let there = values.iter().zip(&self.sampled).filter(|(_, sampled)| **sampled);
+        there.map(|(value, _)| *value).collect()
+    }
+}
+
+/// Derivative of the residuals by one unknown.
+struct Column {
+    values: Vec<f64>,
+    means: Vec<f64>,
+    step: f64,
+}
+
+fn masked(mut piece: Vec<f64>, signal: &Signal) -> Vec<f64> {
+    piece.iter_mut().zip(&signal.sampled).for_each(|(v, s)| *v *= f64::from(*s));
+    piece
+}
+
+/// Returns the change of a signal's reading per unit of an unknown of its sensor, row by row; `None`: no change.
+fn reading<'m>(
+    unknown: &Unknown,
+    signal: &Signal,
+    motion: &'m Motion,
+) -> Option<Box<dyn Fn(usize) -> f64 + 'm>> {
+    match unknown.role {
+        Role::Bias(output, of) if output == signal.output => {
+            of.is_none_or(|of| of == signal.recording).then(|| Box::new(|_| 1.0) as _)
+        }
+        Role::Gain(output, of) if output == signal.output => {
+            let other = &motion.outputs[of];
+            Some(Box::new(move |k| other[k]))
+        }
+        _ => None,
+    }
+}

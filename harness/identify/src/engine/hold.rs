@@ -1,0 +1,114 @@
+//! What the inputs do between rows, by the likelihood.
+//!
+//! A held input comes half a row late on average, so "held without a delay" and "linear with a delay of half a row" differ little. So
+//! each behaviour gets a minimum of its own with all unknowns free, and none is taken that needs an effect before its cause.
+//! Behaviours that explain the recordings about as well as the best count by their probability.
+
+use anyhow::Result;
+
+use super::minimum::{End, Minimum};
+use super::problem::{Hold, Role};
+use super::{DECIDES, ENDS, Fit};
+
+/// A delay that much below 0, in rows, is none: stamps of two channels differ by that.
+const EARLIEST: f64 = 0.05;
+/// A behaviour is taken for better if its sum of squares is less by this (not worth more than a bare mention: Kass and Raftery).
+const ALIKE: f64 = 2.0;
+
+/// Another behaviour, at its own minimum.
+#[derive(Clone, Debug)]
+pub struct Rival {
+    /// The behaviour.
+    pub hold: Hold,
+    /// Sum of squares less that of the behaviour that was taken.
+    pub more: f64,
+    /// Coordinates of its minimum less those of the one that was taken.
+    pub shift: Vec<f64>,
+    /// Its delay, s, if there is one.
+    pub delay: Option<f64>,
+    /// True if the delay is not allowed.
+    pub early: bool,
+    /// True if its minimum was not reached, for its sum of squares is far above.
+    pub lost: bool,
+}
+
+impl Rival {
+    /// Returns true if it explains the recordings about as well.
+    pub fn is_near(&self) -> bool {
+        !self.early && self.more < DECIDES
+    }
+}
+
+impl Fit<'_> {
+    /// Index of the delay of the first output.
+    pub fn delay(&self) -> Option<usize> {
+        self.problem.unknowns.iter().position(|u| u.role == Role::Delay(0))
+    }
+
+    /// The best behaviour's minimum, and the other behaviours. A behaviour that cannot be simulated is none.
+    ///
+    /// # Errors
+    /// If the system refuses the minimum that was found so far.
+    pub fn compare_holds(&mut self, found: Minimum) -> Result<(Minimum, Vec<Rival>)> {
+        if self.problem.holds.len() < 2 {
+            return Ok((found, Vec::new()));
+        }
+        let delay = self.delay().filter(|j| self.free[*j]);
+        let step = self.problem.recordings.first().map_or(0.0, |r| r.step);
+        let now = self.hold;
+        let free = self.free.clone();
+        let mut found = match found.decrement < ENDS.0 {
+            true => found,
+            false => {
+                let z = found.point.z.clone();
+                self.minimise(&z, &free, found.derivatives, End::new(12, ENDS.0))?
+            }
+        };
+        let derivatives = found.derivatives.clone();
+        let mut all: Vec<(Hold, Minimum, bool)> = Vec::new();
+        let early = is_early(self, delay, step, &found);
+        let mut least = if early { f64::INFINITY } else { found.point.cost };
+        for hold in self.problem.holds.clone().into_iter().filter(|hold| *hold != now) {
+            self.hold = hold;
+            let mut z = found.point.z.clone();
+            if let Some(j) = delay {
+                let late = |h: Hold| if h == Hold::ZeroOrderHold { 0.5 * step } else { 0.0 };
+                z[j] += late(now) - late(hold);
+            }
+            let end = End { above: least + DECIDES, ..End::new(8, ENDS.0) };
+            let Ok(other) = self.minimise(&z, &free, derivatives.clone(), end) else { continue };
+            let early = is_early(self, delay, step, &other);
+            if !early {
+                least = least.min(other.point.cost);
+            }
+            all.push((hold, other, early));
+        }
+        self.hold = now;
+        all.insert(0, (now, found.clone(), early));
+        let mut best = 0;
+        for k in 1..all.len() {
+            let (_, other, early) = &all[k];
+            let (_, first, first_early) = &all[best];
+            if !early && (*first_early || other.point.cost < first.point.cost - ALIKE) {
+                best = k;
+            }
+        }
+        let (hold, minimum, _) = all.remove(best);
+        (self.hold, found) = (hold, minimum);
+        let rivals = all.into_iter().map(|(hold, other, early)| Rival {
+            hold,
+            more: other.point.cost - found.point.cost,
+            shift: other.point.z.iter().zip(&found.point.z).map(|(a, b)| a - b).collect(),
+            delay: delay.map(|j| other.point.z[j]),
+            early,
+            lost: other.decrement >= 1.0,
+        });
+        let rivals = rivals.collect();
+        Ok((found, rivals))
+    }
+}
+
+/// Returns true if a minimum has a delay that is not allowed.
+fn is_early(fit: &Fit, delay: Option<usize>, step: f64, minimum: &Minimum) -> bool {
+    !fit.problem.acausal && delay.is_some_and(|j| minimum.point.z[j] < -EARLIEST * step)
+}

@@ -1,0 +1,270 @@
+//! The minimum of a sum of squares within bounds.
+//!
+//! The method is Levenberg and Marquardt's by projection: a step is cut at the bounds, and taken again without the unknowns that hit
+//! one. Broyden's updates keep the derivatives as long as the steps gain what they forecast. The distance to the minimum is the Newton
+//! decrement, in standard deviations.
+
+use anyhow::Result;
+use nalgebra::{Cholesky, DMatrix, DVector};
+
+use super::KEPT;
+use super::fit::{Derivatives, Fit, Point};
+
+/// End of a search.
+#[derive(Clone, Debug)]
+pub struct Minimum {
+    /// The answer there.
+    pub point: Point,
+    /// Derivatives there, unless the last ones are of elsewhere.
+    pub derivatives: Option<Derivatives>,
+    /// Distance to the minimum, standard deviations.
+    pub decrement: f64,
+    /// Unknowns that were searched for.
+    pub free: Vec<bool>,
+}
+
+/// What ends a search.
+#[derive(Clone, Copy, Debug)]
+pub struct End {
+    /// Sets of derivatives at most.
+    pub sets: usize,
+    /// Distance to the minimum, standard deviations.
+    pub decrement: f64,
+    /// A minimum above this sum of squares is of no use.
+    pub above: f64,
+}
+
+impl End {
+    /// A search with so many sets of derivatives, to this distance.
+    pub fn new(sets: usize, decrement: f64) -> Self {
+        End { sets, decrement, above: f64::INFINITY }
+    }
+}
+
+/// Least regularisation of a curvature with a unit diagonal.
+const LEAST: f64 = 1e-12;
+/// Factor of the damping after a step that fails, or that gains what it should.
+const DAMPING: f64 = 8.0;
+/// Steps that are tried with one set of derivatives.
+const TRIES: usize = 7;
+
+/// A curvature in its own scales.
+pub struct Curvature {
+    pub(super) which: Vec<usize>,
+    matrix: DMatrix<f64>,
+    pub(super) scale: Vec<f64>,
+}
+
+impl Curvature {
+    /// JᵀJ over the columns `which`.
+    pub fn new(jacobian: &DMatrix<f64>, which: Vec<usize>) -> Self {
+        let picked = jacobian.select_columns(&which);
+        let a = picked.tr_mul(&picked);
+        let scale: Vec<f64> = a.diagonal().iter().map(|d| 1.0 / (d.sqrt() + 1e-30)).collect();
+        let matrix = DMatrix::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)] * scale[i] * scale[j]);
+        Curvature { which, matrix, scale }
+    }
+
+    /// (JᵀJ + λ D)⁻¹ b over those of `which` that `keep` has, D the diagonal; `b` is in the matrix's own scales.
+    fn solve(&self, b: &[f64], keep: &[usize], damping: f64) -> DVector<f64> {
+        let damped = |more: f64| {
+            let entry = |i: usize, j: usize| {
+                self.matrix[(keep[i], keep[j])] + if i == j { damping + more } else { 0.0 }
+            };
+            Cholesky::new(DMatrix::from_fn(keep.len(), keep.len(), entry))
+        };
+        let right = DVector::from_iterator(keep.len(), keep.iter().map(|k| b[*k]));
+        let mut more = LEAST;
+        loop {
+            if let Some(found) = damped(more) {
+                return found.solve(&right);
+            }
+            if more.is_nan() || more > 1.0 {
+                return right * 0.0;
+            }
+            more *= 100.0;
+        }
+    }
+
+    /// The inverse over all unknowns, without the directions of which the recordings show next to nothing.
+    pub fn spread(&self) -> (DMatrix<f64>, DVector<f64>) {
+        let n = self.which.len();
+        if n == 0 || self.matrix.iter().any(|v| !v.is_finite()) {
+            return (DMatrix::zeros(n, n), DVector::zeros(n));
+        }
+        let found = self.matrix.clone().symmetric_eigen();
+        let least = 1e-13 * found.eigenvalues.max();
+        let inverse = found.eigenvalues.map(|v| if v > least { 1.0 / v } else { 0.0 });
+        (found.eigenvectors, inverse)
+    }
+
+    /// The covariance over `all` unknowns; 0 for the others.
+    pub fn covariance(&self, all: usize) -> DMatrix<f64> {
+        let (vectors, inverse) = self.spread();
+        let inner = &vectors * DMatrix::from_diagonal(&inverse) * vectors.transpose();
+        let mut covariance = DMatrix::zeros(all, all);
+        for (i, &row) in self.which.iter().enumerate() {
+            for (j, &column) in self.which.iter().enumerate() {
+                covariance[(row, column)] = inner[(i, j)] * self.scale[i] * self.scale[j];
+            }
+        }
+        covariance
+    }
+}
+
+/// Places of what is true.
+pub fn places(which: &[bool]) -> Vec<usize> {
+    (0..which.len()).filter(|j| which[*j]).collect()
+}
+
+impl Fit<'_> {
+    /// Unknowns that are free and not at a bound beyond which the sum of squares falls.
+    pub fn inner(&self, z: &[f64], gradient: &DVector<f64>, free: &[bool]) -> Vec<usize> {
+        let is_inner = |j: &usize| {
+            let ((low, high), z, slope) = (self.ends[*j], z[*j], gradient[*j]);
+            !(z <= low + 1e-12 && slope > 0.0 || z >= high - 1e-12 && slope < 0.0)
+        };
+        places(free).into_iter().filter(is_inner).collect()
+    }
+
+    /// Searches from z over the unknowns `free`, with derivatives of nearby if there are any.
+    ///
+    /// # Errors
+    /// If the system refuses the start, or every step of an unknown.
+    pub fn minimise(
+        &mut self,
+        z: &[f64],
+        free: &[bool],
+        derivatives: Option<Derivatives>,
+        end: End,
+    ) -> Result<Minimum> {
+        let z: Vec<f64> = z.iter().zip(&self.ends).map(|(z, e)| z.clamp(e.0, e.1)).collect();
+        let point = self.at(&z)?;
+        self.minimise_on(point, free, derivatives, end)
+    }
+
+    /// The same from a point whose answer is known.
+    ///
+    /// # Errors
+    /// If the system refuses every step of an unknown.
+    pub fn minimise_on(
+        &mut self,
+        mut point: Point,
+        free: &[bool],
+        mut derivatives: Option<Derivatives>,
+        end: End,
+    ) -> Result<Minimum> {
+        let n = point.z.len();
+        let (mut damping, mut fresh, mut decrement, mut sets) = (1e-3, false, f64::INFINITY, 0);
+        loop {
+            if derivatives.is_none() {
+                if sets == end.sets {
+                    break;
+                }
+                derivatives = Some(self.derivatives(&point, free)?);
+                sets += 1;
+                fresh = true;
+            }
+            let Some(now) = &mut derivatives else { break };
+            let jacobian = &mut now.matrix;
+            let gradient = jacobian.tr_mul(&point.e);
+            let curvature = Curvature::new(jacobian, self.inner(&point.z, &gradient, free));
+            let which = curvature.which.clone();
+            let all: Vec<usize> = (0..which.len()).collect();
+            let b: Vec<f64> =
+                which.iter().zip(&curvature.scale).map(|(j, s)| gradient[*j] * s).collect();
+            let newton = curvature.solve(&b, &all, 0.0);
+            let won: f64 = newton.iter().zip(&b).map(|(s, b)| s * b).sum();
+            decrement = won.max(0.0).sqrt();
+            if decrement.is_nan() {
+                break;
+            }
+            if decrement < end.decrement {
+                if fresh || sets == end.sets {
+                    break;
+                }
+                derivatives = None;
+                continue;
+            }
+            if fresh && point.cost - 1.5 * won > end.above && decrement < 30.0 {
+                break;
+            }
+            let mut outcome = None;
+            for _ in 0..TRIES {
+                let scaled = curvature.solve(&b, &all, damping);
+                let mut step = vec![0.0; n];
+                for (k, &j) in which.iter().enumerate() {
+                    step[j] = -scaled[k] * curvature.scale[k];
+                }
+                let hits =
+                    |j: usize| !(self.ends[j].0..=self.ends[j].1).contains(&(point.z[j] + step[j]));
+                let keep: Vec<usize> = all.iter().copied().filter(|k| !hits(which[*k])).collect();
+                if !keep.is_empty() && keep.len() < all.len() {
+                    // a cut step is taken again without the unknowns that hit a bound
+                    let mut cut = vec![0.0; n];
+                    for &j in which.iter().filter(|j| hits(**j)) {
+                        let (low, high) = self.ends[j];
+                        cut[j] = (point.z[j] + step[j]).clamp(low, high) - point.z[j];
+                    }
+                    let own: Vec<f64> =
+                        which.iter().zip(&curvature.scale).map(|(j, s)| cut[*j] / s).collect();
+                    let moved = &curvature.matrix * DVector::from_vec(own);
+                    let right: Vec<f64> = b.iter().zip(moved.iter()).map(|(b, m)| b + m).collect();
+                    let rest = curvature.solve(&right, &keep, damping);
+                    for (k, place) in keep.iter().enumerate() {
+                        cut[which[*place]] = -rest[k] * curvature.scale[*place];
+                    }
+                    step = cut;
+                }
+                let z: Vec<f64> = (0..n)
+                    .map(|j| (point.z[j] + step[j]).clamp(self.ends[j].0, self.ends[j].1))
+                    .collect();
+                let step = DVector::from_fn(n, |j, _| z[j] - point.z[j]);
+                let there = self.at(&z).ok().filter(|there| there.cost < point.cost);
+                if let Some(there) = there {
+                    let foreseen = &*jacobian * &step;
+                    let forecast = -(2.0 * gradient.dot(&step) + foreseen.norm_squared());
+                    let gain = (point.cost - there.cost) / forecast.max(1e-30);
+                    let reach = |j: usize| self.problem.unknowns[j].reach;
+                    let own = DVector::from_fn(n, |j, _| step[j] / reach(j).powi(2));
+                    let size: f64 = (0..n).map(|j| (step[j] / reach(j)).powi(2)).sum();
+                    if size > 0.0 {
+                        let off = &there.e - &point.e - foreseen;
+                        jacobian.ger(1.0 / size, &off, &own, 1.0);
+                    }
+                    if gain > 0.5 {
+                        damping = (damping / DAMPING).max(1e-7);
+                    }
+                    point = there;
+                    fresh = false;
+                    outcome = Some(gain > KEPT);
+                    break;
+                }
+                damping = (damping * DAMPING).max(1e-4);
+                if !fresh {
+                    outcome = Some(false);
+                    break;
+                }
+            }
+            match outcome {
+                None => break,
+                Some(true) => {}
+                Some(false) => derivatives = None,
+            }
+        }
+        Ok(Minimum { point, derivatives, decrement, free: free.to_vec() })
+    }
+
+    /// Derivatives at a minimum by the unknowns that were searched for.
+    ///
+    /// # Errors
+    /// If the system refuses every step of an unknown.
+    pub fn derivatives_at(&mut self, minimum: &mut Minimum) -> Result<Derivatives> {
+        if let Some(found) = &minimum.derivatives {
+            return Ok(found.clone());
+        }
+        let found = self.derivatives(&minimum.point, &minimum.free)?;
+        minimum.derivatives = Some(found.clone());
+        Ok(found)
+    }
+}

@@ -1,0 +1,43 @@
+//! One estimator for any simulated system. It knows nothing of slosh: a [`Problem`] is its data.
+//!
+//! ```text
+//! minimise Σ e_k² + Σ ((z_i − μ_i)/s_i)²,   e = whitened( y_k − (1 + g) y(t_k; z) − b )
+//! ```
+//!
+//! y(t; z) is the answer of the [`System`] for the coordinates z of the unknowns, g and b are errors of the sensors, and the second sum
+//! holds the priors. Each signal has white noise and a drift, whose sizes are estimated from the residual.
+//!
+//! The search takes the whole recordings from several starts, with the noise counted 100, 10 and 1 times ([`search`]). It finds what
+//! the inputs do between rows by the likelihood ([`hold`]). A residual that is more than noise is tested for effects that were not
+//! estimated ([`cause`]). Intervals are quantiles of draws ([`draws`]), along the profile of the likelihood of an unknown whose
+//! likelihood is no parabola ([`profile`]), with the tolerances of known values joined as priors.
+
+pub mod cause;
+pub mod draws;
+pub mod fit;
+pub mod hold;
+pub mod minimum;
+pub mod noise;
+pub mod problem;
+pub mod profile;
+pub mod search;
+
+pub use fit::Fit;
+pub use problem::{Drift, Hold, Motion, Part, Problem, Recorded, Role, Signal, System, Unknown};
+pub use search::Solution;
+
+/// Difference of −2 ln L that decides between two explanations (Kass and Raftery 1995: very strong).
+pub const DECIDES: f64 = 10.0;
+/// Change of the residuals by a difference, in standard deviations of one degree of freedom: above the errors of a solver, below the
+/// curvature of the answer.
+pub const MOVE: f64 = 0.3;
+/// Ends of the steps of a difference, in units of an unknown's reach.
+pub const STEPS: (f64, f64) = (1e-7, 0.2);
+/// The first step, in the same units.
+pub const FIRST_STEP: f64 = 1e-3;
+/// Distance from a minimum, in standard deviations, at which a comparison of minima ends, and at which the last search ends.
+pub const ENDS: (f64, f64) = (0.5, 0.02);
+/// Factors by which the noise counts in a search from a start: priors lead at first, so that starts may be far off.
+pub const INFLATIONS: [f64; 3] = [100.0, 10.0, 1.0];
+/// Part of the forecast that a step must gain for the derivatives to be kept.
+pub const KEPT: f64 = 0.4;

@@ -1,0 +1,64 @@
+//! The noise of a signal from its residual, by maximum likelihood with a weak prior of the drift.
+//!
+//! A short recording cannot tell its drift from the friction of its bearing. So the drift of a gyro is expected to be of the size that
+//! its kind has ([`Drift`]).
+
+use analysis::gauss_markov::{FLOOR, Noise};
+
+use super::problem::{Drift, Signal};
+
+/// Standard deviation of the logarithm of a drift's time about what is expected.
+const TIME_WIDTH: f64 = 1.0;
+/// Least step of the search over these logarithms: a fiftieth of the width moves no estimate.
+const LEAST_STEP: f64 = 0.05;
+
+impl Signal {
+    /// Returns the noise that is assumed before there is a residual.
+    pub fn first_noise(&self) -> Noise {
+        let (drift, time) = self.drift.map_or((0.0, 100.0), |drift| (drift.size, drift.time));
+        Noise { white: self.white, drift, time }
+    }
+
+    /// Returns the noise of a residual at these times (s).
+    pub fn noise_of(&self, time: &[f64], residual: &[f64]) -> Noise {
+        let count = self.sampled.iter().filter(|sampled| **sampled).count().max(1) as f64;
+        let sized = |drift: f64, time_constant: f64| {
+            let unit = Noise { white: 1.0, drift, time: time_constant };
+            let filter = unit.whitening(time, Some(&self.sampled));
+            let mut e = residual.to_vec();
+            filter.apply(&mut e);
+            let white = (e.iter().map(|v| v * v).sum::<f64>() / count).sqrt();
+            let white = white.max(FLOOR.min(1e-6 * self.white));
+            (2.0 * count * white.ln() + filter.log_variance(), Noise { white, ..unit })
+        };
+        let Some(Drift { size: drift, time: usual, width }) = self.drift else {
+            return sized(0.0, 100.0).1;
+        };
+        let span = time[time.len() - 1] - time[0];
+        let ends = (5.0 * span / time.len() as f64, span);
+        let bound = |ln_time: f64| ln_time.clamp(ends.0.ln(), ends.1.ln());
+        let prior = |x: f64, mean: f64, width: f64| ((x - mean) / width).powi(2);
+        let cost = |at: (f64, f64)| {
+            let (deviance, noise) = sized(at.0.exp(), bound(at.1).exp());
+            let known = prior(at.0, drift.ln(), width) + prior(at.1, usual.ln(), TIME_WIDTH);
+            (deviance + known, noise)
+        };
+        let mut at = (drift.ln(), bound((span / 4.0).ln()));
+        let mut best = cost(at);
+        let mut reach = 0.8;
+        while reach > LEAST_STEP {
+            let mut moved = false;
+            for by in [(reach, 0.0), (-reach, 0.0), (0.0, reach), (0.0, -reach)] {
+                let to = (at.0 + by.0, bound(at.1 + by.1));
+                let there = cost(to);
+                if there.0 < best.0 {
+                    (best, at, moved) = (there, to, true);
+                }
+            }
+            if !moved {
+                reach *= 0.5;
+            }
+        }
+        best.1
+    }
+}

@@ -1,0 +1,142 @@
+//! The profile of the likelihood along one unknown whose likelihood is no parabola.
+
+use anyhow::Result;
+
+use super::Fit;
+use super::minimum::{Curvature, End, Minimum, places};
+
+/// Growth of the sum of squares at which a profile ends: such a point counts e⁻⁵.
+const RAISED: f64 = 10.0;
+/// Growth of the sum of squares below which an end of the range leaves an interval open: 1.96².
+pub const OPEN: f64 = 3.8415;
+/// Relative standard deviation of the unknown, or of one that depends on it, from which on the profile is followed.
+const VAGUE: f64 = 0.05;
+/// Sets of derivatives at one point.
+const SETS: usize = 3;
+/// Shortest and longest first step, and longest step, of the coordinate.
+const LENGTHS: [f64; 3] = [0.03, 0.5, 0.6];
+/// Points on a side at most.
+const MOST: usize = 14;
+/// Fall of the sum of squares that makes another minimum.
+pub const LOWER: f64 = 0.5;
+
+/// A point of a profile.
+#[derive(Clone, Debug)]
+pub struct Point {
+    /// The coordinate.
+    pub at: f64,
+    /// The minimum over all other unknowns.
+    pub minimum: Minimum,
+}
+
+impl Fit<'_> {
+    /// The profile at a minimum, along the unknown that is bent, and that unknown; `None` if there is none, or if it is known well
+    /// enough for its likelihood to be a parabola. The points are in the order of the coordinate.
+    ///
+    /// # Errors
+    /// If the system refuses the minimum.
+    pub fn profile(&mut self, minimum: &mut Minimum) -> Result<Option<(usize, Vec<Point>)>> {
+        let unknowns = &self.problem.unknowns;
+        let bent = unknowns.iter().zip(&self.free).position(|(u, free)| u.bent && *free);
+        let Some(j) = bent else { return Ok(None) };
+        let jacobian = self.derivatives_at(minimum)?.matrix;
+        let covariance = Curvature::new(&jacobian, places(&self.free)).covariance(unknowns.len());
+        let std = |i: usize| covariance[(i, i)].sqrt();
+        // what stands for it along the bent valley
+        let partner = |i: &usize| {
+            let correlation = covariance[(*i, j)] / (std(*i) * std(j));
+            !unknowns[*i].log
+                && correlation.abs() > 0.5
+                && std(*i) > VAGUE * minimum.point.z[*i].abs()
+        };
+        let has_partner = places(&self.free).iter().any(|i| *i != j && partner(i));
+        if !(std(j) > VAGUE || has_partner) {
+            return Ok(None);
+        }
+        let first = (0.25 * std(j)).clamp(LENGTHS[0], LENGTHS[1]);
+        let mut free = self.free.clone();
+        free[j] = false;
+        let mut points = vec![Point { at: minimum.point.z[j], minimum: minimum.clone() }];
+        let base = minimum.point.cost;
+        let mut least = base;
+        for side in [-1.0, 1.0] {
+            let (mut last, mut before): (Minimum, Option<Vec<f64>>) = (minimum.clone(), None);
+            let (mut h, mut h_last, mut risen) = (first, first, 0.0);
+            for _ in 0..MOST {
+                let at = last.point.z[j] + side * h;
+                if at < self.ends[j].0 || at > self.ends[j].1 {
+                    break;
+                }
+                let mut z = last.point.z.clone();
+                if let Some(before) = &before {
+                    for i in places(&free) {
+                        z[i] += (z[i] - before[i]) * (h / h_last);
+                    }
+                }
+                z[j] = at;
+                let end =
+                    End { above: least + 3.0 * RAISED, ..End::new(SETS, super::ENDS.0 * 0.1) };
+                let Ok(found) = self.minimise(&z, &free, None, end) else { break };
+                let rise = found.point.cost - base;
+                least = least.min(found.point.cost);
+                points.push(Point { at, minimum: found.clone() });
+                (before, h_last) = (Some(last.point.z.clone()), h);
+                last = found;
+                if rise > RAISED {
+                    break;
+                }
+                let more = rise - risen;
+                let factor = if more < 1.5 {
+                    1.6
+                } else if more < 4.0 {
+                    1.0
+                } else {
+                    0.6
+                };
+                (h, risen) = ((h * factor).min(LENGTHS[2]), rise);
+            }
+        }
+        points.sort_by(|a, b| a.at.total_cmp(&b.at));
+        Ok(Some((j, points)))
+    }
+}
+
+/// A curve through points that rises and falls only as they do (Fritsch and Carlson 1980).
+pub struct Curve {
+    x: Vec<f64>,
+    y: Vec<f64>,
+    slopes: Vec<f64>,
+}
+
+impl Curve {
+    /// The curve through points with growing x.
+    pub fn new(x: &[f64], y: &[f64]) -> Self {
+        let n = x.len();
+        let d: Vec<f64> = (1..n).map(|k| (y[k] - y[k - 1]) / (x[k] - x[k - 1])).collect();
+        let slope = |k: usize| match (k, n) {
+            (_, 0 | 1) => 0.0,
+            (0, _) => d[0],
+            (k, n) if k + 1 == n => d[n - 2],
+            _ if d[k - 1] * d[k] <= 0.0 => 0.0,
+            _ => {
+                let (a, b) = (x[k] - x[k - 1], x[k + 1] - x[k]);
+                let (u, v) = (2.0 * b + a, b + 2.0 * a);
+                (u + v) / (u / d[k - 1] + v / d[k])
+            }
+        };
+        Curve { x: x.to_vec(), y: y.to_vec(), slopes: (0..n).map(slope).collect() }
+    }
+
+    /// Returns the value at a place between the first and the last point.
+    pub fn at(&self, place: f64) -> f64 {
+        if self.x.len() < 2 {
+            return self.y.first().copied().unwrap_or(f64::NAN);
+        }
+        let k = self.x.partition_point(|x| *x <= place).clamp(1, self.x.len() - 1) - 1;
+        let h = self.x[k + 1] - self.x[k];
+        let u = ((place - self.x[k]) / h).clamp(0.0, 1.0);
+        let (a, b, p, q) = (self.y[k], self.y[k + 1], h * self.slopes[k], h * self.slopes[k + 1]);
+        let (c, d) = (3.0 * (b - a) - 2.0 * p - q, 2.0 * (a - b) + p + q);
+        a + u * (p + u * (c + u * d))
+    }
+}
