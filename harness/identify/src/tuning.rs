@@ -3,8 +3,6 @@
 //! A length without a unit is a ratio. "Deviations" are standard deviations of noise, and sums of squares are in its variances.
 //! Coefficients of formulas, orders of tables and names stay with their code.
 
-use analysis::gauss_markov::Noise;
-
 // Signals on clocks of their own: `input/clocks.rs`.
 // Tests: `a_slow_gyro_is_completed_and_its_own_rows_are_known`, `a_band_limited_torque_of_10_hz_is_known_between_its_samples`.
 /// Spacing of values, in usual ones, up to which a cubic joins them.
@@ -140,36 +138,24 @@ pub const SLOPE_PROBES: [f64; 3] = [1e-2, 1e-3, 1e-4];
 /// The finest tolerance of the host's solver.
 pub const FINEST_TOLERANCE: f64 = 1e-13;
 
-// Effects outside the FMU: `model/bench/effect.rs`.
-// Tests: `lags_of_a_sine_equal_those_of_its_frequency_response`.
+// Effects outside the FMU: `bench/effect.rs`.
+// Tests: `lags_of_a_sine_are_those_of_its_frequency_response`.
 /// Fewest and most parts of the way from knot to knot: lines between points of a lagged torque act as the curve does to 1e-3 at 2.4 Hz
 /// and 50 knots a second.
 pub const LAG_PARTS: (f64, f64) = (3.0, 8.0);
 
-// The bench as it is set up: `model/bench/nominal.rs`.
+// The bench as it is set up: `bench/nominal.rs`.
 // Tests: `each_fault_has_a_sentence_of_its_own`.
 /// Coarsest mean time between rows of any bench on the ground, s: slosh at 2.4 Hz needs more than two rows a period.
 pub const COARSEST: f64 = 0.2;
 
-// Runs of the bench: `model/bench/simulate.rs`.
+// Runs of the bench: `bench/simulate.rs`.
 // Tests: `a_twin_with_a_delay_or_a_smooth_torque_is_what_the_fit_simulates`, `a_run_that_would_not_end_is_refused`.
 /// Instants closer than this are the same, s.
 pub const SAME_INSTANT: f64 = 1e-9;
 /// Most internal steps of our FMUs in a communication step: so many, and so many a second. A fit's runs take some 100 a second. A
 /// search may try values that take millions: it cannot judge them, and tries others.
 pub const MOST_INTERNAL_STEPS: (f64, f64) = (200.0, 2e4);
-
-// The valley of tank and hub: `model/bench/tank.rs`.
-// Tests: `a_long_step_along_the_valley_stays_in_it`, `a_step_to_where_there_is_no_tank_ends_before`.
-/// 1 − T is not brought below this part of itself by a step, and I not below this part: beyond it no tank has the mode, no hub the inertia.
-pub const VALLEY_LEFT: f64 = 0.02;
-/// Least T.
-pub const SHALLOWEST: f64 = 0.02;
-
-// Unknowns of the bench: `model/bench/unknown.rs`.
-// Tests: `a_search_stays_within_the_range_that_the_fmu_declares`.
-/// Distance (in x) that a search keeps from the ends of the range, so that differences of x stay within the range.
-pub const RANGE_MARGIN: f64 = 0.06;
 
 // Directions of derivatives: `fit/decomposition.rs`.
 // Tests: `values_that_are_not_finite_are_named_and_no_iteration_hangs`, `parameters_that_no_output_tells_apart_are_named_as_a_set_in_words_and_json`.
@@ -187,8 +173,6 @@ pub const SANDWICH_WINDOW: f64 = 50.0;
 
 // Comparison of models: `fit/evidence.rs`.
 // Tests: `a_difference_of_ten_in_the_criterion_is_a_probability_of_99_percent`, `a_downward_sweep_shows_that_slosh_rotates`.
-/// Least difference of the information criterion that decides (Kass and Raftery: very strong).
-pub const BIC_DECIDES: f64 = 10.0;
 /// Difference below which it tells nothing (not worth more than a bare mention, ibid.).
 pub const BIC_ALIKE: f64 = 2.0;
 
@@ -223,52 +207,12 @@ pub const WINDOW_NOISE: f64 = 0.03;
 /// Residual over the noise from row to row beyond which a fit counts as bad, and another start is tried.
 pub const BAD_START: f64 = 1.5;
 
-// Derivatives and search of the bench: `fit/bench/problem.rs` and its folder.
-// Tests: `sensitivities_equal_those_of_smaller_and_larger_steps`, `after_its_noise_is_renewed_a_minimum_is_of_that_noise`, `starts_forty_percent_off_end_at_the_minimum_of_the_datas_own`, `the_minimum_is_found_along_the_bent_valley_of_the_gyros_scale`.
-/// Change of the answer by a difference, in units of the noise's norm of one degree of freedom.
-pub const BENCH_MOVE: f64 = 0.3;
-/// Drift of a MEMS gyro (the thesis's LSM6DS3), until the recording's own is known. Without it the slow
-/// decay at a recording's start, where the drift is all the noise, would draw the friction after it.
-pub const TYPICAL_DRIFT: Noise = Noise { white: 1.0, drift: 0.2, time: 100.0 };
-/// Bounds of the differences' steps, in units of the variable x.
-pub const BENCH_STEPS: (f64, f64) = (1e-6, 2e-2);
-/// Step of the first differences, in the same units.
-pub const BENCH_FIRST_STEP: f64 = 1e-5;
-/// Most sets of derivatives of a search from afar.
-pub const MOST_SETS: usize = 20;
-/// Longest step of a difference along a direction, in units of x.
-pub const LONGEST_STEP: f64 = 0.05;
-/// Steps end where the Newton decrement is below this: a hundredth of a standard deviation.
-pub const BENCH_DECREMENT: f64 = 0.01;
-/// Newton decrement of a minimum: the sum of squares is known to a hundredth, and no sensitivities are found anew for less.
-pub const MINIMUM: f64 = 0.1;
+// Derivatives and search of the bench: `bench/problem.rs` and its folder.
+// Tests: `starts_forty_percent_off_end_at_the_minimum_of_the_datas_own`, `the_minimum_is_found_along_the_bent_valley_of_the_gyros_scale`.
 /// Sets of sensitivities that Gauss and Newton's steps have at most.
 pub const ROUNDS: usize = 6;
-/// A change of one variable there by more than this of one here is not a valley's bend.
-pub const SHARPEST_BEND: f64 = 1e3;
-/// Windows for starts that are far off, as fractions of the recordings.
-pub const BENCH_WINDOWS: [f64; 7] = [0.1, 0.2, 0.3, 0.4, 0.55, 0.75, 1.0];
-/// Length of the loudest part, s: a slow sweep's resonance, some times over.
-pub const LOUDEST: f64 = 300.0;
-/// Time in which a model forgets its initial state, s: some five times the slosh's time constant 1/(2π · 2.4 Hz · 0.003) = 22 s.
-pub const RUN_IN: f64 = 100.0;
-/// Assumed noise of a window over the gyro's.
-pub const NOISE_FACTOR: f64 = 10.0;
-/// Mean square of a window's residual over that of the one before beyond which it is reached in smaller steps.
-pub const WINDOW_JUMP: f64 = 3.0;
-/// Shortest step from one window to the next, as a fraction of the recordings.
-pub const SHORTEST_GROWTH: f64 = 0.05;
-/// Standard deviation of a parameter about its start in a window, relative.
-pub const WINDOW_PRIOR: f64 = 0.5;
 
-// Attempts: `fit/bench/search.rs`.
-// Tests: `a_stribeck_speed_that_the_loudest_part_rejects_is_rejected_by_the_whole_recording`, `impossible_intersample_behaviours_cost_few_simulations`.
-/// Mean square of the innovations below which a model may be near its minimum; noise has 1.
-pub const NEARLY_NOISE: f64 = 1.5;
-/// Share of the sum of squares that remains after the steps of one set of sensitivities that lead far.
-pub const LEADS: f64 = 0.7;
-
-// Starts from data: `fit/bench/start.rs`.
+// Starts from data: `bench/start.rs`.
 // Tests: `poles_and_zeros_of_the_exact_response_give_the_bench_back`.
 /// Damping ratios that are tried.
 pub const DAMPINGS: [f64; 5] = [0.0015, 0.003, 0.006, 0.015, 0.04];
@@ -277,58 +221,7 @@ pub const FREQUENCY_FINENESS: f64 = 1e-3;
 /// Longest delay that the balance of power may show, s.
 pub const LATEST_DELAY: f64 = 0.05;
 
-// Intersample behaviour: `fit/bench/between.rs`.
-// Tests: `impossible_intersample_behaviours_cost_few_simulations`, `a_delay_of_half_a_row_is_a_finding_where_it_is_known`, `no_model_error_makes_the_rate_come_before_the_torque`.
-/// Standard deviations below zero at which a delay counts as acausal.
-pub const ACAUSAL: f64 = 3.0;
-/// Difference of two channels' time stamps that is negligible, in rows.
-pub const SYNCHRONOUS: f64 = 0.02;
-/// Difference from half a row up to which a delay counts as half a row, in rows.
-pub const HALF_ROW: f64 = 0.1;
-/// Difference from the first behaviour's sum of squares above which another behaviour is out, wherever its minimum is.
-pub const NO_RIVAL: f64 = 1.5;
-/// The same beyond which another one is given up, if a step has been taken.
-pub const LOST_RIVAL: f64 = 10.0;
-/// Newton decrement below which the sum of squares of the minimum is foreseen well enough to say that it does not count.
-pub const FORESEEN: f64 = 1.0;
-
-// The friction's shape: `fit/bench/friction.rs`.
-// Tests: `along_the_frictions_flat_valley_the_interval_equals_that_of_the_likelihood`, `ends_that_the_likelihood_does_not_have_are_open`, `the_end_of_an_interval_beyond_the_last_profile_point_follows_a_parabola`, `a_point_of_the_profile_that_went_astray_ends_no_interval`.
-/// ω_s over the fastest speed of the recording.
-pub const STRIBECK_GRID: [f64; 6] = [0.1, 0.3, 0.7, 1.5, 4.0, 15.0];
-/// Relative standard deviation of d or ω_s beyond which a minimum may be one of several.
-pub const VAGUE_SHAPE: f64 = 0.05;
-/// The same beyond which intervals are no longer those of a quadratic.
-pub const BENT_SHAPE: f64 = 0.05;
-/// Sum of squares above the least at the ends of the 95 % interval of one unknown: 1.96².
-pub const PROFILE_END: f64 = 3.8415;
-/// The same that still counts for the covariance: three standard deviations.
-pub const PROFILE_COUNTED: f64 = 9.0;
-/// The same beyond which no other noise makes a minimum of it.
-pub const PROFILE_EXCLUDED: f64 = 30.0;
-/// Largest growth of the sum of squares from one grid speed to the next that does not count as a wall.
-pub const NO_WALL: f64 = 1.0;
-/// Longest extrapolation beyond the last point, over the way to that from the one before.
-pub const EXTRAPOLATED: f64 = 0.5;
-/// Longest step along ln ω_s.
-pub const LONGEST_SHAPE_STEP: f64 = 0.7;
-/// Target of the next point: square root of its increase of the sum of squares, relative to that at the end of the interval.
-pub const PROFILE_AIM: f64 = 1.03;
-/// Points on either side of the minimum.
-pub const PROFILE_POINTS: usize = 7;
-/// Part by which what the last point adds to the sum of squares may differ from [`PROFILE_END`]. Its root is then an eighth off, and the end is
-/// where the line through it and the point before leads.
-pub const PROFILE_NEAR: f64 = 0.25;
-/// Largest plausible χ², relative to its degrees of freedom: with 8 degrees, 32 has a probability of 1e-4.
-pub const RARE_CHI_SQUARE: f64 = 4.0;
-/// Sets of sensitivities at one speed, the first of them mostly that of another one.
-pub const PROFILE_ROUNDS: usize = 3;
-/// Newton decrement below which a point is near enough to the minimum at its speed: 1 % of [`PROFILE_END`].
-pub const PROFILE_DECREMENT: f64 = 0.2;
-/// Places between two points.
-pub const PROFILE_BETWEEN: usize = 8;
-
-// Goodness: `fit/bench/goodness.rs`.
+// Goodness: `bench/goodness.rs`.
 // Tests: `no_model_fits_a_torque_that_is_clipped`.
 /// Fit of a rate below which a minimum is taken for a wrong one at first, %.
 pub const POOR_FIT: f64 = 90.0;
@@ -358,55 +251,15 @@ pub const OUTPUT_ROUNDING: f64 = 1e-12;
 /// Part of a unit direction from which on an unknown belongs to it.
 pub const DIRECTION_PART: f64 = 1e-2;
 
-// Sources of uncertainty: `uncertainty/bench/sources.rs`.
-// Tests: `a_push_and_a_free_decay_do_not_determine_the_preferential_direction`, `a_hub_turns_one_way_if_nearly_all_of_its_path_does`, `a_hub_that_turns_both_ways_is_not_taken_for_one_that_turns_one_way`, `identify_finds_all_parameters_and_the_sum_of_coulomb_and_stribeck_friction`.
+// Sources of uncertainty: `bench/sources.rs`.
+// Tests: `a_push_and_a_free_decay_do_not_determine_the_preferential_direction`, `a_hub_turns_one_way_if_nearly_all_of_its_path_does`, `a_hub_that_turns_both_ways_is_not_taken_for_one_that_turns_one_way`, `parameters_come_back_and_coulomb_and_stribeck_friction_as_their_sum`.
 /// Standard deviation of the friction's asymmetry above which the recordings do not show it.
 pub const ONE_WAY: f64 = 0.3;
 /// Part of a hub's path against its main direction above which it turns both ways.
 pub const BOTH_WAYS: f64 = 0.1;
-/// Correlation above which two unknowns count as determined only if each is precise by itself.
-pub const COMBINED_CORRELATION: f64 = 0.99;
-/// Relative standard deviation beyond which a correlated unknown is not known by itself.
-pub const VAGUE_ALONE: f64 = 0.05;
 
-// Error budget: `uncertainty/bench/budget.rs`.
-// Tests: `the_error_budget_is_what_a_new_fit_gives`, `a_tolerance_that_nonlinear_slosh_shows_is_no_misfit`.
-/// Relative change by which the answer is differenced: of a long recording, less than a tenth of a standard deviation.
-pub const BUDGET_STEP: f64 = 5e-6;
-/// The recordings show a tolerance from this norm on. It is that of the innovations' change by one standard deviation, less what the
-/// unknowns can take. Noise has 1 for each degree of freedom.
-pub const SHOWN_TOLERANCE: f64 = 1.0;
-/// Relative error for which `relative_slope` seeks the minimum anew.
-pub const BUDGET_SIZE: f64 = 1e-3;
-/// Most steps of `settled`.
-pub const BUDGET_ROUNDS: usize = 5;
-/// Least part of an error that a step is assumed to leave.
-pub const BUDGET_LEAVES: f64 = 0.3;
-/// Step, in standard deviations, that is not taken any more.
-pub const BUDGET_SETTLED: f64 = 0.1;
-
-// Causes: `uncertainty/bench/cause.rs`.
-// Tests: `the_cause_of_a_misfit_is_named_with_the_flag_that_fits_it`, `a_misfit_that_no_candidate_explains_has_no_cause`.
-/// Part of the sum of squares that is left to gain when a search ends: of the candidates, which differ by much more, and of the best.
-pub const CAUSE_PART: (f64, f64) = (1e-2, 1e-3);
-/// Candidates that are fitted.
-pub const REFITTED: usize = 3;
-/// Part of the best candidate's share below which another one is not fitted.
-pub const CAUSE_LEAST: f64 = 0.05;
-/// Largest commanded torque over which the actuator's limit starts.
-pub const ACTUATOR_LIMIT: f64 = 0.9;
-
-// Deep tanks: `uncertainty/bench/deep_tank.rs`.
-// Tests: `in_a_shallow_tank_the_intervals_equal_those_of_first_order`, `the_fill_of_a_tank_without_a_bottom_is_known_from_below`.
-/// Standard deviation of ln h beyond which first order will not do.
-pub const DEEP: f64 = 0.05;
-/// Draws: the quantiles' own error is a fiftieth of a standard deviation.
-pub const DEEP_DRAWS: usize = 20_000;
-/// Fewer than this say nothing.
-pub const FEWEST_DRAWS: usize = 400;
-
-// Design of experiments: `uncertainty/bench/design.rs`.
-// Tests: `d_optimal_power_is_near_the_slosh_frequency_and_reduces_uncertainty`, `a_multisine_has_only_odd_lines_and_the_given_peak`.
+// Design of experiments: `bench/design.rs`.
+// Tests: `d_optimal_power_stands_around_the_slosh_and_tells_more`, `a_multisine_has_odd_lines_alone_and_its_peak`.
 /// Odd lines in a group, of which one is left out.
 pub const LINE_GROUP: usize = 4;
 /// Share of the power that is always spread over all lines. It excites the resonance of a slightly different plant, and shows
@@ -416,26 +269,6 @@ pub const SPREAD_POWER: f64 = 0.25;
 pub const ANGLE_ROUNDS: usize = 20;
 /// Part of the limit with which `within_angle` ends.
 pub const ANGLE_ENOUGH: f64 = 0.97;
-
-// Missing torques: `uncertainty/bench/missing.rs`.
-// Tests: `a_drag_that_the_model_lacks_is_named_with_its_size`.
-/// Root mean square of the torque by which the answer is differenced, over that of the command: small against the nonlinearity,
-/// large against the integrator's tolerance.
-pub const MISSING_STEP: f64 = 1e-4;
-/// Smallest commanded torque that serves as a scale, N·m; a free decay has none.
-pub const QUIET_TORQUE: f64 = 1e-3;
-/// Part of a sensitivity that the unknowns must leave for it to be seen: theirs are differences, good to a thousandth.
-pub const SEEN_SENSITIVITY: f64 = 1e-2;
-/// A torque is missing beyond this many standard deviations: a chance of 6e-5 for each of seven.
-pub const MISSING_LIMIT: f64 = 4.0;
-
-// Study of starts: `words/start_study.rs`.
-// Tests: `a_lower_minimum_from_another_start_makes_the_result_doubtful`.
-/// Difference of two sums of squares, in variances of the noise, up to which two ends are one minimum. The 95 % interval of an unknown
-/// ends at 3.84.
-pub const SAME_MINIMUM: f64 = 0.5;
-/// Ratio of the heights at which a chart draws the searches of one unknown and of the next that ended at the minimum.
-pub const CHART_BELOW: f64 = 0.6;
 
 // Verdict: `words/verdict.rs`.
 // Tests: `a_search_that_would_leave_the_fmus_range_ends_at_its_end_with_a_result`.
@@ -464,10 +297,6 @@ pub const TURNS: usize = 4;
 // Tests: `starts_forty_percent_off_end_at_the_minimum_of_the_datas_own`, `no_model_fits_a_torque_that_is_clipped`.
 /// Beginnings that are tried where no model fits the whole recording, as fractions of its rows.
 pub const BEGINNINGS: [f64; 2] = [0.35, 0.5];
-/// Most times that a search goes on.
-pub const GOES_ON: usize = 3;
-/// Farthest start of the study of starts over the estimate, or the estimate over it.
-pub const STUDY_REACH: f64 = 3.0;
 
 // Friction runs: `methods/friction.rs`.
 // Tests: `friction_of_three_sets_of_runs_ends_in_no_false_minimum`, `recordings_that_show_no_friction_are_refused_with_what_to_do`, `scatter_of_decays_is_not_a_preferential_direction_and_ten_per_cent_of_friction_is`.

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use analysis::statistics::{correlation, mean};
+use analysis::statistics::{correlation, deviation, mean};
 use anyhow::Result;
 use formulas::cylinder::XI;
 use formulas::regime::Regime;
@@ -17,8 +17,8 @@ use crate::engine::cause::{Effect, cause, effects};
 use crate::engine::draws::Derived;
 use crate::engine::hold::Rival;
 use crate::engine::minimum::places;
-use crate::engine::{Motion, Solution};
-use crate::estimate::Estimated;
+use crate::engine::{Fit, Motion, Part, Solution};
+use crate::estimate::{Estimated, prose};
 use crate::input::recording::Recording;
 use crate::input::tolerance::{self, Share};
 use crate::methods::identification::{Details, Identification, ModelFit};
@@ -31,6 +31,8 @@ use crate::words::verdict::{self, Findings};
 const POOR_FIT: f64 = 90.0;
 /// Distance to a minimum up to which a search has converged, standard deviations: the stated deviations contain it.
 const CONVERGED: f64 = 0.5;
+/// Standard deviation of a known value over its tolerance below which the recordings show it.
+const SHOWN: f64 = 0.7;
 
 /// Fit of the rates, %: 100 (1 − |y − ŷ|/|y − mean y|).
 fn fit_pct(recordings: &[Recording], motion: &[Motion], solution: &Solution) -> f64 {
@@ -157,6 +159,7 @@ pub fn answer(
         let estimated = estimated(system, solution, (&full, &own), k, &combinations);
         match &system.targets[k] {
             Target::Parameter(_)
+            | Target::Asymmetry
             | Target::Length
             | Target::MassRatio
             | Target::Inertia
@@ -169,7 +172,12 @@ pub fn answer(
     let findings = findings(system, solution, &found, options, question);
     let fits = findings.fits();
     let mut verdict = verdict::words(question, &findings, &fit, &combinations, &parameters);
-    verdict.extend(shares(&full, &own));
+    let unknowns = &solution.fit.problem.unknowns;
+    let held = unknowns.iter().zip(&solution.fit.free);
+    let held = held.filter(|(u, free)| u.part == Part::Tolerance && !**free);
+    let known = held.filter_map(|(u, _)| Some((u.name.as_str(), u.prior?.1)));
+    verdict.extend(shares(&full, &own, known));
+    verdict.extend(shown(system, solution, &full, &mut parameters));
     let slosh_angle = match fit.model == SloshModel::Frozen.name() {
         true => 0.0,
         false => motion
@@ -236,7 +244,7 @@ fn estimated(
     std = if std.is_finite() { std.max(reach) } else { std };
     let is_part = |c: &Combination| c.of.contains(name) && c.std < 0.5 * std;
     let is_shown = match &system.targets[k] {
-        Target::Parameter(name) if name == friction::ASYMMETRY => std < ONE_WAY,
+        _ if name == friction::ASYMMETRY => std < ONE_WAY,
         _ if !positive => true,
         _ => interval[1].is_finite() && std < 0.5 * value.abs(),
     };
@@ -346,7 +354,11 @@ fn torque_words(solution: &Solution) -> Option<String> {
 }
 
 /// Returns the sentence on estimates whose uncertainty is due to tolerances more than to the recording.
-fn shares(full: &Derived, own: &Derived) -> Option<String> {
+fn shares<'a>(
+    full: &Derived,
+    own: &Derived,
+    known: impl Iterator<Item = (&'a str, f64)>,
+) -> Option<String> {
     if !full.is_told() || !own.is_told() {
         return None;
     }
@@ -363,13 +375,8 @@ fn shares(full: &Derived, own: &Derived) -> Option<String> {
             all.push(Share { name: name.clone(), share, most: most.clone() });
         }
     }
-    let known: Vec<String> = full
-        .tolerances
-        .iter()
-        .map(|(name, draws)| {
-            format!("{name} {:.2} %", 100.0 * analysis::statistics::deviation(draws))
-        })
-        .collect();
+    let known: Vec<String> =
+        known.map(|(name, std)| format!("{name} {} %", (1e6 * std).round() / 1e4)).collect();
     tolerance::shares(&known, &all)
 }
 
@@ -390,6 +397,46 @@ fn regime(model: &str, angle: f64) -> Option<String> {
              nonlinear from 0.25); {advice}."
         )
     })
+}
+
+/// Known values that the residual would not leave alone: they are estimated within their tolerances. Returns a sentence on each.
+fn shown(
+    system: &BenchSystem,
+    solution: &Solution,
+    full: &Derived,
+    parameters: &mut BTreeMap<String, Estimated>,
+) -> Vec<String> {
+    let mut sentences = Vec::new();
+    let Fit { problem, free, .. } = &solution.fit;
+    for (j, unknown) in problem.unknowns.iter().enumerate() {
+        let found = full.tolerances.iter().find(|(name, _)| *name == unknown.name);
+        let (Some((_, prior)), Some((name, draws))) = (unknown.prior, found) else { continue };
+        let relative = deviation(draws);
+        if !free[j] || unknown.part != Part::Tolerance || relative > SHOWN * prior {
+            continue;
+        }
+        let nominal = match &system.targets[j] {
+            Target::Arm => system.bench.arm,
+            Target::Density => system.bench.density,
+            Target::Gravity => system.bench.gravity,
+            _ => 1.0,
+        };
+        let value = nominal * unknown.value(solution.minimum.point.z[j]);
+        let unit = match &system.targets[j] {
+            Target::Arm => "m",
+            Target::Density => "kg/m3",
+            Target::Gravity => "m/s2",
+            _ => "1",
+        };
+        let estimated = Estimated::normal(value, relative * value, unit);
+        sentences.push(format!(
+            "{name} is estimated within its tolerance, because its nominal value leaves more than noise: {value:.4e} ± {:.1e} {}.",
+            estimated.std,
+            prose(unit)
+        ));
+        parameters.insert(name.clone(), estimated);
+    }
+    sentences
 }
 
 /// Condition number of the sensitivities, with columns of unit length.

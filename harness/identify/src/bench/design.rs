@@ -333,6 +333,7 @@ pub fn cramer_rao(
         rivals: Vec::new(),
         tests: Vec::new(),
         at_bound: Vec::new(),
+        sides: Vec::new(),
         starts: 1,
     };
     let found = solution.draw(false)?;

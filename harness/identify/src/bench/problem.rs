@@ -10,6 +10,7 @@ use host::description::Type;
 use host::fmu::Fmu;
 use names::hubslosh::{FrictionModel, SloshModel, fluid, friction, hub, init, slosh, tank};
 
+use super::combination;
 use super::system::{BESIDES, BenchSystem, Target};
 use crate::bench::breaking;
 use crate::bench::nominal::{self, Nominal, Start};
@@ -35,6 +36,8 @@ const ASYMMETRY: f64 = 0.5;
 const FRICTION_WIDTH: f64 = 10.0;
 /// Standard deviation of ln ω_s beforehand, and how far it may be from its start.
 const SPEED: (f64, f64) = (1.5, 30.0);
+/// Rates that show a direction, over the gyro's noise.
+const ABOVE_NOISE: f64 = 5.0;
 /// Widest factor of a known value.
 const WIDEST: (f64, f64) = (0.6, 1.6);
 
@@ -220,17 +223,21 @@ pub fn system<'a>(
             unknown.start = given(name).unwrap_or(*mean);
         }
     }
+    let way = way(recordings);
     let has_encoder = recordings.iter().any(|r| r.angle.is_some());
     if options.sensor_errors {
         if dry && !is_set(friction::ASYMMETRY) {
-            let one = Unknown::linear(
-                friction::ASYMMETRY,
-                "1",
-                Role::Run(None),
-                (0.0, 0.1),
-                (-0.98, 0.98),
-            );
-            list.add(Target::Parameter(friction::ASYMMETRY.into()), one.with_prior(0.0, ASYMMETRY));
+            let of = |role, end: f64| {
+                let one = Unknown::linear(friction::ASYMMETRY, "1", role, (0.0, 0.1), (-end, end));
+                one.with_prior(0.0, ASYMMETRY)
+            };
+            if way == 0.0 {
+                let target = Target::Parameter(friction::ASYMMETRY.into());
+                list.add(target, of(Role::Run(None), 0.98));
+            } else {
+                let one = Unknown { part: Part::Tolerance, ..of(Role::Derived, 0.9) };
+                list.add(Target::Asymmetry, one);
+            }
         }
         let (std, low, high) = DELAY;
         let delay = |name: &str, output| {
@@ -334,6 +341,10 @@ pub fn system<'a>(
     let chosen = |name: &str| matches!(name, slosh::MODEL | friction::MODEL);
     settings.extend(options.settings.iter().filter(|(name, _)| !chosen(name)).cloned());
     let List { unknowns, targets, .. } = list;
+    for u in &unknowns {
+        let is_in = u.start.is_finite() && u.bounds.0 <= u.bounds.1;
+        ensure!(is_in, "{} starts at {:.3e}: the data are those of no bench that the FMU can be", u.name, u.start);
+    }
     refuse_overridden(fmu, &settings, &unknowns, &targets)?;
     let values = |start: &Start| -> Vec<f64> {
         let of = |(unknown, target): (&Unknown, &Target)| match target {
@@ -364,10 +375,21 @@ pub fn system<'a>(
         bench: nominal.bench,
         targets,
         derived,
+        way,
         largest: recordings.iter().map(|r| peak(&r.torque)).fold(0.0, f64::max),
         base: OnceLock::new(),
     };
     Ok((system, unknowns, starts))
+}
+
+/// Direction of a hub that turns one way; 0 if it turns both. A gyro of a hub that rests at first reads its bias.
+fn way(recordings: &[Recording]) -> f64 {
+    let rates = recordings.iter().flat_map(|recording| {
+        let bias = if recording.from_rest { recording.first_rate() } else { 0.0 };
+        let noise = ABOVE_NOISE * recording.rate_noise();
+        recording.rate.iter().map(move |rate| rate - bias).filter(move |rate| rate.abs() > noise)
+    });
+    combination::way(rates).unwrap_or(0.0)
 }
 
 /// Returns true if a prior of the same value makes its tolerance one too many.

@@ -56,6 +56,8 @@ pub enum Target {
     GyroBias,
     /// Reading of the encoder at angle 0, rad.
     AngleOffset,
+    /// Asymmetry of the dry friction of a hub that turns one way: c and d of the search are those of that way.
+    Asymmetry,
     /// Torque that acts over the recorded one.
     Torque,
     /// True time over the recorded one.
@@ -137,6 +139,8 @@ pub struct BenchSystem<'a> {
     pub targets: Vec<Target>,
     /// What is derived: names and units.
     pub derived: Vec<(String, String)>,
+    /// Direction of a hub that turns one way, 1 or −1; 0: both.
+    pub way: f64,
     /// Largest command, N·m.
     pub largest: f64,
     /// Motion that the torques of [`BESIDES`] follow.
@@ -325,12 +329,16 @@ impl System for BenchSystem<'_> {
             }
             None => None,
         };
+        let other = 1.0 + self.way * of(&Target::Asymmetry).unwrap_or(0.0);
         let mut all = Vec::with_capacity(self.derived.len());
         for (target, value) in self.targets.iter().zip(values).take(self.derived.len()) {
             all.push(match (target, shape) {
                 (Target::Length, Some([d, ..])) => d,
                 (Target::MassRatio, Some([_, h, _])) => h,
                 (Target::Inertia, Some([.., inertia])) => inertia,
+                (Target::Parameter(name), _) if [friction::C, friction::D].contains(&name.as_str()) => {
+                    value / other
+                }
                 (Target::GyroScale, _) => 1.0 + value,
                 _ => *value,
             });

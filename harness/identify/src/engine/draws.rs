@@ -72,12 +72,13 @@ impl Solution<'_> {
         };
         let least = points.iter().map(|p| p.minimum.point.cost).fold(f64::INFINITY, f64::min);
         let mut places_of: Vec<Place> = Vec::new();
-        for mut point in points {
+        for point in points {
             if places_of.last().is_some_and(|last| point.at - last.at < 1e-9) {
                 continue;
             }
-            let Ok(found) = self.fit.derivatives_at(&mut point.minimum) else { continue };
-            let mut jacobian = found.matrix;
+            // near a point whose derivatives were not found those of the minimum serve
+            let found = point.minimum.derivatives.as_ref().or(self.minimum.derivatives.as_ref());
+            let Some(mut jacobian) = found.map(|found| found.matrix.clone()) else { continue };
             let mut which = point.minimum.free.clone();
             for j in places(&is_known) {
                 jacobian.column_mut(j).copy_from(&tolerances.matrix.column(j));
@@ -164,7 +165,11 @@ impl Solution<'_> {
                 all.iter().min_by(|a, b| (a.at - place).abs().total_cmp(&(b.at - place).abs()));
             let Some(closest) = closest else { break };
             let normal = DVector::from_fn(closest.spread.ncols(), |_, _| random.normal());
-            let step = &closest.spread * normal;
+            let mut step = &closest.spread * normal;
+            for (j, factors) in &self.sides {
+                let factor = factors[usize::from(step[*j] > 0.0)];
+                step[*j] *= factor;
+            }
             let mut z: Vec<f64> = (0..n).map(|j| middle[j].at(place) + step[j]).collect();
             if let Some(j) = bent {
                 z[j] = place;
@@ -213,7 +218,10 @@ impl Solution<'_> {
             None => found.columns.iter().map(median).collect(),
         };
         if let (Some(j), [first, .., last]) = (bent, all) {
-            let open = [first.rise < OPEN, last.rise < OPEN];
+            // what the prior alone says has no ends
+            let known = |at: f64| unknowns[j].prior.map_or(0.0, |(mean, std)| ((at - mean) / std).powi(2));
+            let least = known(all[lowest].at);
+            let open = [first, last].map(|end| end.rise - (known(end.at) - least) < OPEN);
             found.open = Some((unknowns[j].name.clone(), open));
         }
         found

@@ -11,8 +11,8 @@ const RAISED: f64 = 10.0;
 pub const OPEN: f64 = 3.8415;
 /// Relative standard deviation of the unknown, or of one that depends on it, from which on the profile is followed.
 const VAGUE: f64 = 0.05;
-/// Sets of derivatives at one point.
-const SETS: usize = 3;
+/// Sets of derivatives at one point, besides those of the point before.
+const SETS: usize = 1;
 /// Shortest and longest first step, and longest step, of the coordinate.
 const LENGTHS: [f64; 3] = [0.03, 0.5, 0.6];
 /// Points on a side at most.
@@ -76,7 +76,7 @@ impl Fit<'_> {
                 z[j] = at;
                 let end =
                     End { above: least + 3.0 * RAISED, ..End::new(SETS, super::ENDS.0 * 0.1) };
-                let Ok(found) = self.minimise(&z, &free, None, end) else { break };
+                let Ok(found) = self.minimise(&z, &free, last.derivatives.clone(), end) else { break };
                 let rise = found.point.cost - base;
                 least = least.min(found.point.cost);
                 points.push(Point { at, minimum: found.clone() });
