@@ -274,7 +274,7 @@ def free_flags(start: dict[str, float], noise: dict[str, float], known_as: str) 
         "--bias",
         ",".join([*(f"{n}={noise['b']}" for n in OMEGA), *(f"{n}=1e-3" for n in FORCE)]),
     ]
-    flags += ["--inputs", ",".join(INPUTS), "--held", ",".join(INPUTS[:6])]
+    flags += ["--inputs", ",".join([f"{name}:held" for name in INPUTS[:6]] + INPUTS[6:])]
     flags += ["--outputs", ",".join([*OMEGA, *FORCE])]
     for name, value in known.items():
         flags += ["--set", f"{name}={value}"]

@@ -176,19 +176,21 @@ STICKING = [
 CASES = {
     "VanDerPol": Case(
         "VanDerPol.fmu",
-        ["--free", "mu=1:0.2:4,x0@each=2:-4:4,x1@each=0:-2:2", "--outputs", "x0,x1", "--exchange"],
+        ["--free", "mu=1:0.2:4,x0@each=2:-4:4,x1@each=0:-2:2", "--outputs", "x0,x1"]
+        + ["--solver", "host"],
         van_der_pol,
         "limit cycle; Model Exchange, starts free",
     ),
     "BouncingBall": Case(
         "BouncingBall.fmu",
-        ["--free", "e=0.7:0.5:0.99,g=-9.81:-15:-5,h@each=1:0.3:2", "--outputs", "h", "--exchange"],
+        ["--free", "e=0.7:0.5:0.99,g=-9.81:-15:-5,h@each=1:0.3:2", "--outputs", "h"]
+        + ["--solver", "host"],
         bouncing_ball,
         "bounces until it rests; Model Exchange, events",
     ),
     "Dahlquist": Case(
         "Dahlquist.fmu",
-        ["--free", "k=1:0.1:5,x@each=1:0.1:5", "--outputs", "x", "--exchange"],
+        ["--free", "k=1:0.1:5,x@each=1:0.1:5", "--outputs", "x", "--solver", "host"],
         dahlquist,
         "decay; Model Exchange",
     ),
@@ -197,7 +199,7 @@ CASES = {
         [
             "--free",
             "area=1:0.1:5,c=0.5:0.05:2,h@each=1:0.1:5",
-            *("--outputs", "h", "--inputs", "q", "--held", "q"),
+            *("--outputs", "h", "--inputs", "q:held"),
         ],
         orifice,
         "exported by PythonFMU; Co-Simulation, driven",
@@ -205,7 +207,7 @@ CASES = {
     "Hub": Case(
         "HubSlosh",
         ["--free", "hub.I=0.3:0.05:2,friction.b=0.04:0:1,friction.c=0.02:0:0.1"]
-        + ["--bias", "omega", "--inputs", "tau_cmd", "--held", "tau_cmd", "--outputs", "omega"]
+        + ["--bias", "omega", "--inputs", "tau_cmd:held", "--outputs", "omega"]
         + [word for item in STICKING for word in ("--set", item)],
         hub,
         "stick and slip; Co-Simulation, bias free",

@@ -182,7 +182,7 @@ def free_fit(
     bench.write("draw.csv", time=time, tau_cmd=torque / scale, omega=measured)
     bench.write("torque.csv", time=time, tau_cmd=torque / scale)
     asked = ["--fmu", bench.fmu, "--free", "hub.I=0.3:0.1:1,friction.b=0.04:0:1"]
-    asked += ["--inputs", "tau_cmd", "--held", "tau_cmd", "--outputs", "omega"]
+    asked += ["--inputs", "tau_cmd:held", "--outputs", "omega"]
     for setting in ("slosh.model=frozen", "fluid.rho=1e-6", "friction.model=viscous"):
         asked += ["--set", setting]
     asked += ["--tolerance", "scale(tau_cmd)=1%"]

@@ -254,7 +254,7 @@ def test_identification_gives_typed_estimates(
     random = np.random.default_rng(1)
     run["omega"] += 1e-4 * random.standard_normal(len(run))
     found = hubslosh.identify(
-        run, "frozen", "--perfect", fmu=fmu, out=tmp_path / "result.json",
+        run, "frozen", "--also", "none", fmu=fmu, out=tmp_path / "result.json",
         program=option(request, "--hubslosh"),
     )  # fmt: skip
     assert found.model == "frozen" and found.converged

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
 use experiments::sensors::Sensor;
 use identify::any_fmu::{self, Identification};
 use identify::input::names::list;
@@ -35,12 +35,9 @@ pub struct AnyFmuArgs {
     /// absolute (5mm, or ±0.1 in the unit of the variable); 0 means exact.
     #[arg(long = "tolerance", value_name = "NAME=SIZE,…")]
     pub tolerances: Vec<String>,
-    /// Inputs of the FMU that the recordings drive.
-    #[arg(long, value_name = "NAME,…", requires = "free")]
+    /// Inputs of the FMU that the recordings drive, interpolated linearly; NAME:held is held from row to row.
+    #[arg(long, value_name = "NAME[:held],…", requires = "free")]
     inputs: Vec<String>,
-    /// Inputs that are held from row to row. The other inputs are interpolated linearly.
-    #[arg(long, value_name = "NAME,…", requires = "inputs")]
-    held: Vec<String>,
     /// Outputs of the FMU that were recorded.
     #[arg(long, value_name = "NAME,…", requires = "free")]
     outputs: Vec<String>,
@@ -58,18 +55,47 @@ pub struct AnyFmuArgs {
     /// Models the noise of every output as white noise plus a Gauss–Markov bias, because it drifts.
     #[arg(long)]
     drift: bool,
-    /// Integrates the FMU by the host (Model Exchange) with this relative tolerance [without a number: 1e-8], instead of
-    /// by the FMU's own solver.
-    #[arg(long, value_name = "TOLERANCE", requires = "free", num_args = 0..=1, default_missing_value = "1e-8")]
-    exchange: Option<f64>,
-    /// Relative tolerance of the FMU's own solver [default: the FMU's own].
-    #[arg(long, value_name = "TOLERANCE", conflicts_with = "exchange")]
-    solver_tolerance: Option<f64>,
-    /// Number of random starts within the bounds, which are tried if the search from the first start ends at no good fit
-    /// [default: 8].
-    #[arg(long, value_name = "NUMBER")]
-    tries: Option<usize>,
+    /// Solver that steps the FMU, with its relative tolerance: own (Co-Simulation, such as own:1e-6) or host (Model
+    /// Exchange, such as host:1e-9; without a number 1e-8).
+    #[arg(
+        long,
+        value_name = "own|host[:TOLERANCE]",
+        requires = "free",
+        default_value = "own",
+        value_parser = solver
+    )]
+    solver: Stepped,
 }
+
+/// Solver that steps the FMU, and the tolerance of the FMU's own.
+#[derive(Clone, Copy)]
+struct Stepped {
+    solver: Solver,
+    tolerance: Option<f64>,
+}
+
+/// Parses `own`, `own:TOLERANCE`, `host` or `host:TOLERANCE`.
+fn solver(text: &str) -> Result<Stepped> {
+    let (whose, tolerance) = match text.split_once(':') {
+        Some((whose, number)) => {
+            let number: f64 = number.parse().with_context(|| format!("{number} is no number"))?;
+            ensure!(
+                (1e-13..=1e-2).contains(&number),
+                "{number:e} (allowed: tolerances from 1e-13 to 1e-2)"
+            );
+            (whose, Some(number))
+        }
+        None => (text, None),
+    };
+    match whose {
+        "own" => Ok(Stepped { solver: Solver::Own, tolerance }),
+        "host" => Ok(Stepped { solver: Solver::Host(tolerance.unwrap_or(1e-8)), tolerance: None }),
+        _ => bail!("{whose} (allowed: own, own:TOLERANCE, host, host:TOLERANCE)"),
+    }
+}
+
+/// Random starts within the bounds, which are tried if the search from the first start ends at no good fit.
+const STARTS: usize = 8;
 
 /// Points at which the likelihood is asked for.
 #[derive(clap::Args)]
@@ -124,10 +150,15 @@ impl AnyFmuArgs {
         let names = |flags: &[String]| -> Vec<String> {
             flags.iter().flat_map(|flag| list(flag)).map(String::from).collect()
         };
-        for (flag, flags) in
-            [("inputs", &self.inputs), ("held", &self.held), ("outputs", &self.outputs)]
-        {
-            let names = names(flags);
+        let inputs: Vec<(String, bool)> = names(&self.inputs)
+            .into_iter()
+            .map(|name| match name.strip_suffix(":held") {
+                Some(name) => (name.to_string(), true),
+                None => (name, false),
+            })
+            .collect();
+        let driven: Vec<String> = inputs.iter().map(|(name, _)| name.clone()).collect();
+        for (flag, names) in [("inputs", &driven), ("outputs", &names(&self.outputs))] {
             let twice = (1..names.len()).find(|i| names[..*i].contains(&names[*i]));
             problems.extend(twice.map(|i| format!("--{flag} names {} twice", names[i])));
         }
@@ -135,30 +166,22 @@ impl AnyFmuArgs {
             free: read(&self.free, &mut problems),
             priors: read(&self.prior, &mut problems),
             tolerances: read(&self.tolerances, &mut problems),
-            settings: parsed(request.texts().iter().map(|text| text.parse()), &mut problems),
-            inputs: names(&self.inputs),
-            held: names(&self.held),
+            settings: parsed(told.texts().iter().map(|text| text.parse()), &mut problems),
+            held: inputs.into_iter().filter(|(_, held)| *held).map(|(name, _)| name).collect(),
+            inputs: driven,
             outputs: names(&self.outputs),
             sensors: self.sensors.clone(),
             biases: read(&self.bias, &mut problems),
             // The name of a triad has commas before its sign of equality.
             triads: parsed(self.triad.iter().map(|text| text.parse()), &mut problems),
             drift: self.drift,
-            solver: self.exchange.map_or(Solver::Own, Solver::Host),
-            tolerance: self.solver_tolerance,
-            starts: self.tries.unwrap_or(8),
+            solver: self.solver.solver,
+            tolerance: self.solver.tolerance,
+            starts: STARTS,
         };
         let unread = |sensor: &&Sensor| !question.outputs.iter().any(|output| sensor.has(output));
         for sensor in self.sensors.iter().filter(unread) {
             problems.push(format!("--sensor {}: it is not among the --outputs", sensor.name));
-        }
-        for (flag, tolerance) in
-            [("--exchange", self.exchange), ("--solver-tolerance", self.solver_tolerance)]
-        {
-            if let Some(tolerance) = tolerance.filter(|t| !(1e-13..=1e-2).contains(t)) {
-                problems
-                    .push(format!("{flag} {tolerance:e} (allowed: tolerances from 1e-13 to 1e-2)"));
-            }
         }
         ensure!(problems.is_empty(), "{}", problems.join("; "));
         Ok(question)
@@ -301,8 +324,8 @@ fn print_predicted(bounds: &[Bound]) {
         bounds.iter().filter(|b| b.decided_by_solver).map(|b| b.name.as_str()).collect();
     if !decided.is_empty() {
         println!(
-            "No bound is given for {}: the errors of the FMU's solver decide. A smaller --solver-tolerance makes them smaller. So \
-             does --exchange, unless an output follows the slope of an input.",
+            "No bound is given for {}: the errors of the FMU's solver decide. A smaller tolerance, --solver own:TOLERANCE, makes \
+             them smaller. So does --solver host, unless an output follows the slope of an input.",
             decided.join(", ")
         );
     }

@@ -13,14 +13,10 @@ use crate::{progress, terminal};
 pub struct Out<'a> {
     pub result: Option<&'a Path>,
     pub report: Option<&'a Path>,
-    /// Print the result as JSON instead of tables.
-    pub json: bool,
-    /// Also print each attempt of the search.
-    pub verbose: bool,
 }
 
 impl Out<'_> {
-    /// Runs a search and shows its progress as a spinner; with `verbose` also each attempt.
+    /// Runs a search and shows its progress as a spinner.
     ///
     /// # Errors
     ///
@@ -28,7 +24,7 @@ impl Out<'_> {
     pub fn search<T>(&self, search: impl FnOnce(&mut dyn FnMut(&News)) -> Result<T>) -> Result<T> {
         let spinner = progress::search_spinner()?;
         let found = search(&mut |news| match news {
-            News::Detail(line) if !self.verbose => spinner.set_message(line.clone()),
+            News::Detail(line) => spinner.set_message(line.clone()),
             news => progress::show_line(&spinner, news.line()),
         });
         spinner.finish_and_clear();
@@ -65,9 +61,7 @@ impl Out<'_> {
         page: impl FnOnce() -> String,
     ) -> Result<()> {
         self.save(text)?;
-        if self.json {
-            terminal::print_text_as_json(text.into());
-        } else if !terminal::has_reader() {
+        if !terminal::has_reader() {
             tables();
         }
         if !is_trusted {

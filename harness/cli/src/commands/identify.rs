@@ -3,7 +3,7 @@
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Result, bail, ensure};
+use anyhow::{Context, Result, bail, ensure};
 use host::fmu::Fmu;
 use identify::bench::nominal::{self, Nominal};
 use identify::bench::options::Options;
@@ -11,7 +11,7 @@ use identify::bench::simulate::Intersample;
 use identify::bench::system::Target;
 use identify::input::reading::{self, Source};
 use identify::input::recording::Recording;
-use identify::input::tolerance::Tolerances;
+use identify::input::tolerance::{self, Tolerances};
 use identify::methods::free_decay::FreeDecay;
 use identify::methods::friction::Friction;
 use identify::methods::output_error::OutputError;
@@ -35,7 +35,7 @@ use crate::terminal;
     hubslosh identify friction ramp.csv step.csv sweep.csv --out friction.json\n  \
     hubslosh identify decay decay.csv --columns wave_height=probe:mm --out decay.json\n  \
     hubslosh identify a.csv b.csv --fmu VanDerPol.fmu --free mu=1:0.1:5,x0@each=1:-3:3 --outputs x0,x1 \\\n      \
-    --exchange --out result.json --report result.html")]
+    --solver host --out result.json --report result.html")]
 pub struct IdentifyArgs {
     #[command(subcommand)]
     kind: Kind,
@@ -43,7 +43,7 @@ pub struct IdentifyArgs {
 
 const BENCH: &str = "Example:\n  hubslosh identify bench up.csv down.csv --validate noise.csv --set tank.d=0.163 --out result.json";
 const FMU: &str = "Example:\n  hubslosh identify fmu a.csv b.csv --fmu VanDerPol.fmu --free mu=1:0.1:5,x0@each=1:-3:3 \\\n      \
-    --outputs x0,x1 --exchange --out result.json";
+    --outputs x0,x1 --solver host --out result.json";
 const DECAY: &str =
     "Example:\n  hubslosh identify decay decay.csv --columns wave_height=probe:mm --out decay.json";
 const FRICTION: &str =
@@ -84,7 +84,7 @@ struct DataArgs {
     /// Columns of the recordings for the signals, with units, such as time=t:ms,omega=gyro_z:deg/s. Signals of bench and
     /// friction: time, tau_cmd, omega, theta, g_axial, wheel_speed, omega_x, omega_y; of decay: time, wave_height, force,
     /// theta, omega; of fmu: time, and inputs and outputs of the FMU. A signal that is not named here is read from the
-    /// column with its own name.
+    /// column with its own name. rate=HZ is the sampling rate of a recording without times.
     #[arg(
         long,
         value_name = "SIGNAL=COLUMN[:UNIT],…",
@@ -92,16 +92,6 @@ struct DataArgs {
         hide_default_value = true
     )]
     columns: String,
-    /// Sampling rate of a recording without times, Hz.
-    #[arg(long, value_name = "HZ")]
-    rate: Option<f64>,
-    /// Also prints each attempt of the search: its start, its part of the recording and its unknowns, and why it was
-    /// made, accepted or rejected.
-    #[arg(long)]
-    verbose: bool,
-    /// Prints the result as JSON in place of tables and verdict; --out is written too.
-    #[arg(long)]
-    json: bool,
     /// File for the result, .json.
     #[arg(long, value_name = "FILE", required_unless_present = "messages")]
     out: Option<PathBuf>,
@@ -117,18 +107,13 @@ struct KnownArgs {
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
     settings: Vec<(String, String)>,
     /// Relative standard deviations of known values, which widen the intervals [default:
-    /// torque=1%,clock=0.01%,g_axial=0.1%,tank.r=0.4%,fluid.rho=0.3%]. 0 means exact.
+    /// torque=1%,clock=0.01%,g_axial=0.1%,tank.r=0.4%,fluid.rho=0.3%,gyro_scale=1%]. 0 means exact.
     #[arg(long = "tolerance", value_name = "NAME=SIZE,…")]
     tolerances: Vec<String>,
-    /// Prior knowledge of a parameter: its value and standard deviation.
-    #[arg(long, value_name = "NAME=VALUE:STD", value_parser = prior)]
-    known: Vec<(String, f64, f64)>,
-    /// Standard deviation of the scale factor of the gyro about 1. 0 means that the factor is exactly 1.
-    #[arg(long, value_name = "NUMBER", default_value_t = 0.01)]
-    gyro_scale: f64,
-    /// Value from which the search starts, instead of one estimated from the data.
-    #[arg(long = "start", value_name = "NAME=VALUE", value_parser = start_value)]
-    starts: Vec<(String, f64)>,
+    /// Value from which the search starts, instead of one estimated from the data. STD is the standard deviation of prior
+    /// knowledge about this value.
+    #[arg(long = "start", value_name = "NAME=VALUE[:STD]", value_parser = started)]
+    starts: Vec<(String, f64, Option<f64>)>,
     /// Intersample behaviour of the torque: linear (first-order hold), held (zero-order hold, as of a sampled controller)
     /// or smooth (band-limited, as of a sampled recording of a smooth torque) [default: the one that fits best].
     #[arg(long, value_name = "HOW", value_parser = ["linear", "held", "smooth"])]
@@ -169,26 +154,19 @@ pub struct BenchArgs {
         value_parser = ["none", "viscous", "stribeck_smooth", "stribeck", "lugre"]
     )]
     friction: Vec<String>,
-    /// Estimates no delay, gyro bias or friction asymmetry, because the measurement is perfect.
-    #[arg(long)]
-    perfect: bool,
-    /// Also estimates the time constant with which the actuator lags its command.
-    #[arg(long)]
-    actuator_lag: bool,
-    /// Also estimates the time constant of a low-pass filter in the gyro.
-    #[arg(long)]
-    gyro_lag: bool,
-    /// Also estimates the relative change of the friction over a recording.
-    #[arg(long)]
-    friction_drift: bool,
-    /// Also estimates the damping by breaking waves, slosh.zeta_breaking and slosh.breaking_steepness. If the waves in
-    /// the fit are too low for it, the verdict says so.
-    #[arg(long)]
-    breaking: bool,
-    /// Accepts a negative delay, because the time stamps of the rate may be early. Without this flag a negative delay
-    /// counts as a sign of an error.
-    #[arg(long)]
-    acausal: bool,
+    /// Also estimates: actuator_lag and gyro_lag, time constants of the actuator and of a filter in the gyro;
+    /// friction_drift, the relative change of the friction over a recording; breaking, the damping by breaking waves,
+    /// slosh.zeta_breaking and slosh.breaking_steepness. early_rate accepts a negative delay, because the time stamps of
+    /// the rate may be early. none: estimates no delay, gyro bias or friction asymmetry either, because the measurement is
+    /// perfect.
+    #[arg(
+        long,
+        value_name = "NAME,…",
+        value_delimiter = ',',
+        value_parser =
+            ["actuator_lag", "gyro_lag", "friction_drift", "breaking", "early_rate", "none"]
+    )]
+    also: Vec<String>,
 }
 
 /// `hubslosh identify friction`.
@@ -246,6 +224,31 @@ const REMOVED: [(&str, &str); 6] = [
     ),
 ];
 
+/// Options of older versions that were removed, and what replaces each.
+const GONE: [(&str, &str); 18] = [
+    ("--empty", "identify friction"),
+    (
+        "--tank",
+        "identify fmu --fmu SloshTank; the page 'From a force record to a mechanical model' has the command",
+    ),
+    ("--rate", "--columns rate=HZ"),
+    ("--json", "--out, whose file is JSON"),
+    ("--verbose", "`done` in the file of --out"),
+    ("--known", "--start NAME=VALUE:STD"),
+    ("--gyro-scale", "--tolerance gyro_scale=1%"),
+    ("--perfect", "--also none"),
+    ("--actuator-lag", "--also actuator_lag"),
+    ("--gyro-lag", "--also gyro_lag"),
+    ("--friction-drift", "--also friction_drift"),
+    ("--breaking", "--also breaking"),
+    ("--acausal", "--also early_rate"),
+    ("--start-study", "--start NAME=VALUE for a start of your own; every fit takes several starts"),
+    ("--tries", "nothing: up to 8 starts are tried"),
+    ("--held", "--inputs NAME:held"),
+    ("--exchange", "--solver host, or host:TOLERANCE"),
+    ("--solver-tolerance", "--solver own:TOLERANCE"),
+];
+
 /// Adds the kind of recording to `identify DATA`, which names none: `fmu` if `--free` is there, otherwise
 /// `bench`. Other command lines stay as they are.
 ///
@@ -278,12 +281,11 @@ pub fn with_kind(mut arguments: Vec<OsString>) -> Result<Vec<OsString>> {
                     found.map_or("identify bench, fmu, decay or friction", |(_, text)| text);
                 bail!("--method {name} was removed (use instead: {instead})");
             }
-            "--empty" => bail!("--empty was removed (use instead: identify friction)"),
-            "--tank" => bail!(
-                "--tank was removed (use instead: identify fmu --fmu SloshTank; the page 'From a force record to a mechanical \
-                 model' has the command)"
-            ),
-            _ => {}
+            _ => {
+                if let Some((_, instead)) = GONE.iter().find(|(gone, _)| *gone == option) {
+                    bail!("{option} was removed (use instead: {instead})");
+                }
+            }
         }
     }
     // Flags of the program may stand between the command and the kind; they are moved behind the kind.
@@ -297,28 +299,34 @@ pub fn with_kind(mut arguments: Vec<OsString>) -> Result<Vec<OsString>> {
     Ok(arguments)
 }
 
-fn start_value(text: &str) -> Result<(String, f64)> {
-    let (name, value) = setting(text)?;
-    let value: f64 = value.parse()?;
-    ensure!(value.is_finite() && value > 0.0, "{name} must be a positive number, not {value}");
-    Ok((name, value))
-}
-
-fn prior(text: &str) -> Result<(String, f64, f64)> {
-    let (name, value) = setting(text)?;
-    let parts = value.split_once(':').and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?)));
-    let Some((mean, deviation)) = parts else {
-        bail!("{name} must be VALUE:STD, two numbers, not {value}")
+/// Parses `NAME=VALUE` or `NAME=VALUE:STD`.
+fn started(text: &str) -> Result<(String, f64, Option<f64>)> {
+    let (name, numbers) = setting(text)?;
+    let number = |text: &str| text.parse().ok().filter(|x: &f64| x.is_finite() && *x > 0.0);
+    let (value, std) = match numbers.split_once(':') {
+        Some((value, std)) => (number(value), Some(number(std))),
+        None => (number(&numbers), None),
     };
-    ensure!(
-        f64::is_finite(mean) && mean > 0.0 && f64::is_finite(deviation) && deviation > 0.0,
-        "{name}: value and standard deviation must be positive numbers"
-    );
-    Ok((name, mean, deviation))
+    match (value, std) {
+        (Some(value), None) => Ok((name, value, None)),
+        (Some(value), Some(Some(std))) => Ok((name, value, Some(std))),
+        _ => bail!("{name} must be VALUE or VALUE:STD, positive numbers, not {numbers}"),
+    }
 }
 
-fn tolerances(texts: &[String]) -> Result<Tolerances> {
-    texts.iter().try_fold(Tolerances::default(), |all, text| all.with(text))
+/// Parses the tolerances of known values of the bench, `NAME=SIZE`, and that of the gyro's scale.
+fn tolerances(texts: &[String]) -> Result<(Tolerances, f64)> {
+    let (mut all, mut scale) = (Tolerances::default(), Options::default().gyro_scale);
+    for item in texts.iter().flat_map(|text| text.split(',')) {
+        match item.trim().strip_prefix("gyro_scale=") {
+            Some(value) => {
+                let found = tolerance::part("gyro_scale", value)?;
+                scale = found.with_context(|| format!("gyro_scale: {value} is not a number"))?;
+            }
+            None => all = all.with(item)?,
+        }
+    }
+    Ok((all, scale))
 }
 
 /// Parses `--trim`, the first and last time (s) of the rows to use; empty means all rows.
@@ -354,29 +362,34 @@ impl IdentifyArgs {
 impl FmuArgs {
     fn run(&self) -> Result<()> {
         self.data.check()?;
-        let DataArgs { data, columns, rate, json, .. } = &self.data;
+        let DataArgs { data, .. } = &self.data;
+        let (columns, rate) = self.data.columns()?;
         let (settings, fmu) = (&self.settings, &self.fmu);
-        let request = Request { data, settings, columns, rate: *rate, fmu, json: *json };
-        self.any.identify(&request, &self.points, &self.data.outputs())
+        let told = Told { data, settings, columns: &columns, rate, fmu, json: false };
+        self.any.identify(&told, &self.points, &self.data.outputs())
     }
 }
 
 impl BenchArgs {
+    fn has(&self, name: &str) -> bool {
+        self.also.iter().any(|other| other == name)
+    }
+
     fn run(&self) -> Result<()> {
         let options = Options {
-            acausal: self.acausal,
+            acausal: self.has("early_rate"),
             models: self.model.clone(),
             friction: self.friction.clone(),
-            sensor_errors: !self.perfect,
+            sensor_errors: !self.has("none"),
             effects: [
-                (self.actuator_lag, Target::ActuatorLag),
-                (self.gyro_lag, Target::GyroLag),
-                (self.friction_drift, Target::FrictionDrift),
+                ("actuator_lag", Target::ActuatorLag),
+                ("gyro_lag", Target::GyroLag),
+                ("friction_drift", Target::FrictionDrift),
             ]
             .into_iter()
-            .filter_map(|(is_asked, effect)| is_asked.then_some(effect))
+            .filter_map(|(name, effect)| self.has(name).then_some(effect))
             .collect(),
-            breaking: self.breaking,
+            breaking: self.has("breaking"),
             ..self.known.options()?
         };
         self.known.identify_and_print(
@@ -399,7 +412,7 @@ impl DecayArgs {
     fn run(&self) -> Result<()> {
         self.data.check()?;
         let source = self.data.source(trim(&self.trim)?)?;
-        let clock = tolerances(&self.tolerances)?.clock;
+        let clock = tolerances(&self.tolerances)?.0.clock;
         let (mut signals, mut recordings, mut notes) = (Vec::new(), Vec::new(), Vec::new());
         for path in &self.data.data {
             let (signal, recording) = reading::read_decay(path, &source, &mut |line| {
@@ -423,11 +436,11 @@ impl DecayArgs {
 impl KnownArgs {
     /// Collects what the options state about the bench. Names are those of the FMU's parameters.
     fn options(&self) -> Result<Options> {
-        ensure!(
-            (0.0..1.0).contains(&self.gyro_scale),
-            "--gyro-scale must be from 0 to 1, not {}",
-            self.gyro_scale
-        );
+        let (tolerances, gyro_scale) = tolerances(&self.tolerances)?;
+        let (known, starts): (Vec<_>, Vec<_>) =
+            self.starts.iter().cloned().partition(|(_, _, std)| std.is_some());
+        let known = known.into_iter().filter_map(|(name, value, std)| Some((name, value, std?)));
+        let starts = starts.into_iter().map(|(name, value, _)| (name, value));
         let intersample = self.torque.as_deref().map(|how| match how {
             "held" => Intersample::ZeroOrderHold,
             "smooth" => Intersample::BandLimited,
@@ -435,11 +448,11 @@ impl KnownArgs {
         });
         Ok(Options {
             intersample,
-            known: self.known.clone(),
+            known: known.collect(),
             settings: nominal::with_damping(self.settings.clone()),
-            starts: self.starts.clone(),
-            gyro_scale: self.gyro_scale,
-            tolerances: tolerances(&self.tolerances)?,
+            starts: starts.collect(),
+            gyro_scale,
+            tolerances,
             ..Options::default()
         })
     }
@@ -477,6 +490,24 @@ impl KnownArgs {
 }
 
 impl DataArgs {
+    /// Splits `--columns` into the columns and the sampling rate, `rate=HZ`.
+    fn columns(&self) -> Result<(String, Option<f64>)> {
+        let (mut columns, mut rate) = (Vec::new(), None);
+        for item in self.columns.split(',') {
+            match item.trim().strip_prefix("rate=") {
+                Some(number) => {
+                    let number = number.parse();
+                    rate =
+                        Some(number.with_context(|| {
+                            format!("--columns {item}: a number of Hz is needed")
+                        })?);
+                }
+                None => columns.push(item),
+            }
+        }
+        Ok((columns.join(","), rate))
+    }
+
     /// Checks that the outputs can be written, before a search that may take minutes.
     fn check(&self) -> Result<()> {
         for (path, ending) in [(&self.out, "json"), (&self.report, "html")] {
@@ -491,8 +522,9 @@ impl DataArgs {
     }
 
     fn source(&self, trim: Option<(f64, f64)>) -> Result<Source> {
-        let columns: Columns = self.columns.parse()?;
-        Ok(Source { columns: columns.with_rate(self.rate)?, trim })
+        let (columns, rate) = self.columns()?;
+        let columns: Columns = columns.parse()?;
+        Ok(Source { columns: columns.with_rate(rate)?, trim })
     }
 
     /// Fits by `method`, writes the result to the output files and prints it.
@@ -506,7 +538,7 @@ impl DataArgs {
 
     fn outputs(&self) -> Out<'_> {
         let (result, report) = (self.out.as_deref(), self.report.as_deref());
-        Out { result, report, json: self.json, verbose: self.verbose }
+        Out { result, report }
     }
 }
 

@@ -46,13 +46,13 @@ identify decay @ --out a.json
 identify fmu @ --out a.json
 identify @ --validate @ --out a.json
 identify @ --free hub.I=0.5 --outputs omega --inputs tau_cmd --out a.json
-identify @ --free hub.I=0.5 --outputs omega --inputs tau_cmd --tries 0 --out a.json
+identify @ --free hub.I=0.5 --outputs omega --inputs tau_cmd --out a.json
 identify @ --fmu Model3.fmu --free k=0.7 --outputs y --inputs u --out a.json
-identify @ --fmu Model3.fmu --free k=0.7 --outputs y --inputs u --exchange --out a.json
+identify @ --fmu Model3.fmu --free k=0.7 --outputs y --inputs u --solver host --out a.json
 identify decay.csv --fmu Model3.fmu --free k=0.7 --outputs y --inputs u --out a.json
-identify decay.csv --fmu Model3.fmu --free k=0.7 --outputs y --inputs u --exchange --out a.json
+identify decay.csv --fmu Model3.fmu --free k=0.7 --outputs y --inputs u --solver host --out a.json
 identify decay.csv --fmu Model3.fmu --free k=0.7 --outputs y --out a.json
-identify decay.csv --fmu Model3.fmu --free k=0.1:0.05:0.1 --outputs y --inputs u --exchange --out a.json
+identify decay.csv --fmu Model3.fmu --free k=0.1:0.05:0.1 --outputs y --inputs u --solver host --out a.json
 identify rest.csv --free hub.I=0.5 --outputs omega --inputs tau_cmd --out a.json
 design @ --fmu Model3.fmu --free k=0.7 --outputs y --inputs u --noise y=1e-3
 design decay.csv --fmu Model3.fmu --free k=0.7 --outputs y --noise y=1e-3

@@ -132,19 +132,23 @@ const ROUNDS: usize = 3;
 
 /// Advice on how to make the solver's errors smaller.
 fn remedy(problem: &Problem, solver: &SolverError) -> String {
-    let finer = "a smaller --solver-tolerance makes them smaller";
+    let finer = "a smaller tolerance, --solver own:TOLERANCE, makes them smaller";
     match problem.model {
-        Model::Host { .. } => "a smaller tolerance after --exchange makes them smaller".into(),
+        Model::Host { .. } => {
+            "a smaller tolerance, --solver host:TOLERANCE, makes them smaller".into()
+        }
         Model::Own(_) if problem.setup.can_exchange(problem.model) => {
             let also =
                 if solver.heeds_tolerance { format!("; {finer} too") } else { String::new() };
-            format!("with --exchange the host integrates this FMU, with errors of 1e-8{also}")
+            format!("with --solver host the host integrates this FMU, with errors of 1e-8{also}")
         }
         Model::Own(_) if solver.heeds_tolerance => finer.into(),
         Model::Own(_) => {
             let exchange = match problem.model.offers_exchange() {
-                true => "--exchange is of no use, because an output follows the slope of an input",
-                false => "or for Model Exchange and use --exchange",
+                true => {
+                    "--solver host is of no use, because an output follows the slope of an input"
+                }
+                false => "or for Model Exchange and use --solver host",
             };
             format!(
                 "the FMU ignores the tolerance that a host gives: export it with a finer solver, {exchange}"

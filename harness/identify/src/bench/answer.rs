@@ -268,7 +268,7 @@ fn findings(
         if !options.acausal && solution.fit.free[j] && delay < -0.05 * step {
             doubts.push(format!(
                 "the rate comes {:.2} ms before the torque: check the time stamps and the torque between rows (--torque; \
-                 --acausal allows it)",
+                 --also early_rate allows it)",
                 -1e3 * delay
             ));
         }

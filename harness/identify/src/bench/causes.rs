@@ -94,9 +94,11 @@ pub fn cause(system: &BenchSystem, effect: &Effect) -> Option<Cause> {
     let start = |name: &str, value: f64| format!("--start {name}={value:.3}");
     let limit = system.largest * (1.0 - value);
     let (flags, size) = match target {
-        Target::ActuatorLag => ("--actuator-lag".into(), Some(("actuator_lag", value, "s"))),
-        Target::GyroLag => ("--gyro-lag".into(), Some(("gyro_lag", value, "s"))),
-        Target::FrictionDrift => ("--friction-drift".into(), Some(("friction_drift", value, "1"))),
+        Target::ActuatorLag => ("--also actuator_lag".into(), Some(("actuator_lag", value, "s"))),
+        Target::GyroLag => ("--also gyro_lag".into(), Some(("gyro_lag", value, "s"))),
+        Target::FrictionDrift => {
+            ("--also friction_drift".into(), Some(("friction_drift", value, "1")))
+        }
         Target::Limit => (
             format!("--set {}=true {}", wheel::ENABLED, start(wheel::TAU_MAX, limit)),
             Some((wheel::TAU_MAX, limit, "N.m")),

@@ -343,7 +343,12 @@ pub fn system<'a>(
     let List { unknowns, targets, .. } = list;
     for u in &unknowns {
         let is_in = u.start.is_finite() && u.bounds.0 <= u.bounds.1;
-        ensure!(is_in, "{} starts at {:.3e}: the data are those of no bench that the FMU can be", u.name, u.start);
+        ensure!(
+            is_in,
+            "{} starts at {:.3e}: the data are those of no bench that the FMU can be",
+            u.name,
+            u.start
+        );
     }
     refuse_overridden(fmu, &settings, &unknowns, &targets)?;
     let values = |start: &Start| -> Vec<f64> {

@@ -336,7 +336,9 @@ impl System for BenchSystem<'_> {
                 (Target::Length, Some([d, ..])) => d,
                 (Target::MassRatio, Some([_, h, _])) => h,
                 (Target::Inertia, Some([.., inertia])) => inertia,
-                (Target::Parameter(name), _) if [friction::C, friction::D].contains(&name.as_str()) => {
+                (Target::Parameter(name), _)
+                    if [friction::C, friction::D].contains(&name.as_str()) =>
+                {
                     value / other
                 }
                 (Target::GyroScale, _) => 1.0 + value,

@@ -219,7 +219,8 @@ impl Solution<'_> {
         };
         if let (Some(j), [first, .., last]) = (bent, all) {
             // what the prior alone says has no ends
-            let known = |at: f64| unknowns[j].prior.map_or(0.0, |(mean, std)| ((at - mean) / std).powi(2));
+            let known =
+                |at: f64| unknowns[j].prior.map_or(0.0, |(mean, std)| ((at - mean) / std).powi(2));
             let least = known(all[lowest].at);
             let open = [first, last].map(|end| end.rise - (known(end.at) - least) < OPEN);
             found.open = Some((unknowns[j].name.clone(), open));

@@ -76,7 +76,9 @@ impl Fit<'_> {
                 z[j] = at;
                 let end =
                     End { above: least + 3.0 * RAISED, ..End::new(SETS, super::ENDS.0 * 0.1) };
-                let Ok(found) = self.minimise(&z, &free, last.derivatives.clone(), end) else { break };
+                let Ok(found) = self.minimise(&z, &free, last.derivatives.clone(), end) else {
+                    break;
+                };
                 let rise = found.point.cost - base;
                 least = least.min(found.point.cost);
                 points.push(Point { at, minimum: found.clone() });

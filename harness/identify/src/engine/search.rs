@@ -253,7 +253,8 @@ impl Fit<'_> {
             }
             profile = self.profile(&mut minimum)?;
             let lowest = profile.iter().flat_map(|(_, points)| points);
-            let lowest = lowest.min_by(|a, b| a.minimum.point.cost.total_cmp(&b.minimum.point.cost));
+            let lowest =
+                lowest.min_by(|a, b| a.minimum.point.cost.total_cmp(&b.minimum.point.cost));
             match lowest {
                 Some(low) if low.minimum.point.cost < minimum.point.cost - LOWER => {
                     news(&News::Detail("the profile led to a lower minimum".into()));

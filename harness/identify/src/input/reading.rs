@@ -337,7 +337,7 @@ fn check_time(all: &Recording, coarsest: f64) -> Result<()> {
         "{name}: rows are {step} s apart, at most {coarsest:.3} s are allowed, a fifth of the slosh's expected period{}",
         if step >= 1.0 {
             ". Is time in milliseconds? It must be in seconds. (If the slosh really is that slow, --set g_axial, or \
-             --known tank.d and tank.h)"
+             --start tank.d=VALUE:STD and tank.h)"
         } else {
             ""
         }

@@ -84,7 +84,7 @@ pub fn identify(
             .push(format!("slosh.zeta_breaking is not estimated: {}.", breaking::never(angle)));
     } else if breaks && !is_asked && !is_set(hubslosh::slosh::ZETA_BREAKING) {
         found.verdict.push(format!(
-            "The fit's waves reach a steepness k a of {:.2} ({:.1}°), and waves break from {:.2} on: --breaking estimates this damping.",
+            "The fit's waves reach a steepness k a of {:.2} ({:.1}°), and waves break from {:.2} on: --also breaking estimates this damping.",
             breaking::steepness(angle),
             angle.to_degrees(),
             breaking::least()

@@ -70,7 +70,7 @@ fn coverage_of_a_hundred_twins_of_each_kind() {
     let host = solver_noise::question(Solver::Host(1e-8));
     for (kind, question) in [
         ("Co-Simulation 2.0, adaptive solver, 1e-3", own),
-        ("the same, `--solver-tolerance 1e-5`", fine),
+        ("the same, `--solver own:1e-5`", fine),
         ("Model Exchange 2.0", host),
     ] {
         let (mut count, model) = (Count::default(), Model::open(&path, question.solver).unwrap());

@@ -195,11 +195,11 @@ fn no_interval_is_given_where_the_errors_of_the_fmus_own_solver_decide() {
     ] {
         let fmu = Adaptive::new(&[definitions, &["-DMODEL_EXCHANGE"]].concat());
         for seed in 1..=2 {
-            check_refusal(&found(&fmu, &question(Solver::Own), seed, scale), "--exchange");
+            check_refusal(&found(&fmu, &question(Solver::Own), seed, scale), "--solver host");
         }
     }
     let fmu = Adaptive::new(&["-DTOLERANCE=1e-3", "-DROUGH"]);
-    check_refusal(&found(&fmu, &question(Solver::Own), 1, 1.0), "--solver-tolerance");
+    check_refusal(&found(&fmu, &question(Solver::Own), 1, 1.0), "--solver own:");
     let fmu = Adaptive::new(&["-DTOLERANCE=1e-3", "-DROUGH", "-DDEAF"]);
     check_refusal(&found(&fmu, &question(Solver::Own), 1, 1.0), "ignores the tolerance");
 }

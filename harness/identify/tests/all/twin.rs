@@ -118,7 +118,7 @@ fn damping_by_waves_that_break_comes_back() {
     // waves as large of a liquid that does not break
     let without = of(&[], false);
     assert!(
-        without.verdict.iter().any(|line| line.contains("--breaking")),
+        without.verdict.iter().any(|line| line.contains("--also breaking")),
         "{:?}",
         without.verdict
     );
@@ -173,7 +173,7 @@ fn the_cause_of_a_misfit_is_named_with_the_flag_that_fits_it() {
     let found = identify(&fmu, &recordings, &options, &mut |_| {}).unwrap();
     assert_eq!(found.fits, Some(false), "{:?}", found.verdict);
     let cause = found.details.cause.as_ref().unwrap();
-    assert_eq!(cause.flags, "--actuator-lag", "{cause:?}");
+    assert_eq!(cause.flags, "--also actuator_lag", "{cause:?}");
     let says = |words: &str| found.verdict.iter().any(|line| line.contains(words));
     assert!(
         says("an actuator that lags its command") && !says("rate's square"),
@@ -461,7 +461,7 @@ fn a_bench_of_another_size_is_estimated_if_it_is_said_to_be_one() {
     let told = Options { settings: vec![arm], ..options() };
     let recordings = [large];
     let error = identify(&fmu, &recordings, &told, &mut |_| {}).unwrap_err().to_string();
-    assert!(error.contains("--known hub.I="), "{error}");
+    assert!(error.contains("--start hub.I="), "{error}");
     let told = Options { known: vec![("hub.I".into(), 9.0, 4.0)], ..told };
     let found = identify(&fmu, &recordings, &told, &mut |_| {}).unwrap();
     for (name, truth) in [("tank.d", 0.4), ("tank.h", 0.3), ("hub.I", 5.0)] {
