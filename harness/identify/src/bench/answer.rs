@@ -239,7 +239,12 @@ fn estimated(
     }
     let value = full.values[k];
     // of a skew interval that of the longer side
-    let reach = interval.map(|end| (end - value).abs() / 1.96);
+    let mut ends = interval;
+    if !interval[1].is_finite() {
+        // as far as the range of the profile
+        ends[1] = full.columns[k].iter().copied().fold(value, f64::max);
+    }
+    let reach = ends.map(|end| (end - value).abs() / 1.96);
     let reach = reach.into_iter().filter(|reach| reach.is_finite()).fold(0.0, f64::max);
     std = if std.is_finite() { std.max(reach) } else { std };
     let is_part = |c: &Combination| c.of.contains(name) && c.std < 0.5 * std;
@@ -399,7 +404,7 @@ fn regime(model: &str, angle: f64) -> Option<String> {
     })
 }
 
-/// Known values that the residual would not leave alone: they are estimated within their tolerances. Returns a sentence on each.
+/// Known values of which the recordings tell more than was known: they are estimated within their tolerances. Returns a sentence on each.
 fn shown(
     system: &BenchSystem,
     solution: &Solution,
@@ -430,7 +435,7 @@ fn shown(
         };
         let estimated = Estimated::normal(value, relative * value, unit);
         sentences.push(format!(
-            "{name} is estimated within its tolerance, because its nominal value leaves more than noise: {value:.4e} ± {:.1e} {}.",
+            "{name} is estimated within its tolerance, because the recordings tell more of it than was known: {value:.4e} ± {:.1e} {}.",
             estimated.std,
             prose(unit)
         ));

@@ -14,7 +14,7 @@ const VAGUE: f64 = 0.05;
 /// Standard deviation of the friction's asymmetry above which the recordings do not show it.
 pub const ONE_WAY: f64 = 0.25;
 /// Part of a hub's path against its main direction above which it turns both ways.
-const BOTH_WAYS: f64 = 0.1;
+const BOTH_WAYS: f64 = 0.05;
 
 /// Two unknowns of which only a sum or a product is known.
 #[derive(Clone, Debug, Serialize)]

@@ -389,12 +389,14 @@ pub fn system<'a>(
 
 /// Direction of a hub that turns one way; 0 if it turns both. A gyro of a hub that rests at first reads its bias.
 fn way(recordings: &[Recording]) -> f64 {
-    let rates = recordings.iter().flat_map(|recording| {
+    let one = |recording: &Recording| {
         let bias = if recording.from_rest { recording.first_rate() } else { 0.0 };
         let noise = ABOVE_NOISE * recording.rate_noise();
-        recording.rate.iter().map(move |rate| rate - bias).filter(move |rate| rate.abs() > noise)
-    });
-    combination::way(rates).unwrap_or(0.0)
+        let rates = recording.rate.iter().map(|rate| rate - bias);
+        combination::way(rates.filter(|rate| rate.abs() > noise)).unwrap_or(0.0)
+    };
+    let first = recordings.first().map_or(0.0, one);
+    if recordings.iter().all(|recording| one(recording) == first) { first } else { 0.0 }
 }
 
 /// Returns true if a prior of the same value makes its tolerance one too many.

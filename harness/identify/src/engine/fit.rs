@@ -25,6 +25,8 @@ pub struct Fit<'p> {
     pub part: f64,
     /// Unknowns that are estimated.
     pub free: Vec<bool>,
+    /// True if differences are taken to both sides: where the answer bends, one side alone points elsewhere.
+    pub central: bool,
     /// Least and largest coordinates.
     pub ends: Vec<(f64, f64)>,
     steps: Vec<f64>,
@@ -69,6 +71,7 @@ impl<'p> Fit<'p> {
             inflation: 1.0,
             part: 1.0,
             free: unknowns.iter().map(|u| u.part == Part::Free).collect(),
+            central: false,
             ends: unknowns.iter().map(|u| (end(u, u.bounds.0), end(u, u.bounds.1))).collect(),
             steps: unknowns.iter().map(|u| FIRST_STEP * u.reach).collect(),
             filters: Vec::new(),
@@ -261,17 +264,19 @@ impl<'p> Fit<'p> {
             let (values, means) = whitened(pieces);
             return Ok(Column { values, means, step: self.steps[j] });
         }
-        let base = self.residuals(&at.z, &at.motion);
         let mut step = self.steps[j];
         loop {
-            let (by, motion) = self.moved(at, j, step)?;
-            let mut z = at.z.clone();
-            z[j] += by;
-            let there = self.residuals(&z, &motion);
+            let (by, there) = self.moved(at, j, step)?;
+            let other = self.central.then(|| self.moved(at, j, -by)).transpose().ok().flatten();
+            let (from, base) = match other {
+                Some((from, base)) if from == -by => (from, base),
+                _ => (0.0, self.residuals(&at.z, &at.motion)),
+            };
+            let width = by - from;
             let pieces = there
                 .iter()
                 .zip(&base)
-                .map(|(a, b)| a.iter().zip(b).map(|(a, b)| (a - b) / by).collect::<Vec<f64>>());
+                .map(|(a, b)| a.iter().zip(b).map(|(a, b)| (a - b) / width).collect::<Vec<f64>>());
             let (values, means) = whitened(pieces.collect());
             let norm = values.iter().map(|v| v * v).sum::<f64>().sqrt() * self.inflation;
             let reach = unknown.reach;
@@ -285,10 +290,11 @@ impl<'p> Fit<'p> {
         }
     }
 
-    /// Motion with one coordinate moved by a step, forwards or else backwards.
-    fn moved(&self, at: &Point, j: usize, step: f64) -> Result<(f64, Vec<Motion>)> {
+    /// Residuals with one coordinate moved by a step, to its own side or else to the other.
+    fn moved(&self, at: &Point, j: usize, step: f64) -> Result<(f64, Vec<Vec<f64>>)> {
         let unknown = &self.problem.unknowns[j];
-        let to = |by: f64| -> Result<(f64, Vec<Motion>)> {
+        let is_inside = |by: f64| (self.ends[j].0..=self.ends[j].1).contains(&(at.z[j] + by));
+        let to = |by: f64| -> Result<(f64, Vec<Vec<f64>>)> {
             let mut z = at.z.clone();
             z[j] += by;
             let runs = (0..self.problem.recordings.len()).into_par_iter();
@@ -296,13 +302,11 @@ impl<'p> Fit<'p> {
                 true => self.run(&z, k, false),
                 false => Ok(at.motion[k].clone()),
             };
-            Ok((by, runs.map(one).collect::<Result<_>>()?))
+            let motion = runs.map(one).collect::<Result<Vec<Motion>>>()?;
+            Ok((by, self.residuals(&z, &motion)))
         };
-        let forwards = at.z[j] + step <= self.ends[j].1;
-        let (first, second) = if forwards { (step, -step) } else { (-step, step) };
-        to(first).or_else(
-            |error| if at.z[j] + second < self.ends[j].0 { Err(error) } else { to(second) },
-        )
+        let (first, second) = if is_inside(step) { (step, -step) } else { (-step, step) };
+        to(first).or_else(|error| if is_inside(second) { to(second) } else { Err(error) })
     }
 
     /// Factor of an output in its reading.

@@ -32,12 +32,16 @@ pub struct End {
     pub decrement: f64,
     /// A minimum above this sum of squares is of no use.
     pub above: f64,
+    /// A set of derivatives that lessens the sum of squares by less is the last one: in a bent valley sets lead on by ever so little.
+    pub gain: f64,
+    /// True if a distance by derivatives that were only updated counts, once a set was found.
+    pub trusts: bool,
 }
 
 impl End {
     /// A search with so many sets of derivatives, to this distance.
     pub fn new(sets: usize, decrement: f64) -> Self {
-        End { sets, decrement, above: f64::INFINITY }
+        End { sets, decrement, above: f64::INFINITY, gain: 0.0, trusts: false }
     }
 }
 
@@ -156,11 +160,14 @@ impl Fit<'_> {
     ) -> Result<Minimum> {
         let n = point.z.len();
         let (mut damping, mut fresh, mut decrement, mut sets) = (1e-3, false, f64::INFINITY, 0);
+        // sum of squares at the last set of derivatives
+        let mut last = f64::INFINITY;
         loop {
             if derivatives.is_none() {
-                if sets == end.sets {
+                if sets == end.sets || last - point.cost < end.gain {
                     break;
                 }
+                last = point.cost;
                 derivatives = Some(self.derivatives(&point, free)?);
                 sets += 1;
                 fresh = true;
@@ -180,7 +187,7 @@ impl Fit<'_> {
                 break;
             }
             if decrement < end.decrement {
-                if fresh || sets == end.sets {
+                if fresh || sets == end.sets || end.trusts && sets > 0 {
                     break;
                 }
                 derivatives = None;
@@ -247,12 +254,32 @@ impl Fit<'_> {
                 }
             }
             match outcome {
+                // differences to one side may point elsewhere where the answer bends
+                None if !self.central && decrement > super::ENDS.0 * 0.2 && sets < end.sets => {
+                    self.central = true;
+                    derivatives = None;
+                }
                 None => break,
                 Some(true) => {}
                 Some(false) => derivatives = None,
             }
         }
         Ok(Minimum { point, derivatives, decrement, free: free.to_vec() })
+    }
+
+    /// Distance of a point to the minimum over the unknowns `free`, standard deviations.
+    ///
+    /// # Errors
+    /// If the system refuses every step of an unknown.
+    pub fn decrement(&mut self, at: &mut Minimum, free: &[bool]) -> Result<f64> {
+        let jacobian = self.derivatives_at(at)?.matrix;
+        let gradient = jacobian.tr_mul(&at.point.e);
+        let curvature = Curvature::new(&jacobian, self.inner(&at.point.z, &gradient, free));
+        let scaled = curvature.which.iter().zip(&curvature.scale);
+        let b: Vec<f64> = scaled.map(|(j, s)| gradient[*j] * s).collect();
+        let all: Vec<usize> = (0..b.len()).collect();
+        let step = curvature.solve(&b, &all, 0.0);
+        Ok(step.iter().zip(&b).map(|(s, b)| s * b).sum::<f64>().max(0.0).sqrt())
     }
 
     /// Derivatives at a minimum by the unknowns that were searched for.

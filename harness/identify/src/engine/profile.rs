@@ -12,9 +12,11 @@ pub const OPEN: f64 = 3.8415;
 /// Relative standard deviation of the unknown, or of one that depends on it, from which on the profile is followed.
 const VAGUE: f64 = 0.05;
 /// Sets of derivatives at one point, besides those of the point before.
-const SETS: usize = 1;
+const SETS: usize = 2;
 /// Shortest and longest first step, and longest step, of the coordinate.
 const LENGTHS: [f64; 3] = [0.03, 0.5, 0.6];
+/// Distance to its minimum at which a point counts: it adds a hundredth of [`OPEN`].
+const NEAR: f64 = 0.2;
 /// Points on a side at most.
 const MOST: usize = 14;
 /// Fall of the sum of squares that makes another minimum.
@@ -37,6 +39,7 @@ impl Fit<'_> {
     /// If the system refuses the minimum.
     pub fn profile(&mut self, minimum: &mut Minimum) -> Result<Option<(usize, Vec<Point>)>> {
         let unknowns = &self.problem.unknowns;
+        self.central = false;
         let bent = unknowns.iter().zip(&self.free).position(|(u, free)| u.bent && *free);
         let Some(j) = bent else { return Ok(None) };
         let jacobian = self.derivatives_at(minimum)?.matrix;
@@ -74,8 +77,8 @@ impl Fit<'_> {
                     }
                 }
                 z[j] = at;
-                let end =
-                    End { above: least + 3.0 * RAISED, ..End::new(SETS, super::ENDS.0 * 0.1) };
+                let above = least + 3.0 * RAISED;
+                let end = End { above, trusts: true, ..End::new(SETS, NEAR) };
                 let Ok(found) = self.minimise(&z, &free, last.derivatives.clone(), end) else {
                     break;
                 };

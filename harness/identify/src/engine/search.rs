@@ -3,29 +3,40 @@
 use analysis::gauss_markov::Noise;
 use analysis::innovations::Tests;
 use analysis::random::Random;
-use anyhow::{Context, Result};
-use rayon::prelude::*;
+use anyhow::{Context, Result, bail};
 
 use super::hold::Rival;
 use super::minimum::{Curvature, End, Minimum, places};
 use super::problem::{Part, Problem, Role, Signal};
 use super::profile::{self, LOWER};
-use super::{DECIDES, ENDS, Fit, INFLATIONS};
+use super::{ENDS, Fit, INFLATIONS};
 use crate::news::News;
 
 /// Starts that are drawn where those of the data lead to no minimum.
 const DRAWN: usize = 4;
 /// Parts of the recordings in a search from a start that leads to no minimum on the whole: over a whole oscillation the sum of squares has a
 /// minimum for each cycle, over its beginning only one.
-const PARTS: [f64; 5] = [0.1, 0.2, 0.4, 0.7, 1.0];
+const PARTS: [f64; 7] = [0.1, 0.2, 0.3, 0.4, 0.55, 0.75, 1.0];
 /// Noise over that of neighbouring rows from which on the residual has more in it than the sensor's noise.
 const ABOVE: f64 = 1.5;
 /// Rounds of noise, minimum and profile at the end, each from a lower minimum.
 const ROUNDS: usize = 3;
 /// Doublings of the distance at which a side of a start is looked at.
 const LOOKS: usize = 8;
-/// Sets of derivatives of the last search.
-const LAST: usize = 14;
+/// Distance at which a side of a start is looked at, standard deviations.
+const FAR: f64 = 3.0;
+/// Part of a parabola's rise there below which there is a kink, by its root.
+const KINKED: f64 = 0.8;
+/// Difference of −2 ln L within which two searches, neither of which has ended quite, have found the same minimum.
+const SAME: f64 = 20.0;
+/// A start leads nowhere if the sum of squares over more than this part of the recordings is so many times that of the first search.
+const ASTRAY: (f64, f64) = (0.25, 3.0);
+/// What a recording tells of a known value, over what was known, from which on it is an unknown.
+const SHOWN: f64 = 0.5;
+/// Sets of derivatives of the last search, and what each must lessen the sum of squares by.
+const LAST: (usize, f64) = (8, 0.3);
+/// The same where minima are only compared.
+const ROUGH: f64 = 2.0;
 /// Drift that the noise may have where a misfit is looked at: white noise over that of rows, size and least time of the drift.
 const OWN: (f64, f64, f64) = (1.1, 0.3, 50.0);
 
@@ -72,16 +83,19 @@ pub fn solve<'p>(
     let mut random = Random::new(26, 0);
     starts.extend((0..DRAWN).map(|_| drawn(problem, &mut random)));
     let mut best: Option<Found> = None;
-    let (mut tried, mut error) = (0, None);
+    let (mut tried, mut error, mut course) = (0, None, Vec::new());
     let ways = [(0..given, true), (0..given, false), (given..starts.len(), true)];
     for (number, grows) in ways.into_iter().flat_map(|(all, grows)| all.map(move |k| (k, grows))) {
-        // what is drawn is the last resort
-        if number >= given && best.as_ref().is_some_and(|best| !best.is_loud) {
-            break;
+        if let Some(best) = best.as_mut().filter(|_| number == 0 && !grows || number == given) {
+            // no other start has led to a lower minimum; what is drawn is the last resort
+            best.judge(&mut fit, news)?;
+            if best.is_noise || number >= given && !best.is_loud {
+                break;
+            }
         }
         tried += 1;
         let z = fit.coordinates(&starts[number]);
-        let found = match fit.from_start(&z, grows) {
+        let found = match fit.from_start(&z, grows, &mut course) {
             Ok(found) => found,
             Err(refused) => {
                 error = error.or(Some(refused));
@@ -96,7 +110,7 @@ pub fn solve<'p>(
             fit.simulations()
         )));
         // a minimum that one search alone has found may be one of many
-        let agrees = best.as_ref().is_some_and(|best| (best.first - deviance).abs() < DECIDES);
+        let agrees = best.as_ref().is_some_and(|best| (best.first - deviance).abs() < SAME);
         if best.as_ref().is_none_or(|best| deviance < best.first) {
             best = Some(Found::new(&fit, found, deviance));
         }
@@ -112,6 +126,7 @@ pub fn solve<'p>(
     };
     best.judge(&mut fit, news)?;
     let Found { mut minimum, rivals, .. } = best;
+    fit.free_shown(&mut minimum)?;
     let (found, mut profile) = fit.settle(minimum, news)?;
     minimum = found;
     if let Some(other) = fit.with_tolerances(&minimum)? {
@@ -164,7 +179,8 @@ impl Found {
         (self.minimum, self.rivals) = (minimum, rivals);
         fit.renew_noise(&self.minimum.point);
         let (free, z) = (fit.free.clone(), self.minimum.point.z.clone());
-        self.minimum = fit.minimise(&z, &free, None, End::new(4, ENDS.0 * 0.1))?;
+        let end = End { gain: ROUGH, ..End::new(4, ENDS.0) };
+        self.minimum = fit.minimise(&z, &free, None, end)?;
         (self.noise, self.hold, self.is_judged) = (fit.noise.clone(), fit.hold, true);
         (self.is_noise, self.is_loud) = (fit.is_noise(&self.minimum.point), fit.is_loud());
         news(&News::Detail(format!(
@@ -237,7 +253,8 @@ impl Fit<'_> {
         for _ in 0..ROUNDS {
             self.renew_noise(&minimum.point);
             let z = minimum.point.z.clone();
-            minimum = self.minimise(&z, &free, None, End::new(LAST, ENDS.1))?;
+            minimum =
+                self.minimise(&z, &free, None, End { gain: LAST.1, ..End::new(LAST.0, ENDS.1) })?;
             let stuck = self.stuck(&minimum.point.z);
             if !stuck.is_empty() && !once {
                 once = true;
@@ -252,23 +269,56 @@ impl Fit<'_> {
                 }
             }
             profile = self.profile(&mut minimum)?;
-            let lowest = profile.iter().flat_map(|(_, points)| points);
+            let Some((j, points)) = &profile else { break };
+            // along the profile the likelihood is known, and the others are at their minimum
+            let mut others = free.clone();
+            others[*j] = false;
             let lowest =
-                lowest.min_by(|a, b| a.minimum.point.cost.total_cmp(&b.minimum.point.cost));
-            match lowest {
-                Some(low) if low.minimum.point.cost < minimum.point.cost - LOWER => {
-                    news(&News::Detail("the profile led to a lower minimum".into()));
-                    minimum = low.minimum.clone();
-                }
-                _ => break,
+                points.iter().min_by(|a, b| a.minimum.point.cost.total_cmp(&b.minimum.point.cost));
+            let fall = lowest.map_or(0.0, |low| minimum.point.cost - low.minimum.point.cost);
+            if let Some(low) = lowest.filter(|_| fall > 0.0) {
+                minimum = Minimum { derivatives: None, free: free.clone(), ..low.minimum.clone() };
             }
+            if fall <= ROUGH {
+                minimum.decrement = self.decrement(&mut minimum, &others)?;
+                break;
+            }
+            news(&News::Detail("the profile led to a lower minimum".into()));
         }
         Ok((minimum, profile))
     }
 
+    /// Frees known values of which the recordings tell about as much as was known: where slosh is not linear, or an encoder shows the
+    /// clock.
+    ///
+    /// # Errors
+    /// If the system refuses the minimum.
+    fn free_shown(&mut self, minimum: &mut Minimum) -> Result<()> {
+        let unknowns = &self.problem.unknowns;
+        let is_held = |u: &super::Unknown| u.part == Part::Tolerance && u.role != Role::Derived;
+        let held: Vec<bool> =
+            unknowns.iter().zip(&self.free).map(|(u, free)| is_held(u) && !free).collect();
+        let own = self.derivatives_at(minimum)?.matrix;
+        let known = self.derivatives(&minimum.point, &held)?.matrix;
+        let covariance = Curvature::new(&own, places(&self.free)).covariance(unknowns.len());
+        let priors = unknowns.iter().filter(|u| u.prior.is_some()).count();
+        let rows = own.nrows() - priors;
+        for j in places(&held) {
+            let column = known.column(j).into_owned();
+            let rest = &column - &own * (&covariance * own.tr_mul(&column));
+            let told = rest.rows(0, rows).norm();
+            self.free[j] = unknowns[j].prior.is_some_and(|(_, std)| told * std > SHOWN);
+        }
+        if self.free != minimum.free {
+            minimum.derivatives = None;
+            minimum.free.clone_from(&self.free);
+        }
+        Ok(())
+    }
+
     /// Looks to either side of the starts of recordings: dry friction that stops the hub before the first row that is fitted leaves a
     /// kink in the likelihood, beyond which it is flat.
-    fn sides(&self, minimum: &Minimum) -> Vec<(usize, [f64; 2])> {
+    fn sides(&mut self, minimum: &Minimum) -> Vec<(usize, [f64; 2])> {
         let unknowns = &self.problem.unknowns;
         let is_start = |j: &usize| matches!(unknowns[*j].role, Role::Run(Some(_)));
         let starts: Vec<usize> = places(&self.free).into_iter().filter(is_start).collect();
@@ -277,26 +327,33 @@ impl Fit<'_> {
         };
         let covariance =
             Curvature::new(&found.matrix, places(&self.free)).covariance(unknowns.len());
-        let side = |j: usize, sign: f64| {
+        let mut side = |j: usize, sign: f64| {
             let std = covariance[(j, j)].sqrt();
-            let mut factor = 1.0;
-            for _ in 0..LOOKS {
-                // two of the standard deviations, along the minimum over the others
-                let by = 2.0 * sign * factor / std;
+            let mut free = self.free.clone();
+            free[j] = false;
+            // root of the rise of the sum of squares at so many standard deviations, over the others
+            let mut rise = |deviations: f64| {
+                let by = sign * deviations / std;
                 let z: Vec<f64> = (0..unknowns.len())
                     .map(|i| minimum.point.z[i] + by * covariance[(i, j)])
-                    .zip(&self.ends)
-                    .map(|(z, ends)| z.clamp(ends.0, ends.1))
                     .collect();
-                let rise = self.at(&z).map_or(f64::INFINITY, |at| at.cost - minimum.point.cost);
-                if rise > 2.0 {
-                    return factor.max(1.0);
+                let there = self.minimise(&z, &free, minimum.derivatives.clone(), End::new(1, 0.3));
+                let cost = there.map_or(f64::INFINITY, |there| there.point.cost);
+                (cost - minimum.point.cost).max(0.0).sqrt()
+            };
+            let (mut near, mut far, mut now) = ((0.0, 0.0), FAR, rise(FAR));
+            for _ in 0..LOOKS {
+                if now > KINKED * FAR {
+                    break;
                 }
-                factor *= 2.0;
+                near = (far, now);
+                far *= 2.0;
+                now = rise(far);
             }
-            factor
+            let part = ((FAR - near.1) / (now - near.1)).clamp(0.0, 1.0);
+            ((near.0 + part * (far - near.0)) / FAR).max(1.0)
         };
-        starts.into_par_iter().map(|j| (j, [side(j, -1.0), side(j, 1.0)])).collect()
+        starts.into_iter().map(|j| (j, [side(j, -1.0), side(j, 1.0)])).collect()
     }
 
     /// Returns true if the residual at a point is noise of the size that neighbouring rows show.
@@ -322,7 +379,8 @@ impl Fit<'_> {
         let first = self.minimise(&z, &all, None, End::new(10, ENDS.0 * 0.1))?;
         self.renew_noise(&first.point);
         let z = first.point.z.clone();
-        let found = self.minimise(&z, &all, None, End::new(LAST, ENDS.1))?;
+        let found =
+            self.minimise(&z, &all, None, End { gain: LAST.1, ..End::new(LAST.0, ENDS.1) })?;
         if self.is_noise(&found.point) {
             self.free = all;
             return Ok(Some(found));
@@ -333,20 +391,29 @@ impl Fit<'_> {
     }
 
     /// The minimum from a start, on the whole recordings with noise that counts less and less, or over beginnings that grow.
-    fn from_start(&mut self, z: &[f64], grows: bool) -> Result<Minimum> {
+    fn from_start(&mut self, z: &[f64], grows: bool, course: &mut Vec<f64>) -> Result<Minimum> {
         let first = |fit: &Self| -> Vec<Noise> {
             fit.problem.signals.iter().map(Signal::first_noise).collect()
         };
         let free = self.free.clone();
-        (self.hold, self.inflation) = (self.problem.holds[0], 1.0);
+        (self.hold, self.inflation, self.central) = (self.problem.holds[0], 1.0, false);
         let mut z = z.to_vec();
         let mut found: Option<Minimum> = None;
         if grows {
-            for part in PARTS {
+            let before = course.clone();
+            for (k, part) in PARTS.into_iter().enumerate() {
                 let noise = first(self);
                 self.set(noise, part);
-                self.inflation = if part < 1.0 { 10.0 } else { 1.0 };
-                let minimum = self.minimise(&z, &free, None, End::new(8, ENDS.0))?;
+                let end = End { gain: ROUGH, ..End::new(8, ENDS.0) };
+                let minimum = self.minimise(&z, &free, None, end)?;
+                let cost = minimum.point.cost;
+                match before.get(k) {
+                    Some(best) if part > ASTRAY.0 && cost > ASTRAY.1 * best => {
+                        bail!("it leads nowhere")
+                    }
+                    Some(_) => {}
+                    None => course.push(cost),
+                }
                 z.clone_from(&minimum.point.z);
                 found = Some(minimum);
             }
@@ -356,7 +423,8 @@ impl Fit<'_> {
             for inflation in INFLATIONS {
                 self.inflation = inflation;
                 let sets = if inflation > 1.0 { 8 } else { 4 };
-                let searched = self.minimise(&z, &free, None, End::new(sets, ENDS.0));
+                let end = End { gain: ROUGH, ..End::new(sets, ENDS.0) };
+                let searched = self.minimise(&z, &free, None, end);
                 self.inflation = 1.0;
                 let minimum = searched?;
                 z.clone_from(&minimum.point.z);
