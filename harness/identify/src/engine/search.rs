@@ -285,6 +285,19 @@ impl Fit<'_> {
             }
             news(&News::Detail("the profile led to a lower minimum".into()));
         }
+        if minimum.decrement > ENDS.0 {
+            // sets that gain little may lead on all the same, with differences to both sides
+            self.central = true;
+            let others: Vec<bool> = match &profile {
+                Some((bent, _)) => (0..free.len()).map(|j| free[j] && j != *bent).collect(),
+                None => free.clone(),
+            };
+            let z = minimum.point.z.clone();
+            let found = self.minimise(&z, &others, None, End::new(LAST.0, ENDS.0 * 0.2))?;
+            let decrement = found.decrement;
+            minimum = Minimum { derivatives: None, free, ..found };
+            minimum.decrement = decrement;
+        }
         Ok((minimum, profile))
     }
 
