@@ -166,11 +166,6 @@ pub const FLAT_EIGENVALUE: f64 = 1e-12;
 /// A direction is resolved if its eigenvalue is this many times larger than what errors of the derivatives make of it by chance.
 pub const RESOLVED_EIGENVALUE: f64 = 4.0;
 
-// Covariance: `fit/covariance.rs`.
-// Tests: `coverage_of_a_hundred_twins_of_each_kind`, `recordings_with_the_habits_of_loggers_are_described`.
-/// Length of the windows of the sandwich, s; two times the slosh's decay.
-pub const SANDWICH_WINDOW: f64 = 50.0;
-
 // Comparison of models: `fit/evidence.rs`.
 // Tests: `a_difference_of_ten_in_the_criterion_is_a_probability_of_99_percent`, `a_downward_sweep_shows_that_slosh_rotates`.
 /// Difference below which it tells nothing (not worth more than a bare mention, ibid.).

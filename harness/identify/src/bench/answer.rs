@@ -185,6 +185,11 @@ pub fn answer(
             .flat_map(|motion| &motion.others[0])
             .fold(0.0_f64, |most, angle| most.max(angle.abs())),
     };
+    if !full.is_told() {
+        verdict.push(
+            "No interval is given: hardly any tank and hub have the slosh mode that the recordings show.".into(),
+        );
+    }
     verdict.extend(regime(&fit.model, slosh_angle));
     let columns: Vec<&Vec<f64>> = full.columns.iter().collect();
     let correlations =

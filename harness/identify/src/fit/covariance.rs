@@ -1,13 +1,7 @@
-//! Covariances of the estimates.
-//!
-//! With whitened residuals of unit variance and sensitivities J, the covariance is (JᵀJ)⁻¹: the
-//! Cramér–Rao bound of that noise. If the residual is more than noise, no such formula holds: what a
-//! model leaves out is not random. The sandwich (JᵀJ)⁻¹ (Σ s_w s_wᵀ) (JᵀJ)⁻¹, s_w the sum of the scores
-//! J_kᵀ e_k over windows of [`SANDWICH_WINDOW`], then shows at least how much the estimate would move from
-//! one part of the recording to the next.
+//! Covariances of the estimates: with whitened residuals of unit variance and sensitivities J, (JᵀJ)⁻¹, the Cramér–Rao bound.
 
 use anyhow::Result;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 use crate::fit::decomposition;
 
@@ -30,23 +24,6 @@ impl Covariance {
         let (l, condition) = directions(jacobian, names)?;
         let all_act = jacobian.column_iter().all(|column| column.norm() > 0.0);
         Ok((all_act && condition < 1e9).then(|| Covariance { x: &l * l.transpose(), condition }))
-    }
-
-    /// The sandwich for innovations that are not white; `windows` are ranges of rows.
-    pub fn sandwich(
-        &self,
-        jacobian: &DMatrix<f64>,
-        e: &[f64],
-        windows: &[(usize, usize)],
-    ) -> DMatrix<f64> {
-        let n = self.x.nrows();
-        let mut middle = DMatrix::zeros(n, n);
-        for &(from, to) in windows {
-            let e = DVector::from_column_slice(&e[from..to]);
-            let score = jacobian.rows(from, to - from).tr_mul(&e);
-            middle += &score * score.transpose();
-        }
-        &self.x * middle * &self.x
     }
 
     /// Correlations, row by row; none of what has no finite variance.
@@ -82,21 +59,6 @@ pub fn directions(jacobian: &DMatrix<f64>, names: &[String]) -> Result<(DMatrix<
     }
     l.row_iter_mut().zip(&norms).for_each(|(mut row, norm)| row /= *norm);
     Ok((l, largest / smallest))
-}
-
-/// Windows of `seconds` for [`Covariance::sandwich`], of recordings with so many rows, so many seconds apart.
-pub fn windows(
-    recordings: impl Iterator<Item = (usize, f64)>,
-    seconds: f64,
-) -> Vec<(usize, usize)> {
-    let (mut windows, mut first) = (Vec::new(), 0);
-    for (rows, step) in recordings {
-        let width = ((seconds / step) as usize).clamp(1, rows);
-        windows
-            .extend((0..rows).step_by(width).map(|k| (first + k, first + (k + width).min(rows))));
-        first += rows;
-    }
-    windows
 }
 
 /// A square matrix over the variables `places` as one over all `n`, with zeros for the others.

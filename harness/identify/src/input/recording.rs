@@ -5,7 +5,7 @@
 
 use std::borrow::Cow;
 
-use analysis::statistics::{about_mean, mean, noise_level};
+use analysis::statistics::{mean, noise_level};
 use anyhow::{Context, Result, bail, ensure};
 use files::budget;
 
@@ -219,30 +219,6 @@ impl Recording {
     /// The first rows, with the start of the whole.
     pub(crate) fn first_rows(&self, rows: usize) -> Recording {
         Recording { from_rest: self.from_rest, ..self.rows(0, rows) }
-    }
-
-    /// The part of `seconds` in which the hub moves most, after `run_in` more in which the model forgets how it began; those rows are not
-    /// fitted. `None` where that is not a small part, where the beginning counts (it is not at rest), or an encoder's angle does.
-    pub fn loudest(&self, seconds: f64, run_in: f64) -> Option<Recording> {
-        if self.duration() < 2.0 * (seconds + run_in) || !self.from_rest || self.angle.is_some() {
-            return None;
-        }
-        let rows = |time: f64| (time / self.step()) as usize;
-        let (run_in, length) = (rows(run_in), rows(seconds));
-        if length < 3 {
-            return None; // the rows are farther apart than the part is long
-        }
-        // about the mean: a gyro's bias is not motion
-        let moving = about_mean(&self.rate);
-        let power =
-            |from: usize| moving[from..from + length].iter().map(|rate| rate * rate).sum::<f64>();
-        let starts = (0..self.time.len() - length).step_by((length / 20).max(1));
-        let from = starts.max_by(|a, b| power(*a).total_cmp(&power(*b)))?;
-        let first = from.saturating_sub(run_in);
-        let part = self.rows(first, from + length);
-        let fresh = (0..part.time.len())
-            .map(|row| first + row >= from && part.fresh.as_ref().is_none_or(|fresh| fresh[row]));
-        Some(Recording { fresh: Some(fresh.collect()), from_rest: true, ..part })
     }
 
     /// Returns the usual step from row to row, s.

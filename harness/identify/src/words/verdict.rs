@@ -112,7 +112,7 @@ pub fn words(
     }
     lines.extend(combinations.iter().map(Combination::words));
     for (name, p) in parameters {
-        if !p.determined {
+        if !p.determined && !p.interval[0].is_nan() {
             let [low, high] = p.interval;
             let within = if high.is_finite() {
                 format!("from {low:.2e} to {high:.2e}")

@@ -303,7 +303,8 @@ fn impossible_intersample_behaviours_cost_few_simulations() {
     let [told, found] = [options(), of_any_torque()]
         .map(|options| identify(&fmu, &recordings, &perfect(options), &mut |_| {}).unwrap());
     let more = found.details.fit.simulations - told.details.fit.simulations;
-    assert!(more < 150.0, "{more}");
+    // two more minima, each with sets of derivatives of its own
+    assert!(more < 250.0, "{more}");
     let said = found.verdict.iter().find(|line| line.starts_with("The torque is taken")).unwrap();
     assert!(
         said.contains("smooth between rows (band-limited) changes the sum of squares by +"),
@@ -808,5 +809,55 @@ fn friction_that_drifts_is_named_as_such_or_not_at_all() {
         assert!(found.details.missing.is_empty(), "{said}");
         let cause = found.details.cause.as_ref();
         assert!(cause.is_none_or(|cause| cause.effect == "friction that drifts"), "{said}");
+    }
+}
+
+/// A bench whose actuator makes another torque of its command, or on which a torque acts that no model has: nothing that is stated as
+/// sure is wrong, and no wrong cause is named.
+#[test]
+fn of_benches_outside_the_model_nothing_wrong_is_sure() {
+    type Acts = fn(f64) -> f64;
+    type Besides = fn(f64, f64, f64) -> f64;
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let none: Besides = |_, _, _| 0.0;
+    let plants: [(&str, Acts, Besides, &[&str]); 7] = [
+        ("a dead zone", |tau| if tau.abs() < 0.01 { 0.0 } else { tau }, none, &[]),
+        ("steps of the torque", |tau| (tau / 0.02).round() * 0.02, none, &[]),
+        ("a limit of the torque", |tau| tau.clamp(-0.08, 0.08), none, &["largest torque"]),
+        ("a cable", |tau| tau, |_, angle, _| -0.03 * angle, &["turns the hub back", "the angle"]),
+        ("drag", |tau| tau, |_, _, rate| -0.05 * rate * rate.abs(), &["the rate's square"]),
+        ("a bearing that ripples", |tau| tau, |_, angle, _| 2e-3 * (40.0 * angle).sin(), &[]),
+        ("a pump nearby", |tau| tau, |t, _, _| 3e-3 * (TAU * 0.7 * t).sin(), &[]),
+    ];
+    for (name, acts, besides, causes) in plants {
+        let bench = Bench { besides, ..Bench::default() };
+        let time: Vec<f64> = (0..=7500).map(|k| 0.02 * f64::from(k)).collect();
+        let command = |t: f64| 0.1 * (TAU * (1.25 * t + 0.0075 * t * t)).sin();
+        let recorded: Vec<f64> = time.iter().map(|t| command(*t)).collect();
+        let acting: Vec<f64> = recorded.iter().map(|tau| acts(*tau)).collect();
+        let motion = bench.motion(&Drive::Lines(&time, &acting), &time);
+        let mut random = Random::new(1, 31);
+        let read = motion.rate.iter().map(|w| w + 4.066e-4 * random.normal()).collect();
+        let recording = Recording::of("bench", time, recorded, read);
+        let asked = Options { sensor_errors: true, gyro_scale: 0.01, ..options() };
+        let found = identify(&fmu, &[recording], &asked, &mut |_| {}).unwrap();
+        let said = found.verdict.join("\n");
+        println!("{name}: {:?}\n{said}", found.fits);
+        let missing = found.details.missing.iter().map(|m| m.follows.clone());
+        for cause in found.details.cause.iter().map(|c| c.effect.clone()).chain(missing) {
+            assert!(causes.iter().any(|right| cause.contains(right)), "{name}: {cause}");
+        }
+        if found.fits != Some(true) {
+            continue;
+        }
+        for (parameter, truth) in [
+            ("tank.d", bench.diameter),
+            ("tank.h", bench.height),
+            ("slosh.zeta", bench.zeta),
+            ("hub.I", bench.hub_inertia),
+        ] {
+            let p = &found.parameters[parameter];
+            assert!((p.value - truth).abs() < 5.0 * p.std, "{name}: {parameter} {p:?}");
+        }
     }
 }
