@@ -12,6 +12,7 @@ use names::hubslosh::{SloshModel, friction};
 use super::causes::{self, Cause, Missing};
 use super::combination::{self, Combination, ONE_WAY};
 use super::options::Options;
+use super::problem::LEAST_FRICTION;
 use super::system::{BenchSystem, Target};
 use crate::engine::cause::{Effect, cause, effects};
 use crate::engine::draws::Derived;
@@ -288,7 +289,10 @@ fn findings(
         let target = &system.targets[*j];
         let is_own = matches!(target, Target::Parameter(_)) && !unknown.bent;
         // friction may be 0
-        let is_zero = solution.minimum.point.z[*j] <= unknown.bounds.0 && unknown.bounds.0 == 0.0;
+        let least = LEAST_FRICTION * unknown.start;
+        let is_zero = !unknown.log
+            && solution.minimum.point.z[*j] <= unknown.bounds.0
+            && (0.0..=least).contains(&unknown.bounds.0);
         if is_own && !is_zero {
             doubts.push(format!(
                 "{} = {:.4e} is at the end of the range that the FMU allows, {} to {}",

@@ -14,6 +14,7 @@ use crate::bench::nominal::Nominal;
 use crate::bench::options::Options;
 use crate::bench::problem;
 use crate::bench::simulate::Setup;
+use crate::bench::start::PARAMETERS;
 use crate::engine::minimum::Minimum;
 use crate::engine::{Fit, Hold, Solution};
 use crate::input::recording::Recording;
@@ -287,8 +288,12 @@ pub fn cramer_rao(
     let largest = peak(&torque);
     let rate = vec![0.0; time.len()];
     let recordings = [Recording::of("plan", time, torque, rate)];
+    // what is set of the unknowns is expected, not known
+    let is_expected =
+        |name: &str| PARAMETERS.contains(&name) || name == slosh::ZETA_FROM_CORRELATION;
+    let known = settings.iter().filter(|(name, _)| !is_expected(name)).cloned();
     let options = Options {
-        settings: settings.to_vec(),
+        settings: known.collect(),
         sensor_errors,
         gyro_scale: 0.0,
         tolerances: Tolerances::NONE,
@@ -337,7 +342,22 @@ pub fn cramer_rao(
         starts: 1,
     };
     let found = solution.draw(false)?;
-    let row = |k: usize| (found.names[k].clone(), found.values[k], found.std(k));
+    let start = nominal.start;
+    let expected = [
+        start.d,
+        start.h,
+        start.zeta,
+        start.hub_inertia,
+        start.b,
+        start.c,
+        start.stribeck,
+        start.omega_s,
+    ];
+    let row = |k: usize| {
+        let name = found.names[k].clone();
+        let place = PARAMETERS.iter().position(|other| *other == name);
+        (name, place.map_or(found.values[k], |place| expected[place]), found.std(k))
+    };
     Ok((0..found.names.len()).map(row).collect())
 }
 

@@ -34,6 +34,8 @@ const DELAY: (f64, f64, f64) = (0.05, -0.2, 0.5);
 const ASYMMETRY: f64 = 0.5;
 /// Standard deviation of each of b, c and d beforehand, over its start.
 const FRICTION_WIDTH: f64 = 10.0;
+/// Least friction over its start.
+pub const LEAST_FRICTION: f64 = 1e-4;
 /// Standard deviation of ln ω_s beforehand, and how far it may be from its start.
 const SPEED: (f64, f64) = (1.5, 30.0);
 /// Rates that show a direction, over the gyro's noise.
@@ -72,7 +74,7 @@ impl List<'_> {
     }
 
     /// A parameter that may be 0, in its value.
-    fn from_zero(&self, name: &str, start: f64) -> Unknown {
+    fn nonnegative(&self, name: &str, start: f64) -> Unknown {
         let (low, high) = self.range(name);
         let bounds = (low.max(0.0), high);
         Unknown::linear(name, &self.unit(name), Role::Run(None), (start, start), bounds)
@@ -172,7 +174,9 @@ pub fn system<'a>(
         (friction::D, first.stribeck, dry),
     ] {
         if used && !is_set(name) {
-            let unknown = list.from_zero(name, start).with_prior(start, FRICTION_WIDTH * start);
+            let own = list.nonnegative(name, start).with_prior(start, FRICTION_WIDTH * start);
+            // the bristle law takes none that is 0
+            let unknown = Unknown { bounds: (LEAST_FRICTION * start, own.bounds.1), ..own };
             list.add(Target::Parameter(name.into()), unknown);
         }
     }
@@ -213,7 +217,7 @@ pub fn system<'a>(
         );
         let start = given(name).or(known(name).map(|k| k.1)).unwrap_or(1.0);
         ensure!(start > 0.0, "{name}: only positive parameters can be estimated");
-        let unknown = list.from_zero(name, start);
+        let unknown = list.nonnegative(name, start);
         list.add(Target::Parameter(name.clone()), unknown);
     }
     for (name, mean, std) in &options.known {
@@ -265,11 +269,11 @@ pub fn system<'a>(
     if options.breaking && !frozen {
         let (begins, std) = breaking::BEGINS;
         if !is_set(slosh::ZETA_BREAKING) {
-            let growth = list.from_zero(slosh::ZETA_BREAKING, 0.04).with_prior(0.04, 0.2);
+            let growth = list.nonnegative(slosh::ZETA_BREAKING, 0.04).with_prior(0.04, 0.2);
             list.add(Target::Parameter(slosh::ZETA_BREAKING.into()), growth);
         }
         if !is_set(slosh::BREAKING_STEEPNESS) {
-            let onset = list.from_zero(slosh::BREAKING_STEEPNESS, begins).with_prior(begins, std);
+            let onset = list.nonnegative(slosh::BREAKING_STEEPNESS, begins).with_prior(begins, std);
             list.add(
                 Target::Parameter(slosh::BREAKING_STEEPNESS.into()),
                 Unknown { reach: 0.1, ..onset },
@@ -418,9 +422,9 @@ pub fn effect(target: &Target, part: Part) -> Unknown {
         Target::ActuatorLag => lag("actuator_lag"),
         Target::GyroLag => lag("gyro_lag"),
         Target::FrictionDrift => {
-            Unknown::linear("friction_drift", "1", run, (0.0, 0.3), (-0.95, 5.0))
+            Unknown::linear("friction_drift", "1", run, (0.0, 0.1), (-0.95, 5.0))
         }
-        Target::Limit => Unknown::linear("limit", "1", run, (0.0, 0.2), (0.0, 0.7)),
+        Target::Limit => Unknown::linear("limit", "1", run, (0.0, 0.1), (0.0, 0.7)),
         Target::Compliance => {
             Unknown::linear("compliance", "rad/(N.m)", run, (0.0, 1e-2), (0.0, 10.0))
         }
@@ -428,7 +432,7 @@ pub fn effect(target: &Target, part: Part) -> Unknown {
         Target::Besides(kind) => {
             let Some(one) = BESIDES.get(*kind) else { return lag("lag") };
             let free = (f64::NEG_INFINITY, f64::INFINITY);
-            Unknown::linear(one.follows, one.unit, run, (0.0, 1e-2), free)
+            Unknown::linear(one.follows, one.unit, run, (0.0, 1e-4), free)
         }
         _ => Unknown::linear("effect", "1", run, (0.0, 1.0), (0.0, 1.0)),
     };
@@ -457,11 +461,11 @@ fn candidates(list: &mut List, options: &Options, frozen: bool, law: &str) {
     if !frozen && !is_set(slosh::MODES) {
         add(list, Target::SecondMode);
     }
-    let parameters = [(hub::K, 0.02, true), (slosh::ZETA_AMPLITUDE, 0.02, !frozen)];
+    let parameters = [(hub::K, 0.02, true), (slosh::ZETA_AMPLITUDE, 0.005, !frozen)];
     for (name, reach, used) in parameters {
         let target = Target::Parameter(name.into());
         if used && !is_set(name) && !list.targets.contains(&target) {
-            let unknown = list.from_zero(name, 0.0);
+            let unknown = list.nonnegative(name, 0.0);
             list.add(target, Unknown { part: Part::Candidate, reach, ..unknown });
         }
     }

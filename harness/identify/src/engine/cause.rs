@@ -23,8 +23,6 @@ use crate::news::News;
 
 /// Candidates that are fitted.
 const FITTED: usize = 3;
-/// Part of a candidate's reach by which the answer is differenced.
-const STEP: f64 = 1e-2;
 /// Part of a candidate's change that the unknowns must leave for it to be seen: theirs are differences, good to a thousandth.
 const SEEN: f64 = 1e-2;
 
@@ -80,7 +78,8 @@ pub fn effects(solution: &Solution, news: &mut dyn FnMut(&News)) -> Result<Vec<E
     let rest = |v: &DVector<f64>| v - &jacobian * (&covariance * jacobian.tr_mul(v));
     let one = |&unknown: &usize| -> Option<Score> {
         let mut z = base.point.z.clone();
-        let step = STEP * problem.unknowns[unknown].reach;
+        // a plausible size: the first order of a lag is a delay, that of a limit is nothing
+        let step = problem.unknowns[unknown].reach;
         z[unknown] += step;
         let there = fit.at(&z).ok()?;
         let change = (there.e - &base.point.e) / step;
@@ -90,9 +89,7 @@ pub fn effects(solution: &Solution, news: &mut dyn FnMut(&News)) -> Result<Vec<E
             return None;
         }
         let score = -seen.dot(&base.point.e) / norm;
-        let (low, high) = fit.ends[unknown];
-        let is_possible = score > 0.0 && high > 0.0 || score < 0.0 && low < 0.0;
-        is_possible.then_some(Score { unknown, size: score / norm, std: 1.0 / norm, score })
+        Some(Score { unknown, size: score / norm, std: 1.0 / norm, score })
     };
     let mut scores: Vec<Score> = candidates.par_iter().filter_map(one).collect();
     scores.sort_by(|a, b| b.score.abs().total_cmp(&a.score.abs()));
@@ -117,7 +114,11 @@ pub fn effects(solution: &Solution, news: &mut dyn FnMut(&News)) -> Result<Vec<E
         let mut free = fit.free.clone();
         free[j] = true;
         let mut z = base.point.z.clone();
-        z[j] = score.size.clamp(fit.ends[j].0, fit.ends[j].1);
+        let reach = problem.unknowns[j].reach;
+        let size = score.size.abs().max(0.3 * reach);
+        // far from its minimum an effect that has one sign may seem to have the other
+        let size = if fit.ends[j].0 < 0.0 { size.copysign(score.size) } else { size };
+        z[j] = size.clamp(fit.ends[j].0, fit.ends[j].1);
         let Ok(first) = fit.minimise(&z, &free, None, End::new(8, ENDS.0)) else { continue };
         fit.renew_noise(&first.point);
         let z = first.point.z.clone();

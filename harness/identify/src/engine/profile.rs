@@ -22,6 +22,9 @@ const MOST: usize = 14;
 /// Fall of the sum of squares that makes another minimum.
 pub const LOWER: f64 = 0.5;
 
+/// An unknown, and the points of its profile in the order of the coordinate.
+pub type Profile = (usize, Vec<Point>);
+
 /// A point of a profile.
 #[derive(Clone, Debug)]
 pub struct Point {
@@ -37,7 +40,7 @@ impl Fit<'_> {
     ///
     /// # Errors
     /// If the system refuses the minimum.
-    pub fn profile(&mut self, minimum: &mut Minimum) -> Result<Option<(usize, Vec<Point>)>> {
+    pub fn profile(&mut self, minimum: &mut Minimum) -> Result<Option<Profile>> {
         let unknowns = &self.problem.unknowns;
         self.central = false;
         let bent = unknowns.iter().zip(&self.free).position(|(u, free)| u.bent && *free);

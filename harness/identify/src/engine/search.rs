@@ -8,7 +8,7 @@ use anyhow::{Context, Result, bail};
 use super::hold::Rival;
 use super::minimum::{Curvature, End, Minimum, places};
 use super::problem::{Part, Problem, Role, Signal};
-use super::profile::{self, LOWER};
+use super::profile::{LOWER, Profile};
 use super::{ENDS, Fit, INFLATIONS};
 use crate::news::News;
 
@@ -47,7 +47,7 @@ pub struct Solution<'p> {
     /// The minimum.
     pub minimum: Minimum,
     /// The unknown along which the likelihood is no parabola, and its profile.
-    pub profile: Option<(usize, Vec<profile::Point>)>,
+    pub profile: Option<Profile>,
     /// Other behaviours between rows.
     pub rivals: Vec<Rival>,
     /// Tests of each signal's residual.
@@ -95,7 +95,7 @@ pub fn solve<'p>(
         }
         tried += 1;
         let z = fit.coordinates(&starts[number]);
-        let found = match fit.from_start(&z, grows, &mut course) {
+        let found = match fit.search_from(&z, grows, &mut course) {
             Ok(found) => found,
             Err(refused) => {
                 error = error.or(Some(refused));
@@ -247,7 +247,7 @@ impl Fit<'_> {
         &mut self,
         mut minimum: Minimum,
         news: &mut dyn FnMut(&News),
-    ) -> Result<(Minimum, Option<(usize, Vec<profile::Point>)>)> {
+    ) -> Result<(Minimum, Option<Profile>)> {
         let free = self.free.clone();
         let (mut once, mut profile) = (false, None);
         for _ in 0..ROUNDS {
@@ -404,7 +404,7 @@ impl Fit<'_> {
     }
 
     /// The minimum from a start, on the whole recordings with noise that counts less and less, or over beginnings that grow.
-    fn from_start(&mut self, z: &[f64], grows: bool, course: &mut Vec<f64>) -> Result<Minimum> {
+    fn search_from(&mut self, z: &[f64], grows: bool, course: &mut Vec<f64>) -> Result<Minimum> {
         let first = |fit: &Self| -> Vec<Noise> {
             fit.problem.signals.iter().map(Signal::first_noise).collect()
         };
