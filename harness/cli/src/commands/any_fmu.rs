@@ -166,7 +166,7 @@ impl AnyFmuArgs {
             free: read(&self.free, &mut problems),
             priors: read(&self.prior, &mut problems),
             tolerances: read(&self.tolerances, &mut problems),
-            settings: parsed(told.texts().iter().map(|text| text.parse()), &mut problems),
+            settings: parsed(request.texts().iter().map(|text| text.parse()), &mut problems),
             held: inputs.into_iter().filter(|(_, held)| *held).map(|(name, _)| name).collect(),
             inputs: driven,
             outputs: names(&self.outputs),

@@ -365,7 +365,7 @@ impl FmuArgs {
         let DataArgs { data, .. } = &self.data;
         let (columns, rate) = self.data.columns()?;
         let (settings, fmu) = (&self.settings, &self.fmu);
-        let told = Told { data, settings, columns: &columns, rate, fmu, json: false };
+        let told = Request { data, settings, columns: &columns, rate, fmu, json: false };
         self.any.identify(&told, &self.points, &self.data.outputs())
     }
 }

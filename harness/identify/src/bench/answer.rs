@@ -398,7 +398,7 @@ fn shares<'a>(
 /// of an upright cylinder.
 fn regime(model: &str, angle: f64) -> Option<String> {
     let wave = 2.0 * angle / (XI[0] * XI[0] - 1.0);
-    let (is, advice) = match Regime::of(wave) {
+    let (is, advice) = match Regime::from_ratio(wave) {
         Regime::Nonlinear => ("nonlinear", "less torque is better known"),
         Regime::Transitional if model == SloshModel::Linear.name() => {
             ("between linear and nonlinear", "--model planar,spherical tells whether that matters")

@@ -231,9 +231,9 @@ impl System for BenchSystem<'_> {
             let second = of(&Target::SecondMode).unwrap_or(0.0);
             let zeta = of(&Target::Zeta).unwrap_or(0.0);
             set(slosh::SOURCE, SloshSource::Table.name());
-            reals.push((slosh::table::LENGTH.at([1]), length));
-            reals.push((slosh::table::MASS.at([1]), mass));
-            reals.push((slosh::table::ZETA.at([1]), zeta));
+            reals.push((slosh::table::LENGTH.element([1]), length));
+            reals.push((slosh::table::MASS.element([1]), mass));
+            reals.push((slosh::table::ZETA.element([1]), zeta));
             reals.push((hub::I.into(), inertia));
             reals.push((tank::D.into(), diameter(length, mass, bench)));
             let mut liquid = mass;
@@ -241,9 +241,9 @@ impl System for BenchSystem<'_> {
                 // of a deep cylinder the second mode's mass is 3 % of the first's
                 let other = second * 0.03 * mass;
                 set(slosh::MODES, "2");
-                reals.push((slosh::table::LENGTH.at([2]), length * XI[0] / XI[1]));
-                reals.push((slosh::table::MASS.at([2]), other));
-                reals.push((slosh::table::ZETA.at([2]), zeta));
+                reals.push((slosh::table::LENGTH.element([2]), length * XI[0] / XI[1]));
+                reals.push((slosh::table::MASS.element([2]), other));
+                reals.push((slosh::table::ZETA.element([2]), zeta));
                 liquid += other;
             }
             reals.push((slosh::table::M_LIQ.into(), liquid));

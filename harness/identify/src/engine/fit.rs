@@ -330,7 +330,7 @@ impl<'p> Fit<'p> {
             let inputs: Vec<Vec<f64>> =
                 recording.inputs.iter().map(|input| signal.picked(input)).collect();
             let inputs: Vec<&[f64]> = inputs.iter().map(Vec::as_slice).collect();
-            Tests::of(&signal.picked(&recording.time), &inputs, &signal.picked(e), noise.white)
+            Tests::run(&signal.picked(&recording.time), &inputs, &signal.picked(e), noise.white)
         };
         all.map(one).collect()
     }
