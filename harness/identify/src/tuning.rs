@@ -139,7 +139,7 @@ pub const SLOPE_PROBES: [f64; 3] = [1e-2, 1e-3, 1e-4];
 pub const FINEST_TOLERANCE: f64 = 1e-13;
 
 // Effects outside the FMU: `bench/effect.rs`.
-// Tests: `lags_of_a_sine_are_those_of_its_frequency_response`.
+// Tests: `lags_of_a_sine_equal_those_of_its_frequency_response`.
 /// Fewest and most parts of the way from knot to knot: lines between points of a lagged torque act as the curve does to 1e-3 at 2.4 Hz
 /// and 50 knots a second.
 pub const LAG_PARTS: (f64, f64) = (3.0, 8.0);
@@ -247,14 +247,14 @@ pub const OUTPUT_ROUNDING: f64 = 1e-12;
 pub const DIRECTION_PART: f64 = 1e-2;
 
 // Sources of uncertainty: `bench/sources.rs`.
-// Tests: `a_push_and_a_free_decay_do_not_determine_the_preferential_direction`, `a_hub_turns_one_way_if_nearly_all_of_its_path_does`, `a_hub_that_turns_both_ways_is_not_taken_for_one_that_turns_one_way`, `parameters_come_back_and_coulomb_and_stribeck_friction_as_their_sum`.
+// Tests: `a_push_and_a_free_decay_do_not_determine_the_preferential_direction`, `a_hub_turns_one_way_if_nearly_all_of_its_path_does`, `a_hub_that_turns_both_ways_is_not_taken_for_one_that_turns_one_way`, `identify_finds_all_parameters_and_the_sum_of_coulomb_and_stribeck_friction`.
 /// Standard deviation of the friction's asymmetry above which the recordings do not show it.
 pub const ONE_WAY: f64 = 0.3;
 /// Part of a hub's path against its main direction above which it turns both ways.
 pub const BOTH_WAYS: f64 = 0.1;
 
 // Design of experiments: `bench/design.rs`.
-// Tests: `d_optimal_power_stands_around_the_slosh_and_tells_more`, `a_multisine_has_odd_lines_alone_and_its_peak`.
+// Tests: `d_optimal_power_is_near_the_slosh_frequency_and_reduces_uncertainty`, `a_multisine_has_only_odd_lines_and_the_given_peak`.
 /// Odd lines in a group, of which one is left out.
 pub const LINE_GROUP: usize = 4;
 /// Share of the power that is always spread over all lines. It excites the resonance of a slightly different plant, and shows
