@@ -327,8 +327,8 @@ impl Bob {
     }
 
     fn state<T: Number>(&self) -> [Vec3<T>; 3] {
-        let of = |a: &Vector| [0, 1, 2].map(|i| T::with_slope(a[0][i], a[1][i]));
-        [of(&self.p), of(&self.p_d), of(&self.specific_force)]
+        let number = |a: &Vector| [0, 1, 2].map(|i| T::with_slope(a[0][i], a[1][i]));
+        [number(&self.p), number(&self.p_d), number(&self.specific_force)]
     }
 
     /// Returns the force on the craft and its torque about O, body axes.

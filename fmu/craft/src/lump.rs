@@ -965,23 +965,23 @@ mod tests {
     /// The series are t - 1/4, 1/4 - t, t - 1/4 from far below, and one that only touches zero.
     #[test]
     fn a_series_rises_where_it_passes_zero_from_below() {
-        let of = |terms: &[f64]| {
+        let series = |terms: &[f64]| {
             let mut series = ZERO;
             series[..terms.len()].copy_from_slice(terms);
             series
         };
         let close = |found: Option<f64>, t: f64| assert!((found.unwrap() - t).abs() < 1e-12);
-        close(rise(&of(&[-0.25, 1.0]), 2, 1.0), 0.25);
-        close(rise(&of(&[-0.25, 0.0, 1.0]), 3, 1.0), 0.5);
-        close(rise(&of(&[-2.5e9, 1e10]), 2, 1.0), 0.25);
-        assert_eq!(rise(&of(&[-0.25, 1.0]), 2, 0.2), None);
+        close(rise(&series(&[-0.25, 1.0]), 2, 1.0), 0.25);
+        close(rise(&series(&[-0.25, 0.0, 1.0]), 3, 1.0), 0.5);
+        close(rise(&series(&[-2.5e9, 1e10]), 2, 1.0), 0.25);
+        assert_eq!(rise(&series(&[-0.25, 1.0]), 2, 0.2), None);
         // coefficients from n on do not belong to the series
-        assert_eq!(rise(&of(&[-0.25, 0.0, 1.0]), 2, 1.0), None);
+        assert_eq!(rise(&series(&[-0.25, 0.0, 1.0]), 2, 1.0), None);
         for falling in [[0.25, -1.0], [0.25, 1.0], [-0.25, -1.0], [-1e-12, 1.0]] {
-            assert_eq!(rise(&of(&falling), 2, 1.0), None, "{falling:?}");
+            assert_eq!(rise(&series(&falling), 2, 1.0), None, "{falling:?}");
         }
         // a host at an event: value above zero or not
-        assert_eq!([1e-9, -1e-9].map(|a| rise(&of(&[a, 1.0]), 2, 0.0)), [Some(0.0), None]);
+        assert_eq!([1e-9, -1e-9].map(|a| rise(&series(&[a, 1.0]), 2, 0.0)), [Some(0.0), None]);
     }
 
     /// Returns detached liquid of the default tank at the bottom, in a surface 2 m high and 2 m wide.

@@ -198,15 +198,15 @@ pub(crate) struct Now<T> {
 impl CraftMotion {
     /// Returns the craft at an instant from coefficients 0 and 1 of the motion.
     pub fn now<T: Number>(&self) -> Now<T> {
-        let of = |a: &[Vec3]| -> Vec3<T> { [0, 1, 2].map(|i| T::with_slope(a[0][i], a[1][i])) };
-        let (a, w, w_d) = (of(&self.a), of(&self.w), of(&self.w_d));
+        let number = |a: &[Vec3]| -> Vec3<T> { [0, 1, 2].map(|i| T::with_slope(a[0][i], a[1][i])) };
+        let (a, w, w_d) = (number(&self.a), number(&self.w), number(&self.w_d));
         let [q, dq] = [self.q.get(0), self.q.get(1)];
         let mut instant = Now {
             a,
             w,
             w_d,
-            velocity: of(&self.drift),
-            h_wheels: of(&self.h),
+            velocity: number(&self.drift),
+            h_wheels: number(&self.h),
             axes: rotation(&[0, 1, 2, 3].map(|i| T::with_slope(q[i], dq[i]))),
             mount: self.mount,
             pivot: self.pivot,

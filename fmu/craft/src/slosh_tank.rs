@@ -616,8 +616,8 @@ impl TankMotion {
     }
 
     fn parts<T: Number>(&self) -> Parts<T> {
-        let of = |a: &[Vec3]| -> Vec3<T> { [0, 1, 2].map(|i| T::with_slope(a[0][i], a[1][i])) };
-        let (a, w, w_d) = (of(&self.a), of(&self.w), of(&self.w_d));
+        let number = |a: &[Vec3]| -> Vec3<T> { [0, 1, 2].map(|i| T::with_slope(a[0][i], a[1][i])) };
+        let (a, w, w_d) = (number(&self.a), number(&self.w), number(&self.w_d));
         let zero = constant::<T>([0.0; 3]);
         let lump = self.ball.as_ref().map(|ball| &ball.lump).filter(|lump| lump.is_loose());
         let rigid = lump.map_or_else(

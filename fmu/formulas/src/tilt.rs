@@ -198,7 +198,7 @@ mod tests {
                 integral(&|r| r * r * u(r) * d(r)),
                 integral(&|r| r * u(r) * u(r)),
             );
-            let of = |m: i32, zeros: &[f64], both: f64, side: f64| {
+            let sum_over_modes = |m: i32, zeros: &[f64], both: f64, side: f64| {
                 let one = |b: f64| {
                     let v = |r: f64| libm::jn(m, b * r);
                     let x = both * integral(&|r| r * r * u(r) * v(r));
@@ -210,8 +210,8 @@ mod tests {
                 };
                 zeros.iter().map(|b| one(*b)).sum::<f64>()
             };
-            let s_0 = of(0, &XI_0, 1.0, 1.0) + of(0, &[0.0], 1.0, 1.0);
-            let s_2 = of(2, &XI_2, 0.5, -1.0);
+            let s_0 = sum_over_modes(0, &XI_0, 1.0, 1.0) + sum_over_modes(0, &[0.0], 1.0, 1.0);
+            let s_2 = sum_over_modes(2, &XI_2, 0.5, -1.0);
             let diagonal = |x: f64, y: f64| f * ((a * a - f * f) * x - 2.0 * y) / norm;
             let along = diagonal(0.75 * u2, 0.75 * ud + 0.25 * uu) + s_0 + s_2;
             let across = diagonal(0.25 * u2, 0.25 * (ud - uu)) + s_2;

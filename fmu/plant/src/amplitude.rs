@@ -136,8 +136,8 @@ impl Growth {
     /// Returns the time, s, over which the series converge, from coefficients 0 to 2. Singularities are at u
     /// = 0, W = 0 and y = +-i delta W^(1/2).
     pub fn convergence_radius(&self) -> f64 {
-        let of = |distance: f64, x: &Series| time_within(distance, x[1].abs(), x[2].abs());
-        let time = of(self.u[0], &self.u);
+        let time_near = |distance: f64, x: &Series| time_within(distance, x[1].abs(), x[2].abs());
+        let time = time_near(self.u[0], &self.u);
         if self.breaking.zeta == 0.0 {
             return time;
         }

@@ -149,8 +149,8 @@ impl Noise {
 
     /// Returns the Allan variance at averaging time `tau` (s), (rad/s)².
     pub fn variance(&self, tau: f64) -> f64 {
-        let of = |term: Term| self.coefficient(term) * term.variance(tau, self.bias_time);
-        self.terms().into_iter().map(of).sum()
+        let part = |term: Term| self.coefficient(term) * term.variance(tau, self.bias_time);
+        self.terms().into_iter().map(part).sum()
     }
 }
 

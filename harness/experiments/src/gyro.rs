@@ -158,14 +158,15 @@ impl Characteristics {
 
     /// Returns the specified parameters with their names, and their estimates where the noise has that term.
     fn quantities(&self) -> [(&'static str, f64, Option<Estimate>); 5] {
-        let of = |term| self.fit.terms.iter().find(|(t, _)| *t == term).map(|(_, found)| *found);
+        let estimate =
+            |term| self.fit.terms.iter().find(|(t, _)| *t == term).map(|(_, found)| *found);
         let Noise { arw, bias_instability, bias_time, flicker, rrw, .. } = self.specified;
         [
-            ("N, rad/s/sqrt(Hz)", arw, of(Term::White)),
-            ("B, rad/s", bias_instability, of(Term::Markov)),
+            ("N, rad/s/sqrt(Hz)", arw, estimate(Term::White)),
+            ("B, rad/s", bias_instability, estimate(Term::Markov)),
             ("imu.bias_time, s", bias_time, self.fit.bias_time),
-            ("B of flicker, rad/s", flicker, of(Term::Flicker)),
-            ("K, rad/s/sqrt(s)", rrw, of(Term::Walk)),
+            ("B of flicker, rad/s", flicker, estimate(Term::Flicker)),
+            ("K, rad/s/sqrt(s)", rrw, estimate(Term::Walk)),
         ]
     }
 
@@ -207,8 +208,8 @@ impl Characteristics {
 
     /// Returns the Allan deviations of the records, of the specified and of the fitted noise.
     pub fn table(&self) -> Table {
-        let deviation = |of: &dyn Fn(&Point) -> f64| -> Vec<f64> {
-            self.points.iter().map(|point| of(point).sqrt()).collect()
+        let deviation = |variance: &dyn Fn(&Point) -> f64| -> Vec<f64> {
+            self.points.iter().map(|point| variance(point).sqrt()).collect()
         };
         let columns = vec![
             self.points.iter().map(|point| point.tau).collect(),

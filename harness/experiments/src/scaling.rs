@@ -194,9 +194,9 @@ pub fn froude(lambda: f64, density: f64, gravity: f64) -> Result<Found> {
     );
     let mut text = String::from("full size = factor x model\n");
     let (viscosity, tension) = (froude_viscosity(lambda, gravity), lambda * lambda * gravity);
-    let of = factors.iter().map(|(name, _, factor)| (name.to_string(), json!(factor)));
+    let named = factors.iter().map(|(name, _, factor)| (name.to_string(), json!(factor)));
     let json = json!({
-        "factors": of.collect::<serde_json::Map<_, _>>(),
+        "factors": named.collect::<serde_json::Map<_, _>>(),
         "viscosity_for_reynolds": viscosity,
         "tension_over_density_for_bond": tension,
     });
@@ -345,16 +345,16 @@ mod tests {
     fn froude_factors_equal_those_of_table_2_3_and_keep_the_froude_number() {
         let (lambda, density) = (4.0, 1.2);
         let factors = froude(lambda, density, 1.0);
-        let of = |name: &str| factors.iter().find(|f| f.0 == name).expect(name).2;
-        assert_eq!(of("time"), 2.0);
-        assert_eq!(of("acceleration"), 1.0);
-        assert_eq!(of("mass"), 64.0 * density);
-        assert_eq!(of("force"), 64.0 * density);
-        assert_eq!(of("moment"), 256.0 * density);
-        assert_eq!(of("pressure"), 4.0 * density);
-        let froude = of("velocity").powi(2) / (of("acceleration") * of("length"));
+        let factor = |name: &str| factors.iter().find(|f| f.0 == name).expect(name).2;
+        assert_eq!(factor("time"), 2.0);
+        assert_eq!(factor("acceleration"), 1.0);
+        assert_eq!(factor("mass"), 64.0 * density);
+        assert_eq!(factor("force"), 64.0 * density);
+        assert_eq!(factor("moment"), 256.0 * density);
+        assert_eq!(factor("pressure"), 4.0 * density);
+        let froude = factor("velocity").powi(2) / (factor("acceleration") * factor("length"));
         assert_eq!(froude, 1.0);
-        assert_eq!(of("length") / of("time"), of("velocity"));
+        assert_eq!(factor("length") / factor("time"), factor("velocity"));
     }
 
     #[test]

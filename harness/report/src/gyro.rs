@@ -9,8 +9,8 @@ use crate::page::{document, render_chart, table};
 use crate::svg::{Axis, Chart, Series, Style};
 
 pub fn allan_deviations(gyro: &Characteristics) -> String {
-    let curve = |of: &dyn Fn(&Point) -> f64| -> Vec<(f64, f64)> {
-        gyro.points.iter().map(|point| (point.tau, of(point).sqrt())).collect()
+    let curve = |variance: &dyn Fn(&Point) -> f64| -> Vec<(f64, f64)> {
+        gyro.points.iter().map(|point| (point.tau, variance(point).sqrt())).collect()
     };
     let series = |points, color: &str, style, title: &str| Series {
         points,
@@ -72,8 +72,8 @@ pub fn rest_charts(rest: &Rest) -> [(&'static str, Chart); 6] {
     };
     // The frame around the range that noise allows.
     let around = |to: f64, y: f64| vec![(0.0, y), (to, y), (to, -y), (0.0, -y)];
-    let deviation = |of: &dyn Fn(&Point) -> f64| -> Vec<(f64, f64)> {
-        rest.allan.iter().map(|point| (point.tau, of(point).sqrt())).collect()
+    let deviation = |variance: &dyn Fn(&Point) -> f64| -> Vec<(f64, f64)> {
+        rest.allan.iter().map(|point| (point.tau, variance(point).sqrt())).collect()
     };
     let measured = deviation(&|point| point.variance);
     let mut allan = vec![series(measured.clone(), MEASURED, Style::Dots, "recorded")];
@@ -157,11 +157,11 @@ pub fn rest_charts(rest: &Rest) -> [(&'static str, Chart); 6] {
         ],
         true,
     );
-    let of = |value: &dyn Fn(&Chunk) -> f64| -> Vec<(f64, f64)> {
+    let curve = |value: &dyn Fn(&Chunk) -> f64| -> Vec<(f64, f64)> {
         rest.chunks.iter().map(|chunk| (minutes(chunk.from), value(chunk))).collect()
     };
     let limit = vec![(0.0, KOLMOGOROV), (end, KOLMOGOROV)];
-    let read = of(&|chunk| chunk.kolmogorov);
+    let read = curve(&|chunk| chunk.kolmogorov);
     let kolmogorov = chart(
         "Kolmogorov and Smirnov's distance of the chunks from the normal distribution",
         Axis::linear("time / min", [0.0, end], 0.0, 8),
@@ -169,7 +169,7 @@ pub fn rest_charts(rest: &Rest) -> [(&'static str, Chart); 6] {
         vec![
             series(read.clone(), MEASURED, Style::Dots, "of the readings"),
             series(
-                of(&|chunk| chunk.between_levels),
+                curve(&|chunk| chunk.between_levels),
                 FITTED,
                 Style::Dots,
                 "between the levels of the readings",

@@ -640,12 +640,14 @@ mod tests {
             // potentials and their derivatives by r and z over the radius, each for its azimuthal number
             let at = |rho: f64, z: f64| -> Vec<[f64; 3]> {
                 let point = [[rho * wall_at(z), z - liquid.centre]];
-                let of = |m: usize, c: DVector<f64>| {
+                let field = |m: usize, c: DVector<f64>| {
                     let fields = Fields::new(m, degree, liquid.size, &point);
                     [&fields.u, &fields.r, &fields.z].map(|field| (field * &c)[0])
                 };
-                let mut all = vec![of(1, &u.e * &c)];
-                all.extend(second.iter().map(|(shape, e, _, second)| of(shape.m, e * &second.d)));
+                let mut all = vec![field(1, &u.e * &c)];
+                all.extend(
+                    second.iter().map(|(shape, e, _, second)| field(shape.m, e * &second.d)),
+                );
                 all
             };
             let rule = Gauss::new(4);

@@ -22,11 +22,11 @@ pub(crate) struct AtFill<'a> {
 
 impl<'a> AtFill<'a> {
     pub fn from_rows(rows: &[ModalData], sets: &'a [ParameterSet]) -> Vec<AtFill<'a>> {
-        let of = |(row, set): (&ModalData, &'a ParameterSet)| {
+        let at_fill = |(row, set): (&ModalData, &'a ParameterSet)| {
             let (fill, liquid) = (row.fill, row.m_liq);
             AtFill { fill, liquid, set }
         };
-        rows.iter().zip(sets).map(of).collect()
+        rows.iter().zip(sets).map(at_fill).collect()
     }
 
     fn coefficients(&self, n: usize) -> Option<Coefficients> {
@@ -55,8 +55,8 @@ fn coefficients(known: &Coefficients) -> [f64; 2] {
     [known.nonlinear_inertia, known.nonlinear_stiffness]
 }
 
-fn fills(of: &[&AtFill]) -> String {
-    let all: Vec<String> = of.iter().map(|at| short(at.fill)).collect();
+fn fills(rows: &[&AtFill]) -> String {
+    let all: Vec<String> = rows.iter().map(|at| short(at.fill)).collect();
     all.join(", ")
 }
 

@@ -53,7 +53,7 @@ struct Curves {
 
 impl Curves {
     fn new(rows: &[ModalData], modes: usize) -> Curves {
-        let of = |n: usize| {
+        let curves = |n: usize| {
             [
                 rows.iter().map(|row| 1.0 / row.modes[n].l).collect(),
                 rows.iter().map(|row| bob(row, n)).collect(),
@@ -64,7 +64,7 @@ impl Curves {
             |row: &ModalData| row.r_surface.or(row.length_x.map(|l| l / 2.0)).unwrap_or(1.0);
         Curves {
             liquid: rows.iter().map(|row| row.m_liq).collect(),
-            modes: (0..modes).map(of).collect(),
+            modes: (0..modes).map(curves).collect(),
             radius: rows.iter().map(radius).fold(0.0, f64::max),
         }
     }
@@ -93,11 +93,11 @@ impl Curves {
     /// modes, weighted by their share of its mass.
     fn cost(&self, points: &[usize]) -> f64 {
         let heaviest = |n: usize| self.modes[n][2].iter().copied().fold(0.0, f64::max);
-        let of = |n: usize| {
+        let weighted = |n: usize| {
             let largest = self.errors(n, points).into_iter().fold(0.0, f64::max);
             largest * (heaviest(n) / heaviest(0)).min(1.0)
         };
-        (0..self.modes.len()).map(of).fold(0.0, f64::max)
+        (0..self.modes.len()).map(weighted).fold(0.0, f64::max)
     }
 }
 
@@ -159,14 +159,14 @@ pub fn place(tank: &Tank, low: f64, high: f64, modes: usize) -> Result<Placed, P
             step /= 2;
         }
     }
-    let of = |places: &[usize]| places.iter().map(|i| dense[*i].clone()).collect();
+    let solved = |places: &[usize]| places.iter().map(|i| dense[*i].clone()).collect();
     let middles: Vec<usize> = points
         .windows(2)
         .filter(|pair| pair[1] > pair[0] + 1)
         .map(|pair| (pair[0] + pair[1]) / 2)
         .collect();
-    let between = Between { error: curves.errors(0, &points), rows: of(&middles) };
-    Ok(Placed { sweep: Sweep { rows: of(&points) }, between })
+    let between = Between { error: curves.errors(0, &points), rows: solved(&middles) };
+    Ok(Placed { sweep: Sweep { rows: solved(&points) }, between })
 }
 
 /// Returns the parameters of a tank that can drain: those at its largest fill, where it starts, and its

@@ -123,7 +123,7 @@ mod tests {
             let Curve::Cubic { c } = &segment.curve else { panic!("{:?}", segment.curve) };
             let h = norm(sub(p[1], p[0]));
             let at = |t: f64| {
-                let of = |i: usize| {
+                let coordinate = |i: usize| {
                     [
                         c[0][i] + t * (c[1][i] + t * (c[2][i] + t * c[3][i])),
                         (c[1][i] + t * (2.0 * c[2][i] + t * 3.0 * c[3][i])) / h,
@@ -131,7 +131,7 @@ mod tests {
                         6.0 * c[3][i] / (h * h * h),
                     ]
                 };
-                let (r, z) = (of(0), of(1));
+                let (r, z) = (coordinate(0), coordinate(1));
                 [0, 1, 2, 3].map(|n| [r[n], z[n]])
             };
             [at(0.0), at(1.0)]

@@ -98,17 +98,17 @@ impl Sweep {
             let mut cells: Vec<String> = values.iter().map(|v| v.to_string()).collect();
             for n in 0..modes {
                 let mode = row.modes.get(n);
-                let of = |f: &dyn Fn(&Mode) -> Option<f64>| {
+                let column = |f: &dyn Fn(&Mode) -> Option<f64>| {
                     mode.and_then(f).map_or(String::new(), |v| v.to_string())
                 };
                 cells.extend([
-                    of(&|m| Some(m.lambda)),
-                    of(&|m| Some(m.m)),
-                    of(&|m| Some(m.l)),
-                    of(&|m| m.height),
-                    of(&|m| m.hinge),
-                    of(&|m| Some(m.wave)),
-                    of(&|m| Some(m.beta)),
+                    column(&|m| Some(m.lambda)),
+                    column(&|m| Some(m.m)),
+                    column(&|m| Some(m.l)),
+                    column(&|m| m.height),
+                    column(&|m| m.hinge),
+                    column(&|m| Some(m.wave)),
+                    column(&|m| Some(m.beta)),
                 ]);
                 if is_damped {
                     let found = row.damping.as_ref().and_then(|damping| damping.modes.get(n));
@@ -187,15 +187,15 @@ impl Depletion {
         };
         let modes = rows.iter().map(|r| r.modes.len()).min().unwrap_or(0);
         let mode = |n: usize| {
-            let of = |f: fn(&Mode) -> f64| table(&move |r: &ModalData| f(&r.modes[n]));
+            let mode_table = |f: fn(&Mode) -> f64| table(&move |r: &ModalData| f(&r.modes[n]));
             let over = |f: fn(&Mode) -> f64| table(&move |r: &ModalData| f(&r.modes[n]) / r.m_liq);
             ModeTable([
-                of(|m| m.l),
+                mode_table(|m| m.l),
                 over(|m| m.m),
                 over(|m| m.m_h),
                 over(|m| m.m_h2),
-                of(|m| m.wave),
-                of(|m| m.beta),
+                mode_table(|m| m.wave),
+                mode_table(|m| m.beta),
             ])
         };
         Ok(Depletion {

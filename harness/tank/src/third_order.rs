@@ -263,12 +263,12 @@ impl Overlaps {
     /// largest elevation there. It adds to the crest and subtracts from the trough.
     pub fn second_wave(&self, depth: f64) -> f64 {
         let [_, _, b] = self.wave(depth);
-        let of = |mode: &Excited| {
+        let elevation = |mode: &Excited| {
             let Response { elevated, matrix, vector, .. } = self.response(mode, depth, 0.0);
             let mean = -b * b * elevated / 4.0;
             mode.at_wall * (mean - (inverse(matrix) * vector)[0])
         };
-        self.amplitude * self.amplitude * self.excited.iter().map(of).sum::<f64>()
+        self.amplitude * self.amplitude * self.excited.iter().map(elevation).sum::<f64>()
     }
 
     /// Returns T, omega and the first-order amplitude b of the potential per elevation, with g = 1.

@@ -835,11 +835,11 @@ mod tests {
         let swept = |case: &Case| {
             (case.model.clone().unwrap(), case.fill.unwrap(), case.amplitude.unwrap())
         };
-        let of = |model: &'static str| {
+        let sweeps = |model: &'static str| {
             let at = move |h: f64| AMPLITUDES.map(|a| (model.to_string(), h, a));
             FILLS.into_iter().flat_map(at)
         };
-        let all = MODELS.into_iter().flat_map(of);
+        let all = MODELS.into_iter().flat_map(sweeps);
         assert!(cases.iter().map(swept).eq(all), "the command line's defaults are the same");
         let dusty = cases_of(
             "profile = \"sine\"\n[vary]\nslosh.model = [\"planar\"]\ntank.h = [0.07]\nprofile.amplitude = [0.30000000000000004]",

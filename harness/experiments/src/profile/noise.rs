@@ -182,9 +182,9 @@ mod tests {
 
     #[test]
     fn noise_depends_on_its_seed() {
-        let of = |seed| Noise::new(0.05, (1.25, 3.5), 0.0, seed, 0.26);
-        assert_eq!(of(1), of(1));
-        let (a, b) = (samples(&of(1), 10.0, 0.1), samples(&of(2), 10.0, 0.1));
+        let noise = |seed| Noise::new(0.05, (1.25, 3.5), 0.0, seed, 0.26);
+        assert_eq!(noise(1), noise(1));
+        let (a, b) = (samples(&noise(1), 10.0, 0.1), samples(&noise(2), 10.0, 0.1));
         assert!(a.iter().zip(&b).all(|(x, y)| x != y));
     }
 }

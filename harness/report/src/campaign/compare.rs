@@ -31,7 +31,7 @@ pub(super) fn compare(
     let (mut panels, mut traces) = (Vec::new(), Vec::new());
     let mut largest = Vec::new();
     for (p, (column, label, factor)) in COMPARED.into_iter().enumerate() {
-        let of = |run: &Outcome| match column {
+        let value = |run: &Outcome| match column {
             "f_dip_hz" => run.features().f_dip,
             "f_res_hz" => run.features().f_res,
             "fit_freq_pct" => run.fit().map(|fit| fit.fit_frequency),
@@ -47,7 +47,7 @@ pub(super) fn compare(
                     alone.push(run.case.name.clone());
                 }
                 let there = row.and_then(|row| row.get(column)?.parse::<f64>().ok());
-                if let (Some(here), Some(there)) = (of(run), there) {
+                if let (Some(here), Some(there)) = (value(run), there) {
                     let miss = (here - there) * factor;
                     points.push((run.case.name.as_str(), miss));
                     if most.is_none_or(|(m, _)| m.abs() < miss.abs()) {

@@ -13,13 +13,13 @@ use super::page::{Axis, Group, Page, best, distinct, exact_features, sentence_wi
 /// logarithmic, and a level that is drawn for comparison.
 struct Quantity<'a> {
     label: &'a str,
-    of: &'a dyn Fn(&Outcome) -> Option<f64>,
+    value: &'a dyn Fn(&Outcome) -> Option<f64>,
     decades: bool,
     level: Option<(f64, &'a str)>,
 }
 
-fn quantity<'a>(label: &'a str, of: &'a dyn Fn(&Outcome) -> Option<f64>) -> Quantity<'a> {
-    Quantity { label, of, decades: false, level: None }
+fn quantity<'a>(label: &'a str, value: &'a dyn Fn(&Outcome) -> Option<f64>) -> Quantity<'a> {
+    Quantity { label, value, decades: false, level: None }
 }
 
 /// Plots antiresonance and resonance of every group over the axis, together with those of the exact linear
@@ -237,16 +237,16 @@ pub(super) fn linear_fit(page: &Page, axis: &Axis) -> Figure {
 
 /// Plots cross-axis energy fraction and leakage of recordings, which follow from the rates about three axes.
 pub(super) fn cross_axis(page: &Page, axis: &Axis) -> Figure {
-    let of = |run: &Outcome| run.off_axis().filter(|_| run.is_recording());
+    let share = |run: &Outcome| run.off_axis().filter(|_| run.is_recording());
     let figure = small(
         page,
         axis,
         "Cross-axis energy fraction and leakage of the recordings",
         html! { "Share of the squared rates that is not about the hub's axis, each rate without its mean: the median over the samples and the fraction of the whole record. Near 2/3 the three rates are noise of one size. Leakage: root mean square over the frequencies of √(|H_x|²+|H_y|²)/|H|." },
         [
-            quantity("CEF, median", &|run| Some(of(run)?.median)),
-            quantity("CEF, whole record", &|run| Some(of(run)?.energy)),
-            quantity("leakage, rms", &|run| Some(of(run)?.leakage)),
+            quantity("CEF, median", &|run| Some(share(run)?.median)),
+            quantity("CEF, whole record", &|run| Some(share(run)?.energy)),
+            quantity("leakage, rms", &|run| Some(share(run)?.leakage)),
         ],
     );
     Figure { columns: 3, thesis: "7.15", ..figure }
@@ -254,7 +254,7 @@ pub(super) fn cross_axis(page: &Page, axis: &Axis) -> Figure {
 
 pub(super) fn out_of_the_plane(page: &Page, axis: &Axis) -> Figure {
     // For recordings these figures come from rates and are drawn by `cross_axis`.
-    let of = |run: &Outcome| run.off_axis().filter(|_| !run.is_recording());
+    let share = |run: &Outcome| run.off_axis().filter(|_| !run.is_recording());
     small(
         page,
         axis,
@@ -266,8 +266,8 @@ pub(super) fn out_of_the_plane(page: &Page, axis: &Axis) -> Figure {
                 ..quantity("largest |swirl|", &|run| Some(run.rotary?.swirl.abs()))
             },
             quantity("time in rotary slosh / s", &|run| Some(run.rotary?.time)),
-            quantity("off-axis energy", &|run| Some(of(run)?.energy)),
-            quantity("leakage", &|run| Some(of(run)?.leakage)),
+            quantity("off-axis energy", &|run| Some(share(run)?.energy)),
+            quantity("leakage", &|run| Some(share(run)?.leakage)),
         ],
     )
 }
@@ -287,7 +287,7 @@ fn small<'a>(
             let points: Vec<(f64, f64, Option<f64>)> = group
                 .runs
                 .iter()
-                .filter_map(|run| Some((axis.value(run)?, (quantity.of)(run)?, None)))
+                .filter_map(|run| Some((axis.value(run)?, (quantity.value)(run)?, None)))
                 .filter(|(_, y, _)| y.is_finite() && (!quantity.decades || *y > 0.0))
                 .collect();
             for (x, ..) in &points {

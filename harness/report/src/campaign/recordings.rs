@@ -10,7 +10,7 @@ type Value = (f64, Option<f64>);
 /// its number of digits, and factor, digits and unit of a difference.
 struct Feature {
     heading: [&'static str; 2],
-    of: fn(&Outcome) -> Option<Value>,
+    value: fn(&Outcome) -> Option<Value>,
     digits: usize,
     difference: (f64, usize, &'static str),
 }
@@ -18,7 +18,7 @@ struct Feature {
 const FEATURES: [Feature; 9] = [
     Feature {
         heading: ["antiresonance", "Hz"],
-        of: |run| {
+        value: |run| {
             let (estimate, _) = best(run)?;
             Some((estimate.features.f_dip?, estimate.deviations.f_dip))
         },
@@ -27,7 +27,7 @@ const FEATURES: [Feature; 9] = [
     },
     Feature {
         heading: ["resonance", "Hz"],
-        of: |run| {
+        value: |run| {
             let (estimate, _) = best(run)?;
             Some((estimate.features.f_res?, estimate.deviations.f_res))
         },
@@ -36,43 +36,43 @@ const FEATURES: [Feature; 9] = [
     },
     Feature {
         heading: ["notch", "dB"],
-        of: |run| Some((best(run)?.0.features.notch_db?, None)),
+        value: |run| Some((best(run)?.0.features.notch_db?, None)),
         digits: 2,
         difference: (1.0, 2, "dB"),
     },
     Feature {
         heading: ["fit in", "frequency %"],
-        of: |run| Some((run.fit()?.fit_frequency, None)),
+        value: |run| Some((run.fit()?.fit_frequency, None)),
         digits: 1,
         difference: (1.0, 1, "%"),
     },
     Feature {
         heading: ["fit in", "time %"],
-        of: |run| Some((run.fit()?.fit_time, None)),
+        value: |run| Some((run.fit()?.fit_time, None)),
         digits: 1,
         difference: (1.0, 1, "%"),
     },
     Feature {
         heading: ["residual", "coherence"],
-        of: |run| Some((run.fit()?.coherence?, None)),
+        value: |run| Some((run.fit()?.coherence?, None)),
         digits: 2,
         difference: (1.0, 2, ""),
     },
     Feature {
         heading: ["SNR at", "resonance dB"],
-        of: |run| Some((run.record.as_ref()?.snr_db?[0], None)),
+        value: |run| Some((run.record.as_ref()?.snr_db?[0], None)),
         digits: 0,
         difference: (1.0, 0, "dB"),
     },
     Feature {
         heading: ["CEF,", "median"],
-        of: |run| Some((run.off_axis()?.median, None)).filter(|_| run.is_recording()),
+        value: |run| Some((run.off_axis()?.median, None)).filter(|_| run.is_recording()),
         digits: 4,
         difference: (1.0, 4, ""),
     },
     Feature {
         heading: ["leakage,", "rms"],
-        of: |run| Some((run.off_axis()?.leakage, None)).filter(|_| run.is_recording()),
+        value: |run| Some((run.off_axis()?.leakage, None)).filter(|_| run.is_recording()),
         digits: 4,
         difference: (1.0, 4, ""),
     },
@@ -92,11 +92,11 @@ pub(super) fn result(results: &Results) -> String {
         results.outcomes.iter().partition(|run| run.is_recording());
     let models = distinct(simulated.iter().map(|run| run.range.model.as_str()));
     let off = |model: &str, feature: &Feature| {
-        let of = |run: &Outcome| Some((feature.of)(run)?.0);
+        let value = |run: &Outcome| Some((feature.value)(run)?.0);
         let pairs = recorded.iter().flat_map(|there| {
             let same =
                 simulated.iter().filter(|run| run.range.model == model && same_run(run, there));
-            same.filter_map(|run| Some(1e3 * (of(run)? - of(there)?)))
+            same.filter_map(|run| Some(1e3 * (value(run)? - value(there)?)))
         });
         pairs.reduce(|most, off| if off.abs() > most.abs() { off } else { most })
     };
@@ -152,7 +152,7 @@ pub(super) fn comparison_table(results: &Results) -> Markup {
 
 fn value(feature: &Feature, run: &Outcome) -> String {
     let digits = feature.digits;
-    let Some((value, std)) = (feature.of)(run) else { return String::new() };
+    let Some((value, std)) = (feature.value)(run) else { return String::new() };
     let (factor, places, unit) = feature.difference;
     match std {
         Some(std) => format!("{value:.digits$} ± {:.places$} {unit}", 1.96 * std * factor),
@@ -163,7 +163,8 @@ fn value(feature: &Feature, run: &Outcome) -> String {
 /// Formats the difference of a model's value from the recording's; a ✓ marks a difference within the joint 95
 /// % interval.
 fn difference(feature: &Feature, run: &Outcome, recording: &Outcome) -> String {
-    let Some(((model, a), (there, b))) = (feature.of)(run).zip((feature.of)(recording)) else {
+    let Some(((model, a), (there, b))) = (feature.value)(run).zip((feature.value)(recording))
+    else {
         return String::new();
     };
     let (factor, places, unit) = feature.difference;

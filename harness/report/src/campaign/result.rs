@@ -105,11 +105,11 @@ fn describe_responses(series: &[Series], name: &str, unit: &str) -> String {
         plants.len() > 1
     };
     // The linear runs of the same plant, or else the exact linear plant.
-    let measured = |of: &Series| {
-        series.iter().find(|s| s.model == SloshModel::Linear.name() && s.plant == of.plant)
+    let measured = |own: &Series| {
+        series.iter().find(|s| s.model == SloshModel::Linear.name() && s.plant == own.plant)
     };
-    let reference = |of: &Series, point: &Point| -> [Option<f64>; 2] {
-        let run = measured(of).and_then(|s| s.points.iter().find(|p| p.x == point.x));
+    let reference = |own: &Series, point: &Point| -> [Option<f64>; 2] {
+        let run = measured(own).and_then(|s| s.points.iter().find(|p| p.x == point.x));
         run.map_or(point.exact, Point::extrema)
     };
     let linear = match nonlinear.iter().all(|s| measured(s).is_some()) {
@@ -215,8 +215,8 @@ fn describe_shifts(series: &[Series], name: &str, unit: &str, several: bool) -> 
         .collect();
     let sentence = |s: &&Series| {
         let [antiresonance, resonance] = [|p: &Point| p.antiresonance, |p: &Point| p.resonance]
-            .map(|of| {
-                let values: Vec<f64> = s.points.iter().filter_map(of).collect();
+            .map(|range| {
+                let values: Vec<f64> = s.points.iter().filter_map(range).collect();
                 let (first, last) = (*values.first()?, *values.last()?);
                 let low = values.iter().copied().fold(f64::MAX, f64::min);
                 let high = values.iter().copied().fold(f64::MIN, f64::max);
@@ -249,7 +249,7 @@ fn describe_shifts(series: &[Series], name: &str, unit: &str, several: bool) -> 
 
 fn describe_single_runs(series: &[Series]) -> String {
     let hertz = |f: Option<f64>| f.map_or("none".into(), |f| format!("{f:.4} Hz"));
-    let of = |s: &Series| {
+    let describe = |s: &Series| {
         let point = s.points.first()?;
         let [antiresonance, resonance] = point.extrema().map(hertz);
         let exact = point.exact.map(hertz);
@@ -267,7 +267,7 @@ fn describe_single_runs(series: &[Series]) -> String {
             ),
         })
     };
-    finished(&few(series.iter().filter_map(of).collect(), 3))
+    finished(&few(series.iter().filter_map(describe).collect(), 3))
 }
 
 impl Series {
@@ -281,11 +281,11 @@ impl Series {
 }
 
 fn scatter(page: &Page) -> String {
-    let of = |group: &Group| {
+    let describe = |group: &Group| {
         let parts: Vec<String> = super::draws::QUANTITIES[..2]
             .iter()
-            .filter_map(|(name, _, of)| {
-                let values: Vec<f64> = group.runs.iter().filter_map(|run| of(run)).collect();
+            .filter_map(|(name, _, value)| {
+                let values: Vec<f64> = group.runs.iter().filter_map(|run| value(run)).collect();
                 let (mean, deviation) = moments(&values);
                 let deviation = format!("standard deviation {} mHz", format_two_digits(deviation));
                 (values.len() > 1)
@@ -303,7 +303,7 @@ fn scatter(page: &Page) -> String {
         (!parts.is_empty())
             .then(|| format!("In {count} draws{title} {parts_text}{}", most.unwrap_or_default()))
     };
-    finished(&few(page.groups.iter().filter_map(of).collect(), 3))
+    finished(&few(page.groups.iter().filter_map(describe).collect(), 3))
 }
 
 fn names(page: &Page) -> Vec<String> {
@@ -316,7 +316,7 @@ fn names(page: &Page) -> Vec<String> {
 }
 
 fn left_behind(page: &Page) -> String {
-    let of = |group: &Group| {
+    let extremes = |group: &Group| {
         let rates = group.runs.iter().filter_map(|run| {
             let x = page.axis.as_ref().and_then(|axis| axis.value(run));
             Some((1e3 * run.ending.rate?, x))
@@ -328,7 +328,7 @@ fn left_behind(page: &Page) -> String {
     };
     let named = page.groups.iter().zip(names(page));
     let all: Vec<_> = named
-        .filter_map(|(group, name)| of(group).map(|(most, least)| (name, most, least)))
+        .filter_map(|(group, name)| extremes(group).map(|(most, least)| (name, most, least)))
         .collect();
     if all.is_empty() {
         return String::new();
@@ -400,8 +400,8 @@ fn swirling(models: &[Swirling]) -> String {
 fn largest_angle(page: &Page) -> String {
     let part = |model: &str| {
         let runs = page.groups.iter().filter(|g| g.model == model).flat_map(|g| &g.runs);
-        let most = |of: fn(&Outcome) -> f64| {
-            runs.clone().map(|run| of(run).to_degrees()).fold(0.0, f64::max)
+        let most = |angle: fn(&Outcome) -> f64| {
+            runs.clone().map(|run| angle(run).to_degrees()).fold(0.0, f64::max)
         };
         let tangential = most(|run| run.totals.peak_slosh_angle);
         let radial = most(|run| run.totals.peak_radial_angle);
@@ -567,15 +567,15 @@ mod tests {
 
     #[test]
     fn dwells_state_for_each_model_whether_the_slosh_was_rotary() {
-        let of = |model: &str, rotary: usize, which: Option<&str>| Swirling {
+        let counted = |model: &str, rotary: usize, which: Option<&str>| Swirling {
             model: model.into(),
             runs: 6,
             rotary,
             which: which.map(String::from),
         };
         let all = [
-            of("spherical", 4, Some("smallest torque 0.0625 N·m at 2.4 Hz")),
-            of("liquid", 0, None),
+            counted("spherical", 4, Some("smallest torque 0.0625 N·m at 2.4 Hz")),
+            counted("liquid", 0, None),
         ];
         assert_eq!(
             swirling(&all),
@@ -586,7 +586,7 @@ mod tests {
 
     #[test]
     fn numbers_have_two_digits() {
-        let of = [0.0, 0.0123, 1.0, 1.24, 12.4, 124.0].map(format_two_digits);
-        assert_eq!(of, ["0", "0.012", "1.0", "1.2", "12", "120"]);
+        let formatted = [0.0, 0.0123, 1.0, 1.24, 12.4, 124.0].map(format_two_digits);
+        assert_eq!(formatted, ["0", "0.012", "1.0", "1.2", "12", "120"]);
     }
 }

@@ -145,7 +145,8 @@ impl Tank {
         let middle = match &self.outline {
             Outline::Revolved(points) => {
                 let heights = points.iter().map(|p| p[1]);
-                let [low, high] = [f64::min, f64::max].map(|of| heights.clone().reduce(of));
+                let [low, high] =
+                    [f64::min, f64::max].map(|extreme| heights.clone().reduce(extreme));
                 0.5 * (low.unwrap_or(0.0) + high.unwrap_or(0.0))
             }
             Outline::Box([_, _, low, high]) => 0.5 * (low + high),
@@ -206,11 +207,11 @@ fn cylinder(radius: f64, bottom: f64, level: f64) -> Outline {
 /// Returns h/R of the cylinder whose first mode has this share of the liquid's mass, found by bisection.
 fn depth_over_radius(share: f64) -> f64 {
     let xi = XI[0];
-    let of = |x: f64| 2.0 * (xi * x).tanh() / (xi * (xi * xi - 1.0) * x);
+    let share_at = |x: f64| 2.0 * (xi * x).tanh() / (xi * (xi * xi - 1.0) * x);
     let (mut low, mut high) = (0.02, 50.0);
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
-        *if of(middle) > share { &mut low } else { &mut high } = middle;
+        *if share_at(middle) > share { &mut low } else { &mut high } = middle;
     }
     0.5 * (low + high)
 }
@@ -252,18 +253,20 @@ pub(super) fn bench(parameters: &Parameters, drawing: Option<&Drawing>) -> Tank 
             };
             let m_liq = number(M_LIQ);
             let g = number(G_REF);
-            let of = |array: Array<1>, n: usize| number(&array.element([n + 1]));
-            let mass = |n: usize| of(MASS, n);
+            let element = |array: Array<1>, n: usize| number(&array.element([n + 1]));
+            let mass = |n: usize| element(MASS, n);
             let depth = radius * depth_over_radius(mass(0) / m_liq);
             let mut modes = Vec::new();
             let mut bottom = 0.0;
             // The first mode with its position, and the other modes in use.
             for n in (0..count.max(1)).take_while(|n| *n == 0 || mass(*n) > 0.0) {
-                let l = length(of(LENGTH, n), of(FREQUENCY, n), g, of(K, n) / mass(n));
+                let l =
+                    length(element(LENGTH, n), element(FREQUENCY, n), g, element(K, n) / mass(n));
                 let like = pendulum(n, 2.0 * radius, depth, m_liq);
-                let wave = if of(WAVE, n) > 0.0 { of(WAVE, n) } else { like.wave };
+                let wave = if element(WAVE, n) > 0.0 { element(WAVE, n) } else { like.wave };
                 // If the table has no heights, those of the cylinder are used.
-                let hinge = if of(HINGE, n) == 0.0 { bottom + like.hinge } else { of(HINGE, n) };
+                let hinge =
+                    if element(HINGE, n) == 0.0 { bottom + like.hinge } else { element(HINGE, n) };
                 if n == 0 {
                     bottom = (hinge - l) - (like.hinge - like.length);
                 }
@@ -324,17 +327,28 @@ fn lowest(outline: &Outline) -> f64 {
 pub(super) fn tank(parameters: &Parameters, prefix: &str, drawing: Option<&Drawing>) -> Tank {
     let number = |key: &str| parameters.number(&format!("{prefix}.{key}"));
     let count = (number("modes") as usize).max(1);
-    let of = |key: &str, n: usize| number(&format!("{key}[{}]", n + 1));
+    let element = |key: &str, n: usize| number(&format!("{key}[{}]", n + 1));
     let points = number("fill.points") as usize;
     let diameter = number("diameter");
     let fill = (points > 1).then(|| fill(&number, points, count));
     let mut modes: Vec<Pendulum> = (0..count)
         .map(|n| {
-            let mass = of("mass", n);
-            let l = length(of("length", n), of("frequency", n), number("g_ref"), of("k", n) / mass);
+            let mass = element("mass", n);
+            let l = length(
+                element("length", n),
+                element("frequency", n),
+                number("g_ref"),
+                element("k", n) / mass,
+            );
             let direction = |n: usize| [1, 2].map(|i| number(&format!("direction[{},{i}]", n + 1)));
             let order = order(n, direction);
-            Pendulum { mass, length: l, hinge: of("hinge", n), wave: of("wave", n), order }
+            Pendulum {
+                mass,
+                length: l,
+                hinge: element("hinge", n),
+                wave: element("wave", n),
+                order,
+            }
         })
         .collect();
     let (radius, level, bottom, m_liq, mut note);
@@ -412,7 +426,8 @@ fn mode_radius(mode: &Pendulum) -> f64 {
 
 fn fill(number: &dyn Fn(&str) -> f64, points: usize, count: usize) -> Fill {
     let at = |key: &str, k: usize| number(&format!("fill.{key}[{}]", k + 1));
-    let of = |key: &str, n: usize, k: usize| number(&format!("fill.{key}[{},{}]", n + 1, k + 1));
+    let element =
+        |key: &str, n: usize, k: usize| number(&format!("fill.{key}[{},{}]", n + 1, k + 1));
     let masses: Vec<f64> = (0..points).map(|k| at("liquid", k)).collect();
     let curve = |y: Vec<f64>| {
         let (mut slope, mut curvature) = (vec![0.0; points], vec![0.0; points]);
@@ -421,8 +436,9 @@ fn fill(number: &dyn Fn(&str) -> f64, points: usize, count: usize) -> Fill {
     };
     let modes: Vec<[Vec<[f64; 3]>; 2]> = (0..count)
         .map(|n| {
-            let stiffness = (0..points).map(|k| 1.0 / of("length", n, k)).collect();
-            let bob = (0..points).map(|k| of("hinge", n, k) - of("length", n, k)).collect();
+            let stiffness = (0..points).map(|k| 1.0 / element("length", n, k)).collect();
+            let bob =
+                (0..points).map(|k| element("hinge", n, k) - element("length", n, k)).collect();
             [curve(stiffness), curve(bob)]
         })
         .collect();
@@ -430,9 +446,9 @@ fn fill(number: &dyn Fn(&str) -> f64, points: usize, count: usize) -> Fill {
     // a cylinder.
     let moment: Vec<f64> = (0..points)
         .map(|k| {
-            let bobs: f64 = (0..count).map(|n| of("mass", n, k)).sum();
+            let bobs: f64 = (0..count).map(|n| element("mass", n, k)).sum();
             let of_bobs: f64 = (0..count)
-                .map(|n| of("mass", n, k) * (of("hinge", n, k) - of("length", n, k)))
+                .map(|n| element("mass", n, k) * (element("hinge", n, k) - element("length", n, k)))
                 .sum();
             (masses[k] - bobs) * at("H_0", k) + of_bobs
         })

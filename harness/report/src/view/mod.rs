@@ -87,10 +87,10 @@ pub fn columns(
     parameters: &BTreeMap<String, String>,
 ) -> Vec<String> {
     let parameters = Parameters { description, set: parameters };
-    let of = |names: &[&str]| names.iter().map(|n| n.to_string()).collect::<Vec<_>>();
+    let texts = |names: &[&str]| names.iter().map(|n| n.to_string()).collect::<Vec<_>>();
     let mut all = match kind(description) {
         Some(Kind::Bench) => {
-            let all = of(&[
+            let all = texts(&[
                 THETA,
                 OMEGA,
                 SLOSH_ANGLE,
@@ -205,7 +205,7 @@ const MASSES: usize = 9;
 
 fn spread(values: &[f64]) -> Vec<f64> {
     let [low, high] =
-        [f64::min, f64::max].map(|of| values.iter().copied().reduce(of).unwrap_or(0.0));
+        [f64::min, f64::max].map(|extreme| values.iter().copied().reduce(extreme).unwrap_or(0.0));
     let count = if high > low { MASSES } else { 1 };
     let step = (high - low) / (count - 1).max(1) as f64;
     (0..count).map(|i| low + step * i as f64).collect()
@@ -441,7 +441,7 @@ impl Draft<'_> {
         let surfaces = self.drawing(i).and_then(|drawing| drawing.surfaces.as_ref());
         let Some(surfaces) = surfaces.filter(|_| !tank.modes.is_empty()) else { return Ok(()) };
         let modes = tank.modes.len();
-        let of = |mass: &f64| {
+        let shapes_at = |mass: &f64| {
             surfaces(*mass, modes)
                 .with_context(|| format!("--tank {}: with {mass} kg of liquid", i + 1))
         };
@@ -449,10 +449,10 @@ impl Draft<'_> {
         match tank.fill.as_ref().and(self.run.table.column(&name)) {
             Some(liquid) => {
                 let masses = spread(liquid);
-                let shapes = masses.iter().map(of).collect::<Result<Vec<_>>>()?;
+                let shapes = masses.iter().map(shapes_at).collect::<Result<Vec<_>>>()?;
                 moved["surfaces"] = json!({ "liquid": name, "masses": masses, "shapes": shapes });
             }
-            None => tank.shapes = of(&tank.liquid)?,
+            None => tank.shapes = shapes_at(&tank.liquid)?,
         }
         Ok(())
     }
