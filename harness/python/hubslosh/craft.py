@@ -300,16 +300,16 @@ class Craft:
                 vector(getattr(self, name), 3, name)
             except FmuError as error:
                 problems.append(str(error))
+        wrong = []
         if not isinstance(self.engines, Mapping):
-            problems.append(f"engines must be Engine by name, not {self.engines!r}")
-        for name, engine in self.engines.items() if not problems else ():
-            wrong = (
-                engine.problems()
-                if isinstance(engine, Engine)
-                else [f"is not an Engine: {engine!r}"]
-            )
-            problems += [f"engine {name}: {problem}" for problem in wrong]
-        for check in (self._inertia, self._force) if not problems else (self._inertia,):
+            wrong.append(f"engines must be Engine by name, not {self.engines!r}")
+        for name, engine in self.engines.items() if not wrong else ():
+            if not isinstance(engine, Engine):
+                wrong.append(f"engine {name}: is not an Engine: {engine!r}")
+            else:
+                wrong += [f"engine {name}: {problem}" for problem in engine.problems()]
+        problems += wrong
+        for check in (self._inertia, *([] if wrong else [self._force])):
             try:
                 check()
             except FmuError as error:

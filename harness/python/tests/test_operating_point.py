@@ -128,7 +128,7 @@ def test_every_method_takes_the_same_names(craft: Craft, name: str) -> None:
     shares = {key: (0.9 * value, value) for key, value in values.items() if "freq" in key}
     found = craft.review(
         GAINS, PERIOD, ["50%"], damping="nominal", parameters=drawn, uncertain=shares, draws=2,
-        frequency="nominal",
+        frequency="nominal", inertia="nominal",
     )  # fmt: skip
     assert numbers(found.nominal[0].margins) == pytest.approx(
         numbers(hubslosh.margins(loop)), rel=1e-9, nan_ok=True
@@ -212,11 +212,13 @@ def test_a_quantity_of_a_mode_changes_without_the_others(craft: Craft) -> None:
 def test_slosh_frequency_varies_by_default(craft: Craft) -> None:
     """All modes of a tank together, by 10 %; "nominal" and other shares are arguments."""
     found = craft.review(GAINS, PERIOD, ["50%"], damping="nominal", draws=0)
-    assert [u.name for u in found.uncertain] == ["frequency of NTO", "frequency of MMH"]
+    names = ["frequency of NTO", "frequency of MMH", "inertia of craft"]
+    assert [u.name for u in found.uncertain] == names
     ends = found.uncertain[0].ends[0]["tank[1].frequency[1]"]
     assert ends == pytest.approx((0.9 * ends[1], ends[1], 1.1 * ends[1]), rel=1e-12)
     # a damping ratio that was given, or has a range, leaves the interval of its tank's correlation
     given = {"parameters": {"NTO.zeta[1]": 0.01}, "uncertain": {"MMH.zeta[2]": "5%"}}
+    given["inertia"] = "nominal"
     found = craft.review(GAINS, PERIOD, ["50%"], draws=0, frequency="nominal", **given)
     assert [u.name for u in found.uncertain] == ["damping of MMH", "MMH.zeta[2]"]
     assert list(found.uncertain[0].ends[0]) == ["tank[2].zeta[1]"]
