@@ -290,9 +290,8 @@ fn findings(
         let is_own = matches!(target, Target::Parameter(_)) && !unknown.bent;
         // friction may be 0
         let least = LEAST_FRICTION * unknown.start;
-        let is_zero = !unknown.log
-            && solution.minimum.point.z[*j] <= unknown.bounds.0
-            && (0.0..=least).contains(&unknown.bounds.0);
+        let is_zero =
+            !unknown.log && unknown.bounds.0 >= 0.0 && solution.minimum.point.z[*j] <= 2.0 * least;
         if is_own && !is_zero {
             doubts.push(format!(
                 "{} = {:.4e} is at the end of the range that the FMU allows, {} to {}",

@@ -12,11 +12,15 @@ pub const OPEN: f64 = 3.8415;
 /// Relative standard deviation of the unknown, or of one that depends on it, from which on the profile is followed.
 const VAGUE: f64 = 0.05;
 /// Sets of derivatives at one point, besides those of the point before.
-const SETS: usize = 2;
+const SETS: usize = 4;
 /// Shortest and longest first step, and longest step, of the coordinate.
 const LENGTHS: [f64; 3] = [0.03, 0.5, 0.6];
 /// Distance to its minimum at which a point counts: it adds a hundredth of [`OPEN`].
 const NEAR: f64 = 0.2;
+/// A set of derivatives that lessens the sum of squares of a point by less is the last one.
+const GAIN: f64 = 0.3;
+/// Values of an unknown that is bent, over its start, at which other minima are looked for.
+const GRID: [f64; 6] = [0.03, 0.1, 0.3, 1.0, 3.0, 10.0];
 /// Points on a side at most.
 const MOST: usize = 14;
 /// Fall of the sum of squares that makes another minimum.
@@ -35,12 +39,48 @@ pub struct Point {
 }
 
 impl Fit<'_> {
-    /// The profile at a minimum, along the unknown that is bent, and that unknown; `None` if there is none, or if it is known well
-    /// enough for its likelihood to be a parabola. The points are in the order of the coordinate.
+    /// Looks for a lower minimum at other values of the unknown that is bent, with all others free: between two such minima the
+    /// likelihood may have a ridge that no search crosses.
     ///
     /// # Errors
     /// If the system refuses the minimum.
-    pub fn profile(&mut self, minimum: &mut Minimum) -> Result<Option<Profile>> {
+    pub fn across_ridges(&mut self, minimum: &mut Minimum) -> Result<Vec<Point>> {
+        let unknowns = &self.problem.unknowns;
+        let bent = unknowns.iter().zip(&self.free).position(|(u, free)| u.bent && *free);
+        let Some(j) = bent else { return Ok(Vec::new()) };
+        let derivatives = Some(self.derivatives_at(minimum)?);
+        let mut free = self.free.clone();
+        free[j] = false;
+        let (now, start) = (minimum.point.z[j], unknowns[j].coordinate(unknowns[j].start));
+        let mut points: Vec<Point> = Vec::new();
+        for factor in GRID {
+            let at = (start + factor.ln()).clamp(self.ends[j].0, self.ends[j].1);
+            if (at - now).abs() < LENGTHS[2] {
+                continue;
+            }
+            let mut z = minimum.point.z.clone();
+            z[j] = at;
+            let end = End { trusts: true, gain: 2.0, ..End::new(5, super::ENDS.0) };
+            let Ok(found) = self.minimise(&z, &free, derivatives.clone(), end) else { continue };
+            points.push(Point { at, minimum: found });
+        }
+        let lowest =
+            points.iter().min_by(|a, b| a.minimum.point.cost.total_cmp(&b.minimum.point.cost));
+        let lower = |low: &&Point| low.minimum.point.cost < minimum.point.cost - LOWER;
+        if let Some(low) = lowest.filter(lower) {
+            let (z, free) = (low.minimum.point.z.clone(), self.free.clone());
+            let end = End { gain: 2.0, ..End::new(6, super::ENDS.0) };
+            *minimum = self.minimise(&z, &free, None, end)?;
+        }
+        Ok(points)
+    }
+
+    /// The profile at a minimum, along the unknown that is bent, and that unknown; `None` if there is none, or if it is known well
+    /// enough for its likelihood to be a parabola. The points are in the order of the coordinate, with those `beyond` its ends.
+    ///
+    /// # Errors
+    /// If the system refuses the minimum.
+    pub fn profile(&mut self, minimum: &mut Minimum, beyond: &[Point]) -> Result<Option<Profile>> {
         let unknowns = &self.problem.unknowns;
         self.central = false;
         let bent = unknowns.iter().zip(&self.free).position(|(u, free)| u.bent && *free);
@@ -56,7 +96,17 @@ impl Fit<'_> {
                 && std(*i) > VAGUE * minimum.point.z[*i].abs()
         };
         let has_partner = places(&self.free).iter().any(|i| *i != j && partner(i));
-        if !(std(j) > VAGUE || has_partner) {
+        // with the noise of now
+        let beyond: Vec<Point> = beyond
+            .iter()
+            .map(|p| {
+                let point = &p.minimum.point;
+                let point = self.point(&point.z, point.motion.clone());
+                Point { at: p.at, minimum: Minimum { point, ..p.minimum.clone() } }
+            })
+            .collect();
+        let rivals = beyond.iter().any(|p| p.minimum.point.cost < minimum.point.cost + RAISED);
+        if !(std(j) > VAGUE || has_partner || rivals) {
             return Ok(None);
         }
         let first = (0.25 * std(j)).clamp(LENGTHS[0], LENGTHS[1]);
@@ -81,7 +131,7 @@ impl Fit<'_> {
                 }
                 z[j] = at;
                 let above = least + 3.0 * RAISED;
-                let end = End { above, trusts: true, ..End::new(SETS, NEAR) };
+                let end = End { above, trusts: true, gain: GAIN, ..End::new(SETS, NEAR) };
                 let Ok(found) = self.minimise(&z, &free, last.derivatives.clone(), end) else {
                     break;
                 };
@@ -96,14 +146,19 @@ impl Fit<'_> {
                 let more = rise - risen;
                 let factor = if more < 1.5 {
                     1.6
-                } else if more < 4.0 {
+                } else if more < 6.0 {
                     1.0
                 } else {
-                    0.6
+                    0.7
                 };
-                (h, risen) = ((h * factor).min(LENGTHS[2]), rise);
+                // shorter steps than the first lead nowhere
+                (h, risen) = ((h * factor).clamp(0.5 * first, LENGTHS[2]), rise);
             }
         }
+        let (low, high) = points
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), p| (a.min(p.at), b.max(p.at)));
+        points.extend(beyond.into_iter().filter(|p| p.at < low || p.at > high));
         points.sort_by(|a, b| a.at.total_cmp(&b.at));
         Ok(Some((j, points)))
     }

@@ -8,7 +8,7 @@ use anyhow::{Context, Result, bail};
 use super::hold::Rival;
 use super::minimum::{Curvature, End, Minimum, places};
 use super::problem::{Part, Problem, Role, Signal};
-use super::profile::{LOWER, Profile};
+use super::profile::{self, LOWER, Profile};
 use super::{ENDS, Fit, INFLATIONS};
 use crate::news::News;
 
@@ -127,11 +127,12 @@ pub fn solve<'p>(
     best.judge(&mut fit, news)?;
     let Found { mut minimum, rivals, .. } = best;
     fit.free_shown(&mut minimum)?;
-    let (found, mut profile) = fit.settle(minimum, news)?;
+    let beyond = fit.across_ridges(&mut minimum)?;
+    let (found, mut profile) = fit.settle(minimum, &beyond, news)?;
     minimum = found;
     if let Some(other) = fit.with_tolerances(&minimum)? {
         news(&News::Detail("known values within their tolerances leave noise alone".into()));
-        (minimum, profile) = fit.settle(other, news)?;
+        (minimum, profile) = fit.settle(other, &[], news)?;
     }
     fit.derivatives_at(&mut minimum)?;
     let tests = fit.tests(&minimum.point);
@@ -246,6 +247,7 @@ impl Fit<'_> {
     fn settle(
         &mut self,
         mut minimum: Minimum,
+        beyond: &[profile::Point],
         news: &mut dyn FnMut(&News),
     ) -> Result<(Minimum, Option<Profile>)> {
         let free = self.free.clone();
@@ -268,7 +270,7 @@ impl Fit<'_> {
                     continue;
                 }
             }
-            profile = self.profile(&mut minimum)?;
+            profile = self.profile(&mut minimum, beyond)?;
             let Some((j, points)) = &profile else { break };
             // along the profile the likelihood is known, and the others are at their minimum
             let mut others = free.clone();
