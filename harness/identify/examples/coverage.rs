@@ -33,11 +33,11 @@ use anyhow::{Context, Result, bail};
 use experiments::rest;
 use fmu_twin::{SensorErrors, Twin, Unmodelled};
 use host::fmu::Fmu;
+use identify::bench::identification::Identification;
 use identify::bench::options::Options;
 use identify::bench::start::PARAMETERS;
 use identify::input::reading;
 use identify::input::tolerance::Tolerances;
-use identify::methods::identification::Identification;
 use identify::methods::output_error::identify;
 
 use identify::bench::simulate::Intersample;

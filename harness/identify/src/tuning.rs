@@ -265,7 +265,7 @@ pub const ANGLE_ROUNDS: usize = 20;
 /// Part of the limit with which `within_angle` ends.
 pub const ANGLE_ENOUGH: f64 = 0.97;
 
-// Verdict: `words/verdict.rs`.
+// Verdict: `bench/verdict.rs`.
 // Tests: `a_search_that_would_leave_the_fmus_range_ends_at_its_end_with_a_result`.
 /// Newton decrement above which the verdict reports it.
 pub const TOLD_DECREMENT: f64 = 0.1;

@@ -8,12 +8,12 @@ use anyhow::Result;
 use experiments::profile::Profile;
 use host::fmu::Fmu;
 use identify::bench::design::Multisine;
+use identify::bench::identification::Identification;
 use identify::bench::options::Options;
 use identify::bench::simulate::Intersample;
 use identify::input::reading::{Source, prepare, read};
 use identify::input::recording::Recording;
 use identify::input::tolerance::Tolerances;
-use identify::methods::identification::Identification;
 use identify::methods::output_error;
 use signals::recording::Columns;
 

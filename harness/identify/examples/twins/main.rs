@@ -23,7 +23,7 @@ use anyhow::{Context, Result, bail};
 use draw::Twin;
 use habits::HABITS;
 use host::fmu::Fmu;
-use identify::methods::identification::Identification;
+use identify::bench::identification::Identification;
 
 /// Standard deviations beyond which an answer that says "described" is wrong, unless its interval holds the truth all the same: one
 /// that is open says that it does not know.

@@ -10,10 +10,12 @@ use nalgebra::DMatrix;
 use names::hubslosh::{SloshModel, friction};
 
 use super::causes::{self, Cause, Missing};
-use super::combination::{self, Combination, ONE_WAY};
+use super::combination::{self, ONE_WAY};
 use super::options::Options;
 use super::problem::LEAST_FRICTION;
 use super::system::{BenchSystem, Target};
+use crate::bench::identification::{Details, Identification, ModelFit};
+use crate::bench::verdict::{self, Findings};
 use crate::engine::cause::{Effect, cause, effects};
 use crate::engine::draws::Derived;
 use crate::engine::hold::Rival;
@@ -22,11 +24,10 @@ use crate::engine::{Fit, Motion, Part, Solution};
 use crate::estimate::{Estimated, prose};
 use crate::input::recording::Recording;
 use crate::input::tolerance::{self, Share};
-use crate::methods::identification::{Details, Identification, ModelFit};
 use crate::news::News;
+use crate::words::combination::Combination;
 use crate::words::identified::{Identified, Residual};
 use crate::words::page::RATE;
-use crate::words::verdict::{self, Findings};
 
 /// Fit of a rate below which a minimum is taken for a wrong one, %.
 const POOR_FIT: f64 = 90.0;

@@ -2,10 +2,9 @@
 
 use analysis::statistics::{deviation, mean};
 use names::hubslosh::friction;
-use serde::Serialize;
 
 use crate::engine::draws::Derived;
-use crate::estimate::prose;
+use crate::words::combination::Combination;
 
 /// Correlation above which two unknowns count as determined only if each is precise by itself.
 const ALIKE: f64 = 0.99;
@@ -15,39 +14,6 @@ const VAGUE: f64 = 0.05;
 pub const ONE_WAY: f64 = 0.25;
 /// Part of a hub's path against its main direction above which it turns both ways.
 const BOTH_WAYS: f64 = 0.05;
-
-/// Two unknowns of which only a sum or a product is known.
-#[derive(Clone, Debug, Serialize)]
-pub struct Combination {
-    /// `a + b`, or `a (1 + b)`.
-    pub name: String,
-    /// The two.
-    pub of: [String; 2],
-    /// Value of the combination.
-    pub value: f64,
-    /// Standard deviation.
-    pub std: f64,
-    /// Unit.
-    pub unit: String,
-    /// Their correlation.
-    pub correlation: f64,
-}
-
-impl Combination {
-    /// Returns the combination in words.
-    pub fn words(&self) -> String {
-        format!(
-            "{} and {} cannot be distinguished (correlation {:.4}); only {} = {:.6} ± {:.6} {} is determined.",
-            self.of[0],
-            self.of[1],
-            self.correlation,
-            self.name,
-            self.value,
-            self.std,
-            prose(&self.unit)
-        )
-    }
-}
 
 /// Returns the direction of a hub that turns one way alone (1: counter-clockwise, −1: clockwise), from its rates. `None` if it rests,
 /// or if more than [`BOTH_WAYS`] of its path leads the other way.

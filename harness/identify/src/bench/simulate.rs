@@ -2,7 +2,6 @@
 
 use anyhow::{Result, ensure};
 use experiments::rest;
-use host::description::ModelDescription;
 use host::drive::Inputs;
 use host::fmu::Fmu;
 use names::hubslosh::{
@@ -12,28 +11,14 @@ use names::hubslosh::{
 use crate::bench::effect::{self, Effects};
 use crate::input::clocks;
 use crate::input::recording::Recording;
-use crate::tuning::{MOST_INTERNAL_STEPS, SAME_INSTANT};
+use crate::model::simulate::most_steps;
+use crate::tuning::SAME_INSTANT;
 
 /// The FMU's input for a torque on the hub besides the actuator's.
 pub const TORQUE_BESIDES: &str = TAU_EXT;
 
 /// The FMU's parameters that friction is proportional to.
 const FRICTION: [&str; 3] = [friction::B, friction::C, friction::D];
-
-/// Returns the bound for `solver.max_steps` in runs over these instants, s; `None` where the FMU has no such parameter, the
-/// settings set it, or its default is less.
-pub fn most_steps<'n>(
-    description: &ModelDescription,
-    mut set: impl Iterator<Item = &'n str>,
-    time: &[f64],
-) -> Option<i32> {
-    let variable = description.variable(solver::MAX_STEPS).ok()?;
-    let longest = time.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max);
-    let most =
-        (MOST_INTERNAL_STEPS.0 + MOST_INTERNAL_STEPS.1 * longest).min(f64::from(i32::MAX)) as i32;
-    let default: Option<i32> = variable.attributes().start.as_ref()?.parse().ok();
-    (!set.any(|name| name == solver::MAX_STEPS) && Some(most) < default).then_some(most)
-}
 
 /// Motion of the hub at the rows of a recording.
 #[derive(Clone, Debug, Default)]

@@ -6,11 +6,8 @@ use std::f64::consts::{PI, TAU};
 use analysis::features::Features;
 use analysis::statistics::{mean, median, quantile};
 use analysis::transfer_function::TransferFunction;
-use analysis::{
-    Complex64, FrequencyResponse, logarithmic_grid, spa,
-    welch::{self, Spectra},
-};
-use anyhow::{Context, Result, ensure};
+use analysis::{Complex64, FrequencyResponse};
+use anyhow::Result;
 use formulas::cylinder::tank_of_first_mode;
 use names::hubslosh::{friction, hub, slosh, tank};
 use signals::fourier::Forward;
@@ -18,6 +15,7 @@ use signals::fourier::Forward;
 use crate::bench::nominal::{Bench, Nominal, Start};
 use crate::input::plausible;
 use crate::input::recording::Recording;
+use crate::input::response::{excited_band, response};
 use crate::tuning::{DAMPINGS, FREQUENCY_FINENESS, LATEST_DELAY};
 
 /// Bench parameters from a frequency response.
@@ -48,37 +46,6 @@ pub const PARAMETERS: [&str; 8] = [
     friction::D,
     friction::OMEGA_S,
 ];
-
-/// Frequencies between which the torque has its power, Hz.
-pub fn excited_band(step: f64, torque: &[f64], rate: &[f64]) -> Option<(f64, f64)> {
-    let spectra = Spectra::estimate(step, torque, rate, welch::Segments::Seconds(60.0));
-    let total: f64 = spectra.input.iter().skip(1).sum();
-    let reached = |part: f64| {
-        let mut sum = 0.0;
-        spectra.input.iter().enumerate().skip(1).position(|(_, power)| {
-            sum += power;
-            sum >= part * total
-        })
-    };
-    let (low, high) = (reached(0.01)? as f64, reached(0.99)? as f64);
-    Some(((low + 1.0) * spectra.resolution, (high + 1.0) * spectra.resolution))
-}
-
-/// Frequency response of torque to rate over the band that the torque excites.
-pub fn response(recording: &Recording) -> Result<FrequencyResponse> {
-    let (step, torque, rate) = recording.even()?;
-    let band = excited_band(step, &torque, &rate).context("the torque has no spectrum")?;
-    ensure!(
-        band.1 > 1.15 * band.0,
-        "{}: the torque excites {:.2} to {:.2} Hz alone. A frequency response needs a sweep, a multisine \
-         or noise around the slosh frequency",
-        recording.name,
-        band.0,
-        band.1
-    );
-    let lag = spa::LAG.min(recording.duration() / 4.0);
-    Ok(spa::frequency_response(step, &torque, &rate, &logarithmic_grid(band, 1200), lag))
-}
 
 /// A hub with one slosh mode and viscous friction as three poles and two zeros.
 ///
@@ -461,6 +428,7 @@ mod tests {
     use super::*;
     use analysis::BAND;
     use analysis::linear::Linear;
+    use analysis::logarithmic_grid;
 
     const BENCH: Bench = Bench { arm: 0.225, density: 1000.0, gravity: 9.81 };
 

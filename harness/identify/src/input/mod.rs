@@ -8,6 +8,7 @@ pub mod question;
 pub mod reading;
 pub mod record;
 pub mod recording;
+pub mod response;
 pub mod sensor_faults;
 pub mod spikes;
 pub mod tolerance;

@@ -13,10 +13,10 @@ use names::hubslosh::{FrictionModel, SloshModel, fluid, friction, hub, tank};
 use report::page::{axis_chart, render_chart, series};
 use report::svg::{Axis, Style};
 
-use super::braking::{Braking, FrictionPoint, harmonics_at};
-use super::identification::{Details, Identification};
 use super::output_error::{self, OutputError};
 use super::{Method, Needs, Task};
+use crate::bench::braking::{Braking, FrictionPoint, harmonics_at};
+use crate::bench::identification::{Details, Identification};
 use crate::bench::nominal::{self, Nominal};
 use crate::bench::options::Options;
 use crate::input::plausible;

@@ -1,9 +1,7 @@
 //! Methods of identification, one a file: what each is given, what it needs of that, and what all return.
 
-pub mod braking;
 pub mod free_decay;
 pub mod friction;
-pub mod identification;
 pub mod output_error;
 
 use anyhow::{Context, Result};

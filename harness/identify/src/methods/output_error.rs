@@ -11,14 +11,15 @@ use names::hubslosh::FrictionModel;
 use names::hubslosh::SloshModel::{Frozen, Linear, Planar, Spherical};
 use names::hubslosh::{self};
 
-use super::identification::{Details, Identification, ModelFit};
 use super::{Method, Needs, Task};
 use crate::bench::answer::{self, Fitted, answer};
 use crate::bench::breaking;
+use crate::bench::identification::{Details, Identification, ModelFit};
 use crate::bench::options::Options;
 use crate::bench::problem;
 use crate::bench::start::{self, Response};
 use crate::bench::system::BenchSystem;
+use crate::bench::verdict;
 use crate::engine::search::solve;
 use crate::engine::{DECIDES, Problem};
 use crate::fit::evidence;
@@ -27,7 +28,6 @@ use crate::input::recording::Recording;
 use crate::news::News;
 use crate::tuning::{BEGINNINGS, BIC_ALIKE, LONG_RECORDING};
 use crate::words::page::Sections;
-use crate::words::verdict;
 
 /// The FMU fitted in the time domain.
 pub struct OutputError {

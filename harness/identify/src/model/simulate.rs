@@ -10,14 +10,29 @@ use host::causality::Causality;
 use host::description::{ModelDescription, Type};
 use host::exchange;
 use host::fmu::{Fmu, Instance, Interface};
-use names::hubslosh::solver::MAX_STEPS;
+use names::hubslosh::solver::{self, MAX_STEPS};
 
-use crate::bench::simulate::most_steps;
 use crate::input::question::{Question, Setting, Solver, real};
 use crate::input::record::Record;
 use crate::tuning::{
-    COMPARED_FACTOR, COMPARED_STEPS, COMPARED_TOLERANCE, FINEST_TOLERANCE, HELD_STEPS, SLOPE_PROBES,
+    COMPARED_FACTOR, COMPARED_STEPS, COMPARED_TOLERANCE, FINEST_TOLERANCE, HELD_STEPS,
+    MOST_INTERNAL_STEPS, SLOPE_PROBES,
 };
+
+/// Returns the bound for `solver.max_steps` in runs over these instants, s; `None` where the FMU has no such parameter, the
+/// settings set it, or its default is less.
+pub fn most_steps<'n>(
+    description: &ModelDescription,
+    mut set: impl Iterator<Item = &'n str>,
+    time: &[f64],
+) -> Option<i32> {
+    let variable = description.variable(solver::MAX_STEPS).ok()?;
+    let longest = time.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max);
+    let most =
+        (MOST_INTERNAL_STEPS.0 + MOST_INTERNAL_STEPS.1 * longest).min(f64::from(i32::MAX)) as i32;
+    let default: Option<i32> = variable.attributes().start.as_ref()?.parse().ok();
+    (!set.any(|name| name == solver::MAX_STEPS) && Some(most) < default).then_some(most)
+}
 
 /// An FMU for one solver.
 pub enum Model {

@@ -1,5 +1,6 @@
 //! Fifth stage: the results in words, as a page and as JSON.
 
+pub mod combination;
 pub mod identified;
 pub mod page;
 pub mod verdict;

@@ -8,11 +8,11 @@ use maud::{Markup, html};
 use report::page::{axis_chart, document, render_chart, series, table};
 use report::svg::{Chart, Style};
 
-use crate::bench::combination::Combination;
-use crate::bench::start;
 use crate::estimate::{Estimated, prose};
 use crate::input::recording::Recording;
+use crate::input::response;
 use crate::tuning::{PAGE_LAGS, PAGE_POINTS, PAGE_STRETCH};
+use crate::words::combination::Combination;
 use crate::words::identified::{Identified, Residual};
 use crate::words::verdict::DOUBTS;
 
@@ -224,7 +224,7 @@ fn bode(signals: &Residual) -> Option<[Chart; 2]> {
     let simulated = signals.measured.iter().zip(&signals.residual).map(|(y, e)| y - e).collect();
     let of = |rate: Vec<f64>| {
         let torque = signals.torque.clone()?;
-        start::response(&Recording::of(&signals.name, signals.time.clone(), torque, rate)).ok()
+        response::response(&Recording::of(&signals.name, signals.time.clone(), torque, rate)).ok()
     };
     let (measured, model) = (of(signals.measured.clone())?, of(simulated)?);
     let gain = |response: &analysis::FrequencyResponse| -> Vec<(f64, f64)> {

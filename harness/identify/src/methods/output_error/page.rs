@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 use report::page::table;
 
-use crate::methods::identification::{Identification, ModelFit};
+use crate::bench::identification::{Identification, ModelFit};
 use crate::words::page::Sections;
 
 /// The sections.

@@ -4,9 +4,9 @@ use serde::Serialize;
 
 use super::braking::{Braking, FrictionPoint};
 use crate::bench::causes::{Cause, Missing};
-use crate::bench::combination::Combination;
 use crate::bench::nominal::Start;
 use crate::bench::start::Response;
+use crate::words::combination::Combination;
 use crate::words::identified::Identified;
 use analysis::innovations::Tests;
 

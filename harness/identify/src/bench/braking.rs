@@ -36,13 +36,13 @@ pub struct Braking {
     /// Angle (rad) and acceleration at `speed` (rad/s²) of each row.
     #[serde(skip)]
     pub points: Vec<(f64, f64)>,
-    /// Covariance of the coefficients from the scatter between stretches; `None` if there are fewer than [`LEAST_STRETCHES`](super::friction::LEAST_STRETCHES).
+    /// Covariance of the coefficients from the scatter between stretches; `None` if there are fewer than [`LEAST_STRETCHES`](crate::methods::friction::LEAST_STRETCHES).
     #[serde(skip)]
-    pub(super) covariance: Option<DMatrix<f64>>,
+    pub(crate) covariance: Option<DMatrix<f64>>,
 }
 
 /// Regressors of [`Braking`] at an angle: 1, then cos hθ and sin hθ of each harmonic.
-pub(super) fn harmonics_at(angle: f64, harmonics: usize) -> Vec<f64> {
+pub(crate) fn harmonics_at(angle: f64, harmonics: usize) -> Vec<f64> {
     let each = (1..=harmonics).flat_map(|h| {
         let (sin, cos) = (angle * h as f64).sin_cos();
         [cos, sin]

@@ -1,0 +1,38 @@
+//! Two unknowns of which only a sum or a product is known.
+
+use serde::Serialize;
+
+use crate::estimate::prose;
+
+/// Two unknowns of which only a sum or a product is known.
+#[derive(Clone, Debug, Serialize)]
+pub struct Combination {
+    /// `a + b`, or `a (1 + b)`.
+    pub name: String,
+    /// The two.
+    pub of: [String; 2],
+    /// Value of the combination.
+    pub value: f64,
+    /// Standard deviation.
+    pub std: f64,
+    /// Unit.
+    pub unit: String,
+    /// Their correlation.
+    pub correlation: f64,
+}
+
+impl Combination {
+    /// Returns the combination in words.
+    pub fn words(&self) -> String {
+        format!(
+            "{} and {} cannot be distinguished (correlation {:.4}); only {} = {:.6} ± {:.6} {} is determined.",
+            self.of[0],
+            self.of[1],
+            self.correlation,
+            self.name,
+            self.value,
+            self.std,
+            prose(&self.unit)
+        )
+    }
+}
