@@ -8,7 +8,7 @@ use crate::input::recording::Recording;
 
 /// Frequencies between which the torque has its power, Hz.
 pub fn excited_band(step: f64, torque: &[f64], rate: &[f64]) -> Option<(f64, f64)> {
-    let spectra = Spectra::of(step, torque, rate, welch::Segments::Seconds(60.0));
+    let spectra = Spectra::estimate(step, torque, rate, welch::Segments::Seconds(60.0));
     let total: f64 = spectra.input.iter().skip(1).sum();
     let reached = |part: f64| {
         let mut sum = 0.0;
