@@ -176,15 +176,27 @@ STICKING = [
 CASES = {
     "VanDerPol": Case(
         "VanDerPol.fmu",
-        ["--free", "mu=1:0.2:4,x0@each=2:-4:4,x1@each=0:-2:2", "--outputs", "x0,x1"]
-        + ["--solver", "host"],
+        [
+            "--free",
+            "mu=1:0.2:4,x0@each=2:-4:4,x1@each=0:-2:2",
+            "--outputs",
+            "x0,x1",
+            "--solver",
+            "host",
+        ],
         van_der_pol,
         "limit cycle; Model Exchange, starts free",
     ),
     "BouncingBall": Case(
         "BouncingBall.fmu",
-        ["--free", "e=0.7:0.5:0.99,g=-9.81:-15:-5,h@each=1:0.3:2", "--outputs", "h"]
-        + ["--solver", "host"],
+        [
+            "--free",
+            "e=0.7:0.5:0.99,g=-9.81:-15:-5,h@each=1:0.3:2",
+            "--outputs",
+            "h",
+            "--solver",
+            "host",
+        ],
         bouncing_ball,
         "bounces until it rests; Model Exchange, events",
     ),

@@ -40,14 +40,14 @@ def test_an_engine_along_the_line_of_action_is_the_thrust(craft: Craft) -> None:
         assert found["phase_margin"].to_numpy() == pytest.approx(
             plain["phase_margin"].to_numpy(), rel=1e-9, nan_ok=True
         )
-    # beside O it is the same craft with all else moved the other way
-    beside = replace(craft, thrust=0.0, engines={"main": Engine((0.2, -0.1, 0), (0, 0, 1), 400)})
+    # off the axis through O it is the same craft with all else moved the other way
+    off_axis = replace(craft, thrust=0.0, engines={"main": Engine((0.2, -0.1, 0), (0, 0, 1), 400)})
     moved = replace(
         craft, center_of_mass=(-0.1, 0.12, 1.0),
         tanks={"ox": replace(craft.tanks["ox"], position=(-0.1, 0.6, -0.2))},
     )  # fmt: skip
-    assert beside.parameters("50%") == pytest.approx(moved.parameters("50%"), abs=1e-12)
-    assert beside.trim("50%").untrimmed_acceleration == pytest.approx(
+    assert off_axis.parameters("50%") == pytest.approx(moved.parameters("50%"), abs=1e-12)
+    assert off_axis.trim("50%").untrimmed_acceleration == pytest.approx(
         moved.trim("50%").untrimmed_acceleration, rel=1e-9
     )
 
