@@ -247,7 +247,7 @@ fn without_gravity_only_surface_tension_restores() {
     let k = written.lines().find_map(|l| l.strip_prefix("\"slosh.table.k[1]\" = ")).unwrap();
     assert!(k.parse::<f64>().unwrap() > 0.0 && !written.contains("g_ref"), "{written}");
     for (more, words) in [
-        (&["--parameters", &set, "--nu=1e-6"][..], "damping ratio holds at a specific force"),
+        (&["--parameters", &set, "--nu=1e-6"][..], "A damping ratio depends on the acceleration"),
         (&["--gravity=-1"], "--gravity -1 (allowed: 0 or more"),
     ] {
         let given: Vec<&str> = base[..2].iter().chain(more).copied().collect();
