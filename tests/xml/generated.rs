@@ -120,7 +120,7 @@ fn numbers_of_variables_in_the_documentation_equal_those_of_the_tables() {
             format!("HubSlosh has {hub} parameters, SloshTank {tank}, Spacecraft {spacecraft}:"),
         ),
         ("book/hosts.md", format!("description has {arrays} variables in place of {scalars},")),
-        ("book/hosts.md", format!("| `Spacecraft_1x1` | {small} |")),
+        ("book/hosts.md", format!("| Spacecraft with `pack --tanks 1 --modes 1` | {small} |")),
         ("book/commands.md", format!("with {small} parameters in place of {spacecraft} |")),
     ] {
         let there = String::from_utf8(committed(pack::root().join(page))).unwrap();

@@ -19,7 +19,6 @@ use serde::Serialize;
 use crate::coefficients::FiniteAmplitude;
 use crate::contour::{Problems, Volume, Wall};
 use crate::potential_flow::{Discretisation, Solution};
-use crate::spin::Spin;
 
 const MASSLESS: f64 = 1e-9;
 
@@ -250,6 +249,43 @@ pub struct ModalData {
     /// The wetted wall.
     #[serde(skip)]
     pub wall: Option<Wall>,
+}
+
+/// The liquid of a tank that turns with it about its axis.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Spin {
+    /// Rate Omega about the axis, rad/s.
+    pub omega: f64,
+    /// Specific force along the axis, m/s².
+    pub gravity: f64,
+    /// Height of the centre of mass, m from the contour's own zero.
+    pub z_cg: f64,
+    /// Inertia about the axis, kg·m².
+    #[serde(rename = "I_axis")]
+    pub i_axis: f64,
+    /// Inertia across the axis about the centre of mass, kg·m².
+    #[serde(rename = "I_cg")]
+    pub i_cg: f64,
+    /// Height of the surface on the axis, m from the contour's own zero; `None` if the axis is dry.
+    pub z_apex: Option<f64>,
+    /// Height up to which the outer wall is wet, m from the contour's own zero.
+    pub z_wall: f64,
+    /// Radius within which the floor is dry, m: of the surface at the height of the lowest point. 0 if the floor is wet.
+    pub r_dry: f64,
+    /// Omega^2 R/g with the outer radius R of the surface at rest; `None` without gravity.
+    #[serde(rename = "Omega2_R_g")]
+    pub flatness: Option<f64>,
+    /// 2 Omega/omega_0 with the frequency of the first mode at rest; `None` without one.
+    #[serde(rename = "2Omega_omega")]
+    pub ratio: Option<f64>,
+    /// Frequencies of the first mode of an upright cylinder seen from the tank, Hz: of the wave that runs against the spin and of
+    /// the one that runs with it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub frequencies: Option<[f64; 2]>,
+    /// True if the parameters of the liquid at rest still describe the motion of the spinning one.
+    pub in_range: bool,
+    /// What the spin changes, in words.
+    pub warnings: Vec<String>,
 }
 
 /// A mode at the free surface and the wall, with the quantities of [`Mode`]: shape (r, elevation per angle)

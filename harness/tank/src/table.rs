@@ -3,8 +3,7 @@
 use core::fmt::Write as _;
 
 use crate::coefficients::FiniteAmplitude;
-use crate::modal::{Axis, Capillarity, Damping, ModalData, Mode, Rest};
-use crate::spin::Spin;
+use crate::modal::{Axis, Capillarity, Damping, ModalData, Mode, Rest, Spin};
 
 /// Formats a length in m to 1e-9 m without trailing zeros, because fills from a volume have 17 digits.
 pub(crate) fn short(length: f64) -> String {

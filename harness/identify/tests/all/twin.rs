@@ -98,7 +98,7 @@ const BREAKS: [(&str, &str); 2] =
 
 #[test]
 #[ignore = "half a minute: .ci/run --nightly"]
-fn damping_by_waves_that_break_comes_back() {
+fn damping_of_breaking_waves_is_recovered() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let torque = SHORT.replace("0.1", "0.25");
     let of = |settings: &[(&str, &str)], breaking: bool| {

@@ -2,7 +2,8 @@
 
 use core::f64::consts::{PI, TAU};
 
-use hubslosh_tank::spin::{Spin, spin};
+use hubslosh_tank::modal::Spin;
+use hubslosh_tank::spin::spin;
 use hubslosh_tank::tank::Shape;
 use hubslosh_tank::{Fill, Tank};
 
