@@ -76,8 +76,8 @@ impl Craft {
 }
 
 /// Mounting of the craft. In free flight gravity has no effect, because position and velocity refer to a
-/// freely falling frame. On a pivot O rests on a bearing in uniform gravity, and the craft turns about it,
-/// freely unless the pivot has stiffness, damping or friction.
+/// freely falling frame. If the craft is on a pivot, its point O rests on a bearing in uniform gravity, and
+/// the craft turns about O, freely unless the pivot has stiffness, damping or friction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 #[allow(missing_docs)]

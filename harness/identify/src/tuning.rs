@@ -67,7 +67,8 @@ pub const SHORTEST_RECORDING: f64 = 20.0;
 /// thesis's tank); its half-power width of 14 mHz is resolved by 1/14 mHz = 70 s. A shorter one says less of
 /// damping and mass, and its intervals are as wide as that.
 pub const LONG_RECORDING: f64 = 120.0;
-/// Part of the rows up to which a gyro with new values in them is slower than the recording.
+/// Largest share of rows with a new value of the gyro at which the gyro counts as slower than the recording. Noise makes
+/// a gyro that is as fast as the recording change in nearly every row.
 pub const SLOW_GYRO: f64 = 0.75;
 /// Largest value of a signal: the squares of all rows have a finite sum.
 pub const LARGEST_VALUE: f64 = 1e100;

@@ -142,8 +142,8 @@ impl<'fmu> Run<'fmu> {
         }
     }
 
-    /// Makes a row: outputs are read, then inputs are set and the step is made, except in the last row. A
-    /// controller acts between the two. `i` is the position of the row among those that were read from
+    /// Makes a row. First outputs are read. Then a controller, if there is one, computes its commands from them, inputs are
+    /// set, and a step is made; the last row has outputs only. `i` is the position of the row among those that were read from
     /// Python.
     fn row(&mut self, instance: &mut Instance, row: usize, i: usize) -> Result<(), Failure> {
         let (columns, recorded) = &mut self.outputs;

@@ -49,8 +49,9 @@ pub(crate) fn recognise(wall: &Wall, fill: f64) -> Option<Recognised> {
     })
 }
 
-/// A measured shape of a part of the wetted wall, up from the lowest point, with the depth of liquid up to
-/// which the wall is of this shape, and its share of the wetted area.
+/// A part of the wetted wall that has one of the shapes whose damping was measured. Parts are listed upwards from the
+/// lowest point of the tank. A part has the depth of liquid up to which the wall has this shape, and the part's share of
+/// the wetted area.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Part {
     pub found: Recognised,

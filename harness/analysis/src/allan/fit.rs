@@ -379,7 +379,8 @@ impl Problem<'_> {
         Some((chi_squared, Outlier { tau: self.taus()[worst], ratio }))
     }
 
-    /// Returns the 95 % interval of coefficient `place`, or `None` if a value cannot be tested.
+    /// Returns the 95 % interval of the coefficient with the index `place`: the values for which the estimate
+    /// is within its own 95 % range. Returns `None` if this range cannot be computed at one of the tried values.
     fn interval(&self, place: usize, state: &State, tables: &mut Covariance) -> Option<(f64, f64)> {
         // Distances of the unconstrained estimate from the ends of its 95 % range, if `value` is true.
         let mut beyond = |value: f64| -> Option<(f64, f64, f64)> {

@@ -213,9 +213,9 @@ impl Setting {
 /// Whose solver steps the FMU.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Solver {
-    /// The FMU's (Co-Simulation).
+    /// The solver within the FMU, in Co-Simulation.
     Own,
-    /// The host's (Model Exchange), with this relative tolerance.
+    /// The solver of the host, in Model Exchange, with this relative tolerance.
     Host(f64),
 }
 

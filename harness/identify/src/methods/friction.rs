@@ -244,7 +244,8 @@ struct FreeRow {
     stretch: usize,
 }
 
-/// Fits the rows of one direction by least squares, at this speed, rad/s. A parabola takes the dependence on the speed.
+/// Fits the deceleration in one direction of rotation by least squares, as harmonics of the angle plus a parabola in the
+/// difference from `speed`, rad/s. The result is the deceleration at that speed.
 fn braking(direction: &'static str, rows: &[FreeRow], speed: f64) -> Option<Braking> {
     let (harmonics, count) = (2, rows.len());
     let (width, all) = (2 * harmonics + 1, 2 * harmonics + 3);

@@ -436,7 +436,8 @@ fn may_be_unit(name: &str, text: &str, from: usize, is_last: bool, dimension: Di
     }
 }
 
-/// Returns a name without the separators and the word "in" before its unit.
+/// Returns a column's name, from which the unit at its end was already cut, without what led to the unit: opening
+/// brackets, separators and the word "in".
 fn strip_unit(name: &str) -> &str {
     let name = name.trim_end_matches(|c| BETWEEN.contains(&c) || ['[', '(', '{', '<'].contains(&c));
     let cut = name.strip_suffix(" in").unwrap_or(name);
