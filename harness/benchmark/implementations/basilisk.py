@@ -5,9 +5,6 @@
 Basilisk's `sphericalPendulum` and RKF78, in steps of 1 ms, and of 5 ms in the long spin-up.
 """
 
-import sys
-from pathlib import Path
-
 import numpy as np
 from Basilisk.simulation import extForceTorque, spacecraft, sphericalPendulum, svIntegrators
 from Basilisk.utilities import SimulationBaseClass, macros
@@ -116,12 +113,5 @@ def run(case: str, integrator: str = "RKF78", step: float | None = None) -> np.n
 CASES = {name: lambda name=name: run(name) for name in STEP}
 
 
-def main() -> None:
-    """Run the cases."""
-    for name in sys.argv[2:] or CASES:
-        cases.write(Path(sys.argv[1]), name, CASES[name]())
-        print(f"{name}: written", flush=True)
-
-
 if __name__ == "__main__":
-    main()
+    cases.run(CASES)

@@ -3,6 +3,7 @@
 import csv
 import sys
 import tomllib
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -64,6 +65,17 @@ def inertia(p: dict) -> np.ndarray:
     ])  # fmt: skip
 
 
+def linearised_craft() -> dict:
+    """Return the craft of the case linearisation in the form of those in six axes."""
+    p = parameters("linearisation")
+    tank = {"hinge": np.array([0, 0, p["hinge"]]), "axis": np.array([0, 0, 1.0]), "m": p["m"],
+            "l": p["l"], "c": p["c"], "k": 0.0, "p_0": np.array([0, 0, -1.0]),
+            "p_dot_0": np.zeros(3)}  # fmt: skip
+    return {"mass": p["mass"], "center": np.array([0, 0, p["z_c"]]), "J_xx": p["J"],
+            "J_yy": p["J"], "J_zz": 500.0, "J_xy": 0, "J_xz": 0, "J_yz": 0,
+            "omega_0": np.zeros(3), "tank": [tank]}  # fmt: skip
+
+
 def frequencies() -> np.ndarray:
     """Return the frequencies of the case linearisation, rad/s."""
     return np.round(np.geomspace(0.05, 20.0, 131), 6)
@@ -82,6 +94,13 @@ def write(folder: Path, case: str, rows: np.ndarray, comment: str = "") -> None:
             cells = [f"{row[0]:.9g}"]
             cells += ["" if np.isnan(x) else f"{x + 0.0:.16g}" for x in row[1:]]
             file.write(",".join(cells) + "\n")
+
+
+def run(cases: Mapping[str, Callable[[], np.ndarray]]) -> None:
+    """Run cases from the command line, FOLDER [CASE …], and write their results."""
+    for name in sys.argv[2:] or cases:
+        write(Path(sys.argv[1]), name, cases[name]())
+        print(f"{name}: written", flush=True)
 
 
 def inputs_of_backbones() -> list[tuple[float, float, float, float]]:

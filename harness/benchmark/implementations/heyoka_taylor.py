@@ -7,9 +7,6 @@ seen from axes that do not turn, and the rods' pulls as unknowns. Draining: bala
 moment of momentum, differentiated by heyoka.
 """
 
-import sys
-from pathlib import Path
-
 import heyoka as hy
 import numpy as np
 
@@ -418,13 +415,7 @@ def craft(case: str):
 def linearisation():
     """Return the frequency responses of the nonlinear equations, differentiated by heyoka."""
     p = cases.parameters("linearisation")
-    tank = {"hinge": np.array([0, 0, p["hinge"]]), "axis": np.array([0, 0, 1.0]), "m": p["m"],
-            "l": p["l"], "c": p["c"], "k": 0.0, "p_0": np.array([0, 0, -1.0]),
-            "p_dot_0": np.zeros(3)}  # fmt: skip
-    whole = {"mass": p["mass"], "center": np.array([0, 0, p["z_c"]]), "J_xx": p["J"],
-             "J_yy": p["J"], "J_zz": 500.0, "J_xy": 0, "J_xz": 0, "J_yz": 0,
-             "omega_0": np.zeros(3), "tank": [tank]}  # fmt: skip
-    equations, start = craft_system(whole)
+    equations, start = craft_system(cases.linearised_craft())
     variables = [x for x, _ in equations]
     rates = [hy.expression(rate) for _, rate in equations]
     inputs = [hy.par[4], hy.par[0]]
@@ -519,26 +510,17 @@ def forced():
 
 
 CASES = {
-    **{
-        name: lambda name=name: Bench(name).run(name)
-        for name in ("bench_linear", "bench_spherical")
-    },
-    **{
-        name: lambda name=name: craft(name)
-        for name in ("thrust", "weightless", "draining", "spinner")
-    },
+    "bench_linear": lambda: Bench("bench_linear").run("bench_linear"),
+    "bench_spherical": lambda: Bench("bench_spherical").run("bench_spherical"),
+    "thrust": lambda: craft("thrust"),
+    "weightless": lambda: craft("weightless"),
+    "draining": lambda: craft("draining"),
+    "spinner": lambda: craft("spinner"),
     "linearisation": linearisation,
     "backbones": backbones,
     "forced": forced,
 }
 
 
-def main():
-    """Run the cases."""
-    for name in sys.argv[2:] or CASES:
-        cases.write(Path(sys.argv[1]), name, CASES[name]())
-        print(f"{name}: written", flush=True)
-
-
 if __name__ == "__main__":
-    main()
+    cases.run(CASES)

@@ -214,13 +214,7 @@ def spinner() -> np.ndarray:
 def linearisation() -> np.ndarray:
     """Return the frequency responses by directional derivatives."""
     p = cases.parameters("linearisation")
-    tank = {"hinge": np.array([0, 0, p["hinge"]]), "axis": np.array([0, 0, 1.0]), "m": p["m"],
-            "l": p["l"], "c": p["c"], "k": 0.0, "p_0": np.array([0, 0, -1.0]),
-            "p_dot_0": np.zeros(3)}  # fmt: skip
-    whole = {"mass": p["mass"], "center": np.array([0, 0, p["z_c"]]), "J_xx": p["J"],
-             "J_yy": p["J"], "J_zz": 500.0, "J_xy": 0, "J_xz": 0, "J_yz": 0,
-             "omega_0": np.zeros(3), "tank": [tank]}  # fmt: skip
-    settings, _ = with_tanks(whole)
+    settings, _ = with_tanks(cases.linearised_craft())
     settings["force[3]"] = p["thrust"]
     model = hubslosh.linearize(
         fmu("Spacecraft"), settings, ["torque[2]", "force[1]"], ["omega[2]", "specific_force[1]"]

@@ -3,9 +3,6 @@
 python3 plain.py RESULTS_FOLDER [CASE ...]
 """
 
-import sys
-from pathlib import Path
-
 import numpy as np
 from scipy.integrate import quad, solve_ivp
 
@@ -375,26 +372,17 @@ def fit(t, x, w):
 
 
 CASES = {
-    **{
-        name: lambda name=name: Bench(name).run(name)
-        for name in ("bench_linear", "bench_spherical")
-    },
-    **{
-        name: lambda name=name: craft(name)
-        for name in ("thrust", "weightless", "draining", "spinner")
-    },
+    "bench_linear": lambda: Bench("bench_linear").run("bench_linear"),
+    "bench_spherical": lambda: Bench("bench_spherical").run("bench_spherical"),
+    "thrust": lambda: craft("thrust"),
+    "weightless": lambda: craft("weightless"),
+    "draining": lambda: craft("draining"),
+    "spinner": lambda: craft("spinner"),
     "linearisation": linearisation,
     "backbones": backbones,
     "forced": forced,
 }
 
 
-def main():
-    """Run the cases."""
-    for name in sys.argv[2:] or CASES:
-        cases.write(Path(sys.argv[1]), name, CASES[name]())
-        print(f"{name}: written", flush=True)
-
-
 if __name__ == "__main__":
-    main()
+    cases.run(CASES)
