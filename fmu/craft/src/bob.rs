@@ -42,7 +42,7 @@ use crate::parameters::Tank;
 
 /// Values of one bob for the outputs, body axes: position `rho` from O and velocity relative to the tank,
 /// hinge from O and direction of the tank's axis, and p in tank axes. `centring` is the energy of the
-/// centring stiffness, J; `spin` is the angular momentum beyond that of a point mass, if there is any.
+/// centring stiffness, J; `spin` is the angular momentum that a bob has in addition to the momentum of a point mass, if there is any.
 pub(crate) struct BobNow<T> {
     pub m: T,
     pub rho: Vec3<T>,

@@ -426,7 +426,8 @@ impl ConstrainedBob {
     }
 
     /// Returns coefficient n of force and torque about O on the craft without the terms in [a; w'] of this
-    /// order. `w` is coefficient n of the angular velocity, and `w2` that of the matrix of y -> w x (w x y).
+    /// order. `w` is coefficient n of the angular velocity, and `w2` coefficient n of the matrix of
+    /// y -> w x (w x y).
     #[inline(never)]
     pub fn reaction(&mut self, n: usize, w: Vec3, w2: &Mat3) -> [Vec3; 2] {
         let w = transposed_times(&self.axes, w);

@@ -29,7 +29,7 @@ const LEAST_CORRELATION: f64 = 0.9;
 /// Largest part of the run that may be missing in the recording at its ends.
 const MISSING: f64 = 0.5;
 /// Largest part of a record in gaps: lines join torque and rate alike, so that their ratio is hardly changed.
-/// Where 3 % of the rows are lost one by one, the gaps are 6 % of the record.
+/// Largest part of a sweep in gaps. A record that lost 3 % of its rows one by one has 6 % of its time in gaps.
 const GAPS: f64 = 0.15;
 /// Largest relative difference of the recorder's clock from that of the torque.
 const FASTEST_CLOCK: f64 = 2e-3;
