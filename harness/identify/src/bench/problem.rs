@@ -181,7 +181,8 @@ pub fn system<'a>(
         }
     }
     if dry && !is_set(friction::OMEGA_S) {
-        let start = first.omega_s;
+        // a recording whose rates stay below the bearing's usual speed does not show it, and must not place it
+        let start = first.omega_s.max(nominal.start.omega_s);
         let unknown = list.parameter(friction::OMEGA_S, start).with_prior(start.ln(), SPEED.0);
         let bounds = (start / SPEED.1, start * SPEED.1);
         let bent = !is_set(friction::D);

@@ -53,6 +53,13 @@ fn an_initial_rate_that_friction_stops_at_once_leaves_the_minimum_a_minimum() {
     is_described(40, &[]);
 }
 
+/// Its rates stay below a sixtieth of the Stribeck speed, which was looked for near them: friction.c was stated 6.5 standard deviations off.
+#[test]
+#[ignore = "five seconds of CPU time: .ci/long-tests"]
+fn friction_that_a_gentle_torque_does_not_separate_is_not_sure() {
+    is_described(425, &["friction.c", "friction.d", "friction.omega_s"]);
+}
+
 /// Fill and inertia were stated too narrowly, as if T = tanh(2ξh/d) were known better than its own first order is good for.
 #[test]
 fn fill_and_inertia_of_a_deep_tank_are_in_their_intervals() {
