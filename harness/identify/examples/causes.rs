@@ -18,7 +18,7 @@ use anyhow::{Context, Result, bail};
 use fmu_twin::{SensorErrors, Twin, Unmodelled};
 use host::fmu::Fmu;
 use identify::bench::options::Options;
-use identify::bench::simulate::Intersample;
+use identify::engine::Hold;
 use identify::input::reading::prepare;
 use identify::input::recording::Recording;
 use identify::methods::output_error::identify;
@@ -145,7 +145,7 @@ fn main() -> Result<()> {
             (way.gyro)(&mut recording);
             let options = Options {
                 models: vec!["linear".into()],
-                intersample: Some(Intersample::FirstOrderHold),
+                intersample: Some(Hold::FirstOrderHold),
                 ..Options::default()
             };
             let mut notes = Vec::new();

@@ -40,7 +40,7 @@ use identify::input::reading;
 use identify::input::tolerance::Tolerances;
 use identify::methods::output_error::identify;
 
-use identify::bench::simulate::Intersample;
+use identify::engine::Hold;
 use identify::tuning::COARSEST;
 
 /// Command-line arguments.
@@ -113,9 +113,9 @@ fn arguments() -> Result<Arguments> {
             "gyro" => asked.twin.gyro = Some(value.parse()?),
             "intersample" => {
                 asked.twin.intersample = match value {
-                    "held" => Intersample::ZeroOrderHold,
-                    "smooth" => Intersample::BandLimited,
-                    _ => Intersample::FirstOrderHold,
+                    "held" => Hold::ZeroOrderHold,
+                    "smooth" => Hold::BandLimited,
+                    _ => Hold::FirstOrderHold,
                 }
             }
             "say" => asked.say = value == "true",

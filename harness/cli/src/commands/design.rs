@@ -12,7 +12,8 @@ use host::fmu::Fmu;
 use host::schedule::History;
 use identify::bench::design::{self, Multisine, Wheel};
 use identify::bench::nominal;
-use identify::bench::simulate::{Intersample, Setup};
+use identify::bench::simulate::Setup;
+use identify::engine::Hold;
 use names::hubslosh::{TAU_CMD, friction, hub, imu, slosh, tank, wheel};
 use serde_json::json;
 use signals::table::{self, Table};
@@ -273,7 +274,7 @@ impl<'f> Bench<'f> {
         fmu: &'f Fmu,
         real: &mut dyn FnMut(&str) -> Result<f64>,
     ) -> Result<Self> {
-        let intersample = Intersample::FirstOrderHold;
+        let intersample = Hold::FirstOrderHold;
         let setup = Setup { settings: asked.settings.clone(), intersample };
         let white = white_noise(real)?;
         // Gauss–Markov bias of IEEE Std 952: its standard deviation is the bias instability divided by

@@ -7,8 +7,8 @@ use anyhow::{Context, Result, bail, ensure};
 use host::fmu::Fmu;
 use identify::bench::nominal::{self, Nominal};
 use identify::bench::options::Options;
-use identify::bench::simulate::Intersample;
 use identify::bench::system::Target;
+use identify::engine::Hold;
 use identify::input::reading::{self, Source};
 use identify::input::recording::Recording;
 use identify::input::tolerance::{self, Tolerances};
@@ -442,9 +442,9 @@ impl KnownArgs {
         let known = known.into_iter().filter_map(|(name, value, std)| Some((name, value, std?)));
         let starts = starts.into_iter().map(|(name, value, _)| (name, value));
         let intersample = self.torque.as_deref().map(|how| match how {
-            "held" => Intersample::ZeroOrderHold,
-            "smooth" => Intersample::BandLimited,
-            _ => Intersample::FirstOrderHold,
+            "held" => Hold::ZeroOrderHold,
+            "smooth" => Hold::BandLimited,
+            _ => Hold::FirstOrderHold,
         });
         Ok(Options {
             intersample,

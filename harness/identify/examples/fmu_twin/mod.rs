@@ -10,7 +10,8 @@ use host::drive::Inputs;
 use host::fmu::Fmu;
 
 use identify::bench::design::Multisine;
-use identify::bench::simulate::{Intersample, TORQUE_BESIDES};
+use identify::bench::simulate::TORQUE_BESIDES;
+use identify::engine::Hold;
 use identify::input::recording::Recording;
 
 /// Errors of gyro and data link in addition to the FMU's own noise.
@@ -109,7 +110,7 @@ pub struct Twin {
     /// Values of the gyro a second; `None`: as many as rows.
     pub gyro: Option<f64>,
     /// Intersample behaviour of the torque.
-    pub intersample: Intersample,
+    pub intersample: Hold,
     /// Errors of gyro and data link.
     pub sensor_errors: SensorErrors,
     /// Standard deviation of an encoder's angle, rad; `None`: there is no encoder.
@@ -124,7 +125,7 @@ impl Default for Twin {
             settings: Vec::new(),
             rate: 50.0,
             gyro: None,
-            intersample: Intersample::FirstOrderHold,
+            intersample: Hold::FirstOrderHold,
             sensor_errors: SensorErrors::default(),
             encoder: None,
             unmodelled: Vec::new(),
@@ -160,8 +161,8 @@ impl Twin {
         let time: Vec<f64> = (0..=rows).map(|k| start + k as f64 * step).collect();
         let tau: Vec<f64> = time.iter().map(|&t| torque.torque_at(t)).collect();
         // the FMU hears the recorded torque late: its knots are shifted, there is no torque before the first
-        let held = self.intersample == Intersample::ZeroOrderHold;
-        let heard = if self.intersample == Intersample::BandLimited {
+        let held = self.intersample == Hold::ZeroOrderHold;
+        let heard = if self.intersample == Hold::BandLimited {
             torque.clone()
         } else if late == 0.0 {
             Torque::rows(&time, &tau, None, held)?
@@ -176,7 +177,7 @@ impl Twin {
         let heard = if is(Unmodelled::ActuatorLag) { behind(&heard, &time)? } else { heard };
         // steps that meet the knots, or are short against a smooth torque's cycle
         let parts = match (self.intersample, late == 0.0) {
-            (Intersample::BandLimited, _) => (step / 1e-3).ceil() as usize,
+            (Hold::BandLimited, _) => (step / 1e-3).ceil() as usize,
             (_, true) => 1,
             (_, false) => 4,
         };
@@ -241,7 +242,7 @@ impl Twin {
                 end if end == parts => time[row + 1],
                 end => time[row] + end as f64 * run.step,
             };
-            let shift = if self.intersample == Intersample::BandLimited { late } else { 0.0 };
+            let shift = if self.intersample == Hold::BandLimited { late } else { 0.0 };
             (course.values[0], course.slopes[0]) = match held {
                 true => (heard.torque_at(t), 0.0),
                 false => {

@@ -10,7 +10,7 @@ use host::fmu::Fmu;
 use identify::bench::design::Multisine;
 use identify::bench::identification::Identification;
 use identify::bench::options::Options;
-use identify::bench::simulate::Intersample;
+use identify::engine::Hold;
 use identify::input::reading::{Source, prepare, read};
 use identify::input::recording::Recording;
 use identify::input::tolerance::Tolerances;
@@ -42,7 +42,7 @@ pub struct Twin {
     pub seed: u64,
     bench: Bench,
     excitation: Excitation,
-    between: Intersample,
+    between: Hold,
     /// s.
     duration: f64,
     /// s.
@@ -109,7 +109,7 @@ impl Twin {
             Excitation::Slow,
         ];
         let excitation = excitations[(seed % 6) as usize];
-        let between = Intersample::ALL[(random.uniform() * 3.0) as usize];
+        let between = Hold::ALL[(random.uniform() * 3.0) as usize];
         bench.liquid = if random.uniform() < 0.4 { Liquid::Spherical } else { Liquid::Linear };
         let mut twin = Twin {
             seed,
@@ -157,7 +157,7 @@ impl Twin {
     }
 
     /// Returns the intersample behaviour that the fit receives; `None` for half of the twins, where the fit has to find it.
-    pub fn told(&self) -> Option<Intersample> {
+    pub fn told(&self) -> Option<Hold> {
         (self.seed.is_multiple_of(2)).then_some(self.between)
     }
 
@@ -257,9 +257,9 @@ impl Twin {
         let torque = self.torque();
         let tau: Vec<f64> = commands.iter().map(|t| torque(*t)).collect();
         let drive = match self.between {
-            Intersample::FirstOrderHold => Drive::Lines(commands, &tau),
-            Intersample::ZeroOrderHold => Drive::Held(commands, &tau),
-            Intersample::BandLimited => Drive::Smooth(commands, &*torque),
+            Hold::FirstOrderHold => Drive::Lines(commands, &tau),
+            Hold::ZeroOrderHold => Drive::Held(commands, &tau),
+            Hold::BandLimited => Drive::Smooth(commands, &*torque),
         };
         let late =
             |delay: f64| -> Vec<f64> { instants.iter().map(|t| (t - delay).max(0.0)).collect() };

@@ -121,7 +121,7 @@ pub fn identify(
         }
     }
     told(&News::Step("intervals from the profiles of the likelihood".into()));
-    let mut found = answer(&problem, &minimum, question)?;
+    let mut found = conclude(&problem, &minimum, question)?;
     found.details.starts = starts;
     found.done = done;
     Ok(found)
@@ -157,7 +157,7 @@ fn remedy(problem: &Problem, solver: &SolverError) -> String {
     }
 }
 
-fn answer(problem: &Problem, minimum: &Minimum, question: &Question) -> Result<Identification> {
+fn conclude(problem: &Problem, minimum: &Minimum, question: &Question) -> Result<Identification> {
     let n = minimum.x.len();
     let inner = minimum.inner(problem);
     let solver = solver_error::measure(

@@ -25,14 +25,13 @@ use crate::estimate::{Estimated, prose};
 use crate::input::recording::Recording;
 use crate::input::tolerance::{self, Share};
 use crate::news::News;
+use crate::tuning::CONVERGED;
 use crate::words::combination::Combination;
 use crate::words::identified::{Identified, Residual};
 use crate::words::page::RATE;
 
 /// Fit of a rate below which a minimum is taken for a wrong one, %.
 const POOR_FIT: f64 = 90.0;
-/// Distance to a minimum up to which a search has converged, standard deviations: the stated deviations contain it.
-const CONVERGED: f64 = 0.5;
 /// Standard deviation of a known value over its tolerance below which the recordings show it.
 const SHOWN: f64 = 0.7;
 
@@ -119,16 +118,16 @@ pub struct Fitted<'p> {
     pub system: &'p BenchSystem<'p>,
     /// End of the search.
     pub solution: Solution<'p>,
-    /// In numbers.
+    /// The fit in numbers.
     pub fit: ModelFit,
 }
 
-/// The answer from the chosen model; `near` are others that explain the recordings about as well, with the probability of each and
+/// Concludes the identification from the chosen model; `near` are others that explain the recordings about as well, with the probability of each and
 /// that of the chosen one.
 ///
 /// # Errors
 /// If the FMU refuses a run at the minimum.
-pub fn answer(
+pub fn conclude(
     mut best: Fitted,
     near: (f64, &mut [(f64, Fitted)]),
     question: &verdict::Question,
@@ -264,7 +263,7 @@ fn estimated(
     Estimated { value, std, std_noise, interval, determined, unit: full.units[k].clone() }
 }
 
-/// What the chosen model's minimum shows besides values.
+/// Collects the findings at the chosen model's minimum other than values.
 fn findings(
     system: &BenchSystem,
     solution: &Solution,
@@ -325,7 +324,7 @@ fn findings(
     }
 }
 
-/// What the torque does between rows, in words.
+/// Returns the course of the torque between rows in words.
 fn torque_words(solution: &Solution) -> Option<String> {
     if solution.rivals.is_empty() {
         return None;

@@ -6,8 +6,8 @@ use names::hubslosh::FrictionModel;
 use names::hubslosh::SloshModel::{Frozen, Linear, Planar, Spherical};
 
 use crate::bench::nominal::Nominal;
-use crate::bench::simulate::Intersample;
 use crate::bench::system::Target;
+use crate::engine::Hold;
 use crate::input::recording::Recording;
 use crate::input::tolerance::Tolerances;
 
@@ -35,7 +35,7 @@ pub struct Options {
     /// Tolerances of values that are not estimated.
     pub tolerances: Tolerances,
     /// Intersample behaviour of the torque; `None` chooses the best fit.
-    pub intersample: Option<Intersample>,
+    pub intersample: Option<Hold>,
     /// True if the rate's time stamps may be early: a negative delay then raises no doubt.
     pub acausal: bool,
     /// Recordings that are simulated, not fitted.

@@ -9,6 +9,7 @@ use names::hubslosh::{
 };
 
 use crate::bench::effect::{self, Effects};
+use crate::engine::Hold;
 use crate::input::clocks;
 use crate::input::recording::Recording;
 use crate::model::simulate::most_steps;
@@ -42,8 +43,6 @@ pub enum Read {
     States,
 }
 
-pub use crate::engine::problem::Hold as Intersample;
-
 /// Values that, joined by lines, act as the smooth signal does whose samples these are. Lines make sinc²(Ωh/2) of a sine at
 /// Ω, h the time between rows: 0.8 % less at 2.4 Hz and 50 Hz sampling. With δ² the second difference, which makes
 /// −(Ωh)² + (Ωh)⁴/12 of it,
@@ -73,13 +72,13 @@ pub fn smooth(time: &[f64], signal: &[f64]) -> Vec<f64> {
 
 /// Instants of a recording's torque, s, and its values there; those of a band-limited torque are joined by lines ([`smooth`]).
 /// The recording's ends are among them.
-pub fn course(recording: &Recording, intersample: Intersample) -> (Vec<f64>, Vec<f64>) {
+pub fn course(recording: &Recording, intersample: Hold) -> (Vec<f64>, Vec<f64>) {
     let of = |values: &[f64]| recording.commands().iter().map(|k| values[*k]).collect::<Vec<_>>();
     let (mut knots, mut torque) = match recording.commanded {
         None => (recording.time.clone(), recording.torque.clone()),
         Some(_) => (of(&recording.time), of(&recording.torque)),
     };
-    if intersample == Intersample::BandLimited && knots.len() > 3 {
+    if intersample == Hold::BandLimited && knots.len() > 3 {
         let (fine, values) = clocks::refined(&knots, &torque);
         torque = smooth(&fine, &values);
         knots = fine;
@@ -112,7 +111,7 @@ pub struct Setup {
     /// Values by FMU name, as text, set first.
     pub settings: Vec<(String, String)>,
     /// Intersample behaviour of the torque.
-    pub intersample: Intersample,
+    pub intersample: Hold,
 }
 
 impl Setup {
@@ -162,7 +161,7 @@ impl Setup {
             instance.set_real(&[reference(name)?], &[*value])?;
         }
         let (mut knots, mut torque) = course(recording, self.intersample);
-        let mut held = self.intersample == Intersample::ZeroOrderHold;
+        let mut held = self.intersample == Hold::ZeroOrderHold;
         if effects.actuator_lag > 0.0 {
             (knots, torque) = effect::of_actuator(effects.actuator_lag, &knots, &torque, held);
             held = false;

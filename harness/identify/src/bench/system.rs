@@ -25,7 +25,7 @@ use crate::bench::simulate::{self, Read, Setup};
 use crate::engine::{Hold, Motion, System};
 use crate::input::recording::Recording;
 
-/// What an unknown is to the bench.
+/// The meaning of an unknown for the bench.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Target {
     /// A parameter of the FMU.
@@ -94,7 +94,7 @@ pub struct Row {
 
 /// A torque that follows the motion: in words, with the unit of its factor.
 pub struct Besides {
-    /// What it follows.
+    /// Quantity that the effect is proportional to.
     pub follows: &'static str,
     /// Unit of the factor.
     pub unit: &'static str,
@@ -135,7 +135,7 @@ pub struct BenchSystem<'a> {
     pub settings: Vec<(String, String)>,
     /// Known values.
     pub bench: Bench,
-    /// What each unknown is.
+    /// Meaning of each unknown, in their order.
     pub targets: Vec<Target>,
     /// What is derived: names and units.
     pub derived: Vec<(String, String)>,

@@ -21,18 +21,14 @@ const FEWEST: usize = 400;
 /// Places of the profile's coordinate between which draws are spread evenly.
 const PLACES: usize = 400;
 
-/// What is derived from the unknowns, with its draws.
+/// Quantities that are derived from the unknowns: their names, units and values at the minimum, and draws of each in `columns`.
 #[derive(Clone, Debug, Default)]
 pub struct Derived {
-    /// Names.
     pub names: Vec<String>,
-    /// Units.
     pub units: Vec<String>,
-    /// Values at the minimum.
     pub values: Vec<f64>,
-    /// Draws of each.
     pub columns: Vec<Vec<f64>>,
-    /// The same of the tolerances' coordinates, over their standard deviations, with their names.
+    /// Draws of the coordinates of known values, over their standard deviations, with the names of these values.
     pub tolerances: Vec<(String, Vec<f64>)>,
     /// True for the ends that the profile's range left open, of the quantity with that name.
     pub open: Option<(String, [bool; 2])>,

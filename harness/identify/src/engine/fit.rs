@@ -34,23 +34,20 @@ pub struct Fit<'p> {
     driven: AtomicUsize,
 }
 
-/// The answer at coordinates z.
+/// A simulation at the coordinates `z`: the motion of each recording, the residuals over their standard deviations followed by those
+/// of the priors (`e`), and the sum of their squares (`cost`).
 #[derive(Clone, Debug)]
 pub struct Point {
-    /// Coordinates.
     pub z: Vec<f64>,
-    /// Motion of each recording.
     pub motion: Vec<Motion>,
-    /// Residuals over their standard deviation, then priors.
     pub e: DVector<f64>,
-    /// Sum of their squares.
     pub cost: f64,
 }
 
 /// Derivatives of the residuals.
 #[derive(Clone, Debug)]
 pub struct Derivatives {
-    /// Of the stacked residuals, a column an unknown; 0 of those that were not asked for.
+    /// A column for each unknown, with the derivatives of `Point::e`; 0 for unknowns that were not asked for.
     pub matrix: DMatrix<f64>,
     /// Means of the derivatives of each signal's reading.
     pub means: DMatrix<f64>,

@@ -1,8 +1,8 @@
-//! What the inputs do between rows, by the likelihood.
+//! The likelihood decides which course the inputs take between rows.
 //!
-//! A held input comes half a row late on average, so "held without a delay" and "linear with a delay of half a row" differ little. So
-//! each behaviour gets a minimum of its own with all unknowns free, and none is taken that needs an effect before its cause.
-//! Behaviours that explain the recordings about as well as the best count by their probability.
+//! A held input comes half a row late on average, so "held without a delay" and "linear with a delay of half a row" differ little.
+//! Therefore each course gets a minimum of its own with all unknowns free, and none is taken whose effect would precede its cause.
+//! Courses that explain the recordings about as well as the best one count by their probability.
 
 use anyhow::Result;
 

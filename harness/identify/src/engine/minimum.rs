@@ -23,7 +23,7 @@ pub struct Minimum {
     pub free: Vec<bool>,
 }
 
-/// What ends a search.
+/// Conditions that end a search.
 #[derive(Clone, Copy, Debug)]
 pub struct End {
     /// Sets of derivatives at most.

@@ -7,10 +7,11 @@
 //! y(t; z) is the answer of the [`System`] for the coordinates z of the unknowns, g and b are errors of the sensors, and the second sum
 //! holds the priors. Each signal has white noise and a drift, whose sizes are estimated from the residual.
 //!
-//! The search takes the whole recordings from several starts, with the noise counted 100, 10 and 1 times ([`search`]). It finds what
-//! the inputs do between rows by the likelihood ([`hold`]). A residual that is more than noise is tested for effects that were not
-//! estimated ([`cause`]). Intervals are quantiles of draws ([`draws`]), along the profile of the likelihood of an unknown whose
-//! likelihood is no parabola ([`profile`]), with the tolerances of known values joined as priors.
+//! [`search`] looks for the minimum from several starts: over beginnings of the recordings that grow to the whole, because over a
+//! whole oscillation the sum of squares has a minimum for each cycle, and over the whole at once with the noise counted 100, 10 and 1
+//! times. A minimum counts once two searches have found it. [`hold`] compares how the inputs may run between rows, by the likelihood.
+//! [`profile`] follows an unknown whose likelihood is no parabola. [`cause`] tests a residual that is more than noise for effects that
+//! were not estimated. [`draws`] gives intervals as quantiles of draws along the profile, with the tolerances of known values as priors.
 
 pub mod cause;
 pub mod draws;
@@ -31,13 +32,14 @@ pub const DECIDES: f64 = 10.0;
 /// Change of the residuals by a difference, in standard deviations of one degree of freedom: above the errors of a solver, below the
 /// curvature of the answer.
 pub const MOVE: f64 = 0.3;
-/// Ends of the steps of a difference, in units of an unknown's reach.
+/// Shortest and longest step of a difference, in units of an unknown's reach.
 pub const STEPS: (f64, f64) = (1e-7, 0.2);
 /// The first step, in the same units.
 pub const FIRST_STEP: f64 = 1e-3;
 /// Distance from a minimum, in standard deviations, at which a comparison of minima ends, and at which the last search ends.
 pub const ENDS: (f64, f64) = (0.5, 0.02);
-/// Factors by which the noise counts in a search from a start: priors lead at first, so that starts may be far off.
+/// Factors by which the noise counts in a search over the whole recordings: large ones let the priors lead at first, so that a
+/// start may be far from the minimum.
 pub const INFLATIONS: [f64; 3] = [100.0, 10.0, 1.0];
 /// Part of the forecast that a step must gain for the derivatives to be kept.
 pub const KEPT: f64 = 0.4;

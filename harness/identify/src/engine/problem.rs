@@ -1,23 +1,23 @@
-//! The data of a problem: what is unknown, what was recorded, and the system that answers.
+//! The data of a problem: its unknowns, its recordings, and the simulated system.
 
 use anyhow::Result;
 
-/// What an input does between the rows of a recording (Ljung; Pintelon & Schoukens).
+/// The course of an input between the rows of a recording (Ljung; Pintelon & Schoukens).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Hold {
     /// A line from row to row.
     FirstOrderHold,
-    /// The row's value until the next.
+    /// The value of a row is held until the next row.
     ZeroOrderHold,
     /// Band-limited interpolation of the samples.
     BandLimited,
 }
 
 impl Hold {
-    /// All, the likeliest first.
+    /// All courses, the likeliest first.
     pub const ALL: [Hold; 3] = [Hold::FirstOrderHold, Hold::BandLimited, Hold::ZeroOrderHold];
 
-    /// Returns the behaviour in words.
+    /// Returns the course in words.
     pub fn words(self) -> &'static str {
         match self {
             Hold::FirstOrderHold => "linear between rows (first-order hold)",
@@ -27,10 +27,10 @@ impl Hold {
     }
 }
 
-/// Where an unknown acts.
+/// The place at which an unknown acts; outputs and recordings are given by their index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
-    /// In the system's run, of one recording or of all. Derivatives are differences of runs.
+    /// The unknown acts in the system's run, of one recording or of all, so that its derivatives are differences of runs.
     Run(Option<usize>),
     /// The reading of an output is so much late, s. The run takes it; the derivative is that of the output by time.
     Delay(usize),
@@ -38,11 +38,11 @@ pub enum Role {
     Bias(usize, Option<usize>),
     /// So many times the second output is added to the reading of the first; of an output itself it is the error of its scale.
     Gain(usize, usize),
-    /// In no reading, only in what is derived from the unknowns.
+    /// The unknown acts in no reading, but in quantities that [`System::derive`] computes.
     Derived,
 }
 
-/// How an unknown takes part in a search.
+/// The part that an unknown takes in a search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
     /// It is estimated.
@@ -53,28 +53,21 @@ pub enum Part {
     Candidate,
 }
 
-/// One unknown number. Its coordinate z is its value or the logarithm of that.
+/// One unknown number with its `unit`. The search moves its coordinate z, which is its value or, with `log`, the logarithm of that.
+///
+/// `start` and `bounds` are values. `prior`, mean and standard deviation of what is known beforehand, and `reach`, the plausible
+/// distance from the start, are coordinates. `bent` says that the likelihood along it is no parabola, so that its profile is followed.
 #[derive(Clone, Debug)]
 pub struct Unknown {
-    /// Name in the result.
     pub name: String,
-    /// Unit.
     pub unit: String,
-    /// Where it acts.
     pub role: Role,
-    /// How it takes part.
     pub part: Part,
-    /// Value at the start.
     pub start: f64,
-    /// Least and largest value.
     pub bounds: (f64, f64),
-    /// True if its coordinate is the logarithm.
     pub log: bool,
-    /// Mean and standard deviation of the coordinate beforehand.
     pub prior: Option<(f64, f64)>,
-    /// Plausible distance of the coordinate from the start.
     pub reach: f64,
-    /// True if the likelihood along it is no parabola: the profile is followed.
     pub bent: bool,
 }
 
@@ -131,33 +124,27 @@ impl Unknown {
     }
 }
 
-/// Rows of a recording.
+/// A recording: `time`, s, and `inputs` at its rows, with which the residual is compared, and the usual time between the samples of
+/// the inputs, `step`, s.
 #[derive(Clone, Debug)]
 pub struct Recorded {
-    /// The recording's name.
     pub name: String,
-    /// s.
     pub time: Vec<f64>,
-    /// Inputs at the rows, with which the residual is compared.
     pub inputs: Vec<Vec<f64>>,
-    /// Usual time between the samples of the inputs, s.
     pub step: f64,
 }
 
 /// An output of a recording as it was measured.
+///
+/// `recording` and `output` are indices. `measured` has a value in each row; only rows that are `sampled` have a measured one.
+/// `white` is the white noise from one row to the next, and `drift` the drift that is expected of the sensor, if it drifts.
 #[derive(Clone, Debug)]
 pub struct Signal {
-    /// Number of the recording.
     pub recording: usize,
-    /// Number of the output.
     pub output: usize,
-    /// Values at the rows.
     pub measured: Vec<f64>,
-    /// Rows that have a value.
     pub sampled: Vec<bool>,
-    /// White noise from one row to the next.
     pub white: f64,
-    /// Drift of the noise that is expected; `None`: it does not drift.
     pub drift: Option<Drift>,
 }
 
@@ -172,14 +159,12 @@ pub struct Drift {
     pub width: f64,
 }
 
-/// A system's answer at the rows of one recording.
+/// A simulated run at the rows of one recording: each output, its derivative by time if the system computes it, and `others`,
+/// quantities that the system needs later and the search does not.
 #[derive(Clone, Debug, Default)]
 pub struct Motion {
-    /// Values of each output.
     pub outputs: Vec<Vec<f64>>,
-    /// Derivatives of each output by time, if the system has them.
     pub slopes: Vec<Vec<f64>>,
-    /// What else the system wants to know of its motion.
     pub others: Vec<Vec<f64>>,
 }
 
@@ -199,28 +184,25 @@ pub trait System: Sync {
         whole: bool,
     ) -> Result<Motion>;
 
-    /// Names and units of what is derived from the unknowns.
+    /// Returns names and units of the quantities that [`System::derive`] computes.
     fn derived(&self) -> Vec<(String, String)>;
 
-    /// Returns what is derived from values of the unknowns; `None` if there is no such system.
+    /// Returns the quantities that users ask for, such as tank and hub, from values of all unknowns; `None` if no system has these
+    /// values.
     fn derive(&self, values: &[f64]) -> Option<Vec<f64>>;
 }
 
-/// Recordings, unknowns and the system.
+/// Recordings that are fitted together, unknowns, and the system.
+///
+/// `starts` are values of all unknowns, and `holds` possible courses of the inputs between rows, the likeliest first. With `acausal`
+/// a reading may come before its cause.
 #[derive(Clone)]
 pub struct Problem<'a> {
-    /// The system.
     pub system: &'a dyn System,
-    /// Recordings, fitted together.
     pub recordings: Vec<Recorded>,
-    /// Measured outputs.
     pub signals: Vec<Signal>,
-    /// Unknowns.
     pub unknowns: Vec<Unknown>,
-    /// Values of the unknowns to start from, the likeliest first.
     pub starts: Vec<Vec<f64>>,
-    /// Behaviours between rows that are possible, the first of which is taken at first.
     pub holds: Vec<Hold>,
-    /// True if a reading may be early.
     pub acausal: bool,
 }

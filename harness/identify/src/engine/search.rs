@@ -31,11 +31,11 @@ const KINKED: f64 = 0.8;
 const SAME: f64 = 20.0;
 /// A start leads nowhere if the sum of squares over more than this part of the recordings is so many times that of the first search.
 const ASTRAY: (f64, f64) = (0.25, 3.0);
-/// What a recording tells of a known value, over what was known, from which on it is an unknown.
+/// Information of the recordings about a known value, relative to its tolerance, from which on the value is estimated.
 const SHOWN: f64 = 0.5;
-/// Sets of derivatives of the last search, and what each must lessen the sum of squares by.
+/// Most sets of derivatives of the last search, and the fall of the sum of squares below which a set is the last one.
 const LAST: (usize, f64) = (8, 0.3);
-/// The same where minima are only compared.
+/// The same fall where minima are only compared.
 const ROUGH: f64 = 2.0;
 /// Drift that the noise may have where a misfit is looked at: white noise over that of rows, size and least time of the drift.
 const OWN: (f64, f64, f64) = (1.1, 0.3, 50.0);

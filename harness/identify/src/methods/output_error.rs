@@ -12,7 +12,7 @@ use names::hubslosh::SloshModel::{Frozen, Linear, Planar, Spherical};
 use names::hubslosh::{self};
 
 use super::{Method, Needs, Task};
-use crate::bench::answer::{self, Fitted, answer};
+use crate::bench::answer::{self, Fitted, conclude};
 use crate::bench::breaking;
 use crate::bench::identification::{Details, Identification, ModelFit};
 use crate::bench::options::Options;
@@ -249,7 +249,7 @@ fn identify_whole(
         }
     };
     let own = if rivals.is_empty() { 1.0 } else { probabilities[0] };
-    let mut found = answer(best, (own, &mut rivals), &question, options, &mut tell)?;
+    let mut found = conclude(best, (own, &mut rivals), &question, options, &mut tell)?;
     let details = &mut found.details;
     let fit = &details.fit;
     let chosen = models.iter().position(|m| *m.model == fit.model && m.friction == fit.friction);

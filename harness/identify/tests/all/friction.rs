@@ -7,7 +7,8 @@ use experiments::profile::Torque;
 use host::fmu::Fmu;
 use identify::bench::identification::Identification;
 use identify::bench::options::Options;
-use identify::bench::simulate::{Intersample, Setup};
+use identify::bench::simulate::Setup;
+use identify::engine::Hold;
 use identify::estimate::Estimated;
 use identify::input::recording::Recording;
 use identify::input::tolerance::Tolerances;
@@ -202,10 +203,8 @@ fn rigid(fmu: &Fmu, settings: &[(&str, &str)], torque: &str) -> Recording {
     let mut one =
         fmu_twin::record(fmu, &settings, &torque, Some(3), SensorErrors::default()).unwrap();
     let text = |(name, value): &(&str, &str)| (name.to_string(), value.to_string());
-    let setup = Setup {
-        settings: settings.iter().map(text).collect(),
-        intersample: Intersample::FirstOrderHold,
-    };
+    let setup =
+        Setup { settings: settings.iter().map(text).collect(), intersample: Hold::FirstOrderHold };
     one.angle = Some(setup.run(fmu, &[], &one, 0.0).unwrap().angle);
     one
 }
@@ -217,7 +216,7 @@ fn a_torque_that_is_held_is_recognised() {
     let torque =
         Torque::Profile("lin-sweep:amplitude=0.1,f0=1.25,f1=3.5,duration=100".parse().unwrap());
     let settings = vec![("slosh.model".to_string(), "frozen".to_string())];
-    let twin = Twin { settings, intersample: Intersample::ZeroOrderHold, ..Twin::default() };
+    let twin = Twin { settings, intersample: Hold::ZeroOrderHold, ..Twin::default() };
     let recordings = [twin.record(&fmu, &torque, Some(3)).unwrap()];
     let found = fit(&recordings, &options()).unwrap();
     for (name, truth) in [("hub.I", 0.322414), ("friction.b", 0.03793)] {
@@ -256,10 +255,8 @@ fn the_preferential_direction_shows_in_free_decay() {
     let mut one =
         fmu_twin::record(&fmu, &settings, &torque, Some(3), SensorErrors::default()).unwrap();
     let text = |(name, value): &(&str, &str)| (name.to_string(), value.to_string());
-    let setup = Setup {
-        settings: settings.iter().map(text).collect(),
-        intersample: Intersample::FirstOrderHold,
-    };
+    let setup =
+        Setup { settings: settings.iter().map(text).collect(), intersample: Hold::FirstOrderHold };
     one.angle = Some(setup.run(&fmu, &[], &one, 0.0).unwrap().angle);
     let found = friction::identify(&fmu, &[one], &options(), &mut |_| {}).unwrap();
     let [ahead, back] = &found.details.braking[..] else { panic!("{:?}", found.details.braking) };

@@ -2,7 +2,8 @@
 //! have put there.
 
 use host::fmu::Fmu;
-use identify::bench::simulate::{Intersample, Setup};
+use identify::bench::simulate::Setup;
+use identify::engine::Hold;
 use identify::input::recording::Recording;
 use pack::packed_for_tests;
 
@@ -41,8 +42,7 @@ fn it_moves_as_the_fmu_does() {
                 ("friction.asymmetry", asymmetry.to_string()),
             ];
             let settings = settings.map(|(name, value)| (name.to_string(), value)).to_vec();
-            let intersample =
-                if held { Intersample::ZeroOrderHold } else { Intersample::FirstOrderHold };
+            let intersample = if held { Hold::ZeroOrderHold } else { Hold::FirstOrderHold };
             let recording = Recording::of("test", time.clone(), tau.clone(), tau.clone());
             let motion = Setup { settings, intersample }.run(&fmu, &[], &recording, 0.0).unwrap();
             let off = |a: &[f64], b: &[f64]| {

@@ -8,8 +8,9 @@ use experiments::profile::{Profile, Torque};
 use host::fmu::Fmu;
 use identify::bench::nominal;
 use identify::bench::options::Options;
-use identify::bench::simulate::{Intersample, Setup};
+use identify::bench::simulate::Setup;
 use identify::bench::system::Target;
+use identify::engine::Hold;
 use identify::estimate::Estimated;
 use identify::input::reading::prepare;
 use identify::input::recording::Recording;
@@ -40,7 +41,7 @@ fn sweep(fmu: &Fmu, torque: &str, settings: &[(&str, &str)]) -> Recording {
 fn options() -> Options {
     Options {
         models: vec!["linear".into()],
-        intersample: Some(Intersample::FirstOrderHold),
+        intersample: Some(Hold::FirstOrderHold),
         sensor_errors: false,
         gyro_scale: 0.0,
         tolerances: Tolerances::NONE,
@@ -392,7 +393,7 @@ fn a_delay_that_another_torque_between_rows_explains_as_well_is_not_stated_as_su
     ];
     let settings: Vec<_> = known.map(|(name, value)| (name.to_string(), value.to_string())).into();
     let sensor_errors = SensorErrors { delay: 0.005, ..SensorErrors::default() };
-    let intersample = Intersample::ZeroOrderHold;
+    let intersample = Hold::ZeroOrderHold;
     let twin = Twin { settings, intersample, sensor_errors, ..Twin::default() };
     let torque =
         Torque::Profile("lin-sweep:amplitude=0.05,duration=130,f0=2,f1=3".parse().unwrap());
@@ -497,7 +498,7 @@ fn an_encoder_shows_the_gyros_scale() {
     let torque = Torque::Profile(SHORT.parse().unwrap());
     let mut recording = fmu_twin::record(&fmu, &[], &torque, Some(2), sensor_errors).unwrap();
     // an encoder of 17 bits on the same motion, whose angle is that of a run without noise
-    let setup = Setup { settings: Vec::new(), intersample: Intersample::FirstOrderHold };
+    let setup = Setup { settings: Vec::new(), intersample: Hold::FirstOrderHold };
     let motion = setup.run(&fmu, &[], &recording, 0.0).unwrap();
     let count = std::f64::consts::TAU / f64::from(1 << 17);
     recording.angle = Some(motion.angle.iter().map(|a| (a / count).round() * count).collect());
@@ -575,8 +576,7 @@ fn a_run_that_would_not_end_is_refused() {
     let recording = sweep(&fmu, "lin-sweep:amplitude=0.1,duration=20,f0=2,f1=3", &[]);
     let run = |settings: &[(&str, &str)], delay: f64| {
         let settings = settings.iter().map(|(name, value)| ((*name).into(), (*value).into()));
-        let setup =
-            Setup { settings: settings.collect(), intersample: Intersample::FirstOrderHold };
+        let setup = Setup { settings: settings.collect(), intersample: Hold::FirstOrderHold };
         setup.run(&fmu, &[], &recording, delay)
     };
     let says = |settings: &[(&str, &str)], delay: f64| {
@@ -623,11 +623,11 @@ fn a_twin_with_a_delay_or_a_smooth_torque_is_what_the_fit_simulates() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let torque = Torque::Profile("lin-sweep:amplitude=0.1,duration=130,f0=2,f1=3".parse().unwrap());
     for (intersample, delay) in [
-        (Intersample::FirstOrderHold, 0.0),
-        (Intersample::ZeroOrderHold, 0.0),
-        (Intersample::BandLimited, 0.0),
-        (Intersample::FirstOrderHold, 0.005),
-        (Intersample::BandLimited, 0.005),
+        (Hold::FirstOrderHold, 0.0),
+        (Hold::ZeroOrderHold, 0.0),
+        (Hold::BandLimited, 0.0),
+        (Hold::FirstOrderHold, 0.005),
+        (Hold::BandLimited, 0.005),
     ] {
         let sensor_errors = SensorErrors { delay, ..SensorErrors::default() };
         // the gyro's clock without its noise
@@ -815,7 +815,7 @@ fn friction_that_drifts_is_named_as_such_or_not_at_all() {
 /// A bench whose actuator makes another torque of its command, or on which a torque acts that no model has: nothing that is stated as
 /// sure is wrong, and no wrong cause is named.
 #[test]
-fn of_benches_outside_the_model_nothing_wrong_is_sure() {
+fn benches_outside_the_model_get_neither_wrong_values_nor_wrong_causes() {
     type Acts = fn(f64) -> f64;
     type Besides = fn(f64, f64, f64) -> f64;
     let fmu = Fmu::open(packed_for_tests()).unwrap();
