@@ -6,6 +6,7 @@ use analysis::random::Random;
 use analysis::statistics::deviation;
 use experiments::profile::{Profile, Torque};
 use host::fmu::Fmu;
+use identify::bench::identification::Identification;
 use identify::bench::nominal;
 use identify::bench::options::Options;
 use identify::bench::simulate::Setup;
@@ -645,8 +646,9 @@ fn a_twin_with_a_delay_or_a_smooth_torque_is_what_the_fit_simulates() {
     }
 }
 
-/// Torque, inertias, masses and frictions in proportion make the same motion: nothing else depends on the torque's scale. The hub
-/// sticks in each half cycle, and the instants at which it does depend on the torque.
+/// Torque, inertias, masses and frictions in proportion make the same motion, so only the frictions depend on the torque's scale. The
+/// hub sticks in each half cycle, and the instants at which it does depend on the torque. The sweep is too gentle to determine
+/// friction.b and friction.c: any value along a flat valley may be the nearest fit, and their intervals are what must not move.
 #[test]
 fn a_torque_wrong_by_1_percent_moves_the_frictions_by_1_percent_and_delay_and_asymmetry_not_at_all()
 {
@@ -659,14 +661,25 @@ fn a_torque_wrong_by_1_percent_moves_the_frictions_by_1_percent_and_delay_and_as
         identify(&fmu, std::slice::from_ref(&recording), &options, &mut |_| {}).unwrap()
     };
     let (before, after) = (of(1.0), of(1.01));
-    for (name, expected) in
-        [("friction.b", 0.01), ("friction.c", 0.01), ("friction.asymmetry", 0.0)]
+    let estimate = |name: &str| {
+        [&before, &after]
+            .map(|found| found.parameters.get(name).unwrap_or_else(|| &found.measurement[name]))
+    };
+    for (name, factor) in
+        [("friction.b", 1.01), ("friction.c", 1.01), ("friction.asymmetry", 1.0), ("delay", 1.0)]
     {
-        let (a, b) = (&before.parameters[name], &after.parameters[name]);
-        // the law is exact; searches end a fiftieth of a standard deviation from the minimum, twice
-        let off = (b.value - a.value * (1.0 + expected)) / a.std;
-        assert!(off.abs() < 0.1, "{name}: {a:?} {b:?}");
+        let [a, b] = estimate(name);
+        for end in [0, 1] {
+            let off = (b.interval[end] - a.interval[end] * factor) / a.std;
+            assert!(off.abs() < 0.1, "{name}: {a:?} {b:?}");
+        }
     }
+    let sum = |found: &Identification| {
+        let all = &found.details.combinations;
+        all.iter().find(|c| c.name == "friction.c + friction.d").unwrap().clone()
+    };
+    let [a, b] = [&before, &after].map(sum);
+    assert!((b.value - 1.01 * a.value).abs() < 0.1 * a.std, "{a:?} {b:?}");
 }
 
 /// A rigid liquid, forwards and backwards.
