@@ -2,10 +2,13 @@
 //!
 //! `cargo run --release -p hubslosh-tank --features studies --example third_order -- modelDescription/HubSlosh/documentation/liquid.svg`
 
-use hubslosh_tank::{picture, third_order::Overlaps};
+#[path = "../tests/tank/liquid_figure.rs"]
+mod liquid_figure;
+
+use hubslosh_tank::third_order::Overlaps;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let path = std::env::args().nth(1).ok_or("usage: third_order FILE.svg")?;
-    std::fs::write(path, picture::third_order(&Overlaps::new(40)))?;
+    std::fs::write(path, liquid_figure::draw(&Overlaps::new(40)))?;
     Ok(())
 }

@@ -8,7 +8,7 @@ use core::f64::consts::PI;
 use crate::contour::Wall;
 use crate::curve::Segment;
 use crate::gauss::Gauss;
-use crate::modal::{Axes, Axis, ModalData, Mode, Surface, WallSpeed, rest};
+use crate::modal::{Axes, Axis, ModalData, Mode, Surface, rest};
 
 /// Number of terms in the sums over all modes; [`tail`] estimates the rest of the sum.
 const TERMS: usize = 400;
@@ -64,23 +64,16 @@ fn upright_mode(n: usize, k: f64, h: f64, m: f64, m_liq: f64, surface: Surface, 
     )
 }
 
-/// Returns the shape of a mode of wave number k, sampled over the surface, and its speed along the outer
-/// wall, sinh(k z)/sinh(k h).
-fn sampled([inner, outer]: [f64; 2], k: f64, h: f64, elevation: impl Fn(f64) -> f64) -> Surface {
+/// Returns the shape of a mode of wave number k, sampled over the surface.
+fn sampled([inner, outer]: [f64; 2], k: f64, elevation: impl Fn(f64) -> f64) -> Surface {
     let count = 200;
     let radius = |i: usize| inner + (outer - inner) * i as f64 / count as f64;
-    let speed = |i: usize| {
-        let depth = h * i as f64 / count as f64;
-        let below = (-2.0 * k * (h - depth)).exp_m1() / (-2.0 * k * h).exp_m1();
-        WallSpeed { r: outer, z: h - depth, ratio: (-k * depth).exp() * below }
-    };
     Surface {
         shape: (0..=count).map(|i| [radius(i), elevation(radius(i))]).collect(),
         peak: None,
         gradient: k * k,
         vertical_wall: true,
         upright: true,
-        wall: (0..=count).map(speed).collect(),
     }
 }
 
@@ -114,7 +107,7 @@ pub fn cylinder(radius: f64, h: f64, rho: f64, modes: usize) -> ModalData {
         let square = xi * xi - 1.0;
         let m = m_liq * 2.0 * r * (k * h).tanh() / (xi * square * h);
         let wave = 2.0 * r / square;
-        let mut surface = sampled([0.0, r], k, h, |x| wave * libm::j1(k * x) / libm::j1(xi));
+        let mut surface = sampled([0.0, r], k, |x| wave * libm::j1(k * x) / libm::j1(xi));
         if n == 0 {
             surface.peak = Some([r, wave]);
         }
@@ -193,7 +186,7 @@ pub fn annulus(inner: f64, outer: f64, h: f64, rho: f64, modes: usize) -> ModalD
         let Radial { k, a, n, at_inner, at_outer } = all[i];
         let m = rho * PI * k * (k * h).tanh() * a * a / n;
         let c = |r: f64| libm::j1(k * r) * y1_slope(k * ro) - libm::y1(k * r) * j1_slope(k * ro);
-        let mut surface = sampled([ri, ro], k, h, |r| a * c(r) / n);
+        let mut surface = sampled([ri, ro], k, |r| a * c(r) / n);
         if i == 0 {
             let peak =
                 surface.shape.iter().copied().max_by(|x, y| x[1].abs().total_cmp(&y[1].abs()));
@@ -266,7 +259,7 @@ pub fn box_axis(length: f64, width: f64, h: f64, rho: f64, modes: usize) -> Axis
         let m = m_liq * 8.0 * (k * h).tanh() / (a * a * h * k.powi(3));
         let wave = 4.0 / (a * k * k);
         let sign = if n.is_multiple_of(2) { 1.0 } else { -1.0 };
-        let surface = sampled([0.0, 0.5 * a], k, h, |x| sign * wave * (k * x).sin());
+        let surface = sampled([0.0, 0.5 * a], k, |x| sign * wave * (k * x).sin());
         let shallow = 2.0 * k * (1.0 - 2.0 * h / a) / (2.0 * k * h).sinh();
         let beta = 2.0 / a + 2.0 / width + shallow;
         let mut mode = upright_mode(n + 1, k, h, m, m_liq, surface, beta);

@@ -1,11 +1,8 @@
-//! Damping: one law for every tank and mode ([`tank_damping`], by `formulas::damping`), the individual published
-//! correlations, and ring baffles.
+//! Damping: one law for every tank and mode ([`tank_damping`], by `formulas::damping`).
 //!
 //! Re = nu/sqrt(g R^3) throughout (an inverse Reynolds number), x = h/R is the fill, and zeta is
 //! the logarithmic decrement over 2 pi. Measured tanks scatter by about 30 % around any of these
 //! correlations.
-
-use core::f64::consts::PI;
 
 use formulas::damping as formula;
 
@@ -311,168 +308,30 @@ fn shape_source(shape: formula::Shape) -> &'static str {
     }
 }
 
+/// Returns one sentence for each range of a shape's correlation that the tank is outside of.
 fn outside(shape: formula::Shape, nu: f64, g: f64) -> Vec<String> {
-    match shape {
-        formula::Shape::Sphere { radius, depth } => sphere(radius, depth, nu, g).outside,
-        formula::Shape::Cone { radius, half_angle } => cone(radius, half_angle, nu, g).outside,
-        formula::Shape::Torus { tube_radius, depth } => torus(tube_radius, depth, nu, g).outside,
+    let ranges = match shape {
+        formula::Shape::Sphere { radius, depth } => {
+            let (x, b) = (depth / radius, formula::sphere_number(radius, nu, g));
+            let measured = format!("B = {b:.3e} is outside the measured 0.01 to 1");
+            vec![
+                ((0.1..=1.9).contains(&x), format!("h/R = {x:.3} is outside 0.1 to 1.9")),
+                ((1e-2..=1.0).contains(&b), measured),
+            ]
+        }
+        formula::Shape::Cone { half_angle, .. } => {
+            let text = format!("the half angle of {half_angle} degrees is outside 0 to 45");
+            vec![((0.0..=45.0).contains(&half_angle), text)]
+        }
+        formula::Shape::Torus { tube_radius, depth } => {
+            let (y, scale) = (0.5 * depth / tube_radius, formula::torus_number(tube_radius, nu, g));
+            let measured = format!("Re is {scale:.3e} times that of the one tank measured");
+            vec![
+                ((0.1..=0.9).contains(&y), format!("h/2a = {y:.3} is outside 0.1 to 0.9")),
+                ((0.1..=10.0).contains(&scale), measured),
+            ]
+        }
         formula::Shape::Cylinder { .. } | formula::Shape::Other => Vec::new(),
-    }
-}
-
-/// A damping ratio, with one sentence for each range of its formula that the tank is outside of.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Formula {
-    pub zeta: f64,
-    pub outside: Vec<String>,
-}
-
-impl Formula {
-    fn new(zeta: f64, ranges: &[(bool, String)]) -> Formula {
-        let outside = ranges.iter().filter(|r| !r.0).map(|r| r.1.clone()).collect();
-        Formula { zeta, outside }
-    }
-}
-
-/// Computes the damping ratio of one mode from the laminar layer at the wetted wall of any tank: zeta_n =
-/// beta_n sqrt(nu/(8 omega_n)), omega_n^2 = g lambda_n (cylinder: Case and Parkinson 1957, box: Keulegan
-/// 1959).
-///
-/// Surface film, contact line and turbulence are not included. Measured cylinders have 1.4 to 1.5 times as
-/// much, see [`tank_damping`].
-pub fn laminar(mode: &Mode, nu: f64, g: f64) -> Formula {
-    let omega = (g * mode.lambda).sqrt();
-    let layer = (2.0 * nu / omega).sqrt();
-    let thin = layer < 0.1 * mode.l;
-    let text = format!("the layer of {layer:.3e} m is not thin against the wave");
-    Formula::new(formula::laminar(mode.beta, nu, omega), &[(thin, text)])
-}
-
-/// Computes the damping ratio of an upright cylinder by Mikishev and Dorozhkin. In shallow liquid the formula
-/// falls below the laminar layer; use [`stephens`] there. `radius` and `fill` in m, `nu` in m²/s, `g` in
-/// m/s²; the next functions take the same units.
-pub fn mikishev_dorozhkin(radius: f64, fill: f64, nu: f64, g: f64) -> Formula {
-    let x = fill / radius;
-    let text =
-        format!("h/R = {x:.3} is below 0.5, where the formula falls below the laminar layer");
-    Formula::new(formula::mikishev_dorozhkin(radius, fill, nu, g), &[(x >= 0.5, text)])
-}
-
-/// Computes the damping ratio of an upright cylinder by Stephens, Leonard and Perry, which is 1.493 times the
-/// laminar layer's at every depth.
-pub fn stephens(radius: f64, fill: f64, nu: f64, g: f64) -> Formula {
-    Formula::new(formula::stephens(radius, fill, nu, g), &[])
-}
-
-pub fn sphere(radius: f64, fill: f64, nu: f64, g: f64) -> Formula {
-    let (x, b) = (fill / radius, formula::sphere_number(radius, nu, g));
-    Formula::new(
-        formula::sphere(radius, fill, nu, g),
-        &[
-            ((0.1..=1.9).contains(&x), format!("h/R = {x:.3} is outside 0.1 to 1.9")),
-            ((1e-2..=1.0).contains(&b), format!("B = {b:.3e} is outside the measured 0.01 to 1")),
-        ],
-    )
-}
-
-/// Computes the damping ratio of a cone with its apex down; `radius` is that of the free surface,
-/// `half_angle` in degrees.
-pub fn cone(radius: f64, half_angle: f64, nu: f64, g: f64) -> Formula {
-    let known = (0.0..=45.0).contains(&half_angle);
-    let text = format!("the half angle of {half_angle} degrees is outside 0 to 45");
-    Formula::new(formula::cone(radius, half_angle, nu, g), &[(known, text)])
-}
-
-pub fn torus(tube_radius: f64, fill: f64, nu: f64, g: f64) -> Formula {
-    let (y, scale) = (0.5 * fill / tube_radius, formula::torus_number(tube_radius, nu, g));
-    Formula::new(
-        formula::torus(tube_radius, fill, nu, g),
-        &[
-            ((0.1..=0.9).contains(&y), format!("h/2a = {y:.3} is outside 0.1 to 0.9")),
-            (
-                (0.1..=10.0).contains(&scale),
-                format!("Re is {scale:.3e} times that of the one tank measured"),
-            ),
-        ],
-    )
-}
-
-/// A flat ring baffle at the wall: its depth below the free surface and its width, m.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ring {
-    pub depth: f64,
-    pub width: f64,
-}
-
-/// Checks the ranges of the square-root law: 2 < UT/D < 20 with D = 2 w, ring under the wave's trough, small
-/// part of the section covered. `reach` is the decay of the wave from the surface to the ring.
-fn ring_ranges(ring: Ring, amplitude: f64, reach: f64, covered: f64) -> Vec<(bool, String)> {
-    let Ring { depth, width } = ring;
-    let stroke = amplitude / width * reach;
-    vec![
-        (
-            depth >= amplitude,
-            format!("the ring at a depth of {depth} m comes out of a wave of {amplitude} m"),
-        ),
-        (covered < 0.25, format!("the ring covers {covered:.3} of the section, more than 0.25")),
-        (
-            stroke > 0.64 && stroke < 6.4,
-            format!(
-                "(eta/w) times the decay is {stroke:.3}, outside 0.64 to 6.4: small waves keep more damping"
-            ),
-        ),
-    ]
-}
-
-/// Computes the damping ratio of a ring baffle in an upright cylinder, for the `amplitude` (m) of the wave at
-/// the wall, by [`formula::miles_ring`].
-pub fn miles_ring(radius: f64, ring: Ring, amplitude: f64) -> Formula {
-    let Ring { depth, width } = ring;
-    let (reach, covered) =
-        (formula::motion_at_ring(radius, depth), formula::covered(radius, width));
-    Formula::new(
-        formula::miles_ring(radius, depth, width, amplitude),
-        &ring_ranges(ring, amplitude, reach, covered),
-    )
-}
-
-/// Computes the damping ratio of a ring baffle at the outer wall of any tank of revolution, for the first
-/// mode: zeta = 1.53 lambda w^(3/2) eta^(1/2) G^(5/2) r_b phi(R_F)^2/N. G = |phi_s|/(lambda phi(R_F)) at the
-/// ring's radius r_b, and phi(R_F)^2/N = rho pi lambda wave^2/m. The law comes from Keulegan and Carpenter's
-/// plates, scaled to Miles for the cylinder.
-///
-/// Returns `None` for a box, or if no wall is at this depth.
-pub fn ring(data: &ModalData, ring: Ring, amplitude: f64) -> Option<Formula> {
-    let (mode, wall) = (data.modes.first()?, data.wall.as_ref()?);
-    let at = mode.wall_speed(wall.z_surface - ring.depth)?;
-    let shape = data.rho * PI * mode.lambda * mode.wave * mode.wave / mode.m;
-    let zeta = 1.53
-        * mode.lambda
-        * ring.width.powf(1.5)
-        * amplitude.sqrt()
-        * at.ratio.powf(2.5)
-        * at.r
-        * shape;
-    let w = ring.width / at.r;
-    Some(Formula::new(zeta, &ring_ranges(ring, amplitude, at.ratio, w * (2.0 - w))))
-}
-
-/// Returns the part of a full ring's damping that a sector has: int |cos theta|^(5/2) dtheta/2.8756 between
-/// two angles from the direction of slosh, rad. A half ring has half.
-pub fn sector(from: f64, to: f64) -> f64 {
-    let rule = crate::gauss::Gauss::new(24);
-    let part = |a: f64, b: f64| -> f64 {
-        let terms = rule.nodes.iter().zip(&rule.weights);
-        terms.map(|(v, w)| w * (b - a) * (a + (b - a) * v).cos().abs().powf(2.5)).sum()
     };
-    // in pieces between the zeros of the cosine
-    let first = (from / PI - 0.5).ceil() as i64;
-    let mut places = vec![from];
-    places.extend((first..).map(|k| (k as f64 + 0.5) * PI).take_while(|t| *t < to));
-    places.push(to);
-    places.windows(2).map(|p| part(p[0], p[1])).sum::<f64>() / part_of_circle(&part)
-}
-
-fn part_of_circle(part: &impl Fn(f64, f64) -> f64) -> f64 {
-    2.0 * part(-0.5 * PI, 0.5 * PI)
+    ranges.into_iter().filter(|(within, _)| !within).map(|(_, text)| text).collect()
 }

@@ -38,7 +38,6 @@ const MASSLESS: f64 = 1e-9;
 ///   stiffness.
 /// - `vertical_wall`: true if the walls are vertical at the free surface; `upright`: true if the bottom is
 ///   flat, too, so that capillarity does not change phi_n.
-/// - `wall`: speed of the liquid along the outer wall over that of the surface at the wall.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Mode {
     pub n: usize,
@@ -73,17 +72,6 @@ pub struct Mode {
     pub vertical_wall: bool,
     #[serde(skip)]
     pub upright: bool,
-    #[serde(skip)]
-    pub wall: Vec<WallSpeed>,
-}
-
-/// Speed |phi_s|/(lambda phi(R_F)) along the outer wall at one place, r and z in m, z from the contour's own
-/// zero.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct WallSpeed {
-    pub r: f64,
-    pub z: f64,
-    pub ratio: f64,
 }
 
 /// Fixed mass, kg, when the first `modes` modes are pendulums, with its height, m from the contour's own
@@ -297,7 +285,6 @@ pub(crate) struct Surface {
     pub(crate) gradient: f64,
     pub(crate) vertical_wall: bool,
     pub(crate) upright: bool,
-    pub(crate) wall: Vec<WallSpeed>,
 }
 
 impl Mode {
@@ -335,33 +322,7 @@ impl Mode {
             surface_gradient: surface.gradient,
             vertical_wall: surface.vertical_wall,
             upright: surface.upright,
-            wall: surface.wall,
         }
-    }
-
-    /// Creates a mode between two of a table, without its shape.
-    pub(crate) fn interpolated(
-        n: usize,
-        l: f64,
-        mass: [f64; 3],
-        z_cg: f64,
-        m_liq: f64,
-        wave: f64,
-        beta: f64,
-    ) -> Mode {
-        let mut mode = Mode::new(n, 1.0 / l, mass, z_cg, m_liq, Surface::default(), beta);
-        mode.wave = wave;
-        mode
-    }
-
-    /// Returns the speed along the outer wall at the height z, m from the contour's own zero. If several
-    /// positions have this height, the one nearest to the surface counts; `None` if none has.
-    pub fn wall_speed(&self, z: f64) -> Option<WallSpeed> {
-        let pair = self.wall.windows(2).find(|p| (p[0].z - z) * (p[1].z - z) <= 0.0)?;
-        let (a, b) = (pair[0], pair[1]);
-        let t = if a.z == b.z { 0.0 } else { (z - a.z) / (b.z - a.z) };
-        let between = |a: f64, b: f64| a + t * (b - a);
-        Some(WallSpeed { r: between(a.r, b.r), z, ratio: between(a.ratio, b.ratio) })
     }
 }
 
@@ -624,24 +585,12 @@ fn approximate(
         let peak = (k == 0).then(|| mesh.surface_peak(phi)).map(|[r, u]| [r, scale * u]);
         let mass = [a * a, a * b, b * b].map(|x| rho_pi * lambda * x / big_n);
         let beta = mesh.gradient(phi, false) / (lambda * big_n);
-        // at the contact line phi_s = lambda phi along a vertical wall
-        let contact = mesh.along_surface(phi, 1).first().map_or(0.0, |p| p[1]);
-        let mut along: Vec<WallSpeed> = Vec::new();
-        if vertical {
-            along.push(WallSpeed { r: wall.r_outer, z: wall.z_surface, ratio: 1.0 });
-        }
-        along.extend(mesh.along_wall(phi).iter().map(|[r, z, speed]| WallSpeed {
-            r: *r,
-            z: *z,
-            ratio: speed / (lambda * contact).abs(),
-        }));
         let surface = Surface {
             shape,
             peak,
             gradient: mesh.gradient(phi, true) / big_n,
             vertical_wall: vertical,
             upright: false,
-            wall: along,
         };
         let mut mode =
             Mode::new(k + 1, lambda, mass, volume.z_cg, rho * volume.volume, surface, beta);

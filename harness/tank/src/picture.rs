@@ -8,28 +8,27 @@ use crate::modal::{ModalData, Mode};
 use crate::sweep::Sweep;
 use crate::table::significant;
 use crate::tank::{Geometry, Tank};
-use crate::third_order::Overlaps;
 
 /// Colours of the modes, which colour-blind readers can tell apart (Okabe and Ito).
-const COLOURS: [&str; 5] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#8a6d00"];
+pub const COLOURS: [&str; 5] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#8a6d00"];
 const DRAWN: usize = 5;
 const LIQUID: &str = "#dcecf7";
 const INK: &str = "#222";
-const FAINT: &str = "#999";
+pub const FAINT: &str = "#999";
 
 /// A rectangle of the page, px, with the values at its edges.
 #[derive(Clone, Copy)]
-struct Frame {
-    left: f64,
-    top: f64,
-    width: f64,
-    height: f64,
-    x: [f64; 2],
-    y: [f64; 2],
+pub struct Frame {
+    pub left: f64,
+    pub top: f64,
+    pub width: f64,
+    pub height: f64,
+    pub x: [f64; 2],
+    pub y: [f64; 2],
 }
 
 impl Frame {
-    fn place(&self, x: f64, y: f64) -> (f64, f64) {
+    pub fn place(&self, x: f64, y: f64) -> (f64, f64) {
         (
             self.left + self.width * (x - self.x[0]) / (self.x[1] - self.x[0]),
             self.top + self.height * (self.y[1] - y) / (self.y[1] - self.y[0]),
@@ -45,12 +44,12 @@ impl Frame {
         path
     }
 
-    fn curve(&self, svg: &mut String, points: &[Point], style: &str) {
+    pub fn curve(&self, svg: &mut String, points: &[Point], style: &str) {
         let _ = writeln!(svg, "<path d=\"{}\" fill=\"none\" {style}/>", self.path(points));
     }
 
     /// Draws axes on the left and at the bottom with round ticks and labels.
-    fn axes(&self, svg: &mut String, x_label: &str, y_label: Option<&str>) {
+    pub fn axes(&self, svg: &mut String, x_label: &str, y_label: Option<&str>) {
         let Frame { left, top, width, height, .. } = *self;
         let bottom = top + height;
         let _ = writeln!(
@@ -91,7 +90,7 @@ fn ticks([from, to]: [f64; 2], count: usize) -> Vec<f64> {
     (first..).map(|k| k as f64 * step).take_while(|t| *t <= to + 1e-9 * step).collect()
 }
 
-fn text(svg: &mut String, x: f64, y: f64, anchor: &str, words: &str) {
+pub fn text(svg: &mut String, x: f64, y: f64, anchor: &str, words: &str) {
     let words = escape(words);
     let _ =
         writeln!(svg, "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{words}</text>");
@@ -101,7 +100,7 @@ fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
-fn page(width: f64, height: f64, title: &str, content: &str) -> String {
+pub fn page(width: f64, height: f64, title: &str, content: &str) -> String {
     format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" \
          height=\"{height}\" font-family=\"Helvetica, Arial, sans-serif\" font-size=\"13\" fill=\"{INK}\">\n\
@@ -402,67 +401,6 @@ pub fn sweep(tank: &Tank, sweep: &Sweep, gravity: f64) -> String {
         x += 100.0;
     }
     page(left, 70.0 + chart_height + 60.0, &title, &svg)
-}
-
-/// Draws the amplitude dependence of an upright cylinder's first frequency over the depth: planar and
-/// circular shifts of omega^2 per squared slosh angle, and those of a pendulum. The third order has poles at
-/// the secondary resonances. Points mark the bench's fills, 5 and 10 cm.
-pub fn third_order(overlaps: &Overlaps) -> String {
-    let frame =
-        Frame { left: 80.0, top: 96.0, width: 620.0, height: 360.0, x: [0.1, 2.0], y: [-1.0, 1.0] };
-    let mut svg = String::new();
-    frame.axes(&mut svg, "h/R", Some("shift of ω² per squared slosh angle"));
-    frame.curve(&mut svg, &[[frame.x[0], 0.0], [frame.x[1], 0.0]], &format!("stroke=\"{FAINT}\""));
-    let resonances = overlaps.resonances();
-    for &(depth, [azimuth, number]) in &resonances {
-        let dashed = format!("stroke=\"{FAINT}\" stroke-dasharray=\"5 4\"");
-        frame.curve(&mut svg, &[[depth, frame.y[0]], [depth, frame.y[1]]], &dashed);
-        let (x, y) = frame.place(depth, frame.y[1]);
-        text(&mut svg, x, y - 6.0, "middle", &format!("({azimuth},{number})"));
-    }
-    // Intervals between the poles, with points ever closer to them.
-    let mut ends = vec![frame.x[0]];
-    ends.extend(
-        resonances.iter().map(|(depth, _)| *depth).filter(|d| (frame.x[0]..frame.x[1]).contains(d)),
-    );
-    ends.push(frame.x[1]);
-    let depth = |ends: &[f64], i: i32| {
-        let part = 0.5 - 0.5 * (core::f64::consts::PI * f64::from(i) / 300.0).cos();
-        ends[0] + (ends[1] - ends[0]) * part
-    };
-    for (kind, name) in ["planar", "circular"].into_iter().enumerate() {
-        let colour = COLOURS[kind];
-        let style = format!("stroke=\"{colour}\" stroke-width=\"2\"");
-        for ends in ends.windows(2) {
-            let points: Vec<Point> = (1..300)
-                .map(|i| depth(ends, i))
-                .map(|depth| [depth, overlaps.shifts(depth)[kind]])
-                .collect();
-            for piece in points.split(|p| p[1] < frame.y[0] || p[1] > frame.y[1]) {
-                if piece.len() > 1 {
-                    frame.curve(&mut svg, piece, &style);
-                }
-            }
-        }
-        let pendulum = [-0.125, 0.5][kind];
-        frame.curve(
-            &mut svg,
-            &[[frame.x[0], pendulum], [frame.x[1], pendulum]],
-            &format!("stroke=\"{colour}\" stroke-dasharray=\"1 4\" stroke-width=\"1.6\""),
-        );
-        for fill in [0.05, 0.10] {
-            let depth = fill / 0.0815;
-            let (x, y) = frame.place(depth, overlaps.shifts(depth)[kind]);
-            let _ =
-                writeln!(svg, "<circle cx=\"{x:.2}\" cy=\"{y:.2}\" r=\"4\" fill=\"{colour}\"/>");
-        }
-        let x = frame.left + 260.0 * kind as f64;
-        let _ = writeln!(svg, "<path d=\"M{x} 50h24\" stroke=\"{colour}\" stroke-width=\"2\"/>");
-        text(&mut svg, x + 30.0, 54.0, "start", &format!("{name}; dotted: of a pendulum"));
-    }
-    let title = "First mode of an upright cylinder: frequency and amplitude, third order";
-    text(&mut svg, frame.left, 26.0, "start", title);
-    page(720.0, frame.top + frame.height + 50.0, title, &svg)
 }
 
 #[cfg(test)]

@@ -128,49 +128,6 @@ impl Overlaps {
         }
     }
 
-    /// Computes the overlaps of a sector of `angle`, rad, between the radii `inner` and `outer`, m, with
-    /// `count` modes of each number of half waves over the angle, for motion along the bisector or `across`
-    /// it.
-    pub fn sector(inner: f64, outer: f64, angle: f64, across: bool, count: usize) -> Overlaps {
-        let half = Gauss::new(40);
-        // the mean over the angle
-        let mean = |f: &dyn Fn(f64) -> f64| -> f64 {
-            half.nodes.iter().zip(&half.weights).map(|(x, w)| w * f(angle * (x - 0.5))).sum()
-        };
-        let nu = PI / angle;
-        let radial = |half_waves: f64| Radial::new(inner, outer, half_waves * nu, count);
-        let axisymmetric = radial(0.0);
-        if !across {
-            let psi = axisymmetric.mode(0);
-            let excited = (0..axisymmetric.kappa.len()).map(|n| {
-                let c = axisymmetric.integral(|i| psi[i] * psi[i] * axisymmetric.mode(n)[i]);
-                let (planar, circular) = ([c * c / 4.0; 2], [0.0; 2]);
-                let at_wall = c * axisymmetric.at_wall[n];
-                Excited {
-                    mode: [0, n + 1],
-                    kappa: axisymmetric.kappa[n],
-                    planar,
-                    circular,
-                    at_wall,
-                }
-            });
-            return Overlaps {
-                k: axisymmetric.kappa[0],
-                fourth: [Some(axisymmetric.integral(|i| psi[i].powi(4))), None],
-                amplitude: mean(&f64::cos) * axisymmetric.integral(|i| psi[i] * axisymmetric.r[i]),
-                excited: excited.collect(),
-            };
-        }
-        let (first, double) = (radial(1.0), radial(2.0));
-        let overlaps = Overlaps::from_waves(&first, &axisymmetric, &double);
-        let along = 2.0 * mean(&|phi| (nu * phi).sin() * phi.sin());
-        Overlaps {
-            fourth: [overlaps.fourth[0], None],
-            amplitude: along * overlaps.amplitude,
-            ..overlaps
-        }
-    }
-
     /// Returns the overlaps of a box for motion along `length`, m, with another length across it.
     pub fn rectangle(length: f64) -> Overlaps {
         let k = PI / length;

@@ -7,6 +7,7 @@ mod dimensions;
 mod files;
 mod finite_amplitude;
 mod formulas;
+mod liquid_figure;
 mod physics;
 mod pictures;
 mod reference;

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use crate::liquid_figure;
 use hubslosh_tank::sweep::sweep;
 use hubslosh_tank::third_order::Overlaps;
 use hubslosh_tank::{Tank, picture, table};
@@ -19,7 +20,7 @@ fn is_drawn(svg: &str, file: &str) {
 
 #[test]
 fn the_documentation_s_figure_is_the_one_that_is_drawn() {
-    let svg = picture::third_order(&Overlaps::new(40));
+    let svg = liquid_figure::draw(&Overlaps::new(40));
     is_drawn(&svg, "../../modelDescription/HubSlosh/documentation/liquid.svg");
 }
 

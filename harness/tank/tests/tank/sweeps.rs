@@ -4,87 +4,11 @@ use crate::common::tank;
 use hubslosh_tank::fill_table::Between;
 use hubslosh_tank::interpolation::Monotone;
 use hubslosh_tank::parameters::{Liquid, Target, Value, tank_damping};
-use hubslosh_tank::sweep::{Depletion, sweep};
+use hubslosh_tank::sweep::sweep;
 use hubslosh_tank::{Fill, ModalData, closed_form, fill_table};
 
 fn fills(from: f64, to: f64, count: usize) -> Vec<f64> {
     (0..=count).map(|i| from + (to - from) * i as f64 / count as f64).collect()
-}
-
-/// Interpolated in a sphere between 19 fills against a solution at each: 0.1 R apart the fifth order
-/// leaves 1e-4 of the largest value in the middle.
-#[test]
-fn interpolated_modes_are_those_between_the_fills() {
-    let tank = tank("density = 1000.0\nshape = { sphere = { radius = 1.0 } }");
-    let table = sweep(&tank, &fills(0.1, 1.9, 18), 3).unwrap();
-    let depletion = Depletion::new(&table).unwrap();
-    for fill in [0.35, 0.77, 1.21, 1.55] {
-        let (exact, at) = (tank.solve(fill, 3).unwrap(), depletion.parameters_at(fill));
-        assert!((at.m_liq / exact.m_liq - 1.0).abs() < 1e-4);
-        for (a, b) in at.modes.iter().zip(&exact.modes) {
-            assert!((a.l / b.l - 1.0).abs() < 1e-4, "{fill} {} {}", a.l, b.l);
-            assert!((a.m - b.m).abs() < 1e-4 * exact.m_liq, "{fill}");
-            assert!((a.m_h - b.m_h).abs() < 1e-3 * exact.m_liq, "{fill}");
-        }
-        // between the fills, too, a mode has one height
-        for mode in &at.modes {
-            assert!((mode.m * mode.m_h2 - mode.m_h * mode.m_h).abs() < 1e-14 * mode.m_h.powi(2));
-        }
-        assert!((at.rest.m_0 - exact.rest(3).m_0).abs() < 1e-3 * exact.m_liq);
-        // the sphere's hinge is the centre, between the fills too
-        assert!((at.modes[0].hinge.unwrap() - 1.0).abs() < 1e-3, "{:?}", at.modes[0].hinge);
-        assert!((depletion.fill_from_mass(at.m_liq) - fill).abs() < 1e-9);
-    }
-}
-
-/// At a fill of the table an interpolation is the solution itself, but for rounding in sums of its modes; outside,
-/// that of the nearest end.
-#[test]
-fn at_the_table_s_own_fills_nothing_is_interpolated() {
-    let tank = tank("density = 1000.0\nshape = { sphere = { radius = 1.0 } }");
-    let all = fills(0.2, 1.8, 8);
-    let depletion = Depletion::new(&sweep(&tank, &all, 3).unwrap()).unwrap();
-    assert_eq!(depletion.range(), [all[0], all[8]]);
-    for (fill, asked) in [(all[0], 0.1), (all[3], all[3]), (all[6], all[6]), (all[8], 5.0)] {
-        let (exact, at) = (tank.solve(fill, 3).unwrap(), depletion.parameters_at(asked));
-        let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-9 * b.abs(), "{fill}: {a} {b}");
-        assert_eq!(at.fill, fill);
-        near(at.m_liq, exact.m_liq);
-        near(at.z_cg, exact.z_cg);
-        near(at.i_frozen_cg, exact.i_frozen_cg);
-        near(at.i_frozen_axis, exact.i_frozen_axis);
-        // of a sphere, which drags its liquid by the surface alone, a small difference
-        assert!((at.i_eff_cg - exact.i_eff_cg).abs() < 1e-9 * exact.i_frozen_cg);
-        let rest = exact.rest(3);
-        near(at.rest.m_0, rest.m_0);
-        near(at.rest.height, rest.height);
-        assert!((at.rest.inertia - rest.inertia).abs() < 1e-9 * exact.i_frozen_cg);
-        for (a, b) in at.modes.iter().zip(&exact.modes) {
-            assert_eq!(a.n, b.n);
-            near(a.l, b.l);
-            near(a.m, b.m);
-            near(a.m_h, b.m_h);
-            near(a.m_h2, b.m_h2);
-            near(a.wave, b.wave);
-            near(a.beta, b.beta);
-        }
-    }
-}
-
-/// The first pendulum of a sphere shortens with the fill, at every step; mass of the liquid rises; m_0
-/// stays positive and I_0 too.
-#[test]
-fn interpolated_modes_are_monotone_and_leave_a_positive_rest() {
-    let tank = tank("density = 1000.0\nshape = { sphere = { radius = 1.0 } }");
-    let depletion = Depletion::new(&sweep(&tank, &fills(0.05, 1.95, 19), 3).unwrap()).unwrap();
-    let all: Vec<_> = fills(0.05, 1.95, 2000).iter().map(|f| depletion.parameters_at(*f)).collect();
-    for pair in all.windows(2) {
-        assert!(pair[1].modes[0].l < pair[0].modes[0].l && pair[1].m_liq > pair[0].m_liq);
-        assert!(pair[1].z_cg > pair[0].z_cg);
-    }
-    for at in &all {
-        assert!(at.rest.m_0 > 0.0 && at.rest.inertia >= 0.0, "{} {:?}", at.fill, at.rest);
-    }
 }
 
 /// Without liquid, and without a free surface, there are no modes and no NaN. A liquid that fills a sphere does not
@@ -186,7 +110,6 @@ fn every_bad_fill_of_a_sweep_is_reported() {
     assert_eq!(sweep(&tank, &[-1.0, 0.5, 1.5, 2.0], 2).unwrap_err().0.len(), 3);
     assert!(sweep(&tank, &[0.5, 0.4], 2).unwrap_err().to_string().contains("must ascend"));
     assert!(sweep(&tank, &[], 2).is_err());
-    assert!(Depletion::new(&sweep(&tank, &[0.5], 2).unwrap()).is_err());
 }
 
 /// Compares the FMUs' interpolation, with the placed points, with solutions at eight other fills: frequency and mass

@@ -117,25 +117,3 @@ fn rings_lie_between_a_circle_and_a_channel() {
         }
     }
 }
-
-/// A sector of 180 degrees has the modes cos theta of the circle for motion along its straight wall. A narrow one far from
-/// the axis is a box, along the radius and across it.
-#[test]
-fn sectors_are_half_circles_and_boxes() {
-    let pi = std::f64::consts::PI;
-    let (circle, half) = (Overlaps::round(0.0, 0.8, 20), Overlaps::sector(0.0, 0.8, pi, true, 20));
-    for depth in [0.3, 0.7, 1.5] {
-        let (a, b) = (circle.shifts(depth)[0], half.shifts(depth)[0]);
-        assert!((a - b).abs() < 1e-9 * (1.0 + a.abs()), "{depth} {a} {b}");
-    }
-    // 1 m along the radius and across it
-    let angle = 1e-3;
-    for across in [false, true] {
-        let sector = Overlaps::sector(999.5, 1000.5, angle, across, 12);
-        let channel = Overlaps::rectangle(1.0);
-        for depth in [0.15, 0.4, 1.0] {
-            let (a, b) = (channel.shifts(depth)[0], sector.shifts(depth)[0]);
-            assert!((a - b).abs() < 5e-3 * (1.0 + a.abs()), "{across} {depth} {a} {b}");
-        }
-    }
-}
