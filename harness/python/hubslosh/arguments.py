@@ -10,29 +10,28 @@ from numpy.typing import NDArray
 
 from .fmu import FmuError
 
+# Allowed times, s.
 SECONDS: dict[str, tuple[float, float]] = {
     "period": (1e-6, 1e6), "delay": (0.0, 1e6), "stop": (1e-9, 1e12),
 }  # fmt: skip
-"""Allowed times, s."""
 
+# Allowed whole numbers.
 WHOLE: Mapping[str, tuple[int, int]] = {
     "latency": (0, 1_000_000), "substeps": (1, 1_000_000), "draws": (0, 100_000),
     "runs": (1, 100_000_000), "run": (0, 100_000_000), "workers": (1, 4096),
     "seed": (0, 2**63 - 1), "most": (1, 1_000_000),
 }  # fmt: skip
-"""Allowed whole numbers."""
 
+# Allowed numbers without unit.
 PLAIN: dict[str, tuple[float, float]] = {"largest": (1e-3, 1e3), "sigmas": (1e-3, 1e2)}
-"""Allowed numbers without unit."""
 
-MOST_FILLS = 1000
-"""Most fills of a review."""
+MOST_FILLS = 1000  # Most fills of a review
 
+# Most states of a sampled loop gain, commands on the way included: its poles take seconds.
 MOST_STATES = 1000
-"""Most states of a sampled loop gain, commands on the way included: its poles take seconds."""
 
+# Most points of a review times the square of its loop gain's states: minutes on two cores.
 MOST_WORK = 1e8
-"""Most points of a review times the square of its loop gain's states: minutes on two cores."""
 
 
 def caller() -> int:

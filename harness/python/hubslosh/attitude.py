@@ -16,8 +16,7 @@ from .fmu import FmuError
 if TYPE_CHECKING:
     import pandas as pd
 
-NAMES = tuple(f"q[{i}]" for i in range(1, 5))
-"""Columns of a table that hold a quaternion."""
+NAMES = tuple(f"q[{i}]" for i in range(1, 5))  # Columns of a table that hold a quaternion
 
 Real = NDArray[np.float64]
 

@@ -24,32 +24,27 @@ from .fmu import FmuError
 from .scalings import Complex, Scalings, Vector, form, recentred
 from .short import MOST
 
-DEGREE = 8
-"""Degree of the polynomials that stand for X on an interval."""
+DEGREE = 8  # Degree of the polynomials that stand for X on an interval
 
+# Least sum of semi-axes of the ellipses around intervals, of half length 1, without a pole.
 REACH = 2.0
-"""Least sum of semi-axes of the ellipses around intervals, of half length 1, without a pole."""
 
-LOWEST = 1e-6
-"""Frequency over half the sampling rate that stands for 0."""
+LOWEST = 1e-6  # Frequency over half the sampling rate that stands for 0
 
-REMAINDER = 0.01
-"""Largest remainder of a polynomial over the margin of X."""
+REMAINDER = 0.01  # Largest remainder of a polynomial over the margin of X
 
-ROUNDING = 1e-9
-"""Least margin of X, whose D is scaled to a diagonal of 1."""
+ROUNDING = 1e-9  # Least margin of X, whose D is scaled to a diagonal of 1
 
+# Number of times at which an interval is halved for the polynomials of one pair of scalings.
 HALVINGS = 8
-"""Number of times at which an interval is halved for the polynomials of one pair of scalings."""
 
+# Factors by which the size is divided one after the other if it cannot be certified.
 SIZES = (1.0, 1.2, 1.5, 2.0, 3.0, 5.0, 10.0)
-"""Factors by which the size is divided one after the other if it cannot be certified."""
 
-SMALLEST_BOX = 1e-3
-"""Least width of a box over that of the whole."""
+SMALLEST_BOX = 1e-3  # Least width of a box over that of the whole
 
+# Chebyshev's nodes between 0 and 1.
 NODES = (1 - np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))) / 2
-"""Chebyshev's nodes between 0 and 1."""
 _TO_CHEBYSHEV = np.linalg.inv(np.polynomial.chebyshev.chebvander(2 * NODES - 1, DEGREE))
 _TO_BERNSTEIN = np.linalg.inv([
     [comb(DEGREE, k) * x**k * (1 - x) ** (DEGREE - k) for k in range(DEGREE + 1)] for x in NODES
@@ -214,11 +209,9 @@ class ExhaustedError(Exception):
     """Raised if a proof needs more convex problems than are allowed."""
 
 
-Pair = tuple[Complex, Complex]
-"""D and G."""
+Pair = tuple[Complex, Complex]  # D and G
 
-Region = tuple[float, float, Vector, Vector]
-"""Ends of an interval of frequency, Hz, and of a box."""
+Region = tuple[float, float, Vector, Vector]  # Ends of an interval of frequency, Hz, and of a box
 
 
 class Search:

@@ -20,14 +20,13 @@ from .temporary import write_file
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-MOST = len(COLORS)
-"""Most designs on a page: each has a colour."""
+MOST = len(COLORS)  # Most designs on a page: each has a colour
 
+# Margins that are compared, with their labels. The gain margin is the smaller of up and down.
 MARGINS = {
     "modulus_margin": "modulus (1)", "phase_margin": "phase (deg)", "gain_margin": "gain (dB)",
     "delay_margin": "delay (s)",
 }  # fmt: skip
-"""Margins that are compared, with their labels. The gain margin is the smaller of up and down."""
 
 
 def compare(reviews: Mapping[str, Review], out: str | Path | None = None) -> pd.DataFrame:

@@ -15,20 +15,17 @@ if TYPE_CHECKING:
 
     from .linearization import LinearModel
 
-DEEPEST, HIGHEST = -80.0, 60.0
-"""Range beyond which no diagram shows a loop gain, dB."""
+DEEPEST, HIGHEST = -80.0, 60.0  # Range beyond which no diagram shows a loop gain, dB
 
-AROUND = 1.3
-"""Factor by which a diagram reaches beyond the largest gain margin that it shows."""
+AROUND = 1.3  # Factor by which a diagram reaches beyond the largest gain margin that it shows
 
+# Change of the loop gain's logarithm from point to point that is refined: 0.12 rad or 1 dB.
 TURN = 0.12
-"""Change of the loop gain's logarithm from point to point that is refined: 0.12 rad or 1 dB."""
 
-ODD = (-900, -540, -180, 180)
-"""Phases at which the loop gain is negative, deg."""
+ODD = (-900, -540, -180, 180)  # Phases at which the loop gain is negative, deg
 
+# Loop gains with a distance of 0.5 to -1, the usual requirement of a modulus margin.
 CIRCLE = -1 + 0.5 * np.exp(1j * np.linspace(0, 2 * np.pi, 200))
-"""Loop gains with a distance of 0.5 to -1, the usual requirement of a modulus margin."""
 
 
 @dataclass(frozen=True, eq=False)

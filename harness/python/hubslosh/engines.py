@@ -13,8 +13,7 @@ from .fmu import FmuError, did_you_mean
 
 Vector = NDArray[np.float64]
 
-MOST_PULSES = 1_000_000
-"""Most pulses of a history."""
+MOST_PULSES = 1_000_000  # Most pulses of a history
 
 
 @dataclass(frozen=True, eq=False)

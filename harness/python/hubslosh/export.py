@@ -16,11 +16,11 @@ from .fmu import Fmu, FmuError, Parameters, Value
 from .linearization import LinearModel
 from .temporary import output, write_file
 
+# Beginnings of the names of outputs that the system and the script show.
 SHOWN = ("q[", "omega[", "position[", "velocity[")
-"""Beginnings of the names of outputs that the system and the script show."""
 
+# Namespace of OMSimulator's annotations.
 OMS = "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd"
-"""Namespace of OMSimulator's annotations."""
 
 SCRIPT = """\
 % The craft in Simulink (R2020b or newer): craft.fmu as a Co-Simulation block in a new model.

@@ -11,8 +11,7 @@ from .arguments import check_table, floats
 from .fmu import FmuError
 from .linearization import control_package
 
-ITERATIONS = 30
-"""Iterations of Sanathanan and Koerner's method, which converges within ten."""
+ITERATIONS = 30  # Iterations of Sanathanan and Koerner's method, which converges within ten
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,21 +24,18 @@ __all__ = [
     "source_tree",
 ]
 
+# A value in SI units, or with its unit, ``"50 mm"``; of an enumeration also an item's name.
 Value = float | int | bool | str
-"""A value in SI units, or with its unit, ``"50 mm"``; of an enumeration also an item's name."""
 
-_INDICES = re.compile(r"\[\d+(,\d+)*\]$")
-"""End of the name of a vector's or matrix's element."""
+_INDICES = re.compile(r"\[\d+(,\d+)*\]$")  # End of the name of a vector's or matrix's element
 
-INTEGERS = range(-(2**31), 2**31)
-"""Numbers that fmi2Integer has."""
+INTEGERS = range(-(2**31), 2**31)  # Numbers that fmi2Integer has
 
-Quantity = Value | tuple[float, str]
-"""A value, or a number with its unit, such as ``(50, "mm")``."""
+Quantity = Value | tuple[float, str]  # A value, or a number with its unit, such as ``(50, "mm")``
 
+# Values of variables by name, each a `Quantity`. The type says Any because mypy takes a dict of
+# numbers and texts for ``dict[str, object]``.
 Parameters = Mapping[str, Any]
-"""Values of variables by name, each a `Quantity`. The type says Any because mypy takes a dict of
-numbers and texts for ``dict[str, object]``."""
 
 
 class DefinedUnit(str):

@@ -9,6 +9,7 @@ import pandas as pd
 from .arguments import floats
 from .fmu import FmuError
 
+# Kinds of parts, and the names of their dimensions.
 SHAPES = {
     "point": "nothing of its own",
     "box": "(a, b): a block, its sides across the bearing axis, m",
@@ -17,7 +18,6 @@ SHAPES = {
     "rod": "(radius, length): a solid cylinder across the bearing axis, m",
     "inertia": "the part's own inertia about its centre, parallel to the bearing axis, kg m2",
 }
-"""Kinds of parts, and the names of their dimensions."""
 
 
 def _own(shape: str, mass: float, size: Any) -> float:

@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 
     from .fmu import Value
 
+# Shapes and their dimensions, m; ``angle`` in degrees.
 SHAPES: dict[str, tuple[str, ...]] = {
     "cylinder": ("radius", "height"),
     "horizontal_cylinder": ("radius", "length"),
@@ -49,12 +50,9 @@ SHAPES: dict[str, tuple[str, ...]] = {
     "sector": ("inner_radius", "radius", "angle", "height"),
     "step": (),
 }
-"""Shapes and their dimensions, m; ``angle`` in degrees."""
 
-_MASSLESS = 1e-6
-"""Part of the liquid's mass below which a mode is one without displacement."""
-_EQUAL = 3e-4
-"""Difference of two λ, of their size, that the mesh makes of one."""
+_MASSLESS = 1e-6  # Part of the liquid's mass below which a mode is one without displacement
+_EQUAL = 3e-4  # Difference of two λ, of their size, that the mesh makes of one
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,12 +29,11 @@ from .simulation import (
     too_many_rows,
 )
 
+# Result of a controller in a cycle: the command, or one for each of several, from time (s) and
+# measurements.
 Law = Callable[[float, NDArray[np.float64]], Any]
-"""Result of a controller in a cycle: the command, or one for each of several, from time (s) and
-measurements."""
 
-QUATERNION = tuple(f"q[{i}]" for i in range(1, 5))
-"""Attitude of Spacecraft, scalar first."""
+QUATERNION = tuple(f"q[{i}]" for i in range(1, 5))  # Attitude of Spacecraft, scalar first
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,8 +12,8 @@ from .simulation import parameters_of
 
 Vector = NDArray[np.float64]
 
+# Error limits for which `mode_errors` states the number of modes, as the thesis does (4.2.1).
 TOLERANCES = (0.05, 0.01)
-"""Error limits for which `mode_errors` states the number of modes, as the thesis does (4.2.1)."""
 
 
 def impulse(masses: Vector, omegas: Vector, zetas: Vector, time: Vector) -> NDArray[np.float64]:

@@ -17,11 +17,10 @@ from .arguments import floats
 from .feedback import Feedback
 from .fmu import Fmu, FmuError, Parameters, Quantity
 
-TORQUE = "tau_cmd"
-"""The input that carries the torque, N·m."""
+TORQUE = "tau_cmd"  # The input that carries the torque, N·m
 
+# Default record of `drive` in addition to time and torque.
 COLUMNS = ("omega", "omega_imu", "slosh_angle", "slosh_angle_radial")
-"""Default record of `drive` in addition to time and torque."""
 
 
 class RunError(FmuError):
@@ -184,8 +183,8 @@ class Instance:
             raise FmuError(f"{', '.join(texts)}: only numbers can be read")
 
 
+# Types of a table's columns.
 _DTYPES = {"Real": float, "Integer": np.intc, "Enumeration": np.intc, "Boolean": bool}
-"""Types of a table's columns."""
 
 
 class Plant(Instance):

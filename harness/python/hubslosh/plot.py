@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from .stability import Margins
 
 # Okabe and Ito's palette: distinct for colour-blind readers
+# Colours of series, in turn.
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-"""Colours of series, in turn."""
 
 
 def _subplots(rows: int, height: float | None = None, **options: Any) -> "Sequence[Axes]":
@@ -458,8 +458,7 @@ def _finish(ax: "Axes", found: "Margins", labels: "list[_Label]") -> None:
     _annotate([label for label in labels if label[3]])
 
 
-_Label = tuple[Any, float, float, str, str]
-"""Axes, place, text and colour of a label."""
+_Label = tuple[Any, float, float, str, str]  # Axes, place, text and colour of a label
 
 
 def _annotate(labels: list[_Label]) -> None:

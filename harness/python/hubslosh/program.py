@@ -204,8 +204,7 @@ class Estimated:
         return cls(**{**found, **spread, "interval": (low, high)})
 
 
-Method = Literal["bench", "friction", "decay"]
-"""Kinds of recordings of ``hubslosh identify``."""
+Method = Literal["bench", "friction", "decay"]  # Kinds of recordings of ``hubslosh identify``
 
 
 @dataclass(frozen=True)
@@ -321,10 +320,8 @@ def _free_flags(
     return [*flags, *(["--outputs", ",".join(outputs)] if outputs else [])]
 
 
-Table = pd.DataFrame | str | Path
-"""A table, or the file of one."""
-Free = float | tuple[float, float, float]
-"""Start of an unknown, or start, lowest and highest value."""
+Table = pd.DataFrame | str | Path  # A table, or the file of one
+Free = float | tuple[float, float, float]  # Start of an unknown, or start, lowest and highest value
 
 
 def identify(

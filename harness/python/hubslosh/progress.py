@@ -5,9 +5,9 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
+# True or False shows a line on stderr or none; a function is called with each new line. None shows
+# the line on a terminal and in a notebook.
 Progress = bool | Callable[[str], Any] | None
-"""True or False shows a line on stderr or none; a function is called with each new line. None shows
-the line on a terminal and in a notebook."""
 
 
 def is_watched() -> bool:

@@ -32,8 +32,7 @@ from .review import Review
 from .tanks import toml_key, toml_of
 from .temporary import write_file
 
-OWN = ("controller", "craft", "cases")
-"""Keys of a project that are no arguments of `Craft.review`."""
+OWN = ("controller", "craft", "cases")  # Keys of a project that are no arguments of `Craft.review`
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -18,17 +18,16 @@ from .plant import Plant
 
 TURN = 2 * np.pi
 
+# Quantities of a mode: Hz, 1, kg, and height of the bob on the tank's axis, m.
 KINDS = ("frequency", "zeta", "mass", "bob")
-"""Quantities of a mode: Hz, 1, kg, and height of the bob on the tank's axis, m."""
 
-DELAY = "delay"
-"""Delay of a loop, s."""
+DELAY = "delay"  # Delay of a loop, s
 
+# Names that no tank of a `Craft` may have: parameters of the FMU begin with them.
 RESERVED = re.compile(r"tank(\[\d\])?|craft|init|pivot|solver|delay|force|torque|omega|q")
-"""Names that no tank of a `Craft` may have: parameters of the FMU begin with them."""
 
+# What is wrong with a quantity of a mode that the tank does not have.
 NO_MODE = "does not exist: its tank has no such mode"
-"""What is wrong with a quantity of a mode that the tank does not have."""
 
 _MODE_QUANTITY = re.compile(rf"tank\[(\d)\]\.({'|'.join(KINDS)})\[(\d)\]")
 _MOVES_THE_BOB = re.compile(r"(tank\[\d\])\.(length|hinge)(\[\d\])")

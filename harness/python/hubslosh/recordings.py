@@ -25,12 +25,10 @@ from .fmu import FmuError
 if TYPE_CHECKING:
     import pandas as pd
 
+# Most values of a file, columns that are not used included: three signals in 20 million rows.
 MOST_VALUES = 60_000_000
-"""Most values of a file, columns that are not used included: three signals in 20 million rows."""
-WIDEST = 100
-"""Most columns of a matrix: a wider one is no table of signals."""
-DEEPEST = 8
-"""Deepest structure within structures."""
+WIDEST = 100  # Most columns of a matrix: a wider one is no table of signals
+DEEPEST = 8  # Deepest structure within structures
 
 
 def read_recording(

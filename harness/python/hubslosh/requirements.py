@@ -10,11 +10,11 @@ import pandas as pd
 from .fmu import FmuError, did_you_mean
 from .short import ShortTable
 
+# Margins that may be required, and their units. The gain margin is the smaller of up and down.
 UNITS = {"modulus_margin": "", "phase_margin": "°", "gain_margin": " dB", "delay_margin": " s"}
-"""Margins that may be required, and their units. The gain margin is the smaller of up and down."""
 
+# Points for which a requirement may hold: those without uncertainty, or all of them.
 POINTS = ("nominal", "all")
-"""Points for which a requirement may hold: those without uncertainty, or all of them."""
 
 
 @dataclass(frozen=True)

@@ -41,12 +41,12 @@ from .worst_case import Confirmation, confirm, search
 if TYPE_CHECKING:
     from .craft import Craft, Fill
 
+# Parameters that a tank without this mode does not have.
 OF_A_MODE = re.compile(r"tank\[\d\]\.(mass|length|hinge|k|zeta|wave)\[\d\]$")
-"""Parameters that a tank without this mode does not have."""
 
 
+# Ways in which a slosh mode is stabilised, worst first.
 SEVERITY = ("unstable", "neither", "phase", "gain", "gain and phase")
-"""Ways in which a slosh mode is stabilised, worst first."""
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ import html
 import io
 import re
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,57 +22,18 @@ if TYPE_CHECKING:
     from .review import Review
     from .worst_case import Confirmation
 
-WIDTH = 4.8
-"""Width of a figure, inches; it fits a telephone without shrinking much."""
+WIDTH = 4.8  # Width of a figure, inches; it fits a telephone without shrinking much
 
+# Colours in figures that the page replaces by those of its light or dark mode.
 INK, SOFT, LINE, BAD = "#010203", "#595a5b", "#cfd0d1", "#b30102"
-"""Colours in figures that the page replaces by those of its light or dark mode."""
 
-MOST_CURVES = 12
-"""Number of fills that are drawn in Nichols and Bode diagrams."""
+MOST_CURVES = 12  # Number of fills that are drawn in Nichols and Bode diagrams
 
-MOST_UNSTABLE = 12
-"""Number of unstable points in their table."""
+MOST_UNSTABLE = 12  # Number of unstable points in their table
 
-GAINS = (-50.0, 40.0)
-"""Range of the resonances' loop gain, dB."""
+GAINS = (-50.0, 40.0)  # Range of the resonances' loop gain, dB
 
-STYLE = """
-:root { color-scheme: light dark; --paper: #fff; --ink: #1b1f24; --soft: #59636e; --line: #d3d9df;
-  --card: #f5f7f9; --accent: #0b62a4; --bad: #b3261e; --good: #1a7f37;
-  --c0: #0072b2; --c1: #c05000; --c2: #00805c; --c3: #b04f8a; --c4: #9a6a00; --c5: #2c86bd; }
-@media (prefers-color-scheme: dark) { :root { --paper: #14181d; --ink: #e6eaee; --soft: #9aa5b1;
-  --line: #39424d; --card: #1c2229; --accent: #6cb6ff; --bad: #ff8a80; --good: #5fd38a;
-  --c0: #5db4ec; --c1: #ff9757; --c2: #3fcf9f; --c3: #e596c5; --c4: #f0b840; --c5: #8fd0f7; } }
-@media print { :root { color-scheme: light; --paper: #fff; --ink: #000; --soft: #444; --line: #ccc;
-  --card: #fff; --bad: #b3261e; --good: #1a7f37; --c0: #0072b2; --c1: #c05000; --c2: #00805c;
-  --c3: #b04f8a; --c4: #9a6a00; --c5: #2c86bd; } body { font-size: 10pt; } }
-* { box-sizing: border-box; }
-body { margin: 0 auto; padding: 1rem; max-width: 84rem; background: var(--paper); color: var(--ink);
-  font: 16px/1.5 system-ui, "Segoe UI", Roboto, sans-serif; overflow-wrap: anywhere; }
-h1 { font-size: 1.5rem; line-height: 1.25; margin: .2rem 0 .6rem; }
-h2 { font-size: 1.1rem; line-height: 1.3; margin: 0 0 .4rem; }
-.answer { font-size: 1.15rem; border-left: 5px solid var(--good); padding: .3rem 0 .3rem .9rem; }
-.answer.bad { border-color: var(--bad); }
-.facts { color: var(--soft); }
-.figures { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 26rem), 1fr));
-  gap: 1.2rem; margin: 1.2rem 0; align-items: start; }
-figure, section { margin: 0; min-width: 0; padding: .8rem; border: 1px solid var(--line);
-  border-radius: 8px; break-inside: avoid; }
-figure svg { width: 100%; height: auto; display: block; }
-figcaption { color: var(--soft); font-size: .9rem; }
-.tables { display: grid; gap: 1.2rem; }
-.scroll { overflow-x: auto; }
-table { border-collapse: collapse; font-size: .9rem; font-variant-numeric: tabular-nums; }
-th, td { text-align: right; padding: .2rem .6rem; border-bottom: 1px solid var(--line);
-  white-space: nowrap; }
-th:first-child, td:first-child, td.text { text-align: left; }
-td.text { white-space: normal; min-width: 9rem; }
-tr.bad td { color: var(--bad); font-weight: 600; }
-@page { margin: 14mm; }
-@media print { .figures { grid-template-columns: 1fr 1fr; gap: 4mm; } .scroll { overflow: visible; }
-  table { font-size: 7.5pt; } th, td { padding: .1rem .25rem; } td.text { min-width: 0; } }
-"""
+STYLE = Path(__file__).with_suffix(".css").read_text(encoding="utf-8")
 
 
 def page(review: "Review") -> str:

@@ -20,14 +20,13 @@ from .store import Store, encoded
 if TYPE_CHECKING:
     import pandas as pd
 
+# Evaluation of one draw: numbers by name, from values by name.
 Outcome = Callable[[dict[str, Any]], Mapping[str, float]]
-"""Evaluation of one draw: numbers by name, from values by name."""
 
+# (low, high): uniform; a list: one of its items; a frozen distribution of ``scipy.stats``.
 Range = Any
-"""(low, high): uniform; a list: one of its items; a frozen distribution of ``scipy.stats``."""
 
-FAILED = "refused"
-"""Column that says what the FMU refused."""
+FAILED = "refused"  # Column that says what the FMU refused
 
 
 def draw(ranges: Mapping[str, Range], run: int, seed: int = 1) -> dict[str, Any]:

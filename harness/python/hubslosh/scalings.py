@@ -20,11 +20,9 @@ from .fmu import FmuError
 Complex = NDArray[np.complex128]
 Vector = NDArray[np.float64]
 
-FLOOR = 1e-6
-"""Least eigenvalue of D; its mean is 1, in coordinates in which |N| is balanced."""
+FLOOR = 1e-6  # Least eigenvalue of D; its mean is 1, in coordinates in which |N| is balanced
 
-SMALLEST = 1e-3
-"""Bounds of µ below this are not resolved."""
+SMALLEST = 1e-3  # Bounds of µ below this are not resolved
 
 
 def solver() -> Any:

@@ -5,8 +5,7 @@ from typing import Any
 
 import pandas as pd
 
-MOST = 10
-"""Rows of a table that are printed."""
+MOST = 10  # Rows of a table that are printed
 
 
 class ShortTable(pd.DataFrame):

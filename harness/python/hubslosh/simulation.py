@@ -16,14 +16,12 @@ from .tables import read_parameters
 
 Real = NDArray[np.float64]
 
+# Columns of a torque history (``hubslosh torque``) that are the slope of an input.
 SLOPES = {"tau_slope": TORQUE}
-"""Columns of a torque history (``hubslosh torque``) that are the slope of an input."""
 
-DEFAULT_STEP = 0.02
-"""s, where neither rows nor the FMU suggest another."""
+DEFAULT_STEP = 0.02  # s, where neither rows nor the FMU suggest another
 
-MOST_ROWS = 20_000_000
-"""Largest size of a table; the same as in ``harness/files/src/budget.rs``."""
+MOST_ROWS = 20_000_000  # Largest size of a table; the same as in ``harness/files/src/budget.rs``
 
 
 class History:

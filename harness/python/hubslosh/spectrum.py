@@ -9,11 +9,9 @@ import pandas as pd
 from .arguments import check_numbers, check_table, vector
 from .fmu import FmuError, did_you_mean
 
-BINS = 3
-"""Half the width of the smoothing in lines of the spectrum, unless a resolution is given."""
+BINS = 3  # Half the width of the smoothing in lines of the spectrum, unless a resolution is given
 
-INPUT_FLOOR = 1e-4
-"""Share of the input's maximum power below which there is no estimate."""
+INPUT_FLOOR = 1e-4  # Share of the input's maximum power below which there is no estimate
 
 
 def frequency_response(

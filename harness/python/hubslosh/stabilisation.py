@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from .linearization import LinearModel
 from .stability import LIGHT, MOVED, _broken_at, _closed
 
-SHOWN = 1e-2
-"""Size of a resonance circle in the loop gain below which a mode is left out (-40 dB)."""
+SHOWN = 1e-2  # Size of a resonance circle in the loop gain below which a mode is left out (-40 dB)
 
 _TANK = re.compile(r"tank\[(\d)\]\.p(?:_dot)?\[(\d),\d\]")
 

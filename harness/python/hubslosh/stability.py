@@ -18,23 +18,18 @@ if TYPE_CHECKING:
 
 Matrix = NDArray[np.float64]
 
+# A crossing is near a mode if their frequencies differ by at most this part of the mode's.
 NEAR = 0.2
-"""A crossing is near a mode if their frequencies differ by at most this part of the mode's."""
 
-FAR = 20
-"""dB; phase crossings with larger margins are not printed."""
+FAR = 20  # dB; phase crossings with larger margins are not printed
 
-MOST = 13
-"""Number of crossings that are printed: those with the least gain and phase margins."""
+MOST = 13  # Number of crossings that are printed: those with the least gain and phase margins
 
-LIGHT = 0.2
-"""Damping ratio below which a pole is a mode to be named."""
+LIGHT = 0.2  # Damping ratio below which a pole is a mode to be named
 
-CONVERGED = 1e-11
-"""Relative change below which a delay has converged; rounding is a tenth of it."""
+CONVERGED = 1e-11  # Relative change below which a delay has converged; rounding is a tenth of it
 
-MOVED = 1e-11
-"""Residue, over the norms of B and C, below which an input does not move a mode."""
+MOVED = 1e-11  # Residue, over the norms of B and C, below which an input does not move a mode
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,8 +188,7 @@ def margins_and_gain(
     return _margins(gain, modes, [modes] * gain.D.shape[1], None), gain
 
 
-Modes = list[tuple[float, float, tuple[str, ...]]]
-"""Frequency, damping ratio and states of each."""
+Modes = list[tuple[float, float, tuple[str, ...]]]  # Frequency, damping ratio and states of each
 
 
 def _controllable_modes(plant: LinearModel, modes: Modes) -> list[Modes]:

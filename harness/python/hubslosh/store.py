@@ -12,8 +12,7 @@ import numpy as np
 from .native import FmuWarning
 from .native import Store as NativeStore
 
-_NAMED = 3
-"""Number of runs that a warning names."""
+_NAMED = 3  # Number of runs that a warning names
 
 
 def encoded(value: Any) -> Any:

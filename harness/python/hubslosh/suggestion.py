@@ -15,14 +15,11 @@ from .stability import _closed, _compiled, _largest, frequencies
 if TYPE_CHECKING:
     from .review_point import Point
 
-DEAREST = 15.0
-"""Largest loss of phase at the rigid crossover that a suggestion may cost, deg."""
+DEAREST = 15.0  # Largest loss of phase at the rigid crossover that a suggestion may cost, deg
 
-WORTH = 0.02
-"""Least gain in modulus margin that is worth a filter."""
+WORTH = 0.02  # Least gain in modulus margin that is worth a filter
 
-WORST = 5
-"""Number of worst points that a filter is tried on, besides the nominal ones."""
+WORST = 5  # Number of worst points that a filter is tried on, besides the nominal ones
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
     from .fmu import Value
 
+# FMUs in six axes; their tanks differ in the beginning of a name alone.
 SIX_AXES = ("Spacecraft", "SloshTank")
-"""FMUs in six axes; their tanks differ in the beginning of a name alone."""
 
 
 @dataclass(frozen=True, eq=False)

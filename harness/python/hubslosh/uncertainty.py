@@ -66,15 +66,13 @@ S = np.array([[0.0, -1.0], [1.0, 0.0]])
 OUTPUTS = (*(f"q[{i}]" for i in (2, 3, 4)), *(f"omega[{i}]" for i in (1, 2, 3)))
 INPUTS = (*(f"force[{i}]" for i in (1, 2, 3)), *(f"torque[{i}]" for i in (1, 2, 3)))
 AXES = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
-FACTOR = "acceleration"
-"""Factor of the acceleration at the point; 1 is that of the parameters."""
+FACTOR = "acceleration"  # Factor of the acceleration at the point; 1 is that of the parameters
 UNITS = {"frequency": "Hz", "zeta": "1", "mass": "kg", "bob": "m", FACTOR: "1"}
+# Least values of quantities over those in the middle of their ranges; 0 may round to below 0.
 _LEAST = {"zeta": 1e-9} | dict.fromkeys(
     ("frequency", "mass", FACTOR, "craft.mass", "craft.Jxx", "craft.Jyy", "craft.Jzz"), 0.01
 )  # fmt: skip
-"""Least values of quantities over those in the middle of their ranges; 0 may round to below 0."""
-ALONE = 1e-12
-"""A coefficient below this, relative to others of its kind, is rounding."""
+ALONE = 1e-12  # A coefficient below this, relative to others of its kind, is rounding
 
 
 @dataclass(frozen=True)
@@ -301,8 +299,8 @@ def _root(matrix: Matrix) -> Matrix:
     return found
 
 
+# The FMU's parameters of tanks that uncertain parameters replace, to first order.
 OF_TANK = re.compile(r"tank\[\d\]\.(m_0|H_0|I_0|I_z|(mass|length|frequency|hinge|zeta)\[\d\])")
-"""The FMU's parameters of tanks that uncertain parameters replace, to first order."""
 
 
 def _converted(

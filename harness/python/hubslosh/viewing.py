@@ -18,11 +18,9 @@ from .tanks import _tank_source, toml_of
 if TYPE_CHECKING:
     import pandas as pd
 
-Source = str | Path | Mapping[str, Any]
-"""A tank file, or a dict with its content."""
+Source = str | Path | Mapping[str, Any]  # A tank file, or a dict with its content
 
-HEIGHT = 760
-"""Height of the page in a notebook, px."""
+HEIGHT = 760  # Height of the page in a notebook, px
 
 
 @dataclass(frozen=True)

@@ -18,20 +18,15 @@ if TYPE_CHECKING:
 Vector = NDArray[np.float64]
 Evaluate = Callable[[Iterable[tuple[int, Vector]]], "list[Point]"]
 
-STARTS = 2
-"""Number of points from which the search starts, at different fills."""
+STARTS = 2  # Number of points from which the search starts, at different fills
 
-SMALLEST = 0.25
-"""Least step of the search; the whole range of a quantity is 2."""
+SMALLEST = 0.25  # Least step of the search; the whole range of a quantity is 2
 
-ASIDE = 0.01
-"""Part by which the gain is simulated below and above the margin."""
+ASIDE = 0.01  # Part by which the gain is simulated below and above the margin
 
-RATE = 1e-8
-"""Angular velocity about each axis at the start of a simulation, rad/s."""
+RATE = 1e-8  # Angular velocity about each axis at the start of a simulation, rad/s
 
-GROWTH = 9.0
-"""Logarithm of the largest growth in a simulation, which stays within small motions."""
+GROWTH = 9.0  # Logarithm of the largest growth in a simulation, which stays within small motions
 
 
 @dataclass(frozen=True, eq=False)
