@@ -31,6 +31,78 @@ use planar::Planar;
 use spherical::Spherical;
 use third_order::ThirdOrder;
 
+/// Functions of [`SloshMode`] of a model whose pendulum is its field `p`.
+macro_rules! own_pendulum {
+    () => {
+        fn pendulum(&self) -> &Pendulum {
+            &self.p
+        }
+
+        fn pendulum_mut(&mut self) -> &mut Pendulum {
+            &mut self.p
+        }
+    };
+}
+use own_pendulum;
+
+/// Functions of [`SloshMode`] of a model with one angle `al` along the direction of its pendulum `p`, the rates `al_d`
+/// and `al_dd`, and `drag`, the rate at which its damping acts.
+macro_rules! one_angle {
+    () => {
+        own_pendulum!();
+
+        fn start_problem(&self, init: &Init) -> Option<String> {
+            self.p.start_problem(init)
+        }
+
+        fn amplitude2<T: Number>(&self) -> [T; 2] {
+            [&self.al, &self.al_d].map(|x| number::<T>(x) * number::<T>(x))
+        }
+
+        fn coordinates(&self, at: &Angles) -> [f64; 4] {
+            let ([q_x, q_y], [x_d, y_d]) = (at.angle, at.rate);
+            self.p.coordinates(self.p.angle_and_rate([q_x, q_y, x_d, y_d]))
+        }
+
+        fn angles<T: Number>(&self) -> Angles<T> {
+            let [angle, rate] = [&self.al, &self.al_d].map(|x| self.p.spread(number::<T>(x)));
+            Angles { angle, rate }
+        }
+
+        fn start(&mut self, q: &[f64; 4], _: &HubMotion) {
+            [self.al[0], self.al_d[0]] = self.p.angle_and_rate(*q);
+        }
+
+        fn seed_direction(&mut self, dq: &[f64; 4], _: &HubMotion) {
+            [self.al[1], self.al_d[1]] = self.p.angle_and_rate(*dq);
+        }
+
+        fn derivatives(&self, n: usize, _: &HubMotion) -> [f64; 4] {
+            self.p.coordinates([self.al_d[n], self.al_dd[n]])
+        }
+
+        #[inline(always)]
+        fn coefficient_norm(&self, n: usize) -> f64 {
+            self.al_d[n].abs()
+        }
+
+        #[inline(always)]
+        fn dissipation(&mut self, n: usize, ramp: bool) -> f64 {
+            self.p.c
+                * self.p.l
+                * self.p.l
+                * if ramp { mul(n, &self.drag, &self.al_d) } else { square(n, &self.al_d) }
+        }
+
+        #[inline(always)]
+        fn coordinates_at(&self, n: usize, t: f64, _: f64, varies: bool) -> [f64; 4] {
+            let [al, al_d] = values([&self.al, &self.al_d], n, t);
+            if varies { self.p.coordinates([al, al_d]) } else { [0.0, al, 0.0, al_d] }
+        }
+    };
+}
+use one_angle;
+
 #[derive(Clone, Debug)]
 pub(crate) enum Liquid {
     Linear(Vec<Linear>),

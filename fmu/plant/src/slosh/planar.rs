@@ -37,7 +37,7 @@ use alloc::string::String;
 use taylor::number::Number;
 use taylor::series::{Series, ZERO, constant, mul, next, number, sin_cos, square, values};
 
-use super::{Angles, HubReaction, SloshMode};
+use super::{Angles, HubReaction, SloshMode, one_angle, own_pendulum};
 use crate::hub::HubMotion;
 use crate::parameters::Init;
 use crate::pendulum::Pendulum;
@@ -59,6 +59,8 @@ pub struct Planar {
 }
 
 impl SloshMode for Planar {
+    one_angle!();
+
     fn new(p: &Pendulum) -> Self {
         Planar {
             p: *p,
@@ -74,44 +76,6 @@ impl SloshMode for Planar {
             al_d2: ZERO,
             force: ZERO,
         }
-    }
-
-    fn start_problem(&self, init: &Init) -> Option<String> {
-        self.p.start_problem(init)
-    }
-
-    fn pendulum(&self) -> &Pendulum {
-        &self.p
-    }
-
-    fn pendulum_mut(&mut self) -> &mut Pendulum {
-        &mut self.p
-    }
-
-    fn amplitude2<T: Number>(&self) -> [T; 2] {
-        [&self.al, &self.al_d].map(|x| number::<T>(x) * number::<T>(x))
-    }
-
-    fn coordinates(&self, at: &Angles) -> [f64; 4] {
-        let ([q_x, q_y], [x_d, y_d]) = (at.angle, at.rate);
-        self.p.coordinates(self.p.angle_and_rate([q_x, q_y, x_d, y_d]))
-    }
-
-    fn angles<T: Number>(&self) -> Angles<T> {
-        let [angle, rate] = [&self.al, &self.al_d].map(|x| self.p.spread(number::<T>(x)));
-        Angles { angle, rate }
-    }
-
-    fn start(&mut self, q: &[f64; 4], _: &HubMotion) {
-        [self.al[0], self.al_d[0]] = self.p.angle_and_rate(*q);
-    }
-
-    fn seed_direction(&mut self, dq: &[f64; 4], _: &HubMotion) {
-        [self.al[1], self.al_d[1]] = self.p.angle_and_rate(*dq);
-    }
-
-    fn derivatives(&self, n: usize, _: &HubMotion) -> [f64; 4] {
-        self.p.coordinates([self.al_d[n], self.al_dd[n]])
     }
 
     #[inline(always)]
@@ -161,30 +125,11 @@ impl SloshMode for Planar {
     }
 
     #[inline(always)]
-    fn coefficient_norm(&self, n: usize) -> f64 {
-        self.al_d[n].abs()
-    }
-
-    #[inline(always)]
-    fn dissipation(&mut self, n: usize, ramp: bool) -> f64 {
-        self.p.c
-            * self.p.l
-            * self.p.l
-            * if ramp { mul(n, &self.drag, &self.al_d) } else { square(n, &self.al_d) }
-    }
-
-    #[inline(always)]
     fn mass_height(&mut self, n: usize, hub: &HubMotion) -> f64 {
         let Pendulum { m, l, r, along: [n_x, n_t], .. } = self.p;
         let half = libm::sin(self.al[0] / 2.0);
         let place = |j: usize| [constant(j, r) + l * self.s[j] * n_x, l * self.s[j] * n_t];
         m * l * if n == 0 { 2.0 * half * half } else { -self.c[n] } + m * hub.tilt.height(n, place)
-    }
-
-    #[inline(always)]
-    fn coordinates_at(&self, n: usize, t: f64, _: f64, varies: bool) -> [f64; 4] {
-        let [al, al_d] = values([&self.al, &self.al_d], n, t);
-        if varies { self.p.coordinates([al, al_d]) } else { [0.0, al, 0.0, al_d] }
     }
 
     fn height<T: Number>(&self, hub: &HubMotion) -> [T; 2] {

@@ -43,7 +43,7 @@ use taylor::plane::{
 };
 use taylor::series::{Series, ZERO, constant, mul, mul_tail, next, number, square, values};
 
-use super::{Angles, HubReaction, SloshMode};
+use super::{Angles, HubReaction, SloshMode, own_pendulum};
 use crate::hub::HubMotion;
 use crate::parameters::Init;
 use crate::pendulum::Pendulum;
@@ -159,13 +159,7 @@ impl SloshMode for Spherical {
         }
     }
 
-    fn pendulum(&self) -> &Pendulum {
-        &self.p
-    }
-
-    fn pendulum_mut(&mut self) -> &mut Pendulum {
-        &mut self.p
-    }
+    own_pendulum!();
 
     fn amplitude2<T: Number>(&self) -> [T; 2] {
         let [x_d, y_d] = numbers::<T>(&self.xi_d).map(|rate| number::<T>(&self.k) * rate);

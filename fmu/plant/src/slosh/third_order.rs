@@ -19,7 +19,7 @@
 use taylor::number::Number;
 use taylor::series::{Series, ZERO, constant, mul, mul_tail, next, number, square, values};
 
-use super::{Angles, HubReaction, SloshMode};
+use super::{Angles, HubReaction, SloshMode, own_pendulum};
 use crate::hub::HubMotion;
 use crate::pendulum::Pendulum;
 
@@ -69,13 +69,7 @@ impl SloshMode for ThirdOrder {
         }
     }
 
-    fn pendulum(&self) -> &Pendulum {
-        &self.p
-    }
-
-    fn pendulum_mut(&mut self) -> &mut Pendulum {
-        &mut self.p
-    }
+    own_pendulum!();
 
     fn amplitude2<T: Number>(&self) -> [T; 2] {
         let l2 = T::constant(self.p.l * self.p.l);
