@@ -5,13 +5,13 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
 use experiments::sensors::Sensor;
+use identify::any_fmu::foresee::{Bound, foresee};
+use identify::any_fmu::likelihood::deviances;
 use identify::any_fmu::{self, Identification};
 use identify::input::names::list;
 use identify::input::question::{Question, Solver};
 use identify::input::record::Record;
 use identify::model::simulate::Model;
-use identify::uncertainty::foresee::{Bound, foresee};
-use identify::uncertainty::likelihood::deviances;
 use signals::recording::Columns;
 use signals::table::Table;
 
@@ -223,7 +223,7 @@ impl AnyFmuArgs {
             let names: Vec<String> = question
                 .unknowns(model.description(), &records)?
                 .into_iter()
-                .map(|u| u.name)
+                .map(|(unknown, _)| unknown.name)
                 .collect();
             let names: Vec<&str> = names.iter().map(String::as_str).collect();
             let table = Table::read(points, &names)?;

@@ -1,33 +1,51 @@
 //! Identification of any FMU by output error: which values of its parameters and starts make its outputs those of the recordings.
 //!
 //! A [`Question`] names the unknowns, [`Record`]s hold the recordings, and a [`Model`] runs the FMU with its own solver or the
-//! host's ([`host::exchange`]). The stages are those of the folders.
+//! host's ([`host::exchange`]). Together they are a [`system::FmuSystem`], a system of the [`crate::engine`].
 
+pub mod foresee;
+pub mod likelihood;
 mod page;
+pub mod system;
 
 use std::collections::BTreeMap;
 
+use analysis::gauss_markov::Noise;
+use analysis::innovations::{LIMIT, Tests};
+use analysis::statistics::{mean, median, variance};
 use anyhow::{Context, Result, ensure};
+use nalgebra::DMatrix;
 use serde::Serialize;
 
+use crate::engine::knowledge::Inseparable;
+use crate::engine::minimum::{Curvature, places};
+use crate::engine::search::{solve, solve_near};
+use crate::engine::solver_error::SolverError;
+use crate::engine::{CONVERGED, Motion, Signal, Solution, Unknown};
 use crate::estimate::{Estimated, prose};
-use crate::fit::covariance::Covariance;
-use crate::fit::goodness::{Output, outputs};
-use crate::fit::problem::Problem;
-use crate::fit::search::{self, Minimum};
 use crate::input::question::{Question, Setting};
 use crate::input::record::Record;
-use crate::model::simulate::{Model, Setup};
-use crate::model::unknown::{Unknown, What};
+use crate::input::tolerance::{self, Share};
+use crate::model::simulate::Model;
 use crate::news::News;
-use crate::tuning::{DECREMENT, PAIR_CORRELATION, PRIOR_ALONE, SOLVER_ADDED, TURNS};
-use crate::uncertainty::knowledge::{Inseparable, Knowledge, finite, knowledge};
-use crate::uncertainty::profile::{self, Interval};
-use crate::uncertainty::solver_error::{self, SolverError};
-use crate::uncertainty::tolerated::Tolerated;
 use crate::words::identified::{Identified, Residual};
 use crate::words::verdict::{DOES_NOT_FIT, NO_MINIMUM, NOT_JUDGED, failed};
-use analysis::innovations::LIMIT;
+use system::{FmuSystem, is_known};
+
+/// Correlation from which on two estimates are named as a pair.
+const PAIR: f64 = 0.98;
+/// Part of the prior's standard deviation that is left where the recordings say nothing.
+const PRIOR_ALONE: f64 = 0.9;
+/// Part of a standard deviation below which the solver's errors are not added: they would make it 0.1 % larger.
+const ADDED: f64 = 0.05;
+/// Standard deviations by which the minimum may lie beyond a bound by chance.
+const PRESSED: f64 = 3.0;
+/// Two-sided 95 % of the normal distribution.
+const Z: f64 = 1.96;
+/// Second difference of an output that counts as a jump: in standard deviations of its noise, and in medians of all.
+const JUMP: (f64, f64) = (8.0, 20.0);
+/// Searches at most, each without the rows next to jumps of the one before.
+const TURNS: usize = 4;
 
 /// Results other than the estimates.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -59,6 +77,36 @@ pub struct Details {
 /// Result of fitting any FMU.
 pub type Identification = Identified<Details>;
 
+/// One output of one recording.
+#[derive(Clone, Debug, Serialize)]
+pub struct Output {
+    /// The recording's name.
+    pub recording: String,
+    /// The output's.
+    pub name: String,
+    /// Unit.
+    pub unit: String,
+    /// Rows with a value.
+    pub rows: usize,
+    /// White noise of a row.
+    pub noise_white: f64,
+    /// Gauss–Markov bias: standard deviation and correlation time, s.
+    pub drift: Option<(f64, f64)>,
+    /// 100 (1 − |y − ŷ|/|y − mean y|), %.
+    pub fit_percent: f64,
+    /// Tests of the residual.
+    pub tests: Tests,
+    /// Mean over the mean's standard deviation.
+    pub mean: f64,
+}
+
+impl Output {
+    /// Returns true if the residual is noise about 0.
+    pub fn passed(&self) -> bool {
+        self.tests.passed() && self.mean.abs() < LIMIT
+    }
+}
+
 /// Identifies.
 ///
 /// # Errors
@@ -73,8 +121,7 @@ pub fn identify(
     for record in records {
         record.check(question).with_context(|| format!("{} cannot be used", record.name))?;
     }
-    let setup = Setup::new(question, model.description())?;
-    let unknowns = question.unknowns(model.description(), records)?;
+    let (system, unknowns) = FmuSystem::new(model, question, records)?;
     let mut done = Vec::new();
     let mut told = |words: &News| {
         if let News::Step(line) = words {
@@ -82,69 +129,75 @@ pub fn identify(
         }
         news(words);
     };
-    let problem = Problem::new(model, &setup, records, unknowns, 1e-3);
-    told(&News::Step(format!(
-        "{} unknowns, {} recordings, {} runs for a set of sensitivities",
-        problem.unknowns.len(),
-        records.len(),
-        problem.runs_of_jacobian()
-    )));
-    for warning in problem.warnings()? {
+    let count = unknowns.len();
+    told(&News::Step(format!("{count} unknowns, {} recordings", records.len())));
+    for warning in system.warnings(&unknowns)? {
         told(&News::Step(format!("the FMU warns: {warning}")));
     }
-    let (mut minimum, starts) = search::best(&problem, question.starts, &mut told)?;
-    let mut problem = problem;
-    for _ in 0..ROUNDS {
-        for turn in 1..=TURNS {
-            let before: Vec<f64> = problem.channels.iter().map(|c| c.noise.white).collect();
-            let free = problem.unknowns.iter().filter(|unknown| unknown.prior.is_none()).count();
-            let jumps = problem.leave_out_jumps(&minimum.answer.motion);
-            if jumps > 0 {
-                told(&News::Step(format!("left out {jumps} rows next to jumps of an output")));
-            }
-            problem.estimate_noise(&minimum.answer.motion, &minimum.x, free, question.drift);
-            let changes = problem.channels.iter().zip(&before);
-            let change = changes.map(|(c, b)| (c.noise.white / b).ln().abs()).fold(0.0, f64::max);
-            if turn > 2 && change < 0.01 && minimum.converged() {
-                break;
-            }
-            told(&News::Step(format!("noise estimated, turn {turn}")));
-            let (x, steps) = (&minimum.x, minimum.steps);
-            minimum = search::search(&problem, x, steps, (DECREMENT, 30), &mut told)?;
+    let mut problem = system.problem(unknowns, question);
+    let (mut near, mut starts): (Option<Vec<f64>>, usize) = (None, 0);
+    for turn in 1.. {
+        let mut solution = match &near {
+            None => solve(&problem, None, &mut told)?,
+            Some(values) => solve_near(&problem, values, &mut told)?,
+        };
+        starts = starts.max(solution.starts);
+        let (point, noise) = (&solution.minimum.point, &solution.fit.noise);
+        let mut signals = problem.signals.clone();
+        let jumps = leave_out_jumps(&mut signals, records, &point.motion, noise);
+        if turn == TURNS
+            || signals.iter().zip(&problem.signals).all(|(a, b)| a.sampled == b.sampled)
+        {
+            told(&News::Step(format!("{:.0} runs of each recording", solution.fit.simulations())));
+            let mut found = conclude(&system, &mut solution, question)?;
+            found.details.starts = starts;
+            found.done = done;
+            return Ok(found);
         }
-        // the last noise is that of the last minimum
-        minimum.answer.e = problem.stacked(&minimum.answer.motion, &minimum.x);
-        let is_better;
-        (minimum, is_better) = search::not_worse(&problem, minimum, &mut told);
-        if !is_better {
-            break;
-        }
+        told(&News::Step(format!("left out {jumps} rows next to jumps of an output")));
+        near = Some(solution.fit.values(&point.z));
+        problem.signals = signals;
     }
-    told(&News::Step("intervals from the profiles of the likelihood".into()));
-    let mut found = conclude(&problem, &minimum, question)?;
-    found.details.starts = starts;
-    found.done = done;
-    Ok(found)
+    unreachable!("the last turn returns")
 }
 
-/// Minima at most, each better than the one before, about which the noise is estimated.
-const ROUNDS: usize = 3;
+/// Leaves out the rows next to jumps of the model's outputs and returns their number. If the estimate puts an event on the wrong side
+/// of a row, the sum of squares jumps, and the row does not show how far the event is off.
+fn leave_out_jumps(
+    signals: &mut [Signal],
+    records: &[Record],
+    motion: &[Motion],
+    noise: &[Noise],
+) -> usize {
+    let mut count = 0;
+    for (signal, noise) in signals.iter_mut().zip(noise) {
+        let y = &motion[signal.recording].outputs[signal.output];
+        signal.sampled = records[signal.recording].sampled(signal.output);
+        let bends: Vec<f64> = y.windows(3).map(|y| (y[2] - 2.0 * y[1] + y[0]).abs()).collect();
+        let usual = median(&bends).unwrap_or(0.0);
+        let limit = (JUMP.0 * noise.white).max(JUMP.1 * usual);
+        for (k, _) in bends.iter().enumerate().filter(|(_, bend)| **bend > limit) {
+            count += usize::from(signal.sampled[k + 1]);
+            signal.sampled[k + 1] = false;
+        }
+    }
+    count
+}
 
 /// Advice on how to make the solver's errors smaller.
-fn remedy(problem: &Problem, solver: &SolverError) -> String {
+fn remedy(system: &FmuSystem, heeds_tolerance: bool) -> String {
     let finer = "a smaller tolerance, --solver own:TOLERANCE, makes them smaller";
-    match problem.model {
+    match system.model {
         Model::Host { .. } => {
             "a smaller tolerance, --solver host:TOLERANCE, makes them smaller".into()
         }
-        Model::Own(_) if problem.setup.can_exchange(problem.model) => {
-            let also =
-                if solver.heeds_tolerance { format!("; {finer} too") } else { String::new() };
+        Model::Own(_) if system.setup.can_exchange(system.model) => {
+            let also = if heeds_tolerance { format!("; {finer} too") } else { String::new() };
             format!("with --solver host the host integrates this FMU, with errors of 1e-8{also}")
         }
-        Model::Own(_) if solver.heeds_tolerance => finer.into(),
+        Model::Own(_) if heeds_tolerance => finer.into(),
         Model::Own(_) => {
-            let exchange = match problem.model.offers_exchange() {
+            let exchange = match system.model.offers_exchange() {
                 true => {
                     "--solver host is of no use, because an output follows the slope of an input"
                 }
@@ -157,62 +210,197 @@ fn remedy(problem: &Problem, solver: &SolverError) -> String {
     }
 }
 
-fn conclude(problem: &Problem, minimum: &Minimum, question: &Question) -> Result<Identification> {
-    let n = minimum.x.len();
-    let inner = minimum.inner(problem);
-    let solver = solver_error::measure(
-        problem,
-        &minimum.x,
-        &minimum.answer.motion,
-        &minimum.jacobian,
-        &minimum.steps,
-        &inner,
-    )?;
-    let Knowledge { covariance, inseparable, decided_by_solver } =
-        knowledge(problem, &minimum.jacobian, &inner, &solver)?;
-    let curvature_alone = |j: usize| 1.0 / minimum.jacobian.column(j).norm();
-    // where differences end before the minimum, how far it may be off is part of how sure it is
-    let widened = (1.0 + minimum.decrement.powi(2)).sqrt();
-    // at a bound: as far as it would go with the others held
-    let std: Vec<f64> = (0..n)
-        .map(|j| {
-            if decided_by_solver[j] {
-                return f64::NAN;
+/// A 95 % interval and how it was found: whether each end is one of the likelihood or a bound, and whether the likelihood is a parabola.
+struct Interval {
+    ends: [f64; 2],
+    ended: [bool; 2],
+    is_quadratic: bool,
+}
+
+/// The numbers of a solution: covariances with and without the tolerances, and what the solver's errors do.
+struct Numbers {
+    covariance: DMatrix<f64>,
+    std: Vec<f64>,
+    std_noise: Vec<f64>,
+    intervals: Vec<Interval>,
+    inseparable: Vec<Inseparable>,
+    decided: Vec<bool>,
+    /// Unknowns at a bound, and those of them that want to go further by more than chance.
+    held: Vec<usize>,
+    pressed: Vec<usize>,
+    solver: SolverError,
+}
+
+impl Numbers {
+    fn of(system: &FmuSystem, solution: &mut Solution) -> Result<Self> {
+        let unknowns = &solution.fit.problem.unknowns;
+        let n = unknowns.len();
+        let own = solution.fit.derivatives_at(&mut solution.minimum)?.matrix;
+        let known: Vec<bool> = (0..n).map(|j| is_known(&unknowns[j])).collect();
+        let mut jacobian = own.clone();
+        let tolerances = solution.fit.derivatives(&solution.minimum.point, &known)?.matrix;
+        for j in places(&known) {
+            jacobian.column_mut(j).copy_from(&tolerances.column(j));
+        }
+        let (fit, minimum) = (&solution.fit, &solution.minimum);
+        let point = &minimum.point;
+        let gradient = jacobian.tr_mul(&point.e);
+        let inner = fit.inner(&point.z, &gradient, &vec![true; n]);
+        let is_inner: Vec<bool> = (0..n).map(|j| inner.contains(&j)).collect();
+        let solver =
+            system.with_finer(|finer| fit.solver_error(point, &jacobian, &is_inner, finer));
+        let told = fit.knowledge(&jacobian, &is_inner, &solver);
+        let asked: Vec<usize> = inner.iter().copied().filter(|j| !known[*j]).collect();
+        let alone = Curvature::new(&jacobian, asked).covariance(n);
+        // where the search ended before the minimum, how far it may be off is part of how sure it is
+        let widened = (1.0 + minimum.decrement.powi(2)).sqrt();
+        let with_solver = |j: usize, std: f64| match solver.shift[j] > ADDED * std {
+            true => std.hypot(solver.shift[j]),
+            false => std,
+        };
+        // of one at a bound: curvature with the others at their minimum
+        let inverse = Curvature::new(&jacobian, inner.clone()).covariance(n);
+        let curvature = |j: usize| {
+            let crossed = jacobian.tr_mul(&jacobian.column(j));
+            jacobian.column(j).norm_squared() - crossed.dot(&(&inverse * &crossed))
+        };
+        let held: Vec<usize> = (0..n).filter(|j| !is_inner[*j]).collect();
+        let beyond = |j: &&usize| gradient[**j].abs() / curvature(**j).max(0.0).sqrt() > PRESSED;
+        let pressed = held.iter().filter(beyond).copied().collect();
+        let mut std: Vec<f64> = (0..n)
+            .map(|j| match (told.decided_by_solver[j], is_inner[j]) {
+                (true, _) => f64::NAN,
+                (_, true) => with_solver(j, widened * told.covariance[(j, j)].sqrt()),
+                _ => 1.0 / jacobian.column(j).norm(),
+            })
+            .collect();
+        let std_noise = match known.contains(&true) {
+            true => (0..n).map(|j| alone[(j, j)].sqrt()).collect(),
+            false => std.clone(),
+        };
+        let draws = match solution.profile {
+            Some(_) => Some(solution.draw(true)?).filter(|draws| draws.is_told()),
+            None => None,
+        };
+        let z = &solution.minimum.point.z;
+        let mut intervals = Vec::with_capacity(n);
+        for j in 0..n {
+            let (low, high) = unknowns[j].bounds;
+            let parabola = [-1.0, 1.0].map(|sign| z[j] + sign * Z * std[j]);
+            let mut found = Interval { ends: parabola, ended: [true; 2], is_quadratic: true };
+            if !std[j].is_finite() {
+                let ends = [low, high].map(|end| if end.is_finite() { end } else { f64::NAN });
+                found = Interval { ends, ended: [false; 2], is_quadratic: false };
+            } else if !is_inner[j] {
+                // the sum of squares rises by c x² + 2 g x from the bound on
+                let (c, g) = (curvature(j).max(1e-300), gradient[j].abs());
+                let far = ((g * g + Z * Z * c).sqrt() - g) / c;
+                let is_upper = z[j] >= high;
+                let ends = if is_upper { [z[j] - far, high] } else { [low, z[j] + far] };
+                found = Interval { ends, ended: [is_upper, !is_upper], is_quadratic: false };
+            } else if let (Some(draws), false) = (&draws, known[j]) {
+                // what the solver and the search add widens the draws
+                let wider = std[j] / told.covariance[(j, j)].sqrt();
+                found.ends = draws.interval(j).map(|end| z[j] + wider * (end - z[j]));
+                if let Some((_, open)) =
+                    draws.open.as_ref().filter(|(of, _)| *of == unknowns[j].name)
+                {
+                    found.ended = open.map(|open| !open);
+                }
+                let off = (0..2).map(|k| (found.ends[k] - parabola[k]).abs() / (Z * std[j]));
+                found.is_quadratic = off.fold(0.0, f64::max) < 0.1 && found.ended == [true; 2];
+                let reach = found.ends.map(|end| (end - z[j]).abs() / Z);
+                std[j] = std[j].max(reach[0]).max(reach[1]);
             }
-            let std = match inner.contains(&j) {
-                true => widened * covariance[(j, j)].sqrt(),
-                false => curvature_alone(j),
-            };
-            if solver.shift[j] > SOLVER_ADDED * std { std.hypot(solver.shift[j]) } else { std }
+            for (k, bound) in [low, high].into_iter().enumerate() {
+                let is_beyond = if k == 0 { found.ends[k] < bound } else { found.ends[k] > bound };
+                if is_inner[j] && (is_beyond || !found.ended[k]) && std[j].is_finite() {
+                    let end = if bound.is_finite() { bound } else { found.ends[k] };
+                    (found.ends[k], found.ended[k], found.is_quadratic) = (end, false, false);
+                }
+            }
+            intervals.push(found);
+        }
+        Ok(Numbers {
+            covariance: told.covariance,
+            std,
+            std_noise,
+            intervals,
+            inseparable: told.inseparable,
+            decided: told.decided_by_solver,
+            held,
+            pressed,
+            solver,
         })
-        .collect();
-    let intervals = profile::intervals(problem, minimum, &std)?;
-    let known = Tolerated::of(problem, minimum, &inner)?;
-    let outputs = outputs(problem, &minimum.answer.motion, &minimum.x, question);
+    }
+}
+
+/// Tests the residual of each output.
+fn outputs(system: &FmuSystem, solution: &Solution, question: &Question) -> Vec<Output> {
+    let (fit, point) = (&solution.fit, &solution.minimum.point);
+    let residuals = fit.residuals(&point.z, &point.motion);
+    let innovations = fit.innovations(residuals.clone());
+    let description = system.model.description();
+    let one = |(k, signal): (usize, &Signal)| {
+        let (noise, e) = (fit.noise[k], signal.picked(&innovations[k]));
+        let count = e.len() as f64;
+        let squares: f64 = signal.picked(&residuals[k]).iter().map(|r| r * r).sum();
+        let name = &question.outputs[signal.output];
+        Output {
+            recording: system.records[signal.recording].name.clone(),
+            name: name.clone(),
+            unit: description.variable(name).map_or("", |v| description.unit(v)).into(),
+            rows: e.len(),
+            noise_white: noise.white,
+            drift: (noise.drift > 0.0).then_some((noise.drift * noise.white, noise.time)),
+            fit_percent: 100.0
+                * (1.0 - (squares / (count * variance(&signal.picked(&signal.measured)))).sqrt()),
+            tests: solution.tests[k].clone(),
+            mean: mean(&e) * count.sqrt(),
+        }
+    };
+    fit.problem.signals.iter().enumerate().map(one).collect()
+}
+
+/// JSON knows no infinity.
+fn finite(value: f64) -> f64 {
+    if value.is_finite() { value } else { f64::NAN }
+}
+
+fn conclude(
+    system: &FmuSystem,
+    solution: &mut Solution,
+    question: &Question,
+) -> Result<Identification> {
+    let numbers = Numbers::of(system, solution)?;
+    let Numbers { covariance, std, solver, .. } = &numbers;
+    let problem = solution.fit.problem;
+    let unknowns = &problem.unknowns;
+    let n = unknowns.len();
+    let outputs = outputs(system, solution, question);
+    let minimum = &solution.minimum;
+    let names: Vec<String> = unknowns.iter().map(|u| u.name.clone()).collect();
+    let named = |which: &[usize]| which.iter().map(|&j| names[j].clone()).collect::<Vec<_>>();
+    let shifts = names.iter().cloned().zip(solver.shift.iter().copied().map(finite));
     let mut found = Identified::new(Details {
         outputs,
-        cannot_tell_apart: inseparable,
-        deviance: problem.deviance(&minimum.answer),
-        starts: 1,
+        cannot_tell_apart: numbers.inseparable.clone(),
+        decided_by_solver: named(&places(&numbers.decided)),
+        solver_shift: shifts.collect(),
+        deviance: solution.fit.deviance(&minimum.point),
         decrement: minimum.decrement,
         covariance: (0..n)
             .map(|i| covariance.row(i).iter().copied().map(finite).collect())
             .collect(),
         ..Details::default()
     });
-    let names = problem.names();
-    let correlations = Covariance::correlations(&covariance);
-    found.converged = minimum.converged();
+    found.converged = minimum.decrement < CONVERGED;
     let fits = found.details.outputs.iter().all(Output::passed);
-    let decided: Vec<usize> = (0..n).filter(|&j| decided_by_solver[j]).collect();
-    found.details.decided_by_solver = decided.iter().map(|&j| names[j].clone()).collect();
-    let shifts = names.iter().cloned().zip(solver.shift.iter().copied().map(finite));
-    found.details.solver_shift = shifts.collect();
-    let pressed: Vec<String> =
-        minimum.pressed(problem).into_iter().map(|j| names[j].clone()).collect();
-    found.fits = (!fits || decided.is_empty() && pressed.is_empty()).then_some(fits);
+    let is_decided = !found.details.decided_by_solver.is_empty();
+    let pressed = named(&numbers.pressed);
+    found.fits = (!fits || !is_decided && pressed.is_empty()).then_some(fits);
     let mut words = match found.fits {
-        None if decided.is_empty() => vec![format!(
+        None if !is_decided => vec![format!(
             "{NOT_JUDGED}: the residual of every output is noise, but bounds hold {}: the recordings want to go further, so that \
              no interval can be trusted. Wider bounds, or another start, may lead to another minimum.",
             pressed.join(", ")
@@ -222,101 +410,125 @@ fn conclude(problem: &Problem, minimum: &Minimum, question: &Question) -> Result
         )],
         Some(_) => vec![fit_in_words(&found.details.outputs)],
     };
-    if !decided.is_empty() {
+    let is_seen = solver.differs.contains(&true);
+    if is_decided {
+        let heeds = matches!(system.model, Model::Own(_)) && solver.differs.first() == Some(&true);
         words.push(format!(
             "No interval is given for {}: the errors of the {} solver decide them ({}).",
             found.details.decided_by_solver.join(", "),
-            if matches!(problem.model, Model::Own(_)) { "FMU's own" } else { "host's" },
-            remedy(problem, &solver)
+            if matches!(system.model, Model::Own(_)) { "FMU's own" } else { "host's" },
+            remedy(system, heeds)
         ));
-    }
-    let is_parameter = |unknown: &Unknown| matches!(unknown.what, What::Parameter { .. });
-    if decided.is_empty() && !solver.is_seen && problem.unknowns.iter().any(is_parameter) {
+    } else if !is_seen && (0..n).any(|j| system.is_parameter(j)) {
         words.push(
             "The size of the solver's errors is not known: the outputs are the same with a finer tolerance and with shorter \
              communication steps. The intervals hold if these errors are small against the noise."
                 .into(),
         );
     }
-    words.extend(
-        found
-            .details
-            .cannot_tell_apart
-            .iter()
-            .filter(|set| set.direction.len() > 1)
-            .map(Inseparable::words),
-    );
+    let sets = found.details.cannot_tell_apart.iter().filter(|set| set.direction.len() > 1);
+    words.extend(sets.map(Inseparable::words));
     if !found.converged {
         words.push(format!(
             "{NO_MINIMUM}: it ended {:.1} standard deviations from it",
             minimum.decrement
         ));
     }
-    for (j, unknown) in problem.unknowns.iter().enumerate() {
-        let interval = &intervals[j];
+    for (j, unknown) in unknowns.iter().enumerate() {
+        let interval = &numbers.intervals[j];
         let mut e = Estimated {
-            value: minimum.x[j],
+            value: minimum.point.z[j],
             std: finite(std[j]),
-            std_noise: known.as_ref().map_or(finite(std[j]), |known| finite(known.noise_only[j])),
+            std_noise: finite(numbers.std_noise[j]),
             interval: interval.ends.map(finite),
             determined: false,
             unit: unknown.unit.clone(),
         };
-        if decided_by_solver[j] {
+        if numbers.decided[j] {
             e.interval = [f64::NAN; 2];
-        } else if unknown.is_known {
+        } else if is_known(unknown) {
             e.determined = true;
         } else {
-            say(unknown, &e, interval, inner.contains(&j), std[j], &mut found.details, &mut words);
+            let is_inner = !numbers.held.contains(&j);
+            say(unknown, &e, interval, is_inner, std[j], &mut found.details, &mut words);
             e.determined = interval.ends.iter().all(|end| end.is_finite())
                 && !found.details.not_determined.contains(&unknown.name);
         }
-        match unknown.what {
-            What::Parameter { .. } => found.parameters.insert(unknown.name.clone(), e),
-            _ => found.measurement.insert(unknown.name.clone(), e),
+        match system.is_parameter(j) {
+            true => found.parameters.insert(unknown.name.clone(), e),
+            false => found.measurement.insert(unknown.name.clone(), e),
         };
     }
-    match known {
-        Some(known) => words.extend(known.words(problem, &std)),
-        None => words.push(NOISE_ALONE.into()),
-    }
-    for i in 0..n {
-        for j in 0..i {
-            let is_asked = !(problem.unknowns[i].is_known || problem.unknowns[j].is_known);
-            if is_asked && correlations[i][j].abs() > PAIR_CORRELATION {
-                words.push(format!(
-                    "{} and {} are strongly correlated ({:+.3}): the recordings determine a combination of them better than each \
-                     alone",
-                    names[j], names[i], correlations[i][j]
-                ));
-            }
+    let correlation = |i: usize, j: usize| {
+        let size = (covariance[(i, i)] * covariance[(j, j)]).sqrt();
+        match size > 0.0 && size.is_finite() {
+            true => covariance[(i, j)] / size,
+            false => f64::from(i == j),
+        }
+    };
+    let known: Vec<usize> = (0..n).filter(|j| is_known(&unknowns[*j])).collect();
+    let asked = (0..n).filter(|j| !known.contains(j));
+    let share = |j: usize| {
+        let most = known
+            .iter()
+            .max_by(|a, b| correlation(**a, j).abs().total_cmp(&correlation(**b, j).abs()))?;
+        let share = 1.0 - (numbers.std_noise[j] / std[j]).powi(2);
+        Some(Share { name: names[j].clone(), share, most: names[*most].clone() })
+    };
+    let shares: Vec<Share> =
+        asked.clone().filter(|j| std[*j].is_finite()).filter_map(share).collect();
+    match known.is_empty() {
+        true => words.push(NOISE_ALONE.into()),
+        false => {
+            let sizes: Vec<String> = known.iter().map(|&j| size(system, unknowns, j)).collect();
+            words.extend(tolerance::shares(&sizes, &shares));
         }
     }
-    found.correlations = (names, correlations);
+    for i in asked.clone() {
+        for j in asked.clone().filter(|j| *j < i && correlation(i, *j).abs() > PAIR) {
+            words.push(format!(
+                "{} and {} are strongly correlated ({:+.3}): the recordings determine a combination of them better than each \
+                 alone",
+                names[j],
+                names[i],
+                correlation(i, j)
+            ));
+        }
+    }
+    let row = |i: usize| (0..n).map(|j| correlation(i, j)).collect();
+    found.correlations = (names.clone(), (0..n).map(row).collect());
     found.verdict = words;
     found.settings = question.settings.iter().map(Setting::named).collect();
-    let residuals = problem.residuals(&minimum.answer.motion, &minimum.x);
-    found.residuals = problem
-        .channels
-        .iter()
-        .zip(&residuals)
-        .map(|(channel, residual)| {
-            let record = &problem.records[channel.recording];
-            let name = &question.outputs[channel.output];
-            let description = problem.model.description();
-            let unit = description.variable(name).map_or("1", |v| description.unit(v));
-            Residual {
-                name: format!("{}, {name}", record.name),
-                label: prose(if unit.is_empty() { "1" } else { unit }),
-                time: channel.picked(&record.time),
-                measured: channel.picked(&record.outputs[channel.output]),
-                residual: channel.picked(residual),
-                noise: Some(channel.noise.white),
-                torque: None,
-            }
-        })
-        .collect();
+    let residuals = solution.fit.residuals(&minimum.point.z, &minimum.point.motion);
+    let description = system.model.description();
+    let residual = |((signal, residual), noise): ((&Signal, &Vec<f64>), &Noise)| {
+        let record = &system.records[signal.recording];
+        let name = &question.outputs[signal.output];
+        let unit = description.variable(name).map_or("1", |v| description.unit(v));
+        Residual {
+            name: format!("{}, {name}", record.name),
+            label: prose(if unit.is_empty() { "1" } else { unit }),
+            time: signal.picked(&record.time),
+            measured: signal.picked(&signal.measured),
+            residual: signal.picked(residual),
+            noise: Some(noise.white),
+            torque: None,
+        }
+    };
+    let signals = problem.signals.iter().zip(&residuals).zip(&solution.fit.noise);
+    found.residuals = signals.map(residual).collect();
     Ok(found)
+}
+
+/// A known value with its tolerance in words.
+fn size(system: &FmuSystem, unknowns: &[Unknown], j: usize) -> String {
+    let Unknown { name, unit, prior, .. } = &unknowns[j];
+    let (mean, std) = prior.unwrap_or_default();
+    let whole = if system.is_parameter(j) { mean.abs() } else { 1.0 };
+    match whole > 0.0 {
+        true => format!("{name} {:.2} %", 100.0 * std / whole),
+        false => format!("{name} ± {std:.1e} {}", prose(unit)),
+    }
 }
 
 /// Sentence about intervals of a fit without tolerances.
@@ -368,7 +580,7 @@ fn say(
              {:.4e}{unit}",
             e.value, interval.ends[other]
         ));
-    } else if !interval.quadratic {
+    } else if !interval.is_quadratic {
         details.not_quadratic.push(name.clone());
         let open = match interval.ended {
             [true, true] => String::new(),

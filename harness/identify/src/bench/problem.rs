@@ -537,7 +537,18 @@ pub fn problem<'a>(
         Some(hold) => vec![hold],
         None => guessed(system.recordings),
     };
-    Problem { system, recordings, signals, unknowns, starts, holds, acausal: options.acausal }
+    let acausal = options.acausal;
+    Problem {
+        system,
+        recordings,
+        signals,
+        unknowns,
+        starts,
+        holds,
+        acausal,
+        drawn: 2,
+        rough: false,
+    }
 }
 
 /// Behaviours between rows, the likeliest first: a torque that seldom changes is held. One where it makes no difference.

@@ -145,7 +145,9 @@ impl Solution<'_> {
             .filter_map(|j| {
                 let Role::Bias(output, Some(recording)) = unknowns[j].role else { return None };
                 let of = |s: &super::Signal| (s.output, s.recording) == (output, recording);
-                Some((j, problem.signals.iter().position(of)?))
+                let s = problem.signals.iter().position(of)?;
+                // a bias beside white noise alone is an unknown like any other
+                (fit.noise[s].drift > 0.0).then_some((j, s))
             })
             .collect();
         for _ in 0..DRAWS {

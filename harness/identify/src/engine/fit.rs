@@ -4,12 +4,12 @@ use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 use analysis::gauss_markov::{Noise, Whitening};
 use analysis::innovations::Tests;
-use anyhow::Result;
+use anyhow::{Result, bail};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::problem::{Hold, Motion, Part, Problem, Role, Signal, Unknown};
-use super::{FIRST_STEP, MOVE, STEPS};
+use super::{BEND, FIRST_STEP, MOVE, STEPS, WIDER};
 
 /// A problem with the state of its search: the noise of its signals, and what its inputs do between rows.
 pub struct Fit<'p> {
@@ -29,7 +29,10 @@ pub struct Fit<'p> {
     pub central: bool,
     /// Least and largest coordinates.
     pub ends: Vec<(f64, f64)>,
-    steps: Vec<f64>,
+    /// The unknown whose profile is followed, if the likelihood was seen to be no parabola along it.
+    pub bent: Option<usize>,
+    /// Steps of the differences, and the least ones that stand above the errors of a solver.
+    pub(super) steps: Vec<(f64, f64)>,
     filters: Vec<Whitening>,
     driven: AtomicUsize,
 }
@@ -68,9 +71,10 @@ impl<'p> Fit<'p> {
             inflation: 1.0,
             part: 1.0,
             free: unknowns.iter().map(|u| u.part == Part::Free).collect(),
-            central: false,
+            central: problem.rough,
+            bent: None,
             ends: unknowns.iter().map(|u| (end(u, u.bounds.0), end(u, u.bounds.1))).collect(),
-            steps: unknowns.iter().map(|u| FIRST_STEP * u.reach).collect(),
+            steps: unknowns.iter().map(|u| (FIRST_STEP * u.reach, 0.0)).collect(),
             filters: Vec::new(),
             driven: AtomicUsize::new(0),
         };
@@ -212,6 +216,7 @@ impl<'p> Fit<'p> {
         };
         for (j, column) in columns.into_iter().enumerate() {
             let Some(Column { values, means, step }) = column else { continue };
+            check_finite(&values, &self.problem.unknowns[j].name)?;
             found.matrix.column_mut(j).copy_from_slice(&values);
             found.means.column_mut(j).copy_from_slice(&means);
             self.steps[j] = step;
@@ -261,49 +266,108 @@ impl<'p> Fit<'p> {
             let (values, means) = whitened(pieces);
             return Ok(Column { values, means, step: self.steps[j] });
         }
-        let mut step = self.steps[j];
+        let reach = unknown.reach;
+        let (mut step, mut least) = self.steps[j];
         loop {
-            let (by, there) = self.moved(at, j, step)?;
-            let other = self.central.then(|| self.moved(at, j, -by)).transpose().ok().flatten();
-            let (from, base) = match other {
-                Some((from, base)) if from == -by => (from, base),
-                _ => (0.0, self.residuals(&at.z, &at.motion)),
-            };
-            let width = by - from;
-            let pieces = there
-                .iter()
-                .zip(&base)
-                .map(|(a, b)| a.iter().zip(b).map(|(a, b)| (a - b) / width).collect::<Vec<f64>>());
-            let (values, means) = whitened(pieces.collect());
+            let is_first = step == self.steps[j].0;
+            let (mut pieces, mut bend) = self.difference(at, j, step)?;
+            // a wider step makes the part of the solver's errors smaller, and that of curvature larger
+            let mut wider = step * WIDER;
+            while self.problem.rough && bend > BEND && wider <= STEPS.1 * reach {
+                match self.difference(at, j, wider) {
+                    Ok((other, less)) if less < 0.7 * bend => {
+                        (pieces, bend, least) = (other, less, wider);
+                    }
+                    Ok(_) => {}
+                    Err(_) => break,
+                }
+                wider *= WIDER;
+            }
+            let (values, means) = whitened(pieces);
             let norm = values.iter().map(|v| v * v).sum::<f64>().sqrt() * self.inflation;
-            let reach = unknown.reach;
-            let next = (MOVE / norm.max(1e-300)).clamp(STEPS.0 * reach, STEPS.1 * reach);
+            let next = (MOVE / norm.max(1e-300)).clamp(STEPS.0 * reach, STEPS.1 * reach).max(least);
             // once more where the step was far from what shows
-            let is_first = step == self.steps[j];
             if !is_first || (0.05..20.0).contains(&(next / step)) || !norm.is_finite() {
-                return Ok(Column { values, means, step: next });
+                return Ok(Column { values, means, step: (next, least) });
             }
             step = next;
         }
     }
 
+    /// Change of each residual by one coordinate, by a difference to one side or, if `central`, to both, and the norm of the second
+    /// difference over that of the first: near √3 where errors of the solver decide, small where neither they nor curvature do.
+    fn difference(&self, at: &Point, j: usize, step: f64) -> Result<(Vec<Vec<f64>>, f64)> {
+        let (by, there) = self.moved(at, j, step)?;
+        let other = self.central.then(|| self.moved(at, j, -by)).transpose().ok().flatten();
+        let other = other.filter(|(from, _)| *from == -by);
+        let is_central = other.is_some();
+        let here = || self.residuals(&at.z, &at.motion);
+        let (from, base) = other.unwrap_or_else(|| (0.0, here()));
+        let bend = if self.problem.rough {
+            let middle = if is_central { here() } else { self.moved(at, j, 0.5 * by)?.1 };
+            let norm = |weights: [f64; 3]| {
+                let mut sum = there.clone();
+                for ((sum, b), c) in sum.iter_mut().zip(&middle).zip(&base) {
+                    for ((a, b), c) in sum.iter_mut().zip(b).zip(c) {
+                        *a = weights[0] * *a + weights[1] * b + weights[2] * c;
+                    }
+                }
+                self.innovations(sum).iter().flatten().map(|v| v * v).sum::<f64>().sqrt()
+            };
+            norm([-1.0, 2.0, -1.0]) / norm([1.0, 0.0, -1.0]).max(1e-300)
+        } else {
+            0.0
+        };
+        let width = by - from;
+        let slope = |(a, b): (&Vec<f64>, &Vec<f64>)| -> Vec<f64> {
+            a.iter().zip(b).map(|(a, b)| (a - b) / width).collect()
+        };
+        Ok((there.iter().zip(&base).map(slope).collect(), bend))
+    }
+
     /// Residuals with one coordinate moved by a step, to its own side or else to the other.
     fn moved(&self, at: &Point, j: usize, step: f64) -> Result<(f64, Vec<Vec<f64>>)> {
-        let unknown = &self.problem.unknowns[j];
         let is_inside = |by: f64| (self.ends[j].0..=self.ends[j].1).contains(&(at.z[j] + by));
         let to = |by: f64| -> Result<(f64, Vec<Vec<f64>>)> {
-            let mut z = at.z.clone();
-            z[j] += by;
-            let runs = (0..self.problem.recordings.len()).into_par_iter();
-            let one = |k: usize| match unknown.is_of(k) {
-                true => self.run(&z, k, false),
-                false => Ok(at.motion[k].clone()),
-            };
-            let motion = runs.map(one).collect::<Result<Vec<Motion>>>()?;
+            let (z, motion) = self.motion_with(at, j, at.z[j] + by)?;
             Ok((by, self.residuals(&z, &motion)))
         };
         let (first, second) = if is_inside(step) { (step, -step) } else { (-step, step) };
         to(first).or_else(|error| if is_inside(second) { to(second) } else { Err(error) })
+    }
+
+    /// Coordinates and motion of a point with one coordinate at another value.
+    ///
+    /// # Errors
+    /// If the system refuses the value.
+    pub fn motion_with(&self, at: &Point, j: usize, value: f64) -> Result<(Vec<f64>, Vec<Motion>)> {
+        let mut z = at.z.clone();
+        z[j] = value;
+        let runs = (0..self.problem.recordings.len()).into_par_iter();
+        let one = |k: usize| match self.problem.unknowns[j].is_of(k) {
+            true => self.run(&z, k, false),
+            false => Ok(at.motion[k].clone()),
+        };
+        let motion = runs.map(one).collect::<Result<Vec<Motion>>>()?;
+        Ok((z, motion))
+    }
+
+    /// A sum of motions at the coordinates z as residuals over their standard deviations. The weights add up to 0, so that the
+    /// measurement cancels.
+    pub fn change(&self, z: &[f64], motions: &[(f64, &[Motion])]) -> DVector<f64> {
+        let mut sum: Vec<Vec<f64>> = Vec::new();
+        for (weight, motion) in motions {
+            let residuals = self.residuals(z, motion);
+            sum.resize_with(residuals.len(), Vec::new);
+            for (sum, residual) in sum.iter_mut().zip(residuals) {
+                sum.resize(residual.len(), 0.0);
+                sum.iter_mut().zip(residual).for_each(|(sum, r)| *sum += weight * r);
+            }
+        }
+        let priors = self.problem.unknowns.iter().filter(|u| u.prior.is_some()).count();
+        let mut all = self.innovations(sum).concat();
+        all.resize(all.len() + priors, 0.0);
+        DVector::from_vec(all)
     }
 
     /// Factor of an output in its reading.
@@ -357,7 +421,22 @@ impl Signal {
 struct Column {
     values: Vec<f64>,
     means: Vec<f64>,
-    step: f64,
+    step: (f64, f64),
+}
+
+/// Refuses a derivative by an unknown that is not finite, or whose square is not.
+fn check_finite(values: &[f64], name: &str) -> Result<()> {
+    if values.iter().map(|v| v * v).sum::<f64>().is_finite() {
+        return Ok(());
+    }
+    match values.iter().position(|v| !v.is_finite()) {
+        Some(row) => bail!(
+            "the derivative by {name} is {} in row {} of the residuals: the outputs or the noise are out of range there",
+            values[row],
+            row + 1
+        ),
+        None => bail!("the derivatives by {name} are too large"),
+    }
 }
 
 fn masked(mut piece: Vec<f64>, signal: &Signal) -> Vec<f64> {
@@ -380,5 +459,48 @@ fn reading<'m>(
             Some(Box::new(move |k| other[k]))
         }
         _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::engine::minimum::Curvature;
+
+    #[test]
+    fn values_that_are_not_finite_are_named_and_no_iteration_hangs() {
+        for (entry, words) in [
+            (f64::NAN, "derivative by friction.d is NaN in row 4"),
+            (f64::INFINITY, "derivative by friction.d is inf in row 4"),
+            (f64::NEG_INFINITY, "derivative by friction.d is -inf in row 4"),
+            (1e200, "derivatives by friction.d are too large"),
+        ] {
+            let mut bad = DMatrix::from_fn(5, 2, |k, j| if j == 0 { 1.0 } else { k as f64 - 2.0 });
+            bad[(3, 1)] = entry;
+            let error = check_finite(bad.column(1).as_slice(), "friction.d").unwrap_err();
+            assert!(error.to_string().contains(words), "{error}");
+            assert!(check_finite(bad.column(0).as_slice(), "hub.I").is_ok());
+            let curvature = Curvature::new(&bad, vec![0, 1]);
+            assert!(curvature.covariance(2).iter().all(|v| v.is_finite()));
+            assert!(curvature.unresolved(&[0.0; 2]).is_empty());
+        }
+        // sizes alone change nothing
+        for size in [1e-150, 1e-9, 1.0, 1e9, 1e150] {
+            let line =
+                DMatrix::from_fn(5, 2, |k, j| if j == 0 { size } else { (k as f64 - 2.0) * size });
+            assert!(Curvature::new(&line, vec![0, 1]).unresolved(&[0.0, 0.0]).is_empty(), "{size}");
+        }
+    }
+
+    #[test]
+    fn a_straight_line_has_its_textbook_covariance() {
+        // y = a + b t at t = -2..2, unit noise: var a = 1/5, var b = 1/10, no correlation
+        let line = DMatrix::from_fn(5, 2, |k, j| if j == 0 { 1.0 } else { k as f64 - 2.0 });
+        let found = Curvature::new(&line, vec![0, 1]).covariance(2);
+        assert!((found[(0, 0)] - 0.2).abs() < 1e-15 && (found[(1, 1)] - 0.1).abs() < 1e-15);
+        assert!(found[(0, 1)].abs() < 1e-15);
+        // two columns that are the same are not told apart
+        let same = Curvature::new(&DMatrix::from_element(5, 2, 1.0), vec![0, 1]);
+        assert_eq!(same.unresolved(&[0.0; 2]).len(), 1);
     }
 }

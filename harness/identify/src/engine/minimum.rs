@@ -47,6 +47,10 @@ impl End {
 
 /// Least regularisation of a curvature with a unit diagonal.
 const LEAST: f64 = 1e-12;
+/// Eigenvalue of a curvature with a unit diagonal, over the largest one, up to which the recordings do not show its direction.
+const FLAT: f64 = 1e-12;
+/// A direction is resolved if its eigenvalue is this many times larger than what errors of the derivatives make of it by chance.
+const RESOLVED: f64 = 4.0;
 /// Factor of the damping after a step that fails, or that gains what it should.
 const DAMPING: f64 = 8.0;
 /// Steps that are tried with one set of derivatives.
@@ -64,7 +68,8 @@ impl Curvature {
     pub fn new(jacobian: &DMatrix<f64>, which: Vec<usize>) -> Self {
         let picked = jacobian.select_columns(&which);
         let a = picked.tr_mul(&picked);
-        let scale: Vec<f64> = a.diagonal().iter().map(|d| 1.0 / (d.sqrt() + 1e-30)).collect();
+        let scale: Vec<f64> =
+            a.diagonal().iter().map(|d| if *d > 0.0 { 1.0 / d.sqrt() } else { 1.0 }).collect();
         let matrix = DMatrix::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)] * scale[i] * scale[j]);
         Curvature { which, matrix, scale }
     }
@@ -97,9 +102,25 @@ impl Curvature {
             return (DMatrix::zeros(n, n), DVector::zeros(n));
         }
         let found = self.matrix.clone().symmetric_eigen();
-        let least = 1e-13 * found.eigenvalues.max();
+        let least = FLAT * found.eigenvalues.max();
         let inverse = found.eigenvalues.map(|v| if v > least { 1.0 / v } else { 0.0 });
         (found.eigenvectors, inverse)
+    }
+
+    /// Returns the directions that the curvature does not resolve, as unit vectors in its own scales. `errors` are the independent
+    /// relative errors of the derivatives: along a unit eigenvector v they alone make an eigenvalue of Σ v_i² errors_i².
+    pub fn unresolved(&self, errors: &[f64]) -> Vec<DVector<f64>> {
+        if self.which.is_empty() || self.matrix.iter().any(|v| !v.is_finite()) {
+            return Vec::new();
+        }
+        let found = self.matrix.clone().symmetric_eigen();
+        let flat = FLAT * found.eigenvalues.max();
+        let all = found.eigenvalues.iter().zip(found.eigenvectors.column_iter());
+        let is_flat = |(value, v): &(&f64, nalgebra::DVectorView<f64>)| {
+            let made: f64 = v.iter().zip(errors).map(|(v, error)| (v * error).powi(2)).sum();
+            **value <= flat.max(RESOLVED * made)
+        };
+        all.filter(is_flat).map(|(_, v)| v.into_owned()).collect()
     }
 
     /// The covariance over `all` unknowns; 0 for the others.

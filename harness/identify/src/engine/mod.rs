@@ -17,11 +17,13 @@ pub mod cause;
 pub mod draws;
 pub mod fit;
 pub mod hold;
+pub mod knowledge;
 pub mod minimum;
 pub mod noise;
 pub mod problem;
 pub mod profile;
 pub mod search;
+pub mod solver_error;
 
 pub use fit::Fit;
 pub use problem::{Drift, Hold, Motion, Part, Problem, Recorded, Role, Signal, System, Unknown};
@@ -34,10 +36,16 @@ pub const DECIDES: f64 = 10.0;
 pub const MOVE: f64 = 0.3;
 /// Shortest and longest step of a difference, in units of an unknown's reach.
 pub const STEPS: (f64, f64) = (1e-7, 0.2);
+/// Second over first difference from which on errors of a solver may decide a derivative: they alone make √3 of it.
+pub const BEND: f64 = 0.3;
+/// Factor between the steps that are tried then.
+pub const WIDER: f64 = 8.0;
 /// The first step, in the same units.
 pub const FIRST_STEP: f64 = 1e-3;
 /// Distance from a minimum, in standard deviations, at which a comparison of minima ends, and at which the last search ends.
 pub const ENDS: (f64, f64) = (0.5, 0.02);
+/// Distance to the minimum up to which a search has converged, standard deviations: the stated deviations contain it.
+pub const CONVERGED: f64 = 0.5;
 /// Factors by which the noise counts in a search over the whole recordings: large ones let the priors lead at first, so that a
 /// start may be far from the minimum.
 pub const INFLATIONS: [f64; 3] = [100.0, 10.0, 1.0];

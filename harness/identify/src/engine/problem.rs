@@ -195,7 +195,9 @@ pub trait System: Sync {
 /// Recordings that are fitted together, unknowns, and the system.
 ///
 /// `starts` are values of all unknowns, and `holds` possible courses of the inputs between rows, the likeliest first. With `acausal`
-/// a reading may come before its cause.
+/// a reading may come before its cause. `drawn` starts within the bounds are tried where those of the data lead to no good fit. The
+/// answer of a `rough` system has errors of a solver that jump from one value of an unknown to the next, so that the steps of differences
+/// have to stand above them.
 #[derive(Clone)]
 pub struct Problem<'a> {
     pub system: &'a dyn System,
@@ -205,4 +207,6 @@ pub struct Problem<'a> {
     pub starts: Vec<Vec<f64>>,
     pub holds: Vec<Hold>,
     pub acausal: bool,
+    pub drawn: usize,
+    pub rough: bool,
 }

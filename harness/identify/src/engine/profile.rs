@@ -1,9 +1,11 @@
 //! The profile of the likelihood along one unknown whose likelihood is no parabola.
 
 use anyhow::Result;
+use nalgebra::DMatrix;
 
 use super::Fit;
 use super::minimum::{Curvature, End, Minimum, places};
+use super::problem::Part;
 
 /// Growth of the sum of squares at which a profile ends: such a point counts e⁻⁵.
 const RAISED: f64 = 10.0;
@@ -11,6 +13,8 @@ const RAISED: f64 = 10.0;
 pub const OPEN: f64 = 3.8415;
 /// Relative standard deviation of the unknown, or of one that depends on it, from which on the profile is followed.
 const VAGUE: f64 = 0.05;
+/// Part by which the root of the likelihood's rise may differ from that of a parabola.
+const PARABOLIC: f64 = 0.1;
 /// Sets of derivatives at one point, besides those of the point before.
 const SETS: usize = 4;
 /// Shortest and longest first step, and longest step, of the coordinate.
@@ -39,6 +43,60 @@ pub struct Point {
 }
 
 impl Fit<'_> {
+    /// Looks at a problem of which no unknown is said to be bent for the one along which the likelihood is least like a parabola.
+    /// Returns true if it is followed from now on.
+    ///
+    /// # Errors
+    /// If the system refuses every step of an unknown.
+    pub fn find_bent(&mut self, minimum: &mut Minimum) -> Result<bool> {
+        let unknowns = &self.problem.unknowns;
+        if !self.problem.rough || minimum.decrement > super::ENDS.0 {
+            return Ok(false);
+        }
+        let jacobian = self.derivatives_at(minimum)?.matrix;
+        let gradient = jacobian.tr_mul(&minimum.point.e);
+        let inner = self.inner(&minimum.point.z, &gradient, &self.free);
+        let covariance = Curvature::new(&jacobian, inner.clone()).covariance(unknowns.len());
+        let mut most = (PARABOLIC, None);
+        for j in inner.into_iter().filter(|j| unknowns[*j].part == Part::Free) {
+            let bend = self.bend(minimum, &covariance, j)?;
+            if bend > most.0 {
+                most = (bend, Some(j));
+            }
+        }
+        self.bent = most.1;
+        Ok(self.bent.is_some())
+    }
+
+    /// Part by which the root of the likelihood's rise along an unknown differs from that of a parabola, at the ends of its 95 %
+    /// interval or at a bound before them, the larger of both sides.
+    ///
+    /// # Errors
+    /// If the system refuses every step of an unknown.
+    fn bend(&mut self, minimum: &mut Minimum, covariance: &DMatrix<f64>, j: usize) -> Result<f64> {
+        let derivatives = self.derivatives_at(minimum)?;
+        let (std, mut most) = (covariance[(j, j)].sqrt(), 0.0_f64);
+        if std == 0.0 || !std.is_finite() {
+            return Ok(most);
+        }
+        let mut free = self.free.clone();
+        free[j] = false;
+        for sign in [-1.0, 1.0] {
+            let z = &minimum.point.z;
+            let room = if sign < 0.0 { z[j] - self.ends[j].0 } else { self.ends[j].1 - z[j] };
+            let far = (OPEN.sqrt() * std).min(room);
+            if far < 0.1 * std {
+                continue;
+            }
+            let by = sign * far / std.powi(2);
+            let z: Vec<f64> = (0..z.len()).map(|i| z[i] + by * covariance[(i, j)]).collect();
+            let there = self.minimise(&z, &free, Some(derivatives.clone()), End::new(0, NEAR));
+            let rise = there.map_or(f64::INFINITY, |t| t.point.cost - minimum.point.cost);
+            most = most.max((rise.max(0.0).sqrt() * std / far - 1.0).abs());
+        }
+        Ok(most)
+    }
+
     /// Looks for a lower minimum at other values of the unknown that is bent, with all others free: between two such minima the
     /// likelihood may have a ridge that no search crosses.
     ///
@@ -82,9 +140,10 @@ impl Fit<'_> {
     /// If the system refuses the minimum.
     pub fn profile(&mut self, minimum: &mut Minimum, beyond: &[Point]) -> Result<Option<Profile>> {
         let unknowns = &self.problem.unknowns;
-        self.central = false;
+        self.central = self.problem.rough;
+        let found = self.bent;
         let bent = unknowns.iter().zip(&self.free).position(|(u, free)| u.bent && *free);
-        let Some(j) = bent else { return Ok(None) };
+        let Some(j) = found.or(bent) else { return Ok(None) };
         let jacobian = self.derivatives_at(minimum)?.matrix;
         let covariance = Curvature::new(&jacobian, places(&self.free)).covariance(unknowns.len());
         let std = |i: usize| covariance[(i, i)].sqrt();
@@ -106,10 +165,13 @@ impl Fit<'_> {
             })
             .collect();
         let rivals = beyond.iter().any(|p| p.minimum.point.cost < minimum.point.cost + RAISED);
-        if !(std(j) > VAGUE || has_partner || rivals) {
+        if found.is_none() && !(std(j) > VAGUE || has_partner || rivals) {
             return Ok(None);
         }
-        let first = (0.25 * std(j)).clamp(LENGTHS[0], LENGTHS[1]);
+        // lengths are those of a logarithm; of a value they are relative to its standard deviation
+        let lengths =
+            LENGTHS.map(|length| if unknowns[j].log { length } else { 2.0 * std(j) * length });
+        let first = (0.25 * std(j)).clamp(lengths[0], lengths[1]);
         let mut free = self.free.clone();
         free[j] = false;
         let mut points = vec![Point { at: minimum.point.z[j], minimum: minimum.clone() }];
@@ -152,7 +214,7 @@ impl Fit<'_> {
                     0.7
                 };
                 // shorter steps than the first lead nowhere
-                (h, risen) = ((h * factor).clamp(0.5 * first, LENGTHS[2]), rise);
+                (h, risen) = ((h * factor).clamp(0.5 * first, lengths[2]), rise);
             }
         }
         let (low, high) = points

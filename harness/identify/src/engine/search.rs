@@ -12,8 +12,6 @@ use super::profile::{self, LOWER, Profile};
 use super::{ENDS, Fit, INFLATIONS};
 use crate::news::News;
 
-/// Starts that are drawn where those of the data lead to no minimum.
-const DRAWN: usize = 2;
 /// Parts of the recordings in a search from a start that leads to no minimum on the whole: over a whole oscillation the sum of squares has a
 /// minimum for each cycle, over its beginning only one.
 const PARTS: [f64; 7] = [0.1, 0.2, 0.3, 0.4, 0.55, 0.75, 1.0];
@@ -81,7 +79,7 @@ pub fn solve<'p>(
     let mut starts: Vec<Vec<f64>> = first.into_iter().chain(problem.starts.clone()).collect();
     let given = starts.len();
     let mut random = Random::new(26, 0);
-    starts.extend((0..DRAWN).map(|_| drawn(problem, &mut random)));
+    starts.extend((0..problem.drawn).map(|_| drawn(problem, &mut random)));
     let mut best: Option<Found> = None;
     let (mut tried, mut error, mut course) = (0, None, Vec::new());
     let ways = [(0..given, true), (0..1, false), (given..starts.len(), true)];
@@ -125,7 +123,35 @@ pub fn solve<'p>(
         return Err(error.context("no search was made")?);
     };
     best.judge(&mut fit, news)?;
-    let Found { mut minimum, rivals, .. } = best;
+    conclude(fit, best, tried, news)
+}
+
+/// Searches a problem from values that are near its minimum, such as the minimum of the same problem with fewer rows.
+///
+/// # Errors
+/// If the system refuses the values.
+pub fn solve_near<'p>(
+    problem: &'p Problem<'p>,
+    values: &[f64],
+    news: &mut dyn FnMut(&News),
+) -> Result<Solution<'p>> {
+    let mut fit = Fit::new(problem);
+    let (z, free) = (fit.coordinates(values), fit.free.clone());
+    let minimum = fit.minimise(&z, &free, None, End::new(LAST.0, ENDS.0))?;
+    fit.renew_noise(&minimum.point);
+    let mut found = Found::new(&fit, minimum, 0.0);
+    found.judge(&mut fit, news)?;
+    conclude(fit, found, 1, news)
+}
+
+fn conclude<'p>(
+    mut fit: Fit<'p>,
+    found: Found,
+    starts: usize,
+    news: &mut dyn FnMut(&News),
+) -> Result<Solution<'p>> {
+    let Found { minimum, rivals, .. } = found;
+    let mut minimum = fit.not_above_starts(minimum)?;
     fit.free_shown(&mut minimum)?;
     let beyond = fit.across_ridges(&mut minimum)?;
     let (found, mut profile) = fit.settle(minimum, &beyond, news)?;
@@ -135,10 +161,14 @@ pub fn solve<'p>(
         (minimum, profile) = fit.settle(other, &[], news)?;
     }
     fit.derivatives_at(&mut minimum)?;
+    if profile.is_none() && fit.find_bent(&mut minimum)? {
+        (minimum, profile) = fit.settle(minimum, &[], news)?;
+        fit.derivatives_at(&mut minimum)?;
+    }
     let tests = fit.tests(&minimum.point);
     let at_bound = fit.stuck(&minimum.point.z);
-    let sides = fit.sides(&minimum);
-    Ok(Solution { fit, minimum, profile, rivals, tests, at_bound, sides, starts: tried })
+    let sides = if fit.problem.rough { Vec::new() } else { fit.sides(&minimum) };
+    Ok(Solution { fit, minimum, profile, rivals, tests, at_bound, sides, starts })
 }
 
 /// The best minimum so far.
@@ -226,6 +256,21 @@ impl Fit<'_> {
             z[*j] - low < near || high - z[*j] < near
         };
         places(&self.free).into_iter().filter(is_stuck).collect()
+    }
+
+    /// Returns a minimum that is not above a start of the problem: where a start is better, it is searched from there.
+    ///
+    /// # Errors
+    /// If the system refuses every step of an unknown.
+    pub fn not_above_starts(&mut self, mut minimum: Minimum) -> Result<Minimum> {
+        for start in &self.problem.starts {
+            let Ok(point) = self.at(&self.coordinates(start)) else { continue };
+            if point.cost < minimum.point.cost - LOWER {
+                let (free, end) = (self.free.clone(), End::new(LAST.0, ENDS.0));
+                minimum = self.minimise_on(point, &free, None, end)?;
+            }
+        }
+        Ok(minimum)
     }
 
     /// Takes the recordings' own noise, where the residual has more in it.
@@ -411,7 +456,8 @@ impl Fit<'_> {
             fit.problem.signals.iter().map(Signal::first_noise).collect()
         };
         let free = self.free.clone();
-        (self.hold, self.inflation, self.central) = (self.problem.holds[0], 1.0, false);
+        (self.hold, self.inflation, self.central) =
+            (self.problem.holds[0], 1.0, self.problem.rough);
         let mut z = z.to_vec();
         let mut found: Option<Minimum> = None;
         if grows {

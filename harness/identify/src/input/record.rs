@@ -109,11 +109,8 @@ impl Record {
         noise_level(&self.values(output))
     }
 
-    /// Returns the first rows, as many as this part of its time has.
-    pub fn beginning(&self, part: f64) -> Record {
-        let (first, last) = (self.time[0], self.time[self.time.len() - 1]);
-        let end = first + part * (last - first);
-        let rows = self.time.partition_point(|t| *t <= end).max(2);
+    /// Returns the first rows.
+    pub fn first_rows(&self, rows: usize) -> Record {
         let cut = |columns: &[Vec<f64>]| columns.iter().map(|c| c[..rows].to_vec()).collect();
         Record {
             name: self.name.clone(),

@@ -22,7 +22,6 @@ use crate::bench::system::BenchSystem;
 use crate::bench::verdict;
 use crate::engine::search::solve;
 use crate::engine::{DECIDES, Problem};
-use crate::fit::evidence;
 use crate::input::plausible;
 use crate::input::recording::Recording;
 use crate::news::News;
@@ -237,7 +236,7 @@ fn identify_whole(
     let mut models: Vec<ModelFit> = fitted.iter().chain(&others).map(|f| f.fit.clone()).collect();
     // a law must be better than the first by what decides
     let other = others.iter().position(|f| f.fit.bic < fitted[0].fit.bic - DECIDES);
-    let probabilities = evidence::probabilities(fitted[..near].iter().map(|f| f.fit.bic));
+    let probabilities = verdict::probabilities(fitted[..near].iter().map(|f| f.fit.bic));
     let question =
         verdict::Question { slosh: &models[..slosh], near, laws: &laws, doubts: &doubts };
     let (best, mut rivals) = match other {

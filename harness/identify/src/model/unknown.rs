@@ -4,86 +4,28 @@ use anyhow::{Context, Result, bail, ensure};
 use host::causality::{Causality, Variability};
 use host::description::{ModelDescription, Value, Variable};
 
+use crate::engine::{Part, Role, Unknown};
 use crate::input::question::{Bias, EACH, Free, Question, Size, Tolerance, Triad, real, scaled};
 use crate::input::record::Record;
 use crate::tuning::{KNOWN_REACH, SCALE_REACH};
 
-/// Kinds of unknowns.
+/// What an unknown is to the FMU's run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum What {
-    /// A Real of the FMU, of one recording or of all.
-    Parameter {
-        /// Value reference.
-        reference: u32,
-        /// `None`: of all.
-        recording: Option<usize>,
-    },
-    /// Reading of an output's sensor at 0, in one recording.
-    Bias {
-        /// The output.
-        output: usize,
-        /// The recording.
-        recording: usize,
-    },
-    /// Cross-coupling: share of one output in the reading of another.
-    Gain {
-        /// The output that is read.
-        output: usize,
-        /// The output that is in it.
-        of: usize,
-    },
+pub enum Target {
+    /// The Real with this value reference.
+    Parameter(u32),
     /// Error of an input's scale: 1 + x times the recorded values act.
-    Scale {
-        /// The input.
-        input: usize,
-        /// The one recording; `None`: all.
-        recording: Option<usize>,
-    },
+    Scale(usize),
     /// Error of the clock's rate: true intervals are 1 + x times the recorded ones.
-    Clock {
-        /// The one recording; `None`: all.
-        recording: Option<usize>,
-    },
+    Clock,
+    /// None: it acts in the reading of a sensor.
+    Reading,
 }
 
-impl What {
-    /// Returns true if the FMU's run depends on it; an error of a sensor only changes the reading.
-    pub fn is_in_runs(self) -> bool {
-        !matches!(self, What::Bias { .. } | What::Gain { .. })
-    }
+/// An unknown with its target.
+pub type Targeted = (Unknown, Target);
 
-    /// Returns true if it acts in the recording of this number.
-    pub fn is_of(self, number: usize) -> bool {
-        match self {
-            What::Parameter { recording, .. }
-            | What::Scale { recording, .. }
-            | What::Clock { recording } => recording.is_none_or(|of| of == number),
-            What::Bias { recording, .. } => recording == number,
-            What::Gain { .. } => true,
-        }
-    }
-}
-
-/// One unknown.
-#[derive(Clone, Debug)]
-pub struct Unknown {
-    /// Name in the result.
-    pub name: String,
-    /// Kind.
-    pub what: What,
-    /// Unit.
-    pub unit: String,
-    /// Start of the search.
-    pub start: f64,
-    /// Bounds.
-    pub bounds: (f64, f64),
-    /// Mean and standard deviation beforehand.
-    pub prior: Option<(f64, f64)>,
-    /// Plausible distance from the start.
-    pub reach: f64,
-    /// True for a known value with a tolerance: its uncertainty counts, its estimate was not requested.
-    pub is_known: bool,
-}
+const FREELY: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
 
 impl Question {
     /// The unknowns, in the result's order.
@@ -94,9 +36,9 @@ impl Question {
         &self,
         description: &ModelDescription,
         records: &[Record],
-    ) -> Result<Vec<Unknown>> {
+    ) -> Result<Vec<Targeted>> {
         let (mut unknowns, mut problems) = (Vec::new(), Vec::new());
-        let mut add = |made: Result<Vec<Unknown>>| match made {
+        let mut add = |made: Result<Vec<Targeted>>| match made {
             Ok(made) => unknowns.extend(made),
             Err(error) => problems.push(format!("{error:#}")),
         };
@@ -113,15 +55,17 @@ impl Question {
             add(self.known(tolerance, description, records.len()).map(|unknown| vec![unknown]));
         }
         for prior in &self.priors {
-            let at = unknowns.iter_mut().find(|unknown: &&mut Unknown| unknown.name == prior.name);
+            let at = unknowns.iter_mut().find(|(u, _): &&mut Targeted| u.name == prior.name);
             match at {
-                Some(unknown) => unknown.prior = Some((prior.mean, prior.std)),
+                Some((unknown, _)) => unknown.prior = Some((prior.mean, prior.std)),
                 None => problems.push(format!("--prior {}: it is not free", prior.name)),
             }
         }
-        for (k, unknown) in unknowns.iter().enumerate() {
-            if let Some(other) = unknowns[..k].iter().find(|other| other.name == unknown.name) {
-                problems.push(match (unknown.is_known, other.is_known) {
+        let is_known = |u: &Unknown| u.part == Part::Tolerance;
+        for (k, (unknown, target)) in unknowns.iter().enumerate() {
+            let before = &unknowns[..k];
+            if let Some((other, _)) = before.iter().find(|(other, _)| other.name == unknown.name) {
+                problems.push(match (is_known(unknown), is_known(other)) {
                     (true, false) => format!(
                         "--tolerance {}: it is estimated (allowed: --prior, its mean and standard deviation)",
                         unknown.name
@@ -130,17 +74,15 @@ impl Question {
                     _ => format!("{} is free twice", unknown.name),
                 });
             }
-            let is_alias = |other: &&Unknown| match (unknown.what, other.what) {
-                (
-                    What::Parameter { reference: a, recording: of_a },
-                    What::Parameter { reference: b, recording: of_b },
-                ) => {
-                    let together = of_a.is_none() || of_b.is_none() || of_a == of_b;
-                    a == b && together && unknown.name != other.name
-                }
-                _ => false,
+            let is_alias = |(other, of): &&Targeted| {
+                let alike = matches!(target, Target::Parameter(_)) && of == target;
+                let together = match (unknown.role, other.role) {
+                    (Role::Run(Some(a)), Role::Run(Some(b))) => a == b,
+                    _ => true,
+                };
+                alike && together && unknown.name != other.name
             };
-            if let Some(other) = unknowns[..k].iter().find(is_alias) {
+            if let Some((other, _)) = before.iter().find(is_alias) {
                 problems.push(format!(
                     "{} and {} are the same variable of the FMU (allowed: one of them is free)",
                     other.name, unknown.name
@@ -170,7 +112,7 @@ impl Question {
         })
     }
 
-    fn gains(&self, triad: &Triad) -> Result<Vec<Unknown>> {
+    fn gains(&self, triad: &Triad) -> Result<Vec<Targeted>> {
         let mut gains = Vec::new();
         for (i, read) in triad.outputs.iter().enumerate() {
             for (j, other) in triad.outputs.iter().enumerate() {
@@ -179,16 +121,9 @@ impl Question {
                     true => (format!("scale({read})"), triad.scale),
                     false => (format!("cross({read},{other})"), triad.angle),
                 };
-                gains.push(Unknown {
-                    name,
-                    what: What::Gain { output, of },
-                    unit: "1".into(),
-                    start: 0.0,
-                    bounds: (f64::NEG_INFINITY, f64::INFINITY),
-                    prior: Some((0.0, std)),
-                    reach: std,
-                    is_known: false,
-                });
+                let role = Role::Gain(output, of);
+                let gain = Unknown::linear(&name, "1", role, (0.0, std), FREELY);
+                gains.push((gain.with_prior(0.0, std), Target::Reading));
             }
         }
         Ok(gains)
@@ -199,18 +134,16 @@ impl Question {
         bias: &Bias,
         description: &ModelDescription,
         records: &[Record],
-    ) -> Result<Vec<Unknown>> {
+    ) -> Result<Vec<Targeted>> {
         let output = self.output(&bias.output)?;
         let unit = self.unit(&bias.output, description)?;
-        let one = |(recording, record): (usize, &Record)| Unknown {
-            name: numbered(&format!("bias({})", bias.output), recording),
-            what: What::Bias { output, recording },
-            unit: unit.clone(),
-            start: 0.0,
-            bounds: (f64::NEG_INFINITY, f64::INFINITY),
-            prior: bias.std.map(|std| (0.0, std)),
-            reach: bias.std.unwrap_or_else(|| record.spread(output)),
-            is_known: false,
+        let one = |(recording, record): (usize, &Record)| {
+            let name = numbered(&format!("bias({})", bias.output), recording);
+            let role = Role::Bias(output, Some(recording));
+            let reach = bias.std.unwrap_or_else(|| record.spread(output));
+            let unknown = Unknown::linear(&name, &unit, role, (0.0, reach), FREELY);
+            let prior = bias.std.map(|std| (0.0, std));
+            (Unknown { prior, ..unknown }, Target::Reading)
         };
         Ok(records.iter().enumerate().map(one).collect())
     }
@@ -221,17 +154,17 @@ impl Question {
         free: &Free,
         description: &ModelDescription,
         recordings: usize,
-    ) -> Result<Vec<Unknown>> {
+    ) -> Result<Vec<Targeted>> {
         let one = |recording: Option<usize>| match scaled(&free.name) {
             Some(of) => {
-                let mut unknown = self.scale(of, recording)?;
+                let (mut unknown, target) = self.scale(of, recording)?;
                 let (low, high) = free.bounds.unwrap_or(unknown.bounds);
                 ensure!(low > -1.0, "{} is free from {low} (allowed: above -1)", free.name);
                 if (high - low).is_finite() {
                     unknown.reach = 0.25 * (high - low);
                 }
                 (unknown.start, unknown.bounds) = (free.start, (low, high));
-                Ok(unknown)
+                Ok((unknown, target))
             }
             None => parameter(free, description, recording),
         };
@@ -242,19 +175,19 @@ impl Question {
     }
 
     /// The error of the scale of an input, an output or the clock.
-    fn scale(&self, of: &str, recording: Option<usize>) -> Result<Unknown> {
+    fn scale(&self, of: &str, recording: Option<usize>) -> Result<Targeted> {
         let input = self.inputs.iter().position(|name| name == of);
         let output = self.outputs.iter().position(|name| name == of);
-        let what = match (input, output) {
-            (Some(input), _) => What::Scale { input, recording },
+        let (role, target) = match (input, output) {
+            (Some(input), _) => (Role::Run(recording), Target::Scale(input)),
             (None, Some(output)) => {
                 ensure!(
                     recording.is_none(),
                     "scale({of}){EACH}: a sensor has one scale (allowed: scale({of}))"
                 );
-                What::Gain { output, of: output }
+                (Role::Gain(output, output), Target::Reading)
             }
-            (None, None) if of == CLOCK => What::Clock { recording },
+            (None, None) if of == CLOCK => (Role::Run(recording), Target::Clock),
             (None, None) => {
                 let names = self.inputs.iter().chain(&self.outputs).map(String::as_str);
                 let names: Vec<&str> = names.chain([CLOCK]).collect();
@@ -262,16 +195,8 @@ impl Question {
             }
         };
         let name = format!("scale({of})");
-        Ok(Unknown {
-            name: recording.map_or(name.clone(), |k| numbered(&name, k)),
-            what,
-            unit: "1".into(),
-            start: 0.0,
-            bounds: (f64::NEG_INFINITY, f64::INFINITY),
-            prior: None,
-            reach: SCALE_REACH,
-            is_known: false,
-        })
+        let name = recording.map_or(name.clone(), |k| numbered(&name, k));
+        Ok((Unknown::linear(&name, "1", role, (0.0, SCALE_REACH), FREELY), target))
     }
 
     /// The unknown of a flag `--tolerance`.
@@ -280,14 +205,14 @@ impl Question {
         tolerance: &Tolerance,
         description: &ModelDescription,
         recordings: usize,
-    ) -> Result<Unknown> {
+    ) -> Result<Targeted> {
         let flag = format!("--tolerance {}", tolerance.name);
         if let Some(of) = scaled(&tolerance.name) {
             let Size::Part(part) = tolerance.size else {
                 bail!("{flag}: a scale has a relative tolerance, such as 1%")
             };
             let unknown = self.scale(of, None).with_context(|| flag.clone())?;
-            return unknown.known(0.0, part).with_context(|| flag);
+            return known(unknown, 0.0, part).with_context(|| flag);
         }
         let (name, recording) = match tolerance.name.rsplit_once('@') {
             None => (tolerance.name.as_str(), None),
@@ -319,7 +244,7 @@ impl Question {
             Size::Absolute(text) => deviation(variable, description, text)?,
         };
         let free = Free { name: name.into(), each: false, start: value, bounds: None };
-        parameter(&free, description, recording)?.known(value, std).with_context(|| flag)
+        known(parameter(&free, description, recording)?, value, std).with_context(|| flag)
     }
 
     /// A variable's value in a recording: that of `--set`, or its start in the model description.
@@ -344,13 +269,11 @@ impl Question {
     }
 }
 
-impl Unknown {
-    /// The same as a known value with this standard deviation.
-    fn known(self, mean: f64, std: f64) -> Result<Unknown> {
-        ensure!(std > 0.0 && std.is_finite(), "the tolerance must be above 0");
-        let reach = KNOWN_REACH * std;
-        Ok(Unknown { prior: Some((mean, std)), start: mean, reach, is_known: true, ..self })
-    }
+/// The same as a known value with this standard deviation.
+fn known((unknown, target): Targeted, mean: f64, std: f64) -> Result<Targeted> {
+    ensure!(std > 0.0 && std.is_finite(), "the tolerance must be above 0");
+    let (start, reach, part) = (mean, KNOWN_REACH * std, Part::Tolerance);
+    Ok((Unknown { start, reach, part, ..unknown.with_prior(mean, std) }, target))
 }
 
 /// Name of the clock among the scales.
@@ -386,7 +309,7 @@ fn parameter(
     free: &Free,
     description: &ModelDescription,
     recording: Option<usize>,
-) -> Result<Unknown> {
+) -> Result<Targeted> {
     let variable = real(description, &free.name)?;
     let allowed = [Causality::Parameter, Causality::Output, Causality::Local, Causality::Input];
     ensure!(
@@ -416,14 +339,8 @@ fn parameter(
         _ if free.start != 0.0 => 0.5 * free.start.abs(),
         _ => 1.0,
     };
-    Ok(Unknown {
-        name: recording.map_or(free.name.clone(), |k| numbered(&free.name, k)),
-        what: What::Parameter { reference: variable.reference, recording },
-        unit: description.unit(variable).into(),
-        start: free.start,
-        bounds: (low, high),
-        prior: None,
-        reach,
-        is_known: false,
-    })
+    let name = recording.map_or(free.name.clone(), |k| numbered(&free.name, k));
+    let (unit, role) = (description.unit(variable), Role::Run(recording));
+    let unknown = Unknown::linear(&name, unit, role, (free.start, reach), (low, high));
+    Ok((unknown, Target::Parameter(variable.reference)))
 }

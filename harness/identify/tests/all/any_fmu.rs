@@ -2,14 +2,15 @@
 
 use analysis::random::Random;
 use files::output::atomically;
+use identify::any_fmu::foresee::foresee;
+use identify::any_fmu::likelihood::deviances;
+use identify::any_fmu::system::FmuSystem;
 use identify::any_fmu::{Identification, identify, page};
-use identify::fit::problem::Problem;
-use identify::fit::search::{not_worse, search};
+use identify::engine::Fit;
+use identify::engine::minimum::End;
 use identify::input::question::{Question, Solver};
 use identify::input::record::Record;
-use identify::model::simulate::{Model, Setup};
-use identify::uncertainty::foresee::foresee;
-use identify::uncertainty::likelihood::deviances;
+use identify::model::simulate::Model;
 use pack::{Fmi, HUBSLOSH, packed_for_tests, packed_version_for_tests};
 use std::io::Write;
 
@@ -347,18 +348,17 @@ fn a_minimum_that_is_worse_than_the_start_is_left() {
     let records = [record(1, 0.2, 0.0)];
     let truth = ["hub.I=0.35:0.1:1", "friction.b=0.05:0:1", "init.omega=0.2"];
     let question = Question { biases: Vec::new(), ..question(&truth) };
-    let setup = Setup::new(&question, model.description()).unwrap();
-    let unknowns = question.unknowns(model.description(), &records).unwrap();
-    let problem = Problem::new(&model, &setup, &records, unknowns, NOISE);
-    let start = problem.answer(&problem.start()).unwrap().e.norm_squared();
+    let (system, unknowns) = FmuSystem::new(&model, &question, &records).unwrap();
+    let problem = system.problem(unknowns, &question);
+    let mut fit = Fit::new(&problem);
+    let start = fit.at(&problem.starts[0]).unwrap().cost;
     for bad in [[0.5, 0.1, 0.2], [1.0, 0.05, 0.2], [0.35, 0.0, 0.2]] {
-        // one set of derivatives and no step
-        let steps = problem.first_steps();
-        let there = search(&problem, &bad, steps, (f64::INFINITY, 1), &mut |_| {}).unwrap();
-        assert!(there.cost() > start + 68.0);
-        let (found, is_better) = not_worse(&problem, there, &mut |_| {});
-        assert!(is_better && found.cost() <= start, "{bad:?}: {} {start}", found.cost());
-        assert!((found.x[0] - TRUTH.0).abs() < 2e-3, "{:?}", found.x);
+        // no set of derivatives and no step
+        let there = fit.minimise(&bad, &[true; 3], None, End::new(0, 0.0)).unwrap();
+        assert!(there.point.cost > start + 68.0);
+        let found = fit.not_above_starts(there).unwrap().point;
+        assert!(found.cost <= start, "{bad:?}: {} {start}", found.cost);
+        assert!((found.z[0] - TRUTH.0).abs() < 2e-3, "{:?}", found.z);
     }
 }
 

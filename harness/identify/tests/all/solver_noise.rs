@@ -6,11 +6,11 @@ use std::process::Command;
 use analysis::random::Random;
 use analysis::statistics::deviation;
 use host::fmi2::PLATFORM;
+use identify::any_fmu::foresee::foresee;
 use identify::any_fmu::{Identification, identify};
 use identify::input::question::{Question, Solver};
 use identify::input::record::Record;
 use identify::model::simulate::{Model, Setup};
-use identify::uncertainty::foresee::foresee;
 use tempfile::TempDir;
 
 /// Rows are this far apart, s.

@@ -3,13 +3,12 @@
 use anyhow::{Result, ensure};
 use serde::Serialize;
 
-use crate::fit::problem::Problem;
+use super::finite;
+use super::system::{FmuSystem, is_known};
+use crate::engine::Fit;
 use crate::input::question::Question;
 use crate::input::record::Record;
-use crate::model::simulate::{Model, Setup};
-use crate::model::unknown::What;
-use crate::uncertainty::knowledge::{finite, knowledge};
-use crate::uncertainty::solver_error::measure;
+use crate::model::simulate::Model;
 use analysis::gauss_markov::Noise;
 
 /// The bound of one unknown.
@@ -59,23 +58,24 @@ pub fn foresee(
         noise.iter().all(|sigma| *sigma > 0.0 && sigma.is_finite()),
         "the noise of an output must be above 0"
     );
-    let setup = Setup::new(question, model.description())?;
-    let unknowns = question.unknowns(model.description(), records)?;
-    let mut problem = Problem::new(model, &setup, records, unknowns, 1.0);
-    for channel in &mut problem.channels {
-        channel.noise = Noise::white(noise[channel.output]);
-        channel.sampled.fill(true);
+    let (system, unknowns) = FmuSystem::new(model, question, records)?;
+    let mut problem = system.problem(unknowns, question);
+    for signal in &mut problem.signals {
+        signal.sampled.fill(true);
+        signal.measured.fill(0.0);
     }
-    problem.warnings()?.into_iter().for_each(warn);
-    let x = problem.start();
-    let motion = problem.answer(&x)?.motion;
-    let mut steps = problem.first_steps();
+    system.warnings(&problem.unknowns)?.into_iter().for_each(warn);
+    let x = problem.starts[0].clone();
+    let mut fit = Fit::new(&problem);
+    fit.set(problem.signals.iter().map(|s| Noise::white(noise[s.output])).collect(), 1.0);
+    let at = fit.at(&x)?;
+    let everything = vec![true; x.len()];
     // the second time with steps that suit the noise
-    problem.jacobian(&x, &motion, &mut steps)?;
-    let jacobian = problem.jacobian(&x, &motion, &mut steps)?;
+    fit.derivatives(&at, &everything)?;
+    let jacobian = fit.derivatives(&at, &everything)?.matrix;
+    let solver = system.with_finer(|finer| fit.solver_error(&at, &jacobian, &everything, finer));
+    let known = fit.knowledge(&jacobian, &everything, &solver);
     let all: Vec<usize> = (0..x.len()).collect();
-    let solver = measure(&problem, &x, &motion, &jacobian, &steps, &all)?;
-    let known = knowledge(&problem, &jacobian, &all, &solver)?;
     let covariance = &known.covariance;
     let bound = |j: usize| {
         let unknown = &problem.unknowns[j];
@@ -107,7 +107,7 @@ pub fn foresee(
             prior,
             unit: unknown.unit.clone(),
             with,
-            is_parameter: !unknown.is_known && matches!(unknown.what, What::Parameter { .. }),
+            is_parameter: !is_known(unknown) && system.is_parameter(j),
         }
     };
     Ok(all.iter().map(|&j| bound(j)).collect())

@@ -1,0 +1,198 @@
+//! An FMU and its recordings as a system of the engine.
+
+use std::borrow::Cow;
+
+use anyhow::Result;
+
+use crate::engine::{Drift, Hold, Motion, Part, Problem, Recorded, Role, Signal, System, Unknown};
+use crate::input::question::Question;
+use crate::input::record::Record;
+use crate::model::overridden::{near, refuse};
+use crate::model::simulate::{Finer, Model, Setup, Value};
+use crate::model::unknown::Target;
+
+/// Least noise that is assumed before there is a residual, relative to an output's spread: recordings from a simulation have none.
+const LEAST_NOISE: f64 = 1e-3;
+/// Drift that is expected of an output of any kind: next to nothing is known.
+const DRIFT: Drift = Drift { size: 0.3, time: 30.0, width: 3.0 };
+
+/// The FMU with recordings.
+pub struct FmuSystem<'a> {
+    pub model: &'a Model,
+    pub setup: Setup,
+    pub records: &'a [Record],
+    targets: Vec<(Target, Role)>,
+    names: Vec<(String, String)>,
+}
+
+impl<'a> FmuSystem<'a> {
+    /// Returns the system of a question, and its unknowns.
+    ///
+    /// # Errors
+    /// All that is wrong with what is asked.
+    pub fn new(
+        model: &'a Model,
+        question: &Question,
+        records: &'a [Record],
+    ) -> Result<(Self, Vec<Unknown>)> {
+        let setup = Setup::new(question, model.description())?;
+        let found = question.unknowns(model.description(), records)?;
+        let targets = found.iter().map(|(unknown, target)| (*target, unknown.role)).collect();
+        let (unknowns, _): (Vec<Unknown>, Vec<Target>) = found.into_iter().unzip();
+        let names = unknowns.iter().map(|u| (u.name.clone(), u.unit.clone())).collect();
+        Ok((FmuSystem { model, setup, records, targets, names }, unknowns))
+    }
+
+    /// Returns true if an unknown is a parameter or a start of the FMU.
+    pub fn is_parameter(&self, j: usize) -> bool {
+        matches!(self.targets[j].0, Target::Parameter(_))
+    }
+
+    /// The engine's problem.
+    pub fn problem(&self, unknowns: Vec<Unknown>, question: &Question) -> Problem<'_> {
+        let mut signals = Vec::new();
+        for (recording, record) in self.records.iter().enumerate() {
+            for (output, measured) in record.outputs.iter().enumerate() {
+                signals.push(Signal {
+                    recording,
+                    output,
+                    measured: measured.clone(),
+                    sampled: record.sampled(output),
+                    white: record.noise(output).max(LEAST_NOISE * record.spread(output)),
+                    drift: question.drift.then_some(DRIFT),
+                });
+            }
+        }
+        let recorded = |record: &Record| Recorded {
+            name: record.name.clone(),
+            time: record.time.clone(),
+            inputs: record.inputs.clone(),
+            step: 0.0,
+        };
+        Problem {
+            system: self,
+            recordings: self.records.iter().map(recorded).collect(),
+            signals,
+            starts: vec![unknowns.iter().map(|unknown| unknown.start).collect()],
+            unknowns,
+            // each input runs as the question says
+            holds: vec![Hold::FirstOrderHold],
+            acausal: true,
+            drawn: question.starts.saturating_sub(1),
+            rough: true,
+        }
+    }
+
+    /// The FMU's warnings of the motions that begin at the starts, each once.
+    ///
+    /// # Errors
+    /// If an unknown has no effect in any recording because of another parameter.
+    pub fn warnings(&self, unknowns: &[Unknown]) -> Result<Vec<String>> {
+        let start: Vec<f64> = unknowns.iter().map(|u| u.start).collect();
+        let moved: Vec<f64> = unknowns.iter().map(|u| near(u.start, u.bounds, u.reach)).collect();
+        let of = |(number, record): (usize, &Record)| {
+            let with =
+                |x: &[f64]| self.setup.warnings(self.model, &self.reals(x, number), number, record);
+            // what the FMU refuses here, the search tells
+            with(&moved).or_else(|_| with(&start)).unwrap_or_default()
+        };
+        let warnings: Vec<Vec<String>> = self.records.iter().enumerate().map(of).collect();
+        for (unknown, (target, role)) in unknowns.iter().zip(&self.targets) {
+            let (Target::Parameter(_), Role::Run(recording)) = (target, role) else { continue };
+            let own = warnings.iter().enumerate().filter(|(number, _)| unknown.is_of(*number));
+            let name = recording.and_then(|_| unknown.name.rsplit_once('@'));
+            let name = name.map_or(&*unknown.name, |(name, _)| name);
+            let refused: Vec<Result<()>> = own.map(|(_, said)| refuse(name, said)).collect();
+            // an unknown that has an effect in one recording can be estimated
+            if refused.iter().all(Result::is_err) {
+                refused.into_iter().collect::<Result<()>>()?;
+            }
+        }
+        let mut once: Vec<String> = Vec::new();
+        for warning in warnings.into_iter().flatten() {
+            if !once.contains(&warning) {
+                once.push(warning);
+            }
+        }
+        Ok(once)
+    }
+
+    /// Uses the same system with smaller errors of the solver ([`Setup::finer`]): first with a finer tolerance.
+    pub fn with_finer<T>(&self, use_them: impl FnOnce(&[&dyn System]) -> T) -> T {
+        let finer = self.setup.finer(self.model);
+        let mut systems: Vec<FmuSystem> = Vec::new();
+        for Finer { setup, model } in &finer {
+            let (model, setup) = (model.as_ref().unwrap_or(self.model), setup.clone());
+            let (targets, names) = (self.targets.clone(), self.names.clone());
+            systems.push(FmuSystem { model, setup, records: self.records, targets, names });
+        }
+        let systems: Vec<&dyn System> = systems.iter().map(|s| s as &dyn System).collect();
+        use_them(&systems)
+    }
+
+    fn acts(&self, j: usize, recording: usize) -> bool {
+        matches!(self.targets[j].1, Role::Run(of) if of.is_none_or(|of| of == recording))
+    }
+
+    fn reals(&self, values: &[f64], recording: usize) -> Vec<Value> {
+        let own = (0..values.len()).filter(|j| self.acts(*j, recording));
+        own.filter_map(|j| match self.targets[j].0 {
+            Target::Parameter(reference) => Some((reference, values[j])),
+            _ => None,
+        })
+        .collect()
+    }
+
+    /// The recording's first rows with inputs and times as they act.
+    fn acting(&self, values: &[f64], recording: usize, rows: usize) -> Cow<'_, Record> {
+        let whole = &self.records[recording];
+        let mut record = match rows < whole.time.len() {
+            true => Cow::Owned(whole.first_rows(rows)),
+            false => Cow::Borrowed(whole),
+        };
+        for j in (0..values.len()).filter(|j| self.acts(*j, recording) && values[*j] != 0.0) {
+            let factor = 1.0 + values[j];
+            match self.targets[j].0 {
+                Target::Scale(input) => {
+                    record.to_mut().inputs[input].iter_mut().for_each(|value| *value *= factor);
+                }
+                Target::Clock => {
+                    let first = whole.time[0];
+                    let time = &mut record.to_mut().time;
+                    time.iter_mut().for_each(|t| *t = first + factor * (*t - first));
+                }
+                Target::Parameter(_) | Target::Reading => {}
+            }
+        }
+        record
+    }
+}
+
+impl System for FmuSystem<'_> {
+    fn run(
+        &self,
+        values: &[f64],
+        recording: usize,
+        rows: usize,
+        _: Hold,
+        _: bool,
+    ) -> Result<Motion> {
+        let record = self.acting(values, recording, rows);
+        let reals = self.reals(values, recording);
+        let outputs = self.setup.run(self.model, &reals, recording, &record)?;
+        Ok(Motion { outputs, ..Motion::default() })
+    }
+
+    fn derived(&self) -> Vec<(String, String)> {
+        self.names.clone()
+    }
+
+    fn derive(&self, values: &[f64]) -> Option<Vec<f64>> {
+        Some(values.to_vec())
+    }
+}
+
+/// Returns true for an unknown that is a known value with a tolerance.
+pub fn is_known(unknown: &Unknown) -> bool {
+    unknown.part == Part::Tolerance
+}

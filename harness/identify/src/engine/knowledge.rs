@@ -1,0 +1,92 @@
+//! What the recordings tell of the unknowns at a point: covariance, directions that no output shows, and what the solver's errors decide.
+
+use std::collections::BTreeMap;
+
+use nalgebra::DMatrix;
+use serde::Serialize;
+
+use super::fit::Fit;
+use super::minimum::{Curvature, places};
+use super::solver_error::SolverError;
+
+/// Part of a unit direction from which on an unknown belongs to it.
+const PART: f64 = 1e-2;
+/// Part of its standard deviation from which on the solver's errors decide an estimate.
+const DECIDED: f64 = 0.3;
+
+/// Unknowns that change together without a change of any output.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Inseparable {
+    /// The change of each, in its unit; the largest relative to its steepness is positive.
+    pub direction: BTreeMap<String, f64>,
+}
+
+impl Inseparable {
+    /// Returns the sentence about them.
+    pub fn words(&self) -> String {
+        let names: Vec<&str> = self.direction.keys().map(String::as_str).collect();
+        let changes: Vec<String> =
+            self.direction.iter().map(|(name, by)| format!("{name} {by:+.3e}")).collect();
+        format!(
+            "{} cannot be distinguished: no output changes when they change together ({}). Give one of them a value with --set \
+             in place of --free, or a prior with --prior. Otherwise record an output that depends on them differently, or \
+             another motion.",
+            names.join(", "),
+            changes.join(", ")
+        )
+    }
+}
+
+/// What is known at a point.
+pub struct Knowledge {
+    /// The covariance of all unknowns; rows of those at a bound are 0, and what is not resolved has an infinite variance.
+    pub covariance: DMatrix<f64>,
+    /// Directions that no output shows.
+    pub inseparable: Vec<Inseparable>,
+    /// Unknowns whose derivatives are lost in the solver's errors, or which these move by more than [`DECIDED`] of the standard
+    /// deviation.
+    pub decided_by_solver: Vec<bool>,
+}
+
+impl Fit<'_> {
+    /// Returns what derivatives by the unknowns `which` tell, given the solver's errors.
+    pub fn knowledge(
+        &self,
+        jacobian: &DMatrix<f64>,
+        which: &[bool],
+        solver: &SolverError,
+    ) -> Knowledge {
+        let (n, which) = (which.len(), places(which));
+        let curvature = Curvature::new(jacobian, which.clone());
+        let mut covariance = curvature.covariance(n);
+        let (noise, both): (Vec<f64>, Vec<f64>) =
+            which.iter().map(|&j| solver.derivative[j]).unzip();
+        // what curvature alone leaves unresolved is a property of the model; what noise adds is one of the solver
+        let curved: Vec<f64> =
+            both.iter().zip(&noise).map(|(b, n)| (b * b - n * n).max(0.0).sqrt()).collect();
+        let (of_model, of_both) = (curvature.unresolved(&curved), curvature.unresolved(&both));
+        let mut decided_by_solver = vec![false; n];
+        if of_both.len() > of_model.len() {
+            for direction in &of_both {
+                let parts = which.iter().zip(direction.iter()).filter(|(_, p)| p.abs() > PART);
+                parts.for_each(|(&j, _)| decided_by_solver[j] = true);
+            }
+        }
+        let mut inseparable = Vec::new();
+        for direction in &of_model {
+            let sign = direction[direction.iamax()].signum();
+            let mut changes = BTreeMap::new();
+            for (k, &j) in which.iter().enumerate().filter(|(k, _)| direction[*k].abs() > PART) {
+                covariance[(j, j)] = f64::INFINITY;
+                let by = sign * direction[k] * curvature.scale[k];
+                changes.insert(self.problem.unknowns[j].name.clone(), by);
+            }
+            inseparable.push(Inseparable { direction: changes });
+        }
+        for &j in &which {
+            let std = covariance[(j, j)].sqrt();
+            decided_by_solver[j] |= std.is_finite() && solver.shift[j] > DECIDED * std;
+        }
+        Knowledge { covariance, inseparable, decided_by_solver }
+    }
+}

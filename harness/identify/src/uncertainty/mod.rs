@@ -1,8 +1,0 @@
-//! Fourth stage: intervals, and causes of a misfit.
-
-pub mod foresee;
-pub mod knowledge;
-pub mod likelihood;
-pub mod profile;
-pub mod solver_error;
-pub mod tolerated;
