@@ -1,4 +1,5 @@
-//! Python itself brings the functions that the library calls; macOS's linker has to know.
+//! Tells the linker on macOS that Python's own functions may stay undefined, because the Python that loads the library provides
+//! them.
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");

@@ -1,8 +1,10 @@
-//! Crossings of a loop gain: where its magnitude is 1, where it is negative real, and how near it comes to -1.
+//! Finds the crossings of a loop gain L(jω): the frequencies at which |L| is 1 (gain crossings) or L is a negative real number
+//! (phase crossings), and the least distance of L from -1.
 //!
-//! Poles and zeros tell where to look. The logarithm of the gain is a sum over them, so that on an interval of frequencies
-//! value, slope and a bound of the curvature show whether it can cross at all, and whether more than once; if more than
-//! once, the interval is halved. What the intervals bound is then evaluated from the state space itself.
+//! The search uses that ln L is a sum over the poles and zeros of L. For any interval of frequencies this sum gives the value and
+//! the slope of ln L and a bound of its curvature. These show whether L can cross in the interval not at all, at most once or
+//! several times; in the last case the interval is halved. At the ends of the remaining intervals L itself is then evaluated from
+//! the state-space model, and the crossings are located there by root finding.
 
 use nalgebra::{DMatrix, Schur};
 use num_complex::Complex64 as Complex;
@@ -12,20 +14,19 @@ use pyo3::prelude::*;
 
 use crate::numbers::numbers;
 
-/// Loop gain above which the frequency is at an integrator or another pole on the axis, so that there is no
-/// crossing.
+/// Loop gain above which no phase crossing is searched, because the frequency is that of a pole on the imaginary axis, such as an
+/// integrator at 0.
 const INTEGRATOR: f64 = 1e8;
-/// Loop gain below which it is rounding, so that there is no phase crossing.
+/// Loop gain below which no phase crossing is searched, because the gain is rounding error.
 const NOTHING: f64 = 1e-12;
-/// Error of the logarithm of the gain from poles and zeros, which are eigenvalues with errors of their own.
+/// Allowance for the error of ln L, because poles and zeros are computed eigenvalues and have rounding errors of their own.
 const SLACK: f64 = 1e-3;
-/// Number of frequencies that are evaluated in any case.
+/// Number of frequencies, evenly spaced on a logarithmic scale, with which every search begins.
 const GRID: usize = 40;
-/// Largest number of intervals in a search.
 const MOST: usize = 5_000;
 
-/// A state-space model with its matrix A in Hessenberg form, so that a frequency takes n² operations.
-/// Matrices are stored row after row.
+/// A state-space model with A in Hessenberg form, so that the response at one frequency takes a number of operations that grows
+/// as n² (n states) instead of n³. Matrices are stored row after row.
 #[pyclass(frozen, module = "hubslosh")]
 pub struct Model {
     states: usize,
@@ -37,8 +38,8 @@ pub struct Model {
     d: Vec<f64>,
     /// Sampling period, s; 0 for continuous time.
     period: f64,
-    /// A stored column after column, for a model with one input and one output; its B is then a multiple of
-    /// the first unit vector.
+    /// For a model with one input and one output: A stored column after column. The states are chosen so that B is a multiple of
+    /// the first unit vector, which [`Model::gain`] uses.
     columns: Vec<f64>,
 }
 
@@ -59,8 +60,8 @@ impl Model {
         model
     }
 
-    /// Maps the column `v` of the states from `k` on to a multiple of its first unit vector by a Householder reflection of
-    /// these states.
+    /// Changes the states from number `k` on by a Householder reflection that maps the vector `v` of these states to a multiple
+    /// of their first unit vector.
     fn reflect(&mut self, k: usize, mut v: Vec<f64>) {
         let n = self.states;
         let size = v.iter().map(|x| x * x).sum::<f64>().sqrt();
@@ -91,7 +92,7 @@ impl Model {
         right(&mut self.c);
     }
 
-    /// Returns the response at `w`, rad/s, row after row; not finite at a pole.
+    /// Returns the response matrix at the frequency `w`, rad/s, row after row. At a pole the numbers are NaN or infinite.
     fn at(&self, w: f64) -> Vec<Complex> {
         let (n, m) = (self.states, self.inputs);
         let s = point(w, self.period);
@@ -155,10 +156,12 @@ impl Model {
         found
     }
 
-    /// Returns the response of a model with one input and one output at `w`, rad/s; not finite at a pole.
+    /// Returns the response of a model with one input and one output at the frequency `w`, rad/s; it is NaN or infinite at a
+    /// pole.
     ///
-    /// Column operations from the last column on clear sI − A below its diagonal, with pivots of the larger magnitude. Since
-    /// B has only its first component, the first column then decides, and one column at a time is kept in `column`.
+    /// Column operations from the last column on turn sI − A into an upper triangular matrix; of two possible pivots the larger
+    /// one is used. Since only the first component of B differs from 0, the response then follows from the first column. `column`
+    /// is working memory, so that a call allocates nothing.
     fn gain(&self, w: f64, column: &mut Vec<Complex>) -> Complex {
         let n = self.states;
         let s = point(w, self.period);
@@ -199,7 +202,8 @@ impl Model {
         c / column[0] * self.b[0] + self.d[0]
     }
 
-    /// Returns the eigenvalues of the response at `w`, rad/s, by magnitude; very large at a pole.
+    /// Returns the eigenvalues of the response matrix at the frequency `w`, rad/s, sorted by magnitude; they are very large at a
+    /// pole.
     fn eigenvalues(&self, w: f64) -> Vec<Complex> {
         let mut response = self.at(w);
         for value in response.iter_mut().filter(|value| !value.is_finite()) {
@@ -211,7 +215,7 @@ impl Model {
     }
 }
 
-/// Returns the eigenvalues of a small matrix, row after row.
+/// Returns the eigenvalues of an n × n matrix that is stored row after row.
 fn eigenvalues(a: Vec<Complex>, n: usize) -> Vec<Complex> {
     // The matrix is scaled, because the squares of very large numbers overflow.
     let size = a.iter().map(|x| x.norm()).fold(f64::MIN_POSITIVE, f64::max);
@@ -223,7 +227,8 @@ fn eigenvalues(a: Vec<Complex>, n: usize) -> Vec<Complex> {
     triangle.diagonal().iter().map(|x| x * size).collect()
 }
 
-/// Returns s = jω, or z = exp(jωT) for a model with the period T.
+/// Returns the variable of the transfer function at the frequency `w`, rad/s: s = jω, or z = exp(jωT) for a sampled model with
+/// the period T.
 fn point(w: f64, period: f64) -> Complex {
     if period == 0.0 {
         return Complex::new(0.0, w);
@@ -236,9 +241,10 @@ fn point(w: f64, period: f64) -> Complex {
 struct Root {
     at: Complex,
     is_zero: bool,
-    /// Distance from the axis or the unit circle.
+    /// Distance of the root from the stability boundary: the imaginary axis, or the unit circle of a sampled model.
     axis: f64,
-    /// Factors over the second and the third power of the distance, which bound the second derivatives.
+    /// Two factors for bounds of the second derivative of ln L: the first one is divided by the square and the second one by the
+    /// cube of the distance from the root.
     bends: [f64; 2],
 }
 
@@ -256,35 +262,36 @@ impl Root {
     }
 }
 
-/// A zero and the nearest of the remaining poles. If they are close to each other, their effect on the slope
-/// is small.
+/// A zero of the loop gain together with the nearest pole that has no partner yet. If the two are close, they nearly cancel in ln
+/// L, and the bound of the curvature is much smaller than that of two separate roots.
 struct Pair {
-    /// Number of roots: two for a pair, one for a single root.
+    /// Number of roots in this entry: 2 for a zero with its pole, 1 for a root without a partner.
     roots: usize,
-    /// Half the distance of both, and a factor over the third power of the distance from them.
+    /// Half the distance between zero and pole, and the factor of the joint bound of the curvature, which is divided by the cube
+    /// of the distance from them.
     half_gap: f64,
     steep: f64,
 }
 
-/// A rational function given by its poles, zeros and a factor.
+/// A rational function, given by its poles, its zeros and a constant factor.
 struct Shape {
-    /// The roots of all pairs one after the other, then the single roots.
+    /// Poles and zeros in the order of `pairs`: first both roots of each pair, then the roots without a partner.
     roots: Vec<Root>,
     pairs: Vec<Pair>,
-    /// Logarithm of the factor's magnitude, and its phase.
+    /// Constant factor of the function: logarithm of its magnitude, and its phase, rad.
     factor: (f64, f64),
     period: f64,
 }
 
-/// Logarithm of a value, magnitude and phase, and their derivatives by ω.
+/// Value of ln L at one frequency, its derivative by ω, and a bound of its second derivative. Each is a pair: real part (log
+/// magnitude) and imaginary part (phase, rad).
 struct Logarithm {
     value: [f64; 2],
     slope: [f64; 2],
-    /// Bounds of the second derivatives.
     curvature: [f64; 2],
 }
 
-/// A product of many numbers; its magnitude is moved to a logarithm before it overflows.
+/// A product of many complex numbers. Before the magnitude overflows or underflows, it is moved to the logarithm `scale`.
 struct Product {
     of: Complex,
     scale: f64,
@@ -307,8 +314,8 @@ impl Product {
 }
 
 impl Shape {
-    /// Makes the function from zeros and poles; the factor makes it agree with `exact` at most frequencies of
-    /// the grid.
+    /// Creates the function from its zeros and poles. `exact` evaluates the loop gain from the state-space model; the constant
+    /// factor is the median of the ratios at the frequencies of the grid.
     fn new(
         [zeros, poles]: [&[Complex]; 2],
         period: f64,
@@ -351,7 +358,8 @@ impl Shape {
         shape
     }
 
-    /// Returns the logarithm at `w`, and bounds its second derivative within `half` of `w`.
+    /// Returns ln L at the frequency `w`, rad/s, with its slope, and a bound of its curvature that holds at all frequencies
+    /// within `half` of `w`.
     fn at(&self, w: f64, half: f64) -> Logarithm {
         let s = point(w, self.period);
         // ds/dω, and how far s moves
@@ -404,7 +412,7 @@ impl Shape {
         }
     }
 
-    /// Returns the logarithm of the magnitude at `w`, without the factor.
+    /// Returns the logarithm of |L|² at `w` without the constant factor, which does not change where minima are.
     fn size(&self, w: f64) -> f64 {
         let s = point(w, self.period);
         let (mut above, mut below) = (Product::new(), Product::new());
@@ -415,7 +423,8 @@ impl Shape {
         above.scale + above.of.re.ln() - below.scale - below.of.re.ln()
     }
 
-    /// Returns the ends of intervals that contain all crossings, at most one of each kind per interval.
+    /// Returns the ends of intervals of frequency that together contain all crossings; each interval contains at most one gain
+    /// crossing and at most one phase crossing.
     fn isolate(&self, grid: &[f64]) -> Vec<f64> {
         let mut ends = Vec::new();
         let whole = grid.windows(2).map(|pair| (pair[0], pair[1], [true; 2]));
@@ -438,7 +447,7 @@ impl Shape {
         ends
     }
 
-    /// Returns the frequencies of the lowest minima of the magnitude.
+    /// Returns the frequencies, rad/s, of the (at most five) lowest minima of |L|.
     fn minima(&self, grid: &[f64]) -> Vec<f64> {
         let mut points = grid.to_vec();
         let (low, high) = (grid[0], grid[grid.len() - 1]);
@@ -475,18 +484,19 @@ impl Shape {
     }
 }
 
-/// Result of a search for crossings in an interval.
+/// Number of crossings that an interval of frequencies can contain.
 #[derive(Clone, Copy, PartialEq)]
 enum Look {
     None,
-    /// There is at most one.
+    /// At most one crossing.
     Once,
-    /// There may be several.
+    /// Possibly several crossings, so that the interval must be halved.
     Divide,
 }
 
 impl Logarithm {
-    /// Returns whether the interval within `half` of here, up to `high`, has crossings of a kind.
+    /// Decides how many crossings of this kind the interval within `half` of the evaluated frequency can contain. `high` is the
+    /// upper end of the whole search range, relative to which very short intervals are no longer halved.
     fn look(&self, kind: Kind, half: f64, high: f64) -> Look {
         let Logarithm { value, slope, curvature } = *self;
         let reach = (slope[0].abs() + curvature[0] * half / 2.0) * half + SLACK;
@@ -513,7 +523,7 @@ impl Logarithm {
     }
 }
 
-/// Kind of a crossing: the gain has magnitude 1, or it is real.
+/// Kind of a crossing: at a gain crossing the loop gain has the magnitude 1, at a phase crossing it is real.
 #[derive(Clone, Copy, PartialEq)]
 enum Kind {
     Gain,
@@ -521,7 +531,7 @@ enum Kind {
 }
 
 impl Kind {
-    /// Returns a number that changes its sign at a crossing of this kind.
+    /// Returns a function of the loop gain that changes its sign at a crossing of this kind: ln |L|, or the sine of the phase.
     fn height(self, gain: Complex) -> f64 {
         match self {
             Kind::Gain => gain.norm().max(1e-300).ln(),
@@ -530,8 +540,8 @@ impl Kind {
     }
 }
 
-/// Returns where a function changes its sign between two places, to rounding: inverse quadratic interpolation where it
-/// converges, otherwise bisection (Chandrupatla 1997).
+/// Returns the argument between `a` and `b`, to rounding, at which a function with different signs at `a` and `b` is 0. The
+/// method is inverse quadratic interpolation where that converges, otherwise bisection (Chandrupatla 1997).
 fn between(
     mut of: impl FnMut(f64) -> f64,
     (mut b, mut f_b): (f64, f64),
@@ -568,9 +578,9 @@ fn between(
     if f_a.abs() < f_b.abs() { a } else { b }
 }
 
-/// Numbers of states, inputs and outputs.
 type Size = (usize, usize, usize);
-/// A crossing: true if it is one of the gain, ω in rad/s, real and imaginary part of the loop gain.
+/// A crossing: true for a gain crossing and false for a phase crossing, frequency in rad/s, real and imaginary part of the loop
+/// gain.
 type Crossing = (bool, f64, f64, f64);
 
 fn search(
@@ -645,7 +655,7 @@ fn search(
     (found, nearest)
 }
 
-/// Reads matrices A, B, C, D of numpy.
+/// Reads the matrices A, B, C and D from numpy arrays, and returns them with the numbers of states, inputs and outputs.
 fn matrices(of: [&Bound<PyAny>; 4]) -> PyResult<([Vec<f64>; 4], Size)> {
     let [a, b, c, d] = of.map(numbers);
     let (a, b, c, d) = (a?, b?, c?, d?);
@@ -718,10 +728,9 @@ impl Model {
 
 #[pymethods]
 impl Model {
-    /// Takes A, B, C, D, and the period of a sampled model in s, 0 in continuous time.
+    /// Creates a state-space model from A, B, C and D. `period` is the sampling period in s, or 0 for continuous time.
     ///
-    /// # Errors
-    /// If the matrices do not fit each other.
+    /// # Errors If the sizes of the matrices do not fit each other.
     #[new]
     fn read(
         py: Python,
@@ -735,12 +744,13 @@ impl Model {
         Ok(py.detach(|| Model::new(matrices, size, period)))
     }
 
-    /// Returns the crossings of a loop gain with one input between `low` and `high`, rad/s, and its least distance to -1.
+    /// Returns the crossings of a loop gain with one input and one output between the frequencies `low` and `high`, rad/s, and
+    /// its least distance from -1.
     ///
-    /// `roots`: poles and zeros of the gain, poles of the closed loop, each as pairs of numbers.
+    /// `roots` has the zeros and the poles of the loop gain and the poles of the closed loop, each as a list of pairs (real part,
+    /// imaginary part).
     ///
-    /// # Errors
-    /// If the model has several inputs or outputs.
+    /// # Errors If the model has several inputs or outputs.
     fn crossings(
         &self,
         py: Python,
@@ -757,31 +767,30 @@ impl Model {
         Ok(py.detach(|| search(self, [&poles, &zeros, &closed], low, high)))
     }
 
-    /// Returns frequencies, rad/s, and values at which an eigenvalue of the response has the magnitude 1: real and
-    /// imaginary part. Changes between the `nodes`, rad/s, are found.
+    /// Returns the frequencies, rad/s, at which an eigenvalue of the response matrix has the magnitude 1, each with the real and
+    /// the imaginary part of the eigenvalue. The search looks for changes between neighbouring `nodes` (frequencies, rad/s), so
+    /// that two crossings between the same nodes may be missed.
     ///
-    /// # Errors
-    /// If the model has other numbers of inputs and outputs, or the nodes are no array of floats.
+    /// # Errors If the numbers of inputs and outputs differ, or the nodes are no array of floats.
     fn unit_eigenvalues(&self, py: Python, nodes: &Bound<PyAny>) -> PyResult<Vec<(f64, f64, f64)>> {
         self.must_be_square()?;
         let nodes = numbers(nodes)?;
         Ok(py.detach(|| self.unit_magnitudes(&nodes)))
     }
 
-    /// Returns a better frequency than `w`, rad/s, at which −L exp(−jωτ) has an eigenvalue of magnitude 1 near 1, and the
-    /// eigenvalue's phase there, rad. `delay`: τ, s.
+    /// Returns a frequency near `w`, rad/s, at which −L exp(−jωτ) has an eigenvalue of magnitude 1 near 1, and the phase of this
+    /// eigenvalue, rad. `delay` is τ, s.
     ///
-    /// # Errors
-    /// If the model has other numbers of inputs and outputs.
+    /// # Errors If the numbers of inputs and outputs differ.
     fn critical(&self, py: Python, w: f64, delay: f64) -> PyResult<(f64, f64)> {
         self.must_be_square()?;
         Ok(py.detach(|| self.refined(w, delay)))
     }
 
-    /// Returns C (sI − A)⁻¹ B + D at frequencies in rad/s: real and imaginary parts, frequency by frequency, row after row.
+    /// Returns the response C (sI − A)⁻¹ B + D at `frequencies`, rad/s: pairs of real and imaginary part, one matrix after the
+    /// other, each row after row.
     ///
-    /// # Errors
-    /// If the frequencies are no array of floats.
+    /// # Errors If the frequencies are no array of floats.
     fn response(&self, py: Python, frequencies: &Bound<PyAny>) -> PyResult<Vec<f64>> {
         let frequencies = numbers(frequencies)?;
         let parts = |w: &f64| self.at(*w).into_iter().flat_map(|value| [value.re, value.im]);

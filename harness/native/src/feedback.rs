@@ -1,4 +1,4 @@
-//! A sampled controller between the outputs and the inputs of a run.
+//! A sampled controller in the loop with an FMU: it receives outputs of a run and sets inputs.
 
 use host::fmu::Instance;
 use pyo3::buffer::PyBuffer;
@@ -22,15 +22,15 @@ struct Linear {
     reference: Vec<f64>,
     /// Feedforward f, one row per cycle.
     feedforward: Vec<f64>,
-    /// Indices of a quaternion in y, scalar first. The error of its vector part is that of q⁻¹ ⊗ r, half the
-    /// remaining rotation about each body axis, the short way.
+    /// Places of an attitude quaternion (scalar first) among the measurements y. For this quaternion the error is not r − y but
+    /// the vector part of q⁻¹ ⊗ r: half the small rotation about each body axis that remains, by the shorter way.
     quaternion: Option<[usize; 4]>,
-    /// Memory for e and the next x.
+    /// Working memory for the error e and the next state x, so that a cycle allocates nothing.
     error: Vec<f64>,
     next: Vec<f64>,
 }
 
-/// Adds the product of row `i` of a matrix and `x` to `sum`.
+/// Returns `sum` plus the product of row `i` of a matrix with `x`.
 fn add_row(mut sum: f64, matrix: &[f64], i: usize, x: &[f64]) -> f64 {
     for (m, x) in matrix[i * x.len()..(i + 1) * x.len()].iter().zip(x) {
         sum += m * x;
@@ -76,13 +76,15 @@ impl Linear {
 /// Controller that computes the commands of a cycle.
 enum Controller {
     Linear(Box<Linear>),
-    /// A function of cycle, time (s) and measurements that returns as many numbers as there are commands.
+    /// A Python function of the number of the cycle, the time (s) and the measurements, which returns one number for each
+    /// command.
     Function(Py<PyAny>),
 }
 
-/// The feedback loop around a run, made from the Python class `Feedback`. A cycle begins at every `parts`-th
-/// row. The commands that the controller computes from the measurements there are set `latency` cycles and
-/// `switch` rows later, and held until the next commands.
+/// The feedback loop of a run, created from the Python class `Feedback`.
+///
+/// A controller cycle begins at every `parts`-th row, where the controller computes its commands from the measurements. The
+/// commands reach the FMU `latency` cycles and `switch` rows later, and are held until the next commands arrive.
 pub struct Feedback {
     controller: Controller,
     /// Value references of the measured Reals, and their values.
@@ -91,15 +93,16 @@ pub struct Feedback {
     parts: usize,
     switch: usize,
     latency: usize,
-    /// The last `latency` + 1 commands; those of cycle k are at position k modulo their number.
+    /// Ring buffer of the last `latency` + 1 commands, so that a command can act some cycles after it was computed. The commands
+    /// of cycle k are at position k modulo `latency` + 1.
     on_the_way: Vec<f64>,
     now: Vec<f64>,
-    /// Commands that act from each row on.
+    /// Commands that act from each row on, one row of numbers per row of the run.
     pub commands: Numbers,
 }
 
 impl Feedback {
-    /// Reads the Python class `Feedback` for a run of `rows` rows.
+    /// Reads the Python object `feedback` of class `Feedback` for a run with `rows` rows.
     ///
     /// # Errors
     ///
@@ -135,8 +138,8 @@ impl Feedback {
         })
     }
 
-    /// Performs the controller's part of row `row` at `time` (s), after the outputs are read and before the
-    /// inputs are set.
+    /// Runs the controller at row `row` if a cycle begins there, and writes the commands that act from this row on into the
+    /// inputs. It is called after the outputs of the row are read and before its inputs are set.
     pub fn act(&mut self, fmu: &mut Instance, row: usize, time: f64) -> Result<(), Failure> {
         let (width, cycle) = (self.now.len(), row / self.parts);
         let place = |cycle: usize| (cycle % (self.latency + 1)) * width;
@@ -164,7 +167,7 @@ impl Feedback {
     }
 }
 
-/// Checks that there are as many of something as expected.
+/// Returns an error unless the number `found` of the items named `what` is `expected`.
 fn expect(what: &str, found: usize, expected: usize) -> PyResult<()> {
     if found == expected {
         return Ok(());
@@ -172,7 +175,7 @@ fn expect(what: &str, found: usize, expected: usize) -> PyResult<()> {
     Err(PyValueError::new_err(format!("{what}: {found} (expected: {expected})")))
 }
 
-/// Reads the Python class `Linear`.
+/// Reads a linear controller from the Python object `of`, which has the class `Linear`.
 fn linear(
     of: &Bound<PyAny>,
     (cycles, measured, commands): (usize, usize, usize),

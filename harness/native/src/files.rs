@@ -1,4 +1,4 @@
-//! Files: parameters and recordings that are read, and places of outputs.
+//! Reads files of parameters and recordings for the Python package, and finds where its output files go.
 
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
@@ -14,10 +14,11 @@ use signals::recording::{self, Between, Columns, Signal, Wanted};
 use crate::fmu::error;
 use crate::schedule::bytes;
 
-/// Exponents of SI's base units, factor, offset.
+/// Definition of a unit: exponents of the SI base units, factor and offset.
 type Base = ([i32; 8], f64, f64);
 
-/// Return the parameters of a file, each with name, value, and the name and the definition of its unit; and warnings.
+/// Return the parameters in a file and warnings. Each parameter has its name, its value, and the name and the definition of its
+/// unit.
 #[pyfunction]
 pub fn read_parameters(py: Python, path: PathBuf) -> PyResult<(Bound<PyList>, Vec<String>)> {
     let found = py.detach(|| ParameterSet::read(&path)).map_err(error)?;
@@ -39,11 +40,12 @@ pub fn read_parameters(py: Python, path: PathBuf) -> PyResult<(Bound<PyList>, Ve
     Ok((all, found.warnings))
 }
 
-/// A signal: its name, its SI unit, its values as 64-bit floats.
+/// A signal of a recording: its name, its SI unit, and its values as the bytes of 64-bit floats.
 type Values<'py> = (String, &'static str, Bound<'py, PyBytes>);
 
-/// Return the signals of a recording, the time first, and notes on what was read; None if it is of a kind that the package
-/// converts. Errors call it `name`.
+/// Return the signals of a recording, with the time first, and notes on units and times that were assumed or converted. Return
+/// None if the file is of a kind that only the Python package can read, such as .mat. Error messages name the file `name`,
+/// because `path` may be a temporary file.
 #[pyfunction]
 pub fn read_recording<'py>(
     py: Python<'py>,
@@ -73,8 +75,8 @@ pub fn read_recording<'py>(
     Ok(Some((values.collect::<PyResult<_>>()?, notes)))
 }
 
-/// Return the plain file to which the path of an output leads, which the output may replace; None for a device or a pipe, to which
-/// it is written.
+/// Return the file that an output at `path` replaces, after following links; None if `path` is a device or a pipe, which is
+/// written to instead of replaced.
 #[pyfunction]
 pub fn destination(path: PathBuf) -> PyResult<Option<PathBuf>> {
     match output::destination(&path).map_err(error)? {
@@ -83,13 +85,15 @@ pub fn destination(path: PathBuf) -> PyResult<Option<PathBuf>> {
     }
 }
 
-/// Move a complete file to where the path of an output leads; a device or a pipe gets its bytes.
+/// Move the complete file `draft` to the place to which `path` leads; if this is a device or a pipe, write the bytes of the file
+/// to it.
 #[pyfunction]
 pub fn put(py: Python, draft: PathBuf, path: PathBuf) -> PyResult<()> {
     py.detach(|| output::publish_draft(&draft, &path)).map_err(error)
 }
 
-/// A temporary folder in `parent`, which is removed at the end of `with`, or after a kill when the next one is made there.
+/// A temporary folder within `parent`. It is removed at the end of the `with` statement; if the process is killed, the next
+/// `Folder` in `parent` removes it.
 #[pyclass(frozen, module = "hubslosh")]
 pub struct Folder(Mutex<Option<temporary::Folder>>, PathBuf);
 
@@ -103,12 +107,12 @@ impl Folder {
         Ok(Folder(Mutex::new(Some(made)), path))
     }
 
-    /// Return the path for the files.
+    /// Return the path of the folder.
     fn __enter__(&self) -> PathBuf {
         self.1.clone()
     }
 
-    /// Remove the folder, unless this process is a fork of the one that made it.
+    /// Remove the folder, but not in a forked copy of the process that created it.
     #[pyo3(signature = (*_failure))]
     fn __exit__(&self, _failure: &Bound<pyo3::types::PyTuple>) {
         drop(self.0.lock().unwrap_or_else(PoisonError::into_inner).take());

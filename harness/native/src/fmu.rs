@@ -1,4 +1,4 @@
-//! FMUs and their variables.
+//! The classes `Fmu` and `Variable` of the compiled half.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -56,20 +56,20 @@ pub fn error(why: impl Into<anyhow::Error>) -> PyErr {
 pub struct Variable {
     name: String,
     reference: u32,
-    /// "Real", "Integer", "Boolean", "String", "Enumeration", "Binary" or "Clock".
+    /// Type of the variable: "Real", "Integer", "Boolean", "String", "Enumeration", "Binary" or "Clock".
     kind: String,
     causality: String,
     variability: String,
     start: Option<String>,
-    /// Unit in which it is exchanged; empty if it has none.
+    /// Unit of the values in the FMU's interface; empty if the variable has none.
     unit: String,
-    /// Display units: name, factor, offset.
+    /// Display units, each with its name, factor and offset.
     shown: Vec<(String, f64, f64)>,
-    /// Unit by SI base units, if the FMU defines it: exponents, factor, offset.
+    /// Definition of the unit by SI base units (exponents, factor, offset), if the FMU has one.
     base: Option<([i32; 8], f64, f64)>,
-    /// Items of an enumeration: name, number.
+    /// Items of an enumeration, each with its name and number.
     items: Vec<(String, i64)>,
-    /// An element of an array.
+    /// True if the variable is one element of an array.
     is_element: bool,
 }
 
@@ -102,14 +102,14 @@ impl Variable {
 pub struct Fmu {
     path: PathBuf,
     description: ModelDescription,
-    /// Positions in the description by name.
+    /// Position of each variable in the description, by its name.
     places: BTreeMap<String, usize>,
     /// The FMU loaded for Co-Simulation and for Model Exchange.
     loaded: [Mutex<Option<Arc<host::fmu::Fmu>>>; 2],
 }
 
 impl Fmu {
-    /// Returns the FMU with its binary loaded for an interface; it is loaded only once.
+    /// Returns the FMU with its binary loaded for an interface. The binary is loaded at the first call only.
     pub fn load(&self, interface: Interface) -> PyResult<Arc<host::fmu::Fmu>> {
         let place = &self.loaded[usize::from(interface == Interface::ModelExchange)];
         let mut place = place.lock().unwrap_or_else(PoisonError::into_inner);
@@ -124,12 +124,11 @@ impl Fmu {
         &self.description
     }
 
-    /// Returns true if it has a variable of this name.
+    /// Returns true if the FMU has a variable with this name.
     pub fn has(&self, name: &str) -> bool {
         self.places.contains_key(name)
     }
 
-    /// Finds a variable by its name.
     pub fn variable(&self, name: &str) -> PyResult<&description::Variable> {
         match self.places.get(name) {
             Some(place) => Ok(&self.description.variables[*place]),
@@ -140,7 +139,7 @@ impl Fmu {
 
 #[pymethods]
 impl Fmu {
-    /// Read the description of a packed FMU; nothing is unpacked or loaded.
+    /// Read the model description of a packed FMU. Nothing is unpacked, and no binary is loaded.
     #[new]
     fn new(py: Python, path: PathBuf) -> PyResult<Fmu> {
         let description = py.detach(|| ModelDescription::from_fmu(&path)).map_err(error)?;
@@ -149,46 +148,47 @@ impl Fmu {
         Ok(Fmu { path, description, places, loaded: Default::default() })
     }
 
-    /// Name of the model.
+    /// Name of the model in the description.
     #[getter]
     fn name(&self) -> &str {
         &self.description.model_name
     }
 
-    /// True for FMI 3.0.
+    /// True if the FMU is of FMI 3.0, false if it is of FMI 2.0.
     #[getter]
     fn is_fmi3(&self) -> bool {
         self.description.is_fmi3()
     }
 
-    /// All variables.
+    /// All variables in the order of the model description.
     #[getter]
     fn variables(&self) -> Vec<Variable> {
         let all = self.description.variables.iter();
         all.map(|variable| Variable::describe(&self.description, variable)).collect()
     }
 
-    /// Start, stop and step that the FMU suggests, s.
+    /// Start time, stop time and step size of the default experiment, s; None if the FMU does not suggest one.
     #[getter]
     fn experiment(&self) -> [Option<f64>; 3] {
         let of = &self.description.default_experiment;
         [of.start_time, of.stop_time, of.step_size]
     }
 
-    /// True if the FMU has directional derivatives in Model Exchange.
+    /// True if the FMU provides directional derivatives in Model Exchange.
     #[getter]
     fn differentiates(&self) -> bool {
         self.description.model_exchange.as_ref().is_some_and(|of| of.directional_derivatives)
     }
 
-    /// Value references of the states' derivatives, and of the states.
+    /// Value references of the derivatives of the continuous states, each with the value reference of its state.
     #[getter]
     fn derivatives(&self) -> Vec<(u32, u32)> {
         self.description.derivatives.clone()
     }
 
-    /// Return the files of this Spacecraft, by their names in the archive, that change if it has fewer tanks and modes and other
-    /// start values, which are texts by name: the description and the start values.
+    /// Return the files of a reduced copy of this Spacecraft FMU, each as its name in the archive and its text: the model
+    /// description with only `tanks` tanks and `modes` modes, and the file of start values. `starts` are pairs of a name and a
+    /// start value that differs from the FMU's own.
     fn part(
         &self,
         tanks: usize,
@@ -210,7 +210,7 @@ impl Fmu {
         Ok([(DESCRIPTION, part.xml)].into_iter().chain(start_values).collect())
     }
 
-    /// Unload the binaries that no instance uses, and remove their folders.
+    /// Unload all binaries that no instance uses, and remove their temporary folders.
     fn close(&self) {
         for place in &self.loaded {
             *place.lock().unwrap_or_else(PoisonError::into_inner) = None;

@@ -1,4 +1,4 @@
-//! Instances: single calls, by the names of variables.
+//! The class `Instance`: an instance of an FMU whose functions Python calls one by one, with variables by name.
 #![allow(unsafe_code)]
 
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -14,10 +14,11 @@ use pyo3::prelude::*;
 use crate::fmu::{Fmu, FmuError, FmuWarning, error};
 use crate::run::{Run, Stop, Table};
 
-/// An instance and the FMU that it borrows; the fields are dropped in this order.
+/// An FMI instance together with the loaded FMU that it uses. Rust drops the fields in this order, so that the instance is freed
+/// before its library is unloaded.
 pub struct Held {
     pub instance: fmu::Instance<'static>,
-    /// Slopes of inputs during the next step, per s: value references and values.
+    /// Time derivatives of inputs for the next step: value references, and values per second.
     slopes: (Vec<u32>, Vec<f64>),
     _fmu: Arc<fmu::Fmu>,
 }
@@ -35,16 +36,16 @@ impl Held {
     }
 }
 
-/// An instance of an FMU. Calls from several threads wait for one another.
+/// An instance of an FMU. If several threads call it, a call waits until the call before has ended.
 #[pyclass(frozen, module = "hubslosh")]
 pub struct Instance {
     pub fmu: Py<Fmu>,
     held: Mutex<Option<Held>>,
-    /// The thread that is in a call, as [`this_thread`] identifies it; 0 if none is.
+    /// Number of the thread that is now in a call of this instance (see [`this_thread`]), or 0.
     caller: AtomicUsize,
 }
 
-/// Returns a number that identifies this thread and is not 0.
+/// Returns a number other than 0 that identifies the present thread.
 fn this_thread() -> usize {
     thread_local!(static PLACE: u8 = const { 0 });
     PLACE.with(|place| std::ptr::from_ref(place).addr())
@@ -59,12 +60,12 @@ enum Given {
 }
 
 impl Instance {
-    /// Makes calls of the instance without Python's lock, and then reports the FMU's warnings to Python.
+    /// Runs `calls` on the instance without holding Python's lock, and then passes the FMU's warnings on to Python.
     ///
     /// # Errors
     ///
-    /// If `calls` fails, the instance is closed, or this thread is already in a call of it, for example in a
-    /// controller.
+    /// If `calls` fails, if the instance is closed, or if this thread is already within a call of the instance, for example in a
+    /// controller that a run calls.
     pub fn with<T: Send>(
         &self,
         py: Python,
@@ -96,7 +97,7 @@ impl Instance {
         result
     }
 
-    /// Makes calls of the host, and converts their errors to Python's.
+    /// Runs calls of the crate `host` as [`Instance::with`] does, and converts their errors to Python exceptions.
     fn call<T: Send>(
         &self,
         py: Python,
@@ -108,7 +109,7 @@ impl Instance {
 
 #[pymethods]
 impl Instance {
-    /// Instantiate, for Co-Simulation or for Model Exchange.
+    /// Create an instance of `fmu` for Model Exchange (`exchange` true) or for Co-Simulation.
     #[new]
     fn new(py: Python, fmu: Py<Fmu>, exchange: bool) -> PyResult<Instance> {
         let interface = if exchange { Interface::ModelExchange } else { Interface::CoSimulation };
@@ -117,7 +118,7 @@ impl Instance {
         Ok(Instance { fmu, held: Mutex::new(Some(held)), caller: AtomicUsize::new(0) })
     }
 
-    /// Free the instance; a call in another thread ends first.
+    /// Free the instance; a call that another thread is making ends first.
     fn close(&self, py: Python) -> PyResult<()> {
         py.detach(|| {
             self.alone(|held| {
@@ -127,7 +128,7 @@ impl Instance {
         })
     }
 
-    /// Set a variable to a value of its type.
+    /// Set the variable `name` to a value of its type.
     fn set(&self, py: Python, name: &str, value: Given) -> PyResult<()> {
         let variable = self.fmu.get().variable(name)?;
         let value = match (value, variable.kind()) {
@@ -140,7 +141,7 @@ impl Instance {
         self.call(py, |held| held.instance.set_value(variable, value))
     }
 
-    /// Return the values of numeric variables; Booleans as 0 and 1.
+    /// Return the values of numeric variables as floats; a Boolean is 0 or 1.
     fn get(&self, py: Python, names: Vec<String>) -> PyResult<Vec<f64>> {
         let fmu = self.fmu.get();
         let all = names.iter().map(|name| fmu.variable(name)).collect::<PyResult<Vec<_>>>()?;
@@ -149,7 +150,7 @@ impl Instance {
         })
     }
 
-    /// Enter initialization mode: times in s.
+    /// Enter initialization mode with the relative tolerance of the solver, the start time and the stop time (s).
     fn initialize(
         &self,
         py: Python,
@@ -160,12 +161,12 @@ impl Instance {
         self.call(py, |held| held.instance.enter_initialization_mode(tolerance, start, stop))
     }
 
-    /// Leave initialization mode.
+    /// Leave initialization mode, so that steps can follow.
     fn start(&self, py: Python) -> PyResult<()> {
         self.call(py, |held| held.instance.exit_initialization_mode())
     }
 
-    /// Set the slope of a Real input through the next step, per s.
+    /// Set the time derivative of a Real input during the next step, in its unit per second.
     fn set_slope(&self, py: Python, name: &str, slope: f64) -> PyResult<()> {
         let reference = self.fmu.get().variable(name)?.reference;
         self.call(py, |held| {
@@ -175,7 +176,7 @@ impl Instance {
         })
     }
 
-    /// Make a step from `time` by `step`, s.
+    /// Make one communication step of `step` seconds from `time` (s).
     fn step(&self, py: Python, time: f64, step: f64) -> PyResult<()> {
         self.call(py, |held| {
             let (references, slopes) = std::mem::take(&mut held.slopes);
@@ -188,11 +189,13 @@ impl Instance {
         })
     }
 
-    /// Step through all rows of `time`, s, and record `outputs` at each.
+    /// Simulate a run with a communication point at each time in `time` (s), and record `outputs` at each of them.
     ///
-    /// inputs, outputs: names and a table of floats with a column for each, of enumerations and Booleans too. slopes: of the
-    /// inputs, or None. Returns None at the end, or where and why the FMU stopped: the row, how many rows were read, and a
-    /// sentence.
+    /// `inputs` and `outputs` are pairs of a list of names and a table of floats with one column for each name, also for Booleans
+    /// and enumerations. `slopes` has the derivatives of the inputs after each row, or is None.
+    ///
+    /// Return None if the run reached its end. Otherwise return where and why the FMU stopped: the row, the number of rows that
+    /// were recorded, and a sentence.
     fn run(
         &self,
         py: Python,
@@ -207,7 +210,7 @@ impl Instance {
         self.with(py, |held| run.make(&mut held.instance))
     }
 
-    /// Return the state as bytes.
+    /// Return the saved state of the instance as bytes.
     fn save(&self, py: Python) -> PyResult<Vec<u8>> {
         self.call(py, |held| {
             let state = held.instance.get_state()?;
@@ -217,7 +220,7 @@ impl Instance {
         })
     }
 
-    /// Go back to what `save` returned, here or in another instance.
+    /// Restore a state that `save` returned, also in another instance of the FMU.
     fn restore(&self, py: Python, bytes: &[u8]) -> PyResult<()> {
         self.call(py, |held| {
             let state = held.instance.deserialize(bytes)?;
@@ -227,7 +230,8 @@ impl Instance {
         })
     }
 
-    /// Initialize in Model Exchange, and return the derivatives of `unknowns` for each of `knowns`, by reference.
+    /// Initialise the instance in Model Exchange, and return the derivatives of `unknowns` with respect to each of `knowns`; both
+    /// are lists of value references.
     fn jacobian(
         &self,
         py: Python,
@@ -253,10 +257,11 @@ impl Instance {
     }
 }
 
-/// Returns the derivatives of `unknowns` for each of `knowns`.
+/// Returns the derivatives of `unknowns` with respect to each of `knowns`, one list for each known.
 ///
-/// Most states of a small craft belong to tanks that it does not have. If the derivatives in a direction through a block of knowns
-/// all vanish, they vanish for each known of the block, and none is asked for.
+/// Most states of a small craft belong to tanks that it does not have. Therefore the FMU is first asked for the derivative in a
+/// direction that moves a whole block of knowns; if this derivative is 0, the derivatives with respect to each known of the block
+/// are 0 and are not computed one by one.
 fn jacobian(
     instance: &mut fmu::Instance,
     unknowns: &[u32],

@@ -20,7 +20,7 @@ mod schedule;
 mod study;
 mod tanks;
 
-/// Functions of `hubslosh._native`.
+/// Functions and classes of the Python module `hubslosh._native`.
 #[pyo3::pymodule]
 mod _native {
     #[pymodule_export]

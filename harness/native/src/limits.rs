@@ -1,4 +1,4 @@
-//! Words for how the tanks of a run left the range of their model.
+//! Describes how the tanks in a run left the range in which their model is valid.
 
 use std::collections::BTreeMap;
 
@@ -12,13 +12,14 @@ fn limits_of(fmu: &Fmu) -> Limits {
     Limits::find(|name| fmu.has(name))
 }
 
-/// Return the names of the columns that `out_of_range` reads besides the time; none for other FMUs.
+/// Return the names of the columns that `out_of_range` needs in addition to the time; none if the FMU has no tanks with limits.
 #[pyfunction]
 pub fn limit_columns(fmu: &Fmu) -> Vec<String> {
     limits_of(fmu).required_columns().map(String::from).collect()
 }
 
-/// Return a sentence for each tank that was out of the range of its model, from `time` (s) and the other columns.
+/// Return one sentence for each tank that left the range of its model, with times and reasons. `columns` has the time (s) under
+/// the name `time` and the columns that `limit_columns` names.
 #[pyfunction]
 pub fn out_of_range(fmu: &Fmu, columns: BTreeMap<String, Bound<PyAny>>) -> PyResult<Vec<String>> {
     let read = columns.into_iter().map(|(name, values)| Ok((name, numbers(&values)?)));

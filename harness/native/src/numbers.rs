@@ -1,4 +1,4 @@
-//! Numbers between Python and the host.
+//! Transfers tables of numbers between numpy arrays and the simulation.
 #![allow(unsafe_code)]
 
 use host::c_abi::CallError;
@@ -6,7 +6,7 @@ use pyo3::buffer::PyBuffer;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-/// Reason for the end of a run before its last row.
+/// Reason why a run ended before its last row.
 pub enum Failure {
     /// A call of the FMU failed.
     Call(CallError),
@@ -26,20 +26,20 @@ impl From<PyErr> for Failure {
     }
 }
 
-/// Returns the numbers of an array of numpy.
+/// Returns the numbers in a numpy array of floats.
 ///
-/// # Errors
-/// If it is not an array of floats.
+/// # Errors If the object is not an array of floats.
 pub fn numbers(array: &Bound<PyAny>) -> PyResult<Vec<f64>> {
     PyBuffer::get(array)?.to_vec(array.py())
 }
 
-/// A numpy array of rows × width, and the rows that are being copied to or from it.
+/// A numpy array with `rows` rows of `width` numbers, of which a block of rows at a time is copied here, so that Python's lock is
+/// needed only once per block.
 pub struct Numbers {
     array: PyBuffer<f64>,
     width: usize,
     rows: Vec<f64>,
-    /// Number of values in the array before those rows.
+    /// Number of values in the array before the present block.
     at: usize,
 }
 
@@ -60,12 +60,12 @@ impl Numbers {
         Ok(Numbers { array, width, rows: Vec::new(), at: 0 })
     }
 
-    /// Adds a row to those that wait to be written.
+    /// Adds a row to the block that waits to be written to the array.
     pub fn push(&mut self, row: &[f64]) {
         self.rows.extend_from_slice(row);
     }
 
-    /// Writes the waiting rows to the Python array.
+    /// Writes the waiting rows to the numpy array.
     pub fn write(&mut self, _: Python) {
         if let Some(mut numbers) = self.array.as_slice_ptr() {
             // SAFETY: of() has looked at its type and size, and nobody else runs Python meanwhile.
@@ -76,7 +76,7 @@ impl Numbers {
         self.rows.clear();
     }
 
-    /// Copies the next `rows` rows from the Python array.
+    /// Copies the next `rows` rows from the numpy array.
     pub fn read(&mut self, _: Python, rows: usize) {
         self.at += self.rows.len();
         self.rows.clear();
@@ -87,12 +87,12 @@ impl Numbers {
         }
     }
 
-    /// Returns all rows after the first `rows` of those that were read, so that they are read again.
+    /// Keeps only the first `rows` rows of the present block as read; the next [`Numbers::read`] begins with the row after them.
     pub fn keep(&mut self, rows: usize) {
         self.rows.truncate(rows * self.width);
     }
 
-    /// Returns one of the rows that were read.
+    /// Returns row `i` of the present block.
     pub fn row(&self, i: usize) -> &[f64] {
         &self.rows[i * self.width..(i + 1) * self.width]
     }

@@ -1,4 +1,4 @@
-//! Whole runs: the loop over the communication points.
+//! Simulates whole runs for Python: the loop over the communication points.
 
 use std::time::{Duration, Instant};
 
@@ -11,18 +11,20 @@ use crate::feedback::Feedback;
 use crate::fmu::Fmu;
 use crate::numbers::{Failure, Numbers};
 
-/// Largest number of rows between two visits of Python, in which Ctrl-C is noticed and rows are exchanged.
+/// Largest number of rows that are simulated before the run returns briefly to Python, which exchanges rows with the numpy arrays
+/// and notices Ctrl-C.
 const ROWS: usize = 1024;
-/// Longest time between two visits of Python, if a step takes less.
+/// Longest time before the run returns briefly to Python, unless a single step takes longer.
 const SILENCE: Duration = Duration::from_millis(100);
 
-/// Variables of a table; Reals are exchanged in one call, the others one by one.
+/// Variables that form the columns of a table. Reals are read or set with one call of the FMU, variables of other types with one
+/// call each.
 struct Columns<'fmu> {
-    /// Value references of the Reals, their columns, and memory for their values.
+    /// Reals: their value references, the columns to which they belong, and working memory for their values.
     references: Vec<u32>,
     places: Vec<usize>,
     reals: Vec<f64>,
-    /// The other variables with their columns.
+    /// Variables of other types, each with the column to which it belongs.
     others: Vec<(&'fmu Variable, usize)>,
     row: Vec<f64>,
 }
@@ -76,24 +78,23 @@ impl<'fmu> Columns<'fmu> {
     }
 }
 
-/// End of a run by the FMU: its row, the number of rows read, and the reason.
+/// Description of a run that the FMU ended: the row, the number of rows that were recorded, and the reason.
 pub type Stop = (usize, usize, String);
 
-/// The names of the columns of a table, and its numbers in a Python array.
+/// A table of the Python side: the names of its columns, and the numpy array.
 pub type Table<'py> = (Vec<String>, Bound<'py, PyAny>);
 
-/// A run with one row per communication point.
 pub struct Run<'fmu> {
     time: Vec<f64>,
     inputs: (Columns<'fmu>, Numbers),
-    /// Slopes of the inputs, with buffers for those of the Reals.
+    /// Time derivatives of the inputs after each row, with working memory for those of the Reals.
     slopes: Option<(Numbers, Vec<f64>)>,
     outputs: (Columns<'fmu>, Numbers),
     feedback: Option<Feedback>,
 }
 
 impl<'fmu> Run<'fmu> {
-    /// Prepares a run. `slopes` has the columns of `inputs`.
+    /// Prepares a run. `time` has the communication points, s; `slopes` has the same columns as `inputs`.
     ///
     /// # Errors
     ///
@@ -121,11 +122,12 @@ impl<'fmu> Run<'fmu> {
         })
     }
 
-    /// Makes all rows; Python's lock is held only during the visits.
+    /// Simulates all rows and returns the reason if the FMU ended the run early. Python's lock is held only while rows are
+    /// exchanged.
     ///
     /// # Errors
     ///
-    /// If the controller fails, or on KeyboardInterrupt.
+    /// If the controller raises an exception, or on KeyboardInterrupt.
     pub fn make(&mut self, instance: &mut Instance) -> PyResult<Option<Stop>> {
         let end = self.drive(instance);
         Python::attach(|py| self.hand_over(py));
@@ -142,9 +144,9 @@ impl<'fmu> Run<'fmu> {
         }
     }
 
-    /// Makes a row. First outputs are read. Then a controller, if there is one, computes its commands from them, inputs are
-    /// set, and a step is made; the last row has outputs only. `i` is the position of the row among those that were read from
-    /// Python.
+    /// Simulates one row: reads the outputs, lets the controller (if there is one) compute its commands, sets the inputs and
+    /// makes a step. The last row has only outputs. `row` counts from the start of the run, `i` from the start of the block of
+    /// rows that was last read from Python.
     fn row(&mut self, instance: &mut Instance, row: usize, i: usize) -> Result<(), Failure> {
         let (columns, recorded) = &mut self.outputs;
         recorded.push(columns.get(instance)?);
@@ -188,7 +190,7 @@ impl<'fmu> Run<'fmu> {
         Ok(())
     }
 
-    /// Exchanges rows with Python, and handles signals such as Ctrl-C.
+    /// Exchanges rows with the numpy arrays, and handles signals such as Ctrl-C.
     fn visit(&mut self, py: Python) -> PyResult<()> {
         self.hand_over(py);
         self.inputs.1.read(py, ROWS);

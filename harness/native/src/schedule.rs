@@ -1,4 +1,4 @@
-//! Communication points and histories of inputs, as the command has them.
+//! Communication points and inputs over time for Python, by the same rules as in the command line.
 
 use host::schedule::{self, Schedule};
 use pyo3::prelude::*;
@@ -7,11 +7,11 @@ use pyo3::types::PyBytes;
 use crate::fmu::{Fmu, error};
 use crate::numbers::numbers;
 
-/// An input over time: lines between rows, or steps. Two rows at one time are a jump.
+/// An input as a function of time: rows that are joined by straight lines or held. Two rows with the same time are a jump.
 #[pyclass(frozen, module = "hubslosh")]
 pub struct History(schedule::History);
 
-/// Returns the numbers as bytes, which numpy reads as an array of floats.
+/// Returns numbers as bytes, which numpy reads as an array of 64-bit floats without copying each number.
 pub fn bytes<'py>(py: Python<'py>, values: &[f64]) -> Bound<'py, PyBytes> {
     let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_ne_bytes()).collect();
     PyBytes::new(py, &bytes)
@@ -19,7 +19,8 @@ pub fn bytes<'py>(py: Python<'py>, values: &[f64]) -> Bound<'py, PyBytes> {
 
 #[pymethods]
 impl History {
-    /// Take rows, s; slopes: from each to the next, None: of the lines between them.
+    /// Create the history of an input from rows with times in s. `slopes` has the slope from each row to the next; None means
+    /// straight lines between the rows. With `hold` each value is kept until the next row.
     #[new]
     fn new(
         time: &Bound<PyAny>,
@@ -32,7 +33,7 @@ impl History {
         history.map(History).map_err(error)
     }
 
-    /// Return values and slopes at ascending times and immediately after them.
+    /// Return two arrays for ascending times (s): the values immediately after each time, and the slopes there.
     fn after<'py>(
         &self,
         py: Python<'py>,
@@ -45,7 +46,7 @@ impl History {
     }
 }
 
-/// Return the communication points of a run, s, and which of them are rows of the result (None: all).
+/// Return the communication points of a run, s, and a mask of those that are rows of the result (None: all are).
 #[pyfunction]
 pub fn communication_points<'py>(
     py: Python<'py>,
@@ -64,7 +65,8 @@ pub fn communication_points<'py>(
     Ok((bytes(py, &time), rows))
 }
 
-/// Raise FmuError if the FMU cannot interpolate and one of the inputs has slopes.
+/// Raise FmuError if an input changes linearly between rows but the FMU can only hold inputs. `hold` is the option that the
+/// message recommends.
 #[pyfunction]
 pub fn check_interpolation(
     fmu: &Fmu,
@@ -75,7 +77,8 @@ pub fn check_interpolation(
     schedule::check_interpolation(fmu.description(), inputs, hold).map_err(error)
 }
 
-/// Return what a row of a result pairs, and how inputs go on from row to row.
+/// Return two sentences for the metadata of a result: the times for which inputs and outputs of one row hold, and how inputs
+/// change between rows.
 #[pyfunction]
 pub fn pairing(hold: bool) -> (&'static str, &'static str) {
     (schedule::ROWS, schedule::between(hold))

@@ -1,4 +1,4 @@
-//! Folders of stored runs, and the random numbers of runs.
+//! Folders in which Python stores the runs of studies and campaigns, and the random numbers of these runs.
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -16,23 +16,24 @@ use signals::table;
 
 use crate::fmu::error;
 
-/// Version of the definition. 1: without types and hashes (HubSlosh 0.5.0); 2: draws by NumPy's generator (0.6.1).
+/// Version of the file format of a study. 1: without types and hashes (HubSlosh 0.5.0); 2: random numbers of NumPy's generator
+/// (0.6.1).
 const FORMAT: u32 = 3;
 
-/// Return uniform numbers from 0 (included) to 1 (excluded): the first `count` of stream `run` of this seed, which are
-/// those of run number `run` of a plan with `[random]`.
+/// Return `count` random numbers, uniform from 0 (included) to 1 (excluded), of stream number `run` for this seed. Run number
+/// `run` of a campaign's plan with `[random]` uses the same numbers.
 #[pyfunction]
 pub fn uniforms(seed: u64, run: u64, count: usize) -> Vec<f64> {
     let mut random = Random::new(seed, run);
     (0..count).map(|_| random.uniform()).collect()
 }
 
-/// A folder of stored runs, locked until it is closed.
+/// A folder of stored runs. It is locked until `close`, so that no other process writes into it.
 #[pyclass(frozen, module = "hubslosh")]
 pub struct Store(Mutex<Option<store::Store>>);
 
 impl Store {
-    /// Calls `work` with the store, without Python's lock.
+    /// Runs `work` on the store without holding Python's lock.
     fn with<T: Send>(
         &self,
         py: Python,
@@ -48,7 +49,8 @@ impl Store {
 
 #[pymethods]
 impl Store {
-    /// Open the folder of a study, which `monte_carlo` makes: its seed, and a text for each range.
+    /// Open the folder of a Monte Carlo study. `seed` and `ranges` (pairs of a name and a text) define the study; a folder with
+    /// another definition is refused.
     #[staticmethod]
     fn study(
         py: Python,
@@ -66,15 +68,16 @@ impl Store {
         Ok(Store(Mutex::new(Some(store.map_err(error)?))))
     }
 
-    /// Open the directory of a campaign. Other programs that want to open it get `about` as the reason.
+    /// Open the folder of a campaign. If another program tries to open it meanwhile, it gets the text `about` as the reason for
+    /// the refusal.
     #[staticmethod]
     fn campaign(py: Python, path: PathBuf, about: &str) -> PyResult<Store> {
         let store = py.detach(|| store::Store::take(&path, CAMPAIGN, about, None));
         Ok(Store(Mutex::new(Some(store.map_err(error)?))))
     }
 
-    /// Return the bytes of a run of a study, and the reason why they are not those that were stored; None and None if
-    /// the run was never stored.
+    /// Return the bytes of a stored run of a study, or None, and the reason why the bytes on the disk are not those that were
+    /// stored, or None. Both are None if the run was never stored.
     fn read<'py>(
         &self,
         py: Python<'py>,
@@ -89,18 +92,18 @@ impl Store {
         Ok((bytes.map(|bytes| PyBytes::new(py, &bytes)), damage))
     }
 
-    /// Return the reason why a stored run of a campaign cannot be used; None if it can, or was never stored.
+    /// Return the reason why a stored run of a campaign cannot be used, or None if it can be used or was never stored.
     fn damage(&self, py: Python, run: &str) -> PyResult<Option<String>> {
         let found = self.with(py, |store| store.check(run, table::is_ours))?;
         Ok(found.err().map(|damage| damage.to_string()))
     }
 
-    /// Store the bytes of a run, which are on the disk when this returns.
+    /// Store the bytes of a run. When the call returns, they are on the disk.
     fn add(&self, py: Python, run: &str, content: &[u8]) -> PyResult<()> {
         self.with(py, |store| store.add(run, |path| output::write(path, content)))?.map_err(error)
     }
 
-    /// Write the files that belong to all runs, each a name with its bytes, and close the folder.
+    /// Write the files that summarise all runs, pairs of a name and bytes, and close the folder.
     fn publish(&self, py: Python, files: Vec<(String, Vec<u8>)>) -> PyResult<()> {
         let store = self.0.lock().unwrap_or_else(PoisonError::into_inner).take();
         py.detach(|| {
@@ -110,13 +113,12 @@ impl Store {
         .map_err(error)
     }
 
-    /// Unlock the folder.
     fn close(&self) {
         drop(self.0.lock().unwrap_or_else(PoisonError::into_inner).take());
     }
 }
 
-/// Fails with the difference if a folder's definition is not the wanted one.
+/// Returns an error that describes the difference if the definition `there` in a folder is not the `wanted` one.
 fn differences(there: &str, wanted: &Value) -> Result<()> {
     let there: Value = serde_json::from_str(there)
         .context("study.json is damaged; restore it, or give another folder")?;

@@ -1,6 +1,6 @@
-//! Tanks: from drawings and fills to modal parameters, many fills at a time.
+//! Modal parameters of tanks for Python, for many fills at a time.
 //!
-//! Threads compute, without Python's lock. The thread that called only waits, so that it hears Ctrl-C.
+//! Worker threads compute without Python's lock, while the calling thread waits and notices Ctrl-C.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -21,11 +21,11 @@ use crate::fmu::FmuError;
 /// Time between two checks for Ctrl-C.
 const SILENCE: Duration = Duration::from_millis(100);
 
-/// A tank that was read from a file or a text.
+/// A tank, read from a file or from a text.
 #[pyclass(frozen, module = "hubslosh")]
 pub struct Tank {
     tank: hubslosh_tank::Tank,
-    /// Path of the file, if there is one; error messages begin with it.
+    /// Path of the tank's file, with which error messages begin; None if the tank was read from a text.
     file: Option<PathBuf>,
 }
 
@@ -40,14 +40,14 @@ fn error(file: Option<&Path>, why: impl std::fmt::Display) -> PyErr {
     FmuError::new_err(format!("{prefix}{why}"))
 }
 
-/// Amount of liquid as Python gives it.
+/// Amount of liquid in the forms that Python accepts.
 #[derive(FromPyObject)]
 pub enum Amount {
-    /// m
+    /// Height of the free surface, m.
     Height(f64),
-    /// `60%`, or a height
+    /// A text with a unit: a share of the volume such as `60%`, or a height.
     Text(String),
-    /// (120, "kg")
+    /// A pair of a mass and its unit, such as (120, "kg").
     Mass(f64, String),
 }
 
@@ -66,14 +66,15 @@ impl Amount {
     }
 }
 
-/// Properties of a liquid other than its density, and the specific force along the axis.
+/// Properties of a liquid other than its density, together with the specific force along the tank's axis.
 #[pyclass(frozen, module = "hubslosh")]
 #[derive(Clone, Copy)]
 pub struct Liquid(parameters::Liquid);
 
 #[pymethods]
 impl Liquid {
-    /// Take gravity (m/s²), kinematic viscosity (m²/s), surface tension (N/m) and contact angle (degrees).
+    /// Create the properties: `gravity` in m/s², kinematic viscosity `nu` in m²/s, surface tension `sigma` in N/m, contact angle
+    /// in degrees.
     #[new]
     fn new(
         gravity: f64,
@@ -107,7 +108,7 @@ impl Liquid {
 
 #[pymethods]
 impl Tank {
-    /// Read a tank file.
+    /// Read a tank from its file.
     #[staticmethod]
     fn read(path: PathBuf) -> PyResult<Tank> {
         match hubslosh_tank::Tank::read(&path) {
@@ -116,7 +117,7 @@ impl Tank {
         }
     }
 
-    /// Read the text of a tank file; the files that it names have absolute paths.
+    /// Read a tank from the text of a file; drawings that the text names must have absolute paths.
     #[staticmethod]
     fn parse(text: &str) -> PyResult<Tank> {
         match hubslosh_tank::Tank::parse(text, Path::new("")) {
@@ -125,8 +126,8 @@ impl Tank {
         }
     }
 
-    /// Return the number of modes that Spacecraft has of it if `modes` are asked for: a box with two lengths has those
-    /// along both.
+    /// Return the number of modes that Spacecraft uses for this tank if `modes` modes per direction are requested. A box with two
+    /// different lengths gets at most three, because its modes are along both lengths.
     fn modes(&self, modes: usize) -> usize {
         match &self.tank.geometry {
             Geometry::Box { length_x, length_y } if length_x != length_y => modes.min(2) + 1,
@@ -134,14 +135,14 @@ impl Tank {
         }
     }
 
-    /// Return the mass of liquid at a fill, kg.
+    /// Return the mass of the liquid at a fill, kg.
     fn mass(&self, py: Python, fill: Amount) -> PyResult<f64> {
         let fill = fill.fill()?;
         py.detach(|| self.tank.mass(self.tank.fill_height(fill)?)).map_err(|why| self.error(&why))
     }
 }
 
-/// A tank with liquid at a fill.
+/// Modal parameters of a tank at one fill.
 #[pyclass(frozen, module = "hubslosh")]
 pub struct Solved {
     tank: Py<Tank>,
@@ -151,25 +152,25 @@ pub struct Solved {
 
 #[pymethods]
 impl Solved {
-    /// Return everything that was found, as `hubslosh tank --json` prints it.
+    /// Return all results as `hubslosh tank --json` prints them.
     fn result<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let text = serde_json::to_string(&self.data)
             .map_err(|why| PyRuntimeError::new_err(why.to_string()))?;
         py.import("json")?.call_method1("loads", (text,))
     }
 
-    /// Draw tank, free surface and mode shapes, SVG.
+    /// Return a drawing of the tank, its free surface and its mode shapes as SVG.
     fn picture(&self, py: Python) -> String {
         let tank = &self.tank.get().tank;
         py.detach(|| picture::tank(tank, &self.data, self.liquid.0.gravity))
     }
 
-    /// Return warnings about the surface tension.
+    /// Return the warnings about the surface tension.
     fn warnings(&self) -> Vec<String> {
         parameters::surface_tension_warnings(&self.data, self.liquid.0)
     }
 
-    /// Return the parameters of a model by name, and warnings.
+    /// Return the tank's parameters for an FMU by name, and warnings. `model` is the name of the FMU.
     fn parameters<'py>(&self, py: Python<'py>, model: &str) -> PyResult<Parameters<'py>> {
         let target = target(model)?;
         let of = self.tank.get();
@@ -190,7 +191,7 @@ fn target(model: &str) -> PyResult<Target> {
     }
 }
 
-/// Checks that the liquid's gravity is one that the FMUs accept as g_ref.
+/// Returns the liquid if the FMUs accept its gravity as `g_ref`, otherwise an error.
 fn checked(liquid: Liquid) -> Result<parameters::Liquid, Problems> {
     let gravity = liquid.0.gravity;
     if gravity > 0.0 && gravity < 1e-9 {
@@ -219,12 +220,11 @@ fn parameters_to_python(py: Python, set: ParameterSet) -> PyResult<Parameters> {
     Ok((found, set.warnings))
 }
 
-/// A tank, its fill, the number of modes, and the liquid.
+/// A tank to solve: the tank, its fill, the number of modes, and the liquid.
 pub type Question = (Py<Tank>, Amount, usize, Py<Liquid>);
 
-/// Solve tanks at fills, each a tuple (tank, fill, modes, liquid); one after the other on each core.
-///
-/// Returns for each what was found, or the FmuError.
+/// Solve several tanks, each given as a tuple (tank, fill, modes, liquid), on all cores. Return for each tuple the result, or the
+/// FmuError that it caused.
 #[pyfunction]
 pub fn solve(py: Python, questions: Vec<Question>) -> PyResult<Vec<Py<PyAny>>> {
     let mut asked = Vec::with_capacity(questions.len());
@@ -253,7 +253,8 @@ pub fn solve(py: Python, questions: Vec<Question>) -> PyResult<Vec<Py<PyAny>>> {
         .collect()
 }
 
-/// Return the fill table of tank 1 of Spacecraft, which lets it drain, and warnings.
+/// Return the parameters of a draining tank 1 of Spacecraft (the table of modal parameters over the fill), and warnings.
+/// `between` has the two fills at the ends of the table.
 #[pyfunction]
 pub fn table<'py>(
     py: Python<'py>,
@@ -279,9 +280,9 @@ pub fn table<'py>(
     parameters_to_python(py, set.map_err(|why: Problems| tank.get().error(&why))?)
 }
 
-/// Returns `of(0)` to `of(count - 1)`, computed by one thread per core.
+/// Returns the results of `of(0)` to `of(count - 1)`, computed in parallel by one thread per core.
 ///
-/// On Ctrl-C it returns at once; the threads finish what they are computing.
+/// On Ctrl-C the function returns at once, while the threads finish what they are computing.
 fn in_threads<T: Send + 'static>(
     py: Python,
     count: usize,
