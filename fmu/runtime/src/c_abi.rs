@@ -51,7 +51,7 @@ pub type Logger = Box<dyn Fn(Status, &CStr, &CStr)>;
 pub struct Log {
     logger: Option<Logger>,
     pub filter: Filter,
-    /// True after the warning about the host's steps, which is given only once.
+    /// True once the warning about the host's communication steps has been given, so that it is given only once.
     step_warned: bool,
 }
 
@@ -142,8 +142,8 @@ pub unsafe fn text(string: *const c_char) -> Option<String> {
     Some(unsafe { CStr::from_ptr(string) }.to_string_lossy().into_owned())
 }
 
-/// Borrows an array of the host. NULL is allowed for an empty array; otherwise it is an error that names the
-/// argument.
+/// Borrows an array of the host for reading. A NULL pointer is allowed for an empty array; otherwise it is an error whose
+/// message has the argument's `name`.
 pub unsafe fn array<'a, T>(
     call: &Call,
     name: &str,
@@ -191,13 +191,13 @@ pub fn null_argument(call: &Call, name: &str) -> Fault {
 
 // ---- Instances ----
 
-/// Marks a live component, so that a wrong handle gives an error instead of a crash.
+/// First word of a live component. Calls check it, so that a wrong handle gives an error instead of a crash.
 const COMPONENT: u64 = 0x4875_6253_6c6f_7368;
 
-/// Returns the first word of a live component or saved state of this model, FMI version and loaded copy of
-/// the library, at this address. Other FMUs, functions of the other version, and a second copy of the library
-/// have different marks, because the address of the variable table and the digit of the version differ. The
-/// upper 16 bits of a mark are those of no address.
+/// Returns the mark: the number that is the first word of a live component or saved state at this address. The mark depends
+/// on the model, the FMI version and the loaded copy of the library, so that handles of other FMUs, of the other FMI
+/// version or of a second copy of the library are recognised as wrong. It is computed from the address of the variable
+/// table and a digit for the version. The upper 16 bits of a mark differ from those of any valid address.
 fn mark<M: Model, V: Version>(kind: u64, handle: *const c_void) -> u64 {
     let table = ptr::from_ref(M::table()).addr() as u64;
     // Below the alignment of the table, so that the two parts do not overlap.

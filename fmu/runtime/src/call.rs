@@ -38,7 +38,7 @@ pub enum Events {
 }
 
 impl Events {
-    /// All values, each at the index of its number.
+    /// All ways to handle events, in the order of their numbers.
     pub const ALL: [Events; 3] = [Events::InStep, Events::ByHost, Events::Reported];
 }
 
@@ -71,7 +71,7 @@ pub enum InstanceState {
 }
 
 impl InstanceState {
-    /// All states, each at the index of its number.
+    /// All states, in the order of their numbers.
     pub const ALL: [InstanceState; 11] = [
         InstanceState::Instantiated,
         InstanceState::Initialization,
@@ -231,13 +231,13 @@ impl Call {
         )))
     }
 
-    /// Returns the fault of a call that was refused or has failed.
+    /// Returns a fault with the status Error: the call was refused or has failed.
     #[cold]
     pub fn error(&self, why: impl fmt::Display) -> Fault {
         Fault { severity: Severity::Error, text: format!("{}: {why}", self.name) }
     }
 
-    /// Returns the fault of a call whose result cannot be computed; the instance is unchanged.
+    /// Returns a fault with the status Discard: the result of the call cannot be computed, and the instance is unchanged.
     #[cold]
     pub fn discard(&self, why: impl fmt::Display) -> Fault {
         Fault { severity: Severity::Discard, text: format!("{}: {why}", self.name) }

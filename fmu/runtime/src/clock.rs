@@ -33,7 +33,7 @@ pub(crate) struct Clock {
     pub stop: Option<f64>,
     /// The host's time, s.
     pub time: f64,
-    /// True in Model Exchange, where the host determines the time.
+    /// True in Model Exchange, where the host sets the time, and false in Co-Simulation, where steps advance it.
     pub is_hosts: bool,
     /// Time of the last event, s. In Model Exchange the host may not go back before it.
     pub last_event: f64,
@@ -51,7 +51,7 @@ impl Clock {
         self.at(self.time, 0.0)
     }
 
-    /// Returns the present instant before a step of size `h`; `time` is the host's time of it.
+    /// Returns the instant before a step of size `h` (s) from the host's time `time` (s).
     pub fn at(&self, time: f64, h: f64) -> Instant {
         let resolution = self.resolution(time).max(self.resolution(time + h));
         let since_start = self.is_hosts.then_some(time - self.start);
@@ -106,7 +106,7 @@ impl Clock {
         }
     }
 
-    /// Checks a time that the host sets; `goes_back` says that it may be before the last event.
+    /// Checks a time that the host sets. `goes_back` says that a time before the last event is allowed, as in FMI 2.0.
     ///
     /// # Errors
     ///

@@ -50,8 +50,8 @@ pub trait Dynamics: Clone + Debug + Sized + 'static {
     /// True if outputs depend not only on the inputs' values but also on their slopes.
     const OUTPUTS_USE_SLOPES: bool = false;
 
-    /// The parameter that counts the elements to which the event indicators belong, with the same number of
-    /// indicators per element, in order.
+    /// Name of the parameter that counts elements (for example tanks) which have event indicators. Each element has the
+    /// same number of indicators, and the indicators are in the order of the elements.
     const INDICATORS_OF: Option<&'static str> = None;
 
     /// Creates the model at the start of the simulation, with the inputs at that time. `tolerance` is
@@ -101,8 +101,8 @@ pub trait Dynamics: Clone + Debug + Sized + 'static {
         self.step(inputs, h).map(|()| StepEnd::End)
     }
 
-    /// Applies permanently the discrete changes that the present inputs cause, see
-    /// [`Model::apply_present_inputs`].
+    /// Applies the discrete changes that the present inputs cause, see [`Model::apply_present_inputs`], without the
+    /// possibility to revert them.
     fn take_present_inputs(&mut self, inputs: &Self::Inputs) {
         let _ = inputs;
     }

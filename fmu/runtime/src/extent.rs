@@ -42,9 +42,9 @@ pub struct Extent {
 }
 
 impl Extent {
-    /// Returns the extent of the description with this token, with the start values of the table. `whole` is
-    /// the token of the full description. Returns `None` if the token does not belong to a reduced
-    /// description of this table.
+    /// Returns the extent that a token describes, with the start values of the table. `token` is the GUID or
+    /// instantiationToken that the host passes, `whole` that of the full description. Returns `None` if `token` does not
+    /// belong to a reduced description of this table.
     pub fn from_token<M: Model>(token: &str, whole: &str) -> Option<Extent> {
         let kept = GUID_LENGTH - 1 - DIGITS;
         if token.len() != GUID_LENGTH || !token.is_ascii() || token[..kept] != whole[..kept] {
@@ -149,7 +149,7 @@ impl Extent {
         &self.places
     }
 
-    /// Returns the number of event indicators in use.
+    /// Returns the number of event indicators that the reduced description has.
     pub fn indicators(&self) -> usize {
         self.indicators
     }
@@ -178,7 +178,8 @@ impl Extent {
     }
 }
 
-/// Returns the number of event indicators that belong to the elements within the sizes.
+/// Returns the number of the table's event indicators that belong to elements within the sizes. `of` is the parameter that
+/// counts the elements with indicators.
 fn share<M: Model>(table: &Table<M>, of: Option<&str>, sizes: &[(&str, usize)]) -> usize {
     let all = table.about.event_indicators;
     let size = sizes.iter().find(|(name, _)| Some(*name) == of);
@@ -213,7 +214,7 @@ impl<M: Model> Table<M> {
 }
 
 impl<M: Model> Scalar<M> {
-    /// Returns true if the element's indices are within these sizes.
+    /// Returns true if the indices of this scalar are within the sizes, so that the reduced description contains it.
     pub fn is_within(&self, sizes: &[(&str, usize)]) -> bool {
         let indices = self.variable.indices(self.element);
         self.variable.shape.iter().zip(indices).all(|(dimension, index)| match dimension {

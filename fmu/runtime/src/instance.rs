@@ -104,7 +104,7 @@ impl<M: Model> ExactSizeIterator for Places<M> {}
 pub struct StepInfo {
     /// True if there is an event that must be handled.
     pub event: bool,
-    /// True if the step has stopped before its end.
+    /// True if the step has stopped at an event before its end.
     pub early: bool,
 }
 
@@ -937,7 +937,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(StepInfo { event, early: matches!(end, StepEnd::Event(_)) })
     }
 
-    /// Refuses a step from `at` by `h` that can never be valid.
+    /// Refuses a step from `at` (s) by `h` (s) that is never valid, for example because its size is negative or because it
+    /// does not begin at the present time.
     #[inline(always)]
     pub(crate) fn check_step(&self, call: &Call, at: f64, h: f64) -> Result<(), Fault> {
         self.clock.check_step(at, h).map_err(|why| call.error(why))
@@ -1437,8 +1438,8 @@ impl<M: Model, V: Version> Instance<M, V> {
     }
 }
 
-/// Evaluates a function of the model. The present inputs are applied first if the FMU handles events; they
-/// are not if the host does.
+/// Evaluates the function `question` of the model. If the FMU handles events within its steps, the changes that the present
+/// inputs cause are applied before and reverted afterwards; if the host handles events, they are not.
 #[inline(always)]
 fn query_model<M: Model, T>(
     events: Events,

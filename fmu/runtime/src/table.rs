@@ -94,11 +94,12 @@ const fn span<M: Dynamics>(scalars: &[Scalar<M>], kind: char) -> Span {
 #[allow(missing_docs)]
 pub struct Scalar<M: Dynamics> {
     pub variable: &'static Variable<M>,
-    /// Access of the entry, copied here because every call needs it.
+    /// Access of the entry in the table. It is copied to each scalar, because every call needs it.
     pub access: Access<M>,
-    /// C type in which it is read and set, copied here for the same reason.
+    /// C type in which the scalar is read and set. It is copied from the table's entry, because every call needs it.
     pub c_type: CType,
-    /// Index function of a continuous state, copied here for the same reason.
+    /// Function that returns the index of the continuous state, if the scalar is one. It is copied from the table's entry,
+    /// because every call needs it.
     pub state: Option<Place>,
     /// Index among all scalars, from which the value reference follows (see
     /// [`Version`](crate::version::Version)).
@@ -187,7 +188,7 @@ impl<M: Dynamics> Scalar<M> {
         self.state.map(|place| place(self.element))
     }
 
-    /// Returns an error if the value is not allowed.
+    /// Returns an error message if this scalar must not have `value`, otherwise `None`.
     #[inline]
     pub fn problem(&self, value: Value) -> Option<String> {
         self.variable.problem(self.element, value)
@@ -199,7 +200,7 @@ impl<M: Dynamics> Scalar<M> {
         self.variable.start(&mut parameters, &mut inputs, self.element)
     }
 
-    /// Returns true if a list of dependencies contains `other`.
+    /// Returns true if the list of dependencies `names`, which may have names of whole arrays, contains the scalar `other`.
     pub(crate) fn names(&self, names: &[&str], other: &Scalar<M>) -> bool {
         let v = other.variable;
         names.iter().any(|name| match name.strip_suffix("[]") {

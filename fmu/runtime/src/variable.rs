@@ -131,7 +131,6 @@ pub enum Dimension {
 }
 
 impl Dimension {
-    /// Returns the largest length that the dimension can have.
     pub const fn most(self) -> usize {
         match self {
             Dimension::Fixed(length) | Dimension::Sized(_, length) | Dimension::Used(_, length) => {

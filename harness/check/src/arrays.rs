@@ -8,7 +8,6 @@ use super::under_test::{FmuUnderTest, Interface, Life, Reading, Session, UnderTe
 use host::description::Type;
 use host::fmi2::guarded::Lists;
 
-/// Returns the value references of all variables of the types `kinds`.
 fn references(fmu: &FmuUnderTest, kinds: &[Type]) -> Vec<u32> {
     let all = fmu.variables().iter().filter(|v| kinds.contains(&v.kind));
     all.map(|v| v.reference).collect()

@@ -135,7 +135,8 @@ impl Seen {
         }
     }
 
-    /// Returns true if every pair of `feedthrough` has been observed, be it in the last bit only.
+    /// Returns true if every pair (unknown, known) of `feedthrough` has been observed at least once, even if the value
+    /// changed only in its last bit.
     fn is_complete(&self, feedthrough: &BTreeSet<(usize, usize)>) -> bool {
         feedthrough.iter().all(|pair| self.traces.contains(pair))
     }

@@ -80,8 +80,7 @@ impl Variable {
         self.typed.get("derivative")?.trim().parse().ok()
     }
 
-    /// Returns true for inputs and for parameters that are not constant, because only these are set by a
-    /// host.
+    /// Returns true if a host may set the variable: it is an input, or a parameter that is not constant.
     pub fn is_set_by_hosts(&self) -> bool {
         self.causality == Causality::Input
             || (self.causality == Causality::Parameter && self.variability != Variability::Constant)

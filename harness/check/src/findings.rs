@@ -38,8 +38,8 @@ pub struct Findings {
     pub skipped: Option<String>,
     /// Identifier of the rule that reports the fault which made this rule impossible to check.
     pub(crate) reported_by: Option<String>,
-    /// The call at which the rule ended early because of a crash or a refusal. This is then the rule's last
-    /// finding.
+    /// The call at which the rule ended early, because the FMU crashed or refused the call. The last finding of the rule
+    /// then describes this.
     pub(crate) stopped_at: Option<String>,
 }
 
@@ -56,7 +56,7 @@ impl Findings {
         }
     }
 
-    /// Returns the place of a finding, which is then added with a text.
+    /// Begins a finding at `place`; the methods of the returned value add its text.
     pub fn at(&mut self, place: impl Into<String>) -> At<'_> {
         At { findings: self, place: place.into() }
     }
@@ -96,7 +96,7 @@ impl At<'_> {
         self.push(severity, text.into());
     }
 
-    /// Adds a finding that is an error even if the rule is only a warning.
+    /// Adds a finding that is an error, even if broken rules of this kind are normally only warnings.
     pub fn fail(self, text: impl Into<String>) {
         self.push(Severity::Error, text.into());
     }

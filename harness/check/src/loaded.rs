@@ -98,8 +98,8 @@ impl<V: Version> Loaded<V> {
         Ok(loaded)
     }
 
-    /// Removes the interfaces for which `callable` is false, and the unloadable binaries whose
-    /// modelIdentifier `told` rejects.
+    /// Removes the interfaces for which `callable` is false. Binaries that could not be loaded are removed too, if `told`
+    /// returns false for their modelIdentifier.
     pub fn retain(
         &mut self,
         callable: impl Fn(Interface, &Fmu<V>) -> bool,

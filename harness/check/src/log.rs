@@ -84,8 +84,8 @@ pub fn text(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// Simulates with loggingOn and returns the messages. `changing` says whether the inputs change or keep their
-/// start values.
+/// Simulates an ordinary run with loggingOn and returns the logged messages. `changing` says whether the inputs change
+/// during the run or keep their start values.
 fn ordinary(fmu: &FmuUnderTest, interface: Interface, changing: bool) -> Result<Vec<Message>> {
     fmu.announce("fmi2Instantiate, loggingOn");
     let with = fmu.arguments(interface)?;

@@ -248,12 +248,12 @@ pub fn cut(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 }
 
 pub fn lag(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    /// Relative change of a value with the step above which it is more than rounding.
+    /// Relative change of a value with the step size above which the change is more than rounding.
     const SEEN: f64 = 1e-6;
     /// Number of steps after which an FMU that delays constant inputs by one or two steps shows their effect.
     const SETTLED: usize = 4;
-    /// Fraction of this change by which a value may differ from that of one step earlier and still count as
-    /// the same.
+    /// A value counts as equal to the value of one step earlier if they differ by less than this fraction of the change
+    /// between them.
     const SAME: f64 = 0.02;
     let usual = after_three_steps(fmu)?.step;
     let states: Vec<&Variable> = fmu.states().into_iter().map(|(_, state)| state).collect();

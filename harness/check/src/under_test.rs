@@ -378,7 +378,6 @@ pub struct Session<'f> {
     /// The first state that an event has changed although valuesOfContinuousStatesChanged was false: time,
     /// index, and both values.
     pub(super) hidden_jump: Option<(f64, usize, f64, f64)>,
-    /// Number of events requested only by fmi2CompletedIntegratorStep that were examined so far.
     asked: usize,
     /// The first of these events that has changed a value: time, name, and both values as text.
     pub(super) step_event: Option<(f64, String, String)>,

@@ -245,7 +245,7 @@ fn number(element: &Element, attribute: &str, default: f64) -> Option<f64> {
     }
 }
 
-/// Returns true if two factors agree in the three digits that authors usually write.
+/// Returns true if two factors agree in three digits, the accuracy with which authors usually write conversion factors.
 fn is_equal(a: f64, b: f64) -> bool {
     (a - b).abs() <= 1e-3 * a.abs().max(b.abs())
 }

@@ -137,8 +137,8 @@ fn files_in(value: &OsStr) -> Vec<PathBuf> {
     paths
 }
 
-/// Returns the plain file to which a path leads, whether or not it exists; `None` for a device or a pipe,
-/// which takes several outputs.
+/// Returns the file to which a path leads after following links, whether or not the file exists; `None` for a device or a
+/// pipe, to which several outputs may be written.
 fn place(path: &Path) -> Option<PathBuf> {
     let Ok(Destination::File(file)) = output::destination(path) else { return None };
     let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty());

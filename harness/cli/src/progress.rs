@@ -1,4 +1,4 @@
-//! Progress bars on a terminal. The libraries only report how far they are.
+//! Progress bars on a terminal. The libraries only report their progress; this module displays it.
 
 use std::io;
 use std::sync::{Mutex, PoisonError};
@@ -28,7 +28,7 @@ pub fn search_spinner() -> Result<ProgressBar> {
     Ok(spinner)
 }
 
-/// Prints a line that stays above a bar, and makes it the bar's message.
+/// Prints a line above a progress bar, and shows the line as the bar's message too.
 pub fn show_line(bar: &ProgressBar, line: &str) {
     // Where no bar is drawn, indicatif would lose the line.
     if bar.is_hidden() {
@@ -59,7 +59,8 @@ fn bar(template: &str) -> Result<ProgressBar> {
     Ok(bar)
 }
 
-/// A terminal with one line, which is sent as a message to the program that started this one.
+/// A terminal with a single line. Each line that the progress bar draws is sent as a message to the program that started
+/// this one.
 #[derive(Debug, Default)]
 struct Messages {
     line: Mutex<String>,

@@ -1,4 +1,4 @@
-//! Parameters of a file as settings of an FMU.
+//! Reads a file of parameters as settings of an FMU.
 
 use std::path::Path;
 
@@ -6,7 +6,8 @@ use anyhow::{Context, Result};
 use host::description::ModelDescription;
 use host::parameter_set::ParameterSet;
 
-/// Reads the description of the FMU that the parameters are for, to convert units to the FMU's own.
+/// Returns the description of the FMU for which the parameters are meant; it is needed to convert units to those of the
+/// FMU.
 pub type Describe<'a> = &'a dyn Fn() -> Result<ModelDescription>;
 
 /// Reads names and values from a file of parameters, in its order. Numbers are converted to the units of the

@@ -186,8 +186,8 @@ fn exit(code: u8) -> ! {
     std::process::exit(code.into())
 }
 
-/// Ends the program with exit code 0 if the reader of its output has closed the pipe; passes on any other
-/// error.
+/// Ends the program with exit code 0 if writing failed because the reader of the output has closed the pipe (for example
+/// `hubslosh variables | head`). Any other error is returned.
 pub fn quiet_if_closed<T, E: Into<anyhow::Error>>(written: Result<T, E>) -> Result<T> {
     written.map_err(|error| {
         let error = error.into();

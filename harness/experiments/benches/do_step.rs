@@ -1,9 +1,8 @@
-//! CPU time for 20 ms of motion: one fmi2DoStep compared with two explicit integrators on the
-//! same equations. Each time is the best of five. Only ratios have a meaning; the unit is a
-//! fixed-step RK4 of 5 ms.
+//! CPU time for 20 ms of motion: one fmi2DoStep compared with two explicit integrators on the same equations. Each time is
+//! the best of five. Only the ratios of these times have a meaning; the unit is the time of a fixed-step RK4 of 5 ms.
 //!
-//! All have the same torque, lines between knots 20 ms apart. The torque is a sweep of
-//! 0.1 N·m from 2.2 to 2.6 Hz over antiresonance and resonance (10 cm fill).
+//! All integrators receive the same torque, straight lines between knots 20 ms apart. The torque is a sweep of 0.1 N·m from
+//! 2.2 to 2.6 Hz over antiresonance and resonance (10 cm fill).
 //!
 //! `cargo bench -p experiments`
 
@@ -20,10 +19,11 @@ const STEP: f64 = 0.02;
 const SWEEP: &str = "lin-sweep:amplitude=0.1,f0=2.2,f1=2.6,duration=200";
 const DURATION: f64 = 200.0;
 
-/// θ, ω, α, α'.
+/// States: angle θ and rate ω of the hub, slosh angle α and its rate.
 type State = SVector<f64, 4>;
 
-/// Hub and one linear pendulum of the thesis's bench, the sign of ω smoothed to tanh(ω/ε).
+/// Equations of the hub with one linear pendulum of the thesis's bench. The sign of ω in the dry friction is smoothed to
+/// tanh(ω/ε).
 struct Smooth {
     knots: Vec<f64>,
 }
@@ -78,7 +78,7 @@ fn dopri5(system: Smooth) -> State {
     *solver.y_out().last().expect("it gives points")
 }
 
-/// Best of five.
+/// Returns the shortest of five measured times.
 fn best(mut run: impl FnMut() -> Duration) -> Duration {
     (0..5).map(|_| run()).min().unwrap_or_default()
 }

@@ -1,22 +1,19 @@
-//! Computes one point of the work-precision diagram, for one method at one tolerance: CPU time for 20 ms of motion, and error
-//! over the thesis's sweep. (The sweep has 0.1 N m, 10 cm and dry friction.)
+//! Computes one point of the work-precision diagram, for one method at one tolerance: CPU time for 20 ms of motion, and the
+//! error over the thesis's sweep (0.1 N·m, 10 cm of water, dry friction).
 //!
-//! `work_precision METHOD TOLERANCE SECONDS RUNS [REFERENCE]` prints
-//! `ns per 20 ms,largest error of omega in rad/s`. The motion is solved RUNS times. For each
-//! piece of 10 s (for the whole, if a solver takes it in one call) the smallest CPU time
-//! counts, which excludes other load of the machine. METHOD:
+//! `work_precision METHOD TOLERANCE SECONDS RUNS [REFERENCE]` prints `ns per 20 ms,largest error of omega in rad/s`. The
+//! motion is solved RUNS times. For each piece of 10 s (for the whole sweep, if a solver takes it in one call) the smallest
+//! CPU time counts, which excludes other load of the machine. METHOD is one of:
 //!
-//! * `linear`, `spherical`: the packed FMU (`dist/HubSlosh.fmu`), slosh model of that
-//!   name, set-valued friction; without REFERENCE it writes its rates there to compare
-//!   with later (`work_precision linear 1e-13 2700 1 --write FILE`). `linear/12` reads the first
-//!   12 outputs after every step, in one call, instead of omega alone.
-//! * `dopri5`, `dop853`: ode_solvers on the linear model with sgn(omega) smoothed to
-//!   tanh(omega/1e-5), over the whole sweep in one call; `dopri5@1e-8` with another scale
-//!   than 1e-5 rad/s.
-//! * `rk4`: classical fixed-step Runge-Kutta on the same, TOLERANCE is the step in s.
-//! * `torque`: only makes the torque, whose instructions are no method's.
+//! * `linear`, `spherical`: the packed FMU (`dist/HubSlosh.fmu`) with the slosh model of this name and set-valued friction.
+//!   Without REFERENCE the rates are written to a file, with which later results are compared (`work_precision linear 1e-13
+//!   2700 1 --write FILE`). `linear/12` reads the first 12 outputs after every step, in one call, instead of only omega.
+//! * `dopri5`, `dop853`: ode_solvers on the linear model with sgn(omega) smoothed to tanh(omega/1e-5), over the whole sweep
+//!   in one call; `dopri5@1e-8` smooths over 1e-8 rad/s instead of 1e-5 rad/s.
+//! * `rk4`: classical fixed-step Runge-Kutta on the smoothed model; TOLERANCE is the step in s.
+//! * `torque`: computes only the torque, so that its instructions can be subtracted from those of each method.
 //!
-//! All see the same torque: straight lines between knots 20 ms apart.
+//! All methods receive the same torque: straight lines between knots 20 ms apart.
 
 use std::path::Path;
 use std::time::Duration;
@@ -48,7 +45,7 @@ fn cpu_time() -> Duration {
     now.map_or(Duration::ZERO, Duration::from)
 }
 
-/// Returns the time since the first call.
+/// Returns the time since the first call, on systems that do not report the CPU time of a thread.
 #[cfg(not(unix))]
 fn cpu_time() -> Duration {
     static START: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
@@ -92,8 +89,8 @@ fn fmu(model: &str, outputs: usize, tolerance: f64, torque: &[f64]) -> Result<So
     Ok((rates, took))
 }
 
-/// Hub and one linear pendulum on the bench with 10 cm of water and smoothed friction, as differential
-/// equations for other solvers.
+/// Hub and one linear pendulum on the bench with 10 cm of water and smoothed friction, as differential equations for the
+/// solvers other than the FMU.
 struct Smooth<'a> {
     torque: &'a [f64],
     /// Scale of the smoothing, rad/s.

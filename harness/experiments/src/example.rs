@@ -25,12 +25,12 @@ pub struct Example {
 /// Time function of an input; t in s, largest value 1.
 type Course = fn(t: f64) -> f64;
 
-/// A sine below the slosh frequency of the bench that grows and fades within ten seconds, then no torque. The
-/// hub slips, reverses and comes to rest while the liquid still loads it.
+/// A sine of 2 Hz, below the slosh frequency of the bench, that grows and fades within ten seconds, followed by no torque.
+/// The hub slips, reverses and comes to rest while the liquid still loads it.
 const BENCH: Course = |t| swell(t) * (TAU * 2.0 * t).sin();
 const THRUST: Course = |_| 1.0;
-/// Sines near the slosh frequency of the default tank under that thrust, 0.42 Hz with the tank held. They
-/// grow and fade within ten seconds, then the liquid oscillates freely. No two are in phase, so that no
+/// A sine of 0.4 Hz, near the slosh frequency of the default tank under 1.5 m/s² (0.42 Hz with the tank held), that grows
+/// and fades within ten seconds; afterwards the liquid oscillates freely. The inputs have different phases, so that no
 /// output stays 0.
 const NEAR_SLOSH: Course = |t| swell(t) * (TAU * 0.4 * t).sin();
 const BELOW_SLOSH: Course = |t| swell(t) * (TAU * 0.25 * t).sin();

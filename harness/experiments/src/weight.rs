@@ -50,8 +50,8 @@ impl Contents {
 }
 
 impl Weightless {
-    /// Returns true if the liquid leaves the tank's bottom: inertia dominates, or the dominant force points
-    /// out of the liquid.
+    /// Returns true if the liquid leaves the bottom of the tank, because inertia dominates or because the dominant force
+    /// points out of the liquid.
     fn leaves(self) -> bool {
         self.bond < -1.0 || ruling_force(self.bond, self.weber).starts_with("inertia")
     }

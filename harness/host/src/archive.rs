@@ -30,7 +30,6 @@ pub const UNPACKED_PER_BYTE: u64 = 8;
 pub const DESCRIPTION: &str = "modelDescription.xml";
 
 pub struct Entry {
-    /// Name as it stands in the archive; bytes that are not UTF-8 are replaced.
     pub name: String,
     pub method: CompressionMethod,
     pub encrypted: bool,
@@ -102,7 +101,7 @@ impl Archive {
         Ok(archive)
     }
 
-    /// Returns why the list of files cannot be read, in words of somebody who does not know the format.
+    /// Explains, without terms of the zip format, why the list of files in an archive cannot be read.
     fn fault_of(&self, why: &anyhow::Error) -> String {
         let Some(ZipError::InvalidArchive(what)) = why.downcast_ref() else {
             return format!("{why:#}");
@@ -252,7 +251,7 @@ mod tests {
 
     use super::*;
 
-    /// An archive of files with that content, their sizes in the headers changed by `lie`.
+    /// Returns an archive with these files. `lie` is added to the sizes in the headers, so that the headers are wrong.
     fn archive(files: &[(&str, &[u8])], lie: i64) -> tempfile::NamedTempFile {
         let mut to = ZipWriter::new(std::io::Cursor::new(Vec::new()));
         for (name, content) in files {
@@ -273,7 +272,7 @@ mod tests {
         file
     }
 
-    /// Result of unpacking; the folder holds nothing from outside.
+    /// Unpacks an archive with wrong sizes, and checks that nothing was written outside of the folder.
     fn unpacked(files: &[(&str, &[u8])], lie: i64) -> Result<(), String> {
         let folder = tempfile::tempdir().unwrap();
         let inner = folder.path().join("inner");

@@ -50,9 +50,10 @@ struct Sink {
     uncategorised: AtomicUsize,
 }
 
-/// The sinks of all living instances, by the environment pointer that their FMUs pass back to the callbacks.
+/// Receivers of the messages of all living instances, by the environment pointer that their FMUs pass back to the
+/// callbacks.
 ///
-/// An FMU may pass any pointer. The callbacks look it up here and never follow it.
+/// An FMU may pass any pointer. The callbacks look it up in this map and never follow it.
 static SINKS: Mutex<BTreeMap<usize, Arc<Sink>>> = Mutex::new(BTreeMap::new());
 
 /// Number of calls of a callback with a pointer that is not the environment of an instance.
@@ -124,8 +125,8 @@ impl Sink {
     }
 }
 
-/// Returns the sink for messages with this environment. If no instance has this environment, the message is
-/// assigned to the instance that this thread called last, or to the only instance.
+/// Returns the receiver of messages with this environment pointer. If no instance has this pointer, the message is assigned
+/// to the instance that this thread called last, or to the only instance.
 fn find_sink(environment: *mut c_void) -> Option<Arc<Sink>> {
     let sinks = sinks();
     if let Some(sink) = sinks.get(&(environment as usize)) {

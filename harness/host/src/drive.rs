@@ -26,7 +26,7 @@ const TOLERANCE: f64 = 1e-6;
 /// Relative deviation of an input from its slope above which it jumps, which is an event.
 const JUMP: f64 = 1e-9;
 
-/// Values of the inputs between two communication points, in the order of the inputs.
+/// The inputs between two communication points: value and slope of each input, in the order of [`Inputs`].
 pub struct Course<'a> {
     pub values: &'a mut [f64],
     /// Time derivatives until the next communication point, per s. They are ignored if the FMU cannot

@@ -62,7 +62,7 @@ pub struct Run<I> {
     h: f64,
     next_event: Option<f64>,
     most_steps: usize,
-    /// Value references, values and slopes of the inputs, and the time from which they hold.
+    /// The inputs: value references, values and slopes, and the time for which the values hold.
     inputs: (Vec<u32>, Vec<f64>, Vec<f64>, f64),
 }
 

@@ -85,7 +85,6 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// Returns the last line that the process printed and that is not empty.
     pub fn last_line(&self) -> Option<String> {
         let all = self.printed.concat();
         let text = String::from_utf8_lossy(&all);
@@ -106,8 +105,8 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 static RUNNING: Mutex<BTreeSet<u32>> = Mutex::new(BTreeSet::new());
 
-/// Runs a program that calls [`enter`], until it and all processes that it has started have ended. `hear`
-/// receives the program's answers.
+/// Runs a program that calls [`enter`], and waits until this program and all processes that it has started have ended.
+/// `hear` receives the answers that the program sends.
 pub fn run<A: AsRef<OsStr>>(
     program: &Path,
     arguments: impl IntoIterator<Item = A>,
@@ -441,7 +440,8 @@ impl<F: FnMut(&[u8])> Messages<F> {
     }
 }
 
-/// Output of a process that was read from a pipe: the beginning, and the number of further bytes.
+/// Stored part of the output that a process wrote to a pipe: the beginning of the text, and the number of bytes that follow
+/// and were not stored.
 #[derive(Default)]
 struct Printed {
     kept: Vec<u8>,

@@ -105,7 +105,7 @@ fn text(value: &Value) -> String {
     }
 }
 
-/// Returns an error if two parameters have the same name.
+/// Returns the parameters as a set, or an error if two of them have the same name.
 fn once(parameters: Vec<Parameter>) -> Result<ParameterSet> {
     for (k, parameter) in parameters.iter().enumerate() {
         let Parameter { name, line, .. } = parameter;
@@ -199,7 +199,7 @@ struct Identified {
     parameters: Option<Entries<serde_json::Value>>,
     #[serde(default)]
     settings: Entries<serde_json::Value>,
-    /// Called `described` until version 0.2.
+    /// True if the fit was accepted. Files of version 0.2 and earlier call this key `described`.
     #[serde(alias = "described")]
     fits: Option<bool>,
     converged: Option<bool>,

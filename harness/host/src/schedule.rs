@@ -14,7 +14,7 @@ use crate::description::ModelDescription;
 /// fraction of the row interval, because for example 3 · 0.02 is not exactly 0.06.
 const SAME: f64 = 1e-6;
 
-/// Sentence for the metadata of a result: the times for which the inputs and the outputs in one row hold.
+/// Sentence in the metadata of a result file. It states at which time the inputs and the outputs in one row hold.
 pub const ROWS: &str =
     "inputs from the row's time on; other variables at the row's time, before these inputs act";
 
@@ -94,13 +94,14 @@ impl History {
         self.slopes.iter().all(|slope| *slope == 0.0)
     }
 
-    /// Returns value and slope (per s) at `t` and immediately after it.
+    /// Returns the value and the slope (per s) that the input has immediately after the time `t` (s). At a jump these are
+    /// the values after it.
     pub fn after(&self, t: f64) -> (f64, f64) {
         self.at_row(self.time.partition_point(|row| *row <= t), t)
     }
 
-    /// Returns the value at `t` from a clock with rounding errors: a row that begins up to 1e-9 (1 + |t|) s
-    /// later already counts.
+    /// Returns the value at `t` (s), for a clock with rounding errors: a row that begins up to 1e-9 (1 + |t|) s after `t`
+    /// counts as begun.
     pub fn near(&self, t: f64) -> f64 {
         let slack = 1e-9 * (1.0 + t.abs());
         self.at_row(self.time.partition_point(|row| *row <= t + slack), t).0
@@ -127,7 +128,7 @@ pub struct Cursor<'h> {
 }
 
 impl Cursor<'_> {
-    /// Returns value and slope (per s) at `t` and immediately after it. `t` must not be less than in the last
+    /// Returns the value and the slope (per s) immediately after `t` (s), which must not be before the `t` of the last
     /// call.
     pub fn after(&mut self, t: f64) -> (f64, f64) {
         let time = &self.history.time;

@@ -1,4 +1,5 @@
-//! Readable names for symbols of libraries: names of C++ and Rust without mangling and arguments.
+//! Makes symbols of libraries readable for messages: names of C++ and Rust functions without mangling and without
+//! arguments.
 
 use std::fmt::{self, Write};
 
@@ -6,8 +7,8 @@ use cpp_demangle::{DemangleOptions, Symbol};
 
 const LONGEST: usize = 60;
 
-/// The beginning of a name. Writing fails when it is full, because short symbols of C++ may have extremely
-/// long names.
+/// The first characters of a name. Writing to it fails when it is full, because short symbols of C++ may stand for
+/// extremely long names.
 #[derive(Default)]
 struct Short(String);
 

@@ -84,8 +84,8 @@ pub enum Style {
     Cloud,
 }
 
-/// A curve of a chart. Points that are NaN or infinite are left out; the title is shown when the pointer
-/// rests on the curve.
+/// A curve of a chart. Points that are NaN or infinite are left out. The title is shown when the pointer rests on the
+/// curve.
 #[derive(Clone, Debug)]
 pub struct Series {
     pub points: Vec<(f64, f64)>,

@@ -34,7 +34,7 @@ impl Forward {
     }
 }
 
-/// Transform of a spectrum to N times its signal.
+/// Inverse transform, which returns N times the signal whose spectrum it receives.
 pub struct Inverse(Arc<dyn ComplexToReal<f64>>);
 
 impl Inverse {

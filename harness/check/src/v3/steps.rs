@@ -286,8 +286,8 @@ fn outputs(session: &mut Session, continuous: bool) -> Result<Vec<(String, f64)>
     Ok(outputs)
 }
 
-/// Relative difference of an output that the way of use may cause, because the FMU's solver may be restarted
-/// at other times.
+/// Relative difference of an output that is allowed between two ways to use the FMU (for example with and without event
+/// mode), because the FMU's solver may be restarted at other times.
 const SAME: f64 = 1e-3;
 
 pub fn same_trajectory(subject: &Subject, findings: &mut Findings) -> Result<()> {

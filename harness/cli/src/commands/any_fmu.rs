@@ -94,16 +94,18 @@ fn solver(text: &str) -> Result<Stepped> {
     }
 }
 
-/// Random starts within the bounds, which are tried if the search from the first start ends at no good fit.
+/// Number of random starts within the bounds. They are tried if the search from the user's start values ends without a good
+/// fit.
 const STARTS: usize = 8;
 
-/// Points at which the likelihood is asked for.
+/// Options that request the likelihood at given points instead of a fit.
 #[derive(clap::Args)]
 pub struct PointsArgs {
-    /// A table of points, a column an unknown: --out gets −2 ln L of each, for `hubslosh.posterior` in Python.
+    /// Table of points, one column for each unknown. The command then writes −2 ln L at each point to --out, for
+    /// `hubslosh.posterior` in Python, instead of fitting.
     #[arg(long, hide = true, value_name = "CSV", requires_all = ["free", "found"])]
     points: Option<PathBuf>,
-    /// The result whose noise it is.
+    /// Result of an earlier identification (.json) whose noise the likelihood uses.
     #[arg(long, hide = true, value_name = "JSON", requires = "points")]
     found: Option<PathBuf>,
 }

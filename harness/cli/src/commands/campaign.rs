@@ -69,7 +69,8 @@ pub struct CampaignArgs {
     replace: bool,
 }
 
-/// Length of a directory's name, beyond which it has a hash of the flags.
+/// Longest name of a default results directory, bytes. If the flags would make the name longer, it contains a hash of the
+/// flags instead.
 const LONGEST: usize = 100;
 
 /// Growth of the frequency of `campaign`'s sweep.
@@ -128,7 +129,8 @@ impl CampaignArgs {
         drive(&fmu, &campaign, store, Vec::new())
     }
 
-    /// The directory for these flags: that of the default campaign, or one named by what differs.
+    /// Returns the results directory for these flags: `dist/campaign` for the default campaign, otherwise a directory whose
+    /// name states the flags that differ from the default.
     fn directory(&self) -> PathBuf {
         let numbers =
             |values: &[f64]| values.iter().map(f64::to_string).collect::<Vec<_>>().join("-");
@@ -157,7 +159,7 @@ impl CampaignArgs {
         format!("{DEFAULT_CAMPAIGN}_{}", &files::output::sha256(name.as_bytes())[..12]).into()
     }
 
-    /// The plan that the flags without `--plan` stand for.
+    /// Returns the plan that corresponds to the flags if `--plan` is not given.
     fn flags_as_plan(&self) -> Result<Plan> {
         for (name, _) in &self.settings {
             ensure!(
@@ -179,7 +181,7 @@ impl CampaignArgs {
     }
 }
 
-/// Carries a campaign out and leaves tables and report, which begins with `chapters`.
+/// Runs a campaign and writes its tables and its report, which begins with `chapters`.
 pub fn drive(fmu: &Fmu, campaign: &Campaign, store: Store, chapters: Vec<Chapter>) -> Result<()> {
     let cases = campaign.plan.cases(fmu.description())?;
     let rows: Vec<usize> = cases.iter().map(|case| case.run().steps()).collect();

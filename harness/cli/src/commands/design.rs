@@ -259,9 +259,9 @@ fn check_rows(torque: &Torque, time: &[f64], tau: &[f64]) -> Result<()> {
 /// The bench as it is expected to be, on which a planned torque is tried.
 struct Bench<'f> {
     fmu: &'f Fmu,
-    /// Settings of the FMU with its own damping, from the correlation or not.
+    /// Settings of the FMU, with the damping ratio that the user set or, without one, the ratio of the correlation.
     setup: Setup,
-    /// Delay, bias and asymmetry are predicted too.
+    /// True if delay, gyro bias and friction asymmetry are predicted too.
     sensor_errors: bool,
     noise: Noise,
     /// Largest slosh angle that `--slosh-angle` allows, rad.

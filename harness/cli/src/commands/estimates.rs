@@ -1,4 +1,4 @@
-//! Results of `hubslosh identify`, whatever they were identified from.
+//! Prints and writes the results of all kinds of `hubslosh identify`.
 
 use std::collections::BTreeMap;
 use std::path::Path;

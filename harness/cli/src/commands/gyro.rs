@@ -96,7 +96,7 @@ impl GyroArgs {
     }
 }
 
-/// Longest lag of the autocorrelation, s. The next constant is the least number of chunks in a record.
+/// Longest lag of the autocorrelation, s.
 const LAG: f64 = 10.0;
 const LEAST_CHUNKS: f64 = 3.0;
 

@@ -1,4 +1,4 @@
-//! `hubslosh identify`: which parameters explain recordings, and how sure they are.
+//! `hubslosh identify`: estimates parameters from recordings, with their uncertainties.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};

@@ -30,10 +30,11 @@ pub struct VariablesArgs {
     pub fmu: PathBuf,
 }
 
-/// Characters to which a column is padded; a longer cell pushes the next ones to the right.
+/// Width to which the cells of a column are padded, characters. A longer cell is printed in full and moves the rest of its
+/// line to the right.
 const WIDEST: usize = 80;
 
-/// Number of items of an enumeration that are listed at most.
+/// Largest number of items of an enumeration that the table lists.
 const ITEMS: usize = 50;
 
 impl VariablesArgs {
@@ -83,7 +84,7 @@ impl VariablesArgs {
     }
 }
 
-/// Returns all that the FMU's description says about a variable as a JSON object.
+/// Returns the entry of a variable in the FMU's description as a JSON object.
 fn object(description: &ModelDescription, variable: &Variable) -> Value {
     let attributes = variable.attributes();
     let own = description.unit(variable);

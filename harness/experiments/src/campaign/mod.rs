@@ -1,13 +1,12 @@
 //! A campaign: the runs of a plan, simulated in parallel, each stored and analysed.
 //!
-//! A stored run is reused, whichever program wrote it, if three conditions hold.
-//! `runs/<name>.parquet` is complete, its metadata (Parquet key-value pairs) contain the run's
-//! [recipe](recipe::recipe), and its hash is the manifest's ([`Store`]). All tables follow from the
-//! run's [columns](STORED), so another importer that writes the columns and metadata of
-//! [`Campaign::list`] gets the same tables.
+//! A stored run is reused, whichever program wrote it, if three conditions hold: the file `runs/<name>.parquet` is
+//! complete, its metadata (Parquet key-value pairs) contain the run's [recipe](recipe::recipe), and its hash is the one in
+//! the manifest ([`Store`]). All tables follow from the [columns](STORED) of the runs, so that another importer that writes
+//! the columns and metadata of [`Campaign::list`] gets the same tables.
 //!
-//! The analysis is that of the thesis's bench. For an FMU without the bench's variables, all
-//! outputs are stored, and `runs.csv` has the settings of each run.
+//! The analysis is that of the thesis's bench. For an FMU without the bench's variables, all outputs are stored, and
+//! `runs.csv` has only the settings of each run.
 
 mod onset;
 mod outcome;
@@ -350,7 +349,7 @@ impl Campaign {
         }))
     }
 
-    /// Simulates or reads one run and analyses it.
+    /// Simulates one run, or reads it if it is stored, and analyses it.
     ///
     /// # Errors If the run cannot be stored, because then no other run can be stored either.
     fn done(

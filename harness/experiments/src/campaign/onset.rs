@@ -25,9 +25,9 @@ struct Dwell {
     angle: f64,
 }
 
-/// Result of a search: the frequency of the onset, Hz, and the largest torque without and smallest torque
-/// with rotary slosh, N·m. Without rotary slosh there are no torques, and the frequency is that of the
-/// largest slosh angle.
+/// Result of a search for the onset of rotary slosh: its frequency, Hz, the largest torque without rotary slosh and the
+/// smallest torque with it, N·m. If no torque makes the slosh rotary, there are no torques, and the frequency is that of
+/// the largest slosh angle.
 #[derive(Debug, PartialEq)]
 struct Found {
     frequency: f64,

@@ -38,7 +38,7 @@ const GRID_POINTS: usize = 2000;
 
 /// Separation of antiresonance and resonance that counts as resolved, in units of the resolution.
 const RESOLVED: f64 = 3.0;
-/// Largest residual of a valid transfer function: a tenth of the rate's power does not follow from the
+/// Largest residual of a valid transfer function. With 0.3, a tenth of the power of the rate does not follow from the
 /// torque.
 const MOST_MISFIT: f64 = 0.3;
 /// Largest valid shift of the resonance by a passing sweep, and difference of two estimates from a whole
@@ -93,7 +93,7 @@ pub struct Totals {
 }
 
 impl Totals {
-    /// Returns the totals of a recording, which are NaN for signals that only a simulation has.
+    /// Returns maxima and totals of a recording; NaN for quantities that only a simulation has, such as the energy.
     fn from_recording(table: &Table, rates: &Rates) -> Self {
         Totals {
             peak_slosh_angle: f64::NAN,
@@ -322,7 +322,7 @@ pub struct Outcome {
     /// Exact linear plant with viscous friction for the run, from the FMU's calculated parameters.
     pub linear: Linear,
     pub totals: Totals,
-    /// Estimates from the whole record; `None` if the torque is neither sweep nor noise.
+    /// Estimates from the whole record at once, for example by `spa`; `None` if the torque is neither a sweep nor noise.
     pub record: Option<Record>,
     /// Estimates along the sweep; `None` if the torque is not a sweep.
     pub passing: Option<Passing>,
@@ -333,7 +333,7 @@ pub struct Outcome {
     pub history: History,
     pub path: SloshPath,
     pub ending: Ending,
-    /// Dominant force on the liquid if it is not gravity ([`Range::without_weight`]).
+    /// Name of the force that dominates the liquid if it is not gravity ([`Range::without_weight`]).
     pub weightless: Option<String>,
     /// Sentence about the reasons for which the tank was out of range; empty if it was not.
     pub limits: Vec<String>,
@@ -360,7 +360,7 @@ pub struct Estimate {
 pub enum Doubt {
     /// The sweep shifts the resonance by more than a quarter of its distance to the antiresonance.
     TooFast,
-    /// The record, or its lags or segments, is too short to separate them.
+    /// The record, or the lags or segments of the estimator, are too short to separate antiresonance and resonance.
     TooShort,
     Noise,
     /// Two estimates of one linear response differ by more than a quarter of the separation. After a fast
@@ -414,8 +414,8 @@ impl Estimate {
     }
 }
 
-/// Returns true if antiresonance and resonance are closer than the resolution `than`, Hz; false if either is
-/// missing.
+/// Returns true if antiresonance and resonance are closer to each other than `than`, Hz, which is the resolution. Returns
+/// false if one of the two is missing.
 fn closer(features: &Features, than: f64) -> bool {
     features.delta_f().is_some_and(|delta| delta < than)
 }
@@ -436,8 +436,8 @@ pub type Curve = Vec<(f64, f64)>;
 pub struct Record {
     pub spa: Estimate,
     pub h1: Estimate,
-    /// Signal-to-noise ratio of the rate at resonance and antiresonance of `spa`, dB, from its coherence with
-    /// the torque; `None` if `spa` has no valid ones.
+    /// Signal-to-noise ratio of the rate at resonance and at antiresonance, dB, from the coherence of the rate with the
+    /// torque; `None` if `spa` finds no valid resonance and antiresonance.
     pub snr_db: Option<[f64; 2]>,
     pub snr_over_band: Curve,
     /// A fitted transfer function, if neither `spa` nor H1 nor the passing sweep is valid.

@@ -69,10 +69,10 @@ pub enum Unusable {
     Damaged(Damage),
     #[error("file incomplete")]
     Incomplete,
-    /// The run ends early, or late: the file has `rows` rows and the whole run `expected`.
+    /// The file has `rows` rows, but the whole run has `expected` rows.
     #[error("file incomplete, {rows} rows of {expected}")]
     Rows { rows: usize, expected: usize },
-    /// The run has readings of sensors that the plan does not have.
+    /// The stored run has readings of sensors that the plan does not have.
     #[error("it has sensors")]
     Sensors,
     #[error("{0}")]

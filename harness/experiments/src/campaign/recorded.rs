@@ -28,8 +28,8 @@ const SIGNALS: [Signal; 4] = [
 const LEAST_CORRELATION: f64 = 0.9;
 /// Largest part of the run that may be missing in the recording at its ends.
 const MISSING: f64 = 0.5;
-/// Largest part of a record in gaps: lines join torque and rate alike, so that their ratio is hardly changed.
-/// Largest part of a sweep in gaps. A record that lost 3 % of its rows one by one has 6 % of its time in gaps.
+/// Largest part of a sweep in gaps. In gaps torque and rate are both interpolated linearly, which hardly changes their
+/// ratio. A record that lost 3 % of its rows one by one has 6 % of its time in gaps.
 const GAPS: f64 = 0.15;
 /// Largest relative difference of the recorder's clock from that of the torque.
 const FASTEST_CLOCK: f64 = 2e-3;
@@ -163,9 +163,9 @@ pub(super) fn table(
     Ok((step, Table::new(names, columns)))
 }
 
-/// The recorder's clock against that of the torque: the row of the record at which the torque begins,
-/// possibly before the first or between two, and the relative difference `rate` (1 + rate recorded seconds
-/// are a second of the torque).
+/// Times of a recording in terms of the commanded torque. The clock has the row at which the torque begins (it may lie
+/// before the first row or between two rows) and the relative difference `rate` of the two clocks: 1 + rate recorded
+/// seconds are one second of the torque.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Clock {
     first: f64,
@@ -181,12 +181,13 @@ struct Sought<'t> {
 }
 
 impl Sought<'_> {
-    /// Finds the sweep in a record. Returns the recorder's clock and the correlation coefficient of record
-    /// and sweep there.
+    /// Finds the sweep in a record. Returns the recorder's clock, and the correlation coefficient of record and sweep with
+    /// this clock.
     ///
-    /// A difference of 50 ppm moves the end of 2700 s by half a cycle, so the whole sweep correlates with no
-    /// stretch of the record. The phase of the record against that of the sweep, unwrapped over blocks, is 2π
-    /// f(t) (α + β t) + 2π n: the start that was missed by α, the clock by β, and n whole cycles.
+    /// A clock that is wrong by 50 ppm moves the end of a sweep of 2700 s by half a cycle, so that no stretch of the record
+    /// correlates with the whole sweep. Therefore the phase of the record relative to the sweep is measured in blocks and
+    /// unwrapped. It is 2π f(t) (α + β t) + 2π n, from which follow the error α of the start, the error β of the clock's
+    /// rate, and n whole cycles.
     fn align(&self, record: &[f64]) -> (Clock, f64) {
         let (from, to) = self.span;
         let count = ((to - from) / self.step).round() as usize;
@@ -207,8 +208,9 @@ impl Sought<'_> {
         if found > correlation { (clock, found) } else { (whole, correlation) }
     }
 
-    /// Returns true if the sweep of the other sign explains a record better. Half a cycle is a delay and a
-    /// clock that are off, to a correlation of more than 0.9, so a clock that is off is compared with it.
+    /// Returns true if the sweep with the opposite sign explains the record better than the sweep itself. Delay and clock
+    /// can compensate half a cycle, with a correlation of more than 0.9, so that the clock is fitted for the opposite sign
+    /// too before the two are compared.
     fn is_reversed(&self, record: &[f64], (clock, correlation): (Clock, f64)) -> bool {
         let is_plain = clock.rate == 0.0 && correlation > LEAST_CORRELATION;
         let reversed: Vec<f64> = record.iter().map(|tau| -tau).collect();

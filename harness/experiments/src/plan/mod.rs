@@ -313,7 +313,8 @@ impl Plan {
         self.axis_of_vary().or_else(|| self.axis_of_listed())
     }
 
-    /// Returns the number in which recordings differ most, or dwells at the onset of rotary slosh.
+    /// Returns the number in which the listed recordings (or the dwells at the onset of rotary slosh) differ most, for the
+    /// axis of figures.
     fn axis_of_listed(&self) -> Option<&str> {
         let along = |run: &&Listed| run.recording.is_some() || self.onset.is_some();
         let runs = self.listed.iter().filter(along);

@@ -75,8 +75,8 @@ impl Shape for Noise {
         self.f1
     }
 
-    /// Returns the band from the second tone on if it begins at 0, because the first tone may be at any
-    /// frequency near 0.
+    /// Returns the excited band, Hz. If the band of the noise begins at 0, the excited band begins at the second tone,
+    /// because the first tone may be at any frequency near 0.
     fn band(&self) -> Option<(f64, f64)> {
         let tone = (self.f1 - self.f0) / TONES as f64;
         Some((if self.f0 > 0.0 { self.f0 } else { tone }, self.f1))

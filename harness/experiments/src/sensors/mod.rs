@@ -237,9 +237,9 @@ impl Sensor {
         self.errors.scale * value + self.errors.bias
     }
 
-    /// Returns the readings of one channel in the rows of a run; NaN in rows without a reading. A sample is
-    /// taken in every `every`-th row and read `late` rows later. `stream` seeds the noise, so that channels
-    /// and runs have different noise.
+    /// Returns the readings of one channel in the rows of a run; NaN in rows without a reading. A sample is taken in every
+    /// `every`-th row, and its reading arrives `late` rows later. `stream` seeds the noise, so that channels and runs have
+    /// different noise.
     fn readings(&self, truth: &[f64], every: usize, late: usize, stream: &str) -> Vec<f64> {
         let Errors { noise, quantum, seed, .. } = self.errors;
         let mut random = Random::new(seed, fnv(stream));

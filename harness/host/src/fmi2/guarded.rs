@@ -12,7 +12,7 @@ const FILL: u64 = 0xa5c3_5a3c_a53c_5ac3;
 struct Guarded {
     words: Vec<u64>,
     bytes: usize,
-    /// Content before the call, if the FMU may only read the array.
+    /// Content of the array before the call, if the FMU may only read the array; otherwise `None`.
     input: Option<Vec<u8>>,
 }
 
@@ -43,7 +43,7 @@ impl Guarded {
         self.all_bytes()[MARGIN..MARGIN + self.bytes].to_vec()
     }
 
-    /// Describes writes outside the array or into a read-only array; `None` if there are none.
+    /// Describes the FMU's writes outside of the array, or to an array that it may only read; `None` if there are none.
     fn fault(&self) -> Option<String> {
         let all = self.all_bytes();
         let fill = FILL.to_ne_bytes();

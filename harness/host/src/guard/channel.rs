@@ -29,12 +29,12 @@ type End = UnixStream;
 #[cfg(not(unix))]
 type End = File;
 
-/// The parent's end.
+/// The end of the connection that the parent process holds.
 pub struct Parent {
     end: End,
     nonce: [u8; NONCE],
     bytes: Vec<u8>,
-    /// Bytes without the nonce have arrived.
+    /// True if bytes have arrived that do not begin with the nonce, so that they were not sent by our own code.
     pub is_forged: bool,
     pub is_closed: bool,
 }

@@ -25,7 +25,6 @@ pub struct Illustration {
 }
 
 impl Chapter {
-    /// Returns the chapter's title and content, and adds its figures to those of the page.
     pub(super) fn section(self, figures: &mut Figures) -> (String, Markup) {
         let mut rows = self.table.iter();
         let content = html! {

@@ -30,8 +30,8 @@ pub(super) struct Label {
     pub color: String,
 }
 
-/// Axes of a panel; `equal` gives both the same scale, and `range` is the initial range of x (`None` shows
-/// all data).
+/// One pair of axes of a figure. With `equal` both axes have the same scale; `range` is the initial range of x (`None`
+/// shows all data).
 #[derive(Clone, Default)]
 pub(super) struct Panel {
     pub x: String,

@@ -77,7 +77,7 @@ fn bode(
     ]
 }
 
-/// Draws the band of two standard deviations around a response; nothing if it is as narrow as the line.
+/// Draws the band of two standard deviations around a response, or nothing if the band would be as narrow as the line.
 fn intervals(name: &str, color: &str, estimate: &Estimate) -> Vec<serde_json::Value> {
     /// Smallest visible half-width, dB, and the largest half-width that is drawn, as standard deviation of ln
     /// |H|.

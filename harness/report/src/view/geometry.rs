@@ -99,7 +99,7 @@ fn line(points: &[[f64; 2]], x: f64) -> f64 {
     }
 }
 
-/// A slosh pendulum of a tank; `order` is the index of the mode among the modes of its direction, from 0.
+/// A slosh pendulum of a tank. `order` is the index of its mode, from 0, among the modes that move in the same direction.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pendulum {
     pub mass: f64,

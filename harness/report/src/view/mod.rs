@@ -181,8 +181,8 @@ fn coordinates(n: usize) -> [String; 2] {
     [slosh::Q_RADIAL, slosh::Q_TANGENTIAL].map(|array| array.element([n]))
 }
 
-/// Returns the radial and tangential slosh angles of HubSlosh's modes after the first, as far as they were
-/// recorded. The FMU has no outputs of these angles, so they are computed from its states.
+/// Returns the radial and tangential slosh angles of HubSlosh's second and further modes, if the states of these modes were
+/// recorded. The FMU has outputs only for the angles of the first mode, so the others are computed from the states.
 fn higher_modes(table: &Table, model: &str, modes: &[Pendulum]) -> Vec<[Vec<f64>; 2]> {
     let Some(coordinate) = Coordinate::from_model(model) else { return Vec::new() };
     let recorded = (2..).zip(&modes[1..]).map_while(|(n, mode)| {

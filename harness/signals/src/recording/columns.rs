@@ -36,9 +36,9 @@ pub const SIGNALS: [(&str, Quantity); 10] = [
     ("force", Quantity::Force),
 ];
 
-/// Returns the quantity of a signal.
+/// Returns the quantity, such as a torque or an angle, that a signal of the bench measures.
 ///
-/// # Errors If no signal has this name.
+/// # Errors If no signal of the bench has this name.
 pub fn quantity(signal: &str) -> Result<Quantity> {
     let known = SIGNALS.iter().find(|(name, _)| *name == signal).map(|(_, quantity)| *quantity);
     known.with_context(|| {

@@ -10,19 +10,19 @@ const OFF: f64 = 1e-3;
 const MISSING: f64 = 0.01;
 const MOST_ROWS: f64 = 10.0;
 
-/// Puts a table on an even time grid, and returns the step, s, with the table. Rows on the grid keep their
-/// values; between them values are interpolated linearly, also over gaps as long as few rows are missing.
-/// `done` receives messages about that.
+/// Resamples a table onto an even time grid, and returns the time step of the grid, s, with the table. Values of rows that
+/// lie on the grid are unchanged; other values are interpolated linearly, also over missing rows if these are few. `done`
+/// receives a message if values were interpolated.
 ///
-/// # Errors If time does not grow, or if too many rows are missing.
+/// # Errors If time does not increase, or if too many rows are missing.
 pub fn even(table: Table, done: &mut dyn FnMut(String)) -> Result<(f64, Table)> {
     even_with_gaps(table, MISSING, done)
 }
 
-/// Puts a table on an even grid as [`even`] does, but accepts that up to the share `most_missing` of the rows
-/// is missing.
+/// Resamples a table as [`even`] does, but accepts that up to the share `most_missing` of the rows is missing, for example
+/// 0.1 for 10 %.
 ///
-/// # Errors If time does not grow, or if more rows are missing.
+/// # Errors If time does not increase, or if more rows are missing.
 pub fn even_with_gaps(
     table: Table,
     most_missing: f64,

@@ -223,20 +223,20 @@ pub fn assigned(path: &Path, signals: &[Signal]) -> Result<Vec<(String, Option<u
     Ok(found)
 }
 
-/// Reads a recording: `time` (s) and the wanted signals that it has, in SI units. `done` receives messages
-/// about what was converted or completed.
+/// Reads a recording: the time (s) and those of the wanted signals that the file has, in SI units. `done` receives messages
+/// about values that were converted or completed.
 ///
-/// # Errors If the file cannot be read so. The error lists all faults of its columns.
+/// # Errors If the file cannot be read. The error lists all faults of its columns.
 pub fn read(path: &Path, wanted: &Wanted, done: &mut dyn FnMut(String)) -> Result<Table> {
     let name = path.display().to_string();
     let mut done = |words| done(format!("{name}: {words}"));
     with_text_file(path, |path| read_as(path, wanted, None, &mut done))
 }
 
-/// Reads a recording if it is text in columns or Parquet; `None` for other kinds, which the Python package
-/// converts. `name` is the file's name in errors, because `path` may be temporary.
+/// Reads a recording if it is text in columns or Parquet, and returns `None` for other kinds of files, which the Python
+/// package converts. `name` is the file's name in errors, because `path` may be temporary.
 ///
-/// # Errors If the file cannot be read so. The error lists all faults of its columns.
+/// # Errors If the file cannot be read. The error lists all faults of its columns.
 pub fn read_here(
     path: &Path,
     name: &Path,

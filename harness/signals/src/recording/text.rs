@@ -24,7 +24,7 @@ const COMMENTS: [&str; 3] = ["#", "%", "//"];
 /// Words for missing values, including those that C libraries and spreadsheets print for NaN.
 const MISSING: &str = "nan na n/a #n/a null none - -- nat -nan nan(ind) -nan(ind) 1.#qnan -1.#qnan 1.#ind -1.#ind #nv #div/0!";
 
-/// Reason why a field is not read, worded to follow the field.
+/// Reason why a field is not read, as a phrase that a message puts after the text of the field.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 enum Unreadable {
     #[error(
@@ -55,7 +55,7 @@ enum Value {
     Number(f64),
     Time(Moment),
     Missing,
-    /// A number or a time that can be read in two ways, or in none; the field is the reason.
+    /// A number or a time whose meaning is not unique, such as 1,234, or that cannot be read; the payload is the reason.
     Ambiguous(Unreadable),
     Other,
 }

@@ -10,7 +10,7 @@ use chrono::{DateTime, Datelike as _, NaiveDate, NaiveTime, Timelike as _};
 const SECOND: i64 = 1_000_000_000;
 const DAY: i64 = 86_400 * SECOND;
 
-/// Reason why a field is not read as a time, worded to follow the field.
+/// Reason why a field is not read as a time, as a phrase that a message puts after the text of the field.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Unreadable {
     #[error("has no date: there is no day {day} of month {month} in {year}")]

@@ -268,7 +268,7 @@ pub(super) fn factors(text: &str, dimension: Dimension) -> Vec<f64> {
     Vec::new()
 }
 
-/// Units of quantities that no signal has, to recognise a row of units.
+/// Units of quantities that the bench does not measure, such as volts. They help to recognise a row of units.
 const OTHERS: [&str; 42] = [
     "-", "1", "%", "V", "mV", "A", "mA", "W", "J", "ohm", "K", "C", "degC", "°C", "degF", "Pa",
     "hPa", "kPa", "MPa", "bar", "mbar", "psi", "Hz", "kHz", "l", "m/s", "km/h", "mph", "km", "T",

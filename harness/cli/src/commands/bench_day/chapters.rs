@@ -37,10 +37,9 @@ const CENTAUR: f64 = 2.0425;
 /// Standard gravity as in the thesis, m/s².
 const GRAVITY: f64 = 9.81;
 const POINTS: usize = 1500;
-/// Largest rate of the friction curve near zero, in Stribeck speeds ω_s.
+/// Rate up to which the report draws the friction curve near zero, in multiples of the Stribeck speed ω_s.
 const NEAR: f64 = 5.0;
-/// Longest lag of the gyro's autocorrelation, s. The next constants are the length of a chunk, s, as in the
-/// thesis, and the least number of chunks in a record.
+/// Longest lag of the gyro's autocorrelation, s.
 const LAG: f64 = 10.0;
 const CHUNK: f64 = 900.0;
 const CHUNKS: f64 = 8.0;

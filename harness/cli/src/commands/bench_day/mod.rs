@@ -48,7 +48,7 @@ struct Manifest {
     profile: String,
     #[serde(default = "models")]
     models: Vec<String>,
-    /// Relative standard deviations that no recording shows, as `identify --tolerance` takes them.
+    /// Relative standard deviations of known values, in the form of `identify --tolerance`.
     #[serde(default)]
     tolerance: String,
     /// Relative standard deviation of the gyro's scale.
