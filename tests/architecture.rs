@@ -35,7 +35,7 @@ fn the_physics_knows_no_fmi_and_the_runtime_no_physics() {
 
 /// The build is the check: without the standard library's prelude, a crate that needs it does not compile.
 #[test]
-fn the_models_and_what_they_are_made_of_need_no_standard_library() {
+fn the_models_and_their_dependencies_need_no_standard_library() {
     for krate in ["formulas", "taylor", "plant", "craft"] {
         let file = pack::root().join("fmu").join(krate).join("src/lib.rs");
         let text = fs::read_to_string(file).expect("a crate's root");
@@ -103,7 +103,7 @@ fn the_harness_never_links_a_model_and_its_packages_depend_one_way() {
 /// Otherwise `cargo run`, a test that builds the program or `pack::build_native` would compile again what
 /// `cargo test` has compiled.
 #[test]
-fn tests_and_the_python_package_turn_on_no_feature_of_what_the_program_is_made_of() {
+fn tests_and_the_python_package_enable_no_further_features_of_the_program_s_dependencies() {
     let packages = |edges: &str, selection: &[&str]| -> BTreeSet<String> {
         let mut tree = Command::new(env!("CARGO"));
         tree.current_dir(pack::root()).args(["tree", "--locked", "--offline", "--edges", edges]);
@@ -134,7 +134,7 @@ fn only_the_command_line_draws_progress() {
 
 /// Lists the files in which the workspace's `unsafe_code = "deny"` is lifted.
 #[test]
-fn unsafe_code_stands_in_the_files_of_the_c_interface() {
+fn unsafe_code_is_only_in_the_files_of_the_c_interface() {
     let root = pack::root();
     let mut found = Vec::new();
     collect(&root, &root, &mut found);
@@ -207,7 +207,7 @@ fn a_script_runs_every_test_that_is_ignored() {
 
 /// ARCHITECTURE.md and the page of decisions name a file by its path from the root, or by the end of that path.
 #[test]
-fn source_files_that_architecture_names_are_there() {
+fn source_files_named_in_the_architecture_exist() {
     let text: String = ["ARCHITECTURE.md", "book/decisions.md"]
         .map(|page| fs::read_to_string(pack::root().join(page)).expect("a page"))
         .concat();
@@ -225,7 +225,7 @@ fn source_files_that_architecture_names_are_there() {
 }
 
 #[test]
-fn tests_that_the_tuning_of_fits_names_are_there() {
+fn tests_named_in_the_tuning_of_fits_exist() {
     let mut files = Vec::new();
     collect(&pack::root(), &pack::root().join("harness/identify"), &mut files);
     let read = |name: &str| fs::read_to_string(pack::root().join(name)).expect("a source file");

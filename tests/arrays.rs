@@ -278,7 +278,7 @@ fn inputs(opened: &Opened) -> Vec<String> {
 }
 
 #[test]
-fn the_fmu_with_arrays_steps_to_the_bits_of_that_with_scalars() {
+fn an_fmu_with_arrays_steps_bit_identically_to_one_with_scalars() {
     for case in cases() {
         let opened = [Fmi::V3Arrays, Fmi::V3].map(|fmi| Opened::new(case.model, fmi));
         assert_eq!(opened[0].fmu.binary_hash(), opened[1].fmu.binary_hash(), "one library");

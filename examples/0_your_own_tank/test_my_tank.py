@@ -17,7 +17,7 @@ def test_rigid_liquid_ends_at_rest_and_sloshing_liquid_does_not(fmu: str) -> Non
     assert MY_TANK["friction.model"] == "none"
 
 
-def test_the_summary_says_if_the_liquid_leaves_the_range_of_its_model(
+def test_the_summary_reports_that_the_liquid_leaves_the_range_of_its_model(
     fmu: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A hundredth of the thrust makes the wave so large that the picture must not be trusted."""

@@ -26,7 +26,7 @@ def test_the_lumped_coupling_converges_with_the_step(both: Path | None) -> None:
     assert errors == pytest.approx([4.5e-4, 2.2e-4, 1.1e-4], rel=0.03)
 
 
-def test_the_wrench_as_it_is_diverges(both: Path | None) -> None:
+def test_coupling_by_the_total_wrench_diverges(both: Path | None) -> None:
     """Within a second at 20 ms; the FMU says that the bobs swing over."""
     with pytest.warns(FmuWarning, match="leaves its range"):
         assert coupled(both, STEPS[1], wrench=True)["time"].iloc[-1] < 1.0

@@ -13,7 +13,7 @@ def check(path: str | Path) -> float:
     copies, period, n = np.repeat(np.arange(len(c["counts"])), c["counts"]), c["period"], 9
     same = copies[:, None] == copies
     if (c["D"][:, ~same] != 0).any() or (c["G"][:, ~same] != 0).any():
-        raise ValueError("a scaling does not commute with Δ")
+        raise ValueError("a scaling matrix D does not commute with Δ")
     if any(not np.allclose(x, x.conj().swapaxes(1, 2), 1e-12, 0) for x in (c["D"], c["G"])):
         raise ValueError("a scaling is not Hermitian")
     if np.linalg.eigvalsh(c["D"]).min() <= 0:

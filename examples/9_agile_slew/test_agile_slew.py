@@ -19,7 +19,7 @@ def test_inertias_equal_those_of_all_liquid_and_of_the_rigid_part(spacecraft: st
     assert Observer(spacecraft, FREQUENCY).inertia == pytest.approx(RIGID - 17.5, rel=1e-12)
 
 
-def test_the_observer_gives_back_what_slosh_takes(spacecraft: str) -> None:
+def test_the_observer_compensates_the_slosh_torque(spacecraft: str) -> None:
     """The noise of the gyro, the same each time, is a tenth of what is left."""
     rigid, sloshing = slew(spacecraft, slosh=False, stop=100), slew(spacecraft)
     observed = slew(spacecraft, observe=True, stop=100)

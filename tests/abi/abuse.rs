@@ -178,7 +178,7 @@ fn a_whole_life(fmi: Fmi, share: Share) {
 }
 
 #[test]
-fn a_c_host_lives_through_everything_and_nothing_is_left_behind() {
+fn a_c_host_survives_every_wrong_call_and_no_memory_is_leaked() {
     for fmi in VERSIONS {
         a_whole_life(fmi, PART);
     }

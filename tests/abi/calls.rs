@@ -212,7 +212,7 @@ fn binary_says_that_it_is_fmi_2_with_the_standard_s_types() {
 }
 
 #[test]
-fn functions_that_are_not_offered_say_so() {
+fn functions_that_are_not_supported_return_an_error_with_a_message() {
     let fmu = open();
     let mut instance = stepping(&fmu, &[]);
     refused(instance.cancel_step(), &["no step is running"]);
@@ -224,7 +224,7 @@ fn functions_that_are_not_offered_say_so() {
 // ---- Loading, copies, threads ----
 
 #[test]
-fn survives_loading_and_unloading_many_times() {
+fn the_binary_can_be_loaded_and_unloaded_many_times() {
     for _ in 0..200 {
         let fmu = open();
         let mut instance = stepping(&fmu, &[]);
@@ -397,7 +397,7 @@ fn messages_are_proper_text_in_a_declared_category() {
 }
 
 #[test]
-fn a_percent_sign_is_text_and_no_format() {
+fn a_percent_sign_in_a_message_is_not_a_printf_format() {
     let fmu = open();
     let mut instance = fmu.instantiate("one").unwrap();
     let text = "%s%s%s%n%d %";
@@ -444,7 +444,7 @@ fn stick_and_slip_are_logged_on_request() {
 /// A host with logging on that sets a tolerance receives no message and no warning, because some hosts take
 /// everything except fmi2OK for a failure.
 #[test]
-fn normal_use_is_silent() {
+fn a_correct_run_logs_no_message() {
     let fmu = open();
     let mut instance = fmu.instantiate("one").unwrap();
     for (name, value) in LIVELY {
@@ -520,7 +520,7 @@ fn parameters_and_inputs_can_be_set_before_and_after_setup_experiment() {
 }
 
 #[test]
-fn setup_experiment_may_be_left_out() {
+fn fmi2_setup_experiment_may_be_left_out() {
     let fmu = open();
     let mut instance = fmu.instantiate("one").unwrap();
     instance.enter_initialization_mode().unwrap();
@@ -683,7 +683,7 @@ fn a_step_past_the_stop_time_is_refused() {
 
 /// All times are exact, because they are multiples of powers of two.
 #[test]
-fn the_time_of_the_start_does_not_matter() {
+fn the_motion_does_not_depend_on_the_start_time() {
     let fmu = open();
     let run = |start: f64| {
         let mut instance = stepping_from(&fmu, start, None, &[("init.slosh_angle", "0.2")]);

@@ -332,7 +332,7 @@ fn specific_force_may_run_down_to_nothing_but_not_below() {
 }
 
 #[test]
-fn reset_is_a_fresh_instance() {
+fn a_reset_instance_equals_a_new_one() {
     let expected = to_bytes(&fresh());
     let mut instance = lively(4, 4);
     instance.do_step(0.0, 0.5).unwrap();
@@ -375,7 +375,7 @@ fn after_a_panic_every_call_is_fatal() {
 /// Tests every model bit for bit, in memory and through bytes, in the same instance and in one that was only
 /// created.
 #[test]
-fn restored_state_continues_as_if_nothing_had_happened() {
+fn a_restored_state_continues_bit_identically() {
     for slosh_model in items("slosh.model") {
         for friction_model in items("friction.model") {
             let mut original = lively(slosh_model, friction_model);
@@ -525,7 +525,7 @@ fn random_calls_never_panic() {
 }
 
 #[test]
-fn state_can_be_saved_in_every_state_of_life() {
+fn a_state_can_be_saved_in_every_instance_state() {
     let mut initializing = fresh();
     set(&mut initializing, &[("tank.h", Value::Real(-1.0))]);
     initializing.enter_initialization_mode().unwrap();
@@ -1049,7 +1049,7 @@ fn no_variable_depends_on_a_continuous_state_that_it_does_not_list() {
 
 /// OpenModelica's import, ecos and libcosim set no enumerations; OMSimulator sets none called model.
 #[test]
-fn integer_kinds_have_the_effect_of_the_enumerations() {
+fn integer_twins_have_the_effect_of_the_enumerations() {
     for (kind, model) in [("slosh.kind", "slosh.model"), ("friction.kind", "friction.model")] {
         for n in items(model) {
             let motion = |name: &str| {
@@ -1075,7 +1075,7 @@ fn integer_kinds_have_the_effect_of_the_enumerations() {
 
 /// OpenModelica up to 1.27 sets Booleans to noise.
 #[test]
-fn integer_kinds_override_the_booleans() {
+fn integer_twins_override_the_booleans() {
     for name in ["slosh.zeta_from_correlation", "slosh.capillarity", "wheel.enabled", "imu.enabled"]
     {
         let kind = format!("{name}_kind");

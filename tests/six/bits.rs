@@ -68,7 +68,7 @@ fn compare(what: &str, p: &Parameters, input: impl Fn(usize) -> Inputs, count: u
 /// Tests craft that are free or on a pivot, round and planar modes, surfaces other than spheres, every
 /// damping law, and draining.
 #[test]
-fn random_craft_have_the_bits_of_the_crate() {
+fn the_fmu_and_the_crate_move_random_craft_bit_identically() {
     for seed in 0..40 {
         let mut random = Random::new(seed);
         let mut p = random.parameters();
@@ -109,7 +109,7 @@ fn random_craft_have_the_bits_of_the_crate() {
 /// The records' inputs bring both craft to the same place; the crate's test `reference` compares that with
 /// the records.
 #[test]
-fn spacecraft_has_the_bits_of_the_crate_in_every_reference_record() {
+fn spacecraft_equals_the_crate_bit_for_bit_in_every_reference_record() {
     for record in &records("craft") {
         let (last, _) = steps(record);
         let name = record["name"].as_str().unwrap();
@@ -148,9 +148,9 @@ fn compare_tank(
 }
 
 /// Tests every coupling, with and without a host, with the variety of
-/// [`random_craft_have_the_bits_of_the_crate`].
+/// [`the_fmu_and_the_crate_move_random_craft_bit_identically`].
 #[test]
-fn random_tanks_have_the_bits_of_the_crate() {
+fn the_fmu_and_the_crate_move_random_tanks_bit_identically() {
     for seed in 0..36 {
         let mut random = Random::new(seed);
         let mut p = TankParameters {
@@ -187,7 +187,7 @@ fn random_tanks_have_the_bits_of_the_crate() {
 
 /// Tests tanks in the same way as craft.
 #[test]
-fn slosh_tank_has_the_bits_of_the_crate_in_every_reference_record() {
+fn slosh_tank_equals_the_crate_bit_for_bit_in_every_reference_record() {
     for record in &records("tank") {
         let (last, _) = steps(record);
         let name = record["name"].as_str().unwrap();

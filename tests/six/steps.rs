@@ -269,7 +269,7 @@ fn detached_liquid_gives_its_host_the_impulses_of_the_crate() {
 /// `canInterpolateInputs` refers to all Real inputs, so hosts set the derivatives of all. The derivative of
 /// omega is accepted without effect, because omega changes within the step by omega_dot.
 #[test]
-fn a_derivative_that_is_set_for_omega_is_taken_and_changes_no_bit() {
+fn an_input_derivative_set_for_omega_is_accepted_and_ignored() {
     let table = &::SloshTank::table::TABLE;
     let find = |name: &str| table.find(name).unwrap();
     let run = |slope: Option<f64>| {

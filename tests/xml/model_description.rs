@@ -129,7 +129,7 @@ fn names_and_value_references_are_unique() {
 
 /// Simulink turns dotted ports into buses, and cuts names of parameters after 55 characters.
 #[test]
-fn ports_have_flat_names_and_parameters_short_ones() {
+fn inputs_and_outputs_have_names_without_dots_and_parameters_short_names() {
     for (variable, _) in variables() {
         let name = variable.get("name").unwrap();
         match variable.get("causality").unwrap() {
@@ -309,7 +309,7 @@ fn dependencies_are_always_given_and_point_to_what_the_host_sets() {
 }
 
 #[test]
-fn every_name_in_the_table_s_dependencies_means_something() {
+fn every_name_in_the_table_s_dependencies_is_a_variable() {
     for variable in TABLE.variables {
         for name in variable.depends_on {
             let family = name.split('[').next().unwrap();

@@ -407,7 +407,7 @@ mod tests {
     }
 
     #[test]
-    fn correlations_are_held_at_the_ends_of_their_range() {
+    fn correlations_beyond_their_range_keep_the_value_at_its_end() {
         let sphere = |x: f64| sphere(1.0, x, 1e-6, 9.81);
         assert_eq!((sphere(0.01), sphere(1.99)), (sphere(0.1), sphere(1.9)));
         assert!(sphere(0.11) < sphere(0.1) && sphere(1.89) != sphere(1.9));
@@ -432,7 +432,7 @@ mod tests {
     }
 
     #[test]
-    fn the_ring_has_the_damping_of_miles() {
+    fn a_ring_baffle_has_the_damping_of_miles_s_formula() {
         let zeta = miles_ring(1.0, 0.1, 0.1, 0.04);
         assert!((zeta / (2.83 * 0.63128 * 0.082819 * 0.2) - 1.0).abs() < 1e-4, "{zeta}");
         assert!((motion_at_ring(2.0, 0.2) / 0.83194 - 1.0).abs() < 1e-4);
@@ -477,7 +477,7 @@ mod tests {
     }
 
     #[test]
-    fn a_low_bond_number_adds_its_contact_line() {
+    fn at_low_bond_numbers_the_contact_line_adds_damping() {
         let zeta = low_bond_cylinder(1.0, 1e-4, 4.0, 32.0);
         assert!(
             (zeta / (0.83 * 0.01 / sqrt(2.0) * (1.0 + 8.2 / 8.0)) - 1.0).abs() < 1e-14,

@@ -248,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn steep_slopes_are_held_at_their_limits() {
+    fn steep_slopes_are_limited() {
         // secants 1 and 10 alternate; each slope at most 2.4 of the smaller one
         let (x, y) = ([0.0, 1.0, 2.0, 3.0, 4.0], [0.0, 10.0, 11.0, 21.0, 22.0]);
         let (slope, _) = found(x, y, true);
@@ -268,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn a_quintic_has_what_is_given_at_its_ends() {
+    fn a_quintic_has_the_given_values_and_derivatives_at_its_ends() {
         let (left, right) = ([1.25, -0.5, 3.0], [2.0, 0.75, -1.5]);
         let c = quintic(0.5, left, right);
         let sum = |f: &dyn Fn(f64) -> f64| {

@@ -140,7 +140,7 @@ fn trajectory() -> Vec<(Vec<u64>, Vec<Value>)> {
 }
 
 #[test]
-fn plain_cosimulation_gives_the_bits_of_fmi_2() {
+fn fmi_3_without_event_mode_gives_bit_identical_results_to_fmi_2() {
     let expected = trajectory();
     for stops in [false, true] {
         let mut three: Three = initialised(Events::InStep, LIVELY);
@@ -254,7 +254,7 @@ fn steps_stop_at_the_event_time_of_fmi_2_to_the_last_bit() {
 }
 
 #[test]
-fn torque_that_breaks_stiction_in_event_mode_is_slip_after_it() {
+fn torque_set_in_event_mode_that_breaks_stiction_makes_the_hub_slip() {
     let values = [("slosh.model", Value::Integer(1))];
     let mut three: Three = initialised(Events::Reported, &values);
     handle(&mut three);
@@ -282,7 +282,7 @@ fn torque_that_breaks_stiction_in_event_mode_is_slip_after_it() {
 }
 
 #[test]
-fn a_state_saved_at_an_event_goes_on_as_if_nothing_had_happened() {
+fn a_state_saved_at_an_event_continues_the_same_motion() {
     let mut three: Three = initialised(Events::Reported, LIVELY);
     handle(&mut three);
     set(&mut three, "tau_cmd", Value::Real(0.03));
@@ -324,7 +324,7 @@ fn a_step_with_too_much_work_is_discarded_and_a_shorter_one_goes_on() {
 }
 
 #[test]
-fn reset_is_a_fresh_instance_however_events_are_handled() {
+fn a_reset_instance_equals_a_new_one_whoever_handles_events() {
     for events in [Events::InStep, Events::Reported] {
         let fresh: Three = Instance::with_events(Interface::CoSimulation, events);
         let mut three: Three = initialised(events, LIVELY);
@@ -369,7 +369,7 @@ fn held_g<V: Version>(start: f64, at: impl Fn(usize, f64) -> f64) -> [f64; 2] {
 /// The reference adds up its steps as the FMU does. In earlier versions the work was off by up to 1.5e-4 J,
 /// and at 1e9 s samples were a step late.
 #[test]
-fn work_of_g_and_the_gyro_are_the_same_on_every_clock_of_a_host() {
+fn work_by_g_axial_and_gyro_samples_do_not_depend_on_rounding_of_the_host_clock() {
     fn compare<V: Version>() {
         let exact = held_g::<V>(0.0, |_, time| time);
         assert!(exact[0].abs() > 1e-3 && exact[1] != 0.0, "{exact:?}");

@@ -374,7 +374,7 @@ mod tests {
     }
 
     #[test]
-    fn time_at_rest_runs_while_the_hub_sticks_at_a_rate_that_depends_on_nothing() {
+    fn time_in_stiction_grows_by_one_second_per_second_while_the_hub_sticks() {
         for (omega, rate) in [(0.0, 1.0), (0.07, 0.0)] {
             let mut p = Parameters::default();
             (p.slosh.model, p.friction.model) = (SloshModel::Frozen, FrictionModel::Stribeck);

@@ -240,7 +240,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_valid_saved_words_restore_the_state() {
+    fn only_valid_saved_data_restores_the_state() {
         let state = State {
             time: 1.5,
             x: core::array::from_fn(|i| i as f64 - 3.0),

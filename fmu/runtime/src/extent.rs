@@ -266,7 +266,7 @@ mod tests {
 
     /// Three trays at most: levels are states, one each; the table's start value of the number is 2.
     #[test]
-    fn a_token_says_how_many_states_there_are() {
+    fn a_token_contains_the_number_of_states() {
         assert_eq!(Trays::table().sizes(), [("rows", 3)]);
         let extent = extent_with("10010000").unwrap();
         assert_eq!((extent.places(), &extent.starts()[0]), (&[0][..], &Value::Integer(1)));

@@ -1020,7 +1020,9 @@ impl<M: Model, V: Version> Instance<M, V> {
     /// If a call of the host has failed meanwhile.
     pub(crate) fn leave_intermediate(&mut self, call: &Call) -> Result<(), Fault> {
         if self.state != InstanceState::Intermediate {
-            return Err(call.error("a call of the host's failed within the intermediate update"));
+            return Err(
+                call.error("a call that the host made within the intermediate update has failed")
+            );
         }
         self.state = InstanceState::Stepping;
         Ok(())
@@ -1313,7 +1315,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         }
         if saved.events != self.events {
             return Err(call.error(
-                "the state is of an instance whose host handles events otherwise: eventModeUsed must be the same",
+                "the state was saved by an instance with another eventModeUsed (allowed: the same value)",
             ));
         }
         self.check_layout(call, saved)?;
@@ -1325,7 +1327,7 @@ impl<M: Model, V: Version> Instance<M, V> {
     pub(crate) fn check_layout(&self, call: &Call, saved: &Self) -> Result<(), Fault> {
         if saved.layout != self.layout {
             return Err(call.error(
-                "the state is of this library's other FMU 3.0: variables are scalars in one, arrays in the other",
+                "the state was saved by another FMU 3.0 with the same binary: its variables are scalars where those of this FMU are arrays, or the reverse",
             ));
         }
         if saved.token() != self.token() {

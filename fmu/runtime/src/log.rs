@@ -153,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn only_the_categories_asked_for_are_wanted() {
+    fn only_requested_log_categories_are_logged() {
         let filter = spring_filter(&["logStatusFatal".into()]).unwrap();
         assert!(filter.wants(Topic::Failure(Severity::Fatal)));
         assert!(!filter.wants(Topic::Failure(Severity::Error)));

@@ -149,7 +149,11 @@ pub fn from_bytes<M: Model, V: Version>(bytes: &[u8]) -> Result<Instance<M, V>, 
     let interface = match interface {
         0 => Interface::ModelExchange,
         1 => Interface::CoSimulation,
-        _ => return Err("the saved state is damaged: no such interface".into()),
+        _ => {
+            return Err(
+                "the saved state is damaged: it names an interface that does not exist".into()
+            );
+        }
     };
     let events = Events::ALL.get(usize::from(events)).copied();
     let events = events.filter(|events| V::allows(interface, *events));
@@ -169,7 +173,7 @@ pub fn from_bytes<M: Model, V: Version>(bytes: &[u8]) -> Result<Instance<M, V>, 
     saved.clock.time = rest.finite("time")?;
     saved.clock.last_event = rest.finite("last event")?;
     if !TOLERANCES.contains(&saved.tolerance) {
-        return Err("the saved state is damaged: tolerance".into());
+        return Err("the saved state is damaged: its tolerance is out of range".into());
     }
     for (scalar, value) in table.parameters().iter().zip(&mut saved.parameters) {
         *value = rest.value(scalar, *value)?;

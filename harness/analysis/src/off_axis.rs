@@ -95,7 +95,7 @@ mod tests {
     use signals::fourier::Complex64;
 
     #[test]
-    fn a_rate_of_a_tenth_about_each_other_axis_is_a_cef_of_a_fiftieth() {
+    fn rates_of_a_tenth_about_two_other_axes_give_a_cross_axis_energy_fraction_of_a_fiftieth() {
         let response = |size: f64| FrequencyResponse {
             frequency: vec![1.0; 4],
             response: vec![Complex64::new(0.0, size); 4],

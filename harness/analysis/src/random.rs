@@ -57,7 +57,7 @@ mod tests {
     }
 
     #[test]
-    fn streams_of_one_seed_are_not_alike() {
+    fn streams_of_one_seed_differ() {
         let streams: Vec<Vec<f64>> = (0..4)
             .map(|stream| {
                 let mut random = Random::new(1, stream);

@@ -390,7 +390,7 @@ mod tests {
     }
 
     #[test]
-    fn fits_are_100_for_the_truth_and_0_for_the_mean() {
+    fn the_fit_is_100_percent_for_the_signal_itself_and_0_for_its_mean() {
         let y = [1.0, 2.0, 4.0, 5.0];
         assert_eq!(fit_time(&y, &y), 100.0);
         assert_eq!(fit_time(&y, &[3.0; 4]), 0.0);

@@ -70,7 +70,7 @@ impl Archive {
             } else if let Err(why) = archive.unpack(&from, entry, &mut unpacked.content) {
                 let error = why.downcast_ref::<std::io::Error>();
                 if error.is_some_and(|e| e.kind() == std::io::ErrorKind::StorageFull) {
-                    return Err(why).context("no room to unpack the FMU");
+                    return Err(why).context("there is no space on the disk to unpack the FMU");
                 }
                 unpacked.fault = Some(format!("{why:#}"));
             }
@@ -260,7 +260,7 @@ pub fn description_first(archive: &Archive, findings: &mut Findings) {
 pub fn documentation(archive: &Archive, findings: &mut Findings) {
     match archive.file(INDEX) {
         None if archive.entries.iter().any(|entry| entry.name == INDEX) => {
-            findings.skip("it cannot be unpacked");
+            findings.skip("the FMU cannot be unpacked");
         }
         None => findings.at(INDEX).add("it is missing"),
         Some(page) if page.iter().all(u8::is_ascii_whitespace) => {

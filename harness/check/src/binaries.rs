@@ -317,7 +317,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn folders_are_platforms_tuples_or_a_vendors_own() {
+    fn binary_folders_are_recognised_as_platforms_tuples_or_vendor_names() {
         for (folder, ending, kind) in [
             ("linux64", ".so", Some(Kind::Linux)),
             ("win32", ".dll", None),

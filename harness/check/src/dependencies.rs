@@ -209,7 +209,7 @@ fn observe(fmu: &FmuUnderTest, wanted: &BTreeSet<(usize, usize)>) -> Result<Seen
     let lists: Vec<&Unknown> = d.outputs.iter().chain(&d.derivatives).collect();
     let unknowns: Vec<&Variable> = lists.iter().filter_map(|u| d.at(u.index)).collect();
     if unknowns.is_empty() {
-        return skip("it has neither outputs nor derivatives");
+        return skip("the FMU has neither outputs nor derivatives");
     }
     let exchange = fmu.interfaces().contains(&Interface::ModelExchange);
     let interface = if exchange { Interface::ModelExchange } else { fmu.first_interface()? };
@@ -282,7 +282,7 @@ pub fn initial(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let lists: Vec<&Unknown> = d.initial_unknowns.iter().collect();
     let unknowns: Vec<&Variable> = lists.iter().filter_map(|u| d.at(u.index)).collect();
     if unknowns.is_empty() {
-        return skip("it has no InitialUnknowns");
+        return skip("the FMU has no InitialUnknowns");
     }
     let knowns: Vec<_> = fmu.variables().iter().filter(|v| v.is_set_by_hosts()).collect();
     let interface = fmu.first_interface()?;

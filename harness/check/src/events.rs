@@ -103,7 +103,7 @@ fn missed_event<'f>(
 pub fn values_changed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     continuous(fmu)?;
     if fmu.states().is_empty() {
-        return skip("it has no continuous states");
+        return skip("the FMU has no continuous states");
     }
     for start in 0..STARTS {
         let mut session = random_session(fmu, Interface::ModelExchange, start)?;

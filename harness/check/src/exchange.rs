@@ -10,7 +10,7 @@ use super::under_test::{FmuUnderTest, Interface, Life, Reading, STEPS, Session, 
 /// Returns an instance in continuous-time mode, or skips the rule if the FMU has no Model Exchange.
 pub fn continuous(fmu: &FmuUnderTest) -> Result<Session<'_>> {
     if !fmu.interfaces().contains(&Interface::ModelExchange) {
-        return skip("it offers no Model Exchange");
+        return skip("the FMU offers no Model Exchange");
     }
     fmu.running(Interface::ModelExchange)
 }
@@ -48,7 +48,7 @@ pub fn next_event_time(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()
 
 pub fn terminate_simulation(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     if !fmu.interfaces().contains(&Interface::ModelExchange) {
-        return skip("it offers no Model Exchange");
+        return skip("the FMU offers no Model Exchange");
     }
     let mut session = fmu.session(Interface::ModelExchange)?;
     session.initialise()?;
@@ -122,7 +122,7 @@ pub fn variables(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let mut session = continuous(fmu)?;
     let states = fmu.states();
     if states.is_empty() {
-        return skip("it has no continuous states");
+        return skip("the FMU has no continuous states");
     }
     session.advance(3)?;
     let (mut x, mut dx) = (vec![0.0; states.len()], vec![0.0; states.len()]);

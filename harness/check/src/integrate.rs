@@ -60,7 +60,7 @@ enum Impossible {
     Derivative { index: usize, value: f64 },
     #[error("{0}")]
     Discarded(CallError),
-    #[error("the error of the step is {0:.1e} times what is allowed")]
+    #[error("the error of the step is {0:.1e} times the allowed error")]
     Inexact(f64),
 }
 

@@ -149,13 +149,13 @@ pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) ->
         (_, Some(d))
             if !["CoSimulation", "ModelExchange"].iter().any(|i| d.interface(i).is_some()) =>
         {
-            Err("it offers neither Co-Simulation nor Model Exchange, and the check calls no other interface".into())
+            Err("the FMU offers neither Co-Simulation nor Model Exchange, and the check calls no other interface".into())
         }
         (_, Some(d)) if d.has_clocks() && d.interface("ModelExchange").is_none() => {
-            Err("it has clocks, and the check does not call Co-Simulation of FMUs with clocks".into())
+            Err("the FMU has clocks, and the check does not call Co-Simulation of FMUs with clocks".into())
         }
         _ if binaries.own().is_none() => {
-            Err(format!("it has no binary for this platform, {}", binaries.own_folder()))
+            Err(format!("the FMU has no binary for this platform, {}", binaries.own_folder()))
         }
         (Ok(description), _) => Ok(&description.root),
     };
@@ -176,7 +176,7 @@ pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) ->
             (Check::Binaries(check), _) => check(&binaries, &mut findings),
             (Check::Description3(check), _) => match &third {
                 Some(description) => check(description, &mut findings),
-                None => findings.skip("it is not an FMU 3.0"),
+                None => findings.skip("the file is not an FMU 3.0"),
             },
             (Check::Calls(_) | Check::Calls3(_), _) => {
                 match &callable {
@@ -208,7 +208,9 @@ pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) ->
         {
             outcomes.retain(|outcome| outcome.rule.id != rule.id);
             let mut findings = Findings::new(rule.severity);
-            findings.at("the archive").fail(format!("it cannot be opened as an FMU: {why}"));
+            findings
+                .at("the archive")
+                .fail(format!("the archive cannot be opened as an FMU: {why}"));
             outcomes.push(Outcome { rule, findings, time: Duration::ZERO });
         }
         let place = |outcome: &Outcome| table.iter().position(|rule| rule.id == outcome.rule.id);
@@ -343,7 +345,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rules_have_names_of_their_own_and_stand_in_groups() {
+    fn rule_names_are_unique_and_rules_of_a_group_are_adjacent() {
         for rules in [RULES, fmi3::RULES] {
             let names: BTreeSet<_> = rules.iter().map(|rule| rule.id).collect();
             assert_eq!(names.len(), rules.len());
@@ -356,7 +358,7 @@ mod tests {
     }
 
     #[test]
-    fn a_group_means_its_rules_and_no_others() {
+    fn selecting_a_group_selects_exactly_its_rules() {
         let rule = |id| RULES.iter().find(|rule| rule.id == id).unwrap();
         assert!(is_selected(rule("zip.names"), "zip"));
         assert!(is_selected(rule("zip.names"), "zip.names"));

@@ -132,7 +132,7 @@ pub fn arguments_null(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
 pub fn resources(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let resources = fmu.directory().join("resources");
     if !resources.is_dir() {
-        return skip("it has no resources");
+        return skip("the FMU has no resources");
     }
     let interface = fmu.first_interface()?;
     let run = |location: Option<&str>| -> Result<Vec<Reading>> {

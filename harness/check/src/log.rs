@@ -66,7 +66,7 @@ pub fn categories<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> 
 pub fn text(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let (messages, _) = fmu.provoke_messages()?;
     if messages.is_empty() {
-        findings.skip("it logs nothing");
+        findings.skip("the FMU logs nothing");
     }
     for message in messages {
         let text = &message.text;
@@ -127,7 +127,7 @@ pub fn environment(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let runs: Result<Vec<_>> = runs.collect();
     match foreign_environments() {
         0 if provoke_messages?.0.is_empty() & runs?.iter().all(Vec::is_empty) => {
-            findings.skip("it logs nothing");
+            findings.skip("the FMU logs nothing");
         }
         0 => {}
         n => findings.at("the logger").add(format!(

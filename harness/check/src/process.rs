@@ -196,7 +196,8 @@ pub fn check_in_child(id: &str, fmu: Unpacked, limit: Duration) -> Result<()> {
     let Unpacked { path, directory, description } = fmu;
     // The description is needed until the process ends.
     let mut packed: &'static [u8] = std::fs::read(description)?.leak();
-    let root = Element::unpack(&mut packed).context("the packed description has changed")?;
+    let root = Element::unpack(&mut packed)
+        .context("the file with the parsed description has changed since it was written")?;
     let is_fmi3 = root.get("fmiVersion").is_some_and(|version| version.starts_with("3."));
     let rules = if is_fmi3 { super::rules::fmi3::RULES } else { RULES };
     let rule = rules.iter().find(|rule| rule.id == id).context("no such rule")?;
@@ -218,7 +219,7 @@ pub fn check_in_child(id: &str, fmu: Unpacked, limit: Duration) -> Result<()> {
     };
     let lost = |error: anyhow::Error, findings: &mut Findings| match rule.id == OPENS {
         true => findings.at("the binary").add(format!("{error:#}")),
-        false => findings.skip(format!("it cannot be loaded: {error:#}")),
+        false => findings.skip(format!("the FMU cannot be loaded: {error:#}")),
     };
     match rule.check {
         Check::Calls(check) => {
@@ -243,7 +244,7 @@ pub fn check_in_child(id: &str, fmu: Unpacked, limit: Duration) -> Result<()> {
                 subject.announce("unloading the library");
             }
         },
-        _ => anyhow::bail!("{id} makes no calls"),
+        _ => anyhow::bail!("the rule {id} makes no calls of the binary"),
     }
     trace::done(findings)
 }

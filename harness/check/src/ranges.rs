@@ -116,7 +116,7 @@ pub fn items_known(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let all: Vec<&Variable> =
         fmu.variables().iter().filter(|v| v.kind == Type::Enumeration).collect();
     if all.is_empty() {
-        return skip("it has no enumerations");
+        return skip("the FMU has no enumerations");
     }
     fmu.chose_values();
     for v in all.iter().filter(|v| v.is_set_by_hosts() && start_value(v).is_some()) {

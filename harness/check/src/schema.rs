@@ -418,7 +418,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn times_equal_those_of_xml() {
+    fn times_are_read_as_xml_date_times() {
         for right in [
             "2026-01-31T12:00:00Z",
             "2026-01-31T12:00:00.25+01:00",

@@ -16,7 +16,7 @@ use host::fmi2::{CallError, Status};
 /// Returns an initialised instance for Co-Simulation, or skips the rule if the FMU has no Co-Simulation.
 fn stepping(fmu: &FmuUnderTest) -> Result<Session<'_>> {
     if !fmu.interfaces().contains(&Interface::CoSimulation) {
-        return skip("it offers no Co-Simulation");
+        return skip("the FMU offers no Co-Simulation");
     }
     fmu.running(Interface::CoSimulation)
 }
@@ -288,7 +288,7 @@ pub fn lag(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         Err(error) => match error.downcast::<Unusable>() {
             Ok(unusable) => return Err(unusable.into()),
             Err(_) => {
-                return skip("it refuses steps of half and of twice the usual size");
+                return skip("the FMU refuses steps of half and of twice the usual size");
             }
         },
     };
@@ -325,7 +325,7 @@ pub fn inputs(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let inputs: Vec<_> =
         fmu.variables().iter().filter(|v| v.causality == Causality::Input && v.is_real()).collect();
     if inputs.is_empty() {
-        return skip("it has no Real inputs");
+        return skip("the FMU has no Real inputs");
     }
     for v in &inputs {
         let mut session = fmu.running(Interface::CoSimulation)?;
@@ -422,7 +422,7 @@ pub fn input_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<
         ));
     }
     if !any {
-        findings.skip("it has no continuous inputs that can be moved");
+        findings.skip("the FMU has no continuous inputs that can be moved");
     }
     Ok(())
 }

@@ -80,7 +80,7 @@ pub fn can_be_set(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         }
     }
     if !any {
-        findings.skip("it has no tunable parameters");
+        findings.skip("the FMU has no tunable parameters");
     }
     Ok(())
 }
@@ -145,7 +145,7 @@ pub fn acts(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         }
     }
     if !any {
-        findings.skip("it has no tunable parameters");
+        findings.skip("the FMU has no tunable parameters");
     }
     Ok(())
 }

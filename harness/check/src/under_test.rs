@@ -101,7 +101,7 @@ impl FmuUnderTest {
     pub fn first_interface(&self) -> Result<Interface> {
         let why = || Unusable {
             rule: "load.instance",
-            why: "it offers no interface that can be called".into(),
+            why: "the FMU offers no interface that can be called".into(),
         };
         Ok(*self.interfaces().first().ok_or_else(why)?)
     }
@@ -248,7 +248,8 @@ impl FmuUnderTest {
             Stage::Initialised | Stage::Terminated => {
                 session.initialise()?;
                 if session.is_ended() {
-                    let why = "it asks for the end of the simulation when it is initialised".into();
+                    let why =
+                        "the FMU asks for the end of the simulation when it is initialised".into();
                     return Err(Unusable { rule: "exchange.terminate_simulation", why }.into());
                 }
                 if stage == Stage::Terminated {

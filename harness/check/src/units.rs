@@ -381,7 +381,7 @@ mod tests {
     }
 
     #[test]
-    fn names_are_read_as_modelica_writes_them() {
+    fn unit_names_are_read_by_the_rules_of_modelica() {
         assert_eq!(one("N.m").exponents, [1, 2, -2, 0, 0, 0, 0, 0]);
         assert_eq!(one("kg.m2/s2"), one("J"));
         assert_eq!(one("W/(m2.K)").exponents, [1, 0, -3, 0, -1, 0, 0, 0]);

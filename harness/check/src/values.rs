@@ -99,7 +99,7 @@ pub fn booleans(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let mut session = initializing(fmu)?;
     let all: Vec<_> = fmu.variables().iter().filter(|v| v.kind == Type::Boolean).collect();
     if all.is_empty() {
-        findings.skip("it has no Booleans");
+        findings.skip("the FMU has no Booleans");
     }
     for v in all {
         fmu.announce(format!("reading and setting {}", v.name));
@@ -301,7 +301,7 @@ pub fn fixed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         }
     }
     if !any {
-        findings.skip("it has no fixed parameters");
+        findings.skip("the FMU has no fixed parameters");
     }
     Ok(())
 }

@@ -370,7 +370,7 @@ mod tests {
     }
 
     #[test]
-    fn arrays_are_whole_from_index_1_to_the_last() {
+    fn an_array_is_complete_if_no_index_from_1_to_the_last_is_missing() {
         let whole = |names: &[&str]| {
             is_whole(&names.iter().map(|name| indexed(name).unwrap().1).collect::<Vec<_>>())
         };

@@ -46,7 +46,7 @@ use terminal::{GLOBAL, Terminal};
 #[derive(Parser)]
 #[command(version, after_help = EXIT_CODES)]
 struct Cli {
-    /// Longest time that one call of an FMU may take, s. The command check has --limit instead.
+    /// Longest time that one call of an FMU may take, s. The command `check` has --limit instead.
     #[arg(long, global = true, help_heading = GLOBAL, hide_short_help = true, value_name = "SECONDS", default_value_t = guard::CALL.as_secs_f64())]
     call_limit: f64,
     /// Memory that an FMU may use in the commands run, campaign and analyse, MiB.

@@ -63,7 +63,10 @@ pub fn driven(description: &ModelDescription, chosen: Option<&str>) -> Result<Op
         _ if names.contains(&TORQUE) => Ok(Some(TORQUE.into())),
         [] => Ok(None),
         [only] => Ok(Some(only.into())),
-        _ => bail!("the FMU has several inputs ({}): name the one to drive", names.join(", ")),
+        _ => bail!(
+            "the FMU has several inputs ({}): name the input that the torque drives",
+            names.join(", ")
+        ),
     }
 }
 
@@ -112,7 +115,7 @@ pub fn histories(
     let all: Vec<&str> = takes.iter().map(|v| v.name.as_str()).collect();
     let mut problems = Vec::new();
     if !columns.contains(&"time") {
-        problems.push("it has no column time".to_string());
+        problems.push("the file has no column time".to_string());
     }
     if inputs.is_empty() {
         problems.push("none of its columns is an input".to_string());
@@ -125,7 +128,7 @@ pub fn histories(
         ));
     }
     if let Some(chosen) = chosen.filter(|chosen| !inputs.contains(chosen)) {
-        problems.push(format!("it has no column {chosen}, which is to be driven"));
+        problems.push(format!("the file has no column {chosen}, which is the input to drive"));
     }
     ensure!(
         problems.is_empty(),
@@ -313,7 +316,9 @@ impl Run {
             let variable = fmu.description().variable(name)?;
             match &variable.causality {
                 Causality::Input if self.driven().iter().any(|(driven, _)| driven == name) => {
-                    bail!("{name} comes from the profile or the file")
+                    bail!(
+                        "{name} cannot be set, because the profile or the file of inputs drives it"
+                    )
                 }
                 _ if is_settable(variable) => instance.set(name, value)?,
                 other => bail!(

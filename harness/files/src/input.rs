@@ -19,7 +19,7 @@ pub fn open(path: &Path) -> Result<File> {
     let kind = path.metadata()?;
     // before `File::open`, which waits until somebody writes to a named pipe
     if !kind.is_file() {
-        bail!("it is {} (allowed: a regular file)", file_kind(&kind));
+        bail!("the path leads to {} (allowed: a regular file)", file_kind(&kind));
     }
     let file = File::open(path)?;
     let mut all = READ.lock().unwrap_or_else(PoisonError::into_inner);
@@ -47,7 +47,7 @@ pub fn bytes(path: &Path) -> Result<Vec<u8>> {
     open(path)?.take(budget::TEXT + 1).read_to_end(&mut bytes)?;
     ensure!(
         bytes.len() as u64 <= budget::TEXT,
-        "it is larger than {} MB (allowed: up to that)",
+        "the file is larger than {} MB (allowed: at most this size)",
         budget::TEXT / 1_000_000
     );
     Ok(bytes)
@@ -191,9 +191,9 @@ mod tests {
         let made = std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();
         assert!(made.success());
         let error = open(&pipe).unwrap_err().to_string();
-        assert_eq!(error, "it is a named pipe (allowed: a regular file)");
+        assert_eq!(error, "the path leads to a named pipe (allowed: a regular file)");
         let error = text(Path::new("/dev/zero")).unwrap_err().to_string();
-        assert_eq!(error, "it is a device (allowed: a regular file)");
+        assert_eq!(error, "the path leads to a device (allowed: a regular file)");
     }
 
     #[cfg(unix)]

@@ -140,7 +140,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_hash_equals_that_of_the_standard() {
+    fn sha_256_equals_the_example_of_the_standard() {
         // FIPS 180-4, the example of one block
         let expected = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
         assert_eq!(sha256(b"abc"), expected);

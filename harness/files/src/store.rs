@@ -82,11 +82,15 @@ impl Kind {
 
 #[derive(Debug, thiserror::Error)]
 pub enum Damage {
-    #[error("its file is missing")]
+    #[error("the file of the run is missing")]
     Missing,
-    #[error("its SHA-256 is not that in {MANIFEST}; it is damaged, or another program replaced it")]
+    #[error(
+        "the SHA-256 of the file differs from the one in {MANIFEST}: the file is damaged, or another program has replaced it"
+    )]
     Changed,
-    #[error("it has no line in {MANIFEST}, which is damaged; nothing verifies the run")]
+    #[error(
+        "the run has no line in {MANIFEST}, which is damaged, so that nothing verifies the run"
+    )]
     Unlisted,
     #[error("{0}")]
     Unreadable(anyhow::Error),
@@ -617,7 +621,7 @@ mod tests {
         assert!(error.contains("it is missing") && error.contains("remove"), "{error}");
         fs::create_dir(&place).unwrap();
         let error = format!("{:#}", take().unwrap_err());
-        assert!(error.contains("it is a directory"), "{error}");
+        assert!(error.contains("leads to a directory"), "{error}");
         // without runs there is nothing to verify
         fs::remove_dir(&place).unwrap();
         fs::remove_dir_all(directory.path().join("runs")).unwrap();

@@ -107,14 +107,14 @@ impl Archive {
             return format!("{why:#}");
         };
         if !what.contains("EOCD") {
-            return format!("it is a damaged zip archive: {what}");
+            return format!("the file is a damaged zip archive: {what}");
         }
         let mut start = [0; 2];
         let mut file = &self.file;
         let read = file.seek(SeekFrom::Start(0)).and_then(|_| file.read_exact(&mut start));
         match read.is_ok() && &start == b"PK" {
-            true => "it is an incomplete zip archive: its end is missing, as after a download that stopped".into(),
-            false => "it is not a zip archive".into(),
+            true => "the file is an incomplete zip archive: the end is missing, as after a download that stopped".into(),
+            false => "the file is not a zip archive".into(),
         }
     }
 
@@ -122,7 +122,7 @@ impl Archive {
         let mut directory = ZipIterable::try_new(BufReader::new(&self.file), Config::default())?
             .enforce_header_consistency(true);
         let count = directory.len();
-        ensure!(count <= MOST_ENTRIES, "it has {count} entries (allowed: {MOST_ENTRIES})");
+        ensure!(count <= MOST_ENTRIES, "the archive has {count} entries (allowed: {MOST_ENTRIES})");
         let most = UNPACKED.saturating_add(size.saturating_mul(UNPACKED_PER_BYTE));
         let mut sum = 0u64;
         for zip in directory.files()? {
@@ -130,13 +130,13 @@ impl Archive {
             let length = zip.name_raw().len();
             ensure!(
                 length <= LONGEST_NAME,
-                "a name in it has {length} bytes (allowed: {LONGEST_NAME})"
+                "a name in the archive has {length} bytes (allowed: {LONGEST_NAME})"
             );
             let name = String::from_utf8_lossy(zip.name_raw()).into_owned();
             sum = sum.saturating_add(zip.size());
             ensure!(
                 sum <= most,
-                "with {name}, which has {} bytes by its header, it unpacks to {sum} bytes (allowed \
+                "with {name}, which has {} bytes by its header, the archive unpacks to {sum} bytes (allowed \
                  for an archive of {size} bytes: {most})",
                 zip.size()
             );
@@ -186,7 +186,7 @@ impl Archive {
         let said = entry.zip.size();
         if entry.name == DESCRIPTION {
             let most = xml::LONGEST as u64;
-            ensure!(said <= most, "it has {said} bytes (allowed for a description: {most})");
+            ensure!(said <= most, "the file has {said} bytes (allowed for a description: {most})");
         }
         let mut reader = BufReader::new(&self.file);
         let file = entry.zip.as_ref().with_reader(&mut reader, ZipReadOptions::new())?;
@@ -194,13 +194,13 @@ impl Archive {
         let size = std::io::copy(&mut file.take(said.saturating_add(1)), to).map_err(|why| {
             match why.kind() {
                 ErrorKind::InvalidInput | ErrorKind::InvalidData => {
-                    anyhow!("its compressed bytes are damaged: {why}")
+                    anyhow!("the compressed bytes are damaged: {why}")
                 }
                 _ => anyhow!(why),
             }
         })?;
         let relation = if size > said { "more" } else { "fewer" };
-        ensure!(size == said, "it has {relation} bytes than its header says ({said})");
+        ensure!(size == said, "the file has {relation} bytes than its header says ({said})");
         Ok(())
     }
 
@@ -238,7 +238,7 @@ impl Archive {
     pub fn description(&self) -> Result<String> {
         self.check()?;
         let entry = self.entries.iter().find(|entry| entry.name == DESCRIPTION);
-        let entry = entry.with_context(|| format!("it has no {DESCRIPTION}"))?;
+        let entry = entry.with_context(|| format!("the archive has no {DESCRIPTION}"))?;
         let bytes = self.content(entry).with_context(|| format!("{DESCRIPTION} cannot be read"))?;
         String::from_utf8(bytes).map_err(|_| anyhow!("{DESCRIPTION} is not UTF-8"))
     }
@@ -309,8 +309,12 @@ mod tests {
         let many: Vec<(&str, &[u8])> = many.iter().map(|name| (name.as_str(), &[][..])).collect();
         let long = "n".repeat(LONGEST_NAME + 1);
         for (files, lie, words) in [
-            (&[("zeros", zeros.as_slice())][..], 0, "it unpacks to 68157440 bytes (allowed"),
-            (&many, 0, "it has 20001 entries (allowed: 20000)"),
+            (
+                &[("zeros", zeros.as_slice())][..],
+                0,
+                "the archive unpacks to 68157440 bytes (allowed",
+            ),
+            (&many, 0, "the archive has 20001 entries (allowed: 20000)"),
             (&[(long.as_str(), b"")], 0, "a name in it has 1025 bytes (allowed: 1024)"),
             (&[("../out", b"")], 0, "leads out of the archive"),
             (&[("b/../../out", b"")], 0, "leads out of the archive"),
@@ -327,7 +331,7 @@ mod tests {
             (&[("b/a", b"1"), ("b/a::$DATA", b"2")], 0, "b/a::$DATA and b/a have the same place"),
             (&[("a", b"1"), ("a/", b"")], 0, "a/ and a have the same place"),
             (&[("a", b"17000 bytes")], 4_000_000_000, "which has 4000000011 bytes by its header"),
-            (&[("a", b"17000 bytes")], 3, "it has fewer bytes than its header says (14)"),
+            (&[("a", b"17000 bytes")], 3, "the file has fewer bytes than its header says (14)"),
             (&[("a", b"17000 bytes")], -3, "larger than its declared uncompressed size"),
         ] {
             let why = unpacked(files, lie).unwrap_err();

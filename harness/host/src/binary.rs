@@ -480,7 +480,7 @@ mod tests {
     }
 
     #[test]
-    fn versions_of_glibc_are_numbers_not_texts() {
+    fn glibc_versions_are_compared_as_numbers() {
         assert!(glibc_version("GLIBC_2.4") < glibc_version("GLIBC_2.14"));
         assert_eq!(glibc_version("GLIBC_2.2.5"), Some(Version(2, 2)));
         assert_eq!(glibc_version("GLIBC_PRIVATE"), None);

@@ -377,7 +377,7 @@ impl Reader {
         ];
         let typed = TYPES.iter().find_map(|(name, kind)| Some((*kind, element.child(name)?)));
         if typed.is_none() {
-            self.problem(element, "it has no type");
+            self.problem(element, "the variable has no type");
         }
         let (kind, typed) = typed.map_or((Type::Real, None), |(kind, typed)| (kind, Some(typed)));
         let c_type = match kind {
@@ -447,7 +447,7 @@ impl Reader {
         let mut next = references.max().map_or(Some(0), |last| last.checked_add(1));
         for element in root.list("ModelVariables") {
             let Some((c_type, kind)) = CType::from_element_name(&element.name) else {
-                self.problem(element, "there is no such type");
+                self.problem(element, "the declaredType does not exist");
                 continue;
             };
             let (mut variable, starts) = self.variable3(element, c_type, kind);
@@ -469,13 +469,16 @@ impl Reader {
             let Some(length) = length.filter(|n| to.elements.len() + n <= MOST_ELEMENTS) else {
                 self.problem(
                     element,
-                    &format!("with it the arrays have more than {MOST_ELEMENTS} elements together"),
+                    &format!("with this variable the arrays have more than {MOST_ELEMENTS} elements together"),
                 );
                 continue;
             };
             for index in 0..length {
                 let Some(own) = next else {
-                    self.problem(element, "no value references are left for its elements");
+                    self.problem(
+                        element,
+                        "no value references are left for the elements of this array",
+                    );
                     break;
                 };
                 next = own.checked_add(1);
@@ -536,7 +539,7 @@ impl Reader {
             };
             match size {
                 Some(size) => dimensions.push(size as usize),
-                None => self.problem(dimension, "its size is not known"),
+                None => self.problem(dimension, "the size of the array is not known"),
             }
         }
         dimensions
@@ -627,7 +630,7 @@ impl ModelDescription {
         let version = quote_short(&self.fmi_version).replace('"', "");
         ensure!(
             self.fmi_version == "2.0" || self.is_fmi3(),
-            "it is of FMI version {version}; this host drives 2.0 and 3.0"
+            "the FMU is of FMI version {version} (allowed: 2.0 and 3.0)"
         );
         Ok(())
     }
@@ -688,7 +691,7 @@ impl ModelDescription {
         let is_fmi3 = version.starts_with("3.");
         if !is_fmi3 && !version.starts_with("2.") {
             let version = quote_short(version).replace('"', "");
-            bail!("it is of FMI version {version}; this host drives 2.0 and 3.0");
+            bail!("the FMU is of FMI version {version} (allowed: 2.0 and 3.0)");
         }
         let mut reader = Reader { is_fmi3, ..Reader::default() };
         for list in root.children.iter().filter(|child| child.name == "TypeDefinitions") {
@@ -973,7 +976,7 @@ mod tests {
     }
 
     #[test]
-    fn all_that_is_missing_is_named_with_its_line() {
+    fn all_missing_attributes_are_reported_with_their_lines() {
         let broken = XML
             .replace(" guid=\"{1}\"", "")
             .replace("valueReference=\"3\"", "valueReference=\"x\"");

@@ -218,7 +218,7 @@ fn from_json(text: &str) -> Result<ParameterSet> {
         _ => anyhow!("{none}: {why}"),
     })?;
     let estimates =
-        found.parameters.with_context(|| format!("it has no \"parameters\": {none}"))?;
+        found.parameters.with_context(|| format!("the file has no \"parameters\": {none}"))?;
     let mut warnings = Vec::new();
     if !found.decided_by_solver.is_empty() {
         warnings.push(
@@ -276,7 +276,7 @@ fn keep_parameters_of_one_run(found: ParameterSet) -> ParameterSet {
 
 fn from_ssv(text: &str) -> Result<ParameterSet> {
     let root = Element::parse(text.as_bytes())?;
-    ensure!(root.name == "ParameterSet", "its root is {}, not ParameterSet", root.name);
+    ensure!(root.name == "ParameterSet", "the root element is {}, not ParameterSet", root.name);
     let attribute = |element: &Element, name: &str| {
         element.get(name).map(String::from).with_context(|| {
             format!("line {}: {} has no attribute {name}", element.line, element.name)

@@ -48,10 +48,10 @@ impl History {
         hold: bool,
     ) -> Result<Self> {
         let rows = time.len();
-        ensure!(rows >= 2, "it has {rows} rows; a history needs two");
+        ensure!(rows >= 2, "the history has {rows} rows (allowed: at least two)");
         ensure!(
             values.len() == rows && slopes.as_ref().is_none_or(|slopes| slopes.len() == rows),
-            "its columns have different lengths"
+            "the columns have different lengths"
         );
         // The condition is also true for NaN.
         if let Some(row) = time
@@ -300,7 +300,7 @@ mod tests {
     }
 
     #[test]
-    fn a_history_is_lines_between_rows_that_may_jump() {
+    fn a_history_is_piecewise_linear_and_may_jump() {
         let lines = |hold| {
             let (time, values) = (vec![0.0, 1.0, 1.0, 3.0], vec![0.0, 2.0, 5.0, 1.0]);
             History::new(time, values, None, hold).unwrap()
@@ -334,7 +334,7 @@ mod tests {
     #[test]
     fn wrong_histories_and_too_many_points_are_refused() {
         for (time, word) in [
-            (vec![0.0], "it has 1 rows; a history needs two"),
+            (vec![0.0], "the history has 1 rows (allowed: at least two)"),
             (vec![0.0, 1.0, 0.5], "row 3: time goes from 1 to 0.5 s; it must not go back"),
             (vec![0.0, f64::NAN, 1.0], "row 2: time goes from 0 to NaN s"),
         ] {

@@ -51,7 +51,9 @@ impl Element {
     pub fn parse(bytes: &[u8]) -> Result<Element, Fault> {
         if bytes.len() > LONGEST {
             let length = bytes.len();
-            return Err(Fault::TooLarge(format!("it has {length} bytes (allowed: {LONGEST})")));
+            return Err(Fault::TooLarge(format!(
+                "the file has {length} bytes (allowed: {LONGEST})"
+            )));
         }
         let text = std::str::from_utf8(bytes).map_err(|error| {
             let before = &bytes[..error.valid_up_to()];
@@ -175,7 +177,9 @@ impl Element {
 fn exceeded_budget(text: &str) -> Option<String> {
     let namespaces = text.matches("xmlns").count();
     if namespaces > MOST_NAMESPACES {
-        return Some(format!("it declares {namespaces} namespaces (allowed: {MOST_NAMESPACES})"));
+        return Some(format!(
+            "the file declares {namespaces} namespaces (allowed: {MOST_NAMESPACES})"
+        ));
     }
     let (mut depth, mut elements, mut all_attributes, mut rest) = (0usize, 0, 0, text);
     while let Some(at) = rest.find('<') {
@@ -219,9 +223,9 @@ fn exceeded_budget(text: &str) -> Option<String> {
         let fault = if depth > DEEPEST {
             format!("elements are nested deeper than allowed ({DEEPEST} levels)")
         } else if elements > MOST {
-            format!("it has more elements than allowed ({MOST})")
+            format!("the file has more elements than allowed ({MOST})")
         } else if all_attributes > MOST_ATTRIBUTES {
-            format!("it has more attributes than allowed ({MOST_ATTRIBUTES})")
+            format!("the file has more attributes than allowed ({MOST_ATTRIBUTES})")
         } else if attributes > MOST_OF_ONE {
             format!("an element has {attributes} attributes (allowed: {MOST_OF_ONE})")
         } else if longest_name > LONGEST_NAME {
@@ -274,7 +278,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn elements_know_their_line_their_attributes_and_what_is_inside() {
+    fn xml_elements_have_their_line_attributes_and_children() {
         let root =
             Element::parse(b"<a>\n <b x='1' y=\"&lt;\"/>\n <!-- no --><b><c/></b></a>").unwrap();
         assert_eq!((&*root.name, root.line, root.children.len()), ("a", 1, 2));
@@ -344,7 +348,7 @@ mod tests {
         let spaces: String =
             (0..=MOST_NAMESPACES).map(|n| format!("<b xmlns:c{n}='d'/>")).collect();
         let fault = Element::parse(format!("<a>{spaces}</a>").as_bytes()).unwrap_err();
-        assert_eq!(fault.to_string(), "it declares 101 namespaces (allowed: 100)");
+        assert_eq!(fault.to_string(), "the file declares 101 namespaces (allowed: 100)");
         let fault = Element::parse(bomb.as_bytes()).unwrap_err();
         assert!(matches!(fault, Fault::Doctype(_)));
     }
@@ -360,7 +364,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_equal_those_of_xml() {
+    fn numbers_are_read_as_xml_doubles() {
         assert_eq!(double(" 1.5e3 "), Some(1500.0));
         assert_eq!(double("-INF"), Some(f64::NEG_INFINITY));
         for wrong in ["1,5", "inf", "nan", "infinity", "0x10", "", "1.0d"] {

@@ -68,7 +68,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn elements_have_the_names_of_the_model_descriptions() {
+    fn array_elements_have_the_names_in_the_model_descriptions() {
         assert_eq!(hubslosh::slosh::MASS.element([10]), "slosh.mass[10]");
         assert_eq!(sloshtank::tank::P.element([1, 3]), "tank.p[1,3]");
         assert_eq!(spacecraft::tank::M_0.element([4]), "tank[4].m_0");
@@ -76,7 +76,7 @@ mod tests {
     }
 
     #[test]
-    fn items_are_found_by_their_names() {
+    fn enumeration_items_are_found_by_their_names() {
         use hubslosh::FrictionModel;
         assert_eq!(FrictionModel::named("stribeck_smooth"), Some(FrictionModel::StribeckSmooth));
         assert_eq!(FrictionModel::named("Stribeck"), None);

@@ -665,7 +665,7 @@ fn matrices(of: [&Bound<PyAny>; 4]) -> PyResult<([Vec<f64>; 4], Size)> {
     };
     let states = a.len().isqrt();
     if [a.len(), b.len(), c.len()] != [states * states, states * inputs, outputs * states] {
-        return Err(PyValueError::new_err("A, B, C, D do not fit each other"));
+        return Err(PyValueError::new_err("the sizes of A, B, C and D do not fit each other"));
     }
     Ok(([a, b, c, d], (states, inputs, outputs)))
 }
@@ -680,7 +680,7 @@ impl Model {
         if self.inputs == self.outputs {
             return Ok(());
         }
-        Err(PyValueError::new_err("as many inputs as outputs are expected"))
+        Err(PyValueError::new_err("the model must have as many inputs as outputs"))
     }
 
     fn unit_magnitudes(&self, nodes: &[f64]) -> Vec<(f64, f64, f64)> {

@@ -88,7 +88,9 @@ impl Instance {
 
     fn alone<T>(&self, calls: impl FnOnce(&mut Option<Held>) -> PyResult<T>) -> PyResult<T> {
         if self.caller.load(Ordering::Relaxed) == this_thread() {
-            return Err(FmuError::new_err("the instance is in a call: close it after its end"));
+            return Err(FmuError::new_err(
+                "the instance cannot be closed while one of its calls is running; wait for the end of the call",
+            ));
         }
         let mut held = self.held.lock().unwrap_or_else(PoisonError::into_inner);
         self.caller.store(this_thread(), Ordering::Relaxed);
@@ -136,7 +138,11 @@ impl Instance {
             (Given::Integer(n), Type::Integer | Type::Enumeration) => Value::Integer(n),
             (Given::Boolean(is), Type::Boolean) => Value::Boolean(is),
             (Given::String(text), Type::String) => Value::String(text),
-            (_, kind) => return Err(PyValueError::new_err(format!("{name} is of type {kind:?}"))),
+            (_, kind) => {
+                return Err(PyValueError::new_err(format!(
+                    "{name} cannot be set, because it is of type {kind:?}"
+                )));
+            }
         };
         self.call(py, |held| held.instance.set_value(variable, value))
     }

@@ -41,7 +41,7 @@ impl Store {
     ) -> PyResult<T> {
         py.detach(|| {
             let store = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-            Ok(work(store.as_ref().context("the folder is closed")?))
+            Ok(work(store.as_ref().context("the folder of the study is closed")?))
         })
         .map_err(|why: anyhow::Error| error(why))
     }
@@ -108,7 +108,7 @@ impl Store {
         let store = self.0.lock().unwrap_or_else(PoisonError::into_inner).take();
         py.detach(|| {
             let files = files.iter().map(|(name, bytes)| (name.as_str(), bytes.clone()));
-            store.context("the folder is closed")?.publish(files.collect())
+            store.context("the folder of the study is closed")?.publish(files.collect())
         })
         .map_err(error)
     }

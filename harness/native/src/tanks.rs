@@ -269,7 +269,10 @@ pub fn table<'py>(
         let tank = &of.get().tank;
         let (low, high) = (tank.fill_height(low)?, tank.fill_height(high)?);
         if low >= high {
-            return Err(format!("The table's ends must ascend: {low} m, then {high} m.").into());
+            return Err(format!(
+                "The lower end of the fill table, {low} m, must be below its upper end, {high} m."
+            )
+            .into());
         }
         let placed = fill_table::place(tank, low, high, modes)?;
         let between = Some(&placed.between);
@@ -321,6 +324,6 @@ fn in_threads<T: Send + 'static>(
             }
         }
     })?;
-    let lost = || PyRuntimeError::new_err("a thread of the tank's calculation ended early");
+    let lost = || PyRuntimeError::new_err("a thread that computes tanks has ended unexpectedly");
     found.into_iter().map(|answer| answer.ok_or_else(lost)).collect()
 }

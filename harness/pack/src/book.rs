@@ -66,7 +66,7 @@ fn environment(target: &Path) -> Result<PathBuf> {
         .args([&target.join("python/book"), Path::new("book/requirements.txt")])
         .stderr(Stdio::inherit())
         .output()
-        .context("the book needs Python 3.11 or newer, which cannot be run")?;
+        .context("Python cannot be started; the book needs Python 3.11 or newer")?;
     ensure!(made.status.success(), "the environment with Sphinx could not be made");
     Ok(PathBuf::from(String::from_utf8(made.stdout)?.trim()))
 }

@@ -175,7 +175,7 @@ fn crates(package: &str, platforms: &BTreeSet<&'static str>) -> Result<Vec<Compo
     let metadata = MetadataCommand::new()
         .current_dir(&root)
         .exec()
-        .context("`cargo metadata` failed, which lists the crates of the FMU")?;
+        .context("`cargo metadata` failed; it is needed to list the crates of the FMU")?;
     let lock = std::fs::read_to_string(root.join("Cargo.lock")).context("Cargo.lock")?;
     let lock: toml::Table = lock.parse().context("Cargo.lock cannot be understood")?;
     let nodes = metadata.resolve.as_ref().map_or(&[][..], |resolve| &resolve.nodes);
@@ -310,7 +310,7 @@ pub fn notices(binary: &[u8], folder: &'static str) -> Result<String> {
     let metadata = MetadataCommand::new()
         .current_dir(project::root())
         .exec()
-        .context("`cargo metadata` failed, which lists the crates of the program")?;
+        .context("`cargo metadata` failed; it is needed to list the crates of the program")?;
     let ours = project::root().join("modelDescription/licenses");
     // Each text once, with the components under it.
     let mut texts: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
@@ -489,7 +489,7 @@ mod tests {
     }
 
     #[test]
-    fn the_search_for_crates_does_not_find_its_own_text() {
+    fn the_search_for_linked_crates_does_not_find_its_own_list_of_names() {
         for words in [
             "/rust/depsaddr2lineApache-2.0 OR MIT/x",
             "/rust/deps",
@@ -502,7 +502,7 @@ mod tests {
     }
 
     #[test]
-    fn this_program_contains_no_mark_of_a_run_time_library() {
+    fn this_program_is_not_mistaken_for_one_that_links_a_run_time_library() {
         let this = crate::archive::read(&std::env::current_exe().unwrap()).unwrap();
         for part in RUN_TIME {
             assert!(!contains_backwards(&this, part.mark), "{}", part.name);

@@ -25,10 +25,12 @@ pub fn text() -> Result<String> {
 }
 
 fn compose(pyproject: &Table, readme: &str) -> Result<String> {
-    let project =
-        pyproject.get("project").and_then(Value::as_table).context("it has no [project]")?;
+    let project = pyproject
+        .get("project")
+        .and_then(Value::as_table)
+        .context("the file has no table [project]")?;
     let text = |key: &str| {
-        project.get(key).and_then(Value::as_str).with_context(|| format!("it has no {key}"))
+        project.get(key).and_then(Value::as_str).with_context(|| format!("[project] has no {key}"))
     };
     let list = |value: &Value| -> Vec<String> {
         let values = value.as_array().into_iter().flatten();
@@ -113,7 +115,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn metadata_has_what_pip_and_an_index_read() {
+    fn wheel_metadata_has_all_fields_that_pip_and_a_package_index_need() {
         let pyproject = r#"
             [project]
             name = "hubslosh"
@@ -140,7 +142,7 @@ mod tests {
             assert!(said.lines().any(|there| there == line), "{line} in\n{said}");
         }
         let error = compose(&"[project]\nname = \"x\"".parse().unwrap(), "").unwrap_err();
-        assert_eq!(error.to_string(), "it has no description");
+        assert_eq!(error.to_string(), "[project] has no description");
     }
 
     #[test]

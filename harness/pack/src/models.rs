@@ -80,7 +80,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_of_all_fmus_lead_back_to_them() {
+    fn every_fmu_is_found_by_its_file_names() {
         for model in MODELS {
             for fmi in Fmi::ALL {
                 let name = format!("{}{}", model.name, fmi.suffix());

@@ -118,7 +118,7 @@ pub(crate) fn cargo_build(mut command: Command, quiet: bool) -> Result<PathBuf> 
         .output()
         .context("cargo cannot be run; building the FMU needs Rust")?;
     if !built.status.success() {
-        bail!("it did not build");
+        bail!("cargo could not build the package");
     }
     Message::parse_stream(&built.stdout[..])
         .filter_map(|message| match message {

@@ -181,7 +181,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_release_takes_the_place_of_the_one_before_and_keeps_its_hashes() {
+    fn a_release_replaces_the_files_of_the_last_one_and_keeps_their_hashes() {
         let folder = tempfile::tempdir().unwrap();
         let there = |name: &str| folder.path().join(name).exists();
         let old =

@@ -50,7 +50,7 @@ fn files() -> Result<Files> {
         .current_dir(root())
         .args(["ls-files", "-z", "--cached", "--others", "--exclude-standard"])
         .output()
-        .context("git cannot be run, which knows the files of the source")?;
+        .context("git cannot be run; it is needed to list the files of the source")?;
     let why = String::from_utf8_lossy(&said.stderr);
     ensure!(said.status.success(), "git does not list the files of the source: {}", why.trim());
     let mut files = Files::new();

@@ -293,7 +293,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_line_of_the_record_has_the_hash_in_base64_for_addresses() {
+    fn a_line_of_the_wheel_s_record_has_the_hash_in_url_safe_base64() {
         // the empty text's SHA-256; base64 has both `-` and `_` where plain base64 has `+` and `/`
         assert_eq!(
             record_line("a/b.py", b""),
@@ -316,7 +316,7 @@ mod tests {
     }
 
     #[test]
-    fn the_tag_is_of_the_newest_system_that_a_binary_needs() {
+    fn the_wheel_s_tag_names_the_newest_system_that_a_binary_needs() {
         let of = |kind, architecture, needs: &[_]| {
             let all: Vec<_> =
                 needs.iter().map(|&version| binary(kind, architecture, version)).collect();

@@ -35,7 +35,10 @@ MOST_WORK = 1e8
 
 
 def caller() -> int:
-    """Return ``stacklevel`` for a warning that names the first line outside this package."""
+    """Return the ``stacklevel`` with which a warning names the user's line.
+
+    This is the number of frames up to the first line that lies outside this package.
+    """
     folder, level = str(Path(__file__).parent), 1
     frame = sys._getframe(1)
     while frame.f_back and frame.f_code.co_filename.startswith(folder):
@@ -44,7 +47,11 @@ def caller() -> int:
 
 
 def out_of_range(**values: Any) -> list[str]:
-    """Return a sentence for each argument that is outside its allowed range."""
+    """Return a sentence for each argument that is outside its allowed range.
+
+    The keywords name the arguments, for example ``out_of_range(period=0.0)``; `check_ranges` raises
+    the sentences as an error.
+    """
     found = []
     for name, value in values.items():
         is_number = isinstance(value, int | float | np.integer | np.floating)
@@ -84,7 +91,10 @@ def floats(values: Any) -> NDArray[np.float64]:
 
 
 def names_of(names: Any, what: str, problems: list[str]) -> list[str]:
-    """Return one name or several as a list of names; errors are appended to ``problems``."""
+    """Return one name, or a sequence of names, as a list of names.
+
+    If ``names`` is neither, a sentence about the argument ``what`` is appended to ``problems``.
+    """
     if isinstance(names, str):
         return [names]
     try:
@@ -123,7 +133,11 @@ def check_table(table: Any, what: str) -> None:
 
 
 def column_of(table: Any, name: Any, what: str, problems: list[str]) -> np.ndarray | None:
-    """Return a column of finite numbers; what is wrong goes to ``problems``."""
+    """Return the column ``name`` of a table as finite numbers.
+
+    If the column is missing or has other values, a sentence about the argument ``what`` is appended
+    to ``problems``.
+    """
     try:
         values = table[name].to_numpy(float)
     except (TypeError, ValueError) as error:

@@ -51,11 +51,10 @@ def _as_given(q: Any, names: tuple[str, ...], values: Real) -> Any:
 
 
 def angles(q: "ArrayLike | pd.DataFrame") -> Any:
-    """Return roll, pitch and yaw of a quaternion, of rows of them, or of a table of a run.
+    """Return roll, pitch and yaw of a quaternion, of rows of quaternions, or of a run's table.
 
-    The craft is turned by yaw about z, then by pitch about its new y, then by roll about its
-    new x (3-2-1, Tait–Bryan). At a pitch of ±90° roll and yaw turn about the same axis; roll is
-    then 0.
+    The craft is turned by yaw about z, then by pitch about its new y, then by roll about its new x
+    (3-2-1, Tait–Bryan). At a pitch of ±90° roll and yaw turn about the same axis; roll is then 0.
 
     Parameters
     ----------
@@ -126,7 +125,9 @@ def quaternion(roll: ArrayLike = 0.0, pitch: ArrayLike = 0.0, yaw: ArrayLike = 0
 
 
 def rotation_vector(q: "ArrayLike | pd.DataFrame") -> Any:
-    """Return axis times angle of a quaternion, of rows of them, or of a table of a run.
+    """Return the rotation vector (axis times angle) of each attitude.
+
+    The attitude is a quaternion, an array with one quaternion in each row, or the table of a run.
 
     Parameters
     ----------

@@ -145,7 +145,10 @@ class Certificate:
 
     @property
     def gap(self) -> float:
-        """Size of the worst case over the certified size; inf if either is missing."""
+        """Ratio of the worst case's size to the certified size; inf if one of them is missing.
+
+        A ratio near 1 means that the proof reaches almost as far as possible.
+        """
         return self.worst.size / self.size if self.size else np.inf
 
     def __repr__(self) -> str:
@@ -179,7 +182,7 @@ class Certificate:
         from .temporary import write_file
 
         if not self.size:
-            raise FmuError("nothing was proved, so that there is nothing to save")
+            raise FmuError("the certificate proves nothing, so that there is nothing to save")
 
         def content() -> bytes:
             file = io.BytesIO()
@@ -190,14 +193,17 @@ class Certificate:
 
 
 def corners(count: int) -> Vector:
-    """Return all corners of a cube of ±1, or 64 random corners if it has more than 64."""
+    """Return the corners of the cube [-1, 1]^count.
+
+    If the cube has more than 64 corners, 64 random corners are returned.
+    """
     if count <= 6:
         return np.array(list(product((-1.0, 1.0), repeat=count)))
     return np.random.default_rng(1).choice((-1.0, 1.0), (64, count))
 
 
 class UnstableError(Exception):
-    """A Δ within the box at which the loop is unstable."""
+    """Raised if a proof meets a Δ within its box at which the loop is unstable."""
 
     def __init__(self, delta: Vector) -> None:
         """Store Δ."""
@@ -215,10 +221,11 @@ Region = tuple[float, float, Vector, Vector]  # Ends of an interval of frequency
 
 
 class Search:
-    """Search for scalings D and G that prove a loop stable; it keeps what it has computed.
+    """A search for scalings D and G that prove a loop stable; results are kept for later calls.
 
-    ``response`` returns N, the closed loop's response from the outputs to the inputs of Δ, at
-    frequencies in Hz. ``poles`` returns the closed loop's poles in the z plane for a given Δ.
+    ``response`` is a function that returns N, the closed loop's response from the outputs to the
+    inputs of Δ, at frequencies in Hz. ``poles`` is a function that returns the closed loop's poles
+    in the z plane for a given Δ.
     """
 
     def __init__(
@@ -236,13 +243,20 @@ class Search:
         self.own: dict[bytes, Complex] = {}
 
     def response(self, a: float, b: float) -> Complex:
-        """Return the closed loop's response N at the nodes of a frequency interval."""
+        """Return the closed loop's response N at fixed points within a frequency interval.
+
+        The points are Chebyshev nodes, so that a polynomial through them represents N.
+        """
         if (a, b) not in self.known:
             self.known[a, b] = self.closed(a + (b - a) * NODES)
         return self.known[a, b]
 
     def own_poles(self, low: Vector, high: Vector) -> Complex:
-        """Return the closed loop's poles in the middle of a box of Δ, as complex Hz."""
+        """Return the closed loop's poles for the Δ in the middle of a box.
+
+        The poles are converted from the z plane to complex frequencies, Hz. Raises `UnstableError`
+        if one of them is unstable.
+        """
         middle = (low + high) / 2
         key = middle.tobytes()
         if key not in self.own:
@@ -257,10 +271,11 @@ class Search:
     def proved(
         self, region: Region, ends: tuple[Pair, Pair], part: tuple[float, float], halvings: int
     ) -> list[tuple[float, float]] | None:
-        """Return the frequency intervals on which polynomials prove X < 0; None if they do not.
+        """Return the frequency intervals on which X < 0 is proved, or None if it is not.
 
-        D and G are interpolated linearly between the ends of the region, and ``part`` is the part
-        of the region to prove.
+        X is the matrix of `scalings.form`. D and G are interpolated linearly between their values
+        at both ends of the region's frequency interval, and X is bounded by polynomials. ``part``
+        is the part of the frequency interval to prove; it may be halved ``halvings`` times.
         """
         low, high = region[2:]
         a, b = part
@@ -294,7 +309,10 @@ class Search:
         return found
 
     def halved(self, region: Region) -> list[Region]:
-        """Return a region with its box cut in two along the quantity that helps the proof most."""
+        """Return two regions whose boxes are the halves of a region's box.
+
+        The box is cut along the uncertain quantity that gives the halves the largest margins.
+        """
         a, b, low, high = region
         if ((high - low) / self.width).max() < SMALLEST_BOX:
             raise ExhaustedError
@@ -317,7 +335,10 @@ class Search:
         return best[1]
 
     def margin(self, f: float, low: Vector, high: Vector) -> tuple[float, int]:
-        """Return the largest margin at a frequency, and the number of its scalings in `pairs`."""
+        """Return the largest margin for a box at one frequency, and the index of its scalings.
+
+        The scalings (D, G) that give this margin are ``pairs[index]``.
+        """
         key = f, low.tobytes(), high.tobytes()
         if key not in self.found:
             # 0 is a pole of the craft, though not of N
@@ -328,7 +349,11 @@ class Search:
         return self.found[key]
 
     def certify(self, low: Vector, high: Vector, most: int) -> dict[str, NDArray[Any]]:
-        """Return intervals, boxes and scalings that prove a box; raises if that fails."""
+        """Return frequency intervals, boxes and scalings that together prove stability in a box.
+
+        Raises `UnstableError` if a Δ in the box is unstable, and `ExhaustedError` if more than
+        ``most`` convex problems would be needed.
+        """
         self.width, self.pairs, self.found = high - low, [], {}
         edges = np.append(0.0, np.geomspace(self.nyquist / 1000, self.nyquist, 16))
         stack = [(float(a), float(b), low, high) for a, b in pairwise(edges)]

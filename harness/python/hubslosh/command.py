@@ -21,9 +21,10 @@ from .progress import Line, Progress
 
 
 def find_program(path: str | Path | None = None) -> Path:
-    """Return the path of the program.
+    """Return the path of the program ``hubslosh``.
 
-    The search order is ``path``, $HUBSLOSH, pip's folder of scripts, PATH, the source tree.
+    The search order is ``path``, the environment variable HUBSLOSH, the folder in which pip
+    installs scripts, PATH, and the source tree.
     """
     exe = "hubslosh.exe" if os.name == "nt" else "hubslosh"
     named = path or os.environ.get("HUBSLOSH")
@@ -65,13 +66,12 @@ def call(
 ) -> Any:
     """Run a command of the program and return its result, or None if it has none.
 
-    * ``codes``: Exit codes of a command that has done its work.
-    * ``names``: Names of temporary files in error messages, by their paths.
+    * ``codes``: exit codes with which the command has succeeded.
+    * ``names``: texts that replace the paths of temporary files in error messages.
 
-    KeyboardInterrupt, and whatever a function ``progress`` raises, ends the program and its guarded
-    processes. The program removes what it has written by halves.
-
-    Raises FmuError with the program's message.
+    KeyboardInterrupt, and any exception that a function ``progress`` raises, ends the program and
+    the processes in which it runs FMUs; incomplete files are removed. Raises FmuError with the
+    program's message.
     """
     try:
         child = subprocess.Popen(
@@ -122,7 +122,7 @@ def _end(child: "subprocess.Popen[str]") -> None:
 
 
 def settings_flags(settings: Mapping[str, object] | None) -> list[str]:
-    """Return the flags ``--set``."""
+    """Return settings as flags ``--set NAME=VALUE`` of the command line."""
     flags = []
     for name, value in (settings or {}).items():
         flags += ["--set", f"{name}={str(value).lower() if isinstance(value, bool) else value}"]

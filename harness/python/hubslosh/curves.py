@@ -47,7 +47,11 @@ class Curve:
 
     @property
     def phase(self) -> NDArray[np.float64]:
-        """Unwrapped phase, deg; from -360° to 0° where the gain is last above 0 dB."""
+        """Unwrapped phase, deg.
+
+        It is shifted by a multiple of 360° so that it lies between -360° and 0° at the highest
+        frequency at which the gain is above 0 dB.
+        """
         phase = np.degrees(np.unwrap(np.angle(self.gain)))
         above = np.flatnonzero(np.abs(self.gain) >= 1)
         return phase - 360 * (np.floor(phase[above[-1] if len(above) else 0] / 360) + 1)
@@ -59,7 +63,7 @@ class Curve:
 
 @dataclass(frozen=True, eq=False)
 class Curves:
-    """Curves over the frequencies at which a diagram shows them."""
+    """Curves of several loop gains over the frequencies that one diagram shows."""
 
     every: tuple[Curve, ...]
     range: tuple[float, float]
@@ -67,7 +71,10 @@ class Curves:
 
     @property
     def phases(self) -> tuple[float, float]:
-        """Range of the diagrams, deg: of all curves within the range of gains."""
+        """Range of phase that the diagrams show, deg.
+
+        It contains the phase of each curve wherever its gain lies within ``range``.
+        """
         ends = [-180.0]
         for curve in self.every:
             inside = (curve.decibels > self.range[0]) & (curve.decibels < self.range[1])
@@ -79,10 +86,11 @@ class Curves:
 def curves_of(
     gains: "Sequence[tuple[str, str, str, LinearModel]]", crossings: "pd.DataFrame"
 ) -> Curves:
-    """Return loop gains with one input and one output, each with its name, colour and line.
+    """Return the curves of loop gains with one input and one output.
 
-    They span the frequencies at which one of them is within the range of the diagrams, which
-    contains the gain margins nearest to 0 dB.
+    Each item of ``gains`` has the name, the colour, the line style and the loop gain. The curves
+    span all frequencies at which one of the gains lies within the diagrams' range, which is chosen
+    so that it contains the gain margins nearest to 0 dB.
     """
     margins = crossings["gain_margin"].replace([np.inf, -np.inf], np.nan).dropna()
     down, up = margins[margins < 0].max(), margins[margins >= 0].min()
@@ -158,7 +166,10 @@ def draw_bode(gain: "Axes", phase: "Axes", curves: Curves) -> None:
 
 
 def draw_nichols(ax: "Axes", curves: Curves) -> None:
-    """Draw gain over phase; -1 is a cross, and a contour surrounds it at the distance 0.5."""
+    """Draw gain over phase.
+
+    A cross marks -1; the contour around it contains the loop gains whose distance to -1 is 0.5.
+    """
     left, right = curves.phases
     for curve in curves.every:
         curve.draw(ax, curve.phase, curve.decibels)
@@ -172,9 +183,9 @@ def draw_nichols(ax: "Axes", curves: Curves) -> None:
 
 
 def draw_nyquist(ax: "Axes", curves: Curves) -> None:
-    """Draw the complex loop gain near -1 at positive frequencies; -1 is a cross.
+    """Draw the complex loop gain near -1, at positive frequencies.
 
-    Circles: distance 0.5 to -1, and the unit circle (dotted).
+    A cross marks -1. The circle around it has the radius 0.5; the dotted circle is the unit circle.
     """
     sizes = [1.5]
     for curve in curves.every:

@@ -100,9 +100,10 @@ class Engine:
 
 
 def resultant(force: Vector, engines: Mapping[str, Engine]) -> tuple[Vector, Vector, Vector]:
-    """Return force, a point on its line of action from O, and the torque that is left there.
+    """Return the force of all engines, a point on its line of action, and the remaining torque.
 
-    force: in addition to the engines', at O. The torque that is left is about the line of action.
+    ``force`` is a force at O that acts in addition to the engines. The point is measured from O.
+    The remaining torque is the part about the line of action, which no point of action can remove.
     """
     total = np.concatenate([force, np.zeros(3)])
     for engine in engines.values():
@@ -117,10 +118,10 @@ def resultant(force: Vector, engines: Mapping[str, Engine]) -> tuple[Vector, Vec
 def pulse_history(
     base: Vector, wrenches: Mapping[str, Vector], on: Sequence[str], firing: Any, stop: float
 ) -> pd.DataFrame:
-    """Return force and torque over time; see `Craft.pulses`.
+    """Return force and torque over time while engines fire in pulses; see `Craft.pulses`.
 
-    base: force and torque at the operating point, with the engines that are ``on`` there. wrenches:
-    force and torque of each engine.
+    ``base`` has force and torque at the operating point, where the engines named in ``on`` are
+    firing. ``wrenches`` has force and torque of each engine.
     """
     example = 'such as {"roll": [(0.0, 0.02), (1.0, 1.05)]}'
     if not isinstance(firing, Mapping):

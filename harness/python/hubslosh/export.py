@@ -88,7 +88,7 @@ open_system(model);
 def export(
     folder: str | Path, model: str | Path, parameters: Parameters, linear: LinearModel
 ) -> dict[str, Path]:
-    """Write the files of Spacecraft with these parameters; see `Craft.export`."""
+    """Write the files that `Craft.export` describes, for Spacecraft with these parameters."""
     folder = Path(folder)
     fmu = Fmu.open(model)
     values = {name: fmu.convert(name, value) for name, value in parameters.items()}

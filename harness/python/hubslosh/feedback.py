@@ -29,10 +29,11 @@ class Linear:
 
 @dataclass
 class Feedback:
-    """The loop around a run of ``cycles`` · ``parts`` + 1 rows.
+    """A sampled controller around a run of ``cycles`` · ``parts`` + 1 rows.
 
-    At every ``parts``-th row a cycle begins. What the controller computes from the measurements
-    there is set ``latency`` cycles and ``switch`` rows later, and held until the next command is.
+    A cycle begins at every ``parts``-th row, where the controller computes commands from the
+    measurements. The commands are set ``latency`` cycles and ``switch`` rows later, and held until
+    the next commands are set.
     """
 
     controller: Linear | Callable[[int, float, list[float]], Any]

@@ -39,7 +39,7 @@ Parameters = Mapping[str, Any]
 
 
 class DefinedUnit(str):
-    """A unit's name with its definition by SI base units, as a file has it."""
+    """Name of a unit in a file, with its definition by SI base units."""
 
     EXPONENTS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
     """Base units, by their names in FMI and SSP."""
@@ -117,7 +117,7 @@ def fmu_path(model: str | Path) -> Path:
 
 
 def did_you_mean(wrong: str, names: Iterable[str]) -> str:
-    """Return "; did you mean …?" with the most similar name, or nothing.
+    """Return "; did you mean …?" with the name that is most similar, or an empty text.
 
     A name without its group, such as ``rho`` for ``fluid.rho``, counts as the most similar.
     """
@@ -353,7 +353,7 @@ class Fmu:
         return self.variable(name).unit
 
     def convert(self, name: str, value: Quantity) -> Value:
-        """Return a value in the type and unit of a variable.
+        """Return a value in the type and the unit of a variable, as the FMU receives it.
 
         Parameters
         ----------
@@ -393,7 +393,7 @@ class Fmu:
             if isinstance(value, tuple) and kind != "Real":
                 raise ValueError(f"a value of type {kind} has no unit")
             if kind not in converters:
-                raise ValueError(f"it is of type {kind}")
+                raise ValueError(f"a variable of type {kind} cannot be set")
             return converters[kind](value)
         except (TypeError, ValueError, OverflowError) as error:
             raise FmuError(f"{name} cannot be {value!r}: {error}") from None
@@ -409,7 +409,7 @@ class Fmu:
         return _finite((float(value[0]) - offset) / factor)
 
     def scale(self, name: str, unit: str) -> tuple[float, float]:
-        """Return factor and offset of a unit of a variable.
+        """Return the factor and the offset that convert a variable's values to another unit.
 
         A value in this unit is factor · (value in the variable's own unit) + offset.
 
@@ -443,14 +443,14 @@ class Fmu:
         if isinstance(unit, DefinedUnit) and variable.base is not None:
             exponents, factor, offset = variable.base
             if dict(zip(DefinedUnit.EXPONENTS, exponents, strict=True)) != unit.exponents:
-                raise ValueError(f"the unit {unit} of the file is not a unit of its kind, {base}")
+                raise ValueError(f"the unit {unit} in the file cannot be converted to {base}")
             return factor / unit.factor, (offset - unit.offset) / unit.factor
         if unit == base:
             return 1.0, 0.0
         shown = {name: scale for name, *scale in variable.shown}
         if unit not in shown:
             units = ", ".join(u for u in (base, *shown) if u)
-            raise ValueError(f"it has no unit {unit} (units: {units or 'none'})")
+            raise ValueError(f"the variable has no unit {unit} (units: {units or 'none'})")
         factor, offset = shown[unit]
         return factor, offset
 
@@ -475,7 +475,7 @@ def _item(variable: Variable, value: Any) -> int:
     try:
         return _integer(value)
     except ValueError:
-        raise ValueError(f"there are {', '.join(items)}") from None
+        raise ValueError(f"the allowed values are {', '.join(items)}") from None
 
 
 def _finite(value: Any) -> float:
@@ -501,5 +501,5 @@ def _boolean(value: Any) -> bool:
     if not isinstance(value, str):
         return bool(value)
     if value not in ("true", "false"):
-        raise ValueError("there are true, false")
+        raise ValueError("the allowed values are true and false")
     return value == "true"

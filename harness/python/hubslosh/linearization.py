@@ -33,7 +33,10 @@ def _check_states(states: int, cycles: int, period: float) -> None:
 
 
 def split_delay(delay: float, period: float) -> tuple[int, float]:
-    """Return a delay as whole cycles and a rest in seconds; 1e-9 of a cycle is rounding."""
+    """Return a delay as a number of whole cycles and the remaining seconds.
+
+    A remainder below 1e-9 of a cycle is rounding and counts as 0.
+    """
     check_ranges(delay=delay)
     cycles = int(np.floor(delay / period + 1e-9))
     rest = round(float(delay / period - cycles), 12)
@@ -319,7 +322,7 @@ class LinearModel:
 
 
 def control_package() -> Any:
-    """Return python-control, or raise FmuError."""
+    """Return the module python-control, or raise FmuError if it is not installed."""
     try:
         import control
     except ModuleNotFoundError:
@@ -328,7 +331,10 @@ def control_package() -> Any:
 
 
 def mode_table(rows: list[tuple[float, float, tuple[str, ...]]]) -> "pd.DataFrame":
-    """Return rows of modes as the table of `LinearModel.modes`."""
+    """Return a table of oscillatory modes, as `LinearModel.modes` returns it.
+
+    Each row has frequency (Hz), damping ratio and the states that take part.
+    """
     import pandas as pd
 
     table = pd.DataFrame(rows, columns=["frequency", "zeta", "states"])
@@ -338,7 +344,7 @@ def mode_table(rows: list[tuple[float, float, tuple[str, ...]]]) -> "pd.DataFram
 
 @lru_cache(maxsize=32)
 def eigenvectors(model: LinearModel) -> tuple[Any, Any, Any]:
-    """Return eigenvalues, left and right eigenvectors of A."""
+    """Return the eigenvalues of a model's matrix A, and its left and right eigenvectors."""
     from scipy.linalg import eig
 
     found: tuple[Any, Any, Any] = eig(model.A, left=True)
@@ -356,7 +362,8 @@ def _held(model: LinearModel, time: float) -> tuple[Matrix, Matrix]:
 def exponential(A: Matrix) -> Matrix:
     """Return the exponential of a matrix, by Padé's approximant of order 13 and squaring.
 
-    Higham 2005. On two cores scipy's takes 30 times the CPU time for 25 states: its threads wait.
+    The method is that of Higham (2005). SciPy's function takes 30 times the CPU time for 25 states
+    on two cores, because its threads wait for each other.
     """
     size = float(np.linalg.norm(A, 1))
     squarings = max(0, int(np.ceil(np.log2(size / 5.37)))) if size > 0 else 0

@@ -91,7 +91,10 @@ def posterior(
     estimates = found.parameters | found.measurement
     middle = np.array([estimates[name].value for name in names])
     if not np.isfinite(covariance).all():
-        raise FmuError("an unknown is not determined: there is nothing to start the walkers from")
+        raise FmuError(
+            "the recordings do not determine every unknown, so that the walkers have no range "
+            "in which to start"
+        )
     walkers = walkers or 4 * len(names)
     path = find_program(program)
     with temporary.folder() as folder:

@@ -17,10 +17,11 @@ TOLERANCES = (0.05, 0.01)
 
 
 def impulse(masses: Vector, omegas: Vector, zetas: Vector, time: Vector) -> NDArray[np.float64]:
-    """Return the force (N) of each mode on a tank whose speed jumps by 1 m/s; one row a mode.
+    """Return the force (N) of each mode on a tank whose speed jumps by 1 m/s at time 0.
 
-    The angle a follows l a'' + 2 zeta omega l a' + g a = -u with the tank's acceleration u, and the
-    force is F = m (g a + 2 zeta omega l a') (Rubaga's thesis, equations 4.16 to 4.21).
+    Each row is one mode, each column one time. The slosh angle a follows l a'' + 2 zeta omega l a'
+    + g a = -u with the tank's acceleration u, and the force is F = m (g a + 2 zeta omega l a')
+    (Rubaga's thesis, equations 4.16 to 4.21).
     """
     omegas, zetas = omegas[:, None], zetas[:, None]
     damped = omegas * np.sqrt(1 - zetas**2)
@@ -33,7 +34,10 @@ def impulse(masses: Vector, omegas: Vector, zetas: Vector, time: Vector) -> NDAr
 def mode_responses(
     masses: Vector, omegas: Vector, zetas: Vector, frequencies: Vector
 ) -> NDArray[np.complex128]:
-    """Force of each mode on a tank over its acceleration (kg) at frequencies (Hz), a row a mode."""
+    """Return each mode's frequency response from the tank's acceleration to the force on it.
+
+    The unit is kg. Each row is one mode, each column one frequency (Hz).
+    """
     w = 2 * np.pi * np.asarray(frequencies)
     spring = omegas[:, None] ** 2 + 2j * (zetas * omegas)[:, None] * w
     return -masses[:, None] * spring / (spring - w**2)

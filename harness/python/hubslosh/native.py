@@ -12,7 +12,7 @@ _ROOT = Path(__file__).resolve().parents[3]
 
 
 def source_tree() -> Path | None:
-    """Return the project's root if this package lies in its source tree."""
+    """Return the root folder of the project if this package runs from its source; else None."""
     return _ROOT if (_ROOT / "harness" / "python").is_dir() else None
 
 

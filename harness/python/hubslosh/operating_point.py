@@ -104,9 +104,10 @@ def _row(values: Vector) -> str:
 
 
 def trim(model: str | Path, parameters: Parameters, tanks: Sequence[str] = ()) -> OperatingPoint:
-    """Return Spacecraft with O moved across the thrust, until that acts through the centre of mass.
+    """Return the operating point of Spacecraft whose thrust acts through the centre of mass.
 
-    A craft without thrust, or on a pivot, stays as it is.
+    The origin O, and with it the thrust, is moved across the direction of the thrust. A craft
+    without thrust, or on a pivot, is returned unchanged.
     """
     every, none = dict(parameters), np.zeros(3)
     fmu = Fmu.open(model)
@@ -131,18 +132,21 @@ def trim(model: str | Path, parameters: Parameters, tanks: Sequence[str] = ()) -
 
 
 def is_spacecraft(fmu: Fmu) -> bool:
-    """Return whether an FMU is Spacecraft, in any size."""
+    """Return True if an FMU is Spacecraft, with any number of tanks and modes."""
     return "craft.r[1]" in fmu.variables
 
 
 def warn_of_rotation(what: str, turning: Any) -> None:
-    """Warn if the craft has an angular acceleration at the point where it is linearised."""
+    """Warn if ``turning``, the angular acceleration at the linearisation point, is not 0."""
     if text := rotation(what, turning):
         warnings.warn(text, FmuWarning, stacklevel=caller())
 
 
 def rotation(what: str, turning: Any) -> str:
-    """Return a warning if the craft has an angular acceleration at a point; otherwise ""."""
+    """Return a warning if the angular acceleration ``turning`` is not 0; otherwise "".
+
+    ``what`` names the point in the warning.
+    """
     size = float(np.linalg.norm(turning))
     if size <= LEFT:
         return ""

@@ -24,7 +24,7 @@ COLUMNS = ("omega", "omega_imu", "slosh_angle", "slosh_angle_radial")
 
 
 class RunError(FmuError):
-    """Error of a run that stopped before its end.
+    """Raised if a run stops before its end, because the FMU refuses a step.
 
     Parameters
     ----------
@@ -188,10 +188,11 @@ _DTYPES = {"Real": float, "Integer": np.intc, "Enumeration": np.intc, "Boolean":
 
 
 class Plant(Instance):
-    """An instance of an FMU for Co-Simulation, initialised and ready for its first step.
+    """An instance of an FMU for Co-Simulation that is initialised and ready for its first step.
 
-    Use it in a ``with`` statement, which frees the instance. Calls from several threads follow
-    one another. The FMUs of this package start at rest, unless the settings say otherwise.
+    Use it in a ``with`` statement, which frees the instance. If several threads call it, each call
+    waits until the call before has ended. The FMUs of this package start at rest, unless the
+    settings say otherwise.
 
     Parameters
     ----------

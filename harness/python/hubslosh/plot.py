@@ -646,7 +646,7 @@ def monte_carlo(
 
 
 def save(figure: "Figure | SubFigure", path: "str | Path") -> None:
-    """Write a figure so that the same figure gives the same bytes, as SVG too.
+    """Write a figure so that the same figure always gives the same bytes, also as SVG.
 
     Parameters
     ----------

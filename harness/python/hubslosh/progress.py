@@ -11,12 +11,12 @@ Progress = bool | Callable[[str], Any] | None
 
 
 def is_watched() -> bool:
-    """Return whether stderr is a terminal or the output of a notebook's cell."""
+    """Return True if somebody can see progress: stderr is a terminal or a notebook's output."""
     return sys.stderr.isatty() or type(sys.stderr).__module__ == "ipykernel.iostream"
 
 
 class Line:
-    """A line whose text changes."""
+    """A line on the terminal, or in a notebook, whose text is replaced as work proceeds."""
 
     def __init__(self, progress: Progress = None) -> None:
         """Take who sees the line; None: those on a terminal and in a notebook."""

@@ -167,7 +167,8 @@ class Project:
         law = self.controller
         if callable(law) and not hasattr(law, "dt"):
             raise FmuError(
-                f'the controller {law!r} has no form in a file: give controller_file="FILE.py:NAME"'
+                f"the controller {law!r} cannot be written to a project file: "
+                'give controller_file="FILE.py:NAME"'
             )
         if hasattr(law, "dt"):  # a system of python-control
             law = _from_control(law)
@@ -377,7 +378,7 @@ def _from_transfer_functions(num: Any, den: Any, period: float | None) -> Linear
 
 
 def main() -> None:
-    """Write the page of projects, and print their reviews."""
+    """Write the page of one or several projects and print their reviews (``hubslosh review``)."""
     parser = argparse.ArgumentParser(description="Reviews a loop around a craft by its project.")
     parser.add_argument("projects", type=Path, nargs="+", metavar="PROJECT", help=".toml")
     parser.add_argument("--out", type=Path, metavar="FILE", help="page to write, .html")

@@ -35,25 +35,34 @@ _MOVES_THE_BOB = re.compile(r"(tank\[\d\])\.(length|hinge)(\[\d\])")
 
 @dataclass(frozen=True)
 class ModeQuantity:
-    """A quantity of a slosh mode."""
+    """A quantity of one slosh mode, such as the frequency of mode 1 of tank 2."""
 
     tank: int
     kind: str
     number: int
 
     def name(self, kind: str) -> str:
-        """Return the FMU's name of a parameter of this mode."""
+        """Return the FMU's name of the parameter ``kind`` of this mode.
+
+        For example ``tank[2].zeta[1]``.
+        """
         return f"tank[{self.tank}].{kind}[{self.number}]"
 
 
 def mode_quantity(name: str) -> ModeQuantity | None:
-    """Return the quantity of a mode that a full name stands for."""
+    """Return the quantity of a slosh mode with this full name, or None for other names.
+
+    For example ``tank[1].frequency[1]`` is the frequency of mode 1 of tank 1.
+    """
     match = _MODE_QUANTITY.fullmatch(name)
     return ModeQuantity(int(match[1]), match[2], int(match[3])) if match else None
 
 
 def full_name(name: str, tanks: Iterable[str]) -> str:
-    """Return a name with the number of its tank: ``tank[1].zeta[1]`` for ``NTO.zeta[1]``."""
+    """Return a name with the number of the tank in place of the tank's name.
+
+    For example ``NTO.zeta[1]`` becomes ``tank[1].zeta[1]``.
+    """
     found = [(tank, number) for number, tank in enumerate(tanks, 1) if name.startswith(f"{tank}.")]
     if not found:
         return name
@@ -62,7 +71,10 @@ def full_name(name: str, tanks: Iterable[str]) -> str:
 
 
 def short_name(name: str, tanks: Iterable[str]) -> str:
-    """Return a name with the name of its tank: ``NTO.zeta[1]`` for ``tank[1].zeta[1]``."""
+    """Return a name with the name of the tank in place of the tank's number.
+
+    For example ``tank[1].zeta[1]`` becomes ``NTO.zeta[1]``.
+    """
     for number, tank in enumerate(tanks, 1):
         if name.startswith(prefix := f"tank[{number}]."):
             return f"{tank}.{name.removeprefix(prefix)}"
@@ -70,9 +82,10 @@ def short_name(name: str, tanks: Iterable[str]) -> str:
 
 
 def unknown(name: str, fmu: Fmu, tanks: Iterable[str], also: Iterable[str] = ()) -> str:
-    """Return what is wrong with a name that is no quantity of a craft; "" if it is one.
+    """Return an error message if a name is not a quantity of a craft; otherwise "".
 
-    also: further names, in addition to the FMU's, those of slosh modes and the delay.
+    ``also`` has names that are allowed in addition to the FMU's variables, the quantities of slosh
+    modes and the delay.
     """
     tanks, also = list(tanks), [DELAY, *also]
     full = full_name(name, tanks)
@@ -88,9 +101,9 @@ def unknown(name: str, fmu: Fmu, tanks: Iterable[str], also: Iterable[str] = ())
 def full_names(
     given: Parameters, fmu: Fmu, tanks: Iterable[str], also: Iterable[str] = ()
 ) -> dict[str, Quantity]:
-    """Return values by full names.
+    """Return values by full names, such as ``tank[1].zeta[1]`` for ``NTO.zeta[1]``.
 
-    Raises FmuError for names that are no quantities of a craft, see `unknown`, and for a quantity
+    Raises FmuError for names that are not quantities of a craft (see `unknown`), and for a quantity
     that is given under both of its names.
     """
     tanks, found = list(tanks), dict[str, Quantity]()
@@ -107,7 +120,11 @@ def full_names(
 
 
 def moves_the_bob(name: str) -> str:
-    """Return why a parameter's range would change more than one quantity; "" if it does not."""
+    """Return an error message if a parameter moves the slosh mass; otherwise "".
+
+    If the range of a pendulum's length or hinge varied, the slosh mass would move as well (and with
+    the length the frequency would change), so that one range would vary several quantities.
+    """
     if not (match := _MOVES_THE_BOB.fullmatch(name)):
         return ""
     frequency, bob = (f"{match[1]}.{kind}{match[3]}" for kind in ("frequency", "bob"))
@@ -119,20 +136,20 @@ def moves_the_bob(name: str) -> str:
 
 
 class Modes:
-    """Slosh modes of Spacecraft's parameters, whose quantities can be read and changed."""
+    """The slosh modes in parameters of Spacecraft, whose quantities can be read and changed."""
 
     def __init__(self, model: str | Path, given: Parameters) -> None:
         """Take the parameters of an FMU; nothing is computed before it is asked for."""
         self.model, self.fmu, self.given = model, Fmu.open(model), dict(given)
 
     def number(self, name: str) -> float:
-        """Return a parameter's value: the one that is given, otherwise the FMU's start value."""
+        """Return the value of a parameter: the given value, otherwise the FMU's start value."""
         if name in self.given:
             return float(self.fmu.convert(name, self.given[name]))
         return float(self.fmu.variable(name).start or 0.0)
 
     def problem(self, mode: ModeQuantity) -> str:
-        """Return why a quantity does not exist; "" if it does."""
+        """Return the reason why a mode does not have a quantity; "" if it has it."""
         if mode.tank > self.number("tanks") or mode.number > self.number(
             f"tank[{mode.tank}].modes"
         ):
@@ -187,7 +204,10 @@ class Modes:
         return float(np.dot(axis, force))
 
     def scale_frequency(self, mode: ModeQuantity, factor: float) -> None:
-        """Multiply a mode's frequency by a factor, at every thrust; its bob stays."""
+        """Multiply a mode's frequency by a factor.
+
+        The factor holds at every thrust, and the slosh mass stays in its place.
+        """
         if not factor > 0:
             raise FmuError(f"{mode.name('frequency')} must be above 0 Hz")
         length = self._length(mode)
@@ -197,7 +217,11 @@ class Modes:
         self.given |= {mode.name(name): value for name, value in changes.items()}
 
     def set(self, mode: ModeQuantity, value: float) -> None:
-        """Set one quantity of a mode; its other quantities and the liquid as a whole stay."""
+        """Set one quantity of a mode.
+
+        The other quantities of the mode, and mass, centre and inertia of the liquid as a whole,
+        stay.
+        """
         if mode.kind == "zeta":
             self.given[mode.name("zeta")] = value
         elif mode.kind == "frequency":
@@ -241,11 +265,12 @@ class Modes:
 def rigid_rest(
     m_0: float, H_0: float, I_0: float, more_y: float, points: Iterable[tuple[float, float]]
 ) -> tuple[float, float, float, float]:
-    """Return mass, height and inertia of the rigid liquid after masses at heights are added to it.
+    """Return mass, height and inertia of the rigid liquid after point masses are added to it.
 
-    The fourth result is 0 or negative: an inertia across the axis that is taken from the dry
-    craft, because the rigid liquid's own would be negative, as in a sphere. Both are rigid, so the
-    sum acts the same.
+    ``points`` has pairs of a mass and its height. The fourth result is 0 or negative: an inertia
+    across the axis that must be subtracted from the dry craft, because the inertia of the rigid
+    liquid itself would become negative, as in a sphere. Dry craft and rigid liquid move together,
+    so that only the sum of their inertias acts.
     """
     moment = m_0 * H_0
     inertia = I_0 + moment * H_0
@@ -264,10 +289,10 @@ def apply_changes(
     factors: Mapping[str, float] | None = None,
     tanks: Iterable[str] = (),
 ) -> dict[str, Quantity]:
-    """Return parameters of Spacecraft with quantities of slosh modes, by full names, changed.
+    """Return parameters of Spacecraft in which quantities of slosh modes are changed.
 
-    factors: frequencies by their ratio to those of the parameters, whatever the thrust is.
-    tanks: names for messages.
+    ``values`` has new values, and ``factors`` has ratios of new to given frequencies (whatever the
+    thrust is), both by full names. ``tanks`` has the tanks' names for error messages.
     """
     modes, problems = Modes(model, given), []
     for name, value in values.items():

@@ -94,7 +94,7 @@ def read_recording(
 
 
 class Column(NamedTuple):
-    """A column of a file."""
+    """A column of a recording: name, values, and unit if the file states one."""
 
     name: str
     values: Any
@@ -200,7 +200,7 @@ def _excel(path: Path) -> Iterator[Column]:
 
 
 class Kind(NamedTuple):
-    """A file format that `read_recording` knows."""
+    """A file format that `read_recording` can read."""
 
     name: str
     start: bytes
@@ -220,9 +220,10 @@ KINDS = (
 
 
 def convert(path: Path, out: Path) -> None:
-    """Write the columns of a file of one of the `KINDS` as text in columns.
+    """Write the columns of a recording as text in columns.
 
-    Raises FmuError, which does not name the file, if it cannot be read or holds no columns.
+    Raises FmuError if the file cannot be read or has no columns. The message does not contain the
+    file's name.
     """
     with path.open("rb") as file:
         start = file.read(16)
@@ -230,7 +231,7 @@ def convert(path: Path, out: Path) -> None:
     signed = [kind for kind in KINDS if start.startswith(kind.start)]
     if not named and not signed:
         allowed = ", ".join(kind.name for kind in KINDS)
-        raise FmuError(f"it is of no known kind (allowed: text in columns, {allowed})")
+        raise FmuError(f"the file is of no known kind (allowed: text in columns, {allowed})")
     # .mat of version 7.3 is HDF5 that begins as other .mat files do
     kind = (signed or named)[0]
     try:
@@ -254,7 +255,7 @@ def convert(path: Path, out: Path) -> None:
 
 def _check_size(values: int) -> None:
     if values > MOST_VALUES:
-        raise FmuError(f"it holds {values} values (allowed: up to {MOST_VALUES})")
+        raise FmuError(f"the file holds {values} values (allowed: up to {MOST_VALUES})")
 
 
 def _parts(column: Column) -> Iterator[Column]:
@@ -297,7 +298,7 @@ def _cells(values: np.ndarray) -> list | None:
 def _aligned(columns: list[Column]) -> tuple[list[str], list[list]]:
     """Return header and cells of columns, in rows of their number or of their time."""
     if not columns:
-        raise FmuError("it holds no vector or matrix of numbers")
+        raise FmuError("the file holds no vector or matrix of numbers")
     names = [
         " ".join(f"{name} [{unit}]".split()) if unit and not name.endswith("]") else name
         for name, _, unit, _ in columns
@@ -327,7 +328,7 @@ def _aligned(columns: list[Column]) -> tuple[list[str], list[list]]:
 
 
 def main() -> None:
-    """Convert a file for the program."""
+    """Convert a recording to text for the command ``hubslosh``, which calls this function."""
     if len(sys.argv) != 3:
         sys.exit("usage: python -m hubslosh.recordings FILE OUT.csv")
     try:

@@ -19,7 +19,7 @@ POINTS = ("nominal", "all")
 
 @dataclass(frozen=True)
 class Requirement:
-    """A least margin of the nominal points or of all points."""
+    """The smallest value of one margin that the nominal points, or all points, must have."""
 
     margin: str
     points: str
@@ -27,7 +27,7 @@ class Requirement:
 
     @property
     def unit(self) -> str:
-        """Unit as it follows a number."""
+        """Unit of the limit, as it is printed after the number; "" for a number without unit."""
         return UNITS[self.margin]
 
     def __str__(self) -> str:
@@ -37,7 +37,11 @@ class Requirement:
 
 
 def requirements_of(given: Any) -> tuple[Requirement, ...]:
-    """Return requirements from limits by margin: numbers, or tables of `POINTS`."""
+    """Return requirements from the argument ``requirements=`` of `Craft.review`.
+
+    The argument is a dictionary from the name of a margin to a limit for all points, or to limits
+    for ``nominal`` and ``all`` points. Raises FmuError with everything that is wrong.
+    """
     if given is None:
         return ()
     example = '{"phase_margin": 30, "gain_margin": {"nominal": 6, "all": 3}}'
@@ -66,7 +70,10 @@ def requirements_of(given: Any) -> tuple[Requirement, ...]:
 
 
 def judged(requirements: tuple[Requirement, ...], points: pd.DataFrame) -> ShortTable:
-    """Return a row for each requirement, those that fail first; see `Review.requirements`."""
+    """Return a table with one row for each requirement, failed requirements first.
+
+    See `Review.requirements` for the columns.
+    """
     margins = points[["modulus_margin", "delay_margin"]].copy()
     margins["phase_margin"] = points["phase_margin"].abs()
     margins["gain_margin"] = points[["gain_up", "gain_down"]].abs().min(axis=1)

@@ -51,7 +51,7 @@ SEVERITY = ("unstable", "neither", "phase", "gain", "gain and phase")
 
 @dataclass(frozen=True)
 class Uncertain:
-    """A quantity of the review with its range."""
+    """An uncertain quantity of a review, with its range at each fill."""
 
     name: str
     """Its name as it was given, "damping of" or "frequency of" a tank, or "inertia of craft"."""
@@ -61,7 +61,11 @@ class Uncertain:
     """At each fill low end, nominal value and high end by full name; empty without this mode."""
 
     def values(self, fill: int, share: float) -> dict[str, float]:
-        """Return values at the fill of an index, from a share: -1 low end, 0 nominal, 1 high."""
+        """Return the parameters' values at one fill and one position within their ranges.
+
+        ``fill`` is the index of the fill; ``share`` is -1 at the low end of the range, 0 at the
+        nominal value and 1 at the high end.
+        """
         return {
             name: nominal + abs(share) * ((high if share > 0 else low) - nominal)
             for name, (low, nominal, high) in self.ends[fill].items()
@@ -175,7 +179,7 @@ class Review:
         return table
 
     def unstable(self) -> pd.DataFrame:
-        """Return the rows of `points` that are unstable, the fastest growth first.
+        """Return the unstable rows of `points`, sorted so that the fastest growth comes first.
 
         Returns
         -------
@@ -460,7 +464,7 @@ def review(
 
 
 def row_of(point: Point, uncertain: Iterable[Uncertain]) -> dict[str, Any]:
-    """Return a point as a row of `Review.points`."""
+    """Return the row of `Review.points` that describes a point."""
     found = point.margins
     down, up = found.gain_margins
     margins = {
@@ -530,7 +534,7 @@ class _Space:
         parameters: Parameters | None,
         options: dict[str, Any],
     ) -> "_Space":
-        """Check the arguments of a review, and solve its tanks."""
+        """Check the arguments of a review, compute its tanks, and return its points' space."""
         fills = _list_of(fills)
         if damping not in ("interval", "nominal"):
             raise FmuError(f'damping must be "interval" or "nominal", not {damping!r}')
@@ -580,7 +584,10 @@ class _Space:
         return cls(craft, words, np.array(at), unit, tuple(loops), tuple(given), tuple(found), said)
 
     def point(self, fill: int, shares: Vector) -> Point:
-        """Evaluate a point."""
+        """Return the point at the fill with this index and at these positions in the ranges.
+
+        See `Uncertain.values` for the positions.
+        """
         loop, (every, modes) = self.loops[fill], self.given[fill]
         plain: dict[str, Any] = {}
         factors: dict[str, float] = {}
@@ -601,7 +608,7 @@ class _Space:
         return Point(fill, np.array(shares, float), loop, margins, gain)
 
     def evaluate(self, which: Iterable[tuple[int, Vector]]) -> list[Point]:
-        """Evaluate points on all cores."""
+        """Return points for pairs of a fill's index and positions in the ranges, on all cores."""
         count = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else None
         with warnings.catch_warnings(), ThreadPoolExecutor(count or os.cpu_count()) as pool:
             warnings.simplefilter("ignore", FmuWarning)  # those of the nominal points are told

@@ -37,7 +37,7 @@ STYLE = Path(__file__).with_suffix(".css").read_text(encoding="utf-8")
 
 
 def page(review: "Review") -> str:
-    """Return the page."""
+    """Return the review as a complete HTML page with figures and tables."""
     title = f"Design review over {len(review.fills)} fills and {len(review.points)} points"
     bad = "" if review.passed else " bad"
     figures = "\n".join(_figures(review))
@@ -49,7 +49,7 @@ def page(review: "Review") -> str:
 
 
 def document(title: str, body: str) -> str:
-    """Return a page with a title as its heading."""
+    """Return an HTML page with this title, which is also its heading, and this body."""
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
@@ -129,7 +129,10 @@ def _figures(review: "Review") -> Iterator[str]:
 
 
 def figure_of(title: str, caption: str, height: float, draw: "Callable[[Figure], None]") -> str:
-    """Return a figure as inline SVG in the page's colours."""
+    """Return a figure as inline SVG, in colours that the page can change with its scheme.
+
+    ``draw`` draws into the empty figure; ``height`` is its height in inches.
+    """
     try:
         import matplotlib
         from matplotlib.figure import Figure
@@ -265,7 +268,7 @@ def _stabilisation(figure: "Figure", review: "Review") -> None:
 
 
 def key_of(figure: "Figure", columns: int = 2) -> None:
-    """Put the legend below the axes, where it hides nothing."""
+    """Move the legend of a figure below its axes, where it hides no curve."""
     handles, labels = figure.axes[0].get_legend_handles_labels()
     if handles:
         figure.legend(handles, labels, loc="outside lower center", ncols=columns)
@@ -471,7 +474,10 @@ def _range(row: Any, name: str) -> str:
 
 
 def table_of(title: str, head: tuple[str, ...], rows: list[list[str]], bad: int = 0) -> str:
-    """Return a table as HTML; its first ``bad`` rows are marked."""
+    """Return an HTML table.
+
+    The first ``bad`` rows are marked, for example as failed.
+    """
     names = "".join(f"<th>{html.escape(name)}</th>" for name in head)
     text, marked = ' class="text"', ' class="bad"'
     body = "".join(

@@ -14,7 +14,7 @@ Vector = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """A point of the review that was evaluated."""
+    """One point of a review: a fill and values of the uncertain quantities, with their margins."""
 
     fill: int
     """Index of the fill."""
@@ -29,11 +29,15 @@ class Point:
 
     @property
     def growth(self) -> float:
-        """Growth rate of the closed loop's least stable pole, 1/s."""
+        """Growth rate of the closed loop's least stable pole, 1/s; below 0 if it is stable."""
         size = _largest(self.margins.poles, self.gain.period)
         return float(np.log(size) / self.loop.period)
 
     @property
     def distance(self) -> float:
-        """Modulus margin of a stable loop; otherwise minus the growth rate, 1/s."""
+        """Measure by which the review searches the worst point: small is bad.
+
+        It is the modulus margin of a stable loop, and minus the growth rate (1/s) of an unstable
+        loop.
+        """
         return self.margins.modulus_margin if self.margins.stable else -self.growth

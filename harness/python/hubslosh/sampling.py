@@ -290,14 +290,14 @@ class _InMemory:
     """A study without a folder."""
 
     def rows(self, _draws: list[dict[str, Any]]) -> dict[int, dict[str, Any]]:
-        """Return what is stored: nothing."""
+        """Return no rows, because a study without a folder stores nothing."""
         return {}
 
     def add(self, *_: Any, **__: Any) -> None:
-        """Store nothing."""
+        """Ignore a run, because a study without a folder stores nothing."""
 
     def finish(self, _table: str) -> None:
-        """Store nothing."""
+        """Ignore the table, because a study without a folder stores nothing."""
 
 
 def _opened(

@@ -26,7 +26,10 @@ SMALLEST = 1e-3  # Bounds of µ below this are not resolved
 
 
 def solver() -> Any:
-    """Return the package of the convex solver; FmuError says how to install it if it is missing."""
+    """Return the module of the convex solver Clarabel.
+
+    Raises FmuError, which says how to install it, if it is missing.
+    """
     try:
         import clarabel
     except ModuleNotFoundError:
@@ -42,20 +45,26 @@ def adjoint(matrices: Complex) -> Complex:
 
 
 def form(N: Complex, D: Complex, G: Complex) -> Complex:
-    """Return X = N^H D N - D + j (G N - N^H G) for each matrix N."""
+    """Return X = N^H D N - D + j (G N - N^H G) for each matrix N.
+
+    X < 0 proves that I - N Δ is regular for all |δ| ≤ 1.
+    """
     half = adjoint(N) @ D @ N / 2 + 1j * (G @ N) - D / 2
     return half + adjoint(half)
 
 
 def recentred(N: Complex, copies: NDArray[np.int64], low: Vector, high: Vector) -> Complex:
-    """Return N for a Δ of [-1, 1] that stands for a box of δ from ``low`` to ``high``."""
+    """Return N for a box of δ from ``low`` to ``high`` that is scaled to [-1, 1].
+
+    A proof for |δ| ≤ 1 with the returned matrix is then a proof for the box.
+    """
     middle, radius = ((low + high) / 2)[copies], ((high - low) / 2)[copies]
     found: Complex = np.linalg.solve(np.eye(len(middle)) - N * middle, N) * radius
     return found
 
 
 class Scalings:
-    """Searches D and G for blocks of given sizes."""
+    """Finds scalings D and G for a Δ in which each parameter has a given number of copies."""
 
     def __init__(self, counts: Sequence[int]) -> None:
         """Prepare the constraints; ``counts`` are the numbers of copies."""
@@ -135,10 +144,10 @@ class Scalings:
         return margin, D / across, G / across
 
     def largest(self, N: Complex, least: Vector, guess: float = 1.0) -> float:
-        """Return a size k so that I - N Δ is regular for all |δ| ≤ k with δ ≥ ``least``.
+        """Return the largest size k for which scalings prove I - N Δ regular for all |δ| ≤ k.
 
-        It is the largest that scalings prove, to 0.5 %, but at most 1/SMALLEST. A good guess saves
-        half of the convex problems.
+        Only δ ≥ ``least`` count. The size is exact to 0.5 %, but at most 1/SMALLEST. A good
+        ``guess`` halves the number of convex problems.
         """
 
         def is_proved(log_size: float) -> bool:
@@ -169,9 +178,10 @@ class Scalings:
 
 
 def mu_upper(N: Complex, counts: Sequence[int], least: Vector | None = None) -> float:
-    """Return an upper bound of µ of a matrix for real parameters in ``counts`` copies each.
+    """Return an upper bound of µ of a matrix for real, repeated parameters.
 
-    ``least`` are lower ends of δ, where a range ends on one side.
+    ``counts`` has the number of copies of each parameter in Δ. ``least`` has lower ends of δ for
+    parameters whose range ends on one side, such as damping ratios.
     """
     ends = np.full(len(counts), -np.inf) if least is None else least
     return 1 / Scalings(counts).largest(np.asarray(N, complex), ends)

@@ -25,13 +25,13 @@ class ShortTable(pd.DataFrame):
 
 
 def rows(table: pd.DataFrame, most: int = MOST) -> str:
-    """Return the first rows of a table, and how many follow."""
+    """Return the first rows of a table, and the number of rows that follow."""
     text = table.head(most).to_string(index=False, na_rep="", float_format=lambda x: f"{x:.4g}")
     left = len(table) - most
     return f"{text}\nand {left} more" if left > 0 else text
 
 
 def names(of: Sequence[str], most: int = 6) -> str:
-    """Return names with commas, the first of many."""
+    """Return names separated by commas; of many names only the first ones and their number."""
     left = len(of) - most
     return ", ".join(of[:most]) + (f" and {left} more" if left > 0 else "")

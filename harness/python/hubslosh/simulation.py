@@ -25,7 +25,10 @@ MOST_ROWS = 20_000_000  # Largest size of a table; the same as in ``harness/file
 
 
 class History:
-    """An input over time: lines between rows, or steps. Two rows at one time are a jump."""
+    """An input over time: straight lines between rows, or steps.
+
+    Two rows with the same time are a jump.
+    """
 
     def __init__(self, time: Real, values: Real, slopes: Real | None, hold: bool) -> None:
         """Take rows; slopes: from each to the next, None: of the lines between them."""
@@ -33,7 +36,7 @@ class History:
         self.native = native.History(time, values, slopes, hold)
 
     def after(self, t: Real) -> tuple[Real, Real]:
-        """Return values and slopes at ascending times ``t`` and immediately after them."""
+        """Return values and slopes of the input immediately after each ascending time ``t``."""
         values, slopes = self.native.after(np.ascontiguousarray(t, float))
         return np.frombuffer(values).copy(), np.frombuffer(slopes).copy()
 
@@ -180,7 +183,11 @@ def simulate(
 
 
 def asked_of(fmu: Fmu, columns: Sequence[str], given: Container[str]) -> list[str]:
-    """Return the variables to record: ``columns``, and those that say if a tank is in range."""
+    """Return the variables to record.
+
+    These are ``columns``, and the variables that show whether a tank is in the range of its model;
+    variables in ``given`` are left out.
+    """
     limits = [name for name in native.limit_columns(fmu.native) if name not in columns]
     return [name for name in (*columns, *limits) if name not in given]
 
@@ -193,9 +200,10 @@ def table_of(
     model: str | Path,
     parameters: Parameters,
 ) -> Run:
-    """Return a run as a table with the ``wanted`` rows, or with all rows if that is None.
+    """Return a run as a table.
 
-    Variables that say why a tank is out of range are columns only if ``asked`` names them.
+    ``wanted`` marks the rows to return; None returns all. The variables that say why a tank is out
+    of range become columns only if ``asked`` names them.
     """
     limits = [name for name in native.limit_columns(fmu.native) if name in columns]
     read = {name: np.ascontiguousarray(columns[name], float) for name in ("time", *limits)}
@@ -213,7 +221,10 @@ def table_of(
 def parameters_of(
     parameters: Parameters | str | Path | None,
 ) -> dict[str, Quantity]:
-    """Return parameters by name; a text or a path is a file of them."""
+    """Return parameters by name.
+
+    A text or a path is the file of a parameter set, which is read.
+    """
     if isinstance(parameters, str | Path):
         return dict(read_parameters(Path(parameters)))
     if parameters is None:
@@ -232,7 +243,10 @@ def outputs_of(
     parameters: Parameters,
     problems: list[str],
 ) -> list[str]:
-    """Return the variables to record; those of ``None`` are all outputs and what `view` needs."""
+    """Return the names of the variables to record.
+
+    For ``None`` these are all outputs and the variables from which `view` draws the run.
+    """
     if outputs is not None:
         return fmu.components(names_of(outputs, "outputs", problems))
 
@@ -257,7 +271,7 @@ def outputs_of(
 
 
 def too_many_rows(start: float, stop: float, step: float) -> list[str]:
-    """Return an error message in a list if there are more than `MOST_ROWS` rows; otherwise []."""
+    """Return a list with an error message if there are more than `MOST_ROWS` rows; else []."""
     rows = (stop - start) / step
     if rows <= MOST_ROWS:
         return []
@@ -268,7 +282,10 @@ def too_many_rows(start: float, stop: float, step: float) -> list[str]:
 def histories_of(
     fmu: Fmu, inputs: pd.DataFrame | None, hold: bool, problems: list[str]
 ) -> dict[str, History]:
-    """Return the inputs' histories by name; what is wrong with the table goes to ``problems``."""
+    """Return the history of each input by its name.
+
+    Everything that is wrong with the table ``inputs`` is appended to ``problems``.
+    """
     if inputs is None:
         return {}
     if not isinstance(inputs, pd.DataFrame):
@@ -345,7 +362,7 @@ def check_parameters(
     histories: Mapping[str, History],
     problems: list[str],
 ) -> None:
-    """Add to ``problems`` what is wrong with parameters."""
+    """Append to ``problems`` everything that is wrong with the parameters."""
     for name, value in parameters.items():
         try:
             variable = fmu.variable(name)
@@ -367,7 +384,7 @@ def check_parameters(
 
 
 def check_outputs(fmu: Fmu, columns: Sequence[str], problems: list[str]) -> None:
-    """Add to ``problems`` what is wrong with outputs."""
+    """Append to ``problems`` everything that is wrong with the names of outputs."""
     check: list[tuple[Callable[[str], bool], str]] = [
         (lambda name: columns.count(name) > 1, "is wanted twice"),
         (lambda name: fmu.kind(name) == "String", "is a text; only numbers are recorded"),

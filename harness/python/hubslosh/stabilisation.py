@@ -23,21 +23,24 @@ _TANK = re.compile(r"tank\[(\d)\]\.p(?:_dot)?\[(\d),\d\]")
 
 
 def resonances(gain: LinearModel, tanks: Sequence[str] = ()) -> list[dict[str, Any]]:
-    """Return a row for each slosh mode that shows in a sampled loop gain, command by command.
+    """Return a table of the slosh modes that appear in a sampled loop gain, command by command.
 
-    gain: sampled loop gain with the names of its states, as `Loop.gain` returns it. tanks: names of
-    the tanks in the FMU's order.
+    ``gain`` is the sampled loop gain with the names of its states, as `Loop.gain` returns it;
+    ``tanks`` has the names of the tanks in the FMU's order. Columns of the table:
 
-    ``loop``: the command at which the loop is broken while the others are closed. ``mode``: the
-    tanks and the number of the mode. ``frequency`` (Hz), ``zeta``: of the pole. ``zeta_closed``:
-    damping ratio when this loop is closed too. ``zero`` (Hz): frequency of the zero next to the
-    pole. ``order``: "zero first" if the zero has the lower frequency, otherwise "pole first".
-    ``peak`` (dB): loop gain at the pole's frequency. ``phase`` (deg): of R/(1 + L0), the direction
-    of the resonance circle; 0° is away from -1.
-    ``stabilised``: "unstable" if the closed loop's pole, all commands closed, grows (such a mode is
-    here even if it hardly shows in the loop gain); "gain" if the peak is below 0 dB;
-    "gain and phase" if moreover the phase is within ±90°, so that the loop adds damping; "phase" if
-    only that holds; "neither" if the mode is stable without either.
+    * ``loop``: command at which the loop is broken while the others are closed.
+    * ``mode``: tanks that take part, and number of the mode.
+    * ``frequency`` (Hz), ``zeta``: of the pole of the loop gain.
+    * ``zeta_closed``: damping ratio of this mode when this loop is closed too.
+    * ``zero`` (Hz): frequency of the zero next to the pole.
+    * ``order``: "zero first" if the zero has the lower frequency, otherwise "pole first".
+    * ``peak`` (dB): loop gain at the frequency of the pole.
+    * ``phase`` (deg): of R/(1 + L0), the direction of the resonance circle in the Nyquist plot; at
+      0° the circle points away from -1.
+    * ``stabilised``: "unstable" if the mode grows with all loops closed (such a mode is listed even
+      if it hardly appears in the loop gain); "gain" if the peak is below 0 dB; "phase" if the phase
+      is within ±90°, so that the loop adds damping; "gain and phase" if both hold; "neither" if the
+      mode is stable although neither holds.
     """
     found, closed = [], _closed(gain)
     for i in range(len(gain.D)):

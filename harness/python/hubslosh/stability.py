@@ -75,14 +75,20 @@ class Margins:
 
     @property
     def gain_margins(self) -> tuple[float, float]:
-        """Factors in dB by which the gain may shrink and grow: (-inf, inf) if without limit."""
+        """Gain margins down and up, dB: factors by which the gain may shrink and grow.
+
+        They are (-inf, inf) if any gain is allowed.
+        """
         every = self.crossings["gain_margin"].to_numpy(float)  # NaN: a gain crossing
         down, up = every[every < 0], every[every >= 0]
         return float(down.max(initial=-np.inf)), float(up.min(initial=np.inf))
 
     @property
     def phase_margin(self) -> float:
-        """Return the smallest phase margin in magnitude, deg; inf without a gain crossing."""
+        """Phase margin, deg: the smallest in magnitude of all gain crossings.
+
+        It is inf if the loop gain has no gain crossing.
+        """
         margins = self.crossings["phase_margin"].to_numpy(float)
         margins = margins[~np.isnan(margins)]
         return float(margins[np.abs(margins).argmin()]) if len(margins) else np.inf
@@ -169,7 +175,7 @@ def margins(loop: Loop | LinearModel | Any, parameters: Parameters | None = None
 def margins_and_gain(
     loop: Any, parameters: Parameters | None = None
 ) -> tuple[Margins, LinearModel]:
-    """Return what `margins` finds, and the loop gain."""
+    """Return the result of `margins` together with the loop gain, which it has computed."""
     if isinstance(loop, Loop):
         K = loop._must_be_linear()
         plant = loop.plant(parameters)
@@ -341,10 +347,10 @@ def _compiled(model: LinearModel) -> Any:
 
 
 def band(model: LinearModel) -> tuple[float, float]:
-    """Return the band of the first input's and output's poles and zeros, Hz.
+    """Return the frequency band (Hz) in which a diagram should show the first input and output.
 
-    It reaches from a fifth of the lowest to five times the highest, at most to half the sampling
-    rate.
+    It reaches from a fifth of the lowest pole or zero to five times the highest, but not above half
+    the sampling rate.
     """
     one = LinearModel(model.A, model.B[:, :1], model.C[:1], model.D[:1, :1], (), (), ())
     values = np.concatenate([model.poles, _zeros(one)])
@@ -358,7 +364,7 @@ def band(model: LinearModel) -> tuple[float, float]:
 
 
 def frequencies(model: LinearModel, low: float, high: float, count: int = 200) -> Matrix:
-    """Return ``count`` frequencies between two, Hz, and more about each lightly damped pole."""
+    """Return ``count`` frequencies from ``low`` to ``high`` (Hz), and more near light damping."""
     lines = [np.geomspace(low, high * (1 - 1e-9), count)]
     s = np.linalg.eigvals(model.A).astype(complex)
     if model.period is not None:
@@ -493,10 +499,10 @@ def _unit_eigenvalues(
 
 
 def minimal(model: LinearModel, tolerance: float = 1e-11) -> LinearModel:
-    """Return the part of a model that inputs move and outputs show, in other coordinates.
+    """Return the part of a model that is both controllable and observable.
 
-    By orthonormal bases of the controllable and of the observable subspace; directions smaller than
-    ``tolerance`` of the matrix's norm are rounding.
+    The states are transformed by orthonormal bases of the controllable and of the observable
+    subspace. Directions smaller than ``tolerance`` times the norm of the matrix count as rounding.
     """
 
     def basis(A: Matrix, B: Matrix) -> Matrix:

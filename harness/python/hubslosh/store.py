@@ -16,9 +16,10 @@ _NAMED = 3  # Number of runs that a warning names
 
 
 def encoded(value: Any) -> Any:
-    """Return a value for JSON; two values have the same JSON only if type and value are equal.
+    """Return a value in a form that JSON can store.
 
-    Raises TypeError for a value that has no such form.
+    Two values have the same JSON only if both type and value are equal. Raises TypeError for a
+    value that cannot be stored.
     """
     match value:
         case np.generic() | np.ndarray() if not value.dtype.hasobject:
@@ -46,12 +47,12 @@ def encoded(value: Any) -> Any:
 
 
 def decoded(value: Any) -> float:
-    """Return the number that `encoded` has written as JSON; NaN and infinite ones too."""
+    """Return the number that `encoded` has written, including NaN and infinite numbers."""
     return float(value["float"] if isinstance(value, dict) else value)
 
 
 class Store:
-    """A study's folder, held from ``with`` to its end."""
+    """The folder of a study, which is locked within a ``with`` statement."""
 
     def __init__(self, folder: str | Path, seed: int, ranges: Mapping[str, str]) -> None:
         """Lock the folder for the study with this seed and a text for each range."""
@@ -68,9 +69,10 @@ class Store:
         self._store.close()
 
     def rows(self, draws: list[dict[str, Any]]) -> dict[int, dict[str, Any]]:
-        """Return the results of the stored runs by their numbers; warn of runs that cannot be used.
+        """Return the results of the stored runs by the numbers of the runs.
 
-        ``draws`` are the values that the seed gives; a stored run must have the same.
+        ``draws`` has the values that the seed gives. A stored run that has other values, or that is
+        damaged, is left out with a warning.
         """
         found, damaged = {}, []
         for run, drawn in enumerate(draws):
@@ -89,7 +91,7 @@ class Store:
     def add(
         self, run: int, drawn: Mapping[str, Any], found: Mapping[str, float], **more: Any
     ) -> None:
-        """Store a run; it is on the disk when this returns."""
+        """Store the result of a run. When the call returns, it is on the disk."""
         row = {"run": run, "drawn": _texts(drawn), "found": _texts(found)} | more
         self._store.add(_name(run), (json.dumps(row) + "\n").encode())
 
@@ -116,7 +118,7 @@ def _row(
         row = {name: decoded(value) for name, value in stored["found"].items()}
         more = {key: stored[key] for key in stored if key not in ("run", "drawn", "found")}
     except (ValueError, TypeError, KeyError, AttributeError) as error:
-        return {}, damage or f"its file is not one of a run: {error!r}"
+        return {}, damage or f"the file is not the file of a run: {error!r}"
     return row | more, "; ".join(changed) or damage
 
 

@@ -15,8 +15,9 @@ from .fmu import DefinedUnit, FmuError, Quantity, Value
 def read_table(path: Path, columns: Sequence[str]) -> dict[str, np.ndarray]:
     r"""Read columns of numbers from a .csv or .parquet file; needs pyarrow.
 
-    A column ``time`` of dates or durations is read in seconds, dates from the first row on.
-    Integers as times of a Parquet file are refused, because their unit is not known.
+    A column ``time`` of dates or durations is read in seconds, dates as seconds since the first
+    row. Integers in the column ``time`` of a Parquet file are refused, because their unit is not
+    known.
 
     Parameters
     ----------
@@ -88,9 +89,9 @@ def _numbers(path: Path, name: str, column: Any) -> np.ndarray:
 def read_parameters(path: str | Path) -> dict[str, Quantity]:
     r"""Read a file of parameters: .toml, .ssv or .json.
 
-    The file has ``"name" = value`` as TOML, where nested tables are names with dots; or the
-    parameter set of SSP 1.0, .ssv; or it is a result of ``hubslosh identify --out``. ``hubslosh
-    tank --parameters`` writes the first two.
+    A .toml file has lines ``"name" = value``; nested tables give names with dots. An .ssv file is a
+    parameter set of SSP 1.0. A .json file is a result of ``hubslosh identify --out``. ``hubslosh
+    tank --parameters`` writes the first two kinds.
 
     Parameters
     ----------
@@ -137,10 +138,10 @@ def _with_unit(value: Value, unit: str | None, base: tuple | None) -> Quantity:
 def write_table(
     path: Path, table: Mapping[str, np.ndarray], notes: Mapping[str, str] | None = None
 ) -> None:
-    """Write columns of numbers to a .csv or .parquet file, with every digit; needs pyarrow.
+    """Write columns of numbers to a .csv or .parquet file, with all digits; needs pyarrow.
 
-    The file appears complete or not at all: it is written in a temporary folder next to its
-    place, then moved.
+    The file appears complete or not at all, because it is written to a temporary folder next to its
+    place and then moved.
 
     Parameters
     ----------
@@ -177,7 +178,10 @@ def write_table(
 
 
 def ending_of(path: Path) -> str:
-    """Return csv or parquet."""
+    """Return the ending of a table's file name, csv or parquet.
+
+    Raises FmuError for other endings.
+    """
     ending = path.suffix.lower().lstrip(".")
     if ending not in ("csv", "parquet"):
         raise FmuError(f"{path}: the name must end in .csv or .parquet")
@@ -185,7 +189,7 @@ def ending_of(path: Path) -> str:
 
 
 def setting(text: str) -> tuple[str, str]:
-    """Return name and value of a command line's argument NAME=VALUE.
+    """Return the name and the value in an argument NAME=VALUE of the command line.
 
     Parameters
     ----------

@@ -238,7 +238,7 @@ class Tank:
 
 @dataclass(frozen=True, eq=False)
 class TankCase:
-    """A tank, its fill and its liquid."""
+    """A tank to compute: its drawing, its fill and its liquid."""
 
     source: "dict[str, Any] | Path"
     """File, or what stands in one."""
@@ -260,16 +260,16 @@ def read_drawing(source: "dict[str, Any] | Path") -> Any:
 
 
 def toml_of(source: Mapping[str, Any]) -> str:
-    """Return the text of a tank file with this content."""
+    """Return the text of a TOML file with this content, a tank file as a dictionary."""
     return "".join(f"{toml_key(key)} = {_toml(value)}\n" for key, value in source.items())
 
 
 def solve(
     cases: Sequence[TankCase], drawings: Sequence[Any] | None = None
 ) -> "list[Tank | FmuError]":
-    """Compute each tank on all cores, and return its result or its error.
+    """Compute the modes of several tanks on all cores, and return for each its result or its error.
 
-    ``drawings`` are the results of `read_drawing` for the cases, if they are known already.
+    ``drawings`` are the results of `read_drawing` for the cases, if they were read already.
     """
     drawings = drawings or [read_drawing(case.source) for case in cases]
     found = native.solve(
@@ -376,10 +376,10 @@ def tank(
 def fill_table(
     case: TankCase, between: Sequence[float | str]
 ) -> "tuple[dict[str, Value], list[str]]":
-    """Return the fill table of tank 1 of Spacecraft, which lets it drain, and warnings.
+    """Return the parameters of a draining tank 1 of Spacecraft, and warnings.
 
-    * ``between``: Lowest and highest fill of the table. Up to 12 points are placed between them, in
-      some 5 s of CPU time.
+    ``between`` has the lowest and the highest fill of the table of modal parameters. Up to 12 fills
+    are placed between them, which takes about 5 s of CPU time.
     """
     ends = tuple(between)
     if len(ends) != 2:
@@ -424,7 +424,7 @@ def _is_number(value: Any) -> bool:
 
 
 def toml_key(key: Any) -> str:
-    """Return a key as TOML has it."""
+    """Return a key in the form in which TOML writes it, with quotes if necessary."""
     return str(key) if re.fullmatch(r"[A-Za-z0-9_-]+", str(key)) else json.dumps(str(key))
 
 

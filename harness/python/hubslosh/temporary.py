@@ -11,18 +11,20 @@ from .native import FmuError, Folder, destination, put
 
 
 def folder(parent: Path | None = None, *, hidden: bool = False) -> Folder:
-    """Return a temporary folder for ``with``, by default in the system's; it goes at the end.
+    """Return a temporary folder for a ``with`` statement, at whose end it is removed.
 
-    Folders there that killed processes of Python or of the program have left are removed first.
+    By default it is in the system's folder for temporary files. Folders that were left there by
+    killed processes of Python or of the program are removed first.
     """
     return Folder(Path(tempfile.gettempdir()) if parent is None else parent, hidden)
 
 
 @contextmanager
 def output(path: Path) -> Iterator[Path]:
-    """Yield a file that becomes the output ``path`` when all of it is written.
+    """Yield a temporary file that replaces the output ``path`` after it was written completely.
 
-    Links of ``path`` are followed. A plain file is replaced; a device or a pipe gets the bytes.
+    Links are followed. If ``path`` leads to a device or a pipe, the bytes are written to it
+    instead.
     """
     place = destination(path)
     # a device has no folder of its own next to it
@@ -49,7 +51,10 @@ def check_path(path: Any, ending: str) -> Path:
 
 
 def write_file(path: str | Path, ending: str, content: Callable[[], str | bytes]) -> None:
-    """Write a text or bytes, which are made after the file's name was checked."""
+    """Write a text or bytes to a file, after checking that the file's name has the ending.
+
+    ``content`` is a function that returns the text or the bytes; it is called after the check.
+    """
     path = check_path(path, ending)
     with output(path) as new:
         made = content()

@@ -127,13 +127,13 @@ class _Craft:
         return _rigid(*self.dry(self.values)) + self.liquid
 
     def accelerations(self) -> tuple[Matrix, Matrix]:
-        """Return X as one rigid body, and with moving bobs."""
+        """Return the accelerations X of one rigid body, and those with moving slosh masses."""
         matrices = self.rigid(), self.mass_matrix(self.values)
         whole, moving = (np.linalg.solve(M, self.wrench) for M in matrices)
         return whole, moving
 
     def mass_matrix(self, values: Mapping[str, float]) -> Matrix:
-        """Return M: all but the bobs' motion across their axes."""
+        """Return the mass matrix without the motion of the slosh masses across their axes."""
         M = _rigid(*self.dry(values)) + self.liquid
         for bob in self.bobs:
             tank = self.tanks[bob.tank]
@@ -346,11 +346,14 @@ class _Equations:
         self.most = width + 12 * max(np.count_nonzero(self.spread), 1) * (1 + len(values) // 4)
 
     def unit(self, first: int, count: int) -> Matrix:
-        """Return signals by themselves, from number ``first`` on."""
+        """Return ``count`` signals, from number ``first`` on, as rows of an identity matrix."""
         return np.eye(count, self.most, first)
 
     def times(self, name: str, signal: Matrix) -> Matrix:
-        """Return a parameter times signals: each that is not 0 becomes a channel of Δ."""
+        """Return the product of a parameter and signals.
+
+        If the parameter is uncertain, each signal that is not 0 adds a channel to Δ.
+        """
         product = self.values[name] * signal
         if name in self.index:
             for j in np.flatnonzero(self.spread[self.index[name]]):
@@ -541,12 +544,16 @@ class UncertainModel:
 
     @property
     def deltas(self) -> tuple[str, ...]:
-        """Names of the δ: parameters with ranges, then ``axis[n]`` for axes of a covariance."""
+        """Names of the δ in Δ.
+
+        These are the parameters with ranges, then ``axis[n]`` for the principal axes of a
+        covariance.
+        """
         return tuple(str(name) for name in self.spread.columns)
 
     @property
     def order(self) -> int:
-        """Size of Δ."""
+        """Number of rows of Δ, in which a parameter may occur several times."""
         return sum(self.counts)
 
     def __repr__(self) -> str:
@@ -559,7 +566,7 @@ class UncertainModel:
         )
 
     def delta(self, delta: Mapping[str, float] | ArrayLike) -> Matrix:
-        """Return the δ as a vector.
+        """Return values of δ, given by name or as a sequence, as a vector.
 
         Parameters
         ----------
@@ -882,13 +889,14 @@ class UncertainModel:
         return _closed(loop._gain(self.at(delta), K))
 
     def worst_case(self, loop: Loop, largest: float = 3.0) -> WorstCase:
-        """Return the smallest real Δ that a search finds at the limit of stability of a loop.
+        """Return the smallest real Δ for which a search finds the loop at the limit of stability.
 
-        The sampled loop is exact, delay included. From each lightly damped pole the search follows
-        the sign of the pole's derivatives by δ, up to ``|δ| = largest``, until the signs repeat.
-        It also goes from 0 to each corner of the ranges, 64 of them if there are more. Damping
-        ratios stay at 0 or above. Any Δ found is a lower bound of µ; one that is not found is no
-        proof, see `certify`.
+        The search uses the exact sampled loop, with its delay. Starting from each lightly damped
+        pole, it follows the sign of the derivatives of the pole's damping by each δ, up to ``|δ| =
+        largest``, until the signs repeat. It also tries the lines from 0 to each corner of the
+        ranges, or to 64 of the corners if there are more. Damping ratios stay at 0 or above. A Δ
+        that was found gives a lower bound of µ. If none was found, the loop may still be unstable
+        for some Δ: `certify` proves stability.
 
         Parameters
         ----------

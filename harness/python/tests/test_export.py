@@ -75,7 +75,7 @@ def test_the_system_has_the_craft_and_its_parameters(craft: Craft, tmp_path: Pat
     }
 
 
-def test_the_linear_model_stands_in_the_mat(craft: Craft, tmp_path: Path) -> None:
+def test_the_mat_file_contains_the_linear_model(craft: Craft, tmp_path: Path) -> None:
     """With parameters and inputs at the start."""
     found = loadmat(craft.export(tmp_path, FILL)["mat"], squeeze_me=True)
     model = craft.linearize(FILL)

@@ -20,7 +20,7 @@ G = 9.81  # m/s²
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-def test_between_its_points_a_table_is_the_tank_s_own_parameters(
+def test_between_its_points_a_fill_table_gives_the_parameters_of_the_tank(
     shape: str, request: pytest.FixtureRequest, fmu: Path, tmp_path: Path
 ) -> None:
     """Frequency and mass within 0.5 %; forces and torques, which the hinge is in, within 2 %."""

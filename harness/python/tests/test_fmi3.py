@@ -57,7 +57,7 @@ def test_held_inputs_give_the_bits_of_fmi_2(fmu: Path, model: str) -> None:
 
 
 @pytest.mark.parametrize("model", INPUTS)
-def test_inputs_in_lines_go_through_intermediate_update(fmu: Path, model: str) -> None:
+def test_linear_inputs_are_passed_by_intermediate_update(fmu: Path, model: str) -> None:
     """FMI 3.0 receives ends of lines, not slopes: slopes are right to some units of the last digit.
 
     Held inputs are far from it.
@@ -171,7 +171,7 @@ def test_one_compiled_call_gives_the_bits_of_single_calls(
         ),
     ],
 )
-def test_a_run_that_stops_says_where_and_keeps_what_it_has(
+def test_a_run_that_stops_reports_the_time_and_keeps_its_rows(
     fmu: Path, torque: np.ndarray, hold: bool, sentence: str
 ) -> None:
     """The message names the function that refused, as in FMI 2.0."""

@@ -164,7 +164,7 @@ def test_a_fit_of_a_sweep_finds_antiresonance_and_resonance(fmu: Path) -> None:
     assert hertz[1] == pytest.approx(hertz[2], abs=2e-3)
 
 
-def test_a_fit_says_what_is_wrong_with_it(fmu: Path) -> None:
+def test_a_wrong_fit_raises_errors_with_the_reason(fmu: Path) -> None:
     """Everything at once."""
     with pytest.raises(FmuError, match=r"no column real; .*no column imag; poles must be"):
         fit(pd.DataFrame({"frequency": [1.0]}), poles=1, zeros=2)

@@ -25,7 +25,7 @@ def crossings(found, kind: str) -> np.ndarray:
     return table.loc[table["crossing"] == kind, "frequency"].to_numpy() * TURN
 
 
-def test_three_lags_by_their_closed_form() -> None:
+def test_margins_of_three_lags_equal_the_closed_form() -> None:
     """10/(s + 1)³: |L| = 1 at sqrt(10^(2/3) - 1), negative real at sqrt(3), where it is -10/8."""
     found = margins(10 / (S + 1) ** 3)
     gain, phase = np.sqrt(10 ** (2 / 3) - 1), np.sqrt(3)
@@ -36,7 +36,7 @@ def test_three_lags_by_their_closed_form() -> None:
     assert found.phase_margin == pytest.approx(180 - 3 * np.degrees(np.arctan(gain)), rel=EXACT)
 
 
-def test_an_integrator_with_two_lags_by_its_closed_form() -> None:
+def test_margins_of_an_integrator_with_two_lags_equal_the_closed_form() -> None:
     """3/(s (s + 1) (s + 2)): negative real at sqrt(2), where it is -3/6; Routh: stable below 6."""
     found = margins(3 / (S * (S + 1) * (S + 2)))
     assert crossings(found, "phase") == pytest.approx([np.sqrt(2)], rel=EXACT)
@@ -51,7 +51,7 @@ def test_an_integrator_with_two_lags_by_its_closed_form() -> None:
 
 
 @pytest.mark.parametrize("half", [0.05, 1e-4])
-def test_a_slosh_dipole_however_narrow(half: float) -> None:
+def test_crossings_at_a_narrow_slosh_dipole_are_found(half: float) -> None:
     """By choice of k, a, b k (s² + a²)/(s (s² + b²)) is 1 at 2.5 - half, 2.5 and 2.5 + half rad/s.
 
     The narrower dipole is 1e-8 rad/s wide: no frequency grid would see it. The three are roots of
@@ -67,7 +67,7 @@ def test_a_slosh_dipole_however_narrow(half: float) -> None:
 
 
 @pytest.mark.parametrize("late", [0, 2])
-def test_a_sampled_integrator_by_its_closed_form(late: int) -> None:
+def test_margins_of_a_sampled_integrator_equal_the_closed_form(late: int) -> None:
     """1.5 T/(z^late (z - 1)): |L| = 1 where 2 sin(wT/2) = 1.5 T.
 
     Its phase is -90° - (late + 1/2) wT. At half the sampling rate it is real: -0.75 T for an even
@@ -285,7 +285,7 @@ def test_the_delay_margin_puts_a_pole_on_the_unit_circle(fmu: Path) -> None:
         assert late.delay_margin == pytest.approx(found.delay_margin / 2, rel=1e-9)
 
 
-def test_a_loop_gain_of_rounding_is_no_crossing(fmu: Path) -> None:
+def test_a_loop_gain_that_is_only_rounding_has_no_crossing(fmu: Path) -> None:
     """A roll-off by Tustin's rule is 0 at half the sampling rate, but for rounding."""
     lag = control.ss(1 / (S / 3 + 1) ** 2)
     found = margins(Loop(5 * lag, 0.1, fmu, {"friction.model": "viscous"}, "theta"))

@@ -138,7 +138,7 @@ def test_the_difference_to_co_simulation_is_cvodes_error(fmu: Path) -> None:
         assert difference(fine, expected, name) < difference(coarse, expected, name) / 10, name
 
 
-def test_euler_approaches_it_in_first_order(fmu: Path) -> None:
+def test_euler_converges_to_co_simulation_with_first_order(fmu: Path) -> None:
     """A tenth of the step, a tenth of the error, though events lie between the steps."""
     expected = co_simulation(fmu, start_values("frozen"), tau())
     coarse, fine = (

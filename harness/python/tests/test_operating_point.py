@@ -181,7 +181,7 @@ def test_every_method_reports_a_wrong_name_in_the_same_words(craft: Craft, name:
         assert WRONG[name] in str(told.value)
 
 
-def test_a_delta_has_the_names_of_tanks(craft: Craft) -> None:
+def test_uncertain_values_can_be_named_by_tanks(craft: Craft) -> None:
     """By name and by number."""
     model = craft.uncertain("50%", {"NTO.frequency[1]": "5%", "craft.Jxx": "5%"})
     for name in ("NTO.frequency[1]", "tank[1].frequency[1]"):

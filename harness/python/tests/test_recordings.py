@@ -186,8 +186,9 @@ def test_the_command_lets_the_package_read_other_file_formats(
     monkeypatch.setenv("PATH", "")
     _mat(tmp_path / "structure.mat")
     done = run("structure.mat", COLUMNS.format("log."))
-    assert done.returncode and "it is neither text in columns nor Parquet; the Python package" in (
-        done.stderr
+    assert (
+        done.returncode
+        and "the file is neither text in columns nor Parquet; the Python package" in (done.stderr)
     )
     assert "pip install 'hubslosh[recordings]'" in done.stderr
 
@@ -229,7 +230,9 @@ def test_unreadable_files_are_refused_with_a_reason(tmp_path: Path) -> None:
     with pytest.raises(FmuError, match=r"line 6, column omega: .*the column ends here"):
         read_recording(tmp_path / "a.mat")
     savemat(tmp_path / "b.mat", {"note": "a text"})
-    with pytest.raises(FmuError, match=r"b\.mat cannot be used: it holds no vector or matrix"):
+    with pytest.raises(
+        FmuError, match=r"b\.mat cannot be used: the file holds no vector or matrix"
+    ):
         read_recording(tmp_path / "b.mat")
     _mdf(tmp_path / "c.mf4")
     with pytest.raises(
@@ -238,7 +241,7 @@ def test_unreadable_files_are_refused_with_a_reason(tmp_path: Path) -> None:
         read_recording(tmp_path / "c.mf4")
     (tmp_path / "d.bin").write_bytes(b"\1\0\2\0" * 99)
     with pytest.raises(
-        FmuError, match=r"it is of no known kind .allowed: text in columns, a \.mat"
+        FmuError, match=r"the file is of no known kind .allowed: text in columns, a \.mat"
     ):
         read_recording(tmp_path / "d.bin")
     with pytest.raises(FmuError, match="cannot be opened"):

@@ -230,7 +230,7 @@ def test_the_page_answers_first_and_needs_no_network(
         found.html()
 
 
-def test_the_suggested_filter_does_what_it_says(craft: Craft) -> None:
+def test_the_suggested_filter_raises_the_margin_as_stated(craft: Craft) -> None:
     """Slosh between hinge and bob: stable with the filter, as `margins` of its controller says."""
     craft = replace(craft, tanks={"ox": replace(craft.tanks["ox"], position=(0, 0, 0.62))})
     lightly = {"tank[1].zeta[1]": 5e-4}
@@ -369,7 +369,7 @@ def test_a_project_is_the_same_after_it_was_written_and_read(
     model = Project.read(tmp_path / "one.toml").controller
     s = 2j * np.pi * 0.3
     assert model.response(0.3)[0, 0, 0] == pytest.approx((s + 2) / (s + 4), rel=1e-12)
-    with pytest.raises(FmuError, match="has no form in a file"):
+    with pytest.raises(FmuError, match="cannot be written to a project file"):
         Project(craft, lambda _t, _y: 0.0, settings).save(tmp_path / "law.toml")
     assert not (tmp_path / "law.toml").exists()
     for text, said in {
@@ -383,7 +383,9 @@ def test_a_project_is_the_same_after_it_was_written_and_read(
             Project.read(tmp_path / "wrong.toml")
 
 
-def test_two_designs_stand_on_one_page(craft: Craft, tmp_path: Path, capsys, monkeypatch) -> None:
+def test_two_designs_are_compared_on_one_page(
+    craft: Craft, tmp_path: Path, capsys, monkeypatch
+) -> None:
     """The worse one first and marked; the command compares two files."""
     settings = {"period": PERIOD, "fills": ["30%", "60%"], "damping": "nominal", "draws": 2}
     for name, factor in {"good": 1, "wrong sign": -1}.items():

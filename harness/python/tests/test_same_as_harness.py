@@ -123,7 +123,7 @@ def test_a_held_torque_and_a_tolerance_give_the_same_rate(
     assert np.abs(ours["omega"] - theirs["omega"]).max() <= 1e-12
 
 
-def test_a_written_torque_history_drives_the_harness_alike(
+def test_a_written_torque_history_gives_the_same_run_by_the_harness(
     fmu: Path, harness: Harness, tmp_path: Path
 ) -> None:
     """The other way round: a table written here is read there, every digit of it."""

@@ -145,7 +145,7 @@ def test_all_faults_of_a_call_are_reported_at_once(fmu: Path) -> None:
         "inputs are tau_cmd, tau_ext, g_axial",
         "time in inputs goes back after row 1, 2.0 s",
         "no variable tank.height; did you mean tank.h",
-        "tank.h cannot be (5, 'inch'): it has no unit inch (units: m, mm)",
+        "tank.h cannot be (5, 'inch'): the variable has no unit inch (units: m, mm)",
         "theta is computed by the FMU (output)",
         "there are frozen, linear, planar, spherical, liquid",
         "no variable omga; did you mean omega",
@@ -191,7 +191,7 @@ def test_the_limit_of_rows_equals_that_of_the_command_line() -> None:
     assert f"pub const ROWS: usize = {simulation.MOST_ROWS:_};" in budget.read_text()
 
 
-def test_a_run_that_stops_says_where_and_keeps_what_it_has(fmu: Path) -> None:
+def test_a_run_that_stops_reports_the_time_and_keeps_its_rows(fmu: Path) -> None:
     """The FMU refuses NaN in row 500; 501 rows were read."""
     torque = TORQUE.copy()
     torque[500] = np.nan
@@ -213,7 +213,7 @@ def test_an_unknown_model_raises_an_error_with_suggestions(tmp_path: Path) -> No
     with pytest.raises(FmuError, match="pack makes it"):
         simulate(tmp_path / "none.fmu")
     (tmp_path / "text.fmu").write_text("no zip")
-    with pytest.raises(FmuError, match="is not an FMU: it is not a zip archive"):
+    with pytest.raises(FmuError, match="is not an FMU: the file is not a zip archive"):
         simulate(tmp_path / "text.fmu")
 
 
@@ -231,7 +231,9 @@ def test_inputs_may_be_in_their_display_units(fmu: Path) -> None:
     again = simulate(fmu, inputs=ours[["time", "tau_cmd"]], outputs=["omega"])
     assert np.abs(again["omega"] - ours["omega"]).max() < 1e-12
     scaled.attrs["units"] = {"tau_cmd": "lbf.ft"}
-    with pytest.raises(FmuError, match=r"unit of tau_cmd in inputs: it has no unit lbf.ft .*mN.m"):
+    with pytest.raises(
+        FmuError, match=r"unit of tau_cmd in inputs: the variable has no unit lbf.ft .*mN.m"
+    ):
         simulate(fmu, inputs=scaled)
 
 

@@ -70,7 +70,7 @@ def test_with_nothing_set_hubslosh_moves_and_the_others_rest(fmu: Path) -> None:
         assert not any(result[name].any() for name in names)
 
 
-def test_held_input_is_what_the_harness_holds(fmu: Path) -> None:
+def test_held_inputs_of_fmpy_equal_those_of_the_harness(fmu: Path) -> None:
     """A plain table: fmpy holds each value over the step. Only rounding parts the two."""
     rate = drive(fmu, TIME, tau(TIME), hold=True)["omega"]
     assert difference(simulate(fmu, input=table(TIME, tau(TIME))), rate) <= 1e-9
@@ -103,7 +103,7 @@ def test_fmpy_still_allocates_nine_derivatives(fmu: Path) -> None:
 
 
 @pytest.mark.usefixtures("repaired")
-def test_interpolated_input_is_what_the_harness_hands_over(fmu: Path) -> None:
+def test_interpolated_inputs_of_fmpy_equal_those_of_the_harness(fmu: Path) -> None:
     """The FMU's part of fmpy's interpolation is in order.
 
     Where a communication point meets a row, fmpy hands over the slope that ends there. Rows
@@ -114,7 +114,7 @@ def test_interpolated_input_is_what_the_harness_hands_over(fmu: Path) -> None:
     assert difference(simulate(fmu, input=early, set_input_derivatives=True), rate) <= 1e-7
 
 
-def test_jumps_in_the_input_are_met(fmu: Path) -> None:
+def test_fmpy_steps_to_jumps_of_the_input(fmu: Path) -> None:
     """A pulse with upright edges between the output points; fmpy steps onto them."""
     edges = [(0.0, 0.0), (1.003, 0.0), (1.003, 0.05), (2.007, 0.05), (2.007, 0.0), (60.0, 0.0)]
     theirs = simulate(fmu, input=np.array(edges, [("time", float), ("tau_cmd", float)]))
@@ -148,7 +148,7 @@ def heard_by_omsimulator(name: str) -> str:
     return ".".join(part for part in name.split(".") if part not in ("model", "root", "fmu"))
 
 
-def test_names_that_omsimulator_hears_choose_the_spherical_model(fmu: Path) -> None:
+def test_omsimulator_sets_the_spherical_model_by_names_that_it_accepts(fmu: Path) -> None:
     """Only `slosh.model` and `friction.model` are lost there, and kinds choose the same."""
     variables = read_model_description(str(fmu)).modelVariables
     lost = {v.name for v in variables if heard_by_omsimulator(v.name) != v.name}

@@ -82,7 +82,7 @@ def test_a_resumed_study_returns_every_kind_of_value_with_its_type(tmp_path: Pat
     assert len(pd.read_csv(tmp_path / "runs.csv")) == 40
 
 
-def test_different_values_have_different_texts() -> None:
+def test_different_values_are_stored_as_different_texts() -> None:
     """Values that are equal but of another type too."""
     values = [item for of in RANGES.values() if isinstance(of, list) for item in of]
     values += [
@@ -131,7 +131,7 @@ def test_an_edited_run_is_named_and_not_used(tmp_path: Path) -> None:
         assert cells(study(tmp_path)) == cells(whole)
     assert file.read_bytes() == original
     file.unlink()
-    with pytest.warns(FmuWarning, match="re-running run 7: its file is missing"):
+    with pytest.warns(FmuWarning, match="re-running run 7: the file of the run is missing"):
         assert cells(study(tmp_path)) == cells(whole)
 
     edited(file, lambda stored: stored["found"].update(ratio=1.0))
@@ -142,9 +142,9 @@ def test_an_edited_run_is_named_and_not_used(tmp_path: Path) -> None:
         assert cells(study(tmp_path)) == cells(whole)
     (warning,) = warned
     for words in (
-        f"{tmp_path}: re-running run 7: its SHA-256 is not that in manifest.sha256",
+        f"{tmp_path}: re-running run 7: the SHA-256 of the file differs from the one in",
         "re-running run 8: tank.h is ",
-        "re-running run 9: its SHA-256 is not that in manifest.sha256; it is damaged, or another",
+        "re-running run 9: the SHA-256 of the file differs from the one in manifest.sha256",
         "; and 1 more",
     ):
         assert words in str(warning.message), warning.message
@@ -309,14 +309,14 @@ def test_campaigns_and_studies_judge_a_folder_alike(doors: dict[str, Door], tmp_
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             says(False, rf"is held by another {kind}: process \d+, .*, for \d+ s; wait for its end")
         says(True)
-        changed = "re-running .*: its SHA-256 is not that in manifest.sha256; it is damaged, or"
+        changed = "re-running .*: the SHA-256 of the file differs from the one in manifest.sha256"
         for data in (whole[: len(whole) // 2], b"", whole + b" "):
             first.write_bytes(data)
             says(True, changed)
             assert first.read_bytes() == whole
         first.unlink()
-        says(True, "re-running .*: its file is missing")
-        unlisted = "re-running .*: it has no line in manifest.sha256, which is damaged"
+        says(True, "re-running .*: the file of the run is missing")
+        unlisted = "re-running .*: the run has no line in manifest.sha256, which is damaged"
         unverified = "manifest.sha256 is damaged, so nothing verifies the stored runs; restore it"
         for data, succeeds, words in (
             (good + row[:30], True, []),  # as a kill leaves it

@@ -324,7 +324,7 @@ def test_units_of_a_parameter_set_are_converted(
         (
             parameter("tank.h", "50", "min"),
             "",
-            "the unit min of the file is not a unit of its kind, m",
+            "the unit min in the file cannot be converted to m",
         ),
         (parameter("friction.model", "1", "m", "Integer"), "", "has no unit"),
         (parameter("tank.h", "50 mm"), "", "allowed: a value of type Real"),

@@ -34,7 +34,7 @@ def started(fmu: Path, how: str, folder: Path) -> int:
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGKILL")
-def test_folders_of_a_killed_process_go_at_the_next_start(
+def test_folders_of_a_killed_process_are_removed_at_the_next_start(
     fmu: Path, tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:
     """In Python and of the program; a folder of a living process stays, and what is not ours."""
@@ -59,7 +59,7 @@ def test_folders_of_a_killed_process_go_at_the_next_start(
     assert not living.parent.exists()
 
 
-def test_a_table_that_was_not_written_to_its_end_goes_with_the_next_one(tmp_path: Path) -> None:
+def test_an_incomplete_table_is_removed_when_the_next_one_is_written(tmp_path: Path) -> None:
     """The draft lies in the folder of the file, for it is renamed."""
     import pandas as pd
 
@@ -86,7 +86,9 @@ with hubslosh.Plant(sys.argv[1]):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no forks")
-def test_the_end_of_a_fork_leaves_the_folder_of_its_parent(fmu: Path, tmp_path: Path) -> None:
+def test_the_end_of_a_forked_process_does_not_remove_the_folder_of_its_parent(
+    fmu: Path, tmp_path: Path
+) -> None:
     """The parent removes it at its own end."""
     environment = os.environ | {
         "PYTHONPATH": str(Path(__file__).parents[1]),

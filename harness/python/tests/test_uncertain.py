@@ -422,5 +422,5 @@ def test_a_failed_certificate_is_reported(
     found = model.certify(loop, most=1)
     assert found.size == 0 and found.mu == found.gap == np.inf
     assert "none was found with" in repr(found) and "WorstCase" in repr(found)
-    with pytest.raises(FmuError, match="nothing was proved"):
+    with pytest.raises(FmuError, match="the certificate proves nothing"):
         found.save(tmp_path / "none.npz")

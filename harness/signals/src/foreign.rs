@@ -36,24 +36,24 @@ pub enum Kind {
 /// # Errors [`Foreign`] if it is neither text nor Parquet.
 pub fn kind(path: &Path) -> Result<Kind> {
     const PACKED: [(&[u8], &str); 3] = [
-        (b"\x1f\x8b", "it is compressed with gzip: unpack it first (gunzip)"),
-        (b"\x28\xb5\x2f\xfd", "it is compressed with zstd: unpack it first (unzstd)"),
+        (b"\x1f\x8b", "the file is compressed with gzip: unpack it first (gunzip)"),
+        (b"\x28\xb5\x2f\xfd", "the file is compressed with zstd: unpack it first (unzstd)"),
         (
             b"SQLite format 3",
-            "it is an SQLite database, as a ROS 2 bag is: export its topics as CSV",
+            "the file is an SQLite database, as a ROS 2 bag is: export the topics as CSV",
         ),
     ];
     let mut start = Vec::new();
-    input::open(path).context("it cannot be opened")?.take(4096).read_to_end(&mut start)?;
+    input::open(path).context("the file cannot be opened")?.take(4096).read_to_end(&mut start)?;
     if let Some((_, words)) = PACKED.iter().find(|(sign, _)| start.starts_with(sign)) {
         bail!("{words}");
     }
     if [&b"\xff\xfe"[..], b"\xfe\xff"].iter().any(|mark| start.starts_with(mark)) {
-        bail!("it is UTF-16; save it as UTF-8");
+        bail!("the file is in UTF-16; save it as UTF-8");
     }
     match start.contains(&0) {
         _ if start.starts_with(b"PAR1") => Ok(Kind::Parquet),
-        true => Err(Foreign("it is neither text in columns nor Parquet".into()).into()),
+        true => Err(Foreign("the file is neither text in columns nor Parquet".into()).into()),
         false => Ok(Kind::Text),
     }
 }

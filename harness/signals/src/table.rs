@@ -128,7 +128,7 @@ impl Table {
     fn check(&self) -> Result<()> {
         let mut names = BTreeSet::new();
         if let Some(twice) = self.names.iter().find(|name| !names.insert(*name)) {
-            bail!("two of its columns are called {twice} (allowed: each name once)");
+            bail!("two of the columns are called {twice} (allowed: each name once)");
         }
         self.all_finite()
     }
@@ -199,8 +199,9 @@ impl Table {
         let mut writer = SerializedFileWriter::new(file, Arc::new(schema), Arc::new(properties))?;
         let mut group = writer.next_row_group()?;
         for (name, values) in self.names.iter().zip(&self.columns) {
-            let mut column =
-                group.next_column()?.context("it has fewer columns than names in its header")?;
+            let mut column = group
+                .next_column()?
+                .context("the file has fewer columns than names in its header")?;
             let typed = column.typed::<DoubleType>();
             if self.gaps.contains(name) {
                 let levels: Vec<i16> = values.iter().map(|v| i16::from(!v.is_nan())).collect();
@@ -244,9 +245,9 @@ pub fn names(path: &Path) -> Result<Vec<String>> {
 
 /// Opens a CSV file and reads its header: the rows that follow, and the names of the columns.
 fn header(path: &Path) -> Result<(csv::Reader<File>, Vec<String>)> {
-    let file = input::open(path).context("it cannot be opened")?;
+    let file = input::open(path).context("the file cannot be opened")?;
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(file);
-    let header = reader.headers().context("it has no header row")?;
+    let header = reader.headers().context("the file has no header row")?;
     let names = header.iter().map(|h| h.trim_start_matches('\u{feff}').to_string()).collect();
     Ok((reader, names))
 }
@@ -262,7 +263,7 @@ fn positions(there: &[String], wanted: &[&str]) -> Result<Vec<usize>> {
     };
     let (missing, twice) = (listed(|n| n == 0), listed(|n| n > 1));
     let all = there.join(", ");
-    ensure!(missing.is_empty(), "it has no column {missing} (columns in it: {all})");
+    ensure!(missing.is_empty(), "the file has no column {missing} (columns in it: {all})");
     ensure!(twice.is_empty(), "more than one of its columns is called {twice}");
     Ok(wanted.iter().flat_map(|w| there.iter().position(|t| t.trim() == *w)).collect())
 }

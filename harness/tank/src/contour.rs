@@ -15,13 +15,13 @@ const LARGEST_FILE: u64 = 64 << 20;
 /// Reads the text of a regular file, because a named pipe could block and a device may never end. Errors do
 /// not name the file.
 pub(crate) fn read_text(path: &Path) -> Result<String, Problems> {
-    let problem = |why: String| Problems::from(format!("it cannot be read: {why}"));
+    let problem = |why: String| Problems::from(format!("the file cannot be read: {why}"));
     let about = std::fs::metadata(path).map_err(|error| problem(error.to_string()))?;
     if !about.is_file() {
-        return Err(problem("it is not a regular file".into()));
+        return Err(problem("the path does not lead to a regular file".into()));
     }
     if about.len() > LARGEST_FILE {
-        return Err(problem(format!("it is larger than {} MB", LARGEST_FILE / 1_000_000)));
+        return Err(problem(format!("the file is larger than {} MB", LARGEST_FILE / 1_000_000)));
     }
     std::fs::read_to_string(path).map_err(|error| problem(error.to_string()))
 }

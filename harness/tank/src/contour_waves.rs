@@ -561,7 +561,7 @@ mod tests {
     /// The tolerance of 1e-5 covers what the harmonics leave out at degree 24, and the depth beyond which the
     /// liquid is at rest.
     #[test]
-    fn cylinders_have_the_waves_of_vertical_walls() {
+    fn the_contour_method_equals_the_method_for_vertical_walls_in_cylinders() {
         let overlaps = crate::third_order::Overlaps::round(0.0, 0.5, 20);
         for fill in [0.2, 0.35, 0.61, 1.2] {
             let sides =

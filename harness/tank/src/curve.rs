@@ -221,7 +221,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn chord_is_the_difference_of_points_and_keeps_its_digits() {
+    fn the_chord_of_two_near_points_keeps_its_digits() {
         let curves = [
             Curve::Line { from: [0.1, 0.2], to: [1.0, -0.4] },
             Curve::Ellipse { center: [0.3, 0.4], a_r: 1.2, a_z: 0.7 },

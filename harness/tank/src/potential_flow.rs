@@ -635,7 +635,7 @@ mod tests {
     /// Checks int v^k log|v - x| dv for k = 0 and 1, and of the polynomials themselves. 20 points on each
     /// side of x, stretched by the fifth power, have an error of 1e-12 of the logarithm.
     #[test]
-    fn the_own_panel_s_rules_integrate_a_logarithm() {
+    fn quadrature_on_a_panel_with_a_logarithmic_singularity_is_exact() {
         let mesh = Discretisation::new(&walls()[0], 3, 12, false);
         let rules = mesh.own_rules();
         assert_eq!(rules.len(), 12);
@@ -669,7 +669,7 @@ mod tests {
     /// foot point on the panel plus i times the distance over the length. The preimages are closer than the
     /// rule of the panel's own points allows.
     #[test]
-    fn a_point_s_preimage_is_the_root_of_its_place() {
+    fn the_preimage_of_a_point_under_a_panel_s_map_is_found() {
         let (mut graded, mut plain, mut far) = (0, 0, 0);
         for wall in walls() {
             let mesh = Discretisation::new(&wall, 3, 8, false);

@@ -80,7 +80,7 @@ mod tests {
     /// The reference is Q = int_0^pi cos t/sqrt(2 chi - 2 cos t) dt by the trapezoidal rule, which converges
     /// geometrically for a periodic integrand: at chi >= 1.05 it is exact to rounding with 2000 points.
     #[test]
-    fn legendre_function_is_its_integral() {
+    fn the_legendre_function_equals_its_integral() {
         for x in [0.05, 0.5, 1.0, 1.9999, 2.0001, 5.0, 100.0] {
             let count = 2000;
             let mut sum = 0.0;

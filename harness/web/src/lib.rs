@@ -38,7 +38,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_ends_the_script_element_that_holds_it() {
+    fn embedded_scripts_do_not_end_their_script_element() {
         for text in [THREE, THREE_LICENSE, SCENE] {
             assert!(!text.contains("</script") && !text.contains("<!--"));
         }

@@ -192,7 +192,7 @@ fn breaking_adds_damping_above_the_steepness_in_every_model() {
 
 /// Without other damping the power is that of breaking alone, from far above the onset to rest.
 #[test]
-fn breaking_waves_never_drive() {
+fn breaking_waves_only_dissipate_energy() {
     for model in SloshModel::ALL.into_iter().filter(|model| *model != SloshModel::Frozen) {
         for onset in [0.0, 0.1, 0.66] {
             let mut p = held(model);

@@ -55,7 +55,7 @@ fn energy_balances_along_any_direction() {
 }
 
 #[test]
-fn momentum_is_constant_however_modes_along_any_direction_damp() {
+fn damping_of_modes_in_any_direction_does_not_change_momentum() {
     for model in MODELS {
         let p = askew(model, FrictionModel::None);
         let mut plant = plant(&p);

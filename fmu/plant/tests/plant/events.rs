@@ -268,7 +268,7 @@ fn continuing_after_events_equals_one_whole_step() {
 
 /// To another end or with another torque it is a step of its own, from where it is, which finds its own events.
 #[test]
-fn after_a_stop_another_step_begins_anew() {
+fn after_a_stop_a_step_with_another_end_or_torque_starts_anew() {
     let mut p = bench(SloshModel::Linear, FrictionModel::Stribeck);
     (p.imu.enabled, p.init.omega, p.init.slosh_angle) = (true, 0.05, 0.1);
     let inputs = torque(0.01);
@@ -301,7 +301,7 @@ fn after_a_stop_another_step_begins_anew() {
 
 /// Finite, and stopped within the step.
 #[test]
-fn saved_data_of_no_stopped_step_is_refused() {
+fn saved_data_that_is_not_a_stopped_step_is_refused() {
     let mut p = bench(SloshModel::Linear, FrictionModel::Viscous);
     p.imu.enabled = true;
     let inputs = torque(0.01);

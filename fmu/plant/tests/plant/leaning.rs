@@ -160,7 +160,7 @@ fn rigid_liquid_follows_the_hub() {
 }
 
 #[test]
-fn an_upright_bench_and_a_table_of_modes_are_as_given() {
+fn without_tilt_or_with_a_table_the_modes_are_used_as_given() {
     for model in SLOSHING {
         let mut p = leaning(model, 0.0, 0.7);
         p.slosh.modes = 3;

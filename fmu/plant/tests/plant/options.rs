@@ -228,7 +228,7 @@ fn ringed(slosh: SloshModel) -> Parameters {
 
 /// Miles: 2.83 exp(-0.46) 0.19^1.5 0.1^0.5 = 0.0468 at a wave of 0.1 R, an angle of 0.1195 rad.
 #[test]
-fn ring_has_the_damping_of_miles_and_its_range() {
+fn a_ring_baffle_has_the_damping_and_the_range_of_miles_s_formula() {
     let mut p = ringed(SloshModel::Linear);
     let wave = 2.0 / (1.841_183_781_340_66f64.powi(2) - 1.0);
     let zeta = |p: &Parameters| {
@@ -344,7 +344,7 @@ fn damping_ratio_follows_the_restoring_force_down_to_weightlessness() {
 }
 
 #[test]
-fn parameters_that_others_replace_say_which_do() {
+fn a_replaced_parameter_names_the_parameter_that_replaces_it() {
     let why = |p: &Parameters, name: &str| p.overridden(name).unwrap_or_default();
     let mut p = Parameters::default();
     assert!(why(&p, "slosh.zeta").contains("slosh.zeta_from_correlation is true"));

@@ -54,7 +54,7 @@ impl System<f64, State> for UnitVector {
 }
 
 #[test]
-fn stereographic_model_agrees_with_a_unit_vector_one_past_the_horizontal() {
+fn stereographic_and_unit_vector_pendulums_agree_beyond_the_horizontal() {
     for (zeta, rate) in [(0.0, 25.0), (0.02, 27.0)] {
         let mut p = bench(SloshModel::Spherical, FrictionModel::Viscous);
         p.slosh.zeta_from_correlation = false;
@@ -184,7 +184,7 @@ fn swirl(p: &Parameters, frequency: f64, amplitude: f64) -> f64 {
 }
 
 #[test]
-fn steady_sine_turns_the_liquid_between_50_and_60_mnm() {
+fn a_steady_sine_makes_slosh_rotary_between_50_and_60_millinewton_metres() {
     // The thesis's author saw no rotation at 0.05 N m, a weak one at 0.075, a clear one
     // from 0.1 on (appendix A). Planar motion has a radial share of second order, less than
     // a per cent; rotary motion is a cone.

@@ -33,7 +33,7 @@ fn run(p: &Parameters) -> Vec<Outputs> {
 
 /// With and without a height of the wave, which defaults to that of a cylinder of the diameter tank.d.
 #[test]
-fn table_of_a_cylinder_moves_as_the_cylinder_does() {
+fn modes_of_a_cylinder_given_as_a_table_move_like_the_cylinder() {
     for model in SLOSHING {
         let mut p = bench(model, FrictionModel::Stribeck);
         p.slosh.modes = 3;

@@ -101,7 +101,7 @@ fn discrete_changes_happen_only_at_events() {
 /// Before the motion a variable depends on the values from which it starts. Later it depends on states and
 /// inputs, as far as they have an effect at present: without a leak a rate depends only on the inflow.
 #[test]
-fn dependencies_are_the_declared_ones_that_matter_at_present() {
+fn only_declared_dependencies_that_have_an_effect_now_are_reported() {
     let of = |instance: &mut Subject, name: &str| {
         let scalar = &TABLE.scalars[reference(name) as usize];
         instance.dependencies(&GET_REAL, scalar).unwrap()
@@ -132,7 +132,7 @@ fn outputs_follow_what_the_host_sets() {
 }
 
 #[test]
-fn meaningless_continuous_states_end_the_simulation() {
+fn invalid_continuous_states_end_the_simulation() {
     let mut instance = continuous(&[]);
     instance.set_continuous_states(&[-2.0, 1.0]).unwrap();
     assert_eq!(

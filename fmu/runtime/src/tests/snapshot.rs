@@ -39,7 +39,7 @@ fn eventful() -> Subject {
 }
 
 #[test]
-fn a_state_reads_back_as_itself() {
+fn a_saved_state_is_equal_after_conversion_to_bytes_and_back() {
     let failed = {
         let mut instance = started(CS, &[("z", 101.0)]);
         refused(instance.do_step(0.0, 1.0));
@@ -109,7 +109,7 @@ fn a_restored_state_continues_as_the_instance_would_have() {
 /// The step before followed slopes: the outputs use them until an input is set, also after the state is
 /// restored.
 #[test]
-fn past_slopes_are_saved() {
+fn input_slopes_of_the_last_step_are_part_of_a_saved_state() {
     let mut instance = eventful();
     instance.do_step(1.5, 0.5).unwrap();
     assert!(instance.past_slopes && !instance.sloped);
@@ -124,7 +124,7 @@ fn past_slopes_are_saved() {
 }
 
 #[test]
-fn a_state_of_the_other_interface_is_not_taken() {
+fn a_saved_state_of_the_other_interface_is_refused() {
     let mut instance = started(CS, &[]);
     let other = started(ME, &[]);
     assert_eq!(

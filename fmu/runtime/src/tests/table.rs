@@ -14,7 +14,7 @@ fn scalar(name: &str) -> &'static Scalar<Vessels> {
 }
 
 #[test]
-fn a_table_knows_its_inputs_parameters_and_states() {
+fn a_table_lists_its_inputs_parameters_and_states() {
     assert_eq!(TABLE.scalars.len(), 25);
     assert_eq!(names(TABLE.inputs()), ["q[1]", "q[2]", "z", "w"]);
     assert_eq!(
@@ -233,7 +233,7 @@ fn token_of_fmi_3_changes_with_an_input_that_can_be_set_within_a_step() {
 
 #[test]
 #[should_panic(expected = "each stand together in the table")]
-fn inputs_that_do_not_stand_together_are_refused() {
+fn a_table_whose_inputs_are_not_adjacent_is_refused() {
     let apart = [9, 0, 10].map(|n| TABLE.variables[n]).to_vec().leak();
     const N: usize = 4 + 1;
     assert_eq!(scalar_count(apart), N);

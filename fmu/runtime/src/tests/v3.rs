@@ -537,7 +537,7 @@ fn model_exchange_goes_through_its_modes_and_takes_single_states() {
 }
 
 #[test]
-fn within_steps_hosts_see_real_outputs_and_inputs_that_follow_no_others() {
+fn only_real_outputs_and_independent_inputs_have_intermediate_updates() {
     let vessels = crate::tests::vessels::TABLE.variables.iter();
     let seen = vessels.filter(|variable| has_intermediate_update(variable));
     let names: Vec<_> = seen.map(|variable| variable.name).collect();
@@ -545,7 +545,7 @@ fn within_steps_hosts_see_real_outputs_and_inputs_that_follow_no_others() {
 }
 
 #[test]
-fn a_bool_may_be_any_byte() {
+fn an_fmi3_boolean_may_be_any_byte() {
     assert_eq!(size_of::<fmi3Boolean>(), 1);
     let (instance, _host) = stepping(false);
     unsafe {

@@ -6,7 +6,7 @@ use crate::v2::{GET_STRING, SET_STRING};
 use Value::{Boolean, Integer, Real};
 
 #[test]
-fn a_value_is_read_where_the_variable_lives() {
+fn a_variable_is_read_from_its_place_in_the_model() {
     let mut instance = started(CS, &[("z", 0.25)]);
     for (name, value) in [
         ("level[1]", Real(3.0)),

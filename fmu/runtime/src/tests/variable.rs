@@ -138,7 +138,7 @@ fn quantities_keep_their_given_properties() {
 }
 
 #[test]
-fn parameters_are_read_and_set_where_they_live() {
+fn parameters_are_read_and_set_at_their_places_in_the_model() {
     let mut parameters = vessels::Parameters::default();
     let mut all = TABLE.parameters().to_vec();
     all.extend(TABLE.inputs());

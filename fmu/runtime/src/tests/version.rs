@@ -70,7 +70,7 @@ impl Version for Other {
 }
 
 #[test]
-fn names_references_and_the_policy_of_events_are_the_versions() {
+fn names_references_and_event_handling_depend_on_the_fmi_version() {
     let mut instance = Instance::<Vessels, Other>::new(CS);
     instance.enter_initialization_mode().unwrap();
     instance.exit_initialization_mode().unwrap();

@@ -192,7 +192,7 @@ mod tests {
 
     /// Variables from 1: level, square, der(level), q, rows, w, m, k, time, indicators. By rows, of 3 trays; time is scalar 25.
     #[test]
-    fn an_array_is_the_row_of_its_elements_as_long_as_its_parameter_says() {
+    fn an_array_has_the_number_of_elements_that_its_size_parameter_gives() {
         let scalars_of_rows = |rows: i32| {
             let arrays = Arrays::new::<Trays>(&parameters(rows));
             let all: Vec<Vec<u32>> =

@@ -607,7 +607,7 @@ mod tests {
 
     #[test]
     #[ignore = "minutes: .ci/run --nightly"]
-    fn allan_intervals_hold_the_truth_in_95_of_100() {
+    fn allan_intervals_contain_the_true_value_in_95_of_100_records() {
         let white = Noise { flicker: 0.0, rrw: 0.0, ..ALL };
         let walk = Noise { flicker: 0.0, ..ALL };
         let plateau = Noise { rrw: 0.0, ..ALL };

@@ -21,7 +21,7 @@ pub fn token(subject: &Subject, findings: &mut Findings) -> Result<()> {
         match subject.instantiate(&with)? {
             Ok(_) => findings.at(subject.last_call()).add("it gives an instance (allowed: NULL for a token that is not that of modelDescription.xml)"),
             Err(CallError { messages, .. }) if messages.is_empty() => {
-                findings.at(subject.last_call()).warn("it gives none and says nothing (allowed: a message)");
+                findings.at(subject.last_call()).warn("the call returns no instance and logs no reason (allowed: a message)");
             }
             Err(_) => {}
         }
@@ -206,7 +206,7 @@ pub fn counts(subject: &Subject, findings: &mut Findings) -> Result<()> {
                 ));
             } else if told < n && answer.is_ok() {
                 findings.at(v.place()).warn(format!(
-                    "fmi3GetFloat64 of its {n} values with nValues = {told} returns fmi3OK"
+                    "fmi3GetFloat64 of an array of {n} values with nValues = {told} returns fmi3OK"
                 ));
             }
         }
@@ -227,7 +227,7 @@ pub fn booleans(subject: &Subject, findings: &mut Findings) -> Result<()> {
         }
     }
     if !any {
-        findings.skip("it has no Boolean");
+        findings.skip("the FMU has no Boolean");
     }
     Ok(())
 }
@@ -258,7 +258,7 @@ pub fn fixed(subject: &Subject, findings: &mut Findings) -> Result<()> {
         }
     }
     if !any {
-        findings.skip("it has no fixed parameter of type Float64");
+        findings.skip("the FMU has no fixed parameter of type Float64");
     }
     Ok(())
 }
@@ -328,7 +328,7 @@ pub fn log_environment(subject: &Subject, findings: &mut Findings) -> Result<()>
         0 => {
             done?;
             if heard == 0 {
-                findings.skip("it calls no callback");
+                findings.skip("the FMU calls no callback");
             }
         }
         n => findings.at("the callbacks").add(format!(
@@ -357,7 +357,7 @@ pub fn log_errors(subject: &Subject, findings: &mut Findings) -> Result<()> {
 /// Returns an instance for Model Exchange that is initialised, or skips the rule if the FMU has no Model Exchange.
 fn exchanging(subject: &Subject) -> Result<Session<'_>> {
     if subject.binary(Interface::ModelExchange).is_err() {
-        return skip("it offers no Model Exchange");
+        return skip("the FMU offers no Model Exchange");
     }
     subject.running(Use::EXCHANGE)
 }
@@ -432,7 +432,7 @@ pub fn states_set(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let mut session = exchanging(subject)?;
     let n = session.instance.number_of_states()?;
     if n == 0 {
-        return skip("it has no continuous states");
+        return skip("the FMU has no continuous states");
     }
     let mut x = vec![0.0; n];
     session.instance.continuous_states(&mut x)?;
@@ -455,7 +455,7 @@ pub fn indicators(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let mut session = exchanging(subject)?;
     let nz = session.instance.number_of_indicators()?;
     if nz == 0 {
-        return skip("it has no event indicators");
+        return skip("the FMU has no event indicators");
     }
     session.advance(10 * STEPS)?;
     if let Some((time, i)) = session.zero_indicator {

@@ -56,7 +56,7 @@ fn faults(using: Use, step: &Step, from: f64, h: f64) -> Vec<String> {
 fn require_stepping(subject: &Subject) -> Result<()> {
     match subject.binary(Interface::CoSimulation) {
         Ok(_) => Ok(()),
-        Err(_) => skip("it offers no Co-Simulation"),
+        Err(_) => skip("the FMU offers no Co-Simulation"),
     }
 }
 
@@ -69,7 +69,7 @@ fn stepping_uses(subject: &Subject) -> Vec<Use> {
 fn uses_with_events(subject: &Subject) -> Result<Vec<Use>> {
     let mut uses = subject.uses();
     uses.retain(|u| u.event_mode || u.interface == Interface::ModelExchange);
-    if uses.is_empty() { skip("it has no event mode") } else { Ok(uses) }
+    if uses.is_empty() { skip("the FMU has no event mode") } else { Ok(uses) }
 }
 
 /// Number of steps in a run that should contain events.
@@ -233,7 +233,7 @@ pub fn idempotent(subject: &Subject, findings: &mut Findings) -> Result<()> {
 pub fn discrete_held(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let uses: Vec<Use> = stepping_uses(subject).into_iter().filter(|u| u.event_mode).collect();
     if uses.is_empty() {
-        findings.skip("it has no event mode in Co-Simulation");
+        findings.skip("the FMU has no event mode in Co-Simulation");
     }
     let discrete: Vec<Variable> = subject
         .readable()
@@ -306,7 +306,7 @@ pub fn same_trajectory(subject: &Subject, findings: &mut Findings) -> Result<()>
     let others: Vec<Use> =
         stepping_uses(subject).into_iter().filter(|u| *u != Use::PLAIN).collect();
     if others.is_empty() {
-        findings.skip("it has neither event mode nor early return");
+        findings.skip("the FMU has neither event mode nor early return");
     }
     for using in others {
         let mut session = subject.running(using)?;
@@ -408,7 +408,9 @@ pub fn intermediate_early_return(subject: &Subject, findings: &mut Findings) -> 
         }),
     )?;
     match asked {
-        None => findings.skip("it offers no early return in a step of ten communication steps"),
+        None => {
+            findings.skip("the FMU offers no early return in a step of ten communication steps")
+        }
         Some(time) if step.early_return != 1 => {
             findings.at(format!("step from {from:?} s by {h:?} s")).add(format!(
                 "an early return was asked for at {time:?} s, and earlyReturn is {}",

@@ -84,7 +84,7 @@ impl Subject {
         let mut called = declared(&description.root);
         called.retain(|(of, _)| *of == Interface::ModelExchange || !has_clocks);
         called.first().context(
-            "it offers neither Co-Simulation nor Model Exchange, and the check calls no other interface",
+            "the FMU offers neither Co-Simulation nor Model Exchange, and the check calls no other interface",
         )?;
         let loaded = Loaded::new(called, deadline, |interface| {
             Fmu::load_for(Some(interface), directory, path, &description.root)

@@ -42,7 +42,7 @@ fn two_hundred_thousand_levels_are_refused_by_their_number() {
 }
 
 #[test]
-fn words_of_the_file_and_its_elements_break_their_rules() {
+fn faults_of_the_file_and_its_elements_break_the_intended_rules() {
     words_break(
         r#"
 not well-formed | </ModelVariables> | </ModelVariables> |  | xml.well_formed
@@ -66,7 +66,7 @@ an external entity | <fmiModelDescription | <fmi | <!DOCTYPE a [<!ENTITY b SYSTE
 }
 
 #[test]
-fn interfaces_and_the_experiment_break_their_rules() {
+fn faults_of_interfaces_and_experiment_break_the_intended_rules() {
     words_break(
         r#"
 no C identifier | <CoSimulation | "HubSlosh" | "Hub-Slosh" | xml.model_identifier
@@ -82,7 +82,7 @@ a category twice | <Category name="logStatusError" | logStatusError | logEvents 
 }
 
 #[test]
-fn units_and_types_break_their_rules() {
+fn faults_of_units_and_types_break_the_intended_rules() {
     words_break(
         r#"
 an inverted display factor | <DisplayUnit name="deg" | 57.29577951308232 | 0.0174532925199433 | xml.display_units
@@ -99,7 +99,7 @@ an undefined type | name="slosh.model" | declaredType="SloshModel" | declaredTyp
 }
 
 #[test]
-fn names_and_causalities_break_their_rules() {
+fn faults_of_names_and_causalities_break_the_intended_rules() {
     words_break(
         r#"
 a name twice | name="omega" | name="omega" | name="theta" | xml.names
@@ -116,7 +116,7 @@ multiple set of a parameter | name="hub.I" | causality | canHandleMultipleSetPer
 }
 
 #[test]
-fn start_values_and_ranges_break_their_rules() {
+fn faults_of_start_values_and_ranges_break_the_intended_rules() {
     words_break(
         r#"
 calculated with start | name="theta" | displayUnit="deg" | displayUnit="deg" start="0" | xml.start
@@ -131,7 +131,7 @@ min above max | name="tank.d" | min="0.001" | min="1000" | xml.range
 }
 
 #[test]
-fn words_of_the_structure_break_their_rules() {
+fn faults_of_the_model_structure_break_the_intended_rules() {
     words_break(
         r#"
 a shared reference | name="tau_ext" | valueReference="13" | valueReference="12" | xml.aliases
@@ -149,7 +149,7 @@ fn line(list: &str, n: usize) -> String {
 }
 
 #[test]
-fn malicious_xml_and_elements_out_of_order_break_their_rules() {
+fn malicious_xml_and_elements_out_of_order_break_the_intended_rules() {
     let mut no_order = xml();
     let [types, categories] =
         ["  <TypeDefinitions>", "  <LogCategories>"].map(|word| no_order.find(word).unwrap());

@@ -92,7 +92,7 @@ const USUAL: &str = "startTime=\"0\" stopTime=\"10\" stepSize=\"0.01\"";
 
 #[cfg(target_os = "linux")]
 #[test]
-fn good_fmus_get_no_finding_however_stiff_and_whatever_they_offer() {
+fn correct_fmus_get_no_finding_whatever_their_stiffness_and_capabilities() {
     let long = "startTime=\"0\" stopTime=\"1e6\" stepSize=\"1000\"";
     let mut wrong = Vec::new();
     for (name, definitions, rate, experiment) in [

@@ -91,7 +91,7 @@ impl AnalyseArgs {
         let torque = profile.torque()?;
         if let Torque::Rows { .. } = torque {
             bail!(
-                "--profile {}: it must be a sweep or a noise, which have a frequency response",
+                "--profile {}: the profile must be a sweep or noise, because the analysis needs a frequency response",
                 self.profile
             )
         }
@@ -104,7 +104,7 @@ impl AnalyseArgs {
             let (each, table) = recorded::read(&recorded, &mut |_| {})?;
             ensure!(
                 each >= 1e-6,
-                "{}: its rows are {each:.3e} s apart (allowed: at least 1e-6 s). Is the time in another unit? --columns \
+                "{}: the rows are {each:.3e} s apart (allowed: at least 1e-6 s). Is the time in another unit? --columns \
                  time=COLUMN:UNIT states it",
                 path.display()
             );

@@ -9,9 +9,9 @@ use crate::{fmu, terminal};
 
 /// Builds the documentation and opens it in the web browser.
 ///
-/// It is a static site, whose search works without a network. Sphinx builds it from the project's source; the first time
-/// its packages are downloaded (70 MB). The Python package does not contain the book: its command prints the address at
-/// which the book can be read.
+/// The documentation is a static site, whose search works without a network. Sphinx builds it from the project's source;
+/// the first time, the packages of Sphinx are downloaded (70 MB). The Python package does not contain the documentation:
+/// its command `hubslosh book` prints the address at which the pages can be read.
 #[derive(clap::Args)]
 #[command(
     after_help = "Examples:\n  hubslosh book\n  hubslosh book --no-open\n  hubslosh book --out site"

@@ -52,7 +52,7 @@ pub struct CampaignArgs {
     /// Relative tolerance of the FMU's solver [default: the FMU's own].
     #[arg(long, value_name = "NUMBER")]
     tolerance: Option<f64>,
-    /// Simulates all runs, also those that are stored.
+    /// Simulates all runs again, including those that are stored.
     #[arg(long)]
     force: bool,
     #[command(flatten)]
@@ -64,7 +64,8 @@ pub struct CampaignArgs {
     /// Directory of another campaign, whose runs the report compares with the runs of this campaign.
     #[arg(long, value_name = "DIRECTORY")]
     compare: Option<PathBuf>,
-    /// Replaces the tables and the report of another plan that are in the default directory.
+    /// Replaces tables and report if the default directory contains those of another plan. Without this flag that is an
+    /// error.
     #[arg(long)]
     replace: bool,
 }

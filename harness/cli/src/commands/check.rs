@@ -28,7 +28,7 @@ pub struct CheckArgs {
     /// flag must then be the last one.
     #[arg(long, value_name = "FILE", num_args = 0..=1)]
     json: Option<Option<PathBuf>>,
-    /// File for the findings as SARIF 2.1.0, which code hosts show.
+    /// File for the findings as SARIF 2.1.0, a format that code hosting services such as GitHub display.
     #[arg(long, value_name = "FILE")]
     sarif: Option<PathBuf>,
     /// Rules, such as zip.names, or groups of rules, such as zip, to check [default: all].

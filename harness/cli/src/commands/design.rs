@@ -34,11 +34,12 @@ pub struct DesignArgs {
     /// Torque profile, as for `hubslosh run`.
     #[arg(long, value_name = "PROFILE", conflicts_with_all = ["multisine", "free"])]
     profile: Option<String>,
-    /// Plans an odd random-phase multisine with detection lines and this peak, N·m.
+    /// Plans an odd random-phase multisine (some odd lines stay empty, to detect nonlinearity) whose largest torque is this
+    /// peak, N·m.
     #[arg(long, value_name = "PEAK", conflicts_with = "free")]
     multisine: Option<f64>,
-    /// Prints the torque amplitude of a sine for which the rate in the samples of the gyro has this signal-to-noise
-    /// ratio, dB: in the band, at resonance and antiresonance, and for a rigid hub (thesis 8.6.1).
+    /// Signal-to-noise ratio of the gyro's samples, dB, for which the command prints the required torque amplitude of a
+    /// sine: over the band, at resonance and antiresonance, and for a rigid hub (thesis 8.6.1).
     #[arg(long, value_name = "DB", conflicts_with_all = ["profile", "multisine", "out"])]
     snr: Option<f64>,
     /// Period of the multisine, s.
@@ -50,13 +51,13 @@ pub struct DesignArgs {
     /// Band of the multisine, or of --snr, Hz.
     #[arg(long, value_name = "HZ,HZ", value_delimiter = ',', default_value = "1.25,3.5")]
     band: Vec<f64>,
-    /// Distributes the power of the multisine over its lines so that the parameters of the expected bench are determined
-    /// best (D-optimal); a quarter of the power stays spread over all lines. The command compares it with a linear sweep
-    /// of the same peak, band and length, and recommends the better of both.
+    /// Distributes the power of the multisine over its lines so that it determines the parameters of the expected bench
+    /// best (D-optimal); a quarter of the power stays spread over all lines. The command then compares the multisine with a
+    /// linear sweep of the same peak, band and length, and recommends the better of the two.
     #[arg(long, requires = "multisine")]
     optimal: bool,
-    /// Largest slosh angle, rad, to which the torque is scaled down. Linear theory holds up to 0.18, a wave of 0.15 of
-    /// the radius.
+    /// Largest slosh angle, rad; a torque that would exceed it is scaled down. Linear theory holds up to 0.18 rad, where
+    /// the wave is 0.15 tank radii high.
     #[arg(long, value_name = "RAD")]
     slosh_angle: Option<f64>,
     /// Seed of the random phases and detection lines.
@@ -187,7 +188,9 @@ impl DesignArgs {
             check_rows(&torque, &time, &tau)?;
             return Ok((time, tau, 1.0));
         }
-        let Some(peak) = self.multisine else { bail!("a plan needs --profile or --multisine") };
+        let Some(peak) = self.multisine else {
+            bail!("give the torque to plan: --profile or --multisine")
+        };
         let [f0, f1] = self.band[..] else { bail!("--band needs two frequencies, Hz") };
         ensure!(
             f1 <= 0.5 / STEP,
@@ -314,7 +317,10 @@ impl<'f> Bench<'f> {
 /// the root of the sampling rate.
 fn white_noise(real: &mut dyn FnMut(&str) -> Result<f64>) -> Result<f64> {
     let white = real(imu::ARW)? * real(imu::RATE)?.sqrt();
-    ensure!(white > 0.0, "imu.arw = 0 leaves no noise to compare with (allowed: above 0)");
+    ensure!(
+        white > 0.0,
+        "imu.arw = 0: without noise there is no signal-to-noise ratio (allowed: above 0)"
+    );
     Ok(white)
 }
 

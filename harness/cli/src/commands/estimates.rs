@@ -65,7 +65,7 @@ impl Out<'_> {
             tables();
         }
         if !is_trusted {
-            terminal::warn("the result cannot be trusted; its verdict says why");
+            terminal::warn("the result cannot be trusted; the verdict in the result says why");
         }
         if let Some(path) = self.report {
             output::write(path, page().as_bytes())?;

@@ -50,7 +50,7 @@ pub struct GyroArgs {
     /// Length of each simulated record, h.
     #[arg(long, value_name = "HOURS", default_value_t = 6.0)]
     hours: f64,
-    /// Number of simulated records. Their imu.seed is 1, 2, ….
+    /// Number of simulated records, which differ in the seed of their noise (imu.seed is 1, 2, …).
     #[arg(long, value_name = "NUMBER", default_value_t = 8)]
     records: usize,
     /// Sets a parameter by its name in the FMU, such as imu.arw=1e-4.

@@ -26,8 +26,8 @@ pub struct PackArgs {
     /// Version of FMI, 2 or 3. The binary is the same for both.
     #[arg(long, value_name = "2|3", default_value = "2", value_parser = fmi, conflicts_with_all = ["python", "sdist"])]
     fmi: Fmi,
-    /// FMI 3.0 only: makes vectors and matrices array variables, and the numbers of tanks and modes structural
-    /// parameters, which a host can set before initialization. The binary is the same.
+    /// FMI 3.0 only: describes vectors and matrices as array variables, and the numbers of tanks and modes as structural
+    /// parameters, which a host can set before initialization. The binary is the same as without this flag.
     #[arg(long, conflicts_with_all = ["python", "sdist"])]
     arrays: bool,
     /// Packs the Python package as a wheel instead of an FMU, with all FMUs and the command hubslosh inside.
@@ -44,16 +44,16 @@ pub struct PackArgs {
     /// dist/NAME-fmi3-arrays.fmu, dist].
     #[arg(long, value_name = "FILE|FOLDER")]
     out: Option<PathBuf>,
-    /// Number of tanks whose variables the FMU has. Use it for hosts that show every variable. Spacecraft has 4 tanks;
-    /// the binary is the same.
+    /// Number of tanks whose variables the model description contains, for hosts that show every variable to the user.
+    /// Spacecraft has 4 tanks, and its binary is the same for any number.
     #[arg(long, value_name = "NUMBER", conflicts_with_all = ["python", "sdist", "arrays"])]
     tanks: Option<usize>,
-    /// Number of slosh modes of each tank whose variables the FMU has. Spacecraft and SloshTank have 3, HubSlosh 10; the
-    /// binary is the same.
+    /// Number of slosh modes per tank whose variables the model description contains. Spacecraft and SloshTank have 3
+    /// modes, HubSlosh has 10; the binary is the same for any number.
     #[arg(long, value_name = "NUMBER", conflicts_with_all = ["python", "sdist", "arrays"])]
     modes: Option<usize>,
-    /// File of parameters (.toml, .ssv, .json) that become the start values of the FMU, so that a host needs to set
-    /// nothing. It needs --tanks or --modes.
+    /// File of parameters (.toml, .ssv, .json) that become the start values of the FMU, so that a host does not have to set
+    /// them. This option needs --tanks or --modes.
     #[arg(long, value_name = "FILE")]
     parameters: Option<PathBuf>,
     /// Builds for Linux, Windows and macOS instead of this machine's platform only: one FMU with all binaries, one wheel
@@ -165,7 +165,7 @@ fn fmi(text: &str) -> Result<Fmi> {
     match text {
         "2" | "2.0" => Ok(Fmi::V2),
         "3" | "3.0" => Ok(Fmi::V3),
-        _ => bail!("there is no FMI \"{text}\" here (allowed: 2, 3)"),
+        _ => bail!("FMI \"{text}\" is not supported (allowed: 2, 3)"),
     }
 }
 

@@ -69,6 +69,6 @@ fn checked(fmu: &Path) -> Result<String> {
     let text = report.text();
     match report.count_findings(Severity::Error) {
         0 => Ok(text),
-        _ => bail!("nothing is released, the FMU breaks rules:\n{text}"),
+        _ => bail!("nothing is released, because the FMU breaks rules:\n{text}"),
     }
 }

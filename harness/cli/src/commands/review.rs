@@ -17,7 +17,8 @@ pub struct ReviewArgs {
     /// Project with craft, controller, fills, ranges of uncertain parameters, requirements and cases, .toml.
     #[arg(value_name = "PROJECT", required = true)]
     projects: Vec<PathBuf>,
-    /// File for the page, .html [default: the name of the project with .html; of a comparison comparison.html in the folder of the first].
+    /// File for the page, .html [default: the name of the project with .html; if several projects are compared,
+    /// comparison.html in the folder of the first one].
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Python that has the package hubslosh [default: the Python next to this command, then python3 and python on PATH].

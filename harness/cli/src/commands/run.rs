@@ -53,9 +53,9 @@ pub struct RunArgs {
     /// and to every edge and command of a profile.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.02)]
     step: f64,
-    /// Time between the commands of an oscillating profile, s. Lines join the commands, or each is held with --hold. If
-    /// lines would differ from the profile by more than 2.5 % of its amplitude, closer commands are used, so that they
-    /// differ by 0.1 %.
+    /// Time between the commands of a profile that oscillates, s. The commands are joined by straight lines, or held with
+    /// --hold. If straight lines would differ from the profile by more than 2.5 % of its amplitude, the commands are
+    /// closer, so that they differ by at most 0.1 %.
     #[arg(long, value_name = "SECONDS", default_value_t = SAMPLE, conflicts_with = "input")]
     sample: f64,
     /// Time at which the run stops, s [default: the end of the torque history].
@@ -64,19 +64,20 @@ pub struct RunArgs {
     /// Relative tolerance of the FMU's solver [default: the FMU's own].
     #[arg(long, value_name = "NUMBER")]
     tolerance: Option<f64>,
-    /// Holds inputs from row to row, and a profile from command to command, instead of joining the values by lines.
+    /// Holds each input value until the next row of --input, and each command of a profile until the next command, instead
+    /// of joining the values by straight lines.
     #[arg(long)]
     hold: bool,
     /// Input that the profile drives [default: tau_cmd, or the FMU's only Real input].
     #[arg(long, value_name = "NAME")]
     drive: Option<String>,
-    /// Surface tension of the liquid in the tanks of Spacecraft and SloshTank, N/m. With the density of the tank it gives
-    /// the Bond number, and the run warns if this is low [default: 0.07213, as of water].
+    /// Surface tension of the liquid in the tanks of Spacecraft and SloshTank, N/m. From it and the density of the liquid
+    /// the run computes the Bond number, and warns if the Bond number is low [default: 0.07213, the value of water].
     #[arg(long, value_name = "N/M")]
     tension: Option<f64>,
-    /// Variables to record besides time and the driven inputs [default: of HubSlosh omega, omega_imu, slosh_angle and
-    /// slosh_angle_radial; of other FMUs all outputs and slosh angles; and the variables by which `hubslosh view` draws
-    /// further slosh modes and draining tanks].
+    /// Variables to record in addition to time and the driven inputs [default: for HubSlosh omega, omega_imu, slosh_angle
+    /// and slosh_angle_radial; for other FMUs all outputs and slosh angles; for both also the variables that `hubslosh
+    /// view` needs to draw further slosh modes and draining tanks].
     #[arg(long, value_name = "NAME,…", value_delimiter = ',')]
     columns: Vec<String>,
     /// Also records a sensor with its sampling rate, delay, noise, bias and resolution. The kinds are listed below; the
@@ -131,7 +132,7 @@ impl RunArgs {
                 let Some((input, history)) = all.next() else { bail!("nothing is driven") };
                 (Some(input), history, all.collect())
             }
-            (None, None) => bail!("a run needs --profile or --input"),
+            (None, None) => bail!("give the inputs of the run: --profile or --input"),
         };
         let run = Run {
             settings,

@@ -37,16 +37,16 @@ pub struct TankArgs {
     /// Mass of the liquid, kg, instead of --fill.
     #[arg(long, value_name = "KG", conflicts_with = "fill")]
     fill_mass: Option<f64>,
-    /// Several fills, m or %, for a table over the fill (CSV). With --parameters it is the table of a tank that drains:
-    /// two fills are the ends of the table, and the command places the points between them; more fills, at most 12, are
-    /// the points.
+    /// Several fills, m or %, for a table of modes over the fill (CSV). With --parameters the command writes the fill table
+    /// of a draining tank: if two fills are given, the command places the points of the table between them; if 3 to 12
+    /// fills are given, they are the points.
     #[arg(long, value_name = "METRES|PERCENT%,…", value_delimiter = ',', conflicts_with_all = ["fill", "fill_mass"])]
     sweep: Vec<Fill>,
     /// Number of lateral modes, 1 to 20.
     #[arg(long, value_name = "NUMBER", default_value_t = 5)]
     modes: usize,
-    /// Acceleration along the axis of the tank, m/s², for the frequencies in table and picture. At 0 the frequencies are
-    /// 0 without surface tension (--sigma).
+    /// Acceleration along the axis of the tank, m/s², from which the frequencies in table and picture are computed. With 0
+    /// the frequencies are 0, unless surface tension (--sigma) holds the liquid.
     #[arg(long, value_name = "NUMBER", default_value_t = 9.80665)]
     gravity: f64,
     /// Prints the result as JSON, with --sweep too.
@@ -61,14 +61,15 @@ pub struct TankArgs {
     /// File for the modes as parameters of an FMU, .toml (for `hubslosh run --parameters` and Python) or .ssv (SSP 1.0).
     #[arg(long, value_name = "FILE")]
     parameters: Option<PathBuf>,
-    /// FMU for which --parameters writes.
+    /// FMU whose parameters --parameters writes.
     #[arg(long, value_name = "MODEL", default_value = "HubSlosh", requires = "parameters")]
     model: Model,
-    /// Number of the tank on Spacecraft for which --parameters writes, 1 to 4.
+    /// Number of the tank on Spacecraft whose parameters --parameters writes, 1 to 4.
     #[arg(long, value_name = "NUMBER", default_value_t = 1, requires = "parameters")]
     tank_number: usize,
-    /// Kinematic viscosity of the liquid, m²/s. It gives damping ratios with their intervals at --gravity, in table,
-    /// --out and --parameters, with --sweep at every fill [default: none, the ratios are 0].
+    /// Kinematic viscosity of the liquid, m²/s. With it the command computes damping ratios and their intervals at
+    /// --gravity, for the table, --out and --parameters (with --sweep at every fill) [default: no viscosity, all damping
+    /// ratios are 0].
     #[arg(long, value_name = "NUMBER")]
     nu: Option<f64>,
     /// Surface tension, N/m, for the frequencies at --gravity, the centring stiffness in --parameters and the damping
@@ -79,12 +80,13 @@ pub struct TankArgs {
     /// the centring stiffness of the first mode then include the meniscus at --gravity and --sigma.
     #[arg(long, value_name = "DEGREES", default_value_t = 90.0, requires = "sigma")]
     contact_angle: f64,
-    /// Rate at which tank and liquid turn about the axis of the tank, rad/s. The result then has the surface, the centre of
-    /// mass and the inertias of the turning liquid, and says how far the modes, which are those of the liquid at rest, are
-    /// off. Takes --gravity as the thrust along the axis.
+    /// Rate at which tank and liquid turn about the axis of the tank, rad/s. The command then computes the surface, the
+    /// centre of mass and the inertias of the turning liquid. It also states the error of the modes, which are computed for
+    /// liquid at rest. The thrust along the axis is --gravity.
     #[arg(long, value_name = "NUMBER", conflicts_with = "sweep")]
     spin: Option<f64>,
-    /// Writes --parameters although a centring stiffness is far outside the range of its formula.
+    /// Writes the file of --parameters even if a centring stiffness (by surface tension) is far outside the range of its
+    /// formula.
     #[arg(long, requires = "parameters")]
     force: bool,
 }

@@ -10,12 +10,12 @@ use experiments::run::Run;
 use super::{check_out, write_out};
 use crate::terminal;
 
-/// Writes the torque of a profile as a table, for a bench or another host.
+/// Writes the torque of a profile as a table, for a bench or for another host than `hubslosh run`.
 ///
-/// The columns are time (s), tau_cmd (N·m) and tau_slope (N·m/s), the derivative of tau_cmd until the next row. A host
-/// that sets torque and slope at every row drives the FMU exactly as `hubslosh run` does, jumps included, because every
-/// edge and command of the profile has its row, whatever --step is. Time and tau_cmd without the slopes are a torque
-/// history for `hubslosh run --input`, a bench or Simulink.
+/// The columns are time (s), tau_cmd (N·m) and tau_slope (N·m/s), the derivative of tau_cmd until the next row. Every edge
+/// and every command of the profile has a row, whatever --step is. Therefore a host that sets torque and slope at every row
+/// drives the FMU exactly as `hubslosh run` does, including jumps. For `hubslosh run --input`, a bench or Simulink the
+/// columns time and tau_cmd are enough.
 #[derive(clap::Args)]
 #[command(after_help = help())]
 pub struct TorqueArgs {

@@ -38,14 +38,15 @@ pub struct ViewArgs {
     /// End of the part to show, s.
     #[arg(long, value_name = "SECONDS")]
     to: Option<f64>,
-    /// Tank file, as for `hubslosh tank`, with the contour of a tank to draw. It is tank 1, or the tank whose number is
-    /// in front: 2:fuel.toml.
+    /// Tank file, as for `hubslosh tank`, whose contour is drawn for tank 1. A number in front selects another tank:
+    /// 2:fuel.toml.
     #[arg(long = "tank", value_name = "[N:]TANK.toml")]
     tanks: Vec<String>,
-    /// File of parameters of the run, if the file of the run does not contain them. Those of --set come after them.
+    /// File with the parameters of the run. It is needed if the file of the run does not contain them. Parameters given by
+    /// --set replace those in this file.
     #[arg(long, visible_alias = "set-file", value_name = "FILE")]
     parameters: Option<PathBuf>,
-    /// Parameter of the run, if the file of the run does not contain it.
+    /// Sets a parameter of the run, if the file of the run does not contain it.
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
     settings: Vec<(String, String)>,
     /// FMU of the run: a file, or the name of an FMU of this project [default: the FMU that the file of the run names, or
@@ -69,7 +70,7 @@ impl ViewArgs {
             Some(fmu) => fmu.clone(),
             None => notes.get("model").map(PathBuf::from).or_else(|| find_model(&there)).with_context(|| {
                 format!(
-                    "{}: no FMU of this project has its columns as variables ({}): name the FMU of the run by --fmu",
+                    "{}: no FMU of this project has the columns of the file as variables ({}): name the FMU of the run by --fmu",
                     self.run.display(),
                     there.join(", ")
                 )
@@ -77,8 +78,9 @@ impl ViewArgs {
         };
         let description = ModelDescription::from_fmu(&fmu::find(&name)?)?;
         let mut parameters: BTreeMap<String, String> = match notes.get("parameters") {
-            Some(text) => serde_json::from_str(text)
-                .with_context(|| format!("{}: its metadata are damaged", self.run.display()))?,
+            Some(text) => serde_json::from_str(text).with_context(|| {
+                format!("{}: the metadata of the file are damaged", self.run.display())
+            })?,
             None => BTreeMap::new(),
         };
         let parameters_known =
@@ -127,7 +129,7 @@ impl ViewArgs {
 ///
 /// # Errors
 ///
-/// If the file cannot be read or its metadata are damaged.
+/// If the file cannot be read or the metadata of the file are damaged.
 pub fn page_of_stored_run(
     description: &ModelDescription,
     file: &Path,
@@ -135,7 +137,7 @@ pub fn page_of_stored_run(
 ) -> Result<String> {
     let notes = table::metadata(file)?;
     let parameters = serde_json::from_str(notes.get("parameters").map_or("{}", String::as_str))
-        .with_context(|| format!("{}: its metadata are damaged", file.display()))?;
+        .with_context(|| format!("{}: the metadata of the file are damaged", file.display()))?;
     let names = table::names(file)?;
     // Readings of sensors are not variables, so the picture has no place for them.
     let known = |n: &&str| *n == "time" || description.variables.iter().any(|v| v.name == *n);

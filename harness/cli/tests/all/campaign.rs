@@ -93,7 +93,7 @@ fn campaign_files_keep_their_names_and_columns_and_are_reused() {
 }
 
 #[test]
-fn a_failed_run_is_named_and_leaves_the_others_alone() {
+fn a_failed_run_is_named_and_the_other_runs_are_completed() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let done = campaign(directory, &["--fills", "0,0.1", "--amplitudes", "0.1"]);

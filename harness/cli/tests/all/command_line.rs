@@ -137,7 +137,10 @@ fn a_value_of_the_wrong_kind_is_refused() {
         ("tank.h=deep", &["tank.h expects a number", "\"deep\""]),
         ("wheel.enabled=perhaps", &["wheel.enabled expects true or false"]),
         ("omega=1", &["omega cannot be set", "output"]),
-        ("tau_cmd=1", &["tau_cmd comes from the profile or the file"]),
+        (
+            "tau_cmd=1",
+            &["tau_cmd cannot be set, because the profile or the file of inputs drives it"],
+        ),
     ] {
         refuses(directory, || short_run(directory, &["--profile", "zero", "--set", set]), words);
     }
@@ -444,7 +447,7 @@ fn every_column_that_is_an_input_drives_and_others_are_refused_by_name() {
     refuses(
         directory,
         || run("time,tau_cmd,g_axial\n0,0,9\n1,0,9\n", &["--set", "g_axial=3"]),
-        &["g_axial comes from the profile or the file"],
+        &["g_axial cannot be set, because the profile or the file of inputs drives it"],
     );
 }
 
@@ -535,7 +538,7 @@ fn a_number_with_its_unit_is_the_number_in_si() {
 }
 
 #[test]
-fn messages_are_coloured_when_asked_and_never_into_a_file_unasked() {
+fn messages_are_coloured_on_request_and_not_by_default_in_files() {
     let run = |color: &str| {
         let flags = [color, "variables", "--fmu", "none.fmu"];
         String::from_utf8(hubslosh(Path::new("."), &flags).stderr).unwrap()
@@ -575,7 +578,7 @@ fn quiet_leaves_results_and_warnings_and_strict_makes_warnings_fail() {
 }
 
 #[test]
-fn everything_that_prints_a_table_prints_json_too() {
+fn every_command_that_prints_a_table_also_prints_json() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let fmu = packed_for_tests().to_str().unwrap();
@@ -670,10 +673,13 @@ fn damaged_files_are_refused_in_words_of_users() {
     let cases: [(&[&str], &str); 8] = [
         (
             &["run", "--profile", "zero", "--out", "o.csv", "--fmu", "text.fmu"],
-            "it is not a zip archive",
+            "the file is not a zip archive",
         ),
-        (&["run", "--profile", "zero", "--out", "o.csv", "--fmu", "cut.fmu"], "its end is missing"),
-        (&["run", "--input", "cut.parquet", "--out", "o.csv"], "it is not a complete Parquet file"),
+        (&["run", "--profile", "zero", "--out", "o.csv", "--fmu", "cut.fmu"], "the end is missing"),
+        (
+            &["run", "--input", "cut.parquet", "--out", "o.csv"],
+            "the file is not a complete Parquet file",
+        ),
         (
             &["run", "--profile", "zero", "--parameters", "cut.json", "--out", "o.csv"],
             "it is not a result of `hubslosh identify`",
@@ -684,9 +690,9 @@ fn damaged_files_are_refused_in_words_of_users() {
         ),
         (
             &["run", "--input", "none.csv", "--out", "o.csv"],
-            "none.csv cannot be used: it cannot be opened",
+            "none.csv cannot be used: the file cannot be opened",
         ),
-        (&["tank", "none.toml", "--fill", "1"], "none.toml: it cannot be read"),
+        (&["tank", "none.toml", "--fill", "1"], "none.toml: the file cannot be read"),
         (&["analyse", "zero.csv", "--out", "o"], "tau_cmd is 0 N·m in every row"),
     ];
     let fmu = packed_for_tests().to_str().unwrap();

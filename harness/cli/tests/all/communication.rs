@@ -155,7 +155,7 @@ fn profiles_act_the_same_with_any_output_step() {
 /// The torque is always the same line from command to command; `--sample` only changes how close the commands
 /// are.
 #[test]
-fn a_sampled_controller_is_asked_for_by_its_interval() {
+fn the_option_sample_only_changes_the_interval_between_commands() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let inertia = inertia(folder);

@@ -98,7 +98,12 @@ fn every_flipped_bit_in_a_stored_run_is_noticed() {
         }
         let (said, error) = successful(campaign(directory, &plan));
         assert!(said.contains("50 runs simulated, 0 reused"), "{said}");
-        assert_eq!(error.matches("its SHA-256 is not that in manifest.sha256").count(), RUNS);
+        assert_eq!(
+            error
+                .matches("the SHA-256 of the file differs from the one in manifest.sha256")
+                .count(),
+            RUNS
+        );
         for (run, bytes) in runs.iter().zip(&whole) {
             assert!(std::fs::read(run).unwrap() == *bytes, "{} is as it was", run.display());
         }
@@ -129,14 +134,14 @@ fn a_flipped_run_without_its_manifest_is_never_reused() {
         std::fs::write(&run, &flipped).unwrap();
         std::fs::write(&manifest, damaged).unwrap();
         let (_, error) = successful(campaign(directory, plan));
-        assert!(error.contains("it has no line in manifest.sha256"), "{error}");
+        assert!(error.contains("the run has no line in manifest.sha256"), "{error}");
         assert!(std::fs::read(&run).unwrap() == whole);
         assert!(published(directory) == before);
     }
     // a file is lost
     std::fs::remove_file(&run).unwrap();
     let (_, error) = successful(campaign(directory, plan));
-    assert!(error.contains(": its file is missing"), "{error}");
+    assert!(error.contains(": the file of the run is missing"), "{error}");
     // the manifest is lost
     std::fs::write(&run, &flipped).unwrap();
     std::fs::remove_file(&manifest).unwrap();

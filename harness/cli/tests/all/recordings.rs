@@ -193,7 +193,8 @@ fn a_recording_of_a_run_has_the_features_of_the_run_in_every_file_format() {
     ];
     let error = hubslosh(directory, &wrong).unwrap_err();
     assert!(
-        error.contains("its torque is not lin-sweep") && error.contains("allowed: at least 0.9"),
+        error.contains("the recorded torque is not lin-sweep")
+            && error.contains("allowed: at least 0.9"),
         "{error}"
     );
     let error = hubslosh(directory, &["analyse", "--plan", "run.toml", "--fmu", fmu]).unwrap_err();
@@ -336,7 +337,7 @@ fn a_free_decay_of_30_s_determines_frequency_damping_and_its_growth() {
     let of_ros = write("stamp.sec;stamp.nanosec;wave_height_mm", &|t| {
         format!("{:.0};{:.0}", 1.7e9 + t.floor(), 1e9 * t.fract())
     });
-    assert!(of_ros.unwrap().contains("its times are the columns stamp.sec and stamp.nanosec"));
+    assert!(of_ros.unwrap().contains("the times are the columns stamp.sec and stamp.nanosec"));
     assert!((estimate("o.json") / estimate("d.json") - 1.0).abs() < 1e-9);
     let error = hubslosh(directory, &of).unwrap_err();
     assert!(

@@ -109,7 +109,7 @@ fn at_5_cm_rotary_slosh_begins_at_0_125_newton_metres() {
 }
 
 #[test]
-fn one_linear_model_fits_ever_less_of_a_spherical_liquid() {
+fn the_fit_of_one_linear_model_to_a_spherical_liquid_falls_with_the_torque() {
     let (_, swept, _) = &*TEN;
     let of = |name| figure(swept, "spherical", name);
     let (fit, coherence) = (of("fit_freq_pct"), of("coherence"));
@@ -231,7 +231,7 @@ fn without_dry_friction_a_linear_model_fits_a_linear_liquid() {
 }
 
 #[test]
-fn draws_have_histograms_and_scatter() {
+fn a_report_of_random_draws_has_histograms_and_scatter_plots() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let plan = "title = \"Draws\"\nprofile = \"lin-sweep:amplitude=0.1,f0=2.0,f1=2.6,duration=240\"\n\

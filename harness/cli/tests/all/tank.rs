@@ -284,7 +284,7 @@ fn invalid_parameter_files_are_refused_in_a_sentence() {
         ("set.toml", "a = [1]", "line 1: a cannot be a value of a parameter"),
         ("set.toml", "", "sets nothing"),
         ("set.toml", "\"tank.q\" = 1", "tank.q"),
-        ("set.ssv", "<a/>", "its root is a, not ParameterSet"),
+        ("set.ssv", "<a/>", "the root element is a, not ParameterSet"),
         (
             "set.ssv",
             "<ParameterSet><Parameters><Parameter name='x'/></Parameters></ParameterSet>",

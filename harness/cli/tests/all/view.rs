@@ -32,7 +32,7 @@ fn drawn(directory: &Path, file: &str) -> serde_json::Value {
 }
 
 #[test]
-fn a_run_as_it_is_recorded_by_default_becomes_a_page_that_knows_its_parameters() {
+fn a_run_with_default_columns_becomes_a_page_with_the_run_s_parameters() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     assert!(hubslosh(directory, &[&RUN[..], &["--out", "run.parquet"]].concat()).status.success());
@@ -227,7 +227,7 @@ fn a_box_on_the_bench_lies_with_its_first_length_along_the_tangent() {
 }
 
 #[test]
-fn a_run_of_a_tank_that_drains_records_by_default_what_its_page_needs() {
+fn default_columns_of_a_draining_tank_are_enough_for_its_page() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let fmu = packed_model_for_tests(pack::model("SloshTank").unwrap());

@@ -67,13 +67,13 @@ pub struct Stored {
 pub enum Unusable {
     #[error(transparent)]
     Damaged(Damage),
-    #[error("file incomplete")]
+    #[error("the file is incomplete")]
     Incomplete,
     /// The file has `rows` rows, but the whole run has `expected` rows.
-    #[error("file incomplete, {rows} rows of {expected}")]
+    #[error("the file has {rows} rows, but the run needs {expected}")]
     Rows { rows: usize, expected: usize },
     /// The stored run has readings of sensors that the plan does not have.
-    #[error("it has sensors")]
+    #[error("the stored run has sensors that the plan does not have")]
     Sensors,
     #[error("{0}")]
     Differs(String),
@@ -132,7 +132,7 @@ fn difference(
         if was == Some(is) {
             continue;
         }
-        let Some(was) = was else { return Some(format!("its metadata has no {key}")) };
+        let Some(was) = was else { return Some(format!("the metadata of the file have no {key}")) };
         return Some(match key {
             "parameters" => {
                 let (was, is) = (read(found), read(wanted));

@@ -63,7 +63,7 @@ pub fn check_rows(path: &Path, step: f64, torque: &Torque) -> Result<()> {
     let highest = profile.band().map_or(0.0, |band| band.1);
     ensure!(
         step * highest < 0.5,
-        "{}: its rows are {step:.3e} s apart, and {profile} goes to {highest} Hz (allowed: less than {:.3e} s). Is the time in \
+        "{}: the rows are {step:.3e} s apart, and {profile} goes to {highest} Hz (allowed: less than {:.3e} s). Is the time in \
          another unit? --columns time=COLUMN:UNIT states it",
         path.display(),
         0.5 / highest
@@ -103,7 +103,7 @@ pub(super) fn table(
             );
             ensure!(
                 correlation > LEAST_CORRELATION,
-                "{name}: its torque is not {} (correlation {correlation:.2}; allowed: at least {LEAST_CORRELATION}, with a clock \
+                "{name}: the recorded torque is not {} (correlation {correlation:.2}; allowed: at least {LEAST_CORRELATION}, with a clock \
                  that is up to {} ppm off). Another profile, duration or band acted, or the times are in another unit",
                 case.profile,
                 1e6 * FASTEST_CLOCK

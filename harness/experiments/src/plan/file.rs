@@ -67,7 +67,7 @@ pub(super) fn read(text: &str, problems: &mut Problems) -> Option<Plan> {
     let table = table.get_ref();
     let mut reader = Reader { text, problems };
     for error in &errors {
-        let problem = format!("it is not TOML: {}", error.message());
+        let problem = format!("the plan is not valid TOML: {}", error.message());
         reader.add(error.span().unwrap_or_default(), problem);
     }
     if !errors.is_empty() {
@@ -81,7 +81,7 @@ pub(super) fn read(text: &str, problems: &mut Problems) -> Option<Plan> {
         Some(Named { name, value, lines })
     });
     if !table.contains_key("profile") {
-        let what = "it has no profile, such as profile = \"exp-sweep:amplitude=0.1\"";
+        let what = "the plan has no profile, such as profile = \"exp-sweep:amplitude=0.1\"";
         reader.problems.add(&Lines::default(), what);
     }
     let input = reader.text("", table, "input");

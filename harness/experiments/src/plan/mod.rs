@@ -205,7 +205,7 @@ impl Plan {
             plan.each_name_once(&mut problems);
         }
         problems.check()?;
-        plan.context("it has no profile")
+        plan.context("the plan has no profile")
     }
 
     /// Creates the thesis's sweeps for every combination of models, fills and amplitudes.
@@ -407,7 +407,9 @@ impl Plan {
             .chain([self.listed.len().max(1), draws])
             .try_fold(1_usize, usize::checked_mul)
             .filter(|count| *count <= budget::RUNS)
-            .with_context(|| format!("a plan may have {} runs; this has more", budget::RUNS))?;
+            .with_context(|| {
+                format!("a plan may have at most {} runs, and this plan has more", budget::RUNS)
+            })?;
 
         let mut combinations = match &self.listed[..] {
             [] => vec![Listed::default()],
@@ -687,7 +689,7 @@ mod tests {
     }
 
     #[test]
-    fn every_built_in_plan_has_the_runs_it_should() {
+    fn every_built_in_plan_has_the_expected_number_of_runs() {
         let counts: Vec<(&str, usize)> = BUILT_IN
             .iter()
             .map(|(name, text)| {
@@ -774,7 +776,7 @@ mod tests {
     }
 
     #[test]
-    fn values_with_units_are_the_same_plan() {
+    fn values_with_and_without_units_give_the_same_plan() {
         let [plain, with_units] = [
             "profile = \"sine\"\n[set]\ntank.d = 0.163\n[vary]\ntank.h = [0.05, 0.1]\n[[run]]\nhub.I = 0.3\n",
             "profile = \"sine\"\n[set]\ntank.d = \"163 mm\"\n[vary]\ntank.h = [\"50mm\", \"0.1 m\"]\n\
@@ -887,7 +889,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_plan_says_all_that_is_wrong_with_it() {
+    fn all_faults_of_a_wrong_plan_are_reported_at_once() {
         let text = "titel = \"x\"\nprofile = 3\nstep = -1\nhold = 1\n\
             [set]\ntank.h = [1]\nprofile.amplitude = 1\n[vary]\ntank.d = 1\n\
             [random]\nruns = 0\n[random.draw]\nhub.I = { distribution = \"norml\" }\n\
@@ -919,7 +921,8 @@ mod tests {
             error.lines().skip(1).map(|line| line.trim().to_string()).collect()
         };
         let syntax = lines("title = \"a\nstep = = 1\nstop = 2\n[set\n");
-        let places = syntax.iter().filter_map(|line| line.split_once(": it is not TOML: "));
+        let places =
+            syntax.iter().filter_map(|line| line.split_once(": the plan is not valid TOML: "));
         let places: Vec<&str> = places.map(|(place, _)| place).collect();
         assert_eq!(places, ["line 1", "line 2", "line 2", "line 4"], "{syntax:?}");
         let text = "profile = [\n1,\n2]\n[random]\nruns = 1\nseed = 1e3\nset = 1\n\
@@ -934,7 +937,7 @@ mod tests {
         ];
         assert_eq!(lines(text), expected);
         let error = Plan::parse("title = \"\"").unwrap_err().to_string();
-        assert!(error.starts_with("it has no profile, such as profile = "), "{error}");
+        assert!(error.starts_with("the plan has no profile, such as profile = "), "{error}");
     }
 
     #[test]
@@ -947,7 +950,7 @@ mod tests {
             "line 5: omega cannot be set",
             "line 6: slosh.model expects one of frozen (1)",
             "line 7: tau_cmd comes from the profile",
-            "lines 1 and 9: profile sine: it has no parameter \"amplitde\"",
+            "lines 1 and 9: profile sine: there is no parameter \"amplitde\"",
         ] {
             assert_eq!(error.matches(words).count(), 1, "{words}:\n{error}");
         }
@@ -1006,7 +1009,7 @@ mod tests {
     }
 
     #[test]
-    fn a_draw_stays_the_same_when_there_are_more_of_them() {
+    fn a_draw_does_not_depend_on_the_number_of_draws() {
         let (few, many) =
             (cases(&RANDOM.replace("RUNS", "3")), cases(&RANDOM.replace("RUNS", "9")));
         assert_eq!(few[2].settings, many[2].settings);

@@ -129,7 +129,7 @@ const BAND_FROM_ZERO: Demand = (
     "f0 must be 0 or, as f1, from 1e-9 to 1e9 Hz",
 );
 const NOISE_BAND: [Demand; 2] =
-    [(|v| v.value("f0") < v.value("f1"), "it expects f0 < f1"), BAND_FROM_ZERO];
+    [(|v| v.value("f0") < v.value("f1"), "f0 must be less than f1"), BAND_FROM_ZERO];
 
 fn noise(v: &Values, limit: f64) -> Noise {
     let band = (v.value("f0"), v.value("f1"));

@@ -177,11 +177,11 @@ impl Written {
             match (key.as_str(), value.as_str()) {
                 ("path", _) => {}
                 ("hold", "true" | "false") => held = value == "true",
-                ("hold", _) => bail!("profile file: hold expects true or false, not \"{value}\""),
-                _ => bail!("profile file has no parameter \"{key}\" (it has path, hold)"),
+                ("hold", _) => bail!("profile file: hold must be true or false, not \"{value}\""),
+                _ => bail!("profile file has no parameter \"{key}\" (allowed: path, hold)"),
             }
         }
-        let path = self.path().context("profile file: it expects path=FILE")?;
+        let path = self.path().context("profile file: path=FILE is required")?;
         Torque::read(path, held)
     }
 
@@ -208,8 +208,10 @@ impl Written {
         for (key, text) in &self.pairs {
             let Some(place) = parameters.iter().position(|p| p.name == key) else {
                 let names: Vec<_> = parameters.iter().map(|p| p.name).collect();
-                problems
-                    .push(format!("it has no parameter \"{key}\" (it has {})", names.join(", ")));
+                problems.push(format!(
+                    "there is no parameter \"{key}\" (allowed: {})",
+                    names.join(", ")
+                ));
                 continue;
             };
             match parameters[place].number(text).filter(|v| v.is_finite()) {
@@ -517,10 +519,10 @@ mod tests {
     }
 
     #[test]
-    fn wrong_profiles_are_refused_with_what_there_is() {
+    fn wrong_profiles_are_refused_with_the_allowed_names_and_values() {
         for (text, word) in [
             ("exp-swep:f0=1", "did you mean \"exp-sweep\""),
-            ("sine:freq=2", "it has amplitude, frequency, duration"),
+            ("sine:freq=2", "(allowed: amplitude, frequency, duration)"),
             ("sine:frequency=2,frequency=3", "frequency is given twice"),
             ("exp-sweep:f0=0,duration=0", "f0 must be positive; duration must be positive"),
             ("lin-sweep:f0=-1", "f0 must not be negative"),
@@ -535,7 +537,7 @@ mod tests {
             ("sine-noise:rms=0.09", "must be within limit"),
             (
                 "noise:f0=3,f1=2,seed=0.5",
-                "seed expects a whole number from 0 to 9e15; it expects f0 < f1",
+                "seed expects a whole number from 0 to 9e15; f0 must be less than f1",
             ),
             ("acceleration-step:inertia=0", "inertia must be positive"),
             ("sine:frequency=fast", "expects a number"),
@@ -648,7 +650,7 @@ mod tests {
         assert_eq!(torque("").unwrap().torque_at(0.5), 1.0);
         assert_eq!(torque(",hold=true").unwrap().torque_at(0.5), 0.0);
         let error = torque(",hold=maybe").unwrap_err().to_string();
-        assert!(error.contains("hold expects true or false"), "{error}");
+        assert!(error.contains("hold must be true or false"), "{error}");
         let error = "file".parse::<Written>().unwrap().torque().unwrap_err().to_string();
         assert!(error.contains("path=FILE"), "{error}");
     }

@@ -180,7 +180,7 @@ impl Sensor {
         let (mut values, mut problems) = written.values(&parameters);
         match (kind.of, &of) {
             (None, Some(_)) => problems.push(format!("{} reads no variable by of=", kind.name)),
-            (Some(None), None) => problems.push("it expects of=NAME".into()),
+            (Some(None), None) => problems.push("of=NAME is required".into()),
             _ => {}
         }
         ensure!(problems.is_empty(), "sensor {name}: {}", problems.join("; "));
@@ -366,7 +366,7 @@ impl Sensor {
             0.0 => 1,
             rate => whole("1/rate =", 1.0 / rate)?,
         };
-        ensure!(every > 0, "sensor {}: its rate is above one sample a row", self.name);
+        ensure!(every > 0, "sensor {}: the sampling rate is above one sample per row", self.name);
         Ok([every, whole("delay =", self.errors.delay)?])
     }
 }

@@ -275,7 +275,7 @@ impl Surface<'_> {
         let source = self.choice(hubslosh::slosh::SOURCE, hubslosh::slosh::SOURCE_KIND)?;
         ensure!(
             source == SloshSource::Geometry.name(),
-            "it is known of an upright cylinder alone (slosh.source = geometry), not of a {source}"
+            "the surface is known only for an upright cylinder (slosh.source = geometry), not for a {source}"
         );
         let model = self.choice(hubslosh::slosh::MODEL, hubslosh::slosh::KIND)?;
         let coordinate = Coordinate::from_model(&model)
@@ -294,7 +294,9 @@ impl Surface<'_> {
 
 fn present(description: &ModelDescription, names: &[String]) -> Result<()> {
     for name in names {
-        description.variable(name).with_context(|| format!("it needs {name} of HubSlosh"))?;
+        description
+            .variable(name)
+            .with_context(|| format!("the sensor needs the variable {name} of HubSlosh"))?;
     }
     Ok(())
 }

@@ -43,7 +43,7 @@ fn column<'t>(table: &'t Table, name: &str) -> &'t [f64] {
 }
 
 #[test]
-fn two_gauges_at_right_angles_see_the_wave_of_every_model() {
+fn two_wave_gauges_at_right_angles_measure_the_wave_of_every_slosh_model() {
     for model in ["linear", "planar", "spherical", "liquid"] {
         let set =
             [("slosh.model", model), ("slosh.modes", "3"), ("init.slosh_angle_radial", "0.1")];
@@ -185,7 +185,7 @@ fn sensors_have_the_requested_noise_bias_scale_quantisation_rate_and_delay() {
 }
 
 #[test]
-fn noise_stays_when_a_sensor_joins_and_differs_between_sensors_seeds_and_runs() {
+fn noise_does_not_depend_on_other_sensors_and_differs_between_sensors_seeds_and_runs() {
     let one = record(&[], &["a=encoder:noise=1"], &[], 2.0);
     let two = record(
         &[],
@@ -235,8 +235,8 @@ fn errors_of_sensors_say_what_is_allowed() {
             "angle expects a number, not \"x\"; noise must not be negative",
         ),
         ("a=gauge:of=theta", "gauge reads no variable by of="),
-        ("a=variable", "it expects of=NAME"),
-        ("a=encoder:hight=1", "it has no parameter \"hight\""),
+        ("a=variable", "of=NAME is required"),
+        ("a=encoder:hight=1", "there is no parameter \"hight\""),
     ];
     for (text, words) in cases {
         assert!(said(text).contains(words), "{text}: {}", said(text));

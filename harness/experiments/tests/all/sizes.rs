@@ -88,7 +88,7 @@ fn arrays_sized_by_a_structural_parameter_give_the_motion_of_scalars_to_the_last
 }
 
 #[test]
-fn arrays_have_the_declared_size_where_no_setting_says_another() {
+fn arrays_have_the_declared_size_unless_a_setting_changes_it() {
     let fmu = spacecraft(Fmi::V3Arrays, &settings(&[("tank.position[1,3]", "-0.5")])).unwrap();
     assert!(fmu.description().variable("tank.position[1,3]").is_ok());
     assert!(fmu.description().variable("tank.position[2,3]").is_err());

@@ -275,7 +275,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn writing_beside_an_array_is_a_fault_and_writing_inside_is_none() {
+    fn writing_outside_an_array_is_a_fault_and_writing_inside_is_not() {
         let mut array = Guarded::output::<c_int>(3);
         // SAFETY: inside the array.
         unsafe { array.pointer::<c_int>().add(2).write(7) };

@@ -151,7 +151,7 @@ impl Page {
         if link.contains("://") {
             return Ok(None);
         }
-        let dead = || anyhow!("{}: the link {link} leads nowhere", self.path);
+        let dead = || anyhow!("{}: the target of the link {link} does not exist", self.path);
         let (file, slug) = link.split_once('#').unwrap_or((link, ""));
         let path = if file.is_empty() { self.path.clone() } else { resolve(&self.path, file) };
         let Some(page) = pages.iter().find(|page| page.path == path) else {

@@ -83,7 +83,7 @@ fn sbom_lists_what_is_linked_and_refers_to_nothing_else() {
 }
 
 #[test]
-fn an_archive_of_parts_has_these_and_no_more() {
+fn an_archive_packed_from_parts_contains_only_these_parts() {
     let folder = tempfile::tempdir().unwrap();
     let write = |name: &str, text: &str| {
         let path = folder.path().join(name);

@@ -28,7 +28,7 @@ fn released() -> Vec<(&'static Model, Fmi, PathBuf)> {
 }
 
 #[test]
-fn release_of_this_version_has_this_interface() {
+fn the_committed_release_has_the_interface_of_the_source() {
     for (model, fmi, fmu) in released() {
         let source = model.folder().join(match fmi {
             Fmi::V2 => "modelDescription.xml",
@@ -47,7 +47,7 @@ fn release_of_this_version_has_this_interface() {
 }
 
 #[test]
-fn sbom_beside_the_release_is_its_own() {
+fn the_committed_sbom_equals_the_sbom_inside_the_released_fmu() {
     for (model, _, fmu) in released() {
         let beside = std::fs::read(fmu.with_extension("cdx.json")).unwrap();
         assert!(beside == release::read(&fmu, &model.sbom()).unwrap());

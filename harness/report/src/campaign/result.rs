@@ -524,7 +524,7 @@ mod tests {
     }
 
     #[test]
-    fn without_swirl_and_without_linear_runs_the_exact_response_is_the_measure() {
+    fn without_rotary_slosh_and_linear_runs_the_report_compares_with_the_exact_response() {
         let all =
             [series("spherical", "", &[(50.0, 2.0, 3.0, false), (100.0, 2.002, 2.994, false)])];
         assert_eq!(

@@ -474,7 +474,7 @@ impl Draft<'_> {
         );
         if let Some(k) = time.windows(2).position(|pair| pair[1] <= pair[0]) {
             anyhow::bail!(
-                "{source} cannot be drawn: time does not rise after row {}, {} s",
+                "{source} cannot be drawn: the time does not increase after row {}, {} s",
                 k + 1,
                 time[k]
             );

@@ -181,12 +181,12 @@ pub fn read(
 
 /// Turns a panic of the Parquet library, which damaged files cause, into an error.
 fn guarded<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {
-    bug::caught(work).unwrap_or_else(|panic| bail!("it is a damaged Parquet file: {panic}"))
+    bug::caught(work).unwrap_or_else(|panic| bail!("the Parquet file is damaged: {panic}"))
 }
 
 fn open(path: &Path) -> Result<SerializedFileReader<File>> {
-    let file = input::open(path).context("it cannot be opened")?;
-    SerializedFileReader::new(file).map_err(|_| anyhow!("it is not a complete Parquet file"))
+    let file = input::open(path).context("the file cannot be opened")?;
+    SerializedFileReader::new(file).map_err(|_| anyhow!("the file is not a complete Parquet file"))
 }
 
 fn pairs(reader: &SerializedFileReader<File>) -> BTreeMap<String, String> {
@@ -222,7 +222,7 @@ fn values(
         }
         ColumnReader::Int32ColumnReader(r) => batches(r, rows, level, into, |v| f64::from(*v)),
         ColumnReader::Int64ColumnReader(r) => batches(r, rows, level, into, |v| integer(*v)),
-        _ => bail!("its type is not that of the file's schema"),
+        _ => bail!("the type of the column differs from the type in the file's schema"),
     }
 }
 
@@ -241,15 +241,15 @@ fn batches<T: DataType>(
         values.clear();
         let most = (rows - done).min(BATCH);
         let (read, _, _) = reader.read_records(most, Some(&mut levels), None, &mut values)?;
-        ensure!(read > 0, "it ends too early");
+        ensure!(read > 0, "the column ends too early");
         done += read;
         let mut values = values.iter();
         if level == 0 {
-            ensure!(values.len() == read, "it ends too early");
+            ensure!(values.len() == read, "the column ends too early");
             into.extend(values.map(&mut convert));
             continue;
         }
-        ensure!(levels.len() == read, "it ends too early");
+        ensure!(levels.len() == read, "the column ends too early");
         for of_row in &levels {
             let value = if *of_row == level { values.next() } else { None };
             into.push(value.map_or(f64::NAN, &mut convert));

@@ -18,7 +18,7 @@ const DEEPEST: usize = 16;
 /// # Errors If a header is damaged, or the pages are larger than the memory budget.
 pub fn check(mut file: &File, start: u64, length: u64, size: u64) -> Result<()> {
     let end = start.checked_add(length).filter(|end| *end <= size);
-    let end = end.context("it lies outside the file")?;
+    let end = end.context("the column lies outside the file")?;
     let (mut at, mut sum) = (start, 0_u64);
     let mut buffer = Vec::new();
     while at < end {
@@ -36,7 +36,7 @@ pub fn check(mut file: &File, start: u64, length: u64, size: u64) -> Result<()> 
         sum += inflated;
         ensure!(
             sum <= budget::INFLATED,
-            "its pages take more than {:.1} GB (allowed: less)",
+            "the pages of the column take more than {:.1} GB (allowed: less)",
             budget::INFLATED as f64 / 1e9
         );
         at = at + header.at as u64 + stored;

@@ -160,7 +160,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn columns_and_units_are_told_apart_and_every_fault_is_named() {
+    fn column_options_are_split_into_columns_and_units_and_every_fault_is_reported() {
         let columns: Columns = "time=t,tau_cmd=T_cmd:mNm, omega=gyro_z:deg/s".parse().unwrap();
         let column = |name: &str, unit: Option<&str>| Column {
             name: name.into(),

@@ -61,14 +61,14 @@ pub fn even_with_gaps(
     // The number of rows of the grid is limited, whatever the spacing of the times.
     ensure!(
         count_of <= MOST_ROWS * rows as f64,
-        "its rows are {usual:e} s apart mostly, and {count_of:.1e} of these steps are in the {:.3e} s of it: they make no even \
-         grid (allowed: at most {MOST_ROWS} times its {rows} rows)",
+        "most rows are {usual:e} s apart, so that an even grid over the {:.3e} s of the recording would have {count_of:.1e} rows \
+         (allowed: at most {MOST_ROWS} times the {rows} rows of the recording)",
         last - first
     );
     budget::table(count_of as usize, table.names().len())?;
     let step = (last - first) / count_of;
     done(format!(
-        "its rows are not equally spaced ({usual:.6} s mostly, in {lost} places more than 1.5 times that): they are joined by \
+        "the rows are not equally spaced ({usual:.6} s mostly, in {lost} places more than 1.5 times that): they are joined by \
          lines on a grid of {step:.6} s"
     ));
     let grid: Vec<f64> = (0..=count_of as usize).map(|k| first + k as f64 * step).collect();

@@ -102,14 +102,14 @@ impl Header {
             Some((Ok(Some(stated)), own)) => Some((stated.text, stated.factor / own)),
             Some((Err(Fault::Foreign(unit)), _)) => Some((unit.clone(), factor(signal, &unit)?)),
             Some((Err(Fault::Two(one, other)), _)) => {
-                bail!("its name states two units, {one} and {other}")
+                bail!("the name of the column states two units, {one} and {other}")
             }
         };
         match (row, named) {
             (Some((below, a)), Some((unit, b))) => {
                 ensure!(
                     (a / b - 1.0).abs() < 1e-9,
-                    "its name states {unit}, the row of units {below}"
+                    "the name of the column states {unit}, but the row of units states {below}"
                 );
                 Ok(Some((unit, b)))
             }
@@ -320,7 +320,7 @@ fn read_as(
             wanted.columns.column("time").name
         );
         if let Ok(own) = header.place("time", Some(Quantity::Time.dimension())) {
-            done(format!("its column {} is passed over (--rate)", header.full[own]));
+            done(format!("the column {} is passed over (--rate)", header.full[own]));
         }
     }
     let (mut signals, mut places, mut factors) = (Vec::new(), Vec::new(), Vec::new());
@@ -426,7 +426,7 @@ fn read_as(
             columns[0] = joined;
             seconds = true;
             done(format!(
-                "its times are the columns {} and {}: time counts from {first} s",
+                "the times are the columns {} and {}: time counts from {first} s",
                 header.full[*whole], header.full[*rest]
             ));
         } else if time == header.full[*rest] {
@@ -442,7 +442,7 @@ fn read_as(
     for (signal, column) in signals.iter().zip(&columns) {
         if let Some(row) = column.iter().position(|value| value.abs() > LARGEST) {
             bail!(
-                "row {} of its values: {} is {:e} (allowed: magnitudes up to {LARGEST:e})",
+                "row {} of the values: {} is {:e} (allowed: magnitudes up to {LARGEST:e})",
                 row + 1,
                 signal.name,
                 column[row]
@@ -450,13 +450,13 @@ fn read_as(
         }
     }
     if let Some(origin) = origin {
-        done(format!("its times are dates: time counts from {origin}"));
+        done(format!("the times are dates: time counts from {origin}"));
     }
     if let Some(rate) = counted {
         let rows = columns[0].len();
         columns.insert(0, (0..rows).map(|k| k as f64 / rate).collect());
         signals.insert(0, time_signal);
-        done(format!("it has no times: its rows are taken as {rate} a second (--rate)"));
+        done(format!("the file has no times: its rows are taken as {rate} per second (--rate)"));
     }
     let names = signals.iter().map(|signal| signal.name.to_string()).collect();
     if inputs.is_some() {
@@ -469,7 +469,7 @@ fn read_as(
         Stamps::AsTheyAre => {}
         Stamps::On(grid) => {
             done(format!(
-                "its times are printed to {}: rows {:.6} ms apart have these times, and are taken so",
+                "the times are printed to {}: rows {:.6} ms apart have these times, so that this spacing is used",
                 stamps::format_quantum(grid.quantum),
                 1e3 * grid.step
             ));
@@ -561,9 +561,9 @@ fn complete(
     done: &mut dyn FnMut(String),
 ) -> Result<Vec<Vec<f64>>> {
     let time = &columns[0];
-    ensure!(!time.is_empty(), "it has no rows of values");
+    ensure!(!time.is_empty(), "the file has no rows of values");
     if let Some(row) = time.iter().position(|t| t.is_nan()) {
-        bail!("row {} of its values has no time", row + 1);
+        bail!("row {} of the values has no time", row + 1);
     }
     let origin = if time[0].abs() > LATE { time[0] } else { 0.0 };
     if origin != 0.0 {

@@ -134,7 +134,7 @@ struct Lines {
 
 impl Lines {
     fn open(path: &Path, separator: u8) -> Result<Self> {
-        let file = input::open(path).context("it cannot be opened")?;
+        let file = input::open(path).context("the file cannot be opened")?;
         let mut builder = csv::ReaderBuilder::new();
         let reader =
             builder.has_headers(false).flexible(true).delimiter(separator).from_reader(file);
@@ -264,7 +264,7 @@ impl Layout {
         {
             tried.push(Sample::read(path, separator, least)?);
         }
-        ensure!(tried.iter().any(|sample| !sample.lines.is_empty()), "it is empty");
+        ensure!(tried.iter().any(|sample| !sample.lines.is_empty()), "the file is empty");
         let start = |fields: &[String], separator: u8| {
             let line = fields.join(&char::from(separator).to_string());
             line.chars().take(60).collect::<String>()
@@ -316,7 +316,7 @@ impl Layout {
                 }
                 ensure!(
                     names.len() <= width && width <= fields.len().max(names.len()),
-                    "its header, line {line}, has {} names, its rows have {width} fields (allowed: as many; decimal commas need another \
+                    "the header, line {line}, has {} names, but the rows have {width} fields (allowed: as many; decimal commas need another \
                      separator than commas, or quotes)",
                     names.len()
                 );
@@ -337,7 +337,7 @@ impl Layout {
             let kinds: BTreeSet<&str> = rows.iter().map(|row| lines[*row].1[0].as_str()).collect();
             ensure!(
                 kinds.len() < 2,
-                "its lines are records of several kinds, such as {} (allowed: rows of one kind, or names above them)",
+                "the lines are records of several kinds, such as {} (allowed: rows of one kind, or names above them)",
                 kinds.iter().take(2).copied().collect::<Vec<_>>().join(" and ")
             );
         }
@@ -346,7 +346,7 @@ impl Layout {
             notes.push(format!("line {line} was taken for a row of units"));
         }
         if separator.0 != b',' {
-            notes.push(format!("its columns are separated by {}", separator.1));
+            notes.push(format!("the columns are separated by {}", separator.1));
         }
         names.truncate(width);
         let mut header = Header::from_names(names, units.map(|(_, fields, _)| fields));
@@ -400,7 +400,7 @@ impl Layout {
                 && lines.reader.position().byte() == size
                 && !last[0].is_ascii_whitespace()
             {
-                done(format!("its last line, {line}, is not complete and was left out"));
+                done(format!("the last line, {line}, is not complete and was left out"));
                 break;
             }
             if fields.len() < width || fields[width..].iter().any(|field| !field.is_empty()) {

@@ -565,7 +565,7 @@ mod tests {
     }
 
     #[test]
-    fn a_unit_is_known_in_each_of_its_spellings() {
+    fn every_spelling_of_a_unit_is_recognised() {
         let cases: [(Quantity, f64, &[&str]); 12] = [
             (
                 Torque,
@@ -644,7 +644,7 @@ mod tests {
     }
 
     #[test]
-    fn a_name_states_its_unit_in_many_ways() {
+    fn units_are_found_in_column_names_in_many_notations() {
         let text = |name: &str, quantity: Quantity| {
             find_unit(name, quantity.dimension()).map(|found| found.map(|s| (s.before, s.text)))
         };

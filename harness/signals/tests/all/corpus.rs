@@ -151,7 +151,7 @@ fn spreadsheets() -> Vec<Case> {
             "txt",
             utf_16,
             plain.clone(),
-            Some("it is UTF-16; save it as UTF-8"),
+            Some("the file is in UTF-16; save it as UTF-8"),
         ),
         (
             "Excel, #N/A and #DIV/0! in a column that is not used",
@@ -168,7 +168,7 @@ fn spreadsheets() -> Vec<Case> {
             "csv",
             b"PK\x03\x04\x14\0\x06\0".to_vec(),
             plain.clone(),
-            Some("it is neither text in columns nor Parquet"),
+            Some("the file is neither text in columns nor Parquet"),
         ),
         (
             "LibreOffice, all fields quoted",
@@ -333,21 +333,21 @@ fn laboratories() -> Vec<Case> {
             "csv",
             b"\x1f\x8b\x08\0\0\0\0\0\0\x03".to_vec(),
             of("t", "a", "b"),
-            Some("it is compressed with gzip"),
+            Some("the file is compressed with gzip"),
         ),
         (
             "gzip",
             "gz",
             b"\x1f\x8b\x08\0\0\0\0\0\0\x03".to_vec(),
             of("t", "a", "b"),
-            Some("it is compressed with gzip"),
+            Some("the file is compressed with gzip"),
         ),
         (
             "ROS 2 bag",
             "csv",
             b"SQLite format 3\0\x10\0".to_vec(),
             of("t", "a", "b"),
-            Some("it is an SQLite database"),
+            Some("the file is an SQLite database"),
         ),
     ]
 }
@@ -544,7 +544,7 @@ fn with_words() -> Vec<Case> {
             "lvm",
             labview('.', ""),
             labels.clone(),
-            Some("its header, line 20, has 4 names, its rows have 3 fields"),
+            Some("the header, line 20, has 4 names, but the rows have 3 fields"),
         ),
         (
             "LabVIEW, Germany, with a comment",
@@ -559,7 +559,7 @@ fn with_words() -> Vec<Case> {
             "csv",
             tektronix,
             of("#4:s", "#5:mNm", "#6:deg/s"),
-            Some("its lines are records of several kinds"),
+            Some("the lines are records of several kinds"),
         ),
         (
             "Tektronix MSO",
@@ -594,7 +594,7 @@ fn with_words() -> Vec<Case> {
             "txt",
             lines("", |k| format!("{} -> {},{}", clock(k), torque(k), rate(k))),
             of("#1", "#2:mNm", "#3:deg/s"),
-            Some("its lines are records of several kinds"),
+            Some("the lines are records of several kinds"),
         ),
         (
             "Arduino serial monitor with times and names",
@@ -615,7 +615,7 @@ fn with_words() -> Vec<Case> {
             "log",
             lines("", |k| format!("[2026-01-31 {}] {}\t{}", clock(k), torque(k), rate(k))),
             of("#1", "#2:mNm", "#3:deg/s"),
-            Some("its lines are records of several kinds"),
+            Some("the lines are records of several kinds"),
         ),
         (
             "R write.csv",
@@ -631,14 +631,14 @@ fn with_words() -> Vec<Case> {
                 format!("\"{}\" {} \"slow sweep\"", k + 1, row(k).replace(',', " "))
             }),
             plain(),
-            Some("its header, line 1, has 4 names, its rows have 5 fields"),
+            Some("the header, line 1, has 4 names, but the rows have 5 fields"),
         ),
         (
             "R write.table, no quotes",
             "txt",
             lines("t T_cmd gyro\n", |k| format!("{} {}", k + 1, row(k).replace(',', " "))),
             of("t:ms", "T_cmd:mNm", "gyro:deg/s"),
-            Some("its header, line 1, has 3 names, its rows have 4 fields"),
+            Some("the header, line 1, has 3 names, but the rows have 4 fields"),
         ),
         (
             "R write.csv2",
@@ -675,7 +675,7 @@ fn with_words() -> Vec<Case> {
             "log",
             capture(boot),
             numbered(),
-            Some("its header, line 1, has 2 names, its rows have 3 fields"),
+            Some("the header, line 1, has 2 names, but the rows have 3 fields"),
         ),
         (
             "serial capture, its first row damaged",
@@ -699,7 +699,7 @@ fn with_words() -> Vec<Case> {
                 _ => format!("ATT, {}, 0.1, 0.2", 1000 * millis(k)),
             }),
             of("#2:us", "#5:mNm", "#4:deg/s"),
-            Some("its header, line 4, has 8 names, its rows have 5 fields"),
+            Some("the header, line 4, has 8 names, but the rows have 5 fields"),
         ),
         (
             "ArduPilot DataFlash, its formats alone at the beginning",
@@ -718,13 +718,13 @@ fn with_words() -> Vec<Case> {
                 _ => format!("$GPS,{},48.1,11.5", millis(k)),
             }),
             of("#2:ms", "#3:mNm", "#4:deg/s"),
-            Some("its lines are records of several kinds, such as $GPS and $IMU"),
+            Some("the lines are records of several kinds, such as $GPS and $IMU"),
         ),
     ]
 }
 
 #[test]
-fn the_files_of_tools_are_read_with_the_right_values_or_refused_with_the_words_that_help() {
+fn files_of_many_tools_are_read_correctly_or_refused_with_a_helpful_message() {
     let cases = [spreadsheets(), robots(), laboratories(), programs(), with_words()].concat();
     let time: Vec<f64> = (0..ROWS).map(|k| millis(k) as f64 * 1e-3).collect();
     let torques: Vec<f64> = (0..ROWS).map(|k| torque(k) as f64 * 1e-3).collect();

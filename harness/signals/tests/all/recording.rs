@@ -126,7 +126,7 @@ fn any_separator_decimal_mark_comment_and_unit_gives_the_same_numbers() {
     let dates = read_text(cases[10].0, cases[10].1.as_bytes(), cases[10].2).unwrap().1;
     assert!(dates.contains("time counts from 2026-01-31T23:59:59.990+00:00"), "{dates}");
     let cut = read_text(cases[7].0, cases[7].1.as_bytes(), cases[7].2).unwrap().1;
-    assert!(cut.contains("its last line, 8, is not complete and was left out"), "{cut}");
+    assert!(cut.contains("the last line, 8, is not complete and was left out"), "{cut}");
     assert!(cut.contains("line 4 was taken for a row of units"), "{cut}");
 }
 
@@ -159,7 +159,7 @@ fn a_slow_torque_is_held_and_lost_rows_are_left_out() {
 }
 
 #[test]
-fn a_torque_that_was_lost_for_long_leaves_a_gap() {
+fn rows_in_which_the_torque_is_missing_for_long_are_left_out() {
     let mut text = String::from("time;tau_cmd;omega\n");
     for k in 0..300 {
         let torque = if (100..200).contains(&k) { String::new() } else { "0,5".into() };
@@ -228,7 +228,7 @@ fn other_types_of_a_parquet_file_are_left_to_the_python_package() {
 }
 
 #[test]
-fn a_unit_of_the_times_is_not_one_of_another_signal() {
+fn the_unit_of_the_times_is_not_applied_to_another_signal() {
     // dates need no unit, but milli- of the torque is the same factor as milli- of the time
     let text =
         "t [ms],T [mNm],omega\n2026-01-31T12:00:00.000Z,100,0\n2026-01-31T12:00:00.020Z,250,1\n";
@@ -290,7 +290,7 @@ fn a_fault_is_named_with_line_column_and_what_is_allowed() {
             "--columns force is of no use here (allowed: time, omega, tau_cmd, theta)",
         ),
         ("time,omega,tau_cmd,omega\n0,0,0,0\n", "", "more than one column omega (#2 and others)"),
-        ("time,tau_cmd,omega\n,0,0\n0.1,0,0\n", "", "row 1 of its values has no time"),
+        ("time,tau_cmd,omega\n,0,0\n0.1,0,0\n", "", "row 1 of the values has no time"),
         (
             "time,tau_cmd,omega\n0,0,\n0.1,0,3\n",
             "",
@@ -298,8 +298,8 @@ fn a_fault_is_named_with_line_column_and_what_is_allowed() {
         ),
         ("time,tau_cmd,omega\n0,02,0,1,0,3\n", "", "decimal commas need another separator"),
         ("nothing here\n", "", "line 1, \"nothing here\", is not a row of numbers"),
-        ("", "", "it is empty"),
-        ("a\0b\n", "", "it is neither text in columns nor Parquet"),
+        ("", "", "the file is empty"),
+        ("a\0b\n", "", "the file is neither text in columns nor Parquet"),
     ];
     for (text, of, words) in cases {
         let error = error(text, of);
@@ -315,7 +315,7 @@ fn a_fault_is_named_with_line_column_and_what_is_allowed() {
 
 /// Earlier versions refused each of these files, or read it wrongly.
 #[test]
-fn files_of_loggers_and_spreadsheets_are_read_as_they_are_written() {
+fn files_of_loggers_and_spreadsheets_are_read_with_the_values_that_were_written() {
     let renamed = "time=t:ms,tau_cmd=T_cmd:mNm,omega=gyro z:deg/s";
     let cases: [(&str, &str); 4] = [
         // rosbag exports, flight logs: a column of text, one of Booleans
@@ -423,13 +423,13 @@ fn a_file_without_times_is_read_only_with_a_stated_rate() {
     let (table, said) = read_file(&path, &at_50_hz).unwrap();
     assert_close(column(&table, "time"), &TIME, text);
     assert_close(column(&table, "tau_cmd"), &TORQUE, text);
-    assert!(said.contains("its rows are taken as 50 a second (--rate)"), "{said}");
+    assert!(said.contains("its rows are taken as 50 per second (--rate)"), "{said}");
     assert!(Columns::default().with_rate(Some(0.0)).is_err());
     // what a time column says is passed over, unless it is asked for
     std::fs::write(&path, format!("time,{text}").replace('\n', "\n7,")).unwrap();
     let (table, said) = read_file(&path, &at_50_hz).unwrap();
     assert_close(column(&table, "time"), &TIME, text);
-    assert!(said.contains("its column time is passed over (--rate)"), "{said}");
+    assert!(said.contains("the column time is passed over (--rate)"), "{said}");
     let both = columns("time=time:ms").with_rate(Some(50.0)).unwrap();
     let error = read_file(&path, &both).unwrap_err();
     assert!(
@@ -438,7 +438,7 @@ fn a_file_without_times_is_read_only_with_a_stated_rate() {
     );
     let of = columns("tau_cmd=omega").with_rate(Some(50.0)).unwrap();
     let (_, said) = read_file(&stored("dur_ns.parquet"), &of).unwrap();
-    assert!(said.contains("its column time is passed over"), "{said}");
+    assert!(said.contains("the column time is passed over"), "{said}");
 }
 
 #[test]
@@ -452,7 +452,7 @@ fn columns_of_seconds_and_nanoseconds_form_one_time() {
     ] {
         let (table, said) = read_text("csv", format!("{head}\n{rows}").as_bytes(), of).unwrap();
         assert_close(column(&table, "time"), &TIME, head);
-        assert!(said.contains("its times are the columns"), "{said}");
+        assert!(said.contains("the times are the columns"), "{said}");
     }
     // two full times
     let rows = "1.00,1000000000,0\n1.02,1020000000,1\n1.04,1040000000,2\n";
@@ -462,7 +462,7 @@ fn columns_of_seconds_and_nanoseconds_form_one_time() {
         let (table, said) = read_text("csv", text.as_bytes(), &of).unwrap();
         let off = |(t, expected): (&f64, f64)| (t - 1.0 - expected).abs() < 1e-12;
         assert!(column(&table, "time").iter().zip(TIME).all(off), "{time}: {table:?}");
-        assert!(!said.contains("its times are the columns"), "{said}");
+        assert!(!said.contains("the times are the columns"), "{said}");
     }
 }
 
@@ -474,7 +474,7 @@ fn times_printed_to_milliseconds_are_put_back_onto_their_grid() {
     let time = column(&table, "time");
     let worst = (0..400).map(|k| (time[k] - time[0] - k as f64 / 33.0).abs()).fold(0.0, f64::max);
     assert!(worst < 2e-5, "{worst:e}");
-    assert!(said.contains("its times are printed to 1 ms: rows 30.303"), "{said}");
+    assert!(said.contains("the times are printed to 1 ms: rows 30.303"), "{said}");
 }
 
 /// Writes a Parquet file with time, torque in mN·m and rate, compressed by a codec.

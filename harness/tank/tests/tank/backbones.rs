@@ -77,7 +77,7 @@ fn end(rows: &[Row], motion: usize, of: &EnergyTerms, allowed: f64) -> Option<f6
 
 /// The limits of the product are those of its bob against the backbones. Rotary motion ends later, except by its fold.
 #[test]
-fn limits_are_where_the_bob_leaves_the_backbones() {
+fn angle_limits_are_where_the_model_s_frequency_leaves_nonlinear_potential_flow() {
     for (fill, rows) in backbones() {
         let (s, kappa) = coefficients(fill);
         let known = limits::cylinder(fill, shifts(s, kappa).map(Some));
@@ -101,7 +101,7 @@ fn limits_are_where_the_bob_leaves_the_backbones() {
 /// Up to their limit the frequencies of the energy terms are those of the backbones, planar within 0.06 % and rotary within
 /// 0.11 %. The third order errs by 0.3 % before.
 #[test]
-fn energy_terms_have_the_frequencies_of_the_backbones() {
+fn models_with_energy_terms_have_the_frequencies_of_nonlinear_potential_flow() {
     let mut compared = 0;
     for (fill, rows) in backbones() {
         let Some(known) = energy_terms(fill) else { continue };
@@ -127,7 +127,7 @@ fn energy_terms_have_the_frequencies_of_the_backbones() {
 /// At h/R 0.8 and 1 the bridged pair is within 0.3 % of the backbones up to 16 degrees, and nearer than a pendulum in
 /// planar motion from 7 degrees on. At h/R 1 the planar branch splits near 2 to 3.5 degrees.
 #[test]
-fn bridged_coefficients_are_close_to_the_backbones() {
+fn coefficients_bridged_across_a_pole_are_close_to_nonlinear_potential_flow() {
     let is_bridged = |fill: f64| fill > BRIDGED[0] && fill < BRIDGED[1];
     let all: Vec<_> = backbones().into_iter().filter(|(fill, _)| is_bridged(*fill)).collect();
     assert_eq!(all.len(), 2);

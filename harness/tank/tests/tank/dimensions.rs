@@ -114,7 +114,7 @@ fn quantities(data: &ModalData) -> Vec<Quantity> {
 }
 
 #[test]
-fn every_modal_parameter_has_its_dimension() {
+fn every_modal_parameter_scales_by_its_physical_dimension() {
     let one = solved(1.0, 512.0);
     for (c, rho) in [(4.0, 2048.0), (0.0625, 512.0)] {
         for ((_, a), (_, b)) in one.iter().zip(&solved(c, rho)) {
@@ -130,7 +130,7 @@ fn every_modal_parameter_has_its_dimension() {
 
 /// 4 times as large, and times 2 times as long: gravity stays, viscosity is 16/2 and surface tension 64/4 times as large.
 #[test]
-fn similar_tanks_have_the_same_damping_and_the_same_words_for_it() {
+fn similar_tanks_have_the_same_damping_and_the_same_description() {
     let [one, large] = [1.0, 4.0].map(|c| solved(c, 512.0));
     for ((tank, data), (larger, scaled)) in
         one.iter().zip(&large).filter(|pair| !pair.0.1.modes.is_empty())

@@ -17,7 +17,7 @@ fn problems(text: &str) -> String {
 
 /// Each defect is named in one clear sentence. The words tested are those a reader needs.
 #[test]
-fn bad_contours_are_described() {
+fn every_defect_of_a_contour_has_a_clear_message() {
     let cases = [
         ("profile = []", "no segment"),
         (
@@ -123,7 +123,7 @@ fn all_problems_are_reported_at_once() {
 
 /// Fills that have no modes say why.
 #[test]
-fn impossible_fills_are_described() {
+fn every_impossible_fill_has_a_clear_message() {
     let cases = [
         (
             "shape = { cylinder = { radius = 1.0, height = 1.0 } }",
@@ -254,7 +254,7 @@ fn checks_of_contours_do_not_depend_on_the_size_of_the_tank() {
 /// All that the tank holds, as a height, per cent and a mass: no free surface, no modes, and the rigid body that the
 /// liquid then is.
 #[test]
-fn a_full_closed_tank_has_no_modes_and_says_what_its_liquid_is() {
+fn a_full_closed_tank_has_no_modes_and_a_message_with_its_rigid_liquid() {
     let tank = tank("density = 1000.0\nshape = { sphere = { radius = 1.0 } }");
     let mass = 1000.0 * 4.0 / 3.0 * core::f64::consts::PI;
     for fill in [Fill::Height(2.0), Fill::Share(1.0), Fill::Mass(mass)] {
@@ -273,7 +273,7 @@ fn a_full_closed_tank_has_no_modes_and_says_what_its_liquid_is() {
 /// Volume and mass of what is solved at the height against what was asked; heights of closed forms. The volume is
 /// integrated twice, by 20 points a piece and by 5 on smaller ones: rounding of sums, and of 60 bisections.
 #[test]
-fn per_cent_of_the_volume_and_a_mass_are_the_heights_that_hold_them() {
+fn a_fill_in_per_cent_or_as_a_mass_gives_the_height_with_this_volume() {
     let tanks = [
         "shape = { sphere = { radius = 1.0 } }",
         "shape = { torus = { ring_radius = 1.0, tube_radius = 0.4 } }",
@@ -363,7 +363,7 @@ fn the_wetted_contour_ends_at_the_fill() {
 
 /// Every built-in shape is a contour that the solver accepts, its volume that of the textbook.
 #[test]
-fn shapes_have_their_volumes() {
+fn built_in_shapes_have_the_volumes_of_textbooks() {
     use core::f64::consts::PI;
     let cap = |r: f64, h: f64| PI * h * h * (r - h / 3.0);
     let cases = [
@@ -514,7 +514,7 @@ fn a_contour_is_read_from_an_svg_drawing() {
 
 /// The examples in the folder are read and solved.
 #[test]
-fn example_files_work() {
+fn every_example_file_of_a_tank_is_read_and_solved() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
     let mut count = 0;
     for entry in std::fs::read_dir(folder).unwrap() {

@@ -16,7 +16,7 @@ fn laminar(mode: &Mode, nu: f64, g: f64) -> f64 {
 /// Stephens is 1.493 times the laminar layer at every depth; its tanh(1.84 x)^(-1/4) is the layer's
 /// omega. 1.84 for 1.8412 makes 0.2 %.
 #[test]
-fn stephens_is_1_493_laminar_layers_at_every_depth() {
+fn stephens_s_formula_is_1_493_times_the_laminar_layer_at_every_depth() {
     for fill in [0.02, 0.05, 0.0815, 0.15, 0.25] {
         let mode = &solve(BENCH, fill, 1).modes[0];
         let ratio = damping::stephens(0.0815, fill, 1e-6, 9.81) / laminar(mode, 1e-6, 9.81);
@@ -341,7 +341,7 @@ fn a_contour_that_is_a_shape_has_the_damping_of_the_shape() {
 
 /// h/R = 0.2, R = 0.5 m: 1.45 layers are 2.98e-3, 1.06e-3 and 0.56e-3 (by hand, three digits); Stephens has 1.493.
 #[test]
-fn every_mode_of_a_cylinder_has_its_own_layer() {
+fn every_mode_of_a_cylinder_has_the_damping_of_its_own_laminar_layer() {
     let found =
         damped("shape = { cylinder = { radius = 0.5, height = 1 } }", 0.1, 1e-6, 9.81, None);
     for (mode, by_hand) in found.modes.iter().zip([2.98e-3, 1.06e-3, 0.56e-3]) {
@@ -398,7 +398,7 @@ fn a_tank_s_damping_names_each_range_that_it_leaves() {
 
 /// A sphere of 0.5 m, half full: at 0.05 m/s2 measured, twice the layers; at 9.81 m/s2 not measured.
 #[test]
-fn two_estimates_that_disagree_are_both_written() {
+fn two_damping_estimates_that_disagree_are_both_reported() {
     let shape = "shape = { sphere = { radius = 0.5 } }";
     let inside = damped(shape, 0.5, 1e-6, 0.05, None);
     let (first, layers) = (inside.modes[0], 1.45 * inside.modes[0].laminar);

@@ -6,7 +6,7 @@ use hubslosh_tank::closed_form;
 /// Every mode's hinge is the sphere's centre: the wall does no work when the sphere turns about it.
 /// Demanded is 1e-6 R. The mode's height is m h over m, so its error is 1e-10 over the mass ratio.
 #[test]
-fn hinges_of_a_sphere_are_its_centre_at_every_fill() {
+fn pendulum_hinges_in_a_sphere_are_at_its_centre_at_every_fill() {
     for i in 1..20 {
         let fill = 0.1 * i as f64;
         let data = solve("shape = { sphere = { radius = 1.0 } }", fill, 5);
@@ -52,7 +52,7 @@ fn spheres_have_the_known_frequencies_and_masses() {
 /// Ends of the range of fills. Shallow paraboloid: lambda_n R -> 2 n^2 - 1 with corrections of the order of h/R times
 /// n^4. Nearly full: the ice-fishing problem, 2.7547 with the surface's radius.
 #[test]
-fn spheres_have_the_known_limits() {
+fn modes_of_nearly_empty_and_nearly_full_spheres_have_the_known_limits() {
     let data = solve("shape = { sphere = { radius = 1.0 } }", 1e-3, 3);
     for (mode, limit) in data.modes.iter().zip([1.0, 7.0, 17.0]) {
         assert!((mode.lambda / limit - 1.0).abs() < 3e-3, "{}", mode.lambda);
@@ -126,7 +126,7 @@ fn the_inertia_of_the_fixed_mass_is_never_more_exact_than_what_it_follows_from()
 /// phi_1 = r z exactly: lambda_1 = 1/h, m_1 = 3/4, H_1 = 0.6 h, hinge 1.6 h, wave h; all other modes
 /// carry no mass. The fixed quarter stands above the liquid.
 #[test]
-fn a_cone_of_45_degrees_has_one_mode() {
+fn only_the_first_mode_of_a_45_degree_cone_carries_mass() {
     for h in [0.3, 1.2] {
         let data = solve("shape = { cone = { half_angle = 45.0, height = 1.5 } }", h, 5);
         let first = &data.modes[0];
@@ -203,7 +203,7 @@ fn closed_forms_agree_with_the_boundary_integral_equation() {
 /// Sums over all modes that are known: the mass sum and the inertia's limits. Sum of 1/(xi^2 - 1) =
 /// 1/2 from 400 zeros: the tail is 1/(400 pi^2).
 #[test]
-fn closed_forms_obey_their_sums_and_limits() {
+fn sums_over_all_modes_of_the_closed_forms_have_their_known_values() {
     let xi = closed_form::zeros_of_j1_slope(400);
     assert!(
         (xi[0] - 1.841_183_781_340_659_3).abs() < 1e-15
@@ -232,7 +232,7 @@ fn closed_forms_obey_their_sums_and_limits() {
 /// The bench's cylinder by the FMU's own formulas: m_n = m_liq d tanh(2 xi h/d)/(xi (xi^2 - 1) h),
 /// l_n = d/(2 xi tanh(2 xi h/d)), wave 2 R/(xi^2 - 1).
 #[test]
-fn the_upright_cylinder_of_the_fmu_is_unchanged() {
+fn an_upright_cylinder_equals_the_formulas_of_the_fmu() {
     let (d, h) = (0.163, 0.1);
     let data = solve("shape = { cylinder = { radius = 0.0815, height = 0.2 } }", h, 3);
     for (mode, xi) in data.modes.iter().zip([
@@ -296,7 +296,7 @@ fn cutting_a_wall_into_more_segments_changes_nothing() {
 /// The stated error also holds where the solver is less accurate: nearly full and nearly empty
 /// tanks, cusps, thin gaps. The hinge and the closed form of an annulus check it.
 #[test]
-fn stated_error_covers_hard_tanks() {
+fn the_stated_error_holds_in_tanks_that_are_hard_to_solve() {
     for fill in [1e-3, 0.01, 1.95, 1.99, 1.999, 1.9999] {
         let data = solve("shape = { sphere = { radius = 1.0 } }", fill, 5);
         let r = data.r_surface.unwrap();
@@ -401,7 +401,7 @@ fn wave_numbers_of_an_annulus_scale_and_have_the_limits_of_a_thin_one() {
 
 /// lambda times the length along the waves: k L tanh(k h), k L = pi, 3 pi.
 #[test]
-fn a_box_has_its_frequencies_over_its_own_length() {
+fn each_axis_of_a_box_has_the_frequencies_of_its_length() {
     let data = closed_form::rectangular(0.8, 0.5, 0.2, 1000.0, 2);
     let axes = data.axes.unwrap();
     for (axis, length) in [(axes.x, 0.8), (axes.y, 0.5)] {

@@ -26,7 +26,7 @@ fn the_documentation_s_figure_is_the_one_that_is_drawn() {
 
 /// A tank with a dome, its modes and its sweep, as somebody has looked at them.
 #[test]
-fn pictures_of_a_tank_and_its_sweep_are_unchanged() {
+fn pictures_of_a_tank_and_its_sweep_equal_the_inspected_ones() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/common_bulkhead.toml");
     let tank = Tank::read(&path).unwrap();
     let depth = tank.depth().unwrap();
@@ -126,7 +126,7 @@ fn points(path: &str) -> Vec<[f64; 2]> {
 /// wall. Expected: for a cylinder fill over radius, for an annulus less its inside, for a bowl half its length times
 /// 2/3 of its depth, and so on. The tolerance is a hundredth of a pixel in some hundred.
 #[test]
-fn the_liquid_that_is_drawn_is_the_section_s() {
+fn the_drawn_liquid_has_the_area_of_the_wetted_section() {
     for (text, fill, area) in [
         ("shape = { cylinder = { radius = 2.0, height = 3.0 } }", 1.0, 0.5),
         (

@@ -149,7 +149,7 @@ fn the_reference_annulus_is_reproduced_in_closed_form() {
 
 /// The keys that other programs read.
 #[test]
-fn the_result_has_the_keys_of_the_reference() {
+fn the_result_in_json_has_the_documented_keys() {
     for case in reference() {
         let data = tank(&toml(&case)).solve(number(&case["fill"]), 5).unwrap();
         let written = serde_json::to_value(&data).unwrap();

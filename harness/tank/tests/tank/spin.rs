@@ -24,7 +24,7 @@ fn close(found: f64, expected: f64, error: f64) {
 
 /// Closed forms of the paraboloid in an upright cylinder of radius 1 m that neither bares the floor nor reaches the lid.
 #[test]
-fn in_a_cylinder_the_surface_is_its_closed_form() {
+fn in_a_cylinder_the_spinning_surface_equals_its_closed_form() {
     for (h, beta) in [(0.5, 0.1), (0.5, 1.0), (1.0, 0.3), (1.0, 2.0), (2.0, 5.0)] {
         let shape = Shape::Cylinder { radius: 1.0, height: 4.0 };
         let (m, found) = turned(shape, h / 4.0, beta, false);
@@ -65,7 +65,7 @@ fn in_a_sphere_with_dry_poles_the_centre_of_mass_balances_thrust_and_spin() {
 /// Equilibria of a sphere that a program of its own, by quadrature of the section, found to 8 digits: share of the volume,
 /// Omega^2 R/g, then z_cg/R from the centre, I_axis/(m R^2), I_cg/(m R^2), height of the apex and of the wall line.
 #[test]
-fn in_a_sphere_the_surface_is_that_of_another_program() {
+fn in_a_sphere_the_spinning_liquid_equals_an_independent_program() {
     let rows = [
         (0.25, 0.3, [-0.577_874_03, 0.346_950_23, 0.199_213_78, -0.414_933_79, -0.276_392_74]),
         (0.5, 0.3, [-0.373_605_43, 0.418_646_04, 0.269_741_70, -0.074_860_93, 0.074_310_76]),
@@ -164,7 +164,7 @@ fn liquid_in_two_pools_is_refused() {
 }
 
 #[test]
-fn what_cannot_spin_is_refused() {
+fn tanks_and_rates_that_cannot_spin_are_refused() {
     let cylinder = Tank::from_shape(Shape::Cylinder { radius: 0.3, height: 0.6 }, RHO).unwrap();
     let data = cylinder.solve(0.4, 1).unwrap();
     for omega in [0.0, -1.0, f64::NAN, f64::INFINITY] {

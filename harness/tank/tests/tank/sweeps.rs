@@ -57,7 +57,7 @@ fn empty_and_full_tanks_have_no_modes() {
 
 /// Behind all other columns: the pair of mode 1 with its error, empty where it is not known.
 #[test]
-fn a_sweep_has_the_third_order_of_every_fill() {
+fn a_sweep_has_the_third_order_coefficients_of_every_fill() {
     let tank = tank("density = 1000.0\nshape = { sphere = { radius = 0.1 } }");
     let mut table = sweep(&tank, &[0.0, 0.112, 0.14], 2).unwrap();
     assert!(!table.to_csv().contains("nonlinear"));

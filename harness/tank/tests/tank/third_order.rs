@@ -8,7 +8,7 @@ const COUNT: usize = 40;
 /// The bench's tank, R 81.5 mm. The values, three digits, are from an independent derivation; half
 /// a unit of their last digit.
 #[test]
-fn shifts_of_the_bench_are_the_known_ones() {
+fn frequency_shifts_of_the_bench_equal_an_independent_derivation() {
     let all = Overlaps::new(COUNT);
     for (fill, shifts, equivalent) in
         [(0.10, [-0.429, 0.367], [1.408, 0.734]), (0.05, [-0.257, 0.421], [1.144, 0.842])]
@@ -95,7 +95,7 @@ fn boxes_have_the_waves_of_tadjbakhsh_and_keller() {
 /// A ring without a hole is a circle. A thin ring of radius R is a channel. Its planar wave is that of a box of the length
 /// pi R. Its circular wave is that of Stokes: omega^2 = g k T [1 + (9 T^4 - 10 T^2 + 9) (k a)^2/(8 T^4)].
 #[test]
-fn rings_lie_between_a_circle_and_a_channel() {
+fn annular_tanks_lie_between_a_circle_and_a_channel() {
     let (circle, ring) = (Overlaps::round(0.0, 1.0, 20), Overlaps::round(1e-3, 1.0, 20));
     for depth in [0.4, 0.7, 1.5] {
         for (a, b) in circle.equivalent(depth).iter().zip(ring.equivalent(depth)) {

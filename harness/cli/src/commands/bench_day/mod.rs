@@ -173,7 +173,9 @@ impl Day {
         );
         let mut sweeps = self.items_of_kind(Kind::Sweep);
         let step = sweeps.find_map(|item| recorded::read(&item.recorded, &mut |_| {}).ok());
-        let Some((step, _)) = step else { bail!("no sweep of {MANIFEST} can be read") };
+        let Some((step, _)) = step else {
+            bail!("none of the sweeps that {MANIFEST} lists can be read")
+        };
         plan.push_str(&format!("step = {:?}\n[set]\n", (step * 1e9).round() / 1e9));
         let known = |name: &str| self.settings.iter().any(|(other, _)| other == name);
         for (name, value) in self.settings.iter().chain(found.iter().filter(|(n, _)| !known(n))) {
