@@ -606,8 +606,8 @@ fn approximate(
 mod tests {
     use super::*;
 
-    /// Each difference is doubled and divided by its scale: lambda and beta themselves, the liquid's 5 kg for
-    /// masses, R = 2 m for moments and waves, both for inertias.
+    /// The stated error is twice the difference of two discretisations, divided by a reference quantity: lambda and beta by
+    /// themselves, masses by the liquid's 5 kg, moments and waves by R = 2 m, inertias by both.
     #[test]
     fn each_stated_error_is_relative_to_its_reference_quantity() {
         let approximation = |change: &dyn Fn(&mut Mode)| {

@@ -340,9 +340,9 @@ mod tests {
         vec![Segment::arc([1.1, 0.2], 0.5, -200.0, 20.0)]
     }
 
-    /// A right angle of the liquid, pi/2, has nu = 2, a re-entrant one, 3 pi/2, has nu = 2/3. At a jump of
-    /// the curvature rho^2 log rho is smooth in the cube of v. A cusp has the largest gamma. Weak corners of
-    /// many segments count less.
+    /// A corner where the liquid has an angle of pi/2 has nu = 2, and a re-entrant corner with 3 pi/2 has nu = 2/3. At a
+    /// jump of the curvature rho^2 log rho becomes smooth in the cube of v. A cusp gets the largest gamma. Weak corners
+    /// between many short segments get less grading.
     #[test]
     fn corners_are_graded_by_their_angle() {
         let at = |degrees: f64, many: bool| {
@@ -369,8 +369,8 @@ mod tests {
         assert_eq!(at(1.0, false).0, 6.0);
     }
 
-    /// Points begin and end with the panels, one panel after the other. ds/dv is the slope of their distance,
-    /// the normal is perpendicular and outwards, and lengths add up.
+    /// The points of each panel lie between its ends, and panels follow one another along the boundary. ds/dv is the slope
+    /// of the distance along the boundary, normals point outwards, and the lengths of the panels add up to the boundary.
     #[test]
     fn panels_follow_one_another_along_the_whole_boundary() {
         let cap = 0.8 * 20f64.to_radians().cos();
@@ -464,8 +464,8 @@ mod tests {
         }
     }
 
-    /// A full sphere has only three panels of 60 degrees, because they are close neither to each other nor to
-    /// a surface.
+    /// A full sphere needs only three panels of 60 degrees, because its panels are close neither to each other nor to a
+    /// free surface.
     #[test]
     fn a_full_sphere_has_three_panels() {
         let boundary = Boundary::new(&[Segment::arc([0.0, 0.0], 1.0, -90.0, 90.0)]);

@@ -208,7 +208,8 @@ mod tests {
         }
     }
 
-    /// An ellipse too small to connect two points grows until it does, as half an ellipse about their middle.
+    /// By the SVG standard, an ellipse that is too small to connect two points is enlarged until it does; it is then half
+    /// an ellipse about the middle of the two points.
     #[test]
     fn an_arc_that_is_too_small_grows() {
         let found = arc([0.0, 0.0], [4.0, 0.0], 1.0, 0.5, false, true);

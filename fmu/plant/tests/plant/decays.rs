@@ -71,8 +71,9 @@ fn damping_of_decays_follows_the_frequency_down_to_a_millionth_of_a_metre_per_se
     }
 }
 
-/// A ratio that is given holds where the motion starts: with capillarity without gravity, too; without it, where nothing
-/// restores the liquid there, at 1 m/s2.
+/// A given damping ratio holds at the specific force at which the motion starts. If the motion starts without gravity, the
+/// ratio also holds with capillarity, which restores the liquid; without capillarity nothing restores the liquid there, and
+/// the ratio holds at 1 m/s2.
 #[test]
 fn a_given_damping_ratio_holds_at_the_start_or_at_1_m_per_s2() {
     let mut p = held(SloshModel::Linear);
@@ -112,8 +113,9 @@ fn turning_points(p: &Parameters, length: f64) -> Vec<[f64; 2]> {
     found
 }
 
-/// zeta(A) = zeta + zeta_A A from each decrement, to 0.3 rad. What the nonlinear models themselves change at that
-/// amplitude, of order A^2/16 of a pendulum's, stands in the tolerance: 0.8 % measured, 5e-5 of the linear one.
+/// The damping ratio found from each decrement is zeta + zeta_A A up to an amplitude of 0.3 rad. The nonlinear models also
+/// change the decrement by themselves, of the order of A^2/16 for a pendulum, which the tolerance includes: 0.8 % measured,
+/// but 5e-5 for the linear model.
 #[test]
 fn free_oscillations_lose_zeta_plus_zeta_a_times_amplitude_in_every_model() {
     for model in SloshModel::ALL.into_iter().filter(|model| *model != SloshModel::Frozen) {
@@ -163,8 +165,9 @@ fn breaking_waves_decay_to_their_onset_by_the_closed_form() {
     }
 }
 
-/// zeta + zeta_b max(0, k a - s_b) from each decrement, 0.1 of steepness away from the corner, where its rounding makes
-/// 1 % of zeta. A nonlinear model's amplitude varies within a period by the share A^2/16 of a pendulum's.
+/// The damping ratio found from each decrement is zeta + zeta_b max(0, k a - s_b). The tested steepness is 0.1 away from
+/// the onset s_b, where the rounded corner changes zeta by 1 %. In a nonlinear model the amplitude varies within a period
+/// by the share A^2/16, as for a pendulum.
 #[test]
 fn breaking_adds_damping_above_the_steepness_in_every_model() {
     for model in SloshModel::ALL.into_iter().filter(|model| *model != SloshModel::Frozen) {
@@ -190,7 +193,8 @@ fn breaking_adds_damping_above_the_steepness_in_every_model() {
     }
 }
 
-/// Without other damping the power is that of breaking alone, from far above the onset to rest.
+/// Without any other damping, the dissipated power is that of breaking waves only, from far above the onset to rest; it is
+/// never negative.
 #[test]
 fn breaking_waves_only_dissipate_energy() {
     for model in SloshModel::ALL.into_iter().filter(|model| *model != SloshModel::Frozen) {
@@ -214,7 +218,8 @@ fn breaking_waves_only_dissipate_energy() {
     }
 }
 
-/// A_0 = 1e-4 rad makes the least: 1e-4 zeta_A, to be seen below it alone.
+/// The constant A_0 = 1e-4 rad in the formula leaves a minimum of the amplitude-dependent damping, 1e-4 zeta_A, which is
+/// tested without other damping.
 #[test]
 fn a_vanishing_amplitude_leaves_the_viscous_damping() {
     let mut p = held(SloshModel::Linear);
@@ -225,7 +230,8 @@ fn a_vanishing_amplitude_leaves_the_viscous_damping() {
     assert!((measured - zeta - 1e-4).abs() < 2e-8, "{measured} {zeta}");
 }
 
-/// A = angle in the plane of the tangent, where the sine would be 6 % less: of `zeta_amplitude` and of a ring.
+/// The amplitude A is the angle in the tangential plane, for `zeta_amplitude` and for a ring baffle. Its sine would be 6 %
+/// less at the tested angle.
 #[test]
 fn spherical_and_planar_pendulums_have_equal_damping_at_large_angles() {
     for (zeta_a, width) in [(0.05, 0.0), (0.0, 0.01)] {

@@ -29,7 +29,7 @@ fn plant(p: &Parameters) -> Plant {
 
 const MODELS: [SloshModel; 2] = [SloshModel::Linear, SloshModel::Planar];
 
-/// |E(t) - E(0) - work + heat| over the energy throughput, on a bench that leans, with damping and every friction.
+/// Checks |E(t) - E(0) - work + heat| over the energy throughput, on a tilted bench with damping and every friction law.
 #[test]
 fn energy_balances_along_any_direction() {
     for model in MODELS {
@@ -157,7 +157,8 @@ impl Newton<'_> {
     }
 }
 
-/// Runge-Kutta at 0.1 ms, 14 rad/s: (14e-4)^4/120 of the motion a radian, 1e-12 after three seconds; angles of up to 40 degrees.
+/// The independent motion is integrated by Runge-Kutta in steps of 0.1 ms; at 14 rad/s its error is (14e-4)^4/120 per
+/// radian, 1e-12 after three seconds. Angles reach 40 degrees.
 #[test]
 fn newtons_law_with_guide_forces_moves_hub_and_bobs_as_the_planar_model() {
     for tilt in [0.0, 0.1] {
@@ -261,8 +262,8 @@ fn a_radial_mode_keeps_its_direction_and_swings_at_the_closed_form_frequency() {
     }
 }
 
-/// A liquid that is alike in all directions has no axes: two equal modes at right angles move the hub as one along the tangent
-/// does, in linear theory.
+/// A liquid with the same modes in all directions has no preferred axes: in linear theory two equal modes at right angles
+/// move the hub like one mode along the tangent.
 #[test]
 fn equal_modes_at_right_angles_are_one_mode_along_the_tangent() {
     let run = |directions: &[f64]| -> Vec<Outputs> {
@@ -313,8 +314,8 @@ fn directions_of_modes_are_refused_for_models_without_them() {
     assert!(light.unwrap().contains("least inert"));
 }
 
-/// Mode 1 moves along its direction alone: the outputs at the start are what was set, or the start is refused and the message
-/// gives a start that is accepted.
+/// Mode 1 moves only along its direction. A start in this direction gives exactly the outputs that were set; any other
+/// start is refused, and the message gives a start that is accepted.
 #[test]
 fn a_start_is_along_the_direction_of_mode_1_or_refused() {
     for model in MODELS {

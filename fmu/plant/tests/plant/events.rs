@@ -10,7 +10,8 @@ fn torque(value: f64) -> Inputs {
     Inputs { tau_cmd: Ramp::held(value), ..Inputs::default() }
 }
 
-/// At the limit itself the hub is still held; the event makes it turn, and then nothing is overdue.
+/// At the limit of the static friction the hub is still held. Handling the event lets the hub turn, and afterwards no event
+/// is overdue.
 #[test]
 fn after_a_break_away_no_event_is_overdue() {
     let p = bench(SloshModel::Frozen, FrictionModel::Stribeck);
@@ -46,8 +47,8 @@ fn after_a_break_away_no_event_is_overdue() {
     }
 }
 
-/// Without torque and bristles a LuGre hub at rest keeps the sense in which it has turned last; a torque
-/// gives it another.
+/// A hub with LuGre friction that is at rest, without torque and with undeflected bristles, keeps the direction of its last
+/// motion; a torque then determines the direction.
 #[test]
 fn a_lugre_hub_at_rest_moves_in_the_direction_of_the_torque() {
     let p = bench(SloshModel::Frozen, FrictionModel::Lugre);
@@ -66,7 +67,7 @@ fn a_lugre_hub_at_rest_moves_in_the_direction_of_the_torque() {
     assert_eq!(contact_under(&torque(-1e-6), 0.0), -1);
 }
 
-/// Each indicator of the wheel is the distance to what it stands for.
+/// Each event indicator of the wheel is the distance of command or speed to its limit.
 #[test]
 fn indicators_of_the_wheel_are_distances_to_its_limits() {
     let mut p = bench(SloshModel::Frozen, FrictionModel::Viscous);
@@ -93,7 +94,7 @@ fn indicators_of_the_wheel_are_distances_to_its_limits() {
     }
 }
 
-/// Sample k is due at start + k/rate; an event up to a millionth of a period early takes it.
+/// Sample k is due at start + k/rate. An event up to a millionth of a sampling period early already takes the sample.
 #[test]
 fn the_gyros_samples_are_time_events() {
     let mut p = bench(SloshModel::Frozen, FrictionModel::Viscous);
@@ -115,8 +116,8 @@ fn the_gyros_samples_are_time_events() {
     assert!((next - 3.1).abs() < 1e-15, "all that are overdue");
 }
 
-/// Seeds each state alone, also where the outputs are strongly nonlinear. A hundred times the direction gives a hundred
-/// times the derivative, and the derivative is that of a small step.
+/// Computes the derivatives for each state alone, also where the outputs are strongly nonlinear. A direction 100 times as
+/// long gives derivatives 100 times as large, and they equal the change by a small step.
 #[test]
 fn output_derivatives_are_linear_in_each_direction() {
     for slosh in SloshModel::ALL {
@@ -192,7 +193,7 @@ fn a_step_stops_where_the_hub_comes_to_rest() {
     }
 }
 
-/// The rotor turns by 1 rad/s a second and more slowly than its least speed after a quarter.
+/// The rotor's speed changes by 1 rad/s per second and is below its smallest speed after a quarter of a second.
 #[test]
 fn a_step_stops_where_the_wheel_s_torque_changes() {
     let mut p = bench(SloshModel::Frozen, FrictionModel::Viscous);
@@ -212,7 +213,7 @@ fn a_step_stops_where_the_wheel_s_torque_changes() {
     assert!((at - 0.13).abs() < 1e-12, "{at}");
 }
 
-/// Samples at 0.02, 0.04, ... after the start; the one at the end is not a reason to stop before.
+/// Samples are due 0.02 s, 0.04 s, … after the start. The sample at the end of the step does not stop the step early.
 #[test]
 fn a_step_stops_at_each_sample_of_the_gyro() {
     let mut p = bench(SloshModel::Spherical, FrictionModel::Viscous);
@@ -233,8 +234,8 @@ fn a_step_stops_at_each_sample_of_the_gyro() {
     assert_eq!(plant.step_to_event(&inputs, 7.12 - plant.time()).unwrap(), StepEnd::EventAtEnd);
 }
 
-/// Stick and slip under a swinging liquid, a wheel that saturates, a gyro's samples: with stops and without, to the last bit;
-/// and as often as it may be.
+/// Covers stick and slip under a swinging liquid, a wheel that saturates, and samples of the gyro. Steps that stop at
+/// events and steps that do not give bit-identical results, for any number of stops.
 #[test]
 fn continuing_after_events_equals_one_whole_step() {
     for slosh in SloshModel::ALL {
@@ -266,7 +267,7 @@ fn continuing_after_events_equals_one_whole_step() {
     }
 }
 
-/// To another end or with another torque it is a step of its own, from where it is, which finds its own events.
+/// A step to another end or with another torque is a new step from the present state, which finds its own events.
 #[test]
 fn after_a_stop_a_step_with_another_end_or_torque_starts_anew() {
     let mut p = bench(SloshModel::Linear, FrictionModel::Stribeck);
@@ -299,7 +300,7 @@ fn after_a_stop_a_step_with_another_end_or_torque_starts_anew() {
     assert_eq!(plant.state().to_words(), whole.state().to_words());
 }
 
-/// Finite, and stopped within the step.
+/// The saved numbers must be finite, and the time of the stop must lie within the step.
 #[test]
 fn saved_data_that_is_not_a_stopped_step_is_refused() {
     let mut p = bench(SloshModel::Linear, FrictionModel::Viscous);
@@ -328,7 +329,7 @@ fn saved_data_that_is_not_a_stopped_step_is_refused() {
     assert!(StoppedStep::from_words(&none).is_none(), "its start is not a state");
 }
 
-/// On an error the plant is where it was, and so is the step that has stopped.
+/// After an error the plant and its stopped step are unchanged.
 #[test]
 fn a_failed_step_keeps_the_stopped_step() {
     let mut p = bench(SloshModel::Linear, FrictionModel::Viscous);

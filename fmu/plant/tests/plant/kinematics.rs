@@ -150,7 +150,7 @@ fn forces_momentum_and_energy_equal_those_of_the_masses_at_their_places() {
     }
 }
 
-/// The whole liquid at rest in the hub: its force is m_liq r w^2 outwards.
+/// The whole liquid is at rest in the rotating hub, so that its force is m_liq r w^2, outwards.
 #[test]
 fn liquid_that_turns_with_the_hub_pushes_outwards() {
     for slosh in SloshModel::ALL {
@@ -167,7 +167,6 @@ fn liquid_that_turns_with_the_hub_pushes_outwards() {
     }
 }
 
-/// A torque accelerates the hub from rest.
 #[test]
 fn liquid_pushes_back_against_an_acceleration() {
     for slosh in SloshModel::ALL {
@@ -184,7 +183,7 @@ fn liquid_pushes_back_against_an_acceleration() {
     }
 }
 
-/// Angles and rates of the first mode, in both directions, whatever coordinates the model has.
+/// Sets angles and rates of the first mode in both directions, for every slosh model whatever its coordinates.
 #[test]
 fn a_plant_starts_at_the_angles_and_rates_that_it_was_given() {
     for slosh in SloshModel::ALL.into_iter().filter(|model| *model != SloshModel::Frozen) {

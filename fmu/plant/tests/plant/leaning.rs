@@ -86,9 +86,9 @@ fn measured(p: &Parameters) -> f64 {
     10.0 / (zeros[10] - zeros[0])
 }
 
-/// Lambda over the upright tank's, less 1, along the slope and across it, at h/R = 1 by finite elements
-/// (`hubslosh.liquid_modes`, two meshes 2e-4 apart; `formulas::tilt` names the programs). Allowed of the frequency: half the meshes' difference and
-/// what the second order lacks, 1e-4 and 0.15 %.
+/// Compares the relative change of Lambda by the tilt, along the slope and across it, at h/R = 1, with finite elements
+/// (`hubslosh.liquid_modes`, two meshes 2e-4 apart; `formulas::tilt` names the programs). The tolerance of the frequency is
+/// half the difference of the meshes plus the neglected second order, 1e-4 and 0.15 %.
 #[test]
 fn free_decays_on_a_leaning_bench_have_the_frequencies_of_finite_elements() {
     for (s, change, allowed) in
@@ -106,8 +106,8 @@ fn free_decays_on_a_leaning_bench_have_the_frequencies_of_finite_elements() {
     }
 }
 
-/// Stated and measured frequency agree to the square of 1e-4 rad and the measurement's 1e-7. Models with one direction are tested
-/// obliquely to the slope.
+/// The frequency that the plant states and the frequency of a free decay agree to the square of the amplitude, 1e-4 rad,
+/// plus the measurement's error of 1e-7. Models with one direction are tested in a direction oblique to the slope.
 #[test]
 fn the_stated_frequency_equals_that_of_a_free_decay() {
     for model in SLOSHING {

@@ -15,8 +15,9 @@ fn s_and_kappa_of_1_give_the_frequency_shift_of_a_pendulum() {
     assert!((found[1] / 0.5 - 1.0).abs() < 0.01, "{found:?}");
 }
 
-/// With the inertia s and the spring kappa of the third order: planar 3 kappa/8 - s/2, circular kappa/2.
-/// `tests/physics/liquid.rs` compares with potential flow at the two depths.
+/// The model `liquid` with the coefficients s (inertia) and kappa (spring) has the relative frequency shifts 3 kappa/8 -
+/// s/2 in planar and kappa/2 in circular motion. `tests/physics/liquid.rs` compares them with potential flow at the two
+/// depths.
 #[test]
 fn the_liquid_model_has_the_frequency_shifts_of_the_third_order() {
     for (depth, potential_flow) in [(0.10, [-0.4285, 0.3671]), (0.05, [-0.2566, 0.4208])] {
@@ -40,7 +41,8 @@ fn table(mut p: Parameters, s: f64, kappa: f64) -> Parameters {
     p
 }
 
-/// Coefficients of a table, with soft and hard springs: the shifts are those of the same expansion at any s and kappa.
+/// Uses coefficients of a table with soft and hard springs. The shifts equal those of the same expansion for any s and
+/// kappa.
 #[test]
 fn s_and_kappa_of_a_table_give_their_frequency_shifts() {
     for (s, kappa) in [(1.0, 1.0), (1.4, 0.73), (0.3, 2.0), (3.0, 1.2), (1.0, -0.8)] {
@@ -53,7 +55,8 @@ fn s_and_kappa_of_a_table_give_their_frequency_shifts() {
     }
 }
 
-/// A pendulum's coefficients are a warning in the model that is meant for a tank's own.
+/// If the table leaves s and kappa at 1, which are the coefficients of a pendulum, the model `liquid` warns, because it is
+/// meant for the tank's own coefficients.
 #[test]
 fn the_liquid_model_requires_s_and_kappa_of_a_table() {
     let warnings = |p: &Parameters| Plant::warnings(p, &Inputs::default());

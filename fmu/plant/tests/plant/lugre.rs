@@ -285,7 +285,7 @@ fn step_length_follows_the_bristle_stiffness() {
     }
 }
 
-/// Runge-Kutta 4 with the reversals located by bisection on the indicator.
+/// The host uses classical Runge-Kutta, and bisection on the event indicator to locate reversals.
 #[test]
 fn a_model_exchange_host_that_locates_reversals_reproduces_co_simulation() {
     let mut p = bench(SloshModel::Spherical);

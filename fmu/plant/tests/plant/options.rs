@@ -110,8 +110,8 @@ fn motion_with_all_options_does_not_depend_on_the_communication_step() {
     }
 }
 
-/// d momentum/dt is the moment of gravity on every mass at its place, by Simpson's rule over 1 ms:
-/// (2 pi f h)^4/180 of the torque, 1e-10.
+/// The rate of change of the angular momentum equals the moment of gravity on every mass at its place, by Simpson's rule
+/// over 1 ms, whose error is (2 pi f h)^4/180 of the torque, 1e-10.
 #[test]
 fn momentum_on_a_leaning_bench_changes_by_the_moment_of_gravity() {
     for slosh in SloshModel::ALL {
@@ -156,7 +156,8 @@ fn momentum_on_a_leaning_bench_changes_by_the_moment_of_gravity() {
     }
 }
 
-/// Rigid liquid: a pendulum about the bearing, omega^2 = g tan(tilt) M/I with M the moment of all mass.
+/// With rigid liquid, hub and liquid are a pendulum about the bearing: omega^2 = g tan(tilt) M/I with the static moment M
+/// of all masses.
 #[test]
 fn a_leaning_bench_swings_at_the_frequency_of_its_imbalance() {
     let mut p = bench(SloshModel::Frozen, FrictionModel::None);
@@ -226,7 +227,8 @@ fn ringed(slosh: SloshModel) -> Parameters {
     p
 }
 
-/// Miles: 2.83 exp(-0.46) 0.19^1.5 0.1^0.5 = 0.0468 at a wave of 0.1 R, an angle of 0.1195 rad.
+/// By Miles's formula the damping ratio is 2.83 exp(-0.46) 0.19^1.5 0.1^0.5 = 0.0468 for a wave of 0.1 R, which is a slosh
+/// angle of 0.1195 rad.
 #[test]
 fn a_ring_baffle_has_the_damping_and_the_range_of_miles_s_formula() {
     let mut p = ringed(SloshModel::Linear);
@@ -253,8 +255,9 @@ fn a_ring_baffle_has_the_damping_and_the_range_of_miles_s_formula() {
     assert_eq!(Plant::new(&p, &at(9.81), 0.0, 1e-9).err().map(|all| all.len()), Some(2));
 }
 
-/// a' = -zeta(a) omega a with zeta = Z a^(1/2): a^(-1/2) grows by Z omega/2 per time. Over ten periods,
-/// from 0.2 rad; 1 % of the decay, what the ring's own share in the frequency and the angle's cube make.
+/// The amplitude obeys a' = -zeta(a) omega a with zeta = Z a^(1/2), so that a^(-1/2) grows by Z omega/2 per unit of time.
+/// The test starts at 0.2 rad and covers ten periods. The tolerance of 1 % contains the effect of the ring on the frequency
+/// and the cubic terms of the pendulum.
 #[test]
 fn free_oscillation_decays_by_the_damping_of_its_amplitude() {
     for slosh in sloshing() {
@@ -282,7 +285,8 @@ fn free_oscillation_decays_by_the_damping_of_its_amplitude() {
     }
 }
 
-/// omega_1^2 = (g xi/R + sigma xi^3/(rho R^3)) tanh(xi h/R), and the length stays geometry.
+/// The first frequency is omega_1^2 = (g xi/R + sigma xi^3/(rho R^3)) tanh(xi h/R), and the pendulum's length does not
+/// depend on surface tension.
 #[test]
 fn capillarity_centres_the_liquid_down_to_weightlessness() {
     let (xi, radius) = (1.841_183_781_340_66f64, 0.0815);
@@ -308,7 +312,8 @@ fn capillarity_centres_the_liquid_down_to_weightlessness() {
     }
 }
 
-/// c = 2 zeta m omega at every g: with a given ratio the same, by the correlation as omega^(-1/2).
+/// The drag coefficient is c = 2 zeta m omega at every g: a given ratio zeta stays the same, and the ratio of the
+/// correlation varies as omega^(-1/2).
 #[test]
 fn damping_ratio_follows_the_restoring_force_down_to_weightlessness() {
     let mut p = bench(SloshModel::Linear, FrictionModel::None);
@@ -411,7 +416,8 @@ fn dry_friction_of_a_turning_hub_depends_on_direction_and_angle() {
     }
 }
 
-/// Breaking needs both of its parameters, and a steepness that the model reaches: 1.541 at an amplitude of 1.
+/// Breaking needs both of its parameters and an onset that waves in the model can reach: the steepness is 1.541 at an
+/// amplitude of 1 rad.
 #[test]
 fn warnings_name_breaking_parameters_without_effect() {
     let mut p = bench(SloshModel::Liquid, FrictionModel::None);
@@ -436,7 +442,8 @@ fn warnings_name_breaking_parameters_without_effect() {
     }
 }
 
-/// The onset of a wave in a table follows from its elevation and wave number: as in the cylinder if they are its own.
+/// The onset of breaking for a mode of a table follows from the wave elevation and the wave number in the table. With the
+/// values of a cylinder the onset is that of the cylinder.
 #[test]
 fn the_steepness_of_a_table_has_its_own_wave_and_wave_number() {
     let power = |p: &Parameters| plant(p).outputs(&at(9.81)).power_dissipated;

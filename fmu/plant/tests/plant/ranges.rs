@@ -12,7 +12,7 @@ fn at(g: f64) -> Inputs {
 /// Wave height at the wall over angle, in radii: 2/(xi_1^2 - 1).
 const WAVE: f64 = 2.0 / (1.841_183_781_340_659_5 * 1.841_183_781_340_659_5 - 1.0);
 
-/// Thesis 2.3.5: linear below 0.15 R, nonlinear above 0.25 R.
+/// By the thesis (2.3.5) slosh is linear for waves below 0.15 R and nonlinear above 0.25 R.
 #[test]
 fn regimes_end_at_waves_of_0_15_and_0_25_radii() {
     let regime = |ratio: f64| {
@@ -34,7 +34,8 @@ fn regimes_end_at_waves_of_0_15_and_0_25_radii() {
     }
 }
 
-/// The stroke at the ring, eta exp(-1.84 d/R), is 0.64 to 6.4 widths; the ring stays covered.
+/// The law holds if the stroke of the liquid at the ring, eta exp(-1.84 d/R), is 0.64 to 6.4 times the width of the ring,
+/// and the ring stays covered by liquid.
 #[test]
 fn the_law_of_ring_baffles_holds_within_its_range_of_strokes_and_depths() {
     let within = |width: f64, depth: f64, wave: f64| {
@@ -105,7 +106,7 @@ fn a_ring_wider_than_the_tank_or_below_its_bottom_is_refused() {
     assert_eq!(problems(|p| (p.baffle.width, p.baffle.depth) = (0.0, 0.2)), 0, "there is none");
 }
 
-/// The sum of the table's masses is compared to the last digit.
+/// The masses in the table add up to the mass of the liquid if they differ from it by at most 1e-9.
 #[test]
 fn a_table_whose_masses_are_the_whole_liquid_has_no_fixed_mass() {
     let mut p = bench(SloshModel::Linear, FrictionModel::None);
@@ -122,7 +123,8 @@ fn a_table_whose_masses_are_the_whole_liquid_has_no_fixed_mass() {
     assert!((plant.calculated().m_0 - 0.05).abs() < 1e-15);
 }
 
-/// sin^2 + sin^2 of the two angles is the bob's distance from its hinge's vertical, squared.
+/// The sum of the squared sines of the two start angles is the squared distance of the slosh mass from the vertical through
+/// its hinge, relative to the length; it must be less than 1.
 #[test]
 fn a_spherical_bob_starts_below_the_horizontal() {
     let refused = |radial: f64, tangential: f64| {
@@ -136,8 +138,8 @@ fn a_spherical_bob_starts_below_the_horizontal() {
     assert!(refused(0.9, 0.9), "beyond");
 }
 
-/// h/R = 0.2 has s = -38.7: hub and liquid together would have no positive inertia at amplitudes that depend on the hub.
-/// Secondary resonances at 0.829 and 1.012 are bridged.
+/// At h/R = 0.2 the coefficient s is -38.7, so that hub and liquid together would have no positive inertia at amplitudes
+/// that depend on the hub. Near the secondary resonances at 0.829 and 1.012 the coefficients are interpolated.
 #[test]
 fn a_liquid_whose_inertia_falls_with_the_amplitude_is_refused() {
     let said = |fill: f64, model: SloshModel| {
@@ -156,8 +158,8 @@ fn a_liquid_whose_inertia_falls_with_the_amplitude_is_refused() {
     }
 }
 
-/// Every reason has a plant that shows it, next to one that does not. The bench's cylinder has h/R = 1.227: shifts of omega^2
-/// by -0.429 and +0.367 of the squared angle.
+/// For every reason the test has a plant that passes this limit, and one that is just within. The bench's cylinder has h/R
+/// = 1.227, with relative shifts of omega^2 by -0.429 and +0.367 times the squared angle.
 #[test]
 fn the_output_limited_by_names_the_limit_that_was_passed() {
     let reason = |p: &Parameters, g: f64| {
@@ -213,7 +215,8 @@ fn the_output_limited_by_names_the_limit_that_was_passed() {
     assert_eq!(reason(&p, 0.0), LimitedBy::None);
 }
 
-/// A table of modes has the limits that stand in it, for the model with its coefficients; other models end earlier.
+/// A mode of a table is out of range above the limits that the table states, if the model uses the coefficients of the
+/// table. With other models it is out of range at smaller angles.
 #[test]
 fn a_table_of_modes_has_its_own_limits() {
     let reason = |model: SloshModel, limit: f64, degrees: f64| {

@@ -90,7 +90,8 @@ fn a_second_takes_few_internal_steps() {
     );
 }
 
-/// The tolerance is relative to the motion: on a hub at rest small waves take no more steps than large ones.
+/// The tolerance is relative to the size of the motion, so that on a hub at rest small waves take no more steps than large
+/// ones.
 #[test]
 fn a_small_motion_takes_no_more_steps_than_a_large_one() {
     for slosh in SloshModel::ALL {
@@ -104,8 +105,8 @@ fn a_small_motion_takes_no_more_steps_than_a_large_one() {
     }
 }
 
-/// On a hub too heavy to move: in full swing the rate is what errors are compared with, where the liquid turns what the angle
-/// will make of it.
+/// The hub is too heavy to move. The allowed error takes both angles and rates into account, so that a motion that starts at
+/// an angle (with the rate 0) needs no more steps than a motion that starts with a rate.
 #[test]
 fn rotary_slosh_takes_no_more_internal_steps_than_planar_slosh() {
     for slosh in SloshModel::ALL {
@@ -121,7 +122,8 @@ fn rotary_slosh_takes_no_more_internal_steps_than_planar_slosh() {
     }
 }
 
-/// Stribeck's excess is 1e-30 and less at eight times its speed: a long step from there to rest must not miss it.
+/// At eight times the Stribeck speed the additional friction of Stribeck's law is below 1e-30, invisible to any tolerance.
+/// A long step from there to rest must still notice it.
 #[test]
 fn a_long_step_from_a_fast_hub_to_rest_equals_short_steps() {
     for friction in [FrictionModel::Stribeck, FrictionModel::StribeckSmooth] {

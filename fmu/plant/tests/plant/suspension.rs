@@ -42,7 +42,8 @@ fn a_suspension_line_without_stiffness_and_damping_changes_no_bit() {
     }
 }
 
-/// k (theta - theta_0)^2/2 = 0.25 (0.1)^2 J plus I w^2/2, and -k (theta - theta_0) - c w = -0.05 - 0.02 N m.
+/// The expected energy of the line is k (theta - theta_0)^2/2 = 0.25 (0.1)^2 J, to which I w^2/2 is added, and its torque
+/// is -k (theta - theta_0) - c w = -0.05 - 0.02 N m.
 #[test]
 fn the_line_s_torque_and_energy_equal_those_of_its_twist() {
     let mut p = frozen(FrictionModel::None);
@@ -53,7 +54,7 @@ fn the_line_s_torque_and_energy_equal_those_of_its_twist() {
     assert!((outputs.energy - kinetic - 0.0025).abs() < 1e-15, "{} {kinetic}", outputs.energy);
 }
 
-/// I theta'' = -k (theta - theta_0) - c theta'.
+/// A rigid hub obeys I theta'' = -k (theta - theta_0) - c theta'.
 #[test]
 fn a_rigid_hub_swings_and_decays_as_a_torsion_pendulum() {
     for c in [0.0, 0.05] {
@@ -73,7 +74,8 @@ fn a_rigid_hub_swings_and_decays_as_a_torsion_pendulum() {
     }
 }
 
-/// (K - omega^2 M) (theta, alpha) = 0: M and K of the linear model with k about the bearing.
+/// The frequencies are those of (K - omega^2 M)(theta, alpha) = 0, with M and K of the linear slosh model and the stiffness
+/// k of the line about the bearing.
 #[test]
 fn line_and_liquid_swing_together_at_the_frequencies_of_two_coupled_pendulums() {
     let mut p = bench(SloshModel::Linear, FrictionModel::None);
@@ -108,7 +110,8 @@ fn line_and_liquid_swing_together_at_the_frequencies_of_two_coupled_pendulums() 
     }
 }
 
-/// Coulomb friction takes 2 c_f/k off each half swing of pi sqrt(I/k), until the line no longer overcomes it.
+/// Coulomb friction c_f reduces the amplitude by 2 c_f/k in each half swing of pi sqrt(I/k), until the line can no longer
+/// overcome the friction.
 #[test]
 fn dry_friction_stops_a_hanging_hub_where_and_when_it_must() {
     let mut p = frozen(FrictionModel::Stribeck);

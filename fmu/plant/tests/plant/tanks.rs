@@ -31,7 +31,7 @@ fn run(p: &Parameters) -> Vec<Outputs> {
         .collect()
 }
 
-/// With and without a height of the wave, which defaults to that of a cylinder of the diameter tank.d.
+/// Tests the table with and without a wave height, whose default is that of a cylinder with the diameter tank.d.
 #[test]
 fn modes_of_a_cylinder_given_as_a_table_move_like_the_cylinder() {
     for model in SLOSHING {
@@ -125,7 +125,8 @@ fn an_impossible_table_of_modes_is_refused_with_all_its_faults() {
     );
 }
 
-/// Liquid that the walls drag along (`tank.I_own`) is that much more to turn, wherever the tank is.
+/// Liquid that the walls of the tank take along in a rotation (`tank.I_own`) adds to the inertia of the hub, wherever the
+/// tank is.
 #[test]
 fn the_tanks_own_inertia_is_turned_with_the_hub() {
     let mut p = bench(SloshModel::Frozen, FrictionModel::None);
@@ -143,7 +144,8 @@ fn the_tanks_own_inertia_is_turned_with_the_hub() {
     }
 }
 
-/// A box's modes along one axis are not those along the other.
+/// If the table has only the modes along one axis of a box, models in which the liquid also moves along the other axis are
+/// refused, because a box has other modes there.
 #[test]
 fn modes_along_one_axis_are_refused_where_the_liquid_moves_along_both() {
     for model in SloshModel::ALL {

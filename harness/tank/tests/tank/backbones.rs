@@ -75,7 +75,9 @@ fn end(rows: &[Row], motion: usize, of: &EnergyTerms, allowed: f64) -> Option<f6
     None
 }
 
-/// The limits of the product are those of its bob against the backbones. Rotary motion ends later, except by its fold.
+/// Finds where the frequency of the model with the computed coefficients leaves the frequencies of fully nonlinear
+/// potential flow, and compares these angles with the stated limits. For rotary motion the model holds to larger angles,
+/// except where its branch folds.
 #[test]
 fn angle_limits_are_where_the_model_s_frequency_leaves_nonlinear_potential_flow() {
     for (fill, rows) in backbones() {
@@ -98,8 +100,8 @@ fn angle_limits_are_where_the_model_s_frequency_leaves_nonlinear_potential_flow(
     }
 }
 
-/// Up to their limit the frequencies of the energy terms are those of the backbones, planar within 0.06 % and rotary within
-/// 0.11 %. The third order errs by 0.3 % before.
+/// Up to the stated limit, the models with energy terms have the frequencies of fully nonlinear potential flow, planar
+/// within 0.06 % and rotary within 0.11 %. The third-order model reaches an error of 0.3 % at smaller angles.
 #[test]
 fn models_with_energy_terms_have_the_frequencies_of_nonlinear_potential_flow() {
     let mut compared = 0;
@@ -124,8 +126,9 @@ fn models_with_energy_terms_have_the_frequencies_of_nonlinear_potential_flow() {
     assert!(compared > 150, "{compared}");
 }
 
-/// At h/R 0.8 and 1 the bridged pair is within 0.3 % of the backbones up to 16 degrees, and nearer than a pendulum in
-/// planar motion from 7 degrees on. At h/R 1 the planar branch splits near 2 to 3.5 degrees.
+/// At h/R = 0.8 and 1 the interpolated coefficients s and kappa give frequencies within 0.3 % of nonlinear potential flow
+/// up to 16 degrees. From 7 degrees on they are closer in planar motion than a pendulum. At h/R = 1 the planar branch
+/// splits near 2 to 3.5 degrees.
 #[test]
 fn coefficients_bridged_across_a_pole_are_close_to_nonlinear_potential_flow() {
     let is_bridged = |fill: f64| fill > BRIDGED[0] && fill < BRIDGED[1];
@@ -150,7 +153,8 @@ fn coefficients_bridged_across_a_pole_are_close_to_nonlinear_potential_flow() {
     }
 }
 
-/// Other tanks take a share of the angle at which the series breaks down. It is conservative in cylinders of every depth.
+/// In tanks other than cylinders the limit is a share of the angle at which the series breaks down. The test shows that
+/// this estimate is conservative in cylinders of every depth, whose limits are known.
 #[test]
 fn the_estimated_limit_of_other_tanks_is_conservative_in_cylinders() {
     let mut smallest = f64::INFINITY;

@@ -106,7 +106,7 @@ fn damping_has_no_step_where_a_wall_leaves_a_shape() {
     }
 }
 
-/// At the tangent of a capsule, and in its cylinder.
+/// Covers fills at the tangent of a capsule, where the dome meets the cylinder, and fills within the cylinder.
 #[test]
 fn a_capsule_keeps_the_factor_of_its_dome_on_the_dome_s_share() {
     let (_, shape, liquid) = TANKS[1];
@@ -129,7 +129,8 @@ fn a_capsule_keeps_the_factor_of_its_dome_on_the_dome_s_share() {
     }
 }
 
-/// Between the shape's correlation and 1.45 layers, and an interval that holds both.
+/// The damping of a wall that is partly a measured shape lies between the correlation of the shape and 1.45 times the
+/// laminar layer, and the interval contains both.
 #[test]
 fn a_mixture_lies_between_its_correlations_and_its_interval_holds_them() {
     let walls = [
@@ -193,7 +194,8 @@ fn near_a_sphere_every_shape_has_its_damping() {
     }
 }
 
-/// One correlation at every fill of these tanks: its published formula to the last digit but one.
+/// The wall of these tanks is one measured shape at every fill, so that the damping ratio equals the published formula to
+/// the last digit but one.
 #[test]
 fn a_wall_that_is_one_shape_has_its_published_correlation() {
     let close = |found: f64, expected: f64| {

@@ -128,7 +128,8 @@ fn every_modal_parameter_scales_by_its_physical_dimension() {
     }
 }
 
-/// 4 times as large, and times 2 times as long: gravity stays, viscosity is 16/2 and surface tension 64/4 times as large.
+/// The second tank is 4 times as large and its times are 2 times as long: gravity is then the same, viscosity 16/2 times
+/// and surface tension 64/4 times as large.
 #[test]
 fn similar_tanks_have_the_same_damping_and_the_same_description() {
     let [one, large] = [1.0, 4.0].map(|c| solved(c, 512.0));

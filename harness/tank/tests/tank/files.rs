@@ -15,7 +15,7 @@ fn problems(text: &str) -> String {
     }
 }
 
-/// Each defect is named in one clear sentence. The words tested are those a reader needs.
+/// Each defect has a message of one sentence; the test checks for the words that a reader needs.
 #[test]
 fn every_defect_of_a_contour_has_a_clear_message() {
     let cases = [
@@ -121,7 +121,7 @@ fn all_problems_are_reported_at_once() {
     assert_eq!(tank.solve(1.0, 0).unwrap_err().0.len(), 1);
 }
 
-/// Fills that have no modes say why.
+/// The message for each fill without modes gives the reason.
 #[test]
 fn every_impossible_fill_has_a_clear_message() {
     let cases = [
@@ -199,8 +199,8 @@ fn every_impossible_fill_has_a_clear_message() {
     }
 }
 
-/// A gap of 1e-6 of the size is closed, and a free surface within 1e-6 of a shoulder is refused: of the tank's own size. The
-/// largest is 100 m.
+/// A contour counts as closed if the gap is at most 1e-6 of the tank's size, and a free surface is refused within 1e-6 of
+/// the tank's size from a shoulder. Both hold for small and large tanks, up to the largest size of 100 m.
 #[test]
 fn checks_of_contours_do_not_depend_on_the_size_of_the_tank() {
     for c in [0.01, 1.0, 50.0] {
@@ -251,8 +251,8 @@ fn checks_of_contours_do_not_depend_on_the_size_of_the_tank() {
     }
 }
 
-/// All that the tank holds, as a height, per cent and a mass: no free surface, no modes, and the rigid body that the
-/// liquid then is.
+/// The full tank is given as a height, in per cent and as a mass. It has no free surface and no modes, and the message
+/// describes the rigid body that the liquid is.
 #[test]
 fn a_full_closed_tank_has_no_modes_and_a_message_with_its_rigid_liquid() {
     let tank = tank("density = 1000.0\nshape = { sphere = { radius = 1.0 } }");
@@ -270,8 +270,9 @@ fn a_full_closed_tank_has_no_modes_and_a_message_with_its_rigid_liquid() {
     }
 }
 
-/// Volume and mass of what is solved at the height against what was asked; heights of closed forms. The volume is
-/// integrated twice, by 20 points a piece and by 5 on smaller ones: rounding of sums, and of 60 bisections.
+/// Compares volume and mass of the solved tank with the requested ones, and heights with closed forms. The volume is
+/// integrated twice, with 20 points per piece and with 5 points on smaller pieces, so that only rounding of the sums and of
+/// 60 bisections remains.
 #[test]
 fn a_fill_in_per_cent_or_as_a_mass_gives_the_height_with_this_volume() {
     let tanks = [
@@ -361,7 +362,7 @@ fn the_wetted_contour_ends_at_the_fill() {
     assert!(solve(dome, 0.7, 1).r_inner == Some(0.0));
 }
 
-/// Every built-in shape is a contour that the solver accepts, its volume that of the textbook.
+/// Every built-in shape is a contour that the solver accepts, and its volume equals the formula of a textbook.
 #[test]
 fn built_in_shapes_have_the_volumes_of_textbooks() {
     use core::f64::consts::PI;
@@ -512,7 +513,6 @@ fn a_contour_is_read_from_an_svg_drawing() {
     }
 }
 
-/// The examples in the folder are read and solved.
 #[test]
 fn every_example_file_of_a_tank_is_read_and_solved() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
@@ -529,7 +529,8 @@ fn every_example_file_of_a_tank_is_read_and_solved() {
     assert!(count >= 6);
 }
 
-/// 200 pieces are solved in time; one more is refused, with its number.
+/// A contour of 200 segments is solved in a reasonable time. One more segment is refused, and the message states the
+/// number.
 #[test]
 fn a_contour_has_at_most_200_segments() {
     let parsed = |count: usize| {
@@ -545,7 +546,8 @@ fn a_contour_has_at_most_200_segments() {
     assert!(message.contains("The contour has 201 segments, at most 200."), "{message}");
 }
 
-/// The result names its kind, so that a reader knows which lengths to expect.
+/// The JSON result states whether the tank is a body of revolution or a box, so that a reader knows which lengths to
+/// expect.
 #[test]
 fn a_result_says_whether_it_is_of_a_body_of_revolution_or_of_a_box() {
     for (text, kind) in [
@@ -594,7 +596,7 @@ fn the_table_has_the_damping_of_every_mode_with_its_frequency_in_hertz() {
     assert_eq!(rows.matches("n along y").count(), 1, "{rows}");
 }
 
-/// Each dimension at its limit, which is not allowed, by itself, and a little above.
+/// Sets each dimension alone to its limit, which is not allowed, and to a value slightly above, which is.
 #[test]
 fn every_dimension_of_a_shape_has_its_limit_and_is_named() {
     let dome = |bottom: f64, top: f64| {
@@ -648,7 +650,7 @@ fn every_dimension_of_a_shape_has_its_limit_and_is_named() {
     }
 }
 
-/// Closed form or solved, along either axis of a box.
+/// Covers tanks in closed form, solved tanks, and both axes of a box.
 #[test]
 fn modes_are_numbered_from_1() {
     for text in [
@@ -684,14 +686,14 @@ fn a_table_at_0_gravity_says_that_frequencies_are_0_where_there_are_any() {
     assert_eq!(said(2.0, 0.0), (false, true));
 }
 
-/// Wherever the drawing's zero is, a metre of height is one.
+/// The tank is drawn 80 m above the zero of the drawing. Only its own size counts for the largest allowed size.
 #[test]
 fn a_tank_drawn_far_above_its_zero_does_not_count_as_large() {
     let far = solve("profile = [{ line = [0, 80, 1, 80] }, { line = [1, 80, 1, 81] }]", 0.5, 1);
     assert!((far.m_liq / (500.0 * core::f64::consts::PI) - 1.0).abs() < 1e-12);
 }
 
-/// 200 lines join 201 points of a file.
+/// A file of 201 points gives 200 lines, which is the largest allowed number of segments.
 #[test]
 fn a_file_of_points_joins_at_most_201_by_lines() {
     let folder = tempfile::tempdir().unwrap();
@@ -707,7 +709,8 @@ fn a_file_of_points_joins_at_most_201_by_lines() {
     assert!(said.contains("202 points are joined by straight lines, at most 200"), "{said}");
 }
 
-/// A result with its damping gives the same file as one without, and the file of another liquid's damping is its own.
+/// A result for which damping was computed gives the same parameter file as a result without, because the file computes the
+/// damping for its own liquid.
 #[test]
 fn parameters_belong_to_the_liquid_and_not_to_the_result() {
     let text = "density = 875.0\n\
@@ -732,7 +735,7 @@ fn parameters_belong_to_the_liquid_and_not_to_the_result() {
     }
 }
 
-/// Bit for bit, at every fill; also of a full tank.
+/// Both masses are bit-identical at every fill, also in a full tank.
 #[test]
 fn the_mass_equals_that_of_the_solution() {
     for text in [

@@ -51,7 +51,8 @@ fn backbones_of_the_bench_equal_those_of_fully_nonlinear_flow() {
     }
 }
 
-/// The same tank as a shape, as a profile, and with a bottom that is a hair from flat, which the other method solves.
+/// Computes the same tank as a shape, as a profile, and with a bottom that is almost but not exactly flat, which the method
+/// for arbitrary contours solves.
 #[test]
 fn both_methods_agree_within_their_errors() {
     for fill in [0.5, 1.3, 2.5] {
@@ -72,7 +73,7 @@ fn both_methods_agree_within_their_errors() {
     }
 }
 
-/// Lengths scale, coefficients do not; a capsule is a sphere up to its tangent.
+/// A scaled tank has the same coefficients, and a capsule filled below its tangent has those of a sphere.
 #[test]
 fn coefficients_depend_only_on_the_shape() {
     let sphere = known("shape = { sphere = { radius = 1.0 } }", 0.7);
@@ -88,7 +89,8 @@ fn coefficients_depend_only_on_the_shape() {
     }
 }
 
-/// A ring with walls that lean, a nearly full sphere, where the error is large, and secondary resonances.
+/// Refuses a ring with inclined walls, a nearly full sphere (in which the error is large), and depths with secondary
+/// resonances.
 #[test]
 fn unknown_coefficients_are_refused_with_a_reason() {
     refused("shape = { torus = { ring_radius = 1.0, tube_radius = 0.3 } }", 0.3, "ring of liquid");
@@ -101,8 +103,9 @@ fn unknown_coefficients_are_refused_with_a_reason() {
     );
 }
 
-/// Across the poles of a cylinder s and kappa are bridged, never those of a pendulum, and the limits are stated: h/R 0.5 and
-/// 0.4, where the series says 22 degrees, shallow liquid, and the fold of rotary motion.
+/// Near the poles of the third-order theory a cylinder gets interpolated values of s and kappa instead of the values of a
+/// pendulum, and limits are stated at every depth: also at h/R = 0.5 and 0.4, where the series breaks down only at 22
+/// degrees, in shallow liquid, and for the fold of rotary motion.
 #[test]
 fn a_cylinder_has_coefficients_and_limits_at_every_depth() {
     let at = |fill: f64| known("shape = { cylinder = { radius = 1.0, height = 4.0 } }", fill);
@@ -130,7 +133,7 @@ fn a_cylinder_has_coefficients_and_limits_at_every_depth() {
     assert!(other.angle_limit < 0.61 * other.series_limit, "{other:?}");
 }
 
-/// Files carry the limits: of the coefficients, or of the pendulum where there are none.
+/// Parameter files contain the limits of the coefficients, or the limits of a pendulum if there are no coefficients.
 #[test]
 fn files_for_the_fmus_have_the_limits() {
     let limit = |text: &str, fill: f64, target: Target, name: &str| {
@@ -167,8 +170,8 @@ fn files_for_the_fmus_have_the_limits() {
     assert!(amplitude_dependence("box = [0.8, 0.5]", 0.4).is_some());
 }
 
-/// SloshTank and Spacecraft get the coefficients with the wave's energy at h/R 0.25 to 0.7, HubSlosh and tanks that drain those of
-/// the third order.
+/// For h/R from 0.25 to 0.7, parameter files for SloshTank and Spacecraft contain the coefficients that give the wave's
+/// energy. Files for HubSlosh and for draining tanks contain the third-order coefficients.
 #[test]
 fn files_have_the_energy_terms_where_they_are_known() {
     let cylinder = tank("density = 1000.0\nshape = { cylinder = { radius = 0.1, height = 2.0 } }");
@@ -219,7 +222,8 @@ fn files_have_the_energy_terms_where_they_are_known() {
     assert!(matches!(all[1].1, Value::Real(x) if (x.to_degrees() - 6.5).abs() < 0.01), "{all:?}");
 }
 
-/// Without sigma a tank whose Bond number may be below 100 is warned of: 1000 kg/m3, R = 0.1 m, 7.3e-5 m3/s2.
+/// If no surface tension is given, a tank whose Bond number may be below 100 gets a warning. With 1000 kg/m3,
+/// R = 0.1 m and the largest expected sigma/rho of 7.3e-5 m3/s2 this is the case below 0.73 m/s2.
 #[test]
 fn a_missing_surface_tension_is_warned_of_where_it_matters() {
     let tank = tank("density = 1000.0\nshape = { sphere = { radius = 0.1 } }");
@@ -250,7 +254,7 @@ fn a_missing_surface_tension_is_warned_of_where_it_matters() {
     }
 }
 
-/// A rectangle has its planar shifts, with s = 1; a square has circular motion too.
+/// A rectangular box has the planar shifts of the frequency with s = 1; a square box also has circular motion.
 #[test]
 fn boxes_have_a_pair_for_each_length() {
     let long = found("box = [0.8, 0.5]", 0.4);
@@ -303,7 +307,7 @@ fn third_order_of(set: &ParameterSet) -> Vec<(String, f64)> {
 
 const WATER: Liquid = Liquid { gravity: 9.81, nu: None, sigma: None, contact_angle: 90.0 };
 
-/// Mode 1 alone has coefficients, and of a box the first mode along each length. HubSlosh has none for a box.
+/// Only mode 1 has coefficients (in a box: the first mode along each length). Files for HubSlosh contain none for a box.
 #[test]
 fn files_for_the_fmus_have_the_coefficients_of_the_first_mode() {
     let cylinder =
@@ -336,7 +340,8 @@ fn files_for_the_fmus_have_the_coefficients_of_the_first_mode() {
     assert!(third_order_of(&set).is_empty());
 }
 
-/// A torus, a pole, shallow liquid and surface tension that rules: no coefficients, but the reason.
+/// For a torus, near a pole, in shallow liquid and with dominant surface tension the file has no coefficients, but gives
+/// the reason.
 #[test]
 fn files_without_coefficients_say_why() {
     let cylinder = "shape = { cylinder = { radius = 0.1, height = 2.0 } }";
@@ -369,7 +374,8 @@ fn columns(set: &ParameterSet) -> [Vec<f64>; 2] {
     })
 }
 
-/// The pair of each fill stands at its point with its error in the notes, and no single pair for all.
+/// The file has s and kappa at each point of the fill table and states their errors in its notes; there is no single pair
+/// for all fills.
 #[test]
 fn a_draining_tank_has_the_coefficients_of_every_fill() {
     let sphere = tank("density = 1000.0\nshape = { sphere = { radius = 0.5 } }");
@@ -423,7 +429,7 @@ fn a_table_bounds_unknown_coefficients_by_their_neighbours_and_names_the_fills()
     assert_eq!(set.notes.iter().filter(unknown).count(), 4);
 }
 
-/// A torus has no coefficients at all, and a sphere with one known fill none to interpolate.
+/// A torus has no coefficients at any fill, and a sphere with only one known fill has no second value to interpolate to.
 #[test]
 fn a_fill_table_with_fewer_than_two_known_fills_uses_pendulums_with_a_reason() {
     for (shape, fills, why) in [
@@ -439,7 +445,7 @@ fn a_fill_table_with_fewer_than_two_known_fills_uses_pendulums_with_a_reason() {
     }
 }
 
-/// The errors between the points of placed tables are those at further fills.
+/// The stated errors of a table whose points the command has placed equal the errors at further fills between these points.
 #[test]
 fn a_placed_table_states_the_error_of_the_coefficients_between_its_points() {
     for (shape, low, high) in [

@@ -37,8 +37,8 @@ fn mikishev_dorozhkin_leaves_its_range_in_shallow_liquid() {
     }
 }
 
-/// beta of a cylinder in closed form and of its contour by the solver. For a box, Keulegan's
-/// decrement in his own form: (sqrt(pi nu T)/w) [1 + w/a + (pi w/a)(1 - 2 h/a)/sinh(2 pi h/a)] = 2
+/// Compares beta of a cylinder in closed form with the solver's value for the cylinder's contour, and beta of a box with
+/// Keulegan's logarithmic decrement in his own form: (sqrt(pi nu T)/w) [1 + w/a + (pi w/a)(1 - 2 h/a)/sinh(2 pi h/a)] = 2
 /// pi zeta.
 #[test]
 fn laminar_layer_is_the_known_one_in_cylinder_and_box() {
@@ -59,7 +59,8 @@ fn laminar_layer_is_the_known_one_in_cylinder_and_box() {
     }
 }
 
-/// Sphere: both branches meet at half full; 2 to 4.5 laminar layers up to there.
+/// The two branches of the formula for spheres have the same value at half full. Up to there it is 2 to 4.5 times the
+/// laminar layer.
 #[test]
 fn damping_of_a_sphere_is_continuous() {
     let zeta = |x: f64| damping::sphere(0.1, 0.1 * x, 1e-6, 9.81);
@@ -84,8 +85,8 @@ fn cone_and_torus_have_their_values() {
     assert!((torus * core::f64::consts::TAU / fit - 1.0).abs() < 1e-12);
 }
 
-/// omega^2 = (g xi/R + sigma xi^3/(rho R^3)) tanh(xi h/R) exactly; the contour's own integral agrees;
-/// at g = 0 the spring alone is left.
+/// omega^2 = (g xi/R + sigma xi^3/(rho R^3)) tanh(xi h/R) holds exactly, and the integral over the contour gives the same.
+/// At g = 0 only the stiffness by surface tension remains.
 #[test]
 fn flat_surface_is_exact_in_a_cylinder() {
     let (r, h) = (0.0815f64, 0.1);
@@ -287,8 +288,8 @@ fn damped(
         .unwrap()
 }
 
-/// One tank, one number: drawn in one piece or in three, shifted, as an ellipse with equal axes, as the part of another
-/// tank that is wetted.
+/// The same tank has the same damping if it is drawn in one piece or in three, shifted along its axis, drawn as an ellipse
+/// with equal axes, or as the wetted part of a larger tank.
 #[test]
 fn a_contour_that_is_a_shape_has_the_damping_of_the_shape() {
     let half = 1.0 / 2.0_f64.sqrt();
@@ -339,7 +340,8 @@ fn a_contour_that_is_a_shape_has_the_damping_of_the_shape() {
     assert_eq!(damped(capsule, 0.4, 1e-6, 0.05, None).shape, "sphere");
 }
 
-/// h/R = 0.2, R = 0.5 m: 1.45 layers are 2.98e-3, 1.06e-3 and 0.56e-3 (by hand, three digits); Stephens has 1.493.
+/// At h/R = 0.2 and R = 0.5 m, 1.45 times the laminar layers of the first three modes are 2.98e-3, 1.06e-3 and 0.56e-3
+/// (computed by hand to three digits). The first mode has 1.493 layers, by Stephens.
 #[test]
 fn every_mode_of_a_cylinder_has_the_damping_of_its_own_laminar_layer() {
     let found =
@@ -353,7 +355,8 @@ fn every_mode_of_a_cylinder_has_the_damping_of_its_own_laminar_layer() {
     assert_eq!(second.interval[0], second.laminar);
 }
 
-/// From half a radius of depth on a cylinder's damping is Mikishev and Dorozhkin's, in shallower liquid that of Stephens.
+/// For h/R from 0.5 on the damping of a cylinder follows Mikishev and Dorozhkin, in shallower liquid Stephens, and the
+/// result names its source.
 #[test]
 fn a_cylinder_s_damping_names_its_source() {
     for radius in [0.25, 2.0] {
@@ -396,7 +399,8 @@ fn a_tank_s_damping_names_each_range_that_it_leaves() {
     }
 }
 
-/// A sphere of 0.5 m, half full: at 0.05 m/s2 measured, twice the layers; at 9.81 m/s2 not measured.
+/// In a half-full sphere of 0.5 m the correlation is within its measured range at 0.05 m/s2, where it gives 2.1 times
+/// the estimate for unmeasured shapes, and outside of this range at 9.81 m/s2.
 #[test]
 fn two_damping_estimates_that_disagree_are_both_reported() {
     let shape = "shape = { sphere = { radius = 0.5 } }";
@@ -413,8 +417,8 @@ fn two_damping_estimates_that_disagree_are_both_reported() {
     assert!(outside.modes[0].zeta < correlation && correlation < outside.modes[0].interval[1]);
 }
 
-/// Without gravity the frequency is capillarity's, and the damping finite; at a Bond number of 45 drop-tower tests end
-/// the interval.
+/// Without gravity the frequency follows from surface tension only, and the damping stays finite. At a Bond number of 45
+/// the interval ends at the result of drop-tower tests.
 #[test]
 fn damping_follows_capillarity_where_gravity_vanishes() {
     let shape = "shape = { cylinder = { radius = 0.3, height = 1 } }";
@@ -429,7 +433,8 @@ fn damping_follows_capillarity_where_gravity_vanishes() {
     assert!(low.modes[0].interval[1] > 1.8 * low.modes[0].zeta);
 }
 
-/// A box of 0.8 m by 0.5 m: along which of them HubSlosh's modes are, and that a liquid that swirls has others.
+/// For a box of 0.8 m by 0.5 m the file names the length along which HubSlosh's modes move, and warns that rotary slosh
+/// also needs the modes along the other length.
 #[test]
 fn a_box_with_two_lengths_says_along_which_its_modes_are() {
     let set = |lengths: &str| {
@@ -484,8 +489,8 @@ fn the_description_of_a_damping_ratio_names_the_value_that_was_not_used() {
     assert!((correlation / found.correlation.unwrap() - 1.0).abs() < 1e-3, "{}", found.taken);
 }
 
-/// The meniscus was computed over deep liquid: a surface that is curved, by less than gravity flattens it, over less than a
-/// radius. Bo = 100 g here.
+/// The table of the curved meniscus holds for deep liquid. The warning appears if the surface is noticeably curved (low
+/// Bond number) and the liquid is less than a radius deep. Here Bo = 100 g.
 #[test]
 fn a_meniscus_warns_in_shallow_liquid_at_low_bond_numbers_and_outside_of_its_angles() {
     let mode = &solve("shape = { cylinder = { radius = 0.1, height = 1 } }", 0.2, 1).modes[0];
@@ -521,7 +526,8 @@ fn a_meniscus_warns_in_shallow_liquid_at_low_bond_numbers_and_outside_of_its_ang
     assert!((added(-0.1) / added(0.0) - 1.0).abs() < 1e-12);
 }
 
-/// More than a tenth of what gravity makes, in a tank whose modes capillarity changes: half full sphere, Bo = 1e4 g.
+/// The frequency is stated as unknown if surface tension changes it by more than a tenth of the effect of gravity, in a
+/// tank for which only a first-order formula exists: a half-full sphere with Bo = 1e4 g.
 #[test]
 fn capillarity_is_unknown_from_a_tenth_of_gravity_s_share_on() {
     let half = &solve("shape = { sphere = { radius = 1.0 } }", 1.0, 1).modes[0];
@@ -538,8 +544,9 @@ fn capillarity_is_unknown_from_a_tenth_of_gravity_s_share_on() {
     );
 }
 
-/// In Spacecraft and SloshTank the same box has planar modes along both lengths. Rigid liquid and bobs where they hang have the liquid's mass and
-/// centre, and about either axis its inertia under a lid, in closed form.
+/// In Spacecraft and SloshTank a box with two lengths has planar modes along both. Rigid liquid and slosh masses at rest
+/// together have the mass and the centre of the liquid, and about either axis its inertia under a lid, which is known in
+/// closed form.
 #[test]
 fn a_box_with_two_lengths_has_planar_modes_that_keep_mass_centre_and_inertia() {
     let tank = Tank::parse("density = 1000.0\nbox = [0.8, 0.5]", Path::new("")).unwrap();
@@ -590,8 +597,8 @@ fn a_box_with_two_lengths_has_planar_modes_that_keep_mass_centre_and_inertia() {
     }
 }
 
-/// A spheroid almost as high as it is wide. Up to a fifth of the difference is its distance from the sphere through
-/// bottom and contact line. The test covers the size of a model and of a launcher.
+/// The tank is a spheroid that is almost as high as it is wide. Its distance from the sphere through bottom and contact
+/// line is up to a fifth of the difference. The test covers the sizes of a laboratory model and of a launcher.
 #[test]
 fn a_drawing_counts_as_a_shape_within_a_millionth_of_its_size() {
     for size in [1.0 / 64.0, 16.0] {

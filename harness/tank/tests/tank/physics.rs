@@ -3,8 +3,9 @@
 use crate::common::{reference, solve, tank, toml};
 use hubslosh_tank::closed_form;
 
-/// Every mode's hinge is the sphere's centre: the wall does no work when the sphere turns about it.
-/// Demanded is 1e-6 R. The mode's height is m h over m, so its error is 1e-10 over the mass ratio.
+/// The hinge of every mode is at the centre of the sphere, because the wall does no work on the liquid if the sphere turns
+/// about its centre. The required accuracy is 1e-6 R. The height of a mode is computed as m h over m, so that its error is
+/// 1e-10 over the mass ratio.
 #[test]
 fn pendulum_hinges_in_a_sphere_are_at_its_centre_at_every_fill() {
     for i in 1..20 {
@@ -23,8 +24,8 @@ fn pendulum_hinges_in_a_sphere_are_at_its_centre_at_every_fill() {
     }
 }
 
-/// Half-full sphere (Budiansky 1960, to more digits) and the table of fills, whose nine digits were
-/// computed twice. Half a unit in the last digit written.
+/// Compares with the half-full sphere of Budiansky (1960), to more digits, and with a table over the fill whose nine digits
+/// were computed twice. The tolerance is half a unit of the last digit.
 #[test]
 fn spheres_have_the_known_frequencies_and_masses() {
     let table = [
@@ -49,8 +50,8 @@ fn spheres_have_the_known_frequencies_and_masses() {
     }
 }
 
-/// Ends of the range of fills. Shallow paraboloid: lambda_n R -> 2 n^2 - 1 with corrections of the order of h/R times
-/// n^4. Nearly full: the ice-fishing problem, 2.7547 with the surface's radius.
+/// Nearly empty, the sphere is a shallow paraboloid: lambda_n R tends to 2 n^2 - 1, with corrections of the order of h/R
+/// times n^4. Nearly full, it is the ice-fishing problem, whose eigenvalue is 2.7547 relative to the radius of the surface.
 #[test]
 fn modes_of_nearly_empty_and_nearly_full_spheres_have_the_known_limits() {
     let data = solve("shape = { sphere = { radius = 1.0 } }", 1e-3, 3);
@@ -106,8 +107,8 @@ fn closed_forms_keep_their_error_in_shallow_liquid() {
     assert!(off.abs() < 1e-11, "annulus: {off}");
 }
 
-/// The error of I_0 = I_eff - m_0 h_0^2 - sum m h^2 is at least that of I_eff and grows with the distance of the fixed
-/// mass from the centre of mass.
+/// I_0 = I_eff - m_0 h_0^2 - sum m h^2 is a difference, so that its stated error is at least the error of I_eff and grows
+/// with the distance of the fixed mass from the centre of mass.
 #[test]
 fn the_inertia_of_the_fixed_mass_is_never_more_exact_than_what_it_follows_from() {
     for (shape, fill) in [
@@ -123,8 +124,8 @@ fn the_inertia_of_the_fixed_mass_is_never_more_exact_than_what_it_follows_from()
     }
 }
 
-/// phi_1 = r z exactly: lambda_1 = 1/h, m_1 = 3/4, H_1 = 0.6 h, hinge 1.6 h, wave h; all other modes
-/// carry no mass. The fixed quarter stands above the liquid.
+/// The exact solution is phi_1 = r z: lambda_1 = 1/h, m_1 = 3/4 of the liquid, H_1 = 0.6 h, hinge at 1.6 h, wave h. All
+/// other modes carry no mass, and the fixed quarter of the liquid is above the liquid's centre.
 #[test]
 fn only_the_first_mode_of_a_45_degree_cone_carries_mass() {
     for h in [0.3, 1.2] {
@@ -158,7 +159,8 @@ fn rigid_liquid_is_positive_for_any_number_of_modes() {
     }
 }
 
-/// The closed forms against the solver, which knows only the contour. Its error is 1e-10 here.
+/// Compares the closed forms with the boundary integral equation, which knows only the contour and has an error of 1e-10
+/// here.
 #[test]
 fn closed_forms_agree_with_the_boundary_integral_equation() {
     let upright = |r: f64, h: f64| {
@@ -200,8 +202,8 @@ fn closed_forms_agree_with_the_boundary_integral_equation() {
     }
 }
 
-/// Sums over all modes that are known: the mass sum and the inertia's limits. Sum of 1/(xi^2 - 1) =
-/// 1/2 from 400 zeros: the tail is 1/(400 pi^2).
+/// The known sums are the sum of all modal masses and the limits of the inertia. The sum of 1/(xi^2 - 1) is 1/2; from 400
+/// zeros the remainder is 1/(400 pi^2).
 #[test]
 fn sums_over_all_modes_of_the_closed_forms_have_their_known_values() {
     let xi = closed_form::zeros_of_j1_slope(400);
@@ -229,8 +231,8 @@ fn sums_over_all_modes_of_the_closed_forms_have_their_known_values() {
     );
 }
 
-/// The bench's cylinder by the FMU's own formulas: m_n = m_liq d tanh(2 xi h/d)/(xi (xi^2 - 1) h),
-/// l_n = d/(2 xi tanh(2 xi h/d)), wave 2 R/(xi^2 - 1).
+/// The FMU's own formulas for an upright cylinder are m_n = m_liq d tanh(2 xi h/d)/(xi (xi^2 - 1) h), l_n = d/(2 xi tanh(2
+/// xi h/d)) and a wave of 2 R/(xi^2 - 1) per angle.
 #[test]
 fn an_upright_cylinder_equals_the_formulas_of_the_fmu() {
     let (d, h) = (0.163, 0.1);
@@ -249,8 +251,8 @@ fn an_upright_cylinder_equals_the_formulas_of_the_fmu() {
     }
 }
 
-/// Lengths times c: lambda/c, masses c^3, inertias c^5. A shift of the contour moves all heights by
-/// as much and nothing else.
+/// If all lengths are multiplied by c, lambda is divided by c, masses grow as c^3 and inertias as c^5. A shift of the
+/// contour along the axis shifts all heights by the same amount and changes nothing else.
 #[test]
 fn results_scale_and_shift_with_the_contour() {
     let profile = |c: f64, z: f64| {
@@ -278,7 +280,8 @@ fn results_scale_and_shift_with_the_contour() {
     }
 }
 
-/// Near a corner's limit the contour may be cut in more segments than it needs: nothing changes.
+/// A wall that is cut into more segments than necessary, near the angle at which two segments count as a corner, gives the
+/// same result.
 #[test]
 fn cutting_a_wall_into_more_segments_changes_nothing() {
     let one = solve("profile = [{ arc = [0, 1, 1, -90, 30] }]", 1.3, 5);
@@ -293,8 +296,8 @@ fn cutting_a_wall_into_more_segments_changes_nothing() {
     }
 }
 
-/// The stated error also holds where the solver is less accurate: nearly full and nearly empty
-/// tanks, cusps, thin gaps. The hinge and the closed form of an annulus check it.
+/// Covers nearly full and nearly empty tanks, cusps and thin gaps, where the solver is less accurate. The true error is
+/// known from the hinge of a sphere and from the closed form of an annulus.
 #[test]
 fn the_stated_error_holds_in_tanks_that_are_hard_to_solve() {
     for fill in [1e-3, 0.01, 1.95, 1.99, 1.999, 1.9999] {
@@ -315,8 +318,8 @@ fn the_stated_error_holds_in_tanks_that_are_hard_to_solve() {
     }
 }
 
-/// A full tank has no free surface to measure errors by: they are over its radius of gyration, so that the same lens has
-/// them in every size. Powers of two, so the same digits.
+/// A full tank has no free surface, so that its errors are stated relative to its radius of gyration and do not depend on
+/// the tank's size. The sizes differ by powers of two, so that all digits must agree.
 #[test]
 fn a_full_tank_s_error_does_not_depend_on_its_size() {
     let error = |c: f64| {
@@ -350,8 +353,8 @@ fn thin_liquids_and_small_details_are_solved_as_well_as_others() {
     }
 }
 
-/// A dome that bulges into the tank meets the cylinder in a cusp. The same tank with the cusp's last
-/// 1e-3 R filled up differs by as little.
+/// A dome that bulges into the tank meets the cylinder in a cusp. The result differs only slightly from that of a tank in
+/// which the last 1e-3 R of the cusp is filled up.
 #[test]
 fn a_cusp_at_the_edge_of_an_inverted_dome_is_harmless() {
     let cusp = solve(
@@ -375,8 +378,8 @@ fn a_cusp_at_the_edge_of_an_inverted_dome_is_harmless() {
     }
 }
 
-/// Wave numbers are inverse lengths. For a thin annulus the first is that of the circle, 1/R, and the next ones are
-/// those of standing waves between two walls, n pi/(R - R_i).
+/// Wave numbers scale as inverse lengths. In a thin annulus the first wave number is 1/R (a wave around the circle), and
+/// the next ones are n pi/(R - R_i) (standing waves between the two walls).
 #[test]
 fn wave_numbers_of_an_annulus_scale_and_have_the_limits_of_a_thin_one() {
     let ones = closed_form::annular_wave_numbers(0.4, 1.0, 5);
@@ -399,7 +402,7 @@ fn wave_numbers_of_an_annulus_scale_and_have_the_limits_of_a_thin_one() {
     }
 }
 
-/// lambda times the length along the waves: k L tanh(k h), k L = pi, 3 pi.
+/// For each axis of the box, lambda times the length along the waves is k L tanh(k h) with k L = pi, 3 pi, ….
 #[test]
 fn each_axis_of_a_box_has_the_frequencies_of_its_length() {
     let data = closed_form::rectangular(0.8, 0.5, 0.2, 1000.0, 2);

@@ -24,7 +24,8 @@ fn the_documentation_s_figure_is_the_one_that_is_drawn() {
     is_drawn(&svg, "../../modelDescription/HubSlosh/documentation/liquid.svg");
 }
 
-/// A tank with a dome, its modes and its sweep, as somebody has looked at them.
+/// The expected pictures, of a tank with a dome, its modes and its sweep, were inspected by eye once. This test reports any
+/// change.
 #[test]
 fn pictures_of_a_tank_and_its_sweep_equal_the_inspected_ones() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/common_bulkhead.toml");
@@ -42,7 +43,7 @@ fn curves(svg: &str) -> Vec<&str> {
     svg.lines().filter(|line| line.contains(" fill=\"none\"") && line.contains("width")).collect()
 }
 
-/// A tank four times as large is drawn with the same lines and other numbers.
+/// A tank four times as large is drawn with the same lines; only the numbers at the axes differ.
 #[test]
 fn a_larger_tank_of_the_same_shape_has_the_same_lines() {
     let drawn = |factor: f64| {
@@ -61,7 +62,8 @@ fn a_larger_tank_of_the_same_shape_has_the_same_lines() {
     }
 }
 
-/// An axis has some length where all its values are the same: frequencies without gravity, hinges at a sphere's centre.
+/// If all values are equal (frequencies without gravity, hinges at the centre of a sphere), the axis of the diagram still
+/// has a range.
 #[test]
 fn a_sweep_whose_values_are_all_the_same_can_be_drawn() {
     let text = "density = 1.0\nprofile = [{ arc = [0, 0, 1, -90, 90] }]";
@@ -84,7 +86,7 @@ fn a_sweep_whose_values_are_all_the_same_can_be_drawn() {
     }
 }
 
-/// Every example: well-formed XML without anything that is not a number, the table with every mode.
+/// The picture of every example is well-formed XML that contains no NaN, and the table has every mode.
 #[test]
 fn examples_can_be_drawn_and_tabulated() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");

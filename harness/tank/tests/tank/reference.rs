@@ -50,9 +50,8 @@ fn deviation(
     worst
 }
 
-/// The demand is 1e-6 for three modes and 1e-5 for five; the solver reaches 1e-9, which this
-/// test holds it to (waves, extrapolated to the contact line, 1e-8). And the error that it states
-/// must not be less than the true one.
+/// The documentation promises 1e-6 for three modes and 1e-5 for five. The solver reaches 1e-9, which this test requires
+/// (1e-8 for waves, which are extrapolated to the contact line). The true error must not exceed the stated one.
 #[test]
 fn every_reference_tank_is_reproduced_within_the_stated_error() {
     for case in reference().iter().filter(|case| case["kind"] == "revolution") {
@@ -96,7 +95,8 @@ fn every_reference_tank_is_reproduced_within_the_stated_error() {
     }
 }
 
-/// A light mode has no height below 1e-9 m_liq: cone of 45 degrees, modes 2 to 5.
+/// A mode whose mass is below 1e-9 of the liquid has no defined height, but keeps its moment. The example is modes 2 to 5
+/// of a cone of 45 degrees.
 #[test]
 fn massless_modes_have_no_height_and_keep_their_moment() {
     let cases = reference();
@@ -107,7 +107,7 @@ fn massless_modes_have_no_height_and_keep_their_moment() {
     }
 }
 
-/// Both axes of the box; closed forms, so 1e-11 is the digits written.
+/// Both axes of the box have closed forms, so that the tolerance of 1e-11 is the number of digits in the reference.
 #[test]
 fn the_reference_box_is_reproduced_on_both_axes() {
     let cases = reference();
@@ -132,7 +132,8 @@ fn the_reference_box_is_reproduced_on_both_axes() {
     assert_eq!(data.modes, axes.x.modes);
 }
 
-/// The closed form of the annular cylinder, its sum of 100 terms with the tail: 1e-11 of m R^2.
+/// Compares the closed form of the annular cylinder, with a sum of 100 terms and the estimated rest of the sum, to 1e-11 m
+/// R^2.
 #[test]
 fn the_reference_annulus_is_reproduced_in_closed_form() {
     let cases = reference();
@@ -147,7 +148,6 @@ fn the_reference_annulus_is_reproduced_in_closed_form() {
     assert!(worst[..4].iter().all(|e| *e < 1e-11) && worst[4] < 1e-9, "{worst:?}");
 }
 
-/// The keys that other programs read.
 #[test]
 fn the_result_in_json_has_the_documented_keys() {
     for case in reference() {

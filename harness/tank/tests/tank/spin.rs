@@ -22,7 +22,8 @@ fn close(found: f64, expected: f64, error: f64) {
     assert!((found - expected).abs() <= error, "{found} is not {expected} within {error}");
 }
 
-/// Closed forms of the paraboloid in an upright cylinder of radius 1 m that neither bares the floor nor reaches the lid.
+/// The free surface in an upright cylinder of radius 1 m is a paraboloid with closed forms, as long as it neither bares the
+/// floor nor reaches the lid.
 #[test]
 fn in_a_cylinder_the_spinning_surface_equals_its_closed_form() {
     for (h, beta) in [(0.5, 0.1), (0.5, 1.0), (1.0, 0.3), (1.0, 2.0), (2.0, 5.0)] {
@@ -51,8 +52,8 @@ fn weightless_liquid_lies_at_the_wall() {
     }
 }
 
-/// The liquid of a sphere whose two poles are dry is in balance in the frame that turns: each part of the wall pushes through the
-/// centre, so that z_cg = -g/Omega^2 from it, whatever the fill.
+/// If both poles of the sphere are dry, the liquid is in equilibrium in the rotating frame: the wall pushes everywhere
+/// through the centre of the sphere, so that the centre of mass is at z_cg = -g/Omega^2 from the centre, for any fill.
 #[test]
 fn in_a_sphere_with_dry_poles_the_centre_of_mass_balances_thrust_and_spin() {
     for (share, flatness) in [(0.25, 5.0), (0.25, 10.0), (0.5, 5.0), (0.5, 30.0)] {
@@ -62,8 +63,9 @@ fn in_a_sphere_with_dry_poles_the_centre_of_mass_balances_thrust_and_spin() {
     }
 }
 
-/// Equilibria of a sphere that a program of its own, by quadrature of the section, found to 8 digits: share of the volume,
-/// Omega^2 R/g, then z_cg/R from the centre, I_axis/(m R^2), I_cg/(m R^2), height of the apex and of the wall line.
+/// The expected values were computed to 8 digits by an independent program that integrates over the section: share of the
+/// volume, Omega^2 R/g, then z_cg/R from the centre, I_axis/(m R^2), I_cg/(m R^2), height of the apex and of the contact
+/// line.
 #[test]
 fn in_a_sphere_the_spinning_liquid_equals_an_independent_program() {
     let rows = [
@@ -82,7 +84,7 @@ fn in_a_sphere_the_spinning_liquid_equals_an_independent_program() {
     }
 }
 
-/// The mass is that at rest for every contour, and at a spin of almost 0 so are centre of mass and inertias.
+/// At every spin the mass equals the mass at rest. At a spin of almost 0, centre of mass and inertias do so as well.
 #[test]
 fn a_slow_spin_changes_nothing() {
     let shapes = [
@@ -102,7 +104,8 @@ fn a_slow_spin_changes_nothing() {
     }
 }
 
-/// Frequencies of a solution for all rates, seen from the tank in sqrt(g/R): against the spin and with it.
+/// The expected frequencies, from a solution for any spin rate, are those seen from the tank, in units of sqrt(g/R), for
+/// waves that run against the spin and with it.
 #[test]
 fn the_frequencies_are_those_of_the_rotating_liquid() {
     let rows = [
@@ -139,7 +142,8 @@ fn a_spinner_beyond_the_model_is_out_of_range() {
     assert!(faster.in_range && faster.warnings[0].contains("pendulum"), "{:?}", faster.warnings);
 }
 
-/// The mass of the turned liquid, by an integral of its own over the radius: 2 pi int r (z_surface - z_floor) dr.
+/// The expected mass of the spinning liquid is computed by an independent integral over the radius, 2 pi int r (z_surface -
+/// z_floor) dr.
 #[test]
 fn an_annulus_bares_its_floor_at_the_inner_wall() {
     let shape = Shape::Annulus { inner_radius: 0.4, outer_radius: 1.0, height: 3.0 };
@@ -151,7 +155,8 @@ fn an_annulus_bares_its_floor_at_the_inner_wall() {
     close(found.z_wall, 1.5 * u, 1e-9);
 }
 
-/// Thrown outwards, the liquid of a bowl below a wider chamber would lie in both.
+/// A bowl lies below a wider chamber. Spin would throw the liquid outwards into both, so that it would lie in two separate
+/// pools.
 #[test]
 fn liquid_in_two_pools_is_refused() {
     let hourglass = "density = 1000\nprofile = [{ line = [0, 0, 0.5, 0] }, { line = [0.5, 0, 0.5, 0.5] }, \

@@ -55,7 +55,7 @@ fn empty_and_full_tanks_have_no_modes() {
     assert!(!csv.contains("NaN") && csv.lines().all(|l| l.split(',').count() == 24), "{csv}");
 }
 
-/// Behind all other columns: the pair of mode 1 with its error, empty where it is not known.
+/// The last columns have s and kappa of mode 1 and their error; the cells are empty where these are not known.
 #[test]
 fn a_sweep_has_the_third_order_coefficients_of_every_fill() {
     let tank = tank("density = 1000.0\nshape = { sphere = { radius = 0.1 } }");
@@ -74,8 +74,8 @@ fn a_sweep_has_the_third_order_coefficients_of_every_fill() {
     assert_eq!(cells, [s, kappa, known.error, known.angle_limit]);
 }
 
-/// Ratio and interval of each mode at each fill, behind the mode's other columns; none without a viscosity, empty cells
-/// for an empty tank.
+/// After the other columns of each mode, the table has the damping ratio and its interval. Without a viscosity there are no
+/// such columns, and for an empty tank the cells are empty.
 #[test]
 fn a_sweep_has_the_damping_of_every_fill() {
     let tank = tank("density = 1000.0\nshape = { cylinder = { radius = 1.0, height = 3.0 } }");
@@ -192,7 +192,7 @@ fn a_placed_table_states_the_errors_between_its_points() {
     assert!(worst > 10.0 * placed, "{worst:e} {placed:e}");
 }
 
-/// Names and numbers of a table for both FMUs, and what is refused.
+/// Covers names and values of a fill table for both six-axis FMUs, and the fills and models that are refused.
 #[test]
 fn a_table_over_the_fill_is_written_for_the_six_axis_fmus() {
     let tank = tank("density = 1000.0\nshape = { sphere = { radius = 0.5 } }");
@@ -271,7 +271,8 @@ fn a_table_has_the_modes_that_carry_liquid_at_every_fill() {
     }
 }
 
-/// The errors between a table's points, of 1 for all, in per cent; from 0.5 % on a warning says that the points are few.
+/// The parameter set states the errors between the points of the table, which the test gives as fractions (0.001 is 0.1 %).
+/// If one of them is above 0.5 %, a warning says that the table has too few points.
 #[test]
 fn the_parameters_state_the_errors_between_a_table_s_points() {
     let tank = tank("density = 1000.0\nshape = { sphere = { radius = 0.5 } }");

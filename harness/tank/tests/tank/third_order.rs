@@ -5,8 +5,8 @@ use hubslosh_tank::third_order::Overlaps;
 /// Excited modes of each azimuthal number: the terms fall as n^-5, 40 leave 1e-7.
 const COUNT: usize = 40;
 
-/// The bench's tank, R 81.5 mm. The values, three digits, are from an independent derivation; half
-/// a unit of their last digit.
+/// The tank is the bench's, R = 81.5 mm. The expected values have three digits and come from an independent derivation; the
+/// tolerance is half a unit of the last digit.
 #[test]
 fn frequency_shifts_of_the_bench_equal_an_independent_derivation() {
     let all = Overlaps::new(COUNT);
@@ -21,8 +21,8 @@ fn frequency_shifts_of_the_bench_equal_an_independent_derivation() {
     }
 }
 
-/// The depth at which planar hardening begins, in units of R: the literature's 0.506 is what one
-/// excited mode of each azimuthal number gives, 0.5058. With more of them it falls to 0.5031.
+/// Compares the depth h/R at which planar motion begins to harden. With one excited mode of each azimuthal number the
+/// result is 0.5058, which the literature rounds to 0.506; with more excited modes it falls to 0.5031.
 #[test]
 fn planar_hardening_begins_at_0_5058_with_one_excited_mode_each_and_at_0_5031_with_all() {
     let begins = |count: usize| {
@@ -40,7 +40,8 @@ fn planar_hardening_begins_at_0_5058_with_one_excited_mode_each_and_at_0_5031_wi
     }
 }
 
-/// 2 omega_1 = omega of modes (0,1), (2,2) and (0,2).
+/// At these depths the frequency of the excited modes (0,1), (2,2) and (0,2) is twice the frequency of the first mode, 2
+/// omega_1.
 #[test]
 fn secondary_resonances_stand_at_their_depths() {
     let found = Overlaps::new(5).resonances();
@@ -56,8 +57,8 @@ fn secondary_resonances_stand_at_their_depths() {
     assert_eq!(all.secondary_resonance(1.2), None);
 }
 
-/// The closed form of the formulas has Bessel functions and eight modes of each azimuthal number, with overlaps to 15
-/// digits.
+/// The closed form in `formulas` uses Bessel functions and eight modes of each azimuthal number, whose overlap integrals
+/// have 15 digits.
 #[test]
 fn upright_cylinders_have_the_coefficients_of_the_closed_form() {
     let all = Overlaps::round(0.0, 0.5, 8);
@@ -70,7 +71,8 @@ fn upright_cylinders_have_the_coefficients_of_the_closed_form() {
     }
 }
 
-/// Tadjbakhsh and Keller, J. Fluid Mech. 8 (1960) 442: frequency to third order and elevation to second order.
+/// Compares with Tadjbakhsh and Keller, J. Fluid Mech. 8 (1960) 442: the frequency to third order and the elevation to
+/// second order.
 #[test]
 fn boxes_have_the_waves_of_tadjbakhsh_and_keller() {
     let length = 0.7;
@@ -92,8 +94,9 @@ fn boxes_have_the_waves_of_tadjbakhsh_and_keller() {
     }
 }
 
-/// A ring without a hole is a circle. A thin ring of radius R is a channel. Its planar wave is that of a box of the length
-/// pi R. Its circular wave is that of Stokes: omega^2 = g k T [1 + (9 T^4 - 10 T^2 + 9) (k a)^2/(8 T^4)].
+/// An annular tank without a hole is a circular cylinder. A thin annulus of radius R is a channel: its planar wave is that
+/// of a box of length pi R, and its circular wave is Stokes's wave with omega^2 = g k T [1 + (9 T^4 - 10 T^2 + 9) (k
+/// a)^2/(8 T^4)].
 #[test]
 fn annular_tanks_lie_between_a_circle_and_a_channel() {
     let (circle, ring) = (Overlaps::round(0.0, 1.0, 20), Overlaps::round(1e-3, 1.0, 20));
