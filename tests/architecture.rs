@@ -169,8 +169,8 @@ fn unsafe_code_is_only_in_the_files_of_the_c_interface() {
     assert_eq!(found, known.map(String::from).into());
 }
 
-/// `cargo test` leaves out ignored tests, so each must be in a command of a script in `.ci`; and each word of such a command
-/// names one, because `cargo test` succeeds without a test too.
+/// `cargo test` leaves out ignored tests, so that each of them must be in a command of a script in `.ci`. Conversely, each
+/// name in such a command must belong to a test, because `cargo test` also succeeds if it finds no test.
 #[test]
 fn a_script_runs_every_test_that_is_ignored() {
     let root = pack::root();

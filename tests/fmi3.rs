@@ -1,4 +1,4 @@
-//! The packed FMUs 3.0 in FMPy's hands: it finds no fault, and drives them as it drives those of FMI 2.0.
+//! Tests of the packed FMUs 3.0 with FMPy, which finds no fault in them and gets the same results as from the FMUs 2.0.
 
 use std::io::Read;
 use std::process::Command;

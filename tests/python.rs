@@ -32,7 +32,8 @@ fn pytest(arguments: &mut Command, sentence: &str) {
     println!("{last}");
 }
 
-/// Tests of `harness/python` that need no wheel and take as long as the others: the two halves run in parallel.
+/// Test files of `harness/python` that need no wheel. Together they take as long as all other files, so that both halves
+/// run in parallel.
 const BESIDE: [&str; 3] = ["test_liquid.py", "test_model_exchange.py", "test_review.py"];
 
 /// Returns the command for pytest with the options of the package's tests: FMU and command.

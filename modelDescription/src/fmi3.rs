@@ -208,7 +208,7 @@ fn extra<M: Model>(layout: Layout) -> Vec<Element> {
     }
 }
 
-/// Returns the value reference of a scalar; with arrays that of its entry.
+/// Returns the value reference of a scalar. In the layout with arrays it is the value reference of the array.
 fn reference<M: Model>(layout: Layout, scalar: &Scalar<M>) -> u32 {
     match layout {
         Layout::Scalars => Fmi3::reference(scalar),

@@ -221,8 +221,8 @@ fn every_function_of_fmi_3_is_allowed_or_refused_in_words_in_every_mode() {
     }
 }
 
-/// Makes random calls, or those of the fuzzer's corpus in the folder `HUBSLOSH_CORPUS`, in either version.
-/// `host.c` lists what must not happen, among it floating-point exceptions in calls that succeed.
+/// Makes random calls, or the calls of the fuzzer's corpus in the folder `HUBSLOSH_CORPUS`, in both versions of FMI.
+/// `host.c` lists what must not happen, for example floating-point exceptions in calls that succeed.
 fn no_calls_break<M: runtime::Model>(inputs: u32) {
     let name = M::table().about.model;
     let fmu = Unpacked::new(pack::model(name).unwrap(), Fmi::V2);

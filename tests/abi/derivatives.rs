@@ -248,9 +248,9 @@ fn setting(name: impl Into<String>, value: impl ToString) -> (String, String) {
     (name.into(), value.to_string())
 }
 
-/// Checks the derivatives at three points: that of Model Exchange from `settings`, the same with states moved
-/// by random numbers in the ranges of `scatter`, and that which Co-Simulation reaches in 0.3 s, where a host
-/// can change only the inputs; inputs whose jumps are impulses are left out, because they move states.
+/// Checks the derivatives at three points: at the start of Model Exchange with `settings`; at this point with states moved
+/// by random numbers in the ranges of `scatter`; and at the point that Co-Simulation reaches after 0.3 s, where a host can
+/// change only inputs. Inputs whose jumps are impulses are left out there, because they move states.
 fn check(
     fmu: &Fmu,
     rng: &mut Rng,

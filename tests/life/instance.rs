@@ -269,7 +269,8 @@ fn invalid_steps_are_refused_and_change_nothing() {
     instance.do_step(0.25, 0.75).unwrap();
 }
 
-/// Hosts compute n h or add up h. Both differ from the exact time by some ulps, and so does the stop time.
+/// Hosts compute the time as n h or add up h. Both results, and the stop time, differ from the exact value by some units in
+/// the last place.
 #[test]
 fn communication_points_may_be_off_by_rounding() {
     let h = 0.1;

@@ -1,5 +1,5 @@
-//! The model `liquid`: its coefficients are those of potential flow, and its free oscillations have
-//! the shifts of frequency that potential flow has.
+//! Tests of the slosh model `liquid`: its coefficients equal those of potential flow, and its free oscillations have the
+//! frequency shifts of potential flow.
 
 use formulas::third_order::unbridged;
 use hubslosh_tank::third_order::Overlaps;
@@ -7,8 +7,8 @@ use plant::SloshModel;
 
 use super::free_oscillation::shifts;
 
-/// Ten times the plant's eight excited modes of each azimuthal number change s and kappa by less than 1e-4 of
-/// themselves. Next to a secondary resonance both grow without bound, and so does this difference.
+/// The plant uses eight excited modes of each azimuthal number. Ten times as many change s and kappa by less than 1e-4 of
+/// their values. Near a secondary resonance both coefficients, and therefore this difference, grow without bound.
 #[test]
 fn coefficients_of_the_model_equal_those_of_potential_flow() {
     let all = Overlaps::new(60);

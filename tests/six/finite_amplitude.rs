@@ -70,7 +70,7 @@ fn apart(a: [f64; 6], b: [f64; 6], w: f64) -> f64 {
     (0..6).map(|i| (a[i] - b[i]).abs() / if i < 3 { 1.0 } else { w }).fold(0.0, f64::max)
 }
 
-/// The numbers are the first mode's angle in degrees, and its frequency over that of small waves.
+/// The numbers are the first mode's angle in degrees, and its frequency divided by the frequency of small waves.
 #[test]
 fn periodic_waves_have_the_frequencies_of_potential_flow_in_both_fmus() {
     type Frequency = fn(Tank, f64) -> f64;
@@ -164,9 +164,9 @@ fn bench_with_energy(fill: f64) -> Tank {
     tank
 }
 
-/// Returns the largest angle in degrees, its phase and the largest force over the weight of the liquid in the last of 120 periods of a
-/// tank that moves sideways by -stroke cos(w t), from rest, in a plane. The phase, degrees, is that of the first harmonic of
-/// the angle's sine.
+/// Simulates a tank that moves sideways by -stroke cos(w t), from rest, in a plane, and evaluates the last of 120 periods.
+/// Returns the largest slosh angle in degrees, its phase in degrees (of the first harmonic of the angle's sine), and the
+/// largest force divided by the weight of the liquid.
 fn forced_in_a_plane(fill: f64, ratio: f64, stroke: f64) -> [f64; 3] {
     let mut tank = bench_with_energy(fill);
     tank.zeta[0] = 0.01;
@@ -190,10 +190,10 @@ fn forced_in_a_plane(fill: f64, ratio: f64, stroke: f64) -> [f64; 3] {
     [angle, harmonic[1].atan2(harmonic[0]).to_degrees(), force / weight]
 }
 
-/// Planar motion near resonance at a damping ratio of 0.01 on every mode, by fully nonlinear potential flow, computed for this
-/// project by a spectral method that marches in time: 29 to 40 modes, which agree within 0.3 %. Each row is h/R, the frequency
-/// over that of small waves, stroke over R, and the angle, phase and force of the flow. The third order errs by up to 14 %,
-/// 17 degrees and 21 %.
+/// Compares planar motion near resonance, with a damping ratio of 0.01 on every mode, with fully nonlinear potential flow,
+/// which was computed for this project by a spectral method that marches in time (29 to 40 modes, which agree within 0.3
+/// %). Each row has h/R, the frequency divided by the frequency of small waves, stroke over R, and angle, phase and force
+/// of the flow. The third-order model is wrong by up to 14 %, 17 degrees and 21 %.
 #[test]
 fn forced_planar_waves_with_the_energy_terms_equal_those_of_potential_flow() {
     for (fill, ratio, stroke, angle, phase, force) in [
@@ -211,9 +211,9 @@ fn forced_planar_waves_with_the_energy_terms_equal_those_of_potential_flow() {
     }
 }
 
-/// Rotary motion at h/R 0.5 and 1.01 times the frequency of small waves, with a damping ratio of 0.01 on every mode, by the same
-/// potential flow in three dimensions (about 30 modes). The angles and phases, degrees, are those of the first harmonics along
-/// the stroke and across it. The third order errs by 8 % and 7 degrees.
+/// Compares rotary motion at h/R = 0.5 and 1.01 times the frequency of small waves, with a damping ratio of 0.01 on every
+/// mode, with potential flow in three dimensions (about 30 modes). Angles and phases, in degrees, are those of the first
+/// harmonics along the stroke and across it. The third-order model is wrong by 8 % and 7 degrees.
 #[test]
 fn forced_rotary_waves_with_the_energy_terms_equal_those_of_potential_flow() {
     let mut tank = bench_with_energy(0.5);

@@ -1,4 +1,5 @@
-//! modelDescription.xml of FMI 3.0 says of every variable what that of FMI 2.0 says, and what 3.0 asks for besides.
+//! Tests that modelDescription.xml of FMI 3.0 describes every variable as the one of FMI 2.0 does, and has what FMI 3.0
+//! requires in addition.
 
 use std::collections::BTreeMap;
 

@@ -75,8 +75,8 @@ impl LimitedBy {
 
 /// Relative error of the frequency that a model of the amplitude dependence may have at the end of its range.
 pub const FREQUENCY: f64 = 3e-3;
-/// Relative error of the frequency by which a forced response errs by 3 %, if the error comes from shifts
-/// that are not those of the liquid.
+/// Relative error of the frequency at which a forced response is wrong by 3 %, if the response is wrong only because the
+/// model's frequency shifts differ from those of the liquid.
 pub const FORCED: f64 = 8.5e-4;
 
 /// Rows of h/R and two slosh angles of planar motion in an upright cylinder, degrees: the first where the
@@ -99,9 +99,9 @@ const THIRD_ORDER: [[f64; 3]; 12] = [
     [2.5, 22.06, 11.1],
 ];
 
-/// Rows of h/R and the slosh angle of rotary motion, degrees, at which its branch folds. The first depth is
-/// that of the secondary resonance. At h/R 1 and 2.5 the angle is the end of the computation, so the fold may
-/// be later.
+/// Rows of h/R and the slosh angle of rotary motion, degrees, at which its branch folds. The first row is at the depth of
+/// the secondary resonance. At h/R = 1 and 2.5 the angle is only the end of the computation, so that the fold may be at a
+/// larger angle.
 const FOLD: [[f64; 2]; 6] =
     [[0.8314, 0.5], [0.9, 4.6], [1.0, 7.0], [1.227, 9.4], [2.0, 10.8], [2.5, 10.4]];
 
@@ -125,8 +125,8 @@ pub fn cylinder(fill: f64, shifts: [Option<f64>; 2]) -> AngleLimit {
     AngleLimit { frequency: own(FREQUENCY, 1), forced: own(FORCED, 2) }
 }
 
-/// Rows of h/R and the slosh angle, degrees, at which a forced response of [`energy_terms`] errs by 3 %. From
-/// h/R 0.6 on it errs by less up to 15 degrees.
+/// Rows of h/R and the slosh angle, degrees, at which a forced response of the model with [`energy_terms`] is wrong by 3 %.
+/// From h/R = 0.6 on the error is smaller than 3 % up to 15 degrees, the largest angle that was compared.
 const FORCED_ENERGY: [[f64; 2]; 7] =
     [[0.25, 1.7], [0.3, 2.9], [0.35, 4.8], [0.4, 7.7], [0.5, 11.8], [0.6, 15.0], [0.7, 15.0]];
 

@@ -30,8 +30,8 @@
 
 use crate::cylinder::XI;
 
-/// Number of modes of each azimuthal number in the sums. Leaving out the others changes c by less than 1e-6
-/// of itself for mode 1 and by 0.003 for mode 10 (from h/R 0.2 on).
+/// Number of modes of each azimuthal number in the sums. With all modes c would change by less than 1e-6 of its value for
+/// mode 1, and by 0.003 for mode 10 (from h/R = 0.2 on).
 const ZEROS: usize = 16;
 
 /// Zeros of J0' after 0, and of J2' below.
@@ -143,8 +143,8 @@ mod tests {
         (3.0, 0.7, [-0.15777, 0.10438]),
     ];
 
-    /// At small tilts the tolerance is the difference of the two meshes, otherwise the stated error of the
-    /// frequency, which is half that of Lambda.
+    /// At small tilts the tolerance is the difference of the two meshes. At larger tilts it is the stated error of the
+    /// frequency, which is half the stated error of Lambda.
     #[test]
     fn frequencies_equal_those_of_finite_elements_within_the_stated_errors() {
         for (fill, slope, change) in FINITE_ELEMENTS {

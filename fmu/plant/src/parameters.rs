@@ -209,7 +209,7 @@ pub struct Friction {
     pub harmonics_backward: [f64; 4],
 }
 
-/// Initial conditions; the slosh quantities are those of mode 1.
+/// Initial conditions. The slosh angles and rates are those of mode 1; all further modes start at rest.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 #[allow(missing_docs)]
 pub struct Init {

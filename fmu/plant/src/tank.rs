@@ -220,8 +220,8 @@ impl Slosh {
         self.zeta_amplitude > 0.0 || self.zeta_breaking > 0.0
     }
 
-    /// Returns the breaking of mode `n`, which counts from 0, whose wave at the wall is `wave` per angle,
-    /// m/rad. If the table gives no wave number, it is that of an upright cylinder of this radius, m.
+    /// Returns the parameters of breaking waves for mode `n`, which counts from 0, whose wave at the wall is `wave` per
+    /// angle, m/rad. If the table gives no wave number, the wave number of an upright cylinder of this radius, m, is used.
     pub(crate) fn breaking(&self, n: usize, wave: f64, radius: f64) -> Breaking {
         let k = match self.source {
             SloshSource::Table if self.table.wave_number[n] > 0.0 => self.table.wave_number[n],
@@ -230,8 +230,8 @@ impl Slosh {
         Breaking { zeta: self.zeta_breaking, onset: self.breaking_steepness, steepness: k * wave }
     }
 
-    /// Returns s and kappa of mode `n`, which counts from 0, in a tank filled to h/R = `fill`. The modes of
-    /// an upright cylinder after the first, and all modes of the other models, have those of a pendulum.
+    /// Returns s and kappa of mode `n`, which counts from 0, in a tank filled to h/R = `fill`. They are 1, as for a
+    /// pendulum, for the second and further modes of an upright cylinder and for all slosh models except `liquid`.
     pub(crate) fn third_order(&self, n: usize, fill: f64) -> (f64, f64) {
         match self.source {
             _ if self.model != SloshModel::Liquid => (1.0, 1.0),

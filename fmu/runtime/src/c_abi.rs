@@ -509,8 +509,8 @@ pub unsafe fn serialize<M: Model, V: Version>(
     }
 }
 
-/// Restores a saved state from bytes, whose variables must be those of the instance. The handle of the new
-/// state is written and never read, because the host need not have initialised it.
+/// Restores a saved state from bytes. The bytes must come from an instance with the same variables. The handle of the new
+/// state is only written and never read, because the host need not have initialised it.
 pub unsafe fn deserialize<M: Model, V: Version>(
     handle: *mut c_void,
     call: &'static Call,

@@ -37,7 +37,7 @@ pub struct Extent {
     places: Vec<usize>,
     indicators: usize,
     starts: Vec<Value>,
-    /// Start values of inputs that differ from those of the table, by their place in it.
+    /// Start values of inputs that differ from the start values in the table, each with the input's position in the table.
     inputs: Vec<(usize, f64)>,
 }
 
@@ -159,7 +159,8 @@ impl Extent {
         &self.starts
     }
 
-    /// Returns the start values of inputs that differ from those of the table, by their place in it.
+    /// Returns the start values of inputs that differ from the start values in the table, each with the input's position in
+    /// the table.
     pub fn inputs(&self) -> &[(usize, f64)] {
         &self.inputs
     }

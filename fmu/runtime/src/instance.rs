@@ -301,8 +301,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.extent.as_ref().map_or_else(|| M::table().starts(), |extent| extent.starts().to_vec())
     }
 
-    /// Returns warnings at the start of the simulation: those of [`Model::warnings`], and one for each reason
-    /// for which parameters that differ from their start values have no effect ([`Model::overridden`]).
+    /// Returns the warnings at the start of the simulation: the warnings of [`Model::warnings`], and for each reason
+    /// ([`Model::overridden`]) one warning about the parameters that differ from their start values but have no effect.
     pub fn warnings(&self) -> Vec<String> {
         let Some(model) = &self.model else { return Vec::new() };
         let parameters = self.given_parameters();

@@ -304,8 +304,8 @@ impl<M: Dynamics> Table<M> {
         self.scalars.split_at(end).0.split_at(begin).1
     }
 
-    /// Returns the derivatives of the continuous states. Their order is that of states, derivatives and
-    /// nominal values in Model Exchange.
+    /// Returns the derivatives of the continuous states. Their order is also the order of states, derivatives and nominal
+    /// values in Model Exchange.
     #[inline]
     pub const fn derivatives(&self) -> &'static [Scalar<M>] {
         let (begin, end) = self.derivatives;

@@ -51,8 +51,8 @@ pub struct Chunk {
     /// Kolmogorov–Smirnov distance of the readings from the normal distribution with their mean and variance,
     /// multiplied by √n − 0.01 + 0.85/√n (Stephens). Quantisation alone makes it Δ √n/(2σ√(2π)).
     pub kolmogorov: f64,
-    /// The distance evaluated only between the levels of the readings, where quantisation has no effect. The
-    /// variance is reduced by that of the quantisation, Δ²/12 (Sheppard).
+    /// Kolmogorov–Smirnov distance evaluated only midway between the levels of the readings, where quantisation has no
+    /// effect. The variance of the readings is reduced by the variance of the quantisation error, Δ²/12 (Sheppard).
     pub between_levels: f64,
 }
 

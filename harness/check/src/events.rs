@@ -18,7 +18,8 @@ use super::findings::Findings;
 use super::loaded::skip;
 use super::under_test::{FmuUnderTest, Interface, Life, Observed, STEPS, Session};
 
-/// Number of initial points: the first one as declared, the others with parameters drawn at random.
+/// Number of initial points from which the FMU is simulated. The first point has the declared start values, all further
+/// points have parameters drawn at random.
 const STARTS: u64 = 12;
 /// Relative change of a value below which it is rounding.
 const ROUNDING: f64 = 1e-9;

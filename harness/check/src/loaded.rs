@@ -301,7 +301,7 @@ pub trait Life<'f, V: Version + 'f> {
     /// If a step fails; `steps.run` or `exchange.run` reports this.
     fn advance(&mut self, steps: usize) -> Result<()>;
 
-    /// Reads every variable, each with a call of its own.
+    /// Reads every variable, with one call of the FMU per variable.
     fn readings(&mut self) -> Result<Vec<Self::Reading>>;
 
     /// Describes the first variable whose value differs in at least one bit, or returns `None` if all are

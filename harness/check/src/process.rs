@@ -40,7 +40,8 @@ const PRINTED: usize = 200;
 pub struct SoFar {
     /// Number of rules whose process had to be killed.
     hung: AtomicUsize,
-    /// Reason why the binary cannot be loaded, which is the same for all rules.
+    /// Reason why the binary cannot be loaded. The first rule that finds it stores it here, so that no other rule tries
+    /// again.
     lost: OnceLock<String>,
     pub bug: OnceLock<String>,
 }

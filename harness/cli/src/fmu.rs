@@ -58,8 +58,8 @@ pub fn find(name: &Path) -> Result<PathBuf> {
     Ok(packed)
 }
 
-/// Lists the FMUs that [`find`] finds without building: those of `dist`, then those that came with this
-/// command.
+/// Lists the FMUs that [`find`] finds without building any: first the files in `dist`, then the files that were installed
+/// with this command.
 pub fn all() -> Vec<PathBuf> {
     let mut found: Vec<PathBuf> = Vec::new();
     for folder in ["dist".into()].into_iter().chain(folders()) {
@@ -84,7 +84,7 @@ pub fn shipped_folder(folder: &str) -> Option<PathBuf> {
     packages.map(|fmus| fmus.with_file_name(folder)).find(|path| path.is_dir())
 }
 
-/// Lists the folders of [`INSTALLED`] that exist, also those of the Python versions next to this command.
+/// Lists the folders of [`INSTALLED`] that exist, and the same folders of Python installations next to this command.
 fn folders() -> Vec<PathBuf> {
     let command = std::env::current_exe().and_then(|path| path.canonicalize());
     let Some(own) = command.ok().and_then(|path| path.parent().map(Path::to_path_buf)) else {

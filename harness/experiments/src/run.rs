@@ -221,7 +221,7 @@ pub fn parameters(
 const REPORT_EVERY: usize = 1024;
 
 impl Run {
-    /// Returns the start time, s, which is that of the torque history.
+    /// Returns the start time of the run, s, at which the torque history begins.
     pub fn start(&self) -> f64 {
         self.torque.span().0
     }

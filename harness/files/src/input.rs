@@ -97,8 +97,8 @@ fn file_kind(metadata: &Metadata) -> &'static str {
     if metadata.is_dir() { "a directory" } else { "a special file" }
 }
 
-/// Identity of a file, which is the same for all its paths and links. On systems other than Unix a second
-/// hard link counts as another file.
+/// Identity of a file, by which two paths to the same file are recognised. On systems other than Unix two hard links count
+/// as different files.
 #[derive(PartialEq)]
 struct Identity(#[cfg(unix)] (u64, u64), #[cfg(not(unix))] PathBuf);
 

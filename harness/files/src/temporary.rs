@@ -75,8 +75,8 @@ impl Drop for Folder {
 }
 
 impl Folder {
-    /// Makes one in the system's folder for temporary files. The first one of a program removes those of
-    /// programs that were killed.
+    /// Creates a temporary folder in the system's folder for temporary files. The first call in a program also removes
+    /// folders left by programs that were killed.
     pub fn new() -> Result<Folder> {
         static SWEPT: Once = Once::new();
         SWEPT.call_once(|| sweep(&std::env::temp_dir(), PREFIX));

@@ -344,8 +344,8 @@ fn universal(bytes: &[u8]) -> Result<Binary> {
     whole.context("no code in it")
 }
 
-/// Returns the fault if the hashes in the signature differ from those of the code. macOS kills a process that
-/// loads a binary which was changed after signing, for example by stripping.
+/// Returns a description of the fault if the hashes in the code signature differ from hashes of the code. macOS kills a
+/// process that loads a binary which was changed after signing, for example by stripping.
 fn signature_fault(bytes: &[u8], signature: &[u8]) -> Option<String> {
     const SIGNATURE: u32 = 0xfade_0cc0; // CSMAGIC_EMBEDDED_SIGNATURE
     const DIRECTORY: u32 = 0xfade_0c02; // CSMAGIC_CODEDIRECTORY

@@ -107,8 +107,8 @@ impl Inputs {
         Ok(())
     }
 
-    /// Does the same as [`Inputs::drive`] by Model Exchange. An input that deviates from its slope, or an
-    /// input other than a Real that changes, is an event.
+    /// Simulates as [`Inputs::drive`] does, but in Model Exchange. If an input deviates from its slope, or an input other
+    /// than a Real changes, this is an event.
     fn integrate<'fmu>(
         &self,
         instance: &mut Instance<'fmu>,

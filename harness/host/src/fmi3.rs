@@ -888,8 +888,8 @@ struct Line {
 }
 
 impl Line {
-    /// Stores those of the inputs `references`, with the present `values`, that the FMU accepts within a
-    /// step.
+    /// Selects from the inputs `references`, with the present `values`, the inputs that the FMU accepts within a step, and
+    /// stores them.
     fn fill(&mut self, instance: &mut Instance, references: &[u32], values: &[f64]) -> Called {
         let description = instance.fmu().description();
         self.references.clear();

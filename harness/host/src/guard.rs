@@ -733,8 +733,8 @@ fn kilobytes(status: &str, kind: &str) -> Option<u64> {
 mod tests {
     use super::*;
 
-    /// Argument of this program by which a test knows that it is the guarded process. For the test harness it is the name
-    /// of a test that is not there.
+    /// Argument by which the test program knows that it was started as the guarded process. For the test harness it is the
+    /// name of a test that does not exist.
     const CHILD: &str = "guarded_process";
 
     /// Runs `work` in a guarded process, which runs the test `name` again, and returns the end of that process.

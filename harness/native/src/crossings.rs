@@ -14,8 +14,8 @@ use pyo3::prelude::*;
 
 use crate::numbers::numbers;
 
-/// Loop gain above which no phase crossing is searched, because the frequency is that of a pole on the imaginary axis, such as an
-/// integrator at 0.
+/// Loop gain above which no phase crossing is searched, because such a gain occurs only next to a pole on the imaginary
+/// axis, for example an integrator at 0.
 const INTEGRATOR: f64 = 1e8;
 /// Loop gain below which no phase crossing is searched, because the gain is rounding error.
 const NOTHING: f64 = 1e-12;

@@ -12,8 +12,8 @@ use crate::metadata::{PACKAGE, VERSION};
 use crate::platforms::{Built, PLATFORMS};
 use crate::{Fmi, Model, pack_built, platforms, wheel};
 
-/// Name of the list of the files in the folder, which are those of one version, with their SHA-256 in the
-/// format of `sha256sum --check`.
+/// Name of the list of the files in the folder, all of one version, with their SHA-256 in the format of `sha256sum
+/// --check`.
 pub const PRESENT: &str = "SHA256SUMS";
 
 /// Name of the list of all files of all releases with their SHA-256: those in [`PRESENT`], files of older

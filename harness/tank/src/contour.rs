@@ -226,8 +226,8 @@ impl Contour {
         sum
     }
 
-    /// Returns the height of the highest point of the wall that is wet, m from the contour's own zero; the lowest point
-    /// of the tank if none is. `surface` is that of [`Contour::integrate_wetted`].
+    /// Returns the height, m from the contour's own zero, of the highest wet point of the wall; if no point is wet, the
+    /// height of the lowest point of the tank. For `surface` see [`Contour::integrate_wetted`].
     pub(crate) fn highest_wetted(&self, surface: impl Fn(f64) -> f64) -> f64 {
         let pieces = self.wetted_pieces(&surface, &[]);
         let ends =
@@ -235,7 +235,7 @@ impl Contour {
         ends.fold(self.bottom, f64::max)
     }
 
-    /// Returns the number of separate parts of the wall that are wet. `surface` is that of [`Contour::integrate_wetted`].
+    /// Returns the number of separate parts of the wall that are wet. For `surface` see [`Contour::integrate_wetted`].
     pub(crate) fn count_pools(&self, surface: impl Fn(f64) -> f64) -> usize {
         let pieces = self.wetted_pieces(&surface, &[]);
         let mut pools = usize::from(!pieces.is_empty());
@@ -655,8 +655,8 @@ pub struct Volume {
 }
 
 impl Volume {
-    /// Computes the volume integrals of the liquid below the free surface, by Gauss's theorem along the wall:
-    /// the volume is pi int r^2 dz, and the others are similar.
+    /// Computes the volume integrals of the liquid below the free surface by Gauss's theorem, as integrals along the wall.
+    /// For example, the volume is pi int r^2 dz.
     pub fn from_wall(wall: &Wall) -> Volume {
         let rule = Gauss::new(20);
         let base = wall.z_surface;

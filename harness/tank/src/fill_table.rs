@@ -89,8 +89,8 @@ impl Curves {
         worst
     }
 
-    /// Returns the cost of a choice of points: the largest error of the first mode plus those of the other
-    /// modes, weighted by their share of its mass.
+    /// Returns the cost of a choice of points: the largest interpolation error of all modes, where the errors of a mode that
+    /// is lighter than the first one are weighted with the ratio of the two masses.
     fn cost(&self, points: &[usize]) -> f64 {
         let heaviest = |n: usize| self.modes[n][2].iter().copied().fold(0.0, f64::max);
         let weighted = |n: usize| {

@@ -1,8 +1,9 @@
 //! Capillarity: exact for a flat surface with a free contact line, from a table for the curved meniscus of a cylinder.
 //!
-//! The length l_n stays 1/lambda_n, which is geometry, not g/omega^2. Capillarity adds a centring spring k_s = m_n
-//! (omega_n^2 - g lambda_n) at the bob, or a torsion spring k_s l_n^2 at the hinge. At g = 0 only this spring remains.
-//! Masses and heights are those of the flat surface; those of a curved surface are unknown.
+//! The pendulum's length l_n stays 1/lambda_n, which follows from the geometry, and is not g/omega^2. Capillarity adds a
+//! centring spring k_s = m_n (omega_n^2 - g lambda_n) at the slosh mass, or equivalently a torsion spring k_s l_n^2 at the
+//! hinge. At g = 0 only this spring restores the liquid. Masses and heights are computed for a flat surface, because they
+//! are unknown for a curved one.
 
 use crate::interpolation::Monotone;
 use crate::modal::Mode;

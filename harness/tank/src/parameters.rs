@@ -126,8 +126,8 @@ pub struct ParameterSet {
     pub third_order: Vec<(usize, Coefficients)>,
 }
 
-/// Adds capillarity to the modes: that of a flat surface and, for the first mode of an upright cylinder, that
-/// of the meniscus at the contact angle.
+/// Adds the stiffness by capillarity to the modes: the formula for a flat surface and, for the first mode of an upright
+/// cylinder, the table for the meniscus at the contact angle.
 fn with_capillarity(
     tank: &Tank,
     data: &ModalData,

@@ -193,7 +193,8 @@ impl core::str::FromStr for Fill {
     }
 }
 
-/// Largest number of segments, because each takes panels of its own.
+/// Largest number of segments of a contour. It is limited because each segment is divided into several panels, so that the
+/// computing time grows fast.
 const MOST_SEGMENTS: usize = 200;
 
 pub const MOST_MODES: usize = 20;

@@ -90,8 +90,8 @@ pub trait FrictionLaw {
 /// Dispatches over the law of every [`FrictionModel`]. The compiler reports a missing law.
 macro_rules! laws {
     ($($name:ident => $law:ty;)*) => {
-        /// The friction law in use; its functions are those of [`FrictionLaw`]. The plant has one law, in a
-        /// box with all other series.
+        /// The friction law in use, with the functions of [`FrictionLaw`]. The plant has one law, which is stored together
+        /// with all other series on the heap.
         #[derive(Clone, Debug)]
         #[allow(clippy::large_enum_variant)]
         pub enum Law {

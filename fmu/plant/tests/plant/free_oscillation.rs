@@ -1,4 +1,4 @@
-//! The frequency of a tank's free oscillations, by simulation; `tests/physics` has it, too.
+//! Measures the frequency of a tank's free oscillation by simulation; the tests of `tests/physics` include this file too.
 
 use std::f64::consts::TAU;
 

@@ -1,4 +1,5 @@
-//! Modes of the tilted free surface on a bench that leans: frequency and sloshing mass of the motion are those of the liquid.
+//! Tests of slosh modes on a tilted bench, whose free surface is tilted: frequency and sloshing mass of the simulated
+//! motion equal those that are computed for the liquid.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 

@@ -19,8 +19,8 @@ fn bench(slosh: SloshModel, friction: FrictionModel) -> Parameters {
     p
 }
 
-/// Returns a bench with all options: tilted by 3 degrees, an unbalanced hub, a ring, damping that grows with
-/// the amplitude, surface tension a hundred times that of water.
+/// Returns a bench with all options: tilted by 3 degrees, with an unbalanced hub, a ring baffle, damping that grows with
+/// the amplitude, and a hundred times the surface tension of water.
 fn everything(slosh: SloshModel, friction: FrictionModel) -> Parameters {
     let mut p = bench(slosh, friction);
     (p.bench.tilt, p.bench.tilt_azimuth) = (0.05, 0.7);

@@ -1,4 +1,4 @@
-//! Tests with a host that knows scalars.
+//! Tests with a host that has read the model description with scalar variables.
 
 #![allow(unsafe_code)]
 

@@ -1,4 +1,4 @@
-//! Tests with a host that knows arrays.
+//! Tests with a host that has read the model description with array variables.
 
 #![allow(unsafe_code)]
 
@@ -189,8 +189,8 @@ fn time_and_event_indicators_follow_the_scalars_of_the_table() {
     assert_eq!(time_reference::<Trays>(), 25);
 }
 
-/// A square depends on all levels and inputs of the present trays, although all are 0 and so are the
-/// derivatives; a rate depends on its own input.
+/// A square depends on all levels and inputs of the present trays, although all levels and inputs are 0 and the derivatives
+/// vanish; a rate depends on its own input.
 #[test]
 fn elements_depend_on_elements_also_where_the_derivative_vanishes() {
     let lines = Lines::default();

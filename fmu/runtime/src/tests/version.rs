@@ -1,5 +1,5 @@
-//! An instance in a version of FMI that is not 2.0: as in 3.0, one space of value references that begins
-//! elsewhere, and events that the host handles in Co-Simulation, too.
+//! Tests an instance in an invented version of FMI that differs from 2.0 as 3.0 does: all types share one space of value
+//! references, which does not begin at 0, and the host can handle events also in Co-Simulation.
 
 use super::*;
 use crate::call::{CType, Call, Events, InstanceState, typed};

@@ -1,8 +1,8 @@
-//! Two vessels that leak, on a platform: the smallest model with everything that the runtime knows.
+//! A test model with everything that the runtime supports: two leaking vessels on a platform that can rise.
 //!
-//! A level rises by what flows in and falls by the leak, x' = q - k x; while q runs along a slope s,
-//! x(h) = x e + q (1 - e) / k + s (h - (1 - e) / k) / k with e = exp(-k h). Above the height
-//! [`OPENS`] of the platform a valve opens, which spills half of the first vessel.
+//! A level x rises by the inflow q and falls by the leak, x' = q - k x. While q changes with the slope s, x(h) = x e + q (1
+//! - e) / k + s (h - (1 - e) / k) / k with e = exp(-k h). If the platform is higher than [`OPENS`], a valve opens and
+//! spills half of the first vessel.
 
 use crate::clock::Instant;
 use crate::model::{Dynamics, Model};

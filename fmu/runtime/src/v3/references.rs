@@ -94,8 +94,8 @@ fn extra_name<M: Model>(reference: u32) -> Option<String> {
     extra_names::<M>().into_iter().nth(place as usize)
 }
 
-/// Returns true if hosts may read or set a variable within a step. An input that follows from others cannot
-/// be set, because it has no end value of its own.
+/// Returns true if hosts may read or set a variable within a step. An input whose course follows from other inputs cannot
+/// be set, because it has no independent value at the end of the step.
 pub fn has_intermediate_update<M: Model>(variable: &Variable<M>) -> bool {
     matches!(variable.causality, Causality::Input | Causality::Output)
         && variable.c_type() == CType::Real

@@ -53,8 +53,8 @@ pub struct Estimate {
     pub error: f64,
 }
 
-/// The averaging time, s, at which a fit deviates most, with the ratio of the record's Allan deviation to
-/// that of the fit.
+/// The averaging time, s, at which a fit deviates most from the record, with the record's Allan deviation divided by the
+/// fit's at this time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outlier {
     pub tau: f64,
@@ -225,8 +225,8 @@ impl Problem<'_> {
         Some(((SHORTEST * first).min(*last), *last))
     }
 
-    /// Iterates the generalized least squares until the weights are those of the result. If `fixed` is given,
-    /// this coefficient keeps its value, and so does the correlation time.
+    /// Repeats the generalized least squares with weights from the last result until the weights no longer change. If
+    /// `fixed` is given, this coefficient and the correlation time keep their values.
     fn iterate_weights(
         &self,
         mut state: State,

@@ -28,8 +28,8 @@ fn misbehaving(word: &str) -> Vec<u8> {
     zipped(&files, CompressionMethod::Stored)
 }
 
-/// The shim passes the address of its own variable to the logger; a host that follows this pointer would jump
-/// into it.
+/// The test's library passes the address of its own variable to the logger. A host that followed this pointer would jump
+/// into the variable.
 #[test]
 fn an_fmu_that_hands_its_own_pointer_to_the_logger_breaks_one_rule_and_runs() {
     let folder = tempfile::tempdir().unwrap();

@@ -94,7 +94,7 @@ pub fn keep(name: &str, bytes: &[u8], rules: &[&str]) {
     writeln!(index.unwrap(), "{file}\t{}\t{}", name.escape_debug(), rules.join(" ")).unwrap();
 }
 
-/// Asserts that each FMU breaks exactly the rules that are named with it, among those of the groups.
+/// Asserts that each FMU breaks exactly the rules that are listed for it. Only rules of `groups` are checked.
 pub fn breaks(mutants: Vec<(&str, Vec<u8>, &[&str])>, groups: &[&str]) {
     let mut wrong = Vec::new();
     for (name, bytes, meant) in mutants {

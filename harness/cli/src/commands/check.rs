@@ -42,7 +42,7 @@ pub struct CheckArgs {
     rules: bool,
 }
 
-/// The error if no selected rule could be checked. It has the exit code 2 of its own, to tell it from an FMU
+/// The error that no selected rule could be checked. Its exit code is 2, so that scripts can distinguish it from an FMU
 /// with errors.
 #[derive(Debug)]
 pub struct Unchecked(String);

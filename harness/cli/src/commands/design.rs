@@ -349,7 +349,7 @@ struct Plan {
 }
 
 impl Plan {
-    /// Returns the plain sweep if its bounds are tighter than those of the plan.
+    /// Returns the plain sweep if it determines the parameters more precisely than the planned torque, otherwise `None`.
     fn better(&self) -> Option<&Sweep> {
         let merit = design::merit(&self.bounds);
         self.sweep.as_ref().filter(|sweep| design::merit(&sweep.bounds) < merit)

@@ -89,8 +89,8 @@ pub(super) fn print_estimates(tables: &[&BTreeMap<String, Estimated>]) {
     }
 }
 
-/// Formats a predicted standard deviation for a table; NaN is written as "not told", because the inputs carry
-/// no information about this unknown.
+/// Formats a predicted standard deviation for a table. NaN is written as "not told": the inputs carry no information about
+/// this unknown.
 pub(super) fn deviation(std: f64) -> String {
     if std.is_finite() { format!("{std:.2e}") } else { "not told".into() }
 }

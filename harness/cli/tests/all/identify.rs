@@ -190,7 +190,7 @@ fn a_removed_option_names_what_replaces_it() {
     }
 }
 
-/// Each option that is named in the help of a kind of recording, but for those of every command.
+/// Counts the options in the help of each kind of recording, without the options that every command has.
 #[test]
 fn no_kind_of_recording_has_more_than_15_options() {
     let folder = tempfile::tempdir().unwrap();

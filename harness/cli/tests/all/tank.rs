@@ -93,7 +93,8 @@ fn a_tanks_parameters_drive_the_fmu_as_its_dimensions_do() {
     assert_ne!(other.column("omega").unwrap(), toml.column("omega").unwrap());
 }
 
-/// m_0, H_0, I_0 and the modes of SloshTank and of a tank of Spacecraft are those of the result.
+/// The parameter files for SloshTank and for a tank of Spacecraft contain m_0, H_0, I_0 and the modes of the JSON result
+/// under the names of the FMUs.
 #[test]
 fn parameters_of_the_six_axis_fmus_have_their_names() {
     let folder = tempfile::tempdir().unwrap();

@@ -16,7 +16,8 @@ use crate::progress::Progress;
 
 const APART: f64 = 0.0025;
 const WITHIN: f64 = 0.0025;
-/// Steps of the grid by which the frequencies of a smaller torque may lie outside those of a larger one.
+/// Number of grid steps by which the frequencies with rotary slosh at a smaller torque may lie outside the range of
+/// frequencies at a larger torque.
 const MARGIN: usize = 3;
 
 #[derive(Clone, Copy)]

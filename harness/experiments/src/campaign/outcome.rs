@@ -144,10 +144,9 @@ const NOTABLE_MEAN: f64 = 0.1;
 const PARTS: usize = 8;
 
 impl Rates {
-    /// Measures the rates and their biases. For a sweep or noise, which turn the hub to and fro, the bias is
-    /// the mean of the record. With another torque the mean also contains motion. The bias of a simulated
-    /// gyro is then the mean difference from the true rate, and that of a recorded gyro is unknown and not
-    /// removed.
+    /// Measures the rates and their biases. For a sweep or noise, which turn the hub to and fro, the bias is the mean of
+    /// the record. With any other torque the mean also contains motion. Then the bias of a simulated gyro is its mean
+    /// difference from the true rate, and the bias of a recorded gyro is unknown and not removed.
     fn measure(table: &Table, alternates: bool, is_recording: bool) -> Rates {
         let column = |name| table.column(name).unwrap_or_default();
         let (rate, truth) = (column(OMEGA_IMU), column(OMEGA));

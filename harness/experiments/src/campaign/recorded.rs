@@ -31,7 +31,7 @@ const MISSING: f64 = 0.5;
 /// Largest part of a sweep in gaps. In gaps torque and rate are both interpolated linearly, which hardly changes their
 /// ratio. A record that lost 3 % of its rows one by one has 6 % of its time in gaps.
 const GAPS: f64 = 0.15;
-/// Largest relative difference of the recorder's clock from that of the torque.
+/// Largest relative difference between the rates of the recorder's clock and of the clock that timed the torque.
 const FASTEST_CLOCK: f64 = 2e-3;
 /// Shift of the torque at the end of a record that a wrong clock causes, in cycles, above which times are
 /// corrected.

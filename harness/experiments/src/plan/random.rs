@@ -33,7 +33,7 @@ enum Kind {
         from: f64,
         to: f64,
     },
-    /// Lognormal distribution, whose `deviation` is that of the natural logarithm.
+    /// Lognormal distribution; `deviation` is the standard deviation of the natural logarithm of the value.
     Lognormal {
         median: f64,
         deviation: f64,

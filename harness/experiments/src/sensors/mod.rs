@@ -113,7 +113,7 @@ pub const ERRORS: [Parameter; 7] = [
     parameter("seed", 1.0, "", "seed of the noise", Allowed::Whole(9e15)),
 ];
 
-/// A sensor that was given as `NAME=KIND:key=value,…`; the name is that of its column.
+/// A sensor as given by `NAME=KIND:key=value,…`. NAME is also the name of its column in the table.
 #[derive(Clone, Debug)]
 pub struct Sensor {
     pub name: String,

@@ -67,7 +67,7 @@ impl Coordinate {
         }
     }
 
-    /// Converts coordinates to slosh angles, radial and tangential, rad. `length` is that of the mode's
+    /// Converts the coordinates of a mode to slosh angles, radial and tangential, rad. `length` is the length of the mode's
     /// pendulum, m.
     pub fn angles(self, q: [f64; 2], length: f64) -> [f64; 2] {
         match self {
@@ -262,8 +262,8 @@ impl Surface<'_> {
         Ok(self.text(name)?.parse()?)
     }
 
-    /// Returns the item of an enumeration, or that of its integer twin `kind`, which is for hosts that cannot
-    /// set enumerations.
+    /// Returns the selected item of the enumeration `name`. If the integer parameter `kind` is not 0, it selects the item
+    /// instead; it exists for hosts that cannot set enumerations.
     fn choice(&self, name: &str, kind: &str) -> Result<String> {
         let number: i64 = self.text(kind)?.parse()?;
         let items = self.description.items(self.description.variable(name)?);

@@ -249,7 +249,7 @@ fn errors_of_sensors_say_what_is_allowed() {
     };
     for (text, set, words) in [
         ("a=gauge", ("slosh.model", "frozen"), "no surface that moves"),
-        ("a=camera", ("slosh.source_kind", "2"), "upright cylinder alone"),
+        ("a=camera", ("slosh.source_kind", "2"), "only for an upright cylinder"),
         ("a=pressure:height=0.2", ("tank.h", "0.1"), "above the liquid at rest, tank.h = 0.1 m"),
         ("a=force:of=theta", ("tank.h", "0.1"), "unit rad (allowed: N)"),
         ("a=gauge:rate=30", ("tank.h", "0.1"), "not a multiple of the step, 0.02 s"),

@@ -22,8 +22,9 @@ fn quantity<'a>(label: &'a str, value: &'a dyn Fn(&Outcome) -> Option<f64>) -> Q
     Quantity { label, value, decades: false, level: None }
 }
 
-/// Plots antiresonance and resonance of every group over the axis, together with those of the exact linear
-/// plant. The colour shows the group, the line style its model, the marker antiresonance or resonance.
+/// Plots antiresonance and resonance of every group over the axis, and for comparison antiresonance and resonance of the
+/// exact linear plant. The colour shows the group, the line style its model, and the marker which of the two features it
+/// is.
 pub(super) fn extrema(page: &Page, axis: &Axis) -> Figure {
     let plants = distinct(page.groups.iter().map(Group::plant));
     let models = distinct(page.groups.iter().map(|group| group.model));

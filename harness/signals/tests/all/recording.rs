@@ -9,7 +9,8 @@ const fn signal(name: &'static str, required: bool) -> Signal<'static> {
     Signal { name, required, between: Between::Held, unit: None }
 }
 
-/// Signals of the tests: rows are those of the rate, the torque is held, the angle is interpolated linearly.
+/// Signals of the tests. The rows of a recording are the rows with a rate; the torque is held, and the angle is
+/// interpolated linearly.
 const SIGNALS: [Signal; 3] = [
     signal("omega", true),
     signal("tau_cmd", true),

@@ -1,9 +1,10 @@
-//! Where a bob of the third order leaves fully nonlinear potential flow: backbones of upright cylinders, tests/backbones.csv.
+//! Compares the third-order model with fully nonlinear potential flow in upright cylinders, whose frequencies over the
+//! amplitude (backbones) are in tests/backbones.csv.
 //!
-//! Each row has the frequency of a planar and of a rotary periodic wave over that of small waves, at a slosh angle, by a
-//! variational method (Luke's principle, 8 planar and 10 rotary truncations) with its error. A second method, which marches
-//! in time, agrees within 0.12 %. Columns are empty beyond the end of the computation. The planar branch at h/R 1 is that of
-//! large amplitudes, from 4 degrees.
+//! Each row has the frequency of a planar and of a rotary periodic wave at a slosh angle, divided by the frequency of small
+//! waves. They were computed by a variational method (Luke's principle, with 8 planar and 10 rotary truncations) with its
+//! error; a second method, which marches in time, agrees within 0.12 %. Columns are empty beyond the end of the
+//! computation. At h/R = 1 the planar branch is the one of large amplitudes, from 4 degrees.
 
 use core::f64::consts::{FRAC_PI_2, PI};
 
@@ -36,8 +37,9 @@ fn pair(s: f64, kappa: f64) -> EnergyTerms {
     EnergyTerms { pair: [s, kappa], next: [0.0; 2], rotary: [0.0; 2], compared: 0.0 }
 }
 
-/// Frequency over that of small motion of a bob on the surface of `fmu/craft/src/surface.rs` with l = g = 1. Planar motion by
-/// quadrature with q = a sin t, in which the integrand is periodic.
+/// Returns the frequency of the slosh mass on the surface of `fmu/craft/src/surface.rs`, divided by its frequency in small
+/// motion, with l = g = 1: in planar and in circular motion. Planar motion is integrated by quadrature with q = a sin t,
+/// for which the integrand is periodic.
 fn bob(of: &EnergyTerms, angle: f64) -> [f64; 2] {
     let ([s, kappa], [s_2, kappa_2], [t, t_2]) = (of.pair, of.next, of.rotary);
     let a = angle.sin();

@@ -1,5 +1,6 @@
-//! Every result has its dimension: a tank four times as large, or with a liquid of another density, is the same tank in other
-//! units. By powers of four all numbers keep their digits, so that only what has a size of its own makes a difference.
+//! Every result scales with its physical dimension: a tank four times as large, or with a liquid of another density, gives
+//! the same numbers in other units. Factors that are powers of four change no digit, so that any difference reveals a
+//! constant with a hidden unit.
 
 use crate::common::tank;
 use hubslosh_tank::parameters::{Liquid, tank_damping};

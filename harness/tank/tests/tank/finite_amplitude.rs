@@ -28,9 +28,9 @@ fn refused(text: &str, fill: f64, why: &str) {
     assert!(found.warnings[0].contains("pendulum"), "{found:?}");
 }
 
-/// Fully nonlinear potential flow in the bench's tank of 81.5 mm, with 10 and 5 cm of liquid. Each pair is a slosh angle in
-/// degrees and the frequency over that of small waves. The computation has no expansion in the steepness. At 8 degrees the
-/// fifth order adds 3e-4.
+/// Compares with fully nonlinear potential flow in the bench's tank of radius 81.5 mm, with 10 and 5 cm of liquid. Each
+/// pair is a slosh angle in degrees and the frequency divided by the frequency of small waves. The potential flow was
+/// computed without an expansion in the steepness; at 8 degrees the fifth order adds 3e-4.
 #[test]
 fn backbones_of_the_bench_equal_those_of_fully_nonlinear_flow() {
     for (fill, planar, circular) in [
@@ -395,8 +395,9 @@ fn a_draining_tank_has_the_coefficients_of_every_fill() {
     assert_eq!(set.warnings, [""; 0]);
 }
 
-/// A sphere has poles from 0.556 to 0.63 m, and its coefficients are not known above 0.85 m. Between the known fills the
-/// values stay between those of the neighbours, and beyond the last known fill they keep its value.
+/// In the sphere the third order has poles from 0.556 to 0.63 m, and the coefficients are not known above 0.85 m. Between
+/// known fills the values stay between the values of the neighbouring fills; above the last known fill they keep the value
+/// there.
 #[test]
 fn a_table_bounds_unknown_coefficients_by_their_neighbours_and_names_the_fills() {
     let sphere = tank("density = 1000.0\nshape = { sphere = { radius = 0.5 } }");
