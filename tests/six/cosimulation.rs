@@ -237,7 +237,7 @@ impl Pair {
         self.x = [self.x[1], if is_held { from } else { to }];
     }
 
-    /// Returns p_x, p_x' of the bob.
+    /// Returns p_x, p_x' of the slosh mass.
     fn slosh(&mut self) -> [f64; 2] {
         let x = self.tank.continuous_states();
         [x[0], x[3]]

@@ -1,9 +1,9 @@
 //! Waves of finite amplitude through the packed SloshTank and, on a heavy craft, the packed Spacecraft, compared with fully
 //! nonlinear potential flow, which has no expansion in steepness.
 //!
-//! The force on the craft accelerates craft and tank as the tank alone is accelerated, except for the recoil: a bob of mass m
-//! that swings pushes a craft of mass M. It raises the frequency by m/(2 M), 4e-12 here, and each test compares the
-//! FMUs to 1e-9.
+//! The force on the craft accelerates craft and tank as the tank alone is accelerated, except for the recoil: a slosh mass
+//! of mass m that swings pushes a craft of mass M. It raises the frequency by m/(2 M), 4e-12 here, and each test compares
+//! the FMUs to 1e-9.
 
 use std::f64::consts::TAU;
 
@@ -65,7 +65,7 @@ impl Moved for Carried {
     }
 }
 
-/// Returns the largest difference of two bobs in the direction and, over `w`, in its rate.
+/// Returns the largest difference of two slosh masses in the direction and, over `w`, in its rate.
 fn apart(a: [f64; 6], b: [f64; 6], w: f64) -> f64 {
     (0..6).map(|i| (a[i] - b[i]).abs() / if i < 3 { 1.0 } else { w }).fold(0.0, f64::max)
 }

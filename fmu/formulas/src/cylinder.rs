@@ -94,9 +94,9 @@ fn mcmahon(n: usize) -> f64 {
     b - 7.0 / x - 4.0 * (7.0 * 16.0 + 82.0 * 4.0 - 9.0) / (3.0 * x * x * x)
 }
 
-/// Returns mass, kg, height of the centre of mass above the bottom, m, and transverse inertia about it, kg
-/// m2, of the rigid liquid that remains when the modes `kept` are pendulums. The remainder is chosen so that
-/// mass, centre of mass and inertia of the whole liquid are exact while each bob is at its position of rest.
+/// Returns mass, kg, height of the centre of mass above the bottom, m, and transverse inertia about it, kg m2, of the rigid
+/// liquid that remains when the modes `kept` are pendulums. The remainder is chosen so that mass, centre of mass and
+/// inertia of the whole liquid are exact while each slosh mass is at its position of rest.
 pub fn rest(d: f64, h: f64, m_liq: f64, kept: &[Pendulum]) -> [f64; 3] {
     let z_liq = h / 2.0;
     let sum = |f: &dyn Fn(&Pendulum) -> f64| kept.iter().map(f).sum::<f64>();

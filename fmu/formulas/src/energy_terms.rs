@@ -1,18 +1,20 @@
-//! Coefficients of the first mode in an upright cylinder that give the bob the wave's energy as well as its frequency.
+//! Coefficients of the first mode in an upright cylinder that give the slosh mass the wave's energy as well as its
+//! frequency.
 //!
 //! ```text
 //! L = m |q'|^2/2 + m (s + s_2 |q|^2/l^2) (q.q')^2/(2 l^2) + m (t + t_2 |q|^2/l^2) (q x q')^2/(2 l^2) - m g z
 //! z = l [A^2/2 + kappa A^4/8 + (kappa_2 + 1) A^6/16 + ...],   A = |q|/l
 //! ```
 //!
-//! as in `fmu/craft/src/surface.rs`: a pendulum with s, kappa and the four further coefficients, which are 0 for it. The third
-//! order has the right frequency, but not the right energy: at h/R 0.5 and 16 degrees its bob holds 4.7 % less than the
-//! liquid, and forced near resonance its amplitude errs by 3 to 8 %. Here kappa and kappa_2 follow from the rise of the
-//! liquid's centre of mass, s and s_2 from the frequency of planar motion and t and t_2 from that of circular motion.
+//! as in `fmu/craft/src/surface.rs`: a pendulum with s, kappa and the four further coefficients, which are 0 for it. The
+//! third order has the right frequency, but not the right energy: at h/R 0.5 and 16 degrees its slosh mass holds 4.7 % less
+//! than the liquid, and forced near resonance its amplitude errs by 3 to 8 %. Here kappa and kappa_2 follow from the rise
+//! of the liquid's centre of mass, s and s_2 from the frequency of planar motion and t and t_2 from that of circular
+//! motion.
 //!
-//! Source: fully nonlinear potential flow, computed for this project by a variational method (Luke's principle) at the depths
-//! of [`ROWS`]. The bob's frequencies are those of the flow within 0.06 % (planar) and 0.11 % (circular) up to the angles
-//! there, and its energy is that of planar waves within 0.1 % from h/R 0.35 on (0.7 % at 0.25, 1.1 % at 0.3).
+//! Source: fully nonlinear potential flow, computed for this project by a variational method (Luke's principle) at the
+//! depths of [`ROWS`]. The slosh mass's frequencies are those of the flow within 0.06 % (planar) and 0.11 % (circular) up
+//! to the angles there, and its energy is that of planar waves within 0.1 % from h/R 0.35 on (0.7 % at 0.25, 1.1 % at 0.3).
 //! `harness/tank/tests/tank/backbones.rs` compares the frequencies.
 
 use crate::third_order;

@@ -1,14 +1,14 @@
-//! Ends of the range in which a pendulum, or a bob of the third order, represents the liquid in its tank.
+//! Ends of the range in which a pendulum, or a slosh mass of the third order, represents the liquid in its tank.
 //!
 //! Slosh angles: the model's frequency over the amplitude is compared with fully nonlinear potential flow in upright
-//! cylinders. That flow was computed for this project by two independent methods, a variational one and one that
-//! marches in time; they agree within 0.04 % at h/R 0.5 and more, and within 0.12 % at 0.3. The frequency of the bob is
-//! that of `fmu/craft/src/surface.rs` by quadrature. Two ends are given: at [`FREQUENCY`] the
-//! frequency itself is wrong, and at the smaller, second one a forced planar response near resonance is: its amplitude, force
-//! or phase leaves 3 %, 3 % or 3 degrees. That response was computed for this project by a third method, spectral in space and
-//! marching in time, with a damping ratio of 0.01 on every mode of the liquid, at the peak of the response and 1 % from it. The
-//! angle is interpolated between the largest errors at two or more amplitudes. Part of the error is the damping of the waves
-//! that the first mode drives, which one bob of the third order does not have.
+//! cylinders. That flow was computed for this project by two independent methods, a variational one and one that marches in
+//! time; they agree within 0.04 % at h/R 0.5 and more, and within 0.12 % at 0.3. The frequency of the slosh mass is that of
+//! `fmu/craft/src/surface.rs` by quadrature. Two ends are given: at [`FREQUENCY`] the frequency itself is wrong, and at the
+//! smaller, second one a forced planar response near resonance is: its amplitude, force or phase leaves 3 %, 3 % or 3
+//! degrees. That response was computed for this project by a third method, spectral in space and marching in time, with a
+//! damping ratio of 0.01 on every mode of the liquid, at the peak of the response and 1 % from it. The angle is
+//! interpolated between the largest errors at two or more amplitudes. Part of the error is the damping of the waves that
+//! the first mode drives, which one slosh mass of the third order does not have.
 //!
 //! Swirl: above h/R 0.83 mode (2,2) resonates with twice the frequency of mode 1, so that the branch of rotary motion
 //! folds at the angle [`swirl_fold`], and another one takes over. No single mode has two branches.
@@ -130,8 +130,8 @@ pub fn cylinder(fill: f64, shifts: [Option<f64>; 2]) -> AngleLimit {
 const FORCED_ENERGY: [[f64; 2]; 7] =
     [[0.25, 1.7], [0.3, 2.9], [0.35, 4.8], [0.4, 7.7], [0.5, 11.8], [0.6, 15.0], [0.7, 15.0]];
 
-/// Returns the limit of a bob with the [`energy_terms`] of an upright cylinder filled to h/R = `fill`, or
-/// `None` at depths without such coefficients.
+/// Returns the limit of a slosh mass with the [`energy_terms`] of an upright cylinder filled to h/R = `fill`, or `None` at
+/// depths without such coefficients.
 pub fn cylinder_with_energy(fill: f64) -> Option<AngleLimit> {
     let compared = energy_terms(fill)?.compared;
     Some(AngleLimit { frequency: compared, forced: interpolate(fill, FORCED_ENERGY).to_radians() })

@@ -4,11 +4,10 @@
 //! zeta(A) = zeta + zeta_A A + zeta_b b(sigma A),   A^2 = |q|^2 + |q'|^2/W,   W = omega_n^2
 //! ```
 //!
-//! q is the slosh angle in both directions, rad (displacement over length in the model liquid). Waves of
-//! finite height dissipate more energy per period than the laminar layer at the wall: the surface film stretches, the
-//! contact line moves. There is no formula for zeta_A; it must be measured or fitted (`hubslosh identify`). The drag on
-//! the bob is 2 zeta(A) m omega_n times its velocity, so that it always dissipates. In a free oscillation
-//! A' = -omega_n zeta(A) A.
+//! q is the slosh angle in both directions, rad (displacement over length in the model liquid). Waves of finite height
+//! dissipate more energy per period than the laminar layer at the wall: the surface film stretches, the contact line moves.
+//! There is no formula for zeta_A; it must be measured or fitted (`hubslosh identify`). The drag on the slosh mass is 2
+//! zeta(A) m omega_n times its velocity, so that it always dissipates. In a free oscillation A' = -omega_n zeta(A) A.
 //!
 //! Waves break above a steepness s_b. Steepness is k a, with the wave's amplitude a at the wall and the mode's wave
 //! number k. Linear theory gives a = `wave` A, so k a = sigma A with sigma = k `wave`. In an upright cylinder k = xi_n/R

@@ -8,9 +8,9 @@
 //! zeta = 2.83 exp(-4.60 d/R) alpha^(3/2) (eta/R)^(1/2)
 //! ```
 //!
-//! The ring separates the flow. The drag is 2 zeta omega m times the bob's velocity, with the amplitude from the
-//! current q and q', eta = (wave per angle) A, A^2 = |q|^2 + |q'|^2/omega^2. It therefore always dissipates, and in a
-//! free oscillation a' = -zeta(a) omega a. With W = omega^2 the drag is
+//! The ring separates the flow. The drag is 2 zeta omega m times the slosh mass's velocity, with the amplitude from the
+//! current q and q', eta = (wave per angle) A, A^2 = |q|^2 + |q'|^2/omega^2. It therefore always dissipates, and in a free
+//! oscillation a' = -zeta(a) omega a. With W = omega^2 the drag is
 //!
 //! ```text
 //! c_b = 2 m Z u^(1/4),   u = W [W (|q|^2 + A_0^2) + |q'|^2],   zeta = Z A^(1/2)

@@ -18,8 +18,8 @@ const SHARE_OF_RADIUS: f64 = 0.5;
 
 /// One slosh mode as a pendulum with its hinge on the tank's axis.
 ///
-/// - `m`, `l`: mass of the bob, kg, and length, m, with `inv_l` = 1/l.
-/// - `c`: viscous coefficient of the bob relative to the tank, N s/m, with `c_m` = c/m; `c_0` is that at the
+/// - `m`, `l`: slosh mass, kg, and length of the pendulum, m, with `inv_l` = 1/l.
+/// - `c`: viscous coefficient of the slosh mass relative to the tank, N s/m, with `c_m` = c/m; `c_0` is that at the
 ///   reference g, and `course` is c over its value at the start of the expansion.
 /// - `r`: distance of the hinge from the bearing axis, m.
 /// - `along`: unit vector (n_x, n_t), radial and tangential, of the motion in models that move along one
@@ -130,8 +130,8 @@ impl Pendulum {
         SHARE_OF_RADIUS * baffle.min(growth)
     }
 
-    /// Returns the error of the bob's rate, rad/s, that the series of its amplitude-dependent drag up to
-    /// order n cause at `h` after the start of the expansion.
+    /// Returns the error of the slosh mass's rate, rad/s, that the series of its amplitude-dependent drag up to order n
+    /// cause at `h` after the start of the expansion.
     pub fn defect(&self, n: usize, h: f64) -> f64 {
         let Pendulum { baffle, growth, course, .. } = self;
         let [mut drag, mut rate2] = [0.0; 2];
@@ -183,21 +183,21 @@ impl Pendulum {
         if self.is_askew() { [a * x, a * t] } else { [T::constant(0.0), a] }
     }
 
-    /// Returns q_x, q_y, q_x', q_y' of an angle along the bob's direction and its rate.
+    /// Returns q_x, q_y, q_x', q_y' of an angle along the slosh mass's direction and its rate.
     #[inline(always)]
     pub fn coordinates(&self, [al, al_d]: [f64; 2]) -> [f64; 4] {
         let [x, t] = self.along;
         if self.is_askew() { [al * x, al * t, al_d * x, al_d * t] } else { [0.0, al, 0.0, al_d] }
     }
 
-    /// Returns the angle along the bob's direction and its rate, from q_x, q_y, q_x', q_y'.
+    /// Returns the angle along the slosh mass's direction and its rate, from q_x, q_y, q_x', q_y'.
     #[inline(always)]
     pub fn angle_and_rate(&self, [q_x, q_y, x_d, y_d]: [f64; 4]) -> [f64; 2] {
         let [x, t] = self.along;
         if self.is_askew() { [x * q_x + t * q_y, x * x_d + t * y_d] } else { [q_y, y_d] }
     }
 
-    /// Returns coefficient n of a_x n_x + a_t n_t, the component of a vector a along the bob's direction.
+    /// Returns coefficient n of a_x n_x + a_t n_t, the component of a vector a along the slosh mass's direction.
     #[inline(always)]
     pub fn component(&self, n: usize, [a_x, a_t]: &[Series; 2]) -> f64 {
         self.along[0] * a_x[n] + self.along[1] * a_t[n]
@@ -209,7 +209,7 @@ impl Pendulum {
         radial + self.along[1] * mul(n, a_t, b)
     }
 
-    /// Returns coefficient n of (a_x n_t - a_t n_x) b, the component across the bob's direction times b.
+    /// Returns coefficient n of (a_x n_t - a_t n_x) b, the component across the slosh mass's direction times b.
     #[inline(always)]
     pub fn across_times(&self, n: usize, [a_x, a_t]: &[Series; 2], b: &Series) -> f64 {
         let tangential = if self.is_askew() { self.along[0] * mul(n, a_t, b) } else { 0.0 };

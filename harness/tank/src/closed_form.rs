@@ -48,8 +48,8 @@ pub fn zeros_of_j1_slope(count: usize) -> Vec<f64> {
     (1..=count).map(zero).collect()
 }
 
-/// Returns a mode with the wave number k, 1/m, of a tank with vertical walls and a flat bottom: lambda = k
-/// tanh(k h), and its bob is at the height h - (2/k) tanh(k h/2).
+/// Returns a mode with the wave number k, 1/m, of a tank with vertical walls and a flat bottom: lambda = k tanh(k h), and
+/// its slosh mass is at the height h - (2/k) tanh(k h/2).
 fn upright_mode(n: usize, k: f64, h: f64, m: f64, m_liq: f64, surface: Surface, beta: f64) -> Mode {
     let lambda = k * (k * h).tanh();
     let height = h - 2.0 / k * (0.5 * k * h).tanh();

@@ -1,8 +1,8 @@
 //! Tables over the fill for the six-axis FMUs, with fills placed so that few are enough.
 //!
-//! Between its points an FMU interpolates 1/l, the height of the bob at rest and m/m_liq over the mass of liquid
-//! (`fmu/craft/src/table.rs`, with the slopes of [`formulas::interpolation`]). [`place`] solves at many fills and
-//! chooses points among them that minimise the largest error between the points.
+//! Between its points an FMU interpolates 1/l, the height of the slosh mass at rest and m/m_liq over the mass of liquid
+//! (`fmu/craft/src/table.rs`, with the slopes of [`formulas::interpolation`]). [`place`] solves at many fills and chooses
+//! points among them that minimise the largest error between the points.
 
 use core::f64::consts::PI;
 
@@ -44,7 +44,7 @@ pub struct Between {
     pub rows: Vec<ModalData>,
 }
 
-/// A mode at the candidate fills: mass of liquid, omega^2/g, bob, share of mass.
+/// A mode at the candidate fills: mass of liquid, omega^2/g, slosh mass, share of mass.
 struct Curves {
     liquid: Vec<f64>,
     modes: Vec<[Vec<f64>; 3]>,
@@ -101,7 +101,7 @@ impl Curves {
     }
 }
 
-/// Returns the height of the bob, or of the liquid's centre for a mode without mass, which has no bob.
+/// Returns the height of the slosh mass, or of the liquid's centre for a mode without mass, whose height is not defined.
 fn bob(row: &ModalData, n: usize) -> f64 {
     row.modes[n].height.unwrap_or(row.z_cg)
 }

@@ -23,10 +23,10 @@ impl Fluid {
     }
 }
 
-/// A mode with capillarity: the square of its natural frequency, 1/s², and the centring `spring` at the bob,
-/// N/m, which is slightly negative for a wetting liquid at a large Bond number. `outside` has one sentence
-/// for each range of the formula that the tank is outside of. `unknown` is true if the formula does not apply
-/// to this tank and its contribution exceeds 10 % of omega^2.
+/// A mode with capillarity: the square of its natural frequency, 1/s², and the centring `spring` at the slosh mass, N/m,
+/// which is slightly negative for a wetting liquid at a large Bond number. `outside` has one sentence for each range of the
+/// formula that the tank is outside of. `unknown` is true if the formula does not apply to this tank and its contribution
+/// exceeds 10 % of omega^2.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Capillary {
     pub omega2: f64,

@@ -27,8 +27,8 @@ const MASSLESS: f64 = 1e-9;
 /// - `lambda` = omega_n^2/g, 1/m, and times the outer radius of the free surface (`lambda_r`) or the length
 ///   of the box (`lambda_l`); `l` = 1/lambda is the pendulum's length, m.
 /// - `m`, `m_ratio`: slosh mass, kg, and over the mass of the liquid.
-/// - `height`, `hinge`: spring-mass or pendulum's bob at rest, and the hinge l above it; `None` if the mass
-///   is below 1e-9 of the liquid's. `m_h` and `m_h2` are m h, kg m, and m h^2, kg·m², with h = H - z_cg.
+/// - `height`, `hinge`: height of the slosh mass at rest, and of the hinge l above it; `None` if the mass is below 1e-9 of
+///   the liquid's. `m_h` and `m_h2` are m h, kg m, and m h^2, kg·m², with h = H - z_cg.
 /// - `wave`, `wave_inner`: elevation of the surface at the outer and the inner wall per angle of the
 ///   pendulum, m/rad; `wave_peak` is the largest elevation anywhere (first mode only), at the radius
 ///   `r_peak`, m; `shape` has (r, m/rad) from the axis or inner wall outwards.
@@ -152,7 +152,7 @@ pub struct Capillarity {
     pub warnings: Vec<String>,
 }
 
-/// One mode with surface tension: natural frequency, rad/s, and centring stiffness at the bob, N/m, which is
+/// One mode with surface tension: natural frequency, rad/s, and centring stiffness at the slosh mass, N/m, which is
 /// negative for a meniscus that softens the surface; `None` where no formula holds.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct CapillaryMode {

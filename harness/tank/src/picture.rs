@@ -230,9 +230,9 @@ fn draw_modes(svg: &mut String, frame: &Frame, section: &Section, modes: &[Mode]
     }
 }
 
-/// Draws the tank in section with its liquid and the free surface in each mode, with equal largest
-/// elevations. For modes with more than 1 % of the mass it draws the pendulum's hinge and bob if they lie in
-/// the drawing. `gravity`, m/s², gives the frequencies if the result has none with surface tension.
+/// Draws the tank in section with its liquid and the free surface in each mode, with equal largest elevations. For modes
+/// with more than 1 % of the mass it draws the pendulum's hinge and slosh mass if they lie in the drawing. `gravity`, m/s²,
+/// gives the frequencies if the result has none with surface tension.
 pub fn tank(tank: &Tank, data: &ModalData, gravity: f64) -> String {
     let section = section(tank, data);
     let margin = 0.16 * section.wall.iter().map(|p| p[0]).fold(0.0, f64::max);

@@ -1,5 +1,5 @@
-//! Linear planar pendulum. al in rad is the angle along the direction n = (n_x, n_t), radial and tangential, in which
-//! the bob moves, q = al n. By default the direction is the tangent, q_x = 0.
+//! Linear planar pendulum. al in rad is the angle along the direction n = (n_x, n_t), radial and tangential, in which the
+//! slosh mass moves, q = al n. By default the direction is the tangent, q_x = 0.
 //!
 //! ```text
 //! T   = r (m g al + c l al'),   no share of J beyond the hub's I0
@@ -14,8 +14,8 @@
 //! On a tilted bench, gravity across the axis, e, adds e_y/l to al'', -m l e_x al to T and -m (e_x
 //! r + e_y l al) to E.
 //!
-//! For another direction than the tangent (a box with modes along both axes), u = l al, r_x = r n_x, r_t = r n_t, and
-//! the bob is at (r + u n_x, u n_t). Its kinetic energy to second order is m [(r_t w + u')^2 + (r_x w)^2]/2. Lagrange's
+//! For another direction than the tangent (a box with modes along both axes), u = l al, r_x = r n_x, r_t = r n_t, and the
+//! slosh mass is at (r + u n_x, u n_t). Its kinetic energy to second order is m [(r_t w + u')^2 + (r_x w)^2]/2. Lagrange's
 //! equations are
 //! ```text
 //! J   = m r_x^2,   T = r_t (m g al + c l al') - m (r_x + u)(e_x n_t - e_y n_x)
@@ -114,9 +114,9 @@ impl SloshMode for Linear {
         [al * al * (m * l) * 0.5 + tilted[0] * m, al * al_d * (m * l) + tilted[1] * m]
     }
 
-    /// Returns the force on the tank. The tangential component is -m (r w' + l al'' n_t). The radial one
-    /// follows from the bob's position (r + l al n_x, l al n_t): -m l al'' n_x and, of second order in the
-    /// motion, m (r w^2 + 2 w l al' n_t + w' l al n_t).
+    /// Returns the force on the tank. The tangential component is -m (r w' + l al'' n_t). The radial one follows from the
+    /// slosh mass's position (r + l al n_x, l al n_t): -m l al'' n_x and, of second order in the motion, m (r w^2 + 2 w l
+    /// al' n_t + w' l al n_t).
     fn force<T: Number>(&self, hub: &HubMotion) -> [T; 2] {
         let Pendulum { m, l, r, .. } = self.p;
         let [w, wd]: [T; 2] = [number(&hub.omega), number(&hub.omega_dot)];
@@ -127,8 +127,8 @@ impl SloshMode for Linear {
         [radial + e_x * m - al_dd * (m * l * n_x), e_y * m - (wd * r + al_dd * l * n_t) * m]
     }
 
-    /// Returns r F_y, because in the linear model the force acts at the hinge; gravity of a tilted bench acts
-    /// at the bob.
+    /// Returns r F_y, because in the linear model the force acts at the hinge; gravity of a tilted bench acts at the slosh
+    /// mass.
     fn torque<T: Number>(&self, hub: &HubMotion) -> T {
         let Pendulum { m, l, r, .. } = self.p;
         let ([_, f_y], [e_x, e_y]): ([T; 2], [T; 2]) = (self.force(hub), hub.tilt.now());

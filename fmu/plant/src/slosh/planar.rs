@@ -1,6 +1,6 @@
-//! Nonlinear planar pendulum: the bob swings in one plane, by default the tangential one, with centripetal terms and a
-//! changing inertia. al in rad is the angle along the plane's direction n = (n_x, n_t), q = al n. With s = sin al, c_ =
-//! cos al, and the bob at (r, l s, -l c_) in the hub's frame:
+//! Nonlinear planar pendulum: the slosh mass swings in one plane, by default the tangential one, with centripetal terms and
+//! a changing inertia. al in rad is the angle along the plane's direction n = (n_x, n_t), q = al n. With s = sin al, c_ =
+//! cos al, and the slosh mass at (r, l s, -l c_) in the hub's frame:
 //!
 //! ```text
 //! p    = g s + (c/m) l al' - l w^2 s c_          (restoring specific force)
@@ -11,12 +11,11 @@
 //! H = m [(r^2 + l^2 s^2) w + r l c_ al']
 //! ```
 //!
-//! These are Lagrange's equations for this bob on the hub, to first order the linear model. On a
-//! tilted bench, gravity across the axis, e, adds -e_y c_ to p, m (r e_y - l s e_x) to T and -m
-//! (e_x r + e_y l s) to E.
+//! These are Lagrange's equations for this slosh mass on the hub, to first order the linear model. On a tilted bench,
+//! gravity across the axis, e, adds -e_y c_ to p, m (r e_y - l s e_x) to T and -m (e_x r + e_y l s) to E.
 //!
-//! For another direction than the tangent (a box with modes along both axes), u = l s, r_x = r n_x, r_t = r n_t, and
-//! the bob is at (r + u n_x, u n_t, -l c_). Lagrange's equations of
+//! For another direction than the tangent (a box with modes along both axes), u = l s, r_x = r n_x, r_t = r n_t, and the
+//! slosh mass is at (r + u n_x, u n_t, -l c_). Lagrange's equations of
 //!
 //! ```text
 //! L = m [w^2 (r^2 + u^2 + 2 r_x u) + 2 w r_t u' + (l al')^2]/2 - m g l (1 - c_) + m [e_x (r + u n_x) + e_y u n_t]
@@ -29,7 +28,7 @@
 //! H = m [(r^2 + u^2 + 2 r_x u) w + r_t l c_ al']
 //! ```
 //!
-//! A radial bob (n_t = 0) does not feel the hub's angular acceleration. The centrifugal term w^2 (r + u) moves it
+//! A radial slosh mass (n_t = 0) does not feel the hub's angular acceleration. The centrifugal term w^2 (r + u) moves it
 //! outwards, and it rotates with the hub at r + u, so that its motion accelerates and decelerates the hub (2 w u').
 
 use alloc::string::String;
@@ -142,8 +141,7 @@ impl SloshMode for Planar {
         [half * 2.0 * half * (m * l) + tilted[0] * m, s * al_d * (m * l) + tilted[1] * m]
     }
 
-    /// Returns -m times the bob's acceleration at (r + u n_x, u n_t). The plane's guide carries the force
-    /// across it.
+    /// Returns -m times the slosh mass's acceleration at (r + u n_x, u n_t). The plane's guide carries the force across it.
     fn force<T: Number>(&self, hub: &HubMotion) -> [T; 2] {
         let Pendulum { m, l, r, .. } = self.p;
         let [s, c, ad, al_dd] = [&self.s, &self.c, &self.al_d, &self.al_dd].map(number::<T>);

@@ -1,14 +1,13 @@
-//! Spherical (conical) pendulum with stereographic coordinates. The bob's direction from the hinge,
-//! a unit vector in the hub's frame, is
+//! Spherical (conical) pendulum with stereographic coordinates. The slosh mass's direction from the hinge, a unit vector in
+//! the hub's frame, is
 //!
 //! ```text
 //! p = (k xi_1, k xi_2, 1 - k),   k = 2/(1 + |xi|^2),   q = xi
 //! ```
 //!
-//! Rest is xi = 0; only the bob straight up is singular. The motion is expanded in p and in v, the
-//! bob's velocity relative to the hinge over l in inertial axes. In these variables Newton's law
-//! has few products and no quotient. With R the quarter turn (a, b) -> (-b, a) of the horizontal
-//! part, e_x outwards, e_y along +theta, e_z up:
+//! Rest is xi = 0; only the slosh mass straight up is singular. The motion is expanded in p and in v, the slosh mass's
+//! velocity relative to the hinge over l in inertial axes. In these variables Newton's law has few products and no
+//! quotient. With R the quarter turn (a, b) -> (-b, a) of the horizontal part, e_x outwards, e_y along +theta, e_z up:
 //!
 //! ```text
 //! p' = v - w R p
@@ -21,7 +20,7 @@
 //! L = L_0 - (r/l) w' p_y,   L_0 = |v|^2 - (g/l) p_z + (r/l) w^2 p_x
 //! ```
 //!
-//! The rod pulls at the hinge, and the drag c l p' acts on the tank at the bob, so
+//! The rod pulls at the hinge, and the drag c l p' acts on the tank at the slosh mass, so
 //!
 //! ```text
 //! J = m r^2 p_y^2     (beyond the hub's I0)
@@ -178,7 +177,7 @@ impl SloshMode for Spherical {
         })
     }
 
-    /// Computes the coordinates from sin(angle) = p_x, p_y, with the bob below its hinge.
+    /// Computes the coordinates from sin(angle) = p_x, p_y, with the slosh mass below its hinge.
     fn coordinates(&self, at: &Angles) -> [f64; 4] {
         let [p_x, p_y] = at.angle.map(libm::sin);
         let [v_x, v_y] = [0, 1].map(|i| libm::cos(at.angle[i]) * at.rate[i]);
@@ -316,8 +315,8 @@ impl SloshMode for Spherical {
         m * l * height + m * hub.tilt.height(n, place)
     }
 
-    /// Computes the coordinates from the direction p: xi = p/k and k xi' = p' + v_z xi. The factor k = 1 -
-    /// p_z comes from |p| = 1 if the bob is above the horizontal.
+    /// Computes the coordinates from the direction p: xi = p/k and k xi' = p' + v_z xi. The factor k = 1 - p_z comes from
+    /// |p| = 1 if the slosh mass is above the horizontal.
     #[inline(always)]
     fn coordinates_at(&self, n: usize, t: f64, omega: f64, _: bool) -> [f64; 4] {
         let [[x, y], [v_x, v_y]] = plane::values([&self.dir, &self.v], n, t);
@@ -343,7 +342,7 @@ impl SloshMode for Spherical {
         [0, 1].map(|i| tension * (m * l) * p[i] + c * l * p_d[i])
     }
 
-    /// Returns the torque, of the tension at the hinge and of the drag at the bob.
+    /// Returns the torque, of the tension at the hinge and of the drag at the slosh mass.
     fn torque<T: Number>(&self, hub: &HubMotion) -> T {
         let (Pendulum { l, r, .. }, [_, c]) = (self.p, self.p.restoring_and_drag::<T>());
         let [[x, y], [x_d, y_d]] = [&self.dir, &self.dir_d].map(numbers::<T>);
@@ -380,7 +379,7 @@ mod tests {
     use super::*;
     use taylor::series::ORDER;
 
-    /// Returns xi'' by Lagrange's equations of the bob in xi, with v = xi' + w R xi and rho = xi.xi':
+    /// Returns xi'' by Lagrange's equations of the slosh mass in xi, with v = xi' + w R xi and rho = xi.xi':
     ///
     /// ```text
     /// xi'' = B + A w'

@@ -1,7 +1,8 @@
-//! A mode to third order in its amplitude: a mass on the paraboloid z = |q|^2/(2 l) with a quartic spring, whose coefficients s
-//! and kappa give the liquid's shifts of frequency in planar and in circular motion (`formulas::third_order`). q = (x, y) is the
-//! position of the bob relative to the hinge, m, in the hub's frame. With N = l^2/s + |q|^2, h = kappa/(2 l^2) and the
-//! hub's Coriolis and centrifugal accelerations a = (2 w y' + w^2 (r + x), -2 w x' + w^2 y):
+//! A mode to third order in its amplitude: a mass on the paraboloid z = |q|^2/(2 l) with a quartic spring, whose
+//! coefficients s and kappa give the liquid's shifts of frequency in planar and in circular motion
+//! (`formulas::third_order`). q = (x, y) is the position of the slosh mass relative to the hinge, m, in the hub's frame.
+//! With N = l^2/s + |q|^2, h = kappa/(2 l^2) and the hub's Coriolis and centrifugal accelerations a = (2 w y' + w^2 (r +
+//! x), -2 w x' + w^2 y):
 //!
 //! ```text
 //! mu   = [ q.a + |q'|^2 + g (l/s) (1 + h |q|^2) ] / N
@@ -221,7 +222,7 @@ impl SloshMode for ThirdOrder {
         [height * (m / l) + tilted[0] * m, height_d * (m / l) + tilted[1] * m]
     }
 
-    /// Returns minus the bob's mass times its acceleration, -m (q'' - a - w' (y, -(r + x))).
+    /// Returns minus the slosh mass times its acceleration, -m (q'' - a - w' (y, -(r + x))).
     fn force<T: Number>(&self, hub: &HubMotion) -> [T; 2] {
         let (wd, y, arm) =
             (number::<T>(&hub.omega_dot), number::<T>(&self.q[1]), number::<T>(&self.arm));

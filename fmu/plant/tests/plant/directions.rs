@@ -70,10 +70,10 @@ fn damping_of_modes_in_any_direction_does_not_change_momentum() {
     }
 }
 
-/// Newton's equations of hub and bobs with the guides' forces as unknowns, by Runge-Kutta: x = theta, w, then al and
-/// al' of each mode. A bob at P = (r + l s n_x, l s n_t, -l c) in the hub's frame has a = P'' + 2 w x P' + w' x P + w x
-/// (w x P). Gravity, drag along its path and the guide's force N across the path act on it; -N and minus the drag act
-/// on the hub.
+/// Newton's equations of hub and slosh masses with the guides' forces as unknowns, by Runge-Kutta: x = theta, w, then al
+/// and al' of each mode. A slosh mass at P = (r + l s n_x, l s n_t, -l c) in the hub's frame has a = P'' + 2 w x P' + w' x
+/// P + w x (w x P). Gravity, drag along its path and the guide's force N across the path act on it; -N and minus the drag
+/// act on the hub.
 struct Newton<'a> {
     p: &'a Parameters,
     drag: Vec<f64>,
@@ -81,7 +81,7 @@ struct Newton<'a> {
 }
 
 impl Newton<'_> {
-    /// Returns the residual of the equations of hub and bobs for w' and al'' in `unknown`.
+    /// Returns the residual of the equations of hub and slosh masses for w' and al'' in `unknown`.
     fn residual(&self, x: &[f64], unknown: &[f64]) -> Vec<f64> {
         let (p, table) = (self.p, &self.p.slosh.table);
         let (r, w, w_d) = (p.tank.r, x[1], unknown[0]);

@@ -1,5 +1,5 @@
-//! Forces, momentum and energy in the outputs follow from the positions of the masses: the
-//! bobs' positions come from the states, velocities and accelerations from differences of the positions.
+//! Forces, momentum and energy in the outputs follow from the positions of the masses: the slosh masses' positions come
+//! from the states, velocities and accelerations from differences of the positions.
 
 use super::common::bench;
 use plant::{Calculated, FrictionModel, Inputs, Outputs, Parameters, Plant, Ramp, SloshModel, x};
@@ -23,15 +23,15 @@ fn moving(slosh: SloshModel) -> Parameters {
     p
 }
 
-/// Places of the masses at an instant: hub's angle, and each bob in the hub's frame with its height,
-/// m, and what stands for its height in the potential energy.
+/// Places of the masses at an instant: hub's angle, and each slosh mass in the hub's frame with its height, m, and what
+/// stands for its height in the potential energy.
 struct Place {
     theta: f64,
-    /// For each bob: x from the axis, y, height that moves with it, height that gravity acts on.
+    /// For each slosh mass: x from the axis, y, height that moves with it, height that gravity acts on.
     bobs: Vec<[f64; 4]>,
 }
 
-/// Returns the displacement of a bob from the hinge, its height, and the height that gravity acts on.
+/// Returns the displacement of a slosh mass from the hinge, its height, and the height that gravity acts on.
 fn displaced(p: &Parameters, l: f64, first: bool, q: [f64; 2]) -> [f64; 4] {
     let [a, b] = q;
     match p.slosh.model {

@@ -130,8 +130,8 @@ fn the_stated_frequency_equals_that_of_a_free_decay() {
     }
 }
 
-/// A torque immediately accelerates the hub and the mass that does not slosh: I + r^2 (m_liq - sum of m f), in every
-/// model. A planar bob, which cannot move radially, adds its distance from the axis.
+/// A torque immediately accelerates the hub and the mass that does not slosh: I + r^2 (m_liq - sum of m f), in every model.
+/// A planar slosh mass, which cannot move radially, adds its distance from the axis.
 #[test]
 fn rigid_liquid_follows_the_hub() {
     for model in SLOSHING {

@@ -9,10 +9,9 @@ use ode_solvers::dop853::Dop853;
 use ode_solvers::{SVector, System};
 use plant::{FrictionModel, Inputs, Parameters, Plant, Ramp, SloshModel};
 
-/// Hub and one spherical pendulum by its unit vector p: theta, w, p, p'. Newton's law
-/// of the bob in the hub's frame with the rod's pull eliminated by p.p'' = -|p'|^2. The
-/// plant keeps the bob's inertial velocity in place of p', and the
-/// rod's pull acts on the hub, where this takes w' from the whole angular momentum.
+/// Hub and one spherical pendulum by its unit vector p: theta, w, p, p'. Newton's law of the slosh mass in the hub's frame
+/// with the rod's pull eliminated by p.p'' = -|p'|^2. The plant keeps the slosh mass's inertial velocity in place of p',
+/// and the rod's pull acts on the hub, where this takes w' from the whole angular momentum.
 struct UnitVector {
     i0: f64,
     m: f64,

@@ -185,7 +185,7 @@ fn damaged_saved_states_with_a_valid_checksum_are_refused_with_a_reason() {
         message.strip_prefix("the saved state is damaged: ").unwrap_or(&message).to_string()
     };
     let number = |x: f64| x.to_le_bytes();
-    assert_eq!(why(FLAGS + 1, &[2]), "no such interface");
+    assert_eq!(why(FLAGS + 1, &[2]), "it names an interface that does not exist");
     for state in [InstanceState::Event, InstanceState::Continuous, InstanceState::Fatal] {
         assert_eq!(why(FLAGS - 1, &[state as u8]), "no such instance state");
     }
@@ -193,7 +193,7 @@ fn damaged_saved_states_with_a_valid_checksum_are_refused_with_a_reason() {
     assert_eq!(why(TIMES, &number(f64::NAN)), "start time");
     assert_eq!(why(TIMES + 8, &number(f64::INFINITY)), "stop time");
     assert_eq!(why(TIMES + 16, &number(f64::NAN)), "tolerance");
-    assert_eq!(why(TIMES + 16, &number(0.2)), "tolerance");
+    assert_eq!(why(TIMES + 16, &number(0.2)), "its tolerance is out of range");
     assert_eq!(why(TIMES + 24, &number(f64::NAN)), "time");
     let parameter = |name: &str| PARAMETERS + 8 * TABLE.scalars[reference(name) as usize].slot;
     assert_eq!(why(parameter("has_lid"), &[2]), "has_lid");

@@ -45,9 +45,8 @@ enum Rule {
     Acceleration { radius: f64, angle: f64 },
 }
 
-/// Meaning of the coordinates `slosh.q_radial`, `slosh.q_tangential` of a mode of HubSlosh: slosh angle, rad;
-/// tangent of half the angle from the vertical, times the direction (`Stereographic`); or displacement of the
-/// pendulum's bob, m.
+/// Meaning of the coordinates `slosh.q_radial`, `slosh.q_tangential` of a mode of HubSlosh: slosh angle, rad; tangent of
+/// half the angle from the vertical, times the direction (`Stereographic`); or displacement of the slosh mass, m.
 #[derive(Clone, Copy, Debug)]
 pub enum Coordinate {
     Angle,

@@ -59,8 +59,8 @@ fn a_thrust_cut_off_is_reported_with_the_numbers_of_a_hand_calculation() {
     assert_eq!(said("Spacecraft", &held, ("force[3]", &times, &[60.0, 0.0, 0.0]), water), [""; 0]);
 }
 
-/// A tank of 0.9 m by its diameter at 0.1 m/s² along its axis, Bo = 280.7, then 0.002: Bo = 5.61. Its bob starts with 0.2 1/s:
-/// V = 0.37657 m 0.2 1/s, We = 1000 V² 0.45/0.07213 = 35.39.
+/// A tank of 0.9 m by its diameter at 0.1 m/s² along its axis, Bo = 280.7, then 0.002: Bo = 5.61. Its slosh mass starts
+/// with 0.2 1/s: V = 0.37657 m 0.2 1/s, We = 1000 V² 0.45/0.07213 = 35.39.
 #[test]
 fn a_thrust_cut_off_of_slosh_tank_is_recognised_from_its_acceleration_input() {
     let settings = [("tank.diameter", "0.9"), ("a[1]", "0"), ("tank.p_dot_0[1,1]", "0.2")];

@@ -10,8 +10,8 @@ use super::colors;
 use super::figure::{Figure, Panel, line};
 use super::page::unit;
 
-/// Plots one run: attitude and rates, the path of each bob, and all other signals. `tail` is the end of the
-/// run with more detail.
+/// Plots one run: attitude and rates, the path of each slosh mass, and all other signals. `tail` is the end of the run with
+/// more detail.
 pub(super) fn run(fmu: &Fmu, name: &str, history: &History, tail: &History) -> Vec<Figure> {
     let unit = |signal: &str| unit(fmu, signal).map_or(String::new(), |unit| format!(" / {unit}"));
     // Elements such as omega[1], omega[2], omega[3] share a panel.
