@@ -131,6 +131,7 @@ pub enum Dimension {
 }
 
 impl Dimension {
+    /// Returns the largest number of elements that the array can have.
     pub const fn most(self) -> usize {
         match self {
             Dimension::Fixed(length) | Dimension::Sized(_, length) | Dimension::Used(_, length) => {
