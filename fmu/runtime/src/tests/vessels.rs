@@ -1,7 +1,7 @@
 //! A test model with everything that the runtime supports: two leaking vessels on a platform that can rise.
 //!
-//! A level x rises by the inflow q and falls by the leak, x' = q - k x. While q changes with the slope s, x(h) = x e + q (1
-//! - e) / k + s (h - (1 - e) / k) / k with e = exp(-k h). If the platform is higher than [`OPENS`], a valve opens and
+//! A level x rises by the inflow q and falls by the leak, x' = q - k x. While q changes with the slope s,
+//! x(h) = x e + q (1 - e) / k + s (h - (1 - e) / k) / k with e = exp(-k h). If the platform is higher than [`OPENS`], a valve opens and
 //! spills half of the first vessel.
 
 use crate::clock::Instant;
