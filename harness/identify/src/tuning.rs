@@ -1,4 +1,4 @@
-//! Tuning constants of all fits, by the file that uses them, with tests that depend on them.
+//! Tuning constants besides those of the engine, by the file that uses them, with tests that depend on them.
 //!
 //! A length without a unit is a ratio. "Deviations" are standard deviations of noise, and sums of squares are in its variances.
 //! Coefficients of formulas, orders of tables and names stay with their code.
@@ -158,55 +158,15 @@ pub const SAME_INSTANT: f64 = 1e-9;
 /// search may try values that take millions: it cannot judge them, and tries others.
 pub const MOST_INTERNAL_STEPS: (f64, f64) = (200.0, 2e4);
 
-// Directions of derivatives: `fit/decomposition.rs`.
-// Tests: `values_that_are_not_finite_are_named_and_no_iteration_hangs`, `parameters_that_no_output_tells_apart_are_named_as_a_set_in_words_and_json`.
-/// Limit of nalgebra's iterations; n columns take about 2 n.
-pub const EIGEN_ITERATIONS: usize = 10_000;
-/// Eigenvalue over the largest one up to which a direction counts as flat: the recordings do not show it.
-pub const FLAT_EIGENVALUE: f64 = 1e-12;
-/// A direction is resolved if its eigenvalue is this many times larger than what errors of the derivatives make of it by chance.
-pub const RESOLVED_EIGENVALUE: f64 = 4.0;
-
-// Comparison of models: `fit/evidence.rs`.
+// Comparison of models: `methods/output_error.rs`.
 // Tests: `a_difference_of_ten_in_the_criterion_is_a_probability_of_99_percent`, `a_downward_sweep_shows_that_slosh_rotates`.
 /// Difference below which it tells nothing (not worth more than a bare mention, ibid.).
 pub const BIC_ALIKE: f64 = 2.0;
 
-// Minimum: `fit/minimum.rs`.
-// Tests: `a_bent_valley_ends_at_its_minimum_or_at_the_bound_before_it`.
-/// Distance to the minimum up to which a search has converged, standard deviations: the stated deviations contain it.
-pub const CONVERGED: f64 = 0.5;
-
-// Derivatives of any FMU: `fit/problem.rs`.
-// Tests: `no_interval_is_given_where_the_errors_of_the_fmus_own_solver_decide`, `intervals_contain_the_true_values_of_a_hub_in_closed_form`.
-/// Change of the outputs by a difference to either side, in units of the noise's norm of one degree of freedom.
-pub const MOVE: f64 = 0.5;
-/// Bounds of the differences' steps, in units of an unknown's reach.
-pub const STEPS: (f64, f64) = (1e-7, 2e-2);
-/// The first step, in the same units.
-pub const FIRST_STEP: f64 = 1e-3;
-/// Second over first difference from which on the solver's noise may decide a derivative: noise alone makes √3 of it.
-pub const BEND: f64 = 0.3;
-/// Factor between the steps that are tried where noise may decide, and the largest one in units of an unknown's reach.
-pub const WIDER: (f64, f64) = (8.0, 0.2);
-/// Second difference of an output that counts as a jump: in standard deviations of its noise, and in medians of all.
-pub const OUTPUT_JUMP: (f64, f64) = (8.0, 20.0);
-
 // Search of any FMU: `fit/search.rs`.
 // Tests: `intervals_contain_the_true_values_of_a_hub_in_closed_form`, `parameters_without_information_are_not_determined_and_bounds_are_named`.
-/// A search has ended where the distance to the minimum, in standard deviations, is below this.
-pub const DECREMENT: f64 = 0.02;
 /// Windows of a search from afar, as parts of the recordings.
 pub const WINDOWS: [f64; 5] = [0.1, 0.2, 0.4, 0.7, 1.0];
-/// Least noise of a window, in parts of an output's spread: what the model can't follow yet.
-pub const WINDOW_NOISE: f64 = 0.03;
-/// Residual over the noise from row to row beyond which a fit counts as bad, and another start is tried.
-pub const BAD_START: f64 = 1.5;
-
-// Derivatives and search of the bench: `bench/problem.rs` and its folder.
-// Tests: `starts_forty_percent_off_end_at_the_minimum_of_the_datas_own`, `the_minimum_is_found_along_the_bent_valley_of_the_gyros_scale`.
-/// Sets of sensitivities that Gauss and Newton's steps have at most.
-pub const ROUNDS: usize = 6;
 
 // Starts from data: `bench/start.rs`.
 // Tests: `poles_and_zeros_of_the_exact_response_give_the_bench_back`.
@@ -216,43 +176,6 @@ pub const DAMPINGS: [f64; 5] = [0.0015, 0.003, 0.006, 0.015, 0.04];
 pub const FREQUENCY_FINENESS: f64 = 1e-3;
 /// Longest delay that the balance of power may show, s.
 pub const LATEST_DELAY: f64 = 0.05;
-
-// Goodness: `bench/goodness.rs`.
-// Tests: `no_model_fits_a_torque_that_is_clipped`.
-/// Fit of a rate below which a minimum is taken for a wrong one at first, %.
-pub const POOR_FIT: f64 = 90.0;
-
-// Profile of any FMU: `uncertainty/profile.rs`.
-// Tests: `parameters_without_information_are_not_determined_and_bounds_are_named`, `coverage_of_a_hundred_twins_of_each_kind`.
-/// Part by which √Δ may differ from that of a parabola.
-pub const PARABOLIC: f64 = 0.1;
-/// Largest distance to search for an end, in standard deviations.
-pub const FARTHEST: f64 = 20.0;
-/// Steps of the others to their minimum at one point.
-pub const INNER_STEPS: usize = 3;
-/// Points at which an end is searched for.
-pub const END_POINTS: usize = 10;
-
-// Errors of the solver: `uncertainty/solver_error.rs`.
-// Tests: `no_interval_is_given_where_the_errors_of_the_fmus_own_solver_decide`, `the_slope_of_the_wheels_momentum_is_no_error_of_the_solver`.
-/// Part of its standard deviation from which on the solver's errors decide an estimate.
-pub const SOLVER_DECIDES: f64 = 0.3;
-/// Part of it below which they are not added: they would make it 0.1 % larger.
-pub const SOLVER_ADDED: f64 = 0.05;
-/// Change of an output, in parts of its peak, that rounding may make.
-pub const OUTPUT_ROUNDING: f64 = 1e-12;
-
-// Inseparable unknowns: `uncertainty/knowledge.rs`.
-// Tests: `parameters_that_no_output_tells_apart_are_named_as_a_set_in_words_and_json`.
-/// Part of a unit direction from which on an unknown belongs to it.
-pub const DIRECTION_PART: f64 = 1e-2;
-
-// Sources of uncertainty: `bench/sources.rs`.
-// Tests: `a_push_and_a_free_decay_do_not_determine_the_preferential_direction`, `a_hub_turns_one_way_if_nearly_all_of_its_path_does`, `a_hub_that_turns_both_ways_is_not_taken_for_one_that_turns_one_way`, `identify_finds_all_parameters_and_the_sum_of_coulomb_and_stribeck_friction`.
-/// Standard deviation of the friction's asymmetry above which the recordings do not show it.
-pub const ONE_WAY: f64 = 0.3;
-/// Part of a hub's path against its main direction above which it turns both ways.
-pub const BOTH_WAYS: f64 = 0.1;
 
 // Design of experiments: `bench/design.rs`.
 // Tests: `d_optimal_power_is_near_the_slosh_frequency_and_reduces_uncertainty`, `a_multisine_has_only_odd_lines_and_the_given_peak`.
@@ -280,15 +203,6 @@ pub const PAGE_STRETCH: f64 = 8.0;
 /// Longest lag of the autocorrelation, rows.
 pub const PAGE_LAGS: usize = 200;
 
-// Words on any FMU: `any_fmu/mod.rs`.
-// Tests: `parameters_without_information_are_not_determined_and_bounds_are_named`, `a_prior_holds_what_it_knows_better_than_the_recordings`.
-/// Correlation from which on two estimates are named as a pair.
-pub const PAIR_CORRELATION: f64 = 0.98;
-/// Part of the prior's standard deviation that is left where the recordings say nothing.
-pub const PRIOR_ALONE: f64 = 0.9;
-/// Turns of noise and fit.
-pub const TURNS: usize = 4;
-
 // Output error: `methods/output_error.rs`.
 // Tests: `starts_forty_percent_off_end_at_the_minimum_of_the_datas_own`, `no_model_fits_a_torque_that_is_clipped`.
 /// Beginnings that are tried where no model fits the whole recording, as fractions of its rows.
@@ -314,10 +228,3 @@ pub const MOVING_SPEED: f64 = 0.05;
 pub const FRICTION_POINTS: usize = 400;
 /// Speeds of the second chart over the Stribeck speed.
 pub const SLOW_CHART: f64 = 4.0;
-
-// Free decay: `methods/free_decay.rs`.
-// Tests: `harness/cli/tests/all/recordings.rs`.
-/// Residual over the signal's noise, beyond which something else than one decaying oscillation is in it.
-pub const DECAY_MISFIT: f64 = 2.0;
-/// Part of the oscillation that another one in the residual has, from which on it is named.
-pub const NAMED_OSCILLATION: f64 = 0.02;
