@@ -654,11 +654,15 @@ fn array_elements_have_the_attributes_of_the_scalar_variables() {
     }
 }
 
-/// Packs Spacecraft for FMI 3.0 with the variables of two tanks of one mode.
+/// Packs Spacecraft for FMI 3.0 with the variables of two tanks of one mode and three modes of appendages.
 fn part_of_spacecraft(starts: &[(&str, &str)]) -> (Opened, tempfile::TempDir) {
     let size = |size: &'static names::Size| Limit {
         parameter: size.parameter,
-        size: if size.parameter == "tanks" { 2 } else { 1 },
+        size: match size.parameter {
+            "tanks" => 2,
+            "appendages" => 3,
+            _ => 1,
+        },
         most: size.most,
         has_indicators: size.has_indicators,
         arrays: size.arrays,
@@ -673,11 +677,14 @@ fn part_of_spacecraft(starts: &[(&str, &str)]) -> (Opened, tempfile::TempDir) {
 }
 
 /// Start values of a reduced FMU, which are also settings of the full one.
-const STARTS: [(&str, f64); 5] = [
+const STARTS: [(&str, f64); 8] = [
     ("tanks", 2.0),
     ("tank[2].position[1]", 0.4),
     ("tank[1].p_0[1,2]", 0.1),
     ("craft.mass", 900.25),
+    ("appendages", 3.0),
+    ("appendage[3].participation[2]", 8.0),
+    ("appendage[3].eta_0", 0.5),
     ("solver.max_steps", 5000.0),
 ];
 
@@ -693,7 +700,7 @@ fn an_fmu_with_fewer_variables_moves_as_the_full_fmu() {
         let setting = |wanted: &Key| STARTS.iter().find(|(name, _)| key(name) == *wanted);
         two[1].set(|key| {
             let (name, x) = setting(key)?;
-            let is_whole = ["tanks", "solver.max_steps"].contains(name);
+            let is_whole = ["tanks", "appendages", "solver.max_steps"].contains(name);
             Some(if is_whole { Value::Integer(*x as i64) } else { Value::Real(*x) })
         });
         let names = inputs(&whole);
@@ -706,9 +713,9 @@ fn an_fmu_with_fewer_variables_moves_as_the_full_fmu() {
                 run.instance.update_discrete_states().unwrap();
                 run.instance.enter_continuous_time_mode().unwrap();
             }
-            // Attitude to dissipation, drained; per tank one mode, liquid and ball.
+            // Attitude to dissipation, drained; per tank one mode, liquid and ball; eta and eta_dot.
             let counts = two.each_mut().map(|run| run.instance.number_of_states().unwrap());
-            assert_eq!(counts, [15 + 1 + 2 * (6 + 1 + 6), 116]);
+            assert_eq!(counts, [15 + 1 + 2 * (6 + 1 + 6) + 2 * 3, 128]);
             let counts = two.each_mut().map(|run| run.instance.number_of_indicators().unwrap());
             assert_eq!(counts, [4, 8]);
         }

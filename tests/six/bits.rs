@@ -66,7 +66,7 @@ fn compare(what: &str, p: &Parameters, input: impl Fn(usize) -> Inputs, count: u
 }
 
 /// Tests craft that are free or on a pivot, round and planar modes, surfaces other than spheres, every
-/// damping law, and draining.
+/// damping law, draining, and appendages.
 #[test]
 fn the_fmu_and_the_crate_move_random_craft_bit_identically() {
     for seed in 0..40 {
@@ -88,6 +88,9 @@ fn the_fmu_and_the_crate_move_random_craft_bit_identically() {
         }
         if seed % 3 == 0 && seed % 5 != 4 {
             p.tank.iter_mut().for_each(|tank| random.follow(tank));
+        }
+        if seed >= 25 {
+            random.flex(&mut p);
         }
         let pieces: Vec<Inputs> = (0..COUNT / 25).map(|_| random.inputs()).collect();
         let input = |k: usize| {

@@ -8,8 +8,9 @@ use std::fs::File;
 use std::sync::LazyLock;
 
 use craft::{
-    Craft, INPUTS, Inputs, MODES, Outputs, POINTS, Parameters, Ramp, STATES, SloshTankOutputs,
-    TANK_INPUTS, TANK_STATES, TANKS, TRIANGLE, Tank, TankInputs, TankOutputs, TankParameters,
+    Appendage, Craft, INPUTS, Inputs, MODES, Outputs, POINTS, Parameters, Ramp, STATES,
+    SloshTankOutputs, TANK_INPUTS, TANK_STATES, TANKS, TRIANGLE, Tank, TankInputs, TankOutputs,
+    TankParameters,
 };
 use host::fmi2::{CO_SIMULATION, CallError, Fmu, FmuState, Instance, MODEL_EXCHANGE, Status};
 use pack::models::model;
@@ -64,6 +65,20 @@ impl Settings {
         let products = [("xy", j.xy), ("xz", j.xz), ("yz", j.yz)];
         for (axes, value) in moments.into_iter().chain(products) {
             self.real(format!("{name}.J{axes}"), value);
+        }
+    }
+
+    fn appendage(&mut self, name: &str, mode: &Appendage) {
+        let of = |what: &str| format!("{name}.{what}");
+        self.reals(elements(&of("position"), 3), &mode.position);
+        self.reals(elements(&of("participation"), 6), &mode.participation);
+        for (what, value) in [
+            ("frequency", mode.frequency),
+            ("zeta", mode.zeta),
+            ("eta_0", mode.eta),
+            ("eta_dot_0", mode.eta_dot),
+        ] {
+            self.real(of(what), value);
         }
     }
 
@@ -364,6 +379,10 @@ impl Spacecraft {
         settings.real("pivot.friction.omega_s", p.pivot.friction.omega_s);
         settings.real("pivot.friction.eps", p.pivot.friction.eps);
         settings.integer("tanks", p.tanks as i32);
+        settings.integer("appendages", p.appendages as i32);
+        for (j, mode) in p.appendage[..p.appendages].iter().enumerate() {
+            settings.appendage(&format!("appendage[{}]", j + 1), mode);
+        }
         settings.integer("solver.max_steps", p.max_steps as i32);
         for (i, tank) in p.tank.iter().enumerate() {
             settings.tank(&format!("tank[{}]", i + 1), tank);

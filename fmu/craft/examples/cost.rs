@@ -8,6 +8,7 @@
 //! | `two` | the same, two tanks of one mode, as in the comparison with Basilisk |
 //! | `four` | the same, four tanks of three modes each |
 //! | `telecom`, `pendulums` | the satellite of example 14 at a fill of 60 %, with and without s and κ |
+//! | `flexible`, `flexible_six` | `two` with one and with six modes of appendages |
 //! | `drain`, `drain_bent` | `one` with three modes while its tank drains, with and without s and κ |
 //!
 //! `valgrind --tool=callgrind --toggle-collect='*Spacecraft*step*' cost bench 1000 1e-6` counts the
@@ -79,7 +80,19 @@ fn spacecraft(kind: &str, steps: usize, tolerance: f64) {
             (tank.diameter, tank.depth) = (0.163, 0.10);
             (thrust, size, w) = (mass * 9.81, 0.05, 13.0);
         }
-        "two" => {
+        "two" | "flexible" | "flexible_six" => {
+            p.appendages = [("flexible", 1), ("flexible_six", 6)]
+                .iter()
+                .find_map(|(name, modes)| (*name == kind).then_some(*modes))
+                .unwrap_or(0);
+            // Two arrays of 40 kg and 4 m: their modes bend across them and turn the craft.
+            for (k, mode) in p.appendage.iter_mut().enumerate() {
+                let side = if k % 2 == 0 { 1.0 } else { -1.0 };
+                let size = [1.0, 0.55, 0.33][k / 2];
+                mode.position = [0.0, 0.8 * side, 0.0];
+                mode.frequency = [0.3, 1.9, 5.2][k / 2];
+                mode.participation = [0.0, 0.0, 5.0 * size, 14.0 * side * size * size, 0.0, 0.0];
+            }
             p.tanks = 2;
             p.tank[1].p_0[0] = [-0.02, 0.05, -0.99];
             (p.tank[0].position, p.tank[1].position) = ([0.6, 0.0, 0.0], [-0.6, 0.0, 0.0]);

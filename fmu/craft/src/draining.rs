@@ -22,6 +22,7 @@ use taylor::vector::{
     transposed_times, unit_quaternion,
 };
 
+use crate::appendage::{Deformed, Structure};
 use crate::contents::{
     Contents, Drains, MountedTank, Outflow, has_diverged, normalise_bobs, vector_from,
 };
@@ -30,7 +31,7 @@ use crate::outputs::{Now, TankNow};
 use crate::parameters::{Mount, Parameters, Tank};
 use crate::pivot::Pivot;
 use crate::rigid::{Factors, Mat6, Rigid};
-use crate::sizes::{MODES, TANKS};
+use crate::sizes::{APPENDAGES, MODES, TANKS};
 use crate::state::{BallState, INPUTS, Inputs, Line, STATES, State, index};
 
 /// Inputs of the craft at an instant, over a number type: force at O, torque less that of the wheels, tau -
@@ -86,6 +87,7 @@ pub struct Draining {
     gravity: Vec3,
     pivot: Pivot,
     tanks: Vec<MountedTank>,
+    appendages: Option<Structure>,
     follows: bool,
 }
 
@@ -107,6 +109,7 @@ struct Instant<T> {
     a: Vec3<T>,
     w_d: Vec3<T>,
     by_pivot: T,
+    deformed: Option<Deformed<T>>,
 }
 
 /// A craft during one step.
@@ -115,9 +118,15 @@ pub struct Run<'a> {
     pub inputs: &'a Inputs,
 }
 
-/// Returns the scales for error control: 1 for attitude and directions, and those of rate, position, velocity
-/// and the bobs' rates.
-fn scales(turn: f64, position: f64, velocity: f64, swing: impl Fn(usize) -> f64) -> [f64; STATES] {
+/// Returns the scales for error control: 1 for attitude and directions, and those of rate, position, velocity,
+/// the bobs' rates, and the appendages' displacements and rates.
+fn scales(
+    turn: f64,
+    position: f64,
+    velocity: f64,
+    swing: impl Fn(usize) -> f64,
+    flexing: [f64; 2],
+) -> [f64; STATES] {
     // Work, energies and liquid follow from the other states.
     let mut scale = [f64::INFINITY; STATES];
     scale[..index::OMEGA].fill(1.0);
@@ -128,6 +137,9 @@ fn scales(turn: f64, position: f64, velocity: f64, swing: impl Fn(usize) -> f64)
         scale[at..at + 3].fill(1.0);
         scale[at + 3..at + 6].fill(swing(at + 3));
     }
+    let [eta, eta_dot] = flexing;
+    scale[index::ETA..index::ETA_DOT].fill(eta);
+    scale[index::ETA_DOT..].fill(eta_dot);
     scale
 }
 
@@ -135,7 +147,9 @@ impl System<STATES> for Run<'_> {
     fn moving(&self) -> impl Iterator<Item = Range<usize>> + Clone {
         let tanks = self.craft.tanks.iter().enumerate();
         let bobs = tanks.map(|(i, mounted)| index::bob(i, 0)..index::bob(i, mounted.modes()));
-        [0..index::BOBS, index::LIQUID..index::BALLS].into_iter().chain(bobs)
+        let modes = self.craft.appendages.as_ref().map_or(0, Structure::len);
+        let flexing = [index::ETA, index::ETA_DOT].map(|at| at..at + modes);
+        [0..index::BOBS, index::LIQUID..index::BALLS].into_iter().chain(bobs).chain(flexing)
     }
 
     fn rates(&self, t: f64, x: &[f64; STATES]) -> [f64; STATES] {
@@ -156,7 +170,14 @@ impl System<STATES> for Run<'_> {
         let size = |at: usize| largest(vector_from(x, at)) + largest(vector_from(rate, at)) * time;
         let turn = RATE_FLOOR + size(index::OMEGA);
         let (position, velocity) = (size(index::POSITION), size(index::VELOCITY));
-        scales(turn, RATE_FLOOR + position, RATE_FLOOR + velocity, |at| turn + size(at))
+        let flexing = self.craft.appendages.as_ref().map_or([f64::INFINITY; 2], |structure| {
+            let (eta, eta_dot) = (&x[index::ETA..], &x[index::ETA_DOT..]);
+            let largest = eta[..APPENDAGES].iter().fold(0.0, |most, eta| f64::max(most, eta.abs()));
+            let speed = structure.speed_scale(eta, eta_dot, &rate[index::ETA_DOT..], time);
+            [largest + speed * time, speed].map(|scale| RATE_FLOOR + scale)
+        });
+        let (position, velocity) = (RATE_FLOOR + position, RATE_FLOOR + velocity);
+        scales(turn, position, velocity, |at| turn + size(at), flexing)
     }
 }
 
@@ -193,6 +214,7 @@ impl Draining {
             mount: p.mount,
             gravity: p.gravity,
             pivot: if p.mount == Mount::Pivot { p.pivot } else { Pivot::default() },
+            appendages: Structure::new(p),
             follows: tanks.iter().any(MountedTank::follows),
             tanks,
         })
@@ -217,7 +239,8 @@ impl Draining {
         })
     }
 
-    /// Refuses masses of liquid outside their tables and bobs beyond the bounds of their surfaces.
+    /// Refuses masses of liquid outside their tables, bobs beyond the bounds of their surfaces, and appendages
+    /// beyond their linear model.
     pub fn check(&self, x: &[f64; STATES]) -> Result<(), StepError> {
         self.outflows(&Default::default()).try_for_each(|flow| flow.check(x[flow.at], 0.0))?;
         self.check_surfaces(x)
@@ -229,11 +252,15 @@ impl Draining {
     }
 
     fn is_beyond(&self, x: &[f64; STATES]) -> bool {
-        self.curved()
-            .any(|(i, mounted)| mounted.is_beyond(&x[index::bob(i, 0)..], x[index::LIQUID + i]))
+        let flexes = |structure: &Structure| structure.is_beyond(&x[index::ETA..index::ETA_DOT]);
+        self.appendages.as_ref().is_some_and(flexes)
+            || self
+                .curved()
+                .any(|(i, mounted)| mounted.is_beyond(&x[index::bob(i, 0)..], x[index::LIQUID + i]))
     }
 
     fn check_surfaces(&self, x: &[f64; STATES]) -> Result<(), StepError> {
+        self.appendages.as_ref().map_or(Ok(()), |structure| structure.check(x))?;
         self.curved().try_for_each(|(i, mounted)| {
             mounted.check_surfaces(&x[index::bob(i, 0)..], x[index::LIQUID + i], i + 1)
         })
@@ -261,6 +288,9 @@ impl Draining {
         add(index::VELOCITY);
         for at in (index::BOBS..index::LIQUID).step_by(6) {
             add(at + 3);
+        }
+        for at in (index::ETA_DOT..STATES).step_by(3) {
+            add(at);
         }
         state.flow = now;
         state.x[index::DRAINED] += before - self.energy(state);
@@ -361,7 +391,12 @@ impl Draining {
             contents.insert(Contents::new(mounted)).evaluate(bobs, motion, flow);
         }
         let all = || contents.iter().flatten();
-        let rigid = all().fold(self.craft.lift::<T>(), |sum, tank| sum.combined_with(&tank.rigid));
+        let mut rigid =
+            all().fold(self.craft.lift::<T>(), |sum, tank| sum.combined_with(&tank.rigid));
+        let appendages = self.appendages.as_ref().map(|it| (it, it.deformed_at(x)));
+        if let Some((_, deformed)) = &appendages {
+            rigid = rigid.combined_with(&deformed.body);
+        }
         let [centripetal, gyroscopic] = rigid.inertial_wrench(zero, w, zero);
         let mut force = sub(acting.force, centripetal);
         let mut torque = sub(acting.torque, add(gyroscopic, cross(w, acting.h_wheels)));
@@ -374,14 +409,20 @@ impl Draining {
             (force, torque) = (add(force, f), add(torque, tau));
             tank.add_rods(&mut matrix);
         }
+        if let Some((structure, deformed)) = &appendages {
+            let [f, tau] = structure.loads(deformed, w);
+            (force, torque) = (add(force, f), add(torque, tau));
+            structure.reduce(&mut matrix);
+        }
         let [a, w_d] = self.solve(&self.equations(matrix), [force, torque], &axes);
         let velocity = transposed_times(&axes, vector_from(x, index::VELOCITY));
-        Instant { q, axes, velocity, w, a, w_d, by_pivot }
+        let deformed = appendages.map(|(_, deformed)| deformed);
+        Instant { q, axes, velocity, w, a, w_d, by_pivot, deformed }
     }
 
     pub fn rates<T: Number>(&self, x: &[T; STATES], acting: &Acting<T>) -> [T; STATES] {
         let mut contents = [const { None }; TANKS];
-        let Instant { q, axes, velocity, w, a, w_d, by_pivot } =
+        let Instant { q, axes, velocity, w, a, w_d, by_pivot, deformed } =
             self.solve_instant(x, acting, &mut contents);
         let all = || contents.iter().flatten();
         let c = T::constant;
@@ -403,6 +444,12 @@ impl Draining {
         if self.pivot.acts() {
             dissipation = dissipation + by_pivot;
         }
+        if let (Some(structure), Some(deformed)) = (&self.appendages, &deformed) {
+            let [eta_d, eta_dd] = structure.rates(deformed, w, [a, w_d]);
+            put(index::ETA, &eta_d);
+            put(index::ETA_DOT, &eta_dd);
+            dissipation = dissipation + structure.dissipation(deformed);
+        }
         put(index::DISSIPATED, &[dissipation]);
         let on_pivot = self.mount == Mount::Pivot;
         let mut drained = c(0.0);
@@ -421,7 +468,7 @@ impl Draining {
     /// flows.
     pub fn evaluate<T: Number>(&self, x: &[T; STATES], acting: &Acting<T>) -> Now<T> {
         let mut contents = [const { None }; TANKS];
-        let Instant { axes, velocity, w, a, w_d, .. } =
+        let Instant { axes, velocity, w, a, w_d, deformed, .. } =
             self.solve_instant(x, acting, &mut contents);
         let mut tanks = [const { None }; TANKS];
         let all = contents.iter().flatten().zip(&self.tanks);
@@ -446,6 +493,7 @@ impl Draining {
             pivot: self.pivot,
             craft: self.craft,
             tanks,
+            deformed,
         }
     }
 }
@@ -560,8 +608,8 @@ mod tests {
                 assert!(*evaluations <= most, "{seed} {tolerance}: {evaluations} {most}");
                 // Scales are 1 rad, 1 rad/s, 600 m and 40 m/s. Errors and rounding grow while the liquid swings for 30
                 // s.
-                let allowed =
-                    scales(1.0, 600.0, 40.0, |_| 1.0).map(|size| size * (30.0 * tolerance + 1e-10));
+                let allowed = scales(1.0, 600.0, 40.0, |_| 1.0, [1.0; 2])
+                    .map(|size| size * (30.0 * tolerance + 1e-10));
                 for i in 0..STATES {
                     let off = (x[i] - exact[i]).abs();
                     assert!(off <= allowed[i], "{seed} {tolerance}: x[{i}] off by {off:e}");

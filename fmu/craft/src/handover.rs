@@ -7,6 +7,7 @@
 use taylor::space::Vector;
 use taylor::vector::{Vec3, add, cross, dot, scale, sub, times};
 
+use crate::appendage::Deformed;
 use crate::bob::BobNow;
 use crate::lump::{Directions, Due, Lump};
 use crate::rigid::{Factors, Rigid};
@@ -46,6 +47,11 @@ pub(crate) trait Carrier {
 
     /// Returns the carrier and all rigid liquid as one rigid body.
     fn rigid(&self) -> Rigid;
+
+    /// Returns the deformed appendages of the carrier, after [`Carrier::evaluate_at`].
+    fn deformed(&self) -> Option<Deformed<f64>> {
+        None
+    }
 
     /// Returns the acceleration a, the angular velocity w and the angular acceleration w' of the carrier.
     fn motion(&self) -> [&Vector; 3];
@@ -104,10 +110,15 @@ pub(crate) trait Carrier {
     /// Returns the kinetic energy and that of the centring springs in a frame in which O moves with `v`, body
     /// axes, after [`Carrier::evaluate_at`]. In this frame nothing cancels, however fast the carrier is.
     fn energy_with(&self, v: Vec3) -> f64 {
-        let (w, rigid) = (self.motion()[1][0], self.rigid());
+        let (w, mut rigid, mut energy) = (self.motion()[1][0], self.rigid(), 0.0);
+        if let Some(deformed) = self.deformed() {
+            rigid = rigid.combined_with(&deformed.body);
+            let [momentum, moment] = deformed.momentum;
+            energy = dot(v, momentum) + dot(w, moment) + deformed.energy;
+        }
         let spin = dot(w, times(&rigid.inertia, w));
         let along = dot(v, cross(w, rigid.moment));
-        let mut energy = (rigid.mass * dot(v, v) + spin) / 2.0 + along;
+        energy += (rigid.mass * dot(v, v) + spin) / 2.0 + along;
         for point in self.points() {
             let speed = add(v, add(cross(w, point.rho), point.rate));
             energy += point.m * dot(speed, speed) / 2.0 + point.centring;
@@ -119,6 +130,9 @@ pub(crate) trait Carrier {
     fn drift_of_center(&self) -> (f64, Vec3) {
         let (w, rigid) = (self.motion()[1][0], self.rigid());
         let mut momentum = cross(w, rigid.moment);
+        if let Some(deformed) = self.deformed() {
+            momentum = add(momentum, add(cross(w, deformed.body.moment), deformed.momentum[0]));
+        }
         let mut mass = rigid.mass;
         for point in self.points() {
             let speed = add(cross(w, point.rho), point.rate);

@@ -1,6 +1,6 @@
 //! The physics of a spacecraft in six degrees of freedom with sloshing tanks. The crate
-//! has a rigid body with up to four tanks of up to three pendulums each, and one such tank alone for
-//! a spacecraft that a host simulates. No FMI, no I/O, no unsafe code, no allocation while stepping.
+//! has a rigid body with up to four tanks of up to three pendulums each and up to six modes of flexible appendages, and one such
+//! tank alone for a spacecraft that a host simulates. No FMI, no I/O, no unsafe code, no allocation while stepping.
 //!
 //! Frames and signs: the inertial frame falls freely with the craft. The body frame is fixed
 //! in the dry craft, its origin is O. The attitude q (scalar first) maps body to inertial
@@ -22,7 +22,7 @@
 //! ```
 //!
 //! `spacecraft.rs` and `slosh_tank.rs` are the two components as a host sees them. `motion.rs` has the craft's
-//! equations, `bob.rs` and `constrained.rs` those of one slosh mode, and `rigid.rs` the mass matrix. `lump.rs` describes detached liquid,
+//! equations, `bob.rs` and `constrained.rs` those of one slosh mode, and `rigid.rs` the mass matrix. `appendage.rs` has flexible appendages, `lump.rs` describes detached liquid,
 //! `handover.rs` its impulses on the carrier. `outputs.rs` has energy and momentum. `contents.rs` describes a tank that
 //! drains by a table (`table.rs`), `draining.rs` a craft with such tanks. The crate `taylor` integrates.
 
@@ -31,6 +31,7 @@
 
 extern crate alloc;
 
+mod appendage;
 mod bob;
 mod constrained;
 mod contents;
@@ -55,9 +56,9 @@ mod table;
 pub use formulas::limits::LimitedBy;
 pub use formulas::regime::Regime;
 pub use outputs::{Outputs, TankOutputs};
-pub use parameters::{Ball, Craft, DampingLaw, Inertia, Init, Mount, Parameters, Tank};
+pub use parameters::{Appendage, Ball, Craft, DampingLaw, Inertia, Init, Mount, Parameters, Tank};
 pub use pivot::{Pivot, PivotFriction};
-pub use sizes::{MODES, POINTS, TANKS};
+pub use sizes::{APPENDAGES, MODES, POINTS, TANKS};
 pub use slosh_tank::{
     Coupling, SloshTank, SloshTankOutputs, TANK_INPUTS, TANK_STATES, TRIANGLE, TankInputs,
     TankParameters, TankState,

@@ -32,6 +32,7 @@
 //!
 //! Source: Newton-Euler about O with the bobs' tensions eliminated.
 
+use alloc::boxed::Box;
 use alloc::vec::Vec;
 use alloc::{format, vec};
 use core::ops::ControlFlow;
@@ -39,6 +40,7 @@ use core::ops::ControlFlow;
 use taylor::at_each_order;
 use taylor::error::StepError;
 use taylor::integrator::{self, Convergence, MAX_MAGNITUDE, Motion, RATE_FLOOR, Steps};
+use taylor::number::Number;
 use taylor::series::{self, ORDER, Series, ZERO};
 use taylor::space::{
     self, Attitude, Pair, Vector, ZERO_ATTITUDE, ZERO_PAIR, ZERO_VECTOR, cross, cross_pair,
@@ -49,6 +51,7 @@ use taylor::vector::{
     unit_quaternion, unit_quaternion_slope,
 };
 
+use crate::appendage::{Deformed, Flexing, Structure};
 use crate::bob::{Bob, BobNow};
 use crate::constrained::ConstrainedBob;
 use crate::handover::Carrier;
@@ -115,6 +118,7 @@ pub struct CraftMotion {
     constrained: Vec<ConstrainedBob>,
     parked: Vec<Bob>,
     pub lumps: Vec<Lump>,
+    flexing: Option<Box<Flexing>>,
     any_apart: bool,
     has_events: bool,
     /// Index of the constrained bob that reaches the bound of its surface at the end of the expansion.
@@ -142,6 +146,7 @@ pub struct CraftMotion {
     pub dissipation: Series,
     inv_allowed: [f64; 4],
     lumps_allowed: f64,
+    flexing_allowed: f64,
     longest: f64,
 }
 
@@ -202,7 +207,8 @@ impl CraftMotion {
             longest: modes().fold(0.0, |longest, (tank, _, n)| tank.length[n].max(longest)),
             parked: Vec::with_capacity(bobs.len()),
             bobs,
-            any_apart: !constrained.is_empty(),
+            flexing: Structure::new(p).map(|structure| Box::new(Flexing::new(structure))),
+            any_apart: false,
             has_events: false,
             beyond: None,
             constrained,
@@ -214,6 +220,7 @@ impl CraftMotion {
             },
             due: None,
             lumps_allowed: 0.0,
+            flexing_allowed: 0.0,
         };
         motion.has_events = !motion.lumps.is_empty() || !motion.constrained.is_empty();
         motion.freeze();
@@ -271,6 +278,9 @@ impl CraftMotion {
         }
         if self.any_apart {
             self.add_inertia_apart();
+            if self.flexing.is_some() {
+                return self.factorise_deformed();
+            }
         }
         match self.mount {
             Mount::Free => self.factors.set(&self.matrix),
@@ -335,6 +345,9 @@ impl CraftMotion {
         for lump in self.lumps.iter().filter(|lump| lump.is_loose()) {
             lump.after_impulse(&mut x[index::ball(lump.tank)..], dv, dw);
         }
+        if let Some(flexing) = &self.flexing {
+            flexing.after_impulse(x, dv, dw);
+        }
     }
 
     pub fn evaluate(&mut self, inputs: &Inputs) {
@@ -379,6 +392,9 @@ impl CraftMotion {
             let at = index::ball(lump.tank);
             lump.seed_direction(dx[at..at + 6].try_into().unwrap(), self.w[0], dw);
             lump.seed_shape(&directions(x, lump.tank), &directions(dx, lump.tank));
+        }
+        if let Some(flexing) = &mut self.flexing {
+            flexing.seed_direction(dx, self.w[0], dw);
         }
         self.expand_rates::<1>();
     }
@@ -496,11 +512,13 @@ impl CraftMotion {
                 self.a[N]
             }
         };
-        for (bob, [by_force, by_torque]) in self.bobs.iter_mut().zip(&self.along) {
+        // No zip, which some compilers do not inline here: 1 % of a step.
+        for (i, bob) in self.bobs.iter_mut().enumerate() {
+            let [by_force, by_torque] = self.along[i];
             let [e, _] = bob.along_axis();
             let turning = vector::dot(e, times(&w2, bob.hinge));
             bob.set_axial::<N>(
-                vector::dot(*by_force, force) + vector::dot(*by_torque, torque) + turning,
+                vector::dot(by_force, force) + vector::dot(by_torque, torque) + turning,
             );
         }
         if self.any_apart {
@@ -556,6 +574,11 @@ impl CraftMotion {
         }
         for lump in self.lumps.iter().filter(|lump| lump.is_loose()) {
             put(index::ball(lump.tank), &lump.rates(N, &self.w, &self.w_d));
+        }
+        if let Some(flexing) = &self.flexing {
+            let [eta_d, eta_dd] = flexing.rates(N);
+            put(index::ETA, &eta_d);
+            put(index::ETA_DOT, &eta_dd);
         }
         rate
     }
@@ -688,8 +711,8 @@ impl Motion for CraftMotion {
     }
 }
 
-// Constrained bobs and detached liquid (lump.rs), apart from the equations of a craft without them, which then take fewer
-// instructions.
+// Constrained bobs, detached liquid (lump.rs) and appendages (appendage.rs), apart from the equations of a craft without them,
+// which then take fewer instructions.
 impl CraftMotion {
     #[inline(never)]
     fn add_inertia_apart(&mut self) {
@@ -701,11 +724,24 @@ impl CraftMotion {
         for bob in &self.constrained {
             bob.add_inertia(&mut self.matrix);
         }
+        if let Some(flexing) = &self.flexing {
+            flexing.add_inertia(&mut self.matrix);
+        }
+    }
+
+    /// Factorises M with deformed appendages. A host that integrates itself may hand over any deflection.
+    #[inline(never)]
+    fn factorise_deformed(&mut self) {
+        let mut held = self.matrix;
+        if self.mount == Mount::Pivot {
+            hold_upper_rows(&mut held);
+        }
+        self.factors = Factors::definite_or_zero(&held);
     }
 
     #[inline(never)]
     fn start_apart(&mut self) {
-        let CraftMotion { lumps, constrained, state, w, .. } = self;
+        let CraftMotion { lumps, constrained, flexing, state, w, .. } = self;
         for bob in constrained {
             let at = index::bob(bob.tank, bob.mode);
             bob.start(state.x[at..at + 6].try_into().unwrap(), w[0]);
@@ -713,6 +749,9 @@ impl CraftMotion {
         for lump in lumps.iter_mut().filter(|lump| lump.is_loose()) {
             let at = index::ball(lump.tank);
             lump.start(state.x[at..at + 6].try_into().unwrap(), w[0]);
+        }
+        if let Some(flexing) = flexing {
+            flexing.start(&state.x, w[0]);
         }
     }
 
@@ -731,7 +770,8 @@ impl CraftMotion {
     /// Adds coefficient n of force and torque of constrained bobs and lumps on the craft, about O.
     #[inline(never)]
     fn add_reactions_apart(&mut self, n: usize, [mut force, mut torque]: [Vec3; 2]) -> [Vec3; 2] {
-        let w2 = twice_crossed(product_coefficients(n, &self.w));
+        let ww = product_coefficients(n, &self.w);
+        let w2 = twice_crossed(ww);
         for bob in &mut self.constrained {
             let [f, tau] = bob.reaction(n, self.w[n], &w2);
             (force, torque) = (add(force, f), add(torque, tau));
@@ -747,6 +787,10 @@ impl CraftMotion {
                 torque = sub(torque, add(times(slope, self.w_d[0]), turned));
             }
         }
+        if let Some(flexing) = &mut self.flexing {
+            let [f, tau] = flexing.reaction(n, [&self.a, &self.w, &self.w_d], ww);
+            (force, torque) = (add(force, f), add(torque, tau));
+        }
         [force, torque]
     }
 
@@ -761,6 +805,10 @@ impl CraftMotion {
         for lump in self.lumps.iter_mut().filter(|lump| lump.is_loose()) {
             lump.accelerate(n, self.a[n], self.w_d[n]);
             dissipation += lump.dissipation(n);
+        }
+        if let Some(flexing) = &mut self.flexing {
+            flexing.accelerate(n, self.a[n], self.w_d[n]);
+            dissipation += flexing.dissipation(n);
         }
         dissipation
     }
@@ -778,6 +826,8 @@ impl CraftMotion {
         let fastest =
             loose.fold(RATE_FLOOR, |most, lump| most.max(lump.speed_scale(self.w[0], time)));
         self.lumps_allowed = 1.0 / (allowed * fastest);
+        let speed = self.flexing.as_ref().map_or(0.0, |flexing| flexing.speed_scale(time));
+        self.flexing_allowed = 1.0 / (allowed * (RATE_FLOOR + speed));
     }
 
     #[inline(never)]
@@ -786,7 +836,11 @@ impl CraftMotion {
         let lumps = loose.map(|lump| lump.coefficient_norm(n) * self.lumps_allowed);
         let swing = self.inv_allowed[2];
         let bobs = self.constrained.iter().map(|bob| bob.coefficient_norm(n) * swing);
-        lumps.chain(bobs).fold(0.0, |most, norm| if norm > most { norm } else { most })
+        let flexing = self.flexing.iter().map(|it| it.coefficient_norm(n) * self.flexing_allowed);
+        lumps
+            .chain(bobs)
+            .chain(flexing)
+            .fold(0.0, |most, norm| if norm > most { norm } else { most })
     }
 
     /// Sets up rigid liquids and bobs for the states of the liquids (settled or detached). Does not allocate.
@@ -806,7 +860,9 @@ impl CraftMotion {
                 changed = true;
             }
         }
-        self.any_apart = self.lumps.iter().any(Lump::is_loose) || !self.constrained.is_empty();
+        self.any_apart = self.lumps.iter().any(Lump::is_loose)
+            || !self.constrained.is_empty()
+            || self.flexing.is_some();
         if !changed {
             return;
         }
@@ -830,7 +886,7 @@ impl CraftMotion {
     /// Advances the states of constrained bobs and lumps by a step of length h. Returns true if they are
     /// finite and within bounds.
     ///
-    /// # Errors If a bob is at the bound of its surface.
+    /// # Errors If a bob is at the bound of its surface, or an appendage beyond its linear model.
     #[inline(never)]
     fn take_apart(&mut self, n: usize, h: f64, w: Vec3) -> Result<bool, StepError> {
         if let Some(bob) = self.beyond.take() {
@@ -849,7 +905,24 @@ impl CraftMotion {
             finite &= moved.iter().all(|x| x.abs() < MAX_MAGNITUDE);
             x[at..at + 6].copy_from_slice(&moved);
         }
+        if let Some(flexing) = &self.flexing {
+            flexing.write_states(x, n, h);
+            finite &= x[index::ETA..].iter().all(|x| x.abs() < MAX_MAGNITUDE);
+            if finite {
+                self.check_appendages()?;
+            }
+        }
         Ok(finite)
+    }
+
+    /// Refuses deflections of the appendages beyond their linear model.
+    pub fn check_appendages(&self) -> Result<(), StepError> {
+        self.flexing.as_ref().map_or(Ok(()), |flexing| flexing.structure.check(&self.state.x))
+    }
+
+    /// Returns the deformed appendages from coefficients 0 and 1 of their motion.
+    pub fn deformed<T: Number>(&self) -> Option<Deformed<T>> {
+        self.flexing.as_ref().map(|flexing| flexing.now())
     }
 
     /// Returns the time of the first event of detached liquid, or of a constrained bob that reaches the bound
@@ -966,6 +1039,10 @@ impl Carrier for CraftMotion {
 
     fn rigid(&self) -> Rigid {
         self.rigid
+    }
+
+    fn deformed(&self) -> Option<Deformed<f64>> {
+        CraftMotion::deformed(self)
     }
 
     fn motion(&self) -> [&Vector; 3] {

@@ -8,6 +8,8 @@
 //!     + sum of k l^2 |p_perp|^2/2           E' = f.V + (tau - h_w').w - dissipation - drained'
 //! ```
 //!
+//! The appendages add their K to P, their L to H, and V.K + w.L and the energy of the modes to E (`appendage.rs`); their deformed
+//! body is part of m, S, I.
 //! H also has the angular momentum of rotary motion (`surface.rs`), and E its energy.
 //! m, S, I: dry craft and rigid liquids about O. Sums run over the bobs. r_c: centre of mass of everything from O. V is
 //! in body axes. H is about r_c and does not contain V, so nothing cancels after a long thrust. drained':
@@ -19,6 +21,7 @@ use taylor::vector::{
     Mat3, Quaternion, Vec3, add, constant, cross, dot, part, rotation, scale, sub, times,
 };
 
+use crate::appendage::Deformed;
 use crate::bob::BobNow;
 use crate::motion::CraftMotion;
 use crate::parameters::Mount;
@@ -193,6 +196,7 @@ pub(crate) struct Now<T> {
     pub pivot: Pivot,
     pub craft: Rigid,
     pub tanks: [Option<TankNow<T>>; TANKS],
+    pub deformed: Option<Deformed<T>>,
 }
 
 impl CraftMotion {
@@ -212,6 +216,7 @@ impl CraftMotion {
             pivot: self.pivot,
             craft: self.craft,
             tanks: [const { None }; TANKS],
+            deformed: self.deformed(),
         };
         for (i, liquid) in self.liquids.iter().enumerate() {
             let lump = self.lumps.iter().find(|lump| lump.tank == i && lump.is_loose());
@@ -250,7 +255,10 @@ impl<T: Number> Now<T> {
         let tanks = || self.tanks.iter().flatten();
         let bobs = || tanks().flat_map(|tank| tank.bobs.iter().flatten().chain(&tank.lump));
         let lifted = self.craft.lift::<T>();
-        let rigid = tanks().fold(lifted, |sum, tank| sum.combined_with(&tank.rigid));
+        let mut rigid = tanks().fold(lifted, |sum, tank| sum.combined_with(&tank.rigid));
+        if let Some(deformed) = &self.deformed {
+            rigid = rigid.combined_with(&deformed.body);
+        }
 
         let mut tank: [TankOutputs; TANKS] =
             core::array::from_fn(|i| TankOutputs::from_states(&x[index::bob(i, 0)..]));
@@ -272,6 +280,12 @@ impl<T: Number> Now<T> {
         let half = 0.5;
         let mut energy = (dot(velocity, velocity) * rigid.mass + dot(w, inner_angular)) * half
             + dot(velocity, inner);
+        if let Some(deformed) = &self.deformed {
+            let [momentum, moment] = deformed.momentum;
+            energy = energy + dot(velocity, momentum) + dot(w, moment) + deformed.energy;
+            inner_momentum = add(inner_momentum, momentum);
+            inner_angular = add(inner_angular, moment);
+        }
         let mut all = MassProperties::from_rigid(&rigid);
         for bob in bobs() {
             let against_o = add(cross(w, bob.rho), bob.rate);

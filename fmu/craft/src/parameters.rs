@@ -12,9 +12,10 @@ use taylor::vector::{
     unit_quaternion,
 };
 
+use crate::appendage::{Structure, beyond_message};
 use crate::pivot::Pivot;
 use crate::rigid::{Mat6, Rigid, add_rank_one, along_rod, smallest_pivot};
-use crate::sizes::{MODES, POINTS, TANKS};
+use crate::sizes::{APPENDAGES, MODES, POINTS, TANKS};
 use crate::surface::{self, Higher, Surface};
 use crate::table::{FillTable, LIGHTEST, SHORTEST};
 
@@ -471,6 +472,38 @@ impl Tank {
     }
 }
 
+/// One mode of a flexible appendage with its interface held, with unit modal mass: natural frequency, Hz,
+/// damping ratio, and participation (translation, kg^0.5, and rotation about the interface point `position`,
+/// kg^0.5 m, body axes). `eta` and `eta_dot` are its displacement, kg^0.5 m, and its rate at the start.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
+pub struct Appendage {
+    pub position: Vec3,
+    pub frequency: f64,
+    pub zeta: f64,
+    pub participation: [f64; 6],
+    pub eta: f64,
+    pub eta_dot: f64,
+}
+
+impl Default for Appendage {
+    fn default() -> Self {
+        let (position, participation) = ([0.0; 3], [0.0; 6]);
+        Appendage { position, frequency: 1.0, zeta: 0.005, participation, eta: 0.0, eta_dot: 0.0 }
+    }
+}
+
+impl Appendage {
+    fn find_problems(&self, name: &str, problems: &mut Problems) {
+        problems.vector(&format!("{name}.position"), &self.position, "m");
+        problems.number(&format!("{name}.frequency"), self.frequency, 1e-6, 1e6, "Hz");
+        problems.number(&format!("{name}.zeta"), self.zeta, 0.0, 10.0, "");
+        problems.vector(&format!("{name}.participation"), &self.participation, "kg^0.5, kg^0.5.m");
+        problems.vector(&format!("{name}.eta_0"), &[self.eta], "kg^0.5.m");
+        problems.vector(&format!("{name}.eta_dot_0"), &[self.eta_dot], "kg^0.5.m/s");
+    }
+}
+
 /// Initial motion: attitude from body to inertial axes, scalar first, normalised on reading; angular velocity
 /// relative to the inertial frame, rad/s, body axes; position, m, and velocity, m/s, of O in inertial axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -484,7 +517,7 @@ pub struct Init {
 
 /// All parameters and initial conditions of a [`Spacecraft`](crate::Spacecraft). `gravity`, m/s2, inertial
 /// axes, and `pivot` have an effect only with [`Mount::Pivot`]. `tanks` is the number of tanks, 0 to
-/// [`TANKS`], and `max_steps` the largest number of internal steps in one step, at least 1.
+/// [`TANKS`], `appendages` the number of modes of flexible appendages, 0 to [`APPENDAGES`], and `max_steps` the largest number of internal steps in one step, at least 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct Parameters {
@@ -494,6 +527,8 @@ pub struct Parameters {
     pub pivot: Pivot,
     pub tanks: usize,
     pub tank: [Tank; TANKS],
+    pub appendages: usize,
+    pub appendage: [Appendage; APPENDAGES],
     pub init: Init,
     pub max_steps: usize,
 }
@@ -606,6 +641,8 @@ impl Default for Parameters {
             pivot: Pivot::default(),
             tanks: 1,
             tank: [Tank::default(); TANKS],
+            appendages: 0,
+            appendage: [Appendage::default(); APPENDAGES],
             init: Init::default(),
             max_steps: MAX_STEPS,
         }
@@ -1057,7 +1094,7 @@ impl Craft {
 }
 
 /// Smallest pivot below which a mass matrix counts as singular.
-const SINGULAR: f64 = 1e-12;
+pub(crate) const SINGULAR: f64 = 1e-12;
 
 /// Returns the reason why the mass matrix of a body with the liquid of `tanks` is singular, as words that
 /// follow "is singular". Returns `None` if it is regular with planar modes at rest and with detached liquid.
@@ -1118,6 +1155,15 @@ impl Parameters {
         for (i, tank) in self.tank[..self.tanks.min(TANKS)].iter().enumerate() {
             tank.find_problems(&format!("tank[{}]", i + 1), &mut problems);
         }
+        if self.appendages > APPENDAGES {
+            problems
+                .0
+                .push(format!("appendages = {} (allowed: 0 to {APPENDAGES})", self.appendages));
+        }
+        let appendages = &self.appendage[..self.appendages.min(APPENDAGES)];
+        for (j, appendage) in appendages.iter().enumerate() {
+            appendage.find_problems(&format!("appendage[{}]", j + 1), &mut problems);
+        }
         let tanks = &self.tank[..self.tanks.min(TANKS)];
         let with_ball = tanks.iter().position(|tank| tank.ball.travel > 0.0);
         let that_drains = tanks.iter().position(|tank| tank.fill.points > 0);
@@ -1175,6 +1221,19 @@ impl Parameters {
                      about every axis through their centre of mass, must be above 0: increase craft.mass or craft.J, or the \
                      tanks' m_0, I_0 and I_z"
                 ));
+            } else if let Some(structure) = Structure::new(self) {
+                let eta = self.appendage.map(|appendage| appendage.eta);
+                if structure.is_beyond(&[0.0; APPENDAGES]) {
+                    problems.0.push(
+                        "appendage[].participation leaves the dry craft no mass or inertia (allowed: craft.mass and craft.J above the \
+                         sums of participation[i] participation[j], about the same point). Mass and inertia of the appendages belong to \
+                         craft.mass and craft.J. Check the units kg^0.5 and kg^0.5.m of modes with unit modal mass"
+                            .into(),
+                    );
+                } else if structure.is_beyond(&eta) {
+                    let message = beyond_message(&eta[..self.appendages]);
+                    problems.0.push(message.replace(".eta =", ".eta_0 ="));
+                }
             }
         }
         problems.0

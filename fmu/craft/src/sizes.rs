@@ -6,5 +6,8 @@ pub const TANKS: usize = 4;
 /// Largest number of slosh modes of a tank.
 pub const MODES: usize = 3;
 
+/// Largest number of modes of a craft's flexible appendages.
+pub const APPENDAGES: usize = 6;
+
 /// Largest number of points of a fill table.
 pub const POINTS: usize = 12;

@@ -64,6 +64,10 @@ impl Spacecraft {
                 put(index::bob(i, n) + 3, &rate);
             }
         }
+        for (j, appendage) in p.appendage[..p.appendages].iter().enumerate() {
+            put(index::ETA + j, &[appendage.eta]);
+            put(index::ETA_DOT + j, &[appendage.eta_dot]);
+        }
         for i in 0..p.tanks {
             if let Some(surface) = p.tank[i].resolve().ball_surface() {
                 put(index::ball(i) + 2, &[surface.height - surface.half]);
@@ -348,9 +352,11 @@ impl Spacecraft {
         Ok(changed)
     }
 
-    /// Refuses masses of liquid, as integrated by the host, outside the tanks' tables.
-    pub fn check_liquids(&self) -> Result<(), StepError> {
+    /// Refuses states, as integrated by the host, beyond the model: masses of liquid outside the tanks' tables,
+    /// bobs beyond the bounds of their surfaces, and excessive deflections of the appendages.
+    pub fn check_states(&self) -> Result<(), StepError> {
         let x = &self.motion.state.x;
+        self.motion.check_appendages()?;
         self.draining.as_ref().map_or(Ok(()), |it| it.check(x))
     }
 

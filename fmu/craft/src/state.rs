@@ -5,17 +5,19 @@ use formulas::regime::Regime;
 use taylor::integrator::MAX_MAGNITUDE;
 use taylor::vector::Vec3;
 
-use crate::sizes::{MODES, TANKS};
+use crate::sizes::{APPENDAGES, MODES, TANKS};
 
 /// Indices of the states in x: attitude `Q` from body to inertial axes, four numbers, scalar first; angular
 /// velocity `OMEGA`, rad/s, body axes; `POSITION`, m, and `VELOCITY`, m/s, of O in inertial axes; `WORK` of
 /// force and torque and energy `DISSIPATED` by the liquids since the start, J; from `BOBS` on direction p and
 /// rate p', 1/s, of each of the [`MODES`] modes of each tank, tank axes; from `LIQUID` on the mass of liquid
 /// in each tank, kg; energy `DRAINED` with the outflow, J; from `BALLS` on position, m, and rate, m/s, of
-/// each tank's detached liquid from the tank's origin, tank axes. States that are not in use stay at rest.
+/// each tank's detached liquid from the tank's origin, tank axes; from `ETA` on the modal displacement, kg^0.5
+/// m, of each mode of the appendages, and from `ETA_DOT` on their rates. States that are not in use stay at
+/// rest.
 #[allow(missing_docs)]
 pub mod index {
-    use crate::sizes::{MODES, TANKS};
+    use crate::sizes::{APPENDAGES, MODES, TANKS};
 
     pub const Q: usize = 0;
     pub const OMEGA: usize = 4;
@@ -30,6 +32,9 @@ pub mod index {
 
     pub const BALLS: usize = DRAINED + 1;
 
+    pub const ETA: usize = ball(TANKS);
+    pub const ETA_DOT: usize = ETA + APPENDAGES;
+
     /// Returns the index of the detached liquid's position and rate; `tank` counts from 0.
     pub const fn ball(tank: usize) -> usize {
         BALLS + 6 * tank
@@ -42,7 +47,7 @@ pub mod index {
 }
 
 /// Number of continuous states.
-pub const STATES: usize = index::ball(TANKS);
+pub const STATES: usize = index::ETA_DOT + APPENDAGES;
 
 /// Number of inputs: force, torque, h_wheels, mass flows.
 pub const INPUTS: usize = 9 + TANKS;

@@ -2,13 +2,13 @@
 //! those for few tanks and modes. The binary is the same.
 //!
 //! The GUID (in FMI 3.0 the instantiationToken) of a reduced description equals that of the full one except
-//! for the last eight hexadecimal digits, from which the binary learns which states and event indicators the
+//! for the last nine hexadecimal digits, from which the binary learns which states and event indicators the
 //! host knows:
 //!
 //! ```text
-//! {........-....-....-....-....tmsscccc}   t, m   largest values of the parameters in `Table::sizes`
-//!                                          ss     number of continuous states
-//!                                          cccc   checksum of resources/start_values.txt, 0000 without the file
+//! {........-....-....-....-...tmasscccc}   t, m, a  largest values of the parameters in `Table::sizes`, 0 if there are fewer
+//!                                          ss       number of continuous states
+//!                                          cccc     checksum of resources/start_values.txt, 0000 without the file
 //! ```
 //!
 //! The file has the start values that differ from those of the table, one line `name = value` for each, in
@@ -25,7 +25,10 @@ use crate::variable::{Access, Causality, Dimension, Value};
 pub const START_VALUES: &str = "start_values.txt";
 
 /// Number of hexadecimal digits of a token that describe the extent.
-const DIGITS: usize = 8;
+const DIGITS: usize = SIZES + 6;
+
+/// Largest number of parameters that size arrays.
+const SIZES: usize = 3;
 
 /// The part of the table that a reduced description contains.
 #[derive(Clone, Debug, PartialEq)]
@@ -56,11 +59,11 @@ impl Extent {
             return None;
         }
         let mut sizes = Vec::new();
-        let mut given = digits[..2].chars().map(|digit| digit.to_digit(16));
+        let mut given = digits[..SIZES].chars().map(|digit| digit.to_digit(16));
         for (name, most) in table.sizes() {
             let size = given.next()?? as usize;
             sizes.push((name, size));
-            if !(1..=most).contains(&size) {
+            if size > most {
                 return None;
             }
         }
@@ -71,7 +74,7 @@ impl Extent {
         let kept_states = table.derivatives().iter().zip(table.places());
         let places: Vec<usize> =
             kept_states.filter(|(scalar, _)| within(scalar)).map(|(_, place)| place).collect();
-        if usize::from_str_radix(&digits[2..4], 16) != Ok(places.len()) {
+        if usize::from_str_radix(&digits[SIZES..SIZES + 2], 16) != Ok(places.len()) {
             return None;
         }
         let indicators = share(table, M::INDICATORS_OF, &sizes);
@@ -268,12 +271,21 @@ mod tests {
     /// Three trays at most: levels are states, one each; the table's start value of the number is 2.
     #[test]
     fn a_token_contains_the_number_of_states() {
+        assert_eq!(extent_with("000000000").unwrap().places(), [0_usize; 0]);
         assert_eq!(Trays::table().sizes(), [("rows", 3)]);
-        let extent = extent_with("10010000").unwrap();
+        let extent = extent_with("100010000").unwrap();
         assert_eq!((extent.places(), &extent.starts()[0]), (&[0][..], &Value::Integer(1)));
-        assert_eq!(extent_with("20020000").unwrap().places(), [0, 1]);
-        assert_eq!(extent_with("20020000").unwrap().starts()[0], Value::Integer(2));
-        for wrong in ["10020000", "40030000", "00000000", "11010000", "g0010000", "1001000"] {
+        assert_eq!(extent_with("200020000").unwrap().places(), [0, 1]);
+        assert_eq!(extent_with("200020000").unwrap().starts()[0], Value::Integer(2));
+        for wrong in [
+            "100020000",
+            "400030000",
+            "000010000",
+            "110010000",
+            "101010000",
+            "g00010000",
+            "10001000",
+        ] {
             assert_eq!(extent_with(wrong), None, "{wrong}");
         }
         let whole = Trays::table().guid();

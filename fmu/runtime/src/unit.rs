@@ -60,6 +60,10 @@ pub static UNITS: &[Unit] = &[
     unit("kg.m2/s", [ 1,  2, -1, 0], &[]),
     unit("J",       [ 1,  2, -2, 0], &[]),
     unit("W",       [ 1,  2, -3, 0], &[]),
+    Unit { name: "kg^0.5", base: None, display_units: &[] },
+    Unit { name: "kg^0.5.m", base: None, display_units: &[] },
+    Unit { name: "kg^0.5.m/s", base: None, display_units: &[] },
+    Unit { name: "kg^0.5.m/s2", base: None, display_units: &[] },
     Unit { name: "rad/s/sqrt(Hz)", base: None, display_units: &[] },
     Unit { name: "rad/s/sqrt(s)", base: None, display_units: &[] },
 ];

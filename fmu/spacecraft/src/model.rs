@@ -67,6 +67,7 @@ pub struct Parameters {
     pub mount_kind: i32,
     pub damping_law_kind: [i32; TANKS],
     pub tanks: i32,
+    pub appendages: i32,
     pub modes: [i32; TANKS],
     pub points: [i32; TANKS],
 }
@@ -76,8 +77,9 @@ impl Default for Parameters {
         let craft = craft::Parameters::default();
         let modes = craft.tank.map(|tank| tank.modes as i32);
         let points = craft.tank.map(|tank| tank.fill.points as i32);
-        let (tanks, damping_law_kind) = (craft.tanks as i32, [0; TANKS]);
-        Parameters { mount_kind: 0, damping_law_kind, tanks, modes, points, craft }
+        let (tanks, appendages) = (craft.tanks as i32, craft.appendages as i32);
+        let damping_law_kind = [0; TANKS];
+        Parameters { mount_kind: 0, damping_law_kind, tanks, appendages, modes, points, craft }
     }
 }
 
@@ -114,6 +116,7 @@ impl Parameters {
             p.mount = *mount;
         }
         p.tanks = usize::try_from(self.tanks).unwrap_or(0);
+        p.appendages = usize::try_from(self.appendages).unwrap_or(0);
         for (i, tank) in p.tank.iter_mut().enumerate().take(p.tanks) {
             let (law, kind) = (tank.damping_law, self.damping_law_kind[i]);
             let given = usize::try_from(kind - 1).ok().and_then(|i| DampingLaw::ALL.get(i));
@@ -253,7 +256,7 @@ impl Dynamics for Model {
     fn accept_step(&mut self, inputs: &Inputs) -> Result<bool, String> {
         self.wheels.record_step(self.craft.state().h_wheels(), inputs);
         self.craft.follow_inputs(inputs);
-        self.craft.check_liquids().map_err(|why| why.to_string())?;
+        self.craft.check_states().map_err(|why| why.to_string())?;
         let ranges = self.craft.ranges(inputs);
         self.has_left_range |= self.craft.leaves_range(&ranges);
         self.has_had_lump |= self.craft.has_lump();

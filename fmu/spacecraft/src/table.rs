@@ -4,7 +4,9 @@
 //! Arrays have FMI's structured names: `tank[].p` of the shape 4, 3, 3 is `tank[1].p[1,1]`, … with
 //! the indices tank, mode, axis.
 
-use craft::{BallState, DampingLaw, LimitedBy, MODES, POINTS, STATES, State, TANKS, index};
+use craft::{
+    APPENDAGES, BallState, DampingLaw, LimitedBy, MODES, POINTS, STATES, State, TANKS, index,
+};
 use runtime::table::{About, Scalar, Table, scalar_count, scalars};
 use runtime::variable::Dimension::{Fixed, Sized, Used};
 use runtime::variable::{Dimension, Enumeration, Item, Variable};
@@ -30,7 +32,7 @@ impl runtime::Model for Model {
     }
 }
 
-const DESCRIPTION: &str = "A rigid spacecraft in six degrees of freedom with up to four tanks of sloshing liquid, free or on an air bearing";
+const DESCRIPTION: &str = "A rigid spacecraft in six degrees of freedom with up to four tanks of sloshing liquid and up to six modes of flexible appendages, free or on an air bearing";
 
 static SCALARS: [Scalar<Model>; scalar_count(VARIABLES)] = scalars(VARIABLES);
 
@@ -44,6 +46,8 @@ const MOTION: &[&str] = &[
     "tank[].liquid",
     "tank[].ball.position",
     "tank[].ball.velocity",
+    "appendage[].eta",
+    "appendage[].eta_dot",
     "force",
     "torque",
     "h_wheels",
@@ -58,6 +62,8 @@ const MOMENTUM: &[&str] = &[
     "tank[].liquid",
     "tank[].ball.position",
     "tank[].ball.velocity",
+    "appendage[].eta",
+    "appendage[].eta_dot",
     "h_wheels",
     "mass_flow",
 ];
@@ -70,12 +76,14 @@ const ENERGIES: &[&str] = &[
     "tank[].liquid",
     "tank[].ball.position",
     "tank[].ball.velocity",
+    "appendage[].eta",
+    "appendage[].eta_dot",
     "force",
     "torque",
     "h_wheels",
     "mass_flow",
 ];
-const PLACES: &[&str] = &["tank[].p", "tank[].liquid", "tank[].ball.position"];
+const PLACES: &[&str] = &["tank[].p", "tank[].liquid", "tank[].ball.position", "appendage[].eta"];
 const ANGLES: &[&str] = &["tank[].p"];
 // Dependencies of initial values.
 const EVERYTHING: &[&str] = &[
@@ -90,12 +98,16 @@ const EVERYTHING: &[&str] = &[
     "pivot.",
     "tanks",
     "tank[].",
+    "appendages",
+    "appendage[].",
     "init.",
 ];
 const BOBS: &[&str] = &["tanks", "tank[]."];
+const DEFORMED: &[&str] = &["appendages", "appendage[]."];
 
 const TANK: Dimension = Sized("tanks", TANKS);
 const MODE: Dimension = Used("tank[].modes", MODES);
+const PER_APPENDAGE: &[Dimension] = &[Used("appendages", APPENDAGES)];
 const VECTOR: &[Dimension] = &[Fixed(3)];
 const QUATERNION: &[Dimension] = &[Fixed(4)];
 const MATRIX: &[Dimension] = &[Fixed(3), Fixed(3)];
@@ -103,6 +115,7 @@ const PER_TANK: &[Dimension] = &[TANK];
 const TANK_VECTOR: &[Dimension] = &[TANK, Fixed(3)];
 const PER_MODE: &[Dimension] = &[TANK, MODE];
 const MODE_VECTOR: &[Dimension] = &[TANK, MODE, Fixed(3)];
+const APPENDAGE_VECTOR: &[Dimension] = &[Used("appendages", APPENDAGES), Fixed(3)];
 const MODE_PAIR: &[Dimension] = &[TANK, MODE, Fixed(2)];
 
 const TABLE_OF_TANK: &[Dimension] = &[TANK, Fixed(POINTS)];
@@ -187,19 +200,19 @@ static VARIABLES: &[Variable<Model>] = &[
         "Torque of the pivot's stiffness, damping and friction on the craft, body axes; 0 in free flight")
         .shape(VECTOR).depends_on(&["q", "omega"]),
     V::local("momentum", |o, n| o.momentum[n], "kg.m/s",
-        "Linear momentum of craft and liquids, inertial axes")
+        "Linear momentum of craft, appendages and liquids, inertial axes")
         .shape(VECTOR).depends_on(MOMENTUM),
     V::local("angular_momentum", |o, n| o.angular_momentum[n], "N.m.s",
-        "Angular momentum of craft, wheels and liquids about their centre of mass (on a pivot about O), inertial axes")
+        "Angular momentum of craft, appendages, wheels and liquids about their centre of mass (on a pivot about O), inertial axes")
         .shape(VECTOR).depends_on(MOMENTUM),
     V::local("energy", |o, _| o.energy, "J",
-        "Kinetic energy of craft and liquids plus energy of the centring springs, on a pivot also of gravity and of the pivot's stiffness. Excludes the spin of the wheels and the flow towards an outlet")
-        .depends_on(&["q", "omega", "velocity", "tank[].p", "tank[].p_dot", "tank[].liquid", "tank[].ball.position", "tank[].ball.velocity", "mass_flow"]),
+        "Kinetic energy of craft, appendages and liquids plus energy of the centring springs and of the appendages' stiffness, on a pivot also of gravity and of the pivot's stiffness. Excludes the spin of the wheels and the flow towards an outlet")
+        .depends_on(&["q", "omega", "velocity", "tank[].p", "tank[].p_dot", "tank[].liquid", "tank[].ball.position", "tank[].ball.velocity", "appendage[].eta", "appendage[].eta_dot", "mass_flow"]),
     V::local("work", |o, _| o.work, "J",
         "Work done on the craft by force, torque and wheels since the start: energy - energy(0) = work - dissipated - drained")
         .is_state(|_| index::WORK).depends_on(&["work"]),
     V::local("dissipated", |o, _| o.dissipated, "J",
-        "Energy dissipated by the liquids and by the pivot's damping and friction since the start")
+        "Energy dissipated by the liquids and appendages and by the pivot's damping and friction since the start")
         .is_state(|_| index::DISSIPATED).depends_on(&["dissipated"]),
     V::local("drained", |o, _| o.drained, "J",
         "Energy lost with the outflow since the start: kinetic energy of the liquid that has left, and energy taken by the flow within the tanks")
@@ -208,10 +221,10 @@ static VARIABLES: &[Variable<Model>] = &[
         "Mass of craft and liquids")
         .depends_on(&["tank[].liquid"]),
     V::local("center_of_mass", |o, n| o.center_of_mass[n], "m",
-        "Centre of mass of craft and liquids from O, body axes")
+        "Centre of mass of craft, deformed appendages and liquids from O, body axes")
         .shape(VECTOR).depends_on(PLACES),
     V::local("inertia", |o, n| o.inertia[n / 3][n % 3], "kg.m2",
-        "Inertia matrix of craft and liquids about their centre of mass, each bob a point mass at its current position, body axes")
+        "Inertia matrix of craft, deformed appendages and liquids about their centre of mass, each bob a point mass at its current position, body axes")
         .shape(MATRIX).depends_on(PLACES),
     V::local("tank[].force", |o, n| o.tank[n / 3].force[n % 3], "N",
         "Force of a tank's whole liquid (sloshing and rigid) on the craft, body axes")
@@ -266,6 +279,13 @@ static VARIABLES: &[Variable<Model>] = &[
         "Mass of the whole liquid in a tank")
         .shape(PER_TANK).nominal(100.0).depends_on(&["tank[].liquid[]"]).initial_depends_on(BOBS),
 
+    V::state("appendage[].eta", |n| index::ETA + n, "kg^0.5.m",
+        "Modal displacement of a mode of the appendages: a point with the mode shape phi, kg^-0.5, moves by phi eta relative to the craft")
+        .shape(PER_APPENDAGE).nominal(0.1).reinit().depends_on(&["appendage[].eta[]"]).initial_depends_on(DEFORMED),
+    V::state("appendage[].eta_dot", |n| index::ETA_DOT + n, "kg^0.5.m/s",
+        "Rate of appendage[].eta")
+        .shape(PER_APPENDAGE).nominal(0.1).reinit().depends_on(&["appendage[].eta_dot[]"]).initial_depends_on(DEFORMED),
+
     // The derivatives of the continuous states
     V::derivative("der(q)", |n| index::Q + n, "1/s", "Derivative of q")
         .shape(QUATERNION).depends_on(&["q", "omega"]).initial_depends_on(&["init.q", "init.omega"]),
@@ -294,8 +314,13 @@ static VARIABLES: &[Variable<Model>] = &[
     V::derivative("der(tank[].ball.velocity)", |n| ball(n) + 3, "m/s2", "Derivative of tank[].ball.velocity")
         .shape(TANK_VECTOR).depends_on(MOTION).initial_depends_on(EVERYTHING),
 
+    V::derivative("der(appendage[].eta)", |n| index::ETA + n, "kg^0.5.m/s", "Derivative of appendage[].eta: appendage[].eta_dot")
+        .shape(PER_APPENDAGE).depends_on(&["appendage[].eta_dot"]).initial_depends_on(DEFORMED),
+    V::derivative("der(appendage[].eta_dot)", |n| index::ETA_DOT + n, "kg^0.5.m/s2", "Derivative of appendage[].eta_dot")
+        .shape(PER_APPENDAGE).depends_on(MOTION).initial_depends_on(EVERYTHING),
+
     // The dry craft
-    V::parameter("craft.mass", |p, _| &mut p.craft.mass, "kg", "Mass of the dry craft, wheels included")
+    V::parameter("craft.mass", |p, _| &mut p.craft.mass, "kg", "Mass of the dry craft, wheels and appendages included")
         .range(1e-6, 1e12),
     V::parameter("craft.r", |p, n| &mut p.craft.r[n], "m", "Centre of mass of the dry craft from O, body axes")
         .shape(VECTOR).range(-1e4, 1e4),
@@ -476,6 +501,22 @@ static VARIABLES: &[Variable<Model>] = &[
         "Rate of the unit vector from hinge to bob at the start, tank axes; the FMU keeps its tangential part")
         .shape(MODE_VECTOR),
 
+    // Each mode of the flexible appendages
+    V::integer("appendages", |p, _| &mut p.appendages, "Number of modes of flexible appendages, with the interface held and unit modal mass (Craig-Bampton). Mass and inertia of the undeformed appendages belong to craft.mass, craft.r and craft.Jxx to craft.Jyz")
+        .between(0, APPENDAGES as i32),
+    V::parameter("appendage[].position", |p, n| &mut p.appendage[n / 3].position[n % 3], "m", "Position of the point from O at which a mode's appendage is attached, body axes; modes of one appendage share it")
+        .shape(APPENDAGE_VECTOR).range(-1e4, 1e4),
+    V::parameter("appendage[].frequency", |p, n| &mut p.appendage[n].frequency, "Hz", "Natural frequency of a mode with the interface held")
+        .shape(PER_APPENDAGE).range(1e-6, 1e6),
+    V::parameter("appendage[].zeta", |p, n| &mut p.appendage[n].zeta, "1", "Damping ratio of a mode with the interface held")
+        .shape(PER_APPENDAGE).range(0.0, 10.0),
+    V::parameter("appendage[].participation", |p, n| &mut p.appendage[n / 6].participation[n % 6], "kg^0.5", "Participation of a mode with unit modal mass, body axes: 1 to 3 in translation, kg^0.5, the integral of the mode shape over the mass; 4 to 6 in rotation about appendage[].position, kg^0.5.m. Their squares are the effective masses and inertias")
+        .shape(&[Used("appendages", APPENDAGES), Fixed(6)]).range(-1e6, 1e6),
+    V::parameter("appendage[].eta_0", |p, n| &mut p.appendage[n].eta, "kg^0.5.m", "appendage[].eta at the start")
+        .shape(PER_APPENDAGE).range(-1e9, 1e9),
+    V::parameter("appendage[].eta_dot_0", |p, n| &mut p.appendage[n].eta_dot, "kg^0.5.m/s", "appendage[].eta_dot at the start")
+        .shape(PER_APPENDAGE).range(-1e9, 1e9),
+
     // Initial conditions
     V::parameter("init.q", |p, n| &mut p.init.q[n], "1", "q at the start; the FMU normalises it")
         .shape(QUATERNION),
@@ -552,4 +593,4 @@ static MOUNT: Enumeration = Enumeration {
     ],
 };
 
-const _: () = assert!(STATES == index::BALLS + 6 * TANKS);
+const _: () = assert!(STATES == index::BALLS + 6 * TANKS + 2 * APPENDAGES);

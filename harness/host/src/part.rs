@@ -58,12 +58,12 @@ pub fn start_values(
 ///
 /// # Errors
 ///
-/// If a limit is 0 or above the largest value, a parameter in `starts` is not in the reduced description, or
+/// If a limit is above the largest value, a parameter in `starts` is not in the reduced description, or
 /// the XML is not a description of scalars from this project.
 pub fn describe(xml: &str, limits: &[Limit], starts: &BTreeMap<String, String>) -> Result<Part> {
     for limit in limits {
         let Limit { parameter, size, most, .. } = limit;
-        ensure!((1..=*most).contains(size), "{parameter} = {size} (allowed: 1 to {most})");
+        ensure!(size <= most, "{parameter} = {size} (allowed: 0 to {most})");
     }
     let document = Document::parse(xml).context("modelDescription.xml")?;
     let root = document.root_element();
@@ -152,12 +152,12 @@ fn token_of_part(
     start_values: Option<&str>,
 ) -> Result<String> {
     ensure!(
-        whole.len() == 38 && whole.is_ascii() && (1..=2).contains(&limits.len()) && states < 256,
+        whole.len() == 38 && whole.is_ascii() && (1..=3).contains(&limits.len()) && states < 256,
         "this FMU cannot be described in part"
     );
     let sizes: String = limits.iter().map(|limit| format!("{:x}", limit.size)).collect();
     let sum = start_values.map_or(0, |text| (fnv(text.as_bytes()) & 0xffff).max(1));
-    Ok(format!("{}{sizes:0<2}{states:02x}{sum:04x}}}", &whole[..29]))
+    Ok(format!("{}{sizes:0<3}{states:02x}{sum:04x}}}", &whole[..28]))
 }
 
 /// Returns the FNV-1a hash of 128 bits.

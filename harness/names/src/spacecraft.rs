@@ -26,6 +26,8 @@ pub const MOUNT_KIND: &str = "mount_kind";
 pub const GRAVITY: crate::Array<1> = crate::Array("gravity");
 pub const TANKS: &str = "tanks";
 pub const MOST_TANKS: usize = 4;
+pub const APPENDAGES: &str = "appendages";
+pub const MOST_APPENDAGES: usize = 6;
 
 pub mod pivot {
     pub const TORQUE: crate::Array<1> = crate::Array("pivot.torque");
@@ -129,6 +131,17 @@ pub mod tank {
         pub const ANGLE_LIMIT: crate::Array<3> = crate::Array("tank[].fill.angle_limit");
         pub const SWIRL_LIMIT: crate::Array<3> = crate::Array("tank[].fill.swirl_limit");
     }
+}
+
+pub mod appendage {
+    pub const ETA: crate::Array<1> = crate::Array("appendage[].eta");
+    pub const ETA_DOT: crate::Array<1> = crate::Array("appendage[].eta_dot");
+    pub const POSITION: crate::Array<2> = crate::Array("appendage[].position");
+    pub const FREQUENCY: crate::Array<1> = crate::Array("appendage[].frequency");
+    pub const ZETA: crate::Array<1> = crate::Array("appendage[].zeta");
+    pub const PARTICIPATION: crate::Array<2> = crate::Array("appendage[].participation");
+    pub const ETA_0: crate::Array<1> = crate::Array("appendage[].eta_0");
+    pub const ETA_DOT_0: crate::Array<1> = crate::Array("appendage[].eta_dot_0");
 }
 
 pub mod craft {
@@ -288,6 +301,23 @@ pub const SIZES: &[crate::Size] = &[
             ("tank[].fill.swirl_limit", 1),
             ("tank[].p_0", 1),
             ("tank[].p_dot_0", 1),
+        ],
+    },
+    crate::Size {
+        parameter: "appendages",
+        most: 6,
+        has_indicators: false,
+        arrays: &[
+            ("appendage[].eta", 0),
+            ("appendage[].eta_dot", 0),
+            ("der(appendage[].eta)", 0),
+            ("der(appendage[].eta_dot)", 0),
+            ("appendage[].position", 0),
+            ("appendage[].frequency", 0),
+            ("appendage[].zeta", 0),
+            ("appendage[].participation", 0),
+            ("appendage[].eta_0", 0),
+            ("appendage[].eta_dot_0", 0),
         ],
     },
 ];

@@ -187,17 +187,22 @@ impl Fmu {
     }
 
     /// Return the files of a reduced copy of this Spacecraft FMU, each as its name in the archive and its text: the model
-    /// description with only `tanks` tanks and `modes` modes, and the file of start values. `starts` are pairs of a name and a
-    /// start value that differs from the FMU's own.
+    /// description with only `tanks` tanks, `modes` modes and `appendages` modes of appendages, and the file of start values.
+    /// `starts` are pairs of a name and a start value that differs from the FMU's own.
     fn part(
         &self,
         tanks: usize,
         modes: usize,
+        appendages: usize,
         starts: Vec<(String, String)>,
     ) -> PyResult<Vec<(&'static str, String)>> {
         let limits = names::spacecraft::SIZES.iter().map(|size| Limit {
             parameter: size.parameter,
-            size: if size.parameter == "tanks" { tanks } else { modes },
+            size: match size.parameter {
+                "tanks" => tanks,
+                "appendages" => appendages,
+                _ => modes,
+            },
             most: size.most,
             has_indicators: size.has_indicators,
             arrays: size.arrays,

@@ -93,7 +93,8 @@ def export(
     fmu = Fmu.open(model)
     values = {name: fmu.convert(name, value) for name, value in parameters.items()}
     modes = [int(value) for name, value in values.items() if name.endswith("].modes")]
-    sizes = max(1, int(values["tanks"])), max([1, *modes])
+    appendages = int(values.get("appendages", 0))
+    sizes = max(1, int(values["tanks"])), max([1, *modes]), appendages
     changed = dict(fmu.native.part(*sizes, [(n, _text(v)) for n, v in values.items()]))
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -30,7 +30,13 @@ PARAMETERS = {
         "imu.enabled": True,
         "wheel.enabled": True,
     },
-    "Spacecraft": {},
+    "Spacecraft": {
+        "appendages": 2,
+        "appendage[1].participation[2]": 9.0,
+        "appendage[2].participation[6]": 6.0,
+        "appendage[2].position[1]": 0.7,
+        "appendage[2].eta_0": 0.2,
+    },
     "SloshTank": {},
 }
 

@@ -103,6 +103,9 @@ fn somewhere(seed: u64) -> (Random, Parameters, Spacecraft, Inputs) {
     if seed.is_multiple_of(2) {
         p.tank.iter_mut().for_each(|tank| random.follow(tank));
     }
+    if seed % 5 == 4 {
+        random.flex(&mut p);
+    }
     let u = random.inputs();
     let mut craft = Spacecraft::new(&p, &u, 0.0, 1e-9).unwrap();
     craft.step(&u, 0.1).unwrap();

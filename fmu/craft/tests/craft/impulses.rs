@@ -122,7 +122,7 @@ fn liquid_masses_beyond_the_fill_table_are_refused() {
         let mut x = craft.continuous_states();
         x[craft::index::LIQUID + 1] = liquid;
         craft.set_continuous_states(&x);
-        craft.check_liquids()
+        craft.check_states()
     };
     let (first, last) = (masses[0], masses[craft::POINTS - 1]);
     assert!([first * 1.001, 400.0, last * 0.999].into_iter().all(|liquid| with(liquid).is_ok()));

@@ -25,8 +25,9 @@ fn rotation(q: &[f64]) -> Rotation3<f64> {
 struct Solution {
     a: V,
     w_d: V,
-    /// p'' of each bob, tank axes, then force and torque about O of each tank.
+    /// p'' of each bob, tank axes, eta'' of each mode of the appendages, then force and torque about O of each tank.
     p_dd: Vec<V>,
+    eta_dd: Vec<f64>,
     wrench: Vec<[V; 2]>,
 }
 
@@ -234,7 +235,8 @@ fn solve_with(mistake: Mistake, p: &Parameters, x: &[f64; STATES], u: &Inputs) -
     let w = v(&x[index::OMEGA..]);
     let bobs: Vec<(usize, usize)> =
         (0..p.tanks).flat_map(|i| (0..p.tank[i].modes).map(move |n| (i, n))).collect();
-    let size = 6 + 5 * bobs.len();
+    let first = 6 + 5 * bobs.len();
+    let size = first + p.appendages;
     let mut m = DMatrix::<f64>::zeros(size, size);
     let mut rhs = DVector::<f64>::zeros(size);
     let put = |m: &mut DMatrix<f64>, i: usize, j: usize, block: Matrix3<f64>| {
@@ -348,6 +350,30 @@ fn solve_with(mistake: Mistake, p: &Parameters, x: &[f64; STATES], u: &Inputs) -
         seen.push((i, axes, shape.normal, across, rho, phi + inner, own));
         shapes.push((shape, l, e));
     }
+    // Each mode by itself: the mass that moves by y = p eta relative to the craft, from the interface point.
+    for (j, mode) in p.appendage[..p.appendages].iter().enumerate() {
+        let (at, row) = (v(&mode.position), first + j);
+        let (along, about) = (v(&mode.participation), v(&mode.participation[3..]));
+        let (eta, rate) = (x[index::ETA + j], x[index::ETA_DOT + j]);
+        let y = along * eta;
+        // y'' seen from outside, and the specific force at the interface point, without a, w' and eta''.
+        let moved = w.cross(&along) * (2.0 * rate) + w.cross(&w.cross(&y));
+        let held = w.cross(&w.cross(&at));
+        put(&mut m, 0, 3, -y.cross_matrix());
+        put(&mut m, 3, 0, y.cross_matrix());
+        let both = at.cross_matrix() * y.cross_matrix() + y.cross_matrix() * at.cross_matrix();
+        put(&mut m, 3, 3, -both);
+        let turned = at.cross(&along) + about;
+        for k in 0..3 {
+            (m[(k, row)], m[(row, k)]) = (along[k], along[k]);
+            (m[(3 + k, row)], m[(row, 3 + k)]) = (turned[k], turned[k]);
+        }
+        m[(row, row)] = 1.0;
+        let omega = std::f64::consts::TAU * mode.frequency;
+        rhs[row] = -along.dot(&held) - 2.0 * mode.zeta * omega * rate - omega * omega * eta;
+        force -= moved;
+        torque -= at.cross(&moved) + y.cross(&held) + w.cross(&about) * rate;
+    }
     rhs.rows_mut(0, 3).copy_from(&force);
     rhs.rows_mut(3, 3).copy_from(&torque);
     if p.mount == Mount::Pivot {
@@ -377,7 +403,8 @@ fn solve_with(mistake: Mistake, p: &Parameters, x: &[f64; STATES], u: &Inputs) -
         wrench[*i][0] += f;
         wrench[*i][1] += rho.cross(&f);
     }
-    Solution { a, w_d, p_dd, wrench }
+    let eta_dd = y.as_slice()[first..].to_vec();
+    Solution { a, w_d, p_dd, eta_dd, wrench }
 }
 
 /// Rates of attitude, angular velocity, directions and their rates; the others are 0.
@@ -387,6 +414,8 @@ pub(super) fn newton_rates(p: &Parameters, x: &[f64; STATES], u: &Inputs) -> [f6
     let turned = Quaternion::new(x[0], x[1], x[2], x[3]) * Quaternion::new(0.0, w[0], w[1], w[2]);
     rate[..4].copy_from_slice(&[turned.w, turned.i, turned.j, turned.k].map(|x| x / 2.0));
     rate[index::OMEGA..][..3].copy_from_slice(now.w_d.as_slice());
+    rate[index::ETA..index::ETA_DOT].copy_from_slice(&x[index::ETA_DOT..]);
+    rate[index::ETA_DOT..][..p.appendages].copy_from_slice(&now.eta_dd);
     let mut bobs = now.p_dd.iter();
     for i in 0..p.tanks {
         for n in 0..p.tank[i].modes {
@@ -477,6 +506,26 @@ fn bobs_on_surfaces_follow_newtons_law_with_the_surface_as_a_constraint() {
     assert!(compared > 300);
 }
 
+/// Appendages among tanks that slosh in every way, at large deflections and rates.
+#[test]
+fn appendages_follow_newtons_law_of_each_mode_with_its_acceleration_as_unknown() {
+    for seed in 0..200 {
+        let (mut random, mut p, mut x, u) = anywhere_with(seed, |random, tank| {
+            if seed % 3 == 1 {
+                random.make_planar(tank);
+            }
+            if seed % 5 == 1 {
+                random.bend(tank);
+            }
+        });
+        random.flex(&mut p);
+        for (j, mode) in p.appendage[..p.appendages].iter().enumerate() {
+            (x[index::ETA + j], x[index::ETA_DOT + j]) = (mode.eta, mode.eta_dot);
+        }
+        compare_with_newton(seed, (random, p, x, u));
+    }
+}
+
 fn compare_with_newton(
     seed: u64,
     (mut random, mut p, x, u): (Random, Parameters, [f64; STATES], Inputs),
@@ -498,6 +547,9 @@ fn compare_with_newton(
         let v_d = rotation(&x[..4]) * want.a;
         assert_close(&rate[index::VELOCITY..][..3], v_d.as_slice(), size, ROUNDING, &what);
     }
+    let eta_dd = &rate[index::ETA_DOT..][..p.appendages];
+    assert_close(eta_dd, &want.eta_dd, size, ROUNDING, &what);
+    assert_eq!(rate[index::ETA..index::ETA_DOT], x[index::ETA_DOT..], "{what}");
     let mut bobs = want.p_dd.iter();
     for i in 0..p.tanks {
         for n in 0..p.tank[i].modes {

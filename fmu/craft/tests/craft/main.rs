@@ -3,6 +3,7 @@
 //! `tests/six`, at the root of the project, shows that the packed FMUs compute the same bits, and has the coupling by
 //! co-simulation.
 
+mod appendages;
 mod balances;
 mod ball;
 mod ball_on_host;

@@ -1,8 +1,8 @@
 //! Random craft, states and inputs, of the sizes that spacecraft have.
 
 use craft::{
-    Craft, DampingLaw, FillTable, Inertia, Init, Inputs, Line, Mount, POINTS, Parameters, Pivot,
-    PivotFriction, Ramp, TANKS, Tank,
+    APPENDAGES, Craft, DampingLaw, FillTable, Inertia, Init, Inputs, Line, Mount, POINTS,
+    Parameters, Pivot, PivotFriction, Ramp, TANKS, Tank,
 };
 
 pub struct Random(fastrand::Rng);
@@ -164,6 +164,24 @@ impl Random {
                 velocity: self.vector(2.0),
             },
             ..Parameters::default()
+        }
+    }
+
+    /// Gives a craft up to six modes of appendages, below 2 Hz, that carry a tenth of its mass and inertia each at most and start
+    /// at deflections that no appendage survives.
+    pub fn flex(&mut self, p: &mut Parameters) {
+        let (mass, moment) = (p.craft.mass.sqrt(), p.craft.j.xx.min(p.craft.j.zz).sqrt());
+        p.appendages = 1 + self.below(APPENDAGES);
+        for appendage in &mut p.appendage[..p.appendages] {
+            let [along, about]: [[f64; 3]; 2] =
+                [self.vector(0.1 * mass), self.vector(0.1 * moment)];
+            appendage.participation[..3].copy_from_slice(&along);
+            appendage.participation[3..].copy_from_slice(&about);
+            appendage.position = self.vector(0.6);
+            appendage.frequency = self.magnitude(0.2, 2.0);
+            appendage.zeta = [0.0, self.magnitude(0.001, 0.1)][self.below(2)];
+            appendage.eta = self.between(-0.1, 0.1) * mass;
+            appendage.eta_dot = self.between(-0.3, 0.3) * mass;
         }
     }
 

@@ -52,6 +52,10 @@ pub struct PackArgs {
     /// modes, HubSlosh has 10; the binary is the same for any number.
     #[arg(long, value_name = "NUMBER", conflicts_with_all = ["python", "sdist", "arrays"])]
     modes: Option<usize>,
+    /// Number of modes of flexible appendages whose variables the model description contains, with --tanks or --modes.
+    /// Spacecraft has 6 of them [default: 0].
+    #[arg(long, value_name = "NUMBER", conflicts_with_all = ["python", "sdist", "arrays"])]
+    appendages: Option<usize>,
     /// File of parameters (.toml, .ssv, .json) that become the start values of the FMU, so that a host does not have to set
     /// them. This option needs --tanks or --modes.
     #[arg(long, value_name = "FILE")]
@@ -88,6 +92,7 @@ impl PackArgs {
         let name =
             limits.iter().fold(model.name.to_string(), |name, limit| match limit.parameter {
                 "tanks" => format!("{name}_{}", limit.size),
+                "appendages" if limit.size == 0 => name,
                 _ if limits.len() > 1 => format!("{name}x{}", limit.size),
                 _ => format!("{name}_{}", limit.size),
             });
@@ -108,7 +113,7 @@ impl PackArgs {
 }
 
 impl PackArgs {
-    /// Returns the limits that `--tanks` and `--modes` put on all sizes of the FMU; empty without these
+    /// Returns the limits that `--tanks`, `--modes` and `--appendages` put on all sizes of the FMU; empty without these
     /// options.
     fn limits(&self) -> Result<Vec<Limit<'static>>> {
         let sizes = match self.model.name {
@@ -125,10 +130,20 @@ impl PackArgs {
         );
         if self.tanks.is_none() && self.modes.is_none() {
             ensure!(self.parameters.is_none(), "--parameters needs --tanks or --modes");
+            ensure!(self.appendages.is_none(), "--appendages needs --tanks or --modes");
             return Ok(Vec::new());
         }
+        ensure!(
+            self.appendages.is_none() || has_tanks,
+            "{} has no appendages: --appendages is for Spacecraft",
+            self.model.name
+        );
         let limit = |size: &'static names::Size| {
-            let given = if size.parameter == "tanks" { self.tanks } else { self.modes };
+            let given = match size.parameter {
+                "tanks" => self.tanks,
+                "appendages" => Some(self.appendages.unwrap_or(0)),
+                _ => self.modes,
+            };
             Limit {
                 parameter: size.parameter,
                 size: given.unwrap_or(size.most),
@@ -139,8 +154,12 @@ impl PackArgs {
         };
         let limits: Vec<_> = sizes.iter().map(limit).collect();
         for Limit { parameter, size, most, .. } in &limits {
-            let option = if *parameter == "tanks" { "--tanks" } else { "--modes" };
-            ensure!((1..=*most).contains(size), "{option} {size} (allowed: 1 to {most})");
+            let (option, least) = match *parameter {
+                "tanks" => ("--tanks", 1),
+                "appendages" => ("--appendages", 0),
+                _ => ("--modes", 1),
+            };
+            ensure!((least..=*most).contains(size), "{option} {size} (allowed: {least} to {most})");
         }
         Ok(limits)
     }
