@@ -55,8 +55,8 @@ fn pages_of_variables_have_the_start_values_of_all_components() {
     assert_eq!(row(&page, "a[1..3]"), "0");
 }
 
-/// Returns the number of scalar parameters, and the number of those that a craft with one tank of one mode
-/// has.
+/// Returns the number of scalar parameters, and the number of those that a craft with one tank of one mode and
+/// without appendages has.
 fn parameters<M: Model>() -> [usize; 2] {
     /// Arrays of a tank whose first index is the mode.
     const OF_MODES: [&str; 30] = [
@@ -94,6 +94,9 @@ fn parameters<M: Model>() -> [usize; 2] {
     let all = M::table().parameters();
     let is_further = |s: &Scalar<M>| {
         let indices = s.variable.indices(s.element);
+        if s.variable.name.starts_with("appendage[]") {
+            return true;
+        }
         let field = s.variable.name.strip_prefix("tank[].");
         field.is_some_and(|field| indices[0] > 0 || OF_MODES.contains(&field) && indices[1] > 0)
     };

@@ -22,6 +22,7 @@ from typing import Any
 # numpy, pandas and scipy take 0.3 to 1.2 s to import: each module comes on the first use of
 # one of its names (PEP 562). Type checkers read __init__.pyi, which tests/test_import.py writes.
 _MODULES = {
+    "appendages": ("Appendage",),
     "certificate": ("Certificate", "WorstCase"),
     "checking": ("Checked", "CheckedRule", "Finding", "check"),
     "comparison": ("compare",),

@@ -2,6 +2,7 @@
 # ruff: noqa: I001
 from . import attitude as attitude
 from . import plot as plot
+from .appendages import Appendage as Appendage
 from .certificate import Certificate as Certificate
 from .certificate import WorstCase as WorstCase
 from .checking import Checked as Checked

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import native
+from .appendages import Appendage
 from .arguments import caller, floats, vector
 from .engines import Engine, pulse_history, resultant
 from .fmu import Fmu, FmuError, FmuWarning, Parameters, Quantity
@@ -21,6 +22,7 @@ from .quantities import (
     DELAY,
     RESERVED,
     Modes,
+    Names,
     apply_changes,
     full_names,
     mode_quantity,
@@ -57,6 +59,9 @@ BEYOND_THIRD_ORDER = re.compile(r"\.(nonlinear_(inertia|stiffness)_2|rotary_iner
 
 MOST_TANKS = 4
 """Number of tanks that Spacecraft has."""
+
+MOST_MODES = 6
+"""Number of modes of appendages that Spacecraft has."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -255,6 +260,9 @@ class Craft:
     engines : mapping of Engine
         Engines by name. Those that burn act with ``thrust``; O of the FMU then lies on the line of
         action of their resultant. A torque about this line, of engines that are canted, is left.
+    appendages : mapping of Appendage
+        Flexible appendages by name, with six modes in all at most. Their mass and inertia,
+        undeformed, belong to ``mass``, ``inertia`` and ``center_of_mass``.
 
     Raises
     ------
@@ -285,6 +293,7 @@ class Craft:
     gravity: float | None = None
     model: str | Path = "Spacecraft"
     engines: Mapping[str, Engine] = field(default_factory=dict)
+    appendages: Mapping[str, Appendage] = field(default_factory=dict)
     _known: dict[Any, Any] = field(default_factory=dict, init=False)
     _said: list[str] = field(default_factory=list, init=False)
 
@@ -328,8 +337,40 @@ class Craft:
                     problems.append(f"tank {name} must be a MountedTank, not {tank!r}")
                     continue
                 problems += [f"tank {name}: {problem}" for problem in tank.problems()]
+        problems += self._wrong_appendages()
         if problems:
             raise FmuError("; ".join(problems))
+
+    def _wrong_appendages(self) -> list[str]:
+        if not isinstance(self.appendages, Mapping):
+            return [f"appendages must be Appendage by name, not {self.appendages!r}"]
+        problems, count = [], 0
+        for name, appendage in self.appendages.items():
+            if not isinstance(name, str) or not name or RESERVED.fullmatch(name):
+                problems.append(
+                    f"an appendage cannot have the name {name!r}: it must be a text, and no "
+                    "parameter of the FMU may begin with it"
+                )
+            if isinstance(self.tanks, Mapping) and name in self.tanks:
+                problems.append(f"{name} is a tank and an appendage: give them different names")
+            if not isinstance(appendage, Appendage):
+                problems.append(f"appendage {name} must be an Appendage, not {appendage!r}")
+                continue
+            wrong = appendage.problems()
+            problems += [f"appendage {name}: {problem}" for problem in wrong]
+            count += 0 if wrong else appendage.count
+        if count > MOST_MODES:
+            problems.append(
+                f"appendages have {count} modes in all (allowed: up to {MOST_MODES}): keep those "
+                "with the largest participation"
+            )
+        return problems
+
+    @property
+    def _names(self) -> Names:
+        """Names of tanks, and of appendages mode by mode, in the FMU's order."""
+        modes = [name for name, of in self.appendages.items() for _ in range(of.count)]
+        return Names.collect(self.tanks, modes)
 
     def _inertia(self) -> Vector:
         try:
@@ -619,7 +660,8 @@ class Craft:
             (Hz, under the thrust that acts; the height of the slosh mass stays), ``zeta[1]``,
             ``mass[1]`` (kg) and ``bob[1]`` (height of the slosh mass, m; mass, centre and inertia
             of the liquid stay). ``craft.Jxx``, … and every other parameter of the FMU are
-            allowed, too.
+            allowed, too. A mode of an appendage has the appendage's name: ``array.frequency[1]``
+            and ``array.zeta[1]``.
         trimmed : bool
             Trim the craft, see `trim`. False leaves the thrust at O, with a warning if it turns the
             craft.
@@ -715,7 +757,7 @@ class Craft:
     ) -> tuple[dict[str, Quantity], dict[str, Quantity], Any]:
         """Return untrimmed parameters, quantities of slosh modes and the delay, or None."""
         every = self._untrimmed(fill, **options)
-        given = full_names(parameters_of(parameters), Fmu.open(self.model), self.tanks)
+        given = full_names(parameters_of(parameters), Fmu.open(self.model), self._names)
         late = given.pop(DELAY, None)
         modes = {name: given.pop(name) for name in list(given) if mode_quantity(name)}
         return every | given, modes, late
@@ -740,7 +782,7 @@ class Craft:
             point = OperatingPoint(model, dict(every), none, none, tuple(self.tanks))
         # they leave the centre of mass where it is
         if modes or factors:
-            every = apply_changes(model, point.parameters, modes, factors, self.tanks)
+            every = apply_changes(model, point.parameters, modes, factors, self._names)
             point = replace(point, parameters=every)
         return point
 
@@ -767,6 +809,14 @@ class Craft:
         found |= {f"force[{i + 1}]": float(x) for i, x in enumerate(F)}
         found |= {f"torque[{i + 1}]": float(x) for i, x in enumerate(torque) if torque.any()}
         found |= {f"h_wheels[{i + 1}]": float(x) for i, x in enumerate(self.wheels)}
+        j = 0
+        for appendage in self.appendages.values():
+            place = vector(appendage.position, 3, "") - action
+            for mode in appendage.modes():
+                j += 1
+                mode |= {f"position[{i + 1}]": float(x) for i, x in enumerate(place)}
+                found |= {f"appendage[{j}].{key}": value for key, value in mode.items()}
+        found |= {"appendages": j} if j else {}
         tanks = self.tank_at(fill)
         for number, (name, of) in enumerate(self.tanks.items(), 1):
             prefix, place = f"tank[{number}]", vector(of.position, 3, "") - action
@@ -1175,7 +1225,7 @@ class Craft:
         """
         from .uncertainty import FACTOR, uncertain
 
-        tanks, order = self.tank_at(fill), list(self.tanks)
+        tanks, order = self.tank_at(fill), self._names
         named: dict[str, Any] = full_names(
             ranges, Fmu.open(self.model), order, [FACTOR]  # type: ignore[arg-type]
         )  # fmt: skip
@@ -1206,7 +1256,7 @@ class Craft:
         if problems:
             raise FmuError("; ".join(problems))
         model = uncertain(point.parameters, named, outputs=outputs, model=point.model, **options)
-        return replace(model, tanks=tuple(order))
+        return replace(model, tanks=order)
 
     def simulate(
         self,
@@ -1438,7 +1488,8 @@ class Craft:
 
     def __repr__(self) -> str:
         """Return the craft in a line."""
-        return f"Craft({self.mass:g} kg dry, tanks: {', '.join(self.tanks) or 'none'})"
+        modes = f", appendages: {', '.join(self.appendages)}" if self.appendages else ""
+        return f"Craft({self.mass:g} kg dry, tanks: {', '.join(self.tanks) or 'none'}{modes})"
 
     def __str__(self) -> str:
         """Return the craft in at most ten lines."""
@@ -1455,6 +1506,7 @@ class Craft:
             f"tank {number} {name}: {tank.describe()}"
             for number, (name, tank) in enumerate(self.tanks.items(), 1)
         ]
+        lines += [f"appendage {name}: {of.describe()}" for name, of in self.appendages.items()]
         return "\n".join(lines)
 
 

@@ -1,6 +1,7 @@
 """The operating point of Spacecraft: its thrust acts through the centre of mass, as after trimming.
 
 Otherwise the craft would turn faster and faster, and a linear model would hold only at its start.
+Appendages are deformed as the steady thrust deforms them, so that they rest.
 """
 
 import warnings
@@ -106,8 +107,9 @@ def _row(values: Vector) -> str:
 def trim(model: str | Path, parameters: Parameters, tanks: Sequence[str] = ()) -> OperatingPoint:
     """Return the operating point of Spacecraft whose thrust acts through the centre of mass.
 
-    The origin O, and with it the thrust, is moved across the direction of the thrust. A craft
-    without thrust, or on a pivot, is returned unchanged.
+    The origin O, and with it the thrust, is moved across the direction of the thrust. Appendages
+    get the displacements ``eta_0`` at which they rest under the thrust. A craft without thrust, or
+    on a pivot, is returned unchanged.
     """
     every, none = dict(parameters), np.zeros(3)
     fmu = Fmu.open(model)
@@ -120,15 +122,32 @@ def trim(model: str | Path, parameters: Parameters, tanks: Sequence[str] = ()) -
             return np.array(plant.get([f"{name}[{i}]" for i in (1, 2, 3)]))
 
         force, center, before = get("force"), get("center_of_mass"), get("omega_dot")
-        kind, mount, count = plant.get(["mount_kind", "mount", "tanks"])
+        kind, mount, count, modes = plant.get(["mount_kind", "mount", "tanks", "appendages"])
         if (kind or mount) != 1 or not force.any():
             return OperatingPoint(model, every, none, before, tuple(tanks))
+        names = [f"appendage[{j}]." for j in range(1, int(modes) + 1)]
+        deflections = _deflections(plant, names, force / plant.get(["mass"])[0])
+        if any(deflections.values()):
+            every |= deflections
+            with Plant(model, every) as deformed:
+                center = np.array(deformed.get([f"center_of_mass[{i}]" for i in (1, 2, 3)]))
         shift = center - force * (force @ center) / (force @ force)
         places = ["craft.r", *(f"tank[{number}].position" for number in range(1, int(count) + 1))]
+        places += [f"{name}position" for name in names]
         for place in places:
             moved = get(place) - shift
             every |= {f"{place}[{i + 1}]": float(x) for i, x in enumerate(moved)}
     return OperatingPoint(model, every, shift, before, tuple(tanks))
+
+
+def _deflections(plant: Plant, names: Sequence[str], force: Vector) -> dict[str, Quantity]:
+    """Return the modal displacements of appendages under a steady specific force, m/s²."""
+    found: dict[str, Quantity] = {}
+    for name in names:
+        along = np.array(plant.get([f"{name}participation[{i}]" for i in (1, 2, 3)]))
+        omega = 2 * np.pi * plant.get([f"{name}frequency"])[0]
+        found |= {f"{name}eta_0": float(-(along @ force) / omega**2), f"{name}eta_dot_0": 0.0}
+    return found
 
 
 def is_spacecraft(fmu: Fmu) -> bool:

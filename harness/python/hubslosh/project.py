@@ -2,11 +2,12 @@
 
 ``python -m hubslosh.project PROJECT.toml …`` is what ``hubslosh review`` calls. The keys of the
 file are the arguments of `Craft.review`; the table ``craft`` has those of `Craft`, each table of
-``craft.tanks`` those of `MountedTank`, each of ``craft.engines`` those of `Engine`. ``controller``
-is a matrix of gains, a table with the matrices ``A``, ``B``, ``C``, ``D`` or with ``num`` and
-``den`` of transfer functions (in discrete time also ``period``), or ``"FILE.py:NAME"``: a
-controller, or a function without arguments that returns one, which is run. Each table of ``cases``
-has arguments that replace those of the file, and a table ``craft`` with values of the craft.
+``craft.tanks`` those of `MountedTank`, of ``craft.engines`` those of `Engine`, of
+``craft.appendages`` those of `Appendage`. ``controller`` is a matrix of gains, a table with the
+matrices ``A``, ``B``, ``C``, ``D`` or with ``num`` and ``den`` of transfer functions (in discrete
+time also ``period``), or ``"FILE.py:NAME"``: a controller, or a function without arguments that
+returns one, which is run. Each table of ``cases`` has arguments that replace those of the file, and
+a table ``craft`` with values of the craft.
 """
 
 import argparse
@@ -22,6 +23,7 @@ from typing import Any
 
 import numpy as np
 
+from .appendages import Appendage
 from .comparison import compare
 from .craft import Craft, MountedTank
 from .engines import Engine
@@ -32,6 +34,8 @@ from .review import Review
 from .tanks import toml_key, toml_of
 from .temporary import write_file
 
+# Parts of a craft by name, which have tables of their own in the file
+PARTS = {"tanks": MountedTank, "engines": Engine, "appendages": Appendage}
 OWN = ("controller", "craft", "cases")  # Keys of a project that are no arguments of `Craft.review`
 
 
@@ -145,10 +149,10 @@ class Project:
         craft = {
             of.name: getattr(self.craft, of.name)
             for of in fields(Craft)
-            if of.init and of.name not in ("tanks", "engines")
+            if of.init and of.name not in PARTS
         }
         parts = [toml_of(top), f"\n[craft]\n{toml_of(_set(Craft, craft))}"]
-        for kind, of in (("tanks", MountedTank), ("engines", Engine)):
+        for kind, of in PARTS.items():
             for name, one in getattr(self.craft, kind).items():
                 values = _set(of, {f.name: getattr(one, f.name) for f in fields(of)})
                 if "source" in values and not isinstance(values["source"], Mapping):
@@ -184,7 +188,7 @@ class Project:
         found = {}
         for name, case in self.cases.items():
             changes = dict(_table(case, "craft", {}))
-            allowed = {f.name for f in fields(Craft) if f.init} - {"tanks", "engines"}
+            allowed = {f.name for f in fields(Craft) if f.init} - set(PARTS)
             if wrong := [key for key in changes if key not in allowed]:
                 names = ", ".join(sorted(allowed))
                 raise FmuError(f"cases.{name}.craft has {', '.join(wrong)} (allowed: {names})")
@@ -276,7 +280,7 @@ def _masses(fills: Any) -> Any:
 
 def _craft(given: Mapping[str, Any], folder: Path) -> Craft:
     parts: dict[str, Any] = {}
-    for kind, of in (("tanks", MountedTank), ("engines", Engine)):
+    for kind, of in PARTS.items():
         parts[kind] = {}
         for name, values in _table(given, kind, {}).items():
             if isinstance(values, Mapping) and isinstance(values.get("source"), str):

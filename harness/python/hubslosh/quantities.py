@@ -23,14 +23,41 @@ KINDS = ("frequency", "zeta", "mass", "bob")
 
 DELAY = "delay"  # Delay of a loop, s
 
-# Names that no tank of a `Craft` may have: parameters of the FMU begin with them.
-RESERVED = re.compile(r"tank(\[\d\])?|craft|init|pivot|solver|delay|force|torque|omega|q")
+# Names that no tank or appendage of a `Craft` may have: parameters of the FMU begin with them.
+RESERVED = re.compile(
+    r"(tank|appendage)(\[\d\])?|appendages|craft|init|pivot|solver|delay|force|torque|omega|q"
+)
 
 # What is wrong with a quantity of a mode that the tank does not have.
 NO_MODE = "does not exist: its tank has no such mode"
 
 _MODE_QUANTITY = re.compile(rf"tank\[(\d)\]\.({'|'.join(KINDS)})\[(\d)\]")
 _MOVES_THE_BOB = re.compile(r"(tank\[\d\])\.(length|hinge)(\[\d\])")
+
+
+class Names(tuple[str, ...]):
+    """Names of a craft's tanks in the FMU's order, and of its appendages, mode by mode."""
+
+    appendages: tuple[str, ...] = ()
+
+    @classmethod
+    def collect(cls, tanks: Iterable[str], appendages: Iterable[str] = ()) -> "Names":
+        """Return the names; ``appendages`` has the appendage of each of the FMU's modes."""
+        if isinstance(tanks, Names):
+            return tanks
+        found = cls(tanks)
+        found.appendages = tuple(appendages)
+        return found
+
+    def prefixes(self) -> list[tuple[str, str, int]]:
+        """Return how the FMU's names begin, the name of the tank or appendage, and the mode.
+
+        The mode of a tank is 0. For example ``appendage[3].`` belongs to mode 1 of ``array``.
+        """
+        found = [(f"tank[{number}].", name, 0) for number, name in enumerate(self, 1)]
+        for j, name in enumerate(self.appendages, 1):
+            found.append((f"appendage[{j}].", name, self.appendages[:j].count(name)))
+        return found
 
 
 @dataclass(frozen=True)
@@ -59,25 +86,38 @@ def mode_quantity(name: str) -> ModeQuantity | None:
 
 
 def full_name(name: str, tanks: Iterable[str]) -> str:
-    """Return a name with the number of the tank in place of the tank's name.
+    """Return a name with the number of the tank or mode in place of the name of tank or appendage.
 
-    For example ``NTO.zeta[1]`` becomes ``tank[1].zeta[1]``.
+    For example ``NTO.zeta[1]`` becomes ``tank[1].zeta[1]``, and ``array.zeta[1]`` becomes
+    ``appendage[3].zeta``.
     """
-    found = [(tank, number) for number, tank in enumerate(tanks, 1) if name.startswith(f"{tank}.")]
-    if not found:
-        return name
-    tank, number = max(found, key=lambda row: len(row[0]))
-    return f"tank[{number}]{name.removeprefix(tank)}"
+    found = []
+    for prefix, owner, mode in Names.collect(tanks).prefixes():
+        if not name.startswith(f"{owner}."):
+            continue
+        kind = name.removeprefix(f"{owner}.")
+        if mode:
+            match = re.fullmatch(rf"(\w+)\[{mode}(?:,(\d+))?\]", kind)
+            if not match:
+                continue
+            kind = match[1] + (f"[{match[2]}]" if match[2] else "")
+        found.append((len(owner), prefix + kind))
+    return max(found)[1] if found else name
 
 
 def short_name(name: str, tanks: Iterable[str]) -> str:
-    """Return a name with the name of the tank in place of the tank's number.
+    """Return a name with the name of the tank or appendage in place of the number.
 
-    For example ``tank[1].zeta[1]`` becomes ``NTO.zeta[1]``.
+    For example ``tank[1].zeta[1]`` becomes ``NTO.zeta[1]``, and ``appendage[3].zeta`` becomes
+    ``array.zeta[1]``.
     """
-    for number, tank in enumerate(tanks, 1):
-        if name.startswith(prefix := f"tank[{number}]."):
-            return f"{tank}.{name.removeprefix(prefix)}"
+    for prefix, owner, mode in Names.collect(tanks).prefixes():
+        if name.startswith(prefix):
+            kind = name.removeprefix(prefix)
+            if mode:
+                kind, _, element = kind.removesuffix("]").partition("[")
+                kind = f"{kind}[{mode},{element}]" if element else f"{kind}[{mode}]"
+            return f"{owner}.{kind}"
     return name
 
 
@@ -87,12 +127,15 @@ def unknown(name: str, fmu: Fmu, tanks: Iterable[str], also: Iterable[str] = ())
     ``also`` has names that are allowed in addition to the FMU's variables, the quantities of slosh
     modes and the delay.
     """
-    tanks, also = list(tanks), [DELAY, *also]
+    tanks, also = Names.collect(tanks), [DELAY, *also]
     full = full_name(name, tanks)
     if full in also or mode_quantity(full) or full in fmu.variables:
         return ""
     numbers = [f"tank[{number}]." for number in range(1, len(tanks) + 1)]
-    known = [n for n in fmu.variables if n[:5] != "tank[" or n.startswith(tuple(numbers))]
+    used = tuple(prefix for prefix, _, _ in tanks.prefixes())
+    known = [
+        n for n in fmu.variables if not n.startswith(("tank[", "appendage[")) or n.startswith(used)
+    ]
     known += [f"{number}bob[{n}]" for number in numbers for n in (1, 2, 3)]
     short = [short_name(n, tanks) for n in known]
     return f"the craft has no quantity {name}{did_you_mean(name, [*also, *short, *known])}"
@@ -106,7 +149,7 @@ def full_names(
     Raises FmuError for names that are not quantities of a craft (see `unknown`), and for a quantity
     that is given under both of its names.
     """
-    tanks, found = list(tanks), dict[str, Quantity]()
+    tanks, found = Names.collect(tanks), dict[str, Quantity]()
     problems = [text for name in given if (text := unknown(str(name), fmu, tanks, also))]
     for name, value in given.items():
         full = full_name(str(name), tanks)

@@ -573,7 +573,7 @@ class _Space:
         parts = {name: _part(share, name) for name, share in shares.items()}
         found += _frequencies(craft, loops, parts["frequency"], ranges)
         found += _inertia([every for every, _ in given], parts["inertia"], ranges)
-        found += _quantities(loops, [every for every, _ in given], ranges, craft.tanks)
+        found += _quantities(loops, [every for every, _ in given], ranges, craft._names)
         percent = all(isinstance(f, str) and f.strip().endswith("%") for f in fills)
         if percent:
             at = [float(fill.strip()[:-1]) for fill in fills]
@@ -631,7 +631,7 @@ def _full_ranges(craft: "Craft", given: Any) -> dict[str, tuple[str, Any]]:
     if not isinstance(given, Mapping):
         raise FmuError(f'uncertain must be ranges by name, such as {{"craft.mass": (1380, 1420)}}, '
                        f"not {given!r}")  # fmt: skip
-    full = full_names(given, Fmu.open(craft.model), craft.tanks)
+    full = full_names(given, Fmu.open(craft.model), craft._names)
     return dict(zip(full, ((str(name), range_) for name, range_ in given.items()), strict=True))
 
 

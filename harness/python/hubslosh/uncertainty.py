@@ -17,12 +17,18 @@ lacks at the bob (SP-106). Compared with rigid liquid a mode is then, with s = m
     β   = E^T (a_0 + w_0' × d),  κ = S^T E^T w_0'       both 0 if the surface is at rest
     ρ   = k/(m ω²): share of a centring stiffness, which a change of ω leaves as it is
 
-It is Newton's law of the bob with the rod eliminated, linearised (book, Spacecraft: equations); m
-scales the state, so it multiplies α alone. M_tot X = m_b [A; r_b × A] + [0; J w'] + liquid, with
-A = a + w' × r_b. The products give the repetitions: m 2, ζ 2, ω 4, b 4 of each mode, γ 2 for each
-mode, dry mass 3, a moment of inertia 1, a product of inertia 2, a coordinate of r_b 4. With a
-surface that is not at rest ω and b may have 1 or 2 more. What the loop does not need goes: each
-repeated block is reduced to its controllable and observable part, exactly.
+A mode of an appendage has the participation u = [p; r + P × p] about O and the displacement η_0 at
+the point, with y = p η and D, the derivative of the inertia about O by η:
+
+    η'' = -u·δX - ω (ω η + 2 ζ η')         M_tot has the first moment p η_0 and the inertia D η_0
+    M_tot δX = … - u η'' - [w_0' × y; y × a_0 + D w_0' η]
+
+The tanks' equations are Newton's law of the bob with the rod eliminated, linearised (book,
+Spacecraft: equations); m scales the state, so it multiplies α alone. M_tot X = m_b [A; r_b × A] +
+[0; J w'] + liquid, with A = a + w' × r_b. The products give the repetitions: m 2, ζ 2, ω 4, b 4 of
+each mode, γ 2 for each mode, dry mass 3, a moment of inertia 1, a product of inertia 2, a
+coordinate of r_b 4. With a surface that is not at rest ω and b may have 1 or 2 more. What the loop
+does not need goes: each repeated block is reduced to its controllable and observable part, exactly.
 """
 
 import json
@@ -104,6 +110,19 @@ class _Tank:
 
 
 @dataclass(frozen=True)
+class _Mode:
+    """A mode of an appendage: u, the mass matrix per displacement, and the displacement."""
+
+    number: int
+    u: Matrix
+    body: Matrix
+    eta: float
+
+    def name(self, kind: str) -> str:
+        return f"appendage[{self.number}].{kind}"
+
+
+@dataclass(frozen=True)
 class _Craft:
     """Spacecraft at rest: what the equations need that is not uncertain, and all other values."""
 
@@ -114,6 +133,18 @@ class _Craft:
     """Mass matrix of all liquid, rigid, about O."""
     wrench: Matrix
     wheels: Matrix
+    modes: tuple[_Mode, ...] = ()
+
+    def deformed(self) -> Matrix:
+        """Return the mass matrix that the deflections of appendages add."""
+        return sum((mode.eta * mode.body for mode in self.modes), np.zeros((6, 6)))
+
+    def pull(self, values: Mapping[str, float]) -> Matrix:
+        """Return force and torque by which deformed appendages at rest pull the craft."""
+        pulls = (
+            (TURN * values[mode.name("frequency")]) ** 2 * mode.eta * mode.u for mode in self.modes
+        )
+        return sum(pulls, np.zeros(6))
 
     def dry(self, values: Mapping[str, float]) -> tuple[float, Matrix, Matrix]:
         """Return mass, centre of mass and inertia of the dry craft."""
@@ -128,13 +159,15 @@ class _Craft:
 
     def accelerations(self) -> tuple[Matrix, Matrix]:
         """Return the accelerations X of one rigid body, and those with moving slosh masses."""
-        matrices = self.rigid(), self.mass_matrix(self.values)
-        whole, moving = (np.linalg.solve(M, self.wrench) for M in matrices)
-        return whole, moving
+        whole = np.linalg.solve(self.rigid(), self.wrench)
+        load = self.wrench + self.pull(self.values)
+        return whole, np.linalg.solve(self.mass_matrix(self.values), load)
 
     def mass_matrix(self, values: Mapping[str, float]) -> Matrix:
-        """Return the mass matrix without the motion of the slosh masses across their axes."""
-        M = _rigid(*self.dry(values)) + self.liquid
+        """Return the mass matrix without the motion of appendages, and of slosh masses across."""
+        M = _rigid(*self.dry(values)) + self.liquid + self.deformed()
+        for mode in self.modes:
+            M = M - np.outer(mode.u, mode.u)
         for bob in self.bobs:
             tank = self.tanks[bob.tank]
             E, b = tank.axes[:, :2], values[bob.name("bob")]
@@ -225,10 +258,25 @@ def _read(
                 at = tank.origin + (hinge - length) * axes[:, 2]
                 liquid += _rigid(m, at, np.zeros((3, 3)))
                 drags.append((bob, zeta, floor or 1e-4 * g_ref, int(kind or law)))
+        modes = []
+        for number in range(1, int(get("appendages")[0]) + 1):
+            of = f"appendage[{number}]"
+            participation, place = vector(f"{of}.participation", 6), vector(f"{of}.position")
+            eta, eta_dot, frequency, zeta = get(*(
+                f"{of}.{name}" for name in ("eta", "eta_dot", "frequency", "zeta")
+            )).tolist()  # fmt: skip
+            if eta_dot:
+                problems.append(f"{of} must be at rest: eta_dot_0 = 0")
+            p = participation[:3]
+            u = np.concatenate([p, participation[3:] + np.cross(place, p)])
+            growth = 2 * (p @ place) * np.eye(3) - np.outer(p, place) - np.outer(place, p)
+            body = np.block([[np.zeros((3, 3)), -_cross(p)], [_cross(p), growth]])
+            modes.append(mode := _Mode(number, u, body, eta))
+            values |= {mode.name("frequency"): frequency, mode.name("zeta"): zeta}
         if problems:
             raise FmuError("; ".join(problems))
         wrench = np.concatenate([vector("force"), vector("torque")])
-        found = _Craft(values, tanks, tuple(bobs), liquid, wrench, vector("h_wheels"))
+        found = _Craft(values, tanks, tuple(bobs), liquid, wrench, vector("h_wheels"), tuple(modes))
     # the drag follows the acceleration of craft and liquid as one rigid body (damping.rs)
     whole, moving = held or found.accelerations()
     for bob, zeta, floor, law in drags:
@@ -374,7 +422,7 @@ def _partitioned(
     states = [*OUTPUTS, *(
         f"tank[{bob.tank}].{of}[{bob.mode},{i}]"
         for bob in craft.bobs for of in ("p", "p_dot") for i in (1, 2)
-    )]  # fmt: skip
+    ), *(mode.name(of) for mode in craft.modes for of in ("eta", "eta_dot"))]  # fmt: skip
     n, m = len(states), len(INPUTS)
     eq = _Equations(n + m + 6, values, spread)
     x, u, X = eq.unit(0, n), eq.unit(n, m), eq.unit(n + m, 6)
@@ -406,7 +454,16 @@ def _partitioned(
         force = E @ R + e[:, None] @ tension
         load[:3] += force
         load[3:] += d @ force + E @ S @ (eq.times(height, R) + g * scaled)
-    wet = craft.liquid @ X
+    first = 6 + 4 * len(craft.bobs)
+    for k, flexing in enumerate(craft.modes):
+        s, s_d = (x[first + 2 * k + i][None] for i in (0, 1))
+        frequency, zeta = (flexing.name(kind) for kind in KINDS[:2])
+        stiff = TURN * eq.times(frequency, s) + 2 * eq.times(zeta, s_d)
+        R = flexing.u[None] @ X + TURN * eq.times(frequency, stiff)
+        rates += [s_d, -R]
+        load += flexing.u[:, None] @ R
+        load -= (flexing.body @ X_0)[:, None] @ eq.times(FACTOR, s)
+    wet = (craft.liquid + craft.deformed()) @ X
     # the dry craft: one product for each way in which a parameter acts
     accelerated = a.copy()
     turn = [_cross(np.eye(3)[i]) for i in range(3)]
@@ -688,6 +745,9 @@ class UncertainModel:
         new: dict[str, Quantity] = dict(self.given)
         new |= {name: values[name] for name in craft.values if name.startswith("craft.")}
         wrench, J = values[FACTOR] * craft.mass_matrix(values) @ self._X_0, craft.dry(values)[2]
+        wrench = wrench - craft.pull(values)
+        for mode in craft.modes:
+            new |= {mode.name(kind): values[mode.name(kind)] for kind in KINDS[:2]}
         new |= {name: float(x) for name, x in zip(INPUTS, wrench, strict=True)}
         if commanded:
             new = {name: x for name, x in new.items() if not name.startswith("torque[")}
@@ -1094,7 +1154,7 @@ class UncertainModel:
 
 def _kind(name: str) -> str:
     """Return a quantity without its tank and number: "zeta" of "tank[1].zeta[1]"."""
-    return re.sub(r"^tank\[\d\]\.|\[\d\]$", "", name)
+    return re.sub(r"^(tank|appendage)\[\d\]\.|\[\d\]$", "", name)
 
 
 def _unknown(name: str, values: Mapping[str, float]) -> str:
@@ -1123,7 +1183,8 @@ def uncertain(
     the thrust that acts; the height of the bob and the share of a centring stiffness stay),
     ``tank[1].zeta[1]``, ``tank[1].mass[1]`` and ``tank[1].bob[1]`` (height of the slosh mass on the
     axis; mass, centre and inertia of the liquid stay), ``craft.mass``, ``craft.Jxx``, …,
-    ``craft.r[1]``, … of the dry craft, and ``acceleration``, a factor of the acceleration that
+    ``craft.r[1]``, … of the dry craft, ``appendage[1].frequency`` (Hz, with the interface held) and
+    ``appendage[1].zeta``, and ``acceleration``, a factor of the acceleration that
     force and torque give the craft. Mass and inertia change at constant acceleration.
 
     Parameters
