@@ -69,6 +69,7 @@ use crate::damping;
 use crate::parameters::{Limits, Tank};
 use crate::rigid::{Mat6, Rigid, along_rod};
 use crate::sizes::MODES;
+use crate::spin::{Spin, SpinNow};
 use crate::state::Line;
 use crate::surface::{LEAST_INERTIA, Lift, Meridian, Rotary, Surface};
 use crate::table::{FillCurves, Jet};
@@ -87,6 +88,7 @@ pub struct MountedTank {
     across: [Option<Vec3>; MODES],
     curved: bool,
     surfaces: [Option<Surface>; MODES],
+    spin: Option<Spin>,
     still: Option<[Rigid; 2]>,
 }
 
@@ -126,8 +128,8 @@ struct OnSurface<T> {
 }
 
 /// A tank's contents at an instant. The flow within the tank has the momenta K and L (`flow_momentum`) and
-/// acts on the craft with `flow_wrench` about O; `dissipation` is in W; `shrinking` holds m_0', S_0' and I_0'
-/// w of the rigid liquid.
+/// acts on the craft with `flow_wrench` about O, both with the liquid's spin; `dissipation` is in W; `shrinking` holds m_0',
+/// S_0' and I_0' w of the rigid liquid.
 pub struct Contents<'a, T> {
     mounted: &'a MountedTank,
     pub rigid: Rigid<T>,
@@ -136,6 +138,7 @@ pub struct Contents<'a, T> {
     bobs: [Option<Swing<T>>; MODES],
     pub dissipation: T,
     shrinking: (T, [Vec3<T>; 2]),
+    spin: Option<SpinNow<T>>,
 }
 
 pub fn vector_from<T: Number>(x: &[T], at: usize) -> Vec3<T> {
@@ -162,6 +165,7 @@ impl MountedTank {
             across,
             curved,
             surfaces,
+            spin: Spin::new(tank),
             still,
         };
         let still = if !tank.is_axial() {
@@ -246,18 +250,24 @@ impl MountedTank {
         Some((meridian, lift))
     }
 
-    /// Returns the contents at p and p' of each mode, `x`, tank axes. `a` and `w_d` give the acceleration
-    /// along the tank on which the drag depends. The mass of liquid, the flow and its slope have an effect
-    /// only in tanks with a table.
+    /// Returns the contents at p and p' of each mode, `x`, and the liquid's angular momentum of spin, tank axes. `a` and
+    /// `w_d` give the acceleration along the tank on which the drag depends. The mass of liquid, the flow and its slope
+    /// have an effect only in tanks with a table.
     pub fn contents<T: Number>(
         &self,
         x: &[T],
+        spin: Vec3<T>,
         motion: [Vec3<T>; 3],
         flow: (T, T, f64),
     ) -> Contents<'_, T> {
         let mut contents = Contents::new(self);
-        contents.evaluate(x, motion, flow);
+        contents.evaluate(x, self.spin_now(spin, motion[1]), motion, flow);
         contents
+    }
+
+    /// Returns the liquid's spin at its angular momentum `l`, tank axes, and the angular velocity `w`, body axes.
+    pub fn spin_now<T: Number>(&self, l: Vec3<T>, w: Vec3<T>) -> Option<SpinNow<T>> {
+        Some(self.spin.as_ref()?.now(l, w))
     }
 
     /// Writes the bobs' p' and p'' in tank axes, six numbers each, under the acceleration [a; w'].
@@ -434,6 +444,7 @@ impl<T: Number> Contents<'_, T> {
             bobs: [const { None }; MODES],
             dissipation: none,
             shrinking: (none, [zero; 2]),
+            spin: None,
         }
     }
 
@@ -442,6 +453,7 @@ impl<T: Number> Contents<'_, T> {
     pub fn evaluate(
         &mut self,
         x: &[T],
+        spin: Option<SpinNow<T>>,
         [a, w, w_d]: [Vec3<T>; 3],
         (liquid, flow, slope): (T, T, f64),
     ) {
@@ -466,6 +478,11 @@ impl<T: Number> Contents<'_, T> {
         // derivative.
         let (mut level, mut level_d) = ([zero; 2], [zero; 2]);
         let mut sinking = [c(0.0); 2];
+        if let Some(now) = &spin {
+            self.dissipation = now.dissipation;
+            (self.flow_wrench[1], self.flow_momentum[1]) = (now.torque, now.momentum);
+        }
+        self.spin = spin;
         for n in 0..tank.modes {
             let [m, l, h] = match place {
                 Some(place) => curves.mode(n, place).map(follow),
@@ -663,6 +680,11 @@ impl<T: Number> Contents<'_, T> {
             [force, cross(bob.rho, force)]
         });
         guides.fold(sum, |sum, guide| [add(sum[0], guide[0]), add(sum[1], guide[1])])
+    }
+
+    /// Returns the derivative of the liquid's angular momentum of spin, tank axes, and its energy, J.
+    pub fn spin(&self) -> Option<(Vec3<T>, T)> {
+        self.spin.as_ref().map(|now| (now.rate, now.energy))
     }
 
     /// Returns force and torque about O on the craft at a = w' = 0, without the rigid liquid's inertia.

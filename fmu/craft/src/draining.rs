@@ -1,5 +1,5 @@
-//! A craft with tanks that drain, have planar modes or other bobs than pendulums (`surface.rs`), each with its contents
-//! from `contents.rs`. Outputs and derivatives are of these equations. Steps are, too, if a tank drains; otherwise
+//! A craft with tanks that drain, have planar modes, other bobs than pendulums (`surface.rs`) or liquid that spins (`spin.rs`),
+//! each with its contents from `contents.rs`. Outputs and derivatives are of these equations. Steps are, too, if a tank drains; otherwise
 //! `motion.rs` takes them.
 //!
 //! ```text
@@ -78,7 +78,7 @@ impl Acting<Dual> {
         }
     }
 }
-/// A craft with at least one tank that can drain, or with planar modes or other bobs than pendulums.
+/// A craft with at least one tank that can drain, or with planar modes, other bobs than pendulums, or liquid that spins.
 /// `follows` is true if any drag depends on acceleration or amplitude.
 #[derive(Clone, Debug)]
 pub struct Draining {
@@ -149,7 +149,10 @@ impl System<STATES> for Run<'_> {
         let bobs = tanks.map(|(i, mounted)| index::bob(i, 0)..index::bob(i, mounted.modes()));
         let modes = self.craft.appendages.as_ref().map_or(0, Structure::len);
         let flexing = [index::ETA, index::ETA_DOT].map(|at| at..at + modes);
-        [0..index::BOBS, index::LIQUID..index::BALLS].into_iter().chain(bobs).chain(flexing)
+        let spins =
+            tanks_with_spin(&self.craft.tanks).map(|(i, _)| index::spin(i)..index::spin(i + 1));
+        let others = bobs.chain(flexing).chain(spins);
+        [0..index::BOBS, index::LIQUID..index::BALLS].into_iter().chain(others)
     }
 
     fn rates(&self, t: f64, x: &[f64; STATES]) -> [f64; STATES] {
@@ -177,8 +180,19 @@ impl System<STATES> for Run<'_> {
             [largest + speed * time, speed].map(|scale| RATE_FLOOR + scale)
         });
         let (position, velocity) = (RATE_FLOOR + position, RATE_FLOOR + velocity);
-        scales(turn, position, velocity, |at| turn + size(at), flexing)
+        let mut scale = scales(turn, position, velocity, |at| turn + size(at), flexing);
+        for (i, inertia) in tanks_with_spin(&self.craft.tanks) {
+            let at = index::spin(i);
+            scale[at..at + 3].fill(largest(inertia) * turn + size(at));
+        }
+        scale
     }
+}
+
+/// Iterates over the tanks whose liquid spins: their numbers, which count from 0, and the inertias of their liquids.
+fn tanks_with_spin(tanks: &[MountedTank]) -> impl Iterator<Item = (usize, Vec3)> + Clone {
+    let tanks = tanks.iter().enumerate();
+    tanks.filter_map(|(i, mounted)| Some((i, mounted.tank.spin_inertias()?)))
 }
 
 impl Drains<STATES> for Run<'_> {
@@ -201,8 +215,8 @@ impl Drains<STATES> for Run<'_> {
 }
 
 impl Draining {
-    /// Creates the equations; `None` if all tanks keep their liquid and have pendulums that swing in every
-    /// direction.
+    /// Creates the equations; `None` if all tanks keep their liquid, which does not spin, and have pendulums that
+    /// swing in every direction.
     pub fn new(p: &Parameters) -> Option<Draining> {
         let tanks = &p.tank[..p.tanks];
         if !tanks.iter().any(Tank::has_contents) {
@@ -353,7 +367,7 @@ impl Draining {
         &self,
         x: &[T; STATES],
         acting: &Acting<T>,
-        of_pivot: Vec3<T>,
+        couple: Option<Vec3<T>>,
         axes: &Mat3<T>,
     ) -> [Vec3<T>; 2] {
         let zero = constant::<T>([0.0; 3]);
@@ -365,8 +379,8 @@ impl Draining {
         let [centripetal, gyroscopic] = whole.inertial_wrench(zero, w, zero);
         let force = sub(acting.force, centripetal);
         let mut torque = sub(acting.torque, add(gyroscopic, cross(w, acting.h_wheels)));
-        if self.pivot.acts() {
-            torque = add(torque, of_pivot);
+        if let Some(couple) = couple {
+            torque = add(torque, couple);
         }
         self.solve(&self.equations(whole.mass_matrix()), [force, torque], axes)
     }
@@ -383,12 +397,21 @@ impl Draining {
         let axes = rotation(&q);
         let w = vector_from(x, index::OMEGA);
         let (of_pivot, by_pivot, _) = self.pivot.present(&axes, w);
-        let [a_rigid, w_d_rigid] = self.rigid_motion(x, acting, of_pivot, &axes);
+        let of_pivot = self.pivot.acts().then_some(of_pivot);
+        let mut couple = of_pivot;
+        let mut spins = [const { None }; TANKS];
+        for (i, (mounted, spin)) in self.tanks.iter().zip(&mut spins).enumerate() {
+            *spin = mounted.spin_now(vector_from(x, index::spin(i)), w);
+            if let Some(now) = spin {
+                couple = Some(couple.map_or(now.torque, |sum| add(sum, now.torque)));
+            }
+        }
+        let [a_rigid, w_d_rigid] = self.rigid_motion(x, acting, couple, &axes);
         for (i, (mounted, contents)) in self.tanks.iter().zip(contents.iter_mut()).enumerate() {
             let bobs = &x[index::bob(i, 0)..index::bob(i, 0) + 6 * MODES];
             let motion = [a_rigid, w, w_d_rigid];
             let flow = (x[index::LIQUID + i], acting.flow[i], acting.flow_slope[i]);
-            contents.insert(Contents::new(mounted)).evaluate(bobs, motion, flow);
+            contents.insert(Contents::new(mounted)).evaluate(bobs, spins[i].take(), motion, flow);
         }
         let all = || contents.iter().flatten();
         let mut rigid =
@@ -400,7 +423,7 @@ impl Draining {
         let [centripetal, gyroscopic] = rigid.inertial_wrench(zero, w, zero);
         let mut force = sub(acting.force, centripetal);
         let mut torque = sub(acting.torque, add(gyroscopic, cross(w, acting.h_wheels)));
-        if self.pivot.acts() {
+        if let Some(of_pivot) = of_pivot {
             torque = add(torque, of_pivot);
         }
         let mut matrix = rigid.mass_matrix();
@@ -459,6 +482,9 @@ impl Draining {
                 drained = drained + tank.drained(velocity, w, [a, w_d], on_pivot);
             }
             mounted.write_rates(tank, [a, w_d], |at, numbers| put(index::bob(i, 0) + at, numbers));
+            if let Some((spin_d, _)) = tank.spin() {
+                put(index::spin(i), &spin_d);
+            }
         }
         put(index::DRAINED, &[drained]);
         rate
@@ -477,6 +503,7 @@ impl Draining {
                 rigid: tank.rigid,
                 flow_momentum: tank.flow_momentum,
                 wrench: tank.wrench(a, w, w_d),
+                spin_energy: tank.spin().map(|(_, energy)| energy),
                 bobs: mounted.bobs_now(tank),
                 lump: None,
                 ball_state: BallState::Settled,

@@ -24,7 +24,8 @@
 //! `spacecraft.rs` and `slosh_tank.rs` are the two components as a host sees them. `motion.rs` has the craft's
 //! equations, `bob.rs` and `constrained.rs` those of one slosh mode, and `rigid.rs` the mass matrix. `appendage.rs` has flexible appendages, `lump.rs` describes detached liquid,
 //! `handover.rs` its impulses on the carrier. `outputs.rs` has energy and momentum. `contents.rs` describes a tank that
-//! drains by a table (`table.rs`), `draining.rs` a craft with such tanks. The crate `taylor` integrates.
+//! drains by a table (`table.rs`), `draining.rs` a craft with such tanks, and `spin.rs` liquid that spins. The crate `taylor`
+//! integrates.
 
 #![warn(missing_docs)]
 #![cfg_attr(not(test), no_std)]
@@ -49,6 +50,7 @@ mod rigid;
 mod sizes;
 mod slosh_tank;
 mod spacecraft;
+mod spin;
 mod state;
 mod surface;
 mod table;

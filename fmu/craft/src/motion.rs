@@ -27,6 +27,8 @@
 //!
 //! Bobs on other surfaces than spheres or in planes add matrices of rank one to M (constrained.rs).
 //!
+//! Liquid that spins (spin.rs) adds a couple, which depends on w and its own state only.
+//!
 //! A tank whose liquid has detached has neither rigid liquid nor bobs, but a lump and the inertia that rotates with the
 //! tank (lump.rs). Changes between the two are impulses at the roots of event functions.
 //!
@@ -59,7 +61,7 @@ use crate::lump::{Directions, Due, Lump};
 use crate::parameters::{Limits, Mount, Parameters, Tank};
 use crate::pivot::{Pivot, Rubbing};
 use crate::rigid::{Factors, Mat6, Rigid, add_rank_one, along_rod};
-
+use crate::spin::SpinSeries;
 use crate::state::{BallState, Inputs, STATES, State, index};
 
 /// Longest time over which a rate scale is estimated, s, because rates change in a step much longer than
@@ -96,8 +98,8 @@ fn hold_upper_rows(matrix: &mut Mat6) {
 /// The craft at its current state and the series of its motion. `craft` is the dry craft, `parked` the bobs
 /// of tanks whose liquid has detached, and `whole` craft and liquids at rest as one rigid body, on whose
 /// motion along the tanks the bobs' drag depends. M is `matrix`; `w_both` is (w, w); `torque` is tau - h_w'.
-/// The fields with `allowed` are 1 over the allowed errors of attitude, rate, the bobs' v, velocity, and the
-/// lumps' u.
+/// `couple` is the torque of pivot and spinning liquids, `loss_of_couple` its dissipation. The fields with `allowed` are 1 over
+/// the allowed errors of attitude, rate, the bobs' v, velocity, the lumps' u, and the spins' I^-1 L.
 #[derive(Clone, Debug)]
 pub struct CraftMotion {
     pub state: State,
@@ -108,8 +110,10 @@ pub struct CraftMotion {
     on_springs: bool,
     rubbing: Vec<Rubbing>,
     upright: Vector,
-    of_pivot: Vec3,
-    loss_of_pivot: f64,
+    spins: Vec<SpinSeries>,
+    has_couples: bool,
+    couple: Vec3,
+    loss_of_couple: f64,
     pub craft: Rigid,
     pub rigid: Rigid,
     mass_matrix: Mat6,
@@ -147,6 +151,7 @@ pub struct CraftMotion {
     inv_allowed: [f64; 4],
     lumps_allowed: f64,
     flexing_allowed: f64,
+    spins_allowed: f64,
     longest: f64,
 }
 
@@ -168,6 +173,8 @@ impl CraftMotion {
         let mass_matrix = rigid.mass_matrix();
         let pivot = if p.mount == Mount::Pivot { p.pivot } else { Pivot::default() };
         let axes = if pivot.friction.acts() { 0..3 } else { 0..0 };
+        let spins = tanks.iter().enumerate().filter_map(|(i, tank)| SpinSeries::new(tank, i));
+        let spins: Vec<_> = spins.collect();
         let mut motion = CraftMotion {
             state,
             inputs: Inputs::default(),
@@ -177,8 +184,10 @@ impl CraftMotion {
             on_springs: pivot.acts(),
             rubbing: axes.map(|i| Rubbing::new(&pivot.friction, i)).collect(),
             upright: ZERO_VECTOR,
-            of_pivot: [0.0; 3],
-            loss_of_pivot: 0.0,
+            has_couples: pivot.acts() || !spins.is_empty(),
+            spins,
+            couple: [0.0; 3],
+            loss_of_couple: 0.0,
             craft: p.craft.rigid(),
             rigid,
             mass_matrix,
@@ -221,6 +230,7 @@ impl CraftMotion {
             due: None,
             lumps_allowed: 0.0,
             flexing_allowed: 0.0,
+            spins_allowed: 0.0,
         };
         motion.has_events = !motion.lumps.is_empty() || !motion.constrained.is_empty();
         motion.freeze();
@@ -418,9 +428,10 @@ impl CraftMotion {
 
     #[inline(always)]
     fn expand_rates<const N: usize>(&mut self) {
-        // The pivot comes first. Between the sums below it would take registers from every craft, 4 % of a step.
-        if self.on_springs {
-            self.set_torque_of_pivot::<N>();
+        // The couples of pivot and spinning liquids come first. Between the sums below they would take registers from every
+        // craft, 4 % of a step.
+        if self.has_couples {
+            self.set_couples::<N>();
         }
         if self.follows {
             self.set_axial::<N>();
@@ -434,9 +445,9 @@ impl CraftMotion {
             add(gyroscopic(&self.rigid.inertia, ww), cross_ramp::<N>(&self.w, &self.h)),
         );
         let mut dissipation = 0.0;
-        if self.on_springs {
-            torque = add(torque, self.of_pivot);
-            dissipation = self.loss_of_pivot;
+        if self.has_couples {
+            torque = add(torque, self.couple);
+            dissipation = self.loss_of_couple;
         }
         for bob in &mut self.bobs {
             let [f, tau] = bob.reaction::<N>(&self.w_both, &w2);
@@ -483,13 +494,26 @@ impl CraftMotion {
     }
 
     #[inline(never)]
+    fn set_couples<const N: usize>(&mut self) {
+        (self.couple, self.loss_of_couple) = ([0.0; 3], 0.0);
+        if self.on_springs {
+            self.set_torque_of_pivot::<N>();
+        }
+        for spin in &mut self.spins {
+            let (torque, power) = spin.expand(N, self.w[N]);
+            self.couple = add(self.couple, torque);
+            self.loss_of_couple += power;
+        }
+    }
+
+    #[inline(always)]
     fn set_torque_of_pivot<const N: usize>(&mut self) {
         let ww = products::<N>(&self.w);
-        (self.of_pivot, self.loss_of_pivot) = self.pivot.load::<N>(&self.upright, &self.w, ww);
+        (self.couple, self.loss_of_couple) = self.pivot.load::<N>(&self.upright, &self.w, ww);
         for (i, rubbing) in self.rubbing.iter_mut().enumerate() {
             let (torque, power) = rubbing.expand(N, self.w[N][i]);
-            self.of_pivot[i] -= torque;
-            self.loss_of_pivot += power;
+            self.couple[i] -= torque;
+            self.loss_of_couple += power;
         }
         self.upright[N + 1] = next::<N>(cross::<N>(&self.upright, &self.w));
     }
@@ -506,12 +530,12 @@ impl CraftMotion {
             Mount::Free => sub(ramp::<N>(&self.force), times(&w2, whole.moment)),
             Mount::Pivot => {
                 torque = sub(torque, vector::cross(whole.moment, self.a[N]));
-                if self.on_springs {
-                    torque = add(torque, self.of_pivot);
-                }
                 self.a[N]
             }
         };
+        if self.has_couples {
+            torque = add(torque, self.couple);
+        }
         // No zip, which some compilers do not inline here: 1 % of a step.
         for (i, bob) in self.bobs.iter_mut().enumerate() {
             let [by_force, by_torque] = self.along[i];
@@ -610,6 +634,9 @@ impl Motion for CraftMotion {
             let at = index::bob(bob.tank, bob.mode);
             bob.start(x[at..at + 6].try_into().unwrap(), self.w[0]);
         }
+        for spin in &mut self.spins {
+            spin.start(part(x, index::spin(spin.tank)));
+        }
         if self.any_apart {
             self.start_apart();
         }
@@ -630,6 +657,10 @@ impl Motion for CraftMotion {
         // The force may pass zero, too.
         let speed = largest(self.a[0]) * time + self.longest * swing + RATE_FLOOR;
         self.inv_allowed = [1.0, rate, swing, speed].map(|scale| 1.0 / (allowed * scale));
+        if !self.spins.is_empty() {
+            let fastest = self.spins.iter().map(SpinSeries::rate_scale).fold(rate, f64::max);
+            self.spins_allowed = 1.0 / (allowed * fastest);
+        }
         if self.any_apart {
             self.set_error_scale_apart(time, allowed, rate);
         }
@@ -653,6 +684,8 @@ impl Motion for CraftMotion {
         let q = larger(q_0.abs(), largest(q)) * (1_u64 << n) as f64;
         let v = self.bobs.iter().map(|bob| bob.coefficient_norm(n)).fold(0.0, larger);
         let body = larger(q * attitude, largest(self.w[n]) * rate);
+        let spins = self.spins.iter().map(|spin| spin.coefficient_norm(n) * self.spins_allowed);
+        let body = spins.fold(body, larger);
         let norm = larger(body, larger(v * swing, largest(self.gain[n]) * speed));
         if self.any_apart { larger(norm, self.coefficient_norm_apart(n)) } else { norm }
     }
@@ -697,6 +730,11 @@ impl Motion for CraftMotion {
             let moved = bob.state_at(x[at..at + 6].try_into().unwrap(), n, h, w);
             finite &= moved.iter().all(|x| x.abs() < MAX_MAGNITUDE);
             x[at..at + 6].copy_from_slice(&moved);
+        }
+        for spin in &self.spins {
+            let l = spin.state_at(n, h);
+            finite &= largest(l) < MAX_MAGNITUDE;
+            x[index::spin(spin.tank)..][..3].copy_from_slice(&l);
         }
         if self.any_apart {
             finite &= self.take_apart(n, h, w)?;

@@ -10,7 +10,7 @@
 //!
 //! The appendages add their K to P, their L to H, and V.K + w.L and the energy of the modes to E (`appendage.rs`); their deformed
 //! body is part of m, S, I.
-//! H also has the angular momentum of rotary motion (`surface.rs`), and E its energy.
+//! H also has the angular momentum of rotary motion (`surface.rs`) and of the liquid's spin (`spin.rs`), and E their energies.
 //! m, S, I: dry craft and rigid liquids about O. Sums run over the bobs. r_c: centre of mass of everything from O. V is
 //! in body axes. H is about r_c and does not contain V, so nothing cancels after a long thrust. drained':
 //! `contents.rs`. On a pivot H is about O, and E includes the potential a.S of all masses and the pivot's U
@@ -173,11 +173,13 @@ fn add_matrices<T: Number>(a: Mat3<T>, b: Mat3<T>) -> Mat3<T> {
 
 /// One tank at an instant, for the outputs. `rigid` is the rigid liquid about O, `wrench` force and torque
 /// about O on the craft, `flow_momentum` momentum and moment of momentum about O of the flow within the tank
-/// (`draining.rs`), and `lump` the detached liquid, if any.
+/// (`draining.rs`) with the momentum of the liquid's spin, `spin_energy` the energy of this spin, and `lump` the detached
+/// liquid, if any.
 pub(crate) struct TankNow<T> {
     pub rigid: Rigid<T>,
     pub wrench: [Vec3<T>; 2],
     pub flow_momentum: [Vec3<T>; 2],
+    pub spin_energy: Option<T>,
     pub bobs: [Option<BobNow<T>>; MODES],
     pub lump: Option<BobNow<T>>,
     pub ball_state: BallState,
@@ -234,6 +236,7 @@ impl CraftMotion {
                 rigid,
                 wrench,
                 flow_momentum,
+                spin_energy: None,
                 bobs,
                 lump: None,
                 ball_state: BallState::Settled,
@@ -301,6 +304,9 @@ impl<T: Number> Now<T> {
         for tank in tanks() {
             inner_momentum = add(inner_momentum, tank.flow_momentum[0]);
             inner_angular = add(inner_angular, tank.flow_momentum[1]);
+            if let Some(spin_energy) = tank.spin_energy {
+                energy = energy + spin_energy;
+            }
         }
         let center = all.center();
         let momentum = add(scale(all.mass, velocity), inner_momentum);

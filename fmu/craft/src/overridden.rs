@@ -52,6 +52,11 @@ impl Tank {
             "length" if self.frequency[n] > 0.0 => {
                 Some(format!("frequency[{}] = {:?} Hz", n + 1, self.frequency[n]))
             }
+            "spin_inertia_across" | "spin_coupling" | "spin_decay" | "slip_0"
+                if self.spin_inertia == 0.0 =>
+            {
+                Some("spin_inertia = 0; the liquid has no spin".into())
+            }
             _ => None,
         }
     }

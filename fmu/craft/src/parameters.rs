@@ -9,7 +9,7 @@ use formulas::cylinder;
 use taylor::integrator::Steps;
 use taylor::vector::{
     Mat3, Quaternion, Vec3, add, cross, dot, largest, on_sphere, rotation, scale, sub, times,
-    unit_quaternion,
+    transposed_times, unit_quaternion,
 };
 
 use crate::appendage::{Structure, beyond_message};
@@ -189,6 +189,11 @@ pub struct Tank {
     pub liquid_0: f64,
     pub outlet: f64,
     pub ball: Ball,
+    pub spin_inertia: f64,
+    pub spin_inertia_across: f64,
+    pub spin_coupling: f64,
+    pub spin_decay: [f64; 2],
+    pub slip_0: Vec3,
     pub p_0: [Vec3; MODES],
     pub p_dot_0: [Vec3; MODES],
 }
@@ -321,9 +326,25 @@ impl Tank {
     }
 
     /// Returns true if outputs and derivatives are those of `contents.rs`: the tank can drain, or has planar
-    /// modes or other coefficients of the third order than pendulums.
+    /// modes, other coefficients of the third order than pendulums, or liquid that spins.
     pub(crate) fn has_contents(&self) -> bool {
-        self.fill.points > 0 || self.is_planar() || self.has_surface()
+        self.fill.points > 0 || self.is_planar() || self.has_surface() || self.spin_inertia > 0.0
+    }
+
+    /// Returns A', A' and I_zz of the spinning liquid, kg m2 (`spin.rs`); `None` if the liquid has no spin.
+    pub(crate) fn spin_inertias(&self) -> Option<Vec3> {
+        let axial = self.spin_inertia;
+        let across = if self.spin_inertia_across > 0.0 { self.spin_inertia_across } else { axial };
+        (axial > 0.0).then_some([across, across, axial])
+    }
+
+    /// Returns the liquid's angular momentum of spin at the start, kg m2/s, tank axes, at the angular velocity `omega` of
+    /// the craft, rad/s, body axes.
+    pub(crate) fn spin_at_start(&self, omega: Vec3) -> Vec3 {
+        let Some(inertia) = self.spin_inertias() else { return [0.0; 3] };
+        let [x, y, z] = transposed_times(&rotation(&unit_quaternion(self.q)), omega);
+        let turned = add(self.slip_0, [self.spin_coupling * x, self.spin_coupling * y, z]);
+        [0, 1, 2].map(|i| inertia[i] * turned[i])
     }
 
     pub(crate) fn whole_mass(&self) -> f64 {
@@ -619,6 +640,11 @@ impl Default for Tank {
             fill: FillTable { points: 0, ..CYLINDER },
             liquid_0: 381.704,
             outlet: -0.3,
+            spin_inertia: 0.0,
+            spin_inertia_across: 0.0,
+            spin_coupling: 1.0,
+            spin_decay: [0.0; 2],
+            slip_0: [0.0; 3],
             p_0: [[0.0, 0.0, -1.0]; MODES],
             p_dot_0: [[0.0; 3]; MODES],
         }
@@ -652,6 +678,9 @@ impl Default for Parameters {
 /// Upper limit of masses, inertias and stiffnesses, so that squares and products do not overflow.
 const HEAVIEST: f64 = 1e12;
 const FARTHEST: f64 = 1e9;
+
+/// Smallest inertia of spinning liquid, kg m2, because the equations divide by it.
+const LEAST_SPIN: f64 = 1e-9;
 
 /// Largest ratio of a principal moment to the sum of the others: 1 for a plate, with a margin for moments
 /// given to four digits.
@@ -830,6 +859,7 @@ impl Tank {
         problems.number(&format!("{name}.g_floor"), self.g_floor, 0.0, 1e6, "m/s2");
         problems.number(&format!("{name}.g_bond"), self.g_bond, 0.0, 1e6, "m/s2");
         self.find_ball_problems(name, problems);
+        self.find_spin_problems(name, problems);
         for n in 0..self.modes.min(MODES) {
             let i = n + 1;
             problems.number(&format!("{name}.mass[{i}]"), self.mass[n], LIGHTEST, HEAVIEST, "kg");
@@ -950,6 +980,36 @@ impl Tank {
             for (other, _) in axial.iter().filter(|(_, is_set)| *is_set) {
                 problems.0.push(format!(
                     "{name}.{other} with {name}.{what} (allowed: one of them 0, because {other} is for axisymmetric tanks)"
+                ));
+            }
+        }
+    }
+
+    fn find_spin_problems(&self, name: &str, problems: &mut Problems) {
+        for (what, value) in
+            [("spin_inertia", self.spin_inertia), ("spin_inertia_across", self.spin_inertia_across)]
+        {
+            if value != 0.0 {
+                problems.number(&format!("{name}.{what}"), value, LEAST_SPIN, HEAVIEST, "kg.m2");
+            }
+        }
+        if self.spin_inertia == 0.0 {
+            return;
+        }
+        problems.number(&format!("{name}.spin_coupling"), self.spin_coupling, 0.0, 1.0, "");
+        for (i, decay) in self.spin_decay.iter().enumerate() {
+            problems.number(&format!("{name}.spin_decay[{}]", i + 1), *decay, 0.0, 1e3, "1/s");
+        }
+        for (i, slip) in self.slip_0.iter().enumerate() {
+            problems.number(&format!("{name}.slip_0[{}]", i + 1), *slip, -1e3, 1e3, "rad/s");
+        }
+        for (what, is_set) in
+            [("fill.points", self.fill.points > 0), ("ball.travel", self.ball.travel > 0.0)]
+        {
+            if is_set {
+                problems.0.push(format!(
+                    "{name}.spin_inertia with {name}.{what} (allowed: one of them 0, because the spin of liquid that leaves its \
+                     place is not modelled)"
                 ));
             }
         }
@@ -1175,27 +1235,34 @@ impl Parameters {
                 drains + 1
             ));
         }
-        let that_is_planar = tanks.iter().position(Tank::is_planar);
-        if let (Some(ball), Some(planar)) = (with_ball, that_is_planar)
-            && ball != planar
-        {
-            problems.0.push(format!(
-                "tank[{}].ball.travel with tank[{}].direction (allowed: one of them 0, because a craft with detached \
-                 liquid cannot have planar modes)",
-                ball + 1,
-                planar + 1
-            ));
-        }
-        let with_surface = tanks.iter().position(Tank::has_surface);
-        if let (Some(ball), Some(surface)) = (with_ball, with_surface)
-            && ball != surface
-        {
-            problems.0.push(format!(
-                "tank[{}].ball.travel with tank[{}].nonlinear_inertia or nonlinear_stiffness (allowed: ball.travel = 0, or both \
-                 1 in every mode, because a craft with detached liquid has pendulums only)",
-                ball + 1,
-                surface + 1
-            ));
+        let others: [(fn(&Tank) -> bool, &str, &str); 3] = [
+            (
+                Tank::is_planar,
+                "direction",
+                "one of them 0, because a craft with detached liquid cannot have planar modes",
+            ),
+            (
+                Tank::has_surface,
+                "nonlinear_inertia or nonlinear_stiffness",
+                "ball.travel = 0, or both 1 in every mode, because a craft with detached liquid has pendulums only",
+            ),
+            (
+                |tank| tank.spin_inertia > 0.0,
+                "spin_inertia",
+                "one of them 0, because a craft with detached liquid has no liquid that spins",
+            ),
+        ];
+        for (has, what, allowed) in others {
+            let other = tanks.iter().position(has);
+            if let (Some(ball), Some(other)) = (with_ball, other)
+                && ball != other
+            {
+                problems.0.push(format!(
+                    "tank[{}].ball.travel with tank[{}].{what} (allowed: {allowed})",
+                    ball + 1,
+                    other + 1
+                ));
+            }
         }
         if let (Some(ball), Mount::Pivot) = (with_ball, self.mount) {
             problems.0.push(format!(

@@ -101,11 +101,13 @@ use crate::parameters::{
 use crate::ranges;
 use crate::rigid::{Factors, Mat6, Rigid, add_rank_one, along_rod, largest_eigenvalue};
 use crate::sizes::MODES;
+use crate::spin::SpinSeries;
 use crate::state::{BallState, Line, Ramp, Ranges, has_direction};
 
 /// Number of continuous states of a tank: p and p' of each mode, the dissipated energy and the mass of
-/// liquid. Then follow position (m) and rate (m/s) of the detached liquid from the tank's origin, tank axes.
-pub const TANK_STATES: usize = 6 * MODES + 8;
+/// liquid. Then follow position (m) and rate (m/s) of the detached liquid from the tank's origin, and the liquid's angular
+/// momentum of spin (kg m2/s), tank axes.
+pub const TANK_STATES: usize = SPIN + 3;
 
 /// Number of a tank's inputs: a, omega, omega_dot, mass_flow.
 pub const TANK_INPUTS: usize = 10;
@@ -116,6 +118,7 @@ pub const TRIANGLE: usize = 21;
 const DISSIPATED: usize = 6 * MODES;
 const LIQUID: usize = DISSIPATED + 1;
 const BALL: usize = LIQUID + 1;
+const SPIN: usize = BALL + 6;
 
 /// Meaning of the outputs `bias` and `added_mass` of a tank.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -304,7 +307,8 @@ impl TankState {
 
 /// The tank at its current state and the series of its motion. `constrained` are the bobs that are not
 /// pendulums or are guided in a plane, and `beyond` is the one of them that reaches the bound of its surface
-/// at the end of the expansion. `w_both` is (w, w); `inv_allowed` is 1 over the allowed error of v.
+/// at the end of the expansion. `w_both` is (w, w); `inv_allowed` is 1 over the allowed error of v, `spin_allowed` that of
+/// the spin's I^-1 L.
 #[derive(Clone, Debug)]
 struct TankMotion {
     state: TankState,
@@ -313,6 +317,7 @@ struct TankMotion {
     bobs: Vec<Bob>,
     constrained: Vec<ConstrainedBob>,
     beyond: Option<usize>,
+    spin: Option<SpinSeries>,
     is_apart: bool,
     a: Vector,
     w: Vector,
@@ -320,6 +325,7 @@ struct TankMotion {
     w_d: Vector,
     dissipation: Series,
     inv_allowed: f64,
+    spin_allowed: f64,
     ball: Option<Loose>,
 }
 
@@ -418,12 +424,16 @@ fn draining_rates<T: Number>(
     slope: f64,
 ) -> [T; TANK_STATES] {
     let ([a, w, w_d], flow) = *acting;
-    let contents = mounted.contents(x, [a, w, w_d], (x[LIQUID], flow, slope));
+    let spin = vector_from(x, SPIN);
+    let contents = mounted.contents(x, spin, [a, w, w_d], (x[LIQUID], flow, slope));
     let mut rate = [T::constant(0.0); TANK_STATES];
     mounted.write_rates(&contents, [a, w_d], |at, numbers| {
         rate[at..at + numbers.len()].copy_from_slice(numbers);
     });
     rate[DISSIPATED] = contents.dissipation;
+    if let Some((spin_d, _)) = contents.spin() {
+        rate[SPIN..].copy_from_slice(&spin_d);
+    }
     if mounted.drains() {
         rate[LIQUID] = -flow;
     }
@@ -565,7 +575,7 @@ impl TankMotion {
             bob.seed_direction(x, dx, self.w[0], dw);
         }
         if let Some(lump) = loose(&mut self.ball) {
-            lump.seed_direction(dx[BALL..].try_into().unwrap(), self.w[0], dw);
+            lump.seed_direction(dx[BALL..SPIN].try_into().unwrap(), self.w[0], dw);
             lump.seed_shape(&directions(&self.state.x), &directions(dx));
         }
         self.expand_rates::<1>();
@@ -609,7 +619,7 @@ impl TankMotion {
         if let Some(Loose { lump, .. }) = &self.ball
             && lump.is_loose()
         {
-            rate[BALL..].copy_from_slice(&lump.rates(N, &self.w, &self.w_d));
+            rate[BALL..SPIN].copy_from_slice(&lump.rates(N, &self.w, &self.w_d));
         }
         rate[DISSIPATED] = self.dissipation[N];
         rate
@@ -678,6 +688,9 @@ impl TankMotion {
     fn rates_apart(&mut self, n: usize) -> f64 {
         let w2 = twice_crossed(product_coefficients(n, &self.w));
         let (a, w_d, mut dissipation) = (self.a[n], self.w_d[n], 0.0);
+        if let Some(spin) = &mut self.spin {
+            (_, dissipation) = spin.expand(n, self.w[n]);
+        }
         for bob in &mut self.constrained {
             if bob.follows() {
                 let [e, turned] = bob.along_axis();
@@ -698,6 +711,10 @@ impl TankMotion {
         let swing = self.constrained.iter().map(ConstrainedBob::rate_scale).fold(0.0, f64::max);
         let fastest = 1.0 / (allowed * (RATE_FLOOR + largest(self.w[0]) + swing));
         self.inv_allowed = self.inv_allowed.min(fastest);
+        if let Some(spin) = &self.spin {
+            let fastest = RATE_FLOOR + f64::max(largest(self.w[0]), spin.rate_scale());
+            self.spin_allowed = 1.0 / (allowed * fastest);
+        }
         if let Some(ball) = &mut self.ball {
             let speed = ball.lump.speed_scale(self.w[0], time);
             ball.inv_allowed = 1.0 / (allowed * RATE_FLOOR.max(speed));
@@ -708,7 +725,10 @@ impl TankMotion {
     fn coefficient_norm_apart(&self, n: usize) -> f64 {
         let larger = |a: f64, b: f64| if b > a { b } else { a };
         let bobs = self.constrained.iter().map(|bob| bob.coefficient_norm(n));
-        let norm = bobs.fold(0.0, larger) * self.inv_allowed;
+        let mut norm = bobs.fold(0.0, larger) * self.inv_allowed;
+        if let Some(spin) = &self.spin {
+            norm = larger(norm, spin.coefficient_norm(n) * self.spin_allowed);
+        }
         match &self.ball {
             Some(ball) if ball.lump.is_loose() => {
                 larger(norm, ball.lump.coefficient_norm(n) * ball.inv_allowed)
@@ -732,10 +752,15 @@ impl TankMotion {
             finite &= moved.iter().all(|x| x.abs() < MAX_MAGNITUDE);
             x[6 * bob.mode..][..6].copy_from_slice(&moved);
         }
+        if let Some(spin) = &self.spin {
+            let l = spin.state_at(n, h);
+            finite &= largest(l) < MAX_MAGNITUDE;
+            x[SPIN..].copy_from_slice(&l);
+        }
         if let Some(lump) = loose(&mut self.ball) {
-            let moved = lump.state_at(x[BALL..].try_into().unwrap(), n, h, w);
+            let moved = lump.state_at(x[BALL..SPIN].try_into().unwrap(), n, h, w);
             finite &= moved.iter().all(|x| x.abs() < MAX_MAGNITUDE);
-            x[BALL..].copy_from_slice(&moved);
+            x[BALL..SPIN].copy_from_slice(&moved);
         }
         Ok(finite)
     }
@@ -784,8 +809,11 @@ impl TankMotion {
             let at = 6 * bob.mode;
             bob.start(self.state.x[at..at + 6].try_into().unwrap(), w);
         }
+        if let Some(spin) = &mut self.spin {
+            spin.start(part(&self.state.x, SPIN));
+        }
         if let Some(lump) = loose(&mut self.ball) {
-            lump.start(self.state.x[BALL..].try_into().unwrap(), w);
+            lump.start(self.state.x[BALL..SPIN].try_into().unwrap(), w);
         }
         let Some(rest) = self.ball.as_ref().and_then(|ball| ball.rest) else { return };
         self.expand_rates::<0>();
@@ -905,7 +933,7 @@ impl Carrier for TankMotion {
     }
 
     fn ball(&mut self, _: usize) -> &mut [f64] {
-        &mut self.state.x[BALL..]
+        &mut self.state.x[BALL..SPIN]
     }
 
     fn bob(&mut self, _: usize, n: usize) -> &mut [f64] {
@@ -971,7 +999,7 @@ impl TankMotion {
             bob.after_impulse((&mut self.state.x[at..at + 6]).try_into().unwrap(), dv, dw);
         }
         if let Some(lump) = loose(&mut self.ball) {
-            lump.after_impulse(&mut self.state.x[BALL..], dv, dw);
+            lump.after_impulse(&mut self.state.x[BALL..SPIN], dv, dw);
         }
     }
 }
@@ -1042,6 +1070,7 @@ impl SloshTank {
         if let Some(surface) = tank.ball_surface() {
             x[BALL + 2] = surface.height - surface.half;
         }
+        x[SPIN..].copy_from_slice(&tank.spin_at_start(inputs.omega));
         let (ranges, ball) = (Ranges::default(), BallState::Settled);
         let state = TankState { time: start_time, x, ranges, ball, impulse: [0.0; 6] };
         let mut tank = SloshTank::resume(p, &state, tolerance);
@@ -1077,8 +1106,9 @@ impl SloshTank {
             inputs: TankInputs::default(),
             rigid,
             bobs,
-            is_apart: ball.is_some() || !constrained.is_empty(),
+            is_apart: ball.is_some() || !constrained.is_empty() || tank.spin_inertia > 0.0,
             constrained,
+            spin: SpinSeries::new(&tank, 0),
             beyond: None,
             a: ZERO_VECTOR,
             w: ZERO_VECTOR,
@@ -1086,6 +1116,7 @@ impl SloshTank {
             w_d: ZERO_VECTOR,
             dissipation: ZERO,
             inv_allowed: 0.0,
+            spin_allowed: 0.0,
             ball,
         };
         SloshTank {
@@ -1265,7 +1296,8 @@ impl SloshTank {
         ([a, w, w_d], flow): &Acting<T>,
         slope: f64,
     ) -> SloshTankOutputs {
-        let contents = mounted.contents(x, [*a, *w, *w_d], (x[LIQUID], *flow, slope));
+        let spin = vector_from(x, SPIN);
+        let contents = mounted.contents(x, spin, [*a, *w, *w_d], (x[LIQUID], *flow, slope));
         let mut matrix = contents.rigid.mass_matrix();
         contents.add_rods(&mut matrix);
         let parts = Parts {
@@ -1320,7 +1352,8 @@ impl SloshTank {
     }
 
     /// Returns x: p and p' of each mode, the dissipated energy, J, and the mass of liquid, kg. Then follow
-    /// position, m, and rate, m/s, of the detached liquid. Vectors are in tank axes.
+    /// position, m, and rate, m/s, of the detached liquid, and the liquid's angular momentum of spin, kg m2/s. Vectors are in
+    /// tank axes.
     pub fn continuous_states(&self) -> [f64; TANK_STATES] {
         self.motion.state.x
     }

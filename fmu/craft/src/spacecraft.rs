@@ -55,6 +55,7 @@ impl Spacecraft {
                 let tank = p.tank[i].resolve();
                 let bobs: f64 = tank.mass[..tank.modes].iter().sum();
                 put(index::LIQUID + i, &[tank.m_0 + bobs]);
+                put(index::spin(i), &tank.spin_at_start(p.init.omega));
             }
             for n in 0..MODES {
                 let is_used = i < p.tanks && n < p.tank[i].modes;

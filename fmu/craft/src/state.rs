@@ -12,9 +12,9 @@ use crate::sizes::{APPENDAGES, MODES, TANKS};
 /// force and torque and energy `DISSIPATED` by the liquids since the start, J; from `BOBS` on direction p and
 /// rate p', 1/s, of each of the [`MODES`] modes of each tank, tank axes; from `LIQUID` on the mass of liquid
 /// in each tank, kg; energy `DRAINED` with the outflow, J; from `BALLS` on position, m, and rate, m/s, of
-/// each tank's detached liquid from the tank's origin, tank axes; from `ETA` on the modal displacement, kg^0.5
-/// m, of each mode of the appendages, and from `ETA_DOT` on their rates. States that are not in use stay at
-/// rest.
+/// each tank's detached liquid from the tank's origin, tank axes; from `SPINS` on the angular momentum of spin, kg
+/// m2/s, of each tank's liquid, tank axes; from `ETA` on the modal displacement, kg^0.5 m, of each mode of the
+/// appendages, and from `ETA_DOT` on their rates. States that are not in use stay at rest.
 #[allow(missing_docs)]
 pub mod index {
     use crate::sizes::{APPENDAGES, MODES, TANKS};
@@ -32,12 +32,19 @@ pub mod index {
 
     pub const BALLS: usize = DRAINED + 1;
 
-    pub const ETA: usize = ball(TANKS);
+    pub const ETA: usize = spin(TANKS);
     pub const ETA_DOT: usize = ETA + APPENDAGES;
 
     /// Returns the index of the detached liquid's position and rate; `tank` counts from 0.
     pub const fn ball(tank: usize) -> usize {
         BALLS + 6 * tank
+    }
+
+    pub const SPINS: usize = BALLS + 6 * TANKS;
+
+    /// Returns the index of the angular momentum of spin; `tank` counts from 0.
+    pub const fn spin(tank: usize) -> usize {
+        SPINS + 3 * tank
     }
 
     /// Returns the index of a bob's direction and rate; `tank` and `mode` count from 0.

@@ -39,6 +39,7 @@ const WRENCH: &[&str] = &[
     "tank.liquid",
     "tank.ball.position",
     "tank.ball.velocity",
+    "tank.spin",
     "a",
     "omega",
     "omega_dot",
@@ -47,6 +48,7 @@ const WRENCH: &[&str] = &[
 const EVERYTHING: &[&str] =
     &["tank.", "a", "omega", "omega_dot", "mass_flow", "coupling", "coupling_kind"];
 const TANK: &[&str] = &["tank."];
+const SPINS: &[&str] = &["tank.", "omega"];
 const PLACES: &[&str] = &["tank.p", "tank.liquid", "tank.ball.position"];
 // Dependencies of tank.in_range.
 const MOTION: &[&str] = &["tank.p", "tank.p_dot", "tank.liquid", "a", "omega", "omega_dot"];
@@ -67,6 +69,7 @@ fn bob(n: usize) -> usize {
 const DISSIPATED: usize = 6 * MODES;
 const LIQUID: usize = DISSIPATED + 1;
 const BALL: usize = LIQUID + 1;
+const SPIN: usize = BALL + 6;
 
 fn ball_state(state: BallState) -> i32 {
     match state {
@@ -171,6 +174,10 @@ static VARIABLES: &[Variable<Model>] = &[
         "Velocity of the detached liquid's centre relative to the tank, tank axes; 0 while the liquid is settled")
         .shape(VECTOR).nominal(0.01).reinit().depends_on(&["tank.ball.velocity[]"]).initial_depends_on(TANK),
 
+    V::state("tank.spin", |n| SPIN + n, "kg.m2/s",
+        "Angular momentum of the liquid's spin, tank axes; 0 if tank.spin_inertia is 0")
+        .shape(VECTOR).nominal(0.1).depends_on(&["tank.spin[]"]).initial_depends_on(SPINS),
+
     V::state("tank.liquid", |_| LIQUID, "kg",
         "Mass of the whole liquid in the tank")
         .nominal(100.0).depends_on(&["tank.liquid"]).initial_depends_on(TANK),
@@ -188,6 +195,8 @@ static VARIABLES: &[Variable<Model>] = &[
         .shape(VECTOR).depends_on(&["tank.ball.position", "tank.ball.velocity"]).initial_depends_on(TANK),
     V::derivative("der(tank.ball.velocity)", |n| BALL + 3 + n, "m/s2", "Derivative of tank.ball.velocity")
         .shape(VECTOR).depends_on(WRENCH).initial_depends_on(EVERYTHING),
+    V::derivative("der(tank.spin)", |n| SPIN + n, "N.m", "Derivative of tank.spin")
+        .shape(VECTOR).depends_on(&["omega", "tank.p", "tank.p_dot", "tank.spin"]).initial_depends_on(SPINS),
 
     // The tank
     V::choice("coupling", &COUPLING, |p, _| p.coupling as i32, set_coupling,
@@ -292,6 +301,21 @@ static VARIABLES: &[Variable<Model>] = &[
     V::parameter("tank.ball.drag", |p, _| &mut p.tank.ball.drag, "1/s",
         "Rate at which the detached liquid's speed along the wall decays while it slides; a guess unless measured")
         .range(0.0, 1e3),
+    V::parameter("tank.spin_inertia", |p, _| &mut p.tank.spin_inertia, "kg.m2",
+        "Inertia of the liquid that spins with the tank about its axis, for example that of the whole liquid as a solid; 0: the liquid has no spin. Above 0, the liquid has the states tank.spin, and I_z should be 0. Allowed in a tank with fill.points = 0 and ball.travel = 0")
+        .range(0.0, 1e12),
+    V::parameter("tank.spin_inertia_across", |p, _| &mut p.tank.spin_inertia_across, "kg.m2",
+        "Inertia of the liquid's spin across the tank's axis, m (a^2 + c^2)/5 in a full spheroid with the semi-axes a, a, c; 0: spin_inertia")
+        .range(0.0, 1e12),
+    V::parameter("tank.spin_coupling", |p, _| &mut p.tank.spin_coupling, "1",
+        "Share of the spin across the tank's axis that belongs to the angular momentum: 2 a c/(a^2 + c^2) in a full spheroid with the semi-axes a, a, c, 1 in a partly full tank")
+        .range(0.0, 1.0),
+    V::parameter("tank.spin_decay", |p, n| &mut p.tank.spin_decay[n], "1/s",
+        "Rate at which wall friction decreases the rotation of the liquid against the tank, about its axis and across it: about sqrt(nu Omega)/R times 2.9 and 2.6 in a full sphere")
+        .shape(&[Fixed(2)]).range(0.0, 1e3),
+    V::parameter("tank.slip_0", |p, n| &mut p.tank.slip_0[n], "rad/s",
+        "Rotation of the liquid against the tank at the start, tank axes; 0: the liquid turns with the tank")
+        .display_unit("deg/s").shape(VECTOR).range(-1e3, 1e3),
     V::integer("tank.fill.points", |p, _| &mut p.points, "Number of points in the tank's fill table; 0: the liquid stays. From 2 on the tank can drain, and the table gives its modes and rigid liquid, interpolated monotonically with two continuous derivatives. The start values are the default tank at depths of 0.1 to 1.2 m")
         .between(0, POINTS as i32),
     V::parameter("tank.liquid_0", |p, _| &mut p.tank.liquid_0, "kg", "Mass of the whole liquid at the start, used if fill.points is above 0")

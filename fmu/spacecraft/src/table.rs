@@ -46,6 +46,7 @@ const MOTION: &[&str] = &[
     "tank[].liquid",
     "tank[].ball.position",
     "tank[].ball.velocity",
+    "tank[].spin",
     "appendage[].eta",
     "appendage[].eta_dot",
     "force",
@@ -62,6 +63,7 @@ const MOMENTUM: &[&str] = &[
     "tank[].liquid",
     "tank[].ball.position",
     "tank[].ball.velocity",
+    "tank[].spin",
     "appendage[].eta",
     "appendage[].eta_dot",
     "h_wheels",
@@ -76,6 +78,7 @@ const ENERGIES: &[&str] = &[
     "tank[].liquid",
     "tank[].ball.position",
     "tank[].ball.velocity",
+    "tank[].spin",
     "appendage[].eta",
     "appendage[].eta_dot",
     "force",
@@ -104,6 +107,7 @@ const EVERYTHING: &[&str] = &[
 ];
 const BOBS: &[&str] = &["tanks", "tank[]."];
 const DEFORMED: &[&str] = &["appendages", "appendage[]."];
+const SPINS: &[&str] = &["tanks", "tank[].", "init.omega"];
 
 const TANK: Dimension = Sized("tanks", TANKS);
 const MODE: Dimension = Used("tank[].modes", MODES);
@@ -207,7 +211,7 @@ static VARIABLES: &[Variable<Model>] = &[
         .shape(VECTOR).depends_on(MOMENTUM),
     V::local("energy", |o, _| o.energy, "J",
         "Kinetic energy of craft, appendages and liquids plus energy of the centring springs and of the appendages' stiffness, on a pivot also of gravity and of the pivot's stiffness. Excludes the spin of the wheels and the flow towards an outlet")
-        .depends_on(&["q", "omega", "velocity", "tank[].p", "tank[].p_dot", "tank[].liquid", "tank[].ball.position", "tank[].ball.velocity", "appendage[].eta", "appendage[].eta_dot", "mass_flow"]),
+        .depends_on(&["q", "omega", "velocity", "tank[].p", "tank[].p_dot", "tank[].liquid", "tank[].ball.position", "tank[].ball.velocity", "tank[].spin", "appendage[].eta", "appendage[].eta_dot", "mass_flow"]),
     V::local("work", |o, _| o.work, "J",
         "Work done on the craft by force, torque and wheels since the start: energy - energy(0) = work - dissipated - drained")
         .is_state(|_| index::WORK).depends_on(&["work"]),
@@ -275,6 +279,10 @@ static VARIABLES: &[Variable<Model>] = &[
         "Velocity of the detached liquid's centre relative to the tank, tank axes; 0 while the liquid is settled")
         .shape(TANK_VECTOR).nominal(0.01).reinit().depends_on(&["tank[].ball.velocity[]"]).initial_depends_on(BOBS),
 
+    V::state("tank[].spin", |n| index::spin(n / 3) + n % 3, "kg.m2/s",
+        "Angular momentum of the liquid's spin, tank axes; 0 if tank[].spin_inertia is 0")
+        .shape(TANK_VECTOR).nominal(0.1).depends_on(&["tank[].spin[]"]).initial_depends_on(SPINS),
+
     V::state("tank[].liquid", |n| index::LIQUID + n, "kg",
         "Mass of the whole liquid in a tank")
         .shape(PER_TANK).nominal(100.0).depends_on(&["tank[].liquid[]"]).initial_depends_on(BOBS),
@@ -313,6 +321,8 @@ static VARIABLES: &[Variable<Model>] = &[
         .shape(TANK_VECTOR).depends_on(&["tank[].ball.position", "tank[].ball.velocity"]).initial_depends_on(BOBS),
     V::derivative("der(tank[].ball.velocity)", |n| ball(n) + 3, "m/s2", "Derivative of tank[].ball.velocity")
         .shape(TANK_VECTOR).depends_on(MOTION).initial_depends_on(EVERYTHING),
+    V::derivative("der(tank[].spin)", |n| index::spin(n / 3) + n % 3, "N.m", "Derivative of tank[].spin")
+        .shape(TANK_VECTOR).depends_on(&["omega", "tank[].p", "tank[].p_dot", "tank[].spin"]).initial_depends_on(SPINS),
 
     V::derivative("der(appendage[].eta)", |n| index::ETA + n, "kg^0.5.m/s", "Derivative of appendage[].eta: appendage[].eta_dot")
         .shape(PER_APPENDAGE).depends_on(&["appendage[].eta_dot"]).initial_depends_on(DEFORMED),
@@ -464,6 +474,21 @@ static VARIABLES: &[Variable<Model>] = &[
     V::parameter("tank[].ball.drag", |p, n| &mut p.tank[n].ball.drag, "1/s",
         "Rate at which the detached liquid's speed along the wall decays while it slides; a guess unless measured")
         .shape(PER_TANK).range(0.0, 1e3),
+    V::parameter("tank[].spin_inertia", |p, n| &mut p.tank[n].spin_inertia, "kg.m2",
+        "Inertia of the liquid that spins with the tank about its axis, for example that of the whole liquid as a solid; 0: the liquid has no spin. Above 0, the liquid has the states tank[].spin, and I_z should be 0. Allowed in a tank with fill.points = 0 and ball.travel = 0")
+        .shape(PER_TANK).range(0.0, 1e12),
+    V::parameter("tank[].spin_inertia_across", |p, n| &mut p.tank[n].spin_inertia_across, "kg.m2",
+        "Inertia of the liquid's spin across the tank's axis, m (a^2 + c^2)/5 in a full spheroid with the semi-axes a, a, c; 0: spin_inertia")
+        .shape(PER_TANK).range(0.0, 1e12),
+    V::parameter("tank[].spin_coupling", |p, n| &mut p.tank[n].spin_coupling, "1",
+        "Share of the spin across the tank's axis that belongs to the angular momentum: 2 a c/(a^2 + c^2) in a full spheroid with the semi-axes a, a, c, 1 in a partly full tank")
+        .shape(PER_TANK).range(0.0, 1.0),
+    V::parameter("tank[].spin_decay", |p, n| &mut p.tank[n / 2].spin_decay[n % 2], "1/s",
+        "Rate at which wall friction decreases the rotation of the liquid against the tank, about its axis and across it: about sqrt(nu Omega)/R times 2.9 and 2.6 in a full sphere")
+        .shape(&[TANK, Fixed(2)]).range(0.0, 1e3),
+    V::parameter("tank[].slip_0", |p, n| &mut p.tank[n / 3].slip_0[n % 3], "rad/s",
+        "Rotation of the liquid against the tank at the start, tank axes; 0: the liquid turns with the tank")
+        .display_unit("deg/s").shape(TANK_VECTOR).range(-1e3, 1e3),
     V::integer("tank[].fill.points", |p, n| &mut p.points[n], "Number of points in the tank's fill table; 0: the liquid stays. From 2 on the tank can drain, and the table gives its modes and rigid liquid, interpolated monotonically with two continuous derivatives. The start values are the default tank at depths of 0.1 to 1.2 m")
         .between(0, POINTS as i32).shape(PER_TANK),
     V::parameter("tank[].liquid_0", |p, n| &mut p.tank[n].liquid_0, "kg", "Mass of the whole liquid at the start, used if fill.points is above 0")
@@ -593,4 +618,4 @@ static MOUNT: Enumeration = Enumeration {
     ],
 };
 
-const _: () = assert!(STATES == index::BALLS + 6 * TANKS + 2 * APPENDAGES);
+const _: () = assert!(STATES == index::SPINS + 3 * TANKS + 2 * APPENDAGES);

@@ -28,6 +28,7 @@ pub mod tank {
     pub const ANGLE_Y: crate::Array<1> = crate::Array("tank.angle_y");
     pub const P: crate::Array<2> = crate::Array("tank.p");
     pub const P_DOT: crate::Array<2> = crate::Array("tank.p_dot");
+    pub const SPIN: crate::Array<1> = crate::Array("tank.spin");
     pub const LIQUID: &str = "tank.liquid";
     pub const POSITION: crate::Array<1> = crate::Array("tank.position");
     pub const Q: crate::Array<1> = crate::Array("tank.q");
@@ -70,6 +71,11 @@ pub mod tank {
     pub const SWIRL_LIMIT: crate::Array<1> = crate::Array("tank.swirl_limit");
     pub const G_BOND: &str = "tank.g_bond";
     pub const WAVE: crate::Array<1> = crate::Array("tank.wave");
+    pub const SPIN_INERTIA: &str = "tank.spin_inertia";
+    pub const SPIN_INERTIA_ACROSS: &str = "tank.spin_inertia_across";
+    pub const SPIN_COUPLING: &str = "tank.spin_coupling";
+    pub const SPIN_DECAY: crate::Array<1> = crate::Array("tank.spin_decay");
+    pub const SLIP_0: crate::Array<1> = crate::Array("tank.slip_0");
     pub const LIQUID_0: &str = "tank.liquid_0";
     pub const OUTLET: &str = "tank.outlet";
     pub const P_0: crate::Array<2> = crate::Array("tank.p_0");

@@ -55,6 +55,7 @@ pub mod tank {
     pub const ANGLE_Y: crate::Array<2> = crate::Array("tank[].angle_y");
     pub const P: crate::Array<3> = crate::Array("tank[].p");
     pub const P_DOT: crate::Array<3> = crate::Array("tank[].p_dot");
+    pub const SPIN: crate::Array<2> = crate::Array("tank[].spin");
     pub const LIQUID: crate::Array<1> = crate::Array("tank[].liquid");
     pub const POSITION: crate::Array<2> = crate::Array("tank[].position");
     pub const Q: crate::Array<2> = crate::Array("tank[].q");
@@ -97,6 +98,11 @@ pub mod tank {
     pub const SWIRL_LIMIT: crate::Array<2> = crate::Array("tank[].swirl_limit");
     pub const G_BOND: crate::Array<1> = crate::Array("tank[].g_bond");
     pub const WAVE: crate::Array<2> = crate::Array("tank[].wave");
+    pub const SPIN_INERTIA: crate::Array<1> = crate::Array("tank[].spin_inertia");
+    pub const SPIN_INERTIA_ACROSS: crate::Array<1> = crate::Array("tank[].spin_inertia_across");
+    pub const SPIN_COUPLING: crate::Array<1> = crate::Array("tank[].spin_coupling");
+    pub const SPIN_DECAY: crate::Array<2> = crate::Array("tank[].spin_decay");
+    pub const SLIP_0: crate::Array<2> = crate::Array("tank[].slip_0");
     pub const LIQUID_0: crate::Array<1> = crate::Array("tank[].liquid_0");
     pub const OUTLET: crate::Array<1> = crate::Array("tank[].outlet");
     pub const P_0: crate::Array<3> = crate::Array("tank[].p_0");
@@ -190,12 +196,14 @@ pub const SIZES: &[crate::Size] = &[
             ("tank[].p_dot", 0),
             ("tank[].ball.position", 0),
             ("tank[].ball.velocity", 0),
+            ("tank[].spin", 0),
             ("tank[].liquid", 0),
             ("der(tank[].liquid)", 0),
             ("der(tank[].p)", 0),
             ("der(tank[].p_dot)", 0),
             ("der(tank[].ball.position)", 0),
             ("der(tank[].ball.velocity)", 0),
+            ("der(tank[].spin)", 0),
             ("tank[].position", 0),
             ("tank[].q", 0),
             ("tank[].diameter", 0),
@@ -241,6 +249,11 @@ pub const SIZES: &[crate::Size] = &[
             ("tank[].ball.restitution", 0),
             ("tank[].ball.contact_speed", 0),
             ("tank[].ball.drag", 0),
+            ("tank[].spin_inertia", 0),
+            ("tank[].spin_inertia_across", 0),
+            ("tank[].spin_coupling", 0),
+            ("tank[].spin_decay", 0),
+            ("tank[].slip_0", 0),
             ("tank[].fill.points", 0),
             ("tank[].liquid_0", 0),
             ("tank[].outlet", 0),

@@ -191,14 +191,14 @@ fn momentum_angular_momentum_and_energy_balance_over_1000_s_of_random_craft() {
 /// Runs of `most` steps, of the one whose torque changes the momentum about every axis 1,000.
 fn random_craft(most: usize) {
     let mut excess = Vec::new();
-    for seed in 0..26 {
+    for seed in 0..32 {
         let mut random = Random::new(seed);
         let mut p = random.parameters();
         if seed >= 9 {
             (p.mount, p.init.velocity) = (Mount::Pivot, [0.0; 3]);
         }
-        if seed >= 19 {
-            // Of the last six modes at four tanks, in free flight.
+        if (19..26).contains(&seed) || seed == 31 {
+            // From seed 25 on six modes at four tanks, in free flight.
             (p.mount, p.tanks) = (if seed == 20 { Mount::Pivot } else { Mount::Free }, 4);
             while p.appendages < if seed < 25 { 1 } else { 6 } {
                 random.flex(&mut p);
@@ -209,14 +209,17 @@ fn random_craft(most: usize) {
             // Its torque changes the momentum about every axis.
             (p.pivot, end) = (random.pivot(), 1000);
         }
-        if (11..19).contains(&seed) {
-            p.mount = if [13, 17].contains(&seed) { Mount::Pivot } else { Mount::Free };
+        if (11..19).contains(&seed) || (26..31).contains(&seed) {
+            p.mount = if [13, 17, 28].contains(&seed) { Mount::Pivot } else { Mount::Free };
         }
-        if (11..15).contains(&seed) {
+        if (11..15).contains(&seed) || seed == 27 {
             random.make_all_planar(&mut p);
         }
-        if (14..21).contains(&seed) {
+        if (14..21).contains(&seed) || seed >= 29 {
             random.bend_all(&mut p);
+        }
+        if seed >= 26 {
+            random.spin_all(&mut p);
         }
         // Bobs on surfaces other than spheres move faster than the rule's nodes in one panel resolve.
         let panels = if seed < 14 { 1 } else { 2 };

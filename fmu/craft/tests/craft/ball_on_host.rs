@@ -134,7 +134,8 @@ impl Craft {
                 x[index::WORK] = work;
                 x[index::DISSIPATED] = tank[6 * craft::MODES];
                 x[index::bob(0, 0)..index::bob(1, 0)].copy_from_slice(&tank[..6 * craft::MODES]);
-                x[index::ball(0)..index::ball(1)].copy_from_slice(&tank[6 * craft::MODES + 2..]);
+                x[index::ball(0)..index::ball(1)]
+                    .copy_from_slice(&tank[6 * craft::MODES + 2..TANK_STATES - 3]);
             },
             &[self.ball()],
         );
@@ -480,7 +481,7 @@ fn placed(seed: u64, ball: BallState) -> (SloshTank, TankInputs) {
     let (n, rate) = (v(&random.vector::<3>(1.0)).normalize(), v(&random.vector::<3>(0.3)));
     let along = rate - n * n.dot(&rate);
     x[BALL..BALL + 3].copy_from_slice((center + n * 0.5).as_slice());
-    x[BALL + 3..].copy_from_slice(along.as_slice());
+    x[BALL + 3..BALL + 6].copy_from_slice(along.as_slice());
     tank.set_continuous_states(&x);
     let u = TankInputs {
         a: Ramp { value: random.vector(1.0), slope: [0.0; 3] },

@@ -97,8 +97,11 @@ fn somewhere(seed: u64) -> (Random, Parameters, Spacecraft, Inputs) {
     if (60..85).contains(&seed) {
         random.make_all_planar(&mut p);
     }
-    if seed >= 80 {
+    if (80..90).contains(&seed) || seed >= 95 {
         random.bend_all(&mut p);
+    }
+    if seed >= 90 {
+        random.spin_all(&mut p);
     }
     if seed.is_multiple_of(2) {
         p.tank.iter_mut().for_each(|tank| random.follow(tank));
@@ -123,7 +126,7 @@ fn somewhere(seed: u64) -> (Random, Parameters, Spacecraft, Inputs) {
 /// Along a direction of every kind of state and input at once, of the size of 1 for each.
 #[test]
 fn directional_derivatives_equal_finite_differences() {
-    for seed in 0..90 {
+    for seed in 0..100 {
         let (mut random, p, mut craft, u) = somewhere(seed);
         let (mut dx, du): ([f64; STATES], _) = (random.vector(1.0), random.vector(100.0));
         if p.mount == Mount::Pivot {
@@ -152,7 +155,7 @@ fn directional_derivatives_equal_finite_differences() {
 
 #[test]
 fn directional_derivatives_of_a_tank_equal_finite_differences() {
-    for seed in 0..90 {
+    for seed in 0..100 {
         let mut random = Random::new(seed);
         let mut p = TankParameters { tank: random.tank(), ..TankParameters::default() };
         if seed >= 60 {
@@ -162,11 +165,14 @@ fn directional_derivatives_of_a_tank_equal_finite_differences() {
             random.bend(&mut p.tank);
             random.bend_further(&mut p.tank);
         }
+        if seed >= 90 {
+            random.spin(&mut p.tank);
+        }
         p.coupling = Coupling::ALL[seed as usize % 3];
         let mut ramp = || Ramp { value: random.vector(1.0), slope: random.vector(1.0) };
         let (a, omega_dot) = (ramp(), ramp());
         let mut u = TankInputs { a, omega: random.vector(1.0), omega_dot, ..TankInputs::default() };
-        if seed.is_multiple_of(5) && seed < 60 || seed >= 84 {
+        if seed.is_multiple_of(5) && seed < 60 || (84..90).contains(&seed) {
             p.tank = draining_tank(&mut random, 1 + seed as usize % 3);
             if seed >= 84 {
                 random.bend_by_fill(&mut p.tank);

@@ -1,7 +1,9 @@
 //! Hosts that integrate themselves: the craft's own equations, and a tank on somebody else's rigid
 //! body.
 
-use craft::{Inputs, Mount, Parameters, Ramp, STATES, TankInputs, TankParameters, index};
+use craft::{
+    Inputs, Mount, Parameters, Ramp, STATES, TANK_STATES, TankInputs, TankParameters, index,
+};
 use nalgebra::{SMatrix, SVector};
 
 use super::component::{SloshTank, Spacecraft};
@@ -48,7 +50,7 @@ pub fn runge_kutta(
 /// (30 h)^4/120 of what they do leaves 1e-11. In a quarter of a second these turn by one to two turns.
 #[test]
 fn a_model_exchange_host_reproduces_co_simulation_of_a_craft() {
-    for seed in 0..26 {
+    for seed in 0..30 {
         let mut random = Random::new(seed);
         let mut p = random.parameters();
         if seed >= 18 {
@@ -60,7 +62,10 @@ fn a_model_exchange_host_reproduces_co_simulation_of_a_craft() {
         if (12..18).contains(&seed) {
             random.make_all_planar(&mut p);
         }
-        if (16..22).contains(&seed) {
+        if seed >= 24 {
+            random.spin_all(&mut p);
+        }
+        if (16..22).contains(&seed) || seed >= 28 {
             random.bend_all(&mut p);
         }
         if seed.is_multiple_of(3) {
@@ -126,6 +131,7 @@ impl HostWithTanks {
             let mut states = tank.continuous_states();
             let at = index::bob(i, 0);
             states[..18].copy_from_slice(&x[at..at + 18]);
+            states[TANK_STATES - 3..].copy_from_slice(&x[index::spin(i)..][..3]);
             tank.set_continuous_states(&states);
             // Of a and w' neither bias nor added mass knows.
             let out = tank.outputs(&TankInputs { omega, ..TankInputs::default() });
@@ -156,6 +162,7 @@ impl HostWithTanks {
             let d = tank.derivatives(&TankInputs { a, omega, omega_dot, ..TankInputs::default() });
             let at = index::bob(i, 0);
             rate[at..at + 18].copy_from_slice(&d[..18]);
+            rate[index::spin(i)..][..3].copy_from_slice(&d[TANK_STATES - 3..]);
             rate[index::DISSIPATED] += d[18];
         }
         rate
@@ -167,14 +174,17 @@ type V3 = nalgebra::Vector3<f64>;
 /// The same integrator with the same steps around both: what remains is rounding.
 #[test]
 fn tanks_on_a_host_that_splits_inertia_in_every_stage_move_as_spacecraft() {
-    for seed in 0..26 {
+    for seed in 0..30 {
         let mut random = Random::new(seed);
         let mut p = random.parameters();
         if (12..23).contains(&seed) {
             random.make_all_planar(&mut p);
         }
-        if seed >= 20 {
+        if (20..28).contains(&seed) {
             random.bend_all(&mut p);
+        }
+        if seed >= 25 {
+            random.spin_all(&mut p);
         }
         let inputs = random.inputs();
         let mut craft = Spacecraft::new(&p, &inputs, 0.0, 1e-9).unwrap();

@@ -27,6 +27,7 @@ mod reference;
 mod refusals;
 mod small_motions;
 mod special_cases;
+mod spinning;
 mod surface;
 mod tilting;
 mod waves;

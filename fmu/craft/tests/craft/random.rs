@@ -104,6 +104,21 @@ impl Random {
         }
     }
 
+    /// Gives the liquid of every tank of a craft a spin, of which half have friction.
+    pub fn spin_all(&mut self, p: &mut Parameters) {
+        p.tanks = p.tanks.max(1);
+        p.tank.iter_mut().for_each(|tank| self.spin(tank));
+    }
+
+    /// Gives the liquid of a tank a spin.
+    pub fn spin(&mut self, tank: &mut Tank) {
+        tank.spin_inertia = self.magnitude(0.5, 50.0);
+        tank.spin_inertia_across = [0.0, self.magnitude(0.5, 50.0)][self.below(2)];
+        tank.spin_coupling = self.between(0.2, 1.0);
+        tank.spin_decay = [[0.0; 2], [0.3, 0.1]][self.below(2)];
+        tank.slip_0 = self.vector(2.0);
+    }
+
     /// Gives the bobs of a tank surfaces other than spheres.
     pub fn bend(&mut self, tank: &mut Tank) {
         for s in &mut tank.nonlinear_inertia {
