@@ -713,9 +713,9 @@ fn an_fmu_with_fewer_variables_moves_as_the_full_fmu() {
                 run.instance.update_discrete_states().unwrap();
                 run.instance.enter_continuous_time_mode().unwrap();
             }
-            // Attitude to dissipation, drained; per tank one mode, liquid and ball; eta and eta_dot.
+            // Attitude to dissipation, drained; per tank one mode, liquid, ball and spin; eta and eta_dot.
             let counts = two.each_mut().map(|run| run.instance.number_of_states().unwrap());
-            assert_eq!(counts, [15 + 1 + 2 * (6 + 1 + 6) + 2 * 3, 128]);
+            assert_eq!(counts, [15 + 1 + 2 * (6 + 1 + 6 + 3) + 2 * 3, 140]);
             let counts = two.each_mut().map(|run| run.instance.number_of_indicators().unwrap());
             assert_eq!(counts, [4, 8]);
         }

@@ -21,6 +21,7 @@ const COUNT: usize = 100;
 fn read(out: TankOutputs) -> TankOutputs {
     TankOutputs {
         axial: 0.0,
+        turning: 0.0,
         ranges: Ranges::default(),
         ball_state: BallState::Settled,
         ball_position: [0.0; 3],
@@ -66,7 +67,7 @@ fn compare(what: &str, p: &Parameters, input: impl Fn(usize) -> Inputs, count: u
 }
 
 /// Tests craft that are free or on a pivot, round and planar modes, surfaces other than spheres, every
-/// damping law, draining, and appendages.
+/// damping law, draining, appendages, and liquid that spins.
 #[test]
 fn the_fmu_and_the_crate_move_random_craft_bit_identically() {
     for seed in 0..40 {
@@ -91,6 +92,9 @@ fn the_fmu_and_the_crate_move_random_craft_bit_identically() {
         }
         if seed >= 25 {
             random.flex(&mut p);
+        }
+        if seed >= 30 && seed % 5 != 4 {
+            random.spin_all(&mut p);
         }
         let pieces: Vec<Inputs> = (0..COUNT / 25).map(|_| random.inputs()).collect();
         let input = |k: usize| {
@@ -169,6 +173,9 @@ fn the_fmu_and_the_crate_move_random_tanks_bit_identically() {
         }
         if seed % 5 == 0 && seed % 4 != 3 {
             random.follow(&mut p.tank);
+        }
+        if seed >= 20 && seed % 4 != 3 {
+            random.spin(&mut p.tank);
         }
         if seed % 2 == 0 {
             p.host = Some(random.parameters().craft);

@@ -121,6 +121,19 @@ impl Settings {
             self.reals(rows(&of("direction"), (MODES, 2)), tank.direction.as_flattened());
             self.reals(elements(&of("arm"), MODES), &tank.arm);
         }
+        if tank.spin_inertia > 0.0 {
+            for (what, value) in [
+                ("spin_inertia", tank.spin_inertia),
+                ("spin_inertia_across", tank.spin_inertia_across),
+                ("spin_coupling", tank.spin_coupling),
+            ] {
+                self.real(of(what), value);
+            }
+            self.reals(elements(&of("spin_decay"), 2), &tank.spin_decay);
+            self.reals(elements(&of("slip_0"), 3), &tank.slip_0);
+            self.reals(elements(&of("gyroscopic"), MODES), &tank.gyroscopic);
+            self.reals(elements(&of("gyroscopic_stiffness"), MODES), &tank.gyroscopic_stiffness);
+        }
         if tank.ball.travel > 0.0 {
             for (what, value) in [
                 ("travel", tank.ball.travel),
@@ -329,7 +342,7 @@ fn tank_outputs(name: &str) -> Vec<String> {
         .chain(rows(&of("p_dot"), (MODES, 3)))
         .chain(elements(&of("angle_x"), MODES))
         .chain(elements(&of("angle_y"), MODES))
-        .chain([of("wave_height")])
+        .chain(["wave_height", "spin_ratio", "spin_number"].map(of))
         .collect()
 }
 
@@ -342,8 +355,11 @@ fn read_tank(force: [f64; 3], torque: [f64; 3], next: &mut Numbers) -> TankOutpu
         angle_x: next.array(),
         angle_y: next.array(),
         wave_height: next.one(),
+        spin_ratio: next.one(),
+        spin_number: next.one(),
         // Not read: what tests compare is forces and motion.
         axial: 0.0,
+        turning: 0.0,
         ranges: craft::Ranges::default(),
         ball_state: craft::BallState::Settled,
         ball_position: [0.0; 3],

@@ -59,7 +59,7 @@ fn pages_of_variables_have_the_start_values_of_all_components() {
 /// without appendages has.
 fn parameters<M: Model>() -> [usize; 2] {
     /// Arrays of a tank whose first index is the mode.
-    const OF_MODES: [&str; 30] = [
+    const OF_MODES: [&str; 32] = [
         "mass",
         "length",
         "frequency",
@@ -77,6 +77,8 @@ fn parameters<M: Model>() -> [usize; 2] {
         "nonlinear_stiffness_2",
         "rotary_inertia",
         "rotary_inertia_2",
+        "gyroscopic",
+        "gyroscopic_stiffness",
         "angle_limit",
         "swirl_limit",
         "wave",

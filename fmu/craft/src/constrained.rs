@@ -33,6 +33,8 @@
 //! r'     becomes r' + S sigma q + T (q x r') m in the drag
 //! ```
 //!
+//! In liquid that spins at the rate W (`spin.rs`) P = T tau - (1 - C) W, and D gains epsilon W^2.
+//!
 //! sigma' and tau' = (q x r' + w_e u)' belong to the newest order. m is perpendicular to n and d, so that H gains T/(1 + T u) m
 //! m^T; the row [a; w'] of tau' has - l u e in addition (`surface.rs`).
 //!
@@ -107,11 +109,12 @@ pub(crate) struct ConstrainedBob {
     specific_force: Vec3,
 }
 
-/// Series of the terms beyond the third order, with the symbols above; `known` are the terms of D, P' and
-/// tau' of the current order without the newest [a; w'].
+/// Series of the terms beyond the third order and of liquid that spins at the rate W (`liquid`), with the symbols above;
+/// `known` are the terms of D, P' and tau' of the current order without the newest [a; w'].
 #[derive(Clone, Debug)]
 struct HigherSeries {
     by: Higher,
+    liquid: Series,
     u3: Series,
     beta: Series,
     turning: Series,
@@ -135,6 +138,7 @@ impl HigherSeries {
     fn new(by: Higher) -> Box<HigherSeries> {
         Box::new(HigherSeries {
             by,
+            liquid: ZERO,
             u3: ZERO,
             beta: ZERO,
             turning: ZERO,
@@ -199,11 +203,19 @@ impl HigherSeries {
             swirls[0] += by.rotary[1] * u[j] * self.tau[n - j];
         }
         self.swirl[n] = self.inertia[1] * self.tau[n] + swirls[0];
+        let [gyroscopic, stiffness] = by.gyroscopic;
+        if gyroscopic != 0.0 {
+            self.swirl[n] -= gyroscopic * self.liquid[n];
+            swirls[1] -= gyroscopic * self.liquid[n + 1];
+        }
         self.spin[n] = mul(n, u, &self.swirl);
-        let inwards_known = order * faster
+        let mut inwards_known = order * faster
             - by.inertia * square(n, &self.sigma)
             - by.rotary[1] * square(n, &self.tau)
             - 2.0 * mul(n, &self.swirl, &self.turning);
+        if stiffness != 0.0 {
+            inwards_known += stiffness * square(n, &self.liquid);
+        }
         self.known = [inwards_known, order * swirls[1], order * twist[1]];
         let mut f = [0.0; 2];
         for j in 0..=n {
@@ -607,6 +619,30 @@ impl ConstrainedBob {
     pub fn bound_message(&self, name: &str) -> String {
         let higher = self.surface.higher().unwrap_or_default();
         surface::bound_message(self.coefficients, higher, self.mode, name)
+    }
+
+    /// Sets coefficient n of the liquid's rate of spin W.
+    pub fn set_spin(&mut self, n: usize, turning: f64) {
+        if let Some(higher) = &mut self.higher {
+            higher.liquid[n] = turning;
+        }
+    }
+
+    /// Returns coefficient n of what the mode adds to I_zz s_z of the spinning liquid (`spin.rs`), before
+    /// [`ConstrainedBob::reaction`] of this order; `w` is coefficient n of the angular velocity.
+    pub fn reaction_on_spin(&self, n: usize, w: Vec3) -> f64 {
+        let Some(higher) = self.higher.as_ref().filter(|it| it.by.gyroscopic != [0.0; 2]) else {
+            return 0.0;
+        };
+        let w = transposed_times(&self.axes, w);
+        let r_d = sub(self.v[n], add(self.ahead, cross(w, self.r[0])));
+        let mut tau = self.r[0][0] * r_d[1] - self.r[0][1] * r_d[0] + w[2] * self.u[0];
+        for j in 1..=n {
+            let (a, b) = (self.r[j], self.r_d[n - j]);
+            tau += a[0] * b[1] - a[1] * b[0] + self.u[j] * self.in_tank[n - j][2];
+        }
+        let turned = mul(n, &higher.liquid, &self.u);
+        self.m * self.l * self.l * higher.by.reaction(tau, turned)
     }
 
     pub fn follows(&self) -> bool {

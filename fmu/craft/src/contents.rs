@@ -231,13 +231,14 @@ impl MountedTank {
     }
 
     /// Returns surface and height of the bob of mode `n`, which counts from 0, from l with its derivatives,
-    /// and p, p' and w. `changing` has s and kappa with their derivatives if the table gives them.
+    /// p, p' and w, and the liquid's rate of spin with its derivative. `changing` has s and kappa with their derivatives if the table gives them.
     #[inline(never)]
     fn on_surface<T: Number>(
         &self,
         n: usize,
         l: Jet<T>,
         [p, p_d, w]: [Vec3<T>; 3],
+        turning: [T; 2],
         changing: Option<[Jet<T>; 2]>,
     ) -> Option<(Meridian<T>, Lift<T>)> {
         let across = self.across[n].map(constant);
@@ -246,7 +247,7 @@ impl MountedTank {
             None => self.surfaces[n]?.lift_to(),
         };
         let meridian = Meridian::new(surface, constant(self.e), p, across);
-        let lift = meridian.lift(l, p_d, w, changing);
+        let lift = meridian.lift(l, p_d, (w, turning), changing);
         Some((meridian, lift))
     }
 
@@ -261,13 +262,24 @@ impl MountedTank {
         flow: (T, T, f64),
     ) -> Contents<'_, T> {
         let mut contents = Contents::new(self);
-        contents.evaluate(x, self.spin_now(spin, motion[1]), motion, flow);
+        contents.evaluate(x, self.spin_now(x, spin, motion[1]), motion, flow);
         contents
     }
 
-    /// Returns the liquid's spin at its angular momentum `l`, tank axes, and the angular velocity `w`, body axes.
-    pub fn spin_now<T: Number>(&self, l: Vec3<T>, w: Vec3<T>) -> Option<SpinNow<T>> {
-        Some(self.spin.as_ref()?.now(l, w))
+    /// Returns the liquid's spin at its angular momentum `l` and p and p' of each mode, `x`, tank axes, and the angular
+    /// velocity `w`, body axes.
+    pub fn spin_now<T: Number>(&self, x: &[T], l: Vec3<T>, w: Vec3<T>) -> Option<SpinNow<T>> {
+        let spin = self.spin.as_ref()?;
+        let mut reaction = T::constant(0.0);
+        for n in 0..self.tank.modes {
+            let Some(higher) = self.tank.gyroscopic(n) else { continue };
+            let [p, p_d] = on_sphere(vector_from(x, 6 * n), vector_from(x, 6 * n + 3));
+            let u = p[0] * p[0] + p[1] * p[1];
+            let tau = p[0] * p_d[1] - p[1] * p_d[0] + dot(constant(self.e), w) * u;
+            let inertia = self.tank.mass[n] * self.tank.length[n] * self.tank.length[n];
+            reaction = reaction + higher.reaction(tau, spin.turning(l) * u) * inertia;
+        }
+        Some(spin.now(l, w, reaction))
     }
 
     /// Writes the bobs' p' and p'' in tank axes, six numbers each, under the acceleration [a; w'].
@@ -478,7 +490,9 @@ impl<T: Number> Contents<'_, T> {
         // derivative.
         let (mut level, mut level_d) = ([zero; 2], [zero; 2]);
         let mut sinking = [c(0.0); 2];
+        let mut turning = [c(0.0); 2];
         if let Some(now) = &spin {
+            turning = now.turning;
             self.dissipation = now.dissipation;
             (self.flow_wrench[1], self.flow_momentum[1]) = (now.torque, now.momentum);
         }
@@ -503,7 +517,8 @@ impl<T: Number> Contents<'_, T> {
             let mut rho_d = add(add(scale(h[1], e), scale(l[1], p)), scale(l[0], p_d));
             let on_surface = if mounted.curved {
                 let changing = place.and_then(|place| curves.surface(n, place));
-                mounted.on_surface(n, l, [p, p_d, w], changing.map(|pair| pair.map(follow)))
+                let changing = changing.map(|pair| pair.map(follow));
+                mounted.on_surface(n, l, [p, p_d, w], turning, changing)
             } else {
                 None
             };
@@ -682,9 +697,9 @@ impl<T: Number> Contents<'_, T> {
         guides.fold(sum, |sum, guide| [add(sum[0], guide[0]), add(sum[1], guide[1])])
     }
 
-    /// Returns the derivative of the liquid's angular momentum of spin, tank axes, and its energy, J.
-    pub fn spin(&self) -> Option<(Vec3<T>, T)> {
-        self.spin.as_ref().map(|now| (now.rate, now.energy))
+    /// Returns the derivative of the liquid's angular momentum of spin, tank axes, and its energy, J, and rate, rad/s.
+    pub fn spin(&self) -> Option<(Vec3<T>, [T; 2])> {
+        self.spin.as_ref().map(|now| (now.rate, [now.energy, now.turning[0]]))
     }
 
     /// Returns force and torque about O on the craft at a = w' = 0, without the rigid liquid's inertia.

@@ -322,7 +322,7 @@ impl Draining {
 
     fn energy(&self, state: &State) -> f64 {
         let acting = Acting::flowing(state.flow, [0.0; TANKS]);
-        self.evaluate(&state.x, &acting).outputs(&state.x).energy
+        self.evaluate(&state.x, &acting).outputs(&state.x, &[]).energy
     }
 
     fn equations<T: Number>(&self, matrix: Mat6<T>) -> Equations<T> {
@@ -401,7 +401,8 @@ impl Draining {
         let mut couple = of_pivot;
         let mut spins = [const { None }; TANKS];
         for (i, (mounted, spin)) in self.tanks.iter().zip(&mut spins).enumerate() {
-            *spin = mounted.spin_now(vector_from(x, index::spin(i)), w);
+            let bobs = &x[index::bob(i, 0)..index::bob(i, 0) + 6 * MODES];
+            *spin = mounted.spin_now(bobs, vector_from(x, index::spin(i)), w);
             if let Some(now) = spin {
                 couple = Some(couple.map_or(now.torque, |sum| add(sum, now.torque)));
             }
@@ -503,7 +504,7 @@ impl Draining {
                 rigid: tank.rigid,
                 flow_momentum: tank.flow_momentum,
                 wrench: tank.wrench(a, w, w_d),
-                spin_energy: tank.spin().map(|(_, energy)| energy),
+                spin: tank.spin().map(|(_, energy_and_rate)| energy_and_rate),
                 bobs: mounted.bobs_now(tank),
                 lump: None,
                 ball_state: BallState::Settled,

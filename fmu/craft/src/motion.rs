@@ -499,10 +499,11 @@ impl CraftMotion {
         if self.on_springs {
             self.set_torque_of_pivot::<N>();
         }
-        for spin in &mut self.spins {
-            let (torque, power) = spin.expand(N, self.w[N]);
-            self.couple = add(self.couple, torque);
-            self.loss_of_couple += power;
+        let CraftMotion { spins, constrained, w, couple, loss_of_couple, .. } = self;
+        for spin in spins {
+            let (torque, power) = spin.expand(N, w[N], constrained);
+            *couple = add(*couple, torque);
+            *loss_of_couple += power;
         }
     }
 

@@ -26,13 +26,15 @@ use crate::bob::BobNow;
 use crate::motion::CraftMotion;
 use crate::parameters::Mount;
 use crate::pivot::Pivot;
+use crate::ranges::Bounds;
 use crate::rigid::Rigid;
 use crate::sizes::{MODES, TANKS};
 use crate::state::{BallState, Ranges, STATES, index};
 
 /// Outputs of one tank, with the names, units and axes of the FMUs' outputs `tank[].…`, which their variable
 /// tables describe. Force and torque are those of the tank's whole liquid on the craft, body axes, about O.
-/// Directions `p` and angles, sin(angle_x) = p_x, are in tank axes. `ball_position` is the liquid's centre at
+/// Directions `p` and angles, sin(angle_x) = p_x, are in tank axes. `axial` is the specific force along the tank at the first
+/// hinge, m/s2, and `turning` the rate at which the liquid turns about the tank's axis, rad/s. `ball_position` is the liquid's centre at
 /// rest while it is settled.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
@@ -45,6 +47,9 @@ pub struct TankOutputs {
     pub angle_y: [f64; MODES],
     pub wave_height: f64,
     pub axial: f64,
+    pub turning: f64,
+    pub spin_ratio: f64,
+    pub spin_number: f64,
     pub ranges: Ranges,
     pub ball_state: BallState,
     pub ball_position: Vec3,
@@ -96,6 +101,9 @@ impl TankOutputs {
             angle_y: [0.0; MODES],
             wave_height: 0.0,
             axial: 0.0,
+            turning: 0.0,
+            spin_ratio: 0.0,
+            spin_number: 0.0,
             ranges: Ranges::default(),
             ball_state: BallState::Settled,
             ball_position: [0.0; 3],
@@ -103,16 +111,27 @@ impl TankOutputs {
         }
     }
 
+    /// Sets everything that depends on the bobs. `liquid` is the rate of the liquid's spin, if it has one; otherwise the liquid
+    /// is taken to turn with the tank.
     pub(crate) fn set_angles<'a, T: Number + 'a>(
         &mut self,
         [a, w, w_d]: [Vec3<T>; 3],
         bobs: impl Iterator<Item = &'a BobNow<T>>,
+        liquid: Option<T>,
+        bounds: Option<&Bounds>,
     ) {
         let mut wave = [T::constant(0.0); 2];
         for (n, bob) in bobs.enumerate() {
             if n == 0 {
                 let turning = add(cross(w_d, bob.hinge), cross(w, cross(w, bob.hinge)));
-                self.axial = dot(constant(bob.e), add(a, turning)).result();
+                let axial = dot(constant(bob.e), add(a, turning));
+                self.axial = axial.result();
+                let turning = liquid.unwrap_or_else(|| dot(constant(bob.e), w));
+                self.turning = turning.result();
+                if let Some(bounds) = bounds {
+                    let numbers = bounds.spin_numbers(axial, turning);
+                    [self.spin_ratio, self.spin_number] = numbers.map(T::result);
+                }
             }
             let [x, y] = [bob.in_tank[0].asin(), bob.in_tank[1].asin()];
             self.angle_x[n] = x.result();
@@ -173,13 +192,13 @@ fn add_matrices<T: Number>(a: Mat3<T>, b: Mat3<T>) -> Mat3<T> {
 
 /// One tank at an instant, for the outputs. `rigid` is the rigid liquid about O, `wrench` force and torque
 /// about O on the craft, `flow_momentum` momentum and moment of momentum about O of the flow within the tank
-/// (`draining.rs`) with the momentum of the liquid's spin, `spin_energy` the energy of this spin, and `lump` the detached
+/// (`draining.rs`) with the momentum of the liquid's spin, `spin` the energy and the rate of this spin, and `lump` the detached
 /// liquid, if any.
 pub(crate) struct TankNow<T> {
     pub rigid: Rigid<T>,
     pub wrench: [Vec3<T>; 2],
     pub flow_momentum: [Vec3<T>; 2],
-    pub spin_energy: Option<T>,
+    pub spin: Option<[T; 2]>,
     pub bobs: [Option<BobNow<T>>; MODES],
     pub lump: Option<BobNow<T>>,
     pub ball_state: BallState,
@@ -236,7 +255,7 @@ impl CraftMotion {
                 rigid,
                 wrench,
                 flow_momentum,
-                spin_energy: None,
+                spin: None,
                 bobs,
                 lump: None,
                 ball_state: BallState::Settled,
@@ -253,7 +272,8 @@ impl CraftMotion {
 }
 
 impl<T: Number> Now<T> {
-    pub fn outputs(&self, x: &[f64; STATES]) -> Outputs {
+    /// Returns the outputs; without the `bounds` of the tanks those that depend on the spin are 0.
+    pub fn outputs(&self, x: &[f64; STATES], bounds: &[Bounds]) -> Outputs {
         let Now { w, velocity, .. } = *self;
         let tanks = || self.tanks.iter().flatten();
         let bobs = || tanks().flat_map(|tank| tank.bobs.iter().flatten().chain(&tank.lump));
@@ -270,9 +290,10 @@ impl<T: Number> Now<T> {
             tank.ball_velocity = part(x, index::ball(i) + 3);
         }
         let (mut slosh_force, mut slosh_torque) = ([0.0; 3], [0.0; 3]);
-        for (out, now) in tank.iter_mut().zip(tanks()) {
+        for (i, (out, now)) in tank.iter_mut().zip(tanks()).enumerate() {
             [out.force, out.torque] = now.wrench.map(result);
-            out.set_angles([self.a, w, self.w_d], now.bobs.iter().flatten());
+            let (bobs, turning) = (now.bobs.iter().flatten(), now.spin.map(|[_, turning]| turning));
+            out.set_angles([self.a, w, self.w_d], bobs, turning, bounds.get(i));
             out.ball_state = now.ball_state;
             slosh_force = add(slosh_force, out.force);
             slosh_torque = add(slosh_torque, out.torque);
@@ -304,7 +325,7 @@ impl<T: Number> Now<T> {
         for tank in tanks() {
             inner_momentum = add(inner_momentum, tank.flow_momentum[0]);
             inner_angular = add(inner_angular, tank.flow_momentum[1]);
-            if let Some(spin_energy) = tank.spin_energy {
+            if let Some([spin_energy, _]) = tank.spin {
                 energy = energy + spin_energy;
             }
         }

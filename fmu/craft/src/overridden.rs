@@ -26,6 +26,8 @@ impl Tank {
                 | "nonlinear_stiffness_2"
                 | "rotary_inertia"
                 | "rotary_inertia_2"
+                | "gyroscopic"
+                | "gyroscopic_stiffness"
         );
         if is_of_mode && n >= self.modes {
             return None;
@@ -52,7 +54,12 @@ impl Tank {
             "length" if self.frequency[n] > 0.0 => {
                 Some(format!("frequency[{}] = {:?} Hz", n + 1, self.frequency[n]))
             }
-            "spin_inertia_across" | "spin_coupling" | "spin_decay" | "slip_0"
+            "spin_inertia_across"
+            | "spin_coupling"
+            | "spin_decay"
+            | "slip_0"
+            | "gyroscopic"
+            | "gyroscopic_stiffness"
                 if self.spin_inertia == 0.0 =>
             {
                 Some("spin_inertia = 0; the liquid has no spin".into())

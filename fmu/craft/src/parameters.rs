@@ -181,6 +181,8 @@ pub struct Tank {
     pub nonlinear_stiffness_2: [f64; MODES],
     pub rotary_inertia: [f64; MODES],
     pub rotary_inertia_2: [f64; MODES],
+    pub gyroscopic: [f64; MODES],
+    pub gyroscopic_stiffness: [f64; MODES],
     pub angle_limit: [f64; MODES],
     pub swirl_limit: [f64; MODES],
     pub g_bond: f64,
@@ -302,7 +304,17 @@ impl Tank {
             inertia: self.nonlinear_inertia_2[n],
             stiffness: self.nonlinear_stiffness_2[n],
             rotary: [self.rotary_inertia[n], self.rotary_inertia_2[n]],
+            gyroscopic: match [self.gyroscopic[n], self.gyroscopic_stiffness[n]] {
+                [1.0, 0.0] => [0.0; 2],
+                [c, stiffness] if self.spin_inertia > 0.0 => [1.0 - c, stiffness + 2.0 * c - 1.0],
+                _ => [0.0; 2],
+            },
         }
+    }
+
+    /// Returns the coefficients of mode `n`, which counts from 0, if the liquid's spin acts on it.
+    pub(crate) fn gyroscopic(&self, n: usize) -> Option<Higher> {
+        Some(self.higher(n)).filter(|higher| higher.gyroscopic != [0.0; 2])
     }
 
     pub(crate) fn has_surface(&self) -> bool {
@@ -632,6 +644,8 @@ impl Default for Tank {
             nonlinear_stiffness_2: [0.0; MODES],
             rotary_inertia: [0.0; MODES],
             rotary_inertia_2: [0.0; MODES],
+            gyroscopic: [1.0; MODES],
+            gyroscopic_stiffness: [0.0; MODES],
             angle_limit: [0.0; MODES],
             swirl_limit: [0.0; MODES],
             g_bond: 0.0,
@@ -908,6 +922,15 @@ impl Tank {
                          rotate)"
                     ));
                 }
+            }
+            let [c, epsilon] = [self.gyroscopic[n], self.gyroscopic_stiffness[n]];
+            problems.number(&format!("{name}.gyroscopic[{i}]"), c, -10.0, 10.0, "");
+            problems.number(&format!("{name}.gyroscopic_stiffness[{i}]"), epsilon, -1e3, 1e3, "");
+            if self.gyroscopic(n).is_some() && self.plane_normal(n).is_some() {
+                problems.0.push(format!(
+                    "{name}.gyroscopic[{i}] = {c:?} and gyroscopic_stiffness[{i}] = {epsilon:?} with {name}.direction[{i}] \
+                     (allowed: 1 and 0, because a mode in a plane does not rotate)"
+                ));
             }
             for (what, value) in
                 [("angle_limit", self.angle_limit[n]), ("swirl_limit", self.swirl_limit[n])]

@@ -17,8 +17,8 @@
 //! third_order          A above angle_limit, or above 45 degrees
 //! ```
 //!
-//! x is the specific force along the tank at the hinge, w^2 = max(x, g_floor)/l + k/m that of mode 1, Omega the rate of the
-//! tank about its axis, sin A = |p_perp|. With x/l + k/m below 0 a bob would swing over while real liquid would fall. Beyond
+//! x is the specific force along the tank at the hinge, w^2 = max(x, g_floor)/l + k/m that of mode 1, Omega the rate of
+//! the liquid's spin (`spin.rs`), without one that of the tank about its axis, sin A = |p_perp|. With x/l + k/m below 0 a bob would swing over while real liquid would fall. Beyond
 //! 45 degrees from the tank's axis the bob represents no surface.
 //!
 //! Motion is rotary if the ellipse of the bob has semi-axes in a ratio above 1/2: 2 |q x q'| w > 0.8 (w^2 q^2 + q'^2), which
@@ -30,14 +30,13 @@ use formulas::limits::{
 };
 use formulas::regime::Regime;
 use formulas::third_order;
-use taylor::vector::{Vec3, dot, rotation, unit_quaternion};
+use taylor::number::Number;
 
 use crate::lump::COS_45;
 use crate::outputs::TankOutputs;
 use crate::parameters::Tank;
 use crate::sizes::{MODES, POINTS};
 use crate::state::{BallState, Ranges};
-use crate::surface::Higher;
 
 /// 2 b/a over 1 + (b/a)^2 of an ellipse with the semi-axes a and b = a/2; wider ellipses count as rotary
 /// motion.
@@ -49,8 +48,7 @@ const EMPTY: f64 = 1.0 + 1e-9;
 
 /// Bounds of a tank's ranges. For a draining tank they belong to its initial contents, except `over_fill`.
 /// `radius` is R, m, 0 if no wave is given; `lowest` is the lower bound of x per mode, below which the liquid
-/// leaves the bottom; `g_floor` is the smallest x in w^2, m/s2; `axis` is the tank's axis in axes of the
-/// craft or host.
+/// leaves the bottom; `g_floor` is the smallest x in w^2, m/s2.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Bounds {
     modes: usize,
@@ -61,7 +59,6 @@ pub(crate) struct Bounds {
     g_floor: f64,
     g_bond: f64,
     spin: SpinLimit,
-    axis: Vec3,
 }
 
 /// Bounds of a mode; 0 for those that are not known. The angles are in rad: of slosh, of rotary motion, and
@@ -131,13 +128,11 @@ impl Bounds {
             g_floor: tank.smallest_acceleration(),
             g_bond: tank.g_bond,
             spin: SpinLimit::new(if tank.modes > 0 { tank.length[0] } else { 1.0 }, radius),
-            axis: rotation(&unit_quaternion(tank.q)).map(|row| row[2]),
         }
     }
 
-    /// Returns the ranges for a tank's outputs, at the angular velocity `omega`, rad/s, and mass of liquid,
-    /// kg.
-    pub fn classify(&self, out: &TankOutputs, omega: Vec3, liquid: f64) -> Ranges {
+    /// Returns the ranges for a tank's outputs at the mass of liquid, kg.
+    pub fn classify(&self, out: &TankOutputs, liquid: f64) -> Ranges {
         if out.ball_state != BallState::Settled {
             let limited_by = LimitedBy::Contact;
             return Ranges { regime: Regime::Nonlinear, limited_by, is_physical: false };
@@ -149,11 +144,11 @@ impl Bounds {
             false => 2.0 * libm::hypot(out.angle_x[0], out.angle_y[0]) / (XI[0] * XI[0] - 1.0),
         };
         let regime = if upright { Regime::from_ratio(height) } else { Regime::Nonlinear };
-        let limited_by = self.reason(out, dot(omega, self.axis), liquid);
+        let limited_by = self.reason(out, liquid);
         Ranges { regime, limited_by, is_physical: upright && self.is_held(out.axial) }
     }
 
-    fn reason(&self, out: &TankOutputs, rate: f64, liquid: f64) -> LimitedBy {
+    fn reason(&self, out: &TankOutputs, liquid: f64) -> LimitedBy {
         if !self.is_held(out.axial) {
             return LimitedBy::Contact;
         }
@@ -165,7 +160,7 @@ impl Bounds {
         }
         let x = out.axial.max(self.g_floor);
         let omega2 = |n: usize| x * self.mode[n].inv_l + self.mode[n].k_m;
-        if self.spin.is_exceeded(rate, omega2(0)) {
+        if self.spin.is_exceeded(out.turning, omega2(0)) {
             return LimitedBy::Spin;
         }
         if self.g_bond > 0.0 && out.axial < self.g_bond {
@@ -198,6 +193,18 @@ impl Bounds {
         }
         let upright = self.are_upright(out.p.map(|p| p[2]));
         if reason == LimitedBy::None && !upright { LimitedBy::ThirdOrder } else { reason }
+    }
+
+    /// Returns 2 Omega/omega_0 and Omega^2 R/g of mode 1 at the specific force `axial` along the tank, m/s2, and the rate Omega at
+    /// which the liquid turns, rad/s.
+    pub fn spin_numbers<T: Number>(&self, axial: T, rate: T) -> [T; 2] {
+        if self.modes == 0 {
+            return [T::constant(0.0); 2];
+        }
+        let [inv_l, k_m] = [self.mode[0].inv_l, self.mode[0].k_m];
+        let omega2 = axial.at_least(self.g_floor) * inv_l + T::constant(k_m);
+        let share = rate * rate / omega2;
+        [share.sqrt() * 2.0, share * self.spin.radius_over_length()]
     }
 
     /// Returns true if the motion is physical: the liquid stays at the bottom and the bobs are within 45
@@ -239,13 +246,14 @@ impl Tank {
         let [s, kappa] = [self.nonlinear_inertia[n], self.nonlinear_stiffness[n]];
         let [planar, circular] = third_order::shifts(s, kappa);
         let shifts = [planar, circular - 2.0 * self.rotary_inertia[n]].map(Some);
-        let own = match cylinder_with_energy(fill).filter(|_| self.higher(n) != Higher::default()) {
-            Some(limit) => {
-                let (s, kappa) = third_order::coefficients(fill);
-                shifted(limit.forced, FORCED, shifts, third_order::shifts(s, kappa))
-            }
-            None => cylinder(fill, shifts).forced,
-        };
+        let own =
+            match cylinder_with_energy(fill).filter(|_| self.higher(n).is_beyond_third_order()) {
+                Some(limit) => {
+                    let (s, kappa) = third_order::coefficients(fill);
+                    shifted(limit.forced, FORCED, shifts, third_order::shifts(s, kappa))
+                }
+                None => cylinder(fill, shifts).forced,
+            };
         let own = [own, swirl_fold(fill).unwrap_or(0.0)];
         [0, 1].map(|i| if given[i] > 0.0 { given[i] } else { own[i] })
     }

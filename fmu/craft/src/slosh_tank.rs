@@ -641,6 +641,7 @@ impl TankMotion {
             matrix: rigid.mass_matrix(),
             rigid,
             bobs: [(); MODES].map(|()| None),
+            turning: None,
             lump: None,
             ball_state: self.state_of_ball(),
         };
@@ -689,7 +690,7 @@ impl TankMotion {
         let w2 = twice_crossed(product_coefficients(n, &self.w));
         let (a, w_d, mut dissipation) = (self.a[n], self.w_d[n], 0.0);
         if let Some(spin) = &mut self.spin {
-            (_, dissipation) = spin.expand(n, self.w[n]);
+            (_, dissipation) = spin.expand(n, self.w[n], &mut self.constrained);
         }
         for bob in &mut self.constrained {
             if bob.follows() {
@@ -1005,7 +1006,7 @@ impl TankMotion {
 }
 
 /// Quantities from which the outputs are computed: the `wrench` on the host about O, the `loads`, which are
-/// the wrench at a = w' = 0 without the rigid liquid, and the added mass M_a.
+/// the wrench at a = w' = 0 without the rigid liquid, the added mass M_a, and the rate of the liquid's spin.
 struct Parts<T> {
     motion: [Vec3<T>; 3],
     rigid: Rigid<T>,
@@ -1013,6 +1014,7 @@ struct Parts<T> {
     loads: [Vec3<T>; 2],
     matrix: Mat6<T>,
     bobs: [Option<BobNow<T>>; MODES],
+    turning: Option<T>,
     lump: Option<BobNow<T>>,
     ball_state: BallState,
 }
@@ -1181,7 +1183,7 @@ impl SloshTank {
     /// Returns the ranges of the current motion.
     pub fn ranges(&mut self, inputs: &TankInputs) -> Ranges {
         let outputs = self.outputs_held(inputs);
-        self.bounds.classify(&outputs.tank, inputs.omega, self.motion.state.x[LIQUID])
+        self.bounds.classify(&outputs.tank, self.motion.state.x[LIQUID])
     }
 
     /// Returns the ranges as they were after the last event.
@@ -1266,7 +1268,7 @@ impl SloshTank {
     pub fn outputs(&mut self, inputs: &TankInputs) -> SloshTankOutputs {
         let mut outputs = self.outputs_held(inputs);
         let liquid = self.motion.state.x[LIQUID];
-        outputs.tank.ranges = self.bounds.classify(&outputs.tank, inputs.omega, liquid);
+        outputs.tank.ranges = self.bounds.classify(&outputs.tank, liquid);
         outputs
     }
 
@@ -1307,6 +1309,7 @@ impl SloshTank {
             loads: contents.loads(),
             matrix,
             bobs: mounted.bobs_now(&contents),
+            turning: contents.spin().map(|(_, [_, turning])| turning),
             lump: None,
             ball_state: BallState::Settled,
         };
@@ -1322,7 +1325,8 @@ impl SloshTank {
         for bob in bobs.iter().flatten().chain(&lump) {
             all.add(bob.m, bob.rho);
         }
-        tank.set_angles([a, w, w_d], bobs.iter().flatten());
+        let bounds = Some(&self.bounds);
+        tank.set_angles([a, w, w_d], bobs.iter().flatten(), parts.turning, bounds);
         let zero = constant::<T>([0.0; 3]);
         let lumped = self.lumped.lift::<T>();
         let bias = match self.coupling {

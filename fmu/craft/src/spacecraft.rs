@@ -198,9 +198,9 @@ impl Spacecraft {
     }
 
     fn update_ranges(&self, outputs: &mut Outputs) {
-        let (omega, x) = (outputs.omega, &self.motion.state.x);
+        let x = &self.motion.state.x;
         for (i, (tank, limits)) in outputs.tank.iter_mut().zip(&self.bounds).enumerate() {
-            tank.ranges = limits.classify(tank, omega, x[index::LIQUID + i]);
+            tank.ranges = limits.classify(tank, x[index::LIQUID + i]);
         }
     }
 
@@ -208,10 +208,10 @@ impl Spacecraft {
     pub fn outputs_held(&mut self, inputs: &Inputs) -> Outputs {
         let x = &self.motion.state.x;
         let mut outputs = if let Some(draining) = &self.draining {
-            draining.evaluate(x, &Acting::from_inputs(inputs, 0.0)).outputs(x)
+            draining.evaluate(x, &Acting::from_inputs(inputs, 0.0)).outputs(x, &self.bounds)
         } else {
             self.motion.evaluate(inputs);
-            self.motion.now::<f64>().outputs(&self.motion.state.x)
+            self.motion.now::<f64>().outputs(&self.motion.state.x, &self.bounds)
         };
         for (tank, ranges) in outputs.tank.iter_mut().zip(self.motion.state.ranges) {
             tank.ranges = ranges;
@@ -270,10 +270,10 @@ impl Spacecraft {
         du: &[f64; INPUTS],
     ) -> Outputs {
         if let Some((draining, x, acting)) = self.dual_arguments(inputs, dx, du) {
-            return draining.evaluate(&x, &acting).outputs(dx);
+            return draining.evaluate(&x, &acting).outputs(dx, &self.bounds);
         }
         self.motion.evaluate_direction(inputs, dx, split(du));
-        self.motion.now::<Dual>().outputs(dx)
+        self.motion.now::<Dual>().outputs(dx, &self.bounds)
     }
 
     /// Returns states and inputs of a draining craft with their derivatives in the direction (dx, du).

@@ -15,6 +15,14 @@
 //! I_zz = 2 m a^2/5, gamma = 2 a c/(a^2 + c^2), and the inertia of its potential flow, m (a^2 - c^2)^2/(5 (a^2 + c^2)), is the
 //! rigid liquid's I_0. For a partly full tank gamma = 1 and A' = I_zz: the spin then follows the tank's axis by friction only.
 //!
+//! A gyroscopic mode (`surface.rs`) depends on the spin rate W = L_z/I_zz and reacts on the slip,
+//!
+//! ```text
+//! s_z gains sum of m l^2 [(1 - C) tau + epsilon W u]/I_zz
+//! ```
+//!
+//! because s = -dR/dL for the Routhian R, which has -m l^2 [(1 - C) W tau + epsilon W^2 u/2].
+//!
 //! Source: Poincare's and Kelvin's flow with uniform vorticity in a rotating ellipsoid.
 
 use taylor::number::Number;
@@ -24,6 +32,7 @@ use taylor::vector::{
     unit_quaternion,
 };
 
+use crate::constrained::ConstrainedBob;
 use crate::parameters::Tank;
 
 /// Parameters of a tank's spinning liquid, with the symbols above; vectors are diagonals in tank axes.
@@ -36,13 +45,14 @@ pub(crate) struct Spin {
 }
 
 /// The spinning liquid at an instant: `torque` on the craft and angular momentum Gamma L, body axes; L', tank
-/// axes; energy and dissipation.
+/// axes; energy and dissipation; W and W'.
 pub(crate) struct SpinNow<T> {
     pub torque: Vec3<T>,
     pub momentum: Vec3<T>,
     pub rate: Vec3<T>,
     pub energy: T,
     pub dissipation: T,
+    pub turning: [T; 2],
 }
 
 fn multiply<T: Number>(diagonal: Vec3, x: Vec3<T>) -> Vec3<T> {
@@ -63,12 +73,19 @@ impl Spin {
         })
     }
 
-    /// Returns the liquid's state with L = `l`, tank axes, at the angular velocity `w`, body axes.
-    pub fn now<T: Number>(&self, l: Vec3<T>, w: Vec3<T>) -> SpinNow<T> {
+    /// Returns W.
+    pub fn turning<T: Number>(&self, l: Vec3<T>) -> T {
+        l[2] * self.inverse[2]
+    }
+
+    /// Returns the liquid's state with L = `l`, tank axes, at the angular velocity `w`, body axes; `reaction` is what
+    /// the modes add to I_zz s_z.
+    pub fn now<T: Number>(&self, l: Vec3<T>, w: Vec3<T>, reaction: T) -> SpinNow<T> {
         let axes: Mat3<T> = self.axes.map(constant);
         let w = transposed_times(&axes, w);
         let turned = multiply(self.inverse, l);
-        let slip = sub(turned, multiply(self.coupling, w));
+        let mut slip = sub(turned, multiply(self.coupling, w));
+        slip[2] = slip[2] + reaction * self.inverse[2];
         let drag = multiply(self.friction, slip);
         let rate = sub(cross(slip, l), drag);
         let momentum = multiply(self.coupling, l);
@@ -79,6 +96,7 @@ impl Spin {
             rate,
             energy: dot(l, turned) * 0.5,
             dissipation: dot(slip, drag),
+            turning: [self.turning(l), self.turning(rate)],
         }
     }
 }
@@ -106,17 +124,28 @@ impl SpinSeries {
     }
 
     /// Returns coefficient n of the torque on the craft, body axes, and of the dissipation, from coefficient n of the
-    /// angular velocity `w`, body axes. Sets coefficient n + 1 of L.
+    /// angular velocity `w`, body axes. Sets coefficient n + 1 of L, and of W in the gyroscopic ones of `modes`.
     #[inline(never)]
-    pub fn expand(&mut self, n: usize, w: Vec3) -> (Vec3, f64) {
+    pub fn expand(&mut self, n: usize, w: Vec3, modes: &mut [ConstrainedBob]) -> (Vec3, f64) {
         let Spin { axes, inverse, coupling, friction } = self.spin;
+        let turning = self.spin.turning(self.l[n]);
+        let mut reaction = 0.0;
+        for bob in modes.iter_mut().filter(|bob| bob.tank == self.tank) {
+            bob.set_spin(n, turning);
+            reaction += bob.reaction_on_spin(n, w);
+        }
         self.w[n] = transposed_times(&axes, w);
         self.momentum[n] = multiply(coupling, self.l[n]);
-        let slip = sub(multiply(inverse, self.l[n]), multiply(coupling, self.w[n]));
+        let mut slip = sub(multiply(inverse, self.l[n]), multiply(coupling, self.w[n]));
+        slip[2] += reaction * inverse[2];
         self.slip[n] = slip;
         let turned = space::cross_coefficient(n, &self.slip, &self.l);
         let rate = sub(turned, multiply(friction, slip));
         self.l[n + 1] = rate.map(|x| x / (n + 1) as f64);
+        let turning = self.spin.turning(self.l[n + 1]);
+        for bob in modes.iter_mut().filter(|bob| bob.tank == self.tank) {
+            bob.set_spin(n + 1, turning);
+        }
         let precession = space::cross_coefficient(n, &self.w, &self.momentum);
         let torque = add(multiply(coupling, rate), precession).map(|x| -x);
         let [xx, yy, zz, ..] = space::product_coefficients(n, &self.slip);

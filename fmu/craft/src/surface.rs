@@ -72,6 +72,18 @@
 //! About the axis both parts of the torque by E_i cancel. [a; w'] acts on tau' by v = [n; rho x n - l u e], which adds m T/(1 +
 //! T u) v v^T to the mass matrix.
 //!
+//! **In liquid that spins** at the rate W (`spin.rs`) a mode may have a gyroscopic coefficient C and a stiffness epsilon, in the
+//! Routhian -m l^2 [(1 - C) W tau + epsilon W^2 u/2]:
+//!
+//! ```text
+//! T tau becomes P = T tau - (1 - C) W, except in E_i, t_2 tau^2 and the drag      force gains epsilon W^2 p_perp
+//! E_i gains m l^2 epsilon W^2 u/2
+//! ```
+//!
+//! Small motions in a tank that turns with its liquid have the frequencies l = C W +- sqrt(C^2 W^2 + w^2 + (epsilon + 1 - 2 C) W^2),
+//! seen from the tank, against the spin and with it. A pendulum, which does not take part in the spin, has C = 1 and epsilon =
+//! 0. The parameters are C and epsilon + 1 - 2 C.
+//!
 //! Source: the coefficients are those of `formulas::third_order` and `formulas::energy_terms`. The equations are Lagrange's for these energies.
 //! tests/craft/surface.rs checks them against Newton's law in Cartesian coordinates with the surface as a constraint, and
 //! those of a draining tank against differences of the Lagrangian.
@@ -89,15 +101,27 @@ pub(crate) const LEAST_INERTIA: f64 = 0.5;
 
 const ANGLE_STEP: f64 = core::f64::consts::PI / 1800.0;
 
-/// Coefficients s_2, kappa_2, t and t_2 of a mode beyond the third order; all 0 for none.
+/// Coefficients s_2, kappa_2, t and t_2 of a mode beyond the third order, and 1 - C and epsilon of one in liquid that spins
+/// (`gyroscopic`); all 0 for none.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Higher {
     pub inertia: f64,
     pub stiffness: f64,
     pub rotary: [f64; 2],
+    pub gyroscopic: [f64; 2],
 }
 
 impl Higher {
+    /// Returns true if the mode has coefficients beyond the third order.
+    pub fn is_beyond_third_order(&self) -> bool {
+        Higher { gyroscopic: [0.0; 2], ..*self } != Higher::default()
+    }
+
+    /// Returns (1 - C) tau + epsilon W u, which times m l^2 the mode adds to I_zz s_z of the spinning liquid.
+    pub fn reaction<T: Number>(&self, tau: T, turned: T) -> T {
+        tau * self.gyroscopic[0] + turned * self.gyroscopic[1]
+    }
+
     pub fn rotary_inertia<T: Number>(&self, u: T) -> T {
         T::constant(self.rotary[0]) + u * self.rotary[1]
     }
@@ -267,7 +291,7 @@ impl Surface {
 pub(crate) fn bound_message([s, kappa]: [f64; 2], higher: Higher, n: usize, name: &str) -> String {
     let surface = Surface::new(s, kappa, higher);
     let most = surface.map_or(0.0, |surface| surface.largest_angle().to_degrees());
-    if higher != Higher::default() {
+    if higher.is_beyond_third_order() {
         return format!(
             "the slosh angle of mode {} of {name} exceeds {most:.1} degrees, where {name}.nonlinear_inertia[{1}] = {s:?}, \
              nonlinear_inertia_2[{1}] = {2:?}, nonlinear_stiffness[{1}] = {kappa:?}, nonlinear_stiffness_2[{1}] = {3:?}, \
@@ -349,7 +373,8 @@ impl<T: Number> Meridian<T> {
         let gamma =
             beta * (beta * eta - T::constant(2.0)) * eta + eta * eta * surface.meridian_factor(u);
         let inertia = surface.meridian_inertia(eta, u).at_least(0.5 * LEAST_INERTIA);
-        let around = surface.higher.filter(|higher| higher.rotary != [0.0; 2]).map(|higher| {
+        let turns = |higher: &Higher| higher.rotary != [0.0; 2] || higher.gyroscopic[0] != 0.0;
+        let around = surface.higher.filter(turns).map(|higher| {
             let t = higher.rotary_inertia(u);
             let inertia = (T::constant(1.0) + t * u).at_least(0.5 * LEAST_INERTIA);
             (cross(e, p_perp), t / inertia)
@@ -439,7 +464,7 @@ impl<T: Number> Meridian<T> {
         &self,
         [l, l_d, l_dd]: Jet<T>,
         p_d: Vec3<T>,
-        w: Vec3<T>,
+        (w, turning_liquid): (Vec3<T>, [T; 2]),
         changing: Option<[Jet<T>; 2]>,
     ) -> Lift<T> {
         let Meridian { u, e, p_perp, surface, .. } = *self;
@@ -462,7 +487,8 @@ impl<T: Number> Meridian<T> {
             rotary: None,
         };
         if let Some(higher) = &surface.higher {
-            self.lift_higher(&mut lift, higher, l, [p_perp_d, w], [sigma, psi]);
+            let motion = ([p_perp_d, w], turning_liquid);
+            self.lift_higher(&mut lift, higher, l, motion, [sigma, psi]);
         }
         if let Some([[_, s_d, _], [_, kappa_d, kappa_dd]]) = changing {
             let by_kappa = kappa_d * l * rising;
@@ -483,7 +509,7 @@ impl<T: Number> Meridian<T> {
         lift: &mut Lift<T>,
         higher: &Higher,
         l: T,
-        [p_perp_d, w]: [Vec3<T>; 2],
+        ([p_perp_d, w], [turning, turning_d]): ([Vec3<T>; 2], [T; 2]),
         [sigma, psi]: [T; 2],
     ) {
         let Meridian { u, e, p_perp, .. } = *self;
@@ -497,14 +523,16 @@ impl<T: Number> Meridian<T> {
         if let Some((n, _)) = self.around {
             let (spin, t) = (dot(e, w), higher.rotary_inertia(u));
             let tau = dot(n, p_perp_d) + spin * u;
-            let momentum = t * tau;
+            let own = t * tau;
+            let momentum = own - turning * higher.gyroscopic[0];
             inwards = inwards - tau * tau * higher.rotary[1] - momentum * spin * 2.0;
-            let growing = l * sigma * tau * (2.0 * higher.rotary[1]);
+            let growing =
+                l * sigma * tau * (2.0 * higher.rotary[1]) - l * turning_d * higher.gyroscopic[0];
             let turning = spin * sigma * 2.0;
             let sideways = scale(l * t * turning + growing, n);
             let swept = scale(l * momentum * 2.0, cross(e, p_perp_d));
             lift.inner = add(lift.inner, add(sideways, swept));
-            lift.energy = lift.energy + l * l * momentum * tau * 0.5;
+            lift.energy = lift.energy + l * l * own * tau * 0.5;
             lift.rotary = Some(Rotary {
                 lever: l * u * t,
                 inertia: t,
@@ -516,6 +544,11 @@ impl<T: Number> Meridian<T> {
                 l,
                 w,
             });
+        }
+        if higher.gyroscopic[1] != 0.0 {
+            let stiffening = turning * turning * higher.gyroscopic[1];
+            lift.energy = lift.energy + l * l * u * stiffening * 0.5;
+            inwards = inwards + stiffening;
         }
         lift.inner = add(lift.inner, scale(l * inwards, p_perp));
     }

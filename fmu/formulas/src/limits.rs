@@ -209,6 +209,11 @@ impl SpinLimit {
         self.factor / 4.0 - 1.0
     }
 
+    /// Returns R/l, which times Omega^2/omega_0^2 is Omega^2 R/g.
+    pub fn radius_over_length(&self) -> f64 {
+        self.ratio
+    }
+
     /// Returns true if liquid that turns with its tank at `rate`, rad/s, about its axis is beyond the limits;
     /// `omega2`, 1/s^2, is the squared natural frequency without spin.
     ///

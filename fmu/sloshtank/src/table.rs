@@ -51,7 +51,8 @@ const TANK: &[&str] = &["tank."];
 const SPINS: &[&str] = &["tank.", "omega"];
 const PLACES: &[&str] = &["tank.p", "tank.liquid", "tank.ball.position"];
 // Dependencies of tank.in_range.
-const MOTION: &[&str] = &["tank.p", "tank.p_dot", "tank.liquid", "a", "omega", "omega_dot"];
+const MOTION: &[&str] =
+    &["tank.p", "tank.p_dot", "tank.liquid", "tank.spin", "a", "omega", "omega_dot"];
 
 const MODE: Dimension = Sized("tank.modes", MODES);
 const VECTOR: &[Dimension] = &[Fixed(3)];
@@ -139,6 +140,12 @@ static VARIABLES: &[Variable<Model>] = &[
         .depends_on(MOTION),
     V::local_integer("tank.limited_by_kind", |o, _| o.tank.ranges.limited_by as i32,
         "tank.limited_by as an integer, for hosts that misread enumerations")
+        .depends_on(MOTION),
+    V::local("tank.spin_ratio", |o, _| o.tank.spin_ratio, "1",
+        "2 Omega/omega_0: spin of the liquid about the tank's axis (tank.spin[3]/spin_inertia; without spin_inertia the tank's own rate) over the natural frequency of mode 1 without spin. Above (1 + C)^(-1/2), 0.84 in deep and 0.74 in shallow liquid, out of range (limited_by = spin); 0 without modes")
+        .depends_on(MOTION),
+    V::local("tank.spin_number", |o, _| o.tank.spin_number, "1",
+        "Omega^2 R/g: depth of the paraboloid of liquid that spins at Omega, with the radius R of the free surface and the specific force g along the tank. Above 0.3 out of range (limited_by = spin); 0 without modes")
         .depends_on(MOTION),
     V::local_enumeration("tank.ball.state", &BALL_STATE, |o, _| ball_state(o.tank.ball_state),
         "State of the liquid with tank.ball.travel above 0. Unless it is settled, no pendulum represents the liquid (in_range), and slosh angles and wave_height are 0")
@@ -278,6 +285,10 @@ static VARIABLES: &[Variable<Model>] = &[
         .shape(PER_MODE).range(-1e5, 1e5),
     V::parameter("tank.rotary_inertia_2", |p, n| &mut p.tank.rotary_inertia_2[n], "1", "Coefficient t_2 of a slosh mode's rotary motion: kinetic energy m t_2 |q|^2 (q x q')^2/(2 l^4). 0 for a pendulum; tanks with a fill table have none")
         .shape(PER_MODE).range(-1e5, 1e5),
+    V::parameter("tank.gyroscopic", |p, n| &mut p.tank.gyroscopic[n], "1", "Gyroscopic coefficient C of a slosh mode in liquid that spins at the rate W = tank.spin[3]/spin_inertia. Seen from the tank a wave has the frequencies C W +- sqrt(C^2 W^2 + omega_0^2), against the spin and with it. C is 0.42 in deep and 0.84 in shallow liquid. 1 with gyroscopic_stiffness 0: a pendulum in space, which takes no part in the spin. Without effect if spin_inertia is 0; not for planar modes")
+        .shape(PER_MODE).range(-10.0, 10.0),
+    V::parameter("tank.gyroscopic_stiffness", |p, n| &mut p.tank.gyroscopic_stiffness[n], "1", "Stiffness that the spin of the liquid adds to a slosh mode with gyroscopic other than 1: its share of W^2 in omega_0^2 + gyroscopic_stiffness W^2, which replaces omega_0^2 in the frequencies")
+        .shape(PER_MODE).range(-1e3, 1e3),
     V::parameter("tank.angle_limit", |p, n| &mut p.tank.angle_limit[n], "rad", "Slosh angle above which a mode is out of range (limited_by = third_order): the smaller of the angles at which its frequency errs by 0.3 % and a forced response by 3 %. 0: not known; mode 1 of a tank with diameter above 0 then has that of an upright cylinder")
         .display_unit("deg").shape(PER_MODE).range(0.0, 1.6),
     V::parameter("tank.swirl_limit", |p, n| &mut p.tank.swirl_limit[n], "rad", "Slosh angle above which rotary motion of a mode is out of range (limited_by = secondary_resonance), because its branch folds by a secondary resonance. 0: not known; mode 1 of a tank with diameter above 0 then has that of an upright cylinder")

@@ -74,13 +74,14 @@ pub struct Liquid(parameters::Liquid);
 #[pymethods]
 impl Liquid {
     /// Create the properties: `gravity` in m/s², kinematic viscosity `nu` in m²/s, surface tension `sigma` in N/m, contact angle
-    /// in degrees.
+    /// in degrees, rate of spin in rad/s.
     #[new]
     fn new(
         gravity: f64,
         nu: Option<f64>,
         sigma: Option<f64>,
         contact_angle: Option<f64>,
+        spin: Option<f64>,
     ) -> PyResult<Liquid> {
         let mut problems = Vec::new();
         let given = [("gravity", Some(gravity)), ("nu", nu), ("sigma", sigma)];
@@ -98,11 +99,14 @@ impl Liquid {
             }
             _ => {}
         }
+        if let Some(spin) = spin.filter(|spin| !(*spin > 0.0 && spin.is_finite())) {
+            problems.push(format!("spin = {spin} (allowed: above 0 rad/s, finite)"));
+        }
         if !problems.is_empty() {
             return Err(FmuError::new_err(problems.join("; ")));
         }
         let contact_angle = contact_angle.unwrap_or(90.0);
-        Ok(Liquid(parameters::Liquid { gravity, nu, sigma, contact_angle }))
+        Ok(Liquid(parameters::Liquid { gravity, nu, sigma, contact_angle, spin }))
     }
 }
 

@@ -112,6 +112,7 @@ class Liquid:
         nu: float | None,
         sigma: float | None,
         contact_angle: float | None,
+        spin: float | None,
     ) -> Liquid: ...
 
 class Tank:

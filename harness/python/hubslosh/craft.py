@@ -86,6 +86,10 @@ class MountedTank:
         Surface tension, N/m, for centring stiffnesses.
     contact_angle : float, optional
         Contact angle between surface and wall, deg.
+    spin : float, optional
+        Rate at which the liquid turns with the tank about the tank's axis, rad/s, for the inertia
+        of its spin and the coefficients of its modes; without it the liquid has no spin. The craft
+        starts at rest: set ``init.omega`` to make craft and liquid turn.
 
     Examples
     --------
@@ -102,6 +106,7 @@ class MountedTank:
     nu: float | None = None
     sigma: float | None = None
     contact_angle: float | None = None
+    spin: float | None = None
 
     @property
     def q(self) -> Vector:
@@ -154,7 +159,7 @@ class MountedTank:
         if self.modes not in (1, 2, 3):
             found.append(f"modes must be 1, 2 or 3, not {self.modes!r}")
         try:
-            native.Liquid(1.0, self.nu, self.sigma, self.contact_angle)
+            native.Liquid(1.0, self.nu, self.sigma, self.contact_angle, self.spin)
         except (FmuError, TypeError) as error:
             found.append(str(error))
         return found
@@ -458,8 +463,9 @@ class Craft:
 
     def _case(self, name: str, fill: Any, gravity: float) -> TankCase:
         of = self.tanks[name]
+        spin = None if fill == "100%" else of.spin  # a full tank has no surface
         return TankCase(
-            _tank_source(of.source), fill, of.modes, gravity, of.nu, of.sigma, of.contact_angle
+            _tank_source(of.source), fill, of.modes, gravity, of.nu, of.sigma, of.contact_angle, spin
         )
 
     def _solve(self, asked: Sequence[tuple[str, Any, float]]) -> list[Tank | None]:

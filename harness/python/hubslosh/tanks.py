@@ -250,6 +250,8 @@ class TankCase:
     nu: float | None
     sigma: float | None
     contact_angle: float | None
+    spin: float | None = None
+    """rad/s."""
 
 
 def read_drawing(source: "dict[str, Any] | Path") -> Any:
@@ -285,7 +287,7 @@ def solve(
 
 
 def _liquid(case: TankCase) -> Any:
-    return native.Liquid(case.gravity, case.nu, case.sigma, case.contact_angle)
+    return native.Liquid(case.gravity, case.nu, case.sigma, case.contact_angle, case.spin)
 
 
 def _solve_case(case: TankCase) -> Tank:
@@ -305,6 +307,7 @@ def tank(
     nu: float | None = None,
     sigma: float | None = None,
     contact_angle: float | None = None,
+    spin: float | None = None,
 ) -> Tank:
     """Find the slosh modes of a tank that is a body of revolution or a box.
 
@@ -331,6 +334,9 @@ def tank(
         Surface tension, N/m, for the centring stiffnesses in `Tank.parameters`.
     contact_angle : float, optional
         Contact angle of the liquid at the wall, deg.
+    spin : float, optional
+        Rate at which tank and liquid turn about the tank's axis, rad/s. `Tank.parameters` of
+        SloshTank and Spacecraft then have the liquid's spin.
 
     Returns
     -------
@@ -355,7 +361,7 @@ def tank(
         check_fill(fill)
     numbers = {
         "fill_mass": fill_mass, "modes": modes, "gravity": gravity, "nu": nu, "sigma": sigma,
-        "contact_angle": contact_angle,
+        "contact_angle": contact_angle, "spin": spin,
     }  # fmt: skip
     for name, value in numbers.items():
         if value is not None and (isinstance(value, bool) or not _is_number(value)):
@@ -363,9 +369,10 @@ def tank(
     if modes < 1 or modes != int(modes):
         raise FmuError(f"modes must be a whole number from 1 on, not {modes!r}")
     amount = (float(fill_mass), "kg") if fill_mass is not None else fill
-    (found,) = solve(
-        [TankCase(_tank_source(source), amount, int(modes), gravity, nu, sigma, contact_angle)]
+    case = TankCase(
+        _tank_source(source), amount, int(modes), gravity, nu, sigma, contact_angle, spin
     )
+    (found,) = solve([case])
     if isinstance(found, FmuError):
         raise found
     for warning in found._solved.warnings():

@@ -270,6 +270,13 @@ pub struct Spin {
     /// the one that runs with it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub frequencies: Option<[f64; 2]>,
+    /// Gyroscopic coefficient C of the first mode of an upright cylinder.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gyroscopic: Option<f64>,
+    /// Rate at which the liquid of an upright cylinder takes up the rate of its tank by the laminar layer of its floor, 1/s; `None`
+    /// if the viscosity is not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub decay: Option<f64>,
     /// True if the parameters of the liquid at rest still describe the motion of the spinning one.
     pub in_range: bool,
     /// What the spin changes, in words.

@@ -15,6 +15,7 @@ use formulas::limits::LOW_BOND;
 
 use crate::low_gravity::{self, Capillary, Fluid};
 use crate::modal::ModalData;
+use crate::spin::spin;
 use crate::table::{short, significant};
 use crate::tank::{Fill, Geometry, Shape, Tank};
 use crate::{damping, modal};
@@ -52,13 +53,15 @@ impl Target {
 /// Properties of the liquid other than its density: the specific force `gravity` along the axis at which
 /// damping ratios and stiffnesses hold, m/s², at least 0; kinematic viscosity `nu`, m2/s, without which the
 /// damping ratios are not set; surface tension `sigma`, N/m, without which there is no centring stiffness;
-/// and the angle between surface and wall in the liquid, degrees (90 is a flat surface).
+/// the angle between surface and wall in the liquid, degrees (90 is a flat surface); and the rate at which tank and liquid turn about
+/// the tank's axis, rad/s, if they do.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Liquid {
     pub gravity: f64,
     pub nu: Option<f64>,
     pub sigma: Option<f64>,
     pub contact_angle: f64,
+    pub spin: Option<f64>,
 }
 
 impl Liquid {
@@ -276,6 +279,8 @@ pub fn tank_capillarity(
 pub fn solve(tank: &Tank, fill: Fill, modes: usize, liquid: Liquid) -> Result<ModalData, Problems> {
     let mut data = tank.solve(tank.fill_height(fill)?, modes)?;
     data.capillarity = tank_capillarity(tank, &data, liquid);
+    let spun = liquid.spin.map(|omega| spin(tank, &data, omega, liquid.gravity, liquid.nu));
+    data.spin = spun.transpose()?;
     if !data.modes.is_empty() {
         data.finite_amplitude = Some(finite_amplitude::amplitude_dependence(tank, &data));
         data.damping = liquid.nu.map(|nu| tank_damping(tank, &data, nu, liquid)).transpose()?;
@@ -386,12 +391,23 @@ impl ParameterSet {
         let (mut warnings, mut unknown) = (Vec::new(), Vec::new());
         if let Some(spin) = &data.spin {
             notes.push(format!(
-                "the parameters are those of the liquid at rest; turning with the tank at {} rad/s its centre of mass is at z = {:.6} m \
-                 and its inertia about the axis {} kg·m²",
+                "masses, lengths and heights are those of the liquid at rest; turning with the tank at {} rad/s its centre of mass is at \
+                 z = {:.6} m and its inertia about the axis {} kg·m²",
                 significant(spin.omega),
                 spin.z_cg,
                 significant(spin.i_axis)
             ));
+            if target == Target::HubSlosh {
+                notes.push("HubSlosh has no spin of the liquid".to_string());
+            } else {
+                notes.push(format!(
+                    "the liquid starts at the rate of its tank (set init.omega){}",
+                    match spin.decay {
+                        Some(_) => "",
+                        None => "; spin_decay is known for upright cylinders with nu only, so that it does not rub against the wall",
+                    }
+                ));
+            }
             warnings.extend(spin.warnings.iter().map(|warning| format!("spin: {warning}")));
         }
         let springs = of_axes.map(|all| match all {
@@ -577,7 +593,10 @@ impl ParameterSet {
                 values.push((slosh::MODES.into(), Value::Integer(modes.len() as i64)));
             }
             Target::SloshTank | Target::Spacecraft { .. } => {
-                use sloshtank::tank::{DI_Y, DIRECTION, G_BOND, G_REF, H_0, I_0, I_Z, M_0, MODES};
+                use sloshtank::tank::{
+                    DI_Y, DIRECTION, G_BOND, G_REF, GYROSCOPIC, H_0, I_0, I_Z, M_0, MODES,
+                    SPIN_DECAY, SPIN_INERTIA,
+                };
                 if let Target::Spacecraft { tank: number } = target
                     && !(1..=spacecraft::MOST_TANKS).contains(&number)
                 {
@@ -597,7 +616,19 @@ impl ParameterSet {
                 // With the largest number of modes it may be below 0 by rounding.
                 let least = if both.is_some() { f64::NEG_INFINITY } else { 0.0 };
                 real(target.name(I_0), rest.inertia.max(least));
-                real(target.name(I_Z), data.i_eff_axis.unwrap_or(0.0));
+                match &data.spin {
+                    Some(spin) => {
+                        real(target.name(I_Z), 0.0);
+                        real(target.name(SPIN_INERTIA), spin.i_axis);
+                        if let Some(decay) = spin.decay {
+                            real(target.name(&SPIN_DECAY.element([1])), decay);
+                        }
+                        if let Some(coefficient) = spin.gyroscopic {
+                            real(target.name(&GYROSCOPIC.element([1])), coefficient);
+                        }
+                    }
+                    None => real(target.name(I_Z), data.i_eff_axis.unwrap_or(0.0)),
+                }
                 if liquid.gravity > 0.0 {
                     real(target.name(G_REF), liquid.gravity);
                 }

@@ -14,8 +14,10 @@
 //!
 //!   l = C Omega +- sqrt(C^2 Omega^2 + omega_0^2)
 //!
-//! with C of [`SpinLimit`], whereas a pendulum, which does not take part in the spin, has C = 1. The FMUs leave their range
-//! at the same limits.
+//! with C of [`SpinLimit`], whereas a pendulum, which does not take part in the spin, has C = 1. The FMUs have both, and leave their
+//! range at the same limits.
+//!
+//! The laminar layer of the floor spins the liquid up at the rate sqrt(nu Omega)/h (Greenspan and Howard, J. Fluid Mech. 17, 1963).
 //!
 //! Source: derived from the equations of a rotating liquid, to the first order in Omega. A solution for all Omega differs by at
 //! most 1 % at Omega^2 R/g = 0.1 and h >= R, by 4 % at h = R/4, and by 6 % at 0.3.
@@ -32,11 +34,17 @@ use crate::tank::{Geometry, Shape, Tank};
 const PENDULUM_ERROR: f64 = 0.05;
 
 /// Computes the steady rotation of a tank's liquid, solved as `data`, about the tank's axis at `omega`, rad/s, under the specific
-/// force `gravity`, m/s².
+/// force `gravity`, m/s². `nu` is the kinematic viscosity, m²/s.
 ///
 /// # Errors
 /// A box, which has no axis of revolution; a tank without a free surface; a rate that is not above 0; liquid in separate pools.
-pub fn spin(tank: &Tank, data: &ModalData, omega: f64, gravity: f64) -> Result<Spin, Problems> {
+pub fn spin(
+    tank: &Tank,
+    data: &ModalData,
+    omega: f64,
+    gravity: f64,
+    nu: Option<f64>,
+) -> Result<Spin, Problems> {
     let Geometry::Revolution { contour, shape } = &tank.geometry else {
         return Err("The tank is a box. Its liquid spins about an axis of revolution only."
             .to_string()
@@ -100,7 +108,7 @@ pub fn spin(tank: &Tank, data: &ModalData, omega: f64, gravity: f64) -> Result<S
     let error = (1.0 - c) * ratio.unwrap_or_default() / 2.0;
     if in_range && error > PENDULUM_ERROR {
         warnings.push(format!(
-            "the frequencies of a pendulum, as the FMUs have it, are up to {:.0} % off those of the spinning liquid",
+            "the frequencies of a pendulum, which the FMUs have without gyroscopic[1], are up to {:.0} % off those of the spinning liquid",
             100.0 * error
         ));
     }
@@ -117,6 +125,10 @@ pub fn spin(tank: &Tank, data: &ModalData, omega: f64, gravity: f64) -> Result<S
         flatness,
         ratio,
         frequencies: omega_0.filter(|_| is_cylinder).map(waves),
+        gyroscopic: is_cylinder.then_some(c),
+        decay: nu
+            .filter(|_| is_cylinder)
+            .map(|nu| (nu * omega).sqrt() * PI * radius * radius / volume),
         in_range,
         warnings,
     })

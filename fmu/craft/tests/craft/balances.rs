@@ -221,8 +221,13 @@ fn random_craft(most: usize) {
         if seed >= 26 {
             random.spin_all(&mut p);
         }
-        // Bobs on surfaces other than spheres move faster than the rule's nodes in one panel resolve.
-        let panels = if seed < 14 { 1 } else { 2 };
+        // Bobs on surfaces other than spheres move faster than the rule's nodes in one panel resolve, those in spinning liquid
+        // faster still.
+        let panels = match seed {
+            0..14 => 1,
+            14..26 => 2,
+            _ => 4,
+        };
         if seed.is_multiple_of(3) {
             p.tank.iter_mut().for_each(|tank| random.follow(tank));
         }

@@ -110,13 +110,19 @@ impl Random {
         p.tank.iter_mut().for_each(|tank| self.spin(tank));
     }
 
-    /// Gives the liquid of a tank a spin.
+    /// Gives the liquid of a tank a spin, which acts on two thirds of its modes.
     pub fn spin(&mut self, tank: &mut Tank) {
         tank.spin_inertia = self.magnitude(0.5, 50.0);
         tank.spin_inertia_across = [0.0, self.magnitude(0.5, 50.0)][self.below(2)];
         tank.spin_coupling = self.between(0.2, 1.0);
         tank.spin_decay = [[0.0; 2], [0.3, 0.1]][self.below(2)];
         tank.slip_0 = self.vector(2.0);
+        for n in 0..craft::MODES {
+            let coefficients = [self.between(0.3, 1.3), self.between(-0.5, 0.5)];
+            if tank.direction[n] == [0.0; 2] && self.below(3) > 0 {
+                [tank.gyroscopic[n], tank.gyroscopic_stiffness[n]] = coefficients;
+            }
+        }
     }
 
     /// Gives the bobs of a tank surfaces other than spheres.

@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use anyhow::{Context, Result, bail, ensure};
 use files::output;
 use hubslosh_tank::parameters::{self, Liquid, ParameterSet, Target};
-use hubslosh_tank::spin::spin;
 use hubslosh_tank::{Fill, Problems, Tank, fill_table, picture, sweep, table};
 
 use crate::terminal;
@@ -82,7 +81,8 @@ pub struct TankArgs {
     contact_angle: f64,
     /// Rate at which tank and liquid turn about the axis of the tank, rad/s. The command then computes the surface, the
     /// centre of mass and the inertias of the turning liquid. It also states the error of the modes, which are computed for
-    /// liquid at rest. The thrust along the axis is --gravity.
+    /// liquid at rest. With --parameters of SloshTank and Spacecraft it writes the spin of the liquid. The thrust along the
+    /// axis is --gravity.
     #[arg(long, value_name = "NUMBER", conflicts_with = "sweep")]
     spin: Option<f64>,
     /// Writes the file of --parameters even if a centring stiffness (by surface tension) is far outside the range of its
@@ -124,10 +124,7 @@ impl TankArgs {
         let (text, json, picture, as_table) = match self.fill.or(self.fill_mass.map(Fill::Mass)) {
             Some(fill) => {
                 let data = parameters::solve(&tank, fill, self.modes, self.liquid());
-                let mut data = data.with_context(read)?;
-                if let Some(omega) = self.spin {
-                    data.spin = Some(spin(&tank, &data, omega, self.gravity).with_context(read)?);
-                }
+                let data = data.with_context(read)?;
                 // The table is for a given surface tension, and `--parameters` has its own warning.
                 let has_table = !(self.json || self.out.is_some()) && data.capillarity.is_some();
                 if self.parameters.is_none() && !has_table {
@@ -189,6 +186,7 @@ impl TankArgs {
             nu: self.nu,
             sigma: self.sigma,
             contact_angle: self.contact_angle,
+            spin: self.spin,
         }
     }
 

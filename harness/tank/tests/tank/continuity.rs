@@ -11,7 +11,7 @@ const SLOW: [f64; 2] = [1e-6, 0.3];
 
 fn at(tank: &Tank, fill: f64, [nu, gravity]: [f64; 2]) -> Damping {
     let data = tank.solve(fill, 1).unwrap();
-    let liquid = Liquid { gravity, nu: Some(nu), sigma: None, contact_angle: 90.0 };
+    let liquid = Liquid { gravity, nu: Some(nu), sigma: None, contact_angle: 90.0, spin: None };
     tank_damping(tank, &data, nu, liquid).unwrap()
 }
 

@@ -138,8 +138,13 @@ fn similar_tanks_have_the_same_damping_and_the_same_description() {
         one.iter().zip(&large).filter(|pair| !pair.0.1.modes.is_empty())
     {
         for (nu, sigma, gravity) in [(1e-6, 0.07, 8.0), (1e-3, 0.07, 1e-3), (0.05, 0.5, 0.0)] {
-            let liquid =
-                |sigma| Liquid { gravity, nu: None, sigma: Some(sigma), contact_angle: 90.0 };
+            let liquid = |sigma| Liquid {
+                gravity,
+                nu: None,
+                sigma: Some(sigma),
+                contact_angle: 90.0,
+                spin: None,
+            };
             let a = tank_damping(tank, data, nu, liquid(sigma)).unwrap();
             let b = tank_damping(larger, scaled, 8.0 * nu, liquid(16.0 * sigma)).unwrap();
             assert_eq!((a.shape, &a.taken), (b.shape, &b.taken));

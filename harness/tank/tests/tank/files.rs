@@ -263,7 +263,8 @@ fn a_full_closed_tank_has_no_modes_and_a_message_with_its_rigid_liquid() {
         assert!((data.m_liq / mass - 1.0).abs() < 1e-12 && (data.z_cg - 1.0).abs() < 1e-12);
         let text = table(&data, 9.80665);
         assert!(text.contains("the tank is full and does not slosh") && !text.contains("NaN"));
-        let liquid = Liquid { gravity: 9.8, nu: None, sigma: None, contact_angle: 90.0 };
+        let liquid =
+            Liquid { gravity: 9.8, nu: None, sigma: None, contact_angle: 90.0, spin: None };
         let refused = ParameterSet::new(&tank, &data, Target::SloshTank, liquid).unwrap_err();
         let said = refused.to_string();
         assert!(said.contains("4188.790205 kg at z = 1.000000 m"), "{said}");
@@ -329,7 +330,8 @@ fn table_and_file_state_where_heights_count_from() {
         let data = tank.solve(0.8, 1).unwrap();
         assert!((data.z_lowest - lowest).abs() < 1e-12);
         assert!((data.modes[0].hinge.unwrap() - lowest - 1.0).abs() < 1e-9);
-        let liquid = Liquid { gravity: 9.8, nu: None, sigma: None, contact_angle: 90.0 };
+        let liquid =
+            Liquid { gravity: 9.8, nu: None, sigma: None, contact_angle: 90.0, spin: None };
         let set = ParameterSet::new(tank, &data, Target::SloshTank, liquid).unwrap();
         for text in [table(&data, 9.8), set.to_toml(), set.to_ssv()] {
             assert!(text.contains(words), "{text}");
@@ -568,7 +570,8 @@ fn a_result_says_whether_it_is_of_a_body_of_revolution_or_of_a_box() {
 fn the_table_has_the_damping_of_every_mode_with_its_frequency_in_hertz() {
     let tank = tank("density = 1000.0\nbox = [0.8, 0.5]");
     let mut data = tank.solve(0.3, 2).unwrap();
-    let liquid = Liquid { gravity: 9.81, nu: Some(1e-6), sigma: None, contact_angle: 90.0 };
+    let liquid =
+        Liquid { gravity: 9.81, nu: Some(1e-6), sigma: None, contact_angle: 90.0, spin: None };
     data.damping =
         Some(hubslosh_tank::parameters::tank_damping(&tank, &data, 1e-6, liquid).unwrap());
     let damping = data.damping.clone().unwrap();
@@ -716,7 +719,13 @@ fn parameters_belong_to_the_liquid_and_not_to_the_result() {
     let text = "density = 875.0\n\
         shape = { domed_cylinder = { radius = 0.45, height = 0.9, bottom = 0.45, top = 0.45 } }\n";
     let tank = tank(text);
-    let liquid = Liquid { gravity: 0.2, nu: Some(8.9e-7), sigma: Some(0.03), contact_angle: 90.0 };
+    let liquid = Liquid {
+        gravity: 0.2,
+        nu: Some(8.9e-7),
+        sigma: Some(0.03),
+        contact_angle: 90.0,
+        spin: None,
+    };
     let whole = parameters::solve(&tank, Fill::Share(0.4), 2, liquid).unwrap();
     let fill = tank.fill_height(Fill::Share(0.4)).unwrap();
     let plain = tank.solve(fill, 2).unwrap();

@@ -305,7 +305,8 @@ fn third_order_of(set: &ParameterSet) -> Vec<(String, f64)> {
     set.values.iter().filter_map(of).collect()
 }
 
-const WATER: Liquid = Liquid { gravity: 9.81, nu: None, sigma: None, contact_angle: 90.0 };
+const WATER: Liquid =
+    Liquid { gravity: 9.81, nu: None, sigma: None, contact_angle: 90.0, spin: None };
 
 /// Only mode 1 has coefficients (in a box: the first mode along each length). Files for HubSlosh contain none for a box.
 #[test]

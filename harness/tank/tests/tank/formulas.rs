@@ -146,7 +146,7 @@ fn deep(bond: f64, contact_angle: f64, sigma: f64) -> ParameterSet {
     let tank = Tank::parse(&text, Path::new("")).unwrap();
     let data = tank.solve(fill, 2).unwrap();
     let gravity = if bond.is_finite() { bond * sigma / (1000.0 * radius * radius) } else { 9.81 };
-    let liquid = Liquid { gravity, nu: None, sigma: Some(sigma), contact_angle };
+    let liquid = Liquid { gravity, nu: None, sigma: Some(sigma), contact_angle, spin: None };
     ParameterSet::new(&tank, &data, Target::HubSlosh, liquid).unwrap()
 }
 
@@ -284,8 +284,13 @@ fn damped(
     let text = format!("density = 1000.0\n{shape}");
     let tank = Tank::parse(&text, Path::new("")).unwrap();
     let data = tank.solve(fill, 3).unwrap();
-    tank_damping(&tank, &data, nu, Liquid { gravity, nu: Some(nu), sigma, contact_angle: 90.0 })
-        .unwrap()
+    tank_damping(
+        &tank,
+        &data,
+        nu,
+        Liquid { gravity, nu: Some(nu), sigma, contact_angle: 90.0, spin: None },
+    )
+    .unwrap()
 }
 
 /// The same tank has the same damping if it is drawn in one piece or in three, shifted along its axis, drawn as an ellipse
@@ -441,7 +446,8 @@ fn a_box_with_two_lengths_says_along_which_its_modes_are() {
         let tank =
             Tank::parse(&format!("density = 1000.0\nbox = {lengths}"), Path::new("")).unwrap();
         let data = tank.solve(0.4, 1).unwrap();
-        let liquid = Liquid { gravity: 9.81, nu: None, sigma: None, contact_angle: 90.0 };
+        let liquid =
+            Liquid { gravity: 9.81, nu: None, sigma: None, contact_angle: 90.0, spin: None };
         ParameterSet::new(&tank, &data, Target::HubSlosh, liquid).unwrap()
     };
     let two = set("[0.8, 0.5]");
@@ -552,8 +558,13 @@ fn a_box_with_two_lengths_has_planar_modes_that_keep_mass_centre_and_inertia() {
     let tank = Tank::parse("density = 1000.0\nbox = [0.8, 0.5]", Path::new("")).unwrap();
     let set = |modes: usize, target: Target| {
         let data = tank.solve(0.4, modes).unwrap();
-        let liquid =
-            Liquid { gravity: 9.81, nu: Some(1e-6), sigma: Some(0.07), contact_angle: 90.0 };
+        let liquid = Liquid {
+            gravity: 9.81,
+            nu: Some(1e-6),
+            sigma: Some(0.07),
+            contact_angle: 90.0,
+            spin: None,
+        };
         ParameterSet::new(&tank, &data, target, liquid)
     };
     let axes = tank.solve(0.4, 2).unwrap().axes.unwrap();

@@ -3,6 +3,7 @@
 use core::f64::consts::{PI, TAU};
 
 use hubslosh_tank::modal::Spin;
+use hubslosh_tank::parameters::{Liquid, ParameterSet, Target, Value, solve};
 use hubslosh_tank::spin::spin;
 use hubslosh_tank::tank::Shape;
 use hubslosh_tank::{Fill, Tank};
@@ -15,7 +16,7 @@ fn turned(shape: Shape, share: f64, flatness: f64, weightless: bool) -> (f64, Sp
     let tank = Tank::from_shape(shape, RHO).unwrap();
     let data = tank.solve(tank.fill_height(Fill::Share(share)).unwrap(), 1).unwrap();
     let gravity = if weightless { 0.0 } else { 1.0 };
-    (data.m_liq, spin(&tank, &data, flatness.sqrt(), gravity).unwrap())
+    (data.m_liq, spin(&tank, &data, flatness.sqrt(), gravity, None).unwrap())
 }
 
 fn close(found: f64, expected: f64, error: f64) {
@@ -96,7 +97,7 @@ fn a_slow_spin_changes_nothing() {
     for shape in shapes {
         let tank = Tank::from_shape(shape, RHO).unwrap();
         let data = tank.solve(tank.fill_height(Fill::Share(0.6)).unwrap(), 1).unwrap();
-        let found = spin(&tank, &data, 1e-5, 9.81).unwrap();
+        let found = spin(&tank, &data, 1e-5, 9.81, None).unwrap();
         close(found.z_cg, data.z_cg, 1e-7);
         close(found.i_axis / data.i_frozen_axis, 1.0, 1e-7);
         close(found.i_cg / data.i_frozen_cg, 1.0, 1e-7);
@@ -129,16 +130,16 @@ fn the_frequencies_are_those_of_the_rotating_liquid() {
 fn a_spinner_beyond_the_model_is_out_of_range() {
     let tank = Tank::from_shape(Shape::Cylinder { radius: 0.3, height: 0.6 }, RHO).unwrap();
     let data = tank.solve(0.4, 1).unwrap();
-    let found = spin(&tank, &data, 9.0, 5.0).unwrap();
+    let found = spin(&tank, &data, 9.0, 5.0, None).unwrap();
     close(found.i_axis, 6.38, 0.005);
     close(found.z_apex.unwrap(), 0.06, 0.005);
     close(found.flatness.unwrap(), 4.86, 1e-12);
     close(found.ratio.unwrap(), 3.3, 0.05);
     let has_no_mode = found.warnings.iter().any(|warning| warning.contains("inertial waves"));
     assert!(!found.in_range && has_no_mode, "{:?}", found.warnings);
-    let slow = spin(&tank, &data, 0.2, 5.0).unwrap();
+    let slow = spin(&tank, &data, 0.2, 5.0, None).unwrap();
     assert!(slow.in_range && slow.warnings.is_empty(), "{:?}", slow.warnings);
-    let faster = spin(&tank, &data, 1.5, 5.0).unwrap();
+    let faster = spin(&tank, &data, 1.5, 5.0, None).unwrap();
     assert!(faster.in_range && faster.warnings[0].contains("pendulum"), "{:?}", faster.warnings);
 }
 
@@ -163,8 +164,8 @@ fn liquid_in_two_pools_is_refused() {
                      { line = [0.5, 0.5, 1.5, 0.5] }, { line = [1.5, 0.5, 1.5, 1.5] }]";
     let tank = Tank::parse(hourglass, ".".as_ref()).unwrap();
     let data = tank.solve(0.4, 1).unwrap();
-    assert!(spin(&tank, &data, 0.5, 9.81).unwrap().in_range);
-    let error = spin(&tank, &data, 2.0, 9.81).unwrap_err();
+    assert!(spin(&tank, &data, 0.5, 9.81, None).unwrap().in_range);
+    let error = spin(&tank, &data, 2.0, 9.81, None).unwrap_err();
     assert!(error.to_string().contains("separate pools"), "{error}");
 }
 
@@ -173,13 +174,44 @@ fn tanks_and_rates_that_cannot_spin_are_refused() {
     let cylinder = Tank::from_shape(Shape::Cylinder { radius: 0.3, height: 0.6 }, RHO).unwrap();
     let data = cylinder.solve(0.4, 1).unwrap();
     for omega in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-        let error = spin(&cylinder, &data, omega, 5.0).unwrap_err();
+        let error = spin(&cylinder, &data, omega, 5.0, None).unwrap_err();
         assert!(error.to_string().contains("above 0"), "{error}");
     }
     let square = Tank::parse("density = 1000\nbox = [0.4, 0.4]", ".".as_ref()).unwrap();
     let data = square.solve(0.2, 1).unwrap();
-    assert!(spin(&square, &data, 1.0, 5.0).unwrap_err().to_string().contains("box"));
+    assert!(spin(&square, &data, 1.0, 5.0, None).unwrap_err().to_string().contains("box"));
     let sphere = Tank::from_shape(Shape::Sphere { radius: 0.3 }, RHO).unwrap();
     let full = sphere.solve(0.6, 1).unwrap();
-    assert!(spin(&sphere, &full, 1.0, 5.0).unwrap_err().to_string().contains("full"));
+    assert!(spin(&sphere, &full, 1.0, 5.0, None).unwrap_err().to_string().contains("full"));
+}
+
+/// sqrt(nu Omega)/h of the floor; C_0 of an upright cylinder at h/R = 1 is 0.496.
+#[test]
+fn parameters_have_the_spin_of_the_liquid() {
+    let of = |shape: Shape, nu: Option<f64>, target: Target| {
+        let tank = Tank::from_shape(shape, RHO).unwrap();
+        let liquid = Liquid { gravity: 5.0, nu, sigma: None, contact_angle: 90.0, spin: Some(2.0) };
+        let data = solve(&tank, Fill::Height(0.3), 2, liquid).unwrap();
+        let set = ParameterSet::new(&tank, &data, target, liquid).unwrap();
+        let i_axis = data.spin.unwrap().i_axis;
+        (set, i_axis)
+    };
+    let value = |set: &ParameterSet, name: &str| {
+        set.values.iter().find_map(|(other, value)| match value {
+            Value::Real(x) if other == name => Some(*x),
+            _ => None,
+        })
+    };
+    let cylinder = Shape::Cylinder { radius: 0.3, height: 0.6 };
+    let (set, i_axis) = of(cylinder, Some(1e-6), Target::Spacecraft { tank: 2 });
+    assert_eq!(value(&set, "tank[2].spin_inertia"), Some(i_axis));
+    assert_eq!(value(&set, "tank[2].I_z"), Some(0.0));
+    close(value(&set, "tank[2].gyroscopic[1]").unwrap(), 0.496, 1e-3);
+    close(value(&set, "tank[2].spin_decay[1]").unwrap() * 0.3 / 2e-6_f64.sqrt(), 1.0, 1e-9);
+    let sphere = Shape::Sphere { radius: 0.3 };
+    let (set, i_axis) = of(sphere, None, Target::SloshTank);
+    assert_eq!(value(&set, "tank.spin_inertia"), Some(i_axis));
+    assert_eq!(value(&set, "tank.gyroscopic[1]"), None);
+    let (set, _) = of(cylinder, None, Target::HubSlosh);
+    assert!(!set.values.iter().any(|(name, _)| name.contains("spin")), "{:?}", set.values);
 }

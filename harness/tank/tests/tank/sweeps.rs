@@ -81,7 +81,8 @@ fn a_sweep_has_the_damping_of_every_fill() {
     let tank = tank("density = 1000.0\nshape = { cylinder = { radius = 1.0, height = 3.0 } }");
     let mut table = sweep(&tank, &[0.0, 0.5, 2.0], 2).unwrap();
     assert!(!table.to_csv().contains("zeta"));
-    let liquid = Liquid { gravity: 9.81, nu: Some(1e-6), sigma: None, contact_angle: 90.0 };
+    let liquid =
+        Liquid { gravity: 9.81, nu: Some(1e-6), sigma: None, contact_angle: 90.0, spin: None };
     table.damp(&tank, 1e-6, liquid).unwrap();
     let csv = table.to_csv();
     let lines: Vec<Vec<&str>> = csv.lines().map(|line| line.split(',').collect()).collect();
@@ -197,7 +198,7 @@ fn a_placed_table_states_the_errors_between_its_points() {
 fn a_table_over_the_fill_is_written_for_the_six_axis_fmus() {
     let tank = tank("density = 1000.0\nshape = { sphere = { radius = 0.5 } }");
     let table = sweep(&tank, &[0.1, 0.4, 0.8], 3).unwrap();
-    let liquid = Liquid { gravity: 9.81, nu: None, sigma: None, contact_angle: 90.0 };
+    let liquid = Liquid { gravity: 9.81, nu: None, sigma: None, contact_angle: 90.0, spin: None };
     for (target, prefix) in
         [(Target::SloshTank, "tank"), (Target::Spacecraft { tank: 2 }, "tank[2]")]
     {
@@ -251,7 +252,7 @@ fn a_table_over_the_fill_is_written_for_the_six_axis_fmus() {
 /// three of them.
 #[test]
 fn a_table_has_the_modes_that_carry_liquid_at_every_fill() {
-    let liquid = Liquid { gravity: 9.81, nu: None, sigma: None, contact_angle: 90.0 };
+    let liquid = Liquid { gravity: 9.81, nu: None, sigma: None, contact_angle: 90.0, spin: None };
     for (shape, asked, kept) in [
         ("cone = { half_angle = 45.0, height = 1.5 }", 4, 1),
         ("sphere = { radius = 0.5 }", 1, 1),
@@ -277,7 +278,8 @@ fn a_table_has_the_modes_that_carry_liquid_at_every_fill() {
 fn the_parameters_state_the_errors_between_a_table_s_points() {
     let tank = tank("density = 1000.0\nshape = { sphere = { radius = 0.5 } }");
     let table = sweep(&tank, &[0.1, 0.4, 0.8], 1).unwrap();
-    let liquid = Liquid { gravity: 9.81, nu: Some(1e-6), sigma: None, contact_angle: 90.0 };
+    let liquid =
+        Liquid { gravity: 9.81, nu: Some(1e-6), sigma: None, contact_angle: 90.0, spin: None };
     for (error, few) in [
         ([0.001, 0.002, 0.003], false),
         ([0.005, 0.002, 0.003], false),
