@@ -105,7 +105,7 @@ pub(crate) struct ConstrainedBob {
     known: Vec3,
     multipliers: [f64; 2],
     rest: Vec3,
-    ahead: Vec3,
+    ahead: Vector,
     specific_force: Vec3,
 }
 
@@ -343,7 +343,7 @@ impl ConstrainedBob {
             known: [0.0; 3],
             multipliers: [0.0; 2],
             rest: [0.0; 3],
-            ahead: [0.0; 3],
+            ahead: ZERO_VECTOR,
             specific_force: [0.0; 3],
         })
     }
@@ -360,7 +360,7 @@ impl ConstrainedBob {
         let r_d = [p_d[0], p_d[1], p_d[2] + self.surface.rise(u) * sigma];
         let turned = cross(transposed_times(&self.axes, w), self.r[0]);
         self.v[0] = add(r_d, turned);
-        self.ahead = [0.0; 3];
+        self.ahead[0] = [0.0; 3];
         if let Some(higher) = &mut self.higher {
             higher.start(q, u, self.surface.inner_at(u));
         }
@@ -445,7 +445,7 @@ impl ConstrainedBob {
         let w = transposed_times(&self.axes, w);
         self.w.set(n, w, w);
         let order = (n + 1) as f64;
-        let turned = add(self.ahead, cross(w, self.r[0]));
+        let turned = add(self.ahead[n], cross(w, self.r[0]));
         self.r_d[n] = sub(self.v[n], turned);
         self.r[n + 1] = scale(1.0 / order, self.r_d[n]);
         self.both.set(n, self.r[n + 1], self.v[n]);
@@ -462,7 +462,7 @@ impl ConstrainedBob {
         self.set_normal(n + 1);
 
         let turned = space::cross_pair_coefficient(n, &self.w, &self.both);
-        self.ahead = turned.map(|pair| pair[0]);
+        self.ahead[n + 1] = turned.map(|pair| pair[0]);
         let centripetal = transposed_times(&self.axes, times(w2, self.hinge));
         let fall = add(turned.map(|pair| pair[1]), scale(self.inv_l, centripetal));
         self.fall = scale(-1.0, fall);
@@ -504,7 +504,7 @@ impl ConstrainedBob {
             }
         }
         self.rest = f;
-        self.known = sub(sub(self.fall, f), scale(order, self.ahead));
+        self.known = sub(sub(self.fall, f), scale(order, self.ahead[n + 1]));
         self.multipliers = [order * normal, order * inwards];
         let known = self.force(self.known, 0.0);
         self.f[n] = known;
@@ -635,7 +635,7 @@ impl ConstrainedBob {
             return 0.0;
         };
         let w = transposed_times(&self.axes, w);
-        let r_d = sub(self.v[n], add(self.ahead, cross(w, self.r[0])));
+        let r_d = sub(self.v[n], add(self.ahead[n], cross(w, self.r[0])));
         let mut tau = self.r[0][0] * r_d[1] - self.r[0][1] * r_d[0] + w[2] * self.u[0];
         for j in 1..=n {
             let (a, b) = (self.r[j], self.r_d[n - j]);

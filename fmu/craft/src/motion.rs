@@ -41,7 +41,9 @@ use core::ops::ControlFlow;
 
 use taylor::at_each_order;
 use taylor::error::StepError;
-use taylor::integrator::{self, Convergence, MAX_MAGNITUDE, Motion, RATE_FLOOR, Steps};
+use taylor::integrator::{
+    self, Convergence, Expansion, MAX_MAGNITUDE, Motion, RATE_FLOOR, Steps, add_time,
+};
 use taylor::number::Number;
 use taylor::series::{self, ORDER, Series, ZERO};
 use taylor::space::{
@@ -153,6 +155,8 @@ pub struct CraftMotion {
     flexing_allowed: f64,
     spins_allowed: f64,
     longest: f64,
+    /// Series of the kept expansion, which starts at `state.kept`.
+    expansion: Expansion,
 }
 
 impl CraftMotion {
@@ -231,6 +235,7 @@ impl CraftMotion {
             lumps_allowed: 0.0,
             flexing_allowed: 0.0,
             spins_allowed: 0.0,
+            expansion: Expansion::default(),
         };
         motion.has_events = !motion.lumps.is_empty() || !motion.constrained.is_empty();
         motion.freeze();
@@ -324,6 +329,7 @@ impl CraftMotion {
         let jump = sub(h, self.state.h_wheels);
         self.start(0.0);
         self.factorise();
+        self.expansion.overwrite(1);
         let [dv, dw] = self.factors.solve([[0.0; 3], scale(-1.0, jump)]);
         let x = &mut self.state.x;
         for i in 0..3 {
@@ -407,6 +413,7 @@ impl CraftMotion {
             flexing.seed_direction(dx, self.w[0], dw);
         }
         self.expand_rates::<1>();
+        self.expansion.overwrite(2);
     }
 
     /// Returns the rotation, rad, body axes, of coefficient 1 of the attitude: q_1 = q_0 o (0, turn)/2.
@@ -418,12 +425,36 @@ impl CraftMotion {
         scale(2.0, sum)
     }
 
+    /// Replaces the state by a saved one.
+    pub fn set_state(&mut self, state: &State) {
+        self.state = *state;
+        self.expansion.clear();
+    }
+
     /// Advances the states by `h` > 0. After an error they are unusable.
     // Separate from the preparation of a step: compiled together, both take more instructions.
     #[inline(never)]
     pub fn advance(&mut self, h: f64, limits: Limits) -> Result<(), StepError> {
-        let begin = self.state.time;
-        integrator::advance(self, begin, h, limits.tolerance, &mut limits.steps()).map(|_| ())
+        let (begin, mut steps) = (self.state.time, limits.steps());
+        let State { x, kept, .. } = &mut self.state;
+        if kept.is_continued(&self.inputs) {
+            *x = kept.x;
+        } else {
+            kept.renew(x, &self.inputs);
+            self.expansion.clear();
+        }
+        kept.clock = add_time(kept.clock, h);
+        let (clock, mut start) = (kept.clock[0], kept.start);
+        let mut expansion = core::mem::take(&mut self.expansion);
+        let (times, tolerance) = ((clock, &mut start), limits.tolerance);
+        let done =
+            integrator::advance_kept(self, &mut expansion, times, begin, tolerance, &mut steps);
+        self.state.kept.start = start;
+        if !self.inputs.are_held() {
+            self.state.kept.end();
+        }
+        self.expansion = expansion;
+        done
     }
 
     #[inline(always)]
@@ -699,6 +730,11 @@ impl Motion for CraftMotion {
     #[inline(always)]
     fn event(&mut self, n: usize, h: f64) -> Option<f64> {
         if self.has_events { self.next_event(n, h) } else { None }
+    }
+
+    #[inline(always)]
+    fn keep(&mut self) {
+        self.state.kept.x = self.state.x;
     }
 
     #[inline(always)]
@@ -1006,6 +1042,7 @@ impl CraftMotion {
             for n in 1..4 {
                 self.rates(n);
             }
+            self.expansion.overwrite(4);
             self.next_of_lumps(4, 0.0);
             let Some((lump, due)) = self.due.take() else { break };
             self.change(lump, due, 0.0);
@@ -1044,6 +1081,7 @@ impl Carrier for CraftMotion {
     fn evaluate_at(&mut self, t: f64) {
         self.start(t);
         self.expand_rates::<0>();
+        self.expansion.overwrite(1);
     }
 
     fn lump(&self, lump: usize) -> &Lump {

@@ -15,7 +15,7 @@ use crate::outputs::Outputs;
 use crate::parameters::{Limits, Parameters, tolerance_problem};
 use crate::ranges;
 use crate::sizes::{MODES, TANKS};
-use crate::state::{BallState, INPUTS, Inputs, Ranges, STATES, State, index};
+use crate::state::{BallState, INPUTS, Inputs, Kept, Ranges, STATES, State, index};
 
 /// A rigid body with up to four tanks, free or on a pivot.
 #[derive(Clone, Debug)]
@@ -78,7 +78,8 @@ impl Spacecraft {
         let h_wheels = inputs.h_wheels.value;
         let ranges = [Ranges::default(); TANKS];
         let ball = [BallState::Settled; TANKS];
-        let state = State { time: start_time, x, h_wheels, flow, ranges, ball };
+        let kept = Kept::NONE;
+        let state = State { time: start_time, x, h_wheels, flow, ranges, ball, kept };
         let mut craft = Spacecraft::resume(p, &state, tolerance);
         craft.motion.state.ranges = craft.ranges(inputs);
         Ok(craft)
@@ -111,7 +112,7 @@ impl Spacecraft {
 
     /// Restores a saved state of this craft or of a craft with the same parameters.
     pub fn set_state(&mut self, state: &State) {
-        self.motion.state = *state;
+        self.motion.set_state(state);
     }
 
     /// Advances by exactly `h` > 0 seconds, with the inputs along their ramps. A jump of `h_wheels` or
@@ -123,7 +124,9 @@ impl Spacecraft {
         }
         let before = self.motion.state;
         self.motion.inputs = *inputs;
-        self.take_jumps(inputs);
+        if self.take_jumps(inputs) {
+            self.motion.state.kept.end();
+        }
         let done = match &self.draining {
             Some(craft) if craft.drains() => {
                 let x = &mut self.motion.state.x;
@@ -138,7 +141,7 @@ impl Spacecraft {
                 state.h_wheels = inputs.h_wheels.value_at(h);
                 state.flow = inputs.mass_flow.map(|flow| flow.value_at(h));
             }
-            Err(_) => *state = before,
+            Err(_) => self.motion.set_state(&before),
         }
         done
     }
@@ -232,6 +235,7 @@ impl Spacecraft {
     /// Sets x from the host. Quaternion and directions need not be of unit length.
     pub fn set_continuous_states(&mut self, x: &[f64; STATES]) {
         self.motion.state.x = *x;
+        self.motion.state.kept.end();
     }
 
     /// Returns x'. Quaternion, directions and their rates are normalised first; those in x keep their length.
@@ -350,6 +354,9 @@ impl Spacecraft {
             return Err(StepError::NotFinite { time: before.time });
         }
         self.motion.state.ranges = self.ranges(inputs);
+        if changed {
+            self.motion.state.kept.end();
+        }
         Ok(changed)
     }
 

@@ -156,13 +156,88 @@ pub struct State {
     pub(crate) flow: [f64; TANKS],
     pub(crate) ranges: [Ranges; TANKS],
     pub(crate) ball: [BallState; TANKS],
+    pub(crate) kept: Kept,
+}
+
+/// Start of the expansion that the next step continues while the inputs are held: the states `x` there and
+/// the inputs (force, torque, h_wheels, mass flows). Times are since the inputs are held, each with its
+/// rounding error: of the last step's end, `clock`, and of the expansion's `start`. If `clock` is 0, the next step starts an expansion.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Kept {
+    pub x: [f64; STATES],
+    pub clock: [f64; 2],
+    pub start: [f64; 2],
+    inputs: [f64; INPUTS],
+}
+
+impl Kept {
+    const REALS: usize = STATES + 4 + INPUTS;
+
+    /// No expansion is kept.
+    pub const NONE: Kept =
+        Kept { x: [0.0; STATES], clock: [0.0; 2], start: [0.0; 2], inputs: [0.0; INPUTS] };
+
+    /// Returns true if a step with `inputs` continues the expansion.
+    #[inline(always)]
+    pub fn is_continued(&self, inputs: &Inputs) -> bool {
+        self.clock[0] > 0.0 && inputs.are_held() && self.inputs == inputs.values()
+    }
+
+    /// Starts an expansion at the states `x`.
+    #[inline(always)]
+    pub fn renew(&mut self, x: &[f64; STATES], inputs: &Inputs) {
+        *self = Kept { x: *x, inputs: inputs.values(), ..Kept::NONE };
+    }
+
+    /// Lets the next step start an expansion.
+    pub fn end(&mut self) {
+        (self.clock, self.start) = ([0.0; 2], [0.0; 2]);
+    }
+
+    fn numbers(&self) -> impl Iterator<Item = &f64> {
+        self.clock.iter().chain(&self.start).chain(&self.inputs).chain(&self.x)
+    }
+
+    fn from_numbers(numbers: &[f64; Self::REALS]) -> Option<Kept> {
+        let (clock, rest) = numbers.split_first_chunk()?;
+        let (start, rest) = rest.split_first_chunk()?;
+        let (inputs, x) = rest.split_first_chunk()?;
+        let x = *x.first_chunk()?;
+        let is_kept = clock[0] > 0.0;
+        (!is_kept || has_directions(&x)).then_some(Kept {
+            x,
+            clock: *clock,
+            start: *start,
+            inputs: *inputs,
+        })
+    }
+}
+
+impl Inputs {
+    #[inline(always)]
+    pub(crate) fn are_held(&self) -> bool {
+        let Inputs { force, torque, h_wheels, mass_flow } = self;
+        [force, torque, h_wheels].iter().all(|ramp| ramp.slope == [0.0; 3])
+            && mass_flow.iter().all(|flow| flow.slope == 0.0)
+    }
+
+    #[inline(always)]
+    fn values(&self) -> [f64; INPUTS] {
+        let mut all = [0.0; INPUTS];
+        let vectors = [self.force.value, self.torque.value, self.h_wheels.value];
+        all[..9].copy_from_slice(vectors.as_flattened());
+        for (x, flow) in all[9..].iter_mut().zip(&self.mass_flow) {
+            *x = flow.value;
+        }
+        all
+    }
 }
 
 impl State {
     /// Number of words of a saved state.
     pub const WORDS: usize = Self::REALS + 2 * TANKS;
 
-    const REALS: usize = 4 + TANKS + STATES;
+    const REALS: usize = 4 + TANKS + STATES + Kept::REALS;
 
     /// Returns the wheels' momentum that the motion already includes, N m s.
     pub fn h_wheels(&self) -> Vec3 {
@@ -173,7 +248,8 @@ impl State {
     pub fn to_words(&self) -> [u64; Self::WORDS] {
         let mut words = [0; Self::WORDS];
         let held = self.h_wheels.iter().chain(&self.flow);
-        let numbers = core::iter::once(&self.time).chain(held).chain(&self.x);
+        let numbers =
+            core::iter::once(&self.time).chain(held).chain(&self.x).chain(self.kept.numbers());
         for (word, number) in words.iter_mut().zip(numbers) {
             *word = number.to_bits();
         }
@@ -198,15 +274,19 @@ impl State {
             *ball = BallState::ALL.into_iter().find(|ball| *ball as u64 == *word)?;
         }
         let x: [f64; STATES] = core::array::from_fn(|i| numbers[4 + TANKS + i]);
-        let bobs = (0..TANKS * MODES).all(|i| has_direction(&x[index::bob(0, i)..][..3]));
+        let kept = Kept::from_numbers(numbers[4 + TANKS + STATES..].first_chunk()?)?;
         let is_state = numbers[0].is_finite()
             && numbers[1..].iter().all(|x| x.abs() < MAX_MAGNITUDE)
-            && has_direction(&x[index::Q..][..4])
-            && bobs;
+            && has_directions(&x);
         let h_wheels = [numbers[1], numbers[2], numbers[3]];
         let flow = core::array::from_fn(|i| numbers[4 + i]);
-        is_state.then_some(State { time: numbers[0], x, h_wheels, flow, ranges, ball })
+        is_state.then_some(State { time: numbers[0], x, h_wheels, flow, ranges, ball, kept })
     }
+}
+
+fn has_directions(x: &[f64; STATES]) -> bool {
+    has_direction(&x[index::Q..][..4])
+        && (0..TANKS * MODES).all(|i| has_direction(&x[index::bob(0, i)..][..3]))
 }
 
 pub(crate) fn has_direction(x: &[f64]) -> bool {

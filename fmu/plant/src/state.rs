@@ -3,7 +3,7 @@
 
 use formulas::limits::LimitedBy;
 use formulas::regime::Regime;
-use taylor::integrator::MAX_MAGNITUDE;
+use taylor::integrator::{MAX_MAGNITUDE, add_time};
 
 use crate::contact::Contact;
 use crate::imu::{FLICKERS, Gyro};
@@ -205,14 +205,9 @@ impl State {
 
     /// Moves the clock to `t` after `begin`, which is a time of the host and the time since the start, s.
     pub(crate) fn set_clock(&mut self, begin: (f64, [f64; 2]), t: f64) {
-        let (time, [before, rest]) = begin;
+        let (time, elapsed) = begin;
         self.time = time + t;
-        // Knuth's sum of two numbers and its rounding error, then Dekker's.
-        let sum = before + t;
-        let added = sum - before;
-        let rest = rest + ((before - (sum - added)) + (t - added));
-        let elapsed = sum + rest;
-        self.elapsed = [elapsed, rest - (elapsed - sum)];
+        self.elapsed = add_time(elapsed, t);
     }
 
     /// Records a new contact at `time`. Returns true if it differs from the previous one.

@@ -6,6 +6,9 @@
 //! end. A step ends exactly where it should, and events are roots of polynomials (`root.rs`), found without stepping
 //! back.
 //!
+//! [`advance`] begins a series at each call. [`advance_kept`] continues the series of the call before, so that its
+//! results do not depend on where calls end.
+//!
 //! Source: Jorba & Zou, Experimental Mathematics 14 (2005).
 
 use core::ops::ControlFlow;
@@ -34,6 +37,13 @@ const DECAY: f64 = 0.1;
 
 /// Tolerance of a predicted term over that of a computed term.
 const PREDICTED_SHARE: f64 = 0.25;
+
+/// Largest last term of a series, relative to its tolerance, after which the omitted terms may be predicted.
+const LARGEST_LAST: f64 = 30.0;
+
+/// Length of a step, s, from which on it may err by the whole allowed error. A shorter step of a kept
+/// [`Expansion`] may err in proportion to its length, because more of them add up.
+const FULL_LENGTH: f64 = 0.1;
 
 /// Largest defect of a step over the allowed error of its terms. A step with a larger one is repeated with
 /// half the length.
@@ -73,7 +83,7 @@ impl Steps {
 }
 
 /// Convergence criterion of a motion's series: either the given number of successive terms is negligible
-/// (`Terms`), or two are, the second of which is predicted from the decay of the terms before (`Decay`). One
+/// (`Terms`), or two are, which may be predicted from the decay of the terms before (`Decay`). One
 /// negligible term is not enough, because a motion that starts at rest is even in time, so that every second
 /// term is zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -82,17 +92,22 @@ pub enum Convergence {
     Decay,
 }
 
-/// Returns true if terms n and n + 1 are negligible, of which term n + 1 is predicted. The arguments are the
-/// ratios of terms n, n - 1, n - 2, n - 3 to their tolerance.
+/// Returns true if the series may end with term n: terms n and n - 1 are negligible, or terms n and n + 1,
+/// or terms n + 1 and n + 2. Terms after n are predicted. The arguments are the ratios of terms n, n - 1,
+/// n - 2, n - 3 to their tolerance.
 ///
 /// The prediction takes the slower of two decays over two orders: t_(n+1) = t_(n-1) max(t_n/t_(n-2),
-/// t_(n-1)/t_(n-3)).
+/// t_(n-1)/t_(n-3)), and t_(n+2) from t_n.
 #[inline(always)]
 fn are_negligible([now, one, two, three]: [f64; 4]) -> bool {
-    let decays = now <= DECAY * two && one <= DECAY * three;
-    let predicted = one * now <= PREDICTED_SHARE * two && one * one <= PREDICTED_SHARE * three;
     // NaN is not negligible; non-finite states end the step.
-    now <= 1.0 && (one <= 1.0 || decays && predicted)
+    if now <= 1.0 && one <= 1.0 {
+        return true;
+    }
+    let decays = now <= DECAY * two && one <= DECAY * three;
+    let is_small =
+        |term: f64| term * now <= PREDICTED_SHARE * two && term * one <= PREDICTED_SHARE * three;
+    decays && is_small(one) && (now <= 1.0 || now <= LARGEST_LAST && is_small(now))
 }
 
 /// A motion that can be expanded in a power series, as [`advance`] needs it. Lengths and times are in s.
@@ -145,6 +160,10 @@ pub trait Motion {
     fn event(&mut self, _n: usize, _h: f64) -> Option<f64> {
         None
     }
+
+    /// Stores the states as the start of the next kept [`Expansion`].
+    #[inline(always)]
+    fn keep(&mut self) {}
 
     /// Advances the states to `h` after the start of the expansion, which is `t` after the start of the call,
     /// by the series up to order n. If [`Motion::event`] found an event last, it is there. Returns `Continue`
@@ -229,13 +248,11 @@ fn expand<M: Motion>(motion: &mut M, h: f64, tolerance: f64) -> (usize, f64) {
             }
         }
     }
-    // The last two terms meet the tolerance at this length.
-    let h = progress.h;
-    let length = |n: usize| {
-        let term = motion.coefficient_norm(n);
-        if term > 0.0 { libm::exp(-libm::log(term) / n as f64) } else { h }
-    };
-    (highest, h.min(length(highest)).min(length(highest - 1)))
+    let mut norms = [0.0; ORDER + 1];
+    for n in [highest - 1, highest] {
+        norms[n] = motion.coefficient_norm(n);
+    }
+    (highest, length(&norms, highest, progress.h))
 }
 
 /// Advances the motion by exactly `h` > 0 from the time `begin`. If the motion ends the call itself
@@ -274,6 +291,233 @@ pub fn advance<M: Motion>(
         }
     }
     Ok(ControlFlow::Continue(()))
+}
+
+/// Adds `t` to a time that is kept with its rounding error.
+#[inline(always)]
+pub fn add_time([time, rest]: [f64; 2], t: f64) -> [f64; 2] {
+    // Knuth's sum of two numbers and its rounding error, then Dekker's.
+    let sum = time + t;
+    let added = sum - time;
+    let rest = rest + ((time - (sum - added)) + (t - added));
+    let total = sum + rest;
+    [total, rest - (total - sum)]
+}
+
+/// An expansion that calls of [`advance_kept`] continue while the inputs are held. Each call computes as many
+/// orders as its end needs. The state at an instant follows from the start of the expansion and from the time
+/// since then, not from the instants in between at which calls have ended.
+#[derive(Clone, Debug)]
+pub struct Expansion {
+    /// Number of computed orders: coefficients of the states up to this one are known.
+    orders: usize,
+    /// Number of the lowest orders that other uses of the motion have overwritten since.
+    overwritten: usize,
+    norms: [f64; ORDER + 1],
+    radius: f64,
+    /// Order and length of the whole expansion, if they are known.
+    end: Option<(usize, f64)>,
+}
+
+impl Default for Expansion {
+    fn default() -> Self {
+        let norms = [0.0; ORDER + 1];
+        Expansion { orders: 0, overwritten: 0, norms, radius: f64::INFINITY, end: None }
+    }
+}
+
+impl Expansion {
+    /// Drops all coefficients, because another expansion starts.
+    #[inline(always)]
+    pub fn clear(&mut self) {
+        (self.orders, self.overwritten, self.end) = (0, 0, None);
+    }
+
+    /// Records that coefficients below `order` of all quantities, and coefficient `order` of the states, are
+    /// overwritten.
+    #[inline(always)]
+    pub fn overwrite(&mut self, order: usize) {
+        self.overwritten = self.overwritten.max(order);
+    }
+
+    /// Computes the coefficients again that were overwritten.
+    #[inline(always)]
+    fn repair<M: Motion>(&mut self, motion: &mut M) {
+        if self.overwritten > 0 && self.orders > 0 {
+            motion.start(0.0);
+            for n in 0..self.overwritten.min(self.orders) {
+                motion.rates(n);
+            }
+        }
+        self.overwritten = 0;
+    }
+
+    /// Computes coefficient `n` of the states, if it is not known, and returns its norm.
+    #[inline(always)]
+    fn norm<M: Motion>(&mut self, motion: &mut M, n: usize, tolerance: f64) -> f64 {
+        while self.orders < n {
+            let order = self.orders;
+            motion.rates(order);
+            self.orders = order + 1;
+            match order {
+                0 | 1 => {}
+                2 => {
+                    self.radius =
+                        motion.set_error_scale(LONGEST, STEP_SHARE * tolerance).min(LONGEST);
+                    for n in 1..=3 {
+                        self.norms[n] = motion.coefficient_norm(n);
+                    }
+                }
+                _ => self.norms[order + 1] = motion.coefficient_norm(order + 1),
+            }
+        }
+        self.norms[n]
+    }
+
+    /// Returns the order up to which the series is exact at `t` after the start of the expansion. The longer
+    /// `t`, the higher the order.
+    #[inline(always)]
+    fn order_at<M: Motion>(&mut self, motion: &mut M, t: f64, tolerance: f64) -> Option<usize> {
+        self.norm(motion, 3, tolerance);
+        if t > self.radius {
+            return None;
+        }
+        let highest = highest_order(motion, tolerance);
+        // 1 over the share of the allowed error
+        let share = if t < FULL_LENGTH { FULL_LENGTH / t } else { 1.0 };
+        let convergence = motion.convergence();
+        let mut power = t * t * share;
+        let mut terms =
+            [self.norms[2] * power, self.norms[1] * t * share, f64::INFINITY, f64::INFINITY];
+        let mut negligible = 0;
+        for n in 3..=highest {
+            power *= t;
+            let term = self.norm(motion, n, tolerance) * power;
+            terms = [term, terms[0], terms[1], terms[2]];
+            let ends = match convergence {
+                Convergence::Decay => are_negligible(terms),
+                Convergence::Terms(count) => {
+                    negligible = if term <= 1.0 { negligible + 1 } else { 0 };
+                    negligible >= count
+                }
+            };
+            if n >= MIN_ORDER && ends {
+                return Some(n);
+            }
+        }
+        None
+    }
+
+    /// Returns order and length of the whole expansion.
+    #[cold]
+    fn end<M: Motion>(
+        &mut self,
+        motion: &mut M,
+        tolerance: f64,
+        (begin, steps): (f64, &mut Steps),
+    ) -> Result<(usize, f64), StepError> {
+        if let Some(end) = self.end {
+            return Ok(end);
+        }
+        let (n, mut length) = match self.order_at(motion, self.radius, tolerance) {
+            Some(n) => (n, self.radius),
+            None => {
+                let highest = highest_order(motion, tolerance);
+                (highest, length(&self.norms, highest, self.radius))
+            }
+        };
+        while motion.defect(n, length) > DEFECT {
+            length /= 2.0;
+            steps.add_steps(1, begin)?;
+        }
+        self.end = Some((n, length));
+        Ok((n, length))
+    }
+}
+
+/// Returns the length at which the last two terms up to order n meet the tolerance, at most `longest`.
+fn length(norms: &[f64; ORDER + 1], n: usize, longest: f64) -> f64 {
+    let length = |n: usize| {
+        let term = norms[n];
+        if term > 0.0 { libm::exp(-libm::log(term) / n as f64) } else { longest }
+    };
+    longest.min(length(n)).min(length(n - 1))
+}
+
+/// Returns the order with which a motion needs the fewest operations per time. The length of an expansion of
+/// order n with the allowed error e is the radius of convergence times e^(1/n), and its cost increases with
+/// n^2, so the order is near -ln(e)/2 (Jorba & Zou). Costs that increase less, such as of solving for
+/// accelerations, make a higher order worth while.
+#[inline(always)]
+fn highest_order<M: Motion>(motion: &M, tolerance: f64) -> usize {
+    // -log2(e), rounded
+    let bits = 1023 - ((STEP_SHARE * tolerance).to_bits() >> 52 & 0x7ff) as usize;
+    (5 + 35 * bits / 100).clamp(MIN_ORDER + 3, motion.highest_order())
+}
+
+/// Advances the motion to the time `clock` since the inputs are held, within the expansion if it is exact
+/// there, otherwise by further expansions. `start` is the time of the expansion's start with its rounding
+/// error. `clock` comes without its rounding error, because this error depends on the lengths of the calls.
+/// The states are those at the start of the expansion before the call, and those at `clock` after it.
+///
+/// # Errors See [`StepError`].
+#[inline(always)]
+pub fn advance_kept<M: Motion>(
+    motion: &mut M,
+    expansion: &mut Expansion,
+    (clock, start): (f64, &mut [f64; 2]),
+    begin: f64,
+    tolerance: f64,
+    steps: &mut Steps,
+) -> Result<(), StepError> {
+    let mut moved = 0.0;
+    expansion.repair(motion);
+    loop {
+        steps.add_steps(1, begin + moved)?;
+        let t = (clock - start[0]) - start[1];
+        if t <= 0.0 {
+            return Ok(()); // an event at the end
+        }
+        if expansion.orders == 0 {
+            motion.start(moved);
+        }
+        let mut whole = |motion: &mut M, expansion: &mut Expansion| {
+            expansion.end(motion, tolerance, (begin + moved, &mut *steps))
+        };
+        let order = expansion.order_at(motion, t, tolerance);
+        let (mut n, mut length) = match order.filter(|n| motion.defect(*n, t) <= DEFECT) {
+            Some(n) => (n, t),
+            None => {
+                let (n, end) = whole(motion, expansion)?;
+                (n, end.min(t))
+            }
+        };
+        let mut event = motion.event(n, length);
+        if event.is_some() {
+            // The series of the whole expansion has the same root for every end of the call.
+            (n, length) = whole(motion, expansion)?;
+            event = motion.event(n, length).map(|event| event.min(t));
+            length = length.min(t);
+        }
+        let moves = match event {
+            Some(event) => {
+                length = event;
+                event.is_finite()
+            }
+            None => length > 0.0 && length.is_finite(),
+        };
+        if !moves {
+            return Err(StepError::NotFinite { time: begin + moved });
+        }
+        let _ = motion.take(n, length, moved + length, steps)?;
+        if length == t && event.is_none() {
+            return Ok(());
+        }
+        moved += length;
+        *start = add_time(*start, length);
+        motion.keep();
+        expansion.clear();
+    }
 }
 
 #[cfg(test)]
@@ -574,5 +818,129 @@ mod tests {
         let mut motion = Oscillator { now: [0.0, 0.0], ..Oscillator::new(Convergence::Terms(2)) };
         motion.start(0.0);
         assert_eq!(expand(&mut motion, 1e300, 1e-8), (5, LONGEST));
+    }
+
+    /// An oscillator with its kept expansion: the states at the start, and the times of the last call's end
+    /// and of the start.
+    struct Kept {
+        motion: Oscillator,
+        begin: [f64; 2],
+        expansion: Expansion,
+        clock: [f64; 2],
+        start: [f64; 2],
+    }
+
+    impl Motion for Kept {
+        const UNROLLED: bool = false;
+
+        fn start(&mut self, t: f64) {
+            self.motion.start(t);
+        }
+
+        fn rates(&mut self, n: usize) {
+            self.motion.rates(n);
+        }
+
+        fn set_error_scale(&mut self, h: f64, allowed: f64) -> f64 {
+            self.motion.set_error_scale(h, allowed)
+        }
+
+        fn coefficient_norm(&self, n: usize) -> f64 {
+            self.motion.coefficient_norm(n)
+        }
+
+        fn convergence(&self) -> Convergence {
+            self.motion.convergence
+        }
+
+        fn event(&mut self, n: usize, h: f64) -> Option<f64> {
+            self.motion.event(n, h)
+        }
+
+        fn keep(&mut self) {
+            self.begin = self.motion.now;
+        }
+
+        fn take(
+            &mut self,
+            n: usize,
+            h: f64,
+            t: f64,
+            steps: &mut Steps,
+        ) -> Result<ControlFlow<f64>, StepError> {
+            self.motion.take(n, h, t, steps)
+        }
+    }
+
+    impl Kept {
+        fn new(motion: Oscillator) -> Kept {
+            let (begin, expansion) = (motion.now, Expansion::default());
+            Kept { motion, begin, expansion, clock: [0.0; 2], start: [0.0; 2] }
+        }
+
+        fn advance(&mut self, h: f64, tolerance: f64) {
+            self.motion.now = self.begin;
+            self.clock = add_time(self.clock, h);
+            let mut expansion = core::mem::take(&mut self.expansion);
+            let mut start = self.start;
+            let times = (self.clock[0], &mut start);
+            let mut steps = Steps::new(100_000, "");
+            advance_kept(self, &mut expansion, times, 7.0, tolerance, &mut steps).unwrap();
+            (self.expansion, self.start) = (expansion, start);
+        }
+    }
+
+    /// Calls of any length end at the same bits, before and after reflections at the wall, and within the
+    /// tolerance. Coefficients that other uses have overwritten are computed again.
+    #[test]
+    fn ends_of_calls_change_no_bit_of_a_kept_expansion() {
+        for convergence in [Convergence::Decay, Convergence::Terms(2)] {
+            for (wall, tolerance) in [(None, 1e-4), (None, 1e-10), (Some(0.5), 1e-12)] {
+                let kept = || Kept::new(Oscillator { wall, ..Oscillator::new(convergence) });
+                let mut whole = kept();
+                whole.advance(20.0, tolerance);
+                let mut many = kept();
+                for n in 0..20 * 64 {
+                    many.advance(1.0 / 64.0, tolerance);
+                    if n % 5 == 0 {
+                        many.motion.start(0.0);
+                        many.motion.rates(0);
+                        many.expansion.overwrite(1);
+                    }
+                }
+                assert_eq!(many.motion.now, whole.motion.now, "{convergence:?} {wall:?}");
+                if wall.is_none() {
+                    let error = whole.motion.error(20.0);
+                    assert!(error < 10.0 * tolerance, "{convergence:?} {tolerance}: {error}");
+                    // Orders of a call that ends within an expansion are computed once.
+                    assert!(many.motion.rates < 2 * whole.motion.rates + 20 * 64);
+                }
+            }
+        }
+    }
+
+    /// A short call needs fewer orders than a long one, and more for a smaller tolerance.
+    #[test]
+    fn the_order_of_a_kept_expansion_follows_length_and_tolerance() {
+        let orders = |h: f64, tolerance: f64| {
+            let mut kept = Kept::new(Oscillator::new(Convergence::Decay));
+            kept.advance(h, tolerance);
+            kept.expansion.orders
+        };
+        assert_eq!(orders(0.02, 1e-4), MIN_ORDER);
+        assert!(orders(0.02, 1e-10) < orders(0.5, 1e-10));
+        assert!(orders(0.02, 1e-8) < orders(0.02, 1e-12));
+        // Over several expansions all have the order with the fewest operations.
+        let highest = [1e-6, 1e-10, 1e-14].map(|tolerance| orders(50.0, tolerance));
+        assert!(highest[0] < highest[1] && highest[2] <= ORDER, "{highest:?}");
+    }
+
+    #[test]
+    fn times_add_up_with_their_rounding_error() {
+        let sum = (0..10).fold([0.0; 2], |sum, _| add_time(sum, 0.1));
+        assert_eq!(sum[0], 1.0);
+        let back = add_time(sum, -1.0);
+        // Ten times the rounding error of 0.1, which is 5.55e-18.
+        assert!((back[0] / 5.55e-17 - 1.0).abs() < 1e-2, "{back:?}");
     }
 }

@@ -145,7 +145,7 @@ fn steps(is_enough: impl Fn(usize) -> bool) -> usize {
 /// Numbers of internal steps of a tank that keeps its liquid and one that drains, at the tolerances 1e-5 and
 /// 1e-10: alone and on a craft. More would be slower, fewer less exact.
 const STEPS: [[[usize; 2]; 4]; 2] =
-    [[[16, 6], [31, 12], [19, 10], [27, 13]], [[8, 7], [16, 13], [18, 8], [23, 15]]];
+    [[[16, 8], [31, 12], [19, 10], [27, 13]], [[8, 10], [16, 13], [18, 8], [23, 15]]];
 
 #[test]
 fn a_step_takes_few_internal_steps() {

@@ -25,6 +25,7 @@ mod random;
 mod records;
 mod reference;
 mod refusals;
+mod rows;
 mod small_motions;
 mod special_cases;
 mod spinning;

@@ -1,0 +1,221 @@
+//! Communication points while inputs are held: they lie in expansions that do not depend on them, so they change no bit of the
+//! motion.
+
+use craft::{INPUTS, Inputs, Mount, Parameters, Ramp, STATES, Spacecraft, State, index};
+
+use super::random::Random;
+
+const TOLERANCES: [f64; 3] = [1e-5, 1e-8, 1e-11];
+
+/// Returns lengths, s, whose sum is `total`, between the instants of random rows.
+fn random_rows(random: &mut Random, total: f64) -> Vec<f64> {
+    let mut times = vec![0.0];
+    loop {
+        let next = times[times.len() - 1] + random.magnitude(1e-4, 0.7);
+        if next >= total {
+            break;
+        }
+        times.push(next);
+    }
+    times.push(total);
+    times.windows(2).map(|pair| pair[1] - pair[0]).collect()
+}
+
+/// A craft of each kind: pendulums, drag that follows the motion, other surfaces, planar modes, a pivot with dry friction,
+/// liquid that may detach.
+fn craft_of(kind: usize, seed: u64) -> (Parameters, [Inputs; 4]) {
+    let mut random = Random::new(seed);
+    let mut p = random.parameters();
+    p.tanks = 1 + seed as usize % 2;
+    match kind {
+        1 => p.tank.iter_mut().for_each(|tank| random.follow(tank)),
+        2 => random.bend_all(&mut p),
+        3 => random.make_all_planar(&mut p),
+        4 => {
+            (p.mount, p.pivot) = (Mount::Pivot, random.pivot());
+            (p.init.position, p.init.velocity) = ([0.0; 3], [0.0; 3]);
+        }
+        5 => p.tank.iter_mut().for_each(|tank| tank.ball.travel = 0.6),
+        _ => {}
+    }
+    let inputs = [(); 4].map(|()| {
+        let mut u = Inputs {
+            force: Ramp::held(random.vector(200.0)),
+            torque: Ramp::held(random.vector(50.0)),
+            h_wheels: Ramp::held(random.vector(5.0)),
+            ..Inputs::default()
+        };
+        u.force.value[2] += [2.0, 1.0][random.below(2)] * p.craft.mass;
+        u
+    });
+    (p, inputs)
+}
+
+fn bits(craft: &Spacecraft) -> [u64; STATES] {
+    craft.borrow_states().map(f64::to_bits)
+}
+
+/// Runs the craft for 2 s with each of the inputs, with rows from `rows`; `look` is called after each row. Returns the states
+/// at each change of the inputs.
+fn run(
+    (p, inputs, tolerance): (&Parameters, &[Inputs; 4], f64),
+    mut rows: impl FnMut() -> Vec<f64>,
+    mut look: impl FnMut(&mut Spacecraft, &Inputs),
+) -> Vec<[u64; STATES]> {
+    let mut craft = Spacecraft::new(p, &inputs[0], 0.0, tolerance).unwrap();
+    let mut all = Vec::new();
+    for u in inputs {
+        for h in rows() {
+            if craft.step(u, h).is_err() {
+                return all; // a bob at the bound of its surface
+            }
+            look(&mut craft, u);
+        }
+        all.push(bits(&craft));
+    }
+    all
+}
+
+/// Checks that states have the same bits.
+fn assert_same(found: &[[u64; STATES]], whole: &[[u64; STATES]], what: &str) {
+    assert_eq!(found.len(), whole.len(), "{what}");
+    for (n, (found, whole)) in found.iter().zip(whole).enumerate() {
+        for (i, (found, whole)) in found.iter().zip(whole).enumerate() {
+            let [a, b] = [*found, *whole].map(f64::from_bits);
+            assert!(found == whole, "{what}: state {i} at change {n}: {a:?} and {b:?}");
+        }
+    }
+}
+
+fn every_kind(mut test: impl FnMut((&Parameters, &[Inputs; 4], f64), usize, u64)) {
+    for kind in 0..6 {
+        for seed in 0..6 {
+            let (p, inputs) = craft_of(kind, 10 * kind as u64 + seed);
+            test((&p, &inputs, TOLERANCES[seed as usize % 3]), kind, seed);
+        }
+    }
+}
+
+#[test]
+fn rows_change_no_bit_of_the_motion_while_inputs_are_held() {
+    let mut compared = 0;
+    every_kind(|motion, kind, seed| {
+        let tolerance = motion.2;
+        let whole = run(motion, || vec![2.0], |_, _| {});
+        compared += whole.len();
+        let mut random = Random::new(seed);
+        for found in [
+            run(motion, || vec![1.0; 2], |_, _| {}),
+            run(motion, || vec![0.03125; 64], |_, _| {}),
+            run(motion, || random_rows(&mut random, 2.0), |_, _| {}),
+        ] {
+            assert_same(&found, &whole, &format!("{kind} {seed} {tolerance:e}"));
+        }
+    });
+    assert!(compared > 100, "{compared}");
+}
+
+/// Between rows a host may read outputs, also of other inputs, derivatives and event indicators, and may save and restore.
+#[test]
+fn reading_and_saving_between_rows_change_no_bit_of_the_motion() {
+    every_kind(|motion, kind, seed| {
+        let (p, _, tolerance) = motion;
+        let whole = run(motion, || vec![2.0], |_, _| {});
+        let mut random = Random::new(seed + 100);
+        let mut rows = Random::new(seed);
+        let look = |craft: &mut Spacecraft, u: &Inputs| match random.below(8) {
+            0 => _ = craft.outputs(u),
+            1 => _ = craft.outputs(&random.inputs()),
+            2 => _ = craft.derivatives(u),
+            3 => {
+                let _ = craft.directional_derivative(u, &[0.1; STATES], &[1.0; INPUTS]);
+                let _ = craft.output_derivatives(u, &[0.2; STATES], &[0.5; INPUTS]);
+            }
+            4 => craft.event_indicators(u, &mut [0.0; 2 * craft::TANKS]),
+            5 => {
+                let state = State::from_words(&craft.state().to_words()).unwrap();
+                *craft = Spacecraft::resume(p, &state, tolerance);
+            }
+            6 => {
+                let saved = *craft.state();
+                craft.step(&random.inputs(), 0.3).ok();
+                craft.set_state(&saved);
+            }
+            _ => *craft = craft.clone(),
+        };
+        let found = run(motion, || random_rows(&mut rows, 2.0), look);
+        assert_same(&found, &whole, &format!("{kind} {seed} {tolerance:e}"));
+    });
+}
+
+/// Thrust turns round at 2 s, so that the liquid leaves its bottom, flies and hits the wall. Events are roots of the series of
+/// whole expansions.
+#[test]
+fn rows_change_no_bit_of_detached_liquid() {
+    let mut p = Parameters::default();
+    p.tank[0].ball.travel = 0.6;
+    p.init.omega = [0.02, 0.01, 0.0];
+    let thrust = |f: f64| Inputs { force: Ramp::held([5.0, 0.0, f]), ..Inputs::default() };
+    let inputs = [500.0, -200.0, 300.0, 100.0].map(thrust);
+    let motion = (&p, &inputs, 1e-9);
+    let mut states = Vec::new();
+    let whole = run(motion, || vec![2.0], |craft, _| states.push(craft.has_lump()));
+    assert!(states[1] && whole.len() == 4, "{states:?}");
+    let mut random = Random::new(7);
+    for found in [
+        run(motion, || vec![0.03125; 64], |_, _| {}),
+        run(motion, || random_rows(&mut random, 2.0), |craft, u| _ = craft.outputs(u)),
+    ] {
+        assert_same(&found, &whole, "ball");
+    }
+}
+
+/// A host that sets states starts anew.
+#[test]
+fn states_that_are_set_start_a_new_expansion() {
+    let (p, inputs) = craft_of(0, 3);
+    let mut craft = Spacecraft::new(&p, &inputs[0], 0.0, 1e-9).unwrap();
+    craft.step(&inputs[0], 0.1).unwrap();
+    let mut x = craft.continuous_states();
+    x[index::OMEGA] += 0.1;
+    craft.set_continuous_states(&x);
+    let mut other = Spacecraft::new(&p, &inputs[0], 0.0, 1e-9).unwrap();
+    other.step(&inputs[0], 0.1).unwrap();
+    craft.step(&inputs[0], 0.1).unwrap();
+    other.step(&inputs[0], 0.1).unwrap();
+    let turned = craft.continuous_states()[index::OMEGA] - other.continuous_states()[index::OMEGA];
+    assert!((turned - 0.1).abs() < 0.05, "{turned}");
+}
+
+/// Returns the largest error of attitude, rate and bobs after 20 s of inputs that change every `h` seconds.
+fn error_of_restarts(h: f64, tolerance: f64) -> f64 {
+    let (p, _) = craft_of(0, 2);
+    let run = |tolerance: f64| {
+        let torque = |k: usize| {
+            let value = 20.0 * f64::sin(2.5 * h * k as f64);
+            Ramp::held([value, 0.5 * value, -value])
+        };
+        let with = |k: usize| Inputs {
+            force: Ramp::held([0.0, 0.0, 2.0 * p.craft.mass]),
+            torque: torque(k),
+            ..Inputs::default()
+        };
+        let mut craft = Spacecraft::new(&p, &with(0), 0.0, tolerance).unwrap();
+        (0..(20.0 / h) as usize).for_each(|k| craft.step(&with(k), h).unwrap());
+        craft.continuous_states()
+    };
+    let (found, exact) = (run(tolerance), run(1e-14));
+    let angles = (0..index::POSITION).chain(index::BOBS..index::LIQUID);
+    angles.map(|i| (found[i] - exact[i]).abs()).fold(0.0, f64::max)
+}
+
+/// The allowed error of a short step is proportional to its length.
+#[test]
+fn short_steps_between_changes_of_inputs_are_within_the_solver_tolerance() {
+    for h in [0.1, 0.05, 0.02, 0.005] {
+        for tolerance in [1e-6, 1e-8, 1e-10, 1e-12] {
+            let error = error_of_restarts(h, tolerance);
+            assert!(error < tolerance, "{h} s, {tolerance:e}: {error:e}");
+        }
+    }
+}
