@@ -22,7 +22,7 @@ fn random_rows(random: &mut Random, total: f64) -> Vec<f64> {
 }
 
 /// A craft of each kind: pendulums, drag that follows the motion, other surfaces, planar modes, a pivot with dry friction,
-/// liquid that may detach.
+/// liquid that may detach, flexible appendages, spinning liquid.
 fn craft_of(kind: usize, seed: u64) -> (Parameters, [Inputs; 4]) {
     let mut random = Random::new(seed);
     let mut p = random.parameters();
@@ -36,6 +36,8 @@ fn craft_of(kind: usize, seed: u64) -> (Parameters, [Inputs; 4]) {
             (p.init.position, p.init.velocity) = ([0.0; 3], [0.0; 3]);
         }
         5 => p.tank.iter_mut().for_each(|tank| tank.ball.travel = 0.6),
+        6 => random.flex(&mut p),
+        7 => random.spin_all(&mut p),
         _ => {}
     }
     let inputs = [(); 4].map(|()| {
@@ -88,7 +90,7 @@ fn assert_same(found: &[[u64; STATES]], whole: &[[u64; STATES]], what: &str) {
 }
 
 fn every_kind(mut test: impl FnMut((&Parameters, &[Inputs; 4], f64), usize, u64)) {
-    for kind in 0..6 {
+    for kind in 0..8 {
         for seed in 0..6 {
             let (p, inputs) = craft_of(kind, 10 * kind as u64 + seed);
             test((&p, &inputs, TOLERANCES[seed as usize % 3]), kind, seed);
