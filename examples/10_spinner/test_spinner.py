@@ -8,25 +8,31 @@ from hubslosh import FmuWarning
 
 
 def test_the_nutation_pole_equals_that_of_an_independent_formulation(spacecraft: str) -> None:
-    """Nine digits are known of the prolate craft's."""
+    """For the prolate craft nine digits of the pole are known."""
     assert nutation_pole(spacecraft, PROLATE) == pytest.approx(0.002551418 + 0.468308812j, abs=1e-9)
     assert nutation_pole(spacecraft, OBLATE).real == pytest.approx(-0.0023893, abs=5e-8)
 
 
 @pytest.mark.parametrize("j_zz", [PROLATE, OBLATE])
 def test_nutation_grows_or_decays_as_the_pole_says(spacecraft: str, j_zz: float) -> None:
-    """Within 2 %: the angle wobbles in a craft without symmetry, and is not small."""
+    """The growth agrees within 2 %.
+
+    The nutation angle of a craft without symmetry varies during a turn, and is not small.
+    """
     found = mean_growth(nutation(spacecraft, j_zz, 500))
     assert found == pytest.approx(nutation_pole(spacecraft, j_zz).real, rel=0.02)
 
 
 def test_without_slosh_nutation_stays(spacecraft: str) -> None:
-    """A hundredth of what slosh does, within the wobble."""
+    """The nutation angle changes by at most a hundredth of the change with slosh."""
     assert abs(mean_growth(nutation(spacecraft, PROLATE, 500, slosh=False))) < 2.5e-5
 
 
 def test_the_prolate_craft_ends_in_a_flat_spin(spacecraft: str) -> None:
-    """Energy is least about the axis of greatest inertia: z is across it, and bobs point aside."""
+    """For a given angular momentum the energy is least about the axis of greatest inertia.
+
+    In the end z is across this axis, and the slosh masses point outwards.
+    """
     with pytest.warns(FmuWarning, match="leaves its range"):
         angle = np.degrees(nutation(spacecraft, PROLATE, 4000)["angle"].iloc[-1])
     assert angle == pytest.approx(90, abs=2)

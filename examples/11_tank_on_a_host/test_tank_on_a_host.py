@@ -20,20 +20,24 @@ def both(spacecraft: str) -> Path | None:
 
 
 def test_the_lumped_coupling_converges_with_the_step(both: Path | None) -> None:
-    """First order, on a tumbling host that is lighter than its tank."""
+    """The error is proportional to the step, on a tumbling host that is lighter than its tank."""
     reference = simulate_whole(both)
     errors = [error(coupled(both, step), reference) for step in STEPS[:3]]
     assert errors == pytest.approx([4.5e-4, 2.2e-4, 1.1e-4], rel=0.03)
 
 
 def test_coupling_by_the_total_wrench_diverges(both: Path | None) -> None:
-    """Within a second at 20 ms; the FMU says that the bobs swing over."""
+    """With steps of 20 ms it diverges within a second; the FMU reports that a pendulum turned over.
+    """
     with pytest.warns(FmuWarning, match="leaves its range"):
         assert coupled(both, STEPS[1], wrench=True)["time"].iloc[-1] < 1.0
 
 
 def test_the_ssp_is_valid_and_has_both_fmus(both: Path | None, tmp_path: Path) -> None:
-    """Validates against fmpy's copy of the schema; nine signals there, six back."""
+    """The file is valid by fmpy's copy of the schema.
+
+    Nine signals go from the host to the tank and six back.
+    """
     archive = tmp_path / "TankOnHost.ssp"
     pack_ssp(both, archive, 0.02)
     system = read_ssd(str(archive), validate=True).system

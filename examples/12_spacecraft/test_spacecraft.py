@@ -11,13 +11,16 @@ import hubslosh
 
 
 def test_the_script_is_as_short_as_its_page_says() -> None:
-    """From the drawing to the pictures."""
+    """The script goes from the drawing of the tank to the pictures of the slew."""
     script = Path(__file__).with_name("spacecraft.py").read_text()
     assert len(script.splitlines()) <= 45
 
 
 def test_margins_name_the_slosh_that_simulation_shows(spacecraft: str) -> None:
-    """Stable with 0.15 s; with 2 s the loop swings near slosh, by poles and by simulation."""
+    """With a delay of 0.15 s the loop is stable; with 2 s it is unstable near slosh.
+
+    Poles and simulation agree.
+    """
     mine = replace(loop, model=spacecraft)
     found = hubslosh.margins(mine)
     near = found.crossings[found.crossings["near"].str.contains("slosh of tank 1, slosh of tank 2")]
@@ -40,7 +43,7 @@ def test_margins_name_the_slosh_that_simulation_shows(spacecraft: str) -> None:
 
 
 def test_random_runs_have_the_numbers_of_the_readme(spacecraft: str) -> None:
-    """The nominal slew, and six of the 200."""
+    """The test repeats the nominal slew and six of the 200 random runs."""
     mine = replace(loop, model=spacecraft)
     nominal = after_slew({}, mine)
     assert nominal["error (deg)"] == pytest.approx(0.151, rel=0.03)
@@ -52,7 +55,10 @@ def test_random_runs_have_the_numbers_of_the_readme(spacecraft: str) -> None:
 
 
 def test_the_tank_is_a_half_open_sphere_by_its_closed_form() -> None:
-    """A sphere's hinges are at its centre; at half fill the first root is 1.5602 (SP-106, 2.15)."""
+    """In a sphere all hinges are at the centre.
+
+    At half fill the first eigenvalue is 1.5602 (NASA SP-106, 2.15).
+    """
     assert full.modes["hinge"][0] == pytest.approx(0.35, abs=1e-9)
     half = hubslosh.tank(TANK, fill="50%", modes=1, gravity=1.0)
     expected = np.sqrt(1.560157 / 0.35) / (2 * np.pi)

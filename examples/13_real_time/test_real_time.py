@@ -5,7 +5,7 @@ from real_time import ANGLE, PERIOD, lines, run
 
 
 def test_every_cycle_is_made_once_and_its_lateness_counted(fmu: str) -> None:
-    """300 cycles, a third of a second."""
+    """The run has 300 cycles within a third of a second."""
     table = run(fmu, 300)
     assert np.allclose(table["time"], PERIOD * np.arange(1, 301), rtol=0, atol=1e-12)
     assert (table["start"] >= 0).all() and (table["work"] > 0).all()
@@ -16,7 +16,7 @@ def test_every_cycle_is_made_once_and_its_lateness_counted(fmu: str) -> None:
 
 
 def test_a_controller_in_another_process_turns_the_hub(fmu: str) -> None:
-    """A torque answers a state that is some cycles old; the hub goes towards the wanted angle."""
+    """The torque depends on a state some cycles old; the hub approaches the commanded angle."""
     table = run(fmu, 1000)
     answered = table["age"][table["age"] >= 0]
     assert len(answered) > 0 and (answered >= 1).all()

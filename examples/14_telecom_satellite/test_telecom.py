@@ -24,7 +24,7 @@ pytestmark = pytest.mark.filterwarnings("ignore:(tank|damping).*outside the meas
 
 
 def test_mass_properties_and_margins_equal_a_hand_calculation(spacecraft: str) -> None:
-    """1e-12 of mass, centre of mass and inertia; 1e-9 of every crossing and margin."""
+    """Mass, centre of mass and inertia agree to 1e-12, crossings and margins to 1e-9."""
     craft = replace(telecom.craft, model=spacecraft)
     for fill in telecom.FILLS:
         tanks = {
@@ -72,7 +72,7 @@ def test_mass_properties_and_margins_equal_a_hand_calculation(spacecraft: str) -
 
 
 def test_the_numbers_of_the_readme() -> None:
-    """The craft in ten lines at most; what it weighs at 60 %."""
+    """The craft is defined in ten lines at most; its mass at 60 % is the README's."""
     assert len(str(telecom.craft).splitlines()) <= 10
     at = telecom.craft.mass_properties("60%")
     assert at.mass == pytest.approx(2503.1, abs=0.1)
@@ -82,7 +82,7 @@ def test_the_numbers_of_the_readme() -> None:
 def test_the_worst_case_of_the_review_is_confirmed_by_simulation(
     spacecraft: str, monkeypatch
 ) -> None:
-    """At three fills: slosh is stabilised by gain, the simulated margin differs by 1 % at most."""
+    """At three fills slosh is gain-stabilised, and the simulated margin agrees to 1 %."""
     monkeypatch.setattr(telecom, "craft", replace(telecom.craft, model=spacecraft))
     found = design_review.review(["10%", "50%", "90%"], draws=6)
     assert found.points["stable"].all()
@@ -96,7 +96,7 @@ def test_the_worst_case_of_the_review_is_confirmed_by_simulation(
 def test_a_certificate_is_checked_by_numpy_and_a_changed_one_is_refused(
     spacecraft: str, tmp_path: Path
 ) -> None:
-    """The size, a missing interval, another loop, and scalings that prove nothing."""
+    """Changed are the size, the list of intervals, the loop, or the scalings that prove it."""
     found = certificate.certificate("40%", replace(telecom.craft, model=spacecraft))
     # µ is between both
     assert found.size == pytest.approx(1.81, rel=0.01) and found.gap < 1.0401

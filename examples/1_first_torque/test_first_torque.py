@@ -11,7 +11,7 @@ from first_torque import run
 def test_the_pulse_gives_the_numbers_of_readme(
     fmu: str, model: str, rate: float, angle: float, stopped: float
 ) -> None:
-    """To the digits that are there."""
+    """The simulation agrees with every digit that the README gives."""
     table = run(fmu, model)
     assert round(table["omega"].max(), 4) == rate
     assert round(table["slosh_angle"].abs().max(), 4) == angle
@@ -19,7 +19,10 @@ def test_the_pulse_gives_the_numbers_of_readme(
 
 
 def test_the_liquid_leans_back_under_constant_torque(fmu: str) -> None:
-    """Quasi-static: tan(angle) = -r omega_dot/g, the mean over two periods, to 5 %."""
+    """The mean slosh angle over two periods is quasi-static to 5 %.
+
+    It satisfies tan(angle) = -r omega_dot/g.
+    """
     table = run(fmu, "spherical").query("1 <= time < 1.83")
     lean = -0.225 * table["omega_dot"].mean() / 9.81
     assert table["slosh_angle"].mean() == pytest.approx(lean, rel=0.05)

@@ -34,7 +34,10 @@ def runs(fmu: str) -> dict[tuple[str, str], pd.DataFrame]:
 
 @pytest.mark.parametrize("name", PROFILES)
 def test_a_profile_is_the_integral_of_its_acceleration(name: str) -> None:
-    """Trapezoids of 0.1 ms: 1e-7 in rate and angle but where the acceleration jumps (5e-5)."""
+    """Sums over steps of 0.1 ms agree with rate and angle to 1e-7.
+
+    Where the acceleration jumps they agree to 5e-5.
+    """
     time = np.linspace(0, 6, 60001)
     angle, rate, acceleration = np.array([PROFILES[name](t) for t in time]).T
     step = time[1]
@@ -45,7 +48,7 @@ def test_a_profile_is_the_integral_of_its_acceleration(name: str) -> None:
 
 
 def test_settling_times_and_errors_have_the_numbers_of_the_readme(runs: dict) -> None:
-    """The smoothed slew takes 1.2 s longer and is settled 7 s earlier."""
+    """The smoothed slew takes 1.2 s longer but has settled 7 s earlier."""
     settled = {key: round(settling_time(run, key[0]), 1) for key, run in runs.items()}
     assert settled == SETTLED
     errors = {

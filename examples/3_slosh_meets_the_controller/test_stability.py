@@ -33,7 +33,7 @@ def full(fmu: str) -> Bench:
 def test_the_simulation_turns_unstable_where_the_sampled_linear_model_does(
     fmu: str, full: Bench, cycle: Cycle, sloshing: float, rigid: float
 ) -> None:
-    """Within 0.5 %; the numbers with three digits are README's."""
+    """The limits agree within 0.5 %; numbers with three digits are the README's."""
     predicted = full.first_unstable(cycle)
     assert round(predicted, 3) == sloshing
     assert round(Bench(fmu, FROZEN).first_unstable(cycle), 3) == rigid
@@ -42,7 +42,10 @@ def test_the_simulation_turns_unstable_where_the_sampled_linear_model_does(
 
 @pytest.mark.parametrize("name", DESIGNS)
 def test_a_design_simulated_grows_or_decays_as_its_margin_says(full: Bench, name: str) -> None:
-    """Filters included; a rate of 0.002/s is a tenth of what the slowest of the designs has."""
+    """The designs include filters.
+
+    A motion counts as growing or decaying above 0.002/s, a tenth of the slowest design's rate.
+    """
     cycle, bandwidth, filter = DESIGNS[name]
     stop = min(40.0, 1200 * cycle.period)
     rate = growth(full.run(cycle, bandwidth, stop, filter, outputs=["omega"]))
@@ -51,7 +54,10 @@ def test_a_design_simulated_grows_or_decays_as_its_margin_says(full: Bench, name
 
 
 def test_a_short_delay_damps_slosh_and_a_notch_removes_this_damping(fmu: str, full: Bench) -> None:
-    """Phase stabilisation: 0.3 % of its own, 4.4 % under PD, 0.7 % with the notch."""
+    """The damping ratio is 0.3 % without control and 4.4 % under PD control.
+
+    A notch reduces it to 0.7 %.
+    """
     open_loop = full.linear.poles
     slosh = open_loop[open_loop.imag > 0][0]
     assert -slosh.real / abs(slosh) == pytest.approx(0.0034, abs=5e-5)
@@ -64,7 +70,10 @@ def test_a_short_delay_damps_slosh_and_a_notch_removes_this_damping(fmu: str, fu
 
 
 def test_a_notch_above_the_slosh_frequency_is_worse_than_none(fmu: str, full: Bench) -> None:
-    """At the slosh frequency it turns -3.8 dB into 11.5 dB, but not when the tank is drained."""
+    """A notch at the slosh frequency turns a gain margin of -3.8 dB into 11.5 dB.
+
+    When the tank drains, the slosh frequency moves away and the notch no longer helps.
+    """
     drained = Bench(fmu, DRAINED)
     drained.inertia = full.inertia
     pd = "10 Hz, PD 0.25 Hz"
@@ -82,7 +91,7 @@ def test_a_notch_above_the_slosh_frequency_is_worse_than_none(fmu: str, full: Be
 def test_dry_friction_masks_the_instability_up_to_the_predicted_amplitude(
     full: Bench,
 ) -> None:
-    """The describing function's amplitude within 10 %; it comes within 1 %."""
+    """The simulated amplitude is within 10 % of the describing function's."""
     predicted = predicted_rate(full, 0.25, "linear", dry=True)
     assert threshold(full, 0.25) == pytest.approx(predicted, rel=0.02)
 
@@ -90,9 +99,10 @@ def test_dry_friction_masks_the_instability_up_to_the_predicted_amplitude(
 def test_spherical_pendulums_reach_the_predicted_amplitude_or_rotary_slosh(
     full: Bench,
 ) -> None:
-    """In the plane within 10 %; above some 0.172 Hz the liquid leaves the plane.
+    """Motion in the plane has the predicted amplitude within 10 %.
 
-    900 s leave 1 % of the transient (at 0.17 Hz it decays with 200 s).
+    Above about 0.172 Hz the liquid leaves the plane. After 900 s 1 % of the transient is left (at
+    0.17 Hz its time constant is 200 s).
     """
     angle, radial, rate = settled(full, 0.17, 900)
     assert radial < 0.01 * angle

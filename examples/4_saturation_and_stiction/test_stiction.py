@@ -6,7 +6,7 @@ from stiction import saturation, summary
 
 
 def test_the_wheel_gives_its_torque_until_it_has_no_more_speed(fmu: str) -> None:
-    """0.26 N·m; 0.77 rad/s is 1400 rpm of the rotor on hub and liquid."""
+    """The wheel gives at most 0.26 N·m, and its speed limits the rate of the hub to 0.77 rad/s."""
     runs = saturation(fmu)
     for name, torque, rate, late in (("any torque", 2.39, 1.44, 5.2), ("wheel", 0.26, 0.77, 6.4)):
         table = runs[name]
@@ -19,7 +19,7 @@ def test_the_wheel_gives_its_torque_until_it_has_no_more_speed(fmu: str) -> None
 
 
 def test_dry_friction_leaves_an_error_and_smoothed_friction_creeps(fmu: str) -> None:
-    """README's table, to its digits."""
+    """The simulation agrees with every digit of the README's table."""
     table = summary(fmu).round(4)
     errors = table.drop(columns="stuck (%)").to_numpy()
     assert np.abs(errors - EXPECTED).max() < 1.5e-4

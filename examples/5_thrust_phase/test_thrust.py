@@ -8,7 +8,7 @@ import hubslosh
 
 
 def test_the_craft_is_what_readme_says(fmu: str) -> None:
-    """Mass, frequencies, damping, Bond number, from the FMU."""
+    """Mass, frequencies, damping and Bond number are computed by the FMU."""
     names = ["tank.m_liq", "slosh.frequency[1]", "slosh.damping[1]", "tank.bond"]
     with hubslosh.Plant(fmu, CRAFT | {"g_axial": THRUST}) as plant:
         mass, frequency, damping, bond = plant.get(names)
@@ -26,7 +26,10 @@ def test_the_craft_is_what_readme_says(fmu: str) -> None:
 def test_the_linear_model_under_thrust_predicts_the_decay(
     fmu: str, name: str, error: float, rate: float
 ) -> None:
-    """To 3 %: in nonlinear pendulums of 5° at the start, from windows of six periods."""
+    """The decay of nonlinear pendulums that start at 5° agrees to 3 %.
+
+    It is measured in windows of six periods.
+    """
     predicted = -slosh_pole(fmu, BANDWIDTHS[name]).real
     assert predicted == pytest.approx(rate, rel=5e-3)
     table = run(fmu, BANDWIDTHS[name])

@@ -6,7 +6,10 @@ from monte_carlo import STOP, draws, one, study
 
 
 def test_dask_and_processes_give_the_results_of_single_runs(fmu: str) -> None:
-    """16 draws, 4 of them in processes, bit for bit; both outcomes of each question are there."""
+    """16 runs, 4 of them in other processes, have the same bits.
+
+    For each yes-or-no result both outcomes occur.
+    """
     with Client(
         processes=False, n_workers=1, threads_per_worker=1, dashboard_address=None
     ) as client:

@@ -23,7 +23,7 @@ def folder(request: pytest.FixtureRequest) -> Path:
 def test_fmpy_and_the_harness_give_one_answer(
     fmu: str, folder: Path, name: str, slopes: bool
 ) -> None:
-    """The promise is 1e-9; with the same calls it is the same bits."""
+    """The promised accuracy is 1e-9; with the same calls the bits are the same."""
     theirs = pd.read_csv(folder / f"loop_{name}.csv")
     assert len(theirs) == STEPS + 1 and list(theirs) == ["time", "tau", *RECORDED]
     assert theirs["omega"].abs().max() > 0.02
@@ -31,13 +31,16 @@ def test_fmpy_and_the_harness_give_one_answer(
 
 
 def test_input_slopes_change_the_loop(folder: Path) -> None:
-    """So a host that sets slopes can't be compared with one that does not: they differ by 20 %."""
+    """Results with and without slopes of the inputs differ by 20 %.
+
+    Therefore two hosts can be compared only if both set slopes or neither does.
+    """
     held, slopes = (pd.read_csv(folder / f"loop_{name}.csv") for name in ("held", "slopes"))
     assert difference(held, slopes) > 0.1
 
 
 def test_the_error_goes_with_the_square_of_a_fixed_step(fmu: str, folder: Path) -> None:
-    """README's errors; halving the step divides it by 3.5 at 10 ms, by 3.8 at 5 ms."""
+    """Halving a step of 10 ms divides the error by 3.5, halving 5 ms divides it by 3.8."""
     errors = []
     for step in (0.02, 0.01):
         rows, steps = fixed(fmu, folder, step)
@@ -47,7 +50,10 @@ def test_the_error_goes_with_the_square_of_a_fixed_step(fmu: str, folder: Path) 
 
 
 def test_a_master_that_repeats_steps_makes_half_the_steps(fmu: str, folder: Path) -> None:
-    """4,416 steps, two thirds of them rolled back or halves, at the error of 8,000 fixed ones."""
+    """It makes 4,416 steps with the error of 8,000 fixed steps.
+
+    Two thirds of its steps are rolled back or are halves.
+    """
     rows, steps = adaptive(fmu, folder, 1e-5)
     error = np.abs(rows[:, 1:] - exact(fmu, rows[:, 0])).max()
     assert error < 1.9e-4 and steps < 5000

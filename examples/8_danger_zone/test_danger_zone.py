@@ -14,26 +14,26 @@ GROWTH = {
 def test_poles_from_the_fmus_derivatives_equal_those_of_the_closed_form(
     spacecraft: str, z: float, expected: float
 ) -> None:
-    """Five digits are known; first order in the gains leaves 0.2 %."""
+    """The closed form is first order in the gains, which leaves 0.2 %; five digits are known."""
     craft = Craft(z)
     assert growth(spacecraft, craft) == pytest.approx(expected, rel=2e-5, abs=5e-8)
     assert craft.predicted_growth == pytest.approx(expected, rel=2.5e-3)
 
 
 def test_the_danger_zone_ends_at_the_closed_form(spacecraft: str) -> None:
-    """To 1 mm: the two ends move with the second order of the gains."""
+    """Both ends agree to 1 mm; they move with the square of the gains."""
     assert zone(spacecraft) == pytest.approx(predicted_zone(), abs=1e-3)
 
 
 @pytest.mark.parametrize("z", [-0.45, 0.5])
 def test_the_simulated_loop_grows_as_its_poles_say(spacecraft: str, z: float) -> None:
-    """The cycle of 10 ms delays by 5 ms: 0.3 % of the growth, as measured."""
+    """A cycle of 10 ms delays the torque by 5 ms, which changes the growth by 0.3 %."""
     found = simulated_growth(spacecraft, Craft(z))
     assert found == pytest.approx(growth(spacecraft, Craft(z)), rel=0.01)
 
 
 def test_the_required_damping_equals_the_prediction(spacecraft: str) -> None:
-    """5 % from the boundary the loop is stable or not."""
+    """With 5 % more damping the loop is stable, with 5 % less it is unstable."""
     needed = Craft(0.5).damping_needed
     assert growth(spacecraft, Craft(0.5, zeta=0.95 * needed)) > 0
     assert growth(spacecraft, Craft(0.5, zeta=1.05 * needed)) < 0

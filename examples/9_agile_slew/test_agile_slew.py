@@ -13,14 +13,18 @@ def after(run) -> float:
 
 
 def test_inertias_equal_those_of_all_liquid_and_of_the_rigid_part(spacecraft: str) -> None:
-    """Closed forms; the pendulums hang on the roll axis' side and take no part at first."""
+    """With frozen liquid the FMU has the inertia of the whole craft.
+
+    The observer's inertia is 17.5 kg·m² less, because the sloshing part does not follow a fast
+    turn.
+    """
     rigid = hubslosh.linearize(spacecraft, parameters(False), ["torque[1]"], ["omega[1]"])
     assert 1 / rigid.B[0, 0] == pytest.approx(RIGID, rel=1e-12)
     assert Observer(spacecraft, FREQUENCY).inertia == pytest.approx(RIGID - 17.5, rel=1e-12)
 
 
 def test_the_observer_compensates_the_slosh_torque(spacecraft: str) -> None:
-    """The noise of the gyro, the same each time, is a tenth of what is left."""
+    """A tenth of the remaining error is the gyro's noise, which is the same in each run."""
     rigid, sloshing = slew(spacecraft, slosh=False, stop=100), slew(spacecraft)
     observed = slew(spacecraft, observe=True, stop=100)
     assert after(rigid) < 3e-4
@@ -34,7 +38,10 @@ def test_the_observer_compensates_the_slosh_torque(spacecraft: str) -> None:
 
 @pytest.mark.parametrize("share", [0.9, 1.1])
 def test_a_mistuned_observer_still_helps(spacecraft: str, share: float) -> None:
-    """Thirty times better than none, where the image would wait six minutes."""
+    """The error is thirty times smaller than without observer.
+
+    Without it, a picture could be taken only six minutes later.
+    """
     run = slew(spacecraft, observe=True, frequency=share * FREQUENCY, stop=200)
     assert after(run) < 0.1315 / 30
     assert tranquillisation(run) < 150

@@ -124,7 +124,7 @@ def given(fmu: Path) -> SimpleNamespace:
 
 
 def test_wrong_arguments_are_reported_by_messages_of_the_package(given: SimpleNamespace) -> None:
-    """Every call of the list, each a mistake that somebody makes."""
+    """Each call in the list `WRONG` makes one mistake and raises `FmuError`, never NumPy's."""
     for call in WRONG:
         with pytest.raises(FmuError) as error:
             call(given)
@@ -134,7 +134,7 @@ def test_wrong_arguments_are_reported_by_messages_of_the_package(given: SimpleNa
 def test_a_single_name_and_a_file_of_parameters_are_accepted(
     given: SimpleNamespace, tmp_path: Path
 ) -> None:
-    """Lists of names and mappings give bit-identical results."""
+    """One name gives the same bits as a list with this name, a file the same as a mapping."""
     file = tmp_path / "bench.toml"
     file.write_text('"friction.model" = "viscous"\n"hub.I" = 0.5\n')
     values = VISCOUS | {"hub.I": 0.5}
@@ -149,7 +149,7 @@ def test_a_single_name_and_a_file_of_parameters_are_accepted(
 
 
 def test_masked_arrays_are_refused(given: SimpleNamespace) -> None:
-    """NumPy would take what lies under the mask."""
+    """Otherwise NumPy would silently use the values under the mask."""
     one = np.ma.array([1.0, 99.0, 3.0], mask=[False, True, False])
     matrix = np.ma.array(np.diag([3.0, 3.0, 3.0]), mask=np.eye(3) > 0)
     calls = [

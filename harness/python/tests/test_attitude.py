@@ -27,7 +27,10 @@ def matrix(q: np.ndarray) -> np.ndarray:
 
 
 def test_angles_equal_those_of_three_turns() -> None:
-    """Yaw, pitch, roll by matrices; there and back; rows of them."""
+    """The quaternion of roll, pitch and yaw turns vectors as the product of three matrices does.
+
+    `angles` returns the three angles from the quaternion again, also for many rows at once.
+    """
     random = np.random.default_rng(1)
     roll, yaw = random.uniform(-np.pi, np.pi, (2, 20))
     pitch = random.uniform(-1.5, 1.5, 20)
@@ -42,7 +45,10 @@ def test_angles_equal_those_of_three_turns() -> None:
 
 
 def test_the_attitude_error_is_the_remaining_rotation_in_body_axes() -> None:
-    """From q by the rotation vector to the wanted attitude; the short way."""
+    """An attitude turned by its error is the wanted attitude.
+
+    The error is a rotation vector in body axes, and takes the shorter way (at most π).
+    """
     random = np.random.default_rng(2)
     q, wanted = random.standard_normal((2, 20, 4))
     left = attitude.error(q, wanted)
@@ -59,9 +65,10 @@ def test_the_attitude_error_is_the_remaining_rotation_in_body_axes() -> None:
 
 
 def test_a_rigid_craft_follows_the_slew_under_its_torque(fmu: Path) -> None:
-    """Spacecraft.fmu without liquid, about no principal axis; torque on lines 0.05 s apart.
+    """Spacecraft.fmu without liquid is driven by the slew's torque, about no principal axis.
 
-    Chords of a sine with a period of 20 s leave (0.05 · 2π/20)²/8 = 3e-5 of the torque.
+    The torque is linear between rows 0.05 s apart. For a sine with a period of 20 s such lines
+    differ from the curve by (0.05 · 2π/20)²/8 = 3e-5 of the torque.
     """
     J = np.array([[100.0, -5, 2], [-5, 120, 0], [2, 0, 90]])
     slew = attitude.slew(0.5, 20, (1, 1, 0.5), inertia=J, start=1, step=0.05, stop=25)
@@ -80,7 +87,7 @@ def test_a_rigid_craft_follows_the_slew_under_its_torque(fmu: Path) -> None:
 
 
 def test_invalid_attitudes_are_refused() -> None:
-    """Sizes, zeros, tables without a quaternion."""
+    """Arrays of a wrong size, zero vectors and tables without a quaternion raise an error."""
     with pytest.raises(FmuError, match="four numbers"):
         attitude.angles([1, 0, 0])
     with pytest.raises(FmuError, match="not 0"):

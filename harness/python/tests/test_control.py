@@ -81,7 +81,11 @@ def law_of(linear: Linear) -> Callable[[int, float, list[float]], list[float]]:
 def test_the_compiled_loop_has_the_bits_of_the_loop_in_python(
     spacecraft: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Three commands, six measurements, a filter's state, a quaternion, a reference, substeps."""
+    """A linear controller runs in compiled code; the same controller as a Python function agrees.
+
+    It has three commands, six measurements, a filter with a state, a quaternion, a reference and
+    substeps.
+    """
     loop = three_axes(spacecraft)
     slew = attitude.slew(np.radians(30), 20, (1, 0.3, 0), inertia=np.diag([300.0, 170.0, 260.0]))
     external = pd.DataFrame({"time": [0.0, 15.0, 40.0], "force[1]": [0.0, 2.0, 0.0]})
@@ -100,7 +104,10 @@ def test_the_compiled_loop_has_the_bits_of_the_loop_in_python(
 
 
 def test_a_matrix_of_gains_is_the_function_that_it_stands_for(fmu: Path) -> None:
-    """The same bits: sums from left to right in both; a filter by its difference equation."""
+    """A matrix of gains gives the same bits as a function that adds the terms from left to right.
+
+    A filter gives the same as its difference equation.
+    """
     start = VISCOUS | {"init.slosh_angle": (5, "deg")}
     by_matrix = closed_loop(GAINS, PERIOD, 20, fmu, start, outputs=OUTPUTS)
 
@@ -130,7 +137,7 @@ def test_a_matrix_of_gains_is_the_function_that_it_stands_for(fmu: Path) -> None
 
 
 def test_a_continuous_controller_is_discretised_by_tustins_rule(fmu: Path) -> None:
-    """Compares with python-control, for a transfer function and a state space."""
+    """The discrete controller equals python-control's, for transfer function and state space."""
     lead = control.tf([0.6, 0.4], [0.05, 1])
     start = VISCOUS | {"init.slosh_angle": (5, "deg")}
     runs = [
@@ -149,9 +156,9 @@ def test_a_continuous_controller_is_discretised_by_tustins_rule(fmu: Path) -> No
 
 @pytest.mark.parametrize("delay", [0.037, 0.1, 0.25])
 def test_a_delay_of_any_length_is_exact_in_model_and_simulation(fmu: Path, delay: float) -> None:
-    """100 cycles of a torque of its own each, with the FMU's linear slosh model.
+    """Over 100 cycles with different torques the discrete model and the FMU agree.
 
-    Its tolerance is 1e-9 in this run.
+    The FMU uses its linear slosh model and a tolerance of 1e-9.
     """
     model = linearize(fmu, VISCOUS, ["tau_cmd"], OUTPUTS).sampled(PERIOD, delay=delay)
     commands = 0.05 * np.sin(np.arange(100.0) ** 1.3)
@@ -175,7 +182,10 @@ def test_a_delay_of_any_length_is_exact_in_model_and_simulation(fmu: Path, delay
 
 
 def test_the_simulated_loop_becomes_unstable_at_the_delay_margin(fmu: Path) -> None:
-    """A tenth less decays, a tenth more grows; the margin is not a whole number of cycles."""
+    """With a tenth less delay than the margin the motion decays, with a tenth more it grows.
+
+    The margin is not a whole number of cycles.
+    """
     start = VISCOUS | {"init.slosh_angle": 0.001}
     found = margins(Loop(GAINS, PERIOD, fmu, VISCOUS, delay=0.04))
     assert found.stable and 0.5 * PERIOD < found.delay_margin < 0.8 * PERIOD
@@ -190,7 +200,10 @@ def test_the_simulated_loop_becomes_unstable_at_the_delay_margin(fmu: Path) -> N
 
 
 def test_margins_of_the_spacecraft_name_slosh(spacecraft: Path) -> None:
-    """About z the tanks go back and forth on their arm; the poles agree with the simulation."""
+    """The crossings near slosh frequencies name both tanks and belong to the torque about z.
+
+    About z the liquid moves because the tanks are off the axis.
+    """
     found = margins(three_axes(spacecraft))
     near = found.crossings[found.crossings["near"] != ""]
     assert found.stable and set(near["loop"]) == {"torque[3]"}
@@ -199,7 +212,7 @@ def test_margins_of_the_spacecraft_name_slosh(spacecraft: Path) -> None:
 
 
 def test_errors_of_a_loop_are_reported_in_words(fmu: Path, spacecraft: Path) -> None:
-    """Sizes, kinds, periods, references; never a TypeError."""
+    """A wrong size, type, period or reference raises `FmuError` and never a `TypeError`."""
     loop = (GAINS, PERIOD, 1.0, fmu, VISCOUS)
     wrong = {
         "2 \\(theta, omega\\) and 1": lambda: closed_loop([[1.0]], *loop[1:]),
@@ -253,9 +266,11 @@ def test_errors_of_a_loop_are_reported_in_words(fmu: Path, spacecraft: Path) -> 
 
 @pytest.mark.parametrize("delay", [0.0, 0.06, 0.1])
 def test_the_closed_loop_gain_is_the_simulated_loop(fmu: Path, delay: float) -> None:
-    """Also with a measurement that follows the torque at once: the acceleration, read before it.
+    """The closed loop of `Loop.gain` predicts angle and rate of the simulation over 100 cycles.
 
-    100 cycles from a push of the liquid; the FMU's linear model at a tolerance of 1e-9.
+    One measurement, the acceleration, depends directly on the torque and is read before the new
+    torque acts. The motion begins with a displaced liquid; the FMU uses its linear slosh model and
+    a tolerance of 1e-9.
     """
     gains = np.array([[0.4, 0.6, 0.05]])  # of angle, rate and acceleration
     loop = Loop(gains, PERIOD, fmu, VISCOUS, ["theta", "omega", "omega_dot"], delay=delay)

@@ -45,7 +45,7 @@ def shifted(mass: float, arm: np.ndarray) -> np.ndarray:
 
 
 def test_fmpy_with_the_parameters_of_a_craft_is_simulate_with_them(craft: Craft) -> None:
-    """Bit for bit: nothing but the parameters is set in either."""
+    """FMPy gives the same bits as `simulate`: `Craft.parameters` has all that a host must set."""
     values = craft.parameters("50%")
     names = [f"{name}[{i}]" for name in ("omega", "velocity", "slosh_torque") for i in (1, 2, 3)]
     steps = {"stop_time": 5.0, "output_interval": 0.05, "step_size": 0.05}
@@ -58,7 +58,7 @@ def test_fmpy_with_the_parameters_of_a_craft_is_simulate_with_them(craft: Craft)
 
 
 def test_rigid_mass_properties_are_sums_by_hand(craft: Craft) -> None:
-    """Half a sphere and half a cylinder by their formulas, turned and shifted by hand."""
+    """Liquid of half a sphere and half a cylinder, by textbook formulas, is turned and shifted."""
     found = craft.mass_properties("50%", "rigid")
     R, r, h = 0.5, 0.4, 0.55
     ox = 1440 * 2 / 3 * np.pi * R**3
@@ -87,7 +87,7 @@ def test_rigid_mass_properties_are_sums_by_hand(craft: Craft) -> None:
 
 @pytest.mark.parametrize("fill", ["3%", {"ox": (120.0, "kg"), "fuel": 0.7}, ("100%", 0)])
 def test_effective_mass_properties_equal_the_fmus(craft: Craft, fill) -> None:
-    """Sloshing and rigid liquid alike, at rest."""
+    """Mass, centre of mass and inertia equal the FMU's at rest, with sloshing and rigid liquid."""
     mine = craft.mass_properties(fill)
     shift = craft.trim(fill).shift
     for rigid in (False, True):
@@ -102,7 +102,7 @@ def test_effective_mass_properties_equal_the_fmus(craft: Craft, fill) -> None:
 
 
 def test_loop_and_linear_model_equal_those_of_explicit_parameters(craft: Craft) -> None:
-    """Margins and matrices equal those of the same numbers, put together from `tank`."""
+    """Margins and matrices equal a calculation with parameters put together by hand from `tank`."""
     fill, gains = "60%", np.hstack([20 * np.eye(3), 300 * np.eye(3)])
     mass = craft.mass_properties(fill).mass
     hand = {"craft.mass": 1400.0, "tanks": 2, "force[3]": 400.0}
@@ -136,9 +136,10 @@ def test_loop_and_linear_model_equal_those_of_explicit_parameters(craft: Craft) 
 
 
 def test_draining_tanks_lose_the_mass_that_flows(craft: Craft) -> None:
-    """The sphere's table goes into the FMU, with damping and third order of each fill.
+    """The FMU receives a table over the fill with damping and third-order coefficients.
 
-    Between 56 and 71 % the coefficients have poles.
+    In 10 s with 2 kg/s the mass falls by 20 kg. Coefficients of fills between 56 and 71 % are not
+    used, because the formulas have poles there.
     """
     on_axis = replace(craft.tanks["ox"], position=(0, 0, -0.3), modes=1, nu=3e-6)
     craft = replace(craft, center_of_mass=(0, 0, 1.05), gravity=0.25, tanks={"ox": on_axis})
@@ -167,7 +168,10 @@ def test_draining_tanks_lose_the_mass_that_flows(craft: Craft) -> None:
 
 
 def test_detached_liquid_travels_as_in_closed_forms(craft: Craft) -> None:
-    """In a sphere twice the distance of the centres; in a cylinder the gas's height."""
+    """In a sphere it travels twice the distance between the centres of sphere and liquid.
+
+    In a cylinder it travels the height of the gas.
+    """
     ways = craft.travel({"ox": "50%", "fuel": "25%"})
     assert ways["ox"] == pytest.approx(2 * 3 / 8 * 0.5, rel=1e-8)
     assert ways["fuel"] == pytest.approx(0.75 * 1.1, rel=1e-8)
@@ -181,7 +185,7 @@ def test_detached_liquid_travels_as_in_closed_forms(craft: Craft) -> None:
 def test_the_viewer_draws_a_loop_with_the_craft_s_columns(
     craft: Craft, tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:
-    """With the tanks' own contours."""
+    """The viewer draws the tanks by their own contours."""
     loop = craft.loop(np.hstack([20 * np.eye(3), 300 * np.eye(3)]), 0.1, "60%")
     reference = attitude.slew(0.02, 1.0, axis=(0, 0, 1))
     run = loop.simulate(2, reference=reference, outputs=craft.columns("60%"))
@@ -191,7 +195,7 @@ def test_the_viewer_draws_a_loop_with_the_craft_s_columns(
 
 
 def test_all_errors_of_a_craft_are_reported_at_once(craft: Craft) -> None:
-    """At once where it can; a fill where it is asked for."""
+    """One message lists all wrong fields; a wrong fill is reported by the call that takes it."""
     bad = MountedTank(SPHERE, (0, 0), axis=(0, 0, 0), modes=4)
     with pytest.raises(FmuError) as error:
         Craft(-1, [[1, 0, 0], [0, 1, 0], [0, 0, 3]], tanks={"a": bad, "b": SPHERE}, thrust="x")
@@ -213,7 +217,10 @@ def test_all_errors_of_a_craft_are_reported_at_once(craft: Craft) -> None:
 
 
 def test_many_fills_at_once_are_solved_as_single_fills(craft: Craft) -> None:
-    """On all cores in one call, bit for bit; also after a copy to another process."""
+    """One call solves the fills on all cores and gives the same bits as one call for each.
+
+    This also holds after the craft was copied to another process.
+    """
     fills = ["20%", ("35%", 0.4), {"ox": (120.0, "kg"), "fuel": 0}, "100%"]
     apart = replace(craft)
     craft.solve(fills)
@@ -233,7 +240,7 @@ def test_many_fills_at_once_are_solved_as_single_fills(craft: Craft) -> None:
 
 
 def test_ctrl_c_ends_the_calculation_of_tanks() -> None:
-    """Within a second, of what takes minutes."""
+    """An interrupt ends a calculation of several minutes within a second."""
     # a process in the background of a shell ignores the signal
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     timer = threading.Timer(0.5, lambda: signal.raise_signal(signal.SIGINT))

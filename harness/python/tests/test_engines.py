@@ -23,7 +23,10 @@ def craft(fmu: Path) -> Craft:
 
 
 def test_an_engine_along_the_line_of_action_is_the_thrust(craft: Craft) -> None:
-    """At O itself, further along its line, split in two with one resultant: the same craft."""
+    """Engines with the resultant of the field `thrust` give the same parameters and margins.
+
+    The engine acts at O, or elsewhere on the thrust's line, or is split into two.
+    """
     plain = hubslosh.margins(craft.loop(GAINS, 0.05, "50%")).crossings
     for engines in (
         {"main": Engine((0, 0, 0), (0, 0, 2), 400)},
@@ -53,7 +56,7 @@ def test_an_engine_along_the_line_of_action_is_the_thrust(craft: Craft) -> None:
 
 
 def test_canted_engines_leave_a_torque_about_their_line_of_action(craft: Craft) -> None:
-    """Four engines canted by 10° turn the craft about z, by the moment over the inertia."""
+    """Four engines canted by 10° accelerate the craft about z by their moment over its inertia."""
     cant, r = np.radians(10), 0.6
     engines = {}
     for k in range(4):
@@ -69,7 +72,10 @@ def test_canted_engines_leave_a_torque_about_their_line_of_action(craft: Craft) 
 
 
 def test_pulses_give_their_impulse_whatever_the_cycle(craft: Craft) -> None:
-    """A rigid craft: angular momentum about its centre, and linear momentum, by r × F dt."""
+    """A rigid craft gains the angular and linear momentum of the pulses, whatever the cycle is.
+
+    Angular momentum about the centre of mass is compared with the integral of r × F.
+    """
     engines = {
         "a": Engine((0.7, 0.2, 0.4), (0, 0.3, 1), 22.0, burns=False),
         "b": Engine((-0.5, 0.6, 0.1), (1, 0, 0), 10.0, burns=False),
@@ -96,7 +102,7 @@ def test_pulses_give_their_impulse_whatever_the_cycle(craft: Craft) -> None:
 
 
 def test_wrong_engines_and_pulses_are_named(craft: Craft) -> None:
-    """All of them at once, with what is allowed."""
+    """One message lists every wrong engine and pulse, with the allowed values."""
     with pytest.raises(FmuError, match=r"engine a: direction must not be zero; engine a: thrust"):
         replace(craft, engines={"a": Engine((0, 0, 0), (0, 0, 0), -1)})
     with pytest.raises(FmuError, match="engine a: is not an Engine: 5"):

@@ -15,7 +15,7 @@ REQUIREMENTS = sorted(Path(environment.__file__).parent.glob("requirements*.in")
 
 @pytest.mark.long
 def test_simultaneous_requests_for_one_environment_get_a_working_one(tmp_path: Path) -> None:
-    """One process makes it, the others wait."""
+    """One process makes the environment while the other processes wait for it."""
     requirements = tmp_path / "requirements.txt"
     requirements.write_text("# nothing\n")
     command = [sys.executable, environment.__file__, tmp_path / "made", requirements]
@@ -32,7 +32,7 @@ def test_simultaneous_requests_for_one_environment_get_a_working_one(tmp_path: P
 
 @pytest.mark.long
 def test_a_package_without_a_hash_is_refused(tmp_path: Path) -> None:
-    """A wheel that is there, and nothing else wrong with it."""
+    """The wheel exists and has no other fault, so that only the missing hash can be the reason."""
     wheel = tmp_path / "thing-1-py3-none-any.whl"
     wheel.touch()
     requirements = tmp_path / "requirements.txt"
@@ -45,7 +45,7 @@ def test_a_package_without_a_hash_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("asked", REQUIREMENTS, ids=lambda path: path.stem)
 def test_every_package_has_a_hash_and_those_asked_for_have_their_version(asked: Path) -> None:
-    """The .txt follows from the .in."""
+    """The .txt with versions and hashes agrees with the .in from which it was made."""
     locked = asked.with_suffix(".txt").read_text()
     pinned = re.findall(
         r"^([\w.-]+==[\w.]+)(?: ;[^\\]*)? \\\n    --hash=sha256:[0-9a-f]{64}", locked, re.M

@@ -34,7 +34,10 @@ def craft(request: pytest.FixtureRequest, fmu: Path) -> Craft:
 def test_the_fmu_starts_as_the_craft_in_a_tool_that_sets_nothing(
     craft: Craft, tmp_path: Path
 ) -> None:
-    """FMPy gives the bits of `Craft.simulate`; the FMU has the variables of two tanks only."""
+    """FMPy, which sets no parameter, gives the bits of `Craft.simulate`.
+
+    The FMU has the variables of two tanks only.
+    """
     files = craft.export(tmp_path / "craft", FILL, parameters=TURNING)
     run = craft.simulate(FILL, stop=20, step=0.0625, parameters=TURNING)
     names = [name for name in run.columns if name.startswith(("q[", "omega[", "tank["))]
@@ -55,7 +58,7 @@ def test_the_fmu_starts_as_the_craft_in_a_tool_that_sets_nothing(
 
 
 def test_the_system_has_the_craft_and_its_parameters(craft: Craft, tmp_path: Path) -> None:
-    """FMPy checks the XML against the schemas of SSP 1.0; the .ssv has every value."""
+    """The SSP file is valid by FMPy's copy of the schemas of SSP 1.0; its .ssv has every value."""
     files = craft.export(tmp_path, FILL, parameters=TURNING)
     system = read_ssd(str(files["ssp"])).system
     (component,) = system.elements
@@ -76,7 +79,7 @@ def test_the_system_has_the_craft_and_its_parameters(craft: Craft, tmp_path: Pat
 
 
 def test_the_mat_file_contains_the_linear_model(craft: Craft, tmp_path: Path) -> None:
-    """With parameters and inputs at the start."""
+    """The file also has the parameters and the inputs at the start."""
     found = loadmat(craft.export(tmp_path, FILL)["mat"], squeeze_me=True)
     model = craft.linearize(FILL)
     assert (found["A"] == model.A).all() and (found["C"] == model.C).all()
@@ -88,7 +91,10 @@ def test_the_mat_file_contains_the_linear_model(craft: Craft, tmp_path: Path) ->
 
 @pytest.mark.octave
 def test_octave_runs_the_script_up_to_simulink(craft: Craft, tmp_path: Path) -> None:
-    """It reads the matrices, and finds every port in the FMU."""
+    """Octave reads the matrices and finds each port of the script among the FMU's variables.
+
+    The rest of the script needs Simulink.
+    """
     craft.export(tmp_path, FILL)
     poles = "dlmwrite('poles', [real(eig(A)) imag(eig(A))], 'precision', '%.17g')"
     done = subprocess.run(
@@ -105,7 +111,7 @@ def test_octave_runs_the_script_up_to_simulink(craft: Craft, tmp_path: Path) -> 
 
 
 def test_a_folder_that_cannot_be_made_is_named(craft: Craft, tmp_path: Path) -> None:
-    """So is a wrong parameter, before anything is written."""
+    """A wrong parameter is also named, before any file is written."""
     (tmp_path / "file").write_text("")
     with pytest.raises(FmuError, match="file cannot be made"):
         craft.export(tmp_path / "file", FILL)

@@ -23,7 +23,10 @@ G = 9.81  # m/s²
 def test_between_its_points_a_fill_table_gives_the_parameters_of_the_tank(
     shape: str, request: pytest.FixtureRequest, fmu: Path, tmp_path: Path
 ) -> None:
-    """Frequency and mass within 0.5 %; forces and torques, which the hinge is in, within 2 %."""
+    """Interpolated frequency and mass are within 0.5 % of a calculation for that fill.
+
+    Forces and torques, which depend on the height of the hinge, are within 2 %.
+    """
     program, tank = option(request, "--hubslosh"), tmp_path / "tank.toml"
     tank.write_text(f"density = 1000\nshape = {{ {SHAPES[shape]} }}\n")
 

@@ -23,7 +23,7 @@ PACKAGE = Path(__file__).resolve().parents[1]
 
 
 def test_the_program_drives_the_fmu_and_writes_a_table(fmu: Path, tmp_path: Path) -> None:
-    """A torque history in, signals out, numbers to the last digit."""
+    """``python -m hubslosh`` reads a torque from a file and writes the bits of `drive`."""
     time = np.arange(101) * 0.02
     torque, answer = tmp_path / "torque.csv", tmp_path / "answer.csv"
     write_table(torque, {"time": time, "tau_cmd": 0.1 * np.sin(15 * time)})
@@ -55,26 +55,26 @@ def test_the_program_drives_the_fmu_and_writes_a_table(fmu: Path, tmp_path: Path
 def test_wrong_settings_raise_a_one_sentence_error(
     fmu: Path, settings: dict, sentence: str
 ) -> None:
-    """The FMU's own words where it has any."""
+    """The error contains the FMU's own message if the FMU has given one."""
     with pytest.raises(FmuError) as told:
         Plant(fmu, settings)
     assert sentence in str(told.value)
 
 
 def test_a_torque_that_is_not_a_number_is_refused(fmu: Path) -> None:
-    """NaN stops the run where it stands."""
+    """A NaN in the torque raises an error that names the input."""
     with pytest.raises(FmuError, match="tau_cmd"):
         drive(fmu, [0, 1, 2], [0, float("nan"), 0])
 
 
 def test_a_missing_fmu_raises_an_error_with_the_way_to_build_it(tmp_path: Path) -> None:
-    """With the command that makes it."""
+    """The message contains the command that makes the FMU."""
     with pytest.raises(FmuError, match="pack makes it"):
         Plant(tmp_path / "none.fmu")
 
 
 def test_a_file_of_parameters_equals_a_mapping(fmu: Path, tmp_path: Path) -> None:
-    """TOML and SSV, as ``hubslosh tank --parameters`` writes them: the same run to the last bit."""
+    """Files in TOML and SSV, as ``hubslosh tank --parameters`` writes them, give the same bits."""
     start = {"slosh.table.m_liq": 2.0, "slosh.table.mass[1]": 0.5, "slosh.table.length[1]": 0.05}
     start |= {"slosh.source": "table", "init.slosh_angle": 0.1}
     toml, ssv = tmp_path / "tank.toml", tmp_path / "tank.ssv"
@@ -100,7 +100,7 @@ def test_a_file_of_parameters_equals_a_mapping(fmu: Path, tmp_path: Path) -> Non
 
 
 def test_the_program_never_replaces_its_input(fmu: Path, tmp_path: Path) -> None:
-    """Under another name of the file either."""
+    """An output is refused if it is the input, also under another name of the same file."""
     torque, link = tmp_path / "torque.csv", tmp_path / "link.csv"
     torque.write_text("time,tau_cmd\n0,0\n1,0\n")
     link.symlink_to(torque)
@@ -113,7 +113,7 @@ def test_the_program_never_replaces_its_input(fmu: Path, tmp_path: Path) -> None
 
 
 def test_times_of_a_table_are_in_seconds(tmp_path: Path) -> None:
-    """Dates and durations by their type; integers of a Parquet file have no unit."""
+    """Dates and durations are converted by their type; integers in Parquet have no unit."""
     path = tmp_path / "a.parquet"
     ticks = np.arange(3) * 20
     for kind in ("duration[ms]", "timestamp[ms]", "time32[ms]"):

@@ -22,7 +22,7 @@ def total(parts: dict) -> float:
 
 
 def test_rows_of_the_thesis_do_not_add_up_to_its_total() -> None:
-    """They add to 0.344316; printed are 0.343 and 0.343268."""
+    """The parts in Rubaga's table add to 0.344316 kg·m²; the thesis prints 0.343 and 0.343268."""
     found = bottom_up({name: {"inertia": inertia} for name, inertia in TABLE.items()})
     assert found.attrs["parameters"]["hub.I"] == pytest.approx(0.344316, abs=1e-12)
     assert found["share"].idxmax() == "counterweights"
@@ -30,7 +30,10 @@ def test_rows_of_the_thesis_do_not_add_up_to_its_total() -> None:
 
 
 def test_the_inertia_of_every_shape_equals_the_sum_over_its_points() -> None:
-    """A body cut into n x n x n points: within 1/n^2 of the closed form, off the axis too."""
+    """The inertia of a body cut into n x n x n points is within 1/n² of the closed form.
+
+    The bodies are off the axis.
+    """
     n, mass, at = 60, 3.0, np.array([0.2, -0.1])
     u = (np.arange(n) + 0.5) / n - 0.5
     x, y = (grid.ravel() for grid in np.meshgrid(u, u))
@@ -55,7 +58,7 @@ def test_the_inertia_of_every_shape_equals_the_sum_over_its_points() -> None:
 
 
 def test_imbalance_gives_the_gravity_torque_of_a_tilted_bench(fmu: Path) -> None:
-    """The FMU's torque of gravity on the dry hub: that on the parts, one by one."""
+    """The FMU's torque on the dry hub equals the sum of the torques on the parts."""
     parts = {
         "plate": {"mass": 2.0, "box": (0.5, 0.3)},
         "battery": {"mass": 1.0, "position": (-0.1, 0.05), "box": (0.1, 0.06)},
@@ -77,7 +80,7 @@ def test_imbalance_gives_the_gravity_torque_of_a_tilted_bench(fmu: Path) -> None
 
 
 def test_all_faults_are_reported_at_once() -> None:
-    """Each part with its name and what is allowed."""
+    """One message names each wrong part and the allowed values."""
     parts = {"a": {"mass": -1.0}, "b": {"mass": 1.0, "box": 0.3}, "c": {"mass": 1, "bx": 1}}
     with pytest.raises(FmuError) as said:
         bottom_up(parts)

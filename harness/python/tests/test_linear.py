@@ -15,9 +15,10 @@ FRICTION_B = 0.03793  # N·m·s/rad, the default of friction.b
 
 
 def test_antiresonance_and_gain_follow_from_the_masses(fmu: Path) -> None:
-    """Zeros of omega over torque are the slosh mode on a fixed hub; at 0 Hz friction alone holds.
+    """Zeros from torque to rate are the slosh mode on a fixed hub.
 
-    1e-12: both are the same numbers but for rounding.
+    At 0 Hz the rate is the torque over the friction coefficient. Both sides are the same numbers
+    but for rounding, hence the tolerance 1e-12.
     """
     model = linearize(fmu, VISCOUS, ["tau_cmd"], ["omega"])
     assert model.states == ("omega", "slosh.q_tangential[1]", "slosh.v_tangential[1]")
@@ -33,7 +34,10 @@ def test_antiresonance_and_gain_follow_from_the_masses(fmu: Path) -> None:
 
 
 def test_unused_states_do_not_appear_in_linear_models(fmu: Path) -> None:
-    """With all states the response is the same; the default has those that an output sees."""
+    """By default the model has only states that an output depends on.
+
+    With all states the frequency response is the same.
+    """
     few = linearize(fmu, VISCOUS)
     every = linearize(fmu, VISCOUS, all_states=True)
     assert len(few.states) < len(every.states)
@@ -42,7 +46,7 @@ def test_unused_states_do_not_appear_in_linear_models(fmu: Path) -> None:
 
 
 def test_the_exponential_equals_that_of_scipy() -> None:
-    """Also of stiff, of large and of defective matrices; 1e-12 of the largest element."""
+    """Stiff, large and defective matrices agree to 1e-12 of the largest element."""
     random = np.random.default_rng(5)
     cases = [random.normal(size=(n, n)) * size for n in (1, 6, 25) for size in (1e-6, 0.3, 8.0)]
     cases += [np.diag(np.ones(5), 1), np.zeros((3, 3)), np.diag([-300.0, -1.0, 0.0])]
@@ -52,7 +56,7 @@ def test_the_exponential_equals_that_of_scipy() -> None:
 
 
 def test_linear_models_convert_to_python_control(fmu: Path) -> None:
-    """Names and poles are the same."""
+    """The converted model has the same names and poles."""
     model = linearize(fmu, VISCOUS, ["tau_cmd"], ["omega"])
     system = model.to_control()
     assert system.input_labels == ["tau_cmd"] and system.output_labels == ["omega"]
@@ -60,14 +64,14 @@ def test_linear_models_convert_to_python_control(fmu: Path) -> None:
 
 
 def test_linearising_a_stuck_hub_brings_a_warning(fmu: Path) -> None:
-    """Set-valued friction at rest: no torque moves it."""
+    """Dry friction holds the hub at rest, so that no small torque moves it."""
     with pytest.warns(UserWarning, match="held by dry friction"):
         model = linearize(fmu, {"friction.model": "stribeck"}, ["tau_cmd"], ["omega"])
     assert not model.B.any()
 
 
 def test_wrong_names_raise_errors_with_suggestions(fmu: Path) -> None:
-    """All of them."""
+    """The message lists all wrong names, with a similar name for each."""
     with pytest.raises(FmuError, match=r"no variable tau; .*omega is not an input of HubSlosh"):
         linearize(fmu, VISCOUS, inputs=["tau", "omega"])
     with pytest.raises(FmuError, match="stuck is of type Boolean"):
@@ -127,14 +131,14 @@ def test_a_sweep_shows_the_linear_model(fmu: Path, sweep: pd.DataFrame, hold: bo
     ],
 )
 def test_impossible_estimates_raise_errors(sweep, change, arguments: dict, sentence: str) -> None:
-    """In a sentence."""
+    """Each error is one sentence that names the reason."""
     with pytest.raises(FmuError) as told:
         frequency_response(change(sweep), **arguments)
     assert sentence in str(told.value)
 
 
 def test_a_fit_of_the_exact_response_has_the_models_poles_and_zeros(fmu: Path) -> None:
-    """1e-6: the real pole, 0.09 rad/s, lies two decades below the band."""
+    """The tolerance is 1e-6, because the real pole, 0.09 rad/s, is far below the fitted band."""
     model = linearize(fmu, VISCOUS, ["tau_cmd"], ["omega"])
     frequency = np.geomspace(1.25, 3.5, 400)
     exact = model.response(frequency)[:, 0, 0]
@@ -150,7 +154,7 @@ def test_a_fit_of_the_exact_response_has_the_models_poles_and_zeros(fmu: Path) -
 
 
 def test_a_fit_of_a_sweep_finds_antiresonance_and_resonance(fmu: Path) -> None:
-    """50 mN·m in 15 minutes with a viscous bearing; 2 mHz is what the estimate resolves."""
+    """A sweep of 50 mN·m in 15 minutes, on a viscous bearing, resolves frequencies to 2 mHz."""
     time = np.arange(45001) * 0.02
     rate = np.log(2.8 / 2.0) / time[-1]
     torque = 0.05 * np.sin(2 * np.pi * 2.0 * np.expm1(rate * time) / rate)
@@ -165,6 +169,6 @@ def test_a_fit_of_a_sweep_finds_antiresonance_and_resonance(fmu: Path) -> None:
 
 
 def test_a_wrong_fit_raises_errors_with_the_reason(fmu: Path) -> None:
-    """Everything at once."""
+    """One message lists all wrong arguments."""
     with pytest.raises(FmuError, match=r"no column real; .*no column imag; poles must be"):
         fit(pd.DataFrame({"frequency": [1.0]}), poles=1, zeros=2)

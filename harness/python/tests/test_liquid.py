@@ -81,14 +81,17 @@ def ritz(surface: tuple[complex, complex], wall: list[tuple[np.ndarray, ...]]) -
 def test_a_fill_in_per_cent_equals_the_height_of_that_volume(
     shape: dict, volume: Callable[[float], float]
 ) -> None:
-    """Against closed forms: parts of the volume below a height."""
+    """Heights are compared with closed forms of the volume below a height."""
     found = liquid_modes(shape, "40%", modes=1, resolution=10)
     # curved elements of a sixth of the diameter hold a volume to 1e-4
     assert volume(found.surface) == pytest.approx(0.4, abs=1e-4)
 
 
 def test_an_upright_cylinder_equals_its_closed_forms() -> None:
-    """λ, mass, bob, wave and inertia to 1e-4: what the issue asks of this path, not its limit."""
+    """Frequency, slosh mass, its height, wave and inertia agree to 1e-4.
+
+    This is the accuracy required; finer meshes are more accurate.
+    """
     r, h, rho = 0.5, 0.6, 900.0
     found = liquid_modes({"cylinder": {"radius": r, "height": 2}}, h, density=rho, modes=2)
     k, mass = XI / r, rho * np.pi * r**2 * h
@@ -115,7 +118,7 @@ def test_an_upright_cylinder_equals_its_closed_forms() -> None:
 def test_a_sphere_equals_the_axisymmetric_solver(
     request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Another discretisation, of a curve in place of a volume, whose own error is 1e-9."""
+    """The other solver, of `tank`, discretises a curve instead of a volume; its error is 1e-9."""
     monkeypatch.setenv("HUBSLOSH", str(option(request, "--hubslosh")))
     flat = tank({"density": 1000.0, "shape": {"sphere": {"radius": 1.0}}}, 0.8, modes=1)
     found = liquid_modes({"sphere": {"radius": 1}}, 0.8, modes=1, resolution=18)
@@ -126,7 +129,10 @@ def test_a_sphere_equals_the_axisymmetric_solver(
 
 
 def test_a_lying_cylinder_half_full_has_lamb_s_mode_and_swings_about_its_axis() -> None:
-    """Lamb, Hydrodynamics, art. 259: λR = 1.3557 across; Ritz's method gives two digits more."""
+    """Lamb, Hydrodynamics, art. 259, gives λR = 1.3557 for the mode across the axis.
+
+    Ritz's method gives two more digits.
+    """
     found = liquid_modes({"horizontal_cylinder": {"radius": 1, "length": 1}}, 1.0, modes=3,
                          resolution=12)  # fmt: skip
     across = found.modes[np.abs(found.modes["direction"]) > 89].iloc[0]
@@ -138,7 +144,11 @@ def test_a_lying_cylinder_half_full_has_lamb_s_mode_and_swings_about_its_axis() 
 
 @pytest.mark.parametrize(("inner", "angle"), [(0.0, 90.0), (0.4, 60.0)])
 def test_upright_sectors_have_the_modes_of_bessel_s_functions(inner: float, angle: float) -> None:
-    """λ = k tanh kh, cos(mθ) across the angle, m = nπ/α, zeros of J'm or of the cross product."""
+    """λ = k tanh(k h) with cos(m θ) around the sector, where m = n π/α for the opening angle α.
+
+    k follows from the zeros of the Bessel function's derivative J'm or, in a ring, of the cross
+    product.
+    """
     from scipy.special import yvp
 
     h, alpha = 0.7, np.radians(angle)
@@ -165,7 +175,7 @@ def test_upright_sectors_have_the_modes_of_bessel_s_functions(inner: float, angl
 
 
 def test_a_box_drags_liquid_about_its_vertical() -> None:
-    """Lamb's series for a box: 0.1565 of the rigid inertia for a square."""
+    """Lamb's series for a square box about its vertical gives 0.1565 of the rigid inertia."""
     found = liquid_modes(
         {"box": {"length": 0.4, "width": 0.4, "height": 1}}, "30%", modes=2, resolution=12
     )
@@ -235,7 +245,7 @@ def test_spacecraft_has_the_modes_of_each_direction_and_what_they_turn(
 
 @pytest.mark.parametrize("degrees", [pytest.param(10.0, marks=pytest.mark.long), 40.0])
 def test_a_tilted_box_is_the_plane_problem_of_its_section(degrees: float) -> None:
-    """Modes that do not vary across, by Ritz's method with polynomials on the tilted section."""
+    """Modes that do not vary across the box equal Ritz's method on the tilted section."""
     a, depth, t = 0.4, 0.5, np.radians(degrees)
     force = 9.81 * np.array([np.sin(t), 0, np.cos(t)])
     size = {"length": a, "width": 0.2, "height": 2}
@@ -254,7 +264,7 @@ def test_a_tilted_box_is_the_plane_problem_of_its_section(degrees: float) -> Non
 
 @pytest.mark.long
 def test_small_tilts_change_frequencies_by_their_square() -> None:
-    """Perturbation theory: the first order is 0 by symmetry, so 8° do four times what 4° do."""
+    """By symmetry the first order in the tilt is 0, so that 8° change four times as much as 4°."""
 
     def frequency(degrees: float) -> float:
         t = np.radians(degrees)
@@ -288,7 +298,7 @@ def test_a_tilted_cylinder_equals_that_of_perturbation_theory() -> None:
 
 
 def test_a_cad_solid_equals_the_shape_that_it_draws(tmp_path: Path) -> None:
-    """A box by its dimensions, and the same written as STEP."""
+    """A box given by its dimensions equals the same box read from a STEP file."""
     import gmsh
 
     file = tmp_path / "tank.step"
@@ -307,7 +317,7 @@ def test_a_cad_solid_equals_the_shape_that_it_draws(tmp_path: Path) -> None:
 
 
 def test_stated_errors_hold() -> None:
-    """The difference of the meshes is more than the finer one is off."""
+    """The stated error, the difference of two meshes, exceeds the true error of the finer mesh."""
     k = np.pi / 0.4
     size = {"length": 0.4, "width": 0.3, "height": 1}
     for resolution in (6, 9):
@@ -327,6 +337,6 @@ def test_stated_errors_hold() -> None:
     ],
 )
 def test_invalid_tanks_are_refused_in_words(shape: dict, fill: float, words: str) -> None:
-    """Each says what is allowed."""
+    """Each message says what is allowed."""
     with pytest.raises(FmuError, match=words):
         liquid_modes(shape, fill)

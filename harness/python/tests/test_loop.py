@@ -19,9 +19,9 @@ def command(time: float) -> float:
 
 
 def test_the_sampled_model_is_exact_at_the_sampling_instants(fmu: Path) -> None:
-    """100 cycles of a held torque, two cycles late, with the FMU's linear slosh model.
+    """Over 100 cycles with a torque two cycles late, the sampled model and the FMU agree.
 
-    Its tolerance is 1e-9 in this run.
+    The FMU uses its linear slosh model and a tolerance of 1e-9.
     """
     run = closed_loop(
         lambda time, _: command(time), PERIOD, 10, fmu, VISCOUS,
@@ -42,7 +42,7 @@ def test_the_sampled_model_is_exact_at_the_sampling_instants(fmu: Path) -> None:
 
 
 def test_a_loop_equals_a_drive_with_a_held_torque(fmu: Path) -> None:
-    """The same calls as a run with the torque that the law gave: same bits, whatever the model."""
+    """A run with the controller's torques as a given input gives the same bits, for every model."""
     parameters = {"slosh.model": "spherical", "init.slosh_angle": (5, "deg")}
     seen = []
 
@@ -68,7 +68,7 @@ def test_a_loop_equals_a_drive_with_a_held_torque(fmu: Path) -> None:
 
 
 def test_substeps_add_rows_and_inputs_run_along_their_lines(fmu: Path) -> None:
-    """A ramp of g_axial and a torque from outside, in rows of their own; 1e-7 is the tolerance."""
+    """Between cycles a ramp of g_axial and an external torque are linear; results agree to 1e-7."""
     inputs = pd.DataFrame(
         {"time": [0, 1.0, 3, 5], "tau_ext": [0, 0.02, -0.02, 0], "g_axial": [9.81, 9.81, 5, 5]}
     )
@@ -90,7 +90,7 @@ def test_substeps_add_rows_and_inputs_run_along_their_lines(fmu: Path) -> None:
 
 
 def test_all_faults_of_a_loop_are_reported_at_once(fmu: Path) -> None:
-    """Names, signs, and what has no meaning."""
+    """One message lists wrong names, signs and values."""
     inputs = pd.DataFrame({"time": [0.0, 1.0], "tau_cmd": [0.0, 0.0]})
     with pytest.raises(FmuError) as error:
         closed_loop(
@@ -116,7 +116,7 @@ def test_all_faults_of_a_loop_are_reported_at_once(fmu: Path) -> None:
 
 
 def test_a_vector_s_name_is_all_its_components(fmu: Path) -> None:
-    """Of loops, linear models and records; a scalar of that name stays one."""
+    """In loops, linear models and records, a vector's name stands for all its components."""
     craft = fmu.with_name("Spacecraft.fmu")
     start = {"force[3]": 100.0, "init.omega[1]": 0.01}
     whole = Loop(np.eye(3), 0.1, craft, start, "omega", "torque")

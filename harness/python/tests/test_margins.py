@@ -126,7 +126,7 @@ def test_the_modulus_margin_is_the_least_distance_to_minus_one() -> None:
 
 
 def test_a_loop_gain_without_states_is_a_number() -> None:
-    """Half of it does not cross; its distance to -1 is 1.5."""
+    """The gain 0.5 never has magnitude 1; its distance to -1 is 1.5."""
     none = np.zeros((0, 0))
     half = LinearModel(
         none, np.zeros((0, 1)), np.zeros((1, 0)), np.full((1, 1), 0.5), (), ("u",), ("y",)
@@ -137,7 +137,11 @@ def test_a_loop_gain_without_states_is_a_number() -> None:
 
 
 def test_a_loop_without_crossings_says_so() -> None:
-    """1/(2 (s + 1)) is nowhere 1; its distance to -1 is least at infinity, 1. And L = 0."""
+    """1/(2 (s + 1)) has magnitude below 1 everywhere.
+
+    Its distance to -1 tends to the least value, 1, at infinite frequency. A gain of 0 is the second
+    case.
+    """
     for gain in (0.5, 0.0):
         found = margins(control.tf([gain], [1, 1]))
         assert found.stable and not len(found.crossings) and found.delay_margin == np.inf
@@ -146,7 +150,7 @@ def test_a_loop_without_crossings_says_so() -> None:
 
 
 def test_loops_that_cannot_be_closed_are_refused() -> None:
-    """D = -1, or not square."""
+    """A feedthrough of -1 makes the loop singular; a gain that is not square has no loop."""
     one, none = np.eye(1), np.zeros((1, 1))
     with pytest.raises(FmuError, match="I \\+ D is singular"):
         margins(LinearModel(-one, one, one, -one, ("x",), ("u",), ("y",)))
@@ -222,7 +226,10 @@ def by_pencils(gain: LinearModel) -> list[tuple[str, float]]:
 
 @pytest.mark.parametrize("seed", range(24))
 def test_random_loops_have_the_crossings_of_matrix_pencils(seed: int) -> None:
-    """One to three loops with light and heavy modes, integrators and delays; 1e-9."""
+    """A slower method, eigenvalues of matrix pencils, finds the same crossings to 1e-9.
+
+    Random cases have one to three loops, lightly and heavily damped modes, integrators and delays.
+    """
     random = np.random.default_rng(seed)
     count = int(random.integers(1, 4))
     blocks = [np.zeros((1, 1))] * int(random.integers(0, 2))
@@ -262,7 +269,10 @@ def test_random_loops_have_the_crossings_of_matrix_pencils(seed: int) -> None:
 
 
 def test_the_delay_margin_puts_a_pole_on_the_unit_circle(fmu: Path) -> None:
-    """Three axes with two tanks: stable at each quarter of a cycle before, unstable just after."""
+    """The loop is stable at each quarter cycle below the margin and unstable just above.
+
+    The case has three axes and two tanks.
+    """
     craft = {"tanks": 2, "force[3]": 400.0, "tank[2].position[2]": 0.7, "craft.Jxy": 30.0}
     model = fmu.with_name("Spacecraft.fmu")
     gains = np.hstack([np.diag([80.0, 70.0, 60.0]), np.diag([500.0, 450.0, 400.0])])
@@ -286,7 +296,7 @@ def test_the_delay_margin_puts_a_pole_on_the_unit_circle(fmu: Path) -> None:
 
 
 def test_a_loop_gain_that_is_only_rounding_has_no_crossing(fmu: Path) -> None:
-    """A roll-off by Tustin's rule is 0 at half the sampling rate, but for rounding."""
+    """A filter by Tustin's rule is 0 at half the sampling rate, except for rounding."""
     lag = control.ss(1 / (S / 3 + 1) ** 2)
     found = margins(Loop(5 * lag, 0.1, fmu, {"friction.model": "viscous"}, "theta"))
     assert found.crossings["gain_margin"].dropna().abs().max() < 200

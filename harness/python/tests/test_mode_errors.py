@@ -15,7 +15,7 @@ ZETAS = np.array([0.01, 0.02, 0.05])
 
 
 def test_the_impulse_response_equals_that_of_the_matrix_exponential() -> None:
-    """C exp(A t) B of the thesis's state space (4.16 to 4.21), mode by mode."""
+    """The sum over modes equals C exp(A t) B of the thesis's state space (4.16 to 4.21)."""
     time = np.linspace(0, 3, 40)
     forces = modes.impulse(MASSES, OMEGAS, ZETAS, time)
     for force, m, w, z in zip(forces, MASSES, OMEGAS, ZETAS, strict=True):
@@ -29,7 +29,7 @@ def test_the_impulse_response_equals_that_of_the_matrix_exponential() -> None:
 
 
 def test_the_response_equals_that_of_the_fmu(fmu: Path) -> None:
-    """Force over the tank's acceleration of the linearised FMU, with three of its modes."""
+    """Force over the tank's acceleration equals the linearised FMU's with three modes."""
     settings = {"slosh.modes": 3, "friction.model": "none", "init.slosh_angle": 0.0}
     model = hubslosh.linearize(fmu, settings, "tau_cmd", ["F_tangential", "omega_dot"])
     with hubslosh.Plant(fmu, settings) as plant:
@@ -47,7 +47,10 @@ def test_the_response_equals_that_of_the_fmu(fmu: Path) -> None:
 def test_four_modes_err_by_one_per_cent_and_one_mode_suffices_in_the_band(
     fmu: Path,
 ) -> None:
-    """Figure 4.4: n = 4 deviates less than 1 %, without damping; with the bench's a little more."""
+    """As in figure 4.4 of the thesis, four undamped modes deviate by less than 1 %.
+
+    With the bench's damping the deviation is a little larger.
+    """
     undamped = {"slosh.zeta_from_correlation": False, "slosh.zeta": 0.0}
     assert hubslosh.mode_errors(undamped, 3.5, fmu)["impulse"][4] < 0.01
     errors = hubslosh.mode_errors({"tank.h": 0.1}, 3.5, fmu)

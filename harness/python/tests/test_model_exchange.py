@@ -103,7 +103,7 @@ def co_simulation(fmu: Path, start: dict[str, float], torque: np.ndarray) -> dic
 
 @pytest.mark.parametrize("model", quickly("liquid"))
 def test_cvode_finds_the_motion_of_co_simulation_on_the_bench(fmu: Path, model: str) -> None:
-    """Every signal to 1e-6 SI, from rest, through some 80 changes between stick and slip."""
+    """Every signal agrees to 1e-6 in SI units over 70 or more changes of stick and slip."""
     start = {"slosh.model": MODELS[model], "init.slosh_angle": 0.0}
     expected = co_simulation(fmu, start, bench_tau())
     assert expected["event_count"][-1] >= 70, "the hub sticks and slips"
@@ -115,7 +115,7 @@ def test_cvode_finds_the_motion_of_co_simulation_on_the_bench(fmu: Path, model: 
 
 @pytest.mark.parametrize("model", quickly("spherical"))
 def test_cvode_finds_the_motion_of_co_simulation_when_it_is_violent(fmu: Path, model: str) -> None:
-    """Stick and slip as CVODE's root finder sees them, from jump to jump of the torque."""
+    """CVODE's root finder locates sticking and slipping between jumps of the torque."""
     start = start_values(model)
     expected = co_simulation(fmu, start, tau())
     assert expected["event_count"][-1] >= 8, "the hub sticks and slips"
@@ -126,7 +126,7 @@ def test_cvode_finds_the_motion_of_co_simulation_when_it_is_violent(fmu: Path, m
 
 
 def test_the_difference_to_co_simulation_is_cvodes_error(fmu: Path) -> None:
-    """It falls with CVODE's tolerance: 100 times less asked for, at least 10 times less there."""
+    """With a tolerance 100 times smaller the difference is at least 10 times smaller."""
     expected = co_simulation(fmu, start_values("spherical"), tau())
     coarse, fine = (
         model_exchange(
@@ -139,7 +139,7 @@ def test_the_difference_to_co_simulation_is_cvodes_error(fmu: Path) -> None:
 
 
 def test_euler_converges_to_co_simulation_with_first_order(fmu: Path) -> None:
-    """A tenth of the step, a tenth of the error, though events lie between the steps."""
+    """A tenth of the step gives a tenth of the error, although events lie between the steps."""
     expected = co_simulation(fmu, start_values("frozen"), tau())
     coarse, fine = (
         # fmpy's Euler makes one step of an output interval

@@ -31,7 +31,10 @@ def largest_rate(fmu: Path):
 
 
 def test_a_draw_depends_only_on_seed_and_run() -> None:
-    """Not on the number of runs, nor on names that follow; distributions are what they say."""
+    """It does not depend on the number of runs or on quantities listed after it.
+
+    The draws have the stated distributions.
+    """
     table = monte_carlo(RANGES, 400, 7)
     pd.testing.assert_frame_equal(monte_carlo(RANGES, 10, 7), table[:10])
     assert draw(RANGES, 5, 7) == table.iloc[5, 1:].to_dict()
@@ -46,7 +49,7 @@ def test_a_draw_depends_only_on_seed_and_run() -> None:
 def test_a_study_gives_the_results_of_single_runs_with_any_workers(
     fmu: Path, tmp_path: Path
 ) -> None:
-    """In threads, stopped and gone on with, on dask: the same bits."""
+    """Threads, dask, and a study that was stopped and resumed give the same bits."""
     outcome = largest_rate(fmu)
     table = monte_carlo(RANGES, 12, 1, outcome)
     assert table["rate"][3] == outcome(draw(RANGES, 3, 1))["rate"]
@@ -95,7 +98,7 @@ def test_a_study_gives_the_results_of_single_runs_with_any_workers(
 def test_a_programming_error_ends_a_study_after_the_finished_runs(
     tmp_path: Path, monkeypatch
 ) -> None:
-    """Also where the thread that collects them comes late, as on a busy machine."""
+    """The thread that collects results may be late, as on a busy machine."""
 
     def outcome(values: dict) -> dict[str, float]:
         return {"twice": 2 * values["a"] / (values["a"] != third)}
@@ -112,7 +115,7 @@ def test_a_programming_error_ends_a_study_after_the_finished_runs(
 def test_threads_keep_the_working_directory_for_files(
     fmu: Path, tmp_path: Path, monkeypatch
 ) -> None:
-    """Loading a library changes the working directory for all threads: once, and back again."""
+    """Loading an FMU's library changes the process's working directory and must restore it."""
     monkeypatch.chdir(tmp_path)
     Path("mine.fmu").write_bytes(fmu.read_bytes())
     Path("bench.toml").write_text('"friction.model" = "viscous"\n')
@@ -129,7 +132,10 @@ def test_threads_keep_the_working_directory_for_files(
 def test_a_refused_run_is_a_row_and_a_programming_error_ends_the_study(
     fmu: Path, tmp_path: Path
 ) -> None:
-    """A negative depth is refused by the FMU; an outcome without numbers is a mistake."""
+    """A negative depth, which the FMU refuses, becomes a row with the error.
+
+    An outcome that returns no numbers is a mistake in the script and ends the study.
+    """
     ranges = {"tank.h": (-0.1, 0.1)}
 
     def outcome(values: dict) -> dict[str, float]:
@@ -155,7 +161,10 @@ def test_a_refused_run_is_a_row_and_a_programming_error_ends_the_study(
 
 
 def test_intervals_of_quantiles_have_their_stated_coverage() -> None:
-    """Over 600 samples of 50: the interval of a median then holds in 96.7 %, ± 0.7 %."""
+    """For the median of 50 numbers the interval must contain the truth in 96.7 % of samples.
+
+    600 samples determine this share to ± 0.7 %.
+    """
     random = np.random.default_rng(1)
     inside = 0
     for _ in range(600):

@@ -39,13 +39,13 @@ def link() -> zipfile.ZipInfo:
     ],
 )
 def test_an_archive_beyond_the_budgets_is_refused(tmp_path, files, why) -> None:
-    """Every kind of the host's rules has a case here."""
+    """Each limit of the Rust host on archives has a case here."""
     with pytest.raises(FmuError, match=re.escape(why)):
         Fmu(packed(tmp_path, files))
 
 
 def test_a_library_outside_the_archive_is_refused(tmp_path, fmu) -> None:
-    """The path comes from modelIdentifier."""
+    """The attribute modelIdentifier, which becomes a file name, contains a path."""
     with zipfile.ZipFile(fmu) as archive:
         text = archive.read("modelDescription.xml").decode()
     text = text.replace('modelIdentifier="HubSlosh"', 'modelIdentifier="../../outside"')

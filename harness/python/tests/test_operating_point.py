@@ -39,9 +39,10 @@ def numbers(found: hubslosh.Margins) -> np.ndarray:
 
 
 def test_every_method_linearises_at_the_same_trimmed_point(craft: Craft) -> None:
-    """Thrust 0.1 m off the centre of mass: loop, review, linearize and uncertain agree to 1e-9.
+    """With thrust 0.1 m off the centre of mass, four methods agree to 1e-9.
 
-    Without trimming the delay margin is another one, and a warning says how fast the craft turns.
+    They are `loop`, `review`, `linearize` and `uncertain`. Without trimming the delay margin
+    differs, and a warning says how fast the craft turns.
     """
     by_loop = hubslosh.margins(loop := craft.loop(GAINS, PERIOD, "50%", delay=0.1))
     review = craft.review(GAINS, PERIOD, ["50%"], delay=0.1, damping="nominal", frequency="nominal")
@@ -63,7 +64,10 @@ def test_every_method_linearises_at_the_same_trimmed_point(craft: Craft) -> None
 
 
 def test_trimming_removes_rotation_and_prints_the_remaining_accelerations(craft: Craft) -> None:
-    """The moment of the thrust over the inertia before, by hand; 0 after, also in a run."""
+    """Before trimming, the acceleration is the moment of the thrust over the inertia.
+
+    After trimming it is 0, also in a simulation.
+    """
     point = craft.trim("50%")
     at = craft.mass_properties("50%")
     assert point.shift == pytest.approx(at.center_of_mass * (1, 1, 0), abs=1e-12)
@@ -106,7 +110,7 @@ def test_trimming_removes_rotation_and_prints_the_remaining_accelerations(craft:
 
 @pytest.mark.parametrize("name", ["NTO", "tank[1]"])
 def test_every_method_takes_the_same_names(craft: Craft, name: str) -> None:
-    """A tank by name and by number: loop, linearize, review, uncertain and a study's draw agree."""
+    """`loop`, `linearize`, `review`, `uncertain` and `draw` accept a tank's name and its number."""
     nominal = craft.uncertain("50%", {f"{name}.frequency[1]": "1%"})
     f = 0.8 * nominal.center["tank[1].frequency[1]"]
     zeta = 2 * craft.tank_at("50%")["NTO"].modes["zeta"][0]
@@ -164,7 +168,7 @@ WRONG = {
 
 @pytest.mark.parametrize("name", WRONG)
 def test_every_method_reports_a_wrong_name_in_the_same_words(craft: Craft, name: str) -> None:
-    """As a parameter, as a value of a study, and as a range."""
+    """The name is wrong as a parameter, as a value of a study, or as a range."""
     values, ranges = {name: 0.2}, {name: (0.1, 0.3)}
     for call in (
         lambda: craft.parameters("50%", parameters=values),
@@ -182,14 +186,17 @@ def test_every_method_reports_a_wrong_name_in_the_same_words(craft: Craft, name:
 
 
 def test_uncertain_values_can_be_named_by_tanks(craft: Craft) -> None:
-    """By name and by number."""
+    """A tank's name and its number give the same uncertain model."""
     model = craft.uncertain("50%", {"NTO.frequency[1]": "5%", "craft.Jxx": "5%"})
     for name in ("NTO.frequency[1]", "tank[1].frequency[1]"):
         assert model.delta({name: 0.5}).tolist() == [0.5, 0.0]
 
 
 def test_a_quantity_of_a_mode_changes_without_the_others(craft: Craft) -> None:
-    """Frequency, mass, bob: the others, and the liquid at rest, stay; with surface tension too."""
+    """Frequency, slosh mass and its height can each be changed alone.
+
+    The liquid at rest does not change, also with surface tension.
+    """
     nominal, of = craft.parameters("50%"), ModeQuantity(2, "frequency", 1)
     assert nominal[of.name("k")] > 0
 
@@ -210,7 +217,10 @@ def test_a_quantity_of_a_mode_changes_without_the_others(craft: Craft) -> None:
 
 
 def test_slosh_frequency_varies_by_default(craft: Craft) -> None:
-    """All modes of a tank together, by 10 %; "nominal" and other shares are arguments."""
+    """By default the frequencies of a tank's modes vary together by 10 %.
+
+    The argument can be "nominal" or another share.
+    """
     found = craft.review(GAINS, PERIOD, ["50%"], damping="nominal", draws=0)
     names = ["frequency of NTO", "frequency of MMH", "inertia of craft"]
     assert [u.name for u in found.uncertain] == names
@@ -227,7 +237,7 @@ def test_slosh_frequency_varies_by_default(craft: Craft) -> None:
 
 
 def test_a_used_craft_and_its_results_can_be_pickled(craft: Craft) -> None:
-    """For processes of a study: the copy computes the same."""
+    """A study sends them to other processes; the copy computes the same numbers."""
     loop = craft.loop(GAINS, PERIOD, "50%", delay=0.1)
     review = craft.review(GAINS, PERIOD, ["50%"], damping="nominal", draws=0)
     craft.uncertain("50%", {"NTO.zeta[1]": "interval"})
@@ -238,7 +248,10 @@ def test_a_used_craft_and_its_results_can_be_pickled(craft: Craft) -> None:
 
 
 def test_names_of_tanks_must_not_hide_parameters(craft: Craft) -> None:
-    """The longest name counts; names with which parameters of the FMU begin are refused."""
+    """If one tank's name begins with another's, the longer name is taken.
+
+    A name with which a parameter of the FMU begins is refused.
+    """
     tanks = {"A": craft.tanks["NTO"], "A.B": craft.tanks["MMH"]}
     both = replace(craft, tanks=tanks)
     values = both.parameters("50%", parameters={"A.B.zeta[1]": 0.07, "A.zeta[1]": 0.03})
@@ -250,7 +263,7 @@ def test_names_of_tanks_must_not_hide_parameters(craft: Craft) -> None:
 
 @pytest.mark.parametrize("largest", [0, np.nan, 1e9, "3"])
 def test_the_cost_of_a_worst_case_search_is_limited(craft: Craft, largest: object) -> None:
-    """The search ends at a multiple of the ranges that makes sense."""
+    """``largest``, the multiple of the ranges at which the search ends, is at most 1000."""
     model = craft.uncertain("50%", {"craft.Jxx": "5%"})
     with pytest.raises(FmuError, match=r"largest must be a number from 0\.001 to 1000"):
         model.worst_case(craft.loop(GAINS, PERIOD, "50%"), largest=largest)

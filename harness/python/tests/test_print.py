@@ -93,7 +93,7 @@ def _diagonal(blocks: list[np.ndarray]) -> np.ndarray:
 
 
 def test_every_public_object_prints_in_20_lines(made: dict[str, Callable[[], Any]]) -> None:
-    """And in one that is no longer than a paragraph."""
+    """Its ``repr`` is also no longer than a paragraph."""
     public = {n for n in hubslosh.__all__ if inspect.isclass(getattr(hubslosh, n))}
     assert public <= set(made)
     for name, make in made.items():
@@ -104,7 +104,7 @@ def test_every_public_object_prints_in_20_lines(made: dict[str, Callable[[], Any
 
 
 def test_printed_margins_of_a_loop_are_the_smallest(made: dict[str, Callable]) -> None:
-    """Verdict, margins, the crossings with the least margins, and how many are left out."""
+    """The text has the verdict, the margins, the worst crossings, and the number left out."""
     found = made["Margins"]()
     text = str(found)
     assert text.startswith("closed loop: ") and "phase margin" in text

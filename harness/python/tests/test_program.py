@@ -29,7 +29,7 @@ slosh.model = ["linear", "spherical"]
 
 
 def test_campaign_returns_a_table(fmu: Path, tmp_path: Path, request) -> None:
-    """A row per run, and the report in the same folder."""
+    """The table has a row for each run; the report is in the same folder."""
     binary = option(request, "--hubslosh")
     table = hubslosh.campaign(PLAN, tmp_path / "out", model=fmu, program=binary)
     assert len(table) == 2
@@ -37,7 +37,7 @@ def test_campaign_returns_a_table(fmu: Path, tmp_path: Path, request) -> None:
 
 
 def test_the_package_runs_commands_of_the_program(request) -> None:
-    """Output and exit code are the program's own."""
+    """Output and exit code are the program's."""
     python = [sys.executable, "-m", "hubslosh"]
     surroundings = os.environ | {
         "HUBSLOSH": str(option(request, "--hubslosh")),
@@ -57,7 +57,7 @@ def test_the_package_runs_commands_of_the_program(request) -> None:
 def test_analyse_returns_a_row_for_a_recording_and_for_the_model(
     fmu: Path, tmp_path: Path, request
 ) -> None:
-    """A logger's file: other names, milliseconds, semicolons, decimal commas."""
+    """The recording is a logger's file with other names, milliseconds and decimal commas."""
     binary = option(request, "--hubslosh")
     profile = "exp-sweep:f0=1.25,f1=3.5,duration=60"
     time, growth = 0.02 * np.arange(3001), np.log(3.5 / 1.25) / 60
@@ -84,7 +84,7 @@ def test_analyse_returns_a_row_for_a_recording_and_for_the_model(
 
 
 def test_units_equal_those_of_the_command_line(fmu: Path, request) -> None:
-    """Every variable takes the same units in both, by the same factors."""
+    """Every variable accepts the same units in Python as in the program, with the same factors."""
     command = [option(request, "--hubslosh"), "variables", "--json", "--fmu", fmu]
     listed = json.loads(subprocess.run(command, capture_output=True, check=True).stdout)
     opened = Fmu.open(fmu)
@@ -103,14 +103,14 @@ def test_units_equal_those_of_the_command_line(fmu: Path, request) -> None:
 
 
 def test_errors_of_the_command_are_passed_on(fmu: Path, tmp_path: Path, request) -> None:
-    """A plan that is none."""
+    """The file given as a plan is not a plan."""
     binary = option(request, "--hubslosh")
     with pytest.raises(FmuError, match=r"(?s)hubslosh campaign: .*sewer"):
         hubslosh.campaign("sewer=1\n", tmp_path, model=fmu, program=binary)
 
 
 def test_a_missing_command_raises_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    """With how to get it."""
+    """The message says how to install the program."""
     monkeypatch.setenv("PATH", "")
     monkeypatch.setenv("CARGO_TARGET_DIR", "nowhere")
     monkeypatch.delenv("HUBSLOSH", raising=False)
@@ -131,7 +131,10 @@ def with_binary(fmu: Path, binary: bytes, path: Path) -> Path:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no compiler that is always there")
 def test_an_fmu_that_crashes_ends_no_python(fmu: Path, tmp_path: Path, request) -> None:
-    """Its library aborts while it is loaded: an error of identify, and a finding of check."""
+    """The FMU's library aborts while it is loaded.
+
+    `identify` raises an error, and `check` reports a finding; the Python process goes on.
+    """
     program, library = option(request, "--hubslosh"), tmp_path / "library"
     (source := tmp_path / "crash.c").write_text(
         "#include <stdlib.h>\n__attribute__((constructor)) static void crash(void) { abort(); }\n"
@@ -146,7 +149,7 @@ def test_an_fmu_that_crashes_ends_no_python(fmu: Path, tmp_path: Path, request) 
 
 
 def test_a_check_gives_typed_findings(fmu: Path, tmp_path: Path, request) -> None:
-    """An FMU whose binaries are no libraries breaks a rule; the FMU as it is breaks none."""
+    """An FMU whose libraries are damaged breaks a rule; the undamaged FMU breaks none."""
     program, seen = option(request, "--hubslosh"), []
     checked = hubslosh.check(fmu, only=["steps"], progress=seen.append, program=program)
     assert (checked.errors, checked.warnings, checked.findings) == (0, 0, ())
@@ -168,7 +171,7 @@ def test_a_check_gives_typed_findings(fmu: Path, tmp_path: Path, request) -> Non
 def test_ctrl_c_ends_an_identification_and_its_processes(
     fmu: Path, tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:
-    """The signal comes with the first line of progress, when the guarded process lives."""
+    """The signal is sent at the first line of progress, when the subprocess with the FMU runs."""
     time = np.arange(0, 600, 0.02)
     table = pd.DataFrame({"time": time, "tau_cmd": 0.1 * np.sin(time**2 / 30), "omega": 0.0})
     table["omega"] = np.cumsum(table["tau_cmd"]) * 0.02 / 0.32
@@ -197,7 +200,7 @@ def test_ctrl_c_ends_an_identification_and_its_processes(
 
 
 def test_the_method_of_identify_is_an_argument() -> None:
-    """An unknown flag: the error lists those that exist."""
+    """An unknown method raises an error that lists the known methods."""
     for flags in (["--method", "acceleration"], ["--method=friction"]):
         with pytest.raises(FmuError, match="method="):
             hubslosh.identify("data.csv", None, *flags)
@@ -206,7 +209,7 @@ def test_the_method_of_identify_is_an_argument() -> None:
 def test_every_method_of_identify_returns_the_same_type(
     fmu: Path, tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:
-    """A sweep over a rigid liquid: friction and inertia."""
+    """The case is the method for friction and inertia, with a sweep over a rigid liquid."""
     time = np.arange(0, 60, 0.02)
     torque = 0.1 * np.sin(2 * np.pi * (1.25 * time + 0.01875 * time**2))
     inputs = pd.DataFrame({"time": time, "tau_cmd": torque})
@@ -224,7 +227,7 @@ def test_every_method_of_identify_returns_the_same_type(
 def test_every_method_of_identification_is_in_the_package_and_in_the_book(
     request: pytest.FixtureRequest,
 ) -> None:
-    """`Method` and the docstring of `identify` have the program's methods."""
+    """`Method` and the docstring of `identify` list the methods that the program has."""
     command = [option(request, "--hubslosh"), "identify", "--help"]
     text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
     kinds = re.findall(r"^  (bench|fmu|decay|friction) ", text, re.M)
@@ -241,9 +244,10 @@ def test_every_method_of_identification_is_in_the_package_and_in_the_book(
 def test_identification_gives_typed_estimates(
     fmu: Path, tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:
-    """From three minutes of sweep by the FMU itself: a rigid body, dry friction, white noise.
+    """The recording is a sweep of three minutes, simulated by the FMU.
 
-    The truth lies within four standard deviations of the estimate, which is 1 part in 16,000.
+    The liquid is rigid, the friction is dry and the noise is white. The true inertia is within four
+    standard deviations of the estimate; one is 1/16,000 of the inertia.
     """
     time = np.arange(0, 180, 0.02)
     torque = 0.05 * np.sin(2 * np.pi * (0.3 * time + 0.008 * time**2))
@@ -306,7 +310,7 @@ def spun_down() -> list[pd.DataFrame]:
 def test_any_fmu_is_fitted_by_the_names_of_its_variables(
     fmu: Path, request: pytest.FixtureRequest
 ) -> None:
-    """The truths of a hub in closed form within 4 σ."""
+    """Estimates for a hub with a closed-form motion are within 4 σ of the true values."""
     tables = spun_down()
     binary = option(request, "--hubslosh")
     found = hubslosh.identify(tables, fmu=fmu, **SPUN_DOWN, program=binary)
@@ -336,7 +340,7 @@ def test_any_fmu_is_fitted_by_the_names_of_its_variables(
 
 
 def test_a_result_without_intervals_is_printed(fmu: Path, request: pytest.FixtureRequest) -> None:
-    """Without noise the solver's errors decide the estimate: deviation and ends are infinite."""
+    """Without noise the solver's error limits the estimate, and the intervals are infinite."""
     bench = {"friction.model": "viscous", "init.slosh_angle": 0.1}
     run = hubslosh.simulate(fmu, bench, stop=4, step=0.05, outputs="omega")
     found = hubslosh.identify(
@@ -352,7 +356,11 @@ def test_a_result_without_intervals_is_printed(fmu: Path, request: pytest.Fixtur
 def test_the_posterior_has_the_intervals_that_the_fit_states(
     fmu: Path, request: pytest.FixtureRequest
 ) -> None:
-    """For a model that is nearly linear in its unknowns emcee samples a normal distribution."""
+    """For a model that is nearly linear in its unknowns emcee samples a normal distribution.
+
+    Means, deviations and ends of the intervals agree within the accuracy of 190 independent
+    samples.
+    """
     tables, binary = spun_down(), option(request, "--hubslosh")
     found = hubslosh.identify(tables, fmu=fmu, **SPUN_DOWN, program=binary)
     samples = hubslosh.posterior(

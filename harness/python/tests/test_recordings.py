@@ -126,7 +126,7 @@ def _columns(name: str, prefix: str) -> str:
 def test_every_file_format_gives_the_same_table(
     name: str, write: Write, prefix: str, tmp_path: Path
 ) -> None:
-    """Time, torque and rate in SI, whatever clock and units the file has."""
+    """Time, torque and rate are in SI units, whatever clock and units the file has."""
     write(tmp_path / name)
     table = read_recording(tmp_path / name, _columns(name, prefix))
     assert list(table.columns) == ["time", "tau_cmd", "omega"]
@@ -138,7 +138,7 @@ def test_every_file_format_gives_the_same_table(
 
 
 def test_times_of_every_type_of_parquet_are_seconds() -> None:
-    """Timestamps, durations, times of day, dates of Spark; decimals and halves."""
+    """Types are timestamps, durations, times of day, Spark's dates, decimals and half floats."""
     files = sorted((ROOT / "harness" / "signals" / "tests" / "all" / "data").glob("*.parquet"))
     assert len(files) > 12
     for path in files:
@@ -153,7 +153,7 @@ def test_times_of_every_type_of_parquet_are_seconds() -> None:
 
 
 def test_every_reader_has_a_file_that_tests_it() -> None:
-    """A kind without a writer above would go untested."""
+    """Each file format that the package can read has a function above that writes a test file."""
     endings = {Path(name).suffix for name, _, _ in WRITERS}
     assert all(endings & set(kind.endings) for kind in KINDS)
 
@@ -161,7 +161,10 @@ def test_every_reader_has_a_file_that_tests_it() -> None:
 def test_the_command_lets_the_package_read_other_file_formats(
     request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """One answer from files of several kinds; without the package the program says what to do."""
+    """The program calls the Python package, and the results of all formats are equal.
+
+    Without the package the error says how to convert the file.
+    """
     program = option(request, "--hubslosh")
     monkeypatch.setenv("HUBSLOSH_PYTHON", sys.executable)
     monkeypatch.setenv("PYTHONPATH", str(ROOT / "harness" / "python"))
@@ -194,7 +197,7 @@ def test_the_command_lets_the_package_read_other_file_formats(
 
 
 def test_signals_with_clocks_of_their_own_keep_them(tmp_path: Path) -> None:
-    """A slow torque under a fast gyro: nothing is interpolated."""
+    """A slow torque and a fast gyro keep their own times; no values are interpolated."""
     from asammdf import MDF, Signal
 
     with MDF(version="4.10") as file:
@@ -211,7 +214,7 @@ def test_signals_with_clocks_of_their_own_keep_them(tmp_path: Path) -> None:
 
 
 def test_a_signal_without_unit_is_announced_or_refused(tmp_path: Path) -> None:
-    """Integers as times, rates without a unit: the rules of text hold for every kind."""
+    """Integer times and rates without a unit follow the rules for text files in every format."""
     from scipy.io import savemat
 
     path = tmp_path / "a.mat"
@@ -223,7 +226,7 @@ def test_a_signal_without_unit_is_announced_or_refused(tmp_path: Path) -> None:
 
 
 def test_unreadable_files_are_refused_with_a_reason(tmp_path: Path) -> None:
-    """Wrong kinds, columns that are missing or of different length."""
+    """Files have a wrong type, or columns that are missing or differ in length."""
     from scipy.io import savemat
 
     savemat(tmp_path / "a.mat", {"time": TIME, "omega": RATE[:4], "tau_cmd": TORQUE})
@@ -252,7 +255,7 @@ def test_unreadable_files_are_refused_with_a_reason(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("copies", [1, pytest.param(6, marks=pytest.mark.long)])
 def test_damaged_files_are_read_or_refused_by_name(tmp_path: Path, copies: int) -> None:
-    """Bytes of a file of each kind are changed, and its end is missing."""
+    """In a file of each format, bytes are changed or the end is cut off."""
     dice = np.random.default_rng(copies)
     for name, write, prefix in WRITERS[3:]:
         path = tmp_path / name
@@ -270,7 +273,7 @@ def test_damaged_files_are_read_or_refused_by_name(tmp_path: Path, copies: int) 
 
 
 def test_a_file_that_claims_more_than_it_holds_is_refused_at_once(tmp_path: Path) -> None:
-    """A data set of 2^40 values in a file of some kilobytes."""
+    """A file of some kilobytes declares a data set of 2^40 values."""
     import h5py
 
     with h5py.File(tmp_path / "a.h5", "w") as file:

@@ -39,7 +39,11 @@ def gains(kp: float = 40.0, kd: float = 400.0) -> np.ndarray:
 
 
 def test_margins_of_a_rigid_craft_equal_those_of_a_double_integrator(craft: Craft) -> None:
-    """Full tank: L(z) = kp T² (z + 1)/(2 J (z - 1)²) + kd T/(J (z - 1)) about each axis."""
+    """A full tank does not slosh, so that the sampled loop about each axis is known.
+
+    It is L(z) = kp T² (z + 1)/(2 J (z - 1)²) + kd T/(J (z - 1)), with gains kp and kd, period T and
+    inertia J.
+    """
     found = craft.review(gains(), PERIOD, ["100%"], damping="nominal", inertia="nominal")
     J = craft.mass_properties("100%").inertia[0, 0]
 
@@ -107,7 +111,7 @@ def test_stabilisation_flips_where_the_tank_crosses_the_centre_of_mass(
 
 
 def test_the_family_has_the_same_states_everywhere_and_the_plants_responses(craft: Craft) -> None:
-    """A full tank has no mode; its model keeps the states."""
+    """A full tank has no slosh mode, but its model keeps the states of one."""
     found = craft.review(gains(), PERIOD, ["20%", "60%", "100%"], damping="nominal")
     assert {model.states for model in found.family} == {found.family[0].states}
     assert "tank[1].p[1,1]" in found.family[2].states
@@ -119,7 +123,10 @@ def test_the_family_has_the_same_states_everywhere_and_the_plants_responses(craf
 
 
 def test_bands_hold_all_points_and_the_ends_of_each_range(craft: Craft) -> None:
-    """One draw of each fill, both ends of each range; the mass scales the crossover."""
+    """Points are the nominal ones, random draws, and both ends of each range at each fill.
+
+    Four ranges at two fills make 16 such ends.
+    """
     uncertain = {"craft.Jxx": "10%", "delay": (0.0, 0.2)}
     found = craft.review(gains(), PERIOD, ["30%", "70%"], uncertain=uncertain, draws=6, delay=0.1)
     names = [quantity.name for quantity in found.uncertain]
@@ -137,7 +144,7 @@ def test_bands_hold_all_points_and_the_ends_of_each_range(craft: Craft) -> None:
 
 
 def test_thrust_off_the_centre_of_mass_is_trimmed(craft: Craft) -> None:
-    """The same wrench as a torque that balances the moment: the same margins, and no rotation."""
+    """A torque that balances the thrust's moment gives the same margins, and no rotation."""
     craft = replace(craft, center_of_mass=(0.02, -0.01, 1.0))
     found = craft.review(gains(), PERIOD, ["50%"], damping="nominal")
     center = craft.mass_properties("50%").center_of_mass
@@ -157,7 +164,7 @@ def test_thrust_off_the_centre_of_mass_is_trimmed(craft: Craft) -> None:
 
 
 def test_the_search_finds_the_worst_corner(craft: Craft) -> None:
-    """No corner of the ranges is worse, and the simulation confirms the margin to 1 %."""
+    """No corner of the ranges has a smaller margin; the simulation confirms it to 1 %."""
     craft = replace(craft, inertia=(INERTIA, INERTIA, 1200.0))
     uncertain = {"craft.Jxx": "20%", "craft.Jyy": "10%", "delay": (0.0, 0.3)}
     options = {"damping": "nominal", "frequency": "nominal", "delay": 0.1, "uncertain": uncertain}
@@ -177,7 +184,7 @@ def test_the_search_finds_the_worst_corner(craft: Craft) -> None:
 
 
 def test_a_simulation_that_leaves_the_range_of_its_model_says_so(craft: Craft) -> None:
-    """A tank that spins fast, at the worst case: with the factor, in the review's own words."""
+    """The worst case is a tank that spins fast; the message has the factor beyond the range."""
     loop = craft.loop(gains(), PERIOD, "50%")
     run = loop.simulate(5.0, {"init.omega[3]": 9.0}, outputs=[])
     (sentence,) = [text for text in run.out_of_range if "tank 1" in text]
@@ -188,7 +195,10 @@ def test_a_simulation_that_leaves_the_range_of_its_model_says_so(craft: Craft) -
 
 
 def test_an_unstable_worst_case_grows_as_predicted(craft: Craft) -> None:
-    """Undamped slosh between hinge and bob: the simulated pole is the linear one to 1 %."""
+    """Undamped slosh is unstable if the centre of mass is between slosh mass and hinge.
+
+    The growth in the simulation is the linear pole's to 1 %.
+    """
     tank = replace(craft.tanks["ox"], position=(0, 0, 0.62), nu=None)
     craft = replace(craft, tanks={"ox": tank})
     found = craft.review(
@@ -231,7 +241,10 @@ def test_the_page_answers_first_and_needs_no_network(
 
 
 def test_the_suggested_filter_raises_the_margin_as_stated(craft: Craft) -> None:
-    """Slosh between hinge and bob: stable with the filter, as `margins` of its controller says."""
+    """With the centre of mass between hinge and slosh mass, the filter makes the loop stable.
+
+    `margins` of the controller with the filter gives the stated margin.
+    """
     craft = replace(craft, tanks={"ox": replace(craft.tanks["ox"], position=(0, 0, 0.62))})
     lightly = {"tank[1].zeta[1]": 5e-4}
     still = {"damping": "nominal", "frequency": "nominal", "inertia": "nominal"}
@@ -276,7 +289,7 @@ nu = 3e-7
 def test_a_plan_file_equals_the_call_in_python(
     craft: Craft, tmp_path: Path, capsys, monkeypatch
 ) -> None:
-    """Gains, matrices and a function in a file; the page has the plan's name."""
+    """The plan contains gains, matrices or a Python function; the page has the plan's name."""
     (tmp_path / "ox.toml").write_text("density = 1440.0\nshape = { sphere = { radius = 0.5 } }\n")
     law = (
         "import numpy as np\ndef law():\n    return np.hstack([80 * np.eye(3), 400 * np.eye(3)])\n"
@@ -326,7 +339,7 @@ def test_a_plan_file_equals_the_call_in_python(
 def test_a_project_is_the_same_after_it_was_written_and_read(
     craft: Craft, tmp_path: Path, monkeypatch
 ) -> None:
-    """Gains, matrices, a file and transfer functions; masses, engines, a tank's file, cases."""
+    """The file has gains, matrices, transfer functions, masses, engines, tank files and cases."""
     (tmp_path / "ox.toml").write_text("density = 1440.0\nshape = { sphere = { radius = 0.5 } }\n")
     (tmp_path / "law.py").write_text(f"law = {gains().tolist()}\n")
     craft = replace(
@@ -386,7 +399,7 @@ def test_a_project_is_the_same_after_it_was_written_and_read(
 def test_two_designs_are_compared_on_one_page(
     craft: Craft, tmp_path: Path, capsys, monkeypatch
 ) -> None:
-    """The worse one first and marked; the command compares two files."""
+    """The worse design comes first and is marked; ``hubslosh review`` compares two files."""
     settings = {"period": PERIOD, "fills": ["30%", "60%"], "damping": "nominal", "draws": 2}
     for name, factor in {"good": 1, "wrong sign": -1}.items():
         Project(replace(craft, model=str(craft.model)), factor * gains(), settings).save(
@@ -418,7 +431,7 @@ def test_two_designs_are_compared_on_one_page(
 
 
 def test_a_review_names_what_is_wrong(craft: Craft) -> None:
-    """Fills, ranges, names, controllers."""
+    """The errors name wrong fills, ranges, names and controllers."""
 
     def review(*, of: Craft = craft, law=None, fills=("50%",), **options) -> None:
         of.review(gains() if law is None else law, PERIOD, fills, **options)
@@ -457,7 +470,7 @@ def test_a_review_names_what_is_wrong(craft: Craft) -> None:
 
 
 def test_a_lower_slosh_frequency_makes_the_loop_unstable(craft: Craft) -> None:
-    """Stable at each nominal frequency, unstable at -10 %, which is varied by default."""
+    """The loop is stable at nominal frequencies and unstable at -10 %, the default range's end."""
     craft = replace(craft, tanks={"ox": replace(craft.tanks["ox"], position=(0, 0, 0.62))})
     options = {"damping": "nominal", "draws": 0, "parameters": {"ox.zeta[1]": 8e-4}}
     options["inertia"] = "nominal"
@@ -477,7 +490,10 @@ def test_a_lower_slosh_frequency_makes_the_loop_unstable(craft: Craft) -> None:
 
 
 def test_inertia_varies_by_one_factor(craft: Craft) -> None:
-    """By 5 %, unless it is nominal or a component has a range: the ends are those of the factor."""
+    """By default all components of the inertia vary together by 5 %.
+
+    They do not if the argument is "nominal" or a component has its own range.
+    """
     fixed = {"damping": "nominal", "frequency": "nominal", "draws": 0}
     inertia = [[900.0, -20.0, 5.0], [-20.0, 900.0, 0.0], [5.0, 0.0, 700.0]]
     craft = replace(craft, inertia=inertia)
@@ -495,7 +511,10 @@ def test_inertia_varies_by_one_factor(craft: Craft) -> None:
 
 
 def test_requirements_pass_or_fail(craft: Craft) -> None:
-    """Over nominal or all points; an unstable point fails, and failures come first everywhere."""
+    """A requirement is checked at the nominal points or at all points.
+
+    An unstable point fails, and failures are listed first.
+    """
     fills, fixed = ["30%", "50%"], {"damping": "nominal", "draws": 3}
     plain = craft.review(gains(), PERIOD, fills, **fixed)
     assert plain.requirements().empty and plain.passed and "requirement" not in plain.summary
@@ -532,7 +551,10 @@ def test_requirements_pass_or_fail(craft: Craft) -> None:
 
 
 def test_an_unstable_real_pole_is_the_worst_case(craft: Craft) -> None:
-    """Positive attitude feedback about z: J s² + kd s + kp = 0 with kp < 0, and no oscillation."""
+    """A negative attitude gain kp about z gives J s² + kd s + kp = 0 a positive real root.
+
+    The motion grows without oscillation.
+    """
     law, J = gains(), craft.mass_properties("50%").inertia[2, 2]
     law[2] = 0
     law[2, 2], law[2, 5] = -2 * 200.0, 300.0
@@ -552,7 +574,7 @@ def test_an_unstable_real_pole_is_the_worst_case(craft: Craft) -> None:
 
 
 def test_the_page_shows_what_is_unstable_first(craft: Craft) -> None:
-    """Fills, points and modes: marked, and ahead of the stable ones; one verdict at a fill."""
+    """Unstable fills, points and modes are marked and listed before stable ones."""
     craft = replace(craft, tanks={"ox": replace(craft.tanks["ox"], position=(0, 0, 0.62))})
     fills = ["10%", "30%", "50%"]
     found = craft.review(gains(25, 300), PERIOD, fills, damping="nominal", draws=0,
@@ -590,7 +612,7 @@ def test_the_page_shows_what_is_unstable_first(craft: Craft) -> None:
 
 
 def test_the_cost_of_a_review_is_limited(craft: Craft) -> None:
-    """Times, counts and sizes outside their ranges are refused in words, at once."""
+    """Times, counts and sizes outside their ranges are refused before anything is computed."""
     for (name, value), words in {
         ("period", 1e-9): "period must be a number of seconds from 1e-06 to 1e.06, not 1e-09",
         ("delay", 1e9): "delay must be a number of seconds from 0 to 1e.06",

@@ -68,9 +68,9 @@ def by_fmpy(
 def test_a_sweep_of_five_minutes_gives_the_same_rate(
     fmu: Path, harness: Harness, tmp_path: Path, model: str, friction: str
 ) -> None:
-    """All hosts hand over the same numbers, so nothing but a host's bug can part them.
+    """Every host sets the same inputs in the FMU, so that a difference is a host's error.
 
-    1e-12 rad/s is what the project promises; it is 1e-11 of the largest rate.
+    The tolerance is 1e-12 rad/s, which is 1e-11 of the largest rate.
     """
     settings = {"slosh.model": model, "friction.model": friction}
     flags = [f for name, value in settings.items() for f in ("--set", f"{name}={value}")]
@@ -91,7 +91,7 @@ def test_a_sweep_of_five_minutes_gives_the_same_rate(
 def test_a_whole_sweep_of_the_thesis_is_the_same_by_fmpy_and_by_the_harness(
     fmu: Path, harness: Harness, tmp_path: Path, sweep: tuple[str, float, float]
 ) -> None:
-    """45 minutes at 50 Hz, rotary slosh and wave breaking included."""
+    """The sweep has 45 minutes at 50 Hz, with rotary slosh and breaking waves."""
     model, fill, amplitude = sweep
     settings = {"slosh.model": model, "tank.h": fill}
     flags = [f for name, value in settings.items() for f in ("--set", f"{name}={value}")]
@@ -110,7 +110,7 @@ def test_a_whole_sweep_of_the_thesis_is_the_same_by_fmpy_and_by_the_harness(
 def test_a_held_torque_and_a_tolerance_give_the_same_rate(
     fmu: Path, harness: Harness, tmp_path: Path
 ) -> None:
-    """The torque in stairs, at another step, tolerance, tank and start."""
+    """The torque is held between samples; step, tolerance, tank and start are not the defaults."""
     settings = {"slosh.model": "spherical", "tank.h": 0.05, "init.slosh_angle": 0.1}
     flags = [f for name, value in settings.items() for f in ("--set", f"{name}={value}")]
     profile = "pulse:amplitude=0.05,start=0.1,width=1,duration=20"
@@ -126,7 +126,7 @@ def test_a_held_torque_and_a_tolerance_give_the_same_rate(
 def test_a_written_torque_history_gives_the_same_run_by_the_harness(
     fmu: Path, harness: Harness, tmp_path: Path
 ) -> None:
-    """The other way round: a table written here is read there, every digit of it."""
+    """The program reads each digit of a torque that Python has written."""
     time = np.arange(1001) * 0.02
     torque = 0.05 * np.sin(2 * np.pi * 2.4 * time)
     ours = drive(fmu, time, torque)
@@ -155,7 +155,7 @@ def pulses() -> dict[str, tuple[np.ndarray, np.ndarray]]:
 def test_an_input_history_acts_the_same_in_python_and_on_the_command_line(
     fmu: Path, harness: Harness, tmp_path: Path, name: str, step: float, hold: bool
 ) -> None:
-    """Times, inputs and outputs have the same bits, and the step only chooses rows."""
+    """Times, inputs and outputs have the same bits; the step only chooses the rows."""
     time, torque = pulses()[name]
     path = tmp_path / "in.parquet"
     write_table(path, {"time": time, TORQUE: torque})
@@ -185,7 +185,7 @@ def test_the_table_of_a_profile_acts_as_the_profile(
     fmu: Path, harness: Harness, request: pytest.FixtureRequest, tmp_path: Path,
     profile: str, step: str,
 ) -> None:  # fmt: skip
-    """What ``hubslosh torque`` writes has the bits of ``hubslosh run --profile`` in Python."""
+    """A table of ``hubslosh torque`` in Python has the bits of ``hubslosh run --profile``."""
     path = tmp_path / "torque.parquet"
     command = [option(request, "--hubslosh"), "torque", "--profile", profile]
     subprocess.run([*command, "--out", path, "--step", "0.02"], check=True, capture_output=True)
@@ -204,7 +204,7 @@ def test_the_table_of_a_profile_acts_as_the_profile(
 def test_python_and_the_command_refuse_slopes_for_an_fmu_that_cannot_interpolate(
     fmu: Path, request: pytest.FixtureRequest, tmp_path: Path
 ) -> None:
-    """The same sentence; each names its own way to held inputs."""
+    """Both give the same reason, and each names its own option for held inputs."""
     held = tmp_path / "held.fmu"
     with zipfile.ZipFile(fmu) as old, zipfile.ZipFile(held, "w", zipfile.ZIP_DEFLATED) as new:
         for name in old.namelist():

@@ -23,7 +23,7 @@ TABLE = pd.DataFrame({"time": TIME, "tau_cmd": TORQUE})
 
 
 def test_warnings_of_the_fmu_become_python_warnings(fmu: Path) -> None:
-    """At a hundredth of g capillarity counts; on the ground it does not."""
+    """At a hundredth of g the FMU warns that surface tension matters; at 1 g it does not."""
     with pytest.warns(FmuWarning, match="the Bond number is 9.2"):
         simulate(fmu, {"g_axial": 0.1}, stop=0.1)
     with warnings.catch_warnings():
@@ -34,7 +34,10 @@ def test_warnings_of_the_fmu_become_python_warnings(fmu: Path) -> None:
 def test_a_run_says_how_it_left_the_range_of_its_model_in_the_words_of_the_command(
     fmu: Path, request: pytest.FixtureRequest, tmp_path: Path
 ) -> None:
-    """The reason, its share of the time and its first time; the table has no further columns."""
+    """The message has the reason, the share of the time, and the first time.
+
+    The table has no additional columns.
+    """
     started = {"init.slosh_angle": 0.5}
     run = simulate(fmu, started, stop=1, step=0.1, outputs="omega")
     command = [option(request, "--hubslosh"), "run", "--fmu", fmu, "--step", "0.1"]
@@ -53,7 +56,7 @@ def test_a_run_says_how_it_left_the_range_of_its_model_in_the_words_of_the_comma
 
 
 def test_a_held_torque_gives_the_bits_of_fmpy(fmu: Path) -> None:
-    """Same times, same calls: outputs of all types, every one of 3001 rows."""
+    """With the same times and calls, outputs of all types agree in each of 3001 rows."""
     theirs = simulate_fmu(
         str(fmu), stop_time=60, output_interval=STEP,
         start_values={"slosh.model": 4, "init.slosh_angle": 0},
@@ -75,7 +78,7 @@ def test_a_held_torque_gives_the_bits_of_fmpy(fmu: Path) -> None:
 def test_one_compiled_call_gives_the_bits_of_single_calls(
     fmu: Path, model: str, hold: bool
 ) -> None:
-    """Three inputs with slopes or held; outputs of all types, in a mixed order."""
+    """Three inputs are held or linear; outputs of all types are listed in a mixed order."""
     inputs = TABLE.assign(tau_ext=0.01 * np.cos(3 * TIME), g_axial=9.81 + 0.5 * np.sin(TIME))
     columns = ["stuck", "omega", "regime", "tau_fluid", "event_count", "theta"]
     parameters, inputs = {"slosh.model": model}, inputs[:1001]
@@ -87,9 +90,10 @@ def test_one_compiled_call_gives_the_bits_of_single_calls(
 
 
 def test_steps_between_rows_and_rows_between_steps_do_not_change_results(fmu: Path) -> None:
-    """The torque is the same lines, whatever the step; 1e-9 is ten times the solver's tolerance.
+    """The torque is linear between its rows every 20 ms, whatever the communication step is.
 
-    50 ms is not a multiple of the rows' 20 ms, 7 ms divides nothing.
+    Steps of 50 ms and 7 ms do not fit the rows. The allowed difference, 1e-9, is ten times the
+    solver's tolerance.
     """
     rows = simulate(fmu, inputs=TABLE, tolerance=1e-10, outputs=["theta", "omega"])
     for step in (0.05, 0.007):
@@ -104,7 +108,7 @@ def test_steps_between_rows_and_rows_between_steps_do_not_change_results(fmu: Pa
 
 
 def test_two_rows_at_one_time_are_a_jump(fmu: Path) -> None:
-    """A pulse by jumps is the pulse by held rows."""
+    """A pulse whose edges are two rows at one time equals a pulse of held rows."""
     jumps = pd.DataFrame(
         {"time": [0.0, 1.003, 1.003, 2.007, 2.007, 10.0], "tau_cmd": [0, 0, 0.05, 0.05, 0, 0]}
     )
@@ -117,7 +121,7 @@ def test_two_rows_at_one_time_are_a_jump(fmu: Path) -> None:
 
 
 def test_without_inputs_the_fmu_s_experiment_is_the_default(fmu: Path) -> None:
-    """Start, stop and step are those of its DefaultExperiment, columns its outputs."""
+    """Start, stop and step are those of the FMU's DefaultExperiment; columns are its outputs."""
     run = simulate(fmu, {"init.slosh_angle": (10, "deg"), "tank.h": (50, "mm")})
     assert run["time"].iloc[-1] == 20 and len(run) == 1001
     assert run["slosh_angle"][0] == pytest.approx(np.radians(10), rel=1e-15)
@@ -127,7 +131,7 @@ def test_without_inputs_the_fmu_s_experiment_is_the_default(fmu: Path) -> None:
 
 
 def test_the_slope_of_a_torque_history_is_used(fmu: Path) -> None:
-    """The file has the form that ``hubslosh torque`` writes; here it is not that of the chords."""
+    """A file of ``hubslosh torque`` has the torque's slope, here different from the differences."""
     table = TABLE.assign(tau_slope=np.full(len(TIME), 0.25))[:501]
     ours = simulate(fmu, inputs=table, outputs=["omega"])
     theirs = drive(fmu, TIME[:501], TORQUE[:501], slope=table["tau_slope"], columns=["omega"])
@@ -135,7 +139,7 @@ def test_the_slope_of_a_torque_history_is_used(fmu: Path) -> None:
 
 
 def test_all_faults_of_a_call_are_reported_at_once(fmu: Path) -> None:
-    """Columns by name, parameters, units, outputs, times."""
+    """One message lists wrong columns, parameters, units, outputs and times."""
     inputs = pd.DataFrame({"time": [0.0, 2.0, 1.0], "tau": [0.0, 0.0, 0.0], "g_axial": [9.0] * 3})
     parameters = {"tank.height": 1, "tank.h": (5, "inch"), "theta": 1.0, "slosh.model": "conical"}
     with pytest.raises(FmuError) as told:
@@ -179,20 +183,20 @@ def test_all_faults_of_a_call_are_reported_at_once(fmu: Path) -> None:
 def test_wrong_arguments_raise_a_one_sentence_error(
     fmu: Path, arguments: dict, sentence: str
 ) -> None:
-    """One at a time."""
+    """Each call has one wrong argument."""
     with pytest.raises(FmuError) as told:
         simulate(fmu, **arguments)
     assert sentence in str(told.value)
 
 
 def test_the_limit_of_rows_equals_that_of_the_command_line() -> None:
-    """One number for both."""
+    """The constant in Python equals the constant in the Rust source of the program."""
     budget = Path(__file__).parents[2] / "files" / "src" / "budget.rs"
     assert f"pub const ROWS: usize = {simulation.MOST_ROWS:_};" in budget.read_text()
 
 
 def test_a_run_that_stops_reports_the_time_and_keeps_its_rows(fmu: Path) -> None:
-    """The FMU refuses NaN in row 500; 501 rows were read."""
+    """The FMU refuses a NaN in row 500; the 501 rows computed up to then are kept."""
     torque = TORQUE.copy()
     torque[500] = np.nan
     with Plant(fmu, torque=0.0) as plant, pytest.raises(RunError) as told:
@@ -218,7 +222,10 @@ def test_an_unknown_model_raises_an_error_with_suggestions(tmp_path: Path) -> No
 
 
 def test_inputs_may_be_in_their_display_units(fmu: Path) -> None:
-    """In mN·m the torque, in units that it has; the slope goes with it; a result is an input."""
+    """A torque in mN·m, with its slope, equals the torque in N·m.
+
+    The table that a run returns can be the input of another run.
+    """
     short = TABLE[:501].assign(tau_slope=np.append(np.diff(TORQUE[:501]) / STEP, 0.0))
     scaled = short.assign(tau_cmd=1e3 * short["tau_cmd"], tau_slope=1e3 * short["tau_slope"])
     scaled.attrs["units"] = {"time": "s", "tau_cmd": "mN.m"}
@@ -242,7 +249,7 @@ LONG = np.arange(3_000_001) * STEP
 
 
 def test_an_interrupt_stops_a_run_on_its_way(fmu: Path) -> None:
-    """A hub without friction turns as long as the run goes on."""
+    """A hub without friction turns through the whole run, which would take long."""
     turning = {"slosh.model": "frozen", "friction.model": "none", "init.omega": 1.0}
     # a shell starts its background jobs with SIGINT ignored, and Python keeps that
     handler = signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -257,7 +264,7 @@ def test_an_interrupt_stops_a_run_on_its_way(fmu: Path) -> None:
 
 
 def test_python_goes_on_during_a_run(fmu: Path) -> None:
-    """The main thread counts while another one runs."""
+    """While one thread simulates, the main thread counts."""
     with Plant(fmu) as plant:
         run = threading.Thread(target=plant.run, args=(LONG[:300_001], {}, None, ["theta"]))
         run.start()

@@ -60,7 +60,10 @@ def repaired(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_with_nothing_set_hubslosh_moves_and_the_others_rest(fmu: Path) -> None:
-    """First plot of a host: 0.06 rad from peak to peak within 20 s."""
+    """With default parameters the slosh angle of HubSlosh spans at least 0.06 rad within 20 s.
+
+    SloshTank and Spacecraft stay at rest. This is what a user sees first in a simulation tool.
+    """
     result = simulate_fmu(str(fmu))
     assert np.isfinite([list(row) for row in result]).all()
     assert 0.06 < np.ptp(result["slosh_angle"]) < 0.12
@@ -71,7 +74,10 @@ def test_with_nothing_set_hubslosh_moves_and_the_others_rest(fmu: Path) -> None:
 
 
 def test_held_inputs_of_fmpy_equal_those_of_the_harness(fmu: Path) -> None:
-    """A plain table: fmpy holds each value over the step. Only rounding parts the two."""
+    """From a plain table, fmpy holds each value over the step.
+
+    Results differ only by rounding.
+    """
     rate = drive(fmu, TIME, tau(TIME), hold=True)["omega"]
     assert difference(simulate(fmu, input=table(TIME, tau(TIME))), rate) <= 1e-9
 
@@ -115,7 +121,7 @@ def test_interpolated_inputs_of_fmpy_equal_those_of_the_harness(fmu: Path) -> No
 
 
 def test_fmpy_steps_to_jumps_of_the_input(fmu: Path) -> None:
-    """A pulse with upright edges between the output points; fmpy steps onto them."""
+    """The edges of a pulse lie between the output points, and fmpy ends a step at each edge."""
     edges = [(0.0, 0.0), (1.003, 0.0), (1.003, 0.05), (2.007, 0.05), (2.007, 0.0), (60.0, 0.0)]
     theirs = simulate(fmu, input=np.array(edges, [("time", float), ("tau_cmd", float)]))
     time = np.union1d(TIME, [1.003, 2.007])
@@ -125,13 +131,13 @@ def test_fmpy_steps_to_jumps_of_the_input(fmu: Path) -> None:
 
 
 def test_wrong_start_values_stop_the_simulation(fmu: Path) -> None:
-    """tank.h = 0 is not a tank."""
+    """A tank with the height tank.h = 0 is refused."""
     with pytest.raises(Exception, match="fmi2ExitInitializationMode"):
         simulate(fmu, start_values={"tank.h": 0})
 
 
 def test_the_example_runs(fmu: Path) -> None:
-    """It is what the documentation shows."""
+    """The documentation contains this example."""
     example = Path(__file__).resolve().parents[2] / "hosts" / "fmpy_example.py"
     done = subprocess.run(
         [sys.executable, str(example), str(fmu)], capture_output=True, text=True, check=False
@@ -149,7 +155,10 @@ def heard_by_omsimulator(name: str) -> str:
 
 
 def test_omsimulator_sets_the_spherical_model_by_names_that_it_accepts(fmu: Path) -> None:
-    """Only `slosh.model` and `friction.model` are lost there, and kinds choose the same."""
+    """OMSimulator cannot set the enumerations `slosh.model` and `friction.model`.
+
+    Other parameters, of type Integer, choose the same models.
+    """
     variables = read_model_description(str(fmu)).modelVariables
     lost = {v.name for v in variables if heard_by_omsimulator(v.name) != v.name}
     assert lost == {"slosh.model", "friction.model"}

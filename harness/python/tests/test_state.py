@@ -39,7 +39,7 @@ def go_on(plant: Plant, steps: int) -> bytes:
 
 @pytest.mark.parametrize("model", ["frozen", "linear", "planar", "spherical", "liquid"])
 def test_replay_from_a_saved_state_is_bit_identical(fmu: Path, model: str) -> None:
-    """In the same instance, and in one that has never stepped and was set up differently."""
+    """A state is restored in its own instance and in a new one with other parameters."""
     settings = EVERYTHING | {"slosh.model": model}
     with Plant(fmu, settings) as plant, Plant(fmu) as other:
         go_on(plant, 500)
@@ -54,7 +54,7 @@ def test_replay_from_a_saved_state_is_bit_identical(fmu: Path, model: str) -> No
 
 
 def test_a_damaged_state_is_refused_and_changes_nothing(fmu: Path) -> None:
-    """Cut short or with one bit turned, with a sentence that says so."""
+    """The state is cut off or has one changed bit; the error says so."""
     with Plant(fmu) as plant:
         plant.step(STEP, 0.1)
         time, good = plant.save()
@@ -101,7 +101,7 @@ for _ in range(8):
 
 
 def test_close_waits_for_a_run_in_another_thread(fmu: Path) -> None:
-    """In a process of its own: without the lock it ends by SIGSEGV."""
+    """The test runs in a process of its own, because without the lock it ends by SIGSEGV."""
     environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[1])}
     command = [sys.executable, "-c", CLOSED, fmu]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
@@ -109,7 +109,7 @@ def test_close_waits_for_a_run_in_another_thread(fmu: Path) -> None:
 
 
 def test_a_controller_cannot_close_the_instance_that_it_controls(fmu: Path) -> None:
-    """The run ends with that error; the instance can be closed then."""
+    """The run ends with an error; afterwards the instance can be closed."""
     with Plant(fmu) as plant:
 
         def law(*_: object) -> list[float]:
@@ -122,7 +122,7 @@ def test_a_controller_cannot_close_the_instance_that_it_controls(fmu: Path) -> N
 
 
 def test_a_controller_of_another_size_than_its_loop_is_refused(fmu: Path) -> None:
-    """Sizes are checked before numbers are read."""
+    """Sizes are compared before any number is read."""
     one, none = np.ones((1, 1)), np.zeros((0, 0))
     law = Linear(none, np.zeros((0, 1)), np.zeros((1, 0)), one, np.zeros((2, 1)), np.zeros((2, 1)))
     size = {"cycles": 2, "parts": 1, "switch": 0, "latency": 0}

@@ -29,9 +29,10 @@ def communication_points(cut: str) -> np.ndarray:
 def test_20_ms_5_ms_and_random_steps_agree_within_the_tolerance(
     fmu: Path, model: str, friction: str, tolerance: float
 ) -> None:
-    """The same piecewise linear torque in three cuts: rate and angle at the knots.
+    """One piecewise linear torque is stepped in three ways.
 
-    Allowed is the tolerance asked for, relative to each signal's maximum.
+    Rate and angle at its corners differ by no more than the solver's tolerance, relative to each
+    signal's maximum.
     """
     settings = {"slosh.model": model, "friction.model": friction}
     columns = ("theta", "omega", "slosh_angle", "slosh_angle_radial")

@@ -66,7 +66,7 @@ def not_called(values: dict) -> dict[str, float]:
 
 
 def test_a_resumed_study_returns_every_kind_of_value_with_its_type(tmp_path: Path) -> None:
-    """Also in the rows that were stored by an earlier call with fewer runs."""
+    """Rows that an earlier call with fewer runs has stored are included."""
     whole = study(None)
     study(tmp_path, 17)
     resumed = study(tmp_path)
@@ -83,7 +83,7 @@ def test_a_resumed_study_returns_every_kind_of_value_with_its_type(tmp_path: Pat
 
 
 def test_different_values_are_stored_as_different_texts() -> None:
-    """Values that are equal but of another type too."""
+    """Equal values of different types, such as 1 and True, also have different texts."""
     values = [item for of in RANGES.values() if isinstance(of, list) for item in of]
     values += [
         np.array([[1, 2]]),
@@ -97,7 +97,7 @@ def test_different_values_are_stored_as_different_texts() -> None:
 
 
 def test_integers_of_numpy_count_as_seed_and_runs(tmp_path: Path) -> None:
-    """They give the study of the same Python integers, stored or not."""
+    """They give the same study as Python's integers, stored or not."""
     table = monte_carlo(RANGES, np.int32(5), np.int64(3), outcome, folder=tmp_path)
     assert cells(table) == cells(study(tmp_path, 5, outcome=not_called))
 
@@ -110,7 +110,10 @@ def edited(path: Path, change) -> None:
 
 
 def test_an_edited_run_is_named_and_not_used(tmp_path: Path) -> None:
-    """It is simulated again with a warning: its values are not the seed's, or its SHA-256."""
+    """A run whose values are not the seed's, or whose SHA-256 is wrong, is simulated again.
+
+    A warning names it.
+    """
     whole = study(tmp_path)
     file = tmp_path / "runs" / "000007.json"
     original = file.read_bytes()
@@ -154,7 +157,7 @@ def test_an_edited_run_is_named_and_not_used(tmp_path: Path) -> None:
 def test_a_damaged_manifest_is_an_error_and_a_line_that_a_kill_cut_off_is_not(
     tmp_path: Path,
 ) -> None:
-    """Missing, empty, cut short, without a line, with a wrong line, with bytes that are no text."""
+    """Damaged manifests are missing, empty, cut off, not text, or have a wrong or missing line."""
     study(tmp_path)
     manifest = tmp_path / "manifest.sha256"
     good = manifest.read_bytes()
@@ -203,7 +206,7 @@ def simulated(folder: Path) -> list[dict]:
 
 
 def test_a_second_study_is_refused_while_one_holds_the_folder(tmp_path: Path) -> None:
-    """It hears which process holds it; a process that is killed holds nothing."""
+    """The message names the process that locks the folder; a killed process locks nothing."""
 
     def second(values: dict) -> dict[str, float]:
         with pytest.raises(FmuError) as error:
@@ -217,7 +220,7 @@ def test_a_second_study_is_refused_while_one_holds_the_folder(tmp_path: Path) ->
 
 
 def test_folders_of_campaigns_and_of_older_studies_are_refused(tmp_path: Path) -> None:
-    """Nothing in them is changed."""
+    """The files in such a folder are not changed."""
     old = {"seed": 3, "ranges": {}}
     for name, text, said in (
         ("plan.toml", "", "holds a campaign"),
@@ -237,7 +240,7 @@ def test_folders_of_campaigns_and_of_older_studies_are_refused(tmp_path: Path) -
 def test_a_seed_draws_the_numbers_of_a_plan(
     request: pytest.FixtureRequest, fmu: Path, tmp_path: Path
 ) -> None:
-    """Uniform numbers of ``[random]`` and of `draw`, for each run, bit by bit."""
+    """For each run, `draw` gives the bits that the program draws for ``[random]`` in a plan."""
     ranges = {"tank.h": (0.05, 0.12), "hub.I": (0.30, 0.34), "friction.b": (0.02, 0.05)}
     drawn = [
         f'{name} = {{ distribution = "uniform", from = {low}, to = {high} }}'
@@ -283,7 +286,7 @@ def doors(request: pytest.FixtureRequest, fmu: Path, tmp_path: Path) -> dict[str
 
 
 def test_campaigns_and_studies_judge_a_folder_alike(doors: dict[str, Door], tmp_path: Path) -> None:
-    """A lock that is held, a damaged manifest, a half-written run, a folder of the other kind."""
+    """Folders are locked, have a damaged manifest or half a run, or are of the other kind."""
     for kind, door in doors.items():
         folder = tmp_path / kind
         assert door(folder) == (True, ""), kind
@@ -342,7 +345,7 @@ def test_campaigns_and_studies_judge_a_folder_alike(doors: dict[str, Door], tmp_
 
 
 def test_values_that_cannot_be_stored_are_refused_before_the_first_run(tmp_path: Path) -> None:
-    """Values without a text, and texts as results, which read like numbers."""
+    """Some values have no text; results that are texts must not read like numbers."""
     with pytest.raises(FmuError, match=r"law has .*of type function.* cannot store"):
         monte_carlo({"law": [not_called]}, 2, 1, not_called, folder=tmp_path)
     with pytest.raises(FmuError, match="outcome must return numbers by name"):
@@ -400,7 +403,7 @@ def killed(folder: str, seed: int) -> None:
 def test_a_study_killed_20_times_and_edited_once_equals_an_uninterrupted_one(
     tmp_path: Path,
 ) -> None:
-    """Bit by bit, in every cell; the kills come at random moments of storing."""
+    """Every cell has the same bits; the process is killed at random moments while it stores."""
     whole = study(None, RUNS)
     seed = int(os.environ.get("HUBSLOSH_FUZZ_SEED", "1"))
     command = [sys.executable, "-c", DRIVER, tmp_path, str(seed)]

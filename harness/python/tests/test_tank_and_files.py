@@ -31,7 +31,7 @@ def program(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_tank_equals_the_command_line(program: Path, tmp_path: Path) -> None:
-    """The same file, fill and modes: result, picture and parameters."""
+    """Python and ``hubslosh tank`` give the same result, picture and parameters for one file."""
     file = ROOT / "harness" / "tank" / "examples" / "capsule.toml"
     mine = tank(file, fill="40%", modes=2, gravity=3.0, nu=1e-6)
     out, picture, parameters = (tmp_path / name for name in ("r.json", "t.svg", "p.toml"))
@@ -63,7 +63,10 @@ def test_tank_equals_the_command_line(program: Path, tmp_path: Path) -> None:
 
 
 def test_a_tank_swings_in_the_fmu_with_its_frequency(fmu: Path) -> None:
-    """Held by a huge craft, along x and along an axis of its own: the pole is the mode's."""
+    """On a very heavy craft, the pole of the linearised FMU is the mode's.
+
+    The tank's axis is x or another direction.
+    """
     full = tank(SPHERE, fill="60%", modes=1, gravity=0.1)
     for axis, thrust in (((0, 0, 1), "force[3]"), ((1, 0, 0), "force[1]"), ((0, 0, -1), None)):
         craft = {"craft.mass": 1e9, "tanks": 1, "craft.Jxx": 1e9, "craft.Jyy": 1e9}
@@ -80,7 +83,7 @@ def test_a_tank_swings_in_the_fmu_with_its_frequency(fmu: Path) -> None:
 
 
 def test_errors_of_a_tank_are_reported_in_words(tmp_path: Path) -> None:
-    """In our words, and in the program's."""
+    """The messages are those of the package or of the program."""
     full = tank(SPHERE, fill=0.3, modes=1)
     wrong = {
         "give the fill": lambda: tank(SPHERE),
@@ -108,7 +111,7 @@ def test_errors_of_a_tank_are_reported_in_words(tmp_path: Path) -> None:
 
 
 def test_tables_are_read_back_from_files_with_every_digit(tmp_path: Path) -> None:
-    """The table first, then the file."""
+    """`read_table` of a written file returns the same numbers."""
     from scipy.io import loadmat
 
     table = pd.DataFrame({"time": [0.0, 0.1], "q[1]": [1 / 3, np.pi], "stuck": [True, False]})
@@ -138,7 +141,7 @@ def test_tables_are_read_back_from_files_with_every_digit(tmp_path: Path) -> Non
 
 
 def test_every_plot_has_the_elements_of_its_docstring(fmu: Path) -> None:
-    """A band from the poles, crossings, panels in degrees, quantiles."""
+    """For example, the frequency band of a Bode plot follows from the poles."""
     viscous = {"friction.model": "viscous"}
     model = hubslosh.linearize(fmu, viscous, ["tau_cmd"], ["omega"])
     gain, _ = plot.bode(model)
@@ -214,7 +217,7 @@ def labels_of(*axes: Any) -> list[Any]:
 
 
 def test_margins_of_three_axes_can_be_read(three_axes: hubslosh.Loop) -> None:
-    """The title fits, a zero does not set the scale, and no label covers another."""
+    """The title fits, a gain of zero does not set the scale, and labels do not overlap."""
     gain, phase = plot.margins(three_axes)
     figure = gain.figure
     figure.draw_without_rendering()
@@ -231,7 +234,7 @@ def test_margins_of_three_axes_can_be_read(three_axes: hubslosh.Loop) -> None:
 
 
 def test_nichols_and_nyquist_show_every_crossing_of_three_axes(three_axes: hubslosh.Loop) -> None:
-    """Crossings are the exact ones, on 0 dB and ±180°, in the colour of their command."""
+    """Crossings lie exactly on 0 dB or ±180° and have the colour of their loop."""
     found = hubslosh.margins(three_axes).crossings.query("frequency > 0")
     nichols, nyquist = plot.nichols(three_axes), plot.nyquist(three_axes)
     for ax in (nichols, nyquist):
@@ -301,7 +304,7 @@ def parameter(name: str, value: str, unit: str = "", kind: str = "Real") -> str:
 def test_units_of_a_parameter_set_are_converted(
     fmu: Path, tmp_path: Path, text: str, name: str, value: float
 ) -> None:
-    """Through the file's definitions, otherwise through the FMU's."""
+    """Units are converted by the file's definitions, or else by the FMU's."""
     file = tmp_path / "bench.ssv"
     file.write_text(SSV.format(parameters=text, units=""))
     converted = hubslosh.fmu.Fmu.open(fmu).convert(name, hubslosh.read_parameters(file)[name])
@@ -349,7 +352,7 @@ def test_units_of_a_parameter_set_are_converted(
 def test_a_unit_that_is_not_one_of_the_variable_is_refused(
     fmu: Path, tmp_path: Path, text: str, units: str, said: str
 ) -> None:
-    """A file that is not a parameter set is refused, too."""
+    """A file that is not a parameter set is also refused."""
     file = tmp_path / "bench.ssv"
     file.write_text(SSV.format(parameters=text, units=units))
     with pytest.raises(FmuError, match=said):
@@ -361,7 +364,7 @@ def test_a_unit_that_is_not_one_of_the_variable_is_refused(
 def test_an_output_follows_links_and_is_written_to_a_pipe(
     tmp_path: Path, write: Callable[[pd.DataFrame, Path], None]
 ) -> None:
-    """As the program writes: a link stays a link, a pipe a pipe."""
+    """As in the program, a link and a pipe are not replaced by a file."""
     ending = write.__name__.removeprefix("to_")
     table = pd.DataFrame({"time": [0.0, 1.0], "omega": [1.0, 2.0]})
     plain, link, far, pipe = (tmp_path / f"{n}.{ending}" for n in ("plain", "link", "far", "pipe"))

@@ -37,7 +37,10 @@ def started(fmu: Path, how: str, folder: Path) -> int:
 def test_folders_of_a_killed_process_are_removed_at_the_next_start(
     fmu: Path, tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:
-    """In Python and of the program; a folder of a living process stays, and what is not ours."""
+    """Python and the program remove temporary folders of processes that no longer exist.
+
+    Folders of running processes and foreign folders stay.
+    """
     kept = tmp_path / "hubslosh-of-somebody"
     kept.mkdir()
     pipe = tmp_path / "hubslosh-pipe"
@@ -60,7 +63,7 @@ def test_folders_of_a_killed_process_are_removed_at_the_next_start(
 
 
 def test_an_incomplete_table_is_removed_when_the_next_one_is_written(tmp_path: Path) -> None:
-    """The draft lies in the folder of the file, for it is renamed."""
+    """The table is first written to a temporary file in the same folder and then renamed."""
     import pandas as pd
 
     from hubslosh.files import to_csv
@@ -89,7 +92,7 @@ with hubslosh.Plant(sys.argv[1]):
 def test_the_end_of_a_forked_process_does_not_remove_the_folder_of_its_parent(
     fmu: Path, tmp_path: Path
 ) -> None:
-    """The parent removes it at its own end."""
+    """The parent removes the folder when it ends."""
     environment = os.environ | {
         "PYTHONPATH": str(Path(__file__).parents[1]),
         "TMPDIR": str(tmp_path),

@@ -45,7 +45,7 @@ def check(checkers: Path, name: str, scripts: list[Path], folder: Path) -> tuple
 @pytest.mark.long
 @pytest.mark.parametrize("name", ["mypy", "pyright"])
 def test_type_checkers_accept_scripts_of_users(checkers: Path, name: str, tmp_path: Path) -> None:
-    """A craft, margins, Monte Carlo, identification, a recording with figures: no complaint."""
+    """The script uses a craft, margins, Monte Carlo, identification and figures."""
     assert len(USERS) == 5
     code, output = check(checkers, name, USERS, tmp_path)
     assert code == 0, output
@@ -54,7 +54,7 @@ def test_type_checkers_accept_scripts_of_users(checkers: Path, name: str, tmp_pa
 @pytest.mark.long
 @pytest.mark.parametrize("script", USERS, ids=[script.stem for script in USERS])
 def test_a_script_of_a_user_runs(script: Path, tmp_path: Path, wheel: Path, request) -> None:
-    """With the wheel, in a folder of its own."""
+    """The script runs with the wheel in an empty folder."""
     run_with_wheel([script], wheel, tmp_path, request)
 
 
@@ -73,7 +73,7 @@ MISTAKES = {
 @pytest.mark.long
 @pytest.mark.parametrize("name", ["mypy", "pyright"])
 def test_type_checkers_find_mistakes_of_users(checkers: Path, name: str, tmp_path: Path) -> None:
-    """In every line: no part of the package is Any by mistake."""
+    """Each line has an error, so that no type of the package is Any by mistake."""
     script = tmp_path / "mistakes.py"
     script.write_text("\n".join(["import hubslosh", *MISTAKES, ""]))
     code, output = check(checkers, name, [script], tmp_path)
@@ -84,7 +84,7 @@ def test_type_checkers_find_mistakes_of_users(checkers: Path, name: str, tmp_pat
 
 
 def test_the_compiled_half_has_the_types_that_are_declared() -> None:
-    """``_native.pyi`` has its names and those of its classes, and no others."""
+    """``_native.pyi`` declares exactly the names of the compiled module and of its classes."""
     tree = ast.parse(Path(hubslosh.__file__).with_name("_native.pyi").read_text())
     module = sys.modules["hubslosh._native"]
     declared = {

@@ -63,7 +63,7 @@ def difference(model: UncertainModel, delta: np.ndarray, spacecraft: Path) -> fl
 
 
 def test_every_draw_is_the_linear_model_of_the_fmu(spacecraft: Path) -> None:
-    """1e-9 is promised; ends of the ranges, beyond them, and 40 draws within."""
+    """The draws agree to 1e-9 at the ends of the ranges, beyond them, and at 40 points within."""
     model = uncertain(POINT, RANGES, ("torque", "force"), model=spacecraft)
     random = np.random.default_rng(3)
     count = len(RANGES)
@@ -77,7 +77,10 @@ def test_every_draw_is_the_linear_model_of_the_fmu(spacecraft: Path) -> None:
 
 
 def test_repetitions_equal_those_of_the_derivation(spacecraft: Path) -> None:
-    """With the surface at rest; one axis alone needs half of a mode's."""
+    """The number of copies of each parameter is as derived for a surface at rest.
+
+    Along one axis a mode needs half as many copies.
+    """
     still = {"tank[1].g_ref": 0.3, "force[3]": 470.0, "tank[1].position[3]": -0.3}
     ranges = {f"tank[1].{kind}[1]": "5%" for kind in ("frequency", "zeta", "mass", "bob")}
     ranges |= {"craft.mass": "5%", "craft.Jxx": "5%", "craft.Jxy": (-5, 5), "acceleration": "5%"}
@@ -93,7 +96,7 @@ def test_repetitions_equal_those_of_the_derivation(spacecraft: Path) -> None:
 
 
 def test_surface_tension_without_gravity_gives_a_stable_mode(spacecraft: Path) -> None:
-    """Without thrust the frequency is that of the centring stiffness, at every length."""
+    """Without thrust the frequency is that of the centring stiffness, for every length."""
     start = {"tank[1].k[1]": 3.0, "tank[1].g_ref": 1e-3}
     ranges = {"tank[1].frequency[1]": "20%", "tank[1].mass[1]": "5%"}
     model = uncertain(start, ranges, model=spacecraft)
@@ -105,7 +108,7 @@ def test_surface_tension_without_gravity_gives_a_stable_mode(spacecraft: Path) -
 
 
 def test_a_covariance_gives_its_principal_axes(spacecraft: Path) -> None:
-    """Along each axis ±2 standard deviations; the quadratic form of the covariance is 4."""
+    """Each principal axis ends at ±2 standard deviations, where the quadratic form is 4."""
     names = ["tank[1].frequency[1]", "craft.Jxx"]
     matrix = pd.DataFrame([[4e-6, 1.2e-2], [1.2e-2, 100.0]], names, names)
     of_fit = {"correlations": [dict.fromkeys(names)], "covariance": matrix.to_numpy().tolist()}
@@ -134,9 +137,10 @@ def fit(names: list[str], matrix: np.ndarray) -> Identification:
 
 
 def test_a_fit_s_parameters_become_uncertain_ones(spacecraft: Path) -> None:
-    """The response along each axis of Δ has the derivatives of the FMU's own linear model.
+    """Derivatives of the response by each entry of Δ equal the linearised FMU's.
 
-    Its thrust gives each craft the same acceleration. Central differences: 1e-5 of the largest.
+    They are central differences, good to 1e-5 of the largest. The thrust gives each craft the same
+    acceleration.
     """
     names = ["tank[1].length[1]", "tank[1].hinge[1]", "tank[1].zeta[1]", "tank[1].mass[1]",
              "tank[1].m_0", "tank[1].H_0", "tank[1].I_0", "craft.mass", "craft.Jxx"]  # fmt: skip
@@ -177,7 +181,10 @@ def test_a_fit_s_parameters_become_uncertain_ones(spacecraft: Path) -> None:
 def test_a_fit_of_a_length_gives_the_frequency_with_its_deviation(
     spacecraft: Path, request: pytest.FixtureRequest
 ) -> None:
-    """The frequency within 4 σ of the truth; its deviation and the bob's by the formulas."""
+    """The frequency is within 4 σ of the truth.
+
+    The deviations of frequency and height of the slosh mass follow from formulas.
+    """
     time = np.arange(0.0, 60.0, 0.2)
     torque = pd.DataFrame({"time": time, "torque[2]": np.where(time < 2, 5.0, 0.0)})
     flight = hubslosh.simulate(spacecraft, STILL, torque, outputs=["omega[2]"])
@@ -204,7 +211,7 @@ def test_a_fit_of_a_length_gives_the_frequency_with_its_deviation(
 
 
 def test_a_fit_that_the_model_cannot_take_is_refused_by_name(spacecraft: Path) -> None:
-    """A tank's place, a frequency that does not act, and what is not resolved."""
+    """Refused are a tank's position, a frequency without effect, and undetermined parameters."""
     for name, words in [
         ("tank[1].position[3]", r"replaces tank\[1\].position\[3\] \(allowed"),
         ("tank[1].frequency[1]", r"frequency\[1\] = 0 has no effect"),
@@ -219,7 +226,7 @@ def test_a_fit_that_the_model_cannot_take_is_refused_by_name(spacecraft: Path) -
 
 
 def test_saved_files_restore_the_uncertain_model(spacecraft: Path, tmp_path: Path) -> None:
-    """By scipy, json and python-control."""
+    """Files are read by scipy, json and python-control."""
     model = uncertain(POINT, RANGES, model=spacecraft)
     hubslosh.to_mat(model, tmp_path / "craft.mat")
     read = loadmat(tmp_path / "craft.mat", simplify_cells=True)
@@ -237,7 +244,7 @@ def test_saved_files_restore_the_uncertain_model(spacecraft: Path, tmp_path: Pat
 
 @pytest.mark.octave
 def test_octave_reads_the_file(spacecraft: Path, tmp_path: Path) -> None:
-    """read_lft.m, the part that is arithmetic."""
+    """Octave runs the part of read_lft.m that needs no toolbox."""
     model = uncertain(POINT, RANGES, model=spacecraft)
     hubslosh.to_mat(model, tmp_path / "craft.mat")
     delta = np.linspace(-1, 1, len(RANGES))
@@ -252,7 +259,7 @@ def test_octave_reads_the_file(spacecraft: Path, tmp_path: Path) -> None:
 
 
 def test_models_families_and_parameters_as_mat(spacecraft: Path, tmp_path: Path) -> None:
-    """Names are cell arrays; a family has a third dimension."""
+    """Names are cell arrays, and a family of models has a third dimension."""
     models = {g: linearize(spacecraft, POINT | {"force[3]": g}, "torque", "omega")
               for g in (300.0, 400.0)}  # fmt: skip
     hubslosh.to_mat(models[300.0], tmp_path / "one.mat")
@@ -273,7 +280,10 @@ def test_models_families_and_parameters_as_mat(spacecraft: Path, tmp_path: Path)
 
 @pytest.mark.filterwarnings("ignore:at the start a tank leaves its range")
 def test_all_faults_of_an_uncertain_model_are_reported_at_once(spacecraft: Path) -> None:
-    """Names, ranges, signals; craft that have no such model."""
+    """One message lists wrong names, ranges and signals.
+
+    Craft without such a model are also refused.
+    """
     ranges = {"tank[1].frequence[1]": "5%", "craft.mass": (2, 1), "tank[1].zeta[1]": "150%"}
     with pytest.raises(FmuError) as told:
         uncertain(POINT, ranges, outputs=["theta"], model=spacecraft)
@@ -303,7 +313,7 @@ def danger(spacecraft: Path) -> tuple[UncertainModel, Loop]:
 
 
 def test_the_worst_case_swings_in_the_nonlinear_fmu(danger: tuple[UncertainModel, Loop]) -> None:
-    """At its frequency (1 %): beyond µ's lower bound it grows, below it decays."""
+    """Above µ's lower bound the motion grows, below it decays; its frequency agrees to 1 %."""
     model, loop = danger
     worst = model.worst_case(loop)
     assert 0.1 < worst.size < 3 and worst.mu == pytest.approx(1 / worst.size)
@@ -324,7 +334,7 @@ def test_the_worst_case_swings_in_the_nonlinear_fmu(danger: tuple[UncertainModel
 
 
 def test_bounds_of_mu_enclose_the_worst_case(danger: tuple[UncertainModel, Loop]) -> None:
-    """The upper bound at the frequency of the worst case is above the lower bound, and near."""
+    """At the worst case's frequency the upper bound is above the lower bound, and near."""
     model, loop = danger
     worst = model.worst_case(loop)
     upper = model.mu_upper(loop, [worst.frequency])[0]
@@ -334,7 +344,10 @@ def test_bounds_of_mu_enclose_the_worst_case(danger: tuple[UncertainModel, Loop]
 
 
 def test_the_upper_bound_of_one_repeated_parameter_is_exact() -> None:
-    """I - δ N is singular where 1/δ is a real eigenvalue, or nowhere. The floor of D costs 2 %."""
+    """I - δ N is singular where 1/δ is a real eigenvalue of N.
+
+    The bound is within 2 %, the cost of keeping the scaling D away from singular matrices.
+    """
     random = np.random.default_rng(4)
     for n in (1, 2, 3, 4, 5):
         similar = random.normal(size=(n, n)) + 1j * random.normal(size=(n, n))
@@ -346,7 +359,7 @@ def test_the_upper_bound_of_one_repeated_parameter_is_exact() -> None:
 
 
 def test_a_range_may_end_on_one_side() -> None:
-    """1 + 2 δ is singular at δ = -0.5 alone, which a damping ratio may not reach."""
+    """1 + 2 δ is singular at δ = -0.5 only, which a damping ratio cannot reach."""
     matrix = np.array([[-2.0]])
     for least, exact in ((-np.inf, 2.0), (-0.6, 2.0), (-0.5, 2.0), (-0.4, SMALLEST)):
         bound = mu_upper(matrix, [1], np.array([least]))
@@ -354,7 +367,10 @@ def test_a_range_may_end_on_one_side() -> None:
 
 
 def test_the_upper_bound_of_two_parameters_is_near_the_truth() -> None:
-    """One in three copies, the other in one: for each δ of the first the second follows."""
+    """One parameter has three copies and the other one.
+
+    For each value of the first, the value of the second at which the loop is singular is known.
+    """
     random = np.random.default_rng(8)
     ratios = []
     for _ in range(12):
@@ -385,7 +401,7 @@ def test_the_upper_bound_of_two_parameters_is_near_the_truth() -> None:
 def test_without_the_solver_the_error_says_how_to_install_it(
     danger: tuple[UncertainModel, Loop], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The package clarabel is an extra."""
+    """The solver clarabel is an optional dependency."""
     monkeypatch.setitem(sys.modules, "clarabel", None)
     model, loop = danger
     for call in (lambda: model.mu_upper(loop, [0.1]), lambda: model.certify(loop)):
@@ -394,7 +410,10 @@ def test_without_the_solver_the_error_says_how_to_install_it(
 
 
 def test_no_draw_within_a_certificate_is_unstable(danger: tuple[UncertainModel, Loop]) -> None:
-    """Nor at corners; beyond the worst case the loop is. A damping ratio ends at 0."""
+    """Random draws and corners are stable; beyond the worst case the loop is unstable.
+
+    A damping ratio does not fall below 0.
+    """
     model, loop = danger
     found = model.certify(loop)
     assert 1 < found.gap < 1.0401 and found.mu == pytest.approx(1 / found.size)
@@ -417,7 +436,7 @@ def test_no_draw_within_a_certificate_is_unstable(danger: tuple[UncertainModel, 
 def test_a_failed_certificate_is_reported(
     danger: tuple[UncertainModel, Loop], tmp_path: Path
 ) -> None:
-    """One convex problem is too few for any size."""
+    """A limit of one convex problem is too low to certify a range of any size."""
     model, loop = danger
     found = model.certify(loop, most=1)
     assert found.size == 0 and found.mu == found.gap == np.inf

@@ -8,12 +8,12 @@ from fmpy.validation import validate_fmu
 
 
 def test_the_validator_finds_no_problems(fmu: Path) -> None:
-    """Schema, names, model structure, start values, causalities, units."""
+    """FMPy checks schema, names, model structure, start values, causalities and units."""
     assert validate_fmu(str(fmu)) == []
 
 
 def test_the_command_hubslosh_check_finds_no_problems_either(fmu: Path) -> None:
-    """Calls the command as a user does."""
+    """The test calls ``hubslosh check`` as a user does."""
     command = [sys.executable, "-m", "fmpy", "validate", str(fmu)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout.strip()) == (0, "No problems found."), done.stderr

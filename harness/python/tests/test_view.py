@@ -23,7 +23,7 @@ def shown(page: str) -> dict:
 
 
 def test_a_table_is_shown_with_the_parameters_it_was_made_with(fmu: Path, request) -> None:
-    """The tank has the diameter that was set, in a unit of its own; columns come to 32 bits."""
+    """The tank has the diameter that was set in another unit; columns are rounded to 32 bits."""
     parameters = {"tank.d": (200, "mm"), "slosh.model": "spherical", "init.slosh_angle": 0.2}
     run = hubslosh.simulate(fmu, parameters=parameters, stop=3.0, step=0.02)
     page = hubslosh.view(run, program=option(request, "--hubslosh"))
@@ -44,7 +44,7 @@ def test_a_table_is_shown_with_the_parameters_it_was_made_with(fmu: Path, reques
 def test_a_table_without_the_columns_of_the_motion_is_refused(
     fmu: Path, tmp_path: Path, request
 ) -> None:
-    """All that is missing at once, and how it is recorded; no half page."""
+    """One message lists all missing columns and how to record them; no page is written."""
     run = hubslosh.simulate(fmu, stop=1.0, step=0.02, outputs=["wave_height"])
     out = tmp_path / "page.html"
     with pytest.raises(FmuError, match=r"theta \(or omega\).*slosh_angle") as error:
@@ -55,7 +55,7 @@ def test_a_table_without_the_columns_of_the_motion_is_refused(
 
 
 def test_a_tank_is_drawn_by_its_file(fmu: Path, tmp_path: Path, request) -> None:
-    """A sphere half full of the bench's liquid: its surface is at its middle."""
+    """In a sphere that is half full the surface is drawn at mid height."""
     tank = tmp_path / "sphere.toml"
     tank.write_text("density = 1000\nshape = { sphere = { radius = 0.1 } }\n")
     mass = 1000 * 2 / 3 * np.pi * 0.1**3
@@ -93,7 +93,7 @@ def test_a_run_is_a_pandas_table_also_after_a_loop_a_copy_and_a_pickle(fmu: Path
 def test_default_runs_are_shown(
     fmu: Path, request, name: str, parameters: dict, angles: int
 ) -> None:
-    """The default record of every FMU contains what the page needs."""
+    """The default outputs of every FMU contain what the page needs."""
     path = fmu.with_name(f"{name}.fmu")
     run = hubslosh.simulate(path, parameters, stop=1.0, step=0.05)
     assert sum(".angle_" in column for column in run.columns) == angles

@@ -45,7 +45,7 @@ def installed(wheel: Path, tmp_path_factory) -> Path:
 
 
 def test_the_record_has_every_file_and_its_hash(wheel: Path) -> None:
-    """Checks RECORD as an installer does."""
+    """The test checks the file RECORD as an installer does."""
     with zipfile.ZipFile(wheel) as archive:
         names = archive.namelist()
         record = names[-1]
@@ -66,7 +66,7 @@ def test_the_record_has_every_file_and_its_hash(wheel: Path) -> None:
 
 @pytest.mark.long
 def test_the_fmus_of_fmi_3_are_found_by_name(installed: Path, tmp_path: Path) -> None:
-    """In a folder without the source, as a user has it; the rate has the bits of FMI 2.0."""
+    """They are found in a folder without the source; the rate has the bits of FMI 2.0."""
     program = """
 from hubslosh import simulate
 for model in ("HubSlosh", "Spacecraft", "SloshTank"):
@@ -105,7 +105,7 @@ def python_in(page: Path) -> list[str]:
 @pytest.mark.long
 @pytest.mark.parametrize("readme", [ROOT / "README.md", HERE / "README.md"])
 def test_the_code_in_a_readme_runs(installed: Path, tmp_path: Path, readme: Path) -> None:
-    """With the wheel alone, in an empty directory."""
+    """The code runs in an empty folder with the wheel alone."""
     for code in python_in(readme):
         done = subprocess.run(
             [installed, "-I", "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
@@ -131,7 +131,7 @@ assert not found.failed and found.attempted > 100, found
 def test_the_examples_in_docstrings_give_what_they_show(
     wheel: Path, tmp_path: Path, request
 ) -> None:
-    """In a folder of their own, with the wheel."""
+    """They run in a folder of their own, with the wheel."""
     run_with_wheel(["-c", DOCTESTS], wheel, tmp_path, request)
 
 
@@ -143,7 +143,7 @@ def run_pages(pages: tuple[str, ...], wheel: Path, folder: Path, request) -> str
 
 @pytest.mark.long
 def test_the_books_page_for_python_runs(wheel: Path, tmp_path: Path, request) -> None:
-    """All its blocks as one program."""
+    """All code blocks of the page run as one program."""
     said = run_pages(("python_howto",), wheel, tmp_path, request)
     assert "there are frozen, linear, planar, spherical" in said
     for file in ("loop.png", "bode.png", "path.png", "slew/report.html"):
@@ -152,7 +152,7 @@ def test_the_books_page_for_python_runs(wheel: Path, tmp_path: Path, request) ->
 
 @pytest.mark.long
 def test_the_books_pages_about_a_spacecraft_run(wheel: Path, tmp_path: Path, request) -> None:
-    """The worked example, then the three questions."""
+    """The worked example runs first, then the pages on three questions."""
     pages = ("spacecraft", "which_damping", "how_many_modes", "is_it_slosh")
     assert "slosh of tank 1, slosh of tank 2" in run_pages(pages, wheel, tmp_path, request)
     for file in ("tank.svg", "margins.png", "slew.png"):
@@ -171,7 +171,7 @@ def test_the_books_pages_about_a_spacecraft_run(wheel: Path, tmp_path: Path, req
 def test_every_fmu_of_the_wheel_runs(
     installed: Path, tmp_path: Path, model: str, parameters: dict, moves: str
 ) -> None:
-    """Simulates an installed FMU by name for a second; its initial slosh moves it."""
+    """An FMU, found by name, is simulated for a second, and its initial slosh moves it."""
     code = (
         "import hubslosh\n"
         f"run = hubslosh.simulate({model!r}, {parameters!r}, stop=1)\n"
@@ -186,7 +186,7 @@ def test_every_fmu_of_the_wheel_runs(
 
 @pytest.mark.long
 def test_a_craft_of_one_or_two_tanks_is_made_uncertain(installed: Path, tmp_path: Path) -> None:
-    """By the FMU of the wheel, which is the same for every craft."""
+    """The wheel contains the one FMU that this needs for any craft."""
     code = """
 import numpy as np
 import hubslosh
@@ -209,7 +209,7 @@ for places in ({"a": (0, 0, 0.2)}, {"a": (0.4, 0, 0.2), "b": (-0.4, 0, 0.2)}):
 
 @pytest.mark.long
 def test_functions_that_need_another_package_name_it(installed: Path, tmp_path: Path) -> None:
-    """Plots and control are extras."""
+    """Plots and python-control need optional dependencies."""
     code = (
         "import hubslosh, pandas\n"
         "run = hubslosh.simulate(stop=1)\n"
@@ -231,7 +231,7 @@ def test_functions_that_need_another_package_name_it(installed: Path, tmp_path: 
 def test_a_notebook_runs(
     wheel: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, path: Path
 ) -> None:
-    """From top to bottom with the wheel's files, every cell, figures included."""
+    """Every cell runs in order with the wheel's files, figures included."""
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(tmp_path / "wheel")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path / "wheel"))
@@ -248,5 +248,5 @@ def test_a_notebook_runs(
 
 
 def test_notebooks_exist() -> None:
-    """The list above is not empty by mistake."""
+    """The list of notebooks is not empty."""
     assert len(NOTEBOOKS) == 3
