@@ -13,7 +13,7 @@ def after(run) -> float:
 
 
 def test_inertias_equal_those_of_all_liquid_and_of_the_rigid_part(spacecraft: str) -> None:
-    """With frozen liquid the FMU has the inertia of craft and liquid together.
+    """With rigid liquid the FMU has the inertia of craft and liquid together.
 
     The observer's inertia is 17.5 kg·m² less, because the sloshing part does not follow a fast
     turn.
