@@ -21,7 +21,7 @@ fn dependencies() -> BTreeMap<String, BTreeSet<String>> {
 }
 
 #[test]
-fn the_physics_knows_no_fmi_and_the_runtime_no_physics() {
+fn the_physics_does_not_depend_on_fmi_or_the_runtime_on_physics() {
     let all = dependencies();
     for physics in ["plant", "craft"] {
         let of_both = BTreeSet::from(["formulas".into(), "libm".into(), "taylor".into()]);

@@ -301,7 +301,7 @@ fn an_fmu_with_arrays_steps_bit_identically_to_one_with_scalars() {
 }
 
 #[test]
-fn the_fmu_with_arrays_has_the_states_derivatives_and_indicators_of_that_with_scalars() {
+fn fmus_with_arrays_and_with_scalars_have_equal_states_derivatives_and_indicators() {
     for case in cases() {
         let opened = [Fmi::V3Arrays, Fmi::V3].map(|fmi| Opened::new(case.model, fmi));
         let names = inputs(&opened[0]);

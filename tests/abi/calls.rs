@@ -206,7 +206,7 @@ fn binary_exports_the_functions_of_fmi_and_nothing_else() {
 }
 
 #[test]
-fn binary_says_that_it_is_fmi_2_with_the_standard_s_types() {
+fn the_binary_returns_version_2_0_and_the_types_platform_default() {
     let fmu = open();
     assert_eq!((fmu.version().as_str(), fmu.types_platform().as_str()), ("2.0", "default"));
 }
@@ -318,7 +318,7 @@ fn missing_name_and_unknown_type_give_no_instance_and_a_reason() {
 }
 
 #[test]
-fn without_callbacks_there_is_no_instance_and_no_crash() {
+fn instantiation_without_callbacks_returns_null_and_does_not_crash() {
     let fmu = open();
     let mut with = fmu.instantiation("one");
     with.callbacks = Callbacks::Null;
@@ -371,7 +371,7 @@ fn every_function_handles_a_null_instance() {
 // ---- The logger ----
 
 #[test]
-fn messages_are_proper_text_in_a_declared_category() {
+fn log_messages_are_valid_text_in_a_declared_category() {
     let fmu = open();
     let xml = {
         let mut text = String::new();

@@ -174,7 +174,7 @@ fn units_are_defined<M: Model>() {
 }
 
 #[test]
-fn every_unit_of_fmi_3_is_defined_that_of_time_too() {
+fn every_unit_of_fmi_3_is_defined_including_the_unit_of_time() {
     units_are_defined::<HubSlosh::HubSlosh>();
     units_are_defined::<Spacecraft::Model>();
     units_are_defined::<SloshTank::Model>();

@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn beside_a_turning_point_nothing_is_limited_unless_the_curve_is_to_stay_within_its_points() {
+    fn next_to_a_turning_point_slopes_are_limited_only_if_the_curve_must_stay_within_its_points() {
         let x = [0.0, 1.0, 2.0, 3.0, 4.0];
         for sign in [1.0, -1.0] {
             let y = x.map(|x| sign * (x - 1.9) * (x - 1.9));

@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn torque_that_brings_the_rotor_back_is_given_at_the_limit() {
+    fn at_its_speed_limit_a_rotor_still_takes_torque_that_slows_it_down() {
         let w = Wheel { speed_0: wheel().speed_min, ..wheel() };
         assert_eq!(w.torque(w.speed_0, Ramp { value: 0.1, slope: 0.0 }).value, 0.0);
         assert_eq!(w.torque(w.speed_0, Ramp { value: -0.1, slope: 0.0 }).value, -0.1);
@@ -188,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn a_command_at_a_limit_is_within_or_beyond_it_by_its_slope() {
+    fn a_rising_command_at_a_limit_is_limited_and_a_falling_one_is_not() {
         let w = wheel();
         let (limit, middle) = (w.tau_max, w.speed_0);
         for sign in [1.0, -1.0] {

@@ -42,7 +42,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn hash_of_a_is_the_published_one() {
+    fn the_hash_of_the_letter_a_is_the_published_value() {
         // FNV-1a 128 test vector for "a".
         let a = Hash::new().bytes(b"a").value();
         assert_eq!(a, 0xd228_cb69_6f1a_8caf_7891_2b70_4e4a_8964);

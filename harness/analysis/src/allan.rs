@@ -181,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn a_ramp_rises_with_the_averaging_time() {
+    fn the_allan_deviation_of_a_ramp_rises_with_the_averaging_time() {
         // rate D t: two neighbouring means differ by D tau, so the deviation is D tau / sqrt 2
         let samples: Vec<f64> = (0..20_000).map(|k| 0.25 * 0.1 * k as f64).collect();
         let points = variances(0.1, &samples);
@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn the_bias_has_its_peak_where_the_page_says() {
+    fn the_allan_deviation_of_a_gauss_markov_bias_has_its_peak_where_the_book_says() {
         let noise = Noise { bias_instability: FLICKER, bias_time: 100.0, ..Noise::default() };
         let deviation = |tau: f64| noise.variance(tau).sqrt();
         let times = (0..10_000).map(|k| f64::from(k) * 0.1 + 1.0);

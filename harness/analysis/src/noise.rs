@@ -99,7 +99,7 @@ mod tests {
     }
 
     #[test]
-    fn a_linear_plant_leaves_the_noise_that_was_added_and_nothing_without() {
+    fn with_a_linear_plant_the_estimated_noise_is_the_added_noise() {
         let (_, torque, mut rate) = sweep(0.1);
         let grid = logarithmic_grid((2.0, 3.0), 200);
         let clean = power(STEP, &torque, &rate, &grid);

@@ -36,7 +36,7 @@ mod tests {
     use super::Random;
 
     #[test]
-    fn a_seed_gives_these_numbers_on_every_machine() {
+    fn a_seed_gives_the_same_random_numbers_on_every_machine() {
         // the same from PCG's definition in Python's integers
         let mut random = Random::new(1, 2);
         let bits = [random.uniform(), random.normal()].map(f64::to_bits);

@@ -249,7 +249,7 @@ mod tests {
     use crate::random::Random;
 
     #[test]
-    fn white_normal_noise_on_a_line_is_recognised() {
+    fn white_normal_noise_on_a_linear_trend_is_recognised() {
         let mut random = Random::new(1, 0);
         let samples: Vec<f64> =
             (0..100_000).map(|k| 1e-3 + 1e-9 * f64::from(k) + 4e-4 * random.normal()).collect();

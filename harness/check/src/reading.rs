@@ -109,7 +109,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_encoding_equals_that_of_the_declaration() {
+    fn the_encoding_of_an_xml_file_is_read_from_its_declaration() {
         let found = |text: &str| encoding(text.as_bytes());
         assert_eq!(found("<?xml version='1.0' encoding = 'ISO-8859-1' ?>").unwrap(), "ISO-8859-1");
         assert_eq!(found("\u{feff}<?xml encoding=\"UTF-8\"?><a/>").unwrap(), "UTF-8");

@@ -358,7 +358,7 @@ mod tests {
     }
 
     #[test]
-    fn bad_numbers_are_refused_all_at_once() {
+    fn all_invalid_numbers_are_reported_at_once() {
         let none = Liquid { density: -1.0, tension: f64::NAN };
         let text = bond(none, (9.81, 0.0), WATER, None).unwrap_err().to_string();
         assert_eq!(text, "density = -1, tension = NaN, radius = 0 (allowed: positive numbers)");

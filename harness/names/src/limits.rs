@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn each_tank_that_was_out_of_range_has_a_sentence() {
+    fn the_report_has_a_sentence_for_each_tank_that_left_its_range() {
         let names = ["tank[1].limited_by_kind", "tank[2].limited_by_kind"];
         let limits = Limits::find(|name| names.contains(&name));
         assert_eq!(limits.required_columns().collect::<Vec<_>>(), names);

@@ -417,7 +417,7 @@ mod tests {
     }
 
     #[test]
-    fn differences_next_to_a_corner_keep_their_digits() {
+    fn distances_between_points_near_a_corner_keep_their_digits() {
         let boundary = Boundary::new(&step());
         let panels = boundary.panels(3, false);
         let corner = |segment: usize, end: bool| {

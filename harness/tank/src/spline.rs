@@ -162,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn away_from_the_axis_the_first_and_last_two_pieces_are_one_cubic_each() {
+    fn away_from_the_axis_the_first_two_pieces_of_a_spline_are_one_cubic_and_so_are_the_last_two() {
         let all = derivatives(&POINTS);
         near(all[0][0][3], all[1][0][3]);
         near(all[3][0][3], all[4][0][3]);
@@ -200,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn equal_points_are_all_named() {
+    fn the_message_names_all_equal_points() {
         let p = [1.0, 0.5];
         let message = spline(&[p, p, [1.0, 1.0], p, p]).unwrap_err().to_string();
         assert!(message.contains("Points 1 and 2 are the same, (1, 0.5) m."), "{message}");

@@ -404,7 +404,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bob_that_stands_straight_up_is_out_of_range() {
+    fn a_slosh_mass_above_its_hinge_is_out_of_range() {
         let mode = Spherical::new(&Pendulum::default());
         for (q, is_out) in
             [([0.0; 4], false), ([600.0, 700.0, 0.0, 0.0], false), ([0.0, -1001.0, 0.0, 0.0], true)]

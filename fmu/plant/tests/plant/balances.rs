@@ -65,7 +65,7 @@ fn energy_balances_for_every_model_friction_and_damping() {
 }
 
 #[test]
-fn power_dissipated_equals_the_loss_of_energy() {
+fn the_dissipated_power_equals_the_rate_at_which_energy_is_lost() {
     // Central difference of the energy over 2 ms against the power: its error is
     // (2 pi f h)^2/6 of the power's change, some 1e-4.
     for slosh in SLOSH {

@@ -168,7 +168,7 @@ fn liquid_that_turns_with_the_hub_pushes_outwards() {
 }
 
 #[test]
-fn liquid_pushes_back_against_an_acceleration() {
+fn liquid_at_rest_reacts_against_an_acceleration_of_the_hub() {
     for slosh in SloshModel::ALL {
         let p = bench(slosh, FrictionModel::None);
         let inputs = Inputs { tau_ext: Ramp::held(0.1), ..Inputs::default() };

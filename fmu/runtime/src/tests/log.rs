@@ -126,7 +126,7 @@ fn a_warning_about_the_hosts_inputs_comes_once() {
 }
 
 #[test]
-fn categories_are_the_standards_and_events_only_where_there_are_some() {
+fn log_categories_are_the_standards_and_include_events_only_if_the_model_has_events() {
     let described = |all: Vec<Category>| -> Vec<(&str, String)> {
         all.into_iter().map(|c| (c.name, c.description)).collect()
     };

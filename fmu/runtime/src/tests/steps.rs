@@ -35,7 +35,7 @@ fn a_step_moves_the_model_along_the_inputs_slopes() {
 }
 
 #[test]
-fn a_step_has_a_length_and_begins_where_the_last_one_ended() {
+fn a_step_is_longer_than_zero_and_begins_where_the_last_one_ended() {
     let mut instance = started(CS, &[]);
     for (h, text) in [(0.0, "0.0"), (-1.0, "-1.0"), (f64::NAN, "NaN"), (f64::INFINITY, "inf")] {
         assert_eq!(

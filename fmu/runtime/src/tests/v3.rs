@@ -168,7 +168,7 @@ fn a_ramp_by_intermediate_update_is_the_input_derivative_of_fmi_2_to_the_last_bi
 }
 
 #[test]
-fn an_early_return_happens_at_the_time_that_the_host_requests_if_it_is_allowed() {
+fn a_step_returns_early_at_the_time_that_the_host_requests_if_it_allows_early_return() {
     let (instance, host) = stepping(true);
     host.lock().unwrap().force = Some(1.0);
     host.lock().unwrap().wish = Some(0.25);
@@ -287,7 +287,7 @@ fn time_is_a_variable_after_those_of_the_table() {
 }
 
 #[test]
-fn no_instance_without_name_token_or_for_scheduled_execution() {
+fn instantiation_fails_without_name_or_token_or_for_scheduled_execution() {
     let host = Mutex::new(TestHost::default());
     let environment = ptr::from_ref(&host).cast_mut().cast();
     let guid = c_string(Spring::table().guid());
@@ -327,7 +327,7 @@ fn no_instance_without_name_token_or_for_scheduled_execution() {
 }
 
 #[test]
-fn a_number_sign_is_doubled_and_a_percent_sign_is_not() {
+fn log_messages_of_fmi_3_double_number_signs_and_keep_percent_signs() {
     let host = Mutex::new(TestHost::default());
     let environment = ptr::from_ref(&host).cast_mut().cast();
     unsafe {

@@ -131,7 +131,7 @@ fn binaries_that_no_host_can_use_are_reported() {
 }
 
 #[test]
-fn a_check_without_calls_says_so() {
+fn a_check_that_could_not_call_the_fmu_states_this_in_its_report() {
     let mut files = ours().clone();
     let name = binary();
     files.iter_mut().find(|(n, _)| *n == name).unwrap().0 =

@@ -69,7 +69,7 @@ fn edited_fmu(directory: &Path, edit: impl Fn(String) -> Option<String>) -> Path
 }
 
 #[test]
-fn a_run_leaves_the_columns_asked_for() {
+fn a_run_writes_the_requested_columns() {
     let directory = tempfile::tempdir().unwrap();
     let done = short_run(
         directory.path(),

@@ -271,7 +271,7 @@ fn the_command_in_the_report_is_quoted_for_the_shell() {
 }
 
 #[test]
-fn a_runs_name_may_be_any_text_but_none_or_one_too_long_for_a_file() {
+fn a_runs_name_may_be_any_text_that_is_not_empty_or_too_long_for_a_file_name() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let plan = "profile = \"exp-sweep:f0=2,f1=2.8,duration=60\"\n\

@@ -101,7 +101,7 @@ review none.toml --out review.html
 ";
 
 #[test]
-fn sizes_0_and_1_give_a_result_or_one_error() {
+fn options_with_sizes_0_and_1_give_a_result_or_one_error() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     prepare(folder);

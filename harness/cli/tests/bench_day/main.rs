@@ -150,7 +150,7 @@ fn a_day_of_logs_gives_the_chapters_and_every_number_is_within_its_interval() {
 }
 
 #[test]
-fn a_missing_file_has_a_message_and_its_chapter_says_so() {
+fn a_chapter_whose_file_is_missing_contains_the_message() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let day = Day {

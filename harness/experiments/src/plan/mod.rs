@@ -724,7 +724,7 @@ mod tests {
     }
 
     #[test]
-    fn dwells_at_an_onset_have_its_frequency_and_all_torques() {
+    fn dwells_at_the_onset_frequency_are_run_with_all_torques() {
         let text = "profile = \"sine:duration=10\"\n[vary]\nslosh.model = [\"planar\", \"spherical\"]\n\
                     [onset]\nfrequency = [2.3, 2.5]\namplitude = [0.03, 0.1]\n";
         let mut plan = Plan::parse(text).unwrap();
@@ -915,7 +915,7 @@ mod tests {
     }
 
     #[test]
-    fn every_error_of_the_format_has_its_line() {
+    fn every_error_in_a_plan_file_is_reported_with_its_line() {
         let lines = |text: &str| -> Vec<String> {
             let error = Plan::parse(text).unwrap_err().to_string();
             error.lines().skip(1).map(|line| line.trim().to_string()).collect()

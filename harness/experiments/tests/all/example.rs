@@ -78,7 +78,7 @@ fn the_examples_in_six_axes_slosh_by_degrees() {
 }
 
 #[test]
-fn held_torque_is_within_what_the_example_says() {
+fn held_torque_differs_by_no_more_than_the_example_says() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let example = &EXAMPLES[0];
     let input = folder(example).join(example.input());

@@ -262,14 +262,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn links_are_resolved_from_the_page_that_has_them() {
+    fn links_are_resolved_relative_to_the_page_that_contains_them() {
         assert_eq!(resolve("a/b/c.md", "d.md"), "a/b/d.md");
         assert_eq!(resolve("a/b/c.md", "../../d.md"), "d.md");
         assert_eq!(resolve("c.md", "./a/d.md"), "a/d.md");
     }
 
     #[test]
-    fn names_are_short_and_tell_the_fmus_apart() {
+    fn short_names_of_fmus_are_different() {
         assert_eq!(name("modelDescription/HubSlosh/documentation/model.md"), "hubslosh-model");
         assert_eq!(name("modelDescription/Spacecraft/documentation/model.md"), "spacecraft-model");
         assert_eq!(name("book/campaigns.md"), "campaigns");

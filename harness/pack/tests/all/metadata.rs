@@ -42,7 +42,7 @@ fn address_and_version_equal_those_of_cargo_toml() {
 }
 
 #[test]
-fn an_index_shows_readme_with_links_that_work() {
+fn the_package_index_shows_readme_with_absolute_links() {
     let text = metadata::text().unwrap();
     let (head, body) = text.split_once("\n\n").unwrap();
     assert!(head.contains(&format!("\nProject-URL: Source, {REPOSITORY}\n")), "{head}");

@@ -499,7 +499,7 @@ mod tests {
     }
 
     #[test]
-    fn rotary_slosh_in_the_first_run_gives_no_statement_below_it() {
+    fn if_the_first_run_is_rotary_the_report_says_nothing_about_smaller_torques() {
         let all = [series("spherical", "", &[(50.0, 2.0, 2.9, true), (100.0, 0.0, 0.0, true)])];
         assert_eq!(
             describe_responses(&all, TORQUE, " mN·m"),

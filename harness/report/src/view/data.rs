@@ -115,7 +115,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_last_row_is_kept_and_the_page_stays_within_its_budget() {
+    fn the_viewer_keeps_the_last_row_and_limits_the_number_of_values() {
         for (rows, columns) in [(2, 5), (100_000, 40), (1_000_003, 9)] {
             let kept = Thinning::new(rows, columns).rows(rows);
             assert!(kept.len() * columns <= MOST_VALUES + columns, "{rows} x {columns}");

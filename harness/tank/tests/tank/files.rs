@@ -678,7 +678,7 @@ fn modes_are_numbered_from_1() {
 }
 
 #[test]
-fn a_table_at_0_gravity_says_that_frequencies_are_0_where_there_are_any() {
+fn a_table_at_0_gravity_has_a_note_that_only_capillarity_restores_the_liquid() {
     let sphere = tank("density = 1000.0\nshape = { sphere = { radius = 1.0 } }");
     let said = |fill: f64, gravity: f64| {
         let text = table(&sphere.solve(fill, 1).unwrap(), gravity);

@@ -106,7 +106,7 @@ fn a_sweep_has_the_damping_of_every_fill() {
 }
 
 #[test]
-fn every_bad_fill_of_a_sweep_is_reported() {
+fn every_impossible_fill_of_a_sweep_is_reported() {
     let tank = tank("density = 1.0\nshape = { cylinder = { radius = 1.0, height = 1.0 } }");
     assert_eq!(sweep(&tank, &[-1.0, 0.5, 1.5, 2.0], 2).unwrap_err().0.len(), 3);
     assert!(sweep(&tank, &[0.5, 0.4], 2).unwrap_err().to_string().contains("must ascend"));
