@@ -158,16 +158,6 @@ pub const SAME_INSTANT: f64 = 1e-9;
 /// search may try values that take millions: it cannot judge them, and tries others.
 pub const MOST_INTERNAL_STEPS: (f64, f64) = (200.0, 2e4);
 
-// Comparison of models: `methods/output_error.rs`.
-// Tests: `a_difference_of_ten_in_the_criterion_is_a_probability_of_99_percent`, `a_downward_sweep_shows_that_slosh_rotates`.
-/// Difference below which it tells nothing (not worth more than a bare mention, ibid.).
-pub const BIC_ALIKE: f64 = 2.0;
-
-// Search of any FMU: `fit/search.rs`.
-// Tests: `intervals_contain_the_true_values_of_a_hub_in_closed_form`, `parameters_without_information_are_not_determined_and_bounds_are_named`.
-/// Windows of a search from afar, as parts of the recordings.
-pub const WINDOWS: [f64; 5] = [0.1, 0.2, 0.4, 0.7, 1.0];
-
 // Starts from data: `bench/start.rs`.
 // Tests: `poles_and_zeros_of_the_exact_response_give_the_bench_back`.
 /// Damping ratios that are tried.

@@ -19,9 +19,10 @@ use serde::Serialize;
 
 use crate::engine::knowledge::Inseparable;
 use crate::engine::minimum::{Curvature, places};
+use crate::engine::profile::Z;
 use crate::engine::search::{solve, solve_near};
 use crate::engine::solver_error::SolverError;
-use crate::engine::{CONVERGED, Motion, Signal, Solution, Unknown};
+use crate::engine::{ENDS, Motion, Signal, Solution, Unknown};
 use crate::estimate::{Estimated, prose};
 use crate::input::question::{Question, Setting};
 use crate::input::record::Record;
@@ -40,8 +41,6 @@ const PRIOR_ALONE: f64 = 0.9;
 const ADDED: f64 = 0.05;
 /// Standard deviations by which the minimum may lie beyond a bound by chance.
 const PRESSED: f64 = 3.0;
-/// Two-sided 95 % of the normal distribution.
-const Z: f64 = 1.96;
 /// Second difference of an output that counts as a jump: in standard deviations of its noise, and in medians of all.
 const JUMP: (f64, f64) = (8.0, 20.0);
 /// Searches at most, each without the rows next to jumps of the one before.
@@ -394,7 +393,7 @@ fn conclude(
             .collect(),
         ..Details::default()
     });
-    found.converged = minimum.decrement < CONVERGED;
+    found.converged = minimum.decrement < ENDS.0;
     let fits = found.details.outputs.iter().all(Output::passed);
     let is_decided = !found.details.decided_by_solver.is_empty();
     let pressed = named(&numbers.pressed);

@@ -20,7 +20,7 @@ use crate::engine::cause::{Effect, cause, effects};
 use crate::engine::draws::Derived;
 use crate::engine::hold::Rival;
 use crate::engine::minimum::places;
-use crate::engine::{CONVERGED, Fit, Motion, Part, Solution};
+use crate::engine::{ENDS, Fit, Motion, Part, Solution};
 use crate::estimate::{Estimated, prose};
 use crate::input::recording::Recording;
 use crate::input::tolerance::{self, Share};
@@ -67,7 +67,7 @@ pub fn summary(system: &BenchSystem, solution: &Solution, (model, law): (&str, &
         deviance,
         bic: deviance + count as f64 * (rows as f64).ln(),
         fit_pct,
-        converged: solution.minimum.decrement < CONVERGED,
+        converged: solution.minimum.decrement < ENDS.0,
         newton_decrement: solution.minimum.decrement,
         tests: solution.tests.clone(),
         validation_pct: Vec::new(),

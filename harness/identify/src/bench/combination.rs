@@ -3,13 +3,12 @@
 use analysis::statistics::{deviation, mean};
 use names::hubslosh::friction;
 
+use crate::engine::VAGUE;
 use crate::engine::draws::Derived;
 use crate::words::combination::Combination;
 
 /// Correlation above which two unknowns count as determined only if each is precise by itself.
 const ALIKE: f64 = 0.99;
-/// Relative standard deviation beyond which a correlated unknown is not known by itself.
-const VAGUE: f64 = 0.05;
 /// Standard deviation of the friction's asymmetry above which the recordings do not show it.
 pub const ONE_WAY: f64 = 0.25;
 /// Part of a hub's path against its main direction above which it turns both ways.

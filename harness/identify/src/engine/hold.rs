@@ -8,12 +8,10 @@ use anyhow::Result;
 
 use super::minimum::{End, Minimum};
 use super::problem::{Hold, Role};
-use super::{DECIDES, ENDS, Fit};
+use super::{ALIKE, DECIDES, ENDS, Fit};
 
 /// A delay that much below 0, in rows, is none: stamps of two channels differ by that.
 const EARLIEST: f64 = 0.05;
-/// A behaviour is taken for better if its sum of squares is less by this (not worth more than a bare mention: Kass and Raftery).
-const ALIKE: f64 = 2.0;
 
 /// Another behaviour, at its own minimum.
 #[derive(Clone, Debug)]

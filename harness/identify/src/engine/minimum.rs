@@ -45,9 +45,8 @@ impl End {
     }
 }
 
-/// Least regularisation of a curvature with a unit diagonal.
-const LEAST: f64 = 1e-12;
-/// Eigenvalue of a curvature with a unit diagonal, over the largest one, up to which the recordings do not show its direction.
+/// Eigenvalue of a curvature with a unit diagonal, over the largest one, up to which the recordings do not show its direction; also
+/// the least regularisation of such a curvature.
 const FLAT: f64 = 1e-12;
 /// A direction is resolved if its eigenvalue is this many times larger than what errors of the derivatives make of it by chance.
 const RESOLVED: f64 = 4.0;
@@ -83,7 +82,7 @@ impl Curvature {
             Cholesky::new(DMatrix::from_fn(keep.len(), keep.len(), entry))
         };
         let right = DVector::from_iterator(keep.len(), keep.iter().map(|k| b[*k]));
-        let mut more = LEAST;
+        let mut more = FLAT;
         loop {
             if let Some(found) = damped(more) {
                 return found.solve(&right);

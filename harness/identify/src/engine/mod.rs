@@ -31,6 +31,10 @@ pub use search::Solution;
 
 /// Difference of −2 ln L that decides between two explanations (Kass and Raftery 1995: very strong).
 pub const DECIDES: f64 = 10.0;
+/// Difference of −2 ln L that tells nothing (ibid.: not worth more than a bare mention).
+pub const ALIKE: f64 = 2.0;
+/// Relative standard deviation from which on a value is vague: its likelihood may be no parabola.
+pub const VAGUE: f64 = 0.05;
 /// Change of the residuals by a difference, in standard deviations of one degree of freedom: above the errors of a solver, below the
 /// curvature of the answer.
 pub const MOVE: f64 = 0.3;
@@ -42,10 +46,9 @@ pub const BEND: f64 = 0.3;
 pub const WIDER: f64 = 8.0;
 /// The first step, in the same units.
 pub const FIRST_STEP: f64 = 1e-3;
-/// Distance from a minimum, in standard deviations, at which a comparison of minima ends, and at which the last search ends.
+/// Distance from a minimum, in standard deviations, up to which a search has converged, because the stated deviations contain it, and
+/// at which the last search ends.
 pub const ENDS: (f64, f64) = (0.5, 0.02);
-/// Distance to the minimum up to which a search has converged, standard deviations: the stated deviations contain it.
-pub const CONVERGED: f64 = 0.5;
 /// Factors by which the noise counts in a search over the whole recordings: large ones let the priors lead at first, so that a
 /// start may be far from the minimum.
 pub const INFLATIONS: [f64; 3] = [100.0, 10.0, 1.0];

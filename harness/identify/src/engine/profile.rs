@@ -3,16 +3,14 @@
 use anyhow::Result;
 use nalgebra::DMatrix;
 
-use super::Fit;
 use super::minimum::{Curvature, End, Minimum, places};
 use super::problem::Part;
+use super::{DECIDES, Fit, VAGUE};
 
-/// Growth of the sum of squares at which a profile ends: such a point counts e⁻⁵.
-const RAISED: f64 = 10.0;
 /// Growth of the sum of squares below which an end of the range leaves an interval open: 1.96².
-pub const OPEN: f64 = 3.8415;
-/// Relative standard deviation of the unknown, or of one that depends on it, from which on the profile is followed.
-const VAGUE: f64 = 0.05;
+pub const OPEN: f64 = Z * Z;
+/// Two-sided 95 % of the normal distribution.
+pub const Z: f64 = 1.96;
 /// Part by which the root of the likelihood's rise may differ from that of a parabola.
 const PARABOLIC: f64 = 0.1;
 /// Sets of derivatives at one point, besides those of the point before.
@@ -84,7 +82,7 @@ impl Fit<'_> {
         for sign in [-1.0, 1.0] {
             let z = &minimum.point.z;
             let room = if sign < 0.0 { z[j] - self.ends[j].0 } else { self.ends[j].1 - z[j] };
-            let far = (OPEN.sqrt() * std).min(room);
+            let far = (Z * std).min(room);
             if far < 0.1 * std {
                 continue;
             }
@@ -164,7 +162,7 @@ impl Fit<'_> {
                 Point { at: p.at, minimum: Minimum { point, ..p.minimum.clone() } }
             })
             .collect();
-        let rivals = beyond.iter().any(|p| p.minimum.point.cost < minimum.point.cost + RAISED);
+        let rivals = beyond.iter().any(|p| p.minimum.point.cost < minimum.point.cost + DECIDES);
         if found.is_none() && !(std(j) > VAGUE || has_partner || rivals) {
             return Ok(None);
         }
@@ -192,7 +190,7 @@ impl Fit<'_> {
                     }
                 }
                 z[j] = at;
-                let above = least + 3.0 * RAISED;
+                let above = least + 3.0 * DECIDES;
                 let end = End { above, trusts: true, gain: GAIN, ..End::new(SETS, NEAR) };
                 let Ok(found) = self.minimise(&z, &free, last.derivatives.clone(), end) else {
                     break;
@@ -202,7 +200,7 @@ impl Fit<'_> {
                 points.push(Point { at, minimum: found.clone() });
                 (before, h_last) = (Some(last.point.z.clone()), h);
                 last = found;
-                if rise > RAISED {
+                if rise > DECIDES {
                     break;
                 }
                 let more = rise - risen;

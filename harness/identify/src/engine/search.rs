@@ -9,7 +9,7 @@ use super::hold::Rival;
 use super::minimum::{Curvature, End, Minimum, places};
 use super::problem::{Part, Problem, Role, Signal};
 use super::profile::{self, LOWER, Profile};
-use super::{ENDS, Fit, INFLATIONS};
+use super::{ALIKE, ENDS, Fit, INFLATIONS};
 use crate::news::News;
 
 /// Parts of the recordings in a search from a start that leads to no minimum on the whole: over a whole oscillation the sum of squares has a
@@ -19,6 +19,9 @@ const PARTS: [f64; 7] = [0.1, 0.2, 0.3, 0.4, 0.55, 0.75, 1.0];
 const ABOVE: f64 = 1.5;
 /// Rounds of noise, minimum and profile at the end, each from a lower minimum.
 const ROUNDS: usize = 3;
+/// Turns of noise and minimum at most, and the part of the sum of squares that is left by the last one.
+const TURNS: usize = 8;
+const SETTLED: f64 = 0.98;
 /// Doublings of the distance at which a side of a start is looked at.
 const LOOKS: usize = 8;
 /// Distance at which a side of a start is looked at, standard deviations.
@@ -33,8 +36,6 @@ const ASTRAY: (f64, f64) = (0.25, 3.0);
 const SHOWN: f64 = 0.5;
 /// Most sets of derivatives of the last search, and the fall of the sum of squares below which a set is the last one.
 const LAST: (usize, f64) = (8, 0.3);
-/// The same fall where minima are only compared.
-const ROUGH: f64 = 2.0;
 /// Drift that the noise may have where a misfit is looked at: white noise over that of rows, size and least time of the drift.
 const OWN: (f64, f64, f64) = (1.1, 0.3, 50.0);
 
@@ -210,7 +211,7 @@ impl Found {
         (self.minimum, self.rivals) = (minimum, rivals);
         fit.renew_noise(&self.minimum.point);
         let (free, z) = (fit.free.clone(), self.minimum.point.z.clone());
-        let end = End { gain: ROUGH, ..End::new(4, ENDS.0) };
+        let end = End { gain: ALIKE, ..End::new(4, ENDS.0) };
         self.minimum = fit.minimise(&z, &free, None, end)?;
         (self.noise, self.hold, self.is_judged) = (fit.noise.clone(), fit.hold, true);
         (self.is_noise, self.is_loud) = (fit.is_noise(&self.minimum.point), fit.is_loud());
@@ -297,11 +298,19 @@ impl Fit<'_> {
     ) -> Result<(Minimum, Option<Profile>)> {
         let free = self.free.clone();
         let (mut once, mut profile) = (false, None);
+        let rows: usize =
+            self.problem.signals.iter().map(|s| s.sampled.iter().filter(|s| **s).count()).sum();
         for _ in 0..ROUNDS {
-            self.renew_noise(&minimum.point);
-            let z = minimum.point.z.clone();
-            minimum =
-                self.minimise(&z, &free, None, End { gain: LAST.1, ..End::new(LAST.0, ENDS.1) })?;
+            for _ in 0..TURNS {
+                self.renew_noise(&minimum.point);
+                let z = minimum.point.z.clone();
+                let end = End { gain: LAST.1, ..End::new(LAST.0, ENDS.1) };
+                minimum = self.minimise(&z, &free, None, end)?;
+                // the noise is that of the point before, which matters where it is next to nothing
+                if minimum.point.cost > SETTLED * rows as f64 {
+                    break;
+                }
+            }
             let stuck = self.stuck(&minimum.point.z);
             if !stuck.is_empty() && !once {
                 once = true;
@@ -326,7 +335,7 @@ impl Fit<'_> {
             if let Some(low) = lowest.filter(|_| fall > 0.0) {
                 minimum = Minimum { derivatives: None, free: free.clone(), ..low.minimum.clone() };
             }
-            if fall <= ROUGH {
+            if fall <= ALIKE {
                 minimum.decrement = self.decrement(&mut minimum, &others)?;
                 break;
             }
@@ -465,7 +474,7 @@ impl Fit<'_> {
             for (k, part) in PARTS.into_iter().enumerate() {
                 let noise = first(self);
                 self.set(noise, part);
-                let end = End { gain: ROUGH, ..End::new(8, ENDS.0) };
+                let end = End { gain: ALIKE, ..End::new(8, ENDS.0) };
                 let minimum = self.minimise(&z, &free, None, end)?;
                 let cost = minimum.point.cost;
                 match before.get(k) {
@@ -484,7 +493,7 @@ impl Fit<'_> {
             for inflation in INFLATIONS {
                 self.inflation = inflation;
                 let sets = if inflation > 1.0 { 8 } else { 4 };
-                let end = End { gain: ROUGH, ..End::new(sets, ENDS.0) };
+                let end = End { gain: ALIKE, ..End::new(sets, ENDS.0) };
                 let searched = self.minimise(&z, &free, None, end);
                 self.inflation = 1.0;
                 let minimum = searched?;

@@ -76,22 +76,30 @@ impl Recording {
         self.duration() / (self.time.len() - 1) as f64
     }
 
+    /// The recording with each signal mapped; `mask` maps which rows of a signal have a value.
+    fn mapped(
+        &self,
+        of: impl Fn(&Vec<f64>) -> Vec<f64>,
+        mask: impl Fn(&Vec<bool>) -> Option<Vec<bool>>,
+    ) -> Recording {
+        let mask = |rows: &Option<Vec<bool>>| rows.as_ref().and_then(&mask);
+        Recording {
+            angle: self.angle.as_ref().map(&of),
+            gravity: self.gravity.as_ref().map(&of),
+            wheel_speed: self.wheel_speed.as_ref().map(&of),
+            off_axis: [0, 1].map(|axis| self.off_axis[axis].as_ref().map(&of)),
+            from_rest: self.from_rest,
+            fresh: mask(&self.fresh),
+            angle_fresh: mask(&self.angle_fresh),
+            commanded: mask(&self.commanded),
+            ..Recording::of(&self.name, of(&self.time), of(&self.torque), of(&self.rate))
+        }
+    }
+
     /// The rows `from..to`.
     pub(crate) fn rows(&self, from: usize, to: usize) -> Recording {
-        Recording {
-            name: self.name.clone(),
-            time: self.time[from..to].to_vec(),
-            torque: self.torque[from..to].to_vec(),
-            rate: self.rate[from..to].to_vec(),
-            angle: self.angle.as_ref().map(|x| x[from..to].to_vec()),
-            gravity: self.gravity.as_ref().map(|x| x[from..to].to_vec()),
-            wheel_speed: self.wheel_speed.as_ref().map(|x| x[from..to].to_vec()),
-            off_axis: self.off_axis.clone().map(|axis| axis.map(|x| x[from..to].to_vec())),
-            from_rest: false,
-            fresh: self.fresh.as_ref().map(|x| x[from..to].to_vec()),
-            angle_fresh: self.angle_fresh.as_ref().map(|x| x[from..to].to_vec()),
-            commanded: self.commanded.as_ref().map(|x| x[from..to].to_vec()),
-        }
+        let part = self.mapped(|x| x[from..to].to_vec(), |mask| Some(mask[from..to].to_vec()));
+        Recording { from_rest: false, ..part }
     }
 
     /// Rows with a value of the torque.
@@ -260,15 +268,7 @@ impl Recording {
         if rows.len() as f64 > SLOW_GYRO * self.time.len() as f64 || rows.len() < 3 {
             return Cow::Borrowed(self);
         }
-        let of = |values: &Vec<f64>| rows.iter().map(|k| values[*k]).collect::<Vec<f64>>();
-        Cow::Owned(Recording {
-            angle: self.angle.as_ref().map(of),
-            gravity: self.gravity.as_ref().map(of),
-            wheel_speed: self.wheel_speed.as_ref().map(of),
-            off_axis: [0, 1].map(|axis| self.off_axis[axis].as_ref().map(of)),
-            from_rest: self.from_rest,
-            ..Recording::of(&self.name, of(&self.time), of(&self.torque), of(&self.rate))
-        })
+        Cow::Owned(self.mapped(|x| rows.iter().map(|k| x[*k]).collect(), |_| None))
     }
 
     pub(crate) fn even_rows(&self) -> Result<(f64, Vec<f64>, Vec<f64>)> {

@@ -7,12 +7,11 @@ use anyhow::{Context, Result};
 use serde::Serialize;
 use signals::recording::{Quantity, quantity};
 
-use super::{Method, Needs, Task};
+use super::{Method, Task};
 use crate::engine::minimum::{Curvature, places};
 use crate::engine::search::solve;
 use crate::engine::{
-    CONVERGED, Drift, Hold, Motion, Part, Problem, Recorded, Role, Signal, Solution, System,
-    Unknown,
+    Drift, ENDS, Hold, Motion, Part, Problem, Recorded, Role, Signal, Solution, System, Unknown,
 };
 use crate::estimate::Estimated;
 use crate::input::recording::Recording;
@@ -171,8 +170,6 @@ fn residuals(solution: &Solution) -> (f64, Vec<Vec<f64>>) {
 impl Method for FreeDecay {
     type Details = Details;
 
-    const NEEDS: Needs = Needs { fmu: false, validation: false };
-
     fn identify(&self, task: &Task, news: &mut dyn FnMut(&News)) -> Result<Found> {
         let [unit, inverse, squared] = self.units();
         for recording in task.recordings {
@@ -227,7 +224,7 @@ impl Method for FreeDecay {
         let plus = |e: &Estimated| format!("{:.5} ± {:.5}", e.value, 1.96 * e.std);
         let (f, zeta) = (plus(&frequency), plus(&answer.measurement["zeta"]));
         answer.measurement.insert("frequency".into(), frequency);
-        answer.converged = found.minimum.decrement < CONVERGED;
+        answer.converged = found.minimum.decrement < ENDS.0;
         let residual_of = |(recording, residual): (&Recording, &Vec<f64>)| Residual {
             name: recording.name.clone(),
             label: format!("{}, {unit}", self.signal),

@@ -14,7 +14,7 @@ use report::page::{axis_chart, render_chart, series};
 use report::svg::{Axis, Style};
 
 use super::output_error::{self, OutputError};
-use super::{Method, Needs, Task};
+use super::{Method, Task};
 use crate::bench::braking::{Braking, FrictionPoint, harmonics_at};
 use crate::bench::identification::{Details, Identification};
 use crate::bench::nominal::{self, Nominal};
@@ -36,8 +36,6 @@ pub struct Friction {
 
 impl Method for Friction {
     type Details = Details;
-
-    const NEEDS: Needs = Needs { fmu: true, validation: true };
 
     fn identify(&self, task: &Task, progress: &mut dyn FnMut(&News)) -> Result<Identification> {
         let options = Options { validation: task.validation.to_vec(), ..self.options.clone() };

@@ -1,4 +1,4 @@
-//! Methods of identification, one a file: what each is given, what it needs of that, and what all return.
+//! Methods of identification, one a file: what each is given, and what all return.
 
 pub mod free_decay;
 pub mod friction;
@@ -30,22 +30,10 @@ impl<'a> Task<'a> {
     }
 }
 
-/// Inputs that a method needs or can use.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Needs {
-    /// The FMU.
-    pub fmu: bool,
-    /// Recordings that are held back.
-    pub validation: bool,
-}
-
 /// A method of identification.
 pub trait Method {
     /// Results that only this method has.
     type Details: Serialize;
-
-    /// Parts of a [`Task`] that the method needs.
-    const NEEDS: Needs;
 
     /// Identifies; `progress` receives each message.
     fn identify(

@@ -11,7 +11,7 @@ use names::hubslosh::FrictionModel;
 use names::hubslosh::SloshModel::{Frozen, Linear, Planar, Spherical};
 use names::hubslosh::{self};
 
-use super::{Method, Needs, Task};
+use super::{Method, Task};
 use crate::bench::answer::{self, Fitted, conclude};
 use crate::bench::breaking;
 use crate::bench::identification::{Details, Identification, ModelFit};
@@ -21,11 +21,11 @@ use crate::bench::start::{self, Response};
 use crate::bench::system::BenchSystem;
 use crate::bench::verdict;
 use crate::engine::search::solve;
-use crate::engine::{DECIDES, Problem};
+use crate::engine::{ALIKE, DECIDES, Problem};
 use crate::input::plausible;
 use crate::input::recording::Recording;
 use crate::news::News;
-use crate::tuning::{BEGINNINGS, BIC_ALIKE, LONG_RECORDING};
+use crate::tuning::{BEGINNINGS, LONG_RECORDING};
 use crate::words::page::Sections;
 
 /// The FMU fitted in the time domain.
@@ -36,8 +36,6 @@ pub struct OutputError {
 
 impl Method for OutputError {
     type Details = Details;
-
-    const NEEDS: Needs = Needs { fmu: true, validation: true };
 
     fn identify(&self, task: &Task, progress: &mut dyn FnMut(&News)) -> Result<Identification> {
         let options = Options { validation: task.validation.to_vec(), ..self.options.clone() };
@@ -278,7 +276,7 @@ fn transferred(from: &Fitted, to: &BenchSystem, problem: &Problem) -> Vec<f64> {
 fn sort(fitted: &mut [Fitted]) -> (usize, usize) {
     fitted.sort_by(|a, b| a.fit.bic.total_cmp(&b.fit.bic));
     let within = |of: f64| fitted.iter().filter(|f| f.fit.bic < fitted[0].fit.bic + of).count();
-    let (near, alike) = (within(DECIDES), within(BIC_ALIKE));
+    let (near, alike) = (within(DECIDES), within(ALIKE));
     fitted[..alike].sort_by_key(|f| SIMPLEST.iter().position(|model| *model == f.fit.model));
     (near, fitted.len())
 }

@@ -1,18 +1,25 @@
 //! Any FMU, here HubSlosh with a hub of which the motion is known in closed form: I ω' = τ − b ω.
 
 use analysis::random::Random;
+use experiments::profile::Torque;
 use files::output::atomically;
+use host::fmu::Fmu;
 use identify::any_fmu::foresee::foresee;
 use identify::any_fmu::likelihood::deviances;
 use identify::any_fmu::system::FmuSystem;
 use identify::any_fmu::{Identification, identify, page};
-use identify::engine::Fit;
+use identify::bench::options::Options;
 use identify::engine::minimum::End;
+use identify::engine::{Fit, Hold};
 use identify::input::question::{Question, Solver};
 use identify::input::record::Record;
+use identify::input::tolerance::Tolerances;
+use identify::methods::output_error;
 use identify::model::simulate::Model;
 use pack::{Fmi, HUBSLOSH, packed_for_tests, packed_version_for_tests};
 use std::io::Write;
+
+use crate::fmu_twin::{self, SensorErrors};
 
 /// Rows are this far apart, s.
 const STEP: f64 = 0.05;
@@ -376,4 +383,60 @@ fn a_minimum_at_a_bound_is_reported_in_the_verdict() {
     let set = |name: &str| held.settings.get(name).map(String::as_str);
     assert_eq!(set("slosh.model"), Some("frozen"));
     assert_eq!(set("fluid.rho"), Some("1e-6"));
+}
+
+/// The recording of the book's first identification: what `bench` estimates in other coordinates with weak priors, `fmu` estimates as
+/// it is named.
+#[test]
+#[ignore = "half a minute: .ci/run --nightly"]
+fn a_bench_as_any_fmu_has_one_answer_and_one_interval() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let torque = "lin-sweep:amplitude=0.1,f0=3,f1=1.7,duration=600".parse().unwrap();
+    let none = SensorErrors::default();
+    let recording = fmu_twin::record(&fmu, &[], &Torque::Profile(torque), Some(1), none).unwrap();
+    let options = Options {
+        models: vec!["linear".into()],
+        sensor_errors: false,
+        gyro_scale: 0.0,
+        tolerances: Tolerances::NONE,
+        intersample: Some(Hold::FirstOrderHold),
+        ..Options::default()
+    };
+    let recordings = std::slice::from_ref(&recording);
+    let bench = output_error::identify(&fmu, recordings, &options, &mut |_| {}).unwrap();
+    let free = [
+        "tank.d=0.15:0.05:0.3",
+        "tank.h=0.09:0.02:0.3",
+        "slosh.zeta=0.004:0:0.1",
+        "hub.I=0.3:0.1:1",
+        "friction.b=0.03:0:1",
+        "friction.c=0.004:0:0.1",
+        "friction.d=0.003:0:0.1",
+        "friction.omega_s=0.08:0.002:2",
+    ];
+    let known = ["slosh.model=linear", "slosh.zeta_from_correlation=false"];
+    let asked = Question {
+        settings: known.map(|text| text.parse().unwrap()).to_vec(),
+        held: Vec::new(),
+        biases: Vec::new(),
+        drift: true,
+        ..question(&free)
+    };
+    let record = Record {
+        name: "bench".into(),
+        time: recording.time.clone(),
+        inputs: vec![recording.torque.clone()],
+        outputs: vec![recording.rate.clone()],
+    };
+    let model = Model::open(packed_for_tests(), Solver::Own).unwrap();
+    let found = identify(&model, &asked, &[record], &mut |_| {}).unwrap();
+    assert_eq!((bench.fits, found.fits), (Some(true), Some(true)), "{:?}", found.verdict);
+    for name in ["tank.d", "tank.h", "slosh.zeta", "hub.I"] {
+        let (a, b) = (&bench.parameters[name], &found.parameters[name]);
+        // noise models and priors of the friction differ a little
+        assert!((a.value - b.value).abs() < 0.1 * a.std, "{name}: {a:?} {b:?}");
+        for (a_end, b_end) in a.interval.iter().zip(b.interval) {
+            assert!((a_end - b_end).abs() < 0.2 * a.std, "{name}: {a:?} {b:?}");
+        }
+    }
 }
