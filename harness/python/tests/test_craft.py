@@ -251,3 +251,25 @@ def test_ctrl_c_ends_the_calculation_of_tanks() -> None:
         solve([case] * 10_000)
     signal.signal(signal.SIGINT, before)
     assert time.monotonic() - start < 30
+
+
+def test_the_liquid_of_a_tank_that_spins_turns_with_it(craft: Craft) -> None:
+    """The start is the tank's rate times the inertia of the turning liquid."""
+    tank = MountedTank(CYLINDER, (0.0, 0.0, -0.5), modes=1, nu=1e-6, spin=0.4)
+    spinner = replace(craft, tanks={"fuel": tank}, wheels=(0.0, 0.0, 0.0))
+    values = spinner.parameters(0.4)
+    inertia = values["tank[1].spin_inertia"]
+    radius = 0.4
+    mass = 875.0 * np.pi * radius**2 * 0.4
+    assert inertia == pytest.approx(mass * radius**2 / 2, rel=0.1) and inertia > 0
+    assert values["tank[1].gyroscopic[1]"] == pytest.approx(0.496, abs=1e-3)
+    assert values["tank[1].spin_decay[1]"] == pytest.approx(np.sqrt(1e-6 * 0.4) / 0.4, rel=1e-6)
+    run = hubslosh.simulate(
+        craft.model, {**values, "init.omega[3]": 0.4}, stop=1.0,
+        outputs=["tank[1].spin[3]", "tank[1].spin_number"],
+    )  # fmt: skip
+    assert run["tank[1].spin[3]"].iloc[0] == pytest.approx(0.4 * inertia, rel=1e-9)
+    assert 0 < run["tank[1].spin_number"].iloc[-1] < 1
+    without = replace(craft, tanks={"fuel": replace(tank, spin=None)}).parameters(0.4)
+    assert not any("spin" in name or "gyroscopic" in name for name in without)
+    assert "spin = -1" in replace(tank, spin=-1.0).problems()[0]

@@ -106,7 +106,8 @@ pub fn spin(
     ];
     let in_range = !out_of_range.contains(&true);
     let error = (1.0 - c) * ratio.unwrap_or_default() / 2.0;
-    if in_range && error > PENDULUM_ERROR {
+    // The FMUs have the gyroscopic coefficient of an upright cylinder.
+    if in_range && !is_cylinder && error > PENDULUM_ERROR {
         warnings.push(format!(
             "the frequencies of a pendulum, which the FMUs have without gyroscopic[1], are up to {:.0} % off those of the spinning liquid",
             100.0 * error
