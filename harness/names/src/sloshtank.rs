@@ -24,6 +24,8 @@ pub mod tank {
     pub const IN_RANGE_KIND: &str = "tank.in_range_kind";
     pub const LIMITED_BY: &str = "tank.limited_by";
     pub const LIMITED_BY_KIND: &str = "tank.limited_by_kind";
+    pub const SPIN_RATIO: &str = "tank.spin_ratio";
+    pub const SPIN_NUMBER: &str = "tank.spin_number";
     pub const ANGLE_X: crate::Array<1> = crate::Array("tank.angle_x");
     pub const ANGLE_Y: crate::Array<1> = crate::Array("tank.angle_y");
     pub const P: crate::Array<2> = crate::Array("tank.p");
@@ -67,6 +69,8 @@ pub mod tank {
     pub const NONLINEAR_STIFFNESS_2: crate::Array<1> = crate::Array("tank.nonlinear_stiffness_2");
     pub const ROTARY_INERTIA: crate::Array<1> = crate::Array("tank.rotary_inertia");
     pub const ROTARY_INERTIA_2: crate::Array<1> = crate::Array("tank.rotary_inertia_2");
+    pub const GYROSCOPIC: crate::Array<1> = crate::Array("tank.gyroscopic");
+    pub const GYROSCOPIC_STIFFNESS: crate::Array<1> = crate::Array("tank.gyroscopic_stiffness");
     pub const ANGLE_LIMIT: crate::Array<1> = crate::Array("tank.angle_limit");
     pub const SWIRL_LIMIT: crate::Array<1> = crate::Array("tank.swirl_limit");
     pub const G_BOND: &str = "tank.g_bond";
@@ -157,6 +161,8 @@ pub const SIZES: &[crate::Size] = &[
             ("tank.nonlinear_stiffness_2", 0),
             ("tank.rotary_inertia", 0),
             ("tank.rotary_inertia_2", 0),
+            ("tank.gyroscopic", 0),
+            ("tank.gyroscopic_stiffness", 0),
             ("tank.angle_limit", 0),
             ("tank.swirl_limit", 0),
             ("tank.wave", 0),

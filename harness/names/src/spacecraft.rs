@@ -51,6 +51,8 @@ pub mod tank {
     pub const IN_RANGE_KIND: crate::Array<1> = crate::Array("tank[].in_range_kind");
     pub const LIMITED_BY: crate::Array<1> = crate::Array("tank[].limited_by");
     pub const LIMITED_BY_KIND: crate::Array<1> = crate::Array("tank[].limited_by_kind");
+    pub const SPIN_RATIO: crate::Array<1> = crate::Array("tank[].spin_ratio");
+    pub const SPIN_NUMBER: crate::Array<1> = crate::Array("tank[].spin_number");
     pub const ANGLE_X: crate::Array<2> = crate::Array("tank[].angle_x");
     pub const ANGLE_Y: crate::Array<2> = crate::Array("tank[].angle_y");
     pub const P: crate::Array<3> = crate::Array("tank[].p");
@@ -94,6 +96,8 @@ pub mod tank {
     pub const NONLINEAR_STIFFNESS_2: crate::Array<2> = crate::Array("tank[].nonlinear_stiffness_2");
     pub const ROTARY_INERTIA: crate::Array<2> = crate::Array("tank[].rotary_inertia");
     pub const ROTARY_INERTIA_2: crate::Array<2> = crate::Array("tank[].rotary_inertia_2");
+    pub const GYROSCOPIC: crate::Array<2> = crate::Array("tank[].gyroscopic");
+    pub const GYROSCOPIC_STIFFNESS: crate::Array<2> = crate::Array("tank[].gyroscopic_stiffness");
     pub const ANGLE_LIMIT: crate::Array<2> = crate::Array("tank[].angle_limit");
     pub const SWIRL_LIMIT: crate::Array<2> = crate::Array("tank[].swirl_limit");
     pub const G_BOND: crate::Array<1> = crate::Array("tank[].g_bond");
@@ -189,6 +193,8 @@ pub const SIZES: &[crate::Size] = &[
             ("tank[].in_range_kind", 0),
             ("tank[].limited_by", 0),
             ("tank[].limited_by_kind", 0),
+            ("tank[].spin_ratio", 0),
+            ("tank[].spin_number", 0),
             ("tank[].ball.state", 0),
             ("tank[].angle_x", 0),
             ("tank[].angle_y", 0),
@@ -240,6 +246,8 @@ pub const SIZES: &[crate::Size] = &[
             ("tank[].nonlinear_stiffness_2", 0),
             ("tank[].rotary_inertia", 0),
             ("tank[].rotary_inertia_2", 0),
+            ("tank[].gyroscopic", 0),
+            ("tank[].gyroscopic_stiffness", 0),
             ("tank[].angle_limit", 0),
             ("tank[].swirl_limit", 0),
             ("tank[].g_bond", 0),
@@ -301,6 +309,8 @@ pub const SIZES: &[crate::Size] = &[
             ("tank[].nonlinear_stiffness_2", 1),
             ("tank[].rotary_inertia", 1),
             ("tank[].rotary_inertia_2", 1),
+            ("tank[].gyroscopic", 1),
+            ("tank[].gyroscopic_stiffness", 1),
             ("tank[].angle_limit", 1),
             ("tank[].swirl_limit", 1),
             ("tank[].wave", 1),
