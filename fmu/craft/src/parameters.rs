@@ -1258,7 +1258,8 @@ impl Parameters {
                 drains + 1
             ));
         }
-        let others: [(fn(&Tank) -> bool, &str, &str); 3] = [
+        type Feature = (fn(&Tank) -> bool, &'static str, &'static str);
+        let others: [Feature; 3] = [
             (
                 Tank::is_planar,
                 "direction",

@@ -446,7 +446,8 @@ fn spin_without_inertia_or_of_liquid_that_leaves_its_place_is_refused_by_name() 
         Spacecraft::new(&p, &Inputs::default(), 0.0, 1e-9).err().unwrap_or_default().join("; ")
     };
     assert_eq!(said(&|_| ()), "");
-    let cases: [(&dyn Fn(&mut Tank), &str); 7] = [
+    type Case<'a> = (&'a dyn Fn(&mut Tank), &'a str);
+    let cases: [Case; 7] = [
         (&|tank| tank.spin_inertia = 1e-12, "tank[1].spin_inertia = 1e-12"),
         (&|tank| tank.spin_inertia_across = -1.0, "tank[1].spin_inertia_across = -1.0"),
         (&|tank| tank.spin_coupling = 1.1, "tank[1].spin_coupling = 1.1"),
