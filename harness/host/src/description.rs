@@ -612,13 +612,17 @@ const NAMED: usize = 20;
 impl ModelDescription {
     /// Reads the description of a packed FMU, without unpacking or loading its binary.
     pub fn from_fmu(path: &Path) -> Result<Self> {
+        Ok(ModelDescription::from_archive(&Archive::open(path)?, path)?.1)
+    }
+
+    /// Returns the text of the description as well.
+    pub(crate) fn from_archive(archive: &Archive, path: &Path) -> Result<(String, Self)> {
         let name = path.display();
-        let text = Archive::open(path)?.description();
-        let text = text.with_context(|| format!("{name} is not an FMU"))?;
-        let description = ModelDescription::from_xml(&text);
-        let description = description.with_context(|| format!("{name} cannot be used"))?;
-        description.check_version().with_context(|| format!("{name} cannot be used"))?;
-        Ok(description)
+        let text = archive.description().with_context(|| format!("{name} is not an FMU"))?;
+        let refused = || format!("{name} cannot be used");
+        let description = ModelDescription::from_xml(&text).with_context(refused)?;
+        description.check_version().with_context(refused)?;
+        Ok((text, description))
     }
 
     /// Checks that the FMI version is 2.0 or 3.

@@ -9,8 +9,8 @@ use std::path::Path;
 use anyhow::Result;
 
 use crate::archive::Archive;
+use crate::c_abi::version::Version;
 pub use crate::c_abi::version::{CompletedStep, FmuState as State, Interface, Updated};
-use crate::c_abi::version::{Version, read_description};
 use crate::c_abi::{Called, Message};
 use crate::description::{ModelDescription, Value, Variable};
 use crate::{fmi2, fmi3};
@@ -59,7 +59,7 @@ impl Fmu {
     /// Co-Simulation. `settings` as in [`Fmu::open_with`].
     pub fn open_to_run(path: impl AsRef<Path>, settings: &[(String, String)]) -> Result<Self> {
         let path = path.as_ref();
-        let (_, description) = read_description(&Archive::open(path)?, path)?;
+        let description = ModelDescription::from_fmu(path)?;
         let exchanges = description.co_simulation.is_none() && description.model_exchange.is_some();
         let interface = if exchanges { Interface::ModelExchange } else { Interface::CoSimulation };
         Fmu::open_for(interface, path, settings)
@@ -72,7 +72,7 @@ impl Fmu {
     ) -> Result<Self> {
         let path = path.as_ref();
         let archive = Archive::open(path)?;
-        let described = read_description(&archive, path)?;
+        let described = ModelDescription::from_archive(&archive, path)?;
         Ok(match described.1.is_fmi3() {
             false => {
                 Fmu::V2(fmi2::Fmu::from_archive(&archive, described, path, interface, settings)?)

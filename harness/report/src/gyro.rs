@@ -6,51 +6,39 @@ use experiments::gyro::Characteristics;
 use maud::html;
 
 use crate::page::{document, render_chart, table};
-use crate::svg::{Axis, Chart, Series, Style};
+use crate::svg::{Axis, Chart, Style, series};
 
 pub fn allan_deviations(gyro: &Characteristics) -> String {
     let curve = |variance: &dyn Fn(&Point) -> f64| -> Vec<(f64, f64)> {
         gyro.points.iter().map(|point| (point.tau, variance(point).sqrt())).collect()
     };
-    let series = |points, color: &str, style, title: &str| Series {
-        points,
-        color: color.into(),
-        style,
-        title: title.into(),
-    };
     let measured = curve(&|point| point.variance);
-    let chart = Chart {
-        title: "Allan deviation of the simulated gyro at rest".into(),
-        size: (640.0, 400.0),
-        x: Axis::decades("averaging time / s", measured.iter().map(|p| p.0)),
-        y: Axis::decades("Allan deviation / (rad/s)", measured.iter().map(|p| p.1)),
-        series: vec![
+    let chart = Chart::new(
+        "Allan deviation of the simulated gyro at rest",
+        Axis::decades("averaging time / s", measured.iter().map(|p| p.0)),
+        Axis::decades("Allan deviation / (rad/s)", measured.iter().map(|p| p.1)),
+        vec![
             series(
                 curve(&|point| gyro.specified.arw.powi(2) / point.tau),
-                "#888888",
+                EXPECTED,
                 Style::Dashed,
                 "specified white noise, slope −1/2",
             ),
-            series(measured, "#0b6aa8", Style::Dots, "estimated"),
+            series(measured, MEASURED, Style::Dots, "estimated"),
             series(
                 curve(&|point| gyro.specified.variance(point.tau)),
-                "#b45309",
+                FITTED,
                 Style::Line,
                 "specified noise",
             ),
         ],
-        legend: true,
-    };
+    );
     chart.file()
 }
 
 const MEASURED: &str = "#0b6aa8";
 const EXPECTED: &str = "#888888";
 const FITTED: &str = "#b45309";
-
-fn series(points: Vec<(f64, f64)>, color: &str, style: Style, title: &str) -> Series {
-    Series { points, color: color.into(), style, title: title.into() }
-}
 
 /// Returns the HTML page about a recording at rest, with `rows` as a table and the charts of [`rest_charts`].
 pub fn page(rows: &[(String, String)], found: &Rest) -> String {
@@ -62,14 +50,6 @@ pub fn page(rows: &[(String, String)], found: &Rest) -> String {
 }
 
 pub fn rest_charts(rest: &Rest) -> [(&'static str, Chart); 6] {
-    let chart = |title: &str, x: Axis, y: Axis, series: Vec<Series>, legend: bool| Chart {
-        title: title.into(),
-        size: (640.0, 400.0),
-        x,
-        y,
-        series,
-        legend,
-    };
     // The frame around the range that noise allows.
     let around = |to: f64, y: f64| vec![(0.0, y), (to, y), (to, -y), (0.0, -y)];
     let deviation = |variance: &dyn Fn(&Point) -> f64| -> Vec<(f64, f64)> {
@@ -84,15 +64,14 @@ pub fn rest_charts(rest: &Rest) -> [(&'static str, Chart); 6] {
         let fitted = deviation(&|point| noise.variance(point.tau));
         allan.push(series(fitted, FITTED, Style::Line, "fitted noise"));
     }
-    let allan = chart(
+    let allan = Chart::new(
         "Allan deviation of the recorded gyro at rest",
         Axis::decades("averaging time / s", measured.iter().map(|p| p.0)),
         Axis::decades("Allan deviation / (rad/s)", measured.iter().map(|p| p.1)),
         allan,
-        true,
     );
     let end = rest.quantiles.last().map_or(3.0, |(x, _)| *x);
-    let quantiles = chart(
+    let mut quantiles = Chart::new(
         "Quantiles of the readings, dashed: of the normal distribution",
         Axis::linear("standard normal quantile", rest.quantiles.iter().map(|q| q.0), 0.0, 8),
         Axis::linear(
@@ -105,14 +84,14 @@ pub fn rest_charts(rest: &Rest) -> [(&'static str, Chart); 6] {
             series(vec![(-end, -end), (end, end)], EXPECTED, Style::Dashed, "normal"),
             series(rest.quantiles.clone(), MEASURED, Style::Cloud, "recorded"),
         ],
-        false,
     );
+    quantiles.legend = false;
     let bound = rest.white_bound();
     let correlation: Vec<(f64, f64)> = (rest.autocorrelation.iter().enumerate().skip(1))
         .map(|(k, r)| (k as f64 * rest.step, *r))
         .collect();
     let last = correlation.last().map_or(1.0, |(t, _)| *t);
-    let autocorrelation = chart(
+    let autocorrelation = Chart::new(
         "Autocorrelation beyond lag 0, where it is 1",
         Axis::linear("lag / s", [0.0, last], 0.0, 8),
         Axis::linear("autocorrelation", correlation.iter().map(|p| p.1), 8.0 * bound, 6),
@@ -120,7 +99,6 @@ pub fn rest_charts(rest: &Rest) -> [(&'static str, Chart); 6] {
             series(correlation.clone(), MEASURED, Style::Line, "recorded"),
             series(around(last, bound), EXPECTED, Style::Dashed, "95 % interval of white noise"),
         ],
-        true,
     );
     let minutes = |from: f64| from / 60.0;
     let n = (rest.chunk_length() as f64).sqrt();
@@ -138,16 +116,15 @@ pub fn rest_charts(rest: &Rest) -> [(&'static str, Chart); 6] {
         series(around(end, white), MEASURED, Style::Dashed, "±2σ of the mean, white noise"),
         series(around(end, normal), FITTED, Style::Dashed, "±2σ of the variance, normal noise"),
     ];
-    let chunks = chart(
+    let chunks = Chart::new(
         "Means and variances of consecutive chunks",
         Axis::linear("time / min", [0.0, end], 0.0, 8),
         Axis::linear("relative to the whole record", both, 6.0 * normal, 6),
         all,
-        true,
     );
     let density = |x: f64| (-0.5 * x * x).exp() / std::f64::consts::TAU.sqrt();
     let normal = (-50..=50).map(|k| (0.1 * f64::from(k), density(0.1 * f64::from(k)))).collect();
-    let histogram = chart(
+    let histogram = Chart::new(
         "Histogram of the readings",
         Axis::linear("reading without its line / standard deviation", [-5.0, 5.0], 0.0, 8),
         Axis::linear("density", rest.histogram.iter().map(|bin| bin.1).chain([0.0, 0.4]), 0.0, 5),
@@ -155,14 +132,13 @@ pub fn rest_charts(rest: &Rest) -> [(&'static str, Chart); 6] {
             series(normal, EXPECTED, Style::Dashed, "normal"),
             series(rest.histogram.clone(), MEASURED, Style::Dots, "recorded"),
         ],
-        true,
     );
     let curve = |value: &dyn Fn(&Chunk) -> f64| -> Vec<(f64, f64)> {
         rest.chunks.iter().map(|chunk| (minutes(chunk.from), value(chunk))).collect()
     };
     let limit = vec![(0.0, KOLMOGOROV), (end, KOLMOGOROV)];
     let read = curve(&|chunk| chunk.kolmogorov);
-    let kolmogorov = chart(
+    let kolmogorov = Chart::new(
         "Kolmogorov and Smirnov's distance of the chunks from the normal distribution",
         Axis::linear("time / min", [0.0, end], 0.0, 8),
         Axis::decades("distance times √n", read.iter().map(|p| p.1).chain([0.1, KOLMOGOROV])),
@@ -176,7 +152,6 @@ pub fn rest_charts(rest: &Rest) -> [(&'static str, Chart); 6] {
             ),
             series(limit, EXPECTED, Style::Dashed, "5 % limit of normal noise"),
         ],
-        true,
     );
     [
         ("allan.svg", allan),

@@ -1,6 +1,6 @@
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-use crate::svg::{Axis, Chart, Series, Style};
+use crate::svg::{self, Axis, Chart, Series, Style};
 
 const STYLE: &str = "
 :root{color-scheme:light dark;--ink:#1c1c1e;--paper:#fff;--soft:#6b6b70;--rule:#d8d8dc;--a:#0b62c4;--b:#c2410c;--c:#15803d;--d:#7e22ce;--warn:#fde8d7}
@@ -17,9 +17,6 @@ svg text{fill:var(--ink);font:12px system-ui,sans-serif}svg .tick,svg .label{fil
 svg .title{font-weight:600}svg .grid{stroke:var(--rule);stroke-width:.6;fill:none}svg .frame{stroke:var(--soft);fill:none}svg .curve path{fill:none;stroke-width:1.4}
 details{margin:.6rem 0}summary{cursor:pointer}
 ";
-
-/// Names of colours for [`series`], for curves of the same kind.
-pub const COLORS: [&str; 5] = ["a", "b", "c", "d", "soft"];
 
 pub fn document(title: &str, body: &Markup) -> String {
     let page = html! {
@@ -62,20 +59,15 @@ pub fn table<'a>(
 
 pub fn axis_chart(title: &str, x: &str, y: &str, series: Vec<Series>, logarithmic: bool) -> Chart {
     let points = || series.iter().flat_map(|s| &s.points);
-    Chart {
-        title: title.into(),
-        size: (900.0, 260.0),
-        x: Axis::linear(x, points().map(|p| p.0), 0.0, 8),
-        y: match logarithmic {
-            true => Axis::decades(y, points().map(|p| p.1)),
-            false => Axis::linear(y, points().map(|p| p.1), 0.0, 5),
-        },
-        series,
-        legend: true,
-    }
+    let x = Axis::linear(x, points().map(|p| p.0), 0.0, 8);
+    let y = match logarithmic {
+        true => Axis::decades(y, points().map(|p| p.1)),
+        false => Axis::linear(y, points().map(|p| p.1), 0.0, 5),
+    };
+    Chart { size: (900.0, 260.0), ..Chart::new(title, x, y, series) }
 }
 
 /// Creates a curve in one of the colours of [`STYLE`], for example `a`.
 pub fn series(points: Vec<(f64, f64)>, color: &str, style: Style, title: &str) -> Series {
-    Series { points, color: format!("var(--{color})"), style, title: title.into() }
+    svg::series(points, &format!("var(--{color})"), style, title)
 }

@@ -45,10 +45,6 @@ impl Axis {
         Axis { label: label.into(), from, to, logarithmic: true, ticks }
     }
 
-    pub fn logarithmic(label: &str, (from, to): (f64, f64), ticks: &[f64]) -> Self {
-        Axis { label: label.into(), from, to, logarithmic: true, ticks: ticks.to_vec() }
-    }
-
     fn place(&self, value: f64) -> f64 {
         if self.logarithmic {
             (value / self.from).ln() / (self.to / self.from).ln()
@@ -94,6 +90,10 @@ pub struct Series {
     pub title: String,
 }
 
+pub fn series(points: Vec<(f64, f64)>, color: &str, style: Style, title: &str) -> Series {
+    Series { points, color: color.into(), style, title: title.into() }
+}
+
 #[derive(Clone, Debug)]
 pub struct Chart {
     /// Title, which is also the text for screen readers.
@@ -114,6 +114,11 @@ const STYLE: &str = "svg { background: #ffffff; font: 11px system-ui, sans-serif
 const MARGIN: (f64, f64, f64, f64) = (56.0, 12.0, 26.0, 40.0);
 
 impl Chart {
+    /// Creates a chart in the size of a figure, with a legend.
+    pub fn new(title: &str, x: Axis, y: Axis, series: Vec<Series>) -> Self {
+        Chart { title: title.into(), size: (640.0, 400.0), x, y, series, legend: true }
+    }
+
     /// Returns the `<svg>` element for a page that styles it.
     pub fn svg(&self) -> String {
         self.drawing(None)

@@ -207,7 +207,7 @@ impl<V: Version> Fmu<V> {
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let archive = Archive::open(path)?;
-        let described = read_description(&archive, path)?;
+        let described = ModelDescription::from_archive(&archive, path)?;
         Fmu::from_archive(&archive, described, path, Interface::CoSimulation, &[])
     }
 
@@ -462,18 +462,6 @@ impl<V: Version> Fmu<V> {
         // SAFETY: the standard allows NULL here (FMI 2.0.5, section 2.1.5; FMI 3.0.2, section 2.3.1).
         unsafe { (self.common.free_instance.call)(null_mut()) }
     }
-}
-
-pub(crate) fn read_description(
-    archive: &Archive,
-    path: &Path,
-) -> Result<(String, ModelDescription)> {
-    let name = path.display();
-    let text = archive.description().with_context(|| format!("{name} is not an FMU"))?;
-    let refused = || format!("{name} cannot be used");
-    let description = ModelDescription::from_xml(&text).with_context(refused)?;
-    description.check_version().with_context(refused)?;
-    Ok((text, description))
 }
 
 /// Returns whether all Reals are scalars of type Float64, and the value references of those that are,

@@ -17,7 +17,7 @@ use identify::input::recording::Recording;
 use identify::methods::friction::{self as runs, LEAST_STRETCHES};
 use names::hubslosh::{friction, hub, tank};
 use report::campaign::{Chapter, Illustration};
-use report::svg::{Axis, Chart, Series, Style};
+use report::svg::{self, Axis, Chart, Series, Style};
 use signals::recording::{self, Between, Signal, Wanted};
 
 use super::super::gyro::noise_rows;
@@ -141,23 +141,13 @@ fn bench_recordings(day: &Day, kind: Kind, problems: &mut Vec<String>) -> Vec<Re
 
 fn chart(title: &str, x: &str, y: &str, series: Vec<Series>) -> Chart {
     let points = || series.iter().flat_map(|s| &s.points);
-    Chart {
-        title: title.into(),
-        size: (640.0, 400.0),
-        x: Axis::linear(x, points().map(|p| p.0), 0.0, 8),
-        y: Axis::linear(y, points().map(|p| p.1), 0.0, 6),
-        series,
-        legend: true,
-    }
+    let x = Axis::linear(x, points().map(|p| p.0), 0.0, 8);
+    let y = Axis::linear(y, points().map(|p| p.1), 0.0, 6);
+    Chart::new(title, x, y, series)
 }
 
 fn series(title: &str, style: Style, points: impl IntoIterator<Item = (f64, f64)>) -> Series {
-    Series {
-        title: title.into(),
-        style,
-        color: String::new(),
-        points: points.into_iter().collect(),
-    }
+    svg::series(points.into_iter().collect(), "", style, title)
 }
 
 fn illustration(chart: Chart, thesis: &'static str, caption: impl Into<String>) -> Illustration {
