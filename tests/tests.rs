@@ -30,6 +30,7 @@ mod six {
     mod cosimulation;
     mod finite_amplitude;
     mod hubslosh;
+    mod models;
     mod steps;
     // Random craft and reference records of the crate `craft`
     #[path = "../../fmu/craft/tests/craft/random.rs"]

@@ -286,34 +286,3 @@ impl Dynamics for Model {
         self.tank.output_derivatives(&inputs.tank, &direction, &du)
     }
 }
-
-#[cfg(test)]
-mod tests {
-
-    use super::*;
-
-    /// Pushes the host backwards with the liquid half a metre above its tank, where the host has integrated it.
-    #[test]
-    fn a_step_that_ends_with_the_liquid_outside_its_tank_asks_for_an_event() {
-        let mut parameters = Parameters::default();
-        parameters.host.mass = 1000.0;
-        parameters.tank.tank.ball.travel = 0.6;
-        let mut inputs = Inputs::default();
-        inputs.tank.a.value = [0.0, 0.0, -0.1];
-        let mut model = Model::new(&parameters, &inputs, 0.0, 1e-6).unwrap();
-        assert!(model.accept_step(&inputs).unwrap(), "liquid that has to leave its bottom");
-        model.handle_event(&inputs).unwrap();
-        assert!(!model.accept_step(&inputs).unwrap());
-        let ball = TANK_STATES - 6;
-        let mut x = model.continuous_states().to_vec();
-        x[ball + 2] += 1.1;
-        for (speed, is_overdue) in [(-0.3, false), (0.3, true)] {
-            x[ball + 5] = speed;
-            model.set_continuous_states(&x);
-            assert_eq!(model.accept_step(&inputs).unwrap(), is_overdue);
-        }
-        assert!(model.handle_event(&inputs).unwrap());
-        assert!(model.continuous_states()[ball + 5] < 0.0);
-        assert!(!model.accept_step(&inputs).unwrap());
-    }
-}

@@ -73,7 +73,7 @@ pub(crate) fn arguments(command: &mut Command, package: &str) {
 pub(crate) fn program_arguments(command: &mut Command) {
     command.args(["--release", "--package", "hubslosh", "--bin", "hubslosh"]);
     // Not optimised in the profile, so that `cargo run` compiles them fast.
-    for package in ["pack", "hubslosh"] {
+    for package in ["pack", "hubslosh", "check"] {
         command.arg("--config").arg(format!("profile.release.package.{package}.opt-level = \"s\""));
     }
     command.args(["--features", "shipped", "--message-format", "json-render-diagnostics"]);
