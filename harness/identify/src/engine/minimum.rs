@@ -315,3 +315,46 @@ impl Fit<'_> {
         Ok(found)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::engine::fit::check_finite;
+
+    #[test]
+    fn values_that_are_not_finite_are_named_and_no_iteration_hangs() {
+        for (entry, words) in [
+            (f64::NAN, "derivative by friction.d is NaN in row 4"),
+            (f64::INFINITY, "derivative by friction.d is inf in row 4"),
+            (f64::NEG_INFINITY, "derivative by friction.d is -inf in row 4"),
+            (1e200, "derivatives by friction.d are too large"),
+        ] {
+            let mut bad = DMatrix::from_fn(5, 2, |k, j| if j == 0 { 1.0 } else { k as f64 - 2.0 });
+            bad[(3, 1)] = entry;
+            let error = check_finite(bad.column(1).as_slice(), "friction.d").unwrap_err();
+            assert!(error.to_string().contains(words), "{error}");
+            assert!(check_finite(bad.column(0).as_slice(), "hub.I").is_ok());
+            let curvature = Curvature::new(&bad, vec![0, 1]);
+            assert!(curvature.covariance(2).iter().all(|v| v.is_finite()));
+            assert!(curvature.unresolved(&[0.0; 2]).is_empty());
+        }
+        // sizes alone change nothing
+        for size in [1e-150, 1e-9, 1.0, 1e9, 1e150] {
+            let line =
+                DMatrix::from_fn(5, 2, |k, j| if j == 0 { size } else { (k as f64 - 2.0) * size });
+            assert!(Curvature::new(&line, vec![0, 1]).unresolved(&[0.0, 0.0]).is_empty(), "{size}");
+        }
+    }
+
+    #[test]
+    fn a_straight_line_has_its_textbook_covariance() {
+        // y = a + b t at t = -2..2, unit noise: var a = 1/5, var b = 1/10, no correlation
+        let line = DMatrix::from_fn(5, 2, |k, j| if j == 0 { 1.0 } else { k as f64 - 2.0 });
+        let found = Curvature::new(&line, vec![0, 1]).covariance(2);
+        assert!((found[(0, 0)] - 0.2).abs() < 1e-15 && (found[(1, 1)] - 0.1).abs() < 1e-15);
+        assert!(found[(0, 1)].abs() < 1e-15);
+        // two columns that are the same are not told apart
+        let same = Curvature::new(&DMatrix::from_element(5, 2, 1.0), vec![0, 1]);
+        assert_eq!(same.unresolved(&[0.0; 2]).len(), 1);
+    }
+}

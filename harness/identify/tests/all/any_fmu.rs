@@ -388,7 +388,7 @@ fn a_minimum_at_a_bound_is_reported_in_the_verdict() {
 /// The recording of the book's first identification: what `bench` estimates in other coordinates with weak priors, `fmu` estimates as
 /// it is named.
 #[test]
-#[ignore = "half a minute: .ci/run --nightly"]
+#[ignore = "half a minute: .ci/long-tests"]
 fn a_bench_as_any_fmu_has_one_answer_and_one_interval() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let torque = "lin-sweep:amplitude=0.1,f0=3,f1=1.7,duration=600".parse().unwrap();
