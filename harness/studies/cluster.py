@@ -116,12 +116,12 @@ def why_not_stored(path: Path, run: Run, columns: list[str]) -> str | None:
         for key, wanted in run["notes"].items():
             found = notes.get(key.encode(), b"").decode(errors="replace")
             if found != wanted:
-                return f"its {key} differs"
+                return f"the {key} of the file differs"
         times = hubslosh.read_table(path, columns)["time"]
     except (OSError, pyarrow.ArrowException, hubslosh.FmuError) as error:
-        return f"file incomplete: {error}"
+        return f"the file is incomplete: {error}"
     if len(times) != run["steps"] + 1 or times[-1] != run["stop"]:
-        return f"file incomplete, {len(times)} rows of {run['steps'] + 1}"
+        return f"the file has {len(times)} rows, but the run needs {run['steps'] + 1}"
     return None
 
 

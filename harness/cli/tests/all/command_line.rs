@@ -242,7 +242,7 @@ fn a_number_that_no_machine_can_hold_is_refused_before_anything_is_allocated() {
         (&["gyro", "--fmu", fmu, "--hours", "1e9"], "samples (allowed: 100 to 20000000)"),
         (
             &["campaign", "--fmu", fmu, "--plan", "plan.toml", "--out", "c"],
-            "a plan may have 100000 runs",
+            "a plan may have at most 100000 runs",
         ),
     ] {
         refuses(directory, || hubslosh(directory, arguments), &[words]);
@@ -260,7 +260,7 @@ fn an_experiment_without_information_is_refused() {
     for (plan, words) in [
         (&["zero"][..], &["up to 0.00e0 N·m, does not turn the hub"][..]),
         (&["sine:amplitude=5e-3"], &["friction.c + friction.d = 5.92e-3 N·m", "a larger torque"]),
-        (&["sine", "--set", "imu.arw=0"], &["imu.arw = 0 leaves no noise", "above 0"]),
+        (&["sine", "--set", "imu.arw=0"], &["imu.arw = 0: without noise", "above 0"]),
         (&["zero:duration=0.02"], &["2 rows", "more than 20", "longer duration"]),
     ] {
         let arguments = [&["design", "--fmu", fmu, "--profile"], plan].concat();

@@ -262,7 +262,7 @@ pub(super) fn provenance(
             }
         }
         p {
-            "Each run is in " code { "runs/" } " as Parquet, with what it was made from in its metadata. " code { "features.csv" } " holds the columns of the table above for every run, " code { "features_spa.csv" } " and " code { "features_h1.csv" } " those of the other estimators in the same columns, " code { "runs.csv" } " all of them with everything that was varied, " code { "plan.toml" } " the plan. This command reproduces " @if has_chapters { "the tables and the figures on runs:" } @else { "everything here:" }
+            "Each run is in " code { "runs/" } " as Parquet; the metadata of a file state the FMU, the parameters and the torque of the run. " code { "features.csv" } " has the columns of the table above for every run; " code { "features_spa.csv" } " and " code { "features_h1.csv" } " have the same columns by the other estimators. " code { "runs.csv" } " has all features and everything that was varied, and " code { "plan.toml" } " has the plan. This command reproduces " @if has_chapters { "the tables and the figures on runs:" } @else { "everything here:" }
         }
         p { code { (campaign.command(fmu)) } }
     }
