@@ -34,7 +34,7 @@ fn start(instance: &mut impl Common, fmu: &Fmu) {
     Common::exit_initialization_mode(instance).unwrap();
 }
 
-/// Starts an instance of our host in the same way.
+/// Starts an instance of our host with the same calls.
 fn started<'fmu>(fmu: &'fmu Fmu, kind: i32) -> Instance<'fmu> {
     let mut with = fmu.instantiation("ours");
     with.kind = kind;

@@ -195,7 +195,7 @@ fn the_fmu_and_the_crate_move_random_tanks_bit_identically() {
     }
 }
 
-/// Tests tanks in the same way as craft.
+/// Under every recorded motion, which the host sets as inputs, SloshTank gives the bits of the tank in the crate.
 #[test]
 fn slosh_tank_equals_the_crate_bit_for_bit_in_every_reference_record() {
     for record in &records("tank") {

@@ -390,8 +390,8 @@ fn error(share: f64, exchange: Exchange, order: Order, h: f64) -> f64 {
     error_of(share, tank, exchange, order, h)
 }
 
-/// Returns the largest difference, within 20 s, of the coupled craft's rate from the rate of the craft as a whole, relative
-/// to the latter.
+/// Returns the largest difference, within 20 s, of the coupled craft's rate from the rate of the craft as one FMU, relative
+/// to the rate of the one FMU.
 fn error_of(share: f64, tank: Tank, exchange: Exchange, order: Order, h: f64) -> f64 {
     let p = parameters(share, tank);
     let mut pair = Pair::new(&p, exchange, order);

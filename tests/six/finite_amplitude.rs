@@ -212,7 +212,7 @@ fn forced_planar_waves_with_the_energy_terms_equal_those_of_potential_flow() {
 }
 
 /// Compares rotary motion at h/R = 0.5 and 1.01 times the frequency of small waves, with a damping ratio of 0.01 on every
-/// mode, with potential flow in three dimensions (about 30 modes). Angles and phases, in degrees, are those of the first
+/// mode, with potential flow in three dimensions (about 30 modes). Angles and phases, in degrees, belong to the first
 /// harmonics along the stroke and across it. The third-order model is wrong by 8 % and 7 degrees.
 #[test]
 fn forced_rotary_waves_with_the_energy_terms_equal_those_of_potential_flow() {

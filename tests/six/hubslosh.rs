@@ -82,8 +82,7 @@ fn assert_close(got: f64, want: f64, allowed: f64, what: &str) {
     assert!((got - want).abs() < allowed, "{what}: {got} {want}");
 }
 
-/// A mass of 1e11 kg and corresponding moments of inertia hold the craft to one axis; the rest of its motion
-/// falls as 1/M.
+/// A mass of 1e11 kg and corresponding moments of inertia hold the craft to one axis; its remaining motion falls as 1/M.
 #[test]
 fn spacecraft_held_to_one_axis_is_hubslosh() {
     let fmu = load("HubSlosh");

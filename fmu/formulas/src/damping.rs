@@ -49,9 +49,9 @@ impl Mode {
     }
 }
 
-/// Shapes of tanks for which the damping of the first mode was measured. Lengths are in m; `radius` of a cone
-/// is that of its free surface, and its half angle is in degrees. Cylinder and torus are upright, and the
-/// cone's apex is at the bottom.
+/// Shapes of tanks for which the damping of the first mode was measured. Lengths are in m; `radius` of a cone is the radius
+/// of its free surface, and its half angle is in degrees. Cylinder and torus are upright, and the cone's apex is at the
+/// bottom.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shape {
     Cylinder { radius: f64, depth: f64 },
@@ -304,7 +304,7 @@ pub fn sphere(radius: f64, depth: f64, nu: f64, g: f64) -> f64 {
 
 /// Returns the damping ratio of the first mode of a cone with its apex at the bottom, by a fit of SLOSH-ML to
 /// a figure: (4.964/2 pi) C5 C4^(-1/2) sqrt(Re) with C5 = 1.0037 + 0.0126 b and C4 = 1.001 - 0.0031 b -
-/// 0.0003 b^2. `radius` is that of the free surface, m, and b is `half_angle` in degrees. C4 falls to 0 at 53
+/// 0.0003 b^2. `radius` is the radius of the free surface, m, and b is `half_angle` in degrees. C4 falls to 0 at 53
 /// degrees, so b is limited to 0 to 45.
 pub fn cone(radius: f64, half_angle: f64, nu: f64, g: f64) -> f64 {
     let b = half_angle.clamp(0.0, 45.0);

@@ -24,8 +24,8 @@ unsafe extern "C" {
     fn host_run(fmu: *const HostFmu, data: *const u8, size: usize);
 }
 
-/// Runs the hostile host with `data` against the FMU with which this program is linked, which must be that of
-/// the model `M`.
+/// Runs the hostile host with `data` against the FMU with which this program is linked, which must be the FMU of the model
+/// `M`.
 pub fn run<M: Model>(data: &[u8]) {
     let c_string = |text: &str| CString::new(text).expect("a GUID has no NUL");
     // Inputs for FMI 3.0 have an odd first byte; every fourth of them is for the FMU with arrays.

@@ -147,7 +147,7 @@ impl Growth {
 
     /// Returns the relative drag at `h` after the start of the expansion, and u. u comes from its series up
     /// to order n, and the drag from u and the relative other drag, so that its difference from the drag's
-    /// series is the error of the latter.
+    /// series is the error of the series.
     pub fn drag_at(&self, n: usize, h: f64, other: f64) -> [f64; 2] {
         let u = values([&self.u], n, h)[0].max(0.0);
         let root = libm::sqrt(u);

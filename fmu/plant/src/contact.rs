@@ -1,7 +1,7 @@
 //! Contact state of the bearing: stick or slip.
 
-/// Contact between hub and bearing under a friction law that switches at rest. The numbers are those of the
-/// output `friction_mode`.
+/// Contact between hub and bearing under a friction law that switches at rest. The numbers are the values of the output
+/// `friction_mode`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(i8)]
 #[allow(missing_docs)]

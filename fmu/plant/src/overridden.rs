@@ -7,8 +7,9 @@ use crate::slosh_model::SloshModel;
 
 impl Parameters {
     /// Returns the reason why the value of a parameter is not used although its part of the model is in use;
-    /// `None` if it is used, or if that part is switched off. `name` is the FMU's, with `_kind` for the
-    /// integer twin of a Boolean. The integer twins must be applied before.
+    /// `None` if it is used, or if that part is switched off. `name` is the parameter's name in the FMU; the name of a
+    /// Boolean's integer twin (the integer by which a host can set the Boolean) ends in `_kind`. The integer twins must be
+    /// applied before.
     pub fn overridden(&self, name: &str) -> Option<String> {
         let slosh = &self.slosh;
         if slosh.model == SloshModel::Frozen {

@@ -69,10 +69,10 @@ impl SloshSource {
 /// The largest number of slosh modes.
 pub const MODES: usize = 10;
 
-/// Dependence of a mode's drag coefficient c on its natural frequency omega_n. `Laminar`, c ~ omega_n^(1/2),
-/// is that of a laminar layer at the wall, for bare tanks. `ConstantRatio`, c ~ omega_n, keeps the damping
-/// ratio, for a measured or specified ratio. `BySource` is `Laminar` if the damping ratio comes from the
-/// correlation and `ConstantRatio` if it is given.
+/// Dependence of a mode's drag coefficient c on its natural frequency omega_n. `Laminar`, c ~ omega_n^(1/2), is the damping
+/// of a laminar layer at the wall, for bare tanks. `ConstantRatio`, c ~ omega_n, keeps the damping ratio, for a measured or
+/// specified ratio. `BySource` is `Laminar` if the damping ratio comes from the correlation and `ConstantRatio` if it is
+/// given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 #[allow(missing_docs)]
@@ -209,7 +209,7 @@ pub struct Friction {
     pub harmonics_backward: [f64; 4],
 }
 
-/// Initial conditions. The slosh angles and rates are those of mode 1; all further modes start at rest.
+/// Initial conditions. The slosh angles and rates belong to mode 1; all further modes start at rest.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 #[allow(missing_docs)]
 pub struct Init {

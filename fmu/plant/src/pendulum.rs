@@ -151,8 +151,8 @@ impl Pendulum {
         self.along[0] != 0.0
     }
 
-    /// Returns the reason, if any, why mode 1 cannot start as `init` asks: it moves along its direction, and
-    /// the start is not along it.
+    /// Returns the reason, if any, why mode 1 cannot start as `init` states: the mode moves along one direction, and the
+    /// start has another direction.
     pub fn start_problem(&self, init: &Init) -> Option<String> {
         let [x, t] = self.along;
         let starts = [

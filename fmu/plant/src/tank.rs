@@ -29,7 +29,7 @@ use crate::slosh_model::SloshModel;
 
 /// Values calculated from the parameters; 0 for unused modes. `m_liq` and `m_0` are the masses of the whole
 /// and of the rigid liquid, kg, and `bond` is the Bond number rho g R^2 / sigma. Each mode has the pendulum's
-/// mass, kg, and length, m (on a tilted bench those of oblique pendulums with the frequencies), its natural
+/// mass, kg, and length, m (on a tilted bench the values of oblique pendulums with the same frequencies), its natural
 /// frequency, Hz (on an upright bench sqrt((g + a)/l) / 2 pi), its damping ratio, and the increase of g
 /// equivalent to the centring stiffness, a_n, m/s2.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]

@@ -197,7 +197,7 @@ const COMPONENT: u64 = 0x4875_6253_6c6f_7368;
 /// Returns the mark: the number that is the first word of a live component or saved state at this address. The mark depends
 /// on the model, the FMI version and the loaded copy of the library, so that handles of other FMUs, of the other FMI
 /// version or of a second copy of the library are recognised as wrong. It is computed from the address of the variable
-/// table and a digit for the version. The upper 16 bits of a mark differ from those of any valid address.
+/// table and a digit for the version. The upper 16 bits of a mark differ from the upper 16 bits of every valid address.
 fn mark<M: Model, V: Version>(kind: u64, handle: *const c_void) -> u64 {
     let table = ptr::from_ref(M::table()).addr() as u64;
     // Below the alignment of the table, so that the two parts do not overlap.
@@ -439,7 +439,7 @@ pub fn new_state<M: Model, V: Version>(instance: Instance<M, V>) -> *mut c_void 
 ///
 /// # Errors
 ///
-/// If the handle is NULL or not that of a saved state of this FMU.
+/// If the handle is NULL or does not belong to a saved state of this FMU.
 pub unsafe fn saved_state<'a, M: Model, V: Version>(
     call: &Call,
     name: &str,
@@ -488,7 +488,7 @@ pub unsafe fn serialized_size<M: Model, V: Version>(
     }
 }
 
-/// Serialises a saved state into an array of the host, which is refused if it is too short.
+/// Serialises a saved state into an array of the host, which is refused if the array is too short.
 pub unsafe fn serialize<M: Model, V: Version>(
     handle: *mut c_void,
     call: &'static Call,
@@ -533,8 +533,8 @@ pub unsafe fn deserialize<M: Model, V: Version>(
 }
 
 /// Frees a saved state and sets the handle to NULL; NULL is allowed. fmusim (0.0.39) passes the state itself
-/// instead of the handle's address. The state is then recognised by its mark, which cannot be an address, and
-/// is freed too.
+/// instead of the handle's address. The state is then recognised by its mark, which cannot be an address, and is also
+/// freed.
 pub unsafe fn free_state<M: Model, V: Version>(
     call: &Call,
     name: &str,

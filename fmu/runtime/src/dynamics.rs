@@ -75,10 +75,10 @@ pub trait Dynamics: Clone + Debug + Sized + 'static {
     }
 
     /// Returns the reason why a parameter is not used although the part of the model that it describes is, as
-    /// "name = value" of the parameter that replaces it. `name` is the name in the table, `indices` are those
-    /// of the element, from 0 (empty for a scalar). Hosts get a warning about such parameters if they differ
-    /// from their start values. Parameters of parts that are switched off give no warning, because the same
-    /// parameters often serve several models.
+    /// "name = value" of the parameter that replaces it. `name` is the name in the table, `indices` are the indices of the
+    /// element, from 0 (empty for a scalar). Hosts get a warning about such parameters if they differ from their start
+    /// values. Parameters of parts that are switched off give no warning, because the same parameters often serve several
+    /// models.
     fn overridden(parameters: &Self::Parameters, name: &str, indices: &[usize]) -> Option<String> {
         let _ = (parameters, name, indices);
         None
@@ -131,9 +131,9 @@ pub trait Dynamics: Clone + Debug + Sized + 'static {
     /// Computes the derivatives of the continuous states.
     fn derivatives(&mut self, inputs: &Self::Inputs, x_dot: &mut [f64]);
 
-    /// Computes derivatives in the direction of the states `dx` and of the input slopes in `along`: those of
-    /// the state derivatives are written to `dx_dot`, those of the outputs are returned. Discrete values and
-    /// the slopes of `inputs` are held constant.
+    /// Computes derivatives in the direction of the states `dx` and of the input slopes in `along`: the results for the
+    /// state derivatives are written to `dx_dot`, and the results for the outputs are returned. Discrete values and the
+    /// slopes of `inputs` are held constant.
     fn directional_derivative(
         &mut self,
         inputs: &Self::Inputs,

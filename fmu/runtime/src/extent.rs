@@ -46,8 +46,8 @@ pub struct Extent {
 
 impl Extent {
     /// Returns the extent that a token describes, with the start values of the table. `token` is the GUID or
-    /// instantiationToken that the host passes, `whole` that of the full description. Returns `None` if `token` does not
-    /// belong to a reduced description of this table.
+    /// instantiationToken that the host passes, `whole` the token of the full description. Returns `None` if `token` does
+    /// not belong to a reduced description of this table.
     pub fn from_token<M: Model>(token: &str, whole: &str) -> Option<Extent> {
         let kept = GUID_LENGTH - 1 - DIGITS;
         if token.len() != GUID_LENGTH || !token.is_ascii() || token[..kept] != whole[..kept] {
@@ -88,8 +88,7 @@ impl Extent {
         Some(Extent { token: token.into(), sizes, places, indicators, starts, inputs: Vec::new() })
     }
 
-    /// Reads the description's start values from the folder of resources, if they differ from those of the
-    /// table.
+    /// Reads the description's start values from the folder of resources, if they differ from the table's.
     ///
     /// # Errors
     ///

@@ -38,7 +38,7 @@ pub struct Instance<M: Model, V: Version> {
     pub(crate) events: Events,
     /// Form in which the host sees arrays: as variables, or as their elements.
     pub(crate) layout: Layout,
-    /// The part of the variables that the host knows; `None` for all.
+    /// The part of the variables that the model description read by the host contains; `None` for all.
     pub(crate) extent: Option<Arc<Extent>>,
     pub(crate) state: InstanceState,
     pub(crate) clock: Clock,
@@ -1323,7 +1323,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Refuses a saved state of an instance whose host knows other variables.
+    /// Refuses a saved state of an instance whose model description has other variables.
     pub(crate) fn check_layout(&self, call: &Call, saved: &Self) -> Result<(), Fault> {
         if saved.layout != self.layout {
             return Err(call.error(
@@ -1511,7 +1511,7 @@ fn start_problem<M: Model>(scalar: &Scalar<M>, x: f64) -> Option<String> {
     ))
 }
 
-/// Advances the inputs along their slopes by `h` seconds, within their ranges. The host knows `h` only to
+/// Advances the inputs along their slopes by `h` seconds, within their ranges. The host can give `h` only to within
 /// `resolution`, s.
 #[inline(always)]
 fn follow_slopes<M: Model>(

@@ -250,7 +250,7 @@ impl<M: Dynamics> Table<M> {
     }
 
     /// Returns the instantiationToken of a model description of FMI 3.0, a hash like the GUID. The layouts
-    /// have different tokens, so that the binary knows which description a host has read.
+    /// have different tokens, so that the token tells the binary which description a host has read.
     pub fn token(&self, layout: Layout) -> &str {
         let bytes = self.tokens[layout as usize].get_or_init(|| {
             let mut bytes = [0; GUID_LENGTH];

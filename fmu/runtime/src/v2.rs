@@ -257,7 +257,8 @@ fn logger(functions: &fmi2CallbackFunctions, instance_name: Option<&str>) -> Opt
     }))
 }
 
-/// Returns the interface of the requested instance and the part of the variables that the host knows.
+/// Returns the interface of the requested instance and the part of the variables that the host's model description
+/// contains.
 ///
 /// # Errors
 ///

@@ -20,8 +20,8 @@ pub const PLATFORMS: [(&str, &str, Option<Kind>); 7] = [
     ("aarch64-linux", ".so", Some(Kind::LinuxArm)),
 ];
 
-/// Architectures in the platform tuples of FMI 3.0 (section 2.5.1.4.1), such as x86_64-linux. FMI 2.0.4 allows
-/// these tuples too, except where it has an older name that ends in 32 or 64, such as linux64.
+/// Architectures in the platform tuples of FMI 3.0 (section 2.5.1.4.1), such as x86_64-linux. FMI 2.0.4 also allows these
+/// tuples, except where FMI 2.0 has an older name that ends in 32 or 64, such as linux64.
 const ARCHITECTURES: [&str; 8] =
     ["aarch32", "aarch64", "riscv32", "riscv64", "x86", "x86_64", "ppc32", "ppc64"];
 

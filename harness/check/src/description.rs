@@ -244,9 +244,9 @@ impl Description {
     }
 
     /// Returns the positions of the continuous states: the variables whose derivatives are listed in
-    /// ModelStructure's Derivatives. The attribute `derivative` does not make a state, because inputs,
-    /// outputs and dummy derivatives may have it too (FMI 2.0.5, section 2.2.7). However, an FMU for only
-    /// Co-Simulation may leave the list out, and then the attribute is used.
+    /// ModelStructure's Derivatives. The attribute `derivative` does not make a state, because inputs, outputs and dummy
+    /// derivatives may also have it (FMI 2.0.5, section 2.2.7). However, an FMU for only Co-Simulation may leave the list
+    /// out, and then the attribute is used.
     pub fn states(&self) -> BTreeSet<usize> {
         if self.derivatives.is_empty() && self.model_exchange.is_none() {
             return self.variables.iter().filter_map(Variable::derivative_of).collect();

@@ -264,9 +264,9 @@ const OWNERS: [(&str, &str); 6] = [
     ("a step from", "exchange.run"),
 ];
 
-/// Reports each failing call only once. A call that crashes or is refused stops every rule that makes it: the
-/// rule that owns the call keeps the finding, and the others are skipped because of that rule. For a call
-/// without an owner, the first rule that stopped there keeps the finding.
+/// Reports each failing call only once. A call that crashes or is refused stops every rule that makes it: the rule that
+/// owns the call keeps the finding, and all other rules that make the call are skipped. For a call without an owner, the
+/// first rule that stopped there keeps the finding.
 fn name_each_cause_once(outcomes: &mut [Outcome]) {
     let alike = |text: &str| text.replace(|c: char| c.is_ascii_digit() || ".-+e".contains(c), "");
     // Rules whose only finding is the call at which they stopped, by position in the table.

@@ -98,7 +98,7 @@ impl<V: Version> Loaded<V> {
         Ok(loaded)
     }
 
-    /// Removes the interfaces for which `callable` is false. Binaries that could not be loaded are removed too, if `told`
+    /// Removes the interfaces for which `callable` is false. Binaries that could not be loaded are also removed, if `told`
     /// returns false for their modelIdentifier.
     pub fn retain(
         &mut self,

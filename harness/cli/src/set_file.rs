@@ -6,8 +6,8 @@ use anyhow::{Context, Result};
 use host::description::ModelDescription;
 use host::parameter_set::ParameterSet;
 
-/// Returns the description of the FMU for which the parameters are meant; it is needed to convert units to those of the
-/// FMU.
+/// Returns the description of the FMU for which the parameters are meant; the description is needed to convert units to the
+/// FMU's.
 pub type Describe<'a> = &'a dyn Fn() -> Result<ModelDescription>;
 
 /// Reads names and values from a file of parameters, in its order. Numbers are converted to the units of the

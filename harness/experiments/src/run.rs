@@ -344,7 +344,7 @@ impl Run {
         Ok(instance)
     }
 
-    /// Adds to `columns` the variables in `needs` that must be recorded too, each once. Time and the driven
+    /// Adds to `columns` the variables in `needs` that the caller must also record, each once. Time and the driven
     /// inputs are in the table anyway.
     pub fn columns_with<'n>(
         &self,
@@ -427,8 +427,8 @@ impl Run {
     }
 }
 
-/// Reads the recorded variables of each type with one call; `places` are the columns of the values, reals
-/// first, then the others.
+/// Reads the recorded variables of each type with one call; `places` are the columns of the values, first of the reals,
+/// then of the other types.
 struct Recorder {
     reals: Vec<u32>,
     others: Vec<Variable>,

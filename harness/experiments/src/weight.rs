@@ -108,10 +108,9 @@ fn components(name: &str) -> [String; 3] {
 impl Tanks {
     /// Reads the tanks of an initialised instance; `None` if the FMU is neither Spacecraft nor SloshTank.
     ///
-    /// The density is the tank's `density`. The radius is half its `diameter`, or that of the cylinder with
-    /// its `wave`, R = wave (ξ² − 1)/2. The surface `tension` is in N/m; no FMU in six axes has it. Tanks
-    /// without modes, with unknown dimensions (`wave` = 0), and those whose liquid a stiffness k holds are
-    /// left out.
+    /// The density is the tank's `density`. The radius is half of the tank's `diameter`, or the radius of the cylinder in
+    /// which the wave is equally high, R = wave (ξ² − 1)/2. The surface `tension` is in N/m; no FMU in six axes has it.
+    /// Tanks without modes, with unknown dimensions (`wave` = 0), and those whose liquid a stiffness k holds are left out.
     ///
     /// # Errors If the tension is not positive, or a variable cannot be read.
     pub fn read(

@@ -47,8 +47,8 @@ fn message(payload: &(dyn Any + Send)) -> String {
 #[error("{0}")]
 pub struct Panicked(pub String);
 
-/// Runs `work`; returns the message of its panic if it panics. The first panic counts, because a panic of a
-/// thread makes the thread that waits for it panic too.
+/// Runs `work`; returns the message of its panic if it panics. The first panic counts, because a panic of a thread also
+/// makes the thread that waits for it panic.
 pub fn caught<T>(work: impl FnOnce() -> T) -> Result<T, Panicked> {
     let before = PANICS.lock().unwrap_or_else(PoisonError::into_inner).len();
     catch_unwind(AssertUnwindSafe(work)).map_err(|payload| {

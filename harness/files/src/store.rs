@@ -211,7 +211,7 @@ impl Store {
     /// as the reason. The definition of a campaign is published with its tables, so it has none here.
     ///
     /// # Errors Another program has locked the folder, it belongs to runs of another kind or of another
-    /// definition, or its manifest is damaged. Nothing in it has changed then, except for the lock.
+    /// definition, or its manifest is damaged. In case of an error nothing in the folder has changed, except for the lock.
     pub fn take(
         path: &Path,
         kind: &'static Kind,

@@ -90,7 +90,7 @@ pub struct BaseUnit {
 }
 
 impl BaseUnit {
-    /// Base units of FMI and SSP: those of SI, and rad.
+    /// Base units of FMI and SSP, which are the base units of SI, and rad.
     pub const NAMES: [&str; 8] = ["kg", "m", "s", "A", "K", "mol", "cd", "rad"];
 
     /// Reads the child `BaseUnit` of an element `Unit`. Returns `None` if it is missing or one of its numbers

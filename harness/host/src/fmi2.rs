@@ -498,7 +498,7 @@ impl Drop for Given {
 pub const MODEL_EXCHANGE: i32 = 0;
 pub const CO_SIMULATION: i32 = 1;
 
-/// fmi2StatusKind that asks whether the FMU requests the end of the simulation.
+/// fmi2StatusKind for the question whether the FMU requests the end of the simulation.
 pub const TERMINATED: i32 = 3;
 
 /// Arguments of fmi2Instantiate; `None` becomes a NULL pointer.

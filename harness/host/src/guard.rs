@@ -733,7 +733,7 @@ fn kilobytes(status: &str, kind: &str) -> Option<u64> {
 mod tests {
     use super::*;
 
-    /// Argument by which the test program knows that it was started as the guarded process. For the test harness it is the
+    /// Argument with which a test starts the test program as the guarded process. For the test harness it is the
     /// name of a test that does not exist.
     const CHILD: &str = "guarded_process";
 

@@ -263,7 +263,7 @@ impl Root {
 }
 
 /// A zero of the loop gain together with the nearest pole that has no partner yet. If the two are close, they nearly cancel in ln
-/// L, and the bound of the curvature is much smaller than that of two separate roots.
+/// L, and the bound of the curvature is much smaller than the bound for two separate roots.
 struct Pair {
     /// Number of roots in this entry: 2 for a zero with its pole, 1 for a root without a partner.
     roots: usize,

@@ -265,9 +265,9 @@ impl Instance {
 
 /// Returns the derivatives of `unknowns` with respect to each of `knowns`, one list for each known.
 ///
-/// Most states of a small craft belong to tanks that it does not have. Therefore the FMU is first asked for the derivative in a
-/// direction that moves a whole block of knowns; if this derivative is 0, the derivatives with respect to each known of the block
-/// are 0 and are not computed one by one.
+/// Most states of a small craft belong to tanks that it does not have. Therefore the first call requests the derivative in
+/// a direction that moves a whole block of knowns; if this derivative is 0, the derivatives with respect to each known of
+/// the block are 0 and are not computed one by one.
 fn jacobian(
     instance: &mut fmu::Instance,
     unknowns: &[u32],

@@ -87,7 +87,7 @@ pub type Table<'py> = (Vec<String>, Bound<'py, PyAny>);
 pub struct Run<'fmu> {
     time: Vec<f64>,
     inputs: (Columns<'fmu>, Numbers),
-    /// Time derivatives of the inputs after each row, with working memory for those of the Reals.
+    /// Time derivatives of the inputs after each row, with working memory for the derivatives of the Reals.
     slopes: Option<(Numbers, Vec<f64>)>,
     outputs: (Columns<'fmu>, Numbers),
     feedback: Option<Feedback>,

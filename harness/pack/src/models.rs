@@ -63,9 +63,9 @@ impl Model {
         root().join("modelDescription").join(self.name)
     }
 
-    /// Returns the folder with the example and its reference result, in the FMU as well as in the model's
-    /// folder. The layered standard FMI-LS-REF keeps such files there. (Folders in `extra` are named after
-    /// reversed domain names, and the project has no domain.)
+    /// Returns the folder with the example and its reference result, both in the FMU and in the model's folder. The layered
+    /// standard FMI-LS-REF keeps such files there. (Folders in `extra` are named after reversed domain names, and the
+    /// project has no domain.)
     pub fn example(&self) -> PathBuf {
         self.folder().join(REFERENCES)
     }

@@ -92,7 +92,7 @@ pub(crate) fn native_arguments(command: &mut Command) {
 /// Builds the compiled half of the Python package for the platform on which this program runs and returns its
 /// path, at which the package finds it in the source tree.
 ///
-/// It is built with the features that the program has too: with the features of only one package Cargo would
+/// It is built with the program's features: with the features of only one package Cargo would
 /// compile `host`, `signals`, `parquet` and 16 other crates a second time.
 ///
 /// # Errors

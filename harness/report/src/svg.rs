@@ -213,7 +213,7 @@ fn curve(points: impl IntoIterator<Item = (f64, f64)>, series: &Series) -> Marku
     }
 }
 
-/// Leaves out points within `tolerance` of the line through the others (Ramer, Douglas and Peucker).
+/// Leaves out points within `tolerance` of the line through the remaining points (Ramer, Douglas and Peucker).
 pub(crate) fn simplified(points: &[(f64, f64)], tolerance: f64) -> Vec<(f64, f64)> {
     if points.len() < 3 {
         return points.to_vec();

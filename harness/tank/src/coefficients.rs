@@ -22,7 +22,7 @@ pub struct FiniteAmplitude {
 /// - `wave_second`: second-order elevation at the wall per squared slosh angle, m/rad². At an angle A the
 ///   crest is wave A + wave_second A^2 high and the trough wave A - wave_second A^2 deep.
 /// - `bridged`: true if the coefficients are interpolated over the fill across a pole of the third order.
-/// - `energy`: coefficients that give the wave's energy, too, for a tank that keeps its liquid.
+/// - `energy`: coefficients that also give the wave's energy, for a tank that keeps its liquid.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Coefficients {
     pub nonlinear_inertia: f64,
@@ -47,10 +47,10 @@ pub struct Coefficients {
     pub energy: Option<Energy>,
 }
 
-/// Coefficients of a mode with the wave's energy (`formulas::energy_terms`), in place of those of the third
-/// order: s, kappa, s_2, kappa_2, t and t_2 under the names of the FMUs. `angle_limit` is the angle above
-/// which the mode is out of range, rad, and `frequency_limit` the angle up to which the frequency was
-/// compared with potential flow, with errors below 0.11 %.
+/// Coefficients of a mode with the wave's energy (`formulas::energy_terms`), in place of the coefficients of the third
+/// order: s, kappa, s_2, kappa_2, t and t_2 under the names of the FMUs. `angle_limit` is the angle above which the mode is
+/// out of range, rad, and `frequency_limit` the angle up to which the frequency was compared with potential flow, with
+/// errors below 0.11 %.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Energy {
     pub nonlinear_inertia: f64,

@@ -74,7 +74,7 @@ impl Coefficients {
     }
 
     /// Returns the coefficients of an upright cylinder filled to h/R = `fill` with its limits. Across the
-    /// poles both coefficients are bridged; the second-order wave is then interpolated, too.
+    /// poles both coefficients are bridged; the second-order wave is then also interpolated.
     fn cylinder_coefficients(
         self,
         fill: f64,

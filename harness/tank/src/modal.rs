@@ -393,8 +393,8 @@ impl ModalData {
     }
 
     /// Returns natural frequencies, Hz, at the specific force `gravity`, m/s²; for a box along its first or
-    /// (`along_y`) second length. With surface tension they are those of [`Capillarity`], `None` where no
-    /// formula holds.
+    /// (`along_y`) second length. With surface tension they come from [`Capillarity`], and are `None` where no formula
+    /// holds.
     pub fn frequencies(&self, gravity: f64, along_y: bool) -> Vec<Option<f64>> {
         let omegas: Vec<Option<f64>> = match (&self.capillarity, &self.axes) {
             (Some(found), _) => {

@@ -24,9 +24,8 @@ use crate::{damping, modal};
 /// hold.
 const MOST_CAPILLARY: f64 = 0.1;
 
-/// Surface tension over density, m3/s2, of a liquid whose surface tension is not given: that of water, the
-/// largest of common liquids (hydrazine 6.6e-5, MMH 3.9e-5, liquid hydrogen 2.8e-5, NTO 1.9e-5, liquid oxygen
-/// 1.2e-5).
+/// Surface tension over density, m3/s2, of a liquid whose surface tension is not given: the value of water, the largest of
+/// common liquids (hydrazine 6.6e-5, MMH 3.9e-5, liquid hydrogen 2.8e-5, NTO 1.9e-5, liquid oxygen 1.2e-5).
 const LARGEST_TENSION: f64 = 7.3e-5;
 
 /// The FMU that the parameters are for. HubSlosh gets a table of modes (`slosh.source = table`) and keeps the
@@ -322,8 +321,7 @@ impl ParameterSet {
     }
 
     /// Does what [`ParameterSet::new`] does, with coefficients that give the wave's energy where they are
-    /// known and `has_energy` is true. Tanks with a fill table and HubSlosh have only those of the third
-    /// order.
+    /// known and `has_energy` is true. Tanks with a fill table and HubSlosh have only coefficients of the third order.
     pub(crate) fn with_energy(
         tank: &Tank,
         data: &ModalData,

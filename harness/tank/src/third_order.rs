@@ -58,9 +58,8 @@ pub const DETUNING: f64 = 0.01;
 ///
 /// - `mode` names it: azimuthal number and number from 1 in round sections, half waves over the angle and
 ///   number from 1 in sectors, half waves along the motion and across it in boxes.
-/// - `planar`, `circular`: squared projections on chi over N and the first mode's N. The first is that of
-///   (X^2 + Y^2)/2, which excites the frequency 0. The second, at 2 omega, is that of (X^2 - Y^2)/2 plus that
-///   of X Y.
+/// - `planar`, `circular`: squared projections on chi over N and the first mode's N. The first belongs to (X^2 + Y^2)/2,
+///   which excites the frequency 0. The second, at 2 omega, belongs to (X^2 - Y^2)/2 and X Y.
 /// - `at_wall`: C chi/N at the wall, planar motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Excited {
@@ -308,9 +307,9 @@ fn stationary(m: Matrix2<f64>, v: Vector2<f64>) -> f64 {
 }
 
 /// Radial parts u of the modes of order nu, by Galerkin's method: (r u')'/r + (kappa^2 - nu^2/r^2) u = 0 with
-/// u' = 0 at the walls and int u^2 r dr = 1, where a constant is not a mode. `r` and `weights` (with r dr)
-/// are those of the quadrature, m; `kappa` are the wave numbers, 1/m, ascending; `values` has u at the nodes,
-/// one mode a column, and `at_wall` u at the outer wall.
+/// u' = 0 at the walls and int u^2 r dr = 1, where a constant is not a mode. `r` and `weights` (with r dr) are points and
+/// weights of the quadrature, m; `kappa` are the wave numbers, 1/m, ascending; `values` has u at the nodes, one mode a
+/// column, and `at_wall` u at the outer wall.
 struct Radial {
     r: Vec<f64>,
     weights: Vec<f64>,

@@ -4,7 +4,7 @@
 /// The part of three.js that [`SCENE`] uses, as the global `THREE` (MIT: [`THREE_LICENSE`] goes with it).
 pub static THREE: &str = include_str!("../three/three.min.js");
 
-/// The licence of [`THREE`], which every page that holds it holds too.
+/// The licence of [`THREE`], which every page that contains the library also contains.
 pub static THREE_LICENSE: &str = include_str!("../three/LICENSE");
 
 /// The global `HubSloshScene`: bench or spacecraft with liquid (`scene/README.md`); needs [`THREE`].

@@ -193,8 +193,8 @@ fn breaking_adds_damping_above_the_steepness_in_every_model() {
     }
 }
 
-/// Without any other damping, the dissipated power is that of breaking waves only, from far above the onset to rest; it is
-/// never negative.
+/// Without any other damping, the dissipated power is the power of breaking waves only, from far above the onset to rest;
+/// it is never negative.
 #[test]
 fn breaking_waves_only_dissipate_energy() {
     for model in SloshModel::ALL.into_iter().filter(|model| *model != SloshModel::Frozen) {

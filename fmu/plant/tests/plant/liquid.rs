@@ -41,8 +41,7 @@ fn table(mut p: Parameters, s: f64, kappa: f64) -> Parameters {
     p
 }
 
-/// Uses coefficients of a table with soft and hard springs. The shifts equal those of the same expansion for any s and
-/// kappa.
+/// Uses coefficients of a table with soft and hard springs. For any s and kappa the frequency shifts equal the expansion's.
 #[test]
 fn s_and_kappa_of_a_table_give_their_frequency_shifts() {
     for (s, kappa) in [(1.0, 1.0), (1.4, 0.73), (0.3, 2.0), (3.0, 1.2), (1.0, -0.8)] {

@@ -443,7 +443,7 @@ fn warnings_name_breaking_parameters_without_effect() {
 }
 
 /// The onset of breaking for a mode of a table follows from the wave elevation and the wave number in the table. With the
-/// values of a cylinder the onset is that of the cylinder.
+/// values of a cylinder the waves begin to break as in the cylinder.
 #[test]
 fn the_steepness_of_a_table_has_its_own_wave_and_wave_number() {
     let power = |p: &Parameters| plant(p).outputs(&at(9.81)).power_dissipated;

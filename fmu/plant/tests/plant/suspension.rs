@@ -74,7 +74,7 @@ fn a_rigid_hub_swings_and_decays_as_a_torsion_pendulum() {
     }
 }
 
-/// The frequencies are those of (K - omega^2 M)(theta, alpha) = 0, with M and K of the linear slosh model and the stiffness
+/// The frequencies follow from (K - omega^2 M)(theta, alpha) = 0, with M and K of the linear slosh model and the stiffness
 /// k of the line about the bearing.
 #[test]
 fn line_and_liquid_swing_together_at_the_frequencies_of_two_coupled_pendulums() {

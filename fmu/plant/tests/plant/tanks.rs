@@ -31,7 +31,7 @@ fn run(p: &Parameters) -> Vec<Outputs> {
         .collect()
 }
 
-/// Tests the table with and without a wave height, whose default is that of a cylinder with the diameter tank.d.
+/// Tests the table with and without a wave height, whose default is the wave height of a cylinder with the diameter tank.d.
 #[test]
 fn modes_of_a_cylinder_given_as_a_table_move_like_the_cylinder() {
     for model in SLOSHING {

@@ -18,7 +18,7 @@ pub struct Arrays {
     /// End of each variable's elements in `scalars`.
     ends: Vec<usize>,
     types: Vec<CType>,
-    /// For each scalar its array and its position in it, counted from 1; position 0 is outside the present
+    /// For each scalar its array and its position in the array, counted from 1; position 0 is outside the present
     /// size.
     places: Vec<(u32, usize)>,
     /// Indices of the existing states among the largest possible number of states, in the host's order.
@@ -70,7 +70,7 @@ impl Arrays {
         self.scalars.get(begin..*self.ends.get(n)?)
     }
 
-    /// Returns the C type of a variable; variables after those of the table are real.
+    /// Returns the C type of a variable; variables that come after the table's are real.
     pub fn c_type(&self, reference: u32) -> CType {
         let n = (reference as usize).wrapping_sub(1);
         self.types.get(n).copied().unwrap_or(CType::Real)
@@ -86,7 +86,7 @@ impl Arrays {
         self.ends.is_empty()
     }
 
-    /// Returns the array of a scalar and the scalar's position in it, counted from 1, or `None` if it is
+    /// Returns the array of a scalar and the scalar's position in the array, counted from 1, or `None` if it is
     /// outside the present size.
     pub fn place(&self, scalar: u32) -> Option<(u32, usize)> {
         let place = *self.places.get((scalar as usize).checked_sub(1)?)?;

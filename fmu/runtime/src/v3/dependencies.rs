@@ -58,8 +58,8 @@ pub(super) fn dependencies<M: Model>(
     Ok(all)
 }
 
-/// Returns the dependencies of a variable: those of its initial value until the end of initialization mode,
-/// then the present ones.
+/// Returns the dependencies of a variable: until the end of initialization mode the dependencies of its initial value, then
+/// the present dependencies.
 pub(super) unsafe fn write_dependencies<M: Model>(
     instance: fmi3Instance,
     dependent: fmi3ValueReference,

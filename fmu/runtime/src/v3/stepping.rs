@@ -60,7 +60,7 @@ struct Wish {
 }
 
 /// Calls the host's intermediateUpdate at `time`. No reference into the instance exists during the call,
-/// because the host calls the FMU from it.
+/// because the host calls the FMU from within its callback.
 unsafe fn intermediate_update<M: Model>(
     instance: fmi3Instance,
     time: f64,

@@ -430,10 +430,9 @@ pub fn intermediate_early_return(subject: &Subject, findings: &mut Findings) -> 
 
 /// `intermediate.inputs`: checks that inputs which are set in the intermediate update act within the step.
 ///
-/// With an input that changes linearly with time, the outputs must come nearer to those of steps 64 times as
-/// short than with a held input. The short steps use intermediate update too, because an FMU may use the
-/// input's rate (a wheel's torque is minus the rate of its momentum), and held inputs have no rate for any
-/// step size.
+/// With an input that changes linearly with time, the outputs must come nearer to the outputs with steps 64 times as short
+/// than with a held input. The short steps also use intermediate update, because an FMU may use the input's rate (a wheel's
+/// torque is minus the rate of its momentum), and held inputs have no rate for any step size.
 pub fn intermediate_inputs(subject: &Subject, findings: &mut Findings) -> Result<()> {
     require_updates(subject)?;
     let inputs: Vec<Variable> =

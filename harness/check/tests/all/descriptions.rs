@@ -200,7 +200,7 @@ fn lists_of_unknowns_name_each_unknown_once_and_in_order() {
 }
 
 /// FMI 2.0.5, section 2.2.7: any variable may name the variable whose derivative it is. Only Derivatives makes states of
-/// them (2.2.8). Dymola and JModelica write the attribute for outputs, inputs and dummy derivatives, too.
+/// them (2.2.8). Dymola and JModelica write the attribute also for outputs, inputs and dummy derivatives.
 #[test]
 fn the_attribute_derivative_without_other_signs_makes_no_state() {
     let of = |variable: &str, index: &str| {

@@ -64,8 +64,8 @@ pub struct CampaignArgs {
     /// Directory of another campaign, whose runs the report compares with the runs of this campaign.
     #[arg(long, value_name = "DIRECTORY")]
     compare: Option<PathBuf>,
-    /// Replaces tables and report if the default directory contains those of another plan. Without this flag that is an
-    /// error.
+    /// Replaces tables and report if the default directory contains the tables of another plan. Without this flag that is
+    /// an error.
     #[arg(long)]
     replace: bool,
 }

@@ -66,7 +66,7 @@ pub struct DesignArgs {
     /// Sets a parameter to its expected value for the bench.
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
     settings: Vec<(String, String)>,
-    /// Also predicts delay, gyro bias and friction asymmetry, because they will be estimated too.
+    /// Also predicts delay, gyro bias and friction asymmetry, because the fit of the recording will estimate them.
     #[arg(long, alias = "flaws", conflicts_with = "free")]
     sensor_errors: bool,
     /// FMU: a file, or the name of an FMU of this project (`hubslosh fmus` lists them).
@@ -264,7 +264,7 @@ struct Bench<'f> {
     fmu: &'f Fmu,
     /// Settings of the FMU, with the damping ratio that the user set or, without one, the ratio of the correlation.
     setup: Setup,
-    /// True if delay, gyro bias and friction asymmetry are predicted too.
+    /// True if delay, gyro bias and friction asymmetry are also predicted.
     sensor_errors: bool,
     noise: Noise,
     /// Largest slosh angle that `--slosh-angle` allows, rad.

@@ -314,7 +314,8 @@ fn started(text: &str) -> Result<(String, f64, Option<f64>)> {
     }
 }
 
-/// Parses the tolerances of known values of the bench, `NAME=SIZE`, and that of the gyro's scale.
+/// Parses the tolerances of known values of the bench, `NAME=SIZE`, and the tolerance of the gyro's scale,
+/// `gyro_scale=SIZE`.
 fn tolerances(texts: &[String]) -> Result<(Tolerances, f64)> {
     let (mut all, mut scale) = (Tolerances::default(), Options::default().gyro_scale);
     for item in texts.iter().flat_map(|text| text.split(',')) {
@@ -434,7 +435,7 @@ impl DecayArgs {
 }
 
 impl KnownArgs {
-    /// Collects what the options state about the bench. Names are those of the FMU's parameters.
+    /// Collects what the options state about the bench. The names of the FMU's parameters are used.
     fn options(&self) -> Result<Options> {
         let (tolerances, gyro_scale) = tolerances(&self.tolerances)?;
         let (known, starts): (Vec<_>, Vec<_>) =

@@ -186,7 +186,7 @@ fn a_chapter_whose_file_is_missing_contains_the_message() {
     assert!(said.contains("day.toml is needed"), "{said}");
 }
 
-/// In earlier versions a clock 50 ppm off was refused as "another profile, or the torque's sign", and 3 % of
+/// Earlier versions refused a clock that was wrong by 50 ppm as "another profile, or the torque's sign", and 3 % of
 /// lost rows were too many.
 #[test]
 fn a_clock_300_ppm_off_and_lost_rows_change_no_feature_beyond_its_interval() {

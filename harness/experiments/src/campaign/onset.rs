@@ -27,8 +27,8 @@ struct Dwell {
 }
 
 /// Result of a search for the onset of rotary slosh: its frequency, Hz, the largest torque without rotary slosh and the
-/// smallest torque with it, N·m. If no torque makes the slosh rotary, there are no torques, and the frequency is that of
-/// the largest slosh angle.
+/// smallest torque with it, N·m. If no torque makes the slosh rotary, there are no torques, and the frequency is where the
+/// slosh angle is largest.
 #[derive(Debug, PartialEq)]
 struct Found {
     frequency: f64,

@@ -72,7 +72,7 @@ pub fn check_rows(path: &Path, step: f64, torque: &Torque) -> Result<()> {
 }
 
 /// Reads the recording of a run. Time counts from the torque's beginning, found by correlation with the
-/// torque of the plan. The columns are those of a stored run, as far as the recording has them.
+/// torque of the plan. The columns of a stored run are used, as far as the recording has them.
 ///
 /// # Errors If the recording cannot be used, or has another torque.
 pub(super) fn table(
@@ -209,8 +209,8 @@ impl Sought<'_> {
     }
 
     /// Returns true if the sweep with the opposite sign explains the record better than the sweep itself. Delay and clock
-    /// can compensate half a cycle, with a correlation of more than 0.9, so that the clock is fitted for the opposite sign
-    /// too before the two are compared.
+    /// can compensate half a cycle, with a correlation of more than 0.9, so that the clock is also fitted for the opposite
+    /// sign before the two fits are compared.
     fn is_reversed(&self, record: &[f64], (clock, correlation): (Clock, f64)) -> bool {
         let is_plain = clock.rate == 0.0 && correlation > LEAST_CORRELATION;
         let reversed: Vec<f64> = record.iter().map(|tau| -tau).collect();

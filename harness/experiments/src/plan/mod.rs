@@ -134,7 +134,8 @@ pub const RECORDING: &str = "recording";
 
 /// One run of a plan. `listed` is the name of its `[[run]]`, if the plan gives one; `varied` are the values
 /// of the varied names, in the order of [`Plan::varied`], empty where a `[[run]]` does not set one; `model`,
-/// `fill` (m) and `amplitude` (N·m) are those of `slosh.model`, `tank.h` and the profile, if they exist.
+/// `fill` (m) and `amplitude` (N·m) are the values of `slosh.model`, of `tank.h` and of the profile's amplitude, if they
+/// exist.
 /// `settings` are start values by FMU name.
 #[derive(Clone, Debug)]
 pub struct Case {

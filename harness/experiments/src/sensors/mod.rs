@@ -23,9 +23,8 @@ use crate::run;
 use signals::table::Table;
 
 /// A kind of sensor. `says` describes the measured quantity for readers; `parameters` come in addition to
-/// [`ERRORS`]; `unit` is that of the readings, empty if it is that of the variable; `of` is the variable that
-/// the sensor reads unless `of=NAME` names another, where the outer `None` is for kinds that do not read a
-/// variable.
+/// [`ERRORS`]; `unit` is the unit of the readings, or empty if the readings have the variable's unit; `of` is the variable
+/// that the sensor reads unless `of=NAME` names another, where the outer `None` is for kinds that do not read a variable.
 #[derive(Debug)]
 pub struct Kind {
     pub name: &'static str,

@@ -215,7 +215,7 @@ fn component_along([radial, tangential]: [f64; 2], angle: f64) -> f64 {
     radial * angle.cos() + tangential * angle.sin()
 }
 
-/// Returns radial and tangential acceleration of a point of the hub on the tank's side, less that of gravity,
+/// Returns radial and tangential acceleration of a point of the hub on the tank's side, less the acceleration of gravity,
 /// m/s². `motion` has the values of [`MOTION`].
 fn acceleration(motion: &[f64], radius: f64) -> [f64; 2] {
     let [theta, omega, omega_dot, _, g, tilt, azimuth] = std::array::from_fn(|k| motion[k]);

@@ -11,7 +11,7 @@ use pack::platforms::{PLATFORMS, Platform};
 use pack::{Fmi, MODELS, Model, release};
 
 /// Returns the committed FMUs of this version. Between a new version's number and its release there are none;
-/// then those of an older version must be there.
+/// the files of an older version must then exist.
 fn released() -> Vec<(&'static Model, Fmi, PathBuf)> {
     let folder = pack::root().join("dist").join("release");
     let of = |model| Fmi::ALL.map(|fmi| (model, fmi, release::path(model, fmi, &folder)));

@@ -13,7 +13,7 @@ pub struct Chapter {
     pub illustrations: Vec<Illustration>,
 }
 
-/// A figure of a chapter: the chart, whose colours are replaced by those of the page, a caption that states
+/// A figure of a chapter: the chart, whose colours are replaced by the page's, a caption that states
 /// what the figure shows, and the numbers of the figures in Rubaga's thesis that show the same for its bench.
 /// `equal` is true if both axes have the same scale.
 #[derive(Clone, Debug)]

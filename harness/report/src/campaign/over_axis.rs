@@ -111,8 +111,8 @@ pub(super) fn extrema(page: &Page, axis: &Axis) -> Figure {
     }
 }
 
-/// Returns labels for the ends of lines. Lines that end close together share a label. There are no labels if
-/// they are too many to be read.
+/// Returns labels for the ends of lines. Lines that end close together share a label. If there are too many labels to be
+/// read, none is drawn.
 fn labels(mut ends: Vec<(f64, String, &str, &str)>) -> Vec<Label> {
     const MOST: usize = 12;
     const TOGETHER: f64 = 0.03;

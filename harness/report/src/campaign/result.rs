@@ -9,7 +9,7 @@ use super::page::{Axis, Group, Page, best, distinct, exact_features, manoeuvre, 
 use super::recordings;
 
 /// Features of one run's frequency response: the position of the run on the axis, in the unit of the axis,
-/// and antiresonance and resonance, also those of the exact linear plant, Hz. `swirls` is true if the slosh
+/// and antiresonance and resonance, estimated and of the exact linear plant, Hz. `swirls` is true if the slosh
 /// was rotary for some time.
 #[derive(Clone, Copy, Debug)]
 struct Point {

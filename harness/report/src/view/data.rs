@@ -31,7 +31,7 @@ impl Thinning {
         kept
     }
 
-    /// Returns the number of kept rows per oscillation of the fastest column, if it is too small to show the
+    /// Returns the number of kept rows per oscillation of the fastest column, if there are too few rows to show the
     /// oscillation.
     pub fn too_few(&self, columns: &[&[f64]]) -> Option<f64> {
         let frames = |column: &&[f64]| {

@@ -80,8 +80,7 @@ const BENCH_PANELS: [(&str, &[&str]); 7] = [
 
 const MOST_PANELS: usize = 8;
 
-/// Lists all columns that the page can use, in the order of a table, so that the user knows which columns to
-/// record.
+/// Lists all columns that the page can use, in the order of a table, so that the user sees which columns to record.
 pub fn columns(
     description: &ModelDescription,
     parameters: &BTreeMap<String, String>,
@@ -182,7 +181,8 @@ fn coordinates(n: usize) -> [String; 2] {
 }
 
 /// Returns the radial and tangential slosh angles of HubSlosh's second and further modes, if the states of these modes were
-/// recorded. The FMU has outputs only for the angles of the first mode, so the others are computed from the states.
+/// recorded. The FMU has outputs only for the angles of the first mode, so the angles of higher modes are computed from the
+/// states.
 fn higher_modes(table: &Table, model: &str, modes: &[Pendulum]) -> Vec<[Vec<f64>; 2]> {
     let Some(coordinate) = Coordinate::from_model(model) else { return Vec::new() };
     let recorded = (2..).zip(&modes[1..]).map_while(|(n, mode)| {

@@ -117,8 +117,8 @@ impl Header {
         }
     }
 
-    /// Finds pairs of columns with whole seconds and with the rest of a second, such as `stamp.sec` and
-    /// `stamp.nanosec`, with the factor from the rest to seconds.
+    /// Finds pairs of columns with whole seconds and with fractions of a second, such as `stamp.sec` and
+    /// `stamp.nanosec`, with the factor from the second column to seconds.
     fn halves(&self) -> Vec<(usize, usize, f64)> {
         const RESTS: [(&str, f64); 3] = [
             ("nanoseconds nanosecs nanosec nsecs nsec ns", 1e-9),
@@ -223,8 +223,8 @@ pub fn assigned(path: &Path, signals: &[Signal]) -> Result<Vec<(String, Option<u
     Ok(found)
 }
 
-/// Reads a recording: the time (s) and those of the wanted signals that the file has, in SI units. `done` receives messages
-/// about values that were converted or completed.
+/// Reads a recording: the time (s) and the wanted signals, as far as the file has them, in SI units. `done` receives
+/// messages about values that were converted or completed.
 ///
 /// # Errors If the file cannot be read. The error lists all faults of its columns.
 pub fn read(path: &Path, wanted: &Wanted, done: &mut dyn FnMut(String)) -> Result<Table> {
@@ -484,7 +484,7 @@ fn read_as(
     Ok(Table::new(names, columns))
 }
 
-/// Joins whole seconds and the rest of a second (times `factor`, s) to one time. Returns the first whole
+/// Adds whole seconds and fractions of a second (times `factor`, s) to one time. Returns the first whole
 /// second, from which the times count, and the times, s; `None` if the columns are something else.
 fn join_seconds(whole: &[f64], part: &[f64], factor: f64) -> Option<(f64, Vec<f64>)> {
     let first = *whole.first()?;

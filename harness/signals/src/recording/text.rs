@@ -187,8 +187,7 @@ impl Lines {
 }
 
 /// First lines of a file, split by one of the separators: number, fields and values of each line, the
-/// positions of the columns that hold text instead of numbers or times, and those of the rows of values in
-/// `lines`.
+/// positions of the columns that hold text instead of numbers or times, and the positions of the rows of values in `lines`.
 struct Sample {
     separator: (u8, &'static str),
     lines: Vec<(u64, Vec<String>, Vec<Value>)>,

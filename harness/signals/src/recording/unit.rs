@@ -276,8 +276,8 @@ const OTHERS: [&str; 42] = [
     "grad",
 ];
 
-/// Returns true for the name of a unit, which may stand in brackets. `nanosec` and similar names are columns
-/// with the rest of a second.
+/// Returns true for the name of a unit, which may stand in brackets. columns named `nanosec` and the like contain fractions
+/// of a second.
 pub(super) fn is_unit(text: &str) -> bool {
     let text = text.trim_matches(['[', ']', '(', ')', ' ']);
     if ["nanosec", "nanosecs", "nsec", "nsecs"].contains(&text) {

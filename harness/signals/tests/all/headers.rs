@@ -226,7 +226,7 @@ fn civil(day: i64) -> (i64, i64, i64) {
     (yoe + era * 400 + i64::from(month < 3), month, doy - (153 * mp + 2) / 5 + 1)
 }
 
-/// Makes columns of dates and clock times. There may be a second column with the rest of a second.
+/// Makes columns of dates and clock times. A second column may contain the fraction of a second.
 fn stamps(dice: &mut Rng, ms: &[i64], clear: &mut bool) -> Vec<Column> {
     const NAMES: [&str; 12] =
         ["Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec"];

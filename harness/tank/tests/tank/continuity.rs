@@ -49,8 +49,8 @@ const TANKS: [(&str, &str, [f64; 2]); 9] = [
     ),
 ];
 
-/// Returns the largest relative changes between neighbours of `count` + 1 fills, 0.1 % of the tank's height apart. They
-/// are those of the damping ratio, and of ratio and interval over the laminar layer, which has a slope of its own.
+/// Returns the largest relative changes between neighbours of `count` + 1 fills, 0.1 % of the tank's height apart. The
+/// jumps are of the damping ratio, and of ratio and interval divided by the laminar layer's, which has a slope of its own.
 fn largest_steps(tank: &Tank, liquid: [f64; 2], from: f64, count: usize) -> [f64; 4] {
     let depth = tank.depth().unwrap_or(1.0);
     let numbers = |i: usize| {
@@ -156,8 +156,8 @@ fn a_mixture_lies_between_its_correlations_and_its_interval_holds_them() {
 }
 
 /// Spheroids and capsules that pass through the sphere: near it the ratio changes with the shape as a smooth function
-/// does, far from it little of the sphere is left. At 0.8 of the height the sphere has ten layers, which the interval of a
-/// spheroid a few per cent off holds.
+/// does, far from the sphere the shape is quite different. At 0.8 of the height the sphere has ten layers, which the
+/// interval of a spheroid a few per cent off holds.
 #[test]
 fn near_a_sphere_every_shape_has_its_damping() {
     let solved = |e: f64| {

@@ -548,8 +548,8 @@ fn a_contour_has_at_most_200_segments() {
     assert!(message.contains("The contour has 201 segments, at most 200."), "{message}");
 }
 
-/// The JSON result states whether the tank is a body of revolution or a box, so that a reader knows which lengths to
-/// expect.
+/// The JSON result states whether the tank is a body of revolution or a box, so that a program that reads the result can
+/// choose the lengths.
 #[test]
 fn a_result_says_whether_it_is_of_a_body_of_revolution_or_of_a_box() {
     for (text, kind) in [

@@ -73,7 +73,8 @@ fn both_methods_agree_within_their_errors() {
     }
 }
 
-/// A scaled tank has the same coefficients, and a capsule filled below its tangent has those of a sphere.
+/// A scaled tank has the same coefficients, and a capsule that is filled only within its lower half sphere has the sphere's
+/// coefficients.
 #[test]
 fn coefficients_depend_only_on_the_shape() {
     let sphere = known("shape = { sphere = { radius = 1.0 } }", 0.7);

@@ -209,8 +209,9 @@ fn stiffnesses_have_the_limits_of_a_flat_surface_and_of_large_bond_numbers() {
     assert!(!none.warnings.iter().any(told), "0 is allowed: {:?}", none.warnings);
 }
 
-/// At a contact angle of 90 degrees the frequency equals that of a flat surface. Between the values of the table it rises
-/// steadily with the Bond number and with the angle, and for large Bond numbers the shift approaches its known limit.
+/// At a contact angle of 90 degrees the frequency equals the frequency with a flat surface. Between the values of the table
+/// it rises steadily with the Bond number and with the angle, and for large Bond numbers the shift approaches its known
+/// limit.
 #[test]
 fn curved_meniscus_is_smooth_between_its_values() {
     let xi = 1.841_183_781_340_659_3f64;

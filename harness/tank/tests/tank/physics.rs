@@ -79,7 +79,7 @@ fn the_inertia_of_a_shallow_dish_is_within_its_stated_error() {
     }
 }
 
-/// Compares effective inertias in closed form with sums over 20,000 modes, whose neglected rest is 50^-3 of the rest after
+/// Compares effective inertias in closed form with sums over 20,000 modes, whose remainder is 50^-3 of the remainder after
 /// 400 modes. In shallow liquid an earlier sum of 400 modes was wrong by 3e-10 m R^2 for the cylinder and by 7e-9 for the
 /// annulus, although the stated error was 1e-11.
 #[test]
@@ -160,7 +160,7 @@ fn rigid_liquid_is_positive_for_any_number_of_modes() {
     }
 }
 
-/// Compares the closed forms with the boundary integral equation, which knows only the contour and has an error of 1e-10
+/// Compares the closed forms with the boundary integral equation, which uses only the contour and has an error of 1e-10
 /// here.
 #[test]
 fn closed_forms_agree_with_the_boundary_integral_equation() {
@@ -354,8 +354,8 @@ fn thin_liquids_and_small_details_are_solved_as_well_as_others() {
     }
 }
 
-/// A dome that bulges into the tank meets the cylinder in a cusp. The result differs only slightly from that of a tank in
-/// which the last 1e-3 R of the cusp is filled up.
+/// A dome that bulges into the tank meets the cylinder in a cusp. The result differs only slightly from the result for a
+/// tank in which the last 1e-3 R of the cusp is filled up.
 #[test]
 fn a_cusp_at_the_edge_of_an_inverted_dome_is_harmless() {
     let cusp = solve(

@@ -85,7 +85,8 @@ fn in_a_sphere_the_spinning_liquid_equals_an_independent_program() {
     }
 }
 
-/// At every spin the mass equals the mass at rest. At a spin of almost 0, centre of mass and inertias do so as well.
+/// At every spin the mass equals the mass at rest. At a spin of almost 0, centre of mass and inertias also equal their
+/// values at rest.
 #[test]
 fn a_slow_spin_changes_nothing() {
     let shapes = [

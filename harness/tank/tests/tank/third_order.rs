@@ -94,8 +94,8 @@ fn boxes_have_the_waves_of_tadjbakhsh_and_keller() {
     }
 }
 
-/// An annular tank without a hole is a circular cylinder. A thin annulus of radius R is a channel: its planar wave is that
-/// of a box of length pi R, and its circular wave is Stokes's wave with omega^2 = g k T [1 + (9 T^4 - 10 T^2 + 9) (k
+/// An annular tank without a hole is a circular cylinder. A thin annulus of radius R is a channel: its planar wave is the
+/// wave in a box of length pi R, and its circular wave is Stokes's wave with omega^2 = g k T [1 + (9 T^4 - 10 T^2 + 9) (k
 /// a)^2/(8 T^4)].
 #[test]
 fn annular_tanks_lie_between_a_circle_and_a_channel() {
