@@ -1,4 +1,4 @@
-//! A craft with tanks that drain, have planar modes, other bobs than pendulums (`surface.rs`) or liquid that spins (`spin.rs`),
+//! A craft with tanks that drain, have planar modes, other modes than pendulums (`surface.rs`) or liquid that spins (`spin.rs`),
 //! each with its contents from `contents.rs`. Outputs and derivatives are of these equations. Steps are, too, if a tank drains; otherwise
 //! `motion.rs` takes them.
 //!
@@ -78,7 +78,7 @@ impl Acting<Dual> {
         }
     }
 }
-/// A craft with at least one tank that can drain, or with planar modes, other bobs than pendulums, or liquid that spins.
+/// A craft with at least one tank that can drain, or with planar modes, other modes than pendulums, or liquid that spins.
 /// `follows` is true if any drag depends on acceleration or amplitude.
 #[derive(Clone, Debug)]
 pub struct Draining {

@@ -27,7 +27,7 @@
 //!
 //! Bobs on other surfaces than spheres or in planes add matrices of rank one to M (constrained.rs).
 //!
-//! Liquid that spins (spin.rs) adds a couple, which depends on w and its own state only.
+//! Liquid that spins (spin.rs) adds a couple, which depends on w and on the states of the tank.
 //!
 //! A tank whose liquid has detached has neither rigid liquid nor bobs, but a lump and the inertia that rotates with the
 //! tank (lump.rs). Changes between the two are impulses at the roots of event functions.

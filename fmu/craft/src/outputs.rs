@@ -111,7 +111,7 @@ impl TankOutputs {
         }
     }
 
-    /// Sets everything that depends on the bobs. `liquid` is the rate of the liquid's spin, if it has one; otherwise the liquid
+    /// Sets everything that depends on the slosh masses. `liquid` is the rate of the liquid's spin, if it has one; otherwise the liquid
     /// is taken to turn with the tank.
     pub(crate) fn set_angles<'a, T: Number + 'a>(
         &mut self,

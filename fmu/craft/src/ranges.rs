@@ -18,8 +18,8 @@
 //! ```
 //!
 //! x is the specific force along the tank at the hinge, w^2 = max(x, g_floor)/l + k/m that of mode 1, Omega the rate of
-//! the liquid's spin (`spin.rs`), without one that of the tank about its axis, sin A = |p_perp|. With x/l + k/m below 0 a bob would swing over while real liquid would fall. Beyond
-//! 45 degrees from the tank's axis the bob represents no surface.
+//! the liquid's spin (`spin.rs`), without one that of the tank about its axis, sin A = |p_perp|. With x/l + k/m below 0 a
+//! slosh mass would swing over while real liquid would fall. Beyond 45 degrees from the tank's axis it represents no surface.
 //!
 //! Motion is rotary if the ellipse of the bob has semi-axes in a ratio above 1/2: 2 |q x q'| w > 0.8 (w^2 q^2 + q'^2), which
 //! does not depend on the phase.

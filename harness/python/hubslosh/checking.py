@@ -98,7 +98,7 @@ class Checked:
     warnings : int
         Number of warnings.
     rules : tuple of CheckedRule
-        All selected rules, those that were skipped too.
+        All selected rules, including skipped rules.
 
     Examples
     --------
@@ -157,7 +157,7 @@ def check(
         True shows a line on stderr, which is the default on a terminal and in a notebook; a
         function receives the line as text.
     program : str or Path, optional
-        The program ``hubslosh``; by default that of this package.
+        The program ``hubslosh``; by default the program of this package.
 
     Returns
     -------

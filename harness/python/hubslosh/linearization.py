@@ -362,7 +362,7 @@ def _held(model: LinearModel, time: float) -> tuple[Matrix, Matrix]:
 def exponential(A: Matrix) -> Matrix:
     """Return the exponential of a matrix, by Padé's approximant of order 13 and squaring.
 
-    The method is that of Higham (2005). SciPy's function takes 30 times the CPU time for 25 states
+    The method is Higham's (2005). SciPy's function takes 30 times the CPU time for 25 states
     on two cores, because its threads wait for each other.
     """
     size = float(np.linalg.norm(A, 1))

@@ -110,7 +110,8 @@ class LiquidModes:
         mass, deg from x towards y, -90 to 90; ``length`` of the pendulum (m); heights of ``bob``
         and ``hinge`` (m); ``arm``, distance of the line on which the slosh mass moves from the
         vertical through O (m); ``twist``, inertia about this vertical that the mode moves (kg·m²).
-        A mode that only twists has a mass of about 0; its direction, bob, hinge and arm are NaN.
+        A mode that only twists has a mass of about 0; its direction, arm and the heights of slosh
+        mass and hinge are NaN.
         """
         return self.all
 
@@ -204,8 +205,9 @@ class LiquidModes:
         """Return the liquid as a tank of an FMU, for `simulate`, `Loop` and others.
 
         Each mode is planar with its own direction, and its damping ratio is 0. The tank's axis
-        passes through the centre of mass of the liquid; the bobs are at r_n from this centre. A
-        rigid body completes mass m, centre and inertia J of the liquid under a rigid lid::
+        passes through the centre of mass of the liquid; the slosh masses are at r_n from this
+        centre. A rigid body completes mass m, centre and inertia J of the liquid under a rigid
+        lid::
 
             m_0 = m − Σ m_n,   m_0 r_0 = −Σ m_n r_n,
             J_0 = J − Σ m_n (|r_n|² 1 − r_n⊗r_n) − m_0 (|r_0|² 1 − r_0⊗r_0)
@@ -423,8 +425,8 @@ def _heights(
 ) -> tuple[float, float]:
     """Return the heights of the lowest and the highest point of the turned tank.
 
-    From its corners and rims: the bounding boxes of the geometry's kernel are too large for curved
-    surfaces. Of a file they are what there is.
+    They follow from corners and rims, because the bounding boxes of the geometry's kernel are
+    larger than curved surfaces. Of a file they are what there is.
     """
     if name == "sphere":
         center = level @ [0, 0, size["radius"]]

@@ -215,8 +215,8 @@ class Loop:
         Parameters
         ----------
         parameters : mapping, optional
-            Further parameters, such as ``{"friction.model": "viscous"}``, which override those of
-            the loop.
+            Further parameters, such as ``{"friction.model": "viscous"}``, which override the
+            loop's.
 
         Returns
         -------
@@ -247,9 +247,9 @@ class Loop:
         Parameters
         ----------
         parameters : mapping, optional
-            Further parameters, which override those of the loop.
+            Further parameters, which override the loop's.
         more_delay : float
-            Delay in addition to that of the loop, s.
+            Delay in addition to the loop's, s.
 
         Returns
         -------
@@ -305,7 +305,7 @@ class Loop:
         stop : float
             Time at which the last whole cycle ends, s.
         parameters : mapping, optional
-            Further parameters, which override those of the loop.
+            Further parameters, which override the loop's.
         reference : DataFrame, optional
             Reference of a linear controller, as for `closed_loop`.
         inputs : DataFrame, optional

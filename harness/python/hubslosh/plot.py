@@ -69,7 +69,7 @@ def time_histories(
     *names : str
         Columns to draw; by default all of them.
     axes : sequence of matplotlib Axes, optional
-        Axes to draw into, one for each column; by default those of a new figure.
+        Axes to draw into, one for each column; by default the axes of a new figure.
     label : str, optional
         Name of this run in the legend.
 
@@ -114,7 +114,7 @@ def path(run: pd.DataFrame, ax: "Axes | None" = None, label: str | None = None) 
     run : DataFrame
         Table with the columns ``slosh_angle`` and ``slosh_angle_radial`` (rad).
     ax : matplotlib Axes, optional
-        Axes to draw into; by default those of a new figure.
+        Axes to draw into; by default the axes of a new figure.
     label : str, optional
         Name of this run in the legend.
 
@@ -169,7 +169,7 @@ def bode(
     labels : sequence of str, optional
         Name of each response in the legend.
     axes : sequence of two matplotlib Axes, optional
-        Axes for gain and phase; by default those of a new figure.
+        Axes for gain and phase; by default the axes of a new figure.
 
     Returns
     -------
@@ -253,7 +253,7 @@ def margins(
     parameters : mapping, optional
         Parameters of the FMU in addition to the loop's own; only for a `Loop`.
     axes : sequence of two matplotlib Axes, optional
-        Axes for gain and phase; by default those of a new figure.
+        Axes for gain and phase; by default the axes of a new figure.
 
     Returns
     -------
@@ -302,7 +302,7 @@ def nichols(
     parameters : mapping, optional
         Parameters of the FMU in addition to the loop's own; only for a `Loop`.
     ax : matplotlib Axes, optional
-        Axes to draw into; by default those of a new figure.
+        Axes to draw into; by default the axes of a new figure.
 
     Returns
     -------
@@ -349,7 +349,7 @@ def nyquist(
     parameters : mapping, optional
         Parameters of the FMU in addition to the loop's own; only for a `Loop`.
     ax : matplotlib Axes, optional
-        Axes to draw into; by default those of a new figure.
+        Axes to draw into; by default the axes of a new figure.
 
     Returns
     -------
@@ -507,9 +507,9 @@ def closed_loop(
         Table of `hubslosh.closed_loop`.
     reference : DataFrame, optional
         Commanded attitude over ``time``, with ``q[1]`` to ``q[4]`` or ``theta`` (rad). With it the
-        remaining rotation is drawn too.
+        remaining rotation is also drawn.
     axes : sequence of matplotlib Axes, optional
-        Axes to draw into, one for each quantity; by default those of a new figure.
+        Axes to draw into, one for each quantity; by default the axes of a new figure.
     label : str, optional
         Name of this run in the legend.
 
@@ -594,7 +594,7 @@ def monte_carlo(
         Results to draw; by default all numbers that ``outcome`` has returned. Of a file these are
         the columns without a dot or bracket in their names.
     axes : sequence of matplotlib Axes, optional
-        Axes to draw into, one for each result; by default those of a new figure.
+        Axes to draw into, one for each result; by default the axes of a new figure.
     at : float
         Probability of the quantile, between 0 and 1.
 

@@ -54,7 +54,7 @@ def campaign(
     Raises
     ------
     FmuError
-        If the plan is wrong or a run is refused; the message is that of the program.
+        If the plan is wrong or a run is refused; the message is the program's.
 
     Examples
     --------
@@ -126,7 +126,7 @@ def analyse(
     Raises
     ------
     FmuError
-        If a recording cannot be read or analysed; the message is that of the program.
+        If a recording cannot be read or analysed; the message is the program's.
 
     Examples
     --------

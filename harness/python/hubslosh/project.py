@@ -95,7 +95,7 @@ class Project:
         Returns
         -------
         Project
-            The project, whose name is that of the file.
+            The project, whose name is the file's name.
 
         Raises
         ------

@@ -245,7 +245,7 @@ class Review:
         return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
     def stabilisation(self) -> list[str]:
-        """Return `modes` as sentences, one for all modes that are stabilised in the same way.
+        """Return `modes` as sentences, one for each kind of stabilisation with its modes.
 
         Returns
         -------

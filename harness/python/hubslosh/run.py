@@ -10,9 +10,9 @@ from .viewing import View, view
 class Run(ShortTable):
     """Time histories of one run, as `simulate` and `closed_loop` return them.
 
-    It is a pandas.DataFrame in every respect: parts of it (``run[run["time"] < 1]``) are runs
-    too, and a column is a Series. `view` refuses a part without the columns that it needs to
-    draw the run, and names them.
+    It is a pandas.DataFrame in every respect: parts of it (``run[run["time"] < 1]``) are also runs,
+    and a column is a Series. `view` refuses a part without the columns that it needs to draw the
+    run, and names them.
 
     Examples
     --------

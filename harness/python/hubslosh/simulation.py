@@ -57,7 +57,7 @@ def simulate(
 
     A row of the result has the inputs from its time on, and the outputs just before these
     inputs act: if an output follows an input at once, then a jump of the input shows in the
-    next row. ``.attrs["rows"]`` and ``.attrs["inputs"]`` say so, too.
+    next row. ``.attrs["rows"]`` and ``.attrs["inputs"]`` also state this.
 
     Parameters
     ----------

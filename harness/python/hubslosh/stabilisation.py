@@ -28,10 +28,11 @@ def resonances(gain: LinearModel, tanks: Sequence[str] = ()) -> list[dict[str, A
     ``gain`` is the sampled loop gain with the names of its states, as `Loop.gain` returns it;
     ``tanks`` has the names of the tanks in the FMU's order. Columns of the table:
 
-    * ``loop``: command at which the loop is broken while the others are closed.
+    * ``loop``: command at which the loop is broken while the loops of the other commands are
+      closed.
     * ``mode``: tanks that take part, and number of the mode.
     * ``frequency`` (Hz), ``zeta``: of the pole of the loop gain.
-    * ``zeta_closed``: damping ratio of this mode when this loop is closed too.
+    * ``zeta_closed``: damping ratio of this mode when this loop is also closed.
     * ``zero`` (Hz): frequency of the zero next to the pole.
     * ``order``: "zero first" if the zero has the lower frequency, otherwise "pole first".
     * ``peak`` (dB): loop gain at the frequency of the pole.

@@ -105,7 +105,7 @@ def _row(
 ) -> tuple[dict[str, Any], str | None]:
     """Return the results of a stored run, and the reason if they cannot be used.
 
-    Values that are not those of the draw are the best reason, then the ``damage`` of the file.
+    Values that differ from the draw's are the best reason, then the ``damage`` of the file.
     """
     try:
         stored = json.loads(data)

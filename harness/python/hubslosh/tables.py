@@ -102,8 +102,8 @@ def read_parameters(path: str | Path) -> dict[str, Quantity]:
     -------
     dict
         Values by name, for `simulate` and `Loop`. A parameter of a .ssv with a unit is a pair
-        (number, unit), where the unit is that of the file's definitions if it has one,
-        otherwise one of the FMU's. `Fmu.convert` converts or refuses it.
+        (number, unit), where the unit is defined by the file, or else by the FMU. `Fmu.convert`
+        converts or refuses it.
 
     Raises
     ------

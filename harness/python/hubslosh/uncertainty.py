@@ -673,7 +673,7 @@ class UncertainModel:
         """Return the linear model at Δ.
 
         It equals `linearize` with `parameters` except for rounding. Components of quaternions and
-        of the bobs' directions that follow from their norms are not among its states.
+        of the pendulums' directions that follow from their norms are not among its states.
 
         Parameters
         ----------
@@ -725,8 +725,8 @@ class UncertainModel:
         """Return the parameters of Spacecraft at Δ, for `linearize` and `simulate`.
 
         Force and torque are set to hold the acceleration of the operating point, and the damping
-        forces keep their value there. The rigid liquid changes with masses and heights of the
-        bobs; if its own inertia would become negative, as in a sphere, the inertia of the dry
+        forces keep their value there. The rigid liquid changes with the slosh masses and their
+        heights; if its own inertia would become negative, as in a sphere, the inertia of the dry
         craft is reduced instead.
 
         Parameters
@@ -859,7 +859,7 @@ class UncertainModel:
     ) -> Certificate:
         """Return a proof that the loop is stable for all Δ up to a size near the worst case.
 
-        The proof holds for all frequencies, not those of a grid: D and G scalings on intervals
+        The proof holds for all frequencies, not only for a grid: D and G scalings on intervals
         of frequency, and on parts of the box of Δ where a pair of scalings for the whole box does
         not exist. The size is the worst case's over ``gap``, or ``largest`` if no worst case was
         found; if that cannot be proved, a smaller one. Needs the package clarabel:
@@ -1158,7 +1158,7 @@ def _kind(name: str) -> str:
 
 
 def _unknown(name: str, values: Mapping[str, float]) -> str:
-    """Return what to do about a name that is not that of an uncertain parameter."""
+    """Return what to do about a name that does not belong to an uncertain parameter."""
     if instead := moves_the_bob(name):
         return f"{name} {instead}"
     return f"there is no uncertain {name}{did_you_mean(name, values)}"

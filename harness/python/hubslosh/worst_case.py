@@ -241,8 +241,8 @@ def _showing(gain: LinearModel, pole: complex) -> list[str]:
 def _critical(poles: NDArray[np.complex128], *, at_limit: bool) -> complex:
     """Return the pole of a closed loop that grows fastest, or decays slowest (z plane).
 
-    At a gain margin, and in a stable loop if it has one, that of an oscillation; a negative pole
-    oscillates with half the sampling rate.
+    At a gain margin (``at_limit``) and in a stable loop it is an oscillating pole, if the loop has
+    one; a negative pole oscillates with half the sampling rate.
     """
     moving = poles[(poles.imag > 0) | (poles.real < 0) & (poles.imag == 0)]
     unstable = np.abs(poles).max() >= 1 and not at_limit

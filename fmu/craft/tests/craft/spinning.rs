@@ -246,7 +246,7 @@ fn cylinder(fill: f64, beta: f64, c: f64, stiffness: f64) -> (TankParameters, Ta
     (p, TankInputs { a, omega: [0.0, 0.0, beta.sqrt()], ..TankInputs::default() })
 }
 
-/// Coefficients of a bob's z = p_x + i p_y and of the force on the tank: z'' = at[0] z + at[1] z' + at[2] a, force = at[3] z + at[4] z'
+/// Coefficients of a slosh mass's z = p_x + i p_y and of the force on the tank: z'' = at[0] z + at[1] z' + at[2] a, force = at[3] z + at[4] z'
 /// + at[5] a.
 fn lateral(p: &TankParameters, u: &TankInputs) -> [C; 6] {
     let mut tank = SloshTank::new(p, u, 0.0, 1e-9).unwrap();
