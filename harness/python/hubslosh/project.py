@@ -1,13 +1,14 @@
 """A project file: craft, controller, cases, uncertainty and requirements of a design.
 
 ``python -m hubslosh.project PROJECT.toml …`` is what ``hubslosh review`` calls. The keys of the
-file are the arguments of `Craft.review`; the table ``craft`` has those of `Craft`, each table of
-``craft.tanks`` those of `MountedTank`, of ``craft.engines`` those of `Engine`, of
-``craft.appendages`` those of `Appendage`. ``controller`` is a matrix of gains, a table with the
-matrices ``A``, ``B``, ``C``, ``D`` or with ``num`` and ``den`` of transfer functions (in discrete
-time also ``period``), or ``"FILE.py:NAME"``: a controller, or a function without arguments that
-returns one, which is run. Each table of ``cases`` has arguments that replace those of the file, and
-a table ``craft`` with values of the craft.
+file are the arguments of `Craft.review`. The table ``craft`` has the arguments of `Craft`, each
+table of ``craft.tanks`` the arguments of `MountedTank`, each table of ``craft.engines`` the
+arguments of `Engine`, and each table of ``craft.appendages`` the arguments of `Appendage`.
+``controller`` is a matrix of gains, a table with the matrices ``A``, ``B``, ``C``, ``D`` or with
+``num`` and ``den`` of transfer functions (in discrete time also ``period``), or ``"FILE.py:NAME"``:
+a controller, or a function without arguments that returns one, which is run. Each table of
+``cases`` has arguments that replace the file's for this case, and a table ``craft`` with values of
+the craft.
 """
 
 import argparse
