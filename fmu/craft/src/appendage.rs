@@ -102,13 +102,14 @@ impl Mode {
 }
 
 /// The modes of all appendages. `effective` is the sum of u u^T, and `shares` are bounds of the share of the dry craft's
-/// inertia that each mode's eta takes or gives, per eta.
+/// inertia that each mode's eta takes or gives, per eta. `is_too_heavy` is true if the undeformed appendages leave the craft no inertia.
 #[derive(Clone, Debug)]
 pub(crate) struct Structure {
     modes: Vec<Mode>,
     effective: Mat6,
     dry: Rigid,
     shares: [f64; APPENDAGES],
+    is_too_heavy: bool,
 }
 
 /// The deformed appendages at an instant: `body` has the changes of the first and second moments, `momentum` is [K; L], `slope`
@@ -123,9 +124,11 @@ pub(crate) struct Deformed<T> {
 }
 
 impl Structure {
-    /// Returns the modes of a craft's appendages; `None` if it has none.
+    /// Returns the modes of a craft's appendages up to the last one that has an effect; `None` if none has.
     pub fn new(p: &Parameters) -> Option<Structure> {
-        let modes: Vec<Mode> = p.appendage[..p.appendages].iter().map(Mode::new).collect();
+        let every = &p.appendage[..p.appendages];
+        let used = every.iter().rposition(Appendage::acts).map_or(0, |last| last + 1);
+        let modes: Vec<Mode> = every[..used].iter().map(Mode::new).collect();
         let mut effective = [[0.0; 6]; 6];
         for Mode { p, l, .. } in &modes {
             add_rank_one(&mut effective, 1.0, &[p[0], p[1], p[2], l[0], l[1], l[2]]);
@@ -133,11 +136,20 @@ impl Structure {
         if modes.is_empty() {
             return None;
         }
-        let mut found =
-            Structure { modes, effective, dry: p.craft.rigid(), shares: [0.0; APPENDAGES] };
+        let mut found = Structure {
+            modes,
+            effective,
+            dry: p.craft.rigid(),
+            shares: [0.0; APPENDAGES],
+            is_too_heavy: false,
+        };
         let mut undeformed = found.dry.mass_matrix();
         found.reduce(&mut undeformed);
-        let factors = Factors::definite_or_zero(&undeformed);
+        if smallest_pivot(&undeformed) < SINGULAR {
+            found.is_too_heavy = true;
+            return Some(found);
+        }
+        let factors = Factors::new(&undeformed);
         for j in 0..found.len() {
             let mut eta = [0.0; APPENDAGES];
             eta[j] = 1.0;
@@ -259,10 +271,13 @@ impl Structure {
     /// Returns true if the appendages leave the craft no inertia: at once if their participations belong to a
     /// heavier craft, otherwise at deflections far beyond those of a linear model.
     pub fn is_beyond(&self, eta: &[f64]) -> bool {
+        if self.is_too_heavy {
+            return true;
+        }
         // Most deflections take far less than the inertia that the craft has; NaN does not pass.
         let taken =
             self.shares.iter().zip(eta).fold(0.0, |sum, (share, eta)| sum + share * eta.abs());
-        if taken < 0.5 && self.shares[0] < f64::INFINITY {
+        if taken < 0.5 {
             return false;
         }
         let body = self.deformed(eta, &[0.0; APPENDAGES]).body;

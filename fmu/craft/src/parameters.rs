@@ -527,6 +527,11 @@ impl Default for Appendage {
 }
 
 impl Appendage {
+    /// Returns true if the mode moves the craft, or moves at the start.
+    pub(crate) fn acts(&self) -> bool {
+        self.participation != [0.0; 6] || self.eta != 0.0 || self.eta_dot != 0.0
+    }
+
     fn find_problems(&self, name: &str, problems: &mut Problems) {
         problems.vector(&format!("{name}.position"), &self.position, "m");
         problems.number(&format!("{name}.frequency"), self.frequency, 1e-6, 1e6, "Hz");
@@ -550,7 +555,8 @@ pub struct Init {
 
 /// All parameters and initial conditions of a [`Spacecraft`](crate::Spacecraft). `gravity`, m/s2, inertial
 /// axes, and `pivot` have an effect only with [`Mount::Pivot`]. `tanks` is the number of tanks, 0 to
-/// [`TANKS`], `appendages` the number of modes of flexible appendages, 0 to [`APPENDAGES`], and `max_steps` the largest number of internal steps in one step, at least 1.
+/// [`TANKS`], `appendages` the number of modes of flexible appendages, 0 to
+/// [`APPENDAGES`], of which those without participation have no effect, and `max_steps` the largest number of internal steps in one step, at least 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct Parameters {
@@ -681,7 +687,7 @@ impl Default for Parameters {
             pivot: Pivot::default(),
             tanks: 1,
             tank: [Tank::default(); TANKS],
-            appendages: 0,
+            appendages: APPENDAGES,
             appendage: [Appendage::default(); APPENDAGES],
             init: Init::default(),
             max_steps: MAX_STEPS,
@@ -1313,7 +1319,8 @@ impl Parameters {
                      tanks' m_0, I_0 and I_z"
                 ));
             } else if let Some(structure) = Structure::new(self) {
-                let eta = self.appendage.map(|appendage| appendage.eta);
+                let mut eta = self.appendage.map(|appendage| appendage.eta);
+                eta[structure.len()..].fill(0.0);
                 if structure.is_beyond(&[0.0; APPENDAGES]) {
                     problems.0.push(
                         "appendage[].participation leaves the dry craft no mass or inertia (allowed: craft.mass and craft.J above the \
@@ -1322,7 +1329,7 @@ impl Parameters {
                             .into(),
                     );
                 } else if structure.is_beyond(&eta) {
-                    let message = beyond_message(&eta[..self.appendages]);
+                    let message = beyond_message(&eta[..structure.len()]);
                     problems.0.push(message.replace(".eta =", ".eta_0 ="));
                 }
             }

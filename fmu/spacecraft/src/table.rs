@@ -537,7 +537,7 @@ static VARIABLES: &[Variable<Model>] = &[
         .shape(MODE_VECTOR),
 
     // Each mode of the flexible appendages
-    V::integer("appendages", |p, _| &mut p.appendages, "Number of modes of flexible appendages, with the interface held and unit modal mass (Craig-Bampton). Mass and inertia of the undeformed appendages belong to craft.mass, craft.r and craft.Jxx to craft.Jyz")
+    V::integer("appendages", |p, _| &mut p.appendages, "Number of modes of flexible appendages that are used, with the interface held and unit modal mass (Craig-Bampton). Modes without participation have no effect. Mass and inertia of the undeformed appendages belong to craft.mass, craft.r and craft.Jxx to craft.Jyz")
         .between(0, APPENDAGES as i32),
     V::parameter("appendage[].position", |p, n| &mut p.appendage[n / 3].position[n % 3], "m", "Position of the point from O at which a mode's appendage is attached, body axes; modes of one appendage share it")
         .shape(APPENDAGE_VECTOR).range(-1e4, 1e4),

@@ -93,7 +93,8 @@ def export(
     fmu = Fmu.open(model)
     values = {name: fmu.convert(name, value) for name, value in parameters.items()}
     modes = [int(value) for name, value in values.items() if name.endswith("].modes")]
-    appendages = int(values.get("appendages", 0))
+    named = [int(name[10]) for name in values if name.startswith("appendage[")]
+    appendages = int(values.get("appendages", max([0, *named])))
     sizes = max(1, int(values["tanks"])), max([1, *modes]), appendages
     changed = dict(fmu.native.part(*sizes, [(n, _text(v)) for n, v in values.items()]))
     try:

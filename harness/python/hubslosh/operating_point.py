@@ -125,26 +125,32 @@ def trim(model: str | Path, parameters: Parameters, tanks: Sequence[str] = ()) -
         kind, mount, count, modes = plant.get(["mount_kind", "mount", "tanks", "appendages"])
         if (kind or mount) != 1 or not force.any():
             return OperatingPoint(model, every, none, before, tuple(tanks))
-        names = [f"appendage[{j}]." for j in range(1, int(modes) + 1)]
-        deflections = _deflections(plant, names, force / plant.get(["mass"])[0])
+        flexible = [f"appendage[{j}]." for j in range(1, int(modes) + 1)]
+        flexible = [name for name in flexible if _participation(plant, name).any()]
+        deflections = _deflections(plant, flexible, force / plant.get(["mass"])[0])
         if any(deflections.values()):
             every |= deflections
             with Plant(model, every) as deformed:
                 center = np.array(deformed.get([f"center_of_mass[{i}]" for i in (1, 2, 3)]))
         shift = center - force * (force @ center) / (force @ force)
         places = ["craft.r", *(f"tank[{number}].position" for number in range(1, int(count) + 1))]
-        places += [f"{name}position" for name in names]
+        places += [f"{name}position" for name in flexible]
         for place in places:
             moved = get(place) - shift
             every |= {f"{place}[{i + 1}]": float(x) for i, x in enumerate(moved)}
     return OperatingPoint(model, every, shift, before, tuple(tanks))
 
 
+def _participation(plant: Plant, name: str) -> Vector:
+    """Return the participation of a mode of an appendage, whose parameters begin with ``name``."""
+    return np.array(plant.get([f"{name}participation[{i}]" for i in range(1, 7)]))
+
+
 def _deflections(plant: Plant, names: Sequence[str], force: Vector) -> dict[str, Quantity]:
     """Return the modal displacements of appendages under a steady specific force, m/s²."""
     found: dict[str, Quantity] = {}
     for name in names:
-        along = np.array(plant.get([f"{name}participation[{i}]" for i in (1, 2, 3)]))
+        along = _participation(plant, name)[:3]
         omega = 2 * np.pi * plant.get([f"{name}frequency"])[0]
         found |= {f"{name}eta_0": float(-(along @ force) / omega**2), f"{name}eta_dot_0": 0.0}
     return found

@@ -262,6 +262,8 @@ def _read(
         for number in range(1, int(get("appendages")[0]) + 1):
             of = f"appendage[{number}]"
             participation, place = vector(f"{of}.participation", 6), vector(f"{of}.position")
+            if not participation.any():
+                continue
             eta, eta_dot, frequency, zeta = get(*(
                 f"{of}.{name}" for name in ("eta", "eta_dot", "frequency", "zeta")
             )).tolist()  # fmt: skip

@@ -314,14 +314,23 @@ fn modes_without_participation_leave_the_craft_as_it_is() {
     let mut random = Random::new(3);
     let (mut p, u) = (Parameters { tanks: 2, ..random.parameters() }, random.inputs());
     let mut without = Spacecraft::new(&p, &u, 0.0, 1e-12).unwrap();
-    p.appendages = APPENDAGES;
+    for mode in &mut p.appendage {
+        (mode.eta, mode.eta_dot) = (random.between(-1.0, 1.0), random.between(-1.0, 1.0));
+    }
+    assert_eq!(p.appendages, APPENDAGES);
     let mut with = Spacecraft::new(&p, &u, 0.0, 1e-12).unwrap();
     without.step(&u, 0.5).unwrap();
     with.step(&u, 0.5).unwrap();
     let (a, b) = (without.continuous_states(), with.continuous_states());
-    for i in 0..STATES {
+    for i in (0..index::ETA).filter(|i| *i != index::DISSIPATED) {
         assert!((a[i] - b[i]).abs() < 1e-12 * (1.0 + a[i].abs()), "{i}: {} {}", a[i], b[i]);
     }
+    let mode = &p.appendage[5];
+    let (w, t) = (std::f64::consts::TAU * mode.frequency, 0.5);
+    let (decay, damped) = (mode.zeta * w, w * (1.0 - mode.zeta * mode.zeta).sqrt());
+    let sine = (mode.eta_dot + decay * mode.eta) / damped;
+    let want = (-decay * t).exp() * (mode.eta * (damped * t).cos() + sine * (damped * t).sin());
+    assert!((b[index::ETA + 5] - want).abs() < 1e-12, "{} {want}", b[index::ETA + 5]);
 }
 
 #[test]
@@ -360,12 +369,12 @@ fn appendages_heavier_than_the_craft_and_excessive_deflections_are_refused() {
     assert!(new(&p).is_ok());
     let mut heavy = p;
     heavy.appendage[0].participation[1] = 35.0;
-    let problems = new(&heavy).unwrap_err();
+    let problems = new(&heavy).err().unwrap();
     assert!(problems[0].contains("appendage[].participation leaves"), "{problems:?}");
     let mut bent = p;
     bent.appendage[0].participation[1] = 10.0;
     bent.appendage[0].eta = 1e3;
-    let problems = new(&bent).unwrap_err();
+    let problems = new(&bent).err().unwrap();
     assert!(problems[0].contains("appendage[].eta_0 = [1000.0]"), "{problems:?}");
     // A host may set the state; a step away from it is refused and changes nothing.
     bent.appendage[0].eta = 0.0;
@@ -388,11 +397,11 @@ fn appendages_heavier_than_the_craft_and_excessive_deflections_are_refused() {
     ] {
         let mut p = p;
         change(&mut p.appendage[0]);
-        let problems = new(&p).unwrap_err();
+        let problems = new(&p).err().unwrap();
         assert!(problems[0].starts_with(&format!("appendage[1].{field}")), "{problems:?}");
         p.appendages = 0;
         assert!(new(&p).is_ok());
     }
-    let problems = new(&Parameters { appendages: 7, ..p }).unwrap_err();
+    let problems = new(&Parameters { appendages: 7, ..p }).err().unwrap();
     assert_eq!(problems, ["appendages = 7 (allowed: 0 to 6)"]);
 }

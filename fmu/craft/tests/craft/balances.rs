@@ -8,7 +8,7 @@
 //! less than 0.03 rad and the liquid swings by less than 0.3 rad, so the error is 1e-13 of a step's
 //! contribution. On a pivot gravity turns the craft, too, and H is about O.
 
-use craft::{Inputs, Mount, Outputs, Parameters, Ramp};
+use craft::{APPENDAGES, Inputs, Mount, Outputs, Parameters, Ramp};
 use serde_json::Value;
 
 use super::component::Spacecraft;
@@ -200,7 +200,8 @@ fn random_craft(most: usize) {
         if (19..26).contains(&seed) || seed == 31 {
             // From seed 25 on six modes at four tanks, in free flight.
             (p.mount, p.tanks) = (if seed == 20 { Mount::Pivot } else { Mount::Free }, 4);
-            while p.appendages < if seed < 25 { 1 } else { 6 } {
+            random.flex(&mut p);
+            while seed == 25 && p.appendages < APPENDAGES {
                 random.flex(&mut p);
             }
         }
