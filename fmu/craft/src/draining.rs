@@ -322,7 +322,7 @@ impl Draining {
 
     fn energy(&self, state: &State) -> f64 {
         let acting = Acting::flowing(state.flow, [0.0; TANKS]);
-        self.evaluate(&state.x, &acting).outputs(&state.x, &[]).energy
+        self.evaluate(&state.x, &acting).outputs(&state.x, |_| None).energy
     }
 
     fn equations<T: Number>(&self, matrix: Mat6<T>) -> Equations<T> {

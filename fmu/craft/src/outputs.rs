@@ -26,9 +26,9 @@ use crate::bob::BobNow;
 use crate::motion::CraftMotion;
 use crate::parameters::Mount;
 use crate::pivot::Pivot;
-use crate::ranges::Bounds;
 use crate::rigid::Rigid;
 use crate::sizes::{MODES, TANKS};
+use crate::spin::SpinScale;
 use crate::state::{BallState, Ranges, STATES, index};
 
 /// Outputs of one tank, with the names, units and axes of the FMUs' outputs `tank[].…`, which their variable
@@ -118,7 +118,7 @@ impl TankOutputs {
         [a, w, w_d]: [Vec3<T>; 3],
         bobs: impl Iterator<Item = &'a BobNow<T>>,
         liquid: Option<T>,
-        bounds: Option<&Bounds>,
+        scale_of_spin: Option<SpinScale>,
     ) {
         let mut wave = [T::constant(0.0); 2];
         for (n, bob) in bobs.enumerate() {
@@ -128,8 +128,8 @@ impl TankOutputs {
                 self.axial = axial.result();
                 let turning = liquid.unwrap_or_else(|| dot(constant(bob.e), w));
                 self.turning = turning.result();
-                if let Some(bounds) = bounds {
-                    let numbers = bounds.spin_numbers(axial, turning);
+                if let Some(scale) = scale_of_spin {
+                    let numbers = scale.numbers(axial, turning);
                     [self.spin_ratio, self.spin_number] = numbers.map(T::result);
                 }
             }
@@ -272,8 +272,12 @@ impl CraftMotion {
 }
 
 impl<T: Number> Now<T> {
-    /// Returns the outputs; without the `bounds` of the tanks those that depend on the spin are 0.
-    pub fn outputs(&self, x: &[f64; STATES], bounds: &[Bounds]) -> Outputs {
+    /// Returns the outputs; without `scale_of_spin` of a tank, which counts from 0, its numbers of the spin are 0.
+    pub fn outputs(
+        &self,
+        x: &[f64; STATES],
+        scale_of_spin: impl Fn(usize) -> Option<SpinScale>,
+    ) -> Outputs {
         let Now { w, velocity, .. } = *self;
         let tanks = || self.tanks.iter().flatten();
         let bobs = || tanks().flat_map(|tank| tank.bobs.iter().flatten().chain(&tank.lump));
@@ -293,7 +297,7 @@ impl<T: Number> Now<T> {
         for (i, (out, now)) in tank.iter_mut().zip(tanks()).enumerate() {
             [out.force, out.torque] = now.wrench.map(result);
             let (bobs, turning) = (now.bobs.iter().flatten(), now.spin.map(|[_, turning]| turning));
-            out.set_angles([self.a, w, self.w_d], bobs, turning, bounds.get(i));
+            out.set_angles([self.a, w, self.w_d], bobs, turning, scale_of_spin(i));
             out.ball_state = now.ball_state;
             slosh_force = add(slosh_force, out.force);
             slosh_torque = add(slosh_torque, out.torque);

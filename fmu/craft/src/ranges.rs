@@ -24,19 +24,18 @@
 //! Motion is rotary if the ellipse of the bob has semi-axes in a ratio above 1/2: 2 |q x q'| w > 0.8 (w^2 q^2 + q'^2), which
 //! does not depend on the phase.
 
+use crate::lump::COS_45;
+use crate::outputs::TankOutputs;
+use crate::parameters::Tank;
+use crate::sizes::{MODES, POINTS};
+use crate::spin::SpinScale;
+use crate::state::{BallState, Ranges};
 use formulas::cylinder::XI;
 use formulas::limits::{
     FORCED, LimitedBy, SpinLimit, cylinder, cylinder_with_energy, shifted, swirl_fold,
 };
 use formulas::regime::Regime;
 use formulas::third_order;
-use taylor::number::Number;
-
-use crate::lump::COS_45;
-use crate::outputs::TankOutputs;
-use crate::parameters::Tank;
-use crate::sizes::{MODES, POINTS};
-use crate::state::{BallState, Ranges};
 
 /// 2 b/a over 1 + (b/a)^2 of an ellipse with the semi-axes a and b = a/2; wider ellipses count as rotary
 /// motion.
@@ -195,16 +194,11 @@ impl Bounds {
         if reason == LimitedBy::None && !upright { LimitedBy::ThirdOrder } else { reason }
     }
 
-    /// Returns 2 Omega/omega_0 and Omega^2 R/g of mode 1 at the specific force `axial` along the tank, m/s2, and the rate Omega at
-    /// which the liquid turns, rad/s.
-    pub fn spin_numbers<T: Number>(&self, axial: T, rate: T) -> [T; 2] {
-        if self.modes == 0 {
-            return [T::constant(0.0); 2];
-        }
-        let [inv_l, k_m] = [self.mode[0].inv_l, self.mode[0].k_m];
-        let omega2 = axial.at_least(self.g_floor) * inv_l + T::constant(k_m);
-        let share = rate * rate / omega2;
-        [share.sqrt() * 2.0, share * self.spin.radius_over_length()]
+    /// Returns what relates a spin of the liquid to mode 1; `None` without modes.
+    pub fn spin_scale(&self) -> Option<SpinScale> {
+        let ModeBounds { inv_l, k_m, .. } = self.mode[0];
+        let scale = SpinScale { inv_l, k_m, g_floor: self.g_floor, limit: self.spin };
+        (self.modes > 0).then_some(scale)
     }
 
     /// Returns true if the motion is physical: the liquid stays at the bottom and the bobs are within 45

@@ -1325,8 +1325,8 @@ impl SloshTank {
         for bob in bobs.iter().flatten().chain(&lump) {
             all.add(bob.m, bob.rho);
         }
-        let bounds = Some(&self.bounds);
-        tank.set_angles([a, w, w_d], bobs.iter().flatten(), parts.turning, bounds);
+        let scale = self.bounds.spin_scale();
+        tank.set_angles([a, w, w_d], bobs.iter().flatten(), parts.turning, scale);
         let zero = constant::<T>([0.0; 3]);
         let lumped = self.lumped.lift::<T>();
         let bias = match self.coupling {

@@ -211,10 +211,14 @@ impl Spacecraft {
     pub fn outputs_held(&mut self, inputs: &Inputs) -> Outputs {
         let x = &self.motion.state.x;
         let mut outputs = if let Some(draining) = &self.draining {
-            draining.evaluate(x, &Acting::from_inputs(inputs, 0.0)).outputs(x, &self.bounds)
+            draining
+                .evaluate(x, &Acting::from_inputs(inputs, 0.0))
+                .outputs(x, |i| self.bounds.get(i)?.spin_scale())
         } else {
             self.motion.evaluate(inputs);
-            self.motion.now::<f64>().outputs(&self.motion.state.x, &self.bounds)
+            self.motion
+                .now::<f64>()
+                .outputs(&self.motion.state.x, |i| self.bounds.get(i)?.spin_scale())
         };
         for (tank, ranges) in outputs.tank.iter_mut().zip(self.motion.state.ranges) {
             tank.ranges = ranges;
@@ -274,10 +278,12 @@ impl Spacecraft {
         du: &[f64; INPUTS],
     ) -> Outputs {
         if let Some((draining, x, acting)) = self.dual_arguments(inputs, dx, du) {
-            return draining.evaluate(&x, &acting).outputs(dx, &self.bounds);
+            return draining
+                .evaluate(&x, &acting)
+                .outputs(dx, |i| self.bounds.get(i)?.spin_scale());
         }
         self.motion.evaluate_direction(inputs, dx, split(du));
-        self.motion.now::<Dual>().outputs(dx, &self.bounds)
+        self.motion.now::<Dual>().outputs(dx, |i| self.bounds.get(i)?.spin_scale())
     }
 
     /// Returns states and inputs of a draining craft with their derivatives in the direction (dx, du).

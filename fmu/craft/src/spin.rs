@@ -25,6 +25,7 @@
 //!
 //! Source: Poincare's and Kelvin's flow with uniform vorticity in a rotating ellipsoid.
 
+use formulas::limits::SpinLimit;
 use taylor::number::Number;
 use taylor::space::{self, Vector, ZERO_VECTOR};
 use taylor::vector::{
@@ -98,6 +99,26 @@ impl Spin {
             dissipation: dot(slip, drag),
             turning: [self.turning(l), self.turning(rate)],
         }
+    }
+}
+
+/// Quantities of mode 1 that relate a spin to the frequency of the wave: 1/l, k/m, and the smallest specific force along the tank
+/// in omega_0^2.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SpinScale {
+    pub inv_l: f64,
+    pub k_m: f64,
+    pub g_floor: f64,
+    pub limit: SpinLimit,
+}
+
+impl SpinScale {
+    /// Returns 2 Omega/omega_0 and Omega^2 R/g at the specific force `axial` along the tank, m/s2, and the rate Omega at which
+    /// the liquid turns, rad/s.
+    pub fn numbers<T: Number>(&self, axial: T, rate: T) -> [T; 2] {
+        let omega2 = axial.at_least(self.g_floor) * self.inv_l + T::constant(self.k_m);
+        let share = rate * rate / omega2;
+        [share.sqrt() * 2.0, share * self.limit.radius_over_length()]
     }
 }
 
