@@ -465,7 +465,14 @@ class Craft:
         of = self.tanks[name]
         spin = None if fill == "100%" else of.spin  # a full tank has no surface
         return TankCase(
-            _tank_source(of.source), fill, of.modes, gravity, of.nu, of.sigma, of.contact_angle, spin
+            _tank_source(of.source),
+            fill,
+            of.modes,
+            gravity,
+            of.nu,
+            of.sigma,
+            of.contact_angle,
+            spin,
         )
 
     def _solve(self, asked: Sequence[tuple[str, Any, float]]) -> list[Tank | None]:
