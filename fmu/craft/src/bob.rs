@@ -91,6 +91,7 @@ pub struct Bob {
     p_perp: Vec3,
     known_tension: f64,
     known: Vec3,
+    slope: Vec3,
 }
 
 impl Bob {
@@ -130,6 +131,7 @@ impl Bob {
             p_perp: [0.0; 3],
             known_tension: 0.0,
             known: [0.0; 3],
+            slope: [0.0; 3],
         }
     }
 
@@ -319,6 +321,16 @@ impl Bob {
         let end = largest(space::value(&self.p_d, n - 1, h));
         let rate = f64::max(largest(self.p_d[0]) + largest(self.p_d[1]) * h, end);
         self.drag.defect(n - 1, h) * rate * h
+    }
+
+    /// Stores v' that the series up to order n has at `h`.
+    pub fn store_slope(&mut self, n: usize, h: f64) {
+        self.slope = space::value(&self.v_d, n - 1, h);
+    }
+
+    /// Returns the difference of the stored v' from v' at the start of the expansion, 1/s^2.
+    pub fn slope_defect(&self) -> f64 {
+        largest(sub(self.slope, self.v_d[0]))
     }
 
     #[inline(always)]

@@ -107,6 +107,7 @@ pub(crate) struct ConstrainedBob {
     rest: Vec3,
     ahead: Vector,
     specific_force: Vec3,
+    slope_at_end: Vec3,
 }
 
 /// Series of the terms beyond the third order and of liquid that spins at the rate W (`liquid`), with the symbols above;
@@ -345,6 +346,7 @@ impl ConstrainedBob {
             rest: [0.0; 3],
             ahead: ZERO_VECTOR,
             specific_force: [0.0; 3],
+            slope_at_end: [0.0; 3],
         })
     }
 
@@ -686,6 +688,17 @@ impl ConstrainedBob {
         let end = largest(space::value(rates, n - 1, h));
         let rate = f64::max(largest(rates[0]) + largest(rates[1]) * h, end);
         self.drag.defect(n - 1, h) * rate * h
+    }
+
+    /// Stores V' that the series up to order n has at `h`.
+    pub fn store_slope(&mut self, n: usize, h: f64) {
+        let horner = |sum: Vec3, k: usize| add(scale(h, sum), scale(k as f64, self.v[k]));
+        self.slope_at_end = (1..=n).rev().fold([0.0; 3], horner);
+    }
+
+    /// Returns the difference of the stored V' from V' at the start of the expansion, 1/s^2.
+    pub fn slope_defect(&self) -> f64 {
+        largest(sub(self.slope_at_end, self.v[1]))
     }
 
     pub fn coefficient_norm(&self, n: usize) -> f64 {

@@ -157,6 +157,8 @@ pub struct CraftMotion {
     longest: f64,
     /// Series of the kept expansion, which starts at `state.kept`.
     expansion: Expansion,
+    /// Derivatives of w and V at the end of a series, body axes.
+    slopes: [Vec3; 2],
 }
 
 impl CraftMotion {
@@ -236,6 +238,7 @@ impl CraftMotion {
             flexing_allowed: 0.0,
             spins_allowed: 0.0,
             expansion: Expansion::default(),
+            slopes: [[0.0; 3]; 2],
         };
         motion.has_events = !motion.lumps.is_empty() || !motion.constrained.is_empty();
         motion.freeze();
@@ -730,6 +733,35 @@ impl Motion for CraftMotion {
     #[inline(always)]
     fn event(&mut self, n: usize, h: f64) -> Option<f64> {
         if self.has_events { self.next_event(n, h) } else { None }
+    }
+
+    #[inline(never)]
+    fn store_slopes(&mut self, n: usize, h: f64) {
+        self.slopes = [&self.w_d, &self.a].map(|series| space::value(series, n - 1, h));
+        for bob in &mut self.bobs {
+            bob.store_slope(n, h);
+        }
+        for bob in &mut self.constrained {
+            bob.store_slope(n, h);
+        }
+    }
+
+    #[inline(never)]
+    fn slope_defect(&self, h: f64) -> f64 {
+        let [_, rate, swing, speed] = self.inv_allowed;
+        let [w_d, a] = self.slopes;
+        let body = f64::max(
+            largest(sub(w_d, self.w_d[0])) * rate,
+            if self.mount == Mount::Free { largest(sub(a, self.a[0])) * speed } else { 0.0 },
+        );
+        let constrained = self.constrained.iter().map(ConstrainedBob::slope_defect);
+        let bobs = self.bobs.iter().map(Bob::slope_defect).chain(constrained);
+        h * bobs.map(|defect| defect * swing).fold(body, f64::max)
+    }
+
+    #[inline(always)]
+    fn return_to_start(&mut self) {
+        self.state.x = self.state.kept.x;
     }
 
     #[inline(always)]

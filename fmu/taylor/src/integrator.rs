@@ -42,7 +42,8 @@ const PREDICTED_SHARE: f64 = 0.25;
 const LARGEST_LAST: f64 = 30.0;
 
 /// Length of a step, s, from which on it may err by the whole allowed error. A shorter step of a kept
-/// [`Expansion`] may err in proportion to its length, because more of them add up.
+/// [`Expansion`] may err in proportion to its length, because more of them add up. Ends of calls are compared
+/// with the right-hand side after this length.
 const FULL_LENGTH: f64 = 0.1;
 
 /// Largest defect of a step over the allowed error of its terms. A step with a larger one is repeated with
@@ -160,6 +161,22 @@ pub trait Motion {
     fn event(&mut self, _n: usize, _h: f64) -> Option<f64> {
         None
     }
+
+    /// Stores the derivatives of the states that the series up to order n have at `h` after the start of the
+    /// expansion.
+    #[inline(always)]
+    fn store_slopes(&mut self, _n: usize, _h: f64) {}
+
+    /// Returns the error, relative to the allowed error, that the difference between the stored derivatives
+    /// and coefficients 1 of the states makes over the time `h`.
+    #[inline(always)]
+    fn slope_defect(&self, _h: f64) -> f64 {
+        0.0
+    }
+
+    /// Returns to the states that [`Motion::keep`] has stored.
+    #[inline(always)]
+    fn return_to_start(&mut self) {}
 
     /// Stores the states as the start of the next kept [`Expansion`].
     #[inline(always)]
@@ -317,12 +334,21 @@ pub struct Expansion {
     radius: f64,
     /// Order and length of the whole expansion, if they are known.
     end: Option<(usize, f64)>,
+    /// Time after the start up to which a call may end without a comparison with the right-hand side, s.
+    verified: f64,
 }
 
 impl Default for Expansion {
     fn default() -> Self {
         let norms = [0.0; ORDER + 1];
-        Expansion { orders: 0, overwritten: 0, norms, radius: f64::INFINITY, end: None }
+        Expansion {
+            orders: 0,
+            overwritten: 0,
+            norms,
+            radius: f64::INFINITY,
+            end: None,
+            verified: FULL_LENGTH,
+        }
     }
 }
 
@@ -330,7 +356,7 @@ impl Expansion {
     /// Drops all coefficients, because another expansion starts.
     #[inline(always)]
     pub fn clear(&mut self) {
-        (self.orders, self.overwritten, self.end) = (0, 0, None);
+        (self.orders, self.overwritten, self.end, self.verified) = (0, 0, None, FULL_LENGTH);
     }
 
     /// Records that coefficients below `order` of all quantities, and coefficient `order` of the states, are
@@ -340,11 +366,12 @@ impl Expansion {
         self.overwritten = self.overwritten.max(order);
     }
 
-    /// Computes the coefficients again that were overwritten.
+    /// Computes the coefficients again that were overwritten. The expansion starts `t` after the start of the
+    /// call.
     #[inline(always)]
-    fn repair<M: Motion>(&mut self, motion: &mut M) {
+    fn repair<M: Motion>(&mut self, motion: &mut M, t: f64) {
         if self.overwritten > 0 && self.orders > 0 {
-            motion.start(0.0);
+            motion.start(t);
             for n in 0..self.overwritten.min(self.orders) {
                 motion.rates(n);
             }
@@ -450,9 +477,20 @@ fn length(norms: &[f64; ORDER + 1], n: usize, longest: f64) -> f64 {
 /// accelerations, make a higher order worth while.
 #[inline(always)]
 fn highest_order<M: Motion>(motion: &M, tolerance: f64) -> usize {
+    if motion.convergence() != Convergence::Decay {
+        return motion.highest_order();
+    }
     // -log2(e), rounded
     let bits = 1023 - ((STEP_SHARE * tolerance).to_bits() >> 52 & 0x7ff) as usize;
     (5 + 35 * bits / 100).clamp(MIN_ORDER + 3, motion.highest_order())
+}
+
+/// Returns the largest defect of the derivatives at the end of a series. At small tolerances it is their
+/// rounding error.
+#[inline(always)]
+fn largest_slope_defect(tolerance: f64) -> f64 {
+    const ROUNDING: f64 = 1e-13;
+    DEFECT * (1.0 + ROUNDING / (STEP_SHARE * tolerance))
 }
 
 /// Advances the motion to the time `clock` since the inputs are held, within the expansion if it is exact
@@ -471,7 +509,7 @@ pub fn advance_kept<M: Motion>(
     steps: &mut Steps,
 ) -> Result<(), StepError> {
     let mut moved = 0.0;
-    expansion.repair(motion);
+    expansion.repair(motion, moved);
     loop {
         steps.add_steps(1, begin + moved)?;
         let t = (clock - start[0]) - start[1];
@@ -484,7 +522,8 @@ pub fn advance_kept<M: Motion>(
         let mut whole = |motion: &mut M, expansion: &mut Expansion| {
             expansion.end(motion, tolerance, (begin + moved, &mut *steps))
         };
-        let order = expansion.order_at(motion, t, tolerance);
+        let fits = |end: Option<(usize, f64)>| end.is_none_or(|(_, end)| t <= end);
+        let order = expansion.order_at(motion, t, tolerance).filter(|_| fits(expansion.end));
         let (mut n, mut length) = match order.filter(|n| motion.defect(*n, t) <= DEFECT) {
             Some(n) => (n, t),
             None => {
@@ -509,14 +548,38 @@ pub fn advance_kept<M: Motion>(
         if !moves {
             return Err(StepError::NotFinite { time: begin + moved });
         }
+        let is_end = length == t && event.is_none();
+        let is_verified = is_end && length <= expansion.verified;
+        if event.is_none() && !is_verified {
+            motion.store_slopes(n, length);
+        }
         let _ = motion.take(n, length, moved + length, steps)?;
-        if length == t && event.is_none() {
+        if is_verified {
+            return Ok(());
+        }
+        // The derivatives at the end are needed for the next expansion, too.
+        if event.is_none() {
+            motion.start(moved + length);
+            motion.rates(0);
+            if motion.slope_defect(length / n as f64) > largest_slope_defect(tolerance) {
+                motion.return_to_start();
+                expansion.overwritten = 1;
+                expansion.repair(motion, moved);
+                let end = expansion.end.map_or(length, |(_, end)| end.min(length));
+                expansion.end = Some((n, end / 2.0));
+                continue;
+            }
+        }
+        if is_end {
+            expansion.verified = 2.0 * length;
+            expansion.overwritten = 1;
             return Ok(());
         }
         moved += length;
         *start = add_time(*start, length);
         motion.keep();
         expansion.clear();
+        expansion.orders = usize::from(event.is_none());
     }
 }
 
@@ -942,5 +1005,94 @@ mod tests {
         let back = add_time(sum, -1.0);
         // Ten times the rounding error of 0.1, which is 5.55e-18.
         assert!((back[0] / 5.55e-17 - 1.0).abs() < 1e-2, "{back:?}");
+    }
+
+    /// The motion y' = sqrt((t - 1)^2 + eps^2). Far from t = 1 its coefficients beyond the first two are of
+    /// order eps^2, so they do not show the corner. If `compares` is false, the end of a series is not compared
+    /// with the right-hand side.
+    struct Corner {
+        now: [f64; 2],
+        begin: [f64; 2],
+        square: Series,
+        root: Series,
+        y: Series,
+        allowed: f64,
+        slope: f64,
+        compares: bool,
+    }
+
+    const EPS: f64 = 1e-4;
+
+    impl Motion for Corner {
+        const UNROLLED: bool = false;
+
+        fn start(&mut self, _: f64) {
+            let [s, y] = self.now;
+            (self.square, self.y[0]) = (ZERO, y);
+            self.square[..3].copy_from_slice(&[s * s + EPS * EPS, 2.0 * s, 1.0]);
+        }
+
+        fn rates(&mut self, n: usize) {
+            self.root[n] = series::sqrt(n, self.square[n], &self.root);
+            self.y[n + 1] = series::next(n, self.root[n]);
+        }
+
+        fn set_error_scale(&mut self, h: f64, allowed: f64) -> f64 {
+            self.allowed = allowed;
+            h
+        }
+
+        fn coefficient_norm(&self, n: usize) -> f64 {
+            self.y[n].abs() / self.allowed
+        }
+
+        fn store_slopes(&mut self, n: usize, h: f64) {
+            [self.slope] = series::values([&self.root], n - 1, h);
+        }
+
+        fn slope_defect(&self, h: f64) -> f64 {
+            let compared = f64::from(self.compares);
+            compared * (self.slope - self.root[0]).abs() * h / self.allowed
+        }
+
+        fn return_to_start(&mut self) {
+            self.now = self.begin;
+        }
+
+        fn keep(&mut self) {
+            self.begin = self.now;
+        }
+
+        fn take(
+            &mut self,
+            n: usize,
+            h: f64,
+            _: f64,
+            _: &mut Steps,
+        ) -> Result<ControlFlow<f64>, StepError> {
+            self.now = [self.now[0] + h, series::values([&self.y], n, h)[0]];
+            Ok(ControlFlow::Continue(()))
+        }
+    }
+
+    /// The integral is (s r + eps^2 asinh(s/eps))/2 with r = sqrt(s^2 + eps^2).
+    #[test]
+    fn a_series_that_does_not_show_a_corner_is_repeated_shorter() {
+        let error = |tolerance: f64, compares: bool| {
+            let now = [-1.0, 0.0];
+            let [square, root, y] = [ZERO; 3];
+            let mut motion =
+                Corner { now, begin: now, square, root, y, allowed: 0.0, slope: 0.0, compares };
+            let (mut expansion, mut start) = (Expansion::default(), [0.0; 2]);
+            let mut steps = Steps::new(1000, "");
+            let times = (3.0, &mut start);
+            advance_kept(&mut motion, &mut expansion, times, 0.0, tolerance, &mut steps).unwrap();
+            let integral = |s: f64| 0.5 * (s * s.hypot(EPS) + EPS * EPS * (s / EPS).asinh());
+            (motion.now[1] - integral(2.0) + integral(-1.0)).abs() / tolerance
+        };
+        for tolerance in [1e-4, 1e-6, 1e-8, 1e-10] {
+            assert!(error(tolerance, true) < 1.0, "{tolerance:e}: {}", error(tolerance, true));
+        }
+        assert!(error(1e-4, false) > 1000.0);
     }
 }

@@ -217,7 +217,7 @@ fn off(a: &[f64], b: &[f64]) -> f64 {
 /// Compares communication steps of whole rows with the exact motion: steps of 2 ms at a tolerance of 1e-13. The error of a run may be the
 /// tolerance times 30. A pendulum that falls over multiplies errors: then it may be larger by the
 /// growth of a small displacement at the start.
-fn keep_the_tolerance(seeds: core::ops::Range<u64>, run: impl Fn(u64, Way) -> Vec<f64>) {
+fn keep_the_tolerance(seeds: impl Iterator<Item = u64>, run: impl Fn(u64, Way) -> Vec<f64>) {
     let mut worst = (0.0, 0, 0.0);
     for seed in seeds {
         let run = |tolerance, step, shift| run(seed, Way { tolerance, step, shift });
@@ -287,7 +287,7 @@ fn draining_craft_of(seed: u64, way: Way) -> Vec<f64> {
 
 #[test]
 fn dry_friction_of_a_pivot_keeps_the_solver_tolerance() {
-    keep_the_tolerance(0..20, craft_on_a_pivot_of);
+    keep_the_tolerance((0..20).chain([62]), craft_on_a_pivot_of);
 }
 
 #[test]
