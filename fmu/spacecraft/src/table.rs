@@ -497,7 +497,7 @@ static VARIABLES: &[Variable<Model>] = &[
         "Rate at which wall friction decreases the rotation of the liquid against the tank, about its axis and across it: about sqrt(nu Omega)/R times 2.9 and 2.6 in a full sphere")
         .shape(&[TANK, Fixed(2)]).range(0.0, 1e3),
     V::parameter("tank[].slip_0", |p, n| &mut p.tank[n / 3].slip_0[n % 3], "rad/s",
-        "Rotation of the liquid against the tank at the start, tank axes; 0: the liquid turns with the tank")
+        "Rotation of the liquid against the tank at the start, tank axes; 0: the liquid rotates with the tank")
         .display_unit("deg/s").shape(TANK_VECTOR).range(-1e3, 1e3),
     V::integer("tank[].fill.points", |p, n| &mut p.points[n], "Number of points in the tank's fill table; 0: the liquid stays. From 2 on the tank can drain, and the table gives its modes and rigid liquid, interpolated monotonically with two continuous derivatives. The start values are the default tank at depths of 0.1 to 1.2 m")
         .between(0, POINTS as i32).shape(PER_TANK),

@@ -297,7 +297,7 @@ class Appendage:
 
 
 def _numbers(given: Any) -> Vector:
-    """Return an array; an empty one if these are no numbers."""
+    """Return an array; an empty one if these are not numeric."""
     try:
         return floats(given)
     except (FmuError, TypeError, ValueError):

@@ -87,7 +87,7 @@ class MountedTank:
     contact_angle : float, optional
         Contact angle between surface and wall, deg.
     spin : float, optional
-        Rate at which the liquid turns with the tank about the tank's axis, rad/s, for the inertia
+        Rate at which the liquid rotates with the tank about the tank's axis, rad/s, for the inertia
         of its spin and the coefficients of its modes; without it the liquid has no spin. The craft
         starts at rest: set ``init.omega`` to make craft and liquid turn.
 

@@ -146,7 +146,7 @@ impl Solution<'_> {
                 let Role::Bias(output, Some(recording)) = unknowns[j].role else { return None };
                 let of = |s: &super::Signal| (s.output, s.recording) == (output, recording);
                 let s = problem.signals.iter().position(of)?;
-                // a bias beside white noise alone is an unknown like any other
+                // if the noise is white without a drift, the bias is estimated like every other unknown
                 (fit.noise[s].drift > 0.0).then_some((j, s))
             })
             .collect();

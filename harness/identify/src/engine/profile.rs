@@ -41,8 +41,8 @@ pub struct Point {
 }
 
 impl Fit<'_> {
-    /// Looks at a problem of which no unknown is said to be bent for the one along which the likelihood is least like a parabola.
-    /// Returns true if it is followed from now on.
+    /// Finds the unknown along which the likelihood is least like a parabola, if the problem names no unknown as bent. Returns
+    /// true if a profile along this unknown is needed from now on.
     ///
     /// # Errors
     /// If the system refuses every step of an unknown.
