@@ -45,10 +45,39 @@ use taylor::series::{self, ORDER, Series, ZERO};
 use taylor::space::{Vector, ZERO_VECTOR};
 use taylor::vector::{Mat3, Vec3, add, constant, cross, dot, scale, times};
 
-use crate::parameters::{Appendage, Parameters, SINGULAR};
-use crate::rigid::{Factors, Mat6, Rigid, add_rank_one, largest_eigenvalue, smallest_pivot};
+use crate::rigid::{
+    Factors, Mat6, Rigid, SINGULAR, add_rank_one, largest_eigenvalue, smallest_pivot,
+};
 use crate::sizes::APPENDAGES;
 use crate::state::{STATES, index};
+
+/// One mode of a flexible appendage with its interface held, with unit modal mass: natural frequency, Hz,
+/// damping ratio, and participation (translation, kg^0.5, and rotation about the interface point `position`,
+/// kg^0.5 m, body axes). `eta` and `eta_dot` are its displacement, kg^0.5 m, and its rate at the start.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
+pub struct Appendage {
+    pub position: Vec3,
+    pub frequency: f64,
+    pub zeta: f64,
+    pub participation: [f64; 6],
+    pub eta: f64,
+    pub eta_dot: f64,
+}
+
+impl Default for Appendage {
+    fn default() -> Self {
+        let (position, participation) = ([0.0; 3], [0.0; 6]);
+        Appendage { position, frequency: 1.0, zeta: 0.005, participation, eta: 0.0, eta_dot: 0.0 }
+    }
+}
+
+impl Appendage {
+    /// Returns true if the mode moves the craft, or moves at the start.
+    pub(crate) fn acts(&self) -> bool {
+        self.participation != [0.0; 6] || self.eta != 0.0 || self.eta_dot != 0.0
+    }
+}
 
 #[derive(Clone, Debug)]
 struct Mode {
@@ -124,9 +153,9 @@ pub(crate) struct Deformed<T> {
 }
 
 impl Structure {
-    /// Returns the modes of a craft's appendages up to the last one that has an effect; `None` if none has.
-    pub fn new(p: &Parameters) -> Option<Structure> {
-        let every = &p.appendage[..p.appendages];
+    /// Returns the modes of a craft's appendages up to the last one that has an effect, `None` if none has. `dry` is the dry craft
+    /// with its appendages undeformed.
+    pub fn new(every: &[Appendage], dry: Rigid) -> Option<Structure> {
         let used = every.iter().rposition(Appendage::acts).map_or(0, |last| last + 1);
         let modes: Vec<Mode> = every[..used].iter().map(Mode::new).collect();
         let mut effective = [[0.0; 6]; 6];
@@ -136,13 +165,8 @@ impl Structure {
         if modes.is_empty() {
             return None;
         }
-        let mut found = Structure {
-            modes,
-            effective,
-            dry: p.craft.rigid(),
-            shares: [0.0; APPENDAGES],
-            is_too_heavy: false,
-        };
+        let mut found =
+            Structure { modes, effective, dry, shares: [0.0; APPENDAGES], is_too_heavy: false };
         let mut undeformed = found.dry.mass_matrix();
         found.reduce(&mut undeformed);
         if smallest_pivot(&undeformed) < SINGULAR {

@@ -228,7 +228,7 @@ impl Draining {
             mount: p.mount,
             gravity: p.gravity,
             pivot: if p.mount == Mount::Pivot { p.pivot } else { Pivot::default() },
-            appendages: Structure::new(p),
+            appendages: Structure::new(&p.appendage[..p.appendages], p.craft.rigid()),
             follows: tanks.iter().any(MountedTank::follows),
             tanks,
         })

@@ -55,10 +55,11 @@ mod state;
 mod surface;
 mod table;
 
+pub use appendage::Appendage;
 pub use formulas::limits::LimitedBy;
 pub use formulas::regime::Regime;
 pub use outputs::{Outputs, TankOutputs};
-pub use parameters::{Appendage, Ball, Craft, DampingLaw, Inertia, Init, Mount, Parameters, Tank};
+pub use parameters::{Ball, Craft, DampingLaw, Inertia, Init, Mount, Parameters, Tank};
 pub use pivot::{Pivot, PivotFriction};
 pub use sizes::{APPENDAGES, MODES, POINTS, TANKS};
 pub use slosh_tank::{

@@ -222,7 +222,8 @@ impl CraftMotion {
             longest: modes().fold(0.0, |longest, (tank, _, n)| tank.length[n].max(longest)),
             parked: Vec::with_capacity(bobs.len()),
             bobs,
-            flexing: Structure::new(p).map(|structure| Box::new(Flexing::new(structure))),
+            flexing: Structure::new(&p.appendage[..p.appendages], p.craft.rigid())
+                .map(|structure| Box::new(Flexing::new(structure))),
             any_apart: false,
             has_events: false,
             beyond: None,

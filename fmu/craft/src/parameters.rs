@@ -12,9 +12,9 @@ use taylor::vector::{
     transposed_times, unit_quaternion,
 };
 
-use crate::appendage::{Structure, beyond_message};
+use crate::appendage::{Appendage, Structure, beyond_message};
 use crate::pivot::Pivot;
-use crate::rigid::{Mat6, Rigid, add_rank_one, along_rod, smallest_pivot};
+use crate::rigid::{Mat6, Rigid, SINGULAR, add_rank_one, along_rod, smallest_pivot};
 use crate::sizes::{APPENDAGES, MODES, POINTS, TANKS};
 use crate::surface::{self, Higher, Surface};
 use crate::table::{FillTable, LIGHTEST, SHORTEST};
@@ -505,33 +505,7 @@ impl Tank {
     }
 }
 
-/// One mode of a flexible appendage with its interface held, with unit modal mass: natural frequency, Hz,
-/// damping ratio, and participation (translation, kg^0.5, and rotation about the interface point `position`,
-/// kg^0.5 m, body axes). `eta` and `eta_dot` are its displacement, kg^0.5 m, and its rate at the start.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[allow(missing_docs)]
-pub struct Appendage {
-    pub position: Vec3,
-    pub frequency: f64,
-    pub zeta: f64,
-    pub participation: [f64; 6],
-    pub eta: f64,
-    pub eta_dot: f64,
-}
-
-impl Default for Appendage {
-    fn default() -> Self {
-        let (position, participation) = ([0.0; 3], [0.0; 6]);
-        Appendage { position, frequency: 1.0, zeta: 0.005, participation, eta: 0.0, eta_dot: 0.0 }
-    }
-}
-
 impl Appendage {
-    /// Returns true if the mode moves the craft, or moves at the start.
-    pub(crate) fn acts(&self) -> bool {
-        self.participation != [0.0; 6] || self.eta != 0.0 || self.eta_dot != 0.0
-    }
-
     fn find_problems(&self, name: &str, problems: &mut Problems) {
         problems.vector(&format!("{name}.position"), &self.position, "m");
         problems.number(&format!("{name}.frequency"), self.frequency, 1e-6, 1e6, "Hz");
@@ -1182,9 +1156,6 @@ impl Craft {
     }
 }
 
-/// Smallest pivot below which a mass matrix counts as singular.
-pub(crate) const SINGULAR: f64 = 1e-12;
-
 /// Returns the reason why the mass matrix of a body with the liquid of `tanks` is singular, as words that
 /// follow "is singular". Returns `None` if it is regular with planar modes at rest and with detached liquid.
 /// Other angles of planar modes are not searched, because realistic craft are singular only far outside the
@@ -1318,7 +1289,9 @@ impl Parameters {
                      about every axis through their centre of mass, must be above 0: increase craft.mass or craft.J, or the \
                      tanks' m_0, I_0 and I_z"
                 ));
-            } else if let Some(structure) = Structure::new(self) {
+            } else if let Some(structure) =
+                Structure::new(&self.appendage[..self.appendages], self.craft.rigid())
+            {
                 let mut eta = self.appendage.map(|appendage| appendage.eta);
                 eta[structure.len()..].fill(0.0);
                 if structure.is_beyond(&[0.0; APPENDAGES]) {

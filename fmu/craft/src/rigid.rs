@@ -12,6 +12,9 @@ use core::ops::Mul;
 use taylor::number::Number;
 use taylor::vector::{Mat3, Vec3, add, constant, cross, dot, scale, times};
 
+/// Smallest pivot below which a mass matrix counts as singular.
+pub(crate) const SINGULAR: f64 = 1e-12;
+
 pub type Mat6<T = f64> = [[T; 6]; 6];
 
 /// Mass m, kg, first moment S = m s, kg m, and second moment I, kg m2, of a rigid body about O.
