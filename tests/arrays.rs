@@ -362,7 +362,7 @@ fn array_sizes_are_set_only_in_configuration_mode_and_reset_the_arrays() {
     let tanks = craft.variable("tanks").reference;
     let position = craft.variable("tank.position").reference;
     let mut run = craft.instance(Interface::ModelExchange);
-    let states = |tanks: usize| 4 + 3 + 3 + 3 + 3 + 2 * 6 + tanks * (1 + 3 * 6 + 6);
+    let states = |tanks: usize| 4 + 3 + 3 + 3 + 3 + 2 * 6 + tanks * (1 + 3 * 6 + 6 + 3);
     assert_eq!(run.instance.number_of_states().unwrap(), states(1));
     let mut size = [0u64];
     run.instance.get_numbers(&[tanks], &mut size).unwrap();
