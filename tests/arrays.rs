@@ -470,7 +470,10 @@ fn a_saved_state_brings_its_sizes_and_is_not_of_the_other_fmu() {
     let mut other = opened[1].instance(Interface::CoSimulation);
     let (status, text) = refusal(other.instance.deserialize(&bytes));
     assert_eq!(status, Status::Error);
-    assert!(text.contains("its variables are scalars where those of this FMU are arrays"), "{text}");
+    assert!(
+        text.contains("its variables are scalars where those of this FMU are arrays"),
+        "{text}"
+    );
 }
 
 #[test]

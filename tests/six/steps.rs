@@ -113,7 +113,7 @@ fn random_steps_give_finite_results_or_a_clear_error_message() {
     assert!((500..10_000).contains(&refused), "{refused}");
 }
 
-/// The long form of the same test, which `.ci/run` calls.
+/// The long form of `random_steps_give_finite_results_or_a_clear_error_message`.
 #[test]
 #[ignore = "a minute: .ci/run --nightly"]
 fn a_million_random_steps_give_finite_results_or_a_clear_error() {

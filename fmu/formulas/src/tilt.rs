@@ -222,8 +222,8 @@ mod tests {
     }
 
     /// Short waves do not reach the bottom. The surface is longer by the root of 1 + s^2 along the slope, and
-    /// g is larger by the same factor. For waves whose directions are distributed as cos^2 of the angle, c is
-    /// 1/2 - 3/8 and 1/2 - 1/8, to the order of 1/xi. The truncation error of mode 10 is 0.003.
+    /// g is larger by the same factor. For waves whose directions are distributed as cos^2 of the angle, the
+    /// coefficient of the frequency's change is 1/8 for modes along the slope and 3/8 across it. Mode 10 differs by 0.003.
     #[test]
     fn high_modes_are_waves_on_a_longer_surface() {
         let [along, across] = coefficients(9, 2.0);

@@ -271,9 +271,10 @@ class Search:
     def proved(
         self, region: Region, ends: tuple[Pair, Pair], part: tuple[float, float], halvings: int
     ) -> list[tuple[float, float]] | None:
-        """Return the frequency intervals on which X < 0 is proved, or None if it is not.
+        """Return the frequency intervals on which X < 0 is proved, or None if the proof fails.
 
-        X is the matrix of `scalings.form`. D and G are interpolated linearly between their values
+        X is the matrix of the robustness test with D and G scalings (`scalings.form`): the loop is
+        robust where X is negative definite. D and G are interpolated linearly between their values
         at both ends of the region's frequency interval, and X is bounded by polynomials. ``part``
         is the part of the frequency interval to prove; it may be halved ``halvings`` times.
         """

@@ -1127,7 +1127,8 @@ class Craft:
         fills : sequence of fills
             Fills to review, each as for `fills`.
         damping : {"interval", "nominal"}
-            "interval" varies the damping of each tank over the interval of its correlation;
+            "interval" varies the damping of each tank over the confidence interval of the
+            empirical formula that computes it;
             "nominal" does not vary it.
         frequency : str
             Range of the slosh frequencies of each tank, all its modes together, as a share of the

@@ -228,7 +228,7 @@ class _Mat:
     inputs: Mapping[str, float]
 
     def as_dict(self) -> dict[str, Any]:
-        """Return them as MATLAB has them."""
+        """Return the model as a dictionary of the variables that a .mat file gets."""
         return {
             **{name: getattr(self.linear, name) for name in "ABCD"},
             **{name: list(getattr(self.linear, name)) for name in ("states", "inputs", "outputs")},

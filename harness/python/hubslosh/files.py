@@ -181,7 +181,7 @@ def _distinct_names(values: Mapping[str, Any], units: Mapping[str, str]) -> dict
 
 
 def _family(models: "Sequence[LinearModel]") -> dict[str, Any]:
-    """Return models of one size as MATLAB has them."""
+    """Return models of one size as a dictionary of arrays for a .mat file, one page a model."""
     import numpy as np
 
     first = models[0]

@@ -333,8 +333,8 @@ class Plant(Instance):
     ) -> dict[str, np.ndarray]:
         """Step from row to row in one call, and record variables at every row.
 
-        Rows are read before their inputs are set, so that an output that follows an input at once
-        shows a jump of this input in the next row.
+        At each row the outputs are recorded before the row's inputs are set. An output that follows
+        an input at once therefore shows a jump of the input one row later.
 
         Parameters
         ----------

@@ -140,7 +140,7 @@ class Project:
         Raises
         ------
         FmuError
-            If the file cannot be written, or the controller has no form in it.
+            If the file cannot be written, or a project file cannot contain this kind of controller.
         """
         write_file(path, ".toml", lambda: self._text(Path(path).absolute().parent))
 

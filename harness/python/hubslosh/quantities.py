@@ -334,8 +334,9 @@ def apply_changes(
 ) -> dict[str, Quantity]:
     """Return parameters of Spacecraft in which quantities of slosh modes are changed.
 
-    ``values`` has new values, and ``factors`` has ratios of new to given frequencies (whatever the
-    thrust is), both by full names. ``tanks`` has the tanks' names for error messages.
+    ``values`` maps full names of parameters to their new values. ``factors`` maps full names of
+    frequencies to the ratio of the new to the given frequency, which holds at any thrust. ``tanks``
+    has the tanks' names for error messages.
     """
     modes, problems = Modes(model, given), []
     for name, value in values.items():

@@ -108,7 +108,7 @@ def read_parameters(path: str | Path) -> dict[str, Quantity]:
     Raises
     ------
     FmuError
-        If the file cannot be read, or is none of parameters.
+        If the file cannot be read, or is not a file of parameters.
 
     Examples
     --------

@@ -78,7 +78,7 @@ pub struct DesignArgs {
     /// File for the torque, .csv or .parquet.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Tables of the planned inputs; only with --free.
+    /// Tables with the inputs that you plan to apply; only with --free, which names the parameters to estimate.
     #[arg(value_name = "DATA", requires = "free")]
     data: Vec<PathBuf>,
     /// Standard deviation of the noise in one row of each output; only with --free.

@@ -157,8 +157,8 @@ pub struct BenchArgs {
     /// Also estimates: actuator_lag and gyro_lag, time constants of the actuator and of a filter in the gyro;
     /// friction_drift, the relative change of the friction over a recording; breaking, the damping by breaking waves,
     /// slosh.zeta_breaking and slosh.breaking_steepness. early_rate accepts a negative delay, because the time stamps of
-    /// the rate may be early. none: estimates no delay, gyro bias or friction asymmetry either, because the measurement is
-    /// perfect.
+    /// the rate may be early. none switches off the estimates of delay, gyro bias and friction asymmetry, which
+    /// are made by default.
     #[arg(
         long,
         value_name = "NAME,…",

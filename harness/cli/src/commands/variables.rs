@@ -64,7 +64,7 @@ impl VariablesArgs {
                 description.variables.iter().map(|v| v.causality.as_str()).collect();
             let there: Vec<&str> = there.into_iter().collect();
             bail!(
-                "{} has no variable{asked} (causalities in it: {})",
+                "{} has no variable{asked} (causalities of its variables: {})",
                 fmu.display(),
                 there.join(", ")
             );

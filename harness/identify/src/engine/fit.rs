@@ -435,7 +435,7 @@ pub(super) fn check_finite(values: &[f64], name: &str) -> Result<()> {
             values[row],
             row + 1
         ),
-        None => bail!("the derivatives by {name} are too large"),
+        None => bail!("the derivatives of the residuals with respect to {name} are too large"),
     }
 }
 

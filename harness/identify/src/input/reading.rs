@@ -453,8 +453,8 @@ mod tests {
         Recording { from_rest: false, ..Recording::of("a.csv", time, torque, rate) }
     }
 
-    /// A gyro reads its bias at rest. Taken for motion, it made the rate at the start an unknown that nothing determines: dry
-    /// friction stops the hub at once.
+    /// A gyro reads its bias at rest. If the bias were taken for a motion, the rate at the start would be an unknown that the
+    /// recording does not determine, because dry friction stops the hub at once.
     #[test]
     fn a_constant_reading_is_a_bias_and_a_hub_that_turns_is_not_at_rest() {
         let mut random = analysis::random::Random::new(1, 0);

@@ -238,7 +238,7 @@ impl Question {
         );
         let std = match &tolerance.size {
             Size::Part(part) if value == 0.0 && *part > 0.0 => bail!(
-                "{flag}: {name} is 0, so that a part of it is 0 (allowed: a number with a unit, or ±NUMBER)"
+                "{flag}: {name} is 0, so that a range in percent of {name} is empty (allowed: a number with a unit, or ±NUMBER)"
             ),
             Size::Part(part) => part * value.abs(),
             Size::Absolute(text) => deviation(variable, description, text)?,

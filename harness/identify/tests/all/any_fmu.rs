@@ -143,7 +143,11 @@ fn known_values_count_with_their_tolerances() {
         ("hub.I=1%", &FREE[..], "it is estimated"),
         ("tau_cmd=1%", &FREE, "allowed: scale(tau_cmd)"),
         ("scale(theta)=1%", &FREE, "allowed: tau_cmd, omega, time"),
-        ("friction.asymmetry=1%", &FREE, "is 0, so that a part of it is 0"),
+        (
+            "friction.asymmetry=1%",
+            &FREE,
+            "is 0, so that a range in percent of friction.asymmetry is empty",
+        ),
         ("tank.h=5ft", &FREE, "has no unit \"ft\""),
         ("tank.h@3=1%", &FREE, "from 1 to 2"),
     ] {

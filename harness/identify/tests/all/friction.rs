@@ -136,7 +136,7 @@ fn friction_of_eighteen_more_runs_ends_in_no_false_minimum() {
     assert_eq!(all_sets(3..=8), [""; 0]);
 }
 
-/// A preferential direction in the other way comes back with its sign.
+/// If the friction is lower in the negative direction of rotation, the estimated difference is negative.
 #[test]
 fn identify_finds_the_preferential_direction_in_both_directions() {
     assert_eq!(wrong(&SETS[0], 2, 0.002, -ASYMMETRY), [""; 0]);
