@@ -193,7 +193,7 @@ def table(all_points: dict[str, list[tuple]], unit: float) -> str:
     """Return the page's table."""
     rows = [
         "| method | tolerance (RK4: step, s) | error of omega, rad/s "
-        "| CPU time per 20 ms, ns | CPU time per 20 ms over that of one RK4 step of 5 ms | instructions per 20 ms |",
+        "| CPU time per 20 ms, ns | CPU time over one RK4 step's, 5 ms | instructions per 20 ms |",
         "| --- | --- | --- | --- | --- | --- |",
     ]
     for name, points in all_points.items():
