@@ -315,7 +315,7 @@ mod tests {
                 "the archive unpacks to 68157440 bytes (allowed",
             ),
             (&many, 0, "the archive has 20001 entries (allowed: 20000)"),
-            (&[(long.as_str(), b"")], 0, "a name in it has 1025 bytes (allowed: 1024)"),
+            (&[(long.as_str(), b"")], 0, "a name in the archive has 1025 bytes (allowed: 1024)"),
             (&[("../out", b"")], 0, "leads out of the archive"),
             (&[("b/../../out", b"")], 0, "leads out of the archive"),
             (&[("/out", b"")], 0, "its name is absolute"),
