@@ -31,10 +31,10 @@ def link() -> zipfile.ZipInfo:
 @pytest.mark.parametrize(
     ("files", "why"),
     [
-        ({"resources/zeros": bytes(80 << 20)}, "it unpacks to 83886"),
+        ({"resources/zeros": bytes(80 << 20)}, "the archive unpacks to 83886"),
         ({"../outside": ""}, "leads out of the archive"),
         ({link(): "/etc/hostname"}, "symbolic link"),
-        ({}, "it has no modelDescription.xml"),
+        ({}, "the archive has no modelDescription.xml"),
         ({"modelDescription.xml": "<a " + " b=''" * 700_001}, "attributes"),
     ],
 )

@@ -3,6 +3,7 @@
 use analysis::gauss_markov::Noise;
 use analysis::innovations::Tests;
 use analysis::random::Random;
+use analysis::statistics::deviation;
 use anyhow::{Context, Result, bail};
 
 use super::hold::Rival;
@@ -15,6 +16,11 @@ use crate::news::News;
 /// Parts of the recordings in a search from a start that leads to no minimum on the whole: over a whole oscillation the sum of squares has a
 /// minimum for each cycle, over its beginning only one.
 const PARTS: [f64; 7] = [0.1, 0.2, 0.3, 0.4, 0.55, 0.75, 1.0];
+/// Least noise of a growing beginning, relative to the spread of the signal, for an FMU of which nothing is known: a precise sensor
+/// would drive unknowns to their bounds before the search is near.
+const BEGINNING_NOISE: f64 = 0.03;
+/// Most sets of derivatives of the search over the whole that follows.
+const MOST_SETS: usize = 20;
 /// Noise over that of neighbouring rows from which on the residual has more in it than the sensor's noise.
 const ABOVE: f64 = 1.5;
 /// Rounds of noise, minimum and profile at the end, each from a lower minimum.
@@ -471,9 +477,15 @@ impl Fit<'_> {
         let mut found: Option<Minimum> = None;
         if grows {
             let before = course.clone();
+            let mut noise = first(self);
+            if self.problem.rough {
+                for (noise, signal) in noise.iter_mut().zip(&self.problem.signals) {
+                    let spread = deviation(&signal.picked(&signal.measured));
+                    noise.white = noise.white.max(BEGINNING_NOISE * spread);
+                }
+            }
             for (k, part) in PARTS.into_iter().enumerate() {
-                let noise = first(self);
-                self.set(noise, part);
+                self.set(noise.clone(), part);
                 let end = End { gain: ALIKE, ..End::new(8, ENDS.0) };
                 let minimum = self.minimise(&z, &free, None, end)?;
                 let cost = minimum.point.cost;
@@ -486,6 +498,13 @@ impl Fit<'_> {
                 }
                 z.clone_from(&minimum.point.z);
                 found = Some(minimum);
+            }
+            if self.problem.rough
+                && let Some(minimum) = &found
+            {
+                self.renew_noise(&minimum.point);
+                let end = End { gain: ALIKE, ..End::new(MOST_SETS, ENDS.0) };
+                found = Some(self.minimise(&z, &free, None, end)?);
             }
         } else {
             let noise = first(self);
