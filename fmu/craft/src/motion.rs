@@ -1065,12 +1065,16 @@ impl CraftMotion {
     }
 
     /// Performs all events that are due now, for hosts that integrate themselves. Returns true if there were
-    /// any.
-    pub fn take_due(&mut self, inputs: &Inputs) -> bool {
+    /// any, and `None` if the states are so large that products of their series could overflow.
+    pub fn take_due(&mut self, inputs: &Inputs) -> Option<bool> {
         self.inputs = *inputs;
         let mut any = false;
+        let is_bounded = |x: &[f64; STATES]| x.iter().all(|x| x.abs() < MAX_MAGNITUDE);
         // The largest number of successive events of a lump, for every tank.
         for _ in 0..4 * self.lumps.len() {
+            if !is_bounded(&self.state.x) {
+                return None;
+            }
             self.evaluate_at(0.0);
             for n in 1..4 {
                 self.rates(n);
@@ -1081,7 +1085,7 @@ impl CraftMotion {
             self.change(lump, due, 0.0);
             any = true;
         }
-        any
+        is_bounded(&self.state.x).then_some(any)
     }
 
     pub fn indicators(&mut self, inputs: &Inputs, indicators: &mut [f64]) {

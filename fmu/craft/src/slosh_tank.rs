@@ -863,13 +863,16 @@ impl TankMotion {
     }
 
     /// Performs all events that are due now, for hosts that integrate themselves. Returns true if there were
-    /// any.
-    fn take_due(&mut self, inputs: &TankInputs) -> bool {
+    /// any, and `None` if states are so large that products of their series could overflow.
+    fn take_due(&mut self, inputs: &TankInputs) -> Option<bool> {
         self.inputs = *inputs;
         self.forget();
         let mut any = false;
         // The largest number of successive events.
         for _ in 0..4 {
+            if !self.is_bounded() {
+                return None;
+            }
             self.evaluate_at(0.0);
             for n in 1..4 {
                 self.rates(n);
@@ -879,8 +882,16 @@ impl TankMotion {
             self.perform_event(due, 0.0);
             any = true;
         }
+        let is_bounded = self.is_bounded();
         self.forget();
-        any
+        is_bounded.then_some(any)
+    }
+
+    /// Returns false where states, impulses or the change of w are so large that products of their series could overflow.
+    fn is_bounded(&self) -> bool {
+        let TankState { x, impulse, .. } = &self.state;
+        let turned = self.ball.as_ref().map_or([0.0; 3], |ball| ball.turned);
+        x.iter().chain(impulse).chain(&turned).all(|x| x.abs() < MAX_MAGNITUDE)
     }
 
     fn forget(&mut self) {
@@ -1242,13 +1253,11 @@ impl SloshTank {
     /// nothing has changed.
     pub fn take_event(&mut self, inputs: &TankInputs) -> Result<bool, StepError> {
         let before = self.motion.state;
-        let changed = self.has_ball() && self.motion.take_due(inputs);
-        let TankState { x, impulse, time, .. } = &self.motion.state;
-        if changed && x.iter().chain(impulse).any(|x| !x.is_finite()) {
-            let time = *time;
+        let changed = if self.has_ball() { self.motion.take_due(inputs) } else { Some(false) };
+        let Some(changed) = changed else {
             self.motion.state = before;
-            return Err(StepError::NotFinite { time });
-        }
+            return Err(StepError::NotFinite { time: before.time });
+        };
         self.motion.state.ranges = self.ranges(inputs);
         Ok(changed)
     }

@@ -352,10 +352,13 @@ impl Spacecraft {
     pub fn take_event(&mut self, inputs: &Inputs) -> Result<bool, StepError> {
         let before = self.motion.state;
         let mut changed = self.take_jumps(inputs);
-        if !self.motion.lumps.is_empty() {
-            changed |= self.motion.take_due(inputs);
+        let mut is_bounded = self.motion.state.x.iter().all(|x| x.is_finite());
+        if is_bounded && !self.motion.lumps.is_empty() {
+            let due = self.motion.take_due(inputs);
+            is_bounded = due.is_some();
+            changed |= due == Some(true);
         }
-        if self.motion.state.x.iter().any(|x| !x.is_finite()) {
+        if !is_bounded {
             self.motion.state = before;
             return Err(StepError::NotFinite { time: before.time });
         }
