@@ -30,9 +30,9 @@ struct Way {
     settings: &'static [(&'static str, &'static str)],
     /// Torque under which the effect shows.
     torque: &'static str,
-    /// Change of the gyro's reading by its own fault.
+    /// Change of the gyro's readings, if the effect is a fault of the gyro.
     gyro: fn(&mut Recording),
-    /// Words of the verdict or of the notes that name it.
+    /// Words of the verdict or the notes that name the effect.
     named: &'static str,
 }
 

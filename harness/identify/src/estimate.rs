@@ -5,34 +5,35 @@ use serde::Serialize;
 /// An estimated number.
 #[derive(Clone, Debug, Serialize)]
 pub struct Estimated {
-    /// SI.
+    /// Value, in SI units.
     pub value: f64,
-    /// Standard deviation, everything in it; where the interval is skew, that of its longer side.
+    /// Standard deviation from noise and tolerances. If the interval is skew, it is the longer side over 1.96.
     pub std: f64,
     /// Standard deviation from the noise alone.
     pub std_noise: f64,
-    /// 95 % interval. Where the recording sets no upper end it is infinite, and null in JSON; no lower end is 0.
+    /// 95 % interval. An upper end that the recording does not determine is infinite, and null in JSON; such a lower end is 0.
     pub interval: [f64; 2],
-    /// The recording shows it: both ends are there, and it is known to better than half its size or is near zero by nature.
+    /// True if the recording determines the value: both ends of the interval are finite, and the standard deviation is less than
+    /// half the value, unless the value may be zero by nature.
     pub determined: bool,
     /// Unit as in modelDescription.xml.
     pub unit: String,
 }
 
 impl Estimated {
-    /// A number whose only uncertainty is noise, normally distributed.
+    /// Returns a number whose only uncertainty is normally distributed noise.
     pub fn normal(value: f64, std: f64, unit: &str) -> Self {
         let interval = [value - 1.96 * std, value + 1.96 * std];
         Estimated { value, std, std_noise: std, interval, determined: true, unit: unit.into() }
     }
 
-    /// A number as a percentage of the value; `None` where the value is zero within its standard deviation, and a share of it
-    /// would say nothing.
+    /// Returns a number as a percentage of the value; `None` if the value is zero within its standard deviation, because a
+    /// percentage would then mean nothing.
     pub fn percent(&self, of: f64) -> Option<f64> {
         (self.value.abs() > self.std).then(|| 100.0 * of / self.value)
     }
 
-    /// A change of the value: in percent, or in its own unit.
+    /// Returns a change of the value in words: in percent or, if the value is near zero, in its own unit.
     pub fn change(&self, by: f64) -> String {
         match self.percent(by) {
             Some(percent) => format!("{percent:+.2} %"),
@@ -41,7 +42,7 @@ impl Estimated {
     }
 }
 
-/// A unit of the FMU as prose has it: kg·m² for kg.m2.
+/// Returns a unit of the FMU as it is written in prose: kg·m² for kg.m2.
 pub fn prose(unit: &str) -> String {
     unit.replace('.', "·").replace('2', "²")
 }

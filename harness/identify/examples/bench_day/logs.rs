@@ -29,13 +29,13 @@ const COLUMNS: [&str; 2] = [
     "time=t:ms,tau_cmd=T_cmd:mNm,omega=gyro_z:deg/s,omega_x=gyro_x:deg/s,omega_y=gyro_y:deg/s",
 ];
 
-/// A day.
+/// Logs of one day.
 pub struct Day<'a> {
     /// Bias of the gyro about x, y and z, deg/s.
     pub bias: [f64; 3],
     /// Liquid of the sweeps.
     pub liquid: Liquid,
-    /// Fills, m.
+    /// Filling heights, m.
     pub fills: &'a [f64],
     /// Torque amplitudes, N·m.
     pub amplitudes: &'a [f64],
@@ -43,11 +43,11 @@ pub struct Day<'a> {
     pub sweep: f64,
     /// Duration of the gyro's recording at rest, s; 0 for none.
     pub rest: f64,
-    /// True with friction runs and decays.
+    /// True if the day has friction runs and free decays.
     pub friction: bool,
     /// Slosh models that the report simulates.
     pub models: &'a str,
-    /// Relative difference of the recorder's clock: true times are 1 − clock times those of the logs.
+    /// Relative error of the recorder's clock: true times are the times of the logs multiplied by 1 − clock.
     pub clock: f64,
     /// Part of the rows that the logger loses.
     pub lost: f64,
@@ -122,7 +122,7 @@ impl Day<'_> {
         std::fs::write(directory.join("day.toml"), manifest)
     }
 
-    /// One log; the torque (N·m) counts time from the end of the lead-in.
+    /// Returns the text of one log. The torque (N·m) is a function of the time from the end of the lead-in.
     fn log(&self, number: u64, bench: &Bench, torque: &dyn Fn(f64) -> f64, seconds: f64) -> String {
         let rows = ((LEAD_IN + seconds) / STEP).round() as usize;
         let time: Vec<f64> = (0..=rows).map(|k| STEP * k as f64).collect();

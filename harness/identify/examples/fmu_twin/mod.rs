@@ -1,5 +1,5 @@
-//! Recordings of the FMU in place of a bench, with its gyro's noise: what identification is tried on,
-//! and what a planned experiment would record.
+//! Recordings of the FMU in place of a bench, with its gyro's noise. Identification is tried on them, and they show what a
+//! planned experiment would record.
 
 use analysis::random::Random;
 use analysis::statistics::peak;
@@ -40,7 +40,7 @@ pub enum Unmodelled {
     Nutation,
     /// The bearing warms up: its friction falls by [`WARM`] with a time constant of 600 s.
     Warming,
-    /// The wheel gives nine tenths of the largest torque at most.
+    /// The wheel gives at most nine tenths of the largest commanded torque.
     Clipping,
     /// Air slows the hub by [`AIR`] ω|ω|.
     Drag,
@@ -52,11 +52,11 @@ pub enum Unmodelled {
 
 /// Frequency of rocking, Hz.
 const ROCKING: f64 = 4.1;
-/// Damping ratio.
+/// Damping ratio of rocking.
 const ROCKING_DAMPING: f64 = 0.01;
-/// Rate that the gyro sees of it far below resonance, over the hub's.
+/// Rate of rocking that the gyro sees far below resonance, relative to the hub's rate.
 const ROCKING_SEEN: f64 = 0.01;
-/// Part of the friction that a warm bearing lacks.
+/// Part by which the friction of a warm bearing is smaller.
 const WARM: f64 = 0.3;
 /// Drag of the air, N·m·s².
 const AIR: f64 = 0.02;
@@ -153,7 +153,7 @@ impl Twin {
         all
     }
 
-    /// Records it under a torque; `seed` is that of the gyro's noise, none without noise.
+    /// Records the twin under a torque; `seed` is the seed of the gyro's noise, `None` without noise.
     pub fn record(&self, fmu: &Fmu, torque: &Torque, seed: Option<u32>) -> Result<Recording> {
         let (start, stop) = torque.span();
         let (step, late) = (1.0 / self.rate, self.sensor_errors.delay);
@@ -271,7 +271,7 @@ struct Lag {
 }
 
 impl Lag {
-    /// y after a step on which u is a line from its last value, by the trapezoidal rule.
+    /// Returns y after a step on which u is a line from its last value, by the trapezoidal rule.
     fn step(&mut self, u: f64, step: f64) -> f64 {
         let half = 0.5 * step / LAG;
         self.y = ((1.0 - half) * self.y + half * (self.u + u)) / (1.0 + half);
@@ -280,7 +280,7 @@ impl Lag {
     }
 }
 
-/// A torque behind its command, at [`LAG_PARTS`] instants from row to row.
+/// Returns the torque that lags its command, at [`LAG_PARTS`] instants from row to row.
 fn behind(torque: &Torque, rows: &[f64]) -> Result<Torque> {
     let mut lag = Lag::default();
     let (mut time, mut tau) = (vec![rows[0]], vec![0.0]);
@@ -305,7 +305,7 @@ struct Rocking {
 }
 
 impl Rocking {
-    /// φ after a step under acceleration a (rad/s²), in parts of 1 ms or less, semi-implicitly.
+    /// Returns φ after a step under acceleration a (rad/s²), by the semi-implicit Euler method in parts of 1 ms or less.
     fn step(&mut self, a: f64, step: f64) -> f64 {
         let w = std::f64::consts::TAU * ROCKING;
         let parts = (step / 1e-3).ceil();
@@ -320,7 +320,7 @@ impl Rocking {
     }
 }
 
-/// Records the FMU under a torque at 50 Hz; `seed` is that of the gyro's noise, none without noise.
+/// Records the FMU under a torque at 50 Hz; `seed` is the seed of the gyro's noise, `None` without noise.
 pub fn record(
     fmu: &Fmu,
     settings: &[(&str, &str)],

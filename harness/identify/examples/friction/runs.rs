@@ -8,7 +8,7 @@ use identify::input::recording::Recording;
 
 use crate::bench::{Bearing, Bench, Drive, Liquid};
 
-/// Noise of a row of the thesis's gyro at 50 Hz and its least step, rad/s.
+/// Standard deviation of the noise of the thesis's gyro in one row at 50 Hz, and the gyro's least step, rad/s.
 const GYRO: (f64, f64) = (4.066e-4, 1.53e-4);
 
 /// Torque of a run, N·m, over time, s.
@@ -16,7 +16,6 @@ pub type Course = fn(f64) -> f64;
 
 /// A ramp, a step and a sweep.
 pub struct Set {
-    /// Name.
     pub name: &'static str,
     /// Length of each run, s.
     pub seconds: u32,

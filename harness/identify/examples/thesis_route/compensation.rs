@@ -5,9 +5,9 @@
 //! τ_act = τ_cmd + τ_f(ω_measured),   ω ≈ linear bench(d, h, ζ) driven by τ_act
 //! ```
 //!
-//! It fails, and why can be seen in the equations: nothing in the model loses energy but the slosh. Noise near ω = 0, a gyro's
-//! bias and slightly different friction all make errors of τ_act. A hub without friction integrates them, and the simulated rate
-//! drifts off. In the FMU the same errors die out within seconds.
+//! It fails because only the slosh loses energy in this model. Noise near ω = 0, a gyro's bias and slightly different friction
+//! all make errors of τ_act. A hub without friction integrates them, and the simulated rate drifts off. In the FMU the same
+//! errors die out within seconds.
 
 use std::f64::consts::PI;
 
@@ -20,7 +20,7 @@ use analysis::least_squares::{differences, minimise};
 use identify::bench::nominal::Bench;
 use identify::input::recording::Recording;
 
-/// Friction as it is known beforehand, SI.
+/// Friction that is known beforehand; SI units.
 #[derive(Clone, Copy, Debug)]
 pub struct Friction {
     pub b: f64,
@@ -32,7 +32,7 @@ pub struct Friction {
 }
 
 impl Friction {
-    /// τ_f, N·m.
+    /// Returns the friction torque τ_f at a rate, N·m.
     pub fn torque(&self, w: f64) -> f64 {
         let dry = self.c + self.d * (-(w / self.omega_s).powi(2)).exp();
         let sign = if w.abs() <= self.dead_band { 0.0 } else { w.signum() };
@@ -50,8 +50,8 @@ fn bench_of(hub_inertia: f64, (d, h, zeta): (f64, f64, f64), bench: Bench) -> Li
     Linear { inertia, arm: bench.arm, modes, ..Linear::default() }
 }
 
-/// Fits d, h and ζ from a start, the hub's inertia and the friction being known: the fit of the rate, %,
-/// 100 (1 − |y − ŷ|/|y − mean y|).
+/// Fits tank diameter d, filling height h and damping ratio ζ from a start, with known inertia of the hub and friction. Returns
+/// them with the fit of the simulated rate ŷ to the measured rate y, %: 100 (1 − ‖y − ŷ‖/‖y − mean y‖).
 pub fn identify(
     recording: &Recording,
     friction: Friction,

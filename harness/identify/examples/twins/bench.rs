@@ -27,19 +27,19 @@ const SAME: f64 = 1e-13;
 const REST: f64 = 1e-13;
 /// Largest torque beyond static friction at which the hub still counts as held, N·m.
 const TOUCH: f64 = 1e-12;
-/// Longest time without a look whether a hub that sticks breaks away, s.
+/// Longest time between two checks whether a hub that sticks breaks away, s.
 const LOOK: f64 = 5e-3;
 
 /// State: θ, ω, then s and s' of the linear liquid or u and u' of the spherical one. The time is a state because ode_solvers
 /// 0.6.2 evaluates the twelfth stage of Dop853 at the beginning of the step (c₁₂ is 0 in its table, 1 in Hairer's).
 type State = SVector<f64, 9>;
-/// Place of the time.
+/// Index of the time in the state.
 const TIME: usize = 8;
 
 /// Model of the liquid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Liquid {
-    /// All of it turns with the hub.
+    /// All liquid turns with the hub.
     Frozen,
     /// A mass on a spring.
     Linear,
@@ -50,9 +50,9 @@ pub enum Liquid {
 /// The bearing.
 #[derive(Clone, Copy, Debug)]
 pub struct Bearing {
-    /// Viscous, N·m·s.
+    /// Viscous friction, N·m·s.
     pub b: f64,
-    /// Dry, N·m.
+    /// Dry friction, N·m.
     pub c: f64,
     /// Stribeck's excess, N·m.
     pub d: f64,
@@ -79,7 +79,7 @@ pub struct Bench {
     pub liquid: Liquid,
     /// An appendage on a spring (with the linear liquid): its inertia, kg·m², and its frequency on a hub that is held, Hz.
     pub appendage: Option<(f64, f64)>,
-    /// A torque that no model has, N·m, of time (s), angle and rate.
+    /// A torque that no model has, N·m, as a function of time (s), angle (rad) and rate (rad/s).
     pub besides: fn(f64, f64, f64) -> f64,
 }
 
@@ -162,7 +162,7 @@ pub struct Motion {
     pub slosh: f64,
 }
 
-/// The bench with what follows from it, for one piece of the torque.
+/// The equations of the bench for one piece of the torque.
 struct Equations<'a> {
     bench: &'a Bench,
     /// Inertia that turns with the hub, kg·m².
@@ -254,13 +254,13 @@ impl Equations<'_> {
         Rates { state, driving }
     }
 
-    /// Torque at which a hub at rest breaks away in a direction, N·m.
+    /// Returns the torque at which a hub at rest breaks away in a direction, N·m.
     fn holds(&self, direction: f64) -> f64 {
         let Bearing { c, d, asymmetry, .. } = self.bench.bearing;
         (c + d) * (1.0 + asymmetry * direction.signum())
     }
 
-    /// Contact with which a hub at rest continues.
+    /// Returns the contact with which a hub at rest continues: it sticks or slips.
     fn after_rest(&self, t: f64, y: &State) -> Contact {
         let at_rest = Equations { contact: Contact::Sticks, ..*self };
         let driving = at_rest.rates(t, y).driving;
@@ -339,7 +339,7 @@ fn crossing(a: f64, b: f64, f: &dyn Fn(f64) -> f64) -> f64 {
 }
 
 impl Bench {
-    /// Mass (kg), length (m) and natural frequency (rad/s) of the first mode, and the mass that turns with the hub.
+    /// Returns mass (kg), length (m) and natural frequency (rad/s) of the first mode, and the mass that turns with the hub, kg.
     pub fn mode(&self) -> (f64, f64, f64, f64) {
         let (d, h) = (self.diameter, self.height);
         let liquid = self.density * std::f64::consts::PI / 4.0 * d * d * h;
@@ -352,7 +352,7 @@ impl Bench {
         }
     }
 
-    /// Motion from rest at growing instants `at` (s), the torque's before its first knot being 0.
+    /// Returns the motion from rest at growing instants `at` (s). Before its first knot the torque is 0.
     pub fn motion(&self, drive: &Drive, at: &[f64]) -> Motion {
         let (mass, length, natural, fixed) = self.mode();
         let knots = drive.knots();
@@ -395,7 +395,7 @@ impl Bench {
     }
 }
 
-/// One smooth part of the way from t to `end`, at most to where the contact changes.
+/// Integrates from t to `end`, or to the instant at which the contact changes if it comes first.
 fn advance(now: &mut Equations, t: f64, end: f64, y: State, stops: &mut usize) -> (f64, State) {
     match now.contact {
         Contact::Smooth => (end, now.integrate(t, end, &y)),

@@ -36,9 +36,8 @@ enum Excitation {
     Gentle,
 }
 
-/// A bench with what measures it.
+/// A bench with its sensors and their clock.
 pub struct Twin {
-    /// Number.
     pub seed: u64,
     bench: Bench,
     excitation: Excitation,
@@ -72,7 +71,7 @@ pub struct Measured {
 }
 
 impl Twin {
-    /// The twin of a seed.
+    /// Draws the twin of a seed; its recording lasts `duration` (s).
     pub fn draw(seed: u64, duration: f64) -> Twin {
         let mut random = Random::new(seed, 7);
         let nominal = Bench::default();
@@ -161,14 +160,13 @@ impl Twin {
         (self.seed.is_multiple_of(2)).then_some(self.between)
     }
 
-    /// Slosh models to try: the true one, and of every third twin the other too.
+    /// Returns the slosh models to try: the true model and, for every third twin, a second one.
     pub fn models(&self) -> Vec<String> {
         let own = if self.bench.liquid == Liquid::Linear { "linear" } else { "spherical" };
         let all = ["linear", "spherical"].into_iter();
         all.filter(|name| self.seed.is_multiple_of(3) || *name == own).map(String::from).collect()
     }
 
-    /// Short description.
     pub fn words(&self) -> String {
         format!(
             "{:?} {:?}, {}{}, {} Hz",
@@ -180,7 +178,7 @@ impl Twin {
         )
     }
 
-    /// The truths by the names of the estimates.
+    /// Returns the true values by the names of the estimates.
     pub fn truths(&self) -> Vec<(&'static str, f64)> {
         let Bench { hub_inertia, diameter, height, zeta, bearing, .. } = &self.bench;
         vec![
@@ -200,7 +198,7 @@ impl Twin {
         ]
     }
 
-    /// The torque as a function of time, N·m.
+    /// Returns the torque as a function of time, N·m.
     fn torque(&self) -> Box<dyn Fn(f64) -> f64> {
         let duration = self.duration;
         let profile = |text: String| -> Box<dyn Fn(f64) -> f64> {
@@ -234,24 +232,24 @@ impl Twin {
         }
     }
 
-    /// Records it.
+    /// Records the twin with its sensors.
     pub fn record(&self) -> Recording {
         let rows = self.rows();
         let Measured { torque, rate, angle } = self.measure(&rows, &rows, self.delay);
         Recording { angle, ..Recording::of("twin", self.stamps(&rows), torque, rate) }
     }
 
-    /// Instants of the rows, s.
+    /// Returns the instants of the rows, s.
     pub fn rows(&self) -> Vec<f64> {
         (0..self.drift.len()).map(|k| k as f64 / self.rate).collect()
     }
 
-    /// Times of instants as the recording's clock has them, s.
+    /// Returns the times that the recording's clock shows at these instants, s.
     pub fn stamps(&self, instants: &[f64]) -> Vec<f64> {
         instants.iter().map(|t| self.clock * t).collect()
     }
 
-    /// Reads the sensors at these instants (s) under a torque that is commanded at those of `commands`; the encoder is
+    /// Reads the sensors at `instants` (s) under a torque that is commanded at the instants `commands` (s). The encoder is
     /// `encoder_delay` (s) late.
     pub fn measure(&self, commands: &[f64], instants: &[f64], encoder_delay: f64) -> Measured {
         let torque = self.torque();
@@ -298,7 +296,7 @@ impl Twin {
         output_error::identify(fmu, &parts, &options, &mut |news| hear(news.line()))
     }
 
-    /// The same of a file in which its recording was written.
+    /// Identifies a file in which the twin's recording was written, as a user would.
     pub fn identify_file(
         &self,
         fmu: &Fmu,

@@ -10,7 +10,6 @@ use signals::table::Table;
 
 use crate::draw::{Measured, Twin};
 
-/// The habits.
 pub const HABITS: [&str; 20] = [
     "slow-gyro",
     "ms-33hz",
@@ -37,7 +36,7 @@ pub const HABITS: [&str; 20] = [
 /// A file, and the options with which its user reads it.
 #[derive(Default)]
 pub struct Written {
-    /// Place.
+    /// Path of the file.
     pub path: PathBuf,
     /// Value of `--columns`.
     pub columns: String,
@@ -60,7 +59,7 @@ struct Row {
     angle: Option<f64>,
 }
 
-/// A twin whose measurement has the habit.
+/// Returns a twin whose measurement has the habit.
 pub fn of(mut twin: Twin, habit: &str) -> Twin {
     match habit {
         "ms-33hz" | "us-33hz" => twin = twin.with_rate(33.0),
@@ -71,7 +70,7 @@ pub fn of(mut twin: Twin, habit: &str) -> Twin {
     twin
 }
 
-/// Writes the recording of such a twin to a directory.
+/// Writes the recording of a twin to a directory as a logger with this habit does.
 ///
 /// # Errors
 /// If there is no such habit, or the file cannot be written.
@@ -144,7 +143,7 @@ pub fn write(twin: &Twin, habit: &str, directory: &Path) -> Result<Written> {
     Ok(written)
 }
 
-/// The rows of a log; of a slow torque those of its own clock are among them.
+/// Returns the rows of a log. If the torque has a slow clock of its own, the rows of this clock are among them.
 fn log(twin: &Twin, habit: &str) -> Vec<Row> {
     let mut instants = twin.rows();
     if habit == "uneven" {
@@ -183,7 +182,7 @@ fn log(twin: &Twin, habit: &str) -> Vec<Row> {
     rows
 }
 
-/// The text of a file.
+/// Returns the text of a file.
 fn text(rows: &[Row], habit: &str, encoder: bool) -> Result<String> {
     let mut text = String::new();
     let (separator, head) = match habit {
@@ -243,7 +242,7 @@ fn text(rows: &[Row], habit: &str, encoder: bool) -> Result<String> {
     Ok(text)
 }
 
-/// A number with three decimals and commas between thousands.
+/// Returns a number with three decimals and commas between thousands.
 fn grouped(value: f64) -> String {
     let text = format!("{:.3}", value.abs());
     let (whole, rest) = text.split_once('.').unwrap_or((&text, ""));

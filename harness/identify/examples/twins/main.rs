@@ -25,14 +25,14 @@ use habits::HABITS;
 use host::fmu::Fmu;
 use identify::bench::identification::Identification;
 
-/// Standard deviations beyond which an answer that says "described" is wrong, unless its interval holds the truth all the same: one
-/// that is open says that it does not know.
+/// Standard deviations beyond which an estimate of a described recording counts as wrong, unless its interval holds the truth: an
+/// open interval states that the end is not known.
 const WRONG: f64 = 5.0;
 
 /// Results for one parameter over all twins.
 #[derive(Default)]
 struct Row {
-    /// Error over its standard deviation.
+    /// Errors of the estimates over their standard deviations.
     off: Vec<f64>,
     inside: usize,
 }
@@ -123,7 +123,7 @@ impl Tally {
     }
 }
 
-/// The habit of a name.
+/// Returns the habit with a name.
 fn known(name: &str) -> Result<&'static str> {
     let found = HABITS.into_iter().find(|habit| *habit == name);
     found.with_context(|| format!("{name} is not a habit (allowed: {})", HABITS.join(", ")))

@@ -11,38 +11,37 @@ use crate::input::record::Record;
 use crate::model::simulate::Model;
 use analysis::gauss_markov::Noise;
 
-/// The bound of one unknown.
+/// Cramér–Rao bound of one unknown.
 #[derive(Clone, Debug, Serialize)]
 pub struct Bound {
-    /// Name.
     pub name: String,
     /// Value in the plan.
     pub value: f64,
-    /// The least standard deviation of an unbiased estimate; NaN: none can be made.
+    /// Least standard deviation of an unbiased estimate; NaN if the recordings allow no estimate or the solver's errors decide
+    /// it.
     pub std: f64,
-    /// True if the recordings tell less than the value itself or than was known beforehand.
+    /// True if the recordings determine the unknown hardly better than its prior or, without a prior, not even to within its own
+    /// value.
     pub not_determined: bool,
-    /// True if the errors of the solver decide the bound. Neither bound is known then.
+    /// True if the solver's errors decide the bound; `std` and `std_alone` are then NaN.
     pub decided_by_solver: bool,
     /// Names of the unknowns that the recordings cannot distinguish from this one.
     pub inseparable_from: Vec<String>,
-    /// The same if all others were known.
+    /// Least standard deviation if all other unknowns were known.
     pub std_alone: f64,
-    /// Standard deviation beforehand.
+    /// Standard deviation of the prior; `None` without a prior.
     pub prior: Option<f64>,
-    /// Unit.
     pub unit: String,
-    /// The unknown with which it is most correlated, and how.
+    /// Name of the unknown with which the correlation is largest, and this correlation.
     pub with: Option<(String, f64)>,
-    /// A parameter of the FMU, or one of the sensors.
+    /// True for a parameter or start of the FMU that is estimated; false for errors of sensors and known values.
     pub is_parameter: bool,
 }
 
 /// Predicts the Cramér–Rao bound of each unknown for recordings with these inputs, linearised at the start values. `noise` is the standard
 /// deviation of one sample of each output; tolerances of the question count. `warn` receives the FMU's warnings.
 ///
-/// # Errors
-/// All that is wrong with what is asked; what the FMU refuses.
+/// # Errors If the question has a fault (the message lists all), or the FMU refuses a call.
 pub fn foresee(
     model: &Model,
     question: &Question,

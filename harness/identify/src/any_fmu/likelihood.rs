@@ -12,11 +12,11 @@ use crate::input::question::Question;
 use crate::input::record::Record;
 use crate::model::simulate::Model;
 
-/// −2 ln L but for a constant, priors in it, of each point: values of the unknowns in the order of the result's correlations.
-/// Noise and left-out rows are those of the result, a `result.json`. Infinite outside the bounds, and where the FMU refuses.
+/// Returns the deviance −2 ln L of each point, with the priors and up to a constant. A point has the values of the unknowns in
+/// the order of the result's correlations. The noise and the rows that are left out are taken from `result`, the text of a
+/// `result.json`. The deviance is infinite outside the bounds and where the FMU refuses the values.
 ///
-/// # Errors
-/// If the result is of another question.
+/// # Errors If the result belongs to another question, or a point has another number of values.
 pub fn deviances(
     model: &Model,
     question: &Question,

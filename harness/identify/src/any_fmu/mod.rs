@@ -1,4 +1,4 @@
-//! Identification of any FMU by output error: which values of its parameters and starts make its outputs those of the recordings.
+//! Identification of any FMU by output error: finds the parameters and initial values with which its outputs fit the recordings.
 //!
 //! A [`Question`] names the unknowns, [`Record`]s hold the recordings, and a [`Model`] runs the FMU with its own solver or the
 //! host's ([`host::exchange`]). Together they are a [`system::FmuSystem`], a system of the [`crate::engine`].
@@ -33,39 +33,36 @@ use crate::words::identified::{Identified, Residual};
 use crate::words::verdict::{DOES_NOT_FIT, NO_MINIMUM, NOT_JUDGED, failed};
 use system::{FmuSystem, is_known};
 
-/// Correlation from which on two estimates are named as a pair.
+/// Correlation above which the verdict names two estimates as a pair.
 const PAIR: f64 = 0.98;
-/// Part of the prior's standard deviation that is left where the recordings say nothing.
+/// Ratio of an estimate's standard deviation to its prior's above which the recordings do not determine the estimate.
 const PRIOR_ALONE: f64 = 0.9;
-/// Part of a standard deviation below which the solver's errors are not added: they would make it 0.1 % larger.
+/// Shift by the solver's errors, in standard deviations of the estimate, up to which it is not added to the standard deviation,
+/// because it would make that 0.1 % larger.
 const ADDED: f64 = 0.05;
 /// Standard deviations by which the minimum may lie beyond a bound by chance.
 const PRESSED: f64 = 3.0;
 /// Second difference of an output that counts as a jump: in standard deviations of its noise, and in medians of all.
 const JUMP: (f64, f64) = (8.0, 20.0);
-/// Searches at most, each without the rows next to jumps of the one before.
+/// Largest number of searches. Each leaves out the rows next to the jumps that the search before has shown.
 const TURNS: usize = 4;
 
 /// Results other than the estimates.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Details {
-    /// The outputs of the recordings.
     pub outputs: Vec<Output>,
-    /// Estimates that the recordings do not determine.
     pub not_determined: Vec<String>,
-    /// Sets of estimates that the recordings cannot tell apart.
     pub cannot_tell_apart: Vec<Inseparable>,
     /// Estimates that the errors of the solver decide: they have no interval.
     pub decided_by_solver: Vec<String>,
     /// Shift of each estimate by the errors of the solver, in its unit.
     pub solver_shift: BTreeMap<String, f64>,
-    /// Estimates at a bound.
     pub at_bound: Vec<String>,
-    /// Estimates whose interval is no ± about them.
+    /// Estimates whose likelihood is not a parabola, so that their interval is not the value ± 1.96 standard deviations.
     pub not_quadratic: Vec<String>,
-    /// −2 ln L but for a constant.
+    /// −2 ln L up to a constant.
     pub deviance: f64,
-    /// Starts that were tried.
+    /// Number of starts from which a minimum was searched.
     pub starts: usize,
     /// Distance to the minimum in standard deviations.
     pub decrement: f64,
@@ -73,29 +70,23 @@ pub struct Details {
     pub covariance: Vec<Vec<f64>>,
 }
 
-/// Result of fitting any FMU.
 pub type Identification = Identified<Details>;
 
 /// One output of one recording.
 #[derive(Clone, Debug, Serialize)]
 pub struct Output {
-    /// The recording's name.
     pub recording: String,
-    /// The output's.
     pub name: String,
-    /// Unit.
     pub unit: String,
-    /// Rows with a value.
     pub rows: usize,
-    /// White noise of a row.
+    /// Standard deviation of the white noise in one row, in the output's unit.
     pub noise_white: f64,
     /// Gauss–Markov bias: standard deviation and correlation time, s.
     pub drift: Option<(f64, f64)>,
-    /// 100 (1 − |y − ŷ|/|y − mean y|), %.
+    /// Fit of the simulated ŷ to the measured y, %: 100 (1 − ‖y − ŷ‖/‖y − mean y‖).
     pub fit_percent: f64,
-    /// Tests of the residual.
     pub tests: Tests,
-    /// Mean over the mean's standard deviation.
+    /// Mean of the whitened residual over the standard deviation of this mean.
     pub mean: f64,
 }
 
@@ -106,10 +97,9 @@ impl Output {
     }
 }
 
-/// Identifies.
+/// Fits the question's unknowns to the recordings. `news` receives the progress.
 ///
-/// # Errors
-/// All that is wrong with what is asked; what the FMU refuses.
+/// # Errors If the question has a fault (the message lists all), a recording cannot be used, or the FMU refuses a call.
 pub fn identify(
     model: &Model,
     question: &Question,
@@ -183,7 +173,8 @@ fn leave_out_jumps(
     count
 }
 
-/// Advice on how to make the solver's errors smaller.
+/// Returns advice on how to make the solver's errors smaller. `heeds_tolerance` is true if a finer tolerance changes the FMU's
+/// outputs.
 fn remedy(system: &FmuSystem, heeds_tolerance: bool) -> String {
     let finer = "a smaller tolerance, --solver own:TOLERANCE, makes them smaller";
     match system.model {
@@ -224,7 +215,8 @@ struct Numbers {
     intervals: Vec<Interval>,
     inseparable: Vec<Inseparable>,
     decided: Vec<bool>,
-    /// Unknowns at a bound, and those of them that want to go further by more than chance.
+    /// Indices of unknowns at a bound, and of those among them whose minimum lies beyond the bound by more than [`PRESSED`]
+    /// standard deviations.
     held: Vec<usize>,
     pressed: Vec<usize>,
     solver: SolverError,
@@ -361,7 +353,7 @@ fn outputs(system: &FmuSystem, solution: &Solution, question: &Question) -> Vec<
     fit.problem.signals.iter().enumerate().map(one).collect()
 }
 
-/// JSON knows no infinity.
+/// Returns NaN for an infinite value, because JSON has no infinity.
 fn finite(value: f64) -> f64 {
     if value.is_finite() { value } else { f64::NAN }
 }
@@ -519,7 +511,7 @@ fn conclude(
     Ok(found)
 }
 
-/// A known value with its tolerance in words.
+/// Returns the name of known value `j` with its tolerance in words, for example `tank.r 0.40 %`.
 fn size(system: &FmuSystem, unknowns: &[Unknown], j: usize) -> String {
     let Unknown { name, unit, prior, .. } = &unknowns[j];
     let (mean, std) = prior.unwrap_or_default();
@@ -533,7 +525,7 @@ fn size(system: &FmuSystem, unknowns: &[Unknown], j: usize) -> String {
 /// Sentence about intervals of a fit without tolerances.
 const NOISE_ALONE: &str = "The intervals include noise alone: settings, inputs and the clock count as exact. --tolerance states how sure they are.";
 
-/// Writes remarks about one estimate.
+/// Adds the sentences about one estimate to `words`, and its name to the lists of `details` in which it belongs.
 fn say(
     unknown: &Unknown,
     e: &Estimated,
@@ -615,7 +607,7 @@ fn fit_in_words(outputs: &[Output]) -> String {
     )
 }
 
-/// Lines for a terminal, below the table of estimates.
+/// Returns the lines that a terminal shows below the table of estimates: noise, fit and worst test of each output.
 pub fn lines(found: &Identification) -> Vec<String> {
     let mut lines = vec![format!(
         "{:24} {:>8} {:>12} {:>8} {:>10}",
@@ -639,7 +631,7 @@ pub fn lines(found: &Identification) -> Vec<String> {
     lines
 }
 
-/// The page, in HTML.
+/// Returns the page in HTML.
 pub fn page(found: &Identification) -> String {
     page::write(found)
 }

@@ -7,7 +7,6 @@ use super::Identification;
 use crate::estimate::prose;
 use crate::words::page::{self, Sections};
 
-/// The page.
 pub fn write(found: &Identification) -> String {
     let outputs = found.details.outputs.iter().map(|o| {
         vec![

@@ -13,10 +13,9 @@ use crate::model::unknown::Target;
 
 /// Least noise that is assumed before there is a residual, relative to an output's spread: recordings from a simulation have none.
 const LEAST_NOISE: f64 = 1e-3;
-/// Drift that is expected of an output of any kind: next to nothing is known.
+/// Expected drift of an output of unknown kind. Its width is large because next to nothing is known of the sensor.
 const DRIFT: Drift = Drift { size: 0.3, time: 30.0, width: 3.0 };
 
-/// The FMU with recordings.
 pub struct FmuSystem<'a> {
     pub model: &'a Model,
     pub setup: Setup,
@@ -26,10 +25,9 @@ pub struct FmuSystem<'a> {
 }
 
 impl<'a> FmuSystem<'a> {
-    /// Returns the system of a question, and its unknowns.
+    /// Returns the system for a question, and the unknowns in the order of its targets.
     ///
-    /// # Errors
-    /// All that is wrong with what is asked.
+    /// # Errors If the question has a fault; the message lists all.
     pub fn new(
         model: &'a Model,
         question: &Question,
@@ -48,7 +46,6 @@ impl<'a> FmuSystem<'a> {
         matches!(self.targets[j].0, Target::Parameter(_))
     }
 
-    /// The engine's problem.
     pub fn problem(&self, unknowns: Vec<Unknown>, question: &Question) -> Problem<'_> {
         let mut signals = Vec::new();
         for (recording, record) in self.records.iter().enumerate() {
@@ -83,7 +80,7 @@ impl<'a> FmuSystem<'a> {
         }
     }
 
-    /// The FMU's warnings of the motions that begin at the starts, each once.
+    /// Returns the FMU's warnings at the start values of the unknowns, each once.
     ///
     /// # Errors
     /// If an unknown has no effect in any recording because of another parameter.
@@ -117,7 +114,8 @@ impl<'a> FmuSystem<'a> {
         Ok(once)
     }
 
-    /// Uses the same system with smaller errors of the solver ([`Setup::finer`]): first with a finer tolerance.
+    /// Calls `use_them` with copies of this system whose solver has smaller errors ([`Setup::finer`]); the first copy has a finer
+    /// tolerance.
     pub fn with_finer<T>(&self, use_them: impl FnOnce(&[&dyn System]) -> T) -> T {
         let finer = self.setup.finer(self.model);
         let mut systems: Vec<FmuSystem> = Vec::new();
@@ -143,7 +141,7 @@ impl<'a> FmuSystem<'a> {
         .collect()
     }
 
-    /// The recording's first rows with inputs and times as they act.
+    /// Returns the first `rows` rows of a recording with the errors of the inputs' scales and of the clock taken out.
     fn acting(&self, values: &[f64], recording: usize, rows: usize) -> Cow<'_, Record> {
         let whole = &self.records[recording];
         let mut record = match rows < whole.time.len() {

@@ -29,12 +29,12 @@ use crate::words::combination::Combination;
 use crate::words::identified::{Identified, Residual};
 use crate::words::page::RATE;
 
-/// Fit of a rate below which a minimum is taken for a wrong one, %.
+/// Fit of the rates below which a minimum counts as a wrong one, %.
 const POOR_FIT: f64 = 90.0;
-/// Standard deviation of a known value over its tolerance below which the recordings show it.
+/// Ratio of a known value's standard deviation after the fit to its tolerance, below which the recordings show the value.
 const SHOWN: f64 = 0.7;
 
-/// Fit of the rates, %: 100 (1 − |y − ŷ|/|y − mean y|).
+/// Returns the fit of the simulated rates ŷ to the measured rates y, %: 100 (1 − ‖y − ŷ‖/‖y − mean y‖).
 fn fit_pct(recordings: &[Recording], motion: &[Motion], solution: &Solution) -> f64 {
     let residuals = solution.fit.residuals(&solution.minimum.point.z, motion);
     let (mut left, mut all) = (0.0, 0.0);
@@ -49,7 +49,7 @@ fn fit_pct(recordings: &[Recording], motion: &[Motion], solution: &Solution) -> 
     100.0 * (1.0 - (left / all).sqrt())
 }
 
-/// One model's fit in numbers.
+/// Returns the numbers that describe the fit of one slosh model with one friction law.
 pub fn summary(system: &BenchSystem, solution: &Solution, (model, law): (&str, &str)) -> ModelFit {
     let fit = &solution.fit;
     let point = &solution.minimum.point;
@@ -77,7 +77,7 @@ pub fn summary(system: &BenchSystem, solution: &Solution, (model, law): (&str, &
     }
 }
 
-/// Fit of recordings that are simulated with a result, and not fitted, %.
+/// Returns the fit, %, of each recording of `validation`, which is simulated with the solution's values and was not fitted.
 ///
 /// # Errors
 /// If the FMU refuses to run.
@@ -111,18 +111,15 @@ pub fn validate(
     validation.iter().map(one).collect()
 }
 
-/// A model that was fitted, with what it is.
+/// A fitted model.
 pub struct Fitted<'p> {
-    /// The bench's system.
     pub system: &'p BenchSystem<'p>,
-    /// End of the search.
     pub solution: Solution<'p>,
-    /// The fit in numbers.
     pub fit: ModelFit,
 }
 
-/// Concludes the identification from the chosen model; `near` are others that explain the recordings about as well, with the probability of each and
-/// that of the chosen one.
+/// Concludes the identification from the chosen model `best`. `near` has the probability of the chosen model and, with their
+/// probabilities, the other models that explain the recordings about as well; their draws widen the intervals.
 ///
 /// # Errors
 /// If the FMU refuses a run at the minimum.
@@ -216,7 +213,7 @@ pub fn conclude(
     })
 }
 
-/// An estimate from its draws.
+/// Returns estimate `k` from its draws, `full` with the tolerances of known values and `own` without.
 fn estimated(
     system: &BenchSystem,
     solution: &Solution,
@@ -392,8 +389,8 @@ fn shares<'a>(
     tolerance::shares(&known, &all)
 }
 
-/// Returns a warning if the fit leaves the range of linear slosh: the wave at the wall, 2 α R/(ξ² − 1), relative to the radius R
-/// of an upright cylinder.
+/// Returns a warning if the fit leaves the range of linear slosh. The measure is the wave's height at the wall of an upright
+/// cylinder relative to its radius, 2 α/(ξ² − 1), with the slosh angle α and the first zero ξ = 1.841 of J₁'.
 fn regime(model: &str, angle: f64) -> Option<String> {
     let wave = 2.0 * angle / (XI[0] * XI[0] - 1.0);
     let (is, advice) = match Regime::from_ratio(wave) {
@@ -411,7 +408,8 @@ fn regime(model: &str, angle: f64) -> Option<String> {
     })
 }
 
-/// Known values of which the recordings tell more than was known: they are estimated within their tolerances. Returns a sentence on each.
+/// Adds the known values that the recordings determine better than their tolerances to `parameters`, as estimates within these
+/// tolerances. Returns a sentence on each.
 fn shown(
     system: &BenchSystem,
     solution: &Solution,
@@ -451,7 +449,7 @@ fn shown(
     sentences
 }
 
-/// Condition number of the sensitivities, with columns of unit length.
+/// Returns the condition number of the sensitivities, with columns of unit length; NaN if they are not finite.
 fn condition(solution: &Solution) -> f64 {
     let Some(found) = &solution.minimum.derivatives else { return f64::NAN };
     let picked = found.matrix.select_columns(&places(&solution.fit.free));

@@ -10,16 +10,17 @@ pub struct FrictionPoint {
     pub rate: f64,
     /// Mean friction torque, N·m; positive if it brakes a positive rate.
     pub torque: f64,
-    /// Number of rows.
     pub rows: usize,
 }
 
-/// Deceleration over the hub's angle: β_0 + Σ β_h^s sin hθ + β_h^c cos hθ of one direction, where no torque acts (thesis 5.4).
+/// Deceleration of the hub without torque in one direction, over its angle θ: β_0 + Σ β_h^s sin hθ + β_h^c cos hθ with the
+/// harmonics h (thesis 5.4).
 #[derive(Clone, Debug, Serialize)]
 pub struct Braking {
     /// `counter-clockwise` (forwards) or `clockwise`.
     pub direction: &'static str,
-    /// Speed to which the fit belongs, rad/s: the mean of both directions. A parabola takes the dependence on the speed.
+    /// Speed to which the coefficients belong, rad/s: the mean over both directions. The dependence of the deceleration on the
+    /// speed is fitted as a parabola.
     pub speed: f64,
     /// β_0, then β_1^c, β_1^s, β_2^c, …, rad/s².
     pub coefficients: Vec<f64>,
@@ -29,7 +30,6 @@ pub struct Braking {
     pub rmse: f64,
     /// Share of the acceleration's variance that the fit explains.
     pub r_squared: f64,
-    /// Number of rows.
     pub rows: usize,
     /// Number of stretches of these rows: parts of one decay within one revolution of the hub.
     pub stretches: usize,
@@ -41,7 +41,7 @@ pub struct Braking {
     pub(crate) covariance: Option<DMatrix<f64>>,
 }
 
-/// Regressors of [`Braking`] at an angle: 1, then cos hθ and sin hθ of each harmonic.
+/// Returns the regressors of [`Braking`] at an angle θ: 1, then cos hθ and sin hθ of each harmonic h.
 pub(crate) fn harmonics_at(angle: f64, harmonics: usize) -> Vec<f64> {
     let each = (1..=harmonics).flat_map(|h| {
         let (sin, cos) = (angle * h as f64).sin_cos();
@@ -51,11 +51,10 @@ pub(crate) fn harmonics_at(angle: f64, harmonics: usize) -> Vec<f64> {
 }
 
 impl Braking {
-    /// Returns the half-width of the fit's simultaneous 95 % band at an angle, rad/s²: with this probability the whole curve
-    /// lies in the band. The residuals of one stretch count as one value, because deceleration also depends on the rate,
-    /// which changes slowly within a stretch. `None` if there are too few
-    /// stretches. Liang and Zeger, Biometrika 73 (1986) 13,
-    /// with Scheffé's factor.
+    /// Returns the half-width of the fit's simultaneous 95 % band at an angle, rad/s²: with a probability of 95 % the whole curve
+    /// lies in the band. The residuals of one stretch count as one value, because deceleration also depends on the rate, which
+    /// changes slowly within a stretch. `None` if there are too few stretches. Liang and Zeger, Biometrika 73 (1986) 13, with
+    /// Scheffé's factor.
     pub fn half_width(&self, angle: f64) -> Option<f64> {
         /// 95 % quantile of χ² with five degrees of freedom.
         const CHI_SQUARE: f64 = 11.070;

@@ -10,12 +10,13 @@ pub fn least() -> f64 {
     BEGINS.0 - BEGINS.1
 }
 
-/// Steepness k a of an upright cylinder's first mode at a slosh angle, rad (SloshTank's rule for all tanks).
+/// Returns the steepness k a, wave number times amplitude, of an upright cylinder's first mode at a slosh angle, rad (SloshTank
+/// uses it for all tanks).
 pub fn steepness(angle: f64) -> f64 {
     2.0 * XI[0] / (XI[0] * XI[0] - 1.0) * angle
 }
 
-/// The words about waves that do not break up to a slosh angle, rad.
+/// Returns the clause of the verdict that no wave breaks up to this slosh angle, rad.
 pub fn never(angle: f64) -> String {
     format!(
         "the record never breaks: its steepness k a reaches {:.2} ({:.1}°), and waves break from {:.2} on",

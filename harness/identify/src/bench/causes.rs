@@ -7,21 +7,19 @@ use super::system::{BESIDES, BenchSystem, Target};
 use crate::engine::cause::Effect;
 use crate::estimate::prose;
 
-/// Cause of a misfit.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Cause {
     /// Effect that acts, in words.
     pub effect: String,
     /// Flags of `hubslosh identify` that fit it.
     pub flags: String,
-    /// Estimate of its size: name, value and unit.
+    /// Size of the effect, if it has one number: name, value and unit.
     pub size: Option<(String, f64, String)>,
-    /// Decrease of −2 ln L.
+    /// Decrease of −2 ln L by the effect.
     pub gain: f64,
 }
 
 impl Cause {
-    /// Returns the cause in words.
     pub fn words(&self) -> String {
         let size = self.size.as_ref().map_or(String::new(), |(name, value, unit)| {
             let unit = if unit == "1" { String::new() } else { format!(" {}", prose(unit)) };
@@ -37,20 +35,17 @@ impl Cause {
 /// A torque k φ that the model lacks.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Missing {
-    /// Meaning of φ.
+    /// Quantity φ, in words.
     pub follows: String,
-    /// k.
+    /// Factor k; `std` is its standard deviation, in the same `unit`.
     pub factor: f64,
-    /// Standard deviation of k.
     pub std: f64,
-    /// Unit of k.
     pub unit: String,
-    /// k over its standard deviation, without its sign.
+    /// |k| over its standard deviation.
     pub deviations: f64,
 }
 
 impl Missing {
-    /// Returns the result in words.
     pub fn words(&self) -> String {
         format!(
             "a torque that follows {} is missing, {:.2e} ± {:.1e} {} ({:.0} σ)",
@@ -63,7 +58,6 @@ impl Missing {
     }
 }
 
-/// Returns an effect in words.
 pub fn words(target: &Target) -> String {
     match target {
         Target::ActuatorLag => "an actuator that lags its command",
@@ -87,7 +81,7 @@ pub fn words(target: &Target) -> String {
     .into()
 }
 
-/// The cause that an effect is; `None` if it is a torque, which no option estimates.
+/// Returns the effect as a cause, with the flags that estimate it; `None` if it is a torque, because no option estimates one.
 pub fn cause(system: &BenchSystem, effect: &Effect) -> Option<Cause> {
     let target = &system.targets[effect.unknown];
     let value = effect.size.0;
@@ -118,7 +112,7 @@ pub fn cause(system: &BenchSystem, effect: &Effect) -> Option<Cause> {
     Some(Cause { effect: words(target), flags, size, gain: effect.gain })
 }
 
-/// The torque that an effect is.
+/// Returns the effect as a missing torque; `None` if it is no torque that follows the motion.
 pub fn missing(system: &BenchSystem, effect: &Effect) -> Option<Missing> {
     let Target::Besides(kind) = &system.targets[effect.unknown] else { return None };
     let one = BESIDES.get(*kind)?;

@@ -7,15 +7,15 @@ use crate::engine::VAGUE;
 use crate::engine::draws::Derived;
 use crate::words::combination::Combination;
 
-/// Correlation above which two unknowns count as determined only if each is precise by itself.
+/// Correlation, without its sign, above which two vague unknowns count as a sum of which only the total is known.
 const ALIKE: f64 = 0.99;
 /// Standard deviation of the friction's asymmetry above which the recordings do not show it.
 pub const ONE_WAY: f64 = 0.25;
-/// Part of a hub's path against its main direction above which it turns both ways.
+/// Ratio of a hub's path against its main direction to its path along it, above which the hub turns both ways.
 const BOTH_WAYS: f64 = 0.05;
 
-/// Returns the direction of a hub that turns one way alone (1: counter-clockwise, −1: clockwise), from its rates. `None` if it rests,
-/// or if more than [`BOTH_WAYS`] of its path leads the other way.
+/// Returns the direction of a hub that turns only one way (1: counter-clockwise, −1: clockwise), from its rates. `None` if it
+/// rests, or if more than [`BOTH_WAYS`] of its path leads the other way.
 pub fn way(rates: impl Iterator<Item = f64>) -> Option<f64> {
     let (mut forwards, mut backwards) = (0.0, 0.0);
     rates.for_each(|rate| *if rate < 0.0 { &mut backwards } else { &mut forwards } += rate.abs());
@@ -24,7 +24,8 @@ pub fn way(rates: impl Iterator<Item = f64>) -> Option<f64> {
     (along > 0.0 && against <= BOTH_WAYS * along).then_some(way)
 }
 
-/// The combinations that draws show. Of a hub that turns one `way`, c (1 ± asymmetry) and d (1 ± asymmetry).
+/// Returns the combinations that the draws determine although they do not determine the two unknowns: c (1 ± asymmetry) and d (1
+/// ± asymmetry) of the dry friction if the hub turns one `way`, otherwise c + d.
 pub fn combinations(draws: &Derived, way: Option<f64>) -> Vec<Combination> {
     let place = |name: &str| draws.place(name);
     let mut found = Vec::new();

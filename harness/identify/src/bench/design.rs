@@ -26,8 +26,8 @@ use names::hubslosh::{FrictionModel, SloshModel, slosh};
 /// A random-phase odd multisine with detection lines (Pintelon and Schoukens, System Identification,
 /// chapter 4): Σ a_k sin(2π k f_0 t + φ_k) over odd k, one of each group of [`LINE_GROUP`] left out at random.
 ///
-/// What the response shows at a left-out odd line is odd nonlinear distortion, at even lines even
-/// distortion; between lines (in records of several periods) it is noise.
+/// In the response, power at an odd line that was left out is odd nonlinear distortion, power at even lines is even distortion,
+/// and power between lines (in records of several periods) is noise.
 #[derive(Clone, Debug)]
 pub struct Multisine {
     /// Length of a period, s; lines are 1/period apart.
@@ -36,14 +36,14 @@ pub struct Multisine {
     pub lines: Vec<u32>,
     /// Odd lines of the band without power.
     pub detection: Vec<u32>,
-    /// a_k, N·m.
+    /// Amplitudes a_k, N·m.
     amplitudes: Vec<f64>,
     phases: Vec<f64>,
 }
 
 impl Multisine {
-    /// Lines between two frequencies (Hz), the largest torque being `peak` (N·m). The phases with the
-    /// smallest crest factor of 20 draws are taken.
+    /// Creates a multisine with lines between two frequencies (Hz) and the largest torque `peak` (N·m). Phases are drawn 20 times
+    /// and those with the smallest crest factor are kept, because they have the most power at this peak.
     pub fn new(period: f64, band: (f64, f64), peak: f64, seed: u64) -> Result<Self> {
         let odd = odd_lines(period, band, peak)?;
         let mut random = Random::new(seed, 0);
@@ -60,13 +60,13 @@ impl Multisine {
         Ok(flat.drawn(peak, &mut random))
     }
 
-    /// The same lines with these shares of the power and new phases.
+    /// Returns a multisine with the same lines, these shares of the power, and phases that are drawn anew.
     pub fn shaped(&self, shares: &[f64], peak: f64, seed: u64) -> Self {
         let amplitudes = shares.iter().map(|p| p.sqrt()).collect();
         Multisine { amplitudes, ..self.clone() }.drawn(peak, &mut Random::new(seed, 1))
     }
 
-    /// The phases with the smallest crest factor of 20 draws, and the largest torque `peak`.
+    /// Draws phases 20 times, keeps those with the smallest crest factor, and scales the largest torque to `peak` (N·m).
     fn drawn(self, peak: f64, random: &mut Random) -> Self {
         let mut best: Option<(f64, Self)> = None;
         for _ in 0..20 {
@@ -83,7 +83,7 @@ impl Multisine {
         one.scaled(peak / largest)
     }
 
-    /// The same with all torques times a factor.
+    /// Returns the multisine with all torques multiplied by a factor.
     pub fn scaled(&self, factor: f64) -> Self {
         let amplitudes = self.amplitudes.iter().map(|a| a * factor).collect();
         Multisine { amplitudes, ..self.clone() }
@@ -102,7 +102,7 @@ impl Multisine {
     }
 }
 
-/// Checks the work of `rows` values of a multisine, before its phases are drawn, which takes seconds where it has too many lines.
+/// Refuses a multisine with too many lines for `rows` values, before its phases are drawn: the drawing alone would take seconds.
 ///
 /// # Errors
 /// If it is too much work, or [`Multisine::new`] refuses the band, the period or the peak.
@@ -202,7 +202,8 @@ pub struct Wheel {
 }
 
 impl Wheel {
-    /// The wheel's least and largest speed under a torque on the hub, rad/s: I_w W' = −τ.
+    /// Returns the wheel's least and largest speed, rad/s, under a torque τ on the hub. The speed W follows I_w W' = −τ with the
+    /// wheel's inertia I_w.
     pub fn range(&self, time: &[f64], torque: &[f64]) -> (f64, f64) {
         let mut speed = self.speeds[0];
         let (mut least, mut largest) = (speed, speed);
@@ -213,7 +214,7 @@ impl Wheel {
         (least, largest)
     }
 
-    /// The largest factor (at most 1) by which a torque can be multiplied within the limits.
+    /// Returns the largest factor (at most 1) by which a torque can be multiplied within the wheel's limits.
     pub fn factor(&self, time: &[f64], torque: &[f64]) -> f64 {
         let (least, largest) = self.range(time, torque);
         let [start, low, high] = self.speeds;
@@ -228,14 +229,14 @@ impl Wheel {
     }
 }
 
-/// Largest angle of the liquid's first mode under a torque from rest, rad.
+/// Returns the largest angle of the liquid's first mode under a torque that begins at rest, rad.
 pub fn slosh_angle(fmu: &Fmu, setup: &Setup, time: &[f64], torque: &[f64]) -> Result<f64> {
     let rate = vec![0.0; time.len()];
     let recording = Recording::of("plan", time.to_vec(), torque.to_vec(), rate);
     Ok(peak(&setup.run(fmu, &[], &recording, 0.0)?.slosh_angle))
 }
 
-/// The largest factor (at most 1) by which a torque can be multiplied so that the liquid stays within an angle, rad.
+/// Returns the largest factor (at most 1) by which a torque can be multiplied so that the liquid stays within `limit`, rad.
 pub fn within_angle(
     fmu: &Fmu,
     setup: &Setup,
@@ -265,16 +266,17 @@ pub fn within_angle(
     Ok(within)
 }
 
-/// Geometric mean of the relative standard deviations: what one plan tells against another. An unknown that is expected to be 0,
-/// a delay or a bias, has no relative deviation and does not count.
+/// Returns the geometric mean of the relative standard deviations, by which plans are compared: the smaller, the more a plan
+/// tells. An unknown that is expected to be 0, such as a delay or a bias, has no relative deviation and does not count.
 pub fn merit(bounds: &[(String, f64, f64)]) -> f64 {
     let relative = bounds.iter().filter(|(_, value, _)| *value != 0.0);
     let logarithms: Vec<f64> = relative.map(|(_, value, std)| (std / value.abs()).ln()).collect();
     analysis::statistics::mean(&logarithms).exp()
 }
 
-/// Standard deviations that the engine would state for each unknown at its start, from a torque and a gyro's noise: the Cramér–Rao
-/// bound, with the engine's weak priors. `sensor_errors`: delay, bias and asymmetry are unknown too.
+/// Returns name, expected value and Cramér–Rao bound of each unknown for a planned torque and the noise of a gyro. The bound is
+/// the standard deviation that the engine would state at the start, with its weak priors. With `sensor_errors`, delay, gyro bias
+/// and asymmetry of the friction are unknown as well.
 ///
 /// # Errors
 /// If the hub does not turn, some combination of the unknowns has no influence on its rate, or the FMU refuses to run.

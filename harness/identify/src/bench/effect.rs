@@ -9,7 +9,7 @@
 
 use crate::tuning::LAG_PARTS;
 
-/// The effects; 0: there is none.
+/// Sizes of the effects; an effect of size 0 is absent.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Effects<'a> {
     /// Torque on the hub besides the recorded one at the recording's rows, N·m.
@@ -22,14 +22,16 @@ pub struct Effects<'a> {
     pub friction_drift: f64,
 }
 
-/// Output of a first-order lag at the end of a step h, from y at its beginning, under the line from a with slope b.
+/// Returns the output of a first-order lag (s) at the end of a step `h` (s). At the beginning of the step the output is `y` and
+/// the input is a; the input follows a line with slope b.
 fn lagged(y: f64, (a, b): (f64, f64), h: f64, lag: f64) -> f64 {
     let settled = a - b * lag;
     settled + b * h + (y - settled) * (-h / lag).exp()
 }
 
-/// The torque of an actuator with this lag (s), at the knots of its command and between them. Lines join it. The command is `held`
-/// from knot to knot, or a line. The actuator starts at the first command.
+/// Returns times and values of the torque of an actuator with this lag (s), at the knots of its command and between them, so
+/// close that lines can join the values. The command is `held` from knot to knot, or joined by lines. At the first knot the
+/// actuator has settled at the first command.
 pub fn of_actuator(lag: f64, knots: &[f64], torque: &[f64], held: bool) -> (Vec<f64>, Vec<f64>) {
     let (mut time, mut values) = (vec![knots[0]], vec![torque[0]]);
     let mut y = torque[0];

@@ -10,7 +10,6 @@ use crate::words::combination::Combination;
 use crate::words::identified::Identified;
 use analysis::innovations::Tests;
 
-/// One model's fit.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct ModelFit {
     /// slosh.model.
@@ -21,19 +20,18 @@ pub struct ModelFit {
     pub deviance: f64,
     /// Bayesian information criterion; the smallest is the best.
     pub bic: f64,
-    /// Fit in the time domain, %: 100 (1 − |y − ŷ|/|y − mean y|).
+    /// Fit of the simulated rates ŷ to the measured rates y, %: 100 (1 − ‖y − ŷ‖/‖y − mean y‖).
     pub fit_pct: f64,
-    /// The search ended at a minimum.
     pub converged: bool,
     /// Distance to the minimum in standard deviations.
     pub newton_decrement: f64,
-    /// Residual tests, for each recording.
+    /// Tests of the residual of each signal.
     pub tests: Vec<Tests>,
     /// Fit of the recordings held back, %.
     pub validation_pct: Vec<f64>,
-    /// The gyro's noise: white, rad/s.
+    /// Standard deviation of the gyro's white noise, rad/s.
     pub noise_white: f64,
-    /// Simulations that were needed, of all recordings; those of a part of them count as that part.
+    /// Number of simulations of all recordings. A simulation of a part of the rows counts as this part.
     pub simulations: f64,
     /// True if neither noise nor a small effect explains the residual.
     #[serde(skip)]
@@ -41,7 +39,6 @@ pub struct ModelFit {
 }
 
 impl ModelFit {
-    /// Description in one line.
     pub fn line(&self) -> String {
         format!(
             "{} with {} friction: fit {:.3} %, BIC {:.1}, worst residual test {:.1} standard deviations, {:.0} \
@@ -59,21 +56,21 @@ impl ModelFit {
 /// Results that only the output-error method has.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Details {
-    /// The chosen model's fit.
     pub fit: ModelFit,
     /// Sums that are determined although their terms are not.
     pub combinations: Vec<Combination>,
     /// Condition number of the sensitivities.
     pub condition: f64,
-    /// A torque that the model lacks, if noise is left with it and its rivals lose.
+    /// Torque that the model lacks. It is named only if it leaves noise as residual, and no other effect explains the recordings
+    /// as well.
     pub missing: Vec<Missing>,
-    /// The cause of a misfit, if noise is left with it and its rivals lose.
+    /// Cause of a misfit. It is named only if it leaves noise as residual, and no other effect explains the recordings as well.
     pub cause: Option<Cause>,
     /// All models that were tried, the chosen one first.
     pub models: Vec<ModelFit>,
     /// Estimates from the frequency response.
     pub frequency_response: Option<Response>,
-    /// Starts from the data.
+    /// First start of the search that was computed from the recordings.
     pub start: Option<Start>,
     /// Braking over the angle in free decay, counter-clockwise and clockwise, of friction runs.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -87,5 +84,4 @@ pub struct Details {
     pub seconds: f64,
 }
 
-/// The estimates, with those details.
 pub type Identification = Identified<Details>;

@@ -41,7 +41,7 @@ pub struct Start {
 }
 
 impl Start {
-    /// The same with the first mode of its tank.
+    /// Returns the start with length, mass ratio and inertia of the first mode in its tank.
     pub fn with_modes(self, bench: Bench) -> Self {
         let liquid = bench.liquid(self.d, self.h);
         let mode = pendulum(0, self.d, self.h, liquid);
@@ -50,7 +50,6 @@ impl Start {
         Start { length: mode.length, mass_ratio, inertia, ..self }
     }
 
-    /// Description in one line.
     pub fn line(&self) -> String {
         format!(
             "d {:.4} m, h {:.4} m, damping ratio {:.4}, hub.I {:.4} kg·m²",
@@ -64,7 +63,6 @@ impl Start {
 pub struct Nominal {
     /// Values that recordings of torque and rate do not show.
     pub bench: Bench,
-    /// Parameters.
     pub start: Start,
     /// Inertia of hub and liquid, kg·m².
     pub inertia: f64,
@@ -72,7 +70,7 @@ pub struct Nominal {
     pub period: f64,
 }
 
-/// The FMU with settings, initialised.
+/// Returns an instance of the FMU that is initialised with settings. It refuses a name that is neither a parameter nor an input.
 pub fn initialised<'fmu>(fmu: &'fmu Fmu, settings: &[(String, String)]) -> Result<Instance<'fmu>> {
     let mut instance = rest::instantiate(fmu, "identify")?;
     for (name, value) in settings {
@@ -88,7 +86,7 @@ pub fn initialised<'fmu>(fmu: &'fmu Fmu, settings: &[(String, String)]) -> Resul
     Ok(instance)
 }
 
-/// The FMU's warnings of a motion that begins with these settings.
+/// Returns the FMU's warnings when a motion begins with these settings.
 pub fn warnings(fmu: &Fmu, settings: &[(String, String)]) -> Result<Vec<String>> {
     let mut instance = initialised(fmu, settings)?;
     instance.exit_initialization_mode()?;
@@ -100,8 +98,8 @@ pub fn states_liquid(settings: &[(String, String)]) -> bool {
     settings.iter().any(|(name, _)| [tank::H, fluid::RHO].contains(&name.as_str()))
 }
 
-/// Settings in which a damping ratio counts: `slosh.zeta` turns `slosh.zeta_from_correlation` off, unless the settings say what
-/// that is.
+/// Adds `slosh.zeta_from_correlation = false` to settings that have `slosh.zeta`, because the damping ratio has no effect
+/// otherwise. Settings that have `slosh.zeta_from_correlation` stay as they are.
 pub fn with_damping(mut settings: Vec<(String, String)>) -> Vec<(String, String)> {
     const CORRELATION: &str = slosh::ZETA_FROM_CORRELATION;
     let has = |name: &str| settings.iter().any(|(n, _)| n == name);
@@ -112,24 +110,24 @@ pub fn with_damping(mut settings: Vec<(String, String)>) -> Vec<(String, String)
 }
 
 impl Bench {
-    /// Mass of the liquid in an upright cylinder, kg.
+    /// Returns the mass of the liquid in an upright cylinder, kg.
     pub fn liquid(self, d: f64, h: f64) -> f64 {
         self.density * std::f64::consts::PI / 4.0 * d * d * h
     }
 
-    /// Mass of the first mode in an upright cylinder, kg.
+    /// Returns the mass of the first mode in an upright cylinder, kg.
     pub fn slosh_mass(self, d: f64, h: f64) -> f64 {
         pendulum(0, d, h, self.liquid(d, h)).mass
     }
 
-    /// Moment of inertia about the hub's axis of a mass (kg) in the tank that turns with the hub, kg·m².
+    /// Returns the moment of inertia about the hub's axis, kg·m², of a mass (kg) in the tank that turns with the hub.
     pub fn inertia(self, mass: f64) -> f64 {
         mass * self.arm.powi(2)
     }
 }
 
 impl Nominal {
-    /// Nominal bench of the FMU with settings, and with the `expected` values of estimated parameters.
+    /// Reads the nominal bench from the FMU with these settings and the `expected` values of estimated parameters.
     pub fn of(
         fmu: &Fmu,
         settings: &[(String, String)],
@@ -157,7 +155,7 @@ impl Nominal {
         Ok(Nominal { bench, start, inertia, period: 1.0 / real(&slosh::FREQUENCY.element([1]))? })
     }
 
-    /// Longest mean time between rows with which this bench can be identified, s: a few rows a period.
+    /// Returns the longest mean time between rows with which this bench can be identified, s: five rows in a period of the slosh.
     pub fn coarsest(&self) -> f64 {
         (self.period / 5.0).max(COARSEST)
     }

@@ -22,15 +22,15 @@ pub struct Options {
     pub settings: Vec<(String, String)>,
     /// Priors of estimated parameters: name, mean and standard deviation.
     pub known: Vec<(String, f64, f64)>,
-    /// Starts in place of those from the data, by FMU name.
+    /// Start values that replace the values computed from the recordings, by FMU name.
     pub starts: Vec<(String, f64)>,
     /// True to estimate delay, gyro bias and friction asymmetry as well.
     pub sensor_errors: bool,
-    /// Effects of the bench that the FMU does not have and that are estimated: [`Target::ActuatorLag`] and others.
+    /// Effects that are estimated although the FMU does not have them, such as [`Target::ActuatorLag`].
     pub effects: Vec<Target>,
     /// True to estimate the damping by waves that break, if the fit reaches them.
     pub breaking: bool,
-    /// Standard deviation of the gyro's scale about 1, as its data sheet has it; 0: exactly 1.
+    /// Standard deviation of the gyro's scale about 1, from its data sheet; 0 if the scale is exactly 1.
     pub gyro_scale: f64,
     /// Tolerances of values that are not estimated.
     pub tolerances: Tolerances,
@@ -63,7 +63,7 @@ impl Default for Options {
 }
 
 impl Options {
-    /// The bench as the FMU is set up with these options.
+    /// Returns the bench that the FMU is with these options.
     pub fn nominal(&self, fmu: &Fmu) -> Result<Nominal> {
         let known = self.known.iter().map(|(name, mean, _)| (name.clone(), *mean));
         let expected: Vec<(String, f64)> = known.chain(self.starts.iter().cloned()).collect();

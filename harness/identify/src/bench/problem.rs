@@ -20,30 +20,31 @@ use crate::input::recording::Recording;
 use crate::model::overridden::{near, refuse};
 use crate::model::unknown::range;
 
-/// Output of the gyro, and of the encoder.
+/// Indices of the gyro's rate and of the encoder's angle among the outputs.
 const RATE: usize = 0;
 const ANGLE: usize = 1;
 
 /// Drift of a MEMS gyro (the thesis's LSM6DS3).
 const GYRO_DRIFT: Drift = Drift { size: 0.2, time: 100.0, width: 0.7 };
-/// An encoder's angle integrates what the model leaves of the rate, whatever that is.
+/// Drift of an encoder's angle: it integrates the rate that the model does not explain, whose size is unknown, so that its width
+/// is large.
 const ENCODER_DRIFT: Drift = Drift { size: 1.0, time: 100.0, width: 6.0 };
-/// Standard deviation of a delay beforehand, and its ends, s.
+/// Standard deviation of a delay's prior, and the delay's bounds, s.
 const DELAY: (f64, f64, f64) = (0.05, -0.2, 0.5);
-/// Prior of the dry friction's asymmetry: it is small against 1.
+/// Standard deviation of the prior of the dry friction's asymmetry, which is small against 1.
 const ASYMMETRY: f64 = 0.5;
-/// Standard deviation of each of b, c and d beforehand, over its start.
+/// Standard deviation of the prior of each friction coefficient b, c and d, relative to its start.
 const FRICTION_WIDTH: f64 = 10.0;
-/// Least friction over its start.
+/// Lower bound of a friction coefficient, relative to its start.
 pub const LEAST_FRICTION: f64 = 1e-4;
-/// Standard deviation of ln ω_s beforehand, and how far it may be from its start.
+/// Standard deviation of the prior of ln ω_s (Stribeck speed), and the largest factor between ω_s and its start.
 const SPEED: (f64, f64) = (1.5, 30.0);
-/// Rates that show a direction, over the gyro's noise.
+/// Rate, in standard deviations of the gyro's noise, above which it shows the direction of rotation.
 const ABOVE_NOISE: f64 = 5.0;
-/// Widest factor of a known value.
+/// Least and largest factor by which a known value may differ from its nominal value.
 const WIDEST: (f64, f64) = (0.6, 1.6);
 
-/// Unknowns with what they are to the bench, in groups.
+/// Unknowns, and their targets in the same order.
 struct List<'a> {
     fmu: &'a Fmu,
     unknowns: Vec<Unknown>,
@@ -66,14 +67,14 @@ impl List<'_> {
         description.variable(name).map_or("1".into(), |v| description.unit(v).to_string())
     }
 
-    /// A positive parameter of the FMU in its logarithm.
+    /// Returns a positive parameter of the FMU as an unknown that is searched in its logarithm.
     fn parameter(&self, name: &str, start: f64) -> Unknown {
         let (low, high) = self.range(name);
         let bounds = (low.max(1e-6 * start), high.min(1e6 * start));
         Unknown::positive(name, &self.unit(name), Role::Run(None), start, bounds)
     }
 
-    /// A parameter that may be 0, in its value.
+    /// Returns a parameter of the FMU that may be 0 as an unknown that is searched in its value.
     fn nonnegative(&self, name: &str, start: f64) -> Unknown {
         let (low, high) = self.range(name);
         let bounds = (low.max(0.0), high);
@@ -81,10 +82,9 @@ impl List<'_> {
     }
 }
 
-/// The bench with one slosh model and friction law, from these starts.
+/// Returns the bench with one slosh model and friction law, its unknowns, and the values of all unknowns at each start.
 ///
-/// # Errors
-/// If an option names what cannot be estimated.
+/// # Errors If an option names a parameter that cannot be estimated, or the data give no finite start.
 pub fn system<'a>(
     fmu: &'a Fmu,
     recordings: &'a [Recording],
@@ -392,7 +392,8 @@ pub fn system<'a>(
     Ok((system, unknowns, starts))
 }
 
-/// Direction of a hub that turns one way; 0 if it turns both. A gyro of a hub that rests at first reads its bias.
+/// Returns the direction, 1 or −1, in which the hub turns in all recordings; 0 if it turns both ways. If a recording begins at
+/// rest, its first reading is subtracted, because it is the gyro's bias.
 fn way(recordings: &[Recording]) -> f64 {
     let one = |recording: &Recording| {
         let bias = if recording.from_rest { recording.first_rate() } else { 0.0 };
@@ -404,7 +405,7 @@ fn way(recordings: &[Recording]) -> f64 {
     if recordings.iter().all(|recording| one(recording) == first) { first } else { 0.0 }
 }
 
-/// Returns true if a prior of the same value makes its tolerance one too many.
+/// Returns true if the options have a prior or a start of a value, so that it gets no tolerance in addition.
 fn is_told(name: &str, options: &Options) -> bool {
     options.known.iter().any(|(known, ..)| known == name)
         || options.starts.iter().any(|(s, _)| s == name)
@@ -415,7 +416,7 @@ fn bias(name: &str, unit: &str, (output, recording): (usize, usize), start: f64)
     Unknown::linear(name, unit, role, (start, 1e-2), (f64::NEG_INFINITY, f64::INFINITY))
 }
 
-/// An effect that the FMU does not have, as an unknown.
+/// Returns an effect that the FMU does not have as an unknown. A free effect starts at its plausible size, any other at 0.
 pub fn effect(target: &Target, part: Part) -> Unknown {
     let run = Role::Run(None);
     let lag = |name: &str| Unknown::linear(name, "s", run, (0.0, 0.02), (0.0, 1.0));
@@ -441,7 +442,7 @@ pub fn effect(target: &Target, part: Part) -> Unknown {
     Unknown { part, start, ..unknown }
 }
 
-/// Effects that a misfit may ask for.
+/// Adds the effects that are tried if the models do not fit.
 fn candidates(list: &mut List, options: &Options, frozen: bool, law: &str) {
     let is_set = |name: &str| options.settings.iter().any(|(n, _)| n == name);
     let add = |list: &mut List, target: Target| {
@@ -496,7 +497,6 @@ fn refuse_overridden(
     parameters.iter().try_for_each(|(name, _)| refuse(name, &warnings))
 }
 
-/// The engine's problem for a system.
 pub fn problem<'a>(
     system: &'a BenchSystem,
     unknowns: Vec<Unknown>,
@@ -551,7 +551,8 @@ pub fn problem<'a>(
     }
 }
 
-/// Behaviours between rows, the likeliest first: a torque that seldom changes is held. One where it makes no difference.
+/// Returns the possible courses of the torque between rows, the likeliest first: a torque that seldom changes is probably held. A
+/// torque that hardly varies gets only one course, because all give the same motion.
 fn guessed(recordings: &[Recording]) -> Vec<Hold> {
     let square = |x: f64| x * x;
     let varies = |recording: &Recording| {

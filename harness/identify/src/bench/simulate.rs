@@ -37,21 +37,21 @@ pub struct Motion {
 /// Parts of a [`Motion`] read in every row; the rest stays empty.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Read {
-    /// All of it.
+    /// The whole motion.
     All,
-    /// Angle and rate, for the differences: they are states, and the FMU has no outputs to compute.
+    /// Only angle and rate, for differences of runs: both are states, so that the FMU need not compute its outputs.
     States,
 }
 
-/// Values that, joined by lines, act as the smooth signal does whose samples these are. Lines make sinc²(Ωh/2) of a sine at
-/// Ω, h the time between rows: 0.8 % less at 2.4 Hz and 50 Hz sampling. With δ² the second difference, which makes
-/// −(Ωh)² + (Ωh)⁴/12 of it,
+/// Returns values that act, joined by lines, like the smooth signal whose samples `signal` has. Lines through samples of a sine
+/// of frequency Ω have the amplitude sinc²(Ωh/2), with the time h between rows: 0.8 % less than the sine's at 2.4 Hz and 50 Hz
+/// sampling. This is corrected with the second difference δ², which multiplies a sine by −(Ωh)² + (Ωh)⁴/12:
 ///
 /// ```text
 /// 1/sinc²(Ωh/2) = 1 + (Ωh)²/12 + (Ωh)⁴/240 + … ≈ 1 − δ²/12 + δ⁴/90
 /// ```
 ///
-/// Where rows are unevenly spaced, δ² alone.
+/// If rows are unevenly spaced, only the term with δ² is used.
 pub fn smooth(time: &[f64], signal: &[f64]) -> Vec<f64> {
     let n = signal.len();
     let mean = (time[n - 1] - time[0]) / (n - 1) as f64;
@@ -70,8 +70,8 @@ pub fn smooth(time: &[f64], signal: &[f64]) -> Vec<f64> {
     (0..n).map(|k| signal[k] - two[k] / 12.0 + four[k] / 90.0).collect()
 }
 
-/// Instants of a recording's torque, s, and its values there; those of a band-limited torque are joined by lines ([`smooth`]).
-/// The recording's ends are among them.
+/// Returns the instants of a recording's torque, s, and its values there, N·m, with the recording's first and last row among
+/// them. The values of a band-limited torque are corrected so that lines can join them ([`smooth`]).
 pub fn course(recording: &Recording, intersample: Hold) -> (Vec<f64>, Vec<f64>) {
     let of = |values: &[f64]| recording.commands().iter().map(|k| values[*k]).collect::<Vec<_>>();
     let (mut knots, mut torque) = match recording.commanded {
@@ -95,7 +95,8 @@ pub fn course(recording: &Recording, intersample: Hold) -> (Vec<f64>, Vec<f64>) 
     (knots, torque)
 }
 
-/// A signal at a time, on the line between two rows; `row` is the row before, and grows from call to call.
+/// Returns a signal at a time, on the line between two rows. `row` is the row before this time; it only grows from call to call,
+/// so that the times must grow.
 fn at(time: &[f64], signal: &[f64], t: f64, row: &mut usize) -> f64 {
     while *row + 2 < time.len() && time[*row + 1] <= t {
         *row += 1;
@@ -130,8 +131,8 @@ impl Setup {
         self.run_under(fmu, values, recording, delay, &Effects::default(), Read::All)
     }
 
-    /// The same with effects that the FMU does not have; of the motion `read` is read. The rate is the one that the gyro's filter
-    /// passes.
+    /// Runs the FMU as [`Setup::run`] does, with effects that the FMU does not have, and returns the part `read` of the motion.
+    /// The rate is the output of the gyro's filter, if it has one.
     pub fn run_under(
         &self,
         fmu: &Fmu,
@@ -246,7 +247,8 @@ impl Setup {
     }
 }
 
-/// A cubic between two rows from values and slopes at them, and its slope; beyond the ends the slope stays.
+/// Returns value and slope of a signal `lead` (s) after each time, on the cubic between two rows with these values and slopes.
+/// Beyond the ends the signal continues as a line.
 fn hermite(time: &[f64], values: &[f64], slopes: &[f64], lead: f64) -> Vec<(f64, f64)> {
     let last = time.len() - 1;
     let mut row = 0;
@@ -273,7 +275,7 @@ fn hermite(time: &[f64], values: &[f64], slopes: &[f64], lead: f64) -> Vec<(f64,
     time.iter().copied().map(at).collect()
 }
 
-/// Angle and rate of a motion `lead` (s) after the instants at which it was read.
+/// Returns angle and rate of a motion `lead` (s) after the instants at which it was read.
 pub fn angle_and_rate_at(time: &[f64], motion: &Motion, lead: f64) -> [Vec<f64>; 2] {
     if lead == 0.0 {
         return [motion.angle.clone(), motion.rate.clone()];

@@ -55,7 +55,8 @@ pub const PARAMETERS: [&str; 8] = [
 /// a0 = ω² b/I0,  a1 = ω²(1 + μ) + 2ζω b/I0,  a2 = b/I0 + 2ζω(1 + μ)
 /// ```
 ///
-/// (thesis 6.7, corrected). Six coefficients, five unknowns: that a2 is what the others say tests the structure.
+/// (thesis 6.7, corrected). The six coefficients are functions of five unknowns, so that a2 follows from the others. The
+/// difference, `structure`, shows whether the bench has this structure.
 #[derive(Clone, Copy, Debug)]
 pub struct Plant {
     /// Slosh frequency ω, rad/s.
@@ -64,11 +65,11 @@ pub struct Plant {
     pub zeta: f64,
     /// I0, inertia of hub and fixed mass, kg·m².
     pub inertia: f64,
-    /// μ.
+    /// Mass ratio μ.
     pub mass_ratio: f64,
-    /// b, N·m·s.
+    /// Viscous friction b, N·m·s.
     pub friction: f64,
-    /// a2 less what the other coefficients make of it, 1/s.
+    /// a2 less its value from the other coefficients, 1/s; 0 if the bench has this structure.
     pub structure: f64,
 }
 
@@ -90,7 +91,8 @@ impl Plant {
     }
 }
 
-/// Poles and zeros of a measured response, as slosh and inertia.
+/// Fits poles and zeros to a measured response and returns slosh and inertia; `None` if the slosh is not within the measured
+/// band.
 pub fn translate(measured: &FrequencyResponse, bench: Bench) -> Option<Response> {
     let model = TransferFunction::fit(measured)?;
     let plant = Plant::of(model.numerator, model.denominator())?;
@@ -107,16 +109,16 @@ pub fn translate(measured: &FrequencyResponse, bench: Bench) -> Option<Response>
     (found.slosh_mass > 0.0 && within).then_some(found)
 }
 
-/// The tank (d, h) whose first mode has this frequency (Hz) and mass (kg).
+/// Returns diameter and filling height (m) of the tank whose first mode has this frequency (Hz) and mass (kg).
 pub fn tank(frequency: f64, mass: f64, bench: Bench) -> (f64, f64) {
     let length = bench.gravity / (TAU * frequency).powi(2);
     tank_of_first_mode(length, mass, bench.density)
 }
 
-/// Starts from the data, the likeliest first, and what the response says of the bench: nothing if there is no slosh in it,
-/// and one start then. Others than the first are for recordings where the first leads to no minimum: responses of other
-/// kinds, the balance of torques in parts of the band (a slew's torque has its power far below the slosh), and the FMU as
-/// it is set up.
+/// Returns the bench that the frequency response shows, and starts from the data, the likeliest first. If the response shows no
+/// slosh, it is `None` and there is one start. The further starts are for recordings in which the first leads to no minimum. They
+/// come from the response's antiresonance and resonance, from the balance of torques in parts of the band (because a slew's
+/// torque has its power far below the slosh), and from the FMU as it is set up.
 pub fn from_data(
     recordings: &[Recording],
     nominal: &Nominal,
@@ -159,7 +161,7 @@ pub fn from_data(
     Ok((responses.first().copied().or(Some(first)), all))
 }
 
-/// Balances of torques in bands of the recordings, the least residual first.
+/// Returns the bench from the balance of torques in each band of each recording, the least residual first.
 fn balances(
     recordings: &[Recording],
     bench: Bench,
@@ -173,20 +175,19 @@ fn balances(
     found.iter().map(|b| b.response(bench)).collect()
 }
 
-/// Frequencies between which the torque of a recording has its power, Hz.
+/// Returns the frequencies between which the torque of a recording has its power, Hz.
 fn excited(recording: &Recording) -> Option<(f64, f64)> {
     let (step, torque, rate) = recording.even().ok()?;
     excited_band(step, &torque, &rate)
 }
 
-/// Pairs of octaves from a frequency to another one, Hz, each half over the one before.
+/// Returns bands of two octaves between two frequencies, Hz; each begins an octave above the band before.
 fn octaves(low: f64, high: f64) -> Vec<(f64, f64)> {
     let count = ((high / low).log2() as u32).saturating_sub(1);
     (0..count).map(|k| low * f64::from(1u32 << k)).map(|f| (f, 4.0 * f)).collect()
 }
 
 impl Response {
-    /// Description in one line.
     pub fn line(&self) -> String {
         format!(
             "frequency response: slosh at {:.4} Hz, damping ratio {:.4}, resonance at {:.4} Hz, slosh mass {:.3} kg, \
@@ -227,15 +228,15 @@ impl Response {
 /// Bench parameters from the balance of torques.
 #[derive(Clone, Copy, Debug)]
 pub struct Balance {
-    /// Slosh frequency, Hz, and damping ratio.
+    /// Slosh frequency, Hz.
     pub frequency: f64,
     /// Slosh damping ratio.
     pub damping: f64,
     /// Slosh mass, kg.
     pub mass: f64,
-    /// I0, kg·m².
+    /// I0, inertia of hub and fixed mass, kg·m².
     pub inertia: f64,
-    /// Root mean square of the residual over that of the hub's motion.
+    /// Root mean square of the residual over the root mean square of the hub's rate.
     pub residual: f64,
 }
 
@@ -253,15 +254,16 @@ impl Balance {
     }
 }
 
-/// The slosh mode from the balance of torques in the frequency domain, with the *measured* rate W in it:
+/// Estimates the slosh mode from the balance of the torques T in the frequency domain, with the *measured* rate W:
 ///
 /// ```text
 /// T = jΩ I0 W + jΩ m r² G(Ω) W + b W + c S − δ jΩ T,   G = (ω² + 2jζωΩ)/(ω² − Ω² + 2jζωΩ)
 /// ```
 ///
-/// S is the spectrum of sgn ω, δ a delay (which stands for what dry friction does to the phase as well, and is not used). All but ω and ζ are linear; these are taken from a grid. The residual counts as
-/// motion: it is divided by |jΩ(I0 + m r² G)|. Since nothing is simulated, a multisine's lines make no wrong minima, and
-/// since dry friction is in it, small amplitudes do not pass for damping.
+/// S is the spectrum of the rate's sign, and δ a delay, which also absorbs the effect of dry friction on the phase and is not
+/// used further. The unknowns are linear except the slosh frequency ω and the damping ratio ζ, which are taken from a grid. The
+/// residual is divided by |jΩ(I0 + m r² G)|, which makes it a rate. Because nothing is simulated, the lines of a multisine make
+/// no false minima; because dry friction is a term, its loss at small amplitudes is not taken for damping.
 pub fn balance(recording: &Recording, bench: Bench, band: (f64, f64)) -> Option<Balance> {
     let (step, torque, rate) = recording.even().ok()?;
     let n = rate.len();
@@ -356,7 +358,8 @@ pub fn balance(recording: &Recording, bench: Bench, band: (f64, f64)) -> Option<
 }
 
 /// Returns a start from antiresonance, resonance and the inertia at the band's ends, for recordings that the transfer function
-/// does not fit (large amplitudes bend its peak). For b = 0, ω_p² = ω²(1 + m r²/I0).
+/// does not fit (large amplitudes bend its peak). Without viscous friction b, the resonance ω_p and the antiresonance ω satisfy
+/// ω_p² = ω²(1 + m r²/I0).
 fn from_features(measured: &FrequencyResponse, bench: Bench) -> Option<Response> {
     let features = Features::find(measured);
     let (f, fp) = (features.f_dip?, features.f_res?);
@@ -380,9 +383,10 @@ fn from_features(measured: &FrequencyResponse, bench: Bench) -> Option<Response>
     })
 }
 
-/// Friction from the balance of mean power over windows of 20 s, ⟨τω⟩ = T⟨|ω|⟩ + δ⟨τ'ω⟩, with a delay δ, which near a quarter of a
-/// cycle between torque and rate makes power of nothing: least squares for T and δ, then the median torque T (in most windows
-/// the liquid takes as much as it gives), shared among b, c and d at the speeds of the recording. Rough, but of the right size and shape.
+/// Returns a start of the friction from the balance of mean power over windows of 20 s, ⟨τω⟩ = T⟨|ω|⟩ + δ⟨τ'ω⟩, with the friction
+/// torque T and a delay δ. The delay is needed because torque and rate are nearly a quarter of a cycle apart, so that a small
+/// delay looks like power. After least squares for δ, the median of T over the windows is shared among b, c and d at the speeds
+/// of the recording; in most windows the liquid takes as much power as it gives.
 fn friction(recordings: &[Recording]) -> Start {
     // power and τ'ω over |ω|, and |ω|
     let mut windows: Vec<[f64; 3]> = Vec::new();
@@ -414,7 +418,8 @@ fn friction(recordings: &[Recording]) -> Start {
     Start { zeta: 0.003, b, c, stribeck, omega_s, ..Start::default() }
 }
 
-/// Slope of the line through points (y, x, …), least squares; `None` where they do not tell.
+/// Returns the least-squares slope of a line through points (y, x, …); `None` if there are fewer than five points or all x are
+/// equal.
 fn slope_of(points: &[[f64; 3]]) -> Option<f64> {
     let n = points.len() as f64;
     let [y, x] = [0, 1].map(|i| points.iter().map(|p| p[i]).sum::<f64>() / n);

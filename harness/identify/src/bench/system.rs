@@ -1,15 +1,15 @@
 //! The FMU of the bench as a system.
 //!
-//! The unknowns of the search are what a recording shows: length l and mass ratio μ = m r²/J of the first slosh mode, its damping ratio,
-//! and the inertia J that turns with the hub without that mode's mass. The FMU takes them as a table of modes. Tank and hub are
-//! functions of draws:
+//! The unknowns of the search are the numbers that a recording shows: length l and mass ratio μ = m r²/J of the first slosh mode,
+//! its damping ratio, and the inertia J that turns with the hub without the mass m of this mode. The FMU takes them as a table of
+//! modes. Diameter d and filling height h of the tank and inertia I of the hub are computed from draws of the unknowns:
 //!
 //! ```text
 //! m = μ J/r²,  d⁴ = 8ξ²(ξ² − 1) l m/(π ρ),  T = d/(2ξ l) = tanh(2ξ h/d),  I = J − r² (ρ π d² h/4 − m)
 //! ```
 //!
-//! In d, h and I the likelihood has a long bent valley, for in a deep tank T hardly depends on h. Where tank, hub or modes are set or
-//! known, the FMU's own parameters are the unknowns.
+//! They are not the unknowns themselves because the likelihood has a long bent valley in d, h and I: in a deep tank T hardly
+//! depends on h. However, if tank, hub or modes are set or known, the FMU's own parameters are the unknowns.
 
 use std::f64::consts::PI;
 use std::sync::OnceLock;
@@ -32,11 +32,11 @@ pub enum Target {
     Parameter(String),
     /// A start of a recording that does not begin at rest.
     Initial(usize, String),
-    /// l, m.
+    /// Length l of the first mode's pendulum, m.
     Length,
-    /// μ.
+    /// Mass ratio μ of the first mode.
     MassRatio,
-    /// J, kg·m².
+    /// Inertia J that turns with the hub without the first mode's mass, kg·m².
     Inertia,
     /// Damping ratio of the mode.
     Zeta,
@@ -56,11 +56,12 @@ pub enum Target {
     GyroBias,
     /// Reading of the encoder at angle 0, rad.
     AngleOffset,
-    /// Asymmetry of the dry friction of a hub that turns one way: c and d of the search are those of that way.
+    /// Asymmetry of the dry friction of a hub that turns only one way. The search has the friction c and d in this direction; the
+    /// asymmetry converts them to the mean of both directions.
     Asymmetry,
-    /// Torque that acts over the recorded one.
+    /// Torque that acts over the recorded torque.
     Torque,
-    /// True time over the recorded one.
+    /// True time over the recorded time.
     Clock,
     /// g_axial over its value.
     Gravity,
@@ -68,11 +69,11 @@ pub enum Target {
     Arm,
     /// fluid.rho over its value.
     Density,
-    /// Part of the largest command by which the actuator's limit is below it.
+    /// Difference of the largest command and the actuator's limit, relative to the largest command.
     Limit,
     /// Compliance of the bearing before it slips, rad/(N·m).
     Compliance,
-    /// Mass of the second mode over that of an upright cylinder's.
+    /// Mass of the second mode over its mass in an upright cylinder.
     SecondMode,
     /// Size of a torque that follows the motion.
     Besides(usize),
@@ -82,7 +83,7 @@ pub enum Target {
 pub struct Row {
     /// Time from the recording's first row, s.
     pub time: f64,
-    /// Commanded, N·m.
+    /// Commanded torque, N·m.
     pub torque: f64,
     /// Angle of the hub, rad.
     pub angle: f64,
@@ -92,7 +93,7 @@ pub struct Row {
     pub slosh_angle: f64,
 }
 
-/// A torque that follows the motion: in words, with the unit of its factor.
+/// A torque that is proportional to a quantity of the motion, with the unit of its factor.
 pub struct Besides {
     /// Quantity that the effect is proportional to.
     pub follows: &'static str,
@@ -102,7 +103,7 @@ pub struct Besides {
     pub torque: fn(&Row) -> f64,
 }
 
-/// Torques that a bench may have besides.
+/// Torques that may act on a bench and that the models lack.
 pub const BESIDES: [Besides; 7] = [
     Besides { follows: "the rate", unit: "N.m.s/rad", torque: |row| row.rate },
     Besides {
@@ -125,19 +126,14 @@ pub const BESIDES: [Besides; 7] = [
     },
 ];
 
-/// The FMU with recordings.
 pub struct BenchSystem<'a> {
-    /// The FMU.
     pub fmu: &'a Fmu,
-    /// The recordings.
     pub recordings: &'a [Recording],
-    /// Settings.
     pub settings: Vec<(String, String)>,
-    /// Known values.
     pub bench: Bench,
     /// Meaning of each unknown, in their order.
     pub targets: Vec<Target>,
-    /// What is derived: names and units.
+    /// Names and units of the derived quantities.
     pub derived: Vec<(String, String)>,
     /// Direction of a hub that turns one way, 1 or −1; 0: both.
     pub way: f64,
@@ -147,10 +143,10 @@ pub struct BenchSystem<'a> {
     pub base: OnceLock<Vec<Motion>>,
 }
 
-/// Largest T of a tank: its liquid is then deeper than its diameter three times.
+/// Largest T = tanh(2ξ h/d) from which a filling height is computed: the liquid is then 1.7 diameters deep.
 const DEEPEST: f64 = 0.999_99;
 
-/// Tank and hub with these modes: d, h, I; `None`: there is none.
+/// Returns d, h and I of the tank and hub with this first mode and inertia J; `None` if no tank and hub have them.
 fn tank_of(length: f64, mass: f64, inertia: f64, bench: Bench) -> Option<[f64; 3]> {
     let xi = XI[0];
     let d = diameter(length, mass, bench);
@@ -160,26 +156,26 @@ fn tank_of(length: f64, mass: f64, inertia: f64, bench: Bench) -> Option<[f64; 3
     (hub > 0.0).then_some([d, h, hub])
 }
 
-/// d of a tank with this mode.
+/// Returns the diameter d of a tank whose first mode has this length and mass, m.
 fn diameter(length: f64, mass: f64, bench: Bench) -> f64 {
     let xi = XI[0];
     (8.0 * xi * xi * (xi * xi - 1.0) * length * mass / (PI * bench.density)).powf(0.25)
 }
 
 impl BenchSystem<'_> {
-    /// Value of an unknown, if it is one.
+    /// Returns the value of the unknown with a target; `None` if there is no such unknown.
     pub fn value(&self, values: &[f64], target: &Target) -> Option<f64> {
         self.targets.iter().position(|other| other == target).map(|k| values[k])
     }
 
-    /// Known values with their tolerances.
+    /// Returns the known values, multiplied by the factors that the unknowns have for them.
     fn bench(&self, values: &[f64]) -> Bench {
         let of = |target: &Target| self.value(values, target).unwrap_or(1.0);
         let Bench { arm, density, gravity } = self.bench;
         Bench { arm: arm * of(&Target::Arm), density: density * of(&Target::Density), gravity }
     }
 
-    /// The torque besides along a recording.
+    /// Returns the torques of [`BESIDES`] that are not 0, summed, in each row of a recording, N·m; `None` if all are 0.
     fn besides(&self, values: &[f64], recording: usize) -> Option<Vec<f64>> {
         let base = self.base.get()?;
         let sizes: Vec<(usize, f64)> = self

@@ -16,7 +16,7 @@ use names::hubslosh::{SloshModel, hub};
 pub struct Question<'a> {
     /// Slosh models; those that fit about as well as the best come first.
     pub slosh: &'a [ModelFit],
-    /// Number of those.
+    /// Number of slosh models that fit about as well as the best.
     pub near: usize,
     /// Friction laws, with one slosh model.
     pub laws: &'a [ModelFit],
@@ -32,11 +32,10 @@ pub struct Findings {
     pub tests: Vec<Tests>,
     /// True if the residual asks for effects that were not estimated.
     pub asks: bool,
-    /// Effects with each of which noise is left, in words.
+    /// Effects each of which leaves noise as residual, in words.
     pub alike: Vec<String>,
     /// The torque that the model lacks, if it is the cause.
     pub missing: Vec<Missing>,
-    /// The cause of a misfit.
     pub cause: Option<Cause>,
     /// Doubts about recordings or model, in words.
     pub doubts: Vec<String>,
@@ -49,7 +48,8 @@ impl Findings {
     }
 }
 
-/// Each sentence answers one question: which model, which friction, whether it fits, what is known and what not.
+/// Returns the sentences of the verdict. Each answers one question: which slosh model, which friction, whether it fits, which
+/// estimates are determined and which are not.
 pub fn words(
     question: &Question,
     findings: &Findings,
@@ -189,8 +189,8 @@ fn friction(laws: &[ModelFit]) -> Vec<String> {
     laws[1..].iter().map(one).collect()
 }
 
-/// Probabilities of models by their information criterion, all equally probable beforehand (Kass and Raftery 1995):
-/// exp(−BIC/2) over the sum.
+/// Returns the probabilities of models with these information criteria, if all are equally probable beforehand: exp(−BIC/2) over
+/// the sum of these (Kass and Raftery 1995).
 pub fn probabilities(bic: impl Iterator<Item = f64> + Clone) -> Vec<f64> {
     let least = bic.clone().fold(f64::INFINITY, f64::min);
     let weights: Vec<f64> = bic.map(|b| (-(b - least) / 2.0).exp()).collect();

@@ -1,7 +1,8 @@
 //! Effects that a misfit asks for: a score test (Lagrange multiplier; Rao 1948, Engle 1984) of each candidate, then fits of the best.
 //!
-//! Under a small effect of size x the residuals move by x v. Of v the unknowns and the tolerances can take what lies in the span of
-//! their derivatives J; of the rest v' the size that the residual e asks for, and its standard deviation, are
+//! Under a small effect of size x the residuals e move by x v. The unknowns and the tolerances can cancel the part of v that lies
+//! in the span of their derivatives J. The rest v' of it gives the size that explains the residual best, and its standard
+//! deviation:
 //!
 //! ```text
 //! x = −v'·e/|v'|²,   σ_x = 1/|v'|
@@ -9,7 +10,8 @@
 //!
 //! x/σ_x is normal if the effect is absent. A general test spreads over hundreds of rows or bands what this test gathers in one
 //! number: an estimate can be off by ten standard deviations without a sign in a general test. The candidates with the largest
-//! scores are fitted with all unknowns, from the recordings' own noise, for the noise of a misfit hides what it is made of.
+//! scores are fitted with all unknowns, from the recordings' own noise, because the noise that is estimated from a misfit
+//! contains the misfit and would hide it.
 
 use analysis::innovations::{LIMIT, Tests};
 use anyhow::Result;
@@ -21,21 +23,22 @@ use super::problem::Part;
 use super::{DECIDES, ENDS, Fit, Solution};
 use crate::news::News;
 
-/// Candidates that are fitted.
+/// Largest number of candidates that are fitted, those with the largest scores.
 const FITTED: usize = 3;
-/// Part of a candidate's change that the unknowns must leave for it to be seen: theirs are differences, good to a thousandth.
+/// Least part of a candidate's change that the unknowns cannot cancel. A smaller part does not differ from errors of the
+/// derivatives, which are differences and good to a thousandth.
 const SEEN: f64 = 1e-2;
 
 /// A candidate that the recordings ask for.
 #[derive(Clone, Copy, Debug)]
 pub struct Effect {
-    /// Number of the unknown.
+    /// Index of the unknown.
     pub unknown: usize,
-    /// Its size, and the standard deviation of that.
+    /// Size of the effect, and its standard deviation.
     pub size: (f64, f64),
-    /// Decrease of −2 ln L.
+    /// Decrease of −2 ln L by the effect.
     pub gain: f64,
-    /// True if noise is left with it.
+    /// True if the residual is noise once the effect is fitted.
     pub fits: bool,
 }
 
@@ -47,7 +50,8 @@ struct Score {
     score: f64,
 }
 
-/// Returns the effects that a solution's residual asks for, the largest gain first. Without a score beyond chance nothing is fitted.
+/// Returns the effects that explain a part of a solution's residual, the largest gain first. Only candidates with a score beyond
+/// chance are fitted.
 ///
 /// # Errors
 /// If the system refuses the minimum. A candidate that it refuses is left out.
@@ -149,8 +153,8 @@ pub fn effects(solution: &Solution, news: &mut dyn FnMut(&News)) -> Result<Vec<E
     Ok(found)
 }
 
-/// Returns the effect that is the cause: noise is left with it, and no other effect with which noise is left explains the
-/// recordings about as well.
+/// Returns the effect that is the cause: it leaves noise as residual, and no other effect that does so explains the recordings
+/// about as well.
 pub fn cause(effects: &[Effect]) -> Option<&Effect> {
     let mut fitting = effects.iter().filter(|effect| effect.fits);
     let first = fitting.next()?;

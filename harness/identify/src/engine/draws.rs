@@ -1,9 +1,9 @@
 //! Intervals as quantiles of draws.
 //!
-//! Along the profile a point of deviance Δ counts exp(−Δ/2). Given that, the other unknowns are normal about the minimum over them,
-//! tolerances among them by their priors and one derivative each. Draws outside of the bounds, and those of which there is no such
-//! system, are refused. What is asked for is derived from each draw, so no valley is bent too much, and no interval leaves what is
-//! possible.
+//! A point of the profile is drawn with the weight exp(−Δ/2) of its deviance Δ. There the other unknowns are drawn from a normal
+//! distribution about their minimum; known values with tolerances are among them, by their priors and one derivative each. Draws
+//! outside the bounds, and draws whose values no system has, are refused. The quantities that users ask for are derived from each
+//! draw. Therefore a bent valley of the likelihood does no harm, and no interval includes impossible values.
 
 use analysis::random::Random;
 use anyhow::Result;
@@ -14,9 +14,9 @@ use super::problem::{Part, Role};
 use super::profile::{Curve, OPEN, Point};
 use super::{Fit, Solution};
 
-/// Draws: the quantiles' own error is a fiftieth of a standard deviation.
+/// Number of draws: with so many the error of a quantile is a fiftieth of a standard deviation.
 const DRAWS: usize = 20_000;
-/// Fewer than this say nothing.
+/// Fewest draws from which quantiles are computed.
 const FEWEST: usize = 400;
 /// Places of the profile's coordinate between which draws are spread evenly.
 const PLACES: usize = 400;
@@ -34,7 +34,7 @@ pub struct Derived {
     pub open: Option<(String, [bool; 2])>,
 }
 
-/// A point with what is needed to draw about it.
+/// A point of the profile, with the spread of the draws about it.
 struct Place {
     at: f64,
     rise: f64,
@@ -46,7 +46,7 @@ struct Place {
 }
 
 impl Solution<'_> {
-    /// Draws what is derived, with or without the tolerances.
+    /// Draws the derived quantities, with or without the tolerances of known values.
     ///
     /// # Errors
     /// If the system refuses a derivative.
@@ -258,17 +258,16 @@ impl Derived {
         self.columns.first().is_some_and(|column| column.len() >= FEWEST)
     }
 
-    /// Place of a quantity.
+    /// Returns the index of a quantity.
     pub fn place(&self, name: &str) -> Option<usize> {
         self.names.iter().position(|other| other == name)
     }
 
-    /// Standard deviation of a quantity's draws.
     pub fn std(&self, k: usize) -> f64 {
         analysis::statistics::deviation(&self.columns[k])
     }
 
-    /// The 95 % interval of a quantity.
+    /// Returns the 95 % interval of quantity `k`.
     pub fn interval(&self, k: usize) -> [f64; 2] {
         let mut sorted = self.columns[k].clone();
         sorted.sort_by(f64::total_cmp);
@@ -280,12 +279,12 @@ impl Derived {
         [at(0.025), at(0.975)]
     }
 
-    /// Correlation of two columns of draws.
     pub fn correlation(a: &[f64], b: &[f64]) -> f64 {
         analysis::statistics::correlation(a, b)
     }
 
-    /// Draws of models that explain the recordings about as well, each by its probability, from the draws of each.
+    /// Mixes the draws of models that explain the recordings about as well: each contributes draws in proportion to its
+    /// probability.
     pub fn mixed(all: &[(f64, &Derived)]) -> Derived {
         let Some((_, first)) = all.first() else { return Derived::default() };
         let mut mixed = Derived {

@@ -13,32 +13,31 @@ use super::{BEND, FIRST_STEP, MOVE, STEPS, WIDER};
 
 /// A problem with the state of its search: the noise of its signals, and what its inputs do between rows.
 pub struct Fit<'p> {
-    /// The problem.
     pub problem: &'p Problem<'p>,
-    /// Noise of each signal.
     pub noise: Vec<Noise>,
-    /// Behaviour between rows.
+    /// Course of the inputs between rows.
     pub hold: Hold,
-    /// Factor by which the noise counts.
+    /// Factor by which the noise is multiplied in the sum of squares; above 1 the priors lead the search.
     pub inflation: f64,
     /// Part of each recording that is fitted, from its beginning.
     pub part: f64,
-    /// Unknowns that are estimated.
+    /// True for each unknown that is estimated.
     pub free: Vec<bool>,
-    /// True if differences are taken to both sides: where the answer bends, one side alone points elsewhere.
+    /// True if differences are taken to both sides, because a difference to one side is wrong where the outputs are strongly
+    /// curved in an unknown.
     pub central: bool,
-    /// Least and largest coordinates.
+    /// Least and largest coordinate of each unknown.
     pub ends: Vec<(f64, f64)>,
     /// The unknown whose profile is followed, if the likelihood was seen to be no parabola along it.
     pub bent: Option<usize>,
-    /// Steps of the differences, and the least ones that stand above the errors of a solver.
+    /// Step of each unknown's difference, and the least step whose effect exceeds the errors of the solver.
     pub(super) steps: Vec<(f64, f64)>,
     filters: Vec<Whitening>,
     driven: AtomicUsize,
 }
 
-/// A simulation at the coordinates `z`: the motion of each recording, the residuals over their standard deviations followed by those
-/// of the priors (`e`), and the sum of their squares (`cost`).
+/// A simulation at the coordinates `z`: the motion of each recording, the residuals over their standard deviations, followed by
+/// the deviations from the priors (`e`), and the sum of the squares of `e` (`cost`).
 #[derive(Clone, Debug)]
 pub struct Point {
     pub z: Vec<f64>,
@@ -57,7 +56,7 @@ pub struct Derivatives {
 }
 
 impl<'p> Fit<'p> {
-    /// The fit before its first search.
+    /// Creates the fit of a problem, with the noise that is assumed before the first search.
     pub fn new(problem: &'p Problem<'p>) -> Self {
         let unknowns = &problem.unknowns;
         let end = |u: &Unknown, value: f64| match u.log {
@@ -82,13 +81,13 @@ impl<'p> Fit<'p> {
         fit
     }
 
-    /// Simulations so far; of a part of the recordings they count as that part.
+    /// Returns the number of simulations so far. A simulation of a part of the rows counts as this part.
     pub fn simulations(&self) -> f64 {
         let rows: usize = self.problem.recordings.iter().map(|r| r.time.len()).sum();
         self.driven.load(Relaxed) as f64 / rows as f64
     }
 
-    /// Takes noise over, and the part of the recordings that is fitted.
+    /// Sets the noise of each signal, and the part of the recordings that is fitted.
     pub fn set(&mut self, noise: Vec<Noise>, part: f64) {
         (self.noise, self.part) = (noise, part);
         self.renew_filters();
@@ -103,19 +102,18 @@ impl<'p> Fit<'p> {
         self.filters = self.problem.signals.iter().zip(&self.noise).map(filter).collect();
     }
 
-    /// Rows of a recording that are fitted.
+    /// Returns the number of a recording's rows that are fitted.
     pub fn rows(&self, recording: usize) -> usize {
         let all = self.problem.recordings[recording].time.len();
         ((self.part * all as f64).ceil() as usize).clamp(2.min(all), all)
     }
 
-    /// Coordinates of values, within the bounds.
+    /// Returns the coordinates of values, within the bounds.
     pub fn coordinates(&self, values: &[f64]) -> Vec<f64> {
         let all = self.problem.unknowns.iter().zip(values).zip(&self.ends);
         all.map(|((u, value), ends)| u.coordinate(*value).clamp(ends.0, ends.1)).collect()
     }
 
-    /// Values of coordinates.
     pub fn values(&self, z: &[f64]) -> Vec<f64> {
         self.problem.unknowns.iter().zip(z).map(|(u, z)| u.value(*z)).collect()
     }
@@ -126,17 +124,16 @@ impl<'p> Fit<'p> {
         self.problem.system.run(&self.values(z), recording, rows, self.hold, whole)
     }
 
-    /// Returns the answer at z.
+    /// Simulates all recordings at the coordinates z.
     ///
-    /// # Errors
-    /// If the system refuses z, or answers with numbers that are not finite.
+    /// # Errors If the system refuses z.
     pub fn at(&self, z: &[f64]) -> Result<Point> {
         let runs = (0..self.problem.recordings.len()).into_par_iter();
         let motion = runs.map(|k| self.run(z, k, true)).collect::<Result<Vec<Motion>>>()?;
         Ok(self.point(z, motion))
     }
 
-    /// The answer where the motion is known.
+    /// Returns the point at the coordinates z, whose motion was simulated before.
     pub fn point(&self, z: &[f64], motion: Vec<Motion>) -> Point {
         let residuals = self.residuals(z, &motion);
         let e = DVector::from_vec(self.stacked(residuals, z));
@@ -145,7 +142,7 @@ impl<'p> Fit<'p> {
         Point { z: z.to_vec(), motion, e, cost }
     }
 
-    /// Measured less modelled, for each signal; 0 where nothing was read.
+    /// Returns measured less modelled values of each signal; 0 in rows without a measured value.
     pub fn residuals(&self, z: &[f64], motion: &[Motion]) -> Vec<Vec<f64>> {
         let values = self.values(z);
         let of = |signal: &Signal| {
@@ -173,7 +170,7 @@ impl<'p> Fit<'p> {
         self.problem.signals.iter().map(of).collect()
     }
 
-    /// Residuals of each signal over their standard deviation.
+    /// Whitens the residuals of each signal and divides them by their standard deviation.
     pub fn innovations(&self, mut residuals: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
         for (piece, filter) in residuals.iter_mut().zip(&self.filters) {
             filter.apply(piece);
@@ -194,12 +191,12 @@ impl<'p> Fit<'p> {
         all
     }
 
-    /// −2 ln L of an answer but for a constant, with the noise that it leaves.
+    /// Returns −2 ln L of a point up to a constant, with the noise as it is set.
     pub fn deviance(&self, point: &Point) -> f64 {
         point.cost + self.filters.iter().map(Whitening::log_variance).sum::<f64>()
     }
 
-    /// Returns the derivatives at an answer by the unknowns `which`, and makes the steps of their differences anew.
+    /// Returns the derivatives at a point by the unknowns `which`, and adapts the steps of their differences for the next time.
     ///
     /// # Errors
     /// If the system refuses every step of an unknown.
@@ -294,8 +291,9 @@ impl<'p> Fit<'p> {
         }
     }
 
-    /// Change of each residual by one coordinate, by a difference to one side or, if `central`, to both, and the norm of the second
-    /// difference over that of the first: near √3 where errors of the solver decide, small where neither they nor curvature do.
+    /// Returns the derivative of each residual by coordinate `j`, from a difference to one side or, if `central`, to both sides,
+    /// and the norm of the second difference over the norm of the first. This ratio is near √3 if errors of the solver decide the
+    /// difference, and small if neither these errors nor curvature matter.
     fn difference(&self, at: &Point, j: usize, step: f64) -> Result<(Vec<Vec<f64>>, f64)> {
         let (by, there) = self.moved(at, j, step)?;
         let other = self.central.then(|| self.moved(at, j, -by)).transpose().ok().flatten();
@@ -325,7 +323,8 @@ impl<'p> Fit<'p> {
         Ok((there.iter().zip(&base).map(slope).collect(), bend))
     }
 
-    /// Residuals with one coordinate moved by a step, to its own side or else to the other.
+    /// Returns the residuals with coordinate `j` moved by a step, and this step. If the bounds or the system refuse the step, it
+    /// is made to the other side.
     fn moved(&self, at: &Point, j: usize, step: f64) -> Result<(f64, Vec<Vec<f64>>)> {
         let is_inside = |by: f64| (self.ends[j].0..=self.ends[j].1).contains(&(at.z[j] + by));
         let to = |by: f64| -> Result<(f64, Vec<Vec<f64>>)> {
@@ -336,7 +335,7 @@ impl<'p> Fit<'p> {
         to(first).or_else(|error| if is_inside(second) { to(second) } else { Err(error) })
     }
 
-    /// Coordinates and motion of a point with one coordinate at another value.
+    /// Returns coordinates and motion of a point with coordinate `j` at another value.
     ///
     /// # Errors
     /// If the system refuses the value.
@@ -352,8 +351,8 @@ impl<'p> Fit<'p> {
         Ok((z, motion))
     }
 
-    /// A sum of motions at the coordinates z as residuals over their standard deviations. The weights add up to 0, so that the
-    /// measurement cancels.
+    /// Returns a weighted sum of motions at the coordinates z as residuals over their standard deviations. The weights have to
+    /// add up to 0, so that the measured values cancel.
     pub fn change(&self, z: &[f64], motions: &[(f64, &[Motion])]) -> DVector<f64> {
         let mut sum: Vec<Vec<f64>> = Vec::new();
         for (weight, motion) in motions {
@@ -370,14 +369,14 @@ impl<'p> Fit<'p> {
         DVector::from_vec(all)
     }
 
-    /// Factor of an output in its reading.
+    /// Returns the factor between an output and its reading: 1 plus the error of the sensor's scale.
     fn scale(&self, z: &[f64], output: usize) -> f64 {
         let own =
             |(u, z): (&Unknown, &f64)| (u.role == Role::Gain(output, output)).then(|| u.value(*z));
         1.0 + self.problem.unknowns.iter().zip(z).filter_map(own).sum::<f64>()
     }
 
-    /// Tests for each signal whether the residual of an answer is noise.
+    /// Tests for each signal whether the residual at a point is noise.
     pub fn tests(&self, point: &Point) -> Vec<Tests> {
         let innovations = self.innovations(self.residuals(&point.z, &point.motion));
         self.tests_of(&innovations)
@@ -396,7 +395,7 @@ impl<'p> Fit<'p> {
         all.map(one).collect()
     }
 
-    /// Takes the noise of the residual at a point.
+    /// Estimates the noise of each signal from the residual at a point, and sets it.
     pub fn renew_noise(&mut self, point: &Point) {
         let residuals = self.residuals(&point.z, &point.motion);
         let of = |(signal, residual): (&Signal, &Vec<f64>)| {
@@ -410,7 +409,7 @@ impl<'p> Fit<'p> {
 }
 
 impl Signal {
-    /// Values of a signal in the rows with a value.
+    /// Returns the values of the rows that are sampled.
     pub fn picked(&self, values: &[f64]) -> Vec<f64> {
         let there = values.iter().zip(&self.sampled).filter(|(_, sampled)| **sampled);
         there.map(|(value, _)| *value).collect()

@@ -1,4 +1,4 @@
-//! The likelihood decides which course the inputs take between rows.
+//! Decides by the likelihood which course the inputs take between rows.
 //!
 //! A held input comes half a row late on average, so "held without a delay" and "linear with a delay of half a row" differ little.
 //! Therefore each course gets a minimum of its own with all unknowns free, and none is taken whose effect would precede its cause.
@@ -10,40 +10,40 @@ use super::minimum::{End, Minimum};
 use super::problem::{Hold, Role};
 use super::{ALIKE, DECIDES, ENDS, Fit};
 
-/// A delay that much below 0, in rows, is none: stamps of two channels differ by that.
+/// Delay below 0, in rows, up to which it counts as none, because the time stamps of two channels may differ by so much.
 const EARLIEST: f64 = 0.05;
 
-/// Another behaviour, at its own minimum.
+/// A course of the inputs between rows that was not chosen, at its own minimum.
 #[derive(Clone, Debug)]
 pub struct Rival {
-    /// The behaviour.
     pub hold: Hold,
-    /// Sum of squares less that of the behaviour that was taken.
+    /// Sum of squares less the sum of squares of the chosen course.
     pub more: f64,
-    /// Coordinates of its minimum less those of the one that was taken.
+    /// Coordinates of its minimum less the coordinates of the minimum with the chosen course.
     pub shift: Vec<f64>,
     /// Its delay, s, if there is one.
     pub delay: Option<f64>,
-    /// True if the delay is not allowed.
+    /// True if the delay would let the effect precede its cause.
     pub early: bool,
-    /// True if its minimum was not reached, for its sum of squares is far above.
+    /// True if the search for its minimum was given up, because its sum of squares is far above the least one.
     pub lost: bool,
 }
 
 impl Rival {
-    /// Returns true if it explains the recordings about as well.
+    /// Returns true if it explains the recordings about as well as the chosen course.
     pub fn is_near(&self) -> bool {
         !self.early && self.more < DECIDES
     }
 }
 
 impl Fit<'_> {
-    /// Index of the delay of the first output.
+    /// Returns the index of the delay of the first output.
     pub fn delay(&self) -> Option<usize> {
         self.problem.unknowns.iter().position(|u| u.role == Role::Delay(0))
     }
 
-    /// The best behaviour's minimum, and the other behaviours. A behaviour that cannot be simulated is none.
+    /// Searches a minimum for each course of the inputs between rows. Returns the minimum of the best course, which is then set,
+    /// and the other courses. A course that cannot be simulated is left out.
     ///
     /// # Errors
     /// If the system refuses the minimum that was found so far.

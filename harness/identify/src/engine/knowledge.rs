@@ -1,4 +1,5 @@
-//! What the recordings tell of the unknowns at a point: covariance, directions that no output shows, and what the solver's errors decide.
+//! Information of the recordings about the unknowns at a point: their covariance, the directions that no output shows, and the
+//! unknowns that the solver's errors decide.
 
 use std::collections::BTreeMap;
 
@@ -9,20 +10,20 @@ use super::fit::Fit;
 use super::minimum::{Curvature, places};
 use super::solver_error::SolverError;
 
-/// Part of a unit direction from which on an unknown belongs to it.
+/// Component of a unit direction above which an unknown belongs to the direction.
 const PART: f64 = 1e-2;
-/// Part of its standard deviation from which on the solver's errors decide an estimate.
+/// Shift of an estimate by the solver's errors, in standard deviations, above which these errors decide it.
 const DECIDED: f64 = 0.3;
 
 /// Unknowns that change together without a change of any output.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Inseparable {
-    /// The change of each, in its unit; the largest relative to its steepness is positive.
+    /// Change of each unknown, in its coordinate. The sign is such that the unknown whose change moves the outputs most grows.
     pub direction: BTreeMap<String, f64>,
 }
 
 impl Inseparable {
-    /// Returns the sentence about them.
+    /// Returns the sentence of the verdict about these unknowns.
     pub fn words(&self) -> String {
         let names: Vec<&str> = self.direction.keys().map(String::as_str).collect();
         let changes: Vec<String> =
@@ -37,19 +38,20 @@ impl Inseparable {
     }
 }
 
-/// What is known at a point.
+/// Knowledge of the unknowns at a point.
 pub struct Knowledge {
-    /// The covariance of all unknowns; rows of those at a bound are 0, and what is not resolved has an infinite variance.
+    /// Covariance of all unknowns. The rows of unknowns at a bound are 0, and unknowns that are not resolved have an infinite
+    /// variance.
     pub covariance: DMatrix<f64>,
     /// Directions that no output shows.
     pub inseparable: Vec<Inseparable>,
-    /// Unknowns whose derivatives are lost in the solver's errors, or which these move by more than [`DECIDED`] of the standard
-    /// deviation.
+    /// True for each unknown whose derivative is lost in the solver's errors, or whose estimate these errors move by more than
+    /// [`DECIDED`] standard deviations.
     pub decided_by_solver: Vec<bool>,
 }
 
 impl Fit<'_> {
-    /// Returns what derivatives by the unknowns `which` tell, given the solver's errors.
+    /// Computes the knowledge from the derivatives by the unknowns `which` and the solver's errors.
     pub fn knowledge(
         &self,
         jacobian: &DMatrix<f64>,

@@ -1,8 +1,8 @@
 //! The minimum of a sum of squares within bounds.
 //!
-//! The method is Levenberg and Marquardt's by projection: a step is cut at the bounds, and taken again without the unknowns that hit
-//! one. Broyden's updates keep the derivatives as long as the steps gain what they forecast. The distance to the minimum is the Newton
-//! decrement, in standard deviations.
+//! The method is Levenberg–Marquardt with projection: a step is cut at the bounds, and the unknowns that have not hit a bound are
+//! then solved for again. Broyden's updates replace new derivatives as long as the steps gain about what they forecast. The
+//! distance to the minimum is the Newton decrement, in standard deviations.
 
 use anyhow::Result;
 use nalgebra::{Cholesky, DMatrix, DVector};
@@ -13,9 +13,8 @@ use super::fit::{Derivatives, Fit, Point};
 /// End of a search.
 #[derive(Clone, Debug)]
 pub struct Minimum {
-    /// The answer there.
     pub point: Point,
-    /// Derivatives there, unless the last ones are of elsewhere.
+    /// Derivatives at the minimum; `None` if the last derivatives belong to another point.
     pub derivatives: Option<Derivatives>,
     /// Distance to the minimum, standard deviations.
     pub decrement: f64,
@@ -26,20 +25,21 @@ pub struct Minimum {
 /// Conditions that end a search.
 #[derive(Clone, Copy, Debug)]
 pub struct End {
-    /// Sets of derivatives at most.
+    /// Largest number of sets of derivatives.
     pub sets: usize,
     /// Distance to the minimum, standard deviations.
     pub decrement: f64,
-    /// A minimum above this sum of squares is of no use.
+    /// Sum of squares above which a minimum is of no use, so that the search is given up.
     pub above: f64,
-    /// A set of derivatives that lessens the sum of squares by less is the last one: in a bent valley sets lead on by ever so little.
+    /// Least decrease of the sum of squares by one set of derivatives. If a set gains less, the search ends, because in a bent
+    /// valley every set gains a little and the search would go on and on.
     pub gain: f64,
-    /// True if a distance by derivatives that were only updated counts, once a set was found.
+    /// True if the search may end by a distance whose derivatives were only updated, once one set was computed from differences.
     pub trusts: bool,
 }
 
 impl End {
-    /// A search with so many sets of derivatives, to this distance.
+    /// Ends a search after so many sets of derivatives, or at this distance.
     pub fn new(sets: usize, decrement: f64) -> Self {
         End { sets, decrement, above: f64::INFINITY, gain: 0.0, trusts: false }
     }
@@ -50,12 +50,12 @@ impl End {
 const FLAT: f64 = 1e-12;
 /// A direction is resolved if its eigenvalue is this many times larger than what errors of the derivatives make of it by chance.
 const RESOLVED: f64 = 4.0;
-/// Factor of the damping after a step that fails, or that gains what it should.
+/// Factor by which the damping grows after a step that fails, and falls after a step that gains more than half its forecast.
 const DAMPING: f64 = 8.0;
-/// Steps that are tried with one set of derivatives.
+/// Largest number of steps that are tried from one point, with growing damping.
 const TRIES: usize = 7;
 
-/// A curvature in its own scales.
+/// The curvature JᵀJ of a sum of squares, scaled to a unit diagonal.
 pub struct Curvature {
     pub(super) which: Vec<usize>,
     matrix: DMatrix<f64>,
@@ -63,7 +63,7 @@ pub struct Curvature {
 }
 
 impl Curvature {
-    /// JᵀJ over the columns `which`.
+    /// Computes JᵀJ over the columns `which`.
     pub fn new(jacobian: &DMatrix<f64>, which: Vec<usize>) -> Self {
         let picked = jacobian.select_columns(&which);
         let a = picked.tr_mul(&picked);
@@ -73,7 +73,8 @@ impl Curvature {
         Curvature { which, matrix, scale }
     }
 
-    /// (JᵀJ + λ D)⁻¹ b over those of `which` that `keep` has, D the diagonal; `b` is in the matrix's own scales.
+    /// Returns (JᵀJ + λ D)⁻¹ b over the unknowns of `which` that `keep` has, with the damping λ and the diagonal D of JᵀJ; `b`
+    /// and the result are in the scales of the matrix.
     fn solve(&self, b: &[f64], keep: &[usize], damping: f64) -> DVector<f64> {
         let damped = |more: f64| {
             let entry = |i: usize, j: usize| {
@@ -94,7 +95,8 @@ impl Curvature {
         }
     }
 
-    /// The inverse over all unknowns, without the directions of which the recordings show next to nothing.
+    /// Returns the eigenvectors of the scaled curvature and the inverse of each eigenvalue; 0 for directions of which the
+    /// recordings show next to nothing.
     pub fn spread(&self) -> (DMatrix<f64>, DVector<f64>) {
         let n = self.which.len();
         if n == 0 || self.matrix.iter().any(|v| !v.is_finite()) {
@@ -122,7 +124,7 @@ impl Curvature {
         all.filter(is_flat).map(|(_, v)| v.into_owned()).collect()
     }
 
-    /// The covariance over `all` unknowns; 0 for the others.
+    /// Returns the covariance as a matrix of `all` unknowns; 0 for unknowns that the curvature does not have.
     pub fn covariance(&self, all: usize) -> DMatrix<f64> {
         let (vectors, inverse) = self.spread();
         let inner = &vectors * DMatrix::from_diagonal(&inverse) * vectors.transpose();
@@ -136,13 +138,13 @@ impl Curvature {
     }
 }
 
-/// Places of what is true.
+/// Returns the indices of the entries that are true.
 pub fn places(which: &[bool]) -> Vec<usize> {
     (0..which.len()).filter(|j| which[*j]).collect()
 }
 
 impl Fit<'_> {
-    /// Unknowns that are free and not at a bound beyond which the sum of squares falls.
+    /// Returns the unknowns that are free and not at a bound beyond which the sum of squares falls.
     pub fn inner(&self, z: &[f64], gradient: &DVector<f64>, free: &[bool]) -> Vec<usize> {
         let is_inner = |j: &usize| {
             let ((low, high), z, slope) = (self.ends[*j], z[*j], gradient[*j]);
@@ -151,7 +153,8 @@ impl Fit<'_> {
         places(free).into_iter().filter(is_inner).collect()
     }
 
-    /// Searches from z over the unknowns `free`, with derivatives of nearby if there are any.
+    /// Searches the minimum from z over the unknowns `free`. If `derivatives` of a nearby point are given, the search begins with
+    /// them.
     ///
     /// # Errors
     /// If the system refuses the start, or every step of an unknown.
@@ -167,7 +170,7 @@ impl Fit<'_> {
         self.minimise_on(point, free, derivatives, end)
     }
 
-    /// The same from a point whose answer is known.
+    /// Searches the minimum as [`Fit::minimise`] does, from a point that is simulated already.
     ///
     /// # Errors
     /// If the system refuses every step of an unknown.
@@ -287,7 +290,7 @@ impl Fit<'_> {
         Ok(Minimum { point, derivatives, decrement, free: free.to_vec() })
     }
 
-    /// Distance of a point to the minimum over the unknowns `free`, standard deviations.
+    /// Returns the distance of a point to the minimum over the unknowns `free`, standard deviations.
     ///
     /// # Errors
     /// If the system refuses every step of an unknown.
@@ -302,7 +305,7 @@ impl Fit<'_> {
         Ok(step.iter().zip(&b).map(|(s, b)| s * b).sum::<f64>().max(0.0).sqrt())
     }
 
-    /// Derivatives at a minimum by the unknowns that were searched for.
+    /// Returns the derivatives at a minimum by the unknowns that were searched for, and keeps them there.
     ///
     /// # Errors
     /// If the system refuses every step of an unknown.

@@ -31,20 +31,22 @@ pub use search::Solution;
 
 /// Difference of −2 ln L that decides between two explanations (Kass and Raftery 1995: very strong).
 pub const DECIDES: f64 = 10.0;
-/// Difference of −2 ln L that tells nothing (ibid.: not worth more than a bare mention).
+/// Difference of −2 ln L that does not decide between two explanations (Kass and Raftery 1995: not worth more than a bare
+/// mention).
 pub const ALIKE: f64 = 2.0;
-/// Relative standard deviation from which on a value is vague: its likelihood may be no parabola.
+/// Relative standard deviation above which a value is vague, so that its likelihood may not be a parabola.
 pub const VAGUE: f64 = 0.05;
-/// Change of the residuals by a difference, in standard deviations of one degree of freedom: above the errors of a solver, below the
-/// curvature of the answer.
+/// Change of the residuals that the step of a difference aims at, as the norm of the whitened residuals: large enough to exceed
+/// the errors of a solver, small enough for curvature not to matter.
 pub const MOVE: f64 = 0.3;
 /// Shortest and longest step of a difference, in units of an unknown's reach.
 pub const STEPS: (f64, f64) = (1e-7, 0.2);
-/// Second over first difference from which on errors of a solver may decide a derivative: they alone make √3 of it.
+/// Ratio of the second to the first difference above which errors of a solver may decide a derivative; these errors alone make
+/// the ratio √3.
 pub const BEND: f64 = 0.3;
-/// Factor between the steps that are tried then.
+/// Factor between the wider steps that are tried if the ratio is above [`BEND`].
 pub const WIDER: f64 = 8.0;
-/// The first step, in the same units.
+/// First step of a difference, in units of an unknown's reach.
 pub const FIRST_STEP: f64 = 1e-3;
 /// Distance from a minimum, in standard deviations, up to which a search has converged, because the stated deviations contain it, and
 /// at which the last search ends.

@@ -7,9 +7,9 @@ use analysis::gauss_markov::{FLOOR, Noise};
 
 use super::problem::{Drift, Signal};
 
-/// Standard deviation of the logarithm of a drift's time about what is expected.
+/// Standard deviation of the logarithm of a drift's correlation time about its expected value.
 const TIME_WIDTH: f64 = 1.0;
-/// Least step of the search over these logarithms: a fiftieth of the width moves no estimate.
+/// Least step of the search over the logarithms of a drift's size and correlation time; a finer search moves no estimate.
 const LEAST_STEP: f64 = 0.05;
 
 impl Signal {

@@ -32,11 +32,13 @@ impl Hold {
 pub enum Role {
     /// The unknown acts in the system's run, of one recording or of all, so that its derivatives are differences of runs.
     Run(Option<usize>),
-    /// The reading of an output is so much late, s. The run takes it; the derivative is that of the output by time.
+    /// Delay of the reading of an output, s. The run takes it into account; its derivative is the derivative of the output by
+    /// time.
     Delay(usize),
     /// Added to the reading of an output, in one recording or in all.
     Bias(usize, Option<usize>),
-    /// So many times the second output is added to the reading of the first; of an output itself it is the error of its scale.
+    /// The second output times the unknown is added to the reading of the first. If both are the same output, the unknown is the
+    /// error of its scale.
     Gain(usize, usize),
     /// The unknown acts in no reading, but in quantities that [`System::derive`] computes.
     Derived,
@@ -72,12 +74,12 @@ pub struct Unknown {
 }
 
 impl Unknown {
-    /// A positive unknown in its logarithm.
+    /// Creates a positive unknown that is searched in its logarithm.
     pub fn positive(name: &str, unit: &str, role: Role, start: f64, bounds: (f64, f64)) -> Self {
         Unknown { log: true, reach: 0.3, ..Unknown::linear(name, unit, role, (start, 0.3), bounds) }
     }
 
-    /// An unknown in its value, with the distance from its start that is plausible.
+    /// Creates an unknown that is searched in its value; `reach` is the plausible distance from its start.
     pub fn linear(
         name: &str,
         unit: &str,
@@ -99,22 +101,20 @@ impl Unknown {
         }
     }
 
-    /// The same with a prior of the coordinate.
+    /// Returns the unknown with a prior, whose mean and standard deviation are in its coordinate.
     pub fn with_prior(self, mean: f64, std: f64) -> Self {
         Unknown { prior: Some((mean, std)), ..self }
     }
 
-    /// Returns the coordinate of a value.
     pub fn coordinate(&self, value: f64) -> f64 {
         if self.log { value.ln() } else { value }
     }
 
-    /// Returns the value of a coordinate.
     pub fn value(&self, z: f64) -> f64 {
         if self.log { z.exp() } else { z }
     }
 
-    /// Returns true if it acts in a recording.
+    /// Returns true if the unknown acts in a recording.
     pub fn is_of(&self, recording: usize) -> bool {
         match self.role {
             Role::Run(of) | Role::Bias(_, of) => of.is_none_or(|of| of == recording),
@@ -155,7 +155,7 @@ pub struct Drift {
     pub size: f64,
     /// Correlation time, s.
     pub time: f64,
-    /// Standard deviation of the logarithm of the size about what is expected.
+    /// Standard deviation of the logarithm of the size about its expected value.
     pub width: f64,
 }
 
@@ -194,10 +194,10 @@ pub trait System: Sync {
 
 /// Recordings that are fitted together, unknowns, and the system.
 ///
-/// `starts` are values of all unknowns, and `holds` possible courses of the inputs between rows, the likeliest first. With `acausal`
-/// a reading may come before its cause. `drawn` starts within the bounds are tried where those of the data lead to no good fit. The
-/// answer of a `rough` system has errors of a solver that jump from one value of an unknown to the next, so that the steps of differences
-/// have to stand above them.
+/// `starts` are values of all unknowns, and `holds` possible courses of the inputs between rows, the likeliest first. With
+/// `acausal` a reading may come before its cause. If the starts from the data lead to no good fit, `drawn` starts are drawn
+/// within the bounds. The outputs of a `rough` system have errors of a solver that jump from one value of an unknown to the next;
+/// the steps of differences then have to be so wide that their effect exceeds these errors.
 #[derive(Clone)]
 pub struct Problem<'a> {
     pub system: &'a dyn System,

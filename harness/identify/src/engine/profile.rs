@@ -11,21 +11,24 @@ use super::{DECIDES, Fit, VAGUE};
 pub const OPEN: f64 = Z * Z;
 /// Two-sided 95 % of the normal distribution.
 pub const Z: f64 = 1.96;
-/// Part by which the root of the likelihood's rise may differ from that of a parabola.
+/// Largest relative difference between the root of the likelihood's rise and a straight line, at which the likelihood still
+/// counts as a parabola.
 const PARABOLIC: f64 = 0.1;
-/// Sets of derivatives at one point, besides those of the point before.
+/// Largest number of sets of derivatives at one point of a profile, where the search begins with the derivatives of the point
+/// before.
 const SETS: usize = 4;
 /// Shortest and longest first step, and longest step, of the coordinate.
 const LENGTHS: [f64; 3] = [0.03, 0.5, 0.6];
-/// Distance to its minimum at which a point counts: it adds a hundredth of [`OPEN`].
+/// Distance to the minimum, in standard deviations, at which the search of a point ends: it adds a hundredth of [`OPEN`] to the
+/// sum of squares.
 const NEAR: f64 = 0.2;
-/// A set of derivatives that lessens the sum of squares of a point by less is the last one.
+/// Least decrease of the sum of squares by one set of derivatives; if a set gains less, the search of a point ends.
 const GAIN: f64 = 0.3;
-/// Values of an unknown that is bent, over its start, at which other minima are looked for.
+/// Values of the bent unknown, relative to its start, at which other minima are searched.
 const GRID: [f64; 6] = [0.03, 0.1, 0.3, 1.0, 3.0, 10.0];
-/// Points on a side at most.
+/// Largest number of points on one side of the minimum.
 const MOST: usize = 14;
-/// Fall of the sum of squares that makes another minimum.
+/// Decrease of the sum of squares from which on a minimum counts as a lower one.
 pub const LOWER: f64 = 0.5;
 
 /// An unknown, and the points of its profile in the order of the coordinate.
@@ -34,7 +37,6 @@ pub type Profile = (usize, Vec<Point>);
 /// A point of a profile.
 #[derive(Clone, Debug)]
 pub struct Point {
-    /// The coordinate.
     pub at: f64,
     /// The minimum over all other unknowns.
     pub minimum: Minimum,
@@ -66,8 +68,8 @@ impl Fit<'_> {
         Ok(self.bent.is_some())
     }
 
-    /// Part by which the root of the likelihood's rise along an unknown differs from that of a parabola, at the ends of its 95 %
-    /// interval or at a bound before them, the larger of both sides.
+    /// Returns by which part the root of the likelihood's rise along unknown `j` differs from the root of a parabola's rise, at
+    /// the ends of the 95 % interval or at a bound before them: the larger of both sides.
     ///
     /// # Errors
     /// If the system refuses every step of an unknown.
@@ -131,8 +133,9 @@ impl Fit<'_> {
         Ok(points)
     }
 
-    /// The profile at a minimum, along the unknown that is bent, and that unknown; `None` if there is none, or if it is known well
-    /// enough for its likelihood to be a parabola. The points are in the order of the coordinate, with those `beyond` its ends.
+    /// Returns the bent unknown and its profile through a minimum; `None` if no unknown is bent, or if the bent unknown is
+    /// determined so well that its likelihood is a parabola. The points are in the order of the coordinate. Points of `beyond`
+    /// outside the range of the profile are added.
     ///
     /// # Errors
     /// If the system refuses the minimum.
@@ -224,7 +227,7 @@ impl Fit<'_> {
     }
 }
 
-/// A curve through points that rises and falls only as they do (Fritsch and Carlson 1980).
+/// A cubic curve through points that is monotone wherever the points are (Fritsch and Carlson 1980).
 pub struct Curve {
     x: Vec<f64>,
     y: Vec<f64>,
@@ -232,7 +235,7 @@ pub struct Curve {
 }
 
 impl Curve {
-    /// The curve through points with growing x.
+    /// Creates the curve through points with growing x.
     pub fn new(x: &[f64], y: &[f64]) -> Self {
         let n = x.len();
         let d: Vec<f64> = (1..n).map(|k| (y[k] - y[k - 1]) / (x[k] - x[k - 1])).collect();

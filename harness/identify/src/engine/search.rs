@@ -1,4 +1,4 @@
-//! The search of a problem: from starts to a minimum, its noise, its profile and what it leaves.
+//! The search of a problem: from starts to a minimum, its noise, its profile and the tests of its residual.
 
 use analysis::gauss_markov::Noise;
 use analysis::innovations::Tests;
@@ -21,48 +21,51 @@ const PARTS: [f64; 7] = [0.1, 0.2, 0.3, 0.4, 0.55, 0.75, 1.0];
 const BEGINNING_NOISE: f64 = 0.03;
 /// Most sets of derivatives of the search over the whole that follows.
 const MOST_SETS: usize = 20;
-/// Noise over that of neighbouring rows from which on the residual has more in it than the sensor's noise.
+/// Ratio of the residual's white noise to the noise that neighbouring rows show, above which the residual contains more than the
+/// sensor's noise.
 const ABOVE: f64 = 1.5;
-/// Rounds of noise, minimum and profile at the end, each from a lower minimum.
+/// Largest number of rounds of noise, minimum and profile at the end of a search, each from a lower minimum.
 const ROUNDS: usize = 3;
-/// Turns of noise and minimum at most, and the part of the sum of squares that is left by the last one.
+/// Largest number of turns of noise and minimum, and the sum of squares over the number of rows above which a turn is the last
+/// one: it is 1 if the noise belongs to the residual.
 const TURNS: usize = 8;
 const SETTLED: f64 = 0.98;
-/// Doublings of the distance at which a side of a start is looked at.
+/// Largest number of doublings of the distance at which a side of a start is examined.
 const LOOKS: usize = 8;
-/// Distance at which a side of a start is looked at, standard deviations.
+/// First distance at which a side of a start is examined, standard deviations.
 const FAR: f64 = 3.0;
-/// Part of a parabola's rise there below which there is a kink, by its root.
+/// Root of the likelihood's rise at this distance, relative to the root of a parabola's rise, below which the likelihood has a
+/// kink.
 const KINKED: f64 = 0.8;
-/// Difference of −2 ln L within which two searches, neither of which has ended quite, have found the same minimum.
+/// Difference of −2 ln L below which two searches have found the same minimum, although neither has quite reached it.
 const SAME: f64 = 20.0;
-/// A start leads nowhere if the sum of squares over more than this part of the recordings is so many times that of the first search.
+/// A start leads nowhere if, over more than this part of the recordings, its sum of squares is more than so many times the sum of
+/// squares of the first search.
 const ASTRAY: (f64, f64) = (0.25, 3.0);
 /// Information of the recordings about a known value, relative to its tolerance, from which on the value is estimated.
 const SHOWN: f64 = 0.5;
 /// Most sets of derivatives of the last search, and the fall of the sum of squares below which a set is the last one.
 const LAST: (usize, f64) = (8, 0.3);
-/// Drift that the noise may have where a misfit is looked at: white noise over that of rows, size and least time of the drift.
+/// Limits of the noise while a misfit is examined: largest white noise over the noise of neighbouring rows, largest relative size
+/// and least correlation time (s) of the drift.
 const OWN: (f64, f64, f64) = (1.1, 0.3, 50.0);
 
 /// End of the search of one problem.
 pub struct Solution<'p> {
-    /// The problem, with the noise and the behaviour between rows that were found.
+    /// The problem, with the noise and the course of the inputs between rows that were found.
     pub fit: Fit<'p>,
-    /// The minimum.
     pub minimum: Minimum,
     /// The unknown along which the likelihood is no parabola, and its profile.
     pub profile: Option<Profile>,
-    /// Other behaviours between rows.
+    /// Courses of the inputs between rows that were not chosen.
     pub rivals: Vec<Rival>,
     /// Tests of each signal's residual.
     pub tests: Vec<Tests>,
-    /// Unknowns at a bound.
+    /// Indices of the unknowns at a bound.
     pub at_bound: Vec<usize>,
-    /// Starts of recordings that a kink of the likelihood leaves looser on a side than its curvature says, with the standard deviation
-    /// on either side over that of the curvature.
+    /// Initial values of recordings along which a kink of the likelihood leaves more room on a side than the curvature says, with
+    /// the standard deviation on each side over the standard deviation from the curvature.
     pub sides: Vec<(usize, [f64; 2])>,
-    /// Number of starts that were tried.
     pub starts: usize,
 }
 
@@ -73,10 +76,9 @@ impl Solution<'_> {
     }
 }
 
-/// Searches a problem, first from values that are given besides its starts.
+/// Searches the minimum of a problem from the values `first`, if there are any, and from the problem's starts.
 ///
-/// # Errors
-/// If no start leads anywhere.
+/// # Errors If the search fails from every start.
 pub fn solve<'p>(
     problem: &'p Problem<'p>,
     first: Option<Vec<f64>>,
@@ -184,9 +186,9 @@ struct Found {
     noise: Vec<Noise>,
     hold: super::Hold,
     rivals: Vec<Rival>,
-    /// −2 ln L with the behaviour between rows that is taken at first.
+    /// −2 ln L with the course between rows that is assumed at first.
     first: f64,
-    /// True if behaviours between rows were compared.
+    /// True if the courses between rows were compared.
     is_judged: bool,
     is_noise: bool,
     is_loud: bool,
@@ -206,7 +208,8 @@ impl Found {
         }
     }
 
-    /// Compares what the inputs may do between rows, and tests the residual of the best; the fit has its state afterwards.
+    /// Compares the courses of the inputs between rows and tests the residual of the best. The fit then has the best course and
+    /// its noise.
     fn judge(&mut self, fit: &mut Fit, news: &mut dyn FnMut(&News)) -> Result<()> {
         (fit.hold, fit.inflation) = (self.hold, 1.0);
         fit.set(self.noise.clone(), 1.0);
@@ -231,7 +234,7 @@ impl Found {
     }
 }
 
-/// A start within the bounds, or within the reach where there are none.
+/// Draws a start within the bounds and within three times each unknown's reach.
 fn drawn(problem: &Problem, random: &mut Random) -> Vec<f64> {
     let first = &problem.starts[0];
     let one = |(unknown, start): (&super::Unknown, &f64)| {
@@ -251,12 +254,12 @@ fn drawn(problem: &Problem, random: &mut Random) -> Vec<f64> {
 }
 
 impl Fit<'_> {
-    /// Returns true if a signal's noise is more than its neighbouring rows show.
+    /// Returns true if the noise of a signal is clearly larger than neighbouring rows show.
     pub fn is_loud(&self) -> bool {
         self.noise.iter().zip(&self.problem.signals).any(|(n, s)| n.white > ABOVE * s.white)
     }
 
-    /// Free unknowns at a bound.
+    /// Returns the free unknowns at a bound.
     pub fn stuck(&self, z: &[f64]) -> Vec<usize> {
         let is_stuck = |j: &usize| {
             let ((low, high), near) = (self.ends[*j], 1e-9 * self.problem.unknowns[*j].reach);
@@ -265,7 +268,8 @@ impl Fit<'_> {
         places(&self.free).into_iter().filter(is_stuck).collect()
     }
 
-    /// Returns a minimum that is not above a start of the problem: where a start is better, it is searched from there.
+    /// Returns a minimum that is not above a start of the problem: if a start has a smaller sum of squares, the minimum is
+    /// searched from this start.
     ///
     /// # Errors
     /// If the system refuses every step of an unknown.
@@ -280,7 +284,7 @@ impl Fit<'_> {
         Ok(minimum)
     }
 
-    /// Takes the recordings' own noise, where the residual has more in it.
+    /// Limits the noise to about the noise that neighbouring rows show, so that it does not contain the misfit of a model.
     pub fn limit_noise(&mut self) {
         let own = |(noise, signal): (&Noise, &Signal)| Noise {
             white: noise.white.min(OWN.0 * signal.white),
@@ -291,8 +295,8 @@ impl Fit<'_> {
         self.set(noise, self.part);
     }
 
-    /// The minimum with the noise that it leaves, with every unknown at a bound tried once more from its start, and lower ones that the
-    /// profile leads to.
+    /// Alternates between noise and minimum until the noise belongs to the residual. Unknowns at a bound are tried once more from
+    /// their starts, and a lower minimum on the profile replaces the minimum. Returns the minimum and its profile.
     ///
     /// # Errors
     /// If the system refuses the minimum.
@@ -363,8 +367,8 @@ impl Fit<'_> {
         Ok((minimum, profile))
     }
 
-    /// Frees known values of which the recordings tell about as much as was known: where slosh is not linear, or an encoder shows the
-    /// clock.
+    /// Frees the known values that the recordings determine about as well as their tolerances do, for example if slosh is not
+    /// linear, or if an encoder shows the error of the clock.
     ///
     /// # Errors
     /// If the system refuses the minimum.
@@ -391,8 +395,9 @@ impl Fit<'_> {
         Ok(())
     }
 
-    /// Looks to either side of the starts of recordings: dry friction that stops the hub before the first row that is fitted leaves a
-    /// kink in the likelihood, beyond which it is flat.
+    /// Returns the initial values of recordings with the factor of the standard deviation on each side (`Solution::sides`). It
+    /// differs from 1 if dry friction stops the hub before the first fitted row: the likelihood then has a kink, beyond which it
+    /// is flat.
     fn sides(&mut self, minimum: &Minimum) -> Vec<(usize, [f64; 2])> {
         let unknowns = &self.problem.unknowns;
         let is_start = |j: &usize| matches!(unknowns[*j].role, Role::Run(Some(_)));
@@ -436,8 +441,9 @@ impl Fit<'_> {
         self.tests(point).iter().all(Tests::passed) && !self.is_loud()
     }
 
-    /// The minimum with known values free within their tolerances, if more than noise is left without and noise with that: where
-    /// slosh is not linear, or an encoder shows the clock, a recording tells more of them than was known. They are free from then on.
+    /// Frees the known values within their tolerances if that turns a residual that is more than noise into noise, and returns
+    /// the minimum with them; otherwise returns `None` and leaves them fixed. It happens if slosh is not linear or an encoder
+    /// shows the clock, because a recording then determines some of them better than their tolerances.
     ///
     /// # Errors
     /// If the system refuses the minimum.
@@ -465,7 +471,9 @@ impl Fit<'_> {
         Ok(None)
     }
 
-    /// The minimum from a start, on the whole recordings with noise that counts less and less, or over beginnings that grow.
+    /// Returns the minimum from a start: over beginnings of the recordings that grow to the whole if `grows`, otherwise over the
+    /// whole recordings with less and less inflated noise. `course` has the sums of squares of the first search over growing
+    /// beginnings.
     fn search_from(&mut self, z: &[f64], grows: bool, course: &mut Vec<f64>) -> Result<Minimum> {
         let first = |fit: &Self| -> Vec<Noise> {
             fit.problem.signals.iter().map(Signal::first_noise).collect()

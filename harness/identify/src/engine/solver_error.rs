@@ -22,7 +22,6 @@ use super::problem::{Motion, Role, System};
 /// Part of an output's peak by which rounding may change it.
 const ROUNDING: f64 = 1e-12;
 
-/// Effect of the solver's errors.
 #[derive(Clone, Debug)]
 pub struct SolverError {
     /// Shift of each estimate, in its coordinate.
@@ -37,7 +36,8 @@ pub struct SolverError {
 const FOURTH: ([f64; 5], f64) = ([1.0, -4.0, 6.0, -4.0, 1.0], 70.0);
 const THIRD: ([f64; 5], f64) = ([-1.0, 2.0, 0.0, -2.0, 1.0], 10.0);
 
-/// A sample of the noise by one unknown, the norm of h³ times the third derivative without it, and h.
+/// Sample of the outputs' noise between neighbouring values of one unknown, norm of h³ times the third derivative without this
+/// noise, and the step h.
 struct Roughness {
     noise: DVector<f64>,
     third: f64,
@@ -70,8 +70,8 @@ impl Fit<'_> {
         Some(Roughness { noise, third: 0.5 * third.max(0.0).sqrt(), step })
     }
 
-    /// Measures the solver's errors at a point with these derivatives by the unknowns `which`. `finer` are the system with smaller
-    /// errors.
+    /// Measures the solver's errors at a point with these derivatives by the unknowns `which`. `finer` are copies of the system
+    /// whose solver has smaller errors.
     pub fn solver_error(
         &self,
         at: &Point,

@@ -7,12 +7,12 @@ use std::f64::consts::PI;
 
 use crate::tuning::{COARSE_TORQUE, CUBIC_SPACING, FINE_TORQUE, KERNEL_HALF, KERNEL_SHAPE};
 
-/// Values at all rows, and the rows that had one; `None`: all.
+/// Values at all rows, and which rows had a value of their own; `None`: all.
 pub type Clocked = (Vec<f64>, Option<Vec<bool>>);
 
-/// Completes values that are NaN in rows without one.
+/// Completes values that are NaN in rows without a value.
 ///
-/// A value between others is on the cubic through the four nearest ones or, where some were lost, on a line.
+/// A missing value is taken from the cubic through the four nearest values or, if some of these were lost, from a line.
 pub fn completed(time: &[f64], values: Vec<f64>) -> Clocked {
     let there: Vec<bool> = values.iter().map(|v| !v.is_nan()).collect();
     if there.iter().all(|there| *there) {
@@ -70,8 +70,9 @@ fn through(nodes: &[usize], time: &[f64], values: &[f64], at: f64) -> f64 {
     weights(&times, at).iter().zip(nodes).map(|(weight, k)| weight * values[*k]).sum()
 }
 
-/// Samples of a torque, and those of a band-limited one at instants close enough for lines: the samples themselves unless they are
-/// coarse. Even samples are interpolated by a windowed sinc, which is odd about the ends; uneven ones by cubics.
+/// Returns instants and values of a band-limited torque that are close enough to be joined by lines: the samples themselves
+/// unless they are coarse. Evenly spaced samples are interpolated by a windowed sinc, with samples beyond the ends mirrored at
+/// the end points; unevenly spaced samples are interpolated by cubics.
 pub fn refined(time: &[f64], values: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let n = time.len();
     let step = (time[n - 1] - time[0]) / (n - 1) as f64;
@@ -111,7 +112,7 @@ pub fn refined(time: &[f64], values: &[f64]) -> (Vec<f64>, Vec<f64>) {
     (fine_time, fine)
 }
 
-/// Sinc under a Kaiser window, x in samples.
+/// Returns the sinc under a Kaiser window at x samples.
 fn kernel(x: f64) -> f64 {
     let bessel = |z: f64| {
         let mut term = 1.0;

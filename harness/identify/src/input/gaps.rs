@@ -1,9 +1,11 @@
-//! Stretches in which no torque was recorded: filled where the torque itself foretells them, else the recording is cut there.
+//! Gaps in which no torque was recorded. A gap is filled if the torque around it predicts it; otherwise the recording is cut
+//! there.
 //!
 //! A torque of limited bandwidth that is sampled often is predictable over a gap: an autoregressive model of the samples on
-//! either side, forwards and backwards, gives the missing ones by least squares (Janssen, Veldhuis & Vries, IEEE Trans. ASSP 34,
-//! 1986). Whether that is good enough is measured: as many samples are taken out where all are known, and filled. An error of the
-//! torque is a kick of the hub, ∫Δτ dt/I, which rings in the liquid for a thousand rows; it must be small against the gyro's noise.
+//! either side, forwards and backwards, gives the missing samples by least squares (Janssen, Veldhuis & Vries, IEEE Trans. ASSP
+//! 34, 1986). Trials show whether the prediction is good enough: the same number of samples is removed in places where all are
+//! known, and filled. An error of the torque is a kick of the hub, ∫Δτ dt/I, which rings in the liquid for a thousand rows; it
+//! must be small against the gyro's noise.
 
 use analysis::statistics::{deviation, mean};
 use nalgebra::{DMatrix, DVector};
@@ -15,7 +17,8 @@ use crate::tuning::{
     LOST_SPACING, SHORTEST_RECORDING,
 };
 
-/// Fills the gaps that can be filled, and returns the rows before the others.
+/// Fills the gaps that can be filled, and returns the rows before the other gaps, after which the recording has to be cut. `done`
+/// receives a sentence on each change.
 pub fn bridged(all: Recording, done: &mut dyn FnMut(String)) -> (Recording, Vec<usize>) {
     let knots = all.commands();
     let time: Vec<f64> = knots.iter().map(|k| all.time[*k]).collect();
@@ -94,7 +97,8 @@ pub fn bridged(all: Recording, done: &mut dyn FnMut(String)) -> (Recording, Vec<
     with_rows(all, &knots, filled, cuts)
 }
 
-/// Samples of the torque before and after gap `n` up to the next gaps, at most [`GAP_SIDE`].
+/// Returns the samples of the torque before gap `n`, from the gap before it on, at most [`GAP_SIDE`]; `after` returns the samples
+/// on the other side.
 fn before<'v>(values: &'v [f64], gaps: &[usize], n: usize) -> &'v [f64] {
     let from = gaps.iter().filter(|gap| **gap < n).max().map_or(0, |gap| gap + 1);
     &values[from.max((n + 1).saturating_sub(GAP_SIDE))..=n]
@@ -105,7 +109,8 @@ fn after<'v>(values: &'v [f64], gaps: &[usize], n: usize) -> &'v [f64] {
     &values[n + 1..to.min(n + 1 + GAP_SIDE)]
 }
 
-/// Root mean square of the sums of errors where `lost` samples that are known are filled; infinite where that cannot be tried.
+/// Returns the root mean square of the summed errors of trial fillings of `lost` samples that are known; infinite if no trial is
+/// possible.
 fn tried_out(values: &[f64], gaps: &[usize], lost: usize) -> f64 {
     let side = 4 * GAP_ORDER;
     let room = values.len().saturating_sub(2 * side + lost);
@@ -139,7 +144,7 @@ fn tried_out(values: &[f64], gaps: &[usize], lost: usize) -> f64 {
     if squares.len() < GAP_TRIALS / 2 { f64::INFINITY } else { mean(&squares).sqrt() }
 }
 
-/// The `lost` samples between two stretches; `None` where these are too short.
+/// Predicts the `lost` samples between two stretches; `None` if the stretches are too short.
 fn fill(left: &[f64], right: &[f64], lost: usize) -> Option<Vec<f64>> {
     let order = GAP_ORDER.min((left.len() + right.len()) / 6).min(left.len().min(right.len()) / 2);
     if order < 4 {
@@ -193,7 +198,7 @@ fn fill(left: &[f64], right: &[f64], lost: usize) -> Option<Vec<f64>> {
     Some(found.iter().map(|x| x * size).collect())
 }
 
-/// The gyro's noise as an angular momentum of the hub, N·m·s.
+/// Returns the gyro's noise as an angular momentum of the hub, N·m·s.
 fn momentum(all: &Recording) -> f64 {
     let rate = all.of_fresh(&all.rate);
     let time = all.of_fresh(&all.time);
@@ -204,7 +209,7 @@ fn momentum(all: &Recording) -> f64 {
     all.rate_noise() * deviation(&all.torque) / deviation(&slopes).max(f64::MIN_POSITIVE)
 }
 
-/// The recording with filled samples in rows of their own, and the rows after which it is cut.
+/// Returns the recording with the filled samples in rows of their own, and the rows after which it is cut.
 fn with_rows(
     all: Recording,
     knots: &[usize],

@@ -8,7 +8,7 @@ use crate::tuning::WHEEL_WINDOW;
 use analysis::innovations;
 use analysis::statistics::{deviation, mean, median, noise_level};
 
-/// Returns true if an inertia is not off by a factor that only a wrong unit makes.
+/// Returns true if an inertia and the nominal one differ by less than a factor of 8: a larger factor means a wrong unit.
 pub fn is_size(inertia: f64, nominal: f64) -> bool {
     // revolutions per minute are a factor of 9.5
     (0.125..8.0).contains(&(nominal / inertia))
@@ -42,7 +42,7 @@ pub fn check_size(inertia: f64, nominal: f64) -> Result<()> {
     )
 }
 
-/// Evidence of further columns: notes for the reader, and doubts that no fit can remove.
+/// Returns what the wheel's speed and the rates about other axes show: notes for the reader, and doubts that no fit can remove.
 pub fn columns(recording: &Recording) -> (Vec<String>, Vec<String>) {
     let (mut notes, mut doubts) = (Vec::new(), Vec::new());
     if let Some(speed) = &recording.wheel_speed {
@@ -83,12 +83,13 @@ pub fn columns(recording: &Recording) -> (Vec<String>, Vec<String>) {
 struct Actuator {
     /// wheel.I, kg·m².
     inertia: f64,
-    /// First time at which the speed does not follow the torque, s, and total duration.
+    /// First time at which the speed does not follow the torque, s, and total duration of these times, s.
     missing: Option<(f64, f64)>,
 }
 
-/// I_w ΔΩ = −∫τ dt over windows: least squares of I_w, and windows that are off by more than a tenth of the
-/// largest and more than the speed's noise.
+/// Compares the wheel's speed Ω with the torque τ over windows, in which I_w ΔΩ = −∫τ dt. The wheel's inertia I_w is the median
+/// over windows with a large change of speed. The torque is missing in windows that are off by more than a tenth of the largest
+/// change plus six standard deviations of the speed's noise.
 fn actuator(recording: &Recording, speed: &[f64]) -> Actuator {
     let width = ((WHEEL_WINDOW / recording.step()) as usize).max(2);
     let noise = noise_level(speed);

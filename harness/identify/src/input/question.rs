@@ -10,7 +10,7 @@ use host::description::{ModelDescription, Type, Variable};
 use crate::input::names::list;
 use crate::input::tolerance::part;
 
-/// Ends the name of an unknown that each recording has one of.
+/// Suffix of the name of an unknown of which each recording has one of its own.
 pub const EACH: &str = "@each";
 
 /// `NAME=START[:LOW:HIGH]` or `NAME@each=START[:LOW:HIGH]`: a Real of the FMU that is set before it is initialised, or the error of
@@ -19,9 +19,8 @@ pub const EACH: &str = "@each";
 pub struct Free {
     /// Name in the FMU.
     pub name: String,
-    /// Each recording has its own, as a start has.
+    /// True if each recording has an unknown of its own, for example an initial value.
     pub each: bool,
-    /// Start of the search.
     pub start: f64,
     /// Bounds; `None`: the FMU's min and max.
     pub bounds: Option<(f64, f64)>,
@@ -52,14 +51,12 @@ impl FromStr for Free {
     }
 }
 
-/// `NAME=MEAN:STD`: what is known of an unknown beforehand.
+/// `NAME=MEAN:STD`: prior of an unknown.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Prior {
     /// The unknown's name, as the result has it.
     pub name: String,
-    /// Mean.
     pub mean: f64,
-    /// Standard deviation.
     pub std: f64,
 }
 
@@ -81,13 +78,11 @@ impl FromStr for Prior {
 /// to the value, NUMBER is in the unit; `±NUMBER` is in the variable's own unit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tolerance {
-    /// Name of a variable, of one with its recording (`NAME@2`), or of a scale (`scale(NAME)`, see [`scaled`]).
+    /// Name of a variable, for all recordings or for one of them (`NAME@2`), or of a scale (`scale(NAME)`, see [`scaled`]).
     pub name: String,
-    /// Size.
     pub size: Size,
 }
 
-/// Size of a tolerance.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Size {
     /// Relative to the value.
@@ -116,12 +111,12 @@ pub fn scaled(name: &str) -> Option<&str> {
     name.strip_prefix("scale(")?.strip_suffix(')')
 }
 
-/// `OUTPUT` or `OUTPUT=STD`: a sensor with a bias, another one in each recording, of which STD is known beforehand.
+/// `OUTPUT` or `OUTPUT=STD`: a sensor with a bias that differs from recording to recording. STD is the standard deviation of its
+/// prior about 0; without it there is no prior.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bias {
-    /// The output.
     pub output: String,
-    /// Standard deviation about 0.
+    /// Standard deviation of the prior about 0; `None` without a prior.
     pub std: Option<f64>,
 }
 
@@ -141,15 +136,15 @@ impl FromStr for Bias {
     }
 }
 
-/// `A,B,C=SCALE:ANGLE`: three outputs read by one instrument with three axes. A reading is
-/// y_i = Σ (δ_ij + M_ij) ω_j; of the M_ii, errors of scale, SCALE is the standard deviation, of the others, alignment, ANGLE (rad).
+/// `A,B,C=SCALE:ANGLE`: three outputs ω_j read by one instrument with three axes. Its readings are y_i = Σ (δ_ij + M_ij) ω_j.
+/// SCALE is the standard deviation of the errors of scale, M_ii; ANGLE (rad) is the standard deviation of the misalignments,
+/// M_ij.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Triad {
-    /// The outputs.
     pub outputs: [String; 3],
     /// Standard deviation of the errors of scale.
     pub scale: f64,
-    /// Standard deviation of the alignment, rad.
+    /// Standard deviation of the misalignments, rad.
     pub angle: f64,
 }
 
@@ -170,14 +165,13 @@ impl FromStr for Triad {
     }
 }
 
-/// `NAME=VALUE` or, of the second recording alone, `NAME@2=VALUE`.
+/// `NAME=VALUE` or, for the second recording only, `NAME@2=VALUE`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Setting {
     /// Name in the FMU.
     pub name: String,
     /// The recording, from 0; `None`: all.
     pub recording: Option<usize>,
-    /// The value as text.
     pub value: String,
 }
 
@@ -200,7 +194,8 @@ impl FromStr for Setting {
 }
 
 impl Setting {
-    /// Returns the name, with the number of its recording if it is of one alone (`NAME@2`), and the value.
+    /// Returns the name and the value. The name has the number of the recording if the setting is for one recording only
+    /// (`NAME@2`).
     pub fn named(&self) -> (String, String) {
         let name = match self.recording {
             None => self.name.clone(),
@@ -219,18 +214,13 @@ pub enum Solver {
     Host(f64),
 }
 
-/// Input of an identification.
 #[derive(Clone, Debug)]
 pub struct Question {
-    /// Unknowns.
     pub free: Vec<Free>,
-    /// Priors.
     pub priors: Vec<Prior>,
-    /// Tolerances of known values: unknowns with a prior that are not asked for.
+    /// Tolerances of known values: they are unknowns with a prior, but are not reported as estimates.
     pub tolerances: Vec<Tolerance>,
-    /// Settings.
     pub settings: Vec<Setting>,
-    /// Inputs that are driven.
     pub inputs: Vec<String>,
     /// Inputs that are held from row to row; the others are interpolated linearly.
     pub held: Vec<String>,
@@ -238,7 +228,6 @@ pub struct Question {
     pub outputs: Vec<String>,
     /// Sensors that read what is not an output of the FMU: a wave gauge, a camera.
     pub sensors: Vec<Sensor>,
-    /// Sensors with a bias.
     pub biases: Vec<Bias>,
     /// Instruments with three axes.
     pub triads: Vec<Triad>,
@@ -248,7 +237,8 @@ pub struct Question {
     pub solver: Solver,
     /// Relative tolerance that the FMU's own solver is given; `None`: its own choice.
     pub tolerance: Option<f64>,
-    /// Starts that are drawn within the bounds where the search from the first one ends at no good fit.
+    /// Largest number of starts: the first is given, and the others are drawn within the bounds if the search from it ends at no
+    /// good fit.
     pub starts: usize,
 }
 
@@ -276,7 +266,7 @@ impl Question {
         Ok(Some((sensor, quantity, channel)))
     }
 
-    /// The unit of an output.
+    /// Returns the unit of an output of the FMU or of a column of a sensor.
     ///
     /// # Errors
     /// If there is no such output.
@@ -288,7 +278,7 @@ impl Question {
     }
 }
 
-/// A Real of the FMU.
+/// Returns the Real variable of the FMU with this name.
 pub fn real<'a>(description: &'a ModelDescription, name: &str) -> Result<&'a Variable> {
     let variable = description.variable(name)?;
     ensure!(variable.kind() == Type::Real, "{name} is a {:?} (allowed: Real)", variable.kind());

@@ -32,8 +32,8 @@ pub struct Source {
     pub trim: Option<(f64, f64)>,
 }
 
-/// Reads a file with the signals [`REQUIRED`] and [`OPTIONAL`]. Rows outside `trim` are left out; rows may be
-/// `coarsest` (s) apart. `done` hears what was done to it.
+/// Reads a file with the signals [`REQUIRED`] and [`OPTIONAL`]. Rows outside `trim` are left out; rows may be `coarsest` (s)
+/// apart. `done` receives a sentence on each change.
 pub fn read(
     path: &Path,
     source: &Source,
@@ -55,7 +55,8 @@ pub fn read(
     prepare(trimmed(all, source.trim, done), coarsest, done)
 }
 
-/// The rows in which something was measured, from the first to the last value of the torque, with each signal on its own clock.
+/// Returns the rows in which a torque, a rate or an angle was recorded, from the first to the last value of the torque. Each
+/// signal keeps its own clock.
 fn assembled(name: &str, table: &Table, done: &mut dyn FnMut(String)) -> Result<Recording> {
     let column = |name: &str| table.column(name);
     let (time, torque) = (column("time"), column("tau_cmd"));
@@ -109,8 +110,8 @@ fn assembled(name: &str, table: &Table, done: &mut dyn FnMut(String)) -> Result<
 /// Signals of a free decay, in the order of preference.
 pub const DECAYING: [&str; 4] = ["wave_height", "force", "theta", "omega"];
 
-/// Reads a free decay, one signal of [`DECAYING`] without a torque: that of `source.columns`, else the first that the
-/// file has. Its name, and its values as the recording's rate.
+/// Reads a free decay, which is one signal of [`DECAYING`] without a torque: the signal that `source.columns` names, otherwise
+/// the first that the file has. Returns the signal's name, and a recording that has its values in place of the rate.
 pub fn read_decay(
     path: &Path,
     source: &Source,
@@ -157,7 +158,7 @@ pub fn read_decay(
     Ok((found, all))
 }
 
-/// The rows within two times.
+/// Returns the rows within two times, s.
 fn trimmed(all: Recording, trim: Option<(f64, f64)>, done: &mut dyn FnMut(String)) -> Recording {
     let Some((from, to)) = trim else { return all };
     let (before, part) = (all.time.len(), all.between(from, to));
@@ -166,7 +167,7 @@ fn trimmed(all: Recording, trim: Option<(f64, f64)>, done: &mut dyn FnMut(String
     part
 }
 
-/// Checks a recording, whose rows may be `coarsest` (s) apart, and cuts it at its gaps.
+/// Checks a recording, whose rows may be `coarsest` (s) apart, and cuts it where a gap of the torque cannot be filled.
 pub fn prepare(
     all: Recording,
     coarsest: f64,
@@ -417,7 +418,7 @@ fn is_stuck(part: &Recording) -> bool {
         && innovations::crossed(&unit, &part.torque, part.step()) < innovations::LIMIT
 }
 
-/// Torque and rate averaged over 0.1 s, to tame the noise of differences.
+/// Returns torque and rate averaged over 0.1 s, so that their differences have less noise.
 fn smoothed(part: &Recording) -> Result<(Vec<f64>, Vec<f64>)> {
     let (step, torque, rate) = part.even()?;
     let width = ((0.1 / step) as usize).max(1);
@@ -531,7 +532,7 @@ mod tests {
         }
     }
 
-    /// The rows of a recording without those between some.
+    /// Returns a recording without the rows `lost`.
     fn without(all: &Recording, lost: &[std::ops::Range<usize>]) -> Recording {
         let mut parts: Vec<Recording> = Vec::new();
         let mut from = 0;
@@ -586,7 +587,7 @@ mod tests {
         assert!(!parts[1].from_rest);
     }
 
-    /// Empty cells of a slow gyro: the rows drive the model all the same, at every torque.
+    /// A slow gyro leaves cells empty; these rows still drive the model with their torque.
     #[test]
     fn rows_without_a_sensor_keep_their_torque() {
         let directory = tempfile::tempdir().unwrap();

@@ -14,7 +14,6 @@ use crate::tuning::FEWEST_VALUES;
 /// One recording, in the FMU's units.
 #[derive(Clone, Debug, Default)]
 pub struct Record {
-    /// The file's name.
     pub name: String,
     /// s, growing.
     pub time: Vec<f64>,
@@ -25,10 +24,9 @@ pub struct Record {
 }
 
 impl Record {
-    /// Reads one.
+    /// Reads a recording from a file.
     ///
-    /// # Errors
-    /// If the file cannot be read so.
+    /// # Errors If the file cannot be read, lacks a signal of the question, or fails [`Record::check`].
     pub fn read(
         path: &Path,
         question: &Question,
@@ -66,7 +64,7 @@ impl Record {
         Ok(record)
     }
 
-    /// Refuses what cannot be fitted.
+    /// Fails if an output has too few values, or if times or values are out of range.
     pub fn check(&self, question: &Question) -> Result<()> {
         for (name, values) in question.outputs.iter().zip(&self.outputs) {
             let count = values.iter().filter(|y| !y.is_nan()).count();
@@ -88,7 +86,7 @@ impl Record {
         Ok(())
     }
 
-    /// Rows that have a value of an output.
+    /// Returns for each row whether it has a value of an output.
     pub fn sampled(&self, output: usize) -> Vec<bool> {
         self.outputs[output].iter().map(|y| !y.is_nan()).collect()
     }
@@ -97,19 +95,18 @@ impl Record {
         self.outputs[output].iter().copied().filter(|y| !y.is_nan()).collect()
     }
 
-    /// Standard deviation of an output's values, or what they are where they are all the same.
+    /// Returns the standard deviation of an output's values; if all values are the same, their size, at least 1.
     pub fn spread(&self, output: usize) -> f64 {
         let values = self.values(output);
         let spread = deviation(&values);
         if spread > 0.0 { spread } else { peak(&values).max(1.0) }
     }
 
-    /// The noise that an output shows from row to row.
+    /// Returns the standard deviation of the noise that an output shows from row to row.
     pub fn noise(&self, output: usize) -> f64 {
         noise_level(&self.values(output))
     }
 
-    /// Returns the first rows.
     pub fn first_rows(&self, rows: usize) -> Record {
         let cut = |columns: &[Vec<f64>]| columns.iter().map(|c| c[..rows].to_vec()).collect();
         Record {

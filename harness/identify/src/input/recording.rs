@@ -1,7 +1,8 @@
 //! A recording of a bench: torque command and hub rate against time, in SI units.
 //!
-//! It is not resampled: the FMU is stepped to the very instants of the rows. Each signal has its own clock: a row without a value of
-//! a sensor is not fitted to it, and drives the FMU all the same ([`crate::input::clocks`]). [`crate::input::reading`] reads files.
+//! It is not resampled: the FMU is stepped to the very instants of the rows. Each signal has its own clock: a row without a value
+//! of a sensor is not compared with this sensor, but still drives the FMU ([`crate::input::clocks`]). [`crate::input::reading`]
+//! reads files.
 
 use std::borrow::Cow;
 
@@ -27,32 +28,32 @@ pub struct Recording {
     pub angle: Option<Vec<f64>>,
     /// Specific force along the tank's axis, m/s², if it was recorded: an input like the torque.
     pub gravity: Option<Vec<f64>>,
-    /// Speed of the reaction wheel, rad/s: what the torque really was.
+    /// Speed of the reaction wheel, rad/s, which shows whether the wheel gave the commanded torque.
     pub wheel_speed: Option<Vec<f64>>,
-    /// Rates about the hub's x and y axes, rad/s: what the model leaves out.
+    /// Rates about the hub's x and y axes, rad/s, about which the model does not turn.
     pub off_axis: [Option<Vec<f64>>; 2],
     /// True if the recording begins at rest; otherwise the initial state is unknown.
     pub from_rest: bool,
-    /// Rows with a new value of the gyro that belongs to its motion; the others are not fitted. `None`: all.
+    /// True for rows with a new value of the gyro that is no fault of the sensor. Only these rows are fitted. `None`: all.
     pub fresh: Option<Vec<bool>>,
-    /// The same of the encoder.
+    /// True for rows with a new value of the encoder that is no fault of the sensor. `None`: all.
     pub angle_fresh: Option<Vec<bool>>,
-    /// Rows with a value of the torque; in the others it lies between those. `None`: all.
+    /// True for rows with a value of the torque. In the other rows the torque is interpolated. `None`: all.
     pub commanded: Option<Vec<bool>>,
 }
 
-/// A row among those that are filled in.
+/// A row of a recording in which torques are filled in.
 #[derive(Clone, Copy, Debug)]
 pub struct Row {
     /// s.
     pub time: f64,
-    /// The row of the recording that it is.
+    /// Index of the row in the recording; `None` if the row is added.
     pub own: Option<usize>,
-    /// A torque that is filled in, N·m.
+    /// Torque that is filled in, N·m.
     pub filled: Option<f64>,
 }
 
-/// The values of the rows that a mask has.
+/// Returns the values of the rows in which a mask is true.
 pub(crate) fn masked(values: &[f64], mask: Option<&[bool]>) -> Vec<f64> {
     match mask {
         None => values.to_vec(),
@@ -76,7 +77,7 @@ impl Recording {
         self.duration() / (self.time.len() - 1) as f64
     }
 
-    /// The recording with each signal mapped; `mask` maps which rows of a signal have a value.
+    /// Returns the recording with each signal mapped by `of`, and each list of rows with a value mapped by `mask`.
     fn mapped(
         &self,
         of: impl Fn(&Vec<f64>) -> Vec<f64>,
@@ -96,19 +97,19 @@ impl Recording {
         }
     }
 
-    /// The rows `from..to`.
+    /// Returns the rows `from..to`, whose initial state is unknown.
     pub(crate) fn rows(&self, from: usize, to: usize) -> Recording {
         let part = self.mapped(|x| x[from..to].to_vec(), |mask| Some(mask[from..to].to_vec()));
         Recording { from_rest: false, ..part }
     }
 
-    /// Rows with a value of the torque.
+    /// Returns the rows with a value of the torque.
     pub fn commands(&self) -> Vec<usize> {
         let commanded = self.commanded.as_deref();
         (0..self.time.len()).filter(|k| commanded.is_none_or(|rows| rows[*k])).collect()
     }
 
-    /// Usual time between values of the torque, s.
+    /// Returns the mean time between values of the torque, s.
     pub fn torque_step(&self) -> f64 {
         match &self.commanded {
             None => self.step(),
@@ -119,7 +120,7 @@ impl Recording {
         }
     }
 
-    /// The recording on other rows.
+    /// Returns the recording on other rows. Values that a signal does not have in them are interpolated.
     pub fn with_rows(&self, rows: &[Row]) -> Recording {
         let time: Vec<f64> = rows.iter().map(|row| row.time).collect();
         let of = |values: &[f64], mask: Option<&[bool]>| {
@@ -158,12 +159,12 @@ impl Recording {
         }
     }
 
-    /// Values of the rows with a new value of the gyro.
+    /// Returns the values of the rows with a new value of the gyro.
     pub fn of_fresh(&self, values: &[f64]) -> Vec<f64> {
         masked(values, self.fresh.as_deref())
     }
 
-    /// Values of the rows with a value of the encoder.
+    /// Returns the values of the rows with a new value of the encoder.
     pub fn of_fresh_angle(&self, values: &[f64]) -> Vec<f64> {
         masked(values, self.angle_fresh.as_deref())
     }
@@ -174,12 +175,12 @@ impl Recording {
         mean(&first)
     }
 
-    /// Standard deviation of the gyro's white noise, rad/s.
+    /// Returns the standard deviation of the gyro's white noise, rad/s.
     pub fn rate_noise(&self) -> f64 {
         noise_level(&self.of_fresh(&self.rate))
     }
 
-    /// A recording of torque and rate alone.
+    /// Creates a recording that has only torque and rate, and begins at rest.
     pub fn of(name: &str, time: Vec<f64>, torque: Vec<f64>, rate: Vec<f64>) -> Self {
         Recording {
             name: name.into(),
@@ -197,7 +198,8 @@ impl Recording {
         }
     }
 
-    /// Finds the rows in which a gyro that is slower than the recording has a new value; `false`: all have one.
+    /// Marks the rows in which a gyro that is slower than the recording has a new value. Returns false if the gyro has a new
+    /// value in every row.
     pub(crate) fn with_repeats(&mut self) -> bool {
         let places: Vec<usize> = (0..self.time.len())
             .filter(|k| self.fresh.as_ref().is_none_or(|fresh| fresh[*k]))
@@ -210,21 +212,21 @@ impl Recording {
         true
     }
 
-    /// The rows from one time to another, s.
+    /// Returns the rows from one time to another, s.
     pub fn between(&self, from: f64, to: f64) -> Recording {
         let first = self.time.partition_point(|t| *t < from);
         let last = self.time.partition_point(|t| *t <= to);
         self.rows(first, last.max(first))
     }
 
-    /// The first part, `fraction` of the rows.
+    /// Returns the first part of the recording, `fraction` of its rows.
     pub fn beginning(&self, fraction: f64) -> Recording {
         let rows = ((self.time.len() as f64 * fraction) as usize).max(2);
         let part = self.rows(0, rows.min(self.time.len()));
         Recording { from_rest: self.from_rest, ..part }
     }
 
-    /// The first rows, with the start of the whole.
+    /// Returns the first rows. They begin at rest if the recording does.
     pub(crate) fn first_rows(&self, rows: usize) -> Recording {
         Recording { from_rest: self.from_rest, ..self.rows(0, rows) }
     }
@@ -252,7 +254,8 @@ impl Recording {
         Ok(step)
     }
 
-    /// Torque and rate on an even grid of the mean step, joined by lines: for spectra alone.
+    /// Returns the mean step (s), and torque and rate interpolated linearly onto an even grid with this step. They serve only
+    /// spectra.
     ///
     /// # Errors
     /// If times or values are out of range.
@@ -261,7 +264,7 @@ impl Recording {
         own.even_rows()
     }
 
-    /// The rows of a gyro that is slower than the recording; else all.
+    /// Returns the rows with a value of the gyro if it is slower than the recording; otherwise all rows.
     pub fn of_gyro(&self) -> Cow<'_, Recording> {
         let rows: Vec<usize> =
             (0..self.time.len()).filter(|k| self.fresh.as_ref().is_none_or(|f| f[*k])).collect();

@@ -6,7 +6,7 @@ use anyhow::{Context, Result, ensure};
 
 use crate::input::recording::Recording;
 
-/// Frequencies between which the torque has its power, Hz.
+/// Returns the frequencies between which the torque has 98 % of its power, Hz.
 pub fn excited_band(step: f64, torque: &[f64], rate: &[f64]) -> Option<(f64, f64)> {
     let spectra = Spectra::estimate(step, torque, rate, welch::Segments::Seconds(60.0));
     let total: f64 = spectra.input.iter().skip(1).sum();
@@ -21,7 +21,7 @@ pub fn excited_band(step: f64, torque: &[f64], rate: &[f64]) -> Option<(f64, f64
     Some(((low + 1.0) * spectra.resolution, (high + 1.0) * spectra.resolution))
 }
 
-/// Frequency response of torque to rate over the band that the torque excites.
+/// Estimates the frequency response from torque to rate over the band that the torque excites.
 pub fn response(recording: &Recording) -> Result<FrequencyResponse> {
     let (step, torque, rate) = recording.even()?;
     let band = excited_band(step, &torque, &rate).context("the torque has no spectrum")?;

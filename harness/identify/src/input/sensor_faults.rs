@@ -1,5 +1,5 @@
-//! Values of a sensor that are not its motion: repeated by the logger, clipped at the end of the range, frozen. They are named and
-//! not fitted.
+//! Finds values of a sensor that do not show the motion, because the logger repeated them, or because the sensor was clipped at
+//! the end of its range or frozen. They are reported and not fitted.
 
 use analysis::statistics::{mean, median, noise_level, peak};
 
@@ -9,26 +9,26 @@ use crate::tuning::{
     REPEATS, SENSOR_ROUNDING,
 };
 
-/// Faults of a sensor.
 #[derive(Debug, Default, PartialEq)]
 pub struct Faults {
-    /// Values that are not to be fitted.
+    /// Rows whose values are not to be fitted.
     pub rows: Vec<usize>,
-    /// Sentences that name them.
+    /// Sentences that name the faults.
     pub words: Vec<String>,
 }
 
 /// Reading of a sensor while the hub rests.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Rest {
-    /// A rate: this value, if known.
+    /// A rate reads this value (the gyro's bias), if it is known.
     Rate(Option<f64>),
-    /// An angle: any value. It leaves that value with zero rate.
+    /// An angle may have any value. When the hub begins to turn, the angle leaves this value with zero rate.
     Angle,
 }
 
 impl Rest {
-    /// Returns how far the value after row k leaves that of row k like one that was clipped or frozen, not like a hub that rested.
+    /// Returns the jump from row k to the next row by which a value ends that was clipped or frozen; `None` if the hub rested at
+    /// this value. The smooth motion of an angle that leaves its rest is subtracted.
     fn jump(self, values: &[f64], k: usize) -> Option<f64> {
         let step = (values.get(k + 1)? - values[k]).abs();
         match self {
@@ -42,7 +42,7 @@ impl Rest {
     }
 }
 
-/// Looks for faults in values, of `name`, at growing times, s. The values of a hub that rests are no fault.
+/// Finds the faults in the values of the sensor `name` at growing times, s. Equal values while the hub rests are no fault.
 pub fn find(name: &str, time: &[f64], values: &[f64], rest: Rest) -> Faults {
     let mut found = Faults::default();
     if values.len() < 100 {
@@ -108,7 +108,7 @@ pub fn find(name: &str, time: &[f64], values: &[f64], rest: Rest) -> Faults {
     found
 }
 
-/// Returns true if the largest and the least value are opposite: those of a range are.
+/// Returns true if the largest and the least value are opposite, as the ends of a sensor's range are.
 fn is_opposite(values: &[f64]) -> bool {
     let ends = values
         .iter()
@@ -116,7 +116,8 @@ fn is_opposite(values: &[f64]) -> bool {
     (ends.0 + ends.1).abs() <= SENSOR_ROUNDING * peak(values)
 }
 
-/// Rows at an end of the range, if they are many and stand together: the sensor clips there, or the hub rests.
+/// Returns the rows with the largest value (or the least, if `sign` is −1) if they are many and adjacent: the sensor clips there,
+/// or the hub rests.
 fn held(values: &[f64], sign: f64, (noise, resolution): (f64, f64)) -> Vec<usize> {
     let end = values.iter().fold(f64::NEG_INFINITY, |end, v| end.max(sign * v));
     let rows: Vec<usize> = (0..values.len()).filter(|k| sign * values[*k] == end).collect();
@@ -133,14 +134,14 @@ fn held(values: &[f64], sign: f64, (noise, resolution): (f64, f64)) -> Vec<usize
     if many && 2 * in_runs > rows.len() { rows } else { Vec::new() }
 }
 
-/// Median step with which values leave the end of the range that they have in these rows.
+/// Returns the median jump with which the values leave the end of the range that they have in these rows.
 fn leaves(values: &[f64], rows: &[usize], rest: Rest) -> Option<f64> {
     let last = rows.iter().filter(|k| values.get(**k + 1) != Some(&values[**k]));
     let jumps: Vec<f64> = last.filter_map(|k| rest.jump(values, *k)).collect();
     median(&jumps)
 }
 
-/// Least difference of two values that differ.
+/// Returns the least difference of two values that differ by more than rounding.
 fn resolution(values: &[f64]) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -149,9 +150,9 @@ fn resolution(values: &[f64]) -> f64 {
     steps.fold(f64::INFINITY, f64::min)
 }
 
-/// First and last rows of runs of equal values that chance does not make, that are off the mean and that end in a jump. A hub at
-/// rest reads its gyro's bias, which is near the mean. If a sensor freezes once, one of both is enough for its other runs: a rate
-/// may freeze near its mean, or come back near the frozen value.
+/// Returns the first and last rows of runs of equal values in which the sensor is frozen: they are too long for chance, off the
+/// mean (a hub at rest reads its gyro's bias, which is near the mean), and end in a jump. If the sensor freezes once, its other
+/// runs need only one of the two signs, because a rate may freeze near its mean, or come back near the frozen value.
 fn frozen(values: &[f64], out: &[bool], noise: f64, rest: Rest) -> Vec<(usize, usize)> {
     let runs = runs(values);
     let is_long = |(a, b): &&(usize, usize)| b - a + 1 >= FROZEN_RUN;
@@ -179,7 +180,7 @@ fn frozen(values: &[f64], out: &[bool], noise: f64, rest: Rest) -> Vec<(usize, u
     runs.into_iter().filter(is_frozen).collect()
 }
 
-/// First and last rows of the runs of equal values.
+/// Returns the first and last rows of the runs of equal values.
 fn runs(values: &[f64]) -> Vec<(usize, usize)> {
     let mut runs = Vec::new();
     let mut first = 0;
@@ -192,7 +193,8 @@ fn runs(values: &[f64]) -> Vec<(usize, usize)> {
     runs
 }
 
-/// Rows that repeat the value before them, if they do so where it moves. A long run of an angle that ends without a jump is a hub at rest.
+/// Returns the rows that repeat the value before them although the signal moves there. A long run of an angle that ends without a
+/// jump is no fault, because the hub rests.
 fn repeated(time: &[f64], values: &[f64], out: &[bool], noise: f64, rest: Rest) -> Vec<usize> {
     let moves = |(a, b): &(usize, usize)| {
         let jumps = || rest.jump(values, *b).is_some_and(|jump| jump > FAULT_LEAVES * noise);

@@ -1,16 +1,16 @@
-//! Single values of the gyro that belong to no motion: transmission errors, bits that fell over.
+//! Finds single values of the gyro that belong to no motion, such as transmission errors and flipped bits.
 //!
-//! A value is held against the cubic through its two neighbours on either side, at even rows
+//! A value is compared with the cubic through its two neighbours on either side. At even rows the difference is
 //!
 //! ```text
 //! r_k = y_k − (−y_{k−2} + 4 y_{k−1} + 4 y_{k+1} − y_{k+2})/6
 //! ```
 //!
-//! White noise σ makes √(1 + 34/36) σ = 1.39 σ of it, a motion of a few hertz next to nothing, a step of the torque a kink.
-//! At uneven rows r is scaled to the same noise. The limit follows the values around: a resonance that is sampled slowly is in
-//! all of them.
-//! The largest is taken out first, for a spike spoils the cubic of its neighbours. The rows are left out of the fit, which is
-//! Hampel's loss with its three bends in one place: far out a value has no weight at all.
+//! White noise of standard deviation σ gives r a standard deviation of √(1 + 34/36) σ = 1.39 σ; a motion of a few hertz gives
+//! next to nothing, and a step of the torque gives a kink. At uneven rows r is scaled to the same noise. The limit of r grows
+//! with the values of r around a row, because a resonance that is sampled slowly makes all of them large. The largest spike is
+//! taken out first, because a spike spoils the cubic of its neighbours. The rows of spikes are left out of the fit, because a
+//! value so far out should have no weight (a robust loss such as Hampel's does the same).
 
 use std::collections::{BTreeMap, BinaryHeap};
 
@@ -19,7 +19,7 @@ use analysis::statistics::{median, noise_level, peak};
 use crate::input::clocks::weights;
 use crate::tuning::{SPIKE_AROUND, SPIKE_BEYOND, SPIKE_NEAR_STEP, SPIKE_SHARE, TORQUE_STEP};
 
-/// σ of r over that of white noise.
+/// Standard deviation of r over the standard deviation σ of white noise.
 const GAIN: f64 = 1.394;
 
 /// Returns the differences of values at growing times from the cubics through their neighbours, scaled to the noise of even rows.
@@ -32,8 +32,8 @@ pub fn off_neighbours(time: &[f64], y: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// Rows of a rate whose value is a spike, growing, each with the cubic's rate; of `fresh` rows alone where given.
-/// Empty where there are none, or more than can be called so.
+/// Returns the rows of a rate whose value is a spike, in order, each with the rate of the cubic. If `fresh` is given, only its
+/// rows are used. The result is empty if there are no spikes, or so many that they are noise of another kind.
 pub fn find(
     time: &[f64],
     rate: &[f64],
@@ -98,7 +98,7 @@ pub fn find(
     taken.iter().map(|&k| (rows[k], off((&t, &y), &sound, k).1)).collect()
 }
 
-/// Rows without those taken out.
+/// Rows, some of which are taken out.
 struct Sound {
     rows: usize,
     /// First and last row of each stretch that is out. Stretches do not touch: in a burst of spikes the nearest sound row is

@@ -8,7 +8,7 @@ use crate::tuning::TOLD_SHARE;
 /// Relative standard deviations of numbers that the recording cannot show.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tolerances {
-    /// Scale of the torque: torque that acts over the recorded one.
+    /// Scale of the torque: torque that acts over the recorded torque.
     pub torque: f64,
     /// Rate of the recording's clock.
     pub clock: f64,
@@ -20,7 +20,7 @@ pub struct Tolerances {
     pub density: f64,
 }
 
-/// The names, in their order.
+/// Names of the tolerances, in the order of their fields.
 pub const NAMES: [&str; 5] = ["torque", "clock", G_AXIAL, tank::R, fluid::RHO];
 
 impl Default for Tolerances {
@@ -48,7 +48,6 @@ pub fn part(name: &str, text: &str) -> Result<Option<f64>> {
 
 /// Share of tolerances in the variance of an estimate.
 pub struct Share {
-    /// The estimate.
     pub name: String,
     /// Share, 0 to 1.
     pub share: f64,
@@ -73,7 +72,7 @@ pub fn shares(known: &[String], shares: &[Share]) -> Option<String> {
 }
 
 impl Tolerances {
-    /// All is known exactly.
+    /// No tolerances: all values are known exactly.
     pub const NONE: Tolerances =
         Tolerances { torque: 0.0, clock: 0.0, gravity: 0.0, arm: 0.0, density: 0.0 };
 
@@ -82,7 +81,7 @@ impl Tolerances {
         [self.torque, self.clock, self.gravity, self.arm, self.density]
     }
 
-    /// Sets those of a text like `torque=1%,tank.r=0.002`.
+    /// Sets the tolerances that a text names, for example `torque=1%,tank.r=0.002`.
     pub fn with(mut self, text: &str) -> Result<Self> {
         for item in text.split(',') {
             let (name, value) = item

@@ -19,30 +19,29 @@ use crate::news::News;
 use crate::words::identified::{Identified, Residual};
 use crate::words::verdict::failed;
 
-/// Part of the oscillation that another one in the residual has, from which on it is named.
+/// Amplitude of another oscillation in the residual, relative to the decaying one, above which the verdict names it.
 const NAMED: f64 = 0.02;
-/// Drift of a probe, of which next to nothing is known.
+/// Expected drift of a probe. Its width is large because next to nothing is known of it.
 const DRIFT: Drift = Drift { size: 0.3, time: 1.0, width: 3.0 };
 
-/// The result; `measurement` has f, ζ, ζ_A and κ.
+/// Result; `measurement` has the frequency f, the damping ratio ζ, its growth ζ_A with the amplitude, and the hardening κ.
 pub type Found = Identified<Details>;
 
 /// Results that only this method has.
 #[derive(Clone, Debug, Serialize)]
 pub struct Details {
-    /// The signal.
     pub signal: String,
     /// Amplitude at the beginning and at the end of each record, in the signal's SI unit.
     pub amplitudes: Vec<[f64; 2]>,
     /// Periods of each record.
     pub periods: Vec<f64>,
-    /// ζ, if it is taken as the same at all amplitudes.
+    /// Damping ratio ζ if it is taken as constant over the amplitude.
     pub zeta_constant: f64,
     /// Root mean square of the residual, in the signal's unit.
     pub residual: f64,
-    /// The same if ζ is taken as constant.
+    /// Root mean square of the residual if ζ is taken as constant, in the signal's unit.
     pub residual_constant: f64,
-    /// The signal's white noise, in its unit.
+    /// Standard deviation of the signal's white noise, in its unit.
     pub noise: f64,
 }
 
@@ -55,7 +54,7 @@ pub struct FreeDecay {
 }
 
 impl FreeDecay {
-    /// The signal's unit, and those of ζ_A and κ.
+    /// Returns the units of the signal, of ζ_A and of κ.
     fn units(&self) -> [&'static str; 3] {
         match quantity(self.signal) {
             Ok(Quantity::Length) => ["m", "1/m", "1/m2"],
@@ -66,10 +65,10 @@ impl FreeDecay {
     }
 }
 
-/// Unknowns of all records together, and of each.
+/// Number of unknowns that all records share, and of unknowns that each record has for itself.
 const COMMON: usize = 4;
 const OWN: usize = 4;
-/// The growth of damping with the amplitude among the common ones.
+/// Index of the growth of damping with the amplitude, ζ_A, among the shared unknowns.
 const GROWTH: usize = 2;
 
 /// The oscillation in closed form.
@@ -93,7 +92,7 @@ impl System for Oscillation<'_> {
     }
 }
 
-/// The problem of records with these first estimates.
+/// Returns the engine's problem for records with these first estimates.
 fn problem<'a>(
     system: &'a Oscillation,
     starts: &[Start],
@@ -159,7 +158,7 @@ fn problem<'a>(
     }
 }
 
-/// Root mean square of the residual, and the residual of each record.
+/// Returns the root mean square of the residual of all records, and the residual of each record.
 fn residuals(solution: &Solution) -> (f64, Vec<Vec<f64>>) {
     let point = &solution.minimum.point;
     let residuals = solution.fit.residuals(&point.z, &point.motion);
@@ -317,8 +316,8 @@ mod tests {
         method.identify(&task, &mut |_| {}).unwrap()
     }
 
-    /// Integrates A'' by its own equation, RK4, with quadratic and linear damping and a cubic spring,
-    /// independent of the formula above.
+    /// Integrates an oscillator with linear and quadratic damping and a cubic spring by a Runge–Kutta method, independently of
+    /// the closed form that is fitted.
     fn oscillator(
         zeta: f64,
         quadratic: f64,

@@ -1,5 +1,5 @@
-//! Friction and inertia from runs whose liquid does not move, by [`output_error`] with a rigid liquid; besides, the measured friction over
-//! the rate, and braking over the hub's angle (thesis 5.2 to 5.4).
+//! Friction and inertia from runs in which the liquid does not move, by [`output_error`] with a rigid liquid. The measured
+//! friction over the rate and the deceleration over the hub's angle (thesis 5.2 to 5.4) are added.
 
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
@@ -121,7 +121,8 @@ pub fn identify(
     Ok(found)
 }
 
-/// Settings of a bench without liquid: the least density that the FMU takes, 2e-9 kg in the bench's tank.
+/// Returns the settings of a bench without liquid: the least density that the FMU accepts, with which the bench's tank has 2e-9
+/// kg of liquid.
 pub fn empty() -> [(String, String); 1] {
     [(fluid::RHO.into(), "1e-6".into())]
 }
@@ -156,7 +157,8 @@ fn check(recordings: &[Recording]) -> Result<()> {
     Ok(())
 }
 
-/// Measured friction over rows of similar rate in which the hub slips; `inertia` is that of all that turns, kg·m².
+/// Returns the measured friction over the rate, averaged over rows of similar rate in which the hub turns. `inertia` is the
+/// inertia of hub and liquid, kg·m².
 fn friction_points(recordings: &[Recording], biases: &[f64], inertia: f64) -> Vec<FrictionPoint> {
     let (count, fewest) = FRICTION_BINS;
     let mut all: Vec<(f64, f64)> = Vec::new();
@@ -284,7 +286,7 @@ fn braking(direction: &'static str, rows: &[FreeRow], speed: f64) -> Option<Brak
     })
 }
 
-/// The friction's torque against the rate, measured and fitted (thesis 5.8 and 5.9).
+/// Draws the friction torque against the rate, measured and fitted (thesis 5.8 and 5.9).
 fn friction_curve(found: &Identification) -> Markup {
     let points = &found.details.friction_points;
     let value = |name: &str| found.parameters.get(name).map_or(0.0, |p| p.value);
@@ -325,7 +327,7 @@ fn friction_curve(found: &Identification) -> Markup {
     }
 }
 
-/// Deceleration over the angle in either direction (thesis 5.10 and 5.11).
+/// Draws the deceleration over the angle in each direction (thesis 5.10 and 5.11).
 fn braking_chart(all: &[Braking]) -> Markup {
     let lines = all.iter().zip(["a", "b"]).map(|(braking, color)| {
         let angle = |k: usize| PI * (2.0 * k as f64 / FRICTION_POINTS as f64 - 1.0);
@@ -341,8 +343,8 @@ fn braking_chart(all: &[Braking]) -> Markup {
 mod tests {
     use super::*;
 
-    /// Twelve decays in a direction from 6 rad/s, by viscous and dry friction, which depends on the angle by the share
-    /// `cosine`; the gyro has noise.
+    /// Twelve decays in one direction from 6 rad/s, under viscous and dry friction. The dry friction varies with the angle by the
+    /// share `cosine`; the gyro has noise.
     fn decays(random: &mut analysis::random::Random, way: f64, cosine: f64) -> Vec<Recording> {
         (0..12)
             .map(|_| {
@@ -377,7 +379,7 @@ mod tests {
             .collect()
     }
 
-    /// True if the directions' difference is outside its 95 % band somewhere.
+    /// Returns true if the difference between the two directions leaves its 95 % band at some angle.
     fn differ(seed: u64, cosine: f64) -> bool {
         let mut random = analysis::random::Random::new(seed, 0);
         let all = [decays(&mut random, 1.0, cosine), decays(&mut random, -1.0, 0.0)].concat();

@@ -30,27 +30,26 @@ impl<'a> Task<'a> {
     }
 }
 
-/// A method of identification.
 pub trait Method {
     /// Results that only this method has.
     type Details: Serialize;
 
-    /// Identifies; `progress` receives each message.
+    /// Identifies the parameters from the task's recordings; `progress` receives each message.
     fn identify(
         &self,
         task: &Task,
         progress: &mut dyn FnMut(&News),
     ) -> Result<Identified<Self::Details>>;
 
-    /// Lines for a terminal, below the table of estimates.
+    /// Returns the lines that a terminal shows below the table of estimates.
     fn lines(found: &Identified<Self::Details>) -> Vec<String>;
 
-    /// Sections of the page that only this method has.
+    /// Returns the sections of the page that only this method has.
     fn sections(_found: &Identified<Self::Details>) -> Sections {
         Sections::default()
     }
 
-    /// The page, in HTML.
+    /// Returns the page in HTML.
     fn page(found: &Identified<Self::Details>) -> String {
         page::of(found, &Self::sections(found))
     }

@@ -1,5 +1,5 @@
-//! Output-error fit of the FMU in the time domain: the whole way from recordings to parameters with their uncertainty,
-//! and to words.
+//! Output-error fit of the FMU in the time domain: the whole way from recordings to parameters with their uncertainty and to the
+//! verdict.
 
 mod page;
 
@@ -93,7 +93,7 @@ pub fn identify(
     Ok(found)
 }
 
-/// The longest beginning of a recording that a model fits, in words.
+/// Returns a sentence on the longest beginning of a recording that a model fits; `None` if no model fits a beginning.
 fn fitting_beginning(
     fmu: &Fmu,
     recording: &Recording,
@@ -259,7 +259,8 @@ fn identify_whole(
     Ok(found)
 }
 
-/// A start of a problem at the minimum of another model.
+/// Returns a start of a problem at the minimum of another model. Unknowns that the other model lacks keep the problem's own
+/// start.
 fn transferred(from: &Fitted, to: &BenchSystem, problem: &Problem) -> Vec<f64> {
     let values = from.solution.fit.values(&from.solution.minimum.point.z);
     let mut start = problem.starts[0].clone();

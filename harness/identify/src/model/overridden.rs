@@ -4,10 +4,9 @@ use anyhow::{Result, bail};
 
 use crate::input::names::list;
 
-/// Fails if the FMU's warnings name an unknown as one without effect: nothing can be estimated.
+/// Fails if the FMU warns that an unknown has no effect, because it cannot be estimated then.
 ///
-/// # Errors
-/// For such an unknown, with the reason.
+/// # Errors If a warning names the unknown; the message has the FMU's reason.
 pub fn refuse(unknown: &str, warnings: &[String]) -> Result<()> {
     for warning in warnings {
         let parts = [" has no effect: ", " have no effect: "];
@@ -21,7 +20,8 @@ pub fn refuse(unknown: &str, warnings: &[String]) -> Result<()> {
     Ok(())
 }
 
-/// A value near `start` within `bounds` that is not `start`: the FMU warns of no value that it starts with itself.
+/// Returns a value near `start` within the bounds that is not `start`. It is needed because the FMU does not warn about a
+/// parameter that keeps its default.
 pub fn near(start: f64, (low, high): (f64, f64), reach: f64) -> f64 {
     let by = 1e-6 * reach;
     if start + by <= high { start + by } else { (start - by).max(low) }

@@ -45,8 +45,7 @@ pub enum Model {
 impl Model {
     /// Opens an FMU for a solver.
     ///
-    /// # Errors
-    /// If it is not an FMU, or has not what the solver needs.
+    /// # Errors If the file is not an FMU, or the FMU lacks the interface that the solver needs.
     pub fn open(path: &Path, solver: Solver) -> Result<Self> {
         Ok(match solver {
             Solver::Own => Model::Own(Fmu::open(path)?),
@@ -59,7 +58,6 @@ impl Model {
         fmu
     }
 
-    /// Returns the model description.
     pub fn description(&self) -> &ModelDescription {
         self.fmu().description()
     }
@@ -101,7 +99,7 @@ pub struct Setup {
 pub struct Finer {
     /// Settings, inputs and outputs of the runs.
     pub setup: Setup,
-    /// The FMU for another solver than before; `None`: the same.
+    /// The FMU opened for another solver; `None` if the solver stays the same.
     pub model: Option<Model>,
 }
 
@@ -110,11 +108,8 @@ pub struct Finer {
 struct Output {
     /// Index of its first variable in [`Setup::reads`].
     from: usize,
-    /// Quantity of the output.
     quantity: Quantity,
-    /// Channel of the quantity.
     channel: usize,
-    /// The sensor that reads it.
     sensor: Option<Sensor>,
 }
 
@@ -134,14 +129,13 @@ enum Initialised<'m> {
     Host(exchange::Run<Box<Instance<'m>>>),
 }
 
-/// An unknown's value: its reference.
+/// Value reference of an unknown, and its value.
 pub type Value = (u32, f64);
 
 impl Setup {
     /// Returns the setup for a question.
     ///
-    /// # Errors
-    /// Lists all names that the FMU does not have.
+    /// # Errors If the FMU lacks a variable of the question; the message lists all such names.
     pub fn new(question: &Question, description: &ModelDescription) -> Result<Self> {
         let mut problems = Vec::new();
         let references = |names: &[String], problems: &mut Vec<String>| -> Vec<u32> {
@@ -286,7 +280,7 @@ impl Setup {
         Ok((0..outputs.len()).any(remains))
     }
 
-    /// The outputs at the rows of the recording of this number.
+    /// Returns the outputs at the rows of a recording; `number` is its index.
     ///
     /// # Errors
     /// If the FMU refuses a call; the message has the time.
@@ -303,7 +297,7 @@ impl Setup {
         }
     }
 
-    /// The FMU's warnings of the motion that begins in the recording of this number.
+    /// Returns the FMU's warnings at the beginning of a recording; `number` is its index.
     ///
     /// # Errors
     /// If the FMU refuses a call.
@@ -440,7 +434,8 @@ impl Setup {
         Ok(())
     }
 
-    /// The readings of sensors that are late: at a row what was so that much earlier, at a row too; 0 where nothing has arrived yet.
+    /// Delays the outputs of sensors with a delay: the reading in a row is the output of the row that is earlier by the delay, or
+    /// 0 before the first reading has arrived.
     fn late(&self, record: &Record, mut read: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>> {
         for (number, (output, column)) in self.outputs.iter().zip(&mut read).enumerate() {
             let Some(sensor) = output.sensor.as_ref().filter(|s| s.errors().delay > 0.0) else {
@@ -466,7 +461,7 @@ impl Setup {
         Ok(read)
     }
 
-    /// Values of the inputs at a row and their slopes until the next.
+    /// Returns the values of the inputs at a row and their slopes until the next row.
     fn course(&self, record: &Record, row: usize) -> (Vec<f64>, Vec<f64>) {
         let one = |(signal, held): (&Vec<f64>, &bool)| {
             let next = row + 1;

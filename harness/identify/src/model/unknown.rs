@@ -9,16 +9,16 @@ use crate::input::question::{Bias, EACH, Free, Question, Size, Tolerance, Triad,
 use crate::input::record::Record;
 use crate::tuning::{KNOWN_REACH, SCALE_REACH};
 
-/// What an unknown is to the FMU's run.
+/// Place at which an unknown acts in the FMU's run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Target {
     /// The Real with this value reference.
     Parameter(u32),
-    /// Error of an input's scale: 1 + x times the recorded values act.
+    /// Error x of an input's scale: the recorded values times 1 + x act.
     Scale(usize),
-    /// Error of the clock's rate: true intervals are 1 + x times the recorded ones.
+    /// Error x of the clock's rate: true intervals are the recorded intervals times 1 + x.
     Clock,
-    /// None: it acts in the reading of a sensor.
+    /// No place: the unknown acts in the reading of a sensor.
     Reading,
 }
 
@@ -28,10 +28,9 @@ pub type Targeted = (Unknown, Target);
 const FREELY: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
 
 impl Question {
-    /// The unknowns, in the result's order.
+    /// Returns the unknowns in the order of the result.
     ///
-    /// # Errors
-    /// All that is wrong with names, types, bounds and priors.
+    /// # Errors If a name, type, bound or prior is wrong; the message lists all faults.
     pub fn unknowns(
         &self,
         description: &ModelDescription,
@@ -148,7 +147,7 @@ impl Question {
         Ok(records.iter().enumerate().map(one).collect())
     }
 
-    /// Unknowns of a flag `--free`.
+    /// Returns the unknowns of a flag `--free`: one, or one for each recording.
     fn free(
         &self,
         free: &Free,
@@ -174,7 +173,7 @@ impl Question {
         }
     }
 
-    /// The error of the scale of an input, an output or the clock.
+    /// Returns the error of the scale of an input, an output or the clock as an unknown.
     fn scale(&self, of: &str, recording: Option<usize>) -> Result<Targeted> {
         let input = self.inputs.iter().position(|name| name == of);
         let output = self.outputs.iter().position(|name| name == of);
@@ -199,7 +198,7 @@ impl Question {
         Ok((Unknown::linear(&name, "1", role, (0.0, SCALE_REACH), FREELY), target))
     }
 
-    /// The unknown of a flag `--tolerance`.
+    /// Returns the unknown of a flag `--tolerance`.
     fn known(
         &self,
         tolerance: &Tolerance,
@@ -247,7 +246,7 @@ impl Question {
         known(parameter(&free, description, recording)?, value, std).with_context(|| flag)
     }
 
-    /// A variable's value in a recording: that of `--set`, or its start in the model description.
+    /// Returns a variable's value in a recording: the value of `--set`, otherwise the start in the model description.
     fn set_value(
         &self,
         variable: &Variable,
@@ -269,7 +268,7 @@ impl Question {
     }
 }
 
-/// The same as a known value with this standard deviation.
+/// Returns the unknown as a known value with this mean and standard deviation.
 fn known((unknown, target): Targeted, mean: f64, std: f64) -> Result<Targeted> {
     ensure!(std > 0.0 && std.is_finite(), "the tolerance must be above 0");
     let (start, reach, part) = (mean, KNOWN_REACH * std, Part::Tolerance);
@@ -279,7 +278,7 @@ fn known((unknown, target): Targeted, mean: f64, std: f64) -> Result<Targeted> {
 /// Name of the clock among the scales.
 const CLOCK: &str = "time";
 
-/// Least and largest value that the FMU's description declares for a variable; infinite where it declares none.
+/// Returns the least and largest value that the model description declares for a variable; infinite if it declares none.
 pub fn range(variable: &Variable) -> [f64; 2] {
     let attributes = variable.attributes();
     let number = |text: &Option<String>, otherwise: f64| {
@@ -288,7 +287,7 @@ pub fn range(variable: &Variable) -> [f64; 2] {
     [number(&attributes.min, f64::NEG_INFINITY), number(&attributes.max, f64::INFINITY)]
 }
 
-/// A standard deviation in a variable's own unit, from a number with or without a unit.
+/// Converts a standard deviation, a number with or without a unit, to the variable's own unit.
 fn deviation(variable: &Variable, description: &ModelDescription, text: &str) -> Result<f64> {
     let number = |text: &str| match description.value(variable, text)? {
         Value::Real(number) => Ok(number),
@@ -300,7 +299,7 @@ fn deviation(variable: &Variable, description: &ModelDescription, text: &str) ->
     Ok(number(text)? - number(&zero)?)
 }
 
-/// The name of what a recording has of its own.
+/// Returns the name of an unknown that only one recording has, for example `bias(w)@2`.
 fn numbered(name: &str, recording: usize) -> String {
     format!("{name}@{}", recording + 1)
 }

@@ -9,20 +9,15 @@ use crate::estimate::prose;
 pub struct Combination {
     /// `a + b`, or `a (1 + b)`.
     pub name: String,
-    /// The two.
     pub of: [String; 2],
-    /// Value of the combination.
     pub value: f64,
-    /// Standard deviation.
     pub std: f64,
-    /// Unit.
     pub unit: String,
-    /// Their correlation.
+    /// Correlation of the two unknowns.
     pub correlation: f64,
 }
 
 impl Combination {
-    /// Returns the combination in words.
     pub fn words(&self) -> String {
         format!(
             "{} and {} cannot be distinguished (correlation {:.4}); only {} = {:.6} ± {:.6} {} is determined.",

@@ -18,17 +18,15 @@ pub struct Identified<D> {
     pub settings: BTreeMap<String, String>,
     /// Names and matrix of the correlations.
     pub correlations: (Vec<String>, Vec<Vec<f64>>),
-    /// The search ended at a minimum.
     pub converged: bool,
     /// True if the model fits: the residual is the gyro's noise. If false, no interval can be trusted. `None`: the method does
     /// not test it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fits: Option<bool>,
-    /// The answer in words.
     pub verdict: Vec<String>,
     /// Log of the steps.
     pub done: Vec<String>,
-    /// Measured signals and residuals, of methods that have them in time.
+    /// Measured signals and residuals, of methods that fit in the time domain.
     #[serde(skip)]
     pub residuals: Vec<Residual>,
     /// Results that only this method has.
@@ -39,17 +37,15 @@ pub struct Identified<D> {
 /// A measured signal of one recording and its residual, for the page.
 #[derive(Clone, Debug, Default)]
 pub struct Residual {
-    /// The recording's name.
     pub name: String,
     /// Name and unit of the signal, as on an axis.
     pub label: String,
     /// s.
     pub time: Vec<f64>,
-    /// Measured signal.
     pub measured: Vec<f64>,
     /// Measured less modelled signal.
     pub residual: Vec<f64>,
-    /// Standard deviation of its white noise, if known.
+    /// Standard deviation of the signal's white noise, if known.
     pub noise: Option<f64>,
     /// Torque at the same times, N·m, if the signal is the rate that answers to it.
     pub torque: Option<Vec<f64>>,

@@ -1,5 +1,5 @@
-//! The page on an identification, the same for every method: verdict, estimates, the method's own sections, residuals over time with
-//! their spectrum and autocorrelation, frequency responses of measurement and model, correlations.
+//! The page on an identification, which all methods share: verdict, estimates, the method's own sections, residuals over time
+//! with their spectrum and autocorrelation, frequency responses of measurement and model, correlations.
 
 use analysis::rest;
 use analysis::statistics::{about_mean, variance};
@@ -16,7 +16,6 @@ use crate::words::combination::Combination;
 use crate::words::identified::{Identified, Residual};
 use crate::words::verdict::DOUBTS;
 
-/// Label of a rate.
 pub const RATE: &str = "rad/s";
 
 /// Sections that a method adds to the page.
@@ -28,13 +27,11 @@ pub struct Sections {
     pub combinations: Vec<Combination>,
     /// After the table of estimates.
     pub figures: Markup,
-    /// Condition number of the sensitivities.
     pub condition: Option<f64>,
     /// After the correlations.
     pub last: Markup,
 }
 
-/// The page.
 pub fn of<D>(found: &Identified<D>, sections: &Sections) -> String {
     let is_doubt = |line: &str| DOUBTS.iter().any(|words| line.starts_with(words));
     let body = html! {
@@ -87,7 +84,7 @@ pub(crate) fn digits(value: f64, deviation: f64) -> String {
     }
 }
 
-/// The 95 % interval in words.
+/// Returns the 95 % interval in words.
 fn interval(p: &Estimated) -> String {
     let [low, high] = p.interval.map(|end| digits(end, p.std));
     if p.interval[1].is_finite() {
@@ -189,7 +186,7 @@ fn spectrum(signals: &Residual) -> Chart {
     axis_chart("Amplitude density", "frequency, Hz", &format!("{}/√Hz", signals.label), lines, true)
 }
 
-/// The residual over time, every so many rows.
+/// Residual over time, thinned out so that the chart has at most 2 [`PAGE_POINTS`] points.
 fn residual(signals: &Residual) -> Chart {
     let every = signals.time.len().div_ceil(2 * PAGE_POINTS);
     let rows = (0..signals.time.len()).step_by(every);
@@ -219,7 +216,8 @@ fn autocorrelation(signals: &Residual) -> Chart {
     axis_chart(title, "lag, s", "autocorrelation", lines, false)
 }
 
-/// Gain and phase from torque to rate, of measurement and model by the same estimate; `None` without a torque that excites a band.
+/// Gain and phase from torque to rate, estimated in the same way from measurement and model; `None` without a torque that excites
+/// a band.
 fn bode(signals: &Residual) -> Option<[Chart; 2]> {
     let simulated = signals.measured.iter().zip(&signals.residual).map(|(y, e)| y - e).collect();
     let of = |rate: Vec<f64>| {

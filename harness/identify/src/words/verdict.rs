@@ -9,10 +9,11 @@ pub const NO_MINIMUM: &str = "The search did not end at a minimum";
 
 /// Beginning of the sentence about errors of the solver that leave no judgement.
 pub const NOT_JUDGED: &str = "CANNOT BE JUDGED";
-/// Beginnings of sentences that forbid to trust the numbers.
+/// Beginnings of sentences that say that the numbers cannot be trusted.
 pub const DOUBTS: [&str; 3] = [DOES_NOT_FIT, NO_MINIMUM, NOT_JUDGED];
 
-/// Names the failed tests of a residual, each with its standard deviations of chance; `input` names what may be correlated with it.
+/// Returns a phrase for each test that a residual fails, with the size of the failure in standard deviations of chance; `input`
+/// is the name of the signal with which the residual may be correlated.
 pub fn failed(tests: &Tests, input: &str) -> Vec<String> {
     let (time, frequency) = (tests.in_time, tests.in_frequency);
     let all = [

@@ -1,4 +1,5 @@
-//! Any FMU, here HubSlosh with a hub of which the motion is known in closed form: I ω' = τ − b ω.
+//! Identification of any FMU, here HubSlosh. The recordings are of a hub whose motion is known in closed form: I ω' = τ − b ω
+//! with the inertia I, the rate ω, the torque τ and the viscous coefficient b.
 
 use analysis::random::Random;
 use experiments::profile::Torque;
@@ -21,16 +22,16 @@ use std::io::Write;
 
 use crate::fmu_twin::{self, SensorErrors};
 
-/// Rows are this far apart, s.
+/// Time between rows, s.
 const STEP: f64 = 0.05;
 /// Moment of inertia, kg·m², and viscous coefficient, N·m·s.
 pub const TRUTH: (f64, f64) = (0.35, 0.05);
-/// Noise of a row, rad/s.
+/// Standard deviation of the noise in one row, rad/s.
 const NOISE: f64 = 1e-3;
 /// Bias of the gyro in the first recording, rad/s; the second has none.
 const BIAS: f64 = 4e-3;
 
-/// A hub under torque in steps of 2 s, from a rate at the start.
+/// Records a hub with an initial rate `start` under a torque that changes in steps every 2 s.
 pub fn record(seed: u64, start: f64, bias: f64) -> Record {
     let mut random = Random::new(seed, 0);
     let (inertia, b) = TRUTH;
@@ -104,8 +105,8 @@ fn intervals_contain_the_true_values_of_a_hub_in_closed_form() {
     assert!((noise / NOISE - 1.0).abs() < 0.08, "{noise}");
 }
 
-/// The recorded torque is 2 % too small. Inertia and friction are only known relative to the torque, and no residual shows it: with
-/// noise alone the truth is more than ten standard deviations outside.
+/// The recorded torque is 2 % too small. Because inertia and friction are only known relative to the torque, no residual shows
+/// this error: in intervals that include only noise, the truth is more than ten standard deviations outside.
 #[test]
 fn known_values_count_with_their_tolerances() {
     let mut records = [record(1, 0.2, BIAS), record(2, -0.1, 0.0)];
@@ -167,8 +168,8 @@ fn the_hosts_solver_and_the_fmus_give_the_same_estimates() {
     }
 }
 
-/// The same hub from rest with dry friction of this size, N·m, and how often it stops: ω goes exponentially to (τ − c sgn ω)/b until it is
-/// zero, and rests there where |τ| ≤ c.
+/// Records a hub with dry friction c, N·m, that begins at rest, and returns how often it stops: the rate ω tends exponentially to
+/// (τ − c sgn ω)/b until it is zero, and stays zero while |τ| ≤ c.
 pub fn record_with_stops(seed: u64, c: f64) -> (Record, u32) {
     let mut random = Random::new(seed, 0);
     let (inertia, b) = TRUTH;
@@ -299,7 +300,7 @@ fn the_likelihood_beside_the_estimate_grows_as_the_covariance_says() {
     assert_eq!(deviances[deviances.len() - 1], f64::INFINITY);
 }
 
-/// For a look at it: HUBSLOSH_PAGE=page.html.
+/// With HUBSLOSH_PAGE=page.html in the environment the test writes the page to this file.
 #[test]
 fn the_page_is_whole() {
     let found = found(&question(&FREE));
@@ -313,7 +314,7 @@ fn the_page_is_whole() {
     }
 }
 
-/// slosh.zeta counts where slosh.zeta_from_correlation is false alone.
+/// slosh.zeta has an effect only if slosh.zeta_from_correlation is false.
 #[test]
 fn a_parameter_that_another_one_replaces_is_warned_of_once_and_cannot_be_free() {
     let records = [record(1, 0.0, 0.0), record(2, 0.0, 0.0)];
@@ -352,7 +353,8 @@ fn a_parameter_that_another_one_replaces_is_warned_of_once_and_cannot_be_free() 
     assert_eq!(found.done.iter().filter(|line| warns(line)).count(), 1, "{:?}", found.done);
 }
 
-/// A fit that began at the truth ended 28 standard deviations from it, where the sum of squares was larger by 68, and "fitted".
+/// A fit that began at the truth once ended 28 standard deviations away, where the sum of squares was larger by 68, and was
+/// accepted as fitting.
 #[test]
 fn a_minimum_that_is_worse_than_the_start_is_left() {
     let model = Model::open(packed_for_tests(), Solver::Own).unwrap();
@@ -373,7 +375,7 @@ fn a_minimum_that_is_worse_than_the_start_is_left() {
     }
 }
 
-/// The minimum lies six standard deviations beyond a bound: too few for the tests of the residual.
+/// The minimum lies six standard deviations beyond a bound, which is too near for the tests of the residual to show a misfit.
 #[test]
 fn a_minimum_at_a_bound_is_reported_in_the_verdict() {
     let free = found(&question(&FREE));
@@ -389,8 +391,8 @@ fn a_minimum_at_a_bound_is_reported_in_the_verdict() {
     assert_eq!(set("fluid.rho"), Some("1e-6"));
 }
 
-/// The recording of the book's first identification: what `bench` estimates in other coordinates with weak priors, `fmu` estimates as
-/// it is named.
+/// On the recording of the book's first identification, the method `bench`, which searches in other coordinates with weak priors,
+/// and the method `fmu`, which searches the named parameters, have to give the same estimates and intervals.
 #[test]
 #[ignore = "half a minute: .ci/long-tests"]
 fn a_bench_as_any_fmu_has_one_answer_and_one_interval() {

@@ -1,4 +1,5 @@
-//! Coverage of the intervals of FMUs of other makers' kinds, by a hundred twins each. No recording comes from an FMU.
+//! Coverage of the intervals for kinds of FMUs that other makers export, by a hundred twins (simulated recordings) of each kind.
+//! No recording comes from an FMU.
 
 use std::path::Path;
 
@@ -40,7 +41,8 @@ impl Count {
         }
     }
 
-    /// Prints and checks: of given intervals 93 to 97 % hold the truth, with twice the chance of so many.
+    /// Prints the counts, and checks that at least 93 % of the given intervals hold the truth; if there are few intervals, at
+    /// least 95 % less two standard deviations of this share by chance. No error may exceed [`LIMIT`] standard deviations.
     fn check(&self, kind: &str) {
         let part = self.inside as f64 / self.given.max(1) as f64;
         println!(
@@ -57,7 +59,7 @@ impl Count {
     }
 }
 
-/// `cargo test --release -p identify --test all -- --ignored --nocapture coverage_of_a_hundred`.
+/// Run it with `cargo test --release -p identify --test all -- --ignored --nocapture coverage_of_a_hundred`.
 #[test]
 #[ignore = "minutes: .ci/run --nightly"]
 fn coverage_of_a_hundred_twins_of_each_kind() {

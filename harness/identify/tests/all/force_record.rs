@@ -89,8 +89,9 @@ impl Tank {
         -rest / inertia
     }
 
-    /// The record over `seconds` with loads `step` apart, released at an angle; noise as a part of each load's deviation. The motion has
-    /// four rows a step, because a line from row to row loses (ω h)²/12 of a wave.
+    /// Returns a record over `seconds` of a tank whose liquid is released at an angle, with loads every `step` (s). The noise is
+    /// a part of each load's standard deviation. The tank's motion has four rows a step, because lines between rows h apart lose
+    /// the part (ω h)²/12 of a wave of frequency ω.
     fn record(&self, seconds: f64, step: f64, angle: f64, noise: f64, seed: u64) -> Record {
         let start = Vector2::new(self.length * angle.sin(), 0.0);
         // twelve steps a row: ω h is 0.03, and the fifth power of that is 2e-8
@@ -212,7 +213,7 @@ fn compared(tank: &Tank, result: &Identification) -> Vec<(String, [f64; 2], f64)
     result.parameters.iter().map(|(name, p)| (name.clone(), p.interval, truth(name))).collect()
 }
 
-/// Asserts that the fit is accepted, and that each truth is within 4 standard deviations.
+/// Asserts that the fit is accepted, and that each estimate is within 4 standard deviations of the truth.
 fn holds(tank: &Tank, result: &Identification) {
     assert_eq!(result.fits, Some(true), "{:#?}", result.verdict);
     for (name, [low, high], truth) in compared(tank, result) {
@@ -240,7 +241,7 @@ fn released(angle: f64) -> [String; 2] {
     [format!("tank.p_0[1,1]={}", angle.sin()), format!("tank.p_0[1,3]={}", -angle.cos())]
 }
 
-/// Mass and angle stand for one another in a small free decay: a known angle gives the mass.
+/// In a small free decay only the product of mass and angle is determined, so that the angle has to be known to give the mass.
 #[test]
 fn a_free_decay_from_a_known_angle_gives_the_mass() {
     let record = TANK.record(12.0, 0.02, 0.035, 0.02, 2);
@@ -422,8 +423,9 @@ fn waves_that_break_do_not_fit_without_their_damping_which_a_known_release_gives
     assert!(result.parameters["tank.zeta_breaking[1]"].std < 0.01, "{:?}", result.parameters);
 }
 
-/// Coverage of the 95 % intervals over 20 draws of noise. Statements of one draw are correlated, so that 90 % is two standard deviations
-/// below 95 %. Minutes: `-- --ignored --nocapture intervals_of_force`. `HUBSLOSH_DRAWS=21-100` names other draws.
+/// Coverage of the 95 % intervals over 20 draws of noise. The errors of one draw are correlated, so that 90 % is two standard
+/// deviations below 95 %. It takes minutes: `-- --ignored --nocapture intervals_of_force`. `HUBSLOSH_DRAWS=21-100` names other
+/// draws.
 #[test]
 #[ignore = "20 fits: .ci/run --nightly"]
 fn intervals_of_force_records_hold_the_truth_in_95_percent_of_20_draws() {

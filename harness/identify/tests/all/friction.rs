@@ -23,7 +23,7 @@ use crate::runs::{self, SETS, Set, recordings};
 
 /// Asymmetry of the bearing in these recordings.
 const ASYMMETRY: f64 = 0.15;
-/// Noise of a row of the thesis's gyro at 50 Hz, rad/s.
+/// Standard deviation of the noise of the thesis's gyro in one row at 50 Hz, rad/s.
 const NOISE: f64 = 4.066e-4;
 
 /// A push of 0.1 N·m for 5 s forwards (1) or backwards (−1), and the free decay to rest.
@@ -37,7 +37,8 @@ pub fn push(seed: u64, way: f64) -> Recording {
     Recording::of("push", time, tau, rate)
 }
 
-/// The verdict calls the asymmetry not determined, and the friction of the one `way` is within four standard deviations of the truth.
+/// Asserts that the verdict calls the asymmetry not determined, and that the friction in the direction `way` is within four
+/// standard deviations of the truth.
 pub fn is_one_way(
     parameters: &BTreeMap<String, Estimated>,
     combinations: &[Combination],
@@ -80,7 +81,8 @@ fn fit(recordings: &[Recording], options: &Options) -> anyhow::Result<Identifica
     friction::identify(&fmu, &rates, options, &mut |_| {})
 }
 
-/// The parameters that are three standard deviations or more from the truth; the fit is a minimum, and none is at a bound.
+/// Returns the parameters that are three standard deviations or more from the truth. The fit has to end at a minimum with no
+/// parameter at a bound.
 fn wrong(set: &Set, seed: u64, bias: f64, asymmetry: f64) -> Vec<String> {
     let found = fit(&recordings(set, seed, bias, asymmetry), &options()).unwrap();
     assert!(found.converged && found.fits == Some(true), "{seed}: {:?}", found.verdict);
@@ -122,8 +124,9 @@ fn all_sets(seeds: std::ops::RangeInclusive<u64>) -> Vec<String> {
     SETS.iter().flat_map(of).collect()
 }
 
-/// Seed 2 of the first set failed while the rows at rest did not count: two choices of rows that stick alternated, each by the bias that
-/// the other one gives. `friction.d` was 3.4 standard deviations off and the bias of the ramp 4.9, and the fit was accepted.
+/// Seed 2 of the first set failed as long as rows at rest were left out: the search alternated between two choices of these rows,
+/// because each choice gives a bias that leads to the other. `friction.d` was 3.4 standard deviations off and the bias of the
+/// ramp 4.9, and the fit was accepted.
 #[test]
 fn friction_of_three_sets_of_runs_ends_in_no_false_minimum() {
     assert_eq!(all_sets(1..=2), [""; 0]);
@@ -186,7 +189,7 @@ fn recordings_that_show_no_friction_are_refused_with_what_to_do() {
     assert!(still.contains("does not move") && still.contains("3.0e-3 N·m"), "{still}");
 }
 
-/// A push and the free decay after it: c and d go with 1 + asymmetry alone.
+/// After a push and a free decay in one direction, only the products c (1 + asymmetry) and d (1 + asymmetry) are determined.
 #[test]
 fn a_hub_that_turns_one_way_determines_the_friction_in_that_direction_only() {
     for way in [1.0, -1.0] {
@@ -209,7 +212,8 @@ fn rigid(fmu: &Fmu, settings: &[(&str, &str)], torque: &str) -> Recording {
     one
 }
 
-/// A torque that is held comes half a row late, 8.6° of phase at 2.4 Hz: taken as linear it would turn inertia into friction.
+/// A torque that is held comes half a row late, which is 8.6° of phase at 2.4 Hz. If it were taken as linear between rows, this
+/// phase would be taken for friction.
 #[test]
 fn a_torque_that_is_held_is_recognised() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();

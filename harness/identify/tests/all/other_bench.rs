@@ -1,5 +1,5 @@
-//! The bench that is not the FMU, held against the FMU and against closed forms. What it finds, the FMU's own fit cannot
-//! have put there.
+//! Compares the independent bench, which shares no code with the FMU, with the FMU and with closed forms. Identification is tried
+//! on its recordings because an error of the FMU cannot be in them as well.
 
 use host::fmu::Fmu;
 use identify::bench::simulate::Setup;
@@ -63,8 +63,8 @@ fn it_moves_as_the_fmu_does() {
     }
 }
 
-/// I ω' = τ − c while it slips and rest below c + d: a ramp k t breaks away at t₀ = (c + d)/k; without Stribeck's excess
-/// and viscous friction, ω = k (t − t₀)²/2I from there.
+/// The hub of inertia I rests below the torque c + d, so that a ramp k t makes it break away at t₀ = (c + d)/k. While it slips, I
+/// ω' = τ − c; without Stribeck's excess d and viscous friction its rate is then ω = k (t − t₀)²/2I.
 #[test]
 fn a_ramp_breaks_away_where_the_closed_form_says() {
     let (k, c) = (0.004, 0.006);
@@ -81,8 +81,8 @@ fn a_ramp_breaks_away_where_the_closed_form_says() {
     }
 }
 
-/// Without friction and damping the hub's rate over the torque is (p² + ωₙ²)/(I₀ p (p² + ωₚ²)), ωₚ² = ωₙ² (1 + m r²/I₀): a step τ₀
-/// makes ω = τ₀/I₀ (q t + (1 − q) sin(ωₚ t)/ωₚ), q = ωₙ²/ωₚ².
+/// Without friction and damping the transfer function from torque to the hub's rate is (p² + ωₙ²)/(I₀ p (p² + ωₚ²)), ωₚ² = ωₙ² (1
+/// + m r²/I₀): a step τ₀ makes ω = τ₀/I₀ (q t + (1 − q) sin(ωₚ t)/ωₚ), q = ωₙ²/ωₚ².
 #[test]
 fn a_step_of_torque_moves_hub_and_linear_liquid_as_the_closed_form_says() {
     let bearing = Bearing { b: 0.0, c: 0.0, d: 0.0, omega_s: 1.0, asymmetry: 0.0, eps: None };

@@ -13,10 +13,10 @@ use identify::input::record::Record;
 use identify::model::simulate::{Model, Setup};
 use tempfile::TempDir;
 
-/// Rows are this far apart, s.
+/// Time between rows, s.
 const STEP: f64 = 0.05;
 const ROWS: usize = 400;
-/// Noise of a row: of r, m, and of phi, rad.
+/// Standard deviation of the noise in one row: of r, m, and of phi, rad.
 const NOISE: [f64; 2] = [2e-3, 4e-3];
 pub const TRUTH: [(&str, f64); 5] =
     [("k", 42.0), ("d", 0.1), ("c", 0.03), ("r", 1.3), ("phi", 0.4)];
@@ -147,13 +147,13 @@ pub fn question(solver: Solver) -> Question {
     }
 }
 
-/// Fits one twin. `scale`: of the noise.
+/// Fits one twin whose noise is `scale` times [`NOISE`].
 fn found(fmu: &Adaptive, question: &Question, seed: u64, scale: f64) -> Identification {
     let model = Model::open(&fmu.path(), question.solver).unwrap();
     identify(&model, question, &[record(seed, scale)], &mut |_| {}).unwrap()
 }
 
-/// Intervals that hold the truth, of those that are given.
+/// Returns the number of intervals that hold the truth, and the number of intervals that are given.
 fn held(found: &Identification) -> (usize, usize) {
     let given = TRUTH.iter().filter(|(name, _)| found.parameters[*name].determined);
     let holds = |(name, truth): &&(&str, f64)| {
@@ -184,8 +184,9 @@ fn check_refusal(found: &Identification, remedy: &str) {
     assert!(!words.contains("The model fits"), "{words}");
 }
 
-/// Before, differences were made inside the solver's noise, and nothing compared the solver with a finer one: the truth of the
-/// first was up to 50,000 standard deviations outside with "fits", of the second 20, of the third 17.
+/// The fit used to take differences so small that the solver's noise decided them, and it did not compare the solver with a finer
+/// one. The truth was then up to 50,000 standard deviations outside in the first case, 20 in the second and 17 in the third,
+/// although the verdict was that the model fits.
 #[test]
 fn no_interval_is_given_where_the_errors_of_the_fmus_own_solver_decide() {
     for (definitions, scale) in [
@@ -254,8 +255,8 @@ fn predictions_are_refused_where_solver_errors_decide() {
     }
 }
 
-/// Model Exchange has no slopes, so the host's solver turned a spacecraft without its wheels' torque. That passed for an error of
-/// its own solver, which decided every estimate of a flight with wheels.
+/// Model Exchange has no slopes, so the host's solver turned a spacecraft without its wheels' torque. The difference was taken
+/// for an error of the spacecraft's own solver, so that no interval was given for a flight with wheels.
 #[test]
 fn the_slope_of_the_wheels_momentum_is_no_error_of_the_solver() {
     for fmi in [pack::Fmi::V2, pack::Fmi::V3] {
@@ -290,7 +291,7 @@ fn with_free(free: &[&str], solver: Solver) -> Question {
     Question { free: free.iter().map(|text| text.parse().unwrap()).collect(), ..question(solver) }
 }
 
-/// Only k/m and d/m are in the equations, and c stands alone.
+/// The equations have only the ratios k/m and d/m of stiffness, damping and mass, and c by itself.
 #[test]
 fn parameters_that_no_output_tells_apart_are_named_as_a_set_in_words_and_json() {
     let fmu = Adaptive::new(&["-DTOLERANCE=1e-7", "-DMODEL_EXCHANGE"]);
@@ -370,7 +371,8 @@ fn one_unknown_none_inside_its_bounds_and_one_without_effect_are_answered() {
     }
 }
 
-/// The hinge is shaken at 1 Hz, recorded in 8 rows a period; the FMU takes no slopes of its inputs.
+/// The hinge is shaken at 1 Hz and its motion recorded in 8 rows a period. The FMU takes no slopes of its inputs, so that the
+/// input has to be held over short parts of the way between rows.
 #[test]
 fn a_smooth_input_is_followed_by_an_fmu_that_cannot_interpolate() {
     let fmu = Adaptive::new(&["-DTOLERANCE=1e-7", "-DMODEL_EXCHANGE"]);
@@ -394,7 +396,8 @@ fn a_smooth_input_is_followed_by_an_fmu_that_cannot_interpolate() {
     assert!(off < 0.01 * size, "{off} {size}");
 }
 
-/// 20 twins of each kind: `cargo test --release -p identify --test all -- --ignored --nocapture coverage_with_adaptive_solvers`.
+/// Checks the coverage with 20 twins of each kind: `cargo test --release -p identify --test all -- --ignored --nocapture
+/// coverage_with_adaptive_solvers`.
 #[test]
 #[ignore = "two minutes: .ci/long-tests"]
 fn coverage_with_adaptive_solvers() {

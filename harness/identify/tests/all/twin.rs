@@ -27,7 +27,7 @@ use crate::friction::{is_one_way, push};
 
 /// The thesis's sweep of 2700 s.
 const LONG: &str = "lin-sweep:amplitude=0.1";
-/// A faster one, where only gross faults matter.
+/// A faster sweep, for tests in which only gross faults matter.
 const SHORT: &str = "lin-sweep:amplitude=0.1,duration=300,f0=1.8,f1=3";
 
 fn sweep(fmu: &Fmu, torque: &str, settings: &[(&str, &str)]) -> Recording {
@@ -38,7 +38,7 @@ fn sweep(fmu: &Fmu, torque: &str, settings: &[(&str, &str)]) -> Recording {
         .unwrap()
 }
 
-/// Told that the torque is linear between rows.
+/// Options with a torque that is known to be linear between rows.
 fn options() -> Options {
     Options {
         models: vec!["linear".into()],
@@ -162,7 +162,8 @@ fn a_torque_that_is_wrong_within_its_tolerance_leaves_the_truth_in_the_intervals
     assert!(is_told, "{:?}", found.verdict);
 }
 
-/// A lag of 30 ms in the wheel. Its first order is a delay, which is free; the rest passed for a torque of the rate's square.
+/// The wheel has a lag of 30 ms. To first order the lag is a delay, which is estimated; the rest was once taken for a torque
+/// proportional to the square of the rate.
 #[test]
 fn the_cause_of_a_misfit_is_named_with_the_flag_that_fits_it() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
@@ -192,7 +193,7 @@ fn the_cause_of_a_misfit_is_named_with_the_flag_that_fits_it() {
     assert!((inertia.value - 0.322414).abs() < 4.0 * inertia.std, "{inertia:?}");
 }
 
-/// The hub rocks at 4.1 Hz, and the gyro sees some of it: no candidate has that.
+/// The hub rocks at 4.1 Hz and the gyro sees a part of this motion, which no candidate effect describes.
 #[test]
 fn a_misfit_that_no_candidate_explains_has_no_cause() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
@@ -216,7 +217,8 @@ fn a_misfit_that_no_candidate_explains_has_no_cause() {
     assert!(!says("The cause is an") && says("The cause is unknown"), "{:?}", found.verdict);
 }
 
-/// The arm is 2 % longer than its nominal value. Slosh of a third of a radian shows that, and nothing else takes it.
+/// The arm is 2 % longer than its nominal value. Slosh of a third of a radian shows this, because at this angle no other
+/// parameter has the same effect.
 #[test]
 fn a_tolerance_that_nonlinear_slosh_shows_is_no_misfit() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
@@ -274,8 +276,9 @@ fn along_the_frictions_flat_valley_the_interval_equals_that_of_the_likelihood() 
     assert!(said, "{:?}", found.verdict);
 }
 
-/// Slower yet: the hub never comes near the Stribeck speed, which may be as high as it likes. Then it may be as low, too: the curves
-/// b ω + c + d exp(−(ω/ω_s)²) tend to b ω + (c + d) for ω_s → ∞, and with that sum for c and d = 0 it is the same curve at any ω_s.
+/// In a still slower motion the hub never comes near the Stribeck speed ω_s, so that it has no upper end. It has no lower end
+/// either: the friction b ω + c + d exp(−(ω/ω_s)²) tends to b ω + (c + d) for ω_s → ∞, and the friction with c + d in place of c
+/// and with d = 0 is the same curve at any ω_s.
 #[test]
 fn ends_that_the_likelihood_does_not_have_are_open() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
@@ -320,8 +323,8 @@ fn impossible_intersample_behaviours_cost_few_simulations() {
     }
 }
 
-/// Tank, hub, friction and the gyro's scale stand for one another along a valley that bends. Spherical slosh shows the scale, and the
-/// minimum is two hundredths away from where the fit begins to seek it.
+/// Changes of tank, hub, friction and the gyro's scale cancel along a valley that bends. Spherical slosh shows the scale, and the
+/// minimum is two hundredths away from the start of the search.
 #[test]
 fn the_minimum_is_found_along_the_bent_valley_of_the_gyros_scale() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
@@ -382,7 +385,8 @@ fn twenty_spikes_are_reported_and_left_out() {
     }
 }
 
-/// A torque that is held and comes 5 ms late is, to a gyro, a linear one that comes 15 ms late: no choice may be stated as sure.
+/// A gyro cannot distinguish a held torque that comes 5 ms late from a linear torque that comes 15 ms late, so that neither may
+/// be stated as sure.
 #[test]
 fn a_delay_that_another_torque_between_rows_explains_as_well_is_not_stated_as_sure() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
@@ -541,7 +545,8 @@ fn a_recording_with_an_encoder_is_described_as_one_without() {
     }
 }
 
-/// Friction stops the hub before the first row that is fitted: no row shows the rate at the start, and the search tried ±1,000 rad/s.
+/// Friction stops the hub before the first row that is fitted. No row shows the initial rate, and the search once tried ±1,000
+/// rad/s.
 #[test]
 fn the_first_readings_bound_a_rate_that_friction_stops_at_once() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
@@ -646,9 +651,10 @@ fn a_twin_with_a_delay_or_a_smooth_torque_is_what_the_fit_simulates() {
     }
 }
 
-/// Torque, inertias, masses and frictions in proportion make the same motion, so only the frictions depend on the torque's scale. The
-/// hub sticks in each half cycle, and the instants at which it does depend on the torque. The sweep is too gentle to determine
-/// friction.b and friction.c: any value along a flat valley may be the nearest fit, and their intervals are what must not move.
+/// Torque, inertias, masses and friction that are all scaled alike make the same motion, so that an error of the torque's scale
+/// should change the inertias and the friction by the same factor. The hub sticks in each half cycle, and the instants at which
+/// it does depend on the torque. The sweep is too gentle to determine friction.b and friction.c: any value along a flat valley
+/// may be the nearest fit, and their intervals are what must not move.
 #[test]
 fn a_torque_wrong_by_1_percent_moves_the_frictions_by_1_percent_and_delay_and_asymmetry_not_at_all()
 {
@@ -682,7 +688,7 @@ fn a_torque_wrong_by_1_percent_moves_the_frictions_by_1_percent_and_delay_and_as
     assert!((b.value - 1.01 * a.value).abs() < 0.1 * a.std, "{a:?} {b:?}");
 }
 
-/// A rigid liquid, forwards and backwards.
+/// The liquid is rigid; one push is forwards, one is backwards.
 #[test]
 fn a_push_and_a_free_decay_do_not_determine_the_preferential_direction() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
@@ -731,7 +737,8 @@ fn a_search_that_would_leave_the_fmus_range_ends_at_its_end_with_a_result() {
     assert!(zeta.interval[1] > 0.98 && zeta.interval[1] <= 0.999, "{zeta:?}");
 }
 
-/// Dry friction that turns round with the hub shows when the torque acts: the behaviour is found, and the delay is one.
+/// Dry friction changes its sign when the hub turns back, which shows when the torque acts. Therefore the course between rows and
+/// the delay can both be found.
 #[test]
 fn a_delay_of_half_a_row_is_no_finding_where_the_torque_between_rows_is_found() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
@@ -785,7 +792,8 @@ fn on_bench(bench: &Bench, seed: u64, seconds: u32) -> Recording {
     Recording::of("bench", time, tau, read)
 }
 
-/// A hub with an appendage on a spring was "an actuator that lags", with 12 ms at 8 Hz and 17 ms at 4 Hz.
+/// The verdict once named "an actuator that lags" as the cause for a hub with an appendage on a spring, with 12 ms at 8 Hz and 17
+/// ms at 4 Hz.
 #[test]
 fn a_flexible_hub_has_no_cause_among_those_that_are_tried() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
@@ -803,7 +811,8 @@ fn a_flexible_hub_has_no_cause_among_those_that_are_tried() {
     }
 }
 
-/// Friction that falls by a third with a time constant of a minute was "the rate's square" at 12 standard deviations.
+/// The verdict once named "the rate's square", at 12 standard deviations, for friction that falls by a third with a time constant
+/// of a minute.
 #[test]
 fn friction_that_drifts_is_named_as_such_or_not_at_all() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();

@@ -1,4 +1,5 @@
-//! Twins of a bench that is not the FMU (`examples/twins`) which were refused, or of which something wrong was stated as sure.
+//! Twins of the independent bench (`examples/twins`) that were once refused, or for which something wrong was once stated as
+//! sure.
 
 use host::fmu::Fmu;
 use pack::packed_for_tests;
@@ -6,7 +7,8 @@ use pack::packed_for_tests;
 use crate::draw::Twin;
 use crate::habits::{self, HABITS};
 
-/// Identified as a user would, it is described, nothing is further off than five standard deviations, and the intervals of `held` hold the truth.
+/// Asserts that a twin, identified as a user would do it, is described by the model, that no estimate is further off than five
+/// standard deviations, and that the intervals of the parameters `held` hold the truth.
 fn is_described(seed: u64, held: &[&str]) {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let twin = Twin::draw(seed, 200.0);
@@ -24,50 +26,55 @@ fn is_described(seed: u64, held: &[&str]) {
     assert!(known > 10, "{known}");
 }
 
-/// The twin's friction was stated in a wrong minimum, 69 standard deviations off: the sums of squares that were compared were of different noises.
+/// The twin's friction was once stated in a wrong minimum, 69 standard deviations off, because sums of squares with different
+/// noises were compared.
 #[test]
 #[ignore = "ten seconds of CPU time: .ci/long-tests"]
 fn a_gentle_sweep_with_an_encoder_has_its_friction_in_the_intervals() {
     is_described(22, &[]);
 }
 
-/// It was refused for a point of the friction's profile where some combination of the unknowns has no influence.
+/// The twin was once refused because of one point of the friction's profile at which some combination of the unknowns has no
+/// influence.
 #[test]
 #[ignore = "ten seconds of CPU time: .ci/long-tests"]
 fn a_profile_that_cannot_be_followed_to_its_end_refuses_no_recording() {
     is_described(25, &[]);
 }
 
-/// A delay of 4 ms under a torque that is held was stated as one of 14 ms under a linear one, to 0.1 ms: the held one had not been sought to
-/// its minimum.
+/// A delay of 4 ms under a held torque was once stated as a delay of 14 ms ± 0.1 ms under a linear torque, because the search
+/// with the held torque had ended before its minimum.
 #[test]
 #[ignore = "a quarter of a minute: .ci/run --nightly"]
 fn a_delay_is_not_sure_while_another_torque_between_rows_fits_as_well() {
     is_described(89, &[]);
 }
 
-/// The search ended a standard deviation from the minimum, for that lies at a kink: dry friction stops the hub within the first row.
+/// The search once ended a standard deviation from the minimum, because the likelihood has a kink there: dry friction stops the
+/// hub within the first row.
 #[test]
 #[ignore = "ten seconds of CPU time: .ci/long-tests"]
 fn an_initial_rate_that_friction_stops_at_once_leaves_the_minimum_a_minimum() {
     is_described(40, &[]);
 }
 
-/// Its rates stay below a sixtieth of the Stribeck speed, which was looked for near them: friction.c was stated 6.5 standard deviations off.
+/// The twin's rates stay below a sixtieth of the Stribeck speed. The search looked for this speed near the rates, so that
+/// friction.c was stated 6.5 standard deviations off.
 #[test]
 #[ignore = "five seconds of CPU time: .ci/long-tests"]
 fn friction_that_a_gentle_torque_does_not_separate_is_not_sure() {
     is_described(425, &["friction.c", "friction.d", "friction.omega_s"]);
 }
 
-/// Fill and inertia were stated too narrowly, as if T = tanh(2ξh/d) were known better than its own first order is good for.
+/// The intervals of fill and inertia were once too narrow: they used T = tanh(2ξh/d) to first order, which is too rough in a deep
+/// tank.
 #[test]
 fn fill_and_inertia_of_a_deep_tank_are_in_their_intervals() {
     is_described(164, &["tank.h", "hub.I"]);
 }
 
-/// A point of its friction's profile whose search went astray ended the interval of the Stribeck speed, which was stated 4.2 standard
-/// deviations off.
+/// The search of one point of the friction's profile went astray and ended the interval of the Stribeck speed too early, so that
+/// this was stated 4.2 standard deviations off.
 #[test]
 #[ignore = "a quarter of a minute: .ci/run --nightly"]
 fn a_point_of_the_profile_that_went_astray_ends_no_interval() {
@@ -80,8 +87,9 @@ fn a_point_of_the_profile_that_went_astray_ends_no_interval() {
     assert!((speed.value - truth).abs() < 3.0 * speed.std, "{truth}, found {speed:?}");
 }
 
-/// Each twin is refused, or the verdict is that no model fits, where rows without a gyro lose their torque, printed times are taken at
-/// their word, gaps are joined by lines, one delay serves two sensors or rows are held that the torque's clock does not have.
+/// The twins show five faults of reading: rows without a gyro lose their torque, printed times are taken as exact, gaps are
+/// joined by lines, one delay serves two sensors, or the torque is held in rows that its clock does not have. With any of them a
+/// twin is refused, or the verdict is that no model fits.
 #[test]
 #[ignore = "minutes: .ci/run --nightly"]
 fn recordings_with_the_habits_of_loggers_are_described() {

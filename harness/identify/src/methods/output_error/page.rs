@@ -6,7 +6,6 @@ use report::page::table;
 use crate::bench::identification::{Identification, ModelFit};
 use crate::words::page::Sections;
 
-/// The sections.
 pub fn sections(found: &Identification) -> Sections {
     let fit = &found.details.fit;
     Sections {
