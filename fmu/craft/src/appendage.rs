@@ -16,11 +16,11 @@
 //! sum of V_P.(p eta' + w x p eta) + w.r eta' + eta'^2/2 - omega^2 eta^2/2
 //! ```
 //!
-//! These are the terms of the kinetic energy of the deformed appendage that its participations determine. They are all terms
-//! that are linear in eta, except w.(dI w)/2, where dI is the change of the inertia about P. Terms of the second order, such as the centrifugal
-//! softening of the mode itself, are left out as well. Both change eta by the order (w/omega)^2. The Lagrangian
-//! does not change if the craft is moved, turned, or given a constant velocity, so momentum and angular momentum balance
-//! exactly at every amplitude, and with the loss c eta'^2 energy, too. Lagrange's equations are
+//! These are the terms of the kinetic energy of the deformed appendage that its participations determine: all terms that are
+//! linear in eta, except w.(dI w)/2, where dI is the change of the inertia about P. Terms of the second order, such as the
+//! centrifugal softening of the mode itself, are left out as well. The terms that are left out change eta by the order
+//! (w/omega)^2. The Lagrangian does not change if the craft is moved, turned, or given a constant velocity, so momentum and
+//! angular momentum balance exactly at every amplitude, and energy balances with the loss c eta'^2. Lagrange's equations are
 //!
 //! ```text
 //! eta'' + c eta' + omega^2 eta = -p.a_P - r.w',   a_P = a + w' x P + w x (w x P),   c = 2 zeta omega
@@ -130,8 +130,9 @@ impl Mode {
     }
 }
 
-/// The modes of all appendages. `effective` is the sum of u u^T, and `shares` are bounds of the share of the dry craft's
-/// inertia that each mode's eta takes or gives, per eta. `is_too_heavy` is true if the undeformed appendages leave the craft no inertia.
+/// The modes of all appendages. `effective` is the sum of u u^T. `shares` has for each mode a bound of the share of the dry
+/// craft's inertia that its displacement eta takes or gives, per unit of eta. `is_too_heavy` is true if the undeformed appendages
+/// leave the craft no inertia.
 #[derive(Clone, Debug)]
 pub(crate) struct Structure {
     modes: Vec<Mode>,
@@ -142,7 +143,7 @@ pub(crate) struct Structure {
 }
 
 /// The deformed appendages at an instant: `body` has the changes of the first and second moments, `momentum` is [K; L], `slope`
-/// the derivative of the body's inertia, and `energy` that of the modes without the craft's motion.
+/// is the derivative of the body's inertia by time, and `energy` is the energy of the modes without the craft's motion.
 pub(crate) struct Deformed<T> {
     eta: [T; APPENDAGES],
     rate: [T; APPENDAGES],
@@ -153,8 +154,8 @@ pub(crate) struct Deformed<T> {
 }
 
 impl Structure {
-    /// Returns the modes of a craft's appendages up to the last one that has an effect, `None` if none has. `dry` is the dry craft
-    /// with its appendages undeformed.
+    /// Returns the modes of a craft's appendages up to the last mode that has an effect; `None` if no mode has an effect. `dry`
+    /// is the dry craft with its appendages undeformed.
     pub fn new(every: &[Appendage], dry: Rigid) -> Option<Structure> {
         let used = every.iter().rposition(Appendage::acts).map_or(0, |last| last + 1);
         let modes: Vec<Mode> = every[..used].iter().map(Mode::new).collect();
@@ -292,8 +293,8 @@ impl Structure {
         })
     }
 
-    /// Returns true if the appendages leave the craft no inertia: at once if their participations belong to a
-    /// heavier craft, otherwise at deflections far beyond those of a linear model.
+    /// Returns true if the appendages leave the craft no inertia: at any deflection if their participations belong to a heavier
+    /// craft, otherwise only at deflections far beyond the range of a linear model.
     pub fn is_beyond(&self, eta: &[f64]) -> bool {
         if self.is_too_heavy {
             return true;

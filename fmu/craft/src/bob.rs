@@ -40,9 +40,9 @@ use taylor::vector::{
 use crate::damping::Drag;
 use crate::parameters::Tank;
 
-/// Values of one bob for the outputs, body axes: position `rho` from O and velocity relative to the tank,
-/// hinge from O and direction of the tank's axis, and p in tank axes. `centring` is the energy of the
-/// centring stiffness, J; `spin` is the angular momentum that a bob has in addition to the momentum of a point mass, if there is any.
+/// Values of one bob for the outputs, body axes: position `rho` from O and velocity relative to the tank, hinge from O and
+/// direction of the tank's axis, and p in tank axes. `centring` is the energy of the centring stiffness, J; `spin` is the angular
+/// momentum that a bob has in addition to the angular momentum of a point mass; `None` if it has no such part.
 pub(crate) struct BobNow<T> {
     pub m: T,
     pub rho: Vec3<T>,
@@ -160,8 +160,8 @@ impl Bob {
     /// Returns direction and rate at `t` after the start at `x` in tank axes, normalised, from the series up
     /// to order n. `w` is the craft's angular velocity at that time.
     ///
-    /// Only the change is rotated back into tank axes. The matrix is orthogonal only to rounding, so a
-    /// rotation there and back would shear direction and rate by the same 1e-16 in every step.
+    /// Only the change is rotated back into tank axes. The matrix is orthogonal only to rounding, so that a rotation to body axes
+    /// and back would shear direction and rate by the same 1e-16 in every step.
     #[inline(always)]
     pub fn state_at(&self, x: &[f64; 6], n: usize, t: f64, w: Vec3) -> [f64; 6] {
         let (p, v) = (space::value(&self.p, n, t), space::value(&self.v, n, t));
@@ -323,7 +323,7 @@ impl Bob {
         self.drag.defect(n - 1, h) * rate * h
     }
 
-    /// Stores v' that the series up to order n has at `h`.
+    /// Stores the value that the series of v' has at `h`, from the series up to order n.
     pub fn store_slope(&mut self, n: usize, h: f64) {
         self.slope = space::value(&self.v_d, n - 1, h);
     }

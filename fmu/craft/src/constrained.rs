@@ -1,5 +1,5 @@
-//! A bob whose motion is not that of a pendulum: on another surface than a sphere (`surface.rs`) or guided in a plane
-//! (`contents.rs`), as power series. The tank keeps its liquid.
+//! A bob that does not move as a pendulum does, because it is on another surface than a sphere (`surface.rs`) or guided in a
+//! plane (`contents.rs`). Its motion is expanded in power series. The tank keeps its liquid.
 //!
 //! ```text
 //! r   position of the bob from its hinge P over l, tank axes, e = e_z: rho = P + l r,  r = p + (kappa - 1) u^2/8 e
@@ -13,9 +13,9 @@
 //! S  = (s - 1) sigma',   sigma = q.r'
 //! ```
 //!
-//! T holds the bob on its surface, N in the plane across b. S q is the kinetic energy within the liquid as a force: both
-//! do the same work in every motion on the surface. The multipliers of order n follow from the coefficients n + 1 of n.r'
-//! = 0, b.r' = 0 and sigma. All other terms are products, so every order solves the same equations:
+//! The force T n holds the bob on its surface, and N b holds it in the plane across b. The force S q represents the kinetic
+//! energy within the liquid: both do the same work in every motion on the surface. The multipliers of order n follow from the
+//! coefficients n + 1 of n.r' = 0, b.r' = 0 and sigma. All other terms are products, so every order solves the same equations:
 //!
 //! ```text
 //! f = H Y + known terms,   r'' = Y - T n - S q - N b,   H = n n^T/n.n + (s - 1) (n.n/I) d d^T + b b^T
@@ -169,8 +169,8 @@ impl HigherSeries {
         self.m = [-q[1], q[0], 0.0];
     }
 
-    /// Computes the terms of order n from r to order n + 1, r' and w_e to order n, and u to order n + 1.
-    /// Returns the sum of the known terms in f.
+    /// Computes the terms of order n from the coefficients of r and u up to n + 1 and of r' and w_e up to n. Returns the sum of
+    /// the known terms in f.
     #[inline(never)]
     fn expand(&mut self, n: usize, w_e: f64, r: &Vector, r_d: &Vector, u: &Series) -> [f64; 2] {
         let HigherSeries { by, .. } = *self;
@@ -630,7 +630,7 @@ impl ConstrainedBob {
         }
     }
 
-    /// Returns coefficient n of what the mode adds to I_zz s_z of the spinning liquid (`spin.rs`), before
+    /// Returns coefficient n of the mode's contribution to I_zz s_z of the spinning liquid (`spin.rs`). It is called before
     /// [`ConstrainedBob::reaction`] of this order; `w` is coefficient n of the angular velocity.
     pub fn reaction_on_spin(&self, n: usize, w: Vec3) -> f64 {
         let Some(higher) = self.higher.as_ref().filter(|it| it.by.gyroscopic != [0.0; 2]) else {
@@ -690,7 +690,7 @@ impl ConstrainedBob {
         self.drag.defect(n - 1, h) * rate * h
     }
 
-    /// Stores V' that the series up to order n has at `h`.
+    /// Stores the value that the series of V' has at `h`, from the series up to order n.
     pub fn store_slope(&mut self, n: usize, h: f64) {
         let horner = |sum: Vec3, k: usize| add(scale(h, sum), scale(k as f64, self.v[k]));
         self.slope_at_end = (1..=n).rev().fold([0.0; 3], horner);

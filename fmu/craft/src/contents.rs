@@ -22,10 +22,10 @@
 //! A bob with other coefficients of the third order than a pendulum's is on another surface than a sphere (`surface.rs`).
 //!
 //! A tank with planar modes does not drain. Perpendicular to its plane the bob moves as rigid liquid. With modes along two
-//! directions m_0 is the liquid less the masses of both and may be negative.
+//! directions m_0 is the mass of the liquid less the masses of the modes in both directions, so that it may be negative.
 //!
-//! Mass leaves a bob with the bob's velocity, and leaves the craft with the velocity of the tank at the outlet, r_out =
-//! d + z_out e. It flows along the tank's axis, and from the bobs to the axis on their level. Within the tank it has
+//! Mass leaves a bob with the bob's velocity, and leaves the craft with the velocity of the tank at the outlet, r_out = d + z_out
+//! e. In between, it flows from each bob to the axis at the bob's level, and along the tank's axis. The flow within the tank has
 //! the momentum K relative to the tank and the moment of momentum L about O:
 //!
 //! ```text
@@ -74,9 +74,9 @@ use crate::state::Line;
 use crate::surface::{LEAST_INERTIA, Lift, Meridian, Rotary, Surface};
 use crate::table::{FillCurves, Jet};
 
-/// A tank in its mounting position, with what does not change during a run. `still` holds the rigid liquid
-/// and all liquid at rest of a tank that does not drain; the surfaces of the modes are those at the start
-/// where the table gives them.
+/// A tank in its mounting position, with the quantities that do not change during a run. For a tank that does not drain, `still`
+/// holds the rigid liquid, and all liquid at rest, as rigid bodies. If the table gives the surfaces of the modes, `surfaces` are
+/// those at the start.
 #[derive(Clone, Debug)]
 pub struct MountedTank {
     pub tank: Tank,
@@ -97,10 +97,10 @@ fn jet<T: Number>(x: f64) -> Jet<T> {
     [x, 0.0, 0.0].map(T::constant)
 }
 
-/// A bob with the terms of its equation that do not contain [a; w']: `u` is [p; P x p], `phi` and `g` (G
-/// without a + w' x rho) are those of the equations above, and `centring` is the energy of the centring
-/// stiffness. The rates belong to the changing mass of liquid: m', the velocity h' e + l' p of the rod's far
-/// end for a bob at rest on it, and `centring_d` = k l l' |p_perp|^2.
+/// A bob with the terms of its equation that do not contain [a; w']: `u` is [p; P x p], `phi` is the force phi of the equations
+/// above, `known` is G without a + w' x rho, and `centring` is the energy of the centring stiffness. The rates belong to the
+/// changing mass of liquid: m', the velocity h' e + l' p of the rod's far end for a bob at rest on it, and `centring_d` = k l l'
+/// |p_perp|^2.
 pub struct Swing<T> {
     m: T,
     l: T,
@@ -362,9 +362,9 @@ impl MountedTank {
         surface.least_inertia(p[2], p[0] * p[0] + p[1] * p[1])
     }
 
-    /// Refuses bobs at angles at which the inertia along their meridian is too small. `tank` is the tank's
-    /// number, which counts from 1, or 0 if the system has only one tank. The slack recognises a step that
-    /// could not pass the bound.
+    /// Refuses bobs at angles at which the inertia along their meridian is too small. `tank` is the tank's number, which counts
+    /// from 1, or 0 if the system has only one tank. The bound has a slack of 1e-6, because a step that cannot pass the bound
+    /// ends just before it.
     pub fn check_surfaces(&self, x: &[f64], liquid: f64, tank: usize) -> Result<(), StepError> {
         let is_near = |n: &usize| self.least_inertia(*n, x, liquid) < LEAST_INERTIA * (1.0 + 1e-6);
         let Some(n) = (0..MODES).find(is_near) else { return Ok(()) };
@@ -438,7 +438,7 @@ impl<T: Number> OnSurface<T> {
         Some(rotary.couple(dot(n, slid), dot(self.e, w_d), self.e))
     }
 
-    /// Returns the angular momentum of rotary motion about the axis, beyond that of the bob, over m.
+    /// Returns the angular momentum about the axis that rotary motion has in addition to the bob's, over m.
     fn spin(&self) -> Option<Vec3<T>> {
         Some(scale(self.rotary.as_ref()?.spin(), self.e))
     }

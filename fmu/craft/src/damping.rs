@@ -16,17 +16,17 @@
 //! tank away, and is a_f/2 without thrust. zeta_A makes the damping ratio grow with the amplitude, zeta + zeta_A A.
 //! A_0, far below any motion of interest, keeps the root analytic.
 //!
-//! Breaking waves dissipate in proportion to max(0, k a - s_b). k a is the steepness: wave number times elevation at the
-//! wall. In an upright cylinder k = xi_n/R, and the elevation per slosh angle is 2 R/(xi_n^2 - 1), at any depth
-//! (`formulas::cylinder`). A general tank has no parameter for its wave number, and `wave` may be left at 0. So every mode
-//! takes the cylinder's steepness per angle, 1.54 for mode 1, and s_b belongs to it. A box has k a = 4/pi A: multiply a
-//! measured s_b by 1.21. f is that function with a corner rounded over delta, and f(0) = 0. Written as
+//! Breaking waves dissipate in proportion to max(0, k a - s_b). k a is the steepness: wave number times elevation at the wall. In
+//! an upright cylinder k = xi_n/R, and the elevation per slosh angle is 2 R/(xi_n^2 - 1), at any depth (`formulas::cylinder`). A
+//! general tank has no parameter for its wave number, and `wave` may be left at 0. So every mode takes the cylinder's steepness
+//! per angle, 1.54 for mode 1, and s_b belongs to it. A box has k a = 4/pi A: multiply a measured s_b by 1.21. f is the function
+//! max(0, x - s_b) with its corner rounded over delta and shifted so that f(0) = 0. Written as
 //!
 //! ```text
 //! f(x) = x [1 + (x - 2 s_b)/(sqrt(d^2 + delta^2) + sqrt(s_b^2 + delta^2))]/2
 //! ```
 //!
-//! it is never negative, also not by rounding. Every part of c is positive or 0, so the drag never drives.
+//! f is never negative, not even by rounding. Every part of c is positive or 0, so the drag never drives.
 //!
 //! Source of the law: peaks of forced waves in a box (Baeuerlein and Avila). At k a = 0.22, 0.40, 0.66 and 0.81 they need
 //! zeta = 0.0079, 0.0082, 0.0091 and 0.0142. So s_b is 0.60 to 0.66 and zeta_b about 0.04, in other records 0.03 to 0.09.
@@ -67,7 +67,7 @@ impl Breaking {
 /// Largest step as a share of the time to the nearest singularity of a power series.
 const SHARE_OF_RADIUS: f64 = 0.5;
 
-/// The power series of w f(k a), with those of the products in it.
+/// The power series of w f(k a) and of the products in it.
 #[derive(Clone, Debug)]
 struct Excess {
     law: Breaking,
@@ -115,9 +115,9 @@ impl Excess {
     }
 }
 
-/// One mode's drag in a tank with constant contents, with the series of its law. `growth` is 2 m zeta_A,
-/// kg/rad; `c_ref` is c at g_ref without its dependence on the amplitude, N s/m; `w2_ref` is w_ref^2 and
-/// `floor2` is a_f^2. `instant` is the same law at an instant, with m and l, to check the series.
+/// One mode's drag in a tank with constant contents, with the series of its law. `growth` is 2 m zeta_A, kg/rad; `c_ref` is c at
+/// g_ref without its dependence on the amplitude, N s/m; `w2_ref` is w_ref^2 and `floor2` is a_f^2. `instant` is the same law,
+/// with m and l, for values at an instant, against which the series is checked.
 #[derive(Clone, Debug)]
 pub struct Drag {
     law: DampingLaw,

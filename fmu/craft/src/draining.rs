@@ -1,14 +1,14 @@
 //! A craft with tanks that drain, have planar modes, other modes than pendulums (`surface.rs`) or liquid that spins (`spin.rs`),
-//! each with its contents from `contents.rs`. Outputs and derivatives are of these equations. Steps are, too, if a tank drains; otherwise
-//! `motion.rs` takes them.
+//! each with its contents from `contents.rs`. Outputs and derivatives of such a craft are computed with these equations. If a
+//! tank drains, its steps are computed with them as well; otherwise `motion.rs` computes the steps.
 //!
 //! ```text
 //! M [a; w'] = [ f - w x (w x S) + sum of force ; tau - h_w' - w x (I w + h_w) + sum of torque ]
 //! M = M_R + sum of m u u^T
 //! ```
 //!
-//! as in `motion.rs`, with the loads of the flow within the tanks. A jump of a flow changes K and L by an impulse. The
-//! same equations give this impulse if only the flow's slope acts.
+//! as in `motion.rs`, with the loads of the flow within the tanks. A jump of a flow changes the momenta K and L of the flow
+//! within the tank by an impulse. The equations above give this impulse if only the flow's slope acts.
 
 use alloc::vec::Vec;
 use core::ops::Range;
@@ -99,8 +99,8 @@ struct Equations<T> {
     factors: Factors<T>,
 }
 
-/// The craft at an instant, with its equations solved. `velocity` is that of O, body axes; `by_pivot` is the
-/// power that the pivot dissipates, W.
+/// The craft at an instant, with its equations solved. `velocity` is the velocity of O, body axes; `by_pivot` is the power that
+/// the pivot dissipates, W.
 struct Instant<T> {
     q: Quaternion<T>,
     axes: Mat3<T>,
@@ -118,8 +118,8 @@ pub struct Run<'a> {
     pub inputs: &'a Inputs,
 }
 
-/// Returns the scales for error control: 1 for attitude and directions, and those of rate, position, velocity,
-/// the bobs' rates, and the appendages' displacements and rates.
+/// Returns the scales of all states for error control: 1 for attitude and directions, and the given scales for rate, position,
+/// velocity, the bobs' rates, and the appendages' displacements and rates.
 fn scales(
     turn: f64,
     position: f64,
@@ -311,8 +311,8 @@ impl Draining {
         true
     }
 
-    /// Accounts for the impulse of the wheels that has changed the state from `before`. Where liquid flows,
-    /// the impulse also does work on the rods' moving ends, as T does in drained' (`contents.rs`).
+    /// Adds to the drained energy the work of the wheels' impulse that has changed the state from `before`. If liquid flows, the
+    /// impulse also does work on the moving ends of the rods, as the tension T does in drained' (`contents.rs`).
     pub fn drain_by_impulse(&self, before: &State, state: &mut State) {
         if state.flow != [0.0; TANKS] {
             let work = state.x[index::WORK] - before.x[index::WORK];

@@ -24,7 +24,7 @@ pub(crate) trait Carrier {
 
     fn restore(&mut self, memory: &Self::Memory);
 
-    /// Computes all quantities of the equations of motion at the time `t`.
+    /// Computes all quantities of the equations of motion at the time `t`, from the present states.
     fn evaluate_at(&mut self, t: f64);
 
     fn lump(&self, lump: usize) -> &Lump;
@@ -107,8 +107,8 @@ pub(crate) trait Carrier {
         self.lump(lump).may_settle(a, w, w_d)
     }
 
-    /// Returns the kinetic energy and that of the centring springs in a frame in which O moves with `v`, body
-    /// axes, after [`Carrier::evaluate_at`]. In this frame nothing cancels, however fast the carrier is.
+    /// Returns the kinetic energy and the energy of the centring springs in a frame in which O moves with `v`, body axes, after
+    /// [`Carrier::evaluate_at`]. With a small `v` no large terms cancel, however fast the carrier is.
     fn energy_with(&self, v: Vec3) -> f64 {
         let (w, mut rigid, mut energy) = (self.motion()[1][0], self.rigid(), 0.0);
         if let Some(deformed) = self.deformed() {
@@ -142,8 +142,8 @@ pub(crate) trait Carrier {
         (mass, scale(1.0 / mass, momentum))
     }
 
-    /// Detaches the liquid from the bottom. Its centre keeps its velocity. The shape absorbs motions within
-    /// the liquid, and the carrier takes over the shape's moment of momentum.
+    /// Detaches the liquid from the bottom. The liquid's centre keeps its velocity. Motions within the liquid end in its shape,
+    /// and the carrier takes over their moment of momentum.
     fn leave(&mut self, lump: usize, t: f64) {
         let before = self.energy_with([0.0; 3]);
         let center = self.lump(lump).common_center(&self.directions(lump));
@@ -221,8 +221,8 @@ pub(crate) trait Carrier {
         *self.dissipated() += (1.0 - e) * j * v_n / 2.0;
     }
 
-    /// Hands the liquid over to the pendulums. Returns true if this loses energy; otherwise the states are
-    /// unusable.
+    /// Hands the liquid over to the pendulums. Returns true if the hand-over loses energy; otherwise the states are unusable and
+    /// the caller has to restore them.
     fn settle(&mut self, lump: usize, t: f64) -> bool {
         let before = self.energy_with([0.0; 3]);
         let (mass, of_center) = self.drift_of_center();

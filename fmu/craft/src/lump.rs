@@ -5,12 +5,12 @@
 //! flies freely, bounces off the wall with losses and slides on it. The pendulums take it over again when it comes to
 //! rest at the bottom.
 //!
-//! **Surface within reach.** Liquid at rest under a specific force of any direction has its centre on the tank's
-//! surface of centres of buoyancy. There the surface is perpendicular to the force. Its radius of curvature is I/V, the
-//! second moment of the free surface over the liquid's volume (Dupin 1822, as in the theory of ships). A mass point
-//! that slides on this surface rests where the liquid rests, with the same energy. For a spherical tank the surface is
-//! a sphere about the tank's centre through the settled liquid's centre. For any other tank the model takes an
-//! ellipsoid of revolution about the tank's axis through the liquid's centres at bottom and top,
+//! **Surface within reach.** Liquid at rest under a specific force of any direction has its centre on the tank's surface of
+//! centres of buoyancy. There the surface is perpendicular to the force. Its radius of curvature is I/V, the second moment of the
+//! free surface over the liquid's volume (Dupin 1822, as in the theory of ships). A mass point that slides on this surface rests
+//! where the liquid rests, with the same energy. For a spherical tank the surface is a sphere about the tank's centre through the
+//! settled liquid's centre. For any other tank the model uses an ellipsoid of revolution about the tank's axis, through the
+//! liquid's centres at the bottom and at the top:
 //!
 //! ```text
 //! f = 1 - x.D x >= 0,   D = diag(1/b^2, 1/b^2, 1/a^2) in tank axes,   x from the surface's centre
@@ -18,9 +18,9 @@
 //! a   = travel/2,   b^2 = a R_p or more,   R_p = sum of m l/m_liq
 //! ```
 //!
-//! With b^2 = a R_p the curvature at the bottom is that of the path of the pendulums' common centre, which is I/V for
-//! all modes. For R_p <= a the pendulums' centre, on a sphere of radius R_p, then lies within the surface in every
-//! direction: f = q (1 - c)^2 (1 - q), q = R_p/a, c the cosine of the angle.
+//! With b^2 = a R_p the surface has at the bottom the curvature of the path of the pendulums' common centre, whose radius is I/V
+//! if all modes are modelled. For R_p <= a the pendulums' centre, on a sphere of radius R_p, then lies within the surface in
+//! every direction: f = q (1 - c)^2 (1 - q), q = R_p/a, c the cosine of the angle.
 //!
 //! **Motion.** u = x' + w x rho, rho from O, n outwards. The lump has the inertia of the shape in which it left the
 //! bottom. This inertia rotates with the tank (J_a, a massless part of the craft).
@@ -31,8 +31,8 @@
 //! N  = (m/G.G) [x'.D x' - G.(a + w' x rho + w x (u + x'))]       keeps f = 0 while it slides, N > 0
 //! ```
 //!
-//! The drag's reaction may push the craft away from the lump. If it would, while without drag the lump stays on the
-//! wall, the drag is off until the wall force exceeds twice the drag.
+//! The drag's reaction may push the craft away from the lump. If the lump would leave the wall with drag, but stay on it without,
+//! the drag is off until the wall force exceeds twice the drag.
 //!
 //! Like a rod, the wall adds a matrix of rank one: N is affine in [a; w'], with slope -m G.(..)/G.G.
 //!
@@ -42,15 +42,16 @@
 //! ends a sequence of bounces.
 //!
 //! **Hand-over.** In both directions each part of the liquid keeps its momentum until the body that it joins catches it
-//! plastically. The whole therefore keeps linear and angular momentum and its centre of mass, and loses energy
-//! (Carnot). On leaving, the shape absorbs relative motions within the liquid. On return, the tank catches m_0, and the
-//! bobs keep the motion that their rods allow. The pendulums take over while |p_perp|^2 + |x'|^2/(g l_s) <= sin^2 30
-//! deg, 1/l_s = sum of (m/l)/sum of m. The left side is the mean over the modes, by modal mass, of the energy that each
-//! takes over, so the mean cosine stays far above that of 45 degrees. A hand-over that would raise the energy (through
-//! centring, or because the shape changes while the craft rotates) waits until the lump is nearest to the axis.
+//! plastically. The whole therefore keeps linear and angular momentum and its centre of mass, and loses energy (Carnot). On
+//! leaving, the shape absorbs relative motions within the liquid. On return, the tank catches m_0, and the bobs keep the motion
+//! that their rods allow. The pendulums take over the liquid only if |p_perp|^2 + |x'|^2/(g l_s) <= sin^2 30 deg, 1/l_s = sum of
+//! (m/l)/sum of m. The left side is the mean over the modes, by modal mass, of the energy that each mode takes over, so that the
+//! mean cosine stays far above cos 45 degrees. A hand-over that would raise the energy (through centring, or because the shape
+//! changes while the craft rotates) waits until the lump is nearest to the axis.
 //!
-//! **Validity.** Times and momenta of crossings are valid, impacts only to an order of magnitude. The model does not
-//! represent wall pressure, sprays, films or the liquid's path along the wall. e and d are guesses unless measured.
+//! **Validity.** Times and momenta of crossings are valid, impacts only to an order of magnitude. The model does not represent
+//! wall pressure, sprays, films or the liquid's path along the wall. The coefficient of restitution e and the drag d are guesses
+//! unless they were measured.
 
 use taylor::number::Number;
 use taylor::root::first_root;
@@ -78,15 +79,15 @@ const RESTING: f64 = 1e-9;
 const PRESSING: f64 = 1e-9;
 /// Distance from an event, relative to its time, over which the slope of an event function is taken.
 const NEAR: f64 = 1e-6;
-/// Largest change of an event's time in an iteration, relative to it, and number of iterations.
+/// Largest change of an event's time in one iteration, relative to this time, and number of iterations.
 const FAR: f64 = 0.1;
 const ITERATIONS: usize = 4;
 /// Square of the sine of 30 degrees, the largest swing at which the pendulums take over the liquid.
 const SWING: f64 = 0.25;
 
-/// Event of a tank's liquid: it leaves the bottom, meets the wall, is no longer pressed to it (`Release`), is
-/// pressed strongly enough for the drag, or is taken over by the pendulums (`Settle`). At `Look` a condition
-/// has changed that is not sufficient alone.
+/// Event of a tank's liquid: it leaves the bottom, meets the wall, is no longer pressed to the wall (`Release`), is pressed
+/// strongly enough for the drag, or is taken over by the pendulums (`Settle`). At `Look` one of several conditions for settling
+/// is met, so that the others have to be examined again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Due {
     Leave,
@@ -97,10 +98,9 @@ pub(crate) enum Due {
     Look,
 }
 
-/// Function that crosses zero at an event. `Exact` stands for functions whose series are as exact as the
-/// motion's: the wall force and the bobs' mean cosine. `Axial` is the specific force along the axis over its
-/// lower limit, `Passage` half of the derivative of the square of the distance from the axis, and `Excess`
-/// the wall force over that for drag.
+/// Function that crosses zero at an event. `Exact` stands for functions whose series are as exact as the motion's: the wall force
+/// and the bobs' mean cosine. `Axial` is the specific force along the axis over its lower limit, `Passage` half of the derivative
+/// of the square of the distance from the axis, and `Excess` the wall force beyond the force from which on drag acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Crossing {
     Exact,
@@ -272,8 +272,8 @@ impl Lump {
         if self.state == BallState::Sliding { self.drag } else { 0.0 }
     }
 
-    /// Returns true if drag acts. With d = 0 a released lump would alternate between sliding and light by
-    /// rounding.
+    /// Returns true if drag acts. It is false for d = 0, because otherwise rounding would make a released lump alternate between
+    /// the states `Sliding` and `Light`.
     pub fn drags(&self) -> bool {
         self.drag() > 0.0
     }
@@ -310,8 +310,8 @@ impl Lump {
         Rigid { mass: 0.0, moment: [0.0; 3], inertia }
     }
 
-    /// Sets the derivative of [`Lump::shape`]'s inertia at the directions `p` along `dp`. The centre moves,
-    /// too, but the first moment about it is 0, so its velocity drops out.
+    /// Sets the derivative of [`Lump::shape`]'s inertia at the directions `p` along `dp`. The centre of the liquid also moves,
+    /// but the first moment about it is 0, so that its velocity drops out.
     pub fn seed_shape(&mut self, p: &Directions, dp: &Directions) {
         let center = self.common_center(p);
         let mut slope = [[0.0; 3]; 3];
@@ -495,7 +495,7 @@ impl Lump {
         (g, dot(g, g))
     }
 
-    /// Returns the wrench at a = 0 and w' = 0, also in N.
+    /// Returns the wrench at a = 0 and w' = 0, with the wall force N for these values.
     pub fn bias<T: Number>(&self, w: Vec3<T>) -> [Vec3<T>; 2] {
         if !self.slides() {
             return [constant([0.0; 3]); 2];
@@ -531,8 +531,8 @@ impl Lump {
         }
     }
 
-    /// Applies an impulse on the craft to the lump's rate. In flight the lump keeps its velocity, on the wall
-    /// its velocity along the wall.
+    /// Applies an impulse on the craft to the lump's rate. In flight the lump keeps its velocity; on the wall it keeps only its
+    /// velocity along the wall.
     pub fn after_impulse(&self, x: &mut [f64], dv: Vec3, dw: Vec3) {
         let mut kick = add(dv, cross(dw, self.rho[0]));
         if self.slides() {
@@ -649,8 +649,8 @@ impl Lump {
         [(swing, of_swing), (thrust, of_thrust), (depth, 1e-10 * self.half)]
     }
 
-    /// Returns the next event of the liquid within `h` after the start of the expansion up to order n, with
-    /// its time. `bobs` are those of the tank.
+    /// Returns the next event of the liquid within `h` after the start of the expansion up to order n, with its time. `bobs` are
+    /// the bobs of the tank.
     pub fn next<'a>(
         &self,
         n: usize,
@@ -710,9 +710,9 @@ impl Lump {
         }
     }
 
-    /// Returns the time of an event near the root `t` of its function's series. Coefficient k of a product of
-    /// series is up to 2^k times those of its factors, so the series up to order n is less exact than the
-    /// motion, from whose values at the event this time comes.
+    /// Returns the time of an event near the root `t` of its function's series. Coefficient k of a product of series is up to 2^k
+    /// times those of its factors, so that the product's series up to order n is less exact than the motion. Therefore the time
+    /// is corrected with the function's values that the motion has near the event.
     fn polish(
         &self,
         mut t: f64,
@@ -828,10 +828,10 @@ impl Lump {
         f[1] < -RESTING || f[2] < -PRESSING * size
     }
 
-    /// Returns f for hosts that integrate themselves, after order 0 of the expansion. It is below zero only
-    /// if an impact is due. After an impact the lump may be outside by rounding and move inwards, or be on
-    /// the wall and not pressed. The value is above zero there, so that a host that compares signs does not
-    /// miss a bounce shorter than its step.
+    /// Returns f for hosts that integrate themselves, after order 0 of the expansion. The value is below zero only if an impact
+    /// is due. After an impact the lump may be outside by rounding and move inwards, or be on the wall without being pressed to
+    /// it. In these cases the value is above zero, so that a host that compares signs does not miss a bounce shorter than its
+    /// step.
     fn distance_to_wall(&self, w: &Vector, w_d: &Vector) -> f64 {
         let (x, x_d, g) = (self.x_0, self.x_d[0], times(&self.d, self.x_0));
         let f = 1.0 - dot(x, g);
@@ -844,8 +844,7 @@ impl Lump {
         if self.meets_wall([f, -2.0 * dot(g, x_d), -bent], x_2) { f } else { TOUCHING }
     }
 
-    /// Returns true if a host that has integrated up to here has passed an event, judged by the current
-    /// indicators.
+    /// Returns true if the current indicators show that a host that integrates itself has passed an event.
     pub fn is_overdue(&self, [leaves, ends]: [f64; 2]) -> bool {
         // After the passage nearest to the axis, this indicator of a held lump stays below zero.
         leaves <= 0.0 || ends < 0.0 && self.state != BallState::Held
@@ -915,9 +914,9 @@ impl Lump {
         self.settling(1, a, w, w_d).iter().all(|(x, fine)| x[0] > -fine)
     }
 
-    /// Returns functions that cross zero at events, for hosts that integrate themselves; `bobs` are those of
-    /// the tank. The indicators cross where [`Lump::next`] finds the event, with directions of unit length,
-    /// which a host's need not be.
+    /// Returns functions that cross zero at events, for hosts that integrate themselves; `bobs` are the bobs of the tank. The
+    /// indicators cross zero where [`Lump::next`] finds the event. They use directions of unit length, because a host's
+    /// directions need not have it.
     pub fn indicators<'a>(
         &self,
         [a, w, w_d]: [&Vector; 3],

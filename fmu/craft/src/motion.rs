@@ -25,12 +25,12 @@
 //! With O on a pivot a = -C^T g is given, a' = -w x a. Only the lower half of the system remains, and tau includes the
 //! pivot's torque (pivot.rs), with the pivot's axis Z = C^T e_z, Z' = -w x Z.
 //!
-//! Bobs on other surfaces than spheres or in planes add matrices of rank one to M (constrained.rs).
+//! Bobs that move on other surfaces than spheres, or in planes, add matrices of rank one to M (constrained.rs).
 //!
 //! Liquid that spins (spin.rs) adds a couple, which depends on w and on the states of the tank.
 //!
-//! A tank whose liquid has detached has neither rigid liquid nor bobs, but a lump and the inertia that rotates with the
-//! tank (lump.rs). Changes between the two are impulses at the roots of event functions.
+//! A tank whose liquid has detached has neither rigid liquid nor bobs, but a lump and the inertia that rotates with the tank
+//! (lump.rs). The change from bobs to lump and back is an impulse at the root of an event function.
 //!
 //! Source: Newton-Euler about O with the bobs' tensions eliminated.
 
@@ -85,8 +85,8 @@ fn gyroscopic(inertia: &Mat3, [xx, yy, zz, xy, xz, yz]: [f64; 6]) -> Vec3 {
     [element(2, 1) - element(1, 2), element(0, 2) - element(2, 0), element(1, 0) - element(0, 1)]
 }
 
-/// Replaces the upper half of a matrix so that the solution's upper half equals that of the right-hand side,
-/// which is a on a pivot.
+/// Replaces the upper half of a matrix so that the upper half of the solution equals the upper half of the right-hand side, which
+/// on a pivot is the given acceleration a.
 #[inline(always)]
 fn hold_upper_rows(matrix: &mut Mat6) {
     for i in 0..3 {
@@ -266,7 +266,7 @@ impl CraftMotion {
         }
     }
 
-    /// Replaces rigid liquids and bobs by those of `tanks`, with as many tanks and modes.
+    /// Replaces rigid liquids and bobs by those of `tanks`, which must have the same numbers of tanks and modes.
     pub fn refill<'a>(&mut self, tanks: impl Iterator<Item = &'a Tank> + Clone) {
         self.rigid = self.craft;
         for (liquid, tank) in self.liquids.iter_mut().zip(tanks.clone()) {
@@ -288,7 +288,8 @@ impl CraftMotion {
         self.freeze();
     }
 
-    /// Computes M at the current directions and factorises it. On a pivot the upper rows hold a.
+    /// Computes M at the current directions and factorises it. On a pivot the upper rows of the system hold the given
+    /// acceleration a.
     #[inline(always)]
     fn factorise(&mut self) {
         self.matrix = self.mass_matrix;
@@ -902,8 +903,8 @@ impl CraftMotion {
         [force, torque]
     }
 
-    /// Computes coefficient n of the accelerations of constrained bobs and lumps from those of the craft.
-    /// Returns the dissipation with theirs added.
+    /// Computes coefficient n of the accelerations of constrained bobs, lumps and appendages from coefficient n of the craft's.
+    /// Returns the dissipation with their dissipation added.
     #[inline(never)]
     fn accelerate_apart(&mut self, n: usize, mut dissipation: f64) -> f64 {
         for bob in &mut self.constrained {
@@ -994,7 +995,8 @@ impl CraftMotion {
     /// Advances the states of constrained bobs and lumps by a step of length h. Returns true if they are
     /// finite and within bounds.
     ///
-    /// # Errors If a bob is at the bound of its surface, or an appendage beyond its linear model.
+    /// # Errors
+    /// If a bob is at the bound of its surface, or an appendage beyond its linear model.
     #[inline(never)]
     fn take_apart(&mut self, n: usize, h: f64, w: Vec3) -> Result<bool, StepError> {
         if let Some(bob) = self.beyond.take() {

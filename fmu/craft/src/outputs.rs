@@ -31,11 +31,11 @@ use crate::sizes::{MODES, TANKS};
 use crate::spin::SpinScale;
 use crate::state::{BallState, Ranges, STATES, index};
 
-/// Outputs of one tank, with the names, units and axes of the FMUs' outputs `tank[].…`, which their variable
-/// tables describe. Force and torque are those of the tank's whole liquid on the craft, body axes, about O.
-/// Directions `p` and angles, sin(angle_x) = p_x, are in tank axes. `axial` is the specific force along the tank at the first
-/// hinge, m/s2, and `turning` the rate at which the liquid turns about the tank's axis, rad/s. `ball_position` is the liquid's centre at
-/// rest while it is settled.
+/// Outputs of one tank, with the names, units and axes of the FMUs' outputs `tank[].…`, which their variable tables describe.
+/// `force` and `torque` are exerted by the tank's whole liquid on the craft, body axes, about O. Directions `p` and angles,
+/// sin(angle_x) = p_x, are in tank axes. `axial` is the specific force along the tank at the first hinge, m/s2, and `turning` the
+/// rate at which the liquid turns about the tank's axis, rad/s. `ball_position` is the liquid's centre at rest while it is
+/// settled.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct TankOutputs {
@@ -111,8 +111,8 @@ impl TankOutputs {
         }
     }
 
-    /// Sets everything that depends on the slosh masses. `liquid` is the rate of the liquid's spin, if it has one; otherwise the liquid
-    /// is taken to turn with the tank.
+    /// Sets the outputs that depend on the slosh masses. `liquid` is the rate of the liquid's spin; without it the liquid is
+    /// assumed to turn with the tank.
     pub(crate) fn set_angles<'a, T: Number + 'a>(
         &mut self,
         [a, w, w_d]: [Vec3<T>; 3],
@@ -204,8 +204,8 @@ pub(crate) struct TankNow<T> {
     pub ball_state: BallState,
 }
 
-/// The craft at an instant, or its derivative along a direction. `velocity` is that of O in body axes, `axes`
-/// turns body axes to inertial ones, and the pivot of a free craft has no stiffness and damping.
+/// The craft at an instant, or its derivative along a direction. `velocity` is the velocity of O in body axes, `axes` turns body
+/// axes to inertial axes, and the pivot of a free craft has no stiffness and damping.
 pub(crate) struct Now<T> {
     pub a: Vec3<T>,
     pub w: Vec3<T>,
@@ -272,7 +272,8 @@ impl CraftMotion {
 }
 
 impl<T: Number> Now<T> {
-    /// Returns the outputs; without `scale_of_spin` of a tank, which counts from 0, its numbers of the spin are 0.
+    /// Returns the outputs. `scale_of_spin` returns the scale of a tank's spin; tanks count from 0. If it is `None`, the tank's
+    /// `spin_ratio` and `spin_number` are 0.
     pub fn outputs(
         &self,
         x: &[f64; STATES],

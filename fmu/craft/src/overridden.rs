@@ -6,9 +6,9 @@ use alloc::string::String;
 use crate::parameters::{Parameters, Tank};
 
 impl Tank {
-    /// Returns the reason why the value of a parameter is not used although its tank and mode are in use;
-    /// `None` if it is used, or if the mode is not in use. `field` is its name in the FMUs after `tank.`, and
-    /// `indices` are those of the element, which count from 0.
+    /// Returns the reason why the value of a parameter is not used although its tank and mode are in use; `None` if it is used,
+    /// or if the mode is not in use. `field` is the parameter's name in the FMUs after `tank.`, and `indices` are the indices of
+    /// the element, which count from 0.
     pub fn overridden(&self, field: &str, indices: &[usize]) -> Option<String> {
         let n = *indices.first().unwrap_or(&0);
         let is_of_mode = matches!(

@@ -1,6 +1,6 @@
 //! Parameters of the craft and its tanks, initial conditions, and the checks of both.
 //!
-//! Names in the messages are those of the FMU's parameters. Indices count from 1 there.
+//! Messages use the names of the FMU's parameters, whose indices count from 1.
 
 use alloc::format;
 use alloc::string::String;
@@ -92,10 +92,9 @@ impl Mount {
     pub const ALL: [Mount; 2] = [Mount::Free, Mount::Pivot];
 }
 
-/// Dependence of a mode's drag coefficient c on its natural frequency w, and thus on the acceleration along
-/// the tank. `Laminar`, c ~ w^(1/2), is that of a laminar layer at the wall, for bare tanks. `ConstantRatio`,
-/// c ~ w, keeps the damping ratio, for a measured or specified ratio. `Constant` is for dissipation outside a
-/// laminar layer, for example in a diaphragm.
+/// Dependence of a mode's drag coefficient c on its natural frequency w, and thus on the acceleration along the tank. `Laminar`,
+/// c ~ w^(1/2), describes a laminar layer at the wall, for bare tanks. `ConstantRatio`, c ~ w, keeps the damping ratio, for a
+/// measured or specified ratio. `Constant` is for dissipation outside a laminar layer, for example in a diaphragm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 #[allow(missing_docs)]
@@ -337,8 +336,8 @@ impl Tank {
         self.surface(n).is_some() || self.plane_normal(n).is_some()
     }
 
-    /// Returns true if outputs and derivatives are those of `contents.rs`: the tank can drain, or has planar
-    /// modes, other coefficients of the third order than pendulums, or liquid that spins.
+    /// Returns true if outputs and derivatives are computed by `contents.rs`, because the tank can drain, or has planar modes,
+    /// other coefficients of the third order than pendulums, or liquid that spins.
     pub(crate) fn has_contents(&self) -> bool {
         self.fill.points > 0 || self.is_planar() || self.has_surface() || self.spin_inertia > 0.0
     }
@@ -464,8 +463,8 @@ impl Tank {
         on_sphere(p, p_d)
     }
 
-    /// Returns the specific force along the axis below which mode `n`, which counts from 0, does not
-    /// represent liquid, m/s2. The tolerance separates reversed thrust from thrust that is off.
+    /// Returns the specific force along the axis below which mode `n`, which counts from 0, does not represent liquid, m/s2. It
+    /// is slightly below 0 so that thrust that is off does not count as reversed thrust.
     pub(crate) fn lowest(&self, n: usize) -> f64 {
         -self.smallest_acceleration() - self.k[n] * self.length[n] / self.mass[n]
     }

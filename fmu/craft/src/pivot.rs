@@ -9,9 +9,9 @@
 //! r_i = (C_i + D_i exp(-(w_i/w_s)^2)) tanh(w_i/eps)                         dissipation sum of c_i w_i^2 + r_i w_i
 //! ```
 //!
-//! The torque of the stiffness follows from U exactly, because Z' = Z x w gives U' = -torque.w. Only c_z and r_z act on
-//! rotation about the axis, through any number of revolutions. Without dry friction the torque is a polynomial in Z and
-//! w and enters the series unchanged.
+//! The torque of the stiffness follows exactly from the potential energy U, because Z' = Z x w gives U' = -torque.w. Only c_z and
+//! r_z act on rotation about the axis, through any number of revolutions. Without dry friction the torque is a polynomial in Z
+//! and w and enters the series unchanged.
 //!
 //! r is Stribeck's curve (Rubaga's thesis, eq. 5.1) with its jump at rest smoothed over eps, as in HubSlosh's friction
 //! `stribeck_smooth`. An axis that should stick creeps instead, at |w| ~ eps |torque|/(C + D).
@@ -63,7 +63,7 @@ impl PivotFriction {
 }
 
 impl Pivot {
-    /// Returns true if the pivot does more than hold O.
+    /// Returns true if the pivot has stiffness, damping or friction, so that it does more than hold O.
     pub(crate) fn acts(&self) -> bool {
         let Pivot { k, c, friction } = *self;
         k != [0.0; 2] || c != [0.0; 3] || friction.acts()
@@ -158,11 +158,10 @@ impl Rubbing {
 
     /// Returns the time, s, over which the series converges reliably, from w, w' and w''/2.
     ///
-    /// tanh has its nearest poles at the distance sqrt(v^2 + (pi/2)^2) from v = w/eps. Away from 0 it is so
-    /// flat that its coefficients do not show the poles, so the method uses half of this distance. exp(-v^2),
-    /// v = w/w_s, has no poles. Beyond v = 3 its terms are too small for any tolerance but grow before they
-    /// decay: over dv the term of order n is (2 v dv)^n/n!. The limit keeps the term below 1e-12 at the end
-    /// as well, beyond v = 5.3, or makes the terms decay from order 5 on.
+    /// tanh has its nearest poles at the distance sqrt(v^2 + (pi/2)^2) from v = w/eps. Away from 0 it is so flat that its
+    /// coefficients do not show the poles, so the method uses half of this distance. exp(-v^2), v = w/w_s, has no poles. Beyond v
+    /// = 3 its terms are too small for any tolerance but grow before they decay: over dv the term of order n is (2 v dv)^n/n!.
+    /// The limit either keeps v above 5.3, where the term stays below 1e-12, or makes the terms decay from order 5 on.
     pub(crate) fn convergence_radius(&self, w: [f64; 3]) -> f64 {
         if self.c + self.d == 0.0 {
             return f64::INFINITY;
@@ -194,8 +193,8 @@ mod tests {
     const Z: Vec3 = [0.25, -0.5, 0.75];
     const W: Vec3 = [0.5, -1.0, 2.0];
 
-    /// The values are by hand: Z x (5/4, -3/2, 0) = (9/8, 15/16, 1/4), c w = (1/4, -1/4, 4), c w^2 = 1/8 +
-    /// 1/4 + 8, 2 U = 3/4 + 5/16.
+    /// The values were computed by hand: Z x (5/4, -3/2, 0) = (9/8, 15/16, 1/4), c w = (1/4, -1/4, 4), c w^2 = 1/8 + 1/4 + 8, 2 U
+    /// = 3/4 + 5/16.
     #[test]
     fn pivot_torque_energy_and_dissipation_equal_those_of_a_spring_and_a_damper_about_each_axis() {
         let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], Z];

@@ -17,9 +17,10 @@
 //! third_order          A above angle_limit, or above 45 degrees
 //! ```
 //!
-//! x is the specific force along the tank at the hinge, w^2 = max(x, g_floor)/l + k/m that of mode 1, Omega the rate of
-//! the liquid's spin (`spin.rs`), without one that of the tank about its axis, sin A = |p_perp|. With x/l + k/m below 0 a
-//! slosh mass would swing over while real liquid would fall. Beyond 45 degrees from the tank's axis it represents no surface.
+//! x is the specific force along the tank at the hinge, w^2 = max(x, g_floor)/l + k/m the squared frequency of mode 1, and sin A
+//! = |p_perp|. Omega is the rate of the liquid's spin (`spin.rs`) or, for liquid without spin, the rate of the tank about its
+//! axis. With x/l + k/m below 0 a slosh mass would swing over while real liquid would fall. Beyond 45 degrees from the tank's
+//! axis a slosh mass represents no liquid surface.
 //!
 //! Motion is rotary if the ellipse of the bob has semi-axes in a ratio above 1/2: 2 |q x q'| w > 0.8 (w^2 q^2 + q'^2), which
 //! does not depend on the phase.
@@ -60,8 +61,8 @@ pub(crate) struct Bounds {
     spin: SpinLimit,
 }
 
-/// Bounds of a mode; 0 for those that are not known. The angles are in rad: of slosh, of rotary motion, and
-/// the one at which waves begin to break. `inv_l` is 1/l, 1/m, and `k_m` is k/m, 1/s2.
+/// Bounds of a mode; a bound that is not known is 0. The angles, rad, are the largest slosh angle, the largest angle of rotary
+/// motion, and the angle at which waves begin to break. `inv_l` is 1/l, 1/m, and `k_m` is k/m, 1/s2.
 #[derive(Clone, Copy, Debug)]
 struct ModeBounds {
     angle: f64,
@@ -80,8 +81,8 @@ struct OverFill {
 }
 
 impl OverFill {
-    /// Returns a mode's limits, interpolated linearly over the mass of liquid. Between a known and an unknown
-    /// limit there is none.
+    /// Returns a mode's limits, interpolated linearly over the mass of liquid. Between a point with a known limit and a point
+    /// with an unknown limit, the limit is 0, that is, unknown.
     fn limits_at(&self, n: usize, liquid: f64) -> [f64; 2] {
         let masses = &self.liquid[..self.points];
         let last = self.points - 2;
@@ -194,7 +195,7 @@ impl Bounds {
         if reason == LimitedBy::None && !upright { LimitedBy::ThirdOrder } else { reason }
     }
 
-    /// Returns what relates a spin of the liquid to mode 1; `None` without modes.
+    /// Returns the quantities of mode 1 to which the liquid's spin is related; `None` for a tank without modes.
     pub fn spin_scale(&self) -> Option<SpinScale> {
         let ModeBounds { inv_l, k_m, .. } = self.mode[0];
         let scale = SpinScale { inv_l, k_m, g_floor: self.g_floor, limit: self.spin };
@@ -228,9 +229,8 @@ impl Bounds {
 }
 
 impl Tank {
-    /// Returns the slosh angles, rad, at which mode `n`, which counts from 0, and its rotary motion leave
-    /// their range; 0 if they are not known. Mode 1 of a cylinder of known dimensions has those of potential
-    /// flow.
+    /// Returns the slosh angles, rad, at which mode `n`, which counts from 0, and its rotary motion leave their range; 0 if they
+    /// are not known. Mode 1 of a cylinder of known dimensions has the limits of potential flow.
     fn limits(&self, n: usize) -> [f64; 2] {
         let given = [self.angle_limit[n], self.swirl_limit[n]];
         if n > 0 || self.diameter <= 0.0 {

@@ -46,7 +46,7 @@ impl Rigid {
         }
     }
 
-    /// Returns the same body with the derivative `slope` of its inertia, kg m2.
+    /// Returns the body as numbers with derivatives; its inertia has the derivative `slope`, kg m2.
     pub fn with_inertia_slope<T: Number>(&self, slope: &Mat3) -> Rigid<T> {
         let element = |i: usize, j: usize| T::with_slope(self.inertia[i][j], slope[i][j]);
         Rigid { inertia: [0, 1, 2].map(|i| [0, 1, 2].map(|j| element(i, j))), ..self.lift() }
@@ -122,8 +122,8 @@ pub fn along_rod<T: Number>(p: Vec3<T>, hinge: Vec3<T>) -> [T; 6] {
     [p[0], p[1], p[2], c[0], c[1], c[2]]
 }
 
-/// Largest inverse of mass (1/kg) and inertia (1/(kg m2)). Products of it with masses up to 1e12 kg and arms
-/// up to 1e9 m do not overflow.
+/// Largest inverse of mass (1/kg) and inertia (1/(kg m2)). Its products with masses up to 1e12 kg and arms up to 1e9 m do not
+/// overflow.
 const LARGEST_INVERSE: f64 = 1e30;
 
 /// Smallest divisor, so that the factors of any matrix are finite. Its inverse is above [`LARGEST_INVERSE`].

@@ -20,9 +20,8 @@
 //! M_a^ = M_0 + sum of m [1; [P]x] [1; [P]x]^T = const,  bias^ = [F; torque] + M_a^ [a; w']
 //! ```
 //!
-//! with the [a; w'] given to the tank. M_a^ - M_a is positive semidefinite for every p, so the remaining loop converges
-//! at any mass ratio. In a draining tank M_a^ is that of the start. The loop converges faster when the liquid becomes
-//! less.
+//! with the [a; w'] given to the tank. M_a^ - M_a is positive semidefinite for every p, so that the remaining loop converges at
+//! any mass ratio. A draining tank keeps the M_a^ of the start; the loop converges faster as the mass of liquid falls.
 //!
 //! A planar mode (`contents.rs`) moves with the tank perpendicular to its plane at its bob, not at its hinge. This adds
 //! m u u^T, u = [b; rho x b]. With the acceleration a_P of the hinge
@@ -47,9 +46,10 @@
 //! counts with 2 m at its hinge and the inertia 2 m r^2 about it, r its distance from the hinge within 45 degrees, because
 //! |a_P + w' x (rho - P)|^2 <= 2 |a_P|^2 + 2 r^2 |w'|^2.
 //!
-//! Outputs and derivatives of a tank that drains, has planar modes or such bobs are those of `contents.rs`. A tank that
-//! drains is integrated by extrapolation instead of power series, as in a craft. A jump of its flow is an impulse on the
-//! host, which a force cannot represent. The model leaves it out, for host and bobs.
+//! Outputs and derivatives of a tank that drains, has planar modes or has bobs on other surfaces than spheres are computed by
+//! `contents.rs`. A tank that drains is integrated by extrapolation instead of power series, as in a craft. A jump of its flow
+//! would be an impulse on the host, which a force cannot represent. The model therefore leaves this impulse out, for the host and
+//! for the bobs.
 //!
 //! **Detached liquid** (`lump.rs`, `handover.rs`) acts on its host by impulses. M_a and bias belong to the liquid's
 //! state: in flight only the inertia that rotates with the tank, on the wall plus m u u^T, u = [n; rho x n]. The host's
@@ -59,12 +59,12 @@
 //! [dV; dw] = (M_h + what of the liquid hangs on it)^-1 [J n; rho x J n],   P = M_h [dV; dw]
 //! ```
 //!
-//! P is the change of the host's own momentum, about O, and -P that of the liquid. The host adds M_h^-1 P to V and w.
-//! The tank continues as if the host had done so, within a step with w + dw. V is not in its equations.
+//! P is the change of the host's own momentum and angular momentum about O, and -P is the change of the liquid's. The host adds
+//! M_h^-1 P to V and w. The tank continues as if the host had done so, within a step with w + dw. V is not in its equations.
 //!
-//! If the liquid changes state within a step, the given a and w' are those of a host that responds to the liquid's old
-//! state. From the first change to the end of the step the tank uses the motion that the host would have, a^ and w'^.
-//! It assumes that the other forces on the host stay as they were at the change,
+//! If the liquid changes its state within a step, the given a and w' belong to a host that responds to the liquid's old state.
+//! From the first change to the end of the step the tank uses the motion that the host would have, a^ and w'^. It assumes that
+//! the other forces on the host stay as they were at the change,
 //!
 //! ```text
 //! rest = M_h [a; w'] + [w x (w x S_h); w x (I_h w)] - [F; torque]
@@ -129,9 +129,8 @@ pub enum Coupling {
     /// Constant matrix M of the rigid liquid and each bob at its hinge, and the wrench + M [a; w'] at the
     /// given a, w'. For hosts that add a constant to the matrix that they solve with.
     Lumped = 2,
-    /// The same matrix and wrench as `Lumped`, for hosts that are plain rigid bodies with M in their mass,
-    /// centre of mass and inertia. bias also contains the centrifugal and gyroscopic terms of M, w x (w x S)
-    /// and w x (I w).
+    /// The matrix and wrench of `Lumped`, for hosts that are plain rigid bodies with M in their mass, centre of mass and inertia.
+    /// `bias` also contains the centrifugal and gyroscopic terms of M, w x (w x S) and w x (I w).
     RigidBody = 3,
 }
 
@@ -305,10 +304,10 @@ impl TankState {
     }
 }
 
-/// The tank at its current state and the series of its motion. `constrained` are the bobs that are not
-/// pendulums or are guided in a plane, and `beyond` is the one of them that reaches the bound of its surface
-/// at the end of the expansion. `w_both` is (w, w); `inv_allowed` is 1 over the allowed error of v, `spin_allowed` that of
-/// the spin's I^-1 L.
+/// The tank at its current state and the series of its motion. `constrained` are the bobs that are not pendulums or are guided in
+/// a plane, and `beyond` is the index of the constrained bob that reaches the bound of its surface at the end of the expansion.
+/// `w_both` is (w, w); `inv_allowed` is 1 over the allowed error of v, and `spin_allowed` is 1 over the allowed error of the
+/// spin's I^-1 L.
 #[derive(Clone, Debug)]
 struct TankMotion {
     state: TankState,
@@ -665,8 +664,8 @@ impl TankMotion {
 
 // Detached liquid (lump.rs, handover.rs), apart from the equations of a tank without it.
 impl TankMotion {
-    /// Sets up rigid liquid and bobs for the liquid's state (settled or detached). Does not allocate. Returns
-    /// the change of w.
+    /// Sets up rigid liquid and bobs for the liquid's state (settled or detached). Does not allocate. Returns the change of w by
+    /// impulses that the host has not applied yet.
     #[inline(never)]
     fn start_ball(&mut self) -> Vec3 {
         let Some(ball) = &mut self.ball else { return [0.0; 3] };
@@ -741,7 +740,8 @@ impl TankMotion {
     /// Advances the states of constrained bobs and detached liquid by a step of length h. Returns true if
     /// they are finite and within bounds.
     ///
-    /// # Errors If a bob is at the bound of its surface.
+    /// # Errors
+    /// If a bob is at the bound of its surface.
     #[inline(never)]
     fn take_apart(&mut self, n: usize, h: f64, w: Vec3) -> Result<bool, StepError> {
         if let Some(bob) = self.beyond.take() {
@@ -801,8 +801,8 @@ impl TankMotion {
         self.change(0, due, t);
     }
 
-    /// Sets up detached liquid at the start of an expansion. After a change it holds a and w' of the host's
-    /// response.
+    /// Sets up constrained bobs, spin and detached liquid at the start of an expansion. After the liquid has changed its state
+    /// within a step, it sets a and w' to the host's response and holds them.
     #[inline(never)]
     fn start_apart(&mut self) {
         let w = self.w[0];
@@ -827,7 +827,7 @@ impl TankMotion {
         (self.w[1], self.w[2]) = (self.w_d[0], [0.0; 3]);
     }
 
-    /// Adds the part of the host's response that the host does not apply, over the `h` seconds before `t`.
+    /// Adds to the impulse the part of the host's response, over the `h` seconds before `t`, that the host does not apply.
     #[inline(never)]
     fn lag(&mut self, h: f64, t: f64) {
         if self.loose().rest.is_none() {
@@ -999,8 +999,8 @@ impl Carrier for TankMotion {
 }
 
 impl TankMotion {
-    /// Updates the rates of bobs and detached liquid, after [`Motion::start`]: they keep part of their
-    /// velocities when the host's change.
+    /// Updates the rates of bobs and detached liquid, after [`Motion::start`], because they keep a part of their velocities when
+    /// the host's velocities change.
     fn follow_impulse(&mut self, dv: Vec3, dw: Vec3) {
         for bob in &self.bobs {
             let at = 6 * bob.mode;
@@ -1212,8 +1212,8 @@ impl SloshTank {
         self.motion.state_of_ball() != BallState::Settled
     }
 
-    /// Returns true if the motion is physical at the end of the last step, of length `h`. Detached liquid
-    /// always is.
+    /// Returns true if the motion is physical at the end of the last step, of length `h`. A tank with a model of detached liquid
+    /// always moves physically.
     pub fn is_physical_after(&self, inputs: &TankInputs, h: f64) -> bool {
         let TankMotion { state, ball, .. } = &*self.motion;
         if ball.is_some() {
@@ -1281,7 +1281,7 @@ impl SloshTank {
         outputs
     }
 
-    /// Returns [`SloshTank::outputs`] with the ranges as they were after the last event.
+    /// Returns the outputs as [`SloshTank::outputs`] does, but with the ranges as they were after the last event.
     pub fn outputs_held(&mut self, inputs: &TankInputs) -> SloshTankOutputs {
         let x = self.motion.state.x;
         if let Some(mounted) = &self.draining {

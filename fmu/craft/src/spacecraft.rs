@@ -242,10 +242,9 @@ impl Spacecraft {
         self.motion.state.kept.end();
     }
 
-    /// Returns x'. Quaternion, directions and their rates are normalised first; those in x keep their length.
+    /// Returns x'. Quaternion, directions and their rates are normalised first, without a change of x itself.
     ///
-    /// `h_wheels` acts by w x h_w and by its slope. A host that does not know the slope adds the reaction
-    /// -h_w' to `torque`.
+    /// `h_wheels` acts by w x h_w and by its slope. A host that does not give the slope adds the reaction -h_w' to `torque`.
     pub fn derivatives(&mut self, inputs: &Inputs) -> [f64; STATES] {
         if let Some(draining) = &self.draining {
             return draining.rates(&self.motion.state.x, &Acting::from_inputs(inputs, 0.0));
@@ -319,10 +318,9 @@ impl Spacecraft {
         !lumps.is_empty() && state.ball.iter().any(|state| *state != BallState::Settled)
     }
 
-    /// Writes event indicators, two for each tank: one crosses zero at the end of the liquid's current state,
-    /// one at the end of its sliding on the wall. In a tank without a model of detached liquid the first
-    /// crosses zero where the thrust no longer holds the liquid at the bottom, at which the tank leaves its
-    /// range. Where there is no such event they are 1.
+    /// Writes event indicators, two for each tank: one crosses zero at the end of the liquid's current state, one at the end of
+    /// its sliding on the wall. In a tank without a model of detached liquid the first crosses zero where the thrust no longer
+    /// holds the liquid at the bottom, at which the tank leaves its range. Indicators without an event are 1.
     pub fn event_indicators(&mut self, inputs: &Inputs, indicators: &mut [f64]) {
         self.motion.indicators(inputs, indicators);
         if (0..self.bounds.len()).all(|i| self.has_ball(i)) {

@@ -74,13 +74,13 @@ impl Spin {
         })
     }
 
-    /// Returns W.
+    /// Returns the spin rate W = L_z/I_zz, rad/s.
     pub fn turning<T: Number>(&self, l: Vec3<T>) -> T {
         l[2] * self.inverse[2]
     }
 
-    /// Returns the liquid's state with L = `l`, tank axes, at the angular velocity `w`, body axes; `reaction` is what
-    /// the modes add to I_zz s_z.
+    /// Returns the liquid's state with L = `l`, tank axes, at the angular velocity `w`, body axes; `reaction` is the contribution
+    /// of the modes to I_zz s_z.
     pub fn now<T: Number>(&self, l: Vec3<T>, w: Vec3<T>, reaction: T) -> SpinNow<T> {
         let axes: Mat3<T> = self.axes.map(constant);
         let w = transposed_times(&axes, w);
@@ -102,8 +102,8 @@ impl Spin {
     }
 }
 
-/// Quantities of mode 1 that relate a spin to the frequency of the wave: 1/l, k/m, and the smallest specific force along the tank
-/// in omega_0^2.
+/// Quantities of mode 1 that relate a spin to the frequency omega_0 of the wave: 1/l, k/m, and the smallest specific force along
+/// the tank, m/s2, that counts in omega_0^2.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SpinScale {
     pub inv_l: f64,
@@ -144,8 +144,8 @@ impl SpinSeries {
         self.l[0] = l;
     }
 
-    /// Returns coefficient n of the torque on the craft, body axes, and of the dissipation, from coefficient n of the
-    /// angular velocity `w`, body axes. Sets coefficient n + 1 of L, and of W in the gyroscopic ones of `modes`.
+    /// Returns coefficient n of the torque on the craft, body axes, and of the dissipation, from coefficient n of the angular
+    /// velocity `w`, body axes. Sets coefficient n + 1 of L, and of the spin rate W in those of `modes` that are gyroscopic.
     #[inline(never)]
     pub fn expand(&mut self, n: usize, w: Vec3, modes: &mut [ConstrainedBob]) -> (Vec3, f64) {
         let Spin { axes, inverse, coupling, friction } = self.spin;

@@ -159,9 +159,9 @@ pub struct State {
     pub(crate) kept: Kept,
 }
 
-/// Start of the expansion that the next step continues while the inputs are held: the states `x` there and
-/// the inputs (force, torque, h_wheels, mass flows). Times are since the inputs are held, each with its
-/// rounding error: of the last step's end, `clock`, and of the expansion's `start`. If `clock` is 0, the next step starts an expansion.
+/// Start of the expansion that the next step continues while the inputs are held: the states `x` at this start, and the inputs
+/// (force, torque, h_wheels, mass flows). `clock` is the time of the last step's end and `start` the time of the expansion's
+/// start, both since the inputs are held and each with its rounding error. If `clock` is 0, the next step starts an expansion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Kept {
     pub x: [f64; STATES],
@@ -173,7 +173,7 @@ pub(crate) struct Kept {
 impl Kept {
     const REALS: usize = STATES + 4 + INPUTS;
 
-    /// No expansion is kept.
+    /// Value without a kept expansion: the next step starts one.
     pub const NONE: Kept =
         Kept { x: [0.0; STATES], clock: [0.0; 2], start: [0.0; 2], inputs: [0.0; INPUTS] };
 

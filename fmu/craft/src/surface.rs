@@ -41,12 +41,13 @@
 //! force on the craft at rho   F = phi - m (G + l D y) = phi - m (N G - D M^-1 Pi i),   N = 1 - D M^-1 Pi D^T
 //! ```
 //!
-//! N takes the place of p p^T in the craft's mass matrix. It is at most 1, and for s < 1 it is not positive: a bob then
-//! lends inertia to a craft that must have it. 1 + gamma u is the bob's inertia along the meridian relative to a pendulum's.
-//! A negative s, as in shallow tanks, bounds the angle at which it is positive. The model ends at [`LEAST_INERTIA`].
+//! N takes the place of p p^T in the craft's mass matrix. It is at most 1, and for s < 1 it is not positive: a bob then lends
+//! inertia to a craft that must have it. 1 + gamma u is the bob's inertia along the meridian relative to a pendulum's. A negative
+//! s, as in shallow tanks, bounds the angle up to which this inertia is positive. The model ends at [`LEAST_INERTIA`].
 //!
-//! Drag and centring are phi = c l D p' + k l p_perp, with the power c l^2 |D p'|^2. While the tank drains, the leaving mass
-//! takes its share of E_i with it. s and kappa of its fill table then depend on time, so that z gains the rate kappa' l u^2/8.
+//! Drag and centring are phi = c l D p' + k l p_perp, with the power c l^2 |D p'|^2. While the tank drains, the mass that leaves
+//! takes its share of E_i with it. The coefficients s and kappa of the fill table then depend on time, so that the height z gains
+//! the rate kappa' l u^2/8.
 //!
 //! **Beyond the third order** ([`Higher`]) a tank that keeps its liquid may have
 //!
@@ -69,8 +70,8 @@
 //! Drag acts on E_i as on the bob, so that a wave decays as its energy does: phi gains nothing, i gains (c l/m) [S sigma p_perp +
 //! T (n.p') n] and the power c l^2 [S sigma^2 + T (n.p')^2].
 //!
-//! About the axis both parts of the torque by E_i cancel. [a; w'] acts on tau' by v = [n; rho x n - l u e], which adds m T/(1 +
-//! T u) v v^T to the mass matrix.
+//! The two parts of the torque that E_i causes cancel about the axis. [a; w'] acts on tau' by v = [n; rho x n - l u e], which
+//! adds m T/(1 + T u) v v^T to the mass matrix.
 //!
 //! **In liquid that spins** at the rate W (`spin.rs`) a mode may have a gyroscopic coefficient C and a stiffness epsilon, in the
 //! Routhian -m l^2 [(1 - C) W tau + epsilon W^2 u/2]:
@@ -80,9 +81,9 @@
 //! E_i gains m l^2 epsilon W^2 u/2
 //! ```
 //!
-//! Small motions in a tank that turns with its liquid have the frequencies l = C W +- sqrt(C^2 W^2 + w^2 + (epsilon + 1 - 2 C) W^2),
-//! seen from the tank, against the spin and with it. A pendulum, which does not take part in the spin, has C = 1 and epsilon =
-//! 0. The parameters are C and epsilon + 1 - 2 C.
+//! Small motions in a tank that turns with its liquid have the frequencies l = C W +- sqrt(C^2 W^2 + w^2 + (epsilon + 1 - 2 C)
+//! W^2), seen from the tank, against the spin and with it. A pendulum, which does not take part in the spin, has C = 1 and
+//! epsilon = 0. The FMUs' parameters are C (`gyroscopic`) and epsilon + 1 - 2 C (`gyroscopic_stiffness`).
 //!
 //! Source: the coefficients are those of `formulas::third_order` and `formulas::energy_terms`. The equations are Lagrange's for these energies.
 //! tests/craft/surface.rs checks them against Newton's law in Cartesian coordinates with the surface as a constraint, and
@@ -101,8 +102,8 @@ pub(crate) const LEAST_INERTIA: f64 = 0.5;
 
 const ANGLE_STEP: f64 = core::f64::consts::PI / 1800.0;
 
-/// Coefficients s_2, kappa_2, t and t_2 of a mode beyond the third order, and 1 - C and epsilon of one in liquid that spins
-/// (`gyroscopic`); all 0 for none.
+/// Coefficients s_2, kappa_2, t and t_2 of a mode beyond the third order, and 1 - C and epsilon of a mode in liquid that spins
+/// (`gyroscopic`); a mode without such terms has only zeros.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Higher {
     pub inertia: f64,
@@ -117,7 +118,7 @@ impl Higher {
         Higher { gyroscopic: [0.0; 2], ..*self } != Higher::default()
     }
 
-    /// Returns (1 - C) tau + epsilon W u, which times m l^2 the mode adds to I_zz s_z of the spinning liquid.
+    /// Returns (1 - C) tau + epsilon W u. Multiplied by m l^2 it is the mode's contribution to I_zz s_z of the spinning liquid.
     pub fn reaction<T: Number>(&self, tau: T, turned: T) -> T {
         tau * self.gyroscopic[0] + turned * self.gyroscopic[1]
     }
@@ -127,8 +128,8 @@ impl Higher {
     }
 }
 
-/// The coefficients s - 1 and kappa - 1 of a mode, which are 0 for a pendulum, and those beyond the third
-/// order; `None` if all of these are 0, which leaves the terms out.
+/// The coefficients s - 1 and kappa - 1 of a mode, which are 0 for a pendulum, and the coefficients beyond the third order;
+/// `None` if all of the latter are 0, so that their terms are not computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Surface<T = f64> {
     inertia: T,
@@ -137,7 +138,7 @@ pub(crate) struct Surface<T = f64> {
 }
 
 impl<T: Number> Surface<T> {
-    /// Returns the surface with s and kappa, also if it is that of a pendulum.
+    /// Returns the surface with s and kappa, even if it is the sphere of a pendulum.
     pub fn from_coefficients([s, kappa]: [T; 2]) -> Surface<T> {
         let one = T::constant(1.0);
         Surface { inertia: s - one, stiffness: kappa - one, higher: None }
@@ -189,7 +190,7 @@ impl Surface {
         self.stiffness == 0.0 && self.higher.is_none()
     }
 
-    /// Returns the share of kappa in z/(l u^2).
+    /// Returns the part of z/(l u^2) that is due to kappa, (kappa - 1)/8.
     pub fn lift_of_square(&self) -> f64 {
         0.125 * self.stiffness
     }
@@ -202,7 +203,7 @@ impl Surface {
         }
     }
 
-    /// Returns the share of kappa in beta/u.
+    /// Returns the part of beta/u that is due to kappa, (kappa - 1)/2.
     pub fn bend(&self) -> f64 {
         0.5 * self.stiffness
     }
@@ -286,8 +287,8 @@ impl Surface {
     }
 }
 
-/// Returns the message for a bob of mode `n`, which counts from 0, beyond the bound of its surface, with s
-/// and kappa; `name` is the tank's.
+/// Returns the message for a bob of mode `n`, which counts from 0, with s and kappa, beyond the bound of its surface; `name` is
+/// the tank's name.
 pub(crate) fn bound_message([s, kappa]: [f64; 2], higher: Higher, n: usize, name: &str) -> String {
     let surface = Surface::new(s, kappa, higher);
     let most = surface.map_or(0.0, |surface| surface.largest_angle().to_degrees());
@@ -343,9 +344,9 @@ pub(crate) struct Lift<T> {
     pub rotary: Option<Rotary<T>>,
 }
 
-/// Rotary motion with inertia beyond that of the bob: `lever` is l u T; `inertia` is l T, with the known
-/// terms 2 w_e sigma and 2 t_2 l sigma tau of l (T tau)' = l T (n.y + w_e' u + 2 w_e sigma) + 2 t_2 l sigma
-/// tau; `spin` is l^2 u T tau, with 2 l^2 T tau sigma.
+/// Rotary motion with an inertia in addition to the bob's: `lever` is l u T; `inertia` is l T, with the known terms 2 w_e sigma
+/// and 2 t_2 l sigma tau of l (T tau)' = l T (n.y + w_e' u + 2 w_e sigma) + 2 t_2 l sigma tau; `spin` is l^2 u T tau, with 2 l^2
+/// T tau sigma.
 pub(crate) struct Rotary<T> {
     lever: T,
     inertia: T,
@@ -458,8 +459,8 @@ impl<T: Number> Meridian<T> {
         self.around.map(|(n, _)| n)
     }
 
-    /// Returns the bob's height and the terms of E_i at the rate p', with l and its derivatives, and those of
-    /// s and kappa if they change.
+    /// Returns the bob's height and the terms of E_i at the rate p', from l and its derivatives and, if they change, s and kappa
+    /// with their derivatives.
     pub fn lift(
         &self,
         [l, l_d, l_dd]: Jet<T>,

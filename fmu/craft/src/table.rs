@@ -5,9 +5,10 @@
 //! interpolated over m_liq:   1/l_n,   h_n - l_n (the bob at rest),   m_n/m_liq,   zeta_n,   s_n, kappa_n,   H_0, I_0, I_z
 //! ```
 //!
-//! 1/l_n is omega^2/g. Shallow liquid has a long pendulum with a hinge far above it, proportional to 1/depth. Its
-//! frequency, the height of its bob and its share of the liquid change little, so few points represent them. Each curve
-//! stays between its two points, so lengths and masses stay above 0.
+//! 1/l_n is omega^2/g. Shallow liquid has a long pendulum with a hinge far above it; length and height of the hinge are
+//! proportional to 1/depth. Its frequency, the height of its bob and its share of the liquid change little with the depth, so
+//! that a few points represent them. Each curve stays between the values at the two points around it, so that lengths and masses
+//! stay above 0.
 //!
 //! Source: `formulas::interpolation`.
 
@@ -21,10 +22,10 @@ pub(crate) const SHORTEST: f64 = 1e-6;
 /// Lightest bob, kg, because lighter ones have no effect.
 pub(crate) const LIGHTEST: f64 = 1e-9;
 
-/// Modes and rigid liquid at some masses of the liquid: the FMUs' parameters `tank[].fill.…`, whose variable
-/// tables give meanings and units. `points` is 0 for a tank whose liquid stays, otherwise 2 to [`POINTS`];
-/// `liquid` increases. The damping ratio `zeta` of a mode that is 0 at all points, s and kappa that are 1 at
-/// all points, and limits that are 0 at all points are those of the tank at every fill.
+/// Modes and rigid liquid at some masses of the liquid: the FMUs' parameters `tank[].fill.…`, whose variable tables give meanings
+/// and units. `points` is 0 for a tank whose liquid stays, otherwise 2 to [`POINTS`]; `liquid` increases. If a mode's damping
+/// ratio `zeta` is 0 at all points, its s and kappa are 1 at all points, or its limits are 0 at all points, the value of the tank
+/// is used at every fill.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct FillTable {
@@ -153,7 +154,7 @@ pub(crate) struct Place<T> {
 }
 
 impl FillCurves {
-    /// Locates a mass of liquid, kg. Beyond the ends of the table the tank is as at the end.
+    /// Locates a mass of liquid, kg. A mass beyond an end of the table counts as the mass at this end.
     pub fn place<T: Number>(&self, liquid: T) -> Place<T> {
         let masses = &self.liquid[..self.points];
         let (low, high) = (masses[0], masses[self.points - 1]);
@@ -209,8 +210,8 @@ mod tests {
     use alloc::vec::Vec;
     use taylor::number::Dual;
 
-    /// Random monotone data, also with constant stretches: no slope has the wrong sign, and the values and
-    /// both derivatives agree on both sides of a point.
+    /// Uses random monotone data, some with constant stretches: no slope has the wrong sign, and the values and both derivatives
+    /// agree on both sides of a point.
     #[test]
     fn interpolation_is_monotone_and_has_two_continuous_derivatives() {
         let mut rng = fastrand::Rng::with_seed(3);

@@ -5,8 +5,8 @@
 //! angle^2 = sum of 2 u^n / (n^2 C(2n, n)) from n = 1 = u + u^2/12 + u^3/90 + ...
 //! ```
 //!
-//! The sum ends at n = 6. The relative error of its root is 3e-7 at 45 degrees, 5e-4 at 90 and 0.15 at 180 degrees.
-//! There the angle itself has a kink, but the sum is smooth, so power series remain valid.
+//! The sum ends at n = 6. The relative error of its root is 3e-7 at 45 degrees, 5e-4 at 90 and 0.15 at 180 degrees. At 180
+//! degrees the angle has a kink, but the sum is smooth, so that power series remain valid.
 
 use crate::number::Number;
 use crate::series::{Series, ZERO, mul};
@@ -19,8 +19,8 @@ pub fn squared<T: Number>(chord2: T) -> T {
     TERMS.iter().rev().fold(T::constant(0.0), next)
 }
 
-/// Square of the angle whose squared chord on the unit circle is given as a power series. `sums` are those of
-/// Horner's rule; the last one is the square of the angle.
+/// Square of the angle whose squared chord on the unit circle is given as a power series. `sums` are the series of the partial
+/// sums of Horner's rule; the last one is the square of the angle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SquaredAngle {
     chord2: Series,
@@ -70,7 +70,7 @@ mod tests {
     }
 
     #[test]
-    fn the_series_equals_that_of_the_function() {
+    fn the_power_series_of_the_angle_equals_the_function() {
         let u = [0.3, 0.2, -0.1];
         let mut angle = SquaredAngle::default();
         let mut series = ZERO;

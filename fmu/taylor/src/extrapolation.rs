@@ -8,10 +8,10 @@ use core::ops::Range;
 use crate::error::StepError;
 use crate::integrator::{MAX_MAGNITUDE, STEP_SHARE, Steps};
 
-/// A first-order system x' = rates(t, x) that [`advance`] integrates. Times t are in s since the start of the
-/// call.
+/// A first-order system x' = rates(t, x) that [`advance`] integrates. Times t are in s; their origin is the origin of
+/// [`advance`]'s times.
 pub trait System<const D: usize> {
-    /// Iterates over the index ranges of the states that are in use. The rates of all others must be 0.
+    /// Iterates over the index ranges of the states that are in use. The rates of all other states must be 0.
     fn moving(&self) -> impl Iterator<Item = Range<usize>> + Clone {
         core::iter::once(0..D)
     }
@@ -32,7 +32,7 @@ const ROUNDING: f64 = 2e-14;
 const LONGER: f64 = 4.0;
 const SHORTER: f64 = 0.1;
 
-/// Smaller errors count as this value. Because of [`LONGER`] this has no effect on the step's length, but it
+/// Errors of a step that are smaller count as this value. Because of [`LONGER`] this has no effect on the step's length, but it
 /// avoids 1/0 and powers of numbers near the largest, which end the process of a host that traps them.
 const LEAST_ERROR: f64 = 1e-30;
 
@@ -47,9 +47,8 @@ struct Trial<const D: usize> {
     best: f64,
 }
 
-/// Advances x, whose rates at t are `first`, by `h` with Gragg's midpoint rule. Its results with 2, 4, ... 16
-/// substeps are extrapolated to substeps of zero length until two columns agree to `allowed`. Gives up if the
-/// columns hardly converge.
+/// Advances x, whose rates at t are `first`, by `h` with Gragg's midpoint rule. The rule's results with 2, 4, ... 16 substeps are
+/// extrapolated to substeps of zero length until two columns agree to `allowed`. Gives up if the columns hardly converge.
 fn extrapolate<const D: usize>(
     system: &impl System<D>,
     x: &[f64; D],
@@ -128,8 +127,8 @@ fn extrapolate<const D: usize>(
     Trial { end: None, best }
 }
 
-/// Length `h`, s, of the next step and the number of `steps` tried, which an extrapolation carries from one
-/// stretch of a call to the next.
+/// Length `h`, s, of the next step and counter of the `steps` that were tried. An extrapolation carries both from one stretch of
+/// a call to the next.
 pub struct Pace {
     steps: Steps,
     h: f64,
@@ -146,8 +145,8 @@ impl Pace {
 /// of the previous columns determine the length of a step, and the states at its start determine the error
 /// scale. After a rejected step the following steps grow again.
 ///
-/// # Errors [`StepError::NotFinite`], [`StepError::TooManySteps`]; x is then unusable. Their time has the
-/// same origin as `begin`.
+/// # Errors
+/// [`StepError::NotFinite`] and [`StepError::TooManySteps`], whose time has the same origin as `begin`; x is then unusable.
 pub fn advance<const D: usize>(
     system: &impl System<D>,
     x: &mut [f64; D],
@@ -251,8 +250,7 @@ mod tests {
         }
     }
 
-    /// A polynomial of the rule's own degree is exact to rounding after three columns, which need 1 + 2 + 4 +
-    /// 6 evaluations.
+    /// After three columns the rule is exact to rounding for a rate of degree four. The columns need 1 + 2 + 4 + 6 evaluations.
     #[test]
     fn three_columns_are_enough_for_a_quartic() {
         struct Quartic(Cell<usize>);

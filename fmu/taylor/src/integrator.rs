@@ -1,10 +1,9 @@
 //! Taylor-series integrator with events.
 //!
-//! Over one step the whole motion is a power series in time (`series.rs`). The order grows until successive terms at
-//! the step's end are below the tolerance. If the highest order is not enough, the step is cut to the length at which
-//! it is. Short steps are therefore cheap, and no step is rejected. The series is as exact within the step as at its
-//! end. A step ends exactly where it should, and events are roots of polynomials (`root.rs`), found without stepping
-//! back.
+//! Over one step the whole motion is a power series in time (`series.rs`). The order grows until successive terms at the step's
+//! end are below the tolerance. If the highest order is not enough, the step is cut to the length at which this order is enough.
+//! Short steps are therefore cheap, and no step is rejected. The series is as exact within the step as at its end. A step ends
+//! exactly where it should, and events are roots of polynomials (`root.rs`), found without stepping back.
 //!
 //! [`advance`] begins a series at each call. [`advance_kept`] continues the series of the call before, so that its
 //! results do not depend on where calls end.
@@ -35,15 +34,15 @@ const MIN_ORDER: usize = 5;
 /// Ratio of two terms two orders apart below which the decay of a series may be extrapolated.
 const DECAY: f64 = 0.1;
 
-/// Tolerance of a predicted term over that of a computed term.
+/// Tolerance of a predicted term over the tolerance of a computed term.
 const PREDICTED_SHARE: f64 = 0.25;
 
 /// Largest last term of a series, relative to its tolerance, after which the omitted terms may be predicted.
 const LARGEST_LAST: f64 = 30.0;
 
-/// Length of a step, s, from which on it may err by the whole allowed error. A shorter step of a kept
-/// [`Expansion`] may err in proportion to its length, because more of them add up. Ends of calls are compared
-/// with the right-hand side after this length.
+/// Length of a step, s, from which on the step may err by the whole allowed error. A shorter step of a kept [`Expansion`] may err
+/// only in proportion to its length, because the errors of more steps add up. Ends of calls are compared with the right-hand side
+/// after this length.
 const FULL_LENGTH: f64 = 0.1;
 
 /// Largest defect of a step over the allowed error of its terms. A step with a larger one is repeated with
@@ -66,7 +65,8 @@ impl Steps {
 
     /// Counts `number` more steps, or other work of the same cost, at `time`.
     ///
-    /// # Errors If the limit is exceeded.
+    /// # Errors
+    /// If the limit is exceeded.
     #[inline(always)]
     pub fn add_steps(&mut self, number: usize, time: f64) -> Result<(), StepError> {
         self.taken += number;
@@ -83,10 +83,9 @@ impl Steps {
     }
 }
 
-/// Convergence criterion of a motion's series: either the given number of successive terms is negligible
-/// (`Terms`), or two are, which may be predicted from the decay of the terms before (`Decay`). One
-/// negligible term is not enough, because a motion that starts at rest is even in time, so that every second
-/// term is zero.
+/// Convergence criterion of a motion's series: either the given number of successive terms has to be negligible (`Terms`), or two
+/// successive terms, which may be predicted from the decay of the terms before them (`Decay`). One negligible term is not enough,
+/// because a motion that starts at rest is even in time, so that every second term is zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Convergence {
     Terms(usize),
@@ -182,11 +181,12 @@ pub trait Motion {
     #[inline(always)]
     fn keep(&mut self) {}
 
-    /// Advances the states to `h` after the start of the expansion, which is `t` after the start of the call,
-    /// by the series up to order n. If [`Motion::event`] found an event last, it is there. Returns `Continue`
-    /// if the call goes on, otherwise `Break` with the elapsed length.
+    /// Advances the states to `h` after the start of the expansion, which is `t` after the start of the call, by the series up to
+    /// order n. If the last call of [`Motion::event`] has found an event, the event is at `h`. Returns `Continue` if the call
+    /// goes on, otherwise `Break` with the elapsed length.
     ///
-    /// # Errors If the states are not finite, or the model is not valid there.
+    /// # Errors
+    /// If the states at `h` are not finite, or the model is not valid for them.
     fn take(
         &mut self,
         n: usize,
@@ -321,9 +321,9 @@ pub fn add_time([time, rest]: [f64; 2], t: f64) -> [f64; 2] {
     [total, rest - (total - sum)]
 }
 
-/// An expansion that calls of [`advance_kept`] continue while the inputs are held. Each call computes as many
-/// orders as its end needs. The state at an instant follows from the start of the expansion and from the time
-/// since then, not from the instants in between at which calls have ended.
+/// An expansion that calls of [`advance_kept`] continue while the inputs are held. Each call computes as many orders as its end
+/// needs. The state at an instant depends only on the start of the expansion and on the time since this start, not on the
+/// instants in between at which calls have ended.
 #[derive(Clone, Debug)]
 pub struct Expansion {
     /// Number of computed orders: coefficients of the states up to this one are known.
@@ -366,8 +366,7 @@ impl Expansion {
         self.overwritten = self.overwritten.max(order);
     }
 
-    /// Computes the coefficients again that were overwritten. The expansion starts `t` after the start of the
-    /// call.
+    /// Computes again the coefficients that were overwritten. The expansion starts `t` after the start of the call.
     #[inline(always)]
     fn repair<M: Motion>(&mut self, motion: &mut M, t: f64) {
         if self.overwritten > 0 && self.orders > 0 {
@@ -485,18 +484,18 @@ fn highest_order<M: Motion>(motion: &M, tolerance: f64) -> usize {
     (5 + 35 * bits / 100).clamp(MIN_ORDER + 3, motion.highest_order())
 }
 
-/// Returns the largest defect of the derivatives at the end of a series. At small tolerances it is their
-/// rounding error.
+/// Returns the largest allowed defect of the derivatives at the end of a series. At small tolerances it is the rounding error of
+/// the derivatives.
 #[inline(always)]
 fn largest_slope_defect(tolerance: f64) -> f64 {
     const ROUNDING: f64 = 1e-13;
     DEFECT * (1.0 + ROUNDING / (STEP_SHARE * tolerance))
 }
 
-/// Advances the motion to the time `clock` since the inputs are held, within the expansion if it is exact
-/// there, otherwise by further expansions. `start` is the time of the expansion's start with its rounding
-/// error. `clock` comes without its rounding error, because this error depends on the lengths of the calls.
-/// The states are those at the start of the expansion before the call, and those at `clock` after it.
+/// Advances the motion to the time `clock` since the inputs are held: within the expansion if the expansion is exact at this
+/// time, otherwise by further expansions. `start` is the time of the expansion's start with its rounding error. `clock` comes
+/// without its rounding error, because this error depends on the lengths of the calls. Before the call the states are those at
+/// the start of the expansion, after the call those at `clock`.
 ///
 /// # Errors See [`StepError`].
 #[inline(always)]
@@ -732,7 +731,7 @@ mod tests {
 
     /// Reads off the order at which an expansion with the terms 0.1^n/n! ends, from n = 4 on.
     #[test]
-    fn an_expansion_ends_when_its_terms_say_so() {
+    fn an_expansion_ends_at_the_order_whose_terms_are_negligible() {
         let order = |convergence, tolerance: f64| {
             let mut motion = Oscillator::new(convergence);
             motion.start(0.0);
@@ -883,8 +882,8 @@ mod tests {
         assert_eq!(expand(&mut motion, 1e300, 1e-8), (5, LONGEST));
     }
 
-    /// An oscillator with its kept expansion: the states at the start, and the times of the last call's end
-    /// and of the start.
+    /// An oscillator with its kept expansion, the states `begin` at the start of the expansion, and the times of the last call's
+    /// end, `clock`, and of the expansion's `start`.
     struct Kept {
         motion: Oscillator,
         begin: [f64; 2],
@@ -953,8 +952,8 @@ mod tests {
         }
     }
 
-    /// Calls of any length end at the same bits, before and after reflections at the wall, and within the
-    /// tolerance. Coefficients that other uses have overwritten are computed again.
+    /// Calls of any length end at the same bits, before and after reflections at the wall, and within the tolerance. Coefficients
+    /// that other uses of the motion have overwritten are computed again.
     #[test]
     fn ends_of_calls_change_no_bit_of_a_kept_expansion() {
         for convergence in [Convergence::Decay, Convergence::Terms(2)] {

@@ -20,17 +20,16 @@ pub trait Number:
     /// Returns the number that the formula was evaluated for: the value of an `f64`, the derivative of a
     /// [`Dual`].
     fn result(self) -> f64;
-    /// Returns the value of both number types.
+    /// Returns the value, for an `f64` and for a [`Dual`].
     fn value(self) -> f64;
-    /// Returns the larger of itself and a constant. The value is computed as a maximum, not as a choice of
-    /// two numbers, because a compiler turns 1/choice into a choice of two quotients and divides by a zero
-    /// that was not chosen.
+    /// Returns the larger of the number and a constant. The value is computed as a maximum, not as a choice of two numbers,
+    /// because a compiler turns 1/choice into a choice of two quotients and divides by a zero that was not chosen.
     fn at_least(self, floor: f64) -> Self {
         let slope = if self.value() < floor { 0.0 } else { self.result() };
         Self::with_slope(f64::max(self.value(), floor), slope)
     }
-    /// Returns itself over a divisor that is not negative, and 0 where the divisor is 0. The divisor is
-    /// replaced by a maximum, because a compiler that computes both sides of a choice would divide by 0.
+    /// Returns the number over a divisor that is not negative; 0 if the divisor is 0. The divisor is replaced by a maximum,
+    /// because a compiler that computes both sides of a choice would divide by 0.
     fn over_or_zero(self, divisor: Self) -> Self {
         let numerator = if divisor.value() > 0.0 { self } else { Self::constant(0.0) };
         numerator / divisor.at_least(f64::MIN_POSITIVE)
@@ -247,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn where_there_is_no_derivative_it_is_0() {
+    fn a_derivative_that_does_not_exist_is_set_to_0() {
         let zero = Dual::with_slope(0.0, 1.0);
         assert_eq!(zero.sqrt().result(), 0.0);
         assert_eq!(zero.hypot(zero).result(), 0.0);

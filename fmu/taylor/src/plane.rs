@@ -4,8 +4,8 @@
 use crate::number::Number;
 use crate::series::{self, EMPTY, ORDER, Series};
 
-/// Returns the sum of `term(j)` over 0 <= j <= n with the newest coefficients, those of the ends, added last,
-/// as in `series.rs`.
+/// Returns the sum of `term(j)` over 0 <= j <= n. The terms at both ends, which have the newest coefficients, are added last, as
+/// in `series.rs`.
 #[inline(always)]
 fn sum_both(n: usize, term: impl Fn(usize) -> [f64; 2]) -> [f64; 2] {
     let add = |a: [f64; 2], b: [f64; 2]| [a[0] + b[0], a[1] + b[1]];

@@ -2,22 +2,20 @@
 
 use crate::series::ORDER;
 
-/// Number of steps with one bound over the whole interval, before [`first_root`] changes to bounds over parts
-/// of it.
+/// Number of steps with one bound over the whole interval, before [`first_root`] changes to bounds over parts of the interval.
 const COARSE_STEPS: usize = 200;
 
 /// Returns the first t in (0, h] at which the polynomial `a`, positive at t = 0, has fallen to zero, and
 /// `None` if it stays positive. `a` has at most 2 [`ORDER`] + 1 coefficients, as the product of two series.
 ///
-/// At a point with the value f > 0 and the slope f', a bound M on |f''| over [0, h] gives f(t + s) >= f + f'
-/// s - M s^2 / 2. The root of that parabola is a step that cannot pass the first zero. The steps converge to
-/// it quadratically, like Newton's method.
+/// At a point with the value f > 0 and the slope f', a bound M on |f''| over [0, h] gives f(t + s) >= f + f' s - M s^2 / 2. The
+/// root of that parabola is a step that cannot pass the first zero. The steps converge to this zero quadratically, like Newton's
+/// method.
 ///
-/// M is tight enough if the terms a_n h^n decay, like those of a converged series. If they grow, these steps
-/// become too short. Then the polynomial is expanded about t, and M is a bound over a part of the interval
-/// about as long as the step. Such a step is at least a fixed share of the distance to the nearest complex
-/// root, so the number of steps grows with the logarithm of the accuracy. The search ends only with a root,
-/// to rounding, or with the proof that there is none up to h.
+/// M is tight enough if the terms a_n h^n decay, like those of a converged series. If they grow, these steps become too short.
+/// Then the polynomial is expanded about t, and M is a bound over a part of the interval about as long as the step. Such a step
+/// is at least a fixed share of the distance to the nearest complex root, so the number of steps grows with the logarithm of the
+/// accuracy. The search ends only with a root, to rounding, or with the proof that the polynomial has no root up to h.
 pub fn first_root(a: &[f64], h: f64) -> Option<f64> {
     let (mut power, mut lowest) = (1.0, a[0]);
     for x in &a[1..] {

@@ -58,8 +58,7 @@ pub fn next(n: usize, rate: f64) -> f64 {
 /// turns -0 into +0.
 pub(crate) const EMPTY: f64 = -0.0;
 
-/// Returns the sum of `term(j)` over 0 <= j <= n, with the newest coefficients, those of the ends, added
-/// last.
+/// Returns the sum of `term(j)` over 0 <= j <= n. The terms at both ends, which have the newest coefficients, are added last.
 #[inline(always)]
 pub(crate) fn sum(n: usize, term: impl Fn(usize) -> f64) -> f64 {
     let sum = (1..n).fold(EMPTY, |sum, j| sum + term(j)) + term(0);

@@ -1,5 +1,5 @@
-//! Power series of vectors in space and of quaternions. Functions return coefficient N of the result, for example
-//! `cross` that of the vector product; functions named `…_coefficient` do it in a loop over any order n.
+//! Power series of vectors in space and of quaternions. Functions return coefficient N of the result, for example `cross` returns
+//! coefficient N of the vector product. Functions named `…_coefficient` compute it in a loop for any order n.
 //!
 //! The rules are the product (Cauchy) rule. Each sum has its newest coefficients last, as in `series.rs`. The order N
 //! is a constant parameter of a rule. The compiler then writes sums of vectors out before it inlines them, which saves
@@ -96,7 +96,7 @@ pub fn products<const N: usize>(a: &Vector) -> [f64; 6] {
     sum
 }
 
-/// Returns the same as [`products`] as a loop over any order n, which is smaller code.
+/// Returns the products of [`products`], computed in a loop for any order n, which is smaller code.
 pub fn product_coefficients(n: usize, a: &Vector) -> [f64; 6] {
     let mut sum = [EMPTY; 6];
     for (a, b) in a[..=n].iter().zip(a[..=n].iter().rev()) {

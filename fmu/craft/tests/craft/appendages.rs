@@ -1,5 +1,6 @@
-//! Flexible appendages: Lagrange's equations of each mode, a hub with beams in closed form, and a hinged panel. Newton's law of random
-//! craft is in independent.rs, momentum and energy in balances.rs, derivatives in equations.rs.
+//! Flexible appendages: Lagrange's equations of each mode, a hub with beams in closed form, and a hinged panel. Random craft with
+//! appendages are compared with Newton's law in independent.rs; balances.rs tests their momentum and energy, equations.rs their
+//! derivatives.
 
 use craft::{APPENDAGES, Appendage, Craft, Inertia, Inputs, Parameters, Ramp, STATES, index};
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
@@ -20,8 +21,8 @@ fn motion(x: &[f64; STATES]) -> [V; 2] {
     [axes.inverse() * v(&x[index::VELOCITY..]), v(&x[index::OMEGA..])]
 }
 
-/// Returns the Lagrangian of a dry craft with appendages: kinetic energy of the dry craft as a rigid body, that of the motion by y = p eta
-/// of each mode from its interface point, and the modes' own energies.
+/// Returns the Lagrangian of a dry craft with appendages: the kinetic energy of the dry craft as a rigid body, the part that is
+/// due to each mode's motion y = p eta from its interface point, and the modes' own energies.
 fn lagrangian(p: &Parameters, x: &[f64; STATES]) -> f64 {
     let [velocity, w] = motion(x);
     let center = velocity + w.cross(&v(&p.craft.r));
@@ -85,7 +86,7 @@ fn each_mode_follows_lagranges_equation() {
     }
 }
 
-/// Eigenvalues of a clamped beam: cos l cosh l = -1, near (n - 1/2) pi.
+/// Returns eigenvalue n of a clamped beam: the root of cos l cosh l = -1 near (n - 1/2) pi.
 fn eigenvalue(n: usize) -> f64 {
     let near = (n as f64 + 0.5) * std::f64::consts::PI;
     (0..50).fold(if n == 0 { 1.8751 } else { near }, |l, _| {
@@ -94,8 +95,8 @@ fn eigenvalue(n: usize) -> f64 {
     })
 }
 
-/// A clamped beam of mass m, length L and first frequency f along `x` from `root`, which bends along y: its integrals of phi
-/// and x phi are 2 sigma/l sqrt(m) and 2/l^2 L sqrt(m).
+/// Returns mode n of a clamped beam of mass m, length L and first frequency f, which lies along x from `root` and bends along y.
+/// With its eigenvalue l, the integrals of phi dm and x phi dm are 2 sigma/l sqrt(m) and 2/l^2 L sqrt(m).
 fn beam(n: usize, m: f64, length: f64, f: f64, root: f64) -> Appendage {
     let l = eigenvalue(n);
     let sigma = (l.sinh() - l.sin()) / (l.cosh() + l.cos());
@@ -166,8 +167,8 @@ fn free_free(p: &Parameters) -> Vec<(f64, Vec<f64>)> {
     found
 }
 
-/// A hub with two beams of three modes each, and with one beam of six modes. Each free-free mode, released at rest, swings at the root of
-/// the characteristic equation for ten periods.
+/// Checks a hub with two beams of three modes each, and a hub with one beam of six modes. Each free-free mode is released at rest
+/// and has to swing with the frequency of the characteristic equation for ten periods.
 #[test]
 fn a_hub_with_beams_swings_at_the_roots_of_its_characteristic_equation() {
     for sides in [2, 1] {
@@ -219,8 +220,8 @@ struct Panel {
 }
 
 impl Panel {
-    /// Returns x, y, angle of the hub's centre and the panel's angle as they change: two rigid bodies, all angles exact. Force along
-    /// the hub's y axis and torque act on the hub.
+    /// Returns the rates of x, y and angle of the hub and of the panel's angle, and their second derivatives: two rigid bodies,
+    /// without small angles. Force along the hub's y axis and torque act on the hub.
     fn rates(&self, z: &[f64; 8], force: f64, torque: f64) -> [f64; 8] {
         let Panel { hub: [mass, j], m, d, inertia, hinge, k, c } = *self;
         let [_, _, angle, bend, _, _, turn, swing] = *z;
@@ -252,8 +253,8 @@ impl Panel {
     }
 }
 
-/// Basilisk's hinged rigid body against its mode: eta = sqrt(I) times the angle, I about the hinge. Angles of 1e-5 rad leave 1e-10 of them to the
-/// terms of the third order.
+/// Compares a hinged rigid body, as in Basilisk, with its mode, eta = sqrt(I) times the angle with the inertia I about the hinge.
+/// At angles of 1e-5 rad the terms of the third order are 1e-10 of the angle.
 #[test]
 fn a_hinged_panel_is_one_mode_at_small_angles() {
     let panel =
@@ -308,7 +309,7 @@ fn a_hinged_panel_is_one_mode_at_small_angles() {
     }
 }
 
-/// Modes without participation swing by themselves; a craft that has them moves as one without.
+/// Modes without participation swing by themselves; a craft with such modes moves as a craft without them.
 #[test]
 fn modes_without_participation_leave_the_craft_as_it_is() {
     let mut random = Random::new(3);

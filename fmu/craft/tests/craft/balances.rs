@@ -4,9 +4,9 @@
 //! P' = C f,   H' = C (tau - r_c x f),   E = work - dissipated + const
 //! ```
 //!
-//! Lobatto's rule of five points, of order 8, integrates over a step. In a step the craft turns by
-//! less than 0.03 rad and the liquid swings by less than 0.3 rad, so the error is 1e-13 of a step's
-//! contribution. On a pivot gravity turns the craft, too, and H is about O.
+//! The inputs are integrated over a step by Lobatto's rule of five points, whose order is 8. In a step the craft turns by less
+//! than 0.03 rad and the liquid swings by less than 0.3 rad, so that the error is 1e-13 of a step's contribution. On a pivot
+//! gravity also turns the craft, and H is about O.
 
 use craft::{APPENDAGES, Inputs, Mount, Outputs, Parameters, Ramp};
 use serde_json::Value;
@@ -18,7 +18,7 @@ use super::records::{STEP, inputs, parameters, records, steps};
 /// Steps of a run: 1,000 s, without `--release` 100 s.
 const END: usize = if cfg!(debug_assertions) { 5_000 } else { 50_000 };
 
-/// Nodes in a step of length 1 and their weights, in so many panels.
+/// Iterates over the nodes in a step of length 1 and their weights, with the step divided into `panels` parts.
 fn lobatto(panels: usize) -> impl Iterator<Item = (f64, f64)> {
     let far = f64::sqrt(3.0 / 7.0) / 2.0;
     let (end, inner, middle) = (1.0 / 20.0, 49.0 / 180.0, 16.0 / 45.0);
@@ -78,7 +78,7 @@ impl Balance {
         }
     }
 
-    /// Residuals over their scales.
+    /// Returns the residuals over their scales.
     fn relative(&self) -> [f64; 3] {
         [0, 1, 2].map(|i| {
             let residual = self.worst[i];
@@ -188,7 +188,7 @@ fn momentum_angular_momentum_and_energy_balance_over_1000_s_of_random_craft() {
     random_craft(END);
 }
 
-/// Runs of `most` steps, of the one whose torque changes the momentum about every axis 1,000.
+/// Runs random craft for `most` steps; the craft whose torque changes the momentum about every axis runs for 1,000 steps.
 fn random_craft(most: usize) {
     let mut excess = Vec::new();
     for seed in 0..32 {

@@ -63,7 +63,7 @@ pub(super) fn with_states(
     State::from_words(&words).unwrap()
 }
 
-/// At 0.01 m/s2 0.6 m take 11 s; 382 kg have 42 N s then.
+/// At 0.01 m/s2 the liquid takes 11 s for 0.6 m; its 382 kg then have a momentum of 42 N s.
 #[test]
 fn reversed_thrust_sends_the_liquid_across_the_tank_in_the_time_of_free_fall() {
     let p = craft();
@@ -93,9 +93,9 @@ fn reversed_thrust_sends_the_liquid_across_the_tank_in_the_time_of_free_fall() {
     assert!(height.abs() < 1e-8);
 }
 
-/// The indicator of settled liquid is the smaller of two margins: axial acceleration minus its limit, and the bobs'
-/// mean cosine, by modal mass, minus that of 45 degrees. In a tank without a model of detached liquid it is positive
-/// while thrust holds the liquid.
+/// The indicator of settled liquid is the smaller of two margins: axial acceleration minus its limit, and the bobs' mean cosine,
+/// by modal mass, minus cos 45 degrees. In a tank without a model of detached liquid it is positive while thrust holds the
+/// liquid.
 #[test]
 fn a_host_sees_the_bobs_pass_45_degrees_by_modal_mass() {
     for (tank, mode) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
@@ -146,7 +146,8 @@ fn an_indicator_crosses_zero_where_thrust_no_longer_holds_the_liquid() {
     }
 }
 
-/// Bounce k takes 2 e^k v/g: the sum of all is 2 v e/(g (1 - e)), and m v^2/2 has gone.
+/// With the coefficient of restitution e, bounce k takes the time 2 e^k v/g. All bounces together take 2 v e/(g (1 - e)) and
+/// dissipate m v^2/2.
 #[test]
 fn bounces_are_a_geometric_series_that_ends_at_rest() {
     let (g, e) = (0.01, 0.6);
@@ -209,7 +210,7 @@ fn thrust_that_returns_turns_detached_liquid_into_a_pendulum_again() {
     assert!((out.momentum[2] - 600.0 * 25.0 + 180.0).abs() < 1e-8);
 }
 
-/// Pieces of thrust forwards and backwards, then nothing; every 0.5 s.
+/// Drives a craft with pieces of thrust forwards and backwards, then without thrust, and calls the check every 0.5 s.
 fn drive(
     p: &Parameters,
     seed: u64,
@@ -386,8 +387,8 @@ fn move_alike(seeds: impl Iterator<Item = u64>) {
     println!("worst {:.3} of what is allowed: case {} at {:e}", worst.0, worst.1, worst.2);
 }
 
-/// Impact times came from a product of two series that was cut at their order, and left out how far inside its wall the liquid
-/// starts. Runs with these seeds were off by up to 2e-2 m.
+/// Impact times used to come from a product of two series that was cut at their order, and did not include the distance from the
+/// wall at which the liquid starts. Runs with these seeds were then off by up to 2e-2 m.
 #[test]
 fn detached_liquid_moves_the_same_with_every_communication_step() {
     move_alike([0, 13, 17, 81, 88, 133, 157, 171, 177].into_iter());
@@ -576,7 +577,7 @@ fn rates_equal_newtons_law_with_the_walls_force_as_an_unknown() {
     }
 }
 
-/// Along states that leave the wall: position and rate are brought to it first.
+/// The directions leave the wall, because position and rate are brought to the wall before rates are computed.
 #[test]
 fn directional_derivatives_equal_differences_of_rates_and_outputs() {
     for seed in 0..12 {

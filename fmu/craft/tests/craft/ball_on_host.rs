@@ -1,7 +1,7 @@
 //! Liquid that leaves the bottom of a tank on a host, compared with the same tank of a Spacecraft.
 //!
-//! The host is a rigid body that solves (M_host + M_a) [a; w'] = rest + bias, and adds M_host^-1 of the tank's impulses to
-//! its velocity and rate. What is conserved is read off a Spacecraft in the same state.
+//! The host is a rigid body that solves (M_host + M_a) [a; w'] = rest + bias, and adds M_host^-1 of the tank's impulses to its
+//! velocity and rate. Momenta and energy are read from the outputs of a Spacecraft in the same state.
 
 use craft::{
     BallState, Coupling, Inputs, Outputs, Parameters, Ramp, SloshTank, SloshTankOutputs,
@@ -105,7 +105,7 @@ impl Craft {
         self.held(w, &self.solve(u, 0.0, w, &out.bias, &out.added_mass))
     }
 
-    /// Gives the host what the liquid has done to it since the last call.
+    /// Applies to the host the impulses of the liquid since the last call.
     fn take_impulse(&mut self, impulse: [f64; 6]) {
         if impulse == self.taken {
             return;
@@ -117,7 +117,7 @@ impl Craft {
         (self.taken, self.impulses) = (impulse, self.impulses + 1);
     }
 
-    /// Outputs of a Spacecraft in the same state.
+    /// Returns the outputs of a Spacecraft in the same state.
     pub(super) fn shown(&self, u: &Inputs) -> Outputs {
         let spacecraft = Spacecraft::new(&self.p, u, 0.0, 1e-12).unwrap();
         let tank = self.tank.continuous_states();
@@ -280,7 +280,7 @@ impl Craft {
     }
 }
 
-/// Rates of attitude, rate, position, velocity and work.
+/// Returns the derivatives of attitude, rate, position, velocity and work.
 fn host_rates(u: &Inputs, y: &[f64], acceleration: &Six) -> Vec<f64> {
     let (q, w) = (&y[..4], v(&y[4..]));
     let axes = rotation(q);
@@ -424,9 +424,10 @@ fn on_the_axis_the_host_s_velocity_is_exact_for_any_communication_step() {
     }
 }
 
-/// Thrust backwards, then forwards, six tanks that stand askew; host first, both sides linear over the step. Rates, the lump and the
-/// dissipated energy are of second order in the communication step. Attitude and position lag behind the impulses within a step,
-/// and with the attitude the direction of the momentum: of first order.
+/// Six tanks that stand askew fly with thrust backwards, then forwards. The host takes each step first, and host and tank
+/// exchange values that are linear over the step. The errors of rates, lump and dissipated energy are of second order in the
+/// communication step. The errors of attitude and position, and of the momentum's direction, which depends on the attitude, are
+/// of first order, because they lag behind the impulses within a step.
 #[test]
 fn a_host_that_exchanges_at_communication_points_converges_to_the_spacecraft_s_motion() {
     let errors = |steps: usize| {

@@ -9,7 +9,7 @@ use craft::{
 use super::independent::newton_rates;
 use super::random::{Random, draining_tank};
 
-/// One row of a table of thrust: its length, specific force along the tank at both ends, and across it, the angular
+/// One row of a table of thrust: its length, s, the specific force along the tank at both ends and across the tank, the angular
 /// acceleration, and the flows out of the tanks at both ends, kg/s.
 struct Row {
     h: f64,
@@ -39,7 +39,7 @@ impl Row {
     }
 }
 
-/// Eight rows of 0.05 to 3 s with ramps, jumps, zeros and short reversals.
+/// Returns eight rows of 0.05 to 3 s with ramps, jumps, zeros and short reversals of the thrust.
 fn table(r: &mut Random) -> Vec<Row> {
     let value = |r: &mut Random| match r.below(4) {
         0 => 0.0,
@@ -57,7 +57,7 @@ fn table(r: &mut Random) -> Vec<Row> {
     (0..8).map(row).collect()
 }
 
-/// A table of thrust whose valves open, close, stay and turn their flow round.
+/// Returns a table of thrust during which valves open, close, stay as they are and reverse their flow.
 fn table_with_flows(r: &mut Random) -> Vec<Row> {
     let mut rows = table(r);
     let value = |r: &mut Random| [0.0, r.between(-3.0, 6.0)][r.below(2)];
@@ -126,7 +126,7 @@ fn hold(r: &mut Random, p: &mut Parameters) {
         (r.magnitude(0.01, 1.0), r.magnitude(1e-3, 0.3));
 }
 
-/// How a run goes: its tolerance, its longest communication step, and a displacement of the first bob at the start.
+/// Conditions of a run: its tolerance, its longest communication step, and a displacement of the first bob at the start.
 #[derive(Clone, Copy)]
 struct Way {
     tolerance: f64,
@@ -182,7 +182,7 @@ fn craft_inputs(p: &Parameters, row: &Row, t: f64) -> Inputs {
     }
 }
 
-/// Attitude, rate, directions and their rates.
+/// Returns attitude, rate, directions and their rates.
 fn angles(p: &Parameters, x: &[f64; STATES]) -> Vec<f64> {
     let mut all = x[index::Q..index::Q + 7].to_vec();
     for i in 0..p.tanks {
@@ -214,9 +214,9 @@ fn off(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / size
 }
 
-/// Compares communication steps of whole rows with the exact motion: steps of 2 ms at a tolerance of 1e-13. The error of a run may be the
-/// tolerance times 30. A pendulum that falls over multiplies errors: then it may be larger by the
-/// growth of a small displacement at the start.
+/// Compares communication steps of whole rows with the exact motion, which is computed in steps of 2 ms at a tolerance of 1e-13.
+/// The error of a run may be 30 times the tolerance. A pendulum that falls over multiplies errors; the error may then be larger
+/// by the factor by which a small displacement at the start grows.
 fn keep_the_tolerance(seeds: impl Iterator<Item = u64>, run: impl Fn(u64, Way) -> Vec<f64>) {
     let mut worst = (0.0, 0, 0.0);
     for seed in seeds {
@@ -305,8 +305,8 @@ fn thrust_that_crosses_zero_keeps_the_solver_tolerance_for_a_draining_craft() {
     keep_the_tolerance(0..10, draining_craft_of);
 }
 
-/// The drag's a_+ has singularities at +-i a_f/x' from the instant at which x crosses zero. Steps that did not see them were off
-/// by up to 400 tolerances.
+/// The smoothed acceleration a_+ of the drag has singularities at +-i a_f/x' from the instant at which the specific force x
+/// crosses zero. Steps that ignored them were off by up to 400 tolerances.
 #[test]
 fn thrust_that_crosses_zero_keeps_the_solver_tolerance_for_a_tank() {
     keep_the_tolerance(0..40, tank_of);
@@ -328,8 +328,8 @@ fn a_thousand_random_tables_of_thrust_keep_the_solver_tolerance() {
     keep_the_tolerance(0..200, draining_craft_of);
 }
 
-/// Runge-Kutta steps of 0.2 ms with Newton's law (independent.rs): neither these series nor these formulas. In a step, a_+ bends
-/// by up to its slope, so the rates are exact to 1e-7.
+/// The reference uses Runge-Kutta steps of 0.2 ms with Newton's law (independent.rs), so that it has neither the series nor the
+/// formulas of the craft. In a step, the slope of a_+ may change by as much as itself, so that the rates are exact to 1e-7.
 #[test]
 fn thrust_that_crosses_zero_moves_a_craft_as_newtons_law_with_another_integrator() {
     for seed in [1, 6, 9, 30] {

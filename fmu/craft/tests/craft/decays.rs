@@ -1,5 +1,5 @@
-//! Damping as it is measured: the decay of free oscillations of a tank that somebody holds, and of one in a craft too
-//! heavy to be moved.
+//! Damping as it is measured: the decay of free oscillations in a tank that is held, and in a tank of a craft that is too heavy
+//! to move.
 
 use std::f64::consts::TAU;
 
@@ -44,8 +44,8 @@ fn moments(tank: &Tank, g: f64, period: f64, count: usize) -> [Vec<[f64; 2]>; 2]
     [of_alone, of_craft]
 }
 
-/// From the ground to a millionth of a m/s2, without and with a centring stiffness, zeta goes as omega^(-1/2), stays, or
-/// goes as omega^-1.
+/// From 9.81 m/s2 to a millionth of a m/s2, without and with a centring stiffness, the damping ratio zeta is proportional to
+/// omega^(-1/2), constant, or proportional to omega^-1, depending on the law.
 #[test]
 fn damping_of_decays_follows_the_frequency_down_to_a_millionth_of_a_metre_per_second_squared() {
     for law in DampingLaw::ALL {
@@ -144,7 +144,7 @@ fn ranges(k: f64, thrust: f64, angle: f64) -> Ranges {
     ranges_of(Tank { k: [k; MODES], ..tank(angle) }, thrust)
 }
 
-/// Wave over radius is 0.837 of the angle: 0.15 at 0.179 rad, 0.25 at 0.299.
+/// The wave's height over the radius is 0.837 times the slosh angle: 0.15 at 0.179 rad, and 0.25 at 0.299 rad.
 #[test]
 fn regimes_end_at_waves_of_0_15_and_0_25_radii_and_reversed_thrust_is_out_of_range() {
     let seen = [0.0, 0.178, 0.181, 0.297, 0.301, 0.8, 3.0].map(|angle| ranges(0.0, 2000.0, angle));
@@ -185,7 +185,8 @@ fn the_regime_follows_from_the_waves_of_all_modes_together() {
     assert_eq!(seen, [Linear, Linear, Transitional, Transitional, Nonlinear]);
 }
 
-/// Every bob of every tank within 45 degrees of its axis, or not: what a step's end is asked is what the outputs show.
+/// Bobs of every tank are within 45 degrees of the tank's axis or beyond; the check at the end of a step has to agree with the
+/// ranges in the outputs.
 #[test]
 fn a_step_ends_out_of_range_if_any_pendulum_of_any_tank_does() {
     let mut found = [0; 2];
@@ -217,7 +218,8 @@ fn a_step_ends_out_of_range_if_any_pendulum_of_any_tank_does() {
     assert_eq!(found, [6, 6]);
 }
 
-/// Under thrust along the first tank and against the second: there k l/m has to be more than 1.3 m/s2.
+/// The thrust is along the axis of the first tank and against the axis of the second. In the second tank the liquid is held only
+/// if k l/m is more than 1.3 m/s2.
 #[test]
 fn each_tank_s_range_equals_that_of_the_acceleration_along_its_own_axis() {
     for (k, holds) in [(500.0, false), (800.0, true)] {
@@ -268,8 +270,9 @@ fn drag_follows_the_acceleration_at_the_hinge_from_every_cause() {
     }
 }
 
-/// A point of its table is the default tank: one that could drain, and does not, and one that cannot have the same
-/// drag, though the two are written apart. On a pivot and free, under every law, with thrust to both sides.
+/// A point of the table has the values of the default tank. A tank that could drain but does not must have the same drag as a
+/// tank that cannot drain, although their equations are written separately. Checked on a pivot and in free flight, under every
+/// damping law, with thrust in both directions.
 #[test]
 fn a_tank_that_could_drain_has_the_same_drag_as_a_constant_fill() {
     for (seed, law) in DampingLaw::ALL.into_iter().cycle().take(12).enumerate() {

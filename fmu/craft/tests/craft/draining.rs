@@ -61,7 +61,7 @@ pub fn momenta(out: &Outputs) -> [V; 2] {
     [momentum, v(&out.angular_momentum) + center.cross(&momentum)]
 }
 
-/// Over two seconds, integrals by Lobatto's rule of five points: with and without modes.
+/// The rates are integrated over two seconds by Lobatto's rule of five points, for tanks with and without modes.
 #[test]
 fn outflowing_liquid_takes_its_momentum_and_angular_momentum_along() {
     for (seed, modes) in
@@ -102,10 +102,10 @@ fn outflowing_liquid_takes_its_momentum_and_angular_momentum_along() {
     }
 }
 
-/// The momentum shown is that of Newton and Euler: m V + w x S + S' + f r_out, S' by differences of
-/// the centre of mass shown.
+/// The momentum in the outputs equals m V + w x S + S' + f r_out by Newton and Euler, with S' from differences of the centre of
+/// mass in the outputs.
 #[test]
-fn momentum_counts_only_the_mass_that_moves() {
+fn momentum_of_a_draining_craft_includes_the_flow_within_its_tanks() {
     for seed in (0..6).chain(20..23).chain(40..43) {
         let (p, u) = draining_craft(seed, 1 + seed as usize % 3);
         let e = 1e-3;
@@ -137,8 +137,7 @@ fn momentum_counts_only_the_mass_that_moves() {
     }
 }
 
-/// Whatever the steps, what is left is the start less the integral of the flow, and the motion is the
-/// same.
+/// For steps of any length, the mass that is left is the initial mass less the integral of the flow, and the motion is the same.
 #[test]
 fn outflow_is_the_integral_of_the_flow_for_any_communication_step() {
     let (p, mut u) = draining_craft(7, 2);
@@ -165,8 +164,8 @@ fn outflow_is_the_integral_of_the_flow_for_any_communication_step() {
     }
 }
 
-/// Position and velocity begin at 0 and end at some 100 m and 30 m/s: what a step's errors are compared with grows along
-/// with them.
+/// Position and velocity begin at 0 and end at some 100 m and 30 m/s. The scale of a step's errors grows with them, so that the
+/// steps need not stay as short as at the start.
 #[test]
 fn a_draining_craft_that_starts_at_the_origin_takes_long_steps() {
     for seed in 0..6 {
@@ -191,8 +190,8 @@ fn a_draining_craft_that_starts_at_the_origin_takes_long_steps() {
     }
 }
 
-/// A rotated tank whose axis is the thrust's, its liquid at rest: the terms cancel in the rates, what is left of them is
-/// rounding.
+/// The tank is rotated, the thrust is along its axis, and its liquid is at rest. Large terms then cancel in the rates and leave
+/// only rounding errors, which must not make the steps short.
 #[test]
 fn a_tank_that_drains_at_rest_takes_long_steps() {
     for modes in [0, 3] {
@@ -223,7 +222,8 @@ fn a_tank_that_drains_at_rest_takes_long_steps() {
     }
 }
 
-/// Without flow the second formulation is the first, whatever the drag follows.
+/// Without flow the equations of a draining tank give the same motion as those of a tank that keeps its liquid, for every law of
+/// drag.
 #[test]
 fn a_fill_table_without_outflow_changes_nothing() {
     for seed in 0..4 {
@@ -269,7 +269,8 @@ fn a_fill_table_without_outflow_changes_nothing() {
     }
 }
 
-/// Rates by differences, along a direction of states and inputs at once, flows and fills included.
+/// Derivatives are compared with differences of the rates, along a direction in which all states and inputs change at once,
+/// including flows and masses of liquid.
 #[test]
 fn directional_derivatives_of_draining_craft_equal_finite_differences() {
     for seed in (0..8).chain(20..24).chain(40..44) {
@@ -317,7 +318,8 @@ fn directional_derivatives_of_draining_craft_equal_finite_differences() {
     }
 }
 
-/// At each point of the table, under every damping law: the rates are those of a tank with this ratio at every fill.
+/// At each point of the table, under every damping law, the rates equal the rates of a tank with this point's damping ratio at
+/// every fill.
 #[test]
 fn a_draining_tank_has_the_damping_ratio_of_its_fill() {
     for (i, law) in DampingLaw::ALL.into_iter().enumerate() {
@@ -337,13 +339,12 @@ fn a_draining_tank_has_the_damping_ratio_of_its_fill() {
     }
 }
 
-/// Returns the energy of the craft plus the dissipated energy plus that of the outflow, minus the work; it is
-/// constant.
+/// Returns the energy of the craft plus the dissipated and the drained energy, minus the work. It is constant.
 pub fn energy(out: &Outputs) -> f64 {
     out.energy + out.dissipated + out.drained - out.work
 }
 
-/// Over five seconds, with flows that run along ramps and jump every second; free and on a pivot.
+/// The runs take five seconds, with flows that follow ramps and jump every second, in free flight and on a pivot.
 #[test]
 fn energy_is_kept_while_tanks_drain() {
     for seed in (0..8).chain(21..25).chain(41..45) {
@@ -432,14 +433,14 @@ fn later(u: &TankInputs, t: f64) -> TankInputs {
     TankInputs { a: at(&u.a), omega: turned, omega_dot: at(&u.omega_dot), mass_flow }
 }
 
-/// Newton's law for what is in the tank, rotated and off the host's O. With S its first moment about O,
+/// Newton's law for the liquid in a tank that is rotated and away from the host's O. With the liquid's first moment S about O,
 ///
 /// ```text
 /// -F = m a + w' x S + w x (w x S) + 2 w x S' + S'' + 2 f w x r_out + f' r_out
 /// ```
 ///
-/// S' and S'' by differences of mass and centre of mass that the tank shows; what leaves takes
-/// f (V + w x r_out) with it.
+/// S' and S'' come from differences of the mass and centre of mass in the tank's outputs; the liquid that leaves takes the
+/// momentum f (V + w x r_out) with it.
 #[test]
 fn the_force_of_a_draining_tank_follows_newtons_law() {
     for seed in 0..16 {
@@ -578,7 +579,8 @@ impl Rigid {
     }
 }
 
-/// In every mode of coupling, while it drains; M of the lumped modes stays that of the start.
+/// Checked in every coupling while the tank drains. With the couplings `Lumped` and `RigidBody` the matrix M stays as at the
+/// start.
 #[test]
 fn force_and_torque_of_a_draining_tank_equal_bias_minus_added_mass_times_acceleration() {
     for seed in 0..16 {

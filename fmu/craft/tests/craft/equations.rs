@@ -11,7 +11,7 @@ fn ramps(u: &Inputs) -> [Ramp; 3] {
     [u.force, u.torque, u.h_wheels]
 }
 
-/// Inputs moved by s along du; slopes stay.
+/// Returns the inputs moved by s along du; their slopes stay as they are.
 fn moved(u: &Inputs, du: &[f64; INPUTS], s: f64) -> Inputs {
     let [force, torque, h_wheels] = ramps(u);
     let by = |ramp: Ramp, at: usize| Ramp {
@@ -26,7 +26,7 @@ fn moved(u: &Inputs, du: &[f64; INPUTS], s: f64) -> Inputs {
     }
 }
 
-/// Every output in a row.
+/// Returns all outputs as one list.
 fn flat(out: &Outputs) -> Vec<f64> {
     let mut all = vec![out.energy, out.work, out.dissipated, out.mass];
     all.extend(out.q);
@@ -86,7 +86,7 @@ fn assert_same(exact: &[f64], by_differences: &[f64], now: &[f64], what: &str) {
     }
 }
 
-/// A random craft in motion; quaternion and directions of the states are not of unit length.
+/// Returns a random craft in motion; quaternion and directions of its states are not of unit length.
 fn somewhere(seed: u64) -> (Random, Parameters, Spacecraft, Inputs) {
     let mut random = Random::new(seed);
     let mut p = random.parameters();
@@ -123,7 +123,7 @@ fn somewhere(seed: u64) -> (Random, Parameters, Spacecraft, Inputs) {
     (random, p, craft, u)
 }
 
-/// Along a direction of every kind of state and input at once, of the size of 1 for each.
+/// All kinds of states and inputs change at once along the direction, each by about 1.
 #[test]
 fn directional_derivatives_equal_finite_differences() {
     for seed in 0..100 {

@@ -277,7 +277,7 @@ impl Simulator<'_> {
         2.0 * self.mass * self.case.p.tank[0].ball.drag * self.in_tank(y).rate.norm()
     }
 
-    /// Goes on to the time `end`, with steps of [`Case::step`].
+    /// Simulates to the time `end`, with steps of [`Case::step`].
     fn go(&mut self, end: f64) {
         let step = self.case.step();
         while self.t < end {
@@ -332,7 +332,7 @@ impl Simulator<'_> {
         self.rates(&self.y, mode).1 > 0.0
     }
 
-    /// Takes what the integration has left of f and n.x' on the wall.
+    /// Sets f and n.x' to 0 on the wall, where errors of the integration have left small values.
     fn put_on_wall(&mut self) {
         if self.mode == Mode::Flying {
             return;
@@ -844,8 +844,8 @@ fn liquid_of_three_modes_that_has_settled_stays_under_steady_thrust() {
     }
 }
 
-/// The second mode of the default tank has 1 % of the liquid. At 60 degrees it leaves the liquid at the bottom; the first mode, with
-/// 34 % of the liquid, does not.
+/// The second mode of the default tank has 1 % of the liquid. The liquid stays at the bottom if this mode is at 60 degrees, but
+/// leaves it if the first mode, which has 34 % of the liquid, is at 60 degrees.
 #[test]
 fn a_mode_of_little_mass_beyond_45_degrees_does_not_throw_the_liquid_off() {
     for (mode, leaves) in [(0, true), (1, false)] {

@@ -1,5 +1,4 @@
-//! Hosts that integrate themselves: the craft's own equations, and a tank on somebody else's rigid
-//! body.
+//! Hosts that integrate themselves: the craft's equations by the host's integrator, and a tank on the host's own rigid body.
 
 use craft::{
     Inputs, Mount, Parameters, Ramp, STATES, TANK_STATES, TankInputs, TankParameters, index,
@@ -9,8 +8,8 @@ use nalgebra::{SMatrix, SVector};
 use super::component::{SloshTank, Spacecraft};
 use super::random::Random;
 
-/// Returns the inputs after t as hosts pass them that integrate themselves: without slopes, and with the
-/// wheels' reaction in the torque.
+/// Returns the inputs at t as a host that integrates itself passes them: without slopes, and with the wheels' reaction in the
+/// torque.
 fn after(u: &Inputs, t: f64) -> Inputs {
     let torque = u.torque.value_at(t);
     Inputs {
@@ -44,10 +43,10 @@ pub fn runge_kutta(
     }
 }
 
-/// Runge-Kutta on the rates at an instant at 0.2 ms, at 0.1 ms where planar modes are faster, against the power series.
-/// The rates of planar modes and of other bobs than pendulums are those of contents.rs, not of the series. The fastest bobs
-/// move at 30 and 60 1/s:
-/// (30 h)^4/120 of what they do leaves 1e-11. In a quarter of a second these turn by one to two turns.
+/// Compares the power series with a Runge-Kutta integration of the rates in steps of 0.2 ms, or of 0.1 ms for craft whose planar
+/// modes are faster. The rates of planar modes and of other bobs than pendulums are those of contents.rs, not of the series. The
+/// fastest bobs move at 30 and 60 1/s: (30 h)^4/120 of what they do leaves 1e-11. In a quarter of a second these turn by one to
+/// two turns.
 #[test]
 fn a_model_exchange_host_reproduces_co_simulation_of_a_craft() {
     for seed in 0..30 {
@@ -171,7 +170,7 @@ impl HostWithTanks {
 
 type V3 = nalgebra::Vector3<f64>;
 
-/// The same integrator with the same steps around both: what remains is rounding.
+/// Host and Spacecraft are integrated by the same method with the same steps, so that only rounding differs.
 #[test]
 fn tanks_on_a_host_that_splits_inertia_in_every_stage_move_as_spacecraft() {
     for seed in 0..30 {

@@ -1,4 +1,4 @@
-//! Impulses on a tank alone and on a craft that drains, where a table ends, and what a step costs.
+//! Impulses on a single tank and on a craft that drains, the ends of a fill table, and the number of internal steps.
 
 use craft::{
     Inputs, Line, Parameters, Ramp, SloshTank, Spacecraft, Tank, TankInputs, TankParameters,
@@ -22,7 +22,8 @@ fn rod(tank: &Tank, n: usize, liquid: f64, p: V) -> (f64, V, Matrix3<f64>) {
     (l, V::from(tank.position) + axes * (V::z() * h + l * p), axes)
 }
 
-/// The rod can only pull: across it the bob's velocity V + w x rho + l p' is what it was.
+/// A rod transmits only a force along itself, so that the component of the bob's velocity V + w x rho + l p' across the rod stays
+/// as it was.
 #[test]
 fn an_impulse_of_the_host_leaves_the_bobs_velocities_across_their_rods() {
     for seed in 0..20 {

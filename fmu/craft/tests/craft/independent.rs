@@ -1,6 +1,5 @@
-//! An independent formulation of the same physics: Newton's law of every body with the rods'
-//! tensions as unknowns, bobs in p'' instead of v, no added mass, no expansion. One dense system is
-//! solved.
+//! An independent formulation of the same physics: Newton's law of every body with the tensions of the rods as unknowns. The
+//! bobs' unknown is p'' instead of v, there is no added mass and no power series, and one dense system is solved.
 
 use craft::{
     Coupling, DampingLaw, Inputs, MODES, Mount, Parameters, STATES, SloshTank, Spacecraft, Tank,
@@ -186,7 +185,7 @@ impl Shape {
     }
 }
 
-/// Deliberate mistakes.
+/// Deliberate mistakes, which the reference records have to show.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Mistake {
     Nothing,
@@ -407,7 +406,7 @@ fn solve_with(mistake: Mistake, p: &Parameters, x: &[f64; STATES], u: &Inputs) -
     Solution { a, w_d, p_dd, eta_dd, wrench }
 }
 
-/// Rates of attitude, angular velocity, directions and their rates; the others are 0.
+/// Returns the derivatives of attitude, angular velocity, directions and their rates; all others are 0.
 pub(super) fn newton_rates(p: &Parameters, x: &[f64; STATES], u: &Inputs) -> [f64; STATES] {
     let (now, mut rate) = (solve(p, x, u), [0.0; STATES]);
     let w = &x[index::OMEGA..];
@@ -459,7 +458,7 @@ fn anywhere_with(
     (random, p, x, inputs)
 }
 
-/// Elements against elements, relative to the largest of them or of `size`.
+/// Asserts that elements agree within a tolerance relative to the largest element or to `size`, whichever is larger.
 fn assert_close(got: &[f64], want: &[f64], size: f64, tolerance: f64, what: &str) {
     let size = want.iter().fold(size, |size, x| size.max(x.abs()));
     for (i, (got, want)) in got.iter().zip(want).enumerate() {
@@ -477,7 +476,7 @@ fn accelerations_forces_and_torques_follow_newtons_law_with_the_rod_forces_as_un
     }
 }
 
-/// Planar modes among others, off the axis, in tanks whose rigid liquid is not alike all around it.
+/// The tanks have planar modes and others, off the axis, and their rigid liquid is not axisymmetric.
 #[test]
 fn planar_modes_follow_newtons_law_with_the_guiding_forces_as_unknowns() {
     for seed in 0..300 {
@@ -666,7 +665,8 @@ fn force_and_torque_equal_bias_minus_added_mass_times_acceleration() {
     }
 }
 
-/// M_a is what the wrench loses by [a; w'] under drag that does not follow them, column by column; so is it symmetric.
+/// Each column of M_a is minus the change of force and torque by one component of [a; w'], with drag that does not depend on
+/// them. Therefore M_a is symmetric.
 #[test]
 fn added_mass_is_the_derivative_of_force_and_torque_by_acceleration() {
     for seed in 0..50 {
@@ -682,8 +682,9 @@ fn added_mass_is_the_derivative_of_force_and_torque_by_acceleration() {
     }
 }
 
-/// With each bob lumped at its hinge, of planar modes twice, the constant matrix exceeds M_a whatever the
-/// directions, so that the loop that is left is a contraction. Less than twice does not.
+/// If each bob is lumped at its hinge, with twice its mass for planar modes, the constant matrix minus M_a is positive
+/// semidefinite for all directions of the bobs, so that the remaining loop converges. With less than twice the mass of planar
+/// modes it is not.
 #[test]
 fn the_lumped_inertia_matrix_is_constant_and_at_least_the_added_mass() {
     let mut tight = 0;
@@ -717,8 +718,9 @@ fn the_lumped_inertia_matrix_is_constant_and_at_least_the_added_mass() {
     assert!(tight > 5);
 }
 
-/// A tank alone, moved as the craft moves by Newton's law with the pulls as unknowns: its wrench, and its bobs' p''. The drag is
-/// held: there it follows the motion of the rigid craft, here the motion given.
+/// A single tank is moved as a craft moves by Newton's law with the tensions as unknowns; its wrench and its bobs' p'' have to
+/// agree. The drag does not depend on the acceleration, because in the craft it would follow the motion of craft and liquids as
+/// one rigid body, but in the single tank the given motion.
 #[test]
 fn a_single_tank_follows_newtons_law() {
     for seed in 0..300 {
@@ -760,8 +762,9 @@ fn a_single_tank_follows_newtons_law() {
     }
 }
 
-/// The craft's own wrench of a tank is that of the tank alone under the craft's motion. The drag is held: it follows the
-/// motion of the rigid craft in the one, the motion given in the other.
+/// The wrench of a tank in a craft equals the wrench of the single tank under the craft's motion. The drag does not depend on the
+/// acceleration, because in the craft it would follow the motion of craft and liquids as one rigid body, but in the single tank
+/// the given motion.
 #[test]
 fn a_single_tank_under_the_crafts_motion_moves_as_the_tank_in_the_craft() {
     for seed in 0..100 {
@@ -794,8 +797,8 @@ fn a_single_tank_under_the_crafts_motion_moves_as_the_tank_in_the_craft() {
     }
 }
 
-/// Rigid liquid and bobs at the centre of a sphere: no torque about it under rotation.
-/// Without the bobs' drag and without own inertia a liquid in a sphere cannot be turned.
+/// The hinges of the bobs and the rigid liquid are at the centre of a sphere. Without drag and without own inertia of the rigid
+/// liquid, a rotating sphere cannot turn its liquid, so that the torque about the centre is 0.
 #[test]
 fn a_sphere_s_wrench_about_its_centre_vanishes_under_rotation() {
     for seed in 0..50 {
@@ -840,7 +843,7 @@ fn a_sphere_s_wrench_about_its_centre_vanishes_under_rotation() {
     }
 }
 
-/// Jacobi's rotations against nalgebra's general eigenvalues of M_host^-1 M_a.
+/// Compares the result of Jacobi rotations with nalgebra's eigenvalues of the general matrix M_host^-1 M_a.
 #[test]
 fn coupling_ratio_is_the_largest_eigenvalue() {
     for seed in 0..50 {
@@ -904,8 +907,8 @@ fn deviation(mistake: Mistake, record: &serde_json::Value) -> f64 {
     worst
 }
 
-/// The reference records tell right from wrong: each typical mistake shows in one of them, in
-/// the accelerations at the record's own states already.
+/// The reference records distinguish right from wrong equations: each typical mistake shows in at least one record, even if the
+/// accelerations are computed at the record's own states.
 #[test]
 fn reference_records_catch_typical_mistakes() {
     let all = records::records("craft");

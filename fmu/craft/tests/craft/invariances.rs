@@ -1,7 +1,7 @@
-//! The same craft described otherwise moves the same.
+//! Descriptions of the same craft in another way, for example about another reference point, give the same motion.
 //!
-//! Ten seconds at a tolerance of 1e-13; what differs is rounding, some 1e-16 of each of 500
-//! steps, grown by the liquids' motion some ten times.
+//! The runs take ten seconds at a tolerance of 1e-13. They differ only by rounding, some 1e-16 in each of 500 steps, which the
+//! liquids' motion multiplies by about ten.
 
 use craft::{INPUTS, Inputs, Parameters, Ramp, STATES, TANKS, index};
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};

@@ -1,4 +1,4 @@
-//! Steps, states and refusals: what a host may rely on.
+//! Steps, saved states and refusals as a host relies on them.
 
 use craft::{
     Coupling, Inertia, Inputs, Line, Mount, Parameters, Ramp, STATES, SloshTank, Spacecraft, State,
@@ -13,7 +13,7 @@ fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs() / (1.0 + a.abs().max(b.abs()))).fold(0.0, f64::max)
 }
 
-/// One step of two seconds, or random pieces of it.
+/// Compares one step of two seconds with steps of random lengths that add up to two seconds.
 #[test]
 fn results_do_not_depend_on_the_communication_step() {
     for seed in 0..30 {
@@ -41,7 +41,7 @@ fn results_do_not_depend_on_the_communication_step() {
     }
 }
 
-/// Against a run at 1e-13, over a record that swings at 60 degrees and one with everything.
+/// Compares with runs at a tolerance of 1e-13, over a record that swings at 60 degrees and a record with all kinds of inputs.
 #[test]
 fn errors_stay_within_the_solver_tolerance() {
     for name in ["conical", "four_tanks", "wheels", "rotary"] {
@@ -186,8 +186,8 @@ fn saved_data_that_is_no_state_is_refused() {
     assert_eq!(TankState::from_words(&[0; TankState::WORDS]), None);
 }
 
-/// The wheels' momentum jumps at the first step and again after a second, or rises within a step by
-/// as much. H is conserved to rounding, and the energy is the work of the impulse.
+/// The wheels' momentum jumps at the first step and again after a second, or rises by the same amount within a step. The angular
+/// momentum H is conserved to rounding, and the energy changes by the work of the impulse.
 #[test]
 fn jumps_of_the_wheels_keep_angular_momentum_and_balance_energy() {
     for seed in 0..28 {
@@ -335,7 +335,7 @@ fn a_refused_step_leaves_the_craft_as_it_was_and_says_why() {
     }
 }
 
-/// Each is refused in a sentence that names parameter, value and range, all of them at once.
+/// Each problem is refused in a sentence that names parameter, value and range, and all problems are returned at once.
 #[test]
 fn every_problem_with_the_parameters_is_returned() {
     let mut p = Parameters::default();
@@ -399,8 +399,8 @@ fn every_problem_with_the_parameters_is_returned() {
     assert!(problems[1].starts_with("host.mass = -1.0"));
 }
 
-/// No principal moment of a body exceeds the sum of the others, whether it stands in the diagonal or
-/// rotated axes hide it. A plate has the sum itself, and numbers of four digits.
+/// No principal moment of a body exceeds the sum of the others, in principal axes or in rotated axes. For a plate it equals the
+/// sum; moments of a plate that are rounded to four digits have to be accepted.
 #[test]
 fn principal_moments_that_no_body_has_are_refused() {
     let with = |[xx, yy, zz, xy, xz, yz]: [f64; 6]| {
@@ -477,7 +477,7 @@ fn random_steps_give_finite_results_or_an_error() {
     assert!((100..600).contains(&refused), "{refused}");
 }
 
-/// Directions and quaternion stay of length 1 to rounding, rates tangential, however long.
+/// However long the run, directions and quaternion keep the length 1 to rounding, and the rates of directions stay tangential.
 #[test]
 fn constraints_are_kept_to_rounding() {
     let record = record("four_tanks");

@@ -8,14 +8,14 @@ use fastrand::Rng;
 /// First zero of J1'.
 const XI: f64 = 1.841_183_781_340_659_3;
 
-/// The host's motion of a tank alone.
+/// The host's motion of a single tank.
 #[derive(Clone, Copy, Debug)]
 struct Motion {
     axial: f64,
     spin: f64,
 }
 
-/// Returns the reason of a tank alone.
+/// Returns the reason for which a single tank is out of range.
 fn reason(tank: &Tank, motion: Motion) -> LimitedBy {
     let p = TankParameters { tank: *tank, ..TankParameters::default() };
     let inputs = TankInputs {

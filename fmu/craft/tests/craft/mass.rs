@@ -9,7 +9,7 @@ use super::random::Random;
 type V = Vector3<f64>;
 type M = Matrix3<f64>;
 
-/// A body: mass, centre of mass from O, inertia about it.
+/// A body: mass, centre of mass from O, and inertia about the centre of mass.
 type Body = (f64, V, M);
 
 /// Returns m (|s|^2 1 - s s^T), the inertia of a point mass.
@@ -17,7 +17,7 @@ fn point(m: f64, s: V) -> M {
     m * (M::identity() * s.norm_squared() - s * s.transpose())
 }
 
-/// Returns mass, centre of mass and inertia about it of all bodies together.
+/// Returns the mass, the centre of mass and the inertia about this centre of all bodies together.
 fn sum(bodies: &[Body]) -> Body {
     let mass: f64 = bodies.iter().map(|(m, ..)| m).sum();
     let center = bodies.iter().map(|(m, s, _)| *m * s).sum::<V>() / mass;
@@ -79,7 +79,7 @@ fn mass_properties_equal_those_of_all_bodies_together() {
     }
 }
 
-/// Nothing at all is at O.
+/// Without mass the centre of mass is O and all mass properties are 0.
 #[test]
 fn a_tank_without_liquid_has_no_mass_anywhere() {
     let mut p = TankParameters::default();

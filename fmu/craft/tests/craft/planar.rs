@@ -111,7 +111,7 @@ fn a_free_body_with_a_planar_mode_off_its_axis_has_the_closed_form_s_frequency()
     }
 }
 
-/// On a pivot too heavy to turn a box has a frequency along each axis, and what is pushed along one stays there.
+/// On a craft too heavy to turn, a box has a frequency along each axis, and a motion that starts along one axis stays along it.
 #[test]
 fn a_box_at_rest_under_gravity_has_two_frequencies() {
     let heavy = 1e11;
@@ -166,7 +166,7 @@ fn options_of_axisymmetric_tanks_are_refused_with_asymmetric_ones_by_both_names(
     assert!(p.problems()[0].starts_with("tank[1].ball.travel with tank[2].direction (allowed: "));
 }
 
-/// Rigid liquid below 0 goes with planar modes alone, and the whole has to have inertia.
+/// Rigid liquid of negative mass is allowed only with planar modes, and craft and liquid together must have positive inertia.
 #[test]
 fn negative_rigid_mass_is_allowed_with_planar_modes_if_the_total_inertia_is_positive() {
     let mut p = craft(a_box());
@@ -308,8 +308,8 @@ fn later(u: &TankInputs, t: f64) -> TankInputs {
     TankInputs { a: at(&u.a), omega, omega_dot: at(&u.omega_dot), ..*u }
 }
 
-/// One step of 2 s ends where its pieces do and where Runge-Kutta's does on the tank's own derivatives, whatever the drag follows.
-/// A mass flow has no effect.
+/// One step of 2 s gives the same result as shorter steps, and as a Runge-Kutta integration of the tank's derivatives, for every
+/// law of drag. A mass flow has no effect.
 #[test]
 fn co_simulation_of_a_tank_equals_a_host_that_integrates_it() {
     for seed in 0..8 {
@@ -359,8 +359,8 @@ fn co_simulation_of_a_tank_equals_a_host_that_integrates_it() {
     }
 }
 
-/// In a tank that is held, g/l along each axis. Pushed along x, its liquid has a_x the less to carry along: what the host feels of
-/// its mass at rest is m_liq less the masses that move along x.
+/// In a tank that is held, the squared frequency along each axis is g/l. If the tank is accelerated along x, the host feels at
+/// first only the liquid's mass less the masses of the modes that swing along x.
 #[test]
 fn a_box_on_a_host_has_two_frequencies_and_two_masses() {
     let p = TankParameters { tank: a_box(), ..TankParameters::default() };
@@ -384,7 +384,7 @@ fn a_box_on_a_host_has_two_frequencies_and_two_masses() {
     assert!((out.mass - 1000.0).abs() < 1e-10);
 }
 
-/// Liquid of less than no mass, and a host that it leaves without inertia.
+/// Refused are liquid whose total mass is negative, and liquid that leaves the host without positive inertia.
 #[test]
 fn a_tank_with_negative_total_liquid_mass_is_refused() {
     let mut p = TankParameters { tank: a_box(), ..TankParameters::default() };

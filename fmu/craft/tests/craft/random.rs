@@ -16,7 +16,7 @@ impl Random {
         low + (high - low) * self.0.f64()
     }
 
-    /// Uniform in its logarithm.
+    /// Returns a random number whose logarithm is uniformly distributed.
     pub fn magnitude(&mut self, low: f64, high: f64) -> f64 {
         low * f64::powf(high / low, self.0.f64())
     }
@@ -29,7 +29,8 @@ impl Random {
         [(); N].map(|()| self.between(-size, size))
     }
 
-    /// Half the bobs have centring stiffness, a third no damping; the drag is held.
+    /// Returns a random tank. Half the bobs have centring stiffness, a third have no damping; the drag depends neither on
+    /// acceleration nor on amplitude.
     pub fn tank(&mut self) -> Tank {
         let mut tank = Tank {
             position: self.vector(0.8),
@@ -142,7 +143,7 @@ impl Random {
         nonlinear_stiffness.as_flattened_mut().fill_with(|| self.between(0.3, 2.5));
     }
 
-    /// Takes a tank its axial symmetry: two thirds of its modes are planar, with less rigid liquid than their masses.
+    /// Makes a tank asymmetric: two thirds of its modes are planar, and it has less rigid liquid than the mass of these modes.
     pub fn make_planar(&mut self, tank: &mut Tank) {
         let bobs: f64 = tank.mass[..tank.modes].iter().sum();
         tank.m_0 = f64::max(tank.m_0 * self.between(-0.1, 1.0), -0.5 * bobs);
@@ -206,7 +207,7 @@ impl Random {
         }
     }
 
-    /// Stiffness and damping of a pivot for a craft of 150 to 3000 kg.
+    /// Returns the stiffness and damping of a pivot for a craft of 150 to 3000 kg.
     pub fn pivot(&mut self) -> Pivot {
         let k = [(); 2].map(|()| self.magnitude(1e2, 1e4));
         let mut torques = || [(); 3].map(|()| self.magnitude(0.1, 10.0));

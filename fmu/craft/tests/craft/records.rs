@@ -1,5 +1,5 @@
-//! Reference records: ../six.json, a thinned copy of numbers that were made with the equations
-//! written twice more, once in 113-bit arithmetic; what its signals are stands in its `about`.
+//! Reference records in ../six.json: an excerpt of motions that were computed with two further implementations of the equations,
+//! one of them in 113-bit arithmetic. The entry `about` in the file describes its signals.
 
 use craft::{
     Craft, DampingLaw, Inertia, Init, Inputs, Line, Mount, Parameters, Ramp, TANKS, Tank,

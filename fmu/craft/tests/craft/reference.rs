@@ -1,4 +1,4 @@
-//! The reference records are met within their digits.
+//! Spacecraft and SloshTank agree with the reference records within the digits of the records.
 
 use std::collections::BTreeMap;
 

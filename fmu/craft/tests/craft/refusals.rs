@@ -1,4 +1,4 @@
-//! Every number has its range: at its ends it is taken, beyond it is refused by name.
+//! Every number has a range: at the ends of the range it is accepted, beyond the ends it is refused by name.
 
 use craft::{Inertia, Inputs, MODES, Mount, POINTS, Parameters, Spacecraft, Tank, TankParameters};
 
@@ -109,7 +109,7 @@ fn parameters_of_unused_tanks_and_modes_are_not_checked() {
     assert!(p.problems()[0].starts_with("tanks = 5 (allowed: 0 to 4)"));
 }
 
-/// A direction may be short, if it is one.
+/// A direction may be short, but must be longer than a millionth.
 #[test]
 fn directions_need_a_length_above_a_millionth() {
     let with = |x: f64| {
@@ -132,7 +132,7 @@ fn an_initial_velocity_is_refused_only_on_a_pivot() {
     assert_eq!(p.problems(), [""; 0]);
 }
 
-/// Each pair of axes alone: |J_ij|^2 up to J_ii J_jj. A rod has exactly that: J = (0, 1, 1) along x, turned.
+/// For each pair of axes |J_ij|^2 may be up to J_ii J_jj. A rod, J = (0, 1, 1) along x, has exactly this value in rotated axes.
 #[test]
 fn products_of_inertia_need_moments_of_inertia_large_enough() {
     let with = |[xx, yy, zz, xy, xz, yz]: [f64; 6]| {
@@ -242,7 +242,7 @@ fn a_fill_table_must_rise_and_contain_the_modal_masses() {
     assert_eq!(with(|t| t.fill.mass[2][0] = 1e9), [""; 0]);
 }
 
-/// Rows of a frequency that is given in place of the length, and of a host.
+/// A host without inertia about its z axis is refused; with a second problem, both are returned.
 #[test]
 fn a_host_without_inertia_about_an_axis_is_refused() {
     let mut p =
@@ -256,7 +256,7 @@ fn a_host_without_inertia_about_an_axis_is_refused() {
     assert_eq!(p.problems().len(), 2);
 }
 
-/// Numbers that would be refused, or divided by, in a tank in use.
+/// Unused tanks, modes and points have numbers that would be refused, or cause a division by 0, if they were in use.
 #[test]
 fn unused_tanks_modes_and_table_points_are_never_evaluated() {
     let step = |p: &Parameters| {

@@ -1,5 +1,5 @@
-//! Communication points while inputs are held: they lie in expansions that do not depend on them, so they change no bit of the
-//! motion.
+//! Communication points while inputs are held change no bit of the motion, because they lie within expansions that do not depend
+//! on them.
 
 use craft::{INPUTS, Inputs, Mount, Parameters, Ramp, STATES, Spacecraft, State, index};
 
@@ -117,7 +117,8 @@ fn rows_change_no_bit_of_the_motion_while_inputs_are_held() {
     assert!(compared > 100, "{compared}");
 }
 
-/// Between rows a host may read outputs, also of other inputs, derivatives and event indicators, and may save and restore.
+/// Between rows a host may read outputs (also under other inputs), derivatives and event indicators, and may save and restore the
+/// state.
 #[test]
 fn reading_and_saving_between_rows_change_no_bit_of_the_motion() {
     every_kind(|motion, kind, seed| {
@@ -150,8 +151,8 @@ fn reading_and_saving_between_rows_change_no_bit_of_the_motion() {
     });
 }
 
-/// Thrust turns round at 2 s, so that the liquid leaves its bottom, flies and hits the wall. Events are roots of the series of
-/// whole expansions.
+/// Thrust is reversed at 2 s, so that the liquid leaves the bottom, flies and hits the wall. The events do not depend on the
+/// rows, because they are roots of the series of whole expansions.
 #[test]
 fn rows_change_no_bit_of_detached_liquid() {
     let mut p = Parameters::default();
@@ -172,7 +173,7 @@ fn rows_change_no_bit_of_detached_liquid() {
     }
 }
 
-/// A host that sets states starts anew.
+/// After a host has set the states, the next step starts a new expansion.
 #[test]
 fn states_that_are_set_start_a_new_expansion() {
     let (p, inputs) = craft_of(0, 3);

@@ -1,8 +1,8 @@
 //! Small motions about steady thrust: poles, zeros and the danger zone of the attitude loop from
 //! directional derivatives, compared with closed forms.
 //!
-//! All heights are from the centre of mass of the rigid part R (dry craft and rigid liquid). M =
-//! m_R, I its transverse inertia there, hinge h, bob b = h - l, lateral force at z_f:
+//! All heights are from the centre of mass of the rigid part R (dry craft and rigid liquid), which has the mass M and the
+//! transverse inertia I about this centre. The hinge is at the height h, the bob at b = h - l, and a lateral force acts at z_f:
 //!
 //! ```text
 //! w_0^2 = g/l + k/m,  sigma = 1 + m/M + m b^2/I
@@ -91,7 +91,7 @@ impl Closed {
     }
 }
 
-/// Derivatives of w_y', p_x'' of the first bob by one state or by a mixture of inputs.
+/// Returns the derivatives of w_y' and of the first bob's p_x'' by one state or along a direction of the inputs.
 fn column(craft: &mut Spacecraft, state: Option<usize>, du: [f64; INPUTS]) -> [f64; 2] {
     let mut dx = [0.0; STATES];
     if let Some(at) = state {
@@ -129,7 +129,7 @@ fn assert_close(got: f64, want: f64, tolerance: f64) {
     assert!((got / want - 1.0).abs() < tolerance, "{got} {want}");
 }
 
-/// Also to numbers worked out apart from this code, 10 to 13 digits.
+/// The results are also compared with numbers of 10 to 13 digits that were computed independently of this code.
 #[test]
 fn poles_and_zeros_are_the_closed_forms_with_and_without_centring_stiffness() {
     let numbers = [
@@ -179,7 +179,7 @@ fn frequency_2(tank: Tank, g: f64) -> f64 {
     -craft.directional_derivative(&u, &dx, &[0.0; INPUTS])[SLOSH_RATE]
 }
 
-/// The liquid's 382 kg leave 4e-9 of 1e11 kg.
+/// The craft of 1e11 kg moves because of the liquid's 382 kg, which changes the result by 4e-9.
 #[test]
 fn a_mode_has_the_frequency_that_it_is_given() {
     for k in [0.0, 60.0] {
@@ -283,7 +283,7 @@ fn predicted_growth(z: f64) -> f64 {
     K_D * (zero - pole) / (2.0 * pole)
 }
 
-/// Growth rates worked out apart from this code, five digits.
+/// The expected growth rates, of five digits, were computed independently of this code.
 #[test]
 fn the_growth_rate_of_the_slosh_pole_in_an_attitude_loop_equals_the_analytic_one() {
     for (z, expected) in [
@@ -327,7 +327,7 @@ fn danger_zone_lies_between_centre_of_mass_and_centre_of_percussion() {
     }
 }
 
-/// zeta_p w_p = (c/m) sigma/2 must exceed the growth.
+/// The loop is stable if the damping zeta_p w_p = (c/m) sigma/2 exceeds the growth rate without damping.
 #[test]
 fn damping_that_stabilises_is_predicted_to_5_percent() {
     for z in [0.2, 0.35, 0.5, 0.65] {

@@ -40,7 +40,7 @@ fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
 
 /// The given numbers have six digits.
 #[test]
-fn a_cylinder_is_the_tank_of_its_modes() {
+fn a_tank_given_as_a_cylinder_moves_as_a_tank_with_the_cylinders_modes() {
     let given = Parameters::default();
     let mut cylinder = given;
     let tank = &mut cylinder.tank[0];
@@ -54,8 +54,8 @@ fn a_cylinder_is_the_tank_of_its_modes() {
     assert!(largest_difference(&got[bobs.clone()], &want[bobs]) < 1e-5);
 }
 
-/// Mass, centre of mass and inertia of craft and liquid at rest do not depend on how many modes
-/// are kept: the liquid under a lid.
+/// Mass, centre of mass and inertia of craft and liquid at rest do not depend on the number of modes. They equal those of liquid
+/// under a lid.
 #[test]
 fn mass_centre_of_mass_and_inertia_are_right_whatever_the_modes() {
     let of = |modes: usize| {
@@ -81,8 +81,8 @@ fn mass_centre_of_mass_and_inertia_are_right_whatever_the_modes() {
     }
 }
 
-/// m, c, k to 0 in proportion: the rest of the craft moves as without, with an error in
-/// proportion to m.
+/// If mass m, drag c and stiffness k of the bobs go to 0 in proportion, the rest of the craft moves as without the bobs, with an
+/// error in proportion to m.
 #[test]
 fn bobs_without_mass_move_without_effect_on_the_craft() {
     let mut without = Parameters::default();
@@ -100,8 +100,8 @@ fn bobs_without_mass_move_without_effect_on_the_craft() {
     assert!((ratio / 1e3 - 1.0).abs() < 0.01, "{ratio}");
 }
 
-/// l to 0: the mass sits at its hinge, with an error in proportion to l. The bobs are made to
-/// rest at first; strong damping lets them follow.
+/// If the length l goes to 0, the bob moves as a mass at its hinge, with an error in proportion to l. The bobs are made to rest
+/// at first; strong damping lets them follow.
 #[test]
 fn a_pendulum_without_length_is_a_mass_at_its_hinge() {
     let mut lumped = Parameters::default();
@@ -145,8 +145,8 @@ fn a_tank_without_rigid_liquid_is_allowed() {
     assert_eq!(m.symmetric_eigenvalues().iter().filter(|x| x.abs() > 1e-9).count(), 1);
 }
 
-/// The bob straight up, where stereographic coordinates fail, is a place like any other: the
-/// motion through it keeps its energy.
+/// The upright position, at which stereographic coordinates fail, is not special for the bob's equations: a motion through it
+/// conserves energy.
 #[test]
 fn a_bob_swings_through_the_upright_position() {
     let mut p = Parameters::default();
@@ -206,8 +206,7 @@ fn a_rigid_body_without_tanks_precesses_by_euler() {
     assert!(largest_difference(&craft.continuous_states()[index::OMEGA..][..3], &want) < 1e-13);
 }
 
-/// On a pivot nothing but the angular momentum about O counts: the same as a free craft of
-/// infinite mass at O, which accelerates by -g.
+/// A craft on a pivot moves as a free craft with a very large mass at O, which accelerates by -g.
 #[test]
 fn a_pivot_moves_as_a_free_craft_with_a_very_large_mass_at_o() {
     for seed in 0..5 {

@@ -12,9 +12,9 @@ use super::random::{Random, draining_craft};
 
 type C = Complex<f64>;
 
-/// A rigid body with the inertias A_r across its axis and C_r about it, and a full spheroid of m kg with the semi-axes a
-/// and c along the axis, its centre in the body's: rows of A_r, C_r, m, a, c and of both lambda, nutation's rates over the
-/// rate of spin, seen from the body. Poincare's equations give them (`fmu/craft/src/spin.rs`).
+/// Rows of A_r, C_r, m, a, c and of both rates of nutation lambda, relative to the rate of spin and seen from the body. A rigid
+/// body with the inertias A_r across its axis and C_r about it carries a full spheroid of m kg with the semi-axes a across and c
+/// along the axis, whose centre is the body's. The rates follow from Poincare's equations (`fmu/craft/src/spin.rs`).
 const SPHEROIDS: [([f64; 5], [[f64; 2]; 2]); 6] = [
     ([60.0, 40.0, 30.0, 0.3, 0.2], [[-0.326391621079, 0.0], [-1.3901790763, 0.0]]),
     ([60.0, 40.0, 30.0, 0.25, 0.25], [[-1.0 / 3.0, 0.0], [-1.0, 0.0]]),
@@ -89,8 +89,8 @@ fn craft_with_full_spheroids_nutate_at_the_rates_of_poincare() {
     }
 }
 
-/// (A A' - F^2) lambda^2 + [(A - C) A' + A C' - F^2] lambda + (A - C) C' = 0, with C' - i K/Omega for C' where the liquid
-/// rubs.
+/// (A A' - F^2) lambda^2 + [(A - C) A' + A C' - F^2] lambda + (A - C) C' = 0, with C' - i K/Omega in place of C' if the liquid
+/// has friction.
 fn closed_form([across, axial, m, a, c]: [f64; 5], by_friction: C) -> [C; 3] {
     let (inner, whole) = (m * (a * a + c * c) / 5.0, 2.0 * m * a * a / 5.0);
     let shared = 2.0 * m * a * c / 5.0;
@@ -123,8 +123,9 @@ fn friction_in_full_spheroids_changes_nutation_as_the_closed_form_says() {
     }
 }
 
-/// Rumyantsev's condition: a real lambda. A nutation of 1e-7 rad/s grows by more than its own size in the time in which the closed
-/// form says 1,000 times, and otherwise stays within what two nutations at once can beat.
+/// By Rumyantsev's condition a craft is stable if lambda is real. In an unstable craft a nutation of 1e-7 rad/s at least doubles
+/// in the time in which the closed form predicts a growth by a factor of 1,000; in a stable craft it stays within the beat of the
+/// two nutations.
 #[test]
 fn spinning_craft_are_stable_where_rumyantsev_says_so() {
     let mut random = Random::new(2);
@@ -330,8 +331,8 @@ fn lateral_forces_of_spinning_cylinders_are_those_of_the_rotating_liquid() {
     }
 }
 
-/// At h/R = 1, C_0 is 0.496: out of range above 2 Omega/omega_0 = 0.818, which is 0.541 rad/s here, for the liquid, whatever the
-/// tank does.
+/// At h/R = 1 the coefficient C_0 is 0.496, so that the tank is out of range above 2 Omega/omega_0 = 0.818, which is a spin of
+/// 0.541 rad/s here. Only the rate of the liquid counts, not the rate of the tank.
 #[test]
 fn the_spin_of_the_liquid_and_not_of_its_tank_limits_the_range() {
     let squared = 1.8411837813 * f64::tanh(1.8411837813);

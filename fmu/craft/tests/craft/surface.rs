@@ -1,8 +1,7 @@
 //! Coefficients of the third order and beyond: bobs on other surfaces than spheres.
 //!
-//! `tests/six` compares their waves with potential flow.
-//! `independent.rs`, `equations.rs`, `exchange.rs`, `balances.rs`, `draining.rs` and `impulses.rs` have such bobs among
-//! their random tanks.
+//! `tests/six` compares their waves with potential flow. The random tanks of `independent.rs`, `equations.rs`, `exchange.rs`,
+//! `balances.rs`, `draining.rs` and `impulses.rs` also have bobs on other surfaces than spheres.
 
 use craft::{
     Coupling, FillTable, Inertia, Inputs, Line, MODES, Mount, POINTS, Parameters, Ramp, STATES,
@@ -23,7 +22,8 @@ fn resting(tank: Tank) -> (SloshTank, TankInputs) {
     (SloshTank::new(&p, &u, 0.0, 1e-12).unwrap(), u)
 }
 
-/// Expected: (3 kappa/8 - s/2) A^2 and (kappa/2) A^2. Halving A divides what is left by 16.
+/// The relative shifts are (3 kappa/8 - s/2) A^2 for planar and (kappa/2) A^2 for circular motion. If A is halved, the remaining
+/// difference falls by a factor of 16.
 #[test]
 fn frequencies_shift_as_s_and_kappa_predict_up_to_fourth_order() {
     for (s, kappa) in [(1.0, 1.0), (1.408, 0.734), (1.0, 8.0), (-3.0, 0.5), (1.0, 0.25), (0.0, 1.0)]
@@ -45,7 +45,7 @@ fn frequencies_shift_as_s_and_kappa_predict_up_to_fourth_order() {
     }
 }
 
-/// One step ends where its pieces do, and where Runge-Kutta's does on the tank's own derivatives.
+/// One step gives the same result as shorter steps, and as a Runge-Kutta integration of the tank's derivatives.
 #[test]
 fn the_motion_of_a_tank_does_not_depend_on_the_communication_step() {
     for seed in 0..8 {
@@ -102,7 +102,8 @@ fn the_motion_of_a_tank_does_not_depend_on_the_communication_step() {
     }
 }
 
-/// Coefficients of a pendulum leave the power series in place: the same bits as without them.
+/// With the coefficients of a pendulum the power series of a pendulum are used, so that no bit differs from a tank without
+/// coefficients.
 #[test]
 fn coefficients_near_one_move_as_a_pendulum() {
     let mut tank = Random::new(3).tank();
@@ -452,7 +453,7 @@ fn coefficients_beyond_the_third_order_are_refused_with_planar_modes_and_fill_ta
     assert!(said[0].starts_with("tank.nonlinear_inertia_2[1] = 200000.0 (allowed: "), "{said:?}");
 }
 
-/// A table with the same s and kappa at all points is a tank with them.
+/// A tank whose table has the same s and kappa at all points moves as a tank with these coefficients.
 #[test]
 fn a_fill_table_with_constant_s_and_kappa_moves_as_a_tank_with_these_values() {
     for seed in 0..6 {
@@ -483,9 +484,9 @@ fn a_fill_table_with_constant_s_and_kappa_moves_as_a_tank_with_these_values() {
     }
 }
 
-/// At a point of its table, without flow, a tank has the rates of one with these coefficients.
+/// At a point of its table and without flow, a tank has the same rates as a tank with the coefficients of this point.
 #[test]
-fn a_tank_has_the_coefficients_of_its_fill() {
+fn a_tank_at_a_point_of_its_table_has_the_coefficients_of_this_point() {
     let mut random = Random::new(5);
     let mut tank = draining_tank(&mut random, 2);
     random.bend_by_fill(&mut tank);

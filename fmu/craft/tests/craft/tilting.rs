@@ -127,7 +127,7 @@ fn an_unbalanced_platform_leaks_into_the_tilt_by_its_products_of_inertia() {
     }
 }
 
-/// A centre of mass off the axis couples by gravity, too: it tilts the platform by M g d/(k - M g h) at rest.
+/// A centre of mass at the distance d from the axis also couples by gravity: at rest it tilts the platform by M g d/(k - M g h).
 #[test]
 fn static_imbalance_tilts_the_platform_by_its_moment_over_the_stiffness() {
     let mut p = platform();
@@ -199,7 +199,8 @@ fn a_stiff_pivot_tends_to_a_hub_that_only_turns() {
     assert!((ratio - 10.0).abs() < 0.5, "{ratio} {soft:e} {stiff:e}");
 }
 
-/// Far above eps the sign is 1 to the last bit: I w' = -C until the platform stops, from 2 rad/s after 2 I/C = 16 s.
+/// Far above eps the smoothed sign of the rate is 1 to the last bit, so that I w' = -C with the Coulomb torque C until the
+/// platform stops. From 2 rad/s it stops after 2 I/C = 16 s.
 #[test]
 fn coulomb_friction_stops_a_platform_and_holds_it() {
     let mut p = platform();

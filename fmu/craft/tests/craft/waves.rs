@@ -1,6 +1,6 @@
 //! Free waves of the first mode in the tank of the bench, at rest or driven sideways.
 //!
-//! `tests/six` has this file too, with the packed FMUs as components.
+//! `tests/six` includes this file as well and runs it with the packed FMUs as components.
 
 use std::f64::consts::FRAC_PI_2;
 
