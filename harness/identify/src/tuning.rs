@@ -157,7 +157,7 @@ pub const LAG_PARTS: (f64, f64) = (3.0, 8.0);
 pub const COARSEST: f64 = 0.2;
 
 // Runs of the bench: `bench/simulate.rs`.
-// Tests: `a_twin_with_a_delay_or_a_smooth_torque_is_what_the_fit_simulates`, `a_run_that_would_not_end_is_refused`.
+// Tests: `the_fit_simulates_a_twin_with_a_delay_or_a_smooth_torque`, `a_run_that_would_not_end_is_refused`.
 /// Instants closer than this are the same, s.
 pub const SAME_INSTANT: f64 = 1e-9;
 /// Most internal steps of our FMUs in a communication step: the first number, plus the second number for each second of the step.
@@ -187,7 +187,7 @@ pub const ANGLE_ROUNDS: usize = 20;
 pub const ANGLE_ENOUGH: f64 = 0.97;
 
 // Verdict: `bench/verdict.rs`.
-// Tests: `a_search_that_would_leave_the_fmus_range_ends_at_its_end_with_a_result`.
+// Tests: `a_search_that_would_leave_a_parameters_range_ends_at_the_bound_with_a_result`.
 /// Newton decrement above which the verdict reports it.
 pub const TOLD_DECREMENT: f64 = 0.1;
 
@@ -201,7 +201,7 @@ pub const PAGE_STRETCH: f64 = 8.0;
 pub const PAGE_LAGS: usize = 200;
 
 // Output error: `methods/output_error.rs`.
-// Tests: `starts_forty_percent_off_end_at_the_minimum_of_the_datas_own`, `no_model_fits_a_torque_that_is_clipped`.
+// Tests: `starts_forty_percent_off_lead_to_the_same_minimum_as_starts_from_the_data`, `no_model_fits_a_torque_that_is_clipped`.
 /// Beginnings that are tried where no model fits the whole recording, as fractions of its rows.
 pub const BEGINNINGS: [f64; 2] = [0.35, 0.5];
 

@@ -22,7 +22,7 @@ fn sweep(amplitude: f64, time: &[f64]) -> Vec<f64> {
 
 /// Small torque: the hub stands still most of the time. Large torque: the spherical liquid leaves the torque's plane.
 #[test]
-fn it_moves_as_the_fmu_does() {
+fn the_independent_bench_moves_as_the_fmu() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let time = rows(60.0);
     for (liquid, name) in

@@ -254,7 +254,7 @@ fn a_tolerance_that_nonlinear_slosh_shows_is_no_misfit() {
 /// The motion is so slow that the friction curve is nearly straight. The minimum is at 0.02 rad/s; a quadratic there would
 /// exclude the truth by fourteen standard deviations.
 #[test]
-fn along_the_frictions_flat_valley_the_interval_equals_that_of_the_likelihood() {
+fn the_interval_along_the_flat_valley_of_friction_equals_the_likelihoods() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let slow = "lin-sweep:amplitude=0.025,duration=600,f0=1.8,f1=3";
     let recordings = [sweep(&fmu, slow, &[])];
@@ -280,7 +280,7 @@ fn along_the_frictions_flat_valley_the_interval_equals_that_of_the_likelihood() 
 /// either: the friction b ω + c + d exp(−(ω/ω_s)²) tends to b ω + (c + d) for ω_s → ∞, and the friction with c + d in place of c
 /// and with d = 0 is the same curve at any ω_s.
 #[test]
-fn ends_that_the_likelihood_does_not_have_are_open() {
+fn an_interval_is_open_at_an_end_that_the_likelihood_does_not_bound() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let gentle = "lin-sweep:amplitude=0.0125,duration=600,f0=1.8,f1=3";
     let recordings = [sweep(&fmu, gentle, &[])];
@@ -442,7 +442,7 @@ fn no_model_error_makes_the_rate_come_before_the_torque() {
 }
 
 #[test]
-fn starts_forty_percent_off_end_at_the_minimum_of_the_datas_own() {
+fn starts_forty_percent_off_lead_to_the_same_minimum_as_starts_from_the_data() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let recordings = [sweep(&fmu, SHORT, &[])];
     let own = identify(&fmu, &recordings, &options(), &mut |_| {}).unwrap();
@@ -625,7 +625,7 @@ fn degrees_per_second_are_refused_by_name() {
 }
 
 #[test]
-fn a_twin_with_a_delay_or_a_smooth_torque_is_what_the_fit_simulates() {
+fn the_fit_simulates_a_twin_with_a_delay_or_a_smooth_torque() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let torque = Torque::Profile("lin-sweep:amplitude=0.1,duration=130,f0=2,f1=3".parse().unwrap());
     for (intersample, delay) in [
@@ -718,7 +718,7 @@ fn a_damping_ratio_that_the_correlation_replaces_is_not_estimated() {
 
 /// The damping is the largest that the FMU allows, and a difference from there leaves the range.
 #[test]
-fn a_search_that_would_leave_the_fmus_range_ends_at_its_end_with_a_result() {
+fn a_search_that_would_leave_a_parameters_range_ends_at_the_bound_with_a_result() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let torque = "lin-sweep:amplitude=0.1,f0=1.8,f1=3,duration=60";
     let recording = sweep(&fmu, torque, &[("slosh.model", "linear"), ("slosh.zeta", "0.999")]);
@@ -740,7 +740,7 @@ fn a_search_that_would_leave_the_fmus_range_ends_at_its_end_with_a_result() {
 /// Dry friction changes its sign when the hub turns back, which shows when the torque acts. Therefore the course between rows and
 /// the delay can both be found.
 #[test]
-fn a_delay_of_half_a_row_is_no_finding_where_the_torque_between_rows_is_found() {
+fn a_delay_of_half_a_row_is_not_reported_if_the_torque_between_rows_is_found() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let settings = vec![("slosh.model".to_string(), "frozen".to_string())];
     let sensor_errors = SensorErrors { delay: 0.01, ..SensorErrors::default() };
