@@ -62,7 +62,9 @@ def summary(runs: dict[str, hubslosh.Run]) -> str:
         f"with a wave of up to {wave.max():.1f} mm"
     )
     # if the liquid moves too much for the model, the numbers above are not to be trusted
-    return "\n".join([answer, *(fill(text, 80) for text in runs["spherical"].out_of_range)])
+    # the package 0.6.1 has no sentences on what was out of the models' range
+    beyond = getattr(runs["spherical"], "out_of_range", [])
+    return "\n".join([answer, *(fill(text, 80) for text in beyond)])
 
 
 def figure(runs: dict[str, hubslosh.Run]) -> plt.Figure:
