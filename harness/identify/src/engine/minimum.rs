@@ -330,7 +330,7 @@ mod tests {
             (f64::NAN, "derivative by friction.d is NaN in row 4"),
             (f64::INFINITY, "derivative by friction.d is inf in row 4"),
             (f64::NEG_INFINITY, "derivative by friction.d is -inf in row 4"),
-            (1e200, "derivatives by friction.d are too large"),
+            (1e200, "with respect to friction.d are too large"),
         ] {
             let mut bad = DMatrix::from_fn(5, 2, |k, j| if j == 0 { 1.0 } else { k as f64 - 2.0 });
             bad[(3, 1)] = entry;
