@@ -139,7 +139,7 @@ def check(machine: Machine, args: argparse.Namespace) -> None:
             sys.exit(f"error: hubslosh book does not say where the book is: {address}")
     drawing = ROOT / "harness" / "tank" / "examples" / "capsule.toml"
     run(program, "tank", drawing, "--fill", "1.2", "--out", "tank.json")
-    run(program, "run", "--profile", "exp-sweep:amplitude=0.1", "--out", "sweep.csv")
+    run(program, "run", "--profile", "exp-sweep:amplitude=0.1,duration=300", "--out", "sweep.csv")
     _, seconds = run(program, "identify", "sweep.csv", "--out", "result.json")
     print(f"identify: {seconds:.1f} s", flush=True)
     _, seconds = run(program, "campaign")

@@ -55,7 +55,7 @@ class Appendage:
     >>> panel = hubslosh.Appendage((0, 0.6, 0), 0.2, participation, zeta=0.003)
     >>> craft = hubslosh.Craft(500, [400, 280, 300], appendages={"panel": panel})
     >>> craft.linearize(0).modes()["frequency"].round(4).tolist()
-    [0.2201]
+    [0.2341]
     >>> craft.parameters(0, parameters={"panel.frequency[1]": 0.25})["appendage[1].frequency"]
     0.25
     """
