@@ -45,7 +45,10 @@ def test_the_program_drives_the_fmu_and_writes_a_table(fmu: Path, tmp_path: Path
     [
         ({"tank.height": 0.1}, "no variable tank.height; did you mean tank.h"),
         ({"rho": 1000.0}, "no variable rho; did you mean fluid.rho"),
-        ({"slosh.model": "conical"}, "the allowed values are frozen, linear, planar, spherical, liquid"),
+        (
+            {"slosh.model": "conical"},
+            "the allowed values are frozen, linear, planar, spherical, liquid",
+        ),
         ({"wheel.enabled": "yes"}, "the allowed values are true and false"),
         ({"hub.I": "heavy"}, "hub.I cannot be 'heavy'"),
         ({"tank.h": 0.0}, "tank.h"),
