@@ -126,7 +126,7 @@ pub fn cylinder(fill: f64, shifts: [Option<f64>; 2]) -> AngleLimit {
 }
 
 /// Rows of h/R and the slosh angle, degrees, at which a forced response of the model with [`energy_terms`] is wrong by 3 %.
-/// From h/R = 0.6 on the error is smaller than 3 % up to 15 degrees, the largest angle that was compared.
+/// The error is smaller than 3 % from h/R = 0.6 on, up to 15 degrees, the largest angle that was compared.
 const FORCED_ENERGY: [[f64; 2]; 7] =
     [[0.25, 1.7], [0.3, 2.9], [0.35, 4.8], [0.4, 7.7], [0.5, 11.8], [0.6, 15.0], [0.7, 15.0]];
 

@@ -123,7 +123,7 @@ fn friction_in_full_spheroids_changes_nutation_as_the_closed_form_says() {
     }
 }
 
-/// By Rumyantsev's condition a craft is stable if lambda is real. In an unstable craft a nutation of 1e-7 rad/s at least doubles
+/// A craft is stable if lambda is real (Rumyantsev). In an unstable craft a nutation of 1e-7 rad/s at least doubles
 /// in the time in which the closed form predicts a growth by a factor of 1,000; in a stable craft it stays within the beat of the
 /// two nutations.
 #[test]

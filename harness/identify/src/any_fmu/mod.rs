@@ -223,7 +223,7 @@ struct Numbers {
 }
 
 impl Numbers {
-    fn of(system: &FmuSystem, solution: &mut Solution) -> Result<Self> {
+    fn from_solution(system: &FmuSystem, solution: &mut Solution) -> Result<Self> {
         let unknowns = &solution.fit.problem.unknowns;
         let n = unknowns.len();
         let own = solution.fit.derivatives_at(&mut solution.minimum)?.matrix;
@@ -363,7 +363,7 @@ fn conclude(
     solution: &mut Solution,
     question: &Question,
 ) -> Result<Identification> {
-    let numbers = Numbers::of(system, solution)?;
+    let numbers = Numbers::from_solution(system, solution)?;
     let Numbers { covariance, std, solver, .. } = &numbers;
     let problem = solution.fit.problem;
     let unknowns = &problem.unknowns;
