@@ -839,9 +839,11 @@ fn clocks(sequences: [usize; 3]) {
             hubslosh_fuzz::clocks::run::<M>(&noise(&mut rng, 400));
         }
     }
-    play::<HubSlosh::HubSlosh>(sequences[0]);
-    play::<Spacecraft::Model>(sequences[1]);
-    play::<SloshTank::Model>(sequences[2]);
+    std::thread::scope(|all| {
+        all.spawn(|| play::<HubSlosh::HubSlosh>(sequences[0]));
+        all.spawn(|| play::<Spacecraft::Model>(sequences[1]));
+        all.spawn(|| play::<SloshTank::Model>(sequences[2]));
+    });
 }
 
 #[test]

@@ -9,10 +9,6 @@
 //! filter turns sensitivities of the rate into sensitivities of the innovations. Least squares of
 //! the innovations is then maximum likelihood, and slow drift is not mistaken for a signal.
 
-/// Smallest white noise, rad/s or rad. Simulated recordings have less, but their differences are solver
-/// errors, which are not random.
-pub const FLOOR: f64 = 1e-6;
-
 /// White noise of the standard deviation σ_w and a Gauss–Markov bias: `drift` is σ_b/σ_w and `time` the
 /// correlation time T of the bias, s.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,42 +65,6 @@ impl Noise {
         }
         Whitening { rows, log_variance }
     }
-
-    /// Estimates the noise from a residual (rad/s) at these times by maximum likelihood.
-    pub fn fit(time: &[f64], residual: &[f64], fresh: Option<&[bool]>) -> Self {
-        let new = |fresh: &[bool]| fresh.iter().filter(|new| **new).count();
-        let count = fresh.map_or(residual.len(), new) as f64;
-        // σ_w follows from the other parameters; the search minimises −2 ln L.
-        let sized = |ln_drift: f64, ln_time: f64| {
-            let unit = Noise { white: 1.0, drift: ln_drift.exp(), time: ln_time.exp() };
-            let filter = unit.whitening(time, fresh);
-            let mut e = residual.to_vec();
-            filter.apply(&mut e);
-            let white = (e.iter().map(|v| v * v).sum::<f64>() / count).sqrt().max(FLOOR);
-            (2.0 * count * white.ln() + filter.log_variance, Noise { white, ..unit })
-        };
-        let longest = (time[time.len() - 1] - time[0]).ln();
-        let mut best = sized(-4.0, 4.6);
-        let (mut at, mut reach): ((f64, f64), _) = ((-4.0, 4.6f64.min(longest)), (1.5, 1.5));
-        // Coordinate search over two smooth variables, which takes some tens of evaluations.
-        for _ in 0..40 {
-            let mut moved = false;
-            for (dx, dt) in [(reach.0, 0.0), (-reach.0, 0.0), (0.0, reach.1), (0.0, -reach.1)] {
-                let to = ((at.0 + dx).clamp(-9.0, 4.0), (at.1 + dt).clamp(0.0, longest));
-                let there = sized(to.0, to.1);
-                if there.0 < best.0 {
-                    (best, at, moved) = (there, to, true);
-                }
-            }
-            if !moved {
-                reach = (reach.0 / 2.0, reach.1 / 2.0);
-                if reach.0 < 0.15 {
-                    break;
-                }
-            }
-        }
-        best.1
-    }
 }
 
 impl Whitening {
@@ -122,37 +82,5 @@ impl Whitening {
     /// Returns Σ ln(innovation variance); together with Σ e² it is −2 ln L up to a constant.
     pub fn log_variance(&self) -> f64 {
         self.log_variance
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_simulated_noise_is_estimated_and_its_innovations_are_white() {
-        let mut random = crate::random::Random::new(3, 1);
-        let time: Vec<f64> = (0..135_000).map(|k| 0.02 * f64::from(k)).collect();
-        let keep = (-0.02f64 / 100.0).exp();
-        let (white, drift) = (4.07e-4, 7.85e-5);
-        let mut bias = drift * random.normal();
-        let residual: Vec<f64> = time
-            .iter()
-            .map(|_| {
-                let y = bias + white * random.normal();
-                bias = keep * bias + drift * (1.0 - keep * keep).sqrt() * random.normal();
-                y
-            })
-            .collect();
-        let found = Noise::fit(&time, &residual, None);
-        // 1/sqrt(2 N) = 0.2 %; the drift has 27 correlation times: 20 %, four of them
-        assert!((found.white / white - 1.0).abs() < 0.01, "{found:?}");
-        assert!((found.drift * found.white / drift).ln().abs() < 0.8, "{found:?}");
-        let mut e = residual.clone();
-        found.whitening(&time, None).apply(&mut e);
-        for lag in [1, 50, 500] {
-            let sum: f64 = e.iter().zip(&e[lag..]).map(|(a, b)| a * b).sum();
-            assert!((sum / e.len() as f64).abs() < 4.0 / (e.len() as f64).sqrt(), "lag {lag}");
-        }
     }
 }

@@ -127,7 +127,7 @@ pub fn identify(
     let (mut near, mut starts): (Option<Vec<f64>>, usize) = (None, 0);
     for turn in 1.. {
         let mut solution = match &near {
-            None => solve(&problem, None, &mut told)?,
+            None => solve(&problem, None, f64::INFINITY, &mut told)?,
             Some(values) => solve_near(&problem, values, &mut told)?,
         };
         starts = starts.max(solution.starts);

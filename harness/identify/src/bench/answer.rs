@@ -302,7 +302,7 @@ fn findings(
         let (noise, signal) = (&solution.fit.noise[0], &problem.signals[0]);
         doubts.push(format!(
             "the residual is {:.1} times what neighbouring rows show of noise",
-            noise.white / signal.white
+            noise.white / signal.own_noise()
         ));
     }
     let missing: Vec<Missing> =

@@ -2,7 +2,6 @@
 
 use std::sync::OnceLock;
 
-use analysis::gauss_markov::FLOOR;
 use analysis::statistics::{deviation, noise_level, peak};
 use anyhow::{Result, ensure};
 use host::causality::Causality;
@@ -513,7 +512,7 @@ pub fn problem<'a>(
             output: RATE,
             measured: recording.rate.clone(),
             sampled: all(&recording.fresh),
-            white: recording.rate_noise().max(FLOOR),
+            white: recording.rate_noise(),
             drift: Some(GYRO_DRIFT),
         });
         if let Some(angle) = &recording.angle {
@@ -522,7 +521,7 @@ pub fn problem<'a>(
                 output: ANGLE,
                 measured: angle.clone(),
                 sampled: all(&recording.angle_fresh),
-                white: noise_level(&recording.of_fresh_angle(angle)).max(FLOOR),
+                white: noise_level(&recording.of_fresh_angle(angle)),
                 drift: Some(ENCODER_DRIFT),
             });
         }

@@ -3,10 +3,14 @@
 //! A short recording cannot tell its drift from the friction of its bearing. So the drift of a gyro is expected to be of the size that
 //! its kind has ([`Drift`]).
 
-use analysis::gauss_markov::{FLOOR, Noise};
+use analysis::gauss_markov::Noise;
+use analysis::statistics::deviation;
 
 use super::problem::{Drift, Signal};
 
+/// Smallest white noise, relative to the standard deviation of the signal. A simulated recording may have less, but there the
+/// residual is the error of the solver, which no test of noise passes.
+const LEAST_NOISE: f64 = 1e-5;
 /// Standard deviation of the logarithm of a drift's correlation time about its expected value.
 const TIME_WIDTH: f64 = 1.0;
 /// Least step of the search over the logarithms of a drift's size and correlation time; a finer search moves no estimate.
@@ -16,19 +20,29 @@ impl Signal {
     /// Returns the noise that is assumed before there is a residual.
     pub fn first_noise(&self) -> Noise {
         let (drift, time) = self.drift.map_or((0.0, 100.0), |drift| (drift.size, drift.time));
-        Noise { white: self.white, drift, time }
+        Noise { white: self.own_noise(), drift, time }
+    }
+
+    /// Returns the noise that neighbouring rows show, but at least the least noise.
+    pub fn own_noise(&self) -> f64 {
+        self.white.max(self.least_noise())
+    }
+
+    fn least_noise(&self) -> f64 {
+        (LEAST_NOISE * deviation(&self.picked(&self.measured))).max(f64::MIN_POSITIVE)
     }
 
     /// Returns the noise of a residual at these times (s).
     pub fn noise_of(&self, time: &[f64], residual: &[f64]) -> Noise {
         let count = self.sampled.iter().filter(|sampled| **sampled).count().max(1) as f64;
+        let least = self.least_noise();
         let sized = |drift: f64, time_constant: f64| {
             let unit = Noise { white: 1.0, drift, time: time_constant };
             let filter = unit.whitening(time, Some(&self.sampled));
             let mut e = residual.to_vec();
             filter.apply(&mut e);
             let white = (e.iter().map(|v| v * v).sum::<f64>() / count).sqrt();
-            let white = white.max(FLOOR.min(1e-6 * self.white));
+            let white = white.max(least);
             (2.0 * count * white.ln() + filter.log_variance(), Noise { white, ..unit })
         };
         let Some(Drift { size: drift, time: usual, width }) = self.drift else {
@@ -60,5 +74,57 @@ impl Signal {
             }
         }
         best.1
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use analysis::random::Random;
+
+    const TIME: f64 = 100.0; // s
+
+    /// Returns the noise of a residual with white noise and a drift (rad/s) in a recording whose rate has a standard deviation of 1 rad/s.
+    fn estimated(white: f64, drift: f64) -> (Noise, Vec<f64>, Vec<f64>) {
+        let mut random = Random::new(3, 1);
+        let time: Vec<f64> = (0..135_000).map(|k| 0.02 * f64::from(k)).collect();
+        let keep = (-0.02 / TIME).exp();
+        let mut bias = drift * random.normal();
+        let next = |_: &f64| {
+            let y = bias + white * random.normal();
+            bias = keep * bias + drift * (1.0 - keep * keep).sqrt() * random.normal();
+            y
+        };
+        let residual: Vec<f64> = time.iter().map(next).collect();
+        let signal = Signal {
+            recording: 0,
+            output: 0,
+            measured: time.iter().map(|t| 2f64.sqrt() * (10.0 * t).sin()).collect(),
+            sampled: vec![true; time.len()],
+            white,
+            drift: Some(Drift { size: 0.1, time: TIME, width: 1.5 }),
+        };
+        (signal.noise_of(&time, &residual), time, residual)
+    }
+
+    #[test]
+    fn the_estimated_noise_is_the_simulated_noise_and_makes_the_innovations_white() {
+        let (white, drift) = (4.07e-4, 7.85e-5);
+        let (found, time, residual) = estimated(white, drift);
+        // 1/sqrt(2 N) = 0.2 %; the drift has 27 correlation times: 20 %, four of them
+        assert!((found.white / white - 1.0).abs() < 0.01, "{found:?}");
+        assert!((found.drift * found.white / drift).ln().abs() < 0.8, "{found:?}");
+        let mut e = residual.clone();
+        found.whitening(&time, None).apply(&mut e);
+        for lag in [1, 50, 500] {
+            let sum: f64 = e.iter().zip(&e[lag..]).map(|(a, b)| a * b).sum();
+            assert!((sum / e.len() as f64).abs() < 4.0 / (e.len() as f64).sqrt(), "lag {lag}");
+        }
+    }
+
+    #[test]
+    fn a_residual_of_a_solvers_size_is_below_the_least_noise() {
+        let found = estimated(5e-11, 1e-11).0;
+        assert!((found.white / LEAST_NOISE - 1.0).abs() < 1e-3, "{found:?}");
     }
 }

@@ -74,14 +74,25 @@ impl Solution<'_> {
     pub fn is_noise(&self) -> bool {
         self.tests.iter().all(Tests::passed) && !self.fit.is_loud()
     }
+
+    /// Returns the −2 ln L above which another model need not be searched further: if the residual of this solution is noise, it is
+    /// the −2 ln L of a noise that is e^0.5 times as large; otherwise it is infinite.
+    pub fn ceiling(&self) -> f64 {
+        if !self.is_noise() {
+            return f64::INFINITY;
+        }
+        self.fit.deviance(&self.minimum.point) + self.fit.sampled() as f64
+    }
 }
 
-/// Searches the minimum of a problem from the values `first`, if there are any, and from the problem's starts.
+/// Searches the minimum of a problem from the values `first`, if there are any, and from the problem's starts. If the best of the
+/// first starts has a −2 ln L above `ceiling`, the search ends there without profile, because another model fits far better.
 ///
 /// # Errors If the search fails from every start.
 pub fn solve<'p>(
     problem: &'p Problem<'p>,
     first: Option<Vec<f64>>,
+    ceiling: f64,
     news: &mut dyn FnMut(&News),
 ) -> Result<Solution<'p>> {
     let mut fit = Fit::new(problem);
@@ -96,7 +107,7 @@ pub fn solve<'p>(
         if let Some(best) = best.as_mut().filter(|_| number == 0 && !grows || number == given) {
             // no other start has led to a lower minimum; what is drawn is the last resort
             best.judge(&mut fit, news)?;
-            if best.is_noise || number >= given && !best.is_loud {
+            if best.is_noise || number >= given && !best.is_loud || best.deviance > ceiling {
                 break;
             }
         }
@@ -121,9 +132,9 @@ pub fn solve<'p>(
         if best.as_ref().is_none_or(|best| deviance < best.first) {
             best = Some(Found::new(&fit, found, deviance));
         }
-        if let Some(best) = best.as_mut().filter(|_| agrees) {
+        if let Some(best) = best.as_mut().filter(|best| agrees || best.first > ceiling) {
             best.judge(&mut fit, news)?;
-            if best.is_noise {
+            if best.is_noise || best.deviance > ceiling {
                 break;
             }
         }
@@ -132,7 +143,7 @@ pub fn solve<'p>(
         return Err(error.context("no search was made")?);
     };
     best.judge(&mut fit, news)?;
-    conclude(fit, best, tried, news)
+    conclude(fit, best, tried, ceiling, news)
 }
 
 /// Searches a problem from values that are near its minimum, such as the minimum of the same problem with fewer rows.
@@ -150,33 +161,24 @@ pub fn solve_near<'p>(
     fit.renew_noise(&minimum.point);
     let mut found = Found::new(&fit, minimum, 0.0);
     found.judge(&mut fit, news)?;
-    conclude(fit, found, 1, news)
+    conclude(fit, found, 1, f64::INFINITY, news)
 }
 
 fn conclude<'p>(
     mut fit: Fit<'p>,
     found: Found,
     starts: usize,
+    ceiling: f64,
     news: &mut dyn FnMut(&News),
 ) -> Result<Solution<'p>> {
-    let Found { minimum, rivals, .. } = found;
-    let mut minimum = fit.not_above_starts(minimum)?;
-    fit.free_shown(&mut minimum)?;
-    let beyond = fit.across_ridges(&mut minimum)?;
-    let (found, mut profile) = fit.settle(minimum, &beyond, news)?;
-    minimum = found;
-    if let Some(other) = fit.with_tolerances(&minimum)? {
-        news(&News::Detail("known values within their tolerances leave noise alone".into()));
-        (minimum, profile) = fit.settle(other, &[], news)?;
-    }
+    let is_beaten = found.deviance > ceiling;
+    let Found { mut minimum, rivals, .. } = found;
+    let profile = if is_beaten { None } else { fit.refine(&mut minimum, news)? };
     fit.derivatives_at(&mut minimum)?;
-    if profile.is_none() && fit.find_bent(&mut minimum)? {
-        (minimum, profile) = fit.settle(minimum, &[], news)?;
-        fit.derivatives_at(&mut minimum)?;
-    }
     let tests = fit.tests(&minimum.point);
     let at_bound = fit.stuck(&minimum.point.z);
-    let sides = if fit.problem.rough { Vec::new() } else { fit.sides(&minimum) };
+    let is_kinked = !is_beaten && !fit.problem.rough;
+    let sides = if is_kinked { fit.sides(&minimum) } else { Vec::new() };
     Ok(Solution { fit, minimum, profile, rivals, tests, at_bound, sides, starts })
 }
 
@@ -188,6 +190,8 @@ struct Found {
     rivals: Vec<Rival>,
     /// −2 ln L with the course between rows that is assumed at first.
     first: f64,
+    /// −2 ln L with the best course between rows.
+    deviance: f64,
     /// True if the courses between rows were compared.
     is_judged: bool,
     is_noise: bool,
@@ -202,6 +206,7 @@ impl Found {
             hold: fit.hold,
             rivals: Vec::new(),
             first,
+            deviance: first,
             is_judged: false,
             is_noise: false,
             is_loud: fit.is_loud(),
@@ -223,6 +228,7 @@ impl Found {
         let end = End { gain: ALIKE, ..End::new(4, ENDS.0) };
         self.minimum = fit.minimise(&z, &free, None, end)?;
         (self.noise, self.hold, self.is_judged) = (fit.noise.clone(), fit.hold, true);
+        self.deviance = fit.deviance(&self.minimum.point);
         (self.is_noise, self.is_loud) = (fit.is_noise(&self.minimum.point), fit.is_loud());
         news(&News::Detail(format!(
             "{}: worst test {:.1}, {:.0} simulations",
@@ -256,7 +262,12 @@ fn drawn(problem: &Problem, random: &mut Random) -> Vec<f64> {
 impl Fit<'_> {
     /// Returns true if the noise of a signal is clearly larger than neighbouring rows show.
     pub fn is_loud(&self) -> bool {
-        self.noise.iter().zip(&self.problem.signals).any(|(n, s)| n.white > ABOVE * s.white)
+        self.noise.iter().zip(&self.problem.signals).any(|(n, s)| n.white > ABOVE * s.own_noise())
+    }
+
+    /// Returns the number of rows with a new value, over all signals.
+    fn sampled(&self) -> usize {
+        self.problem.signals.iter().map(|s| s.sampled.iter().filter(|s| **s).count()).sum()
     }
 
     /// Returns the free unknowns at a bound.
@@ -287,12 +298,38 @@ impl Fit<'_> {
     /// Limits the noise to about the noise that neighbouring rows show, so that it does not contain the misfit of a model.
     pub fn limit_noise(&mut self) {
         let own = |(noise, signal): (&Noise, &Signal)| Noise {
-            white: noise.white.min(OWN.0 * signal.white),
+            white: noise.white.min(OWN.0 * signal.own_noise()),
             drift: noise.drift.min(OWN.1),
             time: noise.time.max(OWN.2),
         };
         let noise = self.noise.iter().zip(&self.problem.signals).map(own).collect();
         self.set(noise, self.part);
+    }
+
+    /// Completes a minimum: with the known values that the recordings show, across ridges, along the profile, and with tolerances if
+    /// only they make the residual noise. Returns the profile.
+    ///
+    /// # Errors
+    /// If the system refuses the minimum.
+    fn refine(
+        &mut self,
+        minimum: &mut Minimum,
+        news: &mut dyn FnMut(&News),
+    ) -> Result<Option<Profile>> {
+        let mut at = self.not_above_starts(minimum.clone())?;
+        self.free_shown(&mut at)?;
+        let beyond = self.across_ridges(&mut at)?;
+        let (mut found, mut profile) = self.settle(at, &beyond, news)?;
+        if let Some(other) = self.with_tolerances(&found)? {
+            news(&News::Detail("known values within their tolerances leave noise alone".into()));
+            (found, profile) = self.settle(other, &[], news)?;
+        }
+        self.derivatives_at(&mut found)?;
+        if profile.is_none() && self.find_bent(&mut found)? {
+            (found, profile) = self.settle(found, &[], news)?;
+        }
+        *minimum = found;
+        Ok(profile)
     }
 
     /// Alternates between noise and minimum until the noise belongs to the residual. Unknowns at a bound are tried once more from
@@ -308,8 +345,7 @@ impl Fit<'_> {
     ) -> Result<(Minimum, Option<Profile>)> {
         let free = self.free.clone();
         let (mut once, mut profile) = (false, None);
-        let rows: usize =
-            self.problem.signals.iter().map(|s| s.sampled.iter().filter(|s| **s).count()).sum();
+        let rows = self.sampled();
         for _ in 0..ROUNDS {
             for _ in 0..TURNS {
                 self.renew_noise(&minimum.point);

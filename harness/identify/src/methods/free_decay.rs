@@ -133,7 +133,7 @@ fn problem<'a>(
         output: 0,
         measured: r.rate.clone(),
         sampled: vec![true; r.rate.len()],
-        white: noise_level(&r.rate).max(1e-9 * size),
+        white: noise_level(&r.rate),
         drift: Some(DRIFT),
     };
     let recorded = |r: &Recording| Recorded {
@@ -188,10 +188,10 @@ impl Method for FreeDecay {
         let mut constant = free.clone();
         constant.unknowns[GROWTH].part = Part::Candidate;
         constant.starts.remove(0);
-        let constant = solve(&constant, None, news)?;
+        let constant = solve(&constant, None, f64::INFINITY, news)?;
         let from = constant.fit.values(&constant.minimum.point.z);
         let (residual_constant, zeta_constant) = (residuals(&constant).0, from[1]);
-        let mut found = solve(&free, Some(from), news)?;
+        let mut found = solve(&free, Some(from), f64::INFINITY, news)?;
         let z = found.fit.values(&found.minimum.point.z);
         let jacobian = found.fit.derivatives_at(&mut found.minimum)?.matrix;
         let covariance = Curvature::new(&jacobian, places(&found.fit.free)).covariance(z.len());

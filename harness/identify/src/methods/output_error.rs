@@ -191,7 +191,8 @@ fn identify_whole(
         let number = pairs.iter().position(|other| *other == pair)?;
         let (system, problem) = (&systems[number].0, &problems[number]);
         let extra = from.map(|other| transferred(other, system, problem));
-        let found = solve(problem, extra, &mut |news| {
+        let ceiling = from.map_or(f64::INFINITY, |other| other.solution.ceiling());
+        let found = solve(problem, extra, ceiling, &mut |news| {
             tell(News::Detail(format!("{}: {}", pair.0, news.line())));
         });
         match found {

@@ -251,6 +251,22 @@ fn a_tolerance_that_nonlinear_slosh_shows_is_no_misfit() {
     assert!(is_told, "{:?}", found.verdict);
 }
 
+/// A simulated recording without noise: its residual is the error of a solver, which no test of noise passes, and models that
+/// are wrong leave thousands of times as much.
+#[test]
+fn a_recording_without_noise_fits_and_other_models_are_given_up_early() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let torque: Profile = "lin-sweep:amplitude=0.1,duration=100,f0=1.8,f1=3".parse().unwrap();
+    let recording = Twin::default().record(&fmu, &Torque::Profile(torque), None).unwrap();
+    let models = ["linear", "planar"].map(String::from).to_vec();
+    let options = Options { models, ..options() };
+    let found = identify(&fmu, &[recording], &options, &mut |_| {}).unwrap();
+    assert!(found.fits == Some(true) && found.converged, "{:?}", found.verdict);
+    let [fit, rival] = &found.details.models[..] else { panic!("{:?}", found.details.models) };
+    assert!(fit.model == "linear" && rival.bic > fit.bic + 1e4, "{:?}", found.details.models);
+    assert!(rival.simulations < fit.simulations, "{:?}", found.details.models);
+}
+
 /// The motion is so slow that the friction curve is nearly straight. The minimum is at 0.02 rad/s; a quadratic there would
 /// exclude the truth by fourteen standard deviations.
 #[test]
