@@ -164,7 +164,7 @@ impl Bob {
     /// and back would shear direction and rate by the same 1e-16 in every step.
     #[inline(always)]
     pub fn state_at(&self, x: &[f64; 6], n: usize, t: f64, w: Vec3) -> [f64; 6] {
-        let (p, v) = (space::value(&self.p, n, t), space::value(&self.v, n, t));
+        let [p, v] = self.both.value(n, t);
         let p_d = sub(v, cross(w, p));
         let dp = transposed_times(&self.axes, sub(p, self.p[0]));
         let dp_d = transposed_times(&self.axes, sub(p_d, self.p_d[0]));

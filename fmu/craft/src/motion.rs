@@ -42,7 +42,7 @@ use core::ops::ControlFlow;
 use taylor::at_each_order;
 use taylor::error::StepError;
 use taylor::integrator::{
-    self, Convergence, Expansion, MAX_MAGNITUDE, Motion, RATE_FLOOR, Steps, add_time,
+    self, Convergence, Expansion, KeptMotion, MAX_MAGNITUDE, Motion, RATE_FLOOR, Steps, add_time,
 };
 use taylor::number::Number;
 use taylor::series::{self, ORDER, Series, ZERO};
@@ -95,6 +95,17 @@ fn hold_upper_rows(matrix: &mut Mat6) {
             (matrix[i][j], matrix[j][i]) = (one, one);
         }
     }
+}
+
+/// Place at which the states at the start of the expansion are stored. A step copies them only if they are needed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Start {
+    /// The expansion is continued: `state.kept`.
+    Kept,
+    /// The expansion starts with the step: `before`.
+    Step,
+    /// The expansion starts within the step: `begin`.
+    Within,
 }
 
 /// The craft at its current state and the series of its motion. `craft` is the dry craft, `parked` the bobs
@@ -155,8 +166,12 @@ pub struct CraftMotion {
     flexing_allowed: f64,
     spins_allowed: f64,
     longest: f64,
-    /// Series of the kept expansion, which starts at `state.kept`.
     expansion: Expansion,
+    start: Start,
+    /// States at the start of the step.
+    pub before: [f64; STATES],
+    /// States at the start of the expansion, if they are not stored elsewhere.
+    begin: [f64; STATES],
     /// Derivatives of w and V at the end of a series, body axes.
     slopes: [Vec3; 2],
 }
@@ -239,6 +254,9 @@ impl CraftMotion {
             flexing_allowed: 0.0,
             spins_allowed: 0.0,
             expansion: Expansion::default(),
+            start: Start::Step,
+            before: [0.0; STATES],
+            begin: [0.0; STATES],
             slopes: [[0.0; 3]; 2],
         };
         motion.has_events = !motion.lumps.is_empty() || !motion.constrained.is_empty();
@@ -436,30 +454,40 @@ impl CraftMotion {
         self.expansion.clear();
     }
 
-    /// Advances the states by `h` > 0. After an error they are unusable.
+    /// Advances the states by `h` > 0 from `before`, or if they have jumped since from the present states. After an error they
+    /// are unusable, and the kept expansion is as it was.
     // Separate from the preparation of a step: compiled together, both take more instructions.
     #[inline(never)]
-    pub fn advance(&mut self, h: f64, limits: Limits) -> Result<(), StepError> {
+    pub fn advance(&mut self, h: f64, has_jumped: bool, limits: Limits) -> Result<(), StepError> {
         let (begin, mut steps) = (self.state.time, limits.steps());
-        let State { x, kept, .. } = &mut self.state;
-        if kept.is_continued(&self.inputs) {
+        let (are_held, State { x, kept, .. }) = (self.inputs.are_held(), &mut self.state);
+        let (mut clock, mut start) = ([0.0; 2], [0.0; 2]);
+        if are_held && !has_jumped && kept.is_continued(&self.inputs) {
             *x = kept.x;
+            (clock, start) = (kept.clock, kept.start);
+            self.start = Start::Kept;
         } else {
-            kept.renew(x, &self.inputs);
             self.expansion.clear();
+            self.start = Start::Step;
+            if has_jumped {
+                self.keep();
+            }
         }
-        kept.clock = add_time(kept.clock, h);
-        let (clock, mut start) = (kept.clock[0], kept.start);
-        let mut expansion = core::mem::take(&mut self.expansion);
-        let (times, tolerance) = ((clock, &mut start), limits.tolerance);
-        let done =
-            integrator::advance_kept(self, &mut expansion, times, begin, tolerance, &mut steps);
-        self.state.kept.start = start;
-        if !self.inputs.are_held() {
-            self.state.kept.end();
+        clock = add_time(clock, h);
+        let (times, tolerance) = ((clock[0], &mut start), limits.tolerance);
+        integrator::advance_kept(self, times, begin, tolerance, &mut steps)?;
+        let kept = &mut self.state.kept;
+        if !are_held {
+            kept.end();
+            return Ok(());
         }
-        self.expansion = expansion;
-        done
+        match self.start {
+            Start::Kept => {}
+            Start::Step => kept.renew(&self.before, &self.inputs),
+            Start::Within => kept.renew(&self.begin, &self.inputs),
+        }
+        (kept.clock, kept.start) = (clock, start);
+        Ok(())
     }
 
     #[inline(always)]
@@ -737,40 +765,6 @@ impl Motion for CraftMotion {
         if self.has_events { self.next_event(n, h) } else { None }
     }
 
-    #[inline(never)]
-    fn store_slopes(&mut self, n: usize, h: f64) {
-        self.slopes = [&self.w_d, &self.a].map(|series| space::value(series, n - 1, h));
-        for bob in &mut self.bobs {
-            bob.store_slope(n, h);
-        }
-        for bob in &mut self.constrained {
-            bob.store_slope(n, h);
-        }
-    }
-
-    #[inline(never)]
-    fn slope_defect(&self, h: f64) -> f64 {
-        let [_, rate, swing, speed] = self.inv_allowed;
-        let [w_d, a] = self.slopes;
-        let body = f64::max(
-            largest(sub(w_d, self.w_d[0])) * rate,
-            if self.mount == Mount::Free { largest(sub(a, self.a[0])) * speed } else { 0.0 },
-        );
-        let constrained = self.constrained.iter().map(ConstrainedBob::slope_defect);
-        let bobs = self.bobs.iter().map(Bob::slope_defect).chain(constrained);
-        h * bobs.map(|defect| defect * swing).fold(body, f64::max)
-    }
-
-    #[inline(always)]
-    fn return_to_start(&mut self) {
-        self.state.x = self.state.kept.x;
-    }
-
-    #[inline(always)]
-    fn keep(&mut self) {
-        self.state.kept.x = self.state.x;
-    }
-
     #[inline(always)]
     fn take(
         &mut self,
@@ -817,6 +811,52 @@ impl Motion for CraftMotion {
             self.change(lump, due, t);
         }
         Ok(ControlFlow::Continue(()))
+    }
+}
+
+impl KeptMotion for CraftMotion {
+    #[inline(always)]
+    fn expansion(&mut self) -> &mut Expansion {
+        &mut self.expansion
+    }
+
+    #[inline(never)]
+    fn store_slopes(&mut self, n: usize, h: f64) {
+        self.slopes = [&self.w_d, &self.a].map(|series| space::value(series, n - 1, h));
+        for bob in &mut self.bobs {
+            bob.store_slope(n, h);
+        }
+        for bob in &mut self.constrained {
+            bob.store_slope(n, h);
+        }
+    }
+
+    #[inline(never)]
+    fn slope_defect(&self, h: f64) -> f64 {
+        let [_, rate, swing, speed] = self.inv_allowed;
+        let [w_d, a] = self.slopes;
+        let body = f64::max(
+            largest(sub(w_d, self.w_d[0])) * rate,
+            if self.mount == Mount::Free { largest(sub(a, self.a[0])) * speed } else { 0.0 },
+        );
+        let constrained = self.constrained.iter().map(ConstrainedBob::slope_defect);
+        let bobs = self.bobs.iter().map(Bob::slope_defect).chain(constrained);
+        h * bobs.map(|defect| defect * swing).fold(body, f64::max)
+    }
+
+    #[inline(always)]
+    fn return_to_start(&mut self) {
+        self.state.x = match self.start {
+            Start::Kept => self.state.kept.x,
+            Start::Step => self.before,
+            Start::Within => self.begin,
+        };
+    }
+
+    #[inline(always)]
+    fn keep(&mut self) {
+        self.begin = self.state.x;
+        self.start = Start::Within;
     }
 }
 

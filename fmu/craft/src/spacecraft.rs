@@ -5,6 +5,7 @@ use alloc::boxed::Box;
 use alloc::string::String;
 use alloc::vec::Vec;
 use taylor::error::StepError;
+use taylor::integrator::KeptMotion;
 use taylor::number::{Dual, Number};
 use taylor::vector::{dot, unit_quaternion};
 
@@ -122,26 +123,26 @@ impl Spacecraft {
         if !(h > 0.0 && h.is_finite()) {
             return Err(StepError::Length { h });
         }
-        let before = self.motion.state;
+        let State { time, h_wheels, flow, ball, .. } = self.motion.state;
+        self.motion.before = self.motion.state.x;
         self.motion.inputs = *inputs;
-        if self.take_jumps(inputs) {
-            self.motion.state.kept.end();
-        }
+        let has_jumped = self.take_jumps(inputs);
         let done = match &self.draining {
             Some(craft) if craft.drains() => {
                 let x = &mut self.motion.state.x;
-                Run { craft, inputs }.advance(x, before.time, h, self.limits)
+                Run { craft, inputs }.advance(x, time, h, self.limits)
             }
-            _ => self.motion.advance(h, self.limits),
+            _ => self.motion.advance(h, has_jumped, self.limits),
         };
-        let state = &mut self.motion.state;
-        match done {
-            Ok(()) => {
-                state.time = before.time + h;
-                state.h_wheels = inputs.h_wheels.value_at(h);
-                state.flow = inputs.mass_flow.map(|flow| flow.value_at(h));
-            }
-            Err(_) => self.motion.set_state(&before),
+        let CraftMotion { state, before, .. } = &mut *self.motion;
+        if done.is_ok() {
+            state.time = time + h;
+            state.h_wheels = inputs.h_wheels.value_at(h);
+            state.flow = inputs.mass_flow.map(|flow| flow.value_at(h));
+        } else {
+            state.x = *before;
+            (state.h_wheels, state.flow, state.ball) = (h_wheels, flow, ball);
+            self.motion.expansion().clear();
         }
         done
     }

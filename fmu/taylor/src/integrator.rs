@@ -161,6 +161,26 @@ pub trait Motion {
         None
     }
 
+    /// Advances the states to `h` after the start of the expansion, which is `t` after the start of the call, by the series up to
+    /// order n. If the last call of [`Motion::event`] has found an event, the event is at `h`. Returns `Continue` if the call
+    /// goes on, otherwise `Break` with the elapsed length.
+    ///
+    /// # Errors
+    /// If the states at `h` are not finite, or the model is not valid for them.
+    fn take(
+        &mut self,
+        n: usize,
+        h: f64,
+        t: f64,
+        steps: &mut Steps,
+    ) -> Result<ControlFlow<f64>, StepError>;
+}
+
+/// A motion whose expansion further calls of [`advance_kept`] continue.
+pub trait KeptMotion: Motion {
+    /// Returns the progress of the expansion whose coefficients the motion has.
+    fn expansion(&mut self) -> &mut Expansion;
+
     /// Stores the derivatives of the states that the series up to order n have at `h` after the start of the
     /// expansion.
     #[inline(always)]
@@ -180,20 +200,6 @@ pub trait Motion {
     /// Stores the states as the start of the next kept [`Expansion`].
     #[inline(always)]
     fn keep(&mut self) {}
-
-    /// Advances the states to `h` after the start of the expansion, which is `t` after the start of the call, by the series up to
-    /// order n. If the last call of [`Motion::event`] has found an event, the event is at `h`. Returns `Continue` if the call
-    /// goes on, otherwise `Break` with the elapsed length.
-    ///
-    /// # Errors
-    /// If the states at `h` are not finite, or the model is not valid for them.
-    fn take(
-        &mut self,
-        n: usize,
-        h: f64,
-        t: f64,
-        steps: &mut Steps,
-    ) -> Result<ControlFlow<f64>, StepError>;
 }
 
 /// Progress of an expansion of the length `h`, s, after order n: h^(n + 1) is `power`, `terms` are the last
@@ -365,100 +371,135 @@ impl Expansion {
     pub fn overwrite(&mut self, order: usize) {
         self.overwritten = self.overwritten.max(order);
     }
+}
 
-    /// Computes again the coefficients that were overwritten. The expansion starts `t` after the start of the call.
-    #[inline(always)]
-    fn repair<M: Motion>(&mut self, motion: &mut M, t: f64) {
-        if self.overwritten > 0 && self.orders > 0 {
-            motion.start(t);
-            for n in 0..self.overwritten.min(self.orders) {
-                motion.rates(n);
-            }
+/// Computes again the coefficients of the expansion that were overwritten. The expansion starts `t` after the start of the call.
+#[inline(always)]
+fn repair<M: KeptMotion>(motion: &mut M, t: f64) {
+    let Expansion { overwritten, orders, .. } = *motion.expansion();
+    if overwritten > 0 && orders > 0 {
+        motion.start(t);
+        for n in 0..overwritten.min(orders) {
+            motion.rates(n);
         }
-        self.overwritten = 0;
     }
+    motion.expansion().overwritten = 0;
+}
 
-    /// Computes coefficient `n` of the states, if it is not known, and returns its norm.
-    #[inline(always)]
-    fn norm<M: Motion>(&mut self, motion: &mut M, n: usize, tolerance: f64) -> f64 {
-        while self.orders < n {
-            let order = self.orders;
-            motion.rates(order);
-            self.orders = order + 1;
-            match order {
-                0 | 1 => {}
-                2 => {
-                    self.radius =
-                        motion.set_error_scale(LONGEST, STEP_SHARE * tolerance).min(LONGEST);
-                    for n in 1..=3 {
-                        self.norms[n] = motion.coefficient_norm(n);
-                    }
-                }
-                _ => self.norms[order + 1] = motion.coefficient_norm(order + 1),
-            }
-        }
-        self.norms[n]
+/// Computes coefficient n + 1 of the states, and its norm, if it is not known.
+#[inline(always)]
+fn extend<M: KeptMotion>(motion: &mut M, n: usize, tolerance: f64) {
+    if motion.expansion().orders > n {
+        return;
     }
-
-    /// Returns the order up to which the series is exact at `t` after the start of the expansion. The longer
-    /// `t`, the higher the order.
-    #[inline(always)]
-    fn order_at<M: Motion>(&mut self, motion: &mut M, t: f64, tolerance: f64) -> Option<usize> {
-        self.norm(motion, 3, tolerance);
-        if t > self.radius {
-            return None;
-        }
-        let highest = highest_order(motion, tolerance);
-        // 1 over the share of the allowed error
-        let share = if t < FULL_LENGTH { FULL_LENGTH / t } else { 1.0 };
-        let convergence = motion.convergence();
-        let mut power = t * t * share;
-        let mut terms =
-            [self.norms[2] * power, self.norms[1] * t * share, f64::INFINITY, f64::INFINITY];
-        let mut negligible = 0;
-        for n in 3..=highest {
-            power *= t;
-            let term = self.norm(motion, n, tolerance) * power;
-            terms = [term, terms[0], terms[1], terms[2]];
-            let ends = match convergence {
-                Convergence::Decay => are_negligible(terms),
-                Convergence::Terms(count) => {
-                    negligible = if term <= 1.0 { negligible + 1 } else { 0 };
-                    negligible >= count
-                }
-            };
-            if n >= MIN_ORDER && ends {
-                return Some(n);
-            }
-        }
-        None
+    motion.rates(n);
+    if n == 2 {
+        let radius = motion.set_error_scale(LONGEST, STEP_SHARE * tolerance).min(LONGEST);
+        motion.expansion().radius = radius;
+        motion.expansion().norms[2] = motion.coefficient_norm(2);
     }
+    if n >= 2 {
+        motion.expansion().norms[n + 1] = motion.coefficient_norm(n + 1);
+    }
+    motion.expansion().orders = n + 1;
+}
 
-    /// Returns order and length of the whole expansion.
-    #[cold]
-    fn end<M: Motion>(
-        &mut self,
-        motion: &mut M,
-        tolerance: f64,
-        (begin, steps): (f64, &mut Steps),
-    ) -> Result<(usize, f64), StepError> {
-        if let Some(end) = self.end {
-            return Ok(end);
+/// Search for the order up to which a series is exact at `t` after the start of the expansion: `power` is t^n over the share of
+/// the allowed error, `terms` are the last terms relative to their allowed errors, the newest first, and `negligible` is the number
+/// of successive negligible terms at the end.
+struct Search {
+    t: f64,
+    tolerance: f64,
+    highest: usize,
+    convergence: Convergence,
+    power: f64,
+    terms: [f64; 4],
+    negligible: usize,
+}
+
+impl Search {
+    /// Adds the term of order n + 1. Returns `Break` with the order if the search ends.
+    #[inline(always)]
+    fn add_term<M: KeptMotion>(&mut self, motion: &mut M, n: usize) -> ControlFlow<Option<usize>> {
+        extend(motion, n, self.tolerance);
+        if n < 2 {
+            return ControlFlow::Continue(());
         }
-        let (n, mut length) = match self.order_at(motion, self.radius, tolerance) {
-            Some(n) => (n, self.radius),
-            None => {
-                let highest = highest_order(motion, tolerance);
-                (highest, length(&self.norms, highest, self.radius))
+        let Expansion { radius, norms, .. } = motion.expansion();
+        if n == 2 {
+            if self.t > *radius {
+                return ControlFlow::Break(None);
+            }
+            self.terms[0] = norms[2] * self.power;
+        }
+        self.power *= self.t;
+        let [now, one, two, _] = self.terms;
+        self.terms = [norms[n + 1] * self.power, now, one, two];
+        let is_exact = match self.convergence {
+            Convergence::Decay => n + 1 >= MIN_ORDER && are_negligible(self.terms),
+            Convergence::Terms(count) => {
+                self.negligible = if self.terms[0] <= 1.0 { self.negligible + 1 } else { 0 };
+                n + 1 >= MIN_ORDER && self.negligible >= count
             }
         };
-        while motion.defect(n, length) > DEFECT {
-            length /= 2.0;
-            steps.add_steps(1, begin)?;
+        match is_exact {
+            true => ControlFlow::Break(Some(n + 1)),
+            false if n + 1 >= self.highest => ControlFlow::Break(None),
+            false => ControlFlow::Continue(()),
         }
-        self.end = Some((n, length));
-        Ok((n, length))
     }
+}
+
+/// Returns the order up to which the series is exact at `t` after the start of the expansion. The longer `t`, the higher the
+/// order. The result is `None` if no order is high enough.
+#[inline(never)]
+fn order_at<M: KeptMotion>(motion: &mut M, t: f64, tolerance: f64) -> Option<usize> {
+    // 1 over the share of the allowed error
+    let share = if t < FULL_LENGTH { FULL_LENGTH / t } else { 1.0 };
+    let mut search = Search {
+        t,
+        tolerance,
+        highest: highest_order(motion, tolerance),
+        convergence: motion.convergence(),
+        power: t * t * share,
+        terms: [f64::INFINITY; 4],
+        negligible: 0,
+    };
+    if M::UNROLLED {
+        for_each_order!(N => {
+            if let ControlFlow::Break(end) = search.add_term(motion, N) {
+                return end;
+            }
+        });
+        return None;
+    }
+    (0..search.highest).find_map(|n| search.add_term(motion, n).break_value()).flatten()
+}
+
+/// Returns order and length of the whole expansion.
+#[cold]
+fn whole_expansion<M: KeptMotion>(
+    motion: &mut M,
+    tolerance: f64,
+    (begin, steps): (f64, &mut Steps),
+) -> Result<(usize, f64), StepError> {
+    let Expansion { end, radius, .. } = *motion.expansion();
+    if let Some(end) = end {
+        return Ok(end);
+    }
+    let (n, mut length) = match order_at(motion, radius, tolerance) {
+        Some(n) => (n, radius),
+        None => {
+            let highest = highest_order(motion, tolerance);
+            (highest, length(&motion.expansion().norms, highest, radius))
+        }
+    };
+    while motion.defect(n, length) > DEFECT {
+        length /= 2.0;
+        steps.add_steps(1, begin)?;
+    }
+    motion.expansion().end = Some((n, length));
+    Ok((n, length))
 }
 
 /// Returns the length at which the last two terms up to order n meet the tolerance, at most `longest`.
@@ -499,41 +540,37 @@ fn largest_slope_defect(tolerance: f64) -> f64 {
 ///
 /// # Errors See [`StepError`].
 #[inline(always)]
-pub fn advance_kept<M: Motion>(
+pub fn advance_kept<M: KeptMotion>(
     motion: &mut M,
-    expansion: &mut Expansion,
     (clock, start): (f64, &mut [f64; 2]),
     begin: f64,
     tolerance: f64,
     steps: &mut Steps,
 ) -> Result<(), StepError> {
     let mut moved = 0.0;
-    expansion.repair(motion, moved);
+    repair(motion, moved);
     loop {
         steps.add_steps(1, begin + moved)?;
         let t = (clock - start[0]) - start[1];
         if t <= 0.0 {
             return Ok(()); // an event at the end
         }
-        if expansion.orders == 0 {
+        if motion.expansion().orders == 0 {
             motion.start(moved);
         }
-        let mut whole = |motion: &mut M, expansion: &mut Expansion| {
-            expansion.end(motion, tolerance, (begin + moved, &mut *steps))
-        };
-        let fits = |end: Option<(usize, f64)>| end.is_none_or(|(_, end)| t <= end);
-        let order = expansion.order_at(motion, t, tolerance).filter(|_| fits(expansion.end));
-        let (mut n, mut length) = match order.filter(|n| motion.defect(*n, t) <= DEFECT) {
+        let order = order_at(motion, t, tolerance);
+        let fits = motion.expansion().end.is_none_or(|(_, end)| t <= end);
+        let (mut n, mut length) = match order.filter(|n| fits && motion.defect(*n, t) <= DEFECT) {
             Some(n) => (n, t),
             None => {
-                let (n, end) = whole(motion, expansion)?;
+                let (n, end) = whole_expansion(motion, tolerance, (begin + moved, steps))?;
                 (n, end.min(t))
             }
         };
         let mut event = motion.event(n, length);
         if event.is_some() {
             // The series of the whole expansion has the same root for every end of the call.
-            (n, length) = whole(motion, expansion)?;
+            (n, length) = whole_expansion(motion, tolerance, (begin + moved, steps))?;
             event = motion.event(n, length).map(|event| event.min(t));
             length = length.min(t);
         }
@@ -548,7 +585,7 @@ pub fn advance_kept<M: Motion>(
             return Err(StepError::NotFinite { time: begin + moved });
         }
         let is_end = length == t && event.is_none();
-        let is_verified = is_end && length <= expansion.verified;
+        let is_verified = is_end && length <= motion.expansion().verified;
         if event.is_none() && !is_verified {
             motion.store_slopes(n, length);
         }
@@ -560,25 +597,24 @@ pub fn advance_kept<M: Motion>(
         if event.is_none() {
             motion.start(moved + length);
             motion.rates(0);
+            motion.expansion().overwrite(1);
             if motion.slope_defect(length / n as f64) > largest_slope_defect(tolerance) {
                 motion.return_to_start();
-                expansion.overwritten = 1;
-                expansion.repair(motion, moved);
-                let end = expansion.end.map_or(length, |(_, end)| end.min(length));
-                expansion.end = Some((n, end / 2.0));
+                repair(motion, moved);
+                let end = motion.expansion().end.map_or(length, |(_, end)| end.min(length));
+                motion.expansion().end = Some((n, end / 2.0));
                 continue;
             }
         }
         if is_end {
-            expansion.verified = 2.0 * length;
-            expansion.overwritten = 1;
+            motion.expansion().verified = 2.0 * length;
             return Ok(());
         }
         moved += length;
         *start = add_time(*start, length);
         motion.keep();
-        expansion.clear();
-        expansion.orders = usize::from(event.is_none());
+        motion.expansion().clear();
+        motion.expansion().orders = usize::from(event.is_none());
     }
 }
 
@@ -919,10 +955,6 @@ mod tests {
             self.motion.event(n, h)
         }
 
-        fn keep(&mut self) {
-            self.begin = self.motion.now;
-        }
-
         fn take(
             &mut self,
             n: usize,
@@ -931,6 +963,16 @@ mod tests {
             steps: &mut Steps,
         ) -> Result<ControlFlow<f64>, StepError> {
             self.motion.take(n, h, t, steps)
+        }
+    }
+
+    impl KeptMotion for Kept {
+        fn expansion(&mut self) -> &mut Expansion {
+            &mut self.expansion
+        }
+
+        fn keep(&mut self) {
+            self.begin = self.motion.now;
         }
     }
 
@@ -943,12 +985,11 @@ mod tests {
         fn advance(&mut self, h: f64, tolerance: f64) {
             self.motion.now = self.begin;
             self.clock = add_time(self.clock, h);
-            let mut expansion = core::mem::take(&mut self.expansion);
             let mut start = self.start;
             let times = (self.clock[0], &mut start);
             let mut steps = Steps::new(100_000, "");
-            advance_kept(self, &mut expansion, times, 7.0, tolerance, &mut steps).unwrap();
-            (self.expansion, self.start) = (expansion, start);
+            advance_kept(self, times, 7.0, tolerance, &mut steps).unwrap();
+            self.start = start;
         }
     }
 
@@ -1017,6 +1058,7 @@ mod tests {
         y: Series,
         allowed: f64,
         slope: f64,
+        expansion: Expansion,
         compares: bool,
     }
 
@@ -1045,6 +1087,23 @@ mod tests {
             self.y[n].abs() / self.allowed
         }
 
+        fn take(
+            &mut self,
+            n: usize,
+            h: f64,
+            _: f64,
+            _: &mut Steps,
+        ) -> Result<ControlFlow<f64>, StepError> {
+            self.now = [self.now[0] + h, series::values([&self.y], n, h)[0]];
+            Ok(ControlFlow::Continue(()))
+        }
+    }
+
+    impl KeptMotion for Corner {
+        fn expansion(&mut self) -> &mut Expansion {
+            &mut self.expansion
+        }
+
         fn store_slopes(&mut self, n: usize, h: f64) {
             [self.slope] = series::values([&self.root], n - 1, h);
         }
@@ -1061,17 +1120,6 @@ mod tests {
         fn keep(&mut self) {
             self.begin = self.now;
         }
-
-        fn take(
-            &mut self,
-            n: usize,
-            h: f64,
-            _: f64,
-            _: &mut Steps,
-        ) -> Result<ControlFlow<f64>, StepError> {
-            self.now = [self.now[0] + h, series::values([&self.y], n, h)[0]];
-            Ok(ControlFlow::Continue(()))
-        }
     }
 
     /// The integral is (s r + eps^2 asinh(s/eps))/2 with r = sqrt(s^2 + eps^2).
@@ -1080,12 +1128,11 @@ mod tests {
         let error = |tolerance: f64, compares: bool| {
             let now = [-1.0, 0.0];
             let [square, root, y] = [ZERO; 3];
+            let (begin, allowed, slope, expansion) = (now, 0.0, 0.0, Expansion::default());
             let mut motion =
-                Corner { now, begin: now, square, root, y, allowed: 0.0, slope: 0.0, compares };
-            let (mut expansion, mut start) = (Expansion::default(), [0.0; 2]);
-            let mut steps = Steps::new(1000, "");
-            let times = (3.0, &mut start);
-            advance_kept(&mut motion, &mut expansion, times, 0.0, tolerance, &mut steps).unwrap();
+                Corner { now, begin, square, root, y, allowed, slope, expansion, compares };
+            let (mut steps, times) = (Steps::new(1000, ""), (3.0, &mut [0.0; 2]));
+            advance_kept(&mut motion, times, 0.0, tolerance, &mut steps).unwrap();
             let integral = |s: f64| 0.5 * (s * s.hypot(EPS) + EPS * EPS * (s / EPS).asinh());
             (motion.now[1] - integral(2.0) + integral(-1.0)).abs() / tolerance
         };
