@@ -126,7 +126,7 @@ impl Spacecraft {
         let State { time, h_wheels, flow, ball, .. } = self.motion.state;
         self.motion.before = self.motion.state.x;
         self.motion.inputs = *inputs;
-        let has_jumped = self.take_jumps(inputs);
+        let has_jumped = self.may_jump(inputs) && self.take_jumps(inputs);
         let done = match &self.draining {
             Some(craft) if craft.drains() => {
                 let x = &mut self.motion.state.x;
@@ -151,8 +151,7 @@ impl Spacecraft {
     /// `mass_flow` since the last step.
     pub fn outputs(&mut self, inputs: &Inputs) -> Outputs {
         // The state is large, and most calls find no jump.
-        let may_jump =
-            self.draining.is_some() || inputs.h_wheels.value != self.motion.state.h_wheels;
+        let may_jump = self.may_jump(inputs);
         let before = may_jump.then_some(self.motion.state);
         if may_jump {
             self.take_jumps(inputs);
@@ -296,6 +295,11 @@ impl Spacecraft {
         let x = &self.motion.state.x;
         let along = core::array::from_fn(|i| Dual::with_slope(x[i], dx[i]));
         Some((self.draining.as_ref()?, along, Acting::with_directions(inputs, du)))
+    }
+
+    #[inline(always)]
+    fn may_jump(&self, inputs: &Inputs) -> bool {
+        self.draining.is_some() || inputs.h_wheels.value != self.motion.state.h_wheels
     }
 
     fn take_jumps(&mut self, inputs: &Inputs) -> bool {

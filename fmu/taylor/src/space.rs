@@ -239,14 +239,14 @@ impl Attitude {
 
     #[inline(always)]
     pub fn value(&self, n: usize, t: f64) -> [f64; 4] {
-        let mut sum = self.get(n);
-        for n in (0..n).rev() {
-            let q = self.get(n);
-            for i in 0..4 {
-                sum[i] = sum[i] * t + q[i];
+        let [_, mut cd, _, mut ab] = self.0[n];
+        for [_, c, _, a] in self.0[..n].iter().rev() {
+            for k in 0..2 {
+                cd[k] = cd[k] * t + c[k];
+                ab[k] = ab[k] * t + a[k];
             }
         }
-        sum
+        [ab[0], ab[1], cd[0], cd[1]]
     }
 }
 
