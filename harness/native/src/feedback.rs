@@ -81,6 +81,48 @@ enum Controller {
     Function(Py<PyAny>),
 }
 
+/// A reaction wheel whose torque the controller commands.
+struct Wheel {
+    /// Column of its torque among the commands.
+    place: usize,
+    /// Unit vector of its axis, body axes.
+    axis: [f64; 3],
+    /// Moment of inertia about its axis, kg·m².
+    inertia: f64,
+    /// Largest torque, N·m.
+    max_torque: f64,
+    /// Largest speed relative to the body, rad/s.
+    max_speed: f64,
+    /// Present speed relative to the body, rad/s.
+    speed: f64,
+}
+
+impl Wheel {
+    /// Returns the torque on the craft that acts for `dt` seconds if `asked` is commanded, and advances the speed.
+    ///
+    /// The torque is limited to `max_torque`. If the wheel would pass its largest speed, the torque is reduced so that
+    /// it ends at this speed.
+    fn act(&mut self, asked: f64, dt: f64) -> f64 {
+        let torque = asked.clamp(-self.max_torque, self.max_torque);
+        let free = self.speed - torque * dt / self.inertia;
+        let before = self.speed;
+        self.speed = free.clamp(-self.max_speed, self.max_speed);
+        if self.speed == free { torque } else { (before - self.speed) * self.inertia / dt }
+    }
+}
+
+/// The wheels of a run, and the input of the FMU by which they turn the craft.
+struct Wheels {
+    each: Vec<Wheel>,
+    /// Value references of `h_wheels`.
+    references: [u32; 3],
+    /// Angular momentum of all wheels relative to the body, N·m·s, at the present row, and its derivative up to the next row.
+    momentum: [f64; 3],
+    slope: [f64; 3],
+    /// Speeds at each row, rad/s.
+    speeds: Numbers,
+}
+
 /// The feedback loop of a run, created from the Python class `Feedback`.
 ///
 /// A controller cycle begins at every `parts`-th row, where the controller computes its commands from the measurements. The
@@ -89,7 +131,9 @@ pub struct Feedback {
     controller: Controller,
     /// Value references of the measured Reals, and their values.
     measured: (Vec<u32>, Vec<f64>),
-    command: Vec<u32>,
+    /// Value references of the commanded inputs, their columns among the commands, and their values.
+    command: (Vec<u32>, Vec<usize>, Vec<f64>),
+    wheels: Option<Wheels>,
     parts: usize,
     switch: usize,
     latency: usize,
@@ -97,8 +141,10 @@ pub struct Feedback {
     /// of cycle k are at position k modulo `latency` + 1.
     on_the_way: Vec<f64>,
     now: Vec<f64>,
-    /// Commands that act from each row on, one row of numbers per row of the run.
-    pub commands: Numbers,
+    /// Length of the row before, s.
+    last: f64,
+    /// Commands that act from each row on, within the wheels' limits, one row of numbers per row of the run.
+    commands: Numbers,
 }
 
 impl Feedback {
@@ -108,14 +154,21 @@ impl Feedback {
     ///
     /// If an attribute is missing, or has another type or size.
     pub fn read(feedback: &Bound<PyAny>, fmu: &Fmu, rows: usize) -> PyResult<Self> {
-        let references = |attribute: &str| -> PyResult<Vec<u32>> {
-            let names: Vec<String> = feedback.getattr(attribute)?.extract()?;
-            names.iter().map(|name| Ok(fmu.variable(name)?.reference)).collect()
-        };
+        let names =
+            |attribute: &str| -> PyResult<Vec<String>> { feedback.getattr(attribute)?.extract() };
+        let reference = |name: &String| -> PyResult<u32> { Ok(fmu.variable(name)?.reference) };
         let size = |attribute: &str| -> PyResult<usize> { feedback.getattr(attribute)?.extract() };
         let controller = feedback.getattr("controller")?;
-        let (measured, command) = (references("measured")?, references("command")?);
+        let measured = names("measured")?.iter().map(reference).collect::<PyResult<Vec<_>>>()?;
+        let command = names("command")?;
         let values = vec![0.0; measured.len()];
+        let wheels = wheels(feedback, fmu, rows, command.len())?;
+        let turned = |place: &usize| {
+            wheels.iter().flat_map(|of| &of.each).any(|wheel| wheel.place == *place)
+        };
+        let places: Vec<usize> = (0..command.len()).filter(|place| !turned(place)).collect();
+        let inputs =
+            places.iter().map(|i| reference(&command[*i])).collect::<PyResult<Vec<_>>>()?;
         let (cycles, parts, latency) = (size("cycles")?, size("parts")?, size("latency")?);
         expect("rows of the run", rows, cycles * parts + 1)?;
         let controller = match controller.is_callable() {
@@ -133,14 +186,22 @@ impl Feedback {
             latency,
             on_the_way: vec![0.0; (latency + 1) * command.len()],
             now: vec![0.0; command.len()],
+            last: 0.0,
             commands: Numbers::borrow(&feedback.getattr("commands")?, rows, command.len(), true)?,
-            command,
+            command: (inputs, places.clone(), vec![0.0; places.len()]),
+            wheels,
         })
     }
 
-    /// Runs the controller at row `row` if a cycle begins there, and writes the commands that act from this row on into the
-    /// inputs. It is called after the outputs of the row are read and before its inputs are set.
-    pub fn act(&mut self, fmu: &mut Instance, row: usize, time: f64) -> Result<(), Failure> {
+    /// Runs the controller at row `row` if a cycle begins there, and writes the commands that act from this row to the next,
+    /// `dt` seconds later, into the inputs. It is called after the outputs of the row are read and before its inputs are set.
+    pub fn act(
+        &mut self,
+        fmu: &mut Instance,
+        row: usize,
+        time: f64,
+        dt: f64,
+    ) -> Result<(), Failure> {
         let (width, cycle) = (self.now.len(), row / self.parts);
         let place = |cycle: usize| (cycle % (self.latency + 1)) * width;
         if row.is_multiple_of(self.parts) {
@@ -160,10 +221,50 @@ impl Feedback {
         }
         if row % self.parts == self.switch && cycle >= self.latency {
             self.now.copy_from_slice(&self.on_the_way[place(cycle - self.latency)..][..width]);
-            fmu.set_real(&self.command, &self.now)?;
+            let (references, places, values) = &mut self.command;
+            if !references.is_empty() {
+                for (value, place) in values.iter_mut().zip(places) {
+                    *value = self.now[*place];
+                }
+                fmu.set_real(references, values)?;
+            }
         }
-        self.commands.push(&self.now);
+        let Some(wheels) = &mut self.wheels else {
+            self.commands.push(&self.now);
+            return Ok(());
+        };
+        for (h, slope) in wheels.momentum.iter_mut().zip(&mut wheels.slope) {
+            // as the FMU itself extrapolates its input over the row before
+            *h += *slope * self.last;
+            *slope = 0.0;
+        }
+        self.last = dt;
+        let mut acting = self.now.clone();
+        wheels.speeds.push(&wheels.each.iter().map(|wheel| wheel.speed).collect::<Vec<_>>());
+        for wheel in &mut wheels.each {
+            let torque = wheel.act(self.now[wheel.place], dt);
+            acting[wheel.place] = torque;
+            for (slope, axis) in wheels.slope.iter_mut().zip(wheel.axis) {
+                *slope -= torque * axis;
+            }
+        }
+        fmu.set_real(&wheels.references, &wheels.momentum)?;
+        self.commands.push(&acting);
         Ok(())
+    }
+
+    /// Returns value references, values and derivatives of the inputs that change along a line from this row to the next.
+    pub fn lines(&self) -> Option<(&[u32], &[f64], &[f64])> {
+        let wheels = self.wheels.as_ref()?;
+        Some((&wheels.references, &wheels.momentum, &wheels.slope))
+    }
+
+    /// Writes the rows of commands and speeds so far to Python's arrays.
+    pub fn write(&mut self, py: Python) {
+        self.commands.write(py);
+        if let Some(wheels) = &mut self.wheels {
+            wheels.speeds.write(py);
+        }
     }
 }
 
@@ -173,6 +274,45 @@ fn expect(what: &str, found: usize, expected: usize) -> PyResult<()> {
         return Ok(());
     }
     Err(PyValueError::new_err(format!("{what}: {found} (expected: {expected})")))
+}
+
+/// Reads the wheels of the Python object `feedback`; None if it has none.
+fn wheels(
+    feedback: &Bound<PyAny>,
+    fmu: &Fmu,
+    rows: usize,
+    commands: usize,
+) -> PyResult<Option<Wheels>> {
+    /// Column of the torque, axis, inertia, largest torque, largest speed and speed.
+    type Given = (usize, [f64; 3], f64, f64, f64, f64);
+    let given: Vec<Given> = feedback.getattr("wheels")?.extract()?;
+    if given.is_empty() {
+        return Ok(None);
+    }
+    let mut references = [0; 3];
+    for (i, reference) in references.iter_mut().enumerate() {
+        *reference = fmu.variable(&format!("h_wheels[{}]", i + 1))?.reference;
+    }
+    let wrong = |(place, _, inertia, max_torque, max_speed, _): &Given| {
+        *place >= commands || !(*inertia > 0.0 && *max_torque >= 0.0 && *max_speed >= 0.0)
+    };
+    if given.iter().any(wrong) {
+        return Err(PyValueError::new_err("wheels: a place or a limit is out of range"));
+    }
+    let speeds = Numbers::borrow(&feedback.getattr("speeds")?, rows, given.len(), true)?;
+    let each = given
+        .into_iter()
+        .map(|(place, axis, inertia, max_torque, max_speed, speed)| Wheel {
+            place,
+            axis,
+            inertia,
+            max_torque,
+            max_speed,
+            speed,
+        })
+        .collect();
+    let momentum = feedback.getattr("momentum")?.extract()?;
+    Ok(Some(Wheels { each, references, momentum, slope: [0.0; 3], speeds }))
 }
 
 /// Reads a linear controller from the Python object `of`, which has the class `Linear`.

@@ -84,11 +84,20 @@ pub type Stop = (usize, usize, String);
 /// A table of the Python side: the names of its columns, and the numpy array.
 pub type Table<'py> = (Vec<String>, Bound<'py, PyAny>);
 
+/// The Reals that change along a line within a row: value references, values at the row, and derivatives. Working memory.
+#[derive(Default)]
+struct Lines {
+    references: Vec<u32>,
+    values: Vec<f64>,
+    slopes: Vec<f64>,
+}
+
 pub struct Run<'fmu> {
     time: Vec<f64>,
     inputs: (Columns<'fmu>, Numbers),
-    /// Time derivatives of the inputs after each row, with working memory for the derivatives of the Reals.
-    slopes: Option<(Numbers, Vec<f64>)>,
+    /// Time derivatives of the inputs after each row.
+    slopes: Option<Numbers>,
+    lines: Lines,
     outputs: (Columns<'fmu>, Numbers),
     feedback: Option<Feedback>,
 }
@@ -111,7 +120,8 @@ impl<'fmu> Run<'fmu> {
         let columns = Columns::find(fmu, inputs)?;
         let slopes = slopes.map(|of| Numbers::borrow(of, rows, width, false)).transpose()?;
         Ok(Run {
-            slopes: slopes.map(|slopes| (slopes, columns.reals.clone())),
+            slopes,
+            lines: Lines::default(),
             inputs: (columns, Numbers::borrow(values, rows, width, false)?),
             outputs: (
                 Columns::find(fmu, outputs)?,
@@ -153,19 +163,27 @@ impl<'fmu> Run<'fmu> {
         let time = self.time[row];
         let Some(next) = self.time.get(row + 1) else { return Ok(()) };
         if let Some(feedback) = &mut self.feedback {
-            feedback.act(instance, row, time)?;
+            feedback.act(instance, row, time, next - time)?;
         }
         let (columns, given) = &mut self.inputs;
         columns.set(instance, given.row(i))?;
-        match &mut self.slopes {
-            Some((slopes, along)) if !columns.references.is_empty() => {
-                for (place, slope) in columns.places.iter().zip(along.iter_mut()) {
-                    *slope = slopes.row(i)[*place];
-                }
-                let (references, values) = (&columns.references, &columns.reals);
-                instance.do_step_along(time, next - time, references, values, along)?;
-            }
-            _ => instance.do_step(time, next - time)?,
+        let Lines { references, values, slopes } = &mut self.lines;
+        references.clear();
+        values.clear();
+        slopes.clear();
+        if let Some(along) = &mut self.slopes {
+            references.extend(&columns.references);
+            values.extend(&columns.reals);
+            slopes.extend(columns.places.iter().map(|place| along.row(i)[*place]));
+        }
+        if let Some((turned, h, h_dot)) = self.feedback.as_ref().and_then(Feedback::lines) {
+            references.extend(turned);
+            values.extend(h);
+            slopes.extend(h_dot);
+        }
+        match references.is_empty() {
+            true => instance.do_step(time, next - time)?,
+            false => instance.do_step_along(time, next - time, references, values, slopes)?,
         }
         Ok(())
     }
@@ -183,7 +201,7 @@ impl<'fmu> Run<'fmu> {
                 row += 1;
             }
             self.inputs.1.keep(row - first);
-            if let Some((slopes, _)) = &mut self.slopes {
+            if let Some(slopes) = &mut self.slopes {
                 slopes.keep(row - first);
             }
         }
@@ -194,7 +212,7 @@ impl<'fmu> Run<'fmu> {
     fn visit(&mut self, py: Python) -> PyResult<()> {
         self.hand_over(py);
         self.inputs.1.read(py, ROWS);
-        if let Some((slopes, _)) = &mut self.slopes {
+        if let Some(slopes) = &mut self.slopes {
             slopes.read(py, ROWS);
         }
         py.check_signals()
@@ -203,7 +221,7 @@ impl<'fmu> Run<'fmu> {
     fn hand_over(&mut self, py: Python) {
         self.outputs.1.write(py);
         if let Some(feedback) = &mut self.feedback {
-            feedback.commands.write(py);
+            feedback.write(py);
         }
     }
 }

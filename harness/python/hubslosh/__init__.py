@@ -52,6 +52,7 @@ _MODULES = {
     "tanks": ("Tank", "tank"),
     "uncertainty": ("UncertainModel", "uncertain"),
     "viewing": ("View", "view"),
+    "wheels": ("Wheel",),
 }
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
 

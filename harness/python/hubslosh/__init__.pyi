@@ -67,5 +67,6 @@ from .uncertainty import UncertainModel as UncertainModel
 from .uncertainty import uncertain as uncertain
 from .viewing import View as View
 from .viewing import view as view
+from .wheels import Wheel as Wheel
 
 __version__: str

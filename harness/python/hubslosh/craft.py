@@ -39,6 +39,7 @@ from .tanks import (
     read_drawing,
     solve,
 )
+from .wheels import MOMENTUM, Wheel, histories, momentum, torque_names, wrong_wheels
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -255,8 +256,9 @@ class Craft:
         Up to four tanks by name. Their order gives the numbers of the FMU's tanks.
     thrust : float or sequence of float, shape (3,)
         Force at O, body axes, N; a number is along z. For engines at other places see ``engines``.
-    wheels : sequence of float, shape (3,)
-        Angular momentum of the wheels relative to the body, body axes, N·m·s.
+    wheels : mapping of Wheel
+        Reaction wheels by name. `loop` and `review` command their torques: ``command="wheels"``, or
+        ``"z.torque"`` for one. Their momentum at the start acts in every method.
     gravity : float, optional
         Specific force along the tanks' axes, m/s², for frequencies and damping; by default
         thrust over mass at the fill.
@@ -294,7 +296,7 @@ class Craft:
     center_of_mass: Sequence[float] = (0.0, 0.0, 0.0)
     tanks: Mapping[str, MountedTank] = field(default_factory=dict)
     thrust: float | Sequence[float] = 0.0
-    wheels: Sequence[float] = (0.0, 0.0, 0.0)
+    wheels: Mapping[str, Wheel] = field(default_factory=dict)
     gravity: float | None = None
     model: str | Path = "Spacecraft"
     engines: Mapping[str, Engine] = field(default_factory=dict)
@@ -309,11 +311,11 @@ class Craft:
             number = isinstance(value, int | float | np.number) and np.isfinite(value) and value > 0
             if not number and not (name == "gravity" and value is None):
                 problems.append(f"{name} must be a positive number, not {value!r}")
-        for name in ("center_of_mass", "wheels"):
-            try:
-                vector(getattr(self, name), 3, name)
-            except FmuError as error:
-                problems.append(str(error))
+        try:
+            vector(self.center_of_mass, 3, "center_of_mass")
+        except FmuError as error:
+            problems.append(str(error))
+        problems += wrong_wheels(self.wheels)
         wrong = []
         if not isinstance(self.engines, Mapping):
             wrong.append(f"engines must be Engine by name, not {self.engines!r}")
@@ -821,7 +823,7 @@ class Craft:
         found |= {f"craft.J{'xyz'[i]}{'xyz'[j]}": float(J[i, j]) for i, j in pairs}
         found |= {f"force[{i + 1}]": float(x) for i, x in enumerate(F)}
         found |= {f"torque[{i + 1}]": float(x) for i, x in enumerate(torque) if torque.any()}
-        found |= {f"h_wheels[{i + 1}]": float(x) for i, x in enumerate(self.wheels)}
+        found |= dict(zip(MOMENTUM, momentum(self.wheels).tolist(), strict=True))
         j = 0
         for appendage in self.appendages.values():
             place = vector(appendage.position, 3, "") - action
@@ -1051,7 +1053,7 @@ class Craft:
         measured : str or sequence of str
             Measured variables, as for `Loop`.
         command : str or sequence of str
-            Commanded inputs, as for `Loop`.
+            Commanded inputs, as for `Loop`; ``"wheels"`` is the torque of each wheel in order.
         latency : int
             Delay from measurement to command in whole cycles.
         delay : float
@@ -1091,8 +1093,9 @@ class Craft:
         )
         delay = delay if late is None else late
         return Loop(
-            controller, period, point.model, point.parameters, measured, command, latency, delay
-        )
+            controller, period, point.model, point.parameters, measured, command, latency, delay,
+            self.wheels,
+        )  # fmt: skip
 
     def review(
         self,
@@ -1153,7 +1156,7 @@ class Craft:
         measured : str or sequence of str
             Measured variables, as for `Loop`.
         command : str or sequence of str
-            Commanded inputs, as for `Loop`.
+            Commanded inputs, as for `Loop`; ``"wheels"`` is the torque of each wheel in order.
         latency : int
             Delay from measurement to command in whole cycles.
         delay : float
@@ -1291,7 +1294,9 @@ class Craft:
             Fill of the tanks, as for `fills`.
         inputs : DataFrame, optional
             Histories of inputs with the column ``time``, as for `hubslosh.simulate`; they replace
-            thrust, torque and wheels of the craft.
+            thrust and torque of the craft. A column such as ``z.torque`` is the torque of wheel z
+            on the craft, N·m, held from row to row within the wheel's limits; the result then has
+            the torques that act, and the speeds, such as ``z.speed`` (rad/s).
         stop : float, optional
             End of the simulation, s.
         step : float, optional
@@ -1329,8 +1334,19 @@ class Craft:
             self.parameters(fill, parameters=parameters),
             getattr(inputs, "columns", ()),
         )
+        wheels = None
+        if inputs is not None and any(name in replaced for name in torque_names(self.wheels)):
+            start = np.array([float(mine[name]) for name in MOMENTUM])  # type: ignore[arg-type]
+            hold = bool(options.pop("hold", False))
+            wheels = histories(inputs, self.wheels, start, hold=hold)
+            inputs, replaced = wheels.inputs, wheels.inputs.columns
         given = {n: x for n, x in mine.items() if n not in replaced or n in (parameters or {})}
-        return simulate(self.model, given, inputs, stop, step, outputs, **options)
+        run = simulate(self.model, given, inputs, stop, step, outputs, **options)
+        if wheels is not None:
+            for name, values in wheels.columns(run["time"].to_numpy()).items():
+                run[name] = values
+                run.attrs["units"][name] = "N.m" if name in wheels.torque else "rad/s"
+        return run
 
     def pulses(self, fill: Fill, firing: Mapping[str, Any], stop: float) -> "pd.DataFrame":
         """Return the history of force and torque of engines that fire in pulses.
@@ -1507,19 +1523,18 @@ class Craft:
 
     def __str__(self) -> str:
         """Return the craft in at most ten lines."""
-        J, F, h = self._inertia(), self._force(), vector(self.wheels, 3, "wheels")
+        J, F = self._inertia(), self._force()
         products = f"Jxy, Jxz, Jyz {_row((J[0, 1], J[0, 2], J[1, 2]))}"
         lines = [
             f"Craft of {self.mass:g} kg dry, centre of mass {_row(self.center_of_mass)} m",
             f"inertia Jxx, Jyy, Jzz {_row(np.diag(J))}, {products} kg·m²",
-            f"thrust {_row(F)} N"
-            + (f" by {', '.join(self.engines)}" if self.engines else "")
-            + (f", wheels {_row(h)} N·m·s" if h.any() else ""),
+            f"thrust {_row(F)} N" + (f" by {', '.join(self.engines)}" if self.engines else ""),
         ]
         lines += [
             f"tank {number} {name}: {tank.describe()}"
             for number, (name, tank) in enumerate(self.tanks.items(), 1)
         ]
+        lines += [f"wheel {name}: {of.describe()}" for name, of in self.wheels.items()]
         lines += [f"appendage {name}: {of.describe()}" for name, of in self.appendages.items()]
         return "\n".join(lines)
 

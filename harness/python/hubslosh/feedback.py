@@ -1,7 +1,7 @@
 """A sampled controller between the outputs and the inputs of a run: see `Plant.run`."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -44,8 +44,16 @@ class Feedback:
     parts: int
     switch: int
     latency: int
+    wheels: list[tuple[int, list[float], float, float, float, float]] = field(default_factory=list)
+    """Column of the torque in ``command``, axis, inertia, largest torque and speed, and speed of
+    each wheel."""
+    momentum: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Momentum of the wheels at the start, N·m·s."""
 
     def __post_init__(self) -> None:
         """Make room for the commands."""
-        self.commands: Matrix = np.zeros((self.cycles * self.parts + 1, len(self.command)))
+        rows = self.cycles * self.parts + 1
+        self.commands: Matrix = np.zeros((rows, len(self.command)))
         """The commands in force from each row on; the last row is not set."""
+        self.speeds: Matrix = np.zeros((rows, len(self.wheels)))
+        """Speed of each wheel at each row, rad/s; the last row is not set."""

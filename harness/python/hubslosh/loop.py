@@ -1,7 +1,7 @@
 """A sampled controller in closed loop with an FMU."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -28,6 +28,8 @@ from .simulation import (
     table_of,
     too_many_rows,
 )
+from .wheels import ALL, MOMENTUM, Wheel, momentum, speed_name, torque_names, wrong_wheels
+from .wheels import TORQUE as BODY_TORQUE
 
 # Result of a controller in a cycle: the command, or one for each of several, from time (s) and
 # measurements.
@@ -64,6 +66,10 @@ class Loop:
     delay : float
         Further delay, s; any. The two add up. Each command is held until the next one acts, so
         that a continuous design sees half a cycle more.
+    wheels : mapping of Wheel
+        Reaction wheels by name, for Spacecraft; `Craft.loop` passes those of the craft. Their
+        torques are further commands: ``"z.torque"`` that of wheel z on the craft, N·m, or
+        ``"wheels"`` for all of them in order.
 
     Examples
     --------
@@ -81,6 +87,7 @@ class Loop:
     command: Sequence[str] | str = TORQUE
     latency: int = 0
     delay: float = 0.0
+    wheels: Mapping[str, Wheel] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         """Return the loop in four lines."""
@@ -121,9 +128,20 @@ class Loop:
         controller = None
         found = out_of_range(period=self.period, latency=self.latency, delay=self.delay)
         fmu = Fmu.open(self.model)
-        for name in (commands := fmu.components(names_of(self.command, "command", found))):
-            if name not in fmu.names("input"):
-                allowed = fmu.names("input")
+        if wrong := wrong_wheels(self.wheels):
+            return found + wrong, None
+        names_of(self.command, "command", found)
+        commands = self.names[1]
+        turned = self._turned
+        allowed = [*fmu.names("input"), *torque_names(self.wheels)]
+        if turned and not {*MOMENTUM} <= {*fmu.names("input")}:
+            found.append(f"wheels are for Spacecraft: {fmu.name} has no input h_wheels[1]")
+        for name in commands:
+            if name in turned:
+                continue
+            if turned and name in MOMENTUM:
+                found.append(f"the command {name} is what the wheels set: leave it out")
+            elif name not in allowed:
                 hint = did_you_mean(name, allowed)
                 found.append(
                     f"the command {name} is not an input of {fmu.name} "
@@ -167,7 +185,42 @@ class Loop:
         """Names of what is measured, and of the commands."""
         fmu = Fmu.open(self.model)
         measured, command = names_of(self.measured, "", []), names_of(self.command, "", [])
-        return fmu.components(measured), fmu.components(command)
+        commands: list[str] = []
+        for name in fmu.components(command):
+            commands += torque_names(self.wheels) if name == ALL and self.wheels else [name]
+        return fmu.components(measured), commands
+
+    @property
+    def _turned(self) -> dict[str, Wheel]:
+        """Wheels whose torques are commands, by the names of their torques."""
+        commands = self.names[1]
+        return {name: of for name, of in torque_names(self.wheels).items() if name in commands}
+
+    def _units(self) -> dict[str, str]:
+        """Return the units of torques and speeds of the wheels, which the FMU does not know."""
+        names = torque_names(self.wheels)
+        return dict.fromkeys(names, "N.m") | {speed_name(name): "rad/s" for name in names}
+
+    def _without_wheels(self) -> "Loop":
+        """Return the loop whose wheels' torques act as torque on the craft.
+
+        It has the same margins if the craft does not turn at the operating point.
+        """
+        turned, K = self._turned, self.linear()
+        if not turned or K is None:
+            return self
+        commands = self.names[1]
+        plain = [name for name in commands if name not in turned]
+        new = [*plain, *(name for name in BODY_TORQUE if name not in plain)]
+        new.sort(key=Fmu.open(self.model).names("input").index)
+        share = np.zeros((len(new), len(commands)))
+        for j, name in enumerate(commands):
+            if name in turned:
+                share[[new.index(axis) for axis in BODY_TORQUE], j] = turned[name].direction
+            else:
+                share[new.index(name), j] = 1.0
+        K = replace(K, C=share @ K.C, D=share @ K.D, outputs=tuple(new) if K.outputs else ())
+        return replace(self, controller=K, command=new, wheels={})
 
     def linear(self) -> LinearModel | None:
         """Return the controller as a sampled linear model.
@@ -235,9 +288,42 @@ class Loop:
         >>> loop.plant({"friction.model": "viscous"}).outputs
         ('theta', 'omega')
         """
+        return self._plant(parameters_of(parameters))
+
+    def _plant(self, parameters: Parameters, *, all_states: bool = False) -> LinearModel:
+        """Return the model of `plant`; ``all_states`` as for `linearize`."""
         measured, command = self.names
-        every = parameters_of(self.parameters) | parameters_of(parameters)
-        return linearize(self.model, every, command, measured)
+        every = parameters_of(self.parameters) | dict(parameters)
+        if not (turned := self._turned):
+            return linearize(self.model, every, command, measured, all_states=all_states)
+        plain = [name for name in command if name not in turned]
+        inputs = list(dict.fromkeys([*plain, *BODY_TORQUE, *MOMENTUM]))
+        model = linearize(self.model, every, inputs, measured, all_states=all_states)
+        torque, h = ([inputs.index(name) for name in names] for names in (BODY_TORQUE, MOMENTUM))
+        # the momentum of a wheel acts in a craft that turns; its speed is then a further state
+        speeds, by_speed = [], []
+        for name, wheel in turned.items():
+            column = np.vstack([model.B, model.D])[:, h] @ wheel.direction * wheel.inertia
+            if column.any() or all_states:
+                speeds.append(name)
+                by_speed.append(column)
+        n, m = len(model.A), len(speeds)
+        B, D = np.zeros((n + m, len(command))), np.zeros((len(model.C), len(command)))
+        for j, name in enumerate(command):
+            if name not in turned:
+                B[:n, j], D[:, j] = (of[:, inputs.index(name)] for of in (model.B, model.D))
+                continue
+            B[:n, j], D[:, j] = (
+                of[:, torque] @ turned[name].direction for of in (model.B, model.D)
+            )
+            if name in speeds:
+                B[n + speeds.index(name), j] = -1 / turned[name].inertia
+        A, C = np.zeros((n + m, n + m)), np.zeros((len(model.C), n + m))
+        A[:n, :n], C[:, :n] = model.A, model.C
+        for k, column in enumerate(by_speed, n):
+            A[:n, k], C[:, k] = column[:n], column[n:]
+        states = (*model.states, *map(speed_name, speeds))
+        return LinearModel(A, B, C, D, states, tuple(command), model.outputs)
 
     def gain(self, parameters: Parameters | None = None, *, more_delay: float = 0.0) -> LinearModel:
         """Return the loop gain L from commands round to commands; the loop closes with u = -L u.
@@ -347,8 +433,15 @@ class Loop:
                 for name in command
                 if name in inputs
             ]
+        turned = {} if problems else self._turned
+        plain = [name for name in command if name not in turned]
+        problems += [
+            f"inputs has {name}, which the wheels set: leave it out"
+            for name in MOMENTUM
+            if turned and name in histories
+        ]
         every = parameters_of(self.parameters) | parameters_of(parameters)
-        check_parameters(fmu, every, {**histories, **dict.fromkeys(command)}, problems)
+        check_parameters(fmu, every, {**histories, **dict.fromkeys(plain)}, problems)
         columns = outputs_of(fmu, outputs, every, problems)
         check_outputs(fmu, columns, problems)
         if not problems:
@@ -372,16 +465,22 @@ class Loop:
             parts=parts,
             switch=switch,
             latency=min(latency, cycles),
-        )
+            wheels=[
+                (command.index(name), of.direction.tolist(), of.inertia, of.max_torque,
+                 of.max_speed, of.speed)
+                for name, of in turned.items()
+            ],
+            momentum=self._momentum(fmu, every),
+        )  # fmt: skip
         given = {name: history.after(points) for name, history in histories.items()}
         sloped = any(slopes.any() for _, slopes in given.values())
         start = {name: values[0] for name, (values, _) in given.items()}
-        asked = asked_of(fmu, columns, (*command, *given))
+        asked = asked_of(fmu, columns, (*plain, *given))
         with Plant(
             self.model,
             every,
             tolerance=tolerance,
-            inputs=dict.fromkeys(command, 0.0) | start,
+            inputs=dict.fromkeys(plain, 0.0) | start,
         ) as plant:
             recorded = plant.run(
                 points,
@@ -393,8 +492,24 @@ class Loop:
         commands = feedback.commands
         commands[-1] = commands[-2]
         rows = {"time": points} | dict(zip(command, commands.T, strict=True))
+        speeds, last = feedback.speeds, points[-1] - points[-2]
+        for k, (name, wheel) in enumerate(turned.items()):
+            speeds[-1, k] = speeds[-2, k] - rows[name][-1] * last / wheel.inertia
+            rows[speed_name(name)] = speeds[:, k]
         rows |= {name: values for name, (values, _) in given.items()} | recorded
-        return table_of(fmu, rows, wanted, columns, self.model, every)
+        return table_of(fmu, rows, wanted, columns, self.model, every, self._units())
+
+    def _momentum(self, fmu: Fmu, parameters: Parameters) -> tuple[float, float, float]:
+        """Return the angular momentum of the wheels at the start of a run, N·m·s.
+
+        It is what the parameters say, which differs from that of the wheels if they have a further
+        momentum.
+        """
+        if not self._turned:
+            return (0.0, 0.0, 0.0)
+        own = dict(zip(MOMENTUM, momentum(self.wheels).tolist(), strict=True))
+        x, y, z = (float(fmu.convert(name, parameters.get(name, own[name]))) for name in MOMENTUM)
+        return x, y, z
 
     def _controller(
         self,

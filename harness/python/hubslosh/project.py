@@ -3,7 +3,8 @@
 ``python -m hubslosh.project PROJECT.toml …`` is what ``hubslosh review`` calls. The keys of the
 file are the arguments of `Craft.review`. The table ``craft`` has the arguments of `Craft`, each
 table of ``craft.tanks`` the arguments of `MountedTank`, each table of ``craft.engines`` the
-arguments of `Engine`, and each table of ``craft.appendages`` the arguments of `Appendage`.
+arguments of `Engine`, each table of ``craft.wheels`` the arguments of `Wheel`, and each table of
+``craft.appendages`` the arguments of `Appendage`.
 ``controller`` is a matrix of gains, a table with the matrices ``A``, ``B``, ``C``, ``D`` or with
 ``num`` and ``den`` of transfer functions (in discrete time also ``period``), or ``"FILE.py:NAME"``:
 a controller, or a function without arguments that returns one, which is run. Each table of
@@ -34,9 +35,10 @@ from .loop import Loop, _from_control
 from .review import Review
 from .tanks import toml_key, toml_of
 from .temporary import write_file
+from .wheels import Wheel
 
 # Parts of a craft by name, which have tables of their own in the file
-PARTS = {"tanks": MountedTank, "engines": Engine, "appendages": Appendage}
+PARTS = {"tanks": MountedTank, "engines": Engine, "wheels": Wheel, "appendages": Appendage}
 OWN = ("controller", "craft", "cases")  # Keys of a project that are no arguments of `Craft.review`
 
 
@@ -296,7 +298,8 @@ _MISSING: dict[str, Any] = {}
 def _table(of: Mapping[str, Any], name: str, default: dict[str, Any] = _MISSING) -> dict[str, Any]:
     found = of.get(name, None if default is _MISSING else default)
     if not isinstance(found, dict):
-        raise FmuError(f"the table [{name}] is missing")
+        wrong = f"must be a table, not {found!r}" if name in of else "is missing"
+        raise FmuError(f"the table [{name}] {wrong}")
     return found
 
 

@@ -15,7 +15,7 @@ import pandas as pd
 
 from .arguments import MOST_FILLS, MOST_WORK, check_ranges
 from .fmu import Fmu, FmuError, FmuWarning, Parameters, Quantity
-from .linearization import LinearModel, linearize
+from .linearization import LinearModel
 from .loop import Loop
 from .operating_point import rotation
 from .quantities import (
@@ -483,11 +483,8 @@ def _family(points: Sequence[Point]) -> tuple[LinearModel, ...]:
     models = []
     used: set[str] = set()
     for point in points:
-        measured, command = point.loop.names
-        loop = point.loop
-        model = linearize(loop.model, loop.parameters, command, measured, all_states=True)
-        used |= set(loop.plant().states)
-        models.append(model)
+        used |= set(point.loop.plant().states)
+        models.append(point.loop._plant({}, all_states=True))
     keep = [i for i, name in enumerate(models[0].states) if name in used]
     names = tuple(models[0].states[i] for i in keep)
     return tuple(

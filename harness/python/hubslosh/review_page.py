@@ -119,7 +119,9 @@ def _figures(review: "Review") -> Iterator[str]:
             3.6, lambda figure: _draws(figure, drawn),
         )  # fmt: skip
     found = review.confirmation
-    unit_of = Fmu.open(review.craft.model).unit(commands[0]).replace(".", "·")
+    own = review.nominal[0].loop._units()
+    unit = own.get(commands[0]) or Fmu.open(review.craft.model).unit(commands[0])
+    unit_of = unit.replace(".", "·")
     yield figure_of(
         "Does the nonlinear craft agree at the worst case?",
         f"{_what_is_drawn(found)}, from a small rotation on. "

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Container, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 import pandas as pd
@@ -199,10 +200,12 @@ def table_of(
     asked: Sequence[str],
     model: str | Path,
     parameters: Parameters,
+    units: Mapping[str, str] = MappingProxyType({}),
 ) -> Run:
     """Return a run as a table.
 
-    ``wanted`` marks the rows to return; None returns all. The variables that say why a tank is out
+    ``wanted`` marks the rows to return; None returns all. ``units`` has the units of columns that
+    are no variables of the FMU. The variables that say why a tank is out
     of range become columns only if ``asked`` names them.
     """
     limits = [name for name in native.limit_columns(fmu.native) if name in columns]
@@ -211,8 +214,10 @@ def table_of(
     table = Run(columns, copy=False)
     if wanted is not None:
         table = table[wanted].reset_index(drop=True)
-    units = {name: fmu.unit(name) for name in table.columns if name != "time"}
-    table.attrs["units"] = {"time": "s"} | units
+    units = {"time": "s", **units}
+    table.attrs["units"] = {
+        name: units[name] if name in units else fmu.unit(name) for name in table.columns
+    }
     table.attrs |= {"model": str(model), "parameters": dict(parameters)}
     table.attrs["out_of_range"] = native.out_of_range(fmu.native, read)
     return table

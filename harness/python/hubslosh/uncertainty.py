@@ -780,6 +780,8 @@ class UncertainModel:
 
     def _controller(self, loop: Loop) -> LinearModel:
         """Return the controller of a loop around this model, or raise FmuError."""
+        loop._must_be_linear()
+        loop = loop._without_wheels()
         K = loop._must_be_linear()
         if loop.names != (list(self.M.outputs[self.order :]), list(self.M.inputs[self.order :])):
             raise FmuError("the loop must measure the model's outputs and command its inputs")

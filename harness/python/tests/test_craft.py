@@ -13,13 +13,19 @@ from conftest import option
 from fmpy import simulate_fmu
 
 import hubslosh
-from hubslosh import Craft, FmuError, FmuWarning, MountedTank, attitude
+from hubslosh import Craft, FmuError, FmuWarning, MountedTank, Wheel, attitude
 from hubslosh.tanks import TankCase, read_drawing, solve
 
 SPHERE = {"density": 1440.0, "shape": {"sphere": {"radius": 0.5}}}
 CYLINDER = {"density": 875.0, "shape": {"cylinder": {"radius": 0.4, "height": 1.1}}}
 J = [[1150.0, -14.0, 22.0], [-14.0, 980.0, 9.0], [22.0, 9.0, 870.0]]
 TURNED = (np.sin(0.1), 0.0, np.cos(0.1))
+
+# Wheels about the body axes with a momentum of 1, 2 and 3 N·m·s.
+WHEELS = {
+    name: Wheel(axis, 0.01, 0.2, 400, speed)
+    for name, axis, speed in zip("xyz", np.eye(3), (100.0, 200.0, 300.0), strict=True)
+}
 
 
 @pytest.fixture
@@ -30,7 +36,7 @@ def craft(fmu: Path) -> Craft:
         "fuel": MountedTank(CYLINDER, (-0.2, -0.6, 0.1), TURNED, modes=1),
     }
     return Craft(
-        1400.0, J, (0.01, -0.02, 1.05), tanks, 400.0, (1.0, 2.0, 3.0),
+        1400.0, J, (0.01, -0.02, 1.05), tanks, 400.0, WHEELS,
         model=fmu.with_name("Spacecraft.fmu"),
     )  # fmt: skip
 
@@ -256,7 +262,7 @@ def test_ctrl_c_ends_the_calculation_of_tanks() -> None:
 def test_the_liquid_of_a_tank_that_spins_turns_with_it(craft: Craft) -> None:
     """The start is the tank's rate times the inertia of the turning liquid."""
     tank = MountedTank(CYLINDER, (0.0, 0.0, -0.5), modes=1, nu=1e-6, spin=0.4)
-    spinner = replace(craft, tanks={"fuel": tank}, wheels=(0.0, 0.0, 0.0))
+    spinner = replace(craft, tanks={"fuel": tank}, wheels={})
     values = spinner.parameters(0.4)
     inertia = values["tank[1].spin_inertia"]
     radius = 0.4

@@ -11,11 +11,17 @@ from fmpy.ssp.ssd import read_ssd, read_ssv
 from scipy.io import loadmat
 
 import hubslosh
-from hubslosh import Craft, FmuError, MountedTank
+from hubslosh import Craft, FmuError, MountedTank, Wheel
 
 SPHERE = {"density": 1440.0, "shape": {"sphere": {"radius": 0.5}}}
 FILL = {"ox": "40%", "fuel": "70%"}
 TURNING = {"init.omega[1]": 0.02, "init.omega[2]": -0.01, "ox.zeta[1]": 0.01}
+
+# Wheels about the body axes with a momentum of 1, 2 and 3 N·m·s.
+WHEELS = {
+    name: Wheel(axis, 0.01, 0.2, 400, speed)
+    for name, axis, speed in zip("xyz", np.eye(3), (100.0, 200.0, 300.0), strict=True)
+}
 
 
 @pytest.fixture(params=["Spacecraft", "Spacecraft-fmi3"])
@@ -26,7 +32,7 @@ def craft(request: pytest.FixtureRequest, fmu: Path) -> Craft:
         "fuel": MountedTank(SPHERE, (0, -0.7, -0.4)),
     }
     return Craft(
-        1000.0, (900.0, 800.0, 700.0), (0, 0, 1.0), tanks, 400.0, (1.0, 2.0, 3.0),
+        1000.0, (900.0, 800.0, 700.0), (0, 0, 1.0), tanks, 400.0, WHEELS,
         model=fmu.with_name(f"{request.param}.fmu"),
     )  # fmt: skip
 
