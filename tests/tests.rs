@@ -32,6 +32,9 @@ mod six {
     mod hubslosh;
     mod models;
     mod steps;
+    // Random tanks at the limits of their models
+    #[path = "../../fmu/craft/tests/craft/limit_cases.rs"]
+    mod limit_cases;
     // Random craft and reference records of the crate `craft`
     #[path = "../../fmu/craft/tests/craft/random.rs"]
     mod random;

@@ -4,13 +4,14 @@
 //! slopes, fmi2DoStep, fmi2GetReal of whatever is looked at, fmi2GetDirectionalDerivative. The first
 //! time that states are set the instance gives way to one for Model Exchange.
 
+use std::collections::HashMap;
 use std::fs::File;
 use std::sync::LazyLock;
 
 use craft::{
-    Appendage, Craft, INPUTS, Inputs, MODES, Outputs, POINTS, Parameters, Ramp, STATES,
-    SloshTankOutputs, TANK_INPUTS, TANK_STATES, TANKS, TRIANGLE, Tank, TankInputs, TankOutputs,
-    TankParameters,
+    Appendage, Craft, INPUTS, Inputs, LimitedBy, MODES, Outputs, POINTS, Parameters, Ramp, Ranges,
+    STATES, SloshTankOutputs, TANK_INPUTS, TANK_STATES, TANKS, TRIANGLE, Tank, TankInputs,
+    TankOutputs, TankParameters,
 };
 use host::fmi2::{CO_SIMULATION, CallError, Fmu, FmuState, Instance, MODEL_EXCHANGE, Status};
 use pack::models::model;
@@ -25,8 +26,28 @@ pub fn load(name: &str) -> Fmu {
     Fmu::load(directory.path(), packed).unwrap()
 }
 
-static SPACECRAFT: LazyLock<Fmu> = LazyLock::new(|| load("Spacecraft"));
-static SLOSH_TANK: LazyLock<Fmu> = LazyLock::new(|| load("SloshTank"));
+/// A loaded FMU with the value references of its variables, because a search of the description for each of the hundreds
+/// of parameters takes most of the time of an instantiation.
+struct Loaded {
+    fmu: Fmu,
+    references: HashMap<String, u32>,
+}
+
+impl Loaded {
+    fn new(name: &str) -> Loaded {
+        let fmu = load(name);
+        let variables = fmu.description().variables.iter();
+        let references = variables.map(|v| (v.name.clone(), v.reference)).collect();
+        Loaded { fmu, references }
+    }
+
+    fn reference(&self, name: &str) -> u32 {
+        self.references[name]
+    }
+}
+
+static SPACECRAFT: LazyLock<Loaded> = LazyLock::new(|| Loaded::new("Spacecraft"));
+static SLOSH_TANK: LazyLock<Loaded> = LazyLock::new(|| Loaded::new("SloshTank"));
 
 pub fn elements(name: &str, n: usize) -> impl Iterator<Item = String> {
     (1..=n).map(move |i| format!("{name}[{i}]"))
@@ -96,6 +117,7 @@ impl Settings {
             ("depth", tank.depth),
             ("density", tank.density),
             ("g_floor", tank.g_floor),
+            ("g_bond", tank.g_bond),
         ] {
             self.real(of(what), value);
         }
@@ -162,6 +184,8 @@ impl Settings {
             ("rotary_inertia", &tank.rotary_inertia),
             ("rotary_inertia_2", &tank.rotary_inertia_2),
             ("wave", &tank.wave),
+            ("angle_limit", &tank.angle_limit),
+            ("swirl_limit", &tank.swirl_limit),
         ] {
             self.reals(elements(&of(what), MODES), values);
         }
@@ -198,6 +222,7 @@ impl Settings {
 
 /// An instance with the value references of the variables that the test reads and sets.
 struct Bound {
+    loaded: &'static Loaded,
     instance: Instance<'static>,
     settings: Settings,
     tolerance: f64,
@@ -215,13 +240,13 @@ struct Bound {
 
 impl Bound {
     fn new<M: runtime::Model>(
-        (fmu, table): (&'static Fmu, &'static Table<M>),
+        (loaded, table): (&'static Loaded, &'static Table<M>),
         settings: Settings,
         names: [Vec<String>; 2],
         inputs: &[f64],
         (start, tolerance): (f64, f64),
     ) -> Result<Bound, CallError> {
-        let reference = |name: &String| fmu.description().variable(name).unwrap().reference;
+        let reference = |name: &String| loaded.reference(name);
         let [inputs_named, outputs] = names.map(|names| names.iter().map(reference).collect());
         let places: Vec<usize> = table.places().collect();
         let (mut states, mut derivatives) = (vec![0; places.len()], vec![0; places.len()]);
@@ -230,7 +255,8 @@ impl Bound {
             derivatives[*place] = reference(&derivative.name());
         }
         let mut bound = Bound {
-            instance: fmu.instantiate("six")?,
+            loaded,
+            instance: loaded.fmu.instantiate("six")?,
             settings,
             tolerance,
             start,
@@ -247,13 +273,12 @@ impl Bound {
     }
 
     fn set_up(&mut self, inputs: &[f64]) -> Result<(), CallError> {
-        let Bound { instance, settings, .. } = self;
-        let description = instance.fmu().description();
+        let Bound { loaded, instance, settings, .. } = self;
         for (name, value) in &settings.reals {
-            instance.set_real(&[description.variable(name).unwrap().reference], &[*value])?;
+            instance.set_real(&[loaded.reference(name)], &[*value])?;
         }
         for (name, value) in &settings.integers {
-            instance.set_integer(&[description.variable(name).unwrap().reference], &[*value])?;
+            instance.set_integer(&[loaded.reference(name)], &[*value])?;
         }
         instance.set_real(&self.inputs, inputs)?;
         instance.setup_experiment(Some(self.tolerance), self.start, None)?;
@@ -591,6 +616,26 @@ impl SloshTank {
             inertia: next.matrix(),
             tank: read_tank(force, torque, next),
         }
+    }
+
+    /// Returns the ranges at these inputs. The regime is not read.
+    pub fn ranges(&mut self, inputs: &TankInputs) -> Ranges {
+        let [values, slopes] = SloshTank::flat(inputs);
+        self.0.set(&values, &slopes).unwrap();
+        self.ranges_held()
+    }
+
+    /// Returns the ranges as a host reads them after a step.
+    pub fn ranges_held(&mut self) -> Ranges {
+        let Bound { loaded, instance, .. } = &mut self.0;
+        let [kind, in_range] =
+            ["tank.limited_by_kind", "tank.in_range"].map(|name| loaded.reference(name));
+        let (mut reason, mut is_in_range) = ([0], [0]);
+        instance.get_integer(&[kind], &mut reason).unwrap();
+        instance.get_boolean(&[in_range], &mut is_in_range).unwrap();
+        let limited_by = LimitedBy::from_number(u8::try_from(reason[0]).unwrap()).unwrap();
+        assert_eq!(is_in_range[0] != 0, limited_by == LimitedBy::None);
+        Ranges { limited_by, ..Ranges::default() }
     }
 
     /// Returns the warning that the instance has logged, if there is one.

@@ -18,6 +18,7 @@ mod impulses;
 mod independent;
 mod invariances;
 mod life;
+mod limit_cases;
 mod limits;
 mod mass;
 mod planar;
