@@ -100,7 +100,6 @@ fn variable<M: Model>(scalar: &Scalar<M>) -> Element {
     entry_element(Layout::Scalars, v, (scalar.name(), Fmi3::reference(scalar)), v.description, own)
 }
 
-/// Returns an entry of the table as an array variable with its initial size.
 fn array<M: Model>(v: &'static Variable<M>) -> Element {
     let (mut parameters, mut inputs) = (M::Parameters::default(), M::Inputs::default());
     let mut starts: Vec<_> = elements(v)
@@ -142,7 +141,6 @@ fn elements<M: Model>(v: &Variable<M>) -> Vec<usize> {
     scalars.map(|reference| M::table().scalars[*reference as usize - 1].element).collect()
 }
 
-/// Returns a variable with the attributes that all elements of its entry share, and with its own.
 fn entry_element<M: Model>(
     layout: Layout,
     v: &Variable<M>,
@@ -178,7 +176,6 @@ fn entry_element<M: Model>(
     with_type_attributes(element, v, own)
 }
 
-/// Returns the independent variable and the event indicators, which with arrays are one array variable.
 fn extra<M: Model>(layout: Layout) -> Vec<Element> {
     let indicators = M::table().about.event_indicators;
     let one = |(reference, name): (u32, String)| {
@@ -208,7 +205,6 @@ fn extra<M: Model>(layout: Layout) -> Vec<Element> {
     }
 }
 
-/// Returns the value reference of a scalar. In the layout with arrays it is the value reference of the array.
 fn reference<M: Model>(layout: Layout, scalar: &Scalar<M>) -> u32 {
     match layout {
         Layout::Scalars => Fmi3::reference(scalar),

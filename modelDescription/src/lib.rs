@@ -23,7 +23,6 @@ use runtime::version::Version;
 
 use crate::element::Element;
 
-/// Returns the folder of a model's XML, documentation and pictures.
 pub fn folder<M: Model>() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(M::table().about.model)
 }
@@ -36,7 +35,6 @@ pub fn path<M: Model>() -> PathBuf {
 /// bytes.
 const RELEASED: &str = "2026-11-22T12:00:00Z";
 
-/// Default stop time, s, with 20 s at the gyro's 50 Hz.
 const STOP_TIME: f64 = 20.0;
 const STEP_SIZE: f64 = 0.02;
 
@@ -91,8 +89,6 @@ fn description<M: Model>() -> Element {
         ])
 }
 
-/// Returns the root element with the attributes that both versions have; `token_name` is the version's name
-/// of the GUID.
 fn root<M: Model>(version: &str, token_name: &'static str, token: &str) -> Element {
     let about = &M::table().about;
     Element::new("fmiModelDescription")
@@ -123,7 +119,6 @@ fn unit(unit: &Unit) -> Element {
         .holding(unit.display_units.iter().map(display_unit))
 }
 
-/// Returns the enumerations as type definitions, or `None` if there are none.
 fn type_definitions<M: Model>(one: impl Fn(&Enumeration) -> Element) -> Option<Element> {
     let all = M::table().enumerations();
     let some = !all.is_empty();
@@ -191,14 +186,11 @@ fn variability<M: Model>(v: &Variable<M>) -> &'static str {
     }
 }
 
-/// Attributes of a variable that its entry in the table does not contain.
 struct Own {
     start: Option<String>,
-    /// The index (FMI 2.0) or value reference (FMI 3.0) of the state whose derivative the variable is.
     derivative: Option<u32>,
 }
 
-/// Adds the attributes that depend on the type of the variable.
 fn with_type_attributes<M: Model>(element: Element, v: &Variable<M>, own: Own) -> Element {
     let element = match v.kind {
         Kind::Real(quantity) => element
@@ -225,7 +217,6 @@ fn text(value: Value) -> String {
     }
 }
 
-/// Formats the shortest decimal number that reads back as the same bits.
 fn real(x: f64) -> String {
     format!("{x:?}")
 }
@@ -269,7 +260,6 @@ impl List {
 /// accelerations depend on nearly all parameters, and their lists would make up most of the file.
 const LONGEST: usize = 100;
 
-/// Form in which a list of dependencies with more than [`LONGEST`] entries is written.
 #[derive(Clone, Copy, PartialEq)]
 enum Long {
     /// The list is left out, so that a host assumes a dependency on everything. However, the list of an

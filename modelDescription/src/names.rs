@@ -12,7 +12,6 @@ pub fn path<M: Model>() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../harness/names/src").join(file)
 }
 
-/// Constants of a module and its submodules, in the order of the table.
 #[derive(Default)]
 struct Module {
     constants: Vec<String>,
@@ -118,7 +117,6 @@ fn sizes<M: Model>() -> String {
     )
 }
 
-/// Converts a name with underscores to the form of a Rust variant.
 fn camel(name: &str) -> String {
     let parts = name.split('_').filter_map(|part| {
         let first = part.chars().next()?.to_uppercase();

@@ -92,7 +92,6 @@ pub struct MountedTank {
     still: Option<[Rigid; 2]>,
 }
 
-/// Returns a constant as a [`Jet`], with derivatives of 0.
 fn jet<T: Number>(x: f64) -> Jet<T> {
     [x, 0.0, 0.0].map(T::constant)
 }
@@ -820,7 +819,6 @@ impl Outflow<'_> {
 }
 
 pub trait Drains<const D: usize>: System<D> + Sized {
-    /// Normalises the quaternion and the directions of the bobs.
     fn normalise(&self, x: &mut [f64; D], t: f64);
 
     fn outflows(&self) -> impl Iterator<Item = Outflow<'_>>;

@@ -45,10 +45,8 @@ pub(crate) trait Carrier {
     /// Returns all bobs and lumps that move, after [`Carrier::evaluate_at`].
     fn points(&self) -> impl Iterator<Item = BobNow<f64>>;
 
-    /// Returns the carrier and all rigid liquid as one rigid body.
     fn rigid(&self) -> Rigid;
 
-    /// Returns the deformed appendages of the carrier, after [`Carrier::evaluate_at`].
     fn deformed(&self) -> Option<Deformed<f64>> {
         None
     }
@@ -205,7 +203,6 @@ pub(crate) trait Carrier {
         self.is_pressed(lump, t)
     }
 
-    /// Performs an impact with the coefficient of restitution `e`.
     fn strike(&mut self, lump: usize, e: f64, t: f64) {
         let struck = self.lump(lump);
         let (m, v_n) = (struck.m, struck.approach());

@@ -725,7 +725,6 @@ impl Problems {
         }
     }
 
-    /// Checks a vector that will be normalised.
     fn direction(&mut self, name: &str, value: &[f64]) {
         let before = self.0.len();
         self.vector(name, value, "");

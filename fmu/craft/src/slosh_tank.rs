@@ -788,7 +788,6 @@ impl TankMotion {
         next.map(|(t, _)| t)
     }
 
-    /// Performs the event `due` at `t` after the start of the call.
     #[inline(never)]
     fn perform_event(&mut self, due: Due, t: f64) {
         if self.loose().rest.is_none() {

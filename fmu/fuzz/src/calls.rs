@@ -11,7 +11,6 @@ use runtime::table::Layout;
 
 use crate::sizes;
 
-/// The struct of the same name in `host.h`.
 #[repr(C)]
 struct HostFmu {
     guid: *const c_char,

@@ -18,38 +18,24 @@ use crate::{Values, place, set, survives_being_saved, to_steps};
 const CALLS: usize = 40;
 /// Allowed relative difference between the outputs of two hosts; see [`allowed`].
 const TOLERANCE: f64 = 1e-9;
-/// Largest number of ticks in one step.
 const LONGEST: u32 = 8;
 
-/// A call, or a group of calls that belong together.
 #[derive(Clone, Copy, Debug)]
 enum Call {
-    /// Sets input number n to a value.
     Input(usize, f64),
-    /// Sets the slope of input number n for the next step.
     Slope(usize, f64),
-    /// Sets tunable parameter number n to a fraction of its start value.
     Tune(usize, f64),
-    /// Saves the state, makes a step of this many ticks, and restores the state.
     GoBack(u32),
-    /// Serialises the state and continues with an instance that is deserialised from it.
     Save,
-    /// Reads the time derivatives of the outputs.
     Derivatives,
-    /// Makes a step of this many ticks.
     Step(u32),
 }
 
-/// Rule by which a host computes its times.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Kind {
-    /// start + n tick.
     Multiplied,
-    /// t += h.
     Added,
-    /// Multiplied, but off by a unit in the last place, up or down.
     Off,
-    /// Multiplied; the step size is the difference of two times.
     Differences,
 }
 
@@ -57,12 +43,10 @@ enum Kind {
 struct Clock {
     kind: Kind,
     start: f64,
-    /// Start of the clock from whose differences the step sizes follow, s.
     origin: f64,
     tick: f64,
     ticks: u32,
     time: f64,
-    /// Random bits that choose between up and down.
     noise: u64,
 }
 
@@ -78,7 +62,6 @@ impl Clock {
         Clock { origin: self.origin, ..Clock::new(self.kind, 0.0, self.tick) }
     }
 
-    /// Returns the time that this host passes to the FMU for `time`.
     fn name(&mut self, time: f64) -> f64 {
         if self.kind != Kind::Off {
             return time;
@@ -91,7 +74,6 @@ impl Clock {
         self.name(self.time)
     }
 
-    /// Returns the size of a step of this many ticks, s.
     fn length(&self, ticks: u32) -> f64 {
         let at = |ticks: u32| self.origin + f64::from(ticks) * self.tick;
         match self.kind {
@@ -113,7 +95,6 @@ impl Clock {
     }
 }
 
-/// Outputs after each step, up to the end of the run.
 type Rows = Vec<Vec<f64>>;
 
 /// Runs one case. The first byte chooses the FMI version, the interface, and who handles events; the other
@@ -201,7 +182,6 @@ fn allowed(rows: &Rows, n: usize, tick: f64, is_placed: bool, start: f64) -> f64
     TOLERANCE * size + last_digits(start) * fastest
 }
 
-/// Returns two units in the last place of times after `start`, s.
 fn last_digits(start: f64) -> f64 {
     2.0 * f64::EPSILON * (start.abs() + 10.0)
 }
@@ -332,7 +312,6 @@ fn co_simulation<M: Model, V: Values>(
     rows
 }
 
-/// Makes a step to its end, handling the events on the way. Returns false if the step was refused.
 fn step_all<M: Model, V: Values>(
     instance: &mut Instance<M, V>,
     clock: &mut Clock,

@@ -77,7 +77,6 @@ impl Values for Fmi3 {
         [&v3::SET_FLOAT64, &v3::SET_INT32, &v3::SET_INT64, &v3::SET_BOOLEAN];
 }
 
-/// Index of a variable's type in [`Values::GET`] and [`Values::SET`].
 fn place<M: Model>(scalar: &Scalar<M>) -> usize {
     match scalar.variable.kind {
         Kind::Real(_) => 0,

@@ -15,7 +15,6 @@ use runtime::variable::{Causality, Kind, Quantity, Value};
 
 use crate::{Values, everything_is_a_number, set, step, survives_being_saved, to_steps};
 
-/// Number of steps of one run.
 const STEPS: usize = 12;
 /// Longest step, s. The model bounds the work of a step; this limit keeps the fuzzer fast.
 const LONGEST: f64 = 2.0;
@@ -120,7 +119,6 @@ fn everyday(quantity: Quantity) -> Quantity {
     Quantity { min: near(quantity.min), max: near(quantity.max), ..quantity }
 }
 
-/// Draws a value of a quantity: at its limits, between them, of its nominal magnitude, or any number.
 fn within(quantity: Quantity, data: &mut Unstructured) -> Result<f64> {
     let (min, max) = (quantity.min.unwrap_or(-1e3), quantity.max.unwrap_or(1e3));
     let share = f64::from(data.int_in_range(0..=1000u16)?) / 1000.0;

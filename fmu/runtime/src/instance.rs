@@ -296,7 +296,6 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Returns the start values of the parameters in the description that the host has read.
     fn starts(&self) -> Vec<Value> {
         self.extent.as_ref().map_or_else(|| M::table().starts(), |extent| extent.starts().to_vec())
     }
@@ -916,7 +915,6 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.step_reported(call, at, h, stops)
     }
 
-    /// Makes a step for a host to which events are reported.
     fn step_reported(
         &mut self,
         call: &Call,
@@ -1340,7 +1338,6 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Returns the model, and creates it if necessary.
     #[inline]
     fn model(&mut self, call: &Call) -> Result<&mut M, Fault> {
         if self.model.is_none() {
@@ -1393,7 +1390,6 @@ impl<M: Model, V: Version> Instance<M, V> {
         parameters
     }
 
-    /// Returns the present outputs, and computes them if necessary.
     #[inline(always)]
     fn outputs(&mut self, call: &Call) -> Result<&M::Outputs, Fault> {
         if self.outputs.is_none() {
@@ -1460,7 +1456,6 @@ fn query_model<M: Model, T>(
     }
 }
 
-/// Returns the number that the host sees for a discrete output.
 fn discrete<M: Model>(scalar: &Scalar<M>, outputs: &M::Outputs) -> i32 {
     match scalar.access {
         Access::OutputInteger(get) => get(outputs, scalar.element),
@@ -1469,7 +1464,6 @@ fn discrete<M: Model>(scalar: &Scalar<M>, outputs: &M::Outputs) -> i32 {
     }
 }
 
-/// Returns a computed number as a value, or a fault if it is NaN or infinite.
 #[inline(always)]
 fn finite<M: Model>(call: &Call, scalar: &Scalar<M>, x: f64) -> Result<Value, Fault> {
     if is_finite(x) { Ok(Value::Real(x)) } else { Err(not_finite(call, scalar, x)) }
@@ -1629,7 +1623,6 @@ fn check_length(call: &Call, name: &str, given: usize, needed: usize) -> Result<
     Err(call.error(format_args!("{name} = {given} (allowed: {needed})")))
 }
 
-/// Finds the scalar of a value reference, which must have the type of the call.
 #[inline]
 fn scalar<M: Model, V: Version>(call: &Call, reference: u32) -> Result<&'static Scalar<M>, Fault> {
     V::scalar(reference, call.c_type).map_err(|why| call.error(why))

@@ -41,7 +41,6 @@ const NAMES: [(&str, Option<Topic>); 6] = [
     ("logAll", None),
 ];
 
-/// Returns the categories of a model; one without events has no `logEvents`.
 fn category_names<M: Model>(table: &Table<M>) -> &'static [(&'static str, Option<Topic>)] {
     if table.about.events.is_empty() { &NAMES[1..] } else { &NAMES }
 }

@@ -595,7 +595,6 @@ impl<M: Dynamics> Variable<M> {
         }
     }
 
-    /// Describes the allowed range in the variable's unit, for messages.
     fn allowed(&self) -> String {
         match self.kind {
             Kind::Real(Quantity { min, max, .. }) => match (min, max) {

@@ -43,7 +43,6 @@ impl Wheels {
         }
     }
 
-    /// Records a step in which h_wheels changed from `before` to its present value.
     fn record_step(&mut self, before: [f64; 3], inputs: &Inputs) {
         self.record_torque(inputs);
         for i in 0..3 {

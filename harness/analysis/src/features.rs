@@ -122,7 +122,6 @@ impl Features {
     }
 }
 
-/// Number of simulated errors, which determines a standard deviation to 7 %.
 const DRAWS: usize = 100;
 const WAVES: usize = 8;
 

@@ -82,7 +82,6 @@ pub fn largest_other(time: &[f64], residual: &[f64], frequency: f64) -> (f64, f6
 /// Row of a phasor: time, ∫A, ∫A², A and φ.
 type Row = (f64, f64, f64, f64, f64);
 
-/// A first estimate of one record.
 #[derive(Clone, Copy, Debug)]
 pub struct Start {
     pub frequency: f64,

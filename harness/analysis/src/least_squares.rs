@@ -37,7 +37,6 @@ pub fn minimise(residuals: Residuals, derivatives: Derivatives, x: &[f64]) -> Mi
     }
 }
 
-/// Returns the derivatives of the residuals by central differences with these steps.
 pub fn differences(residuals: Residuals, x: &[f64], steps: &[f64]) -> DMatrix<f64> {
     let columns: Vec<DVector<f64>> = (0..x.len())
         .map(|j| {

@@ -9,7 +9,6 @@ use rand_pcg::rand_core::Rng;
 pub struct Random(Pcg64);
 
 impl Random {
-    /// Returns stream number `stream` for this seed; the streams of one seed are independent.
     pub fn new(seed: u64, stream: u64) -> Self {
         let mut generator = Pcg64::new(seed.into(), stream.into());
         // Seeds and streams that differ in few bits begin similarly, so the first numbers are dropped.
@@ -19,7 +18,6 @@ impl Random {
         Random(generator)
     }
 
-    /// Returns a uniformly distributed number from 0 (included) to 1 (excluded).
     pub fn uniform(&mut self) -> f64 {
         (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
     }

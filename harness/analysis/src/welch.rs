@@ -25,7 +25,6 @@ pub const SEGMENTS: usize = 8;
 pub enum Segments {
     /// Length in seconds; it is reduced if [`SEGMENTS`] of them do not fit into the record.
     Seconds(f64),
-    /// The longest length of which [`SEGMENTS`] fit into the record.
     Longest,
 }
 

@@ -8,7 +8,6 @@ use zip::CompressionMethod;
 
 use super::findings::Findings;
 
-/// Files and folders that FMI 2.0 allows at the top level of an FMU.
 const AT_THE_TOP: [&str; 9] = [
     "modelDescription.xml",
     "model.png",
@@ -35,7 +34,6 @@ pub struct Entry {
 pub struct Archive {
     pub entries: Vec<Entry>,
     broken: Option<String>,
-    /// Reason why the other commands of `hubslosh` do not open the archive.
     refusal: Option<String>,
     directory: temporary::Folder,
 }

@@ -59,17 +59,14 @@ pub(crate) fn tuple(folder: &str) -> Option<Form> {
     }
 }
 
-/// An interface that the description declares, with the functions that its binary must export.
 struct Declared {
     interface: String,
     identifier: String,
-    /// Functions that the binary of this interface must export.
     wanted: Vec<&'static str>,
 }
 
 struct Placed {
     name: String,
-    /// File name without its ending, to compare with modelIdentifier.
     identifier: String,
     folder: String,
     kind: Option<Kind>,
@@ -89,7 +86,6 @@ pub struct Binaries {
     own_folder: &'static str,
 }
 
-/// Returns an interface with the `wanted` functions; `None` if it has no modelIdentifier.
 fn declare(element: &Element, wanted: Vec<&'static str>) -> Option<Declared> {
     let identifier = element.get("modelIdentifier")?.to_string();
     Some(Declared { interface: element.name.to_string(), identifier, wanted })
@@ -184,17 +180,14 @@ impl Binaries {
         self.placed.iter().find(|p| p.folder == self.own_folder).map(|p| p.name.as_str())
     }
 
-    /// Returns the folder of binaries for the platform on which this check runs.
     pub fn own_folder(&self) -> &'static str {
         self.own_folder
     }
 
-    /// Lists the names and contents of the binaries that could be parsed.
     fn readable(&self) -> impl Iterator<Item = (&str, &Binary)> {
         self.placed.iter().filter_map(|p| Some((p.name.as_str(), p.binary.as_ref().ok()?)))
     }
 
-    /// Calls `look` for each binary that could be parsed. The rule is skipped if there is none.
     fn each(&self, findings: &mut Findings, look: impl Fn(&str, &Binary, &mut Findings)) {
         if self.readable().next().is_none() {
             findings.skip("no binary can be read here");

@@ -61,7 +61,6 @@ pub fn model_identifier(d: &Description, findings: &mut Findings) {
     identifiers(d.interfaces(), findings);
 }
 
-/// Reports each interface whose modelIdentifier cannot be the start of a C function's name.
 pub(crate) fn identifiers<'d>(
     interfaces: impl Iterator<Item = &'d Element>,
     findings: &mut Findings,
@@ -215,13 +214,10 @@ pub fn units(d: &Description, findings: &mut Findings) {
     d.each(findings, |v| wrong_unit(v, v.typed.get("displayUnit"), &units));
 }
 
-/// Returns the elements `Unit` by name.
 pub(crate) fn unit_definitions(root: &Element) -> BTreeMap<&str, &Element> {
     root.list("UnitDefinitions").filter_map(|unit| Some((unit.get("name")?, unit))).collect()
 }
 
-/// Returns what is wrong with the unit of a variable, or with one of the display units `shown` of the
-/// variable and its aliases.
 pub(crate) fn wrong_unit<'d>(
     v: &Common,
     shown: impl IntoIterator<Item = &'d str>,

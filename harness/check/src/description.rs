@@ -54,7 +54,6 @@ pub struct Common {
     /// The element with the type's attributes (start, min, unit …): in FMI 2.0 the child of ScalarVariable,
     /// in FMI 3.0 the variable's own element.
     pub typed: Element,
-    /// The variable's element as it stands in the file, without inherited attributes.
     pub(crate) written: Element,
 }
 
@@ -75,7 +74,6 @@ pub struct Unknown {
 }
 
 impl Variable {
-    /// Returns the position of the state of which this variable is the derivative.
     pub fn derivative_of(&self) -> Option<usize> {
         self.typed.get("derivative")?.trim().parse().ok()
     }
@@ -121,7 +119,6 @@ impl Common {
         }
     }
 
-    /// Returns "line N, NAME", the place of this variable in findings.
     pub fn place(&self) -> String {
         format!("line {}, {}", self.line, self.name)
     }
@@ -155,7 +152,6 @@ pub(crate) fn split_attribute(element: &Element, attribute: &str) -> Option<Vec<
     Some(element.get(attribute)?.split_whitespace().map(str::to_string).collect())
 }
 
-/// Adds a finding for each variable for which `wrong` returns a text.
 pub(crate) fn each<'v, V: Deref<Target = Common> + 'v>(
     variables: impl IntoIterator<Item = &'v V>,
     findings: &mut Findings,
@@ -168,7 +164,6 @@ pub(crate) fn each<'v, V: Deref<Target = Common> + 'v>(
     }
 }
 
-/// Returns the allowed values of `initial` in FMI 2.0; see [`Initials`].
 pub(crate) fn initials(
     causality: &Causality,
     variability: &Variability,
@@ -255,7 +250,6 @@ impl Description {
         listed.filter_map(Variable::derivative_of).collect()
     }
 
-    /// Adds a finding for each variable for which `wrong` returns a text.
     pub(crate) fn each<'d>(
         &'d self,
         findings: &mut Findings,

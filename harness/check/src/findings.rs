@@ -25,7 +25,6 @@ impl Severity {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Finding {
     pub severity: Severity,
-    /// Location of the fault: a file, line, variable or call.
     pub place: String,
     pub text: String,
 }
@@ -44,7 +43,6 @@ pub struct Findings {
 }
 
 impl Findings {
-    /// Creates an empty list whose findings will have this severity.
     pub fn new(severity: Severity) -> Findings {
         Findings {
             severity,

@@ -83,7 +83,6 @@ fn write_element(
     Ok(xml.write(XmlEvent::end_element())?)
 }
 
-/// Returns a text without the characters that XML does not allow.
 fn xml_characters(text: &str) -> String {
     let allowed = |c: &char| matches!(c, '\t' | '\n' | '\r' | ' '..='\u{fffd}' | '\u{10000}'..);
     text.chars().filter(allowed).collect()

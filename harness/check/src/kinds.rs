@@ -15,7 +15,6 @@ use super::findings::Findings;
 use super::under_test::{FmuUnderTest, Interface, Life, Reading, Session};
 
 const STARTS: u64 = 12;
-/// Allowed relative difference of two measured factors.
 const AGREE: f64 = 1e-4;
 
 struct Pair<'d> {
@@ -50,7 +49,6 @@ fn pairs<'d>(fmu: &'d FmuUnderTest, list: &'static str, unknowns: &'d [Unknown])
     pairs
 }
 
-/// A measured factor, and the part of it that may be rounding.
 #[derive(Clone, Copy)]
 struct Factor {
     value: f64,
@@ -78,8 +76,6 @@ fn set_known(session: &mut Session, known: &Variable, x: f64) -> Result<bool> {
     Ok(session.set(known, &Reading::Real(x)).is_ok())
 }
 
-/// Measures the factor of a pair at the present point of the session, by a finite difference of `share` of
-/// the known's magnitude.
 fn factor(session: &mut Session, pair: &Pair, share: f64) -> Result<Option<Factor>> {
     let here = session.real(pair.known)?;
     let before = session.real(pair.unknown)?;

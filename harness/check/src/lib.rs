@@ -64,7 +64,6 @@ pub use self::rule::{Check, Rule};
 pub use self::rules::fmi2::RULES;
 pub use self::under_test::FmuUnderTest;
 
-/// A rule as `hubslosh check --list --json` and the package print it.
 #[derive(Debug, serde::Serialize)]
 pub struct Statement {
     fmi: &'static str,
@@ -220,8 +219,6 @@ pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) ->
     Ok(Report { path: path.to_path_buf(), outcomes, unchecked, bug })
 }
 
-/// Writes the parsed description to a file in a temporary folder, from which the processes of the rules read
-/// it.
 fn write_description(root: &Element) -> Result<(temporary::Folder, PathBuf)> {
     let folder = temporary::Folder::new()?;
     let path = folder.path().join("description");

@@ -313,7 +313,6 @@ pub fn deterministic<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<(
     Ok(())
 }
 
-/// Simulates the same run twice and describes the first difference between the results.
 fn differs_when_run_again<F: UnderTest>(fmu: &F, using: F::Use) -> Result<Option<String>> {
     let run = || -> Result<_> {
         let mut session = fmu.running(using)?;
@@ -416,7 +415,6 @@ pub fn terminate<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// Name and closure of a call that rule [`order`] makes in a wrong state.
 type Misplaced = (&'static str, fn(&mut Session) -> Result<(), CallError>);
 
 pub fn order(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {

@@ -44,11 +44,9 @@ pub fn skip<T>(why: impl Into<String>) -> Result<T> {
 
 /// The loaded binaries of an FMU, with a record of the call that is being made.
 pub struct Loaded<V: Version> {
-    /// One binary, or two if modelIdentifier differs between the interfaces.
     binaries: Vec<Fmu<V>>,
     /// The interfaces that can be called, Co-Simulation first, each with the index of its binary.
     interfaces: Vec<(Interface, usize)>,
-    /// The interfaces whose binary cannot be loaded: interface, modelIdentifier and reason.
     broken: Vec<(Interface, String, String)>,
     pub deadline: Instant,
     doing: RefCell<String>,
@@ -168,7 +166,6 @@ impl<V: Version> Loaded<V> {
         answer
     }
 
-    /// Returns the text of the call that was announced last.
     pub fn last_call(&self) -> String {
         let doing = self.doing.borrow();
         if doing.is_empty() { "a first call".into() } else { doing.clone() }
@@ -238,7 +235,6 @@ pub trait UnderTest: Deref<Target = Loaded<Self::Version>> {
     /// A way to use an instance: the interface, and in FMI 3.0 also the optional features that the host
     /// enables.
     type Use: Copy;
-    /// An instance together with its present state in the state machine.
     type Session<'f>: Life<'f, Self::Version>
     where
         Self: 'f;
@@ -250,14 +246,12 @@ pub trait UnderTest: Deref<Target = Loaded<Self::Version>> {
 
     fn root(&self) -> &Element;
 
-    /// Lists the ways in which the FMU declares that it can be used.
     fn uses(&self) -> Vec<Self::Use>;
 
     fn name(using: Self::Use) -> &'static str;
 
     fn interface(using: Self::Use) -> Interface;
 
-    /// Creates an instance for one interface of the FMU under test.
     fn session(&self, using: Self::Use) -> Result<Self::Session<'_>>;
 
     /// Creates an instance and initialises it with the FMU's default experiment, so that it is ready for a
@@ -268,7 +262,6 @@ pub trait UnderTest: Deref<Target = Loaded<Self::Version>> {
     /// NULL.
     fn provoke_messages(&self) -> Result<(Vec<Message>, usize)>;
 
-    /// Returns true if the element of `interface` declares the capability `flag`.
     fn can(&self, interface: Interface, flag: &str) -> bool {
         self.root().child(element(interface)).is_some_and(|element| element.flag(flag))
     }
@@ -282,7 +275,6 @@ pub trait UnderTest: Deref<Target = Loaded<Self::Version>> {
     }
 }
 
-/// Life cycle of an instance, in the order of the standard's state machine.
 pub trait Life<'f, V: Version + 'f> {
     type Reading;
     /// The host's own state (for example time), which a saved FMU state does not contain.
@@ -301,14 +293,12 @@ pub trait Life<'f, V: Version + 'f> {
     /// If a step fails; `steps.run` or `exchange.run` reports this.
     fn advance(&mut self, steps: usize) -> Result<()>;
 
-    /// Reads every variable, with one call of the FMU per variable.
     fn readings(&mut self) -> Result<Vec<Self::Reading>>;
 
     /// Describes the first variable whose value differs in at least one bit, or returns `None` if all are
     /// equal.
     fn difference(&self, ours: &[Self::Reading], theirs: &[Self::Reading]) -> Option<String>;
 
-    /// Returns the host's own state, to which [`Life::go_back`] returns later.
     fn mark(&self) -> Self::Mark;
 
     fn go_back(&mut self, to: &Self::Mark);

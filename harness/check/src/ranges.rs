@@ -69,7 +69,6 @@ fn refusal(fmu: &FmuUnderTest, v: &Variable, value: &Reading) -> Result<Result<(
 
 pub fn limits_exact(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     const JUST: f64 = 1e-6;
-    /// Distance from a bound at which an Integer is outside any reasonable range.
     const FAR: f64 = 1000.0;
     let mut any = false;
     let settable = fmu.variables().iter().filter(|v| v.is_set_by_hosts());
@@ -203,7 +202,6 @@ pub fn items_known(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// Lists values of a parameter or input that are far from its start value and within its bounds.
 fn far_values(v: &Variable) -> Vec<f64> {
     let (min, max) = v.bounds();
     let Some(Reading::Real(start)) = start_value(v) else { return Vec::new() };

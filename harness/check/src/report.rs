@@ -5,7 +5,6 @@ use std::time::Duration;
 use crate::findings::{Finding, Findings, Severity};
 use crate::rule::Rule;
 
-/// Largest number of findings of one rule in the text report. The JUnit file has all that were stored.
 const SHOWN: usize = 8;
 
 pub struct Outcome {
@@ -16,7 +15,6 @@ pub struct Outcome {
 
 pub struct Report {
     pub path: PathBuf,
-    /// Results of the rules, in the order of the table.
     pub outcomes: Vec<Outcome>,
     /// The error that no selected rule was checked. A report with this error says nothing about the FMU.
     pub unchecked: Option<String>,

@@ -27,7 +27,6 @@ use Written::*;
 pub struct Kind {
     names: &'static str,
     needed: Attributes,
-    /// Optional attributes, in the order in which findings list them.
     optional: [Attributes; 3],
     children: Children,
 }
@@ -38,9 +37,7 @@ pub enum Children {
     Any,
     /// Each of these elements at most once, in this order; those marked with `!` are required.
     Sequence(&'static [&'static str]),
-    /// Any number of each of these elements, in this order.
     Ordered(&'static [&'static str]),
-    /// One or more of these elements, in any order.
     Many(&'static [&'static str]),
     /// Exactly one of the first elements, then any of the second.
     Choice(&'static [&'static str], &'static [&'static str]),
@@ -262,7 +259,6 @@ pub fn structure_by(kinds: &'static [Kind], root: &Element, findings: &mut Findi
     elements(kinds, "", root, findings);
 }
 
-/// Elements on which the schema of FMI 3.0 allows attributes of other namespaces and vendors.
 const ANY_ATTRIBUTE: [&str; 3] = ["ModelExchange", "CoSimulation", "ScheduledExecution"];
 
 fn elements(kinds: &'static [Kind], parent: &str, element: &Element, findings: &mut Findings) {

@@ -21,7 +21,6 @@ pub fn uses_with<F: UnderTest>(fmu: &F, can: &str, findings: &mut Findings) -> V
 const SAVE: &str = "canGetAndSet";
 const SERIALIZE: &str = "canSerialize";
 
-/// Simulates some steps from the host's state at which the FMU state was saved, and returns the values.
 fn continue_from<'f, F: UnderTest + 'f>(
     session: &mut F::Session<'f>,
     from: &Mark<'f, F>,

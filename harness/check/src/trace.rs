@@ -8,7 +8,6 @@ use super::findings::Findings;
 
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub enum Crash {
-    /// The crash is an error, whatever the severity of the rule.
     Error,
     /// The crash has the severity of the rule, because the standard leaves the call's effect open.
     Open,

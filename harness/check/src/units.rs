@@ -17,7 +17,6 @@ use host::xml::Element;
 const BASE: [&str; 8] = ["kg", "m", "s", "A", "K", "mol", "cd", "rad"];
 const RADIAN: usize = 7;
 
-/// A unit whose values convert to base units by `value · factor + offset`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Unit {
     exponents: [i32; 8],
@@ -38,7 +37,6 @@ impl Unit {
         Unit { exponents, factor: self.factor * other.factor.powi(power), offset: 0.0 }
     }
 
-    /// Returns true if both units have the same dimension; radians are ignored.
     fn measures_like(&self, other: &Unit) -> bool {
         (0..RADIAN).all(|i| self.exponents[i] == other.exponents[i])
     }
@@ -166,7 +164,6 @@ fn read(name: &str) -> Vec<Unit> {
     }
 }
 
-/// Parses a unit of the form `product` or `product/factor`, such as `kg.m2/s`.
 fn quotient(rest: &mut &str) -> Option<Vec<Unit>> {
     let above = product(rest)?;
     let Some(after) = rest.strip_prefix('/') else { return Some(above) };
@@ -192,7 +189,6 @@ fn combine(left: &[Unit], right: &[Unit], power: i32) -> Vec<Unit> {
     left.iter().flat_map(|l| right.iter().map(move |r| l.times(*r, power))).collect()
 }
 
-/// Parses a symbol or an expression in parentheses, with its exponent.
 fn factor(rest: &mut &str) -> Option<Vec<Unit>> {
     let base = if let Some(inner) = rest.strip_prefix('(') {
         *rest = inner;
@@ -221,7 +217,6 @@ fn factor(rest: &mut &str) -> Option<Vec<Unit>> {
     (!base.is_empty()).then(|| base.iter().map(|u| Unit::ONE.times(*u, power)).collect())
 }
 
-/// Returns the unit in an element BaseUnit, or `None` if it is missing or one of its numbers is not valid.
 fn declared(unit: &Element) -> Option<Unit> {
     let base = unit.child("BaseUnit")?;
     let mut exponents = [0; 8];

@@ -10,7 +10,6 @@ use host::causality::{Causality, Variability};
 use host::description::Type;
 use host::fmi2::{Called, Instance};
 
-/// Lists the variables that hosts set, each with its start value.
 fn settable(fmu: &FmuUnderTest) -> impl Iterator<Item = (&Variable, Reading)> {
     let all = fmu.variables().iter().filter(|v| v.is_set_by_hosts());
     all.filter_map(|v| Some((v, start_value(v)?)))
@@ -215,7 +214,6 @@ pub fn unknown(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// Name and closure of a call with one value reference.
 type Call = (&'static str, fn(&mut Instance, u32) -> Called);
 
 /// Adds a finding unless the FMU refuses the call. Each call uses its own instance, because after an error
@@ -382,7 +380,6 @@ pub fn limits(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// Returns true if `text` contains `name` as a whole word.
 pub fn contains_name(text: &str, name: &str) -> bool {
     let part = |c: char| c.is_alphanumeric() || matches!(c, '_' | '.' | '[');
     text.match_indices(name).any(|(at, _)| {

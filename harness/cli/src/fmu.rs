@@ -73,7 +73,6 @@ pub fn all() -> Vec<PathBuf> {
     found
 }
 
-/// Returns the path of an FMU that came with this command, by its file name.
 pub fn installed(file: &str) -> Option<PathBuf> {
     folders().into_iter().map(|folder| folder.join(file)).find(|path| path.is_file())
 }
@@ -84,7 +83,6 @@ pub fn shipped_folder(folder: &str) -> Option<PathBuf> {
     packages.map(|fmus| fmus.with_file_name(folder)).find(|path| path.is_dir())
 }
 
-/// Lists the folders of [`INSTALLED`] that exist, and the same folders of Python installations next to this command.
 fn folders() -> Vec<PathBuf> {
     let command = std::env::current_exe().and_then(|path| path.canonicalize());
     let Some(own) = command.ok().and_then(|path| path.parent().map(Path::to_path_buf)) else {

@@ -89,7 +89,6 @@ impl Cli {
         )
     }
 
-    /// Returns the limits on time, memory and files of the process that runs the command.
     fn limits(&self) -> Result<Limits> {
         let call = Duration::try_from_secs_f64(self.call_limit).ok().filter(|time| !time.is_zero());
         let call =
@@ -208,12 +207,10 @@ fn main() -> ExitCode {
     code.into()
 }
 
-/// Returns true if `cargo run` started this program; cargo sets the variable.
 fn is_run_by_cargo() -> bool {
     std::env::var_os("CARGO_MANIFEST_DIR").is_some()
 }
 
-/// Runs the command in a guarded process and returns the exit code.
 fn guarded(cli: &Cli) -> Result<u8> {
     // Before the guard, because what is built must not be built within its limits.
     match cli.fmu() {
@@ -264,7 +261,6 @@ fn guarded(cli: &Cli) -> Result<u8> {
     }
 }
 
-/// Runs the command in this process and returns the exit code.
 fn carry_out(cli: Cli) -> u8 {
     let done = match cli.command {
         Some(Command::Pack(args)) => args.run(),

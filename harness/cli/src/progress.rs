@@ -13,7 +13,6 @@ pub fn steps_bar() -> Result<ProgressBar> {
     bar("{bar:40} {percent:>3} %  {elapsed} elapsed, {eta} left")
 }
 
-/// Returns a bar for the steps of many runs, with a message for their number.
 pub fn runs_bar() -> Result<ProgressBar> {
     bar("{msg} {bar:40} {percent:>3} %  {elapsed} elapsed, {eta} left")
 }
@@ -39,7 +38,6 @@ pub fn show_line(bar: &ProgressBar, line: &str) {
     }
 }
 
-/// Returns a progress bar; it is hidden with `--quiet`, or if stderr is not a terminal.
 fn bar(template: &str) -> Result<ProgressBar> {
     let bar = ProgressBar::new(0).with_style(ProgressStyle::with_template(template)?);
     if terminal::has_reader() {

@@ -11,7 +11,6 @@ use clap::builder::styling::{AnsiColor, Effects, Style, Styles};
 use files::input;
 use host::guard;
 
-/// Heading of the options that every command has, in its help.
 pub const GLOBAL: &str = "Global options";
 
 /// Options for output.
@@ -78,7 +77,6 @@ pub fn color_of_arguments() -> ColorChoice {
     value.and_then(|value| value.parse().ok()).unwrap_or_default()
 }
 
-/// Prints an error to stderr in the style of clap's errors.
 pub fn error(text: impl std::fmt::Display) {
     let text = input::without_error_numbers(&text.to_string());
     complain(format!("{} {text}\n", with_style("error:", *Styles::styled().get_error())));
@@ -135,7 +133,6 @@ fn choice() -> anstream::ColorChoice {
     }
 }
 
-/// Prints a text to stdout. If that fails, the program ends.
 pub fn print(text: String) {
     if let Err(error) = quiet_if_closed(stdout().write_all(text.as_bytes())) {
         self::error(format_args!("could not write to stdout: {error}"));

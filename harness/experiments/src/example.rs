@@ -22,7 +22,6 @@ pub struct Example {
     inputs: &'static [(&'static str, f64, Course)],
 }
 
-/// Time function of an input; t in s, largest value 1.
 type Course = fn(t: f64) -> f64;
 
 /// A sine of 2 Hz, below the slosh frequency of the bench, that grows and fades within ten seconds, followed by no torque.
@@ -152,7 +151,6 @@ fn outputs(description: &ModelDescription) -> Vec<&str> {
     outputs.map(|v| v.name.as_str()).collect()
 }
 
-/// Returns one row per [`EVERY`] steps with nine digits, without the inputs.
 fn thinned(description: &ModelDescription, answer: &Table) -> Table {
     let names: Vec<&str> = ["time"].into_iter().chain(outputs(description)).collect();
     let column = |name: &&str| {

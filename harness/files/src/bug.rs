@@ -19,7 +19,6 @@ pub struct Listener {
 
 static LISTENER: OnceLock<Listener> = OnceLock::new();
 
-/// Sets the listener of this process; the first one stays.
 pub fn set_listener(listener: Listener) {
     let _ = LISTENER.set(listener);
 }

@@ -49,7 +49,6 @@ pub fn destination(path: &Path) -> Result<Destination> {
     )
 }
 
-/// Returns the folder of a path; `.` for a bare name.
 fn containing_folder(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
@@ -110,7 +109,6 @@ fn pour(draft: &mut File, path: &Path) -> io::Result<()> {
     io::copy(draft, &mut File::options().append(true).open(path)?).map(drop)
 }
 
-/// Writes `bytes` to `path` completely or not at all, as [`atomically`] does.
 pub fn write(path: &Path, bytes: impl AsRef<[u8]>) -> Result<()> {
     atomically(path, |file| Ok(file.write_all(bytes.as_ref())?))
 }

@@ -184,7 +184,6 @@ fn read_manifest(path: &Path, is_used: bool) -> Result<BTreeMap<String, String>>
 }
 
 impl Definition<'_> {
-    /// Checks that a folder defines these runs or nothing at all.
     fn check(&self, path: &Path, kind: &Kind) -> Result<()> {
         let place = path.join(kind.definition);
         if place.exists() {
@@ -356,7 +355,6 @@ impl Store {
         output::publish_draft(&draft, &place)
     }
 
-    /// Publishes files by name, and the manifest. Removes files that were published earlier and are not now.
     pub fn publish(self, files: Vec<(&str, Vec<u8>)>) -> Result<()> {
         for (name, bytes) in &files {
             let place = self.path.join(name);

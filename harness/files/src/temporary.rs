@@ -112,7 +112,6 @@ impl Folder {
     }
 }
 
-/// Removes the folders of programs that have ended.
 fn sweep(parent: &Path, prefix: &str) {
     for entry in fs::read_dir(parent).into_iter().flatten().flatten() {
         let ours = entry.file_name().to_string_lossy().starts_with(prefix);

@@ -272,7 +272,6 @@ mod tests {
         file
     }
 
-    /// Unpacks an archive with wrong sizes, and checks that nothing was written outside of the folder.
     fn unpacked(files: &[(&str, &[u8])], lie: i64) -> Result<(), String> {
         let folder = tempfile::tempdir().unwrap();
         let inner = folder.path().join("inner");

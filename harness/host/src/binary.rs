@@ -90,13 +90,11 @@ impl fmt::Display for Kind {
 pub struct Binary {
     pub kind: Kind,
     pub size: usize,
-    /// `x86_64` or `arm64`, in the order of the file.
     pub architectures: Vec<&'static str>,
     pub libraries: Vec<String>,
     pub search_paths: Vec<String>,
     /// Newest version of glibc (Linux) or macOS that the binary needs.
     pub needs: Option<Version>,
-    /// Exported names in alphabetical order.
     pub exports: Vec<String>,
     /// Error in the code signature. macOS kills a process that loads unsigned code for arm64.
     pub signature: Option<String>,

@@ -27,7 +27,6 @@ pub enum Status {
     Discard,
     Error,
     Fatal,
-    /// The step goes on in the background (FMI 2.0 only).
     Pending,
 }
 
@@ -56,7 +55,6 @@ struct Sink {
 /// An FMU may pass any pointer. The callbacks look it up in this map and never follow it.
 static SINKS: Mutex<BTreeMap<usize, Arc<Sink>>> = Mutex::new(BTreeMap::new());
 
-/// Number of calls of a callback with a pointer that is not the environment of an instance.
 static FOREIGN: AtomicUsize = AtomicUsize::new(0);
 
 thread_local! {
@@ -245,8 +243,6 @@ macro_rules! functions {
         }
 
         impl $(<$boolean>)? $table $(<$boolean>)? {
-            /// Lists the names of all functions of the table; `version` is the index among each function's
-            /// symbols.
             pub(crate) fn symbols(version: usize) -> Vec<&'static str> {
                 vec![$([$($symbol),+][version],)*]
             }
@@ -274,7 +270,6 @@ pub(crate) use functions;
 pub struct HostState {
     pub float_control: u32,
     pub locale: String,
-    /// Hash of the installed signal handlers; 0 on systems without them.
     pub signal_handlers: u64,
     pub directory: Option<PathBuf>,
 }
@@ -309,7 +304,6 @@ impl HostState {
     }
 }
 
-/// Lists all files below a folder; the list is empty if the folder cannot be read.
 fn files_below(folder: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let below = entries.flat_map(|entry| match entry.path() {
@@ -374,7 +368,6 @@ pub(crate) fn load(
     Ok(Loaded { library, hash, changed: before.changed(), binary })
 }
 
-/// Replaces the mangled symbol in a loader's message by a readable name.
 fn with_readable_symbol(error: &str) -> String {
     const UNDEFINED: &str = "undefined symbol: ";
     match error.split_once(UNDEFINED) {

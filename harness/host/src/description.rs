@@ -44,7 +44,6 @@ pub struct ModelDescription {
 pub struct Array {
     pub length: usize,
     pub c_type: CType,
-    /// Start values as written: none, one for all elements, or one for each element.
     pub start: Vec<String>,
     /// True if structural parameters change its size, so that the declared start values have no meaning.
     pub(crate) is_resized: bool,
@@ -90,7 +89,6 @@ pub struct BaseUnit {
 }
 
 impl BaseUnit {
-    /// Base units of FMI and SSP, which are the base units of SI, and rad.
     pub const NAMES: [&str; 8] = ["kg", "m", "s", "A", "K", "mol", "cd", "rad"];
 
     /// Reads the child `BaseUnit` of an element `Unit`. Returns `None` if it is missing or one of its numbers
@@ -110,7 +108,6 @@ impl BaseUnit {
     }
 }
 
-/// The element `DisplayUnit`: displayed value = `factor` · value + `offset`.
 #[derive(Clone, Debug)]
 pub struct DisplayUnit {
     pub name: String,
@@ -142,7 +139,6 @@ pub struct Variable {
     /// Variability; `Other` with an empty text if it is missing.
     pub variability: Variability,
     pub description: String,
-    /// True if the variable may be set or read within a step (FMI 3.0).
     pub intermediate: bool,
     c_type: CType,
     kind: Type,
@@ -211,7 +207,6 @@ impl CType {
         })
     }
 
-    /// Returns the smallest and the largest value of an integer type, or `None` for other types.
     fn integer_bounds(self) -> Option<(i64, i64)> {
         Some(match self {
             CType::Int8 => (i8::MIN.into(), i8::MAX.into()),
@@ -275,7 +270,6 @@ impl Variable {
     }
 }
 
-/// Returns a text in quotes; of a long text its beginning and its length.
 fn quote_short(text: &str) -> String {
     match text.char_indices().nth(60) {
         None => format!("\"{text}\""),
@@ -301,7 +295,6 @@ impl Reader {
         }
     }
 
-    /// Reads a required attribute with `read`; adds a problem if it is missing or not valid.
     fn required<T: Default>(
         &mut self,
         element: &Element,
@@ -590,7 +583,6 @@ fn derivatives(root: &Element, is_fmi3: bool) -> Vec<(u32, u32)> {
     unknowns.filter_map(pair).collect()
 }
 
-/// Converts a row-major index, counted from 0, to indices from 1, separated by commas.
 fn indices(mut index: usize, dimensions: &[usize]) -> String {
     let mut all = Vec::new();
     for size in dimensions.iter().rev() {
@@ -601,7 +593,6 @@ fn indices(mut index: usize, dimensions: &[usize]) -> String {
     all.join(",")
 }
 
-/// Longest name of a variable, bytes.
 const LONGEST_NAME: usize = 1024;
 /// Largest number of types, and of items of one type. They are limited because each declaredType is searched
 /// among all types.
@@ -811,7 +802,6 @@ impl ModelDescription {
         Ok((si - known.offset) / known.factor)
     }
 
-    /// Lists the names of the units in which a variable may be entered, for messages.
     pub fn unit_names(&self, variable: &Variable) -> String {
         let own = self.unit(variable);
         let all = self.display_units(variable).iter().map(|shown| shown.name.as_str());

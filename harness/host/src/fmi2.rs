@@ -318,7 +318,6 @@ impl Fmu {
         self.exchange.is_some() && self.own.events.is_some()
     }
 
-    /// Lists the 25 C functions that every FMU must export.
     pub fn symbols() -> Vec<&'static str> {
         [Common::<c_int>::symbols(0), Functions::symbols(0)].concat()
     }
@@ -518,7 +517,6 @@ pub enum Callbacks {
     /// Like `Full`, but the struct is overwritten after fmi2Instantiate has returned, because it is valid
     /// only during that call.
     Fleeting,
-    /// Only the logger; the memory functions are NULL.
     Logger,
     Empty,
     Null,

@@ -87,12 +87,10 @@ impl Fmu {
         each!(Fmu, self, fmu => fmu.description())
     }
 
-    /// Returns the SHA-256 of the `.fmu` file, in hexadecimal digits.
     pub fn hash(&self) -> &str {
         each!(Fmu, self, fmu => fmu.hash())
     }
 
-    /// Returns the SHA-256 of the loaded binary, in hexadecimal digits.
     pub fn binary_hash(&self) -> &str {
         each!(Fmu, self, fmu => fmu.binary_hash())
     }
@@ -130,7 +128,6 @@ macro_rules! passed_on {
 
 passed_on! {
     take_messages() -> Vec<Message>;
-    /// Returns the texts of the warnings since the last call, and drops all other messages.
     take_warnings() -> Vec<String>;
     exit_initialization_mode() -> Called;
     /// Saves the state. It must be freed with [`Instance::free_state`]; otherwise its memory is lost.

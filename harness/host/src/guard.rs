@@ -54,7 +54,6 @@ pub struct Limits {
     /// Limit of memory beyond that in use when the first binary is loaded, bytes. The same number limits
     /// temporary files and shared memory.
     pub memory: u64,
-    /// Limit of the size of a file, bytes.
     pub file: u64,
 }
 
@@ -72,7 +71,6 @@ pub enum Cause {
     Hoard,
     /// The process was killed because its connection was closed or carried bytes that were not its messages.
     Interfered,
-    /// Our own code in the process panicked; the text is the report for the user.
     Panicked(String),
 }
 
@@ -236,7 +234,6 @@ const CLOSED: Duration = Duration::from_secs(1);
 const COUNTING: Duration = Duration::from_millis(50);
 const COUNTED: usize = 100_000;
 
-/// Returns the disk space of the files below a folder, bytes.
 fn disk_usage(folder: &Path) -> u64 {
     let (mut folders, mut bytes, mut entries) = (vec![folder.to_path_buf()], 0, 0);
     while let Some(folder) = folders.pop() {
@@ -398,7 +395,6 @@ struct Messages<F> {
     /// Size of the temporary files when the first binary was loaded, bytes; `None` before that.
     loaded: Option<u64>,
     is_endless: bool,
-    /// Report of the first panic since the last one that was caught.
     panic: Option<String>,
     done: Option<u8>,
 }
@@ -406,13 +402,10 @@ struct Messages<F> {
 // Kinds of messages.
 const ALIVE: u8 = b'.';
 const ENDLESS: u8 = b'!';
-/// The first binary is loaded. Content: size of the temporary files, bytes.
 const LOADS: u8 = b'+';
 const ANSWER: u8 = b'>';
-/// Our code has panicked. Content: the report.
 const PANICS: u8 = b'?';
 const CATCHES: u8 = b'-';
-/// The work is done. Content: the exit code.
 const DONE: u8 = b'=';
 
 impl<F: FnMut(&[u8])> Messages<F> {
@@ -422,7 +415,6 @@ impl<F: FnMut(&[u8])> Messages<F> {
         Messages { channel, hear, heard_at, loaded, is_endless: false, panic, done }
     }
 
-    /// Waits for messages for at most `pause` and handles them. Returns false if none has arrived.
     fn read(&mut self, pause: Duration) -> bool {
         let text = |content: &[u8]| String::from_utf8_lossy(content).into_owned();
         self.channel.read(pause, |kind, content| {
@@ -692,7 +684,6 @@ pub fn allow(bytes: u64) {
     let _ = bytes;
 }
 
-/// Sets a soft limit, at most to the limit with which the process was started.
 #[cfg(unix)]
 fn restrict(resource: rustix::process::Resource, bytes: u64) {
     let mut limit = rustix::process::getrlimit(resource);
@@ -715,14 +706,12 @@ fn extend(resource: rustix::process::Resource, bytes: u64) {
     }
 }
 
-/// Returns the memory in use of a kind that /proc/self/status names, bytes.
 #[cfg(target_os = "linux")]
 fn in_use(kind: &str) -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     kilobytes(&status, kind).unwrap_or(1 << 20) << 10
 }
 
-/// Parses a number in kB from the text of /proc/…/status.
 #[cfg(target_os = "linux")]
 fn kilobytes(status: &str, kind: &str) -> Option<u64> {
     let line = status.lines().find_map(|line| line.strip_prefix(kind))?;
@@ -737,7 +726,6 @@ mod tests {
     /// name of a test that does not exist.
     const CHILD: &str = "guarded_process";
 
-    /// Runs `work` in a guarded process, which runs the test `name` again, and returns the end of that process.
     fn end_of(name: &str, work: fn()) -> Cause {
         if std::env::args().any(|argument| argument == CHILD) {
             bug::keep_panics();

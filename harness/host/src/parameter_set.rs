@@ -16,7 +16,6 @@ use crate::xml::Element;
 
 #[derive(Clone, Debug, Default)]
 pub struct ParameterSet {
-    /// Parameters in the order of the file; each name occurs once.
     pub parameters: Vec<Parameter>,
     pub warnings: Vec<String>,
 }
@@ -105,7 +104,6 @@ fn text(value: &Value) -> String {
     }
 }
 
-/// Returns the parameters as a set, or an error if two of them have the same name.
 fn once(parameters: Vec<Parameter>) -> Result<ParameterSet> {
     for (k, parameter) in parameters.iter().enumerate() {
         let Parameter { name, line, .. } = parameter;

@@ -29,7 +29,6 @@ pub const fn between(hold: bool) -> &'static str {
 pub struct History {
     time: Vec<f64>,
     values: Vec<f64>,
-    /// Slope from each row to the next, per s; 0 in the last row.
     slopes: Vec<f64>,
 }
 
@@ -80,7 +79,6 @@ impl History {
         Ok(History { time, values, slopes })
     }
 
-    /// Returns a history with the same rows, each held until the next one.
     pub fn held(&self) -> History {
         let slopes = vec![0.0; self.time.len()];
         History { time: self.time.clone(), values: self.values.clone(), slopes }
@@ -107,7 +105,6 @@ impl History {
         self.at_row(self.time.partition_point(|row| *row <= t + slack), t).0
     }
 
-    /// Returns value and slope at `t` (s), if `begun` rows have begun.
     fn at_row(&self, begun: usize, t: f64) -> (f64, f64) {
         let Some(k) = begun.checked_sub(1) else { return (self.values[0], 0.0) };
         let (value, slope) = (self.values[k], self.slopes[k]);
@@ -121,7 +118,6 @@ impl History {
     }
 }
 
-/// A history that is evaluated at ascending times.
 pub struct Cursor<'h> {
     history: &'h History,
     begun: usize,
@@ -141,7 +137,6 @@ impl Cursor<'_> {
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct Schedule {
-    /// Times, ascending, s.
     pub time: Vec<f64>,
     /// True for each point that is a row of the result; `None` if all are.
     pub rows: Option<Vec<bool>>,

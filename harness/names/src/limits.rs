@@ -74,7 +74,6 @@ fn lower(sentence: &str) -> String {
     sentence[..1].to_lowercase() + &sentence[1..]
 }
 
-/// Returns a share in per cent, never rounded to nothing.
 fn percent(share: f64) -> String {
     match 100.0 * share {
         x if x < 0.1 => "less than 0.1 %".to_string(),

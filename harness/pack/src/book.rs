@@ -13,7 +13,6 @@ use crate::archive::below;
 use crate::metadata::{REPOSITORY, VERSION};
 use crate::{build_native, needs_source, root};
 
-/// Returns the address at which the book of this version can be read without the source.
 pub fn address() -> String {
     format!("{REPOSITORY}/blob/v{VERSION}/book/index.md")
 }
@@ -57,7 +56,6 @@ pub fn write(out: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Returns the Python interpreter of the environment with the packages of `book/requirements.txt`.
 fn environment(target: &Path) -> Result<PathBuf> {
     let python = if cfg!(windows) { "python" } else { "python3" };
     let made = Command::new(python)

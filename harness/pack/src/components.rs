@@ -29,7 +29,6 @@ pub struct Component {
     pub licence: String,
     pub texts: Vec<String>,
     pub purl: String,
-    /// SHA-256 of the package, if Cargo.lock has it.
     pub sha256: Option<String>,
     pub origin: String,
     pub platforms: BTreeSet<&'static str>,
@@ -231,7 +230,6 @@ fn rust_version() -> Result<String> {
     Ok(version.into())
 }
 
-/// Returns true if the reverse of `text` is in `bytes`.
 fn contains_backwards(bytes: &[u8], text: &[u8]) -> bool {
     bytes.windows(text.len()).any(|window| window.iter().rev().eq(text))
 }
@@ -290,8 +288,6 @@ pub fn licence_note(description: &ModelDescription, components: &[Component]) ->
     note
 }
 
-/// Lists the components that are linked into the command `hubslosh` and the compiled half of the Python
-/// package.
 fn linked_in_wheel(command: Packed) -> Result<Vec<Component>> {
     let native = crates(project::NATIVE, &BTreeSet::from([command.folder]))?;
     let mut all = linked("hubslosh", &[command])?;
@@ -411,7 +407,6 @@ struct Product<'a> {
     name: &'a str,
     version: &'a str,
     description: &'a str,
-    /// Names and SHA-256 of its binaries.
     files: Vec<(String, String)>,
 }
 

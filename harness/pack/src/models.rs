@@ -49,7 +49,6 @@ pub fn named(name: &str) -> Option<(Model, Fmi)> {
 }
 
 impl Model {
-    /// Reads the modelDescription.xml that is committed in the source for this version of FMI.
     pub(crate) fn description(&self, fmi: Fmi) -> Result<Vec<u8>> {
         let file = match fmi {
             Fmi::V2 => "modelDescription.xml",

@@ -19,7 +19,6 @@ use crate::project;
 
 #[derive(Debug)]
 pub struct Platform {
-    /// Folder under `binaries/` of the FMU (FMI 2.0.5, section 2.3).
     pub folder: &'static str,
     pub ending: &'static str,
     /// Build targets. If there are several, their binaries are joined into a universal binary.
@@ -32,7 +31,6 @@ pub struct Platform {
 #[derive(Debug)]
 pub struct Target {
     pub triple: &'static str,
-    /// Suffix of the triple for `cargo-zigbuild`: the oldest glibc.
     suffix: &'static str,
     pub architecture: &'static str,
 }
@@ -40,7 +38,6 @@ pub struct Target {
 #[derive(Clone, Copy, Debug)]
 enum Cargo {
     Plain,
-    /// With Zig as the linker, which includes the symbols of every glibc and of macOS.
     Zig,
 }
 
@@ -63,7 +60,6 @@ const MINGW: Tool = Tool {
     get: "Debian package gcc-mingw-w64-x86-64-win32, or MinGW-w64",
 };
 
-/// All platforms, in the order of the archive.
 pub const PLATFORMS: [Platform; 4] = [
     Platform {
         // The names of FMI 2.0 itself are for x86; for other processors it uses the tuples of FMI 3.0.
@@ -163,7 +159,6 @@ pub fn build(model: &Model) -> Result<Vec<Built>> {
     Ok(all)
 }
 
-/// Returns an error with all faults, if there are any.
 pub fn refuse(faults: &[String]) -> Result<()> {
     if !faults.is_empty() {
         bail!("the binaries would not work everywhere, so nothing was packed:{}", faults.concat());

@@ -20,7 +20,6 @@ pub fn root() -> PathBuf {
     crate_root.ancestors().nth(2).unwrap_or(crate_root).to_path_buf()
 }
 
-/// Returns true if the project's source is present.
 pub fn has_source() -> bool {
     root().join("Cargo.toml").is_file()
 }
@@ -50,7 +49,6 @@ pub fn build(package: &str, quiet: bool) -> Result<PathBuf> {
     cargo_build(command, quiet)
 }
 
-/// Returns a command that runs Cargo: the one that runs this program, if there is one.
 pub(crate) fn cargo() -> Command {
     Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
 }
@@ -105,7 +103,6 @@ pub fn build_native(quiet: bool) -> Result<PathBuf> {
     cargo_build(command, quiet)
 }
 
-/// Runs Cargo and returns the path of the binary. Cargo's progress goes to stderr.
 pub(crate) fn cargo_build(mut command: Command, quiet: bool) -> Result<PathBuf> {
     let root = root();
     needs_source("an FMU's binary")?;

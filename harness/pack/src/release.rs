@@ -67,7 +67,6 @@ fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// Returns true if a file's name is `NAME-VERSION` followed by `-` or `.`.
 fn belongs_to(file: &str, name: &str, version: &str) -> bool {
     let rest = file.strip_prefix(name).and_then(|rest| rest.strip_prefix('-'));
     rest.and_then(|rest| rest.strip_prefix(version))
@@ -127,7 +126,6 @@ fn record(
     Ok(written)
 }
 
-/// Returns the release files of one FMI version: endings of their names, and contents.
 fn version_files(
     model: &Model,
     fmi: Fmi,

@@ -85,7 +85,6 @@ pub fn for_tests(fmus: &[&Path]) -> PathBuf {
     make().unwrap_or_else(|error| panic!("the wheel for the tests could not be packed: {error:#}"))
 }
 
-/// Builds the binaries for the platform on which this program runs; the command is this program.
 fn native() -> Result<Binaries> {
     let made = tempfile::tempdir().context("no temporary folder can be made")?;
     let mut fmus = Files::new();
@@ -170,7 +169,6 @@ fn cross_one(
     })
 }
 
-/// Returns the file name of the compiled half, for the ending of the platform's libraries.
 fn native_name(ending: &str) -> &'static str {
     if ending == ".dll" { "_native.pyd" } else { "_native.abi3.so" }
 }
@@ -186,8 +184,6 @@ fn write_one(
     Ok(out)
 }
 
-/// Returns the tags of a platform on which all these binaries run ("Platform compatibility tags"). For glibc
-/// 2.17 the older name is added.
 fn tags(binaries: &[Binary]) -> Result<Vec<String>> {
     let Some(Binary { kind, architectures, .. }) = binaries.first() else {
         bail!("a wheel without binaries has no platform")
@@ -301,7 +297,6 @@ mod tests {
         );
     }
 
-    /// A binary that needs that version.
     fn binary(kind: Kind, architecture: &'static str, needs: Option<Version>) -> Binary {
         Binary {
             kind,

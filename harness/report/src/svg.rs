@@ -96,7 +96,6 @@ pub fn series(points: Vec<(f64, f64)>, color: &str, style: Style, title: &str) -
 
 #[derive(Clone, Debug)]
 pub struct Chart {
-    /// Title, which is also the text for screen readers.
     pub title: String,
     pub size: (f64, f64),
     pub x: Axis,
@@ -114,12 +113,10 @@ const STYLE: &str = "svg { background: #ffffff; font: 11px system-ui, sans-serif
 const MARGIN: (f64, f64, f64, f64) = (56.0, 12.0, 26.0, 40.0);
 
 impl Chart {
-    /// Creates a chart in the size of a figure, with a legend.
     pub fn new(title: &str, x: Axis, y: Axis, series: Vec<Series>) -> Self {
         Chart { title: title.into(), size: (640.0, 400.0), x, y, series, legend: true }
     }
 
-    /// Returns the `<svg>` element for a page that styles it.
     pub fn svg(&self) -> String {
         self.drawing(None)
     }

@@ -243,7 +243,6 @@ pub fn names(path: &Path) -> Result<Vec<String>> {
     names.with_context(|| format!("{} cannot be used", path.display()))
 }
 
-/// Opens a CSV file and reads its header: the rows that follow, and the names of the columns.
 fn header(path: &Path) -> Result<(csv::Reader<File>, Vec<String>)> {
     let file = input::open(path).context("the file cannot be opened")?;
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(file);

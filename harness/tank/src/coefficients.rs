@@ -67,7 +67,6 @@ pub struct Energy {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LimitSource {
-    /// Comparison with fully nonlinear potential flow in upright cylinders (`formulas::limits`).
     PotentialFlow,
     /// A share of the angle at which the second-order wave is half of the first-order wave: the smallest
     /// share that upright cylinders have.

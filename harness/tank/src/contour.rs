@@ -42,7 +42,6 @@ impl From<String> for Problems {
 
 /// Largest size, m. Larger tanks are probably drawn in millimetres.
 pub(crate) const LARGEST: f64 = 100.0;
-/// Largest distance of the ends of two segments that are joined, over the tank's size.
 const JOINED: f64 = 1e-6;
 const LEVEL: f64 = 1e-9;
 
@@ -167,7 +166,6 @@ impl Contour {
         self.bottom
     }
 
-    /// Returns the lowest point as its height, m, and its smallest radius, m.
     pub(crate) fn lowest(&self) -> (f64, f64) {
         let outline = Outline::new(&self.segments);
         let points = || outline.points.iter().flatten();
@@ -176,7 +174,6 @@ impl Contour {
         (self.bottom, flat.map(|p| p[0]).fold(f64::MAX, f64::min))
     }
 
-    /// Returns the largest radius, m.
     pub(crate) fn largest_radius(&self) -> f64 {
         let outline = Outline::new(&self.segments);
         outline.points.iter().flatten().map(|p| p[0]).fold(0.0, f64::max)
@@ -235,7 +232,6 @@ impl Contour {
         ends.fold(self.bottom, f64::max)
     }
 
-    /// Returns the number of separate parts of the wall that are wet. For `surface` see [`Contour::integrate_wetted`].
     pub(crate) fn count_pools(&self, surface: impl Fn(f64) -> f64) -> usize {
         let pieces = self.wetted_pieces(&surface, &[]);
         let mut pools = usize::from(!pieces.is_empty());
@@ -470,7 +466,6 @@ fn shoulder(fill: f64) -> Problems {
     .into()
 }
 
-/// Returns the defect of a single segment, as words for a message.
 fn defect(segment: &Segment) -> Option<String> {
     let numbers: Vec<f64> = match segment.curve {
         Curve::Line { from, to } => vec![from[0], from[1], to[0], to[1]],
@@ -568,7 +563,6 @@ fn extreme(segment: &Segment, sign: f64) -> (f64, f64) {
     places.into_iter().fold((at, f64::MAX), |low, x| if x.1 < low.1 { x } else { low })
 }
 
-/// The contour as short straight lines, for checks that do not depend on their curvature.
 struct Outline {
     points: Vec<Vec<Point>>,
 }

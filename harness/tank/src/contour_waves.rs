@@ -67,7 +67,6 @@ struct Fields {
 }
 
 impl Fields {
-    /// Computes u_n = s^-n |x|^n P_n^m at the points (r, z), for n from m (from 1 for m = 0) to `degree`.
     fn new(m: usize, degree: usize, scale: f64, points: &[[f64; 2]]) -> Fields {
         let first = m.max(1);
         let count = degree + 1 - first;
@@ -247,7 +246,6 @@ impl Liquid {
         all
     }
 
-    /// Returns the integrals int f_i u_k rho drho over the surface.
     fn coupling(&self, f: &DMatrix<f64>, u: &DMatrix<f64>) -> DMatrix<f64> {
         DMatrix::from_fn(f.ncols(), u.ncols(), |i, k| self.integral(|q| f[(q, i)] * u[(q, k)]))
     }
@@ -336,7 +334,6 @@ struct Second {
 }
 
 impl Second {
-    /// Returns the elevation at the wall on the side of the crest when it is largest there.
     fn at_wall(&self, f: &DMatrix<f64>) -> f64 {
         (f.row(f.nrows() - 1) * (&self.p + &self.r))[0]
     }

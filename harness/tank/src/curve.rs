@@ -127,7 +127,6 @@ impl Curve {
     }
 }
 
-/// Returns the radius of the oval of Cassini and its derivative by the polar angle.
 fn cassini(a: f64, c: f64, t: f64) -> (f64, f64) {
     let (sin, cos) = (2.0 * t).sin_cos();
     let root = (a.powi(4) - c.powi(4) * sin * sin).sqrt();

@@ -150,7 +150,6 @@ struct Nearest {
 }
 
 impl Nearest {
-    /// Creates the shape of the whole wall of a tank whose first mode is `first`.
     fn from_whole_wall(found: Recognised, first: formula::Mode, nu: f64) -> Option<Nearest> {
         let (shape, g) = (found.measured(), first.omega * first.omega / first.lambda);
         if shape != shape.at_measured_depth() {
@@ -236,8 +235,6 @@ impl Nearest {
     }
 }
 
-/// Returns a sentence about the damping of a wall that is no measured shape, or is one in part, with the
-/// shapes that it is near.
 fn mixture(found: &[Nearest], near: &[Nearest], factor: f64) -> String {
     let unmeasured = formula::UNMEASURED;
     if found.is_empty() {

@@ -13,7 +13,6 @@ use crate::table::{short, significant};
 /// Largest error between two points, over 1 + |s| or 1 + |kappa|, without a warning.
 const LARGEST: f64 = 0.05;
 
-/// A fill, m above the lowest point, with its mass of liquid, kg, and the parameters of the tank there.
 pub(crate) struct AtFill<'a> {
     pub fill: f64,
     pub liquid: f64,
@@ -33,7 +32,6 @@ impl<'a> AtFill<'a> {
         self.set.third_order.iter().find(|(mode, _)| *mode == n).map(|(_, known)| *known)
     }
 
-    /// Returns the reason why the coefficients are not known, as words for a note.
     fn reason(&self) -> &str {
         let mut reasons = self.set.notes.iter().rev().filter_map(|note| note.strip_prefix(PREFIX));
         let reason = reasons.next().unwrap_or("no formula is known for this mode");
@@ -41,7 +39,6 @@ impl<'a> AtFill<'a> {
     }
 }
 
-/// Beginning of the notes about finite amplitude in the parameters of one fill.
 pub(crate) const PREFIX: &str = "finite amplitude: ";
 
 /// Columns of a mode, s and kappa at the points of a table, with notes about their source, errors and gaps.

@@ -69,7 +69,6 @@ impl Curves {
         }
     }
 
-    /// Returns the largest errors of a mode with these points, in frequency, mass and hinge.
     fn errors(&self, n: usize, points: &[usize]) -> [f64; 3] {
         let taken = |y: &[f64]| points.iter().map(|i| y[*i]).collect::<Vec<_>>();
         let x = taken(&self.liquid);
@@ -106,7 +105,6 @@ fn bob(row: &ModalData, n: usize) -> f64 {
     row.modes[n].height.unwrap_or(row.z_cg)
 }
 
-/// Returns the number of modes that carry liquid in all rows, at least one.
 fn count_carrying_modes(rows: &[ModalData]) -> usize {
     let most = rows.iter().map(|row| row.modes.len()).min().unwrap_or(0);
     let carries = |n: &usize| rows.iter().all(|row| row.modes[*n].m > 1e-6 * row.m_liq);
@@ -347,7 +345,6 @@ fn fill_unknown_limits(limits: Vec<Option<f64>>) -> Vec<Option<f64>> {
 
 const INERTIA: &str = "nonlinear_inertia[";
 
-/// Returns the numbers of modes with their third-order columns; see [`fill_amplitude::columns`].
 fn third_order(
     points: Vec<AtFill>,
     between: Vec<AtFill>,

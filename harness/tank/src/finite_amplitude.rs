@@ -111,7 +111,6 @@ impl Coefficients {
         }
     }
 
-    /// Returns the slosh angle, rad, at which a pendulum in place of these coefficients is out of range.
     pub(crate) fn pendulum_limit(&self) -> f64 {
         let [planar, circular] = formulas::third_order::shifts(1.0, 1.0);
         let shifts = [Some(planar), self.circular.map(|_| circular)];
@@ -211,7 +210,6 @@ pub fn amplitude_dependence(tank: &Tank, data: &ModalData) -> FiniteAmplitude {
     FiniteAmplitude { mode, mode_y, warnings }
 }
 
-/// Returns the coefficients from two truncations of a section with vertical walls.
 fn coefficients_from_overlaps(
     [rough, fine]: [&Overlaps; 2],
     depth: f64,

@@ -35,7 +35,6 @@ impl Monotone {
         Monotone { x: x.to_vec(), y: y.to_vec(), slope, curvature }
     }
 
-    /// Returns the value at `x`; outside the points it is the value at the nearest end.
     pub fn evaluate(&self, x: f64) -> f64 {
         let count = self.x.len();
         let x = x.clamp(self.x[0], self.x[count - 1]);

@@ -231,24 +231,18 @@ pub struct ModalData {
     pub damping: Option<Damping>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub finite_amplitude: Option<FiniteAmplitude>,
-    /// The liquid in steady rotation with the tank, if a rate is given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub spin: Option<Spin>,
-    /// The wetted wall.
     #[serde(skip)]
     pub wall: Option<Wall>,
 }
 
-/// The liquid of a tank that turns with it about its axis.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Spin {
-    /// Rate Omega about the axis, rad/s.
     pub omega: f64,
-    /// Specific force along the axis, m/s².
     pub gravity: f64,
     /// Height of the centre of mass, m from the contour's own zero.
     pub z_cg: f64,
-    /// Inertia about the axis, kg·m².
     #[serde(rename = "I_axis")]
     pub i_axis: f64,
     /// Inertia across the axis about the centre of mass, kg·m².
@@ -279,7 +273,6 @@ pub struct Spin {
     pub decay: Option<f64>,
     /// True if the parameters of the liquid at rest still describe the motion of the spinning one.
     pub in_range: bool,
-    /// What the spin changes, in words.
     pub warnings: Vec<String>,
 }
 

@@ -16,7 +16,6 @@ const LIQUID: &str = "#dcecf7";
 const INK: &str = "#222";
 pub const FAINT: &str = "#999";
 
-/// A rectangle of the page, px, with the values at its edges.
 #[derive(Clone, Copy)]
 pub struct Frame {
     pub left: f64,
@@ -118,7 +117,6 @@ fn outline(segments: &[Segment]) -> Vec<Point> {
     points
 }
 
-/// Drawn section of a tank: wall and wetted wall, both to the right of the axis.
 struct Section {
     wall: Vec<Point>,
     wetted: Vec<Point>,
@@ -154,7 +152,6 @@ fn section(tank: &Tank, data: &ModalData) -> Section {
     }
 }
 
-/// Returns a frame with equal scales for both halves of the tank and `margin` m above and below.
 fn tank_frame(
     section: &Section,
     left: f64,

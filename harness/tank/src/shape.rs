@@ -9,7 +9,6 @@ use crate::contour::Wall;
 use crate::curve::{Point, Segment, norm, sub};
 use crate::tank::Shape;
 
-/// Largest distance of the wetted wall from a shape, over its size.
 const SAME: f64 = 1e-6;
 
 const PLACES: usize = 64;
@@ -107,7 +106,6 @@ pub(crate) fn nearby_shapes(wall: &Wall, fill: f64) -> Vec<Part> {
     KINDS.into_iter().filter_map(of_kind).collect()
 }
 
-/// Distance of the wall from a shape, over its size, from which the wall does not count as this shape.
 const FAR: f64 = 0.01;
 
 /// Distance of the wall from a shape, over depth or largest radius, from which the wall is not near this
@@ -149,7 +147,6 @@ impl Cut {
     }
 }
 
-/// Kinds of measured shapes, in the order in which [`recognise`] tries them.
 const KINDS: [Kind; 4] = [Kind::Cylinder, Kind::Cone, Kind::Sphere, Kind::Torus];
 
 #[derive(Clone, Copy)]
@@ -264,7 +261,6 @@ fn crossing(a: Point, b: Point, z: f64) -> f64 {
     a[0] + (z - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
 }
 
-/// Returns the distance of a point from a measured shape whose lowest point is at the height `bottom`.
 fn distance(shape: &Shape, [r, z]: Point, bottom: f64) -> f64 {
     let z = z - bottom;
     match *shape {

@@ -135,7 +135,6 @@ pub fn spin(
     })
 }
 
-/// The surface g z - Omega^2 r^2/2 = c.
 struct Surface {
     omega: f64,
     gravity: f64,
@@ -143,7 +142,6 @@ struct Surface {
 }
 
 impl Surface {
-    /// Returns the surface that leaves `volume`, m3, in the tank.
     fn holding(contour: &Contour, volume: f64, omega: f64, gravity: f64) -> Surface {
         let (bottom, top) = (contour.bottom(), contour.bottom() + contour.depth());
         let radius = contour.largest_radius();
@@ -165,7 +163,6 @@ impl Surface {
         Surface { omega, gravity, c: 0.5 * (low + high) }
     }
 
-    /// Returns the square of the radius to which the liquid reaches inwards at the height z, m2.
     fn inner(&self, z: f64) -> f64 {
         (2.0 * (self.gravity * z - self.c) / (self.omega * self.omega)).max(0.0)
     }
@@ -179,7 +176,6 @@ impl Surface {
         contour.integrate_wetted(|z| self.inner(z), &apex, density)
     }
 
-    /// Returns the height of the centre of mass and the inertias about and across the axis.
     fn moments(&self, contour: &Contour, rho: f64) -> [f64; 3] {
         let [m, mz, mzz, i_axis] = self.integrate(contour, |[r, z], s| {
             let area = rho * PI * (r * r - s);

@@ -51,7 +51,6 @@ fn thinned(points: &[Point], total: usize) -> Vec<Point> {
     (0..=count).map(|i| points[(i * last) / count]).collect()
 }
 
-/// Fits one spline, with the length of the polyline as its parameter.
 fn smooth(points: &[Point], segments: &mut Vec<Segment>) {
     let count = points.len();
     let h: Vec<f64> = points.windows(2).map(|p| norm(sub(p[1], p[0]))).collect();

@@ -159,7 +159,6 @@ pub enum Geometry {
     Box { length_x: f64, length_y: f64 },
 }
 
-/// A tank and its liquid, whose density is in kg/m³.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tank {
     pub name: Option<String>,
@@ -412,7 +411,6 @@ impl Tank {
         }
     }
 
-    /// Returns the result without liquid: all masses 0, no modes.
     pub(crate) fn empty(&self) -> ModalData {
         let bottom = match &self.geometry {
             Geometry::Revolution { contour, .. } => contour.bottom(),

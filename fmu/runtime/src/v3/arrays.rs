@@ -100,7 +100,6 @@ impl Arrays {
     }
 }
 
-/// Returns the index of the first derivative among the scalars.
 fn first_derivative<M: Model>() -> usize {
     M::table().derivatives().first().map_or(0, |scalar| scalar.index as usize)
 }
@@ -183,7 +182,6 @@ mod tests {
     use super::*;
     use crate::tests::trays::Trays;
 
-    /// The table's start values with another number of trays.
     fn parameters(rows: i32) -> Vec<Value> {
         let mut all = Trays::table().starts();
         all[0] = Value::Integer(rows);

@@ -20,7 +20,6 @@ pub struct Description {
 #[derive(Clone, Debug)]
 pub struct Variable {
     read: Common,
-    /// Type of the function that reads and sets the variable.
     pub c_type: CType,
     pub starts: Vec<String>,
     /// Sizes of an array, computed with the start values of structural parameters; empty for a scalar.

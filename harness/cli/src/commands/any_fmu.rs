@@ -135,7 +135,6 @@ fn parsed<T>(read: impl Iterator<Item = Result<T>>, problems: &mut Vec<String>) 
 }
 
 impl Request<'_> {
-    /// Returns the settings as `NAME=VALUE`, as they were written after `--set`.
     fn texts(&self) -> Vec<String> {
         self.settings.iter().map(|(name, value)| format!("{name}={value}")).collect()
     }
@@ -288,7 +287,6 @@ impl AnyFmuArgs {
     }
 }
 
-/// Prints the estimates with their standard deviations, and the verdict on the fit.
 fn print_found(found: &Identification) {
     print_estimates(&[&found.parameters, &found.measurement]);
     for line in any_fmu::lines(found).iter().chain(&found.verdict) {

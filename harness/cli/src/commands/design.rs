@@ -97,7 +97,6 @@ pub struct DesignArgs {
     any: AnyFmuArgs,
 }
 
-/// Time between two rows of the plan, s.
 const STEP: f64 = 0.02;
 /// Slosh angle at which the wave at the wall, 2 α R/(ξ² − 1), reaches 0.15 R, where linear theory ends, rad.
 const LINEAR: f64 = 0.18;
@@ -259,15 +258,12 @@ fn check_rows(torque: &Torque, time: &[f64], tau: &[f64]) -> Result<()> {
     Ok(())
 }
 
-/// The bench as it is expected to be, on which a planned torque is tried.
 struct Bench<'f> {
     fmu: &'f Fmu,
     /// Settings of the FMU, with the damping ratio that the user set or, without one, the ratio of the correlation.
     setup: Setup,
-    /// True if delay, gyro bias and friction asymmetry are also predicted.
     sensor_errors: bool,
     noise: Noise,
-    /// Largest slosh angle that `--slosh-angle` allows, rad.
     limit: Option<f64>,
 }
 
@@ -288,8 +284,6 @@ impl<'f> Bench<'f> {
         Ok(Bench { fmu, setup, sensor_errors, noise, limit: asked.slosh_angle })
     }
 
-    /// Reduces a torque until the liquid's angle stays within the limit, and returns the factor with the
-    /// torque.
     fn limited(&self, time: &[f64], torque: Vec<f64>) -> Result<(f64, Vec<f64>)> {
         let Some(limit) = self.limit else { return Ok((1.0, torque)) };
         ensure!(limit > 0.0, "--slosh-angle must be a positive number, rad");
@@ -326,23 +320,16 @@ fn white_noise(real: &mut dyn FnMut(&str) -> Result<f64>) -> Result<f64> {
 
 type Bounds = Vec<(String, f64, f64)>;
 
-/// A plain sweep with the same peak, against which an optimal multisine is compared.
 struct Sweep {
     profile: String,
-    /// Largest slosh angle, rad.
     angle: f64,
     bounds: Bounds,
 }
 
-/// A planned torque with its effect on bench and liquid, and the bounds of the unknowns.
 struct Plan {
-    /// Factor by which the torque was reduced to respect the limits.
     factor: f64,
-    /// Largest torque, N·m.
     peak: f64,
-    /// Largest slosh angle, rad.
     angle: f64,
-    /// Least and largest speed of the reaction wheel, rad/s.
     speeds: (f64, f64),
     bounds: Bounds,
     sweep: Option<Sweep>,

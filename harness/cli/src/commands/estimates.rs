@@ -78,7 +78,6 @@ impl Out<'_> {
     }
 }
 
-/// Prints a table of estimates: name, value, standard deviation (also in percent) and unit.
 pub(super) fn print_estimates(tables: &[&BTreeMap<String, Estimated>]) {
     println!("{:24} {:>14} {:>12} {:>9}  unit", "", "value", "std", "std %");
     for (name, p) in tables.iter().flat_map(|table| table.iter()) {

@@ -48,7 +48,6 @@ impl ExamplesArgs {
     }
 }
 
-/// Lists the folders of the examples in the order of the numbers at the beginning of their names.
 fn folders(examples: &Path) -> Result<Vec<PathBuf>> {
     let entries = std::fs::read_dir(examples)
         .with_context(|| format!("{} cannot be read", examples.display()))?;

@@ -96,12 +96,10 @@ impl GyroArgs {
     }
 }
 
-/// Longest lag of the autocorrelation, s.
 const LAG: f64 = 10.0;
 const LEAST_CHUNKS: f64 = 3.0;
 
 impl GyroArgs {
-    /// Analyses a recording of a real gyro at rest, prints its statistics and writes tables and figures.
     fn analyse_recording(&self, path: &Path) -> Result<()> {
         let signals =
             [Signal { name: "omega", required: true, between: Between::Line, unit: None }];
@@ -147,8 +145,6 @@ impl GyroArgs {
     }
 }
 
-/// Returns the tables of a recording at rest (Allan deviation, quantiles, autocorrelation, chunks), each with
-/// the name of its file.
 fn tables(rest: &Rest) -> [(&'static str, Table); 4] {
     let table = |names: &[&str], columns: Vec<Vec<f64>>| {
         Table::new(names.iter().map(|name| name.to_string()).collect(), columns)
@@ -233,7 +229,6 @@ pub fn noise_rows(fit: &Fit) -> Vec<(&'static str, String)> {
     rows
 }
 
-/// Lists the statistics of a recording at rest as pairs of name and value.
 fn rows(rest: &Rest) -> Vec<(String, String)> {
     let hours = rest.count as f64 * rest.step / 3600.0;
     let chunks = rest.chunks.len();

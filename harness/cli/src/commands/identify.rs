@@ -208,7 +208,6 @@ pub struct FmuArgs {
     points: PointsArgs,
 }
 
-/// Methods of older versions that were removed, and what replaces each.
 const REMOVED: [(&str, &str); 6] = [
     ("output-error", "identify bench, or identify without a kind of recording"),
     ("acceleration", "identify friction"),
@@ -224,7 +223,6 @@ const REMOVED: [(&str, &str); 6] = [
     ),
 ];
 
-/// Options of older versions that were removed, and what replaces each.
 const GONE: [(&str, &str); 18] = [
     ("--empty", "identify friction"),
     (
@@ -458,7 +456,6 @@ impl KnownArgs {
         })
     }
 
-    /// Reads the recordings, fits them by `method`, and prints and writes the result.
     fn identify_and_print<M: Method>(
         &self,
         method: M,
@@ -491,7 +488,6 @@ impl KnownArgs {
 }
 
 impl DataArgs {
-    /// Splits `--columns` into the columns and the sampling rate, `rate=HZ`.
     fn columns(&self) -> Result<(String, Option<f64>)> {
         let (mut columns, mut rate) = (Vec::new(), None);
         for item in self.columns.split(',') {
@@ -509,7 +505,6 @@ impl DataArgs {
         Ok((columns.join(","), rate))
     }
 
-    /// Checks that the outputs can be written, before a search that may take minutes.
     fn check(&self) -> Result<()> {
         for (path, ending) in [(&self.out, "json"), (&self.report, "html")] {
             let Some(path) = path else { continue };
@@ -528,7 +523,6 @@ impl DataArgs {
         Ok(Source { columns: columns.with_rate(rate)?, trim })
     }
 
-    /// Fits by `method`, writes the result to the output files and prints it.
     fn find<M: Method>(&self, method: M, task: &Task, notes: Vec<String>) -> Result<()> {
         let out = self.outputs();
         let mut found = out.search(|news| method.identify(task, news))?;
@@ -543,7 +537,6 @@ impl DataArgs {
     }
 }
 
-/// Prints the estimates with their standard deviations, and the verdict on the fit.
 fn print_found<M: Method>(found: &Identified<M::Details>) {
     if !(found.parameters.is_empty() && found.measurement.is_empty()) {
         print_estimates(&[&found.parameters, &found.measurement]);

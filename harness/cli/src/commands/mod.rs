@@ -91,7 +91,6 @@ fn check_out(out: &Path) -> Result<()> {
     if out == Path::new("-") { Ok(()) } else { table::check_ending(out) }
 }
 
-/// Writes a table and prints where it is. For `-` it prints the table itself as CSV.
 fn write_out(table: &Table, out: &Path, metadata: &BTreeMap<String, String>) -> Result<()> {
     if out == Path::new("-") {
         return terminal::quiet_if_closed(table.write_csv(terminal::stdout()));

@@ -34,7 +34,6 @@ pub struct VariablesArgs {
 /// line to the right.
 const WIDEST: usize = 80;
 
-/// Largest number of items of an enumeration that the table lists.
 const ITEMS: usize = 50;
 
 impl VariablesArgs {
@@ -84,7 +83,6 @@ impl VariablesArgs {
     }
 }
 
-/// Returns the entry of a variable in the FMU's description as a JSON object.
 fn object(description: &ModelDescription, variable: &Variable) -> Value {
     let attributes = variable.attributes();
     let own = description.unit(variable);
@@ -119,8 +117,6 @@ fn object(description: &ModelDescription, variable: &Variable) -> Value {
     })
 }
 
-/// Returns the row of a variable in the table: name, causality, start, unit, range (of an enumeration its
-/// items) and description.
 fn row(description: &ModelDescription, variable: &Variable) -> [String; 6] {
     let attributes = variable.attributes();
     let items = description.items(variable);

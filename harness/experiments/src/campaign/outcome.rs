@@ -93,7 +93,6 @@ pub struct Totals {
 }
 
 impl Totals {
-    /// Returns maxima and totals of a recording; NaN for quantities that only a simulation has, such as the energy.
     fn from_recording(table: &Table, rates: &Rates) -> Self {
         Totals {
             peak_slosh_angle: f64::NAN,
@@ -289,9 +288,7 @@ pub struct SloshPath {
 }
 
 impl SloshPath {
-    /// Length of the stretch around the largest wave, in slosh periods.
     pub const LARGEST: f64 = 7.0;
-    /// Length of the stretch around the onset, in slosh periods.
     pub const ONSET: f64 = 38.0;
 
     fn around_extremes(table: &Table, onset: Option<f64>, frequency: f64) -> Self {
@@ -313,7 +310,6 @@ impl SloshPath {
     }
 }
 
-/// A run of the bench with its results.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     pub case: Case,
@@ -323,9 +319,7 @@ pub struct Outcome {
     pub totals: Totals,
     /// Estimates from the whole record at once, for example by `spa`; `None` if the torque is neither a sweep nor noise.
     pub record: Option<Record>,
-    /// Estimates along the sweep; `None` if the torque is not a sweep.
     pub passing: Option<Passing>,
-    /// Rotary slosh; `None` for a recording, which has no angles of the liquid.
     pub rotary: Option<Rotary>,
     /// Torque, rate, slosh angles, and the residual, which is the rate minus its bias and minus the rate of
     /// the exact linear plant under the same torque.
@@ -340,7 +334,6 @@ pub struct Outcome {
     pub warnings: Vec<String>,
 }
 
-/// A frequency response and its features.
 #[derive(Clone, Debug)]
 pub struct Estimate {
     pub response: FrequencyResponse,
@@ -359,7 +352,6 @@ pub struct Estimate {
 pub enum Doubt {
     /// The sweep shifts the resonance by more than a quarter of its distance to the antiresonance.
     TooFast,
-    /// The record, or the lags or segments of the estimator, are too short to separate antiresonance and resonance.
     TooShort,
     Noise,
     /// Two estimates of one linear response differ by more than a quarter of the separation. After a fast
@@ -430,7 +422,6 @@ fn block_means(signal: &[f64], count: usize) -> Cow<'_, [f64]> {
 
 pub type Curve = Vec<(f64, f64)>;
 
-/// Estimates from the whole record.
 #[derive(Clone, Debug)]
 pub struct Record {
     pub spa: Estimate,
@@ -808,7 +799,6 @@ impl Outcome {
     }
 }
 
-/// The variable that shows whether the liquid is in its model's range.
 pub const WAVE: &str = WAVE_HEIGHT;
 
 /// Quantities that determine the range in which a model of the liquid is valid: radius of the tank, m, fill,
@@ -826,7 +816,6 @@ pub struct Range {
 }
 
 impl Range {
-    /// Reads the range of an initialised instance; `None` if the FMU is not the bench.
     pub fn read(description: &ModelDescription, instance: &mut Instance) -> Result<Option<Range>> {
         if !super::is_bench(description) {
             return Ok(None);

@@ -62,17 +62,14 @@ pub struct Stored {
     pub lacks_sensors: bool,
 }
 
-/// Reason why a stored run is simulated again.
 #[derive(Debug, thiserror::Error)]
 pub enum Unusable {
     #[error(transparent)]
     Damaged(Damage),
     #[error("the file is incomplete")]
     Incomplete,
-    /// The file has `rows` rows, but the whole run has `expected` rows.
     #[error("the file has {rows} rows, but the run needs {expected}")]
     Rows { rows: usize, expected: usize },
-    /// The stored run has readings of sensors that the plan does not have.
     #[error("the stored run has sensors that the plan does not have")]
     Sensors,
     #[error("{0}")]

@@ -67,7 +67,6 @@ impl FeatureRow {
         }
     }
 
-    /// Returns the row of a run with one of its estimates and the estimator's name.
     pub fn new(
         run: &Outcome,
         estimate: Option<(&Estimate, &'static str)>,
@@ -118,7 +117,6 @@ impl FeatureRow {
     }
 }
 
-/// First columns of `runs.csv`: the run's settings.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct MadeFrom {
     name: String,
@@ -157,7 +155,6 @@ pub fn columns<Row: Serialize + Default>() -> Result<Vec<String>> {
     Ok(names)
 }
 
-/// Returns a row's values as text; a non-finite number is empty.
 pub fn record<Row: Serialize>(row: &Row) -> Result<Vec<String>> {
     let [_, mut values] = names_and_values(row)?;
     let finite = |value: &&mut String| value.parse::<f64>().is_ok_and(|number| !number.is_finite());

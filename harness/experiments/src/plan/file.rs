@@ -33,7 +33,6 @@ impl Scalar {
 }
 
 impl fmt::Display for Scalar {
-    /// Writes the value in the form of an FMU's start values.
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
             Scalar::Truth(value) => value.fmt(f),
@@ -61,7 +60,6 @@ const KEYS: [&str; 14] = [
     "sensor",
 ];
 
-/// Reads the plan from a text; returns `None` with `problems` that prevent it.
 pub(super) fn read(text: &str, problems: &mut Problems) -> Option<Plan> {
     let (table, errors) = DeTable::parse_recoverable(text);
     let table = table.get_ref();
@@ -163,13 +161,11 @@ impl Reader<'_> {
         self.problems.add(&lines, problem);
     }
 
-    /// Records that a value is not the expected one.
     fn add_unexpected(&mut self, value: &Spanned<DeValue>, expected: &str) {
         let written = self.text[value.span()].split_whitespace().collect::<Vec<_>>().join(" ");
         self.add(value.span(), format!("{expected}, not {written}"));
     }
 
-    /// Records the keys of a table that have no meaning there.
     fn check_keys(&mut self, place: &str, table: &DeTable, keys: &[&str]) {
         for (key, _) in table {
             let name: &str = key.get_ref();

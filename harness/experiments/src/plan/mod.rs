@@ -29,7 +29,6 @@ use self::random::Draws;
 /// its bench.
 pub const MODELS: [&str; 2] = [SloshModel::Linear.name(), SloshModel::Spherical.name()];
 pub const FILLS: [f64; 2] = [0.05, 0.10];
-/// The thesis's amplitudes, N·m (its Table 5.2 and chapter 7).
 pub const AMPLITUDES: [f64; 11] =
     [0.0125, 0.025, 0.05, 0.075, 0.1, 0.125, 0.15, 0.175, 0.2, 0.225, 0.25];
 
@@ -147,19 +146,15 @@ pub struct Case {
     pub amplitude: Option<f64>,
     pub profile: String,
     pub torque: Arc<Torque>,
-    /// SHA-256 of the torque's file, if it comes from one.
     pub torque_sha256: Option<String>,
     pub input: Option<String>,
     pub settings: Vec<(String, String)>,
     /// Time between the rows of the result, and between the commands of the profile, s.
     pub step: f64,
     pub stop: f64,
-    /// Relative tolerance of the FMU's solver; `None` for the FMU's own.
     pub tolerance: Option<f64>,
-    /// True if the torque is held over each step.
     pub hold: bool,
     pub sensors: Vec<Sensor>,
-    /// Recording of a bench under this torque, read in place of a simulation.
     pub recording: Option<Recorded>,
 }
 
@@ -244,7 +239,6 @@ impl Plan {
         Ok(plan)
     }
 
-    /// Returns a plan of [`Plan::sweeps`] as a file, which the campaign writes into its results folder.
     fn written(&self) -> Result<String> {
         let mut table = toml::Table::new();
         table.insert("title".into(), self.title.clone().into());
@@ -259,7 +253,6 @@ impl Plan {
         Ok(toml::to_string(&table)?)
     }
 
-    /// Checks that a name is only one of set, varied, listed, counted or drawn.
     fn each_name_once(&self, problems: &mut Problems) {
         fn names_in<'a, T>(
             named: &'a [Named<T>],
@@ -367,7 +360,6 @@ impl Plan {
         Plan { onset: None, ..self.clone() }.cases(description)
     }
 
-    /// Replaces the cases of [`Plan::seeking`] by dwells at a frequency (Hz) with several torques (N·m).
     pub(crate) fn dwell(&mut self, dwells: Vec<(Case, f64, Vec<f64>)>) {
         let names: Vec<String> = self.grouping().into_iter().map(String::from).collect();
         let lines = self.onset.as_ref().map_or(Lines::default(), |onset| onset.lines.clone());
@@ -672,7 +664,6 @@ mod tests {
 
     use super::{AMPLITUDES, BUILT_IN, Case, FILLS, MODELS, Plan, Sweeps};
 
-    /// Reads the FMU's own description, so that the test needs no FMU.
     fn description() -> ModelDescription {
         let path = concat!(
             env!("CARGO_MANIFEST_DIR"),

@@ -2,7 +2,6 @@
 
 use anyhow::{Result, bail};
 
-/// Line numbers of a file, ascending; empty without a file.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Lines(Vec<usize>);
 
@@ -30,7 +29,6 @@ impl Lines {
     }
 }
 
-/// Problems of a plan with their lines, each recorded only once.
 #[derive(Default)]
 pub(super) struct Problems(Vec<(Lines, String)>);
 
@@ -42,7 +40,6 @@ impl Problems {
         }
     }
 
-    /// Returns the value of a result; an error is recorded as a problem of these lines.
     pub fn take<T>(&mut self, lines: &Lines, result: Result<T>) -> Option<T> {
         result.map_err(|error| self.add(lines, format!("{error:#}"))).ok()
     }

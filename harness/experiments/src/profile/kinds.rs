@@ -98,7 +98,6 @@ const fn time(name: &'static str, default: f64, label: &'static str) -> Paramete
     parameter(name, default, "s", label, Allowed::NotNegative)
 }
 
-/// Returns the parameters of a sweep whose first frequency is restricted to `first`.
 const fn sweep_from(first: Allowed) -> [Parameter; 4] {
     [
         parameter(

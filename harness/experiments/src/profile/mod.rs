@@ -52,7 +52,6 @@ impl Values<'_> {
 }
 
 impl Kind {
-    /// Formats the profile with these values, as the parser reads it.
     fn written(&self, values: &[f64]) -> String {
         let pairs = self.parameters.iter().zip(values);
         let pairs: Vec<_> = pairs.map(|(p, value)| format!("{}={value}", p.name)).collect();
@@ -113,7 +112,6 @@ impl FromStr for Written {
 }
 
 impl Written {
-    /// Splits a text into name and pairs. Error messages begin with `what`, such as "profile".
     pub(crate) fn read(what: &str, text: &str) -> Result<Self> {
         let (name, rest) = text.split_once(':').unwrap_or((text, ""));
         let name = name.trim();
@@ -165,7 +163,6 @@ impl Written {
         if self.name == "file" { self.file() } else { Ok(Torque::Profile(self.profile()?)) }
     }
 
-    /// Returns the path in `file:path=…`, `None` for other profiles.
     pub fn path(&self) -> Option<&Path> {
         let path = self.pairs.iter().find(|(key, _)| key == "path");
         path.filter(|_| self.name == "file").map(|(_, path)| Path::new(path))
@@ -247,14 +244,12 @@ impl Written {
 impl FromStr for Profile {
     type Err = anyhow::Error;
 
-    /// Parses `name` or `name:key=value,key=value`; parameters that are not given have their defaults.
     fn from_str(text: &str) -> Result<Self> {
         text.parse::<Written>()?.profile()
     }
 }
 
 impl fmt::Display for Profile {
-    /// Formats the profile with every parameter, as the parser reads it.
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         f.write_str(&self.kind.written(&self.values))
     }
@@ -314,7 +309,6 @@ pub fn cycles(error: f64) -> f64 {
     (8.0 * error).sqrt() / std::f64::consts::TAU
 }
 
-/// Source of a run's torque.
 #[derive(Clone, Debug)]
 pub enum Torque {
     Profile(Profile),

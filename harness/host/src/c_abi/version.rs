@@ -64,7 +64,6 @@ pub(crate) trait Getter<T> {
     unsafe fn get(self, component: Component, references: &[u32], values: &mut [T]) -> c_int;
 }
 
-/// A C function that reads the values of variables from an array of the host.
 pub(crate) trait Setter<T> {
     /// # Safety
     /// It is a function of the FMU of this instance, and what the values point to is alive.
@@ -82,7 +81,6 @@ pub struct Updated {
     /// The host must update the discrete states again.
     pub again: bool,
     pub terminate: bool,
-    /// Time of the next time event, s.
     pub next_event: Option<f64>,
 }
 
@@ -115,10 +113,8 @@ pub trait Version: Sized {
     /// version's instantiation expects.
     fn resources(directory: &Path) -> Option<String>;
 
-    /// Creates an instance with logging on; `name` is the instance's name in the log.
     fn instantiate<'fmu>(fmu: &'fmu Fmu<Self>, name: &str) -> Called<Instance<'fmu, Self>>;
 
-    /// Enters initialization mode with start and stop time (s) and relative tolerance.
     fn initialize(
         instance: &mut Instance<'_, Self>,
         tolerance: Option<f64>,
@@ -126,7 +122,6 @@ pub trait Version: Sized {
         stop: Option<f64>,
     ) -> Called;
 
-    /// Enters (`enters`) or leaves configuration mode, in which structural parameters may be set.
     fn configure(instance: &mut Instance<'_, Self>, enters: bool) -> Called;
 
     fn step(instance: &mut Instance<'_, Self>, time: f64, step: f64) -> Called;
@@ -165,10 +160,8 @@ pub trait Version: Sized {
         values: &[Value],
     ) -> Called;
 
-    /// Reads Reals, none of which may be an element of an array.
     fn reals(instance: &mut Instance<'_, Self>, references: &[u32], values: &mut [f64]) -> Called;
 
-    /// Sets Reals, none of which may be an element of an array.
     fn set_reals(instance: &mut Instance<'_, Self>, references: &[u32], values: &[f64]) -> Called;
 }
 
@@ -185,7 +178,6 @@ pub struct Fmu<V: Version> {
     changed: Vec<&'static str>,
     /// True if all Reals are scalars of type Float64, so that they can be exchanged in one call.
     is_plain: bool,
-    /// Value references of the scalar Float64 variables, ascending.
     plain: Vec<u32>,
     /// Value references of the Float64 inputs, and of elements of input arrays, that an FMU 3.0 accepts
     /// within a step; ascending.
@@ -411,7 +403,6 @@ impl<V: Version> Fmu<V> {
         self.is_plain || references.iter().all(|r| self.plain.binary_search(r).is_ok())
     }
 
-    /// Creates an instance with logging on and with the array sizes of the description.
     pub fn instantiate(&self, name: &str) -> Called<Instance<'_, V>> {
         let mut instance = V::instantiate(self, name)?;
         if !self.structural.is_empty() {
@@ -428,7 +419,6 @@ impl<V: Version> Fmu<V> {
         Ok(instance)
     }
 
-    /// Creates an instance; `make` calls the function of this name and returns the pointer.
     pub(crate) fn create_instance(
         &self,
         name: &'static str,
@@ -611,7 +601,6 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         Ok(pointers.into_iter().map(|text| unsafe { copy_text(text) }).collect())
     }
 
-    /// Calls a function of the FMU that sets texts, with `values` as strings of C.
     pub(crate) fn write_texts(
         &self,
         function: Function<impl Setter<*const c_char>>,
@@ -804,7 +793,6 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         Ok(bytes)
     }
 
-    /// Restores a saved state from the bytes of [`Instance::serialize`].
     pub fn deserialize(&mut self, bytes: &[u8]) -> Called<FmuState> {
         let mut state = FmuState(null_mut());
         // SAFETY: `bytes.len()` bytes are there.
@@ -868,7 +856,6 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
     }
 }
 
-/// Converts texts for a C function; the pointers are valid as long as the texts.
 fn c_strings(texts: &[&str]) -> (Vec<CString>, Vec<*const c_char>) {
     let texts: Vec<CString> = texts.iter().map(|t| CString::new(*t).unwrap_or_default()).collect();
     let pointers = texts.iter().map(|text| text.as_ptr()).collect();

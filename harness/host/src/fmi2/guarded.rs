@@ -4,11 +4,9 @@
 use super::*;
 use crate::c_abi::version::{GetVector, State};
 
-/// Size of the margin on either side of an array, bytes.
 const MARGIN: usize = 1024;
 const FILL: u64 = 0xa5c3_5a3c_a53c_5ac3;
 
-/// An array between its margins, aligned for every C type of FMI.
 struct Guarded {
     words: Vec<u64>,
     bytes: usize,
@@ -89,7 +87,6 @@ pub struct Lists {
     pub serializes: bool,
 }
 
-/// Returns the lengths with which an array of `all` values is tried: one, half and all.
 fn lengths(all: usize) -> Vec<usize> {
     let mut lengths = vec![1, all.div_ceil(2), all];
     lengths.retain(|n| *n > 0 && *n <= all);

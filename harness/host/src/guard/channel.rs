@@ -29,7 +29,6 @@ type End = UnixStream;
 #[cfg(not(unix))]
 type End = File;
 
-/// The end of the connection that the parent process holds.
 pub struct Parent {
     end: End,
     nonce: [u8; NONCE],

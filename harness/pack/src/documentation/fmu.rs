@@ -31,7 +31,6 @@ pub fn render(root: &Path, introduction: &str, title: &str) -> Result<Documentat
     Ok(Documentation { page, figures: all.figures()? })
 }
 
-/// Renders all pages into one HTML file, which needs no other files.
 fn one_file(root: &Path, pages: &[Page], title: &str, all: &mut Gathered) -> Markup {
     html! {
         (DOCTYPE)

@@ -145,8 +145,6 @@ impl Page {
         PreEscaped(page)
     }
 
-    /// Returns the target of a link, or `None` if it leads out of the documentation. The inner error is a
-    /// broken link.
     fn target(&self, root: &Path, pages: &[Page], link: &str) -> Result<Option<String>> {
         if link.contains("://") {
             return Ok(None);
@@ -235,7 +233,6 @@ fn slug(title: &str) -> String {
     kept.map(|c| if c == ' ' { '-' } else { c }).collect()
 }
 
-/// Returns the name of a page: its path without the parts that all pages have.
 fn name(path: &str) -> String {
     let common = ["modelDescription", "documentation", "book", "README"];
     let path = path.strip_suffix(".md").unwrap_or(path);
@@ -243,7 +240,6 @@ fn name(path: &str) -> String {
     kept.join("-").to_lowercase()
 }
 
-/// Returns the path of a link in the file `from`, from the project's root.
 fn resolve(from: &str, link: &str) -> String {
     let mut parts: Vec<&str> = from.split('/').collect();
     parts.pop();

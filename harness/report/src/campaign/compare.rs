@@ -15,8 +15,6 @@ const COMPARED: [(&str, &str, f64); 4] = [
     ("fit_freq_pct", "fit in frequency / %", 1.0),
 ];
 
-/// Plots the differences of this campaign's runs from the runs of the same name in the campaign in directory
-/// `other`.
 pub(super) fn compare(
     other: &Path,
     page: &Page,

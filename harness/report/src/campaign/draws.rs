@@ -9,7 +9,6 @@ use super::colors;
 use super::figure::{Figure, Panel, numbers};
 use super::page::{Group, Page, best};
 
-/// Name and unit of a result, and the function that reads it from a run.
 type Quantity = (&'static str, &'static str, fn(&Outcome) -> Option<f64>);
 
 pub(super) const QUANTITIES: [Quantity; 4] = [
@@ -139,7 +138,6 @@ pub(super) fn moments(values: &[f64]) -> (f64, f64) {
     }
 }
 
-/// Returns the correlation coefficient, −1 to 1, or 0 if x or y is constant.
 fn correlation(points: &[(f64, f64)]) -> f64 {
     let (x, y): (Vec<f64>, Vec<f64>) = points.iter().copied().unzip();
     let found = statistics::correlation(&x, &y);

@@ -137,7 +137,6 @@ fn anchor(title: &str) -> String {
     title.to_lowercase().replace(|c: char| !c.is_ascii_alphanumeric(), "-")
 }
 
-/// Returns the titles and contents of the sections about runs of the bench, without empty sections.
 fn bench_sections<'a>(
     page: &Page,
     campaign: &Campaign,
@@ -364,7 +363,6 @@ fn card(page: &Page, group: &Group) -> Markup {
     }
 }
 
-/// Formats a frequency with enough digits to distinguish it from `other`.
 fn format_distinct(value: f64, other: f64) -> String {
     let places = (1.5 - (value - other).abs().max(1e-6).log10()).ceil().clamp(3.0, 4.0) as usize;
     format!("{value:.places$}")

@@ -151,7 +151,6 @@ pub(super) fn residual_motion(page: &Page, axis: &Axis) -> Figure {
     Figure { columns: 2, height: 340, ..figure }
 }
 
-/// Plots the largest slosh angles and the residual motion, for torques that have no frequency response.
 pub(super) fn slosh_angles(page: &Page, axis: &Axis) -> Figure {
     let radial = |run: &Outcome| Some(run.totals.peak_radial_angle.to_degrees());
     let tangential = |run: &Outcome| Some(run.totals.peak_slosh_angle.to_degrees());

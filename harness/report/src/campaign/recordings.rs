@@ -86,7 +86,6 @@ fn same_run(a: &Outcome, b: &Outcome) -> bool {
     close(a.case.amplitude, b.case.amplitude) && close(a.case.fill, b.case.fill)
 }
 
-/// Describes the largest deviation of each model from the recordings, one sentence for each model.
 pub(super) fn result(results: &Results) -> String {
     let (recorded, simulated): (Vec<&Outcome>, Vec<&Outcome>) =
         results.outcomes.iter().partition(|run| run.is_recording());
@@ -160,8 +159,6 @@ fn value(feature: &Feature, run: &Outcome) -> String {
     }
 }
 
-/// Formats the difference of a model's value from the recording's; a ✓ marks a difference within the joint 95
-/// % interval.
 fn difference(feature: &Feature, run: &Outcome, recording: &Outcome) -> String {
     let Some(((model, a), (there, b))) = (feature.value)(run).zip((feature.value)(recording))
     else {

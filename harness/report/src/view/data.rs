@@ -4,7 +4,6 @@
 use base64ct::{Base64, Encoding};
 use serde_json::{Value, json};
 
-/// Largest number of values for the moving objects of one page. With 32 bits each this is 6.4 MB of text.
 const MOST_VALUES: usize = 1_200_000;
 
 const INTERVALS: usize = 4_000;
@@ -87,7 +86,6 @@ pub(super) fn times(time: &[f64], rows: &[usize]) -> Value {
     json!({ "times": Base64::encode_string(&bytes), "count": count })
 }
 
-/// Returns the smallest and the largest value in each of [`INTERVALS`] groups of rows.
 pub(super) fn envelope(time: &[f64], values: &[f64]) -> Value {
     let each = values.len().div_ceil(INTERVALS);
     let parts = || values.chunks(each);

@@ -33,7 +33,6 @@ impl Parameters<'_> {
         Some((self.description.value(variable, text).ok()?, text.clone()))
     }
 
-    /// Returns a number in SI units; 0 if the FMU has no such parameter.
     pub fn number(&self, name: &str) -> f64 {
         let number = self.value(name).map(|(value, _)| value.number());
         number.filter(|number| !number.is_nan()).unwrap_or(0.0)
@@ -227,7 +226,6 @@ fn length(given: f64, frequency: f64, g: f64, k_over_m: f64) -> f64 {
 const DRAWN: &str = "an upright cylinder that matches the wave at the wall, the first mode's share of the liquid and the \
     liquid's centre of mass, with a cylinder's surface (--tank draws the tank itself)";
 
-/// Returns the tank of the bench; its origin is the middle of the bottom.
 pub(super) fn bench(parameters: &Parameters, drawing: Option<&Drawing>) -> Tank {
     let number = |name: &str| parameters.number(name);
     let radius = 0.5 * number(tank::D);
@@ -323,7 +321,6 @@ fn lowest(outline: &Outline) -> f64 {
     }
 }
 
-/// Returns a tank of Spacecraft or SloshTank, whose variables begin with `prefix`.
 pub(super) fn tank(parameters: &Parameters, prefix: &str, drawing: Option<&Drawing>) -> Tank {
     let number = |key: &str| parameters.number(&format!("{prefix}.{key}"));
     let count = (number("modes") as usize).max(1);

@@ -47,7 +47,6 @@ pub struct Page {
     pub warnings: Vec<String>,
 }
 
-/// The FMU of this project whose variables a description has.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Bench,
@@ -125,7 +124,6 @@ pub fn columns(
     all
 }
 
-/// Lists the prefixes of the tanks' variables, each with the tank's number of modes; empty for the bench.
 fn prefixes(parameters: &Parameters) -> Vec<(String, usize)> {
     let all: Vec<String> = match kind(parameters.description) {
         Some(Kind::Craft) => (1..=(parameters.number("tanks") as usize).max(1))
@@ -291,7 +289,6 @@ impl Draft<'_> {
         value
     }
 
-    /// Selects the columns that move the hub or craft.
     fn body(&mut self) -> Value {
         let table = self.run.table;
         let mut motion = json!({});
@@ -345,8 +342,6 @@ impl Draft<'_> {
         Ok(tanks)
     }
 
-    /// Selects the columns that move the liquid of a tank. Modes that were not recorded are removed from the
-    /// tank.
     fn tank(&mut self, i: usize, tank: &mut Tank) -> Result<Value> {
         let modes = match self.kind {
             Kind::Bench => self.modes_of_bench(tank),
@@ -419,7 +414,6 @@ impl Draft<'_> {
         (1..=tank.modes.len()).map(mode).collect()
     }
 
-    /// Adds level, lengths and hinges of a draining tank as functions of time.
     fn drain(&mut self, tank: &Tank, moved: &mut Value) {
         let (prefix, Some(fill)) = (&tank.prefix, &tank.fill) else { return };
         let name = format!("{prefix}.liquid");
@@ -583,7 +577,6 @@ fn ordinal(n: usize) -> String {
     }
 }
 
-/// Rounds a number to remove the errors of binary fractions.
 fn rounded(value: f64) -> f64 {
     (value * 1e6).round() / 1e6
 }

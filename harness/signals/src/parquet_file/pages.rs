@@ -51,7 +51,6 @@ struct Header<'a> {
 }
 
 impl Header<'_> {
-    /// Returns the size of the page in bytes, decompressed and as it is stored.
     fn sizes(&mut self) -> Result<(u64, u64)> {
         let (mut inflated, mut stored) = (None, None);
         let mut id = 0_i64;

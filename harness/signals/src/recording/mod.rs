@@ -146,7 +146,6 @@ impl Header {
     }
 }
 
-/// Splits `torque [mNm]` or `torque (mNm)` into name and unit.
 fn bracketed(name: &str) -> Option<(&str, &str)> {
     let (open, close) = match name.chars().last()? {
         ']' => ('[', ']'),

@@ -24,7 +24,6 @@ use super::super::gyro::noise_rows;
 use super::{Day, Item, Kind};
 use crate::terminal;
 
-/// Friction parameters and hub inertia in Table 5.5 of Rubaga's thesis, SI.
 const THESIS: [(&str, f64); 5] = [
     (friction::B, 0.03793),
     (friction::C, 0.003498),
@@ -32,14 +31,11 @@ const THESIS: [(&str, f64); 5] = [
     (friction::OMEGA_S, 0.08581),
     (hub::I, 0.322414),
 ];
-/// Radius of Centaur's oxygen tank, m (thesis 7.2.1).
 const CENTAUR: f64 = 2.0425;
-/// Standard gravity as in the thesis, m/s².
 const GRAVITY: f64 = 9.81;
 const POINTS: usize = 1500;
 /// Rate up to which the report draws the friction curve near zero, in multiples of the Stribeck speed ω_s.
 const NEAR: f64 = 5.0;
-/// Longest lag of the gyro's autocorrelation, s.
 const LAG: f64 = 10.0;
 const CHUNK: f64 = 900.0;
 const CHUNKS: f64 = 8.0;
@@ -98,7 +94,6 @@ pub fn chapters(
     Ok((chapters, fitted))
 }
 
-/// Returns a chapter that says which recordings are missing, and why those that are there could not be used.
 fn missing_chapter(title: &str, kind: Kind, problems: &[String]) -> Chapter {
     let (word, needs) = match kind {
         Kind::Friction => ("friction", "ramps, steps and sweeps of the torque with the tank empty"),
@@ -163,8 +158,6 @@ fn value(day: &Day, fmu: &Fmu, name: &str) -> Result<f64> {
     text.parse().with_context(|| format!("{name} = {text}: a number in SI units is needed"))
 }
 
-/// Computes the Bond number as a function of the tank's diameter, and the tank in space that has the Bond
-/// number of the bench.
 fn bond_number(day: &Day, fmu: &Fmu) -> Result<Chapter> {
     let radius = value(day, fmu, tank::D)? / 2.0;
     let bond = |radius: f64| WATER.bond(GRAVITY, radius);
@@ -436,7 +429,6 @@ fn preferential_direction(
     }
 }
 
-/// Computes bias, trend, noise and autocorrelation of one recording of the gyro at rest.
 fn at_rest(item: &Item) -> Result<Rest> {
     let signals = [Signal { name: "omega", required: true, between: Between::Line, unit: None }];
     let wanted = Wanted { signals: &signals, columns: &item.recorded.columns };

@@ -41,17 +41,14 @@ enum Kind {
 struct Manifest {
     #[serde(default = "title")]
     title: String,
-    /// Columns of recordings without their own.
     #[serde(default)]
     columns: String,
     #[serde(default = "profile")]
     profile: String,
     #[serde(default = "models")]
     models: Vec<String>,
-    /// Relative standard deviations of known values, in the form of `identify --tolerance`.
     #[serde(default)]
     tolerance: String,
-    /// Relative standard deviation of the gyro's scale.
     #[serde(default = "gyro_scale")]
     gyro_scale: f64,
     #[serde(default)]
@@ -96,7 +93,6 @@ struct Day {
     manifest: Manifest,
     tolerances: Tolerances,
     items: Vec<Item>,
-    /// Known parameters by FMU name, which are set in every simulation.
     settings: Vec<(String, String)>,
 }
 
