@@ -2,21 +2,17 @@
 
 use serde::Serialize;
 
-/// An estimated number.
 #[derive(Clone, Debug, Serialize)]
 pub struct Estimated {
-    /// Value, in SI units.
     pub value: f64,
     /// Standard deviation from noise and tolerances. If the interval is skew, it is the longer side over 1.96.
     pub std: f64,
-    /// Standard deviation from the noise alone.
     pub std_noise: f64,
     /// 95 % interval. An upper end that the recording does not determine is infinite, and null in JSON; such a lower end is 0.
     pub interval: [f64; 2],
     /// True if the recording determines the value: both ends of the interval are finite, and the standard deviation is less than
     /// half the value, unless the value may be zero by nature.
     pub determined: bool,
-    /// Unit as in modelDescription.xml.
     pub unit: String,
 }
 
@@ -42,7 +38,6 @@ impl Estimated {
     }
 }
 
-/// Returns a unit of the FMU as it is written in prose: kg·m² for kg.m2.
 pub fn prose(unit: &str) -> String {
     unit.replace('.', "·").replace('2', "²")
 }

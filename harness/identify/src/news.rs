@@ -2,9 +2,7 @@
 
 #[derive(Clone, Debug)]
 pub enum News {
-    /// A step of the method.
     Step(String),
-    /// Details: the attempts of a search.
     Detail(String),
 }
 

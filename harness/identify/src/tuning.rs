@@ -21,15 +21,12 @@ pub const KERNEL_SHAPE: f64 = 7.9;
 // Tests: `lost_samples_of_a_sweep_are_predicted`, `lost_rows_of_a_sweep_are_interpolated_and_lost_rows_of_noise_split_the_recording`.
 /// Spacing of the torque's samples, in usual ones, from which on some were lost.
 pub const LOST_SPACING: f64 = 1.75;
-/// Longest gap that is filled, s.
 pub const LONGEST_FILLED: f64 = 3.0;
 /// Longest gap that a line may join where the recording cannot be cut, s.
 pub const LONGEST_LINE: f64 = 0.25;
 /// Number of samples on each side of a gap to which the autoregressive model is fitted.
 pub const GAP_SIDE: usize = 250;
-/// Order of the autoregressive model.
 pub const GAP_ORDER: usize = 32;
-/// Number of places at which the filling of a gap is tried.
 pub const GAP_TRIALS: usize = 12;
 /// Largest kick of the hub by the errors of all fillings, over the gyro's noise.
 pub const GAP_KICK: f64 = 0.1;
@@ -50,14 +47,12 @@ pub const WHEEL_WINDOW: f64 = 0.1;
 pub const LATE_SENSOR: f64 = 0.1;
 /// Most rows of a free decay; the limit is needed because the spectrum of its residual takes 400 sines a row.
 pub const DECAY_ROWS: usize = 1_000_000;
-/// Number of spikes whose times are listed.
 pub const LISTED_SPIKES: usize = 8;
 /// Spread of the rate over its noise beyond which the hub moves; a gyro's drift makes less.
 pub const MOVING_SPREAD: f64 = 2.0;
 
 // Recordings of any FMU: `input/record.rs`.
 // Tests: `any_fmu_refuses_records_out_of_range`.
-/// Fewest values of an output from which something is estimated.
 pub const FEWEST_VALUES: usize = 10;
 
 // Recordings of the bench: `input/recording.rs`.
@@ -75,7 +70,6 @@ pub const SLOW_GYRO: f64 = 0.75;
 pub const LARGEST_VALUE: f64 = 1e100;
 /// Part of the changes of a held gyro that fall on the rows of its own clock.
 pub const ON_CLOCK: f64 = 0.98;
-/// Slowest gyro that is looked for, in rows a value.
 pub const SLOWEST_GYRO: usize = 100;
 
 // Sensor faults: `input/sensor_faults.rs`.
@@ -94,12 +88,10 @@ pub const FAULT_STEPS: f64 = 2.0;
 pub const FROM_REST: f64 = 1.0 / 3.0;
 /// Largest probability that a run of equal values is chance at which the sensor counts as frozen.
 pub const FROZEN_CHANCE: f64 = 1e-6;
-/// Fewest values in a frozen run.
 pub const FROZEN_RUN: usize = 5;
 /// Fewest repeats that are reported, and the least ratio of their mean square deviation from the neighbours to the mean square
 /// deviation of other values.
 pub const REPEATS: (usize, f64) = (10, 3.0);
-/// Largest error of rounding, relative to the largest value.
 pub const SENSOR_ROUNDING: f64 = 1e-9;
 
 // Spikes: `input/spikes.rs`.
@@ -142,7 +134,6 @@ pub const COMPARED_FACTOR: f64 = 1e-2;
 pub const HELD_STEPS: usize = 4;
 /// Steps whose effects of an input's slope are compared, s.
 pub const SLOPE_PROBES: [f64; 3] = [1e-2, 1e-3, 1e-4];
-/// The finest tolerance of the host's solver.
 pub const FINEST_TOLERANCE: f64 = 1e-13;
 
 // Effects outside the FMU: `bench/effect.rs`.
@@ -158,7 +149,6 @@ pub const COARSEST: f64 = 0.2;
 
 // Runs of the bench: `bench/simulate.rs`.
 // Tests: `the_fit_simulates_a_twin_with_a_delay_or_a_smooth_torque`, `a_run_that_would_not_end_is_refused`.
-/// Instants closer than this are the same, s.
 pub const SAME_INSTANT: f64 = 1e-9;
 /// Most internal steps of our FMUs in a communication step: the first number, plus the second number for each second of the step.
 /// A fit's runs take some 100 steps a second. If a search tries values that would take millions, the run fails and the search
@@ -167,7 +157,6 @@ pub const MOST_INTERNAL_STEPS: (f64, f64) = (200.0, 2e4);
 
 // Starts from data: `bench/start.rs`.
 // Tests: `poles_and_zeros_of_the_exact_response_give_the_bench_back`.
-/// Damping ratios that are tried.
 pub const DAMPINGS: [f64; 5] = [0.0015, 0.003, 0.006, 0.015, 0.04];
 /// Relative step of the slosh frequency over the band; the half-power width at the least damping is three times as much.
 pub const FREQUENCY_FINENESS: f64 = 1e-3;
@@ -176,28 +165,23 @@ pub const LATEST_DELAY: f64 = 0.05;
 
 // Design of experiments: `bench/design.rs`.
 // Tests: `d_optimal_power_is_near_the_slosh_frequency_and_reduces_uncertainty`, `a_multisine_has_only_odd_lines_and_the_given_peak`.
-/// Odd lines in a group, of which one is left out.
 pub const LINE_GROUP: usize = 4;
 /// Share of the power that is always spread over all lines. It excites the resonance of a slightly different plant, and shows
 /// distortion everywhere.
 pub const SPREAD_POWER: f64 = 0.25;
-/// Largest number of rounds of `within_angle`.
 pub const ANGLE_ROUNDS: usize = 20;
 /// Part of the limit that the angle has to reach for `within_angle` to end before its last round.
 pub const ANGLE_ENOUGH: f64 = 0.97;
 
 // Verdict: `bench/verdict.rs`.
 // Tests: `a_search_that_would_leave_a_parameters_range_ends_at_the_bound_with_a_result`.
-/// Newton decrement above which the verdict reports it.
 pub const TOLD_DECREMENT: f64 = 0.1;
 
 // Page: `words/page.rs`.
 // Tests: `the_page_is_whole`.
 /// Number of points of a curve; more points than a screen has pixels are not seen.
 pub const PAGE_POINTS: usize = 700;
-/// Length of the stretch that is drawn row by row, s.
 pub const PAGE_STRETCH: f64 = 8.0;
-/// Longest lag of the autocorrelation, rows.
 pub const PAGE_LAGS: usize = 200;
 
 // Output error: `methods/output_error.rs`.
@@ -209,7 +193,6 @@ pub const BEGINNINGS: [f64; 2] = [0.35, 0.5];
 // Tests: `friction_of_three_sets_of_runs_ends_in_no_false_minimum`, `recordings_that_show_no_friction_are_refused_with_what_to_do`, `scatter_of_decays_is_not_a_preferential_direction_and_ten_per_cent_of_friction_is`.
 /// Length of the blocks of rows that are averaged for the measured friction, s.
 pub const BLOCK: f64 = 0.01;
-/// Number of blocks in the shortest recording of a friction run.
 pub const FEWEST_BLOCKS: usize = 100;
 /// Ratio of the variance of the rate to the variance of the gyro's noise, below which the hub does not move.
 pub const MOVING_POWER: f64 = 2.0;
@@ -221,7 +204,6 @@ pub const STILL: f64 = 4.0;
 pub const FREE_TORQUE: f64 = 1e-3;
 /// Least speed in free decay that is used, relative to the fastest: at lower speeds noise makes the sign uncertain.
 pub const MOVING_SPEED: f64 = 0.05;
-/// Number of points of a curve.
 pub const FRICTION_POINTS: usize = 400;
 /// Largest speed in the second chart, relative to the Stribeck speed.
 pub const SLOW_CHART: f64 = 4.0;

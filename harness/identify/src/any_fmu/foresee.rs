@@ -11,11 +11,9 @@ use crate::input::record::Record;
 use crate::model::simulate::Model;
 use analysis::gauss_markov::Noise;
 
-/// Cramér–Rao bound of one unknown.
 #[derive(Clone, Debug, Serialize)]
 pub struct Bound {
     pub name: String,
-    /// Value in the plan.
     pub value: f64,
     /// Least standard deviation of an unbiased estimate; NaN if the recordings allow no estimate or the solver's errors decide
     /// it.
@@ -25,11 +23,9 @@ pub struct Bound {
     pub not_determined: bool,
     /// True if the solver's errors decide the bound; `std` and `std_alone` are then NaN.
     pub decided_by_solver: bool,
-    /// Names of the unknowns that the recordings cannot distinguish from this one.
     pub inseparable_from: Vec<String>,
     /// Least standard deviation if all other unknowns were known.
     pub std_alone: f64,
-    /// Standard deviation of the prior; `None` without a prior.
     pub prior: Option<f64>,
     pub unit: String,
     /// Name of the unknown with which the correlation is largest, and this correlation.

@@ -33,7 +33,6 @@ use crate::words::identified::{Identified, Residual};
 use crate::words::verdict::{DOES_NOT_FIT, NO_MINIMUM, NOT_JUDGED, failed};
 use system::{FmuSystem, is_known};
 
-/// Correlation above which the verdict names two estimates as a pair.
 const PAIR: f64 = 0.98;
 /// Ratio of an estimate's standard deviation to its prior's above which the recordings do not determine the estimate.
 const PRIOR_ALONE: f64 = 0.9;
@@ -47,39 +46,32 @@ const JUMP: (f64, f64) = (8.0, 20.0);
 /// Largest number of searches. Each leaves out the rows next to the jumps that the search before has shown.
 const TURNS: usize = 4;
 
-/// Results other than the estimates.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Details {
     pub outputs: Vec<Output>,
     pub not_determined: Vec<String>,
     pub cannot_tell_apart: Vec<Inseparable>,
-    /// Estimates that the errors of the solver decide: they have no interval.
     pub decided_by_solver: Vec<String>,
     /// Shift of each estimate by the errors of the solver, in its unit.
     pub solver_shift: BTreeMap<String, f64>,
     pub at_bound: Vec<String>,
     /// Estimates whose likelihood is not a parabola, so that their interval is not the value ± 1.96 standard deviations.
     pub not_quadratic: Vec<String>,
-    /// −2 ln L up to a constant.
     pub deviance: f64,
-    /// Number of starts from which a minimum was searched.
     pub starts: usize,
     /// Distance to the minimum in standard deviations.
     pub decrement: f64,
-    /// Covariance of the estimates, in the order of the correlations' names.
     pub covariance: Vec<Vec<f64>>,
 }
 
 pub type Identification = Identified<Details>;
 
-/// One output of one recording.
 #[derive(Clone, Debug, Serialize)]
 pub struct Output {
     pub recording: String,
     pub name: String,
     pub unit: String,
     pub rows: usize,
-    /// Standard deviation of the white noise in one row, in the output's unit.
     pub noise_white: f64,
     /// Gauss–Markov bias: standard deviation and correlation time, s.
     pub drift: Option<(f64, f64)>,
@@ -91,7 +83,6 @@ pub struct Output {
 }
 
 impl Output {
-    /// Returns true if the residual is noise about 0.
     pub fn passed(&self) -> bool {
         self.tests.passed() && self.mean.abs() < LIMIT
     }
@@ -207,7 +198,6 @@ struct Interval {
     is_quadratic: bool,
 }
 
-/// The numbers of a solution: covariances with and without the tolerances, and what the solver's errors do.
 struct Numbers {
     covariance: DMatrix<f64>,
     std: Vec<f64>,
@@ -326,7 +316,6 @@ impl Numbers {
     }
 }
 
-/// Tests the residual of each output.
 fn outputs(system: &FmuSystem, solution: &Solution, question: &Question) -> Vec<Output> {
     let (fit, point) = (&solution.fit, &solution.minimum.point);
     let residuals = fit.residuals(&point.z, &point.motion);
@@ -522,10 +511,8 @@ fn size(system: &FmuSystem, unknowns: &[Unknown], j: usize) -> String {
     }
 }
 
-/// Sentence about intervals of a fit without tolerances.
 const NOISE_ALONE: &str = "The intervals include noise alone: settings, inputs and the clock count as exact. --tolerance states how sure they are.";
 
-/// Adds the sentences about one estimate to `words`, and its name to the lists of `details` in which it belongs.
 fn say(
     unknown: &Unknown,
     e: &Estimated,
@@ -631,7 +618,6 @@ pub fn lines(found: &Identification) -> Vec<String> {
     lines
 }
 
-/// Returns the page in HTML.
 pub fn page(found: &Identification) -> String {
     page::write(found)
 }

@@ -41,7 +41,6 @@ impl<'a> FmuSystem<'a> {
         Ok((FmuSystem { model, setup, records, targets, names }, unknowns))
     }
 
-    /// Returns true if an unknown is a parameter or a start of the FMU.
     pub fn is_parameter(&self, j: usize) -> bool {
         matches!(self.targets[j].0, Target::Parameter(_))
     }
@@ -141,7 +140,6 @@ impl<'a> FmuSystem<'a> {
         .collect()
     }
 
-    /// Returns the first `rows` rows of a recording with the errors of the inputs' scales and of the clock taken out.
     fn acting(&self, values: &[f64], recording: usize, rows: usize) -> Cow<'_, Record> {
         let whole = &self.records[recording];
         let mut record = match rows < whole.time.len() {
@@ -190,7 +188,6 @@ impl System for FmuSystem<'_> {
     }
 }
 
-/// Returns true for an unknown that is a known value with a tolerance.
 pub fn is_known(unknown: &Unknown) -> bool {
     unknown.part == Part::Tolerance
 }

@@ -34,7 +34,6 @@ const POOR_FIT: f64 = 90.0;
 /// Ratio of a known value's standard deviation after the fit to its tolerance, below which the recordings show the value.
 const SHOWN: f64 = 0.7;
 
-/// Returns the fit of the simulated rates ŷ to the measured rates y, %: 100 (1 − ‖y − ŷ‖/‖y − mean y‖).
 fn fit_pct(recordings: &[Recording], motion: &[Motion], solution: &Solution) -> f64 {
     let residuals = solution.fit.residuals(&solution.minimum.point.z, motion);
     let (mut left, mut all) = (0.0, 0.0);
@@ -49,7 +48,6 @@ fn fit_pct(recordings: &[Recording], motion: &[Motion], solution: &Solution) -> 
     100.0 * (1.0 - (left / all).sqrt())
 }
 
-/// Returns the numbers that describe the fit of one slosh model with one friction law.
 pub fn summary(system: &BenchSystem, solution: &Solution, (model, law): (&str, &str)) -> ModelFit {
     let fit = &solution.fit;
     let point = &solution.minimum.point;
@@ -111,7 +109,6 @@ pub fn validate(
     validation.iter().map(one).collect()
 }
 
-/// A fitted model.
 pub struct Fitted<'p> {
     pub system: &'p BenchSystem<'p>,
     pub solution: Solution<'p>,
@@ -213,7 +210,6 @@ pub fn conclude(
     })
 }
 
-/// Returns estimate `k` from its draws, `full` with the tolerances of known values and `own` without.
 fn estimated(
     system: &BenchSystem,
     solution: &Solution,
@@ -259,7 +255,6 @@ fn estimated(
     Estimated { value, std, std_noise, interval, determined, unit: full.units[k].clone() }
 }
 
-/// Collects the findings at the chosen model's minimum other than values.
 fn findings(
     system: &BenchSystem,
     solution: &Solution,
@@ -320,7 +315,6 @@ fn findings(
     }
 }
 
-/// Returns the course of the torque between rows in words.
 fn torque_words(solution: &Solution) -> Option<String> {
     if solution.rivals.is_empty() {
         return None;
@@ -449,7 +443,6 @@ fn shown(
     sentences
 }
 
-/// Returns the condition number of the sensitivities, with columns of unit length; NaN if they are not finite.
 fn condition(solution: &Solution) -> f64 {
     let Some(found) = &solution.minimum.derivatives else { return f64::NAN };
     let picked = found.matrix.select_columns(&places(&solution.fit.free));

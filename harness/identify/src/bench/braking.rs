@@ -6,7 +6,6 @@ use serde::Serialize;
 /// Mean of torque less inertia times acceleration over rows of similar rate.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct FrictionPoint {
-    /// Mean rate, rad/s.
     pub rate: f64,
     /// Mean friction torque, N·m; positive if it brakes a positive rate.
     pub torque: f64,
@@ -17,23 +16,18 @@ pub struct FrictionPoint {
 /// harmonics h (thesis 5.4).
 #[derive(Clone, Debug, Serialize)]
 pub struct Braking {
-    /// `counter-clockwise` (forwards) or `clockwise`.
     pub direction: &'static str,
     /// Speed to which the coefficients belong, rad/s: the mean over both directions. The dependence of the deceleration on the
     /// speed is fitted as a parabola.
     pub speed: f64,
     /// β_0, then β_1^c, β_1^s, β_2^c, …, rad/s².
     pub coefficients: Vec<f64>,
-    /// Standard deviations of the coefficients, rad/s².
     pub std: Vec<f64>,
-    /// Root mean square of the residual, rad/s².
     pub rmse: f64,
-    /// Share of the acceleration's variance that the fit explains.
     pub r_squared: f64,
     pub rows: usize,
     /// Number of stretches of these rows: parts of one decay within one revolution of the hub.
     pub stretches: usize,
-    /// Angle (rad) and acceleration at `speed` (rad/s²) of each row.
     #[serde(skip)]
     pub points: Vec<(f64, f64)>,
     /// Covariance of the coefficients from the scatter between stretches; `None` if there are fewer than [`LEAST_STRETCHES`](crate::methods::friction::LEAST_STRETCHES).
@@ -65,7 +59,6 @@ impl Braking {
         Some((CHI_SQUARE * few * variance).sqrt())
     }
 
-    /// Returns the fitted acceleration at an angle, rad/s².
     pub fn at(&self, angle: f64) -> f64 {
         let [mean, harmonics @ ..] = &self.coefficients[..] else { return 0.0 };
         let each = harmonics.chunks(2).zip(1..).map(|(pair, h)| {

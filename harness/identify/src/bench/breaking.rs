@@ -5,7 +5,6 @@ use formulas::cylinder::XI;
 /// Steepness at which waves break, and its standard deviation: 0.60 to 0.66 in water.
 pub const BEGINS: (f64, f64) = (0.63, 0.03);
 
-/// Least steepness at which waves may break.
 pub fn least() -> f64 {
     BEGINS.0 - BEGINS.1
 }

@@ -9,13 +9,10 @@ use crate::estimate::prose;
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Cause {
-    /// Effect that acts, in words.
     pub effect: String,
-    /// Flags of `hubslosh identify` that fit it.
     pub flags: String,
     /// Size of the effect, if it has one number: name, value and unit.
     pub size: Option<(String, f64, String)>,
-    /// Decrease of −2 ln L by the effect.
     pub gain: f64,
 }
 
@@ -32,16 +29,13 @@ impl Cause {
     }
 }
 
-/// A torque k φ that the model lacks.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Missing {
-    /// Quantity φ, in words.
     pub follows: String,
     /// Factor k; `std` is its standard deviation, in the same `unit`.
     pub factor: f64,
     pub std: f64,
     pub unit: String,
-    /// |k| over its standard deviation.
     pub deviations: f64,
 }
 

@@ -30,13 +30,10 @@ use names::hubslosh::{FrictionModel, SloshModel, slosh};
 /// and power between lines (in records of several periods) is noise.
 #[derive(Clone, Debug)]
 pub struct Multisine {
-    /// Length of a period, s; lines are 1/period apart.
     pub period: f64,
-    /// Numbers k of the lines with power.
     pub lines: Vec<u32>,
     /// Odd lines of the band without power.
     pub detection: Vec<u32>,
-    /// Amplitudes a_k, N·m.
     amplitudes: Vec<f64>,
     phases: Vec<f64>,
 }
@@ -83,18 +80,15 @@ impl Multisine {
         one.scaled(peak / largest)
     }
 
-    /// Returns the multisine with all torques multiplied by a factor.
     pub fn scaled(&self, factor: f64) -> Self {
         let amplitudes = self.amplitudes.iter().map(|a| a * factor).collect();
         Multisine { amplitudes, ..self.clone() }
     }
 
-    /// Frequencies of the lines with power, Hz.
     pub fn frequencies(&self) -> Vec<f64> {
         self.lines.iter().map(|&k| f64::from(k) / self.period).collect()
     }
 
-    /// Torque at `t` (s), N·m.
     pub fn at(&self, t: f64) -> f64 {
         let turn = (t / self.period).fract();
         let tones = self.lines.iter().zip(&self.amplitudes).zip(&self.phases);
@@ -120,7 +114,6 @@ pub fn check_rows(period: f64, band: (f64, f64), peak: f64, rows: usize) -> Resu
     Ok(())
 }
 
-/// Numbers of the odd lines between two frequencies (Hz) at a period (s).
 fn odd_lines(period: f64, band: (f64, f64), peak: f64) -> Result<Vec<u32>> {
     ensure!(0.0 < band.0 && band.0 < band.1, "a multisine's band must be 0 < f0 < f1");
     ensure!(
@@ -190,12 +183,9 @@ pub fn d_optimal(plant: &Linear, frequencies: &[f64]) -> Vec<f64> {
     shares.iter().map(|p| (1.0 - SPREAD_POWER) * p + SPREAD_POWER / count).collect()
 }
 
-/// A reaction wheel's limits.
 #[derive(Clone, Copy, Debug)]
 pub struct Wheel {
-    /// Largest torque, N·m.
     pub torque: f64,
-    /// Moment of inertia, kg·m².
     pub inertia: f64,
     /// Speed at the start, and the least and the largest that are allowed, rad/s.
     pub speeds: [f64; 3],

@@ -12,24 +12,17 @@ use analysis::innovations::Tests;
 
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct ModelFit {
-    /// slosh.model.
     pub model: String,
-    /// friction.model.
     pub friction: String,
-    /// −2 ln L.
     pub deviance: f64,
-    /// Bayesian information criterion; the smallest is the best.
     pub bic: f64,
     /// Fit of the simulated rates ŷ to the measured rates y, %: 100 (1 − ‖y − ŷ‖/‖y − mean y‖).
     pub fit_pct: f64,
     pub converged: bool,
     /// Distance to the minimum in standard deviations.
     pub newton_decrement: f64,
-    /// Tests of the residual of each signal.
     pub tests: Vec<Tests>,
-    /// Fit of the recordings held back, %.
     pub validation_pct: Vec<f64>,
-    /// Standard deviation of the gyro's white noise, rad/s.
     pub noise_white: f64,
     /// Number of simulations of all recordings. A simulation of a part of the rows counts as this part.
     pub simulations: f64,
@@ -57,30 +50,22 @@ impl ModelFit {
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Details {
     pub fit: ModelFit,
-    /// Sums that are determined although their terms are not.
     pub combinations: Vec<Combination>,
-    /// Condition number of the sensitivities.
     pub condition: f64,
     /// Torque that the model lacks. It is named only if it leaves noise as residual, and no other effect explains the recordings
     /// as well.
     pub missing: Vec<Missing>,
     /// Cause of a misfit. It is named only if it leaves noise as residual, and no other effect explains the recordings as well.
     pub cause: Option<Cause>,
-    /// All models that were tried, the chosen one first.
     pub models: Vec<ModelFit>,
-    /// Estimates from the frequency response.
     pub frequency_response: Option<Response>,
-    /// First start of the search that was computed from the recordings.
     pub start: Option<Start>,
     /// Braking over the angle in free decay, counter-clockwise and clockwise, of friction runs.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub braking: Vec<Braking>,
-    /// Measured friction over the rate, of friction runs.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub friction_points: Vec<FrictionPoint>,
-    /// Largest slosh angle of the fit, rad; 0 without slosh.
     pub slosh_angle: f64,
-    /// Wall time, s.
     pub seconds: f64,
 }
 

@@ -9,14 +9,10 @@ use names::hubslosh::{G_AXIAL, TAU_CMD, fluid, friction, hub, slosh, tank};
 
 use crate::tuning::COARSEST;
 
-/// Known values of the bench without the recording.
 #[derive(Clone, Copy, Debug)]
 pub struct Bench {
-    /// tank.r, m.
     pub arm: f64,
-    /// fluid.rho, kg/m³.
     pub density: f64,
-    /// g_axial, m/s².
     pub gravity: f64,
 }
 
@@ -24,7 +20,6 @@ pub struct Bench {
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 #[allow(missing_docs)]
 pub struct Start {
-    /// Length of the first mode's pendulum, m.
     pub length: f64,
     /// Inertia of the first mode's mass about the hub over the inertia that turns with the hub.
     pub mass_ratio: f64,
@@ -58,15 +53,11 @@ impl Start {
     }
 }
 
-/// The FMU's values of the bench.
 #[derive(Clone, Copy, Debug)]
 pub struct Nominal {
-    /// Values that recordings of torque and rate do not show.
     pub bench: Bench,
     pub start: Start,
-    /// Inertia of hub and liquid, kg·m².
     pub inertia: f64,
-    /// Period of the first slosh mode, s.
     pub period: f64,
 }
 
@@ -110,7 +101,6 @@ pub fn with_damping(mut settings: Vec<(String, String)>) -> Vec<(String, String)
 }
 
 impl Bench {
-    /// Returns the mass of the liquid in an upright cylinder, kg.
     pub fn liquid(self, d: f64, h: f64) -> f64 {
         self.density * std::f64::consts::PI / 4.0 * d * d * h
     }

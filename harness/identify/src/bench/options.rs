@@ -11,34 +11,25 @@ use crate::engine::Hold;
 use crate::input::recording::Recording;
 use crate::input::tolerance::Tolerances;
 
-/// Options of an identification.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Slosh models to be tried, by the names of `slosh.model`'s items.
     pub models: Vec<String>,
-    /// Friction laws to be tried, by the names of `friction.model`'s items.
     pub friction: Vec<String>,
-    /// Known parameters of the bench, by FMU name; these are not estimated.
     pub settings: Vec<(String, String)>,
-    /// Priors of estimated parameters: name, mean and standard deviation.
     pub known: Vec<(String, f64, f64)>,
-    /// Start values that replace the values computed from the recordings, by FMU name.
     pub starts: Vec<(String, f64)>,
     /// True to estimate delay, gyro bias and friction asymmetry as well.
     pub sensor_errors: bool,
     /// Effects that are estimated although the FMU does not have them, such as [`Target::ActuatorLag`].
     pub effects: Vec<Target>,
-    /// True to estimate the damping by waves that break, if the fit reaches them.
     pub breaking: bool,
     /// Standard deviation of the gyro's scale about 1, from its data sheet; 0 if the scale is exactly 1.
     pub gyro_scale: f64,
     /// Tolerances of values that are not estimated.
     pub tolerances: Tolerances,
-    /// Intersample behaviour of the torque; `None` chooses the best fit.
     pub intersample: Option<Hold>,
     /// True if the rate's time stamps may be early: a negative delay then raises no doubt.
     pub acausal: bool,
-    /// Recordings that are simulated, not fitted.
     pub validation: Vec<Recording>,
 }
 
@@ -63,7 +54,6 @@ impl Default for Options {
 }
 
 impl Options {
-    /// Returns the bench that the FMU is with these options.
     pub fn nominal(&self, fmu: &Fmu) -> Result<Nominal> {
         let known = self.known.iter().map(|(name, mean, _)| (name.clone(), *mean));
         let expected: Vec<(String, f64)> = known.chain(self.starts.iter().cloned()).collect();

@@ -19,22 +19,17 @@ use crate::input::recording::Recording;
 use crate::model::overridden::{near, refuse};
 use crate::model::unknown::range;
 
-/// Indices of the gyro's rate and of the encoder's angle among the outputs.
 const RATE: usize = 0;
 const ANGLE: usize = 1;
 
-/// Drift of a MEMS gyro (the thesis's LSM6DS3).
 const GYRO_DRIFT: Drift = Drift { size: 0.2, time: 100.0, width: 0.7 };
 /// Drift of an encoder's angle: it integrates the rate that the model does not explain, whose size is unknown, so that its width
 /// is large.
 const ENCODER_DRIFT: Drift = Drift { size: 1.0, time: 100.0, width: 6.0 };
 /// Standard deviation of a delay's prior, and the delay's bounds, s.
 const DELAY: (f64, f64, f64) = (0.05, -0.2, 0.5);
-/// Standard deviation of the prior of the dry friction's asymmetry, which is small against 1.
 const ASYMMETRY: f64 = 0.5;
-/// Standard deviation of the prior of each friction coefficient b, c and d, relative to its start.
 const FRICTION_WIDTH: f64 = 10.0;
-/// Lower bound of a friction coefficient, relative to its start.
 pub const LEAST_FRICTION: f64 = 1e-4;
 /// Standard deviation of the prior of ln ω_s (Stribeck speed), and the largest factor between ω_s and its start.
 const SPEED: (f64, f64) = (1.5, 30.0);
@@ -43,7 +38,6 @@ const ABOVE_NOISE: f64 = 5.0;
 /// Least and largest factor by which a known value may differ from its nominal value.
 const WIDEST: (f64, f64) = (0.6, 1.6);
 
-/// Unknowns, and their targets in the same order.
 struct List<'a> {
     fmu: &'a Fmu,
     unknowns: Vec<Unknown>,
@@ -66,14 +60,12 @@ impl List<'_> {
         description.variable(name).map_or("1".into(), |v| description.unit(v).to_string())
     }
 
-    /// Returns a positive parameter of the FMU as an unknown that is searched in its logarithm.
     fn parameter(&self, name: &str, start: f64) -> Unknown {
         let (low, high) = self.range(name);
         let bounds = (low.max(1e-6 * start), high.min(1e6 * start));
         Unknown::positive(name, &self.unit(name), Role::Run(None), start, bounds)
     }
 
-    /// Returns a parameter of the FMU that may be 0 as an unknown that is searched in its value.
     fn nonnegative(&self, name: &str, start: f64) -> Unknown {
         let (low, high) = self.range(name);
         let bounds = (low.max(0.0), high);
@@ -441,7 +433,6 @@ pub fn effect(target: &Target, part: Part) -> Unknown {
     Unknown { part, start, ..unknown }
 }
 
-/// Adds the effects that are tried if the models do not fit.
 fn candidates(list: &mut List, options: &Options, frozen: bool, law: &str) {
     let is_set = |name: &str| options.settings.iter().any(|(n, _)| n == name);
     let add = |list: &mut List, target: Target| {

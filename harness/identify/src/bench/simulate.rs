@@ -18,26 +18,19 @@ use crate::tuning::SAME_INSTANT;
 /// The FMU's input for a torque on the hub besides the actuator's.
 pub const TORQUE_BESIDES: &str = TAU_EXT;
 
-/// The FMU's parameters that friction is proportional to.
 const FRICTION: [&str; 3] = [friction::B, friction::C, friction::D];
 
-/// Motion of the hub at the rows of a recording.
 #[derive(Clone, Debug, Default)]
 pub struct Motion {
-    /// rad.
     pub angle: Vec<f64>,
-    /// rad/s.
     pub rate: Vec<f64>,
-    /// rad/s².
     pub acceleration: Vec<f64>,
-    /// Angle of the first slosh mode, rad.
     pub slosh_angle: Vec<f64>,
 }
 
 /// Parts of a [`Motion`] read in every row; the rest stays empty.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Read {
-    /// The whole motion.
     All,
     /// Only angle and rate, for differences of runs: both are states, so that the FMU need not compute its outputs.
     States,
@@ -106,12 +99,9 @@ fn at(time: &[f64], signal: &[f64], t: f64, row: &mut usize) -> f64 {
     signal[k] + part * (signal[k + 1] - signal[k])
 }
 
-/// Setup and drive of the FMU.
 #[derive(Clone, Debug)]
 pub struct Setup {
-    /// Values by FMU name, as text, set first.
     pub settings: Vec<(String, String)>,
-    /// Intersample behaviour of the torque.
     pub intersample: Hold,
 }
 

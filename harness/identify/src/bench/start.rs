@@ -18,24 +18,17 @@ use crate::input::recording::Recording;
 use crate::input::response::{excited_band, response};
 use crate::tuning::{DAMPINGS, FREQUENCY_FINENESS, LATEST_DELAY};
 
-/// Bench parameters from a frequency response.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Response {
-    /// Slosh frequency, Hz: of the zeros.
     pub slosh_frequency: f64,
-    /// Slosh damping ratio: of the zeros.
     pub slosh_damping: f64,
     /// Resonance, Hz: of the pair of poles.
     pub resonance_frequency: f64,
-    /// Slosh mass, kg.
     pub slosh_mass: f64,
-    /// I0, inertia of hub and fixed mass, kg·m².
     pub inertia: f64,
-    /// Fit of the transfer function, %.
     pub fit: f64,
 }
 
-/// Parameters of the FMU that have a start from the data, in the order of [`Start`].
 pub const PARAMETERS: [&str; 8] = [
     tank::D,
     tank::H,
@@ -59,15 +52,10 @@ pub const PARAMETERS: [&str; 8] = [
 /// difference, `structure`, shows whether the bench has this structure.
 #[derive(Clone, Copy, Debug)]
 pub struct Plant {
-    /// Slosh frequency ω, rad/s.
     pub omega: f64,
-    /// Slosh damping ratio ζ.
     pub zeta: f64,
-    /// I0, inertia of hub and fixed mass, kg·m².
     pub inertia: f64,
-    /// Mass ratio μ.
     pub mass_ratio: f64,
-    /// Viscous friction b, N·m·s.
     pub friction: f64,
     /// a2 less its value from the other coefficients, 1/s; 0 if the bench has this structure.
     pub structure: f64,
@@ -85,7 +73,6 @@ impl Plant {
         Some(Plant { omega, zeta, inertia, mass_ratio, friction, structure })
     }
 
-    /// Slosh mass m, kg.
     pub fn mass(&self, bench: Bench) -> f64 {
         self.mass_ratio * self.inertia / bench.inertia(1.0)
     }
@@ -161,7 +148,6 @@ pub fn from_data(
     Ok((responses.first().copied().or(Some(first)), all))
 }
 
-/// Returns the bench from the balance of torques in each band of each recording, the least residual first.
 fn balances(
     recordings: &[Recording],
     bench: Bench,
@@ -175,7 +161,6 @@ fn balances(
     found.iter().map(|b| b.response(bench)).collect()
 }
 
-/// Returns the frequencies between which the torque of a recording has its power, Hz.
 fn excited(recording: &Recording) -> Option<(f64, f64)> {
     let (step, torque, rate) = recording.even().ok()?;
     excited_band(step, &torque, &rate)
@@ -225,16 +210,11 @@ impl Response {
     }
 }
 
-/// Bench parameters from the balance of torques.
 #[derive(Clone, Copy, Debug)]
 pub struct Balance {
-    /// Slosh frequency, Hz.
     pub frequency: f64,
-    /// Slosh damping ratio.
     pub damping: f64,
-    /// Slosh mass, kg.
     pub mass: f64,
-    /// I0, inertia of hub and fixed mass, kg·m².
     pub inertia: f64,
     /// Root mean square of the residual over the root mean square of the hub's rate.
     pub residual: f64,

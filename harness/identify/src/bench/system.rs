@@ -25,36 +25,22 @@ use crate::bench::simulate::{self, Read, Setup};
 use crate::engine::{Hold, Motion, System};
 use crate::input::recording::Recording;
 
-/// The meaning of an unknown for the bench.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Target {
-    /// A parameter of the FMU.
     Parameter(String),
-    /// A start of a recording that does not begin at rest.
     Initial(usize, String),
-    /// Length l of the first mode's pendulum, m.
     Length,
-    /// Mass ratio μ of the first mode.
     MassRatio,
     /// Inertia J that turns with the hub without the first mode's mass, kg·m².
     Inertia,
-    /// Damping ratio of the mode.
     Zeta,
-    /// Delay of the rate, s.
     Delay,
-    /// Delay of the angle, s.
     AngleDelay,
-    /// Time constant of the actuator, s.
     ActuatorLag,
-    /// Time constant of the gyro's filter, s.
     GyroLag,
-    /// Relative change of the friction over a recording.
     FrictionDrift,
-    /// Error of the gyro's scale.
     GyroScale,
-    /// Reading of the gyro at rest, rad/s.
     GyroBias,
-    /// Reading of the encoder at angle 0, rad.
     AngleOffset,
     /// Asymmetry of the dry friction of a hub that turns only one way. The search has the friction c and d in this direction; the
     /// asymmetry converts them to the mean of both directions.
@@ -63,47 +49,31 @@ pub enum Target {
     Torque,
     /// True time over the recorded time.
     Clock,
-    /// g_axial over its value.
     Gravity,
-    /// tank.r over its value.
     Arm,
-    /// fluid.rho over its value.
     Density,
     /// Difference of the largest command and the actuator's limit, relative to the largest command.
     Limit,
-    /// Compliance of the bearing before it slips, rad/(N·m).
     Compliance,
-    /// Mass of the second mode over its mass in an upright cylinder.
     SecondMode,
-    /// Size of a torque that follows the motion.
     Besides(usize),
 }
 
-/// A row of the bench's motion.
 pub struct Row {
-    /// Time from the recording's first row, s.
     pub time: f64,
-    /// Commanded torque, N·m.
     pub torque: f64,
-    /// Angle of the hub, rad.
     pub angle: f64,
-    /// Rate of the hub, rad/s.
     pub rate: f64,
-    /// Slosh angle, rad.
     pub slosh_angle: f64,
 }
 
 /// A torque that is proportional to a quantity of the motion, with the unit of its factor.
 pub struct Besides {
-    /// Quantity that the effect is proportional to.
     pub follows: &'static str,
-    /// Unit of the factor.
     pub unit: &'static str,
-    /// The torque at a row for a factor of 1.
     pub torque: fn(&Row) -> f64,
 }
 
-/// Torques that may act on a bench and that the models lack.
 pub const BESIDES: [Besides; 7] = [
     Besides { follows: "the rate", unit: "N.m.s/rad", torque: |row| row.rate },
     Besides {
@@ -131,15 +101,11 @@ pub struct BenchSystem<'a> {
     pub recordings: &'a [Recording],
     pub settings: Vec<(String, String)>,
     pub bench: Bench,
-    /// Meaning of each unknown, in their order.
     pub targets: Vec<Target>,
-    /// Names and units of the derived quantities.
     pub derived: Vec<(String, String)>,
     /// Direction of a hub that turns one way, 1 or −1; 0: both.
     pub way: f64,
-    /// Largest command, N·m.
     pub largest: f64,
-    /// Motion that the torques of [`BESIDES`] follow.
     pub base: OnceLock<Vec<Motion>>,
 }
 
@@ -156,7 +122,6 @@ fn tank_of(length: f64, mass: f64, inertia: f64, bench: Bench) -> Option<[f64; 3
     (hub > 0.0).then_some([d, h, hub])
 }
 
-/// Returns the diameter d of a tank whose first mode has this length and mass, m.
 fn diameter(length: f64, mass: f64, bench: Bench) -> f64 {
     let xi = XI[0];
     (8.0 * xi * xi * (xi * xi - 1.0) * length * mass / (PI * bench.density)).powf(0.25)
@@ -168,7 +133,6 @@ impl BenchSystem<'_> {
         self.targets.iter().position(|other| other == target).map(|k| values[k])
     }
 
-    /// Returns the known values, multiplied by the factors that the unknowns have for them.
     fn bench(&self, values: &[f64]) -> Bench {
         let of = |target: &Target| self.value(values, target).unwrap_or(1.0);
         let Bench { arm, density, gravity } = self.bench;

@@ -12,37 +12,26 @@ use crate::words::verdict::{DOES_NOT_FIT, NO_MINIMUM, failed};
 use analysis::innovations::Tests;
 use names::hubslosh::{SloshModel, hub};
 
-/// Candidates of the choice.
 pub struct Question<'a> {
-    /// Slosh models; those that fit about as well as the best come first.
     pub slosh: &'a [ModelFit],
-    /// Number of slosh models that fit about as well as the best.
     pub near: usize,
-    /// Friction laws, with one slosh model.
     pub laws: &'a [ModelFit],
-    /// Doubts about the recordings before any fit.
     pub doubts: &'a [String],
 }
 
 /// Findings at the chosen model's minimum other than values.
 pub struct Findings {
-    /// Reasons for the choice of the torque's behaviour between rows, in words.
     pub torque: Option<String>,
-    /// Tests of each signal's residual.
     pub tests: Vec<Tests>,
     /// True if the residual asks for effects that were not estimated.
     pub asks: bool,
-    /// Effects each of which leaves noise as residual, in words.
     pub alike: Vec<String>,
-    /// The torque that the model lacks, if it is the cause.
     pub missing: Vec<Missing>,
     pub cause: Option<Cause>,
-    /// Doubts about recordings or model, in words.
     pub doubts: Vec<String>,
 }
 
 impl Findings {
-    /// Returns true if the model explains the recordings.
     pub fn fits(&self) -> bool {
         self.tests.iter().all(Tests::passed) && !self.asks && self.doubts.is_empty()
     }

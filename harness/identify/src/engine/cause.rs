@@ -23,26 +23,19 @@ use super::problem::Part;
 use super::{DECIDES, ENDS, Fit, Solution};
 use crate::news::News;
 
-/// Largest number of candidates that are fitted, those with the largest scores.
 const FITTED: usize = 3;
 /// Least part of a candidate's change that the unknowns cannot cancel. A smaller part does not differ from errors of the
 /// derivatives, which are differences and good to a thousandth.
 const SEEN: f64 = 1e-2;
 
-/// A candidate that the recordings ask for.
 #[derive(Clone, Copy, Debug)]
 pub struct Effect {
-    /// Index of the unknown.
     pub unknown: usize,
-    /// Size of the effect, and its standard deviation.
     pub size: (f64, f64),
-    /// Decrease of −2 ln L by the effect.
     pub gain: f64,
-    /// True if the residual is noise once the effect is fitted.
     pub fits: bool,
 }
 
-/// Size, standard deviation and score of a candidate, at first order.
 struct Score {
     unknown: usize,
     size: f64,

@@ -14,9 +14,7 @@ use super::problem::{Part, Role};
 use super::profile::{Curve, OPEN, Point};
 use super::{Fit, Solution};
 
-/// Number of draws: with so many the error of a quantile is a fiftieth of a standard deviation.
 const DRAWS: usize = 20_000;
-/// Fewest draws from which quantiles are computed.
 const FEWEST: usize = 400;
 /// Places of the profile's coordinate between which draws are spread evenly.
 const PLACES: usize = 400;
@@ -34,14 +32,11 @@ pub struct Derived {
     pub open: Option<(String, [bool; 2])>,
 }
 
-/// A point of the profile, with the spread of the draws about it.
 struct Place {
     at: f64,
     rise: f64,
     z: Vec<f64>,
-    /// Maps independent normal numbers to steps.
     spread: DMatrix<f64>,
-    /// Mean of each signal's residual.
     means: Vec<f64>,
 }
 
@@ -242,7 +237,6 @@ fn spread(jacobian: &DMatrix<f64>, which: &[bool]) -> DMatrix<f64> {
 }
 
 impl Fit<'_> {
-    /// Mean of each signal's residual.
     fn mean_residuals(&self, point: &super::fit::Point) -> Vec<f64> {
         let residuals = self.residuals(&point.z, &point.motion);
         let mean = |(signal, r): (&super::Signal, &Vec<f64>)| {
@@ -258,7 +252,6 @@ impl Derived {
         self.columns.first().is_some_and(|column| column.len() >= FEWEST)
     }
 
-    /// Returns the index of a quantity.
     pub fn place(&self, name: &str) -> Option<usize> {
         self.names.iter().position(|other| other == name)
     }
@@ -267,7 +260,6 @@ impl Derived {
         analysis::statistics::deviation(&self.columns[k])
     }
 
-    /// Returns the 95 % interval of quantity `k`.
     pub fn interval(&self, k: usize) -> [f64; 2] {
         let mut sorted = self.columns[k].clone();
         sorted.sort_by(f64::total_cmp);

@@ -15,18 +15,15 @@ use super::{BEND, FIRST_STEP, MOVE, STEPS, WIDER};
 pub struct Fit<'p> {
     pub problem: &'p Problem<'p>,
     pub noise: Vec<Noise>,
-    /// Course of the inputs between rows.
     pub hold: Hold,
     /// Factor by which the noise is multiplied in the sum of squares; above 1 the priors lead the search.
     pub inflation: f64,
     /// Part of each recording that is fitted, from its beginning.
     pub part: f64,
-    /// True for each unknown that is estimated.
     pub free: Vec<bool>,
     /// True if differences are taken to both sides, because a difference to one side is wrong where the outputs are strongly
     /// curved in an unknown.
     pub central: bool,
-    /// Least and largest coordinate of each unknown.
     pub ends: Vec<(f64, f64)>,
     /// The unknown whose profile is followed, if the likelihood was seen to be no parabola along it.
     pub bent: Option<usize>,
@@ -46,12 +43,10 @@ pub struct Point {
     pub cost: f64,
 }
 
-/// Derivatives of the residuals.
 #[derive(Clone, Debug)]
 pub struct Derivatives {
     /// A column for each unknown, with the derivatives of `Point::e`; 0 for unknowns that were not asked for.
     pub matrix: DMatrix<f64>,
-    /// Means of the derivatives of each signal's reading.
     pub means: DMatrix<f64>,
 }
 
@@ -87,7 +82,6 @@ impl<'p> Fit<'p> {
         self.driven.load(Relaxed) as f64 / rows as f64
     }
 
-    /// Sets the noise of each signal, and the part of the recordings that is fitted.
     pub fn set(&mut self, noise: Vec<Noise>, part: f64) {
         (self.noise, self.part) = (noise, part);
         self.renew_filters();
@@ -102,13 +96,11 @@ impl<'p> Fit<'p> {
         self.filters = self.problem.signals.iter().zip(&self.noise).map(filter).collect();
     }
 
-    /// Returns the number of a recording's rows that are fitted.
     pub fn rows(&self, recording: usize) -> usize {
         let all = self.problem.recordings[recording].time.len();
         ((self.part * all as f64).ceil() as usize).clamp(2.min(all), all)
     }
 
-    /// Returns the coordinates of values, within the bounds.
     pub fn coordinates(&self, values: &[f64]) -> Vec<f64> {
         let all = self.problem.unknowns.iter().zip(values).zip(&self.ends);
         all.map(|((u, value), ends)| u.coordinate(*value).clamp(ends.0, ends.1)).collect()
@@ -133,7 +125,6 @@ impl<'p> Fit<'p> {
         Ok(self.point(z, motion))
     }
 
-    /// Returns the point at the coordinates z, whose motion was simulated before.
     pub fn point(&self, z: &[f64], motion: Vec<Motion>) -> Point {
         let residuals = self.residuals(z, &motion);
         let e = DVector::from_vec(self.stacked(residuals, z));
@@ -376,13 +367,11 @@ impl<'p> Fit<'p> {
         1.0 + self.problem.unknowns.iter().zip(z).filter_map(own).sum::<f64>()
     }
 
-    /// Tests for each signal whether the residual at a point is noise.
     pub fn tests(&self, point: &Point) -> Vec<Tests> {
         let innovations = self.innovations(self.residuals(&point.z, &point.motion));
         self.tests_of(&innovations)
     }
 
-    /// Tests for each signal whether its innovations are noise.
     pub fn tests_of(&self, innovations: &[Vec<f64>]) -> Vec<Tests> {
         let all = self.problem.signals.iter().zip(innovations).zip(&self.noise);
         let one = |((signal, e), noise): ((&Signal, &Vec<f64>), &Noise)| {
@@ -395,7 +384,6 @@ impl<'p> Fit<'p> {
         all.map(one).collect()
     }
 
-    /// Estimates the noise of each signal from the residual at a point, and sets it.
     pub fn renew_noise(&mut self, point: &Point) {
         let residuals = self.residuals(&point.z, &point.motion);
         let of = |(signal, residual): (&Signal, &Vec<f64>)| {
@@ -409,21 +397,18 @@ impl<'p> Fit<'p> {
 }
 
 impl Signal {
-    /// Returns the values of the rows that are sampled.
     pub fn picked(&self, values: &[f64]) -> Vec<f64> {
         let there = values.iter().zip(&self.sampled).filter(|(_, sampled)| **sampled);
         there.map(|(value, _)| *value).collect()
     }
 }
 
-/// Derivative of the residuals by one unknown.
 struct Column {
     values: Vec<f64>,
     means: Vec<f64>,
     step: (f64, f64),
 }
 
-/// Refuses a derivative by an unknown that is not finite, or whose square is not.
 pub(super) fn check_finite(values: &[f64], name: &str) -> Result<()> {
     if values.iter().map(|v| v * v).sum::<f64>().is_finite() {
         return Ok(());

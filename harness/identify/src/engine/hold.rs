@@ -21,7 +21,6 @@ pub struct Rival {
     pub more: f64,
     /// Coordinates of its minimum less the coordinates of the minimum with the chosen course.
     pub shift: Vec<f64>,
-    /// Its delay, s, if there is one.
     pub delay: Option<f64>,
     /// True if the delay would let the effect precede its cause.
     pub early: bool,
@@ -37,7 +36,6 @@ impl Rival {
 }
 
 impl Fit<'_> {
-    /// Returns the index of the delay of the first output.
     pub fn delay(&self) -> Option<usize> {
         self.problem.unknowns.iter().position(|u| u.role == Role::Delay(0))
     }
@@ -106,7 +104,6 @@ impl Fit<'_> {
     }
 }
 
-/// Returns true if a minimum has a delay that is not allowed.
 fn is_early(fit: &Fit, delay: Option<usize>, step: f64, minimum: &Minimum) -> bool {
     !fit.problem.acausal && delay.is_some_and(|j| minimum.point.z[j] < -EARLIEST * step)
 }

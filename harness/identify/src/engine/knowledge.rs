@@ -12,7 +12,6 @@ use super::solver_error::SolverError;
 
 /// Component of a unit direction above which an unknown belongs to the direction.
 const PART: f64 = 1e-2;
-/// Shift of an estimate by the solver's errors, in standard deviations, above which these errors decide it.
 const DECIDED: f64 = 0.3;
 
 /// Unknowns that change together without a change of any output.
@@ -23,7 +22,6 @@ pub struct Inseparable {
 }
 
 impl Inseparable {
-    /// Returns the sentence of the verdict about these unknowns.
     pub fn words(&self) -> String {
         let names: Vec<&str> = self.direction.keys().map(String::as_str).collect();
         let changes: Vec<String> =
@@ -38,7 +36,6 @@ impl Inseparable {
     }
 }
 
-/// Knowledge of the unknowns at a point.
 pub struct Knowledge {
     /// Covariance of all unknowns. The rows of unknowns at a bound are 0, and unknowns that are not resolved have an infinite
     /// variance.

@@ -10,7 +10,6 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use super::KEPT;
 use super::fit::{Derivatives, Fit, Point};
 
-/// End of a search.
 #[derive(Clone, Debug)]
 pub struct Minimum {
     pub point: Point,
@@ -18,14 +17,11 @@ pub struct Minimum {
     pub derivatives: Option<Derivatives>,
     /// Distance to the minimum, standard deviations.
     pub decrement: f64,
-    /// Unknowns that were searched for.
     pub free: Vec<bool>,
 }
 
-/// Conditions that end a search.
 #[derive(Clone, Copy, Debug)]
 pub struct End {
-    /// Largest number of sets of derivatives.
     pub sets: usize,
     /// Distance to the minimum, standard deviations.
     pub decrement: f64,
@@ -52,7 +48,6 @@ const FLAT: f64 = 1e-12;
 const RESOLVED: f64 = 4.0;
 /// Factor by which the damping grows after a step that fails, and falls after a step that gains more than half its forecast.
 const DAMPING: f64 = 8.0;
-/// Largest number of steps that are tried from one point, with growing damping.
 const TRIES: usize = 7;
 
 /// The curvature JᵀJ of a sum of squares, scaled to a unit diagonal.
@@ -124,7 +119,6 @@ impl Curvature {
         all.filter(is_flat).map(|(_, v)| v.into_owned()).collect()
     }
 
-    /// Returns the covariance as a matrix of `all` unknowns; 0 for unknowns that the curvature does not have.
     pub fn covariance(&self, all: usize) -> DMatrix<f64> {
         let (vectors, inverse) = self.spread();
         let inner = &vectors * DMatrix::from_diagonal(&inverse) * vectors.transpose();
@@ -138,7 +132,6 @@ impl Curvature {
     }
 }
 
-/// Returns the indices of the entries that are true.
 pub fn places(which: &[bool]) -> Vec<usize> {
     (0..which.len()).filter(|j| which[*j]).collect()
 }

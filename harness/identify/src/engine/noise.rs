@@ -17,7 +17,6 @@ const TIME_WIDTH: f64 = 1.0;
 const LEAST_STEP: f64 = 0.05;
 
 impl Signal {
-    /// Returns the noise that is assumed before there is a residual.
     pub fn first_noise(&self) -> Noise {
         let (drift, time) = self.drift.map_or((0.0, 100.0), |drift| (drift.size, drift.time));
         Noise { white: self.own_noise(), drift, time }
@@ -32,7 +31,6 @@ impl Signal {
         (LEAST_NOISE * deviation(&self.picked(&self.measured))).max(f64::MIN_POSITIVE)
     }
 
-    /// Returns the noise of a residual at these times (s).
     pub fn noise_of(&self, time: &[f64], residual: &[f64]) -> Noise {
         let count = self.sampled.iter().filter(|sampled| **sampled).count().max(1) as f64;
         let least = self.least_noise();

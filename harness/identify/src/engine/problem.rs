@@ -5,19 +5,14 @@ use anyhow::Result;
 /// The course of an input between the rows of a recording (Ljung; Pintelon & Schoukens).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Hold {
-    /// A line from row to row.
     FirstOrderHold,
-    /// The value of a row is held until the next row.
     ZeroOrderHold,
-    /// Band-limited interpolation of the samples.
     BandLimited,
 }
 
 impl Hold {
-    /// All courses, the likeliest first.
     pub const ALL: [Hold; 3] = [Hold::FirstOrderHold, Hold::BandLimited, Hold::ZeroOrderHold];
 
-    /// Returns the course in words.
     pub fn words(self) -> &'static str {
         match self {
             Hold::FirstOrderHold => "linear between rows (first-order hold)",
@@ -44,10 +39,8 @@ pub enum Role {
     Derived,
 }
 
-/// The part that an unknown takes in a search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
-    /// It is estimated.
     Free,
     /// A known value with a prior: held in the search, and joined at the end.
     Tolerance,
@@ -74,7 +67,6 @@ pub struct Unknown {
 }
 
 impl Unknown {
-    /// Creates a positive unknown that is searched in its logarithm.
     pub fn positive(name: &str, unit: &str, role: Role, start: f64, bounds: (f64, f64)) -> Self {
         Unknown { log: true, reach: 0.3, ..Unknown::linear(name, unit, role, (start, 0.3), bounds) }
     }
@@ -114,7 +106,6 @@ impl Unknown {
         if self.log { z.exp() } else { z }
     }
 
-    /// Returns true if the unknown acts in a recording.
     pub fn is_of(&self, recording: usize) -> bool {
         match self.role {
             Role::Run(of) | Role::Bias(_, of) => of.is_none_or(|of| of == recording),
@@ -148,12 +139,10 @@ pub struct Signal {
     pub drift: Option<Drift>,
 }
 
-/// A drift that is expected of a kind of sensor.
 #[derive(Clone, Copy, Debug)]
 pub struct Drift {
     /// Size, relative to the white noise of a row.
     pub size: f64,
-    /// Correlation time, s.
     pub time: f64,
     /// Standard deviation of the logarithm of the size about its expected value.
     pub width: f64,
@@ -168,7 +157,6 @@ pub struct Motion {
     pub others: Vec<Vec<f64>>,
 }
 
-/// A simulated system.
 pub trait System: Sync {
     /// Runs through the first `rows` rows of a recording with these values of all unknowns. Slopes are returned where `whole` is
     /// true; the other runs are for differences.
@@ -184,7 +172,6 @@ pub trait System: Sync {
         whole: bool,
     ) -> Result<Motion>;
 
-    /// Returns names and units of the quantities that [`System::derive`] computes.
     fn derived(&self) -> Vec<(String, String)>;
 
     /// Returns the quantities that users ask for, such as tank and hub, from values of all unknowns; `None` if no system has these

@@ -26,19 +26,15 @@ const NEAR: f64 = 0.2;
 const GAIN: f64 = 0.3;
 /// Values of the bent unknown, relative to its start, at which other minima are searched.
 const GRID: [f64; 6] = [0.03, 0.1, 0.3, 1.0, 3.0, 10.0];
-/// Largest number of points on one side of the minimum.
 const MOST: usize = 14;
 /// Decrease of the sum of squares from which on a minimum counts as a lower one.
 pub const LOWER: f64 = 0.5;
 
-/// An unknown, and the points of its profile in the order of the coordinate.
 pub type Profile = (usize, Vec<Point>);
 
-/// A point of a profile.
 #[derive(Clone, Debug)]
 pub struct Point {
     pub at: f64,
-    /// The minimum over all other unknowns.
     pub minimum: Minimum,
 }
 
@@ -235,7 +231,6 @@ pub struct Curve {
 }
 
 impl Curve {
-    /// Creates the curve through points with growing x.
     pub fn new(x: &[f64], y: &[f64]) -> Self {
         let n = x.len();
         let d: Vec<f64> = (1..n).map(|k| (y[k] - y[k - 1]) / (x[k] - x[k - 1])).collect();
@@ -253,7 +248,6 @@ impl Curve {
         Curve { x: x.to_vec(), y: y.to_vec(), slopes: (0..n).map(slope).collect() }
     }
 
-    /// Returns the value at a place between the first and the last point.
     pub fn at(&self, place: f64) -> f64 {
         if self.x.len() < 2 {
             return self.y.first().copied().unwrap_or(f64::NAN);

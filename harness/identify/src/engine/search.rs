@@ -50,18 +50,14 @@ const LAST: (usize, f64) = (8, 0.3);
 /// and least correlation time (s) of the drift.
 const OWN: (f64, f64, f64) = (1.1, 0.3, 50.0);
 
-/// End of the search of one problem.
 pub struct Solution<'p> {
     /// The problem, with the noise and the course of the inputs between rows that were found.
     pub fit: Fit<'p>,
     pub minimum: Minimum,
-    /// The unknown along which the likelihood is no parabola, and its profile.
     pub profile: Option<Profile>,
     /// Courses of the inputs between rows that were not chosen.
     pub rivals: Vec<Rival>,
-    /// Tests of each signal's residual.
     pub tests: Vec<Tests>,
-    /// Indices of the unknowns at a bound.
     pub at_bound: Vec<usize>,
     /// Initial values of recordings along which a kink of the likelihood leaves more room on a side than the curvature says, with
     /// the standard deviation on each side over the standard deviation from the curvature.
@@ -182,7 +178,6 @@ fn conclude<'p>(
     Ok(Solution { fit, minimum, profile, rivals, tests, at_bound, sides, starts })
 }
 
-/// The best minimum so far.
 struct Found {
     minimum: Minimum,
     noise: Vec<Noise>,
@@ -270,7 +265,6 @@ impl Fit<'_> {
         self.problem.signals.iter().map(|s| s.sampled.iter().filter(|s| **s).count()).sum()
     }
 
-    /// Returns the free unknowns at a bound.
     pub fn stuck(&self, z: &[f64]) -> Vec<usize> {
         let is_stuck = |j: &usize| {
             let ((low, high), near) = (self.ends[*j], 1e-9 * self.problem.unknowns[*j].reach);

@@ -19,12 +19,10 @@ use super::fit::{Fit, Point};
 use super::minimum::{Curvature, places};
 use super::problem::{Motion, Role, System};
 
-/// Part of an output's peak by which rounding may change it.
 const ROUNDING: f64 = 1e-12;
 
 #[derive(Clone, Debug)]
 pub struct SolverError {
-    /// Shift of each estimate, in its coordinate.
     pub shift: Vec<f64>,
     /// Relative error of each derivative: from noise, and with the curvature within its step.
     pub derivative: Vec<(f64, f64)>,
@@ -119,7 +117,6 @@ impl Fit<'_> {
     }
 }
 
-/// Returns true if an output differs by more than rounding.
 fn is_changed(motion: &[Motion], base: &[Motion]) -> bool {
     let outputs = motion.iter().zip(base).flat_map(|(a, b)| a.outputs.iter().zip(&b.outputs));
     outputs.into_iter().any(|(new, old)| {

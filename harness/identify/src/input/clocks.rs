@@ -45,7 +45,6 @@ pub fn completed(time: &[f64], values: Vec<f64>) -> Clocked {
     (filled.collect(), Some(there))
 }
 
-/// Returns the median of the times between rows, s.
 pub fn usual(time: &[f64]) -> f64 {
     let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let middle = steps.len().saturating_sub(1) / 2;
@@ -56,7 +55,6 @@ pub fn usual(time: &[f64]) -> f64 {
     }
 }
 
-/// Returns Lagrange's weights of nodes at a time.
 pub fn weights(nodes: &[f64], at: f64) -> Vec<f64> {
     let weight = |(j, node): (usize, &f64)| -> f64 {
         let others = nodes.iter().enumerate().filter(|(i, _)| *i != j);
@@ -112,7 +110,6 @@ pub fn refined(time: &[f64], values: &[f64]) -> (Vec<f64>, Vec<f64>) {
     (fine_time, fine)
 }
 
-/// Returns the sinc under a Kaiser window at x samples.
 fn kernel(x: f64) -> f64 {
     let bessel = |z: f64| {
         let mut term = 1.0;

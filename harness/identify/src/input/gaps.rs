@@ -198,7 +198,6 @@ fn fill(left: &[f64], right: &[f64], lost: usize) -> Option<Vec<f64>> {
     Some(found.iter().map(|x| x * size).collect())
 }
 
-/// Returns the gyro's noise as an angular momentum of the hub, N·m·s.
 fn momentum(all: &Recording) -> f64 {
     let rate = all.of_fresh(&all.rate);
     let time = all.of_fresh(&all.time);
@@ -209,7 +208,6 @@ fn momentum(all: &Recording) -> f64 {
     all.rate_noise() * deviation(&all.torque) / deviation(&slopes).max(f64::MIN_POSITIVE)
 }
 
-/// Returns the recording with the filled samples in rows of their own, and the rows after which it is cut.
 fn with_rows(
     all: Recording,
     knots: &[usize],

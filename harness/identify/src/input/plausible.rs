@@ -81,7 +81,6 @@ pub fn columns(recording: &Recording) -> (Vec<String>, Vec<String>) {
 }
 
 struct Actuator {
-    /// wheel.I, kg·m².
     inertia: f64,
     /// First time at which the speed does not follow the torque, s, and total duration of these times, s.
     missing: Option<(f64, f64)>,
@@ -120,7 +119,6 @@ fn actuator(recording: &Recording, speed: &[f64]) -> Actuator {
 mod tests {
     use super::*;
 
-    /// A sweep of the torque and the wheel's speed under it, limited to `limit` N·m.
     fn wheel(limit: f64) -> Recording {
         let time: Vec<f64> = (0..20_000).map(|k| 0.01 * f64::from(k)).collect();
         let torque: Vec<f64> = time.iter().map(|t| 0.1 * (t * (8.0 + 0.02 * t)).sin()).collect();

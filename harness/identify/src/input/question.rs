@@ -17,7 +17,6 @@ pub const EACH: &str = "@each";
 /// a scale, `scale(NAME)`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Free {
-    /// Name in the FMU.
     pub name: String,
     /// True if each recording has an unknown of its own, for example an initial value.
     pub each: bool,
@@ -51,10 +50,8 @@ impl FromStr for Free {
     }
 }
 
-/// `NAME=MEAN:STD`: prior of an unknown.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Prior {
-    /// The unknown's name, as the result has it.
     pub name: String,
     pub mean: f64,
     pub std: f64,
@@ -85,7 +82,6 @@ pub struct Tolerance {
 
 #[derive(Clone, Debug, PartialEq)]
 pub enum Size {
-    /// Relative to the value.
     Part(f64),
     /// A number, with a unit if it is not the variable's own.
     Absolute(String),
@@ -142,9 +138,7 @@ impl FromStr for Bias {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Triad {
     pub outputs: [String; 3],
-    /// Standard deviation of the errors of scale.
     pub scale: f64,
-    /// Standard deviation of the misalignments, rad.
     pub angle: f64,
 }
 
@@ -168,9 +162,7 @@ impl FromStr for Triad {
 /// `NAME=VALUE` or, for the second recording only, `NAME@2=VALUE`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Setting {
-    /// Name in the FMU.
     pub name: String,
-    /// The recording, from 0; `None`: all.
     pub recording: Option<usize>,
     pub value: String,
 }
@@ -205,10 +197,8 @@ impl Setting {
     }
 }
 
-/// Whose solver steps the FMU.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Solver {
-    /// The solver within the FMU, in Co-Simulation.
     Own,
     /// The solver of the host, in Model Exchange, with this relative tolerance.
     Host(f64),
@@ -222,18 +212,13 @@ pub struct Question {
     pub tolerances: Vec<Tolerance>,
     pub settings: Vec<Setting>,
     pub inputs: Vec<String>,
-    /// Inputs that are held from row to row; the others are interpolated linearly.
     pub held: Vec<String>,
-    /// Outputs that were recorded: of the FMU, or columns of `sensors`.
     pub outputs: Vec<String>,
     /// Sensors that read what is not an output of the FMU: a wave gauge, a camera.
     pub sensors: Vec<Sensor>,
     pub biases: Vec<Bias>,
-    /// Instruments with three axes.
     pub triads: Vec<Triad>,
-    /// True if the noise of each output also drifts.
     pub drift: bool,
-    /// Whose solver steps the FMU.
     pub solver: Solver,
     /// Relative tolerance that the FMU's own solver is given; `None`: its own choice.
     pub tolerance: Option<f64>,
@@ -278,7 +263,6 @@ impl Question {
     }
 }
 
-/// Returns the Real variable of the FMU with this name.
 pub fn real<'a>(description: &'a ModelDescription, name: &str) -> Result<&'a Variable> {
     let variable = description.variable(name)?;
     ensure!(variable.kind() == Type::Real, "{name} is a {:?} (allowed: Real)", variable.kind());

@@ -11,15 +11,11 @@ use crate::input::question::Question;
 use crate::input::recording::{check_times, check_values};
 use crate::tuning::FEWEST_VALUES;
 
-/// One recording, in the FMU's units.
 #[derive(Clone, Debug, Default)]
 pub struct Record {
     pub name: String,
-    /// s, growing.
     pub time: Vec<f64>,
-    /// Each input at the rows.
     pub inputs: Vec<Vec<f64>>,
-    /// Each output at the rows; NaN where it was not read.
     pub outputs: Vec<Vec<f64>>,
 }
 
@@ -86,7 +82,6 @@ impl Record {
         Ok(())
     }
 
-    /// Returns for each row whether it has a value of an output.
     pub fn sampled(&self, output: usize) -> Vec<bool> {
         self.outputs[output].iter().map(|y| !y.is_nan()).collect()
     }

@@ -13,16 +13,11 @@ use files::budget;
 use crate::input::clocks::completed;
 use crate::tuning::{LARGEST_VALUE, ON_CLOCK, SLOW_GYRO, SLOWEST_GYRO};
 
-/// One uninterrupted recording.
 #[derive(Clone, Debug)]
 pub struct Recording {
-    /// Source of the recording.
     pub name: String,
-    /// Times of the rows, s, growing.
     pub time: Vec<f64>,
-    /// Torque command, N·m.
     pub torque: Vec<f64>,
-    /// Hub rate as measured, rad/s.
     pub rate: Vec<f64>,
     /// Hub angle of an encoder, rad, if there is one. It is fitted together with the rate.
     pub angle: Option<Vec<f64>>,
@@ -42,18 +37,14 @@ pub struct Recording {
     pub commanded: Option<Vec<bool>>,
 }
 
-/// A row of a recording in which torques are filled in.
 #[derive(Clone, Copy, Debug)]
 pub struct Row {
-    /// s.
     pub time: f64,
     /// Index of the row in the recording; `None` if the row is added.
     pub own: Option<usize>,
-    /// Torque that is filled in, N·m.
     pub filled: Option<f64>,
 }
 
-/// Returns the values of the rows in which a mask is true.
 pub(crate) fn masked(values: &[f64], mask: Option<&[bool]>) -> Vec<f64> {
     match mask {
         None => values.to_vec(),
@@ -61,23 +52,19 @@ pub(crate) fn masked(values: &[f64], mask: Option<&[bool]>) -> Vec<f64> {
     }
 }
 
-/// Takes a row out of a mask.
 pub(crate) fn take_out(mask: &mut Option<Vec<bool>>, row: usize, rows: usize) {
     mask.get_or_insert_with(|| vec![true; rows])[row] = false;
 }
 
 impl Recording {
-    /// Length, s.
     pub fn duration(&self) -> f64 {
         self.time[self.time.len() - 1] - self.time[0]
     }
 
-    /// Mean time between rows, s.
     pub fn step(&self) -> f64 {
         self.duration() / (self.time.len() - 1) as f64
     }
 
-    /// Returns the recording with each signal mapped by `of`, and each list of rows with a value mapped by `mask`.
     fn mapped(
         &self,
         of: impl Fn(&Vec<f64>) -> Vec<f64>,
@@ -103,13 +90,11 @@ impl Recording {
         Recording { from_rest: false, ..part }
     }
 
-    /// Returns the rows with a value of the torque.
     pub fn commands(&self) -> Vec<usize> {
         let commanded = self.commanded.as_deref();
         (0..self.time.len()).filter(|k| commanded.is_none_or(|rows| rows[*k])).collect()
     }
 
-    /// Returns the mean time between values of the torque, s.
     pub fn torque_step(&self) -> f64 {
         match &self.commanded {
             None => self.step(),
@@ -159,12 +144,10 @@ impl Recording {
         }
     }
 
-    /// Returns the values of the rows with a new value of the gyro.
     pub fn of_fresh(&self, values: &[f64]) -> Vec<f64> {
         masked(values, self.fresh.as_deref())
     }
 
-    /// Returns the values of the rows with a new value of the encoder.
     pub fn of_fresh_angle(&self, values: &[f64]) -> Vec<f64> {
         masked(values, self.angle_fresh.as_deref())
     }
@@ -219,14 +202,12 @@ impl Recording {
         self.rows(first, last.max(first))
     }
 
-    /// Returns the first part of the recording, `fraction` of its rows.
     pub fn beginning(&self, fraction: f64) -> Recording {
         let rows = ((self.time.len() as f64 * fraction) as usize).max(2);
         let part = self.rows(0, rows.min(self.time.len()));
         Recording { from_rest: self.from_rest, ..part }
     }
 
-    /// Returns the first rows. They begin at rest if the recording does.
     pub(crate) fn first_rows(&self, rows: usize) -> Recording {
         Recording { from_rest: self.from_rest, ..self.rows(0, rows) }
     }
@@ -309,7 +290,6 @@ pub fn check_times(time: &[f64]) -> Result<f64> {
     Ok(step)
 }
 
-/// Fails if a value is not a number within ±[`LARGEST_VALUE`].
 pub fn check_values(name: &str, values: impl Iterator<Item = f64>) -> Result<()> {
     for (row, value) in values.enumerate() {
         ensure!(

@@ -11,9 +11,7 @@ use crate::tuning::{
 
 #[derive(Debug, Default, PartialEq)]
 pub struct Faults {
-    /// Rows whose values are not to be fitted.
     pub rows: Vec<usize>,
-    /// Sentences that name the faults.
     pub words: Vec<String>,
 }
 
@@ -141,7 +139,6 @@ fn leaves(values: &[f64], rows: &[usize], rest: Rest) -> Option<f64> {
     median(&jumps)
 }
 
-/// Returns the least difference of two values that differ by more than rounding.
 fn resolution(values: &[f64]) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -180,7 +177,6 @@ fn frozen(values: &[f64], out: &[bool], noise: f64, rest: Rest) -> Vec<(usize, u
     runs.into_iter().filter(is_frozen).collect()
 }
 
-/// Returns the first and last rows of the runs of equal values.
 fn runs(values: &[f64]) -> Vec<(usize, usize)> {
     let mut runs = Vec::new();
     let mut first = 0;

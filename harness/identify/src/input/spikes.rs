@@ -98,7 +98,6 @@ pub fn find(
     taken.iter().map(|&k| (rows[k], off((&t, &y), &sound, k).1)).collect()
 }
 
-/// Rows, some of which are taken out.
 struct Sound {
     rows: usize,
     /// First and last row of each stretch that is out. Stretches do not touch: in a burst of spikes the nearest sound row is
@@ -107,7 +106,6 @@ struct Sound {
 }
 
 impl Sound {
-    /// Returns the stretch in which a row is out.
     fn stretch(&self, k: usize) -> Option<(usize, usize)> {
         let (first, last) = self.out.range(..=k).next_back()?;
         (*last >= k).then_some((*first, *last))
@@ -117,19 +115,16 @@ impl Sound {
         self.stretch(k).is_none()
     }
 
-    /// Returns the nearest sound row below a row.
     fn below(&self, k: usize) -> Option<usize> {
         let next = k.checked_sub(1)?;
         self.stretch(next).map_or(Some(next), |(first, _)| first.checked_sub(1))
     }
 
-    /// Returns the nearest sound row above a row.
     fn above(&self, k: usize) -> Option<usize> {
         let next = self.stretch(k + 1).map_or(k + 1, |(_, last)| last + 1);
         (next < self.rows).then_some(next)
     }
 
-    /// Returns the two nearest sound rows on either side of a row.
     fn near(&self, k: usize) -> impl Iterator<Item = usize> + use<> {
         let (below, above) = (self.below(k), self.above(k));
         let second = [below.and_then(|k| self.below(k)), above.and_then(|k| self.above(k))];
@@ -165,7 +160,6 @@ fn off((time, y): (&[f64], &[f64]), sound: &Sound, k: usize) -> (f64, f64) {
     ((y[k] - cubic) * GAIN / gain.max(GAIN), cubic)
 }
 
-/// Returns true if the torque changes by more than `step` from one row to the next near a row.
 fn near_step(torque: &[f64], row: usize, step: f64) -> bool {
     let near = row.saturating_sub(SPIKE_NEAR_STEP)..(row + SPIKE_NEAR_STEP).min(torque.len() - 1);
     near.into_iter().any(|k| (torque[k + 1] - torque[k]).abs() > step)

@@ -10,17 +10,12 @@ use crate::tuning::TOLD_SHARE;
 pub struct Tolerances {
     /// Scale of the torque: torque that acts over the recorded torque.
     pub torque: f64,
-    /// Rate of the recording's clock.
     pub clock: f64,
-    /// g_axial, where it is not recorded.
     pub gravity: f64,
-    /// tank.r.
     pub arm: f64,
-    /// fluid.rho.
     pub density: f64,
 }
 
-/// Names of the tolerances, in the order of their fields.
 pub const NAMES: [&str; 5] = ["torque", "clock", G_AXIAL, tank::R, fluid::RHO];
 
 impl Default for Tolerances {
@@ -46,12 +41,9 @@ pub fn part(name: &str, text: &str) -> Result<Option<f64>> {
     Ok(Some(number))
 }
 
-/// Share of tolerances in the variance of an estimate.
 pub struct Share {
     pub name: String,
-    /// Share, 0 to 1.
     pub share: f64,
-    /// The tolerance with the largest share.
     pub most: String,
 }
 
@@ -72,11 +64,9 @@ pub fn shares(known: &[String], shares: &[Share]) -> Option<String> {
 }
 
 impl Tolerances {
-    /// No tolerances: all values are known exactly.
     pub const NONE: Tolerances =
         Tolerances { torque: 0.0, clock: 0.0, gravity: 0.0, arm: 0.0, density: 0.0 };
 
-    /// Returns the tolerances in the order of [`NAMES`].
     pub fn all(&self) -> [f64; 5] {
         [self.torque, self.clock, self.gravity, self.arm, self.density]
     }

@@ -27,34 +27,25 @@ const DRIFT: Drift = Drift { size: 0.3, time: 1.0, width: 3.0 };
 /// Result; `measurement` has the frequency f, the damping ratio ζ, its growth ζ_A with the amplitude, and the hardening κ.
 pub type Found = Identified<Details>;
 
-/// Results that only this method has.
 #[derive(Clone, Debug, Serialize)]
 pub struct Details {
     pub signal: String,
-    /// Amplitude at the beginning and at the end of each record, in the signal's SI unit.
     pub amplitudes: Vec<[f64; 2]>,
-    /// Periods of each record.
     pub periods: Vec<f64>,
     /// Damping ratio ζ if it is taken as constant over the amplitude.
     pub zeta_constant: f64,
-    /// Root mean square of the residual, in the signal's unit.
     pub residual: f64,
-    /// Root mean square of the residual if ζ is taken as constant, in the signal's unit.
     pub residual_constant: f64,
-    /// Standard deviation of the signal's white noise, in its unit.
     pub noise: f64,
 }
 
-/// Fits free decays.
 pub struct FreeDecay {
     /// Name of the signal that the recordings hold in place of the rate.
     pub signal: &'static str,
-    /// Relative standard deviation of the recordings' clock.
     pub clock: f64,
 }
 
 impl FreeDecay {
-    /// Returns the units of the signal, of ζ_A and of κ.
     fn units(&self) -> [&'static str; 3] {
         match quantity(self.signal) {
             Ok(Quantity::Length) => ["m", "1/m", "1/m2"],
@@ -71,7 +62,6 @@ const OWN: usize = 4;
 /// Index of the growth of damping with the amplitude, ζ_A, among the shared unknowns.
 const GROWTH: usize = 2;
 
-/// The oscillation in closed form.
 struct Oscillation<'a>(&'a [Recording]);
 
 impl System for Oscillation<'_> {
@@ -92,7 +82,6 @@ impl System for Oscillation<'_> {
     }
 }
 
-/// Returns the engine's problem for records with these first estimates.
 fn problem<'a>(
     system: &'a Oscillation,
     starts: &[Start],
@@ -158,7 +147,6 @@ fn problem<'a>(
     }
 }
 
-/// Returns the root mean square of the residual of all records, and the residual of each record.
 fn residuals(solution: &Solution) -> (f64, Vec<Vec<f64>>) {
     let point = &solution.minimum.point;
     let residuals = solution.fit.residuals(&point.z, &point.motion);

@@ -28,7 +28,6 @@ use crate::tuning::{
 };
 use crate::words::page::Sections;
 
-/// Fits friction and inertia.
 pub struct Friction {
     /// Options of the fit; its slosh models and friction laws are not used.
     pub options: Options,
@@ -127,7 +126,6 @@ pub fn empty() -> [(String, String); 1] {
     [(fluid::RHO.into(), "1e-6".into())]
 }
 
-/// Refuses recordings that cannot show friction.
 fn check(recordings: &[Recording]) -> Result<()> {
     ensure!(!recordings.is_empty(), "there is no recording");
     for recording in recordings {
@@ -235,7 +233,6 @@ fn brakings(recordings: &[Recording], biases: &[f64]) -> Vec<Braking> {
         .collect()
 }
 
-/// A row without torque in which the hub turns.
 struct FreeRow {
     angle: f64,
     speed: f64,
@@ -286,7 +283,6 @@ fn braking(direction: &'static str, rows: &[FreeRow], speed: f64) -> Option<Brak
     })
 }
 
-/// Draws the friction torque against the rate, measured and fitted (thesis 5.8 and 5.9).
 fn friction_curve(found: &Identification) -> Markup {
     let points = &found.details.friction_points;
     let value = |name: &str| found.parameters.get(name).map_or(0.0, |p| p.value);
@@ -327,7 +323,6 @@ fn friction_curve(found: &Identification) -> Markup {
     }
 }
 
-/// Draws the deceleration over the angle in each direction (thesis 5.10 and 5.11).
 fn braking_chart(all: &[Braking]) -> Markup {
     let lines = all.iter().zip(["a", "b"]).map(|(braking, color)| {
         let angle = |k: usize| PI * (2.0 * k as f64 / FRICTION_POINTS as f64 - 1.0);
@@ -379,7 +374,6 @@ mod tests {
             .collect()
     }
 
-    /// Returns true if the difference between the two directions leaves its 95 % band at some angle.
     fn differ(seed: u64, cosine: f64) -> bool {
         let mut random = analysis::random::Random::new(seed, 0);
         let all = [decays(&mut random, 1.0, cosine), decays(&mut random, -1.0, 0.0)].concat();

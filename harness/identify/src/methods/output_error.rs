@@ -28,9 +28,7 @@ use crate::news::News;
 use crate::tuning::{BEGINNINGS, LONG_RECORDING};
 use crate::words::page::Sections;
 
-/// The FMU fitted in the time domain.
 pub struct OutputError {
-    /// Options of the fit.
     pub options: Options,
 }
 
@@ -55,10 +53,8 @@ impl Method for OutputError {
     }
 }
 
-/// Slosh models in the order in which they are fitted.
 const ORDER: [&str; 4] = [Linear.name(), Planar.name(), Spherical.name(), Frozen.name()];
 
-/// Slosh models, the simplest first.
 const SIMPLEST: [&str; 4] = [Frozen.name(), Linear.name(), Planar.name(), Spherical.name()];
 
 /// Identifies the FMU from recordings. `progress` receives each message.

@@ -34,11 +34,8 @@ pub fn most_steps<'n>(
     (!set.any(|name| name == solver::MAX_STEPS) && Some(most) < default).then_some(most)
 }
 
-/// An FMU for one solver.
 pub enum Model {
-    /// Co-Simulation, by the FMU's own solver.
     Own(Fmu),
-    /// The host integrates (Model Exchange).
     Host(Fmu),
 }
 
@@ -85,9 +82,7 @@ pub struct Setup {
     inputs: Vec<u32>,
     held: Vec<bool>,
     outputs: Vec<Output>,
-    /// Value references of the variables that all outputs need.
     reads: Vec<u32>,
-    /// Relative tolerance of the solver, the host's or the FMU's; `None`: the FMU's own.
     tolerance: Option<f64>,
     /// Communication steps from one row to the next, of an FMU that steps itself.
     substeps: usize,
@@ -95,15 +90,12 @@ pub struct Setup {
     most_steps: usize,
 }
 
-/// Runs with smaller errors of the solver.
 pub struct Finer {
-    /// Settings, inputs and outputs of the runs.
     pub setup: Setup,
     /// The FMU opened for another solver; `None` if the solver stays the same.
     pub model: Option<Model>,
 }
 
-/// An output, computed from variables of the FMU.
 #[derive(Clone, Debug)]
 struct Output {
     /// Index of its first variable in [`Setup::reads`].
@@ -123,13 +115,10 @@ impl Output {
 
 /// An instance that is ready for its first step.
 enum Initialised<'m> {
-    /// Co-Simulation.
     Own(Instance<'m>),
-    /// The host integrates.
     Host(exchange::Run<Box<Instance<'m>>>),
 }
 
-/// Value reference of an unknown, and its value.
 pub type Value = (u32, f64);
 
 impl Setup {
@@ -351,7 +340,6 @@ impl Setup {
         Ok(Initialised::Host(run))
     }
 
-    /// Simulates with the host's solver, from row to row.
     fn integrate(
         &self,
         mut run: exchange::Run<Box<Instance>>,
@@ -424,7 +412,6 @@ impl Setup {
         self.late(record, read)
     }
 
-    /// Adds a row of the outputs, from what was read.
     fn keep(&self, at: &[f64], read: &mut [Vec<f64>]) -> Result<()> {
         for (output, column) in self.outputs.iter().zip(read) {
             let value = output.value(at);
@@ -461,7 +448,6 @@ impl Setup {
         Ok(read)
     }
 
-    /// Returns the values of the inputs at a row and their slopes until the next row.
     fn course(&self, record: &Record, row: usize) -> (Vec<f64>, Vec<f64>) {
         let one = |(signal, held): (&Vec<f64>, &bool)| {
             let next = row + 1;
@@ -474,7 +460,6 @@ impl Setup {
         record.inputs.iter().zip(&self.held).map(one).unzip()
     }
 
-    /// Returns true if a held input changes at a row.
     fn jumps(&self, record: &Record, row: usize) -> bool {
         let held = record.inputs.iter().zip(&self.held).filter(|(_, held)| **held);
         held.into_iter().any(|(signal, _)| signal[row] != signal[row - 1])

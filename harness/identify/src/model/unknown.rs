@@ -12,17 +12,14 @@ use crate::tuning::{KNOWN_REACH, SCALE_REACH};
 /// Place at which an unknown acts in the FMU's run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Target {
-    /// The Real with this value reference.
     Parameter(u32),
     /// Error x of an input's scale: the recorded values times 1 + x act.
     Scale(usize),
     /// Error x of the clock's rate: true intervals are the recorded intervals times 1 + x.
     Clock,
-    /// No place: the unknown acts in the reading of a sensor.
     Reading,
 }
 
-/// An unknown with its target.
 pub type Targeted = (Unknown, Target);
 
 const FREELY: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
@@ -103,7 +100,6 @@ impl Question {
         Ok(unknowns)
     }
 
-    /// Returns the place of an output in the list.
     fn output(&self, name: &str) -> Result<usize> {
         let found = self.outputs.iter().position(|output| output == name);
         found.with_context(|| {
@@ -147,7 +143,6 @@ impl Question {
         Ok(records.iter().enumerate().map(one).collect())
     }
 
-    /// Returns the unknowns of a flag `--free`: one, or one for each recording.
     fn free(
         &self,
         free: &Free,
@@ -198,7 +193,6 @@ impl Question {
         Ok((Unknown::linear(&name, "1", role, (0.0, SCALE_REACH), FREELY), target))
     }
 
-    /// Returns the unknown of a flag `--tolerance`.
     fn known(
         &self,
         tolerance: &Tolerance,
@@ -268,14 +262,12 @@ impl Question {
     }
 }
 
-/// Returns the unknown as a known value with this mean and standard deviation.
 fn known((unknown, target): Targeted, mean: f64, std: f64) -> Result<Targeted> {
     ensure!(std > 0.0 && std.is_finite(), "the tolerance must be above 0");
     let (start, reach, part) = (mean, KNOWN_REACH * std, Part::Tolerance);
     Ok((Unknown { start, reach, part, ..unknown.with_prior(mean, std) }, target))
 }
 
-/// Name of the clock among the scales.
 const CLOCK: &str = "time";
 
 /// Returns the least and largest value that the model description declares for a variable; infinite if it declares none.
@@ -287,7 +279,6 @@ pub fn range(variable: &Variable) -> [f64; 2] {
     [number(&attributes.min, f64::NEG_INFINITY), number(&attributes.max, f64::INFINITY)]
 }
 
-/// Converts a standard deviation, a number with or without a unit, to the variable's own unit.
 fn deviation(variable: &Variable, description: &ModelDescription, text: &str) -> Result<f64> {
     let number = |text: &str| match description.value(variable, text)? {
         Value::Real(number) => Ok(number),

@@ -18,17 +18,12 @@ use crate::words::verdict::DOUBTS;
 
 pub const RATE: &str = "rad/s";
 
-/// Sections that a method adds to the page.
 #[derive(Default)]
 pub struct Sections {
-    /// Before the verdict.
     pub first: Markup,
-    /// Combinations of parameters, in the table of estimates.
     pub combinations: Vec<Combination>,
-    /// After the table of estimates.
     pub figures: Markup,
     pub condition: Option<f64>,
-    /// After the correlations.
     pub last: Markup,
 }
 
@@ -58,7 +53,6 @@ pub fn of<D>(found: &Identified<D>, sections: &Sections) -> String {
     document("Identification", &body)
 }
 
-/// Charts of a signal and its residual.
 fn charts(signals: &Residual) -> Vec<Chart> {
     if signals.time.len() < 3 {
         return Vec::new();
@@ -74,7 +68,6 @@ fn charts(signals: &Residual) -> Vec<Chart> {
     charts
 }
 
-/// Returns a number with the digits that its standard deviation justifies, small numbers in scientific notation.
 pub(crate) fn digits(value: f64, deviation: f64) -> String {
     let places = if deviation > 0.0 { 1.0 - deviation.log10().floor() } else { 6.0 };
     match value {
@@ -84,7 +77,6 @@ pub(crate) fn digits(value: f64, deviation: f64) -> String {
     }
 }
 
-/// Returns the 95 % interval in words.
 fn interval(p: &Estimated) -> String {
     let [low, high] = p.interval.map(|end| digits(end, p.std));
     if p.interval[1].is_finite() {
@@ -138,7 +130,6 @@ fn envelope(signals: &Residual) -> Chart {
     axis_chart("Measurement, model and residual", "time, s", &signals.label, lines, true)
 }
 
-/// The stretch around the fastest motion, row by row.
 fn stretch(signals: &Residual) -> Chart {
     let fastest = (0..signals.measured.len())
         .max_by(|a, b| signals.measured[*a].abs().total_cmp(&signals.measured[*b].abs()))
@@ -156,7 +147,6 @@ fn stretch(signals: &Residual) -> Chart {
     axis_chart("Where the signal is largest", "time, s", &signals.label, lines, false)
 }
 
-/// One-sided amplitude density of residual and measurement.
 fn spectrum(signals: &Residual) -> Chart {
     let count = signals.time.len();
     let step = (signals.time[count - 1] - signals.time[0]) / (count - 1) as f64;
@@ -199,7 +189,6 @@ fn residual(signals: &Residual) -> Chart {
     axis_chart(&title, "time, s", &signals.label, lines, false)
 }
 
-/// Autocorrelation of the residual, with the 95 % interval of white noise.
 fn autocorrelation(signals: &Residual) -> Chart {
     let count = signals.residual.len();
     let step = (signals.time[count - 1] - signals.time[0]) / (count - 1) as f64;
