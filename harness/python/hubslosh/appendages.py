@@ -26,22 +26,23 @@ COLUMNS = ("x", "y", "z", "rx", "ry", "rz")
 class Appendage:
     """A flexible appendage of a `Craft`, such as a solar array, by its modes.
 
-    The modes are those of the appendage with its interface to the craft held, with unit modal mass
-    (Craig and Bampton's fixed-interface modes). Mass and inertia of the appendage, undeformed,
-    belong to ``mass``, ``inertia`` and ``center_of_mass`` of the craft.
+    The modes are computed with the interface to the craft fixed, and normalised to unit modal mass
+    (fixed-interface modes of Craig and Bampton). ``mass``, ``inertia`` and ``center_of_mass`` of
+    the craft must include the undeformed appendage.
 
     Parameters
     ----------
     position : sequence of float, shape (3,)
         Interface point from O, body axes, m.
     frequency : float or sequence of float, shape (n,)
-        Natural frequencies with the interface held, Hz.
+        Natural frequencies with the interface fixed, Hz.
     participation : array_like, shape (6,) or (n, 6)
-        Participation of each mode, body axes: the integral over the mass of its mode shape, kg^0.5
-        (three components), and of the moment of its mode shape about the interface point, kg^0.5·m
-        (three). Their squares are the effective masses and inertias.
+        Participation factors of each mode in body axes. The first three are the integral of the
+        mode shape over the mass, kg^0.5; the last three are the integral of the moment of the mode
+        shape about the interface point, kg^0.5·m. Their squares are the effective masses and
+        inertias.
     zeta : float or sequence of float, shape (n,)
-        Damping ratio of all modes, or of each.
+        One damping ratio for all modes, or one for each mode.
 
     Examples
     --------
@@ -74,13 +75,13 @@ class Appendage:
         Parameters
         ----------
         table : DataFrame, str or Path
-            Table, or its CSV file, with a row for each mode: ``frequency`` (Hz), the participations
-            ``x``, ``y``, ``z`` (kg^0.5) and ``rx``, ``ry``, ``rz`` (kg^0.5·m) in body axes, and, if
-            they differ, ``zeta``.
+            Table, or its CSV file, with a row for each mode. Columns: ``frequency`` (Hz), the
+            participation factors ``x``, ``y``, ``z`` (kg^0.5) and ``rx``, ``ry``, ``rz`` (kg^0.5·m)
+            in body axes, and optionally ``zeta``, the damping ratio of each mode.
         position : sequence of float, shape (3,)
             Interface point from O, body axes, m.
         zeta : float
-            Damping ratio of all modes if the table has none.
+            Damping ratio of all modes if the table has no column ``zeta``.
 
         Returns
         -------
@@ -133,9 +134,10 @@ class Appendage:
     ) -> "Appendage":
         """Return an appendage from matrices that are reduced to its interface.
 
-        The first six degrees of freedom are those of the interface point, translation and
-        rotation, the others are modes with unit modal mass. Modes that move the craft most, by the
-        effective mass in the directions in which they have the largest share, are kept.
+        The first six degrees of freedom are the translation and rotation of the interface point,
+        the further ones are modes with unit modal mass. If there are more than ``most`` modes,
+        those are kept that move the craft most, which means that they have the largest share of the
+        effective mass in one of the six directions.
 
         Parameters
         ----------
@@ -146,7 +148,7 @@ class Appendage:
         position : sequence of float, shape (3,)
             Interface point from O, body axes, m.
         zeta : float or sequence of float
-            Damping ratio of all modes, or of each in the file.
+            One damping ratio for all modes, or one for each mode in the file.
         axes : array_like, shape (3, 3), optional
             Matrix from the axes of the file to body axes; by default they are the same.
         most : int
@@ -162,7 +164,7 @@ class Appendage:
         Raises
         ------
         FmuError
-            If the file cannot be read, or the matrices are not of this kind.
+            If the file cannot be read, or the matrices are not symmetric, finite and of one size.
 
         Examples
         --------
@@ -248,7 +250,7 @@ class Appendage:
         return int(np.size(floats(self.frequency)))
 
     def modes(self) -> list[dict[str, Any]]:
-        """Return each mode by the names of Spacecraft's parameters.
+        """Return the parameters of each mode by their names in the FMU Spacecraft.
 
         Returns
         -------
@@ -277,12 +279,12 @@ class Appendage:
         return f"Appendage({self.describe()})"
 
     def describe(self) -> str:
-        """Return number of modes, frequencies and place in a few words.
+        """Return a text with the number of modes, their frequencies and the interface point.
 
         Returns
         -------
         str
-            The words.
+            The text.
 
         Examples
         --------

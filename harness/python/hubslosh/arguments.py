@@ -75,7 +75,7 @@ def check_ranges(**values: Any) -> None:
 
 
 def floats(values: Any) -> NDArray[np.float64]:
-    """Return values as an array of floats; a masked value is refused.
+    """Return values as an array of floats; arrays with masked values are refused.
 
     Raises FmuError for a mask, otherwise TypeError or ValueError, as NumPy does.
     """

@@ -96,7 +96,7 @@ def quaternion(roll: ArrayLike = 0.0, pitch: ArrayLike = 0.0, yaw: ArrayLike = 0
     Parameters
     ----------
     roll, pitch, yaw : array_like
-        Angles about x, y and z, rad. Arrays of one shape, or which numpy broadcasts to one.
+        Angles about x, y and z, rad: numbers, or arrays that NumPy can broadcast to one shape.
 
     Returns
     -------
@@ -196,14 +196,14 @@ def axis_angle(axis: ArrayLike, angle: ArrayLike) -> Real:
 
 
 def error(q: "ArrayLike | pd.DataFrame", wanted: "ArrayLike | pd.DataFrame") -> Any:
-    """Return the rotation that is left from one attitude to another, the shorter way round.
+    """Return the rotation from the present attitude to a wanted attitude, the shorter way.
 
     Parameters
     ----------
     q : array_like, shape (4,) or (n, 4), or DataFrame
         Present attitude, as for `angles`.
     wanted : array_like, shape (4,) or (n, 4), or DataFrame
-        Attitude to reach: one, or as many as ``q`` has rows.
+        Attitude to reach: one quaternion, or one for each row of ``q``.
 
     Returns
     -------

@@ -99,19 +99,20 @@ class WorstCase:
 
 @dataclass(frozen=True, eq=False)
 class Certificate:
-    """Proof that a loop is stable for every Δ of a size; see `UncertainModel.certify`.
+    """Proof that a loop is stable for all Δ up to a certain size; see `UncertainModel.certify`.
 
     Parameters
     ----------
     size : float
-        The loop is stable for all ``|δ| ≤ size``; 1 is the end of the ranges. 0 if nothing was
-        proved.
+        The loop is stable for all ``|δ| ≤ size``. A size of 1 means that the whole ranges are
+        proved; 0 means that nothing was proved.
     worst : WorstCase
         Smallest Δ found that makes the loop unstable.
     least : dict of float
-        Lower ends of δ, by name, where quantities such as damping ratios cannot be below 0.
+        Lower bound of δ by name, for quantities such as damping ratios, which cannot be below 0.
     data : dict of ndarray
-        What `save` writes: the loop, intervals, boxes, D and G.
+        Content of the file that `save` writes: the loop, frequency intervals, boxes of Δ, and the
+        scalings D and G.
     solved : int
         Number of convex problems that were solved.
 

@@ -53,9 +53,9 @@ class CheckedRule:
     rule : str
         Identifier of the rule, such as ``zip.names``.
     title : str
-        The demand in words.
+        The requirement in words.
     source : str
-        Section of the standard, or the hosts that demand it.
+        Section of the standard that states the requirement, or the hosts that need it.
     findings : tuple of Finding
         The findings, at most 1000.
     skipped : str or None
@@ -140,8 +140,8 @@ def check(
 ) -> Checked:
     """Check an FMU against the FMI standard and the constraints of importers.
 
-    Each rule of calls runs in a process of its own, so that an FMU that crashes is a finding
-    and does not end Python. The FMU's binary runs with your privileges.
+    Each rule that calls the binary runs in a process of its own. Therefore an FMU that crashes is
+    reported as a finding, and does not end Python. The FMU's binary runs with your privileges.
 
     Parameters
     ----------

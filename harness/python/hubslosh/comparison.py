@@ -30,7 +30,7 @@ MARGINS = {
 
 
 def compare(reviews: Mapping[str, Review], out: str | Path | None = None) -> pd.DataFrame:
-    """Return the least margins of several designs, and write them as one page.
+    """Return the smallest margins of several designs; optionally write a page of comparison.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def compare(reviews: Mapping[str, Review], out: str | Path | None = None) -> pd.
     Raises
     ------
     FmuError
-        If they are not two to six reviews, or the page cannot be written.
+        If there are fewer than two or more than six reviews, or the page cannot be written.
 
     Examples
     --------

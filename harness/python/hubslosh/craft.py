@@ -74,8 +74,8 @@ class MountedTank:
     source : str, Path or mapping
         Drawing: a tank file (.toml), or a dict with its content, as for `tank`.
     position : sequence of float, shape (3,)
-        Position of the tank's zero (of a ``shape`` its lowest point) from the craft's origin O,
-        body axes, m.
+        Position of the origin of the tank's drawing from the craft's origin O, body axes, m. The
+        origin of a tank given by ``shape`` is its lowest point.
     axis : sequence of float, shape (3,) or (4,)
         Upward direction of the tank's axis in body axes, of any length; or the tank's attitude
         as a quaternion, scalar first, from tank to body axes.
@@ -170,12 +170,12 @@ class MountedTank:
         return f"MountedTank({self.describe()})"
 
     def describe(self) -> str:
-        """Return drawing, place and number of modes in a few words.
+        """Return a text with the shape of the tank, its position and its number of modes.
 
         Returns
         -------
         str
-            The words.
+            The text.
 
         Examples
         --------
@@ -265,11 +265,12 @@ class Craft:
     model : str or Path
         Name or file of the FMU, as for `simulate`.
     engines : mapping of Engine
-        Engines by name. Those that burn act with ``thrust``; O of the FMU then lies on the line of
-        action of their resultant. A torque about this line, of engines that are canted, is left.
+        Engines by name. The engines that burn act in addition to ``thrust``; O of the FMU then lies
+        on the line of action of the resultant force. Canted engines can also cause a torque about
+        this line, which remains.
     appendages : mapping of Appendage
-        Flexible appendages by name, with six modes in all at most. Their mass and inertia,
-        undeformed, belong to ``mass``, ``inertia`` and ``center_of_mass``.
+        Flexible appendages by name, with at most six modes in total. ``mass``, ``inertia`` and
+        ``center_of_mass`` must include the undeformed appendages.
 
     Raises
     ------
@@ -663,7 +664,7 @@ class Craft:
         mass_flow: Any = None,
         between: Sequence[float | str] = ("2%", "98%"),
     ) -> dict[str, Quantity]:
-        """Return the parameters of Spacecraft at a fill, its thrust through the centre of mass.
+        """Return the parameters of Spacecraft at a fill, with thrust through the centre of mass.
 
         Parameters
         ----------
@@ -672,7 +673,7 @@ class Craft:
         parameters : mapping, optional
             Further parameters, which override those of the craft, with the same names in every
             method. A tank has its name or number: ``NTO.frequency[1]`` or ``tank[1].frequency[1]``
-            (Hz, under the thrust that acts; the height of the slosh mass stays), ``zeta[1]``,
+            (Hz, under the present thrust; the height of the slosh mass is kept), ``zeta[1]``,
             ``mass[1]`` (kg) and ``bob[1]`` (height of the slosh mass, m; mass, centre and inertia
             of the liquid stay). ``craft.Jxx``, … and every other parameter of the FMU are
             allowed, too. A mode of an appendage has the appendage's name: ``array.frequency[1]``
@@ -720,12 +721,13 @@ class Craft:
         return point.parameters
 
     def trim(self, fill: Fill, parameters: Parameters | None = None) -> OperatingPoint:
-        """Return the operating point at a fill; ``print`` says which accelerations are left.
+        """Return the trimmed operating point; ``print`` shows the remaining accelerations.
 
-        The thrust acts through the centre of mass, as after trimming: O, and with it the thrust,
-        moves across the thrust, while its direction stays. Every method of a craft uses this point.
-        The effect of further parameters, such as a constant torque, is left, and so is a specific
-        force across the axis of a tank that leans.
+        Trimming moves the origin O, where the thrust acts, at right angles to the thrust until the
+        thrust acts through the centre of mass; the direction of the thrust does not change. Every
+        method of a craft uses this point. Accelerations can remain, for example if further
+        parameters contain a constant torque, or if the axis of a tank is not parallel to the
+        thrust.
 
         Parameters
         ----------
@@ -737,7 +739,7 @@ class Craft:
         Returns
         -------
         OperatingPoint
-            Parameters of the trimmed craft, the way of O, and the accelerations that are left.
+            Parameters of the trimmed craft, the displacement of O, and the remaining accelerations.
 
         Raises
         ------
@@ -899,7 +901,7 @@ class Craft:
     def drain(
         self, mass_flow: Any, fill: Fill, between: Sequence[float | str] = ("2%", "98%")
     ) -> dict[str, Quantity]:
-        """Return the parameters of Spacecraft with tanks that drain from a fill on.
+        """Return the parameters of Spacecraft with tanks that drain, starting at a fill.
 
         The FMU stops where the liquid leaves the fill table. The table has damping ratios and
         third-order coefficients at every fill; a warning names the fills at which the coefficients
@@ -1118,8 +1120,9 @@ class Craft:
     ) -> "Review":
         """Return the design review of a linear sampled controller over fills.
 
-        Each point is trimmed, so that it is a steady state. A search finds the worst case; there
-        the nonlinear FMU is simulated at the gain margin, or as it is if it is unstable.
+        Each point is trimmed, so that it is a steady state. A search finds the worst case. To
+        confirm it, the nonlinear FMU is simulated with the gain at the limit of stability, or, if
+        the worst case is unstable, with the given gain.
 
         Parameters
         ----------
@@ -1167,7 +1170,7 @@ class Craft:
         Returns
         -------
         Review
-            Margins at every point, the worst case and a suggestion; ``print`` gives the answer.
+            Margins at every point, the worst case and a suggestion; ``print`` shows a summary.
 
         Raises
         ------
@@ -1351,16 +1354,18 @@ class Craft:
     def pulses(self, fill: Fill, firing: Mapping[str, Any], stop: float) -> "pd.DataFrame":
         """Return the history of force and torque of engines that fire in pulses.
 
-        Pulses have any length, within a cycle of a controller too: a row stands at each edge. Use
-        it with ``hold=True`` from the trimmed craft on, as `simulate` does.
+        Pulses can have any length, also shorter than a cycle of a controller, because the table has
+        a row at each edge of a pulse. Simulate the trimmed craft with this table and ``hold=True``,
+        as in the example.
 
         Parameters
         ----------
         fill : fill, mapping, or sequence of fills
             Fill of the tanks, as for `fills`.
         firing : mapping
-            Pulses by engine: (start, end) of each, s, of any order, without overlap. Engines that
-            are not named burn throughout or not at all, as at the operating point.
+            Pulses by engine: (start, end) of each pulse, s, in any order, without overlap. Engines
+            that are not named burn all the time if they burn at the operating point, otherwise
+            never.
         stop : float
             End of the history, s.
 
@@ -1444,7 +1449,7 @@ class Craft:
         return export(folder, self.model, given, linear)
 
     def columns(self, fill: Fill) -> list[str]:
-        """Return the names of the variables by which `view` draws craft and liquid.
+        """Return the names of the variables that `view` needs to draw craft and liquid.
 
         Parameters
         ----------

@@ -248,7 +248,8 @@ class Fmu:
         Returns
         -------
         list of str
-            Names with one for each element, a matrix row after row. Other names stay as they are.
+            The name of each vector or matrix is replaced by one name for each element, a matrix row
+            by row. Other names are unchanged.
 
         Examples
         --------
@@ -360,9 +361,10 @@ class Fmu:
         name : str
             Name of the variable.
         value : float, int, bool, str or tuple
-            For a Real a number in the variable's unit, or a number with its unit, ``(50, "mm")`` or
-            ``"50 mm"``: the variable's own unit or one of its display units. For an Enumeration an
-            item's name or number. For a Boolean also the texts "true" and "false".
+            For a Real: a number in the variable's own unit, or a number with a unit, ``(50, "mm")``
+            or ``"50 mm"``, which must be the variable's own unit or one of its display units. For
+            an Enumeration an item's name or number. For a Boolean also the texts "true" and
+            "false".
 
         Returns
         -------
@@ -372,7 +374,7 @@ class Fmu:
         Raises
         ------
         FmuError
-            If the FMU has no such variable, or the value is none of its type.
+            If the FMU has no such variable, or the value cannot be converted to its type.
 
         Examples
         --------

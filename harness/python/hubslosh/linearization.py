@@ -159,11 +159,11 @@ class LinearModel:
         return np.asarray(self.C @ states + self.D, np.complex128)
 
     def sampled(self, period: float, latency: int = 0, delay: float = 0.0) -> "LinearModel":
-        """Return the model as a controller sees it that works in cycles.
+        """Return the model in discrete time, as a controller sees it that works in cycles.
 
-        The inputs are held for a cycle and act late; the inputs on the way are further states. The
-        result is exact at the sampling instants. An output that follows an input at once has the
-        value just after the new input acts.
+        Each input is held for one cycle and acts after the delay; inputs that do not act yet are
+        further states. The result is exact at the sampling instants. If an output depends directly
+        on an input, it has the value just after the new input acts.
 
         Parameters
         ----------
@@ -398,11 +398,11 @@ def linearize(
     *,
     all_states: bool = False,
 ) -> LinearModel:
-    """Linearise an FMU where its parameters start it, by its directional derivatives.
+    """Linearise an FMU at its initial state, by its directional derivatives.
 
-    A hub that dry friction holds does not move: linearise with ``friction.model`` "none" or
-    "viscous", or in motion. The function warns if no output depends on any input, and if
-    Spacecraft turns faster and faster at the point.
+    A hub of HubSlosh that dry friction holds at rest does not respond to small torques. Therefore
+    linearise it with ``friction.model`` "none" or "viscous", or in motion. The function warns if no
+    output depends on any input, and if Spacecraft has an angular acceleration at this point.
 
     Parameters
     ----------

@@ -117,7 +117,7 @@ class LiquidModes:
 
     @cached_property
     def rest(self) -> dict[str, float]:
-        """Mass that no mode moves, kg, and its height, m, for motions along x and along y.
+        """Fixed mass, which no mode moves, kg, and its height, m, for motions along x and y.
 
         Keys: ``m_0_x``, ``H_0_x``, ``m_0_y``, ``H_0_y``. The directions differ because a slosh
         mass that swings only along y is rigid along x.
@@ -489,7 +489,7 @@ class _Tank(NamedTuple):
 
     @contextmanager
     def solid(self) -> "Iterator[tuple[Any, int, Sequence[float]]]":
-        """Give gmsh, the turned inside of the tank as a solid, and the box about it."""
+        """Return gmsh, the rotated inside of the tank as a solid, and its bounding box."""
         try:
             import gmsh
             import skfem  # noqa: F401, of the same extra

@@ -182,7 +182,7 @@ class Loop:
 
     @property
     def names(self) -> tuple[list[str], list[str]]:
-        """Names of what is measured, and of the commands."""
+        """Names of the measured variables, and names of the commanded inputs."""
         fmu = Fmu.open(self.model)
         measured, command = names_of(self.measured, "", []), names_of(self.command, "", [])
         commands: list[str] = []
@@ -258,7 +258,7 @@ class Loop:
 
     @property
     def whole_delay(self) -> tuple[int, float]:
-        """Cycles and seconds from measurement to command."""
+        """Delay from measurement to command: whole cycles, and the remaining seconds."""
         cycles, rest = split_delay(self.delay, self.period)
         return cycles + int(self.latency), rest
 
@@ -326,9 +326,9 @@ class Loop:
         return LinearModel(A, B, C, D, states, tuple(command), model.outputs)
 
     def gain(self, parameters: Parameters | None = None, *, more_delay: float = 0.0) -> LinearModel:
-        """Return the loop gain L from commands round to commands; the loop closes with u = -L u.
+        """Return the loop gain L, opened at the commands; the closed loop satisfies u = -L u.
 
-        It is exact at the sampling instants, delay included.
+        The loop gain includes the delay, and is exact at the sampling instants.
 
         Parameters
         ----------

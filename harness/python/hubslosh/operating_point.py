@@ -26,7 +26,7 @@ LEFT = 1e-7
 
 @dataclass(frozen=True, eq=False, repr=False)
 class OperatingPoint:
-    """Spacecraft with its thrust through the centre of mass, and the accelerations that are left.
+    """Operating point of Spacecraft with thrust through the centre of mass.
 
     Attributes
     ----------
@@ -35,7 +35,8 @@ class OperatingPoint:
     parameters : dict
         Parameters of the FMU at this point.
     shift : ndarray, shape (3,)
-        Way of O, where the thrust acts, across the thrust to the centre of mass, body axes, m.
+        Displacement of the origin O, where the thrust acts, at right angles to the thrust, which
+        brings the centre of mass onto the line of thrust, body axes, m.
     untrimmed_acceleration : ndarray, shape (3,)
         Angular acceleration before trimming, body axes, rad/s².
     tanks : tuple of str
@@ -78,7 +79,7 @@ class OperatingPoint:
 
     @property
     def lateral_acceleration(self) -> dict[str, float]:
-        """Acceleration across each tank's axis after trimming, m/s²; it moves liquid at rest."""
+        """Acceleration across each tank's axis after trimming, m/s², which moves the liquid."""
         return self._remaining[1]
 
     def __repr__(self) -> str:

@@ -37,8 +37,8 @@ def campaign(
     model : str or Path
         Name of the FMU, or its file.
     force : bool
-        Simulate all runs. Otherwise runs are reused that the directory has from the same plan
-        and FMU.
+        Simulate all runs, including those that the directory already contains. By default stored
+        runs are reused if plan and FMU are unchanged.
     progress : bool or callable, optional
         True shows a line on stderr, which is the default on a terminal and in a notebook; a
         function receives the line as text.
@@ -95,7 +95,7 @@ def analyse(
     progress: Progress = None,
     program: str | Path | None = None,
 ) -> pd.DataFrame:
-    """Find resonance, antiresonance and fit of recordings of a bench, by ``hubslosh analyse``.
+    """Analyse recordings of a bench: resonance, antiresonance and fit (``hubslosh analyse``).
 
     Parameters
     ----------
@@ -228,7 +228,7 @@ class Identification:
         True if the residual is noise. If it is False, the model is invalidated and no interval
         can be trusted. None if the method does not test it.
     verdict : tuple of str
-        Verdict in words, a sentence each.
+        Sentences of the verdict.
     all : dict
         Content of the file that ``hubslosh identify --out`` writes.
 
@@ -341,10 +341,10 @@ def identify(
 ) -> Identification:
     """Estimate parameters of an FMU from recordings, by ``hubslosh identify``.
 
-    Without ``free`` the unknowns are those of the slosh bench, and ``method`` says what was
-    recorded. With ``free`` any FMU is fitted by output error, also one of another maker.
-    ``{n: e.value for n, e in found.parameters.items()} | found.settings`` are parameters for
-    `simulate`, and so is the file: ``simulate(parameters="result.json")``.
+    Without ``free`` the unknowns are the parameters of the slosh bench, and ``method`` is the kind
+    of recordings. With ``free`` any FMU can be fitted, also one that is not from this project, by
+    the output-error method. ``{n: e.value for n, e in found.parameters.items()} | found.settings``
+    are parameters for `simulate`, and so is the file: ``simulate(parameters="result.json")``.
 
     Parameters
     ----------

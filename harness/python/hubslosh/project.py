@@ -56,11 +56,13 @@ class Project:
         ``period`` (s) and further arguments of `Craft.review`, such as ``fills``, ``delay``,
         ``uncertain`` and ``requirements``.
     cases : mapping of mappings
-        Cases by name: settings that differ, and in ``craft`` values of the craft that differ.
+        Cases by name. A case has the settings that differ from ``settings``, and under ``craft``
+        the values that differ from ``craft``.
     name : str
         Name of the design on pages.
     controller_file : str, optional
-        ``"FILE.py:NAME"``, by which `save` names the controller; otherwise it writes matrices.
+        ``"FILE.py:NAME"``, the Python object that `save` writes as the controller. Without it
+        `save` writes the matrices of the controller.
 
     Examples
     --------

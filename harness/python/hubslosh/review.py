@@ -105,7 +105,7 @@ class Review:
         A row for each nominal fill, loop and slosh mode that shows in the loop gain, with the
         columns of `hubslosh.stabilisation.resonances`.
     worst : Point
-        Point with the least distance, which a search has found.
+        Point with the smallest ``distance``, found by a search.
     confirmation : Confirmation
         Simulation of the nonlinear FMU at the worst point.
     suggestion : Suggestion
@@ -190,7 +190,7 @@ class Review:
         return rows.sort_values("growth", ascending=False, kind="stable")
 
     def requirements(self) -> pd.DataFrame:
-        """Return the verdict on each requirement, those that fail first.
+        """Return the verdict on each requirement, failed requirements first.
 
         Returns
         -------
@@ -207,7 +207,7 @@ class Review:
         return bool(self.points["stable"].all() and self.requirements()["passed"].all())
 
     def modes(self) -> dict[str, str]:
-        """Return how each slosh mode is stabilised, in words, by its name; unstable ones first.
+        """Return in words how each slosh mode is stabilised, by its name; unstable modes first.
 
         At each fill the worst verdict over all commands counts.
 
@@ -261,7 +261,7 @@ class Review:
 
     @property
     def summary(self) -> str:
-        """The answer in a sentence, and the verdict on the requirements in another."""
+        """One sentence about the stability of all points, and one about the requirements."""
         return " ".join([self._stability(), *self._failures()])
 
     def _failures(self) -> list[str]:

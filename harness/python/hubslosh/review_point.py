@@ -35,7 +35,7 @@ class Point:
 
     @property
     def distance(self) -> float:
-        """Measure by which the review searches the worst point: small is bad.
+        """Measure that the search for the worst point minimises.
 
         It is the modulus margin of a stable loop, and minus the growth rate (1/s) of an unstable
         loop.

@@ -32,8 +32,9 @@ FAILED = "refused"  # Column that says what the FMU refused
 def draw(ranges: Mapping[str, Range], run: int, seed: int = 1) -> dict[str, Any]:
     """Return the values of one run of `monte_carlo`.
 
-    They depend only on the seed, the run and the names up to each value, not on the number of
-    runs. A uniform distribution gives the numbers that a plan with the same ``[random]`` draws.
+    A value depends only on the seed, on the number of the run, and on the names in ``ranges`` up to
+    its own name; it does not depend on how many runs the study has. A uniform distribution gives
+    the numbers that a plan with the same ``[random]`` draws.
 
     Parameters
     ----------
@@ -110,7 +111,7 @@ def monte_carlo(
     workers: int | None = None,
     progress: Progress = None,
 ) -> "pd.DataFrame":
-    """Draw random values, make a run with each draw, and return a row for each run.
+    """Run a Monte Carlo study: draw random values, simulate each draw, and return a row for each.
 
     Parameters
     ----------

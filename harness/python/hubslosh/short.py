@@ -32,6 +32,6 @@ def rows(table: pd.DataFrame, most: int = MOST) -> str:
 
 
 def names(of: Sequence[str], most: int = 6) -> str:
-    """Return names separated by commas; of many names only the first ones and their number."""
+    """Return names separated by commas; of many names only the first, and the total number."""
     left = len(of) - most
     return ", ".join(of[:most]) + (f" and {left} more" if left > 0 else "")

@@ -75,7 +75,7 @@ class Margins:
 
     @property
     def gain_margins(self) -> tuple[float, float]:
-        """Gain margins down and up, dB: factors by which the gain may shrink and grow.
+        """Gain margins, dB: how far the gain may be reduced, and how far it may be increased.
 
         They are (-inf, inf) if any gain is allowed.
         """
@@ -175,7 +175,7 @@ def margins(loop: Loop | LinearModel | Any, parameters: Parameters | None = None
 def margins_and_gain(
     loop: Any, parameters: Parameters | None = None
 ) -> tuple[Margins, LinearModel]:
-    """Return the result of `margins` together with the loop gain, which it has computed."""
+    """Return the result of `margins`, and the loop gain from which the margins were computed."""
     if isinstance(loop, Loop):
         K = loop._must_be_linear()
         plant = loop.plant(parameters)

@@ -24,7 +24,7 @@ WORST = 5  # Number of worst points that a filter is tried on, besides the nomin
 
 @dataclass(frozen=True, eq=False)
 class Suggestion:
-    """The notch or roll-off that raises the smallest modulus margin most, if any raises it."""
+    """The notch or roll-off filter that increases the smallest modulus margin most, if any."""
 
     text: str
     """The suggestion in a sentence."""

@@ -143,14 +143,14 @@ class Tank:
         number : int
             Number of the tank on Spacecraft, 1 to 4.
         position : sequence of float, shape (3,), optional
-            Position of the tank's zero (of a ``shape`` its lowest point), body axes, m. Not for
-            HubSlosh.
+            Position of the origin of the tank's drawing, body axes, m; for a tank given by
+            ``shape`` this is its lowest point. Not for HubSlosh.
         axis : sequence of float, shape (3,), optional
             Upward direction of the tank's axis in body axes, of any length; by default z. Not
             for HubSlosh.
         rigid : bool
-            Return the liquid without slosh, at its centre of mass, with the inertia that it has
-            under a rigid lid. Not for HubSlosh.
+            Return the whole liquid as a rigid body without slosh, at its centre of mass, with the
+            inertia of liquid under a rigid lid. Not for HubSlosh.
 
         Returns
         -------
@@ -311,8 +311,8 @@ def tank(
 ) -> Tank:
     """Find the slosh modes of a tank that is a body of revolution or a box.
 
-    The modes follow from linear potential flow in the tank's contour. `liquid_modes` finds those
-    of other shapes.
+    The modes are computed by linear potential flow in the contour of the tank. For tanks of other
+    shapes use `liquid_modes`.
 
     Parameters
     ----------

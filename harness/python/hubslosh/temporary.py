@@ -11,7 +11,7 @@ from .native import FmuError, Folder, destination, put
 
 
 def folder(parent: Path | None = None, *, hidden: bool = False) -> Folder:
-    """Return a temporary folder for a ``with`` statement, at whose end it is removed.
+    """Return a temporary folder for a ``with`` statement, which removes the folder at its end.
 
     By default it is in the system's folder for temporary files. Folders that were left there by
     killed processes of Python or of the program are removed first.

@@ -136,11 +136,11 @@ class _Craft:
     modes: tuple[_Mode, ...] = ()
 
     def deformed(self) -> Matrix:
-        """Return the mass matrix that the deflections of appendages add."""
+        """Return the part of the mass matrix that comes from deflected appendages."""
         return sum((mode.eta * mode.body for mode in self.modes), np.zeros((6, 6)))
 
     def pull(self, values: Mapping[str, float]) -> Matrix:
-        """Return force and torque by which deformed appendages at rest pull the craft."""
+        """Return the force and torque that deformed appendages at rest exert on the craft."""
         pulls = (
             (TURN * values[mode.name("frequency")]) ** 2 * mode.eta * mode.u for mode in self.modes
         )
@@ -536,8 +536,8 @@ class UncertainModel:
     Attributes
     ----------
     M : LinearModel
-        The certain part. Its inputs are the outputs of Δ, then u; its outputs are the inputs of
-        Δ, then y.
+        The known part of the model. Its inputs are the outputs of Δ, followed by u; its outputs are
+        the inputs of Δ, followed by y.
     spread : DataFrame
         Change of each parameter (row) with each δ (column), SI units.
     center : dict of str to float
@@ -549,7 +549,8 @@ class UncertainModel:
     given : dict
         Parameters of the FMU at its operating point.
     tanks : tuple of str
-        Names of the craft's tanks, by which `delta` takes quantities of their modes, too.
+        Names of the craft's tanks, which `delta` also accepts in the names of quantities, such as
+        ``main.frequency[1]``.
 
     Examples
     --------
@@ -861,7 +862,7 @@ class UncertainModel:
     def certify(
         self, loop: Loop, largest: float = 3.0, *, gap: float = 1.04, most: int = 1000
     ) -> Certificate:
-        """Return a proof that the loop is stable for all Δ up to a size near the worst case.
+        """Prove that the loop is stable for all Δ up to a size close to the worst case.
 
         The proof holds for all frequencies, not only for a grid: D and G scalings on intervals
         of frequency, and on parts of the box of Δ where a pair of scalings for the whole box does
@@ -953,7 +954,7 @@ class UncertainModel:
         return _closed(loop._gain(self.at(delta), K))
 
     def worst_case(self, loop: Loop, largest: float = 3.0) -> WorstCase:
-        """Return the smallest real Δ for which a search finds the loop at the limit of stability.
+        """Search for the smallest real Δ that brings the loop to the limit of stability.
 
         The search uses the exact sampled loop, with its delay. Starting from each lightly damped
         pole, it follows the sign of the derivatives of the pole's damping by each δ, up to ``|δ| =
@@ -1215,7 +1216,7 @@ def uncertain(
     Returns
     -------
     UncertainModel
-        The certain part M and Δ.
+        The known part M and the uncertain part Δ.
 
     Raises
     ------

@@ -58,7 +58,7 @@ class View:
     def open(self) -> None:
         """Show the page in the web browser.
 
-        Without a file the page is written to a temporary one first.
+        If the page has no file, it is written to a temporary file first.
 
         Examples
         --------

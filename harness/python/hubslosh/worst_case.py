@@ -75,7 +75,7 @@ class Confirmation:
 
     @property
     def summary(self) -> str:
-        """The comparison in a sentence, and whether the runs left the range of their model."""
+        """Sentences on the agreement with the prediction, and on tanks that left their range."""
         left = "; the simulation left the range of its model (confirmation.out_of_range)"
         return self._comparison() + (left if self.out_of_range else "")
 
@@ -164,7 +164,7 @@ def _corners(points: "Sequence[Point]") -> list[tuple[int, Vector]]:
 
 
 def confirm(point: "Point") -> Confirmation:
-    """Simulate the nonlinear FMU at a point, and compare its critical oscillation.
+    """Simulate the nonlinear FMU at a point, and compare it with the linear prediction.
 
     A stable loop is simulated with the gain of one command 1 % below and above its nearest gain
     margin. The growth rates of both runs give the gain at the limit. An unstable loop is simulated
