@@ -1082,7 +1082,7 @@ impl<M: Model, V: Version> Instance<M, V> {
     pub fn enter_event_mode(&mut self) -> Result<(), Fault> {
         let call = self.check(V::ENTER_EVENT)?;
         if self.events == Events::InStep {
-            return Err(call.error("this instance was made with eventModeUsed = false"));
+            return Err(call.error("this instance was instantiated with eventModeUsed = false, so it has no event mode (allowed: eventModeUsed = true)"));
         }
         self.leave_initialized(call)?;
         self.state = InstanceState::Event;
@@ -1313,7 +1313,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         }
         if saved.events != self.events {
             return Err(call.error(
-                "the state was saved by an instance with another eventModeUsed (allowed: the same value)",
+                "the saved state is of an instance with another value of eventModeUsed (allowed: an instance with the same value)",
             ));
         }
         self.check_layout(call, saved)?;

@@ -44,7 +44,7 @@ enum Trial {
 
 #[derive(Debug, thiserror::Error)]
 enum Impossible {
-    #[error("the linearised system cannot be solved")]
+    #[error("the integrator's linearised system of equations is singular")]
     Singular,
     #[error("state {} becomes {value}", index + 1)]
     State { index: usize, value: f64 },

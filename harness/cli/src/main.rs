@@ -251,8 +251,7 @@ fn guarded(cli: &Cli) -> Result<u8> {
             limits.memory >> 20
         ),
         Cause::Interfered => bail!(
-            "the FMU has written to the connection of the process that runs it, or has closed it \
-             (allowed: files and connections that the FMU has opened)"
+            "the FMU has written to, or has closed, the pipe between hubslosh and the process that runs the FMU (allowed: only files and connections that the FMU itself has opened)"
         ),
         Cause::Panicked(report) => bail!(report),
         Cause::Flood => {

@@ -90,7 +90,7 @@ pub fn check(command: &clap::Command, matches: &ArgMatches) -> Result<()> {
             outputs[..k].iter().find(|(_, other, _)| file.is_some() && place(other) == file);
         if let Some((other, _, _)) = other {
             anyhow::bail!(
-                "{} is named for two outputs (--{other}, --{option}); give each a file of its own",
+                "{} is the file of two outputs (--{other}, --{option}); give a different file for each",
                 path.display()
             );
         }

@@ -152,7 +152,7 @@ impl Characteristics {
         let octaves: Vec<Octaves> = records.iter().map(|record| record.1.clone()).collect();
         let fit = Octaves::mean(&octaves).and_then(|mean| mean.fit(&specified.terms(), 0));
         let fit =
-            fit.context("the gyro's readings do not change; is imu.lsb larger than its noise?")?;
+            fit.context("the gyro's readings do not change. Probably the resolution imu.lsb is larger than the noise; reduce imu.lsb")?;
         Ok(Characteristics { specified, fit, points })
     }
 

@@ -161,7 +161,7 @@ impl Tanks {
 fn integer(description: &ModelDescription, instance: &mut Instance, name: &str) -> Result<i64> {
     match instance.value(description.variable(name)?)? {
         Value::Integer(n) => Ok(n),
-        other => anyhow::bail!("{name} is not an integer but {other:?}"),
+        other => anyhow::bail!("{name} must be an integer, but it is {other:?}"),
     }
 }
 

@@ -19,7 +19,7 @@ pub fn open(path: &Path) -> Result<File> {
     let kind = path.metadata()?;
     // before `File::open`, which waits until somebody writes to a named pipe
     if !kind.is_file() {
-        bail!("the path leads to {} (allowed: a regular file)", file_kind(&kind));
+        bail!("the path is {} (allowed: a regular file)", file_kind(&kind));
     }
     let file = File::open(path)?;
     let mut all = READ.lock().unwrap_or_else(PoisonError::into_inner);
@@ -191,9 +191,9 @@ mod tests {
         let made = std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();
         assert!(made.success());
         let error = open(&pipe).unwrap_err().to_string();
-        assert_eq!(error, "the path leads to a named pipe (allowed: a regular file)");
+        assert_eq!(error, "the path is a named pipe (allowed: a regular file)");
         let error = text(Path::new("/dev/zero")).unwrap_err().to_string();
-        assert_eq!(error, "the path leads to a device (allowed: a regular file)");
+        assert_eq!(error, "the path is a device (allowed: a regular file)");
     }
 
     #[cfg(unix)]

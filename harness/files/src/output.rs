@@ -45,7 +45,7 @@ pub fn destination(path: &Path) -> Result<Destination> {
         place = folder.join(next);
     }
     bail!(
-        "{name} cannot be written: it is a symbolic link that leads to itself, or over {LINKS} others"
+        "{name} cannot be written: it is a symbolic link that leads to itself, or a chain of more than {LINKS} symbolic links"
     )
 }
 

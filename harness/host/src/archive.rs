@@ -169,8 +169,7 @@ impl Archive {
             }
             ensure!(entry.name != other.name, "two entries are called {name} (allowed: one)");
             bail!(
-                "{name} and {} have the same place on Windows or macOS (allowed: names that differ in more than \
-                 capitals, full stops and spaces at the end, and what follows a colon)",
+                "{name} and {} would be the same file on Windows or macOS (allowed: names that differ in more than capital letters, full stops or spaces at the end, or text after a colon)",
                 other.name.escape_debug()
             );
         }

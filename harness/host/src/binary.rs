@@ -102,13 +102,16 @@ pub struct Binary {
 
 impl Binary {
     pub fn read(bytes: &[u8]) -> Result<Self> {
-        let kind = FileKind::parse(bytes).context("not a binary of any platform")?;
+        let kind =
+            FileKind::parse(bytes).context("the file is not a binary of any known platform")?;
         let mut binary = match kind {
             FileKind::Elf64 => linux(bytes),
             FileKind::Pe64 => windows(bytes),
             FileKind::MachO64 => macos(bytes),
             FileKind::MachOFat32 => universal(bytes),
-            other => bail!("not a binary for 64 bits of Linux, Windows or macOS, but {other:?}"),
+            other => bail!(
+                "the file is {other:?} (allowed: a 64-bit binary for Linux, Windows or macOS)"
+            ),
         }
         .with_context(|| format!("a damaged binary ({kind:?})"))?;
         binary.size = bytes.len();
@@ -339,7 +342,7 @@ fn universal(bytes: &[u8]) -> Result<Binary> {
         whole.needs = whole.needs.max(part.needs);
         whole.signature = whole.signature.take().or(part.signature);
     }
-    whole.context("no code in it")
+    whole.context("the binary contains no machine code")
 }
 
 /// Returns a description of the fault if the hashes in the code signature differ from hashes of the code. macOS kills a

@@ -349,7 +349,7 @@ pub(crate) fn load(
             .collect::<Vec<_>>();
         there.sort();
         let there = if there.is_empty() { "none".into() } else { there.join(", ") };
-        bail!("{name} has no binary for this platform, {binary} (binaries in it: {there})");
+        bail!("{name} has no binary for this platform, {binary} (binaries in the FMU: {there})");
     }
     let bytes =
         std::fs::read(&path).with_context(|| format!("{binary} in {name} cannot be read"))?;

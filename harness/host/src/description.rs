@@ -695,7 +695,7 @@ impl ModelDescription {
             let counts = counts.chain(list.children.iter().map(|of| of.children.len()));
             if let Some(count) = counts.max().filter(|count| *count > MOST_TYPES) {
                 bail!(
-                    "modelDescription.xml: {count} types, or items of one (allowed: {MOST_TYPES})"
+                    "modelDescription.xml has {count} types, or {count} items in one type (allowed: at most {MOST_TYPES})"
                 );
             }
         }

@@ -128,7 +128,11 @@ impl<'fmu, I: DerefMut<Target = Instance<'fmu>>> Run<I> {
     fn update(&mut self) -> Result<()> {
         for _ in 0..1000 {
             let updated = self.instance.update_discrete_states()?;
-            ensure!(!updated.terminate, "the FMU ends the run at t = {} s", self.t);
+            ensure!(
+                !updated.terminate,
+                "the FMU has requested the end of the simulation at t = {} s",
+                self.t
+            );
             if !updated.again {
                 self.next_event = updated.next_event;
                 self.instance.enter_continuous_time_mode()?;
@@ -139,7 +143,10 @@ impl<'fmu, I: DerefMut<Target = Instance<'fmu>>> Run<I> {
                 return Ok(());
             }
         }
-        bail!("the discrete states do not settle at t = {} s", self.t)
+        bail!(
+            "the event iteration at t = {} s does not end: the FMU requests a new iteration again and again",
+            self.t
+        )
     }
 
     fn indicators(&mut self) -> Result<Vec<f64>> {
@@ -244,7 +251,10 @@ impl<'fmu, I: DerefMut<Target = Instance<'fmu>>> Run<I> {
                 false => grown,
             };
             let completed = self.instance.completed_integrator_step()?;
-            ensure!(!completed.terminate, "the FMU ends the run at t = {to} s");
+            ensure!(
+                !completed.terminate,
+                "the FMU has requested the end of the simulation at t = {to} s"
+            );
             let due = self.next_event.is_some_and(|next| to >= next);
             if crossed || completed.enter_event_mode || due {
                 self.instance.enter_event_mode()?;
@@ -254,7 +264,7 @@ impl<'fmu, I: DerefMut<Target = Instance<'fmu>>> Run<I> {
             }
         }
         bail!(
-            "{} steps were not enough from one row to the next, before t = {end} s: a stiff model needs its own solver",
+            "the host's solver needed more than {} steps between two rows, before t = {end} s: the model is probably stiff, so use the FMU's own solver (Co-Simulation)",
             self.most_steps
         )
     }

@@ -171,7 +171,7 @@ impl Schedule {
         let most = |points: usize| -> Result<()> {
             ensure!(
                 points <= budget::ROWS + 1,
-                "{} rows of the inputs and those of the result are {points} communication points (allowed: at most {})",
+                "the {} rows of the inputs and the rows of the result are together {points} communication points (allowed: at most {})",
                 knots.len(),
                 budget::ROWS
             );

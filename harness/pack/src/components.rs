@@ -226,7 +226,7 @@ fn rust_version() -> Result<String> {
         std::process::Command::new(rustc).current_dir(project::root()).arg("--version").output();
     let said = said.context("rustc cannot be run; packing the FMU needs Rust")?;
     let said = String::from_utf8_lossy(&said.stdout);
-    let version = said.split_whitespace().nth(1).context("rustc does not say its version")?;
+    let version = said.split_whitespace().nth(1).context("`rustc --version` prints no version")?;
     Ok(version.into())
 }
 

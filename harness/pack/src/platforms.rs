@@ -210,7 +210,8 @@ impl Toolchain {
             .or_else(|| env::home_dir().map(|home| home.join(".cargo")));
         Ok(Toolchain {
             root,
-            path: env::join_paths(folders).context("a folder on PATH has a strange name")?,
+            path: env::join_paths(folders)
+                .context("a folder on PATH has a name that contains the separator of PATH")?,
             sysroot,
             source,
             home: home.unwrap_or_default().to_string_lossy().into_owned(),

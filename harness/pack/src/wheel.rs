@@ -79,7 +79,7 @@ pub fn for_tests(fmus: &[&Path]) -> PathBuf {
         let read = vec![Binary::read(&library)?];
         let native = (native_name(std::env::consts::DLL_SUFFIX), library);
         let binaries = Binaries { folder: PLATFORM, fmus: fmus_in, native, command: None, read };
-        let folder = fmus[0].parent().context("the FMU is in no folder")?;
+        let folder = fmus[0].parent().context("the path of the FMU has no folder")?;
         write_one(folder, binaries, archive::write)
     };
     make().unwrap_or_else(|error| panic!("the wheel for the tests could not be packed: {error:#}"))
@@ -189,7 +189,10 @@ fn tags(binaries: &[Binary]) -> Result<Vec<String>> {
         bail!("a wheel without binaries has no platform")
     };
     let [architecture] = architectures[..] else {
-        bail!("a wheel is for one processor, not for {}", architectures.join(", "))
+        bail!(
+            "a wheel must be for one processor type, but its binaries are for {}",
+            architectures.join(", ")
+        )
     };
     let needed = |oldest| binaries.iter().filter_map(|b| b.needs).fold(oldest, Version::max);
     Ok(match kind {

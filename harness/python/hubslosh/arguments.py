@@ -85,7 +85,7 @@ def floats(values: Any) -> NDArray[np.float64]:
             where = tuple(int(k) for k in np.argwhere(np.ma.getmaskarray(part))[0])
             raise FmuError(
                 f"a masked array has no value at {', '.join(map(str, where)) or 'its place'}: fill "
-                "it (numpy.ma.filled) or drop it first"
+                "the masked values (numpy.ma.filled) or remove them first"
             )
     return np.asarray(values, float)
 

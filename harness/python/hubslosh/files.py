@@ -28,7 +28,7 @@ def _check_table(table: Any, path: Any, ending: str) -> Path:
     import pandas as pd
 
     if isinstance(table, str | os.PathLike):
-        raise FmuError(f"the table comes first, then the file: (table, {str(table)!r})")
+        raise FmuError(f"the arguments are exchanged: give the table first, then the file: (table, {str(table)!r})")
     if not isinstance(table, pd.DataFrame):
         raise FmuError(f"a pandas.DataFrame is expected, not {type(table).__name__}")
     return temporary.check_path(path, ending)
@@ -174,7 +174,7 @@ def _distinct_names(values: Mapping[str, Any], units: Mapping[str, str]) -> dict
     twice = [name for name in names if list(names.values()).count(names[name]) > 1]
     if twice or any(not re.fullmatch(r"[A-Za-z]\w{0,62}", name) for name in names.values()):
         wrong = twice or [n for n, m in names.items() if not re.fullmatch(r"[A-Za-z]\w{0,62}", m)]
-        raise FmuError(f"columns cannot be named apart in MATLAB: {', '.join(wrong)}")
+        raise FmuError(f"these columns would have the same name in MATLAB: {', '.join(wrong)}")
     units = {names[n]: u for n, u in units.items() if n in names}
     arrays = {names[name]: of for name, of in values.items()}
     return arrays | ({"units": units} if units else {})

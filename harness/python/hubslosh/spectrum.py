@@ -103,7 +103,7 @@ def frequency_response(
         row = uneven[0] if len(uneven) else 0
         raise FmuError(f"time must grow in equal steps; it does not after row {row}, {time[row]} s")
     if not np.ptp(u):
-        raise FmuError(f"{input} does not change; nothing can be said about its effect")
+        raise FmuError(f"{input} is constant, so its effect on the output cannot be estimated")
 
     line = 1 / (len(time) * step)
     if resolution is None:

@@ -188,7 +188,7 @@ def margins_and_gain(
 
         return _margins(gain, modes, _controllable_modes(plant, modes), delayed), gain
     if parameters:
-        raise FmuError("parameters can be given with a Loop, not with a loop gain")
+        raise FmuError("parameters= is only for a Loop; the parameters of a loop gain cannot be changed")
     gain = loop if isinstance(loop, LinearModel) else _loop_gain(loop)
     modes = gain._modes(LIGHT)
     return _margins(gain, modes, [modes] * gain.D.shape[1], None), gain

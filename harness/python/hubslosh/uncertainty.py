@@ -204,7 +204,7 @@ def _read(
             return get(*(f"{name}[{i}]" for i in range(1, count + 1)))
 
         if plant.fmu.name != "Spacecraft":
-            raise FmuError(f"an uncertain model is one of Spacecraft, not of {plant.fmu.name}")
+            raise FmuError(f"uncertain models exist only for Spacecraft, not for {plant.fmu.name}")
         free = (get("mount_kind")[0] or get("mount")[0]) == 1
         problems = [] if free else ["the craft is on a pivot: mount must be free"]
         if vector("omega").any() or vector("q", 4)[1:].any():

@@ -59,8 +59,7 @@ fn fills(rows: &[&AtFill]) -> String {
 
 #[derive(Debug, thiserror::Error)]
 #[error(
-    "{PREFIX}s and kappa of mode {mode} are known at {known} of {fills} fills, so the table leaves them out, and the FMU \
-     takes a pendulum: {why}"
+    "{PREFIX}s and kappa of mode {mode} are known only at {known} of {fills} fills. Therefore the table has no values for them, and the FMU models the mode as a pendulum: {why}"
 )]
 pub(crate) struct TooFewFills {
     mode: usize,

@@ -512,8 +512,7 @@ pub(crate) fn solve(wall: Wall, rho: f64, fill: f64, modes: usize) -> Result<Mod
     let pair = pair(&wall, &volume, rho, modes);
     let Some(Pair { better, error, error_beta }) = pair.filter(|p| p.error < WORST) else {
         return Err(format!(
-            "At a fill of {fill} m the modes could not be computed to better than {WORST}: the contour \
-             has details too fine for its size, or fewer modes must do."
+            "At a fill of {fill} m the modes could not be computed to better than {WORST}: the contour has details that are too fine for its size, or too many modes are asked for."
         )
         .into());
     };

@@ -78,7 +78,8 @@ struct Stepped {
 fn solver(text: &str) -> Result<Stepped> {
     let (whose, tolerance) = match text.split_once(':') {
         Some((whose, number)) => {
-            let number: f64 = number.parse().with_context(|| format!("{number} is no number"))?;
+            let number: f64 =
+                number.parse().with_context(|| format!("{number} is not a number"))?;
             ensure!(
                 (1e-13..=1e-2).contains(&number),
                 "{number:e} (allowed: tolerances from 1e-13 to 1e-2)"

@@ -119,8 +119,7 @@ impl CampaignArgs {
             let (out, file) = (campaign.out.display(), campaign.plan_file());
             ensure!(
                 named,
-                "{out} holds the campaign of another plan ({}): --out DIRECTORY puts this one \
-                 elsewhere, --replace replaces tables and report (equal runs are reused)",
+                "{out} holds the campaign of another plan ({}): --out DIRECTORY writes this campaign to another directory, --replace replaces tables and report (equal runs are reused)",
                 file.display()
             );
             terminal::note(format_args!(

@@ -77,7 +77,7 @@ impl ReviewArgs {
         }
         let names: Vec<_> = pythons.iter().map(|python| python.display().to_string()).collect();
         bail!(
-            "no Python was found (tried: {}); --python names one that has the package hubslosh",
+            "no Python was found (tried: {}); give --python PROGRAM, a Python that has the package hubslosh",
             names.join(", ")
         )
     }

@@ -171,7 +171,7 @@ impl RunArgs {
         let tanks = Tanks::read(description, &mut instance, self.tension.unwrap_or(WATER_TENSION))?;
         if self.tension.is_some() && tanks.is_none() {
             bail!(
-                "--tension is for the tanks of Spacecraft and SloshTank (the bench's is fluid.sigma)"
+                "--tension is for the tanks of Spacecraft and SloshTank (for HubSlosh set the parameter fluid.sigma)"
             );
         }
         let limits = Limits::find(|name| description.variable(name).is_ok());

@@ -297,7 +297,7 @@ fn a_parameter_or_output_given_twice_is_refused() {
     let tank = pack::root().join("harness/tank/examples/capsule.toml");
     let flags = ["tank", tank.to_str().unwrap(), "--fill", "0.5", "--out", "t.toml"];
     let same = || hubslosh(directory, &[&flags[..], &["--parameters", "t.toml"]].concat());
-    refuses(directory, same, &["t.toml is named for two outputs"]);
+    refuses(directory, same, &["t.toml is the file of two outputs"]);
 }
 
 #[test]

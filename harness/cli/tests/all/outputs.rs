@@ -92,7 +92,7 @@ fn an_existing_file_that_looks_like_an_input_is_not_replaced() {
     }
     let said =
         refused(directory.path(), &["check", "B.fmu", "--json", "c.json", "--sarif", "./c.json"]);
-    assert!(said.contains("is named for two outputs (--json, --sarif)"), "{said}");
+    assert!(said.contains("is the file of two outputs (--json, --sarif)"), "{said}");
     assert_eq!(std::fs::read_to_string(at("A.fmu")).unwrap(), "an FMU");
 }
 

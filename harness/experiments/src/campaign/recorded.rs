@@ -100,7 +100,7 @@ pub(super) fn table(
             ensure!(
                 correlation > LEAST_CORRELATION,
                 "{name}: the recorded torque is not {} (correlation {correlation:.2}; allowed: at least {LEAST_CORRELATION}, with a clock \
-                 that is up to {} ppm off). Another profile, duration or band acted, or the times are in another unit",
+                 that is up to {} ppm off). The bench was driven with another profile, duration or frequency band, or the times are in another unit",
                 case.profile,
                 1e6 * FASTEST_CLOCK
             );

@@ -252,7 +252,7 @@ pub struct Surface<'a> {
 impl Surface<'_> {
     fn text(&self, name: &str) -> Result<&str> {
         let found = self.parameters.get(name).map(String::as_str);
-        found.with_context(|| format!("the FMU has no {name}: only HubSlosh has such a surface"))
+        found.with_context(|| format!("the FMU has no variable {name}: only HubSlosh models the liquid's surface for this sensor"))
     }
 
     fn number(&self, name: &str) -> Result<f64> {
@@ -275,8 +275,9 @@ impl Surface<'_> {
             "the surface is known only for an upright cylinder (slosh.source = geometry), not for a {source}"
         );
         let model = self.choice(hubslosh::slosh::MODEL, hubslosh::slosh::KIND)?;
-        let coordinate = Coordinate::from_model(&model)
-            .with_context(|| format!("slosh.model = {model} has no surface that moves"))?;
+        let coordinate = Coordinate::from_model(&model).with_context(|| {
+            format!("slosh.model = {model} has no moving surface (allowed: models with slosh)")
+        })?;
         let count = (self.number(hubslosh::slosh::MODES)? as usize).clamp(1, MODES);
         let mut needs = Vec::new();
         for n in 1..=count {

@@ -248,7 +248,7 @@ fn errors_of_sensors_say_what_is_allowed() {
         format!("{:#}", new.unwrap_err())
     };
     for (text, set, words) in [
-        ("a=gauge", ("slosh.model", "frozen"), "no surface that moves"),
+        ("a=gauge", ("slosh.model", "frozen"), "no moving surface"),
         ("a=camera", ("slosh.source_kind", "2"), "only for an upright cylinder"),
         ("a=pressure:height=0.2", ("tank.h", "0.1"), "above the liquid at rest, tank.h = 0.1 m"),
         ("a=force:of=theta", ("tank.h", "0.1"), "unit rad (allowed: N)"),

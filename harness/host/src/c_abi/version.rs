@@ -215,10 +215,12 @@ impl<V: Version> Fmu<V> {
         let name = path.display();
         match interface {
             Interface::CoSimulation if description.co_simulation.is_none() => {
-                bail!("{name} offers no co-simulation; this host drives nothing else")
+                bail!(
+                    "{name} has no Co-Simulation, which is the only interface that this command uses"
+                )
             }
             Interface::ModelExchange if description.model_exchange.is_none() => {
-                bail!("{name} offers no model exchange: only its own solver can step it")
+                bail!("{name} has no Model Exchange, so only the FMU's own solver can step it")
             }
             _ => {}
         }
@@ -283,7 +285,7 @@ impl<V: Version> Fmu<V> {
             Some(Interface::ModelExchange) => exchange,
         };
         let identifier = identifier
-            .with_context(|| format!("{name} offers neither co-simulation nor model exchange"))?;
+            .with_context(|| format!("{name} has neither Co-Simulation nor Model Exchange"))?;
         let Loaded { library, hash, changed, binary } =
             super::load(directory, path, V::PLATFORM, identifier)?;
         let needed =

@@ -341,7 +341,7 @@ pub fn system<'a>(
         let is_in = u.start.is_finite() && u.bounds.0 <= u.bounds.1;
         ensure!(
             is_in,
-            "{} starts at {:.3e}: the data are those of no bench that the FMU can be",
+            "the recordings give {} = {:.3e} as the start of the search, which is impossible for a bench. Check units and signs of the columns, and the settings of the bench",
             u.name,
             u.start
         );

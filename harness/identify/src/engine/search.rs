@@ -136,7 +136,7 @@ pub fn solve<'p>(
         }
     }
     let Some(mut best) = best else {
-        return Err(error.context("no search was made")?);
+        return Err(error.context("the search could not start")?);
     };
     best.judge(&mut fit, news)?;
     conclude(fit, best, tried, ceiling, news)

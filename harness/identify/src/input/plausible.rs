@@ -34,8 +34,7 @@ pub fn check_size(inertia: f64, nominal: f64) -> Result<()> {
     bail!(
         "the recording shows an inertia of {:.3e} kg·m², the FMU with its settings has {nominal:.3e} kg·m²: \
          {guess}. A torque with little power near the slosh frequency, such as a push, does not show the inertia either: record a \
-         sweep. If the bench really is that different, give its expected inertia: --start hub.I={:.1e}:{:.1e} estimates it all \
-         the same.",
+         sweep. If the bench really is that different, give its expected inertia: --start hub.I={:.1e}:{:.1e} then estimates the inertia from this recording.",
         inertia,
         0.8 * inertia,
         0.4 * inertia

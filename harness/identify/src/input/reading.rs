@@ -124,8 +124,7 @@ pub fn read_decay(
         .or_else(|| (0..DECAYING.len()).find(|k| own(*k)).map(|k| &DECAYING[k]));
     let Some(found) = found.copied() else {
         bail!(
-            "{name} has no column {} (columns in it: {}; --columns time=COLUMN,wave_height=COLUMN:UNIT says which is \
-             which)",
+            "{name} has no column {} (columns in it: {}; --columns time=COLUMN,wave_height=COLUMN:UNIT names the columns)",
             DECAYING.join(", "),
             there.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ")
         )
@@ -337,15 +336,17 @@ fn check_time(all: &Recording, coarsest: f64) -> Result<()> {
             ""
         }
     );
-    ensure!(step >= 1e-4, "{name}: rows are {step} s apart. Time must be in seconds");
+    ensure!(
+        step >= 1e-4,
+        "{name}: rows are {step} s apart, which is impossible: give the time in seconds, or state its unit"
+    );
     let masks = [("tau_cmd", &all.commanded), ("omega", &all.fresh), ("theta", &all.angle_fresh)];
     for (signal, mask) in masks {
         let Some(mask) = mask else { continue };
         let apart = clocks::usual(&masked(&all.time, Some(mask)));
         ensure!(
             apart <= coarsest,
-            "{name}: values of {signal} are {apart:.3} s apart, at most {:.3} s are allowed: the slosh must be seen between them. \
-             Leave its column out, or log it faster",
+            "{name}: values of {signal} are {apart:.3} s apart, at most {:.3} s are allowed: the values must show the slosh. Leave the column of {signal} out, or record {signal} at a higher rate",
             coarsest
         );
     }
@@ -502,7 +503,7 @@ mod tests {
                 "the hub does not turn: omega is noise of 6",
             ),
             (|r| r.time[7] = r.time[6], "row 8: time must grow"),
-            (|r| r.time.iter_mut().for_each(|t| *t *= 1e-9), "Time must be in seconds"),
+            (|r| r.time.iter_mut().for_each(|t| *t *= 1e-9), "give the time in seconds"),
         ];
         for (change, word) in faults {
             let error = refusal(change);

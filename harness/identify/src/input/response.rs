@@ -26,7 +26,7 @@ pub fn response(recording: &Recording) -> Result<FrequencyResponse> {
     let band = excited_band(step, &torque, &rate).context("the torque has no spectrum")?;
     ensure!(
         band.1 > 1.15 * band.0,
-        "{}: the torque excites {:.2} to {:.2} Hz alone. A frequency response needs a sweep, a multisine \
+        "{}: the torque excites only {:.2} to {:.2} Hz. A frequency response needs a sweep, a multisine \
          or noise around the slosh frequency",
         recording.name,
         band.0,

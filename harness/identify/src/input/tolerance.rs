@@ -77,15 +77,16 @@ impl Tolerances {
             let (name, value) = item
                 .split_once('=')
                 .with_context(|| format!("{item}: must be NAME=NUMBER or NAME=NUMBER%"))?;
-            let number = part(name, value)?
-                .with_context(|| format!("{name}: {value} is not a number; 1% or 0.01 is one"))?;
+            let number = part(name, value)?.with_context(|| {
+                format!("{name}: {value} is not a number (allowed: for example 1% or 0.01)")
+            })?;
             match name.trim() {
                 "torque" => self.torque = number,
                 "clock" => self.clock = number,
                 G_AXIAL => self.gravity = number,
                 tank::R => self.arm = number,
                 fluid::RHO => self.density = number,
-                other => bail!("{other} has no tolerance: there are {}", NAMES.join(", ")),
+                other => bail!("{other} has no tolerance (allowed: {})", NAMES.join(", ")),
             }
         }
         Ok(self)

@@ -438,7 +438,7 @@ impl Setup {
                 let measured = record.outputs.get(number).is_some_and(|y| !y[row].is_nan());
                 ensure!(
                     there || !measured,
-                    "sensor {}: it has a reading at {} s, but no row is {delay} s earlier",
+                    "sensor {}: its reading at {} s is delayed by {delay} s, but the recording begins later than the measured time",
                     sensor.name,
                     record.time[row]
                 );

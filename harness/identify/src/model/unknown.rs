@@ -153,7 +153,11 @@ impl Question {
             Some(of) => {
                 let (mut unknown, target) = self.scale(of, recording)?;
                 let (low, high) = free.bounds.unwrap_or(unknown.bounds);
-                ensure!(low > -1.0, "{} is free from {low} (allowed: above -1)", free.name);
+                ensure!(
+                    low > -1.0,
+                    "the lower bound of {} is {low} (allowed: above -1)",
+                    free.name
+                );
                 if (high - low).is_finite() {
                     unknown.reach = 0.25 * (high - low);
                 }
@@ -185,7 +189,10 @@ impl Question {
             (None, None) => {
                 let names = self.inputs.iter().chain(&self.outputs).map(String::as_str);
                 let names: Vec<&str> = names.chain([CLOCK]).collect();
-                bail!("scale({of}): {of} has no scale (allowed: {})", names.join(", "))
+                bail!(
+                    "scale({of}): the scale of {of} cannot be estimated (allowed: {})",
+                    names.join(", ")
+                )
             }
         };
         let name = format!("scale({of})");
@@ -202,7 +209,7 @@ impl Question {
         let flag = format!("--tolerance {}", tolerance.name);
         if let Some(of) = scaled(&tolerance.name) {
             let Size::Part(part) = tolerance.size else {
-                bail!("{flag}: a scale has a relative tolerance, such as 1%")
+                bail!("{flag}: the tolerance of a scale must be relative, such as 1%")
             };
             let unknown = self.scale(of, None).with_context(|| flag.clone())?;
             return known(unknown, 0.0, part).with_context(|| flag);
@@ -313,7 +320,7 @@ fn parameter(
     let (low, high) = free.bounds.unwrap_or(own);
     ensure!(
         own.0 <= low && high <= own.1,
-        "{} is free from {low} to {high} (allowed by the FMU: {} to {})",
+        "the bounds of {} are {low} to {high} (allowed by the FMU: {} to {})",
         free.name,
         own.0,
         own.1
