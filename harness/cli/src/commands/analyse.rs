@@ -27,8 +27,8 @@ pub struct AnalyseArgs {
     /// Recordings: text in columns or Parquet; also .mat, HDF5, TDMS, MDF4 and .xlsx if the Python package is installed.
     #[arg(value_name = "RECORDING", required_unless_present_any = ["plan", "bench_day"])]
     recordings: Vec<PathBuf>,
-    /// Columns of the recordings for the signals, with units. A signal that is not named here is read from the column
-    /// with its own name.
+    /// Column of the recordings that contains each signal, with its unit, such as omega=gyro_z:deg/s. A signal that is
+    /// not named here is read from the column that has the name of the signal.
     #[arg(long, value_name = "SIGNAL=COLUMN[:UNIT],…", default_value_t, hide_default_value = true)]
     columns: Columns,
     /// Torque profile that was commanded. The amplitude is read from the recording.

@@ -23,8 +23,8 @@ use crate::terminal;
 #[command(next_help_heading = "Options for any FMU")]
 pub struct AnyFmuArgs {
     /// Unknowns: Real parameters and start values of the FMU, each with a start and optionally bounds [default bounds:
-    /// min and max of the FMU]. NAME@each has its own value in each recording. scale(NAME) is the relative error of the
-    /// scale of an input or output; 0 is exact.
+    /// min and max of the FMU]. NAME@each is estimated separately for each recording. scale(NAME) is the relative error
+    /// of the scale of an input or output; an error of 0 means an exact scale.
     #[arg(long, value_name = "NAME=START[:LOW:HIGH],…")]
     pub free: Vec<String>,
     /// Prior knowledge of an unknown: its mean and standard deviation.
@@ -35,24 +35,27 @@ pub struct AnyFmuArgs {
     /// absolute (5mm, or ±0.1 in the unit of the variable); 0 means exact.
     #[arg(long = "tolerance", value_name = "NAME=SIZE,…")]
     pub tolerances: Vec<String>,
-    /// Inputs of the FMU that the recordings drive, interpolated linearly; NAME:held is held from row to row.
+    /// Inputs of the FMU that the recordings drive. They are interpolated linearly between the rows; with NAME:held
+    /// each value is held until the next row.
     #[arg(long, value_name = "NAME[:held],…", requires = "free")]
     inputs: Vec<String>,
     /// Outputs of the FMU that were recorded.
     #[arg(long, value_name = "NAME,…", requires = "free")]
     outputs: Vec<String>,
-    /// Recorded output that is not a variable of the FMU, as a sensor of `hubslosh run --sensor`. Its scale, bias and
-    /// delay are known; its noise is estimated. The flag may be repeated.
+    /// Recorded output that is the reading of a sensor and not a variable of the FMU, such as a wave gauge, described
+    /// as for `hubslosh run --sensor`. Scale, bias and delay of the sensor are known; its noise is estimated. The flag
+    /// may be repeated.
     #[arg(long = "sensor", value_name = "NAME=KIND:key=value,…", requires = "free")]
     sensors: Vec<Sensor>,
-    /// Outputs whose sensor has a bias, which differs from recording to recording; STD is its prior standard deviation.
+    /// Outputs whose sensor has an unknown constant bias, which is estimated for each recording; STD is the prior
+    /// standard deviation of the bias.
     #[arg(long, value_name = "OUTPUT[=STD],…")]
     bias: Vec<String>,
     /// Three outputs of one instrument with three axes, whose scales and misalignments (rad) are estimated; SCALE and
     /// ANGLE are their prior standard deviations.
     #[arg(long, value_name = "A,B,C=SCALE:ANGLE", requires = "free")]
     triad: Vec<String>,
-    /// Models the noise of every output as white noise plus a Gauss–Markov bias, because it drifts.
+    /// Models the noise of every output as white noise plus a slowly drifting bias (Gauss–Markov process).
     #[arg(long)]
     drift: bool,
     /// Solver that steps the FMU, with its relative tolerance: own (Co-Simulation, such as own:1e-6) or host (Model

@@ -20,7 +20,7 @@ pub struct BookArgs {
     /// Directory for the book; no browser is opened [default: dist/book].
     #[arg(long, value_name = "DIRECTORY")]
     out: Option<PathBuf>,
-    /// Prints the path of the first page, and opens no browser.
+    /// Builds the documentation and prints the path of its first page, without opening a browser.
     #[arg(long)]
     no_open: bool,
 }

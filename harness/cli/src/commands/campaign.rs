@@ -36,7 +36,7 @@ pub struct CampaignArgs {
     /// Slosh models of the sweeps.
     #[arg(long, value_name = "NAME,…", value_delimiter = ',', default_values = plan::MODELS)]
     model: Vec<String>,
-    /// Fills of the sweeps, m.
+    /// Heights of the liquid in the tank for which the sweeps are simulated, m.
     #[arg(long, value_name = "M,…", value_delimiter = ',', default_values_t = plan::FILLS)]
     fills: Vec<f64>,
     /// Torque amplitudes of the sweeps, N·m.

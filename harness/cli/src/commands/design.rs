@@ -38,8 +38,8 @@ pub struct DesignArgs {
     /// peak, N·m.
     #[arg(long, value_name = "PEAK", conflicts_with = "free")]
     multisine: Option<f64>,
-    /// Signal-to-noise ratio of the gyro's samples, dB, for which the command prints the required torque amplitude of a
-    /// sine: over the band, at resonance and antiresonance, and for a rigid hub (thesis 8.6.1).
+    /// Prints the torque amplitude that a sine needs to reach this signal-to-noise ratio of the gyro's samples, dB:
+    /// over the band, at resonance and antiresonance, and for a rigid hub (thesis 8.6.1).
     #[arg(long, value_name = "DB", conflicts_with_all = ["profile", "multisine", "out"])]
     snr: Option<f64>,
     /// Period of the multisine, s.
@@ -48,7 +48,7 @@ pub struct DesignArgs {
     /// Length of the multisine, s. The length of a profile is its `duration=…`.
     #[arg(long, value_name = "SECONDS", default_value_t = 600.0, conflicts_with = "profile")]
     duration: f64,
-    /// Band of the multisine, or of --snr, Hz.
+    /// Lowest and highest frequency of the multisine, or of the sine for --snr, Hz.
     #[arg(long, value_name = "HZ,HZ", value_delimiter = ',', default_value = "1.25,3.5")]
     band: Vec<f64>,
     /// Distributes the power of the multisine over its lines so that it determines the parameters of the expected bench
@@ -60,13 +60,14 @@ pub struct DesignArgs {
     /// the wave is 0.15 tank radii high.
     #[arg(long, value_name = "RAD")]
     slosh_angle: Option<f64>,
-    /// Seed of the random phases and detection lines.
+    /// Seed of the random phases, and of the choice of the lines that stay empty.
     #[arg(long, value_name = "NUMBER", default_value_t = 1)]
     seed: u64,
     /// Sets a parameter to its expected value for the bench.
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
     settings: Vec<(String, String)>,
-    /// Also predicts delay, gyro bias and friction asymmetry, because the fit of the recording will estimate them.
+    /// Also treats delay, gyro bias and friction asymmetry as unknown, because the fit of the recording will estimate
+    /// them, too.
     #[arg(long, alias = "flaws", conflicts_with = "free")]
     sensor_errors: bool,
     /// FMU: a file, or the name of an FMU of this project (`hubslosh fmus` lists them).
@@ -84,7 +85,7 @@ pub struct DesignArgs {
     /// Standard deviation of the noise in one row of each output; only with --free.
     #[arg(long, value_name = "OUTPUT=STD,…", requires = "free")]
     noise: Vec<String>,
-    /// Columns of the tables for the inputs, with units; only with --free.
+    /// Column of the tables that contains each input, with its unit; only with --free.
     #[arg(
         long,
         value_name = "INPUT=COLUMN[:UNIT],…",

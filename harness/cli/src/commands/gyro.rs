@@ -29,7 +29,8 @@ pub struct GyroArgs {
     /// Recording of a gyro at rest: text in columns, Parquet or another kind of recording.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["hours", "records", "settings", "fmu"])]
     recording: Option<PathBuf>,
-    /// Columns of the recording for the signals time and omega, with units.
+    /// Columns of the recording that contain the signals time and omega, with units, such as
+    /// time=t:ms,omega=gyro_z:deg/s.
     #[arg(
         long,
         value_name = "SIGNAL=COLUMN[:UNIT],…",
@@ -59,7 +60,7 @@ pub struct GyroArgs {
     /// FMU: a file, or the name of an FMU of this project (`hubslosh fmus` lists them).
     #[arg(long, value_name = "FILE|NAME", default_value = DEFAULT_FMU)]
     pub fmu: PathBuf,
-    /// Prints the estimated noise of the simulated gyro as JSON.
+    /// Prints the noise that was estimated from the simulated gyro as JSON.
     #[arg(long, conflicts_with = "recording")]
     json: bool,
     /// Directory for the tables and pictures.

@@ -81,10 +81,11 @@ struct DataArgs {
     /// Recordings: text in columns or Parquet; also .mat, HDF5, TDMS, MDF4 and .xlsx if the Python package is installed.
     #[arg(value_name = "DATA", required = true)]
     data: Vec<PathBuf>,
-    /// Columns of the recordings for the signals, with units, such as time=t:ms,omega=gyro_z:deg/s. Signals of bench and
-    /// friction: time, tau_cmd, omega, theta, g_axial, wheel_speed, omega_x, omega_y; of decay: time, wave_height, force,
-    /// theta, omega; of fmu: time, and inputs and outputs of the FMU. A signal that is not named here is read from the
-    /// column with its own name. rate=HZ is the sampling rate of a recording without times.
+    /// Column of the recordings that contains each signal, with its unit. For example, time=t:ms,omega=gyro_z:deg/s
+    /// reads the time from the column t in ms, and the rate from the column gyro_z in deg/s. Signals of bench and
+    /// friction: time, tau_cmd, omega, theta, g_axial, wheel_speed, omega_x, omega_y; of decay: time, wave_height,
+    /// force, theta, omega; of fmu: time, and inputs and outputs of the FMU. A signal that is not named here is read
+    /// from the column that has the name of the signal. rate=HZ is the sampling rate of a recording without times.
     #[arg(
         long,
         value_name = "SIGNAL=COLUMN[:UNIT],…",
@@ -110,18 +111,18 @@ struct KnownArgs {
     /// torque=1%,clock=0.01%,g_axial=0.1%,tank.r=0.4%,fluid.rho=0.3%,gyro_scale=1%]. 0 means exact.
     #[arg(long = "tolerance", value_name = "NAME=SIZE,…")]
     tolerances: Vec<String>,
-    /// Value from which the search starts, instead of one estimated from the data. STD is the standard deviation of prior
-    /// knowledge about this value.
+    /// Start value of the search for this parameter, instead of the value estimated from the data. STD is the standard
+    /// deviation of prior knowledge about the value.
     #[arg(long = "start", value_name = "NAME=VALUE[:STD]", value_parser = started)]
     starts: Vec<(String, f64, Option<f64>)>,
     /// Intersample behaviour of the torque: linear (first-order hold), held (zero-order hold, as of a sampled controller)
     /// or smooth (band-limited, as of a sampled recording of a smooth torque) [default: the one that fits best].
     #[arg(long, value_name = "HOW", value_parser = ["linear", "held", "smooth"])]
     torque: Option<String>,
-    /// Uses only the rows between two times, s.
+    /// Uses only the rows from the first to the second of these times, s.
     #[arg(long, value_name = "S,S", value_delimiter = ',', allow_hyphen_values = true)]
     trim: Vec<f64>,
-    /// Recording for validation: it is simulated with the result and not fitted.
+    /// Recording for validation: the fitted model simulates it, but it is not used for the fit.
     #[arg(long, value_name = "DATA")]
     validate: Vec<PathBuf>,
     /// FMU: a file, or the name of an FMU of this project (`hubslosh fmus` lists them).
@@ -154,11 +155,11 @@ pub struct BenchArgs {
         value_parser = ["none", "viscous", "stribeck_smooth", "stribeck", "lugre"]
     )]
     friction: Vec<String>,
-    /// Also estimates: actuator_lag and gyro_lag, time constants of the actuator and of a filter in the gyro;
-    /// friction_drift, the relative change of the friction over a recording; breaking, the damping by breaking waves,
-    /// slosh.zeta_breaking and slosh.breaking_steepness. early_rate accepts a negative delay, because the time stamps of
-    /// the rate may be early. none switches off the estimates of delay, gyro bias and friction asymmetry, which
-    /// are made by default.
+    /// Estimates further effects: actuator_lag, the time constant of the actuator; gyro_lag, the time constant of a
+    /// filter in the gyro; friction_drift, the relative change of the friction over a recording; breaking, the damping
+    /// by breaking waves (slosh.zeta_breaking and slosh.breaking_steepness). With early_rate the delay of the rate may
+    /// be negative, because its time stamps may be too early. With none the delay, the gyro bias and the friction
+    /// asymmetry, which are estimated by default, are not estimated.
     #[arg(
         long,
         value_name = "NAME,…",
@@ -183,10 +184,10 @@ pub struct FrictionArgs {
 pub struct DecayArgs {
     #[command(flatten)]
     data: DataArgs,
-    /// Relative standard deviation of the clock's rate, included in the intervals.
+    /// Relative standard deviation of the rate of the recorder's clock, which widens the intervals.
     #[arg(long = "tolerance", value_name = "clock=SIZE")]
     tolerances: Vec<String>,
-    /// Uses only the rows between two times, s.
+    /// Uses only the rows from the first to the second of these times, s.
     #[arg(long, value_name = "S,S", value_delimiter = ',', allow_hyphen_values = true)]
     trim: Vec<f64>,
 }

@@ -52,8 +52,8 @@ pub struct PackArgs {
     /// modes, HubSlosh has 10; the binary is the same for any number.
     #[arg(long, value_name = "NUMBER", conflicts_with_all = ["python", "sdist", "arrays"])]
     modes: Option<usize>,
-    /// Number of modes of flexible appendages whose variables the model description contains, with --tanks or --modes.
-    /// Spacecraft has 6 of them [default: 0].
+    /// Number of modes of flexible appendages whose variables the model description contains. This option needs --tanks
+    /// or --modes. Spacecraft has 6 such modes [default: 0].
     #[arg(long, value_name = "NUMBER", conflicts_with_all = ["python", "sdist", "arrays"])]
     appendages: Option<usize>,
     /// File of parameters (.toml, .ssv, .json) that become the start values of the FMU, so that a host does not have to set

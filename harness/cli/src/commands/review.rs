@@ -8,7 +8,8 @@ use anyhow::{Context, Result, bail, ensure};
 
 /// Reviews the attitude controller of a craft over its fills and writes one page: margins, slosh modes, worst case.
 ///
-/// Several projects, or one with several cases, are compared on one page. The exit code is 1 if a requirement fails. It needs a Python with the packages hubslosh and matplotlib.
+/// Several projects, or one with several cases, are compared on one page. The exit code is 1 if a requirement fails.
+/// The command needs a Python with the packages hubslosh and matplotlib.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  hubslosh review project.toml\n  \
                   hubslosh review first.toml second.toml --out comparison.html\n  \

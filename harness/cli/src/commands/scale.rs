@@ -15,7 +15,7 @@ use crate::terminal;
     hubslosh scale rotation --alpha 2.21 --flight-alpha 0.005\n  \
     hubslosh scale froude --lambda 25 --density-ratio 1.14")]
 pub struct ScaleArgs {
-    /// Prints the numbers as JSON, SI units.
+    /// Prints the results as JSON, in SI units.
     #[arg(long, global = true, display_order = 900)]
     json: bool,
     #[command(subcommand)]
@@ -86,7 +86,7 @@ enum Scale {
     /// Computes the factors from quantities of a model to quantities of the full size, by equal Froude numbers.
     #[command(after_help = "Example:\n  hubslosh scale froude --lambda 25 --density-ratio 1.14")]
     Froude {
-        /// Length of the full size divided by the length of the model.
+        /// Scale factor: a length at full size divided by the same length of the model.
         #[arg(long)]
         lambda: f64,
         /// Density of the liquid at full size divided by the density of the liquid of the model.
