@@ -1,5 +1,5 @@
-//! Flexible appendages, such as solar arrays and booms, by their modes with the interface held (Craig and Bampton's fixed-interface
-//! modes, hybrid coordinates).
+//! Flexible appendages, such as solar arrays and booms. They are described by the modes that they have while the interface to
+//! the craft is fixed (Craig and Bampton's fixed-interface modes, hybrid coordinates).
 //!
 //! ```text
 //! eta       modal displacement, kg^1/2 m, of a mode with unit modal mass
@@ -10,7 +10,8 @@
 //! y, K, L   sum of p eta, of p eta', of l eta'
 //! ```
 //!
-//! Mass and inertia of the undeformed appendage belong to the dry craft. The craft's Lagrangian gains, with V_P = V + w x P,
+//! Mass and inertia of the undeformed appendage belong to the dry craft. The deflections add these terms to the Lagrangian of the
+//! craft, where V_P = V + w x P is the velocity of the interface point:
 //!
 //! ```text
 //! sum of V_P.(p eta' + w x p eta) + w.r eta' + eta'^2/2 - omega^2 eta^2/2
@@ -20,7 +21,7 @@
 //! linear in eta, except w.(dI w)/2, where dI is the change of the inertia about P. Terms of the second order, such as the
 //! centrifugal softening of the mode itself, are left out as well. The terms that are left out change eta by the order
 //! (w/omega)^2. The Lagrangian does not change if the craft is moved, turned, or given a constant velocity, so momentum and
-//! angular momentum balance exactly at every amplitude, and energy balances with the loss c eta'^2. Lagrange's equations are
+//! angular momentum balance exactly at every amplitude, and energy balances with the dissipated power c eta'^2. Lagrange's equations are
 //!
 //! ```text
 //! eta'' + c eta' + omega^2 eta = -p.a_P - r.w',   a_P = a + w' x P + w x (w x P),   c = 2 zeta omega
@@ -28,8 +29,9 @@
 //! torque about O        -(sum of l eta'') - w x L - (sum of D eta') w - D w' - w x (D w) - y x a,   D now the sum of D eta
 //! ```
 //!
-//! p.(w x (w x P)) = -w.(D w)/2. The deformed appendage thus adds a body without mass with the first moment y and the inertia
-//! sum of D eta about O, and each mode takes u u^T, u = [p; l], from the mass matrix. Since y, K, L and D are linear in eta, only their sums
+//! The centrifugal term p.(w x (w x P)) equals -w.(D w)/2. Therefore the deformed appendage acts like an additional body without
+//! mass, which has the first moment y and, about O, the inertia sum of D eta. In addition each mode subtracts u u^T, with
+//! u = [p; l], from the mass matrix. Since y, K, L and D are linear in eta, only their sums
 //! are multiplied with the craft's motion, whatever the number of modes.
 //!
 //! Source: Likins, Dynamics and control of flexible space vehicles, JPL TR 32-1329 (1970), and Lagrange's equations.

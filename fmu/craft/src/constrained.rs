@@ -1,28 +1,28 @@
-//! A bob that does not move as a pendulum does, because it is on another surface than a sphere (`surface.rs`) or guided in a
-//! plane (`contents.rs`). Its motion is expanded in power series. The tank keeps its liquid.
+//! Power series of a bob that does not move as a pendulum: either it lies on another surface than a sphere (`surface.rs`), or
+//! the tank guides it in a plane (`contents.rs`). The tank does not drain. The quantities of one bob are:
 //!
 //! ```text
 //! r   position of the bob from its hinge P over l, tank axes, e = e_z: rho = P + l r,  r = p + (kappa - 1) u^2/8 e
-//! q   p_perp = (r_x, r_y, 0),   u = q.q,   eta = p.e = r_z - (kappa - 1) u^2/8
+//! q   displacement across the tank's axis over l, p_perp = (r_x, r_y, 0),   u = q.q,   eta = p.e = r_z - (kappa - 1) u^2/8
 //! n   normal of the surface, p - beta eta q,   beta = (kappa - 1) u/2
-//! d   q - (n.q/n.n) n, along the meridian
-//! V = r' + w x r
+//! d   direction of the meridian on the surface, q - (n.q/n.n) n
+//! V = r' + w x r                   velocity relative to the hinge over l
 //! B = a + w' x P + w x (w x P)     specific force at the hinge
-//! V' = -w x V - B/l - f
-//! f  = T n + S q + N b + (c/m) r' + (k/m) q        the craft takes m l f at rho
-//! S  = (s - 1) sigma',   sigma = q.r'
+//! V' = -w x V - B/l - f            Newton's law
+//! f  = T n + S q + N b + (c/m) r' + (k/m) q        force on the craft at rho over m l
+//! S  = (s - 1) sigma',   sigma = q.r'              force from the kinetic energy within the liquid, rate along the meridian
 //! ```
 //!
-//! The force T n holds the bob on its surface, and N b holds it in the plane across b. The force S q represents the kinetic
-//! energy within the liquid: both do the same work in every motion on the surface. The multipliers of order n follow from the
+//! The force T n holds the bob on its surface, and N b holds it in the plane perpendicular to b. The force S q does the same work
+//! in every motion on the surface as the kinetic energy within the liquid requires. The multipliers of order n follow from the
 //! coefficients n + 1 of n.r' = 0, b.r' = 0 and sigma. All other terms are products, so every order solves the same equations:
 //!
 //! ```text
 //! f = H Y + known terms,   r'' = Y - T n - S q - N b,   H = n n^T/n.n + (s - 1) (n.n/I) d d^T + b b^T
 //! ```
 //!
-//! I is the inertia along the meridian relative to a pendulum's. H is N of `surface.rs`, so the craft's mass matrix
-//! contains m J^T H J.
+//! I is the inertia along the meridian relative to the inertia of a pendulum. H is the matrix N of `surface.rs`, so that the
+//! craft's mass matrix contains m J^T H J.
 //!
 //! **Coefficients beyond the third order** (`surface.rs`, with S, T, tau and beta from there) add to f, with P = T tau, m = e x q,
 //! w_e = w.e, and to the craft's torque

@@ -1,18 +1,19 @@
-//! Contents of a tank that may drain: masses, lengths and heights are functions of the remaining
-//! liquid.
+//! Contents of a tank that may drain: slosh masses, pendulum lengths and heights are functions of the mass m_liq of the
+//! remaining liquid. The outflow f, kg/s, changes it by m_liq' = -f, and the fixed mass is m_0 = m_liq - sum of m_n. A bob is at
+//! rho from O, and its hinge at P; the height h, the length l and the mass m change with m_liq. Newton's law for the liquid that
+//! stays in the bob determines the tension T of the rod and the motion of its direction p:
 //!
 //! ```text
-//! f  outflow, kg/s: m_liq' = -f;  m_0 = m_liq - sum of m_n   every quantity of the tank's table by m_liq
-//! rho = P + l p,  P = d + h e                                a bob from O; h, l, m change
-//! m [a + w' x rho + w x (w x rho) + 2 w x rho' + rho''] = -T p - phi       Newton for what stays in the bob
+//! rho = P + l p,  P = d + h e
+//! m [a + w' x rho + w x (w x rho) + 2 w x rho' + rho''] = -T p - phi
 //! T = T_0 - m u.[a; w'],   u = [p; P x p]
 //! T_0 = m (l |p'|^2 - p.(w x (w x rho) + 2 w x rho' + P'') - l'') - k l |p_perp|^2
 //! p'' = -(1 - p p^T) G/l - |p'|^2 p
 //! G = a + w' x rho + w x (w x rho) + 2 w x rho' + P'' + 2 l' p' + (c l/m) p' + (k l/m) p_perp
 //! ```
 //!
-//! The bob of a planar mode swings in the plane through P perpendicular to b, a unit vector fixed in the tank. The tank
-//! guides it:
+//! The bob of a planar mode swings in the plane through P perpendicular to b, a unit vector fixed in the tank. The tank guides the
+//! bob by the force -N b:
 //!
 //! ```text
 //! -N b to the right-hand side of Newton's law,   N = -m b.G = N_0 - m u.[a; w'],  u = [b; rho x b]
@@ -33,8 +34,8 @@
 //! L = d x j e + sum of (d + b_n e) x (m_n' l p_perp)
 //! ```
 //!
-//! Bobs and rigid liquid load the craft beyond their forces at constant mass, so that the momentum of the system
-//! including the leaving flow is conserved exactly:
+//! In addition to their forces at constant mass, bobs and rigid liquid exert this force and torque on the craft, so that the
+//! momentum of craft, liquid and outflow together is conserved exactly:
 //!
 //! ```text
 //! force  = -2 w x K - K' - sum of m_n' rho_n'

@@ -1,5 +1,6 @@
-//! Finite amplitude: a bob on a surface of revolution about the tank's axis, with two coefficients of the third order and
-//! four of the order beyond.
+//! Slosh of finite amplitude: a bob on a surface of revolution about the tank's axis. Two coefficients, s and kappa, describe waves
+//! to third order, and four further coefficients the next order. The Lagrangian of the bob in a tank at rest, and the
+//! frequencies that follow from it at the amplitude A, are:
 //!
 //! ```text
 //! L = m |q'|^2/2 + m s (q.q')^2/(2 l^2) - m w^2 (|q|^2/2 + kappa |q|^4/(8 l^2)),   q = l p_perp,  A = |q|/l
@@ -7,7 +8,7 @@
 //! circular motion  frequency^2 = w^2 [1 + kappa A^2/2]
 //! ```
 //!
-//! A pendulum has s = kappa = 1: the sphere rho = P + l p rises by l (A^2/2 + A^4/8), and its rise contributes
+//! A pendulum has s = kappa = 1, because its bob lies on a sphere: the sphere rho = P + l p rises by l (A^2/2 + A^4/8), and its rise contributes
 //! (q.q')^2/l^2 to the squared speed. The states p and p' keep their meaning, so that p_perp is the displacement over l.
 //! Other coefficients lift the bob along the axis and add kinetic energy within the liquid, without momentum:
 //!
@@ -16,8 +17,8 @@
 //! E_i = m (s - 1) l^2 sigma^2/2,   sigma = p_perp.p' = u'/2
 //! ```
 //!
-//! The specific force, and not a potential, acts on the bob. Its place gives momentum, moments and weight for any motion
-//! of the tank. With dp perpendicular to p (in a planar mode also to b) the bob moves by
+//! The specific force, and not a potential, acts on the bob. The position of the bob determines momentum, moments and weight for
+//! any motion of the tank. If p changes by dp, which is perpendicular to p (and in a planar mode to b), the bob moves by
 //!
 //! ```text
 //! drho = l D dp,   D = 1 + beta e p_perp^T,   beta = (kappa - 1) u/2
@@ -41,15 +42,15 @@
 //! force on the craft at rho   F = phi - m (G + l D y) = phi - m (N G - D M^-1 Pi i),   N = 1 - D M^-1 Pi D^T
 //! ```
 //!
-//! N takes the place of p p^T in the craft's mass matrix. It is at most 1, and for s < 1 it is not positive: a bob then lends
-//! inertia to a craft that must have it. 1 + gamma u is the bob's inertia along the meridian relative to a pendulum's. A negative
+//! In the craft's mass matrix N replaces the projection p p^T of a pendulum. The eigenvalues of N are at most 1. For s < 1 one of
+//! them is negative: the bob then reduces the inertia of the craft, which must be large enough. 1 + gamma u is the bob's inertia along the meridian relative to a pendulum's. A negative
 //! s, as in shallow tanks, bounds the angle up to which this inertia is positive. The model ends at [`LEAST_INERTIA`].
 //!
 //! Drag and centring are phi = c l D p' + k l p_perp, with the power c l^2 |D p'|^2. While the tank drains, the mass that leaves
 //! takes its share of E_i with it. The coefficients s and kappa of the fill table then depend on time, so that the height z gains
 //! the rate kappa' l u^2/8.
 //!
-//! **Beyond the third order** ([`Higher`]) a tank that keeps its liquid may have
+//! **Beyond the third order** ([`Higher`]) a tank that does not drain may have the height z and the energy E_i
 //!
 //! ```text
 //! z   = l [(kappa - 1) u^2/8 + kappa_2 u^3/16],   beta = (kappa - 1) u/2 + 3 kappa_2 u^2/8
@@ -85,7 +86,8 @@
 //! W^2), seen from the tank, against the spin and with it. A pendulum, which does not take part in the spin, has C = 1 and
 //! epsilon = 0. The FMUs' parameters are C (`gyroscopic`) and epsilon + 1 - 2 C (`gyroscopic_stiffness`).
 //!
-//! Source: the coefficients are those of `formulas::third_order` and `formulas::energy_terms`. The equations are Lagrange's for these energies.
+//! Source: the coefficients come from `formulas::third_order` and `formulas::energy_terms`; the equations are Lagrange's equations
+//! for these energies.
 //! tests/craft/surface.rs checks them against Newton's law in Cartesian coordinates with the surface as a constraint, and
 //! those of a draining tank against differences of the Lagrangian.
 
