@@ -135,7 +135,7 @@ fn no_warning_names_a_parameter_of_sloshtank_that_changes_an_output() {
     check::<SloshTank::Model>(&[]);
 }
 
-/// Tests some parameters that others override, each with the reason in its warning.
+/// For some parameters that have no effect because another parameter replaces them, the warning must name the reason.
 #[test]
 fn a_warning_names_parameters_that_others_replace() {
     fn said<M: Model>(values: Values) -> Vec<String> {

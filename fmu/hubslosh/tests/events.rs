@@ -224,7 +224,8 @@ fn a_host_that_ignores_event_information_gets_the_same_motion() {
     }
 }
 
-/// Without gyro and wheel every early return is a change of contact, at the time that FMI 2.0 reports for it.
+/// Without gyro and wheel the hub's stick and slip are the only events, so that FMI 3.0 returns early at exactly the
+/// event times that FMI 2.0 reports.
 #[test]
 fn steps_stop_at_the_event_time_of_fmi_2_to_the_last_bit() {
     let values = &LIVELY[..5];

@@ -267,7 +267,7 @@ mod tests {
         Extent::from_token::<Trays>(&token, whole)
     }
 
-    /// Three trays at most: levels are states, one each; the table's start value of the number is 2.
+    /// The test model has at most three trays, each with its level as a state; by default it has two.
     #[test]
     fn a_token_contains_the_number_of_states() {
         assert_eq!(extent_with("000000000").unwrap().places(), [0_usize; 0]);

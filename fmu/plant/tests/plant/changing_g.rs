@@ -127,8 +127,8 @@ fn motion_under_ramps_does_not_depend_on_the_communication_step() {
     }
 }
 
-/// Runge-Kutta 4 with 20 µs steps on the linear pendulum, hub held by its inertia, c written
-/// out: another way to the same motion.
+/// The reference integrates the linear pendulum by classical Runge-Kutta in steps of 20 µs, with the damping formula
+/// written out; the hub is too heavy to move.
 #[test]
 fn damping_follows_its_formula_while_g_ramps_through_zero() {
     let mut p = bench(SloshModel::Linear, FrictionModel::None);

@@ -99,7 +99,7 @@ fn after_an_error_in_initialization_by_a_wrong_parameter_outputs_have_no_value()
     assert!(host.get(&GET_FLOAT64, number("level[1]")).is_err());
 }
 
-/// The platform rises by w = 0.25 m/s from 0 at t = 1, and opens the valve.
+/// In the test model a platform rises by w = 0.25 m/s from 0 at t = 1 s and opens a valve, which is the event.
 #[test]
 fn a_step_stops_at_an_event_if_the_host_allows_it_and_inputs_with_it() {
     let real = |host: &mut Host, name: &str| match host.get(&GET_FLOAT64, number(name)) {

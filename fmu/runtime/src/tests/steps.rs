@@ -80,7 +80,7 @@ fn communication_point_may_be_off_by_rounding_errors() {
     }
 }
 
-/// The same slack holds for the stop time.
+/// The stop time may also be passed by 1e-9 of the larger of step and time since the start, plus 8 roundings.
 #[test]
 fn the_last_step_may_pass_the_stop_time_by_rounding_errors() {
     for (start, stop, slack) in [

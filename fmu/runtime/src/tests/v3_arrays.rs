@@ -138,7 +138,7 @@ fn changing_the_size_of_an_array_resets_its_elements() {
     assert_eq!(*lines.lock().unwrap(), [told]);
 }
 
-/// Scalars 1 to 24 (k), time and two indicators can be read one by one as Float64.
+/// The 24 scalars of the table, which end with k, the time and two event indicators can each be read as Float64.
 #[test]
 fn time_and_event_indicators_follow_the_scalars_of_the_table() {
     let lines = Lines::default();

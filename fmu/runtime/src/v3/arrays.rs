@@ -188,7 +188,8 @@ mod tests {
         all
     }
 
-    /// Variables from 1: level, square, der(level), q, rows, w, m, k, time, indicators. By rows, of 3 trays; time is scalar 25.
+    /// The variables of the test model are numbered from 1: level, square, der(level), q, rows, w, m, k, time,
+    /// indicators. With 3 trays the time is scalar number 25.
     #[test]
     fn an_array_has_the_number_of_elements_that_its_size_parameter_gives() {
         let scalars_of_rows = |rows: i32| {

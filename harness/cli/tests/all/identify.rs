@@ -88,7 +88,7 @@ fn identify_handles_one_unknown_unknowns_at_bounds_and_no_input() {
     assert!(bounds[0]["std"].is_null() && bounds[0]["not_determined"] == true, "{json}");
 }
 
-/// The names of written files used to follow it.
+/// The names of written files used to follow the JSON, so that programs could not parse the output.
 #[test]
 fn printed_json_is_the_only_content_of_stdout() {
     let folder = tempfile::tempdir().unwrap();

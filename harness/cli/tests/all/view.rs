@@ -246,7 +246,7 @@ fn default_columns_of_a_draining_tank_are_enough_for_its_page() {
     assert!(liquid[0] - liquid[liquid.len() - 1] > 0.1);
 }
 
-/// After `<!--<script`, HTML does not take `</script>` for the end of the element.
+/// In HTML, `</script>` after `<!--<script` does not end a script element, so that the rest of the page would be lost.
 #[test]
 fn a_unit_that_is_markup_leaves_the_page_whole() {
     const UNIT: &str = "<!--<script></script>&\u{2028}";

@@ -44,8 +44,9 @@ fn beyond(fmu: &Fmu, case: &Case) -> Vec<String> {
 /// replaces them.
 const MODELS: &str = r#"["linear", "planar", "spherical", "liquid"]"#;
 
-/// At least one run of a plan that says so leaves the range, and no run of the other plans does. The search
-/// for the onset of rotary slosh is made with the linear liquid only, which leaves the range.
+/// If a built-in plan says that it leaves the range of its model, at least one of its runs leaves the range; no run of
+/// the other plans does. The search for the onset of rotary slosh is made with the linear liquid only, which leaves the
+/// range.
 #[test]
 fn built_in_plans_stay_in_their_models_range_or_say_that_they_leave_it() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();

@@ -62,7 +62,8 @@ pub fn of_gyro(lag: f64, time: &[f64], lines: &[f64]) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    /// A sine under a lag: amplitude 1/√(1 + (ΩT)²), phase −atan ΩT.
+    /// A lag of the time constant T changes a sine of the frequency Ω by the amplitude factor 1/√(1 + (ΩT)²) and the
+    /// phase −atan ΩT.
     #[test]
     fn lags_of_a_sine_equal_those_of_its_frequency_response() {
         let (w, lag, h) = (15.0_f64, 0.03, 0.02);

@@ -277,8 +277,8 @@ mod tests {
         assert!(!is_clipped(Some(rate[0])));
     }
 
-    /// A gyro with a bias reaches one end of its range in each cycle, and the other one in few. It comes back from each by less than
-    /// five standard deviations of its noise.
+    /// A gyro with a bias reaches one end of its range in each cycle, and the other end in few cycles. Its first
+    /// reading after each end differs from the end by less than five standard deviations of its noise.
     #[test]
     fn a_clipping_limit_at_one_end_of_the_range_holds_at_the_other() {
         let mut random = Random::new(5, 0);

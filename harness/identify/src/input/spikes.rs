@@ -251,7 +251,7 @@ mod tests {
         assert_eq!(find(&time, &rate, &torque, None), []);
     }
 
-    /// A resonance that a slow gyro samples three times a period, and rows that come when they like.
+    /// Tests a resonance that a slow gyro samples three times in each period, and rows at irregular times.
     #[test]
     fn a_motion_that_is_sampled_coarsely_or_unevenly_has_no_spikes() {
         let mut random = Random::new(9, 0);

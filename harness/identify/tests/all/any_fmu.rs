@@ -204,7 +204,7 @@ pub fn record_with_stops(seed: u64, c: f64) -> (Record, u32) {
     (record, stops)
 }
 
-/// The stops of this FMU are events, which the FMU handles within its own steps.
+/// The motion of this FMU ends at stops, which are events that the FMU handles within its own steps.
 #[test]
 fn an_fmu_3_is_identified_through_its_events() {
     let c = 0.03;
@@ -353,8 +353,8 @@ fn a_parameter_that_another_one_replaces_is_warned_of_once_and_cannot_be_free() 
     assert_eq!(found.done.iter().filter(|line| warns(line)).count(), 1, "{:?}", found.done);
 }
 
-/// A fit that began at the truth once ended 28 standard deviations away, where the sum of squares was larger by 68, and was
-/// accepted as fitting.
+/// A fit that started at the true values once ended 28 standard deviations away, where the sum of squares was larger by
+/// 68, and the verdict was nevertheless that the model fits.
 #[test]
 fn a_minimum_that_is_worse_than_the_start_is_left() {
     let model = Model::open(packed_for_tests(), Solver::Own).unwrap();

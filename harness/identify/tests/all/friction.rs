@@ -132,7 +132,7 @@ fn friction_of_three_sets_of_runs_ends_in_no_false_minimum() {
     assert_eq!(all_sets(1..=2), [""; 0]);
 }
 
-/// The other six seeds of each set.
+/// Fits the other six simulated recordings of each set, whose seeds the short test leaves out.
 #[test]
 #[ignore = "13 s of CPU time: .ci/run --nightly"]
 fn friction_of_eighteen_more_runs_ends_in_no_false_minimum() {

@@ -79,7 +79,7 @@ fn identify_finds_all_parameters_and_the_sum_of_coulomb_and_stribeck_friction() 
     assert!(found.verdict.iter().any(|line| line.contains("cannot be distinguished")));
 }
 
-/// A given start makes the parameter an unknown, as for any parameter that is not estimated by default.
+/// A parameter that is not estimated by default becomes an unknown if a start value is given for it.
 #[test]
 fn identify_finds_damping_that_grows_with_the_amplitude() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
@@ -137,7 +137,8 @@ fn waves_that_do_not_break_show_no_damping_by_breaking() {
     assert!(found.verdict.iter().any(|line| line.contains("never breaks")), "{:?}", found.verdict);
 }
 
-/// The recording has 2 % too little torque: the liquid is taken for too light, and no residual shows it.
+/// The recorded torque is 2 % too small. Therefore the estimated mass of the liquid is too small, and no residual shows
+/// this.
 #[test]
 fn a_torque_that_is_wrong_within_its_tolerance_leaves_the_truth_in_the_intervals() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
@@ -313,9 +314,9 @@ fn an_interval_is_open_at_an_end_that_the_likelihood_does_not_bound() {
     }
 }
 
-/// Held torque comes half a row late; without an estimated delay nothing can compensate for that. The fit distinguishes smooth
-/// from linear torque long before its minimum is known to a hundredth. It then stops: a sweep of 2700 s takes nine simulations in
-/// all, and one at the end.
+/// A held torque acts half a row late, and if no delay is estimated, nothing can compensate for this. The fit
+/// distinguishes smooth from linear torque long before its minimum is known to a hundredth. It then stops: a sweep of
+/// 2700 s takes nine simulations in all, and one at the end.
 #[test]
 fn impossible_intersample_behaviours_cost_few_simulations() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
@@ -435,8 +436,8 @@ fn a_delay_that_another_torque_between_rows_explains_as_well_is_not_stated_as_su
     assert!((delay.value - 0.005).abs() < 4.0 * delay.std && delay.std < 2e-4, "{delay:?}");
 }
 
-/// The bench's dry friction is smooth near rest, and its torque linear between rows. Held torque that comes 10 ms before it is commanded
-/// would explain that a little better.
+/// The dry friction of this bench is smoothed near rest, and its torque is linear between rows. A held torque that acts
+/// 10 ms before it is commanded would fit slightly better, but is impossible.
 #[test]
 fn no_model_error_makes_the_rate_come_before_the_torque() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
@@ -494,7 +495,7 @@ fn a_bench_of_another_size_is_estimated_if_it_is_said_to_be_one() {
     }
 }
 
-/// Downwards a sweep meets the softening resonance from above, where slosh begins to rotate.
+/// A downward sweep reaches the softening resonance from higher frequencies, where rotary slosh begins.
 #[test]
 fn a_downward_sweep_shows_that_slosh_rotates() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
@@ -704,7 +705,7 @@ fn a_torque_wrong_by_1_percent_moves_the_frictions_by_1_percent_and_delay_and_as
     assert!((b.value - 1.01 * a.value).abs() < 0.1 * a.std, "{a:?} {b:?}");
 }
 
-/// The liquid is rigid; one push is forwards, one is backwards.
+/// The recording has rigid liquid, one push forwards and one push backwards.
 #[test]
 fn a_push_and_a_free_decay_do_not_determine_the_preferential_direction() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
@@ -773,7 +774,7 @@ fn a_delay_of_half_a_row_is_not_reported_if_the_torque_between_rows_is_found() {
     assert!(says("linear between rows") && !says("half a row"), "{:?}", found.verdict);
 }
 
-/// A rigid liquid and almost no dry friction, so the asymmetry is not known.
+/// The recording has rigid liquid and almost no dry friction, so that the asymmetry of the friction is not determined.
 #[test]
 fn a_hub_that_turns_both_ways_is_not_taken_for_one_that_turns_one_way() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();

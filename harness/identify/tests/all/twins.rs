@@ -26,55 +26,55 @@ fn is_described(seed: u64, held: &[&str]) {
     assert!(known > 10, "{known}");
 }
 
-/// The twin's friction was once stated in a wrong minimum, 69 standard deviations off, because sums of squares with different
-/// noises were compared.
+/// The fit of this simulated recording once ended in a wrong minimum, with friction that was wrong by 69 standard
+/// deviations, because it compared sums of squares that were scaled by different noise levels.
 #[test]
 #[ignore = "ten seconds of CPU time: .ci/long-tests"]
 fn a_gentle_sweep_with_an_encoder_has_its_friction_in_the_intervals() {
     is_described(22, &[]);
 }
 
-/// The twin was once refused because of one point of the friction's profile at which some combination of the unknowns has no
-/// influence.
+/// This simulated recording was once refused, because at one point of the likelihood profile of the friction a
+/// combination of the unknowns has no influence.
 #[test]
 #[ignore = "ten seconds of CPU time: .ci/long-tests"]
 fn a_profile_that_cannot_be_followed_to_its_end_refuses_no_recording() {
     is_described(25, &[]);
 }
 
-/// A delay of 4 ms under a held torque was once stated as a delay of 14 ms ± 0.1 ms under a linear torque, because the search
-/// with the held torque had ended before its minimum.
+/// The recording has a delay of 4 ms and a held torque. The fit once found a delay of 14 ms ± 0.1 ms with a linear
+/// torque, because the search with the held torque had ended before its minimum.
 #[test]
 #[ignore = "a quarter of a minute: .ci/run --nightly"]
 fn a_delay_is_not_sure_while_another_torque_between_rows_fits_as_well() {
     is_described(89, &[]);
 }
 
-/// The search once ended a standard deviation from the minimum, because the likelihood has a kink there: dry friction stops the
-/// hub within the first row.
+/// The search once ended one standard deviation away from the minimum, because the likelihood has a kink at the
+/// minimum: dry friction stops the hub within the first row.
 #[test]
 #[ignore = "ten seconds of CPU time: .ci/long-tests"]
 fn an_initial_rate_that_friction_stops_at_once_leaves_the_minimum_a_minimum() {
     is_described(40, &[]);
 }
 
-/// The twin's rates stay below a sixtieth of the Stribeck speed. The search looked for this speed near the rates, so that
-/// friction.c was stated 6.5 standard deviations off.
+/// The rates in this simulated recording stay below a sixtieth of the Stribeck speed. The search looked for the
+/// Stribeck speed near these rates, so that friction.c was wrong by 6.5 standard deviations.
 #[test]
 #[ignore = "five seconds of CPU time: .ci/long-tests"]
 fn friction_that_a_gentle_torque_does_not_separate_is_not_sure() {
     is_described(425, &["friction.c", "friction.d", "friction.omega_s"]);
 }
 
-/// The intervals of fill and inertia were once too narrow: they used T = tanh(2ξh/d) to first order, which is too rough in a deep
-/// tank.
+/// The intervals of fill and inertia were once too narrow, because they were computed from T = tanh(2ξh/d) linearised,
+/// which is too inaccurate in a deep tank.
 #[test]
 fn fill_and_inertia_of_a_deep_tank_are_in_their_intervals() {
     is_described(164, &["tank.h", "hub.I"]);
 }
 
-/// The search of one point of the friction's profile went astray and ended the interval of the Stribeck speed too early, so that
-/// this was stated 4.2 standard deviations off.
+/// The search at one point of the likelihood profile of the friction ended in another minimum. This ended the interval
+/// of the Stribeck speed too early, so that its estimate was wrong by 4.2 standard deviations.
 #[test]
 #[ignore = "a quarter of a minute: .ci/run --nightly"]
 fn a_point_of_the_profile_that_went_astray_ends_no_interval() {
@@ -87,9 +87,10 @@ fn a_point_of_the_profile_that_went_astray_ends_no_interval() {
     assert!((speed.value - truth).abs() < 3.0 * speed.std, "{truth}, found {speed:?}");
 }
 
-/// The twins show five faults of reading: rows without a gyro lose their torque, printed times are taken as exact, gaps are
-/// joined by lines, one delay serves two sensors, or the torque is held in rows that its clock does not have. With any of them a
-/// twin is refused, or the verdict is that no model fits.
+/// The simulated recordings have the habits of five loggers, each of which a reader can get wrong: the torque of rows
+/// without a gyro value is lost, printed times are taken as exact, gaps are interpolated linearly, one delay is used
+/// for two sensors, or the torque is held in rows of another clock. With any of these errors a recording is refused, or
+/// the verdict is that no model fits.
 #[test]
 #[ignore = "minutes: .ci/run --nightly"]
 fn recordings_with_the_habits_of_loggers_are_described() {
