@@ -193,7 +193,7 @@ def prepare(client: Client, fmu: Path, sha256: str) -> str:
         )
     data = fmu.read_bytes()
     if hashlib.sha256(data).hexdigest() != sha256:
-        raise CampaignError(f"{fmu} has changed just now; start again")
+        raise CampaignError(f"{fmu} has changed while it was read; start the command again")
     with tempfile.TemporaryDirectory() as directory:
         copy = Path(directory) / f"{sha256}.fmu"
         copy.write_bytes(data)

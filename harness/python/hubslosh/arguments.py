@@ -35,9 +35,9 @@ MOST_WORK = 1e8
 
 
 def caller() -> int:
-    """Return the ``stacklevel`` with which a warning names the user's line.
+    """Return the ``stacklevel`` with which `warnings.warn` names the line of the user's script.
 
-    This is the number of frames up to the first line that lies outside this package.
+    It is the number of stack frames up to the first line that lies outside this package.
     """
     folder, level = str(Path(__file__).parent), 1
     frame = sys._getframe(1)
@@ -77,7 +77,7 @@ def check_ranges(**values: Any) -> None:
 def floats(values: Any) -> NDArray[np.float64]:
     """Return values as an array of floats; arrays with masked values are refused.
 
-    Raises FmuError for a mask, otherwise TypeError or ValueError, as NumPy does.
+    Raises FmuError if a value is masked, and TypeError or ValueError if a value is not a number.
     """
     parts = values if isinstance(values, list | tuple) else [values]
     for part in parts:

@@ -222,7 +222,7 @@ Region = tuple[float, float, Vector, Vector]  # Ends of an interval of frequency
 
 
 class Search:
-    """A search for scalings D and G that prove a loop stable; results are kept for later calls.
+    """A search for scalings D and G that prove that a loop is stable; found scalings are reused.
 
     ``response`` is a function that returns N, the closed loop's response from the outputs to the
     inputs of Δ, at frequencies in Hz. ``poles`` is a function that returns the closed loop's poles

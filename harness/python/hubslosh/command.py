@@ -66,7 +66,7 @@ def call(
 ) -> Any:
     """Run a command of the program and return its result, or None if it has none.
 
-    * ``codes``: exit codes with which the command has succeeded.
+    * ``codes``: exit codes that count as success.
     * ``names``: texts that replace the paths of temporary files in error messages.
 
     KeyboardInterrupt, and any exception that a function ``progress`` raises, ends the program and

@@ -814,9 +814,12 @@ class Craft:
     ) -> dict[str, Quantity]:
         """Return the parameters of Spacecraft at a fill, with O where the craft has it."""
         if detach and (rigid or mass_flow is not None):
-            raise FmuError("detach=True cannot be combined with rigid=True or mass_flow=: only sloshing liquid in a tank that does not drain can leave the bottom")
+            raise FmuError(
+                "detach=True cannot be combined with rigid=True or mass_flow=: only sloshing "
+                "liquid in a tank that does not drain can leave the bottom"
+            )
         if rigid and mass_flow is not None:
-            raise FmuError("rigid=True cannot be combined with mass_flow=: the liquid of a tank that drains sloshes")
+            raise FmuError("rigid=True cannot be combined with mass_flow=: draining liquid sloshes")
         F, action, torque = self._resultant()
         r, J = vector(self.center_of_mass, 3, "") - action, self._inertia()
         found: dict[str, Quantity] = {"craft.mass": float(self.mass), "tanks": len(self.tanks)}

@@ -30,7 +30,7 @@ CIRCLE = -1 + 0.5 * np.exp(1j * np.linspace(0, 2 * np.pi, 200))
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """The loop gain at one command, while the other loops are closed."""
+    """Curve of the loop gain at one command, while the loops of the other commands are closed."""
 
     name: str
     color: str

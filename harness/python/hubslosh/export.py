@@ -88,7 +88,7 @@ open_system(model);
 def export(
     folder: str | Path, model: str | Path, parameters: Parameters, linear: LinearModel
 ) -> dict[str, Path]:
-    """Write the files that `Craft.export` describes, for Spacecraft with these parameters."""
+    """Write a craft with these parameters as FMU, SSV, SSP, .mat and script; see `Craft.export`."""
     folder = Path(folder)
     fmu = Fmu.open(model)
     values = {name: fmu.convert(name, value) for name, value in parameters.items()}
@@ -228,7 +228,7 @@ class _Mat:
     inputs: Mapping[str, float]
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the model as a dictionary of the variables that a .mat file gets."""
+        """Return the content of the .mat file: the values by the names of the variables."""
         return {
             **{name: getattr(self.linear, name) for name in "ABCD"},
             **{name: list(getattr(self.linear, name)) for name in ("states", "inputs", "outputs")},

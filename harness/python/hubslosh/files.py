@@ -21,14 +21,17 @@ class AsDict(Protocol):
     """A model that returns its content by name, such as an `UncertainModel`."""
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the model's content as a dictionary: numbers, arrays, names and texts."""
+        """Return the content of the model by name: numbers, arrays, names and texts."""
 
 
 def _check_table(table: Any, path: Any, ending: str) -> Path:
     import pandas as pd
 
     if isinstance(table, str | os.PathLike):
-        raise FmuError(f"the arguments are exchanged: give the table first, then the file: (table, {str(table)!r})")
+        raise FmuError(
+            "the arguments are exchanged: give the table first, then the file: "
+            f"(table, {str(table)!r})"
+        )
     if not isinstance(table, pd.DataFrame):
         raise FmuError(f"a pandas.DataFrame is expected, not {type(table).__name__}")
     return temporary.check_path(path, ending)
@@ -188,7 +191,7 @@ def _family(models: "Sequence[LinearModel]") -> dict[str, Any]:
     same = ("states", "inputs", "outputs", "period")
     for model in models:
         if wrong := [name for name in same if getattr(model, name) != getattr(first, name)]:
-            raise FmuError(f"the models of a family differ in {', '.join(wrong)}")
+            raise FmuError(f"all models of a family must have the same {', '.join(wrong)}")
     matrices = {name: np.stack([getattr(model, name) for model in models], axis=-1)
                 for name in "ABCD"}  # fmt: skip
     if len(models) == 1:

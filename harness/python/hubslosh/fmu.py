@@ -39,7 +39,7 @@ Parameters = Mapping[str, Any]
 
 
 class DefinedUnit(str):
-    """Name of a unit in a file, with its definition by SI base units."""
+    """Unit that a file of parameters uses: its name, and its definition in SI base units."""
 
     EXPONENTS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
     """Base units, by their names in FMI and SSP."""

@@ -35,7 +35,7 @@ def _check_states(states: int, cycles: int, period: float) -> None:
 def split_delay(delay: float, period: float) -> tuple[int, float]:
     """Return a delay as a number of whole cycles and the remaining seconds.
 
-    A remainder below 1e-9 of a cycle is rounding and counts as 0.
+    If the remainder is less than 1e-9 of a cycle, it comes from rounding and is returned as 0.
     """
     check_ranges(delay=delay)
     cycles = int(np.floor(delay / period + 1e-9))

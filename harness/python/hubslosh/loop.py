@@ -524,7 +524,8 @@ class Loop:
         if model is None:
             if reference is not None:
                 raise FmuError(
-                    "reference= is only for linear controllers; a controller function computes its own reference"
+                    "reference= is only for linear controllers; a controller function computes its "
+                    "own reference"
                 )
             return _checked_law(self.controller, command), measured
         table = _reference(reference, measured, command)

@@ -36,7 +36,7 @@ def mode_responses(
 ) -> NDArray[np.complex128]:
     """Return each mode's frequency response from the tank's acceleration to the force on it.
 
-    The unit is kg. Each row is one mode, each column one frequency (Hz).
+    Force over acceleration is in kg. Each row is one mode, each column one frequency (Hz).
     """
     w = 2 * np.pi * np.asarray(frequencies)
     spring = omegas[:, None] ** 2 + 2j * (zetas * omegas)[:, None] * w

@@ -59,10 +59,11 @@ _STARTS = {"HubSlosh": ["init.slosh_angle"]}
 
 
 class Instance:
-    """An instance of an FMU, from fmi2Instantiate to fmi2FreeInstance; variables by name.
+    """An instance of an FMU, whose variables are set and read by name.
 
-    Use it in a ``with`` statement. Calls from several threads wait for one another. FMUs of this
-    package start at rest, unless parameters set a motion.
+    Use the instance in a ``with`` statement, which frees it at the end. If several threads call the
+    instance, each call waits until the call before has ended. FMUs of this package start at rest
+    unless parameters set an initial motion.
     """
 
     def __init__(self, fmu: Fmu, *, exchange: bool = False) -> None:

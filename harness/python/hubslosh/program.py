@@ -267,7 +267,7 @@ class Identification:
             If the result was found without ``free=``.
         """
         if "covariance" not in self.all:
-            raise FmuError("a result of identify has a covariance if it was found with free=")
+            raise FmuError("only a result of identify with free= has a covariance")
         names = list(self.all["correlations"][0])
         return pd.DataFrame(np.array(self.all["covariance"], float), names, names)
 
@@ -408,7 +408,7 @@ def identify(
     if any(argument.split("=")[0] == "--method" for argument in arguments):
         raise FmuError("give method= instead of the flag --method")
     if free is None and (inputs or outputs or prior):
-        raise FmuError("inputs=, outputs= and prior= need free=")
+        raise FmuError("inputs=, outputs= and prior= can be given only together with free=")
     if free is not None and (model is not None or method != "bench"):
         raise FmuError("free= cannot be combined with model= or method=")
     path = find_program(program)

@@ -25,7 +25,7 @@ class Line:
         self._width = 0
 
     def show(self, text: str) -> None:
-        """Replace the text."""
+        """Replace the displayed text by a new one."""
         if self._show is not None:
             self._show(text)
 
@@ -35,7 +35,7 @@ class Line:
         self._width = len(text)
 
     def close(self) -> None:
-        """Remove the line."""
+        """Remove the line from the terminal or the notebook."""
         if self._width:
             print(f"\r{'':{self._width}}\r", end="", file=sys.stderr, flush=True)
             self._width = 0

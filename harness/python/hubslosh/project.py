@@ -348,7 +348,7 @@ def _controller(given: Any, folder: Path) -> Any:
             raise FmuError(f"controller: {error}") from None
         return LinearModel(A, B, C, D, (), (), (), period)
     if given is None:
-        raise FmuError("the project needs controller")
+        raise FmuError("the project has no controller: give the key controller")
     if not isinstance(given, str):
         return given
     file, _, name = given.rpartition(":")

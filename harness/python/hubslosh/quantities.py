@@ -36,13 +36,13 @@ _MOVES_THE_BOB = re.compile(r"(tank\[\d\])\.(length|hinge)(\[\d\])")
 
 
 class Names(tuple[str, ...]):
-    """Names of a craft's tanks in the FMU's order, and of its appendages, mode by mode."""
+    """Names of the tanks of a craft, in the order of the FMU, and of the appendage of each mode."""
 
     appendages: tuple[str, ...] = ()
 
     @classmethod
     def collect(cls, tanks: Iterable[str], appendages: Iterable[str] = ()) -> "Names":
-        """Return the names; ``appendages`` has the appendage of each of the FMU's modes."""
+        """Return the names of the tanks, and the name of each flexible mode's appendage."""
         if isinstance(tanks, Names):
             return tanks
         found = cls(tanks)
@@ -50,9 +50,11 @@ class Names(tuple[str, ...]):
         return found
 
     def prefixes(self) -> list[tuple[str, str, int]]:
-        """Return how the FMU's names begin, the name of the tank or appendage, and the mode.
+        """Return rows that relate the FMU's numbers to the names of tanks and appendages.
 
-        The mode of a tank is 0. For example ``appendage[3].`` belongs to mode 1 of ``array``.
+        Each row has the beginning of the FMU's names, the name of the tank or appendage, and the
+        number of the mode (0 for a tank). For example, (``appendage[3].``, ``array``, 1) means that
+        the FMU's third flexible mode is mode 1 of the appendage ``array``.
         """
         found = [(f"tank[{number}].", name, 0) for number, name in enumerate(self, 1)]
         for j, name in enumerate(self.appendages, 1):
@@ -86,7 +88,7 @@ def mode_quantity(name: str) -> ModeQuantity | None:
 
 
 def full_name(name: str, tanks: Iterable[str]) -> str:
-    """Return a name with the number of the tank or mode in place of the name of tank or appendage.
+    """Return a quantity's name in the FMU: the number of the tank or mode instead of its name.
 
     For example ``NTO.zeta[1]`` becomes ``tank[1].zeta[1]``, and ``array.zeta[1]`` becomes
     ``appendage[3].zeta``.
@@ -106,7 +108,7 @@ def full_name(name: str, tanks: Iterable[str]) -> str:
 
 
 def short_name(name: str, tanks: Iterable[str]) -> str:
-    """Return a name with the name of the tank or appendage in place of the number.
+    """Return a quantity's name for users: the name of the tank or appendage instead of the number.
 
     For example ``tank[1].zeta[1]`` becomes ``NTO.zeta[1]``, and ``appendage[3].zeta`` becomes
     ``array.zeta[1]``.
@@ -144,7 +146,7 @@ def unknown(name: str, fmu: Fmu, tanks: Iterable[str], also: Iterable[str] = ())
 def full_names(
     given: Parameters, fmu: Fmu, tanks: Iterable[str], also: Iterable[str] = ()
 ) -> dict[str, Quantity]:
-    """Return values by full names, such as ``tank[1].zeta[1]`` for ``NTO.zeta[1]``.
+    """Return values with their names in the FMU, such as ``tank[1].zeta[1]`` for ``NTO.zeta[1]``.
 
     Raises FmuError for names that are not quantities of a craft (see `unknown`), and for a quantity
     that is given under both of its names.
@@ -192,7 +194,7 @@ class Modes:
         return float(self.fmu.variable(name).start or 0.0)
 
     def problem(self, mode: ModeQuantity) -> str:
-        """Return the reason why a mode does not have a quantity; "" if it has it."""
+        """Return the reason why a mode does not have a quantity, or "" if it has."""
         if mode.tank > self.number("tanks") or mode.number > self.number(
             f"tank[{mode.tank}].modes"
         ):
@@ -249,7 +251,7 @@ class Modes:
     def scale_frequency(self, mode: ModeQuantity, factor: float) -> None:
         """Multiply a mode's frequency by a factor.
 
-        The factor holds at every thrust, and the slosh mass stays in its place.
+        The factor is the same at every thrust, and the height of the slosh mass does not change.
         """
         if not factor > 0:
             raise FmuError(f"{mode.name('frequency')} must be above 0 Hz")
@@ -262,8 +264,8 @@ class Modes:
     def set(self, mode: ModeQuantity, value: float) -> None:
         """Set one quantity of a mode.
 
-        The other quantities of the mode, and mass, centre and inertia of the liquid as a whole,
-        stay.
+        The other quantities of the mode do not change, and neither do mass, centre and inertia of
+        the liquid as a whole.
         """
         if mode.kind == "zeta":
             self.given[mode.name("zeta")] = value

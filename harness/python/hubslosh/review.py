@@ -195,9 +195,10 @@ class Review:
         Returns
         -------
         DataFrame
-            A row for each requirement: ``requirement`` in words, ``passed``, ``least`` (its least
-            margin; -inf if a point is unstable), ``fill`` (index, where that is), and the numbers
-            of ``failing`` and of all ``points`` for which it holds. An unstable point fails.
+            A row for each requirement: ``requirement`` in words, ``passed``, ``least`` (the
+            smallest margin; -inf if a point is unstable), ``fill`` (index of the fill where the
+            margin is smallest), and the numbers of ``failing`` points and of all ``points`` to
+            which the requirement applies. An unstable point fails.
         """
         return judged(self.limits, self.points)
 
@@ -245,7 +246,7 @@ class Review:
         return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
     def stabilisation(self) -> list[str]:
-        """Return `modes` as sentences, one for each kind of stabilisation with its modes.
+        """Return sentences, one for each kind of stabilisation, which name the modes stabilised so.
 
         Returns
         -------
@@ -464,7 +465,7 @@ def review(
 
 
 def row_of(point: Point, uncertain: Iterable[Uncertain]) -> dict[str, Any]:
-    """Return the row of `Review.points` that describes a point."""
+    """Return one row of the table `Review.points`: the values and margins of a point."""
     found = point.margins
     down, up = found.gain_margins
     margins = {
@@ -531,7 +532,7 @@ class _Space:
         parameters: Parameters | None,
         options: dict[str, Any],
     ) -> "_Space":
-        """Check the arguments of a review, compute its tanks, and return its points' space."""
+        """Check the arguments of a review, compute its tanks, and return the space of points."""
         fills = _list_of(fills)
         if damping not in ("interval", "nominal"):
             raise FmuError(f'damping must be "interval" or "nominal", not {damping!r}')

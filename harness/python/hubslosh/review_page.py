@@ -131,7 +131,7 @@ def _figures(review: "Review") -> Iterator[str]:
 
 
 def figure_of(title: str, caption: str, height: float, draw: "Callable[[Figure], None]") -> str:
-    """Return a figure as inline SVG, in colours that the page can change with its scheme.
+    """Return a figure as inline SVG, whose colours follow the light or dark scheme of the page.
 
     ``draw`` draws into the empty figure; ``height`` is its height in inches.
     """

@@ -228,7 +228,10 @@ def _one(outcome: Outcome, values: dict[str, Any]) -> dict[str, Any]:
             f'outcome must return numbers by name, such as {{"error": 0.1}}, not {found!r}'
         ) from None
     if FAILED in numbers:
-        raise FmuError(f"outcome returns {FAILED}, a column that the table needs for errors")
+        raise FmuError(
+            f"outcome returns a value named {FAILED}, which is the column for the errors of "
+            "failed runs: choose another name"
+        )
     return numbers
 
 

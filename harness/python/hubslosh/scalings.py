@@ -54,7 +54,7 @@ def form(N: Complex, D: Complex, G: Complex) -> Complex:
 
 
 def recentred(N: Complex, copies: NDArray[np.int64], low: Vector, high: Vector) -> Complex:
-    """Return N for a box of δ from ``low`` to ``high`` that is scaled to [-1, 1].
+    """Return N for a box of δ, from ``low`` to ``high``, after scaling the box to [-1, 1].
 
     A proof for |δ| ≤ 1 with the returned matrix is then a proof for the box.
     """
@@ -114,8 +114,8 @@ class Scalings:
     def best(self, N: Complex) -> tuple[float, Complex, Complex]:
         """Return the margin -λmax(X), and D and G that make it largest.
 
-        A margin above 0 proves that I - N Δ is regular for all |δ| ≤ 1. It is 1 at most, where the
-        mean eigenvalue of D is 1 after balancing.
+        A margin above 0 proves that I - N Δ is regular for all |δ| ≤ 1. The margin is at most 1,
+        because D is scaled so that the mean of its eigenvalues is 1.
         """
         from scipy.sparse import csc_matrix
 
@@ -146,8 +146,9 @@ class Scalings:
     def largest(self, N: Complex, least: Vector, guess: float = 1.0) -> float:
         """Return the largest size k for which scalings prove I - N Δ regular for all |δ| ≤ k.
 
-        Only δ ≥ ``least`` count. The size is exact to 0.5 %, but at most 1/SMALLEST. A good
-        ``guess`` halves the number of convex problems.
+        Only values δ ≥ ``least`` are considered. The returned size is accurate to 0.5 %, and at
+        most 1/SMALLEST. If ``guess`` is close to the result, half as many convex problems are
+        solved.
         """
 
         def is_proved(log_size: float) -> bool:

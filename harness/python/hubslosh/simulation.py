@@ -184,7 +184,7 @@ def simulate(
 
 
 def asked_of(fmu: Fmu, columns: Sequence[str], given: Container[str]) -> list[str]:
-    """Return the variables to record.
+    """Return the names of the variables that a run must record.
 
     These are ``columns``, and the variables that show whether a tank is in the range of its model;
     variables in ``given`` are left out.
@@ -226,9 +226,9 @@ def table_of(
 def parameters_of(
     parameters: Parameters | str | Path | None,
 ) -> dict[str, Quantity]:
-    """Return parameters by name.
+    """Return a dictionary of parameters; a text or a path is read as a file of parameters.
 
-    A text or a path is the file of a parameter set, which is read.
+    See `tables.read_parameters` for the formats of the file.
     """
     if isinstance(parameters, str | Path):
         return dict(read_parameters(Path(parameters)))

@@ -188,7 +188,7 @@ def margins_and_gain(
 
         return _margins(gain, modes, _controllable_modes(plant, modes), delayed), gain
     if parameters:
-        raise FmuError("parameters= is only for a Loop; the parameters of a loop gain cannot be changed")
+        raise FmuError("parameters= is only for a Loop: a loop gain has no parameters")
     gain = loop if isinstance(loop, LinearModel) else _loop_gain(loop)
     modes = gain._modes(LIGHT)
     return _margins(gain, modes, [modes] * gain.D.shape[1], None), gain

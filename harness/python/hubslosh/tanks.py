@@ -196,7 +196,7 @@ class Tank:
             prefix, found = "tank", self._parameters("SloshTank")
         elif model == "HubSlosh":
             if rigid:
-                raise FmuError("rigid= is not for HubSlosh; set its parameter slosh.model = frozen instead")
+                raise FmuError("rigid= is not for HubSlosh: set slosh.model = frozen instead")
             return self._parameters("HubSlosh")
         else:
             raise FmuError(f"there are no parameters of a tank for {model!r} (for: Spacecraft, "

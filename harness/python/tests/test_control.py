@@ -240,7 +240,7 @@ def test_errors_of_a_loop_are_reported_in_words(fmu: Path, spacecraft: Path) -> 
             *loop, reference=pd.DataFrame({"time": [0, 1], "thta": 0.0})
         ),
         "reference must be a pandas.DataFrame": lambda: closed_loop(*loop, reference={"theta": 1}),
-        "a function knows its own reference": lambda: closed_loop(
+        "a controller function computes its own reference": lambda: closed_loop(
             lambda t, y: 0.0, *loop[1:], reference=pd.DataFrame({"time": [0, 1], "theta": 0.0})
         ),
         "returned None at t = 0 s; it must return a finite number": lambda: closed_loop(

@@ -335,7 +335,7 @@ def test_any_fmu_is_fitted_by_the_names_of_its_variables(
     with pytest.raises(FmuError, match=r"^hubslosh identify: data\[1\] cannot be used"):
         backwards = tables[1].iloc[::-1]
         hubslosh.identify([tables[0], backwards], fmu=fmu, **SPUN_DOWN, program=binary)
-    with pytest.raises(FmuError, match="need free="):
+    with pytest.raises(FmuError, match="only together with free="):
         hubslosh.identify(tables, fmu=fmu, outputs=["omega"])
 
 

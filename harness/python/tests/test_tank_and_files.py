@@ -126,12 +126,12 @@ def test_tables_are_read_back_from_files_with_every_digit(tmp_path: Path) -> Non
     assert matlab["units"]["time"].item().item() == "s"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.csv", "a.mat", "a.parquet"]
     wrong = {
-        "the table comes first": lambda: hubslosh.to_csv("a.csv", table),
+        "give the table first, then the file": lambda: hubslosh.to_csv("a.csv", table),
         "must end in .mat": lambda: hubslosh.to_mat(table, "a.csv"),
         "DataFrame is expected, not list": lambda: hubslosh.to_parquet([1], "a.parquet"),
         "the file's name is expected": lambda: hubslosh.to_csv(table, 3),
         "cannot be written": lambda: hubslosh.to_csv(table, tmp_path / "none" / "a.csv"),
-        "named apart in MATLAB: a.b, a_b": lambda: hubslosh.to_mat(
+        "the same name in MATLAB: a.b, a_b": lambda: hubslosh.to_mat(
             pd.DataFrame({"a.b": [1], "a_b": [2]}), "a.mat"
         ),
     }
