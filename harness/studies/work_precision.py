@@ -193,7 +193,8 @@ def table(all_points: dict[str, list[tuple]], unit: float) -> str:
     """Return the page's table."""
     rows = [
         "| method | tolerance (RK4: step, s) | error of omega, rad/s "
-        "| CPU time per 20 ms, ns | CPU time over one RK4 step's, 5 ms | instructions per 20 ms |",
+        "| CPU time per 20 ms of motion, ns | this CPU time in RK4 steps of 5 ms "
+        "| instructions per 20 ms of motion |",
         "| --- | --- | --- | --- | --- | --- |",
     ]
     for name, points in all_points.items():
@@ -274,8 +275,8 @@ def main() -> None:
         "one run. The FMU's cost includes its C interface: two calls that set, fmi2DoStep, one",
         "call that gets.",
         "",
-        "| error at most, rad/s | RK4 steps per 20 ms: linear | spherical "
-        "| best other method, relative to linear |",
+        "| error at most, rad/s | cost of HubSlosh, linear, in RK4 steps per 20 ms of motion "
+        "| cost of HubSlosh, spherical | cost of the best other method over HubSlosh, linear |",
         "| --- | --- | --- | --- |",
         *ratios,
         "",
