@@ -1,5 +1,6 @@
 //! A number with its uncertainty.
 
+use analysis::statistics::about_mean;
 use serde::Serialize;
 
 #[derive(Clone, Debug, Serialize)]
@@ -38,6 +39,17 @@ impl Estimated {
     }
 }
 
+/// Returns the mean of the squares.
+pub(crate) fn mean_square(values: &[f64]) -> f64 {
+    values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64
+}
+
+/// Returns the fit of a model with the residual r to measured values y, %: 100 (1 − ‖r‖/‖y − mean y‖).
+pub(crate) fn fit_percent(residual: &[f64], measured: &[f64]) -> f64 {
+    100.0 * (1.0 - (mean_square(residual) / mean_square(&about_mean(measured))).sqrt())
+}
+
+/// Returns a unit of the FMU as it is written in prose: kg·m² for kg.m2.
 pub fn prose(unit: &str) -> String {
     unit.replace('.', "·").replace('2', "²")
 }

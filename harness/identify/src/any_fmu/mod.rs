@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 
 use analysis::gauss_markov::Noise;
 use analysis::innovations::{LIMIT, Tests};
-use analysis::statistics::{mean, median, variance};
+use analysis::statistics::{mean, median};
 use anyhow::{Context, Result, ensure};
 use nalgebra::DMatrix;
 use serde::Serialize;
@@ -23,7 +23,7 @@ use crate::engine::profile::Z;
 use crate::engine::search::{solve, solve_near};
 use crate::engine::solver_error::SolverError;
 use crate::engine::{ENDS, Motion, Signal, Solution, Unknown};
-use crate::estimate::{Estimated, prose};
+use crate::estimate::{Estimated, fit_percent, prose};
 use crate::input::question::{Question, Setting};
 use crate::input::record::Record;
 use crate::input::tolerance::{self, Share};
@@ -115,19 +115,18 @@ pub fn identify(
         told(&News::Step(format!("the FMU warns: {warning}")));
     }
     let mut problem = system.problem(unknowns, question);
-    let (mut near, mut starts): (Option<Vec<f64>>, usize) = (None, 0);
-    for turn in 1.. {
+    let (mut near, mut starts, mut turn): (Option<Vec<f64>>, usize, usize) = (None, 0, 0);
+    loop {
         let mut solution = match &near {
             None => solve(&problem, None, f64::INFINITY, &mut told)?,
             Some(values) => solve_near(&problem, values, &mut told)?,
         };
-        starts = starts.max(solution.starts);
+        (starts, turn) = (starts.max(solution.starts), turn + 1);
         let (point, noise) = (&solution.minimum.point, &solution.fit.noise);
         let mut signals = problem.signals.clone();
         let jumps = leave_out_jumps(&mut signals, records, &point.motion, noise);
-        if turn == TURNS
-            || signals.iter().zip(&problem.signals).all(|(a, b)| a.sampled == b.sampled)
-        {
+        let is_same = signals.iter().zip(&problem.signals).all(|(a, b)| a.sampled == b.sampled);
+        if turn == TURNS || is_same {
             told(&News::Step(format!("{:.0} runs of each recording", solution.fit.simulations())));
             let mut found = conclude(&system, &mut solution, question)?;
             found.details.starts = starts;
@@ -138,7 +137,6 @@ pub fn identify(
         near = Some(solution.fit.values(&point.z));
         problem.signals = signals;
     }
-    unreachable!("the last turn returns")
 }
 
 /// Leaves out the rows next to jumps of the model's outputs and returns their number. If the estimate puts an event on the wrong side
@@ -177,8 +175,8 @@ fn remedy(system: &FmuSystem, heeds_tolerance: bool) -> String {
             format!("with --solver host the host integrates this FMU, with errors of 1e-8{also}")
         }
         Model::Own(_) if heeds_tolerance => finer.into(),
-        Model::Own(_) => {
-            let exchange = match system.model.offers_exchange() {
+        own => {
+            let exchange = match own.offers_exchange() {
                 true => {
                     "--solver host is of no use, because an output follows the slope of an input"
                 }
@@ -323,8 +321,6 @@ fn outputs(system: &FmuSystem, solution: &Solution, question: &Question) -> Vec<
     let description = system.model.description();
     let one = |(k, signal): (usize, &Signal)| {
         let (noise, e) = (fit.noise[k], signal.picked(&innovations[k]));
-        let count = e.len() as f64;
-        let squares: f64 = signal.picked(&residuals[k]).iter().map(|r| r * r).sum();
         let name = &question.outputs[signal.output];
         Output {
             recording: system.records[signal.recording].name.clone(),
@@ -333,10 +329,12 @@ fn outputs(system: &FmuSystem, solution: &Solution, question: &Question) -> Vec<
             rows: e.len(),
             noise_white: noise.white,
             drift: (noise.drift > 0.0).then_some((noise.drift * noise.white, noise.time)),
-            fit_percent: 100.0
-                * (1.0 - (squares / (count * variance(&signal.picked(&signal.measured)))).sqrt()),
+            fit_percent: fit_percent(
+                &signal.picked(&residuals[k]),
+                &signal.picked(&signal.measured),
+            ),
             tests: solution.tests[k].clone(),
-            mean: mean(&e) * count.sqrt(),
+            mean: mean(&e) * (e.len() as f64).sqrt(),
         }
     };
     fit.problem.signals.iter().enumerate().map(one).collect()
@@ -379,17 +377,17 @@ fn conclude(
     let is_decided = !found.details.decided_by_solver.is_empty();
     let pressed = named(&numbers.pressed);
     found.fits = (!fits || !is_decided && pressed.is_empty()).then_some(fits);
-    let mut words = match found.fits {
-        None if !is_decided => vec![format!(
+    let mut words = vec![match found.fits {
+        None if !is_decided => format!(
             "{NOT_JUDGED}: the residual of every output is noise, but bounds hold {}: the recordings want to go further, so that \
              no interval can be trusted. Wider bounds, or another start, may lead to another minimum.",
             pressed.join(", ")
-        )],
-        None => vec![format!(
+        ),
+        None => format!(
             "{NOT_JUDGED}: the residual of every output is noise, but the errors of the solver decide estimates."
-        )],
-        Some(_) => vec![fit_in_words(&found.details.outputs)],
-    };
+        ),
+        Some(_) => fit_in_words(&found.details.outputs),
+    }];
     let is_seen = solver.differs.contains(&true);
     if is_decided {
         let heeds = matches!(system.model, Model::Own(_)) && solver.differs.first() == Some(&true);
@@ -446,26 +444,22 @@ fn conclude(
             false => f64::from(i == j),
         }
     };
-    let known: Vec<usize> = (0..n).filter(|j| is_known(&unknowns[*j])).collect();
-    let asked = (0..n).filter(|j| !known.contains(j));
+    let (known, asked): (Vec<usize>, Vec<usize>) = (0..n).partition(|j| is_known(&unknowns[*j]));
     let share = |j: usize| {
-        let most = known
-            .iter()
-            .max_by(|a, b| correlation(**a, j).abs().total_cmp(&correlation(**b, j).abs()))?;
+        let size = |i: &&usize| correlation(**i, j).abs();
+        let most = known.iter().max_by(|a, b| size(a).total_cmp(&size(b)))?;
         let share = 1.0 - (numbers.std_noise[j] / std[j]).powi(2);
         Some(Share { name: names[j].clone(), share, most: names[*most].clone() })
     };
-    let shares: Vec<Share> =
-        asked.clone().filter(|j| std[*j].is_finite()).filter_map(share).collect();
+    let told = asked.iter().copied().filter(|j| std[*j].is_finite());
+    let shares: Vec<Share> = told.filter_map(share).collect();
+    let sizes: Vec<String> = known.iter().map(|&j| size(system, unknowns, j)).collect();
     match known.is_empty() {
         true => words.push(NOISE_ALONE.into()),
-        false => {
-            let sizes: Vec<String> = known.iter().map(|&j| size(system, unknowns, j)).collect();
-            words.extend(tolerance::shares(&sizes, &shares));
-        }
+        false => words.extend(tolerance::shares(&sizes, &shares)),
     }
-    for i in asked.clone() {
-        for j in asked.clone().filter(|j| *j < i && correlation(i, *j).abs() > PAIR) {
+    for &i in &asked {
+        for &j in asked.iter().filter(|j| **j < i && correlation(i, **j).abs() > PAIR) {
             words.push(format!(
                 "{} and {} are strongly correlated ({:+.3}): the recordings determine a combination of them better than each \
                  alone",
@@ -480,22 +474,16 @@ fn conclude(
     found.verdict = words;
     found.settings = question.settings.iter().map(Setting::named).collect();
     let residuals = solution.fit.residuals(&minimum.point.z, &minimum.point.motion);
-    let description = system.model.description();
-    let residual = |((signal, residual), noise): ((&Signal, &Vec<f64>), &Noise)| {
-        let record = &system.records[signal.recording];
-        let name = &question.outputs[signal.output];
-        let unit = description.variable(name).map_or("1", |v| description.unit(v));
-        Residual {
-            name: format!("{}, {name}", record.name),
-            label: prose(if unit.is_empty() { "1" } else { unit }),
-            time: signal.picked(&record.time),
-            measured: signal.picked(&signal.measured),
-            residual: signal.picked(residual),
-            noise: Some(noise.white),
-            torque: None,
-        }
+    let residual = |((signal, residual), output): ((&Signal, &Vec<f64>), &Output)| Residual {
+        name: format!("{}, {}", output.recording, output.name),
+        label: prose(if output.unit.is_empty() { "1" } else { &output.unit }),
+        time: signal.picked(&problem.recordings[signal.recording].time),
+        measured: signal.picked(&signal.measured),
+        residual: signal.picked(residual),
+        noise: Some(output.noise_white),
+        torque: None,
     };
-    let signals = problem.signals.iter().zip(&residuals).zip(&solution.fit.noise);
+    let signals = problem.signals.iter().zip(&residuals).zip(&found.details.outputs);
     found.residuals = signals.map(residual).collect();
     Ok(found)
 }

@@ -2,11 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use analysis::statistics::{correlation, deviation, mean};
+use analysis::statistics::{about_mean, correlation, deviation, peak};
 use anyhow::Result;
 use formulas::cylinder::XI;
 use formulas::regime::Regime;
-use nalgebra::DMatrix;
 use names::hubslosh::{SloshModel, friction};
 
 use super::causes::{self, Cause, Missing};
@@ -19,9 +18,9 @@ use crate::bench::verdict::{self, Findings};
 use crate::engine::cause::{Effect, cause, effects};
 use crate::engine::draws::Derived;
 use crate::engine::hold::Rival;
-use crate::engine::minimum::places;
-use crate::engine::{ENDS, Fit, Motion, Part, Solution};
-use crate::estimate::{Estimated, prose};
+use crate::engine::minimum::{Curvature, places};
+use crate::engine::{ENDS, Fit, Part, Solution};
+use crate::estimate::{Estimated, fit_percent, mean_square, prose};
 use crate::input::recording::Recording;
 use crate::input::tolerance::{self, Share};
 use crate::news::News;
@@ -34,31 +33,20 @@ const POOR_FIT: f64 = 90.0;
 /// Ratio of a known value's standard deviation after the fit to its tolerance, below which the recordings show the value.
 const SHOWN: f64 = 0.7;
 
-fn fit_pct(recordings: &[Recording], motion: &[Motion], solution: &Solution) -> f64 {
-    let residuals = solution.fit.residuals(&solution.minimum.point.z, motion);
-    let (mut left, mut all) = (0.0, 0.0);
-    for (signal, residual) in solution.fit.problem.signals.iter().zip(&residuals) {
-        if signal.output == 0 && signal.recording < recordings.len() {
-            left += signal.picked(residual).iter().map(|e| e * e).sum::<f64>();
-            let rate = signal.picked(&signal.measured);
-            let middle = mean(&rate);
-            all += rate.iter().map(|y| (y - middle).powi(2)).sum::<f64>();
-        }
-    }
-    100.0 * (1.0 - (left / all).sqrt())
-}
-
-pub fn summary(system: &BenchSystem, solution: &Solution, (model, law): (&str, &str)) -> ModelFit {
+/// Returns the numbers that describe the fit of one slosh model with one friction law.
+pub fn summary(solution: &Solution, (model, law): (&str, &str)) -> ModelFit {
     let fit = &solution.fit;
     let point = &solution.minimum.point;
     let deviance = fit.deviance(point);
     let rows: usize =
         fit.problem.signals.iter().map(|s| s.sampled.iter().filter(|s| **s).count()).sum();
     let count = places(&fit.free).len();
-    let fit_pct = fit_pct(system.recordings, &point.motion, solution);
-    let first = &fit.problem.signals[0];
-    let residual = first.picked(&fit.residuals(&point.z, &point.motion)[0]);
-    let rms = (residual.iter().map(|e| e * e).sum::<f64>() / residual.len() as f64).sqrt();
+    let residuals = fit.residuals(&point.z, &point.motion);
+    let rates = fit.problem.signals.iter().zip(&residuals).filter(|(signal, _)| signal.output == 0);
+    let (left, measured): (Vec<_>, Vec<_>) =
+        rates.map(|(s, r)| (s.picked(r), about_mean(&s.picked(&s.measured)))).unzip();
+    let fit_pct = fit_percent(&left.concat(), &measured.concat());
+    let rms = mean_square(&left[0]).sqrt();
     ModelFit {
         model: model.into(),
         friction: law.into(),
@@ -71,7 +59,7 @@ pub fn summary(system: &BenchSystem, solution: &Solution, (model, law): (&str, &
         validation_pct: Vec::new(),
         noise_white: fit.noise[0].white,
         simulations: fit.simulations(),
-        poor: fit_pct < POOR_FIT && rms > 2.0 * first.white,
+        poor: fit_pct < POOR_FIT && rms > 2.0 * fit.problem.signals[0].white,
     }
 }
 
@@ -101,10 +89,7 @@ pub fn validate(
         let scale = 1.0 + own.value(&values, &Target::GyroScale).unwrap_or(0.0);
         // the bias of another recording is its own
         let off: Vec<f64> = rate.iter().zip(&model).map(|(y, w)| y - scale * w).collect();
-        let (middle, level) = (mean(&rate), mean(&off));
-        let left: f64 = off.iter().map(|e| (e - level).powi(2)).sum();
-        let all: f64 = rate.iter().map(|y| (y - middle).powi(2)).sum();
-        Ok(100.0 * (1.0 - (left / all).sqrt()))
+        Ok(fit_percent(&about_mean(&off), &rate))
     };
     validation.iter().map(one).collect()
 }
@@ -131,19 +116,15 @@ pub fn conclude(
     let motion = solution.minimum.point.motion.clone();
     let _ = system.base.set(motion.clone());
     let found = effects(solution, &mut |news| tell(news.clone()))?;
-    let full = solution.draw(true)?;
+    let mut full = solution.draw(true)?;
     let own = solution.draw(false)?;
-    let full = match near.1 {
-        [] => full,
-        others => {
-            let mut all = vec![(near.0, full)];
-            for (probability, other) in others {
-                all.push((*probability, other.solution.draw(true)?));
-            }
-            let borrowed: Vec<(f64, &Derived)> = all.iter().map(|(p, d)| (*p, d)).collect();
-            Derived::mixed(&borrowed)
+    if !near.1.is_empty() {
+        let mut all = vec![(near.0, full)];
+        for (probability, other) in near.1 {
+            all.push((*probability, other.solution.draw(true)?));
         }
-    };
+        full = Derived::mixed(&all);
+    }
     let rate = motion.iter().flat_map(|motion| motion.outputs[0].iter().copied());
     let way = combination::way(rate);
     let combinations = combination::combinations(&full, way);
@@ -172,13 +153,9 @@ pub fn conclude(
     let known = held.filter_map(|(u, _)| Some((u.name.as_str(), u.prior?.1)));
     verdict.extend(shares(&full, &own, known));
     verdict.extend(shown(system, solution, &full, &mut parameters));
-    let slosh_angle = match fit.model == SloshModel::Frozen.name() {
-        true => 0.0,
-        false => motion
-            .iter()
-            .flat_map(|motion| &motion.others[0])
-            .fold(0.0_f64, |most, angle| most.max(angle.abs())),
-    };
+    let angles = motion.iter().map(|motion| peak(&motion.others[0]));
+    let is_frozen = fit.model == SloshModel::Frozen.name();
+    let slosh_angle = if is_frozen { 0.0 } else { angles.fold(0.0, f64::max) };
     if !full.is_told() {
         verdict.push(
             "No interval is given: hardly any tank and hub have the slosh mode that the recordings show.".into(),
@@ -190,7 +167,9 @@ pub fn conclude(
         columns.iter().map(|a| columns.iter().map(|b| correlation(a, b)).collect()).collect();
     let details = Details {
         combinations,
-        condition: condition(solution),
+        condition: solution.minimum.derivatives.as_ref().map_or(f64::NAN, |found| {
+            Curvature::new(&found.matrix, places(&solution.fit.free)).condition()
+        }),
         missing: findings.missing.clone(),
         cause: findings.cause.clone(),
         slosh_angle,
@@ -219,21 +198,15 @@ fn estimated(
 ) -> Estimated {
     let name = &full.names[k];
     let unknown = &solution.fit.problem.unknowns[k];
-    let (mut std, mut std_noise, mut interval) = (f64::NAN, f64::NAN, [f64::NAN; 2]);
-    if full.is_told() {
-        (std, interval) = (full.std(k), full.interval(k));
-    }
-    if own.is_told() {
-        std_noise = own.std(k);
-    }
+    let (mut std, mut interval) = match full.is_told() {
+        true => (full.std(k), full.interval(k)),
+        false => (f64::NAN, [f64::NAN; 2]),
+    };
+    let std_noise = if own.is_told() { own.std(k) } else { f64::NAN };
     let positive = unknown.log || unknown.bounds.0 >= 0.0;
     if let Some((_, open)) = full.open.as_ref().filter(|(open, _)| open == name) {
-        if open[0] {
-            interval[0] = 0.0;
-        }
-        if open[1] {
-            interval[1] = f64::INFINITY;
-        }
+        let ends = [0.0, f64::INFINITY];
+        (0..2).filter(|end| open[*end]).for_each(|end| interval[end] = ends[end]);
     }
     let value = full.values[k];
     // of a skew interval that of the longer side
@@ -327,13 +300,12 @@ fn torque_words(solution: &Solution) -> Option<String> {
     let own = fit.delay().filter(|j| fit.free[*j]).map(|j| solution.minimum.point.z[j]);
     let near: Vec<&Rival> = solution.rivals.iter().filter(|r| r.is_near()).collect();
     if !near.is_empty() {
-        let weights: Vec<f64> = near.iter().map(|r| (-0.5 * r.more).exp()).collect();
-        let sum = 1.0 + weights.iter().sum::<f64>();
-        let first = format!("{now}{} (probability {:.2})", late(own), 1.0 / sum);
-        let others = near.iter().zip(&weights).map(|(r, w)| {
+        let weights = near.iter().map(|r| (-0.5 * r.more).exp());
+        let sum = 1.0 + weights.clone().sum::<f64>();
+        let mut each = vec![format!("{now}{} (probability {:.2})", late(own), 1.0 / sum)];
+        each.extend(near.iter().zip(weights).map(|(r, w)| {
             format!("{}{} (probability {:.2})", r.hold.words(), late(r.delay), w / sum)
-        });
-        let each: Vec<String> = std::iter::once(first).chain(others).collect();
+        }));
         return Some(format!(
             "Cannot tell what the torque does between rows: {}. The values are those of the first; their standard deviations \
              include the others. --torque sets it.",
@@ -368,15 +340,10 @@ fn shares<'a>(
     let mut all = Vec::new();
     for (k, name) in full.names.iter().enumerate() {
         let share = 1.0 - (own.std(k) / full.std(k)).powi(2);
-        let most = full
-            .tolerances
-            .iter()
-            .map(|(name, draws)| (name, correlation(draws, &full.columns[k]).abs()))
-            .filter(|(_, correlation)| correlation.is_finite())
-            .max_by(|a, b| a.1.total_cmp(&b.1));
-        if let Some((most, _)) = most {
-            all.push(Share { name: name.clone(), share, most: most.clone() });
-        }
+        let each = full.tolerances.iter();
+        let each = each.map(|(of, draws)| (of, correlation(draws, &full.columns[k]).abs()));
+        let most = each.filter(|(_, r)| r.is_finite()).max_by(|a, b| a.1.total_cmp(&b.1));
+        all.extend(most.map(|(most, _)| Share { name: name.clone(), share, most: most.clone() }));
     }
     let known: Vec<String> =
         known.map(|(name, std)| format!("{name} {} %", (1e6 * std).round() / 1e4)).collect();
@@ -388,18 +355,17 @@ fn shares<'a>(
 fn regime(model: &str, angle: f64) -> Option<String> {
     let wave = 2.0 * angle / (XI[0] * XI[0] - 1.0);
     let (is, advice) = match Regime::from_ratio(wave) {
+        _ if model == SloshModel::Frozen.name() => return None,
         Regime::Nonlinear => ("nonlinear", "less torque is better known"),
         Regime::Transitional if model == SloshModel::Linear.name() => {
             ("between linear and nonlinear", "--model planar,spherical tells whether that matters")
         }
         _ => return None,
     };
-    (model != SloshModel::Frozen.name()).then(|| {
-        format!(
-            "The slosh is {is}: the fit has a slosh angle up to {angle:.2} rad, a wave of {wave:.2} of the radius (linear up to 0.15, \
-             nonlinear from 0.25); {advice}."
-        )
-    })
+    Some(format!(
+        "The slosh is {is}: the fit has a slosh angle up to {angle:.2} rad, a wave of {wave:.2} of the radius (linear up to 0.15, \
+         nonlinear from 0.25); {advice}."
+    ))
 }
 
 /// Adds the known values that the recordings determine better than their tolerances to `parameters`, as estimates within these
@@ -419,19 +385,13 @@ fn shown(
         if !free[j] || unknown.part != Part::Tolerance || relative > SHOWN * prior {
             continue;
         }
-        let nominal = match &system.targets[j] {
-            Target::Arm => system.bench.arm,
-            Target::Density => system.bench.density,
-            Target::Gravity => system.bench.gravity,
-            _ => 1.0,
+        let (nominal, unit) = match &system.targets[j] {
+            Target::Arm => (system.bench.arm, "m"),
+            Target::Density => (system.bench.density, "kg/m3"),
+            Target::Gravity => (system.bench.gravity, "m/s2"),
+            _ => (1.0, "1"),
         };
         let value = nominal * unknown.value(solution.minimum.point.z[j]);
-        let unit = match &system.targets[j] {
-            Target::Arm => "m",
-            Target::Density => "kg/m3",
-            Target::Gravity => "m/s2",
-            _ => "1",
-        };
         let estimated = Estimated::normal(value, relative * value, unit);
         sentences.push(format!(
             "{name} is estimated within its tolerance, because the recordings tell more of it than was known: {value:.4e} ± {:.1e} {}.",
@@ -441,20 +401,6 @@ fn shown(
         parameters.insert(name.clone(), estimated);
     }
     sentences
-}
-
-fn condition(solution: &Solution) -> f64 {
-    let Some(found) = &solution.minimum.derivatives else { return f64::NAN };
-    let picked = found.matrix.select_columns(&places(&solution.fit.free));
-    let a: DMatrix<f64> = picked.tr_mul(&picked);
-    let scaled = DMatrix::from_fn(a.nrows(), a.ncols(), |i, j| {
-        a[(i, j)] / (a[(i, i)] * a[(j, j)]).sqrt().max(1e-300)
-    });
-    if scaled.iter().any(|v| !v.is_finite()) || scaled.is_empty() {
-        return f64::NAN;
-    }
-    let values = scaled.symmetric_eigen().eigenvalues;
-    (values.max() / values.min().max(1e-300)).sqrt()
 }
 
 fn residuals(system: &BenchSystem, solution: &Solution) -> Vec<Residual> {

@@ -10,11 +10,10 @@ use files::budget;
 use host::fmu::Fmu;
 use nalgebra::Matrix5;
 
-use crate::bench::nominal::Nominal;
+use crate::bench::nominal::{Nominal, PARAMETERS};
 use crate::bench::options::Options;
 use crate::bench::problem;
 use crate::bench::simulate::Setup;
-use crate::bench::start::PARAMETERS;
 use crate::engine::minimum::Minimum;
 use crate::engine::{Fit, Hold, Solution};
 use crate::input::recording::Recording;
@@ -334,21 +333,13 @@ pub fn cramer_rao(
         starts: 1,
     };
     let found = solution.draw(false)?;
-    let start = nominal.start;
-    let expected = [
-        start.d,
-        start.h,
-        start.zeta,
-        start.hub_inertia,
-        start.b,
-        start.c,
-        start.stribeck,
-        start.omega_s,
-    ];
     let row = |k: usize| {
         let name = found.names[k].clone();
-        let place = PARAMETERS.iter().position(|other| *other == name);
-        (name, place.map_or(found.values[k], |place| expected[place]), found.std(k))
+        let value = match PARAMETERS.contains(&name.as_str()) {
+            true => nominal.start.parameter(&name),
+            false => found.values[k],
+        };
+        (name, value, found.std(k))
     };
     Ok((0..found.names.len()).map(row).collect())
 }

@@ -16,6 +16,18 @@ pub struct Bench {
     pub gravity: f64,
 }
 
+/// Parameters of the FMU that have a start from the data, in the order of [`Start`].
+pub const PARAMETERS: [&str; 8] = [
+    tank::D,
+    tank::H,
+    slosh::ZETA,
+    hub::I,
+    friction::B,
+    friction::C,
+    friction::D,
+    friction::OMEGA_S,
+];
+
 /// Start of a search: estimated values of the bench in the time domain; SI units.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 #[allow(missing_docs)]
@@ -36,6 +48,25 @@ pub struct Start {
 }
 
 impl Start {
+    /// Returns the value of one of the [`PARAMETERS`].
+    pub fn parameter(mut self, name: &str) -> f64 {
+        *self.parameter_mut(name)
+    }
+
+    /// Returns the place of the value of one of the [`PARAMETERS`].
+    pub fn parameter_mut(&mut self, name: &str) -> &mut f64 {
+        match name {
+            tank::D => &mut self.d,
+            tank::H => &mut self.h,
+            slosh::ZETA => &mut self.zeta,
+            hub::I => &mut self.hub_inertia,
+            friction::B => &mut self.b,
+            friction::C => &mut self.c,
+            friction::D => &mut self.stribeck,
+            _ => &mut self.omega_s,
+        }
+    }
+
     /// Returns the start with length, mass ratio and inertia of the first mode in its tank.
     pub fn with_modes(self, bench: Bench) -> Self {
         let liquid = bench.liquid(self.d, self.h);
@@ -129,17 +160,11 @@ impl Nominal {
         let mut real = |name: &str| instance.real(name);
         let bench =
             Bench { arm: real(tank::R)?, density: real(fluid::RHO)?, gravity: real(G_AXIAL)? };
-        let start = Start {
-            d: real(tank::D)?,
-            h: real(tank::H)?,
-            zeta: real(&slosh::DAMPING.element([1]))?,
-            hub_inertia: real(hub::I)?,
-            b: real(friction::B)?,
-            c: real(friction::C)?,
-            stribeck: real(friction::D)?,
-            omega_s: real(friction::OMEGA_S)?,
-            ..Start::default()
-        };
+        let mut start = Start::default();
+        for name in PARAMETERS {
+            *start.parameter_mut(name) = real(name)?;
+        }
+        start.zeta = real(&slosh::DAMPING.element([1]))?;
         let start = start.with_modes(bench);
         let inertia = start.hub_inertia + bench.inertia(bench.liquid(start.d, start.h));
         Ok(Nominal { bench, start, inertia, period: 1.0 / real(&slosh::FREQUENCY.element([1]))? })

@@ -7,15 +7,17 @@ use anyhow::{Result, ensure};
 use host::causality::Causality;
 use host::description::Type;
 use host::fmu::Fmu;
-use names::hubslosh::{FrictionModel, SloshModel, fluid, friction, hub, init, slosh, tank};
+use names::hubslosh::{FrictionModel, SloshModel, friction, hub, init, slosh, tank, wheel};
 
 use super::combination;
-use super::system::{BESIDES, BenchSystem, Target};
+use super::system::{BESIDES, BenchSystem, Besides, Target};
 use crate::bench::breaking;
-use crate::bench::nominal::{self, Nominal, Start};
+use crate::bench::nominal::{self, Nominal, PARAMETERS, Start};
 use crate::bench::options::Options;
+use crate::bench::simulate::TORQUE_BESIDES;
 use crate::engine::{Drift, Hold, Part, Problem, Recorded, Role, Signal, Unknown};
 use crate::input::recording::Recording;
+use crate::input::tolerance;
 use crate::model::overridden::{near, refuse};
 use crate::model::unknown::range;
 
@@ -50,26 +52,29 @@ impl List<'_> {
         self.unknowns.push(unknown);
     }
 
-    fn range(&self, name: &str) -> (f64, f64) {
-        let found = self.fmu.description().variable(name).map(range);
-        found.map_or((f64::NEG_INFINITY, f64::INFINITY), Into::into)
+    /// Adds the parameter of the FMU that has the unknown's name.
+    fn add_parameter(&mut self, unknown: Unknown) {
+        self.add(Target::Parameter(unknown.name.clone()), unknown);
     }
 
-    fn unit(&self, name: &str) -> String {
+    /// Returns a parameter of the FMU: its unit, and its bounds within `least` to `largest`.
+    fn variable(&self, name: &str, (least, largest): (f64, f64)) -> (String, (f64, f64)) {
         let description = self.fmu.description();
-        description.variable(name).map_or("1".into(), |v| description.unit(v).to_string())
+        let Ok(variable) = description.variable(name) else {
+            return ("1".into(), (least, largest));
+        };
+        let [low, high] = range(variable);
+        (description.unit(variable).into(), (low.max(least), high.min(largest)))
     }
 
     fn parameter(&self, name: &str, start: f64) -> Unknown {
-        let (low, high) = self.range(name);
-        let bounds = (low.max(1e-6 * start), high.min(1e6 * start));
-        Unknown::positive(name, &self.unit(name), Role::Run(None), start, bounds)
+        let (unit, bounds) = self.variable(name, (1e-6 * start, 1e6 * start));
+        Unknown::positive(name, &unit, Role::Run(None), start, bounds)
     }
 
     fn nonnegative(&self, name: &str, start: f64) -> Unknown {
-        let (low, high) = self.range(name);
-        let bounds = (low.max(0.0), high);
-        Unknown::linear(name, &self.unit(name), Role::Run(None), (start, start), bounds)
+        let (unit, bounds) = self.variable(name, (0.0, f64::INFINITY));
+        Unknown::linear(name, &unit, Role::Run(None), (start, start), bounds)
     }
 }
 
@@ -86,89 +91,59 @@ pub fn system<'a>(
     let nominal = Nominal::of(fmu, &options.settings, &[])?;
     let is_set = |name: &str| options.settings.iter().any(|(n, _)| n == name);
     let known = |name: &str| options.known.iter().find(|(n, ..)| n == name);
+    let given = |name: &str| options.starts.iter().find(|(n, _)| n == name).map(|(_, v)| *v);
     let frozen = model == SloshModel::Frozen.name();
+    let run = Role::Run(None);
     // the FMU's own parameters where tank, hub or modes are set or known
     let shapes = [tank::D, tank::H, hub::I];
-    let other = |name: &&String| name.starts_with("slosh.") && *name != slosh::MODEL;
+    let is_shaped = |name: &str| name.starts_with("slosh.") && name != slosh::MODEL;
     let by_modes = !frozen
         && !shapes.iter().any(|name| is_set(name) || known(name).is_some())
-        && !options.settings.iter().map(|(name, _)| name).any(|name| other(&name));
-    let given = |name: &str| options.starts.iter().find(|(n, _)| n == name).map(|(_, v)| *v);
+        && !options.settings.iter().any(|(name, _)| is_shaped(name));
     let start_of = |start: &Start| -> Start {
-        let own = Start {
-            d: given(tank::D).unwrap_or(start.d),
-            h: given(tank::H).unwrap_or(start.h),
-            zeta: given(slosh::ZETA).unwrap_or(start.zeta),
-            hub_inertia: given(hub::I).unwrap_or(start.hub_inertia),
-            b: given(friction::B).unwrap_or(start.b),
-            c: given(friction::C).unwrap_or(start.c),
-            stribeck: given(friction::D).unwrap_or(start.stribeck),
-            omega_s: given(friction::OMEGA_S).unwrap_or(start.omega_s),
-            ..*start
-        };
-        if shapes.iter().any(|name| given(name).is_some()) {
-            own.with_modes(nominal.bench)
-        } else {
-            own
+        let mut own = *start;
+        for name in PARAMETERS {
+            *own.parameter_mut(name) = given(name).unwrap_or(own.parameter(name));
+        }
+        match shapes.iter().any(|name| given(name).is_some()) {
+            true => own.with_modes(nominal.bench),
+            false => own,
         }
     };
     let mut all: Vec<Start> = starts.iter().map(start_of).collect();
     if !options.starts.is_empty() {
         all.extend_from_slice(starts);
     }
-    let first = all[0];
+    let mut first = all[0];
     let mut list = List { fmu, unknowns: Vec::new(), targets: Vec::new() };
-    if !frozen && by_modes {
-        let within = |value: f64, by: f64| (value / by, value * by);
-        let length = Unknown::positive(
-            tank::D,
-            "m",
-            Role::Run(None),
-            first.length,
-            within(first.length, 10.0),
-        );
-        list.add(Target::Length, length);
-        let ratio = first.mass_ratio.clamp(0.01, 1.0);
-        list.add(
-            Target::MassRatio,
-            Unknown::positive(tank::H, "m", Role::Run(None), ratio, (0.002, 3.0)),
-        );
+    if by_modes {
+        let positive = |name: &str, unit: &str, start: f64, by: f64| {
+            Unknown::positive(name, unit, run, start, (start / by, start * by))
+        };
+        list.add(Target::Length, positive(tank::D, "m", first.length, 10.0));
+        let ratio = positive(tank::H, "m", first.mass_ratio.clamp(0.01, 1.0), 1.0);
+        list.add(Target::MassRatio, Unknown { bounds: (0.002, 3.0), ..ratio });
         let zeta = list.parameter(slosh::ZETA, first.zeta);
         list.add(Target::Zeta, Unknown { bounds: (1e-5, 0.9), ..zeta });
-        let inertia = Unknown::positive(
-            hub::I,
-            "kg.m2",
-            Role::Run(None),
-            first.inertia,
-            within(first.inertia, 20.0),
-        );
-        list.add(Target::Inertia, inertia);
+        list.add(Target::Inertia, positive(hub::I, "kg.m2", first.inertia, 20.0));
     } else {
-        let own = [
-            (tank::D, first.d, !frozen),
-            (tank::H, first.h, !frozen),
-            (slosh::ZETA, first.zeta, !frozen),
-        ];
-        let inertia = if first.hub_inertia > 0.0 { first.hub_inertia } else { 0.3 };
-        for (name, start, used) in own.into_iter().chain([(hub::I, inertia, true)]) {
-            if used && !is_set(name) {
-                let unknown = list.parameter(name, start);
-                list.add(Target::Parameter(name.into()), unknown);
+        if first.hub_inertia <= 0.0 {
+            first.hub_inertia = 0.3;
+        }
+        for name in [tank::D, tank::H, slosh::ZETA, hub::I] {
+            if !is_set(name) && (name == hub::I || !frozen) {
+                list.add_parameter(list.parameter(name, first.parameter(name)));
             }
         }
     }
     let viscous = law != FrictionModel::None.name();
     let dry = viscous && law != FrictionModel::Viscous.name();
-    for (name, start, used) in [
-        (friction::B, first.b, viscous),
-        (friction::C, first.c, dry),
-        (friction::D, first.stribeck, dry),
-    ] {
+    for (name, used) in [(friction::B, viscous), (friction::C, dry), (friction::D, dry)] {
         if used && !is_set(name) {
+            let start = first.parameter(name);
             let own = list.nonnegative(name, start).with_prior(start, FRICTION_WIDTH * start);
             // the bristle law takes none that is 0
-            let unknown = Unknown { bounds: (LEAST_FRICTION * start, own.bounds.1), ..own };
-            list.add(Target::Parameter(name.into()), unknown);
+            list.add_parameter(Unknown { bounds: (LEAST_FRICTION * start, own.bounds.1), ..own });
         }
     }
     if dry && !is_set(friction::OMEGA_S) {
@@ -176,30 +151,18 @@ pub fn system<'a>(
         let start = first.omega_s.max(nominal.start.omega_s);
         let unknown = list.parameter(friction::OMEGA_S, start).with_prior(start.ln(), SPEED.0);
         let bounds = (start / SPEED.1, start * SPEED.1);
-        let bent = !is_set(friction::D);
-        list.add(Target::Parameter(friction::OMEGA_S.into()), Unknown { bounds, bent, ..unknown });
+        list.add_parameter(Unknown { bounds, bent: !is_set(friction::D), ..unknown });
     }
     if law == FrictionModel::Lugre.name() && !is_set(friction::SIGMA0) {
         // stiffer bristles move less than 1/100 of what a gyro of this kind sees
         let unknown = list.parameter(friction::SIGMA0, 100.0);
-        list.add(
-            Target::Parameter(friction::SIGMA0.into()),
-            Unknown { bounds: (0.1, 1000.0), ..unknown },
-        );
+        list.add_parameter(Unknown { bounds: (0.1, 1000.0), ..unknown });
     }
     // parameters that are estimated because a start or something known of them is given
     for name in options.starts.iter().map(|s| &s.0).chain(options.known.iter().map(|k| &k.0)) {
-        let there = list.unknowns.iter().any(|u| u.name == *name);
-        let unused = [
-            tank::D,
-            tank::H,
-            slosh::ZETA,
-            friction::B,
-            friction::C,
-            friction::D,
-            friction::OMEGA_S,
-        ];
-        if there || is_set(name) || name == friction::ASYMMETRY || unused.contains(&name.as_str()) {
+        let is_listed = list.unknowns.iter().any(|u| u.name == *name);
+        let is_of_bench = PARAMETERS.contains(&name.as_str()) || name == friction::ASYMMETRY;
+        if is_listed || is_set(name) || is_of_bench {
             continue;
         }
         let variable = fmu.description().variable(name)?;
@@ -209,8 +172,7 @@ pub fn system<'a>(
         );
         let start = given(name).or(known(name).map(|k| k.1)).unwrap_or(1.0);
         ensure!(start > 0.0, "{name}: only positive parameters can be estimated");
-        let unknown = list.nonnegative(name, start);
-        list.add(Target::Parameter(name.clone()), unknown);
+        list.add_parameter(list.nonnegative(name, start));
     }
     for (name, mean, std) in &options.known {
         if let Some(unknown) = list.unknowns.iter_mut().find(|u| u.name == *name) {
@@ -227,12 +189,12 @@ pub fn system<'a>(
                 let one = Unknown::linear(friction::ASYMMETRY, "1", role, (0.0, 0.1), (-end, end));
                 one.with_prior(0.0, ASYMMETRY)
             };
-            if way == 0.0 {
-                let target = Target::Parameter(friction::ASYMMETRY.into());
-                list.add(target, of(Role::Run(None), 0.98));
-            } else {
-                let one = Unknown { part: Part::Tolerance, ..of(Role::Derived, 0.9) };
-                list.add(Target::Asymmetry, one);
+            match way == 0.0 {
+                true => list.add_parameter(of(run, 0.98)),
+                false => {
+                    let one = Unknown { part: Part::Tolerance, ..of(Role::Derived, 0.9) };
+                    list.add(Target::Asymmetry, one);
+                }
             }
         }
         let (std, low, high) = DELAY;
@@ -260,31 +222,25 @@ pub fn system<'a>(
     }
     if options.breaking && !frozen {
         let (begins, std) = breaking::BEGINS;
-        if !is_set(slosh::ZETA_BREAKING) {
-            let growth = list.nonnegative(slosh::ZETA_BREAKING, 0.04).with_prior(0.04, 0.2);
-            list.add(Target::Parameter(slosh::ZETA_BREAKING.into()), growth);
-        }
-        if !is_set(slosh::BREAKING_STEEPNESS) {
-            let onset = list.nonnegative(slosh::BREAKING_STEEPNESS, begins).with_prior(begins, std);
-            list.add(
-                Target::Parameter(slosh::BREAKING_STEEPNESS.into()),
-                Unknown { reach: 0.1, ..onset },
-            );
+        let growth = list.nonnegative(slosh::ZETA_BREAKING, 0.04).with_prior(0.04, 0.2);
+        let onset = list.nonnegative(slosh::BREAKING_STEEPNESS, begins).with_prior(begins, std);
+        for one in [growth, Unknown { reach: 0.1, ..onset }] {
+            if !is_set(&one.name) {
+                list.add_parameter(one);
+            }
         }
     }
     for (k, recording) in recordings.iter().enumerate().filter(|(_, r)| !r.from_rest) {
-        let role = Role::Run(Some(k));
         let (rate, spread) = (recording.first_rate(), deviation(&recording.rate));
-        let one = |name: &str, unit: &str, start: (f64, f64), bounds| {
-            Unknown::linear(&format!("{name}[{}]", k + 1), unit, role, start, bounds)
-        };
-        let omega = one(init::OMEGA, "rad/s", (rate, spread), (-1e3, 1e3)).with_prior(rate, spread);
-        list.add(Target::Initial(k, init::OMEGA.into()), omega);
-        if !frozen {
-            let angle = one(init::SLOSH_ANGLE, "rad", (0.0, 0.1), (-1.4, 1.4));
-            list.add(Target::Initial(k, init::SLOSH_ANGLE.into()), angle.with_prior(0.0, 0.5));
-            let speed = one(init::SLOSH_RATE, "rad/s", (0.0, 1.0), (-100.0, 100.0));
-            list.add(Target::Initial(k, init::SLOSH_RATE.into()), speed.with_prior(0.0, 7.0));
+        let states = [
+            (init::OMEGA, "rad/s", (rate, spread), 1e3, spread),
+            (init::SLOSH_ANGLE, "rad", (0.0, 0.1), 1.4, 0.5),
+            (init::SLOSH_RATE, "rad/s", (0.0, 1.0), 100.0, 7.0),
+        ];
+        for (name, unit, start, end, std) in &states[..if frozen { 1 } else { 3 }] {
+            let (role, own) = (Role::Run(Some(k)), format!("{name}[{}]", k + 1));
+            let state = Unknown::linear(&own, unit, role, *start, (-end, *end));
+            list.add(Target::Initial(k, (*name).into()), state.with_prior(start.0, *std));
         }
     }
     // with an encoder the rate's scale shows, and where slosh is not linear: without it no residual would be noise
@@ -298,30 +254,18 @@ pub fn system<'a>(
     }
     let derived: Vec<(String, String)> =
         list.unknowns.iter().map(|u| (u.name.clone(), u.unit.clone())).collect();
+    let targets = [Target::Torque, Target::Clock, Target::Gravity, Target::Arm, Target::Density];
     let is_recorded = recordings.iter().any(|r| r.gravity.is_some());
-    let tolerances = options.tolerances;
-    let run = Role::Run(None);
-    for (target, name, std, role) in [
-        (Target::Torque, "torque", tolerances.torque, run),
-        (Target::Clock, "clock", tolerances.clock, run),
-        (
-            Target::Gravity,
-            names::hubslosh::G_AXIAL,
-            if is_recorded { 0.0 } else { tolerances.gravity },
-            run,
-        ),
-        (Target::Arm, tank::R, tolerances.arm, run),
-        (
-            Target::Density,
-            fluid::RHO,
-            tolerances.density,
-            if by_modes { Role::Derived } else { run },
-        ),
-    ] {
-        if std > 0.0 && !is_told(name, options) {
+    for ((target, name), std) in
+        targets.into_iter().zip(tolerance::NAMES).zip(options.tolerances.all())
+    {
+        // a value with a prior or a start gets no tolerance in addition
+        let is_told = known(name).is_some() || given(name).is_some();
+        if std > 0.0 && !is_told && !(target == Target::Gravity && is_recorded) {
+            let is_derived = target == Target::Density && by_modes;
+            let role = if is_derived { Role::Derived } else { run };
             let one = Unknown::positive(name, "1", role, 1.0, WIDEST).with_prior(0.0, std);
-            let part = Part::Tolerance;
-            list.add(target, Unknown { part, reach: std, ..one });
+            list.add(target, Unknown { part: Part::Tolerance, reach: std, ..one });
         }
     }
     candidates(&mut list, options, frozen, law);
@@ -338,9 +282,8 @@ pub fn system<'a>(
     settings.extend(options.settings.iter().filter(|(name, _)| !chosen(name)).cloned());
     let List { unknowns, targets, .. } = list;
     for u in &unknowns {
-        let is_in = u.start.is_finite() && u.bounds.0 <= u.bounds.1;
         ensure!(
-            is_in,
+            u.start.is_finite() && u.bounds.0 <= u.bounds.1,
             "the recordings give {} = {:.3e} as the start of the search, which is impossible for a bench. Check units and signs of the columns, and the settings of the bench",
             u.name,
             u.start
@@ -353,17 +296,13 @@ pub fn system<'a>(
             Target::MassRatio => start.mass_ratio,
             Target::Inertia => start.inertia,
             Target::Zeta => start.zeta,
-            Target::Parameter(name) if known(name).is_none() => match name.as_str() {
-                tank::D => start.d,
-                tank::H => start.h,
-                slosh::ZETA => start.zeta,
-                hub::I if start.hub_inertia > 0.0 => start.hub_inertia,
-                friction::B => start.b,
-                friction::C => start.c,
-                friction::D => start.stribeck,
-                friction::OMEGA_S => start.omega_s,
-                _ => unknown.start,
-            },
+            Target::Parameter(name)
+                if PARAMETERS.contains(&name.as_str())
+                    && known(name).is_none()
+                    && (name != hub::I || start.hub_inertia > 0.0) =>
+            {
+                start.parameter(name)
+            }
             _ => unknown.start,
         };
         unknowns.iter().zip(&targets).map(of).collect()
@@ -396,12 +335,6 @@ fn way(recordings: &[Recording]) -> f64 {
     if recordings.iter().all(|recording| one(recording) == first) { first } else { 0.0 }
 }
 
-/// Returns true if the options have a prior or a start of a value, so that it gets no tolerance in addition.
-fn is_told(name: &str, options: &Options) -> bool {
-    options.known.iter().any(|(known, ..)| known == name)
-        || options.starts.iter().any(|(s, _)| s == name)
-}
-
 fn bias(name: &str, unit: &str, (output, recording): (usize, usize), start: f64) -> Unknown {
     let role = Role::Bias(output, Some(recording));
     Unknown::linear(name, unit, role, (start, 1e-2), (f64::NEG_INFINITY, f64::INFINITY))
@@ -409,60 +342,48 @@ fn bias(name: &str, unit: &str, (output, recording): (usize, usize), start: f64)
 
 /// Returns an effect that the FMU does not have as an unknown. A free effect starts at its plausible size, any other at 0.
 pub fn effect(target: &Target, part: Part) -> Unknown {
-    let run = Role::Run(None);
-    let lag = |name: &str| Unknown::linear(name, "s", run, (0.0, 0.02), (0.0, 1.0));
-    let unknown = match target {
-        Target::ActuatorLag => lag("actuator_lag"),
-        Target::GyroLag => lag("gyro_lag"),
-        Target::FrictionDrift => {
-            Unknown::linear("friction_drift", "1", run, (0.0, 0.1), (-0.95, 5.0))
-        }
-        Target::Limit => Unknown::linear("limit", "1", run, (0.0, 0.1), (0.0, 0.7)),
-        Target::Compliance => {
-            Unknown::linear("compliance", "rad/(N.m)", run, (0.0, 1e-2), (0.0, 10.0))
-        }
-        Target::SecondMode => Unknown::linear("second mode", "1", run, (0.0, 1.0), (0.0, 3.0)),
+    let (name, unit, reach, bounds) = match target {
+        Target::ActuatorLag => ("actuator_lag", "s", 0.02, (0.0, 1.0)),
+        Target::GyroLag => ("gyro_lag", "s", 0.02, (0.0, 1.0)),
+        Target::FrictionDrift => ("friction_drift", "1", 0.1, (-0.95, 5.0)),
+        Target::Limit => ("limit", "1", 0.1, (0.0, 0.7)),
+        Target::Compliance => ("compliance", "rad/(N.m)", 1e-2, (0.0, 10.0)),
+        Target::SecondMode => ("second mode", "1", 1.0, (0.0, 3.0)),
         Target::Besides(kind) => {
-            let Some(one) = BESIDES.get(*kind) else { return lag("lag") };
-            let free = (f64::NEG_INFINITY, f64::INFINITY);
-            Unknown::linear(one.follows, one.unit, run, (0.0, 1e-4), free)
+            let Besides { follows, unit, .. } = BESIDES[*kind];
+            (follows, unit, 1e-4, (f64::NEG_INFINITY, f64::INFINITY))
         }
-        _ => Unknown::linear("effect", "1", run, (0.0, 1.0), (0.0, 1.0)),
+        _ => ("effect", "1", 1.0, (0.0, 1.0)),
     };
-    let start = if part == Part::Free { unknown.reach } else { 0.0 };
-    Unknown { part, start, ..unknown }
+    let start = if part == Part::Free { reach } else { 0.0 };
+    Unknown { part, ..Unknown::linear(name, unit, Role::Run(None), (start, reach), bounds) }
 }
 
 fn candidates(list: &mut List, options: &Options, frozen: bool, law: &str) {
     let is_set = |name: &str| options.settings.iter().any(|(n, _)| n == name);
-    let add = |list: &mut List, target: Target| {
+    let mut all: Vec<(Target, Unknown)> = Vec::new();
+    for (target, used) in [
+        (Target::ActuatorLag, true),
+        (Target::GyroLag, true),
+        (Target::FrictionDrift, true),
+        (Target::Limit, !is_set(wheel::TAU_MAX)),
+        (Target::Compliance, law == FrictionModel::Stribeck.name()),
+        (Target::SecondMode, !frozen && !is_set(slosh::MODES)),
+    ] {
+        all.extend(used.then(|| (target.clone(), effect(&target, Part::Candidate))));
+    }
+    for (name, reach, used) in [(hub::K, 0.02, true), (slosh::ZETA_AMPLITUDE, 0.005, !frozen)] {
+        let unknown = Unknown { part: Part::Candidate, reach, ..list.nonnegative(name, 0.0) };
+        all.extend((used && !is_set(name)).then(|| (Target::Parameter(name.into()), unknown)));
+    }
+    if list.fmu.description().variable(TORQUE_BESIDES).is_ok() {
+        let torques = (0..BESIDES.len()).map(Target::Besides);
+        all.extend(torques.map(|target| (target.clone(), effect(&target, Part::Candidate))));
+    }
+    for (target, unknown) in all {
         if !list.targets.contains(&target) {
-            let unknown = effect(&target, Part::Candidate);
             list.add(target, unknown);
         }
-    };
-    add(list, Target::ActuatorLag);
-    add(list, Target::GyroLag);
-    add(list, Target::FrictionDrift);
-    if !is_set(names::hubslosh::wheel::TAU_MAX) {
-        add(list, Target::Limit);
-    }
-    if law == FrictionModel::Stribeck.name() {
-        add(list, Target::Compliance);
-    }
-    if !frozen && !is_set(slosh::MODES) {
-        add(list, Target::SecondMode);
-    }
-    let parameters = [(hub::K, 0.02, true), (slosh::ZETA_AMPLITUDE, 0.005, !frozen)];
-    for (name, reach, used) in parameters {
-        let target = Target::Parameter(name.into());
-        if used && !is_set(name) && !list.targets.contains(&target) {
-            let unknown = list.nonnegative(name, 0.0);
-            list.add(target, Unknown { part: Part::Candidate, reach, ..unknown });
-        }
-    }
-    if list.fmu.description().variable(names::hubslosh::TAU_EXT).is_ok() {
-        (0..BESIDES.len()).for_each(|kind| add(list, Target::Besides(kind)));
     }
 }
 

@@ -1,5 +1,5 @@
 //! Starts from the data: frequency response, three poles and two zeros, and from these the tank, the
-//! inertia and the friction ([`Plant`]). The tank is the upright cylinder whose first mode has this frequency and mass.
+//! inertia and the friction ([`translate`]). The tank is the upright cylinder whose first mode has this frequency and mass.
 
 use std::f64::consts::{PI, TAU};
 
@@ -9,7 +9,6 @@ use analysis::transfer_function::TransferFunction;
 use analysis::{Complex64, FrequencyResponse};
 use anyhow::Result;
 use formulas::cylinder::tank_of_first_mode;
-use names::hubslosh::{friction, hub, slosh, tank};
 use signals::fourier::Forward;
 
 use crate::bench::nominal::{Bench, Nominal, Start};
@@ -29,18 +28,7 @@ pub struct Response {
     pub fit: f64,
 }
 
-pub const PARAMETERS: [&str; 8] = [
-    tank::D,
-    tank::H,
-    slosh::ZETA,
-    hub::I,
-    friction::B,
-    friction::C,
-    friction::D,
-    friction::OMEGA_S,
-];
-
-/// A hub with one slosh mode and viscous friction as three poles and two zeros.
+/// Fits a hub with one slosh mode and viscous friction b, as three poles and two zeros, to a measured response.
 ///
 /// ```text
 /// Ω/τ = (b2 s² + b1 s + b0)/(s³ + a2 s² + a1 s + a0),   μ = m r²/I0
@@ -48,47 +36,19 @@ pub const PARAMETERS: [&str; 8] = [
 /// a0 = ω² b/I0,  a1 = ω²(1 + μ) + 2ζω b/I0,  a2 = b/I0 + 2ζω(1 + μ)
 /// ```
 ///
-/// (thesis 6.7, corrected). The six coefficients are functions of five unknowns, so that a2 follows from the others. The
-/// difference, `structure`, shows whether the bench has this structure.
-#[derive(Clone, Copy, Debug)]
-pub struct Plant {
-    pub omega: f64,
-    pub zeta: f64,
-    pub inertia: f64,
-    pub mass_ratio: f64,
-    pub friction: f64,
-    /// a2 less its value from the other coefficients, 1/s; 0 if the bench has this structure.
-    pub structure: f64,
-}
-
-impl Plant {
-    /// Returns the hub's quantities from the coefficients; `None` if no such hub has them.
-    pub fn of([b2, b1, b0]: [f64; 3], [a2, a1, a0]: [f64; 3]) -> Option<Self> {
-        let omega = (b2 > 0.0 && b0 > 0.0).then(|| (b0 / b2).sqrt())?;
-        let zeta = b1 / b2 / (2.0 * omega);
-        let inertia = 1.0 / b2;
-        let friction = a0 / (omega * omega) * inertia;
-        let mass_ratio = (a1 - 2.0 * zeta * omega * friction / inertia) / (omega * omega) - 1.0;
-        let structure = a2 - friction / inertia - 2.0 * zeta * omega * (1.0 + mass_ratio);
-        Some(Plant { omega, zeta, inertia, mass_ratio, friction, structure })
-    }
-
-    pub fn mass(&self, bench: Bench) -> f64 {
-        self.mass_ratio * self.inertia / bench.inertia(1.0)
-    }
-}
-
-/// Fits poles and zeros to a measured response and returns slosh and inertia; `None` if the slosh is not within the measured
-/// band.
+/// (thesis 6.7, corrected). The six coefficients are functions of five unknowns, so that a2 follows from the others. `None` if no
+/// such hub has these coefficients, or if the slosh is not within the measured band.
 pub fn translate(measured: &FrequencyResponse, bench: Bench) -> Option<Response> {
     let model = TransferFunction::fit(measured)?;
-    let plant = Plant::of(model.numerator, model.denominator())?;
+    let ([b2, b1, b0], [_, a1, a0]) = (model.numerator, model.denominator());
+    let square = (b2 > 0.0 && b0 > 0.0).then(|| b0 / b2)?;
+    let mass_ratio = (a1 - b1 / b2 * a0 / square) / square - 1.0;
     let found = Response {
-        slosh_frequency: plant.omega / TAU,
-        slosh_damping: plant.zeta,
+        slosh_frequency: square.sqrt() / TAU,
+        slosh_damping: b1 / b2 / (2.0 * square.sqrt()),
         resonance_frequency: model.pole_frequency(),
-        slosh_mass: plant.mass(bench),
-        inertia: plant.inertia,
+        slosh_mass: mass_ratio / b2 / bench.inertia(1.0),
+        inertia: 1.0 / b2,
         fit: model.fit_frequency(measured),
     };
     let (low, high) = (measured.frequency[0], *measured.frequency.last()?);
@@ -111,19 +71,15 @@ pub fn from_data(
     nominal: &Nominal,
 ) -> Result<(Option<Response>, Vec<Start>)> {
     let bench = nominal.bench;
-    let mut responses: Vec<Response> = Vec::new();
     // a part of a slow sweep excites little; the others tell
-    let measured = recordings.iter().map(response);
-    let (measured, mut failed): (Vec<_>, Vec<_>) = measured.partition(Result::is_ok);
-    if measured.is_empty()
-        && let Some(Err(error)) = failed.pop()
-    {
-        return Err(error);
+    let (measured, failed): (Vec<_>, Vec<_>) =
+        recordings.iter().map(response).partition(Result::is_ok);
+    if measured.is_empty() {
+        failed.into_iter().collect::<Result<Vec<_>>>()?;
     }
-    for measured in measured.into_iter().flatten() {
-        let found = [translate(&measured, bench), from_features(&measured, bench)];
-        responses.extend(found.into_iter().flatten());
-    }
+    let both = |m: FrequencyResponse| [translate(&m, bench), from_features(&m, bench)];
+    let mut responses: Vec<Response> =
+        measured.into_iter().flatten().flat_map(both).flatten().collect();
     // a step may have a response by chance: one with the inertia of the bench comes first
     let key = |r: &Response| (!plausible::is_size(r.inertia, nominal.inertia), -r.fit);
     responses.sort_by(|a, b| key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal));
@@ -135,14 +91,13 @@ pub fn from_data(
     let parts = balances(recordings, bench, &|r| {
         excited(r).map_or(Vec::new(), |band| octaves(band.0, 0.4 / r.step()))
     });
-    let modes = [first].into_iter().chain(responses.iter().copied());
-    let mut modes: Vec<Response> = modes.chain(parts).collect();
-    let mut all = Vec::new();
-    while !modes.is_empty() {
-        let mode = modes.remove(0);
-        all.push(mode.start(bench, rough));
-        modes.retain(|other| !other.is_near(&mode));
+    let mut modes: Vec<Response> = Vec::new();
+    for mode in [first].into_iter().chain(responses.iter().copied()).chain(parts) {
+        if !modes.iter().any(|other| mode.is_near(other)) {
+            modes.push(mode);
+        }
     }
+    let mut all: Vec<Start> = modes.iter().map(|mode| mode.start(bench, rough)).collect();
     let Start { b, c, stribeck, omega_s, .. } = rough;
     all.push(Start { b, c, stribeck, omega_s, ..nominal.start });
     Ok((responses.first().copied().or(Some(first)), all))
@@ -153,12 +108,10 @@ fn balances(
     bench: Bench,
     bands: &dyn Fn(&Recording) -> Vec<(f64, f64)>,
 ) -> Vec<Response> {
-    let mut found: Vec<Balance> = Vec::new();
-    for recording in recordings {
-        found.extend(bands(recording).into_iter().filter_map(|b| balance(recording, bench, b)));
-    }
-    found.sort_by(|a, b| a.residual.total_cmp(&b.residual));
-    found.iter().map(|b| b.response(bench)).collect()
+    let each = |r| bands(r).into_iter().filter_map(move |band| balance(r, bench, band));
+    let mut found: Vec<(f64, Response)> = recordings.iter().flat_map(each).collect();
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    found.into_iter().map(|(_, response)| response).collect()
 }
 
 fn excited(recording: &Recording) -> Option<(f64, f64)> {
@@ -210,30 +163,6 @@ impl Response {
     }
 }
 
-#[derive(Clone, Copy, Debug)]
-pub struct Balance {
-    pub frequency: f64,
-    pub damping: f64,
-    pub mass: f64,
-    pub inertia: f64,
-    /// Root mean square of the residual over the root mean square of the hub's rate.
-    pub residual: f64,
-}
-
-impl Balance {
-    fn response(&self, bench: Bench) -> Response {
-        let ratio = bench.inertia(self.mass) / self.inertia;
-        Response {
-            slosh_frequency: self.frequency,
-            slosh_damping: self.damping,
-            resonance_frequency: self.frequency * (1.0 + ratio).sqrt(),
-            slosh_mass: self.mass,
-            inertia: self.inertia,
-            fit: 0.0,
-        }
-    }
-}
-
 /// Estimates the slosh mode from the balance of the torques T in the frequency domain, with the *measured* rate W:
 ///
 /// ```text
@@ -243,8 +172,9 @@ impl Balance {
 /// S is the spectrum of the rate's sign, and δ a delay, which also absorbs the effect of dry friction on the phase and is not
 /// used further. The unknowns are linear except the slosh frequency ω and the damping ratio ζ, which are taken from a grid. The
 /// residual is divided by |jΩ(I0 + m r² G)|, which makes it a rate. Because nothing is simulated, the lines of a multisine make
-/// no false minima; because dry friction is a term, its loss at small amplitudes is not taken for damping.
-pub fn balance(recording: &Recording, bench: Bench, band: (f64, f64)) -> Option<Balance> {
+/// no false minima; because dry friction is a term, its loss at small amplitudes is not taken for damping. The result has the root
+/// mean square of the residual over the root mean square of the hub's rate, and the bench.
+fn balance(recording: &Recording, bench: Bench, band: (f64, f64)) -> Option<(f64, Response)> {
     let (step, torque, rate) = recording.even().ok()?;
     let n = rate.len();
     let mean = mean(&rate);
@@ -292,49 +222,41 @@ pub fn balance(recording: &Recording, bench: Bench, band: (f64, f64)) -> Option<
         let scaled = nalgebra::Matrix5::from_fn(|a, b| normal[(a, b)] * scale[a] * scale[b]);
         let found = scaled.cholesky()?.solve(&right.component_mul(&scale)).component_mul(&scale);
         let residual = ((total - found.dot(&right)).max(0.0) / all).sqrt();
-        let plausible = found[0] > 0.0 && found[1] > 0.0;
-        plausible.then_some(Balance {
-            frequency,
-            damping,
-            mass: found[1] / bench.inertia(1.0),
-            inertia: found[0],
-            residual,
-        })
+        let (inertia, of_mass) = (found[0], found[1]);
+        let response = Response {
+            slosh_frequency: frequency,
+            slosh_damping: damping,
+            resonance_frequency: frequency * (1.0 + of_mass / inertia).sqrt(),
+            slosh_mass: of_mass / bench.inertia(1.0),
+            inertia,
+            fit: 0.0,
+        };
+        (inertia > 0.0 && of_mass > 0.0).then_some((residual, response))
     };
     let steps = ((band.1 / band.0).ln() / FREQUENCY_FINENESS) as u32;
     let grid = |damping: f64, low: f64, fineness: f64, count: u32| {
         (0..count).map(move |k| (low * (fineness * f64::from(k)).exp(), damping))
     };
+    let over_band = |damping: &f64| {
+        let fineness = (10.0 * damping * FREQUENCY_FINENESS).sqrt().max(FREQUENCY_FINENESS);
+        grid(*damping, band.0, fineness, steps).filter(|(f, _)| *f < band.1)
+    };
     let mut weights = (1.0, 0.1);
-    let mut best: Option<Balance> = None;
+    let mut best: Option<(f64, Response)> = None;
     for _ in 0..3 {
         let candidates: Vec<(f64, f64)> = match best {
-            None => DAMPINGS
+            None => DAMPINGS.iter().flat_map(over_band).collect(),
+            Some((_, near)) => [0.5, 0.7, 1.0, 1.4, 2.0]
                 .iter()
-                .flat_map(|&z| {
-                    grid(
-                        z,
-                        band.0,
-                        (10.0 * z * FREQUENCY_FINENESS).sqrt().max(FREQUENCY_FINENESS),
-                        steps,
-                    )
-                })
-                .filter(|(f, _)| *f < band.1)
-                .collect(),
-            Some(near) => [0.5, 0.7, 1.0, 1.4, 2.0]
-                .iter()
-                .flat_map(|z| grid(z * near.damping, near.frequency * 0.99, 2e-4, 100))
+                .flat_map(|z| grid(z * near.slosh_damping, near.slosh_frequency * 0.99, 2e-4, 100))
                 .collect(),
         };
-        let found = candidates
-            .into_iter()
-            .filter_map(|(f, z)| try_mode(f, z, weights))
-            .min_by(|a, b| a.residual.total_cmp(&b.residual));
-        let Some(found) = found else { break };
-        weights = (found.inertia, bench.inertia(found.mass));
+        let found = candidates.into_iter().filter_map(|(f, z)| try_mode(f, z, weights));
+        let Some(found) = found.min_by(|a, b| a.0.total_cmp(&b.0)) else { break };
+        weights = (found.1.inertia, bench.inertia(found.1.slosh_mass));
         best = Some(found);
     }
-    best.filter(|b| b.residual < 0.3)
+    best.filter(|(residual, _)| *residual < 0.3)
 }
 
 /// Returns a start from antiresonance, resonance and the inertia at the band's ends, for recordings that the transfer function

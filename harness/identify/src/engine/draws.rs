@@ -271,24 +271,16 @@ impl Derived {
         [at(0.025), at(0.975)]
     }
 
-    pub fn correlation(a: &[f64], b: &[f64]) -> f64 {
-        analysis::statistics::correlation(a, b)
-    }
-
     /// Mixes the draws of models that explain the recordings about as well: each contributes draws in proportion to its
     /// probability.
-    pub fn mixed(all: &[(f64, &Derived)]) -> Derived {
+    pub fn mixed(all: &[(f64, Derived)]) -> Derived {
         let Some((_, first)) = all.first() else { return Derived::default() };
-        let mut mixed = Derived {
-            columns: vec![Vec::new(); first.names.len()],
-            tolerances: Vec::new(),
-            ..(*first).clone()
-        };
+        let columns = vec![Vec::new(); first.names.len()];
+        let mut mixed = Derived { columns, tolerances: Vec::new(), ..first.clone() };
         for (probability, other) in all {
             let count = (probability * DRAWS as f64) as usize;
             for (k, name) in first.names.iter().enumerate() {
-                let column = other.place(name).unwrap_or(k);
-                let from = &other.columns[column];
+                let from = &other.columns[other.place(name).unwrap_or(k)];
                 mixed.columns[k].extend(from.iter().take(count));
             }
         }

@@ -54,10 +54,6 @@ impl<'p> Fit<'p> {
     /// Creates the fit of a problem, with the noise that is assumed before the first search.
     pub fn new(problem: &'p Problem<'p>) -> Self {
         let unknowns = &problem.unknowns;
-        let end = |u: &Unknown, value: f64| match u.log {
-            true if value <= 0.0 => f64::NEG_INFINITY,
-            _ => u.coordinate(value),
-        };
         let mut fit = Fit {
             problem,
             noise: problem.signals.iter().map(Signal::first_noise).collect(),
@@ -67,7 +63,7 @@ impl<'p> Fit<'p> {
             free: unknowns.iter().map(|u| u.part == Part::Free).collect(),
             central: problem.rough,
             bent: None,
-            ends: unknowns.iter().map(|u| (end(u, u.bounds.0), end(u, u.bounds.1))).collect(),
+            ends: unknowns.iter().map(Unknown::ends).collect(),
             steps: unknowns.iter().map(|u| (FIRST_STEP * u.reach, 0.0)).collect(),
             filters: Vec::new(),
             driven: AtomicUsize::new(0),
@@ -148,13 +144,9 @@ impl<'p> Fit<'p> {
                 if *value == 0.0 {
                     continue;
                 }
-                if let Some(shape) = reading(unknown, signal, motion) {
-                    for (k, r) in
-                        residual.iter_mut().enumerate().filter(|(k, _)| signal.sampled[*k])
-                    {
-                        *r -= value * shape(k);
-                    }
-                }
+                let Some(shape) = reading(unknown, signal, motion) else { continue };
+                let rows = residual.iter_mut().enumerate();
+                rows.filter(|(k, _)| signal.sampled[*k]).for_each(|(k, r)| *r -= value * shape(k));
             }
             residual
         };
@@ -173,13 +165,14 @@ impl<'p> Fit<'p> {
     }
 
     fn stacked(&self, residuals: Vec<Vec<f64>>, z: &[f64]) -> Vec<f64> {
-        let mut all = self.innovations(residuals).concat();
-        for (unknown, z) in self.problem.unknowns.iter().zip(z) {
-            if let Some((mean, std)) = unknown.prior {
-                all.push((z - mean) / std);
-            }
-        }
-        all
+        let priors = self.problem.unknowns.iter().zip(z);
+        let deviations = priors.filter_map(|(u, z)| u.prior.map(|(mean, std)| (z - mean) / std));
+        self.innovations(residuals).concat().into_iter().chain(deviations).collect()
+    }
+
+    /// Returns the number of priors, whose deviations follow the residuals.
+    pub fn priors(&self) -> usize {
+        self.problem.unknowns.iter().filter(|u| u.prior.is_some()).count()
     }
 
     /// Returns −2 ln L of a point up to a constant, with the noise as it is set.
@@ -209,8 +202,7 @@ impl<'p> Fit<'p> {
             found.means.column_mut(j).copy_from_slice(&means);
             self.steps[j] = step;
         }
-        let priors = self.problem.unknowns.iter().filter(|u| u.prior.is_some()).count();
-        let mut row = rows - priors;
+        let mut row = rows - self.priors();
         for (j, unknown) in self.problem.unknowns.iter().enumerate() {
             if let Some((_, std)) = unknown.prior {
                 found.matrix[(row, j)] = 1.0 / std;
@@ -295,13 +287,7 @@ impl<'p> Fit<'p> {
         let bend = if self.problem.rough {
             let middle = if is_central { here() } else { self.moved(at, j, 0.5 * by)?.1 };
             let norm = |weights: [f64; 3]| {
-                let mut sum = there.clone();
-                for ((sum, b), c) in sum.iter_mut().zip(&middle).zip(&base) {
-                    for ((a, b), c) in sum.iter_mut().zip(b).zip(c) {
-                        *a = weights[0] * *a + weights[1] * b + weights[2] * c;
-                    }
-                }
-                self.innovations(sum).iter().flatten().map(|v| v * v).sum::<f64>().sqrt()
+                self.weighted(weights.into_iter().zip([&there, &middle, &base])).norm()
             };
             norm([-1.0, 2.0, -1.0]) / norm([1.0, 0.0, -1.0]).max(1e-300)
         } else {
@@ -345,19 +331,24 @@ impl<'p> Fit<'p> {
     /// Returns a weighted sum of motions at the coordinates z as residuals over their standard deviations. The weights have to
     /// add up to 0, so that the measured values cancel.
     pub fn change(&self, z: &[f64], motions: &[(f64, &[Motion])]) -> DVector<f64> {
+        let residuals: Vec<_> =
+            motions.iter().map(|(_, motion)| self.residuals(z, motion)).collect();
+        self.weighted(motions.iter().map(|(weight, _)| *weight).zip(&residuals))
+    }
+
+    /// Whitens a weighted sum of residuals; the deviations from the priors are 0.
+    fn weighted<'r>(&self, all: impl Iterator<Item = (f64, &'r Vec<Vec<f64>>)>) -> DVector<f64> {
         let mut sum: Vec<Vec<f64>> = Vec::new();
-        for (weight, motion) in motions {
-            let residuals = self.residuals(z, motion);
+        for (weight, residuals) in all {
             sum.resize_with(residuals.len(), Vec::new);
             for (sum, residual) in sum.iter_mut().zip(residuals) {
                 sum.resize(residual.len(), 0.0);
                 sum.iter_mut().zip(residual).for_each(|(sum, r)| *sum += weight * r);
             }
         }
-        let priors = self.problem.unknowns.iter().filter(|u| u.prior.is_some()).count();
-        let mut all = self.innovations(sum).concat();
-        all.resize(all.len() + priors, 0.0);
-        DVector::from_vec(all)
+        let mut whitened = self.innovations(sum).concat();
+        whitened.resize(whitened.len() + self.priors(), 0.0);
+        DVector::from_vec(whitened)
     }
 
     /// Returns the factor between an output and its reading: 1 plus the error of the sensor's scale.

@@ -5,7 +5,7 @@
 //! distance to the minimum is the Newton decrement, in standard deviations.
 
 use anyhow::Result;
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SymmetricEigen};
 
 use super::KEPT;
 use super::fit::{Derivatives, Fit, Point};
@@ -68,6 +68,17 @@ impl Curvature {
         Curvature { which, matrix, scale }
     }
 
+    /// Returns a gradient over the unknowns of `which` in the scales of the matrix.
+    fn scaled(&self, gradient: &DVector<f64>) -> Vec<f64> {
+        self.which.iter().zip(&self.scale).map(|(j, s)| gradient[*j] * s).collect()
+    }
+
+    /// Returns the decrease of the sum of squares that a full step from this gradient forecasts.
+    fn forecast(&self, b: &[f64]) -> f64 {
+        let all: Vec<usize> = (0..b.len()).collect();
+        self.solve(b, &all, 0.0).iter().zip(b).map(|(s, b)| s * b).sum()
+    }
+
     /// Returns (JᵀJ + λ D)⁻¹ b over the unknowns of `which` that `keep` has, with the damping λ and the diagonal D of JᵀJ; `b`
     /// and the result are in the scales of the matrix.
     fn solve(&self, b: &[f64], keep: &[usize], damping: f64) -> DVector<f64> {
@@ -90,14 +101,24 @@ impl Curvature {
         }
     }
 
+    fn eigen(&self) -> Option<SymmetricEigen<f64, Dyn>> {
+        let is_known = !self.which.is_empty() && self.matrix.iter().all(|v| v.is_finite());
+        is_known.then(|| self.matrix.clone().symmetric_eigen())
+    }
+
+    /// Returns the condition number of the derivatives, with columns of unit length; NaN if they are not finite.
+    pub fn condition(&self) -> f64 {
+        let ratio = |found: SymmetricEigen<f64, Dyn>| {
+            found.eigenvalues.max() / found.eigenvalues.min().max(1e-300)
+        };
+        self.eigen().map_or(f64::NAN, ratio).sqrt()
+    }
+
     /// Returns the eigenvectors of the scaled curvature and the inverse of each eigenvalue; 0 for directions of which the
     /// recordings show next to nothing.
     pub fn spread(&self) -> (DMatrix<f64>, DVector<f64>) {
         let n = self.which.len();
-        if n == 0 || self.matrix.iter().any(|v| !v.is_finite()) {
-            return (DMatrix::zeros(n, n), DVector::zeros(n));
-        }
-        let found = self.matrix.clone().symmetric_eigen();
+        let Some(found) = self.eigen() else { return (DMatrix::zeros(n, n), DVector::zeros(n)) };
         let least = FLAT * found.eigenvalues.max();
         let inverse = found.eigenvalues.map(|v| if v > least { 1.0 / v } else { 0.0 });
         (found.eigenvectors, inverse)
@@ -106,10 +127,7 @@ impl Curvature {
     /// Returns the directions that the curvature does not resolve, as unit vectors in its own scales. `errors` are the independent
     /// relative errors of the derivatives: along a unit eigenvector v they alone make an eigenvalue of Σ v_i² errors_i².
     pub fn unresolved(&self, errors: &[f64]) -> Vec<DVector<f64>> {
-        if self.which.is_empty() || self.matrix.iter().any(|v| !v.is_finite()) {
-            return Vec::new();
-        }
-        let found = self.matrix.clone().symmetric_eigen();
+        let Some(found) = self.eigen() else { return Vec::new() };
         let flat = FLAT * found.eigenvalues.max();
         let all = found.eigenvalues.iter().zip(found.eigenvectors.column_iter());
         let is_flat = |(value, v): &(&f64, nalgebra::DVectorView<f64>)| {
@@ -134,6 +152,13 @@ impl Curvature {
 
 pub fn places(which: &[bool]) -> Vec<usize> {
     (0..which.len()).filter(|j| which[*j]).collect()
+}
+
+/// Returns the flags with entry `j` false.
+pub fn without(which: &[bool], j: usize) -> Vec<bool> {
+    let mut others = which.to_vec();
+    others[j] = false;
+    others
 }
 
 impl Fit<'_> {
@@ -194,10 +219,8 @@ impl Fit<'_> {
             let curvature = Curvature::new(jacobian, self.inner(&point.z, &gradient, free));
             let which = curvature.which.clone();
             let all: Vec<usize> = (0..which.len()).collect();
-            let b: Vec<f64> =
-                which.iter().zip(&curvature.scale).map(|(j, s)| gradient[*j] * s).collect();
-            let newton = curvature.solve(&b, &all, 0.0);
-            let won: f64 = newton.iter().zip(&b).map(|(s, b)| s * b).sum();
+            let b = curvature.scaled(&gradient);
+            let won = curvature.forecast(&b);
             decrement = won.max(0.0).sqrt();
             if decrement.is_nan() {
                 break;
@@ -291,11 +314,7 @@ impl Fit<'_> {
         let jacobian = self.derivatives_at(at)?.matrix;
         let gradient = jacobian.tr_mul(&at.point.e);
         let curvature = Curvature::new(&jacobian, self.inner(&at.point.z, &gradient, free));
-        let scaled = curvature.which.iter().zip(&curvature.scale);
-        let b: Vec<f64> = scaled.map(|(j, s)| gradient[*j] * s).collect();
-        let all: Vec<usize> = (0..b.len()).collect();
-        let step = curvature.solve(&b, &all, 0.0);
-        Ok(step.iter().zip(&b).map(|(s, b)| s * b).sum::<f64>().max(0.0).sqrt())
+        Ok(curvature.forecast(&curvature.scaled(&gradient)).max(0.0).sqrt())
     }
 
     /// Returns the derivatives at a minimum by the unknowns that were searched for, and keeps them there.

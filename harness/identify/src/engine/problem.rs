@@ -106,6 +106,21 @@ impl Unknown {
         if self.log { z.exp() } else { z }
     }
 
+    /// Returns the least and the largest coordinate.
+    pub fn ends(&self) -> (f64, f64) {
+        let end = |value: f64| match self.log {
+            true if value <= 0.0 => f64::NEG_INFINITY,
+            _ => self.coordinate(value),
+        };
+        (end(self.bounds.0), end(self.bounds.1))
+    }
+
+    /// Returns true for a known value with a tolerance that acts in recordings.
+    pub fn is_held(&self) -> bool {
+        self.part == Part::Tolerance && self.role != Role::Derived
+    }
+
+    /// Returns true if the unknown acts in a recording.
     pub fn is_of(&self, recording: usize) -> bool {
         match self.role {
             Role::Run(of) | Role::Bias(_, of) => of.is_none_or(|of| of == recording),

@@ -3,7 +3,7 @@
 use anyhow::Result;
 use nalgebra::DMatrix;
 
-use super::minimum::{Curvature, End, Minimum, places};
+use super::minimum::{Curvature, End, Minimum, places, without};
 use super::problem::Part;
 use super::{DECIDES, Fit, VAGUE};
 
@@ -36,6 +36,11 @@ pub type Profile = (usize, Vec<Point>);
 pub struct Point {
     pub at: f64,
     pub minimum: Minimum,
+}
+
+/// Returns the point with the least sum of squares.
+pub fn lowest(points: &[Point]) -> Option<&Point> {
+    points.iter().min_by(|a, b| a.minimum.point.cost.total_cmp(&b.minimum.point.cost))
 }
 
 impl Fit<'_> {
@@ -75,8 +80,7 @@ impl Fit<'_> {
         if std == 0.0 || !std.is_finite() {
             return Ok(most);
         }
-        let mut free = self.free.clone();
-        free[j] = false;
+        let free = without(&self.free, j);
         for sign in [-1.0, 1.0] {
             let z = &minimum.point.z;
             let room = if sign < 0.0 { z[j] - self.ends[j].0 } else { self.ends[j].1 - z[j] };
@@ -93,6 +97,11 @@ impl Fit<'_> {
         Ok(most)
     }
 
+    /// Returns the free unknown that the problem names as bent.
+    fn stated_bent(&self) -> Option<usize> {
+        self.problem.unknowns.iter().zip(&self.free).position(|(u, free)| u.bent && *free)
+    }
+
     /// Looks for a lower minimum at other values of the unknown that is bent, with all others free: between two such minima the
     /// likelihood may have a ridge that no search crosses.
     ///
@@ -100,11 +109,9 @@ impl Fit<'_> {
     /// If the system refuses the minimum.
     pub fn across_ridges(&mut self, minimum: &mut Minimum) -> Result<Vec<Point>> {
         let unknowns = &self.problem.unknowns;
-        let bent = unknowns.iter().zip(&self.free).position(|(u, free)| u.bent && *free);
-        let Some(j) = bent else { return Ok(Vec::new()) };
+        let Some(j) = self.stated_bent() else { return Ok(Vec::new()) };
         let derivatives = Some(self.derivatives_at(minimum)?);
-        let mut free = self.free.clone();
-        free[j] = false;
+        let free = without(&self.free, j);
         let (now, start) = (minimum.point.z[j], unknowns[j].coordinate(unknowns[j].start));
         let mut points: Vec<Point> = Vec::new();
         for factor in GRID {
@@ -118,13 +125,11 @@ impl Fit<'_> {
             let Ok(found) = self.minimise(&z, &free, derivatives.clone(), end) else { continue };
             points.push(Point { at, minimum: found });
         }
-        let lowest =
-            points.iter().min_by(|a, b| a.minimum.point.cost.total_cmp(&b.minimum.point.cost));
         let lower = |low: &&Point| low.minimum.point.cost < minimum.point.cost - LOWER;
-        if let Some(low) = lowest.filter(lower) {
-            let (z, free) = (low.minimum.point.z.clone(), self.free.clone());
+        if let Some(low) = lowest(&points).filter(lower) {
+            let free = self.free.clone();
             let end = End { gain: 2.0, ..End::new(6, super::ENDS.0) };
-            *minimum = self.minimise(&z, &free, None, end)?;
+            *minimum = self.minimise(&low.minimum.point.z, &free, None, end)?;
         }
         Ok(points)
     }
@@ -139,8 +144,7 @@ impl Fit<'_> {
         let unknowns = &self.problem.unknowns;
         self.central = self.problem.rough;
         let found = self.bent;
-        let bent = unknowns.iter().zip(&self.free).position(|(u, free)| u.bent && *free);
-        let Some(j) = found.or(bent) else { return Ok(None) };
+        let Some(j) = found.or(self.stated_bent()) else { return Ok(None) };
         let jacobian = self.derivatives_at(minimum)?.matrix;
         let covariance = Curvature::new(&jacobian, places(&self.free)).covariance(unknowns.len());
         let std = |i: usize| covariance[(i, i)].sqrt();
@@ -169,8 +173,7 @@ impl Fit<'_> {
         let lengths =
             LENGTHS.map(|length| if unknowns[j].log { length } else { 2.0 * std(j) * length });
         let first = (0.25 * std(j)).clamp(lengths[0], lengths[1]);
-        let mut free = self.free.clone();
-        free[j] = false;
+        let free = without(&self.free, j);
         let mut points = vec![Point { at: minimum.point.z[j], minimum: minimum.clone() }];
         let base = minimum.point.cost;
         let mut least = base;
@@ -202,21 +205,17 @@ impl Fit<'_> {
                 if rise > DECIDES {
                     break;
                 }
-                let more = rise - risen;
-                let factor = if more < 1.5 {
-                    1.6
-                } else if more < 6.0 {
-                    1.0
-                } else {
-                    0.7
+                let factor = match rise - risen {
+                    more if more < 1.5 => 1.6,
+                    more if more < 6.0 => 1.0,
+                    _ => 0.7,
                 };
                 // shorter steps than the first lead nowhere
                 (h, risen) = ((h * factor).clamp(0.5 * first, lengths[2]), rise);
             }
         }
-        let (low, high) = points
-            .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), p| (a.min(p.at), b.max(p.at)));
+        points.sort_by(|a, b| a.at.total_cmp(&b.at));
+        let (low, high) = (points[0].at, points[points.len() - 1].at);
         points.extend(beyond.into_iter().filter(|p| p.at < low || p.at > high));
         points.sort_by(|a, b| a.at.total_cmp(&b.at));
         Ok(Some((j, points)))

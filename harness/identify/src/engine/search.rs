@@ -4,11 +4,11 @@ use analysis::gauss_markov::Noise;
 use analysis::innovations::Tests;
 use analysis::random::Random;
 use analysis::statistics::deviation;
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, ensure};
 
 use super::hold::Rival;
-use super::minimum::{Curvature, End, Minimum, places};
-use super::problem::{Part, Problem, Role, Signal};
+use super::minimum::{Curvature, End, Minimum, places, without};
+use super::problem::{Part, Problem, Role, Signal, Unknown};
 use super::profile::{self, LOWER, Profile};
 use super::{ALIKE, ENDS, Fit, INFLATIONS};
 use crate::news::News;
@@ -242,13 +242,9 @@ fn drawn(problem: &Problem, random: &mut Random) -> Vec<f64> {
         if unknown.part != Part::Free || !matches!(unknown.role, Role::Run(_)) {
             return *start;
         }
-        let end = |value: f64| {
-            if unknown.log && value <= 0.0 { f64::NEG_INFINITY } else { unknown.coordinate(value) }
-        };
-        let z = unknown.coordinate(*start);
-        let reach = 3.0 * unknown.reach;
-        let (low, high) =
-            (end(unknown.bounds.0).max(z - reach), end(unknown.bounds.1).min(z + reach));
+        let (z, reach) = (unknown.coordinate(*start), 3.0 * unknown.reach);
+        let (low, high) = unknown.ends();
+        let (low, high) = (low.max(z - reach), high.min(z + reach));
         unknown.value(low + (high - low) * random.uniform())
     };
     problem.unknowns.iter().zip(first).map(one).collect()
@@ -367,10 +363,8 @@ impl Fit<'_> {
             profile = self.profile(&mut minimum, beyond)?;
             let Some((j, points)) = &profile else { break };
             // along the profile the likelihood is known, and the others are at their minimum
-            let mut others = free.clone();
-            others[*j] = false;
-            let lowest =
-                points.iter().min_by(|a, b| a.minimum.point.cost.total_cmp(&b.minimum.point.cost));
+            let others = without(&free, *j);
+            let lowest = profile::lowest(points);
             let fall = lowest.map_or(0.0, |low| minimum.point.cost - low.minimum.point.cost);
             if let Some(low) = lowest.filter(|_| fall > 0.0) {
                 minimum = Minimum { derivatives: None, free: free.clone(), ..low.minimum.clone() };
@@ -384,15 +378,11 @@ impl Fit<'_> {
         if minimum.decrement > ENDS.0 {
             // sets that gain little may lead on all the same, with differences to both sides
             self.central = true;
-            let others: Vec<bool> = match &profile {
-                Some((bent, _)) => (0..free.len()).map(|j| free[j] && j != *bent).collect(),
-                None => free.clone(),
-            };
+            let others =
+                profile.as_ref().map_or_else(|| free.clone(), |(bent, _)| without(&free, *bent));
             let z = minimum.point.z.clone();
             let found = self.minimise(&z, &others, None, End::new(LAST.0, ENDS.0 * 0.2))?;
-            let decrement = found.decrement;
             minimum = Minimum { derivatives: None, free, ..found };
-            minimum.decrement = decrement;
         }
         Ok((minimum, profile))
     }
@@ -404,14 +394,12 @@ impl Fit<'_> {
     /// If the system refuses the minimum.
     fn free_shown(&mut self, minimum: &mut Minimum) -> Result<()> {
         let unknowns = &self.problem.unknowns;
-        let is_held = |u: &super::Unknown| u.part == Part::Tolerance && u.role != Role::Derived;
         let held: Vec<bool> =
-            unknowns.iter().zip(&self.free).map(|(u, free)| is_held(u) && !free).collect();
+            unknowns.iter().zip(&self.free).map(|(u, free)| u.is_held() && !free).collect();
         let own = self.derivatives_at(minimum)?.matrix;
         let known = self.derivatives(&minimum.point, &held)?.matrix;
         let covariance = Curvature::new(&own, places(&self.free)).covariance(unknowns.len());
-        let priors = unknowns.iter().filter(|u| u.prior.is_some()).count();
-        let rows = own.nrows() - priors;
+        let rows = own.nrows() - self.priors();
         for j in places(&held) {
             let column = known.column(j).into_owned();
             let rest = &column - &own * (&covariance * own.tr_mul(&column));
@@ -439,8 +427,7 @@ impl Fit<'_> {
             Curvature::new(&found.matrix, places(&self.free)).covariance(unknowns.len());
         let mut side = |j: usize, sign: f64| {
             let std = covariance[(j, j)].sqrt();
-            let mut free = self.free.clone();
-            free[j] = false;
+            let free = without(&self.free, j);
             // root of the rise of the sum of squares at so many standard deviations, over the others
             let mut rise = |deviations: f64| {
                 let by = sign * deviations / std;
@@ -478,13 +465,13 @@ impl Fit<'_> {
     /// # Errors
     /// If the system refuses the minimum.
     fn with_tolerances(&mut self, minimum: &Minimum) -> Result<Option<Minimum>> {
-        let is_held = |u: &super::Unknown| u.part == Part::Tolerance && u.role != Role::Derived;
-        if self.is_noise(&minimum.point) || !self.problem.unknowns.iter().any(is_held) {
+        let unknowns = &self.problem.unknowns;
+        if self.is_noise(&minimum.point) || !unknowns.iter().any(Unknown::is_held) {
             return Ok(None);
         }
         let (free, noise) = (self.free.clone(), self.noise.clone());
         let all: Vec<bool> =
-            self.problem.unknowns.iter().zip(&free).map(|(u, free)| *free || is_held(u)).collect();
+            unknowns.iter().zip(&free).map(|(u, free)| *free || u.is_held()).collect();
         self.limit_noise();
         let z = minimum.point.z.clone();
         let first = self.minimise(&z, &all, None, End::new(10, ENDS.0 * 0.1))?;
@@ -505,9 +492,7 @@ impl Fit<'_> {
     /// whole recordings with less and less inflated noise. `course` has the sums of squares of the first search over growing
     /// beginnings.
     fn search_from(&mut self, z: &[f64], grows: bool, course: &mut Vec<f64>) -> Result<Minimum> {
-        let first = |fit: &Self| -> Vec<Noise> {
-            fit.problem.signals.iter().map(Signal::first_noise).collect()
-        };
+        let mut noise: Vec<Noise> = self.problem.signals.iter().map(Signal::first_noise).collect();
         let free = self.free.clone();
         (self.hold, self.inflation, self.central) =
             (self.problem.holds[0], 1.0, self.problem.rough);
@@ -515,7 +500,6 @@ impl Fit<'_> {
         let mut found: Option<Minimum> = None;
         if grows {
             let before = course.clone();
-            let mut noise = first(self);
             if self.problem.rough {
                 for (noise, signal) in noise.iter_mut().zip(&self.problem.signals) {
                     let spread = deviation(&signal.picked(&signal.measured));
@@ -527,13 +511,9 @@ impl Fit<'_> {
                 let end = End { gain: ALIKE, ..End::new(8, ENDS.0) };
                 let minimum = self.minimise(&z, &free, None, end)?;
                 let cost = minimum.point.cost;
-                match before.get(k) {
-                    Some(best) if part > ASTRAY.0 && cost > ASTRAY.1 * best => {
-                        bail!("it leads nowhere")
-                    }
-                    Some(_) => {}
-                    None => course.push(cost),
-                }
+                let is_astray = |best: &f64| part > ASTRAY.0 && cost > ASTRAY.1 * best;
+                ensure!(!before.get(k).is_some_and(is_astray), "it leads nowhere");
+                course.extend(before.get(k).is_none().then_some(cost));
                 z.clone_from(&minimum.point.z);
                 found = Some(minimum);
             }
@@ -545,7 +525,6 @@ impl Fit<'_> {
                 found = Some(self.minimise(&z, &free, None, end)?);
             }
         } else {
-            let noise = first(self);
             self.set(noise, 1.0);
             for inflation in INFLATIONS {
                 self.inflation = inflation;

@@ -7,6 +7,8 @@
 //! known, and filled. An error of the torque is a kick of the hub, ∫Δτ dt/I, which rings in the liquid for a thousand rows; it
 //! must be small against the gyro's noise.
 
+use std::collections::BTreeMap;
+
 use analysis::statistics::{deviation, mean};
 use nalgebra::{DMatrix, DVector};
 
@@ -24,19 +26,18 @@ pub fn bridged(all: Recording, done: &mut dyn FnMut(String)) -> (Recording, Vec<
     let time: Vec<f64> = knots.iter().map(|k| all.time[*k]).collect();
     let usual = clocks::usual(&time);
     let span = |n: usize| time[n + 1] - time[n];
-    let gaps: Vec<usize> =
-        (0..time.len() - 1).filter(|n| span(*n) > LOST_SPACING * usual).collect();
+    let (gaps, near): (Vec<usize>, Vec<usize>) =
+        (0..time.len() - 1).partition(|n| span(*n) > LOST_SPACING * usual);
     if gaps.is_empty() {
         return (all, Vec::new());
     }
-    let near: Vec<f64> =
-        (0..time.len() - 1).map(span).filter(|s| *s <= LOST_SPACING * usual).collect();
+    let near: Vec<f64> = near.into_iter().map(span).collect();
     let step = mean(&near);
     let is_even = near.iter().all(|s| (s - step).abs() < EVEN_GRID * step);
     let values: Vec<f64> = knots.iter().map(|k| all.torque[*k]).collect();
     let kick = GAP_KICK * momentum(&all) / (gaps.len() as f64).sqrt();
     let (mut filled, mut left) = (Vec::new(), Vec::new());
-    let mut tried: Vec<(usize, f64)> = Vec::new();
+    let mut tried: BTreeMap<usize, f64> = BTreeMap::new();
     for &n in &gaps {
         let lost = (span(n) / step).round() as usize - 1;
         let is_on_grid = (span(n) - (lost + 1) as f64 * step).abs() < 0.1 * step;
@@ -44,14 +45,7 @@ pub fn bridged(all: Recording, done: &mut dyn FnMut(String)) -> (Recording, Vec<
             left.push(n);
             continue;
         }
-        let error = match tried.iter().find(|(count, _)| *count == lost) {
-            Some((_, error)) => *error,
-            None => {
-                let error = tried_out(&values, &gaps, lost) * step;
-                tried.push((lost, error));
-                error
-            }
-        };
+        let error = *tried.entry(lost).or_insert_with(|| tried_out(&values, &gaps, lost) * step);
         match fill(before(&values, &gaps, n), after(&values, &gaps, n), lost) {
             Some(values) if error < kick => filled.push((n, values)),
             _ => left.push(n),
@@ -72,15 +66,11 @@ pub fn bridged(all: Recording, done: &mut dyn FnMut(String)) -> (Recording, Vec<
     let few = left.len() <= FEW_GAPS;
     let end = time[time.len() - 1];
     let mut from = time[0];
+    let is_long = |n: &usize| span(*n) > LONGEST_LINE.max(10.0 * usual);
     for (i, &n) in left.iter().enumerate() {
-        let is_long = span(n) > LONGEST_LINE.max(10.0 * usual);
-        let next = left[i + 1..].iter().find(|m| span(**m) > LONGEST_LINE.max(10.0 * usual));
-        let to = next.map_or(end, |m| time[*m]);
-        let fits = is_even
-            && few
-            && time[n] - from >= SHORTEST_RECORDING
-            && to - time[n + 1] >= SHORTEST_RECORDING;
-        if is_long || fits {
+        let to = left[i + 1..].iter().copied().find(is_long).map_or(end, |m| time[m]);
+        let least = (time[n] - from).min(to - time[n + 1]);
+        if is_long(&n) || is_even && few && least >= SHORTEST_RECORDING {
             cuts.push(n);
             from = time[n + 1];
         }
@@ -131,15 +121,12 @@ fn tried_out(values: &[f64], gaps: &[usize], lost: usize) -> f64 {
             continue;
         }
         let truth = &values[from..from + lost];
-        match fill(&values[lower..from], &values[from + lost..upper], lost) {
-            Some(found) => {
-                let off: Vec<f64> = found.iter().zip(truth).map(|(a, b)| a - b).collect();
-                let sum: f64 = off.iter().sum();
-                let spread = off.iter().map(|e| e * e).sum::<f64>();
-                squares.push(spread.max(sum * sum));
-            }
-            None => return f64::INFINITY,
-        }
+        let Some(found) = fill(&values[lower..from], &values[from + lost..upper], lost) else {
+            return f64::INFINITY;
+        };
+        let off: Vec<f64> = found.iter().zip(truth).map(|(a, b)| a - b).collect();
+        let sum: f64 = off.iter().sum();
+        squares.push(off.iter().map(|e| e * e).sum::<f64>().max(sum * sum));
     }
     if squares.len() < GAP_TRIALS / 2 { f64::INFINITY } else { mean(&squares).sqrt() }
 }
@@ -151,50 +138,36 @@ fn fill(left: &[f64], right: &[f64], lost: usize) -> Option<Vec<f64>> {
         return None;
     }
     // x_k = Σ a_i x_{k−i}, and the same backwards
-    let mut rows: Vec<(Vec<f64>, f64)> = Vec::new();
-    for side in [left, right] {
-        for window in side.windows(order + 1) {
-            rows.push((window[..order].iter().rev().copied().collect(), window[order]));
-            rows.push((window[1..].to_vec(), window[0]));
-        }
+    let mut windows: Vec<Vec<f64>> = Vec::new();
+    for window in [left, right].into_iter().flat_map(|side| side.windows(order + 1)) {
+        windows.extend([window.iter().rev().copied().collect(), window.to_vec()]);
     }
     let size = deviation(left).max(deviation(right)).max(f64::MIN_POSITIVE);
-    let regressors = DMatrix::from_fn(rows.len(), order, |k, i| rows[k].0[i] / size);
-    let target = DVector::from_iterator(rows.len(), rows.iter().map(|row| row.1 / size));
+    let count = windows.len();
+    let regressors = DMatrix::from_fn(count, order, |k, i| windows[k][i + 1] / size);
+    let target = DVector::from_fn(count, |k, _| windows[k][0] / size);
     // the samples of a smooth torque are nearly dependent: normal equations with a little weight on small coefficients
-    let weight = 1e-9 * rows.len() as f64;
+    let weight = 1e-9 * count as f64;
     let mut normal = regressors.tr_mul(&regressors);
     (0..order).for_each(|i| normal[(i, i)] += weight);
     let a = normal.cholesky()?.solve(&regressors.tr_mul(&target));
-    // equations that contain lost samples, all linear in these
+    // equations that contain lost samples, all linear in these: forwards and backwards
     let (n, p) = (lost, order);
-    let known = |k: isize| -> Option<f64> {
-        if k < 0 {
-            return left.get((left.len() as isize + k) as usize).copied();
-        }
-        if (k as usize) < n { None } else { right.get(k as usize - n).copied() }
-    };
-    let count = n + p;
-    let mut matrix = DMatrix::<f64>::zeros(2 * count, n);
-    let mut rest = DVector::<f64>::zeros(2 * count);
-    for e in 0..count {
-        for (row, forwards) in [(2 * e, true), (2 * e + 1, false)] {
-            for i in 0..=p {
-                let k = if forwards {
-                    e as isize - i as isize
-                } else {
-                    e as isize - p as isize + i as isize
-                };
-                let factor = if i == 0 { 1.0 } else { -a[i - 1] };
-                match known(k) {
-                    Some(value) => rest[row] += factor * value / size,
-                    None if (0..n as isize).contains(&k) => matrix[(row, k as usize)] += factor,
-                    None => return None,
+    let known = [&left[left.len() - p..], &vec![0.0; n], &right[..p]].concat();
+    let mut matrix = DMatrix::<f64>::zeros(2 * (n + p), n);
+    let mut rest = DVector::<f64>::zeros(2 * (n + p));
+    for e in 0..n + p {
+        for i in 0..=p {
+            let factor = if i == 0 { 1.0 } else { -a[i - 1] };
+            for (row, k) in [(2 * e, e + p - i), (2 * e + 1, e + i)] {
+                match (p..p + n).contains(&k) {
+                    true => matrix[(row, k - p)] += factor,
+                    false => rest[row] += factor * known[k] / size,
                 }
             }
         }
     }
-    let found = matrix.clone().svd(true, true).solve(&-rest, 1e-12).ok()?;
+    let found = matrix.svd(true, true).solve(&-rest, 1e-12).ok()?;
     Some(found.iter().map(|x| x * size).collect())
 }
 

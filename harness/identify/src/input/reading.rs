@@ -11,7 +11,7 @@ use signals::recording::{self, Between, Columns, Signal, Wanted};
 use signals::table::Table;
 
 use crate::input::clocks::{self, Clocked, completed};
-use crate::input::recording::{Recording, masked, take_out};
+use crate::input::recording::{Recording, masked, places, take_out};
 use crate::input::sensor_faults::{self, Rest};
 use crate::input::{gaps, spikes};
 use crate::tuning::{
@@ -72,7 +72,7 @@ fn assembled(name: &str, table: &Table, done: &mut dyn FnMut(String)) -> Result<
         ensure!(there > 1, "{name} has values in {there} rows (allowed: at least 2)");
         if there < rows.len() {
             let held: Vec<f64> =
-                at.iter().zip(&values).filter(|(_, v)| !v.is_nan()).map(|(t, _)| *t).collect();
+                (0..at.len()).filter(|k| !values[*k].is_nan()).map(|k| at[k]).collect();
             done(format!(
                 "{name} has a value in {there} of {} rows, {:.4} s apart mostly; {}",
                 rows.len(),
@@ -88,7 +88,7 @@ fn assembled(name: &str, table: &Table, done: &mut dyn FnMut(String)) -> Result<
     };
     let (rate, fresh) = of("omega")?.context("a column that was read")?;
     let (torque, commanded) = of("tau_cmd")?.context("a column that was read")?;
-    let (angle, angle_fresh) = of("theta")?.map_or((None, None), |(v, mask)| (Some(v), mask));
+    let (angle, angle_fresh) = of("theta")?.unzip();
     let mut plain = |name: &str| -> Result<Option<Vec<f64>>> { Ok(of(name)?.map(|of| of.0)) };
     Ok(Recording {
         angle,
@@ -97,7 +97,7 @@ fn assembled(name: &str, table: &Table, done: &mut dyn FnMut(String)) -> Result<
         off_axis: [plain("omega_x")?, plain("omega_y")?],
         from_rest: false,
         fresh,
-        angle_fresh,
+        angle_fresh: angle_fresh.flatten(),
         commanded,
         ..Recording::of(name, at.clone(), torque, rate)
     })
@@ -118,11 +118,8 @@ pub fn read_decay(
     let signal = |name| Signal { name, required: true, between: Between::Line, unit: None };
     let there = recording::assigned(path, &DECAYING.map(signal))?;
     let own = |k: usize| there.iter().any(|(_, signal)| *signal == Some(k));
-    let found = given
-        .first()
-        .copied()
-        .or_else(|| (0..DECAYING.len()).find(|k| own(*k)).map(|k| &DECAYING[k]));
-    let Some(found) = found.copied() else {
+    let seen = (0..DECAYING.len()).find(|k| own(*k)).map(|k| &DECAYING[k]);
+    let Some(&found) = given.first().copied().or(seen) else {
         bail!(
             "{name} has no column {} (columns in it: {}; --columns time=COLUMN,wave_height=COLUMN:UNIT names the columns)",
             DECAYING.join(", "),
@@ -173,11 +170,8 @@ pub fn prepare(
     let mut cuts: Vec<(usize, usize)> = Vec::new();
     let mut from = 0;
     for row in gaps {
-        let next = all
-            .commanded
-            .as_ref()
-            .map_or(Some(row + 1), |commanded| (row + 1..all.time.len()).find(|k| commanded[*k]));
-        let Some(next) = next else { break };
+        let is_commanded = |k: &usize| all.commanded.as_ref().is_none_or(|mask| mask[*k]);
+        let Some(next) = (row + 1..all.time.len()).find(is_commanded) else { break };
         let gap = all.time[next] - all.time[row];
         done(format!(
             "{name}: cut at {:.2} s, where tau_cmd is missing for {gap:.2} s and cannot be foretold",
@@ -190,8 +184,10 @@ pub fn prepare(
     let mut parts = Vec::new();
     for (index, (from, to)) in cuts.iter().enumerate() {
         let mut part = all.rows(*from, *to);
-        let seconds = if part.time.len() > 1 { part.duration() } else { 0.0 };
-        let step = if part.time.len() > 1 { part.step() } else { 0.0 };
+        let (seconds, step) = match part.time.len() > 1 {
+            true => (part.duration(), part.step()),
+            false => (0.0, 0.0),
+        };
         if seconds + step < SHORTEST_RECORDING * (1.0 - 1e-9) {
             ensure!(
                 cuts.len() > 1,
@@ -260,8 +256,7 @@ fn without_faults(part: &mut Recording, done: &mut dyn FnMut(String)) {
     ];
     for (sensor, whole, mask, rest) in sensors {
         let Some(whole) = whole else { continue };
-        let places: Vec<usize> =
-            (0..rows).filter(|k| mask.as_ref().is_none_or(|mask| mask[*k])).collect();
+        let places = places(mask, rows);
         let (at, values): (Vec<f64>, Vec<f64>) =
             places.iter().map(|k| (time[*k], whole[*k])).unzip();
         let found = sensor_faults::find(sensor, &at, &values, rest);
@@ -420,11 +415,8 @@ fn smoothed(part: &Recording) -> Result<(Vec<f64>, Vec<f64>)> {
 }
 
 fn running_mean(x: &[f64], width: usize) -> Vec<f64> {
-    let sums = x.iter().scan(0.0, |sum, x| {
-        *sum += x;
-        Some(*sum)
-    });
-    let sums: Vec<f64> = std::iter::once(0.0).chain(sums).collect();
+    let mut sums = vec![0.0];
+    x.iter().for_each(|x| sums.push(sums[sums.len() - 1] + x));
     (width..sums.len()).map(|end| (sums[end] - sums[end - width]) / width as f64).collect()
 }
 

@@ -10,7 +10,7 @@ use analysis::statistics::{mean, noise_level};
 use anyhow::{Context, Result, bail, ensure};
 use files::budget;
 
-use crate::input::clocks::completed;
+use crate::input::clocks::{completed, usual};
 use crate::tuning::{LARGEST_VALUE, ON_CLOCK, SLOW_GYRO, SLOWEST_GYRO};
 
 #[derive(Clone, Debug)]
@@ -52,6 +52,12 @@ pub(crate) fn masked(values: &[f64], mask: Option<&[bool]>) -> Vec<f64> {
     }
 }
 
+/// Returns the rows in which a mask is true.
+pub(crate) fn places(mask: &Option<Vec<bool>>, rows: usize) -> Vec<usize> {
+    (0..rows).filter(|k| mask.as_ref().is_none_or(|mask| mask[*k])).collect()
+}
+
+/// Takes a row out of a mask.
 pub(crate) fn take_out(mask: &mut Option<Vec<bool>>, row: usize, rows: usize) {
     mask.get_or_insert_with(|| vec![true; rows])[row] = false;
 }
@@ -91,18 +97,12 @@ impl Recording {
     }
 
     pub fn commands(&self) -> Vec<usize> {
-        let commanded = self.commanded.as_deref();
-        (0..self.time.len()).filter(|k| commanded.is_none_or(|rows| rows[*k])).collect()
+        places(&self.commanded, self.time.len())
     }
 
     pub fn torque_step(&self) -> f64 {
-        match &self.commanded {
-            None => self.step(),
-            Some(commanded) => {
-                let time = masked(&self.time, Some(commanded));
-                (time[time.len() - 1] - time[0]) / (time.len() - 1) as f64
-            }
-        }
+        let time = masked(&self.time, self.commanded.as_deref());
+        (time[time.len() - 1] - time[0]) / (time.len() - 1) as f64
     }
 
     /// Returns the recording on other rows. Values that a signal does not have in them are interpolated.
@@ -115,32 +115,23 @@ impl Recording {
             };
             completed(&time, rows.iter().map(value).collect())
         };
-        let torque: Vec<f64> = {
-            let (own, _) = of(&self.torque, self.commanded.as_deref());
-            rows.iter().zip(own).map(|(row, own)| row.filled.unwrap_or(own)).collect()
-        };
-        let commanded = |row: &Row| {
-            let own = row.own.filter(|k| self.commanded.as_ref().is_none_or(|c| c[*k]));
-            row.filled.is_some() || own.is_some()
-        };
-        let commanded: Vec<bool> = rows.iter().map(commanded).collect();
+        let (own, _) = of(&self.torque, self.commanded.as_deref());
+        let torque = rows.iter().zip(own).map(|(row, own)| row.filled.unwrap_or(own)).collect();
+        let is_own = |k: usize| self.commanded.as_ref().is_none_or(|commanded| commanded[k]);
+        let commanded: Vec<bool> =
+            rows.iter().map(|row| row.filled.is_some() || row.own.is_some_and(is_own)).collect();
         let (rate, fresh) = of(&self.rate, self.fresh.as_deref());
         let angle = self.angle.as_ref().map(|angle| of(angle, self.angle_fresh.as_deref()));
-        let (angle, angle_fresh) = angle.map_or((None, None), |(angle, mask)| (Some(angle), mask));
-        let plain = |values: &Option<Vec<f64>>| values.as_ref().map(|x| of(x, None).0);
+        let (angle, angle_fresh) = angle.unzip();
         Recording {
-            name: self.name.clone(),
             torque,
             rate,
             angle,
-            gravity: plain(&self.gravity),
-            wheel_speed: plain(&self.wheel_speed),
-            off_axis: [plain(&self.off_axis[0]), plain(&self.off_axis[1])],
-            from_rest: self.from_rest,
             fresh,
-            angle_fresh,
-            commanded: (!commanded.iter().all(|c| *c)).then_some(commanded),
-            time,
+            angle_fresh: angle_fresh.flatten(),
+            commanded: commanded.contains(&false).then_some(commanded),
+            time: time.clone(),
+            ..self.mapped(|values| of(values, None).0, |_| None)
         }
     }
 
@@ -184,11 +175,9 @@ impl Recording {
     /// Marks the rows in which a gyro that is slower than the recording has a new value. Returns false if the gyro has a new
     /// value in every row.
     pub(crate) fn with_repeats(&mut self) -> bool {
-        let places: Vec<usize> = (0..self.time.len())
-            .filter(|k| self.fresh.as_ref().is_none_or(|fresh| fresh[*k]))
-            .collect();
         let Some(new) = fresh(&self.of_fresh(&self.rate)) else { return false };
         let rows = self.time.len();
+        let places = places(&self.fresh, rows);
         for (k, _) in new.iter().enumerate().filter(|(_, new)| !**new) {
             take_out(&mut self.fresh, places[k], rows);
         }
@@ -204,8 +193,7 @@ impl Recording {
 
     pub fn beginning(&self, fraction: f64) -> Recording {
         let rows = ((self.time.len() as f64 * fraction) as usize).max(2);
-        let part = self.rows(0, rows.min(self.time.len()));
-        Recording { from_rest: self.from_rest, ..part }
+        self.first_rows(rows.min(self.time.len()))
     }
 
     pub(crate) fn first_rows(&self, rows: usize) -> Recording {
@@ -241,14 +229,12 @@ impl Recording {
     /// # Errors
     /// If times or values are out of range.
     pub fn even(&self) -> Result<(f64, Vec<f64>, Vec<f64>)> {
-        let own = self.of_gyro();
-        own.even_rows()
+        self.of_gyro().even_rows()
     }
 
     /// Returns the rows with a value of the gyro if it is slower than the recording; otherwise all rows.
     pub fn of_gyro(&self) -> Cow<'_, Recording> {
-        let rows: Vec<usize> =
-            (0..self.time.len()).filter(|k| self.fresh.as_ref().is_none_or(|f| f[*k])).collect();
+        let rows = places(&self.fresh, self.time.len());
         if rows.len() as f64 > SLOW_GYRO * self.time.len() as f64 || rows.len() < 3 {
             return Cow::Borrowed(self);
         }
@@ -283,9 +269,7 @@ pub fn check_times(time: &[f64]) -> Result<f64> {
     if let Some(row) = time.windows(2).position(|pair| pair[1] <= pair[0]) {
         bail!("row {}: time must grow, but {} s follows {} s", row + 2, time[row + 1], time[row]);
     }
-    let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    let middle = (steps.len() - 1) / 2;
-    let step = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let step = usual(time);
     budget::steps(time[time.len() - 1] - time[0], step).context("times of the rows")?;
     Ok(step)
 }

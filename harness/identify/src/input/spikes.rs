@@ -12,7 +12,7 @@
 //! taken out first, because a spike spoils the cubic of its neighbours. The rows of spikes are left out of the fit, because a
 //! value so far out should have no weight (a robust loss such as Hampel's does the same).
 
-use std::collections::{BTreeMap, BinaryHeap};
+use std::collections::{BTreeSet, BinaryHeap};
 
 use analysis::statistics::{median, noise_level, peak};
 
@@ -25,11 +25,12 @@ const GAIN: f64 = 1.394;
 /// Returns the differences of values at growing times from the cubics through their neighbours, scaled to the noise of even rows.
 /// The differences are 0 at the ends.
 pub fn off_neighbours(time: &[f64], y: &[f64]) -> Vec<f64> {
-    let sound = Sound { rows: y.len(), out: BTreeMap::new() };
     let inner = 2..y.len().saturating_sub(2);
-    (0..y.len())
-        .map(|k| if inner.contains(&k) { off((time, y), &sound, k).0 } else { 0.0 })
-        .collect()
+    let one = |k: usize| match inner.contains(&k) {
+        true => off((time, y), &[k - 1, k - 2, k + 1, k + 2], k).0,
+        false => 0.0,
+    };
+    (0..y.len()).map(one).collect()
 }
 
 /// Returns the rows of a rate whose value is a spike, in order, each with the rate of the cubic. If `fresh` is given, only its
@@ -45,7 +46,6 @@ pub fn find(
     if y.len() < 100 {
         return Vec::new();
     }
-    let mut sound = Sound { rows: y.len(), out: BTreeMap::new() };
     let residuals: Vec<f64> =
         off_neighbours(&t, &y)[2..y.len() - 2].iter().map(|r| r.abs()).collect();
     // the median of |r| is 0.6745 σ for noise, and more where friction's kinks are in many rows
@@ -63,96 +63,49 @@ pub fn find(
         .collect();
     let most = (SPIKE_SHARE * y.len() as f64) as usize;
     // a spike is in the cubics of four neighbours
-    if suspects.len() > 5 * most {
+    if suspects.is_empty() || suspects.len() > 5 * most {
         return Vec::new();
     }
+    let mut sound: BTreeSet<usize> = (0..y.len()).collect();
+    let off_sound = |sound: &BTreeSet<usize>, k: usize| off((&t, &y), &near(sound, k), k);
     // by |r| and row; the bits of numbers that are not negative sort as the numbers do. An entry is out of date if the
     // row's |r| has changed since.
     let mut by_size: BinaryHeap<(u64, usize)> =
         suspects.iter().map(|&k| (residuals[k - 2].to_bits(), k)).collect();
     let mut taken: Vec<usize> = Vec::new();
     while let Some((bits, k)) = by_size.pop() {
-        let off = |sound: &Sound, k: usize| off((&t, &y), sound, k).0.abs();
         if f64::from_bits(bits) <= limit(k) {
             continue;
         }
-        if !sound.has(k) || off(&sound, k).to_bits() != bits {
+        if !sound.contains(&k) || off_sound(&sound, k).0.abs().to_bits() != bits {
             continue;
         }
-        sound.take(k);
+        sound.remove(&k);
         taken.push(k);
-        let near = sound.near(k).filter(|near| suspects.binary_search(near).is_ok());
-        by_size.extend(near.map(|near| (off(&sound, near).to_bits(), near)));
+        let suspected = near(&sound, k).into_iter().filter(|j| suspects.binary_search(j).is_ok());
+        by_size.extend(suspected.map(|j| (off_sound(&sound, j).0.abs().to_bits(), j)));
     }
     // put back neighbours of spikes that were taken by mistake
     for k in taken.iter().copied() {
-        if off((&t, &y), &sound, k).0.abs() < limit(k) {
-            sound.put_back(k);
+        if off_sound(&sound, k).0.abs() < limit(k) {
+            sound.insert(k);
         }
     }
-    taken.retain(|&k| !sound.has(k));
+    taken.retain(|k| !sound.contains(k));
     if taken.len() > most {
         return Vec::new();
     }
     taken.sort_unstable();
-    taken.iter().map(|&k| (rows[k], off((&t, &y), &sound, k).1)).collect()
+    taken.iter().map(|&k| (rows[k], off_sound(&sound, k).1)).collect()
 }
 
-struct Sound {
-    rows: usize,
-    /// First and last row of each stretch that is out. Stretches do not touch: in a burst of spikes the nearest sound row is
-    /// found without walking over it.
-    out: BTreeMap<usize, usize>,
+/// Returns the two nearest sound rows on either side of a row.
+fn near(sound: &BTreeSet<usize>, k: usize) -> Vec<usize> {
+    sound.range(..k).rev().take(2).chain(sound.range(k + 1..).take(2)).copied().collect()
 }
 
-impl Sound {
-    fn stretch(&self, k: usize) -> Option<(usize, usize)> {
-        let (first, last) = self.out.range(..=k).next_back()?;
-        (*last >= k).then_some((*first, *last))
-    }
-
-    fn has(&self, k: usize) -> bool {
-        self.stretch(k).is_none()
-    }
-
-    fn below(&self, k: usize) -> Option<usize> {
-        let next = k.checked_sub(1)?;
-        self.stretch(next).map_or(Some(next), |(first, _)| first.checked_sub(1))
-    }
-
-    fn above(&self, k: usize) -> Option<usize> {
-        let next = self.stretch(k + 1).map_or(k + 1, |(_, last)| last + 1);
-        (next < self.rows).then_some(next)
-    }
-
-    fn near(&self, k: usize) -> impl Iterator<Item = usize> + use<> {
-        let (below, above) = (self.below(k), self.above(k));
-        let second = [below.and_then(|k| self.below(k)), above.and_then(|k| self.above(k))];
-        [below, second[0], above, second[1]].into_iter().flatten()
-    }
-
-    fn take(&mut self, k: usize) {
-        let first = k.checked_sub(1).and_then(|k| self.stretch(k)).map_or(k, |(first, _)| first);
-        let last = self.out.remove(&(k + 1)).unwrap_or(k);
-        self.out.insert(first, last);
-    }
-
-    fn put_back(&mut self, k: usize) {
-        let Some((first, last)) = self.stretch(k) else { return };
-        self.out.remove(&first);
-        if first < k {
-            self.out.insert(first, k - 1);
-        }
-        if k < last {
-            self.out.insert(k + 1, last);
-        }
-    }
-}
-
-/// Returns the difference of row k from the cubic through the two nearest sound values on either side, scaled to the noise of even
-/// rows, and the cubic there.
-fn off((time, y): (&[f64], &[f64]), sound: &Sound, k: usize) -> (f64, f64) {
-    let nodes: Vec<usize> = sound.near(k).collect();
+/// Returns the difference of row k from the cubic through other rows, scaled to the noise of even rows, and the cubic there.
+fn off((time, y): (&[f64], &[f64]), nodes: &[usize], k: usize) -> (f64, f64) {
     let times: Vec<f64> = nodes.iter().map(|j| time[*j]).collect();
     let weights = weights(&times, time[k]);
     let cubic = nodes.iter().zip(&weights).map(|(j, weight)| y[*j] * weight).sum();
@@ -216,27 +169,6 @@ mod tests {
         };
         let time: Vec<f64> = (0..400_000).map(|k| 0.02 * f64::from(k)).collect();
         assert_eq!(find(&time, &rate(), &vec![0.0; 400_000], None), []);
-    }
-
-    #[test]
-    fn rows_that_are_out_are_stepped_over_however_they_went_and_came_back() {
-        let mut sound = Sound { rows: 100, out: BTreeMap::new() };
-        let mut expected = [true; 100];
-        let mut random = Random::new(3, 0);
-        for _ in 0..2000 {
-            let k = (random.uniform() * 100.0) as usize;
-            if expected[k] {
-                sound.take(k)
-            } else {
-                sound.put_back(k)
-            }
-            expected[k] ^= true;
-            let k = (random.uniform() * 100.0) as usize;
-            let below = (0..k).rev().filter(|j| expected[*j]).take(2);
-            let above = (k + 1..100).filter(|j| expected[*j]).take(2);
-            assert_eq!(sound.near(k).collect::<Vec<_>>(), below.chain(above).collect::<Vec<_>>());
-            assert_eq!(sound.has(k), expected[k]);
-        }
     }
 
     #[test]

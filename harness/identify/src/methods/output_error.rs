@@ -193,7 +193,7 @@ fn identify_whole(
         });
         match found {
             Ok(solution) => {
-                let fit = answer::summary(system, &solution, pair);
+                let fit = answer::summary(&solution, pair);
                 tell(News::Step(fit.line()));
                 Some(Fitted { system, solution, fit })
             }
