@@ -5,35 +5,27 @@
 
 // Signals on clocks of their own: `input/clocks.rs`.
 // Tests: `a_slow_gyro_is_completed_and_its_own_rows_are_known`, `a_band_limited_torque_of_10_hz_is_known_between_its_samples`.
-/// Spacing of values, in usual ones, up to which a cubic joins them.
-pub const CUBIC_SPACING: f64 = 2.5;
-/// Spacing of a torque's rows, s, above which lines between them do not describe a band-limited torque, because they add images
-/// of its spectrum.
-pub const COARSE_TORQUE: f64 = 0.035;
-/// Largest time between the instants to which a coarse torque is interpolated, s.
+/// Time between the instants of a band-limited torque that lines join, s: over much longer times lines add images of its spectrum.
 pub const FINE_TORQUE: f64 = 0.02;
+/// Part of the usual step by which rows of an even grid may be off.
+pub const UNEVEN: f64 = 0.02;
 /// Half the length of the kernel that interpolates a coarse torque, in its samples.
 pub const KERNEL_HALF: isize = 24;
-/// Shape of the Kaiser window of this kernel: side lobes of 80 dB.
-pub const KERNEL_SHAPE: f64 = 7.9;
 
 // Gaps of the torque: `input/gaps.rs`.
 // Tests: `lost_samples_of_a_sweep_are_predicted`, `lost_rows_of_a_sweep_are_interpolated_and_lost_rows_of_noise_split_the_recording`.
-/// Spacing of the torque's samples, in usual ones, from which on some were lost.
+/// Spacing of samples, in usual ones, from which on some were lost.
 pub const LOST_SPACING: f64 = 1.75;
 pub const LONGEST_FILLED: f64 = 3.0;
 /// Longest gap that a line may join where the recording cannot be cut, s.
 pub const LONGEST_LINE: f64 = 0.25;
-/// Number of samples on each side of a gap to which the autoregressive model is fitted.
-pub const GAP_SIDE: usize = 250;
+/// Order of the autoregressive model. It is fitted to eight times as many samples on each side of a gap.
 pub const GAP_ORDER: usize = 32;
 pub const GAP_TRIALS: usize = 12;
 /// Largest kick of the hub by the errors of all fillings, over the gyro's noise.
 pub const GAP_KICK: f64 = 0.1;
 /// Largest number of gaps at which a recording is cut; with more of them its parts would be too small.
 pub const FEW_GAPS: usize = 5;
-/// Part of the usual step by which samples may be off an even grid.
-pub const EVEN_GRID: f64 = 0.02;
 
 // Plausibility of a recording: `input/plausible.rs`.
 // Tests: `a_wheel_that_gives_its_torque_shows_its_inertia_and_one_that_does_not_is_doubted`.
@@ -47,7 +39,6 @@ pub const WHEEL_WINDOW: f64 = 0.1;
 pub const LATE_SENSOR: f64 = 0.1;
 /// Most rows of a free decay; the limit is needed because the spectrum of its residual takes 400 sines a row.
 pub const DECAY_ROWS: usize = 1_000_000;
-pub const LISTED_SPIKES: usize = 8;
 /// Spread of the rate over its noise beyond which the hub moves; a gyro's drift makes less.
 pub const MOVING_SPREAD: f64 = 2.0;
 
@@ -78,14 +69,9 @@ pub const SLOWEST_GYRO: usize = 100;
 pub const CLIPPED: (usize, f64) = (20, 4.0);
 /// Width of the range just inside an end of the sensor's range, in units of the noise.
 pub const CLIPPED_INSIDE: f64 = 3.0;
-/// Least step, in units of the noise, with which a value comes back from being clipped or frozen.
-pub const FAULT_LEAVES: f64 = 5.0;
 /// Least step, in units of the sensor's resolution, with which values come back from both ends of the range if the sensor is
 /// clipped at both.
 pub const FAULT_STEPS: f64 = 2.0;
-/// Upper bound of the ratio of the first to the second increment of an angle that starts from rest: the rate starts at zero, and
-/// the acceleration does not fall.
-pub const FROM_REST: f64 = 1.0 / 3.0;
 /// Largest probability that a run of equal values is chance at which the sensor counts as frozen.
 pub const FROZEN_CHANCE: f64 = 1e-6;
 pub const FROZEN_RUN: usize = 5;
@@ -96,8 +82,6 @@ pub const SENSOR_ROUNDING: f64 = 1e-9;
 
 // Spikes: `input/spikes.rs`.
 // Tests: `single_and_adjacent_spikes_are_found_and_noise_is_not_a_spike`, `more_than_one_value_in_a_hundred_is_no_spike`, `a_step_of_the_torque_makes_no_spike`.
-/// Standard deviations of r beyond which a value is a spike. In 10¹⁴ recordings of 135,000 rows of noise no value is so far out.
-pub const SPIKE_BEYOND: f64 = 10.0;
 /// Largest share of spikes among all values. More are noise of another kind, for which no row should be left out.
 pub const SPIKE_SHARE: f64 = 0.01;
 /// Rows on either side of a step of the torque in which r may be the hub's own motion.
@@ -134,7 +118,6 @@ pub const COMPARED_FACTOR: f64 = 1e-2;
 pub const HELD_STEPS: usize = 4;
 /// Steps whose effects of an input's slope are compared, s.
 pub const SLOPE_PROBES: [f64; 3] = [1e-2, 1e-3, 1e-4];
-pub const FINEST_TOLERANCE: f64 = 1e-13;
 
 // Effects outside the FMU: `bench/effect.rs`.
 // Tests: `lags_of_a_sine_equal_those_of_its_frequency_response`.
@@ -160,8 +143,6 @@ pub const MOST_INTERNAL_STEPS: (f64, f64) = (200.0, 2e4);
 pub const DAMPINGS: [f64; 5] = [0.0015, 0.003, 0.006, 0.015, 0.04];
 /// Relative step of the slosh frequency over the band; the half-power width at the least damping is three times as much.
 pub const FREQUENCY_FINENESS: f64 = 1e-3;
-/// Longest delay that the balance of power may show, s.
-pub const LATEST_DELAY: f64 = 0.05;
 
 // Design of experiments: `bench/design.rs`.
 // Tests: `d_optimal_power_is_near_the_slosh_frequency_and_reduces_uncertainty`, `a_multisine_has_only_odd_lines_and_the_given_peak`.
@@ -169,9 +150,8 @@ pub const LINE_GROUP: usize = 4;
 /// Share of the power that is always spread over all lines. It excites the resonance of a slightly different plant, and shows
 /// distortion everywhere.
 pub const SPREAD_POWER: f64 = 0.25;
-pub const ANGLE_ROUNDS: usize = 20;
-/// Part of the limit that the angle has to reach for `within_angle` to end before its last round.
-pub const ANGLE_ENOUGH: f64 = 0.97;
+/// Number of halvings of `within_angle`.
+pub const ANGLE_ROUNDS: usize = 12;
 
 // Verdict: `bench/verdict.rs`.
 // Tests: `a_search_that_would_leave_a_parameters_range_ends_at_the_bound_with_a_result`.
@@ -181,8 +161,6 @@ pub const TOLD_DECREMENT: f64 = 0.1;
 // Tests: `the_page_is_whole`.
 /// Number of points of a curve; more points than a screen has pixels are not seen.
 pub const PAGE_POINTS: usize = 700;
-pub const PAGE_STRETCH: f64 = 8.0;
-pub const PAGE_LAGS: usize = 200;
 
 // Output error: `methods/output_error.rs`.
 // Tests: `starts_forty_percent_off_lead_to_the_same_minimum_as_starts_from_the_data`, `no_model_fits_a_torque_that_is_clipped`.
@@ -194,16 +172,9 @@ pub const BEGINNINGS: [f64; 2] = [0.35, 0.5];
 /// Length of the blocks of rows that are averaged for the measured friction, s.
 pub const BLOCK: f64 = 0.01;
 pub const FEWEST_BLOCKS: usize = 100;
-/// Ratio of the variance of the rate to the variance of the gyro's noise, below which the hub does not move.
-pub const MOVING_POWER: f64 = 2.0;
 /// Intervals of the rate over which the measured friction is averaged, and the fewest rows of one.
 pub const FRICTION_BINS: (usize, usize) = (160, 3);
-/// A rate nearer to zero than this many standard deviations of its noise may be that of a hub that sticks.
-pub const STILL: f64 = 4.0;
 /// Torque, relative to the largest torque, up to which the hub counts as free.
 pub const FREE_TORQUE: f64 = 1e-3;
 /// Least speed in free decay that is used, relative to the fastest: at lower speeds noise makes the sign uncertain.
 pub const MOVING_SPEED: f64 = 0.05;
-pub const FRICTION_POINTS: usize = 400;
-/// Largest speed in the second chart, relative to the Stribeck speed.
-pub const SLOW_CHART: f64 = 4.0;

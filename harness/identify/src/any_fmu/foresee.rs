@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::finite;
 use super::system::{FmuSystem, is_known};
-use crate::engine::Fit;
+use crate::engine::{Fit, PRIOR_ALONE};
 use crate::input::question::Question;
 use crate::input::record::Record;
 use crate::model::simulate::Model;
@@ -70,25 +70,22 @@ pub fn foresee(
     let jacobian = fit.derivatives(&at, &everything)?.matrix;
     let solver = system.with_finer(|finer| fit.solver_error(&at, &jacobian, &everything, finer));
     let known = fit.knowledge(&jacobian, &everything, &solver);
-    let all: Vec<usize> = (0..x.len()).collect();
     let covariance = &known.covariance;
     let bound = |j: usize| {
         let unknown = &problem.unknowns[j];
         let std = covariance[(j, j)].sqrt();
         let correlation =
             |k: usize| covariance[(j, k)] / (covariance[(j, j)] * covariance[(k, k)]).sqrt();
-        let with = all.iter().filter(|k| **k != j).map(|&k| (k, correlation(k)));
-        let with = with
-            .filter(|(_, r)| r.is_finite())
-            .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
-            .map(|(k, r)| (problem.unknowns[k].name.clone(), r));
+        let with = (0..x.len()).filter(|k| *k != j).map(|k| (k, correlation(k)));
+        let with = with.filter(|(_, r)| r.is_finite());
+        let with = with.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
         let is_lost = known.decided_by_solver[j];
         let sets = known.inseparable.iter().filter(|set| set.direction.contains_key(&unknown.name));
         let others =
             sets.flat_map(|set| set.direction.keys()).filter(|name| **name != unknown.name);
         let prior = unknown.prior.map(|(_, std)| std);
         let is_vague = match prior {
-            Some(prior) => std > 0.9 * prior,
+            Some(prior) => std > PRIOR_ALONE * prior,
             None => !std.is_finite() || std > x[j].abs(),
         };
         Bound {
@@ -101,9 +98,9 @@ pub fn foresee(
             std_alone: if is_lost { f64::NAN } else { finite(1.0 / jacobian.column(j).norm()) },
             prior,
             unit: unknown.unit.clone(),
-            with,
+            with: with.map(|(k, r)| (problem.unknowns[k].name.clone(), r)),
             is_parameter: !is_known(unknown) && system.is_parameter(j),
         }
     };
-    Ok(all.iter().map(|&j| bound(j)).collect())
+    Ok((0..x.len()).map(bound).collect())
 }

@@ -19,10 +19,10 @@ use serde::Serialize;
 
 use crate::engine::knowledge::Inseparable;
 use crate::engine::minimum::{Curvature, places};
-use crate::engine::profile::Z;
+use crate::engine::profile::PARABOLIC;
 use crate::engine::search::{solve, solve_near};
 use crate::engine::solver_error::SolverError;
-use crate::engine::{ENDS, Motion, Signal, Solution, Unknown};
+use crate::engine::{ENDS, Motion, PAIR, PRIOR_ALONE, ROUNDS, Signal, Solution, Unknown, Z};
 use crate::estimate::{Estimated, fit_percent, prose};
 use crate::input::question::{Question, Setting};
 use crate::input::record::Record;
@@ -33,18 +33,10 @@ use crate::words::identified::{Identified, Residual};
 use crate::words::verdict::{DOES_NOT_FIT, NO_MINIMUM, NOT_JUDGED, failed};
 use system::{FmuSystem, is_known};
 
-const PAIR: f64 = 0.98;
-/// Ratio of an estimate's standard deviation to its prior's above which the recordings do not determine the estimate.
-const PRIOR_ALONE: f64 = 0.9;
-/// Shift by the solver's errors, in standard deviations of the estimate, up to which it is not added to the standard deviation,
-/// because it would make that 0.1 % larger.
-const ADDED: f64 = 0.05;
 /// Standard deviations by which the minimum may lie beyond a bound by chance.
 const PRESSED: f64 = 3.0;
 /// Second difference of an output that counts as a jump: in standard deviations of its noise, and in medians of all.
 const JUMP: (f64, f64) = (8.0, 20.0);
-/// Largest number of searches. Each leaves out the rows next to the jumps that the search before has shown.
-const TURNS: usize = 4;
 
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Details {
@@ -126,7 +118,7 @@ pub fn identify(
         let mut signals = problem.signals.clone();
         let jumps = leave_out_jumps(&mut signals, records, &point.motion, noise);
         let is_same = signals.iter().zip(&problem.signals).all(|(a, b)| a.sampled == b.sampled);
-        if turn == TURNS || is_same {
+        if turn == ROUNDS || is_same {
             told(&News::Step(format!("{:.0} runs of each recording", solution.fit.simulations())));
             let mut found = conclude(&system, &mut solution, question)?;
             found.details.starts = starts;
@@ -233,10 +225,6 @@ impl Numbers {
         let alone = Curvature::new(&jacobian, asked).covariance(n);
         // where the search ended before the minimum, how far it may be off is part of how sure it is
         let widened = (1.0 + minimum.decrement.powi(2)).sqrt();
-        let with_solver = |j: usize, std: f64| match solver.shift[j] > ADDED * std {
-            true => std.hypot(solver.shift[j]),
-            false => std,
-        };
         // of one at a bound: curvature with the others at their minimum
         let inverse = Curvature::new(&jacobian, inner.clone()).covariance(n);
         let curvature = |j: usize| {
@@ -249,7 +237,7 @@ impl Numbers {
         let mut std: Vec<f64> = (0..n)
             .map(|j| match (told.decided_by_solver[j], is_inner[j]) {
                 (true, _) => f64::NAN,
-                (_, true) => with_solver(j, widened * told.covariance[(j, j)].sqrt()),
+                (_, true) => (widened * told.covariance[(j, j)].sqrt()).hypot(solver.shift[j]),
                 _ => 1.0 / jacobian.column(j).norm(),
             })
             .collect();
@@ -287,7 +275,8 @@ impl Numbers {
                     found.ended = open.map(|open| !open);
                 }
                 let off = (0..2).map(|k| (found.ends[k] - parabola[k]).abs() / (Z * std[j]));
-                found.is_quadratic = off.fold(0.0, f64::max) < 0.1 && found.ended == [true; 2];
+                found.is_quadratic =
+                    off.fold(0.0, f64::max) < PARABOLIC && found.ended == [true; 2];
                 let reach = found.ends.map(|end| (end - z[j]).abs() / Z);
                 std[j] = std[j].max(reach[0]).max(reach[1]);
             }

@@ -1,6 +1,7 @@
 //! The answer of the engine about the bench: estimates, combinations, causes and words.
 
 use std::collections::BTreeMap;
+use std::f64::consts::FRAC_1_SQRT_2;
 
 use analysis::statistics::{about_mean, correlation, deviation, peak};
 use anyhow::Result;
@@ -17,9 +18,9 @@ use crate::bench::identification::{Details, Identification, ModelFit};
 use crate::bench::verdict::{self, Findings};
 use crate::engine::cause::{Effect, cause, effects};
 use crate::engine::draws::Derived;
-use crate::engine::hold::Rival;
+use crate::engine::hold::{EARLIEST, Rival};
 use crate::engine::minimum::{Curvature, places};
-use crate::engine::{ENDS, Fit, Part, Solution};
+use crate::engine::{ENDS, Fit, Part, Solution, Z};
 use crate::estimate::{Estimated, fit_percent, mean_square, prose};
 use crate::input::recording::Recording;
 use crate::input::tolerance::{self, Share};
@@ -30,8 +31,6 @@ use crate::words::page::RATE;
 
 /// Fit of the rates below which a minimum counts as a wrong one, %.
 const POOR_FIT: f64 = 90.0;
-/// Ratio of a known value's standard deviation after the fit to its tolerance, below which the recordings show the value.
-const SHOWN: f64 = 0.7;
 
 /// Returns the numbers that describe the fit of one slosh model with one friction law.
 pub fn summary(solution: &Solution, (model, law): (&str, &str)) -> ModelFit {
@@ -215,7 +214,7 @@ fn estimated(
         // as far as the range of the profile
         ends[1] = full.columns[k].iter().copied().fold(value, f64::max);
     }
-    let reach = ends.map(|end| (end - value).abs() / 1.96);
+    let reach = ends.map(|end| (end - value).abs() / Z);
     let reach = reach.into_iter().filter(|reach| reach.is_finite()).fold(0.0, f64::max);
     std = if std.is_finite() { std.max(reach) } else { std };
     let is_part = |c: &Combination| c.of.contains(name) && c.std < 0.5 * std;
@@ -240,7 +239,7 @@ fn findings(
     let mut doubts = question.doubts.to_vec();
     if let Some(j) = solution.fit.delay() {
         let (delay, step) = (solution.minimum.point.z[j], problem.recordings[0].step);
-        if !options.acausal && solution.fit.free[j] && delay < -0.05 * step {
+        if !options.acausal && solution.fit.free[j] && delay < -EARLIEST * step {
             doubts.push(format!(
                 "the rate comes {:.2} ms before the torque: check the time stamps and the torque between rows (--torque; \
                  --also early_rate allows it)",
@@ -382,7 +381,8 @@ fn shown(
         let found = full.tolerances.iter().find(|(name, _)| *name == unknown.name);
         let (Some((_, prior)), Some((name, draws))) = (unknown.prior, found) else { continue };
         let relative = deviation(draws);
-        if !free[j] || unknown.part != Part::Tolerance || relative > SHOWN * prior {
+        // the recordings have at least as much information as the tolerance
+        if !free[j] || unknown.part != Part::Tolerance || relative > FRAC_1_SQRT_2 * prior {
             continue;
         }
         let (nominal, unit) = match &system.targets[j] {

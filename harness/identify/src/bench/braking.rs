@@ -50,13 +50,12 @@ impl Braking {
     /// changes slowly within a stretch. `None` if there are too few stretches. Liang and Zeger, Biometrika 73 (1986) 13, with
     /// Scheffé's factor.
     pub fn half_width(&self, angle: f64) -> Option<f64> {
-        /// 95 % quantile of χ² with five degrees of freedom.
-        const CHI_SQUARE: f64 = 11.070;
         let width = self.coefficients.len();
         let row = DVector::from_vec(harmonics_at(angle, (width - 1) / 2));
         let variance = (row.transpose() * self.covariance.as_ref()? * &row)[(0, 0)];
         let few = (self.stretches - 1) as f64 / (self.stretches - width - 2) as f64;
-        Some((CHI_SQUARE * few * variance).sqrt())
+        // 95 % quantile of χ² with five degrees of freedom
+        Some((11.070 * few * variance).sqrt())
     }
 
     pub fn at(&self, angle: f64) -> f64 {

@@ -3,12 +3,10 @@
 use analysis::statistics::{deviation, mean};
 use names::hubslosh::friction;
 
-use crate::engine::VAGUE;
 use crate::engine::draws::Derived;
+use crate::engine::{PAIR, VAGUE};
 use crate::words::combination::Combination;
 
-/// Correlation, without its sign, above which two vague unknowns count as a sum of which only the total is known.
-const ALIKE: f64 = 0.99;
 /// Standard deviation of the friction's asymmetry above which the recordings do not show it.
 pub const ONE_WAY: f64 = 0.25;
 /// Ratio of a hub's path against its main direction to its path along it, above which the hub turns both ways.
@@ -52,7 +50,7 @@ pub fn combinations(draws: &Derived, way: Option<f64>) -> Vec<Combination> {
     } else if let (Some(c), Some(d)) = (place(friction::C), place(friction::D)) {
         let [a, b] = [&draws.columns[c], &draws.columns[d]];
         let correlation = analysis::statistics::correlation(a, b);
-        if correlation < -ALIKE && is_vague(c) && is_vague(d) {
+        if correlation < -PAIR && is_vague(c) && is_vague(d) {
             let values = a.iter().zip(b).map(|(c, d)| c + d).collect();
             add(c, d, format!("{} + {}", friction::C, friction::D), values);
         }

@@ -18,7 +18,7 @@ use crate::engine::minimum::Minimum;
 use crate::engine::{Fit, Hold, Solution};
 use crate::input::recording::Recording;
 use crate::input::tolerance::Tolerances;
-use crate::tuning::{ANGLE_ENOUGH, ANGLE_ROUNDS, LINE_GROUP, SPREAD_POWER};
+use crate::tuning::{ANGLE_ROUNDS, LINE_GROUP, SPREAD_POWER};
 use analysis::gauss_markov::Noise;
 use names::hubslosh::{FrictionModel, SloshModel, slosh};
 
@@ -245,11 +245,7 @@ pub fn within_angle(
     let (mut within, mut beyond) = (0.0, 1.0);
     for _ in 0..ANGLE_ROUNDS {
         let factor = 0.5 * (within + beyond);
-        let found = angle(factor)?;
-        *(if found <= limit { &mut within } else { &mut beyond }) = factor;
-        if (ANGLE_ENOUGH * limit..=limit).contains(&found) {
-            break;
-        }
+        *(if angle(factor)? <= limit { &mut within } else { &mut beyond }) = factor;
     }
     ensure!(within > 0.0, "no torque of this shape keeps the liquid within {limit} rad");
     Ok(within)

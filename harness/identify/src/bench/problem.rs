@@ -2,6 +2,8 @@
 
 use std::sync::OnceLock;
 
+use analysis::gauss_markov::FLOOR;
+use analysis::innovations::LIMIT;
 use analysis::statistics::{deviation, noise_level, peak};
 use anyhow::{Result, ensure};
 use host::causality::Causality;
@@ -29,14 +31,13 @@ const GYRO_DRIFT: Drift = Drift { size: 0.2, time: 100.0, width: 0.7 };
 /// is large.
 const ENCODER_DRIFT: Drift = Drift { size: 1.0, time: 100.0, width: 6.0 };
 /// Standard deviation of a delay's prior, and the delay's bounds, s.
-const DELAY: (f64, f64, f64) = (0.05, -0.2, 0.5);
+pub const DELAY: (f64, f64, f64) = (0.05, -0.2, 0.5);
+/// Standard deviation of the prior of the dry friction's asymmetry, which is small against 1.
 const ASYMMETRY: f64 = 0.5;
 const FRICTION_WIDTH: f64 = 10.0;
 pub const LEAST_FRICTION: f64 = 1e-4;
 /// Standard deviation of the prior of ln ω_s (Stribeck speed), and the largest factor between ω_s and its start.
 const SPEED: (f64, f64) = (1.5, 30.0);
-/// Rate, in standard deviations of the gyro's noise, above which it shows the direction of rotation.
-const ABOVE_NOISE: f64 = 5.0;
 /// Least and largest factor by which a known value may differ from its nominal value.
 const WIDEST: (f64, f64) = (0.6, 1.6);
 
@@ -327,7 +328,7 @@ pub fn system<'a>(
 fn way(recordings: &[Recording]) -> f64 {
     let one = |recording: &Recording| {
         let bias = if recording.from_rest { recording.first_rate() } else { 0.0 };
-        let noise = ABOVE_NOISE * recording.rate_noise();
+        let noise = LIMIT * recording.rate_noise();
         let rates = recording.rate.iter().map(|rate| rate - bias);
         combination::way(rates.filter(|rate| rate.abs() > noise)).unwrap_or(0.0)
     };

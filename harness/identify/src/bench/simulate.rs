@@ -11,7 +11,7 @@ use names::hubslosh::{
 use crate::bench::effect::{self, Effects};
 use crate::engine::Hold;
 use crate::input::clocks;
-use crate::input::recording::Recording;
+use crate::input::recording::{Recording, masked};
 use crate::model::simulate::most_steps;
 use crate::tuning::SAME_INSTANT;
 
@@ -47,8 +47,6 @@ pub enum Read {
 /// If rows are unevenly spaced, only the term with δ² is used.
 pub fn smooth(time: &[f64], signal: &[f64]) -> Vec<f64> {
     let n = signal.len();
-    let mean = (time[n - 1] - time[0]) / (n - 1) as f64;
-    let even = time.windows(2).all(|t| (t[1] - t[0] - mean).abs() < 0.01 * mean);
     let second = |x: &[f64]| -> Vec<f64> {
         let mut d = vec![0.0; n];
         for k in 1..n - 1 {
@@ -58,7 +56,7 @@ pub fn smooth(time: &[f64], signal: &[f64]) -> Vec<f64> {
         d
     };
     let two = second(signal);
-    let mut four = if even { second(&two) } else { vec![0.0; n] };
+    let mut four = if clocks::is_even(time) { second(&two) } else { vec![0.0; n] };
     (four[0], four[1], four[n - 2], four[n - 1]) = (0.0, 0.0, 0.0, 0.0);
     (0..n).map(|k| signal[k] - two[k] / 12.0 + four[k] / 90.0).collect()
 }
@@ -66,11 +64,9 @@ pub fn smooth(time: &[f64], signal: &[f64]) -> Vec<f64> {
 /// Returns the instants of a recording's torque, s, and its values there, N·m, with the recording's first and last row among
 /// them. The values of a band-limited torque are corrected so that lines can join them ([`smooth`]).
 pub fn course(recording: &Recording, intersample: Hold) -> (Vec<f64>, Vec<f64>) {
-    let of = |values: &[f64]| recording.commands().iter().map(|k| values[*k]).collect::<Vec<_>>();
-    let (mut knots, mut torque) = match recording.commanded {
-        None => (recording.time.clone(), recording.torque.clone()),
-        Some(_) => (of(&recording.time), of(&recording.torque)),
-    };
+    let commanded = recording.commanded.as_deref();
+    let mut knots = masked(&recording.time, commanded);
+    let mut torque = masked(&recording.torque, commanded);
     if intersample == Hold::BandLimited && knots.len() > 3 {
         let (fine, values) = clocks::refined(&knots, &torque);
         torque = smooth(&fine, &values);
@@ -88,17 +84,7 @@ pub fn course(recording: &Recording, intersample: Hold) -> (Vec<f64>, Vec<f64>) 
     (knots, torque)
 }
 
-/// Returns a signal at a time, on the line between two rows. `row` is the row before this time; it only grows from call to call,
-/// so that the times must grow.
-fn at(time: &[f64], signal: &[f64], t: f64, row: &mut usize) -> f64 {
-    while *row + 2 < time.len() && time[*row + 1] <= t {
-        *row += 1;
-    }
-    let k = *row;
-    let part = ((t - time[k]) / (time[k + 1] - time[k])).clamp(0.0, 1.0);
-    signal[k] + part * (signal[k + 1] - signal[k])
-}
-
+/// Setup and drive of the FMU.
 #[derive(Clone, Debug)]
 pub struct Setup {
     pub settings: Vec<(String, String)>,
@@ -162,7 +148,7 @@ impl Setup {
                 return signal.to_vec();
             }
             let mut row = 0;
-            let value = |t: &f64| at(&recording.time, signal, *t, &mut row);
+            let value = |t: &f64| clocks::on_line(&recording.time, signal, *t, &mut row);
             knots.iter().map(value).collect()
         };
         let gravity = recording.gravity.as_deref().map(at_knots);

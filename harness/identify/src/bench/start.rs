@@ -4,7 +4,7 @@
 use std::f64::consts::{PI, TAU};
 
 use analysis::features::Features;
-use analysis::statistics::{mean, median, quantile};
+use analysis::statistics::{correlation, deviation, mean, median, quantile};
 use analysis::transfer_function::TransferFunction;
 use analysis::{Complex64, FrequencyResponse};
 use anyhow::Result;
@@ -12,10 +12,11 @@ use formulas::cylinder::tank_of_first_mode;
 use signals::fourier::Forward;
 
 use crate::bench::nominal::{Bench, Nominal, Start};
+use crate::bench::problem::DELAY;
 use crate::input::plausible;
 use crate::input::recording::Recording;
 use crate::input::response::{excited_band, response};
-use crate::tuning::{DAMPINGS, FREQUENCY_FINENESS, LATEST_DELAY};
+use crate::tuning::{DAMPINGS, FREQUENCY_FINENESS};
 
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Response {
@@ -307,7 +308,9 @@ fn friction(recordings: &[Recording]) -> Start {
             }
         }
     }
-    let delay = slope_of(&windows).filter(|delay| delay.abs() < LATEST_DELAY).unwrap_or(0.0);
+    let (powers, lates): (Vec<f64>, Vec<f64>) = windows.iter().map(|w| (w[0], w[1])).unzip();
+    let slope = correlation(&powers, &lates) * deviation(&powers) / deviation(&lates);
+    let delay = if windows.len() > 4 && slope.abs() < DELAY.0 { slope } else { 0.0 };
     let torque = |[power, late, _]: &[f64; 3]| power - delay * late;
     let (torques, speeds): (Vec<f64>, Vec<f64>) =
         windows.iter().map(|w| (torque(w), w[2])).filter(|(torque, _)| *torque > 0.0).unzip();
@@ -318,16 +321,6 @@ fn friction(recordings: &[Recording]) -> Start {
     let (b, omega_s) = (0.1 * torque / middle, 0.5 * PI * fastest);
     let (c, stribeck) = (0.55 * torque, 0.35 * torque);
     Start { zeta: 0.003, b, c, stribeck, omega_s, ..Start::default() }
-}
-
-/// Returns the least-squares slope of a line through points (y, x, …); `None` if there are fewer than five points or all x are
-/// equal.
-fn slope_of(points: &[[f64; 3]]) -> Option<f64> {
-    let n = points.len() as f64;
-    let [y, x] = [0, 1].map(|i| points.iter().map(|p| p[i]).sum::<f64>() / n);
-    let square: f64 = points.iter().map(|p| (p[1] - x).powi(2)).sum();
-    let product: f64 = points.iter().map(|p| (p[1] - x) * (p[0] - y)).sum();
-    (points.len() > 4 && square > 0.0).then(|| product / square)
 }
 
 #[cfg(test)]

@@ -11,6 +11,7 @@
 //! They are not the unknowns themselves because the likelihood has a long bent valley in d, h and I: in a deep tank T hardly
 //! depends on h. However, if tank, hub or modes are set or known, the FMU's own parameters are the unknowns.
 
+use std::borrow::Cow;
 use std::f64::consts::PI;
 use std::sync::OnceLock;
 
@@ -139,31 +140,34 @@ impl BenchSystem<'_> {
         Bench { arm: arm * of(&Target::Arm), density: density * of(&Target::Density), gravity }
     }
 
+    /// Returns length (m) and mass (kg) of the first mode, and the inertia J (kg·m²), if they are unknowns.
+    fn mode(&self, values: &[f64]) -> Option<[f64; 3]> {
+        let of = |target: Target| self.value(values, &target);
+        let (length, ratio) = of(Target::Length).zip(of(Target::MassRatio))?;
+        let inertia = of(Target::Inertia)?;
+        Some([length, ratio * inertia / self.bench(values).inertia(1.0), inertia])
+    }
+
     /// Returns the torques of [`BESIDES`] that are not 0, summed, in each row of a recording, N·m; `None` if all are 0.
     fn besides(&self, values: &[f64], recording: usize) -> Option<Vec<f64>> {
         let base = self.base.get()?;
-        let sizes: Vec<(usize, f64)> = self
-            .targets
-            .iter()
-            .zip(values)
-            .filter_map(|(target, value)| match target {
-                Target::Besides(kind) if *value != 0.0 => Some((*kind, *value)),
-                _ => None,
-            })
-            .collect();
+        let size = |(target, value): (&Target, &f64)| match target {
+            Target::Besides(kind) if *value != 0.0 => Some((*kind, *value)),
+            _ => None,
+        };
+        let sizes: Vec<_> = self.targets.iter().zip(values).filter_map(size).collect();
         if sizes.is_empty() {
             return None;
         }
         let (motion, recorded) = (&base[recording], &self.recordings[recording]);
-        let row = |k: usize| Row {
-            time: recorded.time[k] - recorded.time[0],
-            torque: recorded.torque[k],
-            angle: motion.others[1][k],
-            rate: motion.outputs[0][k],
-            slosh_angle: motion.others[0][k],
-        };
         let torque = |k: usize| {
-            let row = row(k);
+            let row = Row {
+                time: recorded.time[k] - recorded.time[0],
+                torque: recorded.torque[k],
+                angle: motion.others[1][k],
+                rate: motion.outputs[0][k],
+                slosh_angle: motion.others[0][k],
+            };
             sizes.iter().map(|(kind, size)| size * (BESIDES[*kind].torque)(&row)).sum()
         };
         Some((0..recorded.time.len()).map(torque).collect())
@@ -184,31 +188,24 @@ impl System for BenchSystem<'_> {
         let mut reals: Vec<(String, f64)> = Vec::new();
         let mut set = |name: &str, value: &str| settings.push((name.into(), value.into()));
         let mut effects = Effects::default();
-        let of = |target: &Target| self.value(values, target);
-        let mode = of(&Target::Length).zip(of(&Target::MassRatio)).zip(of(&Target::Inertia));
-        if let Some(((length, ratio), inertia)) = mode {
-            let mass = ratio * inertia / bench.inertia(1.0);
-            let second = of(&Target::SecondMode).unwrap_or(0.0);
-            let zeta = of(&Target::Zeta).unwrap_or(0.0);
+        let of = |target: Target, absent: f64| self.value(values, &target).unwrap_or(absent);
+        let second = of(Target::SecondMode, 0.0);
+        if second != 0.0 {
+            set(slosh::MODES, "2");
+        }
+        if let Some([length, mass, inertia]) = self.mode(values) {
+            // of a deep cylinder the second mode's mass is 3 % of the first's
+            let other = second * 0.03 * mass;
             set(slosh::SOURCE, SloshSource::Table.name());
-            reals.push((slosh::table::LENGTH.element([1]), length));
-            reals.push((slosh::table::MASS.element([1]), mass));
-            reals.push((slosh::table::ZETA.element([1]), zeta));
+            let modes = [(1, length, mass), (2, length * XI[0] / XI[1], other)];
+            for (k, length, mass) in &modes[..if second == 0.0 { 1 } else { 2 }] {
+                reals.push((slosh::table::LENGTH.element([*k]), *length));
+                reals.push((slosh::table::MASS.element([*k]), *mass));
+                reals.push((slosh::table::ZETA.element([*k]), of(Target::Zeta, 0.0)));
+            }
             reals.push((hub::I.into(), inertia));
             reals.push((tank::D.into(), diameter(length, mass, bench)));
-            let mut liquid = mass;
-            if second != 0.0 {
-                // of a deep cylinder the second mode's mass is 3 % of the first's
-                let other = second * 0.03 * mass;
-                set(slosh::MODES, "2");
-                reals.push((slosh::table::LENGTH.element([2]), length * XI[0] / XI[1]));
-                reals.push((slosh::table::MASS.element([2]), other));
-                reals.push((slosh::table::ZETA.element([2]), zeta));
-                liquid += other;
-            }
-            reals.push((slosh::table::M_LIQ.into(), liquid));
-        } else if of(&Target::SecondMode).is_some_and(|second| second != 0.0) {
-            set(slosh::MODES, "2");
+            reals.push((slosh::table::M_LIQ.into(), mass + other));
         }
         for (target, &value) in self.targets.iter().zip(values) {
             match target {
@@ -233,46 +230,39 @@ impl System for BenchSystem<'_> {
         }
         let besides = self.besides(values, recording);
         effects.torque = besides.as_deref();
-        let torque = of(&Target::Torque).unwrap_or(1.0);
-        let clock = of(&Target::Clock).unwrap_or(1.0);
-        let gravity = of(&Target::Gravity).unwrap_or(1.0);
+        let torque = of(Target::Torque, 1.0);
+        let (clock, gravity) = (of(Target::Clock, 1.0), of(Target::Gravity, 1.0));
         let all = &self.recordings[recording];
-        let is_plain = torque == 1.0 && clock == 1.0;
-        let mut own;
-        let acting = if rows == all.time.len() && is_plain {
-            all
-        } else {
-            own = all.first_rows(rows);
+        let mut acting = Cow::Borrowed(all);
+        if rows < all.time.len() || torque != 1.0 || clock != 1.0 {
+            let mut own = all.first_rows(rows);
             own.torque.iter_mut().for_each(|value| *value *= torque);
             let first = own.time[0];
             own.time.iter_mut().for_each(|t| *t = first + clock * (*t - first));
-            &own
-        };
+            acting = Cow::Owned(own);
+        }
         if all.gravity.is_none() && gravity != 1.0 {
             reals.push((names::hubslosh::G_AXIAL.into(), self.bench.gravity * gravity));
         }
         let setup = Setup { settings, intersample: hold };
         let reals: Vec<(&str, f64)> = reals.iter().map(|(name, v)| (name.as_str(), *v)).collect();
-        let delay = of(&Target::Delay).unwrap_or(0.0);
+        let delay = of(Target::Delay, 0.0);
         let read = if whole { Read::All } else { Read::States };
-        let found = setup.run_under(self.fmu, &reals, acting, delay, &effects, read)?;
-        let mut motion = Motion::default();
-        if acting.angle.is_some() {
-            let lead = delay - of(&Target::AngleDelay).unwrap_or(delay);
-            let [angle, rate] = simulate::angle_and_rate_at(&acting.time, &found, lead);
-            motion.outputs = vec![found.rate, angle];
-            if whole {
-                motion.slopes = vec![found.acceleration, rate];
-                motion.others = vec![found.slosh_angle, found.angle];
-            }
-        } else {
-            motion.outputs = vec![found.rate];
-            if whole {
-                motion.slopes = vec![found.acceleration];
-                motion.others = vec![found.slosh_angle, found.angle];
-            }
+        let found = setup.run_under(self.fmu, &reals, &acting, delay, &effects, read)?;
+        let turned = acting.angle.is_some().then(|| {
+            let lead = delay - of(Target::AngleDelay, delay);
+            simulate::angle_and_rate_at(&acting.time, &found, lead)
+        });
+        let (mut outputs, mut slopes) = (vec![found.rate], vec![found.acceleration]);
+        if let Some([angle, rate]) = turned {
+            outputs.push(angle);
+            slopes.push(rate);
         }
-        Ok(motion)
+        let others = vec![found.slosh_angle, found.angle];
+        Ok(match whole {
+            true => Motion { outputs, slopes, others },
+            false => Motion { outputs, ..Motion::default() },
+        })
     }
 
     fn derived(&self) -> Vec<(String, String)> {
@@ -280,31 +270,23 @@ impl System for BenchSystem<'_> {
     }
 
     fn derive(&self, values: &[f64]) -> Option<Vec<f64>> {
-        let of = |target: &Target| self.value(values, target);
         let bench = self.bench(values);
-        let mode = of(&Target::Length).zip(of(&Target::MassRatio)).zip(of(&Target::Inertia));
-        let shape = match mode {
-            Some(((length, ratio), inertia)) => {
-                Some(tank_of(length, ratio * inertia / bench.inertia(1.0), inertia, bench)?)
-            }
+        let shape = match self.mode(values) {
+            Some([length, mass, inertia]) => Some(tank_of(length, mass, inertia, bench)?),
             None => None,
         };
-        let other = 1.0 + self.way * of(&Target::Asymmetry).unwrap_or(0.0);
-        let mut all = Vec::with_capacity(self.derived.len());
-        for (target, value) in self.targets.iter().zip(values).take(self.derived.len()) {
-            all.push(match (target, shape) {
-                (Target::Length, Some([d, ..])) => d,
-                (Target::MassRatio, Some([_, h, _])) => h,
-                (Target::Inertia, Some([.., inertia])) => inertia,
-                (Target::Parameter(name), _)
-                    if [friction::C, friction::D].contains(&name.as_str()) =>
-                {
-                    value / other
-                }
-                (Target::GyroScale, _) => 1.0 + value,
-                _ => *value,
-            });
-        }
-        Some(all)
+        let asymmetry = self.value(values, &Target::Asymmetry).unwrap_or(0.0);
+        let other = 1.0 + self.way * asymmetry;
+        let one = |(target, value): (&Target, &f64)| match (target, shape) {
+            (Target::Length, Some([d, ..])) => d,
+            (Target::MassRatio, Some([_, h, _])) => h,
+            (Target::Inertia, Some([.., inertia])) => inertia,
+            (Target::Parameter(name), _) if [friction::C, friction::D].contains(&name.as_str()) => {
+                value / other
+            }
+            (Target::GyroScale, _) => 1.0 + value,
+            _ => *value,
+        };
+        Some(self.targets.iter().zip(values).take(self.derived.len()).map(one).collect())
     }
 }

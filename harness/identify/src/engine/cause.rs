@@ -20,13 +20,10 @@ use rayon::prelude::*;
 
 use super::minimum::{Curvature, End, places};
 use super::problem::Part;
-use super::{DECIDES, ENDS, Fit, Solution};
+use super::{DECIDES, ENDS, Fit, SEEN, Solution};
 use crate::news::News;
 
 const FITTED: usize = 3;
-/// Least part of a candidate's change that the unknowns cannot cancel. A smaller part does not differ from errors of the
-/// derivatives, which are differences and good to a thousandth.
-const SEEN: f64 = 1e-2;
 
 #[derive(Clone, Copy, Debug)]
 pub struct Effect {
@@ -50,8 +47,9 @@ struct Score {
 /// If the system refuses the minimum. A candidate that it refuses is left out.
 pub fn effects(solution: &Solution, news: &mut dyn FnMut(&News)) -> Result<Vec<Effect>> {
     let problem = solution.fit.problem;
-    let candidates =
-        places(&problem.unknowns.iter().map(|u| u.part == Part::Candidate).collect::<Vec<bool>>());
+    let is_part =
+        |part: Part| -> Vec<bool> { problem.unknowns.iter().map(|u| u.part == part).collect() };
+    let candidates = places(&is_part(Part::Candidate));
     if candidates.is_empty() {
         return Ok(Vec::new());
     }
@@ -64,12 +62,8 @@ pub fn effects(solution: &Solution, news: &mut dyn FnMut(&News)) -> Result<Vec<E
         let z = base.point.z.clone();
         base = fit.minimise(&z, &solution.fit.free, None, End::new(6, ENDS.0))?;
     }
-    let known: Vec<bool> = problem
-        .unknowns
-        .iter()
-        .zip(&fit.free)
-        .map(|(u, free)| *free || u.part == Part::Tolerance)
-        .collect();
+    let tolerances = is_part(Part::Tolerance);
+    let known: Vec<bool> = tolerances.iter().zip(&fit.free).map(|(t, free)| *t || *free).collect();
     let jacobian = fit.derivatives(&base.point, &known)?.matrix;
     let covariance = Curvature::new(&jacobian, places(&known)).covariance(known.len());
     let rest = |v: &DVector<f64>| v - &jacobian * (&covariance * jacobian.tr_mul(v));
@@ -82,6 +76,7 @@ pub fn effects(solution: &Solution, news: &mut dyn FnMut(&News)) -> Result<Vec<E
         let change = (there.e - &base.point.e) / step;
         let seen = rest(&change);
         let norm = seen.norm();
+        // the rest the unknowns cancel
         if !(norm.is_finite() && norm > SEEN * change.norm()) {
             return None;
         }
@@ -90,18 +85,14 @@ pub fn effects(solution: &Solution, news: &mut dyn FnMut(&News)) -> Result<Vec<E
     };
     let mut scores: Vec<Score> = candidates.par_iter().filter_map(one).collect();
     scores.sort_by(|a, b| b.score.abs().total_cmp(&a.score.abs()));
-    let said: Vec<String> = scores
-        .iter()
-        .map(|s| format!("{} {:.1}", problem.unknowns[s.unknown].name, s.score))
-        .collect();
+    let name = |j: usize| &problem.unknowns[j].name;
+    let said: Vec<String> =
+        scores.iter().map(|s| format!("{} {:.1}", name(s.unknown), s.score)).collect();
     news(&News::Detail(format!("scores of effects that are not estimated: {}", said.join(", "))));
-    let before = {
-        let mut own = Fit::new(problem);
-        own.hold = fit.hold;
-        own.set(fit.noise.clone(), 1.0);
-        own.renew_noise(&base.point);
-        own.deviance(&own.point(&base.point.z, base.point.motion.clone()))
-    };
+    let own = fit.noise.clone();
+    fit.renew_noise(&base.point);
+    let before = fit.deviance(&fit.point(&base.point.z, base.point.motion.clone()));
+    fit.set(own, 1.0);
     let chance = DECIDES + (base.point.e.len() as f64).ln();
     let noise = fit.noise.clone();
     let mut found = Vec::new();
@@ -112,9 +103,11 @@ pub fn effects(solution: &Solution, news: &mut dyn FnMut(&News)) -> Result<Vec<E
         free[j] = true;
         let mut z = base.point.z.clone();
         let reach = problem.unknowns[j].reach;
-        let size = score.size.abs().max(0.3 * reach);
+        let mut size = score.size.abs().max(0.3 * reach);
         // far from its minimum an effect that has one sign may seem to have the other
-        let size = if fit.ends[j].0 < 0.0 { size.copysign(score.size) } else { size };
+        if fit.ends[j].0 < 0.0 {
+            size = size.copysign(score.size);
+        }
         z[j] = size.clamp(fit.ends[j].0, fit.ends[j].1);
         let Ok(first) = fit.minimise(&z, &free, None, End::new(8, ENDS.0)) else { continue };
         fit.renew_noise(&first.point);
@@ -133,7 +126,7 @@ pub fn effects(solution: &Solution, news: &mut dyn FnMut(&News)) -> Result<Vec<E
         let size = (there.z[j], std);
         news(&News::Detail(format!(
             "with {} = {:.3e} ± {:.1e}, −2 ln L falls by {gain:.1}, and {}",
-            problem.unknowns[j].name,
+            name(j),
             size.0,
             size.1,
             if fits { "noise is left" } else { "more than noise is left" }

@@ -15,9 +15,10 @@ use super::profile::{Curve, OPEN, Point};
 use super::{Fit, Solution};
 
 const DRAWS: usize = 20_000;
-const FEWEST: usize = 400;
+/// Fewest draws from which quantiles are computed.
+const FEWEST: usize = DRAWS / 50;
 /// Places of the profile's coordinate between which draws are spread evenly.
-const PLACES: usize = 400;
+const PLACES: usize = DRAWS / 50;
 
 /// Quantities that are derived from the unknowns: their names, units and values at the minimum, and draws of each in `columns`.
 #[derive(Clone, Debug, Default)]
@@ -47,19 +48,14 @@ impl Solution<'_> {
     /// If the system refuses a derivative.
     pub fn draw(&mut self, with_tolerances: bool) -> Result<Derived> {
         let unknowns = &self.fit.problem.unknowns;
-        let n = unknowns.len();
-        let is_known: Vec<bool> = unknowns.iter().map(|u| u.part == Part::Tolerance).collect();
-        let is_known: Vec<bool> = match with_tolerances {
-            true => is_known,
-            false => vec![false; n],
-        };
+        let is_known: Vec<bool> =
+            unknowns.iter().map(|u| with_tolerances && u.part == Part::Tolerance).collect();
         let tolerances = self.fit.derivatives(&self.minimum.point, &is_known)?;
         let means = self.fit.derivatives_at(&mut self.minimum)?.means + &tolerances.means;
         let bent = self.profile.as_ref().map(|(j, _)| *j);
-        let whole = Point { at: 0.0, minimum: self.minimum.clone() };
         let points = match &self.profile {
             Some((_, points)) => points.clone(),
-            None => vec![whole],
+            None => vec![Point { at: 0.0, minimum: self.minimum.clone() }],
         };
         let least = points.iter().map(|p| p.minimum.point.cost).fold(f64::INFINITY, f64::min);
         let mut places_of: Vec<Place> = Vec::new();
@@ -108,11 +104,11 @@ impl Solution<'_> {
         let root =
             |(k, p): (usize, &Place)| p.rise.max(0.0).sqrt() * if k < lowest { -1.0 } else { 1.0 };
         let roots = curve(all.iter().enumerate().map(root).collect());
-        let middle: Vec<Curve> =
-            (0..n).map(|j| curve(all.iter().map(|p| p.z[j]).collect())).collect();
-        let residual: Vec<Curve> = (0..problem.signals.len())
-            .map(|s| curve(all.iter().map(|p| p.means[s]).collect()))
-            .collect();
+        let curves = |count: usize, of: fn(&Place, usize) -> f64| -> Vec<Curve> {
+            (0..count).map(|j| curve(all.iter().map(|p| of(p, j)).collect())).collect()
+        };
+        let middle = curves(n, |p, j| p.z[j]);
+        let residual = curves(problem.signals.len(), |p, s| p.means[s]);
         let (low, high) = (x[0], x[x.len() - 1]);
         let width = (high - low) / PLACES as f64;
         let mut sums = Vec::with_capacity(PLACES);
@@ -226,12 +222,10 @@ impl Solution<'_> {
 fn spread(jacobian: &DMatrix<f64>, which: &[bool]) -> DMatrix<f64> {
     let curvature = Curvature::new(jacobian, places(which));
     let (vectors, inverse) = curvature.spread();
-    let k = curvature.which.len();
-    let mut all = DMatrix::zeros(which.len(), k);
+    let mut all = DMatrix::zeros(which.len(), inverse.len());
     for (i, &row) in curvature.which.iter().enumerate() {
-        for c in 0..k {
-            all[(row, c)] = vectors[(i, c)] * inverse[c].sqrt() * curvature.scale[i];
-        }
+        let scaled = vectors.row(i).component_mul(&inverse.map(f64::sqrt).transpose());
+        all.row_mut(row).copy_from(&(scaled * curvature.scale[i]));
     }
     all
 }

@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::problem::{Hold, Motion, Part, Problem, Role, Signal, Unknown};
-use super::{BEND, FIRST_STEP, MOVE, STEPS, WIDER};
+use super::{BEND, MOVE, STEPS, WIDER};
 
 /// A problem with the state of its search: the noise of its signals, and what its inputs do between rows.
 pub struct Fit<'p> {
@@ -64,7 +64,7 @@ impl<'p> Fit<'p> {
             central: problem.rough,
             bent: None,
             ends: unknowns.iter().map(Unknown::ends).collect(),
-            steps: unknowns.iter().map(|u| (FIRST_STEP * u.reach, 0.0)).collect(),
+            steps: unknowns.iter().map(|u| ((STEPS.0 * STEPS.1).sqrt() * u.reach, 0.0)).collect(),
             filters: Vec::new(),
             driven: AtomicUsize::new(0),
         };

@@ -8,10 +8,10 @@ use anyhow::Result;
 
 use super::minimum::{End, Minimum};
 use super::problem::{Hold, Role};
-use super::{ALIKE, DECIDES, ENDS, Fit};
+use super::{ALIKE, DECIDES, ENDS, Fit, SETS};
 
 /// Delay below 0, in rows, up to which it counts as none, because the time stamps of two channels may differ by so much.
-const EARLIEST: f64 = 0.05;
+pub const EARLIEST: f64 = 0.05;
 
 /// A course of the inputs between rows that was not chosen, at its own minimum.
 #[derive(Clone, Debug)]
@@ -51,59 +51,53 @@ impl Fit<'_> {
         }
         let delay = self.delay().filter(|j| self.free[*j]);
         let step = self.problem.recordings.first().map_or(0.0, |r| r.step);
-        let now = self.hold;
-        let free = self.free.clone();
-        let mut found = match found.decrement < ENDS.0 {
-            true => found,
-            false => {
-                let z = found.point.z.clone();
-                self.minimise(&z, &free, found.derivatives, End::new(12, ENDS.0))?
-            }
+        let acausal = self.problem.acausal;
+        let is_early = |minimum: &Minimum| {
+            !acausal && delay.is_some_and(|j| minimum.point.z[j] < -EARLIEST * step)
         };
-        let derivatives = found.derivatives.clone();
-        let mut all: Vec<(Hold, Minimum, bool)> = Vec::new();
-        let early = is_early(self, delay, step, &found);
-        let mut least = if early { f64::INFINITY } else { found.point.cost };
-        for hold in self.problem.holds.clone().into_iter().filter(|hold| *hold != now) {
+        let (now, free) = (self.hold, self.free.clone());
+        let mut found = found;
+        if found.decrement >= ENDS.0 {
+            let z = found.point.z.clone();
+            found = self.minimise(&z, &free, found.derivatives, End::new(12, ENDS.0))?;
+        }
+        let mut least = if is_early(&found) { f64::INFINITY } else { found.point.cost };
+        let mut all: Vec<(Hold, Minimum)> = vec![(now, found.clone())];
+        for hold in self.problem.holds.iter().copied().filter(|hold| *hold != now) {
             self.hold = hold;
             let mut z = found.point.z.clone();
             if let Some(j) = delay {
                 let late = |h: Hold| if h == Hold::ZeroOrderHold { 0.5 * step } else { 0.0 };
                 z[j] += late(now) - late(hold);
             }
-            let end = End { above: least + DECIDES, ..End::new(8, ENDS.0) };
-            let Ok(other) = self.minimise(&z, &free, derivatives.clone(), end) else { continue };
-            let early = is_early(self, delay, step, &other);
-            if !early {
+            let end = End { above: least + DECIDES, ..End::new(SETS, ENDS.0) };
+            let Ok(other) = self.minimise(&z, &free, found.derivatives.clone(), end) else {
+                continue;
+            };
+            if !is_early(&other) {
                 least = least.min(other.point.cost);
             }
-            all.push((hold, other, early));
+            all.push((hold, other));
         }
-        self.hold = now;
-        all.insert(0, (now, found.clone(), early));
         let mut best = 0;
-        for k in 1..all.len() {
-            let (_, other, early) = &all[k];
-            let (_, first, first_early) = &all[best];
-            if !early && (*first_early || other.point.cost < first.point.cost - ALIKE) {
+        for (k, (_, other)) in all.iter().enumerate().skip(1) {
+            let first = &all[best].1;
+            let is_better = is_early(first) || other.point.cost < first.point.cost - ALIKE;
+            if !is_early(other) && is_better {
                 best = k;
             }
         }
-        let (hold, minimum, _) = all.remove(best);
-        (self.hold, found) = (hold, minimum);
-        let rivals = all.into_iter().map(|(hold, other, early)| Rival {
+        let (hold, found) = all.remove(best);
+        self.hold = hold;
+        let rivals = all.into_iter().map(|(hold, other)| Rival {
             hold,
             more: other.point.cost - found.point.cost,
             shift: other.point.z.iter().zip(&found.point.z).map(|(a, b)| a - b).collect(),
             delay: delay.map(|j| other.point.z[j]),
-            early,
+            early: is_early(&other),
             lost: other.decrement >= 1.0,
         });
         let rivals = rivals.collect();
         Ok((found, rivals))
     }
-}
-
-fn is_early(fit: &Fit, delay: Option<usize>, step: f64, minimum: &Minimum) -> bool {
-    !fit.problem.acausal && delay.is_some_and(|j| minimum.point.z[j] < -EARLIEST * step)
 }

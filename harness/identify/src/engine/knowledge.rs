@@ -6,12 +6,12 @@ use std::collections::BTreeMap;
 use nalgebra::DMatrix;
 use serde::Serialize;
 
+use super::SEEN;
 use super::fit::Fit;
 use super::minimum::{Curvature, places};
 use super::solver_error::SolverError;
 
-/// Component of a unit direction above which an unknown belongs to the direction.
-const PART: f64 = 1e-2;
+/// Shift of an estimate by the solver's errors, in standard deviations, above which these errors decide it.
 const DECIDED: f64 = 0.3;
 
 /// Unknowns that change together without a change of any output.
@@ -67,7 +67,7 @@ impl Fit<'_> {
         let mut decided_by_solver = vec![false; n];
         if of_both.len() > of_model.len() {
             for direction in &of_both {
-                let parts = which.iter().zip(direction.iter()).filter(|(_, p)| p.abs() > PART);
+                let parts = which.iter().zip(direction.iter()).filter(|(_, p)| p.abs() > SEEN);
                 parts.for_each(|(&j, _)| decided_by_solver[j] = true);
             }
         }
@@ -75,7 +75,7 @@ impl Fit<'_> {
         for direction in &of_model {
             let sign = direction[direction.iamax()].signum();
             let mut changes = BTreeMap::new();
-            for (k, &j) in which.iter().enumerate().filter(|(k, _)| direction[*k].abs() > PART) {
+            for (k, &j) in which.iter().enumerate().filter(|(k, _)| direction[*k].abs() > SEEN) {
                 covariance[(j, j)] = f64::INFINITY;
                 let by = sign * direction[k] * curvature.scale[k];
                 changes.insert(self.problem.unknowns[j].name.clone(), by);

@@ -7,8 +7,8 @@
 use anyhow::Result;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SymmetricEigen};
 
-use super::KEPT;
 use super::fit::{Derivatives, Fit, Point};
+use super::{KEPT, SETS};
 
 #[derive(Clone, Debug)]
 pub struct Minimum {
@@ -48,7 +48,6 @@ const FLAT: f64 = 1e-12;
 const RESOLVED: f64 = 4.0;
 /// Factor by which the damping grows after a step that fails, and falls after a step that gains more than half its forecast.
 const DAMPING: f64 = 8.0;
-const TRIES: usize = 7;
 
 /// The curvature JᵀJ of a sum of squares, scaled to a unit diagonal.
 pub struct Curvature {
@@ -236,7 +235,7 @@ impl Fit<'_> {
                 break;
             }
             let mut outcome = None;
-            for _ in 0..TRIES {
+            for _ in 0..SETS {
                 let scaled = curvature.solve(&b, &all, damping);
                 let mut step = vec![0.0; n];
                 for (k, &j) in which.iter().enumerate() {

@@ -46,13 +46,27 @@ pub const STEPS: (f64, f64) = (1e-7, 0.2);
 pub const BEND: f64 = 0.3;
 /// Factor between the wider steps that are tried if the ratio is above [`BEND`].
 pub const WIDER: f64 = 8.0;
-/// First step of a difference, in units of an unknown's reach.
-pub const FIRST_STEP: f64 = 1e-3;
 /// Distance from a minimum, in standard deviations, up to which a search has converged, because the stated deviations contain it, and
 /// at which the last search ends.
 pub const ENDS: (f64, f64) = (0.5, 0.02);
 /// Factors by which the noise counts in a search over the whole recordings: large ones let the priors lead at first, so that a
 /// start may be far from the minimum.
 pub const INFLATIONS: [f64; 3] = [100.0, 10.0, 1.0];
+/// Most sets of derivatives of a search that goes to the end, and most turns of a search that repeats a cheaper step.
+pub const SETS: usize = 8;
+/// Fall of the sum of squares below which a set of derivatives is the last one, and a minimum is no lower than another.
+pub const GAIN: f64 = 0.3;
+/// Part of a quantity below which it does not differ from errors of the derivatives, which are differences and good to a
+/// thousandth.
+pub const SEEN: f64 = 1e-2;
+/// Largest number of rounds of a search each of which begins at the end of the round before.
+pub const ROUNDS: usize = 4;
+/// Ratio of the standard deviation with the recordings to the standard deviation without, above which the recordings say nothing
+/// of a value.
+pub const PRIOR_ALONE: f64 = 0.9;
+/// Correlation, without its sign, above which only a combination of two unknowns is known.
+pub const PAIR: f64 = 0.99;
+/// Two-sided 95 % of the normal distribution.
+pub const Z: f64 = 1.96;
 /// Part of the forecast that a step must gain for the derivatives to be kept.
 pub const KEPT: f64 = 0.4;

@@ -5,30 +5,21 @@ use nalgebra::DMatrix;
 
 use super::minimum::{Curvature, End, Minimum, places, without};
 use super::problem::Part;
-use super::{DECIDES, Fit, VAGUE};
+use super::{DECIDES, Fit, GAIN, SETS, VAGUE, Z};
 
 /// Growth of the sum of squares below which an end of the range leaves an interval open: 1.96².
 pub const OPEN: f64 = Z * Z;
-/// Two-sided 95 % of the normal distribution.
-pub const Z: f64 = 1.96;
 /// Largest relative difference between the root of the likelihood's rise and a straight line, at which the likelihood still
 /// counts as a parabola.
-const PARABOLIC: f64 = 0.1;
-/// Largest number of sets of derivatives at one point of a profile, where the search begins with the derivatives of the point
-/// before.
-const SETS: usize = 4;
+pub const PARABOLIC: f64 = 0.1;
 /// Shortest and longest first step, and longest step, of the coordinate.
 const LENGTHS: [f64; 3] = [0.03, 0.5, 0.6];
 /// Distance to the minimum, in standard deviations, at which the search of a point ends: it adds a hundredth of [`OPEN`] to the
 /// sum of squares.
 const NEAR: f64 = 0.2;
-/// Least decrease of the sum of squares by one set of derivatives; if a set gains less, the search of a point ends.
-const GAIN: f64 = 0.3;
 /// Values of the bent unknown, relative to its start, at which other minima are searched.
 const GRID: [f64; 6] = [0.03, 0.1, 0.3, 1.0, 3.0, 10.0];
 const MOST: usize = 14;
-/// Decrease of the sum of squares from which on a minimum counts as a lower one.
-pub const LOWER: f64 = 0.5;
 
 pub type Profile = (usize, Vec<Point>);
 
@@ -125,7 +116,7 @@ impl Fit<'_> {
             let Ok(found) = self.minimise(&z, &free, derivatives.clone(), end) else { continue };
             points.push(Point { at, minimum: found });
         }
-        let lower = |low: &&Point| low.minimum.point.cost < minimum.point.cost - LOWER;
+        let lower = |low: &&Point| low.minimum.point.cost < minimum.point.cost - GAIN;
         if let Some(low) = lowest(&points).filter(lower) {
             let free = self.free.clone();
             let end = End { gain: 2.0, ..End::new(6, super::ENDS.0) };
@@ -193,7 +184,7 @@ impl Fit<'_> {
                 }
                 z[j] = at;
                 let above = least + 3.0 * DECIDES;
-                let end = End { above, trusts: true, gain: GAIN, ..End::new(SETS, NEAR) };
+                let end = End { above, trusts: true, gain: GAIN, ..End::new(SETS / 2, NEAR) };
                 let Ok(found) = self.minimise(&z, &free, last.derivatives.clone(), end) else {
                     break;
                 };

@@ -9,8 +9,8 @@ use anyhow::{Context, Result, ensure};
 use super::hold::Rival;
 use super::minimum::{Curvature, End, Minimum, places, without};
 use super::problem::{Part, Problem, Role, Signal, Unknown};
-use super::profile::{self, LOWER, Profile};
-use super::{ALIKE, ENDS, Fit, INFLATIONS};
+use super::profile::{self, Profile};
+use super::{ALIKE, DECIDES, ENDS, Fit, GAIN, INFLATIONS, PRIOR_ALONE, ROUNDS, SETS};
 use crate::news::News;
 
 /// Parts of the recordings in a search from a start that leads to no minimum on the whole: over a whole oscillation the sum of squares has a
@@ -19,33 +19,18 @@ const PARTS: [f64; 7] = [0.1, 0.2, 0.3, 0.4, 0.55, 0.75, 1.0];
 /// Least noise of a growing beginning, relative to the spread of the signal, for an FMU of which nothing is known: a precise sensor
 /// would drive unknowns to their bounds before the search is near.
 const BEGINNING_NOISE: f64 = 0.03;
-/// Most sets of derivatives of the search over the whole that follows.
-const MOST_SETS: usize = 20;
 /// Ratio of the residual's white noise to the noise that neighbouring rows show, above which the residual contains more than the
 /// sensor's noise.
 const ABOVE: f64 = 1.5;
-/// Largest number of rounds of noise, minimum and profile at the end of a search, each from a lower minimum.
-const ROUNDS: usize = 3;
-/// Largest number of turns of noise and minimum, and the sum of squares over the number of rows above which a turn is the last
-/// one: it is 1 if the noise belongs to the residual.
-const TURNS: usize = 8;
 const SETTLED: f64 = 0.98;
-/// Largest number of doublings of the distance at which a side of a start is examined.
-const LOOKS: usize = 8;
 /// First distance at which a side of a start is examined, standard deviations.
 const FAR: f64 = 3.0;
 /// Root of the likelihood's rise at this distance, relative to the root of a parabola's rise, below which the likelihood has a
 /// kink.
 const KINKED: f64 = 0.8;
-/// Difference of −2 ln L below which two searches have found the same minimum, although neither has quite reached it.
-const SAME: f64 = 20.0;
 /// A start leads nowhere if, over more than this part of the recordings, its sum of squares is more than so many times the sum of
 /// squares of the first search.
 const ASTRAY: (f64, f64) = (0.25, 3.0);
-/// Information of the recordings about a known value, relative to its tolerance, from which on the value is estimated.
-const SHOWN: f64 = 0.5;
-/// Most sets of derivatives of the last search, and the fall of the sum of squares below which a set is the last one.
-const LAST: (usize, f64) = (8, 0.3);
 /// Limits of the noise while a misfit is examined: largest white noise over the noise of neighbouring rows, largest relative size
 /// and least correlation time (s) of the drift.
 const OWN: (f64, f64, f64) = (1.1, 0.3, 50.0);
@@ -124,7 +109,8 @@ pub fn solve<'p>(
             fit.simulations()
         )));
         // a minimum that one search alone has found may be one of many
-        let agrees = best.as_ref().is_some_and(|best| (best.first - deviance).abs() < SAME);
+        let agrees =
+            best.as_ref().is_some_and(|best| (best.first - deviance).abs() < 2.0 * DECIDES);
         if best.as_ref().is_none_or(|best| deviance < best.first) {
             best = Some(Found::new(&fit, found, deviance));
         }
@@ -153,7 +139,7 @@ pub fn solve_near<'p>(
 ) -> Result<Solution<'p>> {
     let mut fit = Fit::new(problem);
     let (z, free) = (fit.coordinates(values), fit.free.clone());
-    let minimum = fit.minimise(&z, &free, None, End::new(LAST.0, ENDS.0))?;
+    let minimum = fit.minimise(&z, &free, None, End::new(SETS, ENDS.0))?;
     fit.renew_noise(&minimum.point);
     let mut found = Found::new(&fit, minimum, 0.0);
     found.judge(&mut fit, news)?;
@@ -277,8 +263,8 @@ impl Fit<'_> {
     pub fn not_above_starts(&mut self, mut minimum: Minimum) -> Result<Minimum> {
         for start in &self.problem.starts {
             let Ok(point) = self.at(&self.coordinates(start)) else { continue };
-            if point.cost < minimum.point.cost - LOWER {
-                let (free, end) = (self.free.clone(), End::new(LAST.0, ENDS.0));
+            if point.cost < minimum.point.cost - GAIN {
+                let (free, end) = (self.free.clone(), End::new(SETS, ENDS.0));
                 minimum = self.minimise_on(point, &free, None, end)?;
             }
         }
@@ -337,10 +323,10 @@ impl Fit<'_> {
         let (mut once, mut profile) = (false, None);
         let rows = self.sampled();
         for _ in 0..ROUNDS {
-            for _ in 0..TURNS {
+            for _ in 0..SETS {
                 self.renew_noise(&minimum.point);
                 let z = minimum.point.z.clone();
-                let end = End { gain: LAST.1, ..End::new(LAST.0, ENDS.1) };
+                let end = End { gain: GAIN, ..End::new(SETS, ENDS.1) };
                 minimum = self.minimise(&z, &free, None, end)?;
                 // the noise is that of the point before, which matters where it is next to nothing
                 if minimum.point.cost > SETTLED * rows as f64 {
@@ -353,8 +339,8 @@ impl Fit<'_> {
                 let mut z = minimum.point.z.clone();
                 let start = self.coordinates(&self.problem.starts[0]);
                 stuck.iter().for_each(|j| z[*j] = start[*j]);
-                if let Ok(other) = self.minimise(&z, &free, None, End::new(8, ENDS.0))
-                    && other.point.cost < minimum.point.cost - LOWER
+                if let Ok(other) = self.minimise(&z, &free, None, End::new(SETS, ENDS.0))
+                    && other.point.cost < minimum.point.cost - GAIN
                 {
                     minimum = other;
                     continue;
@@ -381,7 +367,7 @@ impl Fit<'_> {
             let others =
                 profile.as_ref().map_or_else(|| free.clone(), |(bent, _)| without(&free, *bent));
             let z = minimum.point.z.clone();
-            let found = self.minimise(&z, &others, None, End::new(LAST.0, ENDS.0 * 0.2))?;
+            let found = self.minimise(&z, &others, None, End::new(SETS, ENDS.0 * 0.2))?;
             minimum = Minimum { derivatives: None, free, ..found };
         }
         Ok((minimum, profile))
@@ -404,7 +390,8 @@ impl Fit<'_> {
             let column = known.column(j).into_owned();
             let rest = &column - &own * (&covariance * own.tr_mul(&column));
             let told = rest.rows(0, rows).norm();
-            self.free[j] = unknowns[j].prior.is_some_and(|(_, std)| told * std > SHOWN);
+            let left = |std: f64| 1.0 / (told * std).hypot(1.0);
+            self.free[j] = unknowns[j].prior.is_some_and(|(_, std)| left(std) < PRIOR_ALONE);
         }
         if self.free != minimum.free {
             minimum.derivatives = None;
@@ -439,7 +426,7 @@ impl Fit<'_> {
                 (cost - minimum.point.cost).max(0.0).sqrt()
             };
             let (mut near, mut far, mut now) = ((0.0, 0.0), FAR, rise(FAR));
-            for _ in 0..LOOKS {
+            for _ in 0..SETS {
                 if now > KINKED * FAR {
                     break;
                 }
@@ -477,8 +464,7 @@ impl Fit<'_> {
         let first = self.minimise(&z, &all, None, End::new(10, ENDS.0 * 0.1))?;
         self.renew_noise(&first.point);
         let z = first.point.z.clone();
-        let found =
-            self.minimise(&z, &all, None, End { gain: LAST.1, ..End::new(LAST.0, ENDS.1) })?;
+        let found = self.minimise(&z, &all, None, End { gain: GAIN, ..End::new(SETS, ENDS.1) })?;
         if self.is_noise(&found.point) {
             self.free = all;
             return Ok(Some(found));
@@ -508,7 +494,7 @@ impl Fit<'_> {
             }
             for (k, part) in PARTS.into_iter().enumerate() {
                 self.set(noise.clone(), part);
-                let end = End { gain: ALIKE, ..End::new(8, ENDS.0) };
+                let end = End { gain: ALIKE, ..End::new(SETS, ENDS.0) };
                 let minimum = self.minimise(&z, &free, None, end)?;
                 let cost = minimum.point.cost;
                 let is_astray = |best: &f64| part > ASTRAY.0 && cost > ASTRAY.1 * best;
@@ -521,7 +507,7 @@ impl Fit<'_> {
                 && let Some(minimum) = &found
             {
                 self.renew_noise(&minimum.point);
-                let end = End { gain: ALIKE, ..End::new(MOST_SETS, ENDS.0) };
+                let end = End { gain: ALIKE, ..End::new(2 * SETS, ENDS.0) };
                 found = Some(self.minimise(&z, &free, None, end)?);
             }
         } else {

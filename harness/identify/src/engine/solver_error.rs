@@ -30,10 +30,6 @@ pub struct SolverError {
     pub differs: Vec<bool>,
 }
 
-/// Weights of the fourth difference, whose squares add up to 70, and of the third of the same points, whose squares add up to 10.
-const FOURTH: ([f64; 5], f64) = ([1.0, -4.0, 6.0, -4.0, 1.0], 70.0);
-const THIRD: ([f64; 5], f64) = ([-1.0, 2.0, 0.0, -2.0, 1.0], 10.0);
-
 /// Sample of the outputs' noise between neighbouring values of one unknown, norm of h³ times the third derivative without this
 /// noise, and the step h.
 struct Roughness {
@@ -63,8 +59,10 @@ impl Fit<'_> {
                 weights.into_iter().zip(motions.iter().map(Vec::as_slice)).collect();
             self.change(&at.z, &pairs)
         };
-        let noise = combined(FOURTH.0) / FOURTH.1.sqrt();
-        let third = combined(THIRD.0).norm_squared() - THIRD.1 * noise.norm_squared();
+        // the squares of the weights add up to 70 and to 10
+        let noise = combined([1.0, -4.0, 6.0, -4.0, 1.0]) / 70.0_f64.sqrt();
+        let third = combined([-1.0, 2.0, 0.0, -2.0, 1.0]).norm_squared();
+        let third = third - 10.0 * noise.norm_squared();
         Some(Roughness { noise, third: 0.5 * third.max(0.0).sqrt(), step })
     }
 

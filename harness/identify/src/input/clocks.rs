@@ -5,7 +5,7 @@
 
 use std::f64::consts::PI;
 
-use crate::tuning::{COARSE_TORQUE, CUBIC_SPACING, FINE_TORQUE, KERNEL_HALF, KERNEL_SHAPE};
+use crate::tuning::{FINE_TORQUE, KERNEL_HALF, LOST_SPACING, UNEVEN};
 
 /// Values at all rows, and which rows had a value of their own; `None`: all.
 pub type Clocked = (Vec<f64>, Option<Vec<bool>>);
@@ -29,8 +29,7 @@ pub fn completed(time: &[f64], values: Vec<f64>) -> Clocked {
             (_, Some(b)) if b == k => values[k],
             (Some(a), Some(b)) => {
                 let far = [next.checked_sub(2).map(|n| rows[n]), rows.get(next + 1).copied()];
-                let is_near =
-                    |pair: &[usize]| time[pair[1]] - time[pair[0]] < CUBIC_SPACING * usual;
+                let is_near = |pair: &[usize]| time[pair[1]] - time[pair[0]] < LOST_SPACING * usual;
                 let nodes: Vec<usize> =
                     [far[0], Some(a), Some(b), far[1]].into_iter().flatten().collect();
                 match nodes.windows(2).all(is_near) {
@@ -55,6 +54,24 @@ pub fn usual(time: &[f64]) -> f64 {
     }
 }
 
+/// Returns true if all times between rows are the mean time.
+pub fn is_even(time: &[f64]) -> bool {
+    let step = (time[time.len() - 1] - time[0]) / (time.len() - 1) as f64;
+    time.windows(2).all(|pair| (pair[1] - pair[0] - step).abs() < UNEVEN * step)
+}
+
+/// Returns a signal at a time, on the line between two rows. `row` is the row before this time; it only grows from call to call,
+/// so that the times must grow.
+pub fn on_line(time: &[f64], signal: &[f64], t: f64, row: &mut usize) -> f64 {
+    while *row + 2 < time.len() && time[*row + 1] <= t {
+        *row += 1;
+    }
+    let k = *row;
+    let part = ((t - time[k]) / (time[k + 1] - time[k])).clamp(0.0, 1.0);
+    signal[k] + part * (signal[k + 1] - signal[k])
+}
+
+/// Returns Lagrange's weights of nodes at a time.
 pub fn weights(nodes: &[f64], at: f64) -> Vec<f64> {
     let weight = |(j, node): (usize, &f64)| -> f64 {
         let others = nodes.iter().enumerate().filter(|(i, _)| *i != j);
@@ -74,11 +91,11 @@ fn through(nodes: &[usize], time: &[f64], values: &[f64], at: f64) -> f64 {
 pub fn refined(time: &[f64], values: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let n = time.len();
     let step = (time[n - 1] - time[0]) / (n - 1) as f64;
-    if step <= COARSE_TORQUE {
+    let parts = (step / FINE_TORQUE).round() as usize;
+    if parts < 2 {
         return (time.to_vec(), values.to_vec());
     }
-    let parts = (step / FINE_TORQUE).ceil() as usize;
-    let even = time.windows(2).all(|t| (t[1] - t[0] - step).abs() < 0.01 * step);
+    let even = is_even(time);
     let sample = |k: isize| match k {
         k if k < 0 => 2.0 * values[0] - values[(-k as usize).min(n - 1)],
         k if k as usize >= n => {
@@ -110,7 +127,9 @@ pub fn refined(time: &[f64], values: &[f64]) -> (Vec<f64>, Vec<f64>) {
     (fine_time, fine)
 }
 
+/// Returns the sinc at x samples under a Kaiser window with side lobes of 80 dB.
 fn kernel(x: f64) -> f64 {
+    let shape = 0.1102 * (80.0 - 8.7);
     let bessel = |z: f64| {
         let mut term = 1.0;
         (1..60).fold(1.0, |sum, k| {
@@ -123,7 +142,7 @@ fn kernel(x: f64) -> f64 {
         return 0.0;
     }
     let sinc = if x == 0.0 { 1.0 } else { (PI * x).sin() / (PI * x) };
-    sinc * bessel(KERNEL_SHAPE * inside.sqrt()) / bessel(KERNEL_SHAPE)
+    sinc * bessel(shape * inside.sqrt()) / bessel(shape)
 }
 
 #[cfg(test)]

@@ -15,9 +15,12 @@ use nalgebra::{DMatrix, DVector};
 use crate::input::clocks;
 use crate::input::recording::{Recording, Row};
 use crate::tuning::{
-    EVEN_GRID, FEW_GAPS, GAP_KICK, GAP_ORDER, GAP_SIDE, GAP_TRIALS, LONGEST_FILLED, LONGEST_LINE,
-    LOST_SPACING, SHORTEST_RECORDING,
+    FEW_GAPS, GAP_KICK, GAP_ORDER, GAP_TRIALS, LONGEST_FILLED, LONGEST_LINE, LOST_SPACING,
+    SHORTEST_RECORDING, UNEVEN,
 };
+
+/// Number of samples on each side of a gap to which the autoregressive model is fitted.
+const GAP_SIDE: usize = 8 * GAP_ORDER;
 
 /// Fills the gaps that can be filled, and returns the rows before the other gaps, after which the recording has to be cut. `done`
 /// receives a sentence on each change.
@@ -33,7 +36,7 @@ pub fn bridged(all: Recording, done: &mut dyn FnMut(String)) -> (Recording, Vec<
     }
     let near: Vec<f64> = near.into_iter().map(span).collect();
     let step = mean(&near);
-    let is_even = near.iter().all(|s| (s - step).abs() < EVEN_GRID * step);
+    let is_even = near.iter().all(|s| (s - step).abs() < UNEVEN * step);
     let values: Vec<f64> = knots.iter().map(|k| all.torque[*k]).collect();
     let kick = GAP_KICK * momentum(&all) / (gaps.len() as f64).sqrt();
     let (mut filled, mut left) = (Vec::new(), Vec::new());

@@ -30,8 +30,7 @@ impl FromStr for Free {
 
     fn from_str(text: &str) -> Result<Self> {
         let (name, value) = named(text)?;
-        let values = numbers(value).with_context(|| format!("--free {text}"))?;
-        let (start, bounds) = match values[..] {
+        let (start, bounds) = match numbers(value).with_context(|| format!("--free {text}"))?[..] {
             [start] => (start, None),
             [start, low, high] if low < high => (start, Some((low, high))),
             _ => {
@@ -39,12 +38,8 @@ impl FromStr for Free {
             }
         };
         ensure!(start.is_finite(), "--free {text}: START must be finite");
-        if let Some((low, high)) = bounds {
-            ensure!(
-                (low..=high).contains(&start),
-                "--free {text}: START must lie between LOW and HIGH"
-            );
-        }
+        let is_inside = bounds.is_none_or(|(low, high)| (low..=high).contains(&start));
+        ensure!(is_inside, "--free {text}: START must lie between LOW and HIGH");
         let each = name.ends_with(EACH);
         Ok(Free { name: name.trim_end_matches(EACH).into(), each, start, bounds })
     }

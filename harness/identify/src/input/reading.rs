@@ -14,9 +14,7 @@ use crate::input::clocks::{self, Clocked, completed};
 use crate::input::recording::{Recording, masked, places, take_out};
 use crate::input::sensor_faults::{self, Rest};
 use crate::input::{gaps, spikes};
-use crate::tuning::{
-    DECAY_ROWS, LATE_SENSOR, LISTED_SPIKES, LONG_RECORDING, MOVING_SPREAD, SHORTEST_RECORDING,
-};
+use crate::tuning::{DECAY_ROWS, LATE_SENSOR, LONG_RECORDING, MOVING_SPREAD, SHORTEST_RECORDING};
 
 pub const REQUIRED: [&str; 3] = ["time", "tau_cmd", "omega"];
 pub const OPTIONAL: [&str; 5] = ["theta", "g_axial", "wheel_speed", "omega_x", "omega_y"];
@@ -279,9 +277,9 @@ fn without_spikes(part: &mut Recording, done: &mut dyn FnMut(String)) {
     else {
         return;
     };
-    let at: Vec<String> =
-        found.iter().take(LISTED_SPIKES).map(|(k, _)| format!("{:.2}", part.time[*k])).collect();
-    let more = if found.len() > LISTED_SPIKES { ", …" } else { "" };
+    let listed = &found[..found.len().min(8)];
+    let at: Vec<String> = listed.iter().map(|(k, _)| format!("{:.2}", part.time[*k])).collect();
+    let more = if found.len() > listed.len() { ", …" } else { "" };
     done(format!(
         "{}: {} single values of omega differ from their neighbours by more than noise, by up to {largest:.2e} rad/s; they are \
          not fitted (at {}{more} s)",
@@ -297,10 +295,10 @@ fn without_spikes(part: &mut Recording, done: &mut dyn FnMut(String)) {
 }
 
 fn describe(part: &Recording) -> String {
-    let steps: Vec<f64> = part.time.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let step = part.step();
-    let uneven = steps.iter().fold(0.0, |worst: f64, s| worst.max((s - step).abs()));
-    let sampling = if uneven > 0.01 * step {
+    let sampling = if !clocks::is_even(&part.time) {
+        let off = part.time.windows(2).map(|pair| (pair[1] - pair[0] - step).abs());
+        let uneven = off.fold(0.0, f64::max);
         format!(
             "uneven sampling ({:.1} ms on average, up to {:.1} ms off), used as it is",
             1e3 * step,

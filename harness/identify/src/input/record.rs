@@ -30,24 +30,20 @@ impl Record {
         columns: &Columns,
         done: &mut dyn FnMut(String),
     ) -> Result<Self> {
-        let mut signals = Vec::new();
-        let kinds = [(&question.outputs, true), (&question.inputs, false)];
-        let all = question.outputs.iter().chain(&question.inputs);
-        let units = all.map(|name| question.unit(name, description));
+        let names = || question.outputs.iter().chain(&question.inputs);
+        let units = names().map(|name| question.unit(name, description));
         let units = units.collect::<Result<Vec<String>>>()?;
-        let mut unit = units.iter();
-        for (names, is_output) in kinds {
-            for name in names {
-                let held = question.held.contains(name);
-                let between = match (is_output, held) {
-                    (true, _) => Between::Missing,
-                    (false, true) => Between::Held,
-                    (false, false) => Between::Line,
-                };
-                let unit = unit.next().map(String::as_str);
-                signals.push(Signal { name, required: true, between, unit });
-            }
-        }
+        let signals = names().zip(&units).enumerate().map(|(k, (name, unit))| Signal {
+            name,
+            required: true,
+            between: match question.held.contains(name) {
+                _ if k < question.outputs.len() => Between::Missing,
+                true => Between::Held,
+                false => Between::Line,
+            },
+            unit: Some(unit),
+        });
+        let signals: Vec<Signal> = signals.collect();
         let table = recording::read(path, &Wanted { signals: &signals, columns }, done)?;
         let column = |name: &str| table.column(name).unwrap_or_default().to_vec();
         let record = Record {
@@ -62,8 +58,8 @@ impl Record {
 
     /// Fails if an output has too few values, or if times or values are out of range.
     pub fn check(&self, question: &Question) -> Result<()> {
-        for (name, values) in question.outputs.iter().zip(&self.outputs) {
-            let count = values.iter().filter(|y| !y.is_nan()).count();
+        for (output, name) in question.outputs.iter().enumerate() {
+            let count = self.values(output).len();
             ensure!(
                 count >= FEWEST_VALUES,
                 "{name} has {count} values (allowed: at least {FEWEST_VALUES})"
@@ -75,11 +71,10 @@ impl Record {
         for (name, values) in question.inputs.iter().zip(&self.inputs) {
             check_values(name, values.iter().copied())?;
         }
-        for (name, values) in question.outputs.iter().zip(&self.outputs) {
-            // NaN: not read
-            check_values(name, values.iter().map(|y| if y.is_nan() { 0.0 } else { *y }))?;
-        }
-        Ok(())
+        let outputs = question.outputs.iter().zip(&self.outputs);
+        // NaN: not read
+        let read = |y: &f64| if y.is_nan() { 0.0 } else { *y };
+        outputs.into_iter().try_for_each(|(name, y)| check_values(name, y.iter().map(read)))
     }
 
     pub fn sampled(&self, output: usize) -> Vec<bool> {

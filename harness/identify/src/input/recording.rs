@@ -10,7 +10,7 @@ use analysis::statistics::{mean, noise_level};
 use anyhow::{Context, Result, bail, ensure};
 use files::budget;
 
-use crate::input::clocks::{completed, usual};
+use crate::input::clocks::{completed, on_line, usual};
 use crate::tuning::{LARGEST_VALUE, ON_CLOCK, SLOW_GYRO, SLOWEST_GYRO};
 
 #[derive(Clone, Debug)]
@@ -244,19 +244,12 @@ impl Recording {
     pub(crate) fn even_rows(&self) -> Result<(f64, Vec<f64>, Vec<f64>)> {
         self.check()?;
         let step = self.step();
-        let mut row = 0;
-        let (mut torque, mut rate) = (Vec::new(), Vec::new());
-        for k in 0..self.time.len() {
-            let t = self.time[0] + k as f64 * step;
-            while row + 2 < self.time.len() && self.time[row + 1] < t {
-                row += 1;
-            }
-            let part = (t - self.time[row]) / (self.time[row + 1] - self.time[row]);
-            let at = |x: &[f64]| x[row] + part.clamp(0.0, 1.0) * (x[row + 1] - x[row]);
-            torque.push(at(&self.torque));
-            rate.push(at(&self.rate));
-        }
-        Ok((step, torque, rate))
+        let at = |signal: &[f64]| -> Vec<f64> {
+            let (mut row, times) =
+                (0, (0..self.time.len()).map(|k| self.time[0] + k as f64 * step));
+            times.map(|t| on_line(&self.time, signal, t, &mut row)).collect()
+        };
+        Ok((step, at(&self.torque), at(&self.rate)))
     }
 }
 

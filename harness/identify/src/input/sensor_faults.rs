@@ -1,12 +1,12 @@
 //! Finds values of a sensor that do not show the motion, because the logger repeated them, or because the sensor was clipped at
 //! the end of its range or frozen. They are reported and not fitted.
 
+use analysis::innovations::LIMIT;
 use analysis::statistics::{mean, median, noise_level, peak};
 
 use crate::input::spikes;
 use crate::tuning::{
-    CLIPPED, CLIPPED_INSIDE, FAULT_LEAVES, FAULT_STEPS, FROM_REST, FROZEN_CHANCE, FROZEN_RUN,
-    REPEATS, SENSOR_ROUNDING,
+    CLIPPED, CLIPPED_INSIDE, FAULT_STEPS, FROZEN_CHANCE, FROZEN_RUN, REPEATS, SENSOR_ROUNDING,
 };
 
 #[derive(Debug, Default, PartialEq)]
@@ -33,8 +33,9 @@ impl Rest {
             Rest::Rate(rest) if rest == Some(values[k]) => None,
             Rest::Rate(_) => Some(step),
             Rest::Angle => {
+                // the rate starts at zero and the acceleration does not fall: the second increment is three times the first
                 let second = values.get(k + 2).map_or(0.0, |next| (next - values[k + 1]).abs());
-                Some(step - FROM_REST * second)
+                Some(step - second / 3.0)
             }
         }
     }
@@ -66,7 +67,7 @@ pub fn find(name: &str, time: &[f64], values: &[f64], rest: Rest) -> Faults {
     // a hub rests at one end of its rates at most
     let both = rest != Rest::Angle && jumps.iter().all(steps);
     for (((end, _), rows), jump) in ends.into_iter().zip(held).zip(jumps) {
-        if !both && jump.is_none_or(|jump| jump <= FAULT_LEAVES * noise) {
+        if !both && jump.is_none_or(|jump| jump <= LIMIT * noise) {
             continue;
         }
         if let [first, .., last] = rows[..] {
@@ -158,8 +159,8 @@ fn frozen(values: &[f64], out: &[bool], noise: f64, rest: Rest) -> Vec<(usize, u
     let chance = (repeats + 1) as f64 / values.len() as f64;
     let least = 1.0 + (FROZEN_CHANCE / values.len() as f64).ln() / chance.ln();
     let sign = |&(_, b): &(usize, usize)| {
-        let jump = rest.jump(values, b).is_some_and(|jump| jump > FAULT_LEAVES * noise);
-        (jump, (values[b] - mean).abs() > FAULT_LEAVES * noise)
+        let jump = rest.jump(values, b).is_some_and(|jump| jump > LIMIT * noise);
+        (jump, (values[b] - mean).abs() > LIMIT * noise)
     };
     let is_no_chance = |run: &&(usize, usize)| {
         let (a, b) = **run;
@@ -193,7 +194,7 @@ fn runs(values: &[f64]) -> Vec<(usize, usize)> {
 /// jump is no fault, because the hub rests.
 fn repeated(time: &[f64], values: &[f64], out: &[bool], noise: f64, rest: Rest) -> Vec<usize> {
     let moves = |(a, b): &(usize, usize)| {
-        let jumps = || rest.jump(values, *b).is_some_and(|jump| jump > FAULT_LEAVES * noise);
+        let jumps = || rest.jump(values, *b).is_some_and(|jump| jump > LIMIT * noise);
         rest != Rest::Angle || b - a + 1 < FROZEN_RUN || jumps()
     };
     let moving = runs(values).into_iter().filter(moves);

@@ -1,6 +1,6 @@
 //! Tolerances of values that are not estimated: relative standard deviations.
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, ensure};
 use names::hubslosh::{G_AXIAL, fluid, tank};
 
 use crate::tuning::TOLD_SHARE;
@@ -80,14 +80,12 @@ impl Tolerances {
             let number = part(name, value)?.with_context(|| {
                 format!("{name}: {value} is not a number (allowed: for example 1% or 0.01)")
             })?;
-            match name.trim() {
-                "torque" => self.torque = number,
-                "clock" => self.clock = number,
-                G_AXIAL => self.gravity = number,
-                tank::R => self.arm = number,
-                fluid::RHO => self.density = number,
-                other => bail!("{other} has no tolerance (allowed: {})", NAMES.join(", ")),
-            }
+            let place = NAMES.iter().position(|other| *other == name.trim());
+            let place = place.with_context(|| {
+                format!("{} has no tolerance (allowed: {})", name.trim(), NAMES.join(", "))
+            })?;
+            let Tolerances { torque, clock, gravity, arm, density } = &mut self;
+            *[torque, clock, gravity, arm, density][place] = number;
         }
         Ok(self)
     }

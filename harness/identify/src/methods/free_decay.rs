@@ -2,7 +2,7 @@
 //! an angle or a rate, of a tank that was shaken once or of a hub that was pushed.
 
 use analysis::free_decay::{self, LEAST_PERIODS, Record, Start};
-use analysis::statistics::{mean, noise_level};
+use analysis::statistics::noise_level;
 use anyhow::{Context, Result};
 use serde::Serialize;
 use signals::recording::{Quantity, quantity};
@@ -13,7 +13,7 @@ use crate::engine::search::solve;
 use crate::engine::{
     Drift, ENDS, Hold, Motion, Part, Problem, Recorded, Role, Signal, Solution, System, Unknown,
 };
-use crate::estimate::Estimated;
+use crate::estimate::{Estimated, mean_square};
 use crate::input::recording::Recording;
 use crate::news::News;
 use crate::words::identified::{Identified, Residual};
@@ -56,20 +56,17 @@ impl FreeDecay {
     }
 }
 
-/// Number of unknowns that all records share, and of unknowns that each record has for itself.
-const COMMON: usize = 4;
-const OWN: usize = 4;
-/// Index of the growth of damping with the amplitude, ζ_A, among the shared unknowns.
-const GROWTH: usize = 2;
+/// Unknowns that all records share, and unknowns that each record has for itself.
+const COMMON: [&str; 4] = ["frequency", "zeta", "zeta_amplitude", "hardening"];
+const OWN: [&str; 4] = ["amplitude", "phase", "offset", "slope"];
 
 struct Oscillation<'a>(&'a [Recording]);
 
 impl System for Oscillation<'_> {
     fn run(&self, z: &[f64], recording: usize, rows: usize, _: Hold, _: bool) -> Result<Motion> {
-        let own = COMMON + OWN * recording;
-        let own = [z[own], z[own + 1], z[own + 2], z[own + 3]];
-        let time = &self.0[recording].time[..rows];
-        let signal = free_decay::model(time, [z[0], z[1], z[2], z[3]], own);
+        let four = |from: usize| [z[from], z[from + 1], z[from + 2], z[from + 3]];
+        let own = COMMON.len() + OWN.len() * recording;
+        let signal = free_decay::model(&self.0[recording].time[..rows], four(0), four(own));
         Ok(Motion { outputs: vec![signal], ..Motion::default() })
     }
 
@@ -96,25 +93,29 @@ fn problem<'a>(
     // what shows over a record is a part of a turn, or of the amplitude
     let small = 0.1 / longest;
     let all = Role::Run(None);
-    let free = (f64::NEG_INFINITY, f64::INFINITY);
     let linear = |name: &str, unit: &str, role, start: (f64, f64)| {
-        Unknown::linear(name, unit, role, start, free)
+        Unknown::linear(name, unit, role, start, (f64::NEG_INFINITY, f64::INFINITY))
     };
     let f = average(|start| start.frequency);
-    let mut unknowns = vec![
-        Unknown::linear("frequency", "Hz", all, (f, small * f), (0.5 * f, 2.0 * f)),
-        Unknown::linear("zeta", "1", all, (average(|start| start.zeta), small), (-0.5, 0.9)),
-        linear("zeta_amplitude", inverse, all, (average(|s| s.zeta_amplitude), small / size)),
-        linear("hardening", squared, all, (average(|s| s.hardening), small / size.powi(2))),
+    let shared = [
+        (f, small * f, "Hz"),
+        (average(|s| s.zeta), small, "1"),
+        (average(|s| s.zeta_amplitude), small / size, inverse),
+        (average(|s| s.hardening), small / size.powi(2), squared),
     ];
+    let shared = COMMON.into_iter().zip(shared);
+    let mut unknowns: Vec<Unknown> = shared
+        .map(|(name, (start, reach, unit))| linear(name, unit, all, (start, reach)))
+        .collect();
+    (unknowns[0].bounds, unknowns[1].bounds) = ((0.5 * f, 2.0 * f), (-0.5, 0.9));
     for (k, start) in starts.iter().enumerate() {
         let (role, span) = (Role::Run(Some(k)), system.0[k].duration());
         let a = start.amplitude;
         unknowns.extend([
-            Unknown::positive("amplitude", unit, role, a, (1e-6 * a, 1e6 * a)),
-            linear("phase", "rad", role, (start.phase, 0.3)),
-            linear("offset", unit, role, (start.offset, 0.1 * a)),
-            linear("slope", unit, role, (0.0, 0.1 * a / span)),
+            Unknown::positive(OWN[0], unit, role, a, (1e-6 * a, 1e6 * a)),
+            linear(OWN[1], "rad", role, (start.phase, 0.3)),
+            linear(OWN[2], unit, role, (start.offset, 0.1 * a)),
+            linear(OWN[3], unit, role, (0.0, 0.1 * a / span)),
         ]);
     }
     let signal = |(recording, r): (usize, &Recording)| Signal {
@@ -133,7 +134,8 @@ fn problem<'a>(
     };
     let first: Vec<f64> = unknowns.iter().map(|u| u.start).collect();
     let mut constant = first.clone();
-    constant[GROWTH] = 0.0;
+    // no growth of the damping with the amplitude
+    constant[2] = 0.0;
     Problem {
         system,
         recordings: system.0.iter().map(recorded).collect(),
@@ -150,8 +152,7 @@ fn problem<'a>(
 fn residuals(solution: &Solution) -> (f64, Vec<Vec<f64>>) {
     let point = &solution.minimum.point;
     let residuals = solution.fit.residuals(&point.z, &point.motion);
-    let squares: Vec<f64> = residuals.concat().iter().map(|r| r * r).collect();
-    (mean(&squares).sqrt(), residuals)
+    (mean_square(&residuals.concat()).sqrt(), residuals)
 }
 
 impl Method for FreeDecay {
@@ -174,7 +175,7 @@ impl Method for FreeDecay {
         let system = Oscillation(task.recordings);
         let free = problem(&system, &starts, [unit, inverse, squared]);
         let mut constant = free.clone();
-        constant.unknowns[GROWTH].part = Part::Candidate;
+        constant.unknowns[2].part = Part::Candidate;
         constant.starts.remove(0);
         let constant = solve(&constant, None, f64::INFINITY, news)?;
         let from = constant.fit.values(&constant.minimum.point.z);
@@ -184,7 +185,7 @@ impl Method for FreeDecay {
         let jacobian = found.fit.derivatives_at(&mut found.minimum)?.matrix;
         let covariance = Curvature::new(&jacobian, places(&found.fit.free)).covariance(z.len());
         let std = |k: usize| covariance[(k, k)].sqrt();
-        let own = z[COMMON..].chunks(OWN);
+        let own = z[COMMON.len()..].chunks(OWN.len());
         let ends = |(r, own): (&Recording, &[f64])| {
             [own[0], free_decay::amplitude(r.duration(), own[0], [z[0], z[1], z[2]])]
         };
@@ -200,10 +201,8 @@ impl Method for FreeDecay {
             residual_constant,
             noise,
         });
-        for (name, k, unit) in
-            [("zeta", 1, "1"), ("zeta_amplitude", 2, inverse), ("hardening", 3, squared)]
-        {
-            answer.measurement.insert(name.into(), Estimated::normal(z[k], std(k), unit));
+        for (k, unit) in [(1, "1"), (2, inverse), (3, squared)] {
+            answer.measurement.insert(COMMON[k].into(), Estimated::normal(z[k], std(k), unit));
         }
         // a damping ratio does not depend on the clock
         let estimated = Estimated::normal(z[0], std(0).hypot(self.clock * z[0]), "Hz");
@@ -226,7 +225,7 @@ impl Method for FreeDecay {
         answer.fits = Some(fits);
         let all = amplitudes.iter().flatten();
         let (least, most) = all.fold((f64::MAX, 0.0_f64), |(a, b), x| (a.min(*x), b.max(*x)));
-        let growth = [z[GROWTH], 1.96 * std(GROWTH)];
+        let growth = [z[2], 1.96 * std(2)];
         answer.verdict = vec![
             format!("f = {f} Hz, ζ = {zeta} at vanishing amplitude (95 % intervals)."),
             format!(

@@ -4,7 +4,8 @@
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 
-use analysis::statistics::{mean, peak, variance};
+use analysis::innovations::LIMIT;
+use analysis::statistics::{deviation, mean, peak};
 use anyhow::{Result, ensure};
 use host::fmu::Fmu;
 use maud::{Markup, html};
@@ -23,8 +24,7 @@ use crate::input::plausible;
 use crate::input::recording::Recording;
 use crate::news::News;
 use crate::tuning::{
-    BLOCK, FEWEST_BLOCKS, FREE_TORQUE, FRICTION_BINS, FRICTION_POINTS, MOVING_POWER, MOVING_SPEED,
-    SLOW_CHART, STILL,
+    BLOCK, FEWEST_BLOCKS, FREE_TORQUE, FRICTION_BINS, MOVING_SPEED, MOVING_SPREAD, PAGE_POINTS,
 };
 use crate::words::page::Sections;
 
@@ -145,7 +145,7 @@ fn check(recordings: &[Recording]) -> Result<()> {
         "{}: the torque is 0 in every row. Friction and inertia need a torque; record a ramp, a step or a sweep",
         names()
     );
-    let moves = |r: &Recording| variance(&r.rate) > MOVING_POWER * r.rate_noise().powi(2);
+    let moves = |r: &Recording| deviation(&r.rate) > MOVING_SPREAD * r.rate_noise();
     ensure!(
         recordings.iter().any(moves),
         "{}: the hub does not move: the rate is constant but for the gyro's noise. Static friction holds it up to the largest torque, \
@@ -166,7 +166,7 @@ fn friction_points(recordings: &[Recording], biases: &[f64], inertia: f64) -> Ve
         let block = ((BLOCK / own.step() * (1.0 + 1e-9)) as usize).max(1);
         let means = |signal: &[f64]| -> Vec<f64> { signal.chunks_exact(block).map(mean).collect() };
         let [t, rate, torque] = [&own.time, &own.rate, &own.torque].map(|signal| means(signal));
-        let still = STILL * own.rate_noise();
+        let still = LIMIT * own.rate_noise();
         for k in 1..t.len().saturating_sub(1) {
             let slips = |w: &f64| (w - bias).abs() > still;
             if rate[k - 1..=k + 1].iter().any(slips) {
@@ -296,8 +296,8 @@ fn friction_curve(found: &Identification) -> Markup {
         let within: Vec<&FrictionPoint> = points.iter().filter(|p| p.rate.abs() <= most).collect();
         let rates = || within.iter().map(|p| p.rate);
         let (low, high) = (rates().fold(0.0, f64::min), rates().fold(0.0, f64::max));
-        let at = |k: usize| low + (high - low) * (k as f64 + 0.5) / FRICTION_POINTS as f64;
-        let fitted = (0..FRICTION_POINTS).map(|k| (at(k), curve(at(k)))).collect();
+        let at = |k: usize| low + (high - low) * (k as f64 + 0.5) / PAGE_POINTS as f64;
+        let fitted = (0..PAGE_POINTS).map(|k| (at(k), curve(at(k)))).collect();
         let measured = within.iter().map(|p| (p.rate, p.torque)).collect();
         let lines = vec![
             series(fitted, "a", Style::Line, "fitted"),
@@ -319,15 +319,14 @@ fn friction_curve(found: &Identification) -> Markup {
     html! {
         h2 { "Friction" }
         (chart("Friction torque against the rate, means over rows of similar rate", f64::INFINITY))
-        (chart("The same at low speed", SLOW_CHART * speed))
+        (chart("The same at low speed", 4.0 * speed))
     }
 }
 
 fn braking_chart(all: &[Braking]) -> Markup {
     let lines = all.iter().zip(["a", "b"]).map(|(braking, color)| {
-        let angle = |k: usize| PI * (2.0 * k as f64 / FRICTION_POINTS as f64 - 1.0);
-        let points =
-            (0..=FRICTION_POINTS).map(|k| (angle(k), braking.at(angle(k)).abs())).collect();
+        let angle = |k: usize| PI * (2.0 * k as f64 / PAGE_POINTS as f64 - 1.0);
+        let points = (0..=PAGE_POINTS).map(|k| (angle(k), braking.at(angle(k)).abs())).collect();
         series(points, color, Style::Line, braking.direction)
     });
     let title = "Deceleration in free decay over the angle";

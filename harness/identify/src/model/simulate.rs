@@ -15,8 +15,8 @@ use names::hubslosh::solver::{self, MAX_STEPS};
 use crate::input::question::{Question, Setting, Solver, real};
 use crate::input::record::Record;
 use crate::tuning::{
-    COMPARED_FACTOR, COMPARED_STEPS, COMPARED_TOLERANCE, FINEST_TOLERANCE, HELD_STEPS,
-    MOST_INTERNAL_STEPS, SLOPE_PROBES,
+    COMPARED_FACTOR, COMPARED_STEPS, COMPARED_TOLERANCE, HELD_STEPS, MOST_INTERNAL_STEPS,
+    SLOPE_PROBES,
 };
 
 /// Returns the bound for `solver.max_steps` in runs over these instants, s; `None` where the FMU has no such parameter, the
@@ -185,7 +185,7 @@ impl Setup {
         let setup = |setup: Setup| Finer { setup, model: None };
         let Model::Own(fmu) = model else {
             let tolerance = (COMPARED_FACTOR * self.tolerance.unwrap_or(COMPARED_TOLERANCE))
-                .max(FINEST_TOLERANCE);
+                .max(1e3 * f64::EPSILON);
             return vec![setup(Setup { tolerance: Some(tolerance), ..self.clone() })];
         };
         let suggested = fmu.description().default_experiment.tolerance.filter(|t| *t > 0.0);

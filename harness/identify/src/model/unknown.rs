@@ -86,13 +86,9 @@ impl Question {
             }
         }
         for setting in &self.settings {
-            if let Some(n) = setting.recording.filter(|n| *n >= records.len()) {
-                problems.push(format!(
-                    "--set {}@{}: there are {} recordings",
-                    setting.name,
-                    n + 1,
-                    records.len()
-                ));
+            if setting.recording.is_some_and(|n| n >= records.len()) {
+                let name = setting.named().0;
+                problems.push(format!("--set {name}: there are {} recordings", records.len()));
             }
         }
         ensure!(problems.is_empty(), "{}", problems.join("; "));
@@ -133,12 +129,11 @@ impl Question {
         let output = self.output(&bias.output)?;
         let unit = self.unit(&bias.output, description)?;
         let one = |(recording, record): (usize, &Record)| {
-            let name = numbered(&format!("bias({})", bias.output), recording);
+            let name = numbered(&format!("bias({})", bias.output), Some(recording));
             let role = Role::Bias(output, Some(recording));
             let reach = bias.std.unwrap_or_else(|| record.spread(output));
             let unknown = Unknown::linear(&name, &unit, role, (0.0, reach), FREELY);
-            let prior = bias.std.map(|std| (0.0, std));
-            (Unknown { prior, ..unknown }, Target::Reading)
+            (Unknown { prior: bias.std.map(|std| (0.0, std)), ..unknown }, Target::Reading)
         };
         Ok(records.iter().enumerate().map(one).collect())
     }
@@ -195,8 +190,7 @@ impl Question {
                 )
             }
         };
-        let name = format!("scale({of})");
-        let name = recording.map_or(name.clone(), |k| numbered(&name, k));
+        let name = numbered(&format!("scale({of})"), recording);
         Ok((Unknown::linear(&name, "1", role, (0.0, SCALE_REACH), FREELY), target))
     }
 
@@ -297,9 +291,9 @@ fn deviation(variable: &Variable, description: &ModelDescription, text: &str) ->
     Ok(number(text)? - number(&zero)?)
 }
 
-/// Returns the name of an unknown that only one recording has, for example `bias(w)@2`.
-fn numbered(name: &str, recording: usize) -> String {
-    format!("{name}@{}", recording + 1)
+/// Returns the name of an unknown; with the number of its recording if only one has it, for example `bias(w)@2`.
+fn numbered(name: &str, recording: Option<usize>) -> String {
+    recording.map_or(name.into(), |k| format!("{name}@{}", k + 1))
 }
 
 fn parameter(
@@ -316,14 +310,12 @@ fn parameter(
         variable.variability,
         variable.causality
     );
-    let own: (f64, f64) = range(variable).into();
-    let (low, high) = free.bounds.unwrap_or(own);
+    let [least, largest] = range(variable);
+    let (low, high) = free.bounds.unwrap_or((least, largest));
     ensure!(
-        own.0 <= low && high <= own.1,
-        "the bounds of {} are {low} to {high} (allowed by the FMU: {} to {})",
-        free.name,
-        own.0,
-        own.1
+        least <= low && high <= largest,
+        "{} is free from {low} to {high} (allowed by the FMU: {least} to {largest})",
+        free.name
     );
     ensure!(
         (low..=high).contains(&free.start),
@@ -336,7 +328,7 @@ fn parameter(
         _ if free.start != 0.0 => 0.5 * free.start.abs(),
         _ => 1.0,
     };
-    let name = recording.map_or(free.name.clone(), |k| numbered(&free.name, k));
+    let name = numbered(&free.name, recording);
     let (unit, role) = (description.unit(variable), Role::Run(recording));
     let unknown = Unknown::linear(&name, unit, role, (free.start, reach), (low, high));
     Ok((unknown, Target::Parameter(variable.reference)))

@@ -11,7 +11,7 @@ use report::svg::{Chart, Style};
 use crate::estimate::{Estimated, prose};
 use crate::input::recording::Recording;
 use crate::input::response;
-use crate::tuning::{PAGE_LAGS, PAGE_POINTS, PAGE_STRETCH};
+use crate::tuning::PAGE_POINTS;
 use crate::words::combination::Combination;
 use crate::words::identified::{Identified, Residual};
 use crate::words::verdict::DOUBTS;
@@ -130,14 +130,14 @@ fn envelope(signals: &Residual) -> Chart {
     axis_chart("Measurement, model and residual", "time, s", &signals.label, lines, true)
 }
 
+/// The 8 s around the fastest motion, row by row.
 fn stretch(signals: &Residual) -> Chart {
     let fastest = (0..signals.measured.len())
         .max_by(|a, b| signals.measured[*a].abs().total_cmp(&signals.measured[*b].abs()))
         .unwrap_or(0);
     let middle = signals.time[fastest];
-    let rows: Vec<usize> = (0..signals.time.len())
-        .filter(|&i| (signals.time[i] - middle).abs() < PAGE_STRETCH / 2.0)
-        .collect();
+    let rows: Vec<usize> =
+        (0..signals.time.len()).filter(|&i| (signals.time[i] - middle).abs() < 4.0).collect();
     let of =
         |value: &dyn Fn(usize) -> f64| rows.iter().map(|&i| (signals.time[i], value(i))).collect();
     let lines = vec![
@@ -192,7 +192,7 @@ fn residual(signals: &Residual) -> Chart {
 fn autocorrelation(signals: &Residual) -> Chart {
     let count = signals.residual.len();
     let step = (signals.time[count - 1] - signals.time[0]) / (count - 1) as f64;
-    let values = rest::autocorrelation(&about_mean(&signals.residual), PAGE_LAGS);
+    let values = rest::autocorrelation(&about_mean(&signals.residual), 200);
     let last = (values.len() - 1) as f64 * step;
     let bound = 1.96 / (count as f64).sqrt();
     let values = values.iter().enumerate().skip(1).map(|(k, r)| (k as f64 * step, *r)).collect();
