@@ -2,7 +2,6 @@
 
 use std::sync::OnceLock;
 
-use analysis::gauss_markov::FLOOR;
 use analysis::innovations::LIMIT;
 use analysis::statistics::{deviation, noise_level, peak};
 use anyhow::{Result, ensure};
