@@ -64,8 +64,8 @@ def long_runs(monkeypatch) -> None:
 
 
 @pytest.mark.usefixtures("long_runs")
-def test_with_a_worker_killed_on_the_way_every_column_is_the_harness_s(client, harness) -> None:
-    """Same calls with the same numbers: same bits, in tables and signals."""
+def test_runs_of_a_cluster_with_a_killed_worker_equal_runs_of_the_harness(client, harness) -> None:
+    """Runs on a cluster with a killed worker have the same bits as runs of the harness."""
     theirs = harness(PLAN, "theirs")
     worst, killer = compare(client, harness(PLAN, "ours"), theirs)
     assert len(worst) > 80

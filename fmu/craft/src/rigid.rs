@@ -282,7 +282,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn solving_undoes_multiplying() {
+    fn solving_a_linear_system_inverts_the_matrix_product() {
         let mut rng = fastrand::Rng::with_seed(5);
         let mut between = |low: f64, high: f64| low + rng.f64() * (high - low);
         for _ in 0..100 {
@@ -308,7 +308,7 @@ mod tests {
     }
 
     #[test]
-    fn a_matrix_with_no_inertia_about_an_axis_is_singular() {
+    fn a_mass_matrix_without_inertia_about_an_axis_is_singular() {
         let rod = [[5.0, 0.0, 0.0], [0.0, 5.0, 0.0], [0.0, 0.0, 0.0]];
         let matrix = Rigid::new(10.0, [0.0, 0.0, 0.4], &rod).mass_matrix();
         assert!(smallest_pivot(&matrix) < 1e-12);

@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn shifts_are_close_to_those_of_the_third_order() {
+    fn frequency_shifts_are_close_to_the_third_order_theory() {
         for i in 0..=30 {
             let fill = 0.4 + 0.01 * f64::from(i);
             let EnergyTerms { pair: [s, kappa], rotary, .. } = energy_terms(fill).unwrap();

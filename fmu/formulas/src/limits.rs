@@ -274,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn swirl_folds_above_the_resonance_with_mode_2_2() {
+    fn rotary_slosh_has_an_angle_limit_above_the_resonance_with_mode_2_2() {
         assert_eq!([0.5, 0.83].map(swirl_fold), [None; 2]);
         for [fill, angle] in FOLD {
             let found = swirl_fold(fill).unwrap().to_degrees();

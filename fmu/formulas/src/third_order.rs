@@ -128,7 +128,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn shifts_of_the_bench_equal_those_of_potential_flow() {
+    fn frequency_shifts_of_the_bench_equal_potential_flow() {
         for (fill, planar, circular) in [(0.10, -0.429, 0.367), (0.05, -0.257, 0.421)] {
             let (s, kappa) = coefficients(fill / 0.0815);
             assert!((0.375 * kappa - 0.5 * s - planar).abs() < 6e-4, "{s} {kappa}");

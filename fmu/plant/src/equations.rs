@@ -147,8 +147,7 @@ impl Plant {
         let endless = |due: f64| -due > SAMPLES_AT_ONCE * period || time + period <= time;
         if self.next_sample().is_some_and(endless) {
             return Err(StepError::Model(format!(
-                "too many gyro samples are due at t = {time} s. The host has skipped time events, or imu.rate \
-                 is too high for the resolution of time there"
+                "too many gyro samples are due at t = {time} s. The host has skipped time events, or imu.rate is so high that double precision cannot resolve the sampling times there"
             )));
         }
         if self.wheel.enabled {

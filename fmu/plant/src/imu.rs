@@ -237,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn without_flicker_and_random_walk_their_streams_are_not_used() {
+    fn without_flicker_noise_and_random_walk_no_random_numbers_are_drawn_for_them() {
         let imu = Imu { lsb: 0.0, ..Imu::default() };
         let (mut gyro, mut slow) = (imu.start(), Imu { rrw: 1e-9, ..imu }.start());
         for _ in 0..100 {

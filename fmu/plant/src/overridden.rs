@@ -1,5 +1,6 @@
 //! Finds parameters whose value another parameter replaces.
 
+use alloc::format;
 use alloc::string::String;
 
 use crate::parameters::{Parameters, SloshSource};
@@ -28,7 +29,10 @@ impl Parameters {
             "slosh.table.nonlinear_inertia" | "slosh.table.nonlinear_stiffness"
                 if !matches!(slosh.model, SloshModel::Linear | SloshModel::Liquid) =>
             {
-                Some("it belongs to slosh.model = liquid; other models have a fixed dependence on amplitude".into())
+                Some(format!(
+                    "slosh.model = {} has a fixed dependence on the amplitude; only slosh.model = liquid uses this parameter",
+                    slosh.model.name()
+                ))
             }
             "tank.h"
             | "fluid.nu"

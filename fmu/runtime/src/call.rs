@@ -322,7 +322,7 @@ mod tests {
     }
 
     #[test]
-    fn after_a_panic_everything_is_fatal_but_freeing() {
+    fn after_a_panic_every_call_except_freeing_returns_fatal() {
         assert_eq!(
             GET_REAL.check(CS, InStep, InstanceState::Fatal).unwrap_err().severity,
             Severity::Fatal

@@ -222,7 +222,7 @@ mod tests {
     const START: [f64; 4] = [1.6, 0.0, 0.0, 0.5];
 
     #[test]
-    fn a_revolution_returns_to_its_start_and_costs_more_at_smaller_tolerance() {
+    fn an_integrated_revolution_ends_at_its_start_and_costs_more_at_smaller_tolerance() {
         let mut works = [0; 4];
         for (k, tolerance) in [1e-4, 1e-6, 1e-8, 1e-10].into_iter().enumerate() {
             let (orbit, mut x) = (Orbit::new(), START);

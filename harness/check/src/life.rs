@@ -344,7 +344,7 @@ pub fn reset<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
         session.instance().reset()?;
         session.rewind();
         let again = history::<F>(&mut session)
-            .map_err(|error| anyhow::anyhow!("a run after {call}: {error:#}"))?;
+            .map_err(|error| anyhow::anyhow!("the run after {call} failed: {error:#}"))?;
         for (fresh, again) in fresh.iter().zip(&again) {
             if let Some(text) = session.difference(again, fresh) {
                 is_deterministic(fmu, using)?;

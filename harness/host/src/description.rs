@@ -867,7 +867,7 @@ impl ModelDescription {
             },
             Type::String => Ok(Value::String(text.into())),
             Type::Binary | Type::Clock => {
-                bail!("{name} is of type {:?}, which this host does not set", variable.kind)
+                bail!("{name} is of type {:?}, whose values this command cannot set", variable.kind)
             }
             Type::Enumeration => {
                 let items = self.items(variable);

@@ -221,7 +221,10 @@ impl<'fmu, I: DerefMut<Target = Instance<'fmu>>> Run<I> {
             if !error.is_finite() || error > 1.0 {
                 let factor = if error.is_finite() { 0.9 * error.powf(-0.2) } else { 0.1 };
                 self.h = h * factor.clamp(0.1, 0.9);
-                ensure!(t + self.h > t, "the states cannot be followed past t = {t} s");
+                ensure!(
+                    t + self.h > t,
+                    "the host's solver cannot integrate the states beyond t = {t} s: even the shortest step has too large an error"
+                );
                 continue;
             }
             let ends_row = limit - (t + h) <= 4.0 * f64::EPSILON * limit.abs();

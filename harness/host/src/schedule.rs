@@ -47,7 +47,7 @@ impl History {
         hold: bool,
     ) -> Result<Self> {
         let rows = time.len();
-        ensure!(rows >= 2, "the history has {rows} rows (allowed: at least two)");
+        ensure!(rows >= 2, "the table of inputs has {rows} rows (allowed: at least two)");
         ensure!(
             values.len() == rows && slopes.as_ref().is_none_or(|slopes| slopes.len() == rows),
             "the columns have different lengths"
@@ -329,7 +329,7 @@ mod tests {
     #[test]
     fn wrong_histories_and_too_many_points_are_refused() {
         for (time, word) in [
-            (vec![0.0], "the history has 1 rows (allowed: at least two)"),
+            (vec![0.0], "the table of inputs has 1 rows (allowed: at least two)"),
             (vec![0.0, 1.0, 0.5], "row 3: time goes from 1 to 0.5 s; it must not go back"),
             (vec![0.0, f64::NAN, 1.0], "row 2: time goes from 0 to NaN s"),
         ] {

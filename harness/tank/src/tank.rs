@@ -196,6 +196,25 @@ impl core::str::FromStr for Fill {
 /// computing time grows fast.
 const MOST_SEGMENTS: usize = 200;
 
+/// Terms of the TOML reader, and the words of a tank file that replace them in messages.
+const TERMS: [(&str, &str); 7] = [
+    (
+        "invalid type: unit variant, expected struct variant",
+        "the shape has no dimensions (write for example { sphere = { radius = 0.4 } })",
+    ),
+    ("invalid type: ", "wrong type: "),
+    ("expected f64", "expected a number"),
+    ("unknown variant ", "unknown name "),
+    (", expected one of ", ", allowed are "),
+    ("unexpected keys in table: ", "unknown dimension "),
+    (", available keys: ", ", allowed are "),
+];
+
+fn in_words(error: &toml::de::Error) -> String {
+    let text = error.to_string().trim_end().to_string();
+    TERMS.iter().fold(text, |text, (term, words)| text.replace(term, words))
+}
+
 pub const MOST_MODES: usize = 20;
 
 impl Tank {
@@ -211,8 +230,7 @@ impl Tank {
     ///
     /// # Errors Lists all problems of the file.
     pub fn parse(text: &str, folder: &Path) -> Result<Tank, Problems> {
-        let file: File =
-            toml::from_str(text).map_err(|error| error.to_string().trim_end().to_string())?;
+        let file: File = toml::from_str(text).map_err(|error| in_words(&error))?;
         let mut problems = Vec::new();
         let density = match file.density {
             Some(density) if density > 0.0 && density.is_finite() => density,

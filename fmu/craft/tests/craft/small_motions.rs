@@ -153,7 +153,7 @@ fn poles_and_zeros_are_the_closed_forms_with_and_without_centring_stiffness() {
 }
 
 #[test]
-fn damped_pole_is_the_closed_form() {
+fn a_damped_slosh_pole_equals_the_closed_form() {
     let c = 31.9467;
     let p = craft_with_tank_at(-0.45, 0.0, c);
     let closed = Closed::new(&p);
@@ -194,7 +194,7 @@ fn a_mode_has_the_frequency_that_it_is_given() {
 }
 
 #[test]
-fn centring_stiffness_restores_in_weightlessness() {
+fn centring_stiffness_restores_the_slosh_mass_in_weightlessness() {
     let mut tank = Tank::default();
     tank.k[0] = 60.0;
     assert_close(frequency_2(tank, 0.0), 60.0 / tank.mass[0], 1e-8);

@@ -28,7 +28,7 @@ use crate::terminal;
     hubslosh design --snr 20 --band 1.25,20\n  \
     hubslosh design --multisine 0.25 --duration 600 --out torque.csv\n  \
     hubslosh design --multisine 0.25 --optimal --set friction.b=0.04 --out torque.csv\n  \
-    hubslosh design slew.csv --fmu Spacecraft --free craft.Jzz=640,tank[1].mass[1]=128 --inputs torque[3] \\\n      \
+    hubslosh design slew.csv --fmu Spacecraft --free craft.Jzz=640,tank[1].mass[1]=128 --inputs torque[3] \\\n          \
     --outputs omega[3] --noise omega[3]=1e-5")]
 pub struct DesignArgs {
     /// Torque profile, as for `hubslosh run`.

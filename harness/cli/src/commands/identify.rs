@@ -29,12 +29,12 @@ use crate::terminal;
 /// Without a kind of recording, `identify DATA` means `identify bench DATA`, and with --free `identify fmu DATA`.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  hubslosh identify sweep.parquet --out result.json\n  \
-    hubslosh identify up.csv down.csv --validate noise.csv --model linear,planar,spherical \\\n      \
+    hubslosh identify up.csv down.csv --validate noise.csv --model linear,planar,spherical \\\n          \
     --set tank.d=0.163 --out result.json\n  \
     hubslosh identify bench.mat --columns time=t,tau_cmd=T_cmd:mNm,omega=gyro_z:deg/s --out result.json\n  \
     hubslosh identify friction ramp.csv step.csv sweep.csv --out friction.json\n  \
     hubslosh identify decay decay.csv --columns wave_height=probe:mm --out decay.json\n  \
-    hubslosh identify a.csv b.csv --fmu VanDerPol.fmu --free mu=1:0.1:5,x0@each=1:-3:3 --outputs x0,x1 \\\n      \
+    hubslosh identify a.csv b.csv --fmu VanDerPol.fmu --free mu=1:0.1:5,x0@each=1:-3:3 --outputs x0,x1 \\\n          \
     --solver host --out result.json --report result.html")]
 pub struct IdentifyArgs {
     #[command(subcommand)]
@@ -42,7 +42,7 @@ pub struct IdentifyArgs {
 }
 
 const BENCH: &str = "Example:\n  hubslosh identify bench up.csv down.csv --validate noise.csv --set tank.d=0.163 --out result.json";
-const FMU: &str = "Example:\n  hubslosh identify fmu a.csv b.csv --fmu VanDerPol.fmu --free mu=1:0.1:5,x0@each=1:-3:3 \\\n      \
+const FMU: &str = "Example:\n  hubslosh identify fmu a.csv b.csv --fmu VanDerPol.fmu --free mu=1:0.1:5,x0@each=1:-3:3 \\\n          \
     --outputs x0,x1 --solver host --out result.json";
 const DECAY: &str =
     "Example:\n  hubslosh identify decay decay.csv --columns wave_height=probe:mm --out decay.json";
@@ -495,10 +495,9 @@ impl DataArgs {
             match item.trim().strip_prefix("rate=") {
                 Some(number) => {
                     let number = number.parse();
-                    rate =
-                        Some(number.with_context(|| {
-                            format!("--columns {item}: a number of Hz is needed")
-                        })?);
+                    rate = Some(number.with_context(|| {
+                        format!("--columns {item}: the rate must be a number, Hz")
+                    })?);
                 }
                 None => columns.push(item),
             }

@@ -53,9 +53,9 @@ pub struct RunArgs {
     /// and to every edge and command of a profile.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.02)]
     step: f64,
-    /// Time between the commands of a profile that oscillates, s. The commands are joined by straight lines, or held with
-    /// --hold. If straight lines would differ from the profile by more than 2.5 % of its amplitude, the commands are
-    /// closer, so that they differ by at most 0.1 %.
+    /// Time between the torque commands into which an oscillating profile is divided, s. The commands are joined by
+    /// straight lines, or held with --hold. If straight lines would differ from the profile by more than 2.5 % of its
+    /// amplitude, shorter times are used, so that they differ by at most 0.1 %.
     #[arg(long, value_name = "SECONDS", default_value_t = SAMPLE, conflicts_with = "input")]
     sample: f64,
     /// Time at which the run stops, s [default: the end of the torque history].
@@ -261,12 +261,12 @@ fn help() -> String {
         "Profiles, with their defaults (torque in N·m, frequencies in Hz, times in s):\n{}\n\
          Sensors, with their defaults (SI; angles also as 90deg, lengths as 5mm):\n{}\n\
          Examples:\n  hubslosh run --profile exp-sweep:amplitude=0.1 --out sweep.parquet\n  \
-         hubslosh run --profile sine:amplitude=0.05,frequency=2.344 --set friction.model=none \\\n      \
+         hubslosh run --profile sine:amplitude=0.05,frequency=2.344 --set friction.model=none \\\n          \
          --set tank.h=50mm --step 0.005 --columns theta,omega,slosh_angle --out dwell.csv\n  \
          hubslosh run --input torque.csv --out answer.csv\n  \
          hubslosh run --parameters result.json --input bench.csv --ignore-columns --out twin.csv\n  \
          hubslosh run --profile zero --set init.slosh_angle=0.1 --out - | head\n  \
-         hubslosh run --profile lin-sweep:duration=600 --sensor wave=gauge:angle=90deg,rate=25,noise=0.2mm \\\n      \
+         hubslosh run --profile lin-sweep:duration=600 --sensor wave=gauge:angle=90deg,rate=25,noise=0.2mm \\\n          \
          --sensor load=force:noise=0.01,quantum=0.005 --out bench.csv",
         profile::help(),
         sensors::help()

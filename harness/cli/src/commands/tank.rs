@@ -20,7 +20,7 @@ use crate::terminal;
     hubslosh tank tank.toml --sweep 20%,40%,60%,80% --nu 1e-6 --out sweep.csv --picture sweep.svg\n  \
     hubslosh tank tank.toml --fill 1.2 --modes 3 --nu 1e-6 --parameters tank-1.2.toml\n  \
     hubslosh tank tank.toml --sweep 2%,98% --model SloshTank --nu 1e-6 --parameters draining.toml\n  \
-    hubslosh tank harness/tank/examples/bench.toml --fill 0.1 --modes 1 --gravity 0.5 --sigma 0.073 \\\n      \
+    hubslosh tank harness/tank/examples/bench.toml --fill 0.1 --modes 1 --gravity 0.5 --sigma 0.073 \\\n          \
     --contact-angle 5 --parameters coast.toml\n  \
     hubslosh tank harness/tank/examples/bench.toml --fill 0.1 --spin 3 --gravity 5\n  \
     hubslosh run --set-file tank-1.2.toml --profile exp-sweep:amplitude=0.1 --out sweep.parquet\n\n\

@@ -237,7 +237,7 @@ fn a_number_that_no_machine_can_hold_is_refused_before_anything_is_allocated() {
                 "--period",
                 "10000",
             ],
-            "are 8.4e10 sines (allowed: at most 2e9)",
+            "needs 8.4e10 values of sines (allowed: at most 2e9)",
         ),
         (&["gyro", "--fmu", fmu, "--hours", "1e9"], "samples (allowed: 100 to 20000000)"),
         (

@@ -349,7 +349,7 @@ fn a_free_decay_of_30_s_determines_frequency_damping_and_its_growth() {
 }
 
 #[test]
-fn an_empty_tank_leaves_the_hub_its_whole_inertia() {
+fn with_an_empty_tank_all_inertia_is_attributed_to_the_hub() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let fmu = packed_for_tests();

@@ -350,7 +350,7 @@ fn axes(page: &str) -> Vec<String> {
 }
 
 #[test]
-fn no_two_series_of_another_fmus_figure_look_the_same() {
+fn all_series_in_a_figure_about_another_fmu_look_different() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     std::fs::write(

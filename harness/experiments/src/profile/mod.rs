@@ -435,7 +435,7 @@ impl Profile {
         ensure!(
             intervals <= most,
             "{self} takes {intervals:.3e} commands until {stop} s, because it reaches {highest} Hz or is commanded every {sample} s \
-             (allowed: at most {most}). Up to {:.3e} s, or up to {:.4e} Hz, are possible",
+             (allowed: at most {most}). A length of up to {:.3e} s, or a frequency of up to {:.4e} Hz, is possible",
             stop * most / intervals,
             most / stop * cycles(FINEST)
         );

@@ -67,7 +67,7 @@ fn the_example_of_the_bench_slips_and_comes_to_rest() {
 }
 
 #[test]
-fn the_examples_in_six_axes_slosh_by_degrees() {
+fn in_the_six_axis_examples_the_slosh_angle_reaches_some_degrees() {
     // the wave's force across the thrust: 128 kg at 1.5 m/s2 and 2 degrees are 6.7 N
     for (example, name) in [(&EXAMPLES[1], "slosh_force[1]"), (&EXAMPLES[2], "force[1]")] {
         let answer = reference(example);

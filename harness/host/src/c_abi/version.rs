@@ -722,7 +722,7 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
     pub fn get(&mut self, name: &str) -> Result<Value> {
         let variable = self.fmu.description.variable(name)?;
         if matches!(variable.kind(), Type::Binary | Type::Clock) {
-            bail!("{name} is of type {:?}, which this host does not read", variable.kind());
+            bail!("{name} is of type {:?}, whose values this command cannot read", variable.kind());
         }
         Ok(self.value(variable)?)
     }

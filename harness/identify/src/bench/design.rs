@@ -105,8 +105,7 @@ pub fn check_rows(period: f64, band: (f64, f64), peak: f64, rows: usize) -> Resu
     let sines = (rows as u64).saturating_mul(lines as u64);
     ensure!(
         sines <= budget::SINES,
-        "{rows} rows of {lines} lines are {:.1e} sines (allowed: at most {:.0e}); a shorter record, a \
-         narrower band or a shorter period has fewer",
+        "a multisine with {rows} rows and {lines} lines needs {:.1e} values of sines (allowed: at most {:.0e}); choose a shorter record, a narrower band or a shorter period",
         sines as f64,
         budget::SINES as f64
     );

@@ -96,7 +96,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_text_sets_what_it_names_and_says_what_is_wrong() {
+    fn a_text_of_tolerances_sets_the_named_values_or_names_its_fault() {
         let found = Tolerances::default().with("torque=2%, tank.r=0.001").unwrap();
         assert_eq!(found, Tolerances { torque: 0.02, arm: 0.001, ..Tolerances::default() });
         for (text, says) in [

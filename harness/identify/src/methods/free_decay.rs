@@ -366,7 +366,7 @@ mod tests {
     }
 
     #[test]
-    fn intervals_hold_the_truth_in_white_and_in_coloured_noise() {
+    fn intervals_contain_the_true_value_in_white_and_in_coloured_noise() {
         // 60 records of 25 s each. The 95 % interval covers 57 on average with a scatter of 1.7;
         // the limit is three below
         for (colour, least) in [(0.0, 52), (0.9, 52)] {

@@ -240,7 +240,7 @@ fn parameters_without_information_are_not_determined_and_bounds_are_named() {
 }
 
 #[test]
-fn a_prior_holds_what_it_knows_better_than_the_recordings() {
+fn an_unknown_keeps_its_prior_if_the_recordings_determine_it_less() {
     let mut question = question(&FREE);
     question.priors = vec!["friction.b=0.06:1e-6".parse().unwrap()];
     let found = found(&question);
@@ -266,7 +266,7 @@ fn predicted_standard_deviations_equal_those_of_the_fit() {
 }
 
 #[test]
-fn the_likelihood_beside_the_estimate_grows_as_the_covariance_says() {
+fn the_likelihood_near_the_estimate_falls_as_the_covariance_predicts() {
     let question = question(&FREE);
     let found = found(&question);
     let (names, _) = &found.correlations;

@@ -226,7 +226,7 @@ fn holds(tank: &Tank, result: &Identification) {
 const FORCED: Tank = Tank { drive: [0.1, 2.2, 0.03], growth: 0.01, ..TANK };
 
 #[test]
-fn a_forced_record_of_another_integration_gives_the_whole_model() {
+fn a_forced_record_of_an_independent_integrator_determines_the_whole_model() {
     let record = FORCED.record(10.0, 0.02, 0.0, 0.01, 1);
     let result = found(&question(&[], &[]), &record);
     holds(&FORCED, &result);

@@ -291,7 +291,8 @@ fn with_free(free: &[&str], solver: Solver) -> Question {
     Question { free: free.iter().map(|text| text.parse().unwrap()).collect(), ..question(solver) }
 }
 
-/// The equations have only the ratios k/m and d/m of stiffness, damping and mass, and c by itself.
+/// The equations contain stiffness k, damping d and mass m only in the ratios k/m and d/m, so that these three cannot
+/// be separated; the parameter c can be determined.
 #[test]
 fn parameters_that_no_output_tells_apart_are_named_as_a_set_in_words_and_json() {
     let fmu = Adaptive::new(&["-DTOLERANCE=1e-7", "-DMODEL_EXCHANGE"]);

@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn rounded_times_are_put_back_onto_their_grid() {
+    fn rounded_times_are_restored_to_the_even_grid_that_explains_them() {
         // the last one has rows closer than its digits
         for (step, quantum) in [(1.0 / 33.0, 1e-3), (1.0 / 60.0, 1e-2), (1.0 / 120.0, 1e-2)] {
             let grid = on(&printed(step, 0..5000, quantum));

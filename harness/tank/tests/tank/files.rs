@@ -83,9 +83,15 @@ fn every_defect_of_a_contour_has_a_clear_message() {
             "an arc of 490.0 degrees goes round more than once",
         ),
         ("profile = [{ line = [0, 0, 1] }]", "expected an array of length 4"),
-        ("profile = [{ circle = [0, 0, 1] }]", "unknown variant `circle`"),
+        ("profile = [{ circle = [0, 0, 1] }]", "unknown name `circle`, allowed are `line`"),
         ("profile = [{ line = [0, 0, 1, 0] }]\ncolour = 3", "unknown field `colour`"),
-        ("shape = { sphere = { radius = 1.0, height = 2.0 } }", "height"),
+        (
+            "shape = { sphere = { radius = 1.0, height = 2.0 } }",
+            "unknown dimension height, allowed are radius",
+        ),
+        ("shape = { spheer = { radius = 1.0 } }", "unknown name `spheer`, allowed are `cylinder`"),
+        ("shape = 'sphere'", "the shape has no dimensions"),
+        ("shape = { sphere = { radius = '1 m' } }", "expected a number"),
         ("shape = { sphere = { radius = -1.0 } }", "radius is -1; it must be a number above 0"),
         (
             "shape = { annulus = { inner_radius = 0.5, outer_radius = 0.4, height = 1.0 } }",

@@ -19,7 +19,7 @@ fn is_drawn(svg: &str, file: &str) {
 }
 
 #[test]
-fn the_documentation_s_figure_is_the_one_that_is_drawn() {
+fn the_committed_figure_of_the_documentation_equals_the_drawn_figure() {
     let svg = liquid_figure::draw(&Overlaps::new(40));
     is_drawn(&svg, "../../modelDescription/HubSlosh/documentation/liquid.svg");
 }

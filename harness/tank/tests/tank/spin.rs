@@ -176,7 +176,7 @@ fn liquid_in_two_pools_is_refused() {
 }
 
 #[test]
-fn tanks_and_rates_that_cannot_spin_are_refused() {
+fn spin_is_refused_for_boxes_full_tanks_and_invalid_rates() {
     let cylinder = Tank::from_shape(Shape::Cylinder { radius: 0.3, height: 0.6 }, RHO).unwrap();
     let data = cylinder.solve(0.4, 1).unwrap();
     for omega in [0.0, -1.0, f64::NAN, f64::INFINITY] {
