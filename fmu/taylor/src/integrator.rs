@@ -366,32 +366,33 @@ impl Expansion {
     }
 
     /// Records that coefficients below `order` of all quantities, and coefficient `order` of the states, are
-    /// overwritten.
+    /// overwritten. `order` is at most 4.
     #[inline(always)]
     pub fn overwrite(&mut self, order: usize) {
+        debug_assert!(order <= 4, "`repair` computes four orders");
         self.overwritten = self.overwritten.max(order);
     }
 }
 
 /// Computes again the coefficients of the expansion that were overwritten. The expansion starts `t` after the start of the call.
-#[inline(always)]
+// Only four orders are compiled: all of them would be a sixth of the binary.
+#[inline(never)]
 fn repair<M: KeptMotion>(motion: &mut M, t: f64) {
     let Expansion { overwritten, orders, .. } = *motion.expansion();
-    if overwritten > 0 && orders > 0 {
+    if orders > 0 {
         motion.start(t);
-        for n in 0..overwritten.min(orders) {
-            motion.rates(n);
-        }
+        for_each_order!(N => {
+            if N < overwritten.min(orders) {
+                motion.rates(N);
+            }
+        }; 0 1 2 3);
     }
     motion.expansion().overwritten = 0;
 }
 
-/// Computes coefficient n + 1 of the states, and its norm, if it is not known.
+/// Computes coefficient n + 1 of the states, and its norm.
 #[inline(always)]
-fn extend<M: KeptMotion>(motion: &mut M, n: usize, tolerance: f64) {
-    if motion.expansion().orders > n {
-        return;
-    }
+fn compute_order<M: KeptMotion>(motion: &mut M, n: usize, tolerance: f64) {
     motion.rates(n);
     if n == 2 {
         let radius = motion.set_error_scale(LONGEST, STEP_SHARE * tolerance).min(LONGEST);
@@ -418,14 +419,13 @@ struct Search {
 }
 
 impl Search {
-    /// Adds the term of order n + 1. Returns `Break` with the order if the search ends.
+    /// Adds the term of order n + 1, whose norm is known. Returns `Break` with the order if the search ends.
     #[inline(always)]
-    fn add_term<M: KeptMotion>(&mut self, motion: &mut M, n: usize) -> ControlFlow<Option<usize>> {
-        extend(motion, n, self.tolerance);
+    fn add_term(&mut self, expansion: &Expansion, n: usize) -> ControlFlow<Option<usize>> {
         if n < 2 {
             return ControlFlow::Continue(());
         }
-        let Expansion { radius, norms, .. } = motion.expansion();
+        let Expansion { radius, norms, .. } = expansion;
         if n == 2 {
             if self.t > *radius {
                 return ControlFlow::Break(None);
@@ -448,11 +448,34 @@ impl Search {
             false => ControlFlow::Continue(()),
         }
     }
+
+    /// Computes further orders until the search ends.
+    #[inline(never)]
+    fn extend<M: KeptMotion>(mut self, motion: &mut M) -> Option<usize> {
+        let known = motion.expansion().orders;
+        if M::UNROLLED {
+            for_each_order!(N => {
+                if N >= known {
+                    compute_order(motion, N, self.tolerance);
+                    if let ControlFlow::Break(end) = self.add_term(motion.expansion(), N) {
+                        return end;
+                    }
+                }
+            });
+            return None;
+        }
+        let mut orders = known..self.highest;
+        let end = orders.find_map(|n| {
+            compute_order(motion, n, self.tolerance);
+            self.add_term(motion.expansion(), n).break_value()
+        });
+        end.flatten()
+    }
 }
 
 /// Returns the order up to which the series is exact at `t` after the start of the expansion. The longer `t`, the higher the
 /// order. The result is `None` if no order is high enough.
-#[inline(never)]
+#[inline(always)]
 fn order_at<M: KeptMotion>(motion: &mut M, t: f64, tolerance: f64) -> Option<usize> {
     // 1 over the share of the allowed error
     let share = if t < FULL_LENGTH { FULL_LENGTH / t } else { 1.0 };
@@ -465,15 +488,13 @@ fn order_at<M: KeptMotion>(motion: &mut M, t: f64, tolerance: f64) -> Option<usi
         terms: [f64::INFINITY; 4],
         negligible: 0,
     };
-    if M::UNROLLED {
-        for_each_order!(N => {
-            if let ControlFlow::Break(end) = search.add_term(motion, N) {
-                return end;
-            }
-        });
-        return None;
+    // A loop of its own, because the orders written out lie far apart in memory.
+    for n in 0..motion.expansion().orders {
+        if let ControlFlow::Break(end) = search.add_term(motion.expansion(), n) {
+            return end;
+        }
     }
-    (0..search.highest).find_map(|n| search.add_term(motion, n).break_value()).flatten()
+    search.extend(motion)
 }
 
 /// Returns order and length of the whole expansion.
@@ -548,7 +569,9 @@ pub fn advance_kept<M: KeptMotion>(
     steps: &mut Steps,
 ) -> Result<(), StepError> {
     let mut moved = 0.0;
-    repair(motion, moved);
+    if motion.expansion().overwritten > 0 {
+        repair(motion, moved);
+    }
     loop {
         steps.add_steps(1, begin + moved)?;
         let t = (clock - start[0]) - start[1];
