@@ -455,7 +455,7 @@ impl Search {
         let known = motion.expansion().orders;
         if M::UNROLLED {
             for_each_order!(N => {
-                if N >= known {
+                if N + 1 > known {
                     compute_order(motion, N, self.tolerance);
                     if let ControlFlow::Break(end) = self.add_term(motion.expansion(), N) {
                         return end;
