@@ -10,9 +10,11 @@ use host::fmu::{self, Interface};
 use pyo3::buffer::PyBuffer;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::types::PyBytes;
 
 use crate::fmu::{Fmu, FmuError, FmuWarning, error};
 use crate::run::{Run, Stop, Table};
+use crate::schedule::bytes;
 
 /// An FMI instance together with the loaded FMU that it uses. Rust drops the fields in this order, so that the instance is freed
 /// before its library is unloaded.
@@ -236,15 +238,15 @@ impl Instance {
         })
     }
 
-    /// Initialise the instance in Model Exchange, and return the derivatives of `unknowns` with respect to each of `knowns`; both
-    /// are lists of value references.
-    fn jacobian(
+    /// Initialise the instance in Model Exchange, and return the derivatives of `unknowns` with respect to each of `knowns` as the
+    /// bytes of 64-bit floats, known after known; both are lists of value references.
+    fn jacobian<'py>(
         &self,
-        py: Python,
+        py: Python<'py>,
         unknowns: Vec<u32>,
         knowns: Vec<u32>,
-    ) -> PyResult<Vec<Vec<f64>>> {
-        self.with(py, |held| {
+    ) -> PyResult<Bound<'py, PyBytes>> {
+        let columns = self.with(py, |held| {
             let instance = &mut held.instance;
             instance.enter_initialization_mode(None, 0.0, None).map_err(error)?;
             instance.exit_initialization_mode().map_err(error)?;
@@ -259,34 +261,31 @@ impl Instance {
             }
             instance.enter_continuous_time_mode().map_err(error)?;
             jacobian(instance, &unknowns, &knowns).map_err(error)
-        })
+        })?;
+        Ok(bytes(py, &columns))
     }
 }
 
-/// Returns the derivatives of `unknowns` with respect to each of `knowns`, one list for each known.
+/// Returns the derivatives of `unknowns` with respect to each of `knowns`, known after known.
 ///
 /// Most states of a small craft belong to tanks that it does not have. Therefore the first call requests the derivative in
 /// a direction that moves a whole block of knowns; if this derivative is 0, the derivatives with respect to each known of
 /// the block are 0 and are not computed one by one.
-fn jacobian(
-    instance: &mut fmu::Instance,
-    unknowns: &[u32],
-    knowns: &[u32],
-) -> Called<Vec<Vec<f64>>> {
+fn jacobian(instance: &mut fmu::Instance, unknowns: &[u32], knowns: &[u32]) -> Called<Vec<f64>> {
     const BLOCK: usize = 8;
-    let mut columns = Vec::with_capacity(knowns.len());
+    let mut columns = Vec::with_capacity(knowns.len() * unknowns.len());
     for block in knowns.chunks(BLOCK) {
         if knowns.len() > 4 * BLOCK {
             // Different shares, so that effects of opposite knowns do not cancel.
             let direction: Vec<f64> = (1..=block.len()).map(|n| (n as f64).sqrt()).collect();
             let all = instance.directional_derivative(unknowns, block, &direction)?;
             if all.iter().all(|x| *x == 0.0) {
-                columns.extend(vec![vec![0.0; unknowns.len()]; block.len()]);
+                columns.resize(columns.len() + unknowns.len() * block.len(), 0.0);
                 continue;
             }
         }
         for known in block {
-            columns.push(instance.directional_derivative(unknowns, &[*known], &[1.0])?);
+            columns.extend(instance.directional_derivative(unknowns, &[*known], &[1.0])?);
         }
     }
     Ok(columns)

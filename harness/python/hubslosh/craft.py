@@ -1530,7 +1530,7 @@ class Craft:
         return f"Craft({self.mass:g} kg dry, tanks: {', '.join(self.tanks) or 'none'}{modes})"
 
     def __str__(self) -> str:
-        """Return the craft in at most ten lines."""
+        """Return the craft in three lines, and one for each tank, wheel and appendage."""
         J, F = self._inertia(), self._force()
         products = f"Jxy, Jxz, Jyz {_row((J[0, 1], J[0, 2], J[1, 2]))}"
         lines = [

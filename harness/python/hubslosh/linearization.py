@@ -460,7 +460,7 @@ def linearize(
         if is_spacecraft(fmu):
             turning = instance.get([f"omega_dot[{i}]" for i in (1, 2, 3)])
             warn_of_rotation(f"this point of {fmu.name}", turning)
-    jacobian = np.array(columns, float).reshape(len(known), len(unknown)).T
+    jacobian = np.frombuffer(columns).reshape(len(known), len(unknown)).T
     n = len(states)
     A, B, C, D = jacobian[:n, :n], jacobian[:n, n:], jacobian[n:, :n], jacobian[n:, n:]
     seen = np.ones(n, bool) if all_states else _seen(A, C)

@@ -193,6 +193,8 @@ class Loop:
     @property
     def _turned(self) -> dict[str, Wheel]:
         """Wheels whose torques are commands, by the names of their torques."""
+        if not self.wheels:
+            return {}
         commands = self.names[1]
         return {name: of for name, of in torque_names(self.wheels).items() if name in commands}
 

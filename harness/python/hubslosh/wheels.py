@@ -234,6 +234,7 @@ def histories(
     if problems:
         raise FmuError("; ".join(problems))
     assert time is not None
+    commanded = {name: values for name in named if (values := given[name]) is not None}
     rows = np.flatnonzero(np.diff(time) > 0)  # the intervals, between rows that are no jump
     # an interval ends early where a wheel reaches its largest speed
     edges, torques = [], []
@@ -242,7 +243,7 @@ def histories(
     for row in rows:
         begin, end = float(time[row]), float(time[row + 1])
         asked = {
-            name: float(np.clip(given[name][row], -wheel.max_torque, wheel.max_torque))
+            name: float(np.clip(commanded[name][row], -wheel.max_torque, wheel.max_torque))
             for name, wheel in named.items()
         }
         while begin < end:

@@ -23,7 +23,8 @@ def made(request: pytest.FixtureRequest, fmu: Path, tmp_path: Path) -> dict[str,
     program, model = option(request, "--hubslosh"), fmu.with_name("Spacecraft.fmu")
     of = hubslosh.MountedTank(SPHERE, (0.1, 0.5, -0.3), nu=9e-7)
     tanks = {f"tank {i}": of for i in range(4)}
-    craft = hubslosh.Craft(650.0, (95, 80, 90), (0, 0, 0), tanks, 44.0, (1, 2, 3), 0.05, model)
+    wheels = {f"wheel {i}": hubslosh.Wheel((i, 0, 1), 0.01, 0.2, 400, 50) for i in range(4)}
+    craft = hubslosh.Craft(650.0, (95, 80, 90), (0, 0, 0), tanks, 44.0, wheels, 0.05, model)
     fill = ("60%", "60%", "60%", "60%")
     gains = np.hstack([2 * np.eye(3), 40 * np.eye(3)])
     loop = craft.loop(gains, 0.1, fill, delay=0.15)
@@ -57,6 +58,7 @@ def made(request: pytest.FixtureRequest, fmu: Path, tmp_path: Path) -> dict[str,
         "Review": lambda: craft.review(gains, 0.1, [fill], damping="nominal"),
         "UncertainModel": lambda: craft.uncertain(fill, ranges),
         "Engine": lambda: hubslosh.Engine((0, 0, -1), (0, 0, 1), 400),
+        "Wheel": lambda: hubslosh.Wheel((0, 0, 1), 0.01, 0.2, 400, 50),
         "Appendage": lambda: hubslosh.Appendage((0, 1, 0), range(1, 7), np.ones((6, 6))),
         "Project": lambda: hubslosh.Project(craft, gains, {"period": 0.1}),
         "Certificate": lambda: craft.uncertain(fill, {"tank 0.zeta[1]": "5%"}).certify(loop, 0.1),
