@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 
 use hubslosh_tank::parameters::{self, ParameterSet, Target, Value};
 use hubslosh_tank::tank::Geometry;
-use hubslosh_tank::{Fill, ModalData, Problems, fill_table, picture};
+use hubslosh_tank::{Fill, ModalData, Problems, fill_table, finite_amplitude, picture};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -224,28 +224,32 @@ fn parameters_to_python(py: Python, set: ParameterSet) -> PyResult<Parameters> {
     Ok((found, set.warnings))
 }
 
-/// A tank to solve: the tank, its fill, the number of modes, and the liquid.
-pub type Question = (Py<Tank>, Amount, usize, Py<Liquid>);
+/// A tank to solve: the tank, its fill, the number of modes, the liquid, and true for the coefficients of large waves.
+pub type Question = (Py<Tank>, Amount, usize, Py<Liquid>, bool);
 
-/// Solve several tanks, each given as a tuple (tank, fill, modes, liquid), on all cores. Return for each tuple the result, or the
-/// FmuError that it caused.
+/// Solve several tanks, each given as a tuple (tank, fill, modes, liquid, large_waves), on all cores. Return for each tuple the
+/// result, or the FmuError that it caused.
 #[pyfunction]
 pub fn solve(py: Python, questions: Vec<Question>) -> PyResult<Vec<Py<PyAny>>> {
     let mut asked = Vec::with_capacity(questions.len());
-    for (tank, fill, modes, liquid) in questions {
-        asked.push((tank, fill.fill(), modes, *liquid.get()));
+    for (tank, fill, modes, liquid, large_waves) in questions {
+        asked.push((tank, fill.fill(), modes, *liquid.get(), large_waves));
     }
     let questions = Arc::new(asked);
     let theirs = questions.clone();
     let found = in_threads(py, questions.len(), move |i| {
-        let (tank, fill, modes, liquid) = &theirs[i];
+        let (tank, fill, modes, liquid, large_waves) = &theirs[i];
         let (of, fill) = (tank.get(), fill.as_ref().ok()?);
-        Some(parameters::solve(&of.tank, *fill, *modes, liquid.0))
+        let mut found = parameters::solve(&of.tank, *fill, *modes, liquid.0);
+        if let (Ok(data), true) = (&mut found, large_waves) {
+            finite_amplitude::add_large_waves(&of.tank, data);
+        }
+        Some(found)
     })?;
     found
         .into_iter()
         .zip(&*questions)
-        .map(|(found, (tank, fill, _, liquid))| match (found, fill) {
+        .map(|(found, (tank, fill, _, liquid, _))| match (found, fill) {
             (Some(Ok(data)), _) => {
                 let solved = Solved { tank: tank.clone_ref(py), data, liquid: *liquid };
                 Ok(Py::new(py, solved)?.into_any())

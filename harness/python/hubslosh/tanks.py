@@ -252,6 +252,7 @@ class TankCase:
     contact_angle: float | None
     spin: float | None = None
     """rad/s."""
+    large_waves: bool = False
 
 
 def read_drawing(source: "dict[str, Any] | Path") -> Any:
@@ -276,7 +277,7 @@ def solve(
     drawings = drawings or [read_drawing(case.source) for case in cases]
     found = native.solve(
         [
-            (tank, case.fill, case.modes, _liquid(case))
+            (tank, case.fill, case.modes, _liquid(case), case.large_waves)
             for case, tank in zip(cases, drawings, strict=True)
         ]
     )
@@ -308,6 +309,7 @@ def tank(
     sigma: float | None = None,
     contact_angle: float | None = None,
     spin: float | None = None,
+    large_waves: bool = False,
 ) -> Tank:
     """Find the slosh modes of a tank that is a body of revolution or a box.
 
@@ -337,6 +339,10 @@ def tank(
     spin : float, optional
         Rate at which tank and liquid turn about the tank's axis, rad/s. `Tank.parameters` of
         SloshTank and Spacecraft then have the liquid's spin.
+    large_waves : bool
+        If true, compute from fully nonlinear potential flow, in about 10 s, the coefficients that
+        give the mass of mode 1 the energy of large waves. If false, only spheres and upright
+        cylinders have them, from tables, at the fills of the tables.
 
     Returns
     -------
@@ -370,8 +376,9 @@ def tank(
         raise FmuError(f"modes must be a whole number from 1 on, not {modes!r}")
     amount = (float(fill_mass), "kg") if fill_mass is not None else fill
     case = TankCase(
-        _tank_source(source), amount, int(modes), gravity, nu, sigma, contact_angle, spin
-    )
+        _tank_source(source), amount, int(modes), gravity, nu, sigma, contact_angle, spin,
+        large_waves,
+    )  # fmt: skip
     (found,) = solve([case])
     if isinstance(found, FmuError):
         raise found

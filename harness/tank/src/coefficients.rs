@@ -49,8 +49,8 @@ pub struct Coefficients {
 
 /// Coefficients of a mode with the wave's energy (`formulas::energy_terms`), in place of the coefficients of the third
 /// order: s, kappa, s_2, kappa_2, t and t_2 under the names of the FMUs. `angle_limit` is the angle above which the mode is
-/// out of range, rad, and `frequency_limit` the angle up to which the frequency was compared with potential flow, with
-/// errors below 0.11 %.
+/// out of range, rad, and `frequency_limit` the angle up to which the slosh mass was compared with potential flow: there
+/// its frequency, planar and rotary, and its energy in planar motion have at most these relative errors.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Energy {
     pub nonlinear_inertia: f64,
@@ -61,6 +61,29 @@ pub struct Energy {
     pub rotary_inertia_2: f64,
     pub angle_limit: f64,
     pub frequency_limit: f64,
+    pub frequency_error: f64,
+    pub energy_error: f64,
+    pub source: EnergySource,
+}
+
+/// Source of the coefficients that give the wave's energy, each by fully nonlinear potential flow.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum EnergySource {
+    CylinderTable,
+    SphereTable,
+    /// Computed for this tank and fill (`finite_amplitude::add_large_waves`).
+    ThisTank,
+}
+
+impl EnergySource {
+    pub fn words(self) -> &'static str {
+        match self {
+            EnergySource::CylinderTable => "upright cylinders",
+            EnergySource::SphereTable => "spheres",
+            EnergySource::ThisTank => "this tank",
+        }
+    }
 }
 
 /// Source of the angle at which a mode is out of range.

@@ -58,16 +58,17 @@ pub(crate) struct Waves {
     pub excited: Vec<([usize; 2], f64)>,
 }
 
-struct Fields {
-    u: DMatrix<f64>,
-    r: DMatrix<f64>,
-    z: DMatrix<f64>,
-    rz: DMatrix<f64>,
-    zz: DMatrix<f64>,
+pub(crate) struct Fields {
+    pub u: DMatrix<f64>,
+    pub r: DMatrix<f64>,
+    pub z: DMatrix<f64>,
+    pub rz: DMatrix<f64>,
+    pub zz: DMatrix<f64>,
 }
 
 impl Fields {
-    fn new(m: usize, degree: usize, scale: f64, points: &[[f64; 2]]) -> Fields {
+    /// Computes u_n = s^-n |x|^n P_n^m at the points (r, z), for n from m (from 1 for m = 0) to `degree`.
+    pub fn new(m: usize, degree: usize, scale: f64, points: &[[f64; 2]]) -> Fields {
         let first = m.max(1);
         let count = degree + 1 - first;
         let zero = || DMatrix::zeros(points.len(), count);
@@ -101,7 +102,7 @@ impl Fields {
         fields
     }
 
-    fn times(&self, e: &DMatrix<f64>) -> Fields {
+    pub fn times(&self, e: &DMatrix<f64>) -> Fields {
         Fields {
             u: &self.u * e,
             r: &self.r * e,
@@ -121,17 +122,17 @@ struct Boundary {
 /// The liquid at rest, over the radius of the surface, z from the surface. The harmonics are centred half way
 /// to the bottom, and `wall` holds the slope and the curvature of the wall at the contact line, dR/dz and
 /// d^2R/dz^2.
-struct Liquid {
+pub(crate) struct Liquid {
     boundary: Boundary,
-    centre: f64,
-    size: f64,
+    pub centre: f64,
+    pub size: f64,
     wall: [f64; 2],
-    rho: Vec<f64>,
+    pub rho: Vec<f64>,
     weights: Vec<f64>,
 }
 
 impl Liquid {
-    fn new(wall: &Wall, degree: usize) -> Option<Liquid> {
+    pub fn new(wall: &Wall, degree: usize) -> Option<Liquid> {
         let radius = wall.r_outer;
         if wall.r_inner > 0.0 || radius <= 0.0 {
             return None;
@@ -203,12 +204,12 @@ impl Liquid {
         Some(Liquid { boundary, centre, size, wall: [inclination(last.to), bend], rho, weights })
     }
 
-    fn integral(&self, f: impl Fn(usize) -> f64) -> f64 {
+    pub fn integral(&self, f: impl Fn(usize) -> f64) -> f64 {
         self.weights.iter().enumerate().map(|(i, w)| w * f(i)).sum()
     }
 
     /// Returns harmonics whose kinetic energies are orthonormal, by the boundary integral of u du/dn.
-    fn harmonics(&self, m: usize, degree: usize) -> Harmonics {
+    pub fn harmonics(&self, m: usize, degree: usize) -> Harmonics {
         let Boundary { points, normals, weights } = &self.boundary;
         let fields = Fields::new(m, degree, self.size, points);
         let mut flux = fields.u.clone();
@@ -235,7 +236,7 @@ impl Liquid {
     }
 
     /// Returns orthonormal polynomials at the surface's points, and at the wall in a last row.
-    fn elevations(&self, m: usize, count: usize) -> DMatrix<f64> {
+    pub fn elevations(&self, m: usize, count: usize) -> DMatrix<f64> {
         let mut all = DMatrix::zeros(self.rho.len() + 1, count);
         for (i, rho) in self.rho.iter().chain(&[1.0]).enumerate() {
             for (j, (f, _)) in circle_basis(m as f64, rho * rho, count, 1.0).into_iter().enumerate()
@@ -246,7 +247,8 @@ impl Liquid {
         all
     }
 
-    fn coupling(&self, f: &DMatrix<f64>, u: &DMatrix<f64>) -> DMatrix<f64> {
+    /// Returns the integrals int f_i u_k rho drho over the surface.
+    pub fn coupling(&self, f: &DMatrix<f64>, u: &DMatrix<f64>) -> DMatrix<f64> {
         DMatrix::from_fn(f.ncols(), u.ncols(), |i, k| self.integral(|q| f[(q, i)] * u[(q, k)]))
     }
 }
@@ -341,10 +343,9 @@ impl Second {
 
 /// Combinations e of harmonics, one a column, with orthonormal kinetic energies, and their values at the
 /// surface.
-struct Harmonics {
-    #[cfg_attr(not(test), allow(dead_code))]
-    e: DMatrix<f64>,
-    surface: Fields,
+pub(crate) struct Harmonics {
+    pub e: DMatrix<f64>,
+    pub surface: Fields,
 }
 
 /// Computes the waves with solid harmonics up to `degree`. The slope of the lines grows with the power

@@ -12,16 +12,19 @@
 
 use core::f64::consts::PI;
 
-use formulas::energy_terms::energy_terms;
+use formulas::energy_terms::{EnergyTerms, energy_terms};
 use formulas::limits;
 use formulas::third_order::{BRIDGED, coefficients};
 
-use crate::coefficients::{Coefficients, Energy, FiniteAmplitude, LimitSource};
-use crate::contour::Wall;
+use crate::coefficients::{Coefficients, Energy, EnergySource, FiniteAmplitude, LimitSource};
+use crate::contour::{Contour, Wall};
 use crate::contour_waves;
 use crate::curve::Point;
+use crate::large_waves;
 use crate::modal::ModalData;
-use crate::tank::{Geometry, Tank};
+use crate::shape;
+use crate::sphere_waves;
+use crate::tank::{Geometry, Shape, Tank};
 use crate::third_order::{DETUNING, Overlaps};
 
 const WORST: f64 = 0.05;
@@ -41,6 +44,12 @@ const MOST_ANGLE: f64 = 30.0 * PI / 180.0;
 const ESTIMATED_SHARE: f64 = 0.24;
 /// Largest second-order wave at the wall, over the first-order wave, for which the third order holds.
 const STEEPEST: f64 = 0.5;
+
+/// Largest relative error of the frequency of a slosh mass with the wave's energy.
+const LARGEST_FREQUENCY_ERROR: f64 = 3e-3;
+/// Largest difference of the shifts of omega^2 of the smallest waves from the third order's: over 10 degrees it changes the frequency by
+/// 0.03 %.
+const LARGEST_SHIFT_ERROR: f64 = 0.02;
 
 const ASSUMED: &str = "without them the FMUs take a pendulum (s = kappa = 1: omega^2 shifts by -0.125 A^2 in planar and by \
     +0.5 A^2 in circular motion). That is an assumption: a deep upright cylinder has -0.45 A^2 and +0.36 A^2";
@@ -106,7 +115,7 @@ impl Coefficients {
             angle_limit_from: LimitSource::PotentialFlow,
             frequency_limit: Some(limit.frequency),
             swirl_limit: limits::swirl_fold(fill),
-            energy: energy(fill),
+            energy: cylinder_energy(fill),
             ..known
         }
     }
@@ -119,19 +128,103 @@ impl Coefficients {
     }
 }
 
-fn energy(fill: f64) -> Option<Energy> {
+impl Energy {
+    /// Combines the coefficients with their relative errors of frequency and energy and the angle, rad, above which the mode is
+    /// out of range.
+    fn new(
+        known: &EnergyTerms,
+        [frequency_error, energy_error]: [f64; 2],
+        angle_limit: f64,
+        source: EnergySource,
+    ) -> Energy {
+        let ([s, kappa], [s_2, kappa_2], [t, t_2]) = (known.pair, known.next, known.rotary);
+        Energy {
+            nonlinear_inertia: s,
+            nonlinear_stiffness: kappa,
+            nonlinear_inertia_2: s_2,
+            nonlinear_stiffness_2: kappa_2,
+            rotary_inertia: t,
+            rotary_inertia_2: t_2,
+            angle_limit: angle_limit.min(known.compared),
+            frequency_limit: known.compared,
+            frequency_error,
+            energy_error,
+            source,
+        }
+    }
+}
+
+fn cylinder_energy(fill: f64) -> Option<Energy> {
     let (known, limit) = (energy_terms(fill)?, limits::cylinder_with_energy(fill)?);
-    let ([s, kappa], [s_2, kappa_2], [t, t_2]) = (known.pair, known.next, known.rotary);
-    Some(Energy {
-        nonlinear_inertia: s,
-        nonlinear_stiffness: kappa,
-        nonlinear_inertia_2: s_2,
-        nonlinear_stiffness_2: kappa_2,
-        rotary_inertia: t,
-        rotary_inertia_2: t_2,
-        angle_limit: limit.forced,
-        frequency_limit: limit.frequency,
-    })
+    let errors = [1.1e-3, if fill < 0.35 { 1.1e-2 } else { 1e-3 }];
+    Some(Energy::new(&known, errors, limit.forced, EnergySource::CylinderTable))
+}
+
+/// Returns the radius of a tank that is a sphere; `None` for other contours.
+fn sphere_radius(contour: &Contour, wall: &Wall, depth: f64) -> Option<f64> {
+    let Shape::Sphere { radius } = shape::recognise(wall, depth)?.shape else { return None };
+    let centre = wall.z_surface - depth + radius;
+    let is_on = |[r, z]: Point| (r.hypot(z - centre) - radius).abs() < SAME * radius;
+    let mut points = contour
+        .segments()
+        .iter()
+        .flat_map(|part| (0..=32).map(|i| part.point_at(f64::from(i) / 32.0)));
+    points.all(is_on).then_some(radius)
+}
+
+/// Computes the coefficients that give the wave's energy from fully nonlinear potential flow in this tank at this fill, if
+/// they are not known from the tables of upright cylinders and spheres, and adds them to `data`, which was solved with its
+/// coefficients of the third order. If that is not possible, a warning says why. The computation takes about 10 s.
+pub fn add_large_waves(tank: &Tank, data: &mut ModalData) {
+    let Some(mut found) = data.finite_amplitude.clone() else { return };
+    match &mut found.mode {
+        Some(known) if known.energy.is_some() => {}
+        Some(known) => match large_waves(tank, data, known) {
+            Ok(energy) => known.energy = Some(energy),
+            Err(why) => found.warnings.push(format!("finite amplitude: {LEFT_OUT} {why}")),
+        },
+        None => found.warnings.push(format!(
+            "finite amplitude: {LEFT_OUT} s and kappa of the third order are not known"
+        )),
+    }
+    data.finite_amplitude = Some(found);
+}
+
+const LEFT_OUT: &str = "the coefficients that give the wave's energy are left out, because";
+
+fn large_waves(tank: &Tank, data: &ModalData, third: &Coefficients) -> Result<Energy, String> {
+    let (Geometry::Revolution { contour, .. }, Some(wall)) = (&tank.geometry, &data.wall) else {
+        return Err("the tank is not a body of revolution".to_string());
+    };
+    if wall.r_inner > 0.0 {
+        return Err("the liquid is a ring".to_string());
+    }
+    let fit = large_waves::Side::new(contour, wall).and_then(|side| large_waves::fit(wall, &side));
+    let fit = fit.ok_or_else(|| {
+        format!(
+            "periodic waves up to {:.0} degrees were not found: the wall has a corner near the surface, or modes of the surface have              multiples of the frequency of mode 1",
+            large_waves::LEAST.to_degrees()
+        )
+    })?;
+    // The third order is known by another method.
+    let exact = [third.planar, third.circular.unwrap_or(fit.shifts[1])];
+    let off = (0..2).map(|i| (fit.shifts[i] - exact[i]).abs()).fold(0.0, f64::max);
+    if off > LARGEST_SHIFT_ERROR {
+        return Err(format!(
+            "the shift of omega^2 of small waves, over the square of the slosh angle, differs by {off:.2} from that of the third order \
+             (allowed: {LARGEST_SHIFT_ERROR}): deep liquid and strong resonances need more functions"
+        ));
+    }
+    let [planar, rotary, energy] = fit.errors;
+    if planar.max(rotary) > LARGEST_FREQUENCY_ERROR {
+        return Err(format!(
+            "no slosh mass has the frequencies of the waves within {:.1} %: the best one errs by {:.1} %",
+            100.0 * LARGEST_FREQUENCY_ERROR,
+            100.0 * planar.max(rotary)
+        ));
+    }
+    let errors = [planar.max(rotary), energy];
+    Ok(Energy::new(&fit.terms, errors, third.angle_limit, EnergySource::ThisTank))
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -179,7 +272,20 @@ pub fn amplitude_dependence(tank: &Tank, data: &ModalData) -> FiniteAmplitude {
                     }
                 }
                 (None, Some(wall)) => {
-                    contour_coefficients(wall, mode.wave, mode.lambda, &mut warnings)
+                    let known = contour_coefficients(wall, mode.wave, mode.lambda, &mut warnings);
+                    let radius = match &tank.geometry {
+                        Geometry::Revolution { contour, .. } => sphere_radius(contour, wall, depth),
+                        Geometry::Box { .. } => None,
+                    };
+                    let terms =
+                        radius.and_then(|radius| sphere_waves::energy_terms(depth / radius));
+                    known.map(|known| Coefficients {
+                        energy: terms.map(|terms| {
+                            let (limit, errors) = (known.angle_limit, sphere_waves::ERRORS);
+                            Energy::new(&terms, errors, limit, EnergySource::SphereTable)
+                        }),
+                        ..known
+                    })
                 }
                 (None, None) => None,
             };

@@ -10,8 +10,8 @@
 //! * [`sweep`]: tables over the fill and their [`interpolation`]
 //! * [`fill_table`]: such tables for FMUs whose tanks drain
 //! * [`table()`], [`picture`]: to read and to look at; [`parameters`]: files for the FMUs
-//! * [`damping`], [`low_gravity`], [`third_order`], [`spin`]: effects beyond the modal parameters;
-//!   `shape`: recognises measured shapes
+//! * [`damping`], [`low_gravity`], [`third_order`], [`finite_amplitude`], [`spin`]: effects beyond the modal parameters;
+//!   `contour_waves`, `large_waves`, `sphere_waves`: waves of finite amplitude; `shape`: recognises measured shapes
 
 pub mod closed_form;
 pub mod coefficients;
@@ -24,6 +24,7 @@ pub mod fill_table;
 pub mod finite_amplitude;
 mod gauss;
 pub mod interpolation;
+mod large_waves;
 pub mod low_gravity;
 pub mod modal;
 mod panel;
@@ -32,6 +33,7 @@ pub mod picture;
 mod potential_flow;
 mod ring;
 mod shape;
+mod sphere_waves;
 pub mod spin;
 mod spline;
 mod svg;

@@ -485,8 +485,12 @@ impl ParameterSet {
         for (n, known) in &third_order {
             if let Some(energy) = known.energy.filter(|_| has_energy) {
                 notes.push(format!(
-                    "nonlinear_inertia[{n}] to rotary_inertia_2[{n}]: fully nonlinear potential flow in upright cylinders, frequency and \
-                     energy of the wave, for slosh angles up to {:.1} degrees (angle_limit)",
+                    "nonlinear_inertia[{n}] to rotary_inertia_2[{n}]: fully nonlinear potential flow in {}, frequency (error {:.0e}) and \
+                     energy (error {:.0e}) of the wave up to {:.1} degrees; angle_limit is {:.1} degrees",
+                    energy.source.words(),
+                    energy.frequency_error,
+                    energy.energy_error,
+                    energy.frequency_limit.to_degrees(),
                     energy.angle_limit.to_degrees()
                 ));
                 continue;

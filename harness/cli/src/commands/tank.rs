@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::{Context, Result, bail, ensure};
 use files::output;
 use hubslosh_tank::parameters::{self, Liquid, ParameterSet, Target};
-use hubslosh_tank::{Fill, Problems, Tank, fill_table, picture, sweep, table};
+use hubslosh_tank::{Fill, Problems, Tank, fill_table, finite_amplitude, picture, sweep, table};
 
 use crate::terminal;
 
@@ -23,6 +23,7 @@ use crate::terminal;
     hubslosh tank harness/tank/examples/bench.toml --fill 0.1 --modes 1 --gravity 0.5 --sigma 0.073 \\\n          \
     --contact-angle 5 --parameters coast.toml\n  \
     hubslosh tank harness/tank/examples/bench.toml --fill 0.1 --spin 3 --gravity 5\n  \
+    hubslosh tank tank.toml --fill 1.2 --large-waves --model SloshTank --parameters tank-1.2.toml\n  \
     hubslosh run --set-file tank-1.2.toml --profile exp-sweep:amplitude=0.1 --out sweep.parquet\n\n\
     The format of TANK.toml is described in harness/tank/README.md.")]
 pub struct TankArgs {
@@ -85,6 +86,11 @@ pub struct TankArgs {
     /// axis is --gravity.
     #[arg(long, value_name = "NUMBER", conflicts_with = "sweep")]
     spin: Option<f64>,
+    /// Computes the coefficients that give the mass of the first mode the energy of large waves, from fully nonlinear potential
+    /// flow in this tank, in about 10 s. Without this option only spheres and upright cylinders have them, from tables, at the
+    /// fills of the tables. SloshTank and Spacecraft take them.
+    #[arg(long, conflicts_with = "sweep")]
+    large_waves: bool,
     /// Writes the file of --parameters even if a centring stiffness (by surface tension) is far outside the range of its
     /// formula.
     #[arg(long, requires = "parameters")]
@@ -124,7 +130,10 @@ impl TankArgs {
         let (text, json, picture, as_table) = match self.fill.or(self.fill_mass.map(Fill::Mass)) {
             Some(fill) => {
                 let data = parameters::solve(&tank, fill, self.modes, self.liquid());
-                let data = data.with_context(read)?;
+                let mut data = data.with_context(read)?;
+                if self.large_waves {
+                    finite_amplitude::add_large_waves(&tank, &mut data);
+                }
                 // The table is for a given surface tension, and `--parameters` has its own warning.
                 let has_table = !(self.json || self.out.is_some()) && data.capillarity.is_some();
                 if self.parameters.is_none() && !has_table {

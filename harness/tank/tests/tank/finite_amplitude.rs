@@ -1,13 +1,15 @@
 //! Coefficients of the first mode at finite amplitude.
 
 use formulas::energy_terms::energy_terms;
-use hubslosh_tank::coefficients::{Coefficients, FiniteAmplitude, LimitSource};
+use hubslosh_tank::coefficients::{Coefficients, EnergySource, FiniteAmplitude, LimitSource};
 use hubslosh_tank::fill_table;
-use hubslosh_tank::finite_amplitude::amplitude_dependence;
+use hubslosh_tank::finite_amplitude::{add_large_waves, amplitude_dependence};
 use hubslosh_tank::interpolation::Monotone;
-use hubslosh_tank::parameters::{Liquid, ParameterSet, Target, Value, surface_tension_warnings};
+use hubslosh_tank::parameters::{
+    self, Liquid, ParameterSet, Target, Value, surface_tension_warnings,
+};
 use hubslosh_tank::sweep::sweep;
-use hubslosh_tank::{Tank, table};
+use hubslosh_tank::{Fill, Tank, table};
 
 use crate::common::tank;
 
@@ -210,7 +212,8 @@ fn files_have_the_energy_terms_where_they_are_known() {
                 ("rotary_inertia_2", t_2),
             ];
             assert_eq!(found, expected.map(|(what, x)| (format!("{prefix}.{what}[1]"), x)));
-            assert!(set.notes.iter().any(|note| note.contains("frequency and energy")));
+            let source = "potential flow in upright cylinders, frequency";
+            assert!(set.notes.iter().any(|note| note.contains(source)), "{:?}", set.notes);
         }
     }
     let swept = sweep(&cylinder, &[0.03, 0.05, 0.06], 1).unwrap();
@@ -221,6 +224,63 @@ fn files_have_the_energy_terms_where_they_are_known() {
     let limits = [1, 2, 3].map(|i| format!("tank.fill.angle_limit[1,{i}]"));
     let all: Vec<_> = set.values.iter().filter(|(name, _)| limits.contains(name)).collect();
     assert!(matches!(all[1].1, Value::Real(x) if (x.to_degrees() - 6.5).abs() < 0.01), "{all:?}");
+}
+
+/// Spheres have the coefficients that give the wave's energy from a table. Their frequency is that of the third order in
+/// small waves, which another method computes.
+#[test]
+fn spheres_have_the_energy_terms_at_the_fills_of_their_table() {
+    let sphere = tank("density = 1000.0\nshape = { sphere = { radius = 0.4 } }");
+    let at = |fill: f64| {
+        amplitude_dependence(&sphere, &sphere.solve(fill * 0.4, 1).unwrap()).mode.unwrap()
+    };
+    for fill in [0.12, 0.25, 0.55, 0.9, 1.04] {
+        let (known, energy) = (at(fill), at(fill).energy.unwrap());
+        assert_eq!(energy.source, EnergySource::SphereTable);
+        let planar = 0.375 * energy.nonlinear_stiffness - 0.5 * energy.nonlinear_inertia;
+        let circular = 0.5 * energy.nonlinear_stiffness - 2.0 * energy.rotary_inertia;
+        assert!((planar - known.planar).abs() < 0.03, "{fill}: {planar} {}", known.planar);
+        let third = known.circular.unwrap();
+        assert!((circular - third).abs() < 0.05, "{fill}: {circular} {third}");
+        assert!(energy.angle_limit <= known.angle_limit, "{fill}");
+        assert!(energy.frequency_limit >= energy.angle_limit, "{fill}");
+    }
+    assert!([0.09, 1.08].iter().all(|fill| at(*fill).energy.is_none()));
+    // A capsule is a sphere up to its joint, but its waves are not those of a sphere.
+    let capsule = tank(include_str!("../../examples/capsule.toml"));
+    let data = capsule.solve(0.3, 1).unwrap();
+    assert!(amplitude_dependence(&capsule, &data).mode.is_none_or(|known| known.energy.is_none()));
+}
+
+/// In a tank without a table the coefficients are computed if they are requested; if that is not possible, a warning says why.
+#[test]
+fn large_waves_are_computed_for_a_cone_and_refused_for_a_ring_with_a_reason() {
+    let solved = |text: &str, fill: f64| {
+        let tank = tank(text);
+        let mut data = parameters::solve(&tank, Fill::Height(fill), 1, WATER).unwrap();
+        add_large_waves(&tank, &mut data);
+        data.finite_amplitude.unwrap()
+    };
+    let cone = "density = 1000.0\nshape = { cone = { half_angle = 45, height = 1.0 } }";
+    let found = solved(cone, 0.5);
+    let known = found.mode.unwrap();
+    let energy = known.energy.unwrap_or_else(|| panic!("{found:?}"));
+    assert_eq!(energy.source, EnergySource::ThisTank);
+    assert!(energy.frequency_error < 3e-3 && energy.energy_error < 1e-2, "{energy:?}");
+    let planar = 0.375 * energy.nonlinear_stiffness - 0.5 * energy.nonlinear_inertia;
+    assert!((planar - known.planar).abs() < 0.03, "{planar} {}", known.planar);
+    for (text, fill, why) in [
+        ("density = 1000.0\nbox = [0.8, 0.5]", 0.4, "the tank is not a body of revolution"),
+        (
+            "density = 1000.0\nshape = { torus = { ring_radius = 1.0, tube_radius = 0.3 } }",
+            0.3,
+            "s and kappa of the third order are not known",
+        ),
+    ] {
+        let found = solved(text, fill);
+        let said = found.warnings.iter().filter(|warning| warning.contains(why)).count();
+        assert!(said == 1 && found.mode.is_none_or(|known| known.energy.is_none()), "{found:?}");
+    }
 }
 
 /// If no surface tension is given, a tank whose Bond number may be below 100 gets a warning. With 1000 kg/m3,

@@ -1,0 +1,1083 @@
+//! Periodic waves of large amplitude in a body of revolution: fully nonlinear potential flow.
+//!
+//! The surface and the coordinates are those of `contour_waves.rs`, and Luke's functional is the same, but it is not
+//! expanded in the amplitude: the integrals over the liquid run along the lines up to the surface. With the phase
+//! tau = omega t, lengths over the radius of the surface and g = 1,
+//!
+//! ```text
+//! L = < int [omega zeta_tau phi w - int_0^zeta w (|grad phi|^2/2 + z) dz] rho drho > - < int_Q0 |grad phi|^2 dV >/2
+//! planar     zeta = sum Z f(rho) cos(m theta) cos(k tau),  phi = sum C u(r, z) cos(m theta) sin(k tau),  m + k even
+//! circular   zeta = sum Z f(rho) cos(m (tau - theta)),     phi = sum C u(r, z) sin(m (tau - theta))
+//! ```
+//!
+//! where < > is the mean over theta and tau, and phi and w are taken at the surface. L is stationary in Z and C, with the
+//! volume as a constraint. Newton's method finds the wave and its frequency for a given part of the first mode.
+
+use core::f64::consts::PI;
+use std::thread;
+
+use formulas::energy_terms::EnergyTerms;
+use nalgebra::{DMatrix, DVector};
+
+use crate::contour::{Contour, Wall};
+use crate::contour_waves::{Fields, Liquid};
+use crate::curve::{Curve, Segment};
+use crate::gauss::Gauss;
+
+/// A periodic wave: `angle` is the slosh angle, rad, whose sine is m_liq x_cm/(m_1 l) with the largest distance
+/// x_cm of the liquid's centre of mass from the axis; `frequency` is relative to small waves; `rise` is the
+/// height of the centre of mass at the phase 0 above its height at rest, m_liq z_cm/(m_1 l). Planar motion rests then.
+#[derive(Clone, Copy, Debug)]
+struct LargeWave {
+    angle: f64,
+    frequency: f64,
+    rise: f64,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Motion {
+    Planar,
+    Circular,
+}
+
+/// Numbers of the approximation: degree of the solid harmonics, number of polynomials of the elevation for each
+/// azimuthal number, and largest azimuthal number and multiple of the frequency.
+#[derive(Clone, Copy, Debug)]
+struct Resolution {
+    degree: usize,
+    polynomials: usize,
+    order: usize,
+}
+
+/// Number of Gauss points between the surface at rest and the wave.
+const DEPTHS: usize = 4;
+/// Largest number of Newton's steps for a wave.
+const STEPS: usize = 12;
+/// Largest change of the unknowns, relative to the amplitude, with which a wave has converged.
+const CONVERGED: f64 = 1e-9;
+/// Part of the height of the side, above and below the contact line, that a wave may take.
+const ROOM: f64 = 0.8;
+/// Largest sine of the angle between two segments of a side.
+const SMOOTH: f64 = 1e-3;
+
+/// The wall near the surface as a function of the height: its radius over that of the surface at rest. It goes up and down
+/// from the contact line as far as the wall is smooth and rises, between the heights `low` and `high` from the surface.
+pub(crate) struct Side {
+    pieces: Vec<Piece>,
+    radius: f64,
+    surface: f64,
+    low: f64,
+    high: f64,
+}
+
+/// A part of the wall that rises from `z[0]` to `z[1]`, m, while the parameter of its curve goes from `t[0]` to `t[1]`.
+struct Piece {
+    curve: Curve,
+    t: [f64; 2],
+    z: [f64; 2],
+}
+
+impl Piece {
+    /// Returns the part of a segment from the parameter `start` on towards `end` in which the height changes in the
+    /// direction `sign`; its ends are in the order of their heights. `None` if the height does not change.
+    fn new(curve: Curve, start: f64, end: f64, sign: f64) -> Option<Piece> {
+        let count = 64;
+        let place = |i: usize| start + (end - start) * i as f64 / count as f64;
+        let height = |i: usize| sign * curve.point_at(place(i))[1];
+        let last = (1..=count).take_while(|&i| height(i) > height(i - 1)).last()?;
+        let t = if sign > 0.0 { [start, place(last)] } else { [place(last), start] };
+        Some(Piece { curve, t, z: t.map(|t| curve.point_at(t)[1]) })
+    }
+
+    /// Returns the curve's parameter at the height `z`, m, by Newton's method between bounds.
+    fn parameter(&self, z: f64) -> f64 {
+        let [mut low, mut high] = self.t;
+        let mut t = low + (high - low) * (z - self.z[0]) / (self.z[1] - self.z[0]);
+        for _ in 0..60 {
+            let off = self.curve.point_at(t)[1] - z;
+            if off > 0.0 {
+                high = t;
+            } else {
+                low = t;
+            }
+            let next = t - off / self.curve.slope(t)[1];
+            let inside = (low.min(high)..=low.max(high)).contains(&next);
+            let next = if inside { next } else { 0.5 * (low + high) };
+            if (next - t).abs() < 1e-15 * (1.0 + t.abs()) {
+                return next;
+            }
+            t = next;
+        }
+        t
+    }
+}
+
+impl Side {
+    /// Returns the side of a tank's `contour` at the contact line of `wall`.
+    pub fn new(contour: &Contour, wall: &Wall) -> Option<Side> {
+        let segments = contour.segments();
+        let contact = wall.segments.last()?;
+        let is_within = |t: f64, segment: &Segment| {
+            let (a, b) = (segment.from.min(segment.to), segment.from.max(segment.to));
+            (a..=b).contains(&t)
+        };
+        // At a joint the segment above the contact line counts.
+        let first = segments
+            .iter()
+            .rposition(|part| part.curve == contact.curve && is_within(contact.to, part))?;
+        let is_smooth = |a: &Segment, b: &Segment| {
+            let ([r, z], [r_1, z_1]) = (a.tangent(1.0), b.tangent(0.0));
+            (r * z_1 - z * r_1).abs() < SMOOTH
+        };
+        let mut pieces = Vec::new();
+        let below = segments[..=first].iter().rev();
+        let mut before: Option<&Segment> = None;
+        for segment in below {
+            if before.is_some_and(|after| !is_smooth(segment, after)) {
+                break;
+            }
+            let start = if before.is_none() { contact.to } else { segment.to };
+            if start != segment.from {
+                let Some(piece) = Piece::new(segment.curve, start, segment.from, -1.0) else {
+                    break;
+                };
+                pieces.insert(0, piece);
+            }
+            before = Some(segment);
+        }
+        let mut before: Option<&Segment> = None;
+        for segment in &segments[first..] {
+            if before.is_some_and(|below| !is_smooth(below, segment)) {
+                break;
+            }
+            let start = if before.is_none() { contact.to } else { segment.from };
+            if start != segment.to {
+                let Some(piece) = Piece::new(segment.curve, start, segment.to, 1.0) else { break };
+                pieces.push(piece);
+            }
+            before = Some(segment);
+        }
+        let (radius, surface) = (wall.r_outer, wall.z_surface);
+        let [low, high] =
+            [pieces.first()?.z[0], pieces.last()?.z[1]].map(|z| ROOM * (z - surface) / radius);
+        (low < 0.0 && high > 0.0).then_some(Side { pieces, radius, surface, low, high })
+    }
+
+    /// Returns the radius of the wall at the height `z` above the surface at rest and its first two derivatives, or `None`
+    /// beyond the ends of the side.
+    fn at(&self, z: f64) -> Option<[f64; 3]> {
+        if !(self.low..=self.high).contains(&z) {
+            return None;
+        }
+        let height = self.surface + z * self.radius;
+        let piece = self.pieces.iter().find(|piece| height <= piece.z[1])?;
+        let t = piece.parameter(height);
+        let [d_r, d_z] = piece.curve.slope(t);
+        let step = 1e-4;
+        let inclination = |t: f64| {
+            let [r, z] = piece.curve.slope(t);
+            r / z
+        };
+        let bend =
+            (inclination(t + step) - inclination(t - step)) / (2.0 * step * d_z) * self.radius;
+        Some([piece.curve.point_at(t)[0] / self.radius, d_r / d_z, bend])
+    }
+}
+
+/// A product of functions of theta and tau: of an elevation and its derivative by tau, and of a potential and its
+/// derivative by theta.
+#[derive(Clone, Copy)]
+struct Term {
+    m: usize,
+    k: usize,
+    motion: Motion,
+}
+
+impl Term {
+    fn all(motion: Motion, order: usize) -> Vec<Term> {
+        match motion {
+            Motion::Circular => (0..=order).map(|m| Term { m, k: m, motion }).collect(),
+            Motion::Planar => (0..=order)
+                .flat_map(|m| (0..=order).map(move |k| Term { m, k, motion }))
+                .filter(|term| (term.m + term.k) % 2 == 0)
+                .collect(),
+        }
+    }
+
+    fn has_potential(self) -> bool {
+        self.k > 0
+    }
+
+    fn at(self, theta: f64, tau: f64) -> [f64; 4] {
+        let (m, k) = (self.m as f64, self.k as f64);
+        match self.motion {
+            Motion::Planar => {
+                let ((sin_h, cos_h), (sin_t, cos_t)) = ((m * theta).sin_cos(), (k * tau).sin_cos());
+                [cos_h * cos_t, -k * cos_h * sin_t, cos_h * sin_t, -m * sin_h * sin_t]
+            }
+            Motion::Circular => {
+                let (sin, cos) = (m * (tau - theta)).sin_cos();
+                [cos, -m * sin, sin, -m * cos]
+            }
+        }
+    }
+
+    /// Returns the mean square of the potential's function.
+    fn norm(self) -> f64 {
+        match self.motion {
+            Motion::Planar if self.m > 0 => 0.25,
+            _ => 0.5,
+        }
+    }
+}
+
+/// Points (rho, theta, tau) of the surface.
+struct Points {
+    rho: Vec<f64>,
+    weights: Vec<f64>,
+    angles: Vec<[f64; 2]>,
+}
+
+/// Values of the potential's functions at points, one function a column: u, u_r, u_z and u_theta/r.
+struct Potentials {
+    values: [DMatrix<f64>; 4],
+    /// Second derivatives of the sum of all functions and its derivatives by theta, at each point.
+    second: Vec<[f64; 6]>,
+}
+
+struct Solver<'a> {
+    liquid: Liquid,
+    side: &'a Side,
+    terms: Vec<Term>,
+    resolution: Resolution,
+    /// Combinations of harmonics with orthonormal energies, for each azimuthal number.
+    combinations: Vec<DMatrix<f64>>,
+    points: Points,
+    elevation: DMatrix<f64>,
+    rate: DMatrix<f64>,
+    /// First mode: elevation's coefficients, potential's coefficients, lambda, and int f rho^2 drho.
+    shape: DVector<f64>,
+    potential: DVector<f64>,
+    lambda: f64,
+    amplitude: f64,
+    line: Gauss,
+}
+
+impl<'a> Solver<'a> {
+    /// Prepares waves in the liquid above `wall`. Returns `None` for a liquid with a hole.
+    fn new(
+        wall: &Wall,
+        side: &'a Side,
+        motion: Motion,
+        resolution: Resolution,
+    ) -> Option<Solver<'a>> {
+        let Resolution { degree, polynomials, order } = resolution;
+        let liquid = Liquid::new(wall, degree)?;
+        let terms = Term::all(motion, order);
+        let first = liquid.harmonics(1, degree);
+        let f = liquid.elevations(1, polynomials);
+        let coupling = liquid.coupling(&f, &first.surface.u);
+        let eigen = (&coupling * coupling.transpose()).symmetric_eigen();
+        let best = eigen.eigenvalues.imax();
+        let mut shape = eigen.eigenvectors.column(best).into_owned();
+        let lambda = 1.0 / eigen.eigenvalues[best];
+        let row = &f * &shape;
+        let mut amplitude = liquid.integral(|q| row[q] * liquid.rho[q]);
+        if amplitude < 0.0 {
+            (shape, amplitude) = (-shape, -amplitude);
+        }
+        let potential = coupling.tr_mul(&shape);
+        let combinations = (0..=order).map(|m| liquid.harmonics(m, degree).e).collect();
+        let rule = Gauss::new(polynomials + 6);
+        let count = 2 * order + 2;
+        let half = |n: usize| PI * (n as f64 + 0.5) / count as f64;
+        let grid: Vec<[f64; 2]> = match motion {
+            // The wave at (pi - theta, pi - tau) is the same.
+            Motion::Planar => {
+                (0..count / 2).flat_map(|i| (0..count).map(move |j| [half(i), half(j)])).collect()
+            }
+            Motion::Circular => (0..count).map(|i| [-half(i), 0.0]).collect(),
+        };
+        let mut points = Points { rho: Vec::new(), weights: Vec::new(), angles: Vec::new() };
+        for angles in &grid {
+            for (rho, weight) in rule.nodes.iter().zip(&rule.weights) {
+                points.rho.push(*rho);
+                points.weights.push(weight * rho / grid.len() as f64);
+                points.angles.push(*angles);
+            }
+        }
+        let mut solver = Solver {
+            liquid,
+            side,
+            terms,
+            resolution,
+            combinations,
+            points,
+            elevation: DMatrix::zeros(0, 0),
+            rate: DMatrix::zeros(0, 0),
+            shape,
+            potential,
+            lambda,
+            amplitude,
+            line: Gauss::new(DEPTHS),
+        };
+        let [elevation, rate] = solver.elevations(&solver.points);
+        (solver.elevation, solver.rate) = (elevation, rate);
+        Some(solver)
+    }
+
+    fn elevations(&self, points: &Points) -> [DMatrix<f64>; 2] {
+        let count = self.resolution.polynomials;
+        let (rows, columns) = (points.rho.len(), count * self.terms.len());
+        let [mut value, mut rate] = [0, 1].map(|_| DMatrix::zeros(rows, columns));
+        for (i, (rho, [theta, tau])) in points.rho.iter().zip(&points.angles).enumerate() {
+            for (n, term) in self.terms.iter().enumerate() {
+                let [e, e_tau, ..] = term.at(*theta, *tau);
+                let basis = crate::third_order::circle_basis(term.m as f64, rho * rho, count, 1.0);
+                for (j, (f, _)) in basis.into_iter().enumerate() {
+                    value[(i, n * count + j)] = f * e;
+                    rate[(i, n * count + j)] = f * e_tau;
+                }
+            }
+        }
+        [value, rate]
+    }
+
+    /// Returns the number of the potential's coefficients of a term. The constant of m = 0 keeps the volume.
+    fn potentials_of(&self, term: Term) -> usize {
+        match term.has_potential() {
+            true => self.combinations[term.m].ncols() + usize::from(term.m == 0),
+            false => 0,
+        }
+    }
+
+    fn sizes(&self) -> [usize; 2] {
+        let potentials = self.terms.iter().map(|term| self.potentials_of(*term)).sum();
+        [self.resolution.polynomials * self.terms.len(), potentials]
+    }
+
+    /// Computes the potential's functions at the heights `z` on the lines of `points`, and with `c` the second derivatives
+    /// of their sum: zz, rz, rr, and the derivatives by theta of the sum, its z- and its r-derivative.
+    fn potentials(
+        &self,
+        points: &Points,
+        z: &[f64],
+        walls: &[[f64; 3]],
+        c: Option<&DVector<f64>>,
+    ) -> Potentials {
+        let [_, columns] = self.sizes();
+        let rows = points.rho.len();
+        let mut values = [0; 4].map(|_| DMatrix::zeros(rows, columns));
+        let mut second = vec![[0.0; 6]; if c.is_some() { rows } else { 0 }];
+        let at: Vec<[f64; 2]> =
+            (0..rows).map(|i| [points.rho[i] * walls[i][0], z[i] - self.liquid.centre]).collect();
+        let degree = self.resolution.degree;
+        let fields: Vec<Fields> = self
+            .combinations
+            .iter()
+            .enumerate()
+            .map(|(m, e)| Fields::new(m, degree, self.liquid.size, &at).times(e))
+            .collect();
+        let mut column = 0;
+        for term in self.terms.iter().filter(|term| term.has_potential()) {
+            let fields = &fields[term.m];
+            let functions: Vec<[f64; 2]> = points
+                .angles
+                .iter()
+                .map(|[theta, tau]| {
+                    let [.., s, s_theta] = term.at(*theta, *tau);
+                    [s, s_theta]
+                })
+                .collect();
+            if term.m == 0 {
+                for (i, [s, _]) in functions.iter().enumerate() {
+                    values[0][(i, column)] = *s;
+                }
+                column += 1;
+            }
+            for j in 0..fields.u.ncols() {
+                for (i, [s, s_theta]) in functions.iter().enumerate() {
+                    let r = at[i][0];
+                    values[0][(i, column)] = s * fields.u[(i, j)];
+                    values[1][(i, column)] = s * fields.r[(i, j)];
+                    values[2][(i, column)] = s * fields.z[(i, j)];
+                    values[3][(i, column)] = s_theta * fields.u[(i, j)] / r;
+                    if let Some(c) = c {
+                        let (zz, m) = (fields.zz[(i, j)], term.m as f64);
+                        let (u, u_r) = (fields.u[(i, j)], fields.r[(i, j)]);
+                        let rr = m * m * u / (r * r) - u_r / r - zz;
+                        let all = [
+                            s * zz,
+                            s * fields.rz[(i, j)],
+                            s * rr,
+                            s_theta * u,
+                            s_theta * fields.z[(i, j)],
+                            s_theta * u_r,
+                        ];
+                        for (sum, value) in second[i].iter_mut().zip(all) {
+                            *sum += c[column] * value;
+                        }
+                    }
+                }
+                column += 1;
+            }
+        }
+        Potentials { values, second }
+    }
+
+    fn walls(&self, z: &[f64]) -> Option<Vec<[f64; 3]>> {
+        z.iter().map(|z| self.side.at(*z)).collect()
+    }
+
+    /// Returns gradient and second derivatives of L and of the two constraints at `x`, for a part `part` of the first mode.
+    fn equations(&self, x: &DVector<f64>, part: f64) -> Option<(DVector<f64>, DMatrix<f64>)> {
+        let [nz, nc] = self.sizes();
+        let size = nz + nc + 2;
+        let (elevations, c) = (x.rows(0, nz).into_owned(), x.rows(nz, nc).into_owned());
+        let (pressure, omega) = (x[nz + nc], x[nz + nc + 1]);
+        let zeta = &self.elevation * &elevations;
+        let rate = &self.rate * &elevations;
+        let rows = zeta.len();
+        let walls = self.walls(zeta.as_slice())?;
+        let at = self.potentials(&self.points, zeta.as_slice(), &walls, Some(&c));
+        let [u, u_r, u_z, u_h] = &at.values;
+        let [phi, phi_r, phi_z, phi_h] = at.values.each_ref().map(|u| u * &c);
+
+        // along the lines
+        let mut along = DMatrix::zeros(rows, nc);
+        let mut kinetic = DMatrix::zeros(rows, nc);
+        // coefficients of the diagonal blocks
+        let [mut pull, mut lift, mut bend, mut couple] = [0; 4].map(|_| DVector::zeros(rows));
+        let [mut by_omega, mut push, mut swell] = [0; 3].map(|_| DVector::zeros(rows));
+        for i in 0..rows {
+            let weight = self.points.weights[i];
+            let (rho, [wide, slope, curve]) = (self.points.rho[i], walls[i]);
+            let r = rho * wide;
+            let sigma = rho * slope;
+            let w = wide * wide;
+            let w_1 = 2.0 * wide * slope;
+            let w_2 = 2.0 * (slope * slope + wide * curve);
+            let [zz, rz, rr, by_theta, z_theta, r_theta] = at.second[i];
+            let d_phi = phi_z[i] + sigma * phi_r[i];
+            let dd_phi = zz + 2.0 * sigma * rz + sigma * sigma * rr + rho * curve * phi_r[i];
+            let flux_1 = d_phi * w + phi[i] * w_1;
+            let flux_2 = dd_phi * w + 2.0 * d_phi * w_1 + phi[i] * w_2;
+            let speed2 = phi_r[i].powi(2) + phi_z[i].powi(2) + phi_h[i].powi(2);
+            let d_r = rz + sigma * rr;
+            let d_z = zz + sigma * rz;
+            let d_h = (z_theta + sigma * r_theta) / r - by_theta * sigma / (r * r);
+            let d_speed2 = 2.0 * (phi_r[i] * d_r + phi_z[i] * d_z + phi_h[i] * d_h);
+            let head = 0.5 * speed2 + zeta[i] - pressure;
+            pull[i] = weight * (omega * rate[i] * flux_1 - w * head);
+            lift[i] = weight * phi[i] * w;
+            bend[i] = weight * (omega * rate[i] * flux_2 - w_1 * head - w * (0.5 * d_speed2 + 1.0));
+            couple[i] = weight * omega * flux_1;
+            by_omega[i] = weight * rate[i] * flux_1;
+            push[i] = weight * rate[i] * w;
+            swell[i] = weight * w;
+            for j in 0..nc {
+                let d_u = u_z[(i, j)] + sigma * u_r[(i, j)];
+                along[(i, j)] = weight * omega * rate[i] * (d_u * w + u[(i, j)] * w_1);
+                kinetic[(i, j)] = weight
+                    * w
+                    * (phi_r[i] * u_r[(i, j)] + phi_z[i] * u_z[(i, j)] + phi_h[i] * u_h[(i, j)]);
+            }
+        }
+        let [energy, volume] = self.energy_above(&zeta)?;
+        let moved = &energy * &c;
+
+        let mut gradient = DVector::zeros(size);
+        let on_z = self.elevation.tr_mul(&pull) + omega * self.rate.tr_mul(&lift);
+        gradient.rows_mut(0, nz).copy_from(&on_z);
+        let on_c = omega * u.tr_mul(&push) - moved;
+        gradient.rows_mut(nz, nc).copy_from(&on_c);
+        gradient[nz + nc] = volume[(0, 0)];
+        let first = self.first_mode();
+        gradient[nz + nc + 1] = first.dot(&elevations) - part;
+
+        let scaled = |matrix: &DMatrix<f64>, by: &DVector<f64>| {
+            let mut out = matrix.clone();
+            for mut column in out.column_iter_mut() {
+                column.component_mul_assign(by);
+            }
+            out
+        };
+        let mut matrix = DMatrix::zeros(size, size);
+        let cross = self.elevation.tr_mul(&scaled(&self.rate, &couple));
+        let zz =
+            self.elevation.tr_mul(&scaled(&self.elevation, &bend)) + &cross + cross.transpose();
+        matrix.view_mut((0, 0), (nz, nz)).copy_from(&zz);
+        let zc = self.elevation.tr_mul(&(along - kinetic))
+            + omega * self.rate.tr_mul(&scaled(u, &swell));
+        matrix.view_mut((0, nz), (nz, nc)).copy_from(&zc);
+        matrix.view_mut((nz, 0), (nc, nz)).copy_from(&zc.transpose());
+        matrix.view_mut((nz, nz), (nc, nc)).copy_from(&-energy);
+        let swollen = self.elevation.tr_mul(&swell);
+        matrix.view_mut((0, nz + nc), (nz, 1)).copy_from(&swollen);
+        matrix.view_mut((nz + nc, 0), (1, nz)).copy_from(&swollen.transpose());
+        let by_omega = self.elevation.tr_mul(&by_omega) + self.rate.tr_mul(&lift);
+        matrix.view_mut((0, nz + nc + 1), (nz, 1)).copy_from(&by_omega);
+        matrix.view_mut((nz, nz + nc + 1), (nc, 1)).copy_from(&u.tr_mul(&push));
+        matrix.view_mut((nz + nc + 1, 0), (1, nz)).copy_from(&first.transpose());
+        Some((gradient, matrix))
+    }
+
+    /// Returns the kinetic energy's matrix, and the volume between the surface at rest and the wave.
+    fn energy_above(&self, zeta: &DVector<f64>) -> Option<[DMatrix<f64>; 2]> {
+        let [_, nc] = self.sizes();
+        let mut energy = DMatrix::zeros(nc, nc);
+        let mut column = 0;
+        for term in self.terms.iter().filter(|term| term.has_potential()) {
+            let level = usize::from(term.m == 0);
+            for j in level..self.potentials_of(*term) {
+                energy[(column + j, column + j)] = term.norm();
+            }
+            column += self.potentials_of(*term);
+        }
+        let mut volume = 0.0;
+        for (node, weight) in self.line.nodes.iter().zip(&self.line.weights) {
+            let z: Vec<f64> = zeta.iter().map(|zeta| zeta * node).collect();
+            let walls = self.walls(&z)?;
+            let at = self.potentials(&self.points, &z, &walls, None);
+            let by = DVector::from_fn(z.len(), |i, _| {
+                self.points.weights[i] * weight * zeta[i] * walls[i][0].powi(2)
+            });
+            volume += by.sum();
+            for field in &at.values[1..] {
+                let mut scaled = field.clone();
+                for mut column in scaled.column_iter_mut() {
+                    column.component_mul_assign(&by);
+                }
+                energy += field.tr_mul(&scaled);
+            }
+        }
+        Some([energy, DMatrix::from_element(1, 1, volume)])
+    }
+
+    /// Returns the vector whose product with the elevation's coefficients is the part of the first mode.
+    fn first_mode(&self) -> DVector<f64> {
+        let [nz, _] = self.sizes();
+        let count = self.resolution.polynomials;
+        let mut all = DVector::zeros(nz);
+        let n = self.terms.iter().position(|term| term.m == 1 && term.k == 1).unwrap_or(0);
+        all.rows_mut(n * count, count).copy_from(&self.shape);
+        all
+    }
+
+    fn small_wave(&self, part: f64) -> DVector<f64> {
+        let [nz, nc] = self.sizes();
+        let omega = self.lambda.sqrt();
+        let mut x = DVector::zeros(nz + nc + 2);
+        x.rows_mut(0, nz).copy_from(&(part * self.first_mode()));
+        let mut column = nz;
+        for term in &self.terms {
+            if term.m == 1 && term.k == 1 {
+                let all = -omega * part * &self.potential;
+                x.rows_mut(column, all.len()).copy_from(&all);
+            }
+            column += self.potentials_of(*term);
+        }
+        x[nz + nc + 1] = omega;
+        x
+    }
+
+    fn refine(&self, mut x: DVector<f64>, part: f64) -> Option<DVector<f64>> {
+        for _ in 0..STEPS {
+            let (gradient, matrix) = self.equations(&x, part)?;
+            let change = matrix.lu().solve(&gradient)?;
+            if !change.iter().all(|change| change.is_finite()) {
+                return None;
+            }
+            x -= &change;
+            if change.amax() < CONVERGED * part.abs() {
+                return Some(x);
+            }
+        }
+        None
+    }
+
+    /// Returns the slosh angle's sine and the rise of the centre of mass at the phase 0.
+    fn measure(&self, x: &DVector<f64>) -> Option<[f64; 2]> {
+        let scale = 2.0 / (self.amplitude * self.amplitude);
+        Some(self.moments(x)?.map(|moment| scale * moment))
+    }
+
+    /// Returns the first moments of the liquid between the surface at rest and the wave at the phase 0: sideways and upwards.
+    fn moments(&self, x: &DVector<f64>) -> Option<[f64; 2]> {
+        let [nz, _] = self.sizes();
+        let rule = Gauss::new(self.resolution.polynomials + 6);
+        let count = 2 * self.resolution.order + 4;
+        let mut points = Points { rho: Vec::new(), weights: Vec::new(), angles: Vec::new() };
+        for i in 0..count {
+            for (rho, weight) in rule.nodes.iter().zip(&rule.weights) {
+                points.rho.push(*rho);
+                points.weights.push(weight * rho / count as f64);
+                points.angles.push([PI * (i as f64 + 0.5) / count as f64, 0.0]);
+            }
+        }
+        let [elevation, _] = self.elevations(&points);
+        let zeta = elevation * x.rows(0, nz);
+        let [mut sideways, mut up] = [0.0; 2];
+        for i in 0..zeta.len() {
+            for (node, weight) in self.line.nodes.iter().zip(&self.line.weights) {
+                let z = zeta[i] * node;
+                let wide = self.side.at(z)?[0];
+                let by = points.weights[i] * weight * zeta[i] * wide * wide;
+                sideways += by * points.rho[i] * wide * points.angles[i][0].cos();
+                up += by * z;
+            }
+        }
+        Some([sideways, up])
+    }
+
+    /// Computes waves whose first mode has these slosh angles, rad, ascending; `None` where Newton's method does not converge.
+    fn waves(&self, angles: &[f64]) -> Vec<Option<LargeWave>> {
+        let mut found: Vec<(f64, DVector<f64>)> = Vec::new();
+        let mut wave = |angle: &f64| {
+            let part = angle.sin() * self.amplitude;
+            let start = match &found[..] {
+                [] => self.small_wave(part),
+                [(a, x)] => {
+                    let mut x = x * (part / a);
+                    let last = x.len() - 1;
+                    x[last] *= a / part;
+                    x
+                }
+                [.., (a, x), (b, y)] => y + (y - x) * ((part - b) / (b - a)),
+            };
+            let x = self.refine(start, part)?;
+            let [sine, rise] = self.measure(&x)?;
+            let frequency = x[x.len() - 1] / self.lambda.sqrt();
+            found.push((part, x));
+            Some(LargeWave { angle: sine.asin(), frequency, rise })
+        };
+        angles.iter().map(&mut wave).collect()
+    }
+}
+
+/// Degrees of the harmonics of the truncations whose median is taken. In each of them a few waves are wrong, because a
+/// multiple of their frequency happens to be that of a high mode of the truncated liquid.
+const DEGREES: [usize; 6] = [9, 10, 11, 12, 13, 14];
+/// Largest azimuthal number and multiple of the frequency.
+const ORDER: usize = 4;
+/// Slosh angles at which waves are computed, degrees.
+const ANGLES: [f64; 9] = [2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 16.0, 18.0];
+/// Largest median deviation of a truncation's frequency from the median.
+const SCATTER: f64 = 2e-4;
+
+fn median(values: &mut [f64]) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    match values.len() % 2 {
+        1 => values[middle],
+        _ => 0.5 * (values[middle - 1] + values[middle]),
+    }
+}
+
+/// Returns periodic waves of the liquid above `wall`: medians of several truncations, up to the angle at which these
+/// scatter. The list is empty for a liquid with a hole.
+fn backbone(wall: &Wall, side: &Side, motion: Motion) -> Vec<LargeWave> {
+    let angles = ANGLES.map(f64::to_radians);
+    let truncation = &|degree: usize| {
+        let resolution = Resolution { degree, polynomials: degree / 2, order: ORDER };
+        Some(Solver::new(wall, side, motion, resolution)?.waves(&angles))
+    };
+    let all: Vec<Vec<Option<LargeWave>>> = thread::scope(|scope| {
+        let threads = DEGREES.map(|degree| scope.spawn(move || truncation(degree)));
+        threads.into_iter().filter_map(|thread| thread.join().ok().flatten()).collect()
+    });
+    let mut pooled: Vec<(usize, LargeWave)> = Vec::new();
+    for truncation in &all {
+        pooled.extend(truncation.iter().enumerate().filter_map(|(i, wave)| Some((i, (*wave)?))));
+    }
+    let pooled = without_outliers(pooled);
+    let mut waves = Vec::new();
+    for i in 0..angles.len() {
+        let here: Vec<LargeWave> =
+            pooled.iter().filter(|(k, _)| *k == i).map(|(_, wave)| *wave).collect();
+        if 2 * here.len() < DEGREES.len() {
+            continue;
+        }
+        // Shift of omega^2 and excess of the rise, over the square of the angle's sine, hardly depend on the angle.
+        let of = |f: &dyn Fn(&LargeWave) -> f64| here.iter().map(f).collect::<Vec<f64>>();
+        let square = |wave: &LargeWave| wave.angle.sin().powi(2);
+        let shift = |wave: &LargeWave| (wave.frequency.powi(2) - 1.0) / square(wave);
+        let excess = |wave: &LargeWave| (2.0 * wave.rise / square(wave) - 1.0) / square(wave);
+        let (u, a, b) =
+            (median(&mut of(&square)), median(&mut of(&shift)), median(&mut of(&excess)));
+        let scatter = median(&mut of(&|wave: &LargeWave| 0.5 * u * (shift(wave) - a).abs()));
+        if scatter > SCATTER {
+            break;
+        }
+        waves.push(LargeWave {
+            angle: u.sqrt().asin(),
+            frequency: (1.0 + a * u).sqrt(),
+            rise: 0.5 * u * (1.0 + b * u),
+        });
+    }
+    waves
+}
+
+/// Largest distances of the frequency and the rise of a wave, relative, from the straight lines of the other waves.
+const OUTLIER: [f64; 2] = [5e-4, 3e-3];
+
+/// Removes waves whose frequency or rise does not go with the other waves, because the truncation is at a resonance there.
+/// Each wave has the number of its angle. Over u, the square of the angle's sine, the shift of omega^2 and the excess of the
+/// rise, both over u, are almost straight lines, whose slopes are the medians over all pairs of waves with different angles.
+fn without_outliers(mut waves: Vec<(usize, LargeWave)>) -> Vec<(usize, LargeWave)> {
+    for (i, allowed) in OUTLIER.into_iter().enumerate() {
+        let point = |wave: &LargeWave| {
+            let u = wave.angle.sin().powi(2);
+            let part = [0.5 * (wave.frequency.powi(2) - 1.0), 2.0 * wave.rise / u - 1.0][i];
+            [u, part / u]
+        };
+        let points: Vec<(usize, [f64; 2])> =
+            waves.iter().map(|(k, wave)| (*k, point(wave))).collect();
+        let mut slopes = Vec::new();
+        for (k, (number, [u, y])) in points.iter().enumerate() {
+            let others = points[..k].iter().filter(|(other, _)| other != number);
+            slopes.extend(others.map(|(_, [v, x])| (y - x) / (u - v)));
+        }
+        if slopes.is_empty() {
+            return Vec::new();
+        }
+        let slope = median(&mut slopes);
+        let mut starts: Vec<f64> = points.iter().map(|(_, [u, y])| y - slope * u).collect();
+        let start = median(&mut starts);
+        waves.retain(|(_, wave)| {
+            let [u, y] = point(wave);
+            u * (y - start - slope * u).abs() < allowed
+        });
+    }
+    waves
+}
+
+/// Coefficients of the slosh mass with the energy and the frequencies of waves, see `formulas::energy_terms`, with the largest
+/// errors of its frequency in planar and in circular motion and of its energy, relative, up to the angle `compared`, rad.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Fit {
+    pub terms: EnergyTerms,
+    pub errors: [f64; 3],
+    /// Relative shifts of omega^2 per squared slosh angle of the smallest waves, planar and circular.
+    pub shifts: [f64; 2],
+}
+
+/// Returns the intercept and the slope of the straight line through the points (u, y) with the weights u^2.
+fn line(points: &[[f64; 2]]) -> [f64; 2] {
+    let mut sums = [0.0; 5];
+    for [u, y] in points {
+        let w = u * u;
+        for (sum, value) in sums.iter_mut().zip([w, w * u, w * u * u, w * y, w * u * y]) {
+            *sum += value;
+        }
+    }
+    let [w, wu, wuu, wy, wuy] = sums;
+    let determinant = w * wuu - wu * wu;
+    [(wy * wuu - wuy * wu) / determinant, (w * wuy - wu * wy) / determinant]
+}
+
+/// Returns the frequency of the slosh mass in planar motion, relative to small motion, by quadrature with q = a sin t.
+fn planar_frequency(terms: &EnergyTerms, angle: f64) -> f64 {
+    let ([s, kappa], [s_2, kappa_2]) = (terms.pair, terms.next);
+    let (a, count) = (angle.sin(), 32);
+    let quarter: f64 = (0..count)
+        .map(|i| {
+            let q = a * ((f64::from(i) + 0.5) * PI / (2.0 * f64::from(count))).sin();
+            let u = q * q;
+            let slope =
+                q * (1.0 / (1.0 - u).sqrt() + (kappa - 1.0) * u / 2.0 + 0.375 * kappa_2 * u * u);
+            let inertia = 1.0 + slope * slope + (s - 1.0) * u + s_2 * u * u;
+            // height(a) - height(q) over a^2 - q^2
+            let rise = 1.0 / ((1.0 - u).sqrt() + (1.0 - a * a).sqrt())
+                + (kappa - 1.0) * (a * a + u) / 8.0
+                + kappa_2 * (a.powi(4) + a * a * u + u * u) / 16.0;
+            (inertia / (2.0 * rise)).sqrt() / f64::from(count)
+        })
+        .sum();
+    1.0 / quarter
+}
+
+/// Returns the force towards the axis over the displacement, for m = g = l = 1.
+fn pull(terms: &EnergyTerms, u: f64) -> f64 {
+    1.0 / (1.0 - u).sqrt() + (terms.pair[1] - 1.0) * u / 2.0 + 0.375 * terms.next[1] * u * u
+}
+
+/// Smallest angle up to which waves are needed for a fit, rad.
+pub(crate) const LEAST: f64 = 6.0 * PI / 180.0;
+
+/// Computes periodic waves of the liquid above `wall` and fits the coefficients to them. Returns `None` for a liquid with a
+/// hole, and if there are no waves up to the angle [`LEAST`].
+pub(crate) fn fit(wall: &Wall, side: &Side) -> Option<Fit> {
+    let [planar, circular] =
+        [Motion::Planar, Motion::Circular].map(|motion| backbone(wall, side, motion));
+    fit_waves(&planar, &circular)
+}
+
+fn fit_waves(planar: &[LargeWave], circular: &[LargeWave]) -> Option<Fit> {
+    if planar.len().min(circular.len()) < 3 {
+        return None;
+    }
+    // Both motions up to the same angle.
+    let largest = planar[planar.len() - 1].angle.min(circular[circular.len() - 1].angle);
+    let upto = |waves: &[LargeWave]| -> Vec<LargeWave> {
+        waves.iter().filter(|wave| wave.angle < 1.05 * largest).copied().collect()
+    };
+    let [planar, circular] = [upto(planar), upto(circular)];
+    if planar.len().min(circular.len()) < 3 || largest < 0.95 * LEAST {
+        return None;
+    }
+    let square = |wave: &LargeWave| wave.angle.sin().powi(2);
+    // The liquid rests at the largest angle of planar motion, where its energy is that of its height.
+    let heights: Vec<[f64; 2]> = planar
+        .iter()
+        .map(|wave| {
+            let u = square(wave);
+            [u, 8.0 * (wave.rise - (1.0 - (1.0 - u).sqrt())) / (u * u)]
+        })
+        .collect();
+    let [kappa, kappa_2] = line(&heights);
+    let mut terms = EnergyTerms {
+        pair: [1.0, 1.0 + kappa],
+        next: [0.0, 2.0 * kappa_2],
+        rotary: [0.0; 2],
+        compared: largest,
+    };
+    let turns: Vec<[f64; 2]> = circular
+        .iter()
+        .map(|wave| {
+            let u = square(wave);
+            [u, (pull(&terms, u) / wave.frequency.powi(2) - 1.0) / u]
+        })
+        .collect();
+    let [t, t_2] = line(&turns);
+    terms.rotary = [t / 2.0, t_2 / 3.0];
+    // The frequency is almost linear in s u and s_2 u^2, whose factors in omega are -1/4 and -3/16.
+    for _ in 0..8 {
+        let off: Vec<[f64; 2]> = planar
+            .iter()
+            .map(|wave| {
+                let u = square(wave);
+                [u, 4.0 * (planar_frequency(&terms, wave.angle) / wave.frequency - 1.0) / u]
+            })
+            .collect();
+        let [s, s_2] = line(&off);
+        terms.pair[0] += s;
+        terms.next[0] += s_2 / 0.75;
+    }
+    let shift = |wave: &LargeWave| (wave.frequency.powi(2) - 1.0) / square(wave);
+    let shifts = [shift(&planar[0]), shift(&circular[0])];
+    Some(Fit { errors: errors(&terms, &planar, &circular), shifts, terms })
+}
+
+/// Returns the largest relative errors of the slosh mass up to its angle `compared`: of its frequency in planar and in
+/// circular motion, and of its energy in planar motion.
+fn errors(terms: &EnergyTerms, planar: &[LargeWave], circular: &[LargeWave]) -> [f64; 3] {
+    let square = |wave: &LargeWave| wave.angle.sin().powi(2);
+    let is_compared = |wave: &&LargeWave| wave.angle < terms.compared + 1e-9;
+    let mut errors = [0.0_f64; 3];
+    for wave in planar.iter().filter(is_compared) {
+        let u = square(wave);
+        let height = 1.0 - (1.0 - u).sqrt()
+            + (terms.pair[1] - 1.0) * u * u / 8.0
+            + terms.next[1] * u.powi(3) / 16.0;
+        let frequency = planar_frequency(terms, wave.angle);
+        errors[0] = errors[0].max((frequency / wave.frequency - 1.0).abs());
+        errors[2] = errors[2].max((height / wave.rise - 1.0).abs());
+    }
+    for wave in circular.iter().filter(is_compared) {
+        let (u, [t, t_2]) = (square(wave), terms.rotary);
+        let frequency = (pull(terms, u) / (1.0 + 2.0 * t * u + 3.0 * t_2 * u * u)).sqrt();
+        errors[1] = errors[1].max((frequency / wave.frequency - 1.0).abs());
+    }
+    errors
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sphere_waves;
+
+    fn cylinder() -> Contour {
+        let bottom = Segment::line([0.0, 0.0], [1.0, 0.0]);
+        Contour::new(vec![bottom, Segment::line([1.0, 0.0], [1.0, 4.0])]).unwrap()
+    }
+
+    fn sphere() -> Contour {
+        Contour::new(vec![Segment::arc([0.0, 1.0], 1.0, -90.0, 90.0)]).unwrap()
+    }
+
+    fn waves(contour: &Contour, fill: f64) -> [Vec<LargeWave>; 2] {
+        let wall = contour.cut(fill).unwrap();
+        let side = Side::new(contour, &wall).unwrap();
+        [Motion::Planar, Motion::Circular].map(|motion| backbone(&wall, &side, motion))
+    }
+
+    /// The frequencies in tests/backbones.csv were computed by other programs (a variational method with other functions,
+    /// and one that marches in time).
+    #[test]
+    fn waves_in_cylinders_have_the_known_frequencies() {
+        let known: Vec<[Option<f64>; 4]> = include_str!("../tests/backbones.csv")
+            .lines()
+            .skip(1)
+            .map(|line| {
+                let mut cells = line.split(',').map(|cell| cell.parse().ok());
+                core::array::from_fn(|_| cells.next().flatten())
+            })
+            .collect();
+        let mut compared = 0;
+        for fill in [0.5, 1.227] {
+            for (motion, waves) in waves(&cylinder(), fill).iter().enumerate() {
+                let points: Vec<[f64; 2]> = known
+                    .iter()
+                    .filter(|row| row[0] == Some(fill))
+                    .filter_map(|row| Some([row[1]?, row[2 + motion]?]))
+                    .collect();
+                for wave in waves {
+                    let degrees = wave.angle.to_degrees();
+                    let Some(pair) = points.windows(2).find(|pair| pair[1][0] >= degrees) else {
+                        continue;
+                    };
+                    // The shift of the frequency is nearly proportional to the square of the angle.
+                    let [[a, f_a], [b, f_b]] = [pair[0], pair[1]];
+                    let share = (degrees.powi(2) - a * a) / (b * b - a * a);
+                    let exact = f_a + (f_b - f_a) * share;
+                    let off = (wave.frequency / exact - 1.0).abs();
+                    assert!(off < 3e-4, "{fill} {motion} {degrees}: {} {exact}", wave.frequency);
+                    compared += 1;
+                }
+            }
+        }
+        assert!(compared > 20, "{compared}");
+    }
+
+    /// Returns the mean energy, and that at the phase 0, at which all of it is potential, both relative to 2 pi rho g R^4.
+    fn energies(solver: &Solver, x: &DVector<f64>) -> [f64; 2] {
+        let [nz, nc] = solver.sizes();
+        let zeta = &solver.elevation * x.rows(0, nz);
+        let [matrix, _] = solver.energy_above(&zeta).unwrap();
+        let c = x.rows(nz, nc);
+        let mut energy = 0.5 * (c.transpose() * matrix * c)[0];
+        for i in 0..zeta.len() {
+            for (node, weight) in solver.line.nodes.iter().zip(&solver.line.weights) {
+                let z = zeta[i] * node;
+                let wide = solver.side.at(z).unwrap()[0];
+                energy += solver.points.weights[i] * weight * zeta[i] * wide * wide * z;
+            }
+        }
+        [energy, solver.moments(x).unwrap()[1]]
+    }
+
+    /// Along a family of periodic motions dE = omega dJ holds, with the energy E and the action J, which is the mean of twice
+    /// the kinetic energy over omega. At the phase 0 the liquid rests, so that its height holds the whole energy. At these
+    /// angles this truncation has no resonance.
+    #[test]
+    fn energy_and_action_of_planar_waves_belong_to_their_frequency() {
+        for (contour, fill) in [(cylinder(), 0.6), (sphere(), 0.6)] {
+            let wall = contour.cut(fill).unwrap();
+            let side = Side::new(&contour, &wall).unwrap();
+            let resolution = Resolution { degree: 10, polynomials: 5, order: 4 };
+            let solver = Solver::new(&wall, &side, Motion::Planar, resolution).unwrap();
+            let [nz, nc] = solver.sizes();
+            let wave = |degrees: f64| {
+                let part = degrees.to_radians().sin() * solver.amplitude;
+                let mut x = solver.refine(solver.small_wave(0.02), 0.02).unwrap();
+                for k in 1..=8 {
+                    let next = 0.02 + (part - 0.02) * f64::from(k) / 8.0;
+                    x = solver.refine(x, next).unwrap();
+                }
+                let [energy, at_rest] = energies(&solver, &x);
+                assert!((at_rest / energy - 1.0).abs() < 5e-4, "{degrees} {at_rest} {energy}");
+                let zeta = &solver.elevation * x.rows(0, nz);
+                let [matrix, _] = solver.energy_above(&zeta).unwrap();
+                let c = x.rows(nz, nc);
+                let omega = x[nz + nc + 1];
+                let action = (c.transpose() * matrix * c)[0] / omega;
+                [energy, action, omega]
+            };
+            let [a, b] = [6.0, 6.2].map(wave);
+            let mean = (b[0] - a[0]) / (b[1] - a[1]);
+            let middle = 0.5 * (a[2] + b[2]);
+            assert!((mean / middle - 1.0).abs() < 1e-6, "{mean} {middle}");
+        }
+    }
+
+    /// Medians of the truncations are compared with a finer truncation, whose largest multiple of the frequency is 5.
+    #[test]
+    fn waves_in_a_sphere_do_not_depend_on_the_resolution() {
+        let contour = sphere();
+        let wall = contour.cut(0.5).unwrap();
+        let side = Side::new(&contour, &wall).unwrap();
+        let angles = [2.0, 5.0, 8.0, 10.0, 12.0].map(f64::to_radians);
+        for motion in [Motion::Planar, Motion::Circular] {
+            let resolution = Resolution { degree: 12, polynomials: 6, order: 5 };
+            let fine = Solver::new(&wall, &side, motion, resolution).unwrap().waves(&angles);
+            let coarse = backbone(&wall, &side, motion);
+            let fine: Vec<LargeWave> = fine.into_iter().flatten().collect();
+            let mut close = 0;
+            for wave in &fine {
+                let shift = |wave: &LargeWave| {
+                    let u = wave.angle.sin().powi(2);
+                    [(wave.frequency.powi(2) - 1.0) / u, (2.0 * wave.rise / u - 1.0) / u]
+                };
+                let near = coarse.iter().min_by(|a, b| {
+                    (a.angle - wave.angle).abs().total_cmp(&(b.angle - wave.angle).abs())
+                });
+                let (near, found) = (shift(near.unwrap()), shift(wave));
+                close += usize::from((0..2).all(|i| (near[i] - found[i]).abs() < 0.02));
+            }
+            // One wave of the single truncation may be at one of its resonances.
+            assert!(close >= 4 && fine.len() == 5, "{motion:?} {close} {fine:?} {coarse:?}");
+        }
+    }
+
+    /// Fills between the rows of the table for spheres.
+    #[test]
+    fn the_table_of_spheres_holds_between_its_fills() {
+        for fill in [0.25, 0.85] {
+            let [planar, circular] = waves(&sphere(), fill);
+            let terms = sphere_waves::energy_terms(fill).unwrap();
+            let [flat, round, energy] = errors(&terms, &planar, &circular);
+            println!("{fill}: {flat:.1e} {round:.1e} {energy:.1e}");
+            let [frequency_error, energy_error] = sphere_waves::ERRORS;
+            assert!(flat < frequency_error && round < frequency_error, "{fill}: {flat} {round}");
+            assert!(energy < energy_error, "{fill}: {energy}");
+        }
+        assert_eq!(
+            [0.09, 1.06, f64::NAN].map(|fill| sphere_waves::energy_terms(fill).is_some()),
+            [false; 3]
+        );
+    }
+
+    /// A wall with a corner ends there, and a drawing in several segments gives the same waves.
+    #[test]
+    fn a_side_ends_at_corners_and_goes_on_over_smooth_joints() {
+        let joined = Contour::new(vec![
+            Segment::arc([0.0, 1.0], 1.0, -90.0, -20.0),
+            Segment::arc([0.0, 1.0], 1.0, -20.0, 10.0),
+            Segment::arc([0.0, 1.0], 1.0, 10.0, 90.0),
+        ])
+        .unwrap();
+        let sides = [sphere(), joined].map(|contour| {
+            let wall = contour.cut(0.9).unwrap();
+            Side::new(&contour, &wall).unwrap()
+        });
+        for z in [-0.6, -0.25, 0.0, 0.1, 0.3, 0.7] {
+            let [a, b] = sides.each_ref().map(|side| side.at(z).unwrap());
+            let height: f64 = z * 0.99f64.sqrt() - 0.1;
+            let exact = ((1.0 - height * height) / 0.99).sqrt();
+            assert!(
+                (a[0] - exact).abs() < 1e-12 && (b[0] - exact).abs() < 1e-12,
+                "{z} {a:?} {b:?}"
+            );
+            assert!((0..3).all(|i| (a[i] - b[i]).abs() < 1e-6), "{z} {a:?} {b:?}");
+        }
+        let cone = Contour::new(vec![
+            Segment::line([0.0, 0.0], [0.5, 0.5]),
+            Segment::line([0.5, 0.5], [0.5, 1.5]),
+        ])
+        .unwrap();
+        let wall = cone.cut(0.4).unwrap();
+        let side = Side::new(&cone, &wall).unwrap();
+        assert!((side.high - ROOM * 0.1 / 0.4).abs() < 1e-12 && side.at(0.21).is_none());
+    }
+}
