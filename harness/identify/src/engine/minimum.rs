@@ -187,6 +187,15 @@ impl Fit<'_> {
         self.minimise_on(point, free, derivatives, end)
     }
 
+    /// Searches the minimum from the coordinates of a point over all free unknowns.
+    ///
+    /// # Errors
+    /// If the system refuses the start, or every step of an unknown.
+    pub fn minimise_from(&mut self, from: &Point, end: End) -> Result<Minimum> {
+        let free = self.free.clone();
+        self.minimise(&from.z, &free, None, end)
+    }
+
     /// Searches the minimum as [`Fit::minimise`] does, from a point that is simulated already.
     ///
     /// # Errors

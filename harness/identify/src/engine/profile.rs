@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 
 use super::minimum::{Curvature, End, Minimum, places, without};
 use super::problem::Part;
-use super::{DECIDES, Fit, GAIN, SETS, VAGUE, Z};
+use super::{DECIDES, ENDS, Fit, GAIN, SETS, VAGUE, Z};
 
 /// Growth of the sum of squares below which an end of the range leaves an interval open: 1.96².
 pub const OPEN: f64 = Z * Z;
@@ -42,7 +42,7 @@ impl Fit<'_> {
     /// If the system refuses every step of an unknown.
     pub fn find_bent(&mut self, minimum: &mut Minimum) -> Result<bool> {
         let unknowns = &self.problem.unknowns;
-        if !self.problem.rough || minimum.decrement > super::ENDS.0 {
+        if !self.problem.rough || minimum.decrement > ENDS.0 {
             return Ok(false);
         }
         let jacobian = self.derivatives_at(minimum)?.matrix;
@@ -112,15 +112,14 @@ impl Fit<'_> {
             }
             let mut z = minimum.point.z.clone();
             z[j] = at;
-            let end = End { trusts: true, gain: 2.0, ..End::new(5, super::ENDS.0) };
+            let end = End { trusts: true, gain: 2.0, ..End::new(5, ENDS.0) };
             let Ok(found) = self.minimise(&z, &free, derivatives.clone(), end) else { continue };
             points.push(Point { at, minimum: found });
         }
         let lower = |low: &&Point| low.minimum.point.cost < minimum.point.cost - GAIN;
         if let Some(low) = lowest(&points).filter(lower) {
-            let free = self.free.clone();
-            let end = End { gain: 2.0, ..End::new(6, super::ENDS.0) };
-            *minimum = self.minimise(&low.minimum.point.z, &free, None, end)?;
+            let end = End { gain: 2.0, ..End::new(6, ENDS.0) };
+            *minimum = self.minimise_from(&low.minimum.point, end)?;
         }
         Ok(points)
     }
@@ -169,29 +168,36 @@ impl Fit<'_> {
         let base = minimum.point.cost;
         let mut least = base;
         for side in [-1.0, 1.0] {
-            let (mut last, mut before): (Minimum, Option<Vec<f64>>) = (minimum.clone(), None);
-            let (mut h, mut h_last, mut risen) = (first, first, 0.0);
+            // direction of the valley: at first that of the curvature, then the way from point to point
+            let own = covariance[(j, j)];
+            let along = |i: usize| if own > 0.0 { covariance[(i, j)] / own } else { 0.0 };
+            let mut tangent: Vec<f64> = (0..unknowns.len()).map(along).collect();
+            let (mut last, mut h, mut risen) = (minimum.clone(), first, 0.0);
             for _ in 0..MOST {
                 let at = last.point.z[j] + side * h;
                 if at < self.ends[j].0 || at > self.ends[j].1 {
                     break;
                 }
                 let mut z = last.point.z.clone();
-                if let Some(before) = &before {
-                    for i in places(&free) {
-                        z[i] += (z[i] - before[i]) * (h / h_last);
-                    }
-                }
+                places(&free).into_iter().for_each(|i| z[i] += tangent[i] * (at - last.point.z[j]));
                 z[j] = at;
                 let above = least + 3.0 * DECIDES;
-                let end = End { above, trusts: true, gain: GAIN, ..End::new(SETS / 2, NEAR) };
+                let end = End { above, trusts: true, gain: GAIN, ..End::new(SETS, NEAR) };
                 let Ok(found) = self.minimise(&z, &free, last.derivatives.clone(), end) else {
                     break;
                 };
+                // a search that ended before the floor of the valley says nothing of its height there
+                let floor = found.point.cost - 1.5 * found.decrement.powi(2);
+                if found.decrement > ENDS.0 && floor < least + DECIDES {
+                    h *= 0.5;
+                    continue;
+                }
                 let rise = found.point.cost - base;
                 least = least.min(found.point.cost);
                 points.push(Point { at, minimum: found.clone() });
-                (before, h_last) = (Some(last.point.z.clone()), h);
+                let by = at - last.point.z[j];
+                let change = found.point.z.iter().zip(&last.point.z);
+                tangent = change.map(|(new, old)| (new - old) / by).collect();
                 last = found;
                 if rise > DECIDES {
                     break;
@@ -202,7 +208,7 @@ impl Fit<'_> {
                     _ => 0.7,
                 };
                 // shorter steps than the first lead nowhere
-                (h, risen) = ((h * factor).clamp(0.5 * first, lengths[2]), rise);
+                (h, risen) = ((h * factor).clamp(h.min(0.5 * first), lengths[2]), rise);
             }
         }
         points.sort_by(|a, b| a.at.total_cmp(&b.at));
@@ -248,5 +254,90 @@ impl Curve {
         let (a, b, p, q) = (self.y[k], self.y[k + 1], h * self.slopes[k], h * self.slopes[k + 1]);
         let (c, d) = (3.0 * (b - a) - 2.0 * p - q, 2.0 * (a - b) + p + q);
         a + u * (p + u * (c + u * d))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use analysis::random::Random;
+    use nalgebra::{Matrix2, Vector2};
+
+    use super::*;
+    use crate::engine::search::solve_near;
+    use crate::engine::{Hold, Motion, Problem, Recorded, Role, Signal, System, Unknown};
+
+    /// Friction c + d exp(−(ω/ω_s)²) at rates ω far below ω_s, which show c + d and d/ω_s² much better than c, d and ω_s.
+    struct Bearing(Vec<f64>);
+
+    fn shape(rate: f64, speed: f64) -> f64 {
+        (-(rate / speed).powi(2)).exp()
+    }
+
+    impl System for Bearing {
+        fn run(&self, v: &[f64], _: usize, rows: usize, _: Hold, _: bool) -> Result<Motion> {
+            let torque = self.0[..rows].iter().map(|w| v[0] + v[1] * shape(*w, v[2]));
+            Ok(Motion { outputs: vec![torque.collect()], ..Motion::default() })
+        }
+
+        fn derived(&self) -> Vec<(String, String)> {
+            Vec::new()
+        }
+
+        fn derive(&self, _: &[f64]) -> Option<Vec<f64>> {
+            None
+        }
+    }
+
+    /// For a given ω_s the friction is linear in c and d, so that the sum of squares along ω_s has a closed form.
+    #[test]
+    fn a_profile_follows_a_bent_valley_at_its_floor() {
+        let (truth, mut random) = ([0.02, 2.4e-3, 0.09], Random::new(431, 0));
+        let rates: Vec<f64> = (0..4000).map(|k| 0.024 * (0.01 * f64::from(k)).sin()).collect();
+        let noise = 1e-5;
+        let measured: Vec<f64> = rates
+            .iter()
+            .map(|w| truth[0] + truth[1] * shape(*w, truth[2]) + noise * random.normal())
+            .collect();
+        let unknown = |name: &str, start: f64, by: f64| {
+            Unknown::positive(name, "1", Role::Run(None), start, (start / by, start * by))
+        };
+        let speed = Unknown { bent: true, ..unknown("omega_s", truth[2], 30.0) };
+        let system = Bearing(rates.clone());
+        let time = (0..rates.len()).map(|k| 0.02 * k as f64).collect();
+        let problem = Problem {
+            system: &system,
+            recordings: vec![Recorded { name: "a".into(), time, inputs: Vec::new(), step: 0.02 }],
+            signals: vec![Signal {
+                recording: 0,
+                output: 0,
+                measured: measured.clone(),
+                sampled: vec![true; rates.len()],
+                white: noise,
+                drift: None,
+            }],
+            unknowns: vec![unknown("c", truth[0], 1e4), unknown("d", truth[1], 1e4), speed],
+            starts: vec![truth.to_vec()],
+            holds: vec![Hold::FirstOrderHold],
+            acausal: true,
+            drawn: 0,
+            rough: false,
+        };
+        let found = solve_near(&problem, &truth, &mut |_| {}).unwrap();
+        let white = found.fit.noise[0].white;
+        let floor = |speed: f64| {
+            let rows = || rates.iter().map(|w| Vector2::new(1.0, shape(*w, speed))).zip(&measured);
+            let normal: Matrix2<f64> = rows().map(|(a, _)| a * a.transpose()).sum();
+            let right: Vector2<f64> = rows().map(|(a, y)| a * *y).sum();
+            let x = normal.try_inverse().unwrap() * right;
+            rows().map(|(a, y)| ((y - a.dot(&x)) / white).powi(2)).sum::<f64>()
+        };
+        let (_, points) = found.profile.as_ref().unwrap();
+        let costs: Vec<(f64, f64)> =
+            points.iter().map(|p| (p.minimum.point.cost, floor(p.at.exp()))).collect();
+        let least = costs.iter().map(|c| c.1).fold(f64::INFINITY, f64::min);
+        for (cost, floor) in costs.iter().filter(|c| c.1 < least + DECIDES) {
+            assert!(cost - floor < 0.3, "{costs:?}");
+        }
+        assert!(costs[0].0 > least + OPEN && costs[costs.len() - 1].0 > least + OPEN, "{costs:?}");
     }
 }

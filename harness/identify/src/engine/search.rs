@@ -205,9 +205,8 @@ impl Found {
         let (minimum, rivals) = fit.compare_holds(self.minimum.clone())?;
         (self.minimum, self.rivals) = (minimum, rivals);
         fit.renew_noise(&self.minimum.point);
-        let (free, z) = (fit.free.clone(), self.minimum.point.z.clone());
         let end = End { gain: ALIKE, ..End::new(4, ENDS.0) };
-        self.minimum = fit.minimise(&z, &free, None, end)?;
+        self.minimum = fit.minimise_from(&self.minimum.point, end)?;
         (self.noise, self.hold, self.is_judged) = (fit.noise.clone(), fit.hold, true);
         self.deviance = fit.deviance(&self.minimum.point);
         (self.is_noise, self.is_loud) = (fit.is_noise(&self.minimum.point), fit.is_loud());
@@ -325,9 +324,8 @@ impl Fit<'_> {
         for _ in 0..ROUNDS {
             for _ in 0..SETS {
                 self.renew_noise(&minimum.point);
-                let z = minimum.point.z.clone();
                 let end = End { gain: GAIN, ..End::new(SETS, ENDS.1) };
-                minimum = self.minimise(&z, &free, None, end)?;
+                minimum = self.minimise_from(&minimum.point, end)?;
                 // the noise is that of the point before, which matters where it is next to nothing
                 if minimum.point.cost > SETTLED * rows as f64 {
                     break;
@@ -456,17 +454,14 @@ impl Fit<'_> {
         if self.is_noise(&minimum.point) || !unknowns.iter().any(Unknown::is_held) {
             return Ok(None);
         }
-        let (free, noise) = (self.free.clone(), self.noise.clone());
-        let all: Vec<bool> =
-            unknowns.iter().zip(&free).map(|(u, free)| *free || u.is_held()).collect();
+        let all = unknowns.iter().zip(&self.free).map(|(u, free)| *free || u.is_held()).collect();
+        let (free, noise) = (std::mem::replace(&mut self.free, all), self.noise.clone());
         self.limit_noise();
-        let z = minimum.point.z.clone();
-        let first = self.minimise(&z, &all, None, End::new(10, ENDS.0 * 0.1))?;
+        let first = self.minimise_from(&minimum.point, End::new(10, ENDS.0 * 0.1))?;
         self.renew_noise(&first.point);
-        let z = first.point.z.clone();
-        let found = self.minimise(&z, &all, None, End { gain: GAIN, ..End::new(SETS, ENDS.1) })?;
+        let end = End { gain: GAIN, ..End::new(SETS, ENDS.1) };
+        let found = self.minimise_from(&first.point, end)?;
         if self.is_noise(&found.point) {
-            self.free = all;
             return Ok(Some(found));
         }
         self.free = free;

@@ -155,33 +155,27 @@ fn identify_whole(
     // the slosh models with the first friction law, then other laws
     let first = options.friction.first().map_or(FrictionModel::Stribeck.name(), String::as_str);
     let laws = std::iter::once(first).chain(options.friction.iter().skip(1).map(String::as_str));
-    let mut pairs: Vec<(&str, &str)> = Vec::new();
-    for law in laws {
-        for model in ORDER.into_iter().filter(|model| options.models.iter().any(|m| m == model)) {
-            if model != Frozen.name() && response.is_none() && options.starts.is_empty() {
-                if law == first {
-                    tell(News::Step(format!("{model}: not tried because the data show no slosh")));
-                }
-                continue;
-            }
-            pairs.push((model, law));
-        }
+    let is_asked = |model: &&str| options.models.iter().any(|other| other == model);
+    let has_start = response.is_some() || !options.starts.is_empty();
+    let (models, others): (Vec<&str>, Vec<&str>) =
+        ORDER.into_iter().filter(is_asked).partition(|model| has_start || *model == Frozen.name());
+    for model in others {
+        tell(News::Step(format!("{model}: not tried because the data show no slosh")));
     }
+    let with_law = |law| models.iter().map(move |model| (*model, law));
+    let pairs: Vec<(&str, &str)> = laws.flat_map(with_law).collect();
     ensure!(
         !pairs.is_empty(),
         "the data show no slosh (no antiresonance with a resonance above it in the excited band), and no \
          start was given"
     );
-    let mut systems = Vec::new();
-    for pair in &pairs {
-        systems.push(problem::system(fmu, recordings, options, *pair, &starts)?);
-    }
-    let problems: Vec<Problem> = systems
-        .iter()
-        .map(|(system, unknowns, starts)| {
-            problem::problem(system, unknowns.clone(), starts.clone(), options)
-        })
-        .collect();
+    let systems =
+        pairs.iter().map(|pair| problem::system(fmu, recordings, options, *pair, &starts));
+    let systems = systems.collect::<Result<Vec<_>>>()?;
+    let problems = systems.iter().map(|(system, unknowns, starts)| {
+        problem::problem(system, unknowns.clone(), starts.clone(), options)
+    });
+    let problems: Vec<Problem> = problems.collect();
     let mut failed = None;
     let mut fit = |pair: (&str, &str), from: Option<&Fitted>, tell: &mut dyn FnMut(News)| {
         let number = pairs.iter().position(|other| *other == pair)?;
