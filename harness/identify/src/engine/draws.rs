@@ -77,7 +77,7 @@ impl Solution<'_> {
             places_of.push(Place {
                 at: point.at,
                 rise: point.minimum.point.cost - least,
-                spread: spread(&jacobian, &which),
+                spread: spread(&jacobian, &which, !self.fit.problem.rough),
                 means: self.fit.mean_residuals(&point.minimum.point),
                 z: point.minimum.point.z,
             });
@@ -219,8 +219,8 @@ impl Solution<'_> {
 }
 
 /// Maps independent normal numbers to steps of the unknowns `which` with the covariance of derivatives.
-fn spread(jacobian: &DMatrix<f64>, which: &[bool]) -> DMatrix<f64> {
-    let curvature = Curvature::new(jacobian, places(which));
+fn spread(jacobian: &DMatrix<f64>, which: &[bool], keeps_flat: bool) -> DMatrix<f64> {
+    let curvature = Curvature::new(jacobian, places(which)).with_flat(keeps_flat);
     let (vectors, inverse) = curvature.spread();
     let mut all = DMatrix::zeros(which.len(), inverse.len());
     for (i, &row) in curvature.which.iter().enumerate() {

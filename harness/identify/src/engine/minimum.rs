@@ -54,6 +54,7 @@ pub struct Curvature {
     pub(super) which: Vec<usize>,
     matrix: DMatrix<f64>,
     pub(super) scale: Vec<f64>,
+    keeps_flat: bool,
 }
 
 impl Curvature {
@@ -64,7 +65,13 @@ impl Curvature {
         let scale: Vec<f64> =
             a.diagonal().iter().map(|d| if *d > 0.0 { 1.0 / d.sqrt() } else { 1.0 }).collect();
         let matrix = DMatrix::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)] * scale[i] * scale[j]);
-        Curvature { which, matrix, scale }
+        Curvature { which, matrix, scale, keeps_flat: false }
+    }
+
+    /// Gives directions of which the recordings show next to nothing the largest variance that the curvature resolves, instead of
+    /// none, so that no unknown in such a direction seems to be known well.
+    pub fn with_flat(self, keeps_flat: bool) -> Self {
+        Curvature { keeps_flat, ..self }
     }
 
     /// Returns a gradient over the unknowns of `which` in the scales of the matrix.
@@ -113,13 +120,22 @@ impl Curvature {
         self.eigen().map_or(f64::NAN, ratio).sqrt()
     }
 
-    /// Returns the eigenvectors of the scaled curvature and the inverse of each eigenvalue; 0 for directions of which the
-    /// recordings show next to nothing.
+    /// Returns the eigenvectors of the scaled curvature and the inverse of each eigenvalue. For directions of which the recordings
+    /// show next to nothing it is 0 unless the curvature is [`with_flat`](Self::with_flat).
     pub fn spread(&self) -> (DMatrix<f64>, DVector<f64>) {
         let n = self.which.len();
         let Some(found) = self.eigen() else { return (DMatrix::zeros(n, n), DVector::zeros(n)) };
         let least = FLAT * found.eigenvalues.max();
-        let inverse = found.eigenvalues.map(|v| if v > least { 1.0 / v } else { 0.0 });
+        // unknowns without any effect have no entry in the matrix
+        let acts = |k: usize| -> bool {
+            let parts = found.eigenvectors.column(k).map(|v| v * v);
+            parts.dot(&self.matrix.diagonal()) > 0.5
+        };
+        let inverse = DVector::from_fn(n, |k, _| match found.eigenvalues[k] {
+            v if v > least => 1.0 / v,
+            _ if self.keeps_flat && acts(k) => 1.0 / least,
+            _ => 0.0,
+        });
         (found.eigenvectors, inverse)
     }
 
@@ -376,6 +392,14 @@ mod tests {
         let found = Curvature::new(&line, vec![0, 1]).covariance(2);
         assert!((found[(0, 0)] - 0.2).abs() < 1e-15 && (found[(1, 1)] - 0.1).abs() < 1e-15);
         assert!(found[(0, 1)].abs() < 1e-15);
+        // of two columns that nearly are the same only the sum is known: neither may seem to be
+        let alike = DMatrix::from_fn(5, 2, |k, j| 1.0 + if j == 0 { 1e-8 * k as f64 } else { 0.0 });
+        let sure = Curvature::new(&alike, vec![0, 1]).covariance(2);
+        let honest = Curvature::new(&alike, vec![0, 1]).with_flat(true).covariance(2);
+        assert!(sure[(0, 0)] < 1.0 && honest[(0, 0)] > 1e10, "{sure} {honest}");
+        let blind = DMatrix::from_fn(5, 2, |_, j| if j == 0 { 1.0 } else { 0.0 });
+        let blind = Curvature::new(&blind, vec![0, 1]).with_flat(true).covariance(2);
+        assert!((blind[(0, 0)] - 0.2).abs() < 1e-15 && blind[(1, 1)] == 0.0, "{blind}");
         // two columns that are the same are not told apart
         let same = Curvature::new(&DMatrix::from_element(5, 2, 1.0), vec![0, 1]);
         assert_eq!(same.unresolved(&[0.0; 2]).len(), 1);

@@ -19,7 +19,6 @@ const LENGTHS: [f64; 3] = [0.03, 0.5, 0.6];
 const NEAR: f64 = 0.2;
 /// Values of the bent unknown, relative to its start, at which other minima are searched.
 const GRID: [f64; 6] = [0.03, 0.1, 0.3, 1.0, 3.0, 10.0];
-const MOST: usize = 14;
 
 pub type Profile = (usize, Vec<Point>);
 
@@ -136,7 +135,8 @@ impl Fit<'_> {
         let found = self.bent;
         let Some(j) = found.or(self.stated_bent()) else { return Ok(None) };
         let jacobian = self.derivatives_at(minimum)?.matrix;
-        let covariance = Curvature::new(&jacobian, places(&self.free)).covariance(unknowns.len());
+        let curvature = Curvature::new(&jacobian, places(&self.free));
+        let covariance = curvature.with_flat(!self.problem.rough).covariance(unknowns.len());
         let std = |i: usize| covariance[(i, i)].sqrt();
         // what stands for it along the bent valley
         let partner = |i: &usize| {
@@ -173,7 +173,7 @@ impl Fit<'_> {
             let along = |i: usize| if own > 0.0 { covariance[(i, j)] / own } else { 0.0 };
             let mut tangent: Vec<f64> = (0..unknowns.len()).map(along).collect();
             let (mut last, mut h, mut risen) = (minimum.clone(), first, 0.0);
-            for _ in 0..MOST {
+            for _ in 0..2 * SETS {
                 let at = last.point.z[j] + side * h;
                 if at < self.ends[j].0 || at > self.ends[j].1 {
                     break;
