@@ -960,9 +960,9 @@ class UncertainModel:
         The search uses the exact sampled loop, with its delay. Starting from each lightly damped
         pole, it follows the sign of the derivatives of the pole's damping by each δ, up to ``|δ| =
         largest``, until the signs repeat. It also tries the lines from 0 to each corner of the
-        ranges, or to 64 of the corners if there are more, and random Δ in between. Damping ratios stay at 0 or above. A Δ
-        that was found gives a lower bound of µ. If none was found, the loop may still be unstable
-        for some Δ: `certify` proves stability.
+        ranges, or to 64 of the corners if there are more, and random Δ in between. Damping ratios
+        stay at 0 or above. A Δ that was found gives a lower bound of µ. If none was found, the loop
+        may still be unstable for some Δ: `certify` proves stability.
 
         Parameters
         ----------
@@ -1001,7 +1001,10 @@ class UncertainModel:
         zero = np.zeros(len(self.counts))
         start = self._poles(loop, K, zero)
         if np.abs(start).max() >= 1:
-            raise FmuError("the loop is unstable at Δ = 0")
+            raise FmuError(
+                "the loop is unstable at Δ = 0, which is the craft without changes: "
+                "hubslosh.margins(loop) shows its margins"
+            )
         light = start[(start.imag > 0) & (np.abs(start) > np.exp(-0.3 * np.abs(np.angle(start))))]
         best, seen = WorstCase({}, np.inf, np.nan, {}), set()
         for pole in light[np.argsort(-np.abs(light))]:
