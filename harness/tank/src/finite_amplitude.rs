@@ -192,36 +192,50 @@ pub fn add_large_waves(tank: &Tank, data: &mut ModalData) {
 
 const LEFT_OUT: &str = "the coefficients that give the wave's energy are left out, because";
 
-fn large_waves(tank: &Tank, data: &ModalData, third: &Coefficients) -> Result<Energy, String> {
+/// Reason why a tank has no coefficients that give the wave's energy.
+#[derive(Clone, Copy, Debug, thiserror::Error)]
+enum NoEnergy {
+    #[error("the tank is not a body of revolution")]
+    NotRound,
+    #[error("the liquid is a ring")]
+    Ring,
+    #[error(
+        "periodic waves up to {:.0} degrees were not found: the wall has a corner near the surface, or modes of the surface have \
+         multiples of the frequency of mode 1",
+        large_waves::LEAST.to_degrees()
+    )]
+    NoWaves,
+    #[error(
+        "the shift of omega^2 of small waves, over the square of the slosh angle, differs by {0:.2} from that of the third order \
+         (allowed: {LARGEST_SHIFT_ERROR}): deep liquid and strong resonances need more functions"
+    )]
+    OtherThirdOrder(f64),
+    #[error(
+        "no slosh mass has the frequencies of the waves within {:.1} %: the best one errs by {:.1} %",
+        100.0 * LARGEST_FREQUENCY_ERROR,
+        100.0 * .0
+    )]
+    NoSloshMass(f64),
+}
+
+fn large_waves(tank: &Tank, data: &ModalData, third: &Coefficients) -> Result<Energy, NoEnergy> {
     let (Geometry::Revolution { contour, .. }, Some(wall)) = (&tank.geometry, &data.wall) else {
-        return Err("the tank is not a body of revolution".to_string());
+        return Err(NoEnergy::NotRound);
     };
     if wall.r_inner > 0.0 {
-        return Err("the liquid is a ring".to_string());
+        return Err(NoEnergy::Ring);
     }
     let fit = large_waves::Side::new(contour, wall).and_then(|side| large_waves::fit(wall, &side));
-    let fit = fit.ok_or_else(|| {
-        format!(
-            "periodic waves up to {:.0} degrees were not found: the wall has a corner near the surface, or modes of the surface have              multiples of the frequency of mode 1",
-            large_waves::LEAST.to_degrees()
-        )
-    })?;
+    let fit = fit.ok_or(NoEnergy::NoWaves)?;
     // The third order is known by another method.
     let exact = [third.planar, third.circular.unwrap_or(fit.shifts[1])];
     let off = (0..2).map(|i| (fit.shifts[i] - exact[i]).abs()).fold(0.0, f64::max);
     if off > LARGEST_SHIFT_ERROR {
-        return Err(format!(
-            "the shift of omega^2 of small waves, over the square of the slosh angle, differs by {off:.2} from that of the third order \
-             (allowed: {LARGEST_SHIFT_ERROR}): deep liquid and strong resonances need more functions"
-        ));
+        return Err(NoEnergy::OtherThirdOrder(off));
     }
     let [planar, rotary, energy] = fit.errors;
     if planar.max(rotary) > LARGEST_FREQUENCY_ERROR {
-        return Err(format!(
-            "no slosh mass has the frequencies of the waves within {:.1} %: the best one errs by {:.1} %",
-            100.0 * LARGEST_FREQUENCY_ERROR,
-            100.0 * planar.max(rotary)
-        ));
+        return Err(NoEnergy::NoSloshMass(planar.max(rotary)));
     }
     let errors = [planar.max(rotary), energy];
     Ok(Energy::new(&fit.terms, errors, third.angle_limit, EnergySource::ThisTank))
