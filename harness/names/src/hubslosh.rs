@@ -184,6 +184,7 @@ pub mod solver {
     pub const MAX_STEPS: &str = "solver.max_steps";
 }
 
+/// Parameters that size arrays.
 #[rustfmt::skip]
 pub const SIZES: &[crate::Size] = &[
     crate::Size {

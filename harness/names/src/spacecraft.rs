@@ -176,6 +176,7 @@ pub mod solver {
     pub const MAX_STEPS: &str = "solver.max_steps";
 }
 
+/// Parameters that size arrays.
 #[rustfmt::skip]
 pub const SIZES: &[crate::Size] = &[
     crate::Size {
