@@ -610,7 +610,7 @@ mod tests {
             torque.history(sample, 60.0, hold).unwrap_err().to_string()
         };
         let error = refused("lin-sweep:f1=1e9", 0.02, false);
-        for word in ["4.215e12 commands", "allowed: at most 20000000", "Up to 2.847e-4 s"] {
+        for word in ["4.215e12 commands", "allowed: at most 20000000", "up to 2.847e-4 s"] {
             assert!(error.contains(word), "{word}: {error}");
         }
         // 20 million rows in 60 s, 70.25 for a cycle
