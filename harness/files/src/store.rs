@@ -619,7 +619,7 @@ mod tests {
         assert!(error.contains("it is missing") && error.contains("remove"), "{error}");
         fs::create_dir(&place).unwrap();
         let error = format!("{:#}", take().unwrap_err());
-        assert!(error.contains("leads to a directory"), "{error}");
+        assert!(error.contains("the path is a directory"), "{error}");
         // without runs there is nothing to verify
         fs::remove_dir(&place).unwrap();
         fs::remove_dir_all(directory.path().join("runs")).unwrap();

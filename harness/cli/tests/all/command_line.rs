@@ -380,7 +380,7 @@ fn an_fmu_whose_description_and_binary_do_not_belong_together_is_refused() {
     edited_fmu(directory, |xml| {
         Some(xml.replace("modelIdentifier=\"HubSlosh\"", "modelIdentifier=\"Other\""))
     });
-    refuses(directory, run, &["no binary for this platform", "binaries in it: binaries/"]);
+    refuses(directory, run, &["no binary for this platform", "binaries in the FMU: binaries/"]);
     edited_fmu(directory, |_| Some("<fmiModelDescription".into()));
     refuses(directory, run, &["Edited.fmu", "modelDescription.xml"]);
 }

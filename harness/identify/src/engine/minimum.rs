@@ -256,7 +256,8 @@ impl Fit<'_> {
                 derivatives = None;
                 continue;
             }
-            if fresh && point.cost - 1.5 * won > end.above && decrement < 30.0 {
+            // where dry friction stops the hub, the first forecast may be half of what the steps win
+            if fresh && sets > 1 && point.cost - 1.5 * won > end.above && decrement < 30.0 {
                 break;
             }
             let mut outcome = None;

@@ -28,7 +28,9 @@ impl Signal {
     }
 
     fn least_noise(&self) -> f64 {
-        (LEAST_NOISE * deviation(&self.picked(&self.measured))).max(f64::MIN_POSITIVE)
+        let spread = deviation(&self.picked(&self.measured));
+        // a constant signal has a spread of 0
+        (LEAST_NOISE * spread).max(1e-6 * self.white).max(f64::MIN_POSITIVE)
     }
 
     pub fn noise_of(&self, time: &[f64], residual: &[f64]) -> Noise {

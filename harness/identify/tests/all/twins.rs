@@ -50,6 +50,14 @@ fn a_delay_is_not_sure_while_another_torque_between_rows_fits_as_well() {
     is_described(89, &[]);
 }
 
+/// The torque is held, and the delay is 5 ms. The search with the held torque was given up after one set of derivatives, which
+/// foretold half of what the steps win, so that the delay was stated as 15.1 ms ± 0.05 ms with a linear torque.
+#[test]
+#[ignore = "a quarter of a minute: .ci/run --nightly"]
+fn a_torque_between_rows_is_not_given_up_by_its_first_forecast() {
+    is_described(483, &["delay"]);
+}
+
 /// The search once ended one standard deviation away from the minimum, because the likelihood has a kink at the
 /// minimum: dry friction stops the hub within the first row.
 #[test]
