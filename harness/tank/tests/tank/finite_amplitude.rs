@@ -503,7 +503,7 @@ fn a_fill_table_with_fewer_than_two_known_fills_uses_pendulums_with_a_reason() {
         let table = sweep(&tank, &fills, 1).unwrap();
         let set = fill_table::parameters(&tank, &table, None, Target::SloshTank, WATER).unwrap();
         assert!(third_order_of(&set).is_empty() && set.third_order.is_empty(), "{shape}");
-        let said = |note: &String| note.contains("takes a pendulum") && note.contains(why);
+        let said = |note: &String| note.contains("as a pendulum") && note.contains(why);
         assert!(set.notes.iter().any(said), "{shape} {:?}", set.notes);
     }
 }
