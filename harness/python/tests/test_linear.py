@@ -124,7 +124,7 @@ def test_a_sweep_shows_the_linear_model(fmu: Path, sweep: pd.DataFrame, hold: bo
     [
         (lambda d: d.drop(columns="omega"), {}, "data has no column omega"),
         (lambda d: d.iloc[np.r_[:100, 150:300]], {}, "equal steps; it does not after row 99"),
-        (lambda d: d.assign(tau_cmd=0.1), {}, "tau_cmd does not change"),
+        (lambda d: d.assign(tau_cmd=0.1), {}, "tau_cmd is constant"),
         (lambda d: d[:10], {}, "16 rows or more, not 10"),
         (lambda d: d, {"resolution": 1e-6}, "resolution must be from"),
         (lambda d: d, {"band": (20, 21)}, "no power between 20 and 21 Hz"),

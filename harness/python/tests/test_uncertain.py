@@ -274,7 +274,7 @@ def test_models_families_and_parameters_as_mat(spacecraft: Path, tmp_path: Path)
     read = loadmat(tmp_path / "values.mat", simplify_cells=True)
     assert read["tank_1_h"] == 50 and read["units"]["tank_1_h"] == "mm" and read["mount"] == "free"
     other = replace(models[300.0], outputs=("a", "b", "c"))
-    with pytest.raises(FmuError, match="differ in outputs"):
+    with pytest.raises(FmuError, match="must have the same outputs"):
         hubslosh.to_mat([models[300.0], other], tmp_path / "x.mat")
 
 

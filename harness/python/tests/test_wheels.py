@@ -287,7 +287,7 @@ def test_a_review_and_an_uncertain_model_take_wheels(craft: Craft, tmp_path: Pat
     assert again.loop(0).names[1] == ["x.torque", "y.torque", "z.torque"]
 
 
-def test_wrong_wheels_are_named(rigid: Craft) -> None:
+def test_wrong_wheels_are_named(rigid: Craft, fmu: Path) -> None:
     """Messages say what is wrong, where, and what is allowed."""
     for wheel, what in (
         (Wheel((0, 0, 0), 0.01, 0.2, 400), "axis must not be zero"),
@@ -327,5 +327,5 @@ def test_wrong_wheels_are_named(rigid: Craft) -> None:
     table = pd.DataFrame({"time": [0.0, 1.0], "e.torque": [0.1, 0.0]})
     with pytest.raises(FmuError, match="no inputs of"):
         rigid.simulate(0, table)
-    bench = hubslosh.Loop([[4.0, 2.0]], 0.1, command="z.torque", wheels={"z": PYRAMID["a"]})
+    bench = hubslosh.Loop([[4.0, 2.0]], 0.1, fmu, command="z.torque", wheels={"z": PYRAMID["a"]})
     assert "wheels are for Spacecraft" in bench.problems()[0]
