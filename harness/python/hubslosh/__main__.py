@@ -19,7 +19,7 @@ from .tables import ending_of, read_table, setting, write_table
 
 
 def main() -> None:
-    """Run a command of the program, or simulate the FMU under a torque history from a file."""
+    """Run the command line ``python -m hubslosh``: a command of the program, or a simulation."""
     if sys.argv[1:] and not sys.argv[1].startswith("-"):
         try:
             sys.exit(subprocess.run([find_program(), *sys.argv[1:]], check=False).returncode)

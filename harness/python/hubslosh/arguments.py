@@ -109,7 +109,7 @@ def names_of(names: Any, what: str, problems: list[str]) -> list[str]:
 
 
 def not_numbers(**values: Any) -> list[str]:
-    """Return a sentence for each argument that is neither a number nor None."""
+    """Return one error sentence for each argument that is neither a number nor None."""
     kinds = (int, float, np.integer, np.floating)
     return [
         f"{name} must be a number, not {value!r}"

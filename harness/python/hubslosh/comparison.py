@@ -42,10 +42,12 @@ def compare(reviews: Mapping[str, Review], out: str | Path | None = None) -> pd.
     Returns
     -------
     DataFrame
-        A row for each design: ``passed`` (all points stable, all requirements met), ``unstable``
-        and ``points`` (numbers), the least ``modulus_margin``, ``phase_margin`` (deg),
-        ``gain_margin`` (dB) and ``delay_margin`` (s) of all points (NaN if one is unstable),
-        ``fill`` of the worst point in words, and the number of requirements that are ``failing``.
+        A row for each design. ``passed`` is true if all operating points are stable and all
+        requirements are met. ``points`` is the number of operating points, and ``unstable`` the
+        number of unstable ones. ``modulus_margin``, ``phase_margin`` (deg), ``gain_margin`` (dB)
+        and ``delay_margin`` (s) are the smallest margins over all operating points; they are NaN
+        if a point is unstable. ``fill`` is the fill of the worst operating point in words, and
+        ``failing`` the number of requirements that fail.
 
     Raises
     ------

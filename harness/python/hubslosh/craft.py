@@ -1292,7 +1292,7 @@ class Craft:
         parameters: Parameters | None = None,
         **options: Any,
     ) -> "Run":
-        """Return a simulation of the trimmed craft from a fill on; see `hubslosh.simulate`.
+        """Simulate the trimmed craft, starting at a fill; see `hubslosh.simulate`.
 
         Parameters
         ----------
@@ -1300,9 +1300,10 @@ class Craft:
             Fill of the tanks, as for `fills`.
         inputs : DataFrame, optional
             Histories of inputs with the column ``time``, as for `hubslosh.simulate`; they replace
-            thrust and torque of the craft. A column such as ``z.torque`` is the torque of wheel z
-            on the craft, N·m, held from row to row within the wheel's limits; the result then has
-            the torques that act, and the speeds, such as ``z.speed`` (rad/s).
+            thrust and torque of the craft. A column such as ``z.torque`` commands the torque of
+            wheel z on the craft, N·m. Each value is kept until the next row and is limited to what
+            the wheel can do; the result then contains the torque that acts and the speed of the
+            wheel, such as ``z.torque`` and ``z.speed`` (rad/s).
         stop : float, optional
             End of the simulation, s.
         step : float, optional

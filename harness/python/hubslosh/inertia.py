@@ -53,9 +53,11 @@ def bottom_up(parts: Mapping[str, Mapping[str, Any]] | Sequence[Mapping[str, Any
     Returns
     -------
     DataFrame
-        A row for each part: ``mass`` (kg), ``own`` inertia, ``offset`` (m r²), their sum
-        ``inertia`` (kg·m²) and its ``share``. ``.attrs["parameters"]`` has HubSlosh's ``hub.I``,
-        ``hub.imbalance`` and ``hub.imbalance_angle``, for `simulate`.
+        A row for each part of the hub: its ``mass`` (kg), its ``own`` inertia about its centre of
+        mass, ``offset`` (mass times squared distance from the axis), the sum of both, ``inertia``
+        (all in kg·m²), and the ``share`` of the part in the total inertia.
+        ``.attrs["parameters"]`` has HubSlosh's ``hub.I``, ``hub.imbalance`` and
+        ``hub.imbalance_angle``, for `simulate`.
 
     Raises
     ------

@@ -58,7 +58,7 @@ def posterior(
         A row for each of ``(steps - burn) * walkers`` samples and a column for each unknown, SI
         units. ``table.quantile([0.025, 0.975])`` gives 95 % intervals.
         ``.attrs["autocorrelation"]`` has the correlation time of each unknown in steps; if
-        ``steps - burn`` is less than ten of them, the intervals are rough.
+        ``steps - burn`` is less than ten correlation times, the intervals are inaccurate.
 
     Raises
     ------

@@ -65,11 +65,11 @@ def mode_errors(
     Returns
     -------
     DataFrame
-        A row for each number of modes, with the relative errors ``impulse`` (largest error of
-        the force after an impulse of the tank, over the largest force; equation 4.24 of Rubaga's
-        thesis) and ``band`` (largest error of force over acceleration below ``below``, over the
-        mass of the liquid). ``.attrs["needed"]`` has the number of modes for errors of 5 % and
-        1 %, ``.attrs["below"]`` the end of the band, Hz.
+        A row for each number of modes, with two relative errors. ``impulse`` is the largest error
+        of the force after an impulse of the tank, divided by the largest force (equation 4.24 of
+        Rubaga's thesis). ``band`` is the largest error of the response from acceleration to force
+        at frequencies up to ``below``, divided by the mass of the liquid. ``.attrs["needed"]`` has
+        the number of modes for errors of 5 % and 1 %, ``.attrs["below"]`` the end of the band, Hz.
 
     Raises
     ------

@@ -646,12 +646,13 @@ def monte_carlo(
 
 
 def save(figure: "Figure | SubFigure", path: "str | Path") -> None:
-    """Write a figure so that the same figure always gives the same bytes, also as SVG.
+    """Write a figure to a file, so that equal figures give byte-identical files, also as SVG.
 
     Parameters
     ----------
     figure : matplotlib Figure
-        The figure, such as ``axes[0].figure``; of a part, the whole figure.
+        The figure to write, such as ``axes[0].figure``. If a SubFigure is given, the whole figure
+        that contains it is written.
     path : str or Path
         File in a format of matplotlib, such as .png, .svg or .pdf.
 

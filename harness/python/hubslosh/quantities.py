@@ -71,9 +71,9 @@ class ModeQuantity:
     number: int
 
     def name(self, kind: str) -> str:
-        """Return the FMU's name of the parameter ``kind`` of this mode.
+        """Return the name of one parameter of this slosh mode in the FMU.
 
-        For example ``tank[2].zeta[1]``.
+        For example, ``kind`` "zeta" of the first mode of tank 2 gives ``tank[2].zeta[1]``.
         """
         return f"tank[{self.tank}].{kind}[{self.number}]"
 

@@ -19,7 +19,7 @@ POINTS = ("nominal", "all")
 
 @dataclass(frozen=True)
 class Requirement:
-    """The smallest value of one margin that the nominal points, or all points, must have."""
+    """The least value that one margin must have at the nominal, or at all, operating points."""
 
     margin: str
     points: str
@@ -39,8 +39,9 @@ class Requirement:
 def requirements_of(given: Any) -> tuple[Requirement, ...]:
     """Return requirements from the argument ``requirements=`` of `Craft.review`.
 
-    The argument is a dictionary from the name of a margin to a limit for all points, or to limits
-    for ``nominal`` and ``all`` points. Raises FmuError with everything that is wrong.
+    The argument is a dictionary from the name of a margin to a limit for all operating points, or
+    to separate limits for ``nominal`` and ``all`` operating points. Raises FmuError with
+    everything that is wrong.
     """
     if given is None:
         return ()
@@ -70,9 +71,9 @@ def requirements_of(given: Any) -> tuple[Requirement, ...]:
 
 
 def judged(requirements: tuple[Requirement, ...], points: pd.DataFrame) -> ShortTable:
-    """Return a table with one row for each requirement, failed requirements first.
+    """Judge the margins of the operating points by the requirements, failed requirements first.
 
-    See `Review.requirements` for the columns.
+    The returned table has one row for each requirement and the columns of `Review.requirements`.
     """
     margins = points[["modulus_margin", "delay_margin"]].copy()
     margins["phase_margin"] = points["phase_margin"].abs()

@@ -93,21 +93,23 @@ class Review:
         Linear model of the craft at each fill, from commands to measurements. All have the same
         states; at a fill where a mode is missing, its states are zero.
     nominal : tuple of Point
-        Nominal point at each fill, with its ``loop``, ``margins`` and loop ``gain``.
+        Nominal operating point at each fill, with its ``loop``, ``margins`` and loop ``gain``.
     points : DataFrame
-        A row for each point: ``kind`` ("nominal", "one at a time", "draw" or "search"), ``fill``
-        (index), ``stable``, ``modulus_margin``, ``phase_margin`` (deg), ``gain_up`` and
-        ``gain_down`` (dB), ``delay_margin`` (s), ``growth`` (1/s, of the closed loop's least
-        stable pole), ``distance`` (modulus margin, or minus the growth rate if unstable), and the
-        share of each uncertain quantity: -1 low end, 0 nominal, 1 high end. Margins of an
-        unstable point are NaN.
+        A row for each operating point. ``kind`` says how the point was chosen ("nominal", "one at
+        a time", "draw" or "search"), and ``fill`` is the index of its fill. ``stable`` says
+        whether the closed loop is stable. The margins are ``modulus_margin``, ``phase_margin``
+        (deg), ``gain_up`` and ``gain_down`` (dB by which the gain may rise and fall) and
+        ``delay_margin`` (s); they are NaN if the loop is unstable. ``growth`` (1/s) is the growth
+        rate of the least stable pole of the closed loop. ``distance`` is the modulus margin or, if
+        the loop is unstable, minus the growth rate. One further column for each uncertain quantity
+        has its place in its range: -1 at the low end, 0 at the nominal value, 1 at the high end.
     slosh : DataFrame
-        A row for each nominal fill, loop and slosh mode that shows in the loop gain, with the
-        columns of `hubslosh.stabilisation.resonances`.
+        A row for each slosh mode that appears in the loop gain, at each fill and for each command,
+        with the columns of `hubslosh.stabilisation.resonances`.
     worst : Point
-        Point with the smallest ``distance``, found by a search.
+        Operating point with the smallest ``distance``, found by a search.
     confirmation : Confirmation
-        Simulation of the nonlinear FMU at the worst point.
+        Simulation of the nonlinear FMU at the worst operating point.
     suggestion : Suggestion
         A notch or roll-off that raises the smallest margin, with its cost in phase.
     warnings : tuple of str
@@ -160,10 +162,12 @@ class Review:
         Returns
         -------
         DataFrame
-            A row for each fill: ``fill`` (index), ``at`` (in `unit`), ``points`` and ``unstable``
-            (numbers of all and of unstable points), and for each margin of `points` the columns
-            ``…_low``, ``…_nominal`` and ``…_high``. They are NaN if no point is stable, or for
-            ``…_nominal`` if the nominal point is unstable.
+            A row for each fill. ``fill`` is its index and ``at`` the fill in `unit`. ``points`` is
+            the number of operating points at this fill, and ``unstable`` the number of unstable
+            ones among them. For each margin of `points` the columns ``…_low``, ``…_nominal`` and
+            ``…_high`` have the smallest, the nominal and the largest value over the stable points.
+            They are NaN if no point is stable, and ``…_nominal`` is NaN if the nominal point is
+            unstable.
 
         """
         names = ["modulus_margin", "phase_margin", "gain_up", "gain_down", "delay_margin"]
@@ -184,7 +188,7 @@ class Review:
         Returns
         -------
         DataFrame
-            Rows with the columns of `points`; none if every point is stable.
+            The rows of `points` at which the loop is unstable; an empty table if there are none.
         """
         rows = self.points[~self.points["stable"]]
         return rows.sort_values("growth", ascending=False, kind="stable")
@@ -195,10 +199,12 @@ class Review:
         Returns
         -------
         DataFrame
-            A row for each requirement: ``requirement`` in words, ``passed``, ``least`` (the
-            smallest margin; -inf if a point is unstable), ``fill`` (index of the fill where the
-            margin is smallest), and the numbers of ``failing`` points and of all ``points`` to
-            which the requirement applies. An unstable point fails.
+            A row for each requirement. ``requirement`` states it in words, and ``passed`` says
+            whether it is met. ``least`` is the smallest margin over all operating points to which
+            the requirement applies (-inf if one of them is unstable), and ``fill`` the index of
+            the fill with this margin. ``points`` is the number of operating points to which the
+            requirement applies, and ``failing`` the number of those that fail; an unstable point
+            always fails.
         """
         return judged(self.limits, self.points)
 
@@ -262,11 +268,11 @@ class Review:
 
     @property
     def summary(self) -> str:
-        """One sentence about the stability of all points, and one about the requirements."""
+        """Two sentences: whether every operating point is stable, and which requirements fail."""
         return " ".join([self._stability(), *self._failures()])
 
     def _failures(self) -> list[str]:
-        """Return which requirements fail in a sentence; none without requirements."""
+        """Return one sentence that lists the requirements that fail; none without requirements."""
         table = self.requirements()
         failed = table[~table["passed"]]
         if table.empty:

@@ -381,8 +381,10 @@ def quantiles(
     Returns
     -------
     pandas.DataFrame
-        A row for each result and quantile: ``result``, ``quantile``, ``value`` (linear between
-        order statistics), ``low``, ``high`` and the number of ``runs``.
+        A row for each result and quantile. ``result`` is the name of the result, ``quantile`` the
+        probability, and ``value`` the estimated quantile, interpolated linearly between the sorted
+        results. ``low`` and ``high`` are the ends of its confidence interval, and ``runs`` is the
+        number of runs that have this result.
 
     Raises
     ------

@@ -64,8 +64,9 @@ def simulate(
     ----------
     model : str or Path
         Name of an FMU of this package (see `fmu_path`), such as "HubSlosh" or, of FMI 3.0,
-        "HubSlosh-fmi3"; or the file of any FMU 2.0 or 3.0 for Co-Simulation. Both versions give
-        the same bits if inputs are held; with interpolated inputs the last digits may differ.
+        "HubSlosh-fmi3"; or the file of any FMU 2.0 or 3.0 for Co-Simulation. Results of FMI 2.0
+        and FMI 3.0 are bit-identical if inputs are held; with interpolated inputs the last digits
+        may differ.
     parameters : mapping, str or Path, optional
         Values of parameters and inputs by name, in SI units or with one of the variable's own
         units, ``{"tank.h": (50, "mm")}``; enumerations by item or number. Or a file of
@@ -73,9 +74,9 @@ def simulate(
     inputs : DataFrame, optional
         A table with the column ``time`` (s, growing; two rows at one time are a jump) and one
         column for each input, with straight lines between the rows. Values are in SI units, or
-        in those of ``inputs.attrs["units"]``, such as ``{"wheel_speed": "rpm"}``, each one of
-        the input's own units. ``tau_slope``, which ``hubslosh torque`` writes, is the slope of
-        ``tau_cmd``.
+        in the units that ``inputs.attrs["units"]`` names, such as ``{"wheel_speed": "rpm"}``;
+        these must be units that the FMU declares for the input. ``tau_slope``, which ``hubslosh
+        torque`` writes, is the slope of ``tau_cmd``.
     stop : float, optional
         Time of the last row, s; by default the last time of the inputs, otherwise the FMU's
         suggestion.
@@ -92,8 +93,9 @@ def simulate(
     tolerance : float, optional
         Relative tolerance of the FMU's solver; by default its own choice.
     hold : bool
-        Hold inputs from row to row instead of straight lines. An FMU that cannot interpolate
-        its inputs needs it, unless they are constant from row to row.
+        True: each input keeps its value until the next row. False: inputs follow straight lines
+        between the rows; if the FMU cannot interpolate its inputs, this is possible only for
+        inputs that are constant.
 
     Returns
     -------

@@ -34,28 +34,34 @@ MOVED = 1e-11  # Residue, over the norms of B and C, below which an input does n
 
 @dataclass(frozen=True, eq=False)
 class Margins:
-    """The result of `margins`; ``print`` shows a verdict in words and the main rows of the table.
+    """Stability margins of a control loop; ``print`` shows a verdict and the main crossings.
 
     Attributes
     ----------
     crossings : DataFrame
-        A row for each crossing, by frequency: ``loop`` (the command at which it was broken),
-        ``crossing`` ("gain": the magnitude of the loop gain is 1; "phase": it is negative real),
-        ``frequency`` (Hz), ``gain_margin`` (dB by which the gain may grow, or shrink if
-        negative, until this phase crossing passes through -1), ``phase_margin`` (deg, from -180
-        to 180), ``delay_margin`` (s, phase margin from 0 to 360° over frequency) and ``near``:
-        the lightly damped modes of the plant within a fifth of their frequency, by tank or by
-        the states that take most part.
+        A row for each gain or phase crossing, sorted by frequency. Column ``loop`` names the
+        command at which the loop was broken. ``crossing`` is "gain" if the magnitude of the loop
+        gain is 1, or "phase" if the loop gain is real and negative. ``frequency`` is in Hz.
+        ``gain_margin`` (phase crossings) is the change of the gain in dB, negative for a smaller
+        gain, that moves this crossing to -1, the limit of stability. ``phase_margin`` (gain
+        crossings) is in deg, from -180 to 180. ``delay_margin`` is the delay in s that uses up the
+        phase margin at this frequency, where a negative phase margin counts as a lag of up to
+        360°. ``near`` names the lightly damped modes of the plant whose frequency differs from the
+        crossing frequency by at most a fifth of its own: by their tank or, without a tank, by the
+        states that take part most.
     stable : bool
-        True if the closed loop is stable; for a `Loop`, its controllable and observable part.
+        True if the closed loop is stable. Of a `Loop` only the controllable and observable part is
+        judged.
     poles : ndarray of complex
-        Poles of the closed loop by magnitude: rad/s, or in the z plane.
+        Poles of the closed loop, sorted by magnitude: in rad/s, or in the z plane if the loop is
+        sampled.
     modulus_margin : float
-        Least distance of the loop gain to -1.
+        Smallest distance between the loop gain and the point -1.
     delay_margin : float
-        Further delay of all commands, s, at which the loop becomes unstable; 0 if it already is.
+        Smallest further delay of all commands, s, that makes the loop unstable; 0 if the loop is
+        already unstable.
     modes : DataFrame
-        Modes of the plant with damping ratios below 0.2: see `LinearModel.modes`.
+        Modes of the plant with damping ratios below 0.2; for the columns see `LinearModel.modes`.
 
     Examples
     --------

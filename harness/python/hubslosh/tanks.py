@@ -57,7 +57,7 @@ class Tank:
 
     @cached_property
     def picture(self) -> str:
-        """Picture of tank, free surface and mode shapes, SVG."""
+        """Drawing of the tank, its free surface and its mode shapes, as the text of an SVG file."""
         return str(self._solved.picture())
 
     @property
@@ -405,7 +405,7 @@ def fill_table(
 
 
 def _tank_source(source: Any) -> "dict[str, Any] | Path":
-    """Return a tank's file, or what would stand in one."""
+    """Return the path of a tank file, or a dictionary with the content of a tank file."""
     if isinstance(source, Mapping):
         given = dict(source)
         for key in ("points", "svg"):  # relative to the tank file
@@ -443,7 +443,7 @@ def toml_key(key: Any) -> str:
 
 
 def _toml(value: Any) -> str:
-    """Return a value as TOML has it."""
+    """Return a value in the notation of TOML."""
     if isinstance(value, Mapping):
         inner = ", ".join(f"{toml_key(k)} = {_toml(v)}" for k, v in value.items())
         return f"{{ {inner} }}"

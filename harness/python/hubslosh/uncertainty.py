@@ -84,7 +84,7 @@ ALONE = 1e-12  # A coefficient below this, relative to others of its kind, is ro
 
 @dataclass(frozen=True)
 class _Bob:
-    """A mode: where it is, and its stiffness over mass, 1/s²."""
+    """A slosh mode: numbers of tank and mode, pendulum length (m), stiffness over mass (1/s²)."""
 
     tank: int
     mode: int
@@ -97,7 +97,7 @@ class _Bob:
 
 @dataclass(frozen=True)
 class _Tank:
-    """A tank: origin, axes (columns x, y, e), rigid liquid and acceleration for damping ratios."""
+    """A tank: origin, axes (columns x, y, e), rigid liquid, and ``g_ref`` of its damping ratios."""
 
     number: int
     origin: Matrix
@@ -112,7 +112,7 @@ class _Tank:
 
 @dataclass(frozen=True)
 class _Mode:
-    """A mode of an appendage: u, the mass matrix per displacement, and the displacement."""
+    """A mode of an appendage: participation u, mass matrix per displacement, displacement."""
 
     number: int
     u: Matrix
@@ -125,7 +125,7 @@ class _Mode:
 
 @dataclass(frozen=True)
 class _Craft:
-    """Spacecraft at rest: what the equations need that is not uncertain, and all other values."""
+    """Spacecraft at rest: the values that may be uncertain, and the constants of the equations."""
 
     values: dict[str, float]
     tanks: dict[int, _Tank]
@@ -137,11 +137,11 @@ class _Craft:
     modes: tuple[_Mode, ...] = ()
 
     def deformed(self) -> Matrix:
-        """Return the part of the mass matrix that comes from deflected appendages."""
+        """Return the change of the 6 × 6 mass matrix by the deflection of the appendages."""
         return sum((mode.eta * mode.body for mode in self.modes), np.zeros((6, 6)))
 
     def pull(self, values: Mapping[str, float]) -> Matrix:
-        """Return the force and torque that deformed appendages at rest exert on the craft."""
+        """Return force and torque (6 numbers, about O) of deflected appendages on the craft."""
         pulls = (
             (TURN * values[mode.name("frequency")]) ** 2 * mode.eta * mode.u for mode in self.modes
         )
@@ -159,13 +159,13 @@ class _Craft:
         return _rigid(*self.dry(self.values)) + self.liquid
 
     def accelerations(self) -> tuple[Matrix, Matrix]:
-        """Return the accelerations X of one rigid body, and those with moving slosh masses."""
+        """Return the craft's acceleration (6 numbers) twice: with rigid liquid and with slosh."""
         whole = np.linalg.solve(self.rigid(), self.wrench)
         load = self.wrench + self.pull(self.values)
         return whole, np.linalg.solve(self.mass_matrix(self.values), load)
 
     def mass_matrix(self, values: Mapping[str, float]) -> Matrix:
-        """Return the mass matrix without the motion of appendages, and of slosh masses across."""
+        """Return the mass matrix without appendage modes and without slosh across the tank axes."""
         M = _rigid(*self.dry(values)) + self.liquid + self.deformed()
         for mode in self.modes:
             M = M - np.outer(mode.u, mode.u)
@@ -493,7 +493,7 @@ def _partitioned(
 
 
 def _connected(M: Matrix, inside: int) -> NDArray[np.bool_]:
-    """Return which of the first ``inside`` rows and columns inputs reach and outputs see."""
+    """Return which of the first ``inside`` signals are both controllable and observable."""
     size = np.abs(M).max(axis=1, keepdims=True)
     joined = np.abs(M) > 1e-14 * size
     reached = joined[:inside, inside:].any(axis=1)
@@ -618,7 +618,7 @@ class UncertainModel:
         return sum(self.counts)
 
     def __repr__(self) -> str:
-        """Return sizes, then each block of Δ."""
+        """Return the sizes of the model, then one line for each block of Δ."""
         M, width = self.M, self.order
         copies = names([f"{n} × {c}" for n, c in zip(self.deltas, self.counts, strict=True)])
         return (
@@ -705,7 +705,7 @@ class UncertainModel:
         )  # fmt: skip
 
     def _scale(self, delta: Mapping[str, float] | ArrayLike) -> Matrix:
-        """Return the states of M over those of the FMU: m l of the bobs."""
+        """Return the factors from the FMU's states to those of M: mass times pendulum length."""
         values = self._values | self.values(delta)
         sizes = {
             (bob.tank, bob.mode): values[bob.name("mass")] * self._length(bob, values)
@@ -716,11 +716,11 @@ class UncertainModel:
         return np.array([sizes[int(of[1]), int(of[2])] if of else 1.0 for of in found])
 
     def _ratio(self, bob: _Bob, values: Mapping[str, float]) -> float:
-        """Return a mode's frequency over that of the craft as it was given."""
+        """Return the ratio of a mode's frequency to its value in the craft as given."""
         return values[bob.name("frequency")] / self._craft.values[bob.name("frequency")]
 
     def _length(self, bob: _Bob, values: Mapping[str, float]) -> float:
-        """Return the length of a pendulum, m; gravity's share of ω² stays."""
+        """Return the pendulum length (m) at which gravity's share of ω² is unchanged."""
         return bob.length * values[FACTOR] / self._ratio(bob, values) ** 2
 
     def parameters(
@@ -930,7 +930,7 @@ class UncertainModel:
         return Certificate(size, worst, ends, data, solved)
 
     def _checked(self, loop: Loop, K: LinearModel) -> "dict[str, NDArray[Any]]":
-        """Return what a check needs of the loop: M, the controller, the loop gain at Δ = 0."""
+        """Return M, the controller and the loop gain at Δ = 0, after checking the loop."""
         gain = loop._gain(self.at(np.zeros(len(self.counts))), K)
         systems = {"M": self.M, "K": K, "L": gain}
         found = {f"{name}_{part}": matrix for name, system in systems.items()
@@ -943,7 +943,7 @@ class UncertainModel:
 
     @property
     def _least(self) -> Matrix:
-        """Return lower ends of δ: damping ratios are 0 or above, others well above 0."""
+        """Return the least δ: there damping ratios are 0, and other quantities well above 0."""
         found = np.full(len(self.deltas), -np.inf)
         for k, name in enumerate(self.deltas):
             if name in self.spread.index and (share := _LEAST.get(_kind(name))) is not None:
@@ -1068,7 +1068,7 @@ class UncertainModel:
     def _limit(
         self, loop: Loop, K: LinearModel, way: Matrix, largest: float, steps: int = 24
     ) -> WorstCase:
-        """Return the Δ along a direction, of largest component 1, at the limit of stability."""
+        """Return the Δ along ``way`` (with largest component 1) at the limit of stability."""
 
         def outside(size: float) -> bool:
             # 1e-9: modes that no input moves have no damping there

@@ -206,7 +206,7 @@ class Histories:
 def histories(
     inputs: "pd.DataFrame", wheels: Mapping[str, Wheel], start: Vector, *, hold: bool
 ) -> Histories:
-    """Return what wheels do whose torques are columns of ``inputs``, such as ``z.torque``.
+    """Return torques and speeds of wheels that ``inputs`` command, for example by ``z.torque``.
 
     Their torques are held from row to row, within the wheels' limits. ``start`` is the momentum of
     all wheels at the start, N·m·s. ``hold``: the other inputs are held, too.

@@ -112,7 +112,7 @@ def _decibel(factor: float) -> str:
 
 
 def search(evaluate: Evaluate, points: "Sequence[Point]") -> "list[Point]":
-    """Search the point with the smallest modulus margin, and return all points on the way.
+    """Search the operating point with the smallest modulus margin; return all points tried.
 
     The search starts at the corner to which the effects of single ranges point, and at the worst
     points so far. It changes one coordinate at a time, by a step that is halved when no change
