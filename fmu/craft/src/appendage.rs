@@ -120,13 +120,15 @@ impl Mode {
         }
     }
 
-    /// Returns w.(D w) from the products xx, yy, zz, xy, xz, yz of w.
+    /// Returns w.(D w), the quadratic form of this mode's matrix D in the craft's angular velocity w. `ww` has the
+    /// products xx, yy, zz, xy, xz, yz of the components of w.
     fn turning<T: Number>(&self, ww: Symmetric<T>) -> T {
         let [xx, yy, zz, xy, xz, yz] = self.growth;
         ww[0] * xx + ww[1] * yy + ww[2] * zz + (ww[3] * xy + ww[4] * xz + ww[5] * yz) * 2.0
     }
 
-    /// Returns the part of -eta'' that depends on neither a nor w'. `turning` is w.(D w).
+    /// Returns the part of -eta'', the mode's deceleration, that depends neither on the craft's acceleration a nor on
+    /// its angular acceleration w'. `turning` is w.(D w), see the module's head.
     fn pull<T: Number>(&self, eta: T, rate: T, turning: T) -> T {
         rate * self.damping + eta * self.stiffness - turning * 0.5
     }
@@ -258,7 +260,8 @@ impl Structure {
         [force, torque]
     }
 
-    /// Takes the sum of u u^T from the craft's mass matrix.
+    /// Subtracts the sum of u u^T over all modes from the craft's mass matrix, because the modes move freely along
+    /// their participations u = [p; l].
     pub fn reduce<T: Number>(&self, matrix: &mut Mat6<T>) {
         for (row, effective) in matrix.iter_mut().zip(&self.effective) {
             for (x, effective) in row.iter_mut().zip(effective) {
@@ -439,8 +442,9 @@ impl Flexing {
         self.structure.reduce(matrix);
     }
 
-    /// Returns coefficient n of force and torque about O on the craft without the terms in [a; w'] of this
-    /// order. `ww` are the products of the angular velocity.
+    /// Returns coefficient n of the power series of force and torque about O with which the appendage acts on the
+    /// craft. The terms that contain coefficient n of the accelerations [a; w'] are left out, because the mass matrix
+    /// contains them. `ww` has the products of the components of the angular velocity.
     pub fn reaction(&mut self, n: usize, [a, w, w_d]: [&Vector; 3], ww: [f64; 6]) -> [Vec3; 2] {
         let order = (n + 1) as f64;
         for j in 0..self.structure.len() {
@@ -483,8 +487,8 @@ impl Flexing {
         [force, torque]
     }
 
-    /// Returns the derivatives of w' x y + w x K and D w' + (sum of D eta') w along the direction, without the
-    /// derivative of w'.
+    /// Returns the derivatives of two vectors along the direction, with w' held constant: of w' x y + w x K, and of D
+    /// w' + (sum of D eta') w. The module's head defines y, K and D.
     fn rates_along(&self, w: &Vector, w_d: &Vector) -> [Vec3; 2] {
         let [slope, slope_1] =
             [0, 1].map(|n| self.structure.growth(&self.coefficients(&self.rate, n)));

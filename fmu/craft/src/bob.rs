@@ -175,8 +175,9 @@ impl Bob {
         [p[0], p[1], p[2], p_d[0], p_d[1], p_d[2]]
     }
 
-    /// Returns coefficient N of force and torque about O on the craft without the terms in [a; w'] of this
-    /// order. `w` is the pair (w, w), and `w2` is coefficient N of the matrix of y -> w x (w x y).
+    /// Returns coefficient N of the power series of force and torque about O with which the bob acts on the craft. The
+    /// terms that contain coefficient N of the accelerations [a; w'] are left out, because the mass matrix contains
+    /// them. `w` is the pair (w, w), and `w2` is coefficient N of the matrix of the map y -> w x (w x y).
     #[inline(always)]
     pub fn reaction<const N: usize>(&mut self, w: &Pair, w2: &Mat3) -> [Vec3; 2] {
         let Bob { m, l, c, k, .. } = *self;
@@ -228,7 +229,8 @@ impl Bob {
         self.follows
     }
 
-    /// Returns e and P x e, the direction of the tank's axis at the hinge in six dimensions.
+    /// Returns the unit vector e of the tank's axis and its moment P x e about O, with P the hinge. Their product with
+    /// [a; w'] is the acceleration of the hinge along the axis.
     pub fn along_axis(&self) -> [Vec3; 2] {
         [self.e, cross(self.hinge, self.e)]
     }
@@ -288,8 +290,8 @@ impl Bob {
         }
     }
 
-    /// Returns coefficient N (0 or 1) of the rates of the six numbers (tank axes): p', and p'' = v' - w' x p
-    /// - w x p'.
+    /// Returns coefficient N (0 or 1) of the rates of the bob's six states in tank axes: of p' for its direction p, and
+    /// of p'' = v' - w' x p - w x p' for the rate of the direction.
     pub fn rates<const N: usize>(&self, w: &Vector, w_d: &Vector) -> [f64; 6] {
         let turned = add(space::cross::<N>(w_d, &self.p), space::cross::<N>(w, &self.p_d));
         let p_dd = sub(self.v_d[N], turned);
@@ -298,8 +300,8 @@ impl Bob {
         [p_d[0], p_d[1], p_d[2], p_dd[0], p_dd[1], p_dd[2]]
     }
 
-    /// Returns the scale of v for error control, 1/s: the rate of the swing plus the rate that gravity or
-    /// centring gives to the angle.
+    /// Returns the scale of the bob's velocity v for error control, 1/s: the rate of the swing plus the rate that
+    /// gravity or centring gives to the angle.
     #[inline(always)]
     pub fn rate_scale(&self) -> f64 {
         let stiffness = largest(self.specific_force[0]) * self.inv_l + self.k_m;
@@ -312,8 +314,8 @@ impl Bob {
         if self.follows { self.drag.convergence_radius() } else { f64::INFINITY }
     }
 
-    /// Returns the error of v, 1/s, that the series of the drag up to order n cause at `h` after the start of
-    /// the expansion.
+    /// Returns the error of the bob's velocity v, 1/s, that arises because the series of the drag end at order n. `h`
+    /// (s) is the time since the start of the expansion.
     pub fn defect(&self, n: usize, h: f64) -> f64 {
         if !self.follows {
             return 0.0;
@@ -350,8 +352,8 @@ impl Bob {
         self.at_hinge_and_bob(tension, p, p_d)
     }
 
-    /// Returns the wrench at a = 0 and w' = 0, with the tension T_0 = m (l |v|^2 - p.(w x (w x P))) - k l
-    /// |p_perp|^2.
+    /// Returns force and torque of the bob on the craft for the case that the accelerations a and w' are 0. The tension
+    /// of the rod is then T_0 = m (l |v|^2 - p.(w x (w x P))) - k l |p_perp|^2.
     pub fn bias<T: Number>(&self, w: Vec3<T>) -> [Vec3<T>; 2] {
         let [p, p_d, _] = self.state::<T>();
         let v = add(p_d, cross(w, p));
@@ -395,9 +397,9 @@ impl Bob {
         }
     }
 
-    /// Updates the rate for an impulse that changes the craft's velocity by dV (of O) and dw, body axes. The
-    /// bob keeps its velocity across the rod: l p' changes by -(1 - p p^T)(dV + dw x rho). `x` is the six
-    /// numbers at the start of the expansion.
+    /// Updates the rate p' of the bob's direction for an impulse that changes the velocity of O by `dv` and the angular
+    /// velocity by `dw`, both in body axes. The bob keeps its velocity across the rod, so that l p' changes by -(1 - p
+    /// p^T)(dv + dw x rho). `x` has the bob's six states at the start of the expansion.
     pub fn after_impulse(&self, x: &mut [f64; 6], dv: Vec3, dw: Vec3) {
         let p = self.p[0];
         let rho = add(self.hinge, scale(self.l, p));

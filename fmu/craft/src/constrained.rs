@@ -160,7 +160,8 @@ impl HigherSeries {
         })
     }
 
-    /// Starts an expansion at q and u; `s` is S there.
+    /// Starts an expansion at the displacement q across the tank's axis with the square u; `s` is the value of the
+    /// coefficient S at this displacement.
     fn start(&mut self, q: Vec3, u: f64, s: f64) {
         self.u3[0] = u * u * u;
         let t = self.by.rotary_inertia(u);
@@ -169,8 +170,9 @@ impl HigherSeries {
         self.m = [-q[1], q[0], 0.0];
     }
 
-    /// Computes the terms of order n from the coefficients of r and u up to n + 1 and of r' and w_e up to n. Returns the sum of
-    /// the known terms in f.
+    /// Computes the terms of order n of the force f from the coefficients of the position r and of u up to order n + 1,
+    /// and from the coefficients of r' and w_e up to order n. Returns the sum of the terms of f that are known at this
+    /// order.
     #[inline(never)]
     fn expand(&mut self, n: usize, w_e: f64, r: &Vector, r_d: &Vector, u: &Series) -> [f64; 2] {
         let HigherSeries { by, .. } = *self;
@@ -254,12 +256,14 @@ impl HigherSeries {
         self.share * (self.known[2] + dot(self.m, y) + w_e_d * u)
     }
 
-    /// Sets coefficient n of D and P' from S sigma' (`inner`) and T tau' (`pull`) of the newest order.
+    /// Sets coefficient n of D and P', which the module's head defines. `inner` is S sigma' and `pull` is T tau' of the
+    /// newest order.
     fn set(&mut self, n: usize, inner: f64, pull: f64) {
         (self.inwards[n], self.around[n]) = (self.known[0] + inner, self.known[1] + pull);
     }
 
-    /// Returns coefficient n of (u P)' e + u P w x e; `pull` is T tau' of the newest order.
+    /// Returns coefficient n of (u P)' e + u P w x e, the torque of the coefficients beyond the third order per -m l^2;
+    /// `pull` is T tau' of the newest order.
     fn couple(&self, n: usize, pull: f64, w: &Vector, u: &Series) -> Vec3 {
         let mut couple = [0.0, 0.0, u[0] * (self.known[1] + pull)];
         for j in 0..n {
@@ -421,7 +425,8 @@ impl ConstrainedBob {
         }
     }
 
-    /// Adds m J^T H J, with J [a; w'] = a + w' x rho, to the craft's mass matrix.
+    /// Adds the inertia of the bob, m J^T H J, to the craft's mass matrix. J maps the accelerations [a; w'] to the
+    /// acceleration a + w' x rho of the bob's place, and H is defined in the module's head.
     pub fn add_inertia(&self, matrix: &mut Mat6) {
         let rho = self.place();
         let across = self.across.map(|b| (1.0, b));
@@ -439,9 +444,10 @@ impl ConstrainedBob {
         }
     }
 
-    /// Returns coefficient n of force and torque about O on the craft without the terms in [a; w'] of this
-    /// order. `w` is coefficient n of the angular velocity, and `w2` coefficient n of the matrix of
-    /// y -> w x (w x y).
+    /// Returns coefficient n of the power series of force and torque about O with which the bob acts on the craft. The
+    /// terms that contain coefficient n of the accelerations [a; w'] are left out, because the mass matrix contains
+    /// them. `w` is coefficient n of the angular velocity, and `w2` is coefficient n of the matrix of the map y -> w x
+    /// (w x y).
     #[inline(never)]
     pub fn reaction(&mut self, n: usize, w: Vec3, w2: &Mat3) -> [Vec3; 2] {
         let w = transposed_times(&self.axes, w);
@@ -563,7 +569,8 @@ impl ConstrainedBob {
         self.dragged[n] = dragged;
     }
 
-    /// Sets coefficient n of the multipliers and f and n + 1 of V from coefficient n of [a; w'].
+    /// Sets coefficient n of the multipliers and of the force f, and coefficient n + 1 of the velocity V, from
+    /// coefficient n of the craft's accelerations [a; w'].
     #[inline(never)]
     pub fn accelerate(&mut self, n: usize, a: Vec3, w_d: Vec3) {
         let at_hinge = add(a, cross(w_d, self.hinge));
@@ -623,15 +630,16 @@ impl ConstrainedBob {
         surface::bound_message(self.coefficients, higher, self.mode, name)
     }
 
-    /// Sets coefficient n of the liquid's rate of spin W.
+    /// Sets coefficient n of W, the rate of spin of the liquid.
     pub fn set_spin(&mut self, n: usize, turning: f64) {
         if let Some(higher) = &mut self.higher {
             higher.liquid[n] = turning;
         }
     }
 
-    /// Returns coefficient n of the mode's contribution to I_zz s_z of the spinning liquid (`spin.rs`). It is called before
-    /// [`ConstrainedBob::reaction`] of this order; `w` is coefficient n of the angular velocity.
+    /// Returns coefficient n of the mode's contribution to I_zz s_z: the moment of inertia of the spinning liquid about
+    /// the tank's axis times its slip (`spin.rs`). It is called before [`ConstrainedBob::reaction`] of this order; `w`
+    /// is coefficient n of the angular velocity.
     pub fn reaction_on_spin(&self, n: usize, w: Vec3) -> f64 {
         let Some(higher) = self.higher.as_ref().filter(|it| it.by.gyroscopic != [0.0; 2]) else {
             return 0.0;
@@ -657,7 +665,8 @@ impl ConstrainedBob {
         self.drag.set_axial(n, x);
     }
 
-    /// Returns e and P x e, the direction of the tank's axis at the hinge in six dimensions.
+    /// Returns the unit vector e of the tank's axis and its moment P x e about O, with P the hinge. Their product with
+    /// [a; w'] is the acceleration of the hinge along the axis.
     pub fn along_axis(&self) -> [Vec3; 2] {
         let e = self.axes.map(|row| row[2]);
         [e, cross(self.hinge, e)]
@@ -678,8 +687,8 @@ impl ConstrainedBob {
         if self.follows { self.drag.convergence_radius() } else { f64::INFINITY }
     }
 
-    /// Returns the error of V, 1/s, that the series of the drag up to order n cause at `h` after the start of
-    /// the expansion.
+    /// Returns the error of the bob's velocity V, 1/s, that arises because the series of the drag end at order n. `h`
+    /// (s) is the time since the start of the expansion.
     pub fn defect(&self, n: usize, h: f64) -> f64 {
         if !self.follows {
             return 0.0;
@@ -705,8 +714,9 @@ impl ConstrainedBob {
         largest(self.v[n])
     }
 
-    /// Updates the rate for an impulse that changes the craft's velocity by dV (of O) and dw, body axes: l r'
-    /// changes by -(1 - H)(dV + dw x rho). `x` is the six numbers at the start of the expansion.
+    /// Updates the rate r' of the bob for an impulse that changes the velocity of O by `dv` and the angular velocity by
+    /// `dw`, both in body axes: l r' changes by -(1 - H)(dv + dw x rho). `x` has the bob's six states at the start of
+    /// the expansion.
     pub fn after_impulse(&self, x: &mut [f64; 6], dv: Vec3, dw: Vec3) {
         let kick = transposed_times(&self.axes, add(dv, cross(dw, self.place())));
         let mut change = scale(-self.inv_l, sub(kick, self.held(kick)));

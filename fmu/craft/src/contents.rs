@@ -230,8 +230,10 @@ impl MountedTank {
         [sub(hinge, b.map(|b| b * self.tank.arm[n])), p, p_d]
     }
 
-    /// Returns surface and height of the bob of mode `n`, which counts from 0, from l with its derivatives,
-    /// p, p' and w, and the liquid's rate of spin with its derivative. `changing` has s and kappa with their derivatives if the table gives them.
+    /// Returns the surface on which the bob of mode `n` moves, and the height of the bob. They follow from the length l
+    /// with its derivatives, the direction p, its rate p', the angular velocity w, and the liquid's rate of spin with
+    /// its derivative. `changing` has the large-wave coefficients s and kappa with their derivatives if the fill table
+    /// gives them. Modes count from 0.
     #[inline(never)]
     fn on_surface<T: Number>(
         &self,
@@ -432,7 +434,7 @@ impl<T: Number> OnSurface<T> {
         self.meridian.free(force)
     }
 
-    /// Returns the couple on the craft over m, from -l y, `slid`.
+    /// Returns the couple on the craft per mass of the bob; `slid` is the vector -l y (`surface.rs`).
     fn couple(&self, slid: Vec3<T>, w_d: Vec3<T>) -> Option<Vec3<T>> {
         let (rotary, n) = (self.rotary.as_ref()?, self.meridian.around()?);
         Some(rotary.couple(dot(n, slid), dot(self.e, w_d), self.e))
@@ -641,7 +643,8 @@ impl<T: Number> Contents<'_, T> {
         ];
     }
 
-    /// Adds the bobs' inertia along their rods and perpendicular to the planes of planar modes, m u u^T.
+    /// Adds the inertia of the bobs to the craft's mass matrix: m u u^T along each rod, and for planar modes also
+    /// perpendicular to the plane of the mode.
     pub fn add_rods(&self, matrix: &mut Mat6<T>) {
         for bob in self.bobs.iter().flatten() {
             if let Some(surface) = &bob.surface {
@@ -697,7 +700,8 @@ impl<T: Number> Contents<'_, T> {
         guides.fold(sum, |sum, guide| [add(sum[0], guide[0]), add(sum[1], guide[1])])
     }
 
-    /// Returns the derivative of the liquid's angular momentum of spin, tank axes, and its energy, J, and rate, rad/s.
+    /// Returns the derivative of the angular momentum of the liquid's spin (tank axes), the energy of the spin (J) and
+    /// its rate (rad/s). `None` if the spin is not modelled.
     pub fn spin(&self) -> Option<(Vec3<T>, [T; 2])> {
         self.spin.as_ref().map(|now| (now.rate, [now.energy, now.turning[0]]))
     }
@@ -724,8 +728,8 @@ impl<T: Number> Contents<'_, T> {
         [sub(sum[0], rigid[0]), sub(sum[1], rigid[1])]
     }
 
-    /// Returns the power drained', W, at the velocity `v` of O. On a pivot, where the energy contains the
-    /// potential a.S, v is 0.
+    /// Returns the power drained', W, with which the outflow takes energy from the system, at the velocity `v` of O. On
+    /// a pivot the energy contains the potential a.S, and `v` is 0.
     pub fn drained(&self, v: Vec3<T>, w: Vec3<T>, [a, w_d]: [Vec3<T>; 2], on_pivot: bool) -> T {
         let half = 0.5;
         let (m_0_d, [s_d, turning]) = self.shrinking;

@@ -85,7 +85,8 @@ impl Excess {
         Excess { law, w, above, root, steep, divisor, quotient }
     }
 
-    /// Returns coefficient n from the coefficients n of w^2 and w A.
+    /// Returns coefficient n of the damping by breaking waves, from the coefficients n of w^2 (squared natural
+    /// frequency) and of w A (frequency times amplitude).
     fn expand(&mut self, n: usize, w2: f64, speed: f64) -> f64 {
         let Breaking { begins, steepness, .. } = self.law;
         self.w[n] = sqrt(n, w2, &self.w);
@@ -106,8 +107,8 @@ impl Excess {
         0.5 * (self.steep[n] + mul(n, &self.steep, &self.quotient))
     }
 
-    /// Returns the time, s, over which the series converges, from coefficients 0 to 2: w d = +-i w delta is a
-    /// singularity.
+    /// Estimates the time, s, over which the series of the damping by breaking waves converges, from its coefficients 0
+    /// to 2. The series has a singularity where w d = +-i w delta (see the module's head).
     fn convergence_radius(&self) -> f64 {
         let Excess { root, above, w, .. } = self;
         let [slope, bend] = [1, 2].map(|n| above[n].abs() + CORNER * w[n].abs());
@@ -187,7 +188,8 @@ impl Drag {
         self.x[n] = x;
     }
 
-    /// Returns coefficient n of c, from the coefficients n of x, of |p + e|^2 and of |p'|^2.
+    /// Returns coefficient n of the drag coefficient c, from coefficient n of the specific force x along the tank, of
+    /// |p + e|^2, which determines the slosh angle, and of |p'|^2, the squared rate of the bob's direction.
     pub fn expand(&mut self, n: usize, chord2: f64, rate2: f64) -> f64 {
         let square = mul(n, &self.x, &self.x) + constant(n, self.floor2);
         self.root[n] = sqrt(n, square, &self.root);
@@ -222,7 +224,8 @@ impl Drag {
         self.c[n]
     }
 
-    /// Returns the time, s, over which the series of c converge reliably, from coefficients 0 to 2.
+    /// Estimates the time, s, over which the series of the drag coefficient c converge reliably, from their
+    /// coefficients 0 to 2.
     ///
     /// The roots in a_+ and in A have singularities where x = +-i a_f and where w^2 A^2 = 0. Thrust that
     /// crosses zero passes close by the first. On both sides a_+ is almost linear in x, or almost 0, so its
@@ -238,8 +241,8 @@ impl Drag {
         SHARE_OF_RADIUS * time.min(excess)
     }
 
-    /// Returns the difference, 1/s, between c/m by its series up to order n and c/m itself, at `h` after the
-    /// start of the expansion.
+    /// Returns the error, 1/s, of the drag coefficient per mass, c/m, that arises because its series ends at order n.
+    /// `h` (s) is the time since the start of the expansion.
     pub fn defect(&self, n: usize, h: f64) -> f64 {
         let (law, size) = self.instant;
         let [x, c] = values([&self.x, &self.c], n, h);
@@ -278,8 +281,10 @@ impl Law {
         }
     }
 
-    /// Returns the damping coefficient c (kg/s) at mass m and length l, from the specific force x along the
-    /// tank's axis (m/s2) and from [angle^2 + A_0^2, |p'|^2]. `zeta` replaces the mode's own damping ratio.
+    /// Returns the drag coefficient c (kg/s) of a slosh mode with the mass m (kg) and the pendulum length l (m). It
+    /// depends on the specific force x along the tank's axis (m/s2) and on the amplitude, given as [angle^2 + A_0^2,
+    /// |p'|^2]: squared slosh angle plus the constant A_0^2, and squared rate of the bob's direction. `zeta` replaces
+    /// the mode's own damping ratio.
     #[inline(always)]
     fn coefficient<T: Number>(
         &self,
@@ -325,8 +330,9 @@ impl Law {
     }
 }
 
-/// Returns c of mode `n` of a tank in which mass m and length l change, from x, |p + e|^2 and |p'|^2. `zeta`
-/// replaces the tank's own damping ratio.
+/// Returns the drag coefficient c (kg/s) of mode `n` of a tank in which the mass m and the length l of the mode change,
+/// from the specific force x along the tank (m/s2), from |p + e|^2, which determines the slosh angle, and from |p'|^2,
+/// the squared rate of the bob's direction. `zeta` replaces the tank's own damping ratio.
 pub fn coefficient<T: Number>(
     tank: &Tank,
     n: usize,

@@ -34,7 +34,7 @@ pub(crate) trait Carrier {
     /// Returns the six numbers of the detached liquid, position and velocity, among the states.
     fn ball(&mut self, lump: usize) -> &mut [f64];
 
-    /// Returns the six numbers of a bob of the lump's tank, direction p and velocity v, among the states.
+    /// Returns the six states of one bob of the lump's tank: its direction p and its velocity v relative to the hinge.
     fn bob(&mut self, lump: usize, n: usize) -> &mut [f64];
 
     fn directions(&self, lump: usize) -> Directions;
@@ -59,8 +59,8 @@ pub(crate) trait Carrier {
 
     fn dissipated(&mut self) -> &mut f64;
 
-    /// Applies an impulse about O to the carrier and everything attached to it. Returns the changes of V and
-    /// w.
+    /// Applies an impulse about O to the carrier and everything attached to it. Returns the changes of the velocity V
+    /// of O and of the angular velocity w.
     fn apply_impulse(&mut self, impulse: [Vec3; 2], t: f64) -> [Vec3; 2];
 
     fn shift(&mut self, by: Vec3);

@@ -386,8 +386,9 @@ impl Lump {
         if self.slides() { self.on_wall(&x) } else { x }
     }
 
-    /// Returns coefficient n of force and torque about O on the craft without the terms in [a; w'] of this
-    /// order.
+    /// Returns coefficient n of the power series of force and torque about O with which the lump acts on the craft. The
+    /// terms that contain coefficient n of the accelerations [a; w'] are left out, because the mass matrix contains
+    /// them.
     pub fn reaction(&mut self, n: usize, w: &Vector, w_d: &Vector) -> [Vec3; 2] {
         self.x_d[n] = sub(self.u[n], crosses(w, &self.rho, 0, n));
         self.u_turned = crosses(w, &self.u, 0, n);
@@ -418,8 +419,9 @@ impl Lump {
         [self.known_force, torque]
     }
 
-    /// Returns n and rho x n of a sliding lump at the start of the expansion, which is its direction in the
-    /// mass matrix.
+    /// Returns the normal n of the wall at a sliding lump and its moment rho x n about O, at the start of the
+    /// expansion. The lump adds inertia to the craft's mass matrix only along this direction. `None` if the lump does
+    /// not slide.
     pub fn along_normal(&self) -> Option<[f64; 6]> {
         self.slides().then(|| along_rod(self.outwards(), self.rho[0]))
     }
@@ -459,7 +461,8 @@ impl Lump {
         if drag > 0.0 { self.m * drag * dots(&self.x_d, &self.x_d, 0, n) } else { 0.0 }
     }
 
-    /// Returns coefficient n (0 or 1) of the rates of the six numbers: x', and x'' = u' - w' x rho - w x x'.
+    /// Returns coefficient n (0 or 1) of the rates of the lump's six states: of x' for its position x, and of x'' = u'
+    /// - w' x rho - w x x' for its rate.
     pub fn rates(&self, n: usize, w: &Vector, w_d: &Vector) -> [f64; 6] {
         let u_d = scale((n + 1) as f64, self.u[n + 1]);
         let turned = add(crosses(w_d, &self.rho, 0, n), crosses(w, &self.x_d, 0, n));
@@ -468,7 +471,7 @@ impl Lump {
         [x_d[0], x_d[1], x_d[2], x_dd[0], x_dd[1], x_dd[2]]
     }
 
-    /// Returns the scale of u within the time `t`, m/s, for error control.
+    /// Returns the scale of the lump's velocity u within the time `t` (s), m/s, for error control.
     pub fn speed_scale(&self, w: Vec3, t: f64) -> f64 {
         largest(self.x_d[0]) + self.half * largest(w) + largest(self.u[1]) * t
     }
@@ -510,7 +513,8 @@ impl Lump {
         [force, cross(rho, force)]
     }
 
-    /// Returns m/G.G and u = [G; rho x G] of m u u^T, the added mass of a sliding lump.
+    /// Returns the added mass of a sliding lump, (m/G.G) u u^T, as the factor m/G.G and the vector u = [G; rho x G],
+    /// where G is the normal of the wall without normalisation. `None` if the lump does not slide.
     pub fn added_mass<T: Number>(&self) -> Option<(T, [T; 6])> {
         let (g, squared) = self.gradient::<T>();
         let along = || along_rod(g, Self::value_and_slope::<T>(&self.rho));
@@ -545,7 +549,8 @@ impl Lump {
         }
     }
 
-    /// Returns the impulse J n on the craft at rho for an impact at v_n with restitution e.
+    /// Returns the impulse on the craft, as force and torque impulse about O, if the lump hits the wall with its
+    /// present normal speed v_n and the coefficient of restitution `e`.
     pub fn impulse(&self, matrix: &Factors, e: f64) -> [Vec3; 2] {
         let n = self.outwards();
         let u = [n, cross(self.rho[0], n)];
@@ -946,8 +951,8 @@ impl Lump {
     }
 }
 
-/// Returns the time within h at which the series of a, up to order n, rises through zero. At h = 0, for hosts
-/// that have found the event themselves, returns 0 if a is positive.
+/// Returns the time within `h` (s) at which the function with the power series `a`, taken up to order n, rises through
+/// zero; `None` if it does not. At h = 0, for hosts that have found the event themselves, returns 0 if a is positive.
 fn rise(a: &Series, n: usize, h: f64) -> Option<f64> {
     let size = a[..n].iter().rev().fold(0.0, |sum, x| sum * h.min(1.0) + x.abs());
     let below = a.map(|x| -x);

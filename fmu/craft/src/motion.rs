@@ -70,14 +70,15 @@ use crate::state::{BallState, Inputs, STATES, State, index};
 /// this.
 pub const SCALE_TIME: f64 = 0.1;
 
-/// Returns coefficient n of the matrix of y -> w x (w x y) = (w w^T - |w|^2 1) y, from coefficient n of w
-/// w^T.
+/// Returns coefficient n of the matrix w w^T - |w|^2 1, which maps a vector y to w x (w x y). The argument is
+/// coefficient n of w w^T, of which the elements xx, yy, zz, xy, xz, yz are given.
 #[inline(always)]
 pub fn twice_crossed([xx, yy, zz, xy, xz, yz]: [f64; 6]) -> Mat3 {
     [[-yy - zz, xy, xz], [xy, -xx - zz, yz], [xz, yz, -xx - yy]]
 }
 
-/// Returns w x (I w) from w w^T, in which it is linear.
+/// Returns the gyroscopic torque w x (I w) of a body with the `inertia` I, from the elements of w w^T. The torque is
+/// linear in these elements, so that the function also works for a coefficient of their power series.
 #[inline(always)]
 fn gyroscopic(inertia: &Mat3, [xx, yy, zz, xy, xz, yz]: [f64; 6]) -> Vec3 {
     let columns = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
@@ -342,9 +343,10 @@ impl CraftMotion {
         self.factors.solve([force, torque])
     }
 
-    /// Applies a change of the wheels' momentum to `h`. A jump turns the craft by an impulse, [dV; dw] = M^-1
-    /// [0; -dh], l dp' = -(1 - p p^T)(dV + dw x rho), work -dh.(w + dw/2). Returns true if the momentum
-    /// jumps.
+    /// Sets the angular momentum of the wheels to `h`. If it differs from the present momentum by dh, the craft
+    /// receives an impulse: velocity and angular velocity change by [dV; dw] = M^-1 [0; -dh], the direction p of each
+    /// bob by l dp' = -(1 - p p^T)(dV + dw x rho), and the wheels do the work -dh.(w + dw/2). Returns true if the
+    /// momentum jumps.
     pub fn set_wheels(&mut self, h: Vec3) -> bool {
         if h == self.state.h_wheels {
             return false;
@@ -439,7 +441,8 @@ impl CraftMotion {
         self.expansion.overwrite(2);
     }
 
-    /// Returns the rotation, rad, body axes, of coefficient 1 of the attitude: q_1 = q_0 o (0, turn)/2.
+    /// Returns the rotation vector (rad, body axes) that coefficient 1 of the attitude's power series describes. With
+    /// it coefficient 1 is q_1 = q_0 o (0, turn)/2.
     fn turn(&self) -> Vec3 {
         let [a, x, y, z] = self.q.get(0);
         let [b, v @ ..] = self.q.get(1);
@@ -583,8 +586,8 @@ impl CraftMotion {
         self.upright[N + 1] = next::<N>(cross::<N>(&self.upright, &self.w));
     }
 
-    /// Computes coefficient N of the specific force along each tank at the hinges, e.(a + w' x P + w x (w x
-    /// P)), of craft and liquids as one rigid body.
+    /// Computes, for each tank and hinge, coefficient N of the specific force along the tank's axis, e.(a + w' x P + w
+    /// x (w x P)). The accelerations a and w' are those of craft and liquids as one rigid body, and P is the hinge.
     #[inline(never)]
     fn set_axial<const N: usize>(&mut self) {
         let ww = products::<N>(&self.w);
@@ -916,7 +919,7 @@ impl CraftMotion {
         }
     }
 
-    /// Adds coefficient n of force and torque of constrained bobs and lumps on the craft, about O.
+    /// Adds coefficient n of force and torque about O with which constrained bobs and lumps act on the craft.
     #[inline(never)]
     fn add_reactions_apart(&mut self, n: usize, [mut force, mut torque]: [Vec3; 2]) -> [Vec3; 2] {
         let ww = product_coefficients(n, &self.w);

@@ -246,8 +246,9 @@ impl Tank {
         tank
     }
 
-    /// Returns the rigid liquid: m_0 on the axis at height H_0, with J_0 = I_0 1 + (I_z - I_0) e e^T. Without
-    /// axial symmetry r_0, dI_y and the products are added.
+    /// Returns the rigid liquid of the tank as a body: the fixed mass m_0 on the tank's axis at the height H_0, with
+    /// the inertia J_0 = I_0 1 + (I_z - I_0) e e^T about its centre. In a tank without axial symmetry the offset r_0,
+    /// the difference dI_y and the products of inertia are added.
     pub(crate) fn rigid(&self) -> Rigid {
         let axes = rotation(&unit_quaternion(self.q));
         let mut center = add(self.position, scale(self.h_0, axes.map(|row| row[2])));
@@ -362,9 +363,9 @@ impl Tank {
         self.mass[..self.modes].iter().fold(self.m_0, |sum, m| sum + m)
     }
 
-    /// Returns the unit vector b, tank axes, perpendicular to the plane in which the bob of mode `n` swings,
-    /// which counts from 0; e x b is minus the mode's direction. Returns `None` if the mode swings in every
-    /// direction.
+    /// Returns the unit vector b (tank axes) that is perpendicular to the plane in which the bob of mode `n` swings;
+    /// modes count from 0. With the tank's axis e, e x b is minus the mode's direction. Returns `None` if the mode
+    /// swings in every direction.
     pub(crate) fn plane_normal(&self, n: usize) -> Option<Vec3> {
         let [x, y] = self.direction[n];
         // Only directions longer than 1e-6 are accepted. The bound avoids a division by 0 that a
@@ -373,7 +374,8 @@ impl Tank {
         (self.direction[n] != [0.0; 2]).then(|| [-y / size, x / size, 0.0])
     }
 
-    /// Returns the hinge of mode `n`, which counts from 0, from O, m, and b of a planar mode; body axes.
+    /// Returns the position of the hinge of mode `n` from O (m), and for a planar mode the unit vector b perpendicular
+    /// to its plane; both in body axes. Modes count from 0.
     pub(crate) fn hinge_and_across(&self, n: usize) -> (Vec3, Option<Vec3>) {
         let axes = rotation(&unit_quaternion(self.q));
         let on_axis = add(self.position, scale(self.hinge[n], axes.map(|row| row[2])));
@@ -383,7 +385,8 @@ impl Tank {
         }
     }
 
-    /// Returns the hinge of mode `n`, which counts from 0, from O, m, and the tank's axis; body axes.
+    /// Returns the position of the hinge of mode `n` from O (m), and the unit vector of the tank's axis; both in body
+    /// axes. Modes count from 0.
     pub(crate) fn hinge_and_axis(&self, n: usize) -> [Vec3; 2] {
         let e = rotation(&unit_quaternion(self.q)).map(|row| row[2]);
         [self.hinge_and_across(n).0, e]
@@ -497,7 +500,8 @@ impl Tank {
         by_acceleration || self.zeta_amplitude[n] > 0.0 || self.zeta_breaking[n] > 0.0
     }
 
-    /// Returns c = 2 zeta m sqrt(g_ref/l + k/m) of mode `n`, which counts from 0, at g_ref, N s/m.
+    /// Returns the drag coefficient of mode `n` at the specific force g_ref, N s/m: c = 2 zeta m sqrt(g_ref/l + k/m).
+    /// Modes count from 0.
     pub fn drag(&self, n: usize) -> f64 {
         let (m, l) = (self.mass[n], self.length[n]);
         2.0 * self.zeta[n] * m * libm::sqrt(self.g_ref / l + self.k[n] / m)

@@ -69,8 +69,8 @@ impl Pivot {
         k != [0.0; 2] || c != [0.0; 3] || friction.acts()
     }
 
-    /// Returns coefficient N of torque (N m) and dissipation (W) without dry friction, from Z and w, with the
-    /// products of w's components.
+    /// Returns coefficient N of the pivot's torque (N m) and of its dissipated power (W), both without dry friction,
+    /// from the pivot's axis Z, the angular velocity w and the products of its components.
     #[inline(always)]
     pub(crate) fn load<const N: usize>(&self, z: &Vector, w: &Vector, ww: [f64; 6]) -> (Vec3, f64) {
         let [_, _, _, xy, xz, yz] = products::<N>(z);
@@ -83,8 +83,8 @@ impl Pivot {
         (torque, c[0] * ww[0] + c[1] * ww[1] + c[2] * ww[2])
     }
 
-    /// Returns torque, N m, dissipation, W, and energy, J, at an instant; `axes` turns body axes to inertial
-    /// ones.
+    /// Returns the pivot's torque (N m), dissipated power (W) and stored energy (J) at one instant. `axes` is the
+    /// matrix from body to inertial axes.
     pub(crate) fn present<T: Number>(&self, axes: &Mat3<T>, w: Vec3<T>) -> (Vec3<T>, T, T) {
         let [x, y, z] = axes[2];
         let Pivot { k: [k_x, k_y], c, friction } = *self;
@@ -141,7 +141,7 @@ impl Rubbing {
         }
     }
 
-    /// Returns coefficient n of r and of r w, from coefficient n of w.
+    /// Returns coefficient n of the friction torque r and of the power r w, from coefficient n of the rate w.
     pub(crate) fn expand(&mut self, n: usize, w: f64) -> (f64, f64) {
         self.w[n] = w;
         let u = -series::square(n, &self.w) * self.inv_omega_s * self.inv_omega_s;
@@ -156,7 +156,8 @@ impl Rubbing {
         (self.r[n], series::mul(n, &self.r, &self.w))
     }
 
-    /// Returns the time, s, over which the series converges reliably, from w, w' and w''/2.
+    /// Estimates the time, s, over which the series of the friction torque converges reliably, from the first three
+    /// coefficients w, w' and w''/2 of the rate.
     ///
     /// tanh has its nearest poles at the distance sqrt(v^2 + (pi/2)^2) from v = w/eps. Away from 0 it is so flat that its
     /// coefficients do not show the poles, so the method uses half of this distance. exp(-v^2), v = w/w_s, has no poles. Beyond v

@@ -54,8 +54,8 @@ impl Rigid {
 }
 
 impl<T: Number> Rigid<T> {
-    /// Creates a body of mass m at s with the inertia i_0 across and i_z about the axis e, about its centre
-    /// of mass.
+    /// Creates an axially symmetric body of mass `m` whose centre of mass is at `s`. About its centre of mass it has
+    /// the moment of inertia `i_z` about its axis `e`, and `i_0` about axes perpendicular to `e`.
     pub fn axial(m: T, s: Vec3<T>, i_0: T, i_z: T, e: Vec3<T>) -> Rigid<T> {
         let s2 = dot(s, s);
         let element = |i: usize, j: usize| {
@@ -91,8 +91,8 @@ impl<T: Number> Rigid<T> {
         ]
     }
 
-    /// Returns force and torque about O that the body's motion requires: M [a; w'] + [w x (w x S); w x (I
-    /// w)].
+    /// Returns the force and the torque about O that the motion of the body requires, M [a; w'] + [w x (w x S); w x (I
+    /// w)], with its mass matrix M, first moment S and inertia I about O.
     pub fn inertial_wrench(&self, a: Vec3<T>, w: Vec3<T>, w_d: Vec3<T>) -> [Vec3<T>; 2] {
         let Rigid { mass, moment: s, inertia } = *self;
         let force = add(a.map(|x| x * mass), add(cross(w_d, s), cross(w, cross(w, s))));
@@ -101,7 +101,9 @@ impl<T: Number> Rigid<T> {
     }
 }
 
-/// Adds m u u^T, u = [p; P x p]: the inertia of a bob at the end of its rod, which acts only along the rod.
+/// Adds the inertia of a bob of mass `m` at the end of its rod to a mass matrix. Because the bob moves freely across
+/// the rod, it acts only along the rod's direction: the matrix gains m u u^T with u = [p; P x p], p the direction of
+/// the rod and P its hinge.
 #[inline(always)]
 pub fn add_rank_one(matrix: &mut Mat6, m: f64, u: &[f64; 6]) {
     for i in 0..6 {
@@ -115,7 +117,7 @@ pub fn add_rank_one(matrix: &mut Mat6, m: f64, u: &[f64; 6]) {
     }
 }
 
-/// Returns [p; P x p]: a force along the direction p of a rod, and its moment about O, for a hinge at P.
+/// Returns a unit force along the direction `p` of a rod and its moment about O, [p; P x p], for the `hinge` at P.
 #[inline(always)]
 pub fn along_rod<T: Number>(p: Vec3<T>, hinge: Vec3<T>) -> [T; 6] {
     let c = cross(hinge, p);
@@ -174,7 +176,8 @@ impl<T: Number> Factors<T> {
         }
     }
 
-    /// Sets row j of L from the rows before; returns D's element of this row.
+    /// Sets row j of the triangular factor L from the rows before it. Returns the element of the diagonal factor D in
+    /// this row.
     #[inline(always)]
     fn set_row(&mut self, matrix: &Mat6<T>, j: usize) -> T {
         let Factors { l, inverse } = self;
@@ -197,7 +200,8 @@ impl<T: Number> Factors<T> {
 }
 
 impl<M: Copy> Factors<M> {
-    /// Returns the solution of matrix x = b. The matrix may be constant where b has derivatives.
+    /// Solves the linear system of the factorised matrix for the right-hand side `b`. The matrix may be constant
+    /// although `b` has derivatives.
     #[inline(always)]
     pub fn solve<T: Number + Mul<M, Output = T>>(&self, b: [Vec3<T>; 2]) -> [Vec3<T>; 2] {
         let l = &self.l;
@@ -232,8 +236,9 @@ pub fn smallest_pivot(matrix: &Mat6) -> f64 {
 }
 
 impl Factors {
-    /// Returns L^-1 b with each row divided by the root of its pivot. It turns M_a into the symmetric matrix
-    /// with the eigenvalues of M^-1 M_a.
+    /// Returns L^-1 b with each row divided by the square root of its pivot, where L is the triangular factor of this
+    /// matrix M. Applied to rows and columns of an added mass M_a, it gives the symmetric matrix with the eigenvalues
+    /// of M^-1 M_a.
     fn half_solve(&self, b: &[f64; 6]) -> [f64; 6] {
         let mut x = *b;
         for i in 1..6 {

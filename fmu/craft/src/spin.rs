@@ -74,13 +74,14 @@ impl Spin {
         })
     }
 
-    /// Returns the spin rate W = L_z/I_zz, rad/s.
+    /// Returns the rate of spin W = L_z/I_zz about the tank's axis, rad/s, for the angular momentum `l` of the liquid.
     pub fn turning<T: Number>(&self, l: Vec3<T>) -> T {
         l[2] * self.inverse[2]
     }
 
-    /// Returns the liquid's state with L = `l`, tank axes, at the angular velocity `w`, body axes; `reaction` is the contribution
-    /// of the modes to I_zz s_z.
+    /// Returns the motion of the spinning liquid if its angular momentum is `l` (tank axes) and the angular velocity of
+    /// the craft is `w` (body axes). `reaction` is the contribution of the slosh modes to I_zz s_z, the moment of
+    /// inertia times the slip about the tank's axis.
     pub fn now<T: Number>(&self, l: Vec3<T>, w: Vec3<T>, reaction: T) -> SpinNow<T> {
         let axes: Mat3<T> = self.axes.map(constant);
         let w = transposed_times(&axes, w);
@@ -113,8 +114,9 @@ pub(crate) struct SpinScale {
 }
 
 impl SpinScale {
-    /// Returns 2 Omega/omega_0 and Omega^2 R/g at the specific force `axial` along the tank, m/s2, and the rate Omega at which
-    /// the liquid turns, rad/s.
+    /// Returns the spin ratio 2 Omega/omega_0 and the spin number Omega^2 R/g, which show how close the tank is to the
+    /// limits of the model. `axial` is the specific force along the tank, m/s2, and `rate` the rate Omega at which the
+    /// liquid turns, rad/s.
     pub fn numbers<T: Number>(&self, axial: T, rate: T) -> [T; 2] {
         let omega2 = axial.at_least(self.g_floor) * self.inv_l + T::constant(self.k_m);
         let share = rate * rate / omega2;
@@ -144,8 +146,9 @@ impl SpinSeries {
         self.l[0] = l;
     }
 
-    /// Returns coefficient n of the torque on the craft, body axes, and of the dissipation, from coefficient n of the angular
-    /// velocity `w`, body axes. Sets coefficient n + 1 of L, and of the spin rate W in those of `modes` that are gyroscopic.
+    /// Returns coefficient n of the torque of the spinning liquid on the craft and of the dissipated power, from
+    /// coefficient n of the angular velocity `w`; both vectors are in body axes. Sets coefficient n + 1 of the liquid's
+    /// angular momentum L, and of the rate of spin W in all gyroscopic modes among `modes`.
     #[inline(never)]
     pub fn expand(&mut self, n: usize, w: Vec3, modes: &mut [ConstrainedBob]) -> (Vec3, f64) {
         let Spin { axes, inverse, coupling, friction } = self.spin;
@@ -173,12 +176,13 @@ impl SpinSeries {
         (times(&axes, torque), friction[0] * xx + friction[1] * yy + friction[2] * zz)
     }
 
-    /// Returns L at `t` after the start, from the series up to order n.
+    /// Returns the liquid's angular momentum L at `t` (s) after the start of the expansion, from its series up to order
+    /// n.
     pub fn state_at(&self, n: usize, t: f64) -> Vec3 {
         space::value(&self.l, n, t)
     }
 
-    /// Returns the scale of L over its inertia for error control, rad/s.
+    /// Returns the scale of the liquid's angular momentum L for error control, divided by the inertia, rad/s.
     pub fn rate_scale(&self) -> f64 {
         self.coefficient_norm(0)
     }

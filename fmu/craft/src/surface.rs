@@ -120,7 +120,9 @@ impl Higher {
         Higher { gyroscopic: [0.0; 2], ..*self } != Higher::default()
     }
 
-    /// Returns (1 - C) tau + epsilon W u. Multiplied by m l^2 it is the mode's contribution to I_zz s_z of the spinning liquid.
+    /// Returns the reaction of this mode on the spinning liquid, (1 - C) tau + epsilon W u. Multiplied by m l^2 it is
+    /// the mode's contribution to I_zz s_z, the moment of inertia of the liquid about the tank's axis times its slip
+    /// (`spin.rs`).
     pub fn reaction<T: Number>(&self, tau: T, turned: T) -> T {
         tau * self.gyroscopic[0] + turned * self.gyroscopic[1]
     }
@@ -161,7 +163,9 @@ impl<T: Number> Surface<T> {
         }
     }
 
-    /// Returns the inertia along the meridian, relative to a pendulum's, from eta = p.e and u.
+    /// Returns the inertia of the bob for motion along the meridian of its surface, relative to the inertia of a
+    /// pendulum. `eta` is p.e, the cosine of the angle from the tank's axis, and `u` the squared displacement across
+    /// the axis over l^2.
     pub fn meridian_inertia(&self, eta: T, u: T) -> T {
         let one = T::constant(1.0);
         let tilt = match self.higher {
@@ -192,7 +196,8 @@ impl Surface {
         self.stiffness == 0.0 && self.higher.is_none()
     }
 
-    /// Returns the part of z/(l u^2) that is due to kappa, (kappa - 1)/8.
+    /// Returns (kappa - 1)/8, the part of the bob's lift z/(l u^2) along the tank's axis that comes from the
+    /// coefficient kappa.
     pub fn lift_of_square(&self) -> f64 {
         0.125 * self.stiffness
     }
@@ -210,7 +215,8 @@ impl Surface {
         0.5 * self.stiffness
     }
 
-    /// Returns beta, with which z' = l beta p_perp.p'.
+    /// Returns the slope beta of the bob's surface: the bob rises along the tank's axis at the rate z' = l beta
+    /// p_perp.p'.
     pub fn rise(&self, u: f64) -> f64 {
         self.slope_factor(u)
     }
@@ -273,7 +279,8 @@ impl Surface {
         (0..=1800).map(angle).take_while(|angle| self.holds(*angle)).fold(0.0, f64::max)
     }
 
-    /// Returns the smallest eta = p.e at which the model ends, if it ends at any angle.
+    /// Returns the value of eta = p.e (cosine of the bob's angle from the tank's axis) at which the model ends, or
+    /// `None` if it is valid at all angles.
     pub fn highest(&self) -> Option<f64> {
         let low = self.largest_angle();
         let (mut low, mut high) = (low, low + ANGLE_STEP);
@@ -362,7 +369,8 @@ pub(crate) struct Rotary<T> {
 }
 
 impl<T: Number> Meridian<T> {
-    /// Creates the surface at the unit vector p; `across` is b of a planar mode.
+    /// Creates the surface at the bob's direction, the unit vector `p`. For a planar mode `across` is the unit vector b
+    /// perpendicular to its plane.
     pub fn new(
         surface: Surface<T>,
         e: Vec3<T>,
@@ -410,7 +418,8 @@ impl<T: Number> Meridian<T> {
         sub(x, self.apply_shear(self.free(self.apply_shear_transposed(x))))
     }
 
-    /// Returns the mass matrix of the bob, m J^T N J with J [a; w'] = a + w' x rho.
+    /// Returns the contribution of the bob to the craft's mass matrix, m J^T N J, where J maps the accelerations [a;
+    /// w'] to the acceleration a + w' x rho of the bob's place and N is defined in the module's head.
     pub fn mass_matrix(&self, m: T, rho: Vec3<T>) -> [[T; 6]; 6] {
         let (zero, one) = (T::constant(0.0), T::constant(1.0));
         let mut columns = [[zero; 6]; 6];
@@ -426,8 +435,8 @@ impl<T: Number> Meridian<T> {
         columns
     }
 
-    /// Adds to the mass matrix of the bob the terms by which v differs from [n; rho x n], - l u e, because
-    /// tau is taken against inertial axes.
+    /// Adds the terms of rotary motion to the mass matrix of the bob. They arise because the rate tau is measured
+    /// against inertial axes, so that the direction in the mass matrix is [n; rho x n - l u e] instead of [n; rho x n].
     pub fn add_rotary(&self, [m, l]: [T; 2], rho: Vec3<T>, matrix: &mut [[T; 6]; 6]) {
         let Some((n, share)) = self.around else { return };
         let arm = cross(rho, n);
@@ -461,8 +470,9 @@ impl<T: Number> Meridian<T> {
         self.around.map(|(n, _)| n)
     }
 
-    /// Returns the bob's height and the terms of E_i at the rate p', from l and its derivatives and, if they change, s and kappa
-    /// with their derivatives.
+    /// Returns the height of the bob and the terms of the internal kinetic energy E_i, for the rate p' of the bob's
+    /// direction. They follow from the length l with its derivatives and, if s and kappa change, from these
+    /// coefficients with their derivatives.
     pub fn lift(
         &self,
         [l, l_d, l_dd]: Jet<T>,
@@ -558,12 +568,14 @@ impl<T: Number> Meridian<T> {
 }
 
 impl<T: Number> Rotary<T> {
-    /// Returns l T u w_e', which acts along n, at e.w'.
+    /// Returns the term l T u w_e' of the force, which acts along the normal n, for the angular acceleration `rate_d` =
+    /// e.w' about the tank's axis.
     pub fn pull(&self, rate_d: T) -> T {
         self.lever * rate_d
     }
 
-    /// Returns the couple on the craft over m, with n.(-l y), `slid`, and e.w'.
+    /// Returns the couple on the craft per mass of the bob. `slid` is n.(-l y), and `rate_d` is the angular
+    /// acceleration e.w' about the tank's axis.
     pub fn couple(&self, slid: T, rate_d: T, e: Vec3<T>) -> Vec3<T> {
         let tau_d = self.l * self.u * rate_d + self.turning - slid;
         let along = self.l * self.u * (self.inertia * tau_d + self.growing) + self.swept;
