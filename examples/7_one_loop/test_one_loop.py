@@ -23,7 +23,7 @@ def folder(request: pytest.FixtureRequest) -> Path:
 def test_fmpy_and_the_harness_give_one_answer(
     fmu: str, folder: Path, name: str, slopes: bool
 ) -> None:
-    """The promised accuracy is 1e-9; with the same calls the bits are the same."""
+    """The promised accuracy is 1e-9; with the same calls results are bit-identical."""
     theirs = pd.read_csv(folder / f"loop_{name}.csv")
     assert len(theirs) == STEPS + 1 and list(theirs) == ["time", "tau", *RECORDED]
     assert theirs["omega"].abs().max() > 0.02

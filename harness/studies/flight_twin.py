@@ -6,11 +6,11 @@ A second simulator, independent of Spacecraft.fmu, flies a rigid craft with two 
 It solves Newton's law of craft and bobs, with the rods' tensions as unknowns, as one dense system
 by Runge–Kutta. Wheels turn it by 0.3° to and fro and hold it, thrusters pulse sideways. Three gyros
 with scales, alignment and biases and an accelerometer are recorded at 10 Hz, in two flights. The
-search starts at what `hubslosh tank` says of the tanks' drawing; the truth is up to 10 % off.
-With --known wrong, dry mass, thrust, hinges and rigid liquids are off by their tolerances, too;
-with --known tolerances, the fit takes these tolerances into account.
+search starts at the values that `hubslosh tank` computes from the tanks' drawing; the true values
+differ from them by up to 10 %. With --known wrong, dry mass, thrust, hinges and rigid liquids are
+off by their tolerances, too; with --known tolerances, the fit takes these tolerances into account.
 
-Prints estimates and true values; for several twins the number of intervals that contain the truth.
+Prints estimates and true values; for several twins also how many intervals contain the true value.
 """
 
 import argparse
@@ -221,7 +221,7 @@ def measured(
     errors: np.ndarray,
     truth: dict,
 ) -> pd.DataFrame:
-    """Return what the sensors read of a flight; adds the biases to the truth."""
+    """Return what the sensors read of a flight; adds the biases to the true value."""
     number = 1 + sum(name.startswith("bias(omega[1])") for name in truth)
     table = flight.copy()
     table[OMEGA] = flight[OMEGA].to_numpy() @ (np.eye(3) + errors).T

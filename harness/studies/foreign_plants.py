@@ -5,8 +5,8 @@
 
 The benches are `foreign_plants.c`, compiled by `cc`: equations, integrator and draws of their own,
 and nothing of HubSlosh. `plants` have an effect that HubSlosh does not have. An identification of
-such a recording is wrong if it says that the model fits while the truth is beyond five standard
-deviations and outside the interval, or if it names a cause that does not act. `twins` are
+such a recording is wrong if it says that the model fits while the true value is beyond five
+standard deviations and outside the interval, or if it names a cause that does not act. `twins` are
 benches within the model; with `--habits` the k-th is recorded with the k-th habit of loggers.
 Prints tables in Markdown; `--keep` keeps recordings and results.
 """
@@ -494,7 +494,7 @@ def plants(arguments: argparse.Namespace, plant: ctypes.CDLL, folder: Path) -> N
 
 
 def twins(arguments: argparse.Namespace, plant: ctypes.CDLL, folder: Path) -> None:
-    """Print a line for each twin, and for each parameter how often its interval holds the truth."""
+    """Print a line for each twin, and how often the interval of each parameter is right."""
     tally, runs, seconds = Tally(), [], []
     for seed in arguments.seeds:
         random = default_rng([seed, 1000])

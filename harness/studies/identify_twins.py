@@ -1,4 +1,4 @@
-"""Twins for `hubslosh identify --free`: whether the truth lies inside the stated intervals.
+"""Twins for `hubslosh identify --free`: whether the true value lies inside the stated intervals.
 
     python identify_twins.py FOLDER [--cases VanDerPol,Hub,…] [--twins 100] [--first 1]
 
@@ -7,8 +7,8 @@ modelica/Reference-FMUs (built for FMI 2.0), Orifice.fmu (`orifice.py`, exported
 binary needs LD_PRELOAD=libpython3.11.so). HubSlosh is found by the program.
 
 No recording comes from an FMU: each case solves its equation in closed form or by SciPy at a
-tolerance of 1e-10, draws the truth 30 % about the start of the search, and adds noise. Prints a
-table in Markdown.
+tolerance of 1e-10, draws true values within 30 % of the start of the search, and adds noise.
+Prints a table in Markdown.
 """
 
 import argparse

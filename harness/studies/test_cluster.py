@@ -65,7 +65,7 @@ def long_runs(monkeypatch) -> None:
 
 @pytest.mark.usefixtures("long_runs")
 def test_runs_of_a_cluster_with_a_killed_worker_equal_runs_of_the_harness(client, harness) -> None:
-    """Runs on a cluster with a killed worker have the same bits as runs of the harness."""
+    """Runs on a cluster with a killed worker are bit-identical to runs of `hubslosh campaign`."""
     theirs = harness(PLAN, "theirs")
     worst, killer = compare(client, harness(PLAN, "ours"), theirs)
     assert len(worst) > 80

@@ -1,4 +1,4 @@
-"""The page of measurements is what the command makes."""
+"""The page of measurements equals the page that the command writes."""
 
 from pathlib import Path
 
@@ -17,7 +17,7 @@ def built(fmu: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("built")
 def test_the_page_is_made_of_the_results() -> None:
-    """Page and README say what the kept comparisons come to."""
+    """Page, README and verification state how many of the stored comparisons pass."""
     rows = measured.read_results()
     assert measured.PAGE.read_text(encoding="utf-8") == measured.page(rows, measured.computed())
     for page in ("README.md", "book/verification.md"):

@@ -208,7 +208,7 @@ def test_a_flight_identifies_slosh(fmu: Path, program: Path, tmp_path: Path) -> 
 
 
 def test_intervals_of_a_sticking_hub(fmu: Path, program: Path, tmp_path: Path) -> None:
-    """Five twins of HubSlosh in book/identification_method.md: 17 of 20 intervals hold the truth.
+    """Five twins of HubSlosh in book/identification_method.md: 17 of 20 intervals are right.
 
     Chance makes 17 or more of 20 of 95 % in 98 of 100 cases; seeds are fixed. Stated deviations
     are within a factor of two of the page's medians: inertia and friction are drawn within 30 %.
@@ -267,7 +267,7 @@ def test_the_foreign_plant_without_effects_is_hubslosh(
 @pytest.mark.skipif(sys.platform != "linux", reason="the study compiles a binary for Linux")
 @pytest.mark.parametrize("only", ["decay", "gyro", "tank", "design --free"])
 def test_intervals_of_four_draws(only: str, fmu: Path, program: Path, tmp_path: Path) -> None:
-    """Every interval is given, and at most one of four misses the truth (by chance 1.4 %)."""
+    """Every interval is given, and at most one of four misses the true value (by chance 1.4 %)."""
     bench = intervals.Bench(os.fspath(program), os.fspath(fmu), tmp_path)
     rows = list(intervals.census(bench, only, 4))
     assert rows

@@ -55,7 +55,9 @@ fn a_warning_names_wheels_that_move_without_a_torque() {
     assert!(is_warned(ramp, |_| 0.0, false));
 }
 
-/// Reverses thrust with the liquid half a metre above its tank, where a host has integrated it, moving up or down.
+/// Thrust is reversed, so that the liquid detaches. Then the host, which integrates the FMU, puts the liquid half a
+/// metre above its tank. Only if the liquid moves further outwards does the end of the step ask for an event, which
+/// reverses its speed.
 #[test]
 fn a_step_that_ends_with_the_liquid_outside_its_tank_asks_for_an_event() {
     let mut parameters = spacecraft::Parameters::default();
@@ -82,7 +84,8 @@ fn a_step_that_ends_with_the_liquid_outside_its_tank_asks_for_an_event() {
     assert!(!model.accept_step(&inputs).unwrap());
 }
 
-/// Pushes the host backwards with the liquid half a metre above its tank, where the host has integrated it.
+/// Pushes the host backwards while the liquid is half a metre above its tank, as a host that integrates the FMU may put
+/// it.
 #[test]
 fn a_step_of_slosh_tank_that_ends_with_the_liquid_outside_asks_for_an_event() {
     let mut parameters = sloshtank::Parameters::default();

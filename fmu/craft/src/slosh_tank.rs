@@ -1363,9 +1363,9 @@ impl SloshTank {
         }
     }
 
-    /// Returns x: p and p' of each mode, the dissipated energy, J, and the mass of liquid, kg. Then follow
-    /// position, m, and rate, m/s, of the detached liquid, and the liquid's angular momentum of spin, kg m2/s. Vectors are in
-    /// tank axes.
+    /// Returns the continuous states in this order: direction p and rate p' of the pendulum of each mode, dissipated
+    /// energy (J), mass of the liquid (kg), position (m) and rate (m/s) of the detached liquid, and angular momentum of
+    /// the liquid's spin (kg m2/s). Vectors are in tank axes.
     pub fn continuous_states(&self) -> [f64; TANK_STATES] {
         self.motion.state.x
     }
@@ -1422,8 +1422,9 @@ impl SloshTank {
         SloshTankOutputs { impulse: [0.0; 6], ..self.outputs_from(dx, parts) }
     }
 
-    /// Applies an impulse of the host to the bobs, which keep their velocities across their rods. The impulse
-    /// changes the velocity of O by `dv`, m/s, and the host's angular velocity by `dw`, rad/s, host axes.
+    /// Updates the rates of the bobs after an impulse of the host, which changes the velocity of O by `dv` (m/s) and
+    /// the host's angular velocity by `dw` (rad/s), both in host axes. The bobs keep their velocities across their
+    /// rods.
     pub fn apply_host_impulse(&mut self, dv: Vec3, dw: Vec3) {
         let TankMotion { state, bobs, constrained, .. } = &mut *self.motion;
         if let Some(mounted) = &self.draining {
@@ -1440,8 +1441,9 @@ impl SloshTank {
         self.motion.follow_impulse(dv, dw);
     }
 
-    /// Returns the largest eigenvalue lambda of M_host^-1 M_a at the current directions; `None` if the host's
-    /// mass properties are unknown.
+    /// Returns the coupling ratio, which is the largest eigenvalue lambda of M_host^-1 M_a: the added mass of the
+    /// liquid over the mass of the host, at the current directions of the pendulums. `None` if the host's mass
+    /// properties are unknown.
     ///
     /// A host that uses the total wrench one step late diverges, at any step, above 1 (held values), 1/3
     /// (Gauss-Seidel, linear extrapolation) or 0.155 (Jacobi, linear extrapolation).

@@ -242,9 +242,11 @@ impl Spacecraft {
         self.motion.state.kept.end();
     }
 
-    /// Returns x'. Quaternion, directions and their rates are normalised first, without a change of x itself.
+    /// Returns x', the derivatives of the continuous states x. Before they are computed, copies of the quaternion, the
+    /// directions and their rates are normalised; x itself does not change.
     ///
-    /// `h_wheels` acts by w x h_w and by its slope. A host that does not give the slope adds the reaction -h_w' to `torque`.
+    /// The angular momentum h_w of the wheels (`h_wheels`) acts on the craft by w x h_w and by its slope h_w'. A host
+    /// that does not give the slope must add the reaction -h_w' to `torque`.
     pub fn derivatives(&mut self, inputs: &Inputs) -> [f64; STATES] {
         if let Some(draining) = &self.draining {
             return draining.rates(&self.motion.state.x, &Acting::from_inputs(inputs, 0.0));
@@ -253,8 +255,9 @@ impl Spacecraft {
         self.motion.state_rates::<0>(&self.motion.state.x)
     }
 
-    /// Returns the exact derivative of x' in the direction (dx, du), with du of force, torque, h_wheels:
-    /// coefficient 1 of x' along x + dx s, u + du s. Slopes of the inputs are held.
+    /// Returns the exact directional derivative of x', the derivatives of the states, if the states change along dx and
+    /// the inputs (force, torque and h_wheels) along du. It is coefficient 1 of the power series of x' along x + dx s
+    /// and u + du s. The slopes of the inputs are kept constant.
     pub fn directional_derivative(
         &mut self,
         inputs: &Inputs,

@@ -239,8 +239,9 @@ pub fn laminar(beta: f64, nu: f64, omega: f64) -> f64 {
     beta * sqrt(nu / (8.0 * omega))
 }
 
-/// Returns beta of mode `n`, which counts from 0, of an upright cylinder, 1/m: beta R = (xi^2 + 1)/(xi^2 - 1)
-/// + 2 xi (1 - x)/sinh(2 xi x) (Case and Parkinson, J. Fluid Mech. 2 (1957) 172).
+/// Returns the wall factor beta (1/m) of mode `n` of an upright cylinder, which gives the damping of the laminar layer
+/// at the wall; modes count from 0. With x = h/R it is beta R = (xi^2 + 1)/(xi^2 - 1) + 2 xi (1 - x)/sinh(2 xi x) (Case
+/// and Parkinson, J. Fluid Mech. 2 (1957) 172).
 pub fn cylinder_beta(n: usize, radius: f64, depth: f64) -> f64 {
     let (xi, x) = (XI[n], depth / radius);
     let u = 2.0 * xi * x;
@@ -267,8 +268,8 @@ pub fn low_bond_cylinder(radius: f64, nu: f64, g: f64, bond: f64) -> f64 {
 }
 
 /// Returns the damping ratio of the first mode of an upright cylinder by Mikishev and Dorozhkin (Dodge 2000):
-/// 0.79 sqrt(Re) [1 + (0.318/sinh 1.84 x) (1 + (1 - x)/cosh 1.84 x)]. For x = h/R below 0.5 it is less than
-/// the laminar layer's.
+/// 0.79 sqrt(Re) [1 + (0.318/sinh 1.84 x) (1 + (1 - x)/cosh 1.84 x)]. Here x is h/R. For x below 0.5 the formula gives
+/// less than the damping of the laminar layer.
 #[allow(clippy::approx_constant)] // 0.318 is the correlation's, not 1/pi
 pub fn mikishev_dorozhkin(radius: f64, depth: f64, nu: f64, g: f64) -> f64 {
     let x = depth / radius;
@@ -331,8 +332,9 @@ pub fn covered(radius: f64, width: f64) -> f64 {
     w * (2.0 - w)
 }
 
-/// Returns the factor exp(-1.84 d/R) by which the first mode's motion of the liquid at a ring `depth` below the
-/// surface of an upright cylinder is smaller than at the surface; both lengths in m.
+/// Returns the ratio of the liquid's motion at a ring baffle to its motion at the surface, exp(-1.84 d/R), for the
+/// first mode of an upright cylinder. The ring is `depth` (m) below the surface, and `radius` (m) is the radius of the
+/// cylinder.
 pub fn motion_at_ring(radius: f64, depth: f64) -> f64 {
     // The limit keeps divisions by this share finite.
     exp(-f64::min(1.84 * depth / radius, 100.0))
@@ -593,8 +595,8 @@ mod tests {
         is_near(numbers(&[part(1.0, 3.45, 0.25)]), [1.95, 1.0, 1.3 * 3.45]);
     }
 
-    /// A third of the wall has 4 layers, a half has 1.15 and the rest 1.45. The interval contains the largest
-    /// of them.
+    /// A third of the wall has 4 times the damping of the laminar layer, a half 1.15 times and the rest 1.45 times. The
+    /// result is the mean of these factors, and its interval contains the largest one.
     #[test]
     fn a_wall_of_several_shapes_has_the_mean_of_their_damping() {
         let parts = [part(1.0 / 3.0, 4.0, 1.0), part(0.5, 1.15, 1.0)];

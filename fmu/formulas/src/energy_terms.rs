@@ -44,12 +44,13 @@ pub struct EnergyTerms {
     pub compared: f64,
 }
 
-/// Returns the coefficients at h/R = `fill`, `None` outside [`DEPTHS`].
+/// Returns the coefficients that give the slosh mass the energy of a large wave in an upright cylinder filled to h/R =
+/// `fill`; `None` if the fill is outside [`DEPTHS`].
 ///
 /// Between the rows kappa, kappa_2 and the shifts of the frequency are interpolated, and the other
-/// coefficients follow from them. An error of the interpolation is therefore one of the energy and not of the
-/// frequency. The shifts to third order are interpolated as differences from the third order of potential
-/// flow, which is known at every depth. Beyond the last row the last two coefficients are extrapolated.
+/// coefficients follow from them. An error of the interpolation therefore changes the energy and not the frequency. The
+/// shifts to third order are interpolated as differences from the third order of potential flow, which is known at
+/// every depth. Beyond the last row the last two coefficients are extrapolated.
 pub fn energy_terms(fill: f64) -> Option<EnergyTerms> {
     if !(DEPTHS[0]..=DEPTHS[1]).contains(&fill) {
         return None;
@@ -119,8 +120,8 @@ fn features(&[fill, kappa, s, t, kappa_2, s_2, t_2, _]: &[f64; 8]) -> [f64; 6] {
     ]
 }
 
-/// Returns y at `x` between the points i - 1 and i. With `is_cubic` it is a cubic whose slopes at both points
-/// are those of the parabola through the nearest three points; otherwise it is the straight line.
+/// Interpolates y at `x` between the points i - 1 and i. With `is_cubic` it is a cubic whose slopes at both points are
+/// those of the parabola through the nearest three points; otherwise it is the straight line.
 fn interpolate_segment(x: f64, i: usize, point: impl Fn(usize) -> [f64; 2], is_cubic: bool) -> f64 {
     let [[x_0, y_0], [x_1, y_1]] = [point(i - 1), point(i)];
     let (h, secant) = (x_1 - x_0, (y_1 - y_0) / (x_1 - x_0));

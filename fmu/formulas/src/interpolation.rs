@@ -172,9 +172,10 @@ mod tests {
         }
     }
 
-    /// Returns the differences of the quintic's Bernstein coefficients between two points, divided by h: d/5,
-    /// d/5 + h s/20, the remainder, and the same from the right end. If they all have the sign of the rise,
-    /// the curve is monotonic.
+    /// Returns the differences between neighbouring Bernstein coefficients of the quintic between two points, divided
+    /// by their distance h. From the left end they are d/5 and d/5 + h s/20 with the slope d and the second derivative
+    /// s, then follows the remainder, and then the same from the right end. If they all have the sign of the rise, the
+    /// curve is monotonic.
     fn steps(h: f64, [y_0, d_0, s_0]: [f64; 3], [y_1, d_1, s_1]: [f64; 3]) -> [f64; 5] {
         let secant = (y_1 - y_0) / h;
         let sign = if secant < 0.0 { -1.0 } else { 1.0 };

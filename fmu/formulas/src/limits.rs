@@ -147,8 +147,8 @@ pub fn shifted(limit: f64, error: f64, shifts: [Option<f64>; 2], exact: [f64; 2]
     off.map(|off| libm::sqrt(2.0 * error / off.max(1e-9))).fold(limit, f64::min)
 }
 
-/// Returns a column of [`THIRD_ORDER`] at h/R = `fill`, converted to rad. Shallower liquid continues the
-/// power law of the first two rows, and deeper liquid has the last row's value.
+/// Returns a column of the table [`THIRD_ORDER`] at h/R = `fill`, interpolated and converted from degrees to rad.
+/// Shallower liquid continues the power law of the first two rows, and deeper liquid has the last row's value.
 fn degrees_at(fill: f64, column: usize) -> f64 {
     let [first, second] = [THIRD_ORDER[0], THIRD_ORDER[1]];
     let degrees = if fill < first[0] {
@@ -187,7 +187,8 @@ impl SpinLimit {
     /// Creates the limits of a pendulum of this length in a tank with this radius of the free surface, m. If
     /// the radius is unknown it is 0, and the liquid is taken as deep.
     ///
-    /// C_0 = (1 + 2kh/sinh 2kh)/((kR)^2 - 1) is the liquid's gyroscopic coefficient with tanh kh = 1/(k l):
+    /// The gyroscopic coefficient of the liquid is C_0 = (1 + 2kh/sinh 2kh)/((kR)^2 - 1), with the wave number k and
+    /// tanh kh = 1/(k l):
     /// 0.418 in deep liquid and 0.837 in shallow liquid.
     pub fn new(length: f64, radius: f64) -> SpinLimit {
         let deep = 1.0 / XI[0];
@@ -209,7 +210,8 @@ impl SpinLimit {
         self.factor / 4.0 - 1.0
     }
 
-    /// Returns R/l, which times Omega^2/omega_0^2 is Omega^2 R/g.
+    /// Returns R/l, the radius of the free surface over the pendulum length. Multiplied by Omega^2/omega_0^2 it gives
+    /// the spin number Omega^2 R/g.
     pub fn radius_over_length(&self) -> f64 {
         self.ratio
     }

@@ -65,12 +65,13 @@ const DETUNING: f64 = 0.01;
 /// with twice the frequency of mode 1 at 0.831 and 1.010.
 pub const BRIDGED: [f64; 2] = [0.70, 1.20];
 
-/// Returns s and kappa at h/R = `fill`.
+/// Returns the large-wave coefficients s (inertia) and kappa (stiffness) of the first mode of an upright cylinder
+/// filled to h/R = `fill`.
 ///
-/// Within [`BRIDGED`] the third order has poles, and close to them it holds only at very small amplitudes.
-/// Both coefficients are therefore interpolated linearly between the ends of that range. In fully nonlinear
-/// potential flow at h/R 0.8 and 1.0 the frequencies are those of the interpolated coefficients within 0.3 %
-/// up to 16 degrees, whereas a pendulum is 26 % low in a forced response at h/R 1.0.
+/// Within [`BRIDGED`] the third-order theory has poles, and close to a pole it is valid only at very small amplitudes.
+/// Both coefficients are therefore interpolated linearly between the ends of that range. In fully nonlinear potential
+/// flow at h/R 0.8 and 1.0 the frequencies are those of the interpolated coefficients within 0.3 % up to 16 degrees,
+/// whereas a pendulum is 26 % low in a forced response at h/R 1.0.
 pub fn coefficients(fill: f64) -> (f64, f64) {
     let [low, high] = BRIDGED;
     if fill <= low || fill >= high {
@@ -81,14 +82,14 @@ pub fn coefficients(fill: f64) -> (f64, f64) {
     (s_0 + (s_1 - s_0) * share, kappa_0 + (kappa_1 - kappa_0) * share)
 }
 
-/// Returns the relative shifts of omega^2 per squared slosh angle in planar and in circular motion, 3 kappa/8
-/// - s/2 and kappa/2.
+/// Returns the relative change of the squared frequency omega^2 per squared slosh angle: in planar motion 3 kappa/8 -
+/// s/2, and in circular motion kappa/2.
 pub fn shifts(s: f64, kappa: f64) -> [f64; 2] {
     [0.375 * kappa - 0.5 * s, 0.5 * kappa]
 }
 
-/// Returns s and kappa of the third order at h/R = `fill` without the interpolation of [`coefficients`], so
-/// that they have poles.
+/// Returns the large-wave coefficients s and kappa of third-order theory at h/R = `fill` without the interpolation of
+/// [`coefficients`], so that they grow without bound near 0.831 and 1.010.
 pub fn unbridged(fill: f64) -> (f64, f64) {
     let t_1 = XI[0] * libm::tanh(XI[0] * fill);
     let k2 = XI[0] * XI[0];

@@ -79,8 +79,9 @@ pub fn largest_slope(fill: f64) -> f64 {
     0.7 * f64::min(fill, 1.0)
 }
 
-/// Returns the coefficient c of mode `n`, which counts from 0 and is below [`crate::cylinder::MODES`], at h/R
-/// = `fill`, for motion along the slope and across it.
+/// Returns the coefficient c with which the slope of the surface changes the squared frequency of mode `n` at h/R =
+/// `fill`, for motion along the slope and across it (see [`factors`]). Modes count from 0, and `n` must be below
+/// [`crate::cylinder::MODES`].
 pub fn coefficients(n: usize, fill: f64) -> [f64; 2] {
     let a2 = XI[n] * XI[n];
     let lambda = XI[n] * libm::tanh(XI[n] * fill);
@@ -108,8 +109,9 @@ pub fn coefficients(n: usize, fill: f64) -> [f64; 2] {
     ]
 }
 
-/// Returns the factors on omega^2 of mode `n` at h/R = `fill` for motion along the slope of the surface and
-/// across it. The surface has the slope s, while g along the axis is unchanged.
+/// Returns the factors by which a sloping surface changes the squared frequency omega^2 of mode `n` at h/R = `fill`,
+/// for motion along the slope and across it. The surface has the slope s, and the gravity g along the axis is
+/// unchanged.
 ///
 /// The factor is 1 + c s^2. For negative c it is 1/(1 - c s^2), which equals it to second order, is more
 /// accurate beyond, and never becomes negative.

@@ -1,5 +1,5 @@
 //! Fuzzes parameters, inputs and step sizes: a run must give finite values or an error, a refused call must
-//! change nothing, and repeating a step from a saved state must give the same bits.
+//! change nothing, and repeating a step from a saved state must give bit-identical results.
 
 use std::time::{Duration, Instant};
 

@@ -119,8 +119,9 @@ impl Growth {
         both
     }
 
-    /// Returns coefficient n of the drag relative to its value at the start, from coefficient n of [|q|^2,
-    /// |q'|^2] and of the relative other drag.
+    /// Returns coefficient n of the drag, relative to its value at the start of the expansion. The arguments are
+    /// coefficient n of the squared slosh angle |q|^2 and of its squared rate |q'|^2, and coefficient n of the drag
+    /// that does not depend on the amplitude (`other`).
     pub fn expand(&mut self, n: usize, [q2, v2]: [f64; 2], other: f64) -> f64 {
         self.q2[n] = q2 + if n == 0 { FLOOR * FLOOR } else { 0.0 };
         self.u[n] = mul_ramp(n, &self.w, &self.q2) + v2;
@@ -132,8 +133,8 @@ impl Growth {
         drag
     }
 
-    /// Returns the time, s, over which the series converge, from coefficients 0 to 2. Singularities are at u
-    /// = 0, W = 0 and y = +-i delta W^(1/2).
+    /// Estimates the time, s, over which the series of the drag converge, from coefficients 0 to 2. Their singularities
+    /// are at u = 0, W = 0 and y = +-i delta W^(1/2), with the quantities of the module's head.
     pub fn convergence_radius(&self) -> f64 {
         let time_near = |distance: f64, x: &Series| time_within(distance, x[1].abs(), x[2].abs());
         let time = time_near(self.u[0], &self.u);
@@ -145,9 +146,9 @@ impl Growth {
         time.min(time_within(self.w[0], self.w[1].abs(), 0.0)).min(corner)
     }
 
-    /// Returns the relative drag at `h` after the start of the expansion, and u. u comes from its series up
-    /// to order n, and the drag from u and the relative other drag, so that its difference from the drag's
-    /// series is the error of the series.
+    /// Returns the relative drag and the quantity u of the module's head, at `h` (s) after the start of the expansion.
+    /// u comes from its series up to order n, and the drag is computed from u and from the other drag (`other`). The
+    /// difference from the drag's own series is therefore the error of this series.
     pub fn drag_at(&self, n: usize, h: f64, other: f64) -> [f64; 2] {
         let u = values([&self.u], n, h)[0].max(0.0);
         let root = libm::sqrt(u);

@@ -182,8 +182,8 @@ impl Baffle {
         both
     }
 
-    /// Returns coefficient n of the drag relative to its value at the start, from coefficient n of [|q|^2,
-    /// |q'|^2].
+    /// Returns coefficient n of the baffle's drag, relative to its value at the start of the expansion, from
+    /// coefficient n of the squared slosh angle |q|^2 and of its squared rate |q'|^2.
     pub fn expand(&mut self, n: usize, [q2, v2]: [f64; 2]) -> f64 {
         self.q2[n] = q2 + if n == 0 { self.floor2 } else { 0.0 };
         self.v2[n] = v2;

@@ -50,9 +50,9 @@ impl Plant {
         self.coefficients(0, -torque.value / self.wheel.inertia).map(unsigned_zero)
     }
 
-    /// Returns the derivative of x' in the direction (dx, du) with du = [tau_cmd, tau_ext, g_axial]:
-    /// coefficient 1 of x' along x + dx s, u + du s. The contact and the wheel's state (blocked, at its
-    /// torque limit or free) are held.
+    /// Returns the directional derivative of x', the derivatives of the states, if the states change along dx and the
+    /// inputs [tau_cmd, tau_ext, g_axial] along du. It is coefficient 1 of the power series of x' along x + dx s and u
+    /// + du s. The contact (stick or slip) and the state of the wheel (blocked, at its torque limit or free) are kept.
     pub fn directional_derivative(
         &mut self,
         inputs: &Inputs,
@@ -644,7 +644,8 @@ mod tests {
         }
     }
 
-    /// A damaged saved state may hold any work. The state after a step must be one that can be saved again.
+    /// A damaged saved state may contain any number as the work of g_axial. If the work after a step would be too large
+    /// to be saved again, the step is refused.
     #[test]
     fn work_through_g_axial_beyond_all_magnitudes_is_refused() {
         let (mut plant, inputs) = plant(SloshModel::Linear, FrictionModel::Viscous);

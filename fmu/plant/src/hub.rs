@@ -37,7 +37,8 @@ pub struct Tilt {
 impl Tilt {
     const NONE: Tilt = Tilt { tangent: 0.0, azimuth: 0.0, direction: [ZERO; 2], e: [ZERO; 2] };
 
-    /// Sets coefficient n of d and e, from coefficients up to n of theta.
+    /// Sets coefficient n of d and e, which describe gravity in the frame of the hub on a tilted bench, from the
+    /// coefficients of the hub's angle theta up to order n.
     pub fn expand(&mut self, n: usize, theta: &Series, g: &[f64; 2]) {
         if self.tangent == 0.0 {
             return;
@@ -59,7 +60,7 @@ impl Tilt {
         }
     }
 
-    /// Returns coefficient n of -d.X, the height of a position X in the hub's frame, m.
+    /// Returns coefficient n of the height (m) of a position X that is given in the hub's frame: -d.X.
     pub fn height(&self, n: usize, x: impl Fn(usize) -> [f64; 2]) -> f64 {
         if self.tangent == 0.0 {
             return 0.0;
@@ -76,8 +77,8 @@ impl Tilt {
         [number(&self.e[0]), number(&self.e[1])]
     }
 
-    /// Returns -d.X, m, and its rate, m/s, for a position X with the rate X' in the frame of a hub that turns
-    /// with `w`.
+    /// Returns the height -d.X (m) of a position X, and its rate (m/s). X has the rate X' in the frame of a hub that
+    /// turns at the rate `w`.
     pub fn height_now<T: Number>(&self, [x, y]: [T; 2], [x_d, y_d]: [T; 2], w: T) -> [T; 2] {
         let [d_x, d_y]: [T; 2] = [number(&self.direction[0]), number(&self.direction[1])];
         [-(x * d_x + y * d_y), -(x_d * d_x + y_d * d_y + w * (x * d_y - y * d_x))]

@@ -176,8 +176,8 @@ impl Motion {
         -(e_x * (x + self.rigid_moment) + e_y * y)
     }
 
-    /// Returns mass times height of hub and liquid above rest, kg m, which is the potential energy over g,
-    /// and its rate.
+    /// Returns the sum of mass times height above rest of hub and liquid (kg m), which is the potential energy divided
+    /// by g, and the rate of this sum.
     pub fn height<T: Number, M: SloshMode>(&self, modes: &[M]) -> [T; 2] {
         let ([x, y], still) = (self.imbalance, [T::constant(0.0); 2]);
         let moment = [x + self.rigid_moment, y].map(T::constant);
@@ -390,8 +390,8 @@ impl Motion {
         Ok(flow)
     }
 
-    /// Returns the integral of the liquid's mass times height over `length`, kg m s, from the series of order
-    /// n. The work of a ramp of g is its slope times this integral.
+    /// Returns the integral of the liquid's mass times height over the time `length` (s), kg m s, from the series up to
+    /// order n. If g changes linearly, its work is the slope of g times this integral.
     #[cold]
     fn integral_of_mass_height<M: SloshMode>(&self, modes: &mut [M], n: usize, length: f64) -> f64 {
         let mut sum = ZERO;

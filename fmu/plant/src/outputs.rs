@@ -173,8 +173,8 @@ impl Plant {
         }
     }
 
-    /// Returns the viscous damping ratio of mode `n` at the current g_axial, and its rate along g_axial's
-    /// slope, 1/s. Both are 0 for unused modes and at g_axial = 0.
+    /// Returns the viscous damping ratio of mode `n` at the present g_axial, and the rate (1/s) at which it changes
+    /// with the slope of g_axial. Both are 0 for unused modes and at g_axial = 0.
     pub fn damping_ratio(&self, n: usize, inputs: &Inputs) -> [f64; 2] {
         let (damping, g) = (&self.motion.damping, inputs.g_axial);
         [damping.ratio(n, g.value), damping.slope_of_ratio(n, g.value) * g.slope]

@@ -138,8 +138,8 @@ impl ModeTable {
         [sin, cos]
     }
 
-    /// Returns the pendulum length, m: as given, or from the frequency f at g_ref and the centring stiffness
-    /// k, (2 pi f)^2 = g_ref/l + k/m.
+    /// Returns the pendulum length l of mode `n`, m. It is the given length or, if the frequency f is given, it follows
+    /// from f, the specific force g_ref and the centring stiffness k by (2 pi f)^2 = g_ref/l + k/m.
     pub(crate) fn pendulum_length(&self, n: usize) -> f64 {
         if self.length[n] > 0.0 {
             return self.length[n];

@@ -113,7 +113,8 @@ impl Pendulum {
         self.course[0] = 1.0;
     }
 
-    /// Sets coefficient n of the course of the drag from coefficient n of [|q|^2, |q'|^2].
+    /// Sets coefficient n of the drag, which changes in time, from coefficient n of the squared slosh angle |q|^2 and
+    /// of its squared rate |q'|^2.
     pub fn expand_drag(&mut self, n: usize, at: [f64; 2]) {
         let Pendulum { baffle, growth, .. } = self;
         let other = if baffle.zeta > 0.0 { baffle.expand(n, at) } else { growth.viscous[n] };
@@ -130,8 +131,8 @@ impl Pendulum {
         SHARE_OF_RADIUS * baffle.min(growth)
     }
 
-    /// Returns the error of the slosh mass's rate, rad/s, that the series of its amplitude-dependent drag up to order n
-    /// cause at `h` after the start of the expansion.
+    /// Returns the error of the slosh mass's rate (rad/s) that arises because the series of its amplitude-dependent
+    /// drag end at order n. `h` (s) is the time since the start of the expansion.
     pub fn defect(&self, n: usize, h: f64) -> f64 {
         let Pendulum { baffle, growth, course, .. } = self;
         let [mut drag, mut rate2] = [0.0; 2];
@@ -183,21 +184,23 @@ impl Pendulum {
         if self.is_askew() { [a * x, a * t] } else { [T::constant(0.0), a] }
     }
 
-    /// Returns q_x, q_y, q_x', q_y' of an angle along the slosh mass's direction and its rate.
+    /// Returns the coordinates q_x and q_y of the slosh mass and their rates q_x' and q_y', from its angle along its
+    /// direction of motion and the rate of this angle.
     #[inline(always)]
     pub fn coordinates(&self, [al, al_d]: [f64; 2]) -> [f64; 4] {
         let [x, t] = self.along;
         if self.is_askew() { [al * x, al * t, al_d * x, al_d * t] } else { [0.0, al, 0.0, al_d] }
     }
 
-    /// Returns the angle along the slosh mass's direction and its rate, from q_x, q_y, q_x', q_y'.
+    /// Returns the angle of the slosh mass along its direction of motion, and the rate of this angle, from the
+    /// coordinates q_x and q_y and their rates q_x' and q_y'.
     #[inline(always)]
     pub fn angle_and_rate(&self, [q_x, q_y, x_d, y_d]: [f64; 4]) -> [f64; 2] {
         let [x, t] = self.along;
         if self.is_askew() { [x * q_x + t * q_y, x * x_d + t * y_d] } else { [q_y, y_d] }
     }
 
-    /// Returns coefficient n of a_x n_x + a_t n_t, the component of a vector a along the slosh mass's direction.
+    /// Returns coefficient n of the component of a vector a along the direction n of the slosh mass: a_x n_x + a_t n_t.
     #[inline(always)]
     pub fn component(&self, n: usize, [a_x, a_t]: &[Series; 2]) -> f64 {
         self.along[0] * a_x[n] + self.along[1] * a_t[n]
@@ -209,7 +212,8 @@ impl Pendulum {
         radial + self.along[1] * mul(n, a_t, b)
     }
 
-    /// Returns coefficient n of (a_x n_t - a_t n_x) b, the component across the slosh mass's direction times b.
+    /// Returns coefficient n of the component of a vector a across the direction n of the slosh mass, times a number b:
+    /// (a_x n_t - a_t n_x) b.
     #[inline(always)]
     pub fn across_times(&self, n: usize, [a_x, a_t]: &[Series; 2], b: &Series) -> f64 {
         let tangential = if self.is_askew() { self.along[0] * mul(n, a_t, b) } else { 0.0 };
@@ -225,7 +229,8 @@ impl Pendulum {
         if varies { mul_ramp(n, &self.g, a) } else { self.g[0] * a[n] }
     }
 
-    /// Returns coefficient n of a rate v of the liquid times the course of the drag.
+    /// Returns coefficient n of the product of a rate v of the liquid and the drag coefficient, which may change in
+    /// time.
     #[inline(always)]
     pub fn drag(&self, n: usize, varies: bool, v: &Series) -> f64 {
         if varies { mul(n, &self.course, v) } else { v[n] }

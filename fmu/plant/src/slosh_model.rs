@@ -99,8 +99,8 @@ impl SloshModel {
     }
 }
 
-/// Returns the solution u of u (1 + H u^2) = s by Newton's method. For a softening spring it is the solution
-/// nearest to 0, if one exists.
+/// Returns the displacement u at which a nonlinear spring balances the slope s, that is, the solution of u (1 + H u^2)
+/// = s, by Newton's method. For a softening spring it is the solution nearest to 0, if one exists.
 fn rest(spring: f64, slope: f64) -> f64 {
     let mut u = if spring > 0.0 { slope } else { 0.0 };
     for _ in 0..60 {

@@ -38,7 +38,8 @@ impl Suspension {
         self.c * hub.omega2[n]
     }
 
-    /// Returns tau_s, N m, and the energy of the spring, J, at the start of an expansion.
+    /// Returns the torque tau_s of the suspension line (N m) and the energy of its spring (J) at the start of an
+    /// expansion.
     pub fn present<T: Number>(&self, hub: &HubMotion) -> [T; 2] {
         let [turned, w]: [T; 2] = [number(&hub.theta), number(&hub.omega)];
         let turned = turned - T::constant(self.theta_0);

@@ -136,7 +136,8 @@ impl ModeTable {
         self.direction[..modes].iter().any(|direction| *direction != 0.0)
     }
 
-    /// Returns the largest modal mass along one direction, kg: the larger eigenvalue of the sum of m n n^T.
+    /// Returns the largest sum of modal masses along one direction, kg. It is the larger eigenvalue of the sum of m n
+    /// n^T over the modes, where m is the modal mass and n the direction of a mode.
     fn most_along_one(&self, modes: usize) -> f64 {
         if self.direction[..modes].iter().all(|direction| *direction == self.direction[0]) {
             return self.mass[..modes].iter().sum();
@@ -230,8 +231,9 @@ impl Slosh {
         Breaking { zeta: self.zeta_breaking, onset: self.breaking_steepness, steepness: k * wave }
     }
 
-    /// Returns s and kappa of mode `n`, which counts from 0, in a tank filled to h/R = `fill`. They are 1, as for a
-    /// pendulum, for the second and further modes of an upright cylinder and for all slosh models except `liquid`.
+    /// Returns the large-wave coefficients s (inertia) and kappa (stiffness) of mode `n` in a tank filled to h/R =
+    /// `fill`; modes count from 0. Both are 1, as for a pendulum, for the second and further modes of an upright
+    /// cylinder and for all slosh models except `liquid`.
     pub(crate) fn third_order(&self, n: usize, fill: f64) -> (f64, f64) {
         match self.source {
             _ if self.model != SloshModel::Liquid => (1.0, 1.0),

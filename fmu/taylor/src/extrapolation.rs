@@ -47,8 +47,9 @@ struct Trial<const D: usize> {
     best: f64,
 }
 
-/// Advances x, whose rates at t are `first`, by `h` with Gragg's midpoint rule. The rule's results with 2, 4, ... 16 substeps are
-/// extrapolated to substeps of zero length until two columns agree to `allowed`. Gives up if the columns hardly converge.
+/// Advances the state x by the time `h` with Gragg's midpoint rule; `first` has the rates of x at the time t. The
+/// rule's results with 2, 4, ... 16 substeps are extrapolated to substeps of zero length until two columns agree to
+/// `allowed`. Gives up if the columns hardly converge.
 fn extrapolate<const D: usize>(
     system: &impl System<D>,
     x: &[f64; D],

@@ -47,15 +47,15 @@ pub fn scale(n: usize, a: &Series, b: &Vector2) -> [f64; 2] {
     sum_both(n, |j| [a[j] * b[n - j][0], a[j] * b[n - j][1]])
 }
 
-/// Returns coefficient n of a b_i, the product of a number and component i of a vector.
+/// Returns coefficient n of the product of a number a and component i of a vector b.
 #[inline(always)]
 pub fn mul_part(n: usize, a: &Series, b: &Vector2, i: usize) -> f64 {
     let (a, b) = (&a[..=n], &b.0[..=n]);
     series::sum(n, |j| a[j] * b[n - j][i])
 }
 
-/// Returns coefficient n of a b, the product of a number and a vector, without its term a_n b_0, which may
-/// not be known yet.
+/// Returns coefficient n of the product of a number a and a vector b, without the term a_n b_0, which may not be known
+/// yet.
 #[inline(always)]
 pub fn scale_head(n: usize, a: &Series, b: &Vector2) -> [f64; 2] {
     let mut sum = [EMPTY; 2];
@@ -65,7 +65,8 @@ pub fn scale_head(n: usize, a: &Series, b: &Vector2) -> [f64; 2] {
     sum
 }
 
-/// Returns coefficient n of a b_i without its term a_n b_0, see [`scale_head`].
+/// Returns coefficient n of the product of a number a and component i of a vector b, without the term that contains a_n
+/// (see [`scale_head`]).
 #[inline(always)]
 pub fn mul_part_head(n: usize, a: &Series, b: &Vector2, i: usize) -> f64 {
     let mut sum = EMPTY;
@@ -75,7 +76,7 @@ pub fn mul_part_head(n: usize, a: &Series, b: &Vector2, i: usize) -> f64 {
     sum
 }
 
-/// Returns coefficient n of the products of equal components, (a_1 b_1, a_2 b_2).
+/// Returns coefficient n of the products of the components of two vectors, (a_1 b_1, a_2 b_2).
 #[inline(always)]
 pub fn component_products(n: usize, a: &Vector2, b: &Vector2) -> [f64; 2] {
     let (a, b) = (&a.0[..=n], &b.0[..=n]);
@@ -98,7 +99,7 @@ pub fn dot(n: usize, a: &Vector2, b: &Vector2) -> f64 {
     x + y
 }
 
-/// Returns the values of several vectors' series up to order n at the time t.
+/// Evaluates the power series of several vectors, taken up to order n, at the time t.
 #[inline(always)]
 pub fn values<const K: usize>(a: [&Vector2; K], n: usize, t: f64) -> [[f64; 2]; K] {
     let n = n.min(ORDER);

@@ -57,9 +57,9 @@ impl Rotary {
         }
     }
 
-    /// Evaluates slosh angles (rad) at equal steps (s) of a liquid with this natural frequency (Hz), for any
-    /// torque. In a window with the positions q and the velocities v the swirl number is Σ q × v / √(Σ q² Σ
-    /// v²).
+    /// Measures rotary slosh in slosh angles (rad) at equal steps (s), for a liquid with this natural frequency (Hz)
+    /// under any torque. The result has the largest swirl number and the time in rotary slosh. In a window with the
+    /// positions q and the velocities v the swirl number is Σ q × v / √(Σ q² Σ v²).
     pub fn from_angles(step: f64, frequency: f64, radial: &[f64], tangential: &[f64]) -> Self {
         let length = (PERIODS / frequency / step).ceil() as usize;
         let window = |(x, y): (&[f64], &[f64])| {

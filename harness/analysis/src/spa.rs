@@ -133,9 +133,10 @@ fn estimate(
 /// the processor busy and are six times as fast.
 const TOGETHER: usize = 16;
 
-/// Returns Σ even cos kφ + j odd sin kφ divided by Σ auto cos kφ, and the sum in the denominator, for each angle φ per lag,
-/// rad. The sums use the exact frequencies, because interpolation between the bins of a transform misses deep
-/// antiresonances.
+/// Returns the frequency response from correlation functions, for each angle φ per lag (rad): Σ even cos kφ + j odd sin
+/// kφ divided by Σ auto cos kφ, where `lags` has the even and the odd part of the cross-correlation and the
+/// autocorrelation at each lag k. Also returns the sum in the denominator. The sums use the exact frequencies, because
+/// interpolation between the bins of a transform misses deep antiresonances.
 fn transformed(lags: &[[f64; 3]], angles: [f64; TOGETHER]) -> [(Complex64, f64); TOGETHER] {
     let turn = angles.map(Complex64::cis);
     let (turn_re, turn_im) = (turn.map(|t| t.re), turn.map(|t| t.im));

@@ -31,7 +31,8 @@ impl Sweep {
         self.amplitude * self.phase(t).sin()
     }
 
-    /// Returns the phase φ(t), rad: 2π f0 (e^{at} − 1)/a, or 2π (f0 t + s t²/2).
+    /// Returns the phase φ(t) of the sweep, rad: 2π f0 (e^{at} − 1)/a for an exponential sweep, 2π (f0 t + s t²/2) for
+    /// a linear sweep.
     pub fn phase(&self, t: f64) -> f64 {
         let Sweep { f0, f1, duration, .. } = *self;
         match self.law {

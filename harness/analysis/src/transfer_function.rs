@@ -81,8 +81,8 @@ impl TransferFunction {
         best.map(|(_, fitted)| fitted)
     }
 
-    /// Returns the fit in the frequency domain, %: 100 (1 − |H_meas − H_mod| / |H_meas − mean H_meas|)
-    /// (thesis 6.15).
+    /// Returns the share of the measured response that the model explains in the frequency domain, %: 100 (1 − |H_meas
+    /// − H_mod| / |H_meas − mean H_meas|) (thesis 6.15).
     pub fn fit_frequency(&self, measured: &FrequencyResponse) -> f64 {
         let count = measured.response.len() as f64;
         let mean = measured.response.iter().sum::<Complex64>() / count;
@@ -193,7 +193,8 @@ fn at_the_resonance(measured: &FrequencyResponse) -> Option<TransferFunction> {
 
 const ROUNDS: usize = 30;
 
-/// Returns a start from Sanathanan and Koerner's iteration with U = 1 and Y = H.
+/// Returns start values of the transfer function by Sanathanan and Koerner's iteration, for the input spectrum U = 1
+/// and the output spectrum Y = H, the measured response.
 fn by_sanathanan_koerner(measured: &FrequencyResponse) -> Option<TransferFunction> {
     let count = measured.frequency.len();
     let middle = TAU * measured.frequency.get(count / 2)?;

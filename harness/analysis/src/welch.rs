@@ -91,7 +91,8 @@ impl Spectra {
         all
     }
 
-    /// Returns the magnitude-squared coherence |S_uy|² / (S_uu S_yy), 0 to 1, for each bin.
+    /// Returns the magnitude-squared coherence of input and output, |S_uy|² / (S_uu S_yy), from 0 to 1, for each
+    /// frequency bin.
     pub fn coherence(&self) -> Vec<f64> {
         let at = |k: usize| {
             let power = self.input[k] * self.output[k];
@@ -124,7 +125,8 @@ impl Spectra {
         bins.filter(|(f, _)| (from..=to).contains(f)).collect()
     }
 
-    /// Returns the H1 estimate S_uy / S_uu within a band, Hz.
+    /// Returns the H1 estimate of the frequency response, S_uy / S_uu (cross spectrum over input spectrum), within a
+    /// band, Hz.
     pub fn h1(&self, (from, to): (f64, f64)) -> FrequencyResponse {
         let mut h1 = FrequencyResponse::default();
         for (k, cross) in self.cross.iter().enumerate() {

@@ -16,7 +16,7 @@
 //! With J = 0 it is the explicit midpoint rule, which costs three evaluations a step and is tried first. If
 //! the midpoint rule needs many steps, the FMU is stiff, and J is computed by finite differences; the method
 //! is then L-stable. The work is bounded by a number of steps and not by elapsed time, so that the same run
-//! always gives the same bits.
+//! always gives bit-identical results.
 
 use anyhow::Result;
 use nalgebra::{DMatrix, DVector, Dyn, LU};

@@ -1,5 +1,5 @@
 //! Do the estimates keep what they state? Identifies many recordings of the FMU with different gyro noise, without priors and
-//! starts. Prints the root-mean-square error over the stated standard deviation, how often the 95 % interval contains the truth,
+//! starts. Prints the root-mean-square error over the stated standard deviation, how often the 95 % interval contains the true value,
 //! which models were chosen, and how often no model fitted.
 //!
 //! ```text

@@ -104,7 +104,7 @@ def test_the_compiled_loop_has_the_bits_of_the_loop_in_python(
 
 
 def test_a_matrix_of_gains_is_the_function_that_it_stands_for(fmu: Path) -> None:
-    """A matrix of gains gives the same bits as a function that adds the terms from left to right.
+    """A matrix of gains is bit-identical to a function that adds the terms from left to right.
 
     A filter gives the same as its difference equation.
     """

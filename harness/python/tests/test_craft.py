@@ -51,7 +51,7 @@ def shifted(mass: float, arm: np.ndarray) -> np.ndarray:
 
 
 def test_fmpy_with_the_parameters_of_a_craft_is_simulate_with_them(craft: Craft) -> None:
-    """FMPy gives the same bits as `simulate`: `Craft.parameters` has all that a host must set."""
+    """FMPy and `simulate` agree bit by bit: `Craft.parameters` has all that a host must set."""
     values = craft.parameters("50%")
     names = [f"{name}[{i}]" for name in ("omega", "velocity", "slosh_torque") for i in (1, 2, 3)]
     steps = {"stop_time": 5.0, "output_interval": 0.05, "step_size": 0.05}
@@ -223,7 +223,7 @@ def test_all_errors_of_a_craft_are_reported_at_once(craft: Craft) -> None:
 
 
 def test_many_fills_at_once_are_solved_as_single_fills(craft: Craft) -> None:
-    """One call solves the fills on all cores and gives the same bits as one call for each.
+    """One call solves the fills on all cores and is bit-identical to one call for each fill.
 
     This also holds after the craft was copied to another process.
     """

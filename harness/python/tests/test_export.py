@@ -40,7 +40,7 @@ def craft(request: pytest.FixtureRequest, fmu: Path) -> Craft:
 def test_the_fmu_starts_as_the_craft_in_a_tool_that_sets_nothing(
     craft: Craft, tmp_path: Path
 ) -> None:
-    """FMPy, which sets no parameter, gives the bits of `Craft.simulate`.
+    """FMPy, which sets no parameter, gives the results of `Craft.simulate`, bit by bit.
 
     The FMU has the variables of two tanks only.
     """

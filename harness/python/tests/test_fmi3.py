@@ -88,7 +88,7 @@ def _sizes(table: pd.DataFrame) -> list[tuple[str, float]]:
 
 
 def test_single_steps_and_saved_states_give_the_bits_of_fmi_2(fmu: Path) -> None:
-    """A state saved by one instance is restored in a second one, which continues identically."""
+    """A second instance restores the saved state of the first one and continues bit-identically."""
     rows = []
     names = Fmu.open(fmu).names("output", "local")
     for path in (fmu, three(fmu)):

@@ -23,7 +23,7 @@ PACKAGE = Path(__file__).resolve().parents[1]
 
 
 def test_the_program_drives_the_fmu_and_writes_a_table(fmu: Path, tmp_path: Path) -> None:
-    """``python -m hubslosh`` reads a torque from a file and writes the bits of `drive`."""
+    """``python -m hubslosh`` reads a torque from a file and writes the results of `drive`."""
     time = np.arange(101) * 0.02
     torque, answer = tmp_path / "torque.csv", tmp_path / "answer.csv"
     write_table(torque, {"time": time, "tau_cmd": 0.1 * np.sin(15 * time)})
@@ -77,7 +77,7 @@ def test_a_missing_fmu_raises_an_error_with_the_way_to_build_it(tmp_path: Path) 
 
 
 def test_a_file_of_parameters_equals_a_mapping(fmu: Path, tmp_path: Path) -> None:
-    """Files in TOML and SSV, as ``hubslosh tank --parameters`` writes them, give the same bits."""
+    """TOML and SSV files of ``hubslosh tank --parameters`` give bit-identical results."""
     start = {"slosh.table.m_liq": 2.0, "slosh.table.mass[1]": 0.5, "slosh.table.length[1]": 0.05}
     start |= {"slosh.source": "table", "init.slosh_angle": 0.1}
     toml, ssv = tmp_path / "tank.toml", tmp_path / "tank.ssv"

@@ -42,7 +42,7 @@ def test_the_sampled_model_is_exact_at_the_sampling_instants(fmu: Path) -> None:
 
 
 def test_a_loop_equals_a_drive_with_a_held_torque(fmu: Path) -> None:
-    """A run with the controller's torques as a given input gives the same bits, for every model."""
+    """A run with the controller's torques as input is bit-identical to the loop, for each model."""
     parameters = {"slosh.model": "spherical", "init.slosh_angle": (5, "deg")}
     seen = []
 

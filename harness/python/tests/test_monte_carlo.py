@@ -49,7 +49,7 @@ def test_a_draw_depends_only_on_seed_and_run() -> None:
 def test_a_study_gives_the_results_of_single_runs_with_any_workers(
     fmu: Path, tmp_path: Path
 ) -> None:
-    """Threads, dask, and a study that was stopped and resumed give the same bits."""
+    """Threads, dask, and a study that was stopped and resumed give bit-identical results."""
     outcome = largest_rate(fmu)
     table = monte_carlo(RANGES, 12, 1, outcome)
     assert table["rate"][3] == outcome(draw(RANGES, 3, 1))["rate"]
@@ -161,7 +161,7 @@ def test_a_refused_run_is_a_row_and_a_programming_error_ends_the_study(
 
 
 def test_intervals_of_quantiles_have_their_stated_coverage() -> None:
-    """For the median of 50 numbers the interval must contain the truth in 96.7 % of samples.
+    """For the median of 50 numbers the interval must contain the true value in 96.7 % of samples.
 
     600 samples determine this share to ± 0.7 %.
     """

@@ -155,7 +155,7 @@ def pulses() -> dict[str, tuple[np.ndarray, np.ndarray]]:
 def test_an_input_history_acts_the_same_in_python_and_on_the_command_line(
     fmu: Path, harness: Harness, tmp_path: Path, name: str, step: float, hold: bool
 ) -> None:
-    """Times, inputs and outputs have the same bits; the step only chooses the rows."""
+    """Times, inputs and outputs are bit-identical; the step only chooses the rows."""
     time, torque = pulses()[name]
     path = tmp_path / "in.parquet"
     write_table(path, {"time": time, TORQUE: torque})
@@ -185,7 +185,7 @@ def test_the_table_of_a_profile_acts_as_the_profile(
     fmu: Path, harness: Harness, request: pytest.FixtureRequest, tmp_path: Path,
     profile: str, step: str,
 ) -> None:  # fmt: skip
-    """A table of ``hubslosh torque`` in Python has the bits of ``hubslosh run --profile``."""
+    """Python with a table of ``hubslosh torque`` gives the results of ``run --profile``, bit by bit."""
     path = tmp_path / "torque.parquet"
     command = [option(request, "--hubslosh"), "torque", "--profile", profile]
     subprocess.run([*command, "--out", path, "--step", "0.02"], check=True, capture_output=True)

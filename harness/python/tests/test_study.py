@@ -240,7 +240,7 @@ def test_folders_of_campaigns_and_of_older_studies_are_refused(tmp_path: Path) -
 def test_a_seed_draws_the_numbers_of_a_plan(
     request: pytest.FixtureRequest, fmu: Path, tmp_path: Path
 ) -> None:
-    """For each run, `draw` gives the bits that the program draws for ``[random]`` in a plan."""
+    """For each run, `draw` gives exactly the numbers that the program draws for ``[random]``."""
     ranges = {"tank.h": (0.05, 0.12), "hub.I": (0.30, 0.34), "friction.b": (0.02, 0.05)}
     drawn = [
         f'{name} = {{ distribution = "uniform", from = {low}, to = {high} }}'
@@ -403,7 +403,7 @@ def killed(folder: str, seed: int) -> None:
 def test_a_study_killed_20_times_and_edited_once_equals_an_uninterrupted_one(
     tmp_path: Path,
 ) -> None:
-    """Every cell has the same bits; the process is killed at random moments while it stores."""
+    """Every cell is bit-identical although the process is killed at random moments."""
     whole = study(None, RUNS)
     seed = int(os.environ.get("HUBSLOSH_FUZZ_SEED", "1"))
     command = [sys.executable, "-c", DRIVER, tmp_path, str(seed)]

@@ -181,7 +181,7 @@ def test_a_fit_s_parameters_become_uncertain_ones(spacecraft: Path) -> None:
 def test_a_fit_of_a_length_gives_the_frequency_with_its_deviation(
     spacecraft: Path, request: pytest.FixtureRequest
 ) -> None:
-    """The frequency is within 4 σ of the truth.
+    """The frequency is within 4 σ of the true value.
 
     The deviations of frequency and height of the slosh mass follow from formulas.
     """

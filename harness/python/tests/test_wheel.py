@@ -66,7 +66,7 @@ def test_the_record_has_every_file_and_its_hash(wheel: Path) -> None:
 
 @pytest.mark.long
 def test_the_fmus_of_fmi_3_are_found_by_name(installed: Path, tmp_path: Path) -> None:
-    """They are found in a folder without the source; the rate has the bits of FMI 2.0."""
+    """The FMUs are found outside the source tree; their rate is bit-identical to FMI 2.0."""
     program = """
 from hubslosh import simulate
 for model in ("HubSlosh", "Spacecraft", "SloshTank"):

@@ -153,7 +153,7 @@ def test_a_saturated_wheel_gives_no_more_momentum(rigid: Craft) -> None:
 
 
 def test_the_loop_is_that_of_single_calls(craft: Craft) -> None:
-    """A loop with the matrix of gains has the bits of one that calls the FMU itself."""
+    """A loop with a matrix of gains is bit-identical to a loop that calls the FMU itself."""
     loop = craft.loop(
         np.linalg.pinv(AXES.T) @ GAINS, 0.1, "50%", command="wheels",
         parameters={"init.omega[1]": 0.01},

@@ -14,9 +14,9 @@ const TERMS: usize = 400;
 /// Error of the closed forms from the tails of the sums and from rounding.
 const ERROR: f64 = 1e-11;
 
-/// Returns the sum of tanh(k h/2)/k^5 over the wave numbers beyond `last`, `step` apart, by the midpoint rule
-/// in reverse, (1/step) int dk, with u = 1/k. The terms fall as k^-5 for large k h and as k^-4 for small k h.
-/// In shallow liquid the terms after 400 add 4e-10 m R^2.
+/// Returns the remainder of a series: the sum of tanh(k h/2)/k^5 over all wave numbers k beyond `last`, which are
+/// `step` apart. It is replaced by an integral (midpoint rule in reverse), (1/step) int dk, with u = 1/k. The terms
+/// fall as k^-5 for large k h and as k^-4 for small k h. In shallow liquid the terms after 400 add 4e-10 m R^2.
 fn tail(last: f64, step: f64, h: f64) -> f64 {
     let end = 1.0 / (last + 0.5 * step);
     let rule = Gauss::new(20);
@@ -47,8 +47,8 @@ pub fn zeros_of_j1_slope(count: usize) -> Vec<f64> {
     (1..=count).map(zero).collect()
 }
 
-/// Returns a mode with the wave number k, 1/m, of a tank with vertical walls and a flat bottom: lambda = k tanh(k h), and
-/// its slosh mass is at the height h - (2/k) tanh(k h/2).
+/// Returns the slosh mode with the wave number k (1/m) of a tank with vertical walls and a flat bottom, filled to the
+/// height h. Its eigenvalue is lambda = k tanh(k h), and its slosh mass is at the height h - (2/k) tanh(k h/2).
 fn upright_mode(n: usize, k: f64, h: f64, m: f64, m_liq: f64, surface: Surface, beta: f64) -> Mode {
     let lambda = k * (k * h).tanh();
     let height = h - 2.0 / k * (0.5 * k * h).tanh();

@@ -67,7 +67,8 @@ pub(crate) struct Fields {
 }
 
 impl Fields {
-    /// Computes u_n = s^-n |x|^n P_n^m at the points (r, z), for n from m (from 1 for m = 0) to `degree`.
+    /// Computes the harmonic functions u_n = s^-n |x|^n P_n^m (solid harmonics of the azimuthal number m, scaled by the
+    /// length s) at the points (r, z), for n from m (from 1 for m = 0) to `degree`.
     pub fn new(m: usize, degree: usize, scale: f64, points: &[[f64; 2]]) -> Fields {
         let first = m.max(1);
         let count = degree + 1 - first;
@@ -247,7 +248,8 @@ impl Liquid {
         all
     }
 
-    /// Returns the integrals int f_i u_k rho drho over the surface.
+    /// Returns the matrix of the integrals of f_i u_k over the free surface, int f_i u_k rho drho, for all pairs of the
+    /// functions f_i and u_k.
     pub fn coupling(&self, f: &DMatrix<f64>, u: &DMatrix<f64>) -> DMatrix<f64> {
         DMatrix::from_fn(f.ncols(), u.ncols(), |i, k| self.integral(|q| f[(q, i)] * u[(q, k)]))
     }

@@ -82,8 +82,8 @@ impl Coefficients {
         }
     }
 
-    /// Returns the coefficients of an upright cylinder filled to h/R = `fill` with its limits. Across the
-    /// poles both coefficients are bridged; the second-order wave is then also interpolated.
+    /// Returns the coefficients of an upright cylinder filled to h/R = `fill` with its limits. Near the poles of the
+    /// third-order theory both coefficients, and then also the second-order wave, are interpolated over the fill.
     fn cylinder_coefficients(
         self,
         fill: f64,

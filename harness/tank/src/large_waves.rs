@@ -356,8 +356,9 @@ impl<'a> Solver<'a> {
         [self.resolution.polynomials * self.terms.len(), potentials]
     }
 
-    /// Computes the potential's functions at the heights `z` on the lines of `points`, and with `c` the second derivatives
-    /// of their sum: zz, rz, rr, and the derivatives by theta of the sum, its z- and its r-derivative.
+    /// Computes the functions of which the potential consists, at the heights `z` above the `points`. If the
+    /// coefficients `c` are given, also computes derivatives of the sum of these functions: the second derivatives zz,
+    /// rz and rr, and the derivatives with respect to theta of the sum, of its z-derivative and of its r-derivative.
     fn potentials(
         &self,
         points: &Points,
@@ -776,7 +777,8 @@ fn line(points: &[[f64; 2]]) -> [f64; 2] {
     [(wy * wuu - wuy * wu) / determinant, (w * wuy - wu * wy) / determinant]
 }
 
-/// Returns the frequency of the slosh mass in planar motion, relative to small motion, by quadrature with q = a sin t.
+/// Returns the frequency of the slosh mass in planar motion with the amplitude `angle`, relative to the frequency of
+/// small motion. The period is an integral over the displacement q = a sin t, evaluated by quadrature.
 fn planar_frequency(terms: &EnergyTerms, angle: f64) -> f64 {
     let ([s, kappa], [s_2, kappa_2]) = (terms.pair, terms.next);
     let (a, count) = (angle.sin(), 32);

@@ -43,10 +43,10 @@ pub fn least_gravity(mode: &Mode, tension: f64) -> f64 {
     tension * mode.surface_gradient / LARGEST_SHARE
 }
 
-/// Computes capillarity for a flat surface (contact angle 90 degrees) with a contact line free to slide at a
-/// vertical wall: omega_n^2 = g lambda_n [1 + (sigma/(rho g)) K_n], K_n = int_F (phi_r^2 + phi^2/r^2) r
-/// dr/N_n. It is exact where phi_n does not change, in cylinders, annuli (K = k^2) and boxes, and of first
-/// order in the capillary part elsewhere.
+/// Computes the effect of surface tension on a mode for a flat surface (contact angle 90 degrees) whose contact line
+/// slides freely along a vertical wall. The squared frequency is omega_n^2 = g lambda_n [1 + (sigma/(rho g)) K_n], K_n
+/// = int_F (phi_r^2 + phi^2/r^2) r dr/N_n. It is exact where phi_n does not change, in cylinders, annuli (K = k^2) and
+/// boxes, and of first order in the capillary part elsewhere.
 pub fn flat(mode: &Mode, fluid: Fluid) -> Capillary {
     let added = fluid.sigma / fluid.rho * mode.lambda * mode.surface_gradient;
     let gravity = fluid.g * mode.lambda;

@@ -288,7 +288,8 @@ pub(crate) struct Surface {
 }
 
 impl Mode {
-    /// Creates a mode. `mass` is m, m h, m h^2 with h from the centre of mass at `z_cg`.
+    /// Creates a slosh mode. `mass` has the modal mass m, its first moment m h and its second moment m h^2, where h is
+    /// the height of the slosh mass above the liquid's centre of mass at `z_cg`.
     pub(crate) fn new(
         n: usize,
         lambda: f64,
@@ -369,8 +370,9 @@ impl ModalData {
         }
     }
 
-    /// Sets the errors. The error of I_0 = I_eff - (sum m_n h_n)^2/m_0 - sum m_n h_n^2 follows by
-    /// propagation. Its derivatives by I_eff, sum m_n h_n and m_0 are 1, 2 h_0 and h_0^2.
+    /// Sets the numerical errors of all results. The error of the rigid liquid's inertia, I_0 = I_eff - (sum m_n
+    /// h_n)^2/m_0 - sum m_n h_n^2, follows by error propagation: its derivatives with respect to I_eff, sum m_n h_n and
+    /// m_0 are 1, 2 h_0 and h_0^2.
     pub(crate) fn set_error(&mut self, error: f64, error_beta: f64) {
         (self.error, self.error_beta) = (error, error_beta);
         let axes = self.axes.iter().flat_map(|axes| axes.x.rest.iter().chain(&axes.y.rest));
@@ -422,8 +424,9 @@ impl ModalData {
     }
 }
 
-/// Returns the fixed mass m_0 = m_liq - sum m_n with m_0 H_0 = m_liq z_cg - sum m_n H_n and I_0 = I_eff - m_0
-/// H_0^2 - sum m_n H_n^2, with all heights from z_cg.
+/// Returns the fixed mass m_0, its height H_0 and its inertia I_0, which remain after the masses m_n of all modes at
+/// the heights H_n are subtracted from the liquid: m_0 = m_liq - sum m_n, m_0 H_0 = m_liq z_cg - sum m_n H_n, and, with
+/// heights from z_cg, I_0 = I_eff - m_0 H_0^2 - sum m_n H_n^2.
 pub(crate) fn rest(m_liq: f64, z_cg: f64, i_eff_cg: f64, modes: &[Mode]) -> Rest {
     let m_0 = m_liq - modes.iter().map(|m| m.m).sum::<f64>();
     let h_0 = if m_0 == 0.0 { 0.0 } else { -modes.iter().map(|m| m.m_h).sum::<f64>() / m_0 };

@@ -133,8 +133,9 @@ impl Boundary {
         }
     }
 
-    /// Returns the fraction s of the panel (v^gamma, also outside 0..1) whose point is nearest to x, and the
-    /// distance over the panel's local ds. `w` is x minus the start of the panel.
+    /// Returns the place on the panel that is nearest to the point x, as the fraction s = v^gamma of its length (which
+    /// may lie outside 0..1), and the distance of x from it, divided by the local length element ds. `w` is x minus the
+    /// start of the panel.
     pub(crate) fn foot(&self, panel: &Panel, w: Point) -> [f64; 2] {
         let segment = &self.segments[panel.segment];
         let run = (segment.to - segment.from).signum();

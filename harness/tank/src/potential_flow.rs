@@ -190,7 +190,8 @@ impl Discretisation {
         Some(Solution { lambda, phi, psi })
     }
 
-    /// Assembles 1/2 + D, and S for sources at each point of F and for `q` on the whole boundary.
+    /// Assembles the matrices of the boundary integral equation: 1/2 + D with the double layer D, and the single layer
+    /// S, for sources at each point of the free surface F and for the sources `q` on the whole boundary.
     fn assemble(&self, q: &[f64]) -> (DMatrix<f64>, DMatrix<f64>) {
         let (count, order) = (self.len(), self.order);
         let own = self.own_rules();
@@ -391,10 +392,10 @@ impl Discretisation {
         basis.iter().enumerate().map(|(k, value)| value * coefficient(k)).sum()
     }
 
-    /// Returns int [u_s^2 + u^2/r^2] r ds over the free surface or the wall, with u given at all points. Near
-    /// a corner u_s behaves as rho^(nu - 1), and division of du/dv by ds/dv loses all digits. The integral
-    /// over the last 1e-6 of the panel therefore follows from the exponent (1 if nu > 1, where u_s has a
-    /// limit).
+    /// Returns the integral of the squared surface gradient, int [u_s^2 + u^2/r^2] r ds, over the free surface or the
+    /// wall. The function u is given at all points, and u_s is its derivative along the contour. Near a corner u_s
+    /// behaves as rho^(nu - 1), and division of du/dv by ds/dv loses all digits. The integral over the last 1e-6 of the
+    /// panel therefore follows from the exponent (1 if nu > 1, where u_s has a limit).
     pub(crate) fn gradient(&self, u: &[f64], on_surface: bool) -> f64 {
         let rule = Gauss::new(24);
         let mut slopes = vec![0.0; self.order];

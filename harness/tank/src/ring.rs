@@ -43,7 +43,8 @@ fn elliptic(kc: f64) -> (f64, f64) {
     }
 }
 
-/// Returns Q_1/2 and its derivative at chi = 1 + `x`, x > 0, with a relative error below 1e-13.
+/// Returns the Legendre function of the second kind Q_1/2 and its derivative at chi = 1 + `x` with x > 0. The relative
+/// error is below 1e-13.
 pub(crate) fn legendre_q(x: f64) -> (f64, f64) {
     let chi = 1.0 + x;
     if x > 2.0 {
@@ -62,7 +63,8 @@ pub(crate) fn legendre_q(x: f64) -> (f64, f64) {
     (chi * k * big_k - 2.0 / k * big_e, 0.5 * k * (big_k - chi / x * big_e))
 }
 
-/// Returns g(x, y) and dg/dn at y. `r` and `ry` are the radii of x and y, `d` = y - x, `n` the normal at y.
+/// Returns the potential g(x, y) at the point x of a ring source through y, and its derivative dg/dn along the normal
+/// at y. `r` and `ry` are the radii of x and y, `d` = y - x, `n` the normal at y.
 pub(crate) fn potential(r: f64, ry: f64, d: [f64; 2], n: [f64; 2]) -> (f64, f64) {
     let rr = r * ry;
     let x = (d[0] * d[0] + d[1] * d[1]) / (2.0 * rr);

@@ -26,7 +26,8 @@ const ROWS: [[f64; 8]; 13] = [
 /// Largest relative errors of the slosh mass's frequency and of its energy, at the rows and between them.
 pub(crate) const ERRORS: [f64; 2] = [5e-4, 4e-3];
 
-/// Returns the coefficients at h/R = `fill`, `None` outside the rows.
+/// Returns the coefficients that give the slosh mass the energy of a large wave in a sphere filled to h/R = `fill`;
+/// `None` if the fill is outside the rows of the table.
 ///
 /// They are interpolated linearly. Frequency and energy are nearly linear in the coefficients, so that the frequency and
 /// the energy between two rows are the means of those at the rows.

@@ -31,7 +31,8 @@ impl StribeckCurve {
         StribeckCurve { c: p.c, d: p.d, inv_omega_s2, u_d: ZERO, e: ZERO, torque: ZERO }
     }
 
-    /// Returns the time, s, over which a series of T_C in w converges reliably, from w, w' and w''.
+    /// Estimates the time, s, over which the power series of the dry friction torque T_C converges reliably, from the
+    /// hub's rate w and its derivatives w' and w''.
     ///
     /// Far from rest exp(-v^2), v = w/w_s, is so small that no tolerance sees its terms, but they grow before
     /// they decay. Over dv the term of order n is (2 v dv)^n/n!, the largest at n = 2 v dv. Either the curve

@@ -39,8 +39,9 @@ pub trait FrictionLaw {
     /// Sets coefficient n of the law's own state: 0 is its value, 1 its direction for a partial derivative.
     fn set_state(&mut self, _n: usize, _z: f64) {}
 
-    /// Returns coefficient n of tau_f while the hub is not stuck, from coefficients up to n of theta, w, w^2
-    /// and the law's own state. Sets coefficient n + 1 of that state.
+    /// Returns coefficient n of the friction torque tau_f while the hub is not stuck. It follows from the coefficients
+    /// up to order n of the hub's angle theta, its rate w, w^2 and the state of the friction law, if the law has one.
+    /// Sets coefficient n + 1 of this state.
     fn torque(&mut self, n: usize, contact: Contact, hub: &HubMotion) -> f64;
 
     /// Returns coefficient n of the bearing's dissipated power, W. [`FrictionLaw::torque`] must have computed
@@ -50,7 +51,7 @@ pub trait FrictionLaw {
         -series::mul(n, tau_f, omega)
     }
 
-    /// Returns coefficient n, 0 or 1, of the energy stored in the bearing, J.
+    /// Returns coefficient n (0 or 1) of the energy that is stored in the bearing, J.
     fn energy(&self, _n: usize) -> f64 {
         0.0
     }
@@ -68,8 +69,8 @@ pub trait FrictionLaw {
         0.0
     }
 
-    /// Returns the time, s, over which the series of tau_f converges, from w, w' and w'', for laws whose
-    /// coefficients do not show it.
+    /// Estimates the time, s, over which the series of the friction torque tau_f converges, from the hub's rate w, w'
+    /// and w''. Only laws whose coefficients do not show this time override the default.
     fn convergence_radius(&self, _omega: &Series) -> f64 {
         f64::INFINITY
     }

@@ -72,9 +72,9 @@ impl FrictionLaw for StribeckSmooth {
         -self.b * hub.omega[n] - series::mul(n, &self.curve.torque, &self.sign)
     }
 
-    /// Returns the time, s, to half the distance to the nearest poles of tanh, which are sqrt(v^2 + (pi/2)^2)
-    /// from v = w/eps. Away from 0 tanh is so flat that its coefficients do not show the poles. T_C has a
-    /// limit of its own.
+    /// Estimates the time, s, over which the series of the friction torque converges reliably: the time to half the
+    /// distance to the nearest poles of tanh(v), which are sqrt(v^2 + (pi/2)^2) away from v = w/eps, where w is the
+    /// hub's rate. Away from 0 tanh is so flat that its coefficients do not show the poles. T_C has a limit of its own.
     fn convergence_radius(&self, omega: &Series) -> f64 {
         let [v, v1, v2] = [omega[0], omega[1], omega[2]].map(|x| (x / self.eps).abs());
         let half = libm::sqrt(v * v + 2.4674) / 2.0;

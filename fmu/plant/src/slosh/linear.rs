@@ -97,7 +97,8 @@ impl SloshMode for Linear {
         self.al_d[0].abs() + self.p.omega_n * self.al[0].abs()
     }
 
-    /// Returns coefficient n of m l al^2/2 plus, on a tilted bench, m times the height of the bob.
+    /// Returns coefficient n of the slosh mass times its height above rest, kg m: m l al^2/2, where al is its angle. On
+    /// a tilted bench m times the height of the slosh mass in the hub's frame is added.
     #[inline(always)]
     fn mass_height(&mut self, n: usize, hub: &HubMotion) -> f64 {
         let Pendulum { m, l, r, along: [n_x, n_t], .. } = self.p;
@@ -127,8 +128,8 @@ impl SloshMode for Linear {
         [radial + e_x * m - al_dd * (m * l * n_x), e_y * m - (wd * r + al_dd * l * n_t) * m]
     }
 
-    /// Returns r F_y, because in the linear model the force acts at the hinge; gravity of a tilted bench acts at the slosh
-    /// mass.
+    /// Returns the torque of the liquid on the hub, r times the tangential force, because in the linear model the force
+    /// acts at the hinge. Gravity of a tilted bench acts at the slosh mass instead.
     fn torque<T: Number>(&self, hub: &HubMotion) -> T {
         let Pendulum { m, l, r, .. } = self.p;
         let ([_, f_y], [e_x, e_y]): ([T; 2], [T; 2]) = (self.force(hub), hub.tilt.now());

@@ -192,18 +192,22 @@ pub trait SloshMode {
     /// order 1.
     fn seed_direction(&mut self, dq: &[f64; 4], hub: &HubMotion);
     fn derivatives(&self, n: usize, hub: &HubMotion) -> [f64; 4];
-    /// Returns coefficient n of J and T, from coefficients up to n of q, q' and w.
+    /// Returns coefficient n of the inertia J and of the torque T with which the mode acts on the hub (see the module's
+    /// head), from the coefficients of q, q' and the hub's rate w up to order n.
     fn hub_reaction(&mut self, n: usize, ramp: bool, hub: &HubMotion) -> HubReaction;
-    /// Computes coefficient n of q'' and n + 1 of q and q', after `hub_reaction`, with w' known up to n.
+    /// Computes coefficient n of q'' and coefficient n + 1 of q and q'. It is called after `hub_reaction`, when the
+    /// hub's angular acceleration w' is known up to order n.
     fn accelerate(&mut self, n: usize, varies: bool, hub: &HubMotion);
     fn error_scale(&self) -> f64;
     fn coefficient_norm(&self, n: usize) -> f64;
     /// Returns coefficient n of the mode's dissipated power, W, after `hub_reaction`.
     fn dissipation(&mut self, n: usize, ramp: bool) -> f64;
-    /// Returns coefficient n of mass times height above rest, kg m, which is the potential energy over g.
+    /// Returns coefficient n of the slosh mass times its height above rest (kg m), which is the potential energy
+    /// divided by g.
     fn mass_height(&mut self, n: usize, hub: &HubMotion) -> f64;
-    /// Returns the coordinates at `t`, s, at the hub's rate `omega`, from the series up to order n. `varies`
-    /// is true if g, drag or weight change along the expansion; otherwise the modes move along the tangent.
+    /// Returns the coordinates at the time `t` (s) after the start of the expansion, when the hub has the rate `omega`,
+    /// from their series up to order n. `varies` is true if g, drag or weight change along the expansion; otherwise the
+    /// modes move along the tangent.
     fn coordinates_at(&self, n: usize, t: f64, omega: f64, varies: bool) -> [f64; 4];
     /// Returns mass times height above rest, kg m, and its rate.
     fn height<T: Number>(&self, hub: &HubMotion) -> [T; 2];

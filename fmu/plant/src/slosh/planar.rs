@@ -141,7 +141,9 @@ impl SloshMode for Planar {
         [half * 2.0 * half * (m * l) + tilted[0] * m, s * al_d * (m * l) + tilted[1] * m]
     }
 
-    /// Returns -m times the slosh mass's acceleration at (r + u n_x, u n_t). The plane's guide carries the force across it.
+    /// Returns the force of the slosh mass on the tank, which is minus its mass times its acceleration. The slosh mass
+    /// is at (r + u n_x, u n_t), where u is its displacement along its direction. The plane's guide carries the force
+    /// across it.
     fn force<T: Number>(&self, hub: &HubMotion) -> [T; 2] {
         let Pendulum { m, l, r, .. } = self.p;
         let [s, c, ad, al_dd] = [&self.s, &self.c, &self.al_d, &self.al_dd].map(number::<T>);

@@ -74,8 +74,8 @@ pub struct Spherical {
 }
 
 impl Spherical {
-    /// Sets coefficient n of direction and velocity from coefficient n of the coordinates: p' = k xi' - v_z
-    /// xi, v_z = k^2 xi.xi'.
+    /// Sets coefficient n of the direction p and the velocity v from coefficient n of the coordinates xi, by p' = k xi'
+    /// - v_z xi and v_z = k^2 xi.xi'.
     #[inline(always)]
     fn place(&mut self, n: usize, hub: &HubMotion) {
         let one = constant(n, 1.0);
@@ -92,7 +92,8 @@ impl Spherical {
         self.v[n] = [along[0] - back[0] - turned[1], along[1] - back[1] + turned[0]];
     }
 
-    /// Returns coefficient n of k xi'' = p'' + 2 v_z xi' + v_z' xi, with p'' = v' - w' R p - w R p'.
+    /// Returns coefficient n of k times the acceleration xi'' of the coordinates. It is p'' + 2 v_z xi' + v_z' xi with
+    /// p'' = v' - w' R p - w R p', where p is the slosh mass's direction and v its velocity.
     fn k_xi_dd(&self, n: usize, hub: &HubMotion) -> [f64; 2] {
         let [x, y] = scale(n, &hub.omega_dot, &self.dir);
         let [x_d, y_d] = scale(n, &hub.omega, &self.dir_d);
@@ -177,7 +178,8 @@ impl SloshMode for Spherical {
         })
     }
 
-    /// Computes the coordinates from sin(angle) = p_x, p_y, with the slosh mass below its hinge.
+    /// Computes the coordinates from the slosh angles, whose sines are the components p_x and p_y of the slosh mass's
+    /// direction. The slosh mass is below its hinge.
     fn coordinates(&self, at: &Angles) -> [f64; 4] {
         let [p_x, p_y] = at.angle.map(libm::sin);
         let [v_x, v_y] = [0, 1].map(|i| libm::cos(at.angle[i]) * at.rate[i]);
@@ -304,8 +306,8 @@ impl SloshMode for Spherical {
         self.p.c * self.p.l * self.p.l * speed2
     }
 
-    /// Returns coefficient n of m l (1 + p_z), with 1 + p_z = |xi|^2 k, because this form has no cancellation
-    /// near rest.
+    /// Returns coefficient n of the slosh mass times its height above rest, m l (1 + p_z). It is computed with 1 + p_z
+    /// = |xi|^2 k, because this form has no cancellation near rest.
     #[inline(always)]
     fn mass_height(&mut self, n: usize, hub: &HubMotion) -> f64 {
         let [xi_1, xi_2] = self.xi[0];
@@ -315,7 +317,8 @@ impl SloshMode for Spherical {
         m * l * height + m * hub.tilt.height(n, place)
     }
 
-    /// Computes the coordinates from the direction p: xi = p/k and k xi' = p' + v_z xi. The factor k = 1 - p_z comes from
+    /// Computes the coordinates xi and their rates from the direction p of the slosh mass, by xi = p/k and k xi' = p' +
+    /// v_z xi. The factor k = 1 - p_z comes from
     /// |p| = 1 if the slosh mass is above the horizontal.
     #[inline(always)]
     fn coordinates_at(&self, n: usize, t: f64, omega: f64, _: bool) -> [f64; 4] {
@@ -379,7 +382,8 @@ mod tests {
     use super::*;
     use taylor::series::ORDER;
 
-    /// Returns xi'' by Lagrange's equations of the slosh mass in xi, with v = xi' + w R xi and rho = xi.xi':
+    /// Returns the acceleration xi'' of the coordinates xi by Lagrange's equations of the slosh mass, with v = xi' + w
+    /// R xi and rho = xi.xi':
     ///
     /// ```text
     /// xi'' = B + A w'

@@ -222,7 +222,8 @@ impl SloshMode for ThirdOrder {
         [height * (m / l) + tilted[0] * m, height_d * (m / l) + tilted[1] * m]
     }
 
-    /// Returns minus the slosh mass times its acceleration, -m (q'' - a - w' (y, -(r + x))).
+    /// Returns the force of the slosh mass on the tank, which is minus its mass times its acceleration: -m (q'' - a -
+    /// w' (y, -(r + x))).
     fn force<T: Number>(&self, hub: &HubMotion) -> [T; 2] {
         let (wd, y, arm) =
             (number::<T>(&hub.omega_dot), number::<T>(&self.q[1]), number::<T>(&self.arm));

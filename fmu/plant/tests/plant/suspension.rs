@@ -1,4 +1,5 @@
-//! A hub that hangs from a torsion line: frequencies and decays in closed form, balances, and the bits of a hub without.
+//! A hub that hangs from a torsion line: frequencies and decays in closed form, balances, and results that without a
+//! line are bit-identical to a hub without suspension.
 
 use std::f64::consts::{PI, TAU};
 

@@ -574,7 +574,7 @@ mod tests {
     };
     const COUNT: usize = 1 << 16;
 
-    /// Counts, for N, B and K, the records whose interval contains the truth, and whose fit describes them.
+    /// Counts, for N, B and K, the records whose interval contains the true value, and whose fit describes them.
     fn covered(noise: &Noise, draws: u64) -> ([u64; 3], u64) {
         let (mut held, mut described) = ([0; 3], 0);
         for seed in 0..draws {

@@ -1,6 +1,6 @@
 //! Do the estimates keep what they state, for recordings of a bench that is not the FMU? Twins of [`bench`]: truths drawn
 //! within ±30 %, all kinds of torque, noise and flaws of the measurement. Each is identified as a user would; then how often the
-//! 95 % intervals hold the truth.
+//! 95 % intervals contain the true value.
 //!
 //! ```text
 //! cargo run --release -p identify --features studies --example twins -- [KEY=VALUE ...]
@@ -25,7 +25,7 @@ use habits::HABITS;
 use host::fmu::Fmu;
 use identify::bench::identification::Identification;
 
-/// Standard deviations beyond which an estimate of a described recording counts as wrong, unless its interval holds the truth: an
+/// Standard deviations beyond which an estimate of a described recording counts as wrong, unless its interval contains the true value: an
 /// open interval states that the end is not known.
 const WRONG: f64 = 5.0;
 

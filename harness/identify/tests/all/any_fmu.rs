@@ -106,7 +106,7 @@ fn intervals_contain_the_true_values_of_a_hub_in_closed_form() {
 }
 
 /// The recorded torque is 2 % too small. Because inertia and friction are only known relative to the torque, no residual shows
-/// this error: in intervals that include only noise, the truth is more than ten standard deviations outside.
+/// this error: in intervals that include only noise, the true value is more than ten standard deviations outside.
 #[test]
 fn known_values_count_with_their_tolerances() {
     let mut records = [record(1, 0.2, BIAS), record(2, -0.1, 0.0)];

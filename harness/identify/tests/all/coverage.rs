@@ -41,7 +41,7 @@ impl Count {
         }
     }
 
-    /// Prints the counts, and checks that at least 93 % of the given intervals hold the truth; if there are few intervals, at
+    /// Prints the counts, and checks that at least 93 % of the given intervals contain the true value; if there are few intervals, at
     /// least 95 % less two standard deviations of this share by chance. No error may exceed [`LIMIT`] standard deviations.
     fn check(&self, kind: &str) {
         let part = self.inside as f64 / self.given.max(1) as f64;

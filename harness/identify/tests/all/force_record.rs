@@ -213,7 +213,7 @@ fn compared(tank: &Tank, result: &Identification) -> Vec<(String, [f64; 2], f64)
     result.parameters.iter().map(|(name, p)| (name.clone(), p.interval, truth(name))).collect()
 }
 
-/// Asserts that the fit is accepted, and that each estimate is within 4 standard deviations of the truth.
+/// Asserts that the fit is accepted, and that each estimate is within 4 standard deviations of the true value.
 fn holds(tank: &Tank, result: &Identification) {
     assert_eq!(result.fits, Some(true), "{:#?}", result.verdict);
     for (name, [low, high], truth) in compared(tank, result) {

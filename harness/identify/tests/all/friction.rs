@@ -38,7 +38,7 @@ pub fn push(seed: u64, way: f64) -> Recording {
 }
 
 /// Asserts that the verdict calls the asymmetry not determined, and that the friction in the direction `way` is within four
-/// standard deviations of the truth.
+/// standard deviations of the true value.
 pub fn is_one_way(
     parameters: &BTreeMap<String, Estimated>,
     combinations: &[Combination],
@@ -81,7 +81,7 @@ fn fit(recordings: &[Recording], options: &Options) -> anyhow::Result<Identifica
     friction::identify(&fmu, &rates, options, &mut |_| {})
 }
 
-/// Returns the parameters that are three standard deviations or more from the truth. The fit has to end at a minimum with no
+/// Returns the parameters that are three standard deviations or more from the true value. The fit has to end at a minimum with no
 /// parameter at a bound.
 fn wrong(set: &Set, seed: u64, bias: f64, asymmetry: f64) -> Vec<String> {
     let found = fit(&recordings(set, seed, bias, asymmetry), &options()).unwrap();

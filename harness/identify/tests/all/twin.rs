@@ -269,7 +269,7 @@ fn a_recording_without_noise_fits_and_other_models_are_given_up_early() {
 }
 
 /// The motion is so slow that the friction curve is nearly straight. The minimum is at 0.02 rad/s; a quadratic there would
-/// exclude the truth by fourteen standard deviations.
+/// exclude the true value by fourteen standard deviations.
 #[test]
 fn the_interval_along_the_flat_valley_of_friction_equals_the_likelihoods() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();

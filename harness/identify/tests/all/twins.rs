@@ -8,7 +8,7 @@ use crate::draw::Twin;
 use crate::habits::{self, HABITS};
 
 /// Asserts that a twin, identified as a user would do it, is described by the model, that no estimate is further off than five
-/// standard deviations, and that the intervals of the parameters `held` hold the truth.
+/// standard deviations, and that the intervals of the parameters `held` contain the true value.
 fn is_described(seed: u64, held: &[&str]) {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let twin = Twin::draw(seed, 200.0);
