@@ -185,7 +185,7 @@ def test_the_table_of_a_profile_acts_as_the_profile(
     fmu: Path, harness: Harness, request: pytest.FixtureRequest, tmp_path: Path,
     profile: str, step: str,
 ) -> None:  # fmt: skip
-    """Python with a table of ``hubslosh torque`` gives the results of ``run --profile``, bit by bit."""
+    """A table of ``hubslosh torque`` in Python gives exactly the results of ``run --profile``."""
     path = tmp_path / "torque.parquet"
     command = [option(request, "--hubslosh"), "torque", "--profile", profile]
     subprocess.run([*command, "--out", path, "--step", "0.02"], check=True, capture_output=True)
