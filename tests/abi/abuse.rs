@@ -19,7 +19,7 @@ use runtime::table::Layout;
 
 const VERSIONS: [Fmi; 2] = [Fmi::V2, Fmi::V3];
 
-/// An unpacked FMU, and what the C hosts must know of it.
+/// An unpacked FMU, and the facts about it that the C hosts need.
 struct Unpacked {
     fmi: Fmi,
     directory: tempfile::TempDir,

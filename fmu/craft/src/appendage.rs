@@ -345,7 +345,7 @@ pub(crate) struct Flexing {
     momentum: Vector,
     moment: Vector,
     growth: [Symmetric; ORDER + 1],
-    /// w x y and D w, and their sums with K and L.
+    /// The vectors w x y and D w, and their sums with K and L (see the module's head).
     turned: Vector,
     grown: Vector,
     flow: Vector,

@@ -141,7 +141,7 @@ pub struct CraftMotion {
     has_events: bool,
     /// Index of the constrained bob that reaches the bound of its surface at the end of the expansion.
     beyond: Option<usize>,
-    /// Lump and event at the end of the expansion.
+    /// Number of a detached liquid and the event that it has at the end of the expansion, if there is one.
     due: Option<(usize, Due)>,
     follows: bool,
     whole: Rigid,
@@ -285,7 +285,8 @@ impl CraftMotion {
         }
     }
 
-    /// Replaces rigid liquids and bobs by those of `tanks`, which must have the same numbers of tanks and modes.
+    /// Replaces the rigid liquids and the bobs by the contents of `tanks`, which must have as many tanks and modes as
+    /// before.
     pub fn refill<'a>(&mut self, tanks: impl Iterator<Item = &'a Tank> + Clone) {
         self.rigid = self.craft;
         for (liquid, tank) in self.liquids.iter_mut().zip(tanks.clone()) {

@@ -679,8 +679,8 @@ const FARTHEST: f64 = 1e9;
 /// Smallest inertia of spinning liquid, kg m2, because the equations divide by it.
 const LEAST_SPIN: f64 = 1e-9;
 
-/// Largest ratio of a principal moment to the sum of the others: 1 for a plate, with a margin for moments
-/// given to four digits.
+/// Largest allowed ratio of a principal moment of inertia to the sum of the other two moments. A plate has the ratio 1;
+/// the margin is for moments that are given to four digits.
 const PLATE: f64 = 1.0 + 1e-3;
 
 /// Range of tolerances, from rounding to where error control loses its meaning.

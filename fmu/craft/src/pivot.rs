@@ -63,7 +63,7 @@ impl PivotFriction {
 }
 
 impl Pivot {
-    /// Returns true if the pivot has stiffness, damping or friction, so that it does more than hold O.
+    /// Returns true if the pivot has stiffness, damping or friction, so that it exerts a torque on the craft.
     pub(crate) fn acts(&self) -> bool {
         let Pivot { k, c, friction } = *self;
         k != [0.0; 2] || c != [0.0; 3] || friction.acts()

@@ -38,8 +38,8 @@ use formulas::limits::{
 use formulas::regime::Regime;
 use formulas::third_order;
 
-/// 2 b/a over 1 + (b/a)^2 of an ellipse with the semi-axes a and b = a/2; wider ellipses count as rotary
-/// motion.
+/// Swirl number (2 b/a)/(1 + (b/a)^2) of an ellipse with the semi-axes a and b = a/2. Motion on wider ellipses counts
+/// as rotary.
 const ROTARY: f64 = 0.8;
 
 /// Mass of liquid at which a tank is empty, relative to the first point of its fill table, with a host's

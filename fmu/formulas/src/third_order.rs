@@ -31,9 +31,9 @@ const M: f64 = 0.278_821_981_660_245_8;
 /// Squared amplitude of the wave per squared slosh angle, B = (2/((xi_1^2 - 1) J1(xi_1)))^2.
 const B: f64 = 2.068_401_064_148_324;
 
-/// xi and e = c^2/(n n_1) of the excited modes with the azimuthal numbers 0 and 2, with the integrals c = int
-/// J1^2 J r dr, n = int J^2 r dr and n_1 = int J1^2 r dr. Leaving out higher modes changes s and kappa by
-/// less than 1e-4 from h/R 0.2 on.
+/// Modes that the first mode excites, for the azimuthal numbers 0 and 2: the zero xi of each mode and its coupling e =
+/// c^2/(n n_1) with the first mode, where c = int J1^2 J r dr, n = int J^2 r dr and n_1 = int J1^2 r dr. Leaving out
+/// higher modes changes s and kappa by less than 1e-4 from h/R 0.2 on.
 const EXCITED: [[(f64, f64); 8]; 2] = [
     [
         (3.831_705_970_207_513, 4.011_801_530_216_258e-2),

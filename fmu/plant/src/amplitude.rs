@@ -38,8 +38,8 @@ const WEIGHTLESS: f64 = 1e-6;
 
 const ROUNDED: f64 = 0.02;
 
-/// Waves of one mode that break: zeta_b is `zeta` (0 if waves do not break), s_b is `onset`, and `steepness`
-/// is sigma, 1/rad.
+/// Damping by breaking waves of one mode. With the symbols of the module's head, `zeta` is zeta_b (0 if waves do not
+/// break), `onset` is the steepness s_b, and `steepness` is sigma, 1/rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Breaking {
     pub zeta: f64,

@@ -19,8 +19,8 @@ use crate::parameters::{MODES, Parameters, SloshSource};
 use crate::slosh::Angles;
 use crate::tank::Calculated;
 
-/// 2 b/a over 1 + (b/a)^2 of an ellipse with the semi-axes a and b = a/2; wider ellipses count as rotary
-/// motion.
+/// Swirl number (2 b/a)/(1 + (b/a)^2) of an ellipse with the semi-axes a and b = a/2. Motion on wider ellipses counts
+/// as rotary.
 const ROTARY: f64 = 0.8;
 const LARGEST: f64 = core::f64::consts::FRAC_PI_4;
 

@@ -369,8 +369,8 @@ impl Default for Imu {
 }
 
 impl Default for Solver {
-    /// Allows so many steps that a step with one mode takes at most a fraction of a second, and one with ten
-    /// spherical modes about six seconds.
+    /// Allows as many internal steps as keep a communication step with one mode below a second, and a communication
+    /// step with ten spherical modes at about six seconds.
     fn default() -> Self {
         Solver { max_steps: 200_000 }
     }

@@ -70,7 +70,7 @@ pub struct State {
     /// Time since the start, s, and its rounding error. It is the sum of the steps' lengths, because a host's
     /// clock may be off by rounding, may drift, or start at 1e9 s.
     pub(crate) elapsed: [f64; 2],
-    /// g_axial at the start, m/s2, for which the slosh damping is given.
+    /// Specific force g_axial at the start, m/s2, for which the slosh damping is given.
     pub(crate) start_g: f64,
     pub(crate) axial: Axial,
     pub(crate) gyro: Gyro,

@@ -266,7 +266,8 @@ fn inertia_problems(p: &Parameters) -> impl Iterator<Item = String> {
     })
 }
 
-/// h/R below which waves are shallow: s turns negative and both coefficients grow without bound.
+/// Fill h/R below which waves are shallow: there the large-wave coefficient s turns negative, and s and kappa grow
+/// without bound.
 const SHALLOW: f64 = 0.4;
 
 fn third_order_warning(fill: f64) -> Option<String> {

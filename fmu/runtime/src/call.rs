@@ -160,9 +160,9 @@ pub(crate) mod states {
 pub struct Call {
     /// Name of the function, with which its messages begin.
     pub name: &'static str,
-    /// The states in which it may be called, as bits.
+    /// The instance states in which the function may be called, as a bit mask.
     allowed: u16,
-    /// The C type of the values that it reads or sets, if it does.
+    /// The C type of the values that the function reads or sets; `None` for other functions.
     pub c_type: Option<CType>,
     /// The only interface to which it belongs, or `None` for both.
     only_in: Option<Interface>,

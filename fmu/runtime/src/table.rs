@@ -65,7 +65,8 @@ pub const GUID_LENGTH: usize = 38;
 /// Consecutive scalars: index of the first, and of the one after the last.
 type Span = (usize, usize);
 
-/// Returns the range of the scalars of one kind: 'i' inputs, 'p' parameters, otherwise derivatives.
+/// Returns the range of indices of one kind of scalars: 'i' for inputs, 'p' for parameters, any other character for
+/// derivatives.
 const fn span<M: Dynamics>(scalars: &[Scalar<M>], kind: char) -> Span {
     let (mut begin, mut end, mut n) = (0, 0, 0);
     while n < scalars.len() {

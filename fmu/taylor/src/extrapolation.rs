@@ -136,7 +136,7 @@ pub struct Pace {
 }
 
 impl Pace {
-    /// Starts a call over `h`, s. The first step tries the whole length.
+    /// Starts the pace of a call that advances by `h` (s). The first step tries the whole length.
     pub fn new(h: f64, steps: Steps) -> Pace {
         Pace { steps, h }
     }

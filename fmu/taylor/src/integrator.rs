@@ -332,9 +332,10 @@ pub fn add_time([time, rest]: [f64; 2], t: f64) -> [f64; 2] {
 /// instants in between at which calls have ended.
 #[derive(Clone, Debug)]
 pub struct Expansion {
-    /// Number of computed orders: coefficients of the states up to this one are known.
+    /// Highest order up to which the coefficients of the states are computed.
     orders: usize,
-    /// Number of the lowest orders that other uses of the motion have overwritten since.
+    /// Number of the lowest orders whose coefficients were overwritten, because the motion was used for something else
+    /// after the expansion.
     overwritten: usize,
     norms: [f64; ORDER + 1],
     radius: f64,

@@ -16,7 +16,7 @@ pub struct Outcome {
 pub struct Report {
     pub path: PathBuf,
     pub outcomes: Vec<Outcome>,
-    /// The error that no selected rule was checked. A report with this error says nothing about the FMU.
+    /// The error that no selected rule could be checked. A report with this error contains no result about the FMU.
     pub unchecked: Option<String>,
     /// Report of a bug in this program because of which a rule could not be checked.
     pub bug: Option<String>,

@@ -497,7 +497,7 @@ impl Drop for Given {
 pub const MODEL_EXCHANGE: i32 = 0;
 pub const CO_SIMULATION: i32 = 1;
 
-/// fmi2StatusKind for the question whether the FMU requests the end of the simulation.
+/// Value of fmi2StatusKind with which a host asks whether the FMU requests the end of the simulation.
 pub const TERMINATED: i32 = 3;
 
 /// Arguments of fmi2Instantiate; `None` becomes a NULL pointer.

@@ -44,12 +44,12 @@ pub(crate) fn mean_square(values: &[f64]) -> f64 {
     values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64
 }
 
-/// Returns the fit of a model with the residual r to measured values y, %: 100 (1 − ‖r‖/‖y − mean y‖).
+/// Returns the share of measured values y that a model explains, %: 100 (1 − ‖r‖/‖y − mean y‖), with the residual r.
 pub(crate) fn fit_percent(residual: &[f64], measured: &[f64]) -> f64 {
     100.0 * (1.0 - (mean_square(residual) / mean_square(&about_mean(measured))).sqrt())
 }
 
-/// Returns a unit of the FMU as it is written in prose: kg·m² for kg.m2.
+/// Converts a unit from FMI's spelling to the spelling in prose, for example kg.m2 to kg·m².
 pub fn prose(unit: &str) -> String {
     unit.replace('.', "·").replace('2', "²")
 }

@@ -24,7 +24,7 @@ pub const GAP_ORDER: usize = 32;
 pub const GAP_TRIALS: usize = 12;
 /// Largest kick of the hub by the errors of all fillings, over the gyro's noise.
 pub const GAP_KICK: f64 = 0.1;
-/// Largest number of gaps at which a recording is cut; with more of them its parts would be too small.
+/// Largest number of gaps at which a recording is cut; with more gaps the parts would be too short.
 pub const FEW_GAPS: usize = 5;
 
 // Plausibility of a recording: `input/plausible.rs`.
@@ -59,7 +59,8 @@ pub const LONG_RECORDING: f64 = 120.0;
 pub const SLOW_GYRO: f64 = 0.75;
 /// Largest value of a signal: the squares of all rows have a finite sum.
 pub const LARGEST_VALUE: f64 = 1e100;
-/// Part of the changes of a held gyro that fall on the rows of its own clock.
+/// If at least this fraction of the changes of a gyro signal falls on the rows of a slower clock, the gyro counts as
+/// held with this clock.
 pub const ON_CLOCK: f64 = 0.98;
 pub const SLOWEST_GYRO: usize = 100;
 
@@ -82,7 +83,8 @@ pub const SENSOR_ROUNDING: f64 = 1e-9;
 
 // Spikes: `input/spikes.rs`.
 // Tests: `single_and_adjacent_spikes_are_found_and_noise_is_not_a_spike`, `more_than_one_value_in_a_hundred_is_no_spike`, `a_step_of_the_torque_makes_no_spike`.
-/// Largest share of spikes among all values. More are noise of another kind, for which no row should be left out.
+/// Largest fraction of values that are left out as spikes. If there are more, they are noise of another kind, and no
+/// value is left out.
 pub const SPIKE_SHARE: f64 = 0.01;
 /// Rows on either side of a step of the torque in which r may be the hub's own motion.
 pub const SPIKE_NEAR_STEP: usize = 3;

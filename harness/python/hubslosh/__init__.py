@@ -60,7 +60,7 @@ __all__ = [*sorted(_MODULE_OF), "attitude", "plot"]
 
 
 def __getattr__(name: str) -> Any:
-    """Import what is used for the first time."""
+    """Import a name of the package when it is used for the first time."""
     if name == "__version__":
         value: Any = _version()
     elif name in _MODULE_OF:

@@ -224,7 +224,7 @@ class MassProperties:
     inertia: Vector
 
     def __str__(self) -> str:
-        """Return it in five lines."""
+        """Return the mass properties in five lines."""
         rows = "\n".join(f"  {_row(row, 7)}" for row in self.inertia)
         return (
             f"mass {self.mass:.7g} kg, centre of mass {_row(self.center_of_mass, 6)} m\n"
@@ -306,7 +306,7 @@ class Craft:
     _said: list[str] = field(default_factory=list, init=False)
 
     def __post_init__(self) -> None:
-        """Refuse what is wrong, all of it at once."""
+        """Raise one FmuError that lists all wrong fields."""
         problems = []
         for name, value in {"mass": self.mass, "gravity": self.gravity}.items():
             number = isinstance(value, int | float | np.number) and np.isfinite(value) and value > 0
@@ -479,9 +479,10 @@ class Craft:
         )
 
     def _solve(self, asked: Sequence[tuple[str, Any, float]]) -> list[Tank | None]:
-        """Return tanks by name, fill and gravity; None where they are empty.
+        """Return the solved tanks by name, fill and gravity; None for an empty tank.
 
-        Each is solved once, and all that are new are solved in one call, on all cores.
+        Each tank is solved once. All tanks that were not solved before are solved in one call, on
+        all cores.
         """
         wanted = [key for key in dict.fromkeys(asked) if not _is_empty(key[1])]
         new = [key for key in wanted if key not in self._known]
@@ -812,7 +813,7 @@ class Craft:
         mass_flow: Any = None,
         between: Sequence[float | str] = ("2%", "98%"),
     ) -> dict[str, Quantity]:
-        """Return the parameters of Spacecraft at a fill, with O where the craft has it."""
+        """Return the parameters of Spacecraft at a fill without trimming: O is the given origin."""
         if detach and (rigid or mass_flow is not None):
             raise FmuError(
                 "detach=True cannot be combined with rigid=True or mass_flow=: only sloshing "
@@ -1482,7 +1483,7 @@ class Craft:
         return [name for name in names if name.startswith(drawn)]
 
     def view(self, run: "pd.DataFrame", out: str | Path | None = None, **options: Any) -> "View":
-        """Show a run in 3-D with the tanks as they are drawn.
+        """Show a run in 3-D with the shapes of the tanks from their drawings.
 
         Parameters
         ----------
@@ -1522,7 +1523,7 @@ class Craft:
         return view(run, out, tanks=sources, **options)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what a copy is made from, without what is computed again on demand."""
+        """Return the fields for a copy; results that can be computed again are left out."""
         return {**self.__dict__, "_known": {}, "_said": []}
 
     def __repr__(self) -> str:
@@ -1549,7 +1550,7 @@ class Craft:
 
 
 def _without_point(name: str) -> str:
-    """Return the parameter that a value of a fill table replaces; m_0 is the rest of the liquid."""
+    """Return the parameter that a name of the fill table replaces."""
     prefix, key = name.split(".fill.")
     if key.startswith("liquid["):
         return f"{prefix}.m_0"

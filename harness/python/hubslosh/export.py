@@ -174,7 +174,7 @@ def _shown(fmu: Fmu) -> list[str]:
 
 
 def _ssd(fmu: Fmu) -> str:
-    """Return the description of a system with the FMU, its inputs and what is shown."""
+    """Return the SSP description of a system: the FMU, its inputs and its visible outputs."""
     connectors, units = [], {}
     for kind, names in (("input", fmu.names("input")), ("output", _shown(fmu))):
         for name in names:

@@ -57,7 +57,7 @@ class DefinedUnit(str):
         return unit
 
     def __getnewargs__(self) -> tuple[str, dict[str, int], float, float]:  # type: ignore[override]
-        """Return what a copy is made from."""
+        """Return the arguments from which a copy is made."""
         return str(self), self.exponents, self.factor, self.offset
 
 

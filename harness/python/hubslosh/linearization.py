@@ -353,7 +353,7 @@ def eigenvectors(model: LinearModel) -> tuple[Any, Any, Any]:
 
 @lru_cache(maxsize=32)
 def _held(model: LinearModel, time: float) -> tuple[Matrix, Matrix]:
-    """Return exp(A t) and what a unit input does within the time t."""
+    """Return exp(A t), and the change of the states by a unit input held for the time t."""
     n, m = model.B.shape
     whole = exponential(np.block([[model.A, model.B], [np.zeros((m, n + m))]]) * time)
     return whole[:n, :n], whole[:n, n:]

@@ -521,7 +521,7 @@ class _Tank(NamedTuple):
 def _on_a_mesh(
     tank: _Tank, surface: float | None, elements: float, do: "Callable[[Any], Any]"
 ) -> Any:
-    """Do something on a mesh; on a slightly finer one if it has unusable elements."""
+    """Call a function with a mesh, or with a slightly finer mesh if elements are unusable."""
     for again in range(4):
         mesh = _mesh(tank, surface, elements * 1.05**again)
         try:
@@ -651,7 +651,7 @@ def _volume_and_area(surface: float, mesh: Any) -> tuple[float, float]:
 
 
 def _cut(occ: Any, solid: int, box: Sequence[float], surface: float) -> int:
-    """Cut away what is above the surface; return what is left."""
+    """Cut away the part of the tank above the surface, and return the liquid."""
     margin = max(box[3] - box[0], box[4] - box[1], box[5] - box[2])
     lid = occ.addBox(
         box[0] - margin, box[1] - margin, surface, *(3 * margin,) * 2, box[5] - surface + margin

@@ -521,7 +521,7 @@ class Loop:
         measured: list[str],
         command: list[str],
     ) -> tuple[Any, list[str]]:
-        """Return the controller for a run, and the names of what it measures."""
+        """Return the controller for a run, and the names of the variables that it measures."""
         model = self.linear()
         if model is None:
             if reference is not None:
@@ -644,7 +644,7 @@ def _repeated(names: list[str]) -> list[str]:
 def _points(
     grid: NDArray[np.float64], substeps: int, period: float, rest: float
 ) -> tuple[NDArray[np.float64], int, NDArray[np.bool_] | None]:
-    """Return communication points, at which of each cycle's a command acts, and which are rows."""
+    """Return communication points, those at which a command acts, and those that are rows."""
     place = rest / period * substeps
     nearest = round(place)
     if abs(place - nearest) < 1e-9 * substeps:
@@ -658,7 +658,7 @@ def _points(
 
 
 def _checked_law(law: Law, command: list[str]) -> Callable[[int, float, list[float]], list[float]]:
-    """Return a function as a run calls it; what it returns is checked."""
+    """Return the controller function with a check of the values that it returns."""
     one = f"a finite number for {command[0]}"
     several = f"{len(command)} finite numbers ({', '.join(command)})"
     expected = one if len(command) == 1 else several
@@ -681,7 +681,7 @@ def _checked_law(law: Law, command: list[str]) -> Callable[[int, float, list[flo
 def _reference(
     reference: pd.DataFrame | None, measured: list[str], command: list[str]
 ) -> dict[str, History]:
-    """Return what is wanted, by name."""
+    """Return the reference values by name."""
     if reference is None:
         return {}
     allowed = [*measured, *command, *QUATERNION]

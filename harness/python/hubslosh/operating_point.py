@@ -87,7 +87,7 @@ class OperatingPoint:
         return f"OperatingPoint({np.linalg.norm(self.angular_acceleration):.2g} rad/s² left)"
 
     def __str__(self) -> str:
-        """Return what trimming changed, and what is left, in a line each."""
+        """Return one line on the shift by trimming and one line on the remaining acceleration."""
         lines = [
             f"O, where the thrust acts, moves by {_row(self.shift)} m to the centre of mass",
             f"angular acceleration: {np.linalg.norm(self.untrimmed_acceleration):.4g} rad/s² "

@@ -31,7 +31,7 @@ COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 
 
 def _subplots(rows: int, height: float | None = None, **options: Any) -> "Sequence[Axes]":
-    """Return the axes of a new figure of a height in inches, one above the other."""
+    """Return axes, one above the other, of a new figure with this height in inches."""
     try:
         import matplotlib.pyplot as plt
     except ModuleNotFoundError:

@@ -169,7 +169,7 @@ class Project:
         return "".join(parts)
 
     def _controller_text(self, folder: Path) -> Any:
-        """Return the controller as the file has it."""
+        """Return the controller in the form in which the project file states it."""
         if self.controller_file is not None:
             file, _, name = self.controller_file.rpartition(":")
             return f"{_relative(Path(file), folder)}:{name}"
@@ -187,7 +187,7 @@ class Project:
         return np.asarray(law, float).tolist()
 
     def _each(self) -> "dict[str, tuple[Craft, dict[str, Any]]]":
-        """Return craft and settings of each case by name; without cases those of the project."""
+        """Return craft and settings of each case by name; without cases, those of the project."""
         if not self.cases:
             return {self.name: (self.craft, dict(self.settings))}
         found = {}
@@ -322,7 +322,7 @@ def _check_names(
 
 
 def _call(function: Callable[..., Any], given: Any, where: str) -> Any:
-    """Call a function with what stands in a table."""
+    """Call a function with the entries of a TOML table as arguments."""
     _check_names(function, given, where)
     parameters = inspect.signature(function).parameters
     missing = [name for name, p in parameters.items() if p.default is p.empty and name not in given]

@@ -189,7 +189,7 @@ def _parquet(path: Path) -> Iterator[Column]:
 
 
 def _excel(path: Path) -> Iterator[Column]:
-    """Yield the cells of the first sheet: its header is found as that of any text."""
+    """Yield the cells of the first sheet; the header is found as in a text file."""
     from openpyxl import load_workbook
 
     book = load_workbook(path, read_only=True, data_only=True)
@@ -259,7 +259,7 @@ def _check_size(values: int) -> None:
 
 
 def _parts(column: Column) -> Iterator[Column]:
-    """Yield the signals of a column, each with its cells as a list; none of what is no signal."""
+    """Yield the signals of a column, each with its cells as a list; nothing for other data."""
     values = np.asarray(column.values)
     if values.ndim == 2 and values.shape[1] > values.shape[0]:
         values = values.T
@@ -280,7 +280,7 @@ def _duration(ns: int) -> str:
 
 
 def _cells(values: np.ndarray) -> list | None:
-    """Return the cells of a signal; None for what is no signal."""
+    """Return the cells of a signal, or None if the data is not a signal."""
     if values.dtype.kind in "fiu":
         return values.tolist()
     if values.dtype.kind == "b":

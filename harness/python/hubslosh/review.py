@@ -365,7 +365,7 @@ class Review:
         write_file(path, ".html", self.html)
 
     def __str__(self) -> str:
-        """Return the answer, then what it rests on."""
+        """Return the summary, then the figures on which it rests."""
         table = self.points
         lines = [self.summary, *self.stabilisation()[:8]]
         stable = table[table["stable"]]
@@ -486,7 +486,7 @@ def row_of(point: Point, uncertain: Iterable[Uncertain]) -> dict[str, Any]:
 
 
 def _family(points: Sequence[Point]) -> tuple[LinearModel, ...]:
-    """Return the plants with the states that any of them has, in the FMU's order."""
+    """Return the plants with the same states: all states of any plant, in the FMU's order."""
     models = []
     used: set[str] = set()
     for point in points:
@@ -631,7 +631,7 @@ def _list_of(fills: Any) -> list[Any]:
 
 
 def _full_ranges(craft: "Craft", given: Any) -> dict[str, tuple[str, Any]]:
-    """Return ranges with the names as they were given, by full names."""
+    """Return a dictionary from full names to the ranges with their names as given."""
     if not isinstance(given, Mapping):
         raise FmuError(f'uncertain must be ranges by name, such as {{"craft.mass": (1380, 1420)}}, '
                        f"not {given!r}")  # fmt: skip
@@ -640,9 +640,10 @@ def _full_ranges(craft: "Craft", given: Any) -> dict[str, tuple[str, Any]]:
 
 
 def _damping(craft: "Craft", tanks: list[dict[str, Any]], given: Container[str]) -> list[Uncertain]:
-    """Return the damping of each tank, all of whose modes share the error of one correlation.
+    """Return the range of the damping of each tank.
 
-    given: full names of quantities that have a value or a range of their own.
+    All modes of a tank share the error of one correlation. ``given`` has the full names of
+    quantities that have a value or a range of their own.
     """
     found, known = [], False
     for number, name in enumerate(craft.tanks, 1):
@@ -705,7 +706,7 @@ def _frequencies(
 def _inertia(
     given: Sequence[Parameters], part: float, ranges: Mapping[str, Any]
 ) -> list[Uncertain]:
-    """Return the dry craft's inertia, all of it by one factor, unless a part has its own range."""
+    """Return the range of the dry inertia's factor; none if a component has its own range."""
     names = [f"craft.J{axes}" for axes in ("xx", "yy", "zz", "xy", "xz", "yz")]
     if not part or any(name in ranges for name in names):
         return []
@@ -802,7 +803,7 @@ Ends = list[tuple[float, float]]
 
 
 def _ends(given: Any, nominals: list[float | None]) -> tuple[Ends, str]:
-    """Return the ends of a range at each fill, or what is wrong with it."""
+    """Return the ends of a range at each fill, or a sentence on what is wrong with the range."""
     known = [value for value in nominals if value is not None]
     allowed = 'allowed: (low, high), or a share of the nominal value such as "5%"'
     if not known:

@@ -80,7 +80,7 @@ def _value(of: Range, share: float) -> Any:
 
 
 def _wrong(ranges: Any) -> list[str]:
-    """Return what is wrong with ranges."""
+    """Return a sentence for each wrong range."""
     if not isinstance(ranges, Mapping) or not ranges:
         return ["ranges must be (low, high), a list or a distribution for each name"]
     found = []
@@ -216,7 +216,7 @@ def monte_carlo(
 
 
 def _one(outcome: Outcome, values: dict[str, Any]) -> dict[str, Any]:
-    """Return what is found of one draw."""
+    """Return the results of one draw."""
     try:
         found = outcome(dict(values))
     except FmuError as error:
@@ -251,7 +251,7 @@ def _checked(found: dict[str, Any], values: dict[str, Any]) -> dict[str, Any]:
 def _in_threads(
     workers: int | None, outcome: Outcome, jobs: Iterator[tuple[int, dict[str, Any]]]
 ) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Yield runs and what is found of them, as they are done."""
+    """Yield each run with its results when it is done, from threads."""
     count = workers or len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else None
     count = workers or count or os.cpu_count() or 1
     with ThreadPoolExecutor(count) as pool:
@@ -275,7 +275,7 @@ def _in_threads(
 def _on_dask(
     client: Any, outcome: Outcome, jobs: Iterator[tuple[int, dict[str, Any]]]
 ) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Yield runs and what is found of them, as the cluster has them done."""
+    """Yield each run with its results when the Dask cluster has simulated it."""
     from distributed import as_completed
 
     under_way = {}

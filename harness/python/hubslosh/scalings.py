@@ -207,7 +207,7 @@ def _balanced(N: Complex) -> tuple[Complex, Vector]:
 
 
 def _triangle(matrices: Complex) -> Vector:
-    """Return Hermitian matrices as the solver takes them: triangles of real symmetric ones."""
+    """Return Hermitian matrices in the solver's form: triangles of real symmetric matrices."""
     real, imaginary = matrices.real, matrices.imag
     whole = np.concatenate([
         np.concatenate([real, -imaginary], -1), np.concatenate([imaginary, real], -1)

@@ -32,7 +32,7 @@ class History:
     """
 
     def __init__(self, time: Real, values: Real, slopes: Real | None, hold: bool) -> None:
-        """Take rows; slopes: from each to the next, None: of the lines between them."""
+        """Store rows. ``slopes`` are those until the next row; None: lines join the rows."""
         self.time = time
         self.native = native.History(time, values, slopes, hold)
 

@@ -87,7 +87,7 @@ def _groups(one: LinearModel) -> list[tuple[complex, complex, set[str]]]:
 def _row(
     one: LinearModel, pole: complex, residue: complex, poles: Complex
 ) -> dict[str, Any] | None:
-    """Return the row of a mode in one loop; poles: those of the closed loop."""
+    """Return the row of the table for one mode in one loop."""
     T = one.period
     assert T is not None
     A, b, c, d = one.A, one.B[:, 0], one.C[0], one.D[0, 0]

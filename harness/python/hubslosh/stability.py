@@ -286,7 +286,7 @@ def _margins(
 
 
 def _broken_at(gain: LinearModel, i: int) -> LinearModel:
-    """Return the loop gain at one command while the others are closed with u = -L u."""
+    """Return the loop gain at one command while all other loops are closed with u = -L u."""
     if gain.D.shape == (1, 1):
         return gain
     others = [j for j in range(len(gain.D)) if j != i]
@@ -313,7 +313,7 @@ def _closed(gain: LinearModel) -> NDArray[np.complex128]:
 
 
 def _largest(poles: NDArray[np.complex128], period: float | None) -> float:
-    """Return what decides stability: largest real part, or magnitude in the z plane."""
+    """Return the number that decides stability: largest real part, or magnitude if sampled."""
     sizes = poles.real if period is None else np.abs(poles)
     return float(max(sizes, default=-np.inf if period is None else 0.0))
 
@@ -321,7 +321,7 @@ def _largest(poles: NDArray[np.complex128], period: float | None) -> float:
 def _zeros(gain: LinearModel) -> NDArray[np.complex128]:
     """Return the finite zeros of a model with one input and one output.
 
-    Without D the output's derivatives take its place, until one of them follows the input at once.
+    If D is 0, the output is differentiated until a derivative depends directly on the input.
     """
     A, b, c, d = gain.A, gain.B[:, 0], gain.C[0], float(gain.D[0, 0])
     while len(A):

@@ -147,7 +147,7 @@ def _sampled(point: "Point") -> tuple[NDArray[np.complex128], NDArray[np.complex
 def _distance(
     point: "Point", z: NDArray[np.complex128], L: NDArray[np.complex128], law: LinearModel
 ) -> float:
-    """Return the distance of a point with a filter; each loop broken with the others closed."""
+    """Return the distance from instability at an operating point with a filter in the loop."""
     size = _largest(_closed(_series(point.gain, law)), point.gain.period)
     if size >= 1:
         return -float(np.log(size) / point.loop.period)

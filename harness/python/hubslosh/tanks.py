@@ -52,7 +52,7 @@ class Tank:
     _case: "TankCase" = field(repr=False)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return what a copy in another process is solved from."""
+        """Return the arguments from which a copy in another process is solved."""
         return _solve_case, (self._case,)
 
     @cached_property

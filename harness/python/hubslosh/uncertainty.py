@@ -357,7 +357,7 @@ OF_TANK = re.compile(r"tank\[\d\]\.(m_0|H_0|I_0|I_z|(mass|length|frequency|hinge
 def _converted(
     model: str | Path, given: Parameters, craft: _Craft, table: "pd.DataFrame"
 ) -> tuple["pd.DataFrame", list[str]]:
-    """Return the derivatives of uncertain parameters by those of the FMU, and what forbids them."""
+    """Return derivatives of uncertain parameters by FMU parameters, and errors that forbid them."""
     import pandas as pd
 
     slopes: dict[str, dict[str, float]] = {}
@@ -1190,7 +1190,7 @@ def _kind(name: str) -> str:
 
 
 def _unknown(name: str, values: Mapping[str, float]) -> str:
-    """Return what to do about a name that does not belong to an uncertain parameter."""
+    """Return advice about a name that does not belong to an uncertain parameter."""
     if instead := moves_the_bob(name):
         return f"{name} {instead}"
     return f"there is no uncertain {name}{did_you_mean(name, values)}"

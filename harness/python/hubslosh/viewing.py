@@ -49,7 +49,7 @@ class View:
     path: Path | None = None
 
     def _repr_html_(self) -> str:
-        """Return it in a frame of its own, which IPython shows."""
+        """Return the page in an HTML frame, which IPython shows."""
         return (
             f'<iframe title="A run of an FMU" style="width:100%;height:{HEIGHT}px;border:0" '
             f'srcdoc="{html.escape(self.html)}"></iframe>'
@@ -166,7 +166,7 @@ def view(
 
 
 def _text(value: Quantity) -> str:
-    """Return a value as the program reads it: with its unit, if it has one."""
+    """Return a value as text for the program, with its unit if it has one."""
     match value:
         case bool():
             return str(value).lower()

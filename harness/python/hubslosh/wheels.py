@@ -194,7 +194,7 @@ class Histories:
     """Speed at each time by name, rad/s."""
 
     def columns(self, time: Vector) -> dict[str, Vector]:
-        """Return torques, as they act from each time on, and speeds, by name."""
+        """Return the torque that acts from each time on and the speed of each wheel, by name."""
         place = np.searchsorted(self.time, time, side="right") - 1
         place = np.clip(place, 0, len(self.time) - 2)
         found = {name: values[place] for name, values in self.torque.items()}

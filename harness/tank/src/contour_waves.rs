@@ -266,7 +266,8 @@ struct Shape {
     double: Option<[Wave; 3]>,
 }
 
-/// E, S, and S's derivative by theta, of a motion, and the shapes of the second order.
+/// Elevation E, potential shape S and the derivative of S by the azimuth theta of a motion, and the shapes of second
+/// order that it excites.
 struct Motion {
     first: [Wave; 3],
     second: Vec<Shape>,

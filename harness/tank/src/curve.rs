@@ -159,8 +159,8 @@ impl Segment {
         Segment::ellipse(center, radius, radius, deg0, deg1)
     }
 
-    /// Returns the first point. It is exactly on the axis if it is within rounding of it, because cos(pi/2)
-    /// is not 0 in floating point.
+    /// Returns the first point of the curve. If it is within rounding errors of the axis, it is put exactly on the
+    /// axis, because cos(pi/2) is not 0 in floating point.
     pub fn start(&self) -> Point {
         self.settle(self.curve.point_at(self.from))
     }

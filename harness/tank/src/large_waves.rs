@@ -719,7 +719,8 @@ fn backbone(wall: &Wall, side: &Side, motion: Motion) -> Vec<LargeWave> {
     waves
 }
 
-/// Largest distances of the frequency and the rise of a wave, relative, from the straight lines of the other waves.
+/// Largest relative distance of the frequency, and of the rise, of one wave from the straight line through the other
+/// waves.
 const OUTLIER: [f64; 2] = [5e-4, 3e-3];
 
 /// Removes waves whose frequency or rise does not go with the other waves, because the truncation is at a resonance there.
@@ -952,7 +953,8 @@ mod tests {
         assert!(compared > 20, "{compared}");
     }
 
-    /// Returns the mean energy, and that at the phase 0, at which all of it is potential, both relative to 2 pi rho g R^4.
+    /// Returns the mean energy of the wave and its energy at the phase 0, where the whole energy is potential, both
+    /// relative to 2 pi rho g R^4.
     fn energies(solver: &Solver, x: &DVector<f64>) -> [f64; 2] {
         let [nz, nc] = solver.sizes();
         let zeta = &solver.elevation * x.rows(0, nz);

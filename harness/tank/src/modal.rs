@@ -257,7 +257,8 @@ pub struct Spin {
     /// Omega^2 R/g with the outer radius R of the surface at rest; `None` without gravity.
     #[serde(rename = "Omega2_R_g")]
     pub flatness: Option<f64>,
-    /// 2 Omega/omega_0 with the frequency of the first mode at rest; `None` without one.
+    /// Spin ratio 2 Omega/omega_0, where omega_0 is the frequency of the first mode without spin; `None` without a
+    /// mode.
     #[serde(rename = "2Omega_omega")]
     pub ratio: Option<f64>,
     /// Frequencies of the first mode of an upright cylinder seen from the tank, Hz: of the wave that runs against the spin and of

@@ -5,8 +5,9 @@
 
 use formulas::energy_terms::EnergyTerms;
 
-/// Rows of h/R, kappa, s, t, kappa_2, s_2, t_2 and the largest slosh angle of the comparison, degrees. From h/R = 1.1 on the
-/// third order has poles.
+/// Table for spheres. Each row has the fill h/R, the coefficients kappa, s, t, kappa_2, s_2 and t_2 (see
+/// `EnergyTerms`), and the largest slosh angle (degrees) up to which they were compared with potential flow. From h/R =
+/// 1.1 on the third-order theory has poles.
 const ROWS: [[f64; 8]; 13] = [
     [0.10, 2.7378, 2.2305, 0.4304, 0.919, -0.149, -0.060, 12.8],
     [0.15, 2.3039, 1.9074, 0.3203, 3.372, 1.556, 0.253, 14.8],

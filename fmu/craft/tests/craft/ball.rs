@@ -421,7 +421,7 @@ fn allowing_detached_liquid_changes_no_bit_while_the_liquid_stays() {
 struct Rates {
     a: V,
     w_d: V,
-    /// x'' of each lump in tank axes.
+    /// Second derivative x'' of the position of each lump, tank axes.
     x_dd: Vec<V>,
 }
 

@@ -106,7 +106,8 @@ fn drag(r: &mut Random, tank: &mut Tank) {
     }
 }
 
-/// Gives a craft tanks that drain, with every drag; half of them with surfaces that follow the fill.
+/// Gives a craft draining tanks with all kinds of drag. In half of the tanks the surface of the bob changes with the
+/// fill.
 fn drain(r: &mut Random, p: &mut Parameters) {
     for tank in &mut p.tank {
         let modes = r.below(4);

@@ -876,8 +876,8 @@ fn coupling_ratio_is_the_largest_eigenvalue() {
     assert_eq!(alone.coupling_ratio(), None);
 }
 
-/// Returns the largest deviation of a and w' from those of a record, relative to their largest, if they are
-/// computed from the record's own states.
+/// Computes the accelerations a and w' from the states of a record, and returns their largest deviation from the
+/// accelerations in the record, relative to the largest acceleration.
 fn deviation(mistake: Mistake, record: &serde_json::Value) -> f64 {
     let p = records::parameters(record);
     let samples = &record["samples"];

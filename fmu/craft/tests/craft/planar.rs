@@ -208,7 +208,8 @@ fn a_craft_with_a_singular_mass_matrix_only_beyond_the_range_of_its_modes_is_all
     assert_eq!(host.problems(), [""; 0]);
 }
 
-/// A craft without inertia about its own axis has that of the liquid in a tank off the axis, but not while the liquid flies.
+/// A craft without inertia about its own axis has only the inertia of the liquid in a tank off the axis. While the
+/// liquid flies, even this inertia is missing.
 #[test]
 fn a_craft_with_a_singular_mass_matrix_without_liquid_is_refused_if_the_liquid_may_detach() {
     let mut p = Parameters::default();

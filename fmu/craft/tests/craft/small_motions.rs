@@ -47,7 +47,7 @@ fn craft_with_tank_at(z: f64, k: f64, c: f64) -> Parameters {
 /// Quantities of the closed-form solution, with its letters.
 struct Closed {
     m: f64,
-    /// M and I of the rigid body R.
+    /// Mass and inertia of the rigid body R.
     mass: f64,
     inertia: f64,
     g: f64,

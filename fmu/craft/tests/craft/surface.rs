@@ -288,7 +288,7 @@ impl Lagrangian<'_> {
     }
 }
 
-/// Central differences of seventh order at so many steps.
+/// Weights of the central difference of seventh order: number of steps from the centre, and weight.
 const DIFFERENCES: [(f64, f64); 6] = [
     (1.0, 0.75),
     (2.0, -0.15),

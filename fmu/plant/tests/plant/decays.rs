@@ -141,8 +141,8 @@ fn free_oscillations_lose_zeta_plus_zeta_a_times_amplitude_in_every_model() {
 /// Steepness per angle of mode 1 in an upright cylinder, k a/A = (xi_1/R) 2 R/(xi_1^2 - 1).
 const STEEPNESS: f64 = 2.0 * 1.8411837813 / (1.8411837813 * 1.8411837813 - 1.0);
 
-/// A' = -omega zeta_b (sigma A - s_b) A above the onset, with the solution
-/// 1/A = sigma/s_b + (1/A_1 - sigma/s_b) exp(-omega zeta_b s_b t).
+/// Above the onset of breaking the amplitude A decays by A' = -omega zeta_b (sigma A - s_b) A, with the solution 1/A =
+/// sigma/s_b + (1/A_1 - sigma/s_b) exp(-omega zeta_b s_b t).
 ///
 /// The rounded corner adds up to 4e-4 to a steepness that exceeds the onset by 0.26 to 0.72.
 #[test]

@@ -18,7 +18,7 @@ fn torque(value: f64) -> Inputs {
     Inputs { tau_cmd: Ramp::held(value), ..Inputs::default() }
 }
 
-/// c + d, the torque of break-away with the bench's values, N m.
+/// Break-away torque c + d of the bench's bearing, N m.
 const G_MAX: f64 = 0.003498 + 0.002423;
 
 #[test]

@@ -574,7 +574,8 @@ mod tests {
     };
     const COUNT: usize = 1 << 16;
 
-    /// Counts, for N, B and K, the records whose interval contains the true value, and whose fit describes them.
+    /// Counts the simulated records whose interval contains the true value, separately for N, B and K, and the records
+    /// that the fitted noise model describes.
     fn covered(noise: &Noise, draws: u64) -> ([u64; 3], u64) {
         let (mut held, mut described) = ([0; 3], 0);
         for seed in 0..draws {

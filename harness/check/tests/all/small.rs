@@ -13,7 +13,7 @@ use crate::common::{Files, XML, broken, compiled, keep, look, zipped};
 struct Small<'a> {
     /// Definitions for the C compiler in addition to the rate.
     definitions: &'a [&'a str],
-    /// k in x' = -k (x - u), 1/s.
+    /// Rate k of the equation x' = -k (x - u), 1/s.
     rate: f64,
     /// Attributes of DefaultExperiment.
     experiment: &'a str,

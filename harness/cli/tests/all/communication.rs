@@ -114,7 +114,8 @@ fn pulses_in_a_file_have_their_impulse_with_any_step() {
     assert!((total - 0.008).abs() < 1e-9, "{total} N·m·s of 8 ms");
 }
 
-/// ∫ sin 2πft = (1 − cos 2πft)/2πf. Lines between rows 1 ms apart have (π f h)²/3 = 0.8 % less of it at 49 Hz.
+/// The hub's rate is the integral of the torque, ∫ sin 2πft = (1 − cos 2πft)/2πf. Straight lines between rows h = 1 ms
+/// apart give (π f h)²/3 = 0.8 % less at 49 Hz.
 #[test]
 fn a_sine_of_49_hz_in_a_file_acts_with_any_step() {
     let folder = tempfile::tempdir().unwrap();

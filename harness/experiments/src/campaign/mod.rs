@@ -204,7 +204,7 @@ pub struct Results {
 impl Campaign {
     /// Locks the results directory for this campaign.
     ///
-    /// # Errors If another process holds it, or the directory belongs to something else.
+    /// # Errors If another process has locked the directory, or the directory contains something other than a campaign.
     pub fn take(&self) -> Result<Store> {
         Store::take(&self.out, CAMPAIGN, &format!("the plan \"{}\"", self.plan.title), None)
     }

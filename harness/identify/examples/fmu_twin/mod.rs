@@ -58,7 +58,7 @@ const ROCKING_DAMPING: f64 = 0.01;
 const ROCKING_SEEN: f64 = 0.01;
 /// Part by which the friction of a warm bearing is smaller.
 const WARM: f64 = 0.3;
-/// Drag of the air, N·m·s².
+/// Coefficient of the air's drag torque, which is quadratic in the rate, N·m·s².
 const AIR: f64 = 0.02;
 /// Time constant of wheel or gyro, s.
 const LAG: f64 = 0.03;
@@ -263,7 +263,7 @@ impl Twin {
     }
 }
 
-/// y' = (u − y)/[`LAG`], from rest.
+/// A first-order lag, y' = (u − y)/[`LAG`], which starts at rest.
 #[derive(Default)]
 struct Lag {
     y: f64,
@@ -296,7 +296,8 @@ fn behind(torque: &Torque, rows: &[f64]) -> Result<Torque> {
     Torque::rows(&time, &tau, None, false)
 }
 
-/// φ'' + 2ζΩφ' + Ω²φ = Ω² ∫a dt: far below Ω φ follows the hub's rate.
+/// Rocking of the hub by the angle φ: φ'' + 2ζΩφ' + Ω²φ = Ω² ∫a dt, so that far below the frequency Ω the angle follows
+/// the hub's rate.
 #[derive(Default)]
 struct Rocking {
     phi: f64,

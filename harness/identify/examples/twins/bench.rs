@@ -60,7 +60,7 @@ pub struct Bearing {
     pub omega_s: f64,
     /// Part by which the dry friction is larger forwards and smaller backwards.
     pub asymmetry: f64,
-    /// tanh(ω/eps) for the sign of ω, rad/s; `None`: the sign.
+    /// Rate eps of a smoothed sign tanh(ω/eps), rad/s; `None`: the sign is not smoothed.
     pub eps: Option<f64>,
 }
 
@@ -84,7 +84,7 @@ pub struct Bench {
 }
 
 impl Default for Bench {
-    /// 10 cm of water, the thesis's hub and bearing.
+    /// The bench of the thesis: its hub and bearing, and 10 cm of water.
     fn default() -> Self {
         Bench {
             hub_inertia: 0.322_414,

@@ -20,7 +20,7 @@ pub struct Braking {
     /// Speed to which the coefficients belong, rad/s: the mean over both directions. The dependence of the deceleration on the
     /// speed is fitted as a parabola.
     pub speed: f64,
-    /// β_0, then β_1^c, β_1^s, β_2^c, …, rad/s².
+    /// Coefficients in the order β_0, β_1^c, β_1^s, β_2^c, …, rad/s².
     pub coefficients: Vec<f64>,
     pub std: Vec<f64>,
     pub rmse: f64,
@@ -35,7 +35,8 @@ pub struct Braking {
     pub(crate) covariance: Option<DMatrix<f64>>,
 }
 
-/// Returns the regressors of [`Braking`] at an angle θ: 1, then cos hθ and sin hθ of each harmonic h.
+/// Returns the regressors of the deceleration [`Braking`] at an angle θ: the number 1, then cos hθ and sin hθ of each
+/// harmonic h.
 pub(crate) fn harmonics_at(angle: f64, harmonics: usize) -> Vec<f64> {
     let each = (1..=harmonics).flat_map(|h| {
         let (sin, cos) = (angle * h as f64).sin_cos();

@@ -28,7 +28,7 @@ pub struct Motion {
     pub slosh_angle: Vec<f64>,
 }
 
-/// Parts of a [`Motion`] read in every row; the rest stays empty.
+/// Parts of a [`Motion`] that are read in every row; all other parts stay empty.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Read {
     All,

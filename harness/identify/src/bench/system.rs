@@ -104,7 +104,7 @@ pub struct BenchSystem<'a> {
     pub bench: Bench,
     pub targets: Vec<Target>,
     pub derived: Vec<(String, String)>,
-    /// Direction of a hub that turns one way, 1 or −1; 0: both.
+    /// Direction of rotation of a hub that turns in one direction only, 1 or −1; 0 if it turns in both.
     pub way: f64,
     pub largest: f64,
     pub base: OnceLock<Vec<Motion>>,
@@ -113,7 +113,8 @@ pub struct BenchSystem<'a> {
 /// Largest T = tanh(2ξ h/d) from which a filling height is computed: the liquid is then 1.7 diameters deep.
 const DEEPEST: f64 = 0.999_99;
 
-/// Returns d, h and I of the tank and hub with this first mode and inertia J; `None` if no tank and hub have them.
+/// Returns the diameter d and the fill h of the tank and the inertia I of the hub that have this first mode and this
+/// total inertia J; `None` if there is no such tank and hub.
 fn tank_of(length: f64, mass: f64, inertia: f64, bench: Bench) -> Option<[f64; 3]> {
     let xi = XI[0];
     let d = diameter(length, mass, bench);

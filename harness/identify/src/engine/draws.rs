@@ -218,7 +218,8 @@ impl Solution<'_> {
     }
 }
 
-/// Maps independent normal numbers to steps of the unknowns `which` with the covariance of derivatives.
+/// Returns the matrix that maps independent standard normal numbers to steps of the unknowns `which`. The steps have
+/// the covariance that follows from the derivatives.
 fn spread(jacobian: &DMatrix<f64>, which: &[bool], keeps_flat: bool) -> DMatrix<f64> {
     let curvature = Curvature::new(jacobian, places(which)).with_flat(keeps_flat);
     let (vectors, inverse) = curvature.spread();

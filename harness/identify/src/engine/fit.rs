@@ -129,7 +129,7 @@ impl<'p> Fit<'p> {
         Point { z: z.to_vec(), motion, e, cost }
     }
 
-    /// Returns measured less modelled values of each signal; 0 in rows without a measured value.
+    /// Returns measured minus modelled values of each signal; 0 in rows without a measured value.
     pub fn residuals(&self, z: &[f64], motion: &[Motion]) -> Vec<Vec<f64>> {
         let values = self.values(z);
         let of = |signal: &Signal| {
@@ -175,7 +175,7 @@ impl<'p> Fit<'p> {
         self.problem.unknowns.iter().filter(|u| u.prior.is_some()).count()
     }
 
-    /// Returns −2 ln L of a point up to a constant, with the noise as it is set.
+    /// Returns −2 ln L of a point up to a constant, where L is the likelihood with the present noise parameters.
     pub fn deviance(&self, point: &Point) -> f64 {
         point.cost + self.filters.iter().map(Whitening::log_variance).sum::<f64>()
     }
@@ -336,7 +336,7 @@ impl<'p> Fit<'p> {
         self.weighted(motions.iter().map(|(weight, _)| *weight).zip(&residuals))
     }
 
-    /// Whitens a weighted sum of residuals; the deviations from the priors are 0.
+    /// Whitens a weighted sum of residuals. The elements that belong to priors are set to 0.
     fn weighted<'r>(&self, all: impl Iterator<Item = (f64, &'r Vec<Vec<f64>>)>) -> DVector<f64> {
         let mut sum: Vec<Vec<f64>> = Vec::new();
         for (weight, residuals) in all {

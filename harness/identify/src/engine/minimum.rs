@@ -35,7 +35,8 @@ pub struct End {
 }
 
 impl End {
-    /// Ends a search after so many sets of derivatives, or at this distance.
+    /// Creates the limits of a search: it ends after `sets` sets of derivatives, or when the expected decrease of the
+    /// cost is below `decrement`.
     pub fn new(sets: usize, decrement: f64) -> Self {
         End { sets, decrement, above: f64::INFINITY, gain: 0.0, trusts: false }
     }
@@ -44,7 +45,8 @@ impl End {
 /// Eigenvalue of a curvature with a unit diagonal, over the largest one, up to which the recordings do not show its direction; also
 /// the least regularisation of such a curvature.
 const FLAT: f64 = 1e-12;
-/// A direction is resolved if its eigenvalue is this many times larger than what errors of the derivatives make of it by chance.
+/// A direction counts as resolved if its eigenvalue is at least this many times the eigenvalue that errors of the
+/// derivatives cause by chance.
 const RESOLVED: f64 = 4.0;
 /// Factor by which the damping grows after a step that fails, and falls after a step that gains more than half its forecast.
 const DAMPING: f64 = 8.0;
@@ -85,8 +87,8 @@ impl Curvature {
         self.solve(b, &all, 0.0).iter().zip(b).map(|(s, b)| s * b).sum()
     }
 
-    /// Returns (JᵀJ + λ D)⁻¹ b over the unknowns of `which` that `keep` has, with the damping λ and the diagonal D of JᵀJ; `b`
-    /// and the result are in the scales of the matrix.
+    /// Returns the damped step (JᵀJ + λ D)⁻¹ b in the unknowns of `which` that `keep` lists, with the damping λ and the
+    /// diagonal D of JᵀJ; `b` and the result are in the scales of the matrix.
     fn solve(&self, b: &[f64], keep: &[usize], damping: f64) -> DVector<f64> {
         let damped = |more: f64| {
             let entry = |i: usize, j: usize| {
@@ -169,7 +171,7 @@ pub fn places(which: &[bool]) -> Vec<usize> {
     (0..which.len()).filter(|j| which[*j]).collect()
 }
 
-/// Returns the flags with entry `j` false.
+/// Returns a copy of the flags in which entry `j` is false.
 pub fn without(which: &[bool], j: usize) -> Vec<bool> {
     let mut others = which.to_vec();
     others[j] = false;

@@ -61,8 +61,8 @@ pub const GAIN: f64 = 0.3;
 pub const SEEN: f64 = 1e-2;
 /// Largest number of rounds of a search each of which begins at the end of the round before.
 pub const ROUNDS: usize = 4;
-/// Ratio of the standard deviation with the recordings to the standard deviation without, above which the recordings say nothing
-/// of a value.
+/// If the standard deviation of a value with the recordings is more than this fraction of its prior standard deviation,
+/// the recordings do not determine the value.
 pub const PRIOR_ALONE: f64 = 0.9;
 /// Correlation, without its sign, above which only a combination of two unknowns is known.
 pub const PAIR: f64 = 0.99;

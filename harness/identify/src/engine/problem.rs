@@ -25,7 +25,8 @@ impl Hold {
 /// The place at which an unknown acts; outputs and recordings are given by their index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
-    /// The unknown acts in the system's run, of one recording or of all, so that its derivatives are differences of runs.
+    /// The unknown changes the simulation of one recording, or of all recordings (`None`), so that its derivatives are
+    /// differences between simulations.
     Run(Option<usize>),
     /// Delay of the reading of an output, s. The run takes it into account; its derivative is the derivative of the output by
     /// time.
@@ -115,12 +116,12 @@ impl Unknown {
         (end(self.bounds.0), end(self.bounds.1))
     }
 
-    /// Returns true for a known value with a tolerance that acts in recordings.
+    /// Returns true for a known value with a tolerance that has an effect in the recordings.
     pub fn is_held(&self) -> bool {
         self.part == Part::Tolerance && self.role != Role::Derived
     }
 
-    /// Returns true if the unknown acts in a recording.
+    /// Returns true if the unknown has an effect in this recording.
     pub fn is_of(&self, recording: usize) -> bool {
         match self.role {
             Role::Run(of) | Role::Bias(_, of) => of.is_none_or(|of| of == recording),

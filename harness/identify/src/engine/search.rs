@@ -56,8 +56,8 @@ impl Solution<'_> {
         self.tests.iter().all(Tests::passed) && !self.fit.is_loud()
     }
 
-    /// Returns the −2 ln L above which another model need not be searched further: if the residual of this solution is noise, it is
-    /// the −2 ln L of a noise that is e^0.5 times as large; otherwise it is infinite.
+    /// Returns the value of −2 ln L above which the search for another model can end early: if the residual of this
+    /// solution is noise, it is the −2 ln L of a noise that is e^0.5 times as large; otherwise it is infinite.
     pub fn ceiling(&self) -> f64 {
         if !self.is_noise() {
             return f64::INFINITY;
@@ -169,9 +169,9 @@ struct Found {
     noise: Vec<Noise>,
     hold: super::Hold,
     rivals: Vec<Rival>,
-    /// −2 ln L with the course between rows that is assumed at first.
+    /// Value of −2 ln L with the intersample behaviour that is assumed at first.
     first: f64,
-    /// −2 ln L with the best course between rows.
+    /// Value of −2 ln L with the best intersample behaviour.
     deviance: f64,
     /// True if the courses between rows were compared.
     is_judged: bool,

@@ -30,8 +30,8 @@ pub struct SolverError {
     pub differs: Vec<bool>,
 }
 
-/// Sample of the outputs' noise between neighbouring values of one unknown, norm of h³ times the third derivative without this
-/// noise, and the step h.
+/// Roughness of the outputs along one unknown: a sample of their noise between neighbouring values of the unknown, the
+/// norm of h³ times the third derivative without this noise, and the step h.
 struct Roughness {
     noise: DVector<f64>,
     third: f64,

@@ -14,7 +14,8 @@ pub fn is_size(inertia: f64, nominal: f64) -> bool {
     (0.125..8.0).contains(&(nominal / inertia))
 }
 
-/// Refuses an inertia, kg·m², that is off by a factor that only a wrong unit makes.
+/// Refuses an estimated inertia (kg·m²) that differs from the nominal one by a factor that only a wrong unit can
+/// explain.
 pub fn check_size(inertia: f64, nominal: f64) -> Result<()> {
     let ratio = nominal / inertia;
     if is_size(inertia, nominal) {

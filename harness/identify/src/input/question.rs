@@ -10,7 +10,7 @@ use host::description::{ModelDescription, Type, Variable};
 use crate::input::names::list;
 use crate::input::tolerance::part;
 
-/// Suffix of the name of an unknown of which each recording has one of its own.
+/// Suffix of the name of an unknown that has a separate value in each recording.
 pub const EACH: &str = "@each";
 
 /// `NAME=START[:LOW:HIGH]` or `NAME@each=START[:LOW:HIGH]`: a Real of the FMU that is set before it is initialised, or the error of
@@ -18,7 +18,7 @@ pub const EACH: &str = "@each";
 #[derive(Clone, Debug, PartialEq)]
 pub struct Free {
     pub name: String,
-    /// True if each recording has an unknown of its own, for example an initial value.
+    /// True if the unknown has a separate value in each recording, for example an initial value.
     pub each: bool,
     pub start: f64,
     /// Bounds; `None`: the FMU's min and max.
@@ -217,8 +217,8 @@ pub struct Question {
     pub solver: Solver,
     /// Relative tolerance that the FMU's own solver is given; `None`: its own choice.
     pub tolerance: Option<f64>,
-    /// Largest number of starts: the first is given, and the others are drawn within the bounds if the search from it ends at no
-    /// good fit.
+    /// Largest number of start points of the search. The first one is given by the user; further ones are drawn at
+    /// random within the bounds if the search from the first one does not end at a good fit.
     pub starts: usize,
 }
 

@@ -19,9 +19,10 @@ use crate::news::News;
 use crate::words::identified::{Identified, Residual};
 use crate::words::verdict::failed;
 
-/// Amplitude of another oscillation in the residual, relative to the decaying one, above which the verdict names it.
+/// If the residual contains another oscillation whose amplitude exceeds this fraction of the decaying oscillation, the
+/// verdict names it.
 const NAMED: f64 = 0.02;
-/// Expected drift of a probe. Its width is large because next to nothing is known of it.
+/// Prior of the drift of a wave probe. Its width is large because almost nothing is known about this drift.
 const DRIFT: Drift = Drift { size: 0.3, time: 1.0, width: 3.0 };
 
 /// Result; `measurement` has the frequency f, the damping ratio ζ, its growth ζ_A with the amplitude, and the hardening κ.

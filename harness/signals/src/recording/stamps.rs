@@ -32,8 +32,8 @@ pub enum Stamps {
 
 /// Largest accepted relative error of a grid's step. Every logger's clock has an error of this size.
 const LARGEST_ERROR: f64 = 1e-4;
-/// Fraction of rows with the same time as the row before, above which the times are not those at which the rows were
-/// measured.
+/// If more than this fraction of the rows has the same time as the row before, the times are not the times of the
+/// measurements.
 const SHARED: f64 = 0.05;
 
 pub fn regular(time: &[f64]) -> Stamps {

@@ -226,8 +226,8 @@ fn files_have_the_energy_terms_where_they_are_known() {
     assert!(matches!(all[1].1, Value::Real(x) if (x.to_degrees() - 6.5).abs() < 0.01), "{all:?}");
 }
 
-/// Spheres have the coefficients that give the wave's energy from a table. Their frequency is that of the third order in
-/// small waves, which another method computes.
+/// In spheres the coefficients that give the slosh mass the energy of the wave come from a table. For small waves they
+/// must give the frequency of third-order theory, which another method computes.
 #[test]
 fn spheres_have_the_energy_terms_at_the_fills_of_their_table() {
     let sphere = tank("density = 1000.0\nshape = { sphere = { radius = 0.4 } }");
