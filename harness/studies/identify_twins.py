@@ -1,4 +1,4 @@
-"""Twins for `hubslosh identify --free`: whether the true value lies inside the stated intervals.
+"""Twins for `hubslosh identify --free`: whether the truth lies inside the stated intervals.
 
     python identify_twins.py FOLDER [--cases VanDerPol,Hub,…] [--twins 100] [--first 1]
 

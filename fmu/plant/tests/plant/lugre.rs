@@ -98,7 +98,7 @@ fn dissipation_is_never_negative_up_to_the_largest_sigma1_and_no_further() {
 
 #[test]
 fn stiff_lugre_bristles_approach_the_set_valued_law() {
-    // The torque is a sine that makes the hub slide, reverse and rest.
+    // A sine that the hub follows with stops: sliding, reversal, rest.
     let run = |model: FrictionModel, sigma0: f64| {
         let mut p = bench(SloshModel::Linear);
         p.friction.model = model;

@@ -225,7 +225,7 @@ fn a_finer_tolerance_and_the_hosts_solver_give_intervals_that_hold_the_truth() {
         let (inside, given) = held(&found);
         all = (all.0 + inside, all.1 + given);
     }
-    // of 100 intervals 95 contain the true value; fewer than 89 do by a chance of 0.4 %, once for all with these seeds
+    // of 100 intervals 95 hold the truth; fewer than 89 do by a chance of 0.4 %, once for all with these seeds
     assert!(all.1 == 100 && all.0 >= 89, "{all:?}");
     let (own, host) =
         (found(&fmu, &fine, 1, 1.0), found(&fmu, &question(Solver::Host(1e-8)), 1, 1.0));
