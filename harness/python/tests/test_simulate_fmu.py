@@ -83,12 +83,14 @@ def test_held_inputs_of_fmpy_equal_those_of_the_harness(fmu: Path) -> None:
 
 
 def test_held_input_half_a_step_early_has_no_delay(fmu: Path) -> None:
-    """Runs harness/hosts/fmpy_example.py.
+    """In harness/hosts/fmpy_example.py a held input that is set half a step early is not late.
 
-    Held values are late by half a step: ωH/2 = 0.15 of the torque. Taken half a step early, what
-    is left is of second order: (ωH)²/24 = 0.004 of the torque's fundamental is missing, and
-    within a step the torque is off by up to ωH/2 both ways, which moves the rate by (ωH)²/8 =
-    0.011 of what it would be on the hub alone, a few times what it is near the antiresonance.
+    An input that FMPy holds over steps of length H acts half a step late, which at the frequency ω
+    is an error of ωH/2 = 0.15 of the torque. If each value is set half a step early, only errors
+    of second order are left. The fundamental of the torque is too small by (ωH)²/24 = 0.004.
+    Within a step the torque is wrong by up to ωH/2 in both directions; this changes the rate by
+    (ωH)²/8 = 0.011 of the rate of the hub alone, which is a few times the rate near the
+    antiresonance.
     """
     fine = np.arange(60001) * 0.001
     exact = drive(fmu, fine, tau(fine))["omega"][::20]
