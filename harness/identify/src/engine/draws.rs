@@ -14,11 +14,12 @@ use super::problem::{Part, Role};
 use super::profile::{Curve, OPEN, Point};
 use super::{Fit, Solution};
 
+/// Number of draws: with so many the error of a quantile is a fiftieth of a standard deviation.
 const DRAWS: usize = 20_000;
 /// Fewest draws from which quantiles are computed.
-const FEWEST: usize = DRAWS / 50;
+const FEWEST: usize = 400;
 /// Places of the profile's coordinate between which draws are spread evenly.
-const PLACES: usize = DRAWS / 50;
+const PLACES: usize = 400;
 
 /// Quantities that are derived from the unknowns: their names, units and values at the minimum, and draws of each in `columns`.
 #[derive(Clone, Debug, Default)]
@@ -255,6 +256,7 @@ impl Derived {
         analysis::statistics::deviation(&self.columns[k])
     }
 
+    /// Returns the 95 % interval of quantity `k`.
     pub fn interval(&self, k: usize) -> [f64; 2] {
         let mut sorted = self.columns[k].clone();
         sorted.sort_by(f64::total_cmp);

@@ -7,8 +7,8 @@
 use anyhow::Result;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SymmetricEigen};
 
+use super::KEPT;
 use super::fit::{Derivatives, Fit, Point};
-use super::{KEPT, SETS};
 
 #[derive(Clone, Debug)]
 pub struct Minimum {
@@ -48,6 +48,8 @@ const FLAT: f64 = 1e-12;
 /// A direction counts as resolved if its eigenvalue is at least this many times the eigenvalue that errors of the
 /// derivatives cause by chance.
 const RESOLVED: f64 = 4.0;
+/// Most dampings that are tried with one set of derivatives.
+const TRIES: usize = 8;
 /// Factor by which the damping grows after a step that fails, and falls after a step that gains more than half its forecast.
 const DAMPING: f64 = 8.0;
 
@@ -154,6 +156,7 @@ impl Curvature {
         all.filter(is_flat).map(|(_, v)| v.into_owned()).collect()
     }
 
+    /// Returns the covariance as a matrix of `all` unknowns; 0 for unknowns that the curvature does not have.
     pub fn covariance(&self, all: usize) -> DMatrix<f64> {
         let (vectors, inverse) = self.spread();
         let inner = &vectors * DMatrix::from_diagonal(&inverse) * vectors.transpose();
@@ -263,7 +266,7 @@ impl Fit<'_> {
                 break;
             }
             let mut outcome = None;
-            for _ in 0..SETS {
+            for _ in 0..TRIES {
                 let scaled = curvature.solve(&b, &all, damping);
                 let mut step = vec![0.0; n];
                 for (k, &j) in which.iter().enumerate() {

@@ -52,7 +52,7 @@ pub const ENDS: (f64, f64) = (0.5, 0.02);
 /// Factors by which the noise counts in a search over the whole recordings: large ones let the priors lead at first, so that a
 /// start may be far from the minimum.
 pub const INFLATIONS: [f64; 3] = [100.0, 10.0, 1.0];
-/// Most sets of derivatives of a search that goes to the end, and most turns of a search that repeats a cheaper step.
+/// Most sets of derivatives of a search that goes to the end.
 pub const SETS: usize = 8;
 /// Fall of the sum of squares below which a set of derivatives is the last one, and a minimum is no lower than another.
 pub const GAIN: f64 = 0.3;

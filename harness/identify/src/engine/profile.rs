@@ -17,6 +17,8 @@ const LENGTHS: [f64; 3] = [0.03, 0.5, 0.6];
 /// Distance to the minimum, in standard deviations, at which the search of a point ends: it adds a hundredth of [`OPEN`] to the
 /// sum of squares.
 const NEAR: f64 = 0.2;
+/// Most points of a profile on each side.
+const POINTS: usize = 16;
 /// Values of the bent unknown, relative to its start, at which other minima are searched.
 const GRID: [f64; 6] = [0.03, 0.1, 0.3, 1.0, 3.0, 10.0];
 
@@ -173,7 +175,7 @@ impl Fit<'_> {
             let along = |i: usize| if own > 0.0 { covariance[(i, j)] / own } else { 0.0 };
             let mut tangent: Vec<f64> = (0..unknowns.len()).map(along).collect();
             let (mut last, mut h, mut risen) = (minimum.clone(), first, 0.0);
-            for _ in 0..2 * SETS {
+            for _ in 0..POINTS {
                 let at = last.point.z[j] + side * h;
                 if at < self.ends[j].0 || at > self.ends[j].1 {
                     break;

@@ -22,7 +22,12 @@ const BEGINNING_NOISE: f64 = 0.03;
 /// Ratio of the residual's white noise to the noise that neighbouring rows show, above which the residual contains more than the
 /// sensor's noise.
 const ABOVE: f64 = 1.5;
+/// Most turns of noise and minimum, and the sum of squares over the number of rows above which a turn is the last one: it is 1 if
+/// the noise belongs to the residual.
+const TURNS: usize = 8;
 const SETTLED: f64 = 0.98;
+/// Most doublings of the distance at which a side of a start is examined.
+const LOOKS: usize = 8;
 /// First distance at which a side of a start is examined, standard deviations.
 const FAR: f64 = 3.0;
 /// Root of the likelihood's rise at this distance, relative to the root of a parabola's rise, below which the likelihood has a
@@ -322,7 +327,7 @@ impl Fit<'_> {
         let (mut once, mut profile) = (false, None);
         let rows = self.sampled();
         for _ in 0..ROUNDS {
-            for _ in 0..SETS {
+            for _ in 0..TURNS {
                 self.renew_noise(&minimum.point);
                 let end = End { gain: GAIN, ..End::new(SETS, ENDS.1) };
                 minimum = self.minimise_from(&minimum.point, end)?;
@@ -424,7 +429,7 @@ impl Fit<'_> {
                 (cost - minimum.point.cost).max(0.0).sqrt()
             };
             let (mut near, mut far, mut now) = ((0.0, 0.0), FAR, rise(FAR));
-            for _ in 0..SETS {
+            for _ in 0..LOOKS {
                 if now > KINKED * FAR {
                     break;
                 }
