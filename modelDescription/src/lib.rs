@@ -35,6 +35,7 @@ pub fn path<M: Model>() -> PathBuf {
 /// bytes.
 const RELEASED: &str = "2026-11-22T12:00:00Z";
 
+/// Default stop time, s, with 20 s at the gyro's 50 Hz.
 const STOP_TIME: f64 = 20.0;
 const STEP_SIZE: f64 = 0.02;
 
@@ -119,6 +120,7 @@ fn unit(unit: &Unit) -> Element {
         .holding(unit.display_units.iter().map(display_unit))
 }
 
+/// Returns the enumerations as type definitions, or `None` if there are none.
 fn type_definitions<M: Model>(one: impl Fn(&Enumeration) -> Element) -> Option<Element> {
     let all = M::table().enumerations();
     let some = !all.is_empty();
@@ -188,6 +190,7 @@ fn variability<M: Model>(v: &Variable<M>) -> &'static str {
 
 struct Own {
     start: Option<String>,
+    /// The index (FMI 2.0) or value reference (FMI 3.0) of the state whose derivative the variable is.
     derivative: Option<u32>,
 }
 

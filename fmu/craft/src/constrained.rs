@@ -446,8 +446,8 @@ impl ConstrainedBob {
 
     /// Returns coefficient n of the power series of force and torque about O with which the bob acts on the craft. The
     /// terms that contain coefficient n of the accelerations [a; w'] are left out, because the mass matrix contains
-    /// them. `w` is coefficient n of the angular velocity, and `w2` is coefficient n of the matrix of the map y -> w x
-    /// (w x y).
+    /// them. `w` is coefficient n of the angular velocity, and `w2` is coefficient n of the matrix that maps a vector y to
+    /// w x (w x y).
     #[inline(never)]
     pub fn reaction(&mut self, n: usize, w: Vec3, w2: &Mat3) -> [Vec3; 2] {
         let w = transposed_times(&self.axes, w);

@@ -93,6 +93,7 @@ pub struct MountedTank {
     still: Option<[Rigid; 2]>,
 }
 
+/// Returns a constant as a [`Jet`], with derivatives of 0.
 fn jet<T: Number>(x: f64) -> Jet<T> {
     [x, 0.0, 0.0].map(T::constant)
 }

@@ -609,6 +609,7 @@ mod tests {
         }
     }
 
+    /// Runs 30 s in steps of `h`. Returns the states at the end and the number of evaluations.
     fn run(p: &Parameters, u: &Inputs, h: f64, tolerance: f64) -> ([f64; STATES], usize) {
         let mut x = Spacecraft::new(p, u, 0.0, tolerance).unwrap().continuous_states();
         let (craft, evaluations) = (Draining::new(p).unwrap(), Cell::new(0));

@@ -86,9 +86,8 @@
 //! W^2), seen from the tank, against the spin and with it. A pendulum, which does not take part in the spin, has C = 1 and
 //! epsilon = 0. The FMUs' parameters are C (`gyroscopic`) and epsilon + 1 - 2 C (`gyroscopic_stiffness`).
 //!
-//! Source: the coefficients come from `formulas::third_order` and `formulas::energy_terms`; the equations are Lagrange's equations
-//! for these energies.
-//! tests/craft/surface.rs checks them against Newton's law in Cartesian coordinates with the surface as a constraint, and
+//! Source: the coefficients come from `formulas::third_order` and `formulas::energy_terms`; the equations follow from these
+//! energies by Lagrange's method. tests/craft/surface.rs checks them against Newton's law in Cartesian coordinates with the surface as a constraint, and
 //! those of a draining tank against differences of the Lagrangian.
 
 use alloc::format;

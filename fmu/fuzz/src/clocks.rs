@@ -18,12 +18,14 @@ use crate::{Values, place, set, survives_being_saved, to_steps};
 const CALLS: usize = 40;
 /// Allowed relative difference between the outputs of two hosts; see [`allowed`].
 const TOLERANCE: f64 = 1e-9;
+/// Largest number of ticks in one step.
 const LONGEST: u32 = 8;
 
 #[derive(Clone, Copy, Debug)]
 enum Call {
     Input(usize, f64),
     Slope(usize, f64),
+    /// Sets tunable parameter number n to a fraction of its start value.
     Tune(usize, f64),
     GoBack(u32),
     Save,
@@ -34,6 +36,7 @@ enum Call {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Kind {
     Multiplied,
+    /// t += h.
     Added,
     Off,
     Differences,
@@ -43,6 +46,7 @@ enum Kind {
 struct Clock {
     kind: Kind,
     start: f64,
+    /// Start of the clock from whose differences the step sizes follow, s.
     origin: f64,
     tick: f64,
     ticks: u32,
@@ -74,6 +78,7 @@ impl Clock {
         self.name(self.time)
     }
 
+    /// Returns the size of a step of this many ticks, s.
     fn length(&self, ticks: u32) -> f64 {
         let at = |ticks: u32| self.origin + f64::from(ticks) * self.tick;
         match self.kind {
@@ -182,6 +187,7 @@ fn allowed(rows: &Rows, n: usize, tick: f64, is_placed: bool, start: f64) -> f64
     TOLERANCE * size + last_digits(start) * fastest
 }
 
+/// Returns two units in the last place of times after `start`, s.
 fn last_digits(start: f64) -> f64 {
     2.0 * f64::EPSILON * (start.abs() + 10.0)
 }
@@ -312,6 +318,7 @@ fn co_simulation<M: Model, V: Values>(
     rows
 }
 
+/// Makes a step to its end, handling the events on the way. Returns false if the step was refused.
 fn step_all<M: Model, V: Values>(
     instance: &mut Instance<M, V>,
     clock: &mut Clock,

@@ -1338,6 +1338,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
+    /// Returns the model, and creates it if necessary.
     #[inline]
     fn model(&mut self, call: &Call) -> Result<&mut M, Fault> {
         if self.model.is_none() {
@@ -1390,6 +1391,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         parameters
     }
 
+    /// Returns the present outputs, and computes them if necessary.
     #[inline(always)]
     fn outputs(&mut self, call: &Call) -> Result<&M::Outputs, Fault> {
         if self.outputs.is_none() {
@@ -1464,6 +1466,7 @@ fn discrete<M: Model>(scalar: &Scalar<M>, outputs: &M::Outputs) -> i32 {
     }
 }
 
+/// Returns a computed number as a value, or a fault if it is NaN or infinite.
 #[inline(always)]
 fn finite<M: Model>(call: &Call, scalar: &Scalar<M>, x: f64) -> Result<Value, Fault> {
     if is_finite(x) { Ok(Value::Real(x)) } else { Err(not_finite(call, scalar, x)) }
@@ -1623,6 +1626,7 @@ fn check_length(call: &Call, name: &str, given: usize, needed: usize) -> Result<
     Err(call.error(format_args!("{name} = {given} (allowed: {needed})")))
 }
 
+/// Finds the scalar of a value reference, which must have the type of the call.
 #[inline]
 fn scalar<M: Model, V: Version>(call: &Call, reference: u32) -> Result<&'static Scalar<M>, Fault> {
     V::scalar(reference, call.c_type).map_err(|why| call.error(why))

@@ -39,6 +39,7 @@ pub struct Point {
     pub variance: f64,
 }
 
+/// The longest averaging time is the length of the record divided by this number.
 const LONGEST: usize = 10;
 
 /// Returns the overlapping Allan variance of samples `step` (s) apart, at averaging times equally spaced in
@@ -146,6 +147,7 @@ impl Noise {
         all.into_iter().filter(|term| self.coefficient(*term) > 0.0).collect()
     }
 
+    /// Returns the Allan variance at averaging time `tau` (s), (rad/s)².
     pub fn variance(&self, tau: f64) -> f64 {
         let part = |term: Term| self.coefficient(term) * term.variance(tau, self.bias_time);
         self.terms().into_iter().map(part).sum()

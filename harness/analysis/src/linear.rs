@@ -41,6 +41,7 @@ const SAME: f64 = 1e-9;
 const FLOWS: usize = 1000;
 
 impl Linear {
+    /// Returns Ω/τ at a frequency in Hz, (rad/s)/(N·m).
     pub fn response(&self, frequency: f64) -> Complex64 {
         let s = Complex64::new(0.0, TAU * frequency);
         let slosh: Complex64 = self

@@ -90,6 +90,7 @@ mod tests {
 
     const STEP: f64 = 0.02;
 
+    /// Returns the thesis's sweep with some amplitude, N·m, and the rate of the linear bench.
     fn sweep(amplitude: f64) -> (Sweep, Vec<f64>, Vec<f64>) {
         let sweep = Sweep { amplitude, ..Sweep::THESIS };
         let torque: Vec<f64> = (0..135_000).map(|k| sweep.torque(f64::from(k) * STEP)).collect();

@@ -18,6 +18,7 @@ impl Random {
         Random(generator)
     }
 
+    /// Returns a uniformly distributed number from 0 (included) to 1 (excluded).
     pub fn uniform(&mut self) -> f64 {
         (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
     }

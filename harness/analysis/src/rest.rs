@@ -57,6 +57,8 @@ pub struct Chunk {
 }
 
 impl Rest {
+    /// Analyses samples `step` (s) apart, in chunks of `chunk` (s), with the autocorrelation up to the lag
+    /// `lag` (s).
     pub fn analyse(step: f64, samples: &[f64], chunk: f64, lag: f64) -> Rest {
         let n = samples.len() as f64;
         let middle = (n - 1.0) / 2.0;
@@ -129,6 +131,7 @@ impl Rest {
         [count(|chunk| chunk.kolmogorov), count(|chunk| chunk.between_levels)]
     }
 
+    /// Returns half of the 95 % interval of white noise's autocorrelation, 1.96/√n.
     pub fn white_bound(&self) -> f64 {
         1.96 / (self.count as f64).sqrt()
     }
@@ -175,6 +178,7 @@ pub fn autocorrelation(signal: &[f64], lags: usize) -> Vec<f64> {
     sums[..=lags].iter().map(|sum| sum / power).collect()
 }
 
+/// Returns the probability that a standard normal variable is below x.
 fn normal(x: f64) -> f64 {
     0.5 * libm::erfc(-x / std::f64::consts::SQRT_2)
 }
@@ -206,6 +210,7 @@ fn between_levels(samples: &[f64], quantum: f64) -> f64 {
     modified(distance.fold(0.0, f64::max), n)
 }
 
+/// Computes [`Rest::histogram`] from sorted samples. Bins contain whole levels if the quantisation is coarse.
 fn histogram(sorted: &[f64], sigma: f64, quantum: f64) -> Vec<(f64, f64)> {
     let (most, usual) = BINS;
     let step = quantum / sigma;

@@ -24,6 +24,7 @@ pub enum Law {
 }
 
 impl Sweep {
+    /// The sweep of Rubaga's thesis (chapter 5) at 0.1 N·m.
     pub const THESIS: Sweep =
         Sweep { amplitude: 0.1, f0: BAND.0, f1: BAND.1, duration: 2700.0, law: Law::Exponential };
 
@@ -31,8 +32,8 @@ impl Sweep {
         self.amplitude * self.phase(t).sin()
     }
 
-    /// Returns the phase φ(t) of the sweep, rad: 2π f0 (e^{at} − 1)/a for an exponential sweep, 2π (f0 t + s t²/2) for
-    /// a linear sweep.
+    /// Returns the phase φ(t) of the sweep, rad: 2π f0 (e^{at} − 1)/a for an exponential sweep with the growth a, and
+    /// 2π (f0 t + s t²/2) for a linear sweep with the slope s.
     pub fn phase(&self, t: f64) -> f64 {
         let Sweep { f0, f1, duration, .. } = *self;
         match self.law {

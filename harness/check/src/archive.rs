@@ -8,6 +8,7 @@ use zip::CompressionMethod;
 
 use super::findings::Findings;
 
+/// Files and folders that FMI 2.0 allows at the top level of an FMU.
 const AT_THE_TOP: [&str; 9] = [
     "modelDescription.xml",
     "model.png",

@@ -59,9 +59,11 @@ pub(crate) fn tuple(folder: &str) -> Option<Form> {
     }
 }
 
+/// An interface that the description declares, with the functions that its binary must export.
 struct Declared {
     interface: String,
     identifier: String,
+    /// Functions that the binary of this interface must export.
     wanted: Vec<&'static str>,
 }
 
@@ -86,6 +88,7 @@ pub struct Binaries {
     own_folder: &'static str,
 }
 
+/// Returns an interface with the `wanted` functions; `None` if it has no modelIdentifier.
 fn declare(element: &Element, wanted: Vec<&'static str>) -> Option<Declared> {
     let identifier = element.get("modelIdentifier")?.to_string();
     Some(Declared { interface: element.name.to_string(), identifier, wanted })
@@ -188,6 +191,7 @@ impl Binaries {
         self.placed.iter().filter_map(|p| Some((p.name.as_str(), p.binary.as_ref().ok()?)))
     }
 
+    /// Calls `look` for each binary that could be parsed. The rule is skipped if there is none.
     fn each(&self, findings: &mut Findings, look: impl Fn(&str, &Binary, &mut Findings)) {
         if self.readable().next().is_none() {
             findings.skip("no binary can be read here");

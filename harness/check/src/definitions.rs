@@ -61,6 +61,7 @@ pub fn model_identifier(d: &Description, findings: &mut Findings) {
     identifiers(d.interfaces(), findings);
 }
 
+/// Reports each interface whose modelIdentifier cannot be the start of a C function's name.
 pub(crate) fn identifiers<'d>(
     interfaces: impl Iterator<Item = &'d Element>,
     findings: &mut Findings,

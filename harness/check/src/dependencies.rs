@@ -20,11 +20,14 @@ use host::description::Type;
 /// Largest number of initial points that are tried before a declared feedthrough counts as missing in the
 /// binary.
 const STARTS: u64 = 600;
+/// Smallest number of initial points, which is enough to find most dependencies that are not declared.
 const AT_LEAST: u64 = 40;
 /// Largest number of attempts to reach these initial points. More attempts than points are needed, because
 /// the FMU may refuse parameters drawn at random.
 const TRIES: u64 = 16 * STARTS;
+/// Probability with which a start value is divided by 100.
 const NEXT_TO_NOTHING: f64 = 0.1;
+/// Relative change below which a difference is rounding and not a dependency.
 const ROUNDING: f64 = 1e-9;
 
 /// Returns an instance whose parameters, inputs and start values are drawn at random with the seed `attempt`.
@@ -89,6 +92,7 @@ pub fn random_session<'f>(
     Ok(session)
 }
 
+/// Returns true if two readings of `v` differ by more than rounding.
 fn has_moved(v: &Variable, a: &Reading, b: &Reading) -> bool {
     match (a, b) {
         (Reading::Real(a), Reading::Real(b)) => {

@@ -164,6 +164,7 @@ pub(crate) fn each<'v, V: Deref<Target = Common> + 'v>(
     }
 }
 
+/// Returns the allowed values of `initial` in FMI 2.0; see [`Initials`].
 pub(crate) fn initials(
     causality: &Causality,
     variability: &Variability,

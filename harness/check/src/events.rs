@@ -21,7 +21,9 @@ use super::under_test::{FmuUnderTest, Interface, Life, Observed, STEPS, Session}
 /// Number of initial points from which the FMU is simulated. The first point has the declared start values, all further
 /// points have parameters drawn at random.
 const STARTS: u64 = 12;
+/// Relative change of a value below which it is rounding.
 const ROUNDING: f64 = 1e-9;
+/// A time event nearer than this fraction of the step counts as due.
 const NEARLY_DUE: f64 = 1e-6;
 
 pub fn missed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {

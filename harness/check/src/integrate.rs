@@ -27,21 +27,29 @@ use host::fmi2::{CallError, Status};
 /// Relative tolerance of a step. It is loose, because the check needs a plausible trajectory and not an
 /// accurate one.
 const TOLERANCE: f64 = 1e-3;
+/// Number of explicit steps in one communication step after which the FMU counts as stiff.
 const EXPLICIT_STEPS: usize = 40;
 /// Largest number of integrator steps in one communication step. The host then accepts the state that it has
 /// reached, because FMI prescribes no accuracy.
 const MOST_STEPS: usize = 100;
+/// Largest number of states for which a Jacobian is computed by finite differences.
 const MOST_STATES: usize = 200;
+/// The first integrator step is the communication step divided by this number.
 const PARTS: f64 = 8.0;
+/// Accuracy with which an event indicator's zero crossing is located, as a fraction of the communication
+/// step.
 const LOCATED: f64 = 1e-3;
+/// Shortest integrator step, as a fraction of the communication step.
 const SHORTEST: f64 = 1e-12;
 
 enum Trial {
+    /// The new states, and the estimated error divided by the allowed error.
     Done(DVector<f64>, f64),
     /// The FMU could not be evaluated at a stage (fmi2Discard, or values that are NaN or infinite).
     Impossible(Impossible),
 }
 
+/// Reason why a step cannot be made as long as it was tried.
 #[derive(Debug, thiserror::Error)]
 enum Impossible {
     #[error("the integrator's linearised system of equations is singular")]

@@ -15,6 +15,7 @@ use super::findings::Findings;
 use super::under_test::{FmuUnderTest, Interface, Life, Reading, Session};
 
 const STARTS: u64 = 12;
+/// Allowed relative difference of two measured factors.
 const AGREE: f64 = 1e-4;
 
 struct Pair<'d> {

@@ -44,9 +44,11 @@ pub fn skip<T>(why: impl Into<String>) -> Result<T> {
 
 /// The loaded binaries of an FMU, with a record of the call that is being made.
 pub struct Loaded<V: Version> {
+    /// One binary, or two if modelIdentifier differs between the interfaces.
     binaries: Vec<Fmu<V>>,
     /// The interfaces that can be called, Co-Simulation first, each with the index of its binary.
     interfaces: Vec<(Interface, usize)>,
+    /// The interfaces whose binary cannot be loaded: interface, modelIdentifier and reason.
     broken: Vec<(Interface, String, String)>,
     pub deadline: Instant,
     doing: RefCell<String>,
@@ -262,6 +264,7 @@ pub trait UnderTest: Deref<Target = Loaded<Self::Version>> {
     /// NULL.
     fn provoke_messages(&self) -> Result<(Vec<Message>, usize)>;
 
+    /// Returns true if the element of `interface` declares the capability `flag`.
     fn can(&self, interface: Interface, flag: &str) -> bool {
         self.root().child(element(interface)).is_some_and(|element| element.flag(flag))
     }

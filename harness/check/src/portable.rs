@@ -10,6 +10,7 @@ use super::findings::Findings;
 /// Characters that Windows does not allow in names. The slash separates folders, and control characters have
 /// a rule of their own.
 const FORBIDDEN: [char; 7] = ['<', '>', ':', '"', '|', '?', '*'];
+/// Names of devices on Windows, which no file may have, with any extension.
 const DEVICES: [&str; 6] = ["CON", "PRN", "AUX", "NUL", "CONIN$", "CONOUT$"];
 /// Largest length of one part of a path on the usual file systems, bytes.
 const LONGEST_PART: usize = 255;
@@ -19,6 +20,7 @@ const LONGEST_PATH: usize = 259;
 /// `C:\Users\a.long.user.name\AppData\Local\Temp\` and a folder named after the instance.
 const PORTABLE_PATH: usize = 160;
 
+/// Lists the reasons why Windows cannot create a file or folder with the name `part`.
 fn windows_faults(part: &str) -> Vec<String> {
     let mut faults = Vec::new();
     let stem = part.split('.').next().unwrap_or(part).trim_end().to_uppercase();
@@ -40,6 +42,7 @@ fn windows_faults(part: &str) -> Vec<String> {
     faults
 }
 
+/// Splits a name at its slashes, without the empty last part of a folder.
 fn parts(name: &str) -> impl Iterator<Item = &str> {
     name.split(['/', '\\']).filter(|part| !part.is_empty())
 }

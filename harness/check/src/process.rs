@@ -22,6 +22,7 @@ use super::under_test::FmuUnderTest;
 use super::{life, v3};
 
 pub const SUBCOMMAND: &str = "check-calls";
+/// Number of rules with endless calls after which no further rules of calls are run.
 const HANGS: usize = 2;
 /// Time limit of a single call: at least this long if the rule's limit allows it, and otherwise this part of
 /// the rule's limit, so that [`HANGS`] endless calls take at most about 10 s.
@@ -29,7 +30,9 @@ const CALL: Duration = Duration::from_secs(4);
 const PART: f64 = 15.0;
 /// Largest file that an FMU may write, bytes. It is small because several rules run at the same time.
 const FILE: u64 = 8 << 20;
+/// The rule that reports a binary that cannot be loaded.
 const OPENS: &str = "load.opens";
+/// Number of bytes of the FMU's printed output that a finding quotes.
 const PRINTED: usize = 200;
 
 #[derive(Default)]
@@ -75,6 +78,7 @@ pub fn check(
     }
 }
 
+/// Runs the process of a rule. Returns true if it had to be killed.
 fn run(
     rule: &'static Rule,
     fmu: Unpacked,

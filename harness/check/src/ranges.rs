@@ -69,6 +69,7 @@ fn refusal(fmu: &FmuUnderTest, v: &Variable, value: &Reading) -> Result<Result<(
 
 pub fn limits_exact(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     const JUST: f64 = 1e-6;
+    /// Distance from a bound at which an Integer is outside any reasonable range.
     const FAR: f64 = 1000.0;
     let mut any = false;
     let settable = fmu.variables().iter().filter(|v| v.is_set_by_hosts());

@@ -40,6 +40,7 @@ pub enum Check {
 }
 
 impl Rule {
+    /// Returns true if checking this rule calls the binary.
     pub fn is_of_calls(&self) -> bool {
         matches!(self.check, Check::Calls(_) | Check::Calls3(_))
     }

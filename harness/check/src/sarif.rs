@@ -8,6 +8,7 @@ use serde_json::json;
 use super::findings::Severity;
 use super::report::Report;
 
+/// Converts a path to a URI reference (RFC 3986); an absolute path becomes a `file://` address.
 fn uri(path: &str) -> String {
     let mut uri = String::from(if path.starts_with('/') { "file://" } else { "" });
     for byte in path.bytes() {

@@ -259,6 +259,7 @@ pub fn structure_by(kinds: &'static [Kind], root: &Element, findings: &mut Findi
     elements(kinds, "", root, findings);
 }
 
+/// Elements on which the schema of FMI 3.0 allows attributes of other namespaces and vendors.
 const ANY_ATTRIBUTE: [&str; 3] = ["ModelExchange", "CoSimulation", "ScheduledExecution"];
 
 fn elements(kinds: &'static [Kind], parent: &str, element: &Element, findings: &mut Findings) {

@@ -250,6 +250,7 @@ pub fn cut(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 pub fn lag(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     /// Relative change of a value with the step size above which the change is more than rounding.
     const SEEN: f64 = 1e-6;
+    /// Number of steps after which an FMU that delays constant inputs by one or two steps shows their effect.
     const SETTLED: usize = 4;
     /// A value counts as equal to the value of one step earlier if they differ by less than this fraction of the change
     /// between them.
@@ -350,6 +351,7 @@ pub fn inputs(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 }
 
 pub fn input_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    /// Change of the input within a step, relative to its magnitude.
     const SHARE: f64 = 0.3;
     /// If the difference between a held input and one with a slope is below this fraction of the held input's
     /// effect, the FMU ignores the slope.
@@ -481,6 +483,7 @@ pub fn output_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result
 const STEP_SIZES: &str = "canHandleVariableCommunicationStepSize";
 
 pub fn small(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    /// Step sizes that are tried instead of the usual one, s.
     const SMALL: [f64; 2] = [4e-4, 1e-5];
     const MOST: f64 = 5000.0;
     let usual = after_three_steps(fmu)?.step;

@@ -33,6 +33,7 @@ fn set_between_steps(session: &mut Session, v: &Variable, value: &Reading) -> Re
     Ok(answer)
 }
 
+/// Returns true if the FMU accepts `value` for `v` before initialisation.
 fn is_allowed(
     fmu: &FmuUnderTest,
     interface: Interface,

@@ -22,11 +22,14 @@ pub use self::observed::Observed;
 pub use super::loaded::{Life, STEPS, UnderTest, Unusable};
 pub use host::fmi3::Interface;
 
+/// Number of calls of fmi2NewDiscreteStates after which an event iteration counts as endless.
 const ITERATIONS: usize = 100;
 /// Largest number of immediately successive events. An FMU that always requests the next event at once breaks
 /// a rule.
 const IMMEDIATE: usize = 3;
+/// Number of events requested only by fmi2CompletedIntegratorStep that are examined.
 const ASKED: usize = 20;
+/// Relative change of a state at an event below which it is rounding.
 const JUMP: f64 = 1e-9;
 const UNKNOWN_NOMINAL: f64 = 1e-3;
 
@@ -58,6 +61,7 @@ pub enum Reading {
 }
 
 impl Reading {
+    /// Returns true if the two values are bit-identical.
     pub fn is_identical(&self, other: &Reading) -> bool {
         match (self, other) {
             (Reading::Real(a), Reading::Real(b)) => a.to_bits() == b.to_bits(),
@@ -83,8 +87,11 @@ impl std::fmt::Display for Reading {
 #[derive(Clone, Copy, Debug)]
 pub struct Experiment {
     pub start: f64,
+    /// Relative tolerance, if DefaultExperiment has one.
     pub tolerance: Option<f64>,
+    /// Stop time, s, if DefaultExperiment has one.
     pub stop: Option<f64>,
+    /// Communication step, s.
     pub step: f64,
 }
 
@@ -352,12 +359,15 @@ pub struct Session<'f> {
     pub fmu: &'f FmuUnderTest,
     pub interface: Interface,
     pub instance: Instance<'f>,
+    /// Simulation time that has been reached, s.
     pub time: f64,
     pub step: f64,
+    /// Number of steps so far, from which the changing inputs follow.
     pub count: usize,
     pub(super) next_event: Option<f64>,
     nominals: Vec<f64>,
     pub(super) ended: Option<(f64, &'static str)>,
+    /// The first time at which nextEventTime was in the past, and this nextEventTime, s.
     pub(super) past_event: Option<(f64, f64)>,
     immediate_events: usize,
     /// Result of the last event iteration: whether states, and whether their nominals, have changed.
@@ -381,6 +391,7 @@ pub struct Mark {
 }
 
 impl<'f> Session<'f> {
+    /// Initialises with these start and stop times (s) and this tolerance.
     pub fn initialise_at(
         &mut self,
         start: f64,
@@ -417,6 +428,7 @@ impl<'f> Session<'f> {
         Ok(self.instance.enter_continuous_time_mode()?)
     }
 
+    /// Calls fmi2NewDiscreteStates until no new iteration is requested.
     fn iterate_events(&mut self) -> Result<()> {
         self.fmu.announce("fmi2NewDiscreteStates");
         (self.values_changed, self.nominals_changed) = (false, false);

@@ -37,6 +37,7 @@ impl Unit {
         Unit { exponents, factor: self.factor * other.factor.powi(power), offset: 0.0 }
     }
 
+    /// Returns true if both units have the same dimension; radians are ignored.
     fn measures_like(&self, other: &Unit) -> bool {
         (0..RADIAN).all(|i| self.exponents[i] == other.exponents[i])
     }
@@ -164,6 +165,7 @@ fn read(name: &str) -> Vec<Unit> {
     }
 }
 
+/// Parses a unit of the form `product` or `product/factor`, such as `kg.m2/s`.
 fn quotient(rest: &mut &str) -> Option<Vec<Unit>> {
     let above = product(rest)?;
     let Some(after) = rest.strip_prefix('/') else { return Some(above) };
@@ -217,6 +219,7 @@ fn factor(rest: &mut &str) -> Option<Vec<Unit>> {
     (!base.is_empty()).then(|| base.iter().map(|u| Unit::ONE.times(*u, power)).collect())
 }
 
+/// Returns the unit in an element BaseUnit, or `None` if it is missing or one of its numbers is not valid.
 fn declared(unit: &Element) -> Option<Unit> {
     let base = unit.child("BaseUnit")?;
     let mut exponents = [0; 8];

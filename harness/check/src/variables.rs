@@ -37,6 +37,7 @@ pub(crate) fn unstructured<'d, V: Deref<Target = Common> + 'd>(
     });
 }
 
+/// Returns true if a name follows the grammar of structured names (section 2.2.9).
 fn is_structured(name: &str) -> bool {
     if let Some(inner) = name.strip_prefix("der(").and_then(|rest| rest.strip_suffix(')')) {
         // A comma after the last bracket precedes the order of the derivative; a comma between brackets
@@ -129,12 +130,14 @@ pub fn flat_ports(d: &Description, findings: &mut Findings) {
     });
 }
 
+/// Splits a name such as `array[1,2]` into the array's name and the indices.
 fn indexed(name: &str) -> Option<(&str, Vec<u32>)> {
     let (array, indices) = name.strip_suffix(']')?.split_once('[')?;
     let indices: Option<Vec<u32>> = indices.split(',').map(|i| i.trim().parse().ok()).collect();
     Some((array, indices?))
 }
 
+/// Returns true if `indices` has every index of an array exactly once.
 fn is_whole(indices: &[Vec<u32>]) -> bool {
     let dimensions = indices[0].len();
     if indices.iter().any(|index| index.len() != dimensions || index.contains(&0)) {

@@ -207,6 +207,7 @@ fn main() -> ExitCode {
     code.into()
 }
 
+/// Returns true if `cargo run` started this program; cargo sets the variable.
 fn is_run_by_cargo() -> bool {
     std::env::var_os("CARGO_MANIFEST_DIR").is_some()
 }

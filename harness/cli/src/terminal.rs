@@ -11,6 +11,7 @@ use clap::builder::styling::{AnsiColor, Effects, Style, Styles};
 use files::input;
 use host::guard;
 
+/// Heading of the options that every command has, in its help.
 pub const GLOBAL: &str = "Global options";
 
 /// Options for output.

@@ -22,6 +22,7 @@ pub struct Example {
     inputs: &'static [(&'static str, f64, Course)],
 }
 
+/// Time function of an input; t in s, largest value 1.
 type Course = fn(t: f64) -> f64;
 
 /// A sine of 2 Hz, below the slosh frequency of the bench, that grows and fades within ten seconds, followed by no torque.

@@ -6,6 +6,7 @@ pub fn thousandths(value: f64) -> f64 {
     (value * 1e9).round() / 1e6
 }
 
+/// Rounds a value to this number of significant digits; zero has no sign.
 pub fn significant(value: f64, digits: usize) -> f64 {
     format!("{value:.*e}", digits - 1).parse().unwrap_or(value) + 0.0
 }

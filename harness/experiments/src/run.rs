@@ -221,6 +221,7 @@ pub fn parameters(
 const REPORT_EVERY: usize = 1024;
 
 impl Run {
+    /// Returns the start time of the run, s, at which the torque history begins.
     pub fn start(&self) -> f64 {
         self.torque.span().0
     }
@@ -465,6 +466,7 @@ impl Recorder {
         })
     }
 
+    /// Adds a row, and returns the position of the first value that is NaN or infinite.
     fn record(&mut self, instance: &mut Instance) -> Result<Option<usize>> {
         instance.get_real(&self.reals, &mut self.values)?;
         for (value, place) in self.values.iter().zip(&self.places) {

@@ -250,6 +250,7 @@ impl Tank {
     }
 }
 
+/// Returns the z axis of a frame from its attitude, a quaternion of any norm with the scalar first.
 fn third_axis([w, x, y, z]: [f64; 4]) -> [f64; 3] {
     let norm2 = w * w + x * x + y * y + z * z;
     [2.0 * (x * z + w * y), 2.0 * (y * z - w * x), w * w - x * x - y * y + z * z]

@@ -27,6 +27,7 @@ pub enum Status {
     Discard,
     Error,
     Fatal,
+    /// The step goes on in the background (FMI 2.0 only).
     Pending,
 }
 
@@ -270,6 +271,7 @@ pub(crate) use functions;
 pub struct HostState {
     pub float_control: u32,
     pub locale: String,
+    /// Hash of the installed signal handlers; 0 on systems without them.
     pub signal_handlers: u64,
     pub directory: Option<PathBuf>,
 }
@@ -304,6 +306,7 @@ impl HostState {
     }
 }
 
+/// Lists all files below a folder; the list is empty if the folder cannot be read.
 fn files_below(folder: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let below = entries.flat_map(|entry| match entry.path() {

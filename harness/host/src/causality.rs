@@ -6,6 +6,7 @@ macro_rules! attribute {
         #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
         pub enum $name {
             $($item,)+
+            /// A causality that FMI does not define, as written; empty if the attribute is missing.
             Other(String),
         }
 

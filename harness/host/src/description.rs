@@ -89,6 +89,7 @@ pub struct BaseUnit {
 }
 
 impl BaseUnit {
+    /// Base units of FMI and SSP, which are the base units of SI, and rad.
     pub const NAMES: [&str; 8] = ["kg", "m", "s", "A", "K", "mol", "cd", "rad"];
 
     /// Reads the child `BaseUnit` of an element `Unit`. Returns `None` if it is missing or one of its numbers
@@ -108,6 +109,7 @@ impl BaseUnit {
     }
 }
 
+/// The element `DisplayUnit`: displayed value = `factor` · value + `offset`.
 #[derive(Clone, Debug)]
 pub struct DisplayUnit {
     pub name: String,
@@ -139,6 +141,7 @@ pub struct Variable {
     /// Variability; `Other` with an empty text if it is missing.
     pub variability: Variability,
     pub description: String,
+    /// True if the variable may be set or read within a step (FMI 3.0).
     pub intermediate: bool,
     c_type: CType,
     kind: Type,
@@ -207,6 +210,7 @@ impl CType {
         })
     }
 
+    /// Returns the smallest and the largest value of an integer type, or `None` for other types.
     fn integer_bounds(self) -> Option<(i64, i64)> {
         Some(match self {
             CType::Int8 => (i8::MIN.into(), i8::MAX.into()),
@@ -295,6 +299,7 @@ impl Reader {
         }
     }
 
+    /// Reads a required attribute with `read`; adds a problem if it is missing or not valid.
     fn required<T: Default>(
         &mut self,
         element: &Element,
@@ -583,6 +588,7 @@ fn derivatives(root: &Element, is_fmi3: bool) -> Vec<(u32, u32)> {
     unknowns.filter_map(pair).collect()
 }
 
+/// Converts a row-major index, counted from 0, to indices from 1, separated by commas.
 fn indices(mut index: usize, dimensions: &[usize]) -> String {
     let mut all = Vec::new();
     for size in dimensions.iter().rev() {
@@ -593,6 +599,7 @@ fn indices(mut index: usize, dimensions: &[usize]) -> String {
     all.join(",")
 }
 
+/// Longest name of a variable, bytes.
 const LONGEST_NAME: usize = 1024;
 /// Largest number of types, and of items of one type. They are limited because each declaredType is searched
 /// among all types.

@@ -14,6 +14,7 @@ use anyhow::{Result, bail, ensure};
 use crate::c_abi::Called;
 use crate::fmu::Instance;
 
+/// Accuracy of the time of an event, as a fraction of the step.
 const LOCATED: f64 = 1e-13;
 /// Smallest distance of two events, as a fraction of the distance between two rows.
 const APART: f64 = 1e-6;
@@ -55,6 +56,7 @@ pub struct Run<I> {
     t: f64,
     x: Vec<f64>,
     z: Vec<f64>,
+    /// Ratio of the absolute tolerance of each state to the relative tolerance.
     nominals: Vec<f64>,
     tolerance: f64,
     h: f64,
@@ -175,6 +177,7 @@ impl<'fmu, I: DerefMut<Target = Instance<'fmu>>> Run<I> {
         Ok(dx)
     }
 
+    /// Returns true if an indicator changes sign between the present point and (t, x).
     fn crosses(&mut self, t: f64, x: &[f64]) -> Result<bool> {
         if self.z.is_empty() {
             return Ok(false);

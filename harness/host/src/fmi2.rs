@@ -318,6 +318,7 @@ impl Fmu {
         self.exchange.is_some() && self.own.events.is_some()
     }
 
+    /// Lists the 25 C functions that every FMU must export.
     pub fn symbols() -> Vec<&'static str> {
         [Common::<c_int>::symbols(0), Functions::symbols(0)].concat()
     }

@@ -26,6 +26,7 @@ use crate::description::{CType, Value};
 pub type Fmu = version::Fmu<Fmi3>;
 pub type Instance<'fmu> = version::Instance<'fmu, Fmi3>;
 
+/// Folder of the binaries for the platform of this program (FMI 3.0.2, section 2.5.1.4.1).
 pub const PLATFORM: &str = if cfg!(target_os = "windows") {
     if cfg!(target_arch = "aarch64") {
         "aarch64-windows"
@@ -619,6 +620,7 @@ pub struct Step {
     pub event: u8,
     pub terminate: u8,
     pub early_return: u8,
+    /// lastSuccessfulTime, s; NaN if the FMU has not written it.
     pub last_time: f64,
 }
 
@@ -638,8 +640,10 @@ pub struct EventInfo {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Dependency {
+    /// Element of the dependent variable, from 1; 0 means all elements.
     pub element: usize,
     pub independent: u32,
+    /// Element of the independent variable, from 1; 0 means all elements.
     pub independent_element: usize,
     pub kind: i32,
 }
@@ -741,10 +745,12 @@ impl<'fmu> Instance<'fmu> {
         self.read(T::calls(self.functions()).0, references, values)
     }
 
+    /// Calls fmi3Set… for the type of the values; `values` has all elements of all variables.
     pub fn set_numbers<T: Exchanged>(&mut self, references: &[u32], values: &[T]) -> Called {
         self.write(T::calls(self.functions()).1, references, values)
     }
 
+    /// Reads Booleans as bytes, of which only 0 and 1 are valid.
     pub fn get_boolean_bytes(&mut self, references: &[u32], values: &mut [u8]) -> Called {
         self.read(self.functions().get_boolean, references, values)
     }

@@ -87,10 +87,12 @@ impl Fmu {
         each!(Fmu, self, fmu => fmu.description())
     }
 
+    /// Returns the SHA-256 of the `.fmu` file, in hexadecimal digits.
     pub fn hash(&self) -> &str {
         each!(Fmu, self, fmu => fmu.hash())
     }
 
+    /// Returns the SHA-256 of the loaded binary, in hexadecimal digits.
     pub fn binary_hash(&self) -> &str {
         each!(Fmu, self, fmu => fmu.binary_hash())
     }

@@ -234,6 +234,7 @@ const CLOSED: Duration = Duration::from_secs(1);
 const COUNTING: Duration = Duration::from_millis(50);
 const COUNTED: usize = 100_000;
 
+/// Returns the disk space of the files below a folder, bytes.
 fn disk_usage(folder: &Path) -> u64 {
     let (mut folders, mut bytes, mut entries) = (vec![folder.to_path_buf()], 0, 0);
     while let Some(folder) = folders.pop() {
@@ -402,10 +403,13 @@ struct Messages<F> {
 // Kinds of messages.
 const ALIVE: u8 = b'.';
 const ENDLESS: u8 = b'!';
+/// The first binary is loaded. Content: size of the temporary files, bytes.
 const LOADS: u8 = b'+';
 const ANSWER: u8 = b'>';
+/// Our code has panicked. Content: the report.
 const PANICS: u8 = b'?';
 const CATCHES: u8 = b'-';
+/// The work is done. Content: the exit code.
 const DONE: u8 = b'=';
 
 impl<F: FnMut(&[u8])> Messages<F> {
@@ -415,6 +419,7 @@ impl<F: FnMut(&[u8])> Messages<F> {
         Messages { channel, hear, heard_at, loaded, is_endless: false, panic, done }
     }
 
+    /// Waits for messages for at most `pause` and handles them. Returns false if none has arrived.
     fn read(&mut self, pause: Duration) -> bool {
         let text = |content: &[u8]| String::from_utf8_lossy(content).into_owned();
         self.channel.read(pause, |kind, content| {
@@ -684,6 +689,7 @@ pub fn allow(bytes: u64) {
     let _ = bytes;
 }
 
+/// Sets a soft limit, at most to the limit with which the process was started.
 #[cfg(unix)]
 fn restrict(resource: rustix::process::Resource, bytes: u64) {
     let mut limit = rustix::process::getrlimit(resource);

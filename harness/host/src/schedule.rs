@@ -29,6 +29,7 @@ pub const fn between(hold: bool) -> &'static str {
 pub struct History {
     time: Vec<f64>,
     values: Vec<f64>,
+    /// Slope from each row to the next, per s; 0 in the last row.
     slopes: Vec<f64>,
 }
 
@@ -105,6 +106,7 @@ impl History {
         self.at_row(self.time.partition_point(|row| *row <= t + slack), t).0
     }
 
+    /// Returns value and slope at `t` (s), if `begun` rows have begun.
     fn at_row(&self, begun: usize, t: f64) -> (f64, f64) {
         let Some(k) = begun.checked_sub(1) else { return (self.values[0], 0.0) };
         let (value, slope) = (self.values[k], self.slopes[k]);
@@ -137,6 +139,7 @@ impl Cursor<'_> {
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct Schedule {
+    /// Times, ascending, s.
     pub time: Vec<f64>,
     /// True for each point that is a row of the result; `None` if all are.
     pub rows: Option<Vec<bool>>,

@@ -16,11 +16,13 @@ pub const KERNEL_HALF: isize = 24;
 // Tests: `lost_samples_of_a_sweep_are_predicted`, `lost_rows_of_a_sweep_are_interpolated_and_lost_rows_of_noise_split_the_recording`.
 /// Spacing of samples, in usual ones, from which on some were lost.
 pub const LOST_SPACING: f64 = 1.75;
+/// Longest gap that is filled, s.
 pub const LONGEST_FILLED: f64 = 3.0;
 /// Longest gap that a line may join where the recording cannot be cut, s.
 pub const LONGEST_LINE: f64 = 0.25;
 /// Order of the autoregressive model. It is fitted to eight times as many samples on each side of a gap.
 pub const GAP_ORDER: usize = 32;
+/// Number of places at which the filling of a gap is tried.
 pub const GAP_TRIALS: usize = 12;
 /// Largest kick of the hub by the errors of all fillings, over the gyro's noise.
 pub const GAP_KICK: f64 = 0.1;
@@ -44,6 +46,7 @@ pub const MOVING_SPREAD: f64 = 2.0;
 
 // Recordings of any FMU: `input/record.rs`.
 // Tests: `any_fmu_refuses_records_out_of_range`.
+/// Fewest values of an output from which something is estimated.
 pub const FEWEST_VALUES: usize = 10;
 
 // Recordings of the bench: `input/recording.rs`.
@@ -62,6 +65,7 @@ pub const LARGEST_VALUE: f64 = 1e100;
 /// If at least this fraction of the changes of a gyro signal falls on the rows of a slower clock, the gyro counts as
 /// held with this clock.
 pub const ON_CLOCK: f64 = 0.98;
+/// Slowest gyro that is looked for, in rows a value.
 pub const SLOWEST_GYRO: usize = 100;
 
 // Sensor faults: `input/sensor_faults.rs`.
@@ -75,10 +79,12 @@ pub const CLIPPED_INSIDE: f64 = 3.0;
 pub const FAULT_STEPS: f64 = 2.0;
 /// Largest probability that a run of equal values is chance at which the sensor counts as frozen.
 pub const FROZEN_CHANCE: f64 = 1e-6;
+/// Fewest values in a frozen run.
 pub const FROZEN_RUN: usize = 5;
 /// Fewest repeats that are reported, and the least ratio of their mean square deviation from the neighbours to the mean square
 /// deviation of other values.
 pub const REPEATS: (usize, f64) = (10, 3.0);
+/// Largest error of rounding, relative to the largest value.
 pub const SENSOR_ROUNDING: f64 = 1e-9;
 
 // Spikes: `input/spikes.rs`.
@@ -134,6 +140,7 @@ pub const COARSEST: f64 = 0.2;
 
 // Runs of the bench: `bench/simulate.rs`.
 // Tests: `the_fit_simulates_a_twin_with_a_delay_or_a_smooth_torque`, `a_run_that_would_not_end_is_refused`.
+/// Instants closer than this are the same, s.
 pub const SAME_INSTANT: f64 = 1e-9;
 /// Most internal steps of our FMUs in a communication step: the first number, plus the second number for each second of the step.
 /// A fit's runs take some 100 steps a second. If a search tries values that would take millions, the run fails and the search
@@ -142,12 +149,14 @@ pub const MOST_INTERNAL_STEPS: (f64, f64) = (200.0, 2e4);
 
 // Starts from data: `bench/start.rs`.
 // Tests: `poles_and_zeros_of_the_exact_response_give_the_bench_back`.
+/// Damping ratios that are tried.
 pub const DAMPINGS: [f64; 5] = [0.0015, 0.003, 0.006, 0.015, 0.04];
 /// Relative step of the slosh frequency over the band; the half-power width at the least damping is three times as much.
 pub const FREQUENCY_FINENESS: f64 = 1e-3;
 
 // Design of experiments: `bench/design.rs`.
 // Tests: `d_optimal_power_is_near_the_slosh_frequency_and_reduces_uncertainty`, `a_multisine_has_only_odd_lines_and_the_given_peak`.
+/// Odd lines in a group, of which one is left out.
 pub const LINE_GROUP: usize = 4;
 /// Share of the power that is always spread over all lines. It excites the resonance of a slightly different plant, and shows
 /// distortion everywhere.
@@ -157,6 +166,7 @@ pub const ANGLE_ROUNDS: usize = 12;
 
 // Verdict: `bench/verdict.rs`.
 // Tests: `a_search_that_would_leave_a_parameters_range_ends_at_the_bound_with_a_result`.
+/// Newton decrement above which the verdict reports it.
 pub const TOLD_DECREMENT: f64 = 0.1;
 
 // Page: `words/page.rs`.
@@ -173,6 +183,7 @@ pub const BEGINNINGS: [f64; 2] = [0.35, 0.5];
 // Tests: `friction_of_three_sets_of_runs_ends_in_no_false_minimum`, `recordings_that_show_no_friction_are_refused_with_what_to_do`, `scatter_of_decays_is_not_a_preferential_direction_and_ten_per_cent_of_friction_is`.
 /// Length of the blocks of rows that are averaged for the measured friction, s.
 pub const BLOCK: f64 = 0.01;
+/// Number of blocks in the shortest recording of a friction run.
 pub const FEWEST_BLOCKS: usize = 100;
 /// Intervals of the rate over which the measured friction is averaged, and the fewest rows of one.
 pub const FRICTION_BINS: (usize, usize) = (160, 3);

@@ -89,7 +89,7 @@ struct Wheel {
     axis: [f64; 3],
     /// Moment of inertia about its axis, kg·m².
     inertia: f64,
-    /// Largest torque, N·m.
+    /// Largest torque on the craft, to which a larger command is limited, N·m.
     max_torque: f64,
     /// Largest speed relative to the body, rad/s.
     max_speed: f64,

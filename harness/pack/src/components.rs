@@ -29,6 +29,7 @@ pub struct Component {
     pub licence: String,
     pub texts: Vec<String>,
     pub purl: String,
+    /// SHA-256 of the package, if Cargo.lock has it.
     pub sha256: Option<String>,
     pub origin: String,
     pub platforms: BTreeSet<&'static str>,
@@ -230,6 +231,7 @@ fn rust_version() -> Result<String> {
     Ok(version.into())
 }
 
+/// Returns true if the reverse of `text` is in `bytes`.
 fn contains_backwards(bytes: &[u8], text: &[u8]) -> bool {
     bytes.windows(text.len()).any(|window| window.iter().rev().eq(text))
 }
@@ -407,6 +409,7 @@ struct Product<'a> {
     name: &'a str,
     version: &'a str,
     description: &'a str,
+    /// Names and SHA-256 of its binaries.
     files: Vec<(String, String)>,
 }
 

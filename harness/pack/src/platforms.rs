@@ -19,6 +19,7 @@ use crate::project;
 
 #[derive(Debug)]
 pub struct Platform {
+    /// Folder under `binaries/` of the FMU (FMI 2.0.5, section 2.3).
     pub folder: &'static str,
     pub ending: &'static str,
     /// Build targets. If there are several, their binaries are joined into a universal binary.
@@ -60,6 +61,7 @@ const MINGW: Tool = Tool {
     get: "Debian package gcc-mingw-w64-x86-64-win32, or MinGW-w64",
 };
 
+/// All platforms, in the order of the archive.
 pub const PLATFORMS: [Platform; 4] = [
     Platform {
         // The names of FMI 2.0 itself are for x86; for other processors it uses the tuples of FMI 3.0.
@@ -159,6 +161,7 @@ pub fn build(model: &Model) -> Result<Vec<Built>> {
     Ok(all)
 }
 
+/// Returns an error with all faults, if there are any.
 pub fn refuse(faults: &[String]) -> Result<()> {
     if !faults.is_empty() {
         bail!("the binaries would not work everywhere, so nothing was packed:{}", faults.concat());

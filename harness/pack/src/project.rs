@@ -20,6 +20,7 @@ pub fn root() -> PathBuf {
     crate_root.ancestors().nth(2).unwrap_or(crate_root).to_path_buf()
 }
 
+/// Returns true if the project's source is present.
 pub fn has_source() -> bool {
     root().join("Cargo.toml").is_file()
 }
@@ -49,6 +50,7 @@ pub fn build(package: &str, quiet: bool) -> Result<PathBuf> {
     cargo_build(command, quiet)
 }
 
+/// Returns a command that runs Cargo: the one that runs this program, if there is one.
 pub(crate) fn cargo() -> Command {
     Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
 }

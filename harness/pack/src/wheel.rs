@@ -184,6 +184,8 @@ fn write_one(
     Ok(out)
 }
 
+/// Returns the tags of a platform on which all these binaries run ("Platform compatibility tags"). For glibc
+/// 2.17 the older name is added.
 fn tags(binaries: &[Binary]) -> Result<Vec<String>> {
     let Some(Binary { kind, architectures, .. }) = binaries.first() else {
         bail!("a wheel without binaries has no platform")

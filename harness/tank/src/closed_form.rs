@@ -10,6 +10,7 @@ use crate::curve::Segment;
 use crate::gauss::Gauss;
 use crate::modal::{Axes, Axis, ModalData, Mode, Surface, rest};
 
+/// Number of terms in the sums over all modes; [`tail`] estimates the rest of the sum.
 const TERMS: usize = 400;
 /// Error of the closed forms from the tails of the sums and from rounding.
 const ERROR: f64 = 1e-11;
@@ -63,6 +64,7 @@ fn upright_mode(n: usize, k: f64, h: f64, m: f64, m_liq: f64, surface: Surface, 
     )
 }
 
+/// Returns the shape of a mode of wave number k, sampled over the surface.
 fn sampled([inner, outer]: [f64; 2], k: f64, elevation: impl Fn(f64) -> f64) -> Surface {
     let count = 200;
     let radius = |i: usize| inner + (outer - inner) * i as f64 / count as f64;
@@ -123,6 +125,7 @@ pub fn cylinder(radius: f64, h: f64, rho: f64, modes: usize) -> ModalData {
     upright([0.0, r], h, rho, m_liq, inertias, (0..modes).map(of_mode).collect(), wall)
 }
 
+/// Returns the first `count` zeros k, 1/m, of C'(R_i) with C(r) = J1(k r) Y1'(k R) - Y1(k r) J1'(k R).
 pub fn annular_wave_numbers(inner: f64, outer: f64, count: usize) -> Vec<f64> {
     let slope = |k: f64| {
         j1_slope(k * inner) * y1_slope(k * outer) - y1_slope(k * inner) * j1_slope(k * outer)

@@ -42,6 +42,7 @@ impl From<String> for Problems {
 
 /// Largest size, m. Larger tanks are probably drawn in millimetres.
 pub(crate) const LARGEST: f64 = 100.0;
+/// Largest distance of the ends of two segments that are joined, over the tank's size.
 const JOINED: f64 = 1e-6;
 const LEVEL: f64 = 1e-9;
 
@@ -166,6 +167,7 @@ impl Contour {
         self.bottom
     }
 
+    /// Returns the lowest point as its height, m, and its smallest radius, m.
     pub(crate) fn lowest(&self) -> (f64, f64) {
         let outline = Outline::new(&self.segments);
         let points = || outline.points.iter().flatten();
@@ -174,6 +176,7 @@ impl Contour {
         (self.bottom, flat.map(|p| p[0]).fold(f64::MAX, f64::min))
     }
 
+    /// Returns the largest radius, m.
     pub(crate) fn largest_radius(&self) -> f64 {
         let outline = Outline::new(&self.segments);
         outline.points.iter().flatten().map(|p| p[0]).fold(0.0, f64::max)

@@ -13,6 +13,7 @@ use crate::table::{short, significant};
 /// Largest error between two points, over 1 + |s| or 1 + |kappa|, without a warning.
 const LARGEST: f64 = 0.05;
 
+/// A fill, m above the lowest point, with its mass of liquid, kg, and the parameters of the tank there.
 pub(crate) struct AtFill<'a> {
     pub fill: f64,
     pub liquid: f64,
@@ -39,6 +40,7 @@ impl<'a> AtFill<'a> {
     }
 }
 
+/// Beginning of the notes about finite amplitude in the parameters of one fill.
 pub(crate) const PREFIX: &str = "finite amplitude: ";
 
 /// Columns of a mode, s and kappa at the points of a table, with notes about their source, errors and gaps.

@@ -35,6 +35,7 @@ pub struct Capillary {
     pub unknown: bool,
 }
 
+/// Largest share of capillarity in omega^2 of a mode whose shape it changes.
 const LARGEST_SHARE: f64 = 0.1;
 
 /// Returns the specific force, m/s², below which [`flat`] is not known for a mode whose shape changes;

@@ -231,6 +231,7 @@ pub struct ModalData {
     pub damping: Option<Damping>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub finite_amplitude: Option<FiniteAmplitude>,
+    /// The liquid in steady rotation with the tank, if a rate is given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub spin: Option<Spin>,
     #[serde(skip)]
@@ -239,10 +240,13 @@ pub struct ModalData {
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Spin {
+    /// Rate Omega about the axis, rad/s.
     pub omega: f64,
+    /// Specific force along the axis, m/s².
     pub gravity: f64,
     /// Height of the centre of mass, m from the contour's own zero.
     pub z_cg: f64,
+    /// Inertia about the axis, kg·m².
     #[serde(rename = "I_axis")]
     pub i_axis: f64,
     /// Inertia across the axis about the centre of mass, kg·m².

@@ -119,6 +119,7 @@ impl Boundary {
         }
     }
 
+    /// Returns y - x, to full relative accuracy also if both are near a corner.
     pub(crate) fn difference(&self, x: &BoundaryPoint, y: &BoundaryPoint) -> Point {
         if x.segment == y.segment {
             let segment = &self.segments[x.segment];

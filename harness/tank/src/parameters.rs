@@ -100,6 +100,7 @@ impl Liquid {
     }
 }
 
+/// Returns the radius of a tank's free surface, or half the shorter length of a box, m.
 fn half_width(data: &ModalData) -> f64 {
     let lengths = [data.length_x, data.length_y].into_iter().flatten();
     data.r_surface.unwrap_or_else(|| 0.5 * lengths.fold(f64::INFINITY, f64::min))
@@ -173,6 +174,7 @@ fn with_capillarity(
     all
 }
 
+/// Returns the centring stiffnesses of the modes, N/m, of which the FMUs accept none below 0.
 fn springs(
     tank: &Tank,
     data: &ModalData,
@@ -686,6 +688,7 @@ impl ParameterSet {
         text
     }
 
+    /// Returns the parameters as SSV, the parameter set of SSP 1.0.
     pub fn to_ssv(&self) -> String {
         let mut text = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<!--\n");
         for note in self.comments() {

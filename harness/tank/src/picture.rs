@@ -16,6 +16,7 @@ const LIQUID: &str = "#dcecf7";
 const INK: &str = "#222";
 pub const FAINT: &str = "#999";
 
+/// A rectangle of the page, px, with the values at its edges.
 #[derive(Clone, Copy)]
 pub struct Frame {
     pub left: f64,
@@ -152,6 +153,7 @@ fn section(tank: &Tank, data: &ModalData) -> Section {
     }
 }
 
+/// Returns a frame with equal scales for both halves of the tank and `margin` m above and below.
 fn tank_frame(
     section: &Section,
     left: f64,

@@ -60,6 +60,7 @@ const PART: usize = 16;
 const FAR: f64 = 2.3;
 /// The same limit for a whole panel, which then uses its own points.
 const FAR_WHOLE: f64 = 3.0;
+/// Number of iterations for the eigenvectors. The slowest error component falls by about a third in each.
 const ITERATIONS: usize = 30;
 /// Number of points of the rule on each side of a point of its own panel, and the power with which the rule
 /// absorbs the logarithm.
@@ -130,6 +131,7 @@ impl Discretisation {
         self.points.iter().map(|x| x.p[0]).collect()
     }
 
+    /// Returns the normal velocity of the boundary that rotates about (0, `z0`), at all points.
     pub(crate) fn pitch(&self, z0: f64) -> Vec<f64> {
         self.points.iter().map(|x| (x.p[1] - z0) * x.n[0] - x.p[0] * x.n[1]).collect()
     }
@@ -427,6 +429,7 @@ impl Discretisation {
         total
     }
 
+    /// Returns radius and value of the largest |u| on the free surface, with the sign of u.
     pub(crate) fn surface_peak(&self, u: &[f64]) -> [f64; 2] {
         let step = 1.0 / 16.0;
         let mut best = [0.0; 2];

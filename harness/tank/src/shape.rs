@@ -9,6 +9,7 @@ use crate::contour::Wall;
 use crate::curve::{Point, Segment, norm, sub};
 use crate::tank::Shape;
 
+/// Largest distance of the wetted wall from a shape, over its size.
 const SAME: f64 = 1e-6;
 
 const PLACES: usize = 64;
@@ -106,6 +107,7 @@ pub(crate) fn nearby_shapes(wall: &Wall, fill: f64) -> Vec<Part> {
     KINDS.into_iter().filter_map(of_kind).collect()
 }
 
+/// Distance of the wall from a shape, over its size, from which the wall does not count as this shape.
 const FAR: f64 = 0.01;
 
 /// Distance of the wall from a shape, over depth or largest radius, from which the wall is not near this
@@ -147,6 +149,7 @@ impl Cut {
     }
 }
 
+/// Kinds of measured shapes, in the order in which [`recognise`] tries them.
 const KINDS: [Kind; 4] = [Kind::Cylinder, Kind::Cone, Kind::Sphere, Kind::Torus];
 
 #[derive(Clone, Copy)]

@@ -135,6 +135,7 @@ pub fn spin(
     })
 }
 
+/// The surface g z - Omega^2 r^2/2 = c.
 struct Surface {
     omega: f64,
     gravity: f64,
@@ -142,6 +143,7 @@ struct Surface {
 }
 
 impl Surface {
+    /// Returns the surface that leaves `volume`, m3, in the tank.
     fn holding(contour: &Contour, volume: f64, omega: f64, gravity: f64) -> Surface {
         let (bottom, top) = (contour.bottom(), contour.bottom() + contour.depth());
         let radius = contour.largest_radius();
@@ -163,6 +165,7 @@ impl Surface {
         Surface { omega, gravity, c: 0.5 * (low + high) }
     }
 
+    /// Returns the square of the radius to which the liquid reaches inwards at the height z, m2.
     fn inner(&self, z: f64) -> f64 {
         (2.0 * (self.gravity * z - self.c) / (self.omega * self.omega)).max(0.0)
     }

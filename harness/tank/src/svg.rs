@@ -150,6 +150,7 @@ fn raised([a, b, c]: [Point; 3]) -> Segment {
     bezier([a, third(a, b), third(c, b), c])
 }
 
+/// Creates the arc between two points of an ellipse, `up` counter-clockwise (SVG 2, appendix B.2.4).
 fn arc(p: Point, q: Point, rx: f64, ry: f64, large: bool, up: bool) -> Segment {
     let (rx, ry) = (rx.abs(), ry.abs());
     // on the unit circle

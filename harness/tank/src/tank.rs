@@ -429,6 +429,7 @@ impl Tank {
         }
     }
 
+    /// Returns the result without liquid: all masses 0, no modes.
     pub(crate) fn empty(&self) -> ModalData {
         let bottom = match &self.geometry {
             Geometry::Revolution { contour, .. } => contour.bottom(),

@@ -95,6 +95,7 @@ impl Overlaps {
         Overlaps::from_waves(&first, &mean, &double)
     }
 
+    /// Returns the overlaps of psi = u(r) cos(nu theta) with the modes of the orders 0 and 2 nu.
     fn from_waves(first: &Radial, mean: &Radial, double: &Radial) -> Overlaps {
         let psi = first.mode(0);
         let mut excited = Vec::new();
@@ -300,6 +301,7 @@ fn inverse(m: Matrix2<f64>) -> Matrix2<f64> {
     Matrix2::new(d, -b, -c, a) / (a * d - b * c)
 }
 
+/// Returns the stationary value of x.M x/2 + v.x.
 fn stationary(m: Matrix2<f64>, v: Vector2<f64>) -> f64 {
     -0.5 * v.dot(&(inverse(m) * v))
 }

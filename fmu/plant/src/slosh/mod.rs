@@ -211,7 +211,9 @@ pub trait SloshMode {
     fn coordinates_at(&self, n: usize, t: f64, omega: f64, varies: bool) -> [f64; 4];
     /// Returns mass times height above rest, kg m, and its rate.
     fn height<T: Number>(&self, hub: &HubMotion) -> [T; 2];
+    /// Returns the force of the slosh mass on the tank, N, radial and tangential.
     fn force<T: Number>(&self, hub: &HubMotion) -> [T; 2];
+    /// Returns the torque of the slosh mass on the hub, N m.
     fn torque<T: Number>(&self, hub: &HubMotion) -> T;
     fn energy<T: Number>(&self, hub: &HubMotion) -> T;
     /// Returns the angular momentum about the bearing axis, kg m2/s.

@@ -46,6 +46,7 @@ pub(super) unsafe fn get<M: Model, T>(
     }
 }
 
+/// Reads all elements of array variables, which must be `count`.
 #[cold]
 fn array_values<M: Model>(
     component: &mut Component<M, Fmi3>,

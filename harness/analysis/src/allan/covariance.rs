@@ -21,6 +21,7 @@ const PER_TIME: usize = 8;
 /// Range of the lags in multiples of the sum of both averaging times. Beyond 1 only flicker noise
 /// contributes, and its terms fall as s⁻².
 const RANGE: usize = 2;
+/// Largest ratio of two averaging times whose estimates count as correlated.
 const RATIO: usize = 32;
 
 /// Tables of the covariance C_mn for coefficients of 1, for all pairs of averaging times: the number of pairs
@@ -38,6 +39,7 @@ struct Pair {
     of_terms: Vec<Vec<f64>>,
 }
 
+/// Returns the generalized autocovariance of the angle at `lag` (s) for a coefficient of 1.
 fn angle(term: Term, lag: f64, time: f64) -> f64 {
     let s = lag.abs();
     match term {

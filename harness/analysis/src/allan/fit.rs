@@ -19,6 +19,7 @@ const NORMAL: f64 = 1.96;
 /// in 1,000 records.
 const MISFIT: f64 = 3.1;
 const ITERATIONS: usize = 12;
+/// Largest number of short averaging times that may be left out of the fit, and the longest of them, s.
 const LEFT_OUT: (usize, f64) = (8, 2.0);
 /// Number of octaves that are left out in addition to those that the test of the fit requires. The effect of
 /// a filter on the variance halves with each octave, so that an octave which passes the test can still shift
@@ -64,7 +65,9 @@ pub struct Outlier {
 pub struct Fit {
     pub noise: Noise,
     pub terms: Vec<(Term, Estimate)>,
+    /// Estimate of the Gauss–Markov bias's correlation time, s, if it is fitted.
     pub bias_time: Option<Estimate>,
+    /// Shortest averaging time of the fit, s.
     pub from: f64,
     pub chi_squared: (f64, usize),
     /// True if at most one of 1,000 records with this noise would have a larger misfit.
@@ -72,6 +75,7 @@ pub struct Fit {
     pub worst: Outlier,
 }
 
+/// Coefficients of the terms, and the correlation time of the Gauss–Markov bias, s.
 #[derive(Clone, Debug)]
 struct State {
     coefficients: Vec<f64>,
@@ -182,10 +186,12 @@ impl Problem<'_> {
         self.jacobian(state).columns(0, self.terms.len()) * coefficients
     }
 
+    /// Returns the covariance of the measured Allan variances if the noise is `state`.
     fn covariance(&self, tables: &Covariance, state: &State) -> DMatrix<f64> {
         tables.matrix(&state.coefficients) / self.octaves.records as f64
     }
 
+    /// Returns the best fit with weights from relative errors, with which the iterations start.
     fn start(&self) -> Option<State> {
         let measured = self.measured();
         let taus = self.taus();
@@ -564,6 +570,7 @@ mod tests {
             .collect()
     }
 
+    /// Noise in which flicker dominates from 20 to 200 s.
     const ALL: Noise = Noise {
         arw: 1e-4,
         flicker: 3.4e-5,

@@ -6,7 +6,9 @@ use host::causality::{Causality, Variability};
 use super::{FmuUnderTest, Reading, Session};
 use crate::description::Variable;
 
+/// Relative change of a value below which it is rounding.
 const ROUNDING: f64 = 1e-9;
+/// Relative change of a derivative below which it may come from an iterative solver.
 const ITERATED: f64 = 1e-2;
 
 pub struct Observed {

@@ -354,6 +354,7 @@ pub fn log_errors(subject: &Subject, findings: &mut Findings) -> Result<()> {
 
 // ---------------------------------------------------------------- Model Exchange
 
+/// Returns an instance for Model Exchange that is initialised, or skips the rule if the FMU has no Model Exchange.
 fn exchanging(subject: &Subject) -> Result<Session<'_>> {
     if subject.binary(Interface::ModelExchange).is_err() {
         return skip("the FMU offers no Model Exchange");

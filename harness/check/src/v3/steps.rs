@@ -12,6 +12,7 @@ use host::causality::{Causality, Variability};
 use host::description::{CType, Value};
 use host::fmi3::{Interface, Step, UNWRITTEN, Update};
 
+/// Lists what is wrong in the results of one fmi3DoStep from time `from` by `h` seconds.
 fn faults(using: Use, step: &Step, from: f64, h: f64) -> Vec<String> {
     let mut faults = Vec::new();
     for (name, byte) in [
@@ -64,12 +65,14 @@ fn stepping_uses(subject: &Subject) -> Vec<Use> {
     uses.filter(|u| u.interface == Interface::CoSimulation).collect()
 }
 
+/// Returns the uses in which the host handles events; skips the rule if there are none.
 fn uses_with_events(subject: &Subject) -> Result<Vec<Use>> {
     let mut uses = subject.uses();
     uses.retain(|u| u.event_mode || u.interface == Interface::ModelExchange);
     if uses.is_empty() { skip("the FMU has no event mode") } else { Ok(uses) }
 }
 
+/// Number of steps in a run that should contain events.
 const LONG: usize = 200;
 
 pub fn runs(subject: &Subject, findings: &mut Findings) -> Result<()> {
@@ -492,6 +495,8 @@ pub fn intermediate_inputs(subject: &Subject, findings: &mut Findings) -> Result
 
 // ---------------------------------------------------------------- derivatives
 
+/// Returns the Float64 unknowns for which directional derivatives are checked, each with its declared Float64
+/// dependencies.
 fn pairs(subject: &Subject) -> Vec<(Variable, Vec<Variable>)> {
     let d = &subject.description;
     let states = d.states();

@@ -16,7 +16,9 @@ use host::xml::{Element, double};
 
 pub use crate::loaded::STEPS;
 
+/// Number of calls of fmi3UpdateDiscreteStates after which an event iteration counts as endless.
 const ITERATIONS: usize = 100;
+/// Number of events in one communication step after which the simulation is abandoned.
 const EVENTS: usize = 1000;
 
 /// Callback for intermediate updates within a step. It returns the time of an early return, or `None`.
@@ -40,6 +42,7 @@ pub struct Use {
     pub interface: Interface,
     pub event_mode: bool,
     pub early_return: bool,
+    /// True if the callback intermediateUpdate is passed.
     pub updates: bool,
 }
 
@@ -240,10 +243,12 @@ pub struct Session<'s> {
     pub h: f64,
     /// Number of steps of [`Life::advance`] so far, from which the changing inputs follow.
     pub count: usize,
+    /// Time of the next event that the FMU has announced, s.
     pub next_event: Option<f64>,
     pub events: usize,
     /// The first event indicator that was 0 after event mode: time and index.
     pub zero_indicator: Option<(f64, usize)>,
+    /// True if the FMU has requested the end of the simulation.
     pub ended: bool,
 }
 
@@ -536,6 +541,7 @@ pub fn stimulus(v: &Variable, k: usize) -> Vec<f64> {
     (0..v.length()).map(one).collect()
 }
 
+/// Returns the start value of each element, or `None` if the description has none.
 pub fn start_values(v: &Variable) -> Option<Vec<Value>> {
     let value = |text: &String| {
         Some(match v.kind {

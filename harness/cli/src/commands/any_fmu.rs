@@ -139,6 +139,7 @@ fn parsed<T>(read: impl Iterator<Item = Result<T>>, problems: &mut Vec<String>) 
 }
 
 impl Request<'_> {
+    /// Returns the settings as `NAME=VALUE`, as they were written after `--set`.
     fn texts(&self) -> Vec<String> {
         self.settings.iter().map(|(name, value)| format!("{name}={value}")).collect()
     }

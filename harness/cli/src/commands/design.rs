@@ -98,6 +98,7 @@ pub struct DesignArgs {
     any: AnyFmuArgs,
 }
 
+/// Time between two rows of the plan, s.
 const STEP: f64 = 0.02;
 /// Slosh angle at which the wave at the wall, 2 α R/(ξ² − 1), reaches 0.15 R, where linear theory ends, rad.
 const LINEAR: f64 = 0.18;
@@ -263,8 +264,10 @@ struct Bench<'f> {
     fmu: &'f Fmu,
     /// Settings of the FMU, with the damping ratio that the user set or, without one, the ratio of the correlation.
     setup: Setup,
+    /// True if delay, gyro bias and friction asymmetry are also predicted.
     sensor_errors: bool,
     noise: Noise,
+    /// Largest slosh angle that `--slosh-angle` allows, rad.
     limit: Option<f64>,
 }
 
@@ -323,14 +326,18 @@ type Bounds = Vec<(String, f64, f64)>;
 
 struct Sweep {
     profile: String,
+    /// Largest slosh angle, rad.
     angle: f64,
     bounds: Bounds,
 }
 
 struct Plan {
     factor: f64,
+    /// Largest torque, N·m.
     peak: f64,
+    /// Largest slosh angle, rad.
     angle: f64,
+    /// Least and largest speed of the reaction wheel, rad/s.
     speeds: (f64, f64),
     bounds: Bounds,
     sweep: Option<Sweep>,

@@ -97,6 +97,7 @@ impl GyroArgs {
     }
 }
 
+/// Longest lag of the autocorrelation, s.
 const LAG: f64 = 10.0;
 const LEAST_CHUNKS: f64 = 3.0;
 

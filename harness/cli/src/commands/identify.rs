@@ -209,6 +209,7 @@ pub struct FmuArgs {
     points: PointsArgs,
 }
 
+/// Methods of older versions that were removed, and what replaces each.
 const REMOVED: [(&str, &str); 6] = [
     ("output-error", "identify bench, or identify without a kind of recording"),
     ("acceleration", "identify friction"),
@@ -224,6 +225,7 @@ const REMOVED: [(&str, &str); 6] = [
     ),
 ];
 
+/// Options of older versions that were removed, and what replaces each.
 const GONE: [(&str, &str); 18] = [
     ("--empty", "identify friction"),
     (
@@ -489,6 +491,7 @@ impl KnownArgs {
 }
 
 impl DataArgs {
+    /// Splits `--columns` into the columns and the sampling rate, `rate=HZ`.
     fn columns(&self) -> Result<(String, Option<f64>)> {
         let (mut columns, mut rate) = (Vec::new(), None);
         for item in self.columns.split(',') {

@@ -34,6 +34,7 @@ pub struct VariablesArgs {
 /// line to the right.
 const WIDEST: usize = 80;
 
+/// Largest number of items of an enumeration that the table lists.
 const ITEMS: usize = 50;
 
 impl VariablesArgs {

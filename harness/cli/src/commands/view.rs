@@ -196,6 +196,7 @@ fn part(table: &Table, from: Option<f64>, to: Option<f64>) -> Result<Table> {
 /// Number of points on a segment of a drawn contour, and of masses at which the surface's height is computed.
 const POINTS: usize = 24;
 
+/// Number of radial steps at which the surface of a mode is given.
 const STEPS: usize = 80;
 
 fn drawing(text: &str) -> Result<(usize, Drawing)> {

@@ -122,6 +122,7 @@ pub struct Campaign {
     pub out: PathBuf,
 }
 
+/// Joins sentences about one run; `None` if there are none.
 pub(crate) fn join_sentences(sentences: &[String]) -> Option<String> {
     (!sentences.is_empty()).then(|| sentences.join("; "))
 }
@@ -139,6 +140,7 @@ pub struct Unanalysed {
     pub case: Case,
     pub history: History,
     pub tail: History,
+    /// Largest slosh angle, rad, and its name; `None` without slosh angles.
     pub largest_angle: Option<(f64, String)>,
     /// Sentences about the tanks that left the range of their model, one for each.
     pub limits: Vec<String>,

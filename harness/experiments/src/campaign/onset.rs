@@ -91,6 +91,7 @@ fn dwell(fmu: &Fmu, case: &Case, frequency: f64, torque: f64) -> Result<Dwell> {
     })
 }
 
+/// Searches the onset between two frequencies (Hz) and two torques (N·m).
 fn search(
     band: [f64; 2],
     [mut low, mut high]: [f64; 2],

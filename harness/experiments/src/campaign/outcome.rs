@@ -93,6 +93,7 @@ pub struct Totals {
 }
 
 impl Totals {
+    /// Returns maxima and totals of a recording; NaN for quantities that only a simulation has, such as the energy.
     fn from_recording(table: &Table, rates: &Rates) -> Self {
         Totals {
             peak_slosh_angle: f64::NAN,
@@ -288,7 +289,9 @@ pub struct SloshPath {
 }
 
 impl SloshPath {
+    /// Length of the stretch around the largest wave, in slosh periods.
     pub const LARGEST: f64 = 7.0;
+    /// Length of the stretch around the onset, in slosh periods.
     pub const ONSET: f64 = 38.0;
 
     fn around_extremes(table: &Table, onset: Option<f64>, frequency: f64) -> Self {
@@ -319,7 +322,9 @@ pub struct Outcome {
     pub totals: Totals,
     /// Estimates from the whole record at once, for example by `spa`; `None` if the torque is neither a sweep nor noise.
     pub record: Option<Record>,
+    /// Estimates along the sweep; `None` if the torque is not a sweep.
     pub passing: Option<Passing>,
+    /// Rotary slosh; `None` for a recording, which has no angles of the liquid.
     pub rotary: Option<Rotary>,
     /// Torque, rate, slosh angles, and the residual, which is the rate minus its bias and minus the rate of
     /// the exact linear plant under the same torque.
@@ -799,6 +804,7 @@ impl Outcome {
     }
 }
 
+/// The variable that shows whether the liquid is in its model's range.
 pub const WAVE: &str = WAVE_HEIGHT;
 
 /// Quantities that determine the range in which a model of the liquid is valid: radius of the tank, m, fill,
@@ -816,6 +822,7 @@ pub struct Range {
 }
 
 impl Range {
+    /// Reads the range of an initialised instance; `None` if the FMU is not the bench.
     pub fn read(description: &ModelDescription, instance: &mut Instance) -> Result<Option<Range>> {
         if !super::is_bench(description) {
             return Ok(None);

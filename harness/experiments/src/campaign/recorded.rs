@@ -24,17 +24,21 @@ const SIGNALS: [Signal; 4] = [
     Signal { name: "omega_y", required: false, between: Between::Line, unit: None },
 ];
 
+/// Smallest correlation of the recorded torque with the torque of the plan.
 const LEAST_CORRELATION: f64 = 0.9;
+/// Largest part of the run that may be missing in the recording at its ends.
 const MISSING: f64 = 0.5;
 /// Largest part of a sweep in gaps. In gaps torque and rate are both interpolated linearly, which hardly changes their
 /// ratio. A record that lost 3 % of its rows one by one has 6 % of its time in gaps.
 const GAPS: f64 = 0.15;
+/// Largest relative difference between the rates of the recorder's clock and of the clock that timed the torque.
 const FASTEST_CLOCK: f64 = 2e-3;
 /// Shift of the torque at the end of a record that a wrong clock causes, in cycles, above which times are
 /// corrected.
 const SHIFT: f64 = 0.02;
 /// Cycles of a block in which the phase of a record is compared with the phase of the sweep.
 const BLOCK_CYCLES: f64 = 6.0;
+/// Number of times that the clock is estimated, each time starting from the result before.
 const ROUNDS: usize = 3;
 
 /// Reads a recording on an equally spaced grid. Returns its step, s, and the table.

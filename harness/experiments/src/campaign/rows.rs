@@ -155,6 +155,7 @@ pub fn columns<Row: Serialize + Default>() -> Result<Vec<String>> {
     Ok(names)
 }
 
+/// Returns a row's values as text; a non-finite number is empty.
 pub fn record<Row: Serialize>(row: &Row) -> Result<Vec<String>> {
     let [_, mut values] = names_and_values(row)?;
     let finite = |value: &&mut String| value.parse::<f64>().is_ok_and(|number| !number.is_finite());

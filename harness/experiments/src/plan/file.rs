@@ -60,6 +60,7 @@ const KEYS: [&str; 14] = [
     "sensor",
 ];
 
+/// Reads the plan from a text; returns `None` with `problems` that prevent it.
 pub(super) fn read(text: &str, problems: &mut Problems) -> Option<Plan> {
     let (table, errors) = DeTable::parse_recoverable(text);
     let table = table.get_ref();

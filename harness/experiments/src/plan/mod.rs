@@ -29,6 +29,7 @@ use self::random::Draws;
 /// its bench.
 pub const MODELS: [&str; 2] = [SloshModel::Linear.name(), SloshModel::Spherical.name()];
 pub const FILLS: [f64; 2] = [0.05, 0.10];
+/// The thesis's amplitudes, N·m (its Table 5.2 and chapter 7).
 pub const AMPLITUDES: [f64; 11] =
     [0.0125, 0.025, 0.05, 0.075, 0.1, 0.125, 0.15, 0.175, 0.2, 0.225, 0.25];
 
@@ -146,13 +147,16 @@ pub struct Case {
     pub amplitude: Option<f64>,
     pub profile: String,
     pub torque: Arc<Torque>,
+    /// SHA-256 of the torque's file, if it comes from one.
     pub torque_sha256: Option<String>,
     pub input: Option<String>,
     pub settings: Vec<(String, String)>,
     /// Time between the rows of the result, and between the commands of the profile, s.
     pub step: f64,
     pub stop: f64,
+    /// Relative tolerance of the FMU's solver; `None` for the FMU's own.
     pub tolerance: Option<f64>,
+    /// True if the torque is held over each step.
     pub hold: bool,
     pub sensors: Vec<Sensor>,
     pub recording: Option<Recorded>,
@@ -360,6 +364,7 @@ impl Plan {
         Plan { onset: None, ..self.clone() }.cases(description)
     }
 
+    /// Replaces the cases of [`Plan::seeking`] by dwells at a frequency (Hz) with several torques (N·m).
     pub(crate) fn dwell(&mut self, dwells: Vec<(Case, f64, Vec<f64>)>) {
         let names: Vec<String> = self.grouping().into_iter().map(String::from).collect();
         let lines = self.onset.as_ref().map_or(Lines::default(), |onset| onset.lines.clone());
@@ -664,6 +669,7 @@ mod tests {
 
     use super::{AMPLITUDES, BUILT_IN, Case, FILLS, MODELS, Plan, Sweeps};
 
+    /// Reads the FMU's own description, so that the test needs no FMU.
     fn description() -> ModelDescription {
         let path = concat!(
             env!("CARGO_MANIFEST_DIR"),

@@ -163,6 +163,7 @@ impl Written {
         if self.name == "file" { self.file() } else { Ok(Torque::Profile(self.profile()?)) }
     }
 
+    /// Returns the path in `file:path=…`, `None` for other profiles.
     pub fn path(&self) -> Option<&Path> {
         let path = self.pairs.iter().find(|(key, _)| key == "path");
         path.filter(|_| self.name == "file").map(|(_, path)| Path::new(path))
@@ -244,6 +245,7 @@ impl Written {
 impl FromStr for Profile {
     type Err = anyhow::Error;
 
+    /// Parses `name` or `name:key=value,key=value`; parameters that are not given have their defaults.
     fn from_str(text: &str) -> Result<Self> {
         text.parse::<Written>()?.profile()
     }

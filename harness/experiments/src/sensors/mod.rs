@@ -218,6 +218,7 @@ impl Sensor {
         quantity.with_context(|| format!("sensor {} ({})", self.name, self.kind.name))
     }
 
+    /// Returns the name of a channel's column: the sensor's name, with `.channel` if there are several.
     pub fn column(&self, channel: &str) -> String {
         match channel {
             "" => self.name.clone(),
@@ -388,6 +389,7 @@ pub fn help() -> String {
     kinds.chain([errors]).collect()
 }
 
+/// Hashes a text to a number that is the same on every machine (FNV-1a).
 fn fnv(text: &str) -> u64 {
     let step = |hash: u64, byte: u8| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
     text.bytes().fold(0xcbf2_9ce4_8422_2325, step)

@@ -206,6 +206,7 @@ impl Quantity {
     }
 }
 
+/// Returns the elevation at the wall per slosh angle of mode `n`, which counts from 0, m.
 fn wall(n: usize, radius: f64) -> f64 {
     2.0 * radius / (XI[n] * XI[n] - 1.0)
 }
@@ -244,6 +245,7 @@ impl Modes {
     }
 }
 
+/// HubSlosh's description and start values, from which the surface is computed.
 pub struct Surface<'a> {
     pub description: &'a ModelDescription,
     pub parameters: &'a BTreeMap<String, String>,

@@ -81,6 +81,7 @@ pub struct Updated {
     /// The host must update the discrete states again.
     pub again: bool,
     pub terminate: bool,
+    /// Time of the next time event, s.
     pub next_event: Option<f64>,
 }
 
@@ -115,6 +116,7 @@ pub trait Version: Sized {
 
     fn instantiate<'fmu>(fmu: &'fmu Fmu<Self>, name: &str) -> Called<Instance<'fmu, Self>>;
 
+    /// Enters initialization mode with start and stop time (s) and relative tolerance.
     fn initialize(
         instance: &mut Instance<'_, Self>,
         tolerance: Option<f64>,
@@ -178,6 +180,7 @@ pub struct Fmu<V: Version> {
     changed: Vec<&'static str>,
     /// True if all Reals are scalars of type Float64, so that they can be exchanged in one call.
     is_plain: bool,
+    /// Value references of the scalar Float64 variables, ascending.
     plain: Vec<u32>,
     /// Value references of the Float64 inputs, and of elements of input arrays, that an FMU 3.0 accepts
     /// within a step; ascending.

@@ -4,6 +4,7 @@
 use super::*;
 use crate::c_abi::version::{GetVector, State};
 
+/// Size of the margin on either side of an array, bytes.
 const MARGIN: usize = 1024;
 const FILL: u64 = 0xa5c3_5a3c_a53c_5ac3;
 

@@ -23,9 +23,11 @@ pub struct Bound {
     pub not_determined: bool,
     /// True if the solver's errors decide the bound; `std` and `std_alone` are then NaN.
     pub decided_by_solver: bool,
+    /// Names of the unknowns that the recordings cannot distinguish from this one.
     pub inseparable_from: Vec<String>,
     /// Least standard deviation if all other unknowns were known.
     pub std_alone: f64,
+    /// Standard deviation of the prior; `None` without a prior.
     pub prior: Option<f64>,
     pub unit: String,
     /// Name of the unknown with which the correlation is largest, and this correlation.

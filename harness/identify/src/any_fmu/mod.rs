@@ -49,7 +49,9 @@ pub struct Details {
     pub at_bound: Vec<String>,
     /// Estimates whose likelihood is not a parabola, so that their interval is not the value ± 1.96 standard deviations.
     pub not_quadratic: Vec<String>,
+    /// −2 ln L up to a constant.
     pub deviance: f64,
+    /// Number of starts from which a minimum was searched.
     pub starts: usize,
     /// Distance to the minimum in standard deviations.
     pub decrement: f64,
@@ -75,6 +77,7 @@ pub struct Output {
 }
 
 impl Output {
+    /// Returns true if the residual is noise about 0.
     pub fn passed(&self) -> bool {
         self.tests.passed() && self.mean.abs() < LIMIT
     }
@@ -488,6 +491,7 @@ fn size(system: &FmuSystem, unknowns: &[Unknown], j: usize) -> String {
     }
 }
 
+/// Sentence about intervals of a fit without tolerances.
 const NOISE_ALONE: &str = "The intervals include noise alone: settings, inputs and the clock count as exact. --tolerance states how sure they are.";
 
 fn say(

@@ -6,6 +6,7 @@ use serde::Serialize;
 /// Mean of torque less inertia times acceleration over rows of similar rate.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct FrictionPoint {
+    /// Mean rate, rad/s.
     pub rate: f64,
     /// Mean friction torque, N·m; positive if it brakes a positive rate.
     pub torque: f64,
@@ -28,6 +29,7 @@ pub struct Braking {
     pub rows: usize,
     /// Number of stretches of these rows: parts of one decay within one revolution of the hub.
     pub stretches: usize,
+    /// Angle (rad) and acceleration at `speed` (rad/s²) of each row.
     #[serde(skip)]
     pub points: Vec<(f64, f64)>,
     /// Covariance of the coefficients from the scatter between stretches; `None` if there are fewer than [`LEAST_STRETCHES`](crate::methods::friction::LEAST_STRETCHES).

@@ -13,6 +13,7 @@ pub struct Cause {
     pub flags: String,
     /// Size of the effect, if it has one number: name, value and unit.
     pub size: Option<(String, f64, String)>,
+    /// Decrease of −2 ln L by the effect.
     pub gain: f64,
 }
 

@@ -29,10 +29,12 @@ use names::hubslosh::{FrictionModel, SloshModel, slosh};
 /// and power between lines (in records of several periods) is noise.
 #[derive(Clone, Debug)]
 pub struct Multisine {
+    /// Length of a period, s; lines are 1/period apart.
     pub period: f64,
     pub lines: Vec<u32>,
     /// Odd lines of the band without power.
     pub detection: Vec<u32>,
+    /// Amplitudes a_k, N·m.
     amplitudes: Vec<f64>,
     phases: Vec<f64>,
 }
@@ -84,10 +86,12 @@ impl Multisine {
         Multisine { amplitudes, ..self.clone() }
     }
 
+    /// Frequencies of the lines with power, Hz.
     pub fn frequencies(&self) -> Vec<f64> {
         self.lines.iter().map(|&k| f64::from(k) / self.period).collect()
     }
 
+    /// Torque at `t` (s), N·m.
     pub fn at(&self, t: f64) -> f64 {
         let turn = (t / self.period).fract();
         let tones = self.lines.iter().zip(&self.amplitudes).zip(&self.phases);
@@ -112,6 +116,7 @@ pub fn check_rows(period: f64, band: (f64, f64), peak: f64, rows: usize) -> Resu
     Ok(())
 }
 
+/// Numbers of the odd lines between two frequencies (Hz) at a period (s).
 fn odd_lines(period: f64, band: (f64, f64), peak: f64) -> Result<Vec<u32>> {
     ensure!(0.0 < band.0 && band.0 < band.1, "a multisine's band must be 0 < f0 < f1");
     ensure!(
@@ -183,7 +188,9 @@ pub fn d_optimal(plant: &Linear, frequencies: &[f64]) -> Vec<f64> {
 
 #[derive(Clone, Copy, Debug)]
 pub struct Wheel {
+    /// Largest torque, N·m.
     pub torque: f64,
+    /// Moment of inertia, kg·m².
     pub inertia: f64,
     /// Speed at the start, and the least and the largest that are allowed, rad/s.
     pub speeds: [f64; 3],

@@ -14,6 +14,7 @@ use analysis::innovations::Tests;
 pub struct ModelFit {
     pub model: String,
     pub friction: String,
+    /// −2 ln L.
     pub deviance: f64,
     pub bic: f64,
     /// Fit of the simulated rates ŷ to the measured rates y, %: 100 (1 − ‖y − ŷ‖/‖y − mean y‖).
@@ -22,7 +23,9 @@ pub struct ModelFit {
     /// Distance to the minimum in standard deviations.
     pub newton_decrement: f64,
     pub tests: Vec<Tests>,
+    /// Fit of the recordings held back, %.
     pub validation_pct: Vec<f64>,
+    /// Standard deviation of the gyro's white noise, rad/s.
     pub noise_white: f64,
     /// Number of simulations of all recordings. A simulation of a part of the rows counts as this part.
     pub simulations: f64,
@@ -63,9 +66,12 @@ pub struct Details {
     /// Braking over the angle in free decay, counter-clockwise and clockwise, of friction runs.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub braking: Vec<Braking>,
+    /// Measured friction over the rate, of friction runs.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub friction_points: Vec<FrictionPoint>,
+    /// Largest slosh angle of the fit, rad; 0 without slosh.
     pub slosh_angle: f64,
+    /// Wall time, s.
     pub seconds: f64,
 }
 

@@ -11,8 +11,10 @@ use crate::tuning::COARSEST;
 
 #[derive(Clone, Copy, Debug)]
 pub struct Bench {
+    /// tank.r, m.
     pub arm: f64,
     pub density: f64,
+    /// g_axial, m/s².
     pub gravity: f64,
 }
 
@@ -32,6 +34,7 @@ pub const PARAMETERS: [&str; 8] = [
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 #[allow(missing_docs)]
 pub struct Start {
+    /// Length of the first mode's pendulum, m.
     pub length: f64,
     /// Inertia of the first mode's mass about the hub over the inertia that turns with the hub.
     pub mass_ratio: f64,
@@ -88,7 +91,9 @@ impl Start {
 pub struct Nominal {
     pub bench: Bench,
     pub start: Start,
+    /// Inertia of hub and liquid, kg·m².
     pub inertia: f64,
+    /// Period of the first slosh mode, s.
     pub period: f64,
 }
 
@@ -132,6 +137,7 @@ pub fn with_damping(mut settings: Vec<(String, String)>) -> Vec<(String, String)
 }
 
 impl Bench {
+    /// Returns the mass of the liquid in an upright cylinder, kg.
     pub fn liquid(self, d: f64, h: f64) -> f64 {
         self.density * std::f64::consts::PI / 4.0 * d * d * h
     }

@@ -22,11 +22,13 @@ pub struct Options {
     pub sensor_errors: bool,
     /// Effects that are estimated although the FMU does not have them, such as [`Target::ActuatorLag`].
     pub effects: Vec<Target>,
+    /// True to estimate the damping by waves that break, if the fit reaches them.
     pub breaking: bool,
     /// Standard deviation of the gyro's scale about 1, from its data sheet; 0 if the scale is exactly 1.
     pub gyro_scale: f64,
     /// Tolerances of values that are not estimated.
     pub tolerances: Tolerances,
+    /// Intersample behaviour of the torque; `None` chooses the best fit.
     pub intersample: Option<Hold>,
     /// True if the rate's time stamps may be early: a negative delay then raises no doubt.
     pub acausal: bool,

@@ -22,9 +22,11 @@ use crate::input::tolerance;
 use crate::model::overridden::{near, refuse};
 use crate::model::unknown::range;
 
+/// Indices of the gyro's rate and of the encoder's angle among the outputs.
 const RATE: usize = 0;
 const ANGLE: usize = 1;
 
+/// Drift of a MEMS gyro (the thesis's LSM6DS3).
 const GYRO_DRIFT: Drift = Drift { size: 0.2, time: 100.0, width: 0.7 };
 /// Drift of an encoder's angle: it integrates the rate that the model does not explain, whose size is unknown, so that its width
 /// is large.
@@ -33,7 +35,9 @@ const ENCODER_DRIFT: Drift = Drift { size: 1.0, time: 100.0, width: 6.0 };
 pub const DELAY: (f64, f64, f64) = (0.05, -0.2, 0.5);
 /// Standard deviation of the prior of the dry friction's asymmetry, which is small against 1.
 const ASYMMETRY: f64 = 0.5;
+/// Standard deviation of the prior of each friction coefficient b, c and d, relative to its start.
 const FRICTION_WIDTH: f64 = 10.0;
+/// Lower bound of a friction coefficient, relative to its start.
 pub const LEAST_FRICTION: f64 = 1e-4;
 /// Standard deviation of the prior of ln ω_s (Stribeck speed), and the largest factor between ω_s and its start.
 const SPEED: (f64, f64) = (1.5, 30.0);
@@ -72,6 +76,7 @@ impl List<'_> {
         Unknown::positive(name, &unit, Role::Run(None), start, bounds)
     }
 
+    /// Returns a parameter of the FMU that may be 0 as an unknown that is searched in its value.
     fn nonnegative(&self, name: &str, start: f64) -> Unknown {
         let (unit, bounds) = self.variable(name, (0.0, f64::INFINITY));
         Unknown::linear(name, &unit, Role::Run(None), (start, start), bounds)
@@ -359,6 +364,7 @@ pub fn effect(target: &Target, part: Part) -> Unknown {
     Unknown { part, ..Unknown::linear(name, unit, Role::Run(None), (start, reach), bounds) }
 }
 
+/// Adds the effects that are tried if the models do not fit.
 fn candidates(list: &mut List, options: &Options, frozen: bool, law: &str) {
     let is_set = |name: &str| options.settings.iter().any(|(n, _)| n == name);
     let mut all: Vec<(Target, Unknown)> = Vec::new();

@@ -18,6 +18,7 @@ use crate::tuning::SAME_INSTANT;
 /// The FMU's input for a torque on the hub besides the actuator's.
 pub const TORQUE_BESIDES: &str = TAU_EXT;
 
+/// The FMU's parameters that friction is proportional to.
 const FRICTION: [&str; 3] = [friction::B, friction::C, friction::D];
 
 #[derive(Clone, Debug, Default)]
@@ -25,6 +26,7 @@ pub struct Motion {
     pub angle: Vec<f64>,
     pub rate: Vec<f64>,
     pub acceleration: Vec<f64>,
+    /// Angle of the first slosh mode, rad.
     pub slosh_angle: Vec<f64>,
 }
 

@@ -24,8 +24,11 @@ pub struct Response {
     pub slosh_damping: f64,
     /// Resonance, Hz: of the pair of poles.
     pub resonance_frequency: f64,
+    /// Slosh mass, kg.
     pub slosh_mass: f64,
+    /// I0, inertia of hub and fixed mass, kg·m².
     pub inertia: f64,
+    /// Fit of the transfer function, %.
     pub fit: f64,
 }
 
@@ -115,6 +118,7 @@ fn balances(
     found.into_iter().map(|(_, response)| response).collect()
 }
 
+/// Returns the frequencies between which the torque of a recording has its power, Hz.
 fn excited(recording: &Recording) -> Option<(f64, f64)> {
     let (step, torque, rate) = recording.even().ok()?;
     excited_band(step, &torque, &rate)

@@ -30,18 +30,25 @@ use crate::input::recording::Recording;
 pub enum Target {
     Parameter(String),
     Initial(usize, String),
+    /// Length l of the first mode's pendulum, m.
     Length,
     MassRatio,
     /// Inertia J that turns with the hub without the first mode's mass, kg·m².
     Inertia,
     Zeta,
+    /// Delay of the rate, s.
     Delay,
+    /// Delay of the angle, s.
     AngleDelay,
+    /// Time constant of the actuator, s.
     ActuatorLag,
+    /// Time constant of the gyro's filter, s.
     GyroLag,
     FrictionDrift,
     GyroScale,
+    /// Reading of the gyro at rest, rad/s.
     GyroBias,
+    /// Reading of the encoder at angle 0, rad.
     AngleOffset,
     /// Asymmetry of the dry friction of a hub that turns only one way. The search has the friction c and d in this direction; the
     /// asymmetry converts them to the mean of both directions.
@@ -55,16 +62,22 @@ pub enum Target {
     Density,
     /// Difference of the largest command and the actuator's limit, relative to the largest command.
     Limit,
+    /// Compliance of the bearing before it slips, rad/(N·m).
     Compliance,
     SecondMode,
     Besides(usize),
 }
 
 pub struct Row {
+    /// Time from the recording's first row, s.
     pub time: f64,
+    /// Commanded torque, N·m.
     pub torque: f64,
+    /// Angle of the hub, rad.
     pub angle: f64,
+    /// Rate of the hub, rad/s.
     pub rate: f64,
+    /// Slosh angle, rad.
     pub slosh_angle: f64,
 }
 
@@ -72,9 +85,11 @@ pub struct Row {
 pub struct Besides {
     pub follows: &'static str,
     pub unit: &'static str,
+    /// The torque at a row for a factor of 1.
     pub torque: fn(&Row) -> f64,
 }
 
+/// Torques that may act on a bench and that the models lack.
 pub const BESIDES: [Besides; 7] = [
     Besides { follows: "the rate", unit: "N.m.s/rad", torque: |row| row.rate },
     Besides {
@@ -106,6 +121,7 @@ pub struct BenchSystem<'a> {
     pub derived: Vec<(String, String)>,
     /// Direction of rotation of a hub that turns in one direction only, 1 or −1; 0 if it turns in both.
     pub way: f64,
+    /// Largest command, N·m.
     pub largest: f64,
     pub base: OnceLock<Vec<Motion>>,
 }
@@ -124,6 +140,7 @@ fn tank_of(length: f64, mass: f64, inertia: f64, bench: Bench) -> Option<[f64; 3
     (hub > 0.0).then_some([d, h, hub])
 }
 
+/// Returns the diameter d of a tank whose first mode has this length and mass, m.
 fn diameter(length: f64, mass: f64, bench: Bench) -> f64 {
     let xi = XI[0];
     (8.0 * xi * xi * (xi * xi - 1.0) * length * mass / (PI * bench.density)).powf(0.25)

@@ -26,12 +26,14 @@ pub struct Findings {
     /// True if the residual asks for effects that were not estimated.
     pub asks: bool,
     pub alike: Vec<String>,
+    /// The torque that the model lacks, if it is the cause.
     pub missing: Vec<Missing>,
     pub cause: Option<Cause>,
     pub doubts: Vec<String>,
 }
 
 impl Findings {
+    /// Returns true if the model explains the recordings.
     pub fn fits(&self) -> bool {
         self.tests.iter().all(Tests::passed) && !self.asks && self.doubts.is_empty()
     }

@@ -23,13 +23,16 @@ use super::problem::Part;
 use super::{DECIDES, ENDS, Fit, SEEN, Solution};
 use crate::news::News;
 
+/// Largest number of candidates that are fitted, those with the largest scores.
 const FITTED: usize = 3;
 
 #[derive(Clone, Copy, Debug)]
 pub struct Effect {
     pub unknown: usize,
     pub size: (f64, f64),
+    /// Decrease of −2 ln L by the effect.
     pub gain: f64,
+    /// True if the residual is noise once the effect is fitted.
     pub fits: bool,
 }
 

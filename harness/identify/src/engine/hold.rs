@@ -21,6 +21,7 @@ pub struct Rival {
     pub more: f64,
     /// Coordinates of its minimum less the coordinates of the minimum with the chosen course.
     pub shift: Vec<f64>,
+    /// Its delay, s, if there is one.
     pub delay: Option<f64>,
     /// True if the delay would let the effect precede its cause.
     pub early: bool,

@@ -11,6 +11,7 @@ pub enum Hold {
 }
 
 impl Hold {
+    /// All courses, the likeliest first.
     pub const ALL: [Hold; 3] = [Hold::FirstOrderHold, Hold::BandLimited, Hold::ZeroOrderHold];
 
     pub fn words(self) -> &'static str {
@@ -159,6 +160,7 @@ pub struct Signal {
 pub struct Drift {
     /// Size, relative to the white noise of a row.
     pub size: f64,
+    /// Correlation time, s.
     pub time: f64,
     /// Standard deviation of the logarithm of the size about its expected value.
     pub width: f64,

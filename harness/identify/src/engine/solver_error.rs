@@ -19,6 +19,7 @@ use super::fit::{Fit, Point};
 use super::minimum::{Curvature, places};
 use super::problem::{Motion, Role, System};
 
+/// Part of an output's peak by which rounding may change it.
 const ROUNDING: f64 = 1e-12;
 
 #[derive(Clone, Debug)]
@@ -115,6 +116,7 @@ impl Fit<'_> {
     }
 }
 
+/// Returns true if an output differs by more than rounding.
 fn is_changed(motion: &[Motion], base: &[Motion]) -> bool {
     let outputs = motion.iter().zip(base).flat_map(|(a, b)| a.outputs.iter().zip(&b.outputs));
     outputs.into_iter().any(|(new, old)| {

@@ -44,6 +44,7 @@ pub fn completed(time: &[f64], values: Vec<f64>) -> Clocked {
     (filled.collect(), Some(there))
 }
 
+/// Returns the median of the times between rows, s.
 pub fn usual(time: &[f64]) -> f64 {
     let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let middle = steps.len().saturating_sub(1) / 2;

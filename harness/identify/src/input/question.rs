@@ -45,6 +45,7 @@ impl FromStr for Free {
     }
 }
 
+/// `NAME=MEAN:STD`: prior of an unknown.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Prior {
     pub name: String,
@@ -134,6 +135,7 @@ impl FromStr for Bias {
 pub struct Triad {
     pub outputs: [String; 3],
     pub scale: f64,
+    /// Standard deviation of the misalignments, rad.
     pub angle: f64,
 }
 
@@ -158,6 +160,7 @@ impl FromStr for Triad {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Setting {
     pub name: String,
+    /// The recording, from 0; `None`: all.
     pub recording: Option<usize>,
     pub value: String,
 }
@@ -212,7 +215,9 @@ pub struct Question {
     /// Sensors that read what is not an output of the FMU: a wave gauge, a camera.
     pub sensors: Vec<Sensor>,
     pub biases: Vec<Bias>,
+    /// Instruments with three axes.
     pub triads: Vec<Triad>,
+    /// True if the noise of each output also drifts.
     pub drift: bool,
     pub solver: Solver,
     /// Relative tolerance that the FMU's own solver is given; `None`: its own choice.

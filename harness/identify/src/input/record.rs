@@ -16,6 +16,7 @@ pub struct Record {
     pub name: String,
     pub time: Vec<f64>,
     pub inputs: Vec<Vec<f64>>,
+    /// Each output at the rows; NaN where it was not read.
     pub outputs: Vec<Vec<f64>>,
 }
 

@@ -16,8 +16,11 @@ use crate::tuning::{LARGEST_VALUE, ON_CLOCK, SLOW_GYRO, SLOWEST_GYRO};
 #[derive(Clone, Debug)]
 pub struct Recording {
     pub name: String,
+    /// Times of the rows, s, growing.
     pub time: Vec<f64>,
+    /// Torque command, N·m.
     pub torque: Vec<f64>,
+    /// Hub rate as measured, rad/s.
     pub rate: Vec<f64>,
     /// Hub angle of an encoder, rad, if there is one. It is fitted together with the rate.
     pub angle: Option<Vec<f64>>,
@@ -42,6 +45,7 @@ pub struct Row {
     pub time: f64,
     /// Index of the row in the recording; `None` if the row is added.
     pub own: Option<usize>,
+    /// Torque that is filled in, N·m.
     pub filled: Option<f64>,
 }
 
@@ -63,10 +67,12 @@ pub(crate) fn take_out(mask: &mut Option<Vec<bool>>, row: usize, rows: usize) {
 }
 
 impl Recording {
+    /// Length, s.
     pub fn duration(&self) -> f64 {
         self.time[self.time.len() - 1] - self.time[0]
     }
 
+    /// Mean time between rows, s.
     pub fn step(&self) -> f64 {
         self.duration() / (self.time.len() - 1) as f64
     }
@@ -100,6 +106,7 @@ impl Recording {
         places(&self.commanded, self.time.len())
     }
 
+    /// Returns the mean time between values of the torque, s.
     pub fn torque_step(&self) -> f64 {
         let time = masked(&self.time, self.commanded.as_deref());
         (time[time.len() - 1] - time[0]) / (time.len() - 1) as f64
@@ -191,11 +198,13 @@ impl Recording {
         self.rows(first, last.max(first))
     }
 
+    /// Returns the first part of the recording, `fraction` of its rows.
     pub fn beginning(&self, fraction: f64) -> Recording {
         let rows = ((self.time.len() as f64 * fraction) as usize).max(2);
         self.first_rows(rows.min(self.time.len()))
     }
 
+    /// Returns the first rows. They begin at rest if the recording does.
     pub(crate) fn first_rows(&self, rows: usize) -> Recording {
         Recording { from_rest: self.from_rest, ..self.rows(0, rows) }
     }
@@ -267,6 +276,7 @@ pub fn check_times(time: &[f64]) -> Result<f64> {
     Ok(step)
 }
 
+/// Fails if a value is not a number within ±[`LARGEST_VALUE`].
 pub fn check_values(name: &str, values: impl Iterator<Item = f64>) -> Result<()> {
     for (row, value) in values.enumerate() {
         ensure!(

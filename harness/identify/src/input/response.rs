@@ -6,6 +6,7 @@ use anyhow::{Context, Result, ensure};
 
 use crate::input::recording::Recording;
 
+/// Returns the frequencies between which the torque has 98 % of its power, Hz.
 pub fn excited_band(step: f64, torque: &[f64], rate: &[f64]) -> Option<(f64, f64)> {
     let spectra = Spectra::estimate(step, torque, rate, welch::Segments::Seconds(60.0));
     let total: f64 = spectra.input.iter().skip(1).sum();

@@ -117,6 +117,7 @@ fn off((time, y): (&[f64], &[f64]), nodes: &[usize], k: usize) -> (f64, f64) {
     ((y[k] - cubic) * gain() / own.max(gain()), cubic)
 }
 
+/// Returns true if the torque changes by more than `step` from one row to the next near a row.
 fn near_step(torque: &[f64], row: usize, step: f64) -> bool {
     let near = row.saturating_sub(SPIKE_NEAR_STEP)..(row + SPIKE_NEAR_STEP).min(torque.len() - 1);
     near.into_iter().any(|k| (torque[k + 1] - torque[k]).abs() > step)

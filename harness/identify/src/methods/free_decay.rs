@@ -36,6 +36,7 @@ pub struct Details {
     /// Damping ratio ζ if it is taken as constant over the amplitude.
     pub zeta_constant: f64,
     pub residual: f64,
+    /// Root mean square of the residual if ζ is taken as constant, in the signal's unit.
     pub residual_constant: f64,
     pub noise: f64,
 }

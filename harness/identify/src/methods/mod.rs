@@ -35,6 +35,7 @@ pub trait Method {
         progress: &mut dyn FnMut(&News),
     ) -> Result<Identified<Self::Details>>;
 
+    /// Returns the lines that a terminal shows below the table of estimates.
     fn lines(found: &Identified<Self::Details>) -> Vec<String>;
 
     fn sections(_found: &Identified<Self::Details>) -> Sections {

@@ -83,6 +83,7 @@ pub struct Setup {
     held: Vec<bool>,
     outputs: Vec<Output>,
     reads: Vec<u32>,
+    /// Relative tolerance of the solver, the host's or the FMU's; `None`: the FMU's own.
     tolerance: Option<f64>,
     /// Communication steps from one row to the next, of an FMU that steps itself.
     substeps: usize,
@@ -460,6 +461,7 @@ impl Setup {
         record.inputs.iter().zip(&self.held).map(one).unzip()
     }
 
+    /// Returns true if a held input changes at a row.
     fn jumps(&self, record: &Record, row: usize) -> bool {
         let held = record.inputs.iter().zip(&self.held).filter(|(_, held)| **held);
         held.into_iter().any(|(signal, _)| signal[row] != signal[row - 1])

@@ -35,6 +35,7 @@ pub struct Residual {
     pub time: Vec<f64>,
     pub measured: Vec<f64>,
     pub residual: Vec<f64>,
+    /// Standard deviation of the signal's white noise, if known.
     pub noise: Option<f64>,
     /// Torque at the same times, N·m, if the signal is the rate that answers to it.
     pub torque: Option<Vec<f64>>,

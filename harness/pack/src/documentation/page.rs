@@ -145,6 +145,8 @@ impl Page {
         PreEscaped(page)
     }
 
+    /// Returns the target of a link, or `None` if it leads out of the documentation. The inner error is a
+    /// broken link.
     fn target(&self, root: &Path, pages: &[Page], link: &str) -> Result<Option<String>> {
         if link.contains("://") {
             return Ok(None);

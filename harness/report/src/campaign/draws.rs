@@ -138,6 +138,7 @@ pub(super) fn moments(values: &[f64]) -> (f64, f64) {
     }
 }
 
+/// Returns the correlation coefficient, −1 to 1, or 0 if x or y is constant.
 fn correlation(points: &[(f64, f64)]) -> f64 {
     let (x, y): (Vec<f64>, Vec<f64>) = points.iter().copied().unzip();
     let found = statistics::correlation(&x, &y);

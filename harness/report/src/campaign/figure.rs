@@ -69,6 +69,7 @@ impl Default for Figure {
 pub(super) struct Figures {
     specifications: Vec<Value>,
     titles: Vec<String>,
+    /// True if captions name the corresponding figures of the thesis.
     of_the_thesis: bool,
 }
 
@@ -176,6 +177,7 @@ fn even(points: &[(f64, f64)]) -> Option<(f64, f64)> {
     (points.len() > 20 && step > 0.0 && most < 1e-6 * step).then_some((first.0, step))
 }
 
+/// Returns points joined by a line, each with the half-width of its uncertainty if it has one.
 pub(super) fn dots(
     panel: usize,
     name: &str,

@@ -159,6 +159,8 @@ fn value(feature: &Feature, run: &Outcome) -> String {
     }
 }
 
+/// Formats the difference of a model's value from the recording's; a ✓ marks a difference within the joint 95
+/// % interval.
 fn difference(feature: &Feature, run: &Outcome, recording: &Outcome) -> String {
     let Some(((model, a), (there, b))) = (feature.value)(run).zip((feature.value)(recording))
     else {

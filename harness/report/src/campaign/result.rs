@@ -430,6 +430,7 @@ fn largest_angle_of_other_fmus(results: &Results) -> String {
     }
 }
 
+/// Keeps the first `most` parts of a text, and replaces all further parts by their number ("and 3 more").
 fn few(mut parts: Vec<String>, most: usize) -> Vec<String> {
     let further = parts.len().saturating_sub(most);
     if further > 0 {

@@ -129,6 +129,8 @@ fn values_from(
     (values.len() > 1).then_some(values)
 }
 
+/// Returns the table of the thesis's numbers with a column for each model and a value for each fill; empty
+/// without values.
 pub(super) fn numbers(groups: &[Group]) -> Markup {
     let groups: Vec<&Group> = groups.iter().filter(|group| group.others.is_empty()).collect();
     let models = distinct(groups.iter().map(|group| group.model));

@@ -4,6 +4,7 @@
 use base64ct::{Base64, Encoding};
 use serde_json::{Value, json};
 
+/// Largest number of values for the moving objects of one page. With 32 bits each this is 6.4 MB of text.
 const MOST_VALUES: usize = 1_200_000;
 
 const INTERVALS: usize = 4_000;

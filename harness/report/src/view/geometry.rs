@@ -33,6 +33,7 @@ impl Parameters<'_> {
         Some((self.description.value(variable, text).ok()?, text.clone()))
     }
 
+    /// Returns a number in SI units; 0 if the FMU has no such parameter.
     pub fn number(&self, name: &str) -> f64 {
         let number = self.value(name).map(|(value, _)| value.number());
         number.filter(|number| !number.is_nan()).unwrap_or(0.0)

@@ -124,6 +124,7 @@ pub fn columns(
     all
 }
 
+/// Lists the prefixes of the tanks' variables, each with the tank's number of modes; empty for the bench.
 fn prefixes(parameters: &Parameters) -> Vec<(String, usize)> {
     let all: Vec<String> = match kind(parameters.description) {
         Some(Kind::Craft) => (1..=(parameters.number("tanks") as usize).max(1))

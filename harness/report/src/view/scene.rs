@@ -153,6 +153,7 @@ fn bench(tank: &Tank, arrows: &mut Arrows) -> (Value, f64) {
     (geometry, reach)
 }
 
+/// Returns the craft about O, and the distance from O that contains it, m.
 fn craft(tanks: &[Tank], arrows: &mut Arrows, notes: &mut Vec<String>) -> (Value, f64) {
     let length = |v: &[f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
     let at = |tank: &Tank| length(&tank.position) + tank.extent();

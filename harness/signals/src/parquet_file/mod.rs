@@ -31,6 +31,7 @@ enum Kind {
 }
 
 impl Kind {
+    /// Returns the type of a column; `None` for a type that only the Python package reads.
     fn from_column(column: &ColumnDescriptor) -> Option<Kind> {
         let logical = match (column.logical_type_ref(), column.converted_type()) {
             (Some(LogicalType::Timestamp(stamp)), _) => Some(Kind::Date(match stamp.unit {
@@ -225,6 +226,7 @@ fn values(
     }
 }
 
+/// Appends `rows` values to `into`, a batch at a time. A missing value becomes NaN.
 fn batches<T: DataType>(
     mut reader: ColumnReaderImpl<T>,
     rows: usize,

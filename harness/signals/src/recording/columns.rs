@@ -9,6 +9,7 @@ use anyhow::{Context, Error, Result, bail, ensure};
 
 use super::unit::Quantity;
 
+/// A column of a file, by its name in the file, or `#3` for the third column.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Column {
     pub name: String,
@@ -70,6 +71,7 @@ fn parse_signal(item: &str) -> Result<(String, Column)> {
     Ok((signal, column))
 }
 
+/// Parses `NAME=COLUMN[:UNIT]` for a signal of any name and a unit of any quantity.
 fn parse_variable(item: &str) -> Result<(String, Column)> {
     let Some((signal, column)) = item.split_once('=') else {
         bail!("\"{item}\" is not SIGNAL=COLUMN or SIGNAL=COLUMN:UNIT")

@@ -135,6 +135,7 @@ pub fn moment(field: &str) -> Result<Option<Moment>, Unreadable> {
     })
 }
 
+/// Parses ISO 8601 without separators, such as 20260131T120000.020.
 fn basic(field: &str) -> Result<Option<Moment>, Unreadable> {
     let Some((day, clock)) = field.split_once(['T', ' ', '_']) else { return Ok(None) };
     let is_number = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());

@@ -24,8 +24,8 @@ fn stephens_s_formula_is_1_493_times_the_laminar_layer_at_every_depth() {
     }
 }
 
-/// By Mikishev and Dorozhkin's formula the damping is 1.39 to 1.54 times the damping of the laminar layer from h/R =
-/// 0.5 on, but only 0.90 times at h/R = 0.2.
+/// The damping ratio by Mikishev and Dorozhkin's formula is 1.39 to 1.54 times the damping ratio of the laminar layer from
+/// h/R = 0.5 on, but only 0.90 times at h/R = 0.2.
 #[test]
 fn mikishev_dorozhkin_leaves_its_range_in_shallow_liquid() {
     for (x, least, most) in
