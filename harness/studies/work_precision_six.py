@@ -7,8 +7,10 @@ dist/Spacecraft.fmu``) and Python 3.11 or newer; the first run makes a virtual e
 target directory and needs the network. It writes its section of book/work_precision.md and takes
 some minutes. Better leave the machine alone meanwhile: times are compared with each other.
 
-The craft is that of [a case of the slosh benchmark](../harness/benchmark/thrust/page.md), with two
-pendulums, under forces and torques that jump. Errors are against the benchmark's reference of 20 s.
+The spacecraft is taken from [a case of the slosh
+benchmark](../harness/benchmark/thrust/page.md). It has two pendulums, under
+forces and torques that jump. Errors are differences from the benchmark's
+reference solution of 20 s.
 """
 
 import math
@@ -258,8 +260,8 @@ def section(rows: list[tuple[str, str, float, list[float]]], compiled: float) ->
 
     lines = [
         "| method | tolerance (Basilisk: step) | largest relative error "
-        "| CPU time per simulated second, rows every 1 s, µs "
-        "| the same with rows every 50 ms, µs |",
+        "| CPU time per simulated second with rows every 1 s, µs "
+        "| CPU time per simulated second with rows every 50 ms, µs |",
         "| --- | --- | --- | --- | --- |",
         *(
             f"| {name} | {tolerance} | {wrong:.0e} | {number(coarse)} | {number(fine)} |"
@@ -274,16 +276,17 @@ def section(rows: list[tuple[str, str, float, list[float]]], compiled: float) ->
         f"**At an error of at most {AT:.0e} and rows every 50 ms a simulated second takes",
         f"{at_error(rows)} of CPU time.**",
         *(__doc__ or "").split("\n\n")[3].strip().splitlines(),
-        "Costs are CPU time per simulated second, without set-up, while inputs repeat, on a shared",
-        f"machine: 400 s and the least of {RUNS} runs, of CVODE 60 s and 3 runs, of DOP853 40 s",
-        f"and 2 runs. heyoka compiles its Taylor recurrences first, in {compiled:.0f} s of CPU",
-        "time. CVODE (Adams, by scikit-sundae) and DOP853 call right-hand sides that heyoka",
-        "compiles; their times contain the calls from Python.",
-        "Basilisk's time contains its set-up and has rows every 0.1 s.",
+        "Costs are CPU time per simulated second on a shared machine, without set-up,",
+        f"while the inputs of the 20 s repeat. They are the least of {RUNS} runs of",
+        "400 s; of CVODE, 3 runs of 60 s; of DOP853, 2 runs of 40 s. Before a run heyoka",
+        f"compiles its Taylor recurrences in {compiled:.0f} s of CPU time. CVODE (Adams method, called",
+        "from scikit-sundae) and DOP853 call right-hand sides that heyoka compiled; their",
+        "times contain the calls from Python. Basilisk's time contains its set-up, and",
+        "its rows are 0.1 s apart.",
         "",
         *lines,
         "",
-        "Made by `PYTHONPATH=harness/python python3 harness/studies/work_precision_six.py`.",
+        "The table is written by `PYTHONPATH=harness/python python3 harness/studies/work_precision_six.py`.",
         "",
         MARKS[1],
     ])  # fmt: skip
