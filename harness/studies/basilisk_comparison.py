@@ -91,19 +91,20 @@ def starts(length: float) -> dict[str, Start]:
     cone = np.arcsin(0.3)
     conical = (GRAVITY / (length * np.cos(cone))) ** 0.5  # of a conical pendulum, rad/s
     return {
-        "pulse": Start("at rest; 0.05 N·m for 1 s", pulse=0.05),
-        "release": Start("liquid at rest, 0.1 rad tangential", angle_y=0.1),
-        "release far": Start("liquid at rest, 0.5 rad tangential", angle_y=0.5),
+        "pulse": Start("hub and liquid at rest; a torque of 0.05 N·m acts for 1 s", pulse=0.05),
+        "release": Start("liquid released at a tangential slosh angle of 0.1 rad", angle_y=0.1),
+        "release far": Start("liquid released at a tangential slosh angle of 0.5 rad", angle_y=0.5),
         "conical": Start(
-            "bob on a circle of 0.3 l, hub at rest",
+            "hub at rest, pendulum on a circle with a radius of 0.3 of its length",
             angle_x=float(cone),
             rate_y=float(conical * 0.3),
         ),
         "spinning": Start(
-            "hub at −3 rad/s, bob thrown (0.2, 0.3 rad; 1, −5 rad/s), 0.05 N·m for 1 s",
+            "hub at −3 rad/s; radial and tangential slosh angles of 0.2 and 0.3 rad "
+            "with rates of 1 and −5 rad/s; a torque of 0.05 N·m acts for 1 s",
             angle_x=0.2, angle_y=0.3, rate_x=1.0, rate_y=-5.0, omega=-3.0, pulse=0.05,
         ),
-        "very far": Start("liquid at rest, 1.2 rad tangential", angle_y=1.2),
+        "very far": Start("liquid released at a tangential slosh angle of 1.2 rad", angle_y=1.2),
     }  # fmt: skip
 
 
@@ -269,7 +270,7 @@ def cases_table(fmu: Path, pool: ProcessPoolExecutor) -> tuple[list[str], float]
         found = differences(their, ours(fmu, given))
         largest[name] = [max(pair) for pair in zip(largest[name], found, strict=True)]
     lines = [
-        f"| start | {' | '.join(f'`{name}`' for name in SIGNALS)} |",
+        f"| way to start | {' | '.join(f'difference of `{name}`' for name in SIGNALS)} |",
         "| --- |" + " --- |" * len(SIGNALS),
     ]
     for name, found in largest.items():
@@ -288,8 +289,8 @@ def masses_table(fmu: Path, pool: ProcessPoolExecutor) -> list[str]:
         columns.append([max(differences(their, own)) for their in runs])
     recoil = [free.m / (2 * mass) * free.omega_1 * DURATION for mass in masses]
     lines = [
-        "| M, kg | expected difference, zeta 0 | difference found, zeta 0 "
-        "| difference found, zeta 0.05 |",
+        "| mass M of the hub, kg | expected difference, undamped | difference found, undamped "
+        "| difference found, damping ratio 0.05 |",
         "| --- | --- | --- | --- |",
     ]
     for row in zip(masses, recoil, *columns, strict=True):
@@ -314,7 +315,8 @@ def integrators_table(fmu: Path) -> list[str]:
             rows.append((f"Basilisk's {integrator}", str(step), differences(got, own), seconds))
     unit = rows[1][-1]
     lines = [
-        "| integrator | step, ms | largest difference | CPU time over that of HubSlosh at 1e-8 |",
+        "| integrator | step, ms | largest difference "
+        "| CPU time, in multiples of HubSlosh at tolerance 1e-8 |",
         "| --- | --- | --- | --- |",
     ]
     for name, step, found, seconds in rows:
@@ -354,61 +356,72 @@ def page(
         "",
         "Does the spherical model agree with an independent implementation?",
         "",
-        f"**Yes, to {worst:.0e} of each signal's maximum over 20 s, damped and undamped, near rest",
-        f"and far from it.** Basilisk {version('bsk')} (AVS Lab, University of Colorado) has a",
-        "spherical pendulum for slosh, `sphericalPendulum`, written independently: it uses",
-        "angles where HubSlosh uses the bob's direction, and back-substitution where HubSlosh",
-        "solves for the hub's acceleration. The runs have no friction, because Basilisk has none.",
-        "Made with",
+        f"**Yes, to {worst:.0e} of each signal's maximum over 20 s, for damped and undamped",
+        f"motion, near rest and far from rest.** Basilisk {version('bsk')} (AVS Lab, University of",
+        "Colorado) has a spherical pendulum for slosh, `sphericalPendulum`. It was written",
+        "independently of HubSlosh: the pendulum's coordinates are angles (in HubSlosh a",
+        "unit vector), and the hub's acceleration is found by back-substitution (in",
+        "HubSlosh from one linear equation). The runs have no friction, because Basilisk",
+        "has none. These commands make the comparison and write this page:",
         "",
         "    cargo run --release -- pack",
         "    PYTHONPATH=harness/python python3 harness/studies/basilisk_comparison.py",
         "",
-        f"which fails, and leaves this page alone, if a difference is larger than {ALLOWED:.0e}.",
+        "The second command fails, and does not change this page, if a difference is",
+        f"larger than {ALLOWED:.0e}.",
         "",
-        "Damped runs agree with Basilisk from version 2.11.1 on, because before it",
-        "`sphericalPendulum` added the damping force to the torques without its lever arm (issue",
-        "1484 of AVSLab's repository). Undamped runs agree before, too.",
+        "Damped runs agree with Basilisk from version 2.11.1 on. In earlier versions",
+        "`sphericalPendulum` added the damping force to the torques without its lever arm",
+        "(issue 1484 of AVSLab's repository), so that only undamped runs agree.",
         "",
         "## What is compared",
         "",
-        "`slosh.model` = spherical, one mode, `friction.model` = none, the bench's tank at two",
-        "fills. Starts:",
+        "HubSlosh has `slosh.model` = spherical with one mode, `friction.model` = none, and",
+        "the bench's tank at two fills. The runs start in six ways:",
         "",
         described,
         "",
-        "Basilisk's craft is free in six degrees of freedom. Its hub has the mass M, M · 1 m²",
-        "about x and y, and our inertia about z, `hub.I` + m_0 r². Gravity is a thrust (M + m) g",
-        "along the body's z. The pendulum hinges at (`tank.r`, 0, 0); its damping is c times the",
-        "unit matrix, c = 2 zeta omega_1 m. RKF78 at 1 ms; HubSlosh from Python in steps of 20 ms,",
-        f"tolerance {TOLERANCE:.0e}. Samples every 20 ms; numbers are the largest difference over",
-        "the signal's maximum.",
+        "Basilisk's spacecraft moves freely in six degrees of freedom, whereas HubSlosh",
+        "turns about a fixed axis. Therefore the spacecraft has a very large mass M, and",
+        "moments of inertia of M · 1 m² about x and y. About z it has the inertia of the",
+        "bench, `hub.I` + m_0 r² (m_0 is the rigid liquid, r its distance `tank.r`). A",
+        "thrust (M + m) g along the body's z axis takes the place of gravity, where m is",
+        "the pendulum's mass. The pendulum's hinge is at (`tank.r`, 0, 0), and its damping",
+        "matrix is c times the unit matrix with c = 2 zeta omega_1 m. Basilisk integrates",
+        "with RKF78 in steps of 1 ms. HubSlosh runs from Python in steps of 20 ms with a",
+        f"tolerance of {TOLERANCE:.0e}. The tables have the largest difference between samples",
+        "20 ms apart, divided by the signal's maximum.",
         "",
         f"## Largest differences, M = {MASS:.0e} kg",
         "",
-        "Over both fills and damping ratios of 0, 0.003 and 0.05:",
+        "Each number is the largest over both fills and damping ratios of 0, 0.003 and",
+        "0.05, as a share of the signal's maximum:",
         "",
         *cases,
         "",
-        "*very far* passes 45°, where Basilisk turns its pendulum's frame. Undamped motion far",
-        "from rest magnifies rounding: the next larger number in place of the start's angle moves",
-        f"HubSlosh by {far:.0e} in *release far* and {very:.0e} in *very far* (10 cm, zeta 0);",
-        f"there a tolerance of 1e-12 in place of {TOLERANCE:.0e} moves it by {looser:.0e}.",
+        "Runs that start *very far* from rest pass 45°, where Basilisk changes the frame of",
+        "its pendulum's angles. Undamped motion far from rest magnifies rounding errors. For",
+        "example, if the start angle is replaced by the next larger floating-point number",
+        f"(10 cm, zeta 0), results of HubSlosh change by {far:.0e} in *release far* and by",
+        f"{very:.0e} in *very far*. A tolerance of 1e-12 in place of {TOLERANCE:.0e} changes",
+        f"*very far* by {looser:.0e}.",
         "",
-        "## What remains is Basilisk's free hub",
+        "## The remaining difference: Basilisk's free hub",
         "",
-        "*release far*, 10 cm. A free hub recoils from the bob: the pendulum swings faster by",
-        "m/(2M), which after the time T is a phase of m/(2M) omega_1 T. The difference follows",
-        "1/M from 1e6 kg on, until only rounding is left.",
+        "Basilisk's free hub recoils from the pendulum. The frequency of the pendulum is",
+        "therefore higher by the share m/(2M), which after the time T is a phase of",
+        "m/(2M) omega_1 T. The table is for the start *release far* at 10 cm. The difference",
+        "is proportional to 1/M from 1e6 kg on, until only rounding is left.",
         "",
         *masses,
         "",
-        "## What each integrator leaves",
+        "## Error and cost of each integrator",
         "",
-        f"*release far*, 10 cm, zeta 0.003, M = {MASS:.0e} kg, against HubSlosh at",
-        f"{TOLERANCE:.0e}. CPU time of the whole run, Python's part every 20 ms included on both",
-        "sides: an order of magnitude, not a benchmark. Basilisk's hub has five degrees of freedom",
-        "more.",
+        "The table is for the start *release far* at 10 cm with a damping ratio of 0.003 and",
+        f"M = {MASS:.0e} kg. Differences are from HubSlosh at a tolerance of {TOLERANCE:.0e}.",
+        "The CPU time is for the whole run, with Python's part every 20 ms in both programs. It shows an",
+        "order of magnitude and is not a benchmark, because Basilisk's hub has five degrees",
+        "of freedom more.",
         "",
         *integrators,
         "",

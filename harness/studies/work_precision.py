@@ -298,7 +298,8 @@ def main() -> None:
         "integrators in a motion without friction are on the page of the [comparison with",
         "Basilisk](basilisk.md).",
         "",
-        "The tables are written by `PYTHONPATH=harness/python python3 harness/studies/work_precision.py`.",
+        "The tables are written by",
+        "`PYTHONPATH=harness/python python3 harness/studies/work_precision.py`.",
         "",
     ]
     (PAGES / "work_precision.md").write_text("\n".join(page))
