@@ -165,9 +165,10 @@ def rectangular_tanks() -> tuple[list[Row], str]:
         clear = among & (np.abs(off) > tolerance)
         count = int(clear.sum())
         least = next(n for n in range(count + 1) if binom.sf(n - 1, count, 0.5) < OFTEN)
-        quantity = f"{words} tanks, {count} points more than 1 % off small waves: sign of the shift"
+        points = f"{words} tanks, {count} points that differ from small waves by more than 1 %"
+        quantity = f"{points}: share with the computed sign of the difference"
         rows.append(share(name, quantity, "nonlinear", np.sign(off[clear]) == sign[clear], least))
-    quantity = "52 frequencies: within 1 % of waves of any amplitude from 0 to the end of the range"
+    quantity = "52 frequencies: share within 1 % of a wave in the model's range of amplitudes"
     rows.append(share(name, quantity, "nonlinear", inside, most(len(inside))))
     panel = Panel(
         (70, 50, 600, 330),
@@ -279,7 +280,7 @@ def box_transient() -> tuple[list[Row], str]:
     rows = [
         Row(
             name,
-            f"{len(ratio)} crests and troughs above 20 mm: median of computed over measured height",
+            f"{len(ratio)} crests and troughs above 20 mm: median of computed / measured height",
             "nonlinear",
             "1",
             1.0,
@@ -291,7 +292,7 @@ def box_transient() -> tuple[list[Row], str]:
         share(
             name,
             f"{len(ratio)} crests and troughs above 20 mm: "
-            "share within 20 % of the measured height",
+            "share computed within 20 % of the measured height",
             "nonlinear",
             np.abs(ratio - 1) <= 0.2,
             most(len(ratio)),
@@ -442,7 +443,7 @@ def cylinder_heights() -> tuple[list[Row], str]:
         rows += [
             Row(
                 name,
-                f"peak heights of 9 {words} motions: median of computed over measured height",
+                f"peak heights of 9 {words} motions: median of computed / measured height",
                 "nonlinear",
                 "1",
                 1.0,
@@ -452,7 +453,8 @@ def cylinder_heights() -> tuple[list[Row], str]:
             ),
             share(
                 name,
-                f"peak heights of 9 {words} motions: share within 20 % of the measured height",
+                f"peak heights of 9 {words} motions: "
+                "share computed within 20 % of the measured height",
                 "nonlinear",
                 np.abs(off[among]) <= 0.2,
                 most(int(among.sum())),
@@ -489,7 +491,7 @@ def fits() -> tuple[list[Row], str]:
         fit = 0.79 * math.sqrt(WATER / math.sqrt(G * 0.5**3))
         fit *= 1 + 0.318 / math.sinh(1.84 * x) * (1 + (1 - x) / math.cosh(1.84 * x))
         zeta = tank(cylinder, 0.5 * x, 1)[0]["zeta[1]"]
-        quantity = f"damping ratio of almost a cylinder, 1 m wide, water to h/R = {x:g}"
+        quantity = f"damping ratio of a tank close to a cylinder, 1 m wide, water to h/R = {x:g}"
         rows.append(Row(name, quantity, "damping", "1", fit, SCATTER * fit, zeta, band * zeta))
     sphere = "density = 998.2\nshape = { spheroid = { radius = 0.1, half_height = 0.102 } }\n"
     name = "Sumner and Stofan's power, fit to spheres"
@@ -497,14 +499,14 @@ def fits() -> tuple[list[Row], str]:
         # NASA SP-106, closed form; B = 1e4 nu/sqrt(g D^3) is 0.036, within the measured 0.01 to 1
         fit = 0.131 / (2 * math.pi) * (1e4 * WATER / math.sqrt(G * 0.2**3)) ** 0.359 / x
         zeta = tank(sphere, 0.102 * x, 1)[0]["zeta[1]"]
-        quantity = f"damping ratio of almost a sphere, 0.2 m wide, water to h/R = {x:g}"
+        quantity = f"damping ratio of a tank close to a sphere, 0.2 m wide, water to h/R = {x:g}"
         rows.append(Row(name, quantity, "damping", "1", fit, SCATTER * fit, zeta, band * zeta))
     # from liquid oxygen to water: the paper does not say which liquid
     thin, thick = (tank(cylinder, 0.5, 1, nu=nu)[0]["zeta[1]"] for nu in (1.9e-7, WATER))
     rows.append(
         Row(
             "Yang, Purandare, Peugeot and West (NASA MSFC)",
-            "damping ratio of a smooth tank, 1 m wide, at the least",
+            "smallest damping ratio of a smooth tank, 1 m wide",
             "damping",
             "1",
             0.0005,
@@ -549,7 +551,7 @@ def bench() -> tuple[list[Row], str]:
         rows.append(
             Row(
                 name,
-                f"peak hub acceleration at {amplitude} N·m (7.2), fill not stated",
+                f"largest hub acceleration at {amplitude} N·m (thesis 7.2), fill not stated",
                 "nonlinear",
                 "rad/s²",
                 measured,
@@ -565,7 +567,7 @@ def bench() -> tuple[list[Row], str]:
     low, high = min(o[0] for o in onsets), max(o[1] for o in onsets)
     # open below, closed above: at 0.1 N·m the bench had it, so ours must have it there or below
     middle, half = (low + high) / 2, (high - low) / 2 - 0.0005
-    name_of = "onset of rotary slosh in a sweep (7.1), both fills"
+    name_of = "smallest torque of a sweep with rotary slosh (thesis 7.1), both fills"
     rows.append(Row(name, name_of, "nonlinear", "N·m", 0.0875, 0.0125, middle, half))
     return rows + as_built(), ""
 
@@ -624,17 +626,17 @@ def as_built() -> list[Row]:
         ours = [built_sweep({**fill, "imu.seed": k}, 0.0125, "omega_imu")[0] for k in SEEDS]
         small += [np.mean(ours) - 2 * np.std(ours), np.mean(ours) + 2 * np.std(ours)]
     for amplitude, measured, ours, words in (
-        (0.25, 2.21, large, "both fills, breaking within its range"),
-        (0.0125, 0.222, small, "with the gyro, both fills, ten seeds"),
+        (0.25, 2.21, large, "both fills, waves break"),
+        (0.0125, 0.222, small, "read by the gyro, both fills, ten seeds of noise"),
     ):
         low, high = float(min(ours)), float(max(ours))
-        quantity = f"peak hub acceleration at {amplitude} N·m (7.2), {words}"
+        quantity = f"largest hub acceleration at {amplitude} N·m (thesis 7.2), {words}"
         error = UNSTATED["amplitude"] * measured
         middle, half = (high + low) / 2, (high - low) / 2
         rows.append(Row(name, quantity, "nonlinear", "rad/s²", measured, error, middle, half, 2))
     first = [next(a for a in AMPLITUDES if built_sweep(fill, a)[1]) for fill in fills]
     # appendix A: weak and occasional at 0.075 N·m, visible at 0.1 N·m
-    quantity = "smallest torque of a sweep with rotary slosh (appendix A), both fills"
+    quantity = "smallest torque of a sweep with rotary slosh (thesis, appendix A), both fills"
     middle, half = (max(first) + min(first)) / 2, (max(first) - min(first)) / 2
     rows.append(Row(name, quantity, "nonlinear", "N·m", 0.0875, 0.0125, middle, half, 2))
     return rows
@@ -734,7 +736,7 @@ def markdown(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
 def page(rows: list[Row], cfd: list[tuple[float, float, float]]) -> str:
     """Return the page: the template with the results in it."""
     results = markdown(
-        ("experiment", "quantity", "measured", "computed", "result"),
+        ("experiment", "quantity", "measured ± its error", "computed ± its band", "result"),
         [
             (
                 row.experiment,
@@ -760,7 +762,7 @@ def page(rows: list[Row], cfd: list[tuple[float, float, float]]) -> str:
             ],
         ),
         "computed": markdown(
-            ("h/L", "CFD", "`hubslosh tank`"),
+            ("h/L", "ω√(L/g) by CFD", "ω√(L/g) by `hubslosh tank`"),
             [(f"{h:.2f}", f"{w:.4f}", f"{ours:.4f}") for h, w, ours in cfd],
         ),
     }
