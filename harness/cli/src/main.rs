@@ -42,7 +42,8 @@ use terminal::{GLOBAL, Terminal};
 /// Simulates propellant slosh by FMUs, identifies their parameters from recordings, and packs and checks FMUs.
 ///
 /// In the project's source, `cargo run --release` without a subcommand packs dist/HubSlosh.fmu, simulates the 22 sine
-/// sweeps of Rubaga's thesis with a linear and a spherical liquid, and writes dist/campaign/report.html and features.csv.
+/// sweeps of Rubaga's thesis with the slosh models `linear` and `spherical`, and writes dist/campaign/report.html and
+/// features.csv.
 #[derive(Parser)]
 #[command(version, after_help = EXIT_CODES)]
 struct Cli {

@@ -22,21 +22,22 @@ use crate::terminal;
 #[derive(clap::Args)]
 #[command(next_help_heading = "Options for any FMU")]
 pub struct AnyFmuArgs {
-    /// Unknowns: Real parameters and start values of the FMU, each with a start and optionally bounds [default bounds:
-    /// min and max of the FMU]. NAME@each is estimated separately for each recording. scale(NAME) is the relative error
-    /// of the scale of an input or output; an error of 0 means an exact scale.
+    /// Unknowns to estimate: Real parameters and start values of the FMU, each with an initial guess and optionally
+    /// bounds [default bounds: min and max of the FMU]. NAME@each is estimated separately for each recording.
+    /// scale(NAME) is the relative error of the scale of an input or output; an error of 0 means an exact scale.
     #[arg(long, value_name = "NAME=START[:LOW:HIGH],…")]
     pub free: Vec<String>,
     /// Prior knowledge of an unknown: its mean and standard deviation.
     #[arg(long, value_name = "NAME=MEAN:STD,…")]
     prior: Vec<String>,
-    /// Standard deviations of known values, which widen the intervals. NAME is a value that --set gives, scale(NAME) the
-    /// scale of an input or output, scale(time) the rate of the clock. SIZE is relative (0.5% or 0.005), for a value also
-    /// absolute (5mm, or ±0.1 in the unit of the variable); 0 means exact.
+    /// Uncertainty (standard deviation) of values that are taken as known. It widens the 95 % intervals of the
+    /// estimates. NAME is a value given by --set, scale(NAME) the scale of an input or output, and scale(time) the rate
+    /// of the clock. SIZE is relative (0.5% or 0.005) or, for a value given by --set, absolute (5mm, or ±0.1 in the
+    /// unit of the variable); 0 means exact.
     #[arg(long = "tolerance", value_name = "NAME=SIZE,…")]
     pub tolerances: Vec<String>,
-    /// Inputs of the FMU that the recordings drive. They are interpolated linearly between the rows; with NAME:held
-    /// each value is held until the next row.
+    /// Inputs of the FMU that are set to the values in the recordings. The values are interpolated linearly between the
+    /// rows; with NAME:held each value is held until the next row.
     #[arg(long, value_name = "NAME[:held],…", requires = "free")]
     inputs: Vec<String>,
     /// Outputs of the FMU that were recorded.
@@ -51,15 +52,16 @@ pub struct AnyFmuArgs {
     /// standard deviation of the bias.
     #[arg(long, value_name = "OUTPUT[=STD],…")]
     bias: Vec<String>,
-    /// Three outputs of one instrument with three axes, whose scales and misalignments (rad) are estimated; SCALE and
-    /// ANGLE are their prior standard deviations.
+    /// Three outputs A, B and C that one instrument with three axes measures. The scale errors and misalignments (rad)
+    /// of the axes are estimated; SCALE and ANGLE are the prior standard deviations of these errors.
     #[arg(long, value_name = "A,B,C=SCALE:ANGLE", requires = "free")]
     triad: Vec<String>,
     /// Models the noise of every output as white noise plus a slowly drifting bias (Gauss–Markov process).
     #[arg(long)]
     drift: bool,
-    /// Solver that steps the FMU, with its relative tolerance: own (Co-Simulation, such as own:1e-6) or host (Model
-    /// Exchange, such as host:1e-9; without a number 1e-8).
+    /// Solver that simulates the FMU, with its relative tolerance. `own` is the FMU's own solver (Co-Simulation), for
+    /// example own:1e-6; `host` is the solver of this command (Model Exchange), for example host:1e-9 [default
+    /// tolerance of host: 1e-8].
     #[arg(
         long,
         value_name = "own|host[:TOLERANCE]",

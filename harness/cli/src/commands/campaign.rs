@@ -23,7 +23,7 @@ use crate::{progress, terminal};
 #[derive(clap::Args)]
 #[command(after_help = help())]
 pub struct CampaignArgs {
-    /// Plan: a TOML file, or the name of one of the built-in plans below.
+    /// Plan: a TOML file, or the name of a built-in plan. The built-in plans are listed at the end of this help.
     #[arg(
         long,
         value_name = "FILE",
@@ -33,7 +33,7 @@ pub struct CampaignArgs {
     /// Prints the runs as JSON and simulates none, so that another program can simulate them.
     #[arg(long)]
     list: bool,
-    /// Slosh models of the sweeps.
+    /// Slosh models with which each sweep is simulated.
     #[arg(long, value_name = "NAME,…", value_delimiter = ',', default_values = plan::MODELS)]
     model: Vec<String>,
     /// Heights of the liquid in the tank for which the sweeps are simulated, m.

@@ -28,18 +28,21 @@ use crate::terminal;
     hubslosh design --snr 20 --band 1.25,20\n  \
     hubslosh design --multisine 0.25 --duration 600 --out torque.csv\n  \
     hubslosh design --multisine 0.25 --optimal --set friction.b=0.04 --out torque.csv\n  \
-    hubslosh design slew.csv --fmu Spacecraft --free craft.Jzz=640,tank[1].mass[1]=128 --inputs torque[3] \\\n          \
+    hubslosh design slew.csv --fmu Spacecraft --free craft.Jzz=640,tank[1].mass[1]=128 --inputs torque[3] \
     --outputs omega[3] --noise omega[3]=1e-5")]
 pub struct DesignArgs {
-    /// Torque profile, as for `hubslosh run`.
+    /// Torque profile with its settings, such as lin-sweep:amplitude=0.1. `hubslosh torque --profiles` lists the
+    /// profiles.
     #[arg(long, value_name = "PROFILE", conflicts_with_all = ["multisine", "free"])]
     profile: Option<String>,
-    /// Plans an odd random-phase multisine (some odd lines stay empty, to detect nonlinearity) whose largest torque is this
-    /// peak, N·m.
+    /// Plans a multisine with random phases whose largest torque is this peak, N·m. It contains only odd multiples of
+    /// the frequency 1/period. Some odd multiples are left out, because a response at these frequencies shows
+    /// nonlinearity.
     #[arg(long, value_name = "PEAK", conflicts_with = "free")]
     multisine: Option<f64>,
-    /// Prints the torque amplitude that a sine needs to reach this signal-to-noise ratio of the gyro's samples, dB:
-    /// over the band, at resonance and antiresonance, and for a rigid hub (thesis 8.6.1).
+    /// Desired signal-to-noise ratio of the gyro's samples, dB. The command prints the torque amplitude of a sine that
+    /// reaches it: across the whole band, at the resonance, at the antiresonance, and for a bench without slosh
+    /// (section 8.6.1 of Rubaga's thesis).
     #[arg(long, value_name = "DB", conflicts_with_all = ["profile", "multisine", "out"])]
     snr: Option<f64>,
     /// Period of the multisine, s.
@@ -60,7 +63,8 @@ pub struct DesignArgs {
     /// the wave is 0.15 tank radii high.
     #[arg(long, value_name = "RAD")]
     slosh_angle: Option<f64>,
-    /// Seed of the random phases, and of the choice of the lines that stay empty.
+    /// Seed for the random phases of the multisine, and for the choice of the frequencies that are left out to detect
+    /// nonlinearity.
     #[arg(long, value_name = "NUMBER", default_value_t = 1)]
     seed: u64,
     /// Sets a parameter to its expected value for the bench.
@@ -82,7 +86,7 @@ pub struct DesignArgs {
     /// Tables with the inputs that you plan to apply; only with --free, which names the parameters to estimate.
     #[arg(value_name = "DATA", requires = "free")]
     data: Vec<PathBuf>,
-    /// Standard deviation of the noise in one row of each output; only with --free.
+    /// Standard deviation of the noise in one sample of each output; only with --free.
     #[arg(long, value_name = "OUTPUT=STD,…", requires = "free")]
     noise: Vec<String>,
     /// Column of the tables that contains each input, with its unit; only with --free.

@@ -20,7 +20,7 @@ const DEFAULT_GYRO: &str = "dist/gyro";
 /// recording of a real gyro at rest.
 ///
 /// The command writes allan.csv and allan.svg. With --recording it estimates the noise of a real gyro, and tests whether
-/// this noise is normal, white and stationary by quantiles, autocorrelation and statistics of chunks.
+/// this noise is normal, white and stationary by quantiles, autocorrelation and statistics of parts of the recording.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  hubslosh gyro\n  \
     hubslosh gyro --set imu.arw=1e-4 --set imu.bias_time=300 --hours 12 --out dist/other_gyro\n  \
@@ -42,7 +42,8 @@ pub struct GyroArgs {
     /// Sampling rate of a recording without times, Hz.
     #[arg(long, value_name = "HZ", requires = "recording")]
     rate: Option<f64>,
-    /// Length of the chunks of the recording, s; in Rubaga's thesis 15 min.
+    /// Length of the parts into which the recording is divided, to test whether the noise changes with time, s.
+    /// Rubaga's thesis uses 15 min.
     #[arg(long, value_name = "SECONDS", default_value_t = 900.0, requires = "recording")]
     chunk: f64,
     /// File for a report on the recording, .html.

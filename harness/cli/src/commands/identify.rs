@@ -29,12 +29,12 @@ use crate::terminal;
 /// Without a kind of recording, `identify DATA` means `identify bench DATA`, and with --free `identify fmu DATA`.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  hubslosh identify sweep.parquet --out result.json\n  \
-    hubslosh identify up.csv down.csv --validate noise.csv --model linear,planar,spherical \\\n          \
+    hubslosh identify up.csv down.csv --validate noise.csv --model linear,planar,spherical \
     --set tank.d=0.163 --out result.json\n  \
     hubslosh identify bench.mat --columns time=t,tau_cmd=T_cmd:mNm,omega=gyro_z:deg/s --out result.json\n  \
     hubslosh identify friction ramp.csv step.csv sweep.csv --out friction.json\n  \
     hubslosh identify decay decay.csv --columns wave_height=probe:mm --out decay.json\n  \
-    hubslosh identify a.csv b.csv --fmu VanDerPol.fmu --free mu=1:0.1:5,x0@each=1:-3:3 --outputs x0,x1 \\\n          \
+    hubslosh identify a.csv b.csv --fmu VanDerPol.fmu --free mu=1:0.1:5,x0@each=1:-3:3 --outputs x0,x1 \
     --solver host --out result.json --report result.html")]
 pub struct IdentifyArgs {
     #[command(subcommand)]
@@ -42,7 +42,7 @@ pub struct IdentifyArgs {
 }
 
 const BENCH: &str = "Example:\n  hubslosh identify bench up.csv down.csv --validate noise.csv --set tank.d=0.163 --out result.json";
-const FMU: &str = "Example:\n  hubslosh identify fmu a.csv b.csv --fmu VanDerPol.fmu --free mu=1:0.1:5,x0@each=1:-3:3 \\\n          \
+const FMU: &str = "Example:\n  hubslosh identify fmu a.csv b.csv --fmu VanDerPol.fmu --free mu=1:0.1:5,x0@each=1:-3:3 \
     --outputs x0,x1 --solver host --out result.json";
 const DECAY: &str =
     "Example:\n  hubslosh identify decay decay.csv --columns wave_height=probe:mm --out decay.json";
@@ -61,16 +61,16 @@ enum Kind {
     Bench(Box<BenchArgs>),
     /// Fits parameters and start values of any FMU to its recorded inputs and outputs.
     ///
-    /// --free names the unknowns.
+    /// The option --free names the parameters and start values to fit.
     #[command(after_help = FMU)]
     Fmu(Box<FmuArgs>),
     /// Estimates frequency and damping over the amplitude from a free decay, a signal without torque.
     #[command(after_help = DECAY)]
     Decay(Box<DecayArgs>),
-    /// Fits friction and inertia of a bench whose liquid does not move, such as ramps, steps and sweeps with an empty
-    /// tank.
+    /// Fits friction and inertia of the bench to recordings in which no liquid moves, such as ramps, steps and sweeps
+    /// with an empty tank.
     ///
-    /// The tank counts as empty unless --set tank.h=… states the height of its liquid.
+    /// The command assumes that the tank is empty, unless --set tank.h=… gives the height of the liquid.
     #[command(after_help = FRICTION)]
     Friction(Box<FrictionArgs>),
 }
@@ -82,10 +82,11 @@ struct DataArgs {
     #[arg(value_name = "DATA", required = true)]
     data: Vec<PathBuf>,
     /// Column of the recordings that contains each signal, with its unit. For example, time=t:ms,omega=gyro_z:deg/s
-    /// reads the time from the column t in ms, and the rate from the column gyro_z in deg/s. Signals of bench and
-    /// friction: time, tau_cmd, omega, theta, g_axial, wheel_speed, omega_x, omega_y; of decay: time, wave_height,
-    /// force, theta, omega; of fmu: time, and inputs and outputs of the FMU. A signal that is not named here is read
-    /// from the column that has the name of the signal. rate=HZ is the sampling rate of a recording without times.
+    /// reads the time from the column t in ms, and the rate from the column gyro_z in deg/s. The signals of `bench` and
+    /// `friction` are time, tau_cmd, omega, theta, g_axial, wheel_speed, omega_x and omega_y; the signals of `decay`
+    /// are time, wave_height, force, theta and omega; the signals of `fmu` are time and the inputs and outputs of the
+    /// FMU. A signal that is not named here is read from the column that has the name of the signal. rate=HZ is the
+    /// sampling rate of a recording without times.
     #[arg(
         long,
         value_name = "SIGNAL=COLUMN[:UNIT],…",
@@ -104,15 +105,15 @@ struct DataArgs {
 /// Options that state known properties of a bench and of its sensors.
 #[derive(clap::Args)]
 struct KnownArgs {
-    /// Sets a known parameter of the bench by its name in the FMU. It is then not estimated.
+    /// Sets a known parameter of the bench by its name in the FMU. A parameter that is set is not estimated.
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
     settings: Vec<(String, String)>,
-    /// Relative standard deviations of known values, which widen the intervals [default:
-    /// torque=1%,clock=0.01%,g_axial=0.1%,tank.r=0.4%,fluid.rho=0.3%,gyro_scale=1%]. 0 means exact.
+    /// Uncertainty (relative standard deviation) of values that are taken as known. It widens the 95 % intervals of the
+    /// estimates; 0 means exact [default: torque=1%,clock=0.01%,g_axial=0.1%,tank.r=0.4%,fluid.rho=0.3%,gyro_scale=1%].
     #[arg(long = "tolerance", value_name = "NAME=SIZE,…")]
     tolerances: Vec<String>,
-    /// Start value of the search for this parameter, instead of the value estimated from the data. STD is the standard
-    /// deviation of prior knowledge about the value.
+    /// Initial guess from which the search for a parameter starts; without it the guess is computed from the data. STD,
+    /// if given, is the standard deviation of prior knowledge about the value.
     #[arg(long = "start", value_name = "NAME=VALUE[:STD]", value_parser = started)]
     starts: Vec<(String, f64, Option<f64>)>,
     /// Intersample behaviour of the torque: linear (first-order hold), held (zero-order hold, as of a sampled controller)
@@ -137,7 +138,7 @@ pub struct BenchArgs {
     data: DataArgs,
     #[command(flatten)]
     known: KnownArgs,
-    /// Slosh models to try.
+    /// Slosh models to try; the command chooses one of them by the fit.
     #[arg(
         long,
         value_name = "NAME,…",
@@ -146,7 +147,8 @@ pub struct BenchArgs {
         value_parser = ["frozen", "linear", "planar", "spherical"]
     )]
     model: Vec<String>,
-    /// Friction laws to try: the first law with all slosh models, the others with the chosen slosh model.
+    /// Friction laws to try. The first law is combined with every slosh model; the other laws are then tried with the
+    /// slosh model that fits best.
     #[arg(
         long,
         value_name = "NAME,…",
@@ -184,7 +186,7 @@ pub struct FrictionArgs {
 pub struct DecayArgs {
     #[command(flatten)]
     data: DataArgs,
-    /// Relative standard deviation of the rate of the recorder's clock, which widens the intervals.
+    /// Relative standard deviation of the rate of the recorder's clock. It widens the 95 % interval of the frequency.
     #[arg(long = "tolerance", value_name = "clock=SIZE")]
     tolerances: Vec<String>,
     /// Uses only the rows from the first to the second of these times, s.
@@ -197,7 +199,7 @@ pub struct DecayArgs {
 pub struct FmuArgs {
     #[command(flatten)]
     data: DataArgs,
-    /// Sets a known value of the FMU, or with NAME@RECORDING=VALUE for one recording only.
+    /// Sets a known value of the FMU for all recordings, or with NAME@RECORDING=VALUE for one recording only.
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
     settings: Vec<(String, String)>,
     /// FMU: a file, or the name of an FMU of this project (`hubslosh fmus` lists them).

@@ -40,8 +40,8 @@ pub struct PackArgs {
     /// Packs the source as an sdist instead, from which pip builds the Python package.
     #[arg(long, conflicts_with_all = ["model", "python", "all_platforms"])]
     sdist: bool,
-    /// File for the FMU, or folder for wheels and sdist [default: dist/NAME.fmu, dist/NAME-fmi3.fmu,
-    /// dist/NAME-fmi3-arrays.fmu, dist].
+    /// File for the FMU, or folder for wheels and sdist [default for an FMU: dist/NAME.fmu, dist/NAME-fmi3.fmu or
+    /// dist/NAME-fmi3-arrays.fmu; for wheels and sdist: dist].
     #[arg(long, value_name = "FILE|FOLDER")]
     out: Option<PathBuf>,
     /// Number of tanks whose variables the model description contains, for hosts that show every variable to the user.

@@ -23,7 +23,8 @@ use crate::{progress, set_file, terminal};
 #[derive(clap::Args)]
 #[command(after_help = help())]
 pub struct RunArgs {
-    /// Torque profile with its settings, such as sine:amplitude=0.05,frequency=2.4. The profiles are listed below.
+    /// Torque profile with its settings, such as sine:amplitude=0.05,frequency=2.4. The profiles are listed at the end
+    /// of this help.
     #[arg(
         long,
         value_name = "PROFILE",
@@ -40,8 +41,8 @@ pub struct RunArgs {
     /// Ignores columns of --input that are no inputs of the FMU. Without this flag they are an error.
     #[arg(long, requires = "input")]
     ignore_columns: bool,
-    /// File of parameters, which are set before those of --set: TOML with lines `"name" = value`, .ssv of SSP, or the
-    /// .json that `hubslosh identify` writes.
+    /// File of parameters, which are set before the parameters given by --set: TOML with lines `"name" = value`, .ssv
+    /// of SSP, or the .json that `hubslosh identify` writes.
     #[arg(long, visible_alias = "set-file", value_name = "FILE")]
     parameters: Option<PathBuf>,
     /// Sets a parameter or an input by its name in the FMU. A number is in SI units or has a unit of the variable (50mm);
@@ -49,13 +50,13 @@ pub struct RunArgs {
     /// they are in the command line.
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
     settings: Vec<(String, String)>,
-    /// Time between the rows of the result, s. It does not change the inputs: the FMU also steps to every row of --input,
-    /// and to every edge and command of a profile.
+    /// Time between the rows of the result, s. It does not change the inputs: the FMU also steps to every row of
+    /// --input, and to every jump and torque value of a profile.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.02)]
     step: f64,
-    /// Time between the torque commands into which an oscillating profile is divided, s. The commands are joined by
-    /// straight lines, or held with --hold. If straight lines would differ from the profile by more than 2.5 % of its
-    /// amplitude, shorter times are used, so that they differ by at most 0.1 %.
+    /// Time between the torque values into which an oscillating profile (such as a sine or a sweep) is divided, s. The
+    /// values are joined by straight lines, or held with --hold. If straight lines would differ from the profile by
+    /// more than 2.5 % of its amplitude, shorter times are used, so that they differ by at most 0.1 %.
     #[arg(long, value_name = "SECONDS", default_value_t = SAMPLE, conflicts_with = "input")]
     sample: f64,
     /// Time at which the run stops, s [default: the end of the torque history].
@@ -64,8 +65,8 @@ pub struct RunArgs {
     /// Relative tolerance of the FMU's solver [default: the FMU's own].
     #[arg(long, value_name = "NUMBER")]
     tolerance: Option<f64>,
-    /// Holds each input value until the next row of --input, and each command of a profile until the next command, instead
-    /// of joining the values by straight lines.
+    /// Holds each value (zero-order hold) until the next row of --input or the next torque value of the profile,
+    /// instead of joining the values by straight lines.
     #[arg(long)]
     hold: bool,
     /// Input that the profile drives [default: tau_cmd, or the FMU's only Real input].
@@ -75,13 +76,13 @@ pub struct RunArgs {
     /// the run computes the Bond number, and warns if the Bond number is low [default: 0.07213, the value of water].
     #[arg(long, value_name = "N/M")]
     tension: Option<f64>,
-    /// Variables to record in addition to time and the driven inputs [default: for HubSlosh omega, omega_imu, slosh_angle
-    /// and slosh_angle_radial; for other FMUs all outputs and slosh angles; for both also the variables that `hubslosh
-    /// view` needs to draw further slosh modes and draining tanks].
+    /// Variables to record in addition to time and the driven inputs [default: for HubSlosh omega, omega_imu,
+    /// slosh_angle and slosh_angle_radial; for other FMUs all outputs and slosh angles; for every FMU also the
+    /// variables from which `hubslosh view` draws further slosh modes and draining tanks].
     #[arg(long, value_name = "NAME,…", value_delimiter = ',')]
     columns: Vec<String>,
-    /// Also records a sensor with its sampling rate, delay, noise, bias and resolution. The kinds are listed below; the
-    /// flag may be repeated.
+    /// Also records a sensor with its sampling rate, delay, noise, bias and resolution. The kinds of sensors are listed
+    /// at the end of this help; the flag may be repeated.
     #[arg(long = "sensor", value_name = "NAME=KIND:key=value,…")]
     sensors: Vec<Sensor>,
     /// FMU: a file, or the name of an FMU of this project (`hubslosh fmus` lists them).
@@ -261,12 +262,12 @@ fn help() -> String {
         "Profiles, with their defaults (torque in N·m, frequencies in Hz, times in s):\n{}\n\
          Sensors, with their defaults (SI; angles also as 90deg, lengths as 5mm):\n{}\n\
          Examples:\n  hubslosh run --profile exp-sweep:amplitude=0.1 --out sweep.parquet\n  \
-         hubslosh run --profile sine:amplitude=0.05,frequency=2.344 --set friction.model=none \\\n          \
+         hubslosh run --profile sine:amplitude=0.05,frequency=2.344 --set friction.model=none \
          --set tank.h=50mm --step 0.005 --columns theta,omega,slosh_angle --out dwell.csv\n  \
          hubslosh run --input torque.csv --out answer.csv\n  \
          hubslosh run --parameters result.json --input bench.csv --ignore-columns --out twin.csv\n  \
          hubslosh run --profile zero --set init.slosh_angle=0.1 --out - | head\n  \
-         hubslosh run --profile lin-sweep:duration=600 --sensor wave=gauge:angle=90deg,rate=25,noise=0.2mm \\\n          \
+         hubslosh run --profile lin-sweep:duration=600 --sensor wave=gauge:angle=90deg,rate=25,noise=0.2mm \
          --sensor load=force:noise=0.01,quantum=0.005 --out bench.csv",
         profile::help(),
         sensors::help()

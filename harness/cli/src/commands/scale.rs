@@ -7,7 +7,7 @@ use formulas::similarity::Liquid;
 
 use crate::terminal;
 
-/// Computes the flight tank that a bench represents, by equal Bond or Froude numbers.
+/// Computes size and acceleration of the flight tank that a bench represents, by equal Bond or Froude numbers.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  hubslosh scale thesis\n  \
     hubslosh scale bond --flight-radius 2.0425 --flight-density 1141 --flight-tension 0.0132\n  \
@@ -24,7 +24,7 @@ pub struct ScaleArgs {
 
 #[derive(Subcommand)]
 enum Scale {
-    /// Repeats the numbers of section 7.2 of Rubaga's thesis, as printed and as computed.
+    /// Prints the numbers of section 7.2 of Rubaga's thesis, as printed in the thesis and as computed by this command.
     #[command(after_help = "Example:\n  hubslosh scale thesis")]
     Thesis,
     /// Computes the Bond number of a tank, and the flight tank with the same Bond number.
@@ -34,10 +34,10 @@ enum Scale {
     Bond {
         #[command(flatten)]
         bench: TankAtRest,
-        /// Density of the liquid in flight, kg/m³ [default: the bench's].
+        /// Density of the liquid in flight, kg/m³ [default: the density on the bench].
         #[arg(long)]
         flight_density: Option<f64>,
-        /// Surface tension of the liquid in flight, N/m [default: the bench's].
+        /// Surface tension of the liquid in flight, N/m [default: the surface tension on the bench].
         #[arg(long)]
         flight_tension: Option<f64>,
         /// Radius of the flight tank, m. The command then computes the acceleration in flight.

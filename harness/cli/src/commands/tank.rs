@@ -9,7 +9,8 @@ use hubslosh_tank::{Fill, Problems, Tank, fill_table, finite_amplitude, picture,
 
 use crate::terminal;
 
-/// Computes the slosh modes of a tank from its drawing and a fill, as pendulums with rigid liquid and their errors.
+/// Computes the slosh modes of a tank from its drawing and a fill: a pendulum for each mode, a fixed mass, and the
+/// estimated errors of their values.
 ///
 /// A body of revolution is solved by linear potential flow, a box in closed form. Without --out the command prints a
 /// table.
@@ -20,14 +21,15 @@ use crate::terminal;
     hubslosh tank tank.toml --sweep 20%,40%,60%,80% --nu 1e-6 --out sweep.csv --picture sweep.svg\n  \
     hubslosh tank tank.toml --fill 1.2 --modes 3 --nu 1e-6 --parameters tank-1.2.toml\n  \
     hubslosh tank tank.toml --sweep 2%,98% --model SloshTank --nu 1e-6 --parameters draining.toml\n  \
-    hubslosh tank harness/tank/examples/bench.toml --fill 0.1 --modes 1 --gravity 0.5 --sigma 0.073 \\\n          \
+    hubslosh tank harness/tank/examples/bench.toml --fill 0.1 --modes 1 --gravity 0.5 --sigma 0.073 \
     --contact-angle 5 --parameters coast.toml\n  \
     hubslosh tank harness/tank/examples/bench.toml --fill 0.1 --spin 3 --gravity 5\n  \
     hubslosh tank tank.toml --fill 1.2 --large-waves --model SloshTank --parameters tank-1.2.toml\n  \
     hubslosh run --set-file tank-1.2.toml --profile exp-sweep:amplitude=0.1 --out sweep.parquet\n\n\
     The format of TANK.toml is described in harness/tank/README.md.")]
 pub struct TankArgs {
-    /// Tank file with density, and contour or box.
+    /// File that describes the tank: the density of the liquid, and the contour of a body of revolution or the sides of
+    /// a box.
     #[arg(value_name = "TANK.toml")]
     tank: PathBuf,
     /// Height of the free surface above the lowest point of the tank, m; or, with a % sign, share of the volume of the
@@ -38,8 +40,8 @@ pub struct TankArgs {
     #[arg(long, value_name = "KG", conflicts_with = "fill")]
     fill_mass: Option<f64>,
     /// Several fills, m or %, for a table of modes over the fill (CSV). With --parameters the command writes the fill table
-    /// of a draining tank: if two fills are given, the command places the points of the table between them; if 3 to 12
-    /// fills are given, they are the points.
+    /// of a draining tank: if two fills are given, the command chooses the points of the table between them; if 3 to 12
+    /// fills are given, these fills are the points.
     #[arg(long, value_name = "METRES|PERCENT%,…", value_delimiter = ',', conflicts_with_all = ["fill", "fill_mass"])]
     sweep: Vec<Fill>,
     /// Number of lateral modes, 1 to 20.
@@ -49,7 +51,7 @@ pub struct TankArgs {
     /// the frequencies are 0, unless surface tension (--sigma) holds the liquid.
     #[arg(long, value_name = "NUMBER", default_value_t = 9.80665)]
     gravity: f64,
-    /// Prints the result as JSON, with --sweep too.
+    /// Prints the result as JSON instead of a table, also with --sweep.
     #[arg(long, conflicts_with = "out")]
     json: bool,
     /// File for the result, JSON (CSV with --sweep).
@@ -61,10 +63,10 @@ pub struct TankArgs {
     /// File for the modes as parameters of an FMU, .toml (for `hubslosh run --parameters` and Python) or .ssv (SSP 1.0).
     #[arg(long, value_name = "FILE")]
     parameters: Option<PathBuf>,
-    /// FMU whose parameters --parameters writes.
+    /// FMU for which --parameters writes parameters.
     #[arg(long, value_name = "MODEL", default_value = "HubSlosh", requires = "parameters")]
     model: Model,
-    /// Number of the tank on Spacecraft whose parameters --parameters writes, 1 to 4.
+    /// Number of the tank, 1 to 4, in the parameters that --parameters writes for Spacecraft.
     #[arg(long, value_name = "NUMBER", default_value_t = 1, requires = "parameters")]
     tank_number: usize,
     /// Kinematic viscosity of the liquid, m²/s. With it the command computes damping ratios and their intervals at
@@ -72,8 +74,8 @@ pub struct TankArgs {
     /// ratios are 0].
     #[arg(long, value_name = "NUMBER")]
     nu: Option<f64>,
-    /// Surface tension, N/m, for the frequencies at --gravity, the centring stiffness in --parameters and the damping
-    /// [default: none].
+    /// Surface tension, N/m, for the frequencies at --gravity, for the stiffness with which it centres the liquid
+    /// (written by --parameters) and for the damping [default: no surface tension].
     #[arg(long, value_name = "NUMBER", conflicts_with = "sweep")]
     sigma: Option<f64>,
     /// Contact angle between surface and wall, degrees; 90 is a flat surface. For an upright cylinder, the frequency and
@@ -86,13 +88,13 @@ pub struct TankArgs {
     /// axis is --gravity.
     #[arg(long, value_name = "NUMBER", conflicts_with = "sweep")]
     spin: Option<f64>,
-    /// Computes the coefficients that give the mass of the first mode the energy of large waves, from fully nonlinear potential
-    /// flow in this tank, in about 10 s. Without this option only spheres and upright cylinders have them, from tables, at the
-    /// fills of the tables. SloshTank and Spacecraft take them.
+    /// Computes four coefficients of the first mode from fully nonlinear potential flow in this tank, in about 10 s.
+    /// With these coefficients the pendulum of SloshTank and Spacecraft has the energy of large waves. Without this
+    /// option only spheres and upright cylinders have the coefficients, from tables that cover a range of fills.
     #[arg(long, conflicts_with = "sweep")]
     large_waves: bool,
-    /// Writes the file of --parameters even if a centring stiffness (by surface tension) is far outside the range of its
-    /// formula.
+    /// Writes the file of --parameters even if the formula for the stiffness by surface tension is used far outside its
+    /// range.
     #[arg(long, requires = "parameters")]
     force: bool,
 }

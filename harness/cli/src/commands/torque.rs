@@ -12,23 +12,25 @@ use crate::terminal;
 
 /// Writes the torque of a profile as a table, for a bench or for another host than `hubslosh run`.
 ///
-/// The columns are time (s), tau_cmd (N·m) and tau_slope (N·m/s), the derivative of tau_cmd until the next row. Every edge
-/// and every command of the profile has a row, whatever --step is. Therefore a host that sets torque and slope at every row
-/// drives the FMU exactly as `hubslosh run` does, including jumps. For `hubslosh run --input`, a bench or Simulink the
-/// columns time and tau_cmd are enough.
+/// The columns are time (s), tau_cmd (N·m) and tau_slope (N·m/s), the derivative of tau_cmd until the next row. The
+/// table has a row at every jump and every torque value of the profile, whatever --step is. Therefore a host that sets
+/// torque and slope at every row drives the FMU exactly as `hubslosh run` does, including jumps. For
+/// `hubslosh run --input`, a bench or Simulink the columns time and tau_cmd are enough.
 #[derive(clap::Args)]
 #[command(after_help = help())]
 pub struct TorqueArgs {
-    /// Torque profile with its settings, such as sine:amplitude=0.05,frequency=2.4. The profiles are listed below.
+    /// Torque profile with its settings, such as sine:amplitude=0.05,frequency=2.4. The profiles are listed at the end
+    /// of this help.
     #[arg(long, value_name = "PROFILE", required_unless_present = "profiles")]
     profile: Option<String>,
     /// Largest time between rows, s.
     #[arg(long, value_name = "SECONDS", default_value_t = SAMPLE)]
     step: f64,
-    /// Time between the commands of an oscillating profile, s, as for `hubslosh run`.
+    /// Time between the torque values into which an oscillating profile is divided, s, as for `hubslosh run --sample`.
     #[arg(long, value_name = "SECONDS", default_value_t = SAMPLE)]
     sample: f64,
-    /// Holds the profile from command to command, as for `hubslosh run`, so that all slopes are 0.
+    /// Holds each torque value of the profile until the next value (zero-order hold) instead of interpolating linearly.
+    /// The column tau_slope is then 0.
     #[arg(long)]
     hold: bool,
     /// Time of the last row, s [default: the end of the profile].

@@ -32,10 +32,10 @@ pub struct ViewArgs {
     /// File for the page, .html [default: the name of the run with .html].
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Start of the part to show, s.
+    /// Simulation time at which the page begins to show the run, s.
     #[arg(long, value_name = "SECONDS")]
     from: Option<f64>,
-    /// End of the part to show, s.
+    /// Simulation time at which the page stops showing the run, s.
     #[arg(long, value_name = "SECONDS")]
     to: Option<f64>,
     /// Tank file, as for `hubslosh tank`, whose contour is drawn for tank 1. A number in front selects another tank:
