@@ -135,8 +135,8 @@ class Appendage:
         """Return an appendage from matrices that are reduced to its interface.
 
         The first six degrees of freedom are the translation and rotation of the interface point,
-        the further ones are modes with unit modal mass. If there are more than ``most`` modes,
-        those are kept that move the craft most, which means that they have the largest share of the
+        the further ones are modes with unit modal mass. If there are more than ``most`` modes, only
+        the modes that move the craft most are kept: the modes with the largest share of the
         effective mass in one of the six directions.
 
         Parameters

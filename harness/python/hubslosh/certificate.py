@@ -60,9 +60,10 @@ class WorstCase:
     Attributes
     ----------
     delta : dict of str to float
-        Δ by name; ±1 is the end of a range. Empty if none was found.
+        Value of each uncertain parameter in Δ, by name; ±1 is an end of the parameter's range.
+        Empty if the search found no such Δ.
     size : float
-        Largest magnitude in Δ; inf if none was found.
+        Largest magnitude in Δ; inf if the search found no such Δ.
     frequency : float
         Frequency of the oscillation that neither grows nor decays, Hz.
     parameters : dict of str to float
@@ -83,7 +84,7 @@ class WorstCase:
 
     @property
     def mu(self) -> float:
-        """Lower bound of the structured singular value µ: 1 over the size of Δ."""
+        """Lower bound of the structured singular value µ: 1 divided by the size of the worst Δ."""
         return 1 / self.size
 
     def __repr__(self) -> str:
@@ -111,8 +112,8 @@ class Certificate:
     least : dict of float
         Lower bound of δ by name, for quantities such as damping ratios, which cannot be below 0.
     data : dict of ndarray
-        Content of the file that `save` writes: the loop, frequency intervals, boxes of Δ, and the
-        scalings D and G.
+        Content of the file that `save` writes: the loop, the parts (intervals of frequency and
+        boxes of Δ) into which the proof is divided, and the scalings D and G of each part.
     solved : int
         Number of convex problems that were solved.
 
@@ -351,10 +352,13 @@ class Search:
         return self.found[key]
 
     def certify(self, low: Vector, high: Vector, most: int) -> dict[str, NDArray[Any]]:
-        """Return frequency intervals, boxes and scalings that together prove stability in a box.
+        """Prove that the loop is stable for all Δ between ``low`` and ``high``.
 
-        Raises `UnstableError` if a Δ in the box is unstable, and `ExhaustedError` if more than
-        ``most`` convex problems would be needed.
+        Return the parts (intervals of frequency and boxes of Δ) into which the proof is divided,
+        with the scalings of each part.
+
+        Raises `UnstableError` if the loop is unstable for one of these Δ, and `ExhaustedError` if
+        more than ``most`` convex problems would be needed.
         """
         self.width, self.pairs, self.found = high - low, [], {}
         edges = np.append(0.0, np.geomspace(self.nyquist / 1000, self.nyquist, 16))

@@ -238,10 +238,11 @@ Liquid = Literal["effective", "rigid"]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Craft:
-    """A spacecraft with tanks: one object for all fills.
+    """A spacecraft with tanks; the fill of the tanks is an argument of its methods.
 
-    Body axes have the origin O. All arguments are checked at construction, except the drawings
-    of the tanks, which are read when they are first needed. Each fill is solved once.
+    Positions are given in body axes with the origin O. All arguments are checked at construction,
+    except the drawings of the tanks, which are read when they are first needed. The slosh modes at
+    a fill are computed only once.
 
     Parameters
     ----------
@@ -616,13 +617,14 @@ class Craft:
         fill : fill, mapping, or sequence of fills
             Fill of the tanks, as for `fills`.
         liquid : {"effective", "rigid"}
-            "effective" has the inertia of liquid under a lid without friction, as the FMU has it
-            (about the axis of a body of revolution: 0); "rigid" that of solid liquid.
+            "effective": the liquid has the inertia of liquid under a rigid lid without friction, as
+            in the FMU; about the axis of a body of revolution this inertia is 0. "rigid": the
+            liquid has the inertia of a solid.
 
         Returns
         -------
         MassProperties
-            Of dry craft and liquid, body axes; ``print`` shows them.
+            Mass properties of dry craft and liquid together, body axes; ``print`` shows them.
 
         Raises
         ------
@@ -1124,9 +1126,9 @@ class Craft:
     ) -> "Review":
         """Return the design review of a linear sampled controller over fills.
 
-        Each point is trimmed, so that it is a steady state. A search finds the worst case. To
-        confirm it, the nonlinear FMU is simulated with the gain at the limit of stability, or, if
-        the worst case is unstable, with the given gain.
+        Each operating point is trimmed, so that it is a steady state. A search finds the worst
+        case. To confirm the worst case, the nonlinear FMU is simulated with the gain at the limit
+        of stability or, if the worst case is unstable, with the given gain.
 
         Parameters
         ----------
@@ -1137,25 +1139,27 @@ class Craft:
         fills : sequence of fills
             Fills to review, each as for `fills`.
         damping : {"interval", "nominal"}
-            "interval" varies the damping of each tank over the confidence interval of the
-            empirical formula that computes it;
-            "nominal" does not vary it.
+            "interval" varies the damping of each tank over the confidence interval of the empirical
+            formula that computes the damping; "nominal" does not vary the damping.
         frequency : str
-            Range of the slosh frequencies of each tank, all its modes together, as a share of the
-            nominal ones, such as "10%"; "nominal" does not vary them. The height of the slosh mass
-            stays.
+            Range of the slosh frequencies as a share of their nominal values, such as "10%";
+            "nominal" does not vary them. All modes of a tank vary together, and the heights of the
+            slosh masses do not change.
         inertia : str
-            Range of the dry craft's inertia, all of it by one factor, as a share; "nominal" does
-            not vary it. A component in ``uncertain``, such as ``craft.Jxx``, takes its place.
+            Range of the dry craft's inertia as a share, such as "5%", where one factor multiplies
+            all components; "nominal" does not vary the inertia. If ``uncertain`` names a component,
+            such as ``craft.Jxx``, this argument is ignored.
         uncertain : mapping, optional
             Ranges by name: (low, high) in SI units, or a share of the nominal value such as "5%".
-            Names are as for `parameters`, and "delay". If the frequency or damping ratio of a mode
-            is named here, or its damping ratio is among ``parameters``, then ``frequency`` or
-            ``damping`` of its tank does not vary it. ``craft.mass`` changes the acceleration.
+            Names are as for `parameters`, and "delay". The arguments ``frequency`` and ``damping``
+            do not vary a frequency or a damping ratio that is named here, or a damping ratio that
+            ``parameters`` sets. ``craft.mass`` changes the acceleration.
         requirements : mapping, optional
-            Least margins: "modulus_margin", "phase_margin" (deg), "gain_margin" (dB, up and down)
-            and "delay_margin" (s), each a number for all points or a mapping with "nominal" and
-            "all". An unstable point fails; see `Review.requirements`.
+            Required minimum of each margin: "modulus_margin", "phase_margin" (deg), "gain_margin"
+            (dB, for an increase and for a decrease of the gain) and "delay_margin" (s). A number
+            applies to all operating points; a mapping can have one number for "nominal", the points
+            without deviations, and one for "all" points. An unstable point fails; see
+            `Review.requirements`.
         draws : int
             Number of random points over all fills, uniform within the ranges.
         seed : int

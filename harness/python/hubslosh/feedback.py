@@ -29,11 +29,11 @@ class Linear:
 
 @dataclass
 class Feedback:
-    """A sampled controller around a run of ``cycles`` · ``parts`` + 1 rows.
+    """A sampled controller and the times at which it acts in a simulation.
 
-    A cycle begins at every ``parts``-th row, where the controller computes commands from the
-    measurements. The commands are set ``latency`` cycles and ``switch`` rows later, and held until
-    the next commands are set.
+    The simulation has ``cycles`` · ``parts`` + 1 rows. A cycle begins at every ``parts``-th row,
+    where the controller computes commands from the measurements. The commands are set ``latency``
+    cycles and ``switch`` rows later, and held until the next commands are set.
     """
 
     controller: Linear | Callable[[int, float, list[float]], Any]

@@ -130,8 +130,9 @@ def did_you_mean(wrong: str, names: Iterable[str]) -> str:
 class Fmu:
     """An FMU: its file and its variables.
 
-    It is unpacked for its first instance, and removed when the program ends. Use `open`, which
-    reads a file once per program as long as the file does not change.
+    The archive is unpacked for the first instance, and the unpacked files are removed when the
+    program ends. Create an Fmu by `open`, which reads a file only once as long as the file does not
+    change.
 
     Parameters
     ----------

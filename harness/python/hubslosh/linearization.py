@@ -47,8 +47,8 @@ def split_delay(delay: float, period: float) -> tuple[int, float]:
 class LinearModel:
     """A linear model x' = A x + B u, y = C x + D u of deviations from an operating point.
 
-    With a ``period`` it is x_{k+1} = A x_k + B u_k instead, see `sampled`. All values are in SI
-    units. ``A, B, C, D = model`` works as well.
+    If ``period`` is given, the model is in discrete time, x_{k+1} = A x_k + B u_k; see `sampled`.
+    All values are in SI units. ``A, B, C, D = model`` works as well.
 
     Parameters
     ----------
@@ -127,8 +127,8 @@ class LinearModel:
         Parameters
         ----------
         frequency : array_like, shape (n,)
-            Frequencies, Hz. s = 2πj · frequency; for a sampled model z = exp(s · period) takes its
-            place.
+            Frequencies, Hz, where s = 2πj · frequency. The response of a sampled model is evaluated
+            at z = exp(s · period) instead of s.
 
         Returns
         -------
@@ -172,7 +172,7 @@ class LinearModel:
         latency : int
             Delay from command to plant in whole cycles.
         delay : float
-            Further delay, s; any, not only whole cycles. The two add up.
+            Delay in addition to ``latency``, s; it need not be a whole number of cycles.
 
         Returns
         -------

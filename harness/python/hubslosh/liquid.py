@@ -75,7 +75,8 @@ class LiquidModes:
     lid_inertia : ndarray, shape (3, 3)
         Inertia about O of the liquid under a rigid lid in a tank that rotates, kg·m².
     all : DataFrame
-        A row for each mode, with the columns of `modes`.
+        All computed modes, including modes that `modes` leaves out; the columns are the same as in
+        `modes`.
     error : DataFrame
         Relative differences of ``frequency`` and ``mass`` of each mode between two meshes.
 
@@ -119,8 +120,8 @@ class LiquidModes:
     def rest(self) -> dict[str, float]:
         """Fixed mass, which no mode moves, kg, and its height, m, for motions along x and y.
 
-        Keys: ``m_0_x``, ``H_0_x``, ``m_0_y``, ``H_0_y``. The directions differ because a slosh
-        mass that swings only along y is rigid along x.
+        Keys: ``m_0_x``, ``H_0_x``, ``m_0_y``, ``H_0_y``. The values for x and y differ, because a
+        slosh mass that swings only along y belongs to the fixed mass for motions along x.
         """
         found = {}
         for name, part in (("x", _cos(self.all)), ("y", _sin(self.all))):

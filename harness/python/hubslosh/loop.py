@@ -64,12 +64,13 @@ class Loop:
     latency : int
         Delay from measurement to command in whole cycles.
     delay : float
-        Further delay, s; any. The two add up. Each command is held until the next one acts, so
-        that a continuous design sees half a cycle more.
+        Delay in addition to ``latency``, s; it need not be a whole number of cycles. Each command
+        is held until the next command acts, which a controller designed in continuous time sees as
+        half a cycle of delay more.
     wheels : mapping of Wheel
-        Reaction wheels by name, for Spacecraft; `Craft.loop` passes those of the craft. Their
-        torques are further commands: ``"z.torque"`` that of wheel z on the craft, N·m, or
-        ``"wheels"`` for all of them in order.
+        Reaction wheels by name, for Spacecraft; `Craft.loop` passes the wheels of the craft. The
+        torques of the wheels can be commanded: ``"z.torque"`` is the torque of wheel z on the
+        craft, N·m, and ``"wheels"`` stands for the torques of all wheels in order.
 
     Examples
     --------

@@ -343,8 +343,9 @@ def identify(
 
     Without ``free`` the unknowns are the parameters of the slosh bench, and ``method`` is the kind
     of recordings. With ``free`` any FMU can be fitted, also one that is not from this project, by
-    the output-error method. ``{n: e.value for n, e in found.parameters.items()} | found.settings``
-    are parameters for `simulate`, and so is the file: ``simulate(parameters="result.json")``.
+    the output-error method. To simulate the FMU with the estimates, pass
+    ``{n: e.value for n, e in found.parameters.items()} | found.settings`` as ``parameters`` to
+    `simulate`, or the file written by ``out``: ``simulate(parameters="result.json")``.
 
     Parameters
     ----------
@@ -364,9 +365,9 @@ def identify(
     fmu : str or Path
         Name of an FMU of this package, or its file.
     free : mapping, optional
-        Unknowns: Real parameters and start values of the FMU with a start, ``{"mu": 1.0}``, or
-        with start and bounds, ``{"mu": (1.0, 0.1, 5.0)}``, SI units. ``"x0@each"`` has its own
-        value in each recording.
+        Unknowns: Real parameters and start values of the FMU with an initial guess,
+        ``{"mu": 1.0}``, or with initial guess, lower and upper bound, ``{"mu": (1.0, 0.1, 5.0)}``,
+        SI units. ``"x0@each"`` is estimated separately for each recording.
     inputs, outputs : sequence of str
         With ``free``: columns of the data, by the names of the FMU's inputs and outputs.
     prior : mapping, optional

@@ -56,8 +56,8 @@ class Project:
         ``period`` (s) and further arguments of `Craft.review`, such as ``fills``, ``delay``,
         ``uncertain`` and ``requirements``.
     cases : mapping of mappings
-        Cases by name. A case has the settings that differ from ``settings``, and under ``craft``
-        the values that differ from ``craft``.
+        Cases by name. Each case is a mapping of the settings that differ from ``settings``; its key
+        ``craft`` is a mapping of the values of the craft that differ from ``craft``.
     name : str
         Name of the design on pages.
     controller_file : str, optional

@@ -194,7 +194,7 @@ class Modes:
         return float(self.fmu.variable(name).start or 0.0)
 
     def problem(self, mode: ModeQuantity) -> str:
-        """Return the reason why a mode does not have a quantity, or "" if it has."""
+        """Return the reason why a quantity is not defined for a mode, or "" if it is defined."""
         if mode.tank > self.number("tanks") or mode.number > self.number(
             f"tank[{mode.tank}].modes"
         ):
@@ -264,8 +264,8 @@ class Modes:
     def set(self, mode: ModeQuantity, value: float) -> None:
         """Set one quantity of a mode.
 
-        The other quantities of the mode do not change, and neither do mass, centre and inertia of
-        the liquid as a whole.
+        The other quantities of the mode do not change. Mass, centre of mass and inertia of the
+        whole liquid do not change, either.
         """
         if mode.kind == "zeta":
             self.given[mode.name("zeta")] = value

@@ -214,9 +214,9 @@ class Review:
         return bool(self.points["stable"].all() and self.requirements()["passed"].all())
 
     def modes(self) -> dict[str, str]:
-        """Return in words how each slosh mode is stabilised, by its name; unstable modes first.
+        """Return for each slosh mode, by its name, how it is stabilised, in words.
 
-        At each fill the worst verdict over all commands counts.
+        Unstable modes come first. At each fill the verdict is the worst verdict over all commands.
 
         Returns
         -------
@@ -252,7 +252,9 @@ class Review:
         return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
     def stabilisation(self) -> list[str]:
-        """Return sentences, one for each kind of stabilisation, which name the modes stabilised so.
+        """Return a sentence for each kind of stabilisation, with the modes of this kind.
+
+        For example, one sentence names all modes that are gain-stabilised.
 
         Returns
         -------

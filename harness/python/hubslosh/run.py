@@ -10,9 +10,9 @@ from .viewing import View, view
 class Run(ShortTable):
     """Time histories of one run, as `simulate` and `closed_loop` return them.
 
-    It is a pandas.DataFrame in every respect: parts of it (``run[run["time"] < 1]``) are also runs,
-    and a column is a Series. `view` refuses a part without the columns that it needs to draw the
-    run, and names them.
+    A Run is a pandas.DataFrame: a selection of its rows or columns (``run[run["time"] < 1]``) is
+    also a Run, and one column is a Series. If columns that `view` needs are missing in a selection,
+    `view` raises an error that names them.
 
     Examples
     --------
@@ -26,9 +26,9 @@ class Run(ShortTable):
     def out_of_range(self) -> list[str]:
         """Sentences about the tanks that left the range of their model, one for each.
 
-        A sentence has the reasons with their shares of the time and their first times. The list is
-        empty if the whole run stayed in range, and for FMUs without such a variable. For a part
-        of a run it is about the whole run.
+        Each sentence states the reasons, the share of the time and the first time at which the tank
+        was out of range. The list is empty if the whole run stayed in range, or if the FMU has no
+        variable that says so. A selection of a run has the sentences of the whole run.
 
         Examples
         --------

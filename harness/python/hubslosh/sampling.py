@@ -133,8 +133,8 @@ def monte_carlo(
         same call continues a stopped study, even after kill -9. Stored runs are verified by their
         SHA-256 in ``manifest.sha256`` and by the seed. A run that was changed from outside is
         simulated again, and a warning says why. ``runs.csv`` is written at the end. One process
-        at a time holds the folder. The function is not compared: use another folder if you change
-        it.
+        at a time holds the folder. A change of the function ``outcome`` is not detected: use
+        another folder if you change it.
     client : distributed.Client, optional
         Client of Dask; its workers need this package. Without a client the study uses threads.
     workers : int, optional

@@ -47,7 +47,8 @@ def adjoint(matrices: Complex) -> Complex:
 def form(N: Complex, D: Complex, G: Complex) -> Complex:
     """Return X = N^H D N - D + j (G N - N^H G) for each matrix N.
 
-    X < 0 proves that I - N Δ is regular for all |δ| ≤ 1.
+    If X is negative definite, I - N Δ is regular for all |δ| ≤ 1, which means that the loop is not
+    at the limit of stability for any of these Δ.
     """
     half = adjoint(N) @ D @ N / 2 + 1j * (G @ N) - D / 2
     return half + adjoint(half)

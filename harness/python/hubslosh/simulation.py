@@ -56,9 +56,10 @@ def simulate(
 ) -> Run:
     """Simulate an FMU by its own solver (Co-Simulation) and return its outputs over time.
 
-    A row of the result has the inputs from its time on, and the outputs just before these
-    inputs act: if an output follows an input at once, then a jump of the input shows in the
-    next row. ``.attrs["rows"]`` and ``.attrs["inputs"]`` also state this.
+    In each row of the result the inputs are the values that act from the time of the row on, and
+    the outputs are the values just before these inputs act. Therefore, if an output depends
+    directly on an input, a jump of the input shows in the output one row later. ``.attrs["rows"]``
+    and ``.attrs["inputs"]`` also state this.
 
     Parameters
     ----------

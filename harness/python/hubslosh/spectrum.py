@@ -27,10 +27,10 @@ def frequency_response(
 
     The estimate is H1 = S_uy / S_uu with the spectra of the whole record smoothed over frequency
     by a Hann window (Ljung, *System Identification*, section 6.4). The record must contain the
-    whole motion: it begins at rest, and ends at rest or is much longer than the decay time. The
-    estimate is corrected for the input between rows: by sinc²(f Δt) for lines, by sinc(f Δt) and
-    half a step's delay if held. For a held input an error of about f Δt remains, from the power
-    of its steps above half the sampling rate.
+    whole motion: it must begin at rest, and it must end at rest or be much longer than the decay
+    time. The estimate is corrected for the input between the rows: an input that is linear between
+    rows by sinc²(f Δt), a held input by sinc(f Δt) and a delay of half a row. For a held input an
+    error of about f Δt remains, from the power of its steps above half the sampling rate.
 
     Parameters
     ----------

@@ -23,10 +23,11 @@ _TANK = re.compile(r"tank\[(\d)\]\.p(?:_dot)?\[(\d),\d\]")
 
 
 def resonances(gain: LinearModel, tanks: Sequence[str] = ()) -> list[dict[str, Any]]:
-    """Return a table of the slosh modes that appear in a sampled loop gain, command by command.
+    """Return a table of the slosh modes that appear in a sampled loop gain, with a row for each.
 
-    ``gain`` is the sampled loop gain with the names of its states, as `Loop.gain` returns it;
-    ``tanks`` has the names of the tanks in the FMU's order. Columns of the table:
+    A mode has one row for each command. ``gain`` is the sampled loop gain with the names of its
+    states, as `Loop.gain` returns it; ``tanks`` has the names of the tanks in the FMU's order.
+    Columns of the table:
 
     * ``loop``: command at which the loop is broken while the loops of the other commands are
       closed.

@@ -340,9 +340,9 @@ def tank(
         Rate at which tank and liquid turn about the tank's axis, rad/s. `Tank.parameters` of
         SloshTank and Spacecraft then have the liquid's spin.
     large_waves : bool
-        If true, compute from fully nonlinear potential flow, in about 10 s, the coefficients that
-        give the mass of mode 1 the energy of large waves. If false, only spheres and upright
-        cylinders have them, from tables, at the fills of the tables.
+        True: compute the coefficients with which the pendulum of mode 1 has the energy of large
+        waves, from fully nonlinear potential flow, in about 10 s. False: these coefficients are
+        available only for spheres and upright cylinders, from tables that cover a range of fills.
 
     Returns
     -------

@@ -632,8 +632,8 @@ class UncertainModel:
         Parameters
         ----------
         delta : mapping or array_like, shape (len(deltas),)
-            Numbers by the names in `deltas`, where missing ones are 0; or in the order of
-            `deltas`. ±1 is the end of a range.
+            Values of δ by the names in `deltas`, where a missing name means 0; or a sequence in the
+            order of `deltas`. ±1 is an end of the parameter's range.
 
         Returns
         -------
@@ -676,8 +676,9 @@ class UncertainModel:
     def at(self, delta: Mapping[str, float] | ArrayLike) -> LinearModel:
         """Return the linear model at Δ.
 
-        It equals `linearize` with `parameters` except for rounding. Components of quaternions and
-        of the pendulums' directions that follow from their norms are not among its states.
+        The model equals the result of `linearize` with the parameters that `parameters` returns,
+        except for rounding errors. A component of a quaternion, or of a pendulum's direction, that
+        follows from the unit norm is not a state of the model.
 
         Parameters
         ----------
@@ -832,8 +833,8 @@ class UncertainModel:
 
         It is 1 over the largest size at which D and G scalings with a full block for each
         parameter (Fan, Tits and Doyle 1991) show that the loop has no pole at this frequency,
-        0.001 at least. Quantities such as damping ratios stay at 0 or above. Between the
-        frequencies it shows nothing; `certify` does.
+        0.001 at least. Quantities such as damping ratios stay at 0 or above. The bound holds only
+        at the given frequencies, and not between them; use `certify` for all frequencies.
 
         Parameters
         ----------
@@ -867,9 +868,9 @@ class UncertainModel:
 
         The proof holds for all frequencies, not only for a grid: D and G scalings on intervals
         of frequency, and on parts of the box of Δ where a pair of scalings for the whole box does
-        not exist. The size is the worst case's over ``gap``, or ``largest`` if no worst case was
-        found; if that cannot be proved, a smaller one. Needs the package clarabel:
-        ``pip install 'hubslosh[robust]'``.
+        not exist. The certified size is the size of the worst case divided by ``gap``, or
+        ``largest`` if no worst case was found. If this size cannot be proved, a smaller size is
+        tried. Needs the package clarabel: ``pip install 'hubslosh[robust]'``.
 
         Parameters
         ----------
@@ -878,7 +879,7 @@ class UncertainModel:
         largest : float
             Largest ``|δ|`` to search and to certify.
         gap : float
-            Size of the worst case over the size to certify, above 1.
+            Ratio of the size of the worst case to the size to certify; above 1.
         most : int
             Number of convex problems that may be solved for each size.
 
@@ -961,8 +962,8 @@ class UncertainModel:
         pole, it follows the sign of the derivatives of the pole's damping by each δ, up to ``|δ| =
         largest``, until the signs repeat. It also tries the lines from 0 to each corner of the
         ranges, or to 64 of the corners if there are more, and random Δ in between. Damping ratios
-        stay at 0 or above. A Δ that was found gives a lower bound of µ. If none was found, the loop
-        may still be unstable for some Δ: `certify` proves stability.
+        stay at 0 or above. If a Δ is found, 1 divided by its size is a lower bound of µ. If no Δ is
+        found, the loop may still be unstable for some Δ: `certify` proves stability.
 
         Parameters
         ----------
@@ -1211,13 +1212,13 @@ def uncertain(
     The craft must be free and at rest, and its tanks axially symmetric. Warns with FmuWarning if
     its thrust turns the craft faster and faster; `Craft.uncertain` trims it first.
 
-    Uncertain parameters are ``tank[1].frequency[1]`` (Hz, of the mode in a tank that is held, under
-    the thrust that acts; the height of the bob and the share of a centring stiffness stay),
-    ``tank[1].zeta[1]``, ``tank[1].mass[1]`` and ``tank[1].bob[1]`` (height of the slosh mass on the
-    axis; mass, centre and inertia of the liquid stay), ``craft.mass``, ``craft.Jxx``, …,
-    ``craft.r[1]``, … of the dry craft, ``appendage[1].frequency`` (Hz, with the interface held) and
-    ``appendage[1].zeta``, and ``acceleration``, a factor of the acceleration that
-    force and torque give the craft. Mass and inertia change at constant acceleration.
+    Uncertain parameters are ``tank[1].frequency[1]`` (Hz, for a tank that is held at rest, under
+    the present thrust; the height of the slosh mass and the share of a centring stiffness do not
+    change), ``tank[1].zeta[1]``, ``tank[1].mass[1]`` and ``tank[1].bob[1]`` (height of the slosh
+    mass on the axis; mass, centre and inertia of the whole liquid do not change), ``craft.mass``,
+    ``craft.Jxx``, …, ``craft.r[1]``, … of the dry craft, ``appendage[1].frequency`` (Hz, with the
+    interface held) and ``appendage[1].zeta``, and ``acceleration``, a factor of the acceleration
+    that force and torque give the craft. Mass and inertia change at constant acceleration.
 
     Parameters
     ----------

@@ -108,7 +108,7 @@ def view(
         Tank files with the contours to draw, or dicts with their content, as for `tank`, in the
         order of the tanks, or by the number of the tank from 1.
     start, stop : float, optional
-        Ends of the part to show, s.
+        First and last time to show, s.
     program : str or Path, optional
         The program ``hubslosh``; by default the one that comes with this package.
 

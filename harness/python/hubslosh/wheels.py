@@ -29,9 +29,9 @@ ALL = "wheels"  # Name of the torques of all wheels, as "torque" is that of thre
 class Wheel:
     """A reaction wheel of a `Craft`: its axis, its inertia and its limits.
 
-    Its torque is that on the craft about the axis, so that the wheel turns the other way:
-    inertia · d(speed)/dt = -torque. The craft also feels -ω × h of the wheel's angular momentum
-    h = inertia · speed · axis.
+    The torque of a wheel is the torque on the craft about the axis, so that the wheel accelerates
+    in the opposite direction: inertia · d(speed)/dt = -torque. The craft also feels -ω × h of the
+    wheel's angular momentum h = inertia · speed · axis.
 
     Parameters
     ----------

@@ -168,7 +168,8 @@ def confirm(point: "Point") -> Confirmation:
 
     A stable loop is simulated with the gain of one command 1 % below and above its nearest gain
     margin. The growth rates of both runs give the gain at the limit. An unstable loop is simulated
-    as it is, and its fastest growth compared, with or without oscillation.
+    with its own gain, and its largest growth rate, with or without oscillation, is compared with
+    the prediction.
     """
     rows = point.margins.crossings.query("crossing == 'phase' and frequency > 0")
     if not point.margins.stable or rows.empty:  # without a gain margin, compare the slowest pole
