@@ -175,7 +175,10 @@ pub fn histories(
             }
             let held = held || kind != Type::Real;
             let history = Torque::rows(column("time"), values, slopes, held);
-            Ok((name.to_string(), history.with_context(|| format!("{file} cannot be used"))?))
+            Ok((
+                name.to_string(),
+                history.with_context(|| format!("the file of inputs {file} cannot be used"))?,
+            ))
         })
         .collect()
 }

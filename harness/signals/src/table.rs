@@ -103,7 +103,8 @@ impl Table {
     pub fn read(path: &Path, wanted: &[&str]) -> Result<Table> {
         let name = path.display();
         let read = if is_parquet(path)? { read_parquet } else { read_csv };
-        let table = read(path, wanted).with_context(|| format!("{name} cannot be used"))?;
+        let table =
+            read(path, wanted).with_context(|| format!("the table {name} cannot be used"))?;
         table.all_finite().map_err(|error| anyhow!("{name}, {error}"))?;
         Ok(table)
     }
@@ -222,7 +223,8 @@ impl Table {
 ///
 /// # Errors If the file is not complete.
 pub fn metadata(path: &Path) -> Result<BTreeMap<String, String>> {
-    parquet_file::metadata(path).with_context(|| format!("{} cannot be used", path.display()))
+    parquet_file::metadata(path)
+        .with_context(|| format!("the table {} cannot be used", path.display()))
 }
 
 /// Returns true if HubSlosh wrote a table in Parquet. The file names our library, which importers in other
@@ -240,7 +242,7 @@ pub fn names(path: &Path) -> Result<Vec<String>> {
         true => parquet_file::names(path),
         false => header(path).map(|(_, names)| names),
     };
-    names.with_context(|| format!("{} cannot be used", path.display()))
+    names.with_context(|| format!("the table {} cannot be used", path.display()))
 }
 
 fn header(path: &Path) -> Result<(csv::Reader<File>, Vec<String>)> {

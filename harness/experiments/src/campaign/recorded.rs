@@ -52,7 +52,7 @@ pub fn read(recorded: &Recorded, done: &mut dyn FnMut(String)) -> Result<(f64, T
         done,
     )?;
     even_with_gaps(table, GAPS, &mut |words| done(format!("{name}: {words}")))
-        .with_context(|| format!("{name} cannot be used"))
+        .with_context(|| format!("the recording {name} cannot be used"))
 }
 
 /// Checks that rows of a recording that are `step` s apart can show the torque.

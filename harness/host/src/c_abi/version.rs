@@ -255,8 +255,8 @@ impl<V: Version> Fmu<V> {
         }
         let text = std::fs::read_to_string(&xml)
             .with_context(|| format!("modelDescription.xml in {name} cannot be read"))?;
-        let description =
-            ModelDescription::from_xml(&text).with_context(|| format!("{name} cannot be used"))?;
+        let description = ModelDescription::from_xml(&text)
+            .with_context(|| format!("the FMU {name} cannot be used"))?;
         Fmu::load_described(description, interface, directory, path)
     }
 

@@ -18,7 +18,7 @@ pub enum Unreadable {
     #[error("has no month: neither {0} nor {1} is one")]
     Month(u32, u32),
     #[error(
-        "ends in \"{0}\", which is no offset from UTC (allowed: Z, UTC, +01:00, +0100, AM, PM)"
+        "ends in \"{0}\", which is neither an offset from UTC (allowed: Z, UTC, +01:00, +0100) nor AM or PM"
     )]
     Offset(String),
     #[error(
