@@ -178,7 +178,6 @@ pub fn autocorrelation(signal: &[f64], lags: usize) -> Vec<f64> {
     sums[..=lags].iter().map(|sum| sum / power).collect()
 }
 
-/// Returns the probability that a standard normal variable is below x.
 fn normal(x: f64) -> f64 {
     0.5 * libm::erfc(-x / std::f64::consts::SQRT_2)
 }

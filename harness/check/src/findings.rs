@@ -43,7 +43,6 @@ pub struct Findings {
 }
 
 impl Findings {
-    /// Creates an empty list whose findings will have this severity.
     pub fn new(severity: Severity) -> Findings {
         Findings {
             severity,

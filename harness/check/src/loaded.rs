@@ -224,7 +224,6 @@ fn element(interface: Interface) -> &'static str {
     }
 }
 
-/// Returns the modelIdentifier of each interface that the FMU declares, Co-Simulation first.
 pub fn declared(root: &Element) -> Vec<(Interface, String)> {
     let all = [Interface::CoSimulation, Interface::ModelExchange].into_iter();
     let identifier = |i: Interface| root.child(element(i))?.get("modelIdentifier");

@@ -327,7 +327,6 @@ impl UnderTest for FmuUnderTest {
     }
 }
 
-/// States of the standard's state machine in which rules call an instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
     Instantiated,
@@ -354,7 +353,6 @@ pub fn kind(interface: Interface) -> i32 {
     }
 }
 
-/// An instance together with the state of the host that simulates it.
 pub struct Session<'f> {
     pub fmu: &'f FmuUnderTest,
     pub interface: Interface,
@@ -687,7 +685,6 @@ impl<'f> Life<'f, Fmi2> for Session<'f> {
         (self.next_event, self.ended) = (to.next_event, to.ended);
     }
 
-    /// Initialises with another start time, other parameters and another tolerance.
     fn leave_trajectory(&mut self) -> Result<()> {
         let fmu = self.fmu;
         for v in fmu.variables().iter().filter(|v| v.is_set_by_hosts() && v.is_real()) {

@@ -27,7 +27,6 @@ pub fn search_spinner() -> Result<ProgressBar> {
     Ok(spinner)
 }
 
-/// Prints a line above a progress bar, and shows the line as the bar's message.
 pub fn show_line(bar: &ProgressBar, line: &str) {
     // Where no bar is drawn, indicatif would lose the line.
     if bar.is_hidden() {

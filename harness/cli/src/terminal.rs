@@ -11,10 +11,8 @@ use clap::builder::styling::{AnsiColor, Effects, Style, Styles};
 use files::input;
 use host::guard;
 
-/// Heading of the options that every command has, in its help.
 pub const GLOBAL: &str = "Global options";
 
-/// Options for output.
 #[derive(Clone, Copy, Default, clap::Args)]
 #[group(skip)]
 pub struct Terminal {

@@ -92,7 +92,6 @@ impl Example {
         format!("{}_ref.csv", self.model)
     }
 
-    /// Returns the name of the file of start, stop, step and tolerance.
     pub fn options(&self) -> String {
         format!("{}_ref.opt", self.model)
     }

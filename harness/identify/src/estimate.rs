@@ -39,7 +39,6 @@ impl Estimated {
     }
 }
 
-/// Returns the mean of the squares.
 pub(crate) fn mean_square(values: &[f64]) -> f64 {
     values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64
 }

@@ -117,7 +117,6 @@ impl Chart {
         Chart { title: title.into(), size: (640.0, 400.0), x, y, series, legend: true }
     }
 
-    /// Returns the `<svg>` element for a page that styles it.
     pub fn svg(&self) -> String {
         self.drawing(None)
     }

@@ -40,7 +40,6 @@ impl<'a> AtFill<'a> {
     }
 }
 
-/// Beginning of the notes about finite amplitude in the parameters of one fill.
 pub(crate) const PREFIX: &str = "finite amplitude: ";
 
 /// Columns of a mode, s and kappa at the points of a table, with notes about their source, errors and gaps.

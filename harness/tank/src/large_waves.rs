@@ -113,7 +113,6 @@ impl Piece {
 }
 
 impl Side {
-    /// Returns the side of a tank's `contour` at the contact line of `wall`.
     pub fn new(contour: &Contour, wall: &Wall) -> Option<Side> {
         let segments = contour.segments();
         let contact = wall.segments.last()?;

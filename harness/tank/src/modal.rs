@@ -410,7 +410,6 @@ impl ModalData {
         omegas.iter().map(|omega| omega.map(|omega| omega / core::f64::consts::TAU)).collect()
     }
 
-    /// Describes for the user from which point heights count.
     pub fn origin(&self) -> String {
         if self.z_lowest.abs() < 1e-9 {
             return "z = 0 is the tank's lowest point, z up".to_string();

@@ -34,7 +34,6 @@ impl Deref for Variable {
     }
 }
 
-/// An element of ModelStructure; `list` is its name, for example Output.
 #[derive(Clone, Debug)]
 pub struct Unknown {
     pub list: String,

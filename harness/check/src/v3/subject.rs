@@ -92,7 +92,6 @@ impl Subject {
         Ok(Subject { loaded, description })
     }
 
-    /// Returns the plain use of each interface that can be called.
     pub fn plain_uses(&self) -> Vec<Use> {
         let uses = [Use::PLAIN, Use::EXCHANGE].into_iter();
         uses.filter(|u| self.binary(u.interface).is_ok()).collect()
@@ -234,7 +233,6 @@ impl UnderTest for Subject {
     }
 }
 
-/// An instance together with the state of the host that simulates it.
 pub struct Session<'s> {
     pub subject: &'s Subject,
     pub using: Use,

@@ -79,7 +79,6 @@ struct Stepped {
     tolerance: Option<f64>,
 }
 
-/// Parses `own`, `own:TOLERANCE`, `host` or `host:TOLERANCE`.
 fn solver(text: &str) -> Result<Stepped> {
     let (whose, tolerance) = match text.split_once(':') {
         Some((whose, number)) => {
@@ -141,7 +140,6 @@ fn parsed<T>(read: impl Iterator<Item = Result<T>>, problems: &mut Vec<String>) 
 }
 
 impl Request<'_> {
-    /// Returns the settings as `NAME=VALUE`, as they were written after `--set`.
     fn texts(&self) -> Vec<String> {
         self.settings.iter().map(|(name, value)| format!("{name}={value}")).collect()
     }

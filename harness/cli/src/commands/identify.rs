@@ -131,7 +131,6 @@ struct KnownArgs {
     fmu: PathBuf,
 }
 
-/// `hubslosh identify bench`.
 #[derive(clap::Args)]
 pub struct BenchArgs {
     #[command(flatten)]
@@ -172,7 +171,6 @@ pub struct BenchArgs {
     also: Vec<String>,
 }
 
-/// `hubslosh identify friction`.
 #[derive(clap::Args)]
 pub struct FrictionArgs {
     #[command(flatten)]
@@ -181,7 +179,6 @@ pub struct FrictionArgs {
     known: KnownArgs,
 }
 
-/// `hubslosh identify decay`.
 #[derive(clap::Args)]
 pub struct DecayArgs {
     #[command(flatten)]
@@ -194,7 +191,6 @@ pub struct DecayArgs {
     trim: Vec<f64>,
 }
 
-/// `hubslosh identify fmu`.
 #[derive(clap::Args)]
 pub struct FmuArgs {
     #[command(flatten)]
@@ -302,7 +298,6 @@ pub fn with_kind(mut arguments: Vec<OsString>) -> Result<Vec<OsString>> {
     Ok(arguments)
 }
 
-/// Parses `NAME=VALUE` or `NAME=VALUE:STD`.
 fn started(text: &str) -> Result<(String, f64, Option<f64>)> {
     let (name, numbers) = setting(text)?;
     let number = |text: &str| text.parse().ok().filter(|x: &f64| x.is_finite() && *x > 0.0);

@@ -352,7 +352,6 @@ pub struct Estimate {
     pub doubt: Option<Doubt>,
 }
 
-/// Reasons for rejecting the antiresonance and resonance of a response.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Doubt {
     /// The sweep shifts the resonance by more than a quarter of its distance to the antiresonance.

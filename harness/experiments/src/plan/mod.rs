@@ -129,7 +129,6 @@ pub struct Recorded {
     pub columns: Columns,
 }
 
-/// Text that stands in place of the slosh model for a recording.
 pub const RECORDING: &str = "recording";
 
 /// One run of a plan. `listed` is the name of its `[[run]]`, if the plan gives one; `varied` are the values

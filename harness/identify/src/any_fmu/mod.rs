@@ -51,7 +51,6 @@ pub struct Details {
     pub not_quadratic: Vec<String>,
     /// −2 ln L up to a constant.
     pub deviance: f64,
-    /// Number of starts from which a minimum was searched.
     pub starts: usize,
     /// Distance to the minimum in standard deviations.
     pub decrement: f64,

@@ -51,7 +51,6 @@ pub struct Start {
 }
 
 impl Start {
-    /// Returns the value of one of the [`PARAMETERS`].
     pub fn parameter(mut self, name: &str) -> f64 {
         *self.parameter_mut(name)
     }
@@ -113,7 +112,6 @@ pub fn initialised<'fmu>(fmu: &'fmu Fmu, settings: &[(String, String)]) -> Resul
     Ok(instance)
 }
 
-/// Returns the FMU's warnings when a motion begins with these settings.
 pub fn warnings(fmu: &Fmu, settings: &[(String, String)]) -> Result<Vec<String>> {
     let mut instance = initialised(fmu, settings)?;
     instance.exit_initialization_mode()?;

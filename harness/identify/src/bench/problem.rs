@@ -56,7 +56,6 @@ impl List<'_> {
         self.unknowns.push(unknown);
     }
 
-    /// Adds the parameter of the FMU that has the unknown's name.
     fn add_parameter(&mut self, unknown: Unknown) {
         self.add(Target::Parameter(unknown.name.clone()), unknown);
     }

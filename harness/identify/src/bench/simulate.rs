@@ -86,7 +86,6 @@ pub fn course(recording: &Recording, intersample: Hold) -> (Vec<f64>, Vec<f64>) 
     (knots, torque)
 }
 
-/// Setup and drive of the FMU.
 #[derive(Clone, Debug)]
 pub struct Setup {
     pub settings: Vec<(String, String)>,

@@ -19,7 +19,6 @@ pub struct Question<'a> {
     pub doubts: &'a [String],
 }
 
-/// Findings at the chosen model's minimum other than values.
 pub struct Findings {
     pub torque: Option<String>,
     pub tests: Vec<Tests>,

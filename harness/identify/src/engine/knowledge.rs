@@ -40,7 +40,6 @@ pub struct Knowledge {
     /// Covariance of all unknowns. The rows of unknowns at a bound are 0, and unknowns that are not resolved have an infinite
     /// variance.
     pub covariance: DMatrix<f64>,
-    /// Directions that no output shows.
     pub inseparable: Vec<Inseparable>,
     /// True for each unknown whose derivative is lost in the solver's errors, or whose estimate these errors move by more than
     /// [`DECIDED`] standard deviations.

@@ -62,7 +62,6 @@ pub struct Curvature {
 }
 
 impl Curvature {
-    /// Computes JᵀJ over the columns `which`.
     pub fn new(jacobian: &DMatrix<f64>, which: Vec<usize>) -> Self {
         let picked = jacobian.select_columns(&which);
         let a = picked.tr_mul(&picked);
@@ -174,7 +173,6 @@ pub fn places(which: &[bool]) -> Vec<usize> {
     (0..which.len()).filter(|j| which[*j]).collect()
 }
 
-/// Returns a copy of the flags in which entry `j` is false.
 pub fn without(which: &[bool], j: usize) -> Vec<bool> {
     let mut others = which.to_vec();
     others[j] = false;

@@ -11,7 +11,6 @@ pub enum Hold {
 }
 
 impl Hold {
-    /// All courses, the likeliest first.
     pub const ALL: [Hold; 3] = [Hold::FirstOrderHold, Hold::BandLimited, Hold::ZeroOrderHold];
 
     pub fn words(self) -> &'static str {
@@ -108,7 +107,6 @@ impl Unknown {
         if self.log { z.exp() } else { z }
     }
 
-    /// Returns the least and the largest coordinate.
     pub fn ends(&self) -> (f64, f64) {
         let end = |value: f64| match self.log {
             true if value <= 0.0 => f64::NEG_INFINITY,

@@ -30,7 +30,6 @@ pub struct Point {
     pub minimum: Minimum,
 }
 
-/// Returns the point with the least sum of squares.
 pub fn lowest(points: &[Point]) -> Option<&Point> {
     points.iter().min_by(|a, b| a.minimum.point.cost.total_cmp(&b.minimum.point.cost))
 }
@@ -89,7 +88,6 @@ impl Fit<'_> {
         Ok(most)
     }
 
-    /// Returns the free unknown that the problem names as bent.
     fn stated_bent(&self) -> Option<usize> {
         self.problem.unknowns.iter().zip(&self.free).position(|(u, free)| u.bent && *free)
     }

@@ -72,7 +72,6 @@ pub fn on_line(time: &[f64], signal: &[f64], t: f64, row: &mut usize) -> f64 {
     signal[k] + part * (signal[k + 1] - signal[k])
 }
 
-/// Returns Lagrange's weights of nodes at a time.
 pub fn weights(nodes: &[f64], at: f64) -> Vec<f64> {
     let weight = |(j, node): (usize, &f64)| -> f64 {
         let others = nodes.iter().enumerate().filter(|(i, _)| *i != j);

@@ -16,7 +16,6 @@ use crate::input::sensor_faults::{self, Rest};
 use crate::input::{gaps, spikes};
 use crate::tuning::{DECAY_ROWS, LATE_SENSOR, LONG_RECORDING, MOVING_SPREAD, SHORTEST_RECORDING};
 
-/// Columns that a recording must have.
 pub const REQUIRED: [&str; 3] = ["time", "tau_cmd", "omega"];
 /// Columns that are used if they are there.
 pub const OPTIONAL: [&str; 5] = ["theta", "g_axial", "wheel_speed", "omega_x", "omega_y"];

@@ -56,12 +56,10 @@ pub(crate) fn masked(values: &[f64], mask: Option<&[bool]>) -> Vec<f64> {
     }
 }
 
-/// Returns the rows in which a mask is true.
 pub(crate) fn places(mask: &Option<Vec<bool>>, rows: usize) -> Vec<usize> {
     (0..rows).filter(|k| mask.as_ref().is_none_or(|mask| mask[*k])).collect()
 }
 
-/// Takes a row out of a mask.
 pub(crate) fn take_out(mask: &mut Option<Vec<bool>>, row: usize, rows: usize) {
     mask.get_or_insert_with(|| vec![true; rows])[row] = false;
 }

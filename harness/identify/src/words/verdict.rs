@@ -2,9 +2,7 @@
 
 use analysis::innovations::{self, Tests};
 
-/// Beginning of the sentence about an invalidated model.
 pub const DOES_NOT_FIT: &str = "DOES NOT FIT";
-/// Beginning of the sentence about a search that has not converged.
 pub const NO_MINIMUM: &str = "The search did not end at a minimum";
 
 /// Beginning of the sentence about errors of the solver that leave no judgement.

@@ -12,7 +12,6 @@ const INTERVALS: usize = 4_000;
 /// Smallest number of frames per oscillation with which the animation shows it correctly.
 const FEWEST_FRAMES: f64 = 8.0;
 
-/// Rule by which rows are thinned: one of `every` rows is kept.
 pub(super) struct Thinning {
     pub every: usize,
 }
