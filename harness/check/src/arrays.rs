@@ -31,7 +31,7 @@ fn lists(session: &mut Session) -> Result<Lists> {
         }
     }
     if fmu.can(interface, "providesDirectionalDerivative") {
-        let unknowns = d.outputs.iter().filter_map(|u| d.at(u.index));
+        let unknowns = d.unknowns(d.words.outputs).filter_map(|u| d.variable_of(u));
         let unknowns = unknowns.filter(|v| v.is_continuous()).map(|v| v.reference);
         lists.unknowns = unknowns.collect();
         lists.knowns = lists.inputs.iter().map(|(reference, _)| *reference).collect();
@@ -47,7 +47,8 @@ fn lists(session: &mut Session) -> Result<Lists> {
     }
     match interface {
         Interface::CoSimulation => {
-            let order = d.co_simulation.as_ref().and_then(|i| i.number("maxOutputDerivativeOrder"));
+            let order =
+                d.interface("CoSimulation").and_then(|i| i.number("maxOutputDerivativeOrder"));
             if order.is_some_and(|order| order >= 1.0) {
                 lists.outputs = fmu.outputs.iter().map(|v| v.reference).collect();
             }

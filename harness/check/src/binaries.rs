@@ -1,7 +1,6 @@
 use super::archive::Archive;
 use super::description::Description;
 use super::findings::Findings;
-use super::v3;
 use host::binary::{Binary, Kind};
 use host::fmi2::{Fmu, PLATFORM};
 use host::fmi3;
@@ -88,31 +87,27 @@ pub struct Binaries {
     own_folder: &'static str,
 }
 
-/// Returns an interface with the `wanted` functions; `None` if it has no modelIdentifier.
-fn declare(element: &Element, wanted: Vec<&'static str>) -> Option<Declared> {
+/// Returns an interface with the functions that it needs; `None` if it has no modelIdentifier.
+fn declare(element: &Element, is_fmi3: bool) -> Option<Declared> {
     let identifier = element.get("modelIdentifier")?.to_string();
+    let wanted = match &*element.name {
+        _ if is_fmi3 => fmi3::Fmu::symbols(),
+        "ModelExchange" => [Fmu::symbols(), Fmu::exchange_symbols()].concat(),
+        _ => [Fmu::symbols(), Fmu::step_symbols()].concat(),
+    };
     Some(Declared { interface: element.name.to_string(), identifier, wanted })
 }
 
 impl Binaries {
-    /// Reads the headers of all binaries of an FMU 2.0 and compares their names with the interfaces of
-    /// `description`.
+    /// Reads the headers of all binaries and compares their names with the interfaces of `description`.
     pub fn new(archive: &Archive, description: Option<&Description>) -> Binaries {
-        let common = Fmu::symbols();
-        let declared = description.map(|d| {
-            let exchange = d.model_exchange.iter().map(|e| (e, Fmu::exchange_symbols()));
-            let stepping = d.co_simulation.iter().map(|e| (e, Fmu::step_symbols()));
-            let all = exchange.chain(stepping);
-            all.filter_map(|(e, own)| declare(e, [common.clone(), own].concat())).collect()
-        });
-        Binaries::read(archive, declared, platform, PLATFORM)
-    }
-
-    /// Reads the headers of all libraries of an FMU 3.0, as [`Binaries::new`] does.
-    pub fn of_fmi3(archive: &Archive, description: &v3::Description) -> Binaries {
-        let interfaces = description.interfaces();
-        let declared = interfaces.filter_map(|e| declare(e, fmi3::Fmu::symbols())).collect();
-        let mut all = Binaries::read(archive, Some(declared), tuple, fmi3::PLATFORM);
+        let is_fmi3 = description.is_some_and(Description::is_fmi3);
+        let declared = description.map(|d| d.interfaces().filter_map(|e| declare(e, is_fmi3)));
+        let declared = declared.map(Iterator::collect);
+        if !is_fmi3 {
+            return Binaries::read(archive, declared, platform, PLATFORM);
+        }
+        let mut all = Binaries::read(archive, declared, tuple, fmi3::PLATFORM);
         all.has_sources = archive.below("sources/buildDescription.xml").next().is_some();
         // Static libraries have other endings.
         let is_vendors = |name: &&str| {

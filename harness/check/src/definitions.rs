@@ -1,9 +1,9 @@
-//! Rules of the head and the definitions of modelDescription.xml (FMI 2.0.5, section 2.2): interfaces,
-//! capabilities, units, types.
+//! Rules of the head and the definitions of modelDescription.xml (FMI 2.0.5, section 2.2; FMI 3.0.2, section
+//! 2.4): interfaces, capabilities, units, types.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::description::{Common, Description};
+use super::description::Description;
 use super::findings::Findings;
 use host::xml::{Element, Fault};
 
@@ -23,21 +23,23 @@ pub fn well_formed(archive: &super::archive::Archive, findings: &mut Findings) {
 }
 
 pub fn fmi_version(d: &Description, findings: &mut Findings) {
-    if let Some(other) = d.other_version() {
-        return findings.at("fmiVersion").add(format!(
-            "\"{other}\": this is not FMI 2.0, and no other rule is checked (allowed: \"2.0\")"
-        ));
-    }
-    match d.root.get("fmiVersion") {
-        Some("2.0") => {}
-        Some(other) => findings.at("fmiVersion").add(format!("\"{other}\" (allowed: \"2.0\")")),
-        None => findings.at("fmiVersion").add("it is missing (allowed: \"2.0\")"),
-    }
+    let (expected, version) = (d.words.version, d.root.get("fmiVersion"));
+    let text = match (d.other_version(), version) {
+        (Some(other), _) => {
+            format!("\"{other}\": this is not FMI 2.0, and no other rule is checked")
+        }
+        (None, Some(version)) if version == expected => return,
+        (None, Some(other)) => format!("\"{other}\""),
+        (None, None) => "it is missing".into(),
+    };
+    findings.at("fmiVersion").add(format!("{text} (allowed: \"{expected}\")"));
 }
 
-pub fn guid(d: &Description, findings: &mut Findings) {
-    if d.root.get("guid").is_none_or(|guid| guid.trim().is_empty()) {
-        findings.at("guid").add("it is missing or empty");
+/// `xml.guid`, in FMI 3.0 `xml.token`.
+pub fn token(d: &Description, findings: &mut Findings) {
+    let name = d.words.token;
+    if d.root.get(name).is_none_or(|token| token.trim().is_empty()) {
+        findings.at(name).add("it is missing or empty");
     }
 }
 
@@ -53,20 +55,16 @@ pub fn date(d: &Description, findings: &mut Findings) {
 
 pub fn interfaces(d: &Description, findings: &mut Findings) {
     if d.interfaces().next().is_none() {
-        findings.at("fmiModelDescription").add("neither ModelExchange nor CoSimulation is there");
+        findings.at("fmiModelDescription").add(match d.is_fmi3() {
+            true => "none of ModelExchange, CoSimulation and ScheduledExecution is there",
+            false => "neither ModelExchange nor CoSimulation is there",
+        });
     }
 }
 
-pub fn model_identifier(d: &Description, findings: &mut Findings) {
-    identifiers(d.interfaces(), findings);
-}
-
 /// Reports each interface whose modelIdentifier cannot be the start of a C function's name.
-pub(crate) fn identifiers<'d>(
-    interfaces: impl Iterator<Item = &'d Element>,
-    findings: &mut Findings,
-) {
-    for interface in interfaces {
+pub fn model_identifier(d: &Description, findings: &mut Findings) {
+    for interface in d.interfaces() {
         let name = interface.get("modelIdentifier").unwrap_or_default();
         let first = name.chars().next();
         let is_identifier = first.is_some_and(|c| c.is_ascii_alphabetic() || c == '_')
@@ -81,27 +79,42 @@ pub(crate) fn identifiers<'d>(
 }
 
 pub fn capabilities(d: &Description, findings: &mut Findings) {
+    /// Capabilities that need another one.
+    const NEEDS: [(&str, &str); 3] = [
+        ("canSerializeFMUstate", "canGetAndSetFMUstate"),
+        ("canSerializeFMUState", "canGetAndSetFMUState"),
+        ("canReturnEarlyAfterIntermediateUpdate", "providesIntermediateUpdate"),
+    ];
+    /// Properties of a binary, and so of all interfaces that it serves.
+    const SHARED: [&str; 3] = [
+        "needsExecutionTool",
+        "canBeInstantiatedOnlyOncePerProcess",
+        "canNotUseMemoryManagementFunctions",
+    ];
+    let mut flags: BTreeMap<(&str, &str), (&str, bool)> = BTreeMap::new();
     for interface in d.interfaces() {
-        if interface.flag("canSerializeFMUstate") && !interface.flag("canGetAndSetFMUstate") {
-            findings
-                .at(format!("line {}, {}", interface.line, interface.name))
-                .add("canSerializeFMUstate without canGetAndSetFMUstate");
+        let place = format!("line {}, {}", interface.line, interface.name);
+        for (flag, needed) in NEEDS {
+            if interface.flag(flag) && !interface.flag(needed) {
+                findings.at(&place).add(format!("{flag} without {needed}"));
+            }
         }
-    }
-    let first = d.model_exchange.as_ref().zip(d.co_simulation.as_ref());
-    if let Some((exchange, stepping)) = first
-        && exchange.get("modelIdentifier") == stepping.get("modelIdentifier")
-    {
-        const SHARED: [&str; 3] = [
-            "needsExecutionTool",
-            "canBeInstantiatedOnlyOncePerProcess",
-            "canNotUseMemoryManagementFunctions",
-        ];
+        let step = interface.number("fixedInternalStepSize");
+        if let Some(step) = step.filter(|h| h.is_nan() || *h <= 0.0) {
+            findings.at(&place).add(format!("fixedInternalStepSize={step} (allowed: above 0)"));
+        }
+        if interface.name == "CoSimulation" && d.has_clocks() && !interface.flag("hasEventMode") {
+            let text = "it has clocks, but not hasEventMode: clocks need event mode";
+            findings.at(&place).add(text);
+        }
         for flag in SHARED {
-            if exchange.flag(flag) != stepping.flag(flag) {
-                findings
-                    .at(flag)
-                    .add("one binary, but the two interfaces say different things of it");
+            let key = (flag, interface.get("modelIdentifier").unwrap_or_default());
+            let own = interface.flag(flag);
+            let (first, said) = *flags.entry(key).or_insert((&interface.name, own));
+            if said != own {
+                let other = &interface.name;
+                let text = format!("one binary, but {first} and {other} say different things");
+                findings.at(flag).add(text);
             }
         }
     }
@@ -137,10 +150,7 @@ pub fn default_experiment(d: &Description, findings: &mut Findings) {
 
 /// Reports times, tolerances and step sizes of DefaultExperiment that are not finite or not positive. Returns
 /// the element; if it is missing, the rule is skipped.
-pub(crate) fn experiment_numbers<'d>(
-    root: &'d Element,
-    findings: &mut Findings,
-) -> Option<&'d Element> {
+fn experiment_numbers<'d>(root: &'d Element, findings: &mut Findings) -> Option<&'d Element> {
     let Some(experiment) = root.child("DefaultExperiment") else {
         findings.skip("there is no DefaultExperiment");
         return None;
@@ -157,14 +167,17 @@ pub(crate) fn experiment_numbers<'d>(
     Some(experiment)
 }
 
-pub fn stop_time(d: &Description, findings: &mut Findings) {
-    match d.root.child("DefaultExperiment") {
-        None => findings.skip("there is no DefaultExperiment"),
-        Some(experiment) => stop_before_start(experiment, findings),
+/// `xml.default_experiment` of FMI 3.0.
+pub fn default_experiment3(d: &Description, findings: &mut Findings) {
+    if experiment_numbers(&d.root, findings).is_some() {
+        stop_time(d, findings);
     }
 }
 
-pub(crate) fn stop_before_start(experiment: &Element, findings: &mut Findings) {
+pub fn stop_time(d: &Description, findings: &mut Findings) {
+    let Some(experiment) = d.root.child("DefaultExperiment") else {
+        return findings.skip("there is no DefaultExperiment");
+    };
     let start = experiment.number("startTime").unwrap_or(0.0);
     if let Some(stop) = experiment.number("stopTime").filter(|stop| *stop < start) {
         findings
@@ -173,18 +186,15 @@ pub(crate) fn stop_before_start(experiment: &Element, findings: &mut Findings) {
     }
 }
 
-pub fn unique(d: &Description, findings: &mut Findings) {
-    unique_names(&d.root, "SimpleType", |simple| simple.list("Enumeration").collect(), findings);
+/// Returns the items of an enumeration's type, which are children of the type itself in FMI 3.0.
+pub(crate) fn items(of: &Element) -> impl Iterator<Item = &Element> {
+    of.children.iter().chain(of.list("Enumeration")).filter(|child| child.name == "Item")
 }
 
 /// Reports definitions (of units and types) whose names are repeated, and types two of whose items have the
-/// same name or value. `items` returns the items of a type's element.
-pub(crate) fn unique_names(
-    root: &Element,
-    of_type: &str,
-    items: impl Fn(&Element) -> Vec<&Element>,
-    findings: &mut Findings,
-) {
+/// same name or value.
+pub fn unique(d: &Description, findings: &mut Findings) {
+    let root = &d.root;
     let mut one = |what: &str, elements: &mut dyn Iterator<Item = &Element>, attribute: &str| {
         let mut seen = BTreeSet::new();
         for element in elements {
@@ -197,6 +207,7 @@ pub(crate) fn unique_names(
             }
         }
     };
+    let of_type = if d.is_fmi3() { "TypeDefinitions" } else { "SimpleType" };
     one("Unit", &mut root.list("UnitDefinitions"), "name");
     one(of_type, &mut root.list("TypeDefinitions"), "name");
     one("Category", &mut root.list("LogCategories"), "name");
@@ -205,45 +216,49 @@ pub(crate) fn unique_names(
     }
     for simple in root.list("TypeDefinitions") {
         for attribute in ["name", "value"] {
-            one("Item", &mut items(simple).into_iter(), attribute);
+            one("Item", &mut items(simple), attribute);
         }
     }
 }
 
+/// `xml.units` of FMI 3.0, which has no rule of its own for the numbers.
+pub fn units_with_numbers(d: &Description, findings: &mut Findings) {
+    units(d, findings);
+    super::units::numbers(d, findings);
+}
+
 pub fn units(d: &Description, findings: &mut Findings) {
-    let units = unit_definitions(&d.root);
-    d.each(findings, |v| wrong_unit(v, v.typed.get("displayUnit"), &units));
-}
-
-pub(crate) fn unit_definitions(root: &Element) -> BTreeMap<&str, &Element> {
-    root.list("UnitDefinitions").filter_map(|unit| Some((unit.get("name")?, unit))).collect()
-}
-
-pub(crate) fn wrong_unit<'d>(
-    v: &Common,
-    shown: impl IntoIterator<Item = &'d str>,
-    units: &BTreeMap<&str, &Element>,
-) -> Option<String> {
-    let unit = v.typed.get("unit");
-    if let Some(unit) = unit.filter(|unit| !units.contains_key(unit)) {
-        return Some(format!("the unit \"{unit}\" is not among UnitDefinitions"));
-    }
-    shown.into_iter().find_map(|shown| {
-        let Some(unit) = unit else {
-            return Some(format!("displayUnit \"{shown}\" without a unit"));
-        };
-        let mut all = units[unit].children.iter().filter(|c| c.name == "DisplayUnit");
-        (shown != unit && !all.any(|c| c.get("name") == Some(shown)))
-            .then(|| format!("displayUnit \"{shown}\" is not defined for \"{unit}\""))
-    })
+    let definitions = d.root.list("UnitDefinitions");
+    let units: BTreeMap<&str, &Element> =
+        definitions.filter_map(|unit| Some((unit.get("name")?, unit))).collect();
+    d.each(findings, |v| {
+        let unit = v.typed.get("unit");
+        if let Some(unit) = unit.filter(|unit| !units.contains_key(unit)) {
+            return Some(format!("the unit \"{unit}\" is not among UnitDefinitions"));
+        }
+        let aliases = v.typed.children.iter().filter(|c| c.name == "Alias");
+        [&v.typed].into_iter().chain(aliases).filter_map(|of| of.get("displayUnit")).find_map(
+            |shown| {
+                let Some(unit) = unit else {
+                    return Some(format!("displayUnit \"{shown}\" without a unit"));
+                };
+                let mut all = units[unit].children.iter().filter(|c| c.name == "DisplayUnit");
+                (shown != unit && !all.any(|c| c.get("name") == Some(shown)))
+                    .then(|| format!("displayUnit \"{shown}\" is not defined for \"{unit}\""))
+            },
+        )
+    });
 }
 
 pub fn types(d: &Description, findings: &mut Findings) {
-    let types: BTreeMap<&str, &str> = d
-        .root
-        .list("TypeDefinitions")
-        .filter_map(|t| Some((t.get("name")?, t.children.first()?.name.as_ref())))
-        .collect();
+    // In FMI 2.0 the type's element has the child Real, in FMI 3.0 it is itself called Float64Type.
+    let kind = |of: &'_ Element| match d.is_fmi3() {
+        true => of.name.strip_suffix("Type").map(String::from),
+        false => Some(of.children.first()?.name.to_string()),
+    };
+    let definitions = d.root.list("TypeDefinitions");
+    let types: BTreeMap<&str, String> =
+        definitions.filter_map(|t| Some((t.get("name")?, kind(t)?))).collect();
     d.each(findings, |v| {
         let declared = v.typed.get("declaredType")?;
         match types.get(declared) {
@@ -255,7 +270,7 @@ pub fn types(d: &Description, findings: &mut Findings) {
         }
     });
     let used: BTreeSet<&str> = d.variables.iter().map(|v| v.name.as_str()).collect();
-    for name in types.keys().filter(|name| used.contains(*name)) {
+    for name in types.keys().filter(|name| !d.is_fmi3() && used.contains(*name)) {
         findings.at(format!("SimpleType \"{name}\"")).add("a variable has the same name");
     }
 }

@@ -104,9 +104,9 @@ fn has_moved(v: &Variable, a: &Reading, b: &Reading) -> bool {
 }
 
 struct Seen {
-    pairs: BTreeSet<(usize, usize)>,
-    traces: BTreeSet<(usize, usize)>,
-    moved: BTreeSet<usize>,
+    pairs: BTreeSet<(u32, u32)>,
+    traces: BTreeSet<(u32, u32)>,
+    moved: BTreeSet<u32>,
     starts: u64,
 }
 
@@ -122,20 +122,20 @@ impl Seen {
         before: &[Reading],
         after: &[Reading],
     ) {
-        self.moved.insert(known.index);
+        self.moved.insert(known.key);
         for ((unknown, before), after) in unknowns.iter().zip(before).zip(after) {
             if !before.is_identical(after) {
-                self.traces.insert((unknown.index, known.index));
+                self.traces.insert((unknown.key, known.key));
             }
             if has_moved(unknown, before, after) {
-                self.pairs.insert((unknown.index, known.index));
+                self.pairs.insert((unknown.key, known.key));
             }
         }
     }
 
     /// Returns true if every pair (unknown, known) of `feedthrough` has been observed at least once, even if the value
     /// changed only in its last bit.
-    fn is_complete(&self, feedthrough: &BTreeSet<(usize, usize)>) -> bool {
+    fn is_complete(&self, feedthrough: &BTreeSet<(u32, u32)>) -> bool {
         feedthrough.iter().all(|pair| self.traces.contains(pair))
     }
 
@@ -143,23 +143,24 @@ impl Seen {
     /// itself is left out.
     fn report(&self, fmu: &FmuUnderTest, lists: &[&Unknown], when: &str, findings: &mut Findings) {
         for unknown in lists {
-            let Some(declared) = &unknown.dependencies else { continue };
-            let missing = self
-                .pairs
-                .iter()
-                .filter(|(u, k)| *u == unknown.index && u != k && !declared.contains(k));
+            let (Some(key), Some(declared)) = (unknown.key, &unknown.dependencies) else {
+                continue;
+            };
+            let missing =
+                self.pairs.iter().filter(|(u, k)| *u == key && u != k && !declared.contains(k));
             let missing: Vec<_> = missing.map(|(_, k)| name(fmu, *k)).collect();
             if !missing.is_empty() {
-                findings.at(format!("line {}, {}", unknown.line, name(fmu, unknown.index))).add(
-                    format!("{when} it changes with {}, which is not declared", missing.join(", ")),
-                );
+                findings.at(format!("line {}, {}", unknown.line, name(fmu, key))).add(format!(
+                    "{when} it changes with {}, which is not declared",
+                    missing.join(", ")
+                ));
             }
         }
     }
 }
 
-fn name(fmu: &FmuUnderTest, index: usize) -> &str {
-    fmu.description().at(index).map_or("?", |v| v.name.as_str())
+fn name(fmu: &FmuUnderTest, key: u32) -> &str {
+    fmu.description().at(key).map_or("?", |v| v.name.as_str())
 }
 
 fn read(session: &mut Session, variables: &[&Variable]) -> Result<Vec<Reading>> {
@@ -168,7 +169,7 @@ fn read(session: &mut Session, variables: &[&Variable]) -> Result<Vec<Reading>> 
 
 pub fn running(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let d = fmu.description();
-    let lists: Vec<&Unknown> = d.outputs.iter().chain(&d.derivatives).collect();
+    let lists: Vec<&Unknown> = d.running_unknowns().collect();
     observe(fmu, &BTreeSet::new())?.report(fmu, &lists, "while running", findings);
     Ok(())
 }
@@ -178,11 +179,11 @@ pub fn feedthrough(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     if !fmu.interfaces().contains(&Interface::ModelExchange) {
         return skip("in Co-Simulation an output may wait for the next step to follow its inputs");
     }
-    let is_input = |index: usize| d.at(index).is_some_and(|v| v.causality == Causality::Input);
-    let declared: BTreeSet<(usize, usize)> = d
-        .outputs
-        .iter()
-        .flat_map(|u| u.dependencies.iter().flatten().map(|known| (u.index, *known)))
+    let is_input = |key: u32| d.at(key).is_some_and(|v| v.causality == Causality::Input);
+    let declared: BTreeSet<(u32, u32)> = d
+        .unknowns(d.words.outputs)
+        .filter_map(|u| Some((u.key?, u.dependencies.as_ref()?)))
+        .flat_map(|(key, knowns)| knowns.iter().map(move |known| (key, *known)))
         .filter(|(_, known)| is_input(*known))
         .collect();
     let seen = observe(fmu, &declared)?;
@@ -202,10 +203,10 @@ pub fn feedthrough(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 /// Changes inputs and states one by one, from many initial points, and returns the observed dependencies of
 /// outputs and derivatives. Stops early when all pairs of `wanted` have been observed. Skips the rule if
 /// there is nothing to observe.
-fn observe(fmu: &FmuUnderTest, wanted: &BTreeSet<(usize, usize)>) -> Result<Seen> {
+fn observe(fmu: &FmuUnderTest, wanted: &BTreeSet<(u32, u32)>) -> Result<Seen> {
     let d = fmu.description();
-    let lists: Vec<&Unknown> = d.outputs.iter().chain(&d.derivatives).collect();
-    let unknowns: Vec<&Variable> = lists.iter().filter_map(|u| d.at(u.index)).collect();
+    let lists: Vec<&Unknown> = d.running_unknowns().collect();
+    let unknowns: Vec<&Variable> = lists.iter().filter_map(|u| d.variable_of(u)).collect();
     if unknowns.is_empty() {
         return skip("the FMU has neither outputs nor derivatives");
     }
@@ -277,8 +278,8 @@ pub fn displaced(fmu: &FmuUnderTest, v: &Variable, now: &Reading, share: f64) ->
 
 pub fn initial(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let d = fmu.description();
-    let lists: Vec<&Unknown> = d.initial_unknowns.iter().collect();
-    let unknowns: Vec<&Variable> = lists.iter().filter_map(|u| d.at(u.index)).collect();
+    let lists: Vec<&Unknown> = d.unknowns(d.words.initial_unknowns).collect();
+    let unknowns: Vec<&Variable> = lists.iter().filter_map(|u| d.variable_of(u)).collect();
     if unknowns.is_empty() {
         return skip("the FMU has no InitialUnknowns");
     }
@@ -324,10 +325,8 @@ pub fn directional(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         );
     }
     let unknowns: Vec<&Variable> = d
-        .outputs
-        .iter()
-        .chain(&d.derivatives)
-        .filter_map(|u| d.at(u.index))
+        .running_unknowns()
+        .filter_map(|u| d.variable_of(u))
         .filter(|v| v.is_continuous())
         .collect();
     let references: Vec<u32> = unknowns.iter().map(|v| v.reference).collect();
@@ -374,7 +373,7 @@ pub fn directional(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             let (right, left) = ((above[n] - centre[n]) / h, (centre[n] - below[n]) / h);
             let rounding = 1e-13 * centre[n].abs().max(1e-3 * unknown.nominal()) / h;
             // Left out: a state that is also an output, and a kink, where no derivative exists.
-            if unknown.index == v.index {
+            if unknown.key == v.key {
                 continue;
             }
             if (right - left).abs() > 0.01 * right.abs().max(left.abs()) + rounding {

@@ -1,45 +1,86 @@
-//! Reads modelDescription.xml (FMI 2.0.5, section 2.2) without judging it, so that rules can report what is
-//! wrong.
+//! Reads modelDescription.xml (FMI 2.0.5, section 2.2; FMI 3.0.2, section 2.4) without judging it, so that
+//! rules can report what is wrong.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::ops::Deref;
+use std::collections::BTreeMap;
 use std::str::FromStr;
 
 use super::findings::Findings;
 use host::causality::{Causality, Variability};
-use host::description::Type;
+use host::description::{CType, Type};
 use host::xml::{Element, Fault};
 
-/// The parts of modelDescription.xml that rules need. Faults are not reported here but by the rules.
-pub struct Description {
-    pub root: Element,
-    pub model_exchange: Option<Element>,
-    pub co_simulation: Option<Element>,
-    pub variables: Vec<Variable>,
-    pub outputs: Vec<Unknown>,
-    pub derivatives: Vec<Unknown>,
-    pub initial_unknowns: Vec<Unknown>,
+/// Names in modelDescription.xml that differ between the versions of FMI.
+pub struct Words {
+    pub version: &'static str,
+    pub token: &'static str,
+    /// Types that may be continuous.
+    pub reals: &'static str,
+    pub outputs: &'static str,
+    pub derivatives: &'static str,
+    pub initial_unknowns: &'static str,
+    pub initials: Initials,
 }
 
-#[derive(Clone, Debug)]
-pub struct Variable {
-    /// Position among the variables, counted from 1 as in ModelStructure.
-    pub index: usize,
-    read: Common,
-}
+/// Function that returns the allowed values of `initial`, the default first (FMI 2.0.5, section 2.2.7; FMI
+/// 3.0.2, section 2.4.7.5). `None` means that the standard forbids this pair of causality and variability; an
+/// empty list means that `initial` must not be written.
+type Initials = fn(&Causality, &Variability) -> Option<&'static [&'static str]>;
 
-impl Deref for Variable {
-    type Target = Common;
+static FMI2: Words = Words {
+    version: "2.0",
+    token: "guid",
+    reals: "Real",
+    outputs: "Outputs",
+    derivatives: "Derivatives",
+    initial_unknowns: "InitialUnknowns",
+    initials: |causality, variability| match (causality, variability) {
+        (Causality::StructuralParameter, _) => None,
+        (Causality::Input, Variability::Discrete | Variability::Continuous) => Some(&[]),
+        _ => initials(causality, variability),
+    },
+};
 
-    fn deref(&self) -> &Common {
-        &self.read
+static FMI3: Words = Words {
+    version: "3.0",
+    token: "instantiationToken",
+    reals: "Float32, Float64",
+    outputs: "Output",
+    derivatives: "ContinuousStateDerivative",
+    initial_unknowns: "InitialUnknown",
+    initials,
+};
+
+fn initials(causality: &Causality, variability: &Variability) -> Option<&'static [&'static str]> {
+    use Causality::{
+        CalculatedParameter, Independent, Input, Local, Output, Parameter, StructuralParameter,
+    };
+    use Variability::{Constant, Continuous, Discrete, Fixed, Tunable};
+    match (causality, variability) {
+        (Parameter | StructuralParameter, Fixed | Tunable) => Some(&["exact"]),
+        (CalculatedParameter | Local, Fixed | Tunable) => Some(&["calculated", "approx"]),
+        (Input, Discrete | Continuous) | (Output | Local, Constant) => Some(&["exact"]),
+        (Output | Local, Discrete | Continuous) => Some(&["calculated", "exact", "approx"]),
+        (Independent, Continuous) => Some(&[]),
+        _ => None,
     }
 }
 
-/// The attributes of a variable that FMI 2.0 and 3.0 have in common. In `typed` the attributes that the
-/// variable inherits from its declaredType are filled in.
+/// The parts of modelDescription.xml that rules need. Faults are not reported here but by the rules.
+pub struct Description {
+    pub words: &'static Words,
+    pub root: Element,
+    pub variables: Vec<Variable>,
+    pub structure: Vec<Unknown>,
+    /// Positions of the variables by their keys.
+    places: BTreeMap<u32, usize>,
+}
+
+/// A variable. In `typed` the attributes that it inherits from its declaredType are filled in.
 #[derive(Clone, Debug)]
-pub struct Common {
+pub struct Variable {
+    /// Number by which ModelStructure and the attribute `derivative` name the variable: in FMI 2.0 its position
+    /// among the variables, counted from 1, in FMI 3.0 its value reference.
+    pub key: u32,
     pub line: u64,
     pub name: String,
     /// Value reference; 0 if the attribute is missing or not a number.
@@ -51,72 +92,39 @@ pub struct Common {
     /// if there is no default.
     pub initial: Option<String>,
     pub kind: Type,
+    pub c_type: CType,
+    pub starts: Vec<String>,
+    /// Sizes of an array, computed with the start values of structural parameters; empty for a scalar.
+    pub dimensions: Vec<usize>,
     /// The element with the type's attributes (start, min, unit …): in FMI 2.0 the child of ScalarVariable,
     /// in FMI 3.0 the variable's own element.
     pub typed: Element,
     pub(crate) written: Element,
 }
 
-/// Function that returns the allowed values of `initial`, the default first (FMI 2.0.5, section 2.2.7; FMI
-/// 3.0.2, section 2.4.7.5). `None` means that the standard forbids this pair of causality and variability; an
-/// empty list means that `initial` must not be written.
-pub(crate) type Initials = fn(&Causality, &Variability) -> Option<&'static [&'static str]>;
-
+/// An entry of ModelStructure; `list` is the list that it belongs to, for example Outputs (FMI 3.0: Output).
 #[derive(Clone, Debug)]
 pub struct Unknown {
+    pub list: String,
     pub line: u64,
-    /// Position of the variable, counted from 1; 0 if the attribute is missing or not a number.
-    pub index: usize,
-    /// Positions of the variables that this unknown depends on. `None` if the attribute is missing, which
-    /// means that it may depend on everything.
-    pub dependencies: Option<Vec<usize>>,
+    /// Key of the variable; if it is not a number, 0 in FMI 2.0 and `None` in FMI 3.0.
+    pub key: Option<u32>,
+    /// Keys of the variables that this unknown depends on. `None` if the attribute is missing, which means
+    /// that it may depend on everything.
+    pub dependencies: Option<Vec<u32>>,
     pub kinds: Option<Vec<String>>,
 }
 
 impl Variable {
-    pub fn derivative_of(&self) -> Option<usize> {
-        self.typed.get("derivative")?.trim().parse().ok()
+    /// Returns the key of the variable of which this is the derivative.
+    pub fn derivative_of(&self) -> Option<u32> {
+        number(&self.typed, "derivative")
     }
 
     /// Returns true if a host may set the variable: it is an input, or a parameter that is not constant.
     pub fn is_set_by_hosts(&self) -> bool {
         self.causality == Causality::Input
             || (self.causality == Causality::Parameter && self.variability != Variability::Constant)
-    }
-}
-
-impl Common {
-    /// Reads the attributes of a variable. `types` are the declared types by name, from which missing
-    /// attributes are inherited. `default` is the variability if the attribute is missing.
-    pub(crate) fn read(
-        element: &Element,
-        (kind, mut typed): (Type, Element),
-        types: &BTreeMap<&str, &Element>,
-        default: &str,
-        initials: Initials,
-    ) -> Common {
-        let declared = typed.get("declaredType").and_then(|name| types.get(name)).copied();
-        for (name, value) in declared.iter().flat_map(|declared| &declared.attributes) {
-            if typed.get(name).is_none() {
-                typed.attributes.push((name.clone(), value.clone()));
-            }
-        }
-        let text =
-            |name: &str, default: &str| element.get(name).unwrap_or(default).trim().to_string();
-        let causality = Causality::from(&*text("causality", "local"));
-        let variability = Variability::from(&*text("variability", default));
-        let default = initials(&causality, &variability).and_then(|all| all.first());
-        Common {
-            line: element.line,
-            name: text("name", ""),
-            reference: number(element, "valueReference").unwrap_or(0),
-            initial: element.get("initial").or(default.copied()).map(str::to_string),
-            causality,
-            variability,
-            kind,
-            typed,
-            written: element.clone(),
-        }
     }
 
     pub fn place(&self) -> String {
@@ -129,6 +137,15 @@ impl Common {
 
     pub fn is_continuous(&self) -> bool {
         self.is_real() && self.variability == Variability::Continuous
+    }
+
+    /// Returns true if rules read and set this variable; clocked variables, clocks and Binary are left out.
+    pub fn is_exchanged(&self) -> bool {
+        !matches!(self.kind, Type::Binary | Type::Clock) && self.typed.get("clocks").is_none()
+    }
+
+    pub fn length(&self) -> usize {
+        self.dimensions.iter().product()
     }
 
     /// Returns the attribute nominal, or 1 if it is missing or not positive.
@@ -144,46 +161,8 @@ impl Common {
     }
 }
 
-pub(crate) fn number<T: FromStr>(element: &Element, attribute: &str) -> Option<T> {
+fn number<T: FromStr>(element: &Element, attribute: &str) -> Option<T> {
     element.get(attribute)?.trim().parse().ok()
-}
-
-pub(crate) fn split_attribute(element: &Element, attribute: &str) -> Option<Vec<String>> {
-    Some(element.get(attribute)?.split_whitespace().map(str::to_string).collect())
-}
-
-pub(crate) fn each<'v, V: Deref<Target = Common> + 'v>(
-    variables: impl IntoIterator<Item = &'v V>,
-    findings: &mut Findings,
-    wrong: impl Fn(&'v V) -> Option<String>,
-) {
-    for variable in variables {
-        if let Some(text) = wrong(variable) {
-            findings.at(variable.place()).add(text);
-        }
-    }
-}
-
-/// Returns the allowed values of `initial` in FMI 2.0; see [`Initials`].
-pub(crate) fn initials(
-    causality: &Causality,
-    variability: &Variability,
-) -> Option<&'static [&'static str]> {
-    use Causality::{CalculatedParameter, Independent, Input, Local, Output, Parameter};
-    use Variability::{Constant, Continuous, Discrete, Fixed, Tunable};
-    const EXACT: &[&str] = &["exact"];
-    const COMPUTED: &[&str] = &["calculated", "approx"];
-    const ANY: &[&str] = &["calculated", "exact", "approx"];
-    match (causality, variability) {
-        (Parameter, Fixed | Tunable) => Some(EXACT),
-        (CalculatedParameter, Fixed | Tunable) => Some(COMPUTED),
-        (Input, Discrete | Continuous) => Some(&[]),
-        (Output | Local, Constant) => Some(EXACT),
-        (Output | Local, Discrete | Continuous) => Some(ANY),
-        (Local, Fixed | Tunable) => Some(COMPUTED),
-        (Independent, Continuous) => Some(&[]),
-        _ => None,
-    }
 }
 
 impl Description {
@@ -197,58 +176,109 @@ impl Description {
     }
 
     pub fn new(root: Element) -> Description {
+        let version = root.get("fmiVersion").unwrap_or_default().trim();
+        let is_fmi3 = version.starts_with("3.") && !version.contains('-');
+        let words = if is_fmi3 { &FMI3 } else { &FMI2 };
         let types: BTreeMap<&str, &Element> = root
             .list("TypeDefinitions")
-            .filter_map(|t| Some((t.get("name")?, t.children.first()?)))
+            .filter_map(|t| Some((t.get("name")?, if is_fmi3 { t } else { t.children.first()? })))
             .collect();
-        let elements = root.list("ModelVariables").filter(|e| e.name == "ScalarVariable");
-        let variables =
-            elements.zip(1..).map(|(element, index)| variable(element, index, &types)).collect();
-        let unknowns = |list: &str| -> Vec<Unknown> {
-            let structure = root.child("ModelStructure");
-            structure.into_iter().flat_map(|s| s.list(list)).map(unknown).collect()
+        let sizes: BTreeMap<&str, usize> = root
+            .list("ModelVariables")
+            .filter_map(|e| Some((e.get("valueReference")?, number(e, "start")?)))
+            .collect();
+        let elements = root.list("ModelVariables");
+        let variables: Vec<Variable> = match is_fmi3 {
+            true => {
+                elements.filter_map(|e| variable(words, e, e.clone(), &types, &sizes)).collect()
+            }
+            false => elements
+                .filter(|element| element.name == "ScalarVariable")
+                .zip(1..)
+                .filter_map(|(element, key)| {
+                    let of_fmi2 = |child: &&Element| c_type(words, &child.name).is_some();
+                    let typed = element.children.iter().find(of_fmi2).cloned();
+                    let typed =
+                        typed.unwrap_or(Element { name: "Real".into(), ..Element::default() });
+                    let read = variable(words, element, typed, &types, &sizes)?;
+                    Some(Variable { key, ..read })
+                })
+                .collect(),
         };
-        Description {
-            model_exchange: root.child("ModelExchange").cloned(),
-            co_simulation: root.child("CoSimulation").cloned(),
-            outputs: unknowns("Outputs"),
-            derivatives: unknowns("Derivatives"),
-            initial_unknowns: unknowns("InitialUnknowns"),
-            variables,
-            root,
+        let mut places = BTreeMap::new();
+        for (place, variable) in variables.iter().enumerate() {
+            places.entry(variable.key).or_insert(place);
         }
+        let lists = root.list("ModelStructure");
+        let structure = match is_fmi3 {
+            true => lists.map(|e| unknown(words, &e.name, e)).collect(),
+            false => lists
+                .flat_map(|list| list.children.iter().map(|e| unknown(words, &list.name, e)))
+                .collect(),
+        };
+        Description { words, variables, structure, places, root }
     }
 
     pub fn is_fmi3(&self) -> bool {
-        let version = self.root.get("fmiVersion").map(str::trim);
-        // A draft version such as 3.0-beta.3 has rules of its own, which are not checked here.
-        version.is_some_and(|version| version.starts_with("3.") && !version.contains('-'))
+        std::ptr::eq(self.words, &FMI3)
     }
 
-    /// Returns fmiVersion if it is a version 1 or 3 instead of 2.0.
+    /// Returns fmiVersion if the FMU is of a version for which there are no rules.
     pub fn other_version(&self) -> Option<&str> {
-        let version = self.root.get("fmiVersion").map(str::trim);
+        let version = self.root.get("fmiVersion").map(str::trim).filter(|_| !self.is_fmi3());
         version.filter(|version| version.starts_with("1.") || version.starts_with("3."))
     }
 
-    pub fn at(&self, index: usize) -> Option<&Variable> {
-        self.variables.get(index.checked_sub(1)?)
+    pub fn at(&self, key: u32) -> Option<&Variable> {
+        self.places.get(&key).map(|place| &self.variables[*place])
+    }
+
+    /// Returns the variable of an entry of ModelStructure.
+    pub fn variable_of(&self, unknown: &Unknown) -> Option<&Variable> {
+        self.at(unknown.key?)
+    }
+
+    pub fn interface(&self, name: &str) -> Option<&Element> {
+        self.root.child(name)
     }
 
     pub fn interfaces(&self) -> impl Iterator<Item = &Element> {
-        self.model_exchange.iter().chain(&self.co_simulation)
+        let names = ["ModelExchange", "CoSimulation", "ScheduledExecution"].into_iter();
+        names.filter_map(|name| self.root.child(name))
     }
 
-    /// Returns the positions of the continuous states: the variables whose derivatives are listed in
-    /// ModelStructure's Derivatives. The attribute `derivative` does not make a state, because inputs, outputs and dummy
-    /// derivatives may also have it (FMI 2.0.5, section 2.2.7). However, an FMU for only Co-Simulation may leave the list
-    /// out, and then the attribute is used.
-    pub fn states(&self) -> BTreeSet<usize> {
-        if self.derivatives.is_empty() && self.model_exchange.is_none() {
+    /// Returns true if the FMU has clocks, in which case `eventModeUsed` must be true in Co-Simulation
+    /// (section 2.3.1).
+    pub fn has_clocks(&self) -> bool {
+        self.variables.iter().any(|v| v.kind == Type::Clock)
+    }
+
+    pub fn unknowns<'a>(&'a self, list: &'a str) -> impl Iterator<Item = &'a Unknown> {
+        self.structure.iter().filter(move |u| u.list == list)
+    }
+
+    /// Returns the outputs and then the derivatives in ModelStructure.
+    pub fn running_unknowns(&self) -> impl Iterator<Item = &Unknown> {
+        self.unknowns(self.words.outputs).chain(self.unknowns(self.words.derivatives))
+    }
+
+    /// Returns true if derivatives need not be listed, because the FMU 2.0 is only for Co-Simulation, and are
+    /// not.
+    pub fn hides_states(&self) -> bool {
+        !self.is_fmi3()
+            && self.interface("ModelExchange").is_none()
+            && self.unknowns(self.words.derivatives).next().is_none()
+    }
+
+    /// Returns the keys of the continuous states: the variables whose derivatives ModelStructure lists, in its
+    /// order. The attribute `derivative` does not make a state, because inputs, outputs and dummy derivatives
+    /// may also have it (FMI 2.0.5, section 2.2.7). It is used only if the FMU hides its states.
+    pub fn states(&self) -> Vec<u32> {
+        if self.hides_states() {
             return self.variables.iter().filter_map(Variable::derivative_of).collect();
         }
-        let listed = self.derivatives.iter().filter_map(|unknown| self.at(unknown.index));
-        listed.filter_map(Variable::derivative_of).collect()
+        let listed = self.unknowns(self.words.derivatives);
+        listed.filter_map(|unknown| self.variable_of(unknown)?.derivative_of()).collect()
     }
 
     pub(crate) fn each<'d>(
@@ -256,40 +286,109 @@ impl Description {
         findings: &mut Findings,
         wrong: impl Fn(&'d Variable) -> Option<String>,
     ) {
-        each(&self.variables, findings, wrong);
+        for variable in &self.variables {
+            if let Some(text) = wrong(variable) {
+                findings.at(variable.place()).add(text);
+            }
+        }
     }
 
-    pub(crate) fn name_of(&self, index: usize) -> String {
-        self.at(index).map_or_else(|| format!("index {index}"), |v| v.name.clone())
+    pub(crate) fn name_of(&self, key: Option<u32>) -> String {
+        let kind = if self.is_fmi3() { "valueReference" } else { "index" };
+        match key.map(|key| (key, self.at(key))) {
+            Some((_, Some(v))) => v.name.clone(),
+            Some((key, None)) => format!("{kind} {key}"),
+            None => format!("no {kind}"),
+        }
     }
 }
 
-fn variable(element: &Element, index: usize, types: &BTreeMap<&str, &Element>) -> Variable {
-    let kinds = [
-        ("Real", Type::Real),
-        ("Integer", Type::Integer),
-        ("Boolean", Type::Boolean),
-        ("String", Type::String),
-        ("Enumeration", Type::Enumeration),
-    ];
-    let typed = element.children.iter().find_map(|child| {
-        let (_, kind) = kinds.iter().find(|(name, _)| *name == child.name)?;
-        Some((*kind, child.clone()))
+/// Returns the types that the name of a variable's element stands for.
+fn c_type(words: &Words, name: &str) -> Option<(CType, Type)> {
+    if words.version == "3.0" {
+        return CType::from_element_name(name);
+    }
+    Some(match name {
+        "Real" => (CType::Float64, Type::Real),
+        "Integer" => (CType::Int32, Type::Integer),
+        "Boolean" => (CType::Boolean, Type::Boolean),
+        "String" => (CType::String, Type::String),
+        "Enumeration" => (CType::Int32, Type::Enumeration),
+        _ => return None,
+    })
+}
+
+/// Reads a variable; in FMI 2.0 the caller corrects the key. `types` are the declared types by name, from which
+/// missing attributes are inherited, and `sizes` the start values of structural parameters by value reference.
+fn variable(
+    words: &Words,
+    element: &Element,
+    mut typed: Element,
+    types: &BTreeMap<&str, &Element>,
+    sizes: &BTreeMap<&str, usize>,
+) -> Option<Variable> {
+    let (c_type, kind) = c_type(words, &typed.name)?;
+    let declared = typed.get("declaredType").and_then(|name| types.get(name)).copied();
+    for (name, value) in declared.iter().flat_map(|declared| &declared.attributes) {
+        if typed.get(name).is_none() {
+            typed.attributes.push((name.clone(), value.clone()));
+        }
+    }
+    let text = |name: &str, default: &str| element.get(name).unwrap_or(default).trim().to_string();
+    let causality = text("causality", "local");
+    let default = match kind {
+        _ if words.version == "3.0" && causality.to_lowercase().ends_with("parameter") => "fixed",
+        Type::Real => "continuous",
+        _ => "discrete",
+    };
+    let causality = Causality::from(&*causality);
+    let variability = Variability::from(&*text("variability", default));
+    let default = (words.initials)(&causality, &variability).and_then(|all| all.first());
+    let children = |name: &'static str| element.children.iter().filter(move |c| c.name == name);
+    let start = typed.get("start").map(String::from);
+    let starts = match (words.version, kind) {
+        ("3.0", Type::String | Type::Binary) => {
+            children("Start").map(|c| c.get("value").unwrap_or_default().into()).collect()
+        }
+        ("3.0", _) => start.iter().flat_map(|s| s.split_whitespace()).map(String::from).collect(),
+        _ => start.into_iter().collect(),
+    };
+    let dimensions = children("Dimension").map(|d| {
+        let size = || sizes.get(d.get("valueReference")?.trim()).copied();
+        number(d, "start").or_else(size).unwrap_or(1)
     });
-    let (kind, typed) = typed.unwrap_or((Type::Real, Element::default()));
-    let default = if kind == Type::Real { "continuous" } else { "discrete" };
-    let mut read = Common::read(element, (kind, typed), types, default, initials);
-    read.written = element.without_children();
-    Variable { index, read }
+    let reference = number(element, "valueReference").unwrap_or(0);
+    Some(Variable {
+        key: reference,
+        line: element.line,
+        name: text("name", ""),
+        reference,
+        initial: element.get("initial").or(default.copied()).map(str::to_string),
+        causality,
+        variability,
+        kind,
+        c_type,
+        starts,
+        dimensions: dimensions.collect(),
+        typed,
+        written: element.clone(),
+    })
 }
 
-fn unknown(element: &Element) -> Unknown {
+fn unknown(words: &Words, list: &str, element: &Element) -> Unknown {
+    let is_fmi3 = words.version == "3.0";
+    let absent = (!is_fmi3).then_some(0);
+    let words =
+        |name: &str| -> Option<Vec<&str>> { Some(element.get(name)?.split_whitespace().collect()) };
+    let keys = |all: Vec<&str>| -> Vec<u32> {
+        all.into_iter().filter_map(|key| key.parse().ok().or(absent)).collect()
+    };
     Unknown {
+        list: list.into(),
         line: element.line,
-        index: number(element, "index").unwrap_or(0),
-        dependencies: split_attribute(element, "dependencies")
-            .map(|words| words.iter().map(|word| word.parse().unwrap_or(0)).collect()),
-        kinds: split_attribute(element, "dependenciesKind"),
+        key: number(element, if is_fmi3 { "valueReference" } else { "index" }).or(absent),
+        dependencies: words("dependencies").map(keys),
+        kinds: words("dependenciesKind").map(|all| all.into_iter().map(String::from).collect()),
     }
 }
 
@@ -310,7 +409,7 @@ mod tests {
         assert_eq!((&a.causality, &a.variability), (&Causality::Local, &Variability::Continuous));
         assert_eq!(a.initial.as_deref(), Some("calculated"));
         assert_eq!((a.bounds(), a.typed.get("unit")), ((2.0, f64::INFINITY), Some("m")));
-        assert_eq!((b.initial.as_deref(), b.kind, b.index), (Some("exact"), Type::Integer, 2));
+        assert_eq!((b.initial.as_deref(), b.kind, b.key), (Some("exact"), Type::Integer, 2));
         assert_eq!(c.variability, Variability::Discrete);
     }
 }

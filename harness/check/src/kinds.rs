@@ -36,11 +36,15 @@ impl Pair<'_> {
     }
 }
 
-fn pairs<'d>(fmu: &'d FmuUnderTest, list: &'static str, unknowns: &'d [Unknown]) -> Vec<Pair<'d>> {
+fn pairs<'d>(
+    fmu: &'d FmuUnderTest,
+    list: &'static str,
+    unknowns: impl Iterator<Item = &'d Unknown>,
+) -> Vec<Pair<'d>> {
     let d = fmu.description();
     let mut pairs = Vec::new();
     for u in unknowns {
-        let Some(unknown) = d.at(u.index).filter(|v| v.is_continuous()) else { continue };
+        let Some(unknown) = d.variable_of(u).filter(|v| v.is_continuous()) else { continue };
         let knowns = u.dependencies.iter().flatten().zip(u.kinds.iter().flatten());
         for (known, kind) in knowns.filter(|(_, kind)| *kind != "dependent") {
             let Some(known) = d.at(*known).filter(|v| v.is_real()) else { continue };
@@ -67,7 +71,7 @@ impl Factor {
 fn set_known(session: &mut Session, known: &Variable, x: f64) -> Result<bool> {
     let fmu = session.fmu;
     if session.interface == Interface::ModelExchange
-        && let Some(n) = fmu.states().iter().position(|(_, state)| state.index == known.index)
+        && let Some(n) = fmu.states().iter().position(|(_, state)| state.key == known.key)
     {
         let mut all = vec![0.0; session.states()];
         session.instance.continuous_states(&mut all)?;
@@ -150,9 +154,9 @@ fn at_points(
 
 pub fn kinds(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let d = fmu.description();
-    let initial = pairs(fmu, "InitialUnknowns", &d.initial_unknowns);
-    let mut running = pairs(fmu, "Outputs", &d.outputs);
-    running.extend(pairs(fmu, "Derivatives", &d.derivatives));
+    let initial = pairs(fmu, "InitialUnknowns", d.unknowns(d.words.initial_unknowns));
+    let mut running = pairs(fmu, "Outputs", d.unknowns(d.words.outputs));
+    running.extend(pairs(fmu, "Derivatives", d.unknowns(d.words.derivatives)));
     let mut interface = Interface::ModelExchange;
     if !fmu.interfaces().contains(&interface) {
         interface = Interface::CoSimulation;

@@ -129,38 +129,30 @@ pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) ->
         None => Err("there is no modelDescription.xml that can be unpacked".to_string()),
     };
     // FMI 3 has rules of its own. A file of FMI 1 breaks one rule, which says so.
-    let third = description.as_ref().ok().filter(|d| d.is_fmi3());
-    let third = third.map(|d| v3::Description::new(d.root.clone()));
-    let binaries = match &third {
-        Some(description) => Binaries::of_fmi3(&archive, description),
-        None => Binaries::new(&archive, description.as_ref().ok().copied()),
-    };
-    let is_foreign = description.as_ref().is_ok_and(|d| d.other_version().is_some());
-    let is_wanted = |rule: &&'static Rule| match is_foreign && third.is_none() {
+    let described = description.as_ref().ok().copied();
+    let table = if described.is_some_and(Description::is_fmi3) { fmi3::RULES } else { RULES };
+    let binaries = Binaries::new(&archive, described);
+    let is_foreign = described.is_some_and(|d| d.other_version().is_some());
+    let is_wanted = |rule: &&'static Rule| match is_foreign {
         true => rule.id == "xml.fmi_version",
         false => options.only.is_empty() || options.only.iter().any(|o| is_selected(rule, o)),
     };
-    let table = if third.is_some() { fmi3::RULES } else { RULES };
     let selected: Vec<&'static Rule> = table.iter().filter(is_wanted).collect();
     let calls = selected.iter().filter(|rule| rule.is_of_calls()).count();
-    let callable = match (&description, &third) {
-        (Err(why), _) => Err(why.clone()),
-        (_, Some(d))
-            if !["CoSimulation", "ModelExchange"].iter().any(|i| d.interface(i).is_some()) =>
-        {
+    let offers = |name: &str| described.is_some_and(|d| d.interface(name).is_some());
+    let exchanges = offers("ModelExchange");
+    let callable = match &description {
+        Err(why) => Err(why.clone()),
+        Ok(d) if d.is_fmi3() && !exchanges && !offers("CoSimulation") => {
             Err("the FMU offers neither Co-Simulation nor Model Exchange, and the check calls no other interface".into())
         }
-        (_, Some(d)) if d.has_clocks() && d.interface("ModelExchange").is_none() => {
+        Ok(d) if d.has_clocks() && !exchanges => {
             Err("the FMU has clocks, and the check does not call Co-Simulation of FMUs with clocks".into())
         }
         _ if binaries.own().is_none() => {
             Err(format!("the FMU has no binary for this platform, {}", binaries.own_folder()))
         }
-        (Ok(description), _) => Ok(&description.root),
-    };
-    let callable = match callable {
-        Ok(root) => Ok(write_description(root)?),
-        Err(why) => Err(why),
+        Ok(description) => Ok(write_description(&description.root)?),
     };
     let so_far = process::SoFar::default();
     let one = |rule: &&'static Rule| {
@@ -173,10 +165,6 @@ pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) ->
             // well-formed.
             (Check::Description(_), Err(why)) => findings.skip(why.clone()),
             (Check::Binaries(check), _) => check(&binaries, &mut findings),
-            (Check::Description3(check), _) => match &third {
-                Some(description) => check(description, &mut findings),
-                None => findings.skip("the file is not an FMU 3.0"),
-            },
             (Check::Calls(_) | Check::Calls3(_), _) => {
                 match &callable {
                     Ok((_, description)) => {

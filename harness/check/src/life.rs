@@ -111,7 +111,7 @@ pub fn arguments_null(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
     let with = Instantiation { resources: None, ..fmu.arguments(interface)? };
     let answer = fmu.with_open_effect(place, findings, || fmu.instantiate(interface, &with))?;
     if let Err(error) = answer
-        && fmu.description().co_simulation.is_some()
+        && fmu.description().interface("CoSimulation").is_some()
     {
         findings.at(place).add(error.to_string());
     }

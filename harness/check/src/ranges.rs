@@ -43,7 +43,7 @@ pub fn in_range(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                     Type::Real => OVERSHOOT * bound.abs().max(v.nominal()),
                     _ => 0.0,
                 };
-                if (x < min - slack(min) || x > max + slack(max)) && told.insert(v.index) {
+                if (x < min - slack(min) || x > max + slack(max)) && told.insert(v.key) {
                     findings.at(v.place()).add(format!(
                         "it is {x} after {step} steps of an ordinary run ({}) (allowed by its min \
                              and max: {min} to {max})",
@@ -164,7 +164,7 @@ pub fn items_known(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             if let Ok(Reading::Integer(value)) = session.get(v)
                 && !known.is_empty()
                 && !known.contains(&value)
-                && told.insert(v.index)
+                && told.insert(v.key)
             {
                 let list = known.iter().map(i32::to_string).collect::<Vec<_>>().join(", ");
                 findings.at(v.place()).fail(format!(

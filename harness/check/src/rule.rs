@@ -35,7 +35,6 @@ pub enum Check {
     /// For the loaded FMU, in a process of its own. If the function returns an error, the call that failed is
     /// a finding.
     Calls(fn(&FmuUnderTest, &mut Findings) -> Result<()>),
-    Description3(fn(&v3::Description, &mut Findings)),
     Calls3(fn(&v3::Subject, &mut Findings) -> Result<()>),
 }
 

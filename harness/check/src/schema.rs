@@ -246,17 +246,17 @@ fn place(element: &Element) -> String {
     }
 }
 
-/// `xml.schema`: reports elements and attributes that are unknown, missing or in the wrong order.
-pub fn structure(description: &Description, findings: &mut Findings) {
-    structure_by(KINDS, &description.root, findings);
+/// Returns the table of the description's version.
+fn kinds(d: &Description) -> &'static [Kind] {
+    if d.is_fmi3() { crate::v3::schema::KINDS } else { KINDS }
 }
 
-/// Checks the tree below `root` against the elements of `kinds`, the table of one FMI version.
-pub fn structure_by(kinds: &'static [Kind], root: &Element, findings: &mut Findings) {
-    if root.name != "fmiModelDescription" {
-        return findings.at(place(root)).add("the root element is not fmiModelDescription");
+/// `xml.schema`: reports elements and attributes that are unknown, missing or in the wrong order.
+pub fn structure(d: &Description, findings: &mut Findings) {
+    if d.root.name != "fmiModelDescription" {
+        return findings.at(place(&d.root)).add("the root element is not fmiModelDescription");
     }
-    elements(kinds, "", root, findings);
+    elements(kinds(d), "", &d.root, findings);
 }
 
 /// Elements on which the schema of FMI 3.0 allows attributes of other namespaces and vendors.
@@ -386,13 +386,8 @@ fn children(kind: &Kind, element: &Element, findings: &mut Findings) {
 }
 
 /// `xml.values`: reports attributes whose values do not have the required format.
-pub fn values(description: &Description, findings: &mut Findings) {
-    values_by(KINDS, &description.root, findings);
-}
-
-/// Checks the attribute values below `root` against the formats of `kinds`, the table of one FMI version.
-pub fn values_by(kinds: &'static [Kind], root: &Element, findings: &mut Findings) {
-    value(kinds, "", root, findings);
+pub fn values(d: &Description, findings: &mut Findings) {
+    value(kinds(d), "", &d.root, findings);
 }
 
 fn value(kinds: &'static [Kind], parent: &str, element: &Element, findings: &mut Findings) {

@@ -257,7 +257,7 @@ pub fn lag(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     const SAME: f64 = 0.02;
     let usual = after_three_steps(fmu)?.step;
     let states: Vec<&Variable> = fmu.states().into_iter().map(|(_, state)| state).collect();
-    let is_state = |v: &Variable| states.iter().any(|state| state.index == v.index);
+    let is_state = |v: &Variable| states.iter().any(|state| state.key == v.key);
     let is_watched = |v: &&Variable| {
         let shows = matches!(v.causality, Causality::Output | Causality::Independent);
         v.is_continuous() && (shows || is_state(v))
@@ -429,7 +429,7 @@ pub fn input_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<
 
 pub fn output_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let mut session = after_three_steps(fmu)?;
-    let interface = fmu.description().co_simulation.as_ref();
+    let interface = fmu.description().interface("CoSimulation");
     let order = interface.and_then(|i| i.number("maxOutputDerivativeOrder")).unwrap_or(0.0);
     if order < 1.0 {
         return skip("maxOutputDerivativeOrder is 0");
@@ -560,7 +560,7 @@ pub fn small(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 
 pub fn output_derivative_order(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     after_three_steps(fmu)?;
-    let interface = fmu.description().co_simulation.as_ref();
+    let interface = fmu.description().interface("CoSimulation");
     let most = interface.and_then(|i| i.number("maxOutputDerivativeOrder")).unwrap_or(0.0);
     if most < 1.0 {
         return skip("maxOutputDerivativeOrder is 0");

@@ -1,101 +1,63 @@
-//! Rules about ModelStructure in modelDescription.xml (FMI 2.0.5, section 2.2) and about dependencies.
+//! Rules about ModelStructure in modelDescription.xml (FMI 2.0.5, section 2.2; FMI 3.0.2, section 2.4) and about
+//! dependencies.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use host::causality::Causality;
+use host::causality::{Causality, Variability};
+use host::description::Type;
 
 use super::description::{Description, Unknown, Variable};
 use super::findings::Findings;
 
-/// Reports entries of the list named `list` that are missing, repeated or not allowed; `why` describes the
-/// allowed entries. Each of `entries` is a place, the variable's index or value reference, and whether it is
-/// allowed; `name` returns the name of a variable.
-pub(crate) fn compare_list<K: Ord>(
-    findings: &mut Findings,
-    list: &str,
-    entries: impl Iterator<Item = (String, K, bool)>,
-    needed: &BTreeSet<K>,
-    name: impl Fn(&K) -> String,
-    why: &str,
-) {
-    let mut seen = BTreeSet::new();
-    for (place, key, is_allowed) in entries {
-        if !is_allowed {
-            findings.at(&place).add(format!("it is not allowed here (allowed: {why})"));
-        }
-        if !seen.insert(key) {
-            findings.at(place).add("it is listed already");
-        }
-    }
-    for missing in needed.difference(&seen) {
-        let place = format!("{list}, {}", name(missing));
-        findings.at(place).add(format!("it is missing (required: {why})"));
-    }
+fn place(d: &Description, u: &Unknown) -> String {
+    format!("line {}, {}, {}", u.line, u.list, d.name_of(u.key))
 }
 
+/// Reports entries of `list` that are repeated or not `allowed`, and variables that are `needed` there but
+/// missing; `why` describes the allowed entries.
 fn compare(
     d: &Description,
     findings: &mut Findings,
     list: &str,
-    listed: &[Unknown],
-    expected: &BTreeSet<usize>,
+    needed: impl Fn(&Variable) -> bool,
+    allowed: impl Fn(&Variable) -> bool,
     why: &str,
 ) {
-    let entries = listed.iter().map(|unknown| {
-        let place = format!("line {}, {list}, {}", unknown.line, d.name_of(unknown.index));
-        // An index out of range is reported by another rule.
-        let is_allowed = d.at(unknown.index).is_none() || expected.contains(&unknown.index);
-        (place, unknown.index, is_allowed)
-    });
-    compare_list(findings, list, entries, expected, |index| d.name_of(*index), why);
-}
-
-/// Reports a dependency that is listed twice, and dependenciesKind without as many dependencies.
-pub(crate) fn check_kinds<K: Ord>(
-    findings: &mut Findings,
-    place: &str,
-    dependencies: Option<&[K]>,
-    kinds: Option<&Vec<String>>,
-) {
-    let listed = dependencies.unwrap_or_default();
-    let all = listed.len();
-    match kinds.map(Vec::len) {
-        Some(_) if dependencies.is_none() => {
-            findings.at(place).add("dependenciesKind without dependencies");
+    let mut seen = BTreeSet::new();
+    for unknown in d.unknowns(list).filter(|unknown| unknown.key.is_some()) {
+        if !d.variable_of(unknown).is_none_or(&allowed) {
+            let text = format!("it is not allowed here (allowed: {why})");
+            findings.at(place(d, unknown)).add(text);
         }
-        Some(n) if n != all => {
-            findings.at(place).add(format!("{all} dependencies, but {n} kinds of them"));
+        if !seen.insert(unknown.key) {
+            findings.at(place(d, unknown)).add("it is listed already");
         }
-        _ => {}
     }
-    if listed.iter().collect::<BTreeSet<_>>().len() < all {
-        findings.at(place).add("a dependency is listed twice");
+    for v in d.variables.iter().filter(|v| needed(v) && !seen.contains(&Some(v.key))) {
+        findings.at(format!("{list}, {}", v.name)).add(format!("it is missing (required: {why})"));
     }
-}
-
-fn indices(d: &Description, wanted: impl Fn(&Variable) -> bool) -> BTreeSet<usize> {
-    d.variables.iter().filter(|v| wanted(v)).map(|v| v.index).collect()
 }
 
 pub fn outputs(d: &Description, findings: &mut Findings) {
-    let expected = indices(d, |v| v.causality == Causality::Output);
-    compare(d, findings, "Outputs", &d.outputs, &expected, "every output, once");
+    let is_output = |v: &Variable| v.causality == Causality::Output;
+    compare(d, findings, d.words.outputs, is_output, is_output, "every output, once");
 }
 
+/// `xml.derivatives` of FMI 2.0.
 pub fn derivatives(d: &Description, findings: &mut Findings) {
-    if d.model_exchange.is_none() && d.derivatives.is_empty() {
+    if d.hides_states() {
         return findings.skip("Co-Simulation alone need not list derivatives");
     }
     let mut taken = BTreeMap::new();
     let mut seen = BTreeSet::new();
-    for unknown in &d.derivatives {
-        let Some(v) = d.at(unknown.index) else { continue };
-        let place = format!("line {}, Derivatives, {}", unknown.line, v.name);
+    for unknown in d.unknowns(d.words.derivatives) {
+        let Some(v) = d.variable_of(unknown) else { continue };
+        let place = place(d, unknown);
         let Some(state) = v.derivative_of() else {
             findings.at(&place).add("it has no attribute derivative, so its state is unknown");
             continue;
         };
-        if !seen.insert(unknown.index) {
+        if !seen.insert(v.key) {
             findings.at(&place).add("it is listed already");
         } else if let Some(other) = taken.insert(state, &v.name) {
             findings.at(&place).add(format!("{other} is the derivative of the same state"));
@@ -109,113 +71,166 @@ pub fn derivatives(d: &Description, findings: &mut Findings) {
     }
 }
 
-pub fn initial_unknowns(d: &Description, findings: &mut Findings) {
-    let states = d.states();
-    let expected = indices(d, |v| {
-        let computed = matches!(v.initial.as_deref(), Some("calculated" | "approx"));
-        let derivative = |v: &Variable| v.derivative_of().is_some_and(|s| states.contains(&s));
-        let state = states.contains(&v.index) || derivative(v);
-        computed
-            && (v.causality == Causality::Output
-                || v.causality == Causality::CalculatedParameter
-                || state)
-    });
-    // The standard lets an FMU for Co-Simulation list its states or leave them out.
-    let expected = match d.derivatives.is_empty() && d.model_exchange.is_none() {
-        true => indices(d, |v| {
-            expected.contains(&v.index)
-                && (v.causality != Causality::Local
-                    || d.initial_unknowns.iter().any(|u| u.index == v.index))
-        }),
-        false => expected,
-    };
-    let why = "outputs, states and derivatives with initial calculated or approx, and calculated \
-               parameters, once";
-    compare(d, findings, "InitialUnknowns", &d.initial_unknowns, &expected, why);
-    for pair in d.initial_unknowns.windows(2) {
-        if pair[1].index < pair[0].index {
-            findings
-                .at(format!("line {}, InitialUnknowns, {}", pair[1].line, d.name_of(pair[1].index)))
-                .add(format!(
-                    "index {} after {} (required: ascending)",
-                    pair[1].index, pair[0].index
-                ));
+/// `xml.derivatives` of FMI 3.0.
+pub fn derivatives3(d: &Description, findings: &mut Findings) {
+    let why = "variables with the attribute derivative, once";
+    let allowed = |v: &Variable| v.derivative_of().is_some();
+    compare(d, findings, d.words.derivatives, |_| false, allowed, why);
+    let mut taken: BTreeMap<u32, &str> = BTreeMap::new();
+    for unknown in d.unknowns(d.words.derivatives) {
+        if let Some(v) = d.variable_of(unknown)
+            && let Some(state) = v.derivative_of()
+            && let Some(other) = taken.insert(state, &v.name).filter(|other| *other != v.name)
+        {
+            let text = format!("{other} is the derivative of the same state");
+            findings.at(place(d, unknown)).add(text);
         }
     }
 }
 
-fn lists(d: &Description) -> [(&'static str, &[Unknown]); 3] {
-    [
-        ("Outputs", &d.outputs),
-        ("Derivatives", &d.derivatives),
-        ("InitialUnknowns", &d.initial_unknowns),
-    ]
+fn is_clocked(v: &Variable) -> bool {
+    v.written.get("clocks").is_some()
 }
 
-pub fn indices_in_range(d: &Description, findings: &mut Findings) {
+pub fn clocked_states(d: &Description, findings: &mut Findings) {
+    let is_state = |v: &Variable| v.written.get("previous").is_some();
+    let why = "every variable with the attribute previous, once";
+    compare(d, findings, "ClockedState", is_state, is_state, why);
+}
+
+pub fn event_indicators(d: &Description, findings: &mut Findings) {
+    let why = "continuous Float32 and Float64, each once";
+    compare(d, findings, "EventIndicator", |_| false, Variable::is_continuous, why);
+}
+
+pub fn initial_unknowns(d: &Description, findings: &mut Findings) {
+    let list = d.words.initial_unknowns;
+    let derivatives: BTreeSet<_> = d.unknowns(d.words.derivatives).map(|u| u.key).collect();
+    let states: BTreeSet<u32> = d.states().into_iter().collect();
+    let is_derivative = |v: &Variable| match d.is_fmi3() {
+        true => derivatives.contains(&Some(v.key)),
+        false => v.derivative_of().is_some_and(|state| states.contains(&state)),
+    };
+    let is_unknown = |v: &Variable| {
+        let is_computed = matches!(v.initial.as_deref(), Some("calculated" | "approx"));
+        let is_running =
+            v.causality == Causality::Output || states.contains(&v.key) || is_derivative(v);
+        let is_parameter = v.causality == Causality::CalculatedParameter;
+        !is_clocked(v)
+            && v.kind != Type::Clock
+            && (is_computed && (is_running || is_parameter) || is_parameter && d.is_fmi3())
+    };
+    // Without listed derivatives nobody knows whether a local variable is a state.
+    let may_hide = d.hides_states();
+    let needed = |v: &Variable| is_unknown(v) && !(may_hide && v.causality == Causality::Local);
+    let why = match d.is_fmi3() {
+        true => {
+            "outputs, states and their derivatives with initial calculated or approx, calculated parameters, \
+             once; clocked variables"
+        }
+        false => {
+            "outputs, states and derivatives with initial calculated or approx, and calculated parameters, once"
+        }
+    };
+    compare(d, findings, list, needed, |v| is_unknown(v) || is_clocked(v), why);
+    let keys: Vec<_> = d.unknowns(list).filter(|_| !d.is_fmi3()).collect();
+    for pair in keys.windows(2) {
+        if let (Some(before), Some(key)) = (pair[0].key, pair[1].key)
+            && key < before
+        {
+            findings
+                .at(place(d, pair[1]))
+                .add(format!("index {key} after {before} (required: ascending)"));
+        }
+    }
+}
+
+/// Reports entries of ModelStructure that name no variable.
+pub fn references(d: &Description, findings: &mut Findings) {
     let count = d.variables.len();
-    for (list, unknowns) in lists(d) {
-        for unknown in unknowns {
-            let place = format!("line {}, {list}", unknown.line);
-            if d.at(unknown.index).is_none() {
-                findings.at(&place).add(format!("index {} (allowed: 1 to {count})", unknown.index));
-            }
-            for index in unknown.dependencies.iter().flatten().filter(|i| d.at(**i).is_none()) {
-                findings.at(&place).add(format!("dependency {index} (allowed: 1 to {count})"));
-            }
+    for unknown in &d.structure {
+        let named = unknown.key.map(|key| ("index", key)).into_iter();
+        let known = unknown.dependencies.iter().flatten().map(|key| ("dependency", *key));
+        for (what, key) in named.chain(known).filter(|(_, key)| d.at(*key).is_none()) {
+            let text = match d.is_fmi3() {
+                true => format!("no variable has the valueReference {key}"),
+                false => format!("{what} {key} (allowed: 1 to {count})"),
+            };
+            findings.at(format!("line {}, {}", unknown.line, unknown.list)).add(text);
         }
     }
 }
 
 pub fn dependencies(d: &Description, findings: &mut Findings) {
-    for (list, unknowns) in lists(d) {
-        let initial = list == "InitialUnknowns";
-        for unknown in unknowns {
-            let place = format!("line {}, {list}, {}", unknown.line, d.name_of(unknown.index));
-            check_kinds(findings, &place, unknown.dependencies.as_deref(), unknown.kinds.as_ref());
-            let mut kinds = unknown.kinds.iter().flatten();
-            let odd = kinds.find(|k| !matches!(k.as_str(), "dependent" | "constant"));
-            if let Some(odd) = odd.filter(|_| initial) {
-                findings
-                    .at(&place)
-                    .add(format!("dependenciesKind {odd} (allowed: dependent, constant)"));
+    for unknown in &d.structure {
+        let place = place(d, unknown);
+        let listed = unknown.dependencies.as_deref().unwrap_or_default();
+        let (all, kinds) = (listed.len(), unknown.kinds.as_deref().unwrap_or_default());
+        if unknown.kinds.is_some() && unknown.dependencies.is_none() {
+            findings.at(&place).add("dependenciesKind without dependencies");
+        } else if unknown.kinds.is_some() && kinds.len() != all {
+            let text = format!("{all} dependencies, but {} kinds of them", kinds.len());
+            findings.at(&place).add(text);
+        }
+        if listed.iter().collect::<BTreeSet<_>>().len() < all {
+            findings.at(&place).add("a dependency is listed twice");
+        }
+        // FMI 3.0 allows kinds of linear dependence only for floating-point numbers.
+        let is_linear = !d.is_fmi3() || d.variable_of(unknown).is_none_or(Variable::is_real);
+        for kind in kinds {
+            let fits = match kind.as_str() {
+                "dependent" => true,
+                "constant" => is_linear,
+                _ => is_linear && unknown.list != d.words.initial_unknowns,
+            };
+            if !fits {
+                let allowed = if is_linear { "dependent, constant" } else { "dependent" };
+                findings.at(&place).add(format!("dependenciesKind {kind} (allowed: {allowed})"));
             }
         }
     }
 }
 
 pub fn dependencies_known(d: &Description, findings: &mut Findings) {
-    let states = d.states();
-    for (list, unknowns) in lists(d) {
-        let initial = list == "InitialUnknowns";
-        for unknown in unknowns {
-            let place = format!("line {}, {list}, {}", unknown.line, d.name_of(unknown.index));
-            let dependencies = unknown.dependencies.as_deref().unwrap_or_default();
-            let known = |v: &Variable| {
-                let common =
-                    v.causality == Causality::Input || v.causality == Causality::Independent;
-                match initial {
-                    true => common || v.initial.as_deref() == Some("exact"),
-                    // An FMU for Co-Simulation may hide its derivatives and still name its states.
-                    false => common || states.contains(&v.index) || d.model_exchange.is_none(),
-                }
-            };
-            for v in dependencies.iter().filter_map(|i| d.at(*i)).filter(|v| !known(v)) {
-                let allowed = match initial {
-                    true => "inputs, variables with initial=exact",
-                    false => "inputs, continuous states, the independent variable",
-                };
-                findings
-                    .at(&place)
-                    .add(format!("it cannot depend on {} (allowed: {allowed})", v.name));
+    use Causality::{Independent, Input, Parameter, StructuralParameter};
+    let states: BTreeSet<u32> = d.states().into_iter().collect();
+    let is_fmi3 = d.is_fmi3();
+    let any_state = !is_fmi3 && d.interface("ModelExchange").is_none();
+    for unknown in d.structure.iter().filter(|u| u.list != "EventIndicator") {
+        let initial = unknown.list == d.words.initial_unknowns;
+        let is_always_known = |v: &Variable| match v.causality {
+            Input | Independent => true,
+            Parameter | StructuralParameter => is_fmi3,
+            _ => v.kind == Type::Clock || is_clocked(v),
+        };
+        let is_known = |v: &Variable| match initial {
+            true => v.initial.as_deref() == Some("exact"),
+            false => {
+                any_state
+                    || states.contains(&v.key)
+                    || is_fmi3 && v.variability == Variability::Discrete
             }
+        };
+        let allowed = match (initial, is_fmi3) {
+            (true, true) => "inputs, variables with initial=exact, the independent variable",
+            (true, false) => "inputs, variables with initial=exact",
+            (false, true) => {
+                "inputs, continuous and discrete states, parameters, the independent variable"
+            }
+            (false, false) => "inputs, continuous states, the independent variable",
+        };
+        let listed = unknown.dependencies.iter().flatten().filter_map(|key| d.at(*key));
+        for v in listed.filter(|v| !is_always_known(v) && !is_known(v)) {
+            let text = format!("it cannot depend on {} (allowed: {allowed})", v.name);
+            findings.at(place(d, unknown)).add(text);
         }
     }
 }
 
 pub fn dependencies_written(d: &Description, findings: &mut Findings) {
-    for unknown in d.outputs.iter().filter(|unknown| unknown.dependencies.is_none()) {
-        findings.at(format!("line {}, Outputs, {}", unknown.line, d.name_of(unknown.index))).add(
+    let outputs = d.unknowns(d.words.outputs);
+    for unknown in outputs.filter(|unknown| unknown.dependencies.is_none()) {
+        findings.at(place(d, unknown)).add(
             "no attribute dependencies: that means it depends on everything (write \
              dependencies=\"\" where there is no feedthrough)",
         );

@@ -162,11 +162,11 @@ impl FmuUnderTest {
     /// vectors.
     pub fn states(&self) -> Vec<(&Variable, &Variable)> {
         let d = self.description;
-        let pair = |index| {
-            let derivative: &Variable = d.at(index)?;
+        let pair = |unknown| {
+            let derivative = d.variable_of(unknown)?;
             Some((derivative, d.at(derivative.derivative_of()?)?))
         };
-        d.derivatives.iter().filter_map(|unknown| pair(unknown.index)).collect()
+        d.unknowns(d.words.derivatives).filter_map(pair).collect()
     }
 
     pub fn experiment(&self) -> Experiment {

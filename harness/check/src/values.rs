@@ -52,7 +52,7 @@ pub fn start(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                 continue;
             }
             let Ok(value) = session.get(v) else { continue }; // values.readable tells
-            if !has_digits_of(&value, start) && wrong.insert(v.index) {
+            if !has_digits_of(&value, start) && wrong.insert(v.key) {
                 findings.at(v.place()).add(format!(
                     "start {start} in modelDescription.xml, {value} in the binary {when}"
                 ));
@@ -81,7 +81,7 @@ pub fn readable(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                 }
                 Ok(_) => continue,
             };
-            if told.insert(v.index) {
+            if told.insert(v.key) {
                 findings.at(v.place()).add(fault);
             }
         }

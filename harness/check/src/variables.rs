@@ -1,37 +1,35 @@
 use std::collections::{BTreeMap, BTreeSet};
-use std::ops::Deref;
 
-use super::description::{Common, Description, Initials, Variable, each, initials};
+use super::definitions::items;
+use super::description::{Description, Variable};
 use super::findings::Findings;
 use host::causality::{Causality, Variability};
 use host::description::Type;
-use host::xml::{Element, double};
+use host::xml::double;
 
 pub fn names(d: &Description, findings: &mut Findings) {
     let mut seen: BTreeMap<&str, u64> = BTreeMap::new();
     for v in &d.variables {
-        if v.name.is_empty() {
-            findings.at(v.place()).add("the name is empty");
-        } else if let Some(line) = seen.insert(&v.name, v.line) {
-            findings.at(v.place()).add(format!("line {line} has the same name"));
+        let aliases = v.written.children.iter().filter(|c| c.name == "Alias");
+        let aliases = aliases.map(|alias| (alias.get("name").unwrap_or_default(), alias.line));
+        for (name, line) in [(v.name.as_str(), v.line)].into_iter().chain(aliases) {
+            if name.is_empty() {
+                findings.at(format!("line {line}")).add("the name is empty");
+            } else if let Some(other) = seen.insert(name, line) {
+                findings
+                    .at(format!("line {line}, {name}"))
+                    .add(format!("line {other} has the same name (allowed: unique names)"));
+            }
         }
     }
 }
 
-pub fn structured_names(d: &Description, findings: &mut Findings) {
-    unstructured(&d.root, &d.variables, findings);
-}
-
 /// Reports names that are not structured although the description declares structured names.
-pub(crate) fn unstructured<'d, V: Deref<Target = Common> + 'd>(
-    root: &Element,
-    variables: impl IntoIterator<Item = &'d V>,
-    findings: &mut Findings,
-) {
-    if root.get("variableNamingConvention") != Some("structured") {
+pub fn structured_names(d: &Description, findings: &mut Findings) {
+    if d.root.get("variableNamingConvention") != Some("structured") {
         return findings.skip("names are not declared as structured");
     }
-    each(variables, findings, |v| {
+    d.each(findings, |v| {
         (!is_structured(&v.name))
             .then(|| "the name is not a path like a.b[1].c, der(a.b) or a.'b c'".to_string())
     });
@@ -150,23 +148,22 @@ fn is_whole(indices: &[Vec<u32>]) -> bool {
 }
 
 pub fn causality(d: &Description, findings: &mut Findings) {
-    d.each(findings, |v| wrong_causality(v, initials, "Real"));
-}
-
-/// Returns what is wrong with causality and variability. Only the types named in `reals` may be continuous.
-pub(crate) fn wrong_causality(v: &Common, initials: Initials, reals: &str) -> Option<String> {
-    let (causality, variability) = (&v.causality, &v.variability);
-    if initials(causality, variability).is_none() {
-        let all = ["constant", "fixed", "tunable", "discrete", "continuous"];
-        let allowed: Vec<_> =
-            all.into_iter().filter(|v| initials(causality, &(*v).into()).is_some()).collect();
-        let allowed = allowed.join(", ");
-        return Some(format!(
-            "causality {causality} with variability {variability} (allowed: {allowed})"
-        ));
-    }
-    (v.variability == Variability::Continuous && !v.is_real())
-        .then(|| format!("a continuous {} (allowed: {reals} alone)", v.typed.name))
+    d.each(findings, |v| {
+        let (causality, variability) = (&v.causality, &v.variability);
+        let is_allowed =
+            |variability: &Variability| (d.words.initials)(causality, variability).is_some();
+        if !is_allowed(variability) {
+            let all = ["constant", "fixed", "tunable", "discrete", "continuous"];
+            let allowed: Vec<_> = all.into_iter().filter(|v| is_allowed(&(*v).into())).collect();
+            let allowed = allowed.join(", ");
+            return Some(format!(
+                "causality {causality} with variability {variability} (allowed: {allowed})"
+            ));
+        }
+        let reals = d.words.reals;
+        (v.variability == Variability::Continuous && !v.is_real())
+            .then(|| format!("a continuous {} (allowed: {reals} alone)", v.typed.name))
+    });
 }
 
 pub fn variability(d: &Description, findings: &mut Findings) {
@@ -178,91 +175,82 @@ pub fn variability(d: &Description, findings: &mut Findings) {
 }
 
 pub fn initial(d: &Description, findings: &mut Findings) {
-    d.each(findings, |v| wrong_initial(v, initials));
-}
-
-pub(crate) fn wrong_initial(v: &Common, initials: Initials) -> Option<String> {
-    let written = v.written.get("initial")?;
-    // A forbidden combination of causality and variability is reported by another rule.
-    let allowed = initials(&v.causality, &v.variability)?;
-    let how = if allowed.is_empty() { "none".into() } else { allowed.join(", ") };
-    (!allowed.contains(&written)).then(|| {
-        format!(
-            "initial={written} with causality {} and variability {} (allowed: {how})",
-            v.causality, v.variability
-        )
-    })
+    d.each(findings, |v| {
+        let written = v.written.get("initial")?;
+        // A forbidden combination of causality and variability is reported by another rule.
+        let allowed = (d.words.initials)(&v.causality, &v.variability)?;
+        let how = if allowed.is_empty() { "none".into() } else { allowed.join(", ") };
+        (!allowed.contains(&written)).then(|| {
+            format!(
+                "initial={written} with causality {} and variability {} (allowed: {how})",
+                v.causality, v.variability
+            )
+        })
+    });
 }
 
 pub fn start(d: &Description, findings: &mut Findings) {
     d.each(findings, |v| {
-        wrong_start(v, v.typed.get("start").is_some(), v.causality == Causality::Input)
+        let (count, length) = (v.starts.len(), v.length());
+        if v.kind == Type::Clock || (count == 0 && length == 0) {
+            return None;
+        }
+        let initial = v.initial.as_deref();
+        let why = |other: String| initial.map_or(other, |i| format!("initial={i}"));
+        if v.causality == Causality::Independent || initial == Some("calculated") {
+            let why = why("independent".into());
+            return (count > 0).then(|| format!("a start value with {why} (allowed: none)"));
+        }
+        let is_set = matches!(
+            v.causality,
+            Causality::Input | Causality::Parameter | Causality::StructuralParameter
+        );
+        let is_constant = v.variability == Variability::Constant;
+        if count == 0 && (is_set || is_constant || matches!(initial, Some("exact" | "approx"))) {
+            return Some(format!("no start value with {}", why(v.causality.to_string())));
+        }
+        (count > 1 && count != length).then(|| {
+            format!("{count} start values (allowed: one, or {length}, one for each element)")
+        })
     });
 }
 
-/// Returns what is wrong with the presence (`is_there`) of a start value. `is_required` says that the
-/// causality requires one.
-pub(crate) fn wrong_start(v: &Common, is_there: bool, is_required: bool) -> Option<String> {
-    let initial = v.initial.as_deref();
-    let why = |other: String| format!("with {}", initial.map_or(other, |i| format!("initial={i}")));
-    if v.causality == Causality::Independent || initial == Some("calculated") {
-        return is_there
-            .then(|| format!("a start value {} (allowed: none)", why("independent".into())));
-    }
-    let needed = is_required
-        || v.variability == Variability::Constant
-        || matches!(initial, Some("exact" | "approx"));
-    (needed && !is_there).then(|| format!("no start value {}", why(v.causality.to_string())))
-}
-
+/// Reports start, min, max and nominal of floating-point variables that are NaN, infinite or (nominal) not
+/// positive.
 pub fn finite(d: &Description, findings: &mut Findings) {
-    d.each(findings, |v| not_finite(v, v.typed.number("start")));
-}
-
-/// Returns which of start, min, max and nominal of a floating-point variable is NaN, infinite or (nominal)
-/// not positive.
-pub(crate) fn not_finite(v: &Common, starts: impl IntoIterator<Item = f64>) -> Option<String> {
-    let starts = starts.into_iter().map(|start| ("start", start));
-    let others = ["min", "max", "nominal"].into_iter();
-    let others = others.filter_map(|name| Some((name, v.typed.number(name)?)));
-    let fits = |name: &str, x: f64| x.is_finite() && (name != "nominal" || x > 0.0);
-    let (name, x) = starts.chain(others).find(|(name, x)| v.is_real() && !fits(name, *x))?;
-    Some(match name {
-        "nominal" => format!("nominal={x} (allowed: finite, above 0)"),
-        _ => format!("{name}={x} (allowed: finite numbers)"),
-    })
+    d.each(findings, |v| {
+        let starts = v.starts.iter().filter_map(|s| Some(("start", double(s)?)));
+        let others = ["min", "max", "nominal"].into_iter();
+        let others = others.filter_map(|name| Some((name, v.typed.number(name)?)));
+        let fits = |name: &str, x: f64| x.is_finite() && (name != "nominal" || x > 0.0);
+        let (name, x) = starts.chain(others).find(|(name, x)| v.is_real() && !fits(name, *x))?;
+        Some(match name {
+            "nominal" => format!("nominal={x} (allowed: finite, above 0)"),
+            _ => format!("{name}={x} (allowed: finite numbers)"),
+        })
+    });
 }
 
 pub fn range(d: &Description, findings: &mut Findings) {
     d.each(findings, |v| {
-        let start = v.typed.get("start").and_then(double);
-        out_of_range(v, start.as_slice(), &d.root, |of| of.list("Enumeration").collect())
+        let (min, max) = v.bounds();
+        if min > max {
+            return Some(format!("min={min} is above max={max}"));
+        }
+        if !matches!(v.kind, Type::Real | Type::Integer | Type::Enumeration) {
+            return None;
+        }
+        let starts: Vec<f64> = v.starts.iter().filter_map(|s| double(s)).collect();
+        if let Some(start) = starts.iter().find(|x| **x < min || **x > max) {
+            return Some(format!("start={start} (allowed: {min} to {max})"));
+        }
+        let declared = v.typed.get("declaredType").filter(|_| v.kind == Type::Enumeration)?;
+        let of = d.root.list("TypeDefinitions").find(|t| t.get("name") == Some(declared))?;
+        let items: Vec<f64> = items(of).filter_map(|item| item.number("value")).collect();
+        let odd = starts.iter().find(|x| !items.is_empty() && !items.contains(x))?;
+        let list: Vec<_> = items.iter().map(f64::to_string).collect();
+        Some(format!("start={odd} is not an item (allowed: {})", list.join(", ")))
     });
-}
-
-/// Returns which bound or start value is out of range. `items` returns the items of an enumeration's type.
-pub(crate) fn out_of_range<'d>(
-    v: &Common,
-    starts: &[f64],
-    root: &'d Element,
-    items: impl Fn(&'d Element) -> Vec<&'d Element>,
-) -> Option<String> {
-    let (min, max) = v.bounds();
-    if min > max {
-        return Some(format!("min={min} is above max={max}"));
-    }
-    if !matches!(v.kind, Type::Real | Type::Integer | Type::Enumeration) {
-        return None;
-    }
-    if let Some(start) = starts.iter().find(|x| **x < min || **x > max) {
-        return Some(format!("start={start} (allowed: {min} to {max})"));
-    }
-    let declared = v.typed.get("declaredType").filter(|_| v.kind == Type::Enumeration)?;
-    let of = root.list("TypeDefinitions").find(|t| t.get("name") == Some(declared))?;
-    let items: Vec<f64> = items(of).iter().filter_map(|item| item.number("value")).collect();
-    let odd = starts.iter().find(|x| !items.is_empty() && !items.contains(x))?;
-    let list: Vec<_> = items.iter().map(f64::to_string).collect();
-    Some(format!("start={odd} is not an item (allowed: {})", list.join(", ")))
 }
 
 pub fn aliases(d: &Description, findings: &mut Findings) {
@@ -286,9 +274,8 @@ pub fn aliases(d: &Description, findings: &mut Findings) {
         if settable > 1 {
             findings.at(&place).add(format!("{settable} of them are set by hosts (allowed: one)"));
         }
-        let started = set
-            .iter()
-            .filter(|v| v.typed.get("start").is_some() && v.variability != Variability::Constant);
+        let started =
+            set.iter().filter(|v| !v.starts.is_empty() && v.variability != Variability::Constant);
         if settable <= 1 && started.count() > 1 {
             findings.at(&place).add("several of them have a start value (allowed: one)");
         }
@@ -321,7 +308,7 @@ pub fn independent(d: &Description, findings: &mut Findings) {
 pub fn multiple_set(d: &Description, findings: &mut Findings) {
     d.each(findings, |v| {
         v.written.get("canHandleMultipleSetPerTimeInstant")?;
-        if d.model_exchange.is_none() {
+        if d.interface("ModelExchange").is_none() {
             return Some("canHandleMultipleSetPerTimeInstant without ModelExchange".into());
         }
         (v.causality != Causality::Input)
@@ -336,11 +323,11 @@ pub fn states(d: &Description, findings: &mut Findings) {
         if d.at(index).is_none() {
             return Some(format!("derivative={index} (allowed: 1 to {})", d.variables.len()));
         }
-        (index == v.index).then(|| "it is its own derivative".to_string())
+        (index == v.key).then(|| "it is its own derivative".to_string())
     });
     let states = d.states();
     d.each(findings, |v| {
-        (v.typed.flag("reinit") && !states.contains(&v.index)).then(|| {
+        (v.typed.flag("reinit") && !states.contains(&v.key)).then(|| {
             "reinit, but Derivatives lists no derivative of it, so it is not a state".into()
         })
     });

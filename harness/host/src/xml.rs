@@ -140,12 +140,6 @@ impl Element {
         Some(Element { name, line, attributes, children })
     }
 
-    pub fn without_children(&self) -> Element {
-        let Element { name, line, attributes, .. } = self;
-        let (name, attributes) = (name.clone(), attributes.clone());
-        Element { name, line: *line, attributes, children: Vec::new() }
-    }
-
     pub fn get(&self, attribute: &str) -> Option<&str> {
         self.attributes.iter().find(|(name, _)| name == attribute).map(|(_, value)| &**value)
     }

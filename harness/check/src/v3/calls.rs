@@ -5,6 +5,7 @@ use anyhow::Result;
 
 use super::subject::Subject;
 use super::subject::{STEPS, Session, Use, start_values};
+use crate::description::Variable;
 use crate::findings::Findings;
 use crate::loaded::{Life as _, UnderTest as _, skip};
 use crate::{life, states};
@@ -96,9 +97,8 @@ pub fn start(subject: &Subject, findings: &mut Findings) -> Result<()> {
 
 pub fn set(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let using = subject.plain_uses()[0];
-    let wanted = |v: &&super::description::Variable| {
-        v.is_set_by_hosts() && v.causality != Causality::StructuralParameter
-    };
+    let wanted =
+        |v: &&Variable| v.is_set_by_hosts() && v.causality != Causality::StructuralParameter;
     for v in subject.readable().filter(wanted) {
         let Some(mut values) = start_values(v) else { continue };
         let (min, max) = v.bounds();
@@ -235,7 +235,7 @@ pub fn booleans(subject: &Subject, findings: &mut Findings) -> Result<()> {
 pub fn fixed(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let Some(using) = subject.plain_uses().first().copied() else { return Ok(()) };
     let mut any = false;
-    let wanted = |v: &&super::description::Variable| {
+    let wanted = |v: &&Variable| {
         v.causality == Causality::Parameter
             && v.variability == Variability::Fixed
             && v.c_type == CType::Float64
@@ -365,9 +365,9 @@ fn exchanging(subject: &Subject) -> Result<Session<'_>> {
 pub fn exchange_counts(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let d = &subject.description;
     let mut session = exchanging(subject)?;
-    let length = |r: u32| d.at(r).map_or(0, super::description::Variable::length);
+    let length = |r: u32| d.at(r).map_or(0, Variable::length);
     let states: usize = d.states().into_iter().map(length).sum();
-    let indicators = d.unknowns("EventIndicator").filter_map(|u| u.reference);
+    let indicators = d.unknowns("EventIndicator").filter_map(|u| u.key);
     let indicators: usize = indicators.map(length).sum();
     for (call, own, declared, list) in [
         (
@@ -397,8 +397,8 @@ pub fn exchange_vectors(subject: &Subject, findings: &mut Findings) -> Result<()
     let mut session = exchanging(subject)?;
     session.advance(3)?;
     let derivatives: Vec<u32> =
-        d.unknowns("ContinuousStateDerivative").filter_map(|u| u.reference).collect();
-    let indicators: Vec<u32> = d.unknowns("EventIndicator").filter_map(|u| u.reference).collect();
+        d.unknowns("ContinuousStateDerivative").filter_map(|u| u.key).collect();
+    let indicators: Vec<u32> = d.unknowns("EventIndicator").filter_map(|u| u.key).collect();
     let n = session.instance.number_of_states()?;
     let nz = session.instance.number_of_indicators()?;
     let (mut x, mut dx, mut z) = (vec![0.0; n], vec![0.0; n], vec![0.0; nz]);

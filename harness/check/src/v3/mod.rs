@@ -3,13 +3,9 @@
 
 pub mod archive;
 pub mod calls;
-pub mod definitions;
-pub mod description;
 pub mod schema;
 pub mod steps;
-pub mod structure;
 pub mod subject;
 pub mod variables;
 
-pub use self::description::{Description, Variable};
 pub use self::subject::Subject;

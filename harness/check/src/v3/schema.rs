@@ -7,9 +7,6 @@ use crate::schema::{
     Written, kind,
 };
 
-use super::description::Description;
-use crate::findings::Findings;
-
 const NAME: Attributes = &[("name", Text)];
 const NAMED: Attributes = &[("name", Text), ("valueReference", Unsigned)];
 const DESCRIPTION: Attributes = &[("description", Text)];
@@ -103,11 +100,3 @@ pub static KINDS: &[Kind] = &[
     kind("Output ContinuousStateDerivative ClockedState InitialUnknown EventIndicator", &[("valueReference", Unsigned)],
         &[("dependencies", INDICES), ("dependenciesKind", DEPENDENCY)], NOTE),
 ];
-
-pub fn structure(description: &Description, findings: &mut Findings) {
-    schema::structure_by(KINDS, &description.root, findings);
-}
-
-pub fn values(description: &Description, findings: &mut Findings) {
-    schema::values_by(KINDS, &description.root, findings);
-}

@@ -3,9 +3,9 @@
 
 use anyhow::Result;
 
-use super::description::Variable;
 use super::subject::Subject;
 use super::subject::{STEPS, Session, Use};
+use crate::description::Variable;
 use crate::findings::Findings;
 use crate::loaded::{Life as _, UnderTest as _, skip};
 use host::causality::{Causality, Variability};
@@ -504,7 +504,7 @@ fn pairs(subject: &Subject) -> Vec<(Variable, Vec<Variable>)> {
     let all = d.structure.iter().filter(|u| lists.contains(&u.list.as_str()));
     let float = |v: &Variable| v.c_type == CType::Float64 && v.is_continuous();
     all.filter_map(|u| {
-        let unknown = d.at(u.reference?).filter(|v| float(v))?;
+        let unknown = d.variable_of(u).filter(|v| float(v))?;
         let knowns = d.variables.iter().filter(|v| {
             let listed = u.dependencies.as_ref().is_none_or(|all| all.contains(&v.reference));
             let is_known = v.causality == Causality::Input || states.contains(&v.reference);
@@ -695,7 +695,7 @@ pub fn declared(subject: &Subject, findings: &mut Findings) -> Result<()> {
         {
             continue;
         }
-        let Some(v) = unknown.reference.and_then(|r| d.at(r)) else { continue };
+        let Some(v) = d.variable_of(unknown) else { continue };
         if v.c_type != CType::Float64 || !v.is_continuous() || !v.is_exchanged() {
             continue;
         }
@@ -735,7 +735,7 @@ pub fn elements(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let d = &subject.description;
     let mut session = subject.running(using)?;
     for unknown in d.structure.iter().filter(|u| u.list == "Output") {
-        let (Some(reference), Some(listed)) = (unknown.reference, &unknown.dependencies) else {
+        let (Some(reference), Some(listed)) = (unknown.key, &unknown.dependencies) else {
             continue;
         };
         let Some(v) = d.at(reference) else { continue };

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 
-use super::description::{Description, Variable};
+use crate::description::{Description, Variable};
 use crate::loaded::{Life, Loaded, UnderTest, Unusable, declared};
 use host::c_abi::{CallError, Called, Message};
 use host::causality::Causality;

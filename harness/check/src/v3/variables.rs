@@ -1,35 +1,11 @@
+//! Rules about variables that only FMI 3.0 has (FMI 3.0.2, section 2.4.7).
+
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::definitions::items;
-use super::description::{Description, Variable, initials};
+use crate::description::{Description, Variable};
 use crate::findings::Findings;
-use crate::variables::{
-    not_finite, out_of_range, unstructured, wrong_causality, wrong_initial, wrong_start,
-};
 use host::causality::{Causality, Variability};
 use host::description::{CType, Type};
-use host::xml::double;
-
-pub fn names(d: &Description, findings: &mut Findings) {
-    let mut seen: BTreeMap<&str, u64> = BTreeMap::new();
-    for v in &d.variables {
-        let aliases = v.written.children.iter().filter(|c| c.name == "Alias");
-        let aliases = aliases.map(|alias| (alias.get("name").unwrap_or_default(), alias.line));
-        for (name, line) in [(v.name.as_str(), v.line)].into_iter().chain(aliases) {
-            if name.is_empty() {
-                findings.at(format!("line {line}")).add("the name is empty");
-            } else if let Some(other) = seen.insert(name, line) {
-                findings.at(format!("line {line}, {name}")).add(format!(
-                    "line {other} has the same name (allowed: unique over variables and aliases)"
-                ));
-            }
-        }
-    }
-}
-
-pub fn structured_names(d: &Description, findings: &mut Findings) {
-    unstructured(&d.root, &d.variables, findings);
-}
 
 pub fn references(d: &Description, findings: &mut Findings) {
     let mut seen: BTreeMap<u32, &str> = BTreeMap::new();
@@ -42,44 +18,6 @@ pub fn references(d: &Description, findings: &mut Findings) {
                 ));
         }
     }
-}
-
-pub fn causality(d: &Description, findings: &mut Findings) {
-    d.each(findings, |v| wrong_causality(v, initials, "Float32, Float64"));
-}
-
-pub fn initial(d: &Description, findings: &mut Findings) {
-    d.each(findings, |v| wrong_initial(v, initials));
-}
-
-pub fn start(d: &Description, findings: &mut Findings) {
-    d.each(findings, |v| {
-        let (count, length) = (v.starts.len(), v.length());
-        // An array without elements has no start values.
-        if v.kind == Type::Clock || (count == 0 && length == 0) {
-            return None;
-        }
-        let is_required = matches!(
-            v.causality,
-            Causality::Input | Causality::Parameter | Causality::StructuralParameter
-        );
-        wrong_start(v, count > 0, is_required).or_else(|| {
-            (count > 1 && count != length).then(|| {
-                format!("{count} start values (allowed: one, or {length}, one for each element)")
-            })
-        })
-    });
-}
-
-pub fn finite(d: &Description, findings: &mut Findings) {
-    d.each(findings, |v| not_finite(v, v.starts.iter().filter_map(|s| double(s))));
-}
-
-pub fn range(d: &Description, findings: &mut Findings) {
-    d.each(findings, |v| {
-        let starts: Vec<f64> = v.starts.iter().filter_map(|s| double(s)).collect();
-        out_of_range(v, &starts, &d.root, items)
-    });
 }
 
 pub fn independent(d: &Description, findings: &mut Findings) {
@@ -147,7 +85,7 @@ pub fn clocks(d: &Description, findings: &mut Findings) {
         let Some(text) = v.written.get("previous") else { continue };
         let of = text.trim().parse().ok().and_then(|r| d.at(r));
         let fits = of.is_some_and(|of| {
-            of.reference != v.reference
+            of.key != v.key
                 && of.kind == v.kind
                 && of.variability == Variability::Discrete
                 && of.causality != Causality::Input
@@ -210,7 +148,7 @@ pub fn dimensions(d: &Description, findings: &mut Findings) {
 pub fn derivatives_of(d: &Description, findings: &mut Findings) {
     let states: BTreeSet<u32> = d.states().into_iter().collect();
     d.each(findings, |v| {
-        if v.written.flag("reinit") && !states.contains(&v.reference) {
+        if v.written.flag("reinit") && !states.contains(&v.key) {
             return Some("reinit, but it is not a continuous state".to_string());
         }
         let text = v.written.get("derivative")?;
@@ -219,7 +157,7 @@ pub fn derivatives_of(d: &Description, findings: &mut Findings) {
                 "derivative=\"{text}\" (allowed: the valueReference of a variable)"
             ));
         };
-        if of.reference == v.reference {
+        if of.key == v.key {
             return Some("it is its own derivative".into());
         }
         if !(v.is_continuous() && of.is_continuous()) {
