@@ -66,6 +66,20 @@ pub struct Energy {
     pub source: EnergySource,
 }
 
+impl Energy {
+    /// Returns s, kappa, s_2, kappa_2, t and t_2 with the names of their parameters in the FMUs.
+    pub fn parameters(&self) -> [(&'static str, f64); 6] {
+        [
+            ("nonlinear_inertia", self.nonlinear_inertia),
+            ("nonlinear_stiffness", self.nonlinear_stiffness),
+            ("nonlinear_inertia_2", self.nonlinear_inertia_2),
+            ("nonlinear_stiffness_2", self.nonlinear_stiffness_2),
+            ("rotary_inertia", self.rotary_inertia),
+            ("rotary_inertia_2", self.rotary_inertia_2),
+        ]
+    }
+}
+
 /// Source of the coefficients that give the wave's energy, each by fully nonlinear potential flow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]

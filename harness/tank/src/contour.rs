@@ -40,6 +40,12 @@ impl From<String> for Problems {
     }
 }
 
+impl From<&str> for Problems {
+    fn from(problem: &str) -> Problems {
+        problem.to_string().into()
+    }
+}
+
 /// Largest size, m. Larger tanks are probably drawn in millimetres.
 pub(crate) const LARGEST: f64 = 100.0;
 /// Largest distance of the ends of two segments that are joined, over the tank's size.
@@ -88,9 +94,7 @@ impl Contour {
     pub fn new(segments: Vec<Segment>) -> Result<Contour, Problems> {
         let mut problems = Vec::new();
         if segments.is_empty() {
-            return Err("The contour has no segment: it needs at least one line or arc."
-                .to_string()
-                .into());
+            return Err("The contour has no segment: it needs at least one line or arc.".into());
         }
         for (i, segment) in segments.iter().enumerate() {
             if let Some(problem) = defect(segment) {

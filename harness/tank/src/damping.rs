@@ -56,7 +56,6 @@ pub fn tank_damping(
     if first.omega <= 0.0 {
         return Err("A damping ratio depends on the acceleration along the tank's axis, and is not defined at 0 m/s² without surface \
                     tension: give an acceleration above 0, give the surface tension, or leave out the viscosity."
-            .to_string()
             .into());
     }
     let effective = first.omega * first.omega / first.lambda;

@@ -129,7 +129,6 @@ pub fn place(tank: &Tank, low: f64, high: f64, modes: usize) -> Result<Placed, P
     let dense = sweep::sweep(tank, &fills, modes)?.rows;
     if dense.iter().any(|row| row.modes.is_empty()) {
         return Err("A table over the fill needs a free surface at every fill: an empty tank and a full one have none."
-            .to_string()
             .into());
     }
     let curves = Curves::new(&dense, count_carrying_modes(&dense));
@@ -183,7 +182,6 @@ pub fn parameters(
     if target == Target::HubSlosh {
         return Err(
             "HubSlosh's tank does not drain: a table over the fill is for SloshTank or Spacecraft."
-                .to_string()
                 .into(),
         );
     }
@@ -196,7 +194,6 @@ pub fn parameters(
     }
     if rows.iter().any(|row| row.modes.is_empty()) {
         return Err("A table over the fill needs a free surface at every fill: an empty tank and a full one have none."
-            .to_string()
             .into());
     }
     let (first, last) = (&rows[0], &rows[rows.len() - 1]);

@@ -3,8 +3,6 @@
 //! A set file holds `"name" = value`, TOML with quoted names. The SSV form is the parameter set of
 //! SSP 1.0. `hubslosh run --set-file`, the Python package and SSP tools read them.
 
-use core::fmt::Write as _;
-
 use names::hubslosh::{self, DampingLaw, SloshSource, slosh};
 use names::{sloshtank, spacecraft};
 
@@ -64,6 +62,10 @@ pub struct Liquid {
 }
 
 impl Liquid {
+    fn fluid(&self, data: &ModalData) -> Option<Fluid> {
+        Some(Fluid { rho: data.rho, sigma: self.sigma?, g: self.gravity })
+    }
+
     /// Returns a warning if no surface tension is given and it may have an effect, because with
     /// [`LARGEST_TENSION`] the Bond number is below [`LOW_BOND`].
     fn missing_tension(&self, data: &ModalData) -> Option<String> {
@@ -119,7 +121,7 @@ pub enum Value {
 /// the values (`notes`), omitted values (`warnings`), and values far outside the range of their formula,
 /// which nobody should use unseen (`unknown`). `third_order` lists the modes, which count from 1, whose
 /// coefficients are among the `values`.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct ParameterSet {
     pub notes: Vec<String>,
     pub warnings: Vec<String>,
@@ -135,40 +137,34 @@ fn with_capillarity(
     data: &ModalData,
     modes: &[modal::Mode],
     (fluid, angle): (Fluid, f64),
-    notes: &mut Vec<String>,
-    warnings: &mut Vec<String>,
-    unknown: &mut Vec<String>,
+    set: &mut ParameterSet,
 ) -> Vec<Capillary> {
     let mut all: Vec<Capillary> = modes.iter().map(|mode| low_gravity::flat(mode, fluid)).collect();
-    if angle != 90.0 {
-        if let Geometry::Revolution { shape: Some(Shape::Cylinder { radius, .. }), .. } =
-            &tank.geometry
-        {
+    match &tank.geometry {
+        _ if angle == 90.0 => {}
+        Geometry::Revolution { shape: Some(Shape::Cylinder { radius, .. }), .. } => {
             all[0] = low_gravity::cylinder(&modes[0], *radius, data.fill, angle, fluid);
-            let bond = fluid.bond(*radius);
-            notes.push(format!(
+            set.notes.push(format!(
                 "k of mode 1: meniscus of a deep cylinder at a contact angle of {angle} degrees and the Bond \
-                 number {bond:.4}, free contact line (table); it holds at {} m/s²",
+                 number {:.4}, free contact line (table); it holds at {} m/s²",
+                fluid.bond(*radius),
                 fluid.g
             ));
-            warnings.push(
+            set.warnings.push(
                 "capillarity: under a curved meniscus masses and heights, and the stiffnesses of the modes \
                  after the first, are not known; they are those of a flat surface"
-                    .to_string(),
+                    .into(),
             );
-        } else {
-            warnings.push(format!(
-                "capillarity: the meniscus of a contact angle of {angle} degrees is known for an upright \
-                 cylinder (shape = {{ cylinder = … }}) alone; k is that of a flat surface, 90 degrees"
-            ));
         }
+        _ => set.warnings.push(format!(
+            "capillarity: the meniscus of a contact angle of {angle} degrees is known for an upright \
+             cylinder (shape = {{ cylinder = … }}) alone; k is that of a flat surface, 90 degrees"
+        )),
     }
-    for (n, capillary) in all.iter().enumerate() {
-        let outside = capillary.outside.iter().map(|why| format!("capillarity: {why}"));
-        warnings.extend(outside);
-        if capillary.unknown {
-            let why = capillary.outside.join("; ");
-            unknown.push(format!("k of mode {} is not known: {why}", n + 1));
+    for (n, Capillary { outside, unknown, .. }) in (1..).zip(&all) {
+        set.warnings.extend(outside.iter().map(|why| format!("capillarity: {why}")));
+        if *unknown {
+            set.unknown.push(format!("k of mode {n} is not known: {}", outside.join("; ")));
         }
     }
     all
@@ -180,34 +176,29 @@ fn springs(
     data: &ModalData,
     modes: &[modal::Mode],
     liquid: Liquid,
-    notes: &mut Vec<String>,
-    warnings: &mut Vec<String>,
-    unknown: &mut Vec<String>,
+    set: &mut ParameterSet,
 ) -> Vec<f64> {
-    let Some(sigma) = liquid.sigma else {
+    let Some(fluid) = liquid.fluid(data) else {
         if liquid.gravity == 0.0 {
-            warnings
+            set.warnings
                 .push("nothing centres the liquid at 0 m/s² without surface tension".to_string());
         }
-        warnings.extend(liquid.missing_tension(data));
+        set.warnings.extend(liquid.missing_tension(data));
         return vec![0.0; modes.len()];
     };
-    let fluid = Fluid { rho: data.rho, sigma, g: liquid.gravity };
-    let curved = (fluid, liquid.contact_angle);
-    let mut all = with_capillarity(tank, data, modes, curved, notes, warnings, unknown);
-    for (n, (mode, capillary)) in modes.iter().zip(&mut all).enumerate() {
+    let all = with_capillarity(tank, data, modes, (fluid, liquid.contact_angle), set);
+    let spring = |(n, (mode, capillary)): (usize, (&modal::Mode, &Capillary))| {
         let (k, gravity) = (capillary.spring, liquid.gravity * mode.lambda);
         if k < 0.0 {
-            warnings.push(format!(
-                "capillarity: k of mode {} is {k:.3e} N/m, and the FMUs take none below 0; 0 is written, which \
+            set.warnings.push(format!(
+                "capillarity: k of mode {n} is {k:.3e} N/m, and the FMUs take none below 0; 0 is written, which \
                  leaves the frequency {:.1e} of itself too high",
-                n + 1,
                 1.0 - (capillary.omega2 / gravity).sqrt()
             ));
-            capillary.spring = 0.0;
         }
-    }
-    all.iter().map(|capillary| capillary.spring).collect()
+        if k < 0.0 { 0.0 } else { k }
+    };
+    (1..).zip(modes.iter().zip(&all)).map(spring).collect()
 }
 
 /// Returns axis and number of the three modes that a box has in Spacecraft: the first along each axis, and
@@ -237,37 +228,25 @@ pub fn tank_capillarity(
     data: &ModalData,
     liquid: Liquid,
 ) -> Option<modal::Capillarity> {
-    let sigma = liquid.sigma?;
-    let fluid = Fluid { rho: data.rho, sigma, g: liquid.gravity };
-    let curved = (fluid, liquid.contact_angle);
+    let (fluid, Liquid { contact_angle, gravity, .. }) = (liquid.fluid(data)?, liquid);
     let mut warnings = Vec::new();
     let mut of_modes = |modes: &[modal::Mode]| -> Vec<modal::CapillaryMode> {
-        let (mut notes, mut unknown) = (Vec::new(), Vec::new());
-        let all =
-            with_capillarity(tank, data, modes, curved, &mut notes, &mut warnings, &mut unknown);
-        warnings.extend(unknown.iter().map(|why| why.replacen("k of mode", "f of mode", 1)));
-        all.iter()
-            .map(|mode| {
-                let known = !mode.unknown;
-                modal::CapillaryMode {
-                    omega: known.then(|| mode.omega2.max(0.0).sqrt()),
-                    k: known.then_some(mode.spring),
-                }
-            })
-            .collect()
+        let mut set = ParameterSet::default();
+        let all = with_capillarity(tank, data, modes, (fluid, contact_angle), &mut set);
+        warnings.append(&mut set.warnings);
+        warnings.extend(set.unknown.iter().map(|why| why.replacen("k of mode", "f of mode", 1)));
+        let mode = |mode: &Capillary| modal::CapillaryMode {
+            omega: (!mode.unknown).then(|| mode.omega2.max(0.0).sqrt()),
+            k: (!mode.unknown).then_some(mode.spring),
+        };
+        all.iter().map(mode).collect()
     };
     let modes = if data.modes.is_empty() { Vec::new() } else { of_modes(&data.modes) };
     let modes_y = data.axes.as_ref().map_or(Vec::new(), |axes| of_modes(&axes.y.modes));
     warnings.dedup();
-    Some(modal::Capillarity {
-        sigma,
-        contact_angle: liquid.contact_angle,
-        gravity: liquid.gravity,
-        bond: data.r_surface.filter(|_| sigma > 0.0).map(|radius| fluid.bond(radius)),
-        modes,
-        modes_y,
-        warnings,
-    })
+    let (sigma, radius) = (fluid.sigma, data.r_surface.filter(|_| fluid.sigma > 0.0));
+    let bond = radius.map(|radius| fluid.bond(radius));
+    Some(modal::Capillarity { sigma, contact_angle, gravity, bond, modes, modes_y, warnings })
 }
 
 /// Solves a tank at a fill, and adds what depends on the liquid's other properties: capillarity, damping, and
@@ -296,10 +275,8 @@ pub fn tank_damping(
     nu: f64,
     liquid: Liquid,
 ) -> Result<modal::Damping, Problems> {
-    let stiffnesses = |modes: &[modal::Mode]| {
-        let (mut notes, mut warnings, mut unknown) = (Vec::new(), Vec::new(), Vec::new());
-        springs(tank, data, modes, liquid, &mut notes, &mut warnings, &mut unknown)
-    };
+    let mut unused = ParameterSet::default();
+    let mut stiffnesses = |modes| springs(tank, data, modes, liquid, &mut unused);
     let along_y = data.axes.as_ref().map_or(Vec::new(), |axes| stiffnesses(&axes.y.modes));
     let springs = [&stiffnesses(&data.modes)[..], &along_y[..]];
     damping::tank_damping(tank, data, nu, liquid.gravity, springs, liquid.sigma)
@@ -330,15 +307,12 @@ impl ParameterSet {
         has_energy: bool,
     ) -> Result<ParameterSet, Problems> {
         let name = data.name.as_deref().unwrap_or("tank");
-        let mut notes = vec![
-            format!(
-                "{name}, fill {} m: modal parameters with an error of {:.0e}, of I_0 {:.0e} m R^2",
-                short(data.fill),
-                data.error,
-                data.error_i_0
-            ),
-            format!("heights (hinge, H_0): {}", data.origin()),
-        ];
+        let (fill, ModalData { error, error_i_0, .. }) = (short(data.fill), data);
+        let mut set = ParameterSet::default();
+        set.notes.push(format!(
+            "{name}, fill {fill} m: modal parameters with an error of {error:.0e}, of I_0 {error_i_0:.0e} m R^2"
+        ));
+        set.notes.push(format!("heights (hinge, H_0): {}", data.origin()));
         let most = match target {
             Target::HubSlosh => slosh::MOST_MODES,
             Target::SloshTank => sloshtank::tank::MOST_MODES,
@@ -359,13 +333,10 @@ impl ParameterSet {
         if liquid.gravity == 0.0 && liquid.nu.is_some() {
             return Err("A damping ratio depends on the acceleration along the tank's axis, and is not defined at 0 m/s²: \
                         give an acceleration above 0, or leave out the viscosity."
-                .to_string()
                 .into());
         }
         let sides = match &tank.geometry {
-            Geometry::Box { length_x, length_y } if length_x != length_y => {
-                Some([length_x, length_y])
-            }
+            Geometry::Box { length_x: x, length_y: y } if x != y => Some([x, y]),
             _ => None,
         };
         // For a box with unequal sides, the modes along both; otherwise those along the first axis.
@@ -386,31 +357,27 @@ impl ParameterSet {
         let of_axes = [&data.modes[..count], both.map_or(&[], |axes| &axes.y.modes[..count])];
         let modes: Vec<modal::Mode> =
             chosen.iter().map(|&(axis, n)| of_axes[axis][n].clone()).collect();
-        let (mut warnings, mut unknown) = (Vec::new(), Vec::new());
         if let Some(spin) = &data.spin {
-            notes.push(format!(
+            set.notes.push(format!(
                 "masses, lengths and heights are those of the liquid at rest; turning with the tank at {} rad/s its centre of mass is at \
                  z = {:.6} m and its inertia about the axis {} kg·m²",
                 significant(spin.omega),
                 spin.z_cg,
                 significant(spin.i_axis)
             ));
-            if target == Target::HubSlosh {
-                notes.push("HubSlosh has no spin of the liquid".to_string());
-            } else {
-                notes.push(format!(
-                    "the liquid starts at the rate of its tank (set init.omega){}",
-                    match spin.decay {
-                        Some(_) => "",
-                        None => "; spin_decay is known for upright cylinders with nu only, so that it does not rub against the wall",
-                    }
-                ));
-            }
-            warnings.extend(spin.warnings.iter().map(|warning| format!("spin: {warning}")));
+            let start = "the liquid starts at the rate of its tank (set init.omega)";
+            set.notes.push(match (target, spin.decay) {
+                (Target::HubSlosh, _) => "HubSlosh has no spin of the liquid".into(),
+                (_, Some(_)) => start.into(),
+                (_, None) => format!(
+                    "{start}; spin_decay is known for upright cylinders with nu only, so that it does not rub against the wall"
+                ),
+            });
+            set.warnings.extend(spin.warnings.iter().map(|warning| format!("spin: {warning}")));
         }
         let springs = of_axes.map(|all| match all {
             [] => Vec::new(),
-            _ => springs(tank, data, all, liquid, &mut notes, &mut warnings, &mut unknown),
+            _ => springs(tank, data, all, liquid, &mut set),
         });
         let ratios: Vec<f64> = match liquid.nu {
             Some(nu) => {
@@ -418,23 +385,21 @@ impl ParameterSet {
                     Some(known) if liquid.damped(data) => known.clone(),
                     _ => tank_damping(tank, data, nu, liquid)?,
                 };
-                notes.push(format!("damping ratio of mode 1: {}", found.taken));
+                set.notes.push(format!("damping ratio of mode 1: {}", found.taken));
                 let of_axes = [&found.modes, &found.modes_y];
                 let found_of = chosen.iter().map(|&(axis, n)| &of_axes[axis][n]);
-                for (n, mode) in found_of.clone().enumerate() {
+                for (n, mode) in (1..).zip(found_of.clone()) {
                     let [low, high] = mode.interval.map(significant);
                     let zeta = significant(mode.zeta);
-                    notes.push(format!(
-                        "zeta[{}] = {zeta}, expected between {low} and {high}",
-                        n + 1
-                    ));
+                    set.notes
+                        .push(format!("zeta[{n}] = {zeta}, expected between {low} and {high}"));
                 }
                 let ratios = found_of.map(|mode| mode.zeta).collect();
-                warnings.extend(found.warnings);
+                set.warnings.extend(found.warnings);
                 ratios
             }
             None => {
-                notes.push("no viscosity was given: the damping ratios are 0".to_string());
+                set.notes.push("no viscosity was given: the damping ratios are 0".to_string());
                 vec![0.0; modes.len()]
             }
         };
@@ -454,39 +419,33 @@ impl ParameterSet {
         }
         // HubSlosh has modes along both lengths of a box in its linear and planar models only.
         let is_linear = both.is_some() && target == Target::HubSlosh;
-        let third_order: Vec<(usize, Coefficients)> = chosen
-            .iter()
-            .enumerate()
-            .filter(|(_, (_, of_axis))| *of_axis == 0 && !is_linear)
-            .filter_map(|(n, (axis, _))| Some((n + 1, [found.mode, found.mode_y][*axis]?)))
-            .filter(|(_, known)| {
-                known.series_limit >= finite_amplitude::LEAST_ANGLE
-                    || has_energy && known.energy.is_some()
-            })
-            .collect();
-        // Without its coefficients a mode is a pendulum.
-        let limits: Vec<(usize, [Option<f64>; 2])> = chosen
-            .iter()
-            .enumerate()
+        let known: Vec<(usize, Coefficients)> = (1..)
+            .zip(&chosen)
             .filter(|(_, (_, of_axis))| *of_axis == 0)
-            .filter_map(|(n, (axis, _))| Some((n + 1, [found.mode, found.mode_y][*axis]?)))
-            .map(|(n, known)| {
-                let angle = match third_order.iter().any(|(mode, _)| *mode == n) {
-                    true if has_energy => {
-                        known.energy.map_or(known.angle_limit, |of| of.angle_limit)
-                    }
-                    true => known.angle_limit,
-                    false => known.pendulum_limit(),
-                };
-                (n, [Some(angle), known.swirl_limit])
-            })
+            .filter_map(|(n, (axis, _))| Some((n, [found.mode, found.mode_y][*axis]?)))
             .collect();
+        let energy = |known: &Coefficients| known.energy.filter(|_| has_energy);
+        let is_written = |known: &Coefficients| {
+            let holds = known.series_limit >= finite_amplitude::LEAST_ANGLE;
+            !is_linear && (holds || energy(known).is_some())
+        };
+        let third_order: Vec<_> = known.iter().filter(|of| is_written(&of.1)).copied().collect();
+        // Without its coefficients a mode is a pendulum.
+        let limit = |(n, known): &(usize, Coefficients)| {
+            let angle = match is_written(known) {
+                true => energy(known).map_or(known.angle_limit, |of| of.angle_limit),
+                false => known.pendulum_limit(),
+            };
+            (*n, [("angle_limit", Some(angle)), ("swirl_limit", known.swirl_limit)])
+        };
+        let limits: Vec<_> = known.iter().map(limit).collect();
         if limits.is_empty() {
-            notes.push("angle_limit is not known: in_range ends at 45 degrees alone".to_string());
+            set.notes
+                .push("angle_limit is not known: in_range ends at 45 degrees alone".to_string());
         }
         for (n, known) in &third_order {
-            if let Some(energy) = known.energy.filter(|_| has_energy) {
-                notes.push(format!(
+            if let Some(energy) = energy(known) {
+                set.notes.push(format!(
                     "nonlinear_inertia[{n}] to rotary_inertia_2[{n}]: fully nonlinear potential flow in {}, frequency (error {:.0e}) and \
                      energy (error {:.0e}) of the wave up to {:.1} degrees; angle_limit is {:.1} degrees",
                     energy.source.words(),
@@ -497,7 +456,7 @@ impl ParameterSet {
                 ));
                 continue;
             }
-            notes.push(format!(
+            set.notes.push(format!(
                 "nonlinear_inertia[{0}] = {1}, nonlinear_stiffness[{0}] = {2}: third order of potential flow, {3}, for slosh angles up \
                  to {4:.1} degrees (angle_limit, {5})",
                 n,
@@ -512,55 +471,44 @@ impl ParameterSet {
             ));
         }
         if is_linear {
-            notes.push("separate modes along both lengths have no coefficients of finite amplitude in HubSlosh".to_string());
+            set.notes.push("separate modes along both lengths have no coefficients of finite amplitude in HubSlosh".to_string());
         } else {
-            notes.extend(found.warnings);
+            set.notes.extend(found.warnings);
         }
         // The same parameters for every FMU, with the prefix of its tank.
         let of_modes = |prefix: &str, values: &mut Vec<(String, Value)>| {
-            for (n, (mode, &(axis, of_axis))) in modes.iter().zip(&chosen).enumerate() {
-                for (what, value) in [
-                    ("mass", mode.m),
-                    ("length", mode.l),
-                    ("hinge", mode.hinge.unwrap_or(0.0)),
-                    ("k", springs[axis][of_axis]),
-                    ("zeta", ratios[n]),
-                    ("wave", mode.wave),
-                ] {
-                    values.push((format!("{prefix}.{what}[{}]", n + 1), Value::Real(value)));
-                }
+            let mut real = |n: usize, what: &str, value: f64| {
+                values.push((format!("{prefix}.{what}[{n}]"), Value::Real(value)));
+            };
+            for (n, (mode, &(axis, of_axis))) in (1..).zip(modes.iter().zip(&chosen)) {
+                real(n, "mass", mode.m);
+                real(n, "length", mode.l);
+                real(n, "hinge", mode.hinge.unwrap_or(0.0));
+                real(n, "k", springs[axis][of_axis]);
+                real(n, "zeta", ratios[n - 1]);
+                real(n, "wave", mode.wave);
             }
             for (n, limits) in &limits {
-                for (what, value) in ["angle_limit", "swirl_limit"].into_iter().zip(*limits) {
-                    if let Some(value) = value {
-                        values.push((format!("{prefix}.{what}[{n}]"), Value::Real(value)));
-                    }
+                for (what, limit) in limits {
+                    limit.iter().for_each(|limit| real(*n, what, *limit));
                 }
             }
             for (n, known) in &third_order {
-                let third = [
-                    ("nonlinear_inertia", known.nonlinear_inertia),
-                    ("nonlinear_stiffness", known.nonlinear_stiffness),
-                ];
-                let all = known.energy.filter(|_| has_energy).map(|energy| {
-                    [
-                        ("nonlinear_inertia", energy.nonlinear_inertia),
-                        ("nonlinear_stiffness", energy.nonlinear_stiffness),
-                        ("nonlinear_inertia_2", energy.nonlinear_inertia_2),
-                        ("nonlinear_stiffness_2", energy.nonlinear_stiffness_2),
-                        ("rotary_inertia", energy.rotary_inertia),
-                        ("rotary_inertia_2", energy.rotary_inertia_2),
-                    ]
-                });
-                for (what, value) in all.as_ref().map_or(&third[..], |all| &all[..]) {
-                    values.push((format!("{prefix}.{what}[{n}]"), Value::Real(*value)));
+                match energy(known) {
+                    Some(energy) => {
+                        energy.parameters().iter().for_each(|(what, value)| real(*n, what, *value));
+                    }
+                    None => {
+                        real(*n, "nonlinear_inertia", known.nonlinear_inertia);
+                        real(*n, "nonlinear_stiffness", known.nonlinear_stiffness);
+                    }
                 }
             }
         };
-        let mut values = Vec::new();
+        let values = &mut set.values;
         if let (Some([length_x, length_y]), Target::HubSlosh) = (sides, target) {
             let first_across = count + 1;
-            notes.push(format!(
+            set.notes.push(format!(
                 "modes 1 to {count} are those along the box's first length, {length_x} m, which lies along the tangent on HubSlosh's hub; \
                  {first_across} to {} those along {length_y} m, along the radius (slosh.table.direction): what the hub's rate \
                  does to these is in slosh.model = planar, to first order (linear) nothing; spherical and liquid are refused",
@@ -586,7 +534,7 @@ impl ParameterSet {
                     2.0 * data.r_surface.unwrap_or(data.length_x.unwrap_or(0.0) / 2.0),
                 );
                 real(hubslosh::tank::I_OWN.into(), data.i_eff_axis.unwrap_or(0.0));
-                of_modes("slosh.table", &mut values);
+                of_modes("slosh.table", values);
                 let source = Value::Item(SloshSource::Table.name());
                 values.push((slosh::SOURCE.into(), source));
                 // The damping ratios come from the laminar layer.
@@ -642,29 +590,30 @@ impl ParameterSet {
                     for (n, &(axis, _)) in chosen.iter().enumerate() {
                         real(target.name(&DIRECTION.element([n + 1, axis + 1])), 1.0);
                     }
-                    notes.push(format!(
+                    set.notes.push(format!(
                         "planar modes along both lengths: m_0 = {:.6} kg is the liquid less the masses of all, each of which is \
                          rigid for motion across it",
                         rest.m_0
                     ));
                 }
-                of_modes(&target.name("tank"), &mut values);
+                of_modes(&target.name("tank"), values);
                 values.push((target.name(MODES), Value::Integer(modes.len() as i64)));
                 if target != Target::SloshTank {
-                    notes.push("set tanks to the number of tanks".to_string());
+                    set.notes.push("set tanks to the number of tanks".to_string());
                 }
             }
         }
         let all = data.modes.len() * if both.is_some() { 2 } else { 1 };
         if modes.len() < all {
             let which = if both.is_some() { "" } else { "first " };
-            notes.push(format!("the {which}{} of {all} modes", modes.len()));
+            set.notes.push(format!("the {which}{} of {all} modes", modes.len()));
         }
         if modes[0].height.is_none() {
-            warnings.push("mode 1 carries hardly any mass: its hinge has no meaning".to_string());
+            set.warnings
+                .push("mode 1 carries hardly any mass: its hinge has no meaning".to_string());
         }
-        warnings.dedup();
-        Ok(ParameterSet { notes, warnings, unknown, values, third_order })
+        set.warnings.dedup();
+        Ok(ParameterSet { third_order, ..set })
     }
 
     fn comments(&self) -> impl Iterator<Item = String> {
@@ -673,43 +622,34 @@ impl ParameterSet {
     }
 
     pub fn to_toml(&self) -> String {
-        let mut text = String::new();
-        for note in self.comments() {
-            let _ = writeln!(text, "# {}", note.replace('\n', " "));
-        }
-        for (name, value) in &self.values {
-            let _ = match value {
-                Value::Real(x) => writeln!(text, "\"{name}\" = {x:?}"),
-                Value::Integer(n) => writeln!(text, "\"{name}\" = {n}"),
-                Value::Boolean(flag) => writeln!(text, "\"{name}\" = {flag}"),
-                Value::Item(item) => writeln!(text, "\"{name}\" = \"{item}\""),
-            };
-        }
-        text
+        let notes = self.comments().map(|note| format!("# {}\n", note.replace('\n', " ")));
+        let values = self.values.iter().map(|(name, value)| match value {
+            Value::Real(x) => format!("\"{name}\" = {x:?}\n"),
+            Value::Integer(n) => format!("\"{name}\" = {n}\n"),
+            Value::Boolean(flag) => format!("\"{name}\" = {flag}\n"),
+            Value::Item(item) => format!("\"{name}\" = \"{item}\"\n"),
+        });
+        notes.chain(values).collect()
     }
 
     /// Returns the parameters as SSV, the parameter set of SSP 1.0.
     pub fn to_ssv(&self) -> String {
-        let mut text = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<!--\n");
-        for note in self.comments() {
-            // Two hyphens would end a comment.
-            let _ = writeln!(text, "  {}", note.replace("--", "- -"));
-        }
-        text.push_str(
-            "-->\n<ssv:ParameterSet \
-             xmlns:ssv=\"http://ssp-standard.org/SSP1/SystemStructureParameterValues\" \
-             version=\"1.0\" name=\"tank\">\n  <ssv:Parameters>\n",
-        );
-        for (name, value) in &self.values {
+        // Two hyphens would end a comment.
+        let notes = self.comments().map(|note| format!("  {}\n", note.replace("--", "- -")));
+        let values = self.values.iter().map(|(name, value)| {
             let value = match value {
                 Value::Real(x) => format!("<ssv:Real value=\"{x:?}\"/>"),
                 Value::Integer(n) => format!("<ssv:Integer value=\"{n}\"/>"),
                 Value::Boolean(flag) => format!("<ssv:Boolean value=\"{flag}\"/>"),
                 Value::Item(item) => format!("<ssv:Enumeration value=\"{item}\"/>"),
             };
-            let _ = writeln!(text, "    <ssv:Parameter name=\"{name}\">{value}</ssv:Parameter>");
-        }
-        text.push_str("  </ssv:Parameters>\n</ssv:ParameterSet>\n");
-        text
+            format!("    <ssv:Parameter name=\"{name}\">{value}</ssv:Parameter>\n")
+        });
+        let (notes, values) = (notes.collect::<String>(), values.collect::<String>());
+        format!(
+            "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<!--\n{notes}-->\n<ssv:ParameterSet \
+             xmlns:ssv=\"http://ssp-standard.org/SSP1/SystemStructureParameterValues\" \
+             version=\"1.0\" name=\"tank\">\n  <ssv:Parameters>\n{values}  </ssv:Parameters>\n</ssv:ParameterSet>\n"
+        )
     }
 }

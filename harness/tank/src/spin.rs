@@ -46,9 +46,7 @@ pub fn spin(
     nu: Option<f64>,
 ) -> Result<Spin, Problems> {
     let Geometry::Revolution { contour, shape } = &tank.geometry else {
-        return Err("The tank is a box. Its liquid spins about an axis of revolution only."
-            .to_string()
-            .into());
+        return Err("The tank is a box. Its liquid spins about an axis of revolution only.".into());
     };
     if !(omega > 0.0 && omega.is_finite()) {
         return Err(format!("The spin is {omega} rad/s; it must be a number above 0.").into());
@@ -56,7 +54,6 @@ pub fn spin(
     let Some(radius) = data.r_surface.filter(|_| !data.modes.is_empty()) else {
         return Err("The tank is full, and its liquid has no free surface: spin changes neither its centre of mass nor its \
                     inertia."
-            .to_string()
             .into());
     };
     let volume = data.m_liq / data.rho;

@@ -332,7 +332,6 @@ impl Tank {
             (Fill::Share(_), None) => {
                 return Err("A box is open at the top and has no volume to take per cent of: give the fill as \
                             a height or a mass."
-                    .to_string()
                     .into());
             }
             (Fill::Mass(mass), _) if !(mass >= 0.0 && mass.is_finite()) => {
