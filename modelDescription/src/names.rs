@@ -101,16 +101,21 @@ fn sizes<M: Model>() -> String {
              has_indicators: {},\n        arrays: &[\n",
             M::INDICATORS_OF == Some(parameter)
         );
+        let at = |d: &Dimension| match d {
+            Dimension::Sized(name, _) | Dimension::Used(name, _) => *name == parameter,
+            Dimension::Fixed(_) => false,
+        };
+        let mut line = String::from("           ");
         for variable in M::table().variables {
-            let at = |d: &Dimension| match d {
-                Dimension::Sized(name, _) | Dimension::Used(name, _) => *name == parameter,
-                Dimension::Fixed(_) => false,
-            };
-            if let Some(place) = variable.shape.iter().position(at) {
-                let _ = writeln!(text, "            ({:?}, {place}),", variable.name);
+            let Some(place) = variable.shape.iter().position(at) else { continue };
+            let array = format!(" ({:?}, {place}),", variable.name);
+            if line.len() + array.len() > 100 {
+                text += &line;
+                line = String::from("\n           ");
             }
+            line += &array;
         }
-        text += "        ],\n    },\n";
+        text += &format!("{line}\n        ],\n    }},\n");
     }
     format!(
         "\n/// Parameters that size arrays.\n#[rustfmt::skip]\npub const SIZES: &[crate::Size] = &[\n{text}];\n"
