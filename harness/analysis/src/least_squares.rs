@@ -27,6 +27,16 @@ pub fn smallest(a: DMatrix<f64>, b: &DVector<f64>, least: f64) -> Option<DVector
 /// evaluated only where residuals were evaluated last.
 pub fn minimise(residuals: Residuals, derivatives: Derivatives, x: &[f64]) -> Minimum {
     let method = LevenbergMarquardt::new().with_ftol(1e-9).with_xtol(1e-9);
+    minimise_by(&method, residuals, derivatives, x)
+}
+
+/// Does what [`minimise`] does, with other limits of the search.
+pub fn minimise_by(
+    method: &LevenbergMarquardt<f64>,
+    residuals: Residuals,
+    derivatives: Derivatives,
+    x: &[f64],
+) -> Minimum {
     let search = Search { residuals, derivatives, x: DVector::from_column_slice(x) };
     let (search, report) = method.minimize(search);
     Minimum {

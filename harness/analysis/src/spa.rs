@@ -75,8 +75,7 @@ pub fn frequency_response(
     frequencies: &[f64],
     lag: f64,
 ) -> FrequencyResponse {
-    let (response, _) = estimate(step, input, output, frequencies, lag);
-    FrequencyResponse { response, frequency: frequencies.to_vec() }
+    Estimate::new(step, input, output, frequencies, lag).response
 }
 
 fn estimate(

@@ -10,13 +10,12 @@
 
 use std::f64::consts::TAU;
 
-use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
-use nalgebra::storage::Owned;
-use nalgebra::{DMatrix, DVector, Dyn, Matrix3, Matrix5, OMatrix, U6, Vector3, Vector6};
+use levenberg_marquardt::LevenbergMarquardt;
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix5, Vector3};
 
 use crate::exponential::exponential;
 use crate::features::Features;
-use crate::least_squares;
+use crate::least_squares::{minimise_by, smallest};
 use crate::response::FrequencyResponse;
 use crate::sanathanan_koerner::{self, Coefficients, Line};
 use crate::statistics::mean;
@@ -71,10 +70,15 @@ impl TransferFunction {
     pub fn fit(measured: &FrequencyResponse) -> Option<Self> {
         let starts = [by_sanathanan_koerner(measured), at_the_resonance(measured)];
         let fitted = starts.into_iter().flatten().filter_map(|start| {
-            let problem = Problem { measured, unit: start.pole_omega, model: start };
-            let (problem, report) = LevenbergMarquardt::new().with_patience(200).minimize(problem);
-            let (cost, fitted) = (report.objective_function, problem.model);
-            (cost.is_finite() && fitted.pole_omega.is_finite()).then_some((cost, fitted))
+            let unit = start.pole_omega;
+            let residuals = |x: &[f64]| Self::from_unknowns(x, unit).residuals(measured);
+            let derivatives =
+                |x: &[f64]| Some(Self::from_unknowns(x, unit).derivatives(measured, unit));
+            let method = LevenbergMarquardt::new().with_patience(200);
+            let found = minimise_by(&method, &residuals, &derivatives, &start.unknowns(unit));
+            let fitted = Self::from_unknowns(&found.x, unit);
+            (found.cost.is_finite() && fitted.pole_omega.is_finite())
+                .then_some((found.cost, fitted))
         });
         // Of two equally good fits the first one is kept, so that the choice does not depend on rounding.
         let best = fitted.reduce(|a, b| if b.0 < 0.999 * a.0 { b } else { a });
@@ -186,7 +190,7 @@ fn at_the_resonance(measured: &FrequencyResponse) -> Option<TransferFunction> {
         }
         (b[2 * k], b[2 * k + 1]) = (h.re, h.im);
     }
-    let x = least_squares::smallest(a, &b, 1e-14)?;
+    let x = smallest(a, &b, 1e-14)?;
     let numerator = [x[0] / pole_omega.powi(2), x[1] / pole_omega, x[2]];
     Some(TransferFunction { numerator, ..start })
 }
@@ -208,8 +212,7 @@ fn by_sanathanan_koerner(measured: &FrequencyResponse) -> Option<TransferFunctio
         })
         .collect();
     // If the response does not determine all coefficients, those of smallest norm are taken.
-    let solve =
-        |a: DMatrix<f64>, b: DVector<f64>| Some((least_squares::smallest(a, &b, 1e-14)?, ()));
+    let solve = |a: DMatrix<f64>, b: DVector<f64>| Some((smallest(a, &b, 1e-14)?, ()));
     let (Coefficients { numerator: [b2, b1, b0], denominator }, ()) =
         sanathanan_koerner::fit(&lines, false, ROUNDS, solve)?;
     let (p, w, z) = stable_poles(denominator)?;
@@ -242,64 +245,41 @@ fn stable_poles([c2, c1, c0]: [f64; 3]) -> Option<(f64, f64, f64)> {
     (root.is_finite() && w.is_finite()).then_some((root.abs().max(least), w, damping))
 }
 
-/// The search, with the variables b2, b1, b0 in units of `unit`, which is the ω of the start, then ln p, ln
-/// ω, ln ζ.
-struct Problem<'a> {
-    measured: &'a FrequencyResponse,
-    unit: f64,
-    model: TransferFunction,
-}
-
-impl LeastSquaresProblem<f64, Dyn, U6> for Problem<'_> {
-    type ParameterStorage = Owned<f64, U6>;
-    type ResidualStorage = Owned<f64, Dyn>;
-    type JacobianStorage = Owned<f64, Dyn, U6>;
-
-    fn set_params(&mut self, x: &Vector6<f64>) {
-        let u = self.unit;
-        self.model = TransferFunction {
-            numerator: [x[0] * u, x[1] * u.powi(2), x[2] * u.powi(3)],
+/// The variables of the search: b2, b1, b0 in units of `unit`, which is the ω of the start, then ln p, ln ω, ln ζ.
+impl TransferFunction {
+    fn from_unknowns(x: &[f64], unit: f64) -> Self {
+        TransferFunction {
+            numerator: [x[0] * unit, x[1] * unit.powi(2), x[2] * unit.powi(3)],
             real_pole: x[3].exp(),
             pole_omega: x[4].exp(),
             pole_damping: x[5].exp(),
-        };
+        }
     }
 
-    fn params(&self) -> Vector6<f64> {
-        let (u, m) = (self.unit, &self.model);
-        let [b2, b1, b0] = m.numerator;
-        Vector6::new(
-            b2 / u,
-            b1 / u.powi(2),
-            b0 / u.powi(3),
-            m.real_pole.ln(),
-            m.pole_omega.ln(),
-            m.pole_damping.ln(),
-        )
+    fn unknowns(&self, unit: f64) -> [f64; 6] {
+        let [b2, b1, b0] = self.numerator;
+        let [p, w, z] = [self.real_pole, self.pole_omega, self.pole_damping].map(f64::ln);
+        [b2 / unit, b1 / unit.powi(2), b0 / unit.powi(3), p, w, z]
     }
 
-    fn residuals(&self) -> Option<DVector<f64>> {
-        let points = self.measured.frequency.iter().zip(&self.measured.response);
-        let parts = points.flat_map(|(&f, h)| {
-            let miss = self.model.response(f) - h;
-            [miss.re, miss.im]
-        });
-        Some(DVector::from_iterator(2 * self.measured.frequency.len(), parts))
+    fn residuals(&self, measured: &FrequencyResponse) -> Vec<f64> {
+        let points = measured.frequency.iter().zip(&measured.response);
+        let misses = points.map(|(&f, h)| self.response(f) - h);
+        misses.flat_map(|miss| [miss.re, miss.im]).collect()
     }
 
-    fn jacobian(&self) -> Option<OMatrix<f64, Dyn, U6>> {
-        let (m, u) = (&self.model, self.unit);
-        let mut jacobian = OMatrix::<f64, Dyn, U6>::zeros(2 * self.measured.frequency.len());
-        for (k, &f) in self.measured.frequency.iter().enumerate() {
+    fn derivatives(&self, measured: &FrequencyResponse, unit: f64) -> DMatrix<f64> {
+        let mut jacobian = DMatrix::zeros(2 * measured.frequency.len(), 6);
+        for (k, &f) in measured.frequency.iter().enumerate() {
             let s = Complex64::new(0.0, TAU * f);
-            let (h, real, pair) = (m.response(f), s + m.real_pole, m.pair(s));
+            let (h, real, pair) = (self.response(f), s + self.real_pole, self.pair(s));
             let denominator = real * pair;
-            let (w, z) = (m.pole_omega, m.pole_damping);
+            let (w, z) = (self.pole_omega, self.pole_damping);
             let columns = [
-                s * s * u / denominator,
-                s * u.powi(2) / denominator,
-                Complex64::from(u.powi(3)) / denominator,
-                -h / real * m.real_pole,
+                s * s * unit / denominator,
+                s * unit.powi(2) / denominator,
+                Complex64::from(unit.powi(3)) / denominator,
+                -h / real * self.real_pole,
                 -h / pair * (2.0 * z * s + 2.0 * w) * w,
                 -h / pair * (2.0 * w * s) * z,
             ];
@@ -307,7 +287,7 @@ impl LeastSquaresProblem<f64, Dyn, U6> for Problem<'_> {
                 (jacobian[(2 * k, j)], jacobian[(2 * k + 1, j)]) = (column.re, column.im);
             }
         }
-        Some(jacobian)
+        jacobian
     }
 }
 
