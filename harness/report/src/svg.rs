@@ -104,12 +104,6 @@ pub struct Chart {
     pub legend: bool,
 }
 
-const STYLE: &str = "svg { background: #ffffff; font: 11px system-ui, sans-serif }\
-    text { fill: #1d2733 } .title { font-size: 12.5px; font-weight: 600 }\
-    .grid { stroke: #dde3ea; stroke-width: .7; fill: none }\
-    .frame { stroke: #66758a; fill: none }\
-    .curve path { fill: none; stroke-width: 1.5 }";
-
 const MARGIN: (f64, f64, f64, f64) = (56.0, 12.0, 26.0, 40.0);
 
 impl Chart {
@@ -122,7 +116,7 @@ impl Chart {
     }
 
     pub fn file(&self) -> String {
-        self.drawing(Some(STYLE))
+        self.drawing(Some(include_str!("svg.css")))
     }
 
     fn drawing(&self, style: Option<&str>) -> String {

@@ -9,7 +9,7 @@ use experiments::campaign::{Campaign, Estimate, Results};
 use experiments::plan::AMPLITUDE;
 use experiments::rounding::thousandths;
 use host::fmu::Fmu;
-use maud::{Markup, html};
+use maud::{Markup, PreEscaped, html};
 use names::hubslosh::{slosh, tank};
 
 use super::page::{Group, Page, Varied, cm, hertz, sweep};
@@ -20,57 +20,17 @@ pub(super) fn estimators(groups: &[Group]) -> Markup {
     let duration = run.case.run().steps() as f64 * run.case.step;
     let band = groups[0].band().unwrap_or(BAND);
     let lag = Lengths::for_record(band, groups[0].sweep, duration, run.case.step).lag;
-    let rows: Vec<Markup> = groups.iter().filter_map(swept_row).collect();
+    let methods = format!(
+        include_str!("methods.html"),
+        cycles = demodulation::CYCLES,
+        resolution = 1e3 / lag,
+        lag = lag
+    );
+    let rows: String = groups.iter().filter_map(swept_row).map(Markup::into_string).collect();
     html! {
-        p {
-            b { "Demodulation" } " (solid, in " code { "features.csv" } "). Torque and rate are multiplied by e" sup { "−jφ(t)" } ", with the sweep's known phase φ, and averaged over a Hann window of " (demodulation::CYCLES) " cycles (fewer if the sweep is fast, at least 3) that moves with the sweep. Their ratio is the response while the sweep passes that frequency, as a lock-in amplifier would show it. Both signals have the same window, so its effect on amplitude and phase cancels. Harmonics due to the bearing average out."
-        }
-        p {
-            b { code { "spa" } } " (dashed). MATLAB's Blackman–Tukey estimate, as in the thesis: covariances of the whole record up to a lag of " (format!("{lag:.0}")) " s, Hann lag window, Fourier transform, ratio of cross spectrum to input spectrum. It resolves about " (format!("{:.2}", 1e3 / lag)) " mHz, which fills a narrow antiresonance a little."
-        }
-        p {
-            b { "Welch, H1." } " Eight half-overlapping Hamming segments, averaged cross spectrum over averaged input spectrum: the usual transfer function of two records."
-        }
-        p {
-            b { "Transfer function." } " Used if none of these resolves antiresonance and resonance. Three poles and two zeros are fitted to the spectra of the whole record together with the leakage of its ends. The fit is exact for a linear plant and a record of any length."
-        }
-        p {
-            b { "Choice of the estimate." } " The first choice is the response of the passing sweep, unless the sweep shifts the resonance by more than a quarter of the separation (0.6 √rate). The second is " code { "spa" } ", if the separation is three times its resolution and the signal-to-noise ratio at the resonance is above 1. The third is the transfer function, if its residual is less than 30 % of the rate. If the last two, after a fast sweep, differ by more than a quarter of the separation, neither is valid. The liquid then rings at a frequency that depends on its amplitude, and no single linear response represents the record. Otherwise there is no value. " code { "estimator" } " and " code { "not_trusted" } " in the tables give the choice and the reason."
-        }
-        p {
-            b { "Uncertainty." } " The local rational method estimates the part of the rate that no linear response explains. Around each line of the whole record's spectra it fits a rational function of the torque's spectrum and a polynomial for the record's ends. The residual is gyro noise, dry friction and nonlinear slosh. From its power spectral density Φ" sub { "v" } " follows the standard deviation of |H|, √(Φ" sub { "v" } "/(2nΦ" sub { "uu" } ")) over n averaged lines. For the features a hundred responses with another error of this size are drawn, because at an antiresonance the error is not small against the response. Intervals are two standard deviations to either side. They do not include a shift by the sweep itself (below)."
-        }
-        p {
-            b { "Features." } " Antiresonance and resonance are the two ends of the largest rise of |H| with frequency. They are within the sweep's band, and refined by a parabola through three points of log |H|. Δf is their separation, the notch depth their difference in dB. For a bench with little damping they are the smallest and the largest |H| in the band, as in the thesis. With strong damping the largest |H| is at the band's lower edge, not at the slosh resonance, and the ripple above the resonance may be lower than the antiresonance."
-        }
-        p {
-            b { "Fit." } " Three poles, two zeros, least squares on the complex " code { "spa" } " response. In the time domain the run's torque drives it from the best-fitting initial state, as MATLAB's " code { "compare" } " does. The band hardly determines a slow real pole, and from rest such a pole would keep the offset of the first half cycle for the whole run."
-        }
-        p {
-            b { "Energy residual." } " Largest |E(t) − E(0) − work + heat| of a run over the energy throughput, Σ|Δwork| + heat. It checks the FMU's energy balance at every sample."
-        }
+        (PreEscaped(methods))
         @if !rows.is_empty() {
-            h3 { "Why the swept resonance lies above the exact one" }
-            p {
-                "The sweep is not slow enough for the liquid. With bare-wall damping the resonance is so narrow that the sweep crosses its half-power width in less time than the slosh needs to decay. The oscillation still grows after the sweep has passed the resonance. An upward sweep therefore shows the largest rate later, at a higher frequency, and slightly smaller than a dwell would. The ripple above the resonance is the beat between this ringing and the torque. A bench that sweeps at this rate and uses the envelope shows the same shift: it is a property of the experiment, not of the plant."
-            }
-            div .wide {
-                table {
-                    thead {
-                        tr {
-                            th { "run" } th { "exact" br; "resonance" } th { "half-power" br; "width 2ζf" }
-                            th { "sweep rate" br; "there" } th { "time to" br; "cross" }
-                            th { "slosh decays" br; "in 1/(2πζf)" } th { "swept" br; "resonance" }
-                            th { "its" br; "shift" } th { code { "spa" } br; "resonance" }
-                            th { "its" br; "shift" }
-                        }
-                    }
-                    tbody { @for row in &rows { (row) } }
-                }
-            }
-            p {
-                "The second estimator confirms this. For a linear plant the ratio of whole-record spectra is the frequency response for any sweep rate, because the record includes the ringing after the resonance. In this estimate there is no shift. The antiresonance hardly moves in either estimate, because the hub is nearly still there and little can ring. Only at the smallest torques, where the bearing sticks near the antiresonance, does the sweep show it a few mHz late. For runs of a nonlinear model use both: demodulation shows the response at that moment, " code { "spa" } " gives the best linear summary of the whole."
-            }
+            (PreEscaped(format!(include_str!("swept_resonance.html"), rows = rows)))
         }
     }
 }

@@ -13,7 +13,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use anyhow::{Context, Result, ensure};
 use experiments::sensors::quantity::Coordinate;
 use host::description::ModelDescription;
-use maud::{DOCTYPE, PreEscaped, html};
+use maud::html;
 use names::hubslosh::{
     ENERGY, F_RADIAL, F_TANGENTIAL, HEAT, OMEGA, OMEGA_IMU, SLOSH_ANGLE, SLOSH_ANGLE_RADIAL,
     SloshModel, TAU_ACTUATOR, TAU_CMD, TAU_EXT, TAU_FLUID, TAU_FRICTION, THETA, WAVE_HEIGHT,
@@ -638,72 +638,26 @@ fn panels(kind: Kind, table: &Table) -> Vec<(String, Vec<String>)> {
 }
 
 fn markup(title: &str, facts: &str, kind: Kind, page: &Value, notes: &[String]) -> String {
-    let data = web::json_in_script(&page.to_string());
+    let frame = |body: &str| html! { label { input #body type="checkbox"; " View turns with the " (body) } };
     let body_frame = match kind {
-        Kind::Bench => Some("View turns with the hub"),
-        Kind::Craft => Some("View turns with the craft"),
-        Kind::Tank => None,
+        Kind::Bench => frame("hub"),
+        Kind::Craft => frame("craft"),
+        Kind::Tank => html! {},
     };
-    let page = html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                title { "HubSlosh: " (title) }
-                style { (PreEscaped(include_str!("view.css"))) }
-            }
-            body {
-                main {
-                    header {
-                        h1 { (title) }
-                        p .facts { (facts) }
-                    }
-                    noscript {
-                        p .warning {
-                            "The moving picture and the plots need JavaScript. The numbers are in the run's table; `hubslosh view` made "
-                            "this page from it."
-                        }
-                    }
-                    div .stage {
-                        div #scene {}
-                        div .controls role="group" aria-label="Time" {
-                            button #play type="button" aria-label="Play" title="Play or pause (space)" { "▶" }
-                            input #time type="range" min="0" max="1000" value="0" step="any" aria-label="Time";
-                            output #now for="time" { "" }
-                            label { "Speed " input #speed type="range" min="-2" max="2.5" step="0.05" value="0"; output #speed-is {} }
-                            label { "Wave × " input #wave type="range" min="0" max="1.5" step="0.02" value="0"; output #wave-is {} }
-                            label {
-                                "Plots "
-                                select #window {
-                                    option value="" { "all" }
-                                    @for width in ["300", "60", "20", "5"] { option value=(width) { (width) " s" } }
-                                }
-                            }
-                            @if let Some(text) = body_frame {
-                                label { input #body type="checkbox"; " " (text) }
-                            }
-                        }
-                    }
-                    div .plots { div #plots {} }
-                    details .notes {
-                        summary { "What is drawn, and keys" }
-                        ul { @for note in notes { li { (note) } } }
-                        p {
-                            kbd { "space" } " play, pause · " kbd { "←" } " " kbd { "→" } " one row (with shift ten) · " kbd { "Home" } " "
-                            kbd { "End" } " · " kbd { "," } " " kbd { "." } " slower, faster · " kbd { "b" } " turn with the body. With the "
-                            "picture in focus the arrows turn it, " kbd { "+" } " " kbd { "-" } " zoom, " kbd { "0" } " shows all. "
-                            "A click on a plot goes to that time, a drag zooms, a double click shows all."
-                        }
-                    }
-                }
-                script type="application/json" id="run" { (PreEscaped(data)) }
-                script { (PreEscaped(format!("/* {} */\n", web::THREE_LICENSE.replace("*/", "* /")))) (PreEscaped(web::THREE)) }
-                script { (PreEscaped(format!("/* {} */\n", PLOTLY_LICENSE.replace("*/", "* /")))) (PreEscaped(PLOTLY)) }
-                script { (PreEscaped(web::SCENE)) }
-                script { (PreEscaped(include_str!("view.js"))) }
-            }
-        }
-    };
-    page.into_string()
+    let licence = |text: &str| text.replace("*/", "* /");
+    format!(
+        include_str!("view.html"),
+        title = html! { (title) }.0,
+        facts = html! { (facts) }.0,
+        body_frame = body_frame.0,
+        notes = html! { @for note in notes { li { (note) } } }.0,
+        data = web::json_in_script(&page.to_string()),
+        three = web::THREE,
+        three_license = licence(web::THREE_LICENSE),
+        plotly = PLOTLY,
+        plotly_license = licence(PLOTLY_LICENSE),
+        scene = web::SCENE,
+        style = include_str!("view.css"),
+        script = include_str!("view.js"),
+    )
 }
