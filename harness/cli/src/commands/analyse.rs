@@ -2,11 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
+use analysis::statistics;
 use anyhow::{Context, Result, bail, ensure};
 use experiments::campaign::{Campaign, recorded};
-use experiments::plan::{AMPLITUDE, Plan, Recorded};
+use experiments::plan::{AMPLITUDE, Draft, Plan, Recorded};
 use experiments::profile::{Torque, Written};
-use names::hubslosh::TAU_CMD;
+use names::hubslosh::{TAU_CMD, slosh};
 use signals::recording::Columns;
 
 use super::{RunsArgs, bench_day, campaign, open, setting};
@@ -65,7 +66,7 @@ impl AnalyseArgs {
         let out = self.out.clone().unwrap_or_else(|| Path::new("dist").join(stem));
         let mut plan = match &self.plan {
             Some(file) => Plan::read(file)?,
-            None => Plan::parse(&self.written()?)?,
+            None => self.draft()?.plan()?,
         };
         let fmu = open(&self.runs.fmu)?;
         plan.convert_units(fmu.description());
@@ -86,7 +87,7 @@ impl AnalyseArgs {
 
     /// Writes the plan that the command line describes: every recording is a run with the amplitude of its
     /// own torque, and is simulated with every model.
-    fn written(&self) -> Result<String> {
+    fn draft(&self) -> Result<Draft> {
         let profile: Written = self.profile.parse()?;
         let torque = profile.torque()?;
         if let Torque::Rows { .. } = torque {
@@ -95,55 +96,38 @@ impl AnalyseArgs {
                 self.profile
             )
         }
-        let text = |value: &str| toml::Value::from(value).to_string();
-        let mut plan = format!("title = \"Recordings\"\nprofile = {}\n", text(&self.profile));
-        let (mut runs, mut step) = (String::new(), None);
+        let (mut runs, mut step) = (Vec::new(), None);
         for path in &self.recordings {
-            let recorded = Recorded { path: path.clone(), columns: self.columns.clone() };
+            let (name, columns) = (path.display(), self.columns.clone());
+            let recorded = Recorded { path: path.clone(), columns };
             // The analysis of the recording prints what was changed.
             let (each, table) = recorded::read(&recorded, &mut |_| {})?;
             ensure!(
                 each >= 1e-6,
-                "{}: the rows are {each:.3e} s apart (allowed: at least 1e-6 s). Is the time in another unit? --columns \
-                 time=COLUMN:UNIT states it",
-                path.display()
+                "{name}: the rows are {each:.3e} s apart (allowed: at least 1e-6 s). Is the time in another unit? --columns \
+                 time=COLUMN:UNIT states it"
             );
             recorded::check_rows(path, each, &torque)?;
             step.get_or_insert(each);
-            let column = table.column(TAU_CMD).unwrap_or_default();
-            let amplitude = column.iter().fold(0.0, |most: f64, tau| most.max(tau.abs()));
+            let amplitude = statistics::peak(table.column(TAU_CMD).unwrap_or_default());
             ensure!(
                 amplitude > 0.0,
-                "{}: the torque tau_cmd is 0 N·m in every row, so there is no response to analyse (--columns names the \
-                 column of the torque)",
-                path.display()
+                "{name}: the torque tau_cmd is 0 N·m in every row, so there is no response to analyse (--columns names the \
+                 column of the torque)"
             );
-            runs.push_str("[[run]]\n");
-            runs.push_str(&format!("recording = {}\n", text(&path.display().to_string())));
-            let columns = self.columns.to_string();
-            if !columns.is_empty() {
-                runs.push_str(&format!("columns = {}\n", text(&columns)));
-            }
             // Four digits, because the command was meant to be a round number.
             let digits = 10f64.powi(3 - amplitude.log10().floor() as i32);
-            runs.push_str(&format!("{AMPLITUDE} = {:?}\n", (amplitude * digits).round() / digits));
+            let amplitude = (amplitude * digits).round() / digits;
+            runs.push(Draft::run(&recorded, [(AMPLITUDE, amplitude.into())]));
         }
-        let step = step.map_or(0.02, |step| (step * 1e9).round() / 1e9);
-        plan.push_str(&format!("step = {step:?}\n"));
-        if !self.settings.is_empty() {
-            plan.push_str("[set]\n");
-            for (name, value) in &self.settings {
-                let value = if value.parse::<f64>().is_ok() || value.parse::<bool>().is_ok() {
-                    value.clone()
-                } else {
-                    text(value)
-                };
-                plan.push_str(&format!("{name} = {value}\n"));
-            }
-        }
-        plan.push_str(&runs);
-        let models: Vec<String> = self.model.iter().map(|model| text(model)).collect();
-        plan.push_str(&format!("[vary]\nslosh.model = [{}]\n", models.join(", ")));
-        Ok(plan)
+        Ok(Draft {
+            title: "Recordings".into(),
+            profile: self.profile.clone(),
+            step: Some(step.map_or(0.02, |step| (step * 1e9).round() / 1e9)),
+            set: self.settings.clone(),
+            runs,
+            vary: vec![(slosh::MODEL, self.model.clone())],
+            ..Draft::default()
+        })
     }
 }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail, ensure};
 use experiments::campaign::{CURVES, Campaign, seek_onset};
-use experiments::plan::{self, Plan, Sweeps};
+use experiments::plan::{self, AMPLITUDE, Draft, Plan};
 use experiments::progress::Progress;
 use files::budget;
 use files::store::Store;
@@ -167,17 +167,24 @@ impl CampaignArgs {
                 "{name} is what the campaign varies; use --model, --fills, --amplitudes"
             );
         }
-        Plan::sweeps(Sweeps {
-            models: self.model.clone(),
-            fills: self.fills.clone(),
-            amplitudes: self.amplitudes.clone(),
-            profile: match self.sweep {
-                Sweep::Exponential => "exp-sweep",
-                Sweep::Linear => "lin-sweep",
-            },
-            set: self.settings.clone(),
+        let kind = match self.sweep {
+            Sweep::Exponential => "exp-sweep",
+            Sweep::Linear => "lin-sweep",
+        };
+        let texts = |values: &[f64]| values.iter().map(f64::to_string).collect();
+        let draft = Draft {
+            title: "Sweeps at several fills and amplitudes".into(),
+            profile: format!("{kind}:f0=1.25,f1=3.5,duration=2700"),
             tolerance: self.tolerance,
-        })
+            set: self.settings.clone(),
+            vary: vec![
+                (slosh::MODEL, self.model.clone()),
+                (tank::H, texts(&self.fills)),
+                (AMPLITUDE, texts(&self.amplitudes)),
+            ],
+            ..Draft::default()
+        };
+        draft.plan()
     }
 }
 

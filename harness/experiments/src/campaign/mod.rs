@@ -40,7 +40,7 @@ pub use self::outcome::{
     WAVE,
 };
 use self::recipe::{Stored, Unusable};
-pub use self::rows::{FeatureRow, MadeFrom};
+use self::rows::{MADE_FROM, Row};
 use crate::plan::{Case, Plan};
 use crate::progress::Progress;
 use crate::rest;
@@ -487,49 +487,41 @@ impl Campaign {
     /// settings and all features. Without a run of the bench there is only `runs.csv`.
     pub fn tables(&self, fmu: &Fmu, results: &Results) -> Result<Vec<(&'static str, Vec<u8>)>> {
         let plan = sha256(self.plan.text.as_bytes());
-        let header = rows::columns::<FeatureRow>()?;
+        let Results { outcomes, unanalysed, failures } = results;
         let mut tables = Vec::new();
         type Of = dyn Fn(&Outcome) -> Option<(&Estimate, &'static str)>;
         let mut features = |name: &'static str, of: &Of| -> Result<()> {
-            let row = |run| rows::record(&FeatureRow::new(run, of(run), &plan));
-            tables.push((name, written(&header, results.outcomes.iter().map(row))?));
+            let rows = outcomes.iter().map(|run| Row::analysed(run, of(run)).values(&plan));
+            tables.push((name, written(&Row::columns(), rows)?));
             Ok(())
         };
-        if results.unanalysed.is_empty() {
+        if unanalysed.is_empty() {
             features("features.csv", &Outcome::estimate)?;
             features("features_spa.csv", &|run| Some((&run.record.as_ref()?.spa, "spa")))?;
             features("features_h1.csv", &|run| Some((&run.record.as_ref()?.h1, "h1")))?;
         }
-        let analysed = results.outcomes.iter().map(|run| {
-            let row = FeatureRow::new(run, run.estimate(), &plan);
-            (&run.case, None, row)
+        let analysed = outcomes.iter().map(|run| (None, Row::analysed(run, run.estimate())));
+        let unanalysed =
+            unanalysed.iter().map(|run| (None, Row::unanalysed(&run.case, &run.limits)));
+        let failed = failures.iter().map(|of| (Some(of), Row::unanalysed(&of.case, &[])));
+        let rows = analysed.chain(unanalysed).chain(failed).map(|(failure, row)| {
+            let made_from = rows::made_from(row.case, failure, fmu);
+            [made_from, row.case.varied.clone(), row.values(&plan)].concat()
         });
-        let unanalysed = results
-            .unanalysed
-            .iter()
-            .map(|run| (&run.case, None, FeatureRow::unanalysed(&run.case, &run.limits, &plan)));
-        let failed = results.failures.iter().map(|failure| {
-            let case = &failure.case;
-            (case, Some(failure), FeatureRow::unanalysed(case, &[], &plan))
-        });
-        let rows = analysed.chain(unanalysed).chain(failed).map(|(case, failure, row)| {
-            let made_from = rows::record(&MadeFrom::new(case, failure, fmu))?;
-            Ok([made_from, case.varied.clone(), rows::record(&row)?].concat())
-        });
-        let made_from = rows::columns::<MadeFrom>()?;
-        let varied = self.plan.varied().into_iter().map(String::from).collect();
-        tables.push(("runs.csv", written(&[made_from, varied, header].concat(), rows)?));
+        let varied = self.plan.varied();
+        let header = MADE_FROM.into_iter().chain(varied).map(String::from).chain(Row::columns());
+        tables.push(("runs.csv", written(&header.collect::<Vec<_>>(), rows)?));
         Ok(tables)
     }
 }
 
 /// Writes a CSV table row by row, because the rows of a large campaign as strings would take more memory than
 /// its results.
-fn written(header: &[String], rows: impl Iterator<Item = Result<Vec<String>>>) -> Result<Vec<u8>> {
+fn written(header: &[String], rows: impl Iterator<Item = Vec<String>>) -> Result<Vec<u8>> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     writer.write_record(header)?;
     for row in rows {
-        writer.write_record(row?)?;
+        writer.write_record(row)?;
     }
     writer.into_inner().map_err(|error| error.into_error().into())
 }

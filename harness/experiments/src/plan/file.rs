@@ -61,10 +61,10 @@ const KEYS: [&str; 14] = [
 ];
 
 /// Reads the plan from a text; returns `None` with `problems` that prevent it.
-pub(super) fn read(text: &str, problems: &mut Problems) -> Option<Plan> {
+pub(super) fn read(text: &str, has_lines: bool, problems: &mut Problems) -> Option<Plan> {
     let (table, errors) = DeTable::parse_recoverable(text);
     let table = table.get_ref();
-    let mut reader = Reader { text, problems };
+    let mut reader = Reader { text, has_lines, problems };
     for error in &errors {
         let problem = format!("the plan is not valid TOML: {}", error.message());
         reader.add(error.span().unwrap_or_default(), problem);
@@ -149,12 +149,16 @@ fn names<'t, 'i>(table: &'t DeTable<'i>, is_value: &dyn Fn(&DeTable) -> bool) ->
 
 struct Reader<'a> {
     text: &'a str,
+    has_lines: bool,
     problems: &'a mut Problems,
 }
 
 impl Reader<'_> {
     fn lines(&self, span: Range<usize>) -> Lines {
-        Lines::single(1 + self.text[..span.start].matches('\n').count())
+        match self.has_lines {
+            true => Lines::single(1 + self.text[..span.start].matches('\n').count()),
+            false => Lines::default(),
+        }
     }
 
     fn add(&mut self, span: Range<usize>, problem: String) {

@@ -1,6 +1,7 @@
 //! A campaign's plan: a TOML file that is read, checked and expanded into runs. `book/campaigns.md`
 //! shows the format by example.
 
+mod draft;
 mod file;
 mod problems;
 mod random;
@@ -22,6 +23,7 @@ use host::description::{ModelDescription, Value, did_you_mean};
 use names::hubslosh::{SloshModel, SloshSource, slosh, tank};
 use signals::recording::Columns;
 
+pub use self::draft::Draft;
 use self::problems::{Lines, Problems};
 use self::random::Draws;
 
@@ -101,19 +103,6 @@ pub(crate) struct Onset {
     pub amplitude: Vec<f64>,
     found: bool,
     lines: Lines,
-}
-
-/// Sweeps of the bench from 1.25 to 3.5 Hz in 2700 s. `models` are values of `slosh.model`, `profile` is
-/// `exp-sweep` or `lin-sweep`, `set` holds the settings of every run by FMU name, and `tolerance` is the
-/// relative tolerance of the FMU's solver (`None` for the FMU's own).
-#[derive(Clone, Debug)]
-pub struct Sweeps {
-    pub models: Vec<String>,
-    pub fills: Vec<f64>,
-    pub amplitudes: Vec<f64>,
-    pub profile: &'static str,
-    pub set: Vec<(String, String)>,
-    pub tolerance: Option<f64>,
 }
 
 #[derive(Clone, Debug, Default)]
@@ -198,62 +187,17 @@ impl Plan {
 
     /// Reads a plan's text. Names are checked against the FMU by [`Plan::cases`].
     pub fn parse(text: &str) -> Result<Self> {
+        Plan::from_text(text, true)
+    }
+
+    fn from_text(text: &str, has_lines: bool) -> Result<Self> {
         let mut problems = Problems::default();
-        let plan = file::read(text, &mut problems);
+        let plan = file::read(text, has_lines, &mut problems);
         if let Some(plan) = &plan {
             plan.each_name_once(&mut problems);
         }
         problems.check()?;
         plan.context("the plan has no profile")
-    }
-
-    /// Creates the thesis's sweeps for every combination of models, fills and amplitudes.
-    ///
-    /// # Errors If a setting is also varied.
-    pub fn sweeps(sweeps: Sweeps) -> Result<Self> {
-        let Sweeps { models, fills, amplitudes, profile, set, tolerance } = sweeps;
-        let numbers = |values: Vec<f64>| values.iter().map(f64::to_string).collect();
-        fn named<T>(name: &str, value: T) -> Named<T> {
-            Named { name: name.into(), value, lines: Lines::default() }
-        }
-        let varied = [models, numbers(fills), numbers(amplitudes)];
-        let vary = NAMING.iter().zip(varied).map(|(name, values)| named(name, values));
-        let mut plan = Plan {
-            title: "Sweeps at several fills and amplitudes".into(),
-            text: String::new(),
-            profile: named("profile", format!("{profile}:f0=1.25,f1=3.5,duration=2700").parse()?),
-            step: STEP,
-            stop: None,
-            tolerance,
-            hold: false,
-            input: None,
-            set: set.into_iter().map(|(name, value)| named(&name, value)).collect(),
-            vary: vary.collect(),
-            listed: Vec::new(),
-            count: Vec::new(),
-            draws: None,
-            onset: None,
-            sensors: Vec::new(),
-        };
-        let mut problems = Problems::default();
-        plan.each_name_once(&mut problems);
-        problems.check()?;
-        plan.text = plan.written()?;
-        Ok(plan)
-    }
-
-    fn written(&self) -> Result<String> {
-        let mut table = toml::Table::new();
-        table.insert("title".into(), self.title.clone().into());
-        table.insert("profile".into(), self.profile.value.to_string().into());
-        if let Some(tolerance) = self.tolerance {
-            table.insert("tolerance".into(), tolerance.into());
-        }
-        let set = self.set.iter().map(|set| (set.name.clone(), set.value.as_str().into()));
-        table.insert("set".into(), set.collect::<toml::Table>().into());
-        let vary = self.vary.iter().map(|vary| (vary.name.clone(), vary.value.clone().into()));
-        table.insert("vary".into(), vary.collect::<toml::Table>().into());
-        Ok(toml::to_string(&table)?)
     }
 
     fn each_name_once(&self, problems: &mut Problems) {
@@ -666,7 +610,7 @@ fn settable(
 mod tests {
     use host::description::ModelDescription;
 
-    use super::{AMPLITUDES, BUILT_IN, Case, FILLS, MODELS, Plan, Sweeps};
+    use super::{AMPLITUDE, AMPLITUDES, BUILT_IN, Case, Draft, FILLS, MODELS, Plan};
 
     /// Reads the FMU's own description, so that the test needs no FMU.
     fn description() -> ModelDescription {
@@ -796,14 +740,20 @@ mod tests {
     fn the_sweeps_of_the_command_line_equal_those_of_the_written_plan() {
         let sweeps = |set: &[(&str, &str)]| {
             let set = set.iter().map(|(name, value)| (name.to_string(), value.to_string()));
-            Plan::sweeps(Sweeps {
-                models: vec!["linear".into(), "spherical".into()],
-                fills: FILLS.to_vec(),
-                amplitudes: vec![0.0125, 0.1],
-                profile: "lin-sweep",
+            let texts = |values: &[f64]| values.iter().map(f64::to_string).collect();
+            let draft = Draft {
+                title: "Sweeps".into(),
+                profile: "lin-sweep:f0=1.25,f1=3.5,duration=2700".into(),
                 set: set.collect(),
                 tolerance: Some(1e-9),
-            })
+                vary: vec![
+                    ("slosh.model", vec!["linear".into(), "spherical".into()]),
+                    ("tank.h", texts(&FILLS)),
+                    (AMPLITUDE, texts(&[0.0125, 0.1])),
+                ],
+                ..Draft::default()
+            };
+            draft.plan()
         };
         let plan = sweeps(&[("friction.model", "viscous")]).unwrap();
         let direct = plan.cases(&description()).unwrap();

@@ -10,10 +10,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
 use experiments::campaign::{Campaign, recorded};
-use experiments::plan::{AMPLITUDE, Plan, Recorded};
+use experiments::plan::{AMPLITUDE, Draft, Plan, Recorded};
 use files::{input, output};
 use identify::input::tolerance::Tolerances;
-use names::hubslosh::tank;
+use names::hubslosh::{slosh, tank};
 use serde::Deserialize;
 use signals::recording::Columns;
 
@@ -160,39 +160,26 @@ impl Day {
 
     /// Writes the sweeps as a plan for a campaign, each as a recording that is simulated with every model.
     /// `found` are parameters from the friction runs, which the simulations use.
-    fn plan(&self, found: &[(String, String)]) -> Result<String> {
-        let text = |value: &str| toml::Value::from(value).to_string();
-        let mut plan = format!(
-            "title = {}\nprofile = {}\n",
-            text(&self.manifest.title),
-            text(&self.manifest.profile)
-        );
-        let mut sweeps = self.items_of_kind(Kind::Sweep);
-        let step = sweeps.find_map(|item| recorded::read(&item.recorded, &mut |_| {}).ok());
-        let Some((step, _)) = step else {
+    fn plan(self, found: Vec<(String, String)>) -> Result<Plan> {
+        let read = |item: &Item| recorded::read(&item.recorded, &mut |_| {}).ok();
+        let Some((step, _)) = self.items_of_kind(Kind::Sweep).find_map(read) else {
             bail!("none of the sweeps that {MANIFEST} lists can be read")
         };
-        plan.push_str(&format!("step = {:?}\n[set]\n", (step * 1e9).round() / 1e9));
-        let known = |name: &str| self.settings.iter().any(|(other, _)| other == name);
-        for (name, value) in self.settings.iter().chain(found.iter().filter(|(n, _)| !known(n))) {
-            let plain = value.parse::<f64>().is_ok() || value.parse::<bool>().is_ok();
-            let value = if plain { value.clone() } else { text(value) };
-            plan.push_str(&format!("{name} = {value}\n"));
-        }
-        for item in self.items_of_kind(Kind::Sweep) {
-            let recording = text(&item.recorded.path.display().to_string());
-            plan.push_str(&format!("[[run]]\nrecording = {recording}\n"));
-            let columns = item.recorded.columns.to_string();
-            if !columns.is_empty() {
-                plan.push_str(&format!("columns = {}\n", text(&columns)));
-            }
-            for (key, value) in [(tank::H, &item.fill), (AMPLITUDE, &item.amplitude)] {
-                plan.extend(value.iter().map(|value| format!("{key} = {value}\n")));
+        let run = |item: &Item| {
+            let values = [(tank::H, item.fill.clone()), (AMPLITUDE, item.amplitude.clone())];
+            let given = values.into_iter().filter_map(|(name, value)| Some((name, value?)));
+            Draft::run(&item.recorded, given)
+        };
+        let runs = self.items_of_kind(Kind::Sweep).map(run).collect();
+        let mut set = self.settings;
+        for (name, value) in found {
+            if set.iter().all(|(other, _)| *other != name) {
+                set.push((name, value));
             }
         }
-        let models: Vec<String> = self.manifest.models.iter().map(|model| text(model)).collect();
-        plan.push_str(&format!("[vary]\nslosh.model = [{}]\n", models.join(", ")));
-        Ok(plan)
+        let Manifest { title, profile, models, .. } = self.manifest;
+        let (step, vary) = (Some((step * 1e9).round() / 1e9), vec![(slosh::MODEL, models)]);
+        Draft { title, profile, step, set, runs, vary, tolerance: None }.plan()
     }
 }
 
@@ -219,7 +206,7 @@ pub fn run(directory: &Path, fmu: &Path, jobs: usize, out: Option<PathBuf>) -> R
     for problem in &problems {
         terminal::error(problem);
     }
-    let mut plan = Plan::parse(&day.plan(&found)?)?;
+    let mut plan = day.plan(found)?;
     plan.convert_units(fmu.description());
     plan.cases(fmu.description())?;
     let stem = directory.canonicalize()?;
