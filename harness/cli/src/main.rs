@@ -263,30 +263,17 @@ fn guarded(cli: &Cli) -> Result<u8> {
 }
 
 fn carry_out(cli: Cli) -> u8 {
-    let done = match cli.command {
-        Some(Command::Pack(args)) => args.run(),
-        Some(Command::Run(args)) => args.run(),
-        Some(Command::View(args)) => args.run(),
-        Some(Command::Variables(args)) => args.run(),
-        Some(Command::Completions(args)) => args.run(Cli::command()),
-        Some(Command::Torque(args)) => args.run(),
-        Some(Command::Campaign(args)) => args.run(),
-        Some(Command::Analyse(args)) => args.run(),
-        Some(Command::Check(args)) => args.run(),
-        Some(Command::CheckCalls(args)) => args.run(),
-        Some(Command::Scale(args)) => args.run(),
-        Some(Command::Tank(args)) => args.run(),
-        Some(Command::Gyro(args)) => args.run(),
-        Some(Command::Example(args)) => args.run(),
-        Some(Command::Examples(args)) => args.run(),
-        Some(Command::Fmus(args)) => args.run(),
-        Some(Command::Identify(args)) => args.run(),
-        Some(Command::Design(args)) => args.run(),
-        Some(Command::Review(args)) => args.run(),
-        Some(Command::Release(args)) => args.run(),
-        Some(Command::Book(args)) => args.run(),
-        None => run_default_job(),
-    };
+    macro_rules! run {
+        ($($command:ident)*) => {
+            match cli.command {
+                $(Some(Command::$command(args)) => args.run(),)*
+                Some(Command::Completions(args)) => args.run(Cli::command()),
+                None => run_default_job(),
+            }
+        };
+    }
+    let done = run!(Pack Run View Variables Torque Campaign Analyse Check CheckCalls Scale Tank Gyro Example Examples Fmus
+        Identify Design Review Release Book);
     match done {
         Ok(()) => terminal::code(),
         Err(error) => {

@@ -1,7 +1,6 @@
 //! Files of other kinds than text in columns and Parquet (`.mat`, HDF5, TDMS, MDF4, Excel): the Python
 //! package `hubslosh` converts them to text, which is then read here.
 
-use std::fmt;
 use std::io::{ErrorKind, Read as _};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -11,16 +10,9 @@ use files::input;
 use files::temporary::Folder;
 
 /// The error for a file that is not read here but perhaps by the Python package.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
 pub struct Foreign(pub String);
-
-impl fmt::Display for Foreign {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str(&self.0)
-    }
-}
-
-impl std::error::Error for Foreign {}
 
 const ADVICE: &str = "the Python package reads .mat (5 and 7.3), HDF5, TDMS, MDF4, .xlsx and every type of Parquet: \
     pip install 'hubslosh[recordings]', then python3 -m hubslosh.recordings FILE FILE.csv writes text that is read here";

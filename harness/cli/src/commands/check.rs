@@ -1,10 +1,12 @@
 //! `hubslosh check`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
-use check::{Options, RULES, Severity, check, json, junit, process, rules::fmi3, sarif, table};
+use check::{
+    Options, RULES, Report, Severity, check, json, junit, process, rules::fmi3, sarif, table,
+};
 use files::output;
 
 use crate::{fmu, progress, terminal};
@@ -44,16 +46,9 @@ pub struct CheckArgs {
 
 /// The error that no selected rule could be checked. Its exit code is 2, so that scripts can distinguish it from an FMU
 /// with errors.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
 pub struct Unchecked(String);
-
-impl std::fmt::Display for Unchecked {
-    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        f.write_str(&self.0)
-    }
-}
-
-impl std::error::Error for Unchecked {}
 
 /// Process that `check` starts for the calls of one rule.
 #[derive(clap::Args)]
@@ -63,6 +58,18 @@ pub struct CheckCallsArgs {
     fmu: PathBuf,
     description: PathBuf,
     limit: f64,
+}
+
+/// Checks an FMU by the rules `only`, or by all, and shows the progress.
+pub fn checked(fmu: &Path, only: Vec<String>, limit: Duration) -> Result<Report> {
+    let program = std::env::current_exe().context("the path of this program cannot be found")?;
+    let bar = progress::rules_bar()?;
+    let report = check(fmu, &Options { program, only, limit }, |rules| {
+        bar.set_length(rules as u64);
+        bar.inc(1);
+    })?;
+    bar.finish_and_clear();
+    Ok(report)
 }
 
 impl CheckArgs {
@@ -80,15 +87,7 @@ impl CheckArgs {
         let limit = Duration::try_from_secs_f64(self.limit).ok().filter(|limit| !limit.is_zero());
         let limit =
             limit.with_context(|| format!("--limit {} (allowed: above 0 s)", self.limit))?;
-        let program =
-            std::env::current_exe().context("the path of this program cannot be found")?;
-        let options = Options { program, only: self.only.clone(), limit };
-        let bar = progress::rules_bar()?;
-        let report = check(fmu, &options, |rules| {
-            bar.set_length(rules as u64);
-            bar.inc(1);
-        })?;
-        bar.finish_and_clear();
+        let report = checked(fmu, self.only.clone(), limit)?;
         match &self.json {
             Some(None) => json::write(&report, &mut terminal::stdout())?,
             _ if terminal::has_reader() => {}

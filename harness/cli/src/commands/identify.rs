@@ -207,46 +207,8 @@ pub struct FmuArgs {
     points: PointsArgs,
 }
 
-/// Methods of older versions that were removed, and what replaces each.
-const REMOVED: [(&str, &str); 6] = [
-    ("output-error", "identify bench, or identify without a kind of recording"),
-    ("acceleration", "identify friction"),
-    ("frequency", "identify bench"),
-    ("free-decay", "identify decay"),
-    (
-        "multisine",
-        "the page on other methods, 'Noise or nonlinearity?', has the estimate in Python",
-    ),
-    (
-        "black-box",
-        "the page on other methods, 'ARX and ARMAX', has the fits in Python; identify bench fits parameters with a physical meaning",
-    ),
-];
-
-/// Options of older versions that were removed, and what replaces each.
-const GONE: [(&str, &str); 18] = [
-    ("--empty", "identify friction"),
-    (
-        "--tank",
-        "identify fmu --fmu SloshTank; the page 'From a force record to a mechanical model' has the command",
-    ),
-    ("--rate", "--columns rate=HZ"),
-    ("--json", "--out, whose file is JSON"),
-    ("--verbose", "`done` in the file of --out"),
-    ("--known", "--start NAME=VALUE:STD"),
-    ("--gyro-scale", "--tolerance gyro_scale=1%"),
-    ("--perfect", "--also none"),
-    ("--actuator-lag", "--also actuator_lag"),
-    ("--gyro-lag", "--also gyro_lag"),
-    ("--friction-drift", "--also friction_drift"),
-    ("--breaking", "--also breaking"),
-    ("--acausal", "--also early_rate"),
-    ("--start-study", "--start NAME=VALUE for a start of your own; every fit takes several starts"),
-    ("--tries", "nothing: up to 8 starts are tried"),
-    ("--held", "--inputs NAME:held"),
-    ("--exchange", "--solver host, or host:TOLERANCE"),
-    ("--solver-tolerance", "--solver own:TOLERANCE"),
-];
+/// Options of older versions that were removed, and values of `--method`, with what replaces each.
+const REMOVED: &str = include_str!("removed.txt");
 
 /// Adds the kind of recording to `identify DATA`, which names none: `fmu` if `--free` is there, otherwise
 /// `bench`. Other command lines stay as they are.
@@ -271,20 +233,18 @@ pub fn with_kind(mut arguments: Vec<OsString>) -> Result<Vec<OsString>> {
     let own: Vec<&str> = own.iter().map(String::as_str).collect();
     for (k, argument) in own.iter().enumerate() {
         let (option, value) = argument.split_once('=').unwrap_or((argument, ""));
-        match option {
-            "--method" => {
-                let name =
-                    if value.is_empty() { own.get(k + 1).copied().unwrap_or("") } else { value };
-                let found = REMOVED.iter().find(|(removed, _)| *removed == name);
-                let instead =
-                    found.map_or("identify bench, fmu, decay or friction", |(_, text)| text);
-                bail!("--method {name} was removed (use instead: {instead})");
-            }
-            _ => {
-                if let Some((_, instead)) = GONE.iter().find(|(gone, _)| *gone == option) {
-                    bail!("{option} was removed (use instead: {instead})");
-                }
-            }
+        let instead = |removed: &str| {
+            let mut all = REMOVED.lines().filter_map(|line| line.split_once(" = "));
+            all.find(|(name, _)| *name == removed).map(|(_, instead)| instead)
+        };
+        if option == "--method" {
+            let next = own.get(k + 1).copied().unwrap_or("");
+            let name = if value.is_empty() { next } else { value };
+            let instead = instead(name).unwrap_or("identify bench, fmu, decay or friction");
+            bail!("--method {name} was removed (use instead: {instead})");
+        }
+        if let Some(instead) = instead(option).filter(|_| option.starts_with("--")) {
+            bail!("{option} was removed (use instead: {instead})");
         }
     }
     // Flags of the program may stand between the command and the kind; they are moved behind the kind.

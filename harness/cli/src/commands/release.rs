@@ -3,11 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use anyhow::{Context, Result, bail};
-use check::{Options, Severity};
+use anyhow::{Result, bail};
+use check::Severity;
 use pack::{Model, release};
-
-use crate::progress;
 
 const DEFAULT_RELEASE: &str = "dist/release";
 
@@ -56,14 +54,7 @@ impl ReleaseArgs {
 ///
 /// If the check finds errors; the message is the report.
 fn checked(fmu: &Path) -> Result<String> {
-    let program = std::env::current_exe().context("the path of this program cannot be found")?;
-    let options = Options { program, only: vec![], limit: Duration::from_secs(60) };
-    let bar = progress::rules_bar()?;
-    let mut report = check::check(fmu, &options, |rules| {
-        bar.set_length(rules as u64);
-        bar.inc(1);
-    })?;
-    bar.finish_and_clear();
+    let mut report = super::check::checked(fmu, Vec::new(), Duration::from_secs(60))?;
     // The report names the FMU, not the temporary folder in which it was checked.
     report.path = fmu.file_name().unwrap_or_default().into();
     let text = report.text();

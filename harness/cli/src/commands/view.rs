@@ -66,6 +66,7 @@ impl ViewArgs {
         let is_parquet = self.run.extension().is_some_and(|e| e.eq_ignore_ascii_case("parquet"));
         let there = table::names(&self.run)?;
         let notes = if is_parquet { table::metadata(&self.run)? } else { BTreeMap::new() };
+        let mut parameters = stored_parameters(&self.run, &notes)?;
         let name = match &self.fmu {
             Some(fmu) => fmu.clone(),
             None => notes.get("model").map(PathBuf::from).or_else(|| find_model(&there)).with_context(|| {
@@ -77,12 +78,6 @@ impl ViewArgs {
             })?,
         };
         let description = ModelDescription::from_fmu(&fmu::find(&name)?)?;
-        let mut parameters: BTreeMap<String, String> = match notes.get("parameters") {
-            Some(text) => serde_json::from_str(text).with_context(|| {
-                format!("{}: the metadata of the file are damaged", self.run.display())
-            })?,
-            None => BTreeMap::new(),
-        };
         let parameters_known =
             !parameters.is_empty() || self.parameters.is_some() || !self.settings.is_empty();
         if let Some(path) = &self.parameters {
@@ -93,13 +88,7 @@ impl ViewArgs {
             let variable = description.variable(name)?;
             description.value(variable, value)?;
         }
-        let known: BTreeSet<&str> = description.variables.iter().map(|v| v.name.as_str()).collect();
-        let wanted: Vec<&str> = there
-            .iter()
-            .map(String::as_str)
-            .filter(|n| *n == "time" || known.contains(n))
-            .collect();
-        let whole = Table::read(&self.run, &wanted)?;
+        let whole = variables_of_run(&description, &self.run, &there)?;
         let table = part(&whole, self.from, self.to)?;
         let drawings =
             self.tanks.iter().map(|text| drawing(text)).collect::<Result<BTreeMap<_, _>>>()?;
@@ -135,24 +124,36 @@ pub fn page_of_stored_run(
     file: &Path,
     title: &str,
 ) -> Result<String> {
-    let notes = table::metadata(file)?;
-    let parameters = serde_json::from_str(notes.get("parameters").map_or("{}", String::as_str))
-        .with_context(|| format!("{}: the metadata of the file are damaged", file.display()))?;
-    let names = table::names(file)?;
-    // Readings of sensors are not variables, so the picture has no place for them.
-    let known = |n: &&str| *n == "time" || description.variables.iter().any(|v| v.name == *n);
-    let names: Vec<&str> = names.iter().map(String::as_str).filter(known).collect();
-    let table = Table::read(file, &names)?;
     let page = view::page(&view::Run {
         title: title.into(),
         source: file.display().to_string(),
         description,
-        parameters: &parameters,
+        parameters: &stored_parameters(file, &table::metadata(file)?)?,
         parameters_known: true,
         drawings: &BTreeMap::new(),
-        table: &table,
+        table: &variables_of_run(description, file, &table::names(file)?)?,
     })?;
     Ok(page.html)
+}
+
+fn stored_parameters(
+    file: &Path,
+    notes: &BTreeMap<String, String>,
+) -> Result<BTreeMap<String, String>> {
+    serde_json::from_str(notes.get("parameters").map_or("{}", String::as_str))
+        .with_context(|| format!("{}: the metadata of the file are damaged", file.display()))
+}
+
+/// Reads the columns that are variables of the FMU. Readings of sensors are not, so the picture has no place for them.
+fn variables_of_run(
+    description: &ModelDescription,
+    file: &Path,
+    columns: &[String],
+) -> Result<Table> {
+    let known: BTreeSet<&str> = description.variables.iter().map(|v| v.name.as_str()).collect();
+    let columns = columns.iter().map(String::as_str);
+    let wanted: Vec<&str> = columns.filter(|n| *n == "time" || known.contains(n)).collect();
+    Table::read(file, &wanted)
 }
 
 /// Returns the path of the project's FMU whose variables the columns are; `None` if no FMU fits.
