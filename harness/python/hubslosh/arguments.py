@@ -148,6 +148,46 @@ def column_of(table: Any, name: Any, what: str, problems: list[str]) -> np.ndarr
     return values
 
 
+def parse_share(text: Any) -> float | None:
+    """Return the number that a share such as "5%" or "± 5%" stands for, if it is above 0.
+
+    Anything else, such as a number or a text without "%", gives None.
+    """
+    if not isinstance(text, str):
+        return None
+    text = text.strip().lstrip("±").strip()
+    try:
+        part = float(text.removesuffix("%")) / 100
+    except ValueError:
+        return None
+    return part if text.endswith("%") and 0 < part < np.inf else None
+
+
+# Ranges that `range_ends` reads, for messages.
+RANGES = '(low, high) with low < high, or a share of the nominal value such as "5%"'
+
+
+def range_ends(given: Any, nominal: float) -> tuple[float, float]:
+    """Return the ends of a range: (low, high), or a share such as "5%" of the nominal value.
+
+    Raises ValueError with the rest of a sentence about the quantity if the range is neither.
+    """
+    if isinstance(given, str):
+        if (part := parse_share(given)) is None:
+            raise ValueError(f"cannot be {given!r} (allowed: {RANGES})")
+        if nominal == 0:
+            raise ValueError(f"is 0, so that {given} of it is no range: give (low, high)")
+        half = part * abs(nominal)
+        return float(nominal - half), float(nominal + half)
+    try:
+        low, high = (float(end) for end in given)
+    except (TypeError, ValueError):
+        low = high = np.nan
+    if not (np.isfinite([low, high]).all() and low < high):
+        raise ValueError(f"cannot be {given!r} (allowed: {RANGES})")
+    return low, high
+
+
 def vector(values: Any, length: int, what: str) -> np.ndarray:
     """Return ``values`` as an array of ``length`` finite numbers."""
     try:

@@ -20,12 +20,14 @@ from .loop import Loop
 from .operating_point import OperatingPoint, rotation, trim
 from .quantities import (
     DELAY,
+    NO_MODE,
     RESERVED,
     Modes,
     Names,
     apply_changes,
     full_names,
     mode_quantity,
+    nominal_value,
     short_name,
 )
 from .simulation import outputs_of, parameters_of
@@ -46,6 +48,7 @@ if TYPE_CHECKING:
 
     from .review import Review
     from .run import Run
+    from .sampling import Outcome
     from .uncertainty import UncertainModel
     from .viewing import View
 
@@ -1253,7 +1256,7 @@ class Craft:
         """
         from .uncertainty import FACTOR, uncertain
 
-        tanks, order = self.tank_at(fill), self._names
+        order = self._names
         named: dict[str, Any] = full_names(
             ranges, Fmu.open(self.model), order, [FACTOR]  # type: ignore[arg-type]
         )  # fmt: skip
@@ -1262,15 +1265,7 @@ class Craft:
                 "delay belongs to a loop, not to the craft: give it to Craft.loop, or vary it by "
                 "Craft.review"
             )
-        for name, of in named.items():
-            if isinstance(of, str) and of == "interval":
-                mode = mode_quantity(name)
-                tank = tanks.get(order[mode.tank - 1]) if mode and mode.tank <= len(order) else None
-                table = None if tank is None or mode is None else tank.modes
-                if table is None or mode is None or mode.kind != "zeta" or "zeta_low" not in table:
-                    raise FmuError(f'{name}: "interval" is for zeta[n] of a tank with nu=')
-                row = table.iloc[mode.number - 1]
-                named[name] = (float(row["zeta_low"]), float(row["zeta_high"]))
+        named = self._with_intervals(fill, named)
         point, late = self._point(fill, parameters)
         if late is not None:
             raise FmuError(
@@ -1285,6 +1280,107 @@ class Craft:
             raise FmuError("; ".join(problems))
         model = uncertain(point.parameters, named, outputs=outputs, model=point.model, **options)
         return replace(model, tanks=order)
+
+    def _with_intervals(self, fill: Fill, ranges: Mapping[str, Any]) -> dict[str, Any]:
+        """Return ranges by full names in which (low, high) replaces "interval"."""
+        tanks, order, found = self.tank_at(fill), self._names, dict(ranges)
+        for name, of in ranges.items():
+            if isinstance(of, str) and of == "interval":
+                mode = mode_quantity(name)
+                tank = tanks.get(order[mode.tank - 1]) if mode and mode.tank <= len(order) else None
+                table = None if tank is None or mode is None else tank.modes
+                if table is None or mode is None or mode.kind != "zeta" or "zeta_low" not in table:
+                    raise FmuError(f'{name}: "interval" is for zeta[n] of a tank with nu=')
+                row = table.iloc[mode.number - 1]
+                found[name] = (float(row["zeta_low"]), float(row["zeta_high"]))
+        return found
+
+    def monte_carlo(
+        self,
+        fill: Fill,
+        ranges: Mapping[str, Any],
+        runs: int,
+        seed: int = 1,
+        outcome: "Outcome | None" = None,
+        *,
+        parameters: Parameters | None = None,
+        **options: Any,
+    ) -> "pd.DataFrame":
+        """Run a Monte Carlo study of the craft at a fill; see `hubslosh.monte_carlo`.
+
+        Parameters
+        ----------
+        fill : fill, mapping, or sequence of fills
+            Fill of the tanks, as for `fills`.
+        ranges : mapping
+            Ranges by name, as for `uncertain`: (low, high), a share such as "10%" of the value at
+            the fill, or "interval" for a damping ratio; also a list of values or a distribution of
+            ``scipy.stats``. Names are as for `parameters`; other names, such as one for the bias of
+            a sensor, can have ranges that are neither shares nor "interval".
+        runs : int
+            Number of runs.
+        seed : int
+            Seed of the draws.
+        outcome : callable, optional
+            Function of the drawn values, a dict by the names in ``ranges``, that returns numbers by
+            name. ``craft.loop(law, period, fill, parameters=values)`` takes the values.
+        parameters : mapping, optional
+            Further parameters, see `parameters`; ``"delay"`` among them is the nominal delay.
+        **options
+            ``folder``, ``client``, ``workers`` and ``progress``, as for `hubslosh.monte_carlo`.
+
+        Returns
+        -------
+        DataFrame
+            A row for each run, as `hubslosh.monte_carlo` returns it.
+
+        Raises
+        ------
+        FmuError
+            If a fill, a range or a parameter is wrong, or the study fails.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import hubslosh
+        >>> sphere = {"density": 1010, "shape": {"sphere": {"radius": 0.4}}}
+        >>> tanks = {"main": hubslosh.MountedTank(sphere, (0, 0, 0.2), modes=1, nu=0.9e-6)}
+        >>> craft = hubslosh.Craft(900, [400, 380, 300], tanks=tanks, thrust=500)
+        >>> gains = np.hstack([20 * np.eye(3), 80 * np.eye(3)])
+        >>> def phase(values):
+        ...     loop = craft.loop(gains, 0.1, "50%", parameters=values)
+        ...     return {"phase (deg)": hubslosh.margins(loop).phase_margin}
+        >>> ranges = {"main.frequency[1]": "10%", "main.zeta[1]": "interval", "craft.Jxx": "5%"}
+        >>> table = craft.monte_carlo("50%", ranges, 4, outcome=phase)
+        >>> bool((table["phase (deg)"] > 50).all())
+        True
+        """
+        from .sampling import monte_carlo
+
+        every, modes, late = self._resolve(fill, parameters)
+        nominal: dict[str, float] = {}
+        items = ranges.items() if isinstance(ranges, Mapping) else ()
+        texts = [name for name, of in items if isinstance(of, str)]
+        if texts:
+            given = dict(ranges)
+            full = full_names({n: given[n] for n in texts}, Fmu.open(self.model), self._names)
+            known = dict(zip(full, texts, strict=True))
+            full = self._with_intervals(fill, full)
+            given |= {known[name]: of for name, of in full.items()}
+            point = Modes(self.model, self._realised(every, modes).parameters)
+            for name, of in full.items():
+                if isinstance(of, str):
+                    value = late if name == DELAY else nominal_value(point, every, name)
+                    if value is None:
+                        why = (
+                            'has no nominal value: give parameters={"delay": …}, s'
+                            if name == DELAY
+                            else NO_MODE
+                        )
+                        raise FmuError(f"{known[name]} {why}")
+                    nominal[known[name]] = float(value)
+            ranges = given
+        return monte_carlo(ranges, runs, seed, outcome, nominal=nominal, **options)
 
     def simulate(
         self,

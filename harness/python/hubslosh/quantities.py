@@ -31,6 +31,9 @@ RESERVED = re.compile(
 # What is wrong with a quantity of a mode that the tank does not have.
 NO_MODE = "does not exist: its tank has no such mode"
 
+# Parameters that a tank without this mode does not have.
+OF_A_MODE = re.compile(r"tank\[\d\]\.(mass|length|hinge|k|zeta|wave)\[\d\]$")
+
 _MODE_QUANTITY = re.compile(rf"tank\[(\d)\]\.({'|'.join(KINDS)})\[(\d)\]")
 _MOVES_THE_BOB = re.compile(r"(tank\[\d\])\.(length|hinge)(\[\d\])")
 
@@ -305,6 +308,22 @@ class Modes:
                     name = f"craft.J{'xyz'[i]}{'xyz'[j]}"
                     found[name] = self.number(name) + float(J[i, j])
         self.given |= found
+
+
+def nominal_value(modes: Modes, untrimmed: Parameters, name: str) -> float | None:
+    """Return the value of a quantity by its full name; None if the craft does not have the mode.
+
+    ``modes`` has the parameters of the operating point. ``untrimmed`` has the parameters as they
+    are given, in which trimming has not moved the origin yet.
+    """
+    if mode := mode_quantity(name):
+        return None if modes.problem(mode) else modes.value(mode)
+    if name in untrimmed:
+        return float(modes.fmu.convert(name, untrimmed[name]))
+    if OF_A_MODE.match(name):
+        return None
+    start = modes.fmu.variable(name).start
+    return float(start) if start is not None else None
 
 
 def rigid_rest(

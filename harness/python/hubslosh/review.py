@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import pandas as pd
 
-from .arguments import MOST_FILLS, MOST_WORK, check_ranges
+from .arguments import MOST_FILLS, MOST_WORK, check_ranges, parse_share, range_ends
 from .fmu import Fmu, FmuError, FmuWarning, Parameters, Quantity
 from .linearization import LinearModel
 from .loop import Loop
@@ -26,6 +26,7 @@ from .quantities import (
     full_names,
     mode_quantity,
     moves_the_bob,
+    nominal_value,
     short_name,
 )
 from .requirements import Requirement, judged, requirements_of
@@ -40,10 +41,6 @@ from .worst_case import Confirmation, confirm, search
 
 if TYPE_CHECKING:
     from .craft import Craft, Fill
-
-# Parameters that a tank without this mode does not have.
-OF_A_MODE = re.compile(r"tank\[\d\]\.(mass|length|hinge|k|zeta|wave)\[\d\]$")
-
 
 # Ways in which a slosh mode is stabilised, worst first.
 SEVERITY = ("unstable", "neither", "phase", "gain", "gain and phase")
@@ -668,13 +665,13 @@ def _damping(craft: "Craft", tanks: list[dict[str, Any]], given: Container[str])
     return found
 
 
-def _part(share: Any, what: str) -> float:
+def _part(given: Any, what: str) -> float:
     """Return the part by which a quantity varies; 0 for "nominal"."""
-    part = 0.0 if share == "nominal" else _share(share)
+    part = 0.0 if given == "nominal" else parse_share(given)
     if part is None or part >= 1:
         raise FmuError(
             f'{what} must be a share of the nominal value, such as "10%", or "nominal", not '
-            f"{share!r}"
+            f"{given!r}"
         )
     return part
 
@@ -744,9 +741,9 @@ def _quantities(
             problems.append(f"uncertain: {shown} {bad}")
             continue
         nominals = [
-            _nominal(fmu, loop, every, full) for loop, every in zip(loops, given, strict=True)
+            _nominal(loop, every, full) for loop, every in zip(loops, given, strict=True)
         ]
-        ends, problem = _ends(range_, nominals)
+        limits, problem = _ends(range_, nominals)
         if problem:
             problems.append(f"uncertain: {shown} {problem}")
             continue
@@ -756,7 +753,7 @@ def _quantities(
             text = f"{float(range_[0]):g} to {float(range_[1]):g} {_unit(fmu, full)}".rstrip()
         rows = tuple(
             {} if nominal is None else {full: (low, nominal, high)}
-            for (low, high), nominal in zip(ends, nominals, strict=True)
+            for (low, high), nominal in zip(limits, nominals, strict=True)
         )
         found.append(Uncertain(name, text, rows))
     if problems:
@@ -774,31 +771,11 @@ def _problem(loop: Loop, mode: ModeQuantity) -> str:
     return Modes(loop.model, loop.parameters).problem(mode)  # type: ignore[arg-type]
 
 
-def _nominal(fmu: Fmu, loop: Loop, untrimmed: Parameters, name: str) -> float | None:
+def _nominal(loop: Loop, untrimmed: Parameters, name: str) -> float | None:
     """Return the nominal value; None if this fill does not have the mode."""
     if name == DELAY:
         return float(loop.delay)
-    if mode := mode_quantity(name):
-        modes = Modes(loop.model, loop.parameters)  # type: ignore[arg-type]
-        return None if modes.problem(mode) else modes.value(mode)
-    if name in untrimmed:
-        return float(fmu.convert(name, untrimmed[name]))
-    if OF_A_MODE.match(name):
-        return None
-    start = fmu.variable(name).start
-    return float(start) if start is not None else None
-
-
-def _share(text: Any) -> float | None:
-    """Return the number that "5%" or "± 5%" stands for, if it is above 0."""
-    if not isinstance(text, str):
-        return None
-    text = text.strip().lstrip("±").strip()
-    try:
-        share = float(text.removesuffix("%")) / 100
-    except ValueError:
-        return None
-    return share if text.endswith("%") and 0 < share < np.inf else None
+    return nominal_value(Modes(loop.model, loop.parameters), untrimmed, name)  # type: ignore[arg-type]
 
 
 Ends = list[tuple[float, float]]
@@ -807,23 +784,13 @@ Ends = list[tuple[float, float]]
 def _ends(given: Any, nominals: list[float | None]) -> tuple[Ends, str]:
     """Return the ends of a range at each fill, or a sentence on what is wrong with the range."""
     known = [value for value in nominals if value is not None]
-    allowed = 'allowed: (low, high), or a share of the nominal value such as "5%"'
     if not known:
         return [], NO_MODE
-    if isinstance(given, str):
-        if (share := _share(given)) is None:
-            return [], f"cannot be {given!r} ({allowed})"
-        if 0 in known:
-            return [], f"is 0, of which {given} is nothing: give (low, high)"
-        scaled = [(value or 0.0) * np.array([1 - share, 1 + share]) for value in nominals]
-        return [(float(a), float(b)) for a, b in scaled], ""
     try:
-        low, high = (float(end) for end in given)
-    except (TypeError, ValueError):
-        return [], f"cannot be {given!r} ({allowed})"
-    if not (np.isfinite([low, high]).all() and low < high):
-        return [], f"cannot be {given!r} ({allowed}, low < high)"
-    outside = [value for value in known if not low <= value <= high]
-    if outside:
+        found = [range_ends(given, known[0] if value is None else value) for value in nominals]
+    except ValueError as error:
+        return [], str(error)
+    low, high = found[0]
+    if not isinstance(given, str) and (outside := [x for x in known if not low <= x <= high]):
         return [], f"is nominally {outside[0]:.6g}, outside {low:g} to {high:g}"
-    return [(low, high)] * len(nominals), ""
+    return found, ""

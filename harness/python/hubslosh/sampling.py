@@ -11,7 +11,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .arguments import check_numbers, check_table, floats, names_of, out_of_range
+from .arguments import (
+    check_numbers,
+    check_table,
+    floats,
+    names_of,
+    out_of_range,
+    parse_share,
+    range_ends,
+)
 from .fmu import FmuError
 from .native import uniforms
 from .progress import Line, Progress
@@ -23,13 +31,20 @@ if TYPE_CHECKING:
 # Evaluation of one draw: numbers by name, from values by name.
 Outcome = Callable[[dict[str, Any]], Mapping[str, float]]
 
-# (low, high): uniform; a list: one of its items; a frozen distribution of ``scipy.stats``.
+# (low, high): uniform; a share of a nominal value, such as "10%": uniform; a list: one of its items;
+# a frozen distribution of ``scipy.stats``.
 Range = Any
 
 FAILED = "refused"  # Column that says what the FMU refused
 
 
-def draw(ranges: Mapping[str, Range], run: int, seed: int = 1) -> dict[str, Any]:
+def draw(
+    ranges: Mapping[str, Range],
+    run: int,
+    seed: int = 1,
+    *,
+    nominal: Mapping[str, float] | None = None,
+) -> dict[str, Any]:
     """Return the values of one run of `monte_carlo`.
 
     A value depends only on the seed, on the number of the run, and on the names in ``ranges`` up to
@@ -44,6 +59,8 @@ def draw(ranges: Mapping[str, Range], run: int, seed: int = 1) -> dict[str, Any]
         Number of the run, counted from 0.
     seed : int, default 1
         Seed of the study.
+    nominal : mapping, optional
+        Nominal values by name, as in `monte_carlo`.
 
     Returns
     -------
@@ -61,8 +78,14 @@ def draw(ranges: Mapping[str, Range], run: int, seed: int = 1) -> dict[str, Any]
     >>> hubslosh.draw({"tank.h": (0.04, 0.14), "slosh.model": ["linear", "planar"]}, run=0)
     {'tank.h': 0.09583574388883317, 'slosh.model': 'linear'}
     """
-    if wrong := _wrong(ranges) + out_of_range(run=run, seed=seed):
+    ranges, wrong = _resolved(ranges, nominal)
+    if wrong := wrong + out_of_range(run=run, seed=seed):
         raise FmuError("; ".join(wrong))
+    return _drawn(ranges, run, seed)
+
+
+def _drawn(ranges: Mapping[str, Range], run: int, seed: int) -> dict[str, Any]:
+    """Return the values of one run from ranges without shares."""
     shares = iter(uniforms(int(seed), int(run), len(ranges)))
     return {name: _value(of, next(shares)) for name, of in ranges.items()}
 
@@ -79,25 +102,39 @@ def _value(of: Range, share: float) -> Any:
     return float(value)
 
 
-def _wrong(ranges: Any) -> list[str]:
-    """Return a sentence for each wrong range."""
+def _resolved(ranges: Any, nominal: Any) -> tuple[dict[str, Range], list[str]]:
+    """Return ranges in which (low, high) replaces each share, and a sentence for each wrong one."""
     if not isinstance(ranges, Mapping) or not ranges:
-        return ["ranges must be (low, high), a list or a distribution for each name"]
-    found = []
+        return {}, ["ranges must be (low, high), a share, a list or a distribution for each name"]
+    if not isinstance(nominal, Mapping | None):
+        return {}, [f"nominal must be nominal values by name, not {nominal!r}"]
+    found, problems = {}, []
     for name, of in ranges.items():
+        found[name] = of
         if hasattr(of, "ppf") or (isinstance(of, list) and of):
             continue
         try:
-            low, high = (float(bound) for bound in of)
-            if np.isfinite([low, high]).all() and low < high:
-                continue
+            middle = float((nominal or {})[name]) if parse_share(of) else 0.0
+            if not np.isfinite(middle):
+                raise ValueError
+        except KeyError:
+            problems.append(
+                f"{name} is given as {of} of its nominal value, which is not known: give "
+                f"nominal={{{name!r}: …}}, or take Craft.monte_carlo, which knows it"
+            )
+            continue
         except (TypeError, ValueError):
-            pass
-        found.append(
-            f"{name} cannot be {of!r} (allowed: (low, high) with low < high, a list of values, a "
-            "distribution such as scipy.stats.norm(650, 10))"
-        )
-    return found
+            problems.append(f"nominal[{name!r}] must be a finite number, not {nominal[name]!r}")
+            continue
+        try:
+            found[name] = range_ends(of, middle)
+        except ValueError as error:
+            problems.append(f"{name} {error}{ALSO}")
+    return found, problems
+
+
+# Further kinds of ranges, in messages after those of `range_ends`.
+ALSO = "; or a list of values, or a distribution such as scipy.stats.norm(650, 10)"
 
 
 def monte_carlo(
@@ -110,14 +147,16 @@ def monte_carlo(
     client: Any = None,
     workers: int | None = None,
     progress: Progress = None,
+    nominal: Mapping[str, float] | None = None,
 ) -> "pd.DataFrame":
     """Run a Monte Carlo study: draw random values, simulate each draw, and return a row for each.
 
     Parameters
     ----------
     ranges : mapping
-        Range of each name: (low, high) for a uniform distribution, a list of values, or a frozen
-        distribution of ``scipy.stats``. A run's values depend only on seed and number: 400 runs
+        Range of each name: (low, high) for a uniform distribution, a share such as "10%" of the
+        value in ``nominal`` on both sides, a list of values, or a frozen distribution of
+        ``scipy.stats``. A run's values depend only on seed and number: 400 runs
         begin with the same 200. Items of a list keep their type.
     runs : int
         Number of runs.
@@ -127,7 +166,8 @@ def monte_carlo(
         Function of the drawn values (a dict by name) that makes the run and returns numbers by
         name. By default the table has only the draws. The parameters of a `Craft`, such as
         ``NTO.frequency[1]`` and ``delay``, may be names of ranges:
-        ``craft.loop(law, period, fill, parameters=values)`` takes them.
+        ``craft.loop(law, period, fill, parameters=values)`` takes them. `Craft.monte_carlo` knows
+        their nominal values.
     folder : path, optional
         Folder that makes the study resumable. Each run is stored as soon as it is done, and the
         same call continues a stopped study, even after kill -9. Stored runs are verified by their
@@ -171,7 +211,8 @@ def monte_carlo(
     """
     from .short import ShortTable
 
-    problems = _wrong(ranges) + out_of_range(runs=runs, seed=seed)
+    ranges, problems = _resolved(ranges, nominal)
+    problems += out_of_range(runs=runs, seed=seed)
     problems += [] if workers is None else out_of_range(workers=workers)
     if not isinstance(folder, str | Path | None):
         problems.append(f"folder must be a path, not {folder!r}")
@@ -182,7 +223,7 @@ def monte_carlo(
     if problems:
         raise FmuError("; ".join(problems))
     runs, seed = int(runs), int(seed)  # numpy's integers too
-    draws = [draw(ranges, run, seed) for run in range(runs)]
+    draws = [_drawn(ranges, run, seed) for run in range(runs)]
     if outcome is None:
         table = ShortTable([{"run": run} | values for run, values in enumerate(draws)])
         table.attrs["drawn"] = list(ranges)

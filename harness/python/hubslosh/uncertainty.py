@@ -41,7 +41,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .arguments import check_ranges, floats, names_of, out_of_range
+from .arguments import check_ranges, floats, names_of, out_of_range, range_ends
 from .certificate import (
     SIZES,
     Certificate,
@@ -1306,15 +1306,9 @@ def uncertain(
         if name not in values:
             continue
         try:
-            if isinstance(of, str):
-                share = abs(values[name]) * float(of.strip().removesuffix("%")) / 100
-                low, high = values[name] - share, values[name] + share
-            else:
-                low, high = (float(x) for x in of)
-        except (TypeError, ValueError):
-            low = high = np.nan
-        if not (np.isfinite([low, high]).all() and low < high):
-            problems.append(f'{name} must be (low, high) with low < high or "5%", not {of!r}')
+            low, high = range_ends(of, values[name])
+        except ValueError as error:
+            problems.append(f"{name} {error}")
             continue
         kind = name.split(".")[-1].split("[")[0]
         if low <= 0 and (kind in ("frequency", "mass") or name == FACTOR):

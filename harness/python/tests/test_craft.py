@@ -50,6 +50,34 @@ def shifted(mass: float, arm: np.ndarray) -> np.ndarray:
     )  # fmt: skip
 
 
+def test_monte_carlo_reads_the_ranges_of_an_uncertain_model(craft: Craft) -> None:
+    """Shares are of the value at the fill, by the tank's name or its number.
+
+    The ends are those of `Craft.uncertain`; names of the study's own have ends only.
+    """
+    tanks = {"ox": replace(craft.tanks["ox"], nu=3e-6)}
+    tanks["fuel"] = replace(craft.tanks["fuel"], axis=(0, 0, 1))
+    craft = replace(craft, tanks=tanks)
+    ranges = {"ox.frequency[1]": "10%", "tank[1].zeta[1]": "interval", "craft.Jxx": "± 5%"}
+    model = craft.uncertain("50%", ranges)
+    table = craft.monte_carlo("50%", ranges | {"bias": (0.0, 1.0)}, 300)
+    assert table.attrs["drawn"] == [*ranges, "bias"]
+    for name, full in zip(ranges, model.deltas, strict=True):
+        middle, half = model.center[full], float(model.spread.loc[full, full])
+        assert (table[name] - middle).abs().max() == pytest.approx(half, rel=0.02)
+        assert table[name].between(middle - half, middle + half).all()
+    late = craft.monte_carlo("50%", {"delay": "10%"}, 50, parameters={"delay": 0.1})["delay"]
+    assert 0.09 <= late.min() < 0.092 and 0.108 < late.max() <= 0.11
+    for given, text in {
+        ("delay", "10%"): "delay has no nominal value",
+        ("bias", "10%"): "the craft has no quantity bias",
+        ("fuel.frequency[2]", "10%"): "its tank has no such mode",
+        ("craft.Jxx", "interval"): '"interval" is for zeta',
+    }.items():
+        with pytest.raises(FmuError, match=text):
+            craft.monte_carlo("50%", dict([given]), 3)
+
+
 def test_fmpy_with_the_parameters_of_a_craft_is_simulate_with_them(craft: Craft) -> None:
     """FMPy and `simulate` agree bit by bit: `Craft.parameters` has all that a host must set."""
     values = craft.parameters("50%")

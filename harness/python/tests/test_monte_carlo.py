@@ -160,6 +160,31 @@ def test_a_refused_run_is_a_row_and_a_programming_error_ends_the_study(
         assert part in str(error.value), part
 
 
+def test_a_share_is_a_range_about_the_nominal_value(tmp_path: Path) -> None:
+    """Shares draw what (low, high) draws, store the same study, and need a nominal value."""
+    ranges, nominal = {"a": "10%", "b": "± 5 %", "c": ["x", "y"]}, {"a": 2.0, "b": -4.0}
+    ends = {"a": (1.8, 2.2), "b": (-4.2, -3.8), "c": ["x", "y"]}
+    table = monte_carlo(ranges, 40, 3, nominal=nominal)
+    pd.testing.assert_frame_equal(table, monte_carlo(ends, 40, 3))
+    assert draw(ranges, 7, 3, nominal=nominal) == draw(ends, 7, 3)
+
+    def double(values: dict) -> dict[str, float]:
+        return {"twice": 2 * values["a"]}
+
+    first = monte_carlo(ranges, 5, 3, double, folder=tmp_path, nominal=nominal)
+    pd.testing.assert_frame_equal(monte_carlo(ends, 5, 3, double, folder=tmp_path), first)
+    for given, text in {
+        None: r"b is given as ± 5 % of its nominal value, which is not known: give nominal=",
+        ("b", 0.0): "b is 0, so that ± 5 % of it is no range",
+        ("b", "4 m"): r"nominal\['b'\] must be a finite number, not '4 m'",
+    }.items():
+        values = {"a": 2.0} | dict([given] if given else [])
+        with pytest.raises(FmuError, match=text):
+            monte_carlo(ranges, 5, 3, nominal=values)
+    with pytest.raises(FmuError, match="a cannot be '10'"):
+        monte_carlo({"a": "10"}, 5, nominal=nominal)
+
+
 def test_intervals_of_quantiles_have_their_stated_coverage() -> None:
     """For the median of 50 numbers the interval must contain the true value in 96.7 % of samples.
 
