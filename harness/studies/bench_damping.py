@@ -125,7 +125,14 @@ def cases() -> list[tuple[str, float, float, str]]:
     return [key for key in every if key[0] != "linear" or key[3] == "none"]
 
 
-HEADS = ("ζ_A, 1/rad", "seed", "peak at 0.25 N·m", "at 0.0125", "with the gyro", "swirl from")
+HEADS = (
+    "ζ_A, 1/rad",
+    "disturbance",
+    "largest hub acceleration at 0.25 N·m, rad/s²",
+    "largest hub acceleration at 0.0125 N·m, rad/s²",
+    "largest acceleration at 0.0125 N·m as read by the gyro, rad/s²",
+    "rotary slosh begins at, N·m",
+)
 MEASURED = "| measured (thesis 7.1, 7.2) | | | 2.21 | | 0.222 | 0.075 to 0.1 |"
 
 
@@ -133,7 +140,7 @@ def text(rows: pd.DataFrame) -> str:
     """Return the tables, Markdown."""
     lines = []
     for fill in FILLS:
-        lines.append(" | ".join((f"| {fill * 100:.0f} cm: model", *HEADS)) + " |")
+        lines.append(" | ".join((f"| {fill * 100:.0f} cm fill: slosh model", *HEADS)) + " |")
         lines.append("| --- " * (1 + len(HEADS)) + "|")
         for row in rows[rows["fill_m"] == fill].itertuples():
             large = "leaves its range" if np.isnan(row.peak_large) else f"{row.peak_large:.2f}"

@@ -146,7 +146,7 @@ def test_damping_of_the_bench(case, fmu: Path, monkeypatch: pytest.MonkeyPatch) 
     (row,) = (line for line in table if line.startswith(f"| {case[0]} |"))
     page = lines("damping.md")
     # the rows of 5 cm stand before those of 10 cm
-    start = page.index(next(line for line in page if line.startswith("| 10 cm: model")))
+    start = page.index(next(line for line in page if line.startswith("| 10 cm fill:")))
     assert row in (page[:start] if case[2] == 0.05 else page[start:])
 
 
@@ -182,10 +182,10 @@ def test_errors_of_work_and_precision(
 
 
 def test_a_flight_identifies_slosh(fmu: Path, program: Path, tmp_path: Path) -> None:
-    """Seed 1 with the good gyro, all rows of the table in book/flight.md.
+    """The estimates of one simulated flight equal the table of one flight in book/flight.md.
 
-    Beyond the printed digits estimates may differ by 0.1 of their standard deviations, and these by
-    5 %: far below what decides an interval.
+    The flight has the seed 1 and the good gyro. Beyond the printed digits estimates may differ by
+    0.1 of their standard deviations, and these by 5 %: far below what decides an interval.
     """
     spacecraft = os.fspath(fmu.with_name("Spacecraft.fmu"))
     truth, found, _ = flight_twin.twin(1, "good", os.fspath(program), spacecraft, tmp_path)
@@ -267,7 +267,10 @@ def test_the_foreign_plant_without_effects_is_hubslosh(
 @pytest.mark.skipif(sys.platform != "linux", reason="the study compiles a binary for Linux")
 @pytest.mark.parametrize("only", ["decay", "gyro", "tank", "design --free"])
 def test_intervals_of_four_draws(only: str, fmu: Path, program: Path, tmp_path: Path) -> None:
-    """Every interval is given, and at most one of four misses the true value (by chance 1.4 %)."""
+    """Of four 95 % intervals at most one misses the true value.
+
+    Correct intervals would fail this test with a probability of 1.4 %.
+    """
     bench = intervals.Bench(os.fspath(program), os.fspath(fmu), tmp_path)
     rows = list(intervals.census(bench, only, 4))
     assert rows

@@ -646,8 +646,8 @@ mod tests {
         }
     }
 
-    /// One craft covers all tolerances, of which rounding limits the tightest; the sixteen craft below would
-    /// take a minute at every tolerance.
+    /// One long step of a draining craft gives the same motion as many short steps, and takes at most twice the work
+    /// of one step. A single craft is tested at every tolerance; rounding limits the smallest tolerance.
     #[test]
     fn a_long_step_of_a_draining_craft_equals_short_steps_at_most_twice_as_costly() {
         for seed in 0..4 {
@@ -656,6 +656,8 @@ mod tests {
         }
     }
 
+    /// Sixteen random draining craft: one long step gives the same motion as many short steps, within the tolerance
+    /// of the solver.
     #[test]
     #[ignore = "minutes: .ci/run --nightly"]
     fn long_steps_of_draining_craft_equal_short_steps_at_every_tolerance() {

@@ -908,8 +908,9 @@ mod tests {
         assert!((motion.now[0] - since.cos()).abs() < 1e-12, "{:?}", motion.now);
     }
 
+    /// The integrator counts its internal steps, and an error states the time on the clock of the host.
     #[test]
-    fn steps_are_counted_and_the_time_of_an_error_is_the_hosts() {
+    fn internal_steps_are_counted_and_errors_state_the_time_of_the_host() {
         let mut motion = Oscillator::new(Convergence::Decay);
         let mut steps = Steps::new(3, "; rest");
         let error = advance(&mut motion, 7.0, 1e3, 1e-8, &mut steps).unwrap_err();

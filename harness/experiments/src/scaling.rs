@@ -307,7 +307,8 @@ mod tests {
         thesis().into_iter().find(|f| f.what.starts_with(what)).expect(what).value
     }
 
-    /// The tolerance of each number is half a unit of the last digit that is known.
+    /// Each number of section 7.2 of the thesis, corrected where the thesis is wrong, is reproduced to half a unit of
+    /// its last printed digit.
     #[test]
     fn numbers_of_the_thesis_are_reproduced_with_their_corrections() {
         for (what, known, digit) in [

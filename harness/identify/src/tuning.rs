@@ -170,7 +170,7 @@ pub const ANGLE_ROUNDS: usize = 12;
 pub const TOLD_DECREMENT: f64 = 0.1;
 
 // Page: `words/page.rs`.
-// Tests: `the_page_is_whole`.
+// Tests: `the_report_of_a_fit_is_a_complete_page`.
 /// Number of points of a curve; more points than a screen has pixels are not seen.
 pub const PAGE_POINTS: usize = 700;
 

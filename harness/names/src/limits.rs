@@ -85,8 +85,10 @@ fn percent(share: f64) -> String {
 mod tests {
     use super::*;
 
+    /// For each reason for which a tank was out of range, the share of the time and the first time are computed from
+    /// the history of the reason's number.
     #[test]
-    fn reasons_have_their_shares_of_the_time_and_their_first_times() {
+    fn each_reason_for_leaving_the_range_has_its_share_of_the_time_and_its_first_time() {
         let time = [0.0, 1.0, 3.0, 4.0, 10.0];
         let found = reasons(&time, &[1.0, 2.0, 5.0, 2.0, 5.0]);
         assert_eq!(found, [(LimitedBy::ThirdOrder, 0.8, 1.0), (LimitedBy::Spin, 0.1, 3.0)]);

@@ -109,7 +109,7 @@ def fmu_path(model: str | Path) -> Path:
     there = f'there is no FMU "{model}" here (there are: {", ".join(names) or "none"})'
     if own := re.fullmatch(r"(HubSlosh|SloshTank|Spacecraft)(-fmi3)?(-arrays)?", model):
         raise FmuError(
-            f"{there}; to build the FMU, run in the folder of the project's source (it needs Rust): "
+            f"{there}; to build the FMU, run in the folder of the project's source, with Rust: "
             f"cargo run --release -- pack --model {own[1]}{' --fmi 3' if own[2] else ''}"
             f"{' --arrays' if own[3] else ''}"
         )

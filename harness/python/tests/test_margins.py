@@ -52,10 +52,12 @@ def test_margins_of_an_integrator_with_two_lags_equal_the_closed_form() -> None:
 
 @pytest.mark.parametrize("half", [0.05, 1e-4])
 def test_crossings_at_a_narrow_slosh_dipole_are_found(half: float) -> None:
-    """By choice of k, a, b k (s² + a²)/(s (s² + b²)) is 1 at 2.5 - half, 2.5 and 2.5 + half rad/s.
+    """All three gain crossings next to a narrow pair of pole and zero are found.
 
-    The narrower dipole is 1e-8 rad/s wide: no frequency grid would see it. The three are roots of
-    w³ - k w² - b² w + k a² = 0, the middle one with the other sign.
+    k, a and b are chosen so that the loop gain k (s² + a²)/(s (s² + b²)) has the magnitude 1 at
+    2.5 - half, 2.5 and 2.5 + half rad/s. The narrower dipole is 1e-8 rad/s wide: no frequency grid
+    would show it. The three frequencies are roots of w³ - k w² - b² w + k a² = 0, the middle one
+    with the other sign.
     """
     r1, r2, r3 = 2.5 - half, 2.5 + half, 2.5
     k, b2 = r1 + r2 - r3, r3 * (r1 + r2) - r1 * r2

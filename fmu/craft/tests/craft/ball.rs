@@ -247,6 +247,8 @@ fn drive(
     seen
 }
 
+/// Random craft whose liquid detaches and settles fly for 300 s. Their momentum is constant except for rounding, and
+/// their energy never grows.
 #[test]
 fn momentum_is_exact_and_energy_never_grows_over_300_s_in_six_axes() {
     let mut seen = [0; 6];
@@ -289,6 +291,7 @@ fn momentum_is_exact_and_energy_never_grows_over_300_s_in_six_axes() {
     assert!(seen[1] > 20 && seen[2] > 100 && seen[3] > 20, "{seen:?}");
 }
 
+/// Craft with detached liquid are simulated with different communication steps, which must give the same motion.
 #[test]
 fn results_do_not_depend_on_the_communication_step() {
     for seed in 0..6 {
@@ -394,6 +397,8 @@ fn detached_liquid_moves_the_same_with_every_communication_step() {
     move_alike([0, 13, 17, 81, 88, 133, 157, 171, 177].into_iter());
 }
 
+/// Simulates detached liquid under 200 random histories of thrust with different communication steps, which must give
+/// the same motion.
 #[test]
 #[ignore = "minutes: .ci/run --nightly"]
 fn detached_liquid_under_two_hundred_random_thrusts_moves_the_same_with_every_communication_step() {

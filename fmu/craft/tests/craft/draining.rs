@@ -190,8 +190,8 @@ fn a_draining_craft_that_starts_at_the_origin_takes_long_steps() {
     }
 }
 
-/// The tank is rotated, the thrust is along its axis, and its liquid is at rest. Large terms then cancel in the rates and leave
-/// only rounding errors, which must not make the steps short.
+/// A tank with thrust along its axis drains while its liquid is at rest. In the rates large terms cancel and leave
+/// only rounding errors, which must not make the steps of the integrator short.
 #[test]
 fn a_tank_that_drains_at_rest_takes_long_steps() {
     for modes in [0, 3] {

@@ -13,7 +13,7 @@ fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs() / (1.0 + a.abs().max(b.abs()))).fold(0.0, f64::max)
 }
 
-/// Compares one step of two seconds with steps of random lengths that add up to two seconds.
+/// One communication step of two seconds gives the same result as steps of random lengths that add up to two seconds.
 #[test]
 fn results_do_not_depend_on_the_communication_step() {
     for seed in 0..30 {

@@ -81,6 +81,7 @@ fn compare(d: &mut Deviations, record: &Value, sample: usize, out: &Outputs) {
     add("torque", &torque);
 }
 
+/// Accelerations and motions of Spacecraft equal reference values that another program computed.
 #[test]
 fn spacecraft_equals_the_reference_records() {
     let mut excess = Vec::new();
@@ -112,6 +113,7 @@ fn compare_tank(d: &mut Deviations, record: &Value, sample: usize, out: &SloshTa
     add("M_a", &out.added_mass);
 }
 
+/// Forces, torques and motions of SloshTank equal reference values that another program computed.
 #[test]
 fn slosh_tank_equals_the_reference_records() {
     let mut excess = Vec::new();

@@ -72,6 +72,8 @@ const STEPS: [[[usize; 2]; FrictionModel::ALL.len()]; SloshModel::ALL.len()] = [
     [[19, 36], [19, 36], [34, 57], [20, 37], [172, 192]],
 ];
 
+/// The number of internal steps for a second of motion is compared with the expected number for every slosh model and
+/// friction law, so that a change that makes the integrator slower is noticed.
 #[test]
 fn a_second_takes_few_internal_steps() {
     let found = SloshModel::ALL.map(|slosh| {

@@ -246,9 +246,10 @@ fn default_columns_of_a_draining_tank_are_enough_for_its_page() {
     assert!(liquid[0] - liquid[liquid.len() - 1] > 0.1);
 }
 
-/// In HTML, `</script>` after `<!--<script` does not end a script element, so that the rest of the page would be lost.
+/// A run with a column whose unit is HTML markup is drawn as usual. In HTML, `</script>` after `<!--<script` does not
+/// end a script element, so that the rest of the page would be lost.
 #[test]
-fn a_unit_that_is_markup_leaves_the_page_whole() {
+fn a_unit_that_contains_html_markup_does_not_break_the_page() {
     const UNIT: &str = "<!--<script></script>&\u{2028}";
     let folder = tempfile::tempdir().unwrap();
     let mut from =

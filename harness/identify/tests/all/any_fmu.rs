@@ -300,9 +300,10 @@ fn the_likelihood_near_the_estimate_falls_as_the_covariance_predicts() {
     assert_eq!(deviances[deviances.len() - 1], f64::INFINITY);
 }
 
-/// With HUBSLOSH_PAGE=page.html in the environment the test writes the page to this file.
+/// The HTML report of a fit contains every figure and is well-formed. With HUBSLOSH_PAGE=page.html in the environment
+/// the test writes the page to this file.
 #[test]
-fn the_page_is_whole() {
+fn the_report_of_a_fit_is_a_complete_page() {
     let found = found(&question(&FREE));
     let page = page(&found);
     for words in ["hub.I", "bias(omega)@2", "The model fits", "<svg", "</html>"] {
@@ -353,8 +354,9 @@ fn a_parameter_that_another_one_replaces_is_warned_of_once_and_cannot_be_free() 
     assert_eq!(found.done.iter().filter(|line| warns(line)).count(), 1, "{:?}", found.done);
 }
 
-/// A fit that started at the true values once ended 28 standard deviations away, where the sum of squares was larger by
-/// 68, and the verdict was nevertheless that the model fits.
+/// A fit never ends in a minimum that fits worse than its start values. A fit that started at the true values once
+/// ended 28 standard deviations away, where the sum of squares was larger by 68, and the verdict was nevertheless
+/// that the model fits.
 #[test]
 fn a_minimum_that_is_worse_than_the_start_is_left() {
     let model = Model::open(packed_for_tests(), Solver::Own).unwrap();

@@ -20,9 +20,11 @@ fn sweep(amplitude: f64, time: &[f64]) -> Vec<f64> {
     time.iter().map(|t| amplitude * (turn * (1.9 * t + 0.01 * t * t / 2.0)).sin()).collect()
 }
 
-/// Small torque: the hub stands still most of the time. Large torque: the spherical liquid leaves the torque's plane.
+/// The simulator that makes the recordings for tests of `identify` gives the same motion as the FMU. At a small
+/// torque the hub stands still most of the time; at a large torque the spherical pendulum leaves the plane of the
+/// torque.
 #[test]
-fn the_independent_bench_moves_as_the_fmu() {
+fn the_simulator_of_test_recordings_moves_as_the_fmu() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let time = rows(60.0);
     for (liquid, name) in

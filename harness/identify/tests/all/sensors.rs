@@ -88,6 +88,8 @@ fn comes_back(sensor: &str, column: &str, noise: f64) {
     assert!((white / noise - 1.0).abs() < 0.06, "{column}: {white}");
 }
 
+/// A simulated bench is recorded by a wave gauge with a delay. `identify` must find the parameters with which the
+/// bench was simulated.
 #[test]
 fn identify_finds_the_parameters_of_a_simulated_bench_with_a_late_wave_gauge() {
     comes_back(
@@ -97,11 +99,15 @@ fn identify_finds_the_parameters_of_a_simulated_bench_with_a_late_wave_gauge() {
     );
 }
 
+/// A simulated bench is recorded by a force sensor with noise and a bias. `identify` must find the parameters with
+/// which the bench was simulated.
 #[test]
 fn identify_finds_the_parameters_of_a_simulated_bench_with_a_force_sensor() {
     comes_back("load=force:noise=5e-3,bias=0.01", "load", 5e-3);
 }
 
+/// A simulated bench is recorded by a camera with a delay of 0.1 s. `identify` must find the parameters with which
+/// the bench was simulated.
 #[test]
 fn identify_finds_the_parameters_of_a_simulated_bench_with_a_camera() {
     comes_back("view=camera:rate=10,delay=0.1,noise=5e-4", "view.plane_tangential", 5e-4);

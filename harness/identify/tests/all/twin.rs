@@ -98,6 +98,8 @@ fn identify_finds_damping_that_grows_with_the_amplitude() {
 const BREAKS: [(&str, &str); 2] =
     [("slosh.zeta_breaking", "0.04"), ("slosh.breaking_steepness", "0.63")];
 
+/// From a simulated recording with waves that break, the fit finds the damping and the steepness with which it was
+/// simulated.
 #[test]
 #[ignore = "half a minute: .ci/run --nightly"]
 fn damping_of_breaking_waves_is_recovered() {
@@ -126,6 +128,8 @@ fn damping_of_breaking_waves_is_recovered() {
     );
 }
 
+/// If the waves of a simulated recording do not break, the verdict says that the damping by breaking cannot be
+/// estimated.
 #[test]
 fn waves_that_do_not_break_show_no_damping_by_breaking() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
@@ -384,6 +388,7 @@ fn a_drag_that_the_model_lacks_is_named_with_its_size() {
     assert!(said.contains("a torque that follows the rate's square"), "{said}");
 }
 
+/// Twenty spikes in the rate of a simulated recording are listed in the verdict and not fitted.
 #[test]
 fn twenty_spikes_are_reported_and_left_out() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
@@ -458,6 +463,8 @@ fn no_model_error_makes_the_rate_come_before_the_torque() {
     );
 }
 
+/// A fit whose initial guesses are wrong by 40 % ends at the same estimates as a fit whose initial guesses come from
+/// the data.
 #[test]
 fn starts_forty_percent_off_lead_to_the_same_minimum_as_starts_from_the_data() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
@@ -513,6 +520,8 @@ fn a_downward_sweep_shows_that_slosh_rotates() {
     }
 }
 
+/// A recording with the angle of an encoder determines the scale error of the gyro, which torque and rate cannot
+/// show.
 #[test]
 fn an_encoder_shows_the_gyros_scale() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
@@ -622,6 +631,7 @@ fn a_run_that_would_not_end_is_refused() {
     assert!(run(&[lugre, ("friction.sigma0", "1000")], 0.0).is_ok());
 }
 
+/// If the actuator clips the torque of a simulated recording, no slosh model fits.
 #[test]
 fn no_model_fits_a_torque_that_is_clipped() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
@@ -632,6 +642,7 @@ fn no_model_fits_a_torque_that_is_clipped() {
     assert!(found.verdict.iter().any(|line| line.starts_with(DOES_NOT_FIT)), "{:?}", found.verdict);
 }
 
+/// A rate in deg/s without a stated unit is refused, and the message suspects degrees per second.
 #[test]
 fn degrees_per_second_are_refused_by_name() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
