@@ -133,7 +133,7 @@ HEADS = (
     "largest acceleration at 0.0125 N·m as read by the gyro, rad/s²",
     "rotary slosh begins at, N·m",
 )
-MEASURED = "| measured (thesis 7.1, 7.2) | | | 2.21 | | 0.222 | 0.075 to 0.1 |"
+MEASURED = "| measured on the bench (thesis 7.1, 7.2) | | | 2.21 | | 0.222 | 0.075 to 0.1 |"
 
 
 def text(rows: pd.DataFrame) -> str:
