@@ -41,8 +41,9 @@ pub struct DesignArgs {
     #[arg(long, value_name = "PEAK", conflicts_with = "free")]
     multisine: Option<f64>,
     /// Desired signal-to-noise ratio of the gyro's samples, dB. The command prints the torque amplitude of a sine that
-    /// reaches it: across the whole band, at the resonance, at the antiresonance, and for a bench without slosh
-    /// (section 8.6.1 of Rubaga's thesis).
+    /// reaches this ratio: at both ends of the band, at the frequencies that need the smallest torque (the resonance)
+    /// and the largest (the antiresonance), and for a rigid hub at the upper end of the band (section 8.6.1 of Rubaga's
+    /// thesis).
     #[arg(long, value_name = "DB", conflicts_with_all = ["profile", "multisine", "out"])]
     snr: Option<f64>,
     /// Period of the multisine, s.
