@@ -563,6 +563,7 @@ mod tests {
         }
     }
 
+    /// A torque exactly at the limit of the static friction makes an event, at which the hub begins to turn.
     #[test]
     fn torque_at_the_very_limit_breaks_the_hub_away_at_an_event() {
         let mut p = Parameters::default();
@@ -584,6 +585,7 @@ mod tests {
         }
     }
 
+    /// If a host has skipped sampling times, the missing samples of the gyro are taken at once, up to a limit.
     #[test]
     fn gyro_samples_that_are_due_are_taken_up_to_a_limit() {
         let mut p = Parameters::default();

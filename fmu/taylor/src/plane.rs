@@ -145,6 +145,7 @@ mod tests {
         }
     }
 
+    /// A pair of power series stores the coefficients of both components without mixing them.
     #[test]
     fn both_components_of_a_pair_keep_their_values() {
         let mut a = ZERO_VECTOR2;

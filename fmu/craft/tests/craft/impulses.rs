@@ -148,8 +148,8 @@ fn steps(is_enough: impl Fn(usize) -> bool) -> usize {
 const STEPS: [[[usize; 2]; 4]; 2] =
     [[[16, 8], [31, 12], [19, 10], [27, 13]], [[8, 10], [16, 13], [18, 8], [23, 15]]];
 
-/// The number of internal steps of a second of motion is compared with the expected number for each of several craft,
-/// so that a change that makes the integrator slower is noticed.
+/// The number of internal steps of random tanks, alone and on a craft, is compared with the expected number, so that
+/// a change that makes the integrator slower is noticed.
 #[test]
 fn a_step_takes_few_internal_steps() {
     for (seed, expected) in (0..).zip(STEPS) {

@@ -155,6 +155,8 @@ fn energy_never_grows_without_torque() {
     }
 }
 
+/// Inertia times angular acceleration of the hub equals the sum of all torques on the hub, computed from the outputs
+/// of the plant.
 #[test]
 fn hub_equation_holds_between_the_outputs() {
     let mut rng = fastrand::Rng::with_seed(4);
@@ -181,6 +183,7 @@ fn hub_equation_holds_between_the_outputs() {
     }
 }
 
+/// While dry friction holds the hub (stick), its rate is exactly 0 and its angle does not change by a bit.
 #[test]
 fn a_stuck_hub_is_exactly_at_rest() {
     let mut p = bench(SloshModel::Linear, FrictionModel::Stribeck);
@@ -225,6 +228,8 @@ fn trajectory_does_not_depend_on_the_communication_step() {
     }
 }
 
+/// If the motion is halved, the difference of each nonlinear slosh model from the linear model falls to a quarter
+/// relative to the motion.
 #[test]
 fn nonlinear_models_approach_the_linear_one_quadratically() {
     // Largest difference from the linear model against the motion's size: halving
@@ -315,8 +320,10 @@ fn hub_liquid_and_wheel_together_keep_their_momentum() {
     assert!(last.wheel_speed > p.wheel.speed_min, "the reversed command speeds it up again");
 }
 
+/// The axial acceleration falls to 0, so that nothing restores the liquid. All results stay finite; only a slosh
+/// model with a rim may end the run, when the liquid drifts over the rim.
 #[test]
-fn without_gravity_the_liquid_keeps_its_place_and_nothing_breaks() {
+fn without_gravity_results_stay_finite_or_the_liquid_drifts_over_the_rim() {
     for slosh in SLOSH {
         let mut p = bench(slosh, FrictionModel::Stribeck);
         p.init.slosh_angle = 0.1;

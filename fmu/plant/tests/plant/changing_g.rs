@@ -166,6 +166,7 @@ fn damping_follows_its_formula_while_g_ramps_through_zero() {
     assert!((x[x::SLOSH + 3] - rate).abs() < 2e-7, "{} {rate}", x[x::SLOSH + 3]);
 }
 
+/// Ramps of the axial acceleration to zero, and away from zero, take a bounded number of internal steps.
 #[test]
 fn ramps_to_zero_and_from_it_take_a_bounded_number_of_steps() {
     for slosh in SLOSHING {
@@ -228,6 +229,8 @@ fn damping_after_a_change_of_g_equals_a_start_at_the_new_g() {
     }
 }
 
+/// A plant that starts without axial acceleration dissipates nothing. When 1 m/s² acts later, it has the damping
+/// ratio of a plant that starts at 1 m/s².
 #[test]
 fn a_start_at_zero_g_gets_its_damping_when_g_acts() {
     for correlation in [true, false] {

@@ -176,6 +176,8 @@ fn the_first_deflection_is_dahls_curve() {
     }
 }
 
+/// Before a hub with LuGre friction slides, torque against deflection follows hysteresis loops, which are closed from
+/// the second cycle on.
 #[test]
 fn motion_before_sliding_runs_through_closed_loops() {
     let mut p = bench(SloshModel::Frozen);
@@ -270,6 +272,8 @@ fn a_lugre_hub_below_break_away_torque_stays_at_a_deflection() {
     assert_eq!(plant.omega(), -mirrored.omega());
 }
 
+/// Stiffer bristles of the LuGre friction law have a shorter relaxation time, and the integrator takes shorter steps
+/// in proportion.
 #[test]
 fn step_length_follows_the_bristle_stiffness() {
     // Sliding at 0.05 rad/s for 1 s with a relaxation time from 0.1 s to 0.1 ms. The number of

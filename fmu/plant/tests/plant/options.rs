@@ -196,6 +196,8 @@ fn liquid_on_a_leaning_bench_comes_to_rest_along_gravity() {
     }
 }
 
+/// On a tilted bench the imbalance pulls at the hub; dry friction holds the hub as long as the torque of the
+/// imbalance is below the break-away torque.
 #[test]
 fn dry_friction_holds_a_leaning_hub() {
     // 9.81 tan(0.001) (0.3 + 2.087 0.225) N m = 7.5 mN m sin(phi): more than 5.9 mN m at 90 degrees.

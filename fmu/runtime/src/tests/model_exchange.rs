@@ -70,6 +70,7 @@ fn derivatives_that_are_not_finite_are_discarded() {
     assert_eq!(discarded(instance.derivatives(&mut x)), "fmi2GetDerivatives: der(level[2]) = -inf");
 }
 
+/// Discrete variables change only in event mode, and not while the host integrates the continuous states.
 #[test]
 fn discrete_changes_happen_only_at_events() {
     let mut instance = continuous(&[("inspection", 5.0)]);
@@ -119,6 +120,7 @@ fn only_declared_dependencies_that_have_an_effect_now_are_reported() {
     }
 }
 
+/// After the host has set time, states or inputs, the outputs have the values for the new settings.
 #[test]
 fn outputs_follow_what_the_host_sets() {
     let mut instance = continuous(&[]);
@@ -166,6 +168,7 @@ fn accepted_steps_may_pass_the_stop_time_by_rounding_errors() {
     }
 }
 
+/// A model without events has no event indicators and reports no time events.
 #[test]
 fn model_without_events_has_none() {
     let mut instance = spring(ME);

@@ -138,6 +138,8 @@ fn a_ramp_down_to_the_smallest_value_ends_there() {
     assert_eq!((real(&mut instance, "w"), real(&mut instance, "z")), (-2.0, -1.0));
 }
 
+/// After a refused step the slopes of the inputs that the host has set are unchanged, so that the host can repeat the
+/// step.
 #[test]
 fn a_step_that_is_refused_keeps_the_slopes() {
     let mut instance = started(CS, &[("w", 1.0)]);
@@ -198,6 +200,7 @@ fn input_slopes_of_the_last_step_are_kept_until_an_input_is_set() {
     assert_eq!(real(&mut asked, "trend"), 2.0);
 }
 
+/// An instance stores the input slopes of the last step only if outputs of the model use these slopes.
 #[test]
 fn a_model_whose_outputs_use_no_slopes_keeps_none() {
     let mut instance = spring(CS);

@@ -62,6 +62,7 @@ pub fn combinations(draws: &Derived, way: Option<f64>) -> Vec<Combination> {
 mod tests {
     use super::*;
 
+    /// A hub counts as turning in one direction only if nearly the whole path that it travels is in this direction.
     #[test]
     fn a_hub_turns_one_way_if_nearly_all_of_its_path_does() {
         assert_eq!(way([1.0, 2.0, -0.1].into_iter()), Some(1.0));

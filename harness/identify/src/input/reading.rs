@@ -476,11 +476,14 @@ mod tests {
         format!("{:#}", prepare(bad, COARSEST, &mut |_| {}).unwrap_err())
     }
 
+    /// A recording without faults is accepted without a message and is not split.
     #[test]
     fn a_sound_recording_passes() {
         assert_eq!(prepare(rigid(), COARSEST, &mut |_| {}).unwrap().len(), 1);
     }
 
+    /// For each fault of a recording, such as swapped columns or a constant torque, the error is a sentence about
+    /// this fault.
     #[test]
     fn each_fault_has_a_sentence_of_its_own() {
         type Change = fn(&mut Recording);

@@ -235,6 +235,7 @@ mod tests {
         (found.rows.len(), found.words.join("\n"))
     }
 
+    /// In a simulated gyro recording without faults none is found.
     #[test]
     fn a_sound_gyro_has_no_faults() {
         let (time, mut rate) = gyro();
@@ -296,6 +297,7 @@ mod tests {
         assert!(said.contains("the upper end") && said.contains("the lower end"), "{said}");
     }
 
+    /// Clipped, frozen and repeated values of a gyro are each found and named.
     #[test]
     fn each_fault_is_named() {
         let (time, rate) = gyro();
