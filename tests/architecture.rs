@@ -169,23 +169,20 @@ fn unsafe_code_is_only_in_the_files_of_the_c_interface() {
     assert_eq!(found, known.map(String::from).into());
 }
 
-/// `cargo test` leaves out ignored tests, so that each of them must be in a command of a script in `.ci`. Conversely, each
-/// name in such a command must belong to a test, because `cargo test` also succeeds if it finds no test.
+/// `cargo test` leaves out ignored tests, so that a script in `.ci` has to run each of them. `.ci/long-tests` runs all but those with
+/// one of the parts of names that are listed for the nightly script and for `.ci/fuzz-readers`, and the reason of an ignored test
+/// says which script it is. Each listed part must belong to a test, because `cargo test` also succeeds if it finds no test.
 #[test]
 fn a_script_runs_every_test_that_is_ignored() {
     let root = pack::root();
-    let scripts = root.join(".ci").read_dir().expect("the scripts").flatten();
-    let texts = scripts.filter_map(|entry| fs::read_to_string(entry.path()).ok());
-    // of commands with --ignored, what follows
-    let commands: String = texts
-        .map(|text| text.replace("\\\n", " "))
-        .flat_map(|text| text.lines().map(String::from).collect::<Vec<_>>())
-        .filter_map(|line| line.split_once("--ignored").map(|(_, words)| format!("{words} ")))
-        .collect();
-    let words: Vec<&str> = commands
-        .split([' ', '"'])
-        .filter(|word| word.len() > 3 && !word.starts_with('-'))
-        .collect();
+    let script = fs::read_to_string(root.join(".ci/long-tests")).expect("the script");
+    let list = |name: &str| -> Vec<&str> {
+        let text = script.split(&format!("\n{name}=(")).nth(1).expect("a list of the script");
+        text.split(')').next().expect("its end").split_whitespace().collect()
+    };
+    let (random, readers) = (list("random"), list("readers"));
+    let fuzz = fs::read_to_string(root.join(".ci/fuzz-readers")).expect("the script");
+    let has = |words: &[&str], name: &str| words.iter().any(|word| name.contains(word));
     let mut files = Vec::new();
     collect(&root, &root, &mut files);
     let ignored = format!("#[{}", "ignore");
@@ -195,13 +192,23 @@ fn a_script_runs_every_test_that_is_ignored() {
         for after in text.split(&ignored).skip(1) {
             let name = after.split("fn ").nth(1).and_then(|rest| rest.split('(').next());
             let name = name.expect("a test after its attribute");
-            assert!(words.iter().any(|word| name.contains(word)), "{file}: {name}: {words:?}");
+            let reason = after.split(']').next().expect("the end of the attribute");
+            let (is_random, is_reader) = (has(&random, name), has(&readers, name));
+            let runs_it = if reason.contains(": .ci/long-tests") {
+                !is_random && !is_reader
+            } else if reason.contains(": .ci/run --nightly") {
+                is_random
+            } else {
+                reason.contains(": .ci/fuzz-readers") && is_reader && fuzz.contains(name)
+            };
+            assert!(runs_it, "{file}: {name}: the script that the reason names does not run it");
             names.push(name.to_string());
         }
     }
     assert!(names.len() > 10, "{names:?}");
+    let all = [random, readers].concat();
     let stale: Vec<&&str> =
-        words.iter().filter(|word| !names.iter().any(|name| name.contains(**word))).collect();
+        all.iter().filter(|word| !names.iter().any(|name| name.contains(**word))).collect();
     assert!(stale.is_empty(), "no ignored test has these words in its name: {stale:?}");
 }
 
