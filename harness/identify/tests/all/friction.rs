@@ -128,6 +128,7 @@ fn all_sets(seeds: std::ops::RangeInclusive<u64>) -> Vec<String> {
 /// because each choice gives a bias that leads to the other. `friction.d` was 3.4 standard deviations off and the bias of the
 /// ramp 4.9, and the fit was accepted.
 #[test]
+#[ignore = "some seconds: .ci/long-tests"]
 fn friction_of_three_sets_of_runs_ends_in_no_false_minimum() {
     assert_eq!(all_sets(1..=2), [""; 0]);
 }
@@ -146,12 +147,14 @@ fn identify_finds_the_preferential_direction_in_both_directions() {
 }
 
 #[test]
+#[ignore = "some seconds: .ci/long-tests"]
 fn a_bias_of_five_degrees_a_second_leads_to_no_false_minimum() {
     assert_eq!(wrong(&SETS[0], 4, 0.087, ASYMMETRY), [""; 0]);
 }
 
 /// The tank counts as empty unless its liquid is stated, and the verdict says so.
 #[test]
+#[ignore = "some seconds: .ci/long-tests"]
 fn all_inertia_is_the_hubs_unless_the_liquid_is_stated() {
     let recordings = recordings(&SETS[2], 1, 0.0, ASYMMETRY);
     let with = |settings| fit(&recordings, &Options { settings, ..options() }).unwrap();
@@ -232,6 +235,7 @@ fn a_torque_that_is_held_is_recognised() {
 }
 
 #[test]
+#[ignore = "some seconds: .ci/long-tests"]
 fn liquid_that_moves_does_not_fit_a_rigid_one() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let torque = "lin-sweep:amplitude=0.1,f0=1.8,f1=3,duration=150";
@@ -240,6 +244,7 @@ fn liquid_that_moves_does_not_fit_a_rigid_one() {
 }
 
 #[test]
+#[ignore = "ten seconds of CPU time: .ci/long-tests"]
 fn the_preferential_direction_shows_in_free_decay() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let bench = [("friction.asymmetry", "0.15"), ("friction.forward_cos1", "0.2")];

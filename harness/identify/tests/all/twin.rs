@@ -56,6 +56,7 @@ fn of_any_torque() -> Options {
 }
 
 #[test]
+#[ignore = "some seconds: .ci/long-tests"]
 fn identify_finds_all_parameters_and_the_sum_of_coulomb_and_stribeck_friction() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let found = identify(&fmu, &[sweep(&fmu, LONG, &[])], &of_any_torque(), &mut |_| {}).unwrap();
@@ -81,6 +82,7 @@ fn identify_finds_all_parameters_and_the_sum_of_coulomb_and_stribeck_friction() 
 
 /// A parameter that is not estimated by default becomes an unknown if a start value is given for it.
 #[test]
+#[ignore = "some seconds: .ci/long-tests"]
 fn identify_finds_damping_that_grows_with_the_amplitude() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let recordings = [sweep(&fmu, SHORT, &[("slosh.zeta_amplitude", "0.02")])];
@@ -200,6 +202,7 @@ fn the_cause_of_a_misfit_is_named_with_the_flag_that_fits_it() {
 
 /// The hub rocks at 4.1 Hz and the gyro sees a part of this motion, which no candidate effect describes.
 #[test]
+#[ignore = "some seconds: .ci/long-tests"]
 fn a_misfit_that_no_candidate_explains_has_no_cause() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let torque: Profile = "lin-sweep:amplitude=0.4,duration=120,f0=1.5,f1=3.6".parse().unwrap();
@@ -225,6 +228,7 @@ fn a_misfit_that_no_candidate_explains_has_no_cause() {
 /// The arm is 2 % longer than its nominal value. Slosh of a third of a radian shows this, because at this angle no other
 /// parameter has the same effect.
 #[test]
+#[ignore = "some seconds: .ci/long-tests"]
 fn a_tolerance_that_nonlinear_slosh_shows_is_no_misfit() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let torque: Profile = "lin-sweep:amplitude=0.15,duration=120,f0=1.5,f1=3.6".parse().unwrap();
@@ -275,6 +279,7 @@ fn a_recording_without_noise_fits_and_other_models_are_given_up_early() {
 /// The motion is so slow that the friction curve is nearly straight. The minimum is at 0.02 rad/s; a quadratic there would
 /// exclude the true value by fourteen standard deviations.
 #[test]
+#[ignore = "some seconds: .ci/long-tests"]
 fn the_interval_along_the_flat_valley_of_friction_equals_the_likelihoods() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let slow = "lin-sweep:amplitude=0.025,duration=600,f0=1.8,f1=3";
@@ -301,6 +306,7 @@ fn the_interval_along_the_flat_valley_of_friction_equals_the_likelihoods() {
 /// either: the friction b ω + c + d exp(−(ω/ω_s)²) tends to b ω + (c + d) for ω_s → ∞, and the friction with c + d in place of c
 /// and with d = 0 is the same curve at any ω_s.
 #[test]
+#[ignore = "some seconds: .ci/long-tests"]
 fn an_interval_is_open_at_an_end_that_the_likelihood_does_not_bound() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let gentle = "lin-sweep:amplitude=0.0125,duration=600,f0=1.8,f1=3";
@@ -322,6 +328,7 @@ fn an_interval_is_open_at_an_end_that_the_likelihood_does_not_bound() {
 /// distinguishes smooth from linear torque long before its minimum is known to a hundredth. It then stops: a sweep of
 /// 2700 s takes nine simulations in all, and one at the end.
 #[test]
+#[ignore = "some seconds: .ci/long-tests"]
 fn impossible_intersample_behaviours_cost_few_simulations() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let recordings = [sweep(&fmu, "lin-sweep:amplitude=0.1,duration=200,f0=2,f1=2.8", &[])];
@@ -347,6 +354,7 @@ fn impossible_intersample_behaviours_cost_few_simulations() {
 /// Changes of tank, hub, friction and the gyro's scale cancel along a valley that bends. Spherical slosh shows the scale, and the
 /// minimum is two hundredths away from the start of the search.
 #[test]
+#[ignore = "some seconds: .ci/long-tests"]
 fn the_minimum_is_found_along_the_bent_valley_of_the_gyros_scale() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let torque = fmu_twin::torque("multisine:0.25,200").unwrap();
@@ -370,6 +378,7 @@ fn the_minimum_is_found_along_the_bent_valley_of_the_gyros_scale() {
 /// The general tests of the residual miss this drag: they stay below 4, although the friction is off by tens of its standard
 /// deviations.
 #[test]
+#[ignore = "some seconds: .ci/long-tests"]
 fn a_drag_that_the_model_lacks_is_named_with_its_size() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let settings = [("slosh.zeta_from_correlation", "false"), ("slosh.zeta", "0.003")];
@@ -444,6 +453,7 @@ fn a_delay_that_another_torque_between_rows_explains_as_well_is_not_stated_as_su
 /// The dry friction of this bench is smoothed near rest, and its torque is linear between rows. A held torque that acts
 /// 10 ms before it is commanded would fit slightly better, but is impossible.
 #[test]
+#[ignore = "some seconds: .ci/long-tests"]
 fn no_model_error_makes_the_rate_come_before_the_torque() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let settings = [("friction.model", "stribeck_smooth"), ("friction.eps", "1e-3")];
@@ -466,6 +476,7 @@ fn no_model_error_makes_the_rate_come_before_the_torque() {
 /// A fit whose initial guesses are wrong by 40 % ends at the same estimates as a fit whose initial guesses come from
 /// the data.
 #[test]
+#[ignore = "some seconds: .ci/long-tests"]
 fn starts_forty_percent_off_lead_to_the_same_minimum_as_starts_from_the_data() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let recordings = [sweep(&fmu, SHORT, &[])];
@@ -484,6 +495,7 @@ fn starts_forty_percent_off_lead_to_the_same_minimum_as_starts_from_the_data() {
 }
 
 #[test]
+#[ignore = "some seconds: .ci/long-tests"]
 fn a_bench_of_another_size_is_estimated_if_it_is_said_to_be_one() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let settings = [("hub.I", "5"), ("tank.d", "0.4"), ("tank.h", "0.3"), ("tank.r", "0.5")];
@@ -504,6 +516,7 @@ fn a_bench_of_another_size_is_estimated_if_it_is_said_to_be_one() {
 
 /// A downward sweep reaches the softening resonance from higher frequencies, where rotary slosh begins.
 #[test]
+#[ignore = "half a minute: .ci/long-tests"]
 fn a_downward_sweep_shows_that_slosh_rotates() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let torque = "lin-sweep:amplitude=0.1,duration=400,f0=2.7,f1=2";
@@ -543,6 +556,7 @@ fn an_encoder_shows_the_gyros_scale() {
 
 /// The encoder's angle shows the scale of the gyro, without which no residual is noise: the scale must be free from the beginning.
 #[test]
+#[ignore = "some seconds: .ci/long-tests"]
 fn a_recording_with_an_encoder_is_described_as_one_without() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let settings = [
@@ -574,6 +588,7 @@ fn a_recording_with_an_encoder_is_described_as_one_without() {
 /// Friction stops the hub before the first row that is fitted. No row shows the initial rate, and the search once tried ±1,000
 /// rad/s.
 #[test]
+#[ignore = "some seconds: .ci/long-tests"]
 fn the_first_readings_bound_a_rate_that_friction_stops_at_once() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let torque = "lin-sweep:amplitude=0.1,duration=120,f0=2,f1=2.8";
@@ -823,6 +838,7 @@ fn on_bench(bench: &Bench, seed: u64, seconds: u32) -> Recording {
 /// The verdict once named "an actuator that lags" as the cause for a hub with an appendage on a spring, with 12 ms at 8 Hz and 17
 /// ms at 4 Hz.
 #[test]
+#[ignore = "some seconds: .ci/long-tests"]
 fn a_flexible_hub_has_no_cause_among_those_that_are_tried() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     for frequency in [8.0, 4.0] {
@@ -842,6 +858,7 @@ fn a_flexible_hub_has_no_cause_among_those_that_are_tried() {
 /// The verdict once named "the rate's square", at 12 standard deviations, for friction that falls by a third with a time constant
 /// of a minute.
 #[test]
+#[ignore = "some seconds: .ci/long-tests"]
 fn friction_that_drifts_is_named_as_such_or_not_at_all() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let settings = [("slosh.zeta_from_correlation", "false"), ("slosh.zeta", "0.003")];
@@ -865,6 +882,7 @@ fn friction_that_drifts_is_named_as_such_or_not_at_all() {
 /// A bench whose actuator makes another torque of its command, or on which a torque acts that no model has: nothing that is stated as
 /// sure is wrong, and no wrong cause is named.
 #[test]
+#[ignore = "half a minute: .ci/long-tests"]
 fn benches_outside_the_model_get_neither_wrong_values_nor_wrong_causes() {
     type Acts = fn(f64) -> f64;
     type Besides = fn(f64, f64, f64) -> f64;
