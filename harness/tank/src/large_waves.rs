@@ -1006,6 +1006,7 @@ mod tests {
 
     /// Medians of the truncations are compared with a finer truncation, whose largest multiple of the frequency is 5.
     #[test]
+    #[ignore = "ten seconds of CPU time: .ci/long-tests"]
     fn waves_in_a_sphere_do_not_depend_on_the_resolution() {
         let contour = sphere();
         let wall = contour.cut(0.5).unwrap();
@@ -1035,6 +1036,7 @@ mod tests {
 
     /// Fills between the rows of the table for spheres.
     #[test]
+    #[ignore = "ten seconds of CPU time: .ci/long-tests"]
     fn the_table_of_spheres_holds_between_its_fills() {
         for fill in [0.25, 0.85] {
             let [planar, circular] = waves(&sphere(), fill);

@@ -289,6 +289,7 @@ fn draining_craft_of(seed: u64, way: Way) -> Vec<f64> {
 /// Random craft on a pivot with dry friction are compared with runs in much shorter steps. The errors must stay near
 /// the tolerance of the solver.
 #[test]
+#[ignore = "some seconds: .ci/long-tests"]
 fn dry_friction_of_a_pivot_keeps_the_solver_tolerance() {
     keep_the_tolerance((0..20).chain([62]), craft_on_a_pivot_of);
 }
@@ -310,6 +311,7 @@ fn thrust_that_crosses_zero_keeps_the_solver_tolerance_for_a_draining_tank() {
 /// Random draining craft under thrust that crosses zero are compared with runs in much shorter steps. The errors must
 /// stay near the tolerance of the solver.
 #[test]
+#[ignore = "three seconds: .ci/long-tests"]
 fn thrust_that_crosses_zero_keeps_the_solver_tolerance_for_a_draining_craft() {
     keep_the_tolerance(0..10, draining_craft_of);
 }

@@ -626,6 +626,7 @@ mod tests {
     }
 
     #[test]
+    #[ignore = "three seconds: .ci/long-tests"]
     fn each_interval_contains_the_true_value_and_detects_a_term_that_exists() {
         let white = Noise { flicker: 0.0, rrw: 0.0, ..ALL };
         let bias = Noise { bias_instability: 5e-5, bias_time: 5.0, ..white };

@@ -155,6 +155,7 @@ fn a_flipped_run_without_its_manifest_is_never_reused() {
 }
 
 #[test]
+#[ignore = "some seconds: .ci/long-tests"]
 fn a_large_campaign_keeps_the_curves_of_some_runs_and_the_numbers_of_all() {
     const RUNS: usize = CURVES + 10;
     let directory = tempfile::tempdir().unwrap();

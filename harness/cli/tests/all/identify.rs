@@ -63,6 +63,7 @@ fn run_takes_parameters_from_identify() {
 }
 
 #[test]
+#[ignore = "some seconds: .ci/long-tests"]
 fn identify_handles_one_unknown_unknowns_at_bounds_and_no_input() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
@@ -236,6 +237,7 @@ fn identify_without_a_kind_means_bench() {
 }
 
 #[test]
+#[ignore = "some seconds: .ci/long-tests"]
 fn a_design_uses_the_damping_ratio_that_is_set_and_prints_no_infinite_percentage() {
     let folder = tempfile::tempdir().unwrap();
     let asked = ["design", "--profile", "lin-sweep:duration=40,f0=2,f1=2.8", "--sensor-errors"];

@@ -48,6 +48,7 @@ const SWEEPS: &str = "title = \"Sweeps\"\n\
     [count]\nimu.seed = 5\n";
 
 #[test]
+#[ignore = "some seconds: .ci/long-tests"]
 fn a_killed_campaign_goes_on_where_it_stopped() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
@@ -86,6 +87,7 @@ fn a_killed_campaign_goes_on_where_it_stopped() {
 }
 
 #[test]
+#[ignore = "some seconds: .ci/long-tests"]
 fn runs_by_another_importer_give_the_same_tables() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
@@ -308,6 +310,7 @@ fn a_runs_name_may_be_any_text_that_is_not_empty_or_too_long_for_a_file_name() {
 }
 
 #[test]
+#[ignore = "some seconds: .ci/long-tests"]
 fn the_command_in_the_report_makes_the_same_tables_again() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();

@@ -99,6 +99,7 @@ fn a_spherical_liquid_softens_in_planar_slosh_and_becomes_rotary_from_0_15_newto
 }
 
 #[test]
+#[ignore = "some seconds: .ci/long-tests"]
 fn at_5_cm_rotary_slosh_begins_at_0_125_newton_metres() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
@@ -218,6 +219,7 @@ fn numbers_of_the_thesis_are_compared_with_the_runs() {
 }
 
 #[test]
+#[ignore = "some seconds: .ci/long-tests"]
 fn without_dry_friction_a_linear_model_fits_a_linear_liquid() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();

@@ -48,6 +48,7 @@ const MODELS: &str = r#"["linear", "planar", "spherical", "liquid"]"#;
 /// the other plans does. The search for the onset of rotary slosh is made with the linear liquid only, which leaves the
 /// range.
 #[test]
+#[ignore = "six seconds: .ci/long-tests"]
 fn built_in_plans_stay_in_their_models_range_or_say_that_they_leave_it() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     for (name, text) in BUILT_IN {

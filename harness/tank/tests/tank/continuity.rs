@@ -83,6 +83,7 @@ fn damping_has_no_step_at_500_fills() {
 /// Covers each place where a wall leaves a shape: tangents, shoulder, corner, knuckle. Covers the ends of the ranges of
 /// sphere, cylinder and torus, and the torus where its correlation falls below the laminar layer.
 #[test]
+#[ignore = "some seconds: .ci/long-tests"]
 fn damping_has_no_step_where_a_wall_leaves_a_shape() {
     for (name, levels) in [
         ("sphere", &[0.03][..]),

@@ -148,6 +148,7 @@ fn only_the_first_mode_of_a_45_degree_cone_carries_mass() {
 
 /// The fixed mass is positive for any number of modes: it is the added mass with pressure 0 on the surface.
 #[test]
+#[ignore = "some seconds: .ci/long-tests"]
 fn rigid_liquid_is_positive_for_any_number_of_modes() {
     for case in reference() {
         let data = tank(&toml(&case)).solve(case["fill"].as_f64().unwrap(), 20).unwrap();
