@@ -288,7 +288,7 @@ fn an_fmu_with_arrays_steps_bit_identically_to_one_with_scalars() {
             run.initialise();
         }
         let h = 0.02;
-        for n in 0..100 {
+        for n in 0..30 {
             let time = f64::from(n) * h;
             let all = two.each_mut().map(|run| {
                 run.set(|key| input(case.model, &names, key, time));
@@ -318,7 +318,7 @@ fn fmus_with_arrays_and_with_scalars_have_equal_states_derivatives_and_indicator
         let indicators = two.each_mut().map(|run| run.instance.number_of_indicators().unwrap());
         assert_eq!(indicators[0], indicators[1]);
         // Euler's method: any will do where the bits are compared.
-        for n in 1..200 {
+        for n in 1..50 {
             let time = f64::from(n) * h;
             let all = two.each_mut().map(|run| {
                 let mut x = vec![0.0; run.instance.number_of_states().unwrap()];

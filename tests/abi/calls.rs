@@ -225,7 +225,7 @@ fn functions_that_are_not_supported_return_an_error_with_a_message() {
 
 #[test]
 fn the_binary_can_be_loaded_and_unloaded_many_times() {
-    for _ in 0..200 {
+    for _ in 0..50 {
         let fmu = open();
         let mut instance = stepping(&fmu, &[]);
         instance.do_step(0.0, 0.1).unwrap();

@@ -910,6 +910,7 @@ fn no_output_depends_directly_on_an_input_that_it_does_not_list() {
 
 /// The same must hold for the values at the start and the parameters.
 #[test]
+#[ignore = "six seconds: .ci/long-tests"]
 fn no_initial_value_depends_on_a_parameter_that_it_does_not_list() {
     let base: &[(&str, Value)] = &[
         ("init.omega", Value::Real(0.3)),
