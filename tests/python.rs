@@ -34,7 +34,14 @@ fn pytest(arguments: &mut Command, sentence: &str) {
 
 /// Test files of `harness/python` that need no wheel. Together they take as long as all other files, so that both halves
 /// run in parallel.
-const BESIDE: [&str; 3] = ["test_liquid.py", "test_model_exchange.py", "test_review.py"];
+const BESIDE: [&str; 6] = [
+    "test_liquid.py",
+    "test_model_exchange.py",
+    "test_program.py",
+    "test_recordings.py",
+    "test_review.py",
+    "test_uncertain.py",
+];
 
 /// Returns the command for pytest with the options of the package's tests: FMU and command.
 fn of_the_package() -> Command {
@@ -79,7 +86,7 @@ fn long_tests_of_the_package_pass() {
 }
 
 #[test]
-fn the_package_finds_modes_of_liquids_drives_model_exchange_and_reviews_craft() {
+fn the_package_finds_modes_of_liquids_reads_recordings_and_reviews_craft() {
     let tests = pack::root().join("harness/python/tests");
     pytest(
         of_the_package().args(BESIDE.map(|file| tests.join(file))),
@@ -87,19 +94,23 @@ fn the_package_finds_modes_of_liquids_drives_model_exchange_and_reviews_craft() 
     );
 }
 
+/// Runs the tests of the studies that have results within seconds: features from their definitions, and the benchmark.
 #[test]
+fn the_studies_reproduce_every_feature_and_the_scores_of_the_benchmark() {
+    for model in &MODELS {
+        pack::packed_model_for_tests(model);
+    }
+    let studies = pack::root().join("harness/studies");
+    let quick = ["test_analysis.py", "test_benchmark.py"].map(|file| studies.join(file));
+    pytest(of_the_package().args(quick), "a study failed");
+}
+
+#[test]
+#[ignore = "minutes: .ci/long-tests"]
 fn the_studies_compute_the_numbers_of_the_book() {
     for model in &MODELS {
         pack::packed_model_for_tests(model);
     }
-    pytest(of_the_package().arg(pack::root().join("harness/studies")), "a study failed");
-}
-
-/// Runs the long forms of the studies' tests; [`the_studies_compute_the_numbers_of_the_book`] runs the short
-/// ones.
-#[test]
-#[ignore = "half a minute: .ci/long-tests"]
-fn long_forms_of_the_studies_compute_the_numbers_of_the_book() {
     let studies = pack::root().join("harness/studies");
     pytest(of_the_package().arg("--long").arg(studies), "a study failed");
 }

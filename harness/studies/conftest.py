@@ -5,7 +5,8 @@
     done
     pytest -c harness/python/pyproject.toml harness/studies
 
-``cargo test --release`` runs them with the FMUs that it packs.
+``cargo test --release`` runs test_analysis.py and test_benchmark.py with the FMUs that it packs;
+``.ci/long-tests`` runs all files.
 """
 
 import os
@@ -25,18 +26,18 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     exe = "hubslosh.exe" if os.name == "nt" else "hubslosh"
     parser.addoption("--fmu", type=Path, default=ROOT / "dist" / "HubSlosh.fmu")
     parser.addoption("--hubslosh", type=Path, default=TARGET / "release" / exe)
-    parser.addoption("--long", action="store_true", help="only the tests that .ci/long-tests runs")
+    parser.addoption("--long", action="store_true", help="all tests, as .ci/long-tests")
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Declare the marker of tests that take minutes."""
-    config.addinivalue_line("markers", "long: takes minutes; --long (.ci/long-tests) runs it")
+    """Declare the marker of tests that take seconds each."""
+    config.addinivalue_line("markers", "long: takes seconds; --long (.ci/long-tests) runs it")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Keep either the long tests or the short forms."""
-    long = config.getoption("--long")
-    items[:] = [item for item in items if (item.get_closest_marker("long") is not None) == long]
+    """Leave out the long tests, unless all are wanted."""
+    if not config.getoption("--long"):
+        items[:] = [item for item in items if item.get_closest_marker("long") is None]
 
 
 @pytest.fixture(scope="session")

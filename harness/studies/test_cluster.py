@@ -11,6 +11,8 @@ import cluster
 import hubslosh
 from cluster_comparison import Killer, compare, difference, maker
 
+pytestmark = pytest.mark.long
+
 PLAN = """
 title = "Sweeps and a pulse"
 profile = "exp-sweep:f0=2.1,f1=2.8,duration=120"

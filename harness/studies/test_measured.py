@@ -7,6 +7,8 @@ import pytest
 import measured
 from conftest import ROOT, same_picture
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture
 def built(fmu: Path, monkeypatch: pytest.MonkeyPatch) -> None:

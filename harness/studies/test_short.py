@@ -1,7 +1,7 @@
 """Short forms of the studies: the book's numbers and pictures are those that the studies compute.
 
 Studies that run as a whole within seconds have their own files: `test_measured`, `test_cluster`,
-`test_analysis`.
+`test_analysis`. `.ci/long-tests` runs all but the last.
 """
 
 import json
@@ -39,6 +39,8 @@ import work_precision
 from conftest import ROOT, same_picture
 
 BOOK = ROOT / "book"
+
+pytestmark = pytest.mark.long
 
 
 def lines(page: str) -> list[str]:
@@ -128,7 +130,6 @@ def test_tilt_slows_slosh_along_the_slope() -> None:
     assert slowed(0.5) == pytest.approx(float(shallow[1]), abs=0.05)
 
 
-@pytest.mark.long
 def test_tilt_slows_slosh_of_deeper_liquid() -> None:
     """The two other changes of the page, to their printed digits."""
     deeper = re.search(r"and −(\d+) to −(\d+) % in deeper liquid", " ".join(lines("liquid.md")))
