@@ -70,10 +70,13 @@ def ritz(surface: tuple[complex, complex], wall: list[tuple[np.ndarray, ...]]) -
 @pytest.mark.parametrize(
     ("shape", "volume"),
     [
-        ({"cylinder": {"radius": 0.5, "height": 2.0}}, lambda h: h / 2),
-        (
+        pytest.param(
+            {"cylinder": {"radius": 0.5, "height": 2.0}}, lambda h: h / 2, marks=pytest.mark.long
+        ),
+        pytest.param(
             {"horizontal_cylinder": {"radius": 0.5, "length": 1.5}},
             lambda h: (np.arccos(1 - 2 * h) - 2 * (1 - 2 * h) * np.sqrt(h - h * h)) / np.pi,
+            marks=pytest.mark.long,
         ),
         ({"sphere": {"radius": 0.5}}, lambda h: h * h * (3 - 2 * h)),
     ],
@@ -128,6 +131,7 @@ def test_a_sphere_equals_the_axisymmetric_solver(
     assert found.modes["hinge"][0] == pytest.approx(1.0, abs=1e-4)
 
 
+@pytest.mark.long
 def test_a_lying_cylinder_half_full_has_lamb_s_mode_and_swings_about_its_axis() -> None:
     """Lamb, Hydrodynamics, art. 259, gives λR = 1.3557 for the mode across the axis.
 
@@ -142,7 +146,9 @@ def test_a_lying_cylinder_half_full_has_lamb_s_mode_and_swings_about_its_axis() 
     assert across["hinge"] == pytest.approx(1.0, abs=1e-4)  # the wall's normals meet in the axis
 
 
-@pytest.mark.parametrize(("inner", "angle"), [(0.0, 90.0), (0.4, 60.0)])
+@pytest.mark.parametrize(
+    ("inner", "angle"), [(0.0, 90.0), pytest.param(0.4, 60.0, marks=pytest.mark.long)]
+)
 def test_upright_sectors_have_the_modes_of_bessel_s_functions(inner: float, angle: float) -> None:
     """λ = k tanh(k h) with cos(m θ) around the sector, where m = n π/α for the opening angle α.
 
@@ -192,7 +198,11 @@ def test_a_box_drags_liquid_about_its_vertical() -> None:
     ("shape", "fill"),
     [
         ({"horizontal_cylinder": {"radius": 0.5, "length": 1.6}}, "40%"),
-        ({"sector": {"inner_radius": 0.3, "radius": 1, "angle": 70, "height": 1}}, 0.5),
+        pytest.param(
+            {"sector": {"inner_radius": 0.3, "radius": 1, "angle": 70, "height": 1}},
+            0.5,
+            marks=pytest.mark.long,
+        ),
     ],
 )
 def test_spacecraft_has_the_modes_of_each_direction_and_what_they_turn(
@@ -243,7 +253,8 @@ def test_spacecraft_has_the_modes_of_each_direction_and_what_they_turn(
     assert m @ [*z, values["tank[1].H_0"]] == pytest.approx(found.mass * found.center[2], rel=1e-9)
 
 
-@pytest.mark.parametrize("degrees", [pytest.param(10.0, marks=pytest.mark.long), 40.0])
+@pytest.mark.long
+@pytest.mark.parametrize("degrees", [10.0, 40.0])
 def test_a_tilted_box_is_the_plane_problem_of_its_section(degrees: float) -> None:
     """Modes that do not vary across the box equal Ritz's method on the tilted section."""
     a, depth, t = 0.4, 0.5, np.radians(degrees)

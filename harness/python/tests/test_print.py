@@ -17,8 +17,10 @@ SPHERE = {"density": 1008.0, "shape": {"sphere": {"radius": 0.35}}}
 MOST = 20
 
 
-@pytest.fixture
-def made(request: pytest.FixtureRequest, fmu: Path, tmp_path: Path) -> dict[str, Callable]:
+@pytest.fixture(scope="module")
+def made(
+    request: pytest.FixtureRequest, fmu: Path, tmp_path_factory: pytest.TempPathFactory
+) -> dict[str, Callable]:
     """Return a large object of each public class."""
     program, model = option(request, "--hubslosh"), fmu.with_name("Spacecraft.fmu")
     of = hubslosh.MountedTank(SPHERE, (0.1, 0.5, -0.3), nu=9e-7)
@@ -78,7 +80,9 @@ def made(request: pytest.FixtureRequest, fmu: Path, tmp_path: Path) -> dict[str,
         ),
         "Fmu": lambda: hubslosh.Fmu.open(model),
         "Plant": lambda: hubslosh.Plant(model),
-        "View": lambda: hubslosh.view(run, tmp_path / "run.html", program=program),
+        "View": lambda: hubslosh.view(
+            run, tmp_path_factory.mktemp("view") / "run.html", program=program
+        ),
         "FmuError": lambda: hubslosh.FmuError("wrong"),
         "FmuWarning": lambda: hubslosh.FmuWarning("strange"),
         "RunError": lambda: hubslosh.RunError("stopped", 1.0, {"x": np.zeros(10_000)}),

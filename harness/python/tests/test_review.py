@@ -81,7 +81,11 @@ def closed_form(craft: Craft, fill: str) -> tuple[float, float, float, float]:
 
 @pytest.mark.parametrize(
     ("height", "order", "phase"),
-    [(1.1, "zero first", 0), (0.62, "pole first", 180), (-0.3, "zero first", 0)],
+    [
+        pytest.param(1.1, "zero first", 0, marks=pytest.mark.long),
+        (0.62, "pole first", 180),
+        pytest.param(-0.3, "zero first", 0, marks=pytest.mark.long),
+    ],
 )
 def test_stabilisation_flips_where_the_tank_crosses_the_centre_of_mass(
     craft: Craft, height: float, order: str, phase: float
@@ -112,7 +116,8 @@ def test_stabilisation_flips_where_the_tank_crosses_the_centre_of_mass(
 
 def test_the_family_has_the_same_states_everywhere_and_the_plants_responses(craft: Craft) -> None:
     """A full tank has no slosh mode, but its model keeps the states of one."""
-    found = craft.review(gains(), PERIOD, ["20%", "60%", "100%"], damping="nominal")
+    fixed = {"damping": "nominal", "frequency": "nominal", "inertia": "nominal"}
+    found = craft.review(gains(), PERIOD, ["20%", "60%", "100%"], **fixed)
     assert {model.states for model in found.family} == {found.family[0].states}
     assert "tank[1].p[1,1]" in found.family[2].states
     for point, model in zip(found.nominal, found.family, strict=True):
@@ -146,7 +151,8 @@ def test_bands_hold_all_points_and_the_ends_of_each_range(craft: Craft) -> None:
 def test_thrust_off_the_centre_of_mass_is_trimmed(craft: Craft) -> None:
     """A torque that balances the thrust's moment gives the same margins, and no rotation."""
     craft = replace(craft, center_of_mass=(0.02, -0.01, 1.0))
-    found = craft.review(gains(), PERIOD, ["50%"], damping="nominal")
+    fixed = {"damping": "nominal", "frequency": "nominal", "inertia": "nominal"}
+    found = craft.review(gains(), PERIOD, ["50%"], **fixed)
     center = craft.mass_properties("50%").center_of_mass
     balance = {"torque[1]": 400 * center[1], "torque[2]": -400 * center[0]}
     mine = found.nominal[0].margins
@@ -286,6 +292,7 @@ nu = 3e-7
 """
 
 
+@pytest.mark.long
 def test_a_plan_file_equals_the_call_in_python(
     craft: Craft, tmp_path: Path, capsys, monkeypatch
 ) -> None:
@@ -550,6 +557,7 @@ def test_requirements_pass_or_fail(craft: Craft) -> None:
             craft.review(gains(), PERIOD, fills, requirements=wrong)
 
 
+@pytest.mark.long
 def test_an_unstable_real_pole_is_the_worst_case(craft: Craft) -> None:
     """A negative attitude gain kp about z gives J s² + kd s + kp = 0 a positive real root.
 
@@ -573,6 +581,7 @@ def test_an_unstable_real_pole_is_the_worst_case(craft: Craft) -> None:
     assert "torque[3]" in drawn[: drawn.index("</figure>")]
 
 
+@pytest.mark.long
 def test_the_page_shows_what_is_unstable_first(craft: Craft) -> None:
     """Unstable fills, points and modes are marked and listed before stable ones."""
     craft = replace(craft, tanks={"ox": replace(craft.tanks["ox"], position=(0, 0, 0.62))})

@@ -63,8 +63,23 @@ def by_fmpy(
     return dict(zip(COLUMNS, np.transpose(rows), strict=True))
 
 
-@pytest.mark.parametrize("friction", ["stribeck", "stribeck_smooth"])
-@pytest.mark.parametrize("model", MODELS)
+def shared(quick: set[tuple], *values: list) -> list:
+    """Return every combination of the values; those that are not quick are long."""
+    long = pytest.mark.long
+    return [
+        case if case in quick else pytest.param(*case, marks=long)
+        for case in itertools.product(*values)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("model", "friction"),
+    shared(
+        {("liquid", "stribeck"), ("spherical", "stribeck_smooth")},
+        MODELS,
+        ["stribeck", "stribeck_smooth"],
+    ),
+)
 def test_a_sweep_of_five_minutes_gives_the_same_rate(
     fmu: Path, harness: Harness, tmp_path: Path, model: str, friction: str
 ) -> None:
@@ -150,7 +165,9 @@ def pulses() -> dict[str, tuple[np.ndarray, np.ndarray]]:
 
 
 @pytest.mark.parametrize("hold", [False, True])
-@pytest.mark.parametrize("step", [0.02, 0.005, 0.0333])
+@pytest.mark.parametrize(
+    "step", [*(pytest.param(h, marks=pytest.mark.long) for h in (0.02, 0.005)), 0.0333]
+)
 @pytest.mark.parametrize("name", pulses())
 def test_an_input_history_acts_the_same_in_python_and_on_the_command_line(
     fmu: Path, harness: Harness, tmp_path: Path, name: str, step: float, hold: bool

@@ -9,10 +9,8 @@ import textwrap
 import zipfile
 from pathlib import Path
 
-import nbformat
 import pytest
 from conftest import ROOT, TARGET, run_with_wheel
-from nbclient import NotebookClient
 from packaging.tags import sys_tags
 from packaging.utils import parse_wheel_filename
 
@@ -232,6 +230,9 @@ def test_a_notebook_runs(
     wheel: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, path: Path
 ) -> None:
     """Every cell runs in order with the wheel's files, figures included."""
+    import nbformat
+    from nbclient import NotebookClient
+
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(tmp_path / "wheel")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path / "wheel"))
