@@ -300,7 +300,7 @@ macro_rules! targets {
         /// Runs the long form of the targets in HUBSLOSH_FUZZ_TARGETS, or of all.
         #[test]
         #[ignore = "takes long: .ci/fuzz-readers"]
-        fn campaign() {
+        fn fuzz_campaign() {
             let count = std::env::var("HUBSLOSH_FUZZ_INPUTS").unwrap_or_default().parse().unwrap_or(100_000);
             let chosen = std::env::var("HUBSLOSH_FUZZ_TARGETS").unwrap_or_default();
             $(if chosen.is_empty() || chosen.split(' ').any(|name| name == stringify!($name)) {
