@@ -40,7 +40,7 @@ def campaign(program: Path, fmu: Path, tmp_path_factory) -> Path:
 
 
 def test_every_feature_is_reproduced_from_its_definition(campaign: Path) -> None:
-    """Within the tolerances of ``check_analysis``, for linear and for rotary slosh."""
+    """NumPy and SciPy reproduce the features of linear and rotary slosh within tolerances."""
     assert check_analysis.compare(campaign, analyse) == []
     with (campaign / "features.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
@@ -51,7 +51,7 @@ def test_every_feature_is_reproduced_from_its_definition(campaign: Path) -> None
 
 
 def test_a_wrong_feature_is_detected(campaign: Path) -> None:
-    """An antiresonance 4 mHz off, and one that is missing."""
+    """The check finds an antiresonance that is 4 mHz wrong, and one that is missing."""
     path = campaign / "features_spa.csv"
     text = path.read_text(encoding="utf-8")
     rows = list(csv.DictReader(text.splitlines()))

@@ -31,7 +31,7 @@ def kept(name: str) -> dict[str, dict[str, str]]:
 def test_hubslosh_has_the_scores_of_the_table(
     fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """All ten cases; results of 12 digits and more may differ in their last digit."""
+    """Results of all ten cases have the scores of the table, from 12 digits on to one digit."""
     monkeypatch.setattr(hubslosh_fmus, "FOLDER", fmu.parent)
     for case, run in hubslosh_fmus.CASES.items():
         cases.write(tmp_path, case, run())
@@ -47,14 +47,14 @@ def test_hubslosh_has_the_scores_of_the_table(
 
 
 def test_the_table_is_made_of_the_scores() -> None:
-    """README has the table of scores.csv."""
+    """The table in the README of the benchmark equals the file scores.csv."""
     text = compare.PAGE.read_text(encoding="utf-8")
     assert text == compare.with_table(text, compare.read_scores())
 
 
 @pytest.mark.parametrize("case", ["linearisation", "backbones"])
 def test_a_plain_script_has_the_scores_of_the_table(case: str, tmp_path: Path) -> None:
-    """The quick cases of the script by SciPy."""
+    """The script with SciPy reaches the scores of the table in the quick cases."""
     cases.write(tmp_path, case, plain.CASES[case]())
     found = score.score(case, tmp_path / case / "results.csv")
     row = kept("SciPy")[case]
@@ -80,7 +80,7 @@ def test_a_page_has_every_number_of_its_parameters_and_inputs(case: str) -> None
 
 
 def test_the_benchmark_is_small() -> None:
-    """At most 2 MB."""
+    """All files of the benchmark together have at most 2 MB."""
     files = [path for path in BENCHMARK.rglob("*") if path.is_file() and path.suffix != ".pyc"]
     assert sum(path.stat().st_size for path in files) < 2e6
 
@@ -106,7 +106,7 @@ def changed(change: Callable[[list[float]], list[float]]) -> list[str]:
 
 
 def test_a_reference_scores_all_digits(tmp_path: Path) -> None:
-    """Columns in another order, more times, comments and spaces are allowed."""
+    """Columns in another order, further times, comments and spaces are allowed."""
     lines = reference("bench_linear")
     assert scored(lines, tmp_path).digits == score.MOST_DIGITS
     turned = [",".join(reversed(line.split(","))) for line in lines]
@@ -125,7 +125,7 @@ def test_a_reference_scores_all_digits(tmp_path: Path) -> None:
 def test_digits_are_those_of_the_error_over_the_largest_value(
     change: Callable, digits: float, tmp_path: Path
 ) -> None:
-    """Theta is 0.132 rad at most."""
+    """The error is divided by the largest value of the column; theta is at most 0.132 rad."""
     found = scored(changed(change), tmp_path)
     assert found.digits == pytest.approx(digits, abs=0.01)
     assert found.passed == (digits >= 6)
@@ -135,7 +135,7 @@ def test_digits_are_those_of_the_error_over_the_largest_value(
     ("factor", "hint"), [(180 / math.pi, "degrees for radians"), (-1.0, "the opposite sign")]
 )
 def test_a_common_factor_is_named(factor: float, hint: str, tmp_path: Path) -> None:
-    """A column in degrees, or with the other sign."""
+    """The message names a column that is in degrees, or that has the opposite sign."""
     found = scored(changed(lambda row: [row[0], factor * row[1], *row[2:]]), tmp_path)
     assert not found.passed
     assert found.hint == f"theta looks like {hint}"
@@ -173,7 +173,7 @@ def test_a_file_that_cannot_be_scored_says_why(
 
 
 def test_rows_with_wrong_times_and_values_that_are_not_finite_are_refused(tmp_path: Path) -> None:
-    """A shifted grid of times; an infinite value."""
+    """Results on a shifted grid of times, and results with an infinite value, are refused."""
     with pytest.raises(score.ResultsError, match="no row with time = 0 s; its rows"):
         scored(changed(lambda row: [row[0] + 0.05, *row[1:]]), tmp_path)
     with pytest.raises(score.ResultsError, match="omega is empty or not finite at time = 3"):
@@ -183,7 +183,7 @@ def test_rows_with_wrong_times_and_values_that_are_not_finite_are_refused(tmp_pa
 
 
 def test_measurements_that_are_missing_count_as_failed(tmp_path: Path) -> None:
-    """One row of 24, and a row that does not exist."""
+    """A file with only one of 24 rows, or with a row that does not exist, is scored."""
     found = scored(["row [1],value [various]", "4,7.8"], tmp_path, "measured")
     assert (found.digits, found.needed, found.passed) == (1.0, 24.0, False)
     with pytest.raises(score.ResultsError, match="there is no row 25"):

@@ -79,7 +79,7 @@ def test_runs_of_a_cluster_with_a_killed_worker_equal_runs_of_the_harness(client
 
 @pytest.mark.usefixtures("long_runs")
 def test_when_the_only_worker_is_killed_its_successor_gets_all_it_needs(harness) -> None:
-    """Nobody else has the FMU then, nor the torque."""
+    """The new worker receives FMU and torque again, because no other worker has them."""
     plan = 'profile = "exp-sweep:duration=60"\n[vary]\nprofile.amplitude = [0.05, 0.1, 0.2]\n'
     with cluster.cluster(1, None) as client:
         assert len(client.nthreads()) == 1
@@ -91,7 +91,7 @@ def test_when_the_only_worker_is_killed_its_successor_gets_all_it_needs(harness)
 def test_a_refused_run_and_one_that_kills_its_workers_leave_the_others_alone(
     client, harness, monkeypatch
 ) -> None:
-    """And a second start makes only what is missing, broken, or of another recipe."""
+    """A second start simulates only runs that are missing, damaged, or of another recipe."""
     plan = 'profile = "sine:duration=2"\n[vary]\ntank.h = [0.05, -1, 0.07, 0.09, 0.11]\n'
     ours = harness(plan, "c")
     right = cluster.drive_here
@@ -136,7 +136,7 @@ def test_a_refused_run_and_one_that_kills_its_workers_leave_the_others_alone(
 
 
 def test_errors_are_reported_before_a_worker_starts(monkeypatch, capsys, fmu, tmp_path) -> None:
-    """Plan, program, number of workers: one sentence each, and nothing made."""
+    """A wrong plan, program or number of workers gives one sentence, and no file is written."""
     monkeypatch.chdir(tmp_path)
     for flags, words in (
         (["--hubslosh", "nowhere"], "nowhere cannot be started"),
@@ -152,7 +152,7 @@ def test_errors_are_reported_before_a_worker_starts(monkeypatch, capsys, fmu, tm
 
 
 def test_differences_of_cells_are_relative_and_a_text_differs_or_not() -> None:
-    """Empty against a number is not a small difference."""
+    """An empty cell compared with a number counts as a large difference."""
     assert difference("1.5", "1.50") == 0.0
     assert difference("2.0", "2.000000002") == pytest.approx(1e-9)
     assert difference("", "0.1") == difference("a", "b") == float("inf")

@@ -66,7 +66,7 @@ def style() -> None:
 
 
 def test_rotary_slosh_of_the_readme(fmu: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The picture of two sweeps of 2700 s."""
+    """The picture of two sweeps of 2700 s in the README is reproduced."""
     monkeypatch.setattr(rotary_branch, "FMU", fmu)
     same_picture(rotary_branch.draw(), rotary_branch.PICTURE)
 
@@ -74,7 +74,7 @@ def test_rotary_slosh_of_the_readme(fmu: Path, monkeypatch: pytest.MonkeyPatch) 
 def test_rotary_slosh_begins_where_planar_slosh_is_unstable(
     fmu: Path, program: Path, tmp_path: Path
 ) -> None:
-    """The onset that the plan t5_near_resonance finds for the spherical model."""
+    """The torque that the plan t5_near_resonance finds equals the one of a stability analysis."""
     text = (ROOT / "harness" / "campaigns" / "t5_near_resonance.toml").read_text(encoding="utf-8")
     plan = re.sub(r"slosh.model = \[.*\]", 'slosh.model = ["spherical"]', text)
     path = tmp_path / "spherical.toml"
@@ -95,14 +95,14 @@ def test_rotary_slosh_begins_where_planar_slosh_is_unstable(
 def test_a_picture_of_the_book(
     study, model: str, fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """`mode_errors` and `reversal`, whole."""
+    """Pictures that the studies `mode_errors` and `reversal` draw equal those of the book."""
     monkeypatch.setattr(study, "FMU", fmu.with_name(f"{model}.fmu"))
     study.draw(tmp_path / "picture.svg")
     same_picture((tmp_path / "picture.svg").read_text(encoding="utf-8"), study.PICTURE)
 
 
 def test_damping_over_the_fill_of_a_capsule_has_no_step() -> None:
-    """The ratio at the tangent and its range around it in book/damping.md, to their digits."""
+    """Damping ratios equal the numbers printed in book/damping.md, to their last digits."""
     text = " ".join(lines("damping.md"))
     at_tangent = re.search(r"where the ratio is ([\d.]+) %", text)
     ends = re.search(r"From 24 to 29 % it stays between ([\d.]+) and ([\d.]+) %", text)
@@ -124,14 +124,14 @@ def slowed(depth: float) -> float:
 
 
 def test_tilt_slows_slosh_along_the_slope() -> None:
-    """The change at half a radius of book/liquid.md, to its printed digit."""
+    """The change of frequency at half a radius equals the number printed in book/liquid.md."""
     text = " ".join(lines("liquid.md"))
     shallow = re.search(r"Here it is −([\d.]+) % at a depth of half a radius", text)
     assert slowed(0.5) == pytest.approx(float(shallow[1]), abs=0.05)
 
 
 def test_tilt_slows_slosh_of_deeper_liquid() -> None:
-    """The two other changes of the page, to their printed digits."""
+    """Changes of frequency at two larger depths equal the numbers printed in book/liquid.md."""
     deeper = re.search(r"and −(\d+) to −(\d+) % in deeper liquid", " ".join(lines("liquid.md")))
     found = [slowed(depth) for depth in (1.0, 2.0)]
     assert found == pytest.approx([float(deeper[1]), float(deeper[2])], abs=0.5)
@@ -141,7 +141,7 @@ def test_tilt_slows_slosh_of_deeper_liquid() -> None:
     "case", [("linear", 0.0, 0.05, "none"), ("spherical", 0.016, 0.1, "noise")]
 )
 def test_damping_of_the_bench(case, fmu: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two rows of book/damping.md, in all printed digits."""
+    """Two simulated rows equal the rows of book/damping.md in all printed digits."""
     monkeypatch.setattr(bench_damping, "FMU", fmu)
     table = bench_damping.text(pd.DataFrame([bench_damping.case(case)])).splitlines()
     (row,) = (line for line in table if line.startswith(f"| {case[0]} |"))
@@ -154,7 +154,7 @@ def test_damping_of_the_bench(case, fmu: Path, monkeypatch: pytest.MonkeyPatch) 
 def test_the_motion_equals_that_of_the_last_release(
     fmu: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:
-    """Every model and friction law of 0.1.0 for 300 s, and sweeps of 300 s.
+    """Every slosh model and friction law moves as in release 0.1.0 over 300 s.
 
     The 2700 s and release 0.1.0 are by hand.
     """
@@ -166,7 +166,7 @@ def test_the_motion_equals_that_of_the_last_release(
 def test_errors_of_work_and_precision(
     model: str, fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The FMU's errors over 2700 s at two tolerances, in the printed digits.
+    """The FMU's errors over 2700 s at two tolerances equal the digits printed in the book.
 
     Costs depend on the machine; other methods and instructions are by hand.
     """
@@ -209,7 +209,7 @@ def test_a_flight_identifies_slosh(fmu: Path, program: Path, tmp_path: Path) -> 
 
 
 def test_intervals_of_a_sticking_hub(fmu: Path, program: Path, tmp_path: Path) -> None:
-    """Five twins of HubSlosh in book/identification_method.md: 17 of 20 intervals are right.
+    """Of 20 intervals from five simulated recordings of HubSlosh 17 contain the true value.
 
     Chance makes 17 or more of 20 of 95 % in 98 of 100 cases; seeds are fixed. Stated deviations
     are within a factor of two of the page's medians: inertia and friction are drawn within 30 %.
@@ -239,7 +239,7 @@ def test_intervals_of_a_sticking_hub(fmu: Path, program: Path, tmp_path: Path) -
 def test_the_foreign_plant_without_effects_is_hubslosh(
     liquid: str, fmu: Path, tmp_path: Path
 ) -> None:
-    """Rates under a sweep with stops of the hub, to 1e-7 of the largest: far below a gyro's noise.
+    """The second simulator and HubSlosh agree to 1e-7 of the largest rate, also with stops.
 
     The plant has another integrator and other states than the FMU.
     """
@@ -286,7 +286,7 @@ def test_intervals_of_four_draws(only: str, fmu: Path, program: Path, tmp_path: 
 
 
 def test_check_of_many_variables(program: Path, tmp_path: Path) -> None:
-    """The FMU of book/check_ci.md, with 1000 variables, has no error."""
+    """The check of an FMU with 1000 variables, as in book/check_ci.md, finds no error."""
     fmu = tmp_path / "large.fmu"
     large_fmu.write(fmu, 1000)
     done = subprocess.run([program, "check", fmu, "--json"], capture_output=True, check=False)
@@ -300,7 +300,7 @@ def test_check_of_many_variables(program: Path, tmp_path: Path) -> None:
 def test_the_times_of_a_design_review_count_its_tasks(
     fmu: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A row for each step; the loop's file gives the same loop."""
+    """The table has a row for each step of a design review with its number of tasks."""
     import hubslosh
 
     telecom, _ = design_times.satellite()

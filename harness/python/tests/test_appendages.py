@@ -120,7 +120,7 @@ def lagrange(of: dict[str, float], damping: list[float]) -> control.StateSpace:
 
 @pytest.mark.parametrize("fill", ["10%", "30%", "50%", "70%", "90%"])
 def test_margins_are_those_of_a_lagrange_model_in_python_control(craft: Craft, fill: str) -> None:
-    """All crossings: 0.02 dB and 0.02°, each loop broken with the others closed."""
+    """All margins agree within 0.02 dB and 0.02°, each loop opened while the others are closed."""
     loop = craft.loop(GAINS, PERIOD, fill, delay=2 * PERIOD)
     found = hubslosh.margins(loop)
     point = craft.trim(fill).parameters
@@ -161,7 +161,7 @@ def test_margins_are_those_of_a_lagrange_model_in_python_control(craft: Craft, f
 
 
 def test_modes_of_the_free_craft_are_above_those_of_the_held_appendage(craft: Craft) -> None:
-    """A craft without tanks: frequencies of the mass matrix less u u^T by hand."""
+    """Frequencies of a craft without tanks equal those of matrices that are set up by hand."""
     dry = replace(craft, tanks={}, thrust=0.0)
     u = []
     for of in dry.appendages.values():
@@ -197,7 +197,7 @@ def test_a_trimmed_craft_rests_with_appendages_deformed_by_the_thrust(craft: Cra
 
 
 def test_quantities_of_appendages_have_one_name_in_every_method(craft: Craft) -> None:
-    """Short names and those of the FMU set the same; wrong ones say which there are."""
+    """Short names and names of the FMU set the same values; a wrong name raises an error."""
     short = craft.parameters("50%", parameters={"south.frequency[1]": 0.4, "north.zeta[2]": 0.01})
     full = {"appendage[3].frequency": 0.4, "appendage[2].zeta": 0.01}
     assert short == craft.parameters("50%", parameters=full)
@@ -212,7 +212,7 @@ def test_quantities_of_appendages_have_one_name_in_every_method(craft: Craft) ->
 
 
 def test_an_uncertain_model_is_the_linear_model_of_its_parameters(craft: Craft) -> None:
-    """At both ends of the ranges of an appendage, a mass and a slosh mode: 1e-9."""
+    """Both models agree to 1e-9 at the ends of ranges of an appendage, a mass and a slosh mode."""
     ranges = {
         "north.frequency[1]": "15%", "south.zeta[1]": (0.0, 0.02), "craft.Jxx": "5%",
         "NTO.frequency[1]": "10%", "acceleration": "4%",
@@ -229,7 +229,7 @@ def test_an_uncertain_model_is_the_linear_model_of_its_parameters(craft: Craft) 
 
 
 def test_a_review_varies_frequencies_of_appendages_and_the_delay(craft: Craft) -> None:
-    """The range is reached, a larger one is worse, and values drawn by the names set the loop."""
+    """The frequencies reach the ends of their range, and a larger range lowers the margins."""
     uncertain = {"north.frequency[1]": "20%", "delay": (0.05, 0.15)}
     review = craft.review(
         GAINS, PERIOD, ["50%"], delay=0.1, damping="nominal", uncertain=uncertain, draws=4
@@ -249,7 +249,7 @@ def test_a_review_varies_frequencies_of_appendages_and_the_delay(craft: Craft) -
 def test_a_project_file_and_an_exported_fmu_have_the_appendages(
     craft: Craft, tmp_path: Path
 ) -> None:
-    """Read and written again; the FMU of the craft has variables for three modes and its values."""
+    """A project is written and read again; the exported FMU has variables for three modes."""
     Project(craft, GAINS, {"period": PERIOD}).save(tmp_path / "project.toml")
     again = Project.read(tmp_path / "project.toml").craft
     assert again.parameters("50%") == craft.parameters("50%")
@@ -262,7 +262,7 @@ def test_a_project_file_and_an_exported_fmu_have_the_appendages(
 
 
 def test_reduced_matrices_give_the_modes_that_move_the_craft_most() -> None:
-    """In any axes, by frequency; what is no Craig-Bampton model is refused."""
+    """Modes are sorted by frequency, in any axes; matrices of another form are refused."""
     mass, stiffness = np.zeros((9, 9)), np.zeros((9, 9))
     mass[:6, :6] = np.diag([40.0, 40, 40, 30, 9, 39])
     mass[6:, 6:] = np.eye(3)
@@ -291,7 +291,7 @@ def test_reduced_matrices_give_the_modes_that_move_the_craft_most() -> None:
 def test_a_file_of_matrices_is_read_by_pyyeti(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A reader in pyyeti's place; without pyyeti the error says how to install it."""
+    """A substitute reads in place of pyyeti; without it the error says how to install pyyeti."""
     mass, stiffness = np.diag([40.0, 40, 40, 30, 9, 39, 1]), np.zeros((7, 7))
     mass[2, 6] = mass[6, 2] = 5.0
     stiffness[6, 6] = 4.0
@@ -311,7 +311,7 @@ def test_a_file_of_matrices_is_read_by_pyyeti(
 
 
 def test_everything_that_is_wrong_with_appendages_is_said_at_once() -> None:
-    """Names, numbers of modes, shapes; a table with other columns."""
+    """One message lists wrong names, numbers of modes, shapes and columns of a table."""
     good = Appendage((0, 0, 0), [0.1, 0.2, 0.3, 0.4], np.ones((4, 6)))
     with pytest.raises(FmuError) as error:
         Craft(

@@ -90,7 +90,7 @@ def sweep(fmu: Path) -> pd.DataFrame:
 
 @pytest.mark.parametrize("hold", [False, True])
 def test_a_sweep_shows_the_linear_model(fmu: Path, sweep: pd.DataFrame, hold: bool) -> None:
-    """Antiresonance and resonance to a line of the spectrum, 1/900 Hz.
+    """Antiresonance and resonance agree to one line of the spectrum, 1/900 Hz.
 
     In between the estimate is off by what the record cuts off at its end, some thousandths, and by
     what the smoothing takes from the resonance's top, 2 %. A held torque drives the hub at the

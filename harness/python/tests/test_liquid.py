@@ -208,7 +208,7 @@ def test_a_box_drags_liquid_about_its_vertical() -> None:
 def test_spacecraft_has_the_modes_of_each_direction_and_what_they_turn(
     fmu: Path, shape: dict, fill: float | str
 ) -> None:
-    """On a pivot that turns about the vertical alone, off the liquid's centre.
+    """The craft is on a pivot that turns only about a vertical off the liquid's centre.
 
     With the angle ψ, Lzz the liquid's inertia about the vertical through the pivot, arms a_n about
     it: (J + Lzz) ψ'' + Σ m_n a_n η_n'' = 0, η_n'' + ω_n² η_n + a_n ψ'' = 0, from the potential
@@ -291,7 +291,7 @@ def test_small_tilts_change_frequencies_by_their_square() -> None:
 
 
 def test_a_tilted_cylinder_equals_that_of_perturbation_theory() -> None:
-    """At h/R = 1, to the second order: `fmu/formulas/src/tilt.rs`, whose Λ is ω² over g cos t.
+    """At h/R = 1 the frequencies agree to second order in the tilt with perturbation theory.
 
     The meshes are good to 4e-4 of λ, upright and tilted alike to 1e-4; the fourth order is below.
     """

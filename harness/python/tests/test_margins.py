@@ -26,7 +26,7 @@ def crossings(found, kind: str) -> np.ndarray:
 
 
 def test_margins_of_three_lags_equal_the_closed_form() -> None:
-    """10/(s + 1)³: |L| = 1 at sqrt(10^(2/3) - 1), negative real at sqrt(3), where it is -10/8."""
+    """L = 10/(s + 1)³ has |L| = 1 at sqrt(10^(2/3) - 1) rad/s, and L = -10/8 at sqrt(3) rad/s."""
     found = margins(10 / (S + 1) ** 3)
     gain, phase = np.sqrt(10 ** (2 / 3) - 1), np.sqrt(3)
     assert crossings(found, "gain") == pytest.approx([gain], rel=EXACT)
@@ -37,7 +37,7 @@ def test_margins_of_three_lags_equal_the_closed_form() -> None:
 
 
 def test_margins_of_an_integrator_with_two_lags_equal_the_closed_form() -> None:
-    """3/(s (s + 1) (s + 2)): negative real at sqrt(2), where it is -3/6; Routh: stable below 6."""
+    """L = 3/(s (s + 1) (s + 2)) is -3/6 at sqrt(2) rad/s; a gain of 6 is the limit (Routh)."""
     found = margins(3 / (S * (S + 1) * (S + 2)))
     assert crossings(found, "phase") == pytest.approx([np.sqrt(2)], rel=EXACT)
     assert found.gain_margins[1] == pytest.approx(20 * np.log10(2), rel=EXACT)
@@ -70,7 +70,7 @@ def test_crossings_at_a_narrow_slosh_dipole_are_found(half: float) -> None:
 
 @pytest.mark.parametrize("late", [0, 2])
 def test_margins_of_a_sampled_integrator_equal_the_closed_form(late: int) -> None:
-    """1.5 T/(z^late (z - 1)): |L| = 1 where 2 sin(wT/2) = 1.5 T.
+    """L = 1.5 T/(z^late (z - 1)) has |L| = 1 where 2 sin(w T/2) = 1.5 T.
 
     Its phase is -90° - (late + 1/2) wT. At half the sampling rate it is real: -0.75 T for an even
     number of cycles.
@@ -99,7 +99,7 @@ def test_a_conditionally_stable_loop_has_a_gain_margin_downwards() -> None:
 
 
 def test_each_of_two_loops_is_broken_with_the_other_closed() -> None:
-    """Two integrators, the first drives the second: L = [[a/s, 0], [c/s, b/s]].
+    """Of two integrators the first drives the second: L = [[a/s, 0], [c/s, b/s]].
 
     Triangular: the loops have the crossings of a/s and b/s. With a full matrix the first, the
     second closed, is a/s - d/s · c/s / (1 + b/s) = (a s + a b - c d)/(s (s + b)).
@@ -121,7 +121,7 @@ def test_each_of_two_loops_is_broken_with_the_other_closed() -> None:
 
 
 def test_the_modulus_margin_is_the_least_distance_to_minus_one() -> None:
-    """For 1/(s (s + 1)) as on a fine grid: a minimum is flat, 1e-5 in w is 1e-10 in it."""
+    """The modulus margin of 1/(s (s + 1)) equals the least distance to -1 on a fine grid."""
     w = np.linspace(0.5, 3, 250_001)
     least = np.abs(1 + 1 / (1j * w * (1j * w + 1))).min()
     assert margins(1 / (S * (S + 1))).modulus_margin == pytest.approx(least, rel=1e-8)

@@ -90,7 +90,7 @@ def closed_form(craft: Craft, fill: str) -> tuple[float, float, float, float]:
 def test_stabilisation_flips_where_the_tank_crosses_the_centre_of_mass(
     craft: Craft, height: float, order: str, phase: float
 ) -> None:
-    """Bob ahead of the centre of mass, hinge ahead and bob behind, both behind.
+    """Hinge and slosh mass are both ahead of the centre of mass, on both sides, or both behind.
 
     For a torque the pole moves by Kd (ω_z² - ω_p²)/(2 I ω_p²): phase-stable if the zero is lower.
     """

@@ -192,7 +192,7 @@ def test_the_loop_is_that_of_single_calls(craft: Craft) -> None:
 
 
 def test_wheels_have_the_margins_of_the_torque_that_they_give(craft: Craft) -> None:
-    """About the body axes they have those of `torque`, their bias momentum included."""
+    """Wheels about the body axes have the margins of `torque`, with their bias momentum."""
     craft = replace(craft, wheels=BODY_WHEELS)
     there = hubslosh.margins(craft.loop(GAINS, 0.1, "50%", command="wheels", delay=0.05))
     plain = hubslosh.margins(craft.loop(GAINS, 0.1, "50%", delay=0.05))
@@ -259,7 +259,7 @@ def test_a_loop_with_wheels_follows_equations_of_its_own(rigid: Craft) -> None:
 
 
 def test_a_review_and_an_uncertain_model_take_wheels(craft: Craft, tmp_path: Path) -> None:
-    """A review of wheels about the body axes has the points of one of the torque.
+    """A review of wheels about the body axes has the margins of a review of a torque.
 
     A project file keeps wheels and command.
     """
