@@ -1,6 +1,6 @@
 //! The classes `Fmu` and `Variable` of the compiled half.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -106,6 +106,8 @@ pub struct Fmu {
     places: BTreeMap<String, usize>,
     /// The FMU loaded for Co-Simulation and for Model Exchange.
     loaded: [Mutex<Option<Arc<host::fmu::Fmu>>>; 2],
+    /// Value references of the states and inputs that had an effect in the last Jacobian.
+    pub effective: Mutex<HashSet<u32>>,
 }
 
 impl Fmu {
@@ -145,7 +147,13 @@ impl Fmu {
         let description = py.detach(|| ModelDescription::from_fmu(&path)).map_err(error)?;
         let names = description.variables.iter().map(|variable| variable.name.clone());
         let places = names.zip(0..).collect();
-        Ok(Fmu { path, description, places, loaded: Default::default() })
+        Ok(Fmu {
+            path,
+            description,
+            places,
+            loaded: Default::default(),
+            effective: Default::default(),
+        })
     }
 
     /// Name of the model in the description.

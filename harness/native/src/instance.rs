@@ -1,6 +1,7 @@
 //! The class `Instance`: an instance of an FMU whose functions Python calls one by one, with variables by name.
 #![allow(unsafe_code)]
 
+use std::collections::HashSet;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -260,7 +261,11 @@ impl Instance {
                 }
             }
             instance.enter_continuous_time_mode().map_err(error)?;
-            jacobian(instance, &unknowns, &knowns).map_err(error)
+            let known = &self.fmu.get().effective;
+            let mut effective = known.lock().unwrap_or_else(PoisonError::into_inner).clone();
+            let columns = jacobian(instance, &unknowns, &knowns, &mut effective).map_err(error)?;
+            *known.lock().unwrap_or_else(PoisonError::into_inner) = effective;
+            Ok(columns)
         })?;
         Ok(bytes(py, &columns))
     }
@@ -268,25 +273,41 @@ impl Instance {
 
 /// Returns the derivatives of `unknowns` with respect to each of `knowns`, known after known.
 ///
-/// Most states of a small craft belong to tanks that it does not have. Therefore the first call requests the derivative in
-/// a direction that moves a whole block of knowns; if this derivative is 0, the derivatives with respect to each known of
-/// the block are 0 and are not computed one by one.
-fn jacobian(instance: &mut fmu::Instance, unknowns: &[u32], knowns: &[u32]) -> Called<Vec<f64>> {
+/// Most states of a small craft belong to tanks that it does not have. Therefore the derivative in a direction that moves all
+/// knowns which had no effect in the last Jacobian of this FMU is requested first: if it is 0, so are their columns. `effective`
+/// has the value references of the other knowns; it is updated.
+fn jacobian(
+    instance: &mut fmu::Instance,
+    unknowns: &[u32],
+    knowns: &[u32],
+    effective: &mut HashSet<u32>,
+) -> Called<Vec<f64>> {
     const BLOCK: usize = 8;
-    let mut columns = Vec::with_capacity(knowns.len() * unknowns.len());
-    for block in knowns.chunks(BLOCK) {
-        if knowns.len() > 4 * BLOCK {
-            // Different shares, so that effects of opposite knowns do not cancel.
-            let direction: Vec<f64> = (1..=block.len()).map(|n| (n as f64).sqrt()).collect();
-            let all = instance.directional_derivative(unknowns, block, &direction)?;
-            if all.iter().all(|x| *x == 0.0) {
-                columns.resize(columns.len() + unknowns.len() * block.len(), 0.0);
-                continue;
+    let mut moves = |places: &[usize]| -> Called<bool> {
+        let block: Vec<u32> = places.iter().map(|i| knowns[*i]).collect();
+        // Different shares, so that effects of opposite knowns do not cancel.
+        let direction: Vec<f64> = (1..=block.len()).map(|n| (n as f64).sqrt()).collect();
+        let all = instance.directional_derivative(unknowns, &block, &direction)?;
+        Ok(all.iter().any(|x| *x != 0.0))
+    };
+    let (mut single, rest): (Vec<usize>, Vec<usize>) =
+        (0..knowns.len()).partition(|i| effective.contains(&knowns[*i]));
+    if !rest.is_empty() && moves(&rest)? {
+        for block in rest.chunks(BLOCK) {
+            if moves(block)? {
+                single.extend(block);
             }
         }
-        for known in block {
-            columns.extend(instance.directional_derivative(unknowns, &[*known], &[1.0])?);
-        }
+    }
+    let width = unknowns.len();
+    let mut columns = vec![0.0; knowns.len() * width];
+    for i in single {
+        let column = instance.directional_derivative(unknowns, &[knowns[i]], &[1.0])?;
+        match column.iter().any(|x| *x != 0.0) {
+            true => effective.insert(knowns[i]),
+            false => effective.remove(&knowns[i]),
+        };
+        columns[i * width..][..width].copy_from_slice(&column);
     }
     Ok(columns)
 }

@@ -236,7 +236,11 @@ class Fmu:
         >>> hubslosh.Fmu.open("HubSlosh").names("input")
         ['tau_cmd', 'tau_ext', 'g_axial']
         """
-        return [v.name for v in self.variables.values() if v.causality in causalities]
+        if causalities not in self._by_causality:
+            self._by_causality[causalities] = [
+                v.name for v in self.variables.values() if v.causality in causalities
+            ]
+        return self._by_causality[causalities].copy()
 
     def components(self, names: Iterable[str]) -> list[str]:
         """Replace the names of vectors and matrices by the names of their elements.
@@ -262,6 +266,16 @@ class Fmu:
         for name in names:
             parts += [name] if name in self.variables else self._elements.get(name, [name])
         return parts
+
+    @cached_property
+    def _by_causality(self) -> dict[tuple[str, ...], list[str]]:
+        """Names of the variables by the causalities for which `names` was called."""
+        return {}
+
+    @cached_property
+    def by_reference(self) -> dict[int, Variable]:
+        """Variables by value reference; of several with the same reference the first one."""
+        return {v.reference: v for v in reversed(self.variables.values())}
 
     @cached_property
     def _elements(self) -> dict[str, list[str]]:

@@ -445,9 +445,8 @@ def linearize(
     parameters = parameters_of(parameters)
     names_in = _reals(fmu, inputs, "input")
     names_out = _reals(fmu, outputs, "output")
-    by_reference = {v.reference: v for v in reversed(fmu.variables.values())}
     pairs = fmu.native.derivatives
-    states = [by_reference.get(state) for _, state in pairs]
+    states = [fmu.by_reference.get(state) for _, state in pairs]
     if None in states:
         raise FmuError(f"{fmu.name} has arrays of states; only scalar states are linearised")
     unknown = [derivative for derivative, _ in pairs]
