@@ -1,5 +1,6 @@
 //! A sampled controller in the loop with an FMU: it receives outputs of a run and sets inputs.
 
+use host::c_abi::Called;
 use host::fmu::Instance;
 use pyo3::buffer::PyBuffer;
 use pyo3::exceptions::PyValueError;
@@ -98,16 +99,17 @@ struct Wheel {
 }
 
 impl Wheel {
-    /// Returns the torque on the craft that acts for `dt` seconds if `asked` is commanded, and advances the speed.
+    /// Returns the torque on the craft if `asked` is commanded, and how long it can act, s.
     ///
-    /// The torque is limited to `max_torque`. If the wheel would pass its largest speed, the torque is reduced so that
-    /// it ends at this speed.
-    fn act(&mut self, asked: f64, dt: f64) -> f64 {
+    /// The torque is limited to `max_torque`. At the largest speed a torque that would raise the speed has no effect.
+    fn limited(&self, asked: f64) -> (f64, f64) {
         let torque = asked.clamp(-self.max_torque, self.max_torque);
-        let free = self.speed - torque * dt / self.inertia;
-        let before = self.speed;
-        self.speed = free.clamp(-self.max_speed, self.max_speed);
-        if self.speed == free { torque } else { (before - self.speed) * self.inertia / dt }
+        let rate = -torque / self.inertia;
+        let left = self.max_speed.copysign(rate) - self.speed;
+        match torque == 0.0 || left * rate <= 0.0 {
+            true => (0.0, f64::INFINITY),
+            false => (torque, left / rate),
+        }
     }
 }
 
@@ -116,9 +118,11 @@ struct Wheels {
     each: Vec<Wheel>,
     /// Value references of `h_wheels`.
     references: [u32; 3],
-    /// Angular momentum of all wheels relative to the body, N·m·s, at the present row, and its derivative up to the next row.
+    /// Angular momentum of all wheels relative to the body, N·m·s, at the begin of the present step, and its derivative.
     momentum: [f64; 3],
     slope: [f64; 3],
+    /// Length of the present step, s.
+    step: f64,
     /// Speeds at each row, rad/s.
     speeds: Numbers,
 }
@@ -141,8 +145,6 @@ pub struct Feedback {
     /// of cycle k are at position k modulo `latency` + 1.
     on_the_way: Vec<f64>,
     now: Vec<f64>,
-    /// Length of the row before, s.
-    last: f64,
     /// Commands that act from each row on, within the wheels' limits, one row of numbers per row of the run.
     commands: Numbers,
 }
@@ -186,22 +188,15 @@ impl Feedback {
             latency,
             on_the_way: vec![0.0; (latency + 1) * command.len()],
             now: vec![0.0; command.len()],
-            last: 0.0,
             commands: Numbers::borrow(&feedback.getattr("commands")?, rows, command.len(), true)?,
             command: (inputs, places.clone(), vec![0.0; places.len()]),
             wheels,
         })
     }
 
-    /// Runs the controller at row `row` if a cycle begins there, and writes the commands that act from this row to the next,
-    /// `dt` seconds later, into the inputs. It is called after the outputs of the row are read and before its inputs are set.
-    pub fn act(
-        &mut self,
-        fmu: &mut Instance,
-        row: usize,
-        time: f64,
-        dt: f64,
-    ) -> Result<(), Failure> {
+    /// Runs the controller at row `row` if a cycle begins there, and writes the commands that act from this row to the next into
+    /// the inputs. It is called after the outputs of the row are read and before its inputs are set.
+    pub fn act(&mut self, fmu: &mut Instance, row: usize, time: f64) -> Result<(), Failure> {
         let (width, cycle) = (self.now.len(), row / self.parts);
         let place = |cycle: usize| (cycle % (self.latency + 1)) * width;
         if row.is_multiple_of(self.parts) {
@@ -233,27 +228,55 @@ impl Feedback {
             self.commands.push(&self.now);
             return Ok(());
         };
-        for (h, slope) in wheels.momentum.iter_mut().zip(&mut wheels.slope) {
-            // as the FMU itself extrapolates its input over the row before
-            *h += *slope * self.last;
-            *slope = 0.0;
-        }
-        self.last = dt;
         let mut acting = self.now.clone();
-        wheels.speeds.push(&wheels.each.iter().map(|wheel| wheel.speed).collect::<Vec<_>>());
-        for wheel in &mut wheels.each {
-            let torque = wheel.act(self.now[wheel.place], dt);
-            acting[wheel.place] = torque;
-            for (slope, axis) in wheels.slope.iter_mut().zip(wheel.axis) {
-                *slope -= torque * axis;
-            }
+        for wheel in &wheels.each {
+            acting[wheel.place] = wheel.limited(self.now[wheel.place]).0;
         }
-        fmu.set_real(&wheels.references, &wheels.momentum)?;
         self.commands.push(&acting);
+        self.record_speeds();
         Ok(())
     }
 
-    /// Returns value references, values and derivatives of the inputs that change along a line from this row to the next.
+    /// Adds the present speeds of the wheels to the record; at the last row nothing else is recorded.
+    pub fn record_speeds(&mut self) {
+        if let Some(wheels) = &mut self.wheels {
+            let speeds: Vec<f64> = wheels.each.iter().map(|wheel| wheel.speed).collect();
+            wheels.speeds.push(&speeds);
+        }
+    }
+
+    /// Lets the wheels turn from the time `begin` on, and returns the end of the step in which their torques are constant, s: `end`,
+    /// or the time before it at which a wheel reaches its largest speed.
+    pub fn turn(&mut self, fmu: &mut Instance, begin: f64, end: f64) -> Called<f64> {
+        let Some(wheels) = &mut self.wheels else { return Ok(end) };
+        for (h, slope) in wheels.momentum.iter_mut().zip(&mut wheels.slope) {
+            // as the FMU itself extrapolates its input over the step before
+            *h += *slope * wheels.step;
+            *slope = 0.0;
+        }
+        let full_at = |wheel: &Wheel| begin + wheel.limited(self.now[wheel.place]).1;
+        for wheel in &mut wheels.each {
+            if full_at(wheel) <= begin {
+                wheel.speed = wheel.max_speed.copysign(-self.now[wheel.place]);
+            }
+        }
+        let stop = wheels.each.iter().map(full_at).fold(end, f64::min);
+        wheels.step = stop - begin;
+        for wheel in &mut wheels.each {
+            let (torque, _) = wheel.limited(self.now[wheel.place]);
+            for (slope, axis) in wheels.slope.iter_mut().zip(wheel.axis) {
+                *slope -= torque * axis;
+            }
+            wheel.speed = match full_at(wheel) <= stop {
+                true => wheel.max_speed.copysign(-torque),
+                false => wheel.speed - torque * wheels.step / wheel.inertia,
+            };
+        }
+        fmu.set_real(&wheels.references, &wheels.momentum)?;
+        Ok(stop)
+    }
+
+    /// Returns value references, values and derivatives of the inputs that change along a line over the present step.
     pub fn lines(&self) -> Option<(&[u32], &[f64], &[f64])> {
         let wheels = self.wheels.as_ref()?;
         Some((&wheels.references, &wheels.momentum, &wheels.slope))
@@ -312,7 +335,7 @@ fn wheels(
         })
         .collect();
     let momentum = feedback.getattr("momentum")?.extract()?;
-    Ok(Some(Wheels { each, references, momentum, slope: [0.0; 3], speeds }))
+    Ok(Some(Wheels { each, references, momentum, slope: [0.0; 3], step: 0.0, speeds }))
 }
 
 /// Reads a linear controller from the Python object `of`, which has the class `Linear`.

@@ -161,29 +161,48 @@ impl<'fmu> Run<'fmu> {
         let (columns, recorded) = &mut self.outputs;
         recorded.push(columns.get(instance)?);
         let time = self.time[row];
-        let Some(next) = self.time.get(row + 1) else { return Ok(()) };
+        let Some(next) = self.time.get(row + 1) else {
+            if let Some(feedback) = &mut self.feedback {
+                feedback.record_speeds();
+            }
+            return Ok(());
+        };
         if let Some(feedback) = &mut self.feedback {
-            feedback.act(instance, row, time, next - time)?;
+            feedback.act(instance, row, time)?;
         }
         let (columns, given) = &mut self.inputs;
         columns.set(instance, given.row(i))?;
         let Lines { references, values, slopes } = &mut self.lines;
-        references.clear();
-        values.clear();
-        slopes.clear();
-        if let Some(along) = &mut self.slopes {
-            references.extend(&columns.references);
-            values.extend(&columns.reals);
-            slopes.extend(columns.places.iter().map(|place| along.row(i)[*place]));
-        }
-        if let Some((turned, h, h_dot)) = self.feedback.as_ref().and_then(Feedback::lines) {
-            references.extend(turned);
-            values.extend(h);
-            slopes.extend(h_dot);
-        }
-        match references.is_empty() {
-            true => instance.do_step(time, next - time)?,
-            false => instance.do_step_along(time, next - time, references, values, slopes)?,
+        let mut begin = time;
+        // one step, or more if wheels reach their largest speeds before the next row
+        while begin < *next {
+            let end = match &mut self.feedback {
+                Some(feedback) => feedback.turn(instance, begin, *next)?,
+                None => *next,
+            };
+            references.clear();
+            values.clear();
+            slopes.clear();
+            if let Some(along) = &mut self.slopes {
+                references.extend(&columns.references);
+                slopes.extend(columns.places.iter().map(|place| along.row(i)[*place]));
+                values.extend(&columns.reals);
+                if begin > time {
+                    let moved = values.iter_mut().zip(&*slopes);
+                    moved.for_each(|(value, slope)| *value += slope * (begin - time));
+                    instance.set_real(references, values)?;
+                }
+            }
+            if let Some((turned, h, h_dot)) = self.feedback.as_ref().and_then(Feedback::lines) {
+                references.extend(turned);
+                values.extend(h);
+                slopes.extend(h_dot);
+            }
+            match references.is_empty() {
+                true => instance.do_step(begin, end - begin)?,
+                false => instance.do_step_along(begin, end - begin, references, values, slopes)?,
+            }
+            begin = end;
         }
         Ok(())
     }

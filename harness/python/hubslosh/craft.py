@@ -41,7 +41,7 @@ from .tanks import (
     read_drawing,
     solve,
 )
-from .wheels import MOMENTUM, Wheel, histories, momentum, torque_names, wrong_wheels
+from .wheels import MOMENTUM, Wheel, momentum, wrong_wheels
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -1436,25 +1436,17 @@ class Craft:
         >>> float(run["q[1]"].iloc[-1].round(6))
         0.999988
         """
-        from .simulation import simulate
+        from .simulation import run_of
 
-        mine, replaced = (
-            self.parameters(fill, parameters=parameters),
-            getattr(inputs, "columns", ()),
-        )
-        wheels = None
-        if inputs is not None and any(name in replaced for name in torque_names(self.wheels)):
-            start = np.array([float(mine[name]) for name in MOMENTUM])  # type: ignore[arg-type]
-            hold = bool(options.pop("hold", False))
-            wheels = histories(inputs, self.wheels, start, hold=hold)
-            inputs, replaced = wheels.inputs, wheels.inputs.columns
+        mine = self.parameters(fill, parameters=parameters)
+        momentum = tuple(float(mine[name]) for name in MOMENTUM)  # type: ignore[arg-type]
+        replaced = getattr(inputs, "columns", ())
         given = {n: x for n, x in mine.items() if n not in replaced or n in (parameters or {})}
-        run = simulate(self.model, given, inputs, stop, step, outputs, **options)
-        if wheels is not None:
-            for name, values in wheels.columns(run["time"].to_numpy()).items():
-                run[name] = values
-                run.attrs["units"][name] = "N.m" if name in wheels.torque else "rad/s"
-        return run
+        times, hold = (options.pop("start", None), stop, step), options.pop("hold", False)
+        return run_of(
+            self.model, given, inputs, times, outputs, options.pop("tolerance", None), hold,
+            self.wheels, momentum, **options,
+        )  # fmt: skip
 
     def pulses(self, fill: Fill, firing: Mapping[str, Any], stop: float) -> "pd.DataFrame":
         """Return the history of force and torque of engines that fire in pulses.

@@ -48,7 +48,8 @@ class Feedback:
     """Column of the torque in ``command``, axis, inertia, largest torque and speed, and speed of
     each wheel."""
     momentum: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Momentum of the wheels at the start, N·m·s."""
+    """Momentum of the wheels at the start, N·m·s. A wheel that reaches its largest speed between
+    two rows gives its torque until then, and none from then on."""
 
     def __post_init__(self) -> None:
         """Make room for the commands."""
@@ -56,4 +57,4 @@ class Feedback:
         self.commands: Matrix = np.zeros((rows, len(self.command)))
         """The commands in force from each row on; the last row is not set."""
         self.speeds: Matrix = np.zeros((rows, len(self.wheels)))
-        """Speed of each wheel at each row, rad/s; the last row is not set."""
+        """Speed of each wheel at each row, rad/s."""

@@ -28,7 +28,18 @@ from .simulation import (
     table_of,
     too_many_rows,
 )
-from .wheels import ALL, MOMENTUM, Wheel, momentum, speed_name, torque_names, wrong_wheels
+from .wheels import (
+    ALL,
+    MOMENTUM,
+    Wheel,
+    columns_of,
+    momentum,
+    rows_of,
+    speed_name,
+    torque_names,
+    units_of,
+    wrong_wheels,
+)
 from .wheels import TORQUE as BODY_TORQUE
 
 # Result of a controller in a cycle: the command, or one for each of several, from time (s) and
@@ -201,8 +212,7 @@ class Loop:
 
     def _units(self) -> dict[str, str]:
         """Return the units of torques and speeds of the wheels, which the FMU does not know."""
-        names = torque_names(self.wheels)
-        return dict.fromkeys(names, "N.m") | {speed_name(name): "rad/s" for name in names}
+        return units_of(torque_names(self.wheels))
 
     def _without_wheels(self) -> "Loop":
         """Return the loop whose wheels' torques act as torque on the craft.
@@ -468,11 +478,7 @@ class Loop:
             parts=parts,
             switch=switch,
             latency=min(latency, cycles),
-            wheels=[
-                (command.index(name), of.direction.tolist(), of.inertia, of.max_torque,
-                 of.max_speed, of.speed)
-                for name, of in turned.items()
-            ],
+            wheels=rows_of(turned, command),
             momentum=self._momentum(fmu, every),
         )  # fmt: skip
         given = {name: history.after(points) for name, history in histories.items()}
@@ -495,10 +501,7 @@ class Loop:
         commands = feedback.commands
         commands[-1] = commands[-2]
         rows = {"time": points} | dict(zip(command, commands.T, strict=True))
-        speeds, last = feedback.speeds, points[-1] - points[-2]
-        for k, (name, wheel) in enumerate(turned.items()):
-            speeds[-1, k] = speeds[-2, k] - rows[name][-1] * last / wheel.inertia
-            rows[speed_name(name)] = speeds[:, k]
+        rows |= columns_of(turned, feedback)
         rows |= {name: values for name, (values, _) in given.items()} | recorded
         return table_of(fmu, rows, wanted, columns, self.model, every, self._units())
 

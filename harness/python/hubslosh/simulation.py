@@ -14,6 +14,7 @@ from .fmu import INTEGERS, Fmu, FmuError, Parameters, Quantity, did_you_mean
 from .plant import TORQUE, Plant
 from .run import Run
 from .tables import read_parameters
+from .wheels import Wheel, columns_of, follow, torques_of, units_of
 
 Real = NDArray[np.float64]
 
@@ -129,11 +130,33 @@ def simulate(
     2   2.0      0.0  0.666       -0.010
     3   3.0      0.0  0.596        0.013
     """
-    fmu = Fmu.open(model)
+    return run_of(model, parameters, inputs, (start, stop, step), outputs, tolerance, hold)
+
+
+def run_of(
+    model: str | Path,
+    parameters: Parameters | str | Path | None,
+    inputs: pd.DataFrame | None,
+    times: tuple[float | None, float | None, float | None],
+    outputs: Sequence[str] | str | None,
+    tolerance: float | None,
+    hold: bool,
+    wheels: Mapping[str, Wheel] = MappingProxyType({}),
+    momentum: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> Run:
+    """Return the run of `simulate`, in which columns of ``inputs`` can also command wheels.
+
+    ``times`` are start, stop and step; ``momentum`` is that of all wheels at the start, N·m·s.
+    """
+    fmu, (start, stop, step) = Fmu.open(model), times
     parameters = parameters_of(parameters)
     problems: list[str] = []
-    histories = histories_of(fmu, inputs, hold, problems)
-    rows = next(iter(histories.values())).time if histories else None
+    turned: dict[str, Wheel] = {}
+    if wheels and isinstance(inputs, pd.DataFrame):
+        turned = torques_of(inputs, wheels, problems)
+    histories = histories_of(fmu, inputs, hold, problems, turned)
+    torques = {name: histories.pop(name) for name in turned if name in histories}
+    rows = next(iter((histories | torques).values())).time if histories or torques else None
     if rows is None and inputs is not None and not problems and "time" in inputs:
         rows = inputs["time"].to_numpy(float)
     check_parameters(fmu, parameters, histories, problems)
@@ -171,6 +194,10 @@ def simulate(
     sloped = any(slope.any() for _, slope in values.values())
     slopes = {name: slope for name, (_, slope) in values.items()} if sloped else None
     asked = asked_of(fmu, columns, given)
+    feedback = None
+    if turned:
+        table = np.column_stack([of.after(points)[0] for of in torques.values()])
+        feedback = follow(table[:-1], turned, momentum)
     with Plant(
         model,
         parameters,
@@ -179,9 +206,11 @@ def simulate(
         stop=stop,
         inputs={name: value[0] for name, value in given.items()},
     ) as plant:
-        recorded = plant.run(points, given, slopes, asked)
+        recorded = plant.run(points, given, slopes, asked, feedback)
     rows_made = {"time": points} | given | recorded
-    table = table_of(fmu, rows_made, wanted, columns, model, parameters)
+    if feedback is not None:
+        rows_made |= columns_of(turned, feedback)
+    table = table_of(fmu, rows_made, wanted, columns, model, parameters, units_of(turned))
     table.attrs["rows"], table.attrs["inputs"] = native.pairing(hold)
     return table
 
@@ -288,9 +317,13 @@ def too_many_rows(start: float, stop: float, step: float) -> list[str]:
 
 
 def histories_of(
-    fmu: Fmu, inputs: pd.DataFrame | None, hold: bool, problems: list[str]
+    fmu: Fmu,
+    inputs: pd.DataFrame | None,
+    hold: bool,
+    problems: list[str],
+    torques: Container[str] = (),
 ) -> dict[str, History]:
-    """Return the history of each input by its name.
+    """Return the history of each input by its name, and of the torques of wheels, which are held.
 
     Everything that is wrong with the table ``inputs`` is appended to ``problems``.
     """
@@ -304,7 +337,9 @@ def histories_of(
         return {}
     known = fmu.names("input")
     slopes = {column: name for column, name in SLOPES.items() if name in known}
-    wrong = [str(c) for c in inputs.columns if c not in ("time", *known, *slopes)]
+    wrong = [
+        str(c) for c in inputs.columns if c not in ("time", *known, *slopes) and c not in torques
+    ]
     if wrong:
         hints = ", ".join(f"{name}{_hint(name, known)}" for name in wrong)
         problems.append(
@@ -322,7 +357,7 @@ def histories_of(
     if len(inputs) < 2:
         problems.append(f"inputs needs two rows or more, not {len(inputs)}")
     for name, unit in dict(inputs.attrs.get("units", {})).items():
-        if name in columns and name not in slopes:
+        if name in columns and name not in slopes and name not in torques:
             try:
                 base = (1.0, 0.0) if (name, unit) == ("time", "s") else fmu.scale(name, unit)
                 columns[name] = (columns[name] - base[1]) / base[0]
@@ -339,7 +374,7 @@ def histories_of(
         if column in columns and name not in columns:
             problems.append(f"inputs has {column} but not {name}")
     for name, values in columns.items():
-        kind = "Real" if name in slopes else fmu.kind(name)
+        kind = "Real" if name in slopes or name in torques else fmu.kind(name)
         if kind == "String":
             problems.append(f"the input {name} is a text; only numbers can be given over time")
         if kind in ("Integer", "Enumeration"):
@@ -354,7 +389,9 @@ def histories_of(
         return {}
     slope_of = {name: columns.pop(column) for column, name in slopes.items() if column in columns}
     return {
-        name: History(time, values, slope_of.get(name), hold or fmu.kind(name) != "Real")
+        name: History(
+            time, values, slope_of.get(name), hold or name in torques or fmu.kind(name) != "Real"
+        )
         for name, values in columns.items()
     }
 

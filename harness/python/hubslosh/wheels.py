@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .arguments import column_of, vector
+from .arguments import vector
+from .feedback import Feedback, Linear
 from .fmu import FmuError
 
 if TYPE_CHECKING:
@@ -21,6 +22,9 @@ Vector = NDArray[np.float64]
 
 MOMENTUM = tuple(f"h_wheels[{i}]" for i in (1, 2, 3))  # Input of the FMU, N·m·s
 TORQUE = tuple(f"torque[{i}]" for i in (1, 2, 3))  # Input of the FMU, N·m
+
+# Column of a wheel's torque among commands, axis, inertia, largest torque and speed, and speed.
+Row = tuple[int, list[float], float, float, float, float]
 
 ALL = "wheels"  # Name of the torques of all wheels, as "torque" is that of three components
 
@@ -180,111 +184,64 @@ def speed_name(torque: str) -> str:
     return f"{torque.removesuffix('.torque')}.speed"
 
 
-@dataclass(frozen=True)
-class Histories:
-    """Torques and speeds of wheels over time, and the inputs that make the FMU turn."""
+def rows_of(wheels: Mapping[str, Wheel], command: Sequence[str]) -> list[Row]:
+    """Return the wheels for `Feedback.wheels`.
 
-    inputs: "pd.DataFrame"
-    """The table of inputs with straight lines between its rows, two rows at each jump."""
-    time: Vector
-    """Start of each interval with constant torques, and the end of the last one, s."""
-    torque: dict[str, Vector]
-    """Torque on the craft in each interval by name, N·m."""
-    speed: dict[str, Vector]
-    """Speed at each time by name, rad/s."""
-
-    def columns(self, time: Vector) -> dict[str, Vector]:
-        """Return the torque that acts from each time on and the speed of each wheel, by name."""
-        place = np.searchsorted(self.time, time, side="right") - 1
-        place = np.clip(place, 0, len(self.time) - 2)
-        found = {name: values[place] for name, values in self.torque.items()}
-        for name, values in self.speed.items():
-            found[name] = np.interp(time, self.time, values)
-        return found
-
-
-def histories(
-    inputs: "pd.DataFrame", wheels: Mapping[str, Wheel], start: Vector, *, hold: bool
-) -> Histories:
-    """Return torques and speeds of wheels that ``inputs`` command, for example by ``z.torque``.
-
-    Their torques are held from row to row, within the wheels' limits. ``start`` is the momentum of
-    all wheels at the start, N·m·s. ``hold``: the other inputs are held, too.
+    ``wheels`` are those whose torques are commands, by the names of the torques in ``command``.
     """
-    import pandas as pd
+    return [
+        (command.index(name), of.direction.tolist(), of.inertia, of.max_torque, of.max_speed,
+         of.speed)
+        for name, of in wheels.items()
+    ]  # fmt: skip
 
-    named = {name: of for name, of in torque_names(wheels).items() if name in inputs}
-    problems = [
+
+def follow(
+    torques: Vector, wheels: Mapping[str, Wheel], start: tuple[float, float, float]
+) -> Feedback:
+    """Return a controller that commands the torques of a table: a row per step, a column per wheel.
+
+    ``wheels`` are named by their torques; ``start`` is the momentum of all wheels, N·m·s.
+    """
+    rows, names = len(torques), list(wheels)
+    law = Linear(*np.zeros((4, 0, 0)), np.zeros((rows, 0)), np.ascontiguousarray(torques))
+    law.C, law.D = np.zeros((len(names), 0)), np.zeros((len(names), 0))
+    return Feedback(
+        law, [], names, cycles=rows, parts=1, switch=0, latency=0,
+        wheels=rows_of(wheels, names), momentum=start,
+    )  # fmt: skip
+
+
+def columns_of(wheels: Mapping[str, Wheel], feedback: Feedback) -> dict[str, Vector]:
+    """Return the torque that acts from each row on (N·m), and the speed (rad/s), by name."""
+    torque = feedback.commands
+    torque[-1] = torque[-2]
+    found = {name: torque[:, feedback.command.index(name)] for name in wheels}
+    return found | dict(zip(map(speed_name, wheels), feedback.speeds.T, strict=True))
+
+
+def units_of(wheels: Mapping[str, Wheel]) -> dict[str, str]:
+    """Return the units of torques and speeds of wheels, which are named by their torques."""
+    return dict.fromkeys(wheels, "N.m") | {speed_name(name): "rad/s" for name in wheels}
+
+
+def torques_of(
+    inputs: "pd.DataFrame", wheels: Mapping[str, Wheel], problems: list[str]
+) -> dict[str, Wheel]:
+    """Return the wheels whose torques are columns of ``inputs``, by the names of the torques.
+
+    What is wrong with these columns is appended to ``problems``.
+    """
+    found = {name: of for name, of in torque_names(wheels).items() if name in inputs}
+    problems += [
         f"inputs has {name}, which the wheels set: leave it out, or the torques of the wheels"
         for name in MOMENTUM
-        if name in inputs
+        if found and name in inputs
     ]
     units = dict(inputs.attrs.get("units", {}))
     problems += [
         f"the unit of {name} in inputs must be N.m, not {units[name]}"
-        for name in named
+        for name in found
         if units.get(name, "N.m") != "N.m"
     ]
-    given = {str(name): column_of(inputs, name, "inputs", problems) for name in inputs.columns}
-    time = given.get("time")
-    if "time" not in given:
-        problems.append("inputs has no column time")
-    elif time is not None and (len(time) < 2 or (np.diff(time) < 0).any()):
-        problems.append("time in inputs must be two finite numbers or more that grow")
-    if problems:
-        raise FmuError("; ".join(problems))
-    assert time is not None
-    commanded = {name: values for name in named if (values := given[name]) is not None}
-    rows = np.flatnonzero(np.diff(time) > 0)  # the intervals, between rows that are no jump
-    # an interval ends early where a wheel reaches its largest speed
-    edges, torques = [], []
-    speeds = {name: [float(wheel.speed)] for name, wheel in named.items()}
-    intervals = []  # row of the table, start and end of each part with constant torques
-    for row in rows:
-        begin, end = float(time[row]), float(time[row + 1])
-        asked = {
-            name: float(np.clip(commanded[name][row], -wheel.max_torque, wheel.max_torque))
-            for name, wheel in named.items()
-        }
-        while begin < end:
-            acting, full = {}, {}  # torques, and times at which wheels reach their largest speed
-            for name, wheel in named.items():
-                rate = -asked[name] / wheel.inertia
-                left = np.copysign(wheel.max_speed, rate) - speeds[name][-1]
-                acting[name] = asked[name] if left * rate > 0 else 0.0
-                if acting[name]:
-                    full[name] = max(begin + left / rate, np.nextafter(begin, np.inf))
-            stop = min([end, *full.values()])
-            edges.append(begin)
-            torques.append(acting)
-            intervals.append((row, begin, stop))
-            for name, wheel in named.items():
-                speed = speeds[name][-1] - acting[name] * (stop - begin) / wheel.inertia
-                if full.get(name, np.inf) <= stop:
-                    speed = float(np.copysign(wheel.max_speed, -acting[name]))
-                speeds[name].append(speed)
-            begin = stop
-    edges.append(float(time[-1]))
-    at = np.array(edges)
-    torque = {name: np.array([one[name] for one in torques]) for name in named}
-    speed = {name: np.array(values) for name, values in speeds.items()}
-    h = np.tile(start, (len(at), 1))
-    for name, wheel in named.items():
-        h += np.outer(wheel.inertia * (speed[name] - wheel.speed), wheel.direction)
-    first = np.array([row for row, _, _ in intervals])
-    begins, ends = (np.array([part[i] for part in intervals]) for i in (1, 2))
-    table = {"time": np.column_stack([begins, ends]).ravel()}
-    for name, values in given.items():
-        if name == "time" or name in named:
-            continue
-        assert values is not None
-        slope = (values[first + 1] - values[first]) / (time[first + 1] - time[first])
-        slope = 0.0 * slope if hold else slope
-        pair = [values[first] + slope * (t - time[first]) for t in (begins, ends)]
-        table[name] = np.column_stack(pair).ravel()
-    for i, name in enumerate(MOMENTUM):
-        table[name] = np.column_stack([h[:-1, i], h[1:, i]]).ravel()
-    frame = pd.DataFrame(table)
-    frame.attrs["units"] = {name: unit for name, unit in units.items() if name in table}
-    named_speed = {speed_name(name): values for name, values in speed.items()}
-    return Histories(frame, at, torque, named_speed)
+    return found
