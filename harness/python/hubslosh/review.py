@@ -740,9 +740,7 @@ def _quantities(
         if (mode := mode_quantity(full)) and (bad := _problem(loops[0], mode)) != NO_MODE and bad:
             problems.append(f"uncertain: {shown} {bad}")
             continue
-        nominals = [
-            _nominal(loop, every, full) for loop, every in zip(loops, given, strict=True)
-        ]
+        nominals = [_nominal(loop, every, full) for loop, every in zip(loops, given, strict=True)]
         limits, problem = _ends(range_, nominals)
         if problem:
             problems.append(f"uncertain: {shown} {problem}")

@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 # Evaluation of one draw: numbers by name, from values by name.
 Outcome = Callable[[dict[str, Any]], Mapping[str, float]]
 
-# (low, high): uniform; a share of a nominal value, such as "10%": uniform; a list: one of its items;
-# a frozen distribution of ``scipy.stats``.
+# (low, high) or a share of a nominal value, such as "10%": uniform; a list: one of its items; a
+# frozen distribution of ``scipy.stats``.
 Range = Any
 
 FAILED = "refused"  # Column that says what the FMU refused
@@ -183,6 +183,8 @@ def monte_carlo(
     progress : bool or callable, optional
         Shows a line on stderr with finished runs and remaining time, by default on a terminal and
         in a notebook; or a function that takes the line.
+    nominal : mapping, optional
+        Nominal values by name, of which ranges such as "10%" are shares.
 
     Returns
     -------

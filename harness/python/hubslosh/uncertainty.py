@@ -34,7 +34,9 @@ does not need goes: each repeated block is reduced to its controllable and obser
 import json
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -79,6 +81,9 @@ _LEAST = {"zeta": 1e-9} | dict.fromkeys(
     ("frequency", "mass", FACTOR, "craft.mass", "craft.Jxx", "craft.Jyy", "craft.Jzz"), 0.01
 )  # fmt: skip
 DRAWS = 500  # Random Δ of the search for the worst case, 0.6 ms each with two tanks
+UNSTABLE = 1 + 1e-9  # Magnitude of a pole; modes that no input moves have no damping there
+# Search for the smallest unstable Δ: steps of δ, factor of the box, and the accuracy of its size.
+FIRST_STEP, LAST_STEP, SHRINK, CLOSE = 0.2, 2e-3, 0.9, 3e-3
 ALONE = 1e-12  # A coefficient below this, relative to others of its kind, is rounding
 
 
@@ -915,8 +920,7 @@ class UncertainModel:
                     data, size = search.certify(*box, most), tried
                 except UnstableError as found:
                     end = float(np.abs(found.delta).max())
-                    worst = self._limit(loop, K, found.delta / end, end)
-                    worst = self._nearby(loop, K, worst)
+                    worst = self._shrunk(loop, K, found.delta, end)
                     continue
                 except ExhaustedError:
                     pass
@@ -961,9 +965,11 @@ class UncertainModel:
         The search uses the exact sampled loop, with its delay. Starting from each lightly damped
         pole, it follows the sign of the derivatives of the pole's damping by each δ, up to ``|δ| =
         largest``, until the signs repeat. It also tries the lines from 0 to each corner of the
-        ranges, or to 64 of the corners if there are more, and random Δ in between. Damping ratios
-        stay at 0 or above. If a Δ is found, 1 divided by its size is a lower bound of µ. If no Δ is
-        found, the loop may still be unstable for some Δ: `certify` proves stability.
+        ranges, or to 64 of the corners if there are more, random Δ in between, and Δ at which two
+        uncertain frequencies are equal. From the smallest unstable Δ it continues the search in
+        boxes that shrink. Damping ratios stay at 0 or above. If a Δ is found, 1 divided by its size
+        is a lower bound of µ. If no Δ is found, the loop may still be unstable for some Δ:
+        `certify` proves stability.
 
         Parameters
         ----------
@@ -1025,46 +1031,115 @@ class UncertainModel:
         for way in corners(len(zero)):
             found = self._limit(loop, K, way, min(best.size, largest), steps=8)
             best = min(best, found, key=lambda case: case.size)
-        return self._nearby(loop, K, self._drawn(loop, K, best, largest))
-
-    def _drawn(self, loop: Loop, K: LinearModel, best: WorstCase, largest: float) -> WorstCase:
-        """Return a smaller Δ among random ones within the size of one, if there is one.
-
-        They find a loop that is unstable only between the corners, as at frequencies at which two
-        slosh modes meet. Half of them have the least damping ratios.
-        """
-        rng = np.random.default_rng(1)
-        damping = [_kind(name) == "zeta" for name in self.deltas]
-        for k in range(DRAWS):
-            size = min(best.size, largest)
-            at = rng.uniform(-size, size, len(self.deltas))
-            at = np.maximum(np.where(damping, -size, at) if k % 2 else at, self._least)
-            try:
-                if np.abs(self._poles(loop, K, at)).max() <= 1 + 1e-9:
-                    continue
-            except FmuError:
-                continue  # no craft any more
-            own = float(np.abs(at).max())
-            way = np.where(at <= self._least, -1.0, at / own)
-            found = self._limit(loop, K, way, own, steps=4)
+        if best.delta:
+            found = self._shrunk(loop, K, self.delta(best.delta), best.size)
+            best = min(best, found, key=lambda case: case.size)
+        size = min(best.size, largest)
+        for at in [*self._meetings(size), self._drawn(loop, K, size)]:
+            found = self._shrunk(loop, K, at, min(best.size, largest))
             best = min(best, found, key=lambda case: case.size)
         return best
 
-    def _nearby(self, loop: Loop, K: LinearModel, best: WorstCase) -> WorstCase:
-        """Return a smaller Δ near one, by changes of its direction, if there is one."""
-        step = 0.5 if np.isfinite(best.size) else 0.0
-        while step > 0.05:
-            start = best.size
-            for move in np.vstack([np.eye(len(self.deltas)), -np.eye(len(self.deltas))]):
-                delta = self.delta(best.delta)
-                way = np.where(delta <= self._least, -1.0, delta / best.size)
-                way = np.clip(way + step * move, -1.0, 1.0)
-                way /= np.abs(way).max()
-                best = min(best, self._limit(loop, K, way, 0.998 * best.size, steps=1),
-                           key=lambda case: case.size)  # fmt: skip
-            if best.size == start:
+    def _drawn(self, loop: Loop, K: LinearModel, size: float) -> Matrix:
+        """Return the least stable of random Δ, of which half have the least damping ratios.
+
+        They find a loop that is unstable only between the corners.
+        """
+        rng = np.random.default_rng(1)
+        damping = [_kind(name) == "zeta" for name in self.deltas]
+        best, found = 0.0, np.zeros(len(self.deltas))
+        for k in range(DRAWS):
+            at = rng.uniform(-size, size, len(self.deltas))
+            at = np.maximum(np.where(damping, -size, at) if k % 2 else at, self._least)
+            with suppress(FmuError):  # no craft any more
+                if (there := float(np.abs(self._poles(loop, K, at)).max())) > best:
+                    best, found = there, at
+        return found
+
+    def _meetings(self, size: float) -> list[Matrix]:
+        """Return Δ at which two uncertain frequencies are equal, if their ranges overlap.
+
+        ``size`` bounds the ranges. Two modes of the same frequency and little damping can be
+        unstable in a part of the ranges that is a thousandth of the whole, so that random Δ miss
+        it. There are three Δ for each pair, over the frequencies that both can have; other
+        parameters are nominal, and damping ratios least.
+        """
+        at = np.where([_kind(name) == "zeta" for name in self.deltas], -size, 0.0)
+        found = []
+        for i, j in combinations(self._frequencies, 2):
+            (a, b), (c, d) = ((self.center[self.deltas[k]], self._radius(k)) for k in (i, j))
+            low, high = max(a - b * size, c - d * size), min(a + b * size, c + d * size)
+            for f in np.linspace(low, high, 3) if low < high else ():
+                at[[i, j]] = (f - a) / b, (f - c) / d
+                found.append(np.maximum(at, self._least))
+        return found
+
+    @property
+    def _frequencies(self) -> list[int]:
+        """Places of the frequencies with a range of their own among the δ."""
+        return [
+            k for k, name in enumerate(self.deltas)
+            if _kind(name) == "frequency" and name in self.spread.index
+        ]  # fmt: skip
+
+    def _radius(self, k: int) -> float:
+        """Return half the range of the parameter that has the δ number k to itself."""
+        return float(self.spread.loc[self.deltas[k], self.deltas[k]])
+
+    def _climbed(self, loop: Loop, K: LinearModel, at: Matrix, size: float) -> tuple[bool, Matrix]:
+        """Return a Δ near one, within a box, at which the loop is less stable; True if unstable.
+
+        A pattern search changes one δ at a time, or two frequencies by the same amount, and ends at
+        the first unstable Δ.
+        """
+        moves = list(np.eye(len(at)))
+        for i, j in combinations(self._frequencies, 2):
+            both = 1 / np.array([self._radius(i), self._radius(j)])
+            move = np.zeros(len(at))
+            move[[i, j]] = both / both.max()
+            moves.append(move)
+        low = np.maximum(-size, self._least)
+
+        def largest(delta: Matrix) -> float:
+            try:
+                return float(np.abs(self._poles(loop, K, delta)).max())
+            except FmuError:
+                return 0.0  # no craft any more
+
+        at = np.clip(at, low, size)
+        best, step = largest(at), FIRST_STEP
+        while step > LAST_STEP and best <= UNSTABLE:
+            start = best
+            for move in [sign * step * move for move in moves for sign in (1.0, -1.0)]:
+                new = np.clip(at + move, low, size)
+                if (new != at).any() and (there := largest(new)) > best:
+                    best, at = there, new
+                if best > UNSTABLE:
+                    break
+            if best <= start + 1e-13:
                 step /= 2
-        return best
+        return best > UNSTABLE, at
+
+    def _shrunk(self, loop: Loop, K: LinearModel, at: Matrix, size: float) -> WorstCase:
+        """Return the smallest Δ at the limit of stability that is found from one in a box.
+
+        The box shrinks as long as the search of `_climbed` finds an unstable Δ in it.
+        """
+        stable = 0.0
+        unstable, at = self._climbed(loop, K, at, size)
+        if not unstable:
+            return WorstCase({}, np.inf, np.nan, {})
+        size = float(np.abs(at).max())
+        while size - stable > CLOSE * size:
+            smaller = max(SHRINK * size, (size + stable) / 2)
+            for start in (at * smaller / size, *self._meetings(smaller)):
+                unstable, near = self._climbed(loop, K, start, smaller)
+                if unstable:
+                    at, size = near, float(np.abs(near).max())
+                    break
+            else:
+                stable = smaller
+        return self._limit(loop, K, at / size, size, steps=64)
 
     def _limit(
         self, loop: Loop, K: LinearModel, way: Matrix, largest: float, steps: int = 24
@@ -1072,9 +1147,8 @@ class UncertainModel:
         """Return the Δ along ``way`` (with largest component 1) at the limit of stability."""
 
         def outside(size: float) -> bool:
-            # 1e-9: modes that no input moves have no damping there
             at = np.maximum(size * way, self._least)
-            return bool(np.abs(self._poles(loop, K, at)).max() > 1 + 1e-9)
+            return bool(np.abs(self._poles(loop, K, at)).max() > UNSTABLE)
 
         low, high = 0.0, largest
         for high in np.linspace(0, largest, steps + 1)[1:]:
