@@ -4,8 +4,8 @@
 use anyhow::Result;
 
 use super::findings::Findings;
-use super::under_test::{FmuUnderTest, Interface, Life, Reading, Session, UnderTest};
-use host::description::Type;
+use super::under_test::{FmuUnderTest, Interface, Session};
+use host::description::{Type, Value};
 use host::fmi2::guarded::Lists;
 
 fn references(fmu: &FmuUnderTest, kinds: &[Type]) -> Vec<u32> {
@@ -15,8 +15,8 @@ fn references(fmu: &FmuUnderTest, kinds: &[Type]) -> Vec<u32> {
 
 fn lists(session: &mut Session) -> Result<Lists> {
     let fmu = session.fmu;
-    let d = fmu.description();
-    let interface = session.interface;
+    let d = fmu.description;
+    let interface = session.using.interface;
     let mut lists = Lists {
         reals: references(fmu, &[Type::Real]),
         integers: references(fmu, &[Type::Integer, Type::Enumeration]),
@@ -26,7 +26,7 @@ fn lists(session: &mut Session) -> Result<Lists> {
         ..Lists::default()
     };
     for v in &fmu.inputs {
-        if let Reading::Real(x) = session.get(v)? {
+        if let Value::Real(x) = session.get(v)? {
             lists.inputs.push((v.reference, x));
         }
     }
@@ -54,8 +54,8 @@ fn lists(session: &mut Session) -> Result<Lists> {
             }
         }
         Interface::ModelExchange => {
-            lists.states = Some(fmu.states().len());
-            lists.indicators = Some(session.indicators());
+            let (states, indicators) = session.sizes()?;
+            (lists.states, lists.indicators) = (Some(states), Some(indicators));
         }
     }
     Ok(lists)
@@ -69,18 +69,13 @@ pub fn arrays(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             continue;
         }
         let lists = lists(&mut session)?;
-        fmu.announce(format!(
-            "calls with margins around their arrays ({})",
-            FmuUnderTest::name(interface)
-        ));
+        fmu.announce(format!("calls with margins around their arrays ({interface})"));
         for write in session.instance.find_stray_writes(&lists) {
-            findings
-                .at(format!("{}, {} ({})", write.call, write.array, FmuUnderTest::name(interface)))
-                .add(format!(
-                    "{} (allowed: to write as many values as the call says, into what is to be \
+            findings.at(format!("{}, {} ({interface})", write.call, write.array)).add(format!(
+                "{} (allowed: to write as many values as the call says, into what is to be \
                      written)",
-                    write.fault
-                ));
+                write.fault
+            ));
         }
     }
     Ok(())

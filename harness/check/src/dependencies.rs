@@ -11,11 +11,10 @@ use anyhow::Result;
 
 use super::description::{Unknown, Variable};
 use super::findings::Findings;
-use super::loaded::skip;
-use super::under_test::{FmuUnderTest, Interface, Life, Reading, Session, UnderTest, start_value};
+use super::under_test::{FmuUnderTest, Interface, Session, skip, start_value};
 use super::values::items;
 use host::causality::Causality;
-use host::description::Type;
+use host::description::{Type, Value};
 
 /// Largest number of initial points that are tried before a declared feedthrough counts as missing in the
 /// binary.
@@ -58,32 +57,32 @@ pub fn random_session<'f>(
         }
         let (min, max) = v.bounds();
         let value = match start {
-            Reading::Real(0.0) => {
+            Value::Real(0.0) => {
                 let span = if max.is_finite() { max.min(1.0) } else { v.nominal().min(1.0) };
                 let size = 0.2 * span * 10f64.powf(-5.0 * random.f64());
                 let moved = if random.bool() { size } else { -size };
-                Reading::Real(moved.max(min).min(max.max(min)))
+                Value::Real(moved.max(min).min(max.max(min)))
             }
-            Reading::Real(x) => {
+            Value::Real(x) => {
                 // Some effects show only near zero, for example friction at rest.
                 let share = if random.f64() < NEXT_TO_NOTHING { 0.01 } else { 1.0 };
                 let moved = share * x * (0.7 + 0.6 * random.f64());
-                Reading::Real(moved.max(min).min(max.max(min)))
+                Value::Real(moved.max(min).min(max.max(min)))
             }
-            Reading::Integer(_) if v.kind == Type::Enumeration => {
+            Value::Integer(_) if v.kind == Type::Enumeration => {
                 let items = items(fmu, v);
                 match random.choice(&items) {
-                    Some(item) => Reading::Integer(*item),
+                    Some(item) => Value::Integer(*item),
                     None => continue,
                 }
             }
             // Bounds are drawn more often than values between them.
-            Reading::Integer(_) if max - min <= 1e6 => {
+            Value::Integer(_) if max - min <= 1e6 => {
                 let inside = min + ((max - min + 1.0) * random.f64()).floor();
                 let all = [min, max, max, inside];
-                Reading::Integer(random.choice(all).unwrap_or(min) as i32)
+                Value::Integer(random.choice(all).unwrap_or(min) as i64)
             }
-            Reading::Boolean(_) => Reading::Boolean(random.bool().into()),
+            Value::Boolean(_) => Value::Boolean(random.bool().into()),
             _ => continue,
         };
         // A value that the FMU refuses keeps its old value.
@@ -93,9 +92,9 @@ pub fn random_session<'f>(
 }
 
 /// Returns true if two readings of `v` differ by more than rounding.
-fn has_moved(v: &Variable, a: &Reading, b: &Reading) -> bool {
+fn has_moved(v: &Variable, a: &Value, b: &Value) -> bool {
     match (a, b) {
-        (Reading::Real(a), Reading::Real(b)) => {
+        (Value::Real(a), Value::Real(b)) => {
             let size = a.abs().max(b.abs()).max(1e-3 * v.nominal());
             (a - b).abs() > ROUNDING * size
         }
@@ -119,8 +118,8 @@ impl Seen {
         &mut self,
         unknowns: &[&Variable],
         known: &Variable,
-        before: &[Reading],
-        after: &[Reading],
+        before: &[Value],
+        after: &[Value],
     ) {
         self.moved.insert(known.key);
         for ((unknown, before), after) in unknowns.iter().zip(before).zip(after) {
@@ -160,23 +159,23 @@ impl Seen {
 }
 
 fn name(fmu: &FmuUnderTest, key: u32) -> &str {
-    fmu.description().at(key).map_or("?", |v| v.name.as_str())
+    fmu.description.at(key).map_or("?", |v| v.name.as_str())
 }
 
-fn read(session: &mut Session, variables: &[&Variable]) -> Result<Vec<Reading>> {
+fn read(session: &mut Session, variables: &[&Variable]) -> Result<Vec<Value>> {
     variables.iter().map(|v| Ok(session.get(v)?)).collect()
 }
 
 pub fn running(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let d = fmu.description();
+    let d = fmu.description;
     let lists: Vec<&Unknown> = d.running_unknowns().collect();
     observe(fmu, &BTreeSet::new())?.report(fmu, &lists, "while running", findings);
     Ok(())
 }
 
 pub fn feedthrough(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let d = fmu.description();
-    if !fmu.interfaces().contains(&Interface::ModelExchange) {
+    let d = fmu.description;
+    if !fmu.has(Interface::ModelExchange) {
         return skip("in Co-Simulation an output may wait for the next step to follow its inputs");
     }
     let is_input = |key: u32| d.at(key).is_some_and(|v| v.causality == Causality::Input);
@@ -204,13 +203,13 @@ pub fn feedthrough(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 /// outputs and derivatives. Stops early when all pairs of `wanted` have been observed. Skips the rule if
 /// there is nothing to observe.
 fn observe(fmu: &FmuUnderTest, wanted: &BTreeSet<(u32, u32)>) -> Result<Seen> {
-    let d = fmu.description();
+    let d = fmu.description;
     let lists: Vec<&Unknown> = d.running_unknowns().collect();
     let unknowns: Vec<&Variable> = lists.iter().filter_map(|u| d.variable_of(u)).collect();
     if unknowns.is_empty() {
         return skip("the FMU has neither outputs nor derivatives");
     }
-    let exchange = fmu.interfaces().contains(&Interface::ModelExchange);
+    let exchange = fmu.has(Interface::ModelExchange);
     let interface = if exchange { Interface::ModelExchange } else { fmu.first_interface()? };
     let inputs: Vec<_> =
         fmu.variables().iter().filter(|v| v.causality == Causality::Input).collect();
@@ -244,8 +243,7 @@ fn observe(fmu: &FmuUnderTest, wanted: &BTreeSet<(u32, u32)>) -> Result<Seen> {
         }
         if exchange && !states.is_empty() {
             fmu.announce(format!("moving states one by one, try {attempt}"));
-            let mut x = vec![0.0; states.len()];
-            session.instance.continuous_states(&mut x)?;
+            let x = session.states()?;
             for (n, (_, state)) in states.iter().enumerate() {
                 let mut there = x.clone();
                 there[n] += share * x[n].abs().max(0.1 * state.nominal());
@@ -268,16 +266,16 @@ fn observe(fmu: &FmuUnderTest, wanted: &BTreeSet<(u32, u32)>) -> Result<Seen> {
 
 /// Returns another allowed value for `v`, about `share` of its magnitude away, or `None` if its bounds leave
 /// no room.
-pub fn displaced(fmu: &FmuUnderTest, v: &Variable, now: &Reading, share: f64) -> Option<Reading> {
-    let Reading::Real(x) = now else { return super::values::other_value(fmu, v, now) };
+pub fn displaced(fmu: &FmuUnderTest, v: &Variable, now: &Value, share: f64) -> Option<Value> {
+    let Value::Real(x) = now else { return super::values::other_value(fmu, v, now) };
     let (min, max) = v.bounds();
     let step = share * x.abs().max(0.1 * v.nominal().min(max.abs()));
     let there = if x + step <= max { x + step } else { x - step };
-    (there >= min && there != *x).then_some(Reading::Real(there))
+    (there >= min && there != *x).then_some(Value::Real(there))
 }
 
 pub fn initial(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let d = fmu.description();
+    let d = fmu.description;
     let lists: Vec<&Unknown> = d.unknowns(d.words.initial_unknowns).collect();
     let unknowns: Vec<&Variable> = lists.iter().filter_map(|u| d.variable_of(u)).collect();
     if unknowns.is_empty() {
@@ -316,8 +314,8 @@ pub fn directional(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     /// largest derivative of the unknown. Finite differences lose half of the digits, and more where the
     /// function is curved.
     const AGREE: f64 = 1e-3;
-    let d = fmu.description();
-    if !fmu.interfaces().contains(&Interface::ModelExchange)
+    let d = fmu.description;
+    if !fmu.has(Interface::ModelExchange)
         || !fmu.can(Interface::ModelExchange, "providesDirectionalDerivative")
     {
         return skip(
@@ -334,8 +332,7 @@ pub fn directional(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let inputs = &fmu.inputs;
     let mut session = fmu.running(Interface::ModelExchange)?;
     session.advance(3)?;
-    let mut x = vec![0.0; states.len()];
-    session.instance.continuous_states(&mut x)?;
+    let x = session.states()?;
     let knowns = inputs
         .iter()
         .map(|v| (*v, None))
@@ -352,10 +349,10 @@ pub fn directional(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             }
         };
         let now = session.get(v)?;
-        let Reading::Real(here) = now else { continue };
+        let Value::Real(here) = now else { continue };
         let values = |session: &mut Session, there: f64| -> Result<Vec<f64>> {
             match place {
-                None => session.set(v, &Reading::Real(there))?,
+                None => session.set(v, &Value::Real(there))?,
                 Some(n) => {
                     let mut moved = x.clone();
                     moved[n] = there;

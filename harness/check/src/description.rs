@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 use super::findings::Findings;
 use host::causality::{Causality, Variability};
-use host::description::{CType, Type};
+use host::description::{CType, Type, starts};
 use host::xml::{Element, Fault};
 
 /// Names in modelDescription.xml that differ between the versions of FMI.
@@ -196,7 +196,7 @@ impl Description {
                 .filter(|element| element.name == "ScalarVariable")
                 .zip(1..)
                 .filter_map(|(element, key)| {
-                    let of_fmi2 = |child: &&Element| c_type(words, &child.name).is_some();
+                    let of_fmi2 = |child: &&Element| CType::from_child_name(&child.name).is_some();
                     let typed = element.children.iter().find(of_fmi2).cloned();
                     let typed =
                         typed.unwrap_or(Element { name: "Real".into(), ..Element::default() });
@@ -303,21 +303,6 @@ impl Description {
     }
 }
 
-/// Returns the types that the name of a variable's element stands for.
-fn c_type(words: &Words, name: &str) -> Option<(CType, Type)> {
-    if words.version == "3.0" {
-        return CType::from_element_name(name);
-    }
-    Some(match name {
-        "Real" => (CType::Float64, Type::Real),
-        "Integer" => (CType::Int32, Type::Integer),
-        "Boolean" => (CType::Boolean, Type::Boolean),
-        "String" => (CType::String, Type::String),
-        "Enumeration" => (CType::Int32, Type::Enumeration),
-        _ => return None,
-    })
-}
-
 /// Reads a variable; in FMI 2.0 the caller corrects the key. `types` are the declared types by name, from which
 /// missing attributes are inherited, and `sizes` the start values of structural parameters by value reference.
 fn variable(
@@ -327,7 +312,11 @@ fn variable(
     types: &BTreeMap<&str, &Element>,
     sizes: &BTreeMap<&str, usize>,
 ) -> Option<Variable> {
-    let (c_type, kind) = c_type(words, &typed.name)?;
+    let is_fmi3 = words.version == "3.0";
+    let (c_type, kind) = match is_fmi3 {
+        true => CType::from_element_name(&typed.name),
+        false => CType::from_child_name(&typed.name),
+    }?;
     let declared = typed.get("declaredType").and_then(|name| types.get(name)).copied();
     for (name, value) in declared.iter().flat_map(|declared| &declared.attributes) {
         if typed.get(name).is_none() {
@@ -337,23 +326,18 @@ fn variable(
     let text = |name: &str, default: &str| element.get(name).unwrap_or(default).trim().to_string();
     let causality = text("causality", "local");
     let default = match kind {
-        _ if words.version == "3.0" && causality.to_lowercase().ends_with("parameter") => "fixed",
+        _ if is_fmi3 && causality.to_lowercase().ends_with("parameter") => "fixed",
         Type::Real => "continuous",
         _ => "discrete",
     };
     let causality = Causality::from(&*causality);
     let variability = Variability::from(&*text("variability", default));
     let default = (words.initials)(&causality, &variability).and_then(|all| all.first());
-    let children = |name: &'static str| element.children.iter().filter(move |c| c.name == name);
-    let start = typed.get("start").map(String::from);
-    let starts = match (words.version, kind) {
-        ("3.0", Type::String | Type::Binary) => {
-            children("Start").map(|c| c.get("value").unwrap_or_default().into()).collect()
-        }
-        ("3.0", _) => start.iter().flat_map(|s| s.split_whitespace()).map(String::from).collect(),
-        _ => start.into_iter().collect(),
+    let starts = match is_fmi3 {
+        true => starts(element, c_type),
+        false => typed.get("start").map(String::from).into_iter().collect(),
     };
-    let dimensions = children("Dimension").map(|d| {
+    let dimensions = element.children.iter().filter(|child| child.name == "Dimension").map(|d| {
         let size = || sizes.get(d.get("valueReference")?.trim()).copied();
         number(d, "start").or_else(size).unwrap_or(1)
     });

@@ -13,10 +13,8 @@ use anyhow::Result;
 
 use super::dependencies::random_session;
 use super::description::Variable;
-use super::exchange::continuous;
 use super::findings::Findings;
-use super::loaded::skip;
-use super::under_test::{FmuUnderTest, Interface, Life, Observed, STEPS, Session};
+use super::under_test::{FmuUnderTest, Interface, Observed, STEPS, Session, skip};
 
 /// Number of initial points from which the FMU is simulated. The first point has the declared start values, all further
 /// points have parameters drawn at random.
@@ -27,7 +25,7 @@ const ROUNDING: f64 = 1e-9;
 const NEARLY_DUE: f64 = 1e-6;
 
 pub fn missed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    continuous(fmu)?;
+    fmu.exchanging()?;
     let (mut vary, mut step_event) = (false, None);
     for start in 0..STARTS {
         let mut session = random_session(fmu, Interface::ModelExchange, start)?;
@@ -36,7 +34,7 @@ pub fn missed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             continue;
         }
         let missed = missed_event(&mut session, &mut vary);
-        step_event = step_event.or(session.step_event.clone());
+        step_event = step_event.or(session.notes.step_event.clone());
         if let Ok(Some((time, name, change))) = missed {
             findings.at(format!("event mode at t = {time:?} s, start {start}")).add(format!(
                 "{name} goes from {change}: an event of which the host is not told (allowed: an \
@@ -64,7 +62,7 @@ fn missed_event<'f>(
     vary: &mut bool,
 ) -> Result<Option<(f64, &'f str, String)>> {
     let fmu = session.fmu;
-    let indicators = session.read_indicators()?;
+    let indicators = session.indicators()?;
     // A model without event indicators has no state events.
     *vary |= indicators.is_empty();
     for _ in 0..2 * STEPS {
@@ -79,7 +77,7 @@ fn missed_event<'f>(
         if session.is_ended() {
             break;
         }
-        *vary |= session.read_indicators()? != indicators;
+        *vary |= session.indicators()? != indicators;
         let near = NEARLY_DUE * session.step;
         if session.next_event.is_some_and(|next| next - session.time < near) {
             continue;
@@ -102,7 +100,7 @@ fn missed_event<'f>(
 }
 
 pub fn values_changed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    continuous(fmu)?;
+    fmu.exchanging()?;
     if fmu.states().is_empty() {
         return skip("the FMU has no continuous states");
     }
@@ -113,7 +111,7 @@ pub fn values_changed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
         }
         // Failures to get this far are reported by `exchange.run`.
         let _ = session.advance(2 * STEPS);
-        if let Some((time, n, before, after)) = session.hidden_jump {
+        if let Some((time, n, before, after)) = session.notes.hidden_jump {
             findings.at(format!("the event at t = {time:?} s, start {start}")).add(format!(
                     "{} goes from {before:?} to {after:?}, and valuesOfContinuousStatesChanged of \
                      fmi2NewDiscreteStates is false (allowed: true, or the host goes on from its own \
@@ -127,19 +125,17 @@ pub fn values_changed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
 }
 
 pub fn nominals(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let mut session = continuous(fmu)?;
+    let mut session = fmu.exchanging()?;
     let states = fmu.states();
     let declared = |v: &Variable| v.typed.number("nominal").is_some();
     if !states.iter().any(|(_, state)| declared(state)) {
         return skip("no continuous state has a nominal");
     }
-    if session.nominals_changed {
+    if session.notes.nominals_changed {
         return skip("nominalsOfContinuousStatesChanged: they are others than at the start");
     }
-    let mut nominals = vec![f64::NAN; states.len()];
     fmu.announce("fmi2GetNominalsOfContinuousStates");
-    session.instance.nominals(&mut nominals)?;
-    for ((_, state), given) in states.iter().zip(nominals) {
+    for ((_, state), given) in states.iter().zip(session.nominals()?) {
         let written = state.nominal();
         if declared(state) && (given - written).abs() > ROUNDING * written {
             findings.at(state.place()).add(format!(

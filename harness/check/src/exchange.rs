@@ -4,26 +4,20 @@ use anyhow::Result;
 
 use super::findings::Findings;
 use super::life::expect_refusal;
-use super::loaded::skip;
-use super::under_test::{FmuUnderTest, Interface, Life, Reading, STEPS, Session, UnderTest};
-
-/// Returns an instance in continuous-time mode, or skips the rule if the FMU has no Model Exchange.
-pub fn continuous(fmu: &FmuUnderTest) -> Result<Session<'_>> {
-    if !fmu.interfaces().contains(&Interface::ModelExchange) {
-        return skip("the FMU offers no Model Exchange");
-    }
-    fmu.running(Interface::ModelExchange)
-}
+use super::under_test::{FmuUnderTest, Interface, STEPS, Session, skip};
+use host::description::Value;
 
 pub fn run(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let mut session = continuous(fmu)?;
+    let mut session = fmu.exchanging()?;
     session.advance(2 * STEPS)?;
-    let readings = session.readings()?;
-    for (v, reading) in fmu.variables().iter().zip(readings) {
-        if let Reading::Real(x) = reading
-            && !x.is_finite()
-        {
-            findings.at(v.place()).add(format!("it is {x} after {} steps", 2 * STEPS));
+    report_not_finite(&mut session, &format!("after {} steps", 2 * STEPS), findings)
+}
+
+/// Reports the variables that are NaN or infinite at the end of a run.
+pub fn report_not_finite(session: &mut Session, when: &str, findings: &mut Findings) -> Result<()> {
+    for (v, values) in session.fmu.readable().zip(session.readings()?) {
+        if let Some(x) = values.iter().map(Value::number).find(|x| v.is_real() && !x.is_finite()) {
+            findings.at(v.place()).add(format!("it is {x} {when}"));
         }
     }
     Ok(())
@@ -31,14 +25,14 @@ pub fn run(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 
 pub fn event_iteration(fmu: &FmuUnderTest, _: &mut Findings) -> Result<()> {
     // Other failures are reported by other rules.
-    let mut session = continuous(fmu)?;
+    let mut session = fmu.exchanging()?;
     session.advance(2 * STEPS)
 }
 
 pub fn next_event_time(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let mut session = continuous(fmu)?;
+    let mut session = fmu.exchanging()?;
     session.advance(2 * STEPS)?;
-    if let Some((time, next)) = session.past_event {
+    if let Some((time, next)) = session.notes.past_event {
         findings.at(format!("fmi2NewDiscreteStates at t = {time:?} s")).add(format!(
             "nextEventTime is {next:?} (allowed: a later time, if nextEventTimeDefined)"
         ));
@@ -47,7 +41,7 @@ pub fn next_event_time(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()
 }
 
 pub fn terminate_simulation(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    if !fmu.interfaces().contains(&Interface::ModelExchange) {
+    if !fmu.has(Interface::ModelExchange) {
         return skip("the FMU offers no Model Exchange");
     }
     let mut session = fmu.session(Interface::ModelExchange)?;
@@ -56,29 +50,18 @@ pub fn terminate_simulation(fmu: &FmuUnderTest, findings: &mut Findings) -> Resu
 }
 
 pub fn vectors(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let mut session = continuous(fmu)?;
-    let (nx, ni) = (fmu.states().len(), session.indicators());
+    let mut session = fmu.exchanging()?;
+    let (nx, ni) = session.sizes()?;
     for moved in [false, true] {
         if moved {
             session.advance(3)?;
         }
-        let (mut x, mut dx, mut nominals, mut z) =
-            (vec![f64::NAN; nx], vec![f64::NAN; nx], vec![f64::NAN; nx], vec![f64::NAN; ni]);
         fmu.announce(format!("the vectors of {nx} states and {ni} event indicators"));
-        // Hosts do not ask for states or indicators if there are none.
-        if nx > 0 {
-            session.instance.continuous_states(&mut x)?;
-            session.instance.derivatives(&mut dx)?;
-            session.instance.nominals(&mut nominals)?;
-        }
-        if ni > 0 {
-            session.instance.event_indicators(&mut z)?;
-        }
         for (call, values, above_0) in [
-            ("fmi2GetContinuousStates", x, false),
-            ("fmi2GetDerivatives", dx, false),
-            ("fmi2GetNominalsOfContinuousStates", nominals, true),
-            ("fmi2GetEventIndicators", z, false),
+            ("fmi2GetContinuousStates", session.states()?, false),
+            ("fmi2GetDerivatives", session.derivatives()?, false),
+            ("fmi2GetNominalsOfContinuousStates", session.nominals()?, true),
+            ("fmi2GetEventIndicators", session.indicators()?, false),
         ] {
             let fits = |x: f64| x.is_finite() && (!above_0 || x > 0.0);
             if let Some(n) = values.iter().position(|x| !fits(*x)) {
@@ -98,8 +81,8 @@ pub fn vectors(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 }
 
 pub fn lengths(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let mut session = continuous(fmu)?;
-    let (nx, ni) = (fmu.states().len(), session.indicators());
+    let mut session = fmu.exchanging()?;
+    let (nx, ni) = session.sizes()?;
     let place = |call: &str, n: usize, right: usize| {
         let place = format!("{call} with room for {n} numbers instead of {right}");
         fmu.announce(&place);
@@ -119,22 +102,20 @@ pub fn lengths(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 }
 
 pub fn variables(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let mut session = continuous(fmu)?;
+    let mut session = fmu.exchanging()?;
     let states = fmu.states();
     if states.is_empty() {
         return skip("the FMU has no continuous states");
     }
     session.advance(3)?;
-    let (mut x, mut dx) = (vec![0.0; states.len()], vec![0.0; states.len()]);
     fmu.announce("fmi2GetContinuousStates and fmi2GetDerivatives");
-    session.instance.continuous_states(&mut x)?;
-    session.instance.derivatives(&mut dx)?;
+    let (x, dx) = (session.states()?, session.derivatives()?);
     for (n, (derivative, state)) in states.iter().enumerate() {
         for (v, vector, call) in
             [(state, x[n], "fmi2GetContinuousStates"), (derivative, dx[n], "fmi2GetDerivatives")]
         {
             let read = session.get(v)?;
-            if !read.is_identical(&Reading::Real(vector)) {
+            if !read.is_identical(&Value::Real(vector)) {
                 findings.at(v.place()).add(format!(
                     "it reads {read}, but {call} gives {vector:?} in place {}",
                     n + 1

@@ -6,9 +6,10 @@ const KEPT: usize = 1000;
 
 /// Severity of a broken rule: an error is forbidden by the standard or makes hosts fail; a warning makes some
 /// importers fail or leaves their users without a useful message.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
+    #[default]
     Error,
     Warning,
 }
@@ -29,7 +30,7 @@ pub struct Finding {
     pub text: String,
 }
 
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Findings {
     pub(crate) severity: Severity,
     pub list: Vec<Finding>,
@@ -44,14 +45,7 @@ pub struct Findings {
 
 impl Findings {
     pub fn new(severity: Severity) -> Findings {
-        Findings {
-            severity,
-            list: Vec::new(),
-            more: 0,
-            skipped: None,
-            reported_by: None,
-            stopped_at: None,
-        }
+        Findings { severity, ..Findings::default() }
     }
 
     /// Begins a finding at `place`; the methods of the returned value add its text.

@@ -21,7 +21,7 @@
 use anyhow::Result;
 use nalgebra::{DMatrix, DVector, Dyn, LU};
 
-use super::under_test::{Session, Unusable};
+use super::under_test::{Session, Tested, Unusable};
 use host::fmi2::{CallError, Status};
 
 /// Relative tolerance of a step. It is loose, because the check needs a plausible trajectory and not an
@@ -64,18 +64,20 @@ enum Impossible {
     Inexact(f64),
 }
 
-impl Session<'_> {
+impl<V: Tested> Session<'_, V> {
     /// Integrates to `end`, or as far as the allowed number of steps goes, and handles events on the way.
     ///
     /// # Errors
     ///
     /// If the FMU refuses a call, or no step is short enough.
     pub(super) fn integrate(&mut self, end: f64) -> Result<()> {
-        let (n, start) = (self.states(), self.time);
+        let start = self.time;
+        let magnitudes = V::magnitudes(self)?;
+        let n = magnitudes.len();
         let whole = end - start;
         let mut h = whole / PARTS;
         let mut jacobian: Option<DMatrix<f64>> = None;
-        let mut z = self.read_indicators()?;
+        let mut z = self.indicators()?;
         for step in 0..MOST_STEPS {
             if self.time >= end || self.is_ended() {
                 break;
@@ -84,9 +86,9 @@ impl Session<'_> {
                 // Begin again with a Jacobian and with a new initial step.
                 h = (end - self.time) / PARTS;
             }
-            let (t, x) = (self.time, self.read_states(n)?);
+            let (t, x) = (self.time, DVector::from_vec(self.states()?));
             if step >= EXPLICIT_STEPS && n <= MOST_STATES {
-                jacobian = Some(self.jacobian(t, &x)?);
+                jacobian = Some(self.jacobian(t, &x, &magnitudes)?);
             }
             // If no step is possible, the reason is that of the shortest step, which was tried last.
             let mut why = None;
@@ -99,15 +101,16 @@ impl Session<'_> {
                 if to - t < shortest && !last {
                     return Err(self.diverges(t, &x, why));
                 }
-                let (x_new, error) = match self.trial(t, &x, to - t, jacobian.as_ref())? {
-                    Trial::Impossible(reason) => {
-                        why = Some(reason);
-                        self.go_to(t, &x)?;
-                        h = (to - t) / 4.0;
-                        continue;
-                    }
-                    Trial::Done(x_new, error) => (x_new, error),
-                };
+                let (x_new, error) =
+                    match self.trial(t, &x, to - t, jacobian.as_ref(), &magnitudes)? {
+                        Trial::Impossible(reason) => {
+                            why = Some(reason);
+                            self.go_to(t, &x)?;
+                            h = (to - t) / 4.0;
+                            continue;
+                        }
+                        Trial::Done(x_new, error) => (x_new, error),
+                    };
                 let factor = (0.8 * error.powf(-1.0 / 3.0)).clamp(0.2, 5.0);
                 if error > 1.0 {
                     why = Some(Impossible::Inexact(error));
@@ -116,7 +119,7 @@ impl Session<'_> {
                     continue;
                 }
                 self.go_to(to, &x_new)?;
-                let z_new = self.read_indicators()?;
+                let z_new = self.indicators()?;
                 let crossed = z.iter().zip(&z_new).any(|(a, b)| (*a > 0.0) != (*b > 0.0));
                 if crossed && to - t > LOCATED * whole {
                     self.go_to(t, &x)?;
@@ -126,8 +129,8 @@ impl Session<'_> {
                 self.time = to;
                 // A step that was shortened to end in time gives no reason to shorten the next one.
                 h = if last { h.max((to - t) * factor) } else { (to - t) * factor };
-                self.complete_step(crossed)?;
-                z = if crossed { self.read_indicators()? } else { z_new };
+                V::complete_step(self, crossed)?;
+                z = if crossed { self.indicators()? } else { z_new };
                 break;
             }
         }
@@ -142,6 +145,7 @@ impl Session<'_> {
         x: &DVector<f64>,
         h: f64,
         jacobian: Option<&DMatrix<f64>>,
+        magnitudes: &[f64],
     ) -> Result<Trial> {
         let d = 1.0 / (2.0 + 2f64.sqrt());
         let e = 6.0 + 2f64.sqrt();
@@ -173,7 +177,7 @@ impl Session<'_> {
         let error = (k1 - k2 * 2.0 + k3) * (h / 6.0);
         let mut worst: f64 = 0.0;
         for i in 0..n {
-            let scale = x[i].abs().max(x_new[i].abs()).max(self.nominal(i));
+            let scale = x[i].abs().max(x_new[i].abs()).max(magnitudes[i]);
             worst = worst.max(error[i].abs() / (TOLERANCE * scale));
         }
         Ok(Trial::Done(x_new, worst))
@@ -210,13 +214,13 @@ impl Session<'_> {
 
     /// Computes the Jacobian by forward differences. A column that cannot be evaluated is set to 0, which
     /// only makes the method converge more slowly.
-    fn jacobian(&mut self, t: f64, x: &DVector<f64>) -> Result<DMatrix<f64>> {
+    fn jacobian(&mut self, t: f64, x: &DVector<f64>, magnitudes: &[f64]) -> Result<DMatrix<f64>> {
         let n = x.len();
         let mut jacobian = DMatrix::zeros(n, n);
         if let Ok(f) = self.derivatives_at(t, x)? {
             for j in 0..n {
                 let mut moved = x.clone();
-                let dx = f64::EPSILON.sqrt() * x[j].abs().max(self.nominal(j));
+                let dx = f64::EPSILON.sqrt() * x[j].abs().max(magnitudes[j]);
                 moved[j] += dx;
                 if let Ok(there) = self.derivatives_at(t, &moved)? {
                     jacobian.set_column(j, &((there - &f) / (moved[j] - x[j])));
@@ -225,22 +229,6 @@ impl Session<'_> {
         }
         self.go_to(t, x)?;
         Ok(jacobian)
-    }
-
-    pub(super) fn read_states(&mut self, n: usize) -> Result<DVector<f64>> {
-        let mut x = DVector::zeros(n);
-        if n > 0 {
-            self.instance.continuous_states(x.as_mut_slice())?;
-        }
-        Ok(x)
-    }
-
-    pub(super) fn read_indicators(&mut self) -> Result<Vec<f64>> {
-        let mut z = vec![0.0; self.indicators()];
-        if !z.is_empty() {
-            self.instance.event_indicators(&mut z)?;
-        }
-        Ok(z)
     }
 
     fn try_go_to(&mut self, t: f64, x: &DVector<f64>) -> Result<(), CallError> {
@@ -262,6 +250,6 @@ impl Session<'_> {
             "the states cannot be followed past t = {t:?} s however short the step: {why} (largest \
              state {largest:.1e})"
         );
-        Unusable { rule: "exchange.run", why }.into()
+        Unusable { rule: V::EXCHANGE_RUNS, why }.into()
     }
 }

@@ -12,7 +12,8 @@ use anyhow::Result;
 use super::dependencies::random_session;
 use super::description::{Unknown, Variable};
 use super::findings::Findings;
-use super::under_test::{FmuUnderTest, Interface, Life, Reading, Session};
+use super::under_test::{FmuUnderTest, Interface, Session};
+use host::description::Value;
 
 const STARTS: u64 = 12;
 /// Allowed relative difference of two measured factors.
@@ -41,7 +42,7 @@ fn pairs<'d>(
     list: &'static str,
     unknowns: impl Iterator<Item = &'d Unknown>,
 ) -> Vec<Pair<'d>> {
-    let d = fmu.description();
+    let d = fmu.description;
     let mut pairs = Vec::new();
     for u in unknowns {
         let Some(unknown) = d.variable_of(u).filter(|v| v.is_continuous()) else { continue };
@@ -70,15 +71,14 @@ impl Factor {
 /// Sets a known variable to `x`. Returns false if the FMU refuses or changes the value.
 fn set_known(session: &mut Session, known: &Variable, x: f64) -> Result<bool> {
     let fmu = session.fmu;
-    if session.interface == Interface::ModelExchange
+    if session.using.interface == Interface::ModelExchange
         && let Some(n) = fmu.states().iter().position(|(_, state)| state.key == known.key)
     {
-        let mut all = vec![0.0; session.states()];
-        session.instance.continuous_states(&mut all)?;
+        let mut all = session.states()?;
         all[n] = x;
         return Ok(session.instance.set_continuous_states(&all).is_ok());
     }
-    Ok(session.set(known, &Reading::Real(x)).is_ok())
+    Ok(session.set(known, &Value::Real(x)).is_ok())
 }
 
 fn factor(session: &mut Session, pair: &Pair, share: f64) -> Result<Option<Factor>> {
@@ -111,7 +111,7 @@ fn at_points(
 ) -> Result<Vec<Option<Factor>>> {
     let fmu = session.fmu;
     let mut first_factors = vec![None; pairs.len()];
-    let exchange = session.interface == Interface::ModelExchange;
+    let exchange = session.using.interface == Interface::ModelExchange;
     let stepping = !exchange && !initializing;
     let mut random = fastrand::Rng::with_seed(1);
     for point in 0..3 {
@@ -121,8 +121,7 @@ fn at_points(
         if point > 0 && exchange && !initializing {
             // Other states, with no event in between.
             let states = fmu.states();
-            let mut x = vec![0.0; states.len()];
-            session.instance.continuous_states(&mut x)?;
+            let mut x = session.states()?;
             let here = x.clone();
             for (x, (_, state)) in x.iter_mut().zip(&states) {
                 *x += 0.3 * (2.0 * random.f64() - 1.0) * x.abs().max(0.1 * state.nominal());
@@ -153,17 +152,17 @@ fn at_points(
 }
 
 pub fn kinds(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let d = fmu.description();
+    let d = fmu.description;
     let initial = pairs(fmu, "InitialUnknowns", d.unknowns(d.words.initial_unknowns));
     let mut running = pairs(fmu, "Outputs", d.unknowns(d.words.outputs));
     running.extend(pairs(fmu, "Derivatives", d.unknowns(d.words.derivatives)));
     let mut interface = Interface::ModelExchange;
-    if !fmu.interfaces().contains(&interface) {
+    if !fmu.has(interface) {
         interface = Interface::CoSimulation;
         // Between two steps of Co-Simulation there may be events, which may change the factor.
         running.retain(|pair| pair.kind != "discrete");
     }
-    if !running.is_empty() && fmu.interfaces().contains(&interface) {
+    if !running.is_empty() && fmu.has(interface) {
         look(fmu, findings, &running, interface, false)?;
     }
     if !initial.is_empty() {

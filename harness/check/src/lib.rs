@@ -19,7 +19,6 @@ pub mod json;
 pub mod junit;
 pub mod kinds;
 pub mod life;
-pub mod loaded;
 pub mod log;
 pub mod memory;
 pub mod options;
@@ -64,25 +63,17 @@ pub use self::rule::{Check, Rule};
 pub use self::rules::fmi2::RULES;
 pub use self::under_test::FmuUnderTest;
 
-#[derive(Debug, serde::Serialize)]
+/// A rule of one version of FMI.
+#[derive(serde::Serialize)]
 pub struct Statement {
     fmi: &'static str,
-    rule: &'static str,
-    title: &'static str,
-    source: &'static str,
-    severity: &'static str,
+    #[serde(flatten)]
+    rule: &'static Rule,
 }
 
 pub fn rules() -> Vec<Statement> {
-    let statement = |fmi, rule: &Rule| Statement {
-        fmi,
-        rule: rule.id,
-        title: rule.title,
-        source: rule.source,
-        severity: rule.severity.name(),
-    };
-    let second = RULES.iter().map(|rule| statement("2.0", rule));
-    second.chain(fmi3::RULES.iter().map(|rule| statement("3.0", rule))).collect()
+    let second = RULES.iter().map(|rule| Statement { fmi: "2.0", rule });
+    second.chain(fmi3::RULES.iter().map(|rule| Statement { fmi: "3.0", rule })).collect()
 }
 
 /// Rules that explain why a file cannot be opened as an FMU. If the file cannot be opened, those that are

@@ -4,13 +4,16 @@
 use anyhow::Result;
 
 use super::findings::Findings;
-use super::loaded::{Life, Readings, STEPS, UnderTest, Unusable, skip};
-use super::under_test::{FmuUnderTest, Interface, Reading, Session, Stage};
+use super::under_test::{
+    FmuUnderTest, Interface, Readings, STEPS, Session, Stage, Tested, UnderTest, Unusable, Use,
+    skip,
+};
+use host::description::Value;
 use host::fmi2::{CallError, Callbacks, HostState, Instance, Instantiation, Status, file_uri};
 
 /// `load.opens`: a binary that cannot be loaded has ended the check before. Only if the two interfaces have
 /// two binaries can the second one still be broken here.
-pub fn opens<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
+pub fn opens<V: Tested>(fmu: &UnderTest<V>, findings: &mut Findings) -> Result<()> {
     for why in fmu.broken() {
         findings.at("the binary of one interface").add(why);
     }
@@ -28,32 +31,34 @@ pub fn types_platform(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
     Ok(())
 }
 
-pub fn version<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
-    let call = format!("{}GetVersion", F::FMI);
+pub fn version<V: Tested>(fmu: &UnderTest<V>, findings: &mut Findings) -> Result<()> {
+    let call = format!("{}GetVersion", V::FMI);
     fmu.announce(&call);
     for binary in fmu.binaries() {
         let answer = binary.version();
         // FMI 3.0 has bug-fix versions such as 3.0.1.
-        let is_fixed = F::NUMBER == "3.0" && answer.starts_with("3.0.");
-        if answer != F::NUMBER && !is_fixed {
-            findings.at(&call).add(format!("{answer:?} (allowed: {:?})", F::NUMBER));
+        let is_fixed = fmu.description.words.version == "3.0" && answer.starts_with("3.0.");
+        if answer != fmu.description.words.version && !is_fixed {
+            findings
+                .at(&call)
+                .add(format!("{answer:?} (allowed: {:?})", fmu.description.words.version));
         }
     }
     Ok(())
 }
 
-pub fn instance<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
+pub fn instance<V: Tested>(fmu: &UnderTest<V>, findings: &mut Findings) -> Result<()> {
     for using in fmu.uses() {
         fmu.session(using)?;
     }
     if fmu.interfaces().is_empty() {
-        let call = format!("{}Instantiate", F::FMI);
+        let call = format!("{}Instantiate", V::FMI);
         findings.at(call).add("the binary lacks the functions of the declared interface");
     }
     Ok(())
 }
 
-pub fn initialises<F: UnderTest>(fmu: &F, _: &mut Findings) -> Result<()> {
+pub fn initialises<V: Tested>(fmu: &UnderTest<V>, _: &mut Findings) -> Result<()> {
     for using in fmu.uses() {
         fmu.running(using)?;
     }
@@ -111,7 +116,7 @@ pub fn arguments_null(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
     let with = Instantiation { resources: None, ..fmu.arguments(interface)? };
     let answer = fmu.with_open_effect(place, findings, || fmu.instantiate(interface, &with))?;
     if let Err(error) = answer
-        && fmu.description().interface("CoSimulation").is_some()
+        && fmu.description.interface("CoSimulation").is_some()
     {
         findings.at(place).add(error.to_string());
     }
@@ -135,7 +140,7 @@ pub fn resources(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         return skip("the FMU has no resources");
     }
     let interface = fmu.first_interface()?;
-    let run = |location: Option<&str>| -> Result<Vec<Reading>> {
+    let run = |location: Option<&str>| -> Result<Readings> {
         let mut session = match location {
             None => fmu.session(interface)?,
             Some(_) => {
@@ -149,11 +154,12 @@ pub fn resources(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         session.advance(STEPS)?;
         let mut all = session.readings()?;
         // A text variable may contain the path of the resources and differ for this reason.
-        all.retain(|reading| !matches!(reading, Reading::Text(_)));
+        all.retain(|values| !matches!(values[0], Value::String(_)));
         Ok(all)
     };
-    let is_same =
-        |one: &[Reading], two: &[Reading]| one.iter().zip(two).all(|(a, b)| a.is_identical(b));
+    let is_same = |one: &Readings, two: &Readings| {
+        one.iter().flatten().zip(two.iter().flatten()).all(|(a, b)| a.is_identical(b))
+    };
     let usual = run(None)?;
     is_deterministic(fmu, interface)?;
     let folder = tempfile::tempdir()?;
@@ -187,11 +193,7 @@ pub fn resources(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 /// If the call crashes, `values.unknown` reports it.
 fn refuse_as_usual(fmu: &FmuUnderTest, interface: Interface) -> Result<bool> {
     let mut session = fmu.running(interface)?;
-    let answer = fmu.with_crash_reported_by("values.unknown", || {
-        fmu.announce("fmi2GetReal of an unknown value reference");
-        session.instance.get_real(&[u32::MAX], &mut [0.0])
-    });
-    Ok(answer.is_err_and(|error| !error.messages.is_empty()))
+    Ok(session.refused().is_some_and(|error| !error.messages.is_empty()))
 }
 
 pub fn callbacks(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
@@ -256,8 +258,8 @@ pub fn copies(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 }
 
 /// `instantiate.free_null`: the rule is broken if the call crashes.
-pub fn free_null<F: UnderTest>(fmu: &F, _: &mut Findings) -> Result<()> {
-    fmu.announce(format!("{}FreeInstance(NULL)", F::FMI));
+pub fn free_null<V: Tested>(fmu: &UnderTest<V>, _: &mut Findings) -> Result<()> {
+    fmu.announce(format!("{}FreeInstance(NULL)", V::FMI));
     for binary in fmu.binaries() {
         binary.free_null_instance();
     }
@@ -280,7 +282,7 @@ pub fn null(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-pub fn instances<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
+pub fn instances<V: Tested>(fmu: &UnderTest<V>, findings: &mut Findings) -> Result<()> {
     for using in fmu.uses() {
         let alone = {
             let mut session = fmu.running(using)?;
@@ -296,7 +298,7 @@ pub fn instances<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
         let readings = one.readings()?;
         if let Some(text) = one.difference(&readings, &alone) {
             is_deterministic(fmu, using)?;
-            findings.at(format!("{}, two instances in turn", F::name(using))).add(text);
+            findings.at(format!("{using}, two instances in turn")).add(text);
         }
         drop(two);
         one.advance(1)?;
@@ -304,16 +306,16 @@ pub fn instances<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-pub fn deterministic<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
+pub fn deterministic<V: Tested>(fmu: &UnderTest<V>, findings: &mut Findings) -> Result<()> {
     for using in fmu.uses() {
         if let Some(text) = differs_when_run_again(fmu, using)? {
-            findings.at(format!("{}, the same run again", F::name(using))).add(text);
+            findings.at(format!("{using}, the same run again")).add(text);
         }
     }
     Ok(())
 }
 
-fn differs_when_run_again<F: UnderTest>(fmu: &F, using: F::Use) -> Result<Option<String>> {
+fn differs_when_run_again<V: Tested>(fmu: &UnderTest<V>, using: Use) -> Result<Option<String>> {
     let run = || -> Result<_> {
         let mut session = fmu.running(using)?;
         session.advance(STEPS)?;
@@ -327,28 +329,28 @@ fn differs_when_run_again<F: UnderTest>(fmu: &F, using: F::Use) -> Result<Option
 
 /// Returns an error if two equal runs differ, because comparing runs then proves nothing.
 /// `life.deterministic` reports this fault.
-pub fn is_deterministic<F: UnderTest>(fmu: &F, using: F::Use) -> Result<()> {
-    match differs_when_run_again(fmu, using)? {
+pub fn is_deterministic<V: Tested>(fmu: &UnderTest<V>, using: impl Into<Use>) -> Result<()> {
+    match differs_when_run_again(fmu, using.into())? {
         None => Ok(()),
         Some(why) => Err(Unusable { rule: "life.deterministic", why }.into()),
     }
 }
 
-pub fn reset<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
-    let call = format!("{}Reset", F::FMI);
+pub fn reset<V: Tested>(fmu: &UnderTest<V>, findings: &mut Findings) -> Result<()> {
+    let call = format!("{}Reset", V::FMI);
     for using in fmu.uses() {
-        let fresh = history::<F>(&mut fmu.session(using)?)?;
+        let fresh = history(&mut fmu.session(using)?)?;
         let mut session = fmu.session(using)?;
-        session.leave_trajectory()?;
+        V::leave_trajectory(&mut session)?;
         fmu.announce(format!("{call} after steps"));
-        session.instance().reset()?;
+        session.instance.reset()?;
         session.rewind();
-        let again = history::<F>(&mut session)
+        let again = history(&mut session)
             .map_err(|error| anyhow::anyhow!("the run after {call} failed: {error:#}"))?;
         for (fresh, again) in fresh.iter().zip(&again) {
             if let Some(text) = session.difference(again, fresh) {
                 is_deterministic(fmu, using)?;
-                findings.at(format!("{}, a run after {call}", F::name(using))).add(text);
+                findings.at(format!("{using}, a run after {call}")).add(text);
                 break;
             }
         }
@@ -356,7 +358,7 @@ pub fn reset<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-fn history<'f, F: UnderTest + 'f>(session: &mut F::Session<'f>) -> Result<Vec<Readings<'f, F>>> {
+fn history<V: Tested>(session: &mut Session<V>) -> Result<Vec<Readings>> {
     session.initialise()?;
     let mut all = vec![session.readings()?];
     session.advance(STEPS)?;
@@ -375,12 +377,9 @@ pub fn reset_anywhere(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
         ] {
             let mut session = fmu.session_in(interface, stage)?;
             if stage == Stage::Initialised {
-                fmu.with_crash_reported_by("values.unknown", || {
-                    fmu.announce("fmi2GetReal of an unknown value reference");
-                    let _ = session.instance.get_real(&[u32::MAX], &mut [0.0]);
-                });
+                session.refused();
             }
-            let place = format!("fmi2Reset, {from} ({})", FmuUnderTest::name(interface));
+            let place = format!("fmi2Reset, {from} ({interface})");
             fmu.announce(&place);
             if let Err(error) = session.instance.reset() {
                 findings.at(place).add(error.to_string());
@@ -394,22 +393,22 @@ pub fn reset_anywhere(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
     Ok(())
 }
 
-pub fn terminate<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
-    let call = format!("{}Terminate", F::FMI);
+pub fn terminate<V: Tested>(fmu: &UnderTest<V>, findings: &mut Findings) -> Result<()> {
+    let call = format!("{}Terminate", V::FMI);
     for using in fmu.uses() {
         let mut session = fmu.running(using)?;
         session.advance(3)?;
         let before = session.readings()?;
         fmu.announce(&call);
-        session.instance().terminate()?;
+        session.instance.terminate()?;
         fmu.announce(format!("reading values after {call}"));
         let after = session.readings()?;
         // FMI 3.0 requires only that values can be read; Dymola's FMUs change them slightly in
         // fmi3Terminate.
-        if F::NUMBER == "2.0"
+        if fmu.description.words.version == "2.0"
             && let Some(text) = session.difference(&after, &before)
         {
-            findings.at(format!("after {call} ({})", F::name(using))).add(text);
+            findings.at(format!("after {call} ({using})")).add(text);
         }
     }
     Ok(())
@@ -453,8 +452,7 @@ pub fn order(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             for (call, made) in calls.iter().chain(more) {
                 let mut session = fmu.session_in(interface, *stage)?;
                 let state = stage.name();
-                let place =
-                    format!("{call} in state \"{state}\" ({})", FmuUnderTest::name(interface));
+                let place = format!("{call} in state \"{state}\" ({interface})");
                 let answer = fmu.with_open_effect(&place, findings, || made(&mut session));
                 expect_refusal(findings, place, answer);
             }

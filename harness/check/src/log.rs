@@ -3,10 +3,9 @@
 use anyhow::Result;
 
 use super::findings::Findings;
-use super::loaded::skip;
-use super::under_test::{FmuUnderTest, Interface, Life, STEPS, UnderTest};
+use super::under_test::{FmuUnderTest, Interface, STEPS, Tested, UnderTest, skip};
 use host::c_abi::foreign_environments;
-use host::fmi2::{Instantiation, Message, Status};
+use host::fmi2::{Fmi2, Instantiation, Message, Status};
 
 pub fn percent(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let interface = fmu.first_interface()?;
@@ -38,13 +37,13 @@ pub fn percent(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-pub fn categories<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
+pub fn categories<V: Tested>(fmu: &UnderTest<V>, findings: &mut Findings) -> Result<()> {
     let declared: Vec<&str> =
-        fmu.root().list("LogCategories").filter_map(|c| c.get("name")).collect();
+        fmu.description.root.list("LogCategories").filter_map(|c| c.get("name")).collect();
     if declared.is_empty() {
         return skip("no categories are declared");
     }
-    let (messages, uncategorised) = fmu.provoke_messages()?;
+    let (messages, uncategorised) = V::provoke_messages(fmu)?;
     if uncategorised > 0 {
         let all = declared.join(", ");
         findings.at("a message").add(format!("its category is NULL (declared: {all})"));
@@ -64,7 +63,7 @@ pub fn categories<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> 
 }
 
 pub fn text(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let (messages, _) = fmu.provoke_messages()?;
+    let (messages, _) = Fmi2::provoke_messages(fmu)?;
     if messages.is_empty() {
         findings.skip("the FMU logs nothing");
     }
@@ -111,10 +110,7 @@ pub fn quiet(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         messages.retain(|message| !changing || message.status == Status::Ok);
         if let Some(message) = messages.first() {
             findings
-                .at(format!(
-                    "an ordinary run, {inputs}, loggingOn ({})",
-                    FmuUnderTest::name(interface)
-                ))
+                .at(format!("an ordinary run, {inputs}, loggingOn ({interface})"))
                 .add(format!("{} messages, the first {:?}", messages.len(), message.text));
         }
     }
@@ -122,7 +118,7 @@ pub fn quiet(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 }
 
 pub fn environment(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let provoke_messages = fmu.provoke_messages();
+    let provoke_messages = Fmi2::provoke_messages(fmu);
     let runs = fmu.interfaces().into_iter().map(|interface| ordinary(fmu, interface, true));
     let runs: Result<Vec<_>> = runs.collect();
     match foreign_environments() {
@@ -140,7 +136,7 @@ pub fn environment(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 
 pub fn switch(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let mut session = fmu.session(fmu.first_interface()?)?;
-    let root = &fmu.description().root;
+    let root = &fmu.description.root;
     let declared: Vec<&str> = root.list("LogCategories").filter_map(|c| c.get("name")).collect();
     let sets = declared.iter().map(std::slice::from_ref).chain([&[][..], &declared[..]]);
     for (set, on) in sets.flat_map(|set| [(set, true), (set, false)]) {

@@ -9,8 +9,7 @@ use std::time::{Duration, Instant};
 use anyhow::Result;
 
 use super::findings::Findings;
-use super::loaded::skip;
-use super::under_test::{FmuUnderTest, Interface, Life, UnderTest};
+use super::under_test::{FmuUnderTest, Interface, skip};
 
 const MOST: usize = 500;
 /// Time limit for the first window; the other windows have the same number of calls.
@@ -68,7 +67,7 @@ pub fn memory(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 }
 
 fn look(fmu: &FmuUnderTest, interface: Interface, findings: &mut Findings) -> Result<()> {
-    let name = FmuUnderTest::name(interface);
+    let name = interface;
     let mut session = fmu.running(interface)?;
     let step = || -> Result<()> {
         session.advance(1)?;

@@ -13,13 +13,11 @@ use host::xml::Element;
 
 use super::description::Description;
 use super::findings::Findings;
-use super::loaded::Unusable;
 use super::options::Options;
-use super::rule::{Check, Rule};
+use super::rule::{Check, CheckCalls, Rule};
 use super::rules::fmi2::RULES;
 use super::trace::{self, Answer, Crash};
-use super::under_test::FmuUnderTest;
-use super::{life, v3};
+use super::under_test::{Tested, UnderTest, Unusable};
 
 pub const SUBCOMMAND: &str = "check-calls";
 /// Number of rules with endless calls after which no further rules of calls are run.
@@ -197,55 +195,46 @@ pub fn check_in_child(id: &str, fmu: Unpacked, limit: Duration) -> Result<()> {
     let mut packed: &'static [u8] = std::fs::read(description)?.leak();
     let root = Element::unpack(&mut packed)
         .context("the file with the parsed description has changed since it was written")?;
-    let is_fmi3 = root.get("fmiVersion").is_some_and(|version| version.starts_with("3."));
-    let rules = if is_fmi3 { super::rules::fmi3::RULES } else { RULES };
+    let description: &'static Description = Box::leak(Box::new(Description::new(root)));
+    let rules = if description.is_fmi3() { super::rules::fmi3::RULES } else { RULES };
     let rule = rules.iter().find(|rule| rule.id == id).context("no such rule")?;
     trace::doing(LOADING, Crash::Error);
-    let before = life::surroundings();
-    let mut findings = Findings::new(rule.severity);
     // A rule that is only slow reports its findings before the time limit.
     let deadline = Instant::now() + limit.mul_f64(0.75);
-    let failed = |error: anyhow::Error, now: String, findings: &mut Findings| match error
-        .downcast_ref::<Unusable>()
-    {
-        Some(unusable) if unusable.rule != rule.id => {
-            findings.skip_for(unusable.rule, unusable.to_string());
-        }
-        _ => {
-            findings.stopped_at = Some(now.clone());
-            findings.at(now).add(format!("{error:#}"));
-        }
-    };
-    let lost = |error: anyhow::Error, findings: &mut Findings| match rule.id == OPENS {
-        true => findings.at("the binary").add(format!("{error:#}")),
-        false => findings.skip(format!("the FMU cannot be loaded: {error:#}")),
-    };
-    match rule.check {
+    trace::done(match rule.check {
         Check::Calls(check) => {
-            let description = Box::leak(Box::new(Description::new(root)));
-            match FmuUnderTest::open(directory, path, description, deadline) {
-                Err(error) => lost(error, &mut findings),
-                Ok(mut fmu) => {
-                    fmu.before = before;
-                    if let Err(error) = check(&fmu, &mut findings) {
-                        failed(error, fmu.last_call(), &mut findings);
-                    }
-                    fmu.announce("unloading the binary");
-                }
-            }
+            call(rule, check, UnderTest::open(directory, path, description, deadline))
         }
-        Check::Calls3(check) => match v3::Subject::open(directory, path, root, deadline) {
-            Err(error) => lost(error, &mut findings),
-            Ok(subject) => {
-                if let Err(error) = check(&subject, &mut findings) {
-                    failed(error, subject.last_call(), &mut findings);
-                }
-                subject.announce("unloading the library");
-            }
-        },
+        Check::Calls3(check) => {
+            call(rule, check, UnderTest::open(directory, path, description, deadline))
+        }
         _ => anyhow::bail!("the rule {id} makes no calls of the binary"),
+    })
+}
+
+/// Checks a rule by calls of the FMU, which may be impossible to load.
+fn call<V: Tested>(rule: &Rule, check: CheckCalls<V>, fmu: Result<UnderTest<V>>) -> Findings {
+    let mut findings = Findings::new(rule.severity);
+    match fmu {
+        Err(error) if rule.id == OPENS => findings.at("the binary").add(format!("{error:#}")),
+        Err(error) => findings.skip(format!("the FMU cannot be loaded: {error:#}")),
+        Ok(fmu) => {
+            if let Err(error) = check(&fmu, &mut findings) {
+                match error.downcast_ref::<Unusable>() {
+                    Some(unusable) if unusable.rule != rule.id => {
+                        findings.skip_for(unusable.rule, unusable.to_string());
+                    }
+                    _ => {
+                        findings.stopped_at = Some(fmu.last_call());
+                        findings.at(fmu.last_call()).add(format!("{error:#}"));
+                    }
+                }
+            }
+            // So that a crash or hang of the unloading is reported as such.
+            fmu.announce("unloading the binary");
+        }
     }
-    trace::done(findings)
+    findings
 }
 
 #[cfg(all(test, unix))]

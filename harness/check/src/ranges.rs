@@ -8,10 +8,9 @@ use anyhow::Result;
 use super::dependencies::random_session;
 use super::description::Variable;
 use super::findings::Findings;
-use super::loaded::skip;
-use super::under_test::{FmuUnderTest, Life, Reading, STEPS, Session, UnderTest, start_value};
+use super::under_test::{FmuUnderTest, STEPS, Session, skip, start_value};
 use super::values::{contains_name, items};
-use host::description::Type;
+use host::description::{Type, Value};
 
 /// Tolerance of min and max, relative to the bound or the nominal value, because an integrator may leave a
 /// state slightly outside its range.
@@ -34,8 +33,8 @@ pub fn in_range(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             fmu.announce(format!("reading what has a min or a max after {step} steps"));
             for v in &all {
                 let x = match session.get(v) {
-                    Ok(Reading::Real(x)) => x,
-                    Ok(Reading::Integer(n)) => f64::from(n),
+                    Ok(Value::Real(x)) => x,
+                    Ok(Value::Integer(n)) => n as f64,
                     _ => continue,
                 };
                 let (min, max) = v.bounds();
@@ -45,9 +44,8 @@ pub fn in_range(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                 };
                 if (x < min - slack(min) || x > max + slack(max)) && told.insert(v.key) {
                     findings.at(v.place()).add(format!(
-                        "it is {x} after {step} steps of an ordinary run ({}) (allowed by its min \
-                             and max: {min} to {max})",
-                        FmuUnderTest::name(interface)
+                        "it is {x} after {step} steps of an ordinary run ({interface}) (allowed by its min \
+                             and max: {min} to {max})"
                     ));
                 }
             }
@@ -58,7 +56,7 @@ pub fn in_range(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 
 /// Sets `v` before initialisation and initialises. The inner error is the reason why the FMU refused the
 /// value.
-fn refusal(fmu: &FmuUnderTest, v: &Variable, value: &Reading) -> Result<Result<()>> {
+fn refusal(fmu: &FmuUnderTest, v: &Variable, value: &Value) -> Result<Result<()>> {
     let mut session = fmu.session(fmu.first_interface()?)?;
     fmu.announce(format!("setting {} to {value} and initialising", v.name));
     if let Err(error) = session.set(v, value) {
@@ -91,8 +89,8 @@ pub fn limits_exact(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                 continue;
             }
             let at = |x: f64| match v.kind {
-                Type::Real => Reading::Real(x),
-                _ => Reading::Integer(x as i32),
+                Type::Real => Value::Real(x),
+                _ => Value::Integer(x as i64),
             };
             // An FMU that accepts every value breaks another rule; it has no exact range to compare.
             if refusal(fmu, v, &at(far))?.is_ok() {
@@ -122,9 +120,9 @@ pub fn items_known(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     for v in all.iter().filter(|v| v.is_set_by_hosts() && start_value(v).is_some()) {
         let known = items(fmu, v);
         let (Some(first), Some(last)) = (known.iter().min(), known.iter().max()) else { continue };
-        let list = known.iter().map(i32::to_string).collect::<Vec<_>>().join(", ");
+        let list = known.iter().map(i64::to_string).collect::<Vec<_>>().join(", ");
         for item in &known {
-            if let Err(why) = refusal(fmu, v, &Reading::Integer(*item))?
+            if let Err(why) = refusal(fmu, v, &Value::Integer(*item))?
                 && !fmu
                     .variables()
                     .iter()
@@ -137,7 +135,7 @@ pub fn items_known(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         }
         // Reported are types with further items; a type that accepts any number is reported by another rule.
         let beyond = last.saturating_add(1000);
-        let takes_any = refusal(fmu, v, &Reading::Integer(beyond))?.is_ok();
+        let takes_any = refusal(fmu, v, &Value::Integer(beyond))?.is_ok();
         if takes_any {
             findings
                 .at(v.place())
@@ -145,7 +143,7 @@ pub fn items_known(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             continue;
         }
         for other in first.saturating_sub(1)..=last.saturating_add(3) {
-            if !known.contains(&other) && refusal(fmu, v, &Reading::Integer(other))?.is_ok() {
+            if !known.contains(&other) && refusal(fmu, v, &Value::Integer(other))?.is_ok() {
                 findings.at(v.place()).fail(format!(
                     "{other} is accepted, and no item of its type in modelDescription.xml has \
                          this value (items: {list})"
@@ -161,12 +159,12 @@ pub fn items_known(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let mut look = |session: &mut Session| {
         for v in &computed {
             let known = items(fmu, v);
-            if let Ok(Reading::Integer(value)) = session.get(v)
+            if let Ok(Value::Integer(value)) = session.get(v)
                 && !known.is_empty()
                 && !known.contains(&value)
                 && told.insert(v.key)
             {
-                let list = known.iter().map(i32::to_string).collect::<Vec<_>>().join(", ");
+                let list = known.iter().map(i64::to_string).collect::<Vec<_>>().join(", ");
                 findings.at(v.place()).fail(format!(
                     "it is {value}, and no item of its type in modelDescription.xml has this \
                          value (items: {list})"
@@ -192,7 +190,7 @@ pub fn items_known(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         for x in far_values(v) {
             let mut session = fmu.session(fmu.first_interface()?)?;
             fmu.announce(format!("initialising with {} = {x:?}", v.name));
-            if session.set(v, &Reading::Real(x)).is_ok() && session.initialise().is_ok() {
+            if session.set(v, &Value::Real(x)).is_ok() && session.initialise().is_ok() {
                 look(&mut session);
                 if session.advance(1).is_ok() {
                     look(&mut session);
@@ -205,7 +203,7 @@ pub fn items_known(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 
 fn far_values(v: &Variable) -> Vec<f64> {
     let (min, max) = v.bounds();
-    let Some(Reading::Real(start)) = start_value(v) else { return Vec::new() };
+    let Some(Value::Real(start)) = start_value(v) else { return Vec::new() };
     let size = start.abs().max(v.nominal());
     let mut values = vec![start + 0.3 * size, start + 3.0 * size, start - 3.0 * size];
     if max.is_finite() {

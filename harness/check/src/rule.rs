@@ -4,17 +4,21 @@ use crate::archive::Archive;
 use crate::binaries::Binaries;
 use crate::description::Description;
 use crate::findings::{Findings, Severity};
-use crate::under_test::FmuUnderTest;
-use crate::v3;
+use crate::under_test::UnderTest;
+use host::fmi2::Fmi2;
+use host::fmi3::Fmi3;
 
 /// A rule: a statement about every FMU, its source in the standard, and the function that checks it.
+#[derive(serde::Serialize)]
 pub struct Rule {
+    #[serde(rename = "rule")]
     pub id: &'static str,
     pub title: &'static str,
     /// The section of FMI 2.0.5 or 3.0.2, or the name of a host that fails if the rule is broken.
     pub source: &'static str,
     /// Severity of a finding. A crash or an endless call is always an error.
     pub severity: Severity,
+    #[serde(skip)]
     pub check: Check,
 }
 
@@ -28,14 +32,16 @@ pub(crate) const fn rule(
     Rule { id, title, source, severity, check }
 }
 
+pub type CheckCalls<V> = fn(&UnderTest<V>, &mut Findings) -> Result<()>;
+
 pub enum Check {
     Archive(fn(&Archive, &mut Findings)),
     Description(fn(&Description, &mut Findings)),
     Binaries(fn(&Binaries, &mut Findings)),
     /// For the loaded FMU, in a process of its own. If the function returns an error, the call that failed is
     /// a finding.
-    Calls(fn(&FmuUnderTest, &mut Findings) -> Result<()>),
-    Calls3(fn(&v3::Subject, &mut Findings) -> Result<()>),
+    Calls(CheckCalls<Fmi2>),
+    Calls3(CheckCalls<Fmi3>),
 }
 
 impl Rule {

@@ -3,24 +3,11 @@
 use std::io::Write;
 
 use anyhow::Result;
+use host::fmi2::percent_encoded;
 use serde_json::json;
 
 use super::findings::Severity;
 use super::report::Report;
-
-/// Converts a path to a URI reference (RFC 3986); an absolute path becomes a `file://` address.
-fn uri(path: &str) -> String {
-    let mut uri = String::from(if path.starts_with('/') { "file://" } else { "" });
-    for byte in path.bytes() {
-        match byte {
-            b'A'..=b'Z' | b'a'..=b'z' | b'0'..=b'9' | b'/' | b'.' | b'-' | b'_' | b'~' => {
-                uri.push(byte.into())
-            }
-            _ => uri.push_str(&format!("%{byte:02X}")),
-        }
-    }
-    uri
-}
 
 /// Writes the report in SARIF.
 ///
@@ -28,7 +15,9 @@ fn uri(path: &str) -> String {
 ///
 /// If `out` cannot be written.
 pub fn write(report: &Report, out: &mut impl Write) -> Result<()> {
-    let fmu = uri(&report.path.display().to_string().replace('\\', "/"));
+    let path = report.path.display().to_string().replace('\\', "/");
+    let start = if path.starts_with('/') { "file://" } else { "" };
+    let fmu = format!("{start}{}", percent_encoded(&path, b"/"));
     let rules: Vec<_> = report
         .outcomes
         .iter()

@@ -3,15 +3,16 @@
 use anyhow::Result;
 
 use super::findings::Findings;
-use super::loaded::{Life, Mark, Readings, STEPS, UnderTest, Unusable};
-use super::under_test::{FmuUnderTest, Stage};
+use super::under_test::{
+    FmuUnderTest, Mark, Readings, STEPS, Session, Stage, Tested, UnderTest, Unusable, Use,
+};
 
 /// Returns the uses whose interface declares the capability `can`, for example "canSerialize", to which the
 /// version's word for a state is appended. Skips the rule if there are none.
-pub fn uses_with<F: UnderTest>(fmu: &F, can: &str, findings: &mut Findings) -> Vec<F::Use> {
-    let flag = format!("{can}{}", F::STATE);
+pub fn uses_with<V: Tested>(fmu: &UnderTest<V>, can: &str, findings: &mut Findings) -> Vec<Use> {
+    let flag = format!("{can}{}", V::STATE);
     let mut all = fmu.uses();
-    all.retain(|using| fmu.can(F::interface(*using), &flag));
+    all.retain(|using| fmu.can(using.interface, &flag));
     if all.is_empty() {
         findings.skip(format!("{flag} is not declared"));
     }
@@ -21,10 +22,7 @@ pub fn uses_with<F: UnderTest>(fmu: &F, can: &str, findings: &mut Findings) -> V
 const SAVE: &str = "canGetAndSet";
 const SERIALIZE: &str = "canSerialize";
 
-fn continue_from<'f, F: UnderTest + 'f>(
-    session: &mut F::Session<'f>,
-    from: &Mark<'f, F>,
-) -> Result<Readings<'f, F>> {
+pub fn continue_from<V: Tested>(session: &mut Session<V>, from: &Mark) -> Result<Readings> {
     session.go_back(from);
     session.advance(STEPS)?;
     session.readings()
@@ -32,43 +30,43 @@ fn continue_from<'f, F: UnderTest + 'f>(
 
 /// Returns an error if a repeated run from a saved state differs within one instance. `states.rollback`
 /// reports this.
-fn rolls_back<F: UnderTest>(fmu: &F, using: F::Use) -> Result<()> {
+fn rolls_back<V: Tested>(fmu: &UnderTest<V>, using: Use) -> Result<()> {
     let mut session = fmu.running(using)?;
     session.advance(3)?;
-    let (state, here) = (session.instance().get_state()?, session.mark());
-    let first = continue_from::<F>(&mut session, &here)?;
-    session.instance().set_state(&state)?;
-    let second = continue_from::<F>(&mut session, &here)?;
-    session.instance().free_state(state)?;
+    let (state, here) = (session.instance.get_state()?, session.mark());
+    let first = continue_from(&mut session, &here)?;
+    session.instance.set_state(&state)?;
+    let second = continue_from(&mut session, &here)?;
+    session.instance.free_state(state)?;
     match session.difference(&second, &first) {
         None => Ok(()),
         Some(why) => Err(Unusable { rule: "states.rollback", why }.into()),
     }
 }
 
-pub fn rollback<F: UnderTest>(fmu: &F, findings: &mut Findings) -> Result<()> {
-    let call = |verb: &str| format!("{}{verb}{}", F::FMI, F::STATE);
+pub fn rollback<V: Tested>(fmu: &UnderTest<V>, findings: &mut Findings) -> Result<()> {
+    let call = |verb: &str| format!("{}{verb}{}", V::FMI, V::STATE);
     for using in uses_with(fmu, SAVE, findings) {
         let mut session = fmu.running(using)?;
         session.advance(3)?;
         fmu.announce(call("Get"));
-        let state = session.instance().get_state()?;
+        let state = session.instance.get_state()?;
         let here = session.mark();
         let before = session.readings()?;
-        let first = continue_from::<F>(&mut session, &here)?;
+        let first = continue_from(&mut session, &here)?;
         fmu.announce(call("Set"));
-        session.instance().set_state(&state)?;
+        session.instance.set_state(&state)?;
         let restored = session.readings()?;
-        let set = format!("after {} ({})", call("Set"), F::name(using));
+        let set = format!("after {} ({using})", call("Set"));
         if let Some(text) = session.difference(&restored, &before) {
             findings.at(format!("right {set}")).add(text);
         }
-        let second = continue_from::<F>(&mut session, &here)?;
+        let second = continue_from(&mut session, &here)?;
         if let Some(text) = session.difference(&second, &first) {
             findings.at(format!("{STEPS} steps {set}")).add(text);
         }
         fmu.announce(call("Free"));
-        session.instance().free_state(state)?;
+        session.instance.free_state(state)?;
     }
     Ok(())
 }
@@ -81,14 +79,12 @@ pub fn handle(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         fmu.announce("fmi2GetFMUstate into a handle that is there already");
         session.instance.get_state_into(&mut state)?;
         let here = session.mark();
-        let first = continue_from::<FmuUnderTest>(&mut session, &here)?;
+        let first = continue_from(&mut session, &here)?;
         session.instance.set_state(&state)?;
-        let second = continue_from::<FmuUnderTest>(&mut session, &here)?;
+        let second = continue_from(&mut session, &here)?;
         if let Some(text) = session.difference(&second, &first) {
             rolls_back(fmu, interface)?;
-            findings
-                .at(format!("a handle used again ({})", FmuUnderTest::name(interface)))
-                .add(text);
+            findings.at(format!("a handle used again ({interface})")).add(text);
         }
         session.instance.free_state(state)?;
         fmu.announce("fmi2FreeFMUstate of NULL");
@@ -112,7 +108,7 @@ pub fn bytes(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             }
             session.instance.free_state(state)?;
             let here = session.mark();
-            (continue_from::<FmuUnderTest>(&mut session, &here)?, here, bytes)
+            (continue_from(&mut session, &here)?, here, bytes)
         };
         // Restored into an instance that has been simulated and into one that was neither set up nor
         // initialised.
@@ -127,9 +123,9 @@ pub fn bytes(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             });
             let state = other.instance.deserialize(&bytes)?;
             other.instance.set_state(&state)?;
-            let second = continue_from::<FmuUnderTest>(&mut other, &here)?;
+            let second = continue_from(&mut other, &here)?;
             if let Some(text) = other.difference(&second, &first) {
-                let place = format!("{} ({})", fmu.last_call(), FmuUnderTest::name(interface));
+                let place = format!("{} ({interface})", fmu.last_call());
                 rolls_back(fmu, interface)?;
                 findings.at(place).add(text);
             }
@@ -160,8 +156,7 @@ pub fn garbage(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             ("zeros", vec![0; bytes.len()]),
             ("one byte changed", flipped),
         ] {
-            let place =
-                format!("fmi2DeSerializeFMUstate with {what} ({})", FmuUnderTest::name(interface));
+            let place = format!("fmi2DeSerializeFMUstate with {what} ({interface})");
             let mut session = fmu.running(interface)?;
             session.advance(3)?;
             let before = session.readings()?;
@@ -199,10 +194,7 @@ pub fn modes(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         for stage in [Stage::Instantiated, Stage::Initialization, Stage::Terminated] {
             let mut session = fmu.session_in(interface, stage)?;
             let mode = stage.name();
-            let place = format!(
-                "fmi2GetFMUstate and fmi2SetFMUstate, {mode} ({})",
-                FmuUnderTest::name(interface)
-            );
+            let place = format!("fmi2GetFMUstate and fmi2SetFMUstate, {mode} ({interface})");
             fmu.announce(&place);
             let done = session.instance.get_state().and_then(|state| {
                 let set = session.instance.set_state(&state);

@@ -6,35 +6,25 @@ use super::dependencies::displaced;
 use super::description::Variable;
 use super::findings::Findings;
 use super::life::expect_refusal;
-use super::loaded::skip;
-use super::under_test::{
-    FmuUnderTest, Interface, Life, Reading, STEPS, Session, UnderTest, Unusable,
-};
+use super::under_test::{FmuUnderTest, Interface, STEPS, Session, Unusable, skip};
 use host::causality::Causality;
+use host::description::Value;
 use host::fmi2::{CallError, Status};
-
-/// Returns an initialised instance for Co-Simulation, or skips the rule if the FMU has no Co-Simulation.
-fn stepping(fmu: &FmuUnderTest) -> Result<Session<'_>> {
-    if !fmu.interfaces().contains(&Interface::CoSimulation) {
-        return skip("the FMU offers no Co-Simulation");
-    }
-    fmu.running(Interface::CoSimulation)
-}
 
 /// Returns an instance for Co-Simulation after three ordinary steps. If they fail, other rules report it.
 fn after_three_steps(fmu: &FmuUnderTest) -> Result<Session<'_>> {
-    let mut session = stepping(fmu)?;
+    let mut session = fmu.stepping()?;
     session.advance(3)?;
     if session.is_ended() {
         let why = "it asks for the end of the simulation in its first steps".into();
         return Err(Unusable { rule: "steps.terminated", why }.into());
     }
-    stepping(fmu)
+    fmu.stepping()
 }
 
 pub fn run(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     const LONG: usize = 200;
-    let mut session = stepping(fmu)?;
+    let mut session = fmu.stepping()?;
     for _ in 0..LONG {
         if session.is_ended() {
             break;
@@ -50,17 +40,8 @@ pub fn run(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         findings.at(fmu.last_call()).add(format!("{error}{allowed}"));
         return Ok(());
     }
-    let readings = session.readings()?;
-    for (v, reading) in fmu.variables().iter().zip(readings) {
-        if let Reading::Real(x) = reading
-            && !x.is_finite()
-        {
-            findings
-                .at(v.place())
-                .add(format!("it is {x} after {LONG} steps, which all returned fmi2OK"));
-        }
-    }
-    Ok(())
+    let when = format!("after {LONG} steps, which all returned fmi2OK");
+    super::exchange::report_not_finite(&mut session, &when, findings)
 }
 
 pub fn size(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
@@ -136,7 +117,7 @@ pub fn start_time(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         fmu.running(interface)?.advance(STEPS)?;
         for start in [fmu.experiment().start + 1000.0, fmu.experiment().start - 3.0] {
             let mut session = fmu.session(interface)?;
-            let place = format!("start time {start} s ({})", FmuUnderTest::name(interface));
+            let place = format!("start time {start} s ({interface})");
             if let Err(error) = session.initialise_at(start, None, fmu.experiment().tolerance) {
                 findings.at(place).add(error.to_string());
             } else if let Err(error) = session.advance(STEPS) {
@@ -177,11 +158,7 @@ pub fn tolerance(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                 session.initialise_at(start, None, tolerance).and_then(|()| session.advance(3));
             if let Err(error) = done {
                 let given = tolerance.map_or("none".into(), |x: f64| x.to_string());
-                fails.push((
-                    interface,
-                    format!("tolerance {given} ({})", FmuUnderTest::name(interface)),
-                    error,
-                ));
+                fails.push((interface, format!("tolerance {given} ({interface})"), error));
             }
         }
     }
@@ -331,7 +308,7 @@ pub fn inputs(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         let mut session = fmu.running(Interface::CoSimulation)?;
         let place = format!("{} = NaN, then a step", v.name);
         let refused = fmu.with_open_effect(&place, findings, || {
-            session.set(v, &Reading::Real(f64::NAN)).is_err()
+            session.set(v, &Value::Real(f64::NAN)).is_err()
                 || session.make_step(session.step).is_err()
         });
         if !refused {
@@ -365,14 +342,14 @@ pub fn input_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<
     // one input has an effect.
     let (mut acts, mut ignored) = (false, Vec::new());
     for &input in &fmu.inputs {
-        let running = || -> Result<(Session, Reading)> {
+        let running = || -> Result<(Session, Value)> {
             let mut session = fmu.running(Interface::CoSimulation)?;
             session.advance(3)?;
-            let now = session.read(input)?;
+            let now = session.read(input)?.remove(0);
             Ok((session, now))
         };
         let (_, now) = running()?;
-        let (Reading::Real(here), Some(Reading::Real(there))) =
+        let (Value::Real(here), Some(Value::Real(there))) =
             (&now, displaced(fmu, input, &now, SHARE))
         else {
             continue;
@@ -383,7 +360,7 @@ pub fn input_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<
         let end = |value: f64, slope: Option<f64>| -> Result<Vec<f64>> {
             let (mut session, _) = running()?;
             fmu.announce(format!("a step with {} = {value:?}, its slope {slope:?}", input.name));
-            session.set(input, &Reading::Real(value))?;
+            session.set(input, &Value::Real(value))?;
             if let Some(slope) = slope {
                 let reference = [input.reference];
                 session.instance.set_real_input_derivatives(&reference, &[1], &[slope])?;
@@ -429,7 +406,7 @@ pub fn input_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<
 
 pub fn output_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let mut session = after_three_steps(fmu)?;
-    let interface = fmu.description().interface("CoSimulation");
+    let interface = fmu.description.interface("CoSimulation");
     let order = interface.and_then(|i| i.number("maxOutputDerivativeOrder")).unwrap_or(0.0);
     if order < 1.0 {
         return skip("maxOutputDerivativeOrder is 0");
@@ -560,7 +537,7 @@ pub fn small(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 
 pub fn output_derivative_order(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     after_three_steps(fmu)?;
-    let interface = fmu.description().interface("CoSimulation");
+    let interface = fmu.description.interface("CoSimulation");
     let most = interface.and_then(|i| i.number("maxOutputDerivativeOrder")).unwrap_or(0.0);
     if most < 1.0 {
         return skip("maxOutputDerivativeOrder is 0");
@@ -590,7 +567,7 @@ pub fn output_derivative_order(fmu: &FmuUnderTest, findings: &mut Findings) -> R
 }
 
 pub fn terminated(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let mut session = stepping(fmu)?;
+    let mut session = fmu.stepping()?;
     report_early_end(&mut session, findings)
 }
 

@@ -5,14 +5,13 @@ use anyhow::Result;
 
 use super::description::Variable;
 use super::findings::Findings;
-use super::under_test::{
-    FmuUnderTest, Interface, Life, Reading, STEPS, Session, UnderTest, start_value,
-};
+use super::under_test::{FmuUnderTest, Interface, Readings, STEPS, Session, start_value};
 use super::values::other_value;
 use host::causality::{Causality, Variability};
+use host::description::Value;
 use host::fmi2::Called;
 
-fn tunables(fmu: &FmuUnderTest) -> impl Iterator<Item = (&Variable, Reading)> {
+fn tunables(fmu: &FmuUnderTest) -> impl Iterator<Item = (&Variable, Value)> {
     let all = fmu.variables().iter();
     let all = all
         .filter(|v| v.causality == Causality::Parameter && v.variability == Variability::Tunable);
@@ -21,8 +20,8 @@ fn tunables(fmu: &FmuUnderTest) -> impl Iterator<Item = (&Variable, Reading)> {
 
 /// Sets `v` after initialisation in a mode where the standard allows it. The outer error means that the mode
 /// cannot be entered or left; the inner result is the FMU's answer to setting the value.
-fn set_between_steps(session: &mut Session, v: &Variable, value: &Reading) -> Result<Called> {
-    if session.interface == Interface::CoSimulation {
+fn set_between_steps(session: &mut Session, v: &Variable, value: &Value) -> Result<Called> {
+    if session.using.interface == Interface::CoSimulation {
         return Ok(session.set(v, value));
     }
     session.instance.enter_event_mode()?;
@@ -38,7 +37,7 @@ fn is_allowed(
     fmu: &FmuUnderTest,
     interface: Interface,
     v: &Variable,
-    value: &Reading,
+    value: &Value,
 ) -> Result<bool> {
     let mut session = fmu.session(interface)?;
     Ok(session.set(v, value).is_ok() && session.initialise().is_ok())
@@ -58,8 +57,7 @@ pub fn can_be_set(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                 }
                 let place = format!(
                     "setting the tunable parameter {} to {value} after a step ({})",
-                    v.name,
-                    FmuUnderTest::name(interface)
+                    v.name, interface
                 );
                 fmu.announce(&place);
                 if let Err(error) = set_between_steps(&mut session, v, &value)? {
@@ -91,9 +89,9 @@ pub fn can_be_set(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 fn run(
     fmu: &FmuUnderTest,
     interface: Interface,
-    before: Option<(&Variable, &Reading)>,
-    after: Option<(&Variable, &Reading)>,
-) -> Result<Option<Vec<Reading>>> {
+    before: Option<(&Variable, &Value)>,
+    after: Option<(&Variable, &Value)>,
+) -> Result<Option<Readings>> {
     let mut session = fmu.session(interface)?;
     if let Some((v, value)) = before
         && session.set(v, value).is_err()
@@ -127,19 +125,18 @@ pub fn acts(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             let runs = (run(fmu, interface, change, None)?, run(fmu, interface, None, change)?);
             let (Some(before), Some(after)) = runs else { continue };
             // The effect on all variables other than the parameter itself.
-            let differing = |run: &Vec<Reading>| {
+            let differing = |run: &Readings| {
                 let mut all = fmu.variables().iter().zip(run.iter().zip(&plain));
                 all.find(|(o, (a, b))| {
-                    (o.kind, o.reference) != (v.kind, v.reference) && !a.is_identical(b)
+                    (o.kind, o.reference) != (v.kind, v.reference) && !a[0].is_identical(&b[0])
                 })
                 .map(|(o, _)| o.name.as_str())
             };
             let (Some(name), None) = (differing(&before), differing(&after)) else { continue };
             let text = format!(
                 "set to {value} before initialisation it changes {name} within {STEPS} steps; set \
-                 after initialisation it changes nothing ({}) (allowed: a tunable parameter that \
-                 acts)",
-                FmuUnderTest::name(interface)
+                 after initialisation it changes nothing ({interface}) (allowed: a tunable parameter that \
+                 acts)"
             );
             findings.at(v.place()).add(text);
         }

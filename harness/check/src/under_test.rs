@@ -1,86 +1,77 @@
-//! The FMU 2.0 under test: loads it, calls it as a host does, and has shortcuts for the rules.
+//! The FMU under test for any version of FMI: its binaries, the calls that rules make, the meaning of a crash in
+//! them, and the instances that a host simulates. The trait [`Tested`] contains the differences between the
+//! versions; `under_test/fmi2.rs` and `v3/subject.rs` implement it.
 
+mod fmi2;
 mod observed;
 
-use std::ops::Deref;
+use std::cell::{Cell, RefCell};
 use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::time::{Duration, Instant};
 
-use anyhow::Result;
+use anyhow::{Context, Result};
+use host::c_abi::version::{Fmu, Instance, Version};
+use host::c_abi::{CallError, Called, Message};
+use host::causality::Causality;
+use host::description::{CType, Type, Value};
+use host::fmi2::Fmi2;
+use host::guard;
+use host::xml::double;
 
 use super::description::{Description, Variable};
-use super::loaded::{Loaded, declared};
-use host::causality::Causality;
-use host::description::Type;
-use host::fmi2::{
-    CO_SIMULATION, CallError, Called, Fmi2, Fmu, Instance, Instantiation, MODEL_EXCHANGE, Message,
-    PLATFORM, Status,
-};
-use host::xml::Element;
+use super::findings::Findings;
+use super::life;
+use super::trace::{self, Crash};
 
+pub use self::fmi2::{FmuUnderTest, Stage, copy_files};
 pub use self::observed::Observed;
-pub use super::loaded::{Life, STEPS, UnderTest, Unusable};
-pub use host::fmi3::Interface;
+pub use host::c_abi::version::Interface;
 
-/// Number of calls of fmi2NewDiscreteStates after which an event iteration counts as endless.
-const ITERATIONS: usize = 100;
-/// Largest number of immediately successive events. An FMU that always requests the next event at once breaks
-/// a rule.
-const IMMEDIATE: usize = 3;
-/// Number of events requested only by fmi2CompletedIntegratorStep that are examined.
-const ASKED: usize = 20;
-/// Relative change of a state at an event below which it is rounding.
-const JUMP: f64 = 1e-9;
-const UNKNOWN_NOMINAL: f64 = 1e-3;
+pub const STEPS: usize = 20;
+/// Time limit for a call whose effect the standard leaves open, because it may never return.
+const PATIENCE: Duration = Duration::from_secs(3);
 
-pub struct FmuUnderTest {
-    loaded: Loaded<Fmi2>,
-    description: &'static Description,
-    pub inputs: Vec<&'static Variable>,
-    pub outputs: Vec<&'static Variable>,
-    directory: PathBuf,
-    path: PathBuf,
-    /// State of the process before the binary was loaded, by name; see [`crate::life::surroundings`].
-    pub before: Vec<(&'static str, String)>,
+/// Error that makes a rule impossible to check: `rule` reports the reason, and all others that meet it are
+/// skipped.
+#[derive(Debug, thiserror::Error)]
+#[error("{why}")]
+pub struct Unusable {
+    /// The rule that reports the reason; empty if there is no fault of the FMU.
+    pub rule: &'static str,
+    pub why: String,
 }
 
-impl Deref for FmuUnderTest {
-    type Target = Loaded<Fmi2>;
+/// Ends a rule that does not apply to the FMU, for example because the FMU lacks a capability.
+pub fn skip<T>(why: impl Into<String>) -> Result<T> {
+    Err(Unusable { rule: "", why: why.into() }.into())
+}
 
-    fn deref(&self) -> &Loaded<Fmi2> {
-        &self.loaded
+/// A way to use an instance: the interface, and in FMI 3.0 also the optional features that the host enables.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Use {
+    pub interface: Interface,
+    pub event_mode: bool,
+    pub early_return: bool,
+    /// True if the callback intermediateUpdate is passed.
+    pub updates: bool,
+}
+
+impl From<Interface> for Use {
+    fn from(interface: Interface) -> Use {
+        Use { interface, event_mode: false, early_return: false, updates: false }
     }
 }
 
-#[derive(Clone, Debug)]
-pub enum Reading {
-    Real(f64),
-    Integer(i32),
-    Boolean(i32),
-    Text(String),
-}
-
-impl Reading {
-    /// Returns true if the two values are bit-identical.
-    pub fn is_identical(&self, other: &Reading) -> bool {
-        match (self, other) {
-            (Reading::Real(a), Reading::Real(b)) => a.to_bits() == b.to_bits(),
-            (Reading::Integer(a), Reading::Integer(b)) => a == b,
-            (Reading::Boolean(a), Reading::Boolean(b)) => (*a != 0) == (*b != 0),
-            (Reading::Text(a), Reading::Text(b)) => a == b,
-            _ => false,
-        }
-    }
-}
-
-impl std::fmt::Display for Reading {
+impl std::fmt::Display for Use {
     fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        match self {
-            Reading::Real(x) => write!(f, "{x:?}"),
-            Reading::Integer(n) => write!(f, "{n}"),
-            Reading::Boolean(b) => write!(f, "{}", *b != 0),
-            Reading::Text(text) => write!(f, "{text:?}"),
-        }
+        self.interface.fmt(f)?;
+        f.write_str(match (self.event_mode, self.early_return) {
+            (true, true) => " with event mode and early return",
+            (true, false) => " with event mode",
+            (false, true) => " with early return",
+            (false, false) => "",
+        })
     }
 }
 
@@ -95,78 +86,180 @@ pub struct Experiment {
     pub step: f64,
 }
 
-impl FmuUnderTest {
-    /// Returns the interface that most rules use: Co-Simulation if it can be called.
-    pub fn first_interface(&self) -> Result<Interface> {
-        let why = || Unusable {
-            rule: "load.instance",
-            why: "the FMU offers no interface that can be called".into(),
-        };
-        Ok(*self.interfaces().first().ok_or_else(why)?)
-    }
+/// A version of FMI whose FMUs are checked.
+pub trait Tested: Version + 'static {
+    /// The rule that reports steps of Model Exchange that fail.
+    const EXCHANGE_RUNS: &'static str;
+    /// Beginning of the names of functions.
+    const FMI: &'static str;
+    /// Word for a saved state in the names of functions and capabilities.
+    const STATE: &'static str;
+    /// The rule that reports an FMU which ends the simulation when it is initialised, if there is one.
+    const TERMINATION: Option<&'static str>;
+    /// Description of the call that reads a Real with a value reference that no variable has.
+    const UNKNOWN_READ: &'static str;
+    /// True if `load.opens` also reports binaries that are missing.
+    const REPORTS_MISSING: bool;
+    /// Smallest number of steps of Model Exchange in the suggested experiment, after which a model may do
+    /// anything; 0 for any step.
+    const EXCHANGE_STEPS: f64;
+    /// Smallest number of suggested steps in the suggested experiment for which the suggestion is followed.
+    const SUGGESTED_STEPS: f64;
+    /// Observations of a session that only rules of this version need.
+    type Notes;
 
-    /// Loads the FMU that is unpacked in `directory`. `description` lives as long as the process of the rule.
-    /// No instances are created after `deadline`.
+    /// Returns true if the rules call this interface, which `binary` has.
+    fn is_called(description: &Description, interface: Interface, binary: &Fmu<Self>) -> bool;
+
+    fn uses(fmu: &UnderTest<Self>) -> Vec<Use>;
+
+    /// Creates an instance with ordinary arguments. The inner error is the FMU's refusal.
+    fn make_instance(
+        fmu: &UnderTest<Self>,
+        using: Use,
+    ) -> Result<Result<Instance<'_, Self>, CallError>>;
+
+    fn notes(fmu: &UnderTest<Self>) -> Self::Notes;
+
+    /// Initialises a new instance with the default experiment, so that it is ready for its first step.
+    fn initialise(session: &mut Session<Self>) -> Result<()>;
+
+    /// Makes one communication step of the usual size with changing inputs.
+    fn make_usual_step(session: &mut Session<Self>) -> Result<()>;
+
+    /// Returns the magnitudes of the states by which the integrator measures errors.
+    fn magnitudes(session: &mut Session<Self>) -> Called<Vec<f64>>;
+
+    /// Accepts a step of the integrator and handles the events that follow. `crossed` says that an event
+    /// indicator has changed its sign.
+    fn complete_step(session: &mut Session<Self>, crossed: bool) -> Result<()>;
+
+    /// Returns the values of the elements of input number `n` at a step: its start values plus a sine.
+    fn stimulus(v: &Variable, step: usize, n: usize) -> Vec<f64>;
+
+    /// Brings the instance away from its usual trajectory, so that a following reset has something to undo.
+    fn leave_trajectory(session: &mut Session<Self>) -> Result<()>;
+
+    /// Provokes errors and returns the messages that the FMU logs, and how many of them have the category
+    /// NULL.
+    fn provoke_messages(fmu: &UnderTest<Self>) -> Result<(Vec<Message>, usize)>;
+}
+
+/// The loaded FMU, with a record of the call that is being made.
+pub struct UnderTest<V: Tested> {
+    pub description: &'static Description,
+    /// The continuous inputs and outputs of type Float64.
+    pub inputs: Vec<&'static Variable>,
+    pub outputs: Vec<&'static Variable>,
+    directory: PathBuf,
+    path: PathBuf,
+    /// State of the process before the binary was loaded, by name; see [`crate::life::surroundings`].
+    pub before: Vec<(&'static str, String)>,
+    /// One binary, or two if modelIdentifier differs between the interfaces.
+    binaries: Vec<Fmu<V>>,
+    /// The interfaces that can be called, Co-Simulation first, each with the index of its binary.
+    interfaces: Vec<(Interface, usize)>,
+    /// The modelIdentifiers of the binaries that cannot be loaded, with the reasons.
+    broken: Vec<(String, String)>,
+    deadline: Instant,
+    doing: RefCell<String>,
+    crash: RefCell<Crash>,
+    made: Cell<usize>,
+}
+
+fn element(interface: Interface) -> &'static str {
+    match interface {
+        Interface::CoSimulation => "CoSimulation",
+        Interface::ModelExchange => "ModelExchange",
+    }
+}
+
+impl<V: Tested> UnderTest<V> {
+    /// Loads the FMU that is unpacked in `directory`. No instances are created after `deadline`.
+    ///
+    /// # Errors
+    ///
+    /// If no binary can be loaded.
     pub fn open(
         directory: &Path,
         path: &Path,
         description: &'static Description,
         deadline: Instant,
-    ) -> Result<FmuUnderTest> {
-        let root = &description.root;
-        let mut loaded = Loaded::new(declared(root), deadline, |interface| {
-            Fmu::load_for(Some(interface), directory, path, root)
-        })?;
-        // If only one of two binaries is missing, another rule reports it.
-        let is_there = |identifier: &str| {
-            let file = format!("binaries/{PLATFORM}/{identifier}{}", std::env::consts::DLL_SUFFIX);
-            directory.join(file).exists()
-        };
-        loaded
-            .retain(|of, binary| of == Interface::CoSimulation || binary.has_exchange(), is_there);
+    ) -> Result<Self> {
         let continuous = |causality| {
-            let all = description.variables.iter();
-            all.filter(|v| v.causality == causality && v.is_continuous()).collect()
+            let fits = |v: &&Variable| {
+                v.causality == causality && v.is_continuous() && v.c_type == CType::Float64
+            };
+            description.variables.iter().filter(fits).collect()
         };
-        Ok(FmuUnderTest {
-            loaded,
+        let mut fmu = UnderTest {
             description,
             inputs: continuous(Causality::Input),
             outputs: continuous(Causality::Output),
             directory: directory.to_path_buf(),
             path: path.to_path_buf(),
-            before: Vec::new(),
-        })
+            before: life::surroundings(),
+            binaries: Vec::new(),
+            interfaces: Vec::new(),
+            broken: Vec::new(),
+            deadline,
+            doing: RefCell::default(),
+            crash: RefCell::new(Crash::Error),
+            made: Cell::new(0),
+        };
+        let mut names: Vec<&str> = Vec::new();
+        for interface in [Interface::CoSimulation, Interface::ModelExchange] {
+            let identifier = description.interface(element(interface));
+            let Some(name) = identifier.and_then(|e| e.get("modelIdentifier")) else { continue };
+            let at = match names.iter().position(|known| *known == name) {
+                Some(at) => at,
+                None => match Fmu::load_for(Some(interface), directory, path, &description.root) {
+                    Ok(binary) => {
+                        names.push(name);
+                        fmu.binaries.push(binary);
+                        names.len() - 1
+                    }
+                    Err(error) => {
+                        fmu.broken.push((name.into(), format!("{error:#}")));
+                        continue;
+                    }
+                },
+            };
+            fmu.interfaces.push((interface, at));
+        }
+        let why = || {
+            let mut all: Vec<&str> = fmu.broken().collect();
+            all.dedup();
+            if all.is_empty() { "it declares no interface".into() } else { all.join("; ") }
+        };
+        fmu.binaries.first().with_context(why)?;
+        // Where one of two binaries is missing, FMI 2.0 has a rule of its own.
+        let file =
+            |name: &str| format!("binaries/{}/{name}{}", V::PLATFORM, std::env::consts::DLL_SUFFIX);
+        fmu.broken.retain(|(name, _)| V::REPORTS_MISSING || directory.join(file(name)).exists());
+        let binaries = &fmu.binaries;
+        fmu.interfaces.retain(|(of, at)| V::is_called(description, *of, &binaries[*at]));
+        Ok(fmu)
     }
 
     /// Copies the unpacked FMU to `directory` and loads the copy, which the operating system treats as
     /// another library.
-    pub fn copy(&self, directory: &Path) -> Result<FmuUnderTest> {
+    pub fn copy(&self, directory: &Path) -> Result<Self> {
         copy_files(&self.directory, directory)?;
-        FmuUnderTest::open(directory, &self.path, self.description, self.deadline)
+        UnderTest::open(directory, &self.path, self.description, self.deadline)
     }
 
     pub fn directory(&self) -> &Path {
         &self.directory
     }
 
-    pub fn description(&self) -> &Description {
-        self.description
-    }
-
-    pub fn variables(&self) -> &[Variable] {
+    pub fn variables(&self) -> &'static [Variable] {
         &self.description.variables
     }
 
-    /// Returns pairs of derivative and state, in the order of ModelStructure, which is the order of all state
-    /// vectors.
-    pub fn states(&self) -> Vec<(&Variable, &Variable)> {
-        let d = self.description;
-        let pair = |unknown| {
-            let derivative = d.variable_of(unknown)?;
-            Some((derivative, d.at(derivative.derivative_of()?)?))
-        };
-        d.unknowns(d.words.derivatives).filter_map(pair).collect()
+    /// Returns the variables that rules read and set.
+    pub fn readable(&self) -> impl Iterator<Item = &'static Variable> + use<V> {
+        self.description.variables.iter().filter(|v| v.is_exchanged())
     }
 
     pub fn experiment(&self) -> Experiment {
@@ -176,207 +269,224 @@ impl FmuUnderTest {
         let above_0 = |x: &f64| *x > 0.0;
         let stop = number("stopTime").filter(|stop| *stop > start);
         let span = stop.map_or(f64::INFINITY, |stop| stop - start);
-        let step = number("stepSize").filter(above_0);
         // A step that passes the end at once would show nothing about the FMU.
-        let step = step.filter(|step| *step <= span).unwrap_or(span / 500.0);
+        let step = number("stepSize").filter(above_0);
+        let step = step.filter(|step| V::SUGGESTED_STEPS * step <= span).unwrap_or(span / 500.0);
         let step = if step.is_finite() { step } else { 0.01 };
+        // A multiple of the FMU's own step, of which there may be millions in a 500th of the experiment.
+        let stepping = self.description.interface("CoSimulation");
+        let own = stepping.and_then(|e| e.number("fixedInternalStepSize")).filter(above_0);
+        let step = own.map_or(step, |own| (step / own).round().clamp(1.0, 100.0) * own);
         Experiment { start, tolerance: number("tolerance").filter(above_0), stop, step }
     }
 
-    /// Instantiates the FMU with the arguments `with`. The outer error means that the FMU allows only one
-    /// instance in a process and already has had it, or that the deadline has passed.
-    pub fn instantiate(
+    /// Announces the next call, so that a crash or a hang in it is reported with this text.
+    pub fn announce(&self, what: impl Into<String>) {
+        let what = what.into();
+        trace::doing(&what, self.crash.borrow().clone());
+        *self.doing.borrow_mut() = what;
+    }
+
+    /// Makes calls whose crash is reported by `rule`, which makes the same calls, and not by the present
+    /// rule.
+    pub fn with_crash_reported_by<T>(&self, rule: &str, calls: impl FnOnce() -> T) -> T {
+        self.with_crash(Crash::ReportedBy(rule.into()), calls)
+    }
+
+    /// Makes calls whose effect the standard leaves open. A crash has the severity of the rule. If the calls
+    /// take longer than [`PATIENCE`], the process writes the findings so far, adds that the calls do not
+    /// return, and exits.
+    pub fn with_open_effect<T>(
+        &self,
+        what: impl Into<String>,
+        findings: &Findings,
+        calls: impl FnOnce() -> T,
+    ) -> T {
+        let what = what.into();
+        let mut found = findings.clone();
+        let place = what.clone();
+        let (returned, waiting) = mpsc::channel::<()>();
+        guard::spawn(move || {
+            if waiting.recv_timeout(PATIENCE) == Err(RecvTimeoutError::Timeout) {
+                found
+                    .at(place)
+                    .add(format!("no end after {PATIENCE:?} (allowed: every call returns)"));
+                // If the findings cannot be written, the time limit of the parent process reports the hang.
+                let _ = trace::done(found);
+                std::process::exit(0);
+            }
+        });
+        let answer = self.with_crash(Crash::Open, || {
+            self.announce(what);
+            calls()
+        });
+        drop(returned);
+        answer
+    }
+
+    /// Records that the check has chosen parameter values, for which the model may have no solution. A crash
+    /// or hang then ends the rule without a finding.
+    pub fn chose_values(&self) {
+        *self.crash.borrow_mut() = Crash::ReportedBy(String::new());
+    }
+
+    fn with_crash<T>(&self, crash: Crash, calls: impl FnOnce() -> T) -> T {
+        let before = self.crash.replace(crash);
+        let answer = calls();
+        self.crash.replace(before);
+        // The next call no longer has the special treatment.
+        self.announce(self.last_call());
+        answer
+    }
+
+    pub fn last_call(&self) -> String {
+        let doing = self.doing.borrow();
+        if doing.is_empty() { "a first call".into() } else { doing.clone() }
+    }
+
+    /// Returns the binary of an interface.
+    ///
+    /// # Errors
+    ///
+    /// If the interface cannot be called.
+    pub fn binary(&self, interface: Interface) -> Result<&Fmu<V>> {
+        let of = self.interfaces.iter().find(|(i, _)| *i == interface);
+        of.map(|(_, at)| &self.binaries[*at]).context("no such interface")
+    }
+
+    pub fn binaries(&self) -> &[Fmu<V>] {
+        &self.binaries
+    }
+
+    /// Lists the reasons why interfaces cannot be called although a binary exists.
+    pub fn broken(&self) -> impl Iterator<Item = &str> {
+        self.broken.iter().map(|(_, why)| &why[..])
+    }
+
+    pub fn interfaces(&self) -> Vec<Interface> {
+        self.interfaces.iter().map(|(interface, _)| *interface).collect()
+    }
+
+    pub fn has(&self, interface: Interface) -> bool {
+        self.binary(interface).is_ok()
+    }
+
+    /// Creates an instance by `make`. The rule is abandoned (outer error) if the FMU allows only one instance in
+    /// a process and already has had it, or if the deadline has passed.
+    pub fn make<T, E>(
         &self,
         interface: Interface,
-        with: &Instantiation,
-    ) -> Result<Result<Instance<'_>, CallError>> {
-        let is_once = self.can(interface, "canBeInstantiatedOnlyOncePerProcess");
-        let binary = self.binary(interface)?;
-        self.make(is_once, || binary.instantiate_with(with))
-    }
-
-    pub fn arguments(&self, interface: Interface) -> Result<Instantiation<'_>> {
-        let plain = self.binary(interface)?.instantiation("check");
-        Ok(Instantiation { kind: kind(interface), ..plain })
-    }
-
-    pub fn session_with(&self, interface: Interface, with: &Instantiation) -> Result<Session<'_>> {
-        let instance = self
-            .instantiate(interface, with)?
-            .map_err(|error| Unusable { rule: "load.instance", why: error.to_string() })?;
-        let Experiment { start, stop, step, .. } = self.experiment();
-        // The suggested step size holds for Co-Simulation only. A run of Model Exchange ends before the
-        // suggested stop time, after which a model may do anything.
-        let longest = match (interface, stop) {
-            (Interface::ModelExchange, Some(stop)) => (stop - start) / (3 * STEPS) as f64,
-            _ => f64::INFINITY,
+        make: impl FnOnce() -> Result<T, E>,
+    ) -> Result<Result<T, E>> {
+        let made = self.made.get();
+        let why = if made > 0 && self.can(interface, "canBeInstantiatedOnlyOncePerProcess") {
+            "it can be instantiated only once per process".into()
+        } else if Instant::now() > self.deadline {
+            format!("the time for its calls is over after {made} instances (--limit gives more)")
+        } else {
+            let instance = make();
+            self.made.set(made + usize::from(instance.is_ok()));
+            return Ok(instance);
         };
-        let states = self.states();
-        let nominal = |(_, state): &(&Variable, &Variable)| {
-            state.typed.number("nominal").map_or(UNKNOWN_NOMINAL, |_| state.nominal())
+        Err(Unusable { rule: "", why }.into())
+    }
+
+    pub fn uses(&self) -> Vec<Use> {
+        V::uses(self)
+    }
+
+    /// Creates an instance with ordinary arguments. If this fails, `load.instance` reports it.
+    pub fn session(&self, using: impl Into<Use>) -> Result<Session<'_, V>> {
+        let using = using.into();
+        let instance = V::make_instance(self, using)?;
+        self.session_of(using, instance)
+    }
+
+    fn session_of<'f>(
+        &'f self,
+        using: Use,
+        instance: Result<Instance<'f, V>, CallError>,
+    ) -> Result<Session<'f, V>> {
+        let instance =
+            instance.map_err(|error| Unusable { rule: "load.instance", why: error.to_string() })?;
+        let Experiment { start, stop, step, .. } = self.experiment();
+        // The suggested step size holds for Co-Simulation only.
+        let longest = match (using.interface, stop) {
+            (Interface::ModelExchange, Some(stop)) => (stop - start) / V::EXCHANGE_STEPS,
+            _ => f64::INFINITY,
         };
         Ok(Session {
             fmu: self,
-            interface,
+            using,
             instance,
             time: start,
             step: step.min(longest),
             count: 0,
             next_event: None,
-            nominals: states.iter().map(nominal).collect(),
             ended: None,
-            past_event: None,
-            immediate_events: 0,
-            values_changed: false,
-            nominals_changed: false,
-            hidden_jump: None,
-            asked: 0,
-            step_event: None,
+            notes: V::notes(self),
         })
     }
 
-    /// Creates an instance and brings it into the state `stage` of the standard's state machine.
-    pub fn session_in(&self, interface: Interface, stage: Stage) -> Result<Session<'_>> {
-        let mut session = self.session(interface)?;
-        match stage {
-            Stage::Instantiated => {}
-            Stage::Initialization => {
-                session.instance.setup_experiment(None, session.time, None)?;
-                session.instance.enter_initialization_mode()?;
-            }
-            Stage::Initialised | Stage::Terminated => {
-                session.initialise()?;
-                if session.is_ended() {
-                    let why =
-                        "the FMU asks for the end of the simulation when it is initialised".into();
-                    return Err(Unusable { rule: "exchange.terminate_simulation", why }.into());
-                }
-                if stage == Stage::Terminated {
-                    session.instance.terminate()?;
-                }
+    /// Creates an instance and initialises it with the FMU's default experiment, so that it is ready for a
+    /// step.
+    pub fn running(&self, using: impl Into<Use>) -> Result<Session<'_, V>> {
+        let mut session = self.session(using)?;
+        session.initialise()?;
+        match V::TERMINATION.filter(|_| session.is_ended()) {
+            None => Ok(session),
+            Some(rule) => {
+                let why = "the FMU asks for the end of the simulation when it is initialised";
+                Err(Unusable { rule, why: why.into() }.into())
             }
         }
-        Ok(session)
-    }
-}
-
-impl UnderTest for FmuUnderTest {
-    type Version = Fmi2;
-    type Use = Interface;
-    type Session<'f> = Session<'f>;
-    const FMI: &'static str = "fmi2";
-    const NUMBER: &'static str = "2.0";
-    const STATE: &'static str = "FMUstate";
-
-    fn root(&self) -> &Element {
-        &self.description.root
     }
 
-    fn uses(&self) -> Vec<Interface> {
-        self.interfaces()
-    }
-
-    fn name(interface: Interface) -> &'static str {
-        match interface {
-            Interface::CoSimulation => "Co-Simulation",
-            Interface::ModelExchange => "Model Exchange",
+    /// Returns an initialised instance for Co-Simulation, or skips the rule if the FMU has no Co-Simulation.
+    pub fn stepping(&self) -> Result<Session<'_, V>> {
+        match self.has(Interface::CoSimulation) {
+            true => self.running(Interface::CoSimulation),
+            false => skip("the FMU offers no Co-Simulation"),
         }
     }
 
-    fn interface(interface: Interface) -> Interface {
-        interface
-    }
-
-    fn session(&self, interface: Interface) -> Result<Session<'_>> {
-        self.announce("fmi2Instantiate");
-        let with = Instantiation { logging: false, ..self.arguments(interface)? };
-        self.session_with(interface, &with)
-    }
-
-    fn running(&self, interface: Interface) -> Result<Session<'_>> {
-        self.session_in(interface, Stage::Initialised)
-    }
-
-    fn provoke_messages(&self) -> Result<(Vec<Message>, usize)> {
-        let interface = self.first_interface()?;
-        let mut all = Vec::new();
-        self.announce("fmi2Instantiate with another GUID");
-        let with = Instantiation { guid: Some("another"), ..self.arguments(interface)? };
-        if let Err(error) = self.instantiate(interface, &with)? {
-            all.extend(error.messages);
+    /// Returns an initialised instance for Model Exchange, or skips the rule if the FMU has no Model Exchange.
+    pub fn exchanging(&self) -> Result<Session<'_, V>> {
+        match self.has(Interface::ModelExchange) {
+            true => self.running(Interface::ModelExchange),
+            false => skip("the FMU offers no Model Exchange"),
         }
-        let mut session = self.session(interface)?;
-        self.announce("fmi2SetDebugLogging");
-        session
-            .instance
-            .set_debug_logging(true, &[])
-            .map_err(|error| Unusable { rule: "log.switch", why: error.to_string() })?;
-        self.with_crash_reported_by("life.order", || {
-            self.announce("fmi2ExitInitializationMode in state \"instantiated\"");
-            let _ = session.instance.exit_initialization_mode();
-        });
-        if session.initialise().is_ok() {
-            self.with_crash_reported_by("values.unknown", || {
-                self.announce("fmi2GetReal of an unknown value reference");
-                let _ = session.instance.get_real(&[u32::MAX], &mut [0.0]);
-            });
-            let _ = session.advance(STEPS); // after an error an FMU may refuse all calls
-        }
-        all.extend(session.instance.take_messages());
-        Ok((all, session.instance.uncategorised()))
     }
-}
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stage {
-    Instantiated,
-    Initialization,
-    Initialised,
-    Terminated,
-}
+    /// Returns true if the element of `interface` declares the capability `flag`.
+    pub fn can(&self, interface: Interface, flag: &str) -> bool {
+        self.description.interface(element(interface)).is_some_and(|element| element.flag(flag))
+    }
 
-impl Stage {
-    pub fn name(self) -> &'static str {
-        match self {
-            Stage::Instantiated => "instantiated",
-            Stage::Initialization => "initialization mode",
-            Stage::Initialised => "initialised",
-            Stage::Terminated => "terminated",
+    /// Skips the rule unless the element of `interface` declares the capability `flag`.
+    pub fn require(&self, interface: Interface, flag: &str) -> Result<()> {
+        match self.can(interface, flag) {
+            true => Ok(()),
+            false => skip(format!("{flag} is not declared")),
         }
     }
 }
 
-pub fn kind(interface: Interface) -> i32 {
-    match interface {
-        Interface::CoSimulation => CO_SIMULATION,
-        Interface::ModelExchange => MODEL_EXCHANGE,
-    }
-}
-
-pub struct Session<'f> {
-    pub fmu: &'f FmuUnderTest,
-    pub interface: Interface,
-    pub instance: Instance<'f>,
+/// An instance together with the state of the host that simulates it.
+pub struct Session<'f, V: Tested = Fmi2> {
+    pub fmu: &'f UnderTest<V>,
+    pub using: Use,
+    pub instance: Instance<'f, V>,
     /// Simulation time that has been reached, s.
     pub time: f64,
     pub step: f64,
     /// Number of steps so far, from which the changing inputs follow.
     pub count: usize,
-    pub(super) next_event: Option<f64>,
-    nominals: Vec<f64>,
-    pub(super) ended: Option<(f64, &'static str)>,
-    /// The first time at which nextEventTime was in the past, and this nextEventTime, s.
-    pub(super) past_event: Option<(f64, f64)>,
-    immediate_events: usize,
-    /// Result of the last event iteration: whether states, and whether their nominals, have changed.
-    values_changed: bool,
-    pub(super) nominals_changed: bool,
-    /// The first state that an event has changed although valuesOfContinuousStatesChanged was false: time,
-    /// index, and both values.
-    pub(super) hidden_jump: Option<(f64, usize, f64, f64)>,
-    asked: usize,
-    /// The first of these events that has changed a value: time, name, and both values as text.
-    pub(super) step_event: Option<(f64, String, String)>,
+    /// Time of the next event that the FMU has announced, s.
+    pub next_event: Option<f64>,
+    /// Time at which the FMU has requested the end of the simulation, s, and the call.
+    pub ended: Option<(f64, &'static str)>,
+    pub notes: V::Notes,
 }
 
 /// State of the host that a saved FMU state does not contain.
@@ -388,79 +498,31 @@ pub struct Mark {
     ended: Option<(f64, &'static str)>,
 }
 
-impl<'f> Session<'f> {
-    /// Initialises with these start and stop times (s) and this tolerance.
-    pub fn initialise_at(
-        &mut self,
-        start: f64,
-        stop: Option<f64>,
-        tolerance: Option<f64>,
-    ) -> Result<()> {
-        (self.ended, self.next_event) = (None, None);
-        self.fmu.announce(format!("fmi2SetupExperiment, startTime = {start}"));
-        self.instance.setup_experiment(tolerance, start, stop)?;
-        self.time = start;
-        self.fmu.announce("fmi2EnterInitializationMode");
-        self.instance.enter_initialization_mode()?;
-        self.leave_initialisation()
+/// Values of the readable variables, each with its elements.
+pub type Readings = Vec<Vec<Value>>;
+
+impl<V: Tested> Session<'_, V> {
+    pub fn initialise(&mut self) -> Result<()> {
+        V::initialise(self)
     }
 
-    /// Calls fmi2ExitInitializationMode, and in Model Exchange goes on to continuous-time mode.
-    pub fn leave_initialisation(&mut self) -> Result<()> {
-        self.fmu.announce("fmi2ExitInitializationMode");
-        self.instance.exit_initialization_mode()?;
-        match self.interface {
-            Interface::CoSimulation => Ok(()),
-            Interface::ModelExchange => self.leave_event(),
-        }
-    }
-
-    /// Iterates events until no new event is requested, and then enters continuous-time mode (Model
-    /// Exchange).
-    pub fn leave_event(&mut self) -> Result<()> {
-        self.iterate_events()?;
-        if self.is_ended() {
-            return Ok(());
-        }
-        self.fmu.announce("fmi2EnterContinuousTimeMode");
-        Ok(self.instance.enter_continuous_time_mode()?)
-    }
-
-    /// Calls fmi2NewDiscreteStates until no new iteration is requested.
-    fn iterate_events(&mut self) -> Result<()> {
-        self.fmu.announce("fmi2NewDiscreteStates");
-        (self.values_changed, self.nominals_changed) = (false, false);
-        for _ in 0..ITERATIONS {
-            let info = self.instance.new_discrete_states()?;
-            self.values_changed |= info.values_changed != 0;
-            self.nominals_changed |= info.nominals_changed != 0;
-            if info.terminate_simulation != 0 {
-                self.end("fmi2NewDiscreteStates");
+    /// Makes `steps` communication steps of the usual size with changing inputs. Stops early if the FMU
+    /// requests the end of the simulation.
+    ///
+    /// # Errors
+    ///
+    /// If a step fails; `steps.run` or `exchange.run` reports this.
+    pub fn advance(&mut self, steps: usize) -> Result<()> {
+        for _ in 0..steps {
+            if self.is_ended() {
+                break;
             }
-            if info.new_discrete_states_needed == 0 || self.is_ended() {
-                self.next_event =
-                    (info.next_event_time_defined != 0).then_some(info.next_event_time);
-                let now = self.next_event.is_some_and(|next| next == self.time);
-                self.immediate_events = if now { self.immediate_events + 1 } else { 0 };
-                let passed = |next: f64| next.is_nan() || next < self.time;
-                if let Some(next) = self.next_event
-                    && (passed(next) || self.immediate_events >= IMMEDIATE)
-                {
-                    self.past_event.get_or_insert((self.time, next));
-                }
-                return Ok(());
-            }
+            V::make_usual_step(self)?;
         }
-        let why = format!(
-            "newDiscreteStatesNeeded is still true after {ITERATIONS} calls of \
-             fmi2NewDiscreteStates at t = {:?} s, each of which returned fmi2OK (allowed: an \
-             iteration that ends)",
-            self.time
-        );
-        Err(Unusable { rule: "exchange.event_iteration", why }.into())
+        Ok(())
     }
 
-    fn end(&mut self, call: &'static str) {
+    pub fn end(&mut self, call: &'static str) {
         self.ended.get_or_insert((self.time, call));
     }
 
@@ -470,281 +532,134 @@ impl<'f> Session<'f> {
         self.ended.is_some()
     }
 
-    pub(super) fn states(&self) -> usize {
-        self.fmu.description.states().len()
-    }
-
-    pub(super) fn nominal(&self, state: usize) -> f64 {
-        self.nominals.get(state).copied().unwrap_or(UNKNOWN_NOMINAL)
-    }
-
-    /// Calls fmi2CompletedIntegratorStep and handles the events that follow. `crossed` says that an event
-    /// indicator has changed its sign.
-    pub(super) fn complete_step(&mut self, crossed: bool) -> Result<()> {
-        let completed = self.instance.completed_integrator_step()?;
-        if completed.terminate {
-            self.end("fmi2CompletedIntegratorStep");
-        }
-        let due = self.next_event.is_some_and(|next| self.time >= next);
-        if !(completed.enter_event_mode || crossed || due) {
-            return Ok(());
-        }
-        let is_asked = !crossed && !due && self.asked < ASKED && self.step_event.is_none();
-        if !is_asked {
-            return self.event();
-        }
-        self.asked += 1;
-        let before = Observed::read(self)?;
-        self.event()?;
-        if !self.is_ended()
-            && let Some((name, change)) = before.change(&Observed::read(self)?, self.fmu)
-        {
-            self.step_event = Some((self.time, name.to_string(), change));
-        }
-        Ok(())
-    }
-
-    pub(super) fn event(&mut self) -> Result<()> {
-        let n = self.states();
-        let before = self.read_states(n)?;
-        self.instance.enter_event_mode()?;
-        self.leave_event()?;
-        if self.values_changed || self.is_ended() {
-            return Ok(());
-        }
-        let after = self.read_states(n)?;
-        let jumps = |i: &usize| {
-            let size = before[*i].abs().max(after[*i].abs()).max(1e-3 * self.nominal(*i));
-            (before[*i] - after[*i]).abs() > JUMP * size
-        };
-        if let Some(i) = (0..n).find(jumps) {
-            self.hidden_jump.get_or_insert((self.time, i, before[i], after[i]));
-        }
-        Ok(())
-    }
-
-    /// Sets all Real inputs to values that change from step to step.
+    /// Sets all continuous inputs to values that change from step to step.
     pub fn stimulate(&mut self) -> Called {
-        let fmu = self.fmu;
-        for (n, v) in fmu.inputs.iter().enumerate() {
-            let x = stimulus(v, self.count, n);
-            self.set(v, &Reading::Real(x))?;
+        for (n, v) in self.fmu.inputs.iter().enumerate() {
+            let values = V::stimulus(v, self.count, n).into_iter().map(Value::Real);
+            self.instance.set_values(v.c_type, v.reference, &values.collect::<Vec<_>>())?;
         }
         Ok(())
     }
 
-    /// Advances like [`Life::advance`], but with constant inputs.
-    pub fn coast(&mut self, steps: usize) -> Result<()> {
-        self.steps(steps, |_| Ok(()))
+    /// Reads all elements of a variable; the caller handles a refusal.
+    pub fn elements(&mut self, v: &Variable) -> Called<Vec<Value>> {
+        self.instance.values(v.c_type, v.reference, v.length())
     }
 
-    fn steps(&mut self, steps: usize, prepare: fn(&mut Self) -> Called) -> Result<()> {
-        let rule = match self.interface {
-            Interface::CoSimulation => "steps.run",
-            Interface::ModelExchange => "exchange.run",
-        };
-        for _ in 0..steps {
-            if self.is_ended() {
-                break;
-            }
-            let done = prepare(self).map_err(anyhow::Error::from);
-            done.and_then(|()| self.make_step(self.step)).map_err(|error| {
-                match error.downcast() {
-                    Ok(unusable) => Unusable { ..unusable },
-                    Err(error) => Unusable { rule, why: error.to_string() },
-                }
-            })?;
-        }
-        Ok(())
-    }
-
-    /// Returns true if a step was discarded because the FMU requests the end of the simulation
-    /// (fmi2Terminated).
-    pub(super) fn has_terminated(&mut self, error: &CallError) -> bool {
-        const TERMINATED: i32 = 3; // fmi2Terminated of fmi2StatusKind
-        error.status == Status::Discard
-            && self.instance.boolean_status(TERMINATED).is_ok_and(|ended| ended)
-    }
-
-    /// Makes one step of `h` seconds without changing the inputs. In Model Exchange the step may end earlier
-    /// if the states change fast.
-    pub fn make_step(&mut self, h: f64) -> Result<()> {
-        self.fmu.announce(format!(
-            "a step from {:?} s by {h:?} s ({})",
-            self.time,
-            FmuUnderTest::name(self.interface)
-        ));
-        match self.interface {
-            Interface::CoSimulation => match self.instance.do_step(self.time, h) {
-                Ok(()) => self.time += h,
-                Err(error) if self.has_terminated(&error) => self.end("fmi2DoStep"),
-                Err(error) => return Err(error.into()),
-            },
-            Interface::ModelExchange => self.integrate(self.time + h)?,
-        }
-        self.count += 1;
-        Ok(())
-    }
-
-    pub fn indicators(&self) -> usize {
-        let root = &self.fmu.description.root;
-        root.number("numberOfEventIndicators").unwrap_or(0.0) as usize
-    }
-
-    pub fn get(&mut self, v: &Variable) -> Called<Reading> {
-        let reference = [v.reference];
-        Ok(match v.kind {
-            Type::Real => {
-                let mut value = [f64::NAN];
-                self.instance.get_real(&reference, &mut value)?;
-                Reading::Real(value[0])
-            }
-            Type::Integer | Type::Enumeration => {
-                let mut value = [0];
-                self.instance.get_integer(&reference, &mut value)?;
-                Reading::Integer(value[0])
-            }
-            Type::Boolean => {
-                let mut value = [0];
-                self.instance.get_boolean(&reference, &mut value)?;
-                Reading::Boolean(value[0])
-            }
-            // FMI 2.0 has no Binary and no Clock.
-            Type::String | Type::Binary | Type::Clock => {
-                Reading::Text(self.instance.get_string(&reference)?.pop().unwrap_or_default())
-            }
-        })
-    }
-
-    pub fn set(&mut self, v: &Variable, value: &Reading) -> Called {
-        let reference = [v.reference];
-        match value {
-            Reading::Real(x) => self.instance.set_real(&reference, &[*x]),
-            Reading::Integer(n) => self.instance.set_integer(&reference, &[*n]),
-            Reading::Boolean(b) => self.instance.set_boolean(&reference, &[*b]),
-            Reading::Text(text) => self.instance.set_string(&reference, &[text]),
-        }
-    }
-
-    pub fn real(&mut self, v: &Variable) -> Result<f64> {
-        Ok(if let Reading::Real(x) = self.read(v)? { x } else { f64::NAN })
-    }
-
-    /// Reads a variable in an ordinary run. If this fails, `values.readable` reports it.
-    pub fn read(&mut self, v: &Variable) -> Result<Reading> {
-        self.get(v).map_err(|error| {
+    /// Reads all elements of a variable in an ordinary run. If this fails, `values.readable` reports it.
+    pub fn read(&mut self, v: &Variable) -> Result<Vec<Value>> {
+        self.elements(v).map_err(|error| {
             let why = format!("{} cannot be read: {error}", v.name);
             Unusable { rule: "values.readable", why }.into()
         })
     }
-}
 
-impl<'f> Life<'f, Fmi2> for Session<'f> {
-    type Reading = Reading;
-    type Mark = Mark;
-
-    fn instance(&mut self) -> &mut Instance<'f> {
-        &mut self.instance
+    /// Returns the numbers of continuous states and event indicators.
+    pub fn sizes(&mut self) -> Called<(usize, usize)> {
+        V::sizes(&mut self.instance)
     }
 
-    /// Initialises with the FMU's default experiment, and in Model Exchange goes on to continuous-time mode.
-    fn initialise(&mut self) -> Result<()> {
-        let Experiment { start, tolerance, .. } = self.fmu.experiment();
-        self.initialise_at(start, None, tolerance).map_err(|error| match error.downcast() {
-            Ok(unusable) => Unusable { ..unusable }.into(),
-            Err(error) => Unusable { rule: "load.initialises", why: error.to_string() }.into(),
-        })
+    fn vector(
+        &mut self,
+        length: usize,
+        read: fn(&mut Instance<V>, &mut [f64]) -> Called,
+    ) -> Called<Vec<f64>> {
+        let mut vector = vec![f64::NAN; length];
+        // Hosts do not ask for vectors that are empty.
+        if length > 0 {
+            read(&mut self.instance, &mut vector)?;
+        }
+        Ok(vector)
     }
 
-    fn advance(&mut self, steps: usize) -> Result<()> {
-        self.steps(steps, Session::stimulate)
+    pub fn states(&mut self) -> Called<Vec<f64>> {
+        let (states, _) = self.sizes()?;
+        self.vector(states, |instance, x| instance.continuous_states(x))
     }
 
-    fn readings(&mut self) -> Result<Vec<Reading>> {
-        let fmu = self.fmu;
-        fmu.variables().iter().map(|v| self.read(v)).collect()
+    pub fn derivatives(&mut self) -> Called<Vec<f64>> {
+        let (states, _) = self.sizes()?;
+        self.vector(states, |instance, dx| instance.derivatives(dx))
     }
 
-    fn difference(&self, ours: &[Reading], theirs: &[Reading]) -> Option<String> {
-        let all = self.fmu.variables().iter().zip(ours.iter().zip(theirs));
-        let mut different = all.filter(|(_, (a, b))| !a.is_identical(b));
-        let (v, (a, b)) = different.next()?;
+    pub fn nominals(&mut self) -> Called<Vec<f64>> {
+        let (states, _) = self.sizes()?;
+        self.vector(states, |instance, x| instance.nominals(x))
+    }
+
+    pub fn indicators(&mut self) -> Called<Vec<f64>> {
+        let (_, indicators) = self.sizes()?;
+        self.vector(indicators, |instance, z| instance.event_indicators(z))
+    }
+
+    pub fn readings(&mut self) -> Result<Readings> {
+        self.fmu.readable().map(|v| self.read(v)).collect()
+    }
+
+    /// Describes the first variable whose value differs in at least one bit, or returns `None` if all are
+    /// equal.
+    pub fn difference(&self, ours: &Readings, theirs: &Readings) -> Option<String> {
+        let all = self.fmu.readable().zip(ours.iter().zip(theirs));
+        let mut different = all.filter_map(|(v, (a, b))| {
+            let pair = a.iter().zip(b).find(|(a, b)| !a.is_identical(b))?;
+            Some((&v.name, pair))
+        });
+        let (name, (a, b)) = different.next()?;
         let more = match different.count() {
             0 => String::new(),
             n => format!(" ({n} more differ)"),
         };
-        Some(format!("{} is {a}, not {b}{more}", v.name))
+        Some(format!("{name} is {a}, not {b}{more}"))
     }
 
-    fn mark(&self) -> Mark {
+    /// Reads a value reference that no variable has, and returns the FMU's refusal with its messages. If this
+    /// crashes, `values.unknown` reports it.
+    pub fn refused(&mut self) -> Option<CallError> {
+        self.fmu.with_crash_reported_by("values.unknown", || {
+            self.fmu.announce(V::UNKNOWN_READ);
+            V::reals(&mut self.instance, &[u32::MAX], &mut [0.0]).err()
+        })
+    }
+
+    pub fn mark(&self) -> Mark {
         Mark { time: self.time, count: self.count, next_event: self.next_event, ended: self.ended }
     }
 
-    fn go_back(&mut self, to: &Mark) {
+    pub fn go_back(&mut self, to: &Mark) {
         (self.time, self.count) = (to.time, to.count);
         (self.next_event, self.ended) = (to.next_event, to.ended);
     }
 
-    fn leave_trajectory(&mut self) -> Result<()> {
-        let fmu = self.fmu;
-        for v in fmu.variables().iter().filter(|v| v.is_set_by_hosts() && v.is_real()) {
-            let Some(Reading::Real(start)) = start_value(v) else { continue };
-            let (min, max) = v.bounds();
-            let moved = start * 1.01;
-            if moved >= min && moved <= max {
-                // A value that the FMU refuses keeps its old value.
-                let _ = self.set(v, &Reading::Real(moved));
+    /// Returns the host's own state to the start, which is where the FMU is after a reset.
+    pub fn rewind(&mut self) {
+        let time = self.fmu.experiment().start;
+        self.go_back(&Mark { time, count: 0, next_event: None, ended: None });
+    }
+}
+
+/// Returns the start value of each element, or `None` if the description has none or it is not valid.
+pub fn start_values(v: &Variable) -> Option<Vec<Value>> {
+    let value = |text: &String| {
+        Some(match v.kind {
+            Type::Real if v.c_type == CType::Float32 => {
+                Value::Real(f64::from(double(text)? as f32))
             }
-        }
-        if self.initialise_at(fmu.experiment().start + 1.0, None, Some(1e-3)).is_ok() {
-            self.count = 7;
-            let _ = self.advance(5); // these parameters may have no solution
-        }
-        Ok(())
-    }
-
-    fn rewind(&mut self) {
-        self.count = 0;
-    }
-}
-
-/// Returns the value of input number `n` at a step: a sine around its start value, within its bounds.
-pub fn stimulus(v: &Variable, step: usize, n: usize) -> f64 {
-    let start = v.typed.number("start").filter(|x| x.is_finite()).unwrap_or(0.0);
-    let (min, max) = v.bounds();
-    let scale = match v.typed.number("nominal") {
-        Some(_) => v.nominal(),
-        None => start.abs().max(0.1),
+            Type::Real => Value::Real(double(text)?),
+            Type::Integer | Type::Enumeration => Value::Integer(text.trim().parse().ok()?),
+            Type::Boolean => Value::Boolean(matches!(text.trim(), "true" | "1")),
+            Type::String => Value::String(text.clone()),
+            Type::Binary | Type::Clock => return None,
+        })
     };
-    let moved = start + 0.3 * scale * (0.7 * step as f64 + 1.0 + n as f64).sin();
-    // Checked first, because clamp panics if min is above max.
-    moved.max(min).min(max.max(min))
-}
-
-/// Reads the start value in modelDescription.xml, or returns `None` if there is none or it is not valid.
-pub fn start_value(v: &Variable) -> Option<Reading> {
-    let text = v.typed.get("start")?;
-    Some(match v.kind {
-        Type::Real => Reading::Real(host::xml::double(text)?),
-        Type::Integer | Type::Enumeration => Reading::Integer(text.trim().parse().ok()?),
-        Type::Boolean => Reading::Boolean(matches!(text.trim(), "true" | "1").into()),
-        Type::String | Type::Binary | Type::Clock => Reading::Text(text.to_string()),
-    })
-}
-
-pub(super) fn copy_files(from: &Path, to: &Path) -> Result<()> {
-    std::fs::create_dir_all(to)?;
-    for entry in std::fs::read_dir(from)? {
-        let (path, name) = entry.map(|e| (e.path(), e.file_name()))?;
-        let copy = to.join(&name);
-        // A library must be copied, because otherwise the loader takes it for the one that is already
-        // loaded. For all other files a hard link is enough.
-        let is_library = path.extension().is_some_and(|e| e == std::env::consts::DLL_EXTENSION);
-        if path.is_dir() {
-            copy_files(&path, &copy)?;
-        } else if is_library || std::fs::hard_link(&path, &copy).is_err() {
-            std::fs::copy(&path, &copy)?;
-        }
+    let all: Vec<Value> = v.starts.iter().map(value).collect::<Option<_>>()?;
+    match all.len() {
+        0 => None,
+        1 => Some(vec![all[0].clone(); v.length()]),
+        n => (n == v.length()).then_some(all),
     }
-    Ok(())
+}
+
+/// Returns the start value of a scalar.
+pub fn start_value(v: &Variable) -> Option<Value> {
+    start_values(v)?.into_iter().next()
 }

@@ -10,11 +10,11 @@ use std::f64::consts::PI;
 
 use super::description::Description;
 use super::findings::Findings;
+use host::description::BaseUnit;
 use host::xml::Element;
 
-/// Base units of FMI 2.0 in the order of the schema. The radian comes last, because it has dimension 1 and
-/// authors may write it or leave it out.
-const BASE: [&str; 8] = ["kg", "m", "s", "A", "K", "mol", "cd", "rad"];
+/// Position of the radian among [`BaseUnit::NAMES`]. It has dimension 1, and authors may write it or leave it
+/// out.
 const RADIAN: usize = 7;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,7 +49,7 @@ impl Unit {
 
     /// Writes the unit as UnitDefinitions does, for example "kg=1, m=2, s=-2".
     fn text(&self) -> String {
-        let mut text: Vec<String> = BASE
+        let mut text: Vec<String> = BaseUnit::NAMES
             .iter()
             .zip(self.exponents)
             .filter(|(_, e)| *e != 0)
@@ -221,19 +221,8 @@ fn factor(rest: &mut &str) -> Option<Vec<Unit>> {
 
 /// Returns the unit in an element BaseUnit, or `None` if it is missing or one of its numbers is not valid.
 fn declared(unit: &Element) -> Option<Unit> {
-    let base = unit.child("BaseUnit")?;
-    let mut exponents = [0; 8];
-    for (exponent, name) in exponents.iter_mut().zip(BASE) {
-        *exponent = match base.get(name) {
-            Some(text) => text.trim().parse().ok()?,
-            None => 0,
-        };
-    }
-    Some(Unit {
-        exponents,
-        factor: number(base, "factor", 1.0)?,
-        offset: number(base, "offset", 0.0)?,
-    })
+    let BaseUnit { exponents, factor, offset } = BaseUnit::from_element(unit)?;
+    Some(Unit { exponents, factor, offset })
 }
 
 fn number(element: &Element, attribute: &str, default: f64) -> Option<f64> {

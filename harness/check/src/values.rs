@@ -5,12 +5,12 @@ use anyhow::Result;
 use super::description::Variable;
 use super::findings::Findings;
 use super::life::expect_refusal;
-use super::under_test::{FmuUnderTest, Life, Reading, STEPS, Session, UnderTest, start_value};
+use super::under_test::{FmuUnderTest, STEPS, Session, start_value};
 use host::causality::{Causality, Variability};
-use host::description::Type;
+use host::description::{Type, Value};
 use host::fmi2::{Called, Instance};
 
-fn settable(fmu: &FmuUnderTest) -> impl Iterator<Item = (&Variable, Reading)> {
+fn settable(fmu: &FmuUnderTest) -> impl Iterator<Item = (&Variable, Value)> {
     let all = fmu.variables().iter().filter(|v| v.is_set_by_hosts());
     all.filter_map(|v| Some((v, start_value(v)?)))
 }
@@ -26,10 +26,10 @@ fn initializing<'f>(fmu: &'f FmuUnderTest) -> Result<Session<'f>> {
 
 /// Returns true if a value equals the value in modelDescription.xml within half a unit of the 15th digit plus
 /// rounding, because a double keeps 15 decimal digits.
-fn has_digits_of(value: &Reading, written: &Reading) -> bool {
+fn has_digits_of(value: &Value, written: &Value) -> bool {
     const HALF_A_UNIT: f64 = 5e-15;
     match (value, written) {
-        (Reading::Real(value), Reading::Real(written)) if value.is_finite() => {
+        (Value::Real(value), Value::Real(written)) if value.is_finite() => {
             let largest = value.abs().max(written.abs());
             (value - written).abs() <= (HALF_A_UNIT + f64::EPSILON) * largest
         }
@@ -76,7 +76,7 @@ pub fn readable(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             fmu.announce(format!("reading {} {when}", v.name));
             let fault = match session.get(v) {
                 Err(error) => error.to_string(),
-                Ok(Reading::Real(x)) if !x.is_finite() => {
+                Ok(Value::Real(x)) if !x.is_finite() => {
                     format!("it is {x} {when} (allowed: finite)")
                 }
                 Ok(_) => continue,
@@ -102,15 +102,16 @@ pub fn booleans(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     }
     for v in all {
         fmu.announce(format!("reading and setting {}", v.name));
-        if let Reading::Boolean(value @ (..=-1 | 2..)) = session.get(v)? {
-            findings.at(v.place()).fail(format!("it reads as {value} (allowed: 0 and 1)"));
+        let (reference, mut value) = ([v.reference], [0]);
+        session.instance.get_boolean(&reference, &mut value)?;
+        if !matches!(value, [0 | 1]) {
+            findings.at(v.place()).fail(format!("it reads as {} (allowed: 0 and 1)", value[0]));
         }
-        if v.is_set_by_hosts() && session.set(v, &Reading::Boolean(2)).is_ok() {
-            match session.get(v)? {
-                Reading::Boolean(1) => {}
-                other => findings
-                    .at(v.place())
-                    .add(format!("set to 2, which is true, it reads {other:?}")),
+        if v.is_set_by_hosts() && session.instance.set_boolean(&reference, &[2]).is_ok() {
+            session.instance.get_boolean(&reference, &mut value)?;
+            if value != [1] {
+                let text = format!("set to 2, which is true, it reads {}", value[0]);
+                findings.at(v.place()).add(text);
             }
         }
     }
@@ -148,31 +149,31 @@ pub fn round_trip(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 }
 
 /// Returns another allowed value near `start`, or `None` if there is none.
-pub fn other_value(fmu: &FmuUnderTest, v: &Variable, start: &Reading) -> Option<Reading> {
+pub fn other_value(fmu: &FmuUnderTest, v: &Variable, start: &Value) -> Option<Value> {
     let (min, max) = v.bounds();
     match start {
-        Reading::Real(x) => {
+        Value::Real(x) => {
             let step = x.abs().max(v.nominal() * 1e-3) / 1024.0;
             let step = step.min((max - min) / 4.0);
             let moved = if x + step <= max { x + step } else { x - step };
-            (moved >= min && moved != *x).then_some(Reading::Real(moved))
+            (moved >= min && moved != *x).then_some(Value::Real(moved))
         }
-        Reading::Integer(n) => {
-            let allowed: Vec<i32> = match v.kind {
+        Value::Integer(n) => {
+            let allowed: Vec<i64> = match v.kind {
                 Type::Enumeration => items(fmu, v),
                 _ => vec![n.saturating_add(1), n.saturating_sub(1)],
             };
-            let fits = |m: &i32| m != n && f64::from(*m) >= min && f64::from(*m) <= max;
-            allowed.into_iter().find(fits).map(Reading::Integer)
+            let fits = |m: &i64| m != n && *m as f64 >= min && *m as f64 <= max;
+            allowed.into_iter().find(fits).map(Value::Integer)
         }
-        Reading::Boolean(b) => Some(Reading::Boolean((*b == 0).into())),
-        Reading::Text(text) => Some(Reading::Text(format!("{text}x"))),
+        Value::Boolean(b) => Some(Value::Boolean(!b)),
+        Value::String(text) => Some(Value::String(format!("{text}x"))),
     }
 }
 
-pub fn items(fmu: &FmuUnderTest, v: &Variable) -> Vec<i32> {
+pub fn items(fmu: &FmuUnderTest, v: &Variable) -> Vec<i64> {
     let declared = v.typed.get("declaredType");
-    let types = fmu.description().root.list("TypeDefinitions");
+    let types = fmu.description.root.list("TypeDefinitions");
     let simple = types.filter(|t| t.get("name").is_some() && t.get("name") == declared);
     let items = simple.flat_map(|t| t.list("Enumeration"));
     items.filter_map(|item| item.get("value")?.trim().parse().ok()).collect()
@@ -347,8 +348,8 @@ pub fn limits(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                 let mut session = fmu.session(fmu.first_interface()?)?;
                 fmu.announce(format!("setting {} to {x:?} and initialising", v.name));
                 let value = match v.kind {
-                    Type::Real => Reading::Real(x),
-                    _ => Reading::Integer(x as i32),
+                    Type::Real => Value::Real(x),
+                    _ => Value::Integer(x as i64),
                 };
                 if let Err(error) = session.set(v, &value) {
                     return Ok(Some(error.to_string()));
@@ -398,7 +399,7 @@ pub fn not_a_number(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             let mut session = fmu.session(fmu.first_interface()?)?;
             let place = format!("{} = {x}, then a step", v.name);
             let refused = fmu.with_open_effect(&place, findings, || {
-                session.set(v, &Reading::Real(x)).is_err()
+                session.set(v, &Value::Real(x)).is_err()
                     || session.initialise().is_err()
                     || session.make_step(session.step).is_err()
             });
@@ -420,7 +421,7 @@ pub fn no_warning(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         session.readings()?;
         if let Some(call) = session.instance.take_warning() {
             findings
-                .at(format!("an ordinary run ({})", FmuUnderTest::name(interface)))
+                .at(format!("an ordinary run ({interface})"))
                 .add(format!("{call} returns fmi2Warning (allowed: fmi2OK)"));
         }
     }

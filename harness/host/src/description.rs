@@ -210,6 +210,18 @@ impl CType {
         })
     }
 
+    /// Returns the C type and the displayed type for the child of a ScalarVariable in FMI 2.0.
+    pub fn from_child_name(name: &str) -> Option<(CType, Type)> {
+        Some(match name {
+            "Real" => (CType::Float64, Type::Real),
+            "Integer" => (CType::Int32, Type::Integer),
+            "Boolean" => (CType::Boolean, Type::Boolean),
+            "String" => (CType::String, Type::String),
+            "Enumeration" => (CType::Int32, Type::Enumeration),
+            _ => return None,
+        })
+    }
+
     /// Returns the smallest and the largest value of an integer type, or `None` for other types.
     fn integer_bounds(self) -> Option<(i64, i64)> {
         Some(match self {
@@ -245,12 +257,32 @@ impl Value {
         }
     }
 
+    /// Returns true if the two values are equal to the last bit.
+    pub fn is_identical(&self, other: &Value) -> bool {
+        match (self, other) {
+            (Value::Real(a), Value::Real(b)) => a.to_bits() == b.to_bits(),
+            (a, b) => a == b,
+        }
+    }
+
     fn text(&self) -> String {
         match self {
             Value::Real(x) => x.to_string(),
             Value::Integer(n) => n.to_string(),
             Value::Boolean(yes) => yes.to_string(),
             Value::String(text) => text.clone(),
+        }
+    }
+}
+
+/// Writes the value for messages, a text in quotes.
+impl std::fmt::Display for Value {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        match self {
+            Value::Real(x) => write!(f, "{x:?}"),
+            Value::Integer(n) => write!(f, "{n}"),
+            Value::Boolean(yes) => write!(f, "{yes}"),
+            Value::String(text) => write!(f, "{text:?}"),
         }
     }
 }
@@ -366,29 +398,20 @@ impl Reader {
     }
 
     fn variable(&mut self, element: &Element) -> Variable {
-        const TYPES: [(&str, Type); 5] = [
-            ("Real", Type::Real),
-            ("Integer", Type::Integer),
-            ("Boolean", Type::Boolean),
-            ("String", Type::String),
-            ("Enumeration", Type::Enumeration),
-        ];
-        let typed = TYPES.iter().find_map(|(name, kind)| Some((*kind, element.child(name)?)));
+        let children = element.children.iter();
+        let mut typed =
+            children.filter_map(|child| Some((CType::from_child_name(&child.name)?, child)));
+        let typed = typed.next();
         if typed.is_none() {
             self.problem(element, "the variable has no type");
         }
-        let (kind, typed) = typed.map_or((Type::Real, None), |(kind, typed)| (kind, Some(typed)));
-        let c_type = match kind {
-            Type::Integer | Type::Enumeration => CType::Int32,
-            Type::Boolean => CType::Boolean,
-            Type::String => CType::String,
-            _ => CType::Float64,
-        };
+        let types = typed.map_or((CType::Float64, Type::Real), |(types, _)| types);
+        let typed = typed.map(|(_, typed)| typed);
         let start = typed.and_then(|typed| typed.get("start")).map(String::from);
         Variable {
             variability: element.get("variability").unwrap_or_default().into(),
             intermediate: false,
-            ..self.common(element, typed, (c_type, kind), start)
+            ..self.common(element, typed, types, start)
         }
     }
 
@@ -501,16 +524,7 @@ impl Reader {
         c_type: CType,
         kind: Type,
     ) -> (Variable, Vec<String>) {
-        let starts: Vec<String> = match c_type {
-            CType::String | CType::Binary => {
-                let starts = element.children.iter().filter(|child| child.name == "Start");
-                starts.map(|start| start.get("value").unwrap_or_default().into()).collect()
-            }
-            _ => {
-                let words = element.get("start").into_iter().flat_map(str::split_whitespace);
-                words.map(String::from).collect()
-            }
-        };
+        let starts = starts(element, c_type);
         let variability = element.get("variability").map(Variability::from);
         let variability = variability.unwrap_or_else(|| {
             let causality = element.get("causality");
@@ -586,6 +600,20 @@ fn derivatives(root: &Element, is_fmi3: bool) -> Vec<(u32, u32)> {
         Some((reference(derivative)?, reference(named(typed, "derivative")?)?))
     };
     unknowns.filter_map(pair).collect()
+}
+
+/// Returns the start values of the elements of a variable of FMI 3.0.
+pub fn starts(element: &Element, c_type: CType) -> Vec<String> {
+    match c_type {
+        CType::String | CType::Binary => {
+            let starts = element.children.iter().filter(|child| child.name == "Start");
+            starts.map(|start| start.get("value").unwrap_or_default().into()).collect()
+        }
+        _ => {
+            let words = element.get("start").into_iter().flat_map(str::split_whitespace);
+            words.map(String::from).collect()
+        }
+    }
 }
 
 /// Converts a row-major index, counted from 0, to indices from 1, separated by commas.

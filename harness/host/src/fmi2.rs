@@ -26,22 +26,8 @@ pub mod guarded;
 pub type Fmu = version::Fmu<Fmi2>;
 pub type Instance<'fmu> = version::Instance<'fmu, Fmi2>;
 
-/// Folder of the binaries for the platform of this program (FMI 2.0.5, section 2.3). Names with 32 and 64 are
-/// for x86; other processors use the platform tuples of FMI 3.0. On macOS darwin64 is used for both
-/// processors, because hosts look there on both, and one universal binary serves both.
-pub const PLATFORM: &str = if cfg!(all(target_os = "windows", target_arch = "aarch64")) {
-    "aarch64-windows"
-} else if cfg!(target_os = "windows") {
-    if cfg!(target_pointer_width = "64") { "win64" } else { "win32" }
-} else if cfg!(target_os = "macos") {
-    "darwin64"
-} else if cfg!(target_arch = "aarch64") {
-    "aarch64-linux"
-} else if cfg!(target_pointer_width = "64") {
-    "linux64"
-} else {
-    "linux32"
-};
+/// Folder of the binaries for the platform of this program.
+pub const PLATFORM: &str = version::PLATFORM[0];
 
 // ---------------------------------------------------------------- C types
 
@@ -149,7 +135,6 @@ pub struct Fmi2 {
 }
 
 impl Version for Fmi2 {
-    const PLATFORM: &'static str = PLATFORM;
     const NUMBER: usize = 0;
     type Boolean = c_int;
     type Kept = Given;
@@ -247,7 +232,7 @@ impl Version for Fmi2 {
         let mut number = [0];
         Ok(vec![match c_type {
             CType::Float64 => {
-                let mut value = [0.0];
+                let mut value = [f64::NAN];
                 instance.read(functions.get_real, &reference, &mut value)?;
                 Value::Real(value[0])
             }
@@ -301,16 +286,25 @@ macro_rules! answers {
 /// Returns the URI of a folder, percent-encoded (RFC 3986).
 pub fn file_uri(folder: &Path) -> String {
     let path = folder.to_string_lossy().replace(std::path::MAIN_SEPARATOR, "/");
-    let mut uri = String::from(if path.starts_with('/') { "file://" } else { "file:///" });
-    for byte in path.bytes() {
+    let start = if path.starts_with('/') { "file://" } else { "file:///" };
+    format!("{start}{}", percent_encoded(&path, b"/:"))
+}
+
+/// Encodes the characters of a text that a URI reserves, except `kept`.
+pub fn percent_encoded(text: &str, kept: &[u8]) -> String {
+    let mut encoded = String::new();
+    for byte in text.bytes() {
         match byte {
-            b'A'..=b'Z' | b'a'..=b'z' | b'0'..=b'9' | b'-' | b'.' | b'_' | b'~' | b'/' | b':' => {
-                uri.push(byte.into());
+            _ if byte.is_ascii_alphanumeric()
+                || b"-._~".contains(&byte)
+                || kept.contains(&byte) =>
+            {
+                encoded.push(byte.into());
             }
-            _ => uri.push_str(&format!("%{byte:02X}")),
+            _ => encoded.push_str(&format!("%{byte:02X}")),
         }
     }
-    uri
+    encoded
 }
 
 impl Fmu {

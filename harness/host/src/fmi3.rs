@@ -26,24 +26,8 @@ use crate::description::{CType, Value};
 pub type Fmu = version::Fmu<Fmi3>;
 pub type Instance<'fmu> = version::Instance<'fmu, Fmi3>;
 
-/// Folder of the binaries for the platform of this program (FMI 3.0.2, section 2.5.1.4.1).
-pub const PLATFORM: &str = if cfg!(target_os = "windows") {
-    if cfg!(target_arch = "aarch64") {
-        "aarch64-windows"
-    } else if cfg!(target_pointer_width = "64") {
-        "x86_64-windows"
-    } else {
-        "x86-windows"
-    }
-} else if cfg!(target_os = "macos") {
-    if cfg!(target_arch = "aarch64") { "aarch64-darwin" } else { "x86_64-darwin" }
-} else if cfg!(target_arch = "aarch64") {
-    "aarch64-linux"
-} else if cfg!(target_pointer_width = "64") {
-    "x86_64-linux"
-} else {
-    "x86-linux"
-};
+/// Folder of the binaries for the platform of this program.
+pub const PLATFORM: &str = version::PLATFORM[1];
 
 // ---------------------------------------------------------------- C types
 
@@ -342,7 +326,6 @@ pub struct Fmi3 {
 }
 
 impl Version for Fmi3 {
-    const PLATFORM: &'static str = PLATFORM;
     const NUMBER: usize = 1;
     type Boolean = Byte;
     type Kept = Box<Stepping>;

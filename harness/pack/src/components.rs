@@ -21,7 +21,7 @@ use serde_json::json;
 const OWN: &str = "MIT OR Apache-2.0";
 pub const OWN_TEXTS: [&str; 2] = ["LICENSE-MIT", "LICENSE-APACHE"];
 
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Component {
     pub name: String,
     /// Version; `None` if it is the version of the tool that linked it.
@@ -117,13 +117,12 @@ pub fn linked(package: &str, binaries: &[Packed]) -> Result<Vec<Component>> {
         version: Some(rust_version()?),
         licence: "MIT OR Apache-2.0".into(),
         texts: vec![STANDARD_TEXT.into()],
-        purl: String::new(),
-        sha256: None,
         origin:
             "Rust's standard library: core, alloc, std, panic_unwind, compiler_builtins, and of \
                  the crates it is made from what is used; those that the binaries name follow"
                 .into(),
         platforms: everywhere,
+        ..Component::default()
     });
     let mut crates_of_std: BTreeMap<(String, String), BTreeSet<&str>> = BTreeMap::new();
     for binary in binaries {
@@ -139,9 +138,9 @@ pub fn linked(package: &str, binaries: &[Packed]) -> Result<Vec<Component>> {
             version: Some(version),
             licence: licence.into(),
             texts: vec![STANDARD_TEXT.into()],
-            sha256: None,
             origin: "Part of Rust's standard library".into(),
             platforms,
+            ..Component::default()
         });
     }
     for part in RUN_TIME {
@@ -153,13 +152,11 @@ pub fn linked(package: &str, binaries: &[Packed]) -> Result<Vec<Component>> {
         if !platforms.is_empty() {
             all.push(Component {
                 name: part.name.into(),
-                version: None,
                 licence: part.licence.into(),
                 texts: vec![part.text.into()],
-                purl: String::new(),
-                sha256: None,
                 origin: part.origin.into(),
                 platforms,
+                ..Component::default()
             });
         }
     }

@@ -2,8 +2,9 @@
 
 use anyhow::Result;
 use host::causality::{Causality, Variability};
+use host::description::Value;
 
-use super::{FmuUnderTest, Reading, Session};
+use super::{FmuUnderTest, Session};
 use crate::description::Variable;
 
 /// Relative change of a value below which it is rounding.
@@ -14,7 +15,7 @@ const ITERATED: f64 = 1e-2;
 pub struct Observed {
     states: Vec<f64>,
     derivatives: Vec<f64>,
-    discrete: Vec<Reading>,
+    discrete: Vec<Vec<Value>>,
 }
 
 fn discrete(fmu: &FmuUnderTest) -> impl Iterator<Item = &Variable> {
@@ -25,12 +26,7 @@ fn discrete(fmu: &FmuUnderTest) -> impl Iterator<Item = &Variable> {
 impl Observed {
     /// Reads the present values of the continuous states, their derivatives and the discrete variables.
     pub fn read(session: &mut Session) -> Result<Observed> {
-        let n = session.states();
-        let (mut states, mut derivatives) = (vec![0.0; n], vec![0.0; n]);
-        if n > 0 {
-            session.instance.continuous_states(&mut states)?;
-            session.instance.derivatives(&mut derivatives)?;
-        }
+        let (states, derivatives) = (session.states()?, session.derivatives()?);
         let discrete = discrete(session.fmu).map(|v| session.read(v)).collect::<Result<_>>()?;
         Ok(Observed { states, derivatives, discrete })
     }
@@ -41,14 +37,12 @@ impl Observed {
             (a - b).abs() > share * a.abs().max(b.abs()).max(size)
         };
         for (v, (a, b)) in discrete(fmu).zip(self.discrete.iter().zip(&after.discrete)) {
-            let same = match (a, b) {
-                (Reading::Real(a), Reading::Real(b)) => {
-                    !jumps(*a, *b, ROUNDING, 1e-3 * v.nominal())
-                }
+            let same = match (&a[0], &b[0]) {
+                (Value::Real(a), Value::Real(b)) => !jumps(*a, *b, ROUNDING, 1e-3 * v.nominal()),
                 (a, b) => a.is_identical(b),
             };
             if !same {
-                return Some((&v.name, format!("{a} to {b}")));
+                return Some((&v.name, format!("{} to {}", a[0], b[0])));
             }
         }
         for (n, (derivative, state)) in fmu.states().into_iter().enumerate() {

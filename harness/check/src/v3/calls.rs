@@ -3,11 +3,10 @@
 
 use anyhow::Result;
 
-use super::subject::Subject;
-use super::subject::{STEPS, Session, Use, start_values};
+use super::subject::{STEPS, Subject, start_values};
 use crate::description::Variable;
 use crate::findings::Findings;
-use crate::loaded::{Life as _, UnderTest as _, skip};
+use crate::under_test::{Use, skip};
 use crate::{life, states};
 use host::c_abi::{CallError, Status, foreign_environments};
 use host::causality::{Causality, Variability};
@@ -36,12 +35,9 @@ pub fn callbacks(subject: &Subject, findings: &mut Findings) -> Result<()> {
         with.logger = false;
         with.intermediate_update = false;
         subject.announce("making an instance without callbacks, and a step");
-        match subject.instantiate(&with)? {
-            Ok(_) => {}
-            Err(error) => {
-                findings.at(subject.last_call()).add(error.to_string());
-                continue;
-            }
+        if let Err(error) = subject.instantiate(&with)? {
+            findings.at(subject.last_call()).add(error.to_string());
+            continue;
         }
         // With required intermediate variables, but no callback that receives them.
         let mut session = subject.session(using)?;
@@ -66,8 +62,8 @@ pub fn readable(subject: &Subject, findings: &mut Findings) -> Result<()> {
         let mut session = subject.running(using)?;
         for v in subject.readable() {
             subject.announce(format!("reading {}", v.name));
-            if let Err(error) = session.get(v) {
-                findings.at(v.place()).add(format!("{} ({error})", using.name()));
+            if let Err(error) = session.elements(v) {
+                findings.at(v.place()).add(format!("{using} ({error})"));
             }
         }
     }
@@ -280,24 +276,19 @@ pub fn serialize(subject: &Subject, findings: &mut Findings) -> Result<()> {
         let state = session.instance.get_state()?;
         subject.announce("fmi3SerializeFMUState");
         let bytes = session.instance.serialize(&state)?;
-        let mark = session.mark();
-        // The calls go on even if the FMU has requested the end of the simulation, in both runs.
-        session.go_back(&mark);
-        session.advance(STEPS)?;
-        let first = session.readings()?;
+        let here = session.mark();
+        let first = states::continue_from(&mut session, &here)?;
         subject.announce("fmi3DeserializeFMUState");
         let copy = session.instance.deserialize(&bytes)?;
         session.instance.set_state(&copy)?;
-        session.go_back(&mark);
-        session.advance(STEPS)?;
-        let again = session.readings()?;
+        let again = states::continue_from(&mut session, &here)?;
         if let Some(text) = session.difference(&again, &first) {
-            findings.at(format!("{}, from a serialised state", using.name())).add(text);
+            findings.at(format!("{using}, from a serialised state")).add(text);
         }
         if let Some(half) = bytes.len().checked_div(2).filter(|half| *half > 0) {
             subject.announce("fmi3DeserializeFMUState of half the bytes");
             if let Ok(wrong) = session.instance.deserialize(&bytes[..half]) {
-                findings.at(using.name()).add(format!(
+                findings.at(using.to_string()).add(format!(
                     "{half} of {} bytes are taken for a state (allowed: fmi3Error)",
                     bytes.len()
                 ));
@@ -319,7 +310,7 @@ pub fn log_environment(subject: &Subject, findings: &mut Findings) -> Result<()>
         using.updates = stepping && subject.can(using.interface, "providesIntermediateUpdate");
         let mut session = subject.running(using)?;
         session.advance(2)?;
-        heard += subject.refused(&mut session).map_or(0, |error| error.messages.len());
+        heard += session.refused().map_or(0, |error| error.messages.len());
         heard += session.instance.take_messages().len() + session.instance.updates();
         Ok(())
     };
@@ -341,7 +332,7 @@ pub fn log_environment(subject: &Subject, findings: &mut Findings) -> Result<()>
 
 pub fn log_errors(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let mut session = subject.running(subject.plain_uses()[0])?;
-    if let Some(error) = subject.refused(&mut session)
+    if let Some(error) = session.refused()
         && error.status == Status::Error
         && error.messages.is_empty()
     {
@@ -354,34 +345,17 @@ pub fn log_errors(subject: &Subject, findings: &mut Findings) -> Result<()> {
 
 // ---------------------------------------------------------------- Model Exchange
 
-/// Returns an instance for Model Exchange that is initialised, or skips the rule if the FMU has no Model Exchange.
-fn exchanging(subject: &Subject) -> Result<Session<'_>> {
-    if subject.binary(Interface::ModelExchange).is_err() {
-        return skip("the FMU offers no Model Exchange");
-    }
-    subject.running(Use::EXCHANGE)
-}
-
 pub fn exchange_counts(subject: &Subject, findings: &mut Findings) -> Result<()> {
-    let d = &subject.description;
-    let mut session = exchanging(subject)?;
+    let d = subject.description;
+    let mut session = subject.exchanging()?;
     let length = |r: u32| d.at(r).map_or(0, Variable::length);
     let states: usize = d.states().into_iter().map(length).sum();
     let indicators = d.unknowns("EventIndicator").filter_map(|u| u.key);
     let indicators: usize = indicators.map(length).sum();
+    let (nx, nz) = session.sizes()?;
     for (call, own, declared, list) in [
-        (
-            "fmi3GetNumberOfContinuousStates",
-            session.instance.number_of_states()?,
-            states,
-            "ContinuousStateDerivative",
-        ),
-        (
-            "fmi3GetNumberOfEventIndicators",
-            session.instance.number_of_indicators()?,
-            indicators,
-            "EventIndicator",
-        ),
+        ("fmi3GetNumberOfContinuousStates", nx, states, "ContinuousStateDerivative"),
+        ("fmi3GetNumberOfEventIndicators", nz, indicators, "EventIndicator"),
     ] {
         if own != declared {
             findings
@@ -393,24 +367,16 @@ pub fn exchange_counts(subject: &Subject, findings: &mut Findings) -> Result<()>
 }
 
 pub fn exchange_vectors(subject: &Subject, findings: &mut Findings) -> Result<()> {
-    let d = &subject.description;
-    let mut session = exchanging(subject)?;
+    let d = subject.description;
+    let mut session = subject.exchanging()?;
     session.advance(3)?;
     let derivatives: Vec<u32> =
         d.unknowns("ContinuousStateDerivative").filter_map(|u| u.key).collect();
     let indicators: Vec<u32> = d.unknowns("EventIndicator").filter_map(|u| u.key).collect();
-    let n = session.instance.number_of_states()?;
-    let nz = session.instance.number_of_indicators()?;
-    let (mut x, mut dx, mut z) = (vec![0.0; n], vec![0.0; n], vec![0.0; nz]);
-    if n > 0 {
-        session.instance.continuous_states(&mut x)?;
-        session.instance.derivatives(&mut dx)?;
-    }
-    session.instance.event_indicators(&mut z)?;
     for (call, vector, references) in [
-        ("fmi3GetContinuousStates", x, d.states()),
-        ("fmi3GetContinuousStateDerivatives", dx, derivatives),
-        ("fmi3GetEventIndicators", z, indicators),
+        ("fmi3GetContinuousStates", session.states()?, d.states()),
+        ("fmi3GetContinuousStateDerivatives", session.derivatives()?, derivatives),
+        ("fmi3GetEventIndicators", session.indicators()?, indicators),
     ] {
         let mut of = vector.iter();
         for v in references.iter().filter_map(|r| d.at(*r)) {
@@ -429,18 +395,16 @@ pub fn exchange_vectors(subject: &Subject, findings: &mut Findings) -> Result<()
 }
 
 pub fn states_set(subject: &Subject, findings: &mut Findings) -> Result<()> {
-    let mut session = exchanging(subject)?;
-    let n = session.instance.number_of_states()?;
-    if n == 0 {
+    let mut session = subject.exchanging()?;
+    let x = session.states()?;
+    if x.is_empty() {
         return skip("the FMU has no continuous states");
     }
-    let mut x = vec![0.0; n];
-    session.instance.continuous_states(&mut x)?;
     let moved: Vec<f64> = x.iter().map(|x| x + 1e-3 * x.abs().max(1e-3)).collect();
     subject.announce("fmi3SetContinuousStates");
     session.instance.set_continuous_states(&moved)?;
-    session.instance.continuous_states(&mut x)?;
-    if let Some(i) = (0..n).find(|i| x[*i].to_bits() != moved[*i].to_bits()) {
+    let x = session.states()?;
+    if let Some(i) = (0..x.len()).find(|i| x[*i].to_bits() != moved[*i].to_bits()) {
         findings.at("fmi3SetContinuousStates").add(format!(
             "state {} was set to {:?} and is {:?}",
             i + 1,
@@ -452,13 +416,12 @@ pub fn states_set(subject: &Subject, findings: &mut Findings) -> Result<()> {
 }
 
 pub fn indicators(subject: &Subject, findings: &mut Findings) -> Result<()> {
-    let mut session = exchanging(subject)?;
-    let nz = session.instance.number_of_indicators()?;
-    if nz == 0 {
+    let mut session = subject.exchanging()?;
+    if session.sizes()?.1 == 0 {
         return skip("the FMU has no event indicators");
     }
     session.advance(10 * STEPS)?;
-    if let Some((time, i)) = session.zero_indicator {
+    if let Some((time, i)) = session.notes.zero_indicator {
         findings
             .at(format!("event indicator {}, t = {time:?} s", i + 1))
             .add("it is 0 after event mode (allowed: on the side on which the model is)");

@@ -3,11 +3,10 @@
 
 use anyhow::Result;
 
-use super::subject::Subject;
-use super::subject::{STEPS, Session, Use};
+use super::subject::{STEPS, Session, Subject};
 use crate::description::Variable;
 use crate::findings::Findings;
-use crate::loaded::{Life as _, UnderTest as _, skip};
+use crate::under_test::{Use, skip};
 use host::causality::{Causality, Variability};
 use host::description::{CType, Value};
 use host::fmi3::{Interface, Step, UNWRITTEN, Update};
@@ -53,13 +52,6 @@ fn faults(using: Use, step: &Step, from: f64, h: f64) -> Vec<String> {
     faults
 }
 
-fn require_stepping(subject: &Subject) -> Result<()> {
-    match subject.binary(Interface::CoSimulation) {
-        Ok(_) => Ok(()),
-        Err(_) => skip("the FMU offers no Co-Simulation"),
-    }
-}
-
 fn stepping_uses(subject: &Subject) -> Vec<Use> {
     let uses = subject.uses().into_iter();
     uses.filter(|u| u.interface == Interface::CoSimulation).collect()
@@ -84,7 +76,7 @@ pub fn runs(subject: &Subject, findings: &mut Findings) -> Result<()> {
             let outputs = outputs(&mut session, false)?;
             if let Some((name, x)) = outputs.iter().find(wrong) {
                 findings
-                    .at(format!("{name}, t = {:?} s ({})", session.time, using.name()))
+                    .at(format!("{name}, t = {:?} s ({using})", session.time))
                     .add(format!("it is {x} after a step that returned fmi3OK (allowed: finite)"));
                 break;
             }
@@ -98,7 +90,7 @@ pub fn iterates(subject: &Subject, _: &mut Findings) -> Result<()> {
 }
 
 pub fn answers(subject: &Subject, findings: &mut Findings) -> Result<()> {
-    require_stepping(subject)?;
+    subject.stepping()?;
     let is_clock =
         |v: &&Variable| v.causality == Causality::Independent && v.c_type == CType::Float64;
     let clock = subject.readable().find(is_clock).cloned();
@@ -106,8 +98,9 @@ pub fn answers(subject: &Subject, findings: &mut Findings) -> Result<()> {
         let mut session = subject.running(using)?;
         let mut told: Vec<String> = Vec::new();
         for k in 0..LONG {
-            session.stimulate(k)?;
-            let (from, h) = (session.time, session.h);
+            session.count = k;
+            session.stimulate()?;
+            let (from, h) = (session.time, session.step);
             let step = session.raw_step(h)?;
             let mut all = faults(using, &step, from, h);
             if let Some(v) = &clock
@@ -122,14 +115,14 @@ pub fn answers(subject: &Subject, findings: &mut Findings) -> Result<()> {
             for fault in all {
                 let kind = fault.split_whitespace().take(2).collect::<Vec<_>>().join(" ");
                 if !told.contains(&kind) {
-                    findings.at(format!("{}, step from {from:?} s", using.name())).add(fault);
+                    findings.at(format!("{using}, step from {from:?} s")).add(fault);
                     told.push(kind);
                 }
             }
-            if step.event == 1 && using.event_mode && !session.ended {
+            if step.event == 1 && using.event_mode && !session.is_ended() {
                 session.event()?;
             }
-            if session.ended {
+            if session.is_ended() {
                 break;
             }
         }
@@ -138,11 +131,10 @@ pub fn answers(subject: &Subject, findings: &mut Findings) -> Result<()> {
 }
 
 pub fn wrong(subject: &Subject, findings: &mut Findings) -> Result<()> {
-    require_stepping(subject)?;
-    let mut session = subject.running(Use::PLAIN)?;
+    let mut session = subject.stepping()?;
     session.advance(1)?;
     let place = "fmi3DoStep with a communicationStepSize below 0";
-    let (time, h) = (session.time, -session.h);
+    let (time, h) = (session.time, -session.step);
     if subject.with_open_effect(place, findings, || session.instance.do_step(time, h)).is_ok() {
         findings.at(place).add("it returns fmi3OK (allowed: fmi3Error)");
     }
@@ -170,28 +162,29 @@ pub fn event_answers(subject: &Subject, findings: &mut Findings) -> Result<()> {
                     let what =
                         if byte == UNWRITTEN { "is not written" } else { "is neither 0 nor 1" };
                     findings
-                        .at(format!("{}, fmi3UpdateDiscreteStates", using.name()))
+                        .at(format!("{using}, fmi3UpdateDiscreteStates"))
                         .add(format!("{name} {what}"));
                 }
             }
             let passed = |next: f64| next.is_nan() || next <= session.time;
             if info.next_event_defined == 1 && passed(info.next_event_time) {
                 findings
-                    .at(format!("{}, t = {:?} s", using.name(), session.time))
+                    .at(format!("{}, t = {:?} s", using, session.time))
                     .add(format!("nextEventTime is {:?} (allowed: later)", info.next_event_time));
             }
-            if session.ended || !findings.list.is_empty() {
+            if session.is_ended() || !findings.list.is_empty() {
                 break;
             }
             // Continue to the next event.
-            let events = session.events;
-            while session.events == events && !session.ended && steps < LONG {
+            let events = session.notes.events;
+            while session.notes.events == events && !session.is_ended() && steps < LONG {
                 steps += 1;
-                session.stimulate(k)?;
-                let until = session.time + session.h;
+                session.count = k;
+                session.stimulate()?;
+                let until = session.time + session.step;
                 session.advance_to(until)?;
             }
-            if session.ended || session.events == events || steps >= LONG {
+            if session.is_ended() || session.notes.events == events || steps >= LONG {
                 break;
             }
             subject.announce(format!("event mode at {:?} s", session.time));
@@ -205,7 +198,7 @@ pub fn idempotent(subject: &Subject, findings: &mut Findings) -> Result<()> {
     for using in uses_with_events(subject)? {
         let mut session = subject.running(using)?;
         session.advance(STEPS)?;
-        if session.ended {
+        if session.is_ended() {
             continue;
         }
         session.instance.enter_event_mode()?;
@@ -220,10 +213,7 @@ pub fn idempotent(subject: &Subject, findings: &mut Findings) -> Result<()> {
             && info.terminate != 1
         {
             findings
-                .at(format!(
-                    "{}, another fmi3UpdateDiscreteStates at the same instant",
-                    using.name()
-                ))
+                .at(format!("{using}, another fmi3UpdateDiscreteStates at the same instant"))
                 .add(text);
         }
     }
@@ -243,26 +233,26 @@ pub fn discrete_held(subject: &Subject, findings: &mut Findings) -> Result<()> {
     for using in uses {
         let mut session = subject.running(using)?;
         for k in 0..LONG {
-            session.stimulate(k)?;
+            session.count = k;
+            session.stimulate()?;
             let before: Vec<Vec<Value>> =
                 discrete.iter().map(|v| session.read(v)).collect::<Result<_>>()?;
-            let (from, h) = (session.time, session.h);
+            let (from, h) = (session.time, session.step);
             let step = session.raw_step(h)?;
             for (v, before) in discrete.iter().zip(&before) {
                 let after = session.read(v)?;
                 if after != *before {
                     findings.at(v.place()).add(format!(
-                            "it is {before:?} before and {after:?} after fmi3DoStep from {from:?} s ({}; allowed: \
-                             discrete variables change in event mode alone)",
-                            using.name()
+                            "it is {before:?} before and {after:?} after fmi3DoStep from {from:?} s ({using}; allowed: \
+                             discrete variables change in event mode alone)"
                         ));
                     return Ok(());
                 }
             }
-            if step.event == 1 && !session.ended {
+            if step.event == 1 && !session.is_ended() {
                 session.event()?;
             }
-            if session.ended {
+            if session.is_ended() {
                 break;
             }
         }
@@ -273,7 +263,7 @@ pub fn discrete_held(subject: &Subject, findings: &mut Findings) -> Result<()> {
 fn outputs(session: &mut Session, continuous: bool) -> Result<Vec<(String, f64)>> {
     let wanted =
         |v: &&Variable| v.causality == Causality::Output && (!continuous || v.is_continuous());
-    let all: Vec<Variable> = session.subject.readable().filter(wanted).cloned().collect();
+    let all: Vec<Variable> = session.fmu.readable().filter(wanted).cloned().collect();
     let mut outputs = Vec::new();
     for v in all {
         for value in session.read(&v)? {
@@ -290,12 +280,13 @@ fn outputs(session: &mut Session, continuous: bool) -> Result<Vec<(String, f64)>
 const SAME: f64 = 1e-3;
 
 pub fn same_trajectory(subject: &Subject, findings: &mut Findings) -> Result<()> {
-    require_stepping(subject)?;
-    let mut plain = subject.running(Use::PLAIN)?;
+    let mut plain = subject.stepping()?;
     let mut reference = Vec::new();
-    let until = |session: &Session, k: usize| session.subject.start() + (k + 1) as f64 * session.h;
+    let until = |session: &Session, k: usize| {
+        session.fmu.experiment().start + (k + 1) as f64 * session.step
+    };
     for k in 0..LONG {
-        if plain.ended {
+        if plain.is_ended() {
             break;
         }
         let to = until(&plain, k);
@@ -323,7 +314,7 @@ pub fn same_trajectory(subject: &Subject, findings: &mut Findings) -> Result<()>
                 .find(|((name, a), (_, b))| (a - b).abs() > SAME * size(name));
             if let Some(((name, a), (_, b))) = far {
                 findings
-                    .at(format!("{}, t = {to:?} s", using.name()))
+                    .at(format!("{using}, t = {to:?} s"))
                     .add(format!("{name} is {a:?}, and {b:?} in plain Co-Simulation"));
                 break;
             }
@@ -349,8 +340,9 @@ pub fn intermediate_time(subject: &Subject, findings: &mut Findings) -> Result<(
     let mut session = subject.running(UPDATING)?;
     let mut last = f64::NEG_INFINITY;
     for k in 0..STEPS {
-        session.stimulate(k)?;
-        let (from, h) = (session.time, session.h);
+        session.count = k;
+        session.stimulate()?;
+        let (from, h) = (session.time, session.step);
         // As in `faults`: the FMU's own steps may not fit.
         let slack = 1e-2 * h;
         let mut wrong: Option<String> = None;
@@ -394,7 +386,7 @@ pub fn intermediate_early_return(subject: &Subject, findings: &mut Findings) -> 
     subject.require(Interface::CoSimulation, "canReturnEarlyAfterIntermediateUpdate")?;
     let using = Use { early_return: true, ..UPDATING };
     let mut session = subject.running(using)?;
-    let (from, h) = (session.time, 10.0 * session.h);
+    let (from, h) = (session.time, 10.0 * session.step);
     let mut asked = None;
     let step = session.raw_step_with_updates(
         h,
@@ -434,8 +426,13 @@ pub fn intermediate_early_return(subject: &Subject, findings: &mut Findings) -> 
 /// torque is minus the rate of its momentum), and held inputs have no rate for any step size.
 pub fn intermediate_inputs(subject: &Subject, findings: &mut Findings) -> Result<()> {
     require_updates(subject)?;
-    let inputs: Vec<Variable> =
-        subject.inputs().filter(|v| v.written.flag("intermediateUpdate")).cloned().collect();
+    let inputs: Vec<Variable> = subject
+        .inputs
+        .iter()
+        .copied()
+        .filter(|v| v.written.flag("intermediateUpdate"))
+        .cloned()
+        .collect();
     if inputs.is_empty() {
         return skip("no input has intermediateUpdate");
     }
@@ -449,13 +446,13 @@ pub fn intermediate_inputs(subject: &Subject, findings: &mut Findings) -> Result
         let starts: Vec<f64> = v.starts.iter().filter_map(|s| host::xml::double(s)).collect();
         let start = |i: usize| starts.get(i).or(starts.first()).copied().unwrap_or(0.0);
         let steps = 8;
-        let h = subject.step();
+        let h = subject.experiment().step;
         let slope = v.nominal().max(start(0).abs()) / (h * steps as f64);
         if start(0) + slope * h * steps as f64 > max || start(0) < min {
             continue;
         }
         let at = |t: f64| -> Vec<f64> {
-            (0..v.length()).map(|i| start(i) + slope * (t - subject.start())).collect()
+            (0..v.length()).map(|i| start(i) + slope * (t - subject.experiment().start)).collect()
         };
         let run = |parts: usize, along: bool| -> Result<Vec<(String, f64)>> {
             let mut session = subject.running(if along { UPDATING } else { Use::PLAIN })?;
@@ -498,7 +495,7 @@ pub fn intermediate_inputs(subject: &Subject, findings: &mut Findings) -> Result
 /// Returns the Float64 unknowns for which directional derivatives are checked, each with its declared Float64
 /// dependencies.
 fn pairs(subject: &Subject) -> Vec<(Variable, Vec<Variable>)> {
-    let d = &subject.description;
+    let d = subject.description;
     let states = d.states();
     let lists = ["Output", "ContinuousStateDerivative"];
     let all = d.structure.iter().filter(|u| lists.contains(&u.list.as_str()));
@@ -538,7 +535,7 @@ fn displaced(
 
 fn require_derivatives(subject: &Subject, flag: &str) -> Result<Use> {
     // In Model Exchange derivatives follow immediately from states and inputs.
-    if subject.binary(Interface::ModelExchange).is_err() {
+    if !subject.has(Interface::ModelExchange) {
         return skip(
             "it offers no Model Exchange, where derivatives can be compared with differences",
         );
@@ -679,12 +676,12 @@ fn follows(after: f64, before: f64) -> bool {
 }
 
 pub fn declared(subject: &Subject, findings: &mut Findings) -> Result<()> {
-    if subject.binary(Interface::ModelExchange).is_err() {
+    if !subject.has(Interface::ModelExchange) {
         return skip(
             "it offers no Model Exchange, where a value follows from states and inputs at once",
         );
     }
-    let d = &subject.description;
+    let d = subject.description;
     let states = d.states();
     let mut session = subject.running(Use::EXCHANGE)?;
     session.advance(2)?;
@@ -732,7 +729,7 @@ pub fn elements(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let Some(using) = using else {
         return skip("providesPerElementDependencies is not declared");
     };
-    let d = &subject.description;
+    let d = subject.description;
     let mut session = subject.running(using)?;
     for unknown in d.structure.iter().filter(|u| u.list == "Output") {
         let (Some(reference), Some(listed)) = (unknown.key, &unknown.dependencies) else {

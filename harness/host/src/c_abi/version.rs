@@ -76,6 +76,15 @@ pub enum Interface {
     ModelExchange,
 }
 
+impl std::fmt::Display for Interface {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        f.write_str(match self {
+            Interface::CoSimulation => "Co-Simulation",
+            Interface::ModelExchange => "Model Exchange",
+        })
+    }
+}
+
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Updated {
     /// The host must update the discrete states again.
@@ -85,10 +94,28 @@ pub struct Updated {
     pub next_event: Option<f64>,
 }
 
+/// Folders of the binaries for the platform of this program in FMI 2.0 (FMI 2.0.5, section 2.3) and in FMI 3.0
+/// (FMI 3.0.2, section 2.5.1.4.1). In FMI 2.0 names with 32 and 64 are for x86, and other processors use the
+/// platform tuples of FMI 3.0. On macOS darwin64 is used for both processors, because hosts look there on both,
+/// and one universal binary serves both.
+pub(crate) const PLATFORM: [&str; 2] = {
+    let (is_arm, has_64_bits) = (cfg!(target_arch = "aarch64"), cfg!(target_pointer_width = "64"));
+    match (cfg!(target_os = "windows"), cfg!(target_os = "macos"), is_arm) {
+        (true, _, true) => ["aarch64-windows"; 2],
+        (true, ..) if has_64_bits => ["win64", "x86_64-windows"],
+        (true, ..) => ["win32", "x86-windows"],
+        (_, true, true) => ["darwin64", "aarch64-darwin"],
+        (_, true, false) => ["darwin64", "x86_64-darwin"],
+        (.., true) => ["aarch64-linux"; 2],
+        _ if has_64_bits => ["linux64", "x86_64-linux"],
+        _ => ["linux32", "x86-linux"],
+    }
+};
+
 /// A version of FMI: its C functions, and the order in which a host calls them.
 pub trait Version: Sized {
-    const PLATFORM: &'static str;
     const NUMBER: usize;
+    const PLATFORM: &'static str = PLATFORM[Self::NUMBER];
     /// `fmi2Boolean` or `fmi3Boolean`. It is not `bool`, because a byte that is neither 0 nor 1 must not
     /// become a `bool`.
     type Boolean: Copy + Default + PartialEq + From<bool>;
