@@ -56,6 +56,15 @@ impl Table {
         Table { names, columns, gaps: BTreeSet::new() }
     }
 
+    /// Makes a table from pairs of name and column.
+    ///
+    /// # Panics If the columns are not equally long.
+    pub fn of<Name: Into<String>>(pairs: impl IntoIterator<Item = (Name, Vec<f64>)>) -> Self {
+        let (names, columns) =
+            pairs.into_iter().map(|(name, column)| (name.into(), column)).unzip();
+        Table::new(names, columns)
+    }
+
     /// Adds a column in which NaN marks missing values; the file then has an empty field or a null there.
     ///
     /// # Panics If it has another number of rows than the table.

@@ -498,16 +498,21 @@ fn parted(text: &str) -> String {
 impl Quantity {
     const ALL: [Quantity; 7] = [Time, Torque, Rate, Angle, Acceleration, Length, Force];
 
-    pub(super) fn dimension(self) -> Dimension {
+    /// Returns the dimension, the name with its article, and common units, the SI unit first.
+    fn facts(self) -> (Dimension, &'static str, &'static str) {
         match self {
-            Time => [0, 0, 1, 0],
-            Torque => [1, 2, -2, 0],
-            Rate => [0, 0, -1, 1],
-            Angle => [0, 0, 0, 1],
-            Acceleration => [0, 1, -2, 0],
-            Length => LENGTH,
-            Force => FORCE,
+            Time => ([0, 0, 1, 0], "a time", "s, ms, us, ns, min, h, d"),
+            Torque => ([1, 2, -2, 0], "a torque", "N.m, mN.m, uN.m, N.cm, kN.m, lbf.in, ozf.in"),
+            Rate => ([0, 0, -1, 1], "a rate", "rad/s, mrad/s, deg/s, mdeg/s, dps, deg/h, rpm"),
+            Angle => ([0, 0, 0, 1], "an angle", "rad, mrad, urad, deg, arcmin, arcsec"),
+            Acceleration => ([0, 1, -2, 0], "an acceleration", "m/s2, mm/s2, g, mg"),
+            Length => (LENGTH, "a length", "m, cm, mm, um, in"),
+            Force => (FORCE, "a force", "N, mN, kN, lbf"),
         }
+    }
+
+    pub(super) fn dimension(self) -> Dimension {
+        self.facts().0
     }
 
     /// Returns the factor from a unit of this quantity to SI; `None` for an unknown unit.
@@ -520,15 +525,7 @@ impl Quantity {
 
     /// Lists the names of common units for messages, the SI unit first.
     pub fn units(self) -> &'static str {
-        match self {
-            Time => "s, ms, us, ns, min, h, d",
-            Torque => "N.m, mN.m, uN.m, N.cm, kN.m, lbf.in, ozf.in",
-            Rate => "rad/s, mrad/s, deg/s, mdeg/s, dps, deg/h, rpm",
-            Angle => "rad, mrad, urad, deg, arcmin, arcsec",
-            Acceleration => "m/s2, mm/s2, g, mg",
-            Length => "m, cm, mm, um, in",
-            Force => "N, mN, kN, lbf",
-        }
+        self.facts().2
     }
 
     pub fn unit(self) -> &'static str {
@@ -538,15 +535,7 @@ impl Quantity {
 
 impl fmt::Display for Quantity {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str(match self {
-            Time => "a time",
-            Torque => "a torque",
-            Rate => "a rate",
-            Angle => "an angle",
-            Acceleration => "an acceleration",
-            Length => "a length",
-            Force => "a force",
-        })
+        f.write_str(self.facts().1)
     }
 }
 
