@@ -113,13 +113,10 @@ impl Example {
     fn histories(&self) -> Table {
         let rows = (STOP / STEP).round() as usize;
         let time: Vec<f64> = (0..=rows).map(|row| round(row as f64 * STEP, 6)).collect();
-        let mut names = vec!["time".to_string()];
-        let mut columns = vec![time.clone()];
-        for (name, amplitude, course) in self.inputs {
-            names.push(name.to_string());
-            columns.push(time.iter().map(|&t| round(amplitude * course(t), 6)).collect());
-        }
-        Table::new(names, columns)
+        let inputs = self.inputs.iter().map(|(name, amplitude, course)| {
+            (*name, time.iter().map(|&t| round(amplitude * course(t), 6)).collect())
+        });
+        Table::of([("time", time.clone())].into_iter().chain(inputs))
     }
 }
 
@@ -152,13 +149,10 @@ fn outputs(description: &ModelDescription) -> Vec<&str> {
 }
 
 fn thinned(description: &ModelDescription, answer: &Table) -> Table {
-    let names: Vec<&str> = ["time"].into_iter().chain(outputs(description)).collect();
-    let column = |name: &&str| {
-        let values = answer.column(name).unwrap_or_default();
-        values.iter().step_by(EVERY).map(|&x| significant(x, 9)).collect()
-    };
-    let columns = names.iter().map(column).collect();
-    Table::new(names.into_iter().map(String::from).collect(), columns)
+    Table::of(["time"].into_iter().chain(outputs(description)).map(|name| {
+        let values = answer.column(name).unwrap_or_default().iter().step_by(EVERY);
+        (name, values.map(|&x| significant(x, 9)).collect())
+    }))
 }
 
 fn round(x: f64, decimals: i32) -> f64 {

@@ -211,15 +211,11 @@ impl Characteristics {
         let deviation = |variance: &dyn Fn(&Point) -> f64| -> Vec<f64> {
             self.points.iter().map(|point| variance(point).sqrt()).collect()
         };
-        let columns = vec![
-            self.points.iter().map(|point| point.tau).collect(),
-            deviation(&|point| point.variance),
-            deviation(&|point| self.specified.variance(point.tau)),
-            deviation(&|point| self.fit.noise.variance(point.tau)),
-        ];
-        Table::new(
-            ["tau_s", "deviation", "specified", "estimated"].map(String::from).to_vec(),
-            columns,
-        )
+        Table::of([
+            ("tau_s", self.points.iter().map(|point| point.tau).collect()),
+            ("deviation", deviation(&|point| point.variance)),
+            ("specified", deviation(&|point| self.specified.variance(point.tau))),
+            ("estimated", deviation(&|point| self.fit.noise.variance(point.tau))),
+        ])
     }
 }

@@ -265,16 +265,11 @@ impl Run {
     pub fn torque_table(&self) -> Result<(Table, Schedule)> {
         let (histories, schedule) = self.course()?;
         let mut torque = histories[0].cursor();
-        let mut columns = vec![Vec::new(); 3];
-        for (k, &t) in schedule.time.iter().enumerate() {
-            let (tau, slope) = torque.after(t);
-            let slope = if k + 1 == schedule.time.len() { 0.0 } else { slope };
-            for (column, value) in columns.iter_mut().zip([t, tau, slope]) {
-                column.push(value);
-            }
-        }
-        let names = ["time", TORQUE, SLOPE].map(String::from).to_vec();
-        Ok((Table::new(names, columns), schedule))
+        let (tau, mut slope): (Vec<f64>, Vec<f64>) =
+            schedule.time.iter().map(|t| torque.after(*t)).unzip();
+        slope.last_mut().into_iter().for_each(|last| *last = 0.0);
+        let time = schedule.time.clone();
+        Ok((Table::of([("time", time), (TORQUE, tau), (SLOPE, slope)]), schedule))
     }
 
     fn driven(&self) -> Vec<(&str, &Torque)> {
@@ -422,11 +417,9 @@ impl Run {
         })?;
         progress((steps % REPORT_EVERY) as u64);
 
-        let names = driven.iter().map(|(name, _)| name.to_string());
-        let head = [("time".to_string(), time)].into_iter().chain(names.zip(given));
-        let recorded = columns.iter().map(|name| name.to_string()).zip(recorder.columns());
-        let (names, columns) = head.chain(recorded).unzip();
-        Ok(Table::new(names, columns))
+        let given = driven.iter().map(|(name, _)| *name).zip(given);
+        let recorded = columns.iter().copied().zip(recorder.columns());
+        Ok(Table::of([("time", time)].into_iter().chain(given).chain(recorded)))
     }
 }
 

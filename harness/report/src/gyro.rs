@@ -1,6 +1,6 @@
 //! Charts about a gyro at rest: its Allan deviation, and the noise tests of a recording.
 
-use analysis::allan::Point;
+use analysis::allan::{Noise, Point};
 use analysis::rest::{Chunk, KOLMOGOROV, Rest};
 use experiments::gyro::Characteristics;
 use maud::html;
@@ -9,31 +9,31 @@ use crate::page::{document, render_chart, table};
 use crate::svg::{Axis, Chart, Style, series};
 
 pub fn allan_deviations(gyro: &Characteristics) -> String {
+    let names = ["specified white noise, slope −1/2", "estimated", "specified noise"];
+    allan(
+        "Allan deviation of the simulated gyro at rest",
+        &gyro.points,
+        Some(&gyro.specified),
+        names,
+    )
+    .file()
+}
+
+/// Draws Allan deviations and, if it is known, the noise with its white part; `names` are of the white part, the
+/// deviations and the noise.
+fn allan(title: &str, points: &[Point], noise: Option<&Noise>, names: [&str; 3]) -> Chart {
     let curve = |variance: &dyn Fn(&Point) -> f64| -> Vec<(f64, f64)> {
-        gyro.points.iter().map(|point| (point.tau, variance(point).sqrt())).collect()
+        points.iter().map(|point| (point.tau, variance(point).sqrt())).collect()
     };
     let measured = curve(&|point| point.variance);
-    let chart = Chart::new(
-        "Allan deviation of the simulated gyro at rest",
-        Axis::decades("averaging time / s", measured.iter().map(|p| p.0)),
-        Axis::decades("Allan deviation / (rad/s)", measured.iter().map(|p| p.1)),
-        vec![
-            series(
-                curve(&|point| gyro.specified.arw.powi(2) / point.tau),
-                EXPECTED,
-                Style::Dashed,
-                "specified white noise, slope −1/2",
-            ),
-            series(measured, MEASURED, Style::Dots, "estimated"),
-            series(
-                curve(&|point| gyro.specified.variance(point.tau)),
-                FITTED,
-                Style::Line,
-                "specified noise",
-            ),
-        ],
-    );
-    chart.file()
+    let white = noise.map(|noise| curve(&|point| noise.arw.powi(2) / point.tau));
+    let whole = noise.map(|noise| curve(&|point| noise.variance(point.tau)));
+    let white = white.map(|white| series(white, EXPECTED, Style::Dashed, names[0]));
+    let whole = whole.map(|whole| series(whole, FITTED, Style::Line, names[2]));
+    let x = Axis::decades("averaging time / s", measured.iter().map(|p| p.0));
+    let y = Axis::decades("Allan deviation / (rad/s)", measured.iter().map(|p| p.1));
+    let measured = series(measured, MEASURED, Style::Dots, names[1]);
+    Chart::new(title, x, y, white.into_iter().chain([measured]).chain(whole).collect())
 }
 
 const MEASURED: &str = "#0b6aa8";
@@ -52,23 +52,11 @@ pub fn page(rows: &[(String, String)], found: &Rest) -> String {
 pub fn rest_charts(rest: &Rest) -> [(&'static str, Chart); 6] {
     // The frame around the range that noise allows.
     let around = |to: f64, y: f64| vec![(0.0, y), (to, y), (to, -y), (0.0, -y)];
-    let deviation = |variance: &dyn Fn(&Point) -> f64| -> Vec<(f64, f64)> {
-        rest.allan.iter().map(|point| (point.tau, variance(point).sqrt())).collect()
-    };
-    let measured = deviation(&|point| point.variance);
-    let mut allan = vec![series(measured.clone(), MEASURED, Style::Dots, "recorded")];
-    if let Some(fit) = &rest.noise {
-        let noise = &fit.noise;
-        let white = deviation(&|point| noise.arw.powi(2) / point.tau);
-        allan.insert(0, series(white, EXPECTED, Style::Dashed, "its white noise, slope −1/2"));
-        let fitted = deviation(&|point| noise.variance(point.tau));
-        allan.push(series(fitted, FITTED, Style::Line, "fitted noise"));
-    }
-    let allan = Chart::new(
+    let allan = allan(
         "Allan deviation of the recorded gyro at rest",
-        Axis::decades("averaging time / s", measured.iter().map(|p| p.0)),
-        Axis::decades("Allan deviation / (rad/s)", measured.iter().map(|p| p.1)),
-        allan,
+        &rest.allan,
+        rest.noise.as_ref().map(|fit| &fit.noise),
+        ["its white noise, slope −1/2", "recorded", "fitted noise"],
     );
     let end = rest.quantiles.last().map_or(3.0, |(x, _)| *x);
     let mut quantiles = Chart::new(
@@ -103,11 +91,11 @@ pub fn rest_charts(rest: &Rest) -> [(&'static str, Chart); 6] {
     let minutes = |from: f64| from / 60.0;
     let n = (rest.chunk_length() as f64).sqrt();
     let (white, normal) = (2.0 / n, 2.0 * 2f64.sqrt() / n);
-    let means: Vec<(f64, f64)> =
-        rest.chunks.iter().map(|c| (minutes(c.from), c.mean / rest.deviation)).collect();
-    let variances: Vec<(f64, f64)> = (rest.chunks.iter())
-        .map(|c| (minutes(c.from), c.variance / rest.deviation.powi(2) - 1.0))
-        .collect();
+    let curve = |value: &dyn Fn(&Chunk) -> f64| -> Vec<(f64, f64)> {
+        rest.chunks.iter().map(|chunk| (minutes(chunk.from), value(chunk))).collect()
+    };
+    let means = curve(&|chunk| chunk.mean / rest.deviation);
+    let variances = curve(&|chunk| chunk.variance / rest.deviation.powi(2) - 1.0);
     let end = minutes(rest.count as f64 * rest.step);
     let both = means.iter().chain(&variances).map(|p| p.1);
     let all = vec![
@@ -133,23 +121,16 @@ pub fn rest_charts(rest: &Rest) -> [(&'static str, Chart); 6] {
             series(rest.histogram.clone(), MEASURED, Style::Dots, "recorded"),
         ],
     );
-    let curve = |value: &dyn Fn(&Chunk) -> f64| -> Vec<(f64, f64)> {
-        rest.chunks.iter().map(|chunk| (minutes(chunk.from), value(chunk))).collect()
-    };
     let limit = vec![(0.0, KOLMOGOROV), (end, KOLMOGOROV)];
     let read = curve(&|chunk| chunk.kolmogorov);
+    let between = curve(&|chunk| chunk.between_levels);
     let kolmogorov = Chart::new(
         "Kolmogorov and Smirnov's distance of the chunks from the normal distribution",
         Axis::linear("time / min", [0.0, end], 0.0, 8),
         Axis::decades("distance times √n", read.iter().map(|p| p.1).chain([0.1, KOLMOGOROV])),
         vec![
             series(read.clone(), MEASURED, Style::Dots, "of the readings"),
-            series(
-                curve(&|chunk| chunk.between_levels),
-                FITTED,
-                Style::Dots,
-                "between the levels of the readings",
-            ),
+            series(between, FITTED, Style::Dots, "between the levels of the readings"),
             series(limit, EXPECTED, Style::Dashed, "5 % limit of normal noise"),
         ],
     );

@@ -54,7 +54,8 @@ impl Axis {
     }
 }
 
-fn range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
+/// Returns the least and the largest of the finite values; 0 and 1 without values.
+pub(crate) fn range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
     let (low, high) = values
         .into_iter()
         .filter(|v| v.is_finite())

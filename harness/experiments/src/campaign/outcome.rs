@@ -51,8 +51,9 @@ const LEAST_SNR: f64 = 0.0;
 /// Fails if the frequency responses of a run of `rows` rows take more work than [`budget::PRODUCTS`]. If the
 /// band begins far below one cycle in the whole run, the windows of most frequencies hold all rows.
 pub(super) fn check_work(torque: &Torque, step: f64, rows: usize) -> Result<()> {
-    let Torque::Profile(profile) = torque else { return Ok(()) };
-    let Some(band) = profile.band() else { return Ok(()) };
+    let Some((profile, band)) = torque.profile().and_then(|p| Some((p, p.band()?))) else {
+        return Ok(());
+    };
     let (sweep, rows) = (profile.sweep(), rows as f64);
     let lengths = Lengths::for_record(band, sweep, step * rows, step);
     let lags = lengths.lag / (step * lengths.decimation as f64);
@@ -625,8 +626,8 @@ fn modelled(
     start: f64,
     linear: &Linear,
 ) -> Result<Vec<f64>> {
-    let sweeps = |profile: &Profile| profile.sweep().is_some();
-    let is_sweep = matches!(&run.torque, Torque::Profile(profile) if sweeps(profile)) && !run.hold;
+    let is_sweep =
+        run.torque.profile().is_some_and(|profile| profile.sweep().is_some()) && !run.hold;
     if is_sweep && case.recording.is_some() {
         return Ok(linear.simulate(run.step, recorded, start));
     }
@@ -658,14 +659,12 @@ impl Outcome {
         }
         let column = |name| table.column(name).unwrap_or_default();
         let is_recording = case.recording.is_some();
-        let alternates = match &run.torque {
-            Torque::Profile(profile) => profile.band().is_some(),
-            Torque::Rows { .. } => false,
-        };
+        let profile = run.torque.profile();
+        let alternates = profile.is_some_and(|profile| profile.band().is_some());
         let rates = Rates::measure(table, alternates, is_recording);
-        let (record, swept) = match &run.torque {
-            Torque::Rows { .. } => (None, None),
-            Torque::Profile(profile) => {
+        let (record, swept) = match profile {
+            None => (None, None),
+            Some(profile) => {
                 let (tau, omega) = (column(TAU_CMD), &rates.about_axis[..]);
                 // in every fourth of the frequencies: it changes little between them
                 let unexplained = profile.band().map_or(Vec::new(), |band| {
@@ -696,10 +695,7 @@ impl Outcome {
             Some((passing, rotary)) => (Some(passing), rotary),
             None => (None, (!is_recording).then(|| rotary_in_time(run.step, frequency, table))),
         };
-        let onset = rotary.and_then(|rotary| {
-            let Torque::Profile(profile) = &run.torque else { return None };
-            profile.sweep()?.time_at_frequency(rotary.from?)
-        });
+        let onset = rotary.and_then(|rotary| profile?.sweep()?.time_at_frequency(rotary.from?));
         let history = History::thin(column("time"), &all);
         Ok(Outcome {
             ending: Ending::measure(&history),

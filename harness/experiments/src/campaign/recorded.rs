@@ -59,7 +59,7 @@ pub fn read(recorded: &Recorded, done: &mut dyn FnMut(String)) -> Result<(f64, T
 ///
 /// # Errors If the torque has frequencies of half of the rows' rate or more.
 pub fn check_rows(path: &Path, step: f64, torque: &Torque) -> Result<()> {
-    let Torque::Profile(profile) = torque else { return Ok(()) };
+    let Some(profile) = torque.profile() else { return Ok(()) };
     let highest = profile.band().map_or(0.0, |band| band.1);
     ensure!(
         step * highest < 0.5,
@@ -86,11 +86,7 @@ pub(super) fn table(
     let (time, torque) = (column("time"), column("tau_cmd"));
     let (from, to) = case.torque.span();
     let to = to.min(case.stop);
-    let sweep = match &*case.torque {
-        Torque::Profile(profile) => profile.sweep(),
-        Torque::Rows { .. } => None,
-    };
-    let clock = match sweep {
+    let clock = match case.torque.profile().and_then(|profile| profile.sweep()) {
         Some(sweep) => {
             check_rows(&recorded.path, step, &case.torque)?;
             budget::table(budget::steps(to - from, step).with_context(|| name.to_string())?, 4)?;
@@ -156,11 +152,9 @@ pub(super) fn table(
     for rate in ["omega_x", "omega_y"] {
         columns.extend(table.column(rate).map(|values| (rate, cut(values))));
     }
-    let (names, columns) =
-        columns.into_iter().map(|(name, values)| (name.to_string(), values)).unzip();
     // the plan's own step if it is equal to rounding
     let step = if (step / case.step - 1.0).abs() < 1e-6 { case.step } else { step };
-    Ok((step, Table::new(names, columns)))
+    Ok((step, Table::of(columns)))
 }
 
 /// Times of a recording in terms of the commanded torque. The clock has the row at which the torque begins (it may lie

@@ -315,7 +315,7 @@ impl Reader<'_> {
         let amplitude = self.take("[onset] ", inner, "amplitude", several, |list: &Vec<f64>| {
             list.len() > 1 && ascend(list)
         });
-        if profile.is_some_and(|profile| profile.value.kind() != "sine") {
+        if profile.is_some_and(|profile| profile.value.name() != "sine") {
             self.add(header.span(), "[onset] expects a profile of one frequency, sine".into());
         }
         if table.contains_key("random") {

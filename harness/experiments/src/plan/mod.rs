@@ -35,24 +35,17 @@ pub const FILLS: [f64; 2] = [0.05, 0.10];
 pub const AMPLITUDES: [f64; 11] =
     [0.0125, 0.025, 0.05, 0.075, 0.1, 0.125, 0.15, 0.175, 0.2, 0.225, 0.25];
 
-pub const BUILT_IN: &[(&str, &str)] = &[
-    ("thesis", include_str!("../../../campaigns/thesis.toml")),
-    ("thesis_models", include_str!("../../../campaigns/thesis_models.toml")),
-    ("t1_resonance", include_str!("../../../campaigns/t1_resonance.toml")),
-    ("t2_mass", include_str!("../../../campaigns/t2_mass.toml")),
-    ("t3_diameter", include_str!("../../../campaigns/t3_diameter.toml")),
-    ("t4_distance", include_str!("../../../campaigns/t4_distance.toml")),
-    ("t5_near_resonance", include_str!("../../../campaigns/t5_near_resonance.toml")),
-    ("t6_high_amplitude", include_str!("../../../campaigns/t6_high_amplitude.toml")),
-    ("t7_on_the_axis", include_str!("../../../campaigns/t7_on_the_axis.toml")),
-    ("fills", include_str!("../../../campaigns/fills.toml")),
-    ("amplitudes", include_str!("../../../campaigns/amplitudes.toml")),
-    ("bench_damping", include_str!("../../../campaigns/bench_damping.toml")),
-    ("bench_as_built", include_str!("../../../campaigns/bench_as_built.toml")),
-    ("monte_carlo", include_str!("../../../campaigns/monte_carlo.toml")),
-    ("low_thrust", include_str!("../../../campaigns/low_thrust.toml")),
-    ("slew", include_str!("../../../campaigns/slew.toml")),
-];
+macro_rules! plans {
+    ($($name:literal)*) => {
+        &[$(($name, include_str!(concat!("../../../campaigns/", $name, ".toml")))),*]
+    };
+}
+
+pub const BUILT_IN: &[(&str, &str)] = plans! {
+    "thesis" "thesis_models" "t1_resonance" "t2_mass" "t3_diameter" "t4_distance"
+    "t5_near_resonance" "t6_high_amplitude" "t7_on_the_axis" "fills" "amplitudes" "bench_damping"
+    "bench_as_built" "monte_carlo" "low_thrust" "slew"
+};
 
 /// Step of a plan without one, s: the thesis's IMU at 50 Hz.
 const STEP: f64 = 0.02;
@@ -498,10 +491,7 @@ impl Plan {
             model: value(slosh::MODEL),
             input: input.clone(),
             fill: value(tank::H).filter(|_| !from_table).and_then(|h| h.parse().ok()),
-            amplitude: match &*torque {
-                Torque::Profile(profile) => profile.amplitude(),
-                Torque::Rows { .. } => None,
-            },
+            amplitude: torque.profile().and_then(|profile| profile.amplitude()),
             profile: match &*torque {
                 Torque::Profile(profile) => profile.to_string(),
                 Torque::Rows { held, .. } => {

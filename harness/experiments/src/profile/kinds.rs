@@ -7,7 +7,7 @@ use analysis::sweep::{Law, Sweep};
 use files::budget::FREQUENCY;
 
 use super::Values;
-use super::noise::{DwellInNoise, Noise};
+use super::noise::Noise;
 use super::shape::{Dwell, Piece, Pieces, Shape};
 
 /// A kind of torque history, with times in s, frequencies in Hz and torques in N·m. `says` describes it for
@@ -130,9 +130,14 @@ const BAND_FROM_ZERO: Demand = (
 const NOISE_BAND: [Demand; 2] =
     [(|v| v.value("f0") < v.value("f1"), "f0 must be less than f1"), BAND_FROM_ZERO];
 
-fn noise(v: &Values, limit: f64) -> Noise {
-    let band = (v.value("f0"), v.value("f1"));
-    Noise::new(v.value("rms"), band, v.value("exponent"), v.value("seed") as u64, limit)
+fn noise(v: &Values) -> Noise {
+    let [rms, f0, f1, exponent, seed, limit] =
+        ["rms", "f0", "f1", "exponent", "seed", "limit"].map(|n| v.value(n));
+    Noise::new(rms, (f0, f1), exponent, seed as u64, limit)
+}
+
+fn dwell(v: &Values) -> Dwell {
+    Dwell { amplitude: v.value("amplitude"), frequency: v.value("frequency") }
 }
 
 fn sweep(v: &Values, law: Law) -> Arc<dyn Shape> {
@@ -168,9 +173,7 @@ pub const KINDS: &[Kind] = &[
             duration(60.0),
         ],
         demands: &[],
-        shape: |v| {
-            Arc::new(Dwell { amplitude: v.value("amplitude"), frequency: v.value("frequency") })
-        },
+        shape: |v| Arc::new(dwell(v)),
     },
     Kind {
         name: "constant",
@@ -251,7 +254,7 @@ pub const KINDS: &[Kind] = &[
                 "rms must be at most half of limit (else too much of it is clipped)",
             ),
         ],
-        shape: |v| Arc::new(noise(v, v.value("limit"))),
+        shape: |v| Arc::new(noise(v)),
     },
     Kind {
         name: "sine-noise",
@@ -275,11 +278,7 @@ pub const KINDS: &[Kind] = &[
                 "amplitude and twice rms together must be within limit (else too much is clipped)",
             ),
         ],
-        shape: |v| {
-            let dwell = Dwell { amplitude: v.value("amplitude"), frequency: v.value("frequency") };
-            let noise = noise(v, f64::INFINITY);
-            Arc::new(DwellInNoise { dwell, noise, limit: v.value("limit") })
-        },
+        shape: |v| Arc::new(Noise { sine: Some(dwell(v)), ..noise(v) }),
     },
     Kind {
         name: "zero",

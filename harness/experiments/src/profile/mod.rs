@@ -146,10 +146,6 @@ impl fmt::Display for Written {
 }
 
 impl Written {
-    pub(crate) fn kind(&self) -> &str {
-        &self.name
-    }
-
     pub fn set(&mut self, key: &str, value: &str) {
         self.pairs.retain(|(k, _)| k != key);
         self.pairs.push((key.into(), value.into()));
@@ -342,6 +338,13 @@ impl Torque {
     pub fn rows(time: &[f64], tau: &[f64], slopes: Option<&[f64]>, held: bool) -> Result<Self> {
         let slopes = slopes.map(<[f64]>::to_vec);
         Ok(Torque::Rows { history: History::new(time.to_vec(), tau.to_vec(), slopes, held)?, held })
+    }
+
+    pub fn profile(&self) -> Option<&Profile> {
+        match self {
+            Torque::Profile(profile) => Some(profile),
+            Torque::Rows { .. } => None,
+        }
     }
 
     pub fn span(&self) -> (f64, f64) {

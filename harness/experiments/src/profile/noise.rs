@@ -16,29 +16,26 @@ use analysis::random::Random;
 /// so that the estimate has no gaps.
 pub const TONES: usize = 512;
 
-/// A noise torque in the band from `f0`, which may be 0, to `f1`, Hz. `rms` is the root mean square before
-/// the limit and `limit` the torque at which it is clipped, both in N·m. The power density is ∝ f^exponent: 0
-/// is white, −1 pink, −2 brown.
+/// A noise torque in a band, which may begin at 0, Hz, if wanted with a sine added. The torque is clipped at
+/// ±`limit`, N·m.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Noise {
-    pub rms: f64,
-    pub f0: f64,
-    pub f1: f64,
-    pub exponent: f64,
-    pub seed: u64,
-    pub limit: f64,
-    tones: Vec<Tone>,
+    pub(super) sine: Option<Dwell>,
+    pub(super) band: (f64, f64),
+    pub(super) limit: f64,
+    pub(super) tones: Vec<Tone>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Tone {
+pub(super) struct Tone {
     amplitude: f64,
     rate: f64,
     phase: f64,
 }
 
 impl Noise {
-    /// Makes the noise; the arguments are the fields of [`Noise`], in SI units.
+    /// Makes the noise: `rms` is the root mean square before the limit, N·m, and the power density is
+    /// ∝ f^exponent: 0 is white, −1 pink, −2 brown.
     pub fn new(rms: f64, (f0, f1): (f64, f64), exponent: f64, seed: u64, limit: f64) -> Self {
         let mut random = Random::new(seed, 0);
         let cell = (f1 - f0) / TONES as f64;
@@ -57,51 +54,26 @@ impl Noise {
         for tone in &mut tones {
             tone.amplitude *= rms / power.sqrt();
         }
-        Noise { rms, f0, f1, exponent, seed, limit, tones }
+        Noise { sine: None, band: (f0, f1), limit, tones }
     }
 }
 
 impl Shape for Noise {
     fn torque_after(&self, t: f64) -> f64 {
-        let sum: f64 = self
-            .tones
-            .iter()
-            .map(|tone| tone.amplitude * libm::sin(tone.rate * t + tone.phase))
-            .sum();
-        sum.clamp(-self.limit, self.limit)
+        let tone = |tone: &Tone| tone.amplitude * libm::sin(tone.rate * t + tone.phase);
+        let sine = self.sine.as_ref().map_or(0.0, |sine| sine.torque_after(t));
+        (sine + self.tones.iter().map(tone).sum::<f64>()).clamp(-self.limit, self.limit)
     }
 
-    fn highest(&self, _: f64) -> f64 {
-        self.f1
+    fn highest(&self, stop: f64) -> f64 {
+        self.sine.as_ref().map_or(0.0, |sine| sine.highest(stop)).max(self.band.1)
     }
 
     /// Returns the excited band, Hz. If the band of the noise begins at 0, the excited band begins at the second tone,
     /// because the first tone may be at any frequency near 0.
     fn band(&self) -> Option<(f64, f64)> {
-        let tone = (self.f1 - self.f0) / TONES as f64;
-        Some((if self.f0 > 0.0 { self.f0 } else { tone }, self.f1))
-    }
-}
-
-/// A sine with noise; their sum is clipped at ±`limit`, N·m.
-#[derive(Clone, Debug, PartialEq)]
-pub struct DwellInNoise {
-    pub dwell: Dwell,
-    pub noise: Noise,
-    pub limit: f64,
-}
-
-impl Shape for DwellInNoise {
-    fn torque_after(&self, t: f64) -> f64 {
-        (self.dwell.torque_after(t) + self.noise.torque_after(t)).clamp(-self.limit, self.limit)
-    }
-
-    fn highest(&self, stop: f64) -> f64 {
-        self.dwell.highest(stop).max(self.noise.highest(stop))
-    }
-
-    fn band(&self) -> Option<(f64, f64)> {
-        self.noise.band()
+        let (f0, f1) = self.band;
+        Some((if f0 > 0.0 { f0 } else { f1 / TONES as f64 }, f1))
     }
 }
 

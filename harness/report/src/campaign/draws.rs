@@ -8,6 +8,7 @@ use maud::html;
 use super::colors;
 use super::figure::{Figure, Panel, numbers};
 use super::page::{Group, Page, best};
+use crate::svg::range;
 
 type Quantity = (&'static str, &'static str, fn(&Outcome) -> Option<f64>);
 
@@ -122,7 +123,7 @@ pub(super) fn draws(page: &Page, group: &Group) -> Vec<Figure> {
 
 fn histogram(values: &[f64]) -> (Vec<f64>, Vec<usize>) {
     const BINS: usize = 24;
-    let (low, high) = values.iter().fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(*v), h.max(*v)));
+    let (low, high) = range(values.iter().copied());
     let width = ((high - low) / BINS as f64).max(1e-9);
     let mut counts = vec![0; BINS];
     for value in values {

@@ -3,7 +3,7 @@ use std::collections::BTreeSet;
 use maud::{Markup, html};
 use serde_json::{Value, json};
 
-use crate::svg::simplified;
+use crate::svg::{range, simplified};
 use experiments::rounding::significant;
 
 /// A figure of one or more panels with a common legend, `columns` of them in a row on a wide screen. The
@@ -206,10 +206,7 @@ pub(super) fn thinned(points: &[(f64, f64)], log: bool) -> Vec<(f64, f64)> {
     let points: Vec<(f64, f64)> = points.iter().filter(finite).copied().collect();
     let place = |x: f64| if log { x.ln() } else { x };
     let span = |of: &dyn Fn(&(f64, f64)) -> f64| {
-        let (low, high) = points
-            .iter()
-            .map(of)
-            .fold((f64::MAX, f64::MIN), |(low, high), v| (low.min(v), high.max(v)));
+        let (low, high) = range(points.iter().map(of));
         (low, (high - low).max(1e-300))
     };
     let ((x0, w), (y0, h)) = (span(&|p| place(p.0)), span(&|p| p.1));

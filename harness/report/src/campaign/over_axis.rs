@@ -8,6 +8,7 @@ use maud::{Markup, html};
 use super::colors;
 use super::figure::{Figure, Label, Panel, dots, line};
 use super::page::{Axis, Group, Page, best, distinct, exact_features, sentence_with_names};
+use crate::svg::range;
 
 /// A quantity of a run that is plotted: label, the function that reads it from a run, whether its axis is
 /// logarithmic, and a level that is drawn for comparison.
@@ -117,8 +118,8 @@ fn labels(mut ends: Vec<(f64, String, &str, &str)>) -> Vec<Label> {
     const MOST: usize = 12;
     const TOGETHER: f64 = 0.03;
     ends.sort_by(|a, b| a.1.cmp(&b.1).then(a.0.total_cmp(&b.0)));
-    let span = ends.iter().map(|end| end.0).fold(f64::MIN, f64::max)
-        - ends.iter().map(|end| end.0).fold(f64::MAX, f64::min);
+    let (lowest, highest) = range(ends.iter().map(|end| end.0));
+    let span = highest - lowest;
     let mut labels: Vec<(f64, String, Vec<&str>, &str)> = Vec::new();
     for (y, what, model, color) in ends {
         match labels.last_mut() {
@@ -282,7 +283,7 @@ fn small<'a>(
     let (mut panels, mut traces) = (Vec::new(), Vec::new());
     for (p, quantity) in quantities.into_iter().enumerate() {
         panels.push(Panel { log_y: quantity.decades, ..Panel::new(&axis.label, quantity.label) });
-        let mut ends: Option<(f64, f64)> = None;
+        let mut all = Vec::new();
         for (i, group) in page.groups.iter().enumerate() {
             let points: Vec<(f64, f64, Option<f64>)> = group
                 .runs
@@ -290,12 +291,11 @@ fn small<'a>(
                 .filter_map(|run| Some((axis.value(run)?, (quantity.value)(run)?, None)))
                 .filter(|(_, y, _)| y.is_finite() && (!quantity.decades || *y > 0.0))
                 .collect();
-            for (x, ..) in &points {
-                ends = ends.map(|(low, high)| (low.min(*x), high.max(*x))).or(Some((*x, *x)));
-            }
+            all.extend(points.iter().map(|(x, ..)| *x));
             traces.push(dots(p, &group.title(), colors::category(i), colors::symbol(i), &points));
         }
-        if let (Some((level, name)), Some((low, high))) = (quantity.level, ends) {
+        if let (Some((level, name)), false) = (quantity.level, all.is_empty()) {
+            let (low, high) = range(all);
             traces.push(line(p, name, colors::INK, "dash", &[(low, level), (high, level)]));
         }
     }

@@ -3,7 +3,6 @@ use analysis::sweep::Sweep;
 use analysis::{BAND, FrequencyResponse, logarithmic_grid};
 use experiments::campaign::{Curve, Estimate, Outcome, Results};
 use experiments::plan::{AMPLITUDE, Plan};
-use experiments::profile::Torque;
 use host::fmu::Fmu;
 use names::hubslosh::{slosh, tank};
 
@@ -94,17 +93,11 @@ pub(super) fn passing(run: &Outcome) -> Curve {
 }
 
 pub(super) fn sweep(run: &Outcome) -> Option<&Sweep> {
-    match &*run.case.torque {
-        Torque::Profile(profile) => profile.sweep(),
-        _ => None,
-    }
+    run.case.torque.profile()?.sweep()
 }
 
 pub(super) fn band(run: &Outcome) -> Option<(f64, f64)> {
-    match &*run.case.torque {
-        Torque::Profile(profile) => profile.band(),
-        _ => None,
-    }
+    run.case.torque.profile()?.band()
 }
 
 fn exact_response(run: &Outcome) -> FrequencyResponse {
@@ -138,10 +131,8 @@ impl Varied {
     pub fn new(variable: &str, fmu: &Fmu, runs: &[Outcome]) -> Option<Varied> {
         let (name, unit) = match variable.strip_prefix("profile.") {
             Some(name) => {
-                let parameter = runs.iter().find_map(|run| match &*run.case.torque {
-                    Torque::Profile(profile) => profile.parameter(name),
-                    Torque::Rows { .. } => None,
-                })?;
+                let mut profiles = runs.iter().filter_map(|run| run.case.torque.profile());
+                let parameter = profiles.find_map(|profile| profile.parameter(name))?;
                 (parameter.label, parameter.unit.to_string())
             }
             None => (variable, unit(fmu, variable).unwrap_or_default()),

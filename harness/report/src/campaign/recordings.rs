@@ -15,68 +15,44 @@ struct Feature {
     difference: (f64, usize, &'static str),
 }
 
+const fn feature(
+    heading: [&'static str; 2],
+    digits: usize,
+    difference: (f64, usize, &'static str),
+    value: fn(&Outcome) -> Option<Value>,
+) -> Feature {
+    Feature { heading, value, digits, difference }
+}
+
 const FEATURES: [Feature; 9] = [
-    Feature {
-        heading: ["antiresonance", "Hz"],
-        value: |run| {
-            let (estimate, _) = best(run)?;
-            Some((estimate.features.f_dip?, estimate.deviations.f_dip))
-        },
-        digits: 4,
-        difference: (1e3, 1, "mHz"),
-    },
-    Feature {
-        heading: ["resonance", "Hz"],
-        value: |run| {
-            let (estimate, _) = best(run)?;
-            Some((estimate.features.f_res?, estimate.deviations.f_res))
-        },
-        digits: 4,
-        difference: (1e3, 1, "mHz"),
-    },
-    Feature {
-        heading: ["notch", "dB"],
-        value: |run| Some((best(run)?.0.features.notch_db?, None)),
-        digits: 2,
-        difference: (1.0, 2, "dB"),
-    },
-    Feature {
-        heading: ["fit in", "frequency %"],
-        value: |run| Some((run.fit()?.fit_frequency, None)),
-        digits: 1,
-        difference: (1.0, 1, "%"),
-    },
-    Feature {
-        heading: ["fit in", "time %"],
-        value: |run| Some((run.fit()?.fit_time, None)),
-        digits: 1,
-        difference: (1.0, 1, "%"),
-    },
-    Feature {
-        heading: ["residual", "coherence"],
-        value: |run| Some((run.fit()?.coherence?, None)),
-        digits: 2,
-        difference: (1.0, 2, ""),
-    },
-    Feature {
-        heading: ["SNR at", "resonance dB"],
-        value: |run| Some((run.record.as_ref()?.snr_db?[0], None)),
-        digits: 0,
-        difference: (1.0, 0, "dB"),
-    },
-    Feature {
-        heading: ["CEF,", "median"],
-        value: |run| Some((run.off_axis()?.median, None)).filter(|_| run.is_recording()),
-        digits: 4,
-        difference: (1.0, 4, ""),
-    },
-    Feature {
-        heading: ["leakage,", "rms"],
-        value: |run| Some((run.off_axis()?.leakage, None)).filter(|_| run.is_recording()),
-        digits: 4,
-        difference: (1.0, 4, ""),
-    },
+    feature(["antiresonance", "Hz"], 4, (1e3, 1, "mHz"), |run| {
+        let (estimate, _) = best(run)?;
+        Some((estimate.features.f_dip?, estimate.deviations.f_dip))
+    }),
+    feature(["resonance", "Hz"], 4, (1e3, 1, "mHz"), |run| {
+        let (estimate, _) = best(run)?;
+        Some((estimate.features.f_res?, estimate.deviations.f_res))
+    }),
+    feature(["notch", "dB"], 2, (1.0, 2, "dB"), |run| exact(best(run)?.0.features.notch_db)),
+    feature(["fit in", "frequency %"], 1, (1.0, 1, "%"), |run| {
+        exact(Some(run.fit()?.fit_frequency))
+    }),
+    feature(["fit in", "time %"], 1, (1.0, 1, "%"), |run| exact(Some(run.fit()?.fit_time))),
+    feature(["residual", "coherence"], 2, (1.0, 2, ""), |run| exact(run.fit()?.coherence)),
+    feature(["SNR at", "resonance dB"], 0, (1.0, 0, "dB"), |run| {
+        exact(Some(run.record.as_ref()?.snr_db?[0]))
+    }),
+    feature(["CEF,", "median"], 4, (1.0, 4, ""), |run| recorded(run, run.off_axis()?.median)),
+    feature(["leakage,", "rms"], 4, (1.0, 4, ""), |run| recorded(run, run.off_axis()?.leakage)),
 ];
+
+fn exact(value: Option<f64>) -> Option<Value> {
+    Some((value?, None))
+}
+
+fn recorded(run: &Outcome, value: f64) -> Option<Value> {
+    exact(Some(value)).filter(|_| run.is_recording())
+}
 
 fn same_run(a: &Outcome, b: &Outcome) -> bool {
     let close = |a: Option<f64>, b: Option<f64>| match (a, b) {

@@ -34,8 +34,6 @@ pub(super) fn responses(page: &Page, group: &Group) -> Figure {
             &group.exact_response(),
         ));
     }
-    let near = band_around_resonance(group);
-    let panel = |y: &str| Panel { log_x: true, range: near, ..Panel::new("frequency / Hz", y) };
     Figure {
         title: format!("Frequency response, {}", group.title()),
         caption: html! {
@@ -45,7 +43,7 @@ pub(super) fn responses(page: &Page, group: &Group) -> Figure {
         height: 235,
         half: true,
         shared: true,
-        panels: vec![panel("|H| / dB"), panel("phase / deg")],
+        panels: ["|H| / dB", "phase / deg"].map(|y| panel(group, y)).into(),
         traces,
         ..Figure::default()
     }
@@ -62,6 +60,11 @@ fn band_around_resonance(group: &Group) -> Option<(f64, f64)> {
         Some(((antiresonance - 2.5 * delta).max(from), (resonance + 4.0 * delta).min(to)))
     });
     bands.reduce(|all, one| (all.0.min(one.0), all.1.max(one.1)))
+}
+
+fn panel(group: &Group, y: &str) -> Panel {
+    let range = band_around_resonance(group);
+    Panel { log_x: true, range, ..Panel::new("frequency / Hz", y) }
 }
 
 fn bode(
@@ -129,11 +132,6 @@ pub(super) fn fitted(page: &Page, group: &Group) -> Figure {
         let coherence = thinned(coherence, true);
         traces.push(line(2, &format!("{name}, measured"), color, "solid", &coherence));
     }
-    let panel = |y: &str| Panel {
-        log_x: true,
-        range: band_around_resonance(group),
-        ..Panel::new("frequency / Hz", y)
-    };
     Figure {
         title: format!("Fitted transfer function and residual coherence, {}", group.title()),
         caption: html! { "A transfer function with three poles and two zeros (dashed) over the measured response of the smallest and the largest torque, and the coherence of what it leaves with the torque: 1 where the rest still follows the torque." },
@@ -141,7 +139,9 @@ pub(super) fn fitted(page: &Page, group: &Group) -> Figure {
         height: 235,
         half: true,
         shared: true,
-        panels: vec![panel("|H| / dB"), panel("phase / deg"), panel("residual coherence γ²")],
+        panels: ["|H| / dB", "phase / deg", "residual coherence γ²"]
+            .map(|y| panel(group, y))
+            .into(),
         traces,
         ..Figure::default()
     }
@@ -179,7 +179,7 @@ pub(super) fn models(page: &Page) -> Vec<Figure> {
                 thesis: "7.5 and 7.6",
                 height: 340,
                 half: true,
-                panels: vec![Panel { log_x: true, range: band_around_resonance(groups[0]), ..Panel::new("frequency / Hz", "|H| / dB") }],
+                panels: vec![panel(groups[0], "|H| / dB")],
                 traces,
                 ..Figure::default()
             }

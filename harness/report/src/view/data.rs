@@ -4,6 +4,8 @@
 use base64ct::{Base64, Encoding};
 use serde_json::{Value, json};
 
+use crate::svg::range;
+
 /// Largest number of values for the moving objects of one page. With 32 bits each this is 6.4 MB of text.
 const MOST_VALUES: usize = 1_200_000;
 
@@ -34,7 +36,7 @@ impl Thinning {
     /// oscillation.
     pub fn too_few(&self, columns: &[&[f64]]) -> Option<f64> {
         let frames = |column: &&[f64]| {
-            let (low, high) = range(column);
+            let (low, high) = range(column.iter().copied());
             // With hysteresis, so that noise does not count as oscillation.
             let (mut above, mut crossings) = (column[0] > 0.5 * (low + high), 0usize);
             for value in column.iter() {
@@ -49,16 +51,6 @@ impl Thinning {
         let fewest = columns.iter().map(frames).fold(f64::INFINITY, f64::min);
         (fewest < FEWEST_FRAMES).then_some(fewest)
     }
-}
-
-fn range(values: &[f64]) -> (f64, f64) {
-    values
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)))
-}
-
-pub(super) fn peak(values: &[f64]) -> f64 {
-    values.iter().fold(0.0, |most, v| f64::max(most, v.abs()))
 }
 
 fn text(values: impl Iterator<Item = f64>) -> String {
@@ -92,8 +84,8 @@ pub(super) fn envelope(time: &[f64], values: &[f64]) -> Value {
     let middles = time.chunks(each).map(|part| part[part.len() / 2]);
     json!({
         "times": text(middles),
-        "low": text(parts().map(|part| range(part).0)),
-        "high": text(parts().map(|part| range(part).1)),
+        "low": text(parts().map(|part| range(part.iter().copied()).0)),
+        "high": text(parts().map(|part| range(part.iter().copied()).1)),
         "each": each,
     })
 }

@@ -10,6 +10,7 @@ mod scene;
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use analysis::statistics::peak;
 use anyhow::{Context, Result, ensure};
 use experiments::sensors::quantity::Coordinate;
 use host::description::ModelDescription;
@@ -22,11 +23,12 @@ use names::hubslosh::{
 use serde_json::{Map, Value, json};
 use signals::table::Table;
 
-use self::data::{Thinning, integral, peak};
+use self::data::{Thinning, integral};
 pub use self::geometry::{Drawing, Outline, Surfaces};
 use self::geometry::{Parameters, Pendulum, Tank};
 use self::scene::scene;
 use crate::campaign::{PLOTLY, PLOTLY_LICENSE};
+use crate::svg::range;
 
 pub struct Run<'a> {
     pub title: String,
@@ -133,13 +135,8 @@ fn prefixes(parameters: &Parameters) -> Vec<(String, usize)> {
         Some(Kind::Tank) => vec!["tank".into()],
         _ => Vec::new(),
     };
-    let modes = |prefix: &str| (parameters.number(&format!("{prefix}.modes")) as usize).max(1);
-    all.into_iter()
-        .map(|prefix| {
-            let n = modes(&prefix);
-            (prefix, n)
-        })
-        .collect()
+    let modes = |prefix: &String| parameters.number(&format!("{prefix}.modes")) as usize;
+    all.into_iter().map(|prefix| (modes(&prefix).max(1), prefix)).map(|(n, p)| (p, n)).collect()
 }
 
 #[derive(Default)]
@@ -203,8 +200,7 @@ fn higher_modes(table: &Table, model: &str, modes: &[Pendulum]) -> Vec<[Vec<f64>
 const MASSES: usize = 9;
 
 fn spread(values: &[f64]) -> Vec<f64> {
-    let [low, high] =
-        [f64::min, f64::max].map(|extreme| values.iter().copied().reduce(extreme).unwrap_or(0.0));
+    let (low, high) = range(values.iter().copied());
     let count = if high > low { MASSES } else { 1 };
     let step = (high - low) / (count - 1).max(1) as f64;
     (0..count).map(|i| low + step * i as f64).collect()
