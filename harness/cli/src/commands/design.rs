@@ -166,8 +166,7 @@ impl DesignArgs {
             plan.print(&wheel, self.slosh_angle);
         }
         if let Some(out) = &self.out {
-            let names = ["time", TAU_CMD].map(String::from).to_vec();
-            Table::new(names, vec![time, torque]).write(out, &BTreeMap::new())?;
+            Table::of([("time", time), (TAU_CMD, torque)]).write(out, &BTreeMap::new())?;
             done!("{}", out.display());
         }
         Ok(())
@@ -470,16 +469,9 @@ impl DesignArgs {
             real(friction::B)? + real(hub::C)? + 4.0 * dry / (std::f64::consts::PI * rate);
         let torque = |f: f64| rate / bench.response(f).norm();
         let grid = analysis::logarithmic_grid((f0, f1), 2000);
-        let (mut least, mut most) = ((f64::INFINITY, f0), (0.0, f0));
-        for f in grid {
-            let needed = torque(f);
-            if needed < least.0 {
-                least = (needed, f);
-            }
-            if needed > most.0 {
-                most = (needed, f);
-            }
-        }
+        let needs = || grid.iter().map(|f| (torque(*f), *f));
+        let least = needs().fold((f64::INFINITY, f0), |a, b| if b.0 < a.0 { b } else { a });
+        let most = needs().fold((0.0, f0), |a, b| if b.0 > a.0 { b } else { a });
         let inertia =
             bench.inertia + bench.arm.powi(2) * bench.modes.iter().map(|m| m.mass).sum::<f64>();
         let rows = [

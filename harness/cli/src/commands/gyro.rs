@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use analysis::allan::{Estimate, Fit, Term};
-use analysis::rest::Rest;
+use analysis::rest::{Chunk, Rest};
 use anyhow::{Result, ensure};
 use experiments::gyro::Recording;
 use files::output;
@@ -149,40 +149,30 @@ impl GyroArgs {
 }
 
 fn tables(rest: &Rest) -> [(&'static str, Table); 4] {
-    let table = |names: &[&str], columns: Vec<Vec<f64>>| {
-        Table::new(names.iter().map(|name| name.to_string()).collect(), columns)
-    };
     let tau: Vec<f64> = rest.allan.iter().map(|point| point.tau).collect();
+    let estimated = rest.noise.as_ref().map(|fit| {
+        let deviation = tau.iter().map(|tau| fit.noise.variance(*tau).sqrt());
+        ("estimated", deviation.collect())
+    });
     let deviation = rest.allan.iter().map(|point| point.variance.sqrt()).collect();
-    let mut allan = (vec!["tau_s", "deviation"], vec![tau.clone(), deviation]);
-    if let Some(noise) = &rest.noise {
-        allan.0.push("estimated");
-        allan.1.push(tau.iter().map(|tau| noise.noise.variance(*tau).sqrt()).collect());
-    }
+    let allan = [("tau_s", tau), ("deviation", deviation)].into_iter().chain(estimated);
     let (normal, reading) = rest.quantiles.iter().copied().unzip();
     let lags = (0..rest.autocorrelation.len()).map(|k| k as f64 * rest.step).collect();
+    let correlation = rest.autocorrelation.clone();
+    let of = |value: &dyn Fn(&Chunk) -> f64| rest.chunks.iter().map(value).collect();
     let chunks = [
-        rest.chunks.iter().map(|chunk| chunk.from).collect(),
-        rest.chunks.iter().map(|chunk| chunk.mean).collect(),
-        rest.chunks.iter().map(|chunk| chunk.variance).collect(),
-        rest.chunks.iter().map(|chunk| chunk.kolmogorov).collect(),
-        rest.chunks.iter().map(|chunk| chunk.between_levels).collect(),
-        rest.chunks.iter().map(|c| 12.0 * c.variance / rest.quantum.powi(2)).collect(),
+        ("from_s", of(&|chunk| chunk.from)),
+        ("mean", of(&|chunk| chunk.mean)),
+        ("variance", of(&|chunk| chunk.variance)),
+        ("kolmogorov", of(&|chunk| chunk.kolmogorov)),
+        ("kolmogorov_between_levels", of(&|chunk| chunk.between_levels)),
+        ("qnr", of(&|chunk| 12.0 * chunk.variance / rest.quantum.powi(2))),
     ];
     [
-        ("allan.csv", table(&allan.0, allan.1)),
-        ("quantiles.csv", table(&["normal", "reading"], vec![normal, reading])),
-        (
-            "autocorrelation.csv",
-            table(&["lag_s", "autocorrelation"], vec![lags, rest.autocorrelation.clone()]),
-        ),
-        (
-            "chunks.csv",
-            table(
-                &["from_s", "mean", "variance", "kolmogorov", "kolmogorov_between_levels", "qnr"],
-                chunks.to_vec(),
-            ),
-        ),
+        ("allan.csv", Table::of(allan)),
+        ("quantiles.csv", Table::of([("normal", normal), ("reading", reading)])),
+        ("autocorrelation.csv", Table::of([("lag_s", lags), ("autocorrelation", correlation)])),
+        ("chunks.csv", Table::of(chunks)),
     ]
 }
 

@@ -110,9 +110,7 @@ impl PackArgs {
         done!("packed {} ({} bytes)", out.display(), out.metadata()?.len());
         Ok(())
     }
-}
 
-impl PackArgs {
     /// Returns the limits that `--tanks`, `--modes` and `--appendages` put on all sizes of the FMU; empty without these
     /// options.
     fn limits(&self) -> Result<Vec<Limit<'static>>> {
@@ -138,30 +136,18 @@ impl PackArgs {
             "{} has no appendages: --appendages is for Spacecraft",
             self.model.name
         );
-        let limit = |size: &'static names::Size| {
-            let given = match size.parameter {
-                "tanks" => self.tanks,
-                "appendages" => Some(self.appendages.unwrap_or(0)),
-                _ => self.modes,
+        let limit = |of: &'static names::Size| {
+            let names::Size { parameter, most, has_indicators, arrays } = *of;
+            let (option, given, least) = match parameter {
+                "tanks" => ("--tanks", self.tanks, 1),
+                "appendages" => ("--appendages", Some(self.appendages.unwrap_or(0)), 0),
+                _ => ("--modes", self.modes, 1),
             };
-            Limit {
-                parameter: size.parameter,
-                size: given.unwrap_or(size.most),
-                most: size.most,
-                has_indicators: size.has_indicators,
-                arrays: size.arrays,
-            }
+            let size = given.unwrap_or(most);
+            ensure!((least..=most).contains(&size), "{option} {size} (allowed: {least} to {most})");
+            Ok(Limit { parameter, size, most, has_indicators, arrays })
         };
-        let limits: Vec<_> = sizes.iter().map(limit).collect();
-        for Limit { parameter, size, most, .. } in &limits {
-            let (option, least) = match *parameter {
-                "tanks" => ("--tanks", 1),
-                "appendages" => ("--appendages", 0),
-                _ => ("--modes", 1),
-            };
-            ensure!((least..=*most).contains(size), "{option} {size} (allowed: {least} to {most})");
-        }
-        Ok(limits)
+        sizes.iter().map(limit).collect()
     }
 
     /// Removes the variables beyond the limits from a packed FMU, and makes the parameters of `--parameters`

@@ -64,8 +64,8 @@ pub struct TankArgs {
     #[arg(long, value_name = "FILE")]
     parameters: Option<PathBuf>,
     /// FMU for which --parameters writes parameters.
-    #[arg(long, value_name = "MODEL", default_value = "HubSlosh", requires = "parameters")]
-    model: Model,
+    #[arg(long, value_name = "MODEL", default_value = "HubSlosh", value_parser = MODELS, requires = "parameters")]
+    model: String,
     /// Number of the tank, 1 to 4, in the parameters that --parameters writes for Spacecraft.
     #[arg(long, value_name = "NUMBER", default_value_t = 1, requires = "parameters")]
     tank_number: usize,
@@ -100,15 +100,7 @@ pub struct TankArgs {
 }
 
 /// The FMUs that take a tank's parameters.
-#[derive(Clone, Copy, clap::ValueEnum)]
-enum Model {
-    #[value(name = "HubSlosh")]
-    HubSlosh,
-    #[value(name = "SloshTank")]
-    SloshTank,
-    #[value(name = "Spacecraft")]
-    Spacecraft,
-}
+const MODELS: [&str; 3] = ["HubSlosh", "SloshTank", "Spacecraft"];
 
 impl TankArgs {
     pub fn run(self) -> Result<()> {
@@ -213,10 +205,10 @@ impl TankArgs {
             "--gravity {:e} m/s² (allowed with --parameters: 0, or at least 1e-9, because it becomes the FMU's parameter g_ref)",
             self.gravity
         );
-        let target = match self.model {
-            Model::HubSlosh => Target::HubSlosh,
-            Model::SloshTank => Target::SloshTank,
-            Model::Spacecraft => Target::Spacecraft { tank: self.tank_number },
+        let target = match self.model.as_str() {
+            "SloshTank" => Target::SloshTank,
+            "Spacecraft" => Target::Spacecraft { tank: self.tank_number },
+            _ => Target::HubSlosh,
         };
         let set = make(target, self.liquid()).with_context(|| self.tank.display().to_string())?;
         for warning in &set.warnings {
