@@ -168,7 +168,7 @@ def rectangular_tanks() -> tuple[list[Row], str]:
         points = f"{words} tanks, {count} points that differ from small waves by more than 1 %"
         quantity = f"{points}: share with the computed sign of the difference"
         rows.append(share(name, quantity, "nonlinear", np.sign(off[clear]) == sign[clear], least))
-    quantity = "52 frequencies: share within 1 % of a wave in the model's range of amplitudes"
+    quantity = "52 frequencies: share that a wave of some amplitude has within 1 %"
     rows.append(share(name, quantity, "nonlinear", inside, most(len(inside))))
     panel = Panel(
         (70, 50, 600, 330),
