@@ -270,7 +270,7 @@ def cases_table(fmu: Path, pool: ProcessPoolExecutor) -> tuple[list[str], float]
         found = differences(their, ours(fmu, given))
         largest[name] = [max(pair) for pair in zip(largest[name], found, strict=True)]
     lines = [
-        f"| way to start | {' | '.join(f'difference of `{name}`' for name in SIGNALS)} |",
+        f"| way to start | {' | '.join(f'largest relative difference of `{n}`' for n in SIGNALS)} |",
         "| --- |" + " --- |" * len(SIGNALS),
     ]
     for name, found in largest.items():
