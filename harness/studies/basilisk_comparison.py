@@ -269,8 +269,9 @@ def cases_table(fmu: Path, pool: ProcessPoolExecutor) -> tuple[list[str], float]
     for (name, given), their in zip(cases, theirs, strict=True):
         found = differences(their, ours(fmu, given))
         largest[name] = [max(pair) for pair in zip(largest[name], found, strict=True)]
+    heads = [f"largest relative difference of `{name}`" for name in SIGNALS]
     lines = [
-        f"| way to start | {' | '.join(f'largest relative difference of `{n}`' for n in SIGNALS)} |",
+        f"| way to start | {' | '.join(heads)} |",
         "| --- |" + " --- |" * len(SIGNALS),
     ]
     for name, found in largest.items():
