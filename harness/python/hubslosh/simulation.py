@@ -12,7 +12,7 @@ from . import native
 from .arguments import column_of, names_of, not_numbers
 from .fmu import INTEGERS, Fmu, FmuError, Parameters, Quantity, did_you_mean
 from .plant import TORQUE, Plant
-from .run import Run
+from .run import Noted, Run
 from .tables import read_parameters
 from .wheels import Wheel, columns_of, follow, torques_of, units_of
 
@@ -247,10 +247,10 @@ def table_of(
     if wanted is not None:
         table = table[wanted].reset_index(drop=True)
     units = {"time": "s", **units}
-    table.attrs["units"] = {
-        name: units[name] if name in units else fmu.unit(name) for name in table.columns
-    }
-    table.attrs |= {"model": str(model), "parameters": dict(parameters)}
+    table.attrs["units"] = Noted(
+        (name, units[name] if name in units else fmu.unit(name)) for name in table.columns
+    )
+    table.attrs |= {"model": str(model), "parameters": Noted(parameters)}
     table.attrs["out_of_range"] = native.out_of_range(fmu.native, read)
     return table
 
