@@ -231,8 +231,10 @@ impl Fit<'_> {
         // sum of squares at the last set of derivatives
         let mut last = f64::INFINITY;
         loop {
+            // a residual that is larger than the noise is the measure of what a step can show
+            let scale = (point.cost / point.e.len() as f64).max(1.0);
             if derivatives.is_none() {
-                if sets == end.sets || last - point.cost < end.gain {
+                if sets == end.sets || last - point.cost < scale * end.gain {
                     break;
                 }
                 last = point.cost;
@@ -252,7 +254,7 @@ impl Fit<'_> {
             if decrement.is_nan() {
                 break;
             }
-            if decrement < end.decrement {
+            if decrement < scale.sqrt() * end.decrement {
                 if fresh || sets == end.sets || end.trusts && sets > 0 {
                     break;
                 }
@@ -260,7 +262,8 @@ impl Fit<'_> {
                 continue;
             }
             // where dry friction stops the hub, the first forecast may be half of what the steps win
-            if fresh && sets > 1 && point.cost - 1.5 * won > end.above && decrement < 30.0 {
+            let is_near = decrement < 30.0 * scale.sqrt();
+            if fresh && sets > 1 && is_near && point.cost - 1.5 * won > end.above {
                 break;
             }
             let mut outcome = None;

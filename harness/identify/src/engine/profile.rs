@@ -99,7 +99,9 @@ impl Fit<'_> {
     /// If the system refuses the minimum.
     pub fn across_ridges(&mut self, minimum: &mut Minimum) -> Result<Vec<Point>> {
         let unknowns = &self.problem.unknowns;
-        let Some(j) = self.stated_bent() else { return Ok(Vec::new()) };
+        // below 0 there is no sum of squares
+        let bent = self.stated_bent().filter(|_| minimum.point.cost > DECIDES);
+        let Some(j) = bent else { return Ok(Vec::new()) };
         let derivatives = Some(self.derivatives_at(minimum)?);
         let free = without(&self.free, j);
         let (now, start) = (minimum.point.z[j], unknowns[j].coordinate(unknowns[j].start));
@@ -111,7 +113,8 @@ impl Fit<'_> {
             }
             let mut z = minimum.point.z.clone();
             z[j] = at;
-            let end = End { trusts: true, gain: 2.0, ..End::new(5, ENDS.0) };
+            let above = minimum.point.cost + 3.0 * DECIDES;
+            let end = End { above, trusts: true, gain: 2.0, ..End::new(5, ENDS.0) };
             let Ok(found) = self.minimise(&z, &free, derivatives.clone(), end) else { continue };
             points.push(Point { at, minimum: found });
         }
@@ -138,10 +141,11 @@ impl Fit<'_> {
         let curvature = Curvature::new(&jacobian, places(&self.free));
         let covariance = curvature.with_flat(!self.problem.rough).covariance(unknowns.len());
         let std = |i: usize| covariance[(i, i)].sqrt();
-        // what stands for it along the bent valley
+        // what stands for it along the bent valley is a size, and not an error about 0
         let partner = |i: &usize| {
             let correlation = covariance[(*i, j)] / (std(*i) * std(j));
             !unknowns[*i].log
+                && unknowns[*i].bounds.0 >= 0.0
                 && correlation.abs() > 0.5
                 && std(*i) > VAGUE * minimum.point.z[*i].abs()
         };

@@ -10,7 +10,7 @@ use super::hold::Rival;
 use super::minimum::{Curvature, End, Minimum, places, without};
 use super::problem::{Part, Problem, Role, Signal, Unknown};
 use super::profile::{self, Profile};
-use super::{ALIKE, DECIDES, ENDS, Fit, GAIN, INFLATIONS, PRIOR_ALONE, ROUNDS, SETS};
+use super::{ALIKE, DECIDES, ENDS, Fit, GAIN, Hold, INFLATIONS, PRIOR_ALONE, ROUNDS, SETS};
 use crate::news::News;
 
 /// Parts of the recordings in a search from a start that leads to no minimum on the whole: over a whole oscillation the sum of squares has a
@@ -34,7 +34,7 @@ const FAR: f64 = 3.0;
 /// kink.
 const KINKED: f64 = 0.8;
 /// A start leads nowhere if, over more than this part of the recordings, its sum of squares is more than so many times the sum of
-/// squares of the first search.
+/// squares of the best search. It leads to the minimum of the best search if the two are alike there.
 const ASTRAY: (f64, f64) = (0.25, 3.0);
 /// Limits of the noise while a misfit is examined: largest white noise over the noise of neighbouring rows, largest relative size
 /// and least correlation time (s) of the drift.
@@ -71,56 +71,70 @@ impl Solution<'_> {
     }
 }
 
-/// Searches the minimum of a problem from the values `first`, if there are any, and from the problem's starts. If the best of the
-/// first starts has a −2 ln L above `ceiling`, the search ends there without profile, because another model fits far better.
+/// Searches the minimum of a problem from the values `first`, if there are any, and from the problem's starts. `first` also has the
+/// course of the inputs between rows that is assumed at first. A finite `ceiling` says that another model, from which `first` is,
+/// fits: the search then begins on the whole recordings, and if its minimum has a −2 ln L above the ceiling, it ends there, without
+/// other courses and without profile.
 ///
 /// # Errors If the search fails from every start.
 pub fn solve<'p>(
     problem: &'p Problem<'p>,
-    first: Option<Vec<f64>>,
+    first: Option<(Vec<f64>, Hold)>,
     ceiling: f64,
     news: &mut dyn FnMut(&News),
 ) -> Result<Solution<'p>> {
     let mut fit = Fit::new(problem);
+    let (first, hold) = first.map_or((None, problem.holds[0]), |(z, hold)| (Some(z), hold));
     let mut starts: Vec<Vec<f64>> = first.into_iter().chain(problem.starts.clone()).collect();
     let given = starts.len();
     let mut random = Random::new(26, 0);
     starts.extend((0..problem.drawn).map(|_| drawn(problem, &mut random)));
     let mut best: Option<Found> = None;
-    let (mut tried, mut error, mut course) = (0, None, Vec::new());
-    let ways = [(0..given, true), (0..1, false), (given..starts.len(), true)];
-    for (number, grows) in ways.into_iter().flat_map(|(all, grows)| all.map(move |k| (k, grows))) {
-        if let Some(best) = best.as_mut().filter(|_| number == 0 && !grows || number == given) {
+    let (mut tried, mut error, mut course): (usize, _, Vec<(f64, f64)>) = (0, None, Vec::new());
+    let ways = [(0..given, &PARTS[..]), (0..1, &[]), (given..starts.len(), &PARTS)];
+    for (number, parts) in ways.into_iter().flat_map(|(all, parts)| all.map(move |k| (k, parts))) {
+        let is_whole = parts.is_empty();
+        if let Some(best) = best.as_mut().filter(|_| number == 0 && is_whole || number == given) {
             // no other start has led to a lower minimum; what is drawn is the last resort
-            best.judge(&mut fit, news)?;
+            best.judge(&mut fit, ceiling, news)?;
             if best.is_noise || number >= given && !best.is_loud || best.deviance > ceiling {
                 break;
             }
         }
         tried += 1;
         let z = fit.coordinates(&starts[number]);
-        let found = match fit.search_from(&z, grows, &mut course) {
+        let is_near = number == 0 && ceiling.is_finite() && !is_whole;
+        let parts = if is_near { &PARTS[PARTS.len() - 1..] } else { parts };
+        let mut own = Vec::new();
+        let found = match fit.search_from(&z, hold, parts, &course, &mut own) {
             Ok(found) => found,
             Err(refused) => {
                 error = error.or(Some(refused));
                 continue;
             }
         };
-        let deviance = fit.deviance(&found.point);
-        let way = if grows { "beginnings that grow" } else { "the whole" };
+        let deviance = match (&found, &best) {
+            (Some(found), _) => fit.deviance(&found.point),
+            (None, best) => best.as_ref().map_or(f64::INFINITY, |best| best.first),
+        };
+        let way = if parts.len() > 1 { "beginnings that grow" } else { "the whole" };
         news(&News::Detail(format!(
             "start {}, {way}: −2 ln L {deviance:.1}, {:.0} simulations",
             number + 1,
             fit.simulations()
         )));
-        // a minimum that one search alone has found may be one of many
+        // a minimum that one search alone has found may be one of many, unless none can be lower
+        let is_least = found.as_ref().is_some_and(|found| found.point.cost < DECIDES);
         let agrees =
             best.as_ref().is_some_and(|best| (best.first - deviance).abs() < 2.0 * DECIDES);
-        if best.as_ref().is_none_or(|best| deviance < best.first) {
-            best = Some(Found::new(&fit, found, deviance));
+        if let Some(found) = found
+            && best.as_ref().is_none_or(|best| deviance < best.first)
+        {
+            (best, course) = (Some(Found::new(&fit, found, deviance)), own);
         }
-        if let Some(best) = best.as_mut().filter(|best| agrees || best.first > ceiling) {
-            best.judge(&mut fit, news)?;
+        if let Some(best) = best.as_mut().filter(|best| is_least || agrees || best.first > ceiling)
+        {
+            best.judge(&mut fit, ceiling, news)?;
             if best.is_noise || best.deviance > ceiling {
                 break;
             }
@@ -129,7 +143,7 @@ pub fn solve<'p>(
     let Some(mut best) = best else {
         return Err(error.context("the search could not start")?);
     };
-    best.judge(&mut fit, news)?;
+    best.judge(&mut fit, ceiling, news)?;
     conclude(fit, best, tried, ceiling, news)
 }
 
@@ -147,7 +161,7 @@ pub fn solve_near<'p>(
     let minimum = fit.minimise(&z, &free, None, End::new(SETS, ENDS.0))?;
     fit.renew_noise(&minimum.point);
     let mut found = Found::new(&fit, minimum, 0.0);
-    found.judge(&mut fit, news)?;
+    found.judge(&mut fit, f64::INFINITY, news)?;
     conclude(fit, found, 1, f64::INFINITY, news)
 }
 
@@ -160,8 +174,11 @@ fn conclude<'p>(
 ) -> Result<Solution<'p>> {
     let is_beaten = found.deviance > ceiling;
     let Found { mut minimum, rivals, .. } = found;
-    let profile = if is_beaten { None } else { fit.refine(&mut minimum, news)? };
-    fit.derivatives_at(&mut minimum)?;
+    let mut profile = None;
+    if !is_beaten {
+        profile = fit.refine(&mut minimum, news)?;
+        fit.derivatives_at(&mut minimum)?;
+    }
     let tests = fit.tests(&minimum.point);
     let at_bound = fit.stuck(&minimum.point.z);
     let is_kinked = !is_beaten && !fit.problem.rough;
@@ -172,7 +189,7 @@ fn conclude<'p>(
 struct Found {
     minimum: Minimum,
     noise: Vec<Noise>,
-    hold: super::Hold,
+    hold: Hold,
     rivals: Vec<Rival>,
     /// Value of −2 ln L with the intersample behaviour that is assumed at first.
     first: f64,
@@ -200,11 +217,11 @@ impl Found {
     }
 
     /// Compares the courses of the inputs between rows and tests the residual of the best. The fit then has the best course and
-    /// its noise.
-    fn judge(&mut self, fit: &mut Fit, news: &mut dyn FnMut(&News)) -> Result<()> {
+    /// its noise. Nothing is compared if −2 ln L is above the `ceiling`.
+    fn judge(&mut self, fit: &mut Fit, ceiling: f64, news: &mut dyn FnMut(&News)) -> Result<()> {
         (fit.hold, fit.inflation) = (self.hold, 1.0);
         fit.set(self.noise.clone(), 1.0);
-        if self.is_judged {
+        if self.is_judged || self.first > ceiling {
             return Ok(());
         }
         let (minimum, rivals) = fit.compare_holds(self.minimum.clone())?;
@@ -327,8 +344,13 @@ impl Fit<'_> {
         let (mut once, mut profile) = (false, None);
         let rows = self.sampled();
         for _ in 0..ROUNDS {
-            for _ in 0..TURNS {
+            for turn in 0..TURNS {
+                let before = self.noise.clone();
                 self.renew_noise(&minimum.point);
+                if turn > 0 && self.noise.iter().zip(before).all(|(n, b)| n.white == b.white) {
+                    // the noise is the least one
+                    break;
+                }
                 let end = End { gain: GAIN, ..End::new(SETS, ENDS.1) };
                 minimum = self.minimise_from(&minimum.point, end)?;
                 // the noise is that of the point before, which matters where it is next to nothing
@@ -474,41 +496,54 @@ impl Fit<'_> {
         Ok(None)
     }
 
-    /// Returns the minimum from a start: over beginnings of the recordings that grow to the whole if `grows`, otherwise over the
-    /// whole recordings with less and less inflated noise. `course` has the sums of squares of the first search over growing
-    /// beginnings.
-    fn search_from(&mut self, z: &[f64], grows: bool, course: &mut Vec<f64>) -> Result<Minimum> {
+    /// Returns the minimum from a start: over growing `parts` of the recordings, or, if there are none, over the whole recordings with
+    /// less and less inflated noise. `own` receives the least sum of squares over each part, and `best` has those of the best search
+    /// so far. Returns `None` if the search meets the best one.
+    fn search_from(
+        &mut self,
+        z: &[f64],
+        hold: Hold,
+        parts: &[f64],
+        best: &[(f64, f64)],
+        own: &mut Vec<(f64, f64)>,
+    ) -> Result<Option<Minimum>> {
         let mut noise: Vec<Noise> = self.problem.signals.iter().map(Signal::first_noise).collect();
         let free = self.free.clone();
-        (self.hold, self.inflation, self.central) =
-            (self.problem.holds[0], 1.0, self.problem.rough);
+        (self.hold, self.inflation, self.central) = (hold, 1.0, self.problem.rough);
         let mut z = z.to_vec();
         let mut found: Option<Minimum> = None;
-        if grows {
-            let before = course.clone();
+        if !parts.is_empty() {
             if self.problem.rough {
                 for (noise, signal) in noise.iter_mut().zip(&self.problem.signals) {
                     let spread = deviation(&signal.picked(&signal.measured));
                     noise.white = noise.white.max(BEGINNING_NOISE * spread);
                 }
             }
-            for (k, part) in PARTS.into_iter().enumerate() {
+            for &part in parts {
                 self.set(noise.clone(), part);
-                let end = End { gain: ALIKE, ..End::new(SETS, ENDS.0) };
+                // a model that fits as well as another has its minimum near the other's
+                let sets = if parts.len() > 1 { SETS } else { SETS / 2 };
+                let end = End { gain: ALIKE, ..End::new(sets, ENDS.0) };
                 let minimum = self.minimise(&z, &free, None, end)?;
                 let cost = minimum.point.cost;
-                let is_astray = |best: &f64| part > ASTRAY.0 && cost > ASTRAY.1 * best;
-                ensure!(!before.get(k).is_some_and(is_astray), "it leads nowhere");
-                course.extend(before.get(k).is_none().then_some(cost));
+                own.push((part, cost));
+                let before = best.iter().find(|(other, _)| *other == part && part > ASTRAY.0);
+                if let Some((_, best)) = before {
+                    ensure!(cost < ASTRAY.1 * best, "it leads nowhere");
+                    if minimum.decrement < ENDS.0 && (cost - best).abs() < ALIKE {
+                        return Ok(None);
+                    }
+                }
                 z.clone_from(&minimum.point.z);
                 found = Some(minimum);
             }
-            if self.problem.rough
-                && let Some(minimum) = &found
-            {
+            if let Some(minimum) = &found {
                 self.renew_noise(&minimum.point);
-                let end = End { gain: ALIKE, ..End::new(2 * SETS, ENDS.0) };
-                found = Some(self.minimise(&z, &free, None, end)?);
+                let is_less = |(n, first): (&Noise, &Noise)| n.white < 0.5 * first.white;
+                if self.problem.rough || self.noise.iter().zip(&noise).any(is_less) {
+                    let end = End { gain: ALIKE, ..End::new(2 * SETS, ENDS.0) };
+                    found = Some(self.minimise(&z, &free, None, end)?);
+                }
             }
         } else {
             self.set(noise, 1.0);
@@ -531,6 +566,6 @@ impl Fit<'_> {
         self.renew_noise(&found.point);
         found.point = self.point(&found.point.z, std::mem::take(&mut found.point.motion));
         found.derivatives = None;
-        Ok(found)
+        Ok(Some(found))
     }
 }

@@ -182,6 +182,7 @@ impl Method for FreeDecay {
         let constant = solve(&constant, None, f64::INFINITY, news)?;
         let from = constant.fit.values(&constant.minimum.point.z);
         let (residual_constant, zeta_constant) = (residuals(&constant).0, from[1]);
+        let from = (from, constant.fit.hold);
         let mut found = solve(&free, Some(from), f64::INFINITY, news)?;
         let z = found.fit.values(&found.minimum.point.z);
         let jacobian = found.fit.derivatives_at(&mut found.minimum)?.matrix;

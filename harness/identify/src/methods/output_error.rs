@@ -182,7 +182,8 @@ fn identify_whole(
     let mut fit = |pair: (&str, &str), from: Option<&Fitted>, tell: &mut dyn FnMut(News)| {
         let number = pairs.iter().position(|other| *other == pair)?;
         let (system, problem) = (&systems[number].0, &problems[number]);
-        let extra = from.map(|other| transferred(other, system, problem));
+        let hold = |other: &Fitted| other.solution.fit.hold;
+        let extra = from.map(|other| (transferred(other, system, problem), hold(other)));
         let ceiling = from.map_or(f64::INFINITY, |other| other.solution.ceiling());
         let found = solve(problem, extra, ceiling, &mut |news| {
             tell(News::Detail(format!("{}: {}", pair.0, news.line())));

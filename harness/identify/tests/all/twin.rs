@@ -268,12 +268,15 @@ fn a_recording_without_noise_fits_and_other_models_are_given_up_early() {
     let torque: Profile = "lin-sweep:amplitude=0.1,duration=100,f0=1.8,f1=3".parse().unwrap();
     let recording = Twin::default().record(&fmu, &Torque::Profile(torque), None).unwrap();
     let models = ["linear", "planar"].map(String::from).to_vec();
-    let options = Options { models, ..options() };
+    // the course of the torque and the errors of the sensors are unknown
+    let options = Options { models, ..Options::default() };
     let found = identify(&fmu, &[recording], &options, &mut |_| {}).unwrap();
     assert!(found.fits == Some(true) && found.converged, "{:?}", found.verdict);
     let [fit, rival] = &found.details.models[..] else { panic!("{:?}", found.details.models) };
     assert!(fit.model == "linear" && rival.bic > fit.bic + 1e4, "{:?}", found.details.models);
-    assert!(rival.simulations < fit.simulations, "{:?}", found.details.models);
+    assert!(rival.simulations < 0.5 * fit.simulations, "{:?}", found.details.models);
+    // a search for the third digit behind the noise would take a thousand
+    assert!(fit.simulations < 300.0, "{:?}", found.details.models);
 }
 
 /// The motion is so slow that the friction curve is nearly straight. The minimum is at 0.02 rad/s; a quadratic there would
