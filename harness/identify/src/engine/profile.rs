@@ -190,12 +190,6 @@ impl Fit<'_> {
                 let Ok(found) = self.minimise(&z, &free, last.derivatives.clone(), end) else {
                     break;
                 };
-                // a search that ended before the floor of the valley says nothing of its height there
-                let floor = found.point.cost - 1.5 * found.decrement.powi(2);
-                if found.decrement > ENDS.0 && floor < least + DECIDES {
-                    h *= 0.5;
-                    continue;
-                }
                 let rise = found.point.cost - base;
                 least = least.min(found.point.cost);
                 points.push(Point { at, minimum: found.clone() });
