@@ -378,7 +378,7 @@ PLANTS = {
     ),
     "cable": Plant(effects(cable=(0.2, 0.6)), "turns the hub back|cable|follows the angle$"),
     "fill set wrong": Plant(wrong_fill("--set", ""), "fill|tank.h"),
-    "fill known wrong": Plant(wrong_fill("--known", ":0.001"), "fill|tank.h"),
+    "fill known wrong": Plant(wrong_fill("--start", ":0.001"), "fill|tank.h"),
     "periodic friction": Plant(
         periodic_friction,
         "revolution|friction that follows the angle",
