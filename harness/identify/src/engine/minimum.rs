@@ -231,7 +231,8 @@ impl Fit<'_> {
         // sum of squares at the last set of derivatives
         let mut last = f64::INFINITY;
         loop {
-            // a residual that is larger than the noise is the measure of what a step can show
+            // If the residual is larger than the noise, distances and gains count in its standard deviations: a search for digits
+            // that a misfit hides would be of no use.
             let scale = (point.cost / point.e.len() as f64).max(1.0);
             if derivatives.is_none() {
                 if sets == end.sets || last - point.cost < scale * end.gain {

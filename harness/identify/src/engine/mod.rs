@@ -9,7 +9,8 @@
 //!
 //! [`search`] looks for the minimum from several starts: over beginnings of the recordings that grow to the whole, because over a
 //! whole oscillation the sum of squares has a minimum for each cycle, and over the whole at once with the noise counted 100, 10 and 1
-//! times. A minimum counts once two searches have found it. [`hold`] compares how the inputs may run between rows, by the likelihood.
+//! times. A minimum counts once two searches have found it, or if its sum of squares is so small that no other can be lower.
+//! [`hold`] compares how the inputs may run between rows, by the likelihood.
 //! [`profile`] follows an unknown whose likelihood is no parabola. [`cause`] tests a residual that is more than noise for effects that
 //! were not estimated. [`draws`] gives intervals as quantiles of draws along the profile, with the tolerances of known values as priors.
 
