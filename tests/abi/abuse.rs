@@ -626,6 +626,7 @@ fn abuse_tests_run_in_both_versions_of_fmi() {
 /// Passes a handle of HubSlosh to the functions of all other FMUs, and other wrong handles (`handles.c`).
 #[cfg(target_os = "linux")]
 #[test]
+#[ignore = "three seconds: .ci/long-tests"]
 fn handles_of_other_libraries_other_versions_freed_and_not_handles_are_errors() {
     if under_valgrind() {
         return; // which reports that the mark of a freed instance is read

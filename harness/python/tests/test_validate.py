@@ -4,6 +4,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 from fmpy.validation import validate_fmu
 
 
@@ -12,6 +13,7 @@ def test_the_validator_finds_no_problems(fmu: Path) -> None:
     assert validate_fmu(str(fmu)) == []
 
 
+@pytest.mark.long
 def test_the_command_hubslosh_check_finds_no_problems_either(fmu: Path) -> None:
     """The test calls ``hubslosh check`` as a user does."""
     command = [sys.executable, "-m", "fmpy", "validate", str(fmu)]

@@ -90,26 +90,12 @@ const BOTH: &[&str] = &["-DCO_SIMULATION", "-DMODEL_EXCHANGE"];
 const ONCE: &[&str] = &["-DCO_SIMULATION", "-DMODEL_EXCHANGE", "-DONCE"];
 const USUAL: &str = "startTime=\"0\" stopTime=\"10\" stepSize=\"0.01\"";
 
+/// Asserts that correct FMUs get no finding: name, definitions, rate and experiment of each.
 #[cfg(target_os = "linux")]
-#[test]
-fn correct_fmus_get_no_finding_whatever_their_stiffness_and_capabilities() {
-    let long = "startTime=\"0\" stopTime=\"1e6\" stepSize=\"1000\"";
+fn get_no_finding(cases: &[(&str, &[&str], f64, &str)]) {
     let mut wrong = Vec::new();
-    for (name, definitions, rate, experiment) in [
-        ("both interfaces", BOTH, 1.0, USUAL),
-        ("stiff", BOTH, 1e5, USUAL),
-        ("stiff, Model Exchange only", &BOTH[1..], 1e5, USUAL),
-        ("very stiff", BOTH, 1e9, USUAL),
-        ("steps of 1000 s", BOTH, 1.0, long),
-        ("stiff in steps of 1000 s", BOTH, 1e5, long),
-        ("steps longer than the experiment", BOTH, 1.0, "stopTime=\"1\" stepSize=\"1000\""),
-        ("steps of 1000 s without an end", BOTH, 1.0, "stepSize=\"1000\""),
-        ("short steps", BOTH, 1.0, "stopTime=\"1e-3\" stepSize=\"1e-6\""),
-        ("Co-Simulation only", &BOTH[..1], 1.0, USUAL),
-        ("Model Exchange only", &BOTH[1..], 1.0, USUAL),
-        ("one instance per process", ONCE, 1.0, USUAL),
-    ] {
-        let small = Small { definitions, rate, experiment };
+    for (name, definitions, rate, experiment) in cases {
+        let small = Small { definitions, rate: *rate, experiment };
         let report = look(&small.packed(), &[]);
         // A plain build is for this machine; the one step that is too long is meant.
         let fine = ["bin.system", "xml.default_experiment"];
@@ -119,6 +105,34 @@ fn correct_fmus_get_no_finding_whatever_their_stiffness_and_capabilities() {
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn correct_fmus_get_no_finding_whatever_their_stiffness_and_capabilities() {
+    get_no_finding(&[
+        ("stiff", BOTH, 1e5, USUAL),
+        ("steps longer than the experiment", BOTH, 1.0, "stopTime=\"1\" stepSize=\"1000\""),
+        ("Co-Simulation only", &BOTH[..1], 1.0, USUAL),
+        ("Model Exchange only", &BOTH[1..], 1.0, USUAL),
+        ("one instance per process", ONCE, 1.0, USUAL),
+    ]);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+#[ignore = "five seconds of CPU time: .ci/long-tests"]
+fn correct_fmus_get_no_finding_whatever_their_experiment() {
+    let long = "startTime=\"0\" stopTime=\"1e6\" stepSize=\"1000\"";
+    get_no_finding(&[
+        ("both interfaces", BOTH, 1.0, USUAL),
+        ("stiff, Model Exchange only", &BOTH[1..], 1e5, USUAL),
+        ("very stiff", BOTH, 1e9, USUAL),
+        ("steps of 1000 s", BOTH, 1.0, long),
+        ("stiff in steps of 1000 s", BOTH, 1e5, long),
+        ("steps of 1000 s without an end", BOTH, 1.0, "stepSize=\"1000\""),
+        ("short steps", BOTH, 1.0, "stopTime=\"1e-3\" stepSize=\"1e-6\""),
+    ]);
 }
 
 #[cfg(target_os = "linux")]

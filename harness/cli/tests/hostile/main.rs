@@ -370,6 +370,7 @@ fn ends_its_own_process(when: &str) {
 }
 
 #[test]
+#[ignore = "some seconds: .ci/long-tests"]
 fn a_binary_that_does_harm_when_loaded_ends_its_own_process_and_every_command_says_so() {
     ends_its_own_process("AT_LOAD");
 }
