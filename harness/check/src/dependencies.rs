@@ -82,7 +82,7 @@ pub fn random_session<'f>(
                 let all = [min, max, max, inside];
                 Value::Integer(random.choice(all).unwrap_or(min) as i64)
             }
-            Value::Boolean(_) => Value::Boolean(random.bool().into()),
+            Value::Boolean(_) => Value::Boolean(random.bool()),
             _ => continue,
         };
         // A value that the FMU refuses keeps its old value.

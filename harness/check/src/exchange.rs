@@ -4,23 +4,14 @@ use anyhow::Result;
 
 use super::findings::Findings;
 use super::life::expect_refusal;
-use super::under_test::{FmuUnderTest, Interface, STEPS, Session, skip};
+use super::steps;
+use super::under_test::{FmuUnderTest, Interface, STEPS, skip};
 use host::description::Value;
 
 pub fn run(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let mut session = fmu.exchanging()?;
     session.advance(2 * STEPS)?;
-    report_not_finite(&mut session, &format!("after {} steps", 2 * STEPS), findings)
-}
-
-/// Reports the variables that are NaN or infinite at the end of a run.
-pub fn report_not_finite(session: &mut Session, when: &str, findings: &mut Findings) -> Result<()> {
-    for (v, values) in session.fmu.readable().zip(session.readings()?) {
-        if let Some(x) = values.iter().map(Value::number).find(|x| v.is_real() && !x.is_finite()) {
-            findings.at(v.place()).add(format!("it is {x} {when}"));
-        }
-    }
-    Ok(())
+    steps::report_not_finite(&mut session, &format!("after {} steps", 2 * STEPS), findings)
 }
 
 pub fn event_iteration(fmu: &FmuUnderTest, _: &mut Findings) -> Result<()> {
@@ -46,7 +37,7 @@ pub fn terminate_simulation(fmu: &FmuUnderTest, findings: &mut Findings) -> Resu
     }
     let mut session = fmu.session(Interface::ModelExchange)?;
     session.initialise()?;
-    super::steps::report_early_end(&mut session, findings)
+    steps::report_early_end(&mut session, findings)
 }
 
 pub fn vectors(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {

@@ -6,10 +6,10 @@ use anyhow::Result;
 use super::findings::Findings;
 use super::under_test::{
     FmuUnderTest, Interface, Readings, STEPS, Session, Stage, Tested, UnderTest, Unusable, Use,
-    skip,
+    skip, surroundings,
 };
 use host::description::Value;
-use host::fmi2::{CallError, Callbacks, HostState, Instance, Instantiation, Status, file_uri};
+use host::fmi2::{CallError, Callbacks, Instance, Instantiation, Status, file_uri};
 
 /// `load.opens`: a binary that cannot be loaded has ended the check before. Only if the two interfaces have
 /// two binaries can the second one still be broken here.
@@ -492,29 +492,6 @@ pub fn silent(fmu: &FmuUnderTest, _: &mut Findings) -> Result<()> {
         ordinary_lives(fmu, interface)?;
     }
     Ok(())
-}
-
-pub fn surroundings() -> Vec<(&'static str, String)> {
-    let state = HostState::now();
-    // Wine also has /proc, but it describes Wine's own process.
-    let count = |folder: &str| match cfg!(target_os = "linux") {
-        true => {
-            std::fs::read_dir(folder).map_or(String::new(), |entries| entries.count().to_string())
-        }
-        false => String::new(),
-    };
-    let mut environment: Vec<_> = std::env::vars_os().collect();
-    environment.sort();
-    vec![
-        ("floating-point control (rounding, exceptions)", format!("{:#x}", state.float_control)),
-        ("locale", state.locale),
-        ("signal handlers", format!("{:#x}", state.signal_handlers)),
-        ("working directory", format!("{:?}", std::env::current_dir().ok())),
-        ("environment variables", format!("{environment:?}")),
-        // Left out on systems that do not report it.
-        ("number of threads", count("/proc/self/task")),
-        ("number of open files", count("/proc/self/fd")),
-    ]
 }
 
 pub fn untouched(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {

@@ -1,6 +1,8 @@
 //! The schema of modelDescription.xml as a table: the elements with their parents and order, their
 //! attributes, and the format of each attribute. This file has the table of FMI 2.0 (2.0.5, section 2.2);
-//! `v3/schema.rs` has the table of FMI 3.0.
+//! `schema/fmi3.rs` has the table of FMI 3.0.
+
+mod fmi3;
 
 use super::description::Description;
 use super::findings::Findings;
@@ -248,7 +250,7 @@ fn place(element: &Element) -> String {
 
 /// Returns the table of the description's version.
 fn kinds(d: &Description) -> &'static [Kind] {
-    if d.is_fmi3() { crate::v3::schema::KINDS } else { KINDS }
+    if d.is_fmi3() { fmi3::KINDS } else { KINDS }
 }
 
 /// `xml.schema`: reports elements and attributes that are unknown, missing or in the wrong order.
@@ -437,7 +439,7 @@ mod tests {
 
     #[test]
     fn every_element_that_stands_inside_another_is_in_the_table() {
-        for kinds in [KINDS, crate::v3::schema::KINDS] {
+        for kinds in [KINDS, fmi3::KINDS] {
             for kind in kinds {
                 let names: Vec<&str> = match kind.children {
                     Any => vec![],

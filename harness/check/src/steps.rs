@@ -41,7 +41,17 @@ pub fn run(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         return Ok(());
     }
     let when = format!("after {LONG} steps, which all returned fmi2OK");
-    super::exchange::report_not_finite(&mut session, &when, findings)
+    report_not_finite(&mut session, &when, findings)
+}
+
+/// Reports the variables that are NaN or infinite at the end of a run.
+pub fn report_not_finite(session: &mut Session, when: &str, findings: &mut Findings) -> Result<()> {
+    for (v, values) in session.fmu.readable().zip(session.readings()?) {
+        if let Some(x) = values.iter().map(Value::number).find(|x| v.is_real() && !x.is_finite()) {
+            findings.at(v.place()).add(format!("it is {x} {when}"));
+        }
+    }
+    Ok(())
 }
 
 pub fn size(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {

@@ -15,13 +15,12 @@ use host::c_abi::version::{Fmu, Instance, Version};
 use host::c_abi::{CallError, Called, Message};
 use host::causality::Causality;
 use host::description::{CType, Type, Value};
-use host::fmi2::Fmi2;
+use host::fmi2::{Fmi2, HostState};
 use host::guard;
 use host::xml::double;
 
 use super::description::{Description, Variable};
 use super::findings::Findings;
-use super::life;
 use super::trace::{self, Crash};
 
 pub use self::fmi2::{FmuUnderTest, Stage, copy_files};
@@ -146,14 +145,14 @@ pub trait Tested: Version + 'static {
 }
 
 /// The loaded FMU, with a record of the call that is being made.
-pub struct UnderTest<V: Tested> {
+pub struct UnderTest<V: Tested = Fmi2> {
     pub description: &'static Description,
     /// The continuous inputs and outputs of type Float64.
     pub inputs: Vec<&'static Variable>,
     pub outputs: Vec<&'static Variable>,
     directory: PathBuf,
     path: PathBuf,
-    /// State of the process before the binary was loaded, by name; see [`crate::life::surroundings`].
+    /// State of the process before the binary was loaded, by name; see [`surroundings`].
     pub before: Vec<(&'static str, String)>,
     /// One binary, or two if modelIdentifier differs between the interfaces.
     binaries: Vec<Fmu<V>>,
@@ -198,7 +197,7 @@ impl<V: Tested> UnderTest<V> {
             outputs: continuous(Causality::Output),
             directory: directory.to_path_buf(),
             path: path.to_path_buf(),
-            before: life::surroundings(),
+            before: surroundings(),
             binaries: Vec::new(),
             interfaces: Vec::new(),
             broken: Vec::new(),
@@ -662,4 +661,27 @@ pub fn start_values(v: &Variable) -> Option<Vec<Value>> {
 /// Returns the start value of a scalar.
 pub fn start_value(v: &Variable) -> Option<Value> {
     start_values(v)?.into_iter().next()
+}
+
+pub fn surroundings() -> Vec<(&'static str, String)> {
+    let state = HostState::now();
+    // Wine also has /proc, but it describes Wine's own process.
+    let count = |folder: &str| match cfg!(target_os = "linux") {
+        true => {
+            std::fs::read_dir(folder).map_or(String::new(), |entries| entries.count().to_string())
+        }
+        false => String::new(),
+    };
+    let mut environment: Vec<_> = std::env::vars_os().collect();
+    environment.sort();
+    vec![
+        ("floating-point control (rounding, exceptions)", format!("{:#x}", state.float_control)),
+        ("locale", state.locale),
+        ("signal handlers", format!("{:#x}", state.signal_handlers)),
+        ("working directory", format!("{:?}", std::env::current_dir().ok())),
+        ("environment variables", format!("{environment:?}")),
+        // Left out on systems that do not report it.
+        ("number of threads", count("/proc/self/task")),
+        ("number of open files", count("/proc/self/fd")),
+    ]
 }

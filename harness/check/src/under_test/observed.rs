@@ -4,7 +4,7 @@ use anyhow::Result;
 use host::causality::{Causality, Variability};
 use host::description::Value;
 
-use super::{FmuUnderTest, Session};
+use super::{Session, UnderTest};
 use crate::description::Variable;
 
 /// Relative change of a value below which it is rounding.
@@ -18,7 +18,7 @@ pub struct Observed {
     discrete: Vec<Vec<Value>>,
 }
 
-fn discrete(fmu: &FmuUnderTest) -> impl Iterator<Item = &Variable> {
+fn discrete(fmu: &UnderTest) -> impl Iterator<Item = &Variable> {
     let computed = |v: &&Variable| matches!(v.causality, Causality::Output | Causality::Local);
     fmu.variables().iter().filter(computed).filter(|v| v.variability == Variability::Discrete)
 }
@@ -32,7 +32,7 @@ impl Observed {
     }
 
     /// Describes the first quantity that differs in `after`: its name, and both values as text.
-    pub fn change<'f>(&self, after: &Observed, fmu: &'f FmuUnderTest) -> Option<(&'f str, String)> {
+    pub fn change<'f>(&self, after: &Observed, fmu: &'f UnderTest) -> Option<(&'f str, String)> {
         let jumps = |a: f64, b: f64, share: f64, size: f64| {
             (a - b).abs() > share * a.abs().max(b.abs()).max(size)
         };

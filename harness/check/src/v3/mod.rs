@@ -3,7 +3,6 @@
 
 pub mod archive;
 pub mod calls;
-pub mod schema;
 pub mod steps;
 pub mod subject;
 pub mod variables;

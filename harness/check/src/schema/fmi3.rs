@@ -1,10 +1,10 @@
 //! The schema of modelDescription.xml in FMI 3.0.2 (section 2.4) as a table.
 
-use crate::schema::Children::{Any, Choice, Many, Ordered, Sequence};
-use crate::schema::Written::{Boolean, Double, Int, OneOf, Text, Time, Unsigned};
-use crate::schema::{
-    self, Attributes, BOOLEANS, DEPENDENCY, DOUBLES, INDICES, INITIAL, Kind, LONGS, VARIABILITY,
-    Written, kind,
+use super::Children::{Any, Choice, Many, Ordered, Sequence};
+use super::Written::{Boolean, Double, Int, OneOf, Text, Time, Unsigned};
+use super::{
+    Attributes, BASE_UNIT, BOOLEANS, Children, DEPENDENCY, DOUBLES, EXPERIMENT, INDICES, INITIAL,
+    Kind, LONGS, VARIABILITY, Written, kind,
 };
 
 const NAME: Attributes = &[("name", Text)];
@@ -12,9 +12,9 @@ const NAMED: Attributes = &[("name", Text), ("valueReference", Unsigned)];
 const DESCRIPTION: Attributes = &[("description", Text)];
 const WHOLE: Attributes = &[("quantity", Text), ("min", LONGS), ("max", LONGS)];
 const TEXT: Attributes = &[("mimeType", Text), ("maxSize", LONGS)];
-const NOTE: schema::Children = Sequence(&["Annotations"]);
-const INSIDE: schema::Children = Ordered(&["Annotations", "Dimension", "Alias"]);
-const INSIDE_TEXT: schema::Children = Ordered(&["Annotations", "Dimension", "Start", "Alias"]);
+const NOTE: Children = Sequence(&["Annotations"]);
+const INSIDE: Children = Ordered(&["Annotations", "Dimension", "Alias"]);
+const INSIDE_TEXT: Children = Ordered(&["Annotations", "Dimension", "Start", "Alias"]);
 
 #[rustfmt::skip]
 mod long {
@@ -65,7 +65,7 @@ pub static KINDS: &[Kind] = &[
     kind("ScheduledExecution", &[("modelIdentifier", Text)], INTERFACE, NOTE),
     kind("UnitDefinitions", &[], &[], Many(&["Unit"])),
     kind("Unit", NAME, &[], Ordered(&["Annotations", "BaseUnit", "DisplayUnit"])),
-    kind("BaseUnit", &[], schema::BASE_UNIT, Sequence(&[])),
+    kind("BaseUnit", &[], BASE_UNIT, Sequence(&[])),
     kind("DisplayUnit", NAME, &[("factor", Double), ("offset", Double), ("inverse", Boolean)], NOTE),
     kind("TypeDefinitions", &[], &[], Many(&["Float32Type", "Float64Type", "Int8Type", "UInt8Type", "Int16Type",
         "UInt16Type", "Int32Type", "UInt32Type", "Int64Type", "UInt64Type", "BooleanType", "StringType",
@@ -80,7 +80,7 @@ pub static KINDS: &[Kind] = &[
     kind("Item", &[("name", Text), ("value", LONGS)], DESCRIPTION, NOTE),
     kind("LogCategories", &[], &[], Many(&["Category"])),
     kind("Category", NAME, DESCRIPTION, NOTE),
-    kind("DefaultExperiment", &[], schema::EXPERIMENT, NOTE),
+    kind("DefaultExperiment", &[], EXPERIMENT, NOTE),
     kind("ModelVariables", &[], &[], Many(TYPES)),
     kind("Float32 Float64", NAMED, FLOAT, INSIDE).and(OF_ALL)
         .then(&[("start", DOUBLES), ("derivative", Unsigned), ("reinit", Boolean)]),
