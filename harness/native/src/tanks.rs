@@ -217,7 +217,6 @@ fn parameters_to_python(py: Python, set: ParameterSet) -> PyResult<Parameters> {
         match value {
             Value::Real(x) => found.set_item(name, x)?,
             Value::Integer(n) => found.set_item(name, n)?,
-            Value::Boolean(is) => found.set_item(name, is)?,
             Value::Item(item) => found.set_item(name, item)?,
         }
     }

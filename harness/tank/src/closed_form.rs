@@ -5,7 +5,7 @@
 
 use core::f64::consts::PI;
 
-use crate::contour::Wall;
+use crate::contour::{Wall, bisect};
 use crate::curve::Segment;
 use crate::gauss::Gauss;
 use crate::modal::{Axes, Axis, ModalData, Mode, Surface, rest};
@@ -139,16 +139,7 @@ pub fn annular_wave_numbers(inner: f64, outer: f64, count: usize) -> Vec<f64> {
     while found.len() < count {
         let after = slope(k + step);
         if (before > 0.0) != (after > 0.0) {
-            let (mut a, mut b) = (k, k + step);
-            for _ in 0..60 {
-                let middle = 0.5 * (a + b);
-                if (slope(middle) > 0.0) == (before > 0.0) {
-                    a = middle;
-                } else {
-                    b = middle;
-                }
-            }
-            found.push(0.5 * (a + b));
+            found.push(bisect(k, k + step, |k| slope(k) > 0.0));
         }
         k += step;
         before = after;

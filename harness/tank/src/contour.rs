@@ -269,7 +269,7 @@ impl Contour {
                 let is_above = |t: f64| at(t)[1] > *kink;
                 for k in (1..ends.len()).rev() {
                     if is_above(ends[k - 1]) != is_above(ends[k]) {
-                        ends.insert(k, boundary(ends[k - 1], ends[k], is_above));
+                        ends.insert(k, bisect(ends[k - 1], ends[k], is_above));
                     }
                 }
             }
@@ -277,8 +277,8 @@ impl Contour {
                 let (from, to) = (pair[0], pair[1]);
                 match [from, to].map(is_wet) {
                     [true, true] => pieces.push((segment, [from, to])),
-                    [true, false] => pieces.push((segment, [from, boundary(from, to, is_wet)])),
-                    [false, true] => pieces.push((segment, [boundary(to, from, is_wet), to])),
+                    [true, false] => pieces.push((segment, [from, bisect(from, to, is_wet)])),
+                    [false, true] => pieces.push((segment, [bisect(to, from, is_wet), to])),
                     [false, false] => {}
                 }
             }
@@ -300,16 +300,7 @@ impl Contour {
         if volume >= self.capacity() * (1.0 - 1e-12) {
             return depth;
         }
-        let (mut low, mut high) = (0.0, depth);
-        for _ in 0..60 {
-            let middle = 0.5 * (low + high);
-            if self.volume_below(middle) < volume {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        0.5 * (low + high)
+        bisect(0.0, depth, |fill| self.volume_below(fill) < volume)
     }
 
     /// Returns the whole wall if the tank can be full, which means that the wall ends at the axis or at its
@@ -448,16 +439,9 @@ impl Contour {
                 } else if (segment.curve.point_at(a)[1] - z).abs() <= level {
                     b = a;
                 }
-                for _ in 0..80 {
-                    let middle = 0.5 * (a + b);
-                    if (segment.curve.point_at(middle)[1] >= z) == above {
-                        a = middle;
-                    } else {
-                        b = middle;
-                    }
-                }
-                let up = next_above;
-                found.push(Crossing { segment: i, t: if a == b { a } else { 0.5 * (a + b) }, up });
+                let is_above = |t: f64| segment.curve.point_at(t)[1] >= z;
+                let [a, b] = narrowed([a, b], |t| is_above(t) == above);
+                found.push(Crossing { segment: i, t: 0.5 * (a + b), up: next_above });
                 above = next_above;
             }
         }
@@ -534,17 +518,36 @@ fn samples(segment: &Segment) -> usize {
 
 /// Returns the place between two, at whose first `holds` is true or false and at whose second it is not, where it
 /// changes, by bisection.
-fn boundary(first: f64, second: f64, holds: impl Fn(f64) -> bool) -> f64 {
-    let (mut near, mut far, here) = (first, second, holds(first));
-    for _ in 0..60 {
+pub(crate) fn bisect(first: f64, second: f64, holds: impl Fn(f64) -> bool) -> f64 {
+    let here = holds(first);
+    narrowed([first, second], |at| holds(at) == here)[0]
+}
+
+/// Returns the ends of the last interval of a bisection between two places, of which `is_near` is true at the first.
+fn narrowed([mut near, mut far]: [f64; 2], is_near: impl Fn(f64) -> bool) -> [f64; 2] {
+    for _ in 0..80 {
         let middle = 0.5 * (near + far);
-        if holds(middle) == here {
-            near = middle;
+        *if is_near(middle) { &mut near } else { &mut far } = middle;
+    }
+    [near, far]
+}
+
+/// Returns the ends of the part of an interval around the place that no other is `better` than, by golden section.
+pub(crate) fn golden(
+    [mut a, mut b]: [f64; 2],
+    steps: usize,
+    better: impl Fn(f64, f64) -> bool,
+) -> [f64; 2] {
+    for _ in 0..steps {
+        let step = 0.618_033_988_749_894_8 * (b - a);
+        let (left, right) = (b - step, a + step);
+        if better(left, right) {
+            b = right;
         } else {
-            far = middle;
+            a = left;
         }
     }
-    near
+    [a, b]
 }
 
 /// Returns the minimum of `sign` z on a segment and its position as a fraction of the parameter, by golden section
@@ -556,16 +559,8 @@ fn extreme(segment: &Segment, sign: f64) -> (f64, f64) {
     let lowest =
         (0..=count).min_by(|a, b| height(*a as f64 * step).total_cmp(&height(*b as f64 * step)));
     let at = lowest.unwrap_or(0) as f64 * step;
-    let (mut a, mut b) = ((at - step).max(0.0), (at + step).min(1.0));
-    let golden = 0.618_033_988_749_894_8;
-    for _ in 0..60 {
-        let (left, right) = (b - golden * (b - a), a + golden * (b - a));
-        if height(left) < height(right) {
-            b = right;
-        } else {
-            a = left;
-        }
-    }
+    let around = [(at - step).max(0.0), (at + step).min(1.0)];
+    let [a, b] = golden(around, 60, |left, right| height(left) < height(right));
     let places = [a, b, at].map(|s| (s.clamp(0.0, 1.0), height(s)));
     places.into_iter().fold((at, f64::MAX), |low, x| if x.1 < low.1 { x } else { low })
 }

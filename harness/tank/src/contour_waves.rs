@@ -34,7 +34,7 @@ use core::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::contour::Wall;
+use crate::contour::{Wall, bisect};
 use crate::gauss::Gauss;
 use crate::third_order::circle_basis;
 
@@ -161,13 +161,7 @@ impl Liquid {
             let (mut from, to) = (segment.from, segment.to);
             let cut = height(from) < bottom;
             if cut {
-                let (mut below, mut above) = (from, to);
-                for _ in 0..60 {
-                    let middle = 0.5 * (below + above);
-                    (below, above) =
-                        if height(middle) < bottom { (middle, above) } else { (below, middle) };
-                }
-                from = above;
+                from = bisect(to, from, |t| height(t) >= bottom);
             }
             for (x, w) in rule.nodes.iter().zip(&rule.weights) {
                 let t = from + (to - from) * x;

@@ -127,10 +127,7 @@ pub fn place(tank: &Tank, low: f64, high: f64, modes: usize) -> Result<Placed, P
         })
         .collect();
     let dense = sweep::sweep(tank, &fills, modes)?.rows;
-    if dense.iter().any(|row| row.modes.is_empty()) {
-        return Err("A table over the fill needs a free surface at every fill: an empty tank and a full one have none."
-            .into());
-    }
+    check_surfaces(&dense)?;
     let curves = Curves::new(&dense, count_carrying_modes(&dense));
     let mut points: Vec<usize> =
         (0..POINTS).map(|i| (i * (CANDIDATES - 1) + (POINTS - 1) / 2) / (POINTS - 1)).collect();
@@ -167,6 +164,14 @@ pub fn place(tank: &Tank, low: f64, high: f64, modes: usize) -> Result<Placed, P
     Ok(Placed { sweep: Sweep { rows: solved(&points) }, between })
 }
 
+fn check_surfaces(rows: &[ModalData]) -> Result<(), Problems> {
+    if rows.iter().any(|row| row.modes.is_empty()) {
+        return Err("A table over the fill needs a free surface at every fill: an empty tank and a full one have none."
+            .into());
+    }
+    Ok(())
+}
+
 /// Returns the parameters of a tank that can drain: those at its largest fill, where it starts, and its
 /// table.
 ///
@@ -192,10 +197,7 @@ pub fn parameters(
             format!("A table over the fill has 2 to {POINTS} points, not {}.", rows.len()).into()
         );
     }
-    if rows.iter().any(|row| row.modes.is_empty()) {
-        return Err("A table over the fill needs a free surface at every fill: an empty tank and a full one have none."
-            .into());
-    }
+    check_surfaces(rows)?;
     let (first, last) = (&rows[0], &rows[rows.len() - 1]);
     let modes = count_carrying_modes(rows);
     let solved = |rows: &[ModalData], liquid: Liquid| {
@@ -280,13 +282,10 @@ pub fn parameters(
         }
     }
     // parameters that the table replaces
-    let of_modes = (1..=modes).flat_map(|n| [MASS, LENGTH, HINGE].map(|array| array.element([n])));
-    let ratios_of_modes = (1..=modes).filter(|_| liquid.nu.is_some()).map(|n| ZETA.element([n]));
-    let of_modes = of_modes.chain(ratios_of_modes);
-    let coefficients = (1..=modes)
-        .flat_map(|n| [NONLINEAR_INERTIA.element([n]), NONLINEAR_STIFFNESS.element([n])]);
-    let of_limits = (1..=modes).flat_map(|n| [ANGLE_LIMIT.element([n]), SWIRL_LIMIT.element([n])]);
-    let of_modes = of_modes.chain(coefficients).chain(of_limits);
+    let of_modes =
+        [MASS, LENGTH, HINGE, NONLINEAR_INERTIA, NONLINEAR_STIFFNESS, ANGLE_LIMIT, SWIRL_LIMIT];
+    let of_modes = of_modes.into_iter().chain(liquid.nu.map(|_| ZETA));
+    let of_modes = of_modes.flat_map(|array| (1..=modes).map(move |n| array.element([n])));
     let replaced = [M_0, H_0, I_0, I_Z].map(String::from).into_iter().chain(of_modes);
     let replaced: Vec<String> = replaced.map(|name| target.name(&name)).collect();
     set.values.retain(|(name, _)| !replaced.contains(name));

@@ -112,6 +112,34 @@ impl Piece {
     }
 }
 
+/// Returns the parts of consecutive segments from the parameter `start` of the first one on in which the height changes in
+/// the direction `sign`, up to the first corner.
+fn smooth_pieces<'s>(
+    segments: impl Iterator<Item = &'s Segment>,
+    start: f64,
+    sign: f64,
+) -> Vec<Piece> {
+    let (mut pieces, mut before) = (Vec::new(), None::<&Segment>);
+    for segment in segments {
+        let is_up = sign > 0.0;
+        let [near, far] = [segment.from, segment.to];
+        let [near, far] = if is_up { [near, far] } else { [far, near] };
+        let is_corner = before.is_some_and(|before| {
+            let [low, high] = if is_up { [before, segment] } else { [segment, before] };
+            let ([r, z], [r_1, z_1]) = (low.tangent(1.0), high.tangent(0.0));
+            (r * z_1 - z * r_1).abs() >= SMOOTH
+        });
+        let start = if before.is_none() { start } else { near };
+        let piece = (start != far).then(|| Piece::new(segment.curve, start, far, sign));
+        if is_corner || matches!(piece, Some(None)) {
+            break;
+        }
+        pieces.extend(piece.flatten());
+        before = Some(segment);
+    }
+    pieces
+}
+
 impl Side {
     pub fn new(contour: &Contour, wall: &Wall) -> Option<Side> {
         let segments = contour.segments();
@@ -124,38 +152,9 @@ impl Side {
         let first = segments
             .iter()
             .rposition(|part| part.curve == contact.curve && is_within(contact.to, part))?;
-        let is_smooth = |a: &Segment, b: &Segment| {
-            let ([r, z], [r_1, z_1]) = (a.tangent(1.0), b.tangent(0.0));
-            (r * z_1 - z * r_1).abs() < SMOOTH
-        };
-        let mut pieces = Vec::new();
-        let below = segments[..=first].iter().rev();
-        let mut before: Option<&Segment> = None;
-        for segment in below {
-            if before.is_some_and(|after| !is_smooth(segment, after)) {
-                break;
-            }
-            let start = if before.is_none() { contact.to } else { segment.to };
-            if start != segment.from {
-                let Some(piece) = Piece::new(segment.curve, start, segment.from, -1.0) else {
-                    break;
-                };
-                pieces.insert(0, piece);
-            }
-            before = Some(segment);
-        }
-        let mut before: Option<&Segment> = None;
-        for segment in &segments[first..] {
-            if before.is_some_and(|below| !is_smooth(below, segment)) {
-                break;
-            }
-            let start = if before.is_none() { contact.to } else { segment.from };
-            if start != segment.to {
-                let Some(piece) = Piece::new(segment.curve, start, segment.to, 1.0) else { break };
-                pieces.push(piece);
-            }
-            before = Some(segment);
-        }
+        let mut pieces = smooth_pieces(segments[..=first].iter().rev(), contact.to, -1.0);
+        pieces.reverse();
+        pieces.extend(smooth_pieces(segments[first..].iter(), contact.to, 1.0));
         let (radius, surface) = (wall.r_outer, wall.z_surface);
         let [low, high] =
             [pieces.first()?.z[0], pieces.last()?.z[1]].map(|z| ROOM * (z - surface) / radius);
@@ -230,11 +229,34 @@ impl Term {
     }
 }
 
+/// Returns the matrix with each row multiplied by its factor.
+fn scaled(matrix: &DMatrix<f64>, by: &DVector<f64>) -> DMatrix<f64> {
+    let mut out = matrix.clone();
+    for mut column in out.column_iter_mut() {
+        column.component_mul_assign(by);
+    }
+    out
+}
+
 /// Points (rho, theta, tau) of the surface.
 struct Points {
     rho: Vec<f64>,
     weights: Vec<f64>,
     angles: Vec<[f64; 2]>,
+}
+
+impl Points {
+    fn new(rule: &Gauss, grid: &[[f64; 2]]) -> Points {
+        let mut points = Points { rho: Vec::new(), weights: Vec::new(), angles: Vec::new() };
+        for angles in grid {
+            for (rho, weight) in rule.nodes.iter().zip(&rule.weights) {
+                points.rho.push(*rho);
+                points.weights.push(weight * rho / grid.len() as f64);
+                points.angles.push(*angles);
+            }
+        }
+        points
+    }
 }
 
 /// Values of the potential's functions at points, one function a column: u, u_r, u_z and u_theta/r.
@@ -297,14 +319,7 @@ impl<'a> Solver<'a> {
             }
             Motion::Circular => (0..count).map(|i| [-half(i), 0.0]).collect(),
         };
-        let mut points = Points { rho: Vec::new(), weights: Vec::new(), angles: Vec::new() };
-        for angles in &grid {
-            for (rho, weight) in rule.nodes.iter().zip(&rule.weights) {
-                points.rho.push(*rho);
-                points.weights.push(weight * rho / grid.len() as f64);
-                points.angles.push(*angles);
-            }
-        }
+        let points = Points::new(&rule, &grid);
         let mut solver = Solver {
             liquid,
             side,
@@ -483,7 +498,7 @@ impl<'a> Solver<'a> {
                     * (phi_r[i] * u_r[(i, j)] + phi_z[i] * u_z[(i, j)] + phi_h[i] * u_h[(i, j)]);
             }
         }
-        let [energy, volume] = self.energy_above(&zeta)?;
+        let (energy, volume) = self.energy_above(&zeta)?;
         let moved = &energy * &c;
 
         let mut gradient = DVector::zeros(size);
@@ -491,17 +506,10 @@ impl<'a> Solver<'a> {
         gradient.rows_mut(0, nz).copy_from(&on_z);
         let on_c = omega * u.tr_mul(&push) - moved;
         gradient.rows_mut(nz, nc).copy_from(&on_c);
-        gradient[nz + nc] = volume[(0, 0)];
+        gradient[nz + nc] = volume;
         let first = self.first_mode();
         gradient[nz + nc + 1] = first.dot(&elevations) - part;
 
-        let scaled = |matrix: &DMatrix<f64>, by: &DVector<f64>| {
-            let mut out = matrix.clone();
-            for mut column in out.column_iter_mut() {
-                column.component_mul_assign(by);
-            }
-            out
-        };
         let mut matrix = DMatrix::zeros(size, size);
         let cross = self.elevation.tr_mul(&scaled(&self.rate, &couple));
         let zz =
@@ -523,7 +531,7 @@ impl<'a> Solver<'a> {
     }
 
     /// Returns the kinetic energy's matrix, and the volume between the surface at rest and the wave.
-    fn energy_above(&self, zeta: &DVector<f64>) -> Option<[DMatrix<f64>; 2]> {
+    fn energy_above(&self, zeta: &DVector<f64>) -> Option<(DMatrix<f64>, f64)> {
         let [_, nc] = self.sizes();
         let mut energy = DMatrix::zeros(nc, nc);
         let mut column = 0;
@@ -544,14 +552,10 @@ impl<'a> Solver<'a> {
             });
             volume += by.sum();
             for field in &at.values[1..] {
-                let mut scaled = field.clone();
-                for mut column in scaled.column_iter_mut() {
-                    column.component_mul_assign(&by);
-                }
-                energy += field.tr_mul(&scaled);
+                energy += field.tr_mul(&scaled(field, &by));
             }
         }
-        Some([energy, DMatrix::from_element(1, 1, volume)])
+        Some((energy, volume))
     }
 
     /// Returns the vector whose product with the elevation's coefficients is the part of the first mode.
@@ -607,14 +611,9 @@ impl<'a> Solver<'a> {
         let [nz, _] = self.sizes();
         let rule = Gauss::new(self.resolution.polynomials + 6);
         let count = 2 * self.resolution.order + 4;
-        let mut points = Points { rho: Vec::new(), weights: Vec::new(), angles: Vec::new() };
-        for i in 0..count {
-            for (rho, weight) in rule.nodes.iter().zip(&rule.weights) {
-                points.rho.push(*rho);
-                points.weights.push(weight * rho / count as f64);
-                points.angles.push([PI * (i as f64 + 0.5) / count as f64, 0.0]);
-            }
-        }
+        let grid: Vec<[f64; 2]> =
+            (0..count).map(|i| [PI * (i as f64 + 0.5) / count as f64, 0.0]).collect();
+        let points = Points::new(&rule, &grid);
         let [elevation, _] = self.elevations(&points);
         let zeta = elevation * x.rows(0, nz);
         let [mut sideways, mut up] = [0.0; 2];
@@ -957,7 +956,7 @@ mod tests {
     fn energies(solver: &Solver, x: &DVector<f64>) -> [f64; 2] {
         let [nz, nc] = solver.sizes();
         let zeta = &solver.elevation * x.rows(0, nz);
-        let [matrix, _] = solver.energy_above(&zeta).unwrap();
+        let (matrix, _) = solver.energy_above(&zeta).unwrap();
         let c = x.rows(nz, nc);
         let mut energy = 0.5 * (c.transpose() * matrix * c)[0];
         for i in 0..zeta.len() {
@@ -991,7 +990,7 @@ mod tests {
                 let [energy, at_rest] = energies(&solver, &x);
                 assert!((at_rest / energy - 1.0).abs() < 5e-4, "{degrees} {at_rest} {energy}");
                 let zeta = &solver.elevation * x.rows(0, nz);
-                let [matrix, _] = solver.energy_above(&zeta).unwrap();
+                let (matrix, _) = solver.energy_above(&zeta).unwrap();
                 let c = x.rows(nz, nc);
                 let omega = x[nz + nc + 1];
                 let action = (c.transpose() * matrix * c)[0] / omega;

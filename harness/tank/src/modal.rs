@@ -38,7 +38,7 @@ const MASSLESS: f64 = 1e-9;
 ///   stiffness.
 /// - `vertical_wall`: true if the walls are vertical at the free surface; `upright`: true if the bottom is
 ///   flat, too, so that capillarity does not change phi_n.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Mode {
     pub n: usize,
     pub lambda: f64,
@@ -186,7 +186,7 @@ pub struct ModeDamping {
 ///   `rest`: fixed mass after 1, 2, ... modes.
 /// - `capillarity`, `damping`: if surface tension and viscosity are known. `finite_amplitude`: see
 ///   [`crate::finite_amplitude`].
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ModalData {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
@@ -310,15 +310,12 @@ impl Mode {
         Mode {
             n,
             lambda,
-            lambda_r: None,
-            lambda_l: None,
             m,
             m_ratio: m / m_liq,
             l,
             height,
             hinge: height.map(|height| height + l),
             wave: surface.shape.last().map_or(0.0, |p| p[1]),
-            wave_inner: None,
             beta,
             wave_peak: surface.peak.map(|p| p[1]),
             r_peak: surface.peak.map(|p| p[0]),
@@ -328,6 +325,7 @@ impl Mode {
             surface_gradient: surface.gradient,
             vertical_wall: surface.vertical_wall,
             upright: surface.upright,
+            ..Mode::default()
         }
     }
 }
@@ -346,32 +344,17 @@ impl ModalData {
     ) -> ModalData {
         let [i_frozen_cg, i_frozen_axis, i_eff_cg] = inertias;
         ModalData {
-            name: None,
             kind,
             rho,
             fill,
-            r_surface: None,
-            r_inner: None,
-            length_x: None,
-            length_y: None,
             m_liq,
             z_cg,
-            z_lowest: 0.0,
             i_frozen_cg,
             i_frozen_axis,
-            i_eff_axis: None,
             i_eff_cg,
             rest: (1..=modes.len()).map(|k| rest(m_liq, z_cg, i_eff_cg, &modes[..k])).collect(),
             modes,
-            axes: None,
-            error: 0.0,
-            error_i_0: 0.0,
-            error_beta: 0.0,
-            capillarity: None,
-            damping: None,
-            finite_amplitude: None,
-            spin: None,
-            wall: None,
+            ..ModalData::default()
         }
     }
 

@@ -108,12 +108,11 @@ fn half_width(data: &ModalData) -> f64 {
     data.r_surface.unwrap_or_else(|| 0.5 * lengths.fold(f64::INFINITY, f64::min))
 }
 
-/// Value of a parameter: a quantity in SI units, a number, a Boolean, or an item of an enumeration.
+/// Value of a parameter: a quantity in SI units, a number, or an item of an enumeration.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
     Real(f64),
     Integer(i64),
-    Boolean(bool),
     Item(&'static str),
 }
 
@@ -626,7 +625,6 @@ impl ParameterSet {
         let values = self.values.iter().map(|(name, value)| match value {
             Value::Real(x) => format!("\"{name}\" = {x:?}\n"),
             Value::Integer(n) => format!("\"{name}\" = {n}\n"),
-            Value::Boolean(flag) => format!("\"{name}\" = {flag}\n"),
             Value::Item(item) => format!("\"{name}\" = \"{item}\"\n"),
         });
         notes.chain(values).collect()
@@ -640,7 +638,6 @@ impl ParameterSet {
             let value = match value {
                 Value::Real(x) => format!("<ssv:Real value=\"{x:?}\"/>"),
                 Value::Integer(n) => format!("<ssv:Integer value=\"{n}\"/>"),
-                Value::Boolean(flag) => format!("<ssv:Boolean value=\"{flag}\"/>"),
                 Value::Item(item) => format!("<ssv:Enumeration value=\"{item}\"/>"),
             };
             format!("    <ssv:Parameter name=\"{name}\">{value}</ssv:Parameter>\n")

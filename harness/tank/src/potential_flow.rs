@@ -16,6 +16,7 @@
 
 use nalgebra::DMatrix;
 
+use crate::contour::golden;
 use crate::curve::{Point, Segment, norm, sub};
 use crate::gauss::{Gauss, legendre, legendre_slopes};
 use crate::panel::{Boundary, BoundaryPoint, Panel};
@@ -437,16 +438,8 @@ impl Discretisation {
             let value = |v: f64| self.interpolate(u, panel, v.clamp(1e-300, 1.0));
             let better = |a: &f64, b: &f64| value(*a).abs().total_cmp(&value(*b).abs());
             let sample = (0..=16).map(|i| i as f64 * step).max_by(better).unwrap_or(0.0);
-            // golden section between the neighbouring samples
-            let (mut a, mut b) = ((sample - step).max(0.0), (sample + step).min(1.0));
-            for _ in 0..36 {
-                let (left, right) = (b - 0.618_034 * (b - a), a + 0.618_034 * (b - a));
-                if better(&left, &right).is_gt() {
-                    b = right;
-                } else {
-                    a = left;
-                }
-            }
+            let around = [(sample - step).max(0.0), (sample + step).min(1.0)];
+            let [a, b] = golden(around, 36, |left, right| better(&left, &right).is_gt());
             let v = [a, b, sample].into_iter().max_by(better).unwrap_or(sample).max(1e-300);
             if value(v).abs() > f64::abs(best[1]) {
                 best = [self.boundary.point(&self.panels[panel], v).p[0], value(v)];

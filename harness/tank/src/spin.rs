@@ -26,7 +26,7 @@ use core::f64::consts::{PI, TAU};
 
 use formulas::limits::SpinLimit;
 
-use crate::contour::{Contour, Problems};
+use crate::contour::{Contour, Problems, bisect};
 use crate::modal::{ModalData, Spin};
 use crate::tank::{Geometry, Shape, Tank};
 
@@ -144,22 +144,12 @@ impl Surface {
     fn holding(contour: &Contour, volume: f64, omega: f64, gravity: f64) -> Surface {
         let (bottom, top) = (contour.bottom(), contour.bottom() + contour.depth());
         let radius = contour.largest_radius();
-        let mut low = gravity * bottom - 0.5 * omega * omega * radius * radius;
-        let mut high = gravity * top;
-        for _ in 0..200 {
-            let c = 0.5 * (low + high);
-            if c <= low || c >= high {
-                break;
-            }
-            let surface = Surface { omega, gravity, c };
-            let [below] = surface.integrate(contour, |[r, _], s| [PI * (r * r - s)]);
-            if below < volume {
-                low = c;
-            } else {
-                high = c;
-            }
-        }
-        Surface { omega, gravity, c: 0.5 * (low + high) }
+        let low = gravity * bottom - 0.5 * omega * omega * radius * radius;
+        let surface = |c: f64| Surface { omega, gravity, c };
+        surface(bisect(low, gravity * top, |c| {
+            let [below] = surface(c).integrate(contour, |[r, _], s| [PI * (r * r - s)]);
+            below < volume
+        }))
     }
 
     /// Returns the square of the radius to which the liquid reaches inwards at the height z, m2.

@@ -63,41 +63,38 @@ impl Shape {
     /// # Errors Lists every dimension that is not allowed.
     pub fn segments(&self) -> Result<Vec<Segment>, Problems> {
         let mut problems = Vec::new();
-        let mut above = |name: &str, value: f64, limit: f64| {
-            if !(value > limit && value.is_finite()) {
+        let mut above = |limit: f64, dimensions: &[(&str, f64)]| {
+            for (name, value) in dimensions.iter().filter(|d| !(d.1 > limit && d.1.is_finite())) {
                 problems
                     .push(format!("shape: {name} is {value}; it must be a number above {limit}."));
             }
         };
         let segments = match *self {
             Shape::Cylinder { radius, height } => {
-                above("radius", radius, 0.0);
-                above("height", height, 0.0);
+                above(0.0, &[("radius", radius), ("height", height)]);
                 vec![
                     Segment::line([0.0, 0.0], [radius, 0.0]),
                     Segment::line([radius, 0.0], [radius, height]),
                 ]
             }
             Shape::Sphere { radius } => {
-                above("radius", radius, 0.0);
+                above(0.0, &[("radius", radius)]);
                 vec![Segment::arc([0.0, radius], radius, -90.0, 90.0)]
             }
             Shape::Spheroid { radius, half_height } => {
-                above("radius", radius, 0.0);
-                above("half_height", half_height, 0.0);
+                above(0.0, &[("radius", radius), ("half_height", half_height)]);
                 vec![Segment::ellipse([0.0, half_height], radius, half_height, -90.0, 90.0)]
             }
             Shape::Cone { half_angle, height } => {
-                above("half_angle", half_angle, 0.0);
-                above("90 - half_angle", 90.0 - half_angle, 0.0);
-                above("height", height, 0.0);
+                let rest = 90.0 - half_angle;
+                above(0.0, &[("half_angle", half_angle), ("90 - half_angle", rest)]);
+                above(0.0, &[("height", height)]);
                 vec![Segment::line([0.0, 0.0], [height * half_angle.to_radians().tan(), height])]
             }
             Shape::DomedCylinder { radius, height, bottom, top } => {
-                above("radius", radius, 0.0);
-                above("height", height, 0.0);
-                above("bottom", bottom, -height);
-                above("top", top, -f64::MIN_POSITIVE);
+                above(0.0, &[("radius", radius), ("height", height)]);
+                above(-height, &[("bottom", bottom)]);
+                above(-f64::MIN_POSITIVE, &[("top", top)]);
                 // the bottom edge of the cylindrical part
                 let z = bottom.max(0.0);
                 let mut segments = vec![if bottom == 0.0 {
@@ -113,11 +110,12 @@ impl Shape {
                 segments
             }
             Shape::Torispherical { radius, height, crown_radius, knuckle_radius } => {
-                above("radius", radius, 0.0);
-                above("height", height, 0.0);
-                above("knuckle_radius", knuckle_radius, 0.0);
-                above("radius - knuckle_radius", radius - knuckle_radius, 0.0);
-                above("crown_radius", crown_radius, radius);
+                above(
+                    0.0,
+                    &[("radius", radius), ("height", height), ("knuckle_radius", knuckle_radius)],
+                );
+                above(0.0, &[("radius - knuckle_radius", radius - knuckle_radius)]);
+                above(radius, &[("crown_radius", crown_radius)]);
                 // Crown and knuckle touch on the line through their centres.
                 let (crown, knuckle) = (crown_radius, knuckle_radius);
                 let rise = ((crown - knuckle).powi(2) - (radius - knuckle).powi(2)).sqrt();
@@ -132,9 +130,9 @@ impl Shape {
                 ]
             }
             Shape::Annulus { inner_radius, outer_radius, height } => {
-                above("inner_radius", inner_radius, 0.0);
-                above("outer_radius", outer_radius, inner_radius.max(0.0));
-                above("height", height, 0.0);
+                above(0.0, &[("inner_radius", inner_radius)]);
+                above(inner_radius.max(0.0), &[("outer_radius", outer_radius)]);
+                above(0.0, &[("height", height)]);
                 vec![
                     Segment::line([inner_radius, height], [inner_radius, 0.0]),
                     Segment::line([inner_radius, 0.0], [outer_radius, 0.0]),
@@ -142,8 +140,8 @@ impl Shape {
                 ]
             }
             Shape::Torus { ring_radius, tube_radius } => {
-                above("tube_radius", tube_radius, 0.0);
-                above("ring_radius", ring_radius, tube_radius.max(0.0));
+                above(0.0, &[("tube_radius", tube_radius)]);
+                above(tube_radius.max(0.0), &[("ring_radius", ring_radius)]);
                 vec![Segment::arc([ring_radius, tube_radius], tube_radius, -270.0, 90.0)]
             }
         };
@@ -283,14 +281,8 @@ impl Tank {
         } else {
             Err("There is no tank: give profile, points, svg, shape or box.".to_string().into())
         };
-        match geometry {
-            Ok(geometry) if problems.is_empty() => Ok(Tank { name: file.name, density, geometry }),
-            Ok(_) => Err(Problems(problems)),
-            Err(more) => {
-                problems.extend(more.0);
-                Err(Problems(problems))
-            }
-        }
+        let geometry = with_problems(problems, geometry)?;
+        Ok(Tank { name: file.name, density, geometry })
     }
 
     /// Creates a tank from a shape, with a liquid of `density`, kg/m³.
@@ -303,10 +295,7 @@ impl Tank {
 
     /// Returns the largest fill, m above the lowest point; `None` for a box.
     pub fn depth(&self) -> Option<f64> {
-        match &self.geometry {
-            Geometry::Revolution { contour, .. } => Some(contour.depth()),
-            Geometry::Box { .. } => None,
-        }
+        self.contour().map(Contour::depth)
     }
 
     /// Returns the height of the free surface above the lowest point, m, at a fill. A part of the volume and
@@ -315,10 +304,7 @@ impl Tank {
     /// # Errors If it is more than the tank holds or less than 0, or a part of a box, which is open at the
     /// top.
     pub fn fill_height(&self, fill: Fill) -> Result<f64, Problems> {
-        let capacity = match &self.geometry {
-            Geometry::Revolution { contour, .. } => Some(contour.capacity()),
-            Geometry::Box { .. } => None,
-        };
+        let capacity = self.contour().map(Contour::capacity);
         let volume = match (fill, capacity) {
             (Fill::Height(height), _) => return Ok(height),
             (Fill::Share(share), _) if !(0.0..=1.0).contains(&share) => {
@@ -409,31 +395,23 @@ impl Tank {
             }),
         };
         let full = if problems.is_empty() && solved.is_err() { self.full(fill) } else { None };
-        match full.map_or(solved, Ok) {
-            Ok(data) if problems.is_empty() => Ok(self.described(data)),
-            Ok(_) => Err(Problems(problems)),
-            Err(more) => {
-                problems.extend(more.0);
-                Err(Problems(problems))
-            }
+        Ok(self.described(with_problems(problems, full.map_or(solved, Ok))?))
+    }
+
+    fn contour(&self) -> Option<&Contour> {
+        match &self.geometry {
+            Geometry::Revolution { contour, .. } => Some(contour),
+            Geometry::Box { .. } => None,
         }
     }
-}
 
-impl Tank {
     fn kind(&self) -> &'static str {
-        match self.geometry {
-            Geometry::Revolution { .. } => "revolution",
-            Geometry::Box { .. } => "box",
-        }
+        if self.contour().is_some() { "revolution" } else { "box" }
     }
 
     /// Returns the result without liquid: all masses 0, no modes.
     pub(crate) fn empty(&self) -> ModalData {
-        let bottom = match &self.geometry {
-            Geometry::Revolution { contour, .. } => contour.bottom(),
-            Geometry::Box { .. } => 0.0,
-        };
+        let bottom = self.contour().map_or(0.0, Contour::bottom);
         let data =
             ModalData::new(self.kind(), self.density, 0.0, 0.0, bottom, [0.0; 3], Vec::new());
         self.described(data)
@@ -450,12 +428,22 @@ impl Tank {
     /// Returns the result for the full closed tank, without free surface and modes; `None` if `fill` is not
     /// full.
     fn full(&self, fill: f64) -> Option<ModalData> {
-        let Geometry::Revolution { contour, .. } = &self.geometry else { return None };
+        let contour = self.contour()?;
         if (fill / contour.depth() - 1.0).abs() > 1e-9 {
             return None;
         }
         modal::solve(contour.closed()?, self.density, fill, 0).ok()
     }
+}
+
+/// Returns the result if there are no problems, and otherwise an error with these and its own.
+fn with_problems<T>(mut problems: Vec<String>, result: Result<T, Problems>) -> Result<T, Problems> {
+    match result {
+        Ok(value) if problems.is_empty() => return Ok(value),
+        Ok(_) => {}
+        Err(more) => problems.extend(more.0),
+    }
+    Err(Problems(problems))
 }
 
 fn revolution(segments: Vec<Segment>, shape: Option<Shape>) -> Result<Geometry, Problems> {

@@ -260,31 +260,6 @@ impl Overlaps {
         };
         self.excited.iter().find(near).map(|mode| mode.mode)
     }
-
-    /// Returns the depths, m, at which an excited mode has twice the frequency of the first, in ascending
-    /// order, with the mode. Near these depths the third order is not valid.
-    pub fn resonances(&self) -> Vec<(f64, [usize; 2])> {
-        let mut found = Vec::new();
-        for mode in &self.excited {
-            let detuning = |depth: f64| {
-                4.0 * self.k * (self.k * depth).tanh() - mode.kappa * (mode.kappa * depth).tanh()
-            };
-            let grid: Vec<f64> = (1..400).map(|i| f64::from(i) * 0.02 / self.k).collect();
-            for pair in grid.windows(2) {
-                let [mut low, mut high] = [pair[0], pair[1]];
-                if detuning(low) * detuning(high) < 0.0 {
-                    for _ in 0..60 {
-                        let middle = 0.5 * (low + high);
-                        let left = detuning(low) * detuning(middle) <= 0.0;
-                        (low, high) = if left { (low, middle) } else { (middle, high) };
-                    }
-                    found.push((low, mode.mode));
-                }
-            }
-        }
-        found.sort_by(|a, b| a.0.total_cmp(&b.0));
-        found
-    }
 }
 
 /// Equations of an excited mode per C: t, the source of the mean elevation, and matrix and vector of (p_2,

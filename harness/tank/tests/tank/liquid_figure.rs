@@ -14,7 +14,7 @@ pub fn draw(overlaps: &Overlaps) -> String {
     let mut svg = String::new();
     frame.axes(&mut svg, "h/R", Some("shift of ω² per squared slosh angle"));
     frame.curve(&mut svg, &[[frame.x[0], 0.0], [frame.x[1], 0.0]], &format!("stroke=\"{FAINT}\""));
-    let resonances = overlaps.resonances();
+    let resonances = resonances(overlaps);
     for &(depth, [azimuth, number]) in &resonances {
         let dashed = format!("stroke=\"{FAINT}\" stroke-dasharray=\"5 4\"");
         frame.curve(&mut svg, &[[depth, frame.y[0]], [depth, frame.y[1]]], &dashed);
@@ -64,4 +64,30 @@ pub fn draw(overlaps: &Overlaps) -> String {
     let title = "First mode of an upright cylinder: frequency and amplitude, third order";
     text(&mut svg, frame.left, 26.0, "start", title);
     page(720.0, frame.top + frame.height + 50.0, title, &svg)
+}
+
+/// Returns the depths, m, at which an excited mode has twice the frequency of the first, in ascending
+/// order, with the mode. Near these depths the third order is not valid.
+pub fn resonances(overlaps: &Overlaps) -> Vec<(f64, [usize; 2])> {
+    let mut found = Vec::new();
+    for mode in &overlaps.excited {
+        let detuning = |depth: f64| {
+            4.0 * overlaps.k * (overlaps.k * depth).tanh()
+                - mode.kappa * (mode.kappa * depth).tanh()
+        };
+        let grid: Vec<f64> = (1..400).map(|i| f64::from(i) * 0.02 / overlaps.k).collect();
+        for pair in grid.windows(2) {
+            let [mut low, mut high] = [pair[0], pair[1]];
+            if detuning(low) * detuning(high) < 0.0 {
+                for _ in 0..60 {
+                    let middle = 0.5 * (low + high);
+                    let left = detuning(low) * detuning(middle) <= 0.0;
+                    (low, high) = if left { (low, middle) } else { (middle, high) };
+                }
+                found.push((low, mode.mode));
+            }
+        }
+    }
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    found
 }

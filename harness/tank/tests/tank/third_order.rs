@@ -1,5 +1,6 @@
 //! Amplitude and frequency of the first mode of an upright cylinder.
 
+use crate::liquid_figure::resonances;
 use hubslosh_tank::third_order::Overlaps;
 
 /// Excited modes of each azimuthal number: the terms fall as n^-5, 40 leave 1e-7.
@@ -44,7 +45,7 @@ fn planar_hardening_begins_at_0_5058_with_one_excited_mode_each_and_at_0_5031_wi
 /// omega_1.
 #[test]
 fn secondary_resonances_stand_at_their_depths() {
-    let found = Overlaps::new(5).resonances();
+    let found = resonances(&Overlaps::new(5));
     let modes: Vec<_> = found.iter().map(|r| r.1).collect();
     assert_eq!(modes, [[0, 1], [2, 2], [0, 2]]);
     for ((depth, _), known) in found.iter().zip([0.152_267, 0.831_377, 1.009_701]) {
