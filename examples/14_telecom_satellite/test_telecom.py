@@ -93,6 +93,17 @@ def test_the_worst_case_of_the_review_is_confirmed_by_simulation(
     assert off == pytest.approx(1, abs=0.01)
 
 
+def test_the_worst_case_at_97_percent_is_found_where_two_frequencies_meet(spacecraft: str) -> None:
+    """The loop is unstable in a thousandth of the box only, where NTO is undamped."""
+    craft = replace(telecom.craft, model=spacecraft)
+    loop = telecom.loop("97%", craft)
+    model = craft.uncertain("97%", certificate.RANGES, outputs=loop.names[0])
+    found = model.worst_case(loop, largest=2.0)
+    assert found.size == pytest.approx(1.787, rel=0.01)
+    values = found.parameters
+    assert values["tank[1].frequency[1]"] == pytest.approx(values["tank[2].frequency[1]"], rel=0.02)
+
+
 def test_a_certificate_is_checked_by_numpy_and_a_changed_one_is_refused(
     spacecraft: str, tmp_path: Path
 ) -> None:
