@@ -106,7 +106,7 @@ for number in ("050", "100"):
 """,
     "book/readers.md": RECORDING
     + "\nimport shutil; shutil.move('torque_bench.csv', 'bench.csv')\n",
-    "book/first_check.md": """
+    "book/check_ci.md": """
 import shutil, zipfile
 with zipfile.ZipFile("my.fmu") as whole, zipfile.ZipFile("broken.fmu", "w") as broken:
     for name in whole.namelist():
