@@ -277,6 +277,8 @@ fn inputs(opened: &Opened) -> Vec<String> {
     names
 }
 
+/// Each FMI 3.0 FMU is packed with array variables and with scalar variables; both have the same binary and run with the
+/// same inputs in Co-Simulation.
 #[test]
 fn an_fmu_with_arrays_steps_bit_identically_to_one_with_scalars() {
     for case in cases() {
@@ -300,6 +302,8 @@ fn an_fmu_with_arrays_steps_bit_identically_to_one_with_scalars() {
     }
 }
 
+/// Each FMI 3.0 FMU is packed with array variables and with scalar variables; both run in Model Exchange at the same
+/// states.
 #[test]
 fn fmus_with_arrays_and_with_scalars_have_equal_states_derivatives_and_indicators() {
     for case in cases() {
@@ -356,6 +360,8 @@ fn refusal<T>(called: Result<T, CallError>) -> (Status, String) {
     (error.status, texts.join("\n"))
 }
 
+/// Changing the number of tanks of Spacecraft changes the number of states and sets the elements of arrays to their start
+/// values.
 #[test]
 fn array_sizes_are_set_only_in_configuration_mode_and_reset_the_arrays() {
     let craft = Opened::new(pack::model("Spacecraft").unwrap(), Fmi::V3Arrays);
@@ -398,6 +404,7 @@ fn array_sizes_are_set_only_in_configuration_mode_and_reset_the_arrays() {
     assert_eq!((size, run.instance.number_of_states().unwrap()), ([1], states(1)), "reset");
 }
 
+/// The messages of Spacecraft name the variable, the wrong size or type, and what is allowed.
 #[test]
 fn wrong_sizes_counts_and_types_of_arrays_are_refused_in_words() {
     let craft = Opened::new(pack::model("Spacecraft").unwrap(), Fmi::V3Arrays);
@@ -446,8 +453,10 @@ fn wrong_sizes_counts_and_types_of_arrays_are_refused_in_words() {
     );
 }
 
+/// A state of SloshTank with arrays of three modes is restored in an instance with other sizes; SloshTank with scalar
+/// variables refuses this state.
 #[test]
-fn a_saved_state_brings_its_sizes_and_is_not_of_the_other_fmu() {
+fn a_saved_state_contains_array_sizes_and_the_fmu_with_scalars_refuses_it() {
     let opened =
         [Fmi::V3Arrays, Fmi::V3].map(|fmi| Opened::new(pack::model("SloshTank").unwrap(), fmi));
     let mut three = opened[0].instance(Interface::CoSimulation);
@@ -552,8 +561,10 @@ fn derivatives_and_dependencies_of_arrays_equal_those_of_their_elements_by_rows(
     }
 }
 
+/// A host ramps the torques of Spacecraft within a communication step by intermediate update, in the FMU with arrays and in
+/// the FMU with scalars. The outputs are equal.
 #[test]
-fn inputs_of_arrays_ramp_by_intermediate_update_as_scalars_do() {
+fn input_arrays_changed_in_intermediate_update_act_as_scalar_inputs() {
     let model = pack::model("Spacecraft").unwrap();
     let opened = [Fmi::V3Arrays, Fmi::V3].map(|fmi| Opened::new(model, fmi));
     let all = opened.each_ref().map(|opened| {
@@ -594,6 +605,8 @@ fn inputs_of_arrays_ramp_by_intermediate_update_as_scalars_do() {
     assert_eq!(all[0], all[1]);
 }
 
+/// Start, min, max, unit and the other attributes of each array element equal the attributes of the variable in the FMU
+/// with scalar variables.
 #[test]
 fn array_elements_have_the_attributes_of_the_scalar_variables() {
     for model in &MODELS {
@@ -691,8 +704,9 @@ const STARTS: [(&str, f64); 8] = [
     ("solver.max_steps", 5000.0),
 ];
 
+/// `pack --tanks --modes` leaves variables out of the description of Spacecraft; the binary and the motion stay the same.
 #[test]
-fn an_fmu_with_fewer_variables_moves_as_the_full_fmu() {
+fn an_fmu_packed_with_fewer_tanks_moves_bit_identically_to_the_full_fmu() {
     let text = STARTS.map(|(name, x)| (name, x.to_string()));
     let (part, _folder) = part_of_spacecraft(&text.each_ref().map(|(n, x)| (*n, &**x)));
     let whole = Opened::new(pack::model("Spacecraft").unwrap(), Fmi::V3);
@@ -751,6 +765,7 @@ fn an_fmu_with_fewer_variables_moves_as_the_full_fmu() {
     }
 }
 
+/// Spacecraft is packed with variables for two tanks: `tanks = 3` and a saved state of the full FMU are refused.
 #[test]
 fn an_fmu_with_fewer_variables_refuses_more_tanks_and_states_of_the_full_fmu() {
     let (part, _folder) = part_of_spacecraft(&[]);
@@ -774,6 +789,8 @@ fn an_fmu_with_fewer_variables_refuses_more_tanks_and_states_of_the_full_fmu() {
     run.instance.set_state(&again).unwrap();
 }
 
+/// A packed FMU has start values of its own in its description and in the file start_values.txt, with a checksum. If the
+/// file is missing or was changed, instantiation is refused.
 #[test]
 fn start_values_that_differ_from_the_description_are_refused() {
     let (part, folder) = part_of_spacecraft(&[("craft.mass", "900.0")]);

@@ -52,8 +52,9 @@ fn bits(values: &[f64]) -> Vec<u64> {
     values.iter().map(|x| x.to_bits()).collect()
 }
 
+/// The crate `fmi`, an importer that is independent of this project, runs HubSlosh with the inputs that the harness uses.
 #[test]
-fn co_simulation_gives_the_crate_fmi_the_bits_that_it_gives_us() {
+fn the_importer_crate_fmi_gets_bit_identical_outputs_in_co_simulation() {
     let import: Fmi2Import = fmi::import::from_path(packed_for_tests()).unwrap();
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     assert_eq!(import.model_description().guid, fmu.description().guid);
@@ -102,8 +103,10 @@ fn co_simulation_gives_the_crate_fmi_the_bits_that_it_gives_us() {
     theirs.terminate().unwrap();
 }
 
+/// The crate `fmi`, an importer that is independent of this project, evaluates HubSlosh at the states that the harness
+/// uses.
 #[test]
-fn model_exchange_gives_the_crate_fmi_the_bits_that_it_gives_us() {
+fn the_importer_crate_fmi_gets_bit_identical_derivatives_in_model_exchange() {
     let import: Fmi2Import = fmi::import::from_path(packed_for_tests()).unwrap();
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let mut theirs = import.instantiate_me("theirs", false, true).unwrap();
@@ -230,8 +233,10 @@ mod fmi3 {
         }
     }
 
+    /// The crate `fmi`, an importer that is independent of this project, runs the FMI 3.0 FMUs in Co-Simulation; the
+    /// harness runs the FMI 2.0 FMUs.
     #[test]
-    fn co_simulation_of_fmi_3_gives_the_crate_fmi_the_bits_of_fmi_2_however_it_handles_events() {
+    fn the_importer_crate_fmi_gets_bit_identical_outputs_from_fmi_3_and_fmi_2_with_and_without_event_mode() {
         for model in &MODELS {
             let (import, description) = import(model);
             let two = host::fmu::Fmu::open(packed_model_for_tests(model)).unwrap();
@@ -312,8 +317,10 @@ mod fmi3 {
         }
     }
 
+    /// The crate `fmi`, an importer that is independent of this project, evaluates HubSlosh of FMI 3.0 in Model Exchange;
+    /// the harness evaluates HubSlosh of FMI 2.0.
     #[test]
-    fn model_exchange_of_fmi_3_gives_the_crate_fmi_the_bits_of_fmi_2() {
+    fn the_importer_crate_fmi_gets_bit_identical_derivatives_from_fmi_3_and_fmi_2() {
         let (import, description) = import(HUBSLOSH);
         let two = host::fmi2::Fmu::open(packed_model_for_tests(HUBSLOSH)).unwrap();
         let mut ours = started(&two, MODEL_EXCHANGE);

@@ -60,8 +60,9 @@ fn wheel() -> PathBuf {
     pack::wheel::for_tests(fmus.as_flattened())
 }
 
+/// Runs pytest on harness/python without the files that need no FMU.
 #[test]
-fn fmpy_drives_the_fmu_as_the_harness_does() {
+fn the_python_tests_of_the_fmus_with_fmpy_pass() {
     let tests = pack::root().join("harness/python");
     let mut command = of_the_package();
     command.args([Path::new("--wheel"), &wheel()]).arg(&tests);
@@ -85,6 +86,7 @@ fn long_tests_of_the_package_pass() {
     );
 }
 
+/// Runs pytest on the six files of harness/python/tests that need no wheel.
 #[test]
 fn the_package_finds_modes_of_liquids_reads_recordings_and_reviews_craft() {
     let tests = pack::root().join("harness/python/tests");
@@ -105,6 +107,7 @@ fn the_studies_reproduce_every_feature_and_the_scores_of_the_benchmark() {
     pytest(of_the_package().args(quick), "a study failed");
 }
 
+/// Runs pytest on harness/studies; each study compares its results with the numbers in the book.
 #[test]
 #[ignore = "minutes: .ci/long-tests"]
 fn the_studies_compute_the_numbers_of_the_book() {

@@ -177,6 +177,8 @@ fn a_whole_life(fmi: Fmi, share: Share) {
     assert_eq!(number(&said, " more descriptors"), 0.0, "{said}");
 }
 
+/// A host written in C steps many instances in turns, makes wrong calls, saves and restores states, and loads and unloads
+/// the library hundreds of times, in both versions of FMI.
 #[test]
 fn a_c_host_survives_every_wrong_call_and_no_memory_is_leaked() {
     for fmi in VERSIONS {
@@ -198,6 +200,8 @@ fn functions_answer_as_the_table_has_it(model: &pack::Model, names: [&str; 6], s
     );
 }
 
+/// Each FMI 3.0 function is called in each mode; it either succeeds or returns an error with a message, as the standard
+/// demands for this mode.
 #[test]
 fn every_function_of_fmi_3_is_allowed_or_refused_in_words_in_every_mode() {
     for (model, names, sets) in [
@@ -255,18 +259,21 @@ fn no_calls_break<M: runtime::Model>(inputs: u32) {
     }
 }
 
+/// 3,000 random sequences of calls, with valid and invalid arguments, neither crash the FMU nor make it hang.
 #[test]
 fn no_calls_break_the_packed_binary_of_hubslosh() {
     no_calls_break::<HubSlosh::HubSlosh>(3000);
 }
 
+/// 600 random sequences of calls, with valid and invalid arguments, neither crash the FMU nor make it hang.
 #[test]
-fn no_calls_break_the_packed_binary_of_spacecraft() {
+fn random_call_sequences_do_not_crash_the_packed_spacecraft_fmu() {
     no_calls_break::<Spacecraft::Model>(600);
 }
 
+/// 600 random sequences of calls, with valid and invalid arguments, neither crash the FMU nor make it hang.
 #[test]
-fn no_calls_break_the_packed_binary_of_sloshtank() {
+fn random_call_sequences_do_not_crash_the_packed_sloshtank_fmu() {
     no_calls_break::<SloshTank::Model>(600);
 }
 
@@ -316,6 +323,8 @@ fn no_model_traps(fmi: Fmi, share: Share) {
     assert!(number(&said, " refused") <= 0.03 * number(&said, " runs"), "{said}");
 }
 
+/// The host traps division by zero, invalid operations and overflow. No slosh model, friction law or gyro of HubSlosh
+/// causes one.
 #[cfg(target_os = "linux")]
 #[test]
 fn no_model_raises_a_floating_point_exception() {
@@ -578,6 +587,8 @@ fn scenes(model: &str) -> Vec<Vec<(&'static str, &'static str)>> {
     }
 }
 
+/// The host traps division by zero, invalid operations and overflow while it sets parameters of HubSlosh to values within
+/// their declared ranges.
 #[cfg(target_os = "linux")]
 #[test]
 fn no_allowed_value_of_hubslosh_raises_a_floating_point_exception() {
@@ -596,6 +607,8 @@ fn no_allowed_value_of_spacecraft_raises_a_floating_point_exception() {
     }
 }
 
+/// The host traps division by zero, invalid operations and overflow while it sets parameters of SloshTank to values within
+/// their declared ranges.
 #[cfg(target_os = "linux")]
 #[test]
 fn no_allowed_value_of_sloshtank_raises_a_floating_point_exception() {
@@ -658,6 +671,8 @@ fn handles_of_other_libraries_other_versions_freed_and_not_handles_are_errors() 
 const STACK: [(&str, [u32; 2]); 3] =
     [("HubSlosh", [64, 23]), ("Spacecraft", [156, 112]), ("SloshTank", [122, 66])];
 
+/// The page book/real_time.md states the largest stack of each FMU; the stack is measured in several runs and in both
+/// versions of FMI.
 #[cfg(target_os = "linux")]
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
@@ -768,9 +783,10 @@ fn rounding_shows_in_the_last_digits_alone(model: &str, settings: Settings) {
     }
 }
 
+/// Some hosts set another rounding mode of the processor, or let it replace subnormal numbers by 0.
 #[cfg(all(target_os = "linux", target_arch = "x86_64"))]
 #[test]
-fn rounding_modes_change_last_digits_and_flushing_of_subnormal_numbers_nothing() {
+fn a_hosts_rounding_mode_changes_only_last_digits_and_flushing_subnormal_numbers_changes_nothing() {
     rounding_shows_in_the_last_digits_alone(
         "HubSlosh",
         &[
@@ -811,6 +827,8 @@ fn states<M: runtime::Model>() {
     }
 }
 
+/// Serialised FMU states are damaged at random. The FMU refuses the bytes, or the restored instance goes on with finite
+/// numbers.
 #[test]
 fn damaged_saved_states_are_refused_or_give_a_valid_instance() {
     states::<HubSlosh::HubSlosh>();
@@ -825,8 +843,9 @@ fn values<M: runtime::Model>(runs: usize) {
     }
 }
 
+/// Random bytes decide which variables are set, to which values, and how long the steps are.
 #[test]
-fn any_values_give_finite_results_or_an_error() {
+fn random_values_of_variables_give_finite_results_or_an_error() {
     values::<HubSlosh::HubSlosh>(200);
     // Stiff ones use up the integrator's steps: half a second each.
     values::<Spacecraft::Model>(8);
@@ -848,11 +867,14 @@ fn clocks(sequences: [usize; 3]) {
     });
 }
 
+/// Hosts that add up their communication points, or multiply them, have other rounding errors in the time than the FMU.
 #[test]
-fn hosts_with_other_clocks_get_the_same_outputs() {
+fn hosts_whose_times_have_rounding_errors_get_the_same_outputs() {
     clocks([20, 2, 4]);
 }
 
+/// Hosts that add up their communication points, or multiply them, have other rounding errors in the time than the FMU; the
+/// sequences are random.
 #[test]
 #[ignore = "minutes: .ci/run --nightly"]
 fn hosts_with_other_clocks_get_the_same_outputs_in_a_hundred_thousand_sequences() {

@@ -118,6 +118,7 @@ fn archive() -> zip::ZipArchive<File> {
     zip::ZipArchive::new(File::open(packed_for_tests()).unwrap()).unwrap()
 }
 
+/// All files of HubSlosh.fmu are stored or deflated, the two methods of zip that every importer can unpack.
 #[test]
 fn archive_begins_with_the_model_description_and_is_plain() {
     let mut archive = archive();
@@ -138,6 +139,7 @@ fn archive_begins_with_the_model_description_and_is_plain() {
     }
 }
 
+/// HubSlosh is packed a second time; the two FMU files are equal byte for byte.
 #[test]
 fn the_same_source_gives_the_same_archive() {
     let directory = tempfile();
@@ -234,6 +236,8 @@ fn the_binary_can_be_loaded_and_unloaded_many_times() {
     }
 }
 
+/// 20 instances of two loaded copies of HubSlosh take turns step by step. Each has the results of an instance that runs
+/// alone.
 #[test]
 fn several_copies_and_instances_do_not_disturb_each_other() {
     let (first, second) = (open(), open());
@@ -258,6 +262,8 @@ fn several_copies_and_instances_do_not_disturb_each_other() {
     }
 }
 
+/// Eight threads simulate one instance of HubSlosh each, at the same time; the outputs are bit-identical to those of a
+/// single thread.
 #[test]
 fn instances_in_several_threads_give_the_same_bits() {
     let fmu = open();
@@ -325,6 +331,7 @@ fn instantiation_without_callbacks_returns_null_and_does_not_crash() {
     assert!(fmu.instantiate_with(&with).is_err());
 }
 
+/// An instance without callback functions and without a resource location is initialised and stepped.
 #[test]
 fn every_callback_and_the_resource_location_may_be_null() {
     let fmu = open();
@@ -342,6 +349,8 @@ fn every_callback_and_the_resource_location_may_be_null() {
     assert!(fmu.instantiate_with(&with).is_err());
 }
 
+/// The host frees the callback structure, the instance name and the GUID after fmi2Instantiate; later calls do not read
+/// them.
 #[test]
 fn callbacks_name_and_guid_need_not_outlive_fmi2_instantiate() {
     let fmu = open();
@@ -370,6 +379,7 @@ fn every_function_handles_a_null_instance() {
 
 // ---- The logger ----
 
+/// Several errors are provoked; each message is valid UTF-8 and belongs to a log category of the model description.
 #[test]
 fn log_messages_are_valid_text_in_a_declared_category() {
     let fmu = open();
@@ -404,8 +414,9 @@ fn a_percent_sign_in_a_message_is_not_a_printf_format() {
     refused(instance.set_debug_logging(true, &[text]), &[text, "logStatusError"]);
 }
 
+/// A wrong step and a wrong query are called with each choice of log categories in fmi2SetDebugLogging.
 #[test]
-fn messages_come_in_the_categories_asked_for() {
+fn only_messages_of_the_enabled_log_categories_are_logged() {
     let fmu = open();
     let mut instance = stepping(&fmu, &[]);
     let messages = |instance: &mut Instance| {
@@ -424,6 +435,7 @@ fn messages_come_in_the_categories_asked_for() {
     assert_eq!(messages(&mut instance), 11);
 }
 
+/// With the category logEvents the log has a message for each time at which the hub comes to rest or begins to slip.
 #[test]
 fn stick_and_slip_are_logged_on_request() {
     let fmu = open();
@@ -568,6 +580,8 @@ fn every_boolean_that_is_not_0_is_true_and_reads_1() {
 
 // ---- Parameters and inputs ----
 
+/// HubSlosh gets five wrong parameters: fmi2ExitInitializationMode returns one error that names all five, and succeeds
+/// after the values are corrected.
 #[test]
 fn all_wrong_parameters_are_reported_at_once_and_can_be_corrected() {
     let fmu = open();
@@ -596,6 +610,7 @@ fn all_wrong_parameters_are_reported_at_once_and_can_be_corrected() {
     instance.exit_initialization_mode().unwrap();
 }
 
+/// A minimum wheel speed above the initial wheel speed is refused at the end of initialisation, by both names.
 #[test]
 fn parameters_that_contradict_each_other_are_reported() {
     let fmu = open();
@@ -605,8 +620,10 @@ fn parameters_that_contradict_each_other_are_reported() {
     refused(instance.exit_initialization_mode(), &["wheel.speed_0", "wheel.speed_min"]);
 }
 
+/// The call that sets tau_cmd, tau_ext or g_axial to NaN, to an infinite or to a too large value returns an error with the
+/// allowed range, and the state of HubSlosh stays as before.
 #[test]
-fn inputs_that_are_no_number_or_out_of_range_are_refused_on_the_spot() {
+fn inputs_that_are_nan_or_out_of_range_are_refused_by_the_call_that_sets_them() {
     let fmu = open();
     let mut instance = stepping(&fmu, LIVELY);
     let before = state(&mut instance);
@@ -636,6 +653,8 @@ fn inputs_that_are_no_number_or_out_of_range_are_refused_on_the_spot() {
 
 // ---- Steps ----
 
+/// HubSlosh refuses a communication step that is not positive or not finite, and a communication point that is not the
+/// present time. Its state stays as before.
 #[test]
 fn steps_of_no_positive_length_are_refused_and_change_nothing() {
     let fmu = open();
@@ -708,6 +727,8 @@ fn an_experiment_with_invalid_times_is_refused() {
     instance.setup_experiment(Some(1e-6), 0.0, Some(1.0)).unwrap();
 }
 
+/// A torque of 1e12 N·m for 1e200 s needs more integration steps than `solver.max_steps`: fmi2DoStep returns fmi2Error, the
+/// state stays at the start, and the instance can only be terminated or reset.
 #[test]
 fn a_diverging_run_is_an_error() {
     let fmu = open();
@@ -742,6 +763,8 @@ fn the_status_of_the_last_step_can_be_queried() {
 
 // ---- Reset, end, saved states ----
 
+/// Instances of HubSlosh during initialisation, after steps and after an error are reset; their saved states are
+/// bit-identical to the saved state of a new instance.
 #[test]
 fn reset_from_every_state_is_a_fresh_instance_bit_for_bit() {
     let fmu = open();
@@ -821,8 +844,9 @@ fn a_saved_state_continues_bit_for_bit_also_in_a_new_instance() {
     }
 }
 
+/// fmi2GetFMUstate with the handle of an earlier state overwrites this state; fmi2FreeFMUstate of NULL succeeds.
 #[test]
-fn the_handle_of_a_saved_state_is_reused_and_null_is_fine_to_free() {
+fn a_handle_of_a_saved_state_can_be_reused_and_a_null_handle_can_be_freed() {
     let fmu = open();
     let mut instance = stepping(&fmu, LIVELY);
     let mut saved = instance.get_state().unwrap();
@@ -849,6 +873,7 @@ fn a_saved_state_is_freed_by_itself_as_by_its_address() {
     instance.do_step(0.0, 0.1).unwrap();
 }
 
+/// fmi2DeSerializeFMUstate refuses bytes that are empty, zero, truncated or changed.
 #[test]
 fn bytes_that_are_no_state_are_refused() {
     let fmu = open();

@@ -534,8 +534,10 @@ fn a_warning_names_a_weightless_tank_without_restoring_force() {
     assert_eq!(said(&mut set_right).len(), 0);
 }
 
+/// In Model Exchange HubSlosh also accepts parameters in its first event mode. Values out of range are refused at once;
+/// limits of the wheel that contradict each other are refused by fmi2NewDiscreteStates.
 #[test]
-fn parameters_set_after_initialization_are_as_good_as_before_and_bad_ones_are_refused() {
+fn parameters_set_in_event_mode_act_as_if_set_before_initialization_and_wrong_values_are_refused() {
     let fmu = open();
     let mut late = set_up(&fmu, MODEL_EXCHANGE, &[]);
     late.set("init.slosh_angle", "0.3").unwrap();
@@ -617,8 +619,9 @@ fn a_refused_event_leaves_the_parameters_to_be_corrected() {
     instance.new_discrete_states().unwrap();
 }
 
+/// An integrator may evaluate derivatives at times after the stop time, but no step may end there.
 #[test]
-fn a_step_past_the_stop_time_is_refused_and_a_trial_past_it_is_not() {
+fn in_model_exchange_a_completed_step_after_the_stop_time_is_refused_and_a_trial_time_is_not() {
     let fmu = open();
     let mut with = fmu.instantiation("one");
     with.kind = MODEL_EXCHANGE;
@@ -635,6 +638,8 @@ fn a_step_past_the_stop_time_is_refused_and_a_trial_past_it_is_not() {
     instance.completed_integrator_step().unwrap();
 }
 
+/// In Model Exchange a host sets a slosh mass of the slosh model `liquid` to a place outside the model's range:
+/// fmi2CompletedIntegratorStep returns an error that names the mode, and the instance refuses further calls.
 #[test]
 fn states_out_of_the_models_range_end_the_run() {
     let fmu = open();

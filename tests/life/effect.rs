@@ -109,6 +109,8 @@ fn check<M: Model>(base: Values) {
     assert!(faults.is_empty(), "{base:?}:\n{}", faults.join("\n"));
 }
 
+/// HubSlosh warns of parameters that are set but have no effect. A change of each named parameter leaves all outputs
+/// bit-identical.
 #[test]
 fn no_warning_names_a_parameter_of_hubslosh_that_changes_an_output() {
     let check = check::<HubSlosh::HubSlosh>;
@@ -125,11 +127,15 @@ fn no_warning_names_a_parameter_of_hubslosh_that_changes_an_output() {
     check(&with(&[("wheel.enabled", 1.0), ("imu.enabled", 1.0)]));
 }
 
+/// Spacecraft warns of parameters that are set but have no effect. A change of each named parameter leaves all outputs
+/// bit-identical.
 #[test]
 fn no_warning_names_a_parameter_of_spacecraft_that_changes_an_output() {
     check::<Spacecraft::Model>(&[("force[1]", 10.0)]);
 }
 
+/// SloshTank warns of parameters that are set but have no effect. A change of each named parameter leaves all outputs
+/// bit-identical.
 #[test]
 fn no_warning_names_a_parameter_of_sloshtank_that_changes_an_output() {
     check::<SloshTank::Model>(&[]);

@@ -156,6 +156,8 @@ fn inputs_set_in_initialization_mode_count_from_the_start() {
     assert!((quarter / on_earth - 0.5).abs() < 1e-15);
 }
 
+/// HubSlosh gets five wrong parameters: leaving initialisation mode returns one error that names all five, and succeeds
+/// after the values are corrected.
 #[test]
 fn all_wrong_parameters_are_reported_at_once_and_can_be_corrected() {
     let mut instance = fresh();
@@ -198,6 +200,7 @@ fn all_wrong_parameters_are_reported_at_once_and_can_be_corrected() {
     instance.exit_initialization_mode().unwrap();
 }
 
+/// A minimum wheel speed above the initial wheel speed is refused at the end of initialisation.
 #[test]
 fn parameters_that_contradict_each_other_are_reported() {
     let mut instance = fresh();
@@ -207,8 +210,10 @@ fn parameters_that_contradict_each_other_are_reported() {
     assert!(fault.text.contains("wheel.speed_min"), "{}", fault.text);
 }
 
+/// NaN, an infinite torque and a negative g_axial are refused; a call with one wrong value among several sets none of the
+/// values.
 #[test]
-fn wrong_inputs_are_refused_on_the_spot() {
+fn wrong_inputs_are_refused_by_the_call_that_sets_them() {
     let mut instance = stepping(&[]);
     let before = to_bytes(&instance);
     for (name, value) in [("tau_cmd", f64::NAN), ("tau_ext", f64::NEG_INFINITY), ("g_axial", -1e-9)]
@@ -310,8 +315,9 @@ fn input_with_a_slope_does_not_depend_on_the_choice_of_communication_step() {
     assert!((whole - cut).abs() < 1e-7 * whole.abs(), "{whole} {cut}");
 }
 
+/// g_axial falls by input derivatives. A step in which g_axial would become negative is refused and changes nothing.
 #[test]
-fn specific_force_may_run_down_to_nothing_but_not_below() {
+fn the_axial_specific_force_may_fall_to_zero_but_not_below() {
     let down = |slope: f64| {
         let mut instance = stepping(&[("init.slosh_angle", Value::Real(0.1))]);
         let references = [reference("g_axial")];
@@ -363,6 +369,7 @@ fn after_a_step_that_failed_values_can_be_read_and_a_saved_state_restored() {
     instance.do_step(0.0, 1.0).unwrap();
 }
 
+/// After a panic inside the FMU, all calls, including reset and the restoring of a saved state, return fmi2Fatal.
 #[test]
 fn after_a_panic_every_call_is_fatal() {
     let mut instance = stepping(&[]);
@@ -525,6 +532,8 @@ fn random_calls_never_panic() {
     }
 }
 
+/// New, initialising, stepping, failed and terminated instances of HubSlosh are saved to bytes and read back; the instance
+/// state and the bytes are equal.
 #[test]
 fn a_state_can_be_saved_in_every_instance_state() {
     let mut initializing = fresh();
@@ -830,8 +839,10 @@ fn directional_derivatives_of_variables_without_any_are_refused() {
     assert_eq!(answer, [0.0]);
 }
 
+/// Other parameters, and friction parameters out of range, are refused after initialisation and leave the state of HubSlosh
+/// as before.
 #[test]
-fn friction_can_be_changed_while_stepping_and_nothing_else() {
+fn only_friction_parameters_can_be_changed_between_steps() {
     let mut instance =
         stepping(&[("tau_cmd", Value::Real(0.01)), ("init.omega", Value::Real(0.1))]);
     instance.do_step(0.0, 0.5).unwrap();
@@ -864,6 +875,7 @@ fn friction_can_be_changed_while_stepping_and_nothing_else() {
     assert_eq!(to_bytes(&instance), to_bytes(&other));
 }
 
+/// A state that was saved in Model Exchange cannot be restored in Co-Simulation, nor the reverse.
 #[test]
 fn a_state_of_the_other_interface_is_refused() {
     let mut exchange = HubSlosh::instance(Interface::ModelExchange);
@@ -1099,6 +1111,8 @@ fn integer_twins_override_the_booleans() {
     }
 }
 
+/// `slosh.kind` and `friction.kind` repeat `slosh.model` and `friction.model` as integers, for hosts that cannot set
+/// enumerations. Two different values are refused at the end of initialisation.
 #[test]
 fn kinds_that_contradict_the_enumerations_are_all_reported() {
     let mut instance = fresh();

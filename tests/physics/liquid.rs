@@ -25,8 +25,10 @@ fn coefficients_of_the_model_equal_those_of_potential_flow() {
     }
 }
 
+/// The frequency shifts of planar and of rotary free oscillations in the bench's tank are within 1 % of third-order
+/// potential flow, at fills of 10 and 5 cm.
 #[test]
-fn free_oscillations_have_the_shifts_of_potential_flow() {
+fn the_slosh_model_liquid_has_the_frequency_shifts_of_third_order_potential_flow() {
     let all = Overlaps::new(40);
     for fill in [0.10, 0.05] {
         let (found, expected) = (shifts(SloshModel::Liquid, fill, 1e-4), all.shifts(fill / 0.0815));

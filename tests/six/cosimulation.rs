@@ -279,6 +279,8 @@ fn coupling_by_total_force_and_torque_diverges_above_the_limit_of_the_inertia_ra
     }
 }
 
+/// SloshTank warns if its tank is coupled to a craft so light that the exchange of force and acceleration between their
+/// FMUs diverges.
 #[test]
 fn a_warning_names_a_coupling_that_would_diverge() {
     let tank = Tank::default();
@@ -343,8 +345,10 @@ fn growth(share: f64, order: Order, h: f64) -> (f64, f64) {
 /// Share for a body of 300 kg: lambda = 1.3.
 const LIGHT: f64 = 300.0 / 1180.0;
 
+/// Two FMUs, tank and craft, exchange force and acceleration once in a communication step (Jacobi or Gauss-Seidel order).
+/// The growth rate of the slosh mode equals the growth rate that follows from the delay.
 #[test]
-fn splitting_a_step_makes_the_slosh_mode_grow_by_the_delay_of_the_split() {
+fn coupling_two_fmus_with_a_delay_makes_the_slosh_mode_grow_as_predicted() {
     for (share, order, h) in [
         (1.0, GaussSeidelHeld, 0.02),
         (1.0, GaussSeidelHeld, 0.05),

@@ -93,6 +93,8 @@ fn periodic_waves_have_the_frequencies_of_potential_flow_in_both_fmus() {
     }
 }
 
+/// A slosh mass started on a circle with the frequency that the coefficients s and kappa predict returns to its start after
+/// one period, in Spacecraft and in SloshTank.
 #[test]
 fn waves_on_circles_have_the_predicted_frequency_in_both_fmus() {
     fn end<T: Moved>(tank: &Tank, a: f64, w: f64) -> f64 {

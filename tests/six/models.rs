@@ -40,8 +40,10 @@ fn is_warned(h_wheels: fn(f64) -> f64, torque: fn(f64) -> f64, with_events: bool
     model.step_warning().is_some()
 }
 
+/// Inputs are a history of the wheels' angular momentum and a torque. Spacecraft warns unless the torque is the reaction to
+/// the change.
 #[test]
-fn a_warning_names_wheels_that_move_without_a_torque() {
+fn spacecraft_warns_if_the_wheels_angular_momentum_changes_without_a_reaction_torque() {
     let sine = |t: f64| f64::sin(3.0 * t);
     let reaction = |t: f64| -3.0 * f64::cos(3.0 * t);
     assert!(is_warned(sine, |_| 0.0, false));

@@ -50,6 +50,7 @@ fn missing(rows: &[String]) -> Vec<&str> {
     rows.iter().flat_map(|row| named(row)).filter(looked_up).filter(|n| !is_there(n)).collect()
 }
 
+/// Each row of book/checklist.md names at least one test function of the source.
 #[test]
 fn every_test_that_the_checklist_names_exists() {
     let rows = rows("checklist.md", "| demand");
@@ -60,6 +61,7 @@ fn every_test_that_the_checklist_names_exists() {
     assert_eq!(missing(&rows), [""; 0]);
 }
 
+/// Each row of book/verification.md names a test function of the source or states a check by hand.
 #[test]
 fn every_test_that_the_page_of_verification_names_exists() {
     let rows = rows("verification.md", "| claim");

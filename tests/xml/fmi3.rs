@@ -69,6 +69,8 @@ fn every_variable_is_as_in_fmi_2<M: Model>() {
     assert!(names.values().all(|count| *count == 1), "names are unique");
 }
 
+/// Names, units, ranges, start values and causality of each variable are equal in the model descriptions of FMI 3.0 and FMI
+/// 2.0.
 #[test]
 fn every_variable_of_fmi_3_is_as_in_fmi_2() {
     every_variable_is_as_in_fmi_2::<HubSlosh::HubSlosh>();
@@ -93,6 +95,8 @@ fn an_input_follows_others_exactly_where_the_model_sets_its_slope<M: Model>() {
     }
 }
 
+/// If an input is the derivative of another input, the model sets the slope of the other input, and a host cannot change
+/// the other input within a step.
 #[test]
 fn only_inputs_whose_slopes_the_model_sets_lack_intermediate_update() {
     an_input_follows_others_exactly_where_the_model_sets_its_slope::<HubSlosh::HubSlosh>();
@@ -149,6 +153,8 @@ fn the_structure_is_as_in_fmi_2<M: Model>() {
     assert_eq!(order, sorted);
 }
 
+/// Outputs, states and initial unknowns with their dependencies are equal in the ModelStructure of FMI 3.0 and FMI 2.0; FMI
+/// 3.0 also lists the event indicators.
 #[test]
 fn the_structure_of_fmi_3_equals_that_of_fmi_2_with_event_indicators() {
     the_structure_is_as_in_fmi_2::<HubSlosh::HubSlosh>();
@@ -266,6 +272,7 @@ fn capabilities_are_shown<M: Model>() {
     }
 }
 
+/// Each capability flag of the model description is listed with the test that shows it.
 #[test]
 fn every_declared_capability_of_fmi_3_has_a_test() {
     capabilities_are_shown::<HubSlosh::HubSlosh>();

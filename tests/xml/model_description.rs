@@ -38,6 +38,7 @@ fn unknowns(list: &str) -> Vec<Element> {
     root().child("ModelStructure").unwrap().list(list).cloned().collect()
 }
 
+/// modelDescription.xml of HubSlosh is generated from the table of variables in the Rust source.
 #[test]
 fn the_committed_model_description_equals_the_table() {
     assert!(
@@ -47,7 +48,7 @@ fn the_committed_model_description_equals_the_table() {
 }
 
 #[test]
-fn the_guid_equals_that_of_the_binary() {
+fn the_guid_in_the_model_description_equals_the_guid_of_the_binary() {
     assert_eq!(root().get("guid"), Some(TABLE.guid()));
 }
 
@@ -97,6 +98,8 @@ fn start_values_are_within_min_and_max() {
     }
 }
 
+/// For example, an input is continuous if it is Real, and has a start value; a parameter is fixed, except tunable friction,
+/// and has a start value.
 #[test]
 fn causality_determines_variability_initial_and_start() {
     for (variable, kind) in variables() {
@@ -222,6 +225,8 @@ fn every_slosh_model_and_friction_law_is_in_the_documentation() {
     }
 }
 
+/// ModelStructure lists each output and each state derivative once, and lists as initial unknowns all variables that are
+/// computed during initialisation.
 #[test]
 fn structure_lists_every_output_once_and_what_is_computed_at_the_start() {
     let with = |causalities: &[&str]| -> Vec<usize> {

@@ -285,9 +285,11 @@ mod tests {
         assert_eq!(swirl_fold(9.0), swirl_fold(2.5));
     }
 
-    /// With R = 0.3 m, h = 0.4 m, 5 m/s2 and 9 rad/s, 2 Omega/omega_0 is 3.3 and Omega^2 R/g is 4.86.
+    /// An upright tank with R = 0.3 m and h = 0.4 m at 5 m/s2 that spins at 9 rad/s is out of range: 2 Omega/omega_0 is 3.3
+    /// (limit 1/sqrt(1 + C_0), between 0.7 and 0.9), and Omega^2 R/g is 4.86 (limit 0.3). At 0 and 0.1 rad/s the tank is in
+    /// range.
     #[test]
-    fn a_spinning_tank_leaves_its_range_at_the_inertial_waves_or_a_deep_paraboloid() {
+    fn a_spinning_tank_is_out_of_range_where_inertial_waves_occur_or_the_paraboloid_is_deep() {
         let limit = |fill: f64| {
             let l = 1.0 / (XI[0] / 0.3 * libm::tanh(XI[0] * fill));
             (SpinLimit::new(l, 0.3), 5.0 / l)

@@ -170,8 +170,9 @@ def full_names(
 def moves_the_bob(name: str) -> str:
     """Return an error message if a parameter moves the slosh mass; otherwise "".
 
-    If the range of a pendulum's length or hinge varied, the slosh mass would move as well (and with
-    the length the frequency would change), so that one range would vary several quantities.
+    An uncertain length or hinge of a pendulum would also move the slosh mass, and an uncertain
+    length would also change the frequency. One uncertain parameter would then change several
+    quantities, so it is refused.
     """
     if not (match := _MOVES_THE_BOB.fullmatch(name)):
         return ""

@@ -536,8 +536,9 @@ def _reduced(M: Matrix, first: int, counts: list[int]) -> tuple[Matrix, list[int
 class UncertainModel:
     """Spacecraft with uncertain parameters as a linear fractional transformation y = F_u(M, Δ) u.
 
-    `uncertain` and `Craft.uncertain` return it. Δ is diagonal and real; it has each of ``deltas``
-    in ``counts`` copies, ``|δ| ≤ 1``. The parameters are ``center`` + ``spread`` · δ.
+    `uncertain` and `Craft.uncertain` return an instance. Δ is real and diagonal. Each δ of
+    ``deltas`` has ``|δ| ≤ 1`` and occurs on the diagonal of Δ as often as ``counts`` states. The
+    parameters are ``center`` + ``spread`` · δ.
 
     Attributes
     ----------
@@ -555,8 +556,8 @@ class UncertainModel:
     given : dict
         Parameters of the FMU at its operating point.
     tanks : tuple of str
-        Names of the craft's tanks, which `delta` also accepts in the names of quantities, such as
-        ``main.frequency[1]``.
+        Names of the craft's tanks. `delta` also accepts quantities with these names, for example
+        ``main.frequency[1]`` instead of ``tank[1].frequency[1]``.
 
     Examples
     --------

@@ -476,7 +476,9 @@ fn accelerations_forces_and_torques_follow_newtons_law_with_the_rod_forces_as_un
     }
 }
 
-/// The tanks have planar modes and others, off the axis, and their rigid liquid is not axisymmetric.
+/// The tanks have planar modes and modes that move in two directions; the tanks are not on the spin axis, and their rigid
+/// liquid is not axisymmetric. The unknown guiding forces hold each slosh mass on its line of motion. The accelerations
+/// equal the accelerations of the craft's equations.
 #[test]
 fn planar_modes_follow_newtons_law_with_the_guiding_forces_as_unknowns() {
     for seed in 0..300 {

@@ -152,10 +152,10 @@ fn reading_and_saving_between_rows_change_no_bit_of_the_motion() {
     });
 }
 
-/// Thrust is reversed at 2 s, so that the liquid leaves the bottom, flies and hits the wall. The events do not depend on the
-/// rows, because they are roots of the series of whole expansions.
+/// Thrust is reversed at 2 s, so that the liquid leaves the bottom, flies and hits the wall. Events are roots of the Taylor
+/// series of a whole integration step, and output rows do not shorten this step.
 #[test]
-fn rows_change_no_bit_of_detached_liquid() {
+fn the_spacing_of_output_rows_changes_no_bit_of_the_motion_of_detached_liquid() {
     let mut p = Parameters::default();
     p.tank[0].ball.travel = 0.6;
     p.init.omega = [0.02, 0.01, 0.0];

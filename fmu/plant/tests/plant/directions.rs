@@ -204,9 +204,10 @@ fn inertia(p: &Parameters, be: f64) -> [f64; 3] {
     [value, 2.0 * m * x * l * c, 2.0 * m * l * (l * c * c - x * s)]
 }
 
-/// On a rotating hub, g tan(be) = w^2 (r + l sin be) at equilibrium. About it, with H = J w constant, V = H^2/(2 J) + m
-/// g l (1 - cos be) and Omega^2 = V''/(m l^2). For a hub so heavy that w is constant this is g/(l cos be) - w^2 cos^2
-/// be.
+/// The pendulum of a radial mode on a hub that rotates at w has the angle be at equilibrium: g tan(be) = w^2 (r + l sin
+/// be). Small oscillations about this angle, at constant angular momentum H = J(be) w, have the effective potential V =
+/// H^2/(2 J) + m g l (1 - cos be), where J is the total inertia about the hub's axis, so that Omega^2 = V''/(m l^2). For a
+/// hub so heavy that w is constant, Omega^2 is g/(l cos be) - w^2 cos^2 be.
 #[test]
 fn a_radial_mode_keeps_its_direction_and_swings_at_the_closed_form_frequency() {
     for (hub, shift) in [(0.1, 1.0), (1e6, -1.0)] {

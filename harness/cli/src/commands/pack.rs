@@ -48,8 +48,8 @@ pub struct PackArgs {
     /// Spacecraft has 4 tanks, and its binary is the same for any number.
     #[arg(long, value_name = "NUMBER", conflicts_with_all = ["python", "sdist", "arrays"])]
     tanks: Option<usize>,
-    /// Number of slosh modes per tank whose variables the model description contains. Spacecraft and SloshTank have 3
-    /// modes, HubSlosh has 10; the binary is the same for any number.
+    /// Number of slosh modes per tank whose variables the model description contains. Without this option Spacecraft and
+    /// SloshTank have 3 modes, and HubSlosh has 10. The option changes only the model description, not the binary.
     #[arg(long, value_name = "NUMBER", conflicts_with_all = ["python", "sdist", "arrays"])]
     modes: Option<usize>,
     /// Number of modes of flexible appendages whose variables the model description contains. This option needs --tanks

@@ -89,8 +89,9 @@ pub struct TankArgs {
     #[arg(long, value_name = "NUMBER", conflicts_with = "sweep")]
     spin: Option<f64>,
     /// Computes four coefficients of the first mode from fully nonlinear potential flow in this tank, in about 10 s.
-    /// With these coefficients the pendulum of SloshTank and Spacecraft has the energy of large waves. Without this
-    /// option only spheres and upright cylinders have the coefficients, from tables that cover a range of fills.
+    /// With these coefficients the pendulum of SloshTank and Spacecraft has the same energy as waves of large amplitude.
+    /// Without this option the coefficients come from tables, which exist only for spheres and upright cylinders and for
+    /// a range of fills.
     #[arg(long, conflicts_with = "sweep")]
     large_waves: bool,
     /// Writes the file of --parameters even if the formula for the stiffness by surface tension is used far outside its
