@@ -236,7 +236,8 @@ mod fmi3 {
     /// The crate `fmi`, an importer that is independent of this project, runs the FMI 3.0 FMUs in Co-Simulation; the
     /// harness runs the FMI 2.0 FMUs.
     #[test]
-    fn the_importer_crate_fmi_gets_bit_identical_outputs_from_fmi_3_and_fmi_2_with_and_without_event_mode() {
+    fn the_importer_crate_fmi_gets_bit_identical_outputs_from_both_versions_with_and_without_event_mode()
+     {
         for model in &MODELS {
             let (import, description) = import(model);
             let two = host::fmu::Fmu::open(packed_model_for_tests(model)).unwrap();
