@@ -248,8 +248,9 @@ pub const SIZES: &[crate::Size] = &[
         arrays: &[
             ("appendage[].eta", 0), ("appendage[].eta_dot", 0), ("der(appendage[].eta)", 0),
             ("der(appendage[].eta_dot)", 0), ("appendage[].position", 0),
-            ("appendage[].frequency", 0), ("appendage[].zeta", 0), ("appendage[].participation", 0),
-            ("appendage[].eta_0", 0), ("appendage[].eta_dot_0", 0),
+            ("appendage[].frequency", 0), ("appendage[].zeta", 0),
+            ("appendage[].participation", 0), ("appendage[].eta_0", 0),
+            ("appendage[].eta_dot_0", 0),
         ],
     },
 ];
