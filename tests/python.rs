@@ -60,7 +60,7 @@ fn wheel() -> PathBuf {
     pack::wheel::for_tests(fmus.as_flattened())
 }
 
-/// Runs pytest on harness/python without the files that need no FMU.
+/// Builds the wheel and runs pytest on harness/python, except six files that need no wheel.
 #[test]
 fn the_python_tests_of_the_fmus_with_fmpy_pass() {
     let tests = pack::root().join("harness/python");

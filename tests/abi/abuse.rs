@@ -267,13 +267,13 @@ fn no_calls_break_the_packed_binary_of_hubslosh() {
 
 /// 600 random sequences of calls, with valid and invalid arguments, neither crash the FMU nor make it hang.
 #[test]
-fn random_call_sequences_do_not_crash_the_packed_spacecraft_fmu() {
+fn no_calls_break_the_packed_binary_of_spacecraft() {
     no_calls_break::<Spacecraft::Model>(600);
 }
 
 /// 600 random sequences of calls, with valid and invalid arguments, neither crash the FMU nor make it hang.
 #[test]
-fn random_call_sequences_do_not_crash_the_packed_sloshtank_fmu() {
+fn no_calls_break_the_packed_binary_of_sloshtank() {
     no_calls_break::<SloshTank::Model>(600);
 }
 

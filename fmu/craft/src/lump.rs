@@ -1090,6 +1090,8 @@ mod tests {
         assert_eq!(next(&lump), Some((0.0, Due::Impact)));
     }
 
+    /// The scale that the integrator's tolerance refers to is the sum of the speeds of the liquid relative to the tank, of
+    /// the tank, and of the turning lever.
     #[test]
     fn the_speed_scale_of_detached_liquid_adds_the_speeds_of_all_its_motions() {
         let mut lump = lump(BallState::Flying);

@@ -231,8 +231,10 @@ mod tests {
         }
     }
 
+    /// The craft turns about one axis at the Stribeck speed; the friction torque opposes the rate with the parameters of
+    /// this axis.
     #[test]
-    fn dry_friction_acts_against_each_axis_by_its_own_curve() {
+    fn dry_friction_of_a_pivot_has_its_own_stribeck_curve_about_each_axis() {
         let friction =
             PivotFriction { c: [1.0, 2.0, 4.0], d: [0.5, 0.25, 3.0], omega_s: 0.1, eps: 0.01 };
         let pivot = Pivot { friction, ..Pivot::default() };

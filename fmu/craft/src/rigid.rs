@@ -319,6 +319,7 @@ mod tests {
         assert!(smallest_pivot(&matrix) < 1e-12);
     }
 
+    /// For A = m u u^T the largest eigenvalue of M^-1 A is m u^T M^-1 u.
     #[test]
     fn the_largest_eigenvalue_of_a_rank_one_matrix_is_its_quadratic_form() {
         let own = [[910.0, 14.0, -9.0], [14.0, 860.0, 6.0], [-9.0, 6.0, 640.0]];

@@ -240,6 +240,8 @@ mod tests {
         }
     }
 
+    /// The table over the fill gives modal masses, lengths, hinges and inertias with their derivatives by the mass of
+    /// liquid.
     #[test]
     fn derivatives_equal_finite_differences() {
         let default = crate::Tank::default().fill;
@@ -265,6 +267,8 @@ mod tests {
         }
     }
 
+    /// The points of the table are computed from the formulas of an upright cylinder; between the points the table
+    /// interpolates.
     #[test]
     fn a_fill_table_reproduces_a_cylinder_between_its_points() {
         let (d, r) = (0.9, 0.45);
@@ -288,6 +292,8 @@ mod tests {
         }
     }
 
+    /// Below the first and above the last point of the table, the values are those of the point and their derivatives are
+    /// 0.
     #[test]
     fn beyond_the_ends_of_its_fill_table_a_tank_keeps_the_end_values() {
         let table = FillTable { points: 3, ..crate::Tank::default().fill };

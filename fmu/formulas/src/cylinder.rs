@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn the_table_holds_the_zeros_of_the_bessel_function_s_slope() {
+    fn the_constants_of_cylinder_modes_are_the_zeros_of_the_derivative_of_the_bessel_function_j1() {
         for xi in XI {
             let slope = |x: f64| libm::j0(x) - libm::j1(x) / x;
             assert!(slope(xi * (1.0 - 1e-15)) * slope(xi * (1.0 + 1e-15)) < 0.0, "{xi}");
@@ -181,8 +181,10 @@ mod tests {
         assert!((moment / (m_liq * h / 2.0) - 1.0).abs() < 1e-14);
     }
 
+    /// Cylinders of 2 m diameter, 20 m and 1e6 m deep: modal mass, length, and the hinge's depth below the surface are
+    /// equal.
     #[test]
-    fn a_deep_tank_s_pendulum_hangs_below_the_surface_as_in_any_deep_tank() {
+    fn the_pendulum_of_a_deep_cylinder_does_not_depend_on_the_depth() {
         let [deep, deeper] = [20.0, 1e6].map(|h| (h, pendulum(0, 2.0, h, h)));
         assert!((deep.1.mass / deeper.1.mass - 1.0).abs() < 1e-15);
         assert_eq!(deep.1.length, deeper.1.length);
@@ -190,8 +192,10 @@ mod tests {
         assert!((below[0] - 1.0 / XI[0]).abs() < 1e-14 && (below[1] - 1.0 / XI[0]).abs() < 1e-9);
     }
 
+    /// From length and mass of the first mode the function returns diameter and depth of a cylinder. In deep liquid they do
+    /// not depend on the depth.
     #[test]
-    fn a_fill_that_the_mode_cannot_determine_becomes_a_nearly_deep_tank() {
+    fn a_pendulum_of_a_very_deep_cylinder_is_assigned_a_depth_at_which_tanh_is_0_995() {
         let Pendulum { mass, length, .. } = pendulum(0, 1.0, 5.0, 5000.0);
         let (d, h) = tank_of_first_mode(length, mass, 1000.0);
         assert!((d / 0.995 - 1.0).abs() < 1e-14);

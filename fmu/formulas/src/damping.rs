@@ -422,8 +422,9 @@ mod tests {
         assert!((both / (1.5077 / 1.2557 * sqrt(0.819 / 0.397)) - 1.0).abs() < 1e-12, "{both}");
     }
 
+    /// The fit is a polynomial of fourth order in the depth for a viscosity number of 1.
     #[test]
-    fn the_torus_has_its_fit_and_grows_with_the_root_of_its_number() {
+    fn the_damping_of_a_torus_equals_the_fit_and_grows_with_the_root_of_the_viscosity_number() {
         let full = torus(0.0635, 2.0 * 0.0635, 3.3e-6, 9.81);
         assert!((full * TAU / (1.6629 - 3.7955 + 3.5583 - 1.6759 + 0.3865) - 1.0).abs() < 1e-12);
         assert!((torus_number(0.0635, 3.3e-6, 9.81) - 1.0).abs() < 1e-15);
@@ -487,8 +488,10 @@ mod tests {
         );
     }
 
+    /// The weight falls from 1 at the ends of the measured range of viscosity numbers to 0, as the correlation then gives
+    /// way to wall friction.
     #[test]
-    fn a_correlation_loses_its_weight_outside_its_measurements() {
+    fn a_damping_correlation_gets_weight_0_outside_the_range_of_its_measurements() {
         let (r, g) = (2.0, 9.81);
         let weights = |shape: Shape, unit: f64, numbers: [f64; 6]| {
             let weight = |number: f64| shape.correlation(number * unit, g).unwrap().weight;
@@ -532,7 +535,7 @@ mod tests {
     }
 
     #[test]
-    fn a_depth_outside_the_measurements_becomes_the_nearest_inside() {
+    fn a_damping_correlation_uses_the_nearest_measured_depth() {
         let sphere = |x: f64| Shape::Sphere { radius: 2.0, depth: 2.0 * x };
         let torus = |y: f64| Shape::Torus { tube_radius: 2.0, depth: 4.0 * y };
         for (shape, nearest) in [
@@ -568,6 +571,8 @@ mod tests {
         [factor, low, high]
     }
 
+    /// The damping ratio in units of laminar wall friction, with its lower and upper limits. Limits are ±30 % of the
+    /// correlation where it agrees with 1.45 times wall friction; otherwise they include both estimates.
     #[test]
     fn a_measured_shape_has_its_correlation_and_the_scatter_where_two_estimates_agree() {
         for (factor, low, high) in [
@@ -585,6 +590,7 @@ mod tests {
         is_near([low, high, 1.0], [1.0, 1.95, 1.0]);
     }
 
+    /// In units of laminar wall friction: the ratio without a correlation, or with a correlation of low weight or below 1.
     #[test]
     fn unmeasured_shapes_have_1_45_times_the_laminar_damping() {
         is_near(numbers(&[]), [1.45, 1.0, 1.3 * 1.45]);

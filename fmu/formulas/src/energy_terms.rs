@@ -146,7 +146,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn coefficients_equal_the_table_rows_and_are_continuous() {
+    fn the_large_wave_coefficients_equal_the_rows_of_the_table_and_are_continuous_in_the_fill() {
         for row in ROWS {
             let at = energy_terms(row[0]).unwrap();
             assert_eq!((at.pair, at.next), ([row[2], row[1]], [row[5], row[4]]));
@@ -168,6 +168,8 @@ mod tests {
         assert!(energy_terms(0.7).is_some());
     }
 
+    /// The coefficients from fully nonlinear flow give frequency shifts of planar and circular waves within 0.05 of
+    /// third-order theory, for h/R from 0.4 to 0.7.
     #[test]
     fn frequency_shifts_are_close_to_the_third_order_theory() {
         for i in 0..=30 {

@@ -115,8 +115,9 @@ mod tests {
         (slope, curvature)
     }
 
+    /// Powers up to degree 4 through 2 to 5 points.
     #[test]
-    fn the_polynomial_through_the_points_has_their_derivatives() {
+    fn the_first_and_second_derivatives_of_an_interpolating_polynomial_are_exact() {
         let power = |x: f64, n: i32| {
             libm::pow(x.abs(), f64::from(n)) * if n % 2 == 0 { 1.0 } else { x.signum() }
         };
@@ -135,6 +136,8 @@ mod tests {
         }
     }
 
+    /// Slope and curvature of the interpolant of exp(x) at its points equal the derivatives of the polynomial through the
+    /// five nearest points.
     #[test]
     fn derivatives_of_smooth_data_are_those_through_the_five_nearest_points() {
         let y = X.map(libm::exp);

@@ -234,6 +234,7 @@ pub const LOW_BOND: f64 = 100.0;
 mod tests {
     use super::*;
 
+    /// The output `limited_by` has an integer for each reason why the model is out of range.
     #[test]
     fn limit_reasons_and_their_numbers_are_one_to_one() {
         for (i, reason) in LimitedBy::ALL.into_iter().enumerate() {
@@ -244,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn limits_equal_those_of_the_table() {
+    fn angle_limits_of_a_cylinder_equal_the_table_at_its_rows_and_are_interpolated_between_rows() {
         let third = |fill: f64| {
             let (s, kappa) = third_order::coefficients(fill);
             cylinder(fill, third_order::shifts(s, kappa).map(Some))

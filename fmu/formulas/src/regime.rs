@@ -31,6 +31,7 @@ impl Regime {
 mod tests {
     use super::*;
 
+    /// The output `regime` is linear below a wave height of 0.15 R, transitional up to 0.25 R, and nonlinear above.
     #[test]
     fn regimes_end_at_0_15_and_0_25_of_the_radius() {
         assert_eq!([0.1499, 0.15].map(Regime::from_ratio), [Regime::Linear, Regime::Transitional]);
@@ -41,6 +42,7 @@ mod tests {
         assert_eq!(Regime::from_ratio(f64::NAN), Regime::Nonlinear);
     }
 
+    /// The output `regime` has an integer for each of linear, transitional and nonlinear.
     #[test]
     fn regimes_and_their_numbers_are_one_to_one() {
         for regime in [Regime::Linear, Regime::Transitional, Regime::Nonlinear] {

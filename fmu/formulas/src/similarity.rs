@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn regimes_and_agilities_change_at_their_limits() {
+    fn the_regime_of_a_bond_number_and_the_agility_of_a_slew_change_at_their_limits() {
         let regimes = [1001.0, 1000.0, 31.0, 30.0, 1.1, 1.0].map(|bond| &regime(bond)[..5]);
         assert_eq!(regimes, ["high ", "low g", "low g", "micro", "micro", "capil"]);
         let agilities = [4.9e-5, 5e-5, 5e-4, 5.1e-4].map(agility);

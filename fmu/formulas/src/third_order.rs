@@ -169,8 +169,9 @@ mod tests {
         }
     }
 
+    /// At h/R = 0.831 twice the frequency of mode 1 is the frequency of mode (2,2), at 1.01 of mode (0,2).
     #[test]
-    fn secondary_resonances_are_known_by_their_mode() {
+    fn a_depth_with_a_secondary_resonance_is_reported_with_the_resonant_mode() {
         assert_eq!(secondary_resonance(0.831), Some((2, 2)));
         assert_eq!(secondary_resonance(1.01), Some((0, 2)));
         // In deep liquid 2 omega_1 is 2.5 % above the frequency of (0,2).

@@ -232,6 +232,7 @@ mod tests {
         assert!((along - 0.125).abs() < 0.01 && (across - 0.375).abs() < 0.01, "{along} {across}");
     }
 
+    /// Factors of the two frequencies of each mode in a leaning cylinder, for slopes up to 14.
     #[test]
     fn zero_tilt_changes_nothing_and_no_frequency_is_negative() {
         assert_eq!(factors(0, 1.0, 0.0), [1.0; 2]);

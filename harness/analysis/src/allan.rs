@@ -220,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn the_variance_of_a_simulated_bias_is_the_formula() {
+    fn the_allan_variance_of_a_simulated_gauss_markov_bias_equals_the_formula() {
         // 1e6 samples, 50 to a correlation time: 2e4 correlation times
         let (mut random, mut bias) = (Random::new(2, 0), 0.0);
         let keep = (-1.0 / 50.0f64).exp();

@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn a_band_without_rise_or_that_ends_too_early_has_no_features() {
+    fn no_resonance_is_reported_in_a_band_without_one_or_that_ends_below_it() {
         let hub = Linear { inertia: 0.4, friction: 0.04, arm: 0.2, ..Linear::default() };
         let grid = logarithmic_grid(BAND, 2000);
         assert_eq!(Features::find(&hub.frequency_response(&grid)), Features::default());

@@ -213,7 +213,7 @@ mod tests {
     use crate::random::Random;
 
     #[test]
-    fn a_long_record_with_uneven_rows_takes_one_transform() {
+    fn a_free_decay_of_100000_uneven_rows_is_fitted_with_a_single_fourier_transform() {
         // 100,000 rows of 0.6 to 1.4 times the mean step: the search at every frequency took minutes
         let mut random = Random::new(5, 0);
         let mut time = vec![0.0];
@@ -228,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn four_periods_are_too_few_and_a_constant_is_no_oscillation() {
+    fn a_free_decay_needs_more_than_four_periods_and_an_oscillation() {
         let time: Vec<f64> = (0..200).map(|k| 0.02 * f64::from(k)).collect();
         let signal: Vec<f64> = time.iter().map(|t| (TAU * t).cos()).collect();
         assert!(Start::fit(&Record { time: &time, signal: &signal }).is_none());

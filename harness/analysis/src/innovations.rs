@@ -160,7 +160,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn white_noise_passes_in_short_records_too() {
+    fn white_noise_passes_the_tests_of_the_residual_in_records_from_40_rows_on() {
         let mut random = crate::random::Random::new(7, 0);
         for rows in [40, 150, 400, 3000] {
             let time: Vec<f64> = (0..rows).map(|k| 0.05 * f64::from(k)).collect();
@@ -173,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn white_noise_passes_and_a_residual_signal_does_not() {
+    fn white_noise_passes_the_tests_of_the_residual_and_noise_plus_a_part_of_the_torque_fails() {
         let mut random = crate::random::Random::new(5, 0);
         let time: Vec<f64> = (0..50_000).map(|k| 0.02 * f64::from(k)).collect();
         let torque: Vec<f64> = time.iter().map(|t| 0.1 * (t * (8.0 + 0.005 * t)).sin()).collect();

@@ -46,6 +46,7 @@ mod tests {
     use crate::demodulation::cycles;
     use crate::sweep::{Law, Sweep};
 
+    /// A lag window of 200 s and segments of 20 s for the sweep from 1.25 to 3.5 Hz in 2700 s.
     #[test]
     fn the_thesis_sweep_has_the_window_lengths_of_the_thesis() {
         for law in [Law::Exponential, Law::Linear] {
@@ -58,6 +59,8 @@ mod tests {
         }
     }
 
+    /// Window lengths for a sweep from 0.01 to 0.3 Hz scale with the mean period; a sweep of 2700 s limits them to half of
+    /// the record.
     #[test]
     fn a_slow_spacecraft_has_longer_windows_and_a_fast_sweep_fewer_cycles() {
         let slow = Sweep { f0: 0.01, f1: 0.3, duration: 40_000.0, ..Sweep::THESIS };

@@ -116,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn the_scatter_over_noises_is_the_stated_deviation() {
+    fn the_scatter_of_the_features_over_24_noise_seeds_equals_the_stated_standard_deviation() {
         // a small one of the thesis's torques, at which the gyro's noise is seen; 24 noises
         let (sweep, torque, rate) = sweep(0.05);
         let near = logarithmic_grid((2.25, 2.6), 300);

@@ -143,6 +143,7 @@ mod tests {
         }
     }
 
+    /// The cross-axis energy fraction of a force on a circle is 0.5, of a force along the tangent 0.
     #[test]
     fn half_of_a_circling_force_is_off_axis_and_none_of_a_tangential_force() {
         let turn = |k: usize| (k as f64 * std::f64::consts::TAU / 1000.0).sin_cos();

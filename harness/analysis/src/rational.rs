@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn a_response_that_is_no_transfer_function_does_not_fit() {
+    fn independent_noise_as_input_and_output_does_not_fit_a_transfer_function() {
         let mut random = crate::random::Random::new(7, 0);
         let mut noise = || (0..4000).map(|_| random.normal()).collect::<Vec<_>>();
         let (u, y) = (noise(), noise());

@@ -299,7 +299,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sum_of_neighbours_is_correlated_by_one_half() {
+    fn the_autocorrelation_of_sums_of_adjacent_white_samples_is_one_half_at_lag_1() {
         let mut random = Random::new(2, 0);
         let white: Vec<f64> = (0..50_001).map(|_| random.normal()).collect();
         let sums: Vec<f64> = white.windows(2).map(|x| x[0] + x[1]).collect();

@@ -117,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn angles_in_time_have_the_swirl_number_of_their_ellipse() {
+    fn the_swirl_number_of_an_elliptic_motion_follows_from_its_axes() {
         let step = 0.02;
         let run = |a: f64, b: f64| {
             let phase = |i: usize| 2.0 * PI * 2.3 * step * i as f64;

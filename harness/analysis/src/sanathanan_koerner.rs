@@ -92,7 +92,7 @@ mod tests {
     use signals::fourier::Complex64;
 
     #[test]
-    fn a_transfer_function_is_found_in_its_own_spectra_beside_a_transient() {
+    fn a_transfer_function_is_recovered_from_spectra_that_contain_a_transient() {
         let plant = Coefficients { numerator: [0.4, 0.02, 0.35], denominator: [0.31, 1.1, 0.25] };
         let lines = |transient: f64| -> Vec<Line> {
             let line = |k: i32| {

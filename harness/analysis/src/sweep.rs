@@ -90,6 +90,7 @@ mod tests {
 
     const LAWS: [Law; 2] = [Law::Exponential, Law::Linear];
 
+    /// 5900 cycles of the exponential and 6412.5 cycles of the linear sweep from 1.25 to 3.5 Hz in 2700 s.
     #[test]
     fn the_sweeps_have_the_cycles_of_the_thesis() {
         // 5900.24 and 6412.5 cycles from 1.25 to 3.5 Hz in 2700 s, by hand from the formulas
@@ -104,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn a_downward_sweep_is_the_upward_one_run_backwards() {
+    fn a_downward_sweep_is_the_time_reversed_upward_sweep() {
         for law in LAWS {
             let sweep = |f0, f1| Sweep { f0, f1, duration: 100.0, law, ..Sweep::THESIS };
             let (up, down) = (sweep(1.25, 3.5), sweep(3.5, 1.25));

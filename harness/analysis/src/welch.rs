@@ -178,6 +178,8 @@ mod tests {
         assert!((mean - 20.0).abs() < 1.5, "{mean}");
     }
 
+    /// Two sweeps with unrelated phases: with a single segment of 267 s their coherence is high, with segments of 20 s it
+    /// is low.
     #[test]
     fn a_sweep_and_independent_noise_seem_coherent_only_with_too_few_segments() {
         // 1 to 2 Hz at the thesis's rate: six segments of 20 s see each frequency, or one of 267 s

@@ -331,6 +331,8 @@ mod tests {
         }
     }
 
+    /// `hubslosh scale bond`: an oxygen tank that is computed from the Bond number of the bench with water has this Bond
+    /// number.
     #[test]
     fn the_equivalent_tank_has_the_bench_s_bond_number() {
         let same = WATER.bond(9.81, BENCH.0);

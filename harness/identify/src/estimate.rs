@@ -58,7 +58,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_end_that_is_open_is_null_in_json() {
+    fn an_open_end_of_an_interval_is_null_in_json() {
         let open =
             Estimated { interval: [0.02, f64::INFINITY], ..Estimated::normal(0.1, 0.2, "rad/s") };
         let json = serde_json::to_value(&open).unwrap();

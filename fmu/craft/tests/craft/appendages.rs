@@ -46,8 +46,10 @@ fn difference(f: impl Fn(f64) -> f64, step: f64) -> f64 {
     (8.0 * (p1 - m1) - (p2 - m2)) / (12.0 * step)
 }
 
+/// Random craft with appendages: eta'' + 2 zeta omega eta' + omega^2 eta equals minus the participation vector times the
+/// acceleration of the craft.
 #[test]
-fn each_mode_follows_lagranges_equation() {
+fn each_appendage_mode_follows_lagranges_equation() {
     for seed in 0..50 {
         let mut random = Random::new(seed);
         let mut p = Parameters { tanks: 0, ..random.parameters() };
@@ -362,6 +364,7 @@ fn errors_stay_within_the_solver_tolerance_with_appendages() {
     }
 }
 
+/// A participation whose square exceeds the craft's mass would leave a negative mass in the reduced mass matrix.
 #[test]
 fn appendages_heavier_than_the_craft_and_excessive_deflections_are_refused() {
     let mut p = Parameters { appendages: 1, ..Parameters::default() };

@@ -187,6 +187,8 @@ fn bounces_are_a_geometric_series_that_ends_at_rest() {
     assert!((out.tank[0].force[2] - m * -a).abs() < 1e-9);
 }
 
+/// Thrust is reversed for 3 s, so that the liquid leaves the bottom; after the thrust has its first direction again, the
+/// liquid settles and energy was dissipated.
 #[test]
 fn thrust_that_returns_turns_detached_liquid_into_a_pendulum_again() {
     let p = craft();
@@ -405,8 +407,9 @@ fn detached_liquid_under_two_hundred_random_thrusts_moves_the_same_with_every_co
     move_alike(0..200);
 }
 
+/// The thrust always presses the liquid to the bottom; two craft run with `ball.travel` 0 and 0.6 m.
 #[test]
-fn allowing_detached_liquid_changes_no_bit_while_the_liquid_stays() {
+fn a_craft_that_allows_detached_liquid_moves_bit_identically_while_the_liquid_stays_at_the_bottom() {
     let forward = Inputs { torque: Ramp::held([3.0, -2.0, 1.0]), ..thrust(700.0) };
     let mut p = Parameters::default();
     let mut without = Spacecraft::new(&p, &forward, 0.0, 1e-7).unwrap();
@@ -558,6 +561,8 @@ fn loose(random: &mut Random, slides: [bool; 2]) -> (Parameters, Spacecraft) {
 
 const CASES: [[bool; 2]; 3] = [[false, false], [false, true], [true, true]];
 
+/// Detached liquid is a point mass that flies or slides along the wall. The rates equal those of Newton's law for craft and
+/// liquid, solved with the wall's force as an additional unknown.
 #[test]
 fn rates_equal_newtons_law_with_the_walls_force_as_an_unknown() {
     for seed in 0..12 {
@@ -711,6 +716,8 @@ impl Simulator {
     }
 }
 
+/// A second program, with its own equations and its own search for impacts, simulates random craft with detached liquid;
+/// motions and times of impacts agree.
 #[test]
 fn an_independent_simulator_has_the_same_flight_and_the_same_impacts() {
     for seed in 0..5 {

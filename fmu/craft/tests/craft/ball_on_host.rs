@@ -497,6 +497,8 @@ const BALL: usize = 6 * craft::MODES + 2;
 const STATES: [BallState; 4] =
     [BallState::Settled, BallState::Flying, BallState::Sliding, BallState::Light];
 
+/// SloshTank gives a host the force and torque of the liquid, and the bias and the added mass with which the host can solve
+/// for its acceleration.
 #[test]
 fn force_and_torque_of_detached_liquid_equal_bias_minus_added_mass_times_acceleration() {
     for seed in 0..8 {
@@ -513,6 +515,7 @@ fn force_and_torque_of_detached_liquid_equal_bias_minus_added_mass_times_acceler
     }
 }
 
+/// SloshTank with liquid at the bottom, flying and sliding, at random states and inputs.
 #[test]
 fn directional_derivatives_equal_differences_of_rates_and_outputs() {
     for seed in 0..8 {
@@ -566,8 +569,9 @@ fn directional_derivatives_equal_differences_of_rates_and_outputs() {
     }
 }
 
+/// The tank is saved before each of 40 steps, in which the liquid detaches, hits walls and settles.
 #[test]
-fn a_saved_state_continues_bit_for_bit_and_a_refused_step_changes_none() {
+fn a_saved_tank_with_detached_liquid_continues_bit_for_bit_and_a_refused_step_changes_no_state() {
     let p = one(&mut Random::new(3));
     let u = TankInputs { a: Ramp::held([0.05, 0.0, -0.3]), ..TankInputs::default() };
     let mut tank = SloshTank::new(&alone(&p), &u, 0.0, 1e-8).unwrap();
@@ -592,8 +596,9 @@ fn a_saved_state_continues_bit_for_bit_and_a_refused_step_changes_none() {
     }
 }
 
+/// The specific force of the host always presses the liquid to the bottom; two tanks run with `ball.travel` 0 and 0.6 m.
 #[test]
-fn allowing_detached_liquid_changes_no_bit_while_the_liquid_stays() {
+fn a_tank_that_allows_detached_liquid_moves_bit_identically_while_the_liquid_stays_at_the_bottom() {
     let u = TankInputs {
         a: Ramp { value: [0.3, -0.2, 9.0], slope: [0.1, 0.0, 0.0] },
         omega: [0.02, 0.1, 0.05],
@@ -617,8 +622,9 @@ fn allowing_detached_liquid_changes_no_bit_while_the_liquid_stays() {
     assert_ne!(with, without);
 }
 
+/// SloshTank with `ball.travel` above 0 needs `host.*` and the split coupling.
 #[test]
-fn inputs_that_detached_liquid_needs_from_a_host_are_required() {
+fn detached_liquid_on_a_host_is_refused_without_the_hosts_mass_properties() {
     let p = alone(&one(&mut Random::new(0)));
     let said = |change: fn(&mut TankParameters)| {
         let mut p = p;

@@ -796,6 +796,8 @@ impl Equations for OnHost<'_> {
     }
 }
 
+/// A Model Exchange host with steps of up to 5 ms integrates SloshTank with detached liquid; its end state agrees with an
+/// independent simulator.
 #[test]
 fn hosts_of_a_slosh_tank_find_impacts_after_bounces_shorter_than_their_steps() {
     let method = Method { tolerance: 1e-9, longest: 5e-3, locates: true };

@@ -469,6 +469,8 @@ fn assert_close(got: &[f64], want: &[f64], size: f64, tolerance: f64, what: &str
 // Both solve a system whose condition is some 1e3: rounding leaves 1e-13 to 1e-12.
 const ROUNDING: f64 = 1e-11;
 
+/// 300 random craft: Newton's law for the craft and each slosh mass is solved with the forces in the pendulums' rods as
+/// unknowns.
 #[test]
 fn accelerations_forces_and_torques_follow_newtons_law_with_the_rod_forces_as_unknowns() {
     for seed in 0..300 {
@@ -639,6 +641,8 @@ fn acceleration(u: &TankInputs) -> DVector<f64> {
     DVector::from_iterator(6, u.a.value.iter().chain(&u.omega_dot.value).copied())
 }
 
+/// SloshTank, with random liquid and each coupling, gives a host the force and torque of the liquid, and the bias and added
+/// mass with which the host can solve for its acceleration.
 #[test]
 fn force_and_torque_equal_bias_minus_added_mass_times_acceleration() {
     for coupling in Coupling::ALL {

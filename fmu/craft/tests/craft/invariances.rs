@@ -82,8 +82,10 @@ fn assert_same_attitude(got: &[f64], want: &[f64]) {
     assert_same(&turned, &want[..4], "attitude");
 }
 
+/// The body's origin O is moved by a random vector, and all positions of parts are changed to match; the motion in space is
+/// equal.
 #[test]
-fn the_reference_point_does_not_matter() {
+fn a_craft_moves_alike_for_any_reference_point_of_its_positions() {
     for seed in 0..8 {
         let (mut random, p, knots) = random_craft(seed);
         let want = run(&p, &knots);
@@ -116,8 +118,9 @@ fn the_reference_point_does_not_matter() {
     }
 }
 
+/// The body axes are turned at random, and all parameters and inputs are changed to match; the motion in space is equal.
 #[test]
-fn the_body_frame_does_not_matter() {
+fn a_craft_moves_alike_for_any_orientation_of_its_body_axes() {
     for seed in 0..8 {
         let (mut random, p, knots) = random_craft(seed);
         let want = run(&p, &knots);
@@ -155,8 +158,9 @@ fn the_body_frame_does_not_matter() {
     }
 }
 
+/// Initial attitude, position and velocity are turned at random; the motion is turned in the same way.
 #[test]
-fn the_inertial_frame_does_not_matter() {
+fn a_craft_moves_alike_in_any_inertial_frame() {
     for seed in 0..8 {
         let (mut random, p, knots) = random_craft(seed);
         let want = run(&p, &knots);
@@ -176,8 +180,9 @@ fn the_inertial_frame_does_not_matter() {
     }
 }
 
+/// Random craft with four tanks.
 #[test]
-fn the_order_of_the_tanks_does_not_matter() {
+fn reversing_the_order_of_the_tanks_does_not_change_the_motion() {
     for seed in 0..8 {
         let (_, mut p, knots) = random_craft(seed);
         p.tanks = TANKS;
@@ -193,8 +198,9 @@ fn the_order_of_the_tanks_does_not_matter() {
     }
 }
 
+/// Each tank has one mode, or two modes with half of the mass and the same length, hinge and damping.
 #[test]
-fn two_equal_half_bobs_move_as_one_bob() {
+fn a_slosh_mass_split_into_two_equal_pendulums_moves_as_one_pendulum() {
     for seed in 0..8 {
         let (_, mut p, knots) = random_craft(seed);
         for tank in &mut p.tank {

@@ -495,8 +495,9 @@ fn constraints_are_kept_to_rounding() {
     }
 }
 
+/// 500 steps of a random craft in which each mode has a direction.
 #[test]
-fn bobs_of_planar_modes_stay_in_their_planes_to_rounding() {
+fn slosh_masses_of_planar_modes_stay_in_their_planes_within_rounding() {
     let mut random = Random::new(1);
     let (mut p, u) = (random.parameters(), random.inputs());
     random.make_all_planar(&mut p);
@@ -517,8 +518,9 @@ fn bobs_of_planar_modes_stay_in_their_planes_to_rounding() {
     }
 }
 
+/// The craft has one tank with one mode; the states of all other modes keep their values although one has an initial rate.
 #[test]
-fn bobs_that_are_not_used_stay_at_rest() {
+fn slosh_masses_of_unused_modes_and_tanks_stay_at_rest() {
     let mut p = Parameters::default();
     p.tank[0].p_dot_0[1] = [1.0, 0.0, 0.0];
     let u = Inputs { force: Ramp::held([10.0, 0.0, 2000.0]), ..Inputs::default() };
@@ -535,6 +537,7 @@ fn bobs_that_are_not_used_stay_at_rest() {
     assert_eq!(out.mass, 1180.0 + 253.493 + 128.211);
 }
 
+/// Spacecraft with four tanks, and SloshTank with planar and other modes, take 100 steps without allocating memory.
 #[test]
 fn nothing_is_allocated_while_stepping() {
     let record = record("four_tanks");
@@ -564,6 +567,8 @@ fn nothing_is_allocated_while_stepping() {
     assert_eq!(counted.count_total, 0);
 }
 
+/// A tank without a fill table keeps its mass under an outflow; with a table, an outflow that empties the tank below the
+/// table is refused.
 #[test]
 fn an_impossible_outflow_is_refused() {
     let (mut p, mut u) = (Parameters::default(), Inputs::default());
@@ -653,8 +658,9 @@ fn a_tank_goes_on_from_a_saved_state_bit_for_bit() {
     assert_eq!(run(&mut tank), first);
 }
 
+/// One step of 2 s and 100 steps of 20 ms of a swinging tank.
 #[test]
-fn dissipated_energy_adds_up_over_steps_of_any_length() {
+fn the_dissipated_energy_of_a_long_step_is_the_sum_over_short_steps() {
     let (mut long, inputs) = swinging_tank();
     let mut short = long.clone();
     long.step(&inputs, 2.0).unwrap();

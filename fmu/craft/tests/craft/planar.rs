@@ -135,8 +135,10 @@ fn a_box_at_rest_under_gravity_has_two_frequencies() {
     }
 }
 
+/// For example `diameter`, `fill.points` or `ball.travel` together with `direction` or `dI_y`; the error names both
+/// parameters.
 #[test]
-fn options_of_axisymmetric_tanks_are_refused_with_asymmetric_ones_by_both_names() {
+fn options_of_axisymmetric_tanks_are_refused_together_with_options_of_asymmetric_tanks() {
     type Change = fn(&mut Tank);
     let axial: [(&str, Change); 3] = [
         ("diameter", |tank| tank.diameter = 0.9),

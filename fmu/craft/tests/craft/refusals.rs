@@ -64,6 +64,7 @@ fn said(p: &Parameters, (name, place, ..): &Number, value: f64) -> Option<String
     problems.into_iter().find(|text| text.starts_with(&format!("{name} = ")))
 }
 
+/// Each parameter of Spacecraft is set to its minimum, its maximum and a value beyond.
 #[test]
 fn parameters_are_accepted_up_to_the_ends_of_their_ranges_and_refused_beyond() {
     let cylinder = {
@@ -121,6 +122,7 @@ fn directions_need_a_length_above_a_millionth() {
     assert_eq!([with(1.001e-6), with(0.999e-6)], [0, 2]);
 }
 
+/// A craft on a pivot cannot have a velocity at the start, a free craft can.
 #[test]
 fn an_initial_velocity_is_refused_only_on_a_pivot() {
     let mut p = craft();
@@ -211,6 +213,7 @@ fn a_slosh_frequency_must_give_a_pendulum_length() {
     assert_eq!(p.problems(), [""; 0]);
 }
 
+/// The mass of liquid must increase from point to point and must be at least the sum of the modal masses.
 #[test]
 fn a_fill_table_must_rise_and_contain_the_modal_masses() {
     let with = |change: fn(&mut Tank)| {

@@ -173,8 +173,9 @@ fn angles_at_which_the_inertia_vanishes_are_refused() {
     assert!(why.contains("tank[2].nonlinear_inertia[1] = -6.0") && why.contains(&bound), "{why}");
 }
 
+/// `nonlinear_inertia` and `nonlinear_stiffness` (s and kappa); the error names tank and mode.
 #[test]
-fn coefficients_out_of_range_and_with_detached_liquid_are_refused_by_their_names() {
+fn large_wave_coefficients_are_refused_out_of_range_and_with_detached_liquid() {
     let mut p = Parameters { tanks: 2, ..Parameters::default() };
     p.tank[1].nonlinear_inertia[0] = f64::NAN;
     p.tank[1].nonlinear_stiffness[0] = 2e3;
@@ -436,6 +437,7 @@ fn angles_at_which_the_inertia_of_rotary_motion_vanishes_are_refused() {
     assert_eq!(TankParameters { tank, ..TankParameters::default() }.problems(), [""; 0]);
 }
 
+/// For example `rotary_inertia` of a mode that has a direction; the error names both parameters.
 #[test]
 fn coefficients_beyond_the_third_order_are_refused_with_planar_modes_and_fill_tables() {
     let mut p = TankParameters::default();
@@ -540,8 +542,10 @@ fn a_bound_that_reaches_the_bob_while_the_tank_drains_is_refused() {
     assert!(said.len() == 1 && said[0].contains("exceeds 16.1 degrees"), "{said:?}");
 }
 
+/// A draining tank uses `fill.nonlinear_inertia` and `fill.nonlinear_stiffness`; values out of range are refused with the
+/// index of the table's point.
 #[test]
-fn s_and_kappa_of_a_fill_table_replace_those_of_the_tank_and_are_checked() {
+fn the_large_wave_coefficients_of_a_fill_table_replace_those_of_the_tank_and_are_checked() {
     let mut p = Parameters { tanks: 1, ..Parameters::default() };
     let tank = &mut p.tank[0];
     tank.fill.points = 3;

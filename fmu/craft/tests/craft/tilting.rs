@@ -260,6 +260,7 @@ fn a_platform_under_an_oscillating_torque_follows_stribecks_law() {
     assert!(most > 0.05, "it has to slide past w_s: {most}");
 }
 
+/// With the mount `free`, stiffness and damping of the pivot change no bit of the motion.
 #[test]
 fn pivot_parameters_do_not_change_a_free_craft() {
     let run = |pivot: Pivot| {

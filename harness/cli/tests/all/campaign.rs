@@ -48,6 +48,8 @@ fn with_viscous_friction_the_antiresonance_equals_that_of_the_exact_transfer_fun
     }
 }
 
+/// Two campaigns with the same plan run in one directory. The second simulates nothing, and the tables begin with the
+/// documented columns.
 #[test]
 fn campaign_files_keep_their_names_and_columns_and_are_reused() {
     let directory = tempfile::tempdir().unwrap();
@@ -92,6 +94,8 @@ fn campaign_files_keep_their_names_and_columns_and_are_reused() {
     assert!(String::from_utf8_lossy(&campaign(directory, &other).stdout).contains("0 reused"));
 }
 
+/// A campaign has a run with an empty tank, which the FMU refuses, and a run at 0.1 m; the command fails after the second
+/// run is stored.
 #[test]
 fn a_failed_run_is_named_and_the_other_runs_are_completed() {
     let directory = tempfile::tempdir().unwrap();
@@ -109,6 +113,8 @@ fn a_failed_run_is_named_and_the_other_runs_are_completed() {
     assert!(page.contains("linear_0mm_100"));
 }
 
+/// Without --out, campaigns with different flags are written to directories with different default names. A directory that
+/// holds the campaign of another plan is not overwritten.
 #[test]
 fn other_flags_get_a_directory_of_their_own_and_another_plan_is_not_overwritten() {
     let directory = tempfile::tempdir().unwrap();
@@ -145,8 +151,9 @@ fn other_flags_get_a_directory_of_their_own_and_another_plan_is_not_overwritten(
     assert!(done && error.contains("held the campaign of another plan"), "{error}");
 }
 
+/// The plan has a wave gauge and a force sensor; a second campaign with the same plan simulates nothing.
 #[test]
-fn the_runs_of_a_plan_with_sensors_have_their_readings_and_are_reused() {
+fn runs_of_a_plan_with_sensors_contain_the_readings_and_are_reused() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let plan = "profile = \"sine:duration=2\"\n[vary]\nprofile.amplitude = [0.05, 0.1]\n\
@@ -216,6 +223,8 @@ fn the_runs_of_a_plan_with_sensors_have_their_readings_and_are_reused() {
     }
 }
 
+/// At an axial acceleration of 0.1 m/s² the Bond number of the bench is 9.2, so that surface tension matters: the table of
+/// runs has the number, and the command prints a warning.
 #[test]
 fn a_weightless_liquid_is_reported_in_the_tables_and_at_the_end() {
     let directory = tempfile::tempdir().unwrap();

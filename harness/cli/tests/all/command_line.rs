@@ -68,6 +68,7 @@ fn edited_fmu(directory: &Path, edit: impl Fn(String) -> Option<String>) -> Path
     path
 }
 
+/// `hubslosh run --columns theta,omega,stuck` writes a CSV file with the time and these three columns.
 #[test]
 fn a_run_writes_the_requested_columns() {
     let directory = tempfile::tempdir().unwrap();
@@ -146,6 +147,7 @@ fn a_value_of_the_wrong_kind_is_refused() {
     }
 }
 
+/// A depth of 0, a negative depth and NaN: the command fails with the FMU's message, which names tank.h.
 #[test]
 fn a_tank_without_liquid_is_refused_in_the_fmus_own_words() {
     let directory = tempfile::tempdir().unwrap();
@@ -159,6 +161,8 @@ fn a_tank_without_liquid_is_refused_in_the_fmus_own_words() {
     }
 }
 
+/// A run of 5e13 steps, and other requests for more data than any memory holds, fail at once with the number of steps that
+/// was asked for.
 #[test]
 fn runs_beyond_any_memory_are_refused() {
     let directory = tempfile::tempdir().unwrap();
@@ -186,8 +190,9 @@ fn runs_beyond_any_memory_are_refused() {
     }
 }
 
+/// For example a plan with 9e18 random runs.
 #[test]
-fn a_number_that_no_machine_can_hold_is_refused_before_anything_is_allocated() {
+fn numbers_of_runs_and_steps_that_need_too_much_memory_are_refused_before_allocation() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let fmu = packed_for_tests().to_str().unwrap();
@@ -253,6 +258,8 @@ fn a_number_that_no_machine_can_hold_is_refused_before_anything_is_allocated() {
     assert!(said.contains("100000 runs at once (allowed: 1 to 512)"), "{said}");
 }
 
+/// `hubslosh design` refuses a torque of 0, a torque below the dry friction, a gyro without noise and a record of two rows,
+/// and says what to change.
 #[test]
 fn an_experiment_without_information_is_refused() {
     let directory = tempfile::tempdir().unwrap();
@@ -272,6 +279,7 @@ fn an_experiment_without_information_is_refused() {
     assert!(said.contains("cannot be used with '--duration"), "{said}");
 }
 
+/// At 0.1 m/s² the FMU warns of a low Bond number; `hubslosh run` prints the warning, and prints none at normal gravity.
 #[test]
 fn warnings_of_the_fmu_are_printed() {
     let directory = tempfile::tempdir().unwrap();
@@ -285,6 +293,7 @@ fn warnings_of_the_fmu_are_printed() {
     assert_eq!(said(&["--profile", "zero"]), "");
 }
 
+/// A CSV file with two columns tau_cmd, an output listed twice, and two options that name one output file are refused.
 #[test]
 fn a_parameter_or_output_given_twice_is_refused() {
     let directory = tempfile::tempdir().unwrap();
@@ -300,8 +309,9 @@ fn a_parameter_or_output_given_twice_is_refused() {
     refuses(directory, same, &["t.toml is the file of two outputs"]);
 }
 
+/// The file has the columns time and torque, and HubSlosh has no input torque.
 #[test]
-fn a_torque_file_without_the_columns_names_those_missing_and_those_there() {
+fn a_torque_file_without_a_column_of_an_input_is_refused_and_the_message_lists_its_columns() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     std::fs::write(directory.join("in.csv"), "time,torque\n0,1\n1,1\n").unwrap();
@@ -360,6 +370,8 @@ fn files_that_cannot_be_read_or_written_are_named() {
     }
 }
 
+/// The GUID, and then other parts, of modelDescription.xml are edited in an FMU; `hubslosh run` fails with a message that
+/// names the difference.
 #[test]
 fn an_fmu_whose_description_and_binary_do_not_belong_together_is_refused() {
     let directory = tempfile::tempdir().unwrap();
@@ -385,8 +397,9 @@ fn an_fmu_whose_description_and_binary_do_not_belong_together_is_refused() {
     refuses(directory, run, &["Edited.fmu", "modelDescription.xml"]);
 }
 
+/// book/scaling.md shows commands, each followed by its output; the test runs the commands.
 #[test]
-fn the_scaling_page_shows_what_its_commands_print() {
+fn the_output_of_each_command_on_the_scaling_page_equals_the_printed_output() {
     let page = pack::root().join("book/scaling.md");
     let page = std::fs::read_to_string(page).unwrap();
     let mut commands = 0;
@@ -405,8 +418,10 @@ fn the_scaling_page_shows_what_its_commands_print() {
     assert_eq!(commands, 4);
 }
 
+/// `hubslosh run --input` gets files with the columns tau_ext and g_axial, and a file with a column that is no input of the
+/// FMU.
 #[test]
-fn every_column_that_is_an_input_drives_and_others_are_refused_by_name() {
+fn every_column_named_after_an_input_drives_this_input_and_other_columns_are_refused() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let run = |text: &str, more: &[&str]| {
@@ -451,6 +466,8 @@ fn every_column_that_is_an_input_drives_and_others_are_refused_by_name() {
     );
 }
 
+/// With `--out -` the table is written to stdout and no file is written. If the reader closes the pipe, the program ends
+/// without an error message.
 #[test]
 fn a_table_goes_to_stdout_and_a_closed_pipe_ends_the_program_quietly() {
     let directory = tempfile::tempdir().unwrap();
@@ -507,6 +524,7 @@ fn shells_get_completions_with_every_command() {
     }
 }
 
+/// The exit code is 1 if a command fails, 2 if the command line is wrong, and 0 for --help.
 #[test]
 fn exit_codes_tell_a_failure_from_a_wrong_command_line() {
     for (arguments, code) in [
@@ -518,8 +536,9 @@ fn exit_codes_tell_a_failure_from_a_wrong_command_line() {
     }
 }
 
+/// `tank.h=50mm` gives the bytes of the output of `tank.h=0.05`.
 #[test]
-fn a_number_with_its_unit_is_the_number_in_si() {
+fn a_parameter_given_with_a_unit_has_the_same_effect_as_its_si_value() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let answer = |sets: [&str; 2]| {
@@ -553,6 +572,7 @@ fn messages_are_coloured_on_request_and_not_by_default_in_files() {
     assert!(String::from_utf8(wrong.stderr).unwrap().contains("\u{1b}[31merror:"));
 }
 
+/// --quiet suppresses only progress and summaries. With --strict a warning of the FMU makes the command fail.
 #[test]
 fn quiet_leaves_results_and_warnings_and_strict_makes_warnings_fail() {
     let directory = tempfile::tempdir().unwrap();
@@ -609,6 +629,8 @@ fn every_command_that_prints_a_table_also_prints_json() {
     assert!(json(&gyro)["B, rad/s"]["specified"].is_f64());
 }
 
+/// The command is copied to bin/ and an FMU to the folder of the Python package; `hubslosh run` without --fmu, started in
+/// another directory, finds the FMU.
 #[test]
 fn an_installed_command_finds_the_fmus_that_came_with_it() {
     let directory = tempfile::tempdir().unwrap();
@@ -658,8 +680,10 @@ fn without_arguments_an_installed_command_prints_help_and_writes_nothing() {
     assert!(files(directory.path()).is_empty());
 }
 
+/// FMUs, Parquet, JSON, SSV and CSV files are truncated or contain text; the messages contain no terms of the libraries
+/// that read them.
 #[test]
-fn damaged_files_are_refused_in_words_of_users() {
+fn damaged_input_files_are_refused_in_words_for_users() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let whole = std::fs::read(packed_for_tests()).unwrap();
@@ -713,8 +737,10 @@ fn damaged_files_are_refused_in_words_of_users() {
     }
 }
 
+/// `hubslosh review plan.toml --python PROGRAM` runs PROGRAM with `-m hubslosh.project plan.toml`, and fails if the program
+/// does not exist.
 #[test]
-fn a_review_is_made_by_the_python_package() {
+fn hubslosh_review_starts_the_python_package() {
     let directory = tempfile::tempdir().unwrap();
     let review =
         |python: &str| hubslosh(directory.path(), &["review", "plan.toml", "--python", python]);

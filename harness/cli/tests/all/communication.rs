@@ -74,8 +74,10 @@ fn write(directory: &Path, rows: impl Iterator<Item = (f64, f64)>) {
     std::fs::write(directory.join("in.csv"), format!("time,tau_cmd\n{}", rows.concat())).unwrap();
 }
 
+/// The file has rows 5 ms apart, with a pulse of 30 ms every 0.25 s; lines join the rows. The hub's momentum follows the
+/// integral of the torque for every output step.
 #[test]
-fn pulses_in_a_file_have_their_impulse_with_any_step() {
+fn a_torque_file_has_the_same_impulse_with_any_output_step() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     // 30 ms of 1 N·m every 0.25 s on rows 5 ms apart; lines make ramps of a row at both ends
@@ -125,8 +127,10 @@ fn a_sine_of_49_hz_in_a_file_acts_with_any_step() {
     follows(folder.path(), &["--input", "in.csv"], &integral, 0.02 / w);
 }
 
+/// Sines from 24.9 to 333 Hz and a pulse of 10 ms; the hub's momentum follows the integral of the torque, also if output
+/// steps are longer than a period.
 #[test]
-fn profiles_act_the_same_with_any_output_step() {
+fn a_profile_has_the_same_impulse_with_any_output_step() {
     let folder = tempfile::tempdir().unwrap();
     let follows = |profile: &str, integral: &dyn Fn(f64) -> f64, within: f64| {
         follows(folder.path(), &["--profile", profile], integral, within);
@@ -186,8 +190,9 @@ fn the_option_sample_only_changes_the_interval_between_commands() {
     assert!(said.contains("reaches 30 Hz") && said.contains("below 1.667e-2 s"), "{said}");
 }
 
+/// The table that `hubslosh torque` writes has the impulse of the profile for steps that do not meet the edges.
 #[test]
-fn torque_writes_every_edge_and_command() {
+fn hubslosh_torque_writes_a_row_for_each_edge_of_a_profile() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let impulse = |profile: &str, step: &str| {
@@ -257,6 +262,8 @@ fn a_campaign_follows_its_torque_or_names_the_step_that_it_needs() {
     }
 }
 
+/// `hubslosh design` predicts from rows at the output step, so it refuses a sine of 50 Hz, pulses shorter than a row, and
+/// files with such pulses.
 #[test]
 fn design_refuses_a_profile_that_changes_too_fast_for_its_rows() {
     let folder = tempfile::tempdir().unwrap();

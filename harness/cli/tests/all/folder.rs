@@ -72,6 +72,8 @@ fn is_consistent(directory: &Path) {
     }
 }
 
+/// A campaign of 50 runs; one bit of each stored run is flipped. The next campaign simulates these runs again and has the
+/// tables of the first.
 #[test]
 fn every_flipped_bit_in_a_stored_run_is_noticed() {
     const RUNS: usize = 50;
@@ -114,8 +116,9 @@ fn every_flipped_bit_in_a_stored_run_is_noticed() {
     }
 }
 
+/// A bit of a stored run is flipped and its line is removed from the manifest; the next campaign simulates the run again.
 #[test]
-fn a_flipped_run_without_its_manifest_is_never_reused() {
+fn a_damaged_run_that_the_manifest_does_not_list_is_never_reused() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let plan = "profile = \"sine:duration=0.2\"\n[vary]\nhub.I = [0.3, 0.31]\n";
@@ -154,6 +157,7 @@ fn a_flipped_run_without_its_manifest_is_never_reused() {
     assert!(published(directory) == before);
 }
 
+/// A campaign has more runs than the report draws curves of; runs.csv has a row for every run.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
 fn a_large_campaign_keeps_the_curves_of_some_runs_and_the_numbers_of_all() {
@@ -184,6 +188,7 @@ fn a_large_campaign_keeps_the_curves_of_some_runs_and_the_numbers_of_all() {
     assert!(all.iter().any(|row| same(row) == same(one)), "{one:?}");
 }
 
+/// While a campaign holds its directory, a second campaign fails and names the plan and the process of the first.
 #[test]
 fn a_second_campaign_in_a_directory_is_refused_with_the_name_of_the_first() {
     let directory = tempfile::tempdir().unwrap();
@@ -208,9 +213,10 @@ const INTERRUPTED: &str = "profile = \"zero\"\n[vary]\nprofile = [\"sine:duratio
     \"exp-sweep:duration=40000,amplitude=0.05\", \"exp-sweep:duration=40000,amplitude=0.06\", \
     \"exp-sweep:duration=40000,amplitude=0.04\", \"exp-sweep:duration=40000,amplitude=0.03\"]\n";
 
+/// SIGTERM, SIGINT and SIGKILL end a campaign in the directory of a completed campaign.
 #[cfg(unix)]
 #[test]
-fn a_stopped_campaign_leaves_what_was_there_and_nothing_temporary() {
+fn a_campaign_ended_by_a_signal_leaves_the_last_results_and_no_temporary_file() {
     use std::os::unix::process::ExitStatusExt;
     use std::process::Stdio;
     for (signal, number) in [("TERM", 15), ("INT", 2), ("KILL", 9)] {
@@ -265,9 +271,10 @@ fn limited(command: &Command, blocks: usize) -> Command {
     shell
 }
 
+/// A limit on file size makes the report of a second campaign fail in the directory of a completed campaign.
 #[cfg(unix)]
 #[test]
-fn a_full_disk_names_the_file_and_leaves_what_was_there() {
+fn a_full_disk_gives_an_error_with_the_file_and_leaves_the_last_results() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     // four runs of 60 s, so that the report is larger than the FMU's binary

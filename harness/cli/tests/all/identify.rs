@@ -39,8 +39,9 @@ fn record(folder: &Path, name: &str, settings: &[&str]) {
     Table::new(names, columns).write(&folder.join(name), &Default::default()).unwrap();
 }
 
+/// A recording with hub.I = 0.5 is fitted; `run --parameters result.json` reproduces its rates.
 #[test]
-fn run_takes_parameters_from_identify() {
+fn hubslosh_run_accepts_the_parameters_that_identify_has_estimated() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     record(folder, "data.csv", &["hub.I=0.5"]);
@@ -62,6 +63,8 @@ fn run_takes_parameters_from_identify() {
     assert!((off / clean.len() as f64).sqrt() < 1e-4, "{off}");
 }
 
+/// `identify --free` and `design --free` run with a single unknown, with an unknown that ends at its bound, and without an
+/// input.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
 fn identify_handles_one_unknown_unknowns_at_bounds_and_no_input() {
@@ -99,6 +102,7 @@ fn printed_json_is_the_only_content_of_stdout() {
     serde_json::from_str::<serde_json::Value>(&said).expect(&said);
 }
 
+/// `identify --out` or `--report` in a folder that does not exist fails before any simulation.
 #[test]
 fn outputs_that_cannot_be_written_are_refused_before_the_search() {
     let folder = tempfile::tempdir().unwrap();
@@ -123,8 +127,9 @@ fn outputs_that_cannot_be_written_are_refused_before_the_search() {
     }
 }
 
+/// A recording without liquid is fitted; `run --parameters friction.json` reproduces its rates.
 #[test]
-fn run_takes_friction_from_identify_friction() {
+fn hubslosh_run_accepts_the_friction_that_identify_friction_has_estimated() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     record(folder, "data.csv", &["fluid.rho=1e-6"]);
@@ -138,6 +143,7 @@ fn run_takes_friction_from_identify_friction() {
     hubslosh(folder, &[&asked[..], &["--out", "twin.csv"]].concat()).unwrap();
 }
 
+/// A multisine with a peak of 0.5 N·m is asked for; the plan has a peak of 0.26 N·m, the wheel's torque limit.
 #[test]
 fn a_designed_multisine_is_within_the_wheels_limits() {
     let folder = tempfile::tempdir().unwrap();
@@ -170,6 +176,7 @@ fn a_designed_multisine_is_within_the_wheels_limits() {
     assert!((0.09..=0.1).contains(&angle), "{limited}");
 }
 
+/// Each option of `identify` that was removed gives an error with the command, option or page that replaces it.
 #[test]
 fn a_removed_option_names_what_replaces_it() {
     let folder = tempfile::tempdir().unwrap();

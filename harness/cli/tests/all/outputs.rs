@@ -37,6 +37,8 @@ const CASES: [&str; 15] = [
     "analyse IN --fmu IN --out OUT",
 ];
 
+/// The output has the path of an input, a hard link, a symbolic link or another spelling of the path. The command fails and
+/// the input keeps its content.
 #[cfg(unix)]
 #[test]
 fn no_output_option_replaces_an_input_under_any_of_its_names() {
@@ -64,6 +66,7 @@ fn no_output_option_replaces_an_input_under_any_of_its_names() {
     }
 }
 
+/// The file tank.toml names drawing.svg as its drawing; `hubslosh tank --picture drawing.svg` does not overwrite this file.
 #[test]
 fn a_file_that_a_plan_or_a_tank_names_is_an_input_too() {
     let directory = tempfile::tempdir().unwrap();
@@ -77,6 +80,7 @@ fn a_file_that_a_plan_or_a_tank_names_is_an_input_too() {
     assert!(said.contains("it is the input"), "{said}");
 }
 
+/// `check --json A.fmu B.fmu` takes A.fmu as the name of its output; the command refuses to replace an existing .fmu file.
 #[test]
 fn an_existing_file_that_looks_like_an_input_is_not_replaced() {
     let directory = tempfile::tempdir().unwrap();
@@ -117,6 +121,7 @@ const INPUTS: &str = "analyse --plan, analyse --bench-day, analyse --fmu, campai
     campaign --compare, design --fmu, example --fmu, gyro --recording, gyro --fmu, identify --fmu, run --input, \
     run --parameters, run --fmu, pack --parameters, variables --fmu, view --parameters, view --fmu, book --theme";
 
+/// Options with FILE or FOLDER in their help must be in one of two lists, so that no output can replace an input.
 #[test]
 fn every_option_that_names_a_file_is_known_as_an_input_or_as_an_output() {
     let source = include_str!("../../src/outputs.rs");
@@ -170,6 +175,7 @@ const CHEAP: [&str; 7] = [
     "hubslosh run --input torque.csv",
 ];
 
+/// The examples at the end of each --help are parsed, and those that take little time are run.
 #[test]
 fn every_example_of_every_help_is_understood_and_the_cheap_ones_run() {
     let directory = tempfile::tempdir().unwrap();
@@ -226,6 +232,7 @@ fn every_help_has_the_commands_own_options_first_and_an_example() {
     }
 }
 
+/// `hubslosh tank --sweep --parameters` writes the damping ratio of SloshTank at each fill of the sweep.
 #[test]
 fn a_draining_tank_gets_the_damping_of_every_fill() {
     let directory = tempfile::tempdir().unwrap();
@@ -259,6 +266,8 @@ fn a_draining_tank_gets_the_damping_of_every_fill() {
     );
 }
 
+/// A named pipe without a writer is given as recording, parameters, plan or tank of each command; the command fails instead
+/// of waiting.
 #[cfg(unix)]
 #[test]
 fn a_named_pipe_is_refused_as_any_input() {
@@ -354,6 +363,7 @@ fn an_output_follows_links_and_is_written_to_a_pipe() {
     }
 }
 
+/// If --columns also lists the input that the profile drives, the table has the input once.
 #[test]
 fn a_driven_input_is_one_column_of_the_table() {
     let directory = tempfile::tempdir().unwrap();
@@ -376,6 +386,7 @@ fn ssv(name: &str, value: &str, units: &str) -> String {
     )
 }
 
+/// Values in an SSV file with a unit, for example mm, are converted to SI; an unknown or a wrong unit is refused.
 #[test]
 fn units_of_a_parameter_set_are_converted_or_refused() {
     let directory = tempfile::tempdir().unwrap();
@@ -451,6 +462,7 @@ fn sweep(times: f64, values: f64) -> String {
     text
 }
 
+/// Times in milliseconds or nanoseconds without a stated unit, dates in the far future, and values of 1e300 are refused.
 #[test]
 fn a_recording_in_another_unit_or_of_absurd_values_is_refused_at_once() {
     let directory = tempfile::tempdir().unwrap();
@@ -470,6 +482,7 @@ fn a_recording_in_another_unit_or_of_absurd_values_is_refused_at_once() {
     }
 }
 
+/// A campaign with a sweep of 1 ns succeeds; the run has no frequency response.
 #[test]
 fn a_sweep_that_is_shorter_than_a_step_ends_without_a_response() {
     let directory = tempfile::tempdir().unwrap();

@@ -47,6 +47,7 @@ const SWEEPS: &str = "title = \"Sweeps\"\n\
     [vary]\nslosh.model = [\"linear\", \"spherical\"]\nhub.I = [0.3, 0.35]\nprofile.amplitude = [0.05, 0.1, 0.2]\n\
     [count]\nimu.seed = 5\n";
 
+/// A campaign is killed after its first run; the next campaign with the same plan reuses this run.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
 fn a_killed_campaign_goes_on_where_it_stopped() {
@@ -86,6 +87,8 @@ fn a_killed_campaign_goes_on_where_it_stopped() {
     }
 }
 
+/// `campaign --list` gives the inputs and parameters of each run; runs that another importer stored from this list give the
+/// tables that the command's own runs give.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
 fn runs_by_another_importer_give_the_same_tables() {
@@ -183,6 +186,7 @@ fn a_stored_run_with_other_parameters_is_simulated_again_with_a_reason() {
     assert!(String::from_utf8_lossy(&done.stdout).contains("1 runs simulated, 0 reused"));
 }
 
+/// The plan has no sweep, so the columns of antiresonance and resonance in runs.csv are empty.
 #[test]
 fn features_that_the_torque_does_not_excite_stay_empty() {
     let directory = tempfile::tempdir().unwrap();
@@ -212,8 +216,9 @@ fn features_that_the_torque_does_not_excite_stay_empty() {
     }
 }
 
+/// A plan varies tank.d from −1 to 0.163 m; the FMU refuses the first value.
 #[test]
-fn a_failed_run_is_a_row_with_its_reason() {
+fn a_failed_run_is_a_row_of_runs_csv_with_the_error() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let plan = "profile = \"sine:duration=1\"\n[vary]\ntank.d = [-1, 0.163]\n";
@@ -243,6 +248,8 @@ fn a_wrong_plan_writes_nothing_and_reports_every_fault() {
     assert!(said.contains("--plan") && said.contains("--fills"), "{said}");
 }
 
+/// The output directory has quotes, spaces and `$(…)` in its name; the report's command, run by a shell, has this name as
+/// one argument.
 #[test]
 fn the_command_in_the_report_is_quoted_for_the_shell() {
     let directory = tempfile::tempdir().unwrap();
@@ -347,8 +354,9 @@ fn the_command_in_the_report_makes_the_same_tables_again() {
     assert!(before.contains("linear_100mm_100"));
 }
 
+/// The table of a pulse has the columns time, tau_cmd and tau_slope.
 #[test]
-fn a_torque_is_written_with_its_slopes() {
+fn hubslosh_torque_writes_the_slope_of_each_row() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let profile = "pulse:amplitude=0.2,start=0.1,width=0.1,duration=0.5";
@@ -371,6 +379,7 @@ fn a_torque_is_written_with_its_slopes() {
     }
 }
 
+/// An FMU lacks one output that the analysis of a campaign needs; its runs are simulated and stored.
 #[test]
 fn an_fmu_that_is_not_the_bench_is_driven_and_stored_without_analysis() {
     // the bench under another name for one output that its analysis needs

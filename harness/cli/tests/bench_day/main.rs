@@ -42,9 +42,10 @@ fn number(row: &HashMap<String, String>, name: &str) -> f64 {
     row[name].parse().unwrap_or_else(|_| panic!("{name} = {:?}", row[name]))
 }
 
+/// Logs of a simulated day at the bench are analysed: gyro, friction, sweeps.
 #[test]
 #[ignore = "a minute of CPU time: .ci/long-tests"]
-fn a_day_of_logs_gives_the_chapters_and_every_number_is_within_its_interval() {
+fn bench_day_reports_every_chapter_and_the_true_values_are_within_the_intervals() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     SHORT.write(folder).unwrap();
@@ -150,7 +151,7 @@ fn a_day_of_logs_gives_the_chapters_and_every_number_is_within_its_interval() {
 }
 
 #[test]
-fn a_chapter_whose_file_is_missing_contains_the_message() {
+fn bench_day_reports_a_missing_log_file_in_its_chapter() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let day = Day {

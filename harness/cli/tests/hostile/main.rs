@@ -369,17 +369,23 @@ fn ends_its_own_process(when: &str) {
     memory_was_enough();
 }
 
+/// FMU binaries that crash, exit, loop or fill the memory while they are loaded end only the process that hubslosh started
+/// for them; each command then prints an error.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
 fn a_binary_that_does_harm_when_loaded_ends_its_own_process_and_every_command_says_so() {
     ends_its_own_process("AT_LOAD");
 }
 
+/// FMU binaries that crash, exit, loop or fill the memory in fmi2DoStep end only the process that hubslosh started for
+/// them; each command then prints an error.
 #[test]
 fn a_binary_that_does_harm_in_a_step_ends_its_own_process_and_every_command_says_so() {
     ends_its_own_process("AT_STEP");
 }
 
+/// A malicious FMU writes into the pipe through which its guarded process reports to hubslosh; the command fails and says
+/// so.
 #[test]
 fn forged_messages_of_an_fmu_are_refused() {
     const FORGE: u32 = 19;
@@ -397,6 +403,7 @@ fn forged_messages_of_an_fmu_are_refused() {
     }
 }
 
+/// An FMU fills temporary files, memfd or mapped memory beyond `--memory 48`; the run ends with an error.
 #[test]
 fn temporary_files_and_shared_memory_count_against_the_budget() {
     const FIRST: u32 = 15;
@@ -410,6 +417,8 @@ fn temporary_files_and_shared_memory_count_against_the_budget() {
     }
 }
 
+/// The binary of an FMU changes the floating-point control word while it is loaded; `hubslosh check` reports a finding and
+/// `hubslosh run` warns.
 #[test]
 fn changes_of_the_process_by_loading_an_fmu_are_reported() {
     const FLUSH: u32 = 13;
@@ -424,8 +433,9 @@ fn changes_of_the_process_by_loading_an_fmu_are_reported() {
     assert!(said.contains("warning: loading a.fmu has changed"), "{said}");
 }
 
+/// fmi2GetReal of the FMU loops; `run --call-limit 0.5` fails after 0.5 s.
 #[test]
-fn a_value_that_is_never_returned_ends_a_run_as_a_step_does() {
+fn a_call_that_reads_a_value_without_end_fails_the_run_at_the_call_limit() {
     const LOOP: u32 = 4;
     let sandbox = Sandbox::new();
     std::fs::write(sandbox.path("a.fmu"), harmful(LOOP, "AT_GET")).unwrap();
@@ -434,6 +444,7 @@ fn a_value_that_is_never_returned_ends_a_run_as_a_step_does() {
     assert!(said.contains("has not returned within 0.5 s"), "{said}");
 }
 
+/// fmi2GetReal of the FMU returns NaN for each output; `run` and `campaign` fail.
 #[test]
 fn a_value_that_is_nan_and_a_run_without_values_are_failures() {
     const NONE: u32 = 14;

@@ -927,6 +927,7 @@ mod tests {
     use super::{Liquid, Range, check_work};
     use crate::profile::Written;
 
+    /// At 1e-9 Hz one analysis window contains all 20 million rows of a run, so that the analysis would take hours.
     #[test]
     fn a_sweep_whose_windows_hold_all_of_a_long_run_is_refused() {
         let work = |profile: &str, step: f64, rows: usize| {

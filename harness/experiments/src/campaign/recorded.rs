@@ -306,6 +306,8 @@ mod tests {
     use super::{Clock, LEAST_CORRELATION, Sought, aligned};
     use analysis::sweep::Sweep;
 
+    /// A recording starts 300 rows before the sweep, or 400 rows after its beginning; the correlation with the sweep gives
+    /// the shift.
     #[test]
     fn a_sweep_is_found_in_a_record_that_begins_before_or_within_it() {
         let sweep = Sweep { duration: 100.0, ..Sweep::THESIS };

@@ -791,8 +791,9 @@ mod tests {
         names(&cases(text)).into_iter().map(String::from).collect()
     }
 
+    /// A plan has two [[run]] tables and two varied parameters, eight cases.
     #[test]
-    fn listed_runs_meet_every_combination_and_the_last_varies_fastest() {
+    fn each_listed_run_is_combined_with_all_varied_values_and_the_last_value_varies_fastest() {
         let text = "profile = \"sine:duration=1\"\n\
             [[run]]\nname = \"near\"\nprofile.frequency = 2.3\n\
             [[run]]\nname = \"far\"\nprofile.frequency = 3\nhub.I = 0.5\n\
@@ -816,8 +817,9 @@ mod tests {
         );
     }
 
+    /// The runs "a b", "A/b" and "a_b" get the files a_b, A_b_2 and a_b_3.
     #[test]
-    fn names_are_unique_on_any_file_system() {
+    fn names_of_runs_become_unique_file_names_on_any_file_system() {
         let text = "profile = \"zero:duration=1\"\n[[run]]\nname = \"a b\"\n[[run]]\nname = \"A/b\"\n[[run]]\nname = \"a_b\"";
         assert_eq!(cases_of(text), ["a_b", "A_b_2", "a_b_3"]);
         let text =
@@ -945,6 +947,7 @@ mod tests {
         }
     }
 
+    /// The third random run of a plan has the same parameters whether the plan has 3 or 9 runs.
     #[test]
     fn a_draw_does_not_depend_on_the_number_of_draws() {
         let (few, many) =
@@ -963,8 +966,9 @@ mod tests {
         assert_eq!(error, expected);
     }
 
+    /// A changed torque file changes the hash, so that the run is simulated again.
     #[test]
-    fn a_torque_file_is_part_of_the_recipe() {
+    fn the_content_of_a_torque_file_is_part_of_the_definition_of_a_run() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("torque.csv");
         let hash = |text: &str| {

@@ -554,6 +554,8 @@ mod tests {
         history.time().iter().map(|t| (*t, history.after(*t).0)).collect()
     }
 
+    /// A profile of two pulses, sampled every 20 ms: the torque history has rows at the edges, so that its impulse is
+    /// exact.
     #[test]
     fn edges_of_a_profile_are_rows_at_their_exact_times() {
         let text = "bang-stop-bang:amplitude=0.1,start=0.1,bang=0.3,stop=0.5,duration=2";
@@ -655,7 +657,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_are_joined_by_lines_or_held() {
+    fn torque_rows_are_interpolated_linearly_or_held() {
         let rows = |held| Torque::rows(&[0.0, 1.0, 3.0], &[0.0, 2.0, 0.0], None, held).unwrap();
         assert_eq!((rows(false).torque_at(0.5), rows(false).torque_at(2.0)), (1.0, 1.0));
         assert_eq!((rows(true).torque_at(0.5), rows(true).torque_at(2.0)), (0.0, 2.0));

@@ -78,7 +78,7 @@ fn in_the_six_axis_examples_the_slosh_angle_reaches_some_degrees() {
 }
 
 #[test]
-fn held_torque_differs_by_no_more_than_the_example_says() {
+fn the_example_replayed_with_held_torque_is_as_close_to_the_reference_as_its_readme_states() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let example = &EXAMPLES[0];
     let input = folder(example).join(example.input());
@@ -92,7 +92,7 @@ fn held_torque_differs_by_no_more_than_the_example_says() {
 }
 
 #[test]
-fn committed_files_are_what_the_command_writes() {
+fn committed_files_of_the_examples_equal_the_files_that_hubslosh_example_writes() {
     for example in &EXAMPLES {
         let made = tempfile::tempdir().unwrap();
         example.write(&packed(example), made.path()).unwrap();

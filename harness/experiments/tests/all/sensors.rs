@@ -198,6 +198,7 @@ fn noise_does_not_depend_on_other_sensors_and_differs_between_sensors_seeds_and_
     assert_ne!(column(&two, "c"), column(&two, "b"));
 }
 
+/// A sensor at 10 Hz in rows at 50 Hz: rows without a reading are empty in CSV and null in Parquet.
 #[test]
 fn missing_readings_are_missing_in_files() {
     let table = record(&[], &["s=encoder:rate=10,noise=1e-3"], &["omega"], 1.0);

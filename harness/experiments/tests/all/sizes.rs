@@ -60,6 +60,8 @@ fn spacecraft(fmi: Fmi, settings: &[(String, String)]) -> anyhow::Result<Fmu> {
     Fmu::open_with(packed_version_for_tests(model, fmi), settings)
 }
 
+/// The harness sets `tanks` and array elements of Spacecraft with arrays, and the same parameters of Spacecraft with
+/// scalars.
 #[test]
 fn arrays_sized_by_a_structural_parameter_give_the_motion_of_scalars_to_the_last_bit() {
     let set = settings(&SCALARS);

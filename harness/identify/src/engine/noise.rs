@@ -122,8 +122,10 @@ mod tests {
         }
     }
 
+    /// A residual of 5e-11 rad/s comes from the solver, not from a sensor; the estimated noise is then the least noise that
+    /// a fit assumes.
     #[test]
-    fn a_residual_of_a_solvers_size_is_below_the_least_noise() {
+    fn a_residual_as_small_as_solver_errors_gets_the_least_noise() {
         let found = estimated(5e-11, 1e-11).0;
         assert!((found.white / LEAST_NOISE - 1.0).abs() < 1e-3, "{found:?}");
     }

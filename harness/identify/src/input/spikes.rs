@@ -145,6 +145,8 @@ mod tests {
         find(&time, &rate, &torque, None)
     }
 
+    /// Single and pairs of wrong values of 0.01 to 3 rad/s in a recorded rate are found and replaced; a recording with
+    /// noise only has no spikes.
     #[test]
     fn single_and_adjacent_spikes_are_found_and_noise_is_not_a_spike() {
         assert_eq!(found(&[]), []);
@@ -164,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn a_long_burst_is_no_spike_and_costs_no_more_than_its_rows() {
+    fn a_long_burst_of_noise_is_not_treated_as_spikes_and_is_searched_in_linear_time() {
         // 15,000 rows of noise a thousand times as large: to look at all of them for each took minutes
         let mut random = Random::new(9, 0);
         let burst = |k: usize| (100_000..115_000).contains(&k);

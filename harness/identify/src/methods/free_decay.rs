@@ -368,6 +368,7 @@ mod tests {
         assert!(residual < 1e-3 * 0.3 && residual_constant > 10.0 * residual);
     }
 
+    /// 95 % intervals of frequency and damping from 60 simulated free decays, with white and with correlated noise.
     #[test]
     fn intervals_contain_the_true_value_in_white_and_in_coloured_noise() {
         // 60 records of 25 s each. The 95 % interval covers 57 on average with a scatter of 1.7;

@@ -80,6 +80,7 @@ fn found(question: &Question) -> Identification {
     identify(&model, question, &records, &mut |_| {}).unwrap()
 }
 
+/// `identify fmu` is given two recordings that are computed from the closed-form solution of a hub with viscous friction.
 #[test]
 fn intervals_contain_the_true_values_of_a_hub_in_closed_form() {
     let found = found(&question(&FREE));
@@ -226,6 +227,8 @@ fn an_fmu_3_is_identified_through_its_events() {
     }
 }
 
+/// A parameter of a friction law that is not in use is reported as not determined, and an inertia whose true value is
+/// beyond its bound as at its bound.
 #[test]
 fn parameters_without_information_are_not_determined_and_bounds_are_named() {
     // the stiffness of a law that is not chosen does nothing; the inertia is wanted beyond its bound
@@ -239,6 +242,8 @@ fn parameters_without_information_are_not_determined_and_bounds_are_named() {
     assert!(said, "{:?}", found.verdict);
 }
 
+/// A prior of 0.06 ± 1e-6 for a friction of 0.05 outweighs the recordings; the estimate is 0.06, and the verdict is a
+/// misfit.
 #[test]
 fn an_unknown_keeps_its_prior_if_the_recordings_determine_it_less() {
     let mut question = question(&FREE);

@@ -225,6 +225,8 @@ fn holds(tank: &Tank, result: &Identification) {
 
 const FORCED: Tank = Tank { drive: [0.1, 2.2, 0.03], growth: 0.01, ..TANK };
 
+/// A record of force and torque of SloshTank from an integrator outside the project determines all parameters of the tank,
+/// with intervals that contain the true values.
 #[test]
 fn a_forced_record_of_an_independent_integrator_determines_the_whole_model() {
     let record = FORCED.record(10.0, 0.02, 0.0, 0.01, 1);
@@ -372,6 +374,7 @@ fn moved(offsets: [f64; 3]) -> (Question, Record) {
     (question, record)
 }
 
+/// The tank turns about a point off its axis, and the force balance has constant offsets, which are estimated as biases.
 #[test]
 fn a_tank_that_turns_about_another_point_is_found_with_the_offsets_of_its_balance() {
     for offsets in [[0.0; 3], [0.2, 0.0, -0.03]] {

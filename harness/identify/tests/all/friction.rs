@@ -148,7 +148,7 @@ fn identify_finds_the_preferential_direction_in_both_directions() {
 
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
-fn a_bias_of_five_degrees_a_second_leads_to_no_false_minimum() {
+fn a_gyro_bias_of_5_degrees_per_second_does_not_mislead_the_friction_fit() {
     assert_eq!(wrong(&SETS[0], 4, 0.087, ASYMMETRY), [""; 0]);
 }
 
@@ -180,6 +180,8 @@ fn all_inertia_is_the_hubs_unless_the_liquid_is_stated() {
     }
 }
 
+/// A recording of 0.8 s, a recording without torque and a hub that does not move: the error says which experiment to
+/// record.
 #[test]
 fn recordings_that_show_no_friction_are_refused_with_what_to_do() {
     let [_, step, _] = &recordings(&SETS[0], 1, 0.0, ASYMMETRY)[..] else { panic!("three runs") };
@@ -236,16 +238,18 @@ fn a_torque_that_is_held_is_recognised() {
 
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
-fn liquid_that_moves_does_not_fit_a_rigid_one() {
+fn a_recording_with_sloshing_liquid_does_not_fit_the_rigid_model_of_the_friction_fit() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let torque = "lin-sweep:amplitude=0.1,f0=1.8,f1=3,duration=150";
     let found = fit(&[rigid(&fmu, &[("slosh.model", "linear")], torque)], &options()).unwrap();
     assert!(found.fits == Some(false) && found.verdict.iter().any(|l| l.starts_with(DOES_NOT_FIT)));
 }
 
+/// Pulses in both directions, each followed by a decay of 5 s, with an asymmetry of 0.15 and a variation of 0.2 over the
+/// angle.
 #[test]
 #[ignore = "ten seconds of CPU time: .ci/long-tests"]
-fn the_preferential_direction_shows_in_free_decay() {
+fn the_dependence_of_friction_on_direction_and_angle_is_estimated_from_free_decays() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let bench = [("friction.asymmetry", "0.15"), ("friction.forward_cos1", "0.2")];
     // pulses in turn, and 5 s of decay after each

@@ -33,6 +33,7 @@ fn errors(fmu: &Fmu, recording: &Recording) -> Vec<(&'static str, Option<String>
     ]
 }
 
+/// Recordings with NaN, infinite and huge times and values are refused by every method with row and reason.
 #[test]
 fn no_method_hangs_or_panics_on_values_out_of_range() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
