@@ -311,7 +311,7 @@ mod tests {
     }
 
     #[test]
-    fn calls_of_the_other_interface_are_refused_and_say_so() {
+    fn calls_of_model_exchange_are_refused_in_co_simulation_and_the_reverse() {
         let fault = Fmi2::DO_STEP.check(ME, ByHost, InstanceState::Event).unwrap_err();
         assert_eq!(
             fault.text,

@@ -293,7 +293,7 @@ mod tests {
     }
 
     #[test]
-    fn a_uri_names_a_folder() {
+    fn the_folder_of_a_file_uri_is_decoded() {
         let path_in =
             |uri: &str| folder_of_uri(uri).map(|path| path.to_string_lossy().into_owned());
         for (uri, path) in [

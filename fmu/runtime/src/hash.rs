@@ -49,7 +49,7 @@ mod tests {
     }
 
     #[test]
-    fn hash_depends_on_where_each_text_ends() {
+    fn the_hash_of_two_texts_depends_on_where_the_first_text_ends() {
         let hash = |texts: [&str; 2]| Hash::new().text(texts[0]).text(texts[1]).value();
         assert_ne!(hash(["ab", "c"]), hash(["a", "bc"]));
     }

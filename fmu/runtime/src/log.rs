@@ -179,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn every_topic_has_its_category() {
+    fn every_kind_of_log_message_has_a_log_category() {
         assert_eq!(category(Topic::Event), "logEvents");
         assert_eq!(category(Topic::Warning), "logStatusWarning");
         assert_eq!(category(Topic::Failure(Severity::Discard)), "logStatusDiscard");

@@ -432,8 +432,9 @@ mod tests {
         assert_ne!(of(other.leak()), guid);
     }
 
+    /// For example `a.b[1]` to `a.b[3]`.
     #[test]
-    fn an_arrays_elements_have_their_indices_in_its_brackets() {
+    fn array_elements_are_named_with_their_indices_in_brackets() {
         let scalar = Spring::table().variables[0];
         let names = |name, lengths: &[usize]| {
             let shape: Vec<_> = lengths.iter().map(|length| Dimension::Fixed(*length)).collect();

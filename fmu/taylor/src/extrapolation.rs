@@ -222,8 +222,9 @@ mod tests {
     /// State at the far end of an ellipse with eccentricity 0.6 and semi-axis 1, whose revolution takes 2 pi.
     const START: [f64; 4] = [1.6, 0.0, 0.0, 0.5];
 
+    /// Smaller tolerances take more evaluations.
     #[test]
-    fn an_integrated_revolution_ends_at_its_start_and_costs_more_at_smaller_tolerance() {
+    fn a_kepler_orbit_integrated_over_one_revolution_ends_at_its_start_within_the_tolerance() {
         let mut works = [0; 4];
         for (k, tolerance) in [1e-4, 1e-6, 1e-8, 1e-10].into_iter().enumerate() {
             let (orbit, mut x) = (Orbit::new(), START);
@@ -238,8 +239,9 @@ mod tests {
         assert_eq!(works, [500, 541, 920, 1226]);
     }
 
+    /// A Kepler orbit, integrated by extrapolation over 3 s.
     #[test]
-    fn several_short_calls_equal_one_long_call() {
+    fn an_integration_in_three_parts_equals_an_integration_in_one() {
         let (mut x, mut y) = (START, START);
         let mut pace = Pace::new(3.0, STEPS);
         for (from, to) in [(0.0, 0.5), (0.5, 0.6), (0.6, 3.0)] {

@@ -812,6 +812,8 @@ mod tests {
         assert_eq!(order(Convergence::Decay, 1e-6), 6);
     }
 
+    /// The arguments are the last two terms of a power series and the two terms two orders earlier, in units of the allowed
+    /// error.
     #[test]
     fn a_series_ends_when_its_next_two_terms_are_negligible_or_predicted_to_be() {
         // Both are computed.
@@ -872,6 +874,8 @@ mod tests {
         assert_eq!(end, Err(StepError::NotFinite { time: 7.0 }));
     }
 
+    /// A series of the highest order over 50 s is used only up to the time at which one of its last two terms reaches the
+    /// tolerance.
     #[test]
     fn a_step_too_long_for_the_highest_order_is_cut_to_where_the_last_two_terms_are_allowed() {
         for highest in [10, ORDER] {
@@ -887,7 +891,7 @@ mod tests {
     }
 
     #[test]
-    fn separately_compiled_orders_give_the_same_bits() {
+    fn an_expansion_compiled_separately_for_each_order_gives_bit_identical_results() {
         let mut loops = Oscillator::new(Convergence::Decay);
         let mut apart = Unrolled(Oscillator::new(Convergence::Decay));
         for h in [0.01, 0.3, 9.0] {
@@ -1064,8 +1068,9 @@ mod tests {
         assert!(highest[0] < highest[1] && highest[2] <= ORDER, "{highest:?}");
     }
 
+    /// Ten steps of 0.1 s give exactly 1 s and a remainder of 5.55e-17 s.
     #[test]
-    fn times_add_up_with_their_rounding_error() {
+    fn the_sum_of_time_steps_carries_its_rounding_error() {
         let sum = (0..10).fold([0.0; 2], |sum, _| add_time(sum, 0.1));
         assert_eq!(sum[0], 1.0);
         let back = add_time(sum, -1.0);

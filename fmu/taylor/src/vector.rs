@@ -122,7 +122,7 @@ mod tests {
     const B: Vec3 = [0.5, -1.0, 4.0];
 
     #[test]
-    fn products_equal_those_of_small_integers() {
+    fn vector_and_matrix_products_are_exact_for_small_integers() {
         assert_eq!((add(A, B), sub(A, B)), ([1.5, 1.0, 1.0], [0.5, 3.0, -7.0]));
         assert_eq!((scale(2.0, A), dot(A, B)), ([2.0, 4.0, -6.0], -13.5));
         assert_eq!(cross(A, B), [5.0, -5.5, -2.0]);
@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn slopes_equal_the_derivatives_of_their_functions() {
+    fn the_derivatives_of_unit_quaternions_and_unit_vectors_equal_those_of_dual_numbers() {
         let (q, dq) = ([0.9, -0.1, 0.5, 0.3], [0.2, 0.7, -0.4, 0.1]);
         let dual = |x: f64, dx: f64| Dual::with_slope(x, dx);
         let exact = unit_quaternion([0, 1, 2, 3].map(|i| dual(q[i], dq[i])));

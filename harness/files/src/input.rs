@@ -159,6 +159,7 @@ pub fn check_replaceable(path: &Path) -> Result<()> {
 mod tests {
     use super::*;
 
+    /// A deleted input's file number may be given to a new file; the new file may be overwritten.
     #[cfg(unix)]
     #[test]
     fn a_new_file_is_never_taken_for_a_deleted_input() {

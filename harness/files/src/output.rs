@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn a_failed_write_leaves_the_old_file_and_no_other() {
+    fn a_failed_write_leaves_the_old_file_and_no_temporary_file() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("a.txt");
         std::fs::write(&path, "old").unwrap();
@@ -162,7 +162,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn links_are_followed_and_stay_links() {
+    fn writing_to_a_symbolic_link_writes_its_target_and_keeps_the_link() {
         let directory = tempfile::tempdir().unwrap();
         let at = |name: &str| directory.path().join(name);
         fs::create_dir(at("far")).unwrap();
@@ -190,7 +190,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn a_pipe_gets_all_bytes_and_stays_a_pipe() {
+    fn writing_to_a_named_pipe_sends_all_bytes_and_keeps_the_pipe() {
         use std::os::unix::fs::FileTypeExt;
         let directory = tempfile::tempdir().unwrap();
         let pipe = directory.path().join("a.csv");
@@ -240,7 +240,7 @@ mod tests {
 
     #[cfg(target_os = "linux")]
     #[test]
-    fn an_open_descriptor_is_written_to() {
+    fn writing_to_dev_fd_appends_to_the_open_file() {
         use std::os::fd::AsRawFd;
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("log");

@@ -567,6 +567,7 @@ mod tests {
         }
     }
 
+    /// Lines of manifest.sha256 of a campaign are changed, repeated or removed.
     #[test]
     fn a_damaged_manifest_is_an_error_or_its_runs_are_not_verified() {
         let directory = tempfile::tempdir().unwrap();
@@ -653,7 +654,7 @@ mod tests {
     }
 
     #[test]
-    fn published_files_are_in_the_manifest_and_others_are_removed() {
+    fn a_campaign_lists_its_tables_in_the_manifest_and_removes_tables_of_an_earlier_campaign() {
         let directory = tempfile::tempdir().unwrap();
         let publish = |files: Vec<(&str, Vec<u8>)>| {
             take(directory.path(), CAMPAIGN).unwrap().publish(files).unwrap()
@@ -668,6 +669,8 @@ mod tests {
         assert_eq!(names, [".lock", MANIFEST, "plan.toml", "runs", "runs.csv"]);
     }
 
+    /// A forged manifest lists files outside the campaign's directory and files with other names; the campaign does not
+    /// remove them.
     #[test]
     fn files_that_are_not_the_campaigns_own_are_left_alone_whatever_the_manifest_says() {
         let directory = tempfile::tempdir().unwrap();

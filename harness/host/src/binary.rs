@@ -454,6 +454,7 @@ mod tests {
         }
     }
 
+    /// The binary needs a library and a glibc that not every system has, exports other names, and has a search path.
     #[test]
     fn all_faults_of_a_binary_are_reported_at_once() {
         let mut linux = good(Kind::Linux);
@@ -489,7 +490,7 @@ mod tests {
     }
 
     #[test]
-    fn a_signature_fits_only_the_code_it_was_made_for() {
+    fn the_code_signature_of_a_macos_binary_is_valid_only_for_unchanged_code() {
         let code = vec![7u8; 5000]; // two pages of 4096
         let mut directory = vec![0u8; 44];
         let mut put = |at: usize, number: u32| {
@@ -525,7 +526,7 @@ mod tests {
     }
 
     #[test]
-    fn the_parts_of_a_universal_binary_are_the_files_that_were_joined() {
+    fn a_universal_macos_binary_contains_the_two_binaries_that_were_joined() {
         let thin = |processor: u32, length: usize| {
             let mut bytes = vec![7u8; length];
             for (i, number) in [macho::MH_MAGIC_64, processor, 3].into_iter().enumerate() {

@@ -1048,6 +1048,8 @@ mod tests {
         assert_eq!((d.unit(last), last.intermediate), ("rad", true));
     }
 
+    /// A structural parameter n is set to 3: an array of n by n has 9 elements, and its declared start values no longer
+    /// apply.
     #[test]
     fn arrays_have_the_size_that_a_structural_parameter_is_set_to_and_no_start_values_then() {
         let set = BTreeMap::from([(7, Value::Integer(3))]);
@@ -1065,7 +1067,7 @@ mod tests {
     }
 
     #[test]
-    fn an_alias_of_fmi_3_is_the_same_value_by_another_name_and_no_second_output() {
+    fn an_alias_of_an_fmi_3_output_has_the_value_reference_of_the_output_and_is_local() {
         let d = ModelDescription::from_xml(XML3).unwrap();
         let (y, z) = (d.variable("y").unwrap(), d.variable("z").unwrap());
         assert_eq!((y.reference, &y.causality), (z.reference, &Causality::Output));

@@ -766,6 +766,7 @@ mod tests {
         assert!(report.contains("row 7 is odd (harness/host/src/guard.rs:"), "{report}");
     }
 
+    /// A guarded process catches a panic and later aborts; the parent reports a crash, not the panic.
     #[test]
     fn a_panic_that_was_caught_does_not_explain_a_later_crash() {
         let cause = end_of("a_panic_that_was_caught_does_not_explain_a_later_crash", || {

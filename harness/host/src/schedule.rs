@@ -269,6 +269,7 @@ mod tests {
         (0..schedule.time.len()).map(|k| (schedule.time[k], schedule.is_row(k))).collect()
     }
 
+    /// Inputs at uneven times and results every 20 ms; times that differ by rounding are merged.
     #[test]
     fn every_row_of_an_input_and_of_the_result_is_a_communication_point() {
         let inputs = [0.0, 0.015, 0.02, 0.02, 0.06, 0.07];

@@ -55,7 +55,7 @@ mod tests {
     use super::{LONGEST, readable};
 
     #[test]
-    fn mangled_names_are_read_or_left_out() {
+    fn mangled_symbol_names_are_demangled_or_left_as_they_are() {
         for (symbol, name) in [
             ("cos", Some("cos")),
             ("_Py_NoneStruct", Some("_Py_NoneStruct")),

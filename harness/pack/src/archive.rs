@@ -152,7 +152,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_same_files_give_the_same_bytes_in_the_given_order() {
+    fn packing_equal_files_gives_identical_archives_with_the_files_in_the_given_order() {
         let files =
             [("b.txt".to_string(), b"two".to_vec()), ("binaries/a".to_string(), vec![0; 9999])];
         let packed = || {

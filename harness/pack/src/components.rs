@@ -471,6 +471,7 @@ mod tests {
     use super::*;
     use crate::models::MODELS;
 
+    /// The SBOM lists the crates of the Rust standard library, which the compiler's paths in the binary name.
     #[test]
     fn crates_of_std_are_found_by_name_and_version() {
         let found = standard_crates(
@@ -483,6 +484,7 @@ mod tests {
         assert!(error.contains("new-thing-1.0.0"), "{error}");
     }
 
+    /// The program that searches binaries for paths of crates contains such path prefixes itself.
     #[test]
     fn the_search_for_linked_crates_does_not_find_its_own_list_of_names() {
         for words in [
@@ -496,6 +498,7 @@ mod tests {
         }
     }
 
+    /// The program that searches binaries for marks of run-time libraries contains the marks only reversed.
     #[test]
     fn this_program_is_not_mistaken_for_one_that_links_a_run_time_library() {
         let this = crate::archive::read(&std::env::current_exe().unwrap()).unwrap();

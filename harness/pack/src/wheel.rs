@@ -335,7 +335,7 @@ mod tests {
     }
 
     #[test]
-    fn a_files_name_in_place_of_the_folder_is_refused_before_anything_is_built() {
+    fn pack_refuses_a_file_name_where_a_folder_for_the_wheel_is_expected() {
         let error = write(Path::new("dist/mine.whl")).unwrap_err().to_string();
         assert!(error.contains("mine.whl") && error.contains("a folder is expected"), "{error}");
     }

@@ -219,8 +219,9 @@ impl Segment {
 mod tests {
     use super::*;
 
+    /// Lines, ellipses, Cassini ovals, cosines and cubics.
     #[test]
-    fn the_chord_of_two_near_points_keeps_its_digits() {
+    fn the_difference_of_two_close_points_on_a_curve_has_no_cancellation() {
         let curves = [
             Curve::Line { from: [0.1, 0.2], to: [1.0, -0.4] },
             Curve::Ellipse { center: [0.3, 0.4], a_r: 1.2, a_z: 0.7 },

@@ -57,7 +57,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rule_integrates_powers_up_to_2n_minus_1() {
+    fn gauss_quadrature_with_n_nodes_integrates_powers_up_to_2n_minus_1() {
         for n in [1, 2, 5, 16, 24] {
             let rule = Gauss::new(n);
             for power in 0..2 * n {
@@ -69,7 +69,7 @@ mod tests {
     }
 
     #[test]
-    fn slopes_are_the_derivatives() {
+    fn derivatives_of_legendre_polynomials_equal_finite_differences() {
         let (mut low, mut high, mut slopes) = ([0.0; 8], [0.0; 8], [0.0; 8]);
         let (v, h) = (0.3, 1e-6);
         legendre(v - h, &mut low);

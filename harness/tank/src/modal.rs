@@ -633,8 +633,9 @@ mod tests {
         assert!((ratios.1.0 - 2.0 / 3.0).abs() < 1e-15 && (ratios.1.1 - 2.0 / 3.0).abs() < 1e-15);
     }
 
+    /// A sphere that is nearly full, with a free surface much smaller than the tank.
     #[test]
-    fn errors_are_relative_to_the_radius_of_the_free_surface() {
+    fn stated_errors_of_modes_are_relative_to_the_radius_of_the_free_surface() {
         let segments = vec![crate::curve::Segment::arc([0.0, 1.0], 1.0, -90.0, 90.0)];
         let wall = crate::contour::Contour::new(segments).unwrap().cut(1.99).unwrap();
         let volume = Volume::from_wall(&wall);
@@ -730,6 +731,8 @@ mod tests {
         }
     }
 
+    /// Modes of random tanks are computed with a finer discretisation; their errors are below the errors that the result
+    /// states.
     #[test]
     #[ignore = "some minutes: .ci/run --nightly"]
     fn stated_errors_bound_the_errors_of_a_hundred_random_contours() {

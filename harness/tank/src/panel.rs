@@ -481,7 +481,7 @@ mod tests {
     }
 
     #[test]
-    fn panels_change_their_length_gradually() {
+    fn adjacent_panels_of_a_contour_have_similar_lengths() {
         let fine = [
             Segment::line([1.0, 0.01], [1.0, 0.0]),
             Segment::line([1.0, 0.0], [2.0, 0.0]),

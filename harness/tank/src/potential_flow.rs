@@ -586,7 +586,7 @@ mod tests {
     }
 
     #[test]
-    fn values_along_the_surface_are_at_their_places() {
+    fn values_along_the_free_surface_are_interpolated_at_points_from_the_wall_to_the_axis() {
         for wall in walls() {
             let mesh = Discretisation::new(&wall, 3, 16, false);
             let u = mesh.radii();
@@ -600,6 +600,7 @@ mod tests {
         }
     }
 
+    /// The wave r (1 − r²/(3 b²)) has its maximum at r = b, which is not a node of the mesh.
     #[test]
     fn the_surface_s_largest_elevation_is_found_between_points() {
         for (wall, b) in walls().iter().zip([0.5, 0.61, 1.2]) {
@@ -618,7 +619,7 @@ mod tests {
     }
 
     #[test]
-    fn bernstein_s_ellipse_has_its_foci_at_the_ends() {
+    fn the_bernstein_ellipse_through_a_point_has_its_foci_at_the_ends_of_the_interval() {
         for point in [[2.0 + 1.25, 0.0], [2.0 - 1.25, 0.0], [2.0, 0.75], [2.0, -0.75]] {
             assert!((bernstein(point, 1.0, 3.0) - 2.0).abs() < 1e-15, "{point:?}");
         }

@@ -160,6 +160,7 @@ mod tests {
         }
     }
 
+    /// The not-a-knot condition at ends that are not on the axis of the tank.
     #[test]
     fn away_from_the_axis_the_first_two_pieces_of_a_spline_are_one_cubic_and_so_are_the_last_two() {
         let all = derivatives(&POINTS);
@@ -173,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn at_the_axis_a_spline_is_level() {
+    fn a_spline_that_ends_on_the_axis_is_perpendicular_to_the_axis() {
         let mut dome = [0.0, 0.4, 0.9, 1.5, 2.0, 2.6, 3.0].map(|a: f64| [a.sin(), 1.0 - a.cos()]);
         dome[6] = [0.0, 2.0];
         let all = derivatives(&dome);
@@ -182,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn corners_stay_and_very_many_points_are_thinned_out() {
+    fn a_spline_keeps_corners_and_thins_out_more_than_100_points() {
         let corner = spline(&[[1.0, 0.0], [1.0, 1.0], [2.0, 1.0]]).unwrap();
         assert!(corner.iter().all(|segment| !matches!(segment.curve, Curve::Cubic { .. })));
         let arc = |n: usize| -> Vec<Point> {

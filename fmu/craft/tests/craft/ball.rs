@@ -409,7 +409,7 @@ fn detached_liquid_under_two_hundred_random_thrusts_moves_the_same_with_every_co
 
 /// The thrust always presses the liquid to the bottom; two craft run with `ball.travel` 0 and 0.6 m.
 #[test]
-fn a_craft_that_allows_detached_liquid_moves_bit_identically_while_the_liquid_stays_at_the_bottom() {
+fn a_craft_that_allows_detached_liquid_moves_bit_identically_until_the_liquid_detaches() {
     let forward = Inputs { torque: Ramp::held([3.0, -2.0, 1.0]), ..thrust(700.0) };
     let mut p = Parameters::default();
     let mut without = Spacecraft::new(&p, &forward, 0.0, 1e-7).unwrap();

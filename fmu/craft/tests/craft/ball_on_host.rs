@@ -598,7 +598,7 @@ fn a_saved_tank_with_detached_liquid_continues_bit_for_bit_and_a_refused_step_ch
 
 /// The specific force of the host always presses the liquid to the bottom; two tanks run with `ball.travel` 0 and 0.6 m.
 #[test]
-fn a_tank_that_allows_detached_liquid_moves_bit_identically_while_the_liquid_stays_at_the_bottom() {
+fn a_tank_that_allows_detached_liquid_moves_bit_identically_until_the_liquid_detaches() {
     let u = TankInputs {
         a: Ramp { value: [0.3, -0.2, 9.0], slope: [0.1, 0.0, 0.0] },
         omega: [0.02, 0.1, 0.05],

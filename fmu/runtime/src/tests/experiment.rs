@@ -7,7 +7,7 @@ use crate::v2::*;
 use crate::version::Version;
 
 #[test]
-fn experiment_is_kept_and_the_motion_begins_at_its_start() {
+fn an_instance_keeps_tolerance_start_and_stop_time_of_the_experiment() {
     let mut instance = fresh(CS);
     assert_eq!((instance.time(), instance.tolerance), (0.0, DEFAULT_TOLERANCE));
     instance.setup_experiment(Some(1e-5), 7.0, Some(7.0)).unwrap();
@@ -21,7 +21,7 @@ fn experiment_is_kept_and_the_motion_begins_at_its_start() {
 }
 
 #[test]
-fn wrong_experiments_are_refused_with_all_that_is_wrong() {
+fn setup_experiment_refuses_invalid_values_and_names_each_of_them() {
     let mut instance = fresh(CS);
     let why = unchanged(&mut instance, |i| i.setup_experiment(Some(0.2), f64::NAN, Some(1.0)));
     assert_eq!(
@@ -42,6 +42,8 @@ fn wrong_experiments_are_refused_with_all_that_is_wrong() {
     }
 }
 
+/// Initialisation, stepping or events, and termination lead through the instance states that FMI 2.0 defines for
+/// Co-Simulation and Model Exchange.
 #[test]
 fn instance_goes_through_the_states_of_its_interface() {
     use InstanceState::*;
@@ -82,6 +84,7 @@ fn instance_goes_through_the_states_of_its_interface() {
     }
 }
 
+/// Two start levels that are both too high are named in one error at the end of initialisation, and can be corrected.
 #[test]
 fn contradicting_parameters_end_initialization_with_all_faults_named() {
     let mut instance = fresh(CS);
@@ -266,7 +269,7 @@ fn compare(interface: Interface, events: Events, state: InstanceState, mut expec
 }
 
 #[test]
-fn states_that_can_be_reached_follow_from_interface_and_policy_of_events() {
+fn the_instance_states_that_can_be_reached_follow_from_the_interface_and_from_who_handles_events() {
     use Events::{ByHost, InStep};
     use InstanceState::*;
     let reached = |interface, events| -> Vec<_> {

@@ -43,6 +43,7 @@ fn failures_come_with_status_and_category() {
     Log::new(None).report(&Fault { severity: Severity::Fatal, text: String::new() });
 }
 
+/// If logEvents is enabled, a step with events writes one message, with the last event and the number of events.
 #[test]
 fn events_are_logged_on_request_with_the_last_one_and_their_number() {
     let (mut log, lines) = log();
@@ -145,7 +146,7 @@ fn log_categories_are_the_standards_and_include_events_only_if_the_model_has_eve
 }
 
 #[test]
-fn categories_are_switched_by_name() {
+fn log_categories_are_enabled_by_name() {
     let all = [
         Topic::Event,
         Topic::Warning,

@@ -5,7 +5,7 @@ use crate::call::InstanceState;
 use crate::instance::EventInfo;
 
 #[test]
-fn states_derivatives_and_nominals_come_in_the_hosts_order() {
+fn states_derivatives_and_nominals_are_in_the_order_of_the_model_description() {
     let mut instance = started(ME, &[]);
     let mut x = [0.0; 2];
     instance.continuous_states(&mut x).unwrap();
@@ -25,7 +25,7 @@ fn states_derivatives_and_nominals_come_in_the_hosts_order() {
 }
 
 #[test]
-fn arrays_of_another_length_are_refused() {
+fn arrays_of_states_and_derivatives_with_a_wrong_length_are_refused() {
     let mut instance = started(ME, &[]);
     let long = &mut [0.0; 3];
     let messages = [

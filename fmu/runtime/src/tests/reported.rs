@@ -43,6 +43,7 @@ fn shown(host: &mut Host) -> [Value; 3] {
 const CLOSED: [Value; 3] = [Value::Boolean(false), Value::Integer(0), Value::Integer(1)];
 const OPENED: [Value; 3] = [Value::Boolean(true), Value::Integer(1), Value::Integer(2)];
 
+/// FMI 3.0 with event mode: after a step that ends at an event, discrete outputs change only in event mode.
 #[test]
 fn discrete_outputs_keep_their_value_until_the_host_handles_the_event() {
     let mut host = stepping(Events::Reported, 0.0, &[("inspection", 5.0)]);
@@ -208,6 +209,8 @@ fn a_step_is_discarded_where_a_shorter_one_may_succeed() {
     assert_eq!(host.state(), InstanceState::Failed);
 }
 
+/// FMI 3.0 Co-Simulation handles events within the step, or reports events to a host with event mode; in Model Exchange the
+/// host handles events.
 #[test]
 fn events_are_handled_by_the_interface_or_reported_in_co_simulation() {
     let allowed = |interface| Events::ALL.map(|events| Fmi3::allows(interface, events));

@@ -95,7 +95,7 @@ fn a_saved_state_is_equal_after_conversion_to_bytes_and_back() {
 }
 
 #[test]
-fn a_restored_state_continues_as_the_instance_would_have() {
+fn an_instance_restored_from_bytes_continues_bit_identically() {
     let mut instance = eventful();
     let mut again = fresh(CS);
     again.restore(&read(&to_bytes(&instance)).unwrap()).unwrap();
@@ -148,6 +148,7 @@ fn patched(bytes: &[u8], place: usize, new: &[u8]) -> Vec<u8> {
     bytes
 }
 
+/// Bytes that are empty, truncated, of another model, or of another format.
 #[test]
 fn bytes_that_are_no_saved_state_are_refused_with_a_reason() {
     let bytes = to_bytes(&eventful());
@@ -177,6 +178,7 @@ fn bytes_that_are_no_saved_state_are_refused_with_a_reason() {
     }
 }
 
+/// Single fields of a saved state are set to impossible values, and the checksum is made to match.
 #[test]
 fn damaged_saved_states_with_a_valid_checksum_are_refused_with_a_reason() {
     let bytes = to_bytes(&eventful());

@@ -18,8 +18,9 @@ fn rate(instance: &mut Subject, name: &str) -> Result<f64, Fault> {
     instance.output_derivatives(&[reference(name)], &[1], &mut answer).map(|()| answer[0])
 }
 
+/// An input with the derivative 2 per second, set by fmi2SetRealInputDerivatives, for one step.
 #[test]
-fn a_step_moves_the_model_along_the_inputs_slopes() {
+fn inputs_change_along_their_derivatives_within_a_step() {
     let mut instance = started(CS, &[]);
     slope(&mut instance, "q[1]", 2.0).unwrap();
     instance.do_step(0.0, 0.5).unwrap();
@@ -153,8 +154,9 @@ fn a_step_that_is_refused_keeps_the_slopes() {
     assert!(why.contains("at the end of the step z = inf m"), "{why}");
 }
 
+/// The input w is the derivative of the input z; after a step z has increased by the integral of w.
 #[test]
-fn an_input_that_is_the_rate_of_another_input_moves_it() {
+fn an_input_that_is_the_derivative_of_another_input_changes_the_other_input() {
     let mut instance = started(CS, &[("z", 1.0), ("w", 0.5)]);
     instance.do_step(0.0, 0.5).unwrap();
     assert_eq!(real(&mut instance, "z"), 1.25);
@@ -242,7 +244,7 @@ fn slopes_that_an_input_cannot_have_are_refused() {
 }
 
 #[test]
-fn derivatives_of_outputs_follow_states_and_slopes() {
+fn output_derivatives_follow_from_state_derivatives_and_input_derivatives() {
     let mut instance = started(CS, &[]);
     slope(&mut instance, "q[2]", 3.0).unwrap();
     // net = q - k level, and level' = net.

@@ -69,8 +69,10 @@ fn start_values_equal_those_of_the_model() {
     assert_eq!(scalar("sum").start(), None);
 }
 
+/// A table states dependencies by the name of an array or of an element; for example `net[2]` depends on `level[2]` and
+/// `q[2]`.
 #[test]
-fn dependencies_are_named_by_array_element_or_beginning() {
+fn dependencies_are_resolved_to_array_elements() {
     let depends = |name: &str| names(scalar(name).depends_on());
     let initially = |name: &str| names(scalar(name).initial_depends_on());
     assert_eq!(depends("level[2]"), ["level[2]"]);

@@ -132,6 +132,8 @@ fn step(instance: fmi3Instance, at: f64, h: f64) -> (fmi3Status, bool, f64) {
     (status, early == 1, last)
 }
 
+/// A host of FMI 3.0 changes an input linearly within a step by intermediate update, a host of FMI 2.0 sets its derivative
+/// before the step; the results are bit-identical.
 #[test]
 fn a_ramp_by_intermediate_update_is_the_input_derivative_of_fmi_2_to_the_last_bit() {
     let (instance, host) = stepping(false);
@@ -206,8 +208,9 @@ fn after_an_early_return_at_once_inputs_are_held() {
     assert_eq!(force, 0.0);
 }
 
+/// A host sets a force to NaN in intermediate update: fmi3SetFloat64 returns fmi3Discard, and fmi3DoStep reaches its end.
 #[test]
-fn a_value_out_of_range_within_a_step_is_discarded_and_another_variable_is_an_error() {
+fn a_value_out_of_range_in_intermediate_update_is_discarded_and_the_step_goes_on() {
     let (instance, host) = stepping(false);
     host.lock().unwrap().force = Some(f64::NAN);
     assert_eq!(step(instance, 0.0, 0.5), (fmi3OK, false, 0.5));
@@ -274,7 +277,7 @@ fn counts_types_and_references_are_checked_before_anything_is_written() {
 }
 
 #[test]
-fn time_is_a_variable_after_those_of_the_table() {
+fn the_independent_variable_time_can_be_read_and_not_set() {
     let (instance, _host) = stepping(false);
     let (mut time, reference) = (0.0, time_reference::<Spring>());
     step(instance, 0.0, 0.125);
@@ -352,7 +355,7 @@ fn the_version_is_3_0() {
 }
 
 #[test]
-fn a_derivative_has_a_number_for_each_of_its_variables() {
+fn a_directional_derivative_with_wrong_numbers_of_seeds_or_sensitivities_is_refused() {
     for (seed, sensitivity, said) in
         [(2, 2, "nSeed = 2 (allowed: 1)"), (1, 1, "nSensitivity = 1 (allowed: 2)")]
     {

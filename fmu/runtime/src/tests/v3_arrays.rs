@@ -50,7 +50,7 @@ fn set(instance: fmi3Instance, of: u32, values: &[f64]) -> fmi3Status {
 }
 
 #[test]
-fn values_of_arrays_come_one_after_the_other_by_rows() {
+fn values_of_arrays_are_read_and_set_in_row_major_order() {
     let lines = Lines::default();
     let instance = made(&lines);
     assert_eq!(get(instance, &[6, 7]), (fmi3OK, [0.0, 1.0, 2.0, 3.0, 10.0, 11.0, 13.0, 14.0]));

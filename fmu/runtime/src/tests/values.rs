@@ -5,8 +5,9 @@ use crate::call::InstanceState;
 use crate::v2::{GET_STRING, SET_STRING};
 use Value::{Boolean, Integer, Real};
 
+/// Inputs, parameters, states, outputs and derivatives of a test model with two vessels.
 #[test]
-fn a_variable_is_read_from_its_place_in_the_model() {
+fn every_kind_of_variable_is_read_from_the_model() {
     let mut instance = started(CS, &[("z", 0.25)]);
     for (name, value) in [
         ("level[1]", Real(3.0)),
@@ -73,7 +74,7 @@ fn computed_variables_have_a_value_from_initialization_mode_on() {
 }
 
 #[test]
-fn references_of_another_type_or_of_none_are_refused() {
+fn value_references_of_another_type_or_without_a_variable_are_refused() {
     let mut instance = started(CS, &[]);
     let integer = reference("number");
     let last = TABLE.scalars.len() as u32;
@@ -135,6 +136,7 @@ fn all_wrong_parameters_are_reported_when_initialization_ends() {
     assert_eq!(real(&mut instance, "time_constant"), 0.25);
 }
 
+/// Setting an output, a state or a fixed parameter between steps is refused with the reason.
 #[test]
 fn only_inputs_and_tunable_parameters_are_set_in_motion() {
     let mut instance = started(CS, &[]);
@@ -176,7 +178,7 @@ fn refusing_a_tuned_parameter_refuses_the_whole_call() {
 }
 
 #[test]
-fn directional_derivatives_equal_those_of_the_equations() {
+fn directional_derivatives_equal_the_partial_derivatives_of_the_equations() {
     let mut instance = started(CS, &[]);
     let unknowns = references([
         "der(level[1])",
@@ -217,6 +219,7 @@ fn directional_derivatives_equal_those_of_the_equations() {
     assert_eq!(answers[0], -0.5);
 }
 
+/// In initialisation mode directional derivatives by inputs and parameters are available.
 #[test]
 fn in_initialization_mode_derivatives_are_by_inputs_and_parameters() {
     let mut instance = fresh(CS);

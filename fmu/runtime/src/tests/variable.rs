@@ -39,7 +39,7 @@ fn finite_numbers_are_recognised_by_their_bits() {
 }
 
 #[test]
-fn values_in_the_range_are_taken_its_ends_included() {
+fn values_within_a_range_and_at_its_ends_are_accepted() {
     let both = a_real("m").range(-2.0, 3.0);
     let low = a_real("m").at_least(-2.0);
     let integer = an_integer().between(-2, 3);
@@ -125,7 +125,7 @@ fn rates_are_bounded_by_the_range() {
 }
 
 #[test]
-fn quantities_keep_their_given_properties() {
+fn a_variable_has_the_unit_range_and_nominal_value_that_were_given() {
     let plain = a_real("m");
     assert_eq!((plain.unit(), plain.min(), plain.nominal_value()), ("m", None, 1.0));
     let rich = a_real("kg").range(-2.0, 3.0).nominal(7.0).display_unit("g");

@@ -216,6 +216,8 @@ mod tests {
         assert!(Arrays::default().is_empty());
     }
 
+    /// A value reference of a scalar is mapped to its array and index; beyond the present size of the array the result is
+    /// None.
     #[test]
     fn a_scalar_has_an_array_and_an_index_within_its_size() {
         let arrays = Arrays::new::<Trays>(&parameters(2));

@@ -629,7 +629,7 @@ mod tests {
 
     #[test]
     #[ignore = "three seconds: .ci/long-tests"]
-    fn the_allan_fit_detects_the_noise_terms_that_exist_and_its_intervals_contain_the_true_values() {
+    fn the_allan_fit_detects_the_noise_terms_that_exist_and_contains_their_true_values() {
         let white = Noise { flicker: 0.0, rrw: 0.0, ..ALL };
         let bias = Noise { bias_instability: 5e-5, bias_time: 5.0, ..white };
         let basic = [Term::White, Term::Flicker, Term::Walk];

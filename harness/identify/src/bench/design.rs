@@ -350,6 +350,8 @@ pub fn cramer_rao(
 mod tests {
     use super::*;
 
+    /// A multisine of 100 s period from 1.25 to 3.5 Hz contains only odd multiples of 0.01 Hz, and its peak is 0.25 N·m
+    /// within 16 %.
     #[test]
     fn a_multisine_has_only_odd_lines_and_the_given_peak() {
         let torque = Multisine::new(100.0, (1.25, 3.5), 0.25, 1).unwrap();
@@ -363,6 +365,7 @@ mod tests {
         assert!((torque.at(13.7) + torque.at(63.7)).abs() < 1e-9);
     }
 
+    /// The power spectrum of a D-optimal torque for the bench.
     #[test]
     fn d_optimal_power_is_near_the_slosh_frequency_and_reduces_uncertainty() {
         let plant = Linear { friction: 0.1, ..Linear::bench_10_cm(0.003) };

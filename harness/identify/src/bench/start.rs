@@ -336,6 +336,8 @@ mod tests {
 
     const BENCH: Bench = Bench { arm: 0.225, density: 1000.0, gravity: 9.81 };
 
+    /// The start values of a fit, computed from poles and zeros of the bench's exact frequency response, equal the
+    /// parameters of the bench.
     #[test]
     fn poles_and_zeros_of_the_exact_response_give_the_bench_back() {
         let measured =

@@ -149,6 +149,8 @@ fn kernel(x: f64) -> f64 {
 mod tests {
     use super::*;
 
+    /// A gyro gives a reading in every third row; the other rows are NaN. These rows are interpolated, and rows with
+    /// readings are marked.
     #[test]
     fn a_slow_gyro_is_completed_and_its_own_rows_are_known() {
         let time: Vec<f64> = (0..2000).map(|k| 0.02 * f64::from(k)).collect();

@@ -132,6 +132,8 @@ mod tests {
         Recording { wheel_speed: Some(speed), ..Recording::of("a", time, torque, rate) }
     }
 
+    /// The recorded acceleration of the wheel times its inertia equals the commanded torque, or only 5 % of the torque. In
+    /// the first case a note states the inertia, in the second case a warning says that the wheel did not give the torque.
     #[test]
     fn a_wheel_that_gives_its_torque_shows_its_inertia_and_one_that_does_not_is_doubted() {
         let (notes, doubts) = columns(&wheel(1.0));

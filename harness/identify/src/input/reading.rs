@@ -605,6 +605,7 @@ mod tests {
         );
     }
 
+    /// A rate that repeats each value three times comes from a gyro at a third of the row rate.
     #[test]
     fn a_gyro_slower_than_the_rows_is_seen_by_its_repeats() {
         let mut random = analysis::random::Random::new(1, 0);

@@ -248,6 +248,7 @@ mod tests {
         assert_eq!(find("omega", &time, &rate, Rest::Rate(None)), Faults::default());
     }
 
+    /// A hub rests, turns, and rests again; the search for frozen or saturated gyros reports nothing.
     #[test]
     fn a_hub_at_rest_is_no_fault() {
         // at rest, half a turn in 10 s, at rest, back under constant acceleration to another rest, and on

@@ -158,6 +158,7 @@ mod tests {
         found.iter().for_each(|(k, y)| assert!((y - clean[*k]).abs() < 3.3e-3, "{k} {y}"));
     }
 
+    /// If more than 1 % of the rows are outliers, none is removed as a spike.
     #[test]
     fn more_than_one_value_in_a_hundred_is_no_spike() {
         let many: Vec<(usize, f64)> = (10..14_000).step_by(60).map(|k| (k, 0.1)).collect();
@@ -178,6 +179,7 @@ mod tests {
         assert_eq!(find(&time, &rate(), &vec![0.0; 400_000], None), []);
     }
 
+    /// The torque alternates between 2 and −2 N·m; the kinks of the rate are not removed as spikes.
     #[test]
     fn a_step_of_the_torque_makes_no_spike() {
         let [time, mut torque, mut rate] = with(&[]);

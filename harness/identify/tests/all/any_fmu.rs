@@ -158,6 +158,8 @@ fn known_values_count_with_their_tolerances() {
     }
 }
 
+/// A fit with the harness's solver (Model Exchange) and a fit with the FMU's solver (Co-Simulation) differ by less than 0.1
+/// standard deviations.
 #[test]
 fn the_hosts_solver_and_the_fmus_give_the_same_estimates() {
     let own = found(&question(&FREE));

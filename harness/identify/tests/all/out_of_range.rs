@@ -85,6 +85,7 @@ fn no_method_hangs_or_panics_on_values_out_of_range() {
     }
 }
 
+/// `identify fmu` refuses NaN, infinite and too large times and values with row and reason.
 #[test]
 fn any_fmu_refuses_records_out_of_range() {
     let fmu = Adaptive::new(&["-DTOLERANCE=1e-5"]);

@@ -671,6 +671,8 @@ fn degrees_per_second_are_refused_by_name() {
     assert!(error.contains("omega looks like degrees per second"), "{error}");
 }
 
+/// The model of the fit equals a simulated recording whose torque is held, interpolated or band-limited between samples,
+/// with a delay of 0 or 5 ms.
 #[test]
 fn the_fit_simulates_a_twin_with_a_delay_or_a_smooth_torque() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();

@@ -267,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn short_names_of_fmus_are_different() {
+    fn pages_of_different_fmus_have_different_short_names() {
         assert_eq!(name("modelDescription/HubSlosh/documentation/model.md"), "hubslosh-model");
         assert_eq!(name("modelDescription/Spacecraft/documentation/model.md"), "spacecraft-model");
         assert_eq!(name("book/campaigns.md"), "campaigns");
@@ -276,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn equal_headings_have_addresses_of_their_own() {
+    fn equal_headings_of_a_page_get_different_anchors() {
         let slugs: Vec<_> =
             headings("# A b\n\n## C\n\n## C\n").into_iter().map(|h| h.slug).collect();
         assert_eq!(slugs, ["a-b", "c", "c-1"]);

@@ -48,7 +48,7 @@ fn every_link_and_figure_of_the_documentation_is_in_the_fmu() {
 }
 
 #[test]
-fn every_licence_named_has_its_text() {
+fn every_licence_that_the_fmu_names_is_in_the_fmu_as_text() {
     let files = files();
     let note = text(&files, "documentation/licenses/license.txt");
     assert!(note.contains("SPDX-License-Identifier: MIT OR Apache-2.0\n"));
@@ -65,7 +65,7 @@ fn every_licence_named_has_its_text() {
 }
 
 #[test]
-fn sbom_lists_what_is_linked_and_refers_to_nothing_else() {
+fn the_sbom_of_an_fmu_lists_the_linked_crates_and_has_no_dangling_reference() {
     let files = files();
     let sbom: serde_json::Value = serde_json::from_slice(&files[&HUBSLOSH.sbom()]).unwrap();
     let parts = sbom["components"].as_array().unwrap();
@@ -83,7 +83,7 @@ fn sbom_lists_what_is_linked_and_refers_to_nothing_else() {
 }
 
 #[test]
-fn an_archive_packed_from_parts_contains_only_these_parts() {
+fn an_fmu_packed_from_a_binary_a_description_and_a_folder_contains_only_these_files() {
     let folder = tempfile::tempdir().unwrap();
     let write = |name: &str, text: &str| {
         let path = folder.path().join(name);

@@ -18,7 +18,7 @@ fn released_wheel() -> String {
 }
 
 #[test]
-fn address_and_version_equal_those_of_cargo_toml() {
+fn repository_address_and_version_in_all_pages_equal_cargo_toml() {
     let citation = read("CITATION.cff");
     assert!(citation.lines().any(|line| line == format!("version: {VERSION}")), "CITATION.cff");
     assert!(!citation.contains(REPOSITORY), "the address has one place, Cargo.toml");

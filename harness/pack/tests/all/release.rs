@@ -27,6 +27,7 @@ fn released() -> Vec<(&'static Model, Fmi, PathBuf)> {
     vec![]
 }
 
+/// The model descriptions of the FMUs in dist/release equal the model descriptions of the source.
 #[test]
 fn the_committed_release_has_the_interface_of_the_source() {
     for (model, fmi, fmu) in released() {
@@ -138,6 +139,7 @@ fn gathered(tree: &Path, arguments: &[&str]) -> Result<BTreeSet<String>, String>
     if done.status.success() { Ok(names) } else { Err(said) }
 }
 
+/// A script gathers the files of a release; the list is complete for FMUs and wheels.
 #[cfg(unix)]
 #[test]
 fn release_files_match_the_manifest() {
@@ -189,6 +191,7 @@ fn release_files_match_the_manifest() {
     }
 }
 
+/// The report of `hubslosh check` next to each released FMU has 0 errors.
 #[test]
 fn release_passed_the_check() {
     for (.., fmu) in released() {
@@ -199,6 +202,7 @@ fn release_passed_the_check() {
     }
 }
 
+/// Each released FMU has a binary for each platform and is smaller than the stated limit.
 #[test]
 fn release_is_small_and_for_all_platforms() {
     for (Model { name, .. }, fmi, fmu) in released() {

@@ -507,6 +507,7 @@ mod tests {
         );
     }
 
+    /// Of a series with growing torque only runs in the middle have rotary slosh.
     #[test]
     fn rotary_slosh_that_ends_again_is_stated_between_two_torques() {
         let points = [

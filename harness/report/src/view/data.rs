@@ -104,6 +104,7 @@ pub(super) fn integral(time: &[f64], rate: &[f64]) -> Vec<f64> {
 mod tests {
     use super::*;
 
+    /// Runs with up to a million rows are thinned out for the page.
     #[test]
     fn the_viewer_keeps_the_last_row_and_limits_the_number_of_values() {
         for (rows, columns) in [(2, 5), (100_000, 40), (1_000_003, 9)] {
@@ -131,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn an_oscillation_with_too_few_frames_is_noticed() {
+    fn a_run_with_too_few_rows_per_period_for_the_viewer_is_reported() {
         let wave: Vec<f64> = (0..10_000).map(|k| (0.5 * k as f64).sin()).collect(); // 12.6 rows a period
         assert!(Thinning { every: 1 }.too_few(&[&wave]).is_none());
         let few = Thinning { every: 2 }.too_few(&[&wave]).expect("6.3 frames");

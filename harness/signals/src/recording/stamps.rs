@@ -205,8 +205,9 @@ mod tests {
         assert!(why.contains("no even spacing"), "{why}");
     }
 
+    /// Rows at 33 Hz with times rounded to 1 ms, and others.
     #[test]
-    fn rounded_times_are_restored_to_the_even_grid_that_explains_them() {
+    fn times_printed_with_few_digits_are_restored_to_the_even_grid_of_the_samples() {
         // the last one has rows closer than its digits
         for (step, quantum) in [(1.0 / 33.0, 1e-3), (1.0 / 60.0, 1e-2), (1.0 / 120.0, 1e-2)] {
             let grid = on(&printed(step, 0..5000, quantum));
@@ -224,8 +225,9 @@ mod tests {
         assert!((grid.time[4900] - grid.time[0] - 4984.0 / 33.0).abs() < 2e-5);
     }
 
+    /// Times that are already even, have a gap, or have jitter of 3 ms.
     #[test]
-    fn times_that_no_grid_explains_stay_as_they_are() {
+    fn times_that_do_not_fit_an_even_grid_are_not_changed() {
         let even = printed(0.02, 0..5000, 1e-3);
         assert_eq!(regular(&even), Stamps::AsTheyAre);
         let mut lost = even.clone();

@@ -350,7 +350,7 @@ mod tests {
     }
 
     #[test]
-    fn dates_and_clocks_of_all_kinds_are_seconds() {
+    fn dates_and_clock_times_in_many_notations_are_converted_to_seconds() {
         for fields in [
             ["2026-01-31T23:59:59.990Z", "2026-02-01T00:00:00.010Z"],
             ["2026-01-31T23:59:59.990+0100", "2026-02-01T00:00:00.010+0100"],

@@ -357,6 +357,8 @@ fn text(dice: &mut Rng, columns: &[Column]) -> String {
     all
 }
 
+/// 10,000 random files whose columns have names with and without units; no column is taken for another signal or read in a
+/// wrong unit.
 #[test]
 fn random_headers_are_read_right_or_refused() {
     let seed = std::env::var("HUBSLOSH_FUZZ_SEED").ok().and_then(|seed| seed.parse().ok());

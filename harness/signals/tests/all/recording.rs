@@ -76,7 +76,7 @@ fn a_table_with_only_times_is_read() {
 }
 
 #[test]
-fn any_separator_decimal_mark_comment_and_unit_gives_the_same_numbers() {
+fn a_recording_gives_equal_numbers_for_every_separator_decimal_mark_comment_and_unit() {
     let renamed = "time=t,tau_cmd=T_cmd,omega=gyro z";
     let given = "time=t:ms,tau_cmd=T_cmd:mNm,omega=gyro z:deg/s";
     let cases: [(&str, &str, &str); 11] = [
@@ -131,6 +131,8 @@ fn any_separator_decimal_mark_comment_and_unit_gives_the_same_numbers() {
     assert!(cut.contains("line 4 was taken for a row of units"), "{cut}");
 }
 
+/// A torque at 10 Hz and a gyro at 50 Hz in one file: the torque is held between its rows, and a row with a lost rate is
+/// left out.
 #[test]
 fn a_slow_torque_is_held_and_lost_rows_are_left_out() {
     // torque at 10 Hz under a gyro at 50 Hz, which has rows of its own; one rate lost
@@ -209,7 +211,7 @@ fn timestamps_of_a_parquet_file_are_seconds_from_the_first() {
 }
 
 #[test]
-fn other_types_of_a_parquet_file_are_left_to_the_python_package() {
+fn parquet_columns_of_rare_types_are_refused_with_advice_to_use_the_python_package() {
     let signals = ["omega", "tau_cmd"].map(|name| signal(name, true));
     for (name, of) in [
         ("plain", ""),
@@ -228,8 +230,9 @@ fn other_types_of_a_parquet_file_are_left_to_the_python_package() {
     assert!(error.contains("column time holds INT64 (allowed: timestamps, floating"), "{error}");
 }
 
+/// Columns "t [ms]" with dates and "T [mNm]": dates need no unit.
 #[test]
-fn the_unit_of_the_times_is_not_applied_to_another_signal() {
+fn the_unit_in_the_name_of_the_time_column_is_not_applied_to_other_columns() {
     // dates need no unit, but milli- of the torque is the same factor as milli- of the time
     let text =
         "t [ms],T [mNm],omega\n2026-01-31T12:00:00.000Z,100,0\n2026-01-31T12:00:00.020Z,250,1\n";
@@ -261,7 +264,7 @@ fn a_damaged_parquet_file_is_an_error_and_never_a_panic() {
 }
 
 #[test]
-fn a_fault_is_named_with_line_column_and_what_is_allowed() {
+fn errors_in_a_recording_state_line_column_and_allowed_values() {
     let error = |text: &str, of: &str| read_text("csv", text.as_bytes(), of).unwrap_err();
     let cases = [
         (
@@ -348,8 +351,9 @@ fn files_of_loggers_and_spreadsheets_are_read_with_the_values_that_were_written(
     assert!(said.contains("columns of text are skipped: state, armed"), "{said}");
 }
 
+/// Each recording has three rows, 20 ms apart.
 #[test]
-fn clock_times_and_dates_of_all_kinds_are_seconds() {
+fn recordings_with_clock_times_or_dates_in_many_notations_are_read() {
     let rows = |stamps: [&str; 3]| stamps.map(|stamp| format!("{stamp};0,1;2\n")).concat();
     let cases = [
         // over midnight
@@ -468,7 +472,7 @@ fn columns_of_seconds_and_nanoseconds_form_one_time() {
 }
 
 #[test]
-fn times_printed_to_milliseconds_are_put_back_onto_their_grid() {
+fn times_printed_to_milliseconds_are_restored_to_the_even_grid_of_33_hz() {
     let rows: String = (0..400).map(|k| format!("{:.3},0,{k}\n", f64::from(k) / 33.0)).collect();
     let (table, said) =
         read_text("csv", format!("time,tau_cmd,omega\n{rows}").as_bytes(), "").unwrap();

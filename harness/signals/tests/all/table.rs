@@ -22,7 +22,7 @@ fn numbers_are_read_back_bit_for_bit_from_both_formats() {
 }
 
 #[test]
-fn a_missing_column_and_a_nan_are_named() {
+fn tables_with_a_missing_column_or_a_nan_are_refused_with_column_and_row() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("a.csv");
     std::fs::write(&path, "time,torque\n0,1\n").unwrap();

@@ -114,6 +114,7 @@ fn quantities(data: &ModalData) -> Vec<Quantity> {
     all
 }
 
+/// A tank four times as large, with four times the density: masses, lengths and frequencies scale exactly.
 #[test]
 fn every_modal_parameter_scales_by_its_physical_dimension() {
     let one = solved(1.0, 512.0);

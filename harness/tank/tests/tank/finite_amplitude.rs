@@ -336,7 +336,7 @@ fn boxes_have_a_pair_for_each_length() {
 }
 
 #[test]
-fn the_table_has_coefficients_waves_and_warnings() {
+fn the_printed_table_of_a_tank_has_large_wave_coefficients_wave_heights_and_warnings() {
     let text = |text: &str, fill: f64| {
         let tank: Tank = tank(&format!("density = 1000.0\n{text}"));
         let mut data = tank.solve(fill, 1).unwrap();

@@ -148,6 +148,7 @@ fn the_reference_annulus_is_reproduced_in_closed_form() {
     assert!(worst[..4].iter().all(|e| *e < 1e-11) && worst[4] < 1e-9, "{worst:?}");
 }
 
+/// The JSON of `hubslosh tank` for each reference case has the keys and types of the documentation.
 #[test]
 fn the_result_in_json_has_the_documented_keys() {
     for case in reference() {
