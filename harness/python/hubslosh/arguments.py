@@ -37,7 +37,7 @@ MOST_WORK = 1e8
 def caller() -> int:
     """Return the ``stacklevel`` with which `warnings.warn` names the line of the user's script.
 
-    It is the number of stack frames up to the first line that lies outside this package.
+    The level is the number of stack frames up to the first line outside this package.
     """
     folder, level = str(Path(__file__).parent), 1
     frame = sys._getframe(1)

@@ -163,7 +163,7 @@ def axis_angle(axis: ArrayLike, angle: ArrayLike) -> Real:
     Parameters
     ----------
     axis : array_like, shape (3,)
-        Axis, of any length but 0. It has the same components in body and inertial axes.
+        Axis, of any length but 0. The axis has equal components in body and inertial axes.
     angle : array_like
         Angle, rad; an array gives a quaternion for each element.
 

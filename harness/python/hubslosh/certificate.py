@@ -55,7 +55,7 @@ _TO_BERNSTEIN = np.linalg.inv([
 class WorstCase:
     """Smallest Δ found that brings a loop to the limit of stability.
 
-    `UncertainModel.worst_case` returns it.
+    `UncertainModel.worst_case` returns an instance.
 
     Attributes
     ----------
@@ -147,7 +147,7 @@ class Certificate:
 
     @property
     def gap(self) -> float:
-        """Ratio of the worst case's size to the certified size; inf if one of them is missing.
+        """Ratio of the worst case's size to the certified size; inf if a size is missing.
 
         A ratio near 1 means that the proof reaches almost as far as possible.
         """
@@ -257,7 +257,7 @@ class Search:
         """Return the closed loop's poles for the Δ in the middle of a box.
 
         The poles are converted from the z plane to complex frequencies, Hz. Raises `UnstableError`
-        if one of them is unstable.
+        if one of the poles is unstable.
         """
         middle = (low + high) / 2
         key = middle.tobytes()

@@ -20,7 +20,8 @@ class Finding:
     rule : str
         Identifier of the rule, such as ``zip.names``.
     severity : {"error", "warning"}
-        "error": the standard forbids it, or hosts fail. "warning": some importers fail on it.
+        "error": the standard forbids the fault, or hosts fail. "warning": some importers fail
+        because of the fault.
     place : str
         Location: a file, a line, a variable, a call.
     text : str

@@ -85,15 +85,15 @@ class MountedTank:
     modes : int
         Number of slosh modes, 1 to 3.
     nu : float, optional
-        Kinematic viscosity, m²/s, for damping ratios; without it the modes are undamped.
+        Kinematic viscosity, m²/s, for damping ratios; without a viscosity the modes are undamped.
     sigma : float, optional
         Surface tension, N/m, for centring stiffnesses.
     contact_angle : float, optional
         Contact angle between surface and wall, deg.
     spin : float, optional
         Rate at which the liquid rotates with the tank about the tank's axis, rad/s, for the inertia
-        of its spin and the coefficients of its modes; without it the liquid has no spin. The craft
-        starts at rest: set ``init.omega`` to make craft and liquid turn.
+        of its spin and the coefficients of its modes; without a rate the liquid has no spin. The
+        craft starts at rest: set ``init.omega`` to make craft and liquid turn.
 
     Examples
     --------
@@ -527,7 +527,7 @@ class Craft:
             raise FmuError(f"tank {name}: {error}") from None
 
     def tank_at(self, fill: Fill) -> dict[str, Tank]:
-        """Return the solved tanks at a fill, without those that are empty.
+        """Return the solved tanks at a fill, without empty tanks.
 
         Parameters
         ----------
@@ -627,7 +627,8 @@ class Craft:
         Returns
         -------
         MassProperties
-            Mass properties of dry craft and liquid together, body axes; ``print`` shows them.
+            Mass properties of dry craft and liquid together, body axes; ``print`` shows the mass
+            properties.
 
         Raises
         ------
@@ -685,13 +686,13 @@ class Craft:
             allowed, too. A mode of an appendage has the appendage's name: ``array.frequency[1]``
             and ``array.zeta[1]``.
         trimmed : bool
-            Trim the craft, see `trim`. False leaves the thrust at O, with a warning if it turns the
-            craft.
+            Trim the craft, see `trim`. False leaves the thrust at O, with a warning if this thrust
+            turns the craft.
         rigid : bool
             Liquid without slosh, with its effective inertia.
         detach : bool
-            Liquid may leave the bottom, see `travel`. It then sloshes as a pendulum, without the
-            coefficients of finite amplitude.
+            Liquid may leave the bottom, see `travel`. The liquid then sloshes as a pendulum,
+            without the coefficients of finite amplitude.
         mass_flow : float, mapping or sequence of float, optional
             Outflow of the tanks, kg/s, see `drain`.
         between : sequence of two fills
@@ -914,7 +915,7 @@ class Craft:
 
         The FMU stops where the liquid leaves the fill table. The table has damping ratios and
         third-order coefficients at every fill; a warning names the fills at which the coefficients
-        are not known and are bounded by those of other fills.
+        are not known and are bounded by the coefficients at other fills.
 
         Parameters
         ----------
@@ -923,7 +924,8 @@ class Craft:
         fill : fill, mapping, or sequence of fills
             Fill at the start, as for `fills`.
         between : sequence of two fills
-            Ends of the fill table of each tank with outflow. It takes some 5 s of CPU time, once.
+            Ends of the fill table of each tank with outflow. The computation takes some 5 s of CPU
+            time, once.
 
         Returns
         -------
@@ -1070,7 +1072,8 @@ class Craft:
         delay : float
             Further delay, s.
         parameters : mapping, optional
-            Further parameters, see `parameters`; ``"delay"`` among them replaces ``delay``.
+            Further parameters, see `parameters`; the parameter ``"delay"`` replaces the argument
+            ``delay``.
         rigid : bool
             Liquid without slosh.
         mass_flow : float, mapping or sequence of float, optional
@@ -1400,11 +1403,11 @@ class Craft:
         fill : fill, mapping, or sequence of fills
             Fill of the tanks, as for `fills`.
         inputs : DataFrame, optional
-            Histories of inputs with the column ``time``, as for `hubslosh.simulate`; they replace
-            thrust and torque of the craft. A column such as ``z.torque`` commands the torque of
-            wheel z on the craft, N·m. Each value is kept until the next row and is limited to what
-            the wheel can do; the result then contains the torque that acts and the speed of the
-            wheel, such as ``z.torque`` and ``z.speed`` (rad/s).
+            Histories of inputs with the column ``time``, as for `hubslosh.simulate`; these columns
+            replace thrust and torque of the craft. A column such as ``z.torque`` commands the
+            torque of wheel z on the craft, N·m. Each value is held until the next row and is
+            limited by the torque and the speed of the wheel; the result then contains the torque
+            that acts and the speed of the wheel, such as ``z.torque`` and ``z.speed`` (rad/s).
         stop : float, optional
             End of the simulation, s.
         step : float, optional
@@ -1505,9 +1508,9 @@ class Craft:
         """Write the trimmed craft at a fill, at rest, as files for other tools.
 
         ``craft.fmu`` has the binary of the craft's model and variables for its tanks and modes
-        only; it starts with the craft's values, so that a host needs to set nothing. ``craft.ssv``
-        has these values, ``craft.ssp`` both as a system (SSP 1.0), ``craft.mat`` the linear model
-        from ``torque`` to ``q`` and ``omega`` with parameters and inputs, and
+        only; the FMU starts with the craft's values, so that a host needs to set nothing.
+        ``craft.ssv`` has these values, ``craft.ssp`` both as a system (SSP 1.0), ``craft.mat`` the
+        linear model from ``torque`` to ``q`` and ``omega`` with parameters and inputs, and
         ``craft_simulink.m`` builds a model in Simulink from them.
 
         Parameters
@@ -1594,7 +1597,8 @@ class Craft:
         Raises
         ------
         FmuError
-            If the run lacks columns that are needed to draw it; `columns` returns them.
+            If the run lacks columns that are needed to draw it; `columns` returns the names of
+            these columns.
 
         Examples
         --------

@@ -168,7 +168,8 @@ def draw_bode(gain: "Axes", phase: "Axes", curves: Curves) -> None:
 def draw_nichols(ax: "Axes", curves: Curves) -> None:
     """Draw gain over phase.
 
-    A cross marks -1; the contour around it contains the loop gains whose distance to -1 is 0.5.
+    A cross marks -1; the contour around the point -1 contains the loop gains whose distance to -1
+    is 0.5.
     """
     left, right = curves.phases
     for curve in curves.every:
@@ -185,7 +186,8 @@ def draw_nichols(ax: "Axes", curves: Curves) -> None:
 def draw_nyquist(ax: "Axes", curves: Curves) -> None:
     """Draw the complex loop gain near -1, at positive frequencies.
 
-    A cross marks -1. The circle around it has the radius 0.5; the dotted circle is the unit circle.
+    A cross marks -1. The circle around the point -1 has the radius 0.5; the dotted circle is the
+    unit circle.
     """
     sizes = [1.5]
     for curve in curves.every:

@@ -81,7 +81,7 @@ def fmu_path(model: str | Path) -> Path:
     Raises
     ------
     FmuError
-        If no such FMU exists; the message has the names of those that do.
+        If no such FMU exists; the message lists the FMUs that exist.
 
     Examples
     --------
@@ -274,7 +274,7 @@ class Fmu:
 
     @cached_property
     def by_reference(self) -> dict[int, Variable]:
-        """Variables by value reference; of several with the same reference the first one."""
+        """Variables by value reference; of several variables with one reference the first."""
         return {v.reference: v for v in reversed(self.variables.values())}
 
     @cached_property

@@ -60,7 +60,7 @@ class LiquidModes:
     """Slosh modes of a tank at one fill, as `liquid_modes` returns them.
 
     All axes have their origin at O of the tank's shape (see `liquid_modes`) and z along the
-    specific force. If the specific force is along the tank's z, they are the tank's own axes.
+    specific force. If the specific force is along the tank's z, these axes are the tank's own axes.
 
     Attributes
     ----------
@@ -220,8 +220,8 @@ class LiquidModes:
         model : str
             "Spacecraft", or "SloshTank", which has one tank.
         modes : int, optional
-            Number of modes, 1 to 3; those with the largest slosh masses are kept. By default 3,
-            or all modes that have a slosh mass if they are fewer.
+            Number of modes, 1 to 3; the modes with the largest slosh masses are kept. By default 3,
+            or all modes with a slosh mass if there are fewer than 3.
         position : sequence of float, shape (3,)
             Position of O in body axes, m. The tank's axes are parallel to the body axes.
 

@@ -51,7 +51,7 @@ QUATERNION = tuple(f"q[{i}]" for i in range(1, 5))  # Attitude of Spacecraft, sc
 
 @dataclass(frozen=True, eq=False)
 class Loop:
-    """A sampled controller around an FMU: `closed_loop` simulates it, `margins` analyses it.
+    """A sampled controller around an FMU, for `closed_loop` (simulation) and `margins`.
 
     Parameters
     ----------
@@ -241,7 +241,7 @@ class Loop:
         Returns
         -------
         LinearModel or None
-            The controller with the loop's period; None if it is a function.
+            The controller with the loop's period; None if the controller is a function.
 
         Raises
         ------

@@ -292,8 +292,9 @@ def nichols(
     """Draw the Nichols chart of a loop: gain over phase, for each command in its own colour.
 
     Each loop gain is taken while the other loops are closed. A cross is -1, at all odd multiples of
-    180°; the contour around it has the distance 0.5 to -1. Dots and squares are the gain and phase
-    crossings of `hubslosh.margins`, with the smallest margins and those near slosh modes as labels.
+    180°; the contour around the point -1 has the distance 0.5 to -1. Dots and squares are the gain
+    and phase crossings of `hubslosh.margins`, with the smallest margins and those near slosh modes
+    as labels.
 
     Parameters
     ----------
@@ -338,9 +339,9 @@ def nyquist(
     """Draw the Nyquist plot of a loop near -1, for each command in its own colour.
 
     Each loop gain is taken at positive frequencies, while the other loops are closed. A cross is
-    -1; the circle around it has the radius 0.5, the dotted circle is the unit circle. Dots and
-    squares are the gain and phase crossings of `hubslosh.margins`, with the smallest margins and
-    those near slosh modes as labels.
+    -1; the circle around the point -1 has the radius 0.5, the dotted circle is the unit circle.
+    Dots and squares are the gain and phase crossings of `hubslosh.margins`, with the smallest
+    margins and those near slosh modes as labels.
 
     Parameters
     ----------
@@ -506,8 +507,8 @@ def closed_loop(
     run : DataFrame
         Table of `hubslosh.closed_loop`.
     reference : DataFrame, optional
-        Commanded attitude over ``time``, with ``q[1]`` to ``q[4]`` or ``theta`` (rad). With it the
-        remaining rotation is also drawn.
+        Commanded attitude over ``time``, with ``q[1]`` to ``q[4]`` or ``theta`` (rad). With the
+        target, the remaining rotation is also drawn.
     axes : sequence of matplotlib Axes, optional
         Axes to draw into, one for each quantity; by default the axes of a new figure.
     label : str, optional
@@ -591,8 +592,8 @@ def monte_carlo(
     table : DataFrame
         Result of `hubslosh.monte_carlo`, or its file ``runs.csv``.
     *columns : str
-        Results to draw; by default all numbers that ``outcome`` has returned. Of a file these are
-        the columns without a dot or bracket in their names.
+        Results to draw; by default all numbers that ``outcome`` has returned. In a file, the
+        results are the columns without a dot or bracket in their names.
     axes : sequence of matplotlib Axes, optional
         Axes to draw into, one for each result; by default the axes of a new figure.
     at : float

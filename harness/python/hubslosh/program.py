@@ -225,8 +225,8 @@ class Identification:
     converged : bool
         True if the search ended at a minimum.
     fits : bool or None
-        True if the residual is noise. If it is False, the model is invalidated and no interval
-        can be trusted. None if the method does not test it.
+        True if the residual is noise. If ``fits`` is False, the model is invalidated and no
+        interval can be trusted. None if the method does not test the fit.
     verdict : tuple of str
         Sentences of the verdict.
     all : dict

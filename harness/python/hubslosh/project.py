@@ -61,8 +61,8 @@ class Project:
     name : str
         Name of the design on pages.
     controller_file : str, optional
-        ``"FILE.py:NAME"``, the Python object that `save` writes as the controller. Without it
-        `save` writes the matrices of the controller.
+        ``"FILE.py:NAME"``, the Python object that `save` writes as the controller. Without this
+        name `save` writes the matrices of the controller.
 
     Examples
     --------
@@ -95,7 +95,8 @@ class Project:
         Parameters
         ----------
         path : str or Path
-            The file, .toml. Files that it names are relative to it.
+            The file, .toml. Paths in the project file are relative to the folder of the project
+            file.
 
         Returns
         -------

@@ -314,8 +314,8 @@ class Modes:
 def nominal_value(modes: Modes, untrimmed: Parameters, name: str) -> float | None:
     """Return the value of a quantity by its full name; None if the craft does not have the mode.
 
-    ``modes`` has the parameters of the operating point. ``untrimmed`` has the parameters as they
-    are given, in which trimming has not moved the origin yet.
+    ``modes`` has the parameters of the operating point. ``untrimmed`` has the given parameters,
+    before trimming moves the origin.
     """
     if mode := mode_quantity(name):
         return None if modes.problem(mode) else modes.value(mode)

@@ -29,7 +29,7 @@ class Point:
 
     @property
     def growth(self) -> float:
-        """Growth rate of the closed loop's least stable pole, 1/s; below 0 if it is stable."""
+        """Growth rate of the least stable closed-loop pole, 1/s; below 0 if the point is stable."""
         size = _largest(self.margins.poles, self.gain.period)
         return float(np.log(size) / self.loop.period)
 
@@ -37,7 +37,7 @@ class Point:
     def distance(self) -> float:
         """Measure that the search for the worst point minimises.
 
-        It is the modulus margin of a stable loop, and minus the growth rate (1/s) of an unstable
-        loop.
+        The distance is the modulus margin of a stable loop, and minus the growth rate (1/s) of an
+        unstable loop.
         """
         return self.margins.modulus_margin if self.margins.stable else -self.growth

@@ -65,7 +65,7 @@ class Run(ShortTable):
         Returns
         -------
         View
-            The page; a notebook shows it.
+            The page; a notebook shows the page.
 
         Raises
         ------

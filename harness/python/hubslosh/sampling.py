@@ -48,8 +48,8 @@ def draw(
     """Return the values of one run of `monte_carlo`.
 
     A value depends only on the seed, on the number of the run, and on the names in ``ranges`` up to
-    its own name; it does not depend on how many runs the study has. A uniform distribution gives
-    the numbers that a plan with the same ``[random]`` draws.
+    its own name; the values of a run do not depend on the number of runs in the study. A uniform
+    distribution gives the numbers that a plan with the same ``[random]`` draws.
 
     Parameters
     ----------
@@ -156,8 +156,8 @@ def monte_carlo(
     ranges : mapping
         Range of each name: (low, high) for a uniform distribution, a share such as "10%" of the
         value in ``nominal`` on both sides, a list of values, or a frozen distribution of
-        ``scipy.stats``. A run's values depend only on seed and number: 400 runs
-        begin with the same 200. Items of a list keep their type.
+        ``scipy.stats``. A run's values depend only on seed and number: the first 200 of 400 runs
+        are the runs of a study with 200. Items of a list keep their type.
     runs : int
         Number of runs.
     seed : int, default 1

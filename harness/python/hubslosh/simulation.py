@@ -218,8 +218,8 @@ def run_of(
 def asked_of(fmu: Fmu, columns: Sequence[str], given: Container[str]) -> list[str]:
     """Return the names of the variables that a run must record.
 
-    These are ``columns``, and the variables that show whether a tank is in the range of its model;
-    variables in ``given`` are left out.
+    The list contains ``columns``, and the variables that show whether a tank is in the range of its
+    model; variables in ``given`` are left out.
     """
     limits = [name for name in native.limit_columns(fmu.native) if name not in columns]
     return [name for name in (*columns, *limits) if name not in given]
@@ -282,7 +282,7 @@ def outputs_of(
 ) -> list[str]:
     """Return the names of the variables to record.
 
-    For ``None`` these are all outputs and the variables from which `view` draws the run.
+    For ``None`` the function returns all outputs and the variables from which `view` draws the run.
     """
     if outputs is not None:
         return fmu.components(names_of(outputs, "outputs", problems))

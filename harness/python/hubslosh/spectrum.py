@@ -42,7 +42,7 @@ def frequency_response(
         Column of the output.
     resolution : float, optional
         Half the width of the smoothing, Hz; by default three lines of the spectrum. A wider
-        window reduces noise more, but flattens a narrow resonance: keep it below ζ f.
+        window reduces noise more, but flattens a narrow resonance: keep the resolution below ζ f.
     band : tuple of float, optional
         Lowest and highest frequency, Hz; by default all.
     hold : bool

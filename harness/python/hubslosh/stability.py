@@ -83,7 +83,7 @@ class Margins:
     def gain_margins(self) -> tuple[float, float]:
         """Gain margins, dB: how far the gain may be reduced, and how far it may be increased.
 
-        They are (-inf, inf) if any gain is allowed.
+        The result is (-inf, inf) if any gain is allowed.
         """
         every = self.crossings["gain_margin"].to_numpy(float)  # NaN: a gain crossing
         down, up = every[every < 0], every[every >= 0]
@@ -93,7 +93,7 @@ class Margins:
     def phase_margin(self) -> float:
         """Phase margin, deg: the smallest in magnitude of all gain crossings.
 
-        It is inf if the loop gain has no gain crossing.
+        The margin is inf if the loop gain has no gain crossing.
         """
         margins = self.crossings["phase_margin"].to_numpy(float)
         margins = margins[~np.isnan(margins)]
@@ -144,10 +144,10 @@ def _decibel(value: float) -> str:
 def margins(loop: Loop | LinearModel | Any, parameters: Parameters | None = None) -> Margins:
     """Return every gain and phase crossing of a loop, its margins, and whether it is stable.
 
-    No frequency grid decides what is found: poles and zeros bound slope and curvature of the
-    loop gain, and intervals of frequency are halved until each has one crossing at most.
-    Crossings are then refined in the state space to rounding. A phase crossing with a loop gain
-    below 1e-12 or above 1e8 is left out.
+    Crossings are found without a frequency grid: poles and zeros bound slope and curvature of the
+    loop gain, and intervals of frequency are halved until each has one crossing at most. Crossings
+    are then refined in the state space to rounding. A phase crossing with a loop gain below 1e-12 or above
+    1e8 is left out.
 
     Parameters
     ----------
@@ -355,8 +355,8 @@ def _compiled(model: LinearModel) -> Any:
 def band(model: LinearModel) -> tuple[float, float]:
     """Return the frequency band (Hz) in which a diagram should show the first input and output.
 
-    It reaches from a fifth of the lowest pole or zero to five times the highest, but not above half
-    the sampling rate.
+    The band reaches from a fifth of the frequency of the lowest pole or zero to five times the
+    highest, but not above half the sampling rate.
     """
     one = LinearModel(model.A, model.B[:, :1], model.C[:1], model.D[:1, :1], (), (), ())
     values = np.concatenate([model.poles, _zeros(one)])

@@ -91,7 +91,7 @@ class Store:
     def add(
         self, run: int, drawn: Mapping[str, Any], found: Mapping[str, float], **more: Any
     ) -> None:
-        """Store the result of a run. When the call returns, it is on the disk."""
+        """Store the result of a run. When the call returns, the run is on the disk."""
         row = {"run": run, "drawn": _texts(drawn), "found": _texts(found)} | more
         self._store.add(_name(run), (json.dumps(row) + "\n").encode())
 

@@ -96,14 +96,14 @@ def read_parameters(path: str | Path) -> dict[str, Quantity]:
     Parameters
     ----------
     path : str or Path
-        The file; its ending says which format it has.
+        The file; the ending of the file's name states the format.
 
     Returns
     -------
     dict
         Values by name, for `simulate` and `Loop`. A parameter of a .ssv with a unit is a pair
         (number, unit), where the unit is defined by the file, or else by the FMU. `Fmu.convert`
-        converts or refuses it.
+        converts or refuses the value.
 
     Raises
     ------

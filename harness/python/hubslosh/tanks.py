@@ -393,7 +393,7 @@ def fill_table(
     """Return the parameters of a draining tank 1 of Spacecraft, and warnings.
 
     ``between`` has the lowest and the highest fill of the table of modal parameters. Up to 12 fills
-    are placed between them, which takes about 5 s of CPU time.
+    are placed between the two given fills, which takes about 5 s of CPU time.
     """
     ends = tuple(between)
     if len(ends) != 2:

@@ -13,8 +13,8 @@ from .native import FmuError, Folder, destination, put
 def folder(parent: Path | None = None, *, hidden: bool = False) -> Folder:
     """Return a temporary folder for a ``with`` statement, which removes the folder at its end.
 
-    By default it is in the system's folder for temporary files. Folders that were left there by
-    killed processes of Python or of the program are removed first.
+    By default the new folder is in the system's folder for temporary files. Folders that were left
+    there by killed processes of Python or of the program are removed first.
     """
     return Folder(Path(tempfile.gettempdir()) if parent is None else parent, hidden)
 
@@ -53,7 +53,8 @@ def check_path(path: Any, ending: str) -> Path:
 def write_file(path: str | Path, ending: str, content: Callable[[], str | bytes]) -> None:
     """Write a text or bytes to a file, after checking that the file's name has the ending.
 
-    ``content`` is a function that returns the text or the bytes; it is called after the check.
+    ``content`` is a function that returns the text or the bytes; the function is called after the
+    check.
     """
     path = check_path(path, ending)
     with output(path) as new:

@@ -613,7 +613,7 @@ class UncertainModel:
     def deltas(self) -> tuple[str, ...]:
         """Names of the δ in Δ.
 
-        These are the parameters with ranges, then ``axis[n]`` for the principal axes of a
+        The names are the parameters with ranges, then ``axis[n]`` for the principal axes of a
         covariance.
         """
         return tuple(str(name) for name in self.spread.columns)
@@ -837,10 +837,10 @@ class UncertainModel:
     def mu_upper(self, loop: Loop, frequency: ArrayLike) -> Matrix:
         """Return an upper bound of µ of the closed loop at each frequency.
 
-        It is 1 over the largest size at which D and G scalings with a full block for each
-        parameter (Fan, Tits and Doyle 1991) show that the loop has no pole at this frequency,
-        0.001 at least. Quantities such as damping ratios stay at 0 or above. The bound holds only
-        at the given frequencies, and not between them; use `certify` for all frequencies.
+        The bound is 1 over the largest size at which D and G scalings with a full block for each
+        parameter (Fan, Tits and Doyle 1991) show that the loop has no pole at this frequency, 0.001
+        at least. Quantities such as damping ratios stay at 0 or above. The bound holds only at the
+        given frequencies, and not between them; use `certify` for all frequencies.
 
         Parameters
         ----------
@@ -1285,7 +1285,7 @@ def uncertain(
     """Return a linear model of Spacecraft with uncertain parameters, exact for every value.
 
     The craft must be free and at rest, and its tanks axially symmetric. Warns with FmuWarning if
-    its thrust turns the craft faster and faster; `Craft.uncertain` trims it first.
+    its thrust turns the craft faster and faster; `Craft.uncertain` trims the craft first.
 
     Uncertain parameters are ``tank[1].frequency[1]`` (Hz, for a tank that is held at rest, under
     the present thrust; the height of the slosh mass and the share of a centring stiffness do not

@@ -32,7 +32,7 @@ class View:
     Attributes
     ----------
     html : str
-        The page. It contains everything that it needs, so that it works without a network.
+        The page. The page contains everything that it needs, so that it works without a network.
     path : Path or None
         File of the page, if `view` was given ``out``.
 
@@ -120,7 +120,8 @@ def view(
     Raises
     ------
     FmuError
-        If columns are missing; the message names them. If a file cannot be read or written.
+        If columns are missing; the message names the missing columns. If a file cannot be read or
+        written.
 
     Examples
     --------

@@ -42,15 +42,15 @@ class Wheel:
     axis : sequence of float, shape (3,)
         Direction of the axis, body axes, of any length.
     inertia : float
-        Moment of inertia of the rotor about the axis, kg·m². It also belongs to the inertia of the
-        craft.
+        Moment of inertia of the rotor about the axis, kg·m². The inertia of the craft also includes
+        the wheel's inertia.
     max_torque : float
-        Largest torque, N·m; a larger command is limited to it.
+        Largest torque, N·m; a larger command is limited to this torque.
     max_speed : float
-        Largest speed relative to the body, rad/s. At this speed a torque that would raise it has no
-        effect.
+        Largest speed relative to the body, rad/s. At this speed a torque that would raise the speed
+        has no effect.
     speed : float
-        Speed at the start, rad/s; it gives the wheel's bias momentum.
+        Speed at the start, rad/s; this speed gives the wheel's bias momentum.
 
     Examples
     --------
@@ -230,7 +230,7 @@ def torques_of(
 ) -> dict[str, Wheel]:
     """Return the wheels whose torques are columns of ``inputs``, by the names of the torques.
 
-    What is wrong with these columns is appended to ``problems``.
+    An error message about these columns is appended to ``problems``.
     """
     found = {name: of for name, of in torque_names(wheels).items() if name in inputs}
     problems += [

@@ -115,8 +115,8 @@ def search(evaluate: Evaluate, points: "Sequence[Point]") -> "list[Point]":
     """Search the operating point with the smallest modulus margin; return all points tried.
 
     The search starts at the corner to which the effects of single ranges point, and at the worst
-    points so far. It changes one coordinate at a time, by a step that is halved when no change
-    makes the point worse, so that it finds a local minimum.
+    points so far. The search changes one coordinate at a time, by a step that is halved when no
+    change makes the point worse, and so finds a local minimum.
     """
     found: list[Point] = list(points)
     count = len(points[0].shares)
