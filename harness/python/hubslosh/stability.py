@@ -146,8 +146,8 @@ def margins(loop: Loop | LinearModel | Any, parameters: Parameters | None = None
 
     Crossings are found without a frequency grid: poles and zeros bound slope and curvature of the
     loop gain, and intervals of frequency are halved until each has one crossing at most. Crossings
-    are then refined in the state space to rounding. A phase crossing with a loop gain below 1e-12 or above
-    1e8 is left out.
+    are then refined in the state space to rounding. A phase crossing with a loop gain below 1e-12
+    or above 1e8 is left out.
 
     Parameters
     ----------
