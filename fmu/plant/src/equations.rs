@@ -610,6 +610,7 @@ mod tests {
         assert!(plant.take_event(&inputs).is_err());
     }
 
+    /// A step of 1e12 s with the gyro enabled would take 5e13 samples.
     #[test]
     fn a_step_with_more_samples_than_allowed_is_refused_at_once() {
         let mut p = Parameters::default();
@@ -625,6 +626,7 @@ mod tests {
         plant.step(&inputs, 100.0).unwrap();
     }
 
+    /// The hub's rate, or the rate of a slosh mass, is set to a value whose square overflows.
     #[test]
     fn a_motion_whose_energy_overflows_is_refused() {
         for slosh in SloshModel::ALL {
@@ -658,6 +660,7 @@ mod tests {
         assert_eq!(*plant.state(), before);
     }
 
+    /// A hub that slips under −0.03 N·m sticks after the Coulomb friction is raised to 1 N·m between two steps.
     #[test]
     fn friction_can_be_changed_while_running() {
         let (mut plant, inputs) = plant(SloshModel::Linear, FrictionModel::Stribeck);
@@ -679,6 +682,8 @@ mod tests {
         assert!(plant.omega() < 0.0);
     }
 
+    /// The derivatives of the bench, integrated by Runge–Kutta steps of 0.1 ms, end at the state that the Co-Simulation
+    /// step reaches.
     #[test]
     fn a_model_exchange_host_reproduces_co_simulation_of_the_plant() {
         // Runge-Kutta 4 at 0.1 ms: (omega_2 h)^4 = 4e-11 per step; 1e-9 over 0.2 s.

@@ -148,7 +148,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn noise_has_the_stated_spread_and_no_correlation() {
+    fn the_normal_random_numbers_of_the_gyro_have_unit_variance_and_no_correlation() {
         const COUNT: usize = 200_000;
         let all: Vec<(f64, f64)> = (0..COUNT as u64).map(|k| normals(7, k)).collect();
         let mean = |f: &dyn Fn(usize) -> f64| (0..COUNT).map(f).sum::<f64>() / COUNT as f64;
@@ -161,8 +161,9 @@ mod tests {
         assert!(mean(&|k| all[k].0 * all[(k + 1) % COUNT].0).abs() < 0.012);
     }
 
+    /// A Gauss–Markov bias over 10,000 correlation times.
     #[test]
-    fn bias_drifts_with_its_stationary_spread() {
+    fn a_gyro_bias_has_the_specified_standard_deviation() {
         let imu = Imu { bias_time: 1.0, arw: 0.0, ..Imu::default() };
         let mut gyro = imu.start();
         let mut sum = 0.0;
@@ -236,8 +237,9 @@ mod tests {
         }
     }
 
+    /// Random numbers of the rate random walk are drawn apart from those of white noise and bias.
     #[test]
-    fn without_flicker_noise_and_random_walk_no_random_numbers_are_drawn_for_them() {
+    fn the_other_noise_of_the_gyro_is_equal_with_and_without_a_rate_random_walk() {
         let imu = Imu { lsb: 0.0, ..Imu::default() };
         let (mut gyro, mut slow) = (imu.start(), Imu { rrw: 1e-9, ..imu }.start());
         for _ in 0..100 {
@@ -249,6 +251,7 @@ mod tests {
         assert!(slow.walk != 0.0);
     }
 
+    /// An angular random walk of 1e-3 rad/√s, sampled at 50 and 200 Hz.
     #[test]
     fn white_noise_of_a_sample_is_the_random_walk_times_the_root_of_the_rate() {
         for rate in [50.0, 200.0] {
@@ -284,8 +287,9 @@ mod tests {
         }
     }
 
+    /// 40,000 gyros that differ in their seeds.
     #[test]
-    fn bias_is_drawn_from_its_spread_and_keeps_its_correlation_time() {
+    fn the_initial_gyro_bias_has_the_specified_standard_deviation_and_correlation_time() {
         const COUNT: i32 = 40_000;
         // One period is one correlation time: exp(-1) of the bias remains.
         let imu = Imu { bias_instability: 1e-3, bias_time: 0.1, ..clean(10.0) };
@@ -321,7 +325,7 @@ mod tests {
     }
 
     #[test]
-    fn sample_k_is_taken_k_periods_after_the_start() {
+    fn gyro_sample_k_is_taken_k_periods_after_the_start() {
         let imu = clean(50.0);
         let mut gyro = imu.start();
         imu.sample(&mut gyro, 0.0);
@@ -344,7 +348,7 @@ mod tests {
     }
 
     #[test]
-    fn a_reading_is_rounded_to_the_nearest_step() {
+    fn a_gyro_reading_is_rounded_to_the_nearest_quantisation_step() {
         let imu = Imu { lsb: 1e-3, ..clean(50.0) };
         for (rate, steps) in [(0.012_3, 12.0), (0.012_7, 13.0), (-0.012_7, -13.0)] {
             let mut gyro = imu.start();

@@ -131,8 +131,9 @@ mod tests {
         Wheel { enabled: true, ..Wheel::default() }
     }
 
+    /// A torque command, constant or rising from 0, at the lowest and at the highest speed of the rotor.
     #[test]
-    fn a_torque_command_at_a_limit_is_within_or_beyond_it_by_its_direction() {
+    fn a_wheel_at_a_speed_limit_gives_only_torque_that_leads_away_from_the_limit() {
         let w = wheel();
         let none = Ramp { value: 0.0, slope: 0.0 };
         for (speed, blocked) in [(w.speed_min, 1.0), (w.speed_max, -1.0)] {
@@ -151,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn torque_is_clipped_at_the_limit() {
+    fn the_torque_of_a_wheel_is_clipped_at_its_limit() {
         // A ramp through 0 from -1 to 1 N m in 2 s has zero impulse; both ends are clipped.
         let (impulse, speed, _) = run(&wheel(), Ramp { value: -0.5, slope: 0.5 }, 2.0);
         assert!(impulse.abs() < 1e-15);
@@ -181,14 +182,14 @@ mod tests {
     }
 
     #[test]
-    fn a_speed_outside_its_limits_is_refused_and_one_at_them_is_not() {
+    fn an_initial_wheel_speed_outside_its_limits_is_refused_and_a_speed_at_a_limit_is_accepted() {
         let Wheel { speed_min: low, speed_max: high, .. } = wheel();
         let wrong = |speed_0: f64| !Wheel { speed_0, ..wheel() }.problems().is_empty();
         assert_eq!([low, high, low - 1e-6, high + 1e-6].map(wrong), [false, false, true, true]);
     }
 
     #[test]
-    fn a_rising_command_at_a_limit_is_limited_and_a_falling_one_is_not() {
+    fn a_torque_command_that_leaves_a_limit_outwards_is_clipped_and_one_that_falls_below_is_not() {
         let w = wheel();
         let (limit, middle) = (w.tau_max, w.speed_0);
         for sign in [1.0, -1.0] {
@@ -250,6 +251,7 @@ mod tests {
         }
     }
 
+    /// With `wheel.enabled` = false the torque has no limits; its integral is still added up as a speed.
     #[test]
     fn an_actuator_without_a_wheel_gives_the_commanded_torque_and_sums_its_reaction() {
         let w = Wheel { enabled: false, ..wheel() };

@@ -381,7 +381,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn defaults_equal_those_of_the_standard() {
+    fn missing_attributes_of_a_variable_get_the_defaults_of_the_standard() {
         let xml = br#"<fmiModelDescription><TypeDefinitions><SimpleType name="T"><Real unit="m"
             min="1"/></SimpleType></TypeDefinitions><ModelVariables>
             <ScalarVariable name="a" valueReference="3"><Real declaredType="T" min="2"/></ScalarVariable>

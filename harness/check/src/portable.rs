@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn names_in_the_standard_are_found_only_with_its_capital_letters() {
+    fn folder_names_of_the_standard_in_wrong_capitals_are_reported() {
         for (wrong, right) in [
             ("Binaries/Linux64/a.so", "binaries/linux64/a.so"),
             ("binaries/Win64/a.dll", "binaries/win64/a.dll"),

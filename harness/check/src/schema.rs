@@ -438,7 +438,7 @@ mod tests {
     }
 
     #[test]
-    fn every_element_that_stands_inside_another_is_in_the_table() {
+    fn every_child_element_that_the_schema_allows_is_in_the_schema_table() {
         for kinds in [KINDS, fmi3::KINDS] {
             for kind in kinds {
                 let names: Vec<&str> = match kind.children {

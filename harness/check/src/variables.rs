@@ -338,7 +338,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn structured_names_are_paths() {
+    fn names_of_variables_follow_the_syntax_of_structured_names() {
         for right in [
             "a",
             "a.b_1[2,3].c",

@@ -152,8 +152,10 @@ mod tests {
 
     use super::*;
 
+    /// Friction factor 1.1 + 0.04 cos θ − 0.03 sin θ + 0.02 cos 2θ + 0.01 sin 2θ, for a hub at rest and for a hub that
+    /// turns.
     #[test]
-    fn each_harmonic_has_its_sign_where_the_hub_rests_and_where_it_turns() {
+    fn each_harmonic_of_the_friction_over_the_angle_has_the_documented_sign() {
         let one = OneWay { mean: 1.1, harmonics: [0.04, -0.03, 0.02, 0.01] };
         for (theta, expected) in [
             (0.0, 1.1 + 0.04 + 0.02),
@@ -174,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn the_lower_bound_is_below_the_lowest_factor_by_no_more_than_2e_6_of_its_harmonics() {
+    fn the_lower_bound_of_the_friction_over_the_angle_is_at_most_2e_6_of_the_harmonics_too_low() {
         let half = core::f64::consts::PI / 4096.0;
         for place in [0.0, 1.0, 1024.0, 1025.0, 3001.0, 4095.0] {
             let (s, c) = (place * half).sin_cos();

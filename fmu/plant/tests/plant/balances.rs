@@ -35,6 +35,8 @@ impl Turnover {
     }
 }
 
+/// Random benches with each slosh model and friction law: the change of energy equals the work of the torques less the
+/// dissipated energy.
 #[test]
 fn energy_balances_for_every_model_friction_and_damping() {
     let mut rng = fastrand::Rng::with_seed(1);
@@ -82,6 +84,7 @@ fn the_dissipated_power_equals_the_rate_at_which_energy_is_lost() {
     }
 }
 
+/// Random benches with each slosh model.
 #[test]
 fn momentum_is_constant_without_torque_and_friction() {
     let mut rng = fastrand::Rng::with_seed(2);
@@ -121,6 +124,7 @@ fn momentum_changes_only_by_torque_whatever_the_damping_of_the_liquid() {
     assert!((plant.outputs(&inputs).momentum - first - 0.1).abs() < 1e-11);
 }
 
+/// Random benches with each slosh model and friction law.
 #[test]
 fn energy_never_grows_without_torque() {
     let mut rng = fastrand::Rng::with_seed(3);
@@ -199,6 +203,7 @@ fn a_stuck_hub_is_exactly_at_rest() {
     }
 }
 
+/// A torque ramp over 10 s, in steps of 20 ms, of 5 ms and of random length.
 #[test]
 fn trajectory_does_not_depend_on_the_communication_step() {
     let mut rng = fastrand::Rng::with_seed(5);
@@ -260,7 +265,7 @@ fn nonlinear_models_approach_the_linear_one_quadratically() {
 }
 
 #[test]
-fn liquid_of_vanishing_mass_moves_as_the_frozen_model() {
+fn a_bench_with_liquid_of_vanishing_mass_moves_as_a_bench_with_rigid_liquid() {
     let run = |slosh, rho| {
         let mut p = bench(slosh, FrictionModel::Stribeck);
         p.fluid.rho = rho;
@@ -276,6 +281,7 @@ fn liquid_of_vanishing_mass_moves_as_the_frozen_model() {
     }
 }
 
+/// An asymmetry and harmonics over the angle that together make the friction factor negative.
 #[test]
 fn friction_that_would_drive_the_hub_is_refused() {
     let refused = |asymmetry: f64, forward: [f64; 4]| {
@@ -305,6 +311,7 @@ fn a_bearing_with_a_preferential_direction_holds_less_torque_in_that_direction()
     assert!(stuck(-7.105e-3) && !stuck(-7.106e-3));
 }
 
+/// The wheel reaches its torque limit and then its lowest speed; the sum of the angular momenta stays constant.
 #[test]
 fn hub_liquid_and_wheel_together_keep_their_momentum() {
     let mut p = bench(SloshModel::Spherical, FrictionModel::None);
@@ -344,7 +351,7 @@ fn without_gravity_results_stay_finite_or_the_liquid_drifts_over_the_rim() {
 }
 
 #[test]
-fn gyro_reads_the_same_at_any_communication_step() {
+fn gyro_readings_are_equal_for_any_communication_step() {
     let mut p = bench(SloshModel::Linear, FrictionModel::Viscous);
     p.imu.enabled = true;
     p.imu.lsb = 1e-6;
@@ -373,6 +380,7 @@ fn gyro_reads_the_same_at_any_communication_step() {
 /// processes.
 const RANDOM_STEPS: usize = if cfg!(debug_assertions) { 200 } else { 1_000 };
 
+/// Random benches, torques up to 100 N·m and steps of random length.
 #[test]
 fn random_steps_give_finite_results_or_a_clear_error() {
     let from =

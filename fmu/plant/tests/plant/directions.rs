@@ -293,6 +293,8 @@ fn equal_modes_at_right_angles_are_one_mode_along_the_tangent() {
     }
 }
 
+/// `slosh.table.direction` is allowed only for the slosh models `linear` and `planar`; the modal masses in one direction
+/// must not exceed the mass of liquid.
 #[test]
 fn directions_of_modes_are_refused_for_models_without_them() {
     let refused = |change: fn(&mut Parameters)| {
@@ -362,6 +364,7 @@ fn a_start_is_along_the_direction_of_mode_1_or_refused() {
     }
 }
 
+/// The slosh models `linear` and `planar` move only tangentially, unless a mode has a direction with a radial component.
 #[test]
 fn a_radial_initial_angle_without_effect_brings_a_warning() {
     for (model, direction, warned) in [

@@ -174,8 +174,9 @@ fn braked() -> (Parameters, f64) {
     (p, rest)
 }
 
+/// Friction and a constant torque brake a hub; the time of rest is known in closed form.
 #[test]
-fn a_step_stops_where_the_hub_comes_to_rest() {
+fn a_step_ends_at_the_time_at_which_the_hub_comes_to_rest() {
     let (p, rest) = braked();
     for start in [0.0, 1000.0] {
         let mut plant = Plant::new(&p, &torque(-0.001), start, 1e-9).unwrap();

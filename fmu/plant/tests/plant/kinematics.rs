@@ -101,6 +101,8 @@ fn assert_near(got: f64, want: f64, size: f64, what: &str) {
     assert!((got - want).abs() < size, "{what}: {got} {want}");
 }
 
+/// Positions of hub and slosh masses at several times give velocities and accelerations by differences; forces, momentum
+/// and energy follow from Newton's law.
 #[test]
 fn forces_momentum_and_energy_equal_those_of_the_masses_at_their_places() {
     for slosh in SloshModel::ALL {
@@ -167,6 +169,7 @@ fn liquid_that_turns_with_the_hub_pushes_outwards() {
     }
 }
 
+/// At the first instant of a torque step only the rigid part of the liquid accelerates with the hub.
 #[test]
 fn liquid_at_rest_reacts_against_an_acceleration_of_the_hub() {
     for slosh in SloshModel::ALL {

@@ -160,6 +160,7 @@ fn rigid_liquid_follows_the_hub() {
     }
 }
 
+/// Modes are corrected for a leaning bench only if they are computed from the geometry and the tilt is not 0.
 #[test]
 fn without_tilt_or_with_a_table_the_modes_are_used_as_given() {
     for model in SLOSHING {
@@ -192,6 +193,8 @@ fn a_surface_that_reaches_the_bottom_is_refused_unless_the_liquid_is_rigid() {
     assert_eq!(refused(&leaning(SloshModel::Linear, 0.99, 0.0)), None);
 }
 
+/// In a leaning cylinder the frequencies across and along the tilt differ, but the spherical pendulum has only one
+/// frequency.
 #[test]
 fn warnings_name_large_tilts_and_one_pendulum_for_two_frequencies() {
     let warnings = |model, s| Plant::warnings(&leaning(model, s, 0.0), &at(0.0));

@@ -8,6 +8,8 @@ use plant::{Inputs, Parameters, Plant, SloshModel, SloshSource};
 /// Sampling interval of motions, s.
 const SAMPLE: f64 = 1e-3;
 
+/// With the large-wave coefficients 1 the relative shifts are −1/8 of the squared angle (planar) and 1/2 (circular motion,
+/// per squared radius).
 #[test]
 fn s_and_kappa_of_1_give_the_frequency_shift_of_a_pendulum() {
     let found = shifts(SloshModel::Spherical, 0.10, SAMPLE);

@@ -21,6 +21,7 @@ fn torque(value: f64) -> Inputs {
 /// Break-away torque c + d of the bench's bearing, N m.
 const G_MAX: f64 = 0.003498 + 0.002423;
 
+/// LuGre friction with asymmetry and with harmonics over the angle, each slosh model.
 #[test]
 fn energy_balances_and_the_bearing_never_adds_energy() {
     for slosh in SloshModel::ALL {
@@ -96,6 +97,8 @@ fn dissipation_is_never_negative_up_to_the_largest_sigma1_and_no_further() {
     assert!(problems[0].contains("friction.c"), "{problems:?}");
 }
 
+/// With growing bristle stiffness the motion under LuGre friction converges to the motion under Stribeck friction with true
+/// sticking.
 #[test]
 fn stiff_lugre_bristles_approach_the_set_valued_law() {
     // A sine that the hub follows with stops: sliding, reversal, rest.
@@ -161,7 +164,7 @@ fn driven(
 }
 
 #[test]
-fn the_first_deflection_is_dahls_curve() {
+fn the_bristle_force_of_lugre_friction_from_rest_follows_dahls_curve() {
     // Slowly from rest: g stays c + d, and F = g (1 - exp(-sigma_0 x/g)).
     let mut p = bench(SloshModel::Frozen);
     p.friction.sigma1 = 0.0;
@@ -220,7 +223,7 @@ fn lag(frequency: f64) -> f64 {
 }
 
 #[test]
-fn friction_lags_behind_the_rate_and_more_so_the_faster_it_changes() {
+fn lugre_friction_lags_behind_the_rate_the_more_the_faster_the_rate_changes() {
     let [slow, middle, fast] = [1.0, 4.0, 16.0].map(lag);
     // Larger while the rate grows than while it falls: Stribeck's curve falls with the rate.
     assert!(slow > 0.0 && middle > 2.0 * slow && fast > 2.0 * middle, "{slow} {middle} {fast}");
@@ -228,7 +231,7 @@ fn friction_lags_behind_the_rate_and_more_so_the_faster_it_changes() {
 }
 
 #[test]
-fn break_away_takes_less_torque_the_faster_it_rises() {
+fn lugre_friction_breaks_away_at_less_torque_the_faster_the_torque_rises() {
     // Canudas de Wit et al., figure 4; w_s as small as theirs, so that the hub passes it while
     // the bristles still deflect.
     let break_away = |slope: f64| {

@@ -97,6 +97,7 @@ fn energy_balances_on_a_leaning_bench_with_baffle_and_capillarity() {
     }
 }
 
+/// A leaning bench with baffle, capillarity, imbalance and breaking waves, in one step of 10 s or in steps of 3 ms.
 #[test]
 fn motion_with_all_options_does_not_depend_on_the_communication_step() {
     for slosh in SloshModel::ALL {
@@ -350,6 +351,7 @@ fn damping_ratio_follows_the_restoring_force_down_to_weightlessness() {
     }
 }
 
+/// For example `slosh.zeta` has no effect while `slosh.zeta_from_correlation` is true; the warning says so.
 #[test]
 fn a_replaced_parameter_names_the_parameter_that_replaces_it() {
     let why = |p: &Parameters, name: &str| p.overridden(name).unwrap_or_default();

@@ -25,6 +25,7 @@ fn inertia(p: &Parameters) -> f64 {
     p.hub.inertia + m_liq * p.tank.r * p.tank.r
 }
 
+/// With `hub.k` = `hub.c` = 0 the rest angle `hub.theta_0` has no effect.
 #[test]
 fn a_suspension_line_without_stiffness_and_damping_changes_no_bit() {
     for slosh in SLOSH {
@@ -146,8 +147,9 @@ fn dry_friction_stops_a_hanging_hub_where_and_when_it_must() {
     }
 }
 
+/// The hub hangs on a line with torsional stiffness and damping.
 #[test]
-fn energy_and_torques_balance_and_no_communication_step_matters() {
+fn energy_and_torques_balance_on_a_suspension_line_for_any_communication_step() {
     for slosh in SLOSH {
         for friction in FRICTION {
             let mut p = bench(slosh, friction);

@@ -137,6 +137,7 @@ const MISBEHAVIOURS: &[(&str, &str)] = &[
     ("other_order", "exchange.variables"),
 ];
 
+/// A library around the binary of HubSlosh makes one fault at a time, for example a wrong status.
 #[cfg(target_os = "linux")]
 #[test]
 fn binaries_that_misbehave_are_reported_by_the_intended_rule() {
@@ -226,6 +227,7 @@ derivatives of outputs to an order that is not there | <CoSimulation | maxOutput
 another GUID | <fmiModelDescription | guid="{ | guid="{x | load.instance
 "#;
 
+/// The model description of HubSlosh is changed, for example by exchanging two value references, and the binary is not.
 #[test]
 fn descriptions_that_do_not_fit_the_binary_are_reported() {
     // theta and omega

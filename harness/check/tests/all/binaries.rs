@@ -9,6 +9,7 @@ use zip::CompressionMethod;
 
 use crate::common::{binary, breaks, broken, changed, check_rules, look, ours, with, zipped};
 
+/// `hubslosh check` of HubSlosh as packed for tests has no finding, except the rule on system libraries.
 #[test]
 fn our_own_fmu_keeps_every_rule() {
     let report = check_rules(packed_for_tests(), &[], 120.0);
@@ -27,6 +28,7 @@ fn our_own_fmu_keeps_every_rule() {
     assert_eq!(report.outcomes.len(), RULES.len());
 }
 
+/// The binary of HubSlosh is changed, renamed or replaced by a library that needs other libraries.
 #[test]
 fn binaries_that_no_host_can_use_are_reported() {
     let name = binary();
@@ -130,6 +132,7 @@ fn binaries_that_no_host_can_use_are_reported() {
     );
 }
 
+/// The folder of the binary has wrong capitals, so no binary for this platform is found.
 #[test]
 fn a_check_that_could_not_call_the_fmu_states_this_in_its_report() {
     let mut files = ours().clone();

@@ -107,6 +107,7 @@ fn get_no_finding(cases: &[(&str, &[&str], f64, &str)]) {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
+/// Small FMUs in C with time constants down to 1e-5 s, and with only one of the two interfaces.
 #[cfg(target_os = "linux")]
 #[test]
 fn correct_fmus_get_no_finding_whatever_their_stiffness_and_capabilities() {
@@ -119,6 +120,7 @@ fn correct_fmus_get_no_finding_whatever_their_stiffness_and_capabilities() {
     ]);
 }
 
+/// Small FMUs in C with step sizes of the default experiment from 1 µs to 1000 s.
 #[cfg(target_os = "linux")]
 #[test]
 #[ignore = "five seconds of CPU time: .ci/long-tests"]
@@ -135,6 +137,7 @@ fn correct_fmus_get_no_finding_whatever_their_experiment() {
     ]);
 }
 
+/// A Model Exchange FMU whose state goes to infinity in finite time breaks only `exchange.run`.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_model_without_a_solution_is_reported_by_one_rule() {
@@ -216,7 +219,7 @@ fn a_log_message_without_category_is_reported() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_crash_in_every_step_is_one_finding() {
+fn an_fmu_that_crashes_in_every_step_gets_a_single_finding() {
     let report = stepped(&["-DCRASHES"], USUAL, &["life", "host", "values", "states", "steps"]);
     let all: Vec<_> = report.all().map(|(rule, _)| rule.id).collect();
     assert_eq!(all, ["steps.run"], "{}", report.text());
@@ -261,7 +264,7 @@ fn a_fault_is_reported_by_its_own_rule_with_its_severity() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn symbols_of_other_languages_do_not_fill_a_report() {
+fn undefined_symbols_of_cpp_and_python_are_reported_in_readable_form() {
     for (symbol, told) in [
         ("_ZNK9pythonfmu7PyState4callEv", "undefined symbol: pythonfmu::PyState::call"),
         ("_Py_NoneStruct", "needs a Python host"),
