@@ -7,7 +7,7 @@ from thrust import BANDWIDTHS, CRAFT, THRUST, decay, linear, run, slosh_pole
 import hubslosh
 
 
-def test_the_craft_is_what_readme_says(fmu: str) -> None:
+def test_mass_frequencies_damping_and_bond_number_equal_the_readme(fmu: str) -> None:
     """Mass, frequencies, damping and Bond number are computed by the FMU."""
     names = ["tank.m_liq", "slosh.frequency[1]", "slosh.damping[1]", "tank.bond"]
     with hubslosh.Plant(fmu, CRAFT | {"g_axial": THRUST}) as plant:

@@ -12,7 +12,9 @@ def after(run) -> float:
     return float(np.degrees(run.loc[run["time"] >= DURATION, "error"].abs().max()))
 
 
-def test_inertias_equal_those_of_all_liquid_and_of_the_rigid_part(spacecraft: str) -> None:
+def test_the_inertia_with_rigid_liquid_is_the_inertia_of_craft_and_liquid_together(
+    spacecraft: str,
+) -> None:
     """With rigid liquid the FMU has the inertia of craft and liquid together.
 
     The observer's inertia is 17.5 kg·m² less, because the sloshing part does not follow a fast

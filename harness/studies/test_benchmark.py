@@ -122,7 +122,7 @@ def test_a_reference_scores_all_digits(tmp_path: Path) -> None:
         (lambda row: [*row[:3], 0.0], 0.0),
     ],
 )
-def test_digits_are_those_of_the_error_over_the_largest_value(
+def test_correct_digits_are_computed_from_the_error_over_the_largest_value(
     change: Callable, digits: float, tmp_path: Path
 ) -> None:
     """The error is divided by the largest value of the column; theta is at most 0.132 rad."""

@@ -78,7 +78,7 @@ def test_runs_of_a_cluster_with_a_killed_worker_equal_runs_of_the_harness(client
 
 
 @pytest.mark.usefixtures("long_runs")
-def test_when_the_only_worker_is_killed_its_successor_gets_all_it_needs(harness) -> None:
+def test_a_new_worker_receives_fmu_and_torque_after_the_only_worker_was_killed(harness) -> None:
     """The new worker receives FMU and torque again, because no other worker has them."""
     plan = 'profile = "exp-sweep:duration=60"\n[vary]\nprofile.amplitude = [0.05, 0.1, 0.2]\n'
     with cluster.cluster(1, None) as client:

@@ -29,7 +29,7 @@ def test_the_page_is_made_of_the_results() -> None:
 
 @pytest.mark.usefixtures("built")
 @pytest.mark.parametrize("name", measured.QUICK)
-def test_a_comparison_comes_out_as_it_was_kept(name: str) -> None:
+def test_the_comparisons_reproduce_the_stored_values_and_pictures(name: str) -> None:
     """The stored values are reproduced to 1e-4, and the pictures to 0.2 px."""
     rows, drawing = measured.EXPERIMENTS[name]()
     kept = {(row.experiment, row.quantity): row for row in measured.read_results()}

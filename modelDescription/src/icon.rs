@@ -36,7 +36,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_committed_picture_is_what_is_drawn() {
+    fn the_committed_icon_equals_the_drawn_icon() {
         let shown = std::fs::read(format!("{FOLDER}/icon.png")).unwrap();
         let shown = resvg::tiny_skia::Pixmap::decode_png(&shown).unwrap();
         let drawn = draw(&std::fs::read_to_string(format!("{FOLDER}/icon.svg")).unwrap()).unwrap();

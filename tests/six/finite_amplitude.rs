@@ -138,8 +138,9 @@ fn forced(ratio: f64, stroke: f64, heavy: f64) -> ([f64; 3], f64) {
     (largest, off)
 }
 
-/// A pendulum misses these series of potential flow by up to a factor of two. In the last one the motion
-/// across decays. The force has the error of the angle and an error of 2 % because there is only one mode.
+/// Forced waves near resonance in SloshTank and Spacecraft with large-wave coefficients equal waves of potential flow; a
+/// pendulum without these coefficients is wrong by up to a factor of two. In the last case the motion across the forcing
+/// decays.
 #[test]
 fn forced_waves_near_resonance_equal_those_of_potential_flow_in_both_fmus() {
     for (ratio, stroke, along, across, force) in [

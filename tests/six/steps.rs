@@ -122,7 +122,7 @@ fn a_million_random_steps_give_finite_results_or_a_clear_error() {
 
 /// omega follows from omega_dot in a step and must not leave its range there.
 #[test]
-fn a_step_refused_for_where_an_input_would_end_leaves_the_tank_as_it_was() {
+fn a_step_in_which_an_input_would_leave_its_range_is_refused_and_changes_nothing() {
     let mut tank = Instance::<::SloshTank::Model, Fmi2>::new(Interface::CoSimulation);
     tank.setup_experiment(None, 0.0, None).unwrap();
     tank.enter_initialization_mode().unwrap();

@@ -286,7 +286,7 @@ fn states_are_continuous_each_has_one_derivative_and_only_states_are_reinitialis
 /// An importer takes missing dependencies for a dependency on everything, and sees algebraic loops where
 /// there are none.
 #[test]
-fn dependencies_are_always_given_and_point_to_what_the_host_sets() {
+fn every_dependency_list_is_given_and_contains_only_inputs_parameters_and_states() {
     let all = variables();
     let states: BTreeSet<usize> = derivatives().into_iter().map(|(_, state)| state).collect();
     let kind = |index: &usize| match all[index - 1].0.get("causality").unwrap() {

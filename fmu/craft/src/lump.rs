@@ -968,7 +968,7 @@ mod tests {
 
     /// The series are t - 1/4, 1/4 - t, t - 1/4 from far below, and one that only touches zero.
     #[test]
-    fn a_series_rises_where_it_passes_zero_from_below() {
+    fn a_power_series_counts_as_rising_if_it_crosses_zero_from_below() {
         let series = |terms: &[f64]| {
             let mut series = ZERO;
             series[..terms.len()].copy_from_slice(terms);
@@ -1066,7 +1066,7 @@ mod tests {
     /// 4 m/s. The impact is immediate if the lump moves into the wall or rests there and is pressed. A lump
     /// that falls away from rest never meets the wall.
     #[test]
-    fn detached_liquid_hits_the_wall_in_front_of_it() {
+    fn the_impact_time_of_detached_liquid_on_the_wall_ahead_is_exact() {
         let mut lump = lump(BallState::Flying);
         lump.x_0[2] = -0.5;
         lump.rho = along_z(&[0.0, 3.0]);

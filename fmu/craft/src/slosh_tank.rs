@@ -1469,7 +1469,7 @@ mod tests {
     /// Upright under 9.81 m/s2 along its axis the tank is physical. After 2 s of 30 m/s2 across it, the
     /// pendulum has passed 45 degrees. At 1 m/s2 downwards the specific force has the wrong sign.
     #[test]
-    fn a_tank_is_physical_while_its_bobs_are_upright_and_the_force_holds_them() {
+    fn a_tank_is_in_range_within_45_degrees_and_while_the_force_presses_the_liquid_down() {
         let after = |a: [f64; 3], h: f64| {
             let p = TankParameters::default();
             let start =

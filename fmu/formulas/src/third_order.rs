@@ -143,7 +143,7 @@ mod tests {
     /// rule and Bessel functions by their integral. They check sign and magnitude of every term, also close
     /// to the resonance at 0.15.
     #[test]
-    fn coefficients_equal_those_of_the_averaged_lagrangian() {
+    fn third_order_coefficients_equal_those_of_the_averaged_lagrangian() {
         for (fill, s, kappa) in [
             (0.2, -38.74226735998278, 22.32712645333884),
             (0.6135, 1.1444681651736963, 0.8416439361254805),

@@ -180,7 +180,7 @@ mod tests {
     /// The same sums are evaluated without a closed form, by Simpson's rule from the expansion of K and M,
     /// whose error is (b/2000)^4/180.
     #[test]
-    fn coefficients_equal_those_of_the_perturbation_by_quadrature() {
+    fn coefficients_of_a_tilted_cylinder_equal_the_perturbation_integrals_by_quadrature() {
         const N: usize = 2000;
         let integral = |f: &dyn Fn(f64) -> f64| {
             let h = 1.0 / N as f64;

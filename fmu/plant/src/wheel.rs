@@ -229,7 +229,7 @@ mod tests {
     /// I_w (W_0 - W) = a t + b t^2/2: the rotor meets its limit at the right time, on a ramp and with a
     /// constant torque.
     #[test]
-    fn the_rotor_reaches_its_speed_limit_when_the_impulse_has_done_it() {
+    fn the_rotor_reaches_its_speed_limit_at_the_time_that_the_impulse_of_the_torque_gives() {
         let w = Wheel { speed_0: 100.0, speed_min: 20.0, speed_max: 150.0, ..wheel() };
         for (command, limit) in [
             (ramp(0.1, 0.0), w.speed_min),

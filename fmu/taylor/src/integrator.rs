@@ -904,7 +904,7 @@ mod tests {
 
     /// An oscillator that starts at x = 1 reaches the wall at 1/2 every 2 pi/3.
     #[test]
-    fn an_event_ends_the_expansion_and_the_step_goes_on_from_there() {
+    fn an_event_ends_the_power_series_and_a_new_series_begins_at_the_event() {
         let mut motion = Oscillator { wall: Some(0.5), ..Oscillator::new(Convergence::Decay) };
         motion.advance(7.0, 1e-12).unwrap();
         let since = 7.0 - 3.0 * core::f64::consts::TAU / 3.0;
@@ -1026,7 +1026,7 @@ mod tests {
     /// Calls of any length end at the same bits, before and after reflections at the wall, and within the tolerance. Coefficients
     /// that other uses of the motion have overwritten are computed again.
     #[test]
-    fn ends_of_calls_change_no_bit_of_a_kept_expansion() {
+    fn evaluating_a_power_series_in_several_calls_changes_no_bit_of_the_motion() {
         for convergence in [Convergence::Decay, Convergence::Terms(2)] {
             for (wall, tolerance) in [(None, 1e-4), (None, 1e-10), (Some(0.5), 1e-12)] {
                 let kept = || Kept::new(Oscillator { wall, ..Oscillator::new(convergence) });
@@ -1054,7 +1054,7 @@ mod tests {
 
     /// A short call needs fewer orders than a long one, and more for a smaller tolerance.
     #[test]
-    fn the_order_of_a_kept_expansion_follows_length_and_tolerance() {
+    fn the_order_of_a_power_series_grows_with_the_step_length_and_with_a_smaller_tolerance() {
         let orders = |h: f64, tolerance: f64| {
             let mut kept = Kept::new(Oscillator::new(Convergence::Decay));
             kept.advance(h, tolerance);

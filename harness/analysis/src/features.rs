@@ -190,8 +190,9 @@ mod tests {
         assert_eq!(Features::find(&response), clean);
     }
 
+    /// A hub without slosh, and a band that ends at 2.4 Hz between antiresonance and resonance.
     #[test]
-    fn no_resonance_is_reported_in_a_band_without_one_or_that_ends_below_it() {
+    fn no_resonance_is_reported_if_the_band_contains_none() {
         let hub = Linear { inertia: 0.4, friction: 0.04, arm: 0.2, ..Linear::default() };
         let grid = logarithmic_grid(BAND, 2000);
         assert_eq!(Features::find(&hub.frequency_response(&grid)), Features::default());

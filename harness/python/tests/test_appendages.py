@@ -119,7 +119,7 @@ def lagrange(of: dict[str, float], damping: list[float]) -> control.StateSpace:
 
 
 @pytest.mark.parametrize("fill", ["10%", "30%", "50%", "70%", "90%"])
-def test_margins_are_those_of_a_lagrange_model_in_python_control(craft: Craft, fill: str) -> None:
+def test_margins_equal_those_of_a_lagrange_model_in_python_control(craft: Craft, fill: str) -> None:
     """All margins agree within 0.02 dB and 0.02°, each loop opened while the others are closed."""
     loop = craft.loop(GAINS, PERIOD, fill, delay=2 * PERIOD)
     found = hubslosh.margins(loop)
@@ -310,7 +310,7 @@ def test_a_file_of_matrices_is_read_by_pyyeti(
         Appendage.from_craig_bampton(tmp_path / "boom.op4", (0, 0, 1))
 
 
-def test_everything_that_is_wrong_with_appendages_is_said_at_once() -> None:
+def test_all_errors_of_an_appendage_are_reported_in_one_message() -> None:
     """One message lists wrong names, numbers of modes, shapes and columns of a table."""
     good = Appendage((0, 0, 0), [0.1, 0.2, 0.3, 0.4], np.ones((4, 6)))
     with pytest.raises(FmuError) as error:

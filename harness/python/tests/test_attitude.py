@@ -26,7 +26,7 @@ def matrix(q: np.ndarray) -> np.ndarray:
     return (w**2 - v @ v) * np.eye(3) + 2 * np.outer(v, v) + 2 * w * cross
 
 
-def test_angles_equal_those_of_three_turns() -> None:
+def test_euler_angles_equal_the_product_of_three_rotations() -> None:
     """The quaternion of roll, pitch and yaw turns vectors as the product of three matrices does.
 
     `angles` returns the three angles from the quaternion again, also for many rows at once.

@@ -103,7 +103,7 @@ def test_the_compiled_loop_has_the_bits_of_the_loop_in_python(
     assert np.degrees(np.linalg.norm(left.iloc[-1])) < 1  # the liquid goes on; it holds in the mean
 
 
-def test_a_matrix_of_gains_is_the_function_that_it_stands_for(fmu: Path) -> None:
+def test_a_matrix_of_gains_acts_bit_identically_to_a_function(fmu: Path) -> None:
     """A matrix of gains is bit-identical to a function that adds the terms from left to right.
 
     A filter gives the same as its difference equation.

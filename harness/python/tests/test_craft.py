@@ -78,7 +78,7 @@ def test_monte_carlo_reads_the_ranges_of_an_uncertain_model(craft: Craft) -> Non
             craft.monte_carlo("50%", dict([given]), 3)
 
 
-def test_fmpy_with_the_parameters_of_a_craft_is_simulate_with_them(craft: Craft) -> None:
+def test_fmpy_with_the_parameters_of_a_craft_gives_the_bits_of_simulate(craft: Craft) -> None:
     """FMPy and `simulate` agree bit by bit: `Craft.parameters` has all that a host must set."""
     values = craft.parameters("50%")
     names = [f"{name}[{i}]" for name in ("omega", "velocity", "slosh_torque") for i in (1, 2, 3)]
@@ -135,7 +135,7 @@ def test_effective_mass_properties_equal_the_fmus(craft: Craft, fill) -> None:
         assert values[4:].reshape(3, 3) == pytest.approx(mine.inertia, rel=1e-9, abs=1e-7)
 
 
-def test_loop_and_linear_model_equal_those_of_explicit_parameters(craft: Craft) -> None:
+def test_loop_and_linear_model_of_a_craft_equal_a_calculation_by_hand(craft: Craft) -> None:
     """Margins and matrices equal a calculation with parameters put together by hand from `tank`."""
     fill, gains = "60%", np.hstack([20 * np.eye(3), 300 * np.eye(3)])
     mass = craft.mass_properties(fill).mass
@@ -287,7 +287,7 @@ def test_ctrl_c_ends_the_calculation_of_tanks() -> None:
     assert time.monotonic() - start < 30
 
 
-def test_the_liquid_of_a_tank_that_spins_turns_with_it(craft: Craft) -> None:
+def test_the_liquid_of_a_spinning_tank_starts_with_the_spin_of_the_tank(craft: Craft) -> None:
     """The start is the tank's rate times the inertia of the turning liquid."""
     tank = MountedTank(CYLINDER, (0.0, 0.0, -0.5), modes=1, nu=1e-6, spin=0.4)
     spinner = replace(craft, tanks={"fuel": tank}, wheels={})

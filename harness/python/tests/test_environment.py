@@ -44,7 +44,7 @@ def test_a_package_without_a_hash_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("asked", REQUIREMENTS, ids=lambda path: path.stem)
-def test_every_package_has_a_hash_and_those_asked_for_have_their_version(asked: Path) -> None:
+def test_the_requirements_file_pins_each_package_by_version_and_hash(asked: Path) -> None:
     """The .txt with versions and hashes agrees with the .in from which it was made."""
     locked = asked.with_suffix(".txt").read_text()
     pinned = re.findall(

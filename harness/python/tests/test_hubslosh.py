@@ -70,7 +70,7 @@ def test_a_torque_that_is_not_a_number_is_refused(fmu: Path) -> None:
         drive(fmu, [0, 1, 2], [0, float("nan"), 0])
 
 
-def test_a_missing_fmu_raises_an_error_with_the_way_to_build_it(tmp_path: Path) -> None:
+def test_a_missing_fmu_raises_an_error_with_the_command_that_builds_it(tmp_path: Path) -> None:
     """The message contains the command that makes the FMU."""
     with pytest.raises(FmuError, match="pack makes it"):
         Plant(tmp_path / "none.fmu")

@@ -49,7 +49,7 @@ def stub() -> str:
     return "\n".join([*lines, "", "__version__: str", ""])
 
 
-def test_type_checkers_see_what_comes_on_first_use() -> None:
+def test_the_type_stub_contains_all_lazily_imported_names() -> None:
     """The stub is up to date; ``python harness/python/tests/test_import.py`` writes it."""
     assert STUB.read_text() == stub()
     for name in hubslosh.__all__:

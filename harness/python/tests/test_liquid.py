@@ -205,7 +205,7 @@ def test_a_box_drags_liquid_about_its_vertical() -> None:
         ),
     ],
 )
-def test_spacecraft_has_the_modes_of_each_direction_and_what_they_turn(
+def test_spacecraft_has_slosh_modes_along_both_axes_and_their_moments_about_a_pivot(
     fmu: Path, shape: dict, fill: float | str
 ) -> None:
     """The craft is on a pivot that turns only about a vertical off the liquid's centre.
@@ -308,7 +308,7 @@ def test_a_tilted_cylinder_equals_that_of_perturbation_theory() -> None:
     assert across == pytest.approx(0.23149 * slope**2, abs=3e-4)
 
 
-def test_a_cad_solid_equals_the_shape_that_it_draws(tmp_path: Path) -> None:
+def test_a_box_from_a_step_file_equals_the_box_given_by_dimensions(tmp_path: Path) -> None:
     """A box given by its dimensions equals the same box read from a STEP file."""
     import gmsh
 

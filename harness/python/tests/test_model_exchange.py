@@ -114,7 +114,9 @@ def test_cvode_finds_the_motion_of_co_simulation_on_the_bench(fmu: Path, model: 
 
 
 @pytest.mark.parametrize("model", quickly("spherical"))
-def test_cvode_finds_the_motion_of_co_simulation_when_it_is_violent(fmu: Path, model: str) -> None:
+def test_cvode_finds_the_motion_of_co_simulation_through_stick_slip_and_torque_jumps(
+    fmu: Path, model: str
+) -> None:
     """CVODE's root finder locates sticking and slipping between jumps of the torque."""
     start = start_values(model)
     expected = co_simulation(fmu, start, tau())

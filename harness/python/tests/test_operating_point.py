@@ -38,7 +38,7 @@ def numbers(found: hubslosh.Margins) -> np.ndarray:
     return found.crossings[["frequency", "gain_margin", "phase_margin"]].to_numpy()
 
 
-def test_every_method_linearises_at_the_same_trimmed_point(craft: Craft) -> None:
+def test_loop_linearize_review_and_uncertain_linearise_at_one_trimmed_point(craft: Craft) -> None:
     """With thrust 0.1 m off the centre of mass, four methods agree to 1e-9.
 
     They are `loop`, `review`, `linearize` and `uncertain`. Without trimming the delay margin
@@ -109,7 +109,7 @@ def test_trimming_removes_rotation_and_prints_the_remaining_accelerations(craft:
 
 
 @pytest.mark.parametrize("name", ["NTO", "tank[1]"])
-def test_every_method_takes_the_same_names(craft: Craft, name: str) -> None:
+def test_every_method_accepts_names_and_numbers_of_tanks(craft: Craft, name: str) -> None:
     """`loop`, `linearize`, `review`, `uncertain` and `draw` accept a tank's name and its number."""
     nominal = craft.uncertain("50%", {f"{name}.frequency[1]": "1%"})
     f = 0.8 * nominal.center["tank[1].frequency[1]"]
@@ -167,7 +167,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("name", WRONG)
-def test_every_method_reports_a_wrong_name_in_the_same_words(craft: Craft, name: str) -> None:
+def test_every_method_reports_a_wrong_name_with_one_message(craft: Craft, name: str) -> None:
     """The name is wrong as a parameter, as a value of a study, or as a range."""
     values, ranges = {name: 0.2}, {name: (0.1, 0.3)}
     for call in (
@@ -192,7 +192,7 @@ def test_uncertain_values_can_be_named_by_tanks(craft: Craft) -> None:
         assert model.delta({name: 0.5}).tolist() == [0.5, 0.0]
 
 
-def test_a_quantity_of_a_mode_changes_without_the_others(craft: Craft) -> None:
+def test_frequency_mass_and_height_of_a_mode_change_independently(craft: Craft) -> None:
     """Frequency, slosh mass and its height can each be changed alone.
 
     The liquid at rest does not change, also with surface tension.

@@ -152,7 +152,7 @@ def test_times_of_every_type_of_parquet_are_seconds() -> None:
         np.testing.assert_allclose(table["tau_cmd"], 0.1 * np.arange(5), atol=2e-4)
 
 
-def test_every_reader_has_a_file_that_tests_it() -> None:
+def test_every_file_format_that_can_be_read_has_a_test_file() -> None:
     """Each file format that the package can read has a function above that writes a test file."""
     endings = {Path(name).suffix for name, _, _ in WRITERS}
     assert all(endings & set(kind.endings) for kind in KINDS)
@@ -196,7 +196,7 @@ def test_the_command_lets_the_package_read_other_file_formats(
     assert "pip install 'hubslosh[recordings]'" in done.stderr
 
 
-def test_signals_with_clocks_of_their_own_keep_them(tmp_path: Path) -> None:
+def test_signals_with_different_sampling_times_are_not_interpolated(tmp_path: Path) -> None:
     """A slow torque and a fast gyro keep their own times; no values are interpolated."""
     from asammdf import MDF, Signal
 
@@ -272,7 +272,7 @@ def test_damaged_files_are_read_or_refused_by_name(tmp_path: Path, copies: int) 
                 assert name in str(error)
 
 
-def test_a_file_that_claims_more_than_it_holds_is_refused_at_once(tmp_path: Path) -> None:
+def test_a_small_file_that_declares_a_huge_data_set_is_refused_at_once(tmp_path: Path) -> None:
     """A file of some kilobytes declares a data set of 2^40 values."""
     import h5py
 

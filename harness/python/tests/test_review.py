@@ -114,7 +114,9 @@ def test_stabilisation_flips_where_the_tank_crosses_the_centre_of_mass(
     assert found.points["stable"].all() == (phase == 0)
 
 
-def test_the_family_has_the_same_states_everywhere_and_the_plants_responses(craft: Craft) -> None:
+def test_the_linear_models_of_all_fills_have_equal_states_and_the_responses_of_the_craft(
+    craft: Craft,
+) -> None:
     """A full tank has no slosh mode, but its model keeps the states of one."""
     fixed = {"damping": "nominal", "frequency": "nominal", "inertia": "nominal"}
     found = craft.review(gains(), PERIOD, ["20%", "60%", "100%"], **fixed)
@@ -343,7 +345,7 @@ def test_a_plan_file_equals_the_call_in_python(
         Project.read(plan("{ A = [[0.0]] }"))
 
 
-def test_a_project_is_the_same_after_it_was_written_and_read(
+def test_a_project_is_unchanged_after_writing_and_reading(
     craft: Craft, tmp_path: Path, monkeypatch
 ) -> None:
     """The file has gains, matrices, transfer functions, masses, engines, tank files and cases."""
@@ -437,7 +439,7 @@ def test_two_designs_are_compared_on_one_page(
         main()
 
 
-def test_a_review_names_what_is_wrong(craft: Craft) -> None:
+def test_a_review_refuses_wrong_fills_ranges_names_and_controllers(craft: Craft) -> None:
     """The errors name wrong fills, ranges, names and controllers."""
 
     def review(*, of: Craft = craft, law=None, fills=("50%",), **options) -> None:
@@ -582,7 +584,7 @@ def test_an_unstable_real_pole_is_the_worst_case(craft: Craft) -> None:
 
 
 @pytest.mark.long
-def test_the_page_shows_what_is_unstable_first(craft: Craft) -> None:
+def test_the_page_of_a_review_lists_unstable_points_first(craft: Craft) -> None:
     """Unstable fills, points and modes are marked and listed before stable ones."""
     craft = replace(craft, tanks={"ox": replace(craft.tanks["ox"], position=(0, 0, 0.62))})
     fills = ["10%", "30%", "50%"]

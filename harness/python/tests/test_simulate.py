@@ -31,7 +31,7 @@ def test_warnings_of_the_fmu_become_python_warnings(fmu: Path) -> None:
         simulate(fmu, stop=0.1)
 
 
-def test_a_run_says_how_it_left_the_range_of_its_model_in_the_words_of_the_command(
+def test_a_run_out_of_range_has_the_message_of_the_command(
     fmu: Path, request: pytest.FixtureRequest, tmp_path: Path
 ) -> None:
     """The message has the reason, the share of the time, and the first time.
@@ -274,7 +274,7 @@ def test_python_goes_on_during_a_run(fmu: Path) -> None:
     assert count > 1000
 
 
-def test_an_fmu_that_is_not_in_the_package_is_refused_with_the_way_to_it(
+def test_an_unknown_fmu_name_is_refused_with_the_fmus_that_exist(
     fmu: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     """The message names the FMUs that exist and the command."""

@@ -59,7 +59,7 @@ def repaired(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(simulation, "Input", Input)
 
 
-def test_with_nothing_set_hubslosh_moves_and_the_others_rest(fmu: Path) -> None:
+def test_with_default_parameters_only_hubslosh_moves(fmu: Path) -> None:
     """With default parameters the slosh angle of HubSlosh spans at least 0.06 rad within 20 s.
 
     SloshTank and Spacecraft stay at rest. This is what a user sees first in a simulation tool.

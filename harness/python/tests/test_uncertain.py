@@ -398,7 +398,7 @@ def test_the_upper_bound_of_two_parameters_is_near_the_truth() -> None:
     assert len(ratios) > 6 and np.median(ratios) < 1.05
 
 
-def test_without_the_solver_the_error_says_how_to_install_it(
+def test_an_error_says_how_to_install_clarabel(
     danger: tuple[UncertainModel, Loop], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The solver clarabel is an optional dependency."""

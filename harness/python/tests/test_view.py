@@ -22,7 +22,7 @@ def shown(page: str) -> dict:
     return json.loads(found[1])
 
 
-def test_a_table_is_shown_with_the_parameters_it_was_made_with(fmu: Path, request) -> None:
+def test_view_draws_a_table_with_the_parameters_of_its_run(fmu: Path, request) -> None:
     """The tank has the diameter that was set in another unit; columns are rounded to 32 bits."""
     parameters = {"tank.d": (200, "mm"), "slosh.model": "spherical", "init.slosh_angle": 0.2}
     run = hubslosh.simulate(fmu, parameters=parameters, stop=3.0, step=0.02)

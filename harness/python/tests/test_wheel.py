@@ -126,7 +126,7 @@ assert not found.failed and found.attempted > 100, found
 
 
 @pytest.mark.long
-def test_the_examples_in_docstrings_give_what_they_show(
+def test_the_examples_in_docstrings_give_the_shown_results(
     wheel: Path, tmp_path: Path, request
 ) -> None:
     """They run in a folder of their own, with the wheel."""
@@ -206,7 +206,9 @@ for places in ({"a": (0, 0, 0.2)}, {"a": (0.4, 0, 0.2), "b": (-0.4, 0, 0.2)}):
 
 
 @pytest.mark.long
-def test_functions_that_need_another_package_name_it(installed: Path, tmp_path: Path) -> None:
+def test_functions_name_the_optional_package_that_is_missing(
+    installed: Path, tmp_path: Path
+) -> None:
     """Plots and python-control need optional dependencies."""
     code = (
         "import hubslosh, pandas\n"

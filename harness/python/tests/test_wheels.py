@@ -195,7 +195,9 @@ def test_the_loop_is_that_of_single_calls(craft: Craft) -> None:
     ]  # fmt: skip
 
 
-def test_wheels_have_the_margins_of_the_torque_that_they_give(craft: Craft) -> None:
+def test_a_loop_with_wheels_has_the_margins_of_a_loop_with_torques_and_bias_momentum(
+    craft: Craft,
+) -> None:
     """Wheels about the body axes have the margins of `torque`, with their bias momentum."""
     craft = replace(craft, wheels=BODY_WHEELS)
     there = hubslosh.margins(craft.loop(GAINS, 0.1, "50%", command="wheels", delay=0.05))

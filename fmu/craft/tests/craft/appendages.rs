@@ -313,7 +313,7 @@ fn a_hinged_panel_is_one_mode_at_small_angles() {
 
 /// Modes without participation swing by themselves; a craft with such modes moves as a craft without them.
 #[test]
-fn modes_without_participation_leave_the_craft_as_it_is() {
+fn appendage_modes_without_participation_do_not_change_the_motion_of_the_craft() {
     let mut random = Random::new(3);
     let (mut p, u) = (Parameters { tanks: 2, ..random.parameters() }, random.inputs());
     let mut without = Spacecraft::new(&p, &u, 0.0, 1e-12).unwrap();

@@ -395,7 +395,7 @@ fn move_alike(seeds: impl Iterator<Item = u64>) {
 /// Impact times used to come from a product of two series that was cut at their order, and did not include the distance from the
 /// wall at which the liquid starts. Runs with these seeds were then off by up to 2e-2 m.
 #[test]
-fn detached_liquid_moves_the_same_with_every_communication_step() {
+fn the_motion_of_detached_liquid_does_not_depend_on_the_communication_step() {
     move_alike([0, 13, 17, 81, 88, 133, 157, 171, 177].into_iter());
 }
 

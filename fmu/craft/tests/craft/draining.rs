@@ -346,7 +346,7 @@ pub fn energy(out: &Outputs) -> f64 {
 
 /// The runs take five seconds, with flows that follow ramps and jump every second, in free flight and on a pivot.
 #[test]
-fn energy_is_kept_while_tanks_drain() {
+fn the_energy_balance_holds_while_tanks_drain() {
     for seed in (0..8).chain(21..25).chain(41..45) {
         let (mut p, u) = draining_craft(seed, seed as usize % 4);
         if [6, 7, 24, 43].contains(&seed) {

@@ -273,7 +273,7 @@ fn sums(p: &Parameters, x: &[f64; STATES]) -> [f64; 7] {
 /// Nothing acts on a body whose host solves (M_body + sum of M_a) [a; w'] = rest + sum of bias. It conserves momentum
 /// and angular momentum in every stage of the host's integrator, and loses the energy that the tanks dissipate.
 #[test]
-fn a_host_with_its_tanks_keeps_momentum_and_loses_the_energy_that_they_dissipate() {
+fn a_host_coupled_to_tanks_keeps_momentum_and_loses_the_energy_that_the_tanks_dissipate() {
     let mut telling = 0;
     for seed in 0..8 {
         let mut random = Random::new(seed);
@@ -314,7 +314,7 @@ fn later(u: &TankInputs, t: f64) -> TankInputs {
 /// One step of 2 s gives the same result as shorter steps, and as a Runge-Kutta integration of the tank's derivatives, for every
 /// law of drag. A mass flow has no effect.
 #[test]
-fn co_simulation_of_a_tank_equals_a_host_that_integrates_it() {
+fn co_simulation_of_a_tank_equals_model_exchange_by_a_runge_kutta_host() {
     for seed in 0..8 {
         let mut random = Random::new(seed);
         let mut p = TankParameters { tank: random.tank(), ..TankParameters::default() };

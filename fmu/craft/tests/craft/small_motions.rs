@@ -183,7 +183,7 @@ fn frequency_2(tank: Tank, g: f64) -> f64 {
 
 /// The craft of 1e11 kg moves because of the liquid's 382 kg, which changes the result by 4e-9.
 #[test]
-fn a_mode_has_the_frequency_that_it_is_given() {
+fn a_slosh_mode_oscillates_at_the_frequency_given_as_parameter() {
     for k in [0.0, 60.0] {
         let mut tank = Tank { g_ref: 2.0, damping_law: DampingLaw::Constant, ..Tank::default() };
         (tank.k[0], tank.frequency[0]) = (k, 0.5);

@@ -309,8 +309,9 @@ fn waves_in_spinning_cylinders_have_the_frequencies_of_the_rotating_liquid() {
     }
 }
 
-/// Within 1 % at Omega^2 R/g = 0.1, and at 0.3 within 3 % up to 1.5 Omega and 14 % beyond, of the force or the liquid's mass,
-/// whichever is more.
+/// Lateral forces of a shaken spinning cylinder with the pendulum model differ from the theory of the rotating liquid by at
+/// most 1 % at Omega^2 R/g = 0.1; at 0.3 by at most 3 % up to 1.5 Omega and by 14 % at higher frequencies (in parts of the
+/// force, or of the liquid's mass if this is larger).
 #[test]
 fn lateral_forces_of_spinning_cylinders_are_those_of_the_rotating_liquid() {
     for [fill, beta, rate, re, im] in FORCES {

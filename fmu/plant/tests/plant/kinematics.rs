@@ -188,7 +188,7 @@ fn liquid_at_rest_reacts_against_an_acceleration_of_the_hub() {
 
 /// Sets angles and rates of the first mode in both directions, for every slosh model whatever its coordinates.
 #[test]
-fn a_plant_starts_at_the_angles_and_rates_that_it_was_given() {
+fn a_bench_starts_at_the_given_slosh_angles_and_rates() {
     for slosh in SloshModel::ALL.into_iter().filter(|model| *model != SloshModel::Frozen) {
         let mut p = bench(slosh, FrictionModel::Viscous);
         p.init.slosh_angle = 0.3;

@@ -47,7 +47,7 @@ fn a_suspension_line_without_stiffness_and_damping_changes_no_bit() {
 /// The expected energy of the line is k (theta - theta_0)^2/2 = 0.25 (0.1)^2 J, to which I w^2/2 is added, and its torque
 /// is -k (theta - theta_0) - c w = -0.05 - 0.02 N m.
 #[test]
-fn the_line_s_torque_and_energy_equal_those_of_its_twist() {
+fn torque_and_energy_of_the_suspension_line_follow_from_its_twist() {
     let mut p = frozen(FrictionModel::None);
     (p.hub.c, p.init.omega) = (0.1, 0.2);
     let outputs = plant(&p).outputs(&Inputs::default());
@@ -115,7 +115,7 @@ fn line_and_liquid_swing_together_at_the_frequencies_of_two_coupled_pendulums() 
 /// Coulomb friction c_f reduces the amplitude by 2 c_f/k in each half swing of pi sqrt(I/k), until the line can no longer
 /// overcome the friction.
 #[test]
-fn dry_friction_stops_a_hanging_hub_where_and_when_it_must() {
+fn dry_friction_stops_a_hub_on_a_suspension_line_at_the_predicted_angle_and_time() {
     let mut p = frozen(FrictionModel::Stribeck);
     (p.friction.b, p.friction.d, p.friction.c) = (0.0, 0.0, 0.006);
     let (half, loss) = (PI * (inertia(&p) / p.hub.k).sqrt(), 2.0 * p.friction.c / p.hub.k);

@@ -102,7 +102,7 @@ fn after_an_error_in_initialization_by_a_wrong_parameter_outputs_have_no_value()
 
 /// In the test model a platform rises by w = 0.25 m/s from 0 at t = 1 s and opens a valve, which is the event.
 #[test]
-fn a_step_stops_at_an_event_if_the_host_allows_it_and_inputs_with_it() {
+fn a_step_ends_at_an_event_if_the_host_allows_early_return_and_input_ramps_end_there_too() {
     let real = |host: &mut Host, name: &str| match host.get(&GET_FLOAT64, number(name)) {
         Ok(Value::Real(x)) => x,
         other => panic!("{name}: {other:?}"),
@@ -153,7 +153,7 @@ fn time_may_go_back_to_the_last_event_at_most() {
 /// After both errors the host may continue in FMI 3.0: an input outside its range, and invalid continuous
 /// states.
 #[test]
-fn values_out_of_range_are_discarded_and_say_what_is_allowed() {
+fn inputs_and_states_out_of_range_return_discard_with_the_allowed_range() {
     let mut host = stepping(Events::Reported, 0.0, &[]);
     let said = discarded(host.set(&SET_FLOAT64, &[number("q[2]")], |_| Value::Real(11.0)));
     assert!(said.contains("q[2] = 11.0"), "{said}");

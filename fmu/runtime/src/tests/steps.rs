@@ -119,7 +119,7 @@ fn a_step_to_the_stop_time_is_the_last() {
 /// q must not fall below 1. A ramp from 4 may miss this value by 1e-9 of its height and then ends exactly
 /// there.
 #[test]
-fn a_ramp_down_to_the_smallest_value_ends_there() {
+fn an_input_ramp_down_to_the_smallest_allowed_value_is_accepted() {
     let after = |end: f64| {
         let mut instance = started(CS, &[("q[1]", 4.0)]);
         slope(&mut instance, "q[1]", end - 4.0).unwrap();

@@ -254,7 +254,7 @@ fn an_interface_that_cannot_be_loaded_is_reported_and_the_other_is_checked() {
 /// With fault 36 the library allows only one instance in each process, which breaks rules unless it is
 /// declared.
 #[test]
-fn an_fmu_3_with_one_instance_per_process_keeps_the_rules_if_it_says_so() {
+fn an_fmu_3_that_declares_one_instance_per_process_passes_the_check() {
     let undeclared = files(36);
     let xml = XML
         .replace("<ModelExchange ", "<ModelExchange canBeInstantiatedOnlyOncePerProcess=\"true\" ");

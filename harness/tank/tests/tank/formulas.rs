@@ -379,7 +379,7 @@ fn a_cylinder_s_damping_names_its_source() {
 
 /// A tank outside the measurements of its shape's correlation says which, at the specific force of its frequency.
 #[test]
-fn a_tank_s_damping_names_each_range_that_it_leaves() {
+fn the_damping_ratio_of_a_tank_names_each_measured_range_that_the_tank_leaves() {
     let number = damping::sphere_number(0.5, 1e-6, 9.81);
     let b = format!("B = {number:.3e} is outside the measured 0.01 to 1");
     let sphere = "sphere = { radius = 0.5 }";

@@ -45,7 +45,7 @@ fn curves(svg: &str) -> Vec<&str> {
 
 /// A tank four times as large is drawn with the same lines; only the numbers at the axes differ.
 #[test]
-fn a_larger_tank_of_the_same_shape_has_the_same_lines() {
+fn the_picture_of_a_scaled_tank_has_identical_lines() {
     let drawn = |factor: f64| {
         let text = format!("density = 1.0\nprofile = [{{ arc = [0, 0, {factor}, -90, 90] }}]");
         let tank = Tank::parse(&text, Path::new("")).unwrap();
@@ -65,7 +65,7 @@ fn a_larger_tank_of_the_same_shape_has_the_same_lines() {
 /// If all values are equal (frequencies without gravity, hinges at the centre of a sphere), the axis of the diagram still
 /// has a range.
 #[test]
-fn a_sweep_whose_values_are_all_the_same_can_be_drawn() {
+fn a_sweep_with_equal_values_at_all_fills_can_be_drawn() {
     let text = "density = 1.0\nprofile = [{ arc = [0, 0, 1, -90, 90] }]";
     let tank = Tank::parse(text, Path::new("")).unwrap();
     let swept = sweep(&tank, &[0.5, 1.0, 2.0], 2).unwrap();

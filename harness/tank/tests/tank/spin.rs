@@ -109,7 +109,7 @@ fn a_slow_spin_changes_nothing() {
 /// The expected frequencies, from a solution for any spin rate, are those seen from the tank, in units of sqrt(g/R), for
 /// waves that run against the spin and with it.
 #[test]
-fn the_frequencies_are_those_of_the_rotating_liquid() {
+fn frequencies_of_waves_in_a_spinning_cylinder_equal_the_theory_of_rotating_liquid() {
     let rows = [
         (1.0, 0.1, [1.491_836, 1.182_808], 0.007),
         (0.25, 0.1, [1.180_696, 0.702_227], 0.04),
