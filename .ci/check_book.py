@@ -39,7 +39,7 @@ ANSWERS = {
     "real time": "real_time.html",
     "gyro": "gyro.html",
     "Allan": "gyro.html",
-    "slosh frequency": "is_it_slosh.html",
+    "slosh frequency": "glossary.html#term-slosh-frequency",
     "units": "conventions.html",
     "resume": "campaign_howto.html",
     "exit code": "check.html",
