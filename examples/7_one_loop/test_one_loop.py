@@ -50,7 +50,7 @@ def test_the_error_goes_with_the_square_of_a_fixed_step(fmu: str, folder: Path) 
 
 
 def test_a_master_that_repeats_steps_makes_half_the_steps(fmu: str, folder: Path) -> None:
-    """It makes 4,416 steps with the error of 8,000 fixed steps.
+    """The master makes 4,416 steps with the error of 8,000 fixed steps.
 
     Two thirds of its steps are rolled back or are halves.
     """

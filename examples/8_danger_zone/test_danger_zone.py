@@ -21,7 +21,7 @@ def test_poles_from_the_fmus_derivatives_equal_those_of_the_closed_form(
 
 
 def test_the_danger_zone_ends_at_the_closed_form(spacecraft: str) -> None:
-    """Both ends agree to 1 mm; they move with the square of the gains."""
+    """Both ends of the danger zone agree to 1 mm; the ends move with the square of the gains."""
     assert zone(spacecraft) == pytest.approx(predicted_zone(), abs=1e-3)
 
 

@@ -74,7 +74,7 @@ def test_rotary_slosh_of_the_readme(fmu: Path, monkeypatch: pytest.MonkeyPatch) 
 def test_rotary_slosh_begins_where_planar_slosh_is_unstable(
     fmu: Path, program: Path, tmp_path: Path
 ) -> None:
-    """The torque that the plan t5_near_resonance finds equals the one of a stability analysis."""
+    """The torque that the plan t5_near_resonance finds equals that of a stability analysis."""
     text = (ROOT / "harness" / "campaigns" / "t5_near_resonance.toml").read_text(encoding="utf-8")
     plan = re.sub(r"slosh.model = \[.*\]", 'slosh.model = ["spherical"]', text)
     path = tmp_path / "spherical.toml"

@@ -617,8 +617,8 @@ fn no_allowed_value_of_sloshtank_raises_a_floating_point_exception() {
     }
 }
 
-/// Runs all tests in both versions of FMI, whereas the suite runs each test in one of them. It takes minutes and is
-/// started by hand.
+/// Runs all tests of this file in both versions of FMI, whereas the suite runs each test in one version. The run takes
+/// minutes and is started by hand.
 #[cfg(target_os = "linux")]
 #[test]
 #[ignore = "minutes: .ci/run --nightly"]

@@ -274,7 +274,7 @@ fn invalid_steps_are_refused_and_change_nothing() {
     instance.do_step(0.25, 0.75).unwrap();
 }
 
-/// Hosts compute the time as n h or add up h. Both results, and the stop time, differ from the exact value by some units in
+/// Hosts compute the time as n h or add up h. Both times, and the stop time, differ from the exact value by some units in
 /// the last place.
 #[test]
 fn communication_points_may_be_off_by_rounding() {
@@ -292,8 +292,8 @@ fn communication_points_may_be_off_by_rounding() {
     }
 }
 
-/// With a slope, one long step sees the same input as many short ones. Both results have an error below the
-/// tolerance 1e-8 (relative).
+/// With a slope, one long step sees the same input as many short ones. The results of the long step and of the short steps
+/// have a relative error below the tolerance 1e-8.
 #[test]
 fn input_with_a_slope_does_not_depend_on_the_choice_of_communication_step() {
     let run = |cuts: u32| {
@@ -920,7 +920,8 @@ fn no_output_depends_directly_on_an_input_that_it_does_not_list() {
     }
 }
 
-/// The same must hold for the values at the start and the parameters.
+/// Each parameter is changed by itself; if a value at the start then changes, the model description must list the parameter
+/// as a dependency.
 #[test]
 #[ignore = "six seconds: .ci/long-tests"]
 fn no_initial_value_depends_on_a_parameter_that_it_does_not_list() {
@@ -1008,8 +1009,8 @@ fn no_initial_value_depends_on_a_parameter_that_it_does_not_list() {
     }
 }
 
-/// The same must hold for continuous states: a host's solver may leave entries of the Jacobian that are not
-/// listed at 0.
+/// Each continuous state is changed by itself; if a variable then changes, the model description must list the state as a
+/// dependency: a host's solver may leave entries of the Jacobian that are not listed at 0.
 #[test]
 fn no_variable_depends_on_a_continuous_state_that_it_does_not_list() {
     for slosh_model in items("slosh.model") {

@@ -468,8 +468,8 @@ fn lumped_coupling_of_planar_modes_converges_to_the_craft() {
     }
 }
 
-/// The lumped matrix is on the body's side, in the equations that it solves or in the body itself, and bias^
-/// comes from outside. This is stable at any mass ratio, and at least of first order.
+/// The lumped matrix is on the body's side, in the equations that it solves or in the body itself, and bias^ comes from
+/// outside. The coupling is stable at any mass ratio, and at least of first order.
 #[test]
 fn lumped_coupling_is_stable_and_converges_up_to_lambda_6() {
     let lambda = ratio(Tank::default());

@@ -230,7 +230,8 @@ fn detached_liquid_moves_in_the_packed_fmu_as_in_the_crate() {
     assert_eq!(seen.last(), Some(&craft::BallState::Settled));
 }
 
-/// The same holds for a tank on another simulator's craft, and for the impulses that the craft receives.
+/// SloshTank with detached liquid on the craft of another simulator gives the craft the impulses that the Rust crate
+/// computes.
 #[test]
 fn detached_liquid_gives_its_host_the_impulses_of_the_crate() {
     let mut p = TankParameters { host: Some(Parameters::default().craft), ..Default::default() };

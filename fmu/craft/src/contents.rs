@@ -881,8 +881,8 @@ pub fn normalise_bobs(x: &mut [f64]) {
 mod tests {
     use super::*;
 
-    /// A flow of 2 - t kg/s reverses at 2 s. It passes a point 1.5 kg below at 2 t - t^2/2 = 1.5, which is at
-    /// 1 s and again at 3 s. A flow of 1 + t kg/s passes it at 1 s and does not return.
+    /// A flow of 2 - t kg/s reverses at 2 s. The mass of liquid passes a point of the table 1.5 kg below the start at 2 t -
+    /// t^2/2 = 1.5, which is at 1 s and again at 3 s. With a flow of 1 + t kg/s the mass passes this point at 1 s only.
     #[test]
     fn a_tank_passes_a_point_of_its_table_again_after_the_flow_reverses() {
         let tank = Tank::default();

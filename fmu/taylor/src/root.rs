@@ -187,8 +187,8 @@ mod tests {
         }
     }
 
-    /// Compares polynomials of degree 8 with samples: no root is missed, and every result is a root. The
-    /// terms decay, like those of a converged series, or grow up to 8^8.
+    /// The search for the first root of polynomials of degree 8 is compared with samples of the polynomials: no root is
+    /// missed, and every result is a root. The terms decay, like those of a converged series, or grow up to 8^8.
     #[test]
     fn no_sample_before_the_first_root_is_below_zero() {
         let mut seed = 1u64;

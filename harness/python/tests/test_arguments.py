@@ -134,7 +134,7 @@ def test_wrong_arguments_are_reported_by_messages_of_the_package(given: SimpleNa
 def test_a_single_name_and_a_file_of_parameters_are_accepted(
     given: SimpleNamespace, tmp_path: Path
 ) -> None:
-    """One name is the same as a list with this name, a file the same as a mapping, bit by bit."""
+    """A name gives the bits of a list with this name, a file the bits of a mapping."""
     file = tmp_path / "bench.toml"
     file.write_text('"friction.model" = "viscous"\n"hub.I" = 0.5\n')
     values = VISCOUS | {"hub.I": 0.5}

@@ -251,7 +251,7 @@ def test_all_errors_of_a_craft_are_reported_at_once(craft: Craft) -> None:
 
 
 def test_many_fills_at_once_are_solved_as_single_fills(craft: Craft) -> None:
-    """One call solves the fills on all cores and is bit-identical to one call for each fill.
+    """A call with many fills uses all cores and gives the bits of a call for each fill.
 
     This also holds after the craft was copied to another process.
     """

@@ -15,7 +15,7 @@ REQUIREMENTS = sorted(Path(environment.__file__).parent.glob("requirements*.in")
 
 @pytest.mark.long
 def test_simultaneous_requests_for_one_environment_get_a_working_one(tmp_path: Path) -> None:
-    """One process makes the environment while the other processes wait for it."""
+    """One process makes the environment, and the other processes wait until it is complete."""
     requirements = tmp_path / "requirements.txt"
     requirements.write_text("# nothing\n")
     command = [sys.executable, environment.__file__, tmp_path / "made", requirements]

@@ -121,7 +121,7 @@ def test_an_upright_cylinder_equals_its_closed_forms() -> None:
 def test_a_sphere_equals_the_axisymmetric_solver(
     request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The other solver, of `tank`, discretises a curve instead of a volume; its error is 1e-9."""
+    """`tank` discretises the contour instead of the volume; the error of `tank` is 1e-9."""
     monkeypatch.setenv("HUBSLOSH", str(option(request, "--hubslosh")))
     flat = tank({"density": 1000.0, "shape": {"sphere": {"radius": 1.0}}}, 0.8, modes=1)
     found = liquid_modes({"sphere": {"radius": 1}}, 0.8, modes=1, resolution=18)

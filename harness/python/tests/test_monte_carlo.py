@@ -30,7 +30,7 @@ def largest_rate(fmu: Path):
 
 
 def test_a_draw_depends_only_on_seed_and_run() -> None:
-    """It does not depend on the number of runs or on quantities listed after it.
+    """A drawn value depends on neither the number of runs nor the quantities listed after it.
 
     The draws have the stated distributions.
     """

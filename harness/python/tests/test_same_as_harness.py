@@ -221,7 +221,7 @@ def test_the_table_of_a_profile_acts_as_the_profile(
 def test_python_and_the_command_refuse_slopes_for_an_fmu_that_cannot_interpolate(
     fmu: Path, request: pytest.FixtureRequest, tmp_path: Path
 ) -> None:
-    """Both give the same reason, and each names its own option for held inputs."""
+    """Python and the command give one reason, and each names its own option for held inputs."""
     held = tmp_path / "held.fmu"
     with zipfile.ZipFile(fmu) as old, zipfile.ZipFile(held, "w", zipfile.ZIP_DEFLATED) as new:
         for name in old.namelist():

@@ -121,7 +121,7 @@ def test_two_rows_at_one_time_are_a_jump(fmu: Path) -> None:
 
 
 def test_without_inputs_the_fmu_s_experiment_is_the_default(fmu: Path) -> None:
-    """Start, stop and step are those of the FMU's DefaultExperiment; columns are its outputs."""
+    """Start, stop and step are in the DefaultExperiment; the columns are the FMU's outputs."""
     run = simulate(fmu, {"init.slosh_angle": (10, "deg"), "tank.h": (50, "mm")})
     assert run["time"].iloc[-1] == 20 and len(run) == 1001
     assert run["slosh_angle"][0] == pytest.approx(np.radians(10), rel=1e-15)

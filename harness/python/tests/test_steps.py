@@ -29,7 +29,7 @@ def communication_points(cut: str) -> np.ndarray:
 def test_20_ms_5_ms_and_random_steps_agree_within_the_tolerance(
     fmu: Path, model: str, friction: str, tolerance: float
 ) -> None:
-    """One piecewise linear torque is stepped in three ways.
+    """A piecewise linear torque acts in three runs with different communication steps.
 
     Rate and angle at its corners differ by no more than the solver's tolerance, relative to each
     signal's maximum.

@@ -97,7 +97,7 @@ def test_different_values_are_stored_as_different_texts() -> None:
 
 
 def test_integers_of_numpy_count_as_seed_and_runs(tmp_path: Path) -> None:
-    """They give the same study as Python's integers, stored or not."""
+    """NumPy's integers give the study that Python's integers give, stored or not."""
     table = monte_carlo(RANGES, np.int32(5), np.int64(3), outcome, folder=tmp_path)
     assert cells(table) == cells(study(tmp_path, 5, outcome=not_called))
 

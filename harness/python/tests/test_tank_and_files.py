@@ -83,7 +83,7 @@ def test_a_tank_swings_in_the_fmu_with_its_frequency(fmu: Path) -> None:
 
 
 def test_errors_of_a_tank_are_reported_in_words(tmp_path: Path) -> None:
-    """The messages are those of the package or of the program."""
+    """Wrong tanks raise FmuError with the message of the package or of the program."""
     full = tank(SPHERE, fill=0.3, modes=1)
     wrong = {
         "give the fill": lambda: tank(SPHERE),

@@ -96,7 +96,7 @@ def test_repetitions_equal_those_of_the_derivation(spacecraft: Path) -> None:
 
 
 def test_surface_tension_without_gravity_gives_a_stable_mode(spacecraft: Path) -> None:
-    """Without thrust the frequency is that of the centring stiffness, for every length."""
+    """Without thrust the frequency follows from the centring stiffness, for every length."""
     start = {"tank[1].k[1]": 3.0, "tank[1].g_ref": 1e-3}
     ranges = {"tank[1].frequency[1]": "20%", "tank[1].mass[1]": "5%"}
     model = uncertain(start, ranges, model=spacecraft)
@@ -367,7 +367,7 @@ def test_a_range_may_end_on_one_side() -> None:
 
 
 def test_the_upper_bound_of_two_parameters_is_near_the_truth() -> None:
-    """One parameter has three copies and the other one.
+    """One parameter occurs three times in Δ, the other once.
 
     For each value of the first, the value of the second at which the loop is singular is known.
     """

@@ -129,7 +129,7 @@ assert not found.failed and found.attempted > 100, found
 def test_the_examples_in_docstrings_give_the_shown_results(
     wheel: Path, tmp_path: Path, request
 ) -> None:
-    """They run in a folder of their own, with the wheel."""
+    """The examples run in an empty folder, with the installed wheel."""
     run_with_wheel(["-c", DOCTESTS], wheel, tmp_path, request)
 
 
@@ -184,7 +184,7 @@ def test_every_fmu_of_the_wheel_runs(
 
 @pytest.mark.long
 def test_a_craft_of_one_or_two_tanks_is_made_uncertain(installed: Path, tmp_path: Path) -> None:
-    """The wheel contains the one FMU that this needs for any craft."""
+    """`Craft.uncertain` works in the wheel, which contains one Spacecraft FMU for any craft."""
     code = """
 import numpy as np
 import hubslosh

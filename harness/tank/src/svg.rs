@@ -180,8 +180,8 @@ mod tests {
     use super::*;
     use core::f64::consts::{PI, TAU};
 
-    /// Between (2, 0) and (0, 1) of an ellipse of 2 by 1 there are four arcs. They are a quarter and three
-    /// quarters, about one of two centres and in either direction.
+    /// Between (2, 0) and (0, 1) of an ellipse of 2 by 1 there are four arcs. The arcs are a quarter or three quarters of
+    /// the ellipse, about one of two centres and in either direction.
     #[test]
     fn the_four_arcs_between_two_points_have_their_turns_and_centres() {
         let (p, q) = ([2.0, 0.0], [0.0, 1.0]);

@@ -167,9 +167,9 @@ fn regimes_end_at_waves_of_0_15_and_0_25_radii_and_reversed_thrust_is_out_of_ran
     assert!(ranges(800.0, -2000.0, 0.1).is_in_range());
 }
 
-/// The wave of each mode counts. 0.1 rad of the first mode are 0.084 R, in the linear range. 0.1 rad of both, with half
-/// as high a wave of the second, are 0.126 R, and 0.15 rad of both 0.188 R. If a tank's waves are not given, the first
-/// angle uses that of a cylinder.
+/// The output `regime` follows from the sum of the waves of all modes. 0.1 rad of the first mode are 0.084 R, in the linear
+/// range. 0.1 rad of both, with half as high a wave of the second, are 0.126 R, and 0.15 rad of both 0.188 R. If a tank's
+/// waves are not given, the first angle uses that of a cylinder.
 #[test]
 fn the_regime_follows_from_the_waves_of_all_modes_together() {
     let with = |wave: [f64; MODES], angle: f64| {

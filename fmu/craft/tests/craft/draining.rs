@@ -222,8 +222,8 @@ fn a_tank_that_drains_at_rest_takes_long_steps() {
     }
 }
 
-/// Without flow the equations of a draining tank give the same motion as those of a tank that keeps its liquid, for every law of
-/// drag.
+/// Without flow the equations of a draining tank give the same motion as the equations of a tank with constant mass, for
+/// every law of drag.
 #[test]
 fn a_fill_table_without_outflow_changes_nothing() {
     for seed in 0..4 {
@@ -477,9 +477,9 @@ fn the_force_of_a_draining_tank_follows_newtons_law() {
     }
 }
 
-/// While all tanks drain, a host that solves with added mass and bias has the accelerations of the
-/// whole craft, and the tanks' bobs have those of the craft's bobs. Force and torque match Newton's
-/// and Euler's laws.
+/// While all tanks drain, a host that solves with added mass and bias has the accelerations of the whole craft, and the
+/// slosh masses of the tanks have the accelerations of the slosh masses in Spacecraft. Force and torque match Newton's and
+/// Euler's laws.
 #[test]
 fn draining_tanks_on_a_rigid_body_move_as_spacecraft() {
     for seed in (0..12).chain(20..26).chain(40..44) {

@@ -190,8 +190,8 @@ fn products_of_inertia_need_moments_of_inertia_large_enough() {
     assert!(!scaled(3.09 / 2.0) && scaled(3.10 / 2.0));
 }
 
-/// The pendulum length l follows from the frequency f by (2 pi f)^2 = g/l + k/m. This has a solution only if f is above
-/// the frequency that the stiffness k alone causes.
+/// The pendulum length l follows from the frequency f by (2 pi f)^2 = g/l + k/m. This equation has a solution only if f is
+/// above the frequency that the stiffness k alone causes.
 #[test]
 fn a_slosh_frequency_must_give_a_pendulum_length() {
     let mut p = craft();

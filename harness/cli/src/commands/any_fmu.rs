@@ -23,7 +23,7 @@ use crate::terminal;
 #[command(next_help_heading = "Options for any FMU")]
 pub struct AnyFmuArgs {
     /// Unknowns to estimate: Real parameters and start values of the FMU, each with an initial guess and optionally
-    /// bounds [default bounds: min and max of the FMU]. NAME@each means that each recording has a value of NAME of its own to estimate.
+    /// bounds [default bounds: min and max of the FMU]. NAME@each estimates a separate value of NAME for each recording.
     /// scale(NAME) is the relative error of the scale of an input or output; an error of 0 means an exact scale.
     #[arg(long, value_name = "NAME=START[:LOW:HIGH],…")]
     pub free: Vec<String>,

@@ -299,7 +299,7 @@ fn a_named_pipe_is_refused_as_any_input() {
     }
 }
 
-/// One command for each kind of output, with the file as OUT.
+/// One command for each kind of output is run with a symbolic link, and with a named pipe, as the output.
 #[cfg(unix)]
 #[test]
 fn an_output_follows_links_and_is_written_to_a_pipe() {

@@ -327,8 +327,8 @@ fn parameters_that_no_output_tells_apart_are_named_as_a_set_in_words_and_json() 
     }
 }
 
-/// Tests problems of sizes at which matrices are empty or singular. None of them panics, and each gives a result or an
-/// error.
+/// Fits with one unknown, with all unknowns at their bounds, and with an unknown without effect have empty or singular
+/// matrices. Each fit gives a result or an error, and none panics.
 #[test]
 fn one_unknown_none_inside_its_bounds_and_one_without_effect_are_answered() {
     let fmu = Adaptive::new(&["-DTOLERANCE=1e-5", "-DMODEL_EXCHANGE"]);

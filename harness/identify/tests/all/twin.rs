@@ -305,9 +305,9 @@ fn the_interval_along_the_flat_valley_of_friction_equals_the_likelihoods() {
     assert!(said, "{:?}", found.verdict);
 }
 
-/// In a still slower motion the hub never comes near the Stribeck speed ω_s, so that it has no upper end. It has no lower end
-/// either: the friction b ω + c + d exp(−(ω/ω_s)²) tends to b ω + (c + d) for ω_s → ∞, and the friction with c + d in place of c
-/// and with d = 0 is the same curve at any ω_s.
+/// In a still slower motion the hub never comes near the Stribeck speed ω_s, so that the interval of ω_s has no upper end.
+/// The interval has no lower end either: the friction b ω + c + d exp(−(ω/ω_s)²) tends to b ω + (c + d) for ω_s → ∞, and
+/// the friction with c + d in place of c and with d = 0 is the same curve at any ω_s.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
 fn an_interval_is_open_at_an_end_that_the_likelihood_does_not_bound() {
@@ -327,9 +327,9 @@ fn an_interval_is_open_at_an_end_that_the_likelihood_does_not_bound() {
     }
 }
 
-/// A held torque acts half a row late, and if no delay is estimated, nothing can compensate for this. The fit
-/// distinguishes smooth from linear torque long before its minimum is known to a hundredth. It then stops: a sweep of
-/// 2700 s takes nine simulations in all, and one at the end.
+/// A held torque acts half a row late, and if no delay is estimated, nothing can compensate for this. The fit distinguishes
+/// smooth from linear torque long before its minimum is known to a hundredth. The search then stops: a sweep of 2700 s
+/// takes nine simulations in all, and one at the end.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
 fn impossible_intersample_behaviours_cost_few_simulations() {

@@ -34,7 +34,7 @@ fn a_gentle_sweep_with_an_encoder_has_its_friction_in_the_intervals() {
     is_described(22, &[]);
 }
 
-/// This simulated recording was once refused, because at one point of the likelihood profile of the friction a
+/// The simulated recording of this test was once refused, because at one point of the likelihood profile of the friction a
 /// combination of the unknowns has no influence.
 #[test]
 #[ignore = "ten seconds of CPU time: .ci/long-tests"]
@@ -91,8 +91,8 @@ fn fill_and_inertia_of_a_deep_tank_are_in_their_intervals() {
     is_described(164, &["tank.h", "hub.I"]);
 }
 
-/// The search at one point of the likelihood profile of the friction ended in another minimum. This ended the interval
-/// of the Stribeck speed too early, so that its estimate was wrong by 4.2 standard deviations.
+/// The search at one point of the likelihood profile of the friction ended in another minimum. The interval of the Stribeck
+/// speed then ended too early, and its estimate was wrong by 4.2 standard deviations.
 #[test]
 #[ignore = "a quarter of a minute: .ci/run --nightly"]
 fn a_point_of_the_profile_that_went_astray_ends_no_interval() {

@@ -257,8 +257,8 @@ fn checks_of_contours_do_not_depend_on_the_size_of_the_tank() {
     }
 }
 
-/// The full tank is given as a height, in per cent and as a mass. It has no free surface and no modes, and the message
-/// describes the rigid body that the liquid is.
+/// The full tank is given as a height, in per cent and as a mass. A full tank has no free surface and no modes, and the
+/// message states mass, centre of mass and inertia of the liquid as a rigid body.
 #[test]
 fn a_full_closed_tank_has_no_modes_and_a_message_with_its_rigid_liquid() {
     let tank = tank("density = 1000.0\nshape = { sphere = { radius = 1.0 } }");
@@ -537,8 +537,8 @@ fn every_example_file_of_a_tank_is_read_and_solved() {
     assert!(count >= 6);
 }
 
-/// A contour of 200 segments is solved in a reasonable time. One more segment is refused, and the message states the
-/// number.
+/// A contour of 200 segments is solved in a reasonable time. A contour of 201 segments is refused, and the message states
+/// this number.
 #[test]
 fn a_contour_has_at_most_200_segments() {
     let parsed = |count: usize| {
@@ -750,7 +750,8 @@ fn parameters_belong_to_the_liquid_and_not_to_the_result() {
     }
 }
 
-/// Both masses are bit-identical at every fill, also in a full tank.
+/// The mass of a fill, computed without the modes, is bit-identical to the mass in the solution with modes, at every fill
+/// and in a full tank.
 #[test]
 fn the_mass_equals_that_of_the_solution() {
     for text in [

@@ -610,8 +610,8 @@ fn a_box_with_two_lengths_has_planar_modes_that_keep_mass_centre_and_inertia() {
     }
 }
 
-/// The tank is a spheroid that is almost as high as it is wide. Its distance from the sphere through bottom and contact
-/// line is up to a fifth of the difference. The test covers the sizes of a laboratory model and of a launcher.
+/// The tank is a spheroid that is almost as high as it is wide. The distance of the spheroid from the sphere through bottom
+/// and contact line is up to a fifth of the difference. The test covers the sizes of a laboratory model and of a launcher.
 #[test]
 fn a_drawing_counts_as_a_shape_within_a_millionth_of_its_size() {
     for size in [1.0 / 64.0, 16.0] {

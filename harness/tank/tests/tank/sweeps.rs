@@ -274,7 +274,7 @@ fn a_table_has_the_modes_that_carry_liquid_at_every_fill() {
 }
 
 /// The parameter set states the errors between the points of the table, which the test gives as fractions (0.001 is 0.1 %).
-/// If one of them is above 0.5 %, a warning says that the table has too few points.
+/// If an error is above 0.5 %, a warning says that the table has too few points.
 #[test]
 fn the_parameters_state_the_errors_between_a_table_s_points() {
     let tank = tank("density = 1000.0\nshape = { sphere = { radius = 0.5 } }");
