@@ -125,6 +125,7 @@ fn tests_and_the_python_package_enable_no_further_features_of_the_program_s_depe
     assert!(more.is_empty(), "{more:?}");
 }
 
+/// No other package depends on `indicatif`.
 #[test]
 fn only_the_command_line_draws_progress() {
     for (package, dependencies) in dependencies() {

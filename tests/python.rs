@@ -118,8 +118,9 @@ fn the_studies_compute_the_numbers_of_the_book() {
     pytest(of_the_package().arg("--long").arg(studies), "a study failed");
 }
 
+/// Runs the examples in Python and the loop in Rust with the packed FMUs.
 #[test]
-fn the_examples_give_what_their_readmes_say() {
+fn the_examples_give_the_results_that_their_readmes_state() {
     // all in one folder
     let [fmu, ..] = pack::MODELS.each_ref().map(pack::packed_model_for_tests);
     let folder = fmu.with_file_name("one-loop");

@@ -67,6 +67,7 @@ fn a_minimal_fmu_needs_only_a_table_and_a_model() {
     run(Command::new(python()).args(["-c", FMPY]).arg(&fmu), "fmpy and the second FMU disagree");
 }
 
+/// The source of the spring FMU, table of variables and model together.
 #[test]
 fn a_minimal_fmu_on_the_runtime_takes_at_most_150_lines() {
     let folder = pack::root().join("tests/spring/src");

@@ -6,7 +6,7 @@ from monte_carlo import STOP, draws, one, study
 
 
 def test_dask_and_processes_give_the_results_of_single_runs(fmu: str) -> None:
-    """16 runs by Dask or by processes are bit-identical to 16 runs in one process.
+    """A study by Dask (16 runs) and one by processes (4 runs) give the results of single runs.
 
     For each yes-or-no result both outcomes occur.
     """

@@ -299,6 +299,7 @@ fn floating_point_state_and_working_directory_of_the_host_are_unchanged() {
 
 // ---- Making an instance ----
 
+/// The logged message names the given and the expected GUID.
 #[test]
 fn wrong_or_missing_guid_gives_no_instance_and_a_reason() {
     let fmu = open();
@@ -475,6 +476,8 @@ fn a_correct_run_logs_no_message() {
 
 // ---- The order of calls ----
 
+/// For example fmi2DoStep before initialisation; the message names the instance state and the states in which the call is
+/// allowed.
 #[test]
 fn calls_in_the_wrong_state_are_refused_with_call_and_state() {
     let fmu = open();
@@ -742,6 +745,7 @@ fn a_diverging_run_is_an_error() {
     instance.terminate().unwrap();
 }
 
+/// fmi2GetStatus and fmi2GetRealStatus give fmi2OK and the end of the step; queries for pending steps are refused.
 #[test]
 fn the_status_of_the_last_step_can_be_queried() {
     let fmu = open();

@@ -319,6 +319,7 @@ fn euler_in_model_exchange_converges_to_co_simulation_with_first_order() {
     assert!(worst[1] < 1e-3 && worst[1] < 0.7 * worst[0], "{worst:?}");
 }
 
+/// For example fmi2GetDerivatives before initialisation.
 #[test]
 fn calls_of_model_exchange_in_the_wrong_state_are_refused() {
     let fmu = open();

@@ -103,6 +103,7 @@ fn lively(slosh_model: i32, friction_model: i32) -> Instance {
     ])
 }
 
+/// For example fmi2DoStep before initialisation; the saved state of HubSlosh stays bit-identical.
 #[test]
 fn calls_are_refused_in_the_wrong_state_and_change_nothing() {
     let mut instance = fresh();
@@ -823,6 +824,7 @@ fn directional_derivatives_in_initialization_mode_are_with_respect_to_inputs_and
     assert!(to_bytes(&instance) == before);
 }
 
+/// Derivatives of Booleans, and by parameters after initialisation, are refused with an error.
 #[test]
 fn directional_derivatives_of_variables_without_any_are_refused() {
     let mut instance = lively(4, 4);

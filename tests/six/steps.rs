@@ -158,8 +158,9 @@ fn with_kind<M: runtime::Model>(
     instance.get(&GET_REAL, M::table().find(shown).unwrap())
 }
 
+/// For example `mount_kind` = 2 acts as `mount` = pivot; two different values are refused.
 #[test]
-fn an_integer_kind_equals_its_enumeration_for_hosts_that_set_none() {
+fn an_integer_kind_parameter_replaces_its_enumeration_for_hosts_that_cannot_set_enumerations() {
     type Craft = ::Spacecraft::Model;
     type Tank = ::SloshTank::Model;
     // On a pivot an accelerometer reads minus gravity.

@@ -52,6 +52,7 @@ fn the_guid_in_the_model_description_equals_the_guid_of_the_binary() {
     assert_eq!(root().get("guid"), Some(TABLE.guid()));
 }
 
+/// Each start value in modelDescription.xml equals the value that a new instance returns.
 #[test]
 fn start_values_equal_those_of_the_binary_to_the_last_bit() {
     let mut fresh = HubSlosh::instance(Interface::CoSimulation);

@@ -259,6 +259,7 @@ fn steps_stop_at_the_event_time_of_fmi_2_to_the_last_bit() {
     assert!(stops > 10, "{stops} steps with events");
 }
 
+/// FMI 3.0: a host sets a large torque in event mode while the hub sticks.
 #[test]
 fn torque_set_in_event_mode_that_breaks_stiction_makes_the_hub_slip() {
     let values = [("slosh.model", Value::Integer(1))];

@@ -372,6 +372,7 @@ mod tests {
         (plant, inputs)
     }
 
+    /// The state for the time in stiction has the derivative 1 for a hub at rest and 0 for a hub that turns.
     #[test]
     fn time_in_stiction_grows_by_one_second_per_second_while_the_hub_sticks() {
         for (omega, rate) in [(0.0, 1.0), (0.07, 0.0)] {

@@ -161,6 +161,7 @@ mod tests {
         assert!((impulse - 0.0026).abs() < 1e-15);
     }
 
+    /// A torque of 0.1 N·m brakes the rotor of the reaction wheel to its lowest speed in 3.3 s of 10 s.
     #[test]
     fn the_hub_gains_the_momentum_that_the_rotor_loses_until_saturation() {
         let w = wheel();

@@ -416,6 +416,7 @@ mod tests {
         }
     }
 
+    /// The GUID is a hash of names, types, units and other attributes of the variables, but not of their descriptions.
     #[test]
     fn the_guid_has_the_right_form_and_does_not_depend_on_descriptions() {
         let guid = Spring::table().guid();

@@ -407,6 +407,7 @@ pub(crate) fn missing_functions(library: &Library, symbols: &[&'static str]) -> 
 mod tests {
     use super::*;
 
+    /// An error of the loader that names an undefined symbol of CPython is explained as "needs a Python host".
     #[test]
     fn a_binary_that_lacks_pythons_symbols_needs_a_python_host() {
         for symbol in ["_Py_NoneStruct", "PyExc_TypeError", "__Py_Dealloc"] {

@@ -1034,7 +1034,7 @@ mod tests {
 </fmiModelDescription>"#;
 
     #[test]
-    fn arrays_of_fmi_3_are_read_as_their_elements_by_rows() {
+    fn arrays_of_fmi_3_are_read_as_elements_in_row_major_order() {
         let d = ModelDescription::from_xml(XML3).unwrap();
         let elements = d.variables.iter().filter(|v| v.causality == Causality::Input);
         let elements: Vec<_> =
@@ -1075,8 +1075,9 @@ mod tests {
         assert_eq!((&z.causality, displayed), (&Causality::Local, Some("deg")));
     }
 
+    /// The type UInt8 allows 0 to 255.
     #[test]
-    fn a_whole_number_of_fmi_3_must_fit_its_type() {
+    fn an_integer_value_of_fmi_3_must_fit_the_declared_type() {
         let d = ModelDescription::from_xml(XML3).unwrap();
         let small = d.variable("small").unwrap();
         assert_eq!(d.value(small, "255").unwrap(), Value::Integer(255));

@@ -853,8 +853,9 @@ fn detachment_and_settling_keep_momenta_and_the_centre_of_mass_and_dissipate_ene
     assert!(settled > 10, "{settled}");
 }
 
+/// A craft with detached liquid is saved before each of 40 steps; the restored craft takes the step to an equal state.
 #[test]
-fn a_saved_state_of_a_lump_continues_bit_for_bit() {
+fn a_saved_state_of_detached_liquid_continues_bit_for_bit() {
     let p = askew(&mut Random::new(3));
     let u = thrust(-0.2 * p.craft.mass);
     let mut craft = Spacecraft::new(&p, &u, 0.0, 1e-8).unwrap();

@@ -644,6 +644,7 @@ fn detached_liquid_on_a_host_is_refused_without_the_hosts_mass_properties() {
     }
 }
 
+/// SloshTank with detached liquid, random parameters and random accelerations of the host.
 #[test]
 fn random_tanks_on_hosts_give_finite_results_without_allocation() {
     for seed in 0..40 {

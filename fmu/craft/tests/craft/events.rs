@@ -677,6 +677,7 @@ fn without_location(case: &Case, seed: u64) -> f64 {
     balance
 }
 
+/// A host integrates detached liquid and handles events only at the ends of its steps.
 #[test]
 fn liquid_stays_in_the_tank_in_a_model_exchange_host_that_locates_no_events() {
     for (seed, case) in (0..6).map(|seed| (seed, case(seed))).chain([(6, default_case())]) {

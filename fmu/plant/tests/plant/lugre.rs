@@ -256,6 +256,8 @@ fn lugre_friction_breaks_away_at_less_torque_the_faster_the_torque_rises() {
     assert!(fast > 0.003498 * 0.99, "Coulomb's torque is left: {fast}");
 }
 
+/// A torque of 2 mN·m, less than the friction at break-away, turns a hub with LuGre friction by torque divided by bristle
+/// stiffness.
 #[test]
 fn a_lugre_hub_below_break_away_torque_stays_at_a_deflection() {
     let mut p = bench(SloshModel::Frozen);

@@ -109,6 +109,7 @@ fn parameters_without_effect_that_differ_from_their_start_values_are_named_with_
     assert_eq!(with(&[("gauges", 7.0), ("start.level[1]", 4.5), ("start.level[2]", 4.5)]), both);
 }
 
+/// A model that warns of the host's inputs in every step writes one message to the log.
 #[test]
 fn a_warning_about_the_hosts_inputs_comes_once() {
     let (mut log, lines) = log();

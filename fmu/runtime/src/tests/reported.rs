@@ -87,6 +87,7 @@ fn after_an_error_before_initialization_discrete_outputs_have_their_start_values
     assert!(to_bytes(&other) == bytes);
 }
 
+/// FMI 3.0: initialisation fails because a parameter is NaN; reading a discrete or a continuous output is then an error.
 #[test]
 fn after_an_error_in_initialization_by_a_wrong_parameter_outputs_have_no_value() {
     let mut host = Host::with_events(CS, Events::Reported);

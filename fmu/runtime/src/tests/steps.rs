@@ -36,7 +36,7 @@ fn inputs_change_along_their_derivatives_within_a_step() {
 }
 
 #[test]
-fn a_step_is_longer_than_zero_and_begins_where_the_last_one_ended() {
+fn a_step_must_be_longer_than_zero_and_begin_at_the_end_of_the_step_before() {
     let mut instance = started(CS, &[]);
     for (h, text) in [(0.0, "0.0"), (-1.0, "-1.0"), (f64::NAN, "NaN"), (f64::INFINITY, "inf")] {
         assert_eq!(
@@ -104,7 +104,7 @@ fn the_last_step_may_pass_the_stop_time_by_rounding_errors() {
 }
 
 #[test]
-fn a_step_to_the_stop_time_is_the_last() {
+fn no_step_is_allowed_after_a_step_that_ends_at_the_stop_time() {
     let mut instance = fresh(CS);
     instance.setup_experiment(None, 0.0, Some(1.0)).unwrap();
     instance.enter_initialization_mode().unwrap();

@@ -169,6 +169,8 @@ fn a_ramp_by_intermediate_update_is_the_input_derivative_of_fmi_2_to_the_last_bi
     assert!(host.lock().unwrap().statuses.iter().all(|status| *status == fmi3OK));
 }
 
+/// FMI 3.0: the host requests a time in its intermediate update; a requested time before the step ends the step at once,
+/// and a time after its end has no effect.
 #[test]
 fn a_step_returns_early_at_the_time_that_the_host_requests_if_it_allows_early_return() {
     let (instance, host) = stepping(true);

@@ -49,6 +49,7 @@ fn set(instance: fmi3Instance, of: u32, values: &[f64]) -> fmi3Status {
     unsafe { fmi3SetFloat64::<Trays>(instance, &of, 1, values.as_ptr(), values.len()) }
 }
 
+/// Matrices and vectors of a test FMU with array variables.
 #[test]
 fn values_of_arrays_are_read_and_set_in_row_major_order() {
     let lines = Lines::default();

@@ -97,6 +97,7 @@ fn value_references_of_another_type_or_without_a_variable_are_refused() {
     assert!(refused(instance.set(&SET_STRING, &[0], |_| Boolean(true))).contains("of type Real"));
 }
 
+/// fmi2SetReal with one of two values out of range sets neither value.
 #[test]
 fn setting_several_values_succeeds_or_fails_as_a_whole() {
     let mut instance = started(CS, &[]);
@@ -112,6 +113,7 @@ fn setting_several_values_succeeds_or_fails_as_a_whole() {
     assert_eq!(real(&mut instance, "net[1]"), 10.0 - 0.5 * 3.0);
 }
 
+/// Wrong parameters are accepted one by one and named together by fmi2ExitInitializationMode.
 #[test]
 fn all_wrong_parameters_are_reported_when_initialization_ends() {
     let mut instance = fresh(CS);
@@ -167,6 +169,7 @@ fn only_inputs_and_tunable_parameters_are_set_in_motion() {
     assert_eq!(real(&mut instance, "time_constant"), 0.25);
 }
 
+/// The model refuses a tunable parameter that contradicts the state; an input set in the call keeps its old value.
 #[test]
 fn refusing_a_tuned_parameter_refuses_the_whole_call() {
     let mut instance = started(CS, &[("z", 3.0)]);
@@ -247,6 +250,8 @@ fn in_initialization_mode_derivatives_are_by_inputs_and_parameters() {
     assert!(refused(ask("sum", "z", f64::INFINITY)).contains("direction of z = inf"));
 }
 
+/// After fmi2Error in fmi2DoStep the instance has the time and the values before the step, and only reading, reset,
+/// termination and restoring a state are allowed.
 #[test]
 fn after_a_step_that_failed_the_last_values_can_be_read() {
     let mut instance = started(CS, &[("z", 101.0)]);

@@ -89,6 +89,7 @@ dependenciesKind="fixed fixed" | dependenciesKind="fixed" | xml.dependencies
 <Output valueReference="6" dependencies="2" dependenciesKind="constant"/> | <Output valueReference="6" dependencies="8"/> | xml.dependencies_known
 "#;
 
+/// Each case changes one attribute in the model description of a small FMI 3.0 FMU; the intended rule reports the change.
 #[test]
 fn a_wrong_attribute_in_the_description_of_an_fmu_3_is_reported() {
     let mut files = files(0);
@@ -119,6 +120,7 @@ fn co_simulation_of_an_fmu_with_clocks_is_not_called() {
     assert_eq!(skipped, ["steps.answers"], "{}", report.text());
 }
 
+/// Each case moves or adds one file in the archive of a small FMI 3.0 FMU; the intended rule reports the change.
 #[test]
 fn a_wrong_archive_of_an_fmu_3_is_reported() {
     let without_fault = files(0);

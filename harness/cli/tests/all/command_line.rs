@@ -129,6 +129,8 @@ fn an_unknown_name_brings_a_suggestion() {
     );
 }
 
+/// For example an unknown item of an enumeration, a text for a number, a value for an output, or a value for the input that
+/// the profile drives.
 #[test]
 fn a_value_of_the_wrong_kind_is_refused() {
     let directory = tempfile::tempdir().unwrap();
@@ -328,6 +330,7 @@ fn a_torque_file_without_a_column_of_an_input_is_refused_and_the_message_lists_i
     );
 }
 
+/// Files with NaN, infinity, a word, a time that goes back, or a single row.
 #[test]
 fn a_torque_that_is_not_a_number_is_named_by_file_and_row() {
     let directory = tempfile::tempdir().unwrap();

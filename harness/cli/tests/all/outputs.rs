@@ -215,6 +215,7 @@ fn every_example_of_every_help_is_understood_and_the_cheap_ones_run() {
     assert!(understood > 50 && run > 15, "{understood} {run}");
 }
 
+/// Options that all commands share follow under the heading "Global options".
 #[test]
 fn every_help_has_the_commands_own_options_first_and_an_example() {
     let mut texts = Vec::new();

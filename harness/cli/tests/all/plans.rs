@@ -232,6 +232,7 @@ fn a_failed_run_is_a_row_of_runs_csv_with_the_error() {
     assert!(text(directory, "c/report.html").contains("d_-1"));
 }
 
+/// A plan with an unknown key of its profile and an unknown parameter; the command creates no directory.
 #[test]
 fn a_wrong_plan_writes_nothing_and_reports_every_fault() {
     let directory = tempfile::tempdir().unwrap();

@@ -350,6 +350,7 @@ fn a_free_decay_of_30_s_determines_frequency_damping_and_its_growth() {
     );
 }
 
+/// A sweep with an empty tank is recorded and fitted by `identify friction`.
 #[test]
 fn with_an_empty_tank_all_inertia_is_attributed_to_the_hub() {
     let directory = tempfile::tempdir().unwrap();

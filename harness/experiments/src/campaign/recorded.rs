@@ -327,6 +327,7 @@ mod tests {
         assert!(aligned(&reversed, &wanted).1 < 0.9);
     }
 
+    /// Recordings of the thesis's sweep with clock errors up to 1e-3 and 3 % lost rows.
     #[test]
     fn a_sweep_is_found_despite_clock_errors_and_lost_rows() {
         let sweep = Sweep::THESIS;

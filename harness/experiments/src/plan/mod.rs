@@ -827,6 +827,7 @@ mod tests {
         assert_eq!(cases_of(text), ["zero", "sine"]);
     }
 
+    /// A plan file with unknown keys, wrong types and wrong distributions; the error lists each fault with its line.
     #[test]
     fn all_faults_of_a_wrong_plan_are_reported_at_once() {
         let text = "titel = \"x\"\nprofile = 3\nstep = -1\nhold = 1\n\
@@ -915,6 +916,7 @@ mod tests {
         friction.c = { distribution = \"normal\", mean = 0.0, deviation = 0.01, max = 0.02 }\n\
         imu.seed = { distribution = \"uniform\", from = 1, to = 6 }\n";
 
+    /// 4,000 random values of each varied parameter.
     #[test]
     fn draws_have_the_specified_distributions_within_the_variables_bounds() {
         let cases = cases(&RANDOM.replace("RUNS", "4000"));

@@ -517,6 +517,7 @@ mod tests {
         assert_eq!(profile.to_string().parse::<Profile>().unwrap(), profile);
     }
 
+    /// For example `sine:freq=2`; the error lists amplitude, frequency and duration.
     #[test]
     fn wrong_profiles_are_refused_with_the_allowed_names_and_values() {
         for (text, word) in [

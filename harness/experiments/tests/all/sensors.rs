@@ -42,6 +42,7 @@ fn column<'t>(table: &'t Table, name: &str) -> &'t [f64] {
     table.column(name).unwrap()
 }
 
+/// The root of the sum of squares of both gauges equals the FMU's output `wave_height`.
 #[test]
 fn two_wave_gauges_at_right_angles_measure_the_wave_of_every_slosh_model() {
     for model in ["linear", "planar", "spherical", "liquid"] {

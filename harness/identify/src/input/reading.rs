@@ -541,6 +541,7 @@ mod tests {
         }
     }
 
+    /// Gaps of 10 and 50 rows in the recorded torque: a sweep can be predicted from the rows around a gap, noise cannot.
     #[test]
     fn lost_rows_of_a_sweep_are_interpolated_and_lost_rows_of_noise_split_the_recording() {
         let mut random = analysis::random::Random::new(1, 0);
