@@ -391,7 +391,7 @@ mod tests {
             (&["13:00:00 PM"], "is no time of day (allowed: hours, minutes and seconds"),
             (&["12:00:00:05"], "is no time of day (allowed: hours, minutes and seconds"),
             (&["00:20.0"], "is no time of day (allowed: hours, minutes and seconds"),
-            (&["2026-01-31 12:00:00 CET"], "ends in \"CET\", which is no offset"),
+            (&["2026-01-31 12:00:00 CET"], "ends in \"CET\", which is neither an offset"),
             (&["12:00:00", "2026-01-31 12:00:01"], "is a date, where the lines above have none"),
             (&["1/2/2026 12:00:00", "2026-01-31 12:00:01"], "in another form"),
             (&["ab:cd"], "is not a time"),
