@@ -1439,12 +1439,11 @@ class Craft:
         >>> float(run["q[1]"].iloc[-1].round(6))
         0.999988
         """
-        from .simulation import run_of
+        from .simulation import run_of, without_replaced
 
         mine = self.parameters(fill, parameters=parameters)
         momentum = tuple(float(mine[name]) for name in MOMENTUM)  # type: ignore[arg-type]
-        replaced = getattr(inputs, "columns", ())
-        given = {n: x for n, x in mine.items() if n not in replaced or n in (parameters or {})}
+        given = without_replaced(mine, inputs, parameters_of(parameters))
         times, hold = (options.pop("start", None), stop, step), options.pop("hold", False)
         return run_of(
             self.model, given, inputs, times, outputs, options.pop("tolerance", None), hold,

@@ -27,6 +27,7 @@ from .simulation import (
     parameters_of,
     table_of,
     too_many_rows,
+    without_replaced,
 )
 from .wheels import (
     ALL,
@@ -71,7 +72,8 @@ class Loop:
     measured : str or sequence of str
         Measured variables of the FMU; ``"omega"`` of Spacecraft is all three components.
     command : str or sequence of str
-        Inputs of the FMU that the controller commands.
+        Inputs of the FMU that the controller commands. A command is added to the value that the
+        parameters give its input, for example to the thrust of a craft.
     latency : int
         Delay from measurement to command in whole cycles.
     delay : float
@@ -408,7 +410,8 @@ class Loop:
         reference : DataFrame, optional
             Reference of a linear controller, as for `closed_loop`.
         inputs : DataFrame, optional
-            Histories of other inputs, as for `closed_loop`.
+            Histories of other inputs, as for `closed_loop`; they replace constants among the
+            parameters of the loop, such as the thrust of a craft.
         outputs : str or sequence of str, optional
             Variables to record, as for `simulate`.
         substeps : int
@@ -453,8 +456,9 @@ class Loop:
             for name in MOMENTUM
             if turned and name in histories
         ]
-        every = parameters_of(self.parameters) | parameters_of(parameters)
-        check_parameters(fmu, every, {**histories, **dict.fromkeys(plain)}, problems)
+        further = parameters_of(parameters)
+        every = without_replaced(parameters_of(self.parameters) | further, inputs, further)
+        check_parameters(fmu, every, histories, problems)
         columns = outputs_of(fmu, outputs, every, problems)
         check_outputs(fmu, columns, problems)
         if not problems:
@@ -462,13 +466,15 @@ class Loop:
         if problems:
             raise FmuError("; ".join(problems))
 
+        constants = self._constants(every)
+        every = {name: value for name, value in every.items() if name not in plain}
         cycles = max(round(stop / self.period), 1)
         grid = np.arange(cycles * substeps + 1) * (self.period / substeps)
         latency, rest = self.whole_delay
         points, switch, wanted = _points(grid, substeps, self.period, rest)
         parts = (len(points) - 1) // cycles
         controller, seen = self._controller(
-            cycles, grid[:-1:substeps], reference, measured, command
+            cycles, grid[:-1:substeps], reference, measured, constants
         )
         feedback = Feedback(
             controller,
@@ -489,7 +495,7 @@ class Loop:
             self.model,
             every,
             tolerance=tolerance,
-            inputs=dict.fromkeys(plain, 0.0) | start,
+            inputs={name: constants[name] for name in plain} | start,
         ) as plant:
             recorded = plant.run(
                 points,
@@ -499,11 +505,24 @@ class Loop:
                 feedback,
             )
         commands = feedback.commands
+        commands[: feedback.latency * parts + switch] = list(constants.values())
         commands[-1] = commands[-2]
         rows = {"time": points} | dict(zip(command, commands.T, strict=True))
         rows |= columns_of(turned, feedback)
         rows |= {name: values for name, (values, _) in given.items()} | recorded
         return table_of(fmu, rows, wanted, columns, self.model, every, self._units())
+
+    def _constants(self, parameters: Parameters) -> dict[str, float]:
+        """Return the constant to which each command is added.
+
+        The constant is the value of the commanded input in ``parameters``, such as the thrust of a
+        craft, and 0 if the parameters do not have this input.
+        """
+        fmu, turned = Fmu.open(self.model), self._turned
+        return {
+            name: 0.0 if name in turned else float(fmu.convert(name, parameters.get(name, 0.0)))
+            for name in self.names[1]
+        }
 
     def _momentum(self, fmu: Fmu, parameters: Parameters) -> tuple[float, float, float]:
         """Return the angular momentum of the wheels at the start of a run, N·m·s.
@@ -523,17 +542,21 @@ class Loop:
         time: NDArray[np.float64],
         reference: pd.DataFrame | None,
         measured: list[str],
-        command: list[str],
+        constants: dict[str, float],
     ) -> tuple[Any, list[str]]:
-        """Return the controller for a run, and the names of the variables that it measures."""
-        model = self.linear()
+        """Return the controller for a run, and the names of the variables that it measures.
+
+        The commands that the controller returns contain the ``constants``, which are named by the
+        commands in order.
+        """
+        model, command = self.linear(), list(constants)
         if model is None:
             if reference is not None:
                 raise FmuError(
                     "reference= is only for linear controllers; a controller function computes its "
                     "own reference"
                 )
-            return _checked_law(self.controller, command), measured
+            return _checked_law(self.controller, constants), measured
         table = _reference(reference, measured, command)
         attitude = all(name in table for name in QUATERNION)
         # the scalar part, which a controller seldom has, is measured as well
@@ -551,7 +574,8 @@ class Loop:
         if attitude:
             quaternion = [seen.index(name) for name in QUATERNION]
             wanted[:, quaternion] /= np.linalg.norm(wanted[:, quaternion], axis=1)[:, None]
-        linear = Linear(A, B, C, D, wanted, columns(command), quaternion)
+        forward = columns(command) + list(constants.values())
+        linear = Linear(A, B, C, D, wanted, forward, quaternion)
         return linear, seen
 
 
@@ -576,8 +600,8 @@ def closed_loop(
 
     In every cycle the controller receives the values of ``measured``. Its command acts ``delay``
     seconds and ``latency`` cycles later and is held for one cycle; until the first one acts,
-    commands are 0. With a linear controller the whole loop is compiled code; a function is
-    called once per cycle.
+    commands are 0. A command is added to the value that ``parameters`` give its input. With a
+    linear controller the whole loop is compiled code; a function is called once per cycle.
 
     Parameters
     ----------
@@ -617,8 +641,8 @@ def closed_loop(
     Returns
     -------
     Run
-        A table with the columns ``time``, the commands (as they are from this time on), the
-        inputs and ``outputs``. Units are in ``.attrs["units"]``. ``.out_of_range`` says which
+        A table with the columns ``time``, the commanded inputs (as they are from this time on),
+        the inputs and ``outputs``. Units are in ``.attrs["units"]``. ``.out_of_range`` says which
         tanks left the range of their model, why, when first, and for which share of the time.
 
     Raises
@@ -634,9 +658,9 @@ def closed_loop(
     >>> round(abs(float(run["theta"].iloc[-1])), 3)
     0.0
     """
-    loop = Loop(controller, period, model, parameters, measured, command, latency, delay)
+    loop = Loop(controller, period, model, None, measured, command, latency, delay)
     return loop.simulate(
-        stop, reference=reference, inputs=inputs, outputs=outputs, substeps=substeps,
+        stop, parameters, reference=reference, inputs=inputs, outputs=outputs, substeps=substeps,
         tolerance=tolerance,
     )  # fmt: skip
 
@@ -661,8 +685,11 @@ def _points(
     return np.append(points.ravel(), grid[-1]), switch, wanted
 
 
-def _checked_law(law: Law, command: list[str]) -> Callable[[int, float, list[float]], list[float]]:
-    """Return the controller function with a check of the values that it returns."""
+def _checked_law(
+    law: Law, constants: dict[str, float]
+) -> Callable[[int, float, list[float]], list[float]]:
+    """Return the controller function with a check of its values, to which constants are added."""
+    command, added = list(constants), np.array(list(constants.values()))
     one = f"a finite number for {command[0]}"
     several = f"{len(command)} finite numbers ({', '.join(command)})"
     expected = one if len(command) == 1 else several
@@ -677,7 +704,7 @@ def _checked_law(law: Law, command: list[str]) -> Callable[[int, float, list[flo
             raise FmuError(
                 f"the controller returned {returned!r} at t = {time:g} s; it must return {expected}"
             )
-        return values.tolist()
+        return (values + added).tolist()
 
     return call
 

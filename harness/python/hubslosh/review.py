@@ -541,6 +541,9 @@ class _Space:
         fills = _list_of(fills)
         if damping not in ("interval", "nominal"):
             raise FmuError(f'damping must be "interval" or "nominal", not {damping!r}')
+        Loop(
+            controller, period, craft.model, wheels=craft.wheels, **options
+        )._must_be_linear()  # before the tanks are computed
         loops, tanks, given, problems, turns = [], [], [], [], ""
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
@@ -549,8 +552,6 @@ class _Space:
             for k, fill in enumerate(fills):
                 try:
                     loop = craft.loop(controller, period, fill, parameters=parameters, **options)
-                    if not loops:
-                        loop._must_be_linear()
                     every, modes, _ = craft._resolve(fill, parameters)
                     loops.append(loop)
                     given.append((every, modes))

@@ -274,6 +274,18 @@ def parameters_of(
     return dict(parameters)
 
 
+def without_replaced(
+    parameters: Parameters, inputs: pd.DataFrame | None, given: Container[str]
+) -> dict[str, Quantity]:
+    """Return parameters without the constants that a history in ``inputs`` replaces.
+
+    Parameters in ``given``, which the caller gave together with ``inputs``, are kept, so that
+    `check_parameters` refuses values that are given twice.
+    """
+    columns = getattr(inputs, "columns", ())
+    return {n: value for n, value in parameters.items() if n not in columns or n in given}
+
+
 def outputs_of(
     fmu: Fmu,
     outputs: Sequence[str] | str | None,

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from .linearization import LinearModel
 from .run import Run
+from .simulation import parameters_of
 from .stability import _closed
 
 if TYPE_CHECKING:
@@ -223,7 +224,9 @@ def _compare(point: "Point", command: str | None, factor: float) -> tuple[Run, c
     run = loop.simulate(stop, start, outputs=[])
     # not those in which it hardly shows: their own poles may be almost the same
     shown = [command] if command else _showing(gain, critical)
-    signals = run[shown].to_numpy()[:-1]  # the last row repeats the command before
+    constants = loop._constants(parameters_of(loop.parameters))
+    # the last row repeats the command before
+    signals = run[shown].to_numpy()[:-1] - [constants[name] for name in shown]
     # axes with the same inertia have the same pole, which a run of this length does not separate
     apart = np.minimum(np.abs(poles - critical), np.abs(poles - critical.conjugate()))
     rest = poles[apart * len(run) > 1]

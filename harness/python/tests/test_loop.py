@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from hubslosh import FmuError, Loop, closed_loop, drive, linearize
+from hubslosh import FmuError, Loop, closed_loop, drive, linearize, simulate
 
 VISCOUS = {"friction.model": "viscous"}
 PERIOD = 0.1  # s
@@ -131,3 +131,45 @@ def test_a_vector_s_name_is_all_its_components(fmu: Path) -> None:
     assert linearize(fmu, VISCOUS, "tau_cmd", "omega").outputs == ("omega",)
     with pytest.raises(FmuError, match="did you mean omega"):
         linearize(craft, start, "torque", "omga")
+
+
+@pytest.mark.parametrize("is_linear", [True, False])
+def test_a_command_is_added_to_the_constant_of_its_input(fmu: Path, *, is_linear: bool) -> None:
+    """A run with the recorded inputs as histories is bit-identical, also before the first command.
+
+    The engine is gimballed: force[1], force[2] and torque[3] are commands, and the parameters have
+    a thrust along x and z, and a torque about z.
+    """
+    craft = fmu.with_name("Spacecraft.fmu")
+    start = {"force[1]": 12.0, "force[3]": 400.0, "torque[3]": 5.0, "init.omega[2]": 0.01}
+    command = ["force[1]", "force[2]", "torque[3]"]
+    gains = np.diag([-300.0, 300.0, 200.0])[[1, 0, 2]]
+    law = gains if is_linear else lambda time, omega: -gains @ omega
+    loop = Loop(law, 0.1, craft, start, "omega", command, latency=1, delay=0.04)
+    run = loop.simulate(5, outputs="omega", substeps=5)
+    assert run[command].iloc[0].tolist() == [12.0, 0.0, 5.0]
+    first = int(np.flatnonzero((run[command] != run[command].iloc[0]).any(axis=1))[0])
+    assert run["time"][first] == pytest.approx(0.14)
+    inputs = run[["time", *command]]
+    alone = {name: value for name, value in start.items() if name not in command}
+    again = simulate(craft, alone, inputs, outputs="omega", hold=True)
+    assert (again[["omega[1]", "omega[2]", "omega[3]"]] == run.iloc[:, 4:7]).all().all()
+    assert run["omega[2]"].abs().max() > 0.005
+
+
+def test_a_history_replaces_the_constant_of_a_loop(fmu: Path) -> None:
+    """A throttled thrust replaces the constant thrust, unless both are given in one call."""
+    craft = fmu.with_name("Spacecraft.fmu")
+    start = {"force[3]": 400.0, "init.omega[2]": 0.01}
+    loop = Loop(np.eye(3), 0.1, craft, start, "omega", "torque")
+    thrust = pd.DataFrame({"time": [0.0, 1.0, 1.0, 2.0], "force[3]": [300.0, 300.0, 0.0, 0.0]})
+    run = loop.simulate(2, inputs=thrust, outputs=["specific_force[3]", "mass"])
+    along = (run["specific_force[3]"] * run["mass"]).to_numpy()
+    assert along[[5, -1]] == pytest.approx([300.0, 0.0], abs=1.0)
+    assert run["force[3]"].iloc[[0, -1]].tolist() == [300.0, 0.0]
+    with pytest.raises(FmuError, match=r"force\[3\] is given twice, in parameters and in inputs"):
+        loop.simulate(2, {"force[3]": 100.0}, inputs=thrust)
+    with pytest.raises(FmuError, match=r"force\[3\] is given twice"):
+        closed_loop(
+            np.eye(3), 0.1, 2, craft, start, measured="omega", command="torque", inputs=thrust
+        )

@@ -640,3 +640,24 @@ def test_the_cost_of_a_review_is_limited(craft: Craft) -> None:
         given[name] = value
         with pytest.raises(FmuError, match=words):
             craft.review(gains(), **given)
+
+
+def test_thrust_vector_control_is_confirmed_by_the_simulation(craft: Craft) -> None:
+    """A review commands the force of a gimballed engine, to which the thrust is added.
+
+    A force across the thrust, at the distance d below the centre of mass, is the torque d F. The
+    thrust is tilted, so that its component along x is a constant of the command force[1]; a full
+    tank does not slosh, so that the craft rests under a tilted thrust.
+    """
+    tilted = replace(craft, thrust=(20.0, 0.0, 400.0))
+    place = tilted.trim("100%").shift
+    arm = (tilted.mass_properties("100%").center_of_mass - place)[2]
+    mix = np.array([[0, -1 / arm, 0], [1 / arm, 0, 0], [0, 0, 1]])
+    command = ["force[1]", "force[2]", "torque[3]"]
+    found = tilted.review(
+        mix @ gains(), PERIOD, ["100%"], draws=0, command=command, damping="nominal",
+        inertia="nominal", frequency="nominal",
+    )  # fmt: skip
+    assert found.confirmation.agrees, found.confirmation.summary
+    with pytest.raises(FmuError, match=r"the command force\[4\] is not an input"):
+        craft.review(gains(), PERIOD, ["wrong fill"], command=[*command[:2], "force[4]"])
