@@ -288,6 +288,22 @@ class Review:
         ]
 
     def _stability(self) -> str:
+        return self._stable_points() + self._neutral()
+
+    def _neutral(self) -> str:
+        """Return a sentence on neutral poles of nominal points; "" if there are none."""
+        fills = [k for k, point in enumerate(self.nominal) if len(point.margins.neutral)]
+        if not fills:
+            return ""
+        most = max(len(self.nominal[k].margins.neutral) for k in fills)
+        return (
+            f" {_plural(most, 'pole')} at {self._fill_text(fills)} {'is' if most == 1 else 'are'} "
+            "neutral, which counts as stable: the controller does not move "
+            f"{'this pole' if most == 1 else 'these poles'} (an attitude without feedback, or an "
+            "axis without gain)."
+        )
+
+    def _stable_points(self) -> str:
         table = self.points
         unstable = table[~table["stable"]]
         count, all_of = _plural(len(self.fills), "fill"), _all_of(len(self.fills), "fill")

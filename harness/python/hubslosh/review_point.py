@@ -29,9 +29,14 @@ class Point:
 
     @property
     def growth(self) -> float:
-        """Growth rate of the least stable closed-loop pole, 1/s; below 0 if the point is stable."""
-        size = _largest(self.margins.poles, self.gain.period)
-        return float(np.log(size) / self.loop.period)
+        """Growth rate of the least stable closed-loop pole, 1/s; below 0 if the point is stable.
+
+        Neutral poles do not count; if all poles are neutral, the rate is -inf.
+        """
+        poles = self.margins.poles
+        size = _largest(poles[~np.isin(poles, self.margins.neutral)], self.gain.period)
+        with np.errstate(divide="ignore"):
+            return float(np.log(size) / self.loop.period)
 
     @property
     def distance(self) -> float:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .linearization import LinearModel
-from .stability import LIGHT, MOVED, _broken_at, _closed
+from .stability import LIGHT, MOVED, _broken_at, _moved
 
 SHOWN = 1e-2  # Size of a resonance circle in the loop gain below which a mode is left out (-40 dB)
 
@@ -44,8 +44,8 @@ def resonances(gain: LinearModel, tanks: Sequence[str] = ()) -> list[dict[str, A
       is within ±90°, so that the loop adds damping; "gain and phase" if both hold; "neither" if the
       mode is stable although neither holds.
     """
-    found, closed = [], _closed(gain)
-    for i in range(len(gain.D)):
+    found, closed = [], _moved(gain)
+    for i in range(len(gain.D) if len(closed) else 0):
         one = _broken_at(gain, i)
         for poles, residue, names in _groups(one):
             row = _row(one, poles, residue, closed)

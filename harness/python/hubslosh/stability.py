@@ -50,8 +50,8 @@ class Margins:
         crossing frequency by at most a fifth of its own: by their tank or, without a tank, by the
         states that take part most.
     stable : bool
-        True if the closed loop is stable. Of a `Loop` only the controllable and observable part is
-        judged.
+        True if every pole of the closed loop decays, neutral poles excepted. Of a `Loop` only the
+        controllable and observable part is judged.
     poles : ndarray of complex
         Poles of the closed loop, sorted by magnitude: in rad/s, or in the z plane if the loop is
         sampled.
@@ -62,6 +62,10 @@ class Margins:
         already unstable.
     modes : DataFrame
         Modes of the plant with damping ratios below 0.2; for the columns see `LinearModel.modes`.
+    neutral : ndarray of complex
+        Neutral poles among ``poles``: they neither grow nor decay, to rounding, because the
+        controller does not move them. Examples are an attitude that the controller does not use,
+        and a craft whose controller has no gain about an axis.
 
     Examples
     --------
@@ -78,6 +82,7 @@ class Margins:
     modulus_margin: float
     delay_margin: float
     modes: "pd.DataFrame"
+    neutral: NDArray[np.complex128]
 
     @property
     def gain_margins(self) -> tuple[float, float]:
@@ -103,7 +108,7 @@ class Margins:
         """Return the verdict, then the crossings."""
         down, up = self.gain_margins
         lines = [
-            f"closed loop: {'stable' if self.stable else 'UNSTABLE'}",
+            f"closed loop: {'stable' if self.stable else 'UNSTABLE'}{_neutral_text(self.neutral)}",
             f"gain margins {_decibel(up)} and {_decibel(down)}, "
             f"phase margin {_degrees(self.phase_margin)}, "
             f"delay margin {self.delay_margin:.3g} s, modulus margin {self.modulus_margin:.3g}",
@@ -129,6 +134,18 @@ class Margins:
     def __repr__(self) -> str:
         """Return the verdict in a line."""
         return f"Margins({'; '.join(str(self).splitlines()[:2])})"
+
+
+def _neutral_text(neutral: NDArray[np.complex128]) -> str:
+    """Return words on neutral poles; "" if there are none."""
+    count = len(neutral)
+    if not count:
+        return ""
+    poles = "neutral pole, which is" if count == 1 else "neutral poles, which are"
+    return (
+        f", except for {count} {poles} not controlled (an attitude without feedback, or an axis "
+        "without gain)"
+    )
 
 
 def _degrees(value: float) -> str:
@@ -278,11 +295,14 @@ def _margins(
     table = table.reset_index(drop=True)
     units = {"frequency": "Hz", "gain_margin": "dB", "phase_margin": "deg", "delay_margin": "s"}
     table.attrs["units"] = units
-    stable = _largest(poles, gain.period) < (0 if gain.period is None else 1)
+    neutral = _is_neutral(gain, poles)
+    stable = _largest(poles[~neutral], gain.period) < (0 if gain.period is None else 1)
     delay = 0.0
     if stable:
         delay = least_delay if delayed is None else _delay_margin(delayed, gain, poles)
-    return Margins(table, bool(stable), poles, float(modulus), float(delay), mode_table(modes))
+    return Margins(
+        table, bool(stable), poles, float(modulus), float(delay), mode_table(modes), poles[neutral]
+    )
 
 
 def _broken_at(gain: LinearModel, i: int) -> LinearModel:
@@ -305,15 +325,55 @@ def _broken_at(gain: LinearModel, i: int) -> LinearModel:
     )
 
 
+def _closed_matrix(gain: LinearModel) -> Matrix:
+    A, B, C, D = gain
+    found: Matrix = A - B @ np.linalg.solve(np.eye(len(D)) + D, C)
+    return found
+
+
 def _closed(gain: LinearModel) -> NDArray[np.complex128]:
     """Return the closed loop's poles by magnitude."""
-    A, B, C, D = gain
-    poles = np.linalg.eigvals(A - B @ np.linalg.solve(np.eye(len(D)) + D, C)).astype(complex)
+    poles = np.linalg.eigvals(_closed_matrix(gain)).astype(complex)
     return poles[np.argsort(np.abs(poles))]
 
 
+def _is_neutral(gain: LinearModel, poles: NDArray[np.complex128]) -> NDArray[np.bool_]:
+    """Return which poles of the closed loop are neutral.
+
+    A neutral pole is at the limit of stability to rounding, and the feedback does not move it: the
+    loop gain has this pole, too. The rounding error of a pole is n ε ‖A‖ times its condition number
+    (LAPACK Users' Guide, 4.8.1). The condition number of a multiple pole is infinite; the error of
+    a chain of three integrators is the cube root of n ε ‖A‖.
+    """
+    from scipy.linalg import eig, matrix_balance
+
+    off = np.abs(poles.real if gain.period is None else np.abs(poles) - 1)
+    A = matrix_balance(_closed_matrix(gain))[0] if len(poles) else np.zeros((0, 0))
+    size = float(np.linalg.norm(A)) or 1.0
+    rounding = len(A) * np.finfo(float).eps
+    most = np.cbrt(rounding) * size
+    if not (off <= most).any():
+        return np.zeros(len(poles), bool)
+    values, left, right = eig(A, left=True)
+    with np.errstate(divide="ignore"):
+        error = np.minimum(rounding * size / np.abs((left.conj() * right).sum(axis=0)), most)
+    nearest = np.abs(poles[:, None] - values).argmin(axis=1)
+    kept = np.abs(poles[:, None] - np.linalg.eigvals(gain.A)).min(axis=1) <= most
+    found: NDArray[np.bool_] = (off <= error[nearest]) & kept
+    return found
+
+
+def _moved(gain: LinearModel) -> NDArray[np.complex128]:
+    """Return the closed loop's poles by magnitude, without neutral poles."""
+    poles = _closed(gain)
+    return poles[~_is_neutral(gain, poles)]
+
+
 def _largest(poles: NDArray[np.complex128], period: float | None) -> float:
-    """Return the number that decides stability: largest real part, or magnitude if sampled."""
+    """Return the number that decides stability: largest real part, or magnitude if sampled.
+
+    ``poles`` has no neutral poles.
+    """
     sizes = poles.real if period is None else np.abs(poles)
     return float(max(sizes, default=-np.inf if period is None else 0.0))
 

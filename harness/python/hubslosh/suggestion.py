@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .linearization import LinearModel
 from .loop import _tustin
-from .stability import _closed, _compiled, _largest, frequencies
+from .stability import _compiled, _largest, _moved, frequencies
 
 if TYPE_CHECKING:
     from .review_point import Point
@@ -148,7 +148,7 @@ def _distance(
     point: "Point", z: NDArray[np.complex128], L: NDArray[np.complex128], law: LinearModel
 ) -> float:
     """Return the distance from instability at an operating point with a filter in the loop."""
-    size = _largest(_closed(_series(point.gain, law)), point.gain.period)
+    size = _largest(_moved(_series(point.gain, law)), point.gain.period)
     if size >= 1:
         return -float(np.log(size) / point.loop.period)
     sensitivity = np.linalg.inv(np.eye(L.shape[1]) + _value(law, z)[:, None, None] * L)

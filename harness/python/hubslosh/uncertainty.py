@@ -61,7 +61,7 @@ from .plant import Plant
 from .quantities import KINDS, TURN, full_name, moves_the_bob, rigid_rest
 from .short import names
 from .simulation import parameters_of
-from .stability import _closed, minimal
+from .stability import _moved, minimal
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -957,8 +957,8 @@ class UncertainModel:
         return found
 
     def _poles(self, loop: Loop, K: LinearModel, delta: Matrix) -> NDArray[np.complex128]:
-        """Return the poles of the sampled loop with the controller K at Δ."""
-        return _closed(loop._gain(self.at(delta), K))
+        """Return the poles of the sampled loop with K at Δ, without neutral poles."""
+        return _moved(loop._gain(self.at(delta), K))
 
     def worst_case(self, loop: Loop, largest: float = 3.0) -> WorstCase:
         """Search for the smallest real Δ that brings the loop to the limit of stability.
@@ -1008,7 +1008,7 @@ class UncertainModel:
 
         zero = np.zeros(len(self.counts))
         start = self._poles(loop, K, zero)
-        if np.abs(start).max() >= 1:
+        if np.abs(start).max(initial=0.0) >= 1:
             raise FmuError(
                 "the loop is unstable at Δ = 0, which is the craft without changes: "
                 "hubslosh.margins(loop) shows its margins"
@@ -1053,7 +1053,7 @@ class UncertainModel:
             at = rng.uniform(-size, size, len(self.deltas))
             at = np.maximum(np.where(damping, -size, at) if k % 2 else at, self._least)
             with suppress(FmuError):  # no craft any more
-                if (there := float(np.abs(self._poles(loop, K, at)).max())) > best:
+                if (there := float(np.abs(self._poles(loop, K, at)).max(initial=0.0))) > best:
                     best, found = there, at
         return found
 
@@ -1103,7 +1103,7 @@ class UncertainModel:
 
         def largest(delta: Matrix) -> float:
             try:
-                return float(np.abs(self._poles(loop, K, delta)).max())
+                return float(np.abs(self._poles(loop, K, delta)).max(initial=0.0))
             except FmuError:
                 return 0.0  # no craft any more
 
@@ -1149,7 +1149,7 @@ class UncertainModel:
 
         def outside(size: float) -> bool:
             at = np.maximum(size * way, self._least)
-            return bool(np.abs(self._poles(loop, K, at)).max() > UNSTABLE)
+            return bool(np.abs(self._poles(loop, K, at)).max(initial=0.0) > UNSTABLE)
 
         low, high = 0.0, largest
         for high in np.linspace(0, largest, steps + 1)[1:]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from .linearization import LinearModel
 from .run import Run
 from .simulation import parameters_of
-from .stability import _closed
+from .stability import _closed, _is_neutral
 
 if TYPE_CHECKING:
     from .review_point import Point
@@ -211,7 +211,8 @@ def _compare(point: "Point", command: str | None, factor: float) -> tuple[Run, c
     loop = replace(loop, controller=law)
     gain, T = loop.gain(), loop.period
     poles = _closed(gain)
-    critical = _critical(poles, at_limit=command is not None)
+    neutral = _is_neutral(gain, poles)
+    critical = _critical(poles if neutral.all() else poles[~neutral], at_limit=command is not None)
     s = np.log(critical) / T
     times = [1 / max(abs(s.real), 1e-9)]
     times += [20 * 2 * np.pi / abs(s.imag)] if s.imag else []

@@ -9,7 +9,7 @@ import pytest
 from scipy.linalg import eigvals
 from scipy.optimize import brentq
 
-from hubslosh import FmuError, LinearModel, Loop, margins
+from hubslosh import Craft, FmuError, LinearModel, Loop, margins
 from hubslosh.stability import _broken_at, _closed, minimal
 
 EXACT = 1e-6
@@ -302,3 +302,41 @@ def test_a_loop_gain_that_is_only_rounding_has_no_crossing(fmu: Path) -> None:
     lag = control.ss(1 / (S / 3 + 1) ** 2)
     found = margins(Loop(5 * lag, 0.1, fmu, {"friction.model": "viscous"}, "theta"))
     assert found.crossings["gain_margin"].dropna().abs().max() < 200
+
+
+def test_a_pole_that_the_controller_does_not_move_is_neutral(fmu: Path) -> None:
+    """A rate controller leaves the attitude; a controller without gain about z leaves two poles.
+
+    The second case is a chain of two integrators, whose poles rounding moves by the root of ε.
+    """
+    model = fmu.with_name("Spacecraft.fmu")
+    craft = Craft(900, (400, 380, 300), model=model)
+    attitude = np.hstack([2 * 10 * np.eye(3), 80 * np.eye(3)])
+    cases = [
+        (attitude * np.repeat([0, 1], 3), 3),
+        (attitude * [[1], [1], [0]], 2),
+        (attitude * [[1], [0], [0]], 4),
+        (attitude, 0),
+    ]
+    for gains, count in cases:
+        found = margins(craft.loop(gains, 0.1, {}, delay=0.15))
+        assert found.stable and len(found.neutral) == count
+        assert np.abs(found.neutral - 1) == pytest.approx(0, abs=1e-6)
+        assert ("neutral" in str(found)) == (count > 0)
+        wrong = margins(craft.loop(-gains, 0.1, {}, delay=0.15))
+        assert not wrong.stable and len(wrong.neutral) == count
+    # poles that the feedback moves to the limit of stability, and slow growth
+    assert not margins(1 / S**2).stable and not len(margins(1 / S**2).neutral)
+    slow = margins(-1e-9 / S)
+    assert not slow.stable and not len(slow.neutral)
+
+
+def test_undamped_oscillations_without_feedback_are_neutral() -> None:
+    """An undamped mode that the input does not move, and a decaying pole."""
+    A = np.zeros((3, 3))
+    A[:2, :2] = [[0.0, 2.0], [-2.0, 0.0]]
+    B, C, D = np.array([[0.0], [0.0], [1.0]]), np.array([[1.0, 0.0, 3.0]]), np.zeros((1, 1))
+    gain = LinearModel(A, B, C, D, ("a", "b", "c"), ("u",), ("y",))
+    for loop in (gain, gain.sampled(0.1)):
+        found = margins(loop)
+        assert found.stable and len(found.neutral) == 2

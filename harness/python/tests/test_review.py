@@ -661,3 +661,21 @@ def test_thrust_vector_control_is_confirmed_by_the_simulation(craft: Craft) -> N
     assert found.confirmation.agrees, found.confirmation.summary
     with pytest.raises(FmuError, match=r"the command force\[4\] is not an input"):
         craft.review(gains(), PERIOD, ["wrong fill"], command=[*command[:2], "force[4]"])
+
+
+def test_a_neutral_attitude_does_not_count_as_unstable(craft: Craft) -> None:
+    """A rate controller leaves the attitude where it is; the simulation confirms its margin."""
+    found = craft.review(
+        gains(kp=0.0), PERIOD, ["100%"], draws=3, damping="nominal", delay=0.1,
+        requirements={"phase_margin": 30},
+    )  # fmt: skip
+    assert found.passed and found.unstable().empty and found.points["growth"].max() < -0.1
+    assert "3 poles at 100% are neutral, which counts as stable" in found.summary
+    assert "UNSTABLE" not in str(found) and found.confirmation.agrees
+    assert found.confirmation.command is not None
+    alone = craft.review(
+        gains() * [[1], [1], [0]], PERIOD, ["50%"], damping="nominal", frequency="nominal",
+        inertia="nominal", draws=0,
+    )  # fmt: skip
+    assert alone.unstable().empty and alone.confirmation.agrees, str(alone)
+    assert len(alone.nominal[0].margins.neutral) == 2
