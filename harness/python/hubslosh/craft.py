@@ -802,8 +802,7 @@ class Craft:
         if trimmed:
             point = trim(model, every, list(self.tanks))
         else:
-            none = np.zeros(3)
-            point = OperatingPoint(model, dict(every), none, none, tuple(self.tanks))
+            point = OperatingPoint(model, dict(every), np.zeros(3), None, tuple(self.tanks))
         # they leave the centre of mass where it is
         if modes or factors:
             every = apply_changes(model, point.parameters, modes, factors, self._names)

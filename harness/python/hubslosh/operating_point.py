@@ -37,8 +37,8 @@ class OperatingPoint:
     shift : ndarray, shape (3,)
         Displacement of the origin O, where the thrust acts, at right angles to the thrust, which
         brings the centre of mass onto the line of thrust, body axes, m.
-    untrimmed_acceleration : ndarray, shape (3,)
-        Angular acceleration before trimming, body axes, rad/s².
+    untrimmed : dict or None
+        Parameters before trimming; None if the thrust is 0.
     tanks : tuple of str
         Names of the tanks in the FMU's order.
 
@@ -54,7 +54,7 @@ class OperatingPoint:
     model: str | Path
     parameters: dict[str, Quantity]
     shift: Vector
-    untrimmed_acceleration: Vector
+    untrimmed: dict[str, Quantity] | None
     tanks: tuple[str, ...]
 
     @cached_property
@@ -71,6 +71,16 @@ class OperatingPoint:
                 here = force + np.cross(turning, get(f"tank[{number}].position"))
                 across[name] = float(np.linalg.norm(here - axis * (axis @ here)))
         return turning, across
+
+    @cached_property
+    def untrimmed_acceleration(self) -> Vector:
+        """Angular acceleration before trimming, body axes, rad/s².
+
+        Appendages are deflected as in this acceleration, so that they turn with the craft.
+        """
+        if self.untrimmed is None:
+            return np.zeros(3)
+        return _steady_acceleration(self.model, self.untrimmed)
 
     @property
     def angular_acceleration(self) -> Vector:
@@ -112,22 +122,21 @@ def trim(model: str | Path, parameters: Parameters, tanks: Sequence[str] = ()) -
     get the displacements ``eta_0`` at which they rest under the thrust. A craft without thrust, or
     on a pivot, is returned unchanged.
     """
-    every, none = dict(parameters), np.zeros(3)
+    every, before, none = dict(parameters), dict(parameters), np.zeros(3)
     fmu = Fmu.open(model)
     forces = [every.get(f"force[{i}]", 0.0) for i in (1, 2, 3)]
     if not is_spacecraft(fmu) or not any(forces):
-        return OperatingPoint(model, every, none, none, tuple(tanks))
+        return OperatingPoint(model, every, none, None, tuple(tanks))
     with Plant(model, every) as plant:
 
         def get(name: str) -> Vector:
             return np.array(plant.get([f"{name}[{i}]" for i in (1, 2, 3)]))
 
-        force, center, before = get("force"), get("center_of_mass"), get("omega_dot")
-        kind, mount, count, modes = plant.get(["mount_kind", "mount", "tanks", "appendages"])
+        force, center = get("force"), get("center_of_mass")
+        kind, mount, count = plant.get(["mount_kind", "mount", "tanks"])
         if (kind or mount) != 1 or not force.any():
             return OperatingPoint(model, every, none, before, tuple(tanks))
-        flexible = [f"appendage[{j}]." for j in range(1, int(modes) + 1)]
-        flexible = [name for name in flexible if _participation(plant, name).any()]
+        flexible = _flexible(plant)
         deflections = _deflections(plant, flexible, force / plant.get(["mass"])[0])
         if any(deflections.values()):
             every |= deflections
@@ -140,6 +149,36 @@ def trim(model: str | Path, parameters: Parameters, tanks: Sequence[str] = ()) -
             moved = get(place) - shift
             every |= {f"{place}[{i + 1}]": float(x) for i, x in enumerate(moved)}
     return OperatingPoint(model, every, shift, before, tuple(tanks))
+
+
+def _flexible(plant: Plant) -> list[str]:
+    """Return the beginnings of the names of the modes of appendages that the craft moves."""
+    names = [f"appendage[{j}]." for j in range(1, int(plant.get(["appendages"])[0]) + 1)]
+    return [name for name in names if _participation(plant, name).any()]
+
+
+def _steady_acceleration(model: str | Path, parameters: Parameters) -> Vector:
+    """Return the angular acceleration with appendages deflected so that they do not vibrate."""
+    with Plant(model, parameters) as plant:
+        names = _flexible(plant)
+
+    def accelerations(deflections: Vector) -> tuple[Vector, Vector]:
+        """Return the accelerations of the modes, and the angular acceleration of the craft."""
+        start = dict(zip((f"{name}eta_0" for name in names), deflections.tolist(), strict=True))
+        start |= dict.fromkeys((f"{name}eta_dot_0" for name in names), 0.0)
+        with Plant(model, {**parameters, **start}) as plant:
+            modal = plant.get([f"der({name}eta_dot)" for name in names])
+            return np.array(modal), np.array(plant.get([f"omega_dot[{i}]" for i in (1, 2, 3)]))
+
+    eta = np.zeros(len(names))
+    rest, turning = accelerations(eta)
+    if names:
+        columns = [accelerations(row)[0] - rest for row in np.eye(len(names))]
+        slope = np.array(columns).T
+        for _ in range(4):  # almost linear in the deflections
+            eta = eta - np.linalg.solve(slope, rest)
+            rest, turning = accelerations(eta)
+    return turning
 
 
 def _participation(plant: Plant, name: str) -> Vector:

@@ -330,3 +330,29 @@ def test_all_errors_of_an_appendage_are_reported_in_one_message() -> None:
         assert text in str(error.value)
     with pytest.raises(FmuError, match="missing: rz, unknown: mass"):
         Appendage.from_table(ARRAY.rename(columns={"rz": "mass"}), (0, 0, 0))
+
+
+def test_the_acceleration_before_trimming_has_the_rigid_inertia_of_the_craft(fmu: Path) -> None:
+    """The deflected array turns with the craft: J α = -c × F, where the array moves c.
+
+    A mode with the displacement η moves the centre of mass by p η/m, and
+    η = -(p·a + r·α)/ω² with the acceleration a of the interface point.
+    """
+    place, at = np.array([0.1, -0.02, 0.3]), np.array([0.0, 0.9, 0.8])
+    inertia, thrust, m = np.diag([400.0, 280.0, 300.0]), np.array([0.0, 0.0, 50.0]), 500.0
+    p, r = np.array([0.0, 0.0, 5.2]), np.array([11.0, 0.0, 0.0])
+    array = Appendage(tuple(at), 0.31, [*p, *r])
+    craft = Craft(
+        m, np.diag(inertia), tuple(place), {}, tuple(thrust), appendages={"array": array},
+        model=fmu.with_name("Spacecraft.fmu"),
+    )  # fmt: skip
+    eta = 0.0
+    for _ in range(100):
+        c = place + p * eta / m
+        turning = np.linalg.solve(inertia, np.cross(-c, thrust))
+        a = thrust / m + np.cross(turning, at - c)
+        eta = -(p @ a + r @ turning) / (2 * np.pi * 0.31) ** 2
+    point = craft.trim({})
+    assert point.untrimmed_acceleration == pytest.approx(turning, rel=1e-2, abs=1e-4)
+    assert np.linalg.norm(turning) > 0.01  # the deflection changes the inertia by 1 %
+    assert f"{np.linalg.norm(point.untrimmed_acceleration):.4g} rad/s² before" in str(point)
