@@ -1626,14 +1626,17 @@ class Craft:
         return f"Craft({self.mass:g} kg dry, tanks: {', '.join(self.tanks) or 'none'}{modes})"
 
     def __str__(self) -> str:
-        """Return the craft in three lines, and one for each tank, wheel and appendage."""
+        """Return the craft in three or four lines, and one for each tank, wheel and appendage."""
         J, F = self._inertia(), self._force()
+        burning = [name for name, engine in self.engines.items() if engine.burns]
         products = f"Jxy, Jxz, Jyz {_row((J[0, 1], J[0, 2], J[1, 2]))}"
         lines = [
             f"Craft of {self.mass:g} kg dry, centre of mass {_row(self.center_of_mass)} m",
             f"inertia Jxx, Jyy, Jzz {_row(np.diag(J))}, {products} kg·m²",
-            f"thrust {_row(F)} N" + (f" by {', '.join(self.engines)}" if self.engines else ""),
+            f"thrust {_row(F)} N" + (f" by {', '.join(burning)}" if burning else ""),
         ]
+        if pulsed := [name for name in self.engines if name not in burning]:
+            lines.append(f"thrusters that fire in pulses: {', '.join(pulsed)}")
         lines += [
             f"tank {number} {name}: {tank.describe()}"
             for number, (name, tank) in enumerate(self.tanks.items(), 1)

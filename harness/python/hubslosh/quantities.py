@@ -205,10 +205,13 @@ class Modes:
             return NO_MODE
         if mode.kind == "zeta":
             return ""
-        if self.number(f"tank[{mode.tank}].fill.points") or self.number(
-            f"tank[{mode.tank}].diameter"
-        ):
-            return "follows from the tank's fill table or diameter, and cannot be given"
+        if self.number(f"tank[{mode.tank}].fill.points"):
+            return (
+                "follows from the fill table of its tank, which drains, and cannot be given; leave "
+                "out mass_flow, or vary the fill instead"
+            )
+        if self.number(f"tank[{mode.tank}].diameter"):
+            return "follows from the diameter of its tank, and cannot be given; leave out diameter"
         planar = any(
             self.number(f"tank[{mode.tank}].direction[{n},{i}]")
             for n in range(1, int(self.number(f"tank[{mode.tank}].modes")) + 1)

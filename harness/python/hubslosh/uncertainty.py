@@ -790,10 +790,18 @@ class UncertainModel:
     def _controller(self, loop: Loop) -> LinearModel:
         """Return the controller of a loop around this model, or raise FmuError."""
         loop._must_be_linear()
-        loop = loop._without_wheels()
+        given, loop = loop, loop._without_wheels()
         K = loop._must_be_linear()
-        if loop.names != (list(self.M.outputs[self.order :]), list(self.M.inputs[self.order :])):
-            raise FmuError("the loop must measure the model's outputs and command its inputs")
+        measured, commands = loop.names
+        outputs, inputs = self.M.outputs[self.order :], self.M.inputs[self.order :]
+        if (measured, commands) != (list(outputs), list(inputs)):
+            wanted = "loop.names[1]" if given is loop else repr(commands)
+            raise FmuError(
+                f"the loop measures {', '.join(measured)} and commands {', '.join(commands)}, but "
+                f"the outputs of the uncertain model are {', '.join(outputs)}, and its inputs "
+                f"{', '.join(inputs)}. They must be the same in the same order: create the model "
+                f"with uncertain(…, inputs={wanted}, outputs=loop.names[0])"
+            )
         return K
 
     def closed(self, loop: Loop, frequency: ArrayLike) -> NDArray[np.complex128]:

@@ -121,3 +121,13 @@ def test_wrong_engines_and_pulses_are_named(craft: Craft) -> None:
         given = dict([firing]) if isinstance(firing, tuple) else firing
         with pytest.raises(FmuError, match=text):
             with_roll.pulses("50%", given, stop=1)
+
+
+def test_a_printed_craft_lists_thrusters_apart_from_the_engines_that_burn(craft: Craft) -> None:
+    """The thrust is by the main engine only; thrusters have a line of their own."""
+    main, side = Engine((0, 0, -1.5), (0, 0, 1), 400), Engine((1, 0, 0), (0, 1, 0), 22, burns=False)
+    craft = replace(craft, thrust=0.0, engines={"main": main, "up": side, "down": side})
+    lines = str(craft).splitlines()
+    assert lines[2:4] == ["thrust (0, 0, 400) N by main", "thrusters that fire in pulses: up, down"]
+    assert str(replace(craft, engines={"up": side})).splitlines()[2] == "thrust (0, 0, 0) N"
+    assert "thrusters" not in str(replace(craft, engines={"main": main}))

@@ -267,3 +267,13 @@ def test_the_cost_of_a_worst_case_search_is_limited(craft: Craft, largest: objec
     model = craft.uncertain("50%", {"craft.Jxx": "5%"})
     with pytest.raises(FmuError, match=r"largest must be a number from 0\.001 to 1000"):
         model.worst_case(craft.loop(GAINS, PERIOD, "50%"), largest=largest)
+
+
+def test_a_quantity_that_cannot_be_given_names_the_parameter_to_leave_out(craft: Craft) -> None:
+    """A fill table comes from mass_flow; a diameter does not."""
+    frequency, given = ModeQuantity(1, "frequency", 1), craft.parameters("50%")
+    drains = Modes(craft.model, given | {"tank[1].fill.points": 3}).problem(frequency)
+    assert drains.endswith("cannot be given; leave out mass_flow, or vary the fill instead")
+    scaled = Modes(craft.model, given | {"tank[1].diameter": 1.0}).problem(frequency)
+    assert "mass_flow" not in scaled and scaled.endswith("; leave out diameter")
+    assert not Modes(craft.model, given).problem(frequency)

@@ -443,3 +443,25 @@ def test_a_failed_certificate_is_reported(
     assert "none was found with" in repr(found) and "WorstCase" in repr(found)
     with pytest.raises(FmuError, match="the certificate proves nothing"):
         found.save(tmp_path / "none.npz")
+
+
+def test_a_loop_that_does_not_fit_the_model_is_told_both_lists(
+    danger: tuple[UncertainModel, Loop],
+) -> None:
+    """The message names what loop and model have, and the call that gives a model that fits."""
+    model, loop = danger
+    other = replace(loop, command="force")
+    with pytest.raises(FmuError) as told:
+        model.worst_case(other)
+    for text in (
+        "commands force[1], force[2], force[3], but", "its inputs torque[1], torque[2], torque[3]",
+        "uncertain(…, inputs=loop.names[1], outputs=loop.names[0])",
+    ):  # fmt: skip
+        assert text in str(told.value)
+    start = dict(loop.parameters)
+    fits = uncertain(
+        start, {"craft.Jxx": "10%"}, model=loop.model, inputs=other.names[1],
+        outputs=other.names[0],
+    )  # fmt: skip
+    with pytest.raises(FmuError, match="unstable at Δ = 0"):  # it fits, but does not control
+        fits.worst_case(other)
