@@ -305,7 +305,7 @@ impl<V: Tested> UnderTest<V> {
         let mut found = findings.clone();
         let place = what.clone();
         let (returned, waiting) = mpsc::channel::<()>();
-        guard::spawn(move || {
+        let watchdog = guard::spawn(move || {
             if waiting.recv_timeout(PATIENCE) == Err(RecvTimeoutError::Timeout) {
                 found
                     .at(place)
@@ -320,6 +320,9 @@ impl<V: Tested> UnderTest<V> {
             calls()
         });
         drop(returned);
+        // Some rules make thousands of such calls. Watchdogs that still end would use up the memory that
+        // the process may have for its threads.
+        let _ = watchdog.join();
         answer
     }
 

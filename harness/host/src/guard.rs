@@ -28,6 +28,7 @@ use std::process::{Child, Command, ExitStatus};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex, MutexGuard, Once, OnceLock, PoisonError, Weak};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
@@ -456,7 +457,7 @@ struct Reader {
 /// # Panics
 ///
 /// If the system still refuses to start a thread.
-pub fn spawn(work: impl FnOnce() + Send + 'static) {
+pub fn spawn(work: impl FnOnce() + Send + 'static) -> JoinHandle<()> {
     let work = Arc::new(Mutex::new(Some(work)));
     let attempt = || {
         let work = work.clone();
@@ -473,7 +474,7 @@ pub fn spawn(work: impl FnOnce() + Send + 'static) {
                 std::thread::sleep(Duration::from_millis(50));
             }
             Err(error) => panic!("a thread could not be started: {error}"),
-            Ok(_) => return,
+            Ok(thread) => return thread,
         }
     }
     panic!("a thread could not be started: the system is short of resources");
