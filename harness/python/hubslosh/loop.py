@@ -1,5 +1,6 @@
 """A sampled controller in closed loop with an FMU."""
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
@@ -10,9 +11,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from .arguments import column_of, floats, names_of, not_numbers, out_of_range
+from .arguments import caller, column_of, floats, names_of, not_numbers, out_of_range
 from .feedback import Feedback, Linear
-from .fmu import Fmu, FmuError, Parameters, did_you_mean
+from .fmu import Fmu, FmuError, FmuWarning, Parameters, did_you_mean
 from .linearization import LinearModel, linearize, split_delay
 from .plant import TORQUE, Plant
 from .run import Run
@@ -36,6 +37,7 @@ from .wheels import (
     columns_of,
     momentum,
     rows_of,
+    saturated,
     speed_name,
     torque_names,
     units_of,
@@ -504,6 +506,8 @@ class Loop:
                 asked,
                 feedback,
             )
+        for text in saturated(turned, feedback, points):
+            warnings.warn(text, FmuWarning, stacklevel=caller())
         commands = feedback.commands
         commands[: feedback.latency * parts + switch] = list(constants.values())
         commands[-1] = commands[-2]

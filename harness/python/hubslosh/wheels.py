@@ -220,6 +220,27 @@ def columns_of(wheels: Mapping[str, Wheel], feedback: Feedback) -> dict[str, Vec
     return found | dict(zip(map(speed_name, wheels), feedback.speeds.T, strict=True))
 
 
+def saturated(wheels: Mapping[str, Wheel], feedback: Feedback, time: Vector) -> list[str]:
+    """Return a warning for each wheel that is at its largest speed in the last rows of a run.
+
+    ``wheels`` are named by their torques, in the order of ``feedback``; ``time`` has a number for
+    each row, s.
+    """
+    found = []
+    for (name, wheel), speed in zip(wheels.items(), feedback.speeds.T, strict=True):
+        below = np.flatnonzero(np.abs(speed) < wheel.max_speed)
+        first = int(below[-1]) + 1 if len(below) else 0
+        if first < len(time) - 1:
+            found.append(
+                f"wheel {name.removesuffix('.torque')} stays at its largest speed, "
+                f"{wheel.max_speed:g} rad/s, from {time[first]:.4g} s to the end of the run at "
+                f"{time[-1]:.4g} s, and gives no torque in one direction. Give it a larger inertia "
+                "or max_speed, start it at a speed that leaves more room, or unload it with "
+                "thrusters, whose torque is a command or an input"
+            )
+    return found
+
+
 def units_of(wheels: Mapping[str, Wheel]) -> dict[str, str]:
     """Return the units of torques and speeds of wheels, which are named by their torques."""
     return dict.fromkeys(wheels, "N.m") | {speed_name(name): "rad/s" for name in wheels}

@@ -1,5 +1,6 @@
 """Reaction wheels: closed forms, conservation of angular momentum, limits, and linear models."""
 
+import warnings
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import hubslosh
-from hubslosh import Craft, FmuError, MountedTank, Wheel, attitude
+from hubslosh import Craft, FmuError, FmuWarning, MountedTank, Wheel, attitude
 
 SPHERE = {"density": 1440.0, "shape": {"sphere": {"radius": 0.5}}}
 INERTIA = np.array([[900.0, -20.0, 5.0], [-20.0, 850.0, 12.0], [5.0, 12.0, 700.0]])
@@ -335,3 +336,25 @@ def test_wrong_wheels_are_named(rigid: Craft, fmu: Path) -> None:
         rigid.simulate(0, table)
     bench = hubslosh.Loop([[4.0, 2.0]], 0.1, fmu, command="z.torque", wheels={"z": PYRAMID["a"]})
     assert "wheels are for Spacecraft" in bench.problems()[0]
+
+
+def test_a_wheel_that_stays_at_its_largest_speed_is_warned_of(rigid: Craft) -> None:
+    """A constant torque of 0.2 N·m turns the wheel from 80 to 100 rad/s in 1 s.
+
+    A wheel that is braked later, or that reaches the limit only at the end, is not reported.
+    """
+    wheel = Wheel((0, 0, 1), 0.01, 0.2, 100, 80.0)
+    body = replace(rigid, wheels={"z": wheel})
+    loop = body.loop(lambda t, y: -0.5, 0.25, 0, command="wheels")
+    with pytest.warns(FmuWarning) as told:
+        run = loop.simulate(5, outputs=[], substeps=2)
+    assert len(told) == 1 and Path(told[0].filename) == Path(__file__)
+    said = "wheel z stays at its largest speed, 100 rad/s, from 1 s to the end of the run at 5 s"
+    assert str(told[0].message).startswith(said)
+    assert "unload it with thrusters" in str(told[0].message)
+    assert (run["z.speed"][run["time"] >= 1] == 100).all()
+    braked = body.loop(lambda t, y: -0.5 if t < 3 else 0.1, 0.25, 0, command="wheels")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", FmuWarning)
+        braked.simulate(5, outputs=[])
+        loop.simulate(1, outputs=[])
