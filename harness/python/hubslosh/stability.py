@@ -352,14 +352,16 @@ def _is_neutral(gain: LinearModel, poles: NDArray[np.complex128]) -> NDArray[np.
     size = float(np.linalg.norm(A)) or 1.0
     rounding = len(A) * np.finfo(float).eps
     most = np.cbrt(rounding) * size
-    if not (off <= most).any():
-        return np.zeros(len(poles), bool)
+    near = off <= most
+    if near.any():
+        near &= np.abs(poles[:, None] - np.linalg.eigvals(gain.A)).min(axis=1) <= most
+    if not near.any():
+        return near
     values, left, right = eig(A, left=True)
     with np.errstate(divide="ignore"):
         error = np.minimum(rounding * size / np.abs((left.conj() * right).sum(axis=0)), most)
     nearest = np.abs(poles[:, None] - values).argmin(axis=1)
-    kept = np.abs(poles[:, None] - np.linalg.eigvals(gain.A)).min(axis=1) <= most
-    found: NDArray[np.bool_] = (off <= error[nearest]) & kept
+    found: NDArray[np.bool_] = (off <= error[nearest]) & near
     return found
 
 
