@@ -12,7 +12,8 @@
 /// turn. Otherwise the intervals next to a turning point are not limited, because the true maximum lies
 /// between points.
 ///
-/// # Panics If the lengths of the slices differ.
+/// # Panics
+/// If the lengths of the slices differ.
 pub fn derivatives(x: &[f64], y: &[f64], within: bool, slope: &mut [f64], curvature: &mut [f64]) {
     let count = x.len();
     assert!([y.len(), slope.len(), curvature.len()] == [count; 3]);

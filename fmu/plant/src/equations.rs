@@ -139,7 +139,8 @@ impl Plant {
     /// rest, determines its new contact, keeps the rotor within its speeds, takes the gyro's samples, and
     /// updates the regime. Returns true if continuous states have changed.
     ///
-    /// # Errors [`StepError::Model`], [`StepError::NotFinite`]; the plant is unchanged.
+    /// # Errors
+    /// [`StepError::Model`], [`StepError::NotFinite`]; the plant is unchanged.
     pub fn take_event(&mut self, inputs: &Inputs) -> Result<bool, StepError> {
         let (before, time) = (self.state, self.state.time);
         let period = 1.0 / self.imu.rate;
@@ -208,7 +209,8 @@ impl Plant {
 
     /// Changes the friction law from here on.
     ///
-    /// # Errors Lists all problems of the parameters; the plant is unchanged.
+    /// # Errors
+    /// Lists all problems of the parameters; the plant is unchanged.
     pub fn set_friction(&mut self, p: &Friction, inputs: &Inputs) -> Result<(), Vec<String>> {
         let problems = Law::problems(p);
         if !problems.is_empty() {
@@ -226,7 +228,8 @@ impl Plant {
     /// The inputs' derivatives are unknown here. The rule is exact to fourth order in the step if g_axial is
     /// linear in time, otherwise to second order.
     ///
-    /// # Errors [`StepError::NotFinite`]; the plant is unchanged.
+    /// # Errors
+    /// [`StepError::NotFinite`]; the plant is unchanged.
     pub fn accept_step(&mut self, inputs: &Inputs) -> Result<(), StepError> {
         let work = self.work_axial(inputs);
         self.evaluate(inputs);
@@ -242,7 +245,8 @@ impl Plant {
 
     /// Refuses states from the host that are outside the models' range.
     ///
-    /// # Errors [`StepError::Model`] names the mode and the reason.
+    /// # Errors
+    /// [`StepError::Model`] names the mode and the reason.
     pub fn check_range(&self) -> Result<(), StepError> {
         let time = self.state.time;
         with_modes!(&self.liquid, modes => {

@@ -141,7 +141,8 @@ impl Plant {
     /// Creates a plant at the start of its motion, at `start_time` (s), with the inputs that act then.
     /// `tolerance` is the allowed relative error of rates and angles.
     ///
-    /// # Errors Lists all problems of combined parameters. The caller must check the ranges of single
+    /// # Errors
+    /// Lists all problems of combined parameters. The caller must check the ranges of single
     /// parameters.
     pub fn new(
         p: &Parameters,
@@ -277,7 +278,8 @@ impl Plant {
 
     /// Advances by exactly `h` > 0 seconds, with the inputs along their ramps.
     ///
-    /// # Errors See [`StepError`]; the plant is unchanged.
+    /// # Errors
+    /// See [`StepError`]; the plant is unchanged.
     pub fn step(&mut self, inputs: &Inputs, h: f64) -> Result<(), StepError> {
         let before = self.state;
         let done = self.advance(inputs, h, f64::INFINITY);
@@ -291,7 +293,8 @@ impl Plant {
     /// reaches a limit, or the gyro takes a sample. A step from there to the same end with the same inputs
     /// continues as if it had not stopped.
     ///
-    /// # Errors The same as for [`Plant::step`].
+    /// # Errors
+    /// The same as for [`Plant::step`].
     pub fn step_to_event(&mut self, inputs: &Inputs, h: f64) -> Result<StepEnd, StepError> {
         let (before, stopped) = (self.state, self.stopped.take());
         let (mut length, mut passed, mut begun) = (h, -1.0, 0.0);

@@ -281,7 +281,8 @@ fn expand<M: Motion>(motion: &mut M, h: f64, tolerance: f64) -> (usize, f64) {
 /// Advances the motion by exactly `h` > 0 from the time `begin`. If the motion ends the call itself
 /// ([`Motion::take`]), returns the elapsed length. After an error the states are unusable.
 ///
-/// # Errors See [`StepError`].
+/// # Errors
+/// See [`StepError`].
 #[inline(always)]
 pub fn advance<M: Motion>(
     motion: &mut M,
@@ -560,7 +561,8 @@ fn largest_slope_defect(tolerance: f64) -> f64 {
 /// without its rounding error, because this error depends on the lengths of the calls. Before the call the states are those at
 /// the start of the expansion, after the call those at `clock`.
 ///
-/// # Errors See [`StepError`].
+/// # Errors
+/// See [`StepError`].
 #[inline(always)]
 pub fn advance_kept<M: KeptMotion>(
     motion: &mut M,

@@ -16,7 +16,8 @@ pub fn moving_starts(description: &ModelDescription) -> Vec<String> {
 
 /// Creates an instance in which all [`moving_starts`] are 0, so that only the settings move it.
 ///
-/// # Errors If the FMU refuses a call.
+/// # Errors
+/// If the FMU refuses a call.
 pub fn instantiate<'fmu>(fmu: &'fmu Fmu, name: &str) -> Result<Instance<'fmu>> {
     let mut instance = fmu.instantiate(name)?;
     for start in moving_starts(fmu.description()) {

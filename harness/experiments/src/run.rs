@@ -46,7 +46,8 @@ pub const TORQUE: &str = TAU_CMD;
 /// Returns the name of the input that the torque drives: `chosen` if given, otherwise [`TORQUE`], otherwise
 /// the FMU's only Real input. Returns `None` if the FMU has no input.
 ///
-/// # Errors If the input does not exist, or several inputs are possible.
+/// # Errors
+/// If the input does not exist, or several inputs are possible.
 pub fn driven(description: &ModelDescription, chosen: Option<&str>) -> Result<Option<String>> {
     if let Some(name) = chosen {
         let variable = description.variable(name)?;
@@ -79,7 +80,8 @@ pub const SLOPE: &str = "tau_slope";
 /// `chosen`, else [`TORQUE`], else the file's first. `done` receives messages about the units in which the
 /// columns are read.
 ///
-/// # Errors If the file has no such column, or other columns. The error lists all problems of the columns.
+/// # Errors
+/// If the file has no such column, or other columns. The error lists all problems of the columns.
 pub fn histories(
     description: &ModelDescription,
     path: &Path,
@@ -261,7 +263,8 @@ impl Run {
     /// (N·m) and `tau_slope`, its derivative until the next point (N·m/s). The schedule says which points are
     /// rows of the result.
     ///
-    /// # Errors If the profile takes too many commands.
+    /// # Errors
+    /// If the profile takes too many commands.
     pub fn torque_table(&self) -> Result<(Table, Schedule)> {
         let (histories, schedule) = self.course()?;
         let mut torque = histories[0].cursor();
@@ -285,7 +288,8 @@ impl Run {
 
     /// Checks stop time, step, tolerance and inputs.
     ///
-    /// # Errors If a value is not allowed; the message is one sentence about it.
+    /// # Errors
+    /// If a value is not allowed; the message is one sentence about it.
     pub fn check(&self) -> Result<()> {
         ensure!(
             self.stop > self.start() && self.stop.is_finite(),
@@ -306,7 +310,8 @@ impl Run {
 
     /// Creates an instance with the start values set, ready for the first step.
     ///
-    /// # Errors If [`Run::check`] fails, or the FMU refuses a setting.
+    /// # Errors
+    /// If [`Run::check`] fails, or the FMU refuses a setting.
     pub fn initialise<'fmu>(&self, fmu: &'fmu Fmu) -> Result<Instance<'fmu>> {
         self.check()?;
         let mut instance = rest::instantiate(fmu, "run")?;
@@ -367,7 +372,8 @@ impl Run {
     /// [`Run::step`] seconds; [`schedule::ROWS`] says which values of inputs and outputs a row pairs.
     /// `progress` receives the number of rows since its last call.
     ///
-    /// # Errors If the FMU refuses a call, or a recorded value is not finite.
+    /// # Errors
+    /// If the FMU refuses a call, or a recorded value is not finite.
     pub fn drive(
         &self,
         instance: &mut Instance,

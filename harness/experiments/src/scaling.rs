@@ -23,7 +23,8 @@ pub const BENCH: (f64, f64) = (0.0815, 0.225);
 
 /// Checks that all values are positive numbers.
 ///
-/// # Errors Names all that are not.
+/// # Errors
+/// Names all that are not.
 fn positive(values: &[(&str, f64)]) -> Result<()> {
     let wrong: Vec<String> = values
         .iter()
@@ -52,7 +53,8 @@ pub enum Flight {
 /// Computes the Bond number of the bench's liquid at the acceleration `a` (m/s²) in a tank of `radius` (m),
 /// and the flight tank with `liquid` that has the same Bond number.
 ///
-/// # Errors If a value is not positive.
+/// # Errors
+/// If a value is not positive.
 pub fn bond(
     bench: Liquid,
     (a, radius): (f64, f64),
@@ -95,7 +97,8 @@ pub fn bond(
 /// Computes Bond, Weber and Froude numbers of a liquid that moves at `velocity` (m/s), and names the dominant
 /// force. Also computes the times that gravity and surface tension take over the radius (thesis 2.28, 2.29).
 ///
-/// # Errors If a value is not positive.
+/// # Errors
+/// If a value is not positive.
 pub fn numbers(liquid: Liquid, (a, radius): (f64, f64), velocity: f64) -> Result<Found> {
     positive(&[
         ("density", liquid.density),
@@ -134,7 +137,8 @@ pub fn numbers(liquid: Liquid, (a, radius): (f64, f64), velocity: f64) -> Result
 /// Computes the bench's rotational Bond numbers at the angular acceleration `alpha` (rad/s²) and rate `omega`
 /// (rad/s), and the tanks that have the same numbers at the angular acceleration `target` in flight.
 ///
-/// # Errors If a value is not positive.
+/// # Errors
+/// If a value is not positive.
 pub fn rotation(
     liquid: Liquid,
     (radius, arm): (f64, f64),
@@ -183,7 +187,8 @@ pub fn rotation(
 /// Computes the factors of Froude similarity (the thesis's Table 2.3) for the ratios of length, density and
 /// gravity of full size to model.
 ///
-/// # Errors If a ratio is not positive, or a factor overflows.
+/// # Errors
+/// If a ratio is not positive, or a factor overflows.
 pub fn froude(lambda: f64, density: f64, gravity: f64) -> Result<Found> {
     positive(&[("lambda", lambda), ("density ratio", density), ("gravity ratio", gravity)])?;
     let factors = similarity::froude(lambda, density, gravity);

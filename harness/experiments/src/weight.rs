@@ -112,7 +112,8 @@ impl Tanks {
     /// which the wave is equally high, R = wave (ξ² − 1)/2. The surface `tension` is in N/m; no FMU in six axes has it.
     /// Tanks without modes, with unknown dimensions (`wave` = 0), and those whose liquid a stiffness k holds are left out.
     ///
-    /// # Errors If the tension is not positive, or a variable cannot be read.
+    /// # Errors
+    /// If the tension is not positive, or a variable cannot be read.
     pub fn read(
         description: &ModelDescription,
         instance: &mut Instance,

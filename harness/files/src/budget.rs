@@ -32,7 +32,8 @@ pub const NAME: usize = 200;
 
 /// Returns the number of steps of length `step` (s) in `span` (s), the last perhaps shorter.
 ///
-/// # Errors If there are more than [`ROWS`], or if the numbers make none.
+/// # Errors
+/// If there are more than [`ROWS`], or if the numbers make none.
 pub fn steps(span: f64, step: f64) -> Result<usize> {
     ensure!(
         step > 0.0 && step.is_finite(),
@@ -54,7 +55,8 @@ pub fn steps(span: f64, step: f64) -> Result<usize> {
 
 /// Returns the size of a table of numbers, bytes.
 ///
-/// # Errors If it has more than [`ROWS`], or takes more than [`BYTES`].
+/// # Errors
+/// If it has more than [`ROWS`], or takes more than [`BYTES`].
 pub fn table(rows: usize, columns: usize) -> Result<u64> {
     ensure!(rows <= ROWS + 1, "{rows} rows (allowed: at most {ROWS})");
     let bytes = (rows as u64).saturating_mul(columns as u64).saturating_mul(8);
@@ -71,7 +73,8 @@ pub fn table(rows: usize, columns: usize) -> Result<u64> {
 /// Returns the size of the numbers that are read from a file of `size` bytes. A small file that claims to
 /// hold much is damaged or made to harm.
 ///
-/// # Errors If [`table`] fails, or the numbers take more than [`RECORDING`] and than [`PER_BYTE`] times the
+/// # Errors
+/// If [`table`] fails, or the numbers take more than [`RECORDING`] and than [`PER_BYTE`] times the
 /// file.
 pub fn reading(rows: usize, columns: usize, size: u64) -> Result<u64> {
     let bytes = table(rows, columns)?;
@@ -90,7 +93,8 @@ pub fn reading(rows: usize, columns: usize, size: u64) -> Result<u64> {
 /// Returns the number of threads for `wanted` jobs at once (0 for as many as the machine has cores) that hold
 /// `bytes` each.
 ///
-/// # Errors If more than [`JOBS`] are wanted.
+/// # Errors
+/// If more than [`JOBS`] are wanted.
 pub fn jobs(wanted: usize, bytes: u64) -> Result<usize> {
     ensure!(wanted <= JOBS, "{wanted} runs at once (allowed: 1 to {JOBS})");
     let cores = std::thread::available_parallelism().map_or(1, usize::from).min(JOBS);

@@ -14,7 +14,8 @@ use crate::budget;
 
 /// Opens a regular file for reading; a symbolic link to one counts as one.
 ///
-/// # Errors If the file cannot be opened or is not a regular file. The message does not repeat the path.
+/// # Errors
+/// If the file cannot be opened or is not a regular file. The message does not repeat the path.
 pub fn open(path: &Path) -> Result<File> {
     let kind = path.metadata()?;
     // before `File::open`, which waits until somebody writes to a named pipe
@@ -41,7 +42,8 @@ pub fn read_so_far() -> Vec<String> {
 
 /// Reads a file of at most [`budget::TEXT`] bytes.
 ///
-/// # Errors If the file cannot be read, is not a regular file or is too large.
+/// # Errors
+/// If the file cannot be read, is not a regular file or is too large.
 pub fn bytes(path: &Path) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     open(path)?.take(budget::TEXT + 1).read_to_end(&mut bytes)?;
@@ -55,7 +57,8 @@ pub fn bytes(path: &Path) -> Result<Vec<u8>> {
 
 /// Reads a text of at most [`budget::TEXT`] bytes in UTF-8.
 ///
-/// # Errors If [`bytes`] fails, or the text is not UTF-8.
+/// # Errors
+/// If [`bytes`] fails, or the text is not UTF-8.
 pub fn text(path: &Path) -> Result<String> {
     String::from_utf8(bytes(path)?).map_err(|error| {
         let at = error.utf8_error().valid_up_to();
@@ -141,7 +144,8 @@ pub fn protect(path: &Path) {
 /// Fails if `path` leads to a protected input: by the same name, a relative path, a symbolic link or a hard
 /// link.
 ///
-/// # Errors If it does; the message names both paths.
+/// # Errors
+/// If it does; the message names both paths.
 pub fn check_replaceable(path: &Path) -> Result<()> {
     let Some(identity) = identity(path) else { return Ok(()) };
     let all = PROTECTED.lock().unwrap_or_else(PoisonError::into_inner);

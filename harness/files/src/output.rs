@@ -22,7 +22,8 @@ const LINKS: usize = 40;
 
 /// Finds the destination of an output. Symbolic links are followed, also to a file that does not exist yet.
 ///
-/// # Errors If the path leads to a directory, or its links lead in a circle.
+/// # Errors
+/// If the path leads to a directory, or its links lead in a circle.
 pub fn destination(path: &Path) -> Result<Destination> {
     let name = path.display();
     let mut place = path.to_path_buf();
@@ -84,7 +85,8 @@ pub fn atomically<T>(path: &Path, write: impl FnOnce(&mut File) -> Result<T>) ->
 /// Moves a complete file to where the path of an output leads: it takes the place of a plain file, and its
 /// bytes go to a device or a pipe.
 ///
-/// # Errors If that fails; the message names `path`.
+/// # Errors
+/// If that fails; the message names `path`.
 pub fn publish_draft(draft: &Path, path: &Path) -> Result<()> {
     let move_or_pour = || -> Result<()> {
         match destination(path)? {

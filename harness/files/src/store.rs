@@ -133,7 +133,8 @@ fn lines(sums: &BTreeMap<String, String>) -> String {
 
 /// Returns the last hash of each name. A line that a kill has cut off does not count.
 ///
-/// # Errors Another line is not in the format of a manifest.
+/// # Errors
+/// Another line is not in the format of a manifest.
 fn sums(text: &str) -> Result<BTreeMap<String, String>> {
     let whole = text.rfind('\n').map_or("", |end| &text[..=end]);
     let pair = |(row, line): (usize, &str)| {
@@ -161,7 +162,8 @@ fn has_no_runs(path: &Path) -> bool {
 
 /// Reads a folder's manifest. `is_used` is true if a program has locked the folder before.
 ///
-/// # Errors Nothing verifies the stored runs: the manifest is damaged, or it is missing although the folder
+/// # Errors
+/// Nothing verifies the stored runs: the manifest is damaged, or it is missing although the folder
 /// is used.
 fn read_manifest(path: &Path, is_used: bool) -> Result<BTreeMap<String, String>> {
     let place = path.join(MANIFEST);
@@ -209,7 +211,8 @@ impl Store {
     /// Creates the folder if it does not exist, and locks it. Other programs that want to lock it get `about`
     /// as the reason. The definition of a campaign is published with its tables, so it has none here.
     ///
-    /// # Errors Another program has locked the folder, it belongs to runs of another kind or of another
+    /// # Errors
+    /// Another program has locked the folder, it belongs to runs of another kind or of another
     /// definition, or its manifest is damaged. In case of an error nothing in the folder has changed, except for the lock.
     pub fn take(
         path: &Path,
@@ -290,7 +293,8 @@ impl Store {
     /// manifest is accepted if the folder is new, or if `is_ours` does not recognise its file as one of
     /// HubSlosh.
     ///
-    /// # Errors The file is not the stored one.
+    /// # Errors
+    /// The file is not the stored one.
     pub fn check(
         &self,
         run: &str,
@@ -305,7 +309,8 @@ impl Store {
 
     /// Returns the bytes of a stored run that only HubSlosh writes, or `None` if it was never stored.
     ///
-    /// # Errors The file is not the stored one.
+    /// # Errors
+    /// The file is not the stored one.
     pub fn read(&self, run: &str) -> Result<Option<Vec<u8>>, Damage> {
         let read = |path: &Path| {
             let bytes = input::bytes(path)?;

@@ -768,7 +768,8 @@ impl Model {
 impl Model {
     /// Creates a state-space model from A, B, C and D. `period` is the sampling period in s, or 0 for continuous time.
     ///
-    /// # Errors If the sizes of the matrices do not fit each other.
+    /// # Errors
+    /// If the sizes of the matrices do not fit each other.
     #[new]
     fn read(
         py: Python,
@@ -788,7 +789,8 @@ impl Model {
     /// `roots` has the zeros and the poles of the loop gain and the poles of the closed loop, each as a list of pairs (real part,
     /// imaginary part).
     ///
-    /// # Errors If the model has several inputs or outputs.
+    /// # Errors
+    /// If the model has several inputs or outputs.
     fn crossings(
         &self,
         py: Python,
@@ -809,7 +811,8 @@ impl Model {
     /// the imaginary part of the eigenvalue. The search looks for changes between neighbouring `nodes` (frequencies, rad/s), so
     /// that two crossings between the same nodes may be missed.
     ///
-    /// # Errors If the numbers of inputs and outputs differ, or the nodes are no array of floats.
+    /// # Errors
+    /// If the numbers of inputs and outputs differ, or the nodes are no array of floats.
     fn unit_eigenvalues(&self, py: Python, nodes: &Bound<PyAny>) -> PyResult<Vec<(f64, f64, f64)>> {
         self.must_be_square()?;
         let nodes = numbers(nodes)?;
@@ -819,7 +822,8 @@ impl Model {
     /// Returns a frequency near `w`, rad/s, at which −L exp(−jωτ) has an eigenvalue of magnitude 1 near 1, and the phase of this
     /// eigenvalue, rad. `delay` is τ, s.
     ///
-    /// # Errors If the numbers of inputs and outputs differ.
+    /// # Errors
+    /// If the numbers of inputs and outputs differ.
     fn critical(&self, py: Python, w: f64, delay: f64) -> PyResult<(f64, f64)> {
         self.must_be_square()?;
         Ok(py.detach(|| self.refined(w, delay)))
@@ -828,7 +832,8 @@ impl Model {
     /// Returns the response C (sI − A)⁻¹ B + D at `frequencies`, rad/s: pairs of real and imaginary part, one matrix after the
     /// other, each row after row.
     ///
-    /// # Errors If the frequencies are no array of floats.
+    /// # Errors
+    /// If the frequencies are no array of floats.
     fn response(&self, py: Python, frequencies: &Bound<PyAny>) -> PyResult<Vec<f64>> {
         let frequencies = numbers(frequencies)?;
         let parts = |w: &f64| self.at(*w).into_iter().flat_map(|value| [value.re, value.im]);

@@ -28,7 +28,8 @@ impl From<PyErr> for Failure {
 
 /// Returns the numbers in a numpy array of floats.
 ///
-/// # Errors If the object is not an array of floats.
+/// # Errors
+/// If the object is not an array of floats.
 pub fn numbers(array: &Bound<PyAny>) -> PyResult<Vec<f64>> {
     PyBuffer::get(array)?.to_vec(array.py())
 }

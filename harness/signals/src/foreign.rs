@@ -25,7 +25,8 @@ pub enum Kind {
 
 /// Detects the kind of a file from its first bytes.
 ///
-/// # Errors [`Foreign`] if it is neither text nor Parquet.
+/// # Errors
+/// [`Foreign`] if it is neither text nor Parquet.
 pub fn kind(path: &Path) -> Result<Kind> {
     const PACKED: [(&[u8], &str); 3] = [
         (b"\x1f\x8b", "the file is compressed with gzip: unpack it first (gunzip)"),
@@ -53,7 +54,8 @@ pub fn kind(path: &Path) -> Result<Kind> {
 /// Converts a file to text in columns with the Python package. The folder of the text is deleted when the
 /// returned value is dropped.
 ///
-/// # Errors If no Python with the package is found, or the package cannot read the file; `why` is the reason
+/// # Errors
+/// If no Python with the package is found, or the package cannot read the file; `why` is the reason
 /// that the file was not read here.
 pub fn converted(path: &Path, why: &anyhow::Error) -> Result<(Folder, PathBuf)> {
     let folder = Folder::new()?;

@@ -26,7 +26,8 @@ impl Forward {
 
     /// Returns the spectrum of a signal, N/2 + 1 lines.
     ///
-    /// # Panics If the signal has another length than the transform.
+    /// # Panics
+    /// If the signal has another length than the transform.
     pub fn transform(&self, mut signal: Vec<f64>) -> Vec<Complex64> {
         let mut spectrum = self.0.make_output_vec();
         self.0.process(&mut signal, &mut spectrum).expect("a signal of the transform's length");
@@ -45,7 +46,8 @@ impl Inverse {
     /// Returns N times the signal of a spectrum of N/2 + 1 lines. Imaginary parts of line 0 and, if N is
     /// even, of the last line are ignored, because a real signal has none.
     ///
-    /// # Panics If the spectrum has another length.
+    /// # Panics
+    /// If the spectrum has another length.
     pub fn transform(&self, mut spectrum: Vec<Complex64>) -> Vec<f64> {
         let last = spectrum.len() - 1;
         spectrum[0].im = 0.0;

@@ -30,7 +30,8 @@ pub struct Table {
 
 /// Returns true for the name of a Parquet file, false for a CSV file.
 ///
-/// # Errors If the name has another ending.
+/// # Errors
+/// If the name has another ending.
 fn is_parquet(path: &Path) -> Result<bool> {
     match path.extension().and_then(|e| e.to_str()).map(str::to_lowercase).as_deref() {
         Some("csv") => Ok(false),
@@ -41,7 +42,8 @@ fn is_parquet(path: &Path) -> Result<bool> {
 
 /// Checks that a table can be written to `path`.
 ///
-/// # Errors If its name ends neither in .csv nor in .parquet.
+/// # Errors
+/// If its name ends neither in .csv nor in .parquet.
 pub fn check_ending(path: &Path) -> Result<()> {
     is_parquet(path).map(drop)
 }
@@ -49,7 +51,8 @@ pub fn check_ending(path: &Path) -> Result<()> {
 impl Table {
     /// Makes a table from columns with their names.
     ///
-    /// # Panics If the columns are not equally long, or names and columns differ in number.
+    /// # Panics
+    /// If the columns are not equally long, or names and columns differ in number.
     pub fn new(names: Vec<String>, columns: Vec<Vec<f64>>) -> Self {
         assert_eq!(names.len(), columns.len());
         assert!(columns.windows(2).all(|pair| pair[0].len() == pair[1].len()));
@@ -58,7 +61,8 @@ impl Table {
 
     /// Makes a table from pairs of name and column.
     ///
-    /// # Panics If the columns are not equally long.
+    /// # Panics
+    /// If the columns are not equally long.
     pub fn of<Name: Into<String>>(pairs: impl IntoIterator<Item = (Name, Vec<f64>)>) -> Self {
         let (names, columns) =
             pairs.into_iter().map(|(name, column)| (name.into(), column)).unzip();
@@ -67,7 +71,8 @@ impl Table {
 
     /// Adds a column in which NaN marks missing values; the file then has an empty field or a null there.
     ///
-    /// # Panics If it has another number of rows than the table.
+    /// # Panics
+    /// If it has another number of rows than the table.
     pub fn with_gaps(mut self, name: &str, column: Vec<f64>) -> Table {
         assert_eq!(column.len(), self.rows());
         self.names.push(name.into());
@@ -95,7 +100,8 @@ impl Table {
 
     /// Returns a table with only the columns `names`, in this order.
     ///
-    /// # Panics If a column does not exist.
+    /// # Panics
+    /// If a column does not exist.
     pub fn select(&self, names: &[&str]) -> Table {
         let column = |name: &&str| self.column(name).expect("a column of this table").to_vec();
         Table {
@@ -107,7 +113,8 @@ impl Table {
 
     /// Reads the columns `wanted` from a file, which may have others.
     ///
-    /// # Errors If the file cannot be read, a column is missing or exists twice, or a value is not a finite
+    /// # Errors
+    /// If the file cannot be read, a column is missing or exists twice, or a value is not a finite
     /// number.
     pub fn read(path: &Path, wanted: &[&str]) -> Result<Table> {
         let name = path.display();
@@ -120,7 +127,8 @@ impl Table {
 
     /// Checks that all values are finite, except missing ones in columns with gaps.
     ///
-    /// # Errors Names the first value that is not.
+    /// # Errors
+    /// Names the first value that is not.
     pub fn all_finite(&self) -> Result<()> {
         for (column, values) in self.names.iter().zip(&self.columns) {
             let gaps = self.gaps.contains(column);
@@ -146,7 +154,8 @@ impl Table {
     /// Writes the table to a CSV or Parquet file, replacing the file as a whole. `metadata` are a Parquet
     /// file's key-value pairs; a CSV file has none.
     ///
-    /// # Errors If a value is neither finite nor missing, or the file cannot be written.
+    /// # Errors
+    /// If a value is neither finite nor missing, or the file cannot be written.
     pub fn write(&self, path: &Path, metadata: &BTreeMap<String, String>) -> Result<()> {
         let is_parquet = is_parquet(path)?;
         atomically(path, |file| match is_parquet {
@@ -157,7 +166,8 @@ impl Table {
 
     /// Writes the table as CSV.
     ///
-    /// # Errors If a value is neither finite nor missing, or the file cannot be written.
+    /// # Errors
+    /// If a value is neither finite nor missing, or the file cannot be written.
     pub fn write_csv(&self, file: impl Write) -> Result<()> {
         self.check()?;
         let mut out = BufWriter::new(file);
@@ -230,7 +240,8 @@ impl Table {
 
 /// Returns the key-value metadata of a Parquet file.
 ///
-/// # Errors If the file is not complete.
+/// # Errors
+/// If the file is not complete.
 pub fn metadata(path: &Path) -> Result<BTreeMap<String, String>> {
     parquet_file::metadata(path)
         .with_context(|| format!("the table {} cannot be used", path.display()))
@@ -245,7 +256,8 @@ pub fn is_ours(path: &Path) -> bool {
 
 /// Lists the names of the columns of a file.
 ///
-/// # Errors If the file cannot be read or has no header.
+/// # Errors
+/// If the file cannot be read or has no header.
 pub fn names(path: &Path) -> Result<Vec<String>> {
     let names = match is_parquet(path)? {
         true => parquet_file::names(path),
@@ -264,7 +276,8 @@ fn header(path: &Path) -> Result<(csv::Reader<File>, Vec<String>)> {
 
 /// Finds the position of each wanted column.
 ///
-/// # Errors Lists the columns that are missing, and those that exist twice.
+/// # Errors
+/// Lists the columns that are missing, and those that exist twice.
 fn positions(there: &[String], wanted: &[&str]) -> Result<Vec<usize>> {
     let count = |name: &&&str| there.iter().filter(|other| other.trim() == **name).count();
     let listed = |of: fn(usize) -> bool| {

@@ -89,7 +89,8 @@ struct Crossing {
 impl Contour {
     /// Creates a contour from its segments.
     ///
-    /// # Errors All defects: values that are not finite, radii below 0, segments without length, gaps,
+    /// # Errors
+    /// All defects: values that are not finite, radii below 0, segments without length, gaps,
     /// self-crossing, clockwise order, a size above 100 m.
     pub fn new(segments: Vec<Segment>) -> Result<Contour, Problems> {
         let mut problems = Vec::new();
@@ -319,7 +320,8 @@ impl Contour {
 
     /// Returns the wetted wall at `fill`, m above the lowest point.
     ///
-    /// # Errors A fill that is not positive or above the top, separate pools, a free surface at a horizontal
+    /// # Errors
+    /// A fill that is not positive or above the top, separate pools, a free surface at a horizontal
     /// part of the wall or of zero width.
     pub fn cut(&self, fill: f64) -> Result<Wall, Problems> {
         if !fill.is_finite() {

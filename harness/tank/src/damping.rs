@@ -22,7 +22,8 @@ const ENDS: &str = "use the low end for stability margins, check both ends for s
 /// part, has the damping of that shape. If only a part of the wall is such a shape, the factor over the
 /// laminar layer is a mean by area. So the ratio is continuous in the fill and in the shape of the tank.
 ///
-/// # Errors If there is neither gravity nor centring stiffness, because there is no natural frequency then.
+/// # Errors
+/// If there is neither gravity nor centring stiffness, because there is no natural frequency then.
 pub fn tank_damping(
     tank: &Tank,
     data: &ModalData,

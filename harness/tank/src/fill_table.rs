@@ -114,7 +114,8 @@ fn count_carrying_modes(rows: &[ModalData]) -> usize {
 
 /// Places [`POINTS`] fills between two, m above the lowest point, including the ends.
 ///
-/// # Errors Ends without a free surface, and the errors of [`Tank::solve`].
+/// # Errors
+/// Ends without a free surface, and the errors of [`Tank::solve`].
 pub fn place(tank: &Tank, low: f64, high: f64, modes: usize) -> Result<Placed, Problems> {
     // denser near the ends, where the surface of a closed tank gets narrow and the modes change
     // most
@@ -175,7 +176,8 @@ fn check_surfaces(rows: &[ModalData]) -> Result<(), Problems> {
 /// Returns the parameters of a tank that can drain: those at its largest fill, where it starts, and its
 /// table.
 ///
-/// # Errors Those of [`ParameterSet::new`], a HubSlosh target, whose tank does not drain, and fewer than two
+/// # Errors
+/// Those of [`ParameterSet::new`], a HubSlosh target, whose tank does not drain, and fewer than two
 /// fills or more than [`POINTS`].
 pub fn parameters(
     tank: &Tank,

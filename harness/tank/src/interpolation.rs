@@ -15,7 +15,8 @@ pub struct Monotone {
 impl Monotone {
     /// Interpolates points with ascending `x`; one point gives a constant.
     ///
-    /// # Panics If there is no point, or `x` is not ascending.
+    /// # Panics
+    /// If there is no point, or `x` is not ascending.
     pub fn new(x: &[f64], y: &[f64]) -> Monotone {
         Monotone::interpolate(x, y, false)
     }
@@ -23,7 +24,8 @@ impl Monotone {
     /// Interpolates like [`Monotone::new`], but stays between its two points everywhere, as the FMUs' tables
     /// do, so that it turns where the data turn.
     ///
-    /// # Panics The same as for [`Monotone::new`].
+    /// # Panics
+    /// The same as for [`Monotone::new`].
     pub fn bounded(x: &[f64], y: &[f64]) -> Monotone {
         Monotone::interpolate(x, y, true)
     }

@@ -405,7 +405,8 @@ impl ModalData {
 
     /// Returns the fixed mass when the first `modes` modes are pendulums.
     ///
-    /// # Panics If there are fewer modes.
+    /// # Panics
+    /// If there are fewer modes.
     pub fn rest(&self, modes: usize) -> Rest {
         rest(self.m_liq, self.z_cg, self.i_eff_cg, &self.modes[..modes])
     }
@@ -495,7 +496,8 @@ fn estimate(before: f64, last: f64) -> f64 {
 /// Solves for the first `modes` modes of a liquid of density `rho` above `wall`. A full closed tank, whose
 /// `wall` has no free surface, has no modes and only the effective inertia.
 ///
-/// # Errors If the estimated error is above 1e-2.
+/// # Errors
+/// If the estimated error is above 1e-2.
 pub(crate) fn solve(wall: Wall, rho: f64, fill: f64, modes: usize) -> Result<ModalData, Problems> {
     let volume = Volume::from_wall(&wall);
     let modes = if wall.r_outer > 0.0 { modes } else { 0 };

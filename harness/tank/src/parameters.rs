@@ -251,7 +251,8 @@ pub fn tank_capillarity(
 /// Solves a tank at a fill, and adds what depends on the liquid's other properties: capillarity, damping, and
 /// the amplitude dependence of the first mode.
 ///
-/// # Errors If the tank cannot hold the fill, the modes cannot be solved, or the damping has no estimate
+/// # Errors
+/// If the tank cannot hold the fill, the modes cannot be solved, or the damping has no estimate
 /// ([`Tank::fill_height`], [`Tank::solve`], [`tank_damping`]).
 pub fn solve(tank: &Tank, fill: Fill, modes: usize, liquid: Liquid) -> Result<ModalData, Problems> {
     let mut data = tank.solve(tank.fill_height(fill)?, modes)?;
@@ -267,7 +268,8 @@ pub fn solve(tank: &Tank, fill: Fill, modes: usize, liquid: Liquid) -> Result<Mo
 
 /// Returns the damping of a tank's modes with the capillarity of the liquid, see [`damping::tank_damping`].
 ///
-/// # Errors Without gravity and surface tension there is no natural frequency.
+/// # Errors
+/// Without gravity and surface tension there is no natural frequency.
 pub fn tank_damping(
     tank: &Tank,
     data: &ModalData,
@@ -285,7 +287,8 @@ impl ParameterSet {
     /// Returns the parameters of a tank solved as `data`, with as many modes as both the tank and the FMU
     /// have.
     ///
-    /// # Errors A tank that the FMU cannot represent: number above four, or full; damping ratios without a
+    /// # Errors
+    /// A tank that the FMU cannot represent: number above four, or full; damping ratios without a
     /// specific force.
     pub fn new(
         tank: &Tank,

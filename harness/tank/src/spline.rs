@@ -14,7 +14,8 @@ const MANY: usize = 100;
 /// the polyline turns by more than 40 degrees is a corner. At the axis the curve is horizontal. At its other
 /// ends and at corners its third derivative is constant over two intervals (not-a-knot).
 ///
-/// # Errors Two equal points in succession.
+/// # Errors
+/// Two equal points in succession.
 pub(crate) fn spline(points: &[Point]) -> Result<Vec<Segment>, Problems> {
     let same: Vec<String> = points
         .windows(2)

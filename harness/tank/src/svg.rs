@@ -11,7 +11,8 @@ use crate::curve::{Curve, Point, Segment, cross, dot, sub};
 /// Supports lines, cubic and quadratic curves, and arcs with unrotated axes. Leaves out lines that close the
 /// path along the axis.
 ///
-/// # Errors A file that cannot be read or has no path, a transform, rotated arcs, several subpaths.
+/// # Errors
+/// A file that cannot be read or has no path, a transform, rotated arcs, several subpaths.
 pub(crate) fn read(path: &Path, scale: f64) -> Result<Vec<Segment>, Problems> {
     let text = crate::contour::read_text(path)
         .map_err(|why| Problems::from(format!("{}: {why}", path.display())))?;

@@ -18,7 +18,8 @@ pub struct Sweep {
 ///
 /// A fill of 0 or without a free surface gives a row without modes.
 ///
-/// # Errors Lists the problems of all fills; also if the fills do not ascend.
+/// # Errors
+/// Lists the problems of all fills; also if the fills do not ascend.
 pub fn sweep(tank: &Tank, fills: &[f64], modes: usize) -> Result<Sweep, Problems> {
     let mut problems = Vec::new();
     if fills.is_empty() {

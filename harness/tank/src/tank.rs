@@ -60,7 +60,8 @@ pub enum Shape {
 impl Shape {
     /// Returns the generating curve.
     ///
-    /// # Errors Lists every dimension that is not allowed.
+    /// # Errors
+    /// Lists every dimension that is not allowed.
     pub fn segments(&self) -> Result<Vec<Segment>, Problems> {
         let mut problems = Vec::new();
         let mut above = |limit: f64, dimensions: &[(&str, f64)]| {
@@ -218,7 +219,8 @@ pub const MOST_MODES: usize = 20;
 impl Tank {
     /// Reads the file of a tank. Other files that it names are relative to it.
     ///
-    /// # Errors Lists all problems of the file.
+    /// # Errors
+    /// Lists all problems of the file.
     pub fn read(path: &Path) -> Result<Tank, Problems> {
         let text = crate::contour::read_text(path)?;
         Tank::parse(&text, path.parent().unwrap_or(Path::new("")))
@@ -226,7 +228,8 @@ impl Tank {
 
     /// Parses the text of a tank's file; `folder` is the folder of the files that it names.
     ///
-    /// # Errors Lists all problems of the file.
+    /// # Errors
+    /// Lists all problems of the file.
     pub fn parse(text: &str, folder: &Path) -> Result<Tank, Problems> {
         let file: File = toml::from_str(text).map_err(|error| in_words(&error))?;
         let mut problems = Vec::new();
@@ -287,7 +290,8 @@ impl Tank {
 
     /// Creates a tank from a shape, with a liquid of `density`, kg/m³.
     ///
-    /// # Errors Lists every dimension outside its range.
+    /// # Errors
+    /// Lists every dimension outside its range.
     pub fn from_shape(shape: Shape, density: f64) -> Result<Tank, Problems> {
         let geometry = revolution(shape.segments()?, Some(shape))?;
         Ok(Tank { name: None, density, geometry })
@@ -301,7 +305,8 @@ impl Tank {
     /// Returns the height of the free surface above the lowest point, m, at a fill. A part of the volume and
     /// a mass may be 0 or the tank's whole capacity. A height is returned unchanged.
     ///
-    /// # Errors If it is more than the tank holds or less than 0, or a part of a box, which is open at the
+    /// # Errors
+    /// If it is more than the tank holds or less than 0, or a part of a box, which is open at the
     /// top.
     pub fn fill_height(&self, fill: Fill) -> Result<f64, Problems> {
         let capacity = self.contour().map(Contour::capacity);
@@ -343,7 +348,8 @@ impl Tank {
     /// Returns the mass of the liquid at `fill`, m above the lowest point, kg, which is the mass of
     /// [`Tank::solve`], without solving for modes where these take time.
     ///
-    /// # Errors A fill outside the tank.
+    /// # Errors
+    /// A fill outside the tank.
     pub fn mass(&self, fill: f64) -> Result<f64, Problems> {
         let wall = match &self.geometry {
             Geometry::Revolution {
@@ -365,7 +371,8 @@ impl Tank {
     /// Cylinders and annuli given by their dimensions, and boxes, have a closed form. The boundary integral
     /// equation solves all others.
     ///
-    /// # Errors A fill outside the tank, a number of modes that is not 1 to [`MOST_MODES`].
+    /// # Errors
+    /// A fill outside the tank, a number of modes that is not 1 to [`MOST_MODES`].
     pub fn solve(&self, fill: f64, modes: usize) -> Result<ModalData, Problems> {
         let mut problems = Vec::new();
         if !(1..=MOST_MODES).contains(&modes) {

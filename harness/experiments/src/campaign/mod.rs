@@ -206,7 +206,8 @@ pub struct Results {
 impl Campaign {
     /// Locks the results directory for this campaign.
     ///
-    /// # Errors If another process has locked the directory, or the directory contains something other than a campaign.
+    /// # Errors
+    /// If another process has locked the directory, or the directory contains something other than a campaign.
     pub fn take(&self) -> Result<Store> {
         Store::take(&self.out, CAMPAIGN, &format!("the plan \"{}\"", self.plan.title), None)
     }
@@ -214,7 +215,8 @@ impl Campaign {
     /// Simulates all runs that are not stored yet and analyses all of them. Stores the runs in the directory;
     /// [`Campaign::tables`] returns the tables.
     ///
-    /// # Errors If there are no runs, or a run cannot be stored. A run that cannot be simulated is a failure
+    /// # Errors
+    /// If there are no runs, or a run cannot be stored. A run that cannot be simulated is a failure
     /// among the results.
     pub fn execute(
         &self,
@@ -350,7 +352,8 @@ impl Campaign {
 
     /// Simulates one run, or reads it if it is stored, and analyses it.
     ///
-    /// # Errors If the run cannot be stored, because then no other run can be stored either.
+    /// # Errors
+    /// If the run cannot be stored, because then no other run can be stored either.
     fn done(
         &self,
         fmu: &Fmu,

@@ -43,7 +43,8 @@ const ROUNDS: usize = 3;
 
 /// Reads a recording on an equally spaced grid. Returns its step, s, and the table.
 ///
-/// # Errors If the recording cannot be used.
+/// # Errors
+/// If the recording cannot be used.
 pub fn read(recorded: &Recorded, done: &mut dyn FnMut(String)) -> Result<(f64, Table)> {
     let name = recorded.path.display().to_string();
     let table = recording::read(
@@ -57,7 +58,8 @@ pub fn read(recorded: &Recorded, done: &mut dyn FnMut(String)) -> Result<(f64, T
 
 /// Checks that rows of a recording that are `step` s apart can show the torque.
 ///
-/// # Errors If the torque has frequencies of half of the rows' rate or more.
+/// # Errors
+/// If the torque has frequencies of half of the rows' rate or more.
 pub fn check_rows(path: &Path, step: f64, torque: &Torque) -> Result<()> {
     let Some(profile) = torque.profile() else { return Ok(()) };
     let highest = profile.band().map_or(0.0, |band| band.1);
@@ -74,7 +76,8 @@ pub fn check_rows(path: &Path, step: f64, torque: &Torque) -> Result<()> {
 /// Reads the recording of a run. Time counts from the torque's beginning, found by correlation with the
 /// torque of the plan. The columns of a stored run are used, as far as the recording has them.
 ///
-/// # Errors If the recording cannot be used, or has another torque.
+/// # Errors
+/// If the recording cannot be used, or has another torque.
 pub(super) fn table(
     case: &Case,
     recorded: &Recorded,

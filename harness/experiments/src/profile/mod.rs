@@ -40,7 +40,8 @@ pub struct Values<'a> {
 impl Values<'_> {
     /// Returns the value of a parameter.
     ///
-    /// # Panics If the kind has no such parameter.
+    /// # Panics
+    /// If the kind has no such parameter.
     pub fn value(&self, name: &str) -> f64 {
         self.get(name).unwrap_or_else(|| panic!("{} has no {name}", self.kind.name))
     }
@@ -153,7 +154,8 @@ impl Written {
 
     /// Makes the torque; a file is read.
     ///
-    /// # Errors If there is no such profile, a parameter is unknown or not allowed, or the file cannot be
+    /// # Errors
+    /// If there is no such profile, a parameter is unknown or not allowed, or the file cannot be
     /// read.
     pub fn torque(&self) -> Result<Torque> {
         if self.name == "file" { self.file() } else { Ok(Torque::Profile(self.profile()?)) }
@@ -320,7 +322,8 @@ pub enum Torque {
 impl Torque {
     /// Reads the columns `time` (s) and `tau_cmd` (N·m) of a file; the rows are `held` or joined by lines.
     ///
-    /// # Errors If the file cannot be read as a history of inputs.
+    /// # Errors
+    /// If the file cannot be read as a history of inputs.
     pub fn read(path: &Path, held: bool) -> Result<Self> {
         let signal =
             Signal { name: TAU_CMD, required: true, between: Between::Missing, unit: None };
@@ -334,7 +337,8 @@ impl Torque {
     /// Makes a torque from rows of time (s) and torque (N·m). With `slopes` (N·m/s) the torque follows each
     /// row's slope until the next row, and may jump there.
     ///
-    /// # Errors If there are no rows, or the times do not ascend.
+    /// # Errors
+    /// If there are no rows, or the times do not ascend.
     pub fn rows(time: &[f64], tau: &[f64], slopes: Option<&[f64]>, held: bool) -> Result<Self> {
         let slopes = slopes.map(<[f64]>::to_vec);
         Ok(Torque::Rows { history: History::new(time.to_vec(), tau.to_vec(), slopes, held)?, held })
@@ -371,7 +375,8 @@ impl Torque {
     /// lines between those would differ from it by more than 2.5 % of the amplitude, `sample` is divided so
     /// that they differ by at most 0.1 %. Held rows are never divided.
     ///
-    /// # Errors If there would be more than [`budget::ROWS`] rows, or the profile has frequencies above half
+    /// # Errors
+    /// If there would be more than [`budget::ROWS`] rows, or the profile has frequencies above half
     /// of the rate of held rows.
     pub fn history(&self, sample: f64, stop: f64, hold: bool) -> Result<Cow<'_, History>> {
         match self {
@@ -383,7 +388,8 @@ impl Torque {
 
     /// Returns the number of rows of [`Torque::history`] without making them.
     ///
-    /// # Errors If the profile has more commands than allowed, or frequencies that the commands do not
+    /// # Errors
+    /// If the profile has more commands than allowed, or frequencies that the commands do not
     /// follow, as for [`Torque::history`].
     pub fn row_count(&self, sample: f64, stop: f64, hold: bool) -> Result<usize> {
         Ok(match self {
@@ -397,7 +403,8 @@ impl Torque {
 
     /// Checks that rows `step` s apart can represent the torque.
     ///
-    /// # Errors If its highest frequency is half of the rows' rate or more.
+    /// # Errors
+    /// If its highest frequency is half of the rows' rate or more.
     pub fn check_rows(&self, step: f64, stop: f64) -> Result<()> {
         let Torque::Profile(profile) = self else { return Ok(()) };
         let highest = profile.shape.highest(stop);

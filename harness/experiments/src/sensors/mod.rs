@@ -151,7 +151,8 @@ impl FromStr for Sensor {
 impl Sensor {
     /// Makes a sensor with the name of its column from `KIND:key=value,…`.
     ///
-    /// # Errors Lists everything that is wrong with it.
+    /// # Errors
+    /// Lists everything that is wrong with it.
     pub fn new(name: &str, text: &str) -> Result<Self> {
         let plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '.';
         ensure!(
@@ -195,7 +196,8 @@ impl Sensor {
 
     /// Returns the quantity that the sensor measures in an FMU with these settings.
     ///
-    /// # Errors If the FMU has no such quantity.
+    /// # Errors
+    /// If the FMU has no such quantity.
     pub fn quantity(
         &self,
         description: &ModelDescription,
@@ -260,7 +262,8 @@ pub struct Sensors(Vec<(Sensor, Quantity)>);
 impl Sensors {
     /// Makes the sensors of a run with these settings, whose rows are `step` seconds apart.
     ///
-    /// # Errors Lists everything that is wrong with them.
+    /// # Errors
+    /// Lists everything that is wrong with them.
     pub fn new(
         sensors: &[Sensor],
         description: &ModelDescription,
@@ -308,7 +311,8 @@ impl Sensors {
     /// Returns the first `kept` columns of a run's table and the readings of [`Sensors::read`], without the
     /// columns that were recorded only for the sensors.
     ///
-    /// # Errors If the table lacks a variable that they need.
+    /// # Errors
+    /// If the table lacks a variable that they need.
     pub fn recorded(&self, table: Table, kept: usize, run: &str, step: f64) -> Result<Table> {
         let names: Vec<String> =
             table.names()[..kept].iter().cloned().chain(self.columns()).collect();
@@ -319,7 +323,8 @@ impl Sensors {
     /// Adds the readings of all sensors to a run's table. `run` is the name of the run; runs with the same
     /// seed but different names have different noise.
     ///
-    /// # Errors If the table lacks a variable that they need.
+    /// # Errors
+    /// If the table lacks a variable that they need.
     pub fn read(&self, table: Table, run: &str, step: f64) -> Result<Table> {
         let mut columns = Vec::new();
         for (sensor, quantity) in &self.0 {
@@ -350,7 +355,8 @@ impl Sensors {
 impl Sensor {
     /// Converts period and delay to numbers of rows: from sample to sample, and from a sample to its reading.
     ///
-    /// # Errors If one is not a multiple of the step.
+    /// # Errors
+    /// If one is not a multiple of the step.
     fn rows(&self, step: f64) -> Result<[usize; 2]> {
         let whole = |what: &str, seconds: f64| {
             let rows = seconds / step;

@@ -94,7 +94,8 @@ const MOTION: [&str; 7] =
 impl Quantity {
     /// Makes the quantity that a Real variable of the FMU is. `unit` is the unit that the variable must have.
     ///
-    /// # Errors If there is no such variable, or it has another unit.
+    /// # Errors
+    /// If there is no such variable, or it has another unit.
     pub fn variable(
         description: &ModelDescription,
         name: &str,
@@ -114,7 +115,8 @@ impl Quantity {
 
     /// Makes the wave at an angle on the wall (rad), m.
     ///
-    /// # Errors If the FMU is not HubSlosh with an upright cylinder whose liquid moves.
+    /// # Errors
+    /// If the FMU is not HubSlosh with an upright cylinder whose liquid moves.
     pub fn wave(surface: &Surface, angle: f64) -> Result<Self> {
         let (needs, modes) = surface.modes()?;
         Ok(Quantity { needs, channels: single_value("m"), rule: Rule::Wave { modes, angle } })
@@ -122,7 +124,8 @@ impl Quantity {
 
     /// Makes the pressure at an angle on the wall (rad) and a height over the bottom (m), Pa.
     ///
-    /// # Errors If the FMU is not HubSlosh with an upright cylinder whose liquid moves, or the height is
+    /// # Errors
+    /// If the FMU is not HubSlosh with an upright cylinder whose liquid moves, or the height is
     /// above the liquid at rest.
     pub fn pressure(surface: &Surface, angle: f64, height: f64) -> Result<Self> {
         let (mut needs, modes) = surface.modes()?;
@@ -139,7 +142,8 @@ impl Quantity {
     /// Makes the surface as a camera sees it: the plane that fits best, and every mode, each as a height at
     /// the wall, m.
     ///
-    /// # Errors If the FMU is not HubSlosh with an upright cylinder whose liquid moves.
+    /// # Errors
+    /// If the FMU is not HubSlosh with an upright cylinder whose liquid moves.
     pub fn camera(surface: &Surface) -> Result<Self> {
         let (needs, modes) = surface.modes()?;
         let plane = ["plane_radial".to_string(), "plane_tangential".into()];
@@ -152,7 +156,8 @@ impl Quantity {
     /// Makes the specific force of a point of the hub in the direction of an angle (rad), from radial
     /// outwards towards tangential, m/s².
     ///
-    /// # Errors If the FMU is not HubSlosh.
+    /// # Errors
+    /// If the FMU is not HubSlosh.
     pub fn acceleration(description: &ModelDescription, radius: f64, angle: f64) -> Result<Self> {
         let needs: Vec<String> = MOTION.map(String::from).into();
         present(description, &needs)?;

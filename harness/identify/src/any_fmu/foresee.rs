@@ -39,7 +39,8 @@ pub struct Bound {
 /// Predicts the Cramér–Rao bound of each unknown for recordings with these inputs, linearised at the start values. `noise` is the standard
 /// deviation of one sample of each output; tolerances of the question count. `warn` receives the FMU's warnings.
 ///
-/// # Errors If the question has a fault (the message lists all), or the FMU refuses a call.
+/// # Errors
+/// If the question has a fault (the message lists all), or the FMU refuses a call.
 pub fn foresee(
     model: &Model,
     question: &Question,

@@ -16,7 +16,8 @@ use crate::model::simulate::Model;
 /// the order of the result's correlations. The noise and the rows that are left out are taken from `result`, the text of a
 /// `result.json`. The deviance is infinite outside the bounds and where the FMU refuses the values.
 ///
-/// # Errors If the result belongs to another question, or a point has another number of values.
+/// # Errors
+/// If the result belongs to another question, or a point has another number of values.
 pub fn deviances(
     model: &Model,
     question: &Question,

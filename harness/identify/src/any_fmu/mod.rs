@@ -84,7 +84,8 @@ impl Output {
 
 /// Fits the question's unknowns to the recordings. `news` receives the progress.
 ///
-/// # Errors If the question has a fault (the message lists all), a recording cannot be used, or the FMU refuses a call.
+/// # Errors
+/// If the question has a fault (the message lists all), a recording cannot be used, or the FMU refuses a call.
 pub fn identify(
     model: &Model,
     question: &Question,

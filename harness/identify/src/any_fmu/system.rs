@@ -27,7 +27,8 @@ pub struct FmuSystem<'a> {
 impl<'a> FmuSystem<'a> {
     /// Returns the system for a question, and the unknowns in the order of its targets.
     ///
-    /// # Errors If the question has a fault; the message lists all.
+    /// # Errors
+    /// If the question has a fault; the message lists all.
     pub fn new(
         model: &'a Model,
         question: &Question,

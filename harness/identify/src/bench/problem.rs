@@ -84,7 +84,8 @@ impl List<'_> {
 
 /// Returns the bench with one slosh model and friction law, its unknowns, and the values of all unknowns at each start.
 ///
-/// # Errors If an option names a parameter that cannot be estimated, or the data give no finite start.
+/// # Errors
+/// If an option names a parameter that cannot be estimated, or the data give no finite start.
 pub fn system<'a>(
     fmu: &'a Fmu,
     recordings: &'a [Recording],

@@ -114,7 +114,8 @@ impl<'p> Fit<'p> {
 
     /// Simulates all recordings at the coordinates z.
     ///
-    /// # Errors If the system refuses z.
+    /// # Errors
+    /// If the system refuses z.
     pub fn at(&self, z: &[f64]) -> Result<Point> {
         let runs = (0..self.problem.recordings.len()).into_par_iter();
         let motion = runs.map(|k| self.run(z, k, true)).collect::<Result<Vec<Motion>>>()?;

@@ -76,7 +76,8 @@ impl Solution<'_> {
 /// fits: the search then begins on the whole recordings, and if its minimum has a −2 ln L above the ceiling, it ends there, without
 /// other courses and without profile.
 ///
-/// # Errors If the search fails from every start.
+/// # Errors
+/// If the search fails from every start.
 pub fn solve<'p>(
     problem: &'p Problem<'p>,
     first: Option<(Vec<f64>, Hold)>,

@@ -23,7 +23,8 @@ pub struct Record {
 impl Record {
     /// Reads a recording from a file.
     ///
-    /// # Errors If the file cannot be read, lacks a signal of the question, or fails [`Record::check`].
+    /// # Errors
+    /// If the file cannot be read, lacks a signal of the question, or fails [`Record::check`].
     pub fn read(
         path: &Path,
         question: &Question,

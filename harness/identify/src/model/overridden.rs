@@ -6,7 +6,8 @@ use crate::input::names::list;
 
 /// Fails if the FMU warns that an unknown has no effect, because it cannot be estimated then.
 ///
-/// # Errors If a warning names the unknown; the message has the FMU's reason.
+/// # Errors
+/// If a warning names the unknown; the message has the FMU's reason.
 pub fn refuse(unknown: &str, warnings: &[String]) -> Result<()> {
     for warning in warnings {
         let parts = [" has no effect: ", " have no effect: "];

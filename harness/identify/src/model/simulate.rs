@@ -42,7 +42,8 @@ pub enum Model {
 impl Model {
     /// Opens an FMU for a solver.
     ///
-    /// # Errors If the file is not an FMU, or the FMU lacks the interface that the solver needs.
+    /// # Errors
+    /// If the file is not an FMU, or the FMU lacks the interface that the solver needs.
     pub fn open(path: &Path, solver: Solver) -> Result<Self> {
         Ok(match solver {
             Solver::Own => Model::Own(Fmu::open(path)?),
@@ -125,7 +126,8 @@ pub type Value = (u32, f64);
 impl Setup {
     /// Returns the setup for a question.
     ///
-    /// # Errors If the FMU lacks a variable of the question; the message lists all such names.
+    /// # Errors
+    /// If the FMU lacks a variable of the question; the message lists all such names.
     pub fn new(question: &Question, description: &ModelDescription) -> Result<Self> {
         let mut problems = Vec::new();
         let references = |names: &[String], problems: &mut Vec<String>| -> Vec<u32> {

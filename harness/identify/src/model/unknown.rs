@@ -27,7 +27,8 @@ const FREELY: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
 impl Question {
     /// Returns the unknowns in the order of the result.
     ///
-    /// # Errors If a name, type, bound or prior is wrong; the message lists all faults.
+    /// # Errors
+    /// If a name, type, bound or prior is wrong; the message lists all faults.
     pub fn unknowns(
         &self,
         description: &ModelDescription,

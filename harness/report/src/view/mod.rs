@@ -216,7 +216,8 @@ fn vector(name: &str) -> Vec<String> {
 
 /// Returns the page that shows a run.
 ///
-/// # Errors If the FMU is not one of this project's, columns are missing, or the table has fewer than two
+/// # Errors
+/// If the FMU is not one of this project's, columns are missing, or the table has fewer than two
 /// rows. The message says how to record the columns.
 pub fn page(run: &Run) -> Result<Page> {
     let Some(kind) = kind(run.description) else {

@@ -66,7 +66,8 @@ pub struct Found {
 
 /// Lists the paths of the columns; `a.b` is the column b within the structure a.
 ///
-/// # Errors If the file cannot be read.
+/// # Errors
+/// If the file cannot be read.
 pub fn names(path: &Path) -> Result<Vec<String>> {
     guarded(|| {
         let reader = open(path)?;
@@ -81,7 +82,8 @@ pub fn metadata(path: &Path) -> Result<BTreeMap<String, String>> {
 
 /// Returns the name of the library that wrote the file, if the file has it.
 ///
-/// # Errors If the file is not complete.
+/// # Errors
+/// If the file is not complete.
 pub fn writer(path: &Path) -> Result<Option<String>> {
     guarded(|| Ok(open(path)?.metadata().file_metadata().created_by().map(String::from)))
 }
@@ -90,7 +92,8 @@ pub fn writer(path: &Path) -> Result<Option<String>> {
 /// of the time among the selected ones, with the seconds of the unit that is stated for it: integers need
 /// one, and timestamps have their own. Columns at which `booleans` is true may hold true and false.
 ///
-/// # Errors If the file cannot be read, or another unit is stated for timestamps than theirs; [`Foreign`] for
+/// # Errors
+/// If the file cannot be read, or another unit is stated for timestamps than theirs; [`Foreign`] for
 /// types that are not read here.
 pub fn read(
     path: &Path,

@@ -15,7 +15,8 @@ const DEEPEST: usize = 16;
 
 /// Checks the pages in the `length` bytes from `start` of a file with `size` bytes.
 ///
-/// # Errors If a header is damaged, or the pages are larger than the memory budget.
+/// # Errors
+/// If a header is damaged, or the pages are larger than the memory budget.
 pub fn check(mut file: &File, start: u64, length: u64, size: u64) -> Result<()> {
     let end = start.checked_add(length).filter(|end| *end <= size);
     let end = end.context("the column lies outside the file")?;

@@ -38,7 +38,8 @@ pub const SIGNALS: [(&str, Quantity); 10] = [
 
 /// Returns the quantity, such as a torque or an angle, that a signal of the bench measures.
 ///
-/// # Errors If no signal of the bench has this name.
+/// # Errors
+/// If no signal of the bench has this name.
 pub fn quantity(signal: &str) -> Result<Quantity> {
     let known = SIGNALS.iter().find(|(name, _)| *name == signal).map(|(_, quantity)| *quantity);
     known.with_context(|| {
@@ -100,7 +101,8 @@ impl Columns {
     /// Parses columns for the variables of an FMU, `NAME=COLUMN[:UNIT]`. Items are not split at commas,
     /// because names like `p[1,2]` contain them.
     ///
-    /// # Errors Lists all items that are wrong.
+    /// # Errors
+    /// Lists all items that are wrong.
     pub fn for_variables<'a>(items: impl IntoIterator<Item = &'a str>) -> Result<Self> {
         Columns::parse(items, parse_variable)
     }
@@ -125,7 +127,8 @@ impl Columns {
 
     /// Sets the rate of files without times, in rows per second.
     ///
-    /// # Errors If the rate is not a positive number.
+    /// # Errors
+    /// If the rate is not a positive number.
     pub fn with_rate(self, rate: Option<f64>) -> Result<Self> {
         if let Some(rate) = rate {
             ensure!(

@@ -14,7 +14,8 @@ const MOST_ROWS: f64 = 10.0;
 /// lie on the grid are unchanged; other values are interpolated linearly, also over missing rows if these are few. `done`
 /// receives a message if values were interpolated.
 ///
-/// # Errors If time does not increase, or if too many rows are missing.
+/// # Errors
+/// If time does not increase, or if too many rows are missing.
 pub fn even(table: Table, done: &mut dyn FnMut(String)) -> Result<(f64, Table)> {
     even_with_gaps(table, MISSING, done)
 }
@@ -22,7 +23,8 @@ pub fn even(table: Table, done: &mut dyn FnMut(String)) -> Result<(f64, Table)> 
 /// Resamples a table as [`even`] does, but accepts that up to the share `most_missing` of the rows is missing, for example
 /// 0.1 for 10 %.
 ///
-/// # Errors If time does not increase, or if more rows are missing.
+/// # Errors
+/// If time does not increase, or if more rows are missing.
 pub fn even_with_gaps(
     table: Table,
     most_missing: f64,

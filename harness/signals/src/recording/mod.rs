@@ -225,7 +225,8 @@ pub fn assigned(path: &Path, signals: &[Signal]) -> Result<Vec<(String, Option<u
 /// Reads a recording: the time (s) and the wanted signals, as far as the file has them, in SI units. `done` receives
 /// messages about values that were converted or completed.
 ///
-/// # Errors If the file cannot be read. The error lists all faults of its columns.
+/// # Errors
+/// If the file cannot be read. The error lists all faults of its columns.
 pub fn read(path: &Path, wanted: &Wanted, done: &mut dyn FnMut(String)) -> Result<Table> {
     let name = path.display().to_string();
     let mut done = |words| done(format!("{name}: {words}"));
@@ -235,7 +236,8 @@ pub fn read(path: &Path, wanted: &Wanted, done: &mut dyn FnMut(String)) -> Resul
 /// Reads a recording if it is text in columns or Parquet, and returns `None` for other kinds of files, which the Python
 /// package converts. `name` is the file's name in errors, because `path` may be temporary.
 ///
-/// # Errors If the file cannot be read. The error lists all faults of its columns.
+/// # Errors
+/// If the file cannot be read. The error lists all faults of its columns.
 pub fn read_here(
     path: &Path,
     name: &Path,
@@ -251,7 +253,8 @@ pub fn read_here(
 /// Reads histories of inputs: `time` (s) and the signals, with all rows. Signals in `booleans` may be `true`
 /// and `false`, which become 1 and 0. Rows may be unevenly spaced, and each must have every value.
 ///
-/// # Errors If the file cannot be read so.
+/// # Errors
+/// If the file cannot be read so.
 pub fn read_inputs(
     path: &Path,
     wanted: &Wanted,
@@ -496,7 +499,8 @@ fn join_seconds(whole: &[f64], part: &[f64], factor: f64) -> Option<(f64, Vec<f6
 
 /// Checks that times without a stated unit can be seconds.
 ///
-/// # Errors If they look like milliseconds or days.
+/// # Errors
+/// If they look like milliseconds or days.
 fn plausible(time: &[f64]) -> Result<()> {
     if let Some(late) = time.iter().find(|t| t.abs() > LATEST) {
         bail!(
@@ -536,7 +540,8 @@ fn dimension(signal: &Signal) -> Option<(Dimension, f64)> {
 
 /// Returns the factor from `unit` to the unit in which a signal is wanted.
 ///
-/// # Errors If `unit` is not a unit of the signal's quantity.
+/// # Errors
+/// If `unit` is not a unit of the signal's quantity.
 fn factor(signal: &Signal, unit: &str) -> Result<f64> {
     let Some(own) = signal.unit else {
         let quantity = quantity(signal.name)?;
@@ -552,7 +557,8 @@ fn factor(signal: &Signal, unit: &str) -> Result<f64> {
 /// Selects the rows with a value of the rows' signal, and completes the other signals there by their
 /// [`Between`].
 ///
-/// # Errors If a gap is too long to complete.
+/// # Errors
+/// If a gap is too long to complete.
 fn complete(
     signals: &[Signal],
     mut columns: Vec<Vec<f64>>,

@@ -86,7 +86,8 @@ impl Value {
 
 /// Parses a field as a number; `None` if it is not one.
 ///
-/// # Errors If it can be read in two ways, or has another decimal sign than the fields before.
+/// # Errors
+/// If it can be read in two ways, or has another decimal sign than the fields before.
 fn number(
     field: &str,
     separator: u8,
@@ -254,7 +255,8 @@ pub(super) struct Layout {
 impl Layout {
     /// Detects the layout of a file: separator, header, units and first row.
     ///
-    /// # Errors If no separator gives rows of numbers.
+    /// # Errors
+    /// If no separator gives rows of numbers.
     pub fn detect(path: &Path) -> Result<Self> {
         // A table of times alone has one column.
         let mut tried = Vec::new();
@@ -367,7 +369,8 @@ impl Layout {
     /// Reads the columns at the positions `places`. If `times`, the first one is the time and may hold dates
     /// and clock times. `true` and `false` are allowed where `booleans` is true. NaN marks missing values.
     ///
-    /// # Errors If a field is not a number, or can be read in two ways; the error names the lines.
+    /// # Errors
+    /// If a field is not a number, or can be read in two ways; the error names the lines.
     pub fn read(
         &self,
         path: &Path,

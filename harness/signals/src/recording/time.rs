@@ -84,7 +84,8 @@ const WEEKDAYS: [&str; 7] = ["mon", "tue", "wed", "thu", "fri", "sat", "sun"];
 
 /// Parses a field as a date or a clock time; `None` if it is neither.
 ///
-/// # Errors If it is one that cannot be read, or that can be read in two ways. The error is the reason,
+/// # Errors
+/// If it is one that cannot be read, or that can be read in two ways. The error is the reason,
 /// worded to follow the field.
 pub fn moment(field: &str) -> Result<Option<Moment>, Unreadable> {
     if field.len() < 4
@@ -282,7 +283,8 @@ impl Times {
     /// Returns the seconds from the first time to this one. `field` is the text, which messages repeat. A
     /// clock time that jumps back by more than half a day has passed midnight.
     ///
-    /// # Errors If the time is of another kind than the first, or its date can be read in two ways.
+    /// # Errors
+    /// If the time is of another kind than the first, or its date can be read in two ways.
     pub fn seconds(&mut self, moment: Moment, field: &str) -> Result<f64, Unreadable> {
         if let Moment::Ordered(Ordered { first, second, .. }, _) = moment
             && first.max(second) > 12

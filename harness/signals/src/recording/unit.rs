@@ -332,7 +332,8 @@ pub(super) enum Fault {
 /// Finds the unit of a dimension within the name of a column: `gyro [deg/s]`, `gyro{deg/s} z`, `gyro_dps`,
 /// `gyroDegPerSec`, `gyro in deg/s`, `time_ms_boot`, `TIME_US`.
 ///
-/// # Errors If the name states a unit of another dimension, or two units.
+/// # Errors
+/// If the name states a unit of another dimension, or two units.
 pub(super) fn find_unit(name: &str, dimension: Dimension) -> Result<Option<Stated>, Fault> {
     let stated = |from: usize, to: usize, text: &str, factor: f64| Stated {
         text: text.trim().into(),
