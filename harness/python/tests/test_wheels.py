@@ -208,8 +208,8 @@ def test_a_loop_with_wheels_has_the_margins_of_a_loop_with_torques_and_bias_mome
     assert axes.tolist() == plain.crossings["loop"].str[7].tolist()
     assert there.delay_margin == pytest.approx(plain.delay_margin)
     rest = replace(craft, wheels={})
-    assert abs(hubslosh.margins(rest.loop(GAINS, 0.1, "50%", delay=0.05)).poles
-               - plain.poles).max() > 1e-4  # fmt: skip
+    without_bias = hubslosh.margins(rest.loop(GAINS, 0.1, "50%", delay=0.05)).poles
+    assert abs(np.sort(abs(without_bias)) - np.sort(abs(plain.poles))).max() > 3e-5
 
 
 def test_a_wheel_in_a_craft_that_turns_is_a_gyrostat(rigid: Craft) -> None:
