@@ -232,6 +232,20 @@ fn source_files_named_in_the_architecture_exist() {
     assert!(missing.is_empty(), "{missing:?}");
 }
 
+/// Two entries that begin alike are two wordings of one change, for example after a merge.
+#[test]
+fn each_change_has_one_entry_in_the_changelog() {
+    let text = fs::read_to_string(pack::root().join("CHANGELOG.md")).expect("the changelog");
+    let versions = text.split("\n## ").skip(1);
+    for version in versions {
+        let mut beginnings = BTreeSet::new();
+        for entry in version.lines().filter(|line| line.starts_with("* ")) {
+            let beginning: String = entry.chars().take(75).collect();
+            assert!(beginnings.insert(beginning), "two entries begin like this one: {entry}");
+        }
+    }
+}
+
 #[test]
 fn tests_named_in_the_tuning_of_fits_exist() {
     let mut files = Vec::new();
