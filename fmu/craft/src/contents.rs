@@ -73,7 +73,7 @@ use crate::sizes::MODES;
 use crate::spin::{Spin, SpinNow};
 use crate::state::Line;
 use crate::surface::{LEAST_INERTIA, Lift, Meridian, Rotary, Surface};
-use crate::table::{FillCurves, Jet};
+use crate::table::{FillCurves, Filling, Jet};
 
 /// A tank in its mounting position, with the quantities that do not change during a run. For a tank that does not drain, `still`
 /// holds the rigid liquid, and all liquid at rest, as rigid bodies. If the table gives the surfaces of the modes, `surfaces` are
@@ -176,7 +176,7 @@ impl MountedTank {
         } else {
             let s = add(d, scale(tank.h_0, e));
             let rigid = Rigid::axial(tank.m_0, s, tank.i_0, tank.i_z, e);
-            (!mounted.drains()).then(|| [rigid, mounted.at_rest(0.0)])
+            (!mounted.drains()).then(|| [rigid, mounted.at_rest(0.0, None)])
         };
         MountedTank { still, ..mounted }
     }
@@ -194,29 +194,34 @@ impl MountedTank {
         (0..self.tank.modes).any(|n| self.tank.follows(n))
     }
 
-    /// Returns the liquid at rest as a rigid body. `liquid`, kg, has an effect only in tanks with a table.
-    pub fn at_rest<T: Number>(&self, liquid: T) -> Rigid<T> {
-        let MountedTank { tank, curves, .. } = self;
+    /// Returns modes and rigid liquid at a mass of liquid, kg; `None` if the tank has no table.
+    pub fn filling<T: Number>(&self, liquid: T) -> Option<Filling<T>> {
+        self.drains().then(|| self.curves.filling(self.tank.modes, liquid))
+    }
+
+    /// Returns the liquid at rest as a rigid body. `liquid`, kg, has an effect only in tanks with a table, whose
+    /// [`MountedTank::filling`] is `filling`.
+    pub fn at_rest<T: Number>(&self, liquid: T, filling: Option<&Filling<T>>) -> Rigid<T> {
+        let tank = &self.tank;
         if let Some(whole) = self.rigid_at_rest() {
             return whole.lift();
         }
         let constant_of = |x: f64| T::constant(x);
-        let place = (tank.fill.points > 0).then(|| curves.place(liquid));
         let (e, d, zero) = (constant::<T>(self.e), constant::<T>(self.d), constant_of(0.0));
-        let mut m_0 = if place.is_some() { liquid } else { constant_of(tank.m_0) };
+        let mut m_0 = if filling.is_some() { liquid } else { constant_of(tank.m_0) };
         let mut bobs = Rigid { mass: zero, moment: [zero; 3], inertia: [[zero; 3]; 3] };
         for n in 0..tank.modes {
-            let [m, l, h] = match place {
-                Some(place) => curves.mode(n, place).map(|jet| jet[0]),
+            let [m, l, h] = match filling {
+                Some(filling) => filling.modes[n].map(|jet| jet[0]),
                 None => [tank.mass[n], tank.length[n], tank.hinge[n]].map(constant_of),
             };
-            if place.is_some() {
+            if filling.is_some() {
                 m_0 = m_0 - m;
             }
             bobs = bobs.combined_with(&Rigid::axial(m, add(d, scale(h - l, e)), zero, zero, e));
         }
-        let [h_0, i_0, i_z] = match place {
-            Some(place) => curves.rigid(place).map(|jet| jet[0]),
+        let [h_0, i_0, i_z] = match filling {
+            Some(filling) => filling.rigid.map(|jet| jet[0]),
             None => [tank.h_0, tank.i_0, tank.i_z].map(constant_of),
         };
         bobs.combined_with(&Rigid::axial(m_0, add(d, scale(h_0, e)), i_0, i_z, e))
@@ -265,7 +270,8 @@ impl MountedTank {
         flow: (T, T, f64),
     ) -> Contents<'_, T> {
         let mut contents = Contents::new(self);
-        contents.evaluate(x, self.spin_now(x, spin, motion[1]), motion, flow);
+        let filling = self.filling(flow.0);
+        contents.evaluate(x, self.spin_now(x, spin, motion[1]), motion, flow, filling.as_ref());
         contents
     }
 
@@ -456,25 +462,26 @@ impl<T: Number> Contents<'_, T> {
             rigid: Rigid { mass: none, moment: zero, inertia: [zero; 3] },
             flow_wrench: [zero; 2],
             flow_momentum: [zero; 2],
-            bobs: [const { None }; MODES],
+            bobs: core::array::from_fn(|_| None),
             dissipation: none,
             shrinking: (none, [zero; 2]),
             spin: None,
         }
     }
 
-    /// Evaluates new contents in place, without copies of them; see [`MountedTank::contents`] for the
-    /// arguments.
+    /// Evaluates new contents in place, without copies of them; see [`MountedTank::contents`] and
+    /// [`MountedTank::filling`] for the arguments.
     pub fn evaluate(
         &mut self,
         x: &[T],
         spin: Option<SpinNow<T>>,
         [a, w, w_d]: [Vec3<T>; 3],
         (liquid, flow, slope): (T, T, f64),
+        filling: Option<&Filling<T>>,
     ) {
         let mounted = self.mounted;
         let MountedTank { tank, curves, axes, .. } = mounted;
-        let drains = tank.fill.points > 0;
+        let drains = filling.is_some();
         let c = T::constant;
         let flow = if drains { flow } else { c(0.0) };
         let slope = if drains { slope } else { 0.0 };
@@ -483,7 +490,7 @@ impl<T: Number> Contents<'_, T> {
         let follow = |[value, first, second]: Jet<T>| -> Jet<T> {
             [value, -(first * flow), second * flow * flow - first * slope]
         };
-        let place = drains.then(|| curves.place(liquid));
+        let place = filling.map(|filling| filling.place);
         let (e, d) = (constant::<T>(mounted.e), constant::<T>(mounted.d));
         let outlet = add(d, e.map(|x| x * tank.outlet));
         let mut m_0 = if drains { [liquid, -flow, c(-slope)] } else { jet(tank.m_0) };
@@ -501,8 +508,8 @@ impl<T: Number> Contents<'_, T> {
         }
         self.spin = spin;
         for n in 0..tank.modes {
-            let [m, l, h] = match place {
-                Some(place) => curves.mode(n, place).map(follow),
+            let [m, l, h] = match filling {
+                Some(filling) => filling.modes[n].map(follow),
                 None => [tank.mass[n], tank.length[n], tank.hinge[n]].map(jet),
             };
             let k = tank.k[n];
@@ -610,8 +617,8 @@ impl<T: Number> Contents<'_, T> {
         if let Some([rigid, _]) = &mounted.still {
             self.rigid = rigid.lift();
         }
-        let Some(place) = place else { return };
-        let [h_0, i_0, i_z] = curves.rigid(place).map(follow);
+        let Some(filling) = filling else { return };
+        let [h_0, i_0, i_z] = filling.rigid.map(follow);
         // The rigid liquid about O.
         let s = add(d, scale(h_0[0], e));
         let s_d = scale(h_0[1], e);

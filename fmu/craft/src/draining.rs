@@ -32,7 +32,9 @@ use crate::parameters::{Mount, Parameters, Tank};
 use crate::pivot::Pivot;
 use crate::rigid::{Factors, Mat6, Rigid};
 use crate::sizes::{APPENDAGES, MODES, TANKS};
+use crate::spin::SpinNow;
 use crate::state::{BallState, INPUTS, Inputs, Line, STATES, State, index};
+use crate::table::Filling;
 
 /// Inputs of the craft at an instant, over a number type: force at O, torque less that of the wheels, tau -
 /// h_w', the wheels' momentum, and the outflow of each tank with its slope.
@@ -354,10 +356,14 @@ impl Draining {
         factors.solve([force, torque])
     }
 
-    fn at_rest<T: Number>(&self, x: &[T; STATES]) -> Rigid<T> {
-        let liquids = self.tanks.iter().enumerate();
-        liquids.fold(self.craft.lift::<T>(), |sum, (i, mounted)| {
-            sum.combined_with(&mounted.at_rest(x[index::LIQUID + i]))
+    fn at_rest<T: Number>(
+        &self,
+        x: &[T; STATES],
+        fillings: &[Option<Filling<T>>; TANKS],
+    ) -> Rigid<T> {
+        let liquids = self.tanks.iter().zip(fillings).enumerate();
+        liquids.fold(self.craft.lift::<T>(), |sum, (i, (mounted, filling))| {
+            sum.combined_with(&mounted.at_rest(x[index::LIQUID + i], filling.as_ref()))
         })
     }
 
@@ -369,13 +375,14 @@ impl Draining {
         acting: &Acting<T>,
         couple: Option<Vec3<T>>,
         axes: &Mat3<T>,
+        fillings: &[Option<Filling<T>>; TANKS],
     ) -> [Vec3<T>; 2] {
         let zero = constant::<T>([0.0; 3]);
         if !self.follows {
             return [zero; 2];
         }
         let w = vector_from(x, index::OMEGA);
-        let whole = self.at_rest(x);
+        let whole = self.at_rest(x, fillings);
         let [centripetal, gyroscopic] = whole.inertial_wrench(zero, w, zero);
         let force = sub(acting.force, centripetal);
         let mut torque = sub(acting.torque, add(gyroscopic, cross(w, acting.h_wheels)));
@@ -399,20 +406,23 @@ impl Draining {
         let (of_pivot, by_pivot, _) = self.pivot.present(&axes, w);
         let of_pivot = self.pivot.acts().then_some(of_pivot);
         let mut couple = of_pivot;
-        let mut spins = [const { None }; TANKS];
+        let mut spins: [Option<SpinNow<T>>; TANKS] = core::array::from_fn(|_| None);
+        let mut fillings: [Option<Filling<T>>; TANKS] = core::array::from_fn(|_| None);
         for (i, (mounted, spin)) in self.tanks.iter().zip(&mut spins).enumerate() {
+            fillings[i] = mounted.filling(x[index::LIQUID + i]);
             let bobs = &x[index::bob(i, 0)..index::bob(i, 0) + 6 * MODES];
             *spin = mounted.spin_now(bobs, vector_from(x, index::spin(i)), w);
             if let Some(now) = spin {
                 couple = Some(couple.map_or(now.torque, |sum| add(sum, now.torque)));
             }
         }
-        let [a_rigid, w_d_rigid] = self.rigid_motion(x, acting, couple, &axes);
+        let [a_rigid, w_d_rigid] = self.rigid_motion(x, acting, couple, &axes, &fillings);
         for (i, (mounted, contents)) in self.tanks.iter().zip(contents.iter_mut()).enumerate() {
             let bobs = &x[index::bob(i, 0)..index::bob(i, 0) + 6 * MODES];
             let motion = [a_rigid, w, w_d_rigid];
             let flow = (x[index::LIQUID + i], acting.flow[i], acting.flow_slope[i]);
-            contents.insert(Contents::new(mounted)).evaluate(bobs, spins[i].take(), motion, flow);
+            let contents = contents.insert(Contents::new(mounted));
+            contents.evaluate(bobs, spins[i].take(), motion, flow, fillings[i].as_ref());
         }
         let all = || contents.iter().flatten();
         let mut rigid =
@@ -445,7 +455,7 @@ impl Draining {
     }
 
     pub fn rates<T: Number>(&self, x: &[T; STATES], acting: &Acting<T>) -> [T; STATES] {
-        let mut contents = [const { None }; TANKS];
+        let mut contents: [Option<Contents<'_, T>>; TANKS] = core::array::from_fn(|_| None);
         let Instant { q, axes, velocity, w, a, w_d, by_pivot, deformed } =
             self.solve_instant(x, acting, &mut contents);
         let all = || contents.iter().flatten();
@@ -494,10 +504,10 @@ impl Draining {
     /// Returns everything from which the outputs are computed, for the states x under the acting forces and
     /// flows.
     pub fn evaluate<T: Number>(&self, x: &[T; STATES], acting: &Acting<T>) -> Now<T> {
-        let mut contents = [const { None }; TANKS];
+        let mut contents: [Option<Contents<'_, T>>; TANKS] = core::array::from_fn(|_| None);
         let Instant { axes, velocity, w, a, w_d, deformed, .. } =
             self.solve_instant(x, acting, &mut contents);
-        let mut tanks = [const { None }; TANKS];
+        let mut tanks: [Option<TankNow<T>>; TANKS] = core::array::from_fn(|_| None);
         let all = contents.iter().flatten().zip(&self.tanks);
         for (now, (tank, mounted)) in tanks.iter_mut().zip(all) {
             *now = Some(TankNow {

@@ -103,28 +103,35 @@ impl FillTable {
 /// A quantity and its first two derivatives, by the mass of liquid or by time.
 pub(crate) type Jet<T> = [T; 3];
 
+/// Coefficients of each interval's quintic, in powers of the position from 0 to 1 in the interval.
 #[derive(Clone, Copy, Debug)]
-struct Curve([[f64; 3]; POINTS]);
+struct Curve([[f64; 6]; POINTS - 1]);
 
 impl Curve {
     fn new(masses: &[f64], y: [f64; POINTS]) -> Curve {
         let (mut slope, mut curvature) = ([0.0; POINTS], [0.0; POINTS]);
         let n = masses.len();
         derivatives(masses, &y[..n], true, &mut slope[..n], &mut curvature[..n]);
-        Curve(core::array::from_fn(|i| [y[i], slope[i], curvature[i]]))
+        let at = |i: usize| [y[i], slope[i], curvature[i]];
+        let mut intervals = [[0.0; 6]; POINTS - 1];
+        for (i, coefficients) in intervals.iter_mut().enumerate().take(n.saturating_sub(1)) {
+            *coefficients = quintic(masses[i + 1] - masses[i], at(i), at(i + 1));
+        }
+        Curve(intervals)
     }
 
+    /// Returns value, slope and second derivative by Horner's scheme.
     fn evaluate<T: Number>(&self, at: Place<T>) -> Jet<T> {
-        let Place { interval: i, t, h, .. } = at;
-        let c = quintic(h, self.0[i], self.0[i + 1]);
-        let first: [f64; 5] = core::array::from_fn(|k| (k + 1) as f64 * c[k + 1] / h);
-        let second: [f64; 4] = core::array::from_fn(|k| (k + 1) as f64 * first[k + 1] / h);
-        [polynomial(&c, t), polynomial(&first, t), polynomial(&second, t)]
+        let c = &self.0[at.interval];
+        let (mut value, mut slope, mut half) =
+            (T::constant(c[5]), T::constant(0.0), T::constant(0.0));
+        for c in c[..5].iter().rev() {
+            half = half * at.t + slope;
+            slope = slope * at.t + value;
+            value = value * at.t + T::constant(*c);
+        }
+        [value, slope * at.inv_h, half * (2.0 * at.inv_h * at.inv_h)]
     }
-}
-
-fn polynomial<T: Number>(c: &[f64], t: T) -> T {
-    c.iter().rev().fold(T::constant(0.0), |sum, c| sum * t + T::constant(*c))
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -144,13 +151,23 @@ pub(crate) struct FillCurves {
     modes: [ModeCurves; MODES],
 }
 
-/// Position of a mass of liquid in a table: interval, position in the interval from 0 to 1, and its width.
+/// Position of a mass of liquid in a table: interval, position in the interval from 0 to 1, and 1 over the width of the
+/// interval, 1/kg.
 #[derive(Clone, Copy)]
 pub(crate) struct Place<T> {
     liquid: T,
     interval: usize,
     t: T,
-    h: f64,
+    inv_h: f64,
+}
+
+/// A tank's contents at a mass of liquid: mass, length and hinge height of each mode, and H_0, I_0 and I_z of the rigid
+/// liquid.
+#[derive(Clone, Copy)]
+pub(crate) struct Filling<T> {
+    pub place: Place<T>,
+    pub modes: [[Jet<T>; 3]; MODES],
+    pub rigid: [Jet<T>; 3],
 }
 
 impl FillCurves {
@@ -165,8 +182,18 @@ impl FillCurves {
         };
         let last = self.points - 2;
         let interval = (0..last).find(|&i| liquid.value() < masses[i + 1]).unwrap_or(last);
-        let h = masses[interval + 1] - masses[interval];
-        Place { liquid, interval, t: (liquid - T::constant(masses[interval])) * (1.0 / h), h }
+        let inv_h = 1.0 / (masses[interval + 1] - masses[interval]);
+        Place { liquid, interval, t: (liquid - T::constant(masses[interval])) * inv_h, inv_h }
+    }
+
+    /// Returns the first `modes` modes and the rigid liquid at a mass of liquid, kg.
+    pub fn filling<T: Number>(&self, modes: usize, liquid: T) -> Filling<T> {
+        let place = self.place(liquid);
+        let mut each = [[[T::constant(0.0); 3]; 3]; MODES];
+        for (n, mode) in each.iter_mut().enumerate().take(modes) {
+            *mode = self.mode(n, place);
+        }
+        Filling { place, modes: each, rigid: self.rigid(place) }
     }
 
     pub fn rigid<T: Number>(&self, at: Place<T>) -> [Jet<T>; 3] {
