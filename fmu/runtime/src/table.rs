@@ -62,6 +62,25 @@ impl Layout {
 /// Length of a GUID with braces.
 pub const GUID_LENGTH: usize = 38;
 
+/// Joins parts of a table. `N` is the number of all variables.
+///
+/// # Panics
+/// If the parts have another number of variables, or none.
+pub const fn join<M: Dynamics, const N: usize>(parts: &[&[Variable<M>]]) -> [Variable<M>; N] {
+    let mut all = [parts[0][0]; N];
+    let (mut n, mut part) = (0, 0);
+    while part < parts.len() {
+        let mut i = 0;
+        while i < parts[part].len() {
+            all[n] = parts[part][i];
+            (n, i) = (n + 1, i + 1);
+        }
+        part += 1;
+    }
+    assert!(n == N, "the number of variables");
+    all
+}
+
 /// Consecutive scalars: index of the first, and of the one after the last.
 type Span = (usize, usize);
 
