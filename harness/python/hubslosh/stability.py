@@ -343,25 +343,40 @@ def _is_neutral(gain: LinearModel, poles: NDArray[np.complex128]) -> NDArray[np.
     A neutral pole is at the limit of stability to rounding, and the feedback does not move it: the
     loop gain has this pole, too. The rounding error of a pole is n ε ‖A‖ times its condition number
     (LAPACK Users' Guide, 4.8.1). The condition number of a multiple pole is infinite; the error of
-    a chain of three integrators is the cube root of n ε ‖A‖.
+    a double pole is the square root of n ε times ‖A‖. A chain of three integrators has its poles at
+    the point 0 (if sampled: 1), with an error of the cube root of n ε times ‖A‖. Poles that are
+    farther than that from the limit need no condition number.
     """
     from scipy.linalg import eig, matrix_balance
 
+    if not len(poles):
+        return np.zeros(0, bool)
     off = np.abs(poles.real if gain.period is None else np.abs(poles) - 1)
-    A = matrix_balance(_closed_matrix(gain))[0] if len(poles) else np.zeros((0, 0))
-    size = float(np.linalg.norm(A)) or 1.0
-    rounding = len(A) * np.finfo(float).eps
-    most = np.cbrt(rounding) * size
+    away = np.abs(poles if gain.period is None else poles - 1)
+    rounding = len(poles) * np.finfo(float).eps
+
+    def limits(A: Matrix) -> tuple[float, Matrix]:
+        """Return ‖A‖, and the largest error of each pole."""
+        size = float(np.linalg.norm(A)) or 1.0
+        chain = np.cbrt(rounding) * size
+        return size, np.where(away <= chain, chain, np.sqrt(rounding) * size)
+
+    A = _closed_matrix(gain)
+    # balancing reduces the norm, so that most loops are decided without it
+    if not (off <= limits(A)[1]).any():
+        return np.zeros(len(poles), bool)
+    A = matrix_balance(A)[0]
+    size, most = limits(A)
     near = off <= most
     if near.any():
         near &= np.abs(poles[:, None] - np.linalg.eigvals(gain.A)).min(axis=1) <= most
     if not near.any():
         return near
     values, left, right = eig(A, left=True)
-    with np.errstate(divide="ignore"):
-        error = np.minimum(rounding * size / np.abs((left.conj() * right).sum(axis=0)), most)
     nearest = np.abs(poles[:, None] - values).argmin(axis=1)
-    found: NDArray[np.bool_] = (off <= error[nearest]) & near
+    with np.errstate(divide="ignore"):
+        error = rounding * size / np.abs((left.conj() * right).sum(axis=0))
+    found: NDArray[np.bool_] = (off <= np.minimum(error[nearest], most)) & near
     return found
 
 
