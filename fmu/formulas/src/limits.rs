@@ -15,6 +15,8 @@
 //!
 //! Spin: in a liquid that turns with its tank a wave has two frequencies, and a pendulum is wrong about both.
 
+use core::f64::consts::PI;
+
 use crate::cylinder::XI;
 use crate::energy_terms::energy_terms;
 use crate::third_order;
@@ -78,6 +80,20 @@ pub const FREQUENCY: f64 = 3e-3;
 /// Relative error of the frequency at which a forced response is wrong by 3 %, if the response is wrong only because the
 /// model's frequency shifts differ from those of the liquid.
 pub const FORCED: f64 = 8.5e-4;
+
+/// Relative error of the third order's frequency at the angle at which a forced response is wrong by 3 %, for a tank in
+/// which only free motion was compared with potential flow. It is the smallest such error in upright cylinders with h/R
+/// of 0.4 and more.
+pub const FORCED_UNCOMPARED: f64 = 5e-4;
+/// Slosh angle at which a forced response with [`energy_terms`] is wrong by 3 % over the angle at which a forced response
+/// of the third order is, for a tank in which only free motion was compared with potential flow. It is the smallest such
+/// ratio in upright cylinders.
+pub const ENERGY_UNCOMPARED: f64 = 1.2;
+/// Slosh angle, rad, above which no forced response of the third order was found right within 3 % in any upright
+/// cylinder.
+pub const LARGEST_FORCED: f64 = 11.1 * PI / 180.0;
+/// Largest slosh angle, rad, at which a forced response with [`energy_terms`] was compared with potential flow.
+pub const LARGEST_FORCED_ENERGY: f64 = 15.0 * PI / 180.0;
 
 /// Rows of h/R and two slosh angles of planar motion in an upright cylinder, degrees: the first where the
 /// frequency of the third order errs by [`FREQUENCY`], the second where a forced response errs by 3 %. Rotary
@@ -260,6 +276,24 @@ mod tests {
         let shallow = [0.24, 0.15, 0.1].map(|fill| third(fill).frequency.to_degrees());
         assert!(shallow[0] < 4.41 && shallow[0] > 3.9, "{shallow:?}");
         assert!(shallow[1] < 1.2 && shallow[2] < 0.5 && shallow[2] > 0.0, "{shallow:?}");
+    }
+
+    /// The limits of tanks in which only free motion was compared are those of the upright cylinder that is most unfavourable.
+    #[test]
+    fn limits_without_a_forced_comparison_are_those_of_the_most_unfavourable_cylinder() {
+        let rows = || THIRD_ORDER.into_iter();
+        // the frequency's error grows with the square of the angle
+        let error = |[_, frequency, forced]: [f64; 3]| FREQUENCY * (forced / frequency).powi(2);
+        let least = rows().filter(|row| row[0] >= 0.4).map(error).fold(1.0, f64::min);
+        assert!((least / FORCED_UNCOMPARED - 1.0).abs() < 0.02, "{least}");
+        let largest = rows().map(|row| row[2]).fold(0.0, f64::max);
+        assert_eq!(largest.to_radians(), LARGEST_FORCED);
+        let third = |fill: f64| degrees_at(fill, 2).to_degrees();
+        let ratio = FORCED_ENERGY.map(|[fill, forced]| forced / third(fill));
+        let smallest = ratio.into_iter().fold(9.0, f64::min);
+        assert!((smallest / ENERGY_UNCOMPARED - 1.0).abs() < 0.02, "{ratio:?}");
+        let compared = FORCED_ENERGY.map(|[_, forced]| forced).into_iter().fold(0.0, f64::max);
+        assert_eq!(compared.to_radians(), LARGEST_FORCED_ENERGY);
     }
 
     /// From fully nonlinear flow, a pendulum's frequency of planar motion is off by 0.3 % at 1.6, 3.5, 8.3

@@ -105,8 +105,11 @@ impl EnergySource {
 #[serde(rename_all = "snake_case")]
 pub enum LimitSource {
     PotentialFlow,
+    /// The difference of the frequency from free waves of fully nonlinear potential flow in this tank or, for spheres, in a
+    /// sphere.
+    FreeWaves,
     /// A share of the angle at which the second-order wave is half of the first-order wave: the smallest
-    /// share that upright cylinders have.
+    /// share that upright cylinders have; at most the largest angle of an upright cylinder.
     Estimate,
 }
 
@@ -114,6 +117,9 @@ impl LimitSource {
     pub fn words(self) -> &'static str {
         match self {
             LimitSource::PotentialFlow => "fully nonlinear potential flow in upright cylinders",
+            LimitSource::FreeWaves => {
+                "free waves of fully nonlinear potential flow in this shape; forced waves were not compared"
+            }
             LimitSource::Estimate => {
                 "an estimate, not a comparison: a share of the angle at which the series breaks down"
             }

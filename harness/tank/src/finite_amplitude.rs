@@ -13,7 +13,7 @@
 use core::f64::consts::PI;
 
 use formulas::energy_terms::{EnergyTerms, energy_terms};
-use formulas::limits;
+use formulas::limits::{self, AngleLimit};
 use formulas::third_order::{BRIDGED, coefficients};
 
 use crate::coefficients::{Coefficients, Energy, EnergySource, FiniteAmplitude, LimitSource};
@@ -72,7 +72,9 @@ impl Coefficients {
             planar: fine.planar,
             circular: fine.circular,
             wave_second: fine.second,
-            angle_limit: (ESTIMATED_SHARE * STEEPEST * wave / fine.second).abs().min(MOST_ANGLE),
+            angle_limit: (ESTIMATED_SHARE * STEEPEST * wave / fine.second)
+                .abs()
+                .min(limits::LARGEST_FORCED),
             angle_limit_from: LimitSource::Estimate,
             frequency_limit: None,
             swirl_limit: None,
@@ -117,6 +119,30 @@ impl Coefficients {
             swirl_limit: limits::swirl_fold(fill),
             energy: cylinder_energy(fill),
             ..known
+        }
+    }
+
+    /// Adds the coefficients with the energy of large waves in this tank. They also tell where the third order ends.
+    fn with_large_waves(
+        self,
+        terms: &EnergyTerms,
+        errors: [f64; 2],
+        source: EnergySource,
+    ) -> Coefficients {
+        let pair = [self.nonlinear_inertia, self.nonlinear_stiffness];
+        let AngleLimit { frequency, forced } = large_waves::third_order_limit(terms, pair);
+        // Nobody has compared forced waves, so that the smaller angle counts.
+        let (angle_limit, angle_limit_from) = match forced < self.angle_limit {
+            true => (forced, LimitSource::FreeWaves),
+            false => (self.angle_limit, self.angle_limit_from),
+        };
+        let limit = (limits::ENERGY_UNCOMPARED * angle_limit).min(limits::LARGEST_FORCED_ENERGY);
+        Coefficients {
+            angle_limit,
+            angle_limit_from,
+            frequency_limit: Some(frequency),
+            energy: Some(Energy::new(terms, errors, limit, source)),
+            ..self
         }
     }
 
@@ -181,7 +207,7 @@ pub fn add_large_waves(tank: &Tank, data: &mut ModalData) {
     match &mut found.mode {
         Some(known) if known.energy.is_some() => {}
         Some(known) => match large_waves(tank, data, known) {
-            Ok(energy) => known.energy = Some(energy),
+            Ok(with_energy) => *known = with_energy,
             Err(why) => found.warnings.push(format!("finite amplitude: {LEFT_OUT} {why}")),
         },
         None => found.warnings.push(format!(
@@ -219,7 +245,11 @@ enum NoEnergy {
     NoSloshMass(f64),
 }
 
-fn large_waves(tank: &Tank, data: &ModalData, third: &Coefficients) -> Result<Energy, NoEnergy> {
+fn large_waves(
+    tank: &Tank,
+    data: &ModalData,
+    third: &Coefficients,
+) -> Result<Coefficients, NoEnergy> {
     let (Geometry::Revolution { contour, .. }, Some(wall)) = (&tank.geometry, &data.wall) else {
         return Err(NoEnergy::NotRound);
     };
@@ -239,7 +269,7 @@ fn large_waves(tank: &Tank, data: &ModalData, third: &Coefficients) -> Result<En
         return Err(NoEnergy::NoSloshMass(planar.max(rotary)));
     }
     let errors = [planar.max(rotary), energy];
-    Ok(Energy::new(&fit.terms, errors, third.angle_limit, EnergySource::ThisTank))
+    Ok(third.with_large_waves(&fit.terms, errors, EnergySource::ThisTank))
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -294,12 +324,13 @@ pub fn amplitude_dependence(tank: &Tank, data: &ModalData) -> FiniteAmplitude {
                     };
                     let terms =
                         radius.and_then(|radius| sphere_waves::energy_terms(depth / radius));
-                    known.map(|known| Coefficients {
-                        energy: terms.map(|terms| {
-                            let (limit, errors) = (known.angle_limit, sphere_waves::ERRORS);
-                            Energy::new(&terms, errors, limit, EnergySource::SphereTable)
-                        }),
-                        ..known
+                    known.map(|known| match terms {
+                        Some(terms) => known.with_large_waves(
+                            &terms,
+                            sphere_waves::ERRORS,
+                            EnergySource::SphereTable,
+                        ),
+                        None => known,
                     })
                 }
                 (None, None) => None,

@@ -17,6 +17,7 @@ use core::f64::consts::PI;
 use std::thread;
 
 use formulas::energy_terms::EnergyTerms;
+use formulas::limits::{self, AngleLimit};
 use nalgebra::{DMatrix, DVector};
 
 use crate::contour::{Contour, Wall};
@@ -803,6 +804,38 @@ fn pull(terms: &EnergyTerms, u: f64) -> f64 {
     1.0 / (1.0 - u).sqrt() + (terms.pair[1] - 1.0) * u / 2.0 + 0.375 * terms.next[1] * u * u
 }
 
+/// Returns the frequency of the slosh mass in circular motion with the amplitude `angle`, relative to the frequency of small
+/// motion.
+fn circular_frequency(terms: &EnergyTerms, angle: f64) -> f64 {
+    let (u, [t, t_2]) = (angle.sin().powi(2), terms.rotary);
+    (pull(terms, u) / (1.0 + 2.0 * t * u + 3.0 * t_2 * u * u)).sqrt()
+}
+
+/// Returns the limit of a slosh mass of the third order, `pair` = (s, kappa), in a tank whose large waves have the
+/// coefficients `terms`: the angles at which its frequency in planar or in circular motion differs from theirs, at most the
+/// angle up to which `terms` hold.
+pub(crate) fn third_order_limit(terms: &EnergyTerms, pair: [f64; 2]) -> AngleLimit {
+    let third = EnergyTerms { pair, next: [0.0; 2], rotary: [0.0; 2], ..*terms };
+    let off = |angle: f64| {
+        [planar_frequency, circular_frequency]
+            .map(|frequency| (frequency(&third, angle) / frequency(terms, angle) - 1.0).abs())
+            .into_iter()
+            .fold(0.0, f64::max)
+    };
+    let last_within = |error: f64| {
+        let angles =
+            (1..=LIMIT_STEPS).map(|i| terms.compared * f64::from(i) / f64::from(LIMIT_STEPS));
+        angles.take_while(|angle| off(*angle) < error).last().unwrap_or(0.0)
+    };
+    AngleLimit {
+        frequency: last_within(limits::FREQUENCY),
+        forced: last_within(limits::FORCED_UNCOMPARED),
+    }
+}
+
+/// Number of angles at which [`third_order_limit`] compares frequencies.
+const LIMIT_STEPS: u32 = 200;
+
 /// Smallest angle up to which waves are needed for a fit, rad.
 pub(crate) const LEAST: f64 = 6.0 * PI / 180.0;
 
@@ -886,8 +919,7 @@ fn errors(terms: &EnergyTerms, planar: &[LargeWave], circular: &[LargeWave]) -> 
         errors[2] = errors[2].max((height / wave.rise - 1.0).abs());
     }
     for wave in circular.iter().filter(is_compared) {
-        let (u, [t, t_2]) = (square(wave), terms.rotary);
-        let frequency = (pull(terms, u) / (1.0 + 2.0 * t * u + 3.0 * t_2 * u * u)).sqrt();
+        let frequency = circular_frequency(terms, wave.angle);
         errors[1] = errors[1].max((frequency / wave.frequency - 1.0).abs());
     }
     errors

@@ -79,11 +79,11 @@ fn both_methods_agree_within_their_errors() {
 /// coefficients.
 #[test]
 fn coefficients_depend_only_on_the_shape() {
-    let sphere = known("shape = { sphere = { radius = 1.0 } }", 0.7);
-    let small = known("shape = { sphere = { radius = 0.01 } }", 0.007);
+    let sphere = known("shape = { sphere = { radius = 1.0 } }", 0.5);
+    let small = known("shape = { sphere = { radius = 0.01 } }", 0.005);
     let capsule =
         "shape = { domed_cylinder = { radius = 1.0, height = 1.0, bottom = 1.0, top = 1.0 } }";
-    let capsule = known(capsule, 0.7);
+    let capsule = known(capsule, 0.5);
     for (other, scale) in [(small, 0.01), (capsule, 1.0)] {
         assert!((sphere.nonlinear_inertia - other.nonlinear_inertia).abs() < 1e-6, "{other:?}");
         assert!((sphere.nonlinear_stiffness - other.nonlinear_stiffness).abs() < 1e-6, "{other:?}");
@@ -131,9 +131,29 @@ fn a_cylinder_has_coefficients_and_limits_at_every_depth() {
     let bridged = found("shape = { cylinder = { radius = 1.0, height = 2.0 } }", 0.8314);
     assert!(bridged.warnings[0].contains("interpolated between h/R 0.7 and 1.2"), "{bridged:?}");
     assert!(bridged.warnings[1].contains("rotary motion folds at"), "{bridged:?}");
-    let other = known("shape = { sphere = { radius = 1.0 } }", 0.7);
+    let other = known("shape = { sphere = { radius = 1.0 } }", 1.5);
     assert_eq!((other.angle_limit_from, other.frequency_limit), (LimitSource::Estimate, None));
     assert!(other.angle_limit < 0.61 * other.series_limit, "{other:?}");
+}
+
+/// In a sphere the third order ends where its frequency leaves that of free waves of potential flow, also near h/R = 1, where
+/// the second-order wave at the wall vanishes and says nothing about the end of the series.
+#[test]
+fn limits_of_a_sphere_follow_from_its_large_waves() {
+    for i in 0..=19 {
+        let fill = 0.1 + 0.05 * f64::from(i);
+        let mode = known("shape = { sphere = { radius = 1.0 } }", fill);
+        let [limit, frequency] =
+            [mode.angle_limit, mode.frequency_limit.unwrap()].map(f64::to_degrees);
+        assert!(limit < frequency && (4.0..11.0).contains(&limit), "{fill} {limit} {frequency}");
+        let energy = mode.energy.unwrap();
+        assert!(energy.angle_limit <= energy.frequency_limit, "{fill}");
+        assert!(energy.angle_limit.to_degrees() <= 15.01, "{fill}");
+        println!("{fill:.2} {limit:.1} {frequency:.1} {:.1}", energy.angle_limit.to_degrees());
+    }
+    let half = known("shape = { sphere = { radius = 1.0 } }", 1.0);
+    assert!((half.angle_limit.to_degrees() - 8.9).abs() < 0.3, "{half:?}");
+    assert_eq!(half.angle_limit_from, LimitSource::FreeWaves);
 }
 
 /// Parameter files contain the limits of the coefficients, or the limits of a pendulum if there are no coefficients.
@@ -242,7 +262,7 @@ fn spheres_have_the_energy_terms_at_the_fills_of_their_table() {
         assert!((planar - known.planar).abs() < 0.03, "{fill}: {planar} {}", known.planar);
         let third = known.circular.unwrap();
         assert!((circular - third).abs() < 0.05, "{fill}: {circular} {third}");
-        assert!(energy.angle_limit <= known.angle_limit, "{fill}");
+        assert!(energy.angle_limit <= 1.2 * known.angle_limit, "{fill}");
         assert!(energy.frequency_limit >= energy.angle_limit, "{fill}");
     }
     assert!([0.09, 1.08].iter().all(|fill| at(*fill).energy.is_none()));
