@@ -337,6 +337,32 @@ def _closed(gain: LinearModel) -> NDArray[np.complex128]:
     return poles[np.argsort(np.abs(poles))]
 
 
+def _size(A: Matrix) -> Any:
+    """Return the norm of a matrix, or of each of a stack of matrices; 1 instead of 0."""
+    size = np.linalg.norm(A, axis=(-2, -1))
+    return np.where(size > 0, size, 1.0)
+
+
+def _errors(
+    A: Matrix, poles: NDArray[np.complex128], period: float | None
+) -> tuple[Matrix, Matrix]:
+    """Return each pole's distance from the limit of stability, and its largest rounding error.
+
+    ``A`` is the closed loop's matrix, or a stack of matrices with as many rows of ``poles``.
+    """
+    off = np.abs(poles.real if period is None else np.abs(poles) - 1)
+    away = np.abs(poles if period is None else poles - 1)
+    rounding, size = A.shape[-1] * np.finfo(float).eps, _size(A)[..., None]
+    chain = np.cbrt(rounding) * size
+    return off, np.where(away <= chain, chain, np.sqrt(rounding) * size)
+
+
+def _may_be_neutral(A: Matrix, poles: NDArray[np.complex128], period: float | None) -> Any:
+    """Return whether rounding can move a pole to the limit of stability; for `_errors`."""
+    off, most = _errors(A, poles, period)
+    return (off <= most).any(axis=-1)
+
+
 def _is_neutral(gain: LinearModel, poles: NDArray[np.complex128]) -> NDArray[np.bool_]:
     """Return which poles of the closed loop are neutral.
 
@@ -349,24 +375,13 @@ def _is_neutral(gain: LinearModel, poles: NDArray[np.complex128]) -> NDArray[np.
     """
     from scipy.linalg import eig, matrix_balance
 
-    if not len(poles):
-        return np.zeros(0, bool)
-    off = np.abs(poles.real if gain.period is None else np.abs(poles) - 1)
-    away = np.abs(poles if gain.period is None else poles - 1)
-    rounding = len(poles) * np.finfo(float).eps
-
-    def limits(A: Matrix) -> tuple[float, Matrix]:
-        """Return ‖A‖, and the largest error of each pole."""
-        size = float(np.linalg.norm(A)) or 1.0
-        chain = np.cbrt(rounding) * size
-        return size, np.where(away <= chain, chain, np.sqrt(rounding) * size)
-
     A = _closed_matrix(gain)
     # balancing reduces the norm, so that most loops are decided without it
-    if not (off <= limits(A)[1]).any():
+    if not len(A) or not _may_be_neutral(A, poles, gain.period):
         return np.zeros(len(poles), bool)
     A = matrix_balance(A)[0]
-    size, most = limits(A)
+    off, most = _errors(A, poles, gain.period)
+    size, rounding = _size(A), len(A) * np.finfo(float).eps
     near = off <= most
     if near.any():
         near &= np.abs(poles[:, None] - np.linalg.eigvals(gain.A)).min(axis=1) <= most

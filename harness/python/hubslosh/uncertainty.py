@@ -34,9 +34,7 @@ does not need goes: each repeated block is reduced to its controllable and obser
 import json
 import re
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
-from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -51,17 +49,18 @@ from .certificate import (
     Search,
     UnstableError,
     WorstCase,
-    corners,
 )
+from .delta_search import DeltaSearch
 from .fmu import FmuError, Parameters, Quantity, did_you_mean
 from .linearization import LinearModel
 from .loop import Loop
 from .operating_point import warn_of_rotation
 from .plant import Plant
+from .progress import Progress
 from .quantities import KINDS, TURN, full_name, moves_the_bob, rigid_rest
 from .short import names
 from .simulation import parameters_of
-from .stability import _moved, minimal
+from .stability import minimal
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -80,10 +79,6 @@ UNITS = {"frequency": "Hz", "zeta": "1", "mass": "kg", "bob": "m", FACTOR: "1"}
 _LEAST = {"zeta": 1e-9} | dict.fromkeys(
     ("frequency", "mass", FACTOR, "craft.mass", "craft.Jxx", "craft.Jyy", "craft.Jzz"), 0.01
 )  # fmt: skip
-DRAWS = 500  # Random Δ of the search for the worst case, 0.6 ms each with two tanks
-UNSTABLE = 1 + 1e-9  # Magnitude of a pole; modes that no input moves have no damping there
-# Search for the smallest unstable Δ: steps of δ, factor of the box, and the accuracy of its size.
-FIRST_STEP, LAST_STEP, SHRINK, CLOSE = 0.2, 2e-3, 0.9, 3e-3
 ALONE = 1e-12  # A coefficient below this, relative to others of its kind, is rounding
 
 
@@ -876,7 +871,8 @@ class UncertainModel:
         return np.array(found)
 
     def certify(
-        self, loop: Loop, largest: float = 3.0, *, gap: float = 1.04, most: int = 1000
+        self, loop: Loop, largest: float = 3.0, *, gap: float = 1.04, most: int = 1000,
+        worst: WorstCase | None = None, progress: Progress = None,
     ) -> Certificate:
         """Prove that the loop is stable for all Δ up to a size close to the worst case.
 
@@ -896,6 +892,11 @@ class UncertainModel:
             Ratio of the size of the worst case to the size to certify; above 1.
         most : int
             Number of convex problems that may be solved for each size.
+        worst : WorstCase, optional
+            Result of `worst_case` for this loop, which is searched if it is not given.
+        progress : bool or callable, optional
+            Shows a line on stderr, as for `worst_case`, and then the proved part of the box and of
+            the frequencies.
 
         Returns
         -------
@@ -912,11 +913,17 @@ class UncertainModel:
         if not gap > 1:
             raise FmuError(f"gap = {gap!r} must be above 1, such as 1.05")
         K, least = self._controller(loop), self._least
+        delta_search = DeltaSearch(self, loop, K, progress)
         search = Search(
-            lambda f: self.closed(loop, f), lambda delta: self._poles(loop, K, delta),
-            self.counts, loop.period,
-        )  # fmt: skip
-        worst = self.worst_case(loop, largest)
+            lambda f: self.closed(loop, f), delta_search.poles, self.counts, loop.period, progress
+        )
+        if worst is None:
+            worst = delta_search.worst(largest)
+        elif worst.delta and not delta_search.is_limit(self.delta(worst.delta)):
+            raise FmuError(
+                "worst is not a worst case of this loop, which is not at its limit of stability "
+                "there: give the result of worst_case of the same model and loop"
+            )
         data: dict[str, NDArray[Any]] = {}
         size, solved = 0.0, 0
         for factor in SIZES:
@@ -928,12 +935,14 @@ class UncertainModel:
                 try:
                     data, size = search.certify(*box, most), tried
                 except UnstableError as found:
-                    end = float(np.abs(found.delta).max())
-                    worst = self._shrunk(loop, K, found.delta, end)
-                    continue
+                    smaller = delta_search.limit(found.delta)
+                    if smaller is not None and smaller.size < worst.size:
+                        worst = delta_search.smallest([], smaller, smaller.size)
+                        continue
                 except ExhaustedError:
                     pass
                 finally:
+                    search.line.close()
                     solved += search.scalings.solved
                 break
             if size:
@@ -964,11 +973,9 @@ class UncertainModel:
                 found[k] = (share - 1) * self.center[name] / self.spread.loc[name, name]
         return found
 
-    def _poles(self, loop: Loop, K: LinearModel, delta: Matrix) -> NDArray[np.complex128]:
-        """Return the poles of the sampled loop with K at Δ, without neutral poles."""
-        return _moved(loop._gain(self.at(delta), K))
-
-    def worst_case(self, loop: Loop, largest: float = 3.0) -> WorstCase:
+    def worst_case(
+        self, loop: Loop, largest: float = 3.0, *, progress: Progress = None
+    ) -> WorstCase:
         """Search for the smallest real Δ that brings the loop to the limit of stability.
 
         The search uses the exact sampled loop, with its delay. Starting from each lightly damped
@@ -986,6 +993,9 @@ class UncertainModel:
             Loop, as for `closed`.
         largest : float
             Largest ``|δ|`` to search.
+        progress : bool or callable, optional
+            Shows a line on stderr with the smallest size so far and the remaining time, by default
+            on a terminal and in a notebook; or a function that takes the line.
 
         Returns
         -------
@@ -998,190 +1008,12 @@ class UncertainModel:
             If the loop does not fit the model or is unstable at Δ = 0, or ``largest`` is out of
             range.
         """
-        K = self._controller(loop)
         check_ranges(largest=largest)
+        return DeltaSearch(self, loop, self._controller(loop), progress).worst(largest)
 
-        def signs(at: Matrix, pole: complex) -> Matrix:
-            """Return the direction in which a pole's magnitude grows."""
-            slopes = []
-            for k in range(len(at)):
-                step = np.zeros(len(at))
-                step[k] = 1e-4
-                ends = [
-                    self._nearest(self._poles(loop, K, at + way * step), pole) for way in (1, -1)
-                ]
-                slopes.append(abs(ends[0]) - abs(ends[1]))
-            size = max(np.abs(slopes), default=0.0)
-            return np.where(np.abs(slopes) > 1e-6 * size, np.sign(slopes), 0.0)
-
-        zero = np.zeros(len(self.counts))
-        start = self._poles(loop, K, zero)
-        if np.abs(start).max(initial=0.0) >= 1:
-            raise FmuError(
-                "the loop is unstable at Δ = 0, which is the craft without changes: "
-                "hubslosh.margins(loop) shows its margins"
-            )
-        light = start[(start.imag > 0) & (np.abs(start) > np.exp(-0.3 * np.abs(np.angle(start))))]
-        best, seen = WorstCase({}, np.inf, np.nan, {}), set()
-        for pole in light[np.argsort(-np.abs(light))]:
-            here, follow = zero, complex(pole)
-            for _ in range(6):
-                way = signs(here, follow)
-                if tuple(way) in seen or not way.any():
-                    break
-                seen.add(tuple(way))
-                found = self._limit(loop, K, way, largest)
-                if not np.isfinite(found.size):
-                    break
-                here = self.delta(found.delta)
-                best = min(best, found, key=lambda case: case.size)
-                every = self._poles(loop, K, here)
-                follow = complex(every[np.argmax(np.abs(every))])
-        for way in corners(len(zero)):
-            found = self._limit(loop, K, way, min(best.size, largest), steps=8)
-            best = min(best, found, key=lambda case: case.size)
-        if best.delta:
-            found = self._shrunk(loop, K, self.delta(best.delta), best.size)
-            best = min(best, found, key=lambda case: case.size)
-        size = min(best.size, largest)
-        for at in [*self._meetings(size), self._drawn(loop, K, size)]:
-            found = self._shrunk(loop, K, at, min(best.size, largest))
-            best = min(best, found, key=lambda case: case.size)
-        return best
-
-    def _drawn(self, loop: Loop, K: LinearModel, size: float) -> Matrix:
-        """Return the least stable of random Δ, of which half have the least damping ratios.
-
-        They find a loop that is unstable only between the corners.
-        """
-        rng = np.random.default_rng(1)
-        damping = [_kind(name) == "zeta" for name in self.deltas]
-        best, found = 0.0, np.zeros(len(self.deltas))
-        for k in range(DRAWS):
-            at = rng.uniform(-size, size, len(self.deltas))
-            at = np.maximum(np.where(damping, -size, at) if k % 2 else at, self._least)
-            with suppress(FmuError):  # no craft any more
-                if (there := float(np.abs(self._poles(loop, K, at)).max(initial=0.0))) > best:
-                    best, found = there, at
-        return found
-
-    def _meetings(self, size: float) -> list[Matrix]:
-        """Return Δ at which two uncertain frequencies are equal, if their ranges overlap.
-
-        ``size`` bounds the ranges. Two modes of the same frequency and little damping can be
-        unstable in a part of the ranges that is a thousandth of the whole, so that random Δ miss
-        it. There are three Δ for each pair, over the frequencies that both can have; other
-        parameters are nominal, and damping ratios least.
-        """
-        at = np.where([_kind(name) == "zeta" for name in self.deltas], -size, 0.0)
-        found = []
-        for i, j in combinations(self._frequencies, 2):
-            (a, b), (c, d) = ((self.center[self.deltas[k]], self._radius(k)) for k in (i, j))
-            low, high = max(a - b * size, c - d * size), min(a + b * size, c + d * size)
-            for f in np.linspace(low, high, 3) if low < high else ():
-                at[[i, j]] = (f - a) / b, (f - c) / d
-                found.append(np.maximum(at, self._least))
-        return found
-
-    @property
-    def _frequencies(self) -> list[int]:
-        """Places of the frequencies with a range of their own among the δ."""
-        return [
-            k for k, name in enumerate(self.deltas)
-            if _kind(name) == "frequency" and name in self.spread.index
-        ]  # fmt: skip
-
-    def _radius(self, k: int) -> float:
-        """Return half the range of the parameter that has the δ number k to itself."""
-        return float(self.spread.loc[self.deltas[k], self.deltas[k]])
-
-    def _climbed(self, loop: Loop, K: LinearModel, at: Matrix, size: float) -> tuple[bool, Matrix]:
-        """Return a Δ near one, within a box, at which the loop is less stable; True if unstable.
-
-        A pattern search changes one δ at a time, or two frequencies by the same amount, and ends at
-        the first unstable Δ.
-        """
-        moves = list(np.eye(len(at)))
-        for i, j in combinations(self._frequencies, 2):
-            both = 1 / np.array([self._radius(i), self._radius(j)])
-            move = np.zeros(len(at))
-            move[[i, j]] = both / both.max()
-            moves.append(move)
-        low = np.maximum(-size, self._least)
-
-        def largest(delta: Matrix) -> float:
-            try:
-                return float(np.abs(self._poles(loop, K, delta)).max(initial=0.0))
-            except FmuError:
-                return 0.0  # no craft any more
-
-        at = np.clip(at, low, size)
-        best, step = largest(at), FIRST_STEP
-        while step > LAST_STEP and best <= UNSTABLE:
-            start = best
-            for move in [sign * step * move for move in moves for sign in (1.0, -1.0)]:
-                new = np.clip(at + move, low, size)
-                if (new != at).any() and (there := largest(new)) > best:
-                    best, at = there, new
-                if best > UNSTABLE:
-                    break
-            if best <= start + 1e-13:
-                step /= 2
-        return best > UNSTABLE, at
-
-    def _shrunk(self, loop: Loop, K: LinearModel, at: Matrix, size: float) -> WorstCase:
-        """Return the smallest Δ at the limit of stability that is found from one in a box.
-
-        The box shrinks as long as the search of `_climbed` finds an unstable Δ in it.
-        """
-        stable = 0.0
-        unstable, at = self._climbed(loop, K, at, size)
-        if not unstable:
-            return WorstCase({}, np.inf, np.nan, {})
-        size = float(np.abs(at).max())
-        while size - stable > CLOSE * size:
-            smaller = max(SHRINK * size, (size + stable) / 2)
-            for start in (at * smaller / size, *self._meetings(smaller)):
-                unstable, near = self._climbed(loop, K, start, smaller)
-                if unstable:
-                    at, size = near, float(np.abs(near).max())
-                    break
-            else:
-                stable = smaller
-        return self._limit(loop, K, at / size, size, steps=64)
-
-    def _limit(
-        self, loop: Loop, K: LinearModel, way: Matrix, largest: float, steps: int = 24
-    ) -> WorstCase:
-        """Return the Δ along ``way`` (with largest component 1) at the limit of stability."""
-
-        def outside(size: float) -> bool:
-            at = np.maximum(size * way, self._least)
-            return bool(np.abs(self._poles(loop, K, at)).max(initial=0.0) > UNSTABLE)
-
-        low, high = 0.0, largest
-        for high in np.linspace(0, largest, steps + 1)[1:]:
-            try:
-                if outside(high):
-                    break
-            except FmuError:
-                return WorstCase({}, np.inf, np.nan, {})  # no craft any more
-            low = float(high)
-        else:
-            return WorstCase({}, np.inf, np.nan, {})
-        for _ in range(50):
-            middle = (low + high) / 2
-            low, high = (low, middle) if outside(middle) else (middle, high)
-        at = np.maximum(high * way, self._least)
-        every = self._poles(loop, K, at)
-        critical = every[np.argmax(np.abs(every))]
-        named = dict(zip(self.deltas, at.tolist(), strict=True))
-        frequency = abs(float(np.angle(critical))) / (TURN * loop.period)
-        return WorstCase(named, float(high), frequency, self.values(at))
-
-    @staticmethod
-    def _nearest(poles: NDArray[np.complex128], pole: complex) -> complex:
-        return complex(poles[np.argmin(np.abs(poles - pole))])
+    def _of_kind(self, kind: str) -> list[int]:
+        """Return the places of the δ that are a quantity of one kind, such as "zeta"."""
+        return [k for k, name in enumerate(self.deltas) if _kind(name) == kind]
 
     def as_dict(self) -> "dict[str, Any]":
         """Return the content of the files that `to_mat` and `to_json` write.

@@ -1,6 +1,7 @@
 """Uncertain models against the FMU's own linear models, and a worst case against its motion."""
 
 import json
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -15,6 +16,7 @@ from scipy.optimize import brentq
 
 import hubslosh
 from hubslosh import FmuError, Identification, Loop, UncertainModel, linearize, uncertain
+from hubslosh.delta_search import DeltaSearch
 from hubslosh.scalings import SMALLEST, mu_upper
 
 TURN = 2 * np.pi
@@ -431,6 +433,40 @@ def test_no_draw_within_a_certificate_is_unstable(danger: tuple[UncertainModel, 
     assert not hubslosh.margins(replace(loop, parameters=start)).stable
     with pytest.raises(FmuError, match="gap = 1 must be above 1"):
         model.certify(loop, gap=1)
+
+
+def test_many_delta_at_once_have_the_poles_of_single_loops(
+    danger: tuple[UncertainModel, Loop],
+) -> None:
+    """The stacked matrices of the search equal the loop gain's, for any delay."""
+    model, given = danger
+    for delay, latency in ((0.0, 0), (0.04, 0), (given.period, 1), (0.13, 2)):
+        loop = replace(given, delay=delay, latency=latency)
+        law = loop.linear()
+        search = DeltaSearch(model, loop, law)
+        deltas = np.random.default_rng(3).uniform(-1, 1, (70, len(model.deltas)))
+        deltas = np.maximum(deltas, search.least)
+        for delta, poles in zip(deltas, search.poles(deltas), strict=True):
+            exact = hubslosh.stability._closed(loop._gain(model.at(delta), law))
+            for pole in exact[np.abs(exact) > 0.5]:
+                assert np.abs(poles - pole).min() < 1e-12
+
+
+def test_a_certificate_takes_the_worst_case_that_is_known(
+    danger: tuple[UncertainModel, Loop],
+) -> None:
+    """A worst case of another loop is refused; progress shows sizes, shares and the time left."""
+    model, loop = danger
+    lines: list[str] = []
+    worst = model.worst_case(loop, progress=lines.append)
+    assert any(re.fullmatch(r"worst case: .* so far, about \d+ s left", line) for line in lines)
+    lines.clear()
+    found = model.certify(loop, worst=worst, progress=lines.append)
+    assert found.worst is worst and found.size == model.certify(loop).size
+    assert lines and all(re.search(r"\d+ % proved, about \d+ s left", line) for line in lines)
+    assert "100 % proved, about 0 s left" in lines[-1]
+    with pytest.raises(FmuError, match="worst is not a worst case of this loop"):
+        model.certify(replace(loop, delay=loop.delay + 0.02), worst=worst)
 
 
 def test_a_failed_certificate_is_reported(
