@@ -292,7 +292,7 @@ impl Feedback {
 }
 
 /// Returns an error unless the number `found` of the items named `what` is `expected`.
-fn expect(what: &str, found: usize, expected: usize) -> PyResult<()> {
+pub fn expect(what: &str, found: usize, expected: usize) -> PyResult<()> {
     if found == expected {
         return Ok(());
     }

@@ -208,14 +208,15 @@ impl Instance {
     fn run(
         &self,
         py: Python,
-        time: PyBuffer<f64>,
+        rows: (PyBuffer<f64>, Option<Vec<u8>>),
         inputs: Table,
         slopes: Option<&Bound<PyAny>>,
         outputs: Table,
         feedback: Option<&Bound<PyAny>>,
     ) -> PyResult<Option<Stop>> {
         let fmu = self.fmu.get();
-        let mut run = Run::new(fmu, time.to_vec(py)?, &inputs, slopes, &outputs, feedback)?;
+        let mut run =
+            Run::new(fmu, (rows.0.to_vec(py)?, rows.1), &inputs, slopes, &outputs, feedback)?;
         self.with(py, |held| run.make(&mut held.instance))
     }
 

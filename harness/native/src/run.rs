@@ -7,7 +7,7 @@ use host::description::{Type, Value, Variable};
 use host::fmu::Instance;
 use pyo3::prelude::*;
 
-use crate::feedback::Feedback;
+use crate::feedback::{Feedback, expect};
 use crate::fmu::Fmu;
 use crate::numbers::{Failure, Numbers};
 
@@ -49,7 +49,7 @@ impl<'fmu> Columns<'fmu> {
             from.get_real(&self.references, &mut self.reals)?;
         }
         if self.others.is_empty() {
-            return Ok(&self.reals);
+            return Ok(self.last());
         }
         for (place, real) in self.places.iter().zip(&self.reals) {
             self.row[*place] = *real;
@@ -57,7 +57,12 @@ impl<'fmu> Columns<'fmu> {
         for (variable, place) in &self.others {
             self.row[*place] = from.value(variable)?.number();
         }
-        Ok(&self.row)
+        Ok(self.last())
+    }
+
+    /// Returns the values that `get` read last.
+    fn last(&self) -> &[f64] {
+        if self.others.is_empty() { &self.reals } else { &self.row }
     }
 
     fn set(&mut self, to: &mut Instance, row: &[f64]) -> Called {
@@ -94,6 +99,9 @@ struct Lines {
 
 pub struct Run<'fmu> {
     time: Vec<f64>,
+    /// Rows whose outputs are read, if not all are; the others repeat the outputs of the row before. Reading can make the FMU
+    /// compute all its outputs.
+    wanted: Option<Vec<bool>>,
     inputs: (Columns<'fmu>, Numbers),
     /// Time derivatives of the inputs after each row.
     slopes: Option<Numbers>,
@@ -103,20 +111,24 @@ pub struct Run<'fmu> {
 }
 
 impl<'fmu> Run<'fmu> {
-    /// Prepares a run. `time` has the communication points, s; `slopes` has the same columns as `inputs`.
+    /// Prepares a run. `time` has the communication points, s, and 0 for each row whose outputs are not read, if there are such
+    /// rows; `slopes` has the same columns as `inputs`.
     ///
     /// # Errors
     ///
     /// If a variable is unknown, or a table has another size.
     pub fn new(
         fmu: &'fmu Fmu,
-        time: Vec<f64>,
+        (time, wanted): (Vec<f64>, Option<Vec<u8>>),
         (inputs, values): &Table,
         slopes: Option<&Bound<PyAny>>,
         (outputs, recorded): &Table,
         feedback: Option<&Bound<PyAny>>,
     ) -> PyResult<Run<'fmu>> {
         let (rows, width) = (time.len(), inputs.len());
+        if let Some(wanted) = &wanted {
+            expect("rows of the run", wanted.len(), rows)?;
+        }
         let columns = Columns::find(fmu, inputs)?;
         let slopes = slopes.map(|of| Numbers::borrow(of, rows, width, false)).transpose()?;
         Ok(Run {
@@ -128,6 +140,7 @@ impl<'fmu> Run<'fmu> {
                 Numbers::borrow(recorded, rows, outputs.len(), true)?,
             ),
             feedback: feedback.map(|of| Feedback::read(of, fmu, rows)).transpose()?,
+            wanted: wanted.map(|of| of.iter().map(|byte| *byte != 0).collect()),
             time,
         })
     }
@@ -159,7 +172,10 @@ impl<'fmu> Run<'fmu> {
     /// rows that was last read from Python.
     fn row(&mut self, instance: &mut Instance, row: usize, i: usize) -> Result<(), Failure> {
         let (columns, recorded) = &mut self.outputs;
-        recorded.push(columns.get(instance)?);
+        recorded.push(match &self.wanted {
+            Some(rows) if row > 0 && !rows[row] => columns.last(),
+            _ => columns.get(instance)?,
+        });
         let time = self.time[row];
         let Some(next) = self.time.get(row + 1) else {
             if let Some(feedback) = &mut self.feedback {

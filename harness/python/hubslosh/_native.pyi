@@ -60,7 +60,7 @@ class Instance:
     def step(self, time: float, step: float) -> None: ...
     def run(
         self,
-        time: Floats,
+        rows: tuple[Floats, bytes | None],
         inputs: Table,
         slopes: Floats | None,
         outputs: Table,

@@ -505,6 +505,7 @@ class Loop:
                 {name: slopes for name, (_, slopes) in given.items()} if sloped else None,
                 asked,
                 feedback,
+                wanted,
             )
         for text in saturated(turned, feedback, points):
             warnings.warn(text, FmuWarning, stacklevel=caller())

@@ -206,7 +206,7 @@ def run_of(
         stop=stop,
         inputs={name: value[0] for name, value in given.items()},
     ) as plant:
-        recorded = plant.run(points, given, slopes, asked, feedback)
+        recorded = plant.run(points, given, slopes, asked, feedback, wanted)
     rows_made = {"time": points} | given | recorded
     if feedback is not None:
         rows_made |= columns_of(turned, feedback)
@@ -241,7 +241,8 @@ def table_of(
     of range become columns only if ``asked`` names them.
     """
     limits = [name for name in native.limit_columns(fmu.native) if name in columns]
-    read = {name: np.ascontiguousarray(columns[name], float) for name in ("time", *limits)}
+    rows = slice(None) if wanted is None else wanted
+    read = {name: np.ascontiguousarray(columns[name][rows], float) for name in ("time", *limits)}
     columns = {name: of for name, of in columns.items() if name in asked or name not in limits}
     table = Run(columns, copy=False)
     if wanted is not None:
