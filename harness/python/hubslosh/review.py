@@ -592,6 +592,9 @@ class _Space:
         found = _damping(craft, tanks, known) if damping == "interval" else []
         parts = {name: _part(share, name) for name, share in shares.items()}
         found += _frequencies(craft, loops, parts["frequency"], ranges)
+        found += _array_frequencies(
+            craft, [every for every, _ in given], parts["frequency"], ranges
+        )
         found += _inertia([every for every, _ in given], parts["inertia"], ranges)
         found += _quantities(loops, [every for every, _ in given], ranges, craft._names)
         percent = all(isinstance(f, str) and f.strip().endswith("%") for f in fills)
@@ -716,6 +719,21 @@ def _frequencies(
             ends.append(_scaled(part, here))
         if any(ends):
             found.append(Uncertain(f"frequency of {name}", f"± {100 * part:g}%", tuple(ends)))
+    return found
+
+
+def _array_frequencies(
+    craft: "Craft", given: Sequence[Parameters], part: float, ranges: Mapping[str, Any]
+) -> list[Uncertain]:
+    """Return the frequencies of each appendage, whose modes vary together."""
+    found = []
+    for name in craft.appendages if part else ():
+        owners = enumerate(craft._names.appendages, 1)
+        full = [f"appendage[{j}].frequency" for j, owner in owners if owner == name]
+        full = [of for of in full if of not in ranges]
+        ends = tuple(_scaled(part, {of: float(every[of]) for of in full}) for every in given)  # type: ignore[arg-type]
+        if full:
+            found.append(Uncertain(f"frequency of {name}", f"± {100 * part:g}%", ends))
     return found
 
 
