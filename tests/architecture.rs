@@ -240,7 +240,7 @@ fn each_change_has_one_entry_in_the_changelog() {
     for version in versions {
         let mut beginnings = BTreeSet::new();
         for entry in version.lines().filter(|line| line.starts_with("* ")) {
-            let beginning: String = entry.chars().take(75).collect();
+            let beginning: String = entry.chars().take(60).collect();
             assert!(beginnings.insert(beginning), "two entries begin like this one: {entry}");
         }
     }

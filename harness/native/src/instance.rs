@@ -198,8 +198,9 @@ impl Instance {
         })
     }
 
-    /// Simulate a run with a communication point at each time in `time` (s), and record `outputs` at each of them.
+    /// Simulate a run with a communication point at each time in `rows`, and record `outputs` at each of them.
     ///
+    /// `rows` has the times (s), and None or a byte for each row, which is 0 if the row only repeats the outputs of the row before.
     /// `inputs` and `outputs` are pairs of a list of names and a table of floats with one column for each name, also for Booleans
     /// and enumerations. `slopes` has the derivatives of the inputs after each row, or is None.
     ///

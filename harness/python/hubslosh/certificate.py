@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from .fmu import FmuError
 from .progress import Line, Progress
+from .quantities import short_name
 from .scalings import Complex, Scalings, Vector, form, recentred
 from .short import MOST
 
@@ -70,6 +71,8 @@ class WorstCase:
         Frequency of the oscillation that neither grows nor decays, Hz.
     parameters : dict of str to float
         Uncertain parameters at this Δ, by name, SI units.
+    tanks : tuple of str
+        Names of the craft's tanks, with which parameters are printed.
 
     Examples
     --------
@@ -83,6 +86,7 @@ class WorstCase:
     size: float
     frequency: float
     parameters: "dict[str, float]"
+    tanks: tuple[str, ...] = ()
 
     @property
     def mu(self) -> float:
@@ -93,7 +97,9 @@ class WorstCase:
         """Return size and frequency, then the parameters."""
         if not np.isfinite(self.size):
             return "WorstCase: none was found, the lower bound of µ is 0"
-        values = [f"\n  {name} = {x:.6g}" for name, x in self.parameters.items()]
+        values = [
+            f"\n  {short_name(name, self.tanks)} = {x:.6g}" for name, x in self.parameters.items()
+        ]
         left = len(values) - MOST
         more = f"\n  and {left} more" if left > 0 else ""
         first = f"WorstCase: unstable from {self.size:.4g} times the ranges on, µ ≥ {self.mu:.4g}"

@@ -75,7 +75,9 @@ class MountedTank:
     Parameters
     ----------
     source : str, Path or mapping
-        Drawing: a tank file (.toml), or a dict with its content, as for `tank`.
+        Drawing: a tank file (.toml), or a dict with its content, as for `tank`. The ``height`` of a
+        ``domed_cylinder`` is the height of its cylindrical part, m, without the domes, whose own
+        heights are ``bottom`` and ``top``.
     position : sequence of float, shape (3,)
         Position of the origin of the tank's drawing from the craft's origin O, body axes, m. The
         origin of a tank given by ``shape`` is its lowest point.
@@ -1100,6 +1102,21 @@ class Craft:
         >>> gains = np.hstack([2 * 10 * np.eye(3), 80 * np.eye(3)])
         >>> hubslosh.margins(craft.loop(gains, 0.1, "60%")).stable
         True
+
+        An engine whose thrust misses the centre of mass turns the craft. Margins do not depend on this
+        torque, because the loop belongs to the equilibrium at which the controller holds it. A
+        simulation from rest adds it as a constant, which ends in an attitude error of torque over
+        gain:
+
+        >>> engine = hubslosh.Engine((0.01, 0, 0), (0, 0, 1), 50)
+        >>> craft = hubslosh.Craft(900, [400, 380, 300], tanks=tanks, engines={"main": engine})
+        >>> loop = craft.loop(gains, 0.1, "60%")
+        >>> torque = np.cross(-craft.trim("60%").shift, [0, 0, 50])
+        >>> torque.round(3)
+        array([ 0. , -0.5,  0. ])
+        >>> run = loop.simulate(300, {f"torque[{i}]": torque[i - 1] for i in (1, 2, 3)})
+        >>> bool(abs(run["q[3]"].iloc[-1] - torque[1] / 20) < 1e-3)
+        True
         """
         point, late = self._point(
             fill, parameters, rigid=rigid, mass_flow=mass_flow, between=between
@@ -1107,7 +1124,7 @@ class Craft:
         delay = delay if late is None else late
         return Loop(
             controller, period, point.model, point.parameters, measured, command, latency, delay,
-            self.wheels,
+            self.wheels, self._names,
         )  # fmt: skip
 
     def review(
@@ -1147,9 +1164,9 @@ class Craft:
             "interval" varies the damping of each tank over the confidence interval of the empirical
             formula that computes the damping; "nominal" does not vary the damping.
         frequency : str
-            Range of the slosh frequencies as a share of their nominal values, such as "10%";
-            "nominal" does not vary them. All modes of a tank vary together, and the heights of the
-            slosh masses do not change.
+            Range of the slosh frequencies, and of the frequencies of appendages, as a share of
+            their nominal values, such as "10%"; "nominal" does not vary them. All modes of a tank
+            or an appendage vary together, and the heights of the slosh masses do not change.
         inertia : str
             Range of the dry craft's inertia as a share, such as "5%", where one factor multiplies
             all components; "nominal" does not vary the inertia. If ``uncertain`` names a component,

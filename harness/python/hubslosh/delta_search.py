@@ -162,7 +162,7 @@ class DeltaSearch:
         critical = poles[np.argmax(np.abs(poles))]
         named = dict(zip(self.model.deltas, at.tolist(), strict=True))
         frequency = abs(float(np.angle(critical))) / (2 * np.pi * self.loop.period)
-        return WorstCase(named, size, frequency, self.model.values(at))
+        return WorstCase(named, size, frequency, self.model.values(at), self.model.tanks)
 
     def is_limit(self, delta: Matrix) -> bool:
         """Return True if the loop is unstable at Δ, and stable a little nearer to 0."""

@@ -86,6 +86,9 @@ class Loop:
         Reaction wheels by name, for Spacecraft; `Craft.loop` passes the wheels of the craft. The
         torques of the wheels can be commanded: ``"z.torque"`` is the torque of wheel z on the
         craft, N·m, and ``"wheels"`` stands for the torques of all wheels in order.
+    tanks : tuple of str
+        Names of the craft's tanks, with which `margins` names slosh modes; `Craft.loop` passes
+        them.
 
     Examples
     --------
@@ -104,6 +107,7 @@ class Loop:
     latency: int = 0
     delay: float = 0.0
     wheels: Mapping[str, Wheel] = field(default_factory=dict)
+    tanks: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         """Return the loop in four lines."""

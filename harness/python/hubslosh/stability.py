@@ -12,6 +12,7 @@ from .fmu import FmuError, Parameters
 from .linearization import LinearModel, eigenvectors, mode_table
 from .loop import Loop, _from_control
 from .native import Model
+from .quantities import short_name
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -209,7 +210,8 @@ def margins_and_gain(
         def delayed(more: float) -> LinearModel:
             return loop._gain(small, K, more)
 
-        return _margins(gain, modes, _controllable_modes(plant, modes), delayed), gain
+        moved = _controllable_modes(plant, modes)
+        return _margins(gain, modes, moved, delayed, loop.tanks), gain
     if parameters:
         raise FmuError("parameters= is only for a Loop: a loop gain has no parameters")
     gain = loop if isinstance(loop, LinearModel) else _loop_gain(loop)
@@ -253,6 +255,7 @@ def _margins(
     modes: Modes,
     moved: list[Modes],
     delayed: Callable[[float], LinearModel] | None,
+    tanks: tuple[str, ...] = (),
 ) -> Margins:
     import pandas as pd
 
@@ -280,7 +283,7 @@ def _margins(
             else:
                 row["gain_margin"] = -20 * np.log10(abs(L))
             rows.append(
-                row | {"delay_margin": late, "near": _nearby_modes(row["frequency"], moved[i])}
+                row | {"delay_margin": late, "near": _nearby_modes(row["frequency"], moved[i], tanks)}
             )
     columns = [
         "loop",
@@ -507,12 +510,12 @@ def _band(gain: LinearModel, roots: list[NDArray[np.complex128]]) -> tuple[float
     return low, min(1e3 * size, (1 - 1e-7) * nyquist)
 
 
-def _nearby_modes(frequency: float, modes: Modes) -> str:
+def _nearby_modes(frequency: float, modes: Modes, tanks: tuple[str, ...]) -> str:
     """Return the modes near a frequency, by name."""
     close = [mode for mode in modes if abs(mode[0] - frequency) <= NEAR * mode[0]]
     if not close:
         return ""
-    who = sorted({_mode_of(state) for _, _, states in close for state in states})
+    who = sorted({_mode_of(state, tanks) for _, _, states in close for state in states})
     f, zeta = [f for f, _, _ in close], [100 * zeta for _, zeta, _ in close]
     return f"{', '.join(who)} ({_span(f)} Hz, ζ = {_span(zeta)} %)"
 
@@ -522,12 +525,16 @@ def _span(values: list[float]) -> str:
     return low if low == high else f"{low} to {high}"
 
 
-def _mode_of(state: str) -> str:
-    """Return the slosh mode that a state of our FMUs belongs to, otherwise the state itself."""
+def _mode_of(state: str, tanks: tuple[str, ...]) -> str:
+    """Return the mode that a state of our FMUs belongs to, otherwise the state itself."""
     if found := re.fullmatch(r"slosh\.\w+\[(\d+)\]", state):
         return f"slosh mode {found[1]}"
-    if found := re.fullmatch(r"tank\[(\d)\]\.p(?:_dot)?\[(\d),\d\]", state):
-        return f"slosh of tank {found[1]}" + (f" mode {found[2]}" if found[2] != "1" else "")
+    shown = short_name(state, tanks)
+    if re.fullmatch(r"appendage\[\d\]\.eta(?:_dot)?", state) and shown != state:
+        return re.sub(r"\.eta(?:_dot)?\[(\d)\]$", r" mode \1", shown)
+    if found := re.fullmatch(r"(?:tank\[(\d)\]|.+)\.p(?:_dot)?\[(\d),\d\]", state):
+        owner = shown.rpartition(".p")[0] if shown != state else f"tank {found[1]}"
+        return f"slosh of {owner}" + (f" mode {found[2]}" if found[2] != "1" else "")
     return state
 
 

@@ -57,7 +57,7 @@ from .loop import Loop
 from .operating_point import warn_of_rotation
 from .plant import Plant
 from .progress import Progress
-from .quantities import KINDS, TURN, full_name, moves_the_bob, rigid_rest
+from .quantities import KINDS, TURN, full_name, moves_the_bob, rigid_rest, short_name
 from .short import names
 from .simulation import parameters_of
 from .stability import minimal
@@ -621,7 +621,10 @@ class UncertainModel:
     def __repr__(self) -> str:
         """Return the sizes of the model, then one line for each block of Δ."""
         M, width = self.M, self.order
-        copies = names([f"{n} × {c}" for n, c in zip(self.deltas, self.counts, strict=True)])
+        copies = names([
+            f"{short_name(n, self.tanks)} × {c}"
+            for n, c in zip(self.deltas, self.counts, strict=True)
+        ])  # fmt: skip
         return (
             f"UncertainModel, {len(M.A)} states, Δ of {width}: {copies}\n"
             f"  inputs: {names(M.inputs[width:])}\n  outputs: {names(M.outputs[width:])}"

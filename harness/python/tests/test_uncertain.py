@@ -469,6 +469,19 @@ def test_a_certificate_takes_the_worst_case_that_is_known(
         model.certify(replace(loop, delay=loop.delay + 0.02), worst=worst)
 
 
+def test_margins_and_worst_cases_print_the_names_of_the_tanks(spacecraft: Path) -> None:
+    """Tanks have the names that the user gave them in every printed result."""
+    sphere = {"density": 1010, "shape": {"sphere": {"radius": 0.4}}}
+    tanks = {"NTO": hubslosh.MountedTank(sphere, (0, 0, 0.8), modes=1, nu=0.9e-6)}
+    craft = hubslosh.Craft(900, [400, 380, 300], tanks=tanks, thrust=500, model=spacecraft)
+    loop = craft.loop(np.hstack([20 * np.eye(3), 80 * np.eye(3)]), 0.1, "50%", delay=1.0)
+    model = craft.uncertain("50%", {"NTO.frequency[1]": "10%", "NTO.zeta[1]": "interval"})
+    worst = model.worst_case(loop)
+    for text in (str(hubslosh.margins(loop)), repr(model), repr(worst)):
+        assert "NTO" in text and "tank" not in text
+    assert "NTO.frequency[1] = " in repr(worst)
+
+
 def test_a_failed_certificate_is_reported(
     danger: tuple[UncertainModel, Loop], tmp_path: Path
 ) -> None:
