@@ -1103,8 +1103,8 @@ class Craft:
         >>> hubslosh.margins(craft.loop(gains, 0.1, "60%")).stable
         True
 
-        An engine whose thrust misses the centre of mass turns the craft. Margins do not depend on this
-        torque, because the loop belongs to the equilibrium at which the controller holds it. A
+        An engine whose thrust misses the centre of mass turns the craft. Margins do not depend on
+        this torque, because the loop belongs to the equilibrium at which the controller holds it. A
         simulation from rest adds it as a constant, which ends in an attitude error of torque over
         gain:
 

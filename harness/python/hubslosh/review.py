@@ -349,7 +349,10 @@ class Review:
                 change = value / quantity.ends[point.fill][name][1] - 1
                 words.append(f"{quantity.name} {100 * change:+.3g} %")
             else:
-                words += [f"{name} = {value:.4g}" for name, value in values.items()]
+                words += [
+                    f"{short_name(name, point.loop.tanks)} = {value:.4g}"
+                    for name, value in values.items()
+                ]
         return ", ".join(words)
 
     def html(self) -> str:
@@ -731,7 +734,10 @@ def _array_frequencies(
         owners = enumerate(craft._names.appendages, 1)
         full = [f"appendage[{j}].frequency" for j, owner in owners if owner == name]
         full = [of for of in full if of not in ranges]
-        ends = tuple(_scaled(part, {of: float(every[of]) for of in full}) for every in given)  # type: ignore[arg-type]
+        ends = tuple(
+            _scaled(part, {of: float(every[of]) for of in full})  # type: ignore[arg-type]
+            for every in given
+        )
         if full:
             found.append(Uncertain(f"frequency of {name}", f"± {100 * part:g}%", ends))
     return found

@@ -13,6 +13,7 @@ import pandas as pd
 from .curves import Curves, curves_of, draw_bode, draw_nichols
 from .fmu import FmuError
 from .plot import COLORS
+from .quantities import short_name
 from .stability import _broken_at
 
 if TYPE_CHECKING:
@@ -415,7 +416,8 @@ def _tables(review: "Review") -> str:
     rows = [["fill", review.fills[worst.fill], ""]]
     for quantity, share in zip(review.uncertain, worst.shares, strict=True):
         for name, value in quantity.values(worst.fill, float(share)).items() if share else ():
-            rows.append([name, f"{value:.5g}", f"{quantity.ends[worst.fill][name][1]:.5g}"])
+            shown = short_name(name, worst.loop.tanks)
+            rows.append([shown, f"{value:.5g}", f"{quantity.ends[worst.fill][name][1]:.5g}"])
     parts.append(table_of("Where is the worst case?", ("quantity", "worst", "nominal"), rows))
     if review.warnings:
         items = "".join(f"<li>{html.escape(text)}</li>" for text in review.warnings[:8])
@@ -457,7 +459,8 @@ def _unstable_points(review: "Review") -> str:
         for quantity in review.uncertain:
             if share := float(row[quantity.name]):
                 values |= quantity.values(fill, share)
-        where = ", ".join(f"{name} = {value:.4g}" for name, value in values.items()) or "nominal"
+        named = {short_name(name, review.worst.loop.tanks): x for name, x in values.items()}
+        where = ", ".join(f"{name} = {value:.4g}" for name, value in named.items()) or "nominal"
         twice = f"{np.log(2) / row['growth']:.3g}" if row["growth"] > 0 else "never"
         rows.append([review.fills[fill], f"{row['growth']:.3g}", twice, where])
     count = f"{len(table)} of {len(review.points)}"

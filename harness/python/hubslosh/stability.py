@@ -282,9 +282,8 @@ def _margins(
                 least_delay = min(least_delay, late)
             else:
                 row["gain_margin"] = -20 * np.log10(abs(L))
-            rows.append(
-                row | {"delay_margin": late, "near": _nearby_modes(row["frequency"], moved[i], tanks)}
-            )
+            near = _nearby_modes(row["frequency"], moved[i], tanks)
+            rows.append(row | {"delay_margin": late, "near": near})
     columns = [
         "loop",
         "crossing",

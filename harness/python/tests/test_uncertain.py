@@ -477,8 +477,9 @@ def test_margins_and_worst_cases_print_the_names_of_the_tanks(spacecraft: Path) 
     loop = craft.loop(np.hstack([20 * np.eye(3), 80 * np.eye(3)]), 0.1, "50%", delay=1.0)
     model = craft.uncertain("50%", {"NTO.frequency[1]": "10%", "NTO.zeta[1]": "interval"})
     worst = model.worst_case(loop)
-    for text in (str(hubslosh.margins(loop)), repr(model), repr(worst)):
-        assert "NTO" in text and "tank" not in text
+    review = craft.review(loop.controller, 0.1, ["50%"], draws=5)
+    for text in (str(hubslosh.margins(loop)), repr(model), repr(worst), str(review)):
+        assert "NTO" in text and "tank[" not in text and "tank 1" not in text
     assert "NTO.frequency[1] = " in repr(worst)
 
 
