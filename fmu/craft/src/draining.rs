@@ -36,8 +36,8 @@ use crate::spin::SpinNow;
 use crate::state::{BallState, INPUTS, Inputs, Line, STATES, State, index};
 use crate::table::Filling;
 
-/// Inputs of the craft at an instant, over a number type: force at O, torque less that of the wheels, tau -
-/// h_w', the wheels' momentum, and the outflow of each tank with its slope.
+/// Inputs of the craft at an instant, generic over the number type: force at O, torque minus the torque on the wheels
+/// (tau - h_w'), angular momentum of the wheels, and outflow of each tank with its slope.
 pub struct Acting<T> {
     pub force: Vec3<T>,
     pub torque: Vec3<T>,
@@ -609,7 +609,7 @@ mod tests {
         (p, Inputs { force, torque, h_wheels, mass_flow })
     }
 
-    fn later(u: &Inputs, t: f64) -> Inputs {
+    fn inputs_after(u: &Inputs, t: f64) -> Inputs {
         let at = |ramp: &Ramp| Ramp { value: ramp.value_at(t), slope: ramp.slope };
         Inputs {
             force: at(&u.force),
@@ -625,7 +625,7 @@ mod tests {
         let (craft, evaluations) = (Draining::new(p).unwrap(), Cell::new(0));
         for k in 0..(30.0 / h).round() as usize {
             let begin = k as f64 * h;
-            let inputs = &later(u, begin);
+            let inputs = &inputs_after(u, begin);
             let counted = Counted { run: Run { craft: &craft, inputs }, evaluations: &evaluations };
             let limits = Limits { tolerance, max_steps: MAX_STEPS };
             counted.advance(&mut x, begin, h, limits).unwrap();

@@ -715,9 +715,10 @@ impl Lump {
         }
     }
 
-    /// Returns the time of an event near the root `t` of its function's series. Coefficient k of a product of series is up to 2^k
-    /// times those of its factors, so that the product's series up to order n is less exact than the motion. Therefore the time
-    /// is corrected with the function's values that the motion has near the event.
+    /// Returns the time of an event near the root `t` of its function's series. Coefficient k of a product of series
+    /// is up to 2^k times as large as the coefficients of its factors, so that the product's series up to order n is
+    /// less exact than the motion. Therefore the time is corrected with values of the function that are computed from
+    /// the motion near the event.
     fn polish(
         &self,
         mut t: f64,

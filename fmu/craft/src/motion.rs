@@ -587,8 +587,9 @@ impl CraftMotion {
         self.upright[N + 1] = next::<N>(cross::<N>(&self.upright, &self.w));
     }
 
-    /// Computes, for each tank and hinge, coefficient N of the specific force along the tank's axis, e.(a + w' x P + w
-    /// x (w x P)). The accelerations a and w' are those of craft and liquids as one rigid body, and P is the hinge.
+    /// Computes, for each tank and hinge, coefficient N of the specific force along the tank's axis, e.(a + w' x P +
+    /// w x (w x P)). The accelerations a and w' are computed as if craft and liquids were one rigid body; P is the
+    /// position of the hinge.
     #[inline(never)]
     fn set_axial<const N: usize>(&mut self) {
         let ww = products::<N>(&self.w);

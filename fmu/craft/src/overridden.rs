@@ -34,7 +34,10 @@ impl Tank {
         }
         match field {
             "m_0" | "H_0" | "I_0" | "I_z" | "mass" | "length" | "hinge" if self.fill.points > 0 => {
-                Some(format!("fill.points = {}; the fill table gives it", self.fill.points))
+                Some(format!(
+                    "fill.points = {}, so that the fill table gives the value",
+                    self.fill.points
+                ))
             }
             "zeta" if self.fill.has_zeta(n) => {
                 Some(format!("fill.zeta[{},1] to fill.zeta[{0},{}]", n + 1, self.fill.points))
@@ -47,7 +50,7 @@ impl Tank {
             }
             "m_0" | "H_0" | "I_0" | "mass" | "length" | "hinge" | "wave" if self.diameter > 0.0 => {
                 Some(format!(
-                    "diameter = {:?} m; it follows from diameter and depth",
+                    "diameter = {:?} m, so that the value follows from diameter and depth",
                     self.diameter
                 ))
             }

@@ -327,7 +327,10 @@ impl Tank {
         let pair = [self.nonlinear_inertia[n], self.nonlinear_stiffness[n]];
         let text = surface::bound_message(pair, self.higher(n), n, name);
         match self.fill.has_surface(n) {
-            true => format!("{text}; {name}.fill gives them at {:?} kg", self.liquid_0),
+            true => format!(
+                "{text}. The table {name}.fill gives these coefficients at {:?} kg of liquid",
+                self.liquid_0
+            ),
             false => text,
         }
     }
@@ -530,10 +533,10 @@ pub struct Init {
     pub velocity: Vec3,
 }
 
-/// All parameters and initial conditions of a [`Spacecraft`](crate::Spacecraft). `gravity`, m/s2, inertial
-/// axes, and `pivot` have an effect only with [`Mount::Pivot`]. `tanks` is the number of tanks, 0 to
-/// [`TANKS`], `appendages` the number of modes of flexible appendages, 0 to
-/// [`APPENDAGES`], of which those without participation have no effect, and `max_steps` the largest number of internal steps in one step, at least 1.
+/// All parameters and initial conditions of a [`Spacecraft`](crate::Spacecraft). `gravity`, m/s2, inertial axes, and
+/// `pivot` have an effect only with [`Mount::Pivot`]. `tanks` is the number of tanks, 0 to [`TANKS`], `appendages`
+/// the number of modes of flexible appendages, 0 to [`APPENDAGES`] (a mode without participation has no effect), and
+/// `max_steps` the largest number of internal steps in one step, at least 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct Parameters {
@@ -864,8 +867,7 @@ impl Tank {
                 let by_k = libm::sqrt(self.k[n] / self.mass[n]) / core::f64::consts::TAU;
                 let most = libm::sqrt(self.g_ref / SHORTEST) / core::f64::consts::TAU;
                 problems.0.push(format!(
-                    "{name}.frequency[{i}] = {f:?} Hz (allowed: above the {by_k:?} Hz of {name}.k[{i}] alone, and \
-                     below {most:?} Hz)"
+                    "{name}.frequency[{i}] = {f:?} Hz (allowed: above {by_k:?} Hz, the frequency from {name}.k[{i}] without thrust, and below {most:?} Hz)"
                 ));
             } else {
                 problems.number(&format!("{name}.length[{i}]"), length, SHORTEST, FARTHEST, "m");

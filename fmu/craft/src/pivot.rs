@@ -105,8 +105,8 @@ impl Pivot {
     }
 }
 
-/// Dry friction about one axis as power series: those of w, of u' and e = exp u with u = -(w/w_s)^2, of v'
-/// and t = tanh v with v = w/eps, of 1 - t^2, and of C + D e and r.
+/// Power series of the dry friction about one axis: of w, of u' and e = exp u with u = -(w/w_s)^2, of v' and t = tanh
+/// v with v = w/eps, of 1 - t^2, and of C + D e and r.
 #[derive(Clone, Debug)]
 pub(crate) struct Rubbing {
     c: f64,

@@ -1,9 +1,9 @@
 //! Ranges in which the pendulums represent the liquid.
 //!
 //! Linear theory holds while the wave at the wall is low compared with the radius R of the free surface. Below 0.15 R
-//! it holds, from 0.15 R to 0.25 R it loses validity, above 0.25 R forces are only indications (Rubaga's thesis 2.3.5,
-//! after Dodge). R is that of an upright cylinder with the tank's wave per slosh angle, R = wave (xi^2 - 1)/2, which is
-//! exact for a cylinder.
+//! it holds, from 0.15 R to 0.25 R it loses validity, above 0.25 R forces are only indications (Rubaga's thesis
+//! 2.3.5, after Dodge). R is computed as for an upright cylinder that has the same wave height per slosh angle as the
+//! tank, R = wave (xi^2 - 1)/2, because the tank's own radius is not a parameter. For an upright cylinder R is exact.
 //!
 //! The reasons for which a tank is out of range, in the order in which they are given if there are several:
 //!

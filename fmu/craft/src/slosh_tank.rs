@@ -242,13 +242,12 @@ impl TankInputs {
     }
 }
 
-/// Outputs of the tank at one instant. Force and torque on the host are about O. `bias`, N and N m, and
-/// `added_mass`, kg, kg m, kg m2, the upper triangle by rows, are explained at [`Coupling`]. `impulse` is the
-/// sum of the impulses of detached liquid on the host since the start, N s, and about O, N m s, each in the
-/// host's axes at its time; the host adds M_host^-1 times its change to its velocity and rate. It is 0 in
-/// derivatives. `liquid` is the mass of liquid as a state of a draining tank, kg. Mass, centre of mass from O
-/// and inertia about it are those of the whole liquid, with the bobs as point masses at their current
-/// positions, host axes.
+/// Outputs of the tank at one instant. Force and torque on the host are about O. `bias`, N and N m, and `added_mass`,
+/// kg, kg m, kg m2, the upper triangle by rows, are explained at [`Coupling`]. `impulse` is the sum of the impulses
+/// of detached liquid on the host since the start, N s, and about O, N m s, each in the host's axes at its time; the
+/// host adds M_host^-1 times its change to its velocity and rate. It is 0 in derivatives. `liquid` is the mass of
+/// liquid as a state of a draining tank, kg. Mass, centre of mass relative to O and inertia about the centre of mass
+/// include the whole liquid, with the bobs as point masses at their current positions, in host axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct SloshTankOutputs {
@@ -988,7 +987,6 @@ impl Carrier for TankMotion {
         [dv, dw]
     }
 
-    /// Does nothing, because the host does not move.
     fn shift(&mut self, _: Vec3) {}
 
     fn is_pressed(&mut self, _: usize, t: f64) -> bool {
@@ -1247,9 +1245,9 @@ impl SloshTank {
         self.has_ball() && self.motion.loose().lump.is_overdue(now)
     }
 
-    /// Performs all events that are due: liquid leaves the bottom, meets the wall or settles, and the ranges
-    /// become those of the current motion. Returns true if continuous states have changed. After an error
-    /// nothing has changed.
+    /// Performs all events that are due: liquid leaves the bottom of the tank, meets the wall or settles, and the
+    /// outputs about the range of the model follow the current motion. Returns true if continuous states have
+    /// changed. After an error nothing has changed.
     pub fn take_event(&mut self, inputs: &TankInputs) -> Result<bool, StepError> {
         let before = self.motion.state;
         let changed = if self.has_ball() { self.motion.take_due(inputs) } else { Some(false) };

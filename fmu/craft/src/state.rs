@@ -218,7 +218,6 @@ impl Kept {
     }
 }
 
-/// All values without a kept expansion are equal.
 impl PartialEq for Kept {
     fn eq(&self, other: &Kept) -> bool {
         self.numbers().eq(other.numbers())

@@ -33,8 +33,8 @@
 //! G = a + w' x rho + w x (w x rho) + 2 w x rho' + (rho'' without y) + phi/m
 //! ```
 //!
-//! p_perp and e have the projections -eta e_t and e_t = e - eta p, eta = p.e, so only the motion along the meridian differs
-//! from that of a pendulum:
+//! p_perp and e have the projections -eta e_t and e_t = e - eta p, eta = p.e, so that the slosh mass moves as a
+//! pendulum except along the meridian:
 //!
 //! ```text
 //! M = Pi (D^T D + (s - 1) p_perp p_perp^T) Pi = Pi + gamma e_t e_t^T,   gamma = (1 - beta eta)^2 - 1 + (s - 1) eta^2

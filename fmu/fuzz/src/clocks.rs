@@ -18,7 +18,6 @@ use crate::{Values, place, set, survives_being_saved, to_steps};
 const CALLS: usize = 40;
 /// Allowed relative difference between the outputs of two hosts; see [`allowed`].
 const TOLERANCE: f64 = 1e-9;
-/// Largest number of ticks in one step.
 const LONGEST: u32 = 8;
 
 #[derive(Clone, Copy, Debug)]
@@ -95,7 +94,7 @@ impl Clock {
         }
     }
 
-    fn go(&mut self, ticks: u32) {
+    fn advance_ticks(&mut self, ticks: u32) {
         (self.time, self.ticks) = (self.after(ticks), self.ticks + ticks);
     }
 }
@@ -331,7 +330,7 @@ fn step_all<M: Model, V: Values>(
             Err(_) => return false,
             Ok(info) => {
                 if info.event {
-                    instance.enter_event_mode().expect("a step has told of an event");
+                    instance.enter_event_mode().expect("the step has reported an event");
                     to_steps(instance);
                 }
                 if !info.early {
@@ -346,7 +345,7 @@ fn step_all<M: Model, V: Values>(
             }
         }
     }
-    clock.go(ticks);
+    clock.advance_ticks(ticks);
     true
 }
 
@@ -386,7 +385,7 @@ fn model_exchange<M: Model, V: Values>(
             for (x, rate) in x.iter_mut().zip(&rates) {
                 *x += h * rate;
             }
-            clock.go(1);
+            clock.advance_ticks(1);
             let now = clock.now();
             instance.set_time(now).expect("a good time");
             if instance.set_continuous_states(&x).is_err() {

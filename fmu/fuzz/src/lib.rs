@@ -102,7 +102,7 @@ fn step<M: Model, V: Version>(
 ) -> Result<StepInfo, Fault> {
     let info = instance.step_to_event(at, h, true)?;
     if info.event {
-        instance.enter_event_mode().expect("a step has told of an event");
+        instance.enter_event_mode().expect("the step has reported an event");
         to_steps(instance);
     }
     Ok(info)

@@ -15,7 +15,6 @@ use runtime::variable::{Causality, Kind, Quantity, Value};
 
 use crate::{Values, everything_is_a_number, set, step, survives_being_saved, to_steps};
 
-/// Number of steps of one run.
 const STEPS: usize = 12;
 /// Longest step, s. The model bounds the work of a step; this limit keeps the fuzzer fast.
 const LONGEST: f64 = 2.0;

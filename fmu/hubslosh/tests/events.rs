@@ -23,7 +23,6 @@ fn reference<V: Version>(name: &str) -> u32 {
     V::reference(scalar(name))
 }
 
-/// Reads one value by the function for its type.
 fn get<V: Version>(instance: &mut Instance<Model, V>, name: &str) -> Value {
     let is_two = V::PREFIX == "fmi2";
     let call = match scalar(name).variable.kind {
@@ -83,7 +82,6 @@ fn initialised<V: Version>(events: Events, values: &[(&str, Value)]) -> Instance
     instance
 }
 
-/// Handles an event through event mode, as hosts do.
 fn handle(instance: &mut Three) {
     if instance.state() == InstanceState::Stepping {
         instance.enter_event_mode().unwrap();
@@ -93,7 +91,6 @@ fn handle(instance: &mut Three) {
     instance.enter_step_mode(&v3::ENTER_STEP).unwrap();
 }
 
-/// Returns the torque of a communication step, N m.
 fn torque(step: usize) -> f64 {
     0.06 * (0.7 * step as f64).sin()
 }

@@ -18,8 +18,8 @@
 //!
 //! A_0, far below the law's range, keeps u away from 0.
 //!
-//! The law is that of plates by Keulegan and Carpenter. It holds if the liquid's stroke at the ring
-//! is 0.64 to 6.4 widths, the ring stays covered (d >= eta) and alpha < 0.25. For smaller waves the
+//! The drag follows the law of Keulegan and Carpenter for plates in oscillating flow. It holds if the liquid's stroke
+//! at the ring is 0.64 to 6.4 widths, the ring stays covered (d >= eta) and alpha < 0.25. For smaller waves the
 //! damping is higher than the law.
 
 use alloc::format;
@@ -116,7 +116,7 @@ pub(crate) fn warnings(p: &Parameters) -> Vec<String> {
     }
     if p.slosh.source == SloshSource::Table {
         warnings.push(
-            "baffle: Miles's formula holds for an upright cylinder. The model takes one of diameter tank.d"
+            "baffle: Miles's formula holds for an upright cylinder. The model computes the damping as in an upright cylinder of the diameter tank.d"
                 .to_string(),
         );
     }

@@ -161,7 +161,6 @@ mod tests {
         assert!(mean(&|k| all[k].0 * all[(k + 1) % COUNT].0).abs() < 0.012);
     }
 
-    /// A Gauss–Markov bias over 10,000 correlation times.
     #[test]
     fn a_gyro_bias_has_the_specified_standard_deviation() {
         let imu = Imu { bias_time: 1.0, arw: 0.0, ..Imu::default() };

@@ -9,8 +9,9 @@
 //! third_order          A above the angle at which the model's frequency is wrong, or above 45 degrees
 //! ```
 //!
-//! w^2 = g/l + k/m is that of mode 1, and sin A = displacement/l. In an upright cylinder the angles follow from the depth and
-//! from the dependence of the model's frequency on the amplitude. A table of modes gives its own angles.
+//! w is the frequency of mode 1, w^2 = g/l + k/m, and A is its slosh angle, sin A = displacement/l. In an upright
+//! cylinder the angles follow from the depth and from the dependence of the model's frequency on the amplitude. A
+//! table of modes gives its own angles.
 
 use formulas::limits::{self, LOW_BOND, LimitedBy, SpinLimit};
 use formulas::third_order;

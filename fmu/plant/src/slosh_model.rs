@@ -1,5 +1,5 @@
-//! The models of the liquid, and what the rest of the plant needs to know about each. The series of their modes are in
-//! `slosh/`.
+//! The slosh models, and the properties of each model that the rest of the plant uses. The series of their modes are
+//! in `slosh/`.
 
 use core::f64::consts::FRAC_PI_2;
 

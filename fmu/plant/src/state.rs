@@ -58,7 +58,8 @@ pub(crate) struct Ranges {
     pub limited_by: LimitedBy,
 }
 
-/// Everything that a saved state of the plant needs besides parameters and inputs.
+/// State of the plant that is saved and restored. Together with parameters and inputs it determines the motion that
+/// follows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct State {
     pub(crate) time: f64,

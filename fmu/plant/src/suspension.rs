@@ -6,7 +6,7 @@
 //!
 //! A stuck hub does not move: the bearing holds the spring's torque, too.
 //!
-//! Source: thesis 8.4.4 names the line; the law is that of a linear torsion spring.
+//! Source: section 8.4.4 of Rubaga's thesis mentions the line; its torque is modelled as a linear torsion spring.
 
 use taylor::number::Number;
 use taylor::series::{constant, number};

@@ -92,7 +92,7 @@ pub(crate) fn problems(p: &Parameters) -> Vec<String> {
     let length = |n: usize| table.pendulum_length(n);
     for n in (0..modes).filter(|n| length(*n).is_nan() || length(*n) <= 0.0) {
         problems.push(format!(
-            "slosh.table.frequency[{0}] = {1} Hz (allowed: above the frequency of slosh.table.k[{0}] = {2} N/m alone)",
+            "slosh.table.frequency[{0}] = {1} Hz (allowed: above the frequency that slosh.table.k[{0}] = {2} N/m causes without gravity)",
             n + 1,
             table.frequency[n],
             table.k[n]
@@ -123,7 +123,7 @@ pub(crate) fn problems(p: &Parameters) -> Vec<String> {
     let least = p.hub.inertia + p.tank.own_inertia + table.least_inertia(modes, p.tank.r);
     if askew.is_some() && slosh.model == SloshModel::Planar && least <= 0.0 {
         problems.push(format!(
-            "slosh.table.direction: hub and liquid have the inertia {least} kg.m2 with the bobs where they are least inert \
+            "slosh.table.direction: hub and liquid have the inertia {least} kg.m2 at the most unfavourable directions of the slosh masses \
              (allowed: greater than 0; hub.I = {} kg.m2)",
             p.hub.inertia
         ));
@@ -184,8 +184,8 @@ pub(crate) fn warnings(p: &Parameters, g: f64) -> Vec<String> {
         _ if slosh.model != SloshModel::Liquid => {}
         SloshSource::Geometry => warnings.extend(third_order_warning(p.tank.h / radius)),
         SloshSource::Table if slosh.third_order(0, 0.0) == (1.0, 1.0) => warnings.push(
-            "slosh.table.nonlinear_inertia[1] and slosh.table.nonlinear_stiffness[1] are 1 with slosh.model = liquid: mode 1 \
-             has the frequency of a pendulum over amplitude, in any tank. Set both to the coefficients of this tank"
+            "slosh.table.nonlinear_inertia[1] and slosh.table.nonlinear_stiffness[1] are 1 with slosh.model = liquid: the \
+             frequency of mode 1 then falls with the amplitude as that of a pendulum, whatever the tank. Set both to the coefficients of this tank"
                 .to_string(),
         ),
         SloshSource::Table => {}
@@ -209,8 +209,8 @@ pub(crate) fn warnings(p: &Parameters, g: f64) -> Vec<String> {
     if geometry && slosh.capillarity && bond < LOW_BOND {
         warnings.push(format!(
             "slosh.capillarity at the Bond number {bond:.3} holds for a flat surface and a free contact \
-             line. For other contact angles set slosh.table.k. Modal masses under a curved meniscus are \
-             unknown"
+             line. For other contact angles set slosh.table.k. The modal masses remain those \
+             of a flat surface, because those of a curved meniscus are unknown"
         ));
     }
     warnings

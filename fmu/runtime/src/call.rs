@@ -210,7 +210,7 @@ impl Call {
         }
         if let Some(other) = foreign {
             return Err(self.error(format_args!(
-                "not allowed in state \"{}\": it belongs to {}, and this instance is for {}",
+                "not allowed in state \"{}\": the function belongs to {}, but this instance is for {}",
                 state.name(),
                 other.name(),
                 interface.name()
@@ -315,8 +315,8 @@ mod tests {
         let fault = Fmi2::DO_STEP.check(ME, ByHost, InstanceState::Event).unwrap_err();
         assert_eq!(
             fault.text,
-            "fmi2DoStep: not allowed in state \"event mode\": it belongs to Co-Simulation, and this \
-             instance is for Model Exchange"
+            "fmi2DoStep: not allowed in state \"event mode\": the function belongs to \
+             Co-Simulation, but this instance is for Model Exchange"
         );
         assert!(Fmi2::SET_TIME.check(CS, InStep, InstanceState::Stepping).is_err());
     }

@@ -1,8 +1,8 @@
-//! Model descriptions with only part of the variables, for hosts that show every variable to the user: only
-//! those for few tanks and modes. The binary is the same.
+//! Reduced model descriptions, which have variables only for a few tanks and modes. They are for hosts that show
+//! every variable to the user. The binary is the same as for the full model description.
 //!
-//! The GUID (in FMI 3.0 the instantiationToken) of a reduced description equals that of the full one except
-//! for the last nine hexadecimal digits, from which the binary learns which states and event indicators the
+//! The GUID (in FMI 3.0 the instantiationToken) of a reduced description equals the GUID of the full description
+//! except for the last nine hexadecimal digits, from which the binary learns which states and event indicators the
 //! host knows:
 //!
 //! ```text
@@ -11,8 +11,8 @@
 //!                                          cccc     checksum of resources/start_values.txt, 0000 without the file
 //! ```
 //!
-//! The file has the start values that differ from those of the table, one line `name = value` for each, in
-//! the order of the table.
+//! The file resources/start_values.txt has the start values that differ from the start values in the table of
+//! variables, one line `name = value` for each, in the order of the table.
 
 use std::path::Path;
 
@@ -27,14 +27,12 @@ pub const START_VALUES: &str = "start_values.txt";
 /// Number of hexadecimal digits of a token that describe the extent.
 const DIGITS: usize = SIZES + 6;
 
-/// Largest number of parameters that size arrays.
 const SIZES: usize = 3;
 
 /// The part of the table that a reduced description contains.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Extent {
     token: String,
-    /// Names and largest values of the parameters that size arrays.
     sizes: Vec<(&'static str, usize)>,
     /// Indices in the model of the continuous states, in the host's order.
     places: Vec<usize>,
@@ -115,7 +113,11 @@ impl Extent {
             ));
         }
         let wrong = |n: usize, line: &str| {
-            format!("{}, line {}: {line:?} is no start value here", file.display(), n + 1)
+            format!(
+                "{}, line {}: {line:?} is not NAME = VALUE with a variable of this FMU, in the order of its table",
+                file.display(),
+                n + 1
+            )
         };
         let mut scalars = M::table().scalars.iter().enumerate();
         for (n, line) in text.lines().enumerate() {

@@ -54,7 +54,6 @@ pub struct Instance<M: Model, V: Version> {
     /// The model. It is created when it is needed for the first time in initialization mode, and dropped when
     /// a parameter or input is set before the simulation starts.
     pub(crate) model: Option<M>,
-    /// The present outputs, if they have been computed.
     pub(crate) outputs: Option<M::Outputs>,
     /// Values of the discrete outputs as the host saw them last in event mode, by slot
     /// ([`Events::Reported`]). Empty until initialization has ended; before that discrete outputs are
@@ -469,8 +468,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Resets all elements of the variables selected by `meant` to their start values. Returns the variables
-    /// of which an element had another value, in the order of the table.
+    /// Resets all elements of the variables selected by `meant` to their start values. Returns the variables that
+    /// have changed, that is, at least one of their elements had another value, in the order of the table.
     pub(crate) fn restart(
         &mut self,
         meant: impl Fn(&Variable<M>) -> bool,
@@ -500,7 +499,8 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Returns true if a discrete value differs from the one that the host sees.
+    /// Returns true if a discrete value in the model differs from the value that the host can read, which changes
+    /// only in event mode.
     fn hides_discrete(&mut self, call: &Call) -> Result<bool, Fault> {
         let outputs = *self.outputs(call)?;
         let mut all = M::table().discrete().zip(&self.shown);
@@ -718,7 +718,7 @@ impl<M: Model, V: Version> Instance<M, V> {
                 (_, Some(place)) => self.scratch[0][place] += d,
                 _ => {
                     return Err(call.error(format_args!(
-                        "{} is not among the knowns: it is neither an input nor a continuous state",
+                        "{} cannot be a known: it is neither an input nor a continuous state",
                         scalar.name()
                     )));
                 }
@@ -750,7 +750,7 @@ impl<M: Model, V: Version> Instance<M, V> {
                     (Access::OfInputs(get), _) => get(self.model(call)?, along, scalar.element)[1],
                     _ => {
                         return Err(call.error(format_args!(
-                            "{} is not computed from states and inputs",
+                            "{} has no derivative, because it is not computed from states and inputs",
                             scalar.name()
                         )));
                     }
@@ -864,8 +864,7 @@ impl<M: Model, V: Version> Instance<M, V> {
                 Value::Real(x) if known.contains(&scalar.variable.causality) => x,
                 _ => {
                     return Err(call.error(format_args!(
-                        "{} is not among the knowns: in initialization mode these are inputs and \
-                         parameters",
+                        "{} cannot be a known in initialization mode (allowed: inputs and parameters)",
                         scalar.name()
                     )));
                 }
@@ -1026,7 +1025,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Gives inputs slopes for the next `h` seconds, at the end of which they have the values `ends`.
+    /// Lets inputs change linearly over the next `h` seconds to the values `ends`.
     pub(crate) fn ramp_to(
         &mut self,
         call: &Call,
@@ -1210,7 +1209,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Reads the continuous states in the host's order, which is that of the derivatives in the model
+    /// Reads the continuous states in the host's order, that is, the order of the derivatives in the model
     /// description. The array must have as many elements as there are states.
     pub fn continuous_states(&mut self, states: &mut [f64]) -> Result<(), Fault> {
         let call = self.check(V::GET_CONTINUOUS_STATES)?;
@@ -1306,14 +1305,14 @@ impl<M: Model, V: Version> Instance<M, V> {
         let call = self.check(V::SET_STATE)?;
         if saved.interface != self.interface {
             return Err(call.error(format_args!(
-                "the state is of an instance for {}, and this one is for {}",
+                "the saved state belongs to an instance for {}, but this instance is for {}",
                 saved.interface.name(),
                 self.interface.name()
             )));
         }
         if saved.events != self.events {
             return Err(call.error(
-                "the saved state is of an instance with another value of eventModeUsed (allowed: an instance with the same value)",
+                "the saved state belongs to an instance with another value of eventModeUsed (allowed: states of instances with the same value)",
             ));
         }
         self.check_layout(call, saved)?;
@@ -1325,12 +1324,12 @@ impl<M: Model, V: Version> Instance<M, V> {
     pub(crate) fn check_layout(&self, call: &Call, saved: &Self) -> Result<(), Fault> {
         if saved.layout != self.layout {
             return Err(call.error(
-                "the state was saved by another FMU 3.0 with the same binary: its variables are scalars where those of this FMU are arrays, or the reverse",
+                "the state was saved by an FMU with the same binary but another model description: one of the two FMUs has array variables, the other has only scalars (allowed: states saved by this FMU)",
             ));
         }
         if saved.token() != self.token() {
             return Err(call.error(format_args!(
-                "the state is of an FMU with another part of the variables, {}; this one is {}",
+                "the state was saved by an FMU whose model description has other variables: its GUID is {}, the GUID of this FMU is {} (allowed: states saved by this FMU)",
                 saved.token(),
                 self.token()
             )));
@@ -1338,7 +1337,6 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Returns the model, and creates it if necessary.
     #[inline]
     fn model(&mut self, call: &Call) -> Result<&mut M, Fault> {
         if self.model.is_none() {
@@ -1391,7 +1389,6 @@ impl<M: Model, V: Version> Instance<M, V> {
         parameters
     }
 
-    /// Returns the present outputs, and computes them if necessary.
     #[inline(always)]
     fn outputs(&mut self, call: &Call) -> Result<&M::Outputs, Fault> {
         if self.outputs.is_none() {
@@ -1477,7 +1474,7 @@ fn not_finite<M: Model>(call: &Call, scalar: &Scalar<M>, x: f64) -> Fault {
     let known: Vec<String> = scalar.depends_on().take(6).map(Scalar::name).collect();
     let more = if scalar.depends_on().count() > known.len() { ", ..." } else { "" };
     call.error(format_args!(
-        "{} = {}: what it is computed from is too large ({}{more}). Check initial values, inputs and parameters; in Model \
+        "{} = {}: the values that it is computed from are too large ({}{more}). Check initial values, inputs and parameters; in Model \
          Exchange take shorter steps",
         scalar.name(),
         text(x),

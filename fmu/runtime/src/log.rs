@@ -31,7 +31,6 @@ pub struct Category {
     pub topic: Option<Topic>,
 }
 
-/// Names of the categories in the standard, with their topics.
 const NAMES: [(&str, Option<Topic>); 6] = [
     ("logEvents", Some(Topic::Event)),
     ("logStatusWarning", Some(Topic::Warning)),
@@ -50,7 +49,8 @@ pub fn categories<M: Model, V: Version>(table: &Table<M>) -> Vec<Category> {
     let description = |topic| match topic {
         Some(Topic::Event) => table.about.events.into(),
         Some(Topic::Warning) => {
-            "What the parameters leave of the range in which the model is known".into()
+            "Warnings about parameters and inputs, such as values for which the model is not valid"
+                .into()
         }
         Some(Topic::Failure(severity)) => {
             format!("Why a call returned {}{severity:?}", V::PREFIX)

@@ -117,11 +117,13 @@ pub fn from_bytes<M: Model, V: Version>(bytes: &[u8]) -> Result<Instance<M, V>, 
     }
     let format = u32::from_le_bytes(rest.take()?);
     if format != FORMAT {
-        return Err(format!("the saved state has format {format}; known: {FORMAT}"));
+        return Err(format!(
+            "the saved state has format {format}, but this FMU reads only format {FORMAT}"
+        ));
     }
     let length = u32::from_le_bytes(rest.take()?) as usize;
     if length != bytes.len() {
-        return Err(format!("the saved state should have {length} bytes, not {}", bytes.len()));
+        return Err(format!("the saved state should have {length} bytes but has {}", bytes.len()));
     }
     let guid = rest.take::<38>()?;
     let of = |layout: &Layout| guid == V::token::<M>(*layout).as_bytes();
@@ -134,11 +136,13 @@ pub fn from_bytes<M: Model, V: Version>(bytes: &[u8]) -> Result<Instance<M, V>, 
     let Some(layout) = layout.or(extent.is_some().then_some(Layout::Scalars)) else {
         let guid = text;
         return Err(format!(
-            "the saved state is of another FMU or of another version of {model}, {guid}"
+            "the saved state belongs to another FMU, or another version of {model}, with the GUID {guid}"
         ));
     };
     if length != size {
-        return Err(format!("a saved state has {size} bytes, not {length}"));
+        return Err(format!(
+            "saved states of this FMU have {size} bytes, but this one has {length}"
+        ));
     }
     let (body, checksum) = bytes.split_at(length - 16);
     if Hash::new().bytes(body).value().to_le_bytes() != checksum {

@@ -452,7 +452,6 @@ mod tests {
         assert_ne!(of(other.leak()), guid);
     }
 
-    /// For example `a.b[1]` to `a.b[3]`.
     #[test]
     fn array_elements_are_named_with_their_indices_in_brackets() {
         let scalar = Spring::table().variables[0];

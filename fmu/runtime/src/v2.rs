@@ -217,7 +217,6 @@ pub struct fmi2EventInfo {
 
 // ---- What the functions do ----
 
-/// Creates an instance, or logs the reason and returns NULL.
 unsafe fn instantiate<M: Model>(
     (name, kind): (fmi2String, fmi2Type),
     (guid, resources): (fmi2String, fmi2String),
@@ -429,7 +428,6 @@ fn fmi2GetDirectionalDerivative(c: fmi2Component, vUnknown_ref: *const fmi2Value
 
 // ---- Saved states ----
 
-/// Saves the state into the existing handle, or into a new one if it is NULL.
 fn fmi2GetFMUstate(c: fmi2Component, FMUstate: *mut fmi2FMUstate) -> fmi2Status =
     perform_if_allowed::<M, Fmi2>(c, &GET_STATE, |component| save_state(&GET_STATE, "FMUstate", FMUstate, &component.instance));
 /// Restores a saved state of this or another instance, in any instance state.
@@ -437,7 +435,6 @@ fn fmi2SetFMUstate(c: fmi2Component, FMUstate: fmi2FMUstate) -> fmi2Status =
     perform_if_allowed::<M, Fmi2>(c, Fmi2::SET_STATE, |component| {
         component.instance.restore(saved_state(Fmi2::SET_STATE, "FMUstate", FMUstate)?)
     });
-/// Frees a saved state and sets the handle to NULL; NULL is allowed.
 fn fmi2FreeFMUstate(c: fmi2Component, FMUstate: *mut fmi2FMUstate) -> fmi2Status =
     perform::<M, Fmi2>(c, &FREE_STATE, |_| free_state::<M, Fmi2>(&FREE_STATE, "FMUstate", FMUstate));
 fn fmi2SerializedFMUstateSize(c: fmi2Component, FMUstate: fmi2FMUstate, size: *mut usize) -> fmi2Status =
@@ -502,7 +499,6 @@ fn fmi2GetNominalsOfContinuousStates(c: fmi2Component, x_nominal: *mut fmi2Real,
 
 // ---- Co-Simulation ----
 
-/// Sets the slopes of inputs for the next step.
 fn fmi2SetRealInputDerivatives(c: fmi2Component, vr: *const fmi2ValueReference, nvr: usize, order: *const fmi2Integer, value: *const fmi2Real) -> fmi2Status = {
     let call = Fmi2::SET_INPUT_DERIVATIVES;
     perform_if_allowed::<M, Fmi2>(c, call, |component| {
@@ -545,7 +541,6 @@ fn fmi2GetStatus(c: fmi2Component, s: fmi2StatusKind, value: *mut fmi2Status) ->
         let ended = if instance.state() == InstanceState::Failed { fmi2Error } else { fmi2OK };
         (s == fmi2DoStepStatus).then_some(ended)
     });
-/// Returns the time that the last step reached.
 fn fmi2GetRealStatus(c: fmi2Component, s: fmi2StatusKind, value: *mut fmi2Real) -> fmi2Status =
     write_step_status::<M, _>(c, &GET_REAL_STATUS, s, value, |instance| {
         (s == fmi2LastSuccessfulTime).then_some(instance.time())

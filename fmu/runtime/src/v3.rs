@@ -191,7 +191,6 @@ fn fmi3GetVariableDependencies(instance: fmi3Instance, dependent: fmi3ValueRefer
     let (to, from) = ((elementIndicesOfDependent, independents), (elementIndicesOfIndependents, dependencyKinds));
     write_dependencies::<M>(instance, dependent, to, from, nDependencies)
 };
-/// Saves the state into the existing handle, or into a new one if it is NULL.
 fn fmi3GetFMUState(instance: fmi3Instance, FMUState: *mut fmi3FMUState) -> fmi3Status =
     perform_if_allowed::<M, Fmi3>(instance, &GET_STATE, |component| save_state(&GET_STATE, "FMUState", FMUState, &component.instance));
 /// Restores a saved state of this or another instance, in any instance state.
@@ -201,7 +200,6 @@ fn fmi3SetFMUState(instance: fmi3Instance, FMUState: fmi3FMUState) -> fmi3Status
         resize(component);
         Ok(())
     });
-/// Frees a saved state and sets the handle to NULL; NULL is allowed.
 fn fmi3FreeFMUState(instance: fmi3Instance, FMUState: *mut fmi3FMUState) -> fmi3Status =
     perform::<M, Fmi3>(instance, &FREE_STATE, |_| free_state::<M, Fmi3>(&FREE_STATE, "FMUState", FMUState));
 fn fmi3SerializedFMUStateSize(instance: fmi3Instance, FMUState: fmi3FMUState, size: *mut usize) -> fmi3Status =

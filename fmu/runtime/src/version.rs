@@ -10,7 +10,6 @@ use crate::table::{Layout, Scalar};
 /// version has several of them.
 #[allow(missing_docs)]
 pub trait Version: std::fmt::Debug + 'static {
-    /// Prefix of the names of functions and types.
     const PREFIX: &'static str;
 
     /// Data about the host, other than the logger, that an instance needs.

@@ -34,7 +34,7 @@ impl core::fmt::Display for StepError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
             StepError::Length { h } => {
-                write!(f, "the step has the length {h} s (allowed: a finite length above 0)")
+                write!(f, "the length of the step is {h} s (allowed: a finite length above 0)")
             }
             StepError::NotFinite { time } => write!(
                 f,

@@ -50,7 +50,6 @@ struct Balance {
     angular: [f64; 3],
     /// Scales of P, H, E.
     scale: [f64; 3],
-    /// Largest residuals.
     worst: [f64; 3],
 }
 

@@ -27,7 +27,7 @@ fn craft() -> Parameters {
 }
 
 /// Returns a random craft with two tanks that stand neither on the axis nor along it.
-pub(super) fn askew(random: &mut Random) -> Parameters {
+pub(super) fn off_axis_craft(random: &mut Random) -> Parameters {
     let mut p = Parameters { tanks: 2, ..random.parameters() };
     p.mount = Mount::Free;
     for i in 0..2 {
@@ -45,7 +45,6 @@ pub(super) fn askew(random: &mut Random) -> Parameters {
     p
 }
 
-/// Returns the same craft with changed states of the liquid.
 pub(super) fn with_states(
     craft: &Spacecraft,
     change: impl Fn(&mut [f64; STATES]),
@@ -256,7 +255,7 @@ fn momentum_is_exact_and_energy_never_grows_over_300_s_in_six_axes() {
     let mut seen = [0; 6];
     for seed in 0..11 {
         let mut random = Random::new(seed);
-        let mut p = askew(&mut random);
+        let mut p = off_axis_craft(&mut random);
         if seed >= 8 {
             random.flex(&mut p);
         }
@@ -297,7 +296,7 @@ fn momentum_is_exact_and_energy_never_grows_over_300_s_in_six_axes() {
 #[test]
 fn results_do_not_depend_on_the_communication_step() {
     for seed in 0..6 {
-        let p = askew(&mut Random::new(seed));
+        let p = off_axis_craft(&mut Random::new(seed));
         let mut random = Random::new(seed + 200);
         let pieces: Vec<Inputs> = (0..6)
             .map(|_| {
@@ -365,7 +364,7 @@ fn detached(seed: u64, tolerance: f64, step: f64, shift: f64) -> Vec<f64> {
 }
 
 /// Returns the largest difference of a value, m, rad, m/s or rad/s.
-fn apart(a: &[f64], b: &[f64]) -> f64 {
+fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
@@ -375,11 +374,11 @@ fn move_alike(seeds: impl Iterator<Item = u64>) {
     let mut worst: (f64, u64, f64) = (0.0, 0, 0.0);
     for seed in seeds {
         let run = |tolerance, step, shift| detached(seed, tolerance, step, shift);
-        let near = apart(&run(1e-12, 1e-2, 1e-9), &run(1e-12, 1e-2, 0.0)) / 1e-9;
+        let near = largest_difference(&run(1e-12, 1e-2, 1e-9), &run(1e-12, 1e-2, 0.0)) / 1e-9;
         for tolerance in [1e-6, 1e-9, 1e-12] {
             let short = run(tolerance, 1e-2, 0.0);
             for step in [0.5, 1.0, 2.0] {
-                let off = apart(&run(tolerance, step, 0.0), &short);
+                let off = largest_difference(&run(tolerance, step, 0.0), &short);
                 // Rounding.
                 let allowed = (0.1 * tolerance + 1e-12) * near.max(1.0);
                 assert!(off < allowed, "{seed} {tolerance:e} {step} s: {off:e} of {allowed:e}");
@@ -538,7 +537,7 @@ fn newton(p: &Parameters, x: &[f64; STATES], u: &Inputs, slides: &[bool]) -> Rat
 
 /// Returns a craft with two lumps anywhere within their walls; the second or both are on them.
 fn loose(random: &mut Random, slides: [bool; 2]) -> (Parameters, Spacecraft) {
-    let p = askew(random);
+    let p = off_axis_craft(random);
     let mut craft = Spacecraft::new(&p, &Inputs::default(), 0.0, 1e-12).unwrap();
     let numbers: [[f64; 6]; 2] = [0, 1].map(|i| {
         let (height, semi, _) = wall(&p, i);
@@ -655,7 +654,7 @@ struct Simulator {
 }
 
 impl Simulator {
-    fn moved(&self, s: &Pair, h: f64) -> Pair {
+    fn state_after(&self, s: &Pair, h: f64) -> Pair {
         let inverse = self.inertia.try_inverse().unwrap();
         let arm = v(&self.p.craft.r);
         // [velocity, acceleration, q', w'] at an instant.
@@ -722,7 +721,7 @@ impl Simulator {
 fn an_independent_simulator_has_the_same_flight_and_the_same_impacts() {
     for seed in 0..5 {
         let mut random = Random::new(seed);
-        let mut p = askew(&mut random);
+        let mut p = off_axis_craft(&mut random);
         p.tanks = 1;
         // A sphere: impacts on narrower walls multiply what rounding has made some hundred times each.
         (p.tank[0].ball.travel, p.tank[0].ball.radius) = (1.0, 0.5);
@@ -763,7 +762,7 @@ fn an_independent_simulator_has_the_same_flight_and_the_same_impacts() {
         for k in 1..=12_000 {
             let end = k as f64 * step;
             while t < end {
-                let next = simulator.moved(&s, end - t);
+                let next = simulator.state_after(&s, end - t);
                 // The liquid starts at the wall.
                 if k < 10 || simulator.inside(&next) > 0.0 {
                     (s, t) = (next, end);
@@ -772,10 +771,10 @@ fn an_independent_simulator_has_the_same_flight_and_the_same_impacts() {
                 let (mut low, mut high) = (0.0, end - t);
                 for _ in 0..45 {
                     let middle = (low + high) / 2.0;
-                    let outside = simulator.inside(&simulator.moved(&s, middle)) <= 0.0;
+                    let outside = simulator.inside(&simulator.state_after(&s, middle)) <= 0.0;
                     if outside { high = middle } else { low = middle }
                 }
-                s = simulator.moved(&s, low);
+                s = simulator.state_after(&s, low);
                 t += low;
                 simulator.impact(&mut s, 0.9);
                 impacts += 1;
@@ -803,7 +802,7 @@ fn detachment_and_settling_keep_momenta_and_the_centre_of_mass_and_dissipate_ene
     let mut settled = 0;
     for seed in 0..10 {
         let mut random = Random::new(seed);
-        let mut p = askew(&mut random);
+        let mut p = off_axis_craft(&mut random);
         for tank in &mut p.tank[..2] {
             tank.p_dot_0 = [random.vector(0.3); craft::MODES];
             (tank.k, tank.ball.travel) = ([0.0; craft::MODES], 1.0);
@@ -856,7 +855,7 @@ fn detachment_and_settling_keep_momenta_and_the_centre_of_mass_and_dissipate_ene
 /// A craft with detached liquid is saved before each of 40 steps; the restored craft takes the step to an equal state.
 #[test]
 fn a_saved_state_of_detached_liquid_continues_bit_for_bit() {
-    let p = askew(&mut Random::new(3));
+    let p = off_axis_craft(&mut Random::new(3));
     let u = thrust(-0.2 * p.craft.mass);
     let mut craft = Spacecraft::new(&p, &u, 0.0, 1e-8).unwrap();
     for k in 0..40 {
@@ -898,17 +897,18 @@ fn a_model_exchange_host_finds_the_impacts_and_settling_times_of_co_simulation()
         host.event_indicators(u, &mut z);
         z
     };
-    let moved = |host: &mut Spacecraft, u: &Inputs, x: &[f64; STATES], h: f64| -> [f64; STATES] {
-        let mut rates = |d: &[f64; STATES], h: f64| {
-            host.set_continuous_states(&std::array::from_fn(|i| x[i] + h * d[i]));
-            host.derivatives(u)
+    let state_after =
+        |host: &mut Spacecraft, u: &Inputs, x: &[f64; STATES], h: f64| -> [f64; STATES] {
+            let mut rates = |d: &[f64; STATES], h: f64| {
+                host.set_continuous_states(&std::array::from_fn(|i| x[i] + h * d[i]));
+                host.derivatives(u)
+            };
+            let k1 = rates(&[0.0; STATES], 0.0);
+            let k2 = rates(&k1, h / 2.0);
+            let k3 = rates(&k2, h / 2.0);
+            let k4 = rates(&k3, h);
+            std::array::from_fn(|i| x[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]))
         };
-        let k1 = rates(&[0.0; STATES], 0.0);
-        let k2 = rates(&k1, h / 2.0);
-        let k3 = rates(&k2, h / 2.0);
-        let k4 = rates(&k3, h);
-        std::array::from_fn(|i| x[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]))
-    };
     for (u, steps) in [(&back, 7_000), (&forward, 12_000)] {
         host.set_continuous_states(&x);
         host.take_event(u).unwrap();
@@ -917,7 +917,7 @@ fn a_model_exchange_host_finds_the_impacts_and_settling_times_of_co_simulation()
             let mut left = step;
             while left > 0.0 {
                 let before = indicators(&mut host, u, &x);
-                let next = moved(&mut host, u, &x, left);
+                let next = state_after(&mut host, u, &x, left);
                 let after = indicators(&mut host, u, &next);
                 let crossed = |after: &[f64; 2 * TANKS]| {
                     before.iter().zip(after).any(|(a, b)| (*a > 0.0) != (*b > 0.0))
@@ -929,11 +929,11 @@ fn a_model_exchange_host_finds_the_impacts_and_settling_times_of_co_simulation()
                 let (mut low, mut high) = (0.0, left);
                 for _ in 0..50 {
                     let middle = (low + high) / 2.0;
-                    let there = moved(&mut host, u, &x, middle);
+                    let there = state_after(&mut host, u, &x, middle);
                     let z = indicators(&mut host, u, &there);
                     if crossed(&z) { high = middle } else { low = middle }
                 }
-                x = moved(&mut host, u, &x, high);
+                x = state_after(&mut host, u, &x, high);
                 host.set_continuous_states(&x);
                 host.take_event(u).unwrap();
                 x = host.continuous_states();

@@ -9,7 +9,7 @@ use craft::{
 };
 use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion};
 
-use super::ball::{V, askew, rotation, thrust, v, with_states};
+use super::ball::{V, off_axis_craft, rotation, thrust, v, with_states};
 use super::equations::output_slopes;
 use super::random::Random;
 
@@ -117,8 +117,7 @@ impl Craft {
         (self.taken, self.impulses) = (impulse, self.impulses + 1);
     }
 
-    /// Returns the outputs of a Spacecraft in the same state.
-    pub(super) fn shown(&self, u: &Inputs) -> Outputs {
+    pub(super) fn spacecraft_outputs(&self, u: &Inputs) -> Outputs {
         let spacecraft = Spacecraft::new(&self.p, u, 0.0, 1e-12).unwrap();
         let tank = self.tank.continuous_states();
         let Host { q, w, r, velocity, work } = self.host;
@@ -180,7 +179,7 @@ impl Craft {
         rate
     }
 
-    fn moved(&mut self, u: &Inputs, x: &[f64], h: f64) -> Vec<f64> {
+    fn state_after(&mut self, u: &Inputs, x: &[f64], h: f64) -> Vec<f64> {
         runge_kutta(x, h, |_, x| self.rates(u, x))
     }
 
@@ -218,7 +217,7 @@ impl Craft {
         while left > 0.0 {
             let x = self.pack();
             let before = self.indicators(u, &x);
-            let next = self.moved(u, &x, left);
+            let next = self.state_after(u, &x, left);
             if self.indicators(u, &next) == before {
                 self.unpack(&next);
                 return;
@@ -226,10 +225,10 @@ impl Craft {
             let (mut low, mut high) = (0.0, left);
             for _ in 0..45 {
                 let middle = (low + high) / 2.0;
-                let there = self.moved(u, &x, middle);
+                let there = self.state_after(u, &x, middle);
                 if self.indicators(u, &there) == before { low = middle } else { high = middle }
             }
-            let there = self.moved(u, &x, high);
+            let there = self.state_after(u, &x, high);
             self.unpack(&there);
             self.event(u);
             left -= high;
@@ -280,7 +279,6 @@ impl Craft {
     }
 }
 
-/// Returns the derivatives of attitude, rate, position, velocity and work.
 fn host_rates(u: &Inputs, y: &[f64], acceleration: &Six) -> Vec<f64> {
     let (q, w) = (&y[..4], v(&y[4..]));
     let axes = rotation(q);
@@ -308,9 +306,9 @@ fn runge_kutta(x: &[f64], h: f64, mut rates: impl FnMut(f64, &[f64]) -> Vec<f64>
     (0..x.len()).map(|i| x[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i])).collect()
 }
 
-/// Returns a craft with one tank that stands askew, whose bobs' drag does not depend on the acceleration.
+/// Returns a craft with one tank that stands off_axis_craft, whose bobs' drag does not depend on the acceleration.
 fn one(random: &mut Random) -> Parameters {
-    let mut p = Parameters { tanks: 1, ..askew(random) };
+    let mut p = Parameters { tanks: 1, ..off_axis_craft(random) };
     let tank = &mut p.tank[0];
     (tank.damping_law, tank.zeta_amplitude) = (craft::DampingLaw::Constant, [0.0; craft::MODES]);
     tank.k = [0.0; craft::MODES];
@@ -337,7 +335,7 @@ fn a_host_that_integrates_slosh_tank_moves_as_spacecraft_and_keeps_momenta_and_e
         let mut has_settled = false;
         for (u, steps) in [(&back, 1_000), (&Inputs::default(), 5_000), (&forward, 16_000)] {
             craft.event(u);
-            let start = craft.shown(u);
+            let start = craft.spacecraft_outputs(u);
             let mut dissipated = start.dissipated;
             for k in 0..steps {
                 let before = craft.ball();
@@ -347,7 +345,7 @@ fn a_host_that_integrates_slosh_tank_moves_as_spacecraft_and_keeps_momenta_and_e
                 if k % 10 > 0 && before == craft.ball() {
                     continue;
                 }
-                let now = craft.shown(u);
+                let now = craft.spacecraft_outputs(u);
                 // Rounding of a difference of energies of 1e3 J.
                 assert!(now.dissipated >= dissipated - 1e-10, "{seed} {}", now.dissipated);
                 dissipated = now.dissipated;
@@ -365,7 +363,7 @@ fn a_host_that_integrates_slosh_tank_moves_as_spacecraft_and_keeps_momenta_and_e
             }
             own.step(u, 1e-3 * steps as f64).unwrap();
         }
-        let (want, got) = (own.outputs(&forward), craft.shown(&forward));
+        let (want, got) = (own.outputs(&forward), craft.spacecraft_outputs(&forward));
         assert_eq!(want.tank[0].ball_state, got.tank[0].ball_state, "{seed}");
         let errors = [
             off(want.omega, got.omega),
@@ -405,7 +403,7 @@ fn on_the_axis_the_host_s_velocity_is_exact_for_any_communication_step() {
             own.step(&u, h).unwrap();
             craft.exchange(&u, h);
             gained += force * h;
-            let (want, got) = (own.outputs(&u), craft.shown(&u));
+            let (want, got) = (own.outputs(&u), craft.spacecraft_outputs(&u));
             seen[craft.ball() as usize] += 1;
             assert_eq!(want.tank[0].ball_state, got.tank[0].ball_state, "{h} {k}");
             let momentum = got.momentum[2] - gained;
@@ -424,7 +422,7 @@ fn on_the_axis_the_host_s_velocity_is_exact_for_any_communication_step() {
     }
 }
 
-/// Six tanks that stand askew fly with thrust backwards, then forwards. The host takes each step first, and host and tank
+/// Six tanks that stand off_axis_craft fly with thrust backwards, then forwards. The host takes each step first, and host and tank
 /// exchange values that are linear over the step. The errors of rates, lump and dissipated energy are of second order in the
 /// communication step. The errors of attitude and position, and of the momentum's direction, which depends on the attitude, are
 /// of first order, because they lag behind the impulses within a step.
@@ -441,7 +439,7 @@ fn a_host_that_exchanges_at_communication_points_converges_to_the_spacecraft_s_m
                 own.step(u, seconds as f64).unwrap();
                 (0..seconds * steps).for_each(|_| craft.exchange(u, 1.0 / steps as f64));
             }
-            let (want, got) = (own.outputs(&forward), craft.shown(&forward));
+            let (want, got) = (own.outputs(&forward), craft.spacecraft_outputs(&forward));
             let speed = v(&want.velocity).norm();
             for (sum, error) in sum.iter_mut().zip([
                 off(want.omega, got.omega) / v(&want.omega).norm(),

@@ -20,7 +20,6 @@ struct Row {
 }
 
 impl Row {
-    /// Specific force from `t` on.
     fn force(&self, t: f64) -> Ramp {
         let slope = (self.along[1] - self.along[0]) / self.h;
         let [x, y] = self.across;
@@ -120,7 +119,7 @@ fn drain(r: &mut Random, p: &mut Parameters) {
 }
 
 /// Puts a craft on a pivot with dry friction from sharp to wide corners.
-fn hold(r: &mut Random, p: &mut Parameters) {
+fn put_on_pivot(r: &mut Random, p: &mut Parameters) {
     (p.mount, p.pivot) = (Mount::Pivot, r.pivot());
     (p.init.position, p.init.velocity) = ([0.0; 3], [0.0; 3]);
     (p.pivot.friction.omega_s, p.pivot.friction.eps) =
@@ -256,7 +255,7 @@ fn craft_on_a_pivot_of(seed: u64, way: Way) -> Vec<f64> {
     if r.below(3) == 0 {
         r.make_all_planar(&mut p);
     }
-    hold(&mut r, &mut p);
+    put_on_pivot(&mut r, &mut p);
     craft_states(&p, &table(&mut r), way)
 }
 
@@ -281,7 +280,7 @@ fn draining_craft_of(seed: u64, way: Way) -> Vec<f64> {
     let mut p = parameters(&mut r);
     drain(&mut r, &mut p);
     if r.below(3) == 0 {
-        hold(&mut r, &mut p);
+        put_on_pivot(&mut r, &mut p);
     }
     craft_states(&p, &table_with_flows(&mut r), way)
 }

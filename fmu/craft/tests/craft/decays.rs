@@ -83,7 +83,6 @@ fn damping_of_decays_follows_the_frequency_down_to_a_millionth_of_a_metre_per_se
 /// Steepness of the first mode in a cylinder per slosh angle: k = xi/R, elevation 2 R/(xi^2 - 1).
 const STEEPNESS: f64 = 2.0 * 1.841183781340659 / (1.841183781340659 * 1.841183781340659 - 1.0);
 
-/// Returns max(0, x) with its corner rounded over 0.02.
 fn rounded(x: f64) -> f64 {
     (x + x.hypot(0.02)) / 2.0
 }

@@ -425,7 +425,7 @@ fn tank_alone(seed: u64, coupling: Coupling) -> (TankParameters, TankInputs) {
     (p, TankInputs { a, omega, omega_dot, mass_flow })
 }
 
-fn later(u: &TankInputs, t: f64) -> TankInputs {
+fn inputs_after(u: &TankInputs, t: f64) -> TankInputs {
     let at = |ramp: &Ramp| Ramp { value: ramp.value_at(t), slope: ramp.slope };
     let turned =
         [0, 1, 2].map(|i| u.omega[i] + (u.omega_dot.value[i] + u.omega_dot.slope[i] * t / 2.0) * t);
@@ -451,16 +451,16 @@ fn the_force_of_a_draining_tank_follows_newtons_law() {
         let mut shown = Vec::new();
         for k in 0..7 {
             if k > 0 {
-                tank.step(&later(&u, (k - 1) as f64 * e), e).unwrap();
+                tank.step(&inputs_after(&u, (k - 1) as f64 * e), e).unwrap();
             }
-            shown.push(tank.outputs(&later(&u, k as f64 * e)));
+            shown.push(tank.outputs(&inputs_after(&u, k as f64 * e)));
         }
         let s = |k: usize| v(&shown[k].center_of_mass) * shown[k].mass;
         let pair = |k: usize| (s(3 + k) + s(3 - k), s(3 + k) - s(3 - k));
         let [(a1, d1), (a2, d2), (a3, d3)] = [pair(1), pair(2), pair(3)];
         let s_d = (d1 * 45.0 - d2 * 9.0 + d3) / (60.0 * e);
         let s_dd = (a1 * 270.0 - a2 * 27.0 + a3 * 2.0 - s(3) * 490.0) / (180.0 * e * e);
-        let now = later(&u, 3.0 * e);
+        let now = inputs_after(&u, 3.0 * e);
         let outlet = v(&p.tank.position) + attitude(&p.tank.q) * V::new(0.0, 0.0, p.tank.outlet);
         let (a, w, w_d) = (v(&now.a.value), v(&now.omega), v(&now.omega_dot.value));
         let (flow, out) = (now.mass_flow, &shown[3]);
@@ -497,7 +497,7 @@ fn draining_tanks_on_a_rigid_body_move_as_spacecraft() {
         let w = v(&out.omega);
         // The dry craft: (M + sum of M_a) [a; w'] = rest + sum of bias.
         let dry = Rigid::new(p.craft.mass, &p.craft.r, &p.craft.j.matrix());
-        let [centrifugal, gyroscopic] = dry.turning(w);
+        let [centrifugal, gyroscopic] = dry.gyroscopic_terms(w);
         let h = v(&u.h_wheels.value);
         let force = v(&u.force.value) - centrifugal;
         let torque = v(&u.torque.value) - gyroscopic - w.cross(&h);
@@ -574,7 +574,7 @@ impl Rigid {
     }
 
     /// Returns w x (w x S) and w x (I w).
-    fn turning(&self, w: V) -> [V; 2] {
+    fn gyroscopic_terms(&self, w: V) -> [V; 2] {
         [w.cross(&w.cross(&self.moment)), w.cross(&(self.inertia * w))]
     }
 }
@@ -589,7 +589,7 @@ fn force_and_torque_of_a_draining_tank_equal_bias_minus_added_mass_times_acceler
             let mut tank = SloshTank::new(&p, &u, 0.0, 1e-9).unwrap();
             let start = tank.outputs(&u);
             tank.step(&u, 1.5).unwrap();
-            let u = later(&u, 1.5);
+            let u = inputs_after(&u, 1.5);
             let out = tank.outputs(&u);
             let mut m = Matrix6::zeros();
             let places = (0..6).flat_map(|i| (i..6).map(move |j| (i, j)));
@@ -619,9 +619,9 @@ fn a_tank_s_outflow_is_the_integral_of_the_flow_for_any_communication_step() {
     let ends = [5.0, 0.5, 0.1, 0.02].map(|h| {
         let mut tank = SloshTank::new(&p, &u, 0.0, 1e-12).unwrap();
         for k in 0..(5.0_f64 / h).round() as usize {
-            tank.step(&later(&u, k as f64 * h), h).unwrap();
+            tank.step(&inputs_after(&u, k as f64 * h), h).unwrap();
         }
-        tank.outputs(&later(&u, 5.0))
+        tank.outputs(&inputs_after(&u, 5.0))
     });
     let left = p.tank.liquid_0 - u.mass_flow.integral(5.0);
     for out in &ends {

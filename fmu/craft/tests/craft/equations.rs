@@ -12,7 +12,7 @@ fn ramps(u: &Inputs) -> [Ramp; 3] {
 }
 
 /// Returns the inputs moved by s along du; their slopes stay as they are.
-fn moved(u: &Inputs, du: &[f64; INPUTS], s: f64) -> Inputs {
+fn inputs_along(u: &Inputs, du: &[f64; INPUTS], s: f64) -> Inputs {
     let [force, torque, h_wheels] = ramps(u);
     let by = |ramp: Ramp, at: usize| Ramp {
         value: [0, 1, 2].map(|i| ramp.value[i] + s * du[at + i]),
@@ -26,8 +26,7 @@ fn moved(u: &Inputs, du: &[f64; INPUTS], s: f64) -> Inputs {
     }
 }
 
-/// Returns all outputs as one list.
-fn flat(out: &Outputs) -> Vec<f64> {
+fn to_list(out: &Outputs) -> Vec<f64> {
     let mut all = vec![out.energy, out.work, out.dissipated, out.mass];
     all.extend(out.q);
     let vectors = [
@@ -137,19 +136,19 @@ fn directional_derivatives_equal_finite_differences() {
         let at = |s: f64, f: &dyn Fn(&mut Spacecraft, &Inputs) -> Vec<f64>| {
             let mut craft = craft.clone();
             craft.set_continuous_states(&std::array::from_fn(|i| x[i] + s * dx[i]));
-            f(&mut craft, &moved(&u, &du, s))
+            f(&mut craft, &inputs_along(&u, &du, s))
         };
         let rates = |craft: &mut Spacecraft, u: &Inputs| craft.derivatives(u).to_vec();
-        let outputs = |craft: &mut Spacecraft, u: &Inputs| flat(&craft.outputs_held(u));
+        let outputs = |craft: &mut Spacecraft, u: &Inputs| to_list(&craft.outputs_held(u));
         let rates_by_differences = difference(|s| at(s, &rates));
         let outputs_by_differences = difference(|s| at(s, &outputs));
-        let now = [craft.derivatives(&u).to_vec(), flat(&craft.outputs_held(&u))];
+        let now = [craft.derivatives(&u).to_vec(), to_list(&craft.outputs_held(&u))];
         let exact = craft.directional_derivative(&u, &dx, &du);
         assert_same(&exact, &rates_by_differences, &now[0], &format!("{seed} rate"));
-        let exact = flat(&craft.output_derivatives(&u, &dx, &du));
+        let exact = to_list(&craft.output_derivatives(&u, &dx, &du));
         assert_same(&exact, &outputs_by_differences, &now[1], &format!("{seed} output"));
         assert_eq!(craft.continuous_states(), x, "nothing has moved");
-        assert_eq!(flat(&craft.outputs_held(&u)), now[1]);
+        assert_eq!(to_list(&craft.outputs_held(&u)), now[1]);
     }
 }
 

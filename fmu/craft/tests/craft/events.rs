@@ -8,7 +8,7 @@
 use craft::{BallState, Inputs, Parameters, Ramp, Spacecraft, State, TANKS, index};
 use nalgebra::{DMatrix, DVector, Matrix3, Quaternion, UnitQuaternion};
 
-use super::ball::{V, askew, rotation, shape, thrust, v, wall};
+use super::ball::{V, off_axis_craft, rotation, shape, thrust, v, wall};
 use super::ball_on_host::Craft;
 use super::random::Random;
 
@@ -47,7 +47,7 @@ impl Case {
 /// off its bottom.
 fn case(seed: u64) -> Case {
     let mut random = Random::new(seed);
-    let mut p = Parameters { tanks: 1, ..askew(&mut random) };
+    let mut p = Parameters { tanks: 1, ..off_axis_craft(&mut random) };
     p.init.omega = random.vector(0.05);
     // At the bottom the liquid's centre is on the wall.
     if random.below(2) == 0 {
@@ -225,7 +225,7 @@ impl Simulator<'_> {
 
     /// Returns the motion after `h` s by the modified midpoint rule with 2, 4, ... 10 steps, extrapolated to
     /// infinitely many.
-    fn moved(&self, h: f64) -> Coordinates {
+    fn state_after(&self, h: f64) -> Coordinates {
         let plus = |y: &Coordinates, r: &Coordinates, h: f64| -> Coordinates {
             std::array::from_fn(|i| y[i] + h * r[i])
         };
@@ -277,12 +277,11 @@ impl Simulator<'_> {
         2.0 * self.mass * self.case.p.tank[0].ball.drag * self.in_tank(y).rate.norm()
     }
 
-    /// Simulates to the time `end`, with steps of [`Case::step`].
-    fn go(&mut self, end: f64) {
+    fn simulate_to(&mut self, end: f64) {
         let step = self.case.step();
         while self.t < end {
             let h = (end - self.t).min(step);
-            let mut past = self.moved(h);
+            let mut past = self.state_after(h);
             let (mut low, mut high) = (0.0, h);
             if self.mode == Mode::Flying {
                 // Within the step the liquid may have met the wall and come back: f has a minimum where its slope is 0.
@@ -294,9 +293,13 @@ impl Simulator<'_> {
                     let (mut before, mut after) = (0.0, h);
                     for _ in 0..50 {
                         let middle = (before + after) / 2.0;
-                        if outwards(&self.moved(middle)) { before = middle } else { after = middle }
+                        if outwards(&self.state_after(middle)) {
+                            before = middle
+                        } else {
+                            after = middle
+                        }
                     }
-                    let nearest = self.moved(before);
+                    let nearest = self.state_after(before);
                     if self.in_tank(&nearest).f < 0.0 {
                         (high, past) = (before, nearest);
                     }
@@ -309,10 +312,10 @@ impl Simulator<'_> {
             }
             for _ in 0..60 {
                 let middle = (low + high) / 2.0;
-                let is_past = self.distance_to_event(&self.moved(middle)) <= 0.0;
+                let is_past = self.distance_to_event(&self.state_after(middle)) <= 0.0;
                 if is_past { high = middle } else { low = middle }
             }
-            self.y = self.moved(high);
+            self.y = self.state_after(high);
             self.t += high;
             self.put_on_wall();
             match self.mode {
@@ -387,7 +390,7 @@ impl Simulator<'_> {
 
     /// Returns the quantities that are compared between hosts: rate, the liquid's position and rate in the
     /// tank (tank axes), velocity of O, dissipated energy.
-    fn shown(&self) -> Shown {
+    fn compared_quantities(&self) -> Shown {
         let tank = &self.case.p.tank[0];
         let axes = rotation(&tank.q).inverse();
         let (w, r) = (v(&self.y[W..]), v(&self.case.p.craft.r));
@@ -400,7 +403,7 @@ impl Simulator<'_> {
 
 type Shown = [[f64; 3]; 5];
 
-fn shown(craft: &mut Spacecraft, u: &Inputs) -> Shown {
+fn compared_quantities(craft: &mut Spacecraft, u: &Inputs) -> Shown {
     let out = craft.outputs(u);
     let tank = &out.tank[0];
     let lost = [out.dissipated, 0.0, 0.0];
@@ -422,10 +425,10 @@ fn by_co_simulation(case: &Case, h: f64) -> Shown {
         craft.step(u, h.min(left)).unwrap();
         left -= h.min(left);
     }
-    shown(&mut craft, u)
+    compared_quantities(&mut craft, u)
 }
 
-/// Returns the tank of the default craft under a thrust of 1.2 kN that is reversed and slightly askew.
+/// Returns the tank of the default craft under a thrust of 1.2 kN that is reversed and slightly off_axis_craft.
 fn default_case() -> Case {
     let mut p = Parameters::default();
     p.tank[0].ball.travel = 0.6;
@@ -438,8 +441,8 @@ fn default_case() -> Case {
 fn impacts_equal_those_of_an_independent_simulator_at_any_communication_step() {
     for (seed, case) in (0..13).map(|seed| (seed, case(seed))).chain([(13, default_case())]) {
         let mut simulator = Simulator::new(&case);
-        simulator.go(case.end);
-        let want = simulator.shown();
+        simulator.simulate_to(case.end);
+        let want = simulator.compared_quantities();
         for h in [0.01, 0.07, 0.5, 1.0, 10.0] {
             let error = distance(&by_co_simulation(&case, h), &want);
             // The tolerance is 1e-12. Each of up to 16 impacts multiplies errors some two to ten times.
@@ -568,7 +571,6 @@ pub(super) fn integrate(
     (x, events)
 }
 
-/// A Spacecraft for a host that integrates it.
 struct Own<'a> {
     craft: Spacecraft,
     u: &'a Inputs,
@@ -620,7 +622,7 @@ fn by_model_exchange(case: &Case, method: Method) -> (Shown, usize) {
     let mut own = Own { craft, u: &case.u, impacts: 0 };
     let (x, _) = integrate(&mut own, &start, case.end, method);
     own.take(&x);
-    (shown(&mut own.craft, &case.u), own.impacts)
+    (compared_quantities(&mut own.craft, &case.u), own.impacts)
 }
 
 /// Hosts that locate events, as CVODE does with an output every 5 ms, and with a fixed step; what they may be off by.
@@ -641,10 +643,10 @@ fn locating(case: &Case) -> [(Method, f64); 3] {
 fn hosts_of_model_exchange_find_impacts_after_bounces_shorter_than_their_steps() {
     for (seed, case) in (0..9).map(|seed| (seed, case(seed))).chain([(9, default_case())]) {
         let mut simulator = Simulator::new(&case);
-        simulator.go(case.end);
+        simulator.simulate_to(case.end);
         for (method, allowed) in locating(&case) {
             let (shown, impacts) = by_model_exchange(&case, method);
-            let error = distance(&shown, &simulator.shown());
+            let error = distance(&shown, &simulator.compared_quantities());
             assert!(error < allowed, "{seed} {method:?}: {error:e}");
             assert_eq!(impacts, simulator.impacts, "{seed} {method:?}");
         }
@@ -710,16 +712,16 @@ fn compare_hosts(first: u64, count: u64) -> Figures {
             continue;
         }
         let mut simulator = Simulator::new(&case);
-        simulator.go(case.end);
-        let (want, impacts) = (simulator.shown(), simulator.impacts);
+        simulator.simulate_to(case.end);
+        let (want, impacts) = (simulator.compared_quantities(), simulator.impacts);
         let sensitivity = [1.0 - 1e-7, 1.0 + 1e-7].map(|factor| {
             let mut u = case.u;
             u.force.value = u.force.value.map(|f| f * factor);
             let other = Case { u, ..case };
             let mut simulator = Simulator::new(&other);
-            simulator.go(case.end);
+            simulator.simulate_to(case.end);
             let is_other = simulator.impacts != impacts;
-            if is_other { f64::INFINITY } else { distance(&simulator.shown(), &want) }
+            if is_other { f64::INFINITY } else { distance(&simulator.compared_quantities(), &want) }
         });
         let sensitivity = sensitivity[0].max(sensitivity[1]);
         if sensitivity > 1e-3 {
@@ -768,7 +770,6 @@ fn co_simulation_and_model_exchange_find_the_same_impacts_of_two_hundred_random_
     assert!(figures.craft > 180, "{figures:?}");
 }
 
-/// A SloshTank and its host, integrated together.
 struct OnHost<'a> {
     craft: Craft,
     u: &'a Inputs,
@@ -805,22 +806,22 @@ fn hosts_of_a_slosh_tank_find_impacts_after_bounces_shorter_than_their_steps() {
     for seed in 0..6 {
         let case = case(seed);
         let mut simulator = Simulator::new(&case);
-        simulator.go(case.end);
+        simulator.simulate_to(case.end);
         let mut host = OnHost { craft: Craft::new(&case.p), u: &case.u, impacts: 0 };
         let start = host.craft.pack();
         let (x, _) = integrate(&mut host, &start, case.end, method);
         host.craft.unpack(&x);
-        let out = host.craft.shown(&case.u);
+        let out = host.craft.spacecraft_outputs(&case.u);
         let tank = &out.tank[0];
         let lost = [out.dissipated, 0.0, 0.0];
         let shown = [tank.ball_position, tank.ball_velocity, out.omega, out.velocity, lost];
-        let error = distance(&shown, &simulator.shown());
+        let error = distance(&shown, &simulator.compared_quantities());
         assert!(error < 1e-6, "{seed}: {error:e}");
         assert_eq!(host.impacts, simulator.impacts, "{seed}");
     }
 }
 
-/// The first three modes of the default tank; the liquid is thrown off askew and comes back under thrust along the axis.
+/// The first three modes of the default tank; the liquid is thrown off off_axis_craft and comes back under thrust along the axis.
 #[test]
 fn liquid_of_three_modes_that_has_settled_stays_under_steady_thrust() {
     for seed in 0..9 {

@@ -20,7 +20,6 @@ fn rotation(q: &[f64]) -> Rotation3<f64> {
     UnitQuaternion::from_quaternion(Quaternion::new(q[0], q[1], q[2], q[3])).into()
 }
 
-/// Solution of the system of equations; body axes.
 struct Solution {
     a: V,
     w_d: V,
@@ -153,7 +152,7 @@ struct Shape {
 
 impl Shape {
     /// Computes the bob's place and rate from `rod` and its rate, both of a pendulum with the same q.
-    fn of(tank: &Tank, n: usize, e: V, rod: V, rod_d: V) -> Shape {
+    fn from_rod(tank: &Tank, n: usize, e: V, rod: V, rod_d: V) -> Shape {
         let l = tank.length[n];
         let across = |x: V| x - e * e.dot(&x);
         let (q, q_d) = (across(rod), across(rod_d));
@@ -177,7 +176,6 @@ impl Shape {
         shape
     }
 
-    /// Returns z'' for the acceleration x''.
     fn height_dd(&self, x_dd: V) -> f64 {
         let rate = 2.0 * self.q.dot(&self.q_d);
         let rate_d = 2.0 * (self.q_d.norm_squared() + self.q.dot(&x_dd));
@@ -277,7 +275,7 @@ fn solve_with(mistake: Mistake, p: &Parameters, x: &[f64; STATES], u: &Inputs) -
         let rate = rate - dir * dir.dot(&rate);
         let (e, l, mass) = (axes * V::z(), tank.length[n], tank.mass[n]);
         let hinge = v(&tank.position) + axes * hinge;
-        let shape = Shape::of(tank, n, e, dir * l, rate * l);
+        let shape = Shape::from_rod(tank, n, e, dir * l, rate * l);
         let (rho, moved) = (hinge + shape.at, shape.rate / l);
         let perp = dir - e * e.dot(&dir);
         let along = e.dot(&(rigid_a + rigid_w_d.cross(&hinge) + w.cross(&w.cross(&hinge))));

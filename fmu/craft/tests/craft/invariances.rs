@@ -40,7 +40,6 @@ fn random_craft(seed: u64) -> (Random, Parameters, Vec<[f64; INPUTS]>) {
     (random, p, inputs)
 }
 
-/// Runs over the knots with straight lines between.
 fn run(p: &Parameters, knots: &[[f64; INPUTS]]) -> [f64; STATES] {
     let inputs = |k: usize| {
         let (from, to) = (knots[k], knots[k + 1]);
@@ -180,7 +179,6 @@ fn a_craft_moves_alike_in_any_inertial_frame() {
     }
 }
 
-/// Random craft with four tanks.
 #[test]
 fn reversing_the_order_of_the_tanks_does_not_change_the_motion() {
     for seed in 0..8 {

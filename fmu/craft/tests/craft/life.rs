@@ -252,7 +252,6 @@ fn jumps_of_the_wheels_keep_angular_momentum_and_balance_energy() {
     }
 }
 
-/// A continuous change is not a jump.
 #[test]
 fn a_continuous_change_of_the_wheels_momentum_gives_no_impulse() {
     let p = Parameters::default();
@@ -495,7 +494,6 @@ fn constraints_are_kept_to_rounding() {
     }
 }
 
-/// 500 steps of a random craft in which each mode has a direction.
 #[test]
 fn slosh_masses_of_planar_modes_stay_in_their_planes_within_rounding() {
     let mut random = Random::new(1);

@@ -71,7 +71,6 @@ impl Case {
         case
     }
 
-    /// Returns the squared frequency of mode 1.
     fn omega2(&self) -> f64 {
         self.motion.axial / self.tank.length[0] + self.tank.k[0] / self.tank.mass[0]
     }

@@ -304,7 +304,7 @@ fn a_host_coupled_to_tanks_keeps_momentum_and_loses_the_energy_that_the_tanks_di
 }
 
 /// Returns the host's motion over a step that begins `t` later.
-fn later(u: &TankInputs, t: f64) -> TankInputs {
+fn inputs_after(u: &TankInputs, t: f64) -> TankInputs {
     let at = |ramp: &Ramp| Ramp { value: ramp.value_at(t), slope: ramp.slope };
     let slope = u.omega_dot.slope;
     let omega = [0, 1, 2].map(|i| u.omega[i] + (u.omega_dot.value[i] + slope[i] * t / 2.0) * t);
@@ -334,7 +334,7 @@ fn co_simulation_of_a_tank_equals_model_exchange_by_a_runge_kutta_host() {
         let mut t = 0.0;
         while t < 2.0 {
             let h = f64::min(random.magnitude(1e-3, 0.5), 2.0 - t);
-            cut.step(&later(&u, t), h).unwrap();
+            cut.step(&inputs_after(&u, t), h).unwrap();
             t += h;
         }
         let mut x = [0.0; STATES];
@@ -342,7 +342,7 @@ fn co_simulation_of_a_tank_equals_model_exchange_by_a_runge_kutta_host() {
         let rates = |t: f64, x: &[f64; STATES]| {
             host.set_continuous_states(x[..TANK_STATES].try_into().unwrap());
             let mut rate = [0.0; STATES];
-            rate[..TANK_STATES].copy_from_slice(&host.derivatives(&later(&u, t)));
+            rate[..TANK_STATES].copy_from_slice(&host.derivatives(&inputs_after(&u, t)));
             rate
         };
         runge_kutta(rates, &mut x, 2.0, 10_000);

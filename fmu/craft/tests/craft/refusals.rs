@@ -31,14 +31,12 @@ const NUMBERS: [Number; 22] = [
     ("tank[1].p_dot_0[2][3]", |p| &mut p.tank[0].p_dot_0[1][2], -1e9, 1e9),
 ];
 
-/// Numbers of a tank given by its dimensions.
 const CYLINDER: [Number; 3] = [
     ("tank[1].diameter", |p| &mut p.tank[0].diameter, 1e-6, 1e3),
     ("tank[1].depth", |p| &mut p.tank[0].depth, 1e-3, 1e3),
     ("tank[1].density", |p| &mut p.tank[0].density, 1e-3, 1e5),
 ];
 
-/// Numbers of a tank that can drain.
 const FILL: [Number; 6] = [
     ("tank[1].fill.H_0[2]", |p| &mut p.tank[0].fill.h_0[1], -1e9, 1e9),
     ("tank[1].fill.I_0[1]", |p| &mut p.tank[0].fill.i_0[0], 0.0, 1e12),
@@ -57,14 +55,13 @@ fn craft() -> Parameters {
 }
 
 /// Returns the message about this parameter with the value `value`, if it is refused.
-fn said(p: &Parameters, (name, place, ..): &Number, value: f64) -> Option<String> {
+fn refusal_message(p: &Parameters, (name, place, ..): &Number, value: f64) -> Option<String> {
     let mut p = *p;
     *place(&mut p) = value;
     let problems = p.problems();
     problems.into_iter().find(|text| text.starts_with(&format!("{name} = ")))
 }
 
-/// Each parameter of Spacecraft is set to its minimum, its maximum and a value beyond.
 #[test]
 fn parameters_are_accepted_up_to_the_ends_of_their_ranges_and_refused_beyond() {
     let cylinder = {
@@ -81,14 +78,18 @@ fn parameters_are_accepted_up_to_the_ends_of_their_ranges_and_refused_beyond() {
         assert_eq!(p.problems(), [""; 0]);
         for number in numbers {
             let (name, _, low, high) = *number;
-            assert_eq!([low, high].map(|end| said(&p, number, end)), [None, None], "{name}");
+            assert_eq!(
+                [low, high].map(|end| refusal_message(&p, number, end)),
+                [None, None],
+                "{name}"
+            );
             let below = if low == 0.0 { -1e-300 } else { low - low.abs() * 1e-9 };
             for value in [below, high * (1.0 + 1e-9), f64::NAN, f64::INFINITY] {
                 // A diameter of 0 or less is not a cylinder.
                 if name == "tank[1].diameter" && (0.0..high).contains(&value) {
                     continue;
                 }
-                let text = said(&p, number, value);
+                let text = refusal_message(&p, number, value);
                 assert!(text.is_some_and(|text| text.contains("(allowed: ")), "{name} {value}");
             }
         }
@@ -110,7 +111,6 @@ fn parameters_of_unused_tanks_and_modes_are_not_checked() {
     assert!(p.problems()[0].starts_with("tanks = 5 (allowed: 0 to 4)"));
 }
 
-/// A direction may be short, but must be longer than a millionth.
 #[test]
 fn directions_need_a_length_above_a_millionth() {
     let with = |x: f64| {
@@ -122,7 +122,6 @@ fn directions_need_a_length_above_a_millionth() {
     assert_eq!([with(1.001e-6), with(0.999e-6)], [0, 2]);
 }
 
-/// A craft on a pivot cannot have a velocity at the start, a free craft can.
 #[test]
 fn an_initial_velocity_is_refused_only_on_a_pivot() {
     let mut p = craft();
@@ -204,7 +203,7 @@ fn a_slosh_frequency_must_give_a_pendulum_length() {
     let problems = p.problems();
     assert!(problems.len() == 1, "{problems:?}");
     assert!(problems[0].starts_with("tank[1].frequency[1] = 0.317"), "{problems:?}");
-    assert!(problems[0].contains("above the 0.318309"), "{problems:?}");
+    assert!(problems[0].contains("above 0.318309"), "{problems:?}");
     // A length of 1e-6 m at 1.5 m/s2: sqrt(1.5e6)/2 pi
     assert!(problems[0].contains("below 194.9"), "{problems:?}");
     p.tank[0].frequency[0] = 195.0;

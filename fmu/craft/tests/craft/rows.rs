@@ -78,7 +78,6 @@ fn run(
     all
 }
 
-/// Checks that states have the same bits.
 fn assert_same(found: &[[u64; STATES]], whole: &[[u64; STATES]], what: &str) {
     assert_eq!(found.len(), whole.len(), "{what}");
     for (n, (found, whole)) in found.iter().zip(whole).enumerate() {

@@ -44,10 +44,8 @@ fn craft_with_tank_at(z: f64, k: f64, c: f64) -> Parameters {
     p
 }
 
-/// Quantities of the closed-form solution, with its letters.
 struct Closed {
     m: f64,
-    /// Mass and inertia of the rigid body R.
     mass: f64,
     inertia: f64,
     g: f64,

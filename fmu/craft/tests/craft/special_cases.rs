@@ -5,7 +5,6 @@ use craft::{Inertia, Inputs, Mount, Parameters, Ramp, STATES, TankInputs, TankPa
 use super::component::{SloshTank, Spacecraft};
 use super::random::Random;
 
-/// Returns a sinusoidal torque, N m.
 fn torque(t: f64) -> f64 {
     0.6 * f64::sin(13.0 * t)
 }
@@ -54,8 +53,8 @@ fn a_tank_given_as_a_cylinder_moves_as_a_tank_with_the_cylinders_modes() {
     assert!(largest_difference(&got[bobs.clone()], &want[bobs]) < 1e-5);
 }
 
-/// Mass, centre of mass and inertia of craft and liquid at rest do not depend on the number of modes. The values equal
-/// those of liquid under a rigid lid.
+/// Mass, centre of mass and inertia of craft and liquid at rest do not depend on the number of modes. The values
+/// equal the properties of liquid under a rigid lid.
 #[test]
 fn mass_centre_of_mass_and_inertia_are_right_whatever_the_modes() {
     let of = |modes: usize| {

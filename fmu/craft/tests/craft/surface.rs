@@ -15,7 +15,6 @@ use super::exchange::runge_kutta;
 use super::random::{Random, draining_tank};
 use super::waves::{G, bench, circular, planar};
 
-/// A tank that rests upright under gravity.
 fn resting(tank: Tank) -> (SloshTank, TankInputs) {
     let u = TankInputs { a: Ramp::held([0.0, 0.0, G]), ..TankInputs::default() };
     let p = TankParameters { tank, ..TankParameters::default() };
@@ -236,7 +235,6 @@ struct Lagrangian<'a> {
 }
 
 impl Lagrangian<'_> {
-    /// Returns l, h, m, s and kappa.
     fn table<T: Number>(&self, t: T) -> [T; 5] {
         if self.tank.fill.points == 0 {
             let Tank {
@@ -258,7 +256,6 @@ impl Lagrangian<'_> {
         [l, h, m, ends(&|i| nonlinear_inertia[n][i]), ends(&|i| nonlinear_stiffness[n][i])]
     }
 
-    /// Returns L at q, q' and t.
     fn at(&self, q: [f64; 2], q_d: [f64; 2], t: f64) -> f64 {
         let time = Dual::with_slope(t, 1.0);
         let [l, h, _, _, kappa] = self.table(time);
@@ -532,7 +529,8 @@ fn a_bound_that_reaches_the_bob_while_the_tank_drains_is_refused() {
     let mut slosh = SloshTank::new(&p, &u, 0.0, 1e-8).unwrap();
     let why = (0..90).find_map(|_| slosh.step(&u, 0.1).err()).unwrap().to_string();
     assert!(
-        why.contains("slosh angle of mode 1") && why.contains("tank.fill gives them at"),
+        why.contains("slosh angle of mode 1")
+            && why.contains("The table tank.fill gives these coefficients at"),
         "{why}"
     );
     assert!(slosh.continuous_states()[6 * MODES + 1] > 305.0);

@@ -43,7 +43,6 @@ fn start(p: &Parameters) -> Spacecraft {
     Spacecraft::new(p, &Inputs::default(), 0.0, 1e-12).unwrap()
 }
 
-/// Returns the quaternion of small rotations about x and y.
 fn tilted([x, y]: [f64; 2]) -> [f64; 4] {
     [1.0, x / 2.0, y / 2.0, 0.0]
 }

@@ -46,7 +46,6 @@ pub fn sideways([value, slope]: [f64; 2]) -> Ramp {
 
 /// One tank whose motion is prescribed.
 pub trait Moved: Sized {
-    /// Starts upright, at rest, under gravity.
     fn start(tank: &Tank) -> Self;
 
     /// Accelerates the tank along x for `h` s: value at the start (m/s2) and slope.

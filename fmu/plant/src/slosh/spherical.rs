@@ -171,7 +171,7 @@ impl SloshMode for Spherical {
         let sum = sines[0] * sines[0] + sines[1] * sines[1];
         (sum > 0.9999).then(|| {
             format!(
-                "init.slosh_angle = {} and init.slosh_angle_radial = {} put the bob at or beyond \
+                "init.slosh_angle = {} and init.slosh_angle_radial = {} put the slosh mass at or above \
                  the horizontal: sin^2 + sin^2 = {sum:.6} must be below 1",
                 init.slosh_angle, init.slosh_angle_radial
             )

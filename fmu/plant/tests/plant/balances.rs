@@ -84,7 +84,6 @@ fn the_dissipated_power_equals_the_rate_at_which_energy_is_lost() {
     }
 }
 
-/// Random benches with each slosh model.
 #[test]
 fn momentum_is_constant_without_torque_and_friction() {
     let mut rng = fastrand::Rng::with_seed(2);
@@ -124,7 +123,6 @@ fn momentum_changes_only_by_torque_whatever_the_damping_of_the_liquid() {
     assert!((plant.outputs(&inputs).momentum - first - 0.1).abs() < 1e-11);
 }
 
-/// Random benches with each slosh model and friction law.
 #[test]
 fn energy_never_grows_without_torque() {
     let mut rng = fastrand::Rng::with_seed(3);

@@ -17,7 +17,7 @@ fn bench(slosh: SloshModel, friction: FrictionModel) -> Parameters {
     p
 }
 
-fn at(g: f64) -> Inputs {
+fn inputs_with_gravity(g: f64) -> Inputs {
     Inputs { g_axial: Ramp::held(g), ..Inputs::default() }
 }
 
@@ -34,8 +34,8 @@ const PIECES: [(Ramp, f64); 7] = [
 
 /// Runs along [`PIECES`], each cut into steps of about `h`; the outputs after each step.
 fn run(p: &Parameters, h: f64) -> Vec<Outputs> {
-    let mut plant = Plant::new(p, &at(9.81), 0.0, TOLERANCE).unwrap();
-    let mut all = vec![plant.outputs(&at(9.81))];
+    let mut plant = Plant::new(p, &inputs_with_gravity(9.81), 0.0, TOLERANCE).unwrap();
+    let mut all = vec![plant.outputs(&inputs_with_gravity(9.81))];
     for (g, length) in PIECES {
         let steps = (length / h).ceil().max(1.0);
         let h = length / steps;
@@ -95,12 +95,12 @@ fn a_jump_of_g_on_a_tilted_bench_does_the_work_of_the_change_in_height() {
         let mut p = bench(slosh, FrictionModel::Viscous);
         (p.bench.tilt, p.bench.tilt_azimuth) = (0.1, 0.7);
         (p.hub.imbalance, p.hub.imbalance_angle) = (0.4, 2.0);
-        let mut plant = Plant::new(&p, &at(9.81), 0.0, TOLERANCE).unwrap();
-        plant.step(&at(9.81), 0.1).unwrap();
-        let x_dot = plant.derivatives(&at(9.81));
+        let mut plant = Plant::new(&p, &inputs_with_gravity(9.81), 0.0, TOLERANCE).unwrap();
+        plant.step(&inputs_with_gravity(9.81), 0.1).unwrap();
+        let x_dot = plant.derivatives(&inputs_with_gravity(9.81));
         let [before, after] = [9.81, 12.81].map(|g| {
-            let rate = plant.output_derivatives(&at(g), &x_dot, &[0.0; 3]);
-            [plant.outputs_held(&at(g)), rate]
+            let rate = plant.output_derivatives(&inputs_with_gravity(g), &x_dot, &[0.0; 3]);
+            [plant.outputs_held(&inputs_with_gravity(g)), rate]
         });
         for (value, other) in before.iter().zip(&after) {
             let residual = other.energy - value.energy - (other.work_axial - value.work_axial);
@@ -176,12 +176,12 @@ fn ramps_to_zero_and_from_it_take_a_bounded_number_of_steps() {
         // 20 halvings to a millionth, 34 growths by half from there, and the motion's own.
         p.solver = Solver { max_steps: 100 };
         let inputs = |value, slope| Inputs { g_axial: Ramp { value, slope }, ..Inputs::default() };
-        let mut plant = Plant::new(&p, &at(9.81), 0.0, TOLERANCE).unwrap();
+        let mut plant = Plant::new(&p, &inputs_with_gravity(9.81), 0.0, TOLERANCE).unwrap();
         plant.step(&inputs(9.81, -98.1), 0.1).unwrap();
         plant.step(&inputs(0.0, 98.1), 0.1).unwrap();
         // And where the clock's rounding makes the end of the ramp.
         let (slope, h) = (-9.81 / 0.3, 0.3);
-        let mut plant = Plant::new(&p, &at(9.81), 0.1, TOLERANCE).unwrap();
+        let mut plant = Plant::new(&p, &inputs_with_gravity(9.81), 0.1, TOLERANCE).unwrap();
         plant.step(&inputs(9.81, slope), h).unwrap();
         assert!((inputs(9.81, slope).g_axial.value_at(h)).abs() < 1e-14);
     }
@@ -189,7 +189,7 @@ fn ramps_to_zero_and_from_it_take_a_bounded_number_of_steps() {
 
 /// Measures the damping ratio from the logarithmic decrement of the free tangential motion with the hub held.
 fn measured_zeta(p: &Parameters, g_start: f64, g: f64) -> f64 {
-    let mut plant = Plant::new(p, &at(g_start), 0.0, TOLERANCE).unwrap();
+    let mut plant = Plant::new(p, &inputs_with_gravity(g_start), 0.0, TOLERANCE).unwrap();
     let length = plant.calculated().length[0];
     if g != g_start {
         let ramp = Ramp { value: g_start, slope: g - g_start };
@@ -204,7 +204,7 @@ fn measured_zeta(p: &Parameters, g_start: f64, g: f64) -> f64 {
     };
     let before = amplitude2(&plant);
     for _ in 0..10 {
-        plant.step(&at(g), period).unwrap();
+        plant.step(&inputs_with_gravity(g), period).unwrap();
     }
     -(amplitude2(&plant) / before).ln() / (2.0 * core::f64::consts::TAU * 10.0)
 }
@@ -221,14 +221,14 @@ fn damping_after_a_change_of_g_equals_a_start_at_the_new_g() {
         for g in [1.0, 0.1, 0.01] {
             let (changed, started) = (measured_zeta(&p, 9.81, g), measured_zeta(&p, g, g));
             assert!((changed / started - 1.0).abs() < 0.01, "{g}: {changed} {started}");
-            let plant = Plant::new(&p, &at(g), 0.0, TOLERANCE).unwrap();
+            let plant = Plant::new(&p, &inputs_with_gravity(g), 0.0, TOLERANCE).unwrap();
             let zeta = plant.calculated().damping[0];
             // Energy and its peaks differ by zeta^2.
             assert!((started / zeta - 1.0).abs() < 0.01, "{g}: {started} {zeta}");
-            let plant = Plant::new(&p, &at(9.81), 0.0, TOLERANCE).unwrap();
-            let [shown, _] = plant.damping_ratio(0, &at(g));
+            let plant = Plant::new(&p, &inputs_with_gravity(9.81), 0.0, TOLERANCE).unwrap();
+            let [shown, _] = plant.damping_ratio(0, &inputs_with_gravity(g));
             assert!((shown / zeta - 1.0).abs() < 1e-14, "{shown} {zeta}");
-            assert_eq!(plant.damping_ratio(0, &at(0.0)), [0.0; 2]);
+            assert_eq!(plant.damping_ratio(0, &inputs_with_gravity(0.0)), [0.0; 2]);
         }
     }
 }
@@ -242,10 +242,10 @@ fn a_start_at_zero_g_gets_its_damping_when_g_acts() {
         p.hub.inertia = 1e9;
         p.slosh.zeta_from_correlation = correlation;
         p.init = plant::Init { slosh_angle: 0.1, ..Default::default() };
-        let mut plant = Plant::new(&p, &at(0.0), 0.0, TOLERANCE).unwrap();
-        let rest = plant.outputs(&at(0.0));
-        plant.step(&at(0.0), 1.0).unwrap();
-        assert_eq!(plant.outputs(&at(0.0)).heat, rest.heat, "nothing drags");
+        let mut plant = Plant::new(&p, &inputs_with_gravity(0.0), 0.0, TOLERANCE).unwrap();
+        let rest = plant.outputs(&inputs_with_gravity(0.0));
+        plant.step(&inputs_with_gravity(0.0), 1.0).unwrap();
+        assert_eq!(plant.outputs(&inputs_with_gravity(0.0)).heat, rest.heat, "nothing drags");
         let (from_zero, started) = (measured_zeta(&p, 0.0, 1.0), measured_zeta(&p, 1.0, 1.0));
         assert!((from_zero / started - 1.0).abs() < 1e-3, "{from_zero} {started}");
     }
@@ -256,25 +256,29 @@ fn derivatives_along_g_equal_those_of_the_changing_damping() {
     for slosh in SLOSHING {
         let mut p = bench(slosh, FrictionModel::Viscous);
         p.init.slosh_rate = 1.0;
-        let mut plant = Plant::new(&p, &at(9.81), 0.0, TOLERANCE).unwrap();
+        let mut plant = Plant::new(&p, &inputs_with_gravity(9.81), 0.0, TOLERANCE).unwrap();
         // Somewhere else than where the work was booked last.
         let (g, step) = (0.02, 1e-6);
         let (none, du) = ([0.0; STATES], [0.0, 0.0, 1.0]);
-        let slopes = plant.directional_derivative(&at(g), &none, &du);
-        let outputs = plant.output_derivatives(&at(g), &none, &du);
-        let [above, below] = [g + step, g - step].map(|g| plant.derivatives(&at(g)));
+        let slopes = plant.directional_derivative(&inputs_with_gravity(g), &none, &du);
+        let outputs = plant.output_derivatives(&inputs_with_gravity(g), &none, &du);
+        let [above, below] =
+            [g + step, g - step].map(|g| plant.derivatives(&inputs_with_gravity(g)));
         for i in 0..STATES {
             let difference = (above[i] - below[i]) / (2.0 * step);
             // The square of 5e-5 of g, times the power's third derivative.
             assert!((slopes[i] - difference).abs() < 1e-7 * (1.0 + difference.abs()), "{i}");
         }
-        let ratio = |g: f64| plant.damping_ratio(0, &at(g))[0];
+        let ratio = |g: f64| plant.damping_ratio(0, &inputs_with_gravity(g))[0];
         let difference = (ratio(g + step) - ratio(g - step)) / (2.0 * step);
-        let along = |value: f64| Inputs { g_axial: Ramp { value, slope: 1.0 }, ..at(value) };
+        let along = |value: f64| Inputs {
+            g_axial: Ramp { value, slope: 1.0 },
+            ..inputs_with_gravity(value)
+        };
         let [_, slope] = plant.damping_ratio(0, &along(g));
         assert!((slope - difference).abs() < 1e-6 * (1e-3 + difference.abs()), "{slosh:?}");
         assert_eq!(plant.damping_ratio(0, &along(0.0))[1], 0.0, "no derivative: 0");
-        let [above, below] = [g + step, g - step].map(|g| plant.outputs(&at(g)));
+        let [above, below] = [g + step, g - step].map(|g| plant.outputs(&inputs_with_gravity(g)));
         let pairs: [fn(&Outputs) -> f64; 5] = [
             |o| o.work_axial,
             |o| o.energy,
@@ -288,9 +292,9 @@ fn derivatives_along_g_equal_those_of_the_changing_damping() {
             assert!((got - difference).abs() < 1e-6 * (1e-3 + difference.abs()), "{slosh:?} {n}");
         }
         // Without specific force there is no derivative; a finite one is given.
-        let at_zero = plant.directional_derivative(&at(0.0), &none, &du);
+        let at_zero = plant.directional_derivative(&inputs_with_gravity(0.0), &none, &du);
         assert!(at_zero.iter().all(|x| x.is_finite()));
-        let at_zero = plant.output_derivatives(&at(0.0), &none, &du);
+        let at_zero = plant.output_derivatives(&inputs_with_gravity(0.0), &none, &du);
         assert!(at_zero.f_tangential.is_finite());
     }
 }
@@ -298,8 +302,8 @@ fn derivatives_along_g_equal_those_of_the_changing_damping() {
 /// Simulates as a Model Exchange host does, with fixed steps of Runge-Kutta 4, and returns the residual of
 /// the energy balance over the work of g.
 fn residual_of_a_host(p: &Parameters, h: f64, g: impl Fn(f64) -> f64) -> f64 {
-    let mut plant = Plant::new(p, &at(g(0.0)), 0.0, TOLERANCE).unwrap();
-    let energy = plant.outputs_held(&at(g(0.0))).energy;
+    let mut plant = Plant::new(p, &inputs_with_gravity(g(0.0)), 0.0, TOLERANCE).unwrap();
+    let energy = plant.outputs_held(&inputs_with_gravity(g(0.0))).energy;
     let steps = (2.0 / h).round() as usize;
     for k in 0..steps {
         let t = k as f64 * h;
@@ -308,7 +312,7 @@ fn residual_of_a_host(p: &Parameters, h: f64, g: impl Fn(f64) -> f64) -> f64 {
             let moved = core::array::from_fn(|i| x[i] + s * direction[i]);
             plant.set_continuous_states(&moved);
             plant.set_time(t + s, Some(t + s), 0.0);
-            plant.derivatives(&at(g(t + s)))
+            plant.derivatives(&inputs_with_gravity(g(t + s)))
         };
         let k1 = derivatives(&[0.0; STATES], 0.0);
         let k2 = derivatives(&k1, h / 2.0);
@@ -316,11 +320,11 @@ fn residual_of_a_host(p: &Parameters, h: f64, g: impl Fn(f64) -> f64) -> f64 {
         let k4 = derivatives(&k3, h);
         let mean = core::array::from_fn(|i| (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]) / 6.0);
         derivatives(&mean, h);
-        plant.accept_step(&at(g(t + h))).unwrap();
+        plant.accept_step(&inputs_with_gravity(g(t + h))).unwrap();
     }
-    let o = plant.outputs_held(&at(g(2.0)));
+    let o = plant.outputs_held(&inputs_with_gravity(g(2.0)));
     // A jump at an instant: exact.
-    let jumped = at(g(2.0) + 3.0);
+    let jumped = inputs_with_gravity(g(2.0) + 3.0);
     let after = plant.outputs_held(&jumped);
     let jump = after.energy - o.energy - (after.work_axial - o.work_axial);
     assert!(jump.abs() < 1e-14, "{jump:e}");

@@ -6,7 +6,7 @@ use plant::{DampingLaw, FrictionModel, Inputs, Parameters, Plant, Ramp, SloshMod
 
 const TOLERANCE: f64 = 1e-10;
 
-fn at(g: f64) -> Inputs {
+fn inputs_with_gravity(g: f64) -> Inputs {
     Inputs { g_axial: Ramp::held(g), ..Inputs::default() }
 }
 
@@ -21,7 +21,7 @@ fn held(model: SloshModel) -> Parameters {
 /// Returns the damping ratio of a small free oscillation at `g` after a start at `g_start`. It is the logarithmic decrement
 /// over ten periods of omega = sqrt((g + a)/l), between zeros of the angle.
 fn zeta_of_decay(p: &Parameters, g_start: f64, g: f64, omega: f64) -> f64 {
-    let mut plant = Plant::new(p, &at(g_start), 0.0, TOLERANCE).unwrap();
+    let mut plant = Plant::new(p, &inputs_with_gravity(g_start), 0.0, TOLERANCE).unwrap();
     let amplitude2 = |plant: &Plant| {
         let x = plant.continuous_states();
         let (al, rate) = (x[x::SLOSH + 1], x[x::SLOSH + 3]);
@@ -29,7 +29,7 @@ fn zeta_of_decay(p: &Parameters, g_start: f64, g: f64, omega: f64) -> f64 {
     };
     let before = amplitude2(&plant);
     for _ in 0..10 {
-        plant.step(&at(g), TAU / omega).unwrap();
+        plant.step(&inputs_with_gravity(g), TAU / omega).unwrap();
     }
     // Of a' = -zeta omega a for small zeta; its square enters relatively, 1e-4 at zeta = 0.01.
     -(amplitude2(&plant) / before).ln() / (2.0 * TAU * 10.0)
@@ -45,7 +45,8 @@ fn damping_of_decays_follows_the_frequency_down_to_a_millionth_of_a_metre_per_se
             p.slosh.damping_law = law;
             p.slosh.capillarity = capillarity;
             p.init.slosh_angle = 0.01;
-            let calculated = *Plant::new(&p, &at(9.81), 0.0, TOLERANCE).unwrap().calculated();
+            let calculated =
+                *Plant::new(&p, &inputs_with_gravity(9.81), 0.0, TOLERANCE).unwrap().calculated();
             let (zeta, l) = (calculated.damping[0], calculated.length[0]);
             // sigma xi^2/(rho R^2)
             let a = if capillarity {
@@ -83,7 +84,7 @@ fn a_given_damping_ratio_holds_at_the_start_or_at_1_m_per_s2() {
         p.slosh.capillarity = capillarity;
         let xi = 1.8411837813 / (p.tank.d / 2.0);
         let a = if capillarity { 0.07213 * xi * xi / 1000.0 } else { 0.0 };
-        let plant = Plant::new(&p, &at(g_start), 0.0, TOLERANCE).unwrap();
+        let plant = Plant::new(&p, &inputs_with_gravity(g_start), 0.0, TOLERANCE).unwrap();
         let omega = ((g + a) / plant.calculated().length[0]).sqrt();
         let measured = zeta_of_decay(&p, g_start, g, omega);
         assert!((measured / 2e-3 - 1.0).abs() < 3e-4, "{capillarity} {g_start}: {measured}");
@@ -93,13 +94,13 @@ fn a_given_damping_ratio_holds_at_the_start_or_at_1_m_per_s2() {
 /// Amplitudes at the turning points of the tangential angle, by parabolas through samples, and their times.
 fn turning_points(p: &Parameters, length: f64) -> Vec<[f64; 2]> {
     let (h, mut found) = (2e-3, Vec::new());
-    let mut plant = Plant::new(p, &at(9.81), 0.0, TOLERANCE).unwrap();
+    let mut plant = Plant::new(p, &inputs_with_gravity(9.81), 0.0, TOLERANCE).unwrap();
     let mut last = [0.0; 3];
     for k in 1..(length / h) as usize {
-        plant.step(&at(9.81), h).unwrap();
+        plant.step(&inputs_with_gravity(9.81), h).unwrap();
         let x = plant.continuous_states();
         let now = match p.slosh.model {
-            SloshModel::Spherical => plant.outputs(&at(9.81)).slosh_angle,
+            SloshModel::Spherical => plant.outputs(&inputs_with_gravity(9.81)).slosh_angle,
             SloshModel::Liquid => x[x::SLOSH + 1] / plant.calculated().length[0],
             _ => x[x::SLOSH + 1],
         };
@@ -123,7 +124,7 @@ fn free_oscillations_lose_zeta_plus_zeta_a_times_amplitude_in_every_model() {
             let mut p = held(model);
             p.init.slosh_angle = 0.32;
             p.slosh.zeta_amplitude = zeta_a;
-            let plant = Plant::new(&p, &at(9.81), 0.0, TOLERANCE).unwrap();
+            let plant = Plant::new(&p, &inputs_with_gravity(9.81), 0.0, TOLERANCE).unwrap();
             let zeta = plant.calculated().damping[0];
             let points = turning_points(&p, 20.0);
             assert!(points.len() > 40 && points[points.len() - 1][1] < 0.1);
@@ -151,7 +152,7 @@ fn breaking_waves_decay_to_their_onset_by_the_closed_form() {
     let mut p = held(SloshModel::Linear);
     (p.slosh.zeta_from_correlation, p.slosh.zeta, p.init.slosh_angle) = (false, 0.0, 0.6);
     (p.slosh.zeta_breaking, p.slosh.breaking_steepness) = (zeta_b, onset);
-    let plant = Plant::new(&p, &at(9.81), 0.0, TOLERANCE).unwrap();
+    let plant = Plant::new(&p, &inputs_with_gravity(9.81), 0.0, TOLERANCE).unwrap();
     let omega = (9.81 / plant.calculated().length[0]).sqrt();
     let points = turning_points(&p, 6.0);
     let [start, first] = points[0];
@@ -175,7 +176,7 @@ fn breaking_adds_damping_above_the_steepness_in_every_model() {
         let mut p = held(model);
         p.init.slosh_angle = 0.42;
         (p.slosh.zeta_breaking, p.slosh.breaking_steepness) = (zeta_b, onset);
-        let plant = Plant::new(&p, &at(9.81), 0.0, TOLERANCE).unwrap();
+        let plant = Plant::new(&p, &inputs_with_gravity(9.81), 0.0, TOLERANCE).unwrap();
         let zeta = plant.calculated().damping[0];
         let (mut above, mut below) = (0, 0);
         for pair in turning_points(&p, 40.0).windows(2) {
@@ -204,11 +205,11 @@ fn breaking_waves_only_dissipate_energy() {
             (p.slosh.zeta_breaking, p.slosh.breaking_steepness) = (3.0, onset);
             for (angle, rate) in [(0.6, 2.0), (0.05, -0.5), (1e-4, 0.0), (0.0, 1e-9)] {
                 (p.init.slosh_angle, p.init.slosh_rate_radial) = (angle, rate);
-                let mut plant = Plant::new(&p, &at(9.81), 0.0, TOLERANCE).unwrap();
+                let mut plant = Plant::new(&p, &inputs_with_gravity(9.81), 0.0, TOLERANCE).unwrap();
                 let mut heat = 0.0;
                 for _ in 0..100 {
-                    plant.step(&at(9.81), 0.05).unwrap();
-                    let now = plant.outputs(&at(9.81));
+                    plant.step(&inputs_with_gravity(9.81), 0.05).unwrap();
+                    let now = plant.outputs(&inputs_with_gravity(9.81));
                     assert!(now.power_dissipated >= 0.0 && now.heat >= heat, "{model:?} {onset}");
                     heat = now.heat;
                 }
@@ -224,7 +225,7 @@ fn breaking_waves_only_dissipate_energy() {
 fn a_vanishing_amplitude_leaves_the_viscous_damping() {
     let mut p = held(SloshModel::Linear);
     (p.slosh.zeta_amplitude, p.init.slosh_angle) = (1.0, 1e-6);
-    let plant = Plant::new(&p, &at(9.81), 0.0, TOLERANCE).unwrap();
+    let plant = Plant::new(&p, &inputs_with_gravity(9.81), 0.0, TOLERANCE).unwrap();
     let (zeta, l) = (plant.calculated().damping[0], plant.calculated().length[0]);
     let measured = zeta_of_decay(&p, 9.81, 9.81, (9.81 / l).sqrt());
     assert!((measured - zeta - 1e-4).abs() < 2e-8, "{measured} {zeta}");
@@ -239,9 +240,9 @@ fn spherical_and_planar_pendulums_have_equal_damping_at_large_angles() {
             let mut p = held(model);
             (p.slosh.zeta_amplitude, p.baffle.width, p.baffle.depth) = (zeta_a, width, 0.02);
             (p.init.slosh_angle, p.init.slosh_rate) = (0.6, 0.5);
-            let mut plant = Plant::new(&p, &at(9.81), 0.0, TOLERANCE).unwrap();
-            plant.step(&at(9.81), 2.0).unwrap();
-            plant.outputs(&at(9.81)).heat
+            let mut plant = Plant::new(&p, &inputs_with_gravity(9.81), 0.0, TOLERANCE).unwrap();
+            plant.step(&inputs_with_gravity(9.81), 2.0).unwrap();
+            plant.outputs(&inputs_with_gravity(9.81)).heat
         });
         // The series of the angle is 2e-8 off at 0.6 rad.
         let off = dissipated[0] / dissipated[1] - 1.0;

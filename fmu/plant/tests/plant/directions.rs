@@ -314,7 +314,7 @@ fn directions_of_modes_are_refused_for_models_without_them() {
         p.hub.inertia = 1e-9;
         p.slosh.table.mass[..3].copy_from_slice(&[4.8, 0.1, 4.8]);
     });
-    assert!(light.unwrap().contains("least inert"));
+    assert!(light.unwrap().contains("most unfavourable directions"));
 }
 
 /// Mode 1 moves only along its direction. A start in this direction gives exactly the outputs that were set; any other

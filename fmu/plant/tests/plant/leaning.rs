@@ -23,12 +23,12 @@ fn leaning(model: SloshModel, s: f64, beta: f64) -> Parameters {
     p
 }
 
-fn at(tau: f64) -> Inputs {
+fn inputs_with_torque(tau: f64) -> Inputs {
     Inputs { g_axial: Ramp::held(G), tau_ext: Ramp::held(tau), ..Inputs::default() }
 }
 
 fn plant(p: &Parameters) -> Plant {
-    Plant::new(p, &at(0.0), 0.0, 1e-11).unwrap()
+    Plant::new(p, &inputs_with_torque(0.0), 0.0, 1e-11).unwrap()
 }
 
 /// Returns the displacement of mode 1 over its pendulum's length when it hangs at rest.
@@ -74,8 +74,8 @@ fn measured(p: &Parameters) -> f64 {
     let mut zeros = Vec::new();
     let mut last = 0.0;
     for k in 1.. {
-        plant.step(&at(0.0), h).unwrap();
-        let now = plant.outputs(&at(0.0)).slosh_rate;
+        plant.step(&inputs_with_torque(0.0), h).unwrap();
+        let now = plant.outputs(&inputs_with_torque(0.0)).slosh_rate;
         if k > 2 && last < 0.0 && now >= 0.0 {
             zeros.push((k as f64 - now / (now - last)) * h);
             if zeros.len() == 11 {
@@ -140,13 +140,13 @@ fn rigid_liquid_follows_the_hub() {
             p.hub.inertia = 0.05;
             hang(&mut p, 0.0);
             let plant = plant(&p);
-            let rate = |tau: f64| plant.clone().outputs(&at(tau)).omega_dot;
+            let rate = |tau: f64| plant.clone().outputs(&inputs_with_torque(tau)).omega_dot;
             let inertia = 1.0 / (rate(1.0) - rate(0.0));
             let (l, r) = (plant.calculated().length[0], p.tank.r);
             let upright = {
                 let mut p = p;
                 p.bench.tilt = 0.0;
-                Plant::new(&p, &at(0.0), 0.0, 1e-11).unwrap().calculated().mass[0]
+                Plant::new(&p, &inputs_with_torque(0.0), 0.0, 1e-11).unwrap().calculated().mass[0]
             };
             let [along, across] = tilt::factors(0, 1.0, 0.3);
             let n2 = beta.sin().powi(2);
@@ -184,7 +184,7 @@ fn without_tilt_or_with_a_table_the_modes_are_used_as_given() {
 
 #[test]
 fn a_surface_that_reaches_the_bottom_is_refused_unless_the_liquid_is_rigid() {
-    let refused = |p: &Parameters| Plant::new(p, &at(0.0), 0.0, 1e-9).err();
+    let refused = |p: &Parameters| Plant::new(p, &inputs_with_torque(0.0), 0.0, 1e-9).err();
     for model in SLOSHING {
         let why = refused(&leaning(model, 1.01, 0.0)).unwrap();
         assert!(why[0].contains("reaches the bottom") && why[0].contains("bench.tilt"), "{why:?}");
@@ -197,7 +197,7 @@ fn a_surface_that_reaches_the_bottom_is_refused_unless_the_liquid_is_rigid() {
 /// frequency.
 #[test]
 fn warnings_name_large_tilts_and_one_pendulum_for_two_frequencies() {
-    let warnings = |model, s| Plant::warnings(&leaning(model, s, 0.0), &at(0.0));
+    let warnings = |model, s| Plant::warnings(&leaning(model, s, 0.0), &inputs_with_torque(0.0));
     let said = |model, s, text: &str| warnings(model, s).iter().any(|said| said.contains(text));
     for model in SLOSHING {
         assert!(said(model, 0.71, "exceeds 1 %") && !said(model, 0.69, "exceeds 1 %"));

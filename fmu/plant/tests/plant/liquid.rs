@@ -5,7 +5,6 @@ use super::free_oscillation::{held, shifts, shifts_of};
 use formulas::third_order::coefficients;
 use plant::{Inputs, Parameters, Plant, SloshModel, SloshSource};
 
-/// Sampling interval of motions, s.
 const SAMPLE: f64 = 1e-3;
 
 /// With the large-wave coefficients 1 the relative shifts are −1/8 of the squared angle (planar) and 1/2 (circular motion,
@@ -62,7 +61,7 @@ fn s_and_kappa_of_a_table_give_their_frequency_shifts() {
 fn the_liquid_model_requires_s_and_kappa_of_a_table() {
     let warnings = |p: &Parameters| Plant::warnings(p, &Inputs::default());
     let p = table(held(SloshModel::Liquid, 0.1), 1.0, 1.0);
-    assert!(warnings(&p)[0].contains("frequency of a pendulum"), "{:?}", warnings(&p));
+    assert!(warnings(&p)[0].contains("as that of a pendulum"), "{:?}", warnings(&p));
     assert_eq!(warnings(&table(p, 1.0, 1.1)), [""; 0]);
     for (model, is_used) in [
         (SloshModel::Linear, true),

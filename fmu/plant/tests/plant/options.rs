@@ -33,12 +33,12 @@ fn everything(slosh: SloshModel, friction: FrictionModel) -> Parameters {
     p
 }
 
-fn at(g: f64) -> Inputs {
+fn inputs_with_gravity(g: f64) -> Inputs {
     Inputs { g_axial: Ramp::held(g), ..Inputs::default() }
 }
 
 fn plant(p: &Parameters) -> Plant {
-    Plant::new(p, &at(9.81), 0.0, TOLERANCE).unwrap()
+    Plant::new(p, &inputs_with_gravity(9.81), 0.0, TOLERANCE).unwrap()
 }
 
 /// Specific force: constant, falling to 0, zero, rising again.
@@ -52,7 +52,7 @@ const PIECES: [(Ramp, f64); 4] = [
 /// Runs along [`PIECES`], each cut into steps of about `h`; the outputs after each step.
 fn run(p: &Parameters, h: f64) -> Vec<Outputs> {
     let mut plant = plant(p);
-    let mut all = vec![plant.outputs(&at(9.81))];
+    let mut all = vec![plant.outputs(&inputs_with_gravity(9.81))];
     for (g, length) in PIECES {
         let steps = (length / h).ceil().max(1.0);
         let h = length / steps;
@@ -64,7 +64,7 @@ fn run(p: &Parameters, h: f64) -> Vec<Outputs> {
                 ..Inputs::default()
             };
             plant.step(&inputs, h).unwrap();
-            all.push(plant.outputs(&at(inputs.g_axial.value_at(h).max(0.0))));
+            all.push(plant.outputs(&inputs_with_gravity(inputs.g_axial.value_at(h).max(0.0))));
         }
     }
     all
@@ -119,7 +119,7 @@ fn momentum_on_a_leaning_bench_changes_by_the_moment_of_gravity() {
         let mut p = everything(slosh, FrictionModel::None);
         (p.init.slosh_rate, p.init.slosh_rate_radial) = (2.0, -1.0);
         let mut plant = plant(&p);
-        let (known, inputs) = (*plant.calculated(), at(9.81));
+        let (known, inputs) = (*plant.calculated(), inputs_with_gravity(9.81));
         let moment = |o: &Outputs| {
             let (sin, cos) = (p.bench.tilt_azimuth - o.theta).sin_cos();
             let e = [cos, sin].map(|part| 9.81 * p.bench.tilt.tan() * part);
@@ -170,9 +170,9 @@ fn a_leaning_bench_swings_at_the_frequency_of_its_imbalance() {
     let moment = 0.3 + m_0 * p.tank.r;
     let inertia = p.hub.inertia + m_0 * p.tank.r * p.tank.r;
     let omega = (9.81 * 0.1f64.tan() * moment / inertia).sqrt();
-    plant.step(&at(9.81), TAU / omega / 3.0).unwrap();
+    plant.step(&inputs_with_gravity(9.81), TAU / omega / 3.0).unwrap();
     // cos(120 degrees); a pendulum's period at 1 mrad is longer by 6e-8.
-    let theta = plant.outputs(&at(9.81)).theta;
+    let theta = plant.outputs(&inputs_with_gravity(9.81)).theta;
     assert!((theta / 1e-3 + 0.5).abs() < 1e-6, "{theta}");
 }
 
@@ -185,9 +185,9 @@ fn liquid_on_a_leaning_bench_comes_to_rest_along_gravity() {
         (p.slosh.zeta_from_correlation, p.slosh.zeta) = (false, 0.2);
         let mut plant = plant(&p);
         for _ in 0..200 {
-            plant.step(&at(9.81), 1.0).unwrap();
+            plant.step(&inputs_with_gravity(9.81), 1.0).unwrap();
         }
-        let o = plant.outputs(&at(9.81));
+        let o = plant.outputs(&inputs_with_gravity(9.81));
         // Downhill is theta = 0, and the bob hangs along gravity. In `liquid` (tangent of the
         // slope, quartic spring) to the third order.
         assert!(o.theta.abs() < 1e-9 && o.slosh_angle.abs() < 1e-9, "{slosh:?} {o:?}");
@@ -207,17 +207,17 @@ fn dry_friction_holds_a_leaning_hub() {
     (p.init.omega, p.init.slosh_angle) = (0.0, 0.0);
     let mut stuck = |azimuth: f64| {
         p.bench.tilt_azimuth = azimuth;
-        plant(&p).outputs(&at(9.81)).discrete.stuck
+        plant(&p).outputs(&inputs_with_gravity(9.81)).discrete.stuck
     };
     assert!(stuck(0.0) && stuck(0.3));
     p.init.slosh_angle = 0.001; // in equilibrium with the lateral part
     let mut moved = plant(&p);
-    assert!(moved.outputs(&at(9.81)).discrete.stuck);
+    assert!(moved.outputs(&inputs_with_gravity(9.81)).discrete.stuck);
     p.bench.tilt_azimuth = TAU / 4.0;
     moved = plant(&p);
-    assert!(!moved.outputs(&at(9.81)).discrete.stuck);
-    moved.step(&at(9.81), 5.0).unwrap();
-    assert!(moved.outputs(&at(9.81)).theta > 0.01, "it turns downhill");
+    assert!(!moved.outputs(&inputs_with_gravity(9.81)).discrete.stuck);
+    moved.step(&inputs_with_gravity(9.81), 5.0).unwrap();
+    assert!(moved.outputs(&inputs_with_gravity(9.81)).theta > 0.01, "it turns downhill");
 }
 
 /// Returns a hub that does not move, without viscous damping, with a ring d/R = w/R = 0.1.
@@ -237,7 +237,7 @@ fn a_ring_baffle_has_the_damping_and_the_range_of_miles_s_formula() {
     let mut p = ringed(SloshModel::Linear);
     let wave = 2.0 / (1.841_183_781_340_66f64.powi(2) - 1.0);
     let zeta = |p: &Parameters| {
-        let o = plant(p).outputs(&at(9.81));
+        let o = plant(p).outputs(&inputs_with_gravity(9.81));
         (o.baffle_zeta, o.discrete.baffle_in_range)
     };
     p.init.slosh_angle = 0.1 / wave;
@@ -253,9 +253,14 @@ fn a_ring_baffle_has_the_damping_and_the_range_of_miles_s_formula() {
     p.init.slosh_angle = 0.12 / wave;
     assert!(!zeta(&p).1);
     (p.init.slosh_angle, p.baffle.width) = (0.09 / wave, 0.2 * 0.0815);
-    assert!(!zeta(&p).1 && Plant::warnings(&p, &at(9.81))[0].contains("covers 0.360"));
+    assert!(
+        !zeta(&p).1 && Plant::warnings(&p, &inputs_with_gravity(9.81))[0].contains("covers 0.360")
+    );
     (p.baffle.width, p.baffle.depth) = (0.1, 0.2);
-    assert_eq!(Plant::new(&p, &at(9.81), 0.0, 1e-9).err().map(|all| all.len()), Some(2));
+    assert_eq!(
+        Plant::new(&p, &inputs_with_gravity(9.81), 0.0, 1e-9).err().map(|all| all.len()),
+        Some(2)
+    );
 }
 
 /// The amplitude obeys a' = -zeta(a) omega a with zeta = Z a^(1/2), so that a^(-1/2) grows by Z omega/2 per unit of time.
@@ -268,13 +273,13 @@ fn free_oscillation_decays_by_the_damping_of_its_amplitude() {
         p.init.slosh_angle = 0.1;
         let mut plant = plant(&p);
         let omega = (9.81 / plant.calculated().length[0]).sqrt();
-        let first = plant.outputs(&at(9.81));
+        let first = plant.outputs(&inputs_with_gravity(9.81));
         let z = first.baffle_zeta / 0.1f64.sqrt();
         let mut energy = first.energy;
         let time = 10.0 * TAU / omega;
         for _ in 0..1000 {
-            plant.step(&at(9.81), time / 1000.0).unwrap();
-            let now = plant.outputs(&at(9.81)).energy;
+            plant.step(&inputs_with_gravity(9.81), time / 1000.0).unwrap();
+            let now = plant.outputs(&inputs_with_gravity(9.81)).energy;
             assert!(now <= energy * (1.0 + 1e-12), "{slosh:?}: a ring never drives");
             energy = now;
         }
@@ -301,14 +306,14 @@ fn capillarity_centres_the_liquid_down_to_weightlessness() {
             (p.slosh.zeta_from_correlation, p.slosh.zeta) = (false, 0.0);
             let length = plant(&p).calculated().length[0];
             p.slosh.capillarity = true;
-            let mut plant = Plant::new(&p, &at(g), 0.0, TOLERANCE).unwrap();
+            let mut plant = Plant::new(&p, &inputs_with_gravity(g), 0.0, TOLERANCE).unwrap();
             assert_eq!(plant.calculated().length[0], length);
             let capillary = p.fluid.sigma * (xi / radius).powi(3) / p.fluid.rho;
             let omega = ((g * xi / radius + capillary) * (xi * 0.1 / radius).tanh()).sqrt();
             let frequency = plant.calculated().frequency[0];
             assert!((frequency * TAU / omega - 1.0).abs() < 1e-12, "{g} {frequency}");
-            plant.step(&at(g), TAU / omega / 3.0).unwrap();
-            let angle = plant.outputs(&at(g)).slosh_angle;
+            plant.step(&inputs_with_gravity(g), TAU / omega / 3.0).unwrap();
+            let angle = plant.outputs(&inputs_with_gravity(g)).slosh_angle;
             // cos(120 degrees), and the third order in 1 mrad.
             assert!((angle / 1e-3 + 0.5).abs() < 1e-5, "{slosh:?} {g} {angle}");
         }
@@ -326,26 +331,29 @@ fn damping_ratio_follows_the_restoring_force_down_to_weightlessness() {
     for correlation in [false, true] {
         (p.slosh.zeta_from_correlation, p.slosh.zeta) = (correlation, 0.02);
         let mut plant = plant(&p);
-        let first = [0, 1].map(|n| plant.damping_ratio(n, &at(9.81))[0]);
+        let first = [0, 1].map(|n| plant.damping_ratio(n, &inputs_with_gravity(9.81))[0]);
         let down = Inputs { g_axial: Ramp { value: 9.81, slope: -9.81 }, ..Inputs::default() };
         plant.step(&down, 1.0).unwrap();
-        let last = [0, 1].map(|n| plant.damping_ratio(n, &at(0.0))[0]);
-        let weightless = Plant::new(&p, &at(0.0), 0.0, TOLERANCE).unwrap();
+        let last = [0, 1].map(|n| plant.damping_ratio(n, &inputs_with_gravity(0.0))[0]);
+        let weightless = Plant::new(&p, &inputs_with_gravity(0.0), 0.0, TOLERANCE).unwrap();
         for n in 0..2 {
             let ratio = weightless.calculated().frequency[n]
-                / Plant::new(&p, &at(9.81), 0.0, 1e-9).unwrap().calculated().frequency[n];
+                / Plant::new(&p, &inputs_with_gravity(9.81), 0.0, 1e-9)
+                    .unwrap()
+                    .calculated()
+                    .frequency[n];
             let expected = if correlation { first[n] * ratio.powf(-0.5) } else { first[n] };
             assert!((last[n] / expected - 1.0).abs() < 1e-12, "{correlation} {n} {last:?}");
             // A start without weight has the damping that is calculated for it.
-            let started = weightless.damping_ratio(n, &at(0.0))[0];
+            let started = weightless.damping_ratio(n, &inputs_with_gravity(0.0))[0];
             let calculated = weightless.calculated().damping[n];
             assert!((started / calculated - 1.0).abs() < 1e-14, "{started} {calculated}");
         }
         // And it is the ratio of the motion: the envelope over a period.
         let omega = TAU * weightless.calculated().frequency[0];
-        let before = plant.outputs(&at(0.0)).energy;
-        plant.step(&at(0.0), 2.0 * TAU / omega).unwrap();
-        let decay = (plant.outputs(&at(0.0)).energy / before).ln() / (2.0 * TAU);
+        let before = plant.outputs(&inputs_with_gravity(0.0)).energy;
+        plant.step(&inputs_with_gravity(0.0), 2.0 * TAU / omega).unwrap();
+        let decay = (plant.outputs(&inputs_with_gravity(0.0)).energy / before).ln() / (2.0 * TAU);
         let zeta = last[0];
         assert!((decay / -(2.0 * zeta) - 1.0).abs() < 0.05, "{decay} {zeta}");
     }
@@ -374,12 +382,12 @@ fn a_replaced_parameter_names_the_parameter_that_replaces_it() {
 fn warnings_name_low_bond_numbers() {
     let mut p = bench(SloshModel::Linear, FrictionModel::None);
     p.init.slosh_angle_radial = 0.0;
-    assert!(Plant::warnings(&p, &at(9.81)).is_empty());
-    assert!(Plant::warnings(&p, &at(0.1))[0].contains("Bond number is 9.209"));
+    assert!(Plant::warnings(&p, &inputs_with_gravity(9.81)).is_empty());
+    assert!(Plant::warnings(&p, &inputs_with_gravity(0.1))[0].contains("Bond number is 9.209"));
     let mut with = p;
     with.slosh.capillarity = true;
-    assert!(Plant::warnings(&with, &at(0.1))[0].contains("contact angles"));
-    assert!(Plant::warnings(&with, &at(9.81)).is_empty());
+    assert!(Plant::warnings(&with, &inputs_with_gravity(0.1))[0].contains("contact angles"));
+    assert!(Plant::warnings(&with, &inputs_with_gravity(9.81)).is_empty());
 }
 
 /// Expected torque, with tanh(w/eps) = 1: -b w -+ (C + D exp(-(w/w_s)^2)) (1 +- A + harmonics of the angle), for both
@@ -426,7 +434,7 @@ fn dry_friction_of_a_turning_hub_depends_on_direction_and_angle() {
 fn warnings_name_breaking_parameters_without_effect() {
     let mut p = bench(SloshModel::Liquid, FrictionModel::None);
     p.slosh.breaking_steepness = 0.66;
-    assert_eq!(Plant::warnings(&p, &at(9.81)), [""; 0]);
+    assert_eq!(Plant::warnings(&p, &inputs_with_gravity(9.81)), [""; 0]);
     // It bounds the range (limited_by) without damping.
     assert_eq!(p.overridden("slosh.breaking_steepness"), None);
     p.slosh.zeta_breaking = 0.04;
@@ -440,7 +448,7 @@ fn warnings_name_breaking_parameters_without_effect() {
         (SloshModel::Frozen, 0.0, ""),
     ] {
         (p.slosh.model, p.slosh.breaking_steepness) = (model, onset);
-        let warnings = Plant::warnings(&p, &at(9.81));
+        let warnings = Plant::warnings(&p, &inputs_with_gravity(9.81));
         let first = warnings.first().map_or("", String::as_str);
         assert!(first.contains(what) && warnings.is_empty() == what.is_empty(), "{warnings:?}");
     }
@@ -450,7 +458,7 @@ fn warnings_name_breaking_parameters_without_effect() {
 /// values of a cylinder the waves begin to break as in the cylinder.
 #[test]
 fn the_steepness_of_a_table_has_its_own_wave_and_wave_number() {
-    let power = |p: &Parameters| plant(p).outputs(&at(9.81)).power_dissipated;
+    let power = |p: &Parameters| plant(p).outputs(&inputs_with_gravity(9.81)).power_dissipated;
     let mut p = bench(SloshModel::Spherical, FrictionModel::None);
     (p.slosh.zeta_breaking, p.slosh.breaking_steepness, p.init.slosh_rate) = (0.04, 0.25, 1.0);
     let (expected, known) = (power(&p), *plant(&p).calculated());

@@ -5,7 +5,7 @@ use plant::{
     FrictionModel, Inputs, LimitedBy, Parameters, Plant, Ramp, Regime, SloshModel, SloshSource,
 };
 
-fn at(g: f64) -> Inputs {
+fn inputs_with_gravity(g: f64) -> Inputs {
     Inputs { g_axial: Ramp::held(g), ..Inputs::default() }
 }
 
@@ -18,7 +18,9 @@ fn regimes_end_at_waves_of_0_15_and_0_25_radii() {
     let regime = |ratio: f64| {
         let mut p = bench(SloshModel::Linear, FrictionModel::None);
         p.init.slosh_angle = ratio / WAVE;
-        let o = Plant::new(&p, &at(9.81), 0.0, 1e-9).unwrap().outputs(&at(9.81));
+        let o = Plant::new(&p, &inputs_with_gravity(9.81), 0.0, 1e-9)
+            .unwrap()
+            .outputs(&inputs_with_gravity(9.81));
         assert!((o.wave_height - ratio * 0.0815).abs() < 1e-15);
         o.discrete.regime
     };
@@ -42,7 +44,9 @@ fn the_law_of_ring_baffles_holds_within_its_range_of_strokes_and_depths() {
         let mut p = bench(SloshModel::Linear, FrictionModel::None);
         (p.baffle.width, p.baffle.depth) = (width, depth);
         p.init.slosh_angle = wave / (0.0815 * WAVE);
-        let o = Plant::new(&p, &at(9.81), 0.0, 1e-9).unwrap().outputs(&at(9.81));
+        let o = Plant::new(&p, &inputs_with_gravity(9.81), 0.0, 1e-9)
+            .unwrap()
+            .outputs(&inputs_with_gravity(9.81));
         assert!((o.baffle_wave / wave - 1.0).abs() < 1e-3);
         o.discrete.baffle_in_range
     };
@@ -61,7 +65,7 @@ fn the_law_of_ring_baffles_holds_within_its_range_of_strokes_and_depths() {
 #[test]
 fn warnings_name_formulas_outside_their_range() {
     let mut p = bench(SloshModel::Linear, FrictionModel::None);
-    let warnings = |p: &Parameters, g: f64| Plant::warnings(p, &at(g));
+    let warnings = |p: &Parameters, g: f64| Plant::warnings(p, &inputs_with_gravity(g));
     assert!(warnings(&p, 9.81).is_empty());
     // 1000 0.0815^2 g/0.07213 = 92.1 g
     assert!(warnings(&p, 1.08).len() == 1 && warnings(&p, 1.09).is_empty(), "Bond number 100");
@@ -114,12 +118,12 @@ fn a_table_whose_masses_are_the_whole_liquid_has_no_fixed_mass() {
     p.slosh.table.m_liq = 1.0;
     p.slosh.table.mass[..2].copy_from_slice(&[0.75, 0.25 + 5e-10]);
     p.slosh.table.length[..2].copy_from_slice(&[0.1, 0.1]);
-    let plant = Plant::new(&p, &at(9.81), 0.0, 1e-9).unwrap();
+    let plant = Plant::new(&p, &inputs_with_gravity(9.81), 0.0, 1e-9).unwrap();
     assert_eq!(plant.calculated().m_0, 0.0);
     p.slosh.table.mass[1] = 0.25 + 2e-9;
     assert!(Plant::problems(&p)[0].contains("add up to"));
     p.slosh.table.mass[1] = 0.2;
-    let plant = Plant::new(&p, &at(9.81), 0.0, 1e-9).unwrap();
+    let plant = Plant::new(&p, &inputs_with_gravity(9.81), 0.0, 1e-9).unwrap();
     assert!((plant.calculated().m_0 - 0.05).abs() < 1e-15);
 }
 
@@ -130,7 +134,7 @@ fn a_spherical_bob_starts_below_the_horizontal() {
     let refused = |radial: f64, tangential: f64| {
         let mut p = bench(SloshModel::Spherical, FrictionModel::None);
         (p.init.slosh_angle_radial, p.init.slosh_angle) = (radial, tangential);
-        Plant::new(&p, &at(9.81), 0.0, 1e-9).is_err()
+        Plant::new(&p, &inputs_with_gravity(9.81), 0.0, 1e-9).is_err()
     };
     // 45 degrees each are 90 together.
     assert!(!refused(0.78, 0.78) && !refused(-0.78, 0.78) && refused(0.79, -0.79));
@@ -163,7 +167,9 @@ fn a_liquid_whose_inertia_falls_with_the_amplitude_is_refused() {
 #[test]
 fn the_output_limited_by_names_the_limit_that_was_passed() {
     let reason = |p: &Parameters, g: f64| {
-        let o = Plant::new(p, &at(g), 0.0, 1e-9).unwrap().outputs(&at(g));
+        let o = Plant::new(p, &inputs_with_gravity(g), 0.0, 1e-9)
+            .unwrap()
+            .outputs(&inputs_with_gravity(g));
         o.discrete.limited_by
     };
     let of_angle = |model: SloshModel, degrees: f64| {
@@ -226,7 +232,9 @@ fn a_table_of_modes_has_its_own_limits() {
         (p.slosh.table.nonlinear_inertia[0], p.slosh.table.nonlinear_stiffness[0]) = (1.4, 0.7);
         p.slosh.table.angle_limit[0] = f64::to_radians(limit);
         p.init.slosh_angle = f64::to_radians(degrees);
-        let o = Plant::new(&p, &at(9.81), 0.0, 1e-9).unwrap().outputs(&at(9.81));
+        let o = Plant::new(&p, &inputs_with_gravity(9.81), 0.0, 1e-9)
+            .unwrap()
+            .outputs(&inputs_with_gravity(9.81));
         o.discrete.limited_by
     };
     let liquid = |limit: f64, degrees: f64| reason(SloshModel::Liquid, limit, degrees);

@@ -18,7 +18,6 @@ fn after(p: &Parameters, inputs: &Inputs, tolerance: f64, h: f64) -> [f64; STATE
     *plant.continuous_states()
 }
 
-/// Returns the number of internal steps that `h` takes.
 fn steps(p: &Parameters, inputs: &Inputs, tolerance: f64, h: f64) -> usize {
     let is_enough = |max_steps: usize| {
         let mut p = *p;

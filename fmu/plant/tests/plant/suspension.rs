@@ -19,7 +19,6 @@ fn frozen(friction: FrictionModel) -> Parameters {
     p
 }
 
-/// Returns the inertia of hub and rigid liquid, kg m2.
 fn inertia(p: &Parameters) -> f64 {
     let m_liq = 1000.0 * PI / 4.0 * p.tank.d * p.tank.d * p.tank.h;
     p.hub.inertia + m_liq * p.tank.r * p.tank.r

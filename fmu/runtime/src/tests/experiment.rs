@@ -107,7 +107,6 @@ fn contradicting_parameters_end_initialization_with_all_faults_named() {
     );
 }
 
-/// All calls.
 const CALLS: [&Call; 40] = [
     &SET_DEBUG_LOGGING,
     Fmi2::SETUP_EXPERIMENT,

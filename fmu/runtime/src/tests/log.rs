@@ -135,7 +135,10 @@ fn log_categories_are_the_standards_and_include_events_only_if_the_model_has_eve
     let all = described(categories::<_, Fmi2>(&TABLE));
     let expected = [
         ("logEvents", "The valve moves"),
-        ("logStatusWarning", "What the parameters leave of the range in which the model is known"),
+        (
+            "logStatusWarning",
+            "Warnings about parameters and inputs, such as values for which the model is not valid",
+        ),
         ("logStatusDiscard", "Why a call returned fmi2Discard"),
         ("logStatusError", "Why a call returned fmi2Error"),
         ("logStatusFatal", "Why a call returned fmi2Fatal"),

@@ -46,7 +46,6 @@ fn started(interface: Interface, values: &[(&str, f64)]) -> Subject {
     instance
 }
 
-/// Returns [`started`] in continuous-time mode.
 fn continuous(values: &[(&str, f64)]) -> Subject {
     let mut instance = started(ME, values);
     instance.enter_continuous_time_mode().unwrap();
@@ -73,7 +72,6 @@ fn set_boolean(instance: &mut Subject, name: &str, b: bool) -> Result<(), Fault>
     instance.set(&SET_BOOLEAN, &[reference(name)], |_| Value::Boolean(b))
 }
 
-/// Reads a value by the call for its type.
 fn get(instance: &mut Subject, name: &str) -> Result<Value, Fault> {
     let reference = reference(name);
     let call = match TABLE.scalars[reference as usize].variable.kind {
@@ -91,7 +89,6 @@ fn real(instance: &mut Subject, name: &str) -> f64 {
     }
 }
 
-/// Returns the message of a refused call.
 fn refused<T: std::fmt::Debug>(result: Result<T, Fault>) -> String {
     let fault = result.expect_err("it should be refused");
     assert_eq!(fault.severity, Severity::Error, "{}", fault.text);
@@ -119,7 +116,6 @@ fn close(a: f64, b: f64, tolerance: f64) {
     assert!((a - b).abs() <= tolerance * b.abs().max(1e-300), "{a} instead of {b}");
 }
 
-/// Returns a spring whose motion begins.
 fn spring(interface: Interface) -> Instance<Spring, Fmi2> {
     let mut instance = Instance::new(interface);
     instance.enter_initialization_mode().unwrap();

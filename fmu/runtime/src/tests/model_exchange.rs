@@ -168,7 +168,6 @@ fn accepted_steps_may_pass_the_stop_time_by_rounding_errors() {
     }
 }
 
-/// A model without events has no event indicators and reports no time events.
 #[test]
 fn model_without_events_has_none() {
     let mut instance = spring(ME);

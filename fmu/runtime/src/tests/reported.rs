@@ -32,7 +32,7 @@ fn stepping(events: Events, start: f64, values: &[(&str, f64)]) -> Host {
 }
 
 /// Returns state, number of movements and position of the valve, as the host sees them.
-fn shown(host: &mut Host) -> [Value; 3] {
+fn valve_outputs(host: &mut Host) -> [Value; 3] {
     [
         host.get(&GET_BOOLEAN, number("open")).unwrap(),
         host.get(&GET_INT32, number("events")).unwrap(),
@@ -47,7 +47,7 @@ const OPENED: [Value; 3] = [Value::Boolean(true), Value::Integer(1), Value::Inte
 #[test]
 fn discrete_outputs_keep_their_value_until_the_host_handles_the_event() {
     let mut host = stepping(Events::Reported, 0.0, &[("inspection", 5.0)]);
-    assert_eq!(shown(&mut host), CLOSED);
+    assert_eq!(valve_outputs(&mut host), CLOSED);
     let quiet = StepInfo { event: false, early: false };
     assert_eq!(host.step_to_event(0.0, 0.5, false), Ok(quiet));
     host.set(&SET_FLOAT64, &[number("z")], |_| Value::Real(3.0)).unwrap();
@@ -58,18 +58,18 @@ fn discrete_outputs_keep_their_value_until_the_host_handles_the_event() {
     let before = level(&mut host);
     let event = StepInfo { event: true, early: false };
     assert_eq!(host.step_to_event(0.5, 0.001, false), Ok(event));
-    assert_eq!(shown(&mut host), CLOSED, "the valve has opened");
+    assert_eq!(valve_outputs(&mut host), CLOSED, "the valve has opened");
     assert!((level(&mut host) / before - 0.5).abs() < 1e-3, "and half of the vessel is spilt");
     // it stays an event until it is handled
     assert_eq!(host.step_to_event(0.501, 0.5, false), Ok(event));
     host.enter_event_mode().unwrap();
-    assert_eq!(shown(&mut host), CLOSED);
+    assert_eq!(valve_outputs(&mut host), CLOSED);
     let info = EventInfo { states_changed: false, next_time: Some(5.0) };
     assert_eq!(host.new_discrete_states(), Ok(info));
-    assert_eq!(shown(&mut host), OPENED);
+    assert_eq!(valve_outputs(&mut host), OPENED);
     host.enter_step_mode(&ENTER_STEP).unwrap();
     assert_eq!(host.step_to_event(1.001, 0.5, false), Ok(quiet));
-    assert_eq!(shown(&mut host), OPENED);
+    assert_eq!(valve_outputs(&mut host), OPENED);
 }
 
 /// An error terminates an instance of FMI 3.0, but its variables can still be read.
@@ -79,11 +79,11 @@ fn after_an_error_before_initialization_discrete_outputs_have_their_start_values
     assert!(host.exit_initialization_mode().is_err());
     host.after_error();
     assert_eq!(host.state(), InstanceState::Terminated);
-    assert_eq!(shown(&mut host), CLOSED);
+    assert_eq!(valve_outputs(&mut host), CLOSED);
     // Saved states keep the difference between a value and none.
     let bytes = to_bytes(&host);
     let mut other = from_bytes::<Vessels, Fmi3>(&bytes).unwrap();
-    assert_eq!(shown(&mut other), CLOSED);
+    assert_eq!(valve_outputs(&mut other), CLOSED);
     assert!(to_bytes(&other) == bytes);
 }
 

@@ -129,8 +129,8 @@ fn a_saved_state_of_the_other_interface_is_refused() {
     let other = started(ME, &[]);
     assert_eq!(
         unchanged(&mut instance, |i| i.restore(&other)),
-        "fmi2SetFMUstate: the state is of an instance for Model Exchange, and this one is for \
-         Co-Simulation"
+        "fmi2SetFMUstate: the saved state belongs to an instance for Model Exchange, but this \
+         instance is for Co-Simulation"
     );
     let mut moved = instance.clone();
     moved.do_step(0.0, 1.0).unwrap();
@@ -155,21 +155,29 @@ fn bytes_that_are_no_saved_state_are_refused_with_a_reason() {
     let why = |bytes: &[u8]| read(bytes).map(|_| ()).unwrap_err();
     assert_eq!(why(&[]), "the saved state is cut off");
     assert_eq!(why(b"FMUstatX"), "these bytes are not a saved state of Vessels");
-    assert_eq!(why(&patched(&bytes, 8, &[9])), "the saved state has format 9; known: 4");
+    assert_eq!(
+        why(&patched(&bytes, 8, &[9])),
+        "the saved state has format 9, but this FMU reads only format 4"
+    );
     let length = bytes.len();
     let cut = &bytes[..length - 1];
-    assert_eq!(why(cut), format!("the saved state should have {length} bytes, not {}", length - 1));
+    assert_eq!(
+        why(cut),
+        format!("the saved state should have {length} bytes but has {}", length - 1)
+    );
     let other = "{00000000-0000-0000-0000-000000000000}";
     assert_eq!(
         why(&patched(&bytes, 16, other.as_bytes())),
-        format!("the saved state is of another FMU or of another version of Vessels, {other}")
+        format!(
+            "the saved state belongs to another FMU, or another version of Vessels, with the GUID {other}"
+        )
     );
     let mut long = bytes.clone();
     long.extend([0; 8]);
     let says = (length + 8) as u32;
     assert_eq!(
         why(&patched(&long, 12, &says.to_le_bytes())),
-        format!("a saved state has {length} bytes, not {}", length + 8)
+        format!("saved states of this FMU have {length} bytes, but this one has {}", length + 8)
     );
     for place in 54..length {
         let mut damaged = bytes.clone();

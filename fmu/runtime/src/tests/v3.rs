@@ -90,7 +90,6 @@ unsafe extern "C" fn update(
     }
 }
 
-/// Returns an instance in Step Mode with its host.
 fn stepping(early_return: bool) -> (fmi3Instance, Box<Mutex<TestHost>>) {
     let host = Box::new(Mutex::new(TestHost::default()));
     let environment = ptr::from_ref(&*host).cast_mut().cast();
@@ -122,7 +121,6 @@ fn stepping(early_return: bool) -> (fmi3Instance, Box<Mutex<TestHost>>) {
     (instance, host)
 }
 
-/// Makes a step, and returns its status, whether it returned early, and the last successful time.
 fn step(instance: fmi3Instance, at: f64, h: f64) -> (fmi3Status, bool, f64) {
     let (mut event, mut terminate, mut early, mut last) = (7, 7, 7, f64::NAN);
     let status = unsafe {

@@ -18,8 +18,7 @@ unsafe extern "C" fn log(to: *mut c_void, _: fmi3Status, _: fmi3String, what: fm
     lines.lock().unwrap().push(unsafe { text(what) }.unwrap());
 }
 
-/// Returns an instance for a host that uses arrays.
-fn made(lines: &Lines) -> fmi3Instance {
+fn instance_with_arrays(lines: &Lines) -> fmi3Instance {
     let token = c_string(Trays::table().token(Layout::Arrays));
     let environment = std::ptr::from_ref(lines).cast_mut().cast();
     let (name, log) = (c"one".as_ptr(), Some(log as _));
@@ -49,11 +48,10 @@ fn set(instance: fmi3Instance, of: u32, values: &[f64]) -> fmi3Status {
     unsafe { fmi3SetFloat64::<Trays>(instance, &of, 1, values.as_ptr(), values.len()) }
 }
 
-/// Matrices and vectors of a test FMU with array variables.
 #[test]
 fn values_of_arrays_are_read_and_set_in_row_major_order() {
     let lines = Lines::default();
-    let instance = made(&lines);
+    let instance = instance_with_arrays(&lines);
     assert_eq!(get(instance, &[6, 7]), (fmi3OK, [0.0, 1.0, 2.0, 3.0, 10.0, 11.0, 13.0, 14.0]));
     assert_eq!(set(instance, 7, &[1.5, 2.5, 3.5, 4.5]), fmi3OK);
     assert_eq!(get(instance, &[8, 7]), (fmi3OK, [0.5, 1.5, 2.5, 3.5, 4.5]));
@@ -84,7 +82,7 @@ fn wrong_counts_types_and_references_of_arrays_are_described() {
     .enumerate()
     {
         let lines = Lines::default();
-        let instance = made(&lines);
+        let instance = instance_with_arrays(&lines);
         let status = match case {
             0 => get::<3>(instance, &all[..1]).0,
             1 => get::<3>(instance, &all[..4]).0,
@@ -106,7 +104,7 @@ fn wrong_counts_types_and_references_of_arrays_are_described() {
 #[test]
 fn changing_the_size_of_an_array_resets_its_elements() {
     let lines = Lines::default();
-    let instance = made(&lines);
+    let instance = instance_with_arrays(&lines);
     let rows = |n: u64| unsafe {
         assert_eq!(fmi3EnterConfigurationMode::<Trays>(instance), fmi3OK);
         assert_eq!(fmi3SetUInt64::<Trays>(instance, &5, 1, &n, 1), fmi3OK);
@@ -135,7 +133,7 @@ fn changing_the_size_of_an_array_resets_its_elements() {
     assert_eq!((get(instance, &[7, 8]), states()), ((fmi3OK, [10.0, 11.0, 13.0, 14.0, 0.5]), 2));
     unsafe { fmi3FreeInstance::<Trays>(instance) };
     // to three rows; to one nothing was set any more
-    let told = "fmi3SetUInt64: rows changed, what was set before is lost of m";
+    let told = "fmi3SetUInt64: rows changed: the values set earlier for m are lost. Set them again";
     assert_eq!(*lines.lock().unwrap(), [told]);
 }
 
@@ -145,7 +143,7 @@ fn time_and_event_indicators_follow_the_scalars_of_the_table() {
     let lines = Lines::default();
     let token = c_string(Trays::table().token(Layout::Scalars));
     let environment = std::ptr::from_ref(&lines).cast_mut().cast();
-    let made = || unsafe {
+    let scalar_instance = || unsafe {
         let (name, token, path) = (c"one".as_ptr(), token.as_ptr(), std::ptr::null());
         let instance = fmi3InstantiateModelExchange::<Trays>(
             name,
@@ -159,7 +157,7 @@ fn time_and_event_indicators_follow_the_scalars_of_the_table() {
         fmi3EnterInitializationMode::<Trays>(instance, 0, 0.0, 3.0, 0, 0.0);
         instance
     };
-    let instance = made();
+    let instance = scalar_instance();
     assert_eq!(get(instance, &[24, 25, 26, 27]), (fmi3OK, [0.5, 3.0, 0.25, -0.5]));
     unsafe { fmi3FreeInstance::<Trays>(instance) };
     for (case, said) in [
@@ -172,7 +170,7 @@ fn time_and_event_indicators_follow_the_scalars_of_the_table() {
     .into_iter()
     .enumerate()
     {
-        let instance = made();
+        let instance = scalar_instance();
         let status = match case {
             0 => get::<1>(instance, &[28]).0,
             1 => set(instance, 27, &[1.0]),
@@ -195,7 +193,7 @@ fn time_and_event_indicators_follow_the_scalars_of_the_table() {
 #[test]
 fn elements_depend_on_elements_also_where_the_derivative_vanishes() {
     let lines = Lines::default();
-    let instance = made(&lines);
+    let instance = instance_with_arrays(&lines);
     unsafe {
         fmi3EnterInitializationMode::<Trays>(instance, 0, 0.0, 0.0, 0, 0.0);
         assert_eq!(fmi3ExitInitializationMode::<Trays>(instance), fmi3OK);

@@ -208,11 +208,13 @@ fn directional_derivatives_equal_the_partial_derivatives_of_the_equations() {
         })
     };
     assert!(
-        ask("sum", "leak", 1.0).ends_with(
-            "leak is not among the knowns: it is neither an input nor a continuous state"
-        )
+        ask("sum", "leak", 1.0)
+            .ends_with("leak cannot be a known: it is neither an input nor a continuous state")
     );
-    assert!(ask("leak", "z", 1.0).ends_with("leak is not computed from states and inputs"));
+    assert!(
+        ask("leak", "z", 1.0)
+            .ends_with("leak has no derivative, because it is not computed from states and inputs")
+    );
     assert!(
         ask("sum", "z", f64::NAN).ends_with("direction of z = NaN (allowed: any finite number)")
     );
@@ -245,7 +247,7 @@ fn in_initialization_mode_derivatives_are_by_inputs_and_parameters() {
     // From 0 on by the order of magnitude.
     close(ask("room", "z", 1.0).unwrap(), -1.0, 1e-11);
     assert_eq!(ask("sum", "q[1]", 0.0), Ok(0.0));
-    let known = "is not among the knowns: in initialization mode these are inputs and parameters";
+    let known = "cannot be a known in initialization mode (allowed: inputs and parameters)";
     assert!(refused(ask("sum", "level[1]", 1.0)).ends_with(&format!("level[1] {known}")));
     assert!(refused(ask("sum", "z", f64::INFINITY)).contains("direction of z = inf"));
 }

@@ -227,7 +227,6 @@ impl Dynamics for Vessels {
         self.handle_event(inputs).map(|_| ()).map_err(failure)
     }
 
-    /// Makes a step that stops at the inspection.
     fn step_to_event(&mut self, inputs: &Inputs, h: f64) -> Result<StepEnd, StepFailure> {
         let left = self.inspection - self.time;
         if left <= 0.0 || left > h {

@@ -15,7 +15,6 @@ use crate::variable::{Access, Dimension, Value, Variable};
 pub struct Arrays {
     /// Value references of the scalars, variable by variable.
     scalars: Vec<u32>,
-    /// End of each variable's elements in `scalars`.
     ends: Vec<usize>,
     types: Vec<CType>,
     /// For each scalar its array and its position in the array, counted from 1; position 0 is outside the present

@@ -8,7 +8,6 @@ use crate::model::Model;
 use crate::table::{Layout, Scalar};
 use crate::version::Version;
 
-/// Instance states in which values can be read and set.
 pub(super) const GET: u16 = ANY;
 pub(super) const SET: u16 = I | M | S | E | C;
 

@@ -11,7 +11,6 @@ use crate::call::{Call, Fault};
 use crate::model::Model;
 use crate::variable::Causality;
 
-/// Dependency of one element of a variable on an element of another.
 pub(super) struct Dependency {
     element: usize,
     independent: fmi3ValueReference,
@@ -39,7 +38,7 @@ pub(super) fn dependencies<M: Model>(
         if matches!(scalar.variable.causality, Causality::Input | Causality::Parameter) {
             let name = scalar.name();
             return Err(
-                call.error(format_args!("{name} is set by the host and depends on nothing"))
+                call.error(format_args!("{name} depends on no variable, because the host sets it"))
             );
         }
         for known in instance.dependencies(call, scalar)? {

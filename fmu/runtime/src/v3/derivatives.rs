@@ -11,7 +11,6 @@ use crate::model::Model;
 use crate::number::{is_finite, text as number};
 use crate::version::Version;
 
-/// Computes the derivative of the unknowns in a direction of the knowns.
 pub(super) unsafe fn directional_derivative<M: Model>(
     instance: fmi3Instance,
     (unknowns, n_unknowns): References,

@@ -102,7 +102,6 @@ pub(super) fn check_elements<M: Model>(
     )))
 }
 
-/// Updates the sizes of the host's arrays after a change of structural parameters.
 pub(super) fn resize<M: Model>(component: &mut Component<M, Fmi3>) {
     let Component { instance, host, .. } = component;
     if let Some(arrays) = &mut host.arrays {
@@ -135,7 +134,10 @@ pub(super) fn start_resized<M: Model>(
         component.log.report_effect(call, || {
             let names: Vec<_> = lost.iter().map(|variable| variable.array_name()).collect();
             let sizes = changed.join(", ");
-            format!("{sizes} changed, what was set before is lost of {}", names.join(", "))
+            format!(
+                "{sizes} changed: the values set earlier for {} are lost. Set them again",
+                names.join(", ")
+            )
         });
     }
 }

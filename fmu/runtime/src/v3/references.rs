@@ -11,7 +11,6 @@ pub(super) fn scalar_reference<M: Model>(scalar: &Scalar<M>) -> u32 {
     scalar.index + 1
 }
 
-/// Returns the C type of a scalar in FMI 3.0.
 #[inline]
 pub(crate) fn type_of<M: Model>(scalar: &Scalar<M>) -> CType {
     match scalar.c_type {

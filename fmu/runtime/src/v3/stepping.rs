@@ -55,7 +55,6 @@ pub(super) unsafe fn output_derivatives<M: Model>(
 
 #[derive(Clone, Copy)]
 struct Wish {
-    /// Time of the early return that the host requests, s.
     early_return: Option<f64>,
 }
 

@@ -108,7 +108,7 @@ pub(super) fn check_intermediate<M: Model>(
             Phase::Get => ("got", "intermediateVariableGetAllowed"),
         };
         return Err(call.error(format_args!(
-            "within this intermediate update variables can only be {now}: {then} alone is true"
+            "variables can only be {now} in this intermediate update, because only {then} is true"
         )));
     }
     let name = || Fmi3::scalar::<M>(reference, call.c_type).map_or_else(|why| why, Scalar::name);
