@@ -7,8 +7,8 @@
 //!
 //! The ratio of wall shear to volume is beta_n = int_W |grad phi|^2 dS / int_Q |grad phi|^2 dV, 1/m. The true natural
 //! frequency omega_n includes capillarity, so that zeta stays finite if g vanishes. The factor f accounts for surface
-//! film and contact line: the value of a measured shape, or [`UNMEASURED`] for any other. A wall that is such a shape in
-//! part has a mean of both.
+//! film and contact line. It is measured for some shapes of tanks; any other shape has [`UNMEASURED`]. If only a part
+//! of the wall has a measured shape, f is a mean of both values.
 //!
 //! Re = nu/sqrt(g R^3) throughout (an inverse Reynolds number), x = h/R is the fill, and zeta is
 //! the logarithmic decrement over 2 pi. Measured tanks scatter by about 30 % around any

@@ -12,9 +12,10 @@
 //! of the liquid's centre of mass, s and s_2 from the frequency of planar motion and t and t_2 from that of circular
 //! motion.
 //!
-//! Source: fully nonlinear potential flow, computed for this project by a variational method (Luke's principle) at the
-//! depths of [`ROWS`]. The slosh mass's frequencies are those of the flow within 0.06 % (planar) and 0.11 % (circular) up
-//! to the angles there, and its energy is that of planar waves within 0.1 % from h/R 0.35 on (0.7 % at 0.25, 1.1 % at 0.3).
+//! Source: fully nonlinear potential flow, computed for this project by a variational method (Luke's principle) at
+//! the depths of [`ROWS`]. Up to the slosh angles in that table, the frequencies of the slosh mass differ from the
+//! frequencies of the flow by at most 0.06 % (planar) and 0.11 % (circular), and its energy differs from the energy
+//! of planar waves by at most 0.1 % from h/R 0.35 on (0.7 % at 0.25, 1.1 % at 0.3).
 //! `harness/tank/tests/tank/backbones.rs` compares the frequencies.
 
 use crate::third_order;

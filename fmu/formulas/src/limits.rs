@@ -77,8 +77,8 @@ impl LimitedBy {
 
 /// Relative error of the frequency that a model of the amplitude dependence may have at the end of its range.
 pub const FREQUENCY: f64 = 3e-3;
-/// Relative error of the frequency at which a forced response is wrong by 3 %, if the response is wrong only because the
-/// model's frequency shifts differ from those of the liquid.
+/// Relative error of the frequency at which a forced response is wrong by 3 %, if the response is wrong only because
+/// the frequencies of the model change with the amplitude in another way than the frequencies of the liquid.
 pub const FORCED: f64 = 8.5e-4;
 
 /// Relative error of the third order's frequency at the angle at which a forced response is wrong by 3 %, for a tank in

@@ -68,10 +68,10 @@ pub const BRIDGED: [f64; 2] = [0.70, 1.20];
 /// Returns the large-wave coefficients s (inertia) and kappa (stiffness) of the first mode of an upright cylinder
 /// filled to h/R = `fill`.
 ///
-/// Within [`BRIDGED`] the third-order theory has poles, and close to a pole it is valid only at very small amplitudes.
-/// Both coefficients are therefore interpolated linearly between the ends of that range. In fully nonlinear potential
-/// flow at h/R 0.8 and 1.0 the frequencies are those of the interpolated coefficients within 0.3 % up to 16 degrees,
-/// whereas a pendulum is 26 % low in a forced response at h/R 1.0.
+/// Within [`BRIDGED`] the third-order theory has poles, and close to a pole it is valid only at very small
+/// amplitudes. Both coefficients are therefore interpolated linearly between the ends of that range. With the
+/// interpolated coefficients, the frequencies differ from fully nonlinear potential flow at h/R = 0.8 and 1.0 by at
+/// most 0.3 % up to 16 degrees. A pendulum, in contrast, is 26 % too low in a forced response at h/R = 1.0.
 pub fn coefficients(fill: f64) -> (f64, f64) {
     let [low, high] = BRIDGED;
     if fill <= low || fill >= high {
@@ -111,8 +111,8 @@ pub fn unbridged(fill: f64) -> (f64, f64) {
     (1.5 * circular - 2.0 * planar, 2.0 * circular)
 }
 
-/// Returns azimuthal number and radial number, which counts from 1, of the excited mode whose frequency is
-/// twice that of the first mode within [`DETUNING`] at h/R = `fill`, if there is one.
+/// Returns azimuthal number and radial number, which counts from 1, of the excited mode whose frequency is twice the
+/// first mode's frequency within [`DETUNING`] at h/R = `fill`, if there is one.
 pub fn secondary_resonance(fill: f64) -> Option<(usize, usize)> {
     let t_1 = XI[0] * libm::tanh(XI[0] * fill);
     EXCITED.iter().enumerate().find_map(|(azimuth, modes)| {

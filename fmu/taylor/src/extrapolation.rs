@@ -222,7 +222,6 @@ mod tests {
     /// State at the far end of an ellipse with eccentricity 0.6 and semi-axis 1, whose revolution takes 2 pi.
     const START: [f64; 4] = [1.6, 0.0, 0.0, 0.5];
 
-    /// Smaller tolerances take more evaluations.
     #[test]
     fn a_kepler_orbit_integrated_over_one_revolution_ends_at_its_start_within_the_tolerance() {
         let mut works = [0; 4];
@@ -239,7 +238,6 @@ mod tests {
         assert_eq!(works, [500, 541, 920, 1226]);
     }
 
-    /// A Kepler orbit, integrated by extrapolation over 3 s.
     #[test]
     fn an_integration_in_three_parts_equals_an_integration_in_one() {
         let (mut x, mut y) = (START, START);

@@ -17,9 +17,10 @@
 //! sigma_A²(tau) = ½ E[(b2 − b1)²] = var b1 − cov(b1, b2) = sigma² (2x − 3 + 4 e^−x − e^−2x) / x²
 //! ```
 //!
-//! The deviation rises with slope +1/2, has its maximum 0.617 sigma at tau = 1.89 T, and falls with slope −1/2, without
-//! a plateau. The *bias instability* B of data sheets is that of flicker noise. The FMU's Gauss–Markov bias has
-//! sigma = B/0.664 (thesis 5.5). Its maximum is therefore 0.617/0.664 B = 0.93 B, and B is 0.664/0.617 = 1.076 times the maximum.
+//! The deviation rises with slope +1/2, has its maximum 0.617 sigma at tau = 1.89 T, and falls with slope −1/2,
+//! without a plateau. The *bias instability* B in data sheets describes flicker noise. The FMU's Gauss–Markov bias
+//! has sigma = B/0.664 (thesis 5.5). Its maximum is therefore 0.617/0.664 B = 0.93 B, and B is 0.664/0.617 = 1.076
+//! times the maximum.
 
 mod covariance;
 mod fit;

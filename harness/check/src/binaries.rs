@@ -62,7 +62,6 @@ pub(crate) fn tuple(folder: &str) -> Option<Form> {
 struct Declared {
     interface: String,
     identifier: String,
-    /// Functions that the binary of this interface must export.
     wanted: Vec<&'static str>,
 }
 

@@ -79,7 +79,6 @@ pub fn model_identifier(d: &Description, findings: &mut Findings) {
 }
 
 pub fn capabilities(d: &Description, findings: &mut Findings) {
-    /// Capabilities that need another one.
     const NEEDS: [(&str, &str); 3] = [
         ("canSerializeFMUstate", "canGetAndSetFMUstate"),
         ("canSerializeFMUState", "canGetAndSetFMUState"),

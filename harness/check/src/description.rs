@@ -71,7 +71,6 @@ pub struct Description {
     pub root: Element,
     pub variables: Vec<Variable>,
     pub structure: Vec<Unknown>,
-    /// Positions of the variables by their keys.
     places: BTreeMap<u32, usize>,
 }
 
@@ -116,7 +115,7 @@ pub struct Unknown {
 }
 
 impl Variable {
-    /// Returns the key of the variable of which this is the derivative.
+    /// Returns the key of the state, if this variable is the derivative of a state.
     pub fn derivative_of(&self) -> Option<u32> {
         number(&self.typed, "derivative")
     }

@@ -19,7 +19,7 @@ pub struct Report {
     pub outcomes: Vec<Outcome>,
     /// The error that no selected rule could be checked. A report with this error contains no result about the FMU.
     pub unchecked: Option<String>,
-    /// Report of a bug in this program because of which a rule could not be checked.
+    /// Report of a bug in this program that prevented the check of a rule.
     pub bug: Option<String>,
 }
 

@@ -248,7 +248,6 @@ fn place(element: &Element) -> String {
     }
 }
 
-/// Returns the table of the description's version.
 fn kinds(d: &Description) -> &'static [Kind] {
     if d.is_fmi3() { fmi3::KINDS } else { KINDS }
 }

@@ -145,7 +145,6 @@ pub fn initial_unknowns(d: &Description, findings: &mut Findings) {
     }
 }
 
-/// Reports entries of ModelStructure that name no variable.
 pub fn references(d: &Description, findings: &mut Findings) {
     let count = d.variables.len();
     for unknown in &d.structure {

@@ -81,7 +81,6 @@ pub struct Experiment {
     pub tolerance: Option<f64>,
     /// Stop time, s, if DefaultExperiment has one.
     pub stop: Option<f64>,
-    /// Communication step, s.
     pub step: f64,
 }
 
@@ -89,7 +88,6 @@ pub struct Experiment {
 pub trait Tested: Version + 'static {
     /// The rule that reports steps of Model Exchange that fail.
     const EXCHANGE_RUNS: &'static str;
-    /// Beginning of the names of functions.
     const FMI: &'static str;
     /// Word for a saved state in the names of functions and capabilities.
     const STATE: &'static str;
@@ -479,7 +477,6 @@ pub struct Session<'f, V: Tested = Fmi2> {
     pub fmu: &'f UnderTest<V>,
     pub using: Use,
     pub instance: Instance<'f, V>,
-    /// Simulation time that has been reached, s.
     pub time: f64,
     pub step: f64,
     /// Number of steps so far, from which the changing inputs follow.
@@ -556,7 +553,6 @@ impl<V: Tested> Session<'_, V> {
         })
     }
 
-    /// Returns the numbers of continuous states and event indicators.
     pub fn sizes(&mut self) -> Called<(usize, usize)> {
         V::sizes(&mut self.instance)
     }
@@ -661,7 +657,6 @@ pub fn start_values(v: &Variable) -> Option<Vec<Value>> {
     }
 }
 
-/// Returns the start value of a scalar.
 pub fn start_value(v: &Variable) -> Option<Value> {
     start_values(v)?.into_iter().next()
 }

@@ -1,7 +1,8 @@
-//! Files and budgets of one command: what it may read, how much of it, and how outputs appear complete or not at all.
+//! Files of one command: the inputs that it may read and their largest sizes, and outputs, which are written
+//! completely or not at all.
 //!
-//! The bottom of the harness: it knows no FMU and no signal. Panics of our own code are reported here, with the files that
-//! were read.
+//! All other crates of the harness may use this crate, which itself knows neither FMUs nor signals. It also writes
+//! the report after a panic of our own code, with the names of the files that were read.
 
 pub mod budget;
 pub mod bug;

@@ -16,8 +16,8 @@ use sha2::{Digest, Sha256};
 
 use crate::symbol::readable;
 
-/// Newest version of glibc that a binary may need: the one of the oldest Linux on which simulation tools
-/// still run.
+/// Newest version of glibc that a binary may need: the version in the oldest Linux on which simulation tools still
+/// run.
 pub const GLIBC: Version = Version(2, 17);
 /// Newest version of macOS that a binary may need: the first one for both architectures.
 pub const MACOS: Version = Version(11, 0);

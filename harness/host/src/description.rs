@@ -627,7 +627,6 @@ fn indices(mut index: usize, dimensions: &[usize]) -> String {
     all.join(",")
 }
 
-/// Longest name of a variable, bytes.
 const LONGEST_NAME: usize = 1024;
 /// Largest number of types, and of items of one type. They are limited because each declaredType is searched
 /// among all types.
@@ -1075,7 +1074,6 @@ mod tests {
         assert_eq!((&z.causality, displayed), (&Causality::Local, Some("deg")));
     }
 
-    /// The type UInt8 allows 0 to 255.
     #[test]
     fn an_integer_value_of_fmi_3_must_fit_the_declared_type() {
         let d = ModelDescription::from_xml(XML3).unwrap();

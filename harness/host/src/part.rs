@@ -160,7 +160,6 @@ fn token_of_part(
     Ok(format!("{}{sizes:0<3}{states:02x}{sum:04x}}}", &whole[..28]))
 }
 
-/// Returns the FNV-1a hash of 128 bits.
 fn fnv(bytes: &[u8]) -> u128 {
     bytes.iter().fold(0x6c62_272e_07bb_0142_62b8_2175_6295_c58d, |hash: u128, byte| {
         (hash ^ u128::from(*byte)).wrapping_mul(0x0000_0000_0100_0000_0000_0000_0000_013b)
@@ -220,7 +219,6 @@ impl Edits {
         self.0.push((begin..range.end, String::new()));
     }
 
-    /// Sets an attribute, if the element has it.
     fn set(&mut self, node: &Node, name: &str, value: &str) {
         if let Some(attribute) = node.attribute_node(name) {
             self.0.push((attribute.range_value(), value.into()));

@@ -12,7 +12,6 @@ pub const MOST: usize = 400_000;
 pub const MOST_ATTRIBUTES: usize = 1_000_000;
 /// Largest number of attributes of one element; FMI uses up to 13.
 pub const MOST_OF_ONE: usize = 200;
-/// Longest name of an element or attribute, bytes.
 pub const LONGEST_NAME: usize = 1000;
 /// Longest value of an attribute, bytes. The longest values in FMI are lists of dependencies.
 pub const LONGEST_VALUE: usize = 1 << 20;

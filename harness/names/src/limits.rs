@@ -5,7 +5,8 @@ use formulas::limits::LimitedBy;
 
 use crate::{hubslosh, sloshtank, spacecraft};
 
-/// Variables that show by what a tank is limited: the name of each, and words before the reason in messages.
+/// Output variables that give the reason why a tank is out of the range of its model. Each entry has the name of the
+/// variable, and the words that precede the reason in messages.
 pub struct Limits {
     tanks: Vec<(String, String)>,
 }

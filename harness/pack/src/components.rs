@@ -217,7 +217,6 @@ fn crates(package: &str, platforms: &BTreeSet<&'static str>) -> Result<Vec<Compo
     Ok(all)
 }
 
-/// Returns the version of rustc, for example "1.95.0".
 fn rust_version() -> Result<String> {
     let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
     let said =
@@ -228,7 +227,6 @@ fn rust_version() -> Result<String> {
     Ok(version.into())
 }
 
-/// Returns true if the reverse of `text` is in `bytes`.
 fn contains_backwards(bytes: &[u8], text: &[u8]) -> bool {
     bytes.windows(text.len()).any(|window| window.iter().rev().eq(text))
 }
@@ -406,7 +404,6 @@ struct Product<'a> {
     name: &'a str,
     version: &'a str,
     description: &'a str,
-    /// Names and SHA-256 of its binaries.
     files: Vec<(String, String)>,
 }
 

@@ -61,7 +61,6 @@ const MINGW: Tool = Tool {
     get: "Debian package gcc-mingw-w64-x86-64-win32, or MinGW-w64",
 };
 
-/// All platforms, in the order of the archive.
 pub const PLATFORMS: [Platform; 4] = [
     Platform {
         // The names of FMI 2.0 itself are for x86; for other processors it uses the tuples of FMI 3.0.

@@ -20,7 +20,6 @@ pub fn root() -> PathBuf {
     crate_root.ancestors().nth(2).unwrap_or(crate_root).to_path_buf()
 }
 
-/// Returns true if the project's source is present.
 pub fn has_source() -> bool {
     root().join("Cargo.toml").is_file()
 }
@@ -50,7 +49,7 @@ pub fn build(package: &str, quiet: bool) -> Result<PathBuf> {
     cargo_build(command, quiet)
 }
 
-/// Returns a command that runs Cargo: the one that runs this program, if there is one.
+/// Returns a command that runs Cargo. If this program was started by Cargo, the command is the same Cargo.
 pub(crate) fn cargo() -> Command {
     Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
 }

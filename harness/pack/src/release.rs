@@ -1,6 +1,6 @@
 //! Makes the files of a release: each FMU for all platforms, of every kind ([`Fmi::ALL`]), with its SBOM and the
-//! report of its check; then the wheels' SBOM and the wheel for Linux. [`MANIFEST`] lists the SHA-256 of all
-//! files, [`PRESENT`] that of the files in the folder.
+//! report of its check; then the wheels' SBOM and the wheel for Linux. [`MANIFEST`] lists the SHA-256 of all files of
+//! the release, [`PRESENT`] the SHA-256 of the files that are in the folder.
 
 use std::io::Read;
 use std::path::{Path, PathBuf};

@@ -181,7 +181,6 @@ impl Contour {
         (self.bottom, flat.map(|p| p[0]).fold(f64::MAX, f64::min))
     }
 
-    /// Returns the largest radius, m.
     pub(crate) fn largest_radius(&self) -> f64 {
         let outline = Outline::new(&self.segments);
         outline.points.iter().flatten().map(|p| p[0]).fold(0.0, f64::max)
@@ -525,7 +524,8 @@ pub(crate) fn bisect(first: f64, second: f64, holds: impl Fn(f64) -> bool) -> f6
     narrowed([first, second], |at| holds(at) == here)[0]
 }
 
-/// Returns the ends of the last interval of a bisection between two places, of which `is_near` is true at the first.
+/// Bisects between two places until both are closest to the place at which `is_near` changes, and returns them.
+/// `is_near` is true at the first place and false at the second.
 fn narrowed([mut near, mut far]: [f64; 2], is_near: impl Fn(f64) -> bool) -> [f64; 2] {
     for _ in 0..80 {
         let middle = 0.5 * (near + far);

@@ -219,7 +219,6 @@ impl Segment {
 mod tests {
     use super::*;
 
-    /// Lines, ellipses, Cassini ovals, cosines and cubics.
     #[test]
     fn the_difference_of_two_close_points_on_a_curve_has_no_cancellation() {
         let curves = [

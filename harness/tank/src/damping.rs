@@ -18,9 +18,10 @@ const ENDS: &str = "use the low end for stability margins, check both ends for s
 /// specific force `gravity`, m/s². `springs` are the modes' centring stiffnesses, N/m, along each axis of a
 /// box; empty for none. `sigma`, N/m, if known, is used for low Bond numbers.
 ///
-/// A contour that is a sphere, an upright cylinder, a cone or a torus, to 1e-6 of its size over the wetted
-/// part, has the damping of that shape. If only a part of the wall is such a shape, the factor over the
-/// laminar layer is a mean by area. So the ratio is continuous in the fill and in the shape of the tank.
+/// If the wetted wall is a sphere, an upright cylinder, a cone or a torus to 1e-6 of its size, the damping is
+/// computed by the correlation measured for this shape. If only a part of the wall has such a shape, the factor by
+/// which the correlation exceeds the damping of a laminar boundary layer is averaged by area, so that the damping
+/// ratio is a continuous function of the fill and of the shape of the tank.
 ///
 /// # Errors
 /// If there is neither gravity nor centring stiffness, because there is no natural frequency then.

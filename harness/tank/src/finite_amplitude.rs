@@ -47,8 +47,8 @@ const STEEPEST: f64 = 0.5;
 
 /// Largest relative error of the frequency of a slosh mass with the wave's energy.
 const LARGEST_FREQUENCY_ERROR: f64 = 3e-3;
-/// Largest difference between the shifts of omega^2 of the smallest waves and those of the third-order theory. At 10 degrees this
-/// difference changes the frequency by 0.03 %.
+/// Largest difference between the shift of omega^2 of the smallest waves and the shift by the third-order theory,
+/// each divided by the square of the slosh angle. At 10 degrees this difference changes the frequency by 0.03 %.
 const LARGEST_SHIFT_ERROR: f64 = 0.02;
 
 const ASSUMED: &str = "without them the FMUs take a pendulum (s = kappa = 1: omega^2 shifts by -0.125 A^2 in planar and by \

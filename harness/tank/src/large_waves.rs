@@ -1,7 +1,7 @@
 //! Periodic waves of large amplitude in a body of revolution: fully nonlinear potential flow.
 //!
-//! The surface and the coordinates are those of `contour_waves.rs`, and Luke's functional is the same, but it is not
-//! expanded in the amplitude: the integrals over the liquid run along the lines up to the surface. With the phase
+//! The surface, the coordinates and Luke's functional are the same as in `contour_waves.rs`, but the functional is
+//! not expanded in the amplitude: the integrals over the liquid run along the lines up to the surface. With the phase
 //! tau = omega t, lengths over the radius of the surface and g = 1,
 //!
 //! ```text
@@ -52,7 +52,6 @@ struct Resolution {
 
 /// Number of Gauss points between the surface at rest and the wave.
 const DEPTHS: usize = 4;
-/// Largest number of Newton's steps for a wave.
 const STEPS: usize = 12;
 /// Largest change of the unknowns, relative to the amplitude, with which a wave has converged.
 const CONVERGED: f64 = 1e-9;
@@ -61,8 +60,9 @@ const ROOM: f64 = 0.8;
 /// Largest sine of the angle between two segments of a side.
 const SMOOTH: f64 = 1e-3;
 
-/// The wall near the surface as a function of the height: its radius over that of the surface at rest. It goes up and down
-/// from the contact line as far as the wall is smooth and rises, between the heights `low` and `high` from the surface.
+/// The wall near the surface: its radius, divided by the radius of the surface at rest, as a function of the height
+/// above the surface. The function is defined from `low` to `high`, the part around the contact line in which the
+/// wall is smooth and rises.
 pub(crate) struct Side {
     pieces: Vec<Piece>,
     radius: f64,
@@ -230,7 +230,6 @@ impl Term {
     }
 }
 
-/// Returns the matrix with each row multiplied by its factor.
 fn scaled(matrix: &DMatrix<f64>, by: &DVector<f64>) -> DMatrix<f64> {
     let mut out = matrix.clone();
     for mut column in out.column_iter_mut() {
@@ -371,9 +370,9 @@ impl<'a> Solver<'a> {
         [self.resolution.polynomials * self.terms.len(), potentials]
     }
 
-    /// Computes the functions of which the potential consists, at the heights `z` above the `points`. If the
-    /// coefficients `c` are given, also computes derivatives of the sum of these functions: the second derivatives zz,
-    /// rz and rr, and the derivatives with respect to theta of the sum, of its z-derivative and of its r-derivative.
+    /// Computes the base functions of the potential at the heights `z` above the `points`. If the coefficients `c`
+    /// are given, also computes derivatives of the sum of these functions: the second derivatives zz, rz and rr, and
+    /// the derivatives with respect to theta of the sum, of its z-derivative and of its r-derivative.
     fn potentials(
         &self,
         points: &Points,
@@ -1065,7 +1064,6 @@ mod tests {
         }
     }
 
-    /// Fills between the rows of the table for spheres.
     #[test]
     #[ignore = "ten seconds of CPU time: .ci/long-tests"]
     fn the_table_of_spheres_holds_between_its_fills() {

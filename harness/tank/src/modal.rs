@@ -265,8 +265,8 @@ pub struct Spin {
     /// mode.
     #[serde(rename = "2Omega_omega")]
     pub ratio: Option<f64>,
-    /// Frequencies of the first mode of an upright cylinder seen from the tank, Hz: of the wave that runs against the spin and of
-    /// the one that runs with it.
+    /// Frequencies of the first mode of an upright cylinder seen from the tank, Hz: first of the wave that runs
+    /// against the spin, then of the wave that runs with the spin.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub frequencies: Option<[f64; 2]>,
     /// Gyroscopic coefficient C of the first mode of an upright cylinder.

@@ -169,7 +169,7 @@ fn with_capillarity(
     all
 }
 
-/// Returns the centring stiffnesses of the modes, N/m, of which the FMUs accept none below 0.
+/// Returns the centring stiffnesses of the modes, N/m. A negative stiffness is set to 0, because the FMUs refuse it.
 fn springs(
     tank: &Tank,
     data: &ModalData,

@@ -58,13 +58,13 @@ pub(crate) struct Part {
     pub share: f64,
 }
 
-/// Returns the measured shapes of which a wetted wall is in part. `fill` is the height of the free surface
-/// above the lowest point, m.
+/// Returns the shapes with measured damping (sphere, cylinder, cone, torus) that a wetted wall has in part, each with
+/// its share. `fill` is the height of the free surface above the lowest point, m.
 ///
-/// The wall up to some height is compared with the sphere, cylinder, cone or torus through its lowest point
-/// and the contact line that it would have there. It counts as this shape within 1e-6 of its size, and not at
-/// all from [`FAR`] on. A smooth step between makes the result continuous in the fill and in the shape of the
-/// tank.
+/// The wall up to some height is compared with the sphere, cylinder, cone or torus through its lowest point and the
+/// contact line that it would have there. The share of a shape is 1 if the wall deviates by less than 1e-6 of its
+/// size, and 0 from the deviation [`FAR`] on. A smooth step between these deviations makes the result continuous in
+/// the fill and in the shape of the tank.
 pub(crate) fn parts(wall: &Wall, fill: f64) -> Vec<Part> {
     let places = (SAMPLES / wall.segments.len()).clamp(2, PLACES);
     let points = sampled(wall, places);

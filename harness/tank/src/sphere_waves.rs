@@ -1,5 +1,5 @@
-//! Coefficients of the first mode in a sphere that give the slosh mass the wave's energy as well as its frequency, over the
-//! fill. `formulas::energy_terms` has those of upright cylinders and the equations.
+//! Coefficients of the first mode in a sphere that give the slosh mass the wave's energy as well as its frequency,
+//! over the fill. `formulas::energy_terms` has the coefficients of upright cylinders, and the equations.
 //!
 //! Source: fully nonlinear potential flow by `large_waves.rs`. `examples/sphere_waves.rs` prints the rows.
 

@@ -1,5 +1,5 @@
-//! Liquid that turns with its tank about the tank's axis at a steady rate: its surface, its centre of mass, its inertia, and
-//! what the spin does to the first mode.
+//! Liquid that turns with its tank about the tank's axis at a steady rate: its surface, its centre of mass, its
+//! inertia, and the effect of the spin on the first slosh mode.
 //!
 //! On the surface g z - Omega^2 r^2/2 = c. At the height z the liquid reaches inwards to r_i, r_i^2 = max(0, 2 (g z -
 //! c)/Omega^2). With integrals along the wall, up the outer and down the inner one,

@@ -250,8 +250,8 @@ impl Overlaps {
         }
     }
 
-    /// Returns the excited mode whose frequency is twice that of the first mode within [`DETUNING`] at a
-    /// depth, m.
+    /// Returns the excited mode whose frequency is twice the first mode's frequency within [`DETUNING`] at a depth,
+    /// m.
     pub fn secondary_resonance(&self, depth: f64) -> Option<[usize; 2]> {
         let [t_1, ..] = self.wave(depth);
         let near = |mode: &&Excited| {

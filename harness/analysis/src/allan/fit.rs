@@ -114,9 +114,9 @@ impl Octaves {
         Problem { octaves: self, terms, from }.fit()
     }
 
-    /// Fits N, B and K. If this fit is rejected, tries to leave out short averaging times, at which filters
-    /// of a gyro act, or to add a ramp or a Gauss–Markov bias. If every fit is rejected, returns the one of
-    /// N, B and K to all octaves. Returns `None` in the cases of [`Octaves::fit`].
+    /// Fits N, B and K. If this fit is rejected, tries to leave out short averaging times, at which filters of a gyro
+    /// act, or to add a ramp or a Gauss–Markov bias. If every fit is rejected, returns the fit of N, B and K to all
+    /// octaves. Returns `None` in the cases of [`Octaves::fit`].
     pub fn describe(&self) -> Option<Fit> {
         const BASIC: [Term; 3] = [Term::White, Term::Flicker, Term::Walk];
         let first = self.fit(&BASIC, 0)?;
@@ -570,7 +570,6 @@ mod tests {
             .collect()
     }
 
-    /// Noise in which flicker dominates from 20 to 200 s.
     const ALL: Noise = Noise {
         arw: 1e-4,
         flicker: 3.4e-5,

@@ -77,7 +77,6 @@ impl Tested for Fmi2 {
         Notes { nominals: fmu.states().into_iter().map(nominal).collect(), ..Notes::default() }
     }
 
-    /// Initialises, and in Model Exchange goes on to continuous-time mode.
     fn initialise(session: &mut Session) -> Result<()> {
         let Experiment { start, tolerance, .. } = session.fmu.experiment();
         session.initialise_at(start, None, tolerance).map_err(|error| match error.downcast() {
@@ -131,7 +130,6 @@ impl Tested for Fmi2 {
         vec![moved.max(min).min(max.max(min))]
     }
 
-    /// Initialises with another start time, other parameters and another tolerance.
     fn leave_trajectory(session: &mut Session) -> Result<()> {
         let fmu = session.fmu;
         for v in fmu.variables().iter().filter(|v| v.is_set_by_hosts() && v.is_real()) {
@@ -301,7 +299,6 @@ impl Session<'_> {
         Ok(self.instance.enter_continuous_time_mode()?)
     }
 
-    /// Calls fmi2NewDiscreteStates until no new iteration is requested.
     fn iterate_events(&mut self) -> Result<()> {
         self.fmu.announce("fmi2NewDiscreteStates");
         (self.notes.values_changed, self.notes.nominals_changed) = (false, false);

@@ -24,7 +24,6 @@ pub type Within<'a> = dyn FnMut(&Update) -> Option<f64> + 'a;
 /// Observations of a session.
 #[derive(Default)]
 pub struct Notes {
-    /// Number of events so far.
     pub events: usize,
     /// The first event indicator that was 0 after event mode: time and index.
     pub zero_indicator: Option<(f64, usize)>,
@@ -197,7 +196,6 @@ impl Session<'_> {
         Ok(info)
     }
 
-    /// Calls fmi3UpdateDiscreteStates until no new iteration is requested.
     pub fn iterate(&mut self) -> Result<EventInfo> {
         self.fmu.announce("fmi3UpdateDiscreteStates");
         for _ in 0..ITERATIONS {

@@ -15,7 +15,6 @@ struct Small<'a> {
     definitions: &'a [&'a str],
     /// Rate k of the equation x' = -k (x - u), 1/s.
     rate: f64,
-    /// Attributes of DefaultExperiment.
     experiment: &'a str,
 }
 

@@ -207,7 +207,6 @@ pub struct Fmu<V: Version> {
     changed: Vec<&'static str>,
     /// True if all Reals are scalars of type Float64, so that they can be exchanged in one call.
     is_plain: bool,
-    /// Value references of the scalar Float64 variables, ascending.
     plain: Vec<u32>,
     /// Value references of the Float64 inputs, and of elements of input arrays, that an FMU 3.0 accepts
     /// within a step; ascending.
@@ -519,7 +518,8 @@ pub struct Instance<'fmu, V: Version> {
     pub(crate) kept: V::Kept,
     warned: Cell<Option<&'static str>>,
     pub(crate) calls: Calls,
-    /// Values of arrays of which single elements were set before the array could be read.
+    /// Values of arrays, by value reference, if single elements of the array were set before the whole array could be
+    /// read.
     arrays: RefCell<BTreeMap<u32, Vec<Value>>>,
     one_thread: PhantomData<*mut ()>,
 }

@@ -22,7 +22,6 @@ fn text(files: &BTreeMap<String, Vec<u8>>, name: &str) -> String {
     String::from_utf8(files[name].clone()).unwrap()
 }
 
-/// Returns all values that an attribute has in a page.
 fn attributes(page: &str, name: &str) -> BTreeSet<String> {
     let before = format!(" {name}=\"");
     page.split(&before).skip(1).map(|part| part.split('"').next().unwrap().to_string()).collect()

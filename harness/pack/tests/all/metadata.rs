@@ -9,7 +9,6 @@ fn read(name: &str) -> String {
     std::fs::read_to_string(root().join(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
 }
 
-/// Returns the version of the wheel in dist/release.
 fn released_wheel() -> String {
     let folder = root().join("dist/release").read_dir().expect("the release");
     let mut names = folder.flatten().map(|entry| entry.file_name().to_string_lossy().into_owned());

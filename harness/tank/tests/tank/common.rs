@@ -13,12 +13,10 @@ pub fn reference() -> Vec<Value> {
     all["cases"].as_array().unwrap().clone()
 }
 
-/// A number.
 pub fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or_else(|| panic!("{value} is not a number"))
 }
 
-/// The tank's file.
 pub fn toml(case: &Value) -> String {
     let rho = number(&case["rho"]);
     let shape = if case["kind"] == "box" {
@@ -33,7 +31,6 @@ pub fn toml(case: &Value) -> String {
     format!("name = {}\ndensity = {rho:?}\n{shape}\n", case["name"])
 }
 
-/// A tank from its text.
 pub fn tank(text: &str) -> Tank {
     Tank::parse(text, Path::new("")).unwrap_or_else(|problems| panic!("{text}: {problems}"))
 }

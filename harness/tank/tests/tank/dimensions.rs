@@ -29,7 +29,6 @@ const TANKS: [(&str, f64); 10] = [
     ("shape = { spheroid = { radius = @0.7, half_height = @0.02 } }", 0.04),
 ];
 
-/// Three modes of each tank, `c` times as large.
 fn solved(c: f64, rho: f64) -> Vec<(Tank, ModalData)> {
     let scaled = |text: &str| {
         let mut parts = text.split('@');

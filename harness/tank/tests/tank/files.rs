@@ -7,7 +7,6 @@ use hubslosh_tank::parameters::{self, Liquid, ParameterSet, Target};
 use hubslosh_tank::tank::Geometry;
 use hubslosh_tank::{Fill, Tank, table};
 
-/// All problems of a file without its density.
 fn problems(text: &str) -> String {
     match Tank::parse(&format!("density = 1000.0\n{text}"), Path::new("")) {
         Ok(_) => panic!("accepted without error: {text}"),
@@ -127,7 +126,6 @@ fn all_problems_are_reported_at_once() {
     assert_eq!(tank.solve(1.0, 0).unwrap_err().0.len(), 1);
 }
 
-/// The message for each fill without modes gives the reason.
 #[test]
 fn every_impossible_fill_has_a_clear_message() {
     let cases = [

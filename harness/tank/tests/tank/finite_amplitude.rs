@@ -447,7 +447,6 @@ fn files_without_coefficients_say_why() {
     }
 }
 
-/// Returns the columns s and kappa of mode 1.
 fn columns(set: &ParameterSet) -> [Vec<f64>; 2] {
     let all = third_order_of(set);
     ["inertia", "stiffness"].map(|what| {

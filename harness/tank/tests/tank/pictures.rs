@@ -38,7 +38,6 @@ fn pictures_of_a_tank_and_its_sweep_equal_the_inspected_ones() {
     is_drawn(&picture::sweep(&tank, &swept, 9.80665), "tests/tank/drawn/sweep.svg");
 }
 
-/// Paths of curves: walls, surfaces, modes, charts.
 fn curves(svg: &str) -> Vec<&str> {
     svg.lines().filter(|line| line.contains(" fill=\"none\"") && line.contains("width")).collect()
 }
@@ -115,7 +114,6 @@ fn examples_can_be_drawn_and_tabulated() {
     }
 }
 
-/// The points of a path.
 fn points(path: &str) -> Vec<[f64; 2]> {
     let place = |point: &str| -> [f64; 2] {
         let (x, y) = point.trim_end_matches('Z').split_once(' ').unwrap();
