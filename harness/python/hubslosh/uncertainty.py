@@ -874,8 +874,14 @@ class UncertainModel:
         return np.array(found)
 
     def certify(
-        self, loop: Loop, largest: float = 3.0, *, gap: float = 1.04, most: int = 1000,
-        worst: WorstCase | None = None, progress: Progress = None,
+        self,
+        loop: Loop,
+        largest: float = 3.0,
+        *,
+        gap: float = 1.04,
+        most: int = 1000,
+        worst: WorstCase | None = None,
+        progress: Progress = None,
     ) -> Certificate:
         """Prove that the loop is stable for all Δ up to a size close to the worst case.
 
