@@ -149,7 +149,7 @@ FREE = {"hub.I": 0.35, "friction.b": 0.05}
 
 
 def any_fmu(bench: Bench, rng: np.random.Generator) -> Result:
-    """Fit a hub in closed form with `--free`; the scale of its torque is known to 1 %."""
+    """Fit a hub in closed form; the scale of its torque is known to 1 %."""
     found, _ = free_fit(bench, rng)
     return {name: ends(found[name], truth) for name, truth in FREE.items()}
 
@@ -236,7 +236,10 @@ friction.model = "{friction}"
 """
         seeds = list(range(1, draws + 1))
         noise = f"imu.enabled = true\n[vary]\nimu.seed = {seeds}\n"
-        features = ("features.csv", "features_spa.csv")
+        features = {
+            "features.csv": "by demodulation",
+            "features_spa.csv": "by spectral analysis (spa)",
+        }
         runs = {}
         for name, text in (("clean", plan), ("noisy", plan + noise)):
             (bench.folder / f"{name}.toml").write_text(text)
@@ -247,12 +250,12 @@ friction.model = "{friction}"
                     runs[name, table] = list(csv.DictReader(file))
         for k in range(draws):
             result = {}
-            for table in features:
-                for feature in ("f_res", "f_dip"):
+            for table, method in features.items():
+                for feature, name in (("f_res", "resonance"), ("f_dip", "antiresonance")):
                     truth = float(runs["clean", table][0][f"{feature}_hz"])
                     value = float(runs["noisy", table][k][f"{feature}_hz"])
                     half = 1.96 * float(runs["noisy", table][k][f"{feature}_std_hz"])
-                    result[f"{feature}_hz, {table}"] = (truth, value - half, value + half)
+                    result[f"{name}, {method}"] = (truth, value - half, value + half)
             yield result
 
     return draw
@@ -338,7 +341,7 @@ METHODS: dict[str, Draws] = {
     "identify decay": each(free_decay),
     "gyro --recording": each(gyro),
     "identify friction": each(friction),
-    "identify --free": each(any_fmu),
+    "identify fmu": each(any_fmu),
     "tank --nu": each(tank_damping),
     "design --free": each(planned_free),
     "design": planned_bench,
