@@ -378,7 +378,7 @@ fn array_sizes_are_set_only_in_configuration_mode_and_reset_the_arrays() {
     run.resize("tanks", 4);
     let said: Vec<_> = run.instance.take_messages();
     let said: Vec<_> = said.iter().map(|m| (&*m.category, m.status, &*m.text)).collect();
-    let text = "fmi3SetUInt64: tanks changed, what was set before is lost of tank.position";
+    let text = "fmi3SetUInt64: tanks changed: the values set earlier for tank.position are lost. Set them again";
     assert_eq!(said, [("logStatusWarning", Status::Warning, text)], "nobody else is named");
     assert_eq!(run.instance.number_of_states().unwrap(), states(4));
     let mut there = vec![0.0; 12];
@@ -480,7 +480,7 @@ fn a_saved_state_contains_array_sizes_and_the_fmu_with_scalars_refuses_it() {
     let (status, text) = refusal(other.instance.deserialize(&bytes));
     assert_eq!(status, Status::Error);
     assert!(
-        text.contains("its variables are scalars where those of this FMU are arrays"),
+        text.contains("one of the two FMUs has array variables, the other has only scalars"),
         "{text}"
     );
 }
@@ -781,7 +781,7 @@ fn an_fmu_with_fewer_variables_refuses_more_tanks_and_states_of_the_full_fmu() {
     let bytes = other.instance.serialize(&state).unwrap();
     let mut run = part.instance(Interface::CoSimulation);
     let (_, text) = refusal(run.instance.deserialize(&bytes));
-    assert!(text.contains("another part of the variables"), "{text}");
+    assert!(text.contains("an FMU whose model description has other variables"), "{text}");
     let mut run = part.instance(Interface::CoSimulation);
     let own = run.instance.get_state().unwrap();
     let bytes = run.instance.serialize(&own).unwrap();
