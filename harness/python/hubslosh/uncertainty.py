@@ -209,7 +209,10 @@ def _read(
         free = (get("mount_kind")[0] or get("mount")[0]) == 1
         problems = [] if free else ["the craft is on a pivot: mount must be free"]
         if vector("omega").any() or vector("q", 4)[1:].any():
-            problems.append("the craft must be at rest: init.omega 0, init.q 1, 0, 0, 0")
+            problems.append(
+                "the craft must be at rest: init.omega 0, init.q 1, 0, 0, 0 (margins, reviews and "
+                "monte_carlo also take a craft that spins)"
+            )
         values = dict(zip(
             names := ["craft.mass", *(f"craft.r[{i}]" for i in (1, 2, 3)),
                       *(f"craft.J{axes}" for axes in AXES)],
