@@ -278,9 +278,10 @@ mod tests {
         assert!(shallow[1] < 1.2 && shallow[2] < 0.5 && shallow[2] > 0.0, "{shallow:?}");
     }
 
-    /// The limits of tanks in which only free motion was compared are those of the upright cylinder that is most unfavourable.
+    /// A tank in which only free motion was compared with potential flow has the limits of the most unfavourable upright
+    /// cylinder.
     #[test]
-    fn limits_without_a_forced_comparison_are_those_of_the_most_unfavourable_cylinder() {
+    fn a_tank_without_a_forced_comparison_has_the_limits_of_the_most_unfavourable_cylinder() {
         let rows = || THIRD_ORDER.into_iter();
         // the frequency's error grows with the square of the angle
         let error = |[_, frequency, forced]: [f64; 3]| FREQUENCY * (forced / frequency).powi(2);

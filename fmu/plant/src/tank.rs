@@ -185,7 +185,7 @@ pub(crate) fn warnings(p: &Parameters, g: f64) -> Vec<String> {
         SloshSource::Geometry => warnings.extend(third_order_warning(p.tank.h / radius)),
         SloshSource::Table if slosh.third_order(0, 0.0) == (1.0, 1.0) => warnings.push(
             "slosh.table.nonlinear_inertia[1] and slosh.table.nonlinear_stiffness[1] are 1 with slosh.model = liquid: the \
-             frequency of mode 1 then falls with the amplitude as that of a pendulum, whatever the tank. Set both to the coefficients of this tank"
+             frequency of mode 1 then falls with the amplitude like the frequency of a pendulum, whatever the tank. Set both to the coefficients of this tank"
                 .to_string(),
         ),
         SloshSource::Table => {}

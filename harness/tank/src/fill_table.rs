@@ -173,12 +173,12 @@ fn check_surfaces(rows: &[ModalData]) -> Result<(), Problems> {
     Ok(())
 }
 
-/// Returns the parameters of a tank that can drain: those at its largest fill, where it starts, and its
+/// Returns the parameters of a tank that can drain: the parameters at its largest fill, where it starts, and its fill
 /// table.
 ///
 /// # Errors
-/// Those of [`ParameterSet::new`], a HubSlosh target, whose tank does not drain, and fewer than two
-/// fills or more than [`POINTS`].
+/// The errors of [`ParameterSet::new`]; also if the target is HubSlosh, whose tank does not drain, or if there are
+/// fewer than two fills or more than [`POINTS`].
 pub fn parameters(
     tank: &Tank,
     sweep: &Sweep,

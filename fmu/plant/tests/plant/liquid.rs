@@ -61,7 +61,7 @@ fn s_and_kappa_of_a_table_give_their_frequency_shifts() {
 fn the_liquid_model_requires_s_and_kappa_of_a_table() {
     let warnings = |p: &Parameters| Plant::warnings(p, &Inputs::default());
     let p = table(held(SloshModel::Liquid, 0.1), 1.0, 1.0);
-    assert!(warnings(&p)[0].contains("as that of a pendulum"), "{:?}", warnings(&p));
+    assert!(warnings(&p)[0].contains("like the frequency of a pendulum"), "{:?}", warnings(&p));
     assert_eq!(warnings(&table(p, 1.0, 1.1)), [""; 0]);
     for (model, is_used) in [
         (SloshModel::Linear, true),
