@@ -14,11 +14,9 @@ use host::fmi2::{Fmu, Instance};
 const STEP: f64 = 0.02;
 const STEPS: usize = 3000;
 
-/// The plant's parameters; its liquid is displaced at the start.
 const PLANT: [(&str, &str); 3] =
     [("init.slosh_angle", "0.1"), ("tank.h", "0.05"), ("friction.kind", "2")];
 
-/// Recorded variables of the plant.
 const RECORDED: [&str; 3] = ["theta", "omega", "slosh_angle"];
 
 fn main() -> Result<()> {
@@ -84,7 +82,6 @@ fn closed_loop(plant: &Fmu, controller: &Fmu, slopes: bool) -> Result<Vec<Vec<f6
     Ok(rows)
 }
 
-/// An instance, initialised.
 fn started<'a>(fmu: &'a Fmu, settings: &[(&str, &str)]) -> Result<Instance<'a>> {
     let mut instance = fmu.instantiate("loop")?;
     for (name, value) in settings {

@@ -29,7 +29,6 @@ pub struct Inputs {
     omega: [f64; 2],
 }
 
-/// The torque, N m, and the parameters.
 #[derive(Clone, Debug)]
 pub struct Controller {
     p: Parameters,
@@ -67,7 +66,7 @@ static TABLE: Table<Controller> = Table::new(
 );
 
 impl Controller {
-    /// Torque that tau tends to.
+    /// Returns the torque, N m, to which the filtered torque tau tends.
     fn wanted(&self, theta: f64, omega: f64) -> f64 {
         -self.p.k_p * theta - self.p.k_d * omega
     }

@@ -3,7 +3,6 @@
 
 pub mod controller;
 
-/// The functions of FMI 2.0.
 pub mod fmi2 {
     pub use runtime::v2::*;
 
