@@ -325,7 +325,6 @@ impl Structure {
     }
 }
 
-/// Returns the message for deflections at which the linear model of the appendages ends.
 pub(crate) fn beyond_message(eta: &[f64]) -> String {
     format!(
         "appendage[].eta = {eta:?} kg^0.5.m: appendages that are deformed so far leave the craft no inertia (allowed: small \

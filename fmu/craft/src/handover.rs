@@ -65,7 +65,6 @@ pub(crate) trait Carrier {
 
     fn shift(&mut self, by: Vec3);
 
-    /// Returns true if the wall presses on the lump in its current state.
     fn is_pressed(&mut self, lump: usize, t: f64) -> bool;
 
     /// Performs the event `due` of the lump at the time `t`: it leaves the bottom, meets the wall, is

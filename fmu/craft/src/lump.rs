@@ -667,7 +667,6 @@ impl Lump {
         Some((self.polish(t, n, h, motion, crossing), due))
     }
 
-    /// Returns time, event and event function of [`Lump::next`], with products of series up to order n.
     fn next_crossing<'a>(
         &self,
         n: usize,

@@ -101,11 +101,11 @@ fn hold_upper_rows(matrix: &mut Mat6) {
 /// Place at which the states at the start of the expansion are stored. A step copies them only if they are needed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Start {
-    /// The expansion is continued: `state.kept`.
+    /// The expansion that `state.kept` holds is continued.
     Kept,
-    /// The expansion starts with the step: `before`.
+    /// The expansion starts with the step, from the states in `before`.
     Step,
-    /// The expansion starts within the step: `begin`.
+    /// The expansion starts within the step, from the states in `begin`.
     Within,
 }
 
@@ -332,7 +332,6 @@ impl CraftMotion {
         }
     }
 
-    /// Solves for [a; w']; on a pivot the upper half of the right-hand side is a.
     #[inline(always)]
     fn solve(&self, [force, torque]: [Vec3; 2]) -> [Vec3; 2] {
         let mut torque = torque;
@@ -883,7 +882,6 @@ impl CraftMotion {
         }
     }
 
-    /// Factorises M with deformed appendages. A host that integrates itself may hand over any deflection.
     #[inline(never)]
     fn factorise_deformed(&mut self) {
         let mut held = self.matrix;

@@ -964,7 +964,6 @@ impl Tank {
         ]
     }
 
-    /// Reports parameters of axial symmetry combined with planar modes.
     fn find_axial_problems(&self, name: &str, problems: &mut Problems) {
         let uneven = [
             ("r_0", self.r_0 != [0.0; 2]),
@@ -1040,7 +1039,6 @@ impl Tank {
         problems.number(&format!("{name}.ball.drag"), ball.drag, 0.0, 1e3, "1/s");
     }
 
-    /// Checks the surface that the detached liquid's centre can reach, for a tank without other problems.
     fn find_ball_surface_problems(&self, name: &str, problems: &mut Problems) {
         let ball = &self.ball;
         if ball.travel <= 0.0 {
@@ -1082,7 +1080,6 @@ impl Tank {
         }
     }
 
-    /// Returns all problems of a tank on a host; `name` is its name in messages.
     pub(crate) fn problems(&self, name: &str) -> Vec<String> {
         let mut problems = Problems(Vec::new());
         self.find_problems(name, &mut problems);
@@ -1147,7 +1144,6 @@ impl Craft {
         }
     }
 
-    /// Returns all problems of a host's mass properties; `name` is its name in messages.
     pub(crate) fn problems(&self, name: &str) -> Vec<String> {
         let mut problems = Problems(Vec::new());
         self.find_problems(name, &mut problems);

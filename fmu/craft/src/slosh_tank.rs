@@ -180,7 +180,6 @@ impl TankParameters {
         problems
     }
 
-    /// Lists settings that cannot be combined with detached liquid on a host.
     fn ball_problems(&self) -> Vec<&'static str> {
         let drains = self.tank.fill.points > 0;
         let all = [
@@ -356,7 +355,6 @@ pub struct SloshTank {
     first: Option<[Vec3; 2]>,
 }
 
-/// The motion of a tank with the equations of `contents.rs` over one step.
 struct Run<'a> {
     mounted: &'a MountedTank,
     inputs: &'a TankInputs,
@@ -438,7 +436,6 @@ fn draining_rates<T: Number>(
     rate
 }
 
-/// Returns states and inputs of the tank with their derivatives along (dx, du).
 fn dual_arguments(
     x: &[f64; TANK_STATES],
     inputs: &TankInputs,
@@ -579,7 +576,6 @@ impl TankMotion {
         self.expand_rates::<1>();
     }
 
-    /// Advances the states by `h` > 0. After an error they are unusable.
     // Separate from the preparation of a step: compiled together, both take more instructions.
     #[inline(never)]
     fn advance(&mut self, h: f64, limits: Limits) -> Result<(), StepError> {
@@ -838,7 +834,6 @@ impl TankMotion {
         self.give(dv, dw);
     }
 
-    /// Adds an impulse that changes the host's velocity by `dv` and its rate by `dw`.
     fn give(&mut self, dv: Vec3, dw: Vec3) {
         let ball = self.loose_mut();
         ball.turned = add(ball.turned, dw);

@@ -288,7 +288,6 @@ impl Spacecraft {
         self.motion.now::<Dual>().outputs(dx, |i| self.bounds.get(i)?.spin_scale())
     }
 
-    /// Returns states and inputs of a draining craft with their derivatives in the direction (dx, du).
     fn dual_arguments(
         &self,
         inputs: &Inputs,

@@ -124,7 +124,6 @@ impl SpinScale {
     }
 }
 
-/// The power series of a tank's spinning liquid, in tank axes; `tank` counts from 0.
 #[derive(Clone, Debug)]
 pub(crate) struct SpinSeries {
     pub tank: usize,

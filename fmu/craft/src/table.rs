@@ -120,7 +120,6 @@ impl Curve {
         Curve(intervals)
     }
 
-    /// Returns value, slope and second derivative by Horner's scheme.
     fn evaluate<T: Number>(&self, at: Place<T>) -> Jet<T> {
         let c = &self.0[at.interval];
         let (mut value, mut slope, mut half) =

@@ -14,7 +14,6 @@ fn v(x: &[f64]) -> V {
     V::new(x[0], x[1], x[2])
 }
 
-/// Returns the velocity of O in body axes and the angular velocity.
 fn motion(x: &[f64; STATES]) -> [V; 2] {
     let q = UnitQuaternion::from_quaternion(Quaternion::new(x[0], x[1], x[2], x[3]));
     let axes: Rotation3<f64> = q.into();
@@ -40,7 +39,6 @@ fn lagrangian(p: &Parameters, x: &[f64; STATES]) -> f64 {
     sum
 }
 
-/// Central differences with Richardson's extrapolation.
 fn difference(f: impl Fn(f64) -> f64, step: f64) -> f64 {
     let [p2, p1, m1, m2] = [2.0, 1.0, -1.0, -2.0].map(|s| f(s * step));
     (8.0 * (p1 - m1) - (p2 - m2)) / (12.0 * step)

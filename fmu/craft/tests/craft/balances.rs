@@ -15,7 +15,6 @@ use super::component::Spacecraft;
 use super::random::Random;
 use super::records::{STEP, inputs, parameters, records, steps};
 
-/// Steps of a run: 1,000 s, without `--release` 100 s.
 const END: usize = if cfg!(debug_assertions) { 5_000 } else { 50_000 };
 
 /// Iterates over the nodes in a step of length 1 and their weights, with the step divided into `panels` parts.
@@ -43,12 +42,10 @@ fn turned(q: [f64; 4], v: [f64; 3]) -> [f64; 3] {
     [0, 1, 2].map(|i| v[i] + 2.0 * outer[i])
 }
 
-/// Accumulated inputs of a motion, and the largest size of every quantity.
 struct Balance {
     start: Outputs,
     impulse: [f64; 3],
     angular: [f64; 3],
-    /// Scales of P, H, E.
     scale: [f64; 3],
     worst: [f64; 3],
 }
@@ -77,7 +74,6 @@ impl Balance {
         }
     }
 
-    /// Returns the residuals over their scales.
     fn relative(&self) -> [f64; 3] {
         [0, 1, 2].map(|i| {
             let residual = self.worst[i];

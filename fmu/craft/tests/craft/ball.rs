@@ -292,7 +292,6 @@ fn momentum_is_exact_and_energy_never_grows_over_300_s_in_six_axes() {
     assert!(seen[1] > 20 && seen[2] > 100 && seen[3] > 20, "{seen:?}");
 }
 
-/// Craft with detached liquid are simulated with different communication steps, which must give the same motion.
 #[test]
 fn results_do_not_depend_on_the_communication_step() {
     for seed in 0..6 {
@@ -363,7 +362,6 @@ fn detached(seed: u64, tolerance: f64, step: f64, shift: f64) -> Vec<f64> {
     all
 }
 
-/// Returns the largest difference of a value, m, rad, m/s or rad/s.
 fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
@@ -428,7 +426,6 @@ fn a_craft_that_allows_detached_liquid_moves_bit_identically_until_the_liquid_de
 struct Rates {
     a: V,
     w_d: V,
-    /// Second derivative x'' of the position of each lump, tank axes.
     x_dd: Vec<V>,
 }
 
@@ -683,7 +680,6 @@ impl Simulator {
         Pair { particle: s.particle + s.speed * h, ..at(mean, h) }
     }
 
-    /// Returns the particle's position relative to the tank's origin, tank axes.
     fn in_tank(&self, s: &Pair) -> V {
         let tank = &self.p.tank[0];
         let from_o = s.q.inverse() * (s.particle - s.place) + v(&self.p.craft.r);

@@ -19,7 +19,6 @@ fn alone(p: &Parameters) -> TankParameters {
     TankParameters { tank: p.tank[0], host: Some(p.craft), ..TankParameters::default() }
 }
 
-/// State of a host: attitude, rate, position and velocity of O, work.
 #[derive(Clone, Copy)]
 struct Host {
     q: [f64; 4],
@@ -29,7 +28,6 @@ struct Host {
     work: f64,
 }
 
-/// A rigid body with one tank, simulated by its host.
 pub(super) struct Craft {
     p: Parameters,
     tank: SloshTank,
@@ -53,7 +51,6 @@ impl Craft {
         Craft { p: *p, tank, host, taken: [0.0; 6], impulses: 0 }
     }
 
-    /// Returns M_host about O, and the force and torque that its rotation takes.
     fn body(&self, w: V) -> (SMatrix<f64, 6, 6>, Six) {
         let (m, r, j) = (self.p.craft.mass, v(&self.p.craft.r), self.p.craft.j.matrix());
         let arm = r.cross_matrix();
@@ -79,7 +76,6 @@ impl Craft {
         matrix
     }
 
-    /// Returns [a; w'] from the tank's bias and added mass.
     fn solve(&self, u: &Inputs, t: f64, w: V, bias: &[f64; 6], added: &[f64; 21]) -> Six {
         let (matrix, turning) = self.body(w);
         let (f, tau) = (u.force.value_at(t), u.torque.value_at(t));
@@ -105,7 +101,6 @@ impl Craft {
         self.held(w, &self.solve(u, 0.0, w, &out.bias, &out.added_mass))
     }
 
-    /// Applies to the host the impulses of the liquid since the last call.
     fn take_impulse(&mut self, impulse: [f64; 6]) {
         if impulse == self.taken {
             return;
@@ -513,7 +508,6 @@ fn force_and_torque_of_detached_liquid_equal_bias_minus_added_mass_times_acceler
     }
 }
 
-/// SloshTank with liquid at the bottom, flying and sliding, at random states and inputs.
 #[test]
 fn directional_derivatives_equal_differences_of_rates_and_outputs() {
     for seed in 0..8 {
@@ -620,7 +614,6 @@ fn a_tank_that_allows_detached_liquid_moves_bit_identically_until_the_liquid_det
     assert_ne!(with, without);
 }
 
-/// SloshTank with `ball.travel` above 0 needs `host.*` and the split coupling.
 #[test]
 fn detached_liquid_on_a_host_is_refused_without_the_hosts_mass_properties() {
     let p = alone(&one(&mut Random::new(0)));
@@ -642,7 +635,6 @@ fn detached_liquid_on_a_host_is_refused_without_the_hosts_mass_properties() {
     }
 }
 
-/// SloshTank with detached liquid, random parameters and random accelerations of the host.
 #[test]
 fn random_tanks_on_hosts_give_finite_results_without_allocation() {
     for seed in 0..40 {

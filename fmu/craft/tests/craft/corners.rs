@@ -118,7 +118,6 @@ fn drain(r: &mut Random, p: &mut Parameters) {
     }
 }
 
-/// Puts a craft on a pivot with dry friction from sharp to wide corners.
 fn put_on_pivot(r: &mut Random, p: &mut Parameters) {
     (p.mount, p.pivot) = (Mount::Pivot, r.pivot());
     (p.init.position, p.init.velocity) = ([0.0; 3], [0.0; 3]);
@@ -144,7 +143,6 @@ fn drive(rows: &[Row], longest: f64, mut step: impl FnMut(&Row, f64, f64), mut l
     }
 }
 
-/// Runs a tank under a host's motion; returns directions and rates after each row.
 fn tank_states(p: &TankParameters, rows: &[Row], way: Way) -> Vec<f64> {
     let inputs = |row: &Row, t: f64| {
         let Ramp { value, slope } = row.turn;
@@ -182,7 +180,6 @@ fn craft_inputs(p: &Parameters, row: &Row, t: f64) -> Inputs {
     }
 }
 
-/// Returns attitude, rate, directions and their rates.
 fn angles(p: &Parameters, x: &[f64; STATES]) -> Vec<f64> {
     let mut all = x[index::Q..index::Q + 7].to_vec();
     for i in 0..p.tanks {
@@ -191,7 +188,6 @@ fn angles(p: &Parameters, x: &[f64; STATES]) -> Vec<f64> {
     all
 }
 
-/// Runs a craft; returns attitude, rate and bobs after each row.
 fn craft_states(p: &Parameters, rows: &[Row], way: Way) -> Vec<f64> {
     let first = craft_inputs(p, &rows[0], 0.0);
     let mut craft = Spacecraft::new(p, &first, 0.0, way.tolerance).unwrap();
@@ -248,7 +244,6 @@ fn craft_of(seed: u64, way: Way) -> Vec<f64> {
     craft_states(&p, &table(&mut r), way)
 }
 
-/// A third of the craft has tanks that stay, with planar modes.
 fn craft_on_a_pivot_of(seed: u64, way: Way) -> Vec<f64> {
     let mut r = Random::new(seed);
     let mut p = parameters(&mut r);
@@ -274,7 +269,6 @@ fn draining_tank_of(seed: u64, way: Way) -> Vec<f64> {
     tank_states(&p, &table_with_flows(&mut r), way)
 }
 
-/// A third of the craft is on a pivot.
 fn draining_craft_of(seed: u64, way: Way) -> Vec<f64> {
     let mut r = Random::new(seed);
     let mut p = parameters(&mut r);

@@ -139,7 +139,6 @@ fn ranges_of(tank: Tank, thrust: f64) -> Ranges {
     seen[0]
 }
 
-/// Ranges of a tank with centring stiffness, released at an angle.
 fn ranges(k: f64, thrust: f64, angle: f64) -> Ranges {
     ranges_of(Tank { k: [k; MODES], ..tank(angle) }, thrust)
 }

@@ -40,7 +40,6 @@ pub fn after(u: &Inputs, t: f64) -> Inputs {
     }
 }
 
-/// Returns the rates P' and H' about the inertial origin by force, torque and flows.
 fn rates(p: &Parameters, u: &Inputs, out: &Outputs) -> [V; 2] {
     let turn = attitude(&out.q);
     let (force, r) = (turn * v(&u.force.value), v(&out.position));
@@ -54,7 +53,6 @@ fn rates(p: &Parameters, u: &Inputs, out: &Outputs) -> [V; 2] {
     [momentum, angular]
 }
 
-/// Returns P, and H about the inertial origin.
 pub fn momenta(out: &Outputs) -> [V; 2] {
     let center = v(&out.position) + attitude(&out.q) * v(&out.center_of_mass);
     let momentum = v(&out.momentum);
@@ -378,7 +376,6 @@ fn the_energy_balance_holds_while_tanks_drain() {
     }
 }
 
-/// Liquid that flows inside the craft gets its momentum from the craft.
 #[test]
 fn a_valve_that_opens_or_shuts_keeps_momentum_and_energy() {
     for seed in (0..6).chain(21..24).chain(41..44) {
@@ -549,7 +546,6 @@ fn draining_tanks_on_a_rigid_body_move_as_spacecraft() {
     }
 }
 
-/// Mass, first and second moment about O of a rigid body.
 struct Rigid {
     mass: f64,
     arm: Matrix3<f64>,
@@ -573,7 +569,6 @@ impl Rigid {
         matrix
     }
 
-    /// Returns w x (w x S) and w x (I w).
     fn gyroscopic_terms(&self, w: V) -> [V; 2] {
         [w.cross(&w.cross(&self.moment)), w.cross(&(self.inertia * w))]
     }

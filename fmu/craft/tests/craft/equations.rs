@@ -11,7 +11,6 @@ fn ramps(u: &Inputs) -> [Ramp; 3] {
     [u.force, u.torque, u.h_wheels]
 }
 
-/// Returns the inputs moved by s along du; their slopes stay as they are.
 fn inputs_along(u: &Inputs, du: &[f64; INPUTS], s: f64) -> Inputs {
     let [force, torque, h_wheels] = ramps(u);
     let by = |ramp: Ramp, at: usize| Ramp {
@@ -122,7 +121,6 @@ fn somewhere(seed: u64) -> (Random, Parameters, Spacecraft, Inputs) {
     (random, p, craft, u)
 }
 
-/// All kinds of states and inputs change at once along the direction, each by about 1.
 #[test]
 fn directional_derivatives_equal_finite_differences() {
     for seed in 0..100 {
@@ -242,7 +240,6 @@ fn directional_derivatives_of_a_tank_equal_finite_differences() {
     }
 }
 
-/// Returns the derivative of the outputs by time, along the inputs' ramps.
 pub fn output_slopes(tank: &mut SloshTank, inputs: &TankInputs) -> SloshTankOutputs {
     let dx = tank.derivatives(inputs);
     let mut du = [0.0; TANK_INPUTS];

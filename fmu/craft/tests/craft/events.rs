@@ -102,7 +102,6 @@ fn attitude(y: &Coordinates) -> UnitQuaternion<f64> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Mode {
     Flying,
-    /// On the wall with its drag, and without drag.
     Sliding,
     Light,
 }
@@ -119,7 +118,6 @@ struct Simulator<'a> {
     case: &'a Case,
     inertia: Matrix3<f64>,
     d: Matrix3<f64>,
-    /// The wall's centre relative to the craft's centre of mass, body axes.
     center: V,
     mass: f64,
     y: Coordinates,
@@ -372,7 +370,6 @@ impl Simulator<'_> {
         self.strike(ball.restitution);
     }
 
-    /// Applies the impulse of two bodies at a point.
     fn strike(&mut self, e: f64) {
         let InTank { x, rate, gradient, .. } = self.in_tank(&self.y);
         let (n, arm, q) = (gradient.normalize(), x + self.center, attitude(&self.y));
@@ -410,13 +407,11 @@ fn compared_quantities(craft: &mut Spacecraft, u: &Inputs) -> Shown {
     [tank.ball_position, tank.ball_velocity, out.omega, out.velocity, lost]
 }
 
-/// Returns the largest difference, each quantity over 1 or its size.
 fn distance(a: &Shown, b: &Shown) -> f64 {
     let pairs = a.iter().zip(b);
     pairs.map(|(a, b)| (v(a) - v(b)).norm() / (1.0 + v(b).norm())).fold(0.0, f64::max)
 }
 
-/// Simulates the case by the craft's own steps of length `h`, and returns the compared quantities.
 fn by_co_simulation(case: &Case, h: f64) -> Shown {
     let Case { p, u, end } = case;
     let mut craft = Spacecraft::new(p, u, 0.0, 1e-12).unwrap();
@@ -451,16 +446,13 @@ fn impacts_equal_those_of_an_independent_simulator_at_any_communication_step() {
     }
 }
 
-/// Interface that a Model Exchange host integrates.
 pub(super) trait Equations {
     fn rates(&mut self, x: &[f64]) -> Vec<f64>;
 
     fn indicators(&mut self, x: &[f64]) -> Vec<f64>;
 
-    /// Result of `completedIntegratorStep`: true if the host must handle an event.
     fn is_event_overdue(&mut self, x: &[f64]) -> bool;
 
-    /// Handles events and returns the states after them.
     fn event(&mut self, x: &[f64]) -> Vec<f64>;
 }
 
@@ -469,7 +461,6 @@ pub(super) trait Equations {
 pub(super) struct Method {
     /// Relative and absolute tolerance of a step; 0 for steps of the length `longest`.
     pub tolerance: f64,
-    /// The longest step, s.
     pub longest: f64,
     /// True if events are located within a step. Otherwise they are handled at its end.
     pub locates: bool,
@@ -679,7 +670,6 @@ fn without_location(case: &Case, seed: u64) -> f64 {
     balance
 }
 
-/// A host integrates detached liquid and handles events only at the ends of its steps.
 #[test]
 fn liquid_stays_in_the_tank_in_a_model_exchange_host_that_locates_no_events() {
     for (seed, case) in (0..6).map(|seed| (seed, case(seed))).chain([(6, default_case())]) {
@@ -687,7 +677,6 @@ fn liquid_stays_in_the_tank_in_a_model_exchange_host_that_locates_no_events() {
     }
 }
 
-/// Results of the runs of [`compare_hosts`].
 #[derive(Debug, Default)]
 struct Figures {
     craft: usize,
@@ -759,7 +748,7 @@ fn co_simulation_and_model_exchange_find_the_same_impacts_of_random_craft() {
     assert!(figures.craft > 3 && figures.impacts > 10, "{figures:?}");
 }
 
-/// The night's run: the seed is HUBSLOSH_EVENTS_SEED, if that is set.
+/// Runs the comparison with a seed from the environment variable HUBSLOSH_EVENTS_SEED, if it is set, so that a nightly run tries new cases.
 #[test]
 #[ignore = "minutes: .ci/run --nightly"]
 fn co_simulation_and_model_exchange_find_the_same_impacts_of_two_hundred_random_craft() {

@@ -20,7 +20,6 @@ fn after(u: &Inputs, t: f64) -> Inputs {
     }
 }
 
-/// Integrates from 0 to `end` by the classical Runge-Kutta method in this many steps.
 pub fn runge_kutta(
     mut f: impl FnMut(f64, &[f64; STATES]) -> [f64; STATES],
     x: &mut [f64; STATES],

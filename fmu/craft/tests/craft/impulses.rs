@@ -111,7 +111,6 @@ fn a_jump_of_the_wheels_keeps_momentum_and_energy_of_a_draining_craft() {
     assert!(by_rods > 1e3 * h, "{by_rods:e} J");
 }
 
-/// The table bounds the mass of liquid that a host integrates.
 #[test]
 fn liquid_masses_beyond_the_fill_table_are_refused() {
     let mut random = Random::new(1);

@@ -103,7 +103,6 @@ fn rigid_motion(p: &Parameters, x: &[f64; STATES], u: &Inputs) -> [V; 2] {
     [force / mass - w_d.cross(&center) - w.cross(&w.cross(&center)), w_d]
 }
 
-/// Returns the drag coefficient of a mode under the specific force `x` along its tank.
 fn drag(tank: &Tank, n: usize, x: f64, p_z: f64, rate2: f64) -> f64 {
     let (m, l) = (tank.mass[n], tank.length[n]);
     let floor = if tank.g_floor > 0.0 { tank.g_floor } else { 1e-4 * tank.g_ref };
@@ -424,12 +423,10 @@ pub(super) fn newton_rates(p: &Parameters, x: &[f64; STATES], u: &Inputs) -> [f6
     rate
 }
 
-/// Returns a random craft in a random state with bobs anywhere on their spheres.
 fn anywhere(seed: u64) -> (Random, Parameters, [f64; STATES], Inputs) {
     anywhere_with(seed, |_, _| {})
 }
 
-/// Returns a random craft as [`anywhere`] does, with changed tanks.
 fn anywhere_with(
     seed: u64,
     change: impl Fn(&mut Random, &mut Tank),
@@ -507,7 +504,6 @@ fn bobs_on_surfaces_follow_newtons_law_with_the_surface_as_a_constraint() {
     assert!(compared > 300);
 }
 
-/// Appendages among tanks that slosh in every way, at large deflections and rates.
 #[test]
 fn appendages_follow_newtons_law_of_each_mode_with_its_acceleration_as_unknown() {
     for seed in 0..200 {
@@ -625,7 +621,6 @@ fn tank_anywhere(seed: u64, coupling: Coupling) -> (TankParameters, SloshTank, T
     (p, tank, u)
 }
 
-/// Returns the symmetric matrix whose upper triangle is given row by row.
 fn symmetric(triangle: &[f64]) -> DMatrix<f64> {
     let mut m = DMatrix::zeros(6, 6);
     let places = (0..6).flat_map(|i| (i..6).map(move |j| (i, j)));
@@ -847,7 +842,6 @@ fn a_sphere_s_wrench_about_its_centre_vanishes_under_rotation() {
     }
 }
 
-/// Compares the result of Jacobi rotations with nalgebra's eigenvalues of the general matrix M_host^-1 M_a.
 #[test]
 fn coupling_ratio_is_the_largest_eigenvalue() {
     for seed in 0..50 {

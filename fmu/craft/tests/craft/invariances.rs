@@ -74,7 +74,6 @@ fn assert_same(got: &[f64], want: &[f64], what: &str) {
     }
 }
 
-/// Asserts that attitudes are the same up to the sign of q.
 fn assert_same_attitude(got: &[f64], want: &[f64]) {
     let sign = got.iter().zip(want).map(|(a, b)| a * b).sum::<f64>().signum();
     let turned: Vec<f64> = got[..4].iter().map(|x| sign * x).collect();

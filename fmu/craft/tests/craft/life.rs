@@ -633,7 +633,6 @@ fn an_impossible_outflow_is_refused() {
     assert!(problems[1].starts_with("tank[1].liquid_0 = 30.0"), "{problems:?}");
 }
 
-/// Returns a tank that swings after a jump of the craft's acceleration.
 fn swinging_tank() -> (SloshTank, TankInputs) {
     let inputs = TankInputs { a: Ramp::held([1.0, 0.0, 9.0]), ..TankInputs::default() };
     let mut parameters = TankParameters::default();
@@ -656,7 +655,6 @@ fn a_tank_goes_on_from_a_saved_state_bit_for_bit() {
     assert_eq!(run(&mut tank), first);
 }
 
-/// One step of 2 s and 100 steps of 20 ms of a swinging tank.
 #[test]
 fn the_dissipated_energy_of_a_long_step_is_the_sum_over_short_steps() {
     let (mut long, inputs) = swinging_tank();

@@ -7,17 +7,14 @@ use fastrand::Rng;
 
 use super::component::SloshTank;
 
-/// First zero of J1'.
 pub const XI: f64 = 1.841_183_781_340_659_3;
 
-/// The host's motion of a single tank.
 #[derive(Clone, Copy, Debug)]
 pub struct Motion {
     pub axial: f64,
     pub spin: f64,
 }
 
-/// Returns the reason for which a single tank is out of range.
 pub fn reason(tank: &Tank, motion: Motion) -> LimitedBy {
     let p = TankParameters { tank: *tank, ..TankParameters::default() };
     let inputs = TankInputs {

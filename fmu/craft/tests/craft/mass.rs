@@ -12,7 +12,6 @@ type M = Matrix3<f64>;
 /// A body: mass, centre of mass from O, and inertia about the centre of mass.
 type Body = (f64, V, M);
 
-/// Returns m (|s|^2 1 - s s^T), the inertia of a point mass.
 fn point(m: f64, s: V) -> M {
     m * (M::identity() * s.norm_squared() - s * s.transpose())
 }
@@ -25,7 +24,6 @@ fn sum(bodies: &[Body]) -> Body {
     (mass, center, inertia)
 }
 
-/// Returns the rigid liquid, and the bobs in the directions `p`, relative to the host's O.
 fn liquid(tank: &Tank, p: &[[f64; 3]]) -> Vec<Body> {
     let [q0, x, y, z] = tank.q;
     let axes = UnitQuaternion::from_quaternion(Quaternion::new(q0, x, y, z));
@@ -80,7 +78,6 @@ fn mass_properties_equal_those_of_all_bodies_together() {
     }
 }
 
-/// Without mass the centre of mass is O and all mass properties are 0.
 #[test]
 fn a_tank_without_liquid_has_no_mass_anywhere() {
     let mut p = TankParameters::default();

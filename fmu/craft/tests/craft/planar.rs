@@ -303,7 +303,6 @@ fn a_host_coupled_to_tanks_keeps_momentum_and_loses_the_energy_that_the_tanks_di
     assert!(telling > 5, "{telling}");
 }
 
-/// Returns the host's motion over a step that begins `t` later.
 fn inputs_after(u: &TankInputs, t: f64) -> TankInputs {
     let at = |ramp: &Ramp| Ramp { value: ramp.value_at(t), slope: ramp.slope };
     let slope = u.omega_dot.slope;

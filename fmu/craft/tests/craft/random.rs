@@ -16,7 +16,6 @@ impl Random {
         low + (high - low) * self.0.f64()
     }
 
-    /// Returns a random number whose logarithm is uniformly distributed.
     pub fn magnitude(&mut self, low: f64, high: f64) -> f64 {
         low * f64::powf(high / low, self.0.f64())
     }
@@ -76,13 +75,11 @@ impl Random {
         }
     }
 
-    /// [`Random::make_planar`] for every tank of a craft.
     pub fn make_all_planar(&mut self, p: &mut Parameters) {
         p.tanks = p.tanks.max(1);
         p.tank.iter_mut().for_each(|tank| self.make_planar(tank));
     }
 
-    /// [`Random::bend`] for every tank of a craft.
     pub fn bend_all(&mut self, p: &mut Parameters) {
         p.tanks = p.tanks.max(1);
         p.tank.iter_mut().for_each(|tank| self.bend(tank));
@@ -105,13 +102,11 @@ impl Random {
         }
     }
 
-    /// Gives the liquid of every tank of a craft a spin, of which half have friction.
     pub fn spin_all(&mut self, p: &mut Parameters) {
         p.tanks = p.tanks.max(1);
         p.tank.iter_mut().for_each(|tank| self.spin(tank));
     }
 
-    /// Gives the liquid of a tank a spin, which acts on two thirds of its modes.
     pub fn spin(&mut self, tank: &mut Tank) {
         tank.spin_inertia = self.magnitude(0.5, 50.0);
         tank.spin_inertia_across = [0.0, self.magnitude(0.5, 50.0)][self.below(2)];
@@ -126,7 +121,6 @@ impl Random {
         }
     }
 
-    /// Gives the bobs of a tank surfaces other than spheres.
     pub fn bend(&mut self, tank: &mut Tank) {
         for s in &mut tank.nonlinear_inertia {
             *s = self.between(0.7, 2.5);
@@ -136,7 +130,6 @@ impl Random {
         }
     }
 
-    /// Gives the bobs of a tank surfaces that change from point to point of its table.
     pub fn bend_by_fill(&mut self, tank: &mut Tank) {
         let FillTable { nonlinear_inertia, nonlinear_stiffness, .. } = &mut tank.fill;
         nonlinear_inertia.as_flattened_mut().fill_with(|| self.between(0.7, 2.5));
@@ -207,7 +200,6 @@ impl Random {
         }
     }
 
-    /// Returns the stiffness and damping of a pivot for a craft of 150 to 3000 kg.
     pub fn pivot(&mut self) -> Pivot {
         let k = [(); 2].map(|()| self.magnitude(1e2, 1e4));
         let mut torques = || [(); 3].map(|()| self.magnitude(0.1, 10.0));

@@ -24,7 +24,6 @@ pub fn records(kind: &str) -> Vec<Value> {
     records.into_iter().filter(|record| record["kind"] == kind).collect()
 }
 
-/// Returns a record by its name.
 pub fn record(name: &str) -> Value {
     let all = records("craft").into_iter().chain(records("tank"));
     all.into_iter().find(|record| record["name"] == name).unwrap()
@@ -34,14 +33,12 @@ pub fn number(value: &Value) -> f64 {
     value.as_f64().unwrap()
 }
 
-/// Returns a signal's largest value in the complete record; the excerpt states it.
 pub fn largest(record: &Value, signal: &str) -> f64 {
     record["largest"][signal].as_f64().unwrap_or_else(|| {
         numbers(&record["samples"][signal]).iter().fold(0.0, |a: f64, x| a.max(x.abs()))
     })
 }
 
-/// Collects every number in nested lists.
 pub fn numbers(value: &Value) -> Vec<f64> {
     match value {
         Value::Array(list) => list.iter().flat_map(numbers).collect(),
@@ -180,7 +177,6 @@ pub fn motion(record: &Value, k: usize, omega: [f64; 3]) -> TankInputs {
     }
 }
 
-/// Returns the host's motion at the end of a step.
 pub fn motion_at_end(inputs: &TankInputs) -> TankInputs {
     let end = |ramp: &Ramp| Ramp { value: ramp.value_at(STEP), slope: ramp.slope };
     let w_d = &inputs.omega_dot;
@@ -201,7 +197,6 @@ pub fn slosh_tank(record: &Value, tolerance: f64) -> SloshTank {
     SloshTank::new(&tank_parameters(record), &TankInputs::default(), 0.0, tolerance).unwrap()
 }
 
-/// Returns the number of communication steps of a record, and the number between two samples.
 pub fn steps(record: &Value) -> (usize, usize) {
     let whole = |t: f64| (t / STEP).round() as usize;
     (whole(number(&record["t_end"])), whole(number(&record["dt"])))

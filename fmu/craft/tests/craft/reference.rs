@@ -7,7 +7,6 @@ use serde_json::Value;
 
 use super::records::*;
 
-/// Largest deviation of each signal over the record, relative to its largest value.
 #[derive(Default)]
 struct Deviations(BTreeMap<String, (f64, f64)>);
 
@@ -81,7 +80,6 @@ fn compare(d: &mut Deviations, record: &Value, sample: usize, out: &Outputs) {
     add("torque", &torque);
 }
 
-/// Accelerations and motions of Spacecraft equal reference values that another program computed.
 #[test]
 fn spacecraft_equals_the_reference_records() {
     let mut excess = Vec::new();
@@ -113,7 +111,6 @@ fn compare_tank(d: &mut Deviations, record: &Value, sample: usize, out: &SloshTa
     add("M_a", &out.added_mass);
 }
 
-/// Forces, torques and motions of SloshTank equal reference values that another program computed.
 #[test]
 fn slosh_tank_equals_the_reference_records() {
     let mut excess = Vec::new();

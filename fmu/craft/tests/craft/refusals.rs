@@ -5,7 +5,6 @@ use craft::{Inertia, Inputs, MODES, Mount, POINTS, Parameters, Spacecraft, Tank,
 /// A parameter: its name in messages, its place, and its range.
 type Number = (&'static str, fn(&mut Parameters) -> &mut f64, f64, f64);
 
-/// Numbers of any craft.
 const NUMBERS: [Number; 22] = [
     ("craft.mass", |p| &mut p.craft.mass, 1e-9, 1e12),
     ("craft.r[3]", |p| &mut p.craft.r[2], -1e9, 1e9),
@@ -54,7 +53,6 @@ fn craft() -> Parameters {
     p
 }
 
-/// Returns the message about this parameter with the value `value`, if it is refused.
 fn refusal_message(p: &Parameters, (name, place, ..): &Number, value: f64) -> Option<String> {
     let mut p = *p;
     *place(&mut p) = value;

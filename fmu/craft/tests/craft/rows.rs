@@ -7,7 +7,6 @@ use super::random::Random;
 
 const TOLERANCES: [f64; 3] = [1e-5, 1e-8, 1e-11];
 
-/// Returns lengths, s, whose sum is `total`, between the instants of random rows.
 fn random_rows(random: &mut Random, total: f64) -> Vec<f64> {
     let mut times = vec![0.0];
     loop {
@@ -97,7 +96,6 @@ fn every_kind(mut test: impl FnMut((&Parameters, &[Inputs; 4], f64), usize, u64)
     }
 }
 
-/// While the inputs are constant, the motion is bit-identical for every sequence of communication points.
 #[test]
 fn communication_points_change_no_bit_of_the_motion_while_inputs_are_held() {
     let mut compared = 0;
@@ -173,7 +171,6 @@ fn the_spacing_of_output_rows_changes_no_bit_of_the_motion_of_detached_liquid() 
     }
 }
 
-/// After a host has set the states, the next step starts a new expansion.
 #[test]
 fn states_that_are_set_start_a_new_expansion() {
     let (p, inputs) = craft_of(0, 3);

@@ -23,14 +23,12 @@ const PITCH_RATE: usize = index::OMEGA + 1;
 const SLOSH: usize = index::bob(0, 0);
 const SLOSH_RATE: usize = SLOSH + 3;
 
-/// Thrust of the craft in these tests, N.
 const THRUST: f64 = 2400.0;
 
 fn inputs() -> Inputs {
     Inputs { force: Ramp::held([0.0, 0.0, THRUST]), ..Inputs::default() }
 }
 
-/// Returns a craft with one undamped tank on the axis at height z.
 fn craft_with_tank_at(z: f64, k: f64, c: f64) -> Parameters {
     let j = Inertia { xx: 860.0, yy: 860.0, zz: 640.0, xy: 0.0, xz: 0.0, yz: 0.0 };
     let mut p = Parameters::default();
@@ -53,7 +51,6 @@ struct Closed {
     b: f64,
     w_0_2: f64,
     sigma: f64,
-    /// Height of R's centre of mass above O.
     center: f64,
 }
 
@@ -116,7 +113,6 @@ fn torque() -> [f64; INPUTS] {
     du
 }
 
-/// Returns the input direction of a lateral force at the height z above O.
 fn force_at(z: f64) -> [f64; INPUTS] {
     let mut du = [0.0; INPUTS];
     (du[0], du[4]) = (1.0, z);

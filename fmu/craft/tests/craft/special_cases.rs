@@ -9,7 +9,6 @@ fn torque(t: f64) -> f64 {
     0.6 * f64::sin(13.0 * t)
 }
 
-/// Knots between which the torque is linear, s.
 const KNOT: f64 = 0.01;
 
 fn torque_in_knot(k: usize) -> (f64, f64) {
@@ -17,7 +16,6 @@ fn torque_in_knot(k: usize) -> (f64, f64) {
     (from, (to - from) / KNOT)
 }
 
-/// Returns the states after ten seconds of thrust and a sinusoidal torque.
 fn after_ten_seconds(p: &Parameters) -> [f64; STATES] {
     let force = Ramp::held([50.0, 0.0, 2400.0]);
     let input = |k: usize| {
@@ -37,7 +35,6 @@ fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
-/// The given numbers have six digits.
 #[test]
 fn a_tank_given_as_a_cylinder_moves_as_a_tank_with_the_cylinders_modes() {
     let given = Parameters::default();
@@ -123,7 +120,6 @@ fn a_pendulum_without_length_is_a_mass_at_its_hinge() {
     assert!((ratio / 10.0 - 1.0).abs() < 0.1, "{ratio} {off:?}");
 }
 
-/// M_a of a tank without rigid liquid has the rank of its modes.
 #[test]
 fn a_tank_without_rigid_liquid_is_allowed() {
     let mut p = Parameters::default();
@@ -187,7 +183,6 @@ fn without_force_and_stiffness_a_bob_coasts_on_its_sphere() {
     assert!(largest_difference(&x[index::bob(0, 0)..][..3], &want) < 1e-8);
 }
 
-/// Without tanks and without wheels: Euler's equations of a symmetric body have a closed form.
 #[test]
 fn a_rigid_body_without_tanks_precesses_by_euler() {
     let mut p = Parameters { tanks: 0, ..Parameters::default() };

@@ -50,7 +50,6 @@ fn spheroid([across, axial, m, a, c]: [f64; 5], rate: f64, decay: [f64; 2]) -> P
     p
 }
 
-/// Returns the roots of a l^2 + b l + c.
 fn roots(a: C, b: C, c: C) -> [C; 2] {
     let root = (b * b - a * c * 4.0).sqrt();
     [(-b + root) / (a * 2.0), (-b - root) / (a * 2.0)]
@@ -396,7 +395,6 @@ fn liquid_spins_up_with_its_tank_at_the_rate_of_its_decay() {
     }
 }
 
-/// Returns a hash of states and outputs along motions of random craft.
 fn bits(change: impl Fn(&mut Parameters)) -> u64 {
     let mut hash = 0xcbf2_9ce4_8422_2325_u64;
     let mut take = |x: f64| hash = (hash ^ x.to_bits()).wrapping_mul(0x0100_0000_01b3);
@@ -426,7 +424,6 @@ fn bits(change: impl Fn(&mut Parameters)) -> u64 {
     hash
 }
 
-/// With `spin_inertia` = 0 the other parameters of the liquid's spin have no effect.
 #[test]
 fn parameters_of_the_spin_without_spin_inertia_change_no_bit() {
     let before = bits(|_| ());

@@ -172,7 +172,6 @@ fn angles_at_which_the_inertia_vanishes_are_refused() {
     assert!(why.contains("tank[2].nonlinear_inertia[1] = -6.0") && why.contains(&bound), "{why}");
 }
 
-/// `nonlinear_inertia` and `nonlinear_stiffness` (s and kappa); the error names tank and mode.
 #[test]
 fn large_wave_coefficients_are_refused_out_of_range_and_with_detached_liquid() {
     let mut p = Parameters { tanks: 2, ..Parameters::default() };

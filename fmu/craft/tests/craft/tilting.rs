@@ -24,7 +24,6 @@ fn platform() -> Parameters {
     }
 }
 
-/// Returns an undamped tank of 1.33 kg of rigid and 0.76 kg of sloshing liquid.
 fn tank() -> Tank {
     let mut tank = Tank {
         position: [0.0, 0.0, 0.05],
@@ -259,7 +258,6 @@ fn a_platform_under_an_oscillating_torque_follows_stribecks_law() {
     assert!(most > 0.05, "it has to slide past w_s: {most}");
 }
 
-/// With the mount `free`, stiffness and damping of the pivot change no bit of the motion.
 #[test]
 fn pivot_parameters_do_not_change_a_free_craft() {
     let run = |pivot: Pivot| {

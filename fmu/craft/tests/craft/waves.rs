@@ -34,27 +34,21 @@ pub fn bench(fill: f64) -> Tank {
     tank
 }
 
-/// Returns the frequency of small waves, rad/s.
 pub fn linear_frequency(tank: &Tank) -> f64 {
     f64::sqrt(G / tank.length[0])
 }
 
-/// Returns the specific force of an upright tank that is accelerated along x, m/s2.
 pub fn sideways([value, slope]: [f64; 2]) -> Ramp {
     Ramp { value: [value, 0.0, G], slope: [slope, 0.0, 0.0] }
 }
 
-/// One tank whose motion is prescribed.
 pub trait Moved: Sized {
     fn start(tank: &Tank) -> Self;
 
-    /// Accelerates the tank along x for `h` s: value at the start (m/s2) and slope.
     fn step(&mut self, a: [f64; 2], h: f64);
 
-    /// Returns p of the first mode and its rate.
     fn bob(&mut self) -> [f64; 6];
 
-    /// Returns the derivative of [`bob`](Self::bob) in a tank at rest.
     fn rates(&mut self) -> [f64; 6];
 }
 
