@@ -116,7 +116,6 @@ mod tests {
         (slope, curvature)
     }
 
-    /// Powers up to degree 4 through 2 to 5 points.
     #[test]
     fn the_first_and_second_derivatives_of_an_interpolating_polynomial_are_exact() {
         let power = |x: f64, n: i32| {

@@ -250,7 +250,6 @@ pub const LOW_BOND: f64 = 100.0;
 mod tests {
     use super::*;
 
-    /// The output `limited_by` has an integer for each reason why the model is out of range.
     #[test]
     fn limit_reasons_and_their_numbers_are_one_to_one() {
         for (i, reason) in LimitedBy::ALL.into_iter().enumerate() {

@@ -42,7 +42,6 @@ mod tests {
         assert_eq!(Regime::from_ratio(f64::NAN), Regime::Nonlinear);
     }
 
-    /// The output `regime` has an integer for each of linear, transitional and nonlinear.
     #[test]
     fn regimes_and_their_numbers_are_one_to_one() {
         for regime in [Regime::Linear, Regime::Transitional, Regime::Nonlinear] {
