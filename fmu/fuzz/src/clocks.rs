@@ -24,7 +24,6 @@ const LONGEST: u32 = 8;
 enum Call {
     Input(usize, f64),
     Slope(usize, f64),
-    /// Sets tunable parameter number n to a fraction of its start value.
     Tune(usize, f64),
     GoBack(u32),
     Save,
@@ -35,7 +34,6 @@ enum Call {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Kind {
     Multiplied,
-    /// t += h.
     Added,
     Off,
     Differences,
@@ -45,7 +43,6 @@ enum Kind {
 struct Clock {
     kind: Kind,
     start: f64,
-    /// Start of the clock from whose differences the step sizes follow, s.
     origin: f64,
     tick: f64,
     ticks: u32,
@@ -77,7 +74,6 @@ impl Clock {
         self.name(self.time)
     }
 
-    /// Returns the size of a step of this many ticks, s.
     fn length(&self, ticks: u32) -> f64 {
         let at = |ticks: u32| self.origin + f64::from(ticks) * self.tick;
         match self.kind {
@@ -186,7 +182,6 @@ fn allowed(rows: &Rows, n: usize, tick: f64, is_placed: bool, start: f64) -> f64
     TOLERANCE * size + last_digits(start) * fastest
 }
 
-/// Returns two units in the last place of times after `start`, s.
 fn last_digits(start: f64) -> f64 {
     2.0 * f64::EPSILON * (start.abs() + 10.0)
 }
@@ -201,7 +196,6 @@ fn outputs<M: Model>() -> impl Iterator<Item = &'static Scalar<M>> {
     M::table().scalars.iter().filter(is_shown)
 }
 
-/// Reads all [`outputs`], or returns `None` if one of them cannot be read.
 fn read<M: Model, V: Values>(instance: &mut Instance<M, V>) -> Option<Vec<f64>> {
     let value = |scalar: &Scalar<M>| match instance.get(V::GET[place(scalar)], V::reference(scalar))
     {

@@ -16,7 +16,6 @@ use runtime::version::Version;
 
 use crate::{Values, everything_is_a_number, set, step, survives_being_saved, to_steps};
 
-/// Number of bytes of the checksum at the end of a saved state.
 const CHECKSUM: usize = 16;
 
 /// Runs one case. The first byte chooses the FMI version and the saved state. Patches follow, each a place

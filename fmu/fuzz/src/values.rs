@@ -133,7 +133,6 @@ fn within(quantity: Quantity, data: &mut Unstructured) -> Result<f64> {
     })
 }
 
-/// Draws a number, usually between 1e-6 and 1e3, otherwise with any bits.
 fn real(data: &mut Unstructured) -> Result<f64> {
     if data.ratio(1, 8)? {
         return Ok(f64::from_bits(data.arbitrary()?));
