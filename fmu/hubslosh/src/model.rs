@@ -8,7 +8,6 @@ use runtime::Dynamics;
 use runtime::clock::Instant;
 use runtime::model::{StepEnd, StepFailure};
 
-/// The bench: hub, bearing, tank, wheel and gyro.
 #[derive(Clone, Debug)]
 pub struct HubSlosh {
     plant: Plant,
@@ -149,7 +148,6 @@ fn failure(why: StepError) -> StepFailure {
     StepFailure { text: why.to_string(), shorter_may_succeed: why.shorter_may_succeed() }
 }
 
-/// Number of words that [`Dynamics::save`] writes.
 pub const SAVED_WORDS: usize = State::WORDS + 1 + StoppedStep::WORDS;
 
 impl Dynamics for HubSlosh {

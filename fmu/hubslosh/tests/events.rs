@@ -124,7 +124,6 @@ fn discrete<V: Version>(instance: &mut Instance<Model, V>) -> Vec<Value> {
     DISCRETE.iter().map(|name| get(instance, name)).collect()
 }
 
-/// Computes the trajectory through FMI 2.0, with which those through FMI 3.0 are compared.
 fn trajectory() -> Vec<(Vec<u64>, Vec<Value>)> {
     let mut two: Two = initialised(Events::InStep, LIVELY);
     let mut all = Vec::new();
@@ -136,7 +135,6 @@ fn trajectory() -> Vec<(Vec<u64>, Vec<Value>)> {
     all
 }
 
-/// HubSlosh with stick, slip and swinging liquid, in steps of equal length.
 #[test]
 fn fmi_3_without_event_mode_gives_bit_identical_results_to_fmi_2() {
     let expected = trajectory();
@@ -256,7 +254,6 @@ fn steps_stop_at_the_event_time_of_fmi_2_to_the_last_bit() {
     assert!(stops > 10, "{stops} steps with events");
 }
 
-/// FMI 3.0: a host sets a large torque in event mode while the hub sticks.
 #[test]
 fn torque_set_in_event_mode_that_breaks_stiction_makes_the_hub_slip() {
     let values = [("slosh.model", Value::Integer(1))];
@@ -328,7 +325,6 @@ fn a_step_with_too_much_work_is_discarded_and_a_shorter_one_goes_on() {
     three.step_to_event(0.0, 0.1, false).unwrap();
 }
 
-/// FMI 3.0 with and without event mode.
 #[test]
 fn a_reset_instance_equals_a_new_one_whoever_handles_events() {
     for events in [Events::InStep, Events::Reported] {
