@@ -250,7 +250,6 @@ mod tests {
         assert!(slow.walk != 0.0);
     }
 
-    /// An angular random walk of 1e-3 rad/√s, sampled at 50 and 200 Hz.
     #[test]
     fn white_noise_of_a_sample_is_the_random_walk_times_the_root_of_the_rate() {
         for rate in [50.0, 200.0] {
@@ -286,7 +285,6 @@ mod tests {
         }
     }
 
-    /// 40,000 gyros that differ in their seeds.
     #[test]
     fn the_initial_gyro_bias_has_the_specified_standard_deviation_and_correlation_time() {
         const COUNT: i32 = 40_000;

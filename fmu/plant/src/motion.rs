@@ -502,7 +502,6 @@ impl<const UNROLLED: bool, M: SloshMode> integrator::Motion for Stretch<'_, UNRO
         all.fold(0.0, larger) / self.allowed[1]
     }
 
-    /// Returns the time within `h` at which the hub comes to rest or breaks away, s.
     #[inline(always)]
     fn event(&mut self, n: usize, h: f64) -> Option<f64> {
         self.event = None;

@@ -203,7 +203,6 @@ impl Plant {
         outputs.discrete.baffle_in_range = baffle;
     }
 
-    /// Returns the ranges for the outputs, for which the equations must have been evaluated last.
     pub(crate) fn evaluate_ranges(&self, outputs: &Outputs) -> Ranges {
         let regime = Regime::from_ratio(outputs.wave_height / self.radius);
         let baffle = self.baffle.is_none_or(|range| range.contains(outputs.baffle_wave));

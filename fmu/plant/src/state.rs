@@ -211,7 +211,6 @@ impl State {
         self.elapsed = add_time(elapsed, t);
     }
 
-    /// Records a new contact at `time`. Returns true if it differs from the previous one.
     pub(crate) fn record_contact(&mut self, contact: Contact, time: f64) -> bool {
         let changes = contact != self.contact;
         if changes {

@@ -12,7 +12,7 @@ use crate::parameters::Friction;
 /// tolerance sees its terms.
 const VISIBLE: f64 = 3.0;
 
-/// Rate over w_s beyond which that excess is below 1e-12 of d.
+/// Ratio of the rate to the Stribeck speed w_s above which the excess d exp(-(w/w_s)^2) is below 1e-12 d, so that it counts as 0.
 const FLAT: f64 = 5.3;
 
 #[derive(Clone, Debug)]

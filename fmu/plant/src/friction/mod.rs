@@ -63,7 +63,6 @@ pub trait FrictionLaw {
     /// Advances the law's own state z by `t` seconds with its series up to order n.
     fn advance(&self, _n: usize, _t: f64, _z: &mut f64) {}
 
-    /// Returns the magnitude of coefficient n of the law's own state over its allowed error.
     #[inline(always)]
     fn coefficient_norm(&self, _n: usize) -> f64 {
         0.0

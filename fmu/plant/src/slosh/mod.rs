@@ -31,7 +31,7 @@ use planar::Planar;
 use spherical::Spherical;
 use third_order::ThirdOrder;
 
-/// Functions of [`SloshMode`] of a model whose pendulum is its field `p`.
+/// Defines the functions of [`SloshMode`] that are alike in all models that store their pendulum in the field `p`.
 macro_rules! own_pendulum {
     () => {
         fn pendulum(&self) -> &Pendulum {

@@ -11,7 +11,6 @@ fn plant(p: &plant::Parameters, inputs: &Inputs) -> Plant {
     Plant::new(p, inputs, 0.0, TOLERANCE).unwrap()
 }
 
-/// Energy throughput so far: work in either direction, and heat.
 struct Turnover {
     first: Outputs,
     last: Outputs,
@@ -378,7 +377,6 @@ fn gyro_readings_are_equal_for_any_communication_step() {
 /// processes.
 const RANDOM_STEPS: usize = if cfg!(debug_assertions) { 200 } else { 1_000 };
 
-/// Random benches, torques up to 100 N·m and steps of random length.
 #[test]
 fn random_steps_give_finite_results_or_a_clear_error() {
     let from =

@@ -32,7 +32,6 @@ const PIECES: [(Ramp, f64); 7] = [
     (Ramp { value: 3.0, slope: 1.0 }, 0.5),
 ];
 
-/// Runs along [`PIECES`], each cut into steps of about `h`; the outputs after each step.
 fn run(p: &Parameters, h: f64) -> Vec<Outputs> {
     let mut plant = Plant::new(p, &inputs_with_gravity(9.81), 0.0, TOLERANCE).unwrap();
     let mut all = vec![plant.outputs(&inputs_with_gravity(9.81))];

@@ -4,7 +4,6 @@ use plant::{FrictionModel, Parameters, SloshModel};
 
 pub const SLOSH: [SloshModel; SloshModel::ALL.len()] = SloshModel::ALL;
 
-/// Slosh models with liquid that moves: all but the first, `Frozen`.
 pub const SLOSHING: [SloshModel; SLOSH.len() - 1] = {
     let mut moving = [SloshModel::Linear; SLOSH.len() - 1];
     let mut i = 0;
@@ -15,14 +14,12 @@ pub const SLOSHING: [SloshModel; SLOSH.len() - 1] = {
     moving
 };
 
-/// Returns true if the model ends at a rim, which a violent motion reaches.
 pub fn has_rim(slosh: SloshModel) -> bool {
     slosh == SloshModel::Liquid
 }
 
 pub const FRICTION: [FrictionModel; FrictionModel::ALL.len()] = FrictionModel::ALL;
 
-/// Returns the bench with the given slosh model and friction law.
 pub fn bench(slosh: SloshModel, friction: FrictionModel) -> Parameters {
     let mut p = Parameters::default();
     p.slosh.model = slosh;

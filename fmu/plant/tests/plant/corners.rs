@@ -4,7 +4,6 @@
 use super::common::bench;
 use plant::{FrictionModel, Inputs, Parameters, Plant, Ramp, SloshModel};
 
-/// One row of a table of inputs: its length, torque and specific force at both ends.
 struct Row {
     h: f64,
     torque: [f64; 2],

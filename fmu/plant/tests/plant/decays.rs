@@ -91,7 +91,6 @@ fn a_given_damping_ratio_holds_at_the_start_or_at_1_m_per_s2() {
     }
 }
 
-/// Amplitudes at the turning points of the tangential angle, by parabolas through samples, and their times.
 fn turning_points(p: &Parameters, length: f64) -> Vec<[f64; 2]> {
     let (h, mut found) = (2e-3, Vec::new());
     let mut plant = Plant::new(p, &inputs_with_gravity(9.81), 0.0, TOLERANCE).unwrap();

@@ -55,7 +55,6 @@ fn gain(system: &([[f64; 4]; 4], [f64; 4]), f: f64) -> f64 {
     n.0.hypot(n.1) / d.0.hypot(d.1)
 }
 
-/// Returns the frequency of the largest (sign 1) or smallest (-1) gain between two frequencies.
 fn extremum(system: &([[f64; 4]; 4], [f64; 4]), low: f64, high: f64, sign: f64) -> f64 {
     let (mut low, mut high) = (low, high);
     for _ in 0..200 {

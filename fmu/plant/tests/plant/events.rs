@@ -67,7 +67,6 @@ fn a_lugre_hub_at_rest_moves_in_the_direction_of_the_torque() {
     assert_eq!(contact_under(&torque(-1e-6), 0.0), -1);
 }
 
-/// Each event indicator of the wheel is the distance of command or speed to its limit.
 #[test]
 fn indicators_of_the_wheel_are_distances_to_its_limits() {
     let mut p = bench(SloshModel::Frozen, FrictionModel::Viscous);
@@ -330,7 +329,6 @@ fn saved_data_that_is_not_a_stopped_step_is_refused() {
     assert!(StoppedStep::from_words(&none).is_none(), "its start is not a state");
 }
 
-/// After an error the plant and its stopped step are unchanged.
 #[test]
 fn a_failed_step_keeps_the_stopped_step() {
     let mut p = bench(SloshModel::Linear, FrictionModel::Viscous);

@@ -33,7 +33,6 @@ fn frequency(p: &Parameters, h: f64) -> f64 {
     TAU * cycles / (crossings[crossings.len() - 1] - crossings[0])
 }
 
-/// Returns [`shifts_of`] for the bench with this model and depth.
 pub fn shifts(model: SloshModel, depth: f64, h: f64) -> [f64; 2] {
     shifts_of(held(model, depth), h)
 }

@@ -10,7 +10,6 @@ const H: f64 = 5e-4;
 
 const G: f64 = 9.81;
 
-/// Returns a tilted bench with three modes, of which two move, and an unbalanced hub.
 fn moving(slosh: SloshModel) -> Parameters {
     let mut p = bench(slosh, FrictionModel::Viscous);
     p.slosh.modes = 3;
@@ -68,7 +67,6 @@ fn place(p: &Parameters, known: &Calculated, plant: &Plant) -> Place {
     Place { theta: states[x::THETA], bobs: (0..modes).map(bob).collect() }
 }
 
-/// Returns the first and second derivative at the middle of five samples.
 fn derivatives(f: [f64; 5]) -> [f64; 2] {
     let [a, b, c, d, e] = f;
     [

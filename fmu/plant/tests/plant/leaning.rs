@@ -31,7 +31,6 @@ fn plant(p: &Parameters) -> Plant {
     Plant::new(p, &inputs_with_torque(0.0), 0.0, 1e-11).unwrap()
 }
 
-/// Returns the displacement of mode 1 over its pendulum's length when it hangs at rest.
 fn rest(p: &Parameters) -> f64 {
     let s = p.bench.tilt.tan();
     let spring = match p.slosh.model {
@@ -49,7 +48,6 @@ fn rest(p: &Parameters) -> f64 {
     low
 }
 
-/// Puts mode 1 at rest, displaced by `aside` of its length along the tangent.
 fn hang(p: &mut Parameters, aside: f64) {
     let (sin, cos) = (p.bench.tilt_azimuth - p.init.theta).sin_cos();
     let u = rest(p);

@@ -33,7 +33,6 @@ fn the_liquid_model_has_the_frequency_shifts_of_the_third_order() {
     }
 }
 
-/// Returns a tank given by a table, with these coefficients of mode 1.
 fn table(mut p: Parameters, s: f64, kappa: f64) -> Parameters {
     p.slosh.source = SloshSource::Table;
     let table = &mut p.slosh.table;

@@ -21,7 +21,6 @@ fn torque(value: f64) -> Inputs {
 /// Break-away torque c + d of the bench's bearing, N m.
 const G_MAX: f64 = 0.003498 + 0.002423;
 
-/// LuGre friction with asymmetry and with harmonics over the angle, each slosh model.
 #[test]
 fn energy_balances_and_the_bearing_never_adds_energy() {
     for slosh in SloshModel::ALL {
@@ -294,7 +293,6 @@ fn step_length_follows_the_bristle_stiffness() {
     }
 }
 
-/// The host uses classical Runge-Kutta, and bisection on the event indicator to locate reversals.
 #[test]
 fn a_model_exchange_host_that_locates_reversals_reproduces_co_simulation() {
     let mut p = bench(SloshModel::Spherical);

@@ -41,7 +41,6 @@ fn plant(p: &Parameters) -> Plant {
     Plant::new(p, &inputs_with_gravity(9.81), 0.0, TOLERANCE).unwrap()
 }
 
-/// Specific force: constant, falling to 0, zero, rising again.
 const PIECES: [(Ramp, f64); 4] = [
     (Ramp { value: 9.81, slope: 0.0 }, 1.0),
     (Ramp { value: 9.81, slope: -9.81 }, 1.0),
@@ -49,7 +48,6 @@ const PIECES: [(Ramp, f64); 4] = [
     (Ramp { value: 0.0, slope: 6.0 }, 1.0),
 ];
 
-/// Runs along [`PIECES`], each cut into steps of about `h`; the outputs after each step.
 fn run(p: &Parameters, h: f64) -> Vec<Outputs> {
     let mut plant = plant(p);
     let mut all = vec![plant.outputs(&inputs_with_gravity(9.81))];

@@ -3,7 +3,6 @@
 use super::common::bench;
 use plant::{FrictionModel, Inputs, Parameters, Plant, Ramp, STATES, SloshModel, StepError};
 
-/// Returns displaced liquid on a hub that turns, under a torque that brakes it.
 fn start(slosh: SloshModel, friction: FrictionModel) -> (Parameters, Inputs) {
     let mut p = bench(slosh, friction);
     p.friction.eps = 1e-2;

@@ -146,7 +146,6 @@ fn dry_friction_stops_a_hub_on_a_suspension_line_at_the_predicted_angle_and_time
     }
 }
 
-/// The hub hangs on a line with torsional stiffness and damping.
 #[test]
 fn energy_and_torques_balance_on_a_suspension_line_for_any_communication_step() {
     for slosh in SLOSH {

@@ -8,7 +8,6 @@ fn plant(p: &Parameters) -> Plant {
     Plant::new(p, &Inputs::default(), 0.0, 1e-10).unwrap()
 }
 
-/// Returns a sphere of 0.2 m, half full, with three modes.
 fn sphere() -> Parameters {
     let mut p = bench(SloshModel::Linear, FrictionModel::Viscous);
     (p.slosh.source, p.slosh.modes) = (SloshSource::Table, 3);

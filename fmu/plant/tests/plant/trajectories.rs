@@ -89,7 +89,6 @@ impl Fill {
     }
 }
 
-/// Runs one record and returns what differs by more than is allowed.
 fn differences(name: &str, fill: &Fill, run: &Run, tolerance: f64) -> Vec<String> {
     let (step, torque) = fill.input(run);
     let is_pulse = run.input == "pulse";
