@@ -421,7 +421,6 @@ pub(crate) use c_functions;
 
 const STATE: u64 = 0x5374_6174_6548_7562;
 
-/// The object to which a handle of a saved state points.
 #[repr(C)]
 struct SavedState<M: Model, V: Version> {
     mark: u64,

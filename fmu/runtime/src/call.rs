@@ -9,9 +9,7 @@ use std::fmt;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Interface {
-    /// The host integrates.
     ModelExchange = 0,
-    /// The FMU integrates.
     CoSimulation = 1,
 }
 
@@ -48,14 +46,10 @@ impl Events {
 #[allow(missing_docs)]
 pub enum InstanceState {
     Instantiated = 0,
-    /// Initialization mode: parameters and inputs are set, and initial values can be read.
     Initialization = 1,
     Stepping = 2,
-    /// In event mode, at an event that the host handles.
     Event = 3,
-    /// In continuous-time mode, between events (Model Exchange).
     Continuous = 4,
-    /// The simulation has ended, and the last values can still be read.
     Terminated = 5,
     /// A step has failed. The last values can be read, and a saved state can be restored.
     Failed = 6,
@@ -64,9 +58,7 @@ pub enum InstanceState {
     /// Event mode directly after initialization mode. Parameters can still be set here, because OpenModelica
     /// does so; the next call that continues the simulation makes it an ordinary event mode.
     Initialized = 8,
-    /// Configuration mode, before initialization: structural parameters can be set.
     Configuration = 9,
-    /// Within a step, during an intermediate update.
     Intermediate = 10,
 }
 
@@ -160,16 +152,13 @@ pub(crate) mod states {
 pub struct Call {
     /// Name of the function, with which its messages begin.
     pub name: &'static str,
-    /// The instance states in which the function may be called, as a bit mask.
     allowed: u16,
     /// The C type of the values that the function reads or sets; `None` for other functions.
     pub c_type: Option<CType>,
-    /// The only interface to which it belongs, or `None` for both.
     only_in: Option<Interface>,
 }
 
 impl Call {
-    /// Creates a function that may be called in these [`states`].
     pub(crate) const fn new(name: &'static str, allowed: u16) -> Call {
         Call { name, allowed, c_type: None, only_in: None }
     }
@@ -244,17 +233,14 @@ impl Call {
     }
 }
 
-/// Creates a call that reads or sets values of a type.
 pub(crate) const fn typed(c_type: CType, name: &'static str, allowed: u16) -> Call {
     Call { c_type: Some(c_type), ..Call::new(name, allowed) }
 }
 
-/// Restricts a call to Co-Simulation.
 pub(crate) const fn cs(call: Call) -> Call {
     Call { only_in: Some(Interface::CoSimulation), ..call }
 }
 
-/// Restricts a call to Model Exchange.
 pub(crate) const fn me(call: Call) -> Call {
     Call { only_in: Some(Interface::ModelExchange), ..call }
 }
@@ -264,7 +250,6 @@ pub(crate) const fn me(call: Call) -> Call {
 #[allow(missing_docs)]
 pub enum Severity {
     Discard,
-    /// The call was refused or has failed.
     Error,
     Fatal,
 }

@@ -26,7 +26,6 @@ pub struct Instant {
     pub resolution: f64,
 }
 
-/// Start time, stop time and present time of an instance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Clock {
     pub start: f64,

@@ -24,7 +24,6 @@ use crate::variable::{Access, Causality, Dimension, Value};
 /// Name of the file of start values, in the folder of resources.
 pub const START_VALUES: &str = "start_values.txt";
 
-/// Number of hexadecimal digits of a token that describe the extent.
 const DIGITS: usize = SIZES + 6;
 
 const SIZES: usize = 3;

@@ -46,7 +46,6 @@ pub struct Instance<M: Model, V: Version> {
     /// Values of the parameters in the order of the table, even if they are not allowed.
     pub(crate) parameters: Vec<Value>,
     pub(crate) inputs: M::Inputs,
-    /// True if an input has a slope for the next step.
     pub(crate) sloped: bool,
     /// True while the inputs have the slopes of the step that has just ended. Until an input is set, outputs
     /// are then limits from the left.
@@ -59,7 +58,6 @@ pub struct Instance<M: Model, V: Version> {
     /// ([`Events::Reported`]). Empty until initialization has ended; before that discrete outputs are
     /// computed like all others.
     pub(crate) shown: Vec<i32>,
-    /// Memory for vectors of continuous states in the model's order.
     scratch: [Vec<f64>; 2],
 }
 
@@ -185,7 +183,6 @@ impl<M: Model, V: Version> Instance<M, V> {
         self
     }
 
-    /// Returns the GUID or token of the description that the host has read.
     pub(crate) fn token(&self) -> &str {
         match &self.extent {
             Some(extent) => extent.token(),
@@ -193,7 +190,6 @@ impl<M: Model, V: Version> Instance<M, V> {
         }
     }
 
-    /// Returns the indices in the model of the continuous states, in the host's order.
     fn places(&self) -> Places<M> {
         Places { extent: self.extent.clone(), next: 0, model: PhantomData }
     }
@@ -334,7 +330,6 @@ impl<M: Model, V: Version> Instance<M, V> {
         warnings
     }
 
-    /// Continues after initialization in Model Exchange, where parameters can be set until now.
     fn leave_initialized(&mut self, call: &Call) -> Result<(), Fault> {
         if self.state == InstanceState::Initialized {
             self.model(call)?;
@@ -523,7 +518,6 @@ impl<M: Model, V: Version> Instance<M, V> {
         }
     }
 
-    /// Sets a parameter, or a continuous state if the host may set single states.
     fn store_parameter(&mut self, scalar: &Scalar<M>, value: Value) {
         match value {
             Value::Real(x) if V::SETS_STATES && scalar.state.is_some() => {
@@ -541,7 +535,6 @@ impl<M: Model, V: Version> Instance<M, V> {
         }
     }
 
-    /// Returns true if the simulation has started, after which fixed parameters cannot be set.
     #[inline]
     pub(crate) fn is_running(&self) -> bool {
         !matches!(
@@ -1025,7 +1018,6 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Lets inputs change linearly over the next `h` seconds to the values `ends`.
     pub(crate) fn ramp_to(
         &mut self,
         call: &Call,
@@ -1065,7 +1057,6 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.outputs = None;
     }
 
-    /// Removes the slopes, so that the inputs are held.
     pub(crate) fn drop_ramps(&mut self) {
         hold_inputs::<M>(&mut self.inputs);
         self.sloped = false;
@@ -1267,7 +1258,6 @@ impl<M: Model, V: Version> Instance<M, V> {
         }
     }
 
-    /// Computes the event indicators for a call that reads variables.
     pub(crate) fn indicators_for(
         &mut self,
         call: &Call,
@@ -1365,11 +1355,6 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Converts the parameters for the model.
-    ///
-    /// # Errors
-    ///
-    /// Lists everything that is not allowed.
     pub(crate) fn model_parameters(&self) -> Result<M::Parameters, Vec<String>> {
         let all = M::table().parameters().iter().zip(&self.parameters);
         let problem = |(scalar, value): (&Scalar<M>, &Value)| {
@@ -1463,7 +1448,6 @@ fn discrete<M: Model>(scalar: &Scalar<M>, outputs: &M::Outputs) -> i32 {
     }
 }
 
-/// Returns a computed number as a value, or a fault if it is NaN or infinite.
 #[inline(always)]
 fn finite<M: Model>(call: &Call, scalar: &Scalar<M>, x: f64) -> Result<Value, Fault> {
     if is_finite(x) { Ok(Value::Real(x)) } else { Err(not_finite(call, scalar, x)) }
@@ -1491,7 +1475,6 @@ fn state_refusal<M: Model>(scalar: &Scalar<M>, value: Value) -> String {
     format!("{} = {value} (allowed: magnitudes below {MAX_STATE:e})", scalar.name())
 }
 
-/// Returns the reason why a state cannot start with this value.
 fn start_problem<M: Model>(scalar: &Scalar<M>, x: f64) -> Option<String> {
     if is_finite(x) && x.abs() < MAX_STATE {
         return None;

@@ -191,7 +191,6 @@ pub const fn scalars<M: Dynamics, const N: usize>(
     scalars
 }
 
-/// Returns true for a discrete output, which changes only at events.
 const fn is_discrete<M: Dynamics>(variable: &Variable<M>) -> bool {
     matches!(variable.access, Access::OutputInteger(_) | Access::OutputBoolean(_))
 }

@@ -293,7 +293,6 @@ fn interface<M: Model>(
     }
 }
 
-/// Reads the variables of all references and converts each value to its C type by `as_c`.
 #[inline]
 unsafe fn get<M: Model, T>(
     c: fmi2Component,
@@ -314,7 +313,6 @@ unsafe fn get<M: Model, T>(
     }
 }
 
-/// Sets the variables of all references; each value is converted from its C type by `from_c`.
 #[inline]
 unsafe fn set<M: Model, T: Copy>(
     c: fmi2Component,
@@ -430,7 +428,6 @@ fn fmi2GetDirectionalDerivative(c: fmi2Component, vUnknown_ref: *const fmi2Value
 
 fn fmi2GetFMUstate(c: fmi2Component, FMUstate: *mut fmi2FMUstate) -> fmi2Status =
     perform_if_allowed::<M, Fmi2>(c, &GET_STATE, |component| save_state(&GET_STATE, "FMUstate", FMUstate, &component.instance));
-/// Restores a saved state of this or another instance, in any instance state.
 fn fmi2SetFMUstate(c: fmi2Component, FMUstate: fmi2FMUstate) -> fmi2Status =
     perform_if_allowed::<M, Fmi2>(c, Fmi2::SET_STATE, |component| {
         component.instance.restore(saved_state(Fmi2::SET_STATE, "FMUstate", FMUstate)?)

@@ -193,7 +193,6 @@ fn fmi3GetVariableDependencies(instance: fmi3Instance, dependent: fmi3ValueRefer
 };
 fn fmi3GetFMUState(instance: fmi3Instance, FMUState: *mut fmi3FMUState) -> fmi3Status =
     perform_if_allowed::<M, Fmi3>(instance, &GET_STATE, |component| save_state(&GET_STATE, "FMUState", FMUState, &component.instance));
-/// Restores a saved state of this or another instance, in any instance state.
 fn fmi3SetFMUState(instance: fmi3Instance, FMUState: fmi3FMUState) -> fmi3Status =
     perform_if_allowed::<M, Fmi3>(instance, Fmi3::SET_STATE, |component| {
         component.instance.restore(saved_state(Fmi3::SET_STATE, "FMUState", FMUState)?)?;

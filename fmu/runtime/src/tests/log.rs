@@ -10,7 +10,6 @@ use crate::version::Version;
 
 type Line = (Status, String, String);
 
-/// Returns a log and the list of what has been logged.
 fn log() -> (Log, Rc<RefCell<Vec<Line>>>) {
     let lines = Rc::new(RefCell::new(Vec::new()));
     let to = lines.clone();

@@ -35,7 +35,6 @@ fn fresh(interface: Interface) -> Subject {
     Instance::new(interface)
 }
 
-/// Returns an instance whose motion begins at t = 0, with these values set before.
 fn started(interface: Interface, values: &[(&str, f64)]) -> Subject {
     let mut instance = fresh(interface);
     for (name, value) in values {

@@ -70,7 +70,6 @@ fn derivatives_that_are_not_finite_are_discarded() {
     assert_eq!(discarded(instance.derivatives(&mut x)), "fmi2GetDerivatives: der(level[2]) = -inf");
 }
 
-/// Discrete variables change only in event mode, and not while the host integrates the continuous states.
 #[test]
 fn discrete_changes_happen_only_at_events() {
     let mut instance = continuous(&[("inspection", 5.0)]);

@@ -15,7 +15,6 @@ fn number(name: &str) -> u32 {
     reference(name) + 1
 }
 
-/// Returns an instance in step mode at `start`, with these values set before.
 fn stepping(events: Events, start: f64, values: &[(&str, f64)]) -> Host {
     let mut host = Host::with_events(CS, events);
     for (name, x) in values {
@@ -31,7 +30,6 @@ fn stepping(events: Events, start: f64, values: &[(&str, f64)]) -> Host {
     host
 }
 
-/// Returns state, number of movements and position of the valve, as the host sees them.
 fn valve_outputs(host: &mut Host) -> [Value; 3] {
     [
         host.get(&GET_BOOLEAN, number("open")).unwrap(),

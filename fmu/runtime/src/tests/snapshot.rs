@@ -7,7 +7,6 @@ use crate::hash::Hash;
 use crate::snapshot::{from_bytes, size};
 
 const CHECKSUM: usize = 16;
-/// Number of discrete outputs. The table in `snapshot.rs` has the positions of the parts.
 const SHOWN_COUNT: usize = 3;
 const FLAGS: usize = 55;
 const TIMES: usize = 58;
@@ -138,7 +137,6 @@ fn a_saved_state_of_the_other_interface_is_refused() {
     assert_eq!(to_bytes(&moved), to_bytes(&instance));
 }
 
-/// Returns bytes that are changed in one place, with the checksum adapted.
 fn patched(bytes: &[u8], place: usize, new: &[u8]) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     bytes[place..place + new.len()].copy_from_slice(new);
@@ -148,7 +146,6 @@ fn patched(bytes: &[u8], place: usize, new: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// Bytes that are empty, truncated, of another model, or of another format.
 #[test]
 fn bytes_that_are_no_saved_state_are_refused_with_a_reason() {
     let bytes = to_bytes(&eventful());

@@ -18,7 +18,6 @@ fn rate(instance: &mut Subject, name: &str) -> Result<f64, Fault> {
     instance.output_derivatives(&[reference(name)], &[1], &mut answer).map(|()| answer[0])
 }
 
-/// An input with the derivative 2 per second, set by fmi2SetRealInputDerivatives, for one step.
 #[test]
 fn inputs_change_along_their_derivatives_within_a_step() {
     let mut instance = started(CS, &[]);

@@ -24,7 +24,6 @@ fn reference(name: &str) -> u32 {
     Spring::table().find(name).unwrap() + 1
 }
 
-/// Data of a test's host, to which its environment pointer leads.
 #[derive(Default)]
 struct TestHost {
     instance: Option<usize>,
@@ -474,7 +473,6 @@ fn dependencies_are_those_of_the_start_during_initialization_and_the_declared_on
     }
 }
 
-/// Returns an instance of Model Exchange that sends its messages to `host`.
 fn model_exchange(host: &Mutex<TestHost>) -> fmi3Instance {
     let environment = ptr::from_ref(host).cast_mut().cast();
     let (name, token) = (c"one".as_ptr(), token());

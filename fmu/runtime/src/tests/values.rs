@@ -5,7 +5,6 @@ use crate::call::InstanceState;
 use crate::v2::{GET_STRING, SET_STRING};
 use Value::{Boolean, Integer, Real};
 
-/// Inputs, parameters, states, outputs and derivatives of a test model with two vessels.
 #[test]
 fn every_kind_of_variable_is_read_from_the_model() {
     let mut instance = started(CS, &[("z", 0.25)]);
@@ -97,7 +96,6 @@ fn value_references_of_another_type_or_without_a_variable_are_refused() {
     assert!(refused(instance.set(&SET_STRING, &[0], |_| Boolean(true))).contains("of type Real"));
 }
 
-/// fmi2SetReal with one of two values out of range sets neither value.
 #[test]
 fn setting_several_values_succeeds_or_fails_as_a_whole() {
     let mut instance = started(CS, &[]);
@@ -138,7 +136,6 @@ fn all_wrong_parameters_are_reported_when_initialization_ends() {
     assert_eq!(real(&mut instance, "time_constant"), 0.25);
 }
 
-/// Setting an output, a state or a fixed parameter between steps is refused with the reason.
 #[test]
 fn only_inputs_and_tunable_parameters_are_set_in_motion() {
     let mut instance = started(CS, &[]);
@@ -224,7 +221,6 @@ fn directional_derivatives_equal_the_partial_derivatives_of_the_equations() {
     assert_eq!(answers[0], -0.5);
 }
 
-/// In initialisation mode directional derivatives by inputs and parameters are available.
 #[test]
 fn in_initialization_mode_derivatives_are_by_inputs_and_parameters() {
     let mut instance = fresh(CS);

@@ -17,7 +17,6 @@ pub struct Host<M: Model> {
     pub(super) set: Vec<fmi3ValueReference>,
     pub(super) indicators: Vec<f64>,
     pub(super) arrays: Option<Box<Arrays>>,
-    /// The variables that the host requires within steps, by its own references.
     pub(super) required_variables: Vec<fmi3ValueReference>,
 }
 

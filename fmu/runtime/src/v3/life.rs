@@ -34,7 +34,6 @@ fn logger(environment: fmi3InstanceEnvironment, logger: fmi3LogMessageCallback) 
     }))
 }
 
-/// Creates an instance by `make`. On failure it returns NULL and logs the reason.
 pub(super) unsafe fn instantiate<M: Model>(
     function: &str,
     (name, token, resources): (fmi3String, fmi3String, fmi3String),

@@ -56,7 +56,6 @@ pub(super) unsafe fn fill_states<M: Model>(
     }
 }
 
-/// Writes a count, which `count` reads from the instance, to a variable of the host.
 pub(super) unsafe fn write_count<M: Model>(
     instance: fmi3Instance,
     call: &'static Call,

@@ -116,11 +116,6 @@ pub(super) struct Answers {
 }
 
 impl Answers {
-    /// Initialises the results before the step.
-    ///
-    /// # Errors
-    ///
-    /// If a pointer is NULL.
     unsafe fn initialise(&self, call: &Call, time: f64) -> Result<(), Fault> {
         let Answers { event, terminate, early, last } = *self;
         let flags = [
@@ -174,7 +169,6 @@ pub(super) unsafe fn do_step<M: Model>(
     unsafe { step_with_updates::<M>(instance, at, h, answers) }
 }
 
-/// Writes results and messages after a step; `before` is the number of events before it.
 #[inline(always)]
 unsafe fn write_step_results<M: Model>(
     component: &mut Component<M, Fmi3>,

@@ -15,7 +15,6 @@ use crate::table::Scalar;
 use crate::variable::{Access, Value};
 use crate::version::Version;
 
-/// Reads the variables of all references and converts each value to its C type by `as_c`.
 #[inline]
 pub(super) unsafe fn get<M: Model, T>(
     instance: fmi3Instance,
@@ -46,7 +45,6 @@ pub(super) unsafe fn get<M: Model, T>(
     }
 }
 
-/// Reads all elements of array variables, which must be `count`.
 #[cold]
 fn array_values<M: Model>(
     component: &mut Component<M, Fmi3>,
@@ -121,7 +119,6 @@ pub(super) fn check_intermediate<M: Model>(
     Ok(())
 }
 
-/// Sets the variables of all references; each value is converted from its C type by `from_c`.
 #[inline]
 pub(super) unsafe fn set<M: Model, T: Copy>(
     instance: fmi3Instance,
@@ -148,7 +145,6 @@ pub(super) unsafe fn set<M: Model, T: Copy>(
     }
 }
 
-/// Sets all elements of array variables; `values` has the elements one after the other.
 #[cold]
 fn set_arrays<M: Model>(
     component: &mut Component<M, Fmi3>,
@@ -238,7 +234,6 @@ pub(super) unsafe fn access_no_variable<M: Model>(
     }
 }
 
-/// Reads structural parameters, which exist only in the layout with arrays.
 pub(super) unsafe fn get_sizes<M: Model>(
     instance: fmi3Instance,
     (references, count): References,
@@ -264,7 +259,6 @@ pub(super) unsafe fn get_sizes<M: Model>(
     }
 }
 
-/// Sets structural parameters, which exist only in the layout with arrays.
 pub(super) unsafe fn set_sizes<M: Model>(
     instance: fmi3Instance,
     (references, count): References,
