@@ -60,7 +60,6 @@ const VECTOR: &[Dimension] = &[Fixed(3)];
 const PER_MODE: &[Dimension] = &[MODE];
 const MODE_VECTOR: &[Dimension] = &[MODE, Fixed(3)];
 
-/// Returns the index among the continuous states of element `n` of the shape [`MODE_VECTOR`].
 fn bob(n: usize) -> usize {
     6 * (n / 3) + n % 3
 }
