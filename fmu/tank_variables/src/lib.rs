@@ -30,7 +30,6 @@ pub static DAMPING_LAW: Enumeration = Enumeration {
     ],
 };
 
-/// Items of `regime`.
 pub static REGIME: Enumeration = Enumeration {
     name: "Regime",
     description: "Amplitude class of the wave at the wall, R being the free surface's radius",
@@ -64,7 +63,6 @@ pub static BALL_STATE: Enumeration = Enumeration {
     ],
 };
 
-/// Returns the item of [`BALL_STATE`].
 pub fn ball_state(state: BallState) -> i32 {
     match state {
         BallState::Settled => 1,
@@ -73,7 +71,6 @@ pub fn ball_state(state: BallState) -> i32 {
     }
 }
 
-/// Sets a tank's damping law to the item `number` of [`DAMPING_LAW`].
 pub fn set_damping_law<M: Tanks>(p: &mut M::Parameters, tank: usize, number: i32) {
     if let Some(law) = usize::try_from(number - 1).ok().and_then(|i| DampingLaw::ALL.get(i)) {
         M::tank_mut(p, tank).damping_law = *law;
