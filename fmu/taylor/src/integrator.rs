@@ -333,14 +333,12 @@ pub fn add_time([time, rest]: [f64; 2], t: f64) -> [f64; 2] {
 /// instants in between at which calls have ended.
 #[derive(Clone, Debug)]
 pub struct Expansion {
-    /// Highest order up to which the coefficients of the states are computed.
     orders: usize,
     /// Number of the lowest orders whose coefficients were overwritten, because the motion was used for something else
     /// after the expansion.
     overwritten: usize,
     norms: [f64; ORDER + 1],
     radius: f64,
-    /// Order and length of the whole expansion, if they are known.
     end: Option<(usize, f64)>,
     /// Time after the start up to which a call may end without a comparison with the right-hand side, s.
     verified: f64,
@@ -361,7 +359,6 @@ impl Default for Expansion {
 }
 
 impl Expansion {
-    /// Drops all coefficients, because another expansion starts.
     #[inline(always)]
     pub fn clear(&mut self) {
         (self.orders, self.overwritten, self.end, self.verified) = (0, 0, None, FULL_LENGTH);
@@ -451,7 +448,6 @@ impl Search {
         }
     }
 
-    /// Computes further orders until the search ends.
     #[inline(never)]
     fn extend<M: KeptMotion>(mut self, motion: &mut M) -> Option<usize> {
         let known = motion.expansion().orders;
@@ -499,7 +495,6 @@ fn order_at<M: KeptMotion>(motion: &mut M, t: f64, tolerance: f64) -> Option<usi
     search.extend(motion)
 }
 
-/// Returns order and length of the whole expansion.
 #[cold]
 fn whole_expansion<M: KeptMotion>(
     motion: &mut M,
@@ -1054,7 +1049,6 @@ mod tests {
         }
     }
 
-    /// A short call needs fewer orders than a long one, and more for a smaller tolerance.
     #[test]
     fn the_order_of_a_power_series_grows_with_the_step_length_and_with_a_smaller_tolerance() {
         let orders = |h: f64, tolerance: f64| {

@@ -210,7 +210,6 @@ impl Number for Dual {
 mod tests {
     use super::*;
 
-    /// Returns the results of every operation of a number, each with its own argument.
     fn formulas<T: Number>(x: T) -> [T; 16] {
         let c = T::constant;
         [

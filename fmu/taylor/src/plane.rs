@@ -145,7 +145,6 @@ mod tests {
         }
     }
 
-    /// A pair of power series stores the coefficients of both components without mixing them.
     #[test]
     fn both_components_of_a_pair_keep_their_values() {
         let mut a = ZERO_VECTOR2;
