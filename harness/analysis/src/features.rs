@@ -94,7 +94,6 @@ impl Features {
         Features::find_within(response, (f64::NEG_INFINITY, f64::INFINITY))
     }
 
-    /// Finds the features between two frequencies, Hz; otherwise as [`Features::find`].
     pub fn find_within(response: &FrequencyResponse, (from, to): (f64, f64)) -> Self {
         let level = response.decibels();
         let first = response.frequency.partition_point(|f| *f < from);
@@ -190,7 +189,6 @@ mod tests {
         assert_eq!(Features::find(&response), clean);
     }
 
-    /// A hub without slosh, and a band that ends at 2.4 Hz between antiresonance and resonance.
     #[test]
     fn no_resonance_is_reported_if_the_band_contains_none() {
         let hub = Linear { inertia: 0.4, friction: 0.04, arm: 0.2, ..Linear::default() };

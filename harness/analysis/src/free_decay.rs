@@ -79,7 +79,6 @@ pub fn largest_other(time: &[f64], residual: &[f64], frequency: f64) -> (f64, f6
     lines.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_default()
 }
 
-/// Row of a phasor: time, ∫A, ∫A², A and φ.
 type Row = (f64, f64, f64, f64, f64);
 
 #[derive(Clone, Copy, Debug)]

@@ -30,7 +30,6 @@ pub fn minimise(residuals: Residuals, derivatives: Derivatives, x: &[f64]) -> Mi
     minimise_by(&method, residuals, derivatives, x)
 }
 
-/// Does what [`minimise`] does, with other limits of the search.
 pub fn minimise_by(
     method: &LevenbergMarquardt<f64>,
     residuals: Residuals,

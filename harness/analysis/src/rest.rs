@@ -209,7 +209,6 @@ fn between_levels(samples: &[f64], quantum: f64) -> f64 {
     modified(distance.fold(0.0, f64::max), n)
 }
 
-/// Computes [`Rest::histogram`] from sorted samples. Bins contain whole levels if the quantisation is coarse.
 fn histogram(sorted: &[f64], sigma: f64, quantum: f64) -> Vec<(f64, f64)> {
     let (most, usual) = BINS;
     let step = quantum / sigma;

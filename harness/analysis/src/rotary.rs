@@ -41,7 +41,6 @@ pub fn swirl(radial: &FrequencyResponse, tangential: &FrequencyResponse, torque:
 }
 
 impl Rotary {
-    /// Summarises the swirl numbers at the frequencies (Hz) that a sweep passes at these times (s).
     pub fn from_sweep(frequency: &[f64], time: &[f64], swirl: &[f64]) -> Self {
         let turning: Vec<usize> = (0..swirl.len()).filter(|&i| swirl[i].abs() > ROTARY).collect();
         // Each point represents the time up to half-way to its neighbours.

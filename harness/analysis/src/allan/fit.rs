@@ -65,9 +65,7 @@ pub struct Outlier {
 pub struct Fit {
     pub noise: Noise,
     pub terms: Vec<(Term, Estimate)>,
-    /// Estimate of the Gauss–Markov bias's correlation time, s, if it is fitted.
     pub bias_time: Option<Estimate>,
-    /// Shortest averaging time of the fit, s.
     pub from: f64,
     pub chi_squared: (f64, usize),
     /// True if at most one of 1,000 records with this noise would have a larger misfit.
@@ -75,7 +73,6 @@ pub struct Fit {
     pub worst: Outlier,
 }
 
-/// Coefficients of the terms, and the correlation time of the Gauss–Markov bias, s.
 #[derive(Clone, Debug)]
 struct State {
     coefficients: Vec<f64>,
@@ -98,7 +95,6 @@ impl Octaves {
         Octaves { step, count: samples.len(), records: 1, factors, variances }
     }
 
-    /// Averages the octaves of records of equal length; `None` without records.
     pub fn mean(records: &[Octaves]) -> Option<Octaves> {
         let first = records.first()?;
         let mean = |k: usize| {
@@ -186,7 +182,6 @@ impl Problem<'_> {
         self.jacobian(state).columns(0, self.terms.len()) * coefficients
     }
 
-    /// Returns the covariance of the measured Allan variances if the noise is `state`.
     fn covariance(&self, tables: &Covariance, state: &State) -> DMatrix<f64> {
         tables.matrix(&state.coefficients) / self.octaves.records as f64
     }
