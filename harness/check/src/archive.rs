@@ -8,7 +8,6 @@ use zip::CompressionMethod;
 
 use super::findings::Findings;
 
-/// Files and folders that FMI 2.0 allows at the top level of an FMU.
 const AT_THE_TOP: [&str; 9] = [
     "modelDescription.xml",
     "model.png",
@@ -22,7 +21,6 @@ const AT_THE_TOP: [&str; 9] = [
 ];
 
 pub struct Entry {
-    /// Name as it stands in the archive; bytes that are not UTF-8 are replaced.
     pub name: String,
     method: CompressionMethod,
     encrypted: bool,
@@ -279,7 +277,6 @@ pub fn folders(archive: &Archive, findings: &mut Findings) {
     report_unknown_folders("2.0", &AT_THE_TOP, archive, findings);
 }
 
-/// Reports the names at the top level that FMI `version` does not allow.
 pub fn report_unknown_folders(
     version: &str,
     allowed: &[&str],

@@ -58,7 +58,6 @@ pub(crate) fn tuple(folder: &str) -> Option<Form> {
     }
 }
 
-/// An interface that the description declares, with the functions that its binary must export.
 struct Declared {
     interface: String,
     identifier: String,
@@ -98,7 +97,6 @@ fn declare(element: &Element, is_fmi3: bool) -> Option<Declared> {
 }
 
 impl Binaries {
-    /// Reads the headers of all binaries and compares their names with the interfaces of `description`.
     pub fn new(archive: &Archive, description: Option<&Description>) -> Binaries {
         let is_fmi3 = description.is_some_and(Description::is_fmi3);
         let declared = description.map(|d| d.interfaces().filter_map(|e| declare(e, is_fmi3)));
@@ -172,7 +170,6 @@ impl Binaries {
         all
     }
 
-    /// Returns the name of the binary for the platform on which this check runs.
     pub fn own(&self) -> Option<&str> {
         self.placed.iter().find(|p| p.folder == self.own_folder).map(|p| p.name.as_str())
     }

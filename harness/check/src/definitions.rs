@@ -35,7 +35,6 @@ pub fn fmi_version(d: &Description, findings: &mut Findings) {
     findings.at("fmiVersion").add(format!("{text} (allowed: \"{expected}\")"));
 }
 
-/// `xml.guid`, in FMI 3.0 `xml.token`.
 pub fn token(d: &Description, findings: &mut Findings) {
     let name = d.words.token;
     if d.root.get(name).is_none_or(|token| token.trim().is_empty()) {
@@ -166,7 +165,6 @@ fn experiment_numbers<'d>(root: &'d Element, findings: &mut Findings) -> Option<
     Some(experiment)
 }
 
-/// `xml.default_experiment` of FMI 3.0.
 pub fn default_experiment3(d: &Description, findings: &mut Findings) {
     if experiment_numbers(&d.root, findings).is_some() {
         stop_time(d, findings);
@@ -220,7 +218,6 @@ pub fn unique(d: &Description, findings: &mut Findings) {
     }
 }
 
-/// `xml.units` of FMI 3.0, which has no rule of its own for the numbers.
 pub fn units_with_numbers(d: &Description, findings: &mut Findings) {
     units(d, findings);
     super::units::numbers(d, findings);

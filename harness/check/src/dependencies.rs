@@ -91,7 +91,6 @@ pub fn random_session<'f>(
     Ok(session)
 }
 
-/// Returns true if two readings of `v` differ by more than rounding.
 fn has_moved(v: &Variable, a: &Value, b: &Value) -> bool {
     match (a, b) {
         (Value::Real(a), Value::Real(b)) => {

@@ -115,7 +115,6 @@ pub struct Unknown {
 }
 
 impl Variable {
-    /// Returns the key of the state, if this variable is the derivative of a state.
     pub fn derivative_of(&self) -> Option<u32> {
         number(&self.typed, "derivative")
     }
@@ -153,7 +152,6 @@ impl Variable {
         nominal.unwrap_or(1.0)
     }
 
-    /// Returns the attributes min and max; a missing bound is infinite.
     pub fn bounds(&self) -> (f64, f64) {
         let bound = |name, none| self.typed.number(name).filter(|x| !x.is_nan()).unwrap_or(none);
         (bound("min", f64::NEG_INFINITY), bound("max", f64::INFINITY))
@@ -232,7 +230,6 @@ impl Description {
         self.places.get(&key).map(|place| &self.variables[*place])
     }
 
-    /// Returns the variable of an entry of ModelStructure.
     pub fn variable_of(&self, unknown: &Unknown) -> Option<&Variable> {
         self.at(unknown.key?)
     }

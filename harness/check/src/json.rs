@@ -21,7 +21,6 @@ struct Rule<'r> {
     title: &'static str,
     source: &'static str,
     findings: &'r [Finding],
-    /// Reason why the rule was not checked; null if it was.
     skipped: Option<String>,
     seconds: f64,
 }

@@ -63,7 +63,6 @@ pub use self::rule::{Check, Rule};
 pub use self::rules::fmi2::RULES;
 pub use self::under_test::FmuUnderTest;
 
-/// A rule of one version of FMI.
 #[derive(serde::Serialize)]
 pub struct Statement {
     fmi: &'static str,

@@ -20,7 +20,6 @@ const LONGEST_PATH: usize = 259;
 /// `C:\Users\a.long.user.name\AppData\Local\Temp\` and a folder named after the instance.
 const PORTABLE_PATH: usize = 160;
 
-/// Lists the reasons why Windows cannot create a file or folder with the name `part`.
 fn windows_faults(part: &str) -> Vec<String> {
     let mut faults = Vec::new();
     let stem = part.split('.').next().unwrap_or(part).trim_end().to_uppercase();

@@ -28,7 +28,6 @@ const CALL: Duration = Duration::from_secs(4);
 const PART: f64 = 15.0;
 /// Largest file that an FMU may write, bytes. It is small because several rules run at the same time.
 const FILE: u64 = 8 << 20;
-/// The rule that reports a binary that cannot be loaded.
 const OPENS: &str = "load.opens";
 /// Number of bytes of the FMU's printed output that a finding quotes.
 const PRINTED: usize = 200;

@@ -54,7 +54,6 @@ impl Doctype {
     }
 }
 
-/// Returns the encoding in the XML declaration, or `None` if there is none.
 fn encoding(bytes: &[u8]) -> Option<String> {
     let text = String::from_utf8_lossy(&bytes[..bytes.len().min(1000)]);
     let declaration = text.trim_start_matches('\u{feff}').strip_prefix("<?xml")?;

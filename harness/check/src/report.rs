@@ -24,7 +24,6 @@ pub struct Report {
 }
 
 impl Report {
-    /// Counts the findings of one severity, including those beyond the stored ones.
     pub fn count_findings(&self, severity: Severity) -> usize {
         let more = self.outcomes.iter().map(|outcome| &outcome.findings);
         let more = more.filter(|f| f.severity == severity).map(|f| f.more).sum::<usize>();
@@ -35,7 +34,6 @@ impl Report {
         self.outcomes.iter().flat_map(|o| o.findings.list.iter().map(move |f| (o.rule, f)))
     }
 
-    /// Renders the report as text: every finding, the skipped rules with their reasons, and a summary.
     pub fn text(&self) -> String {
         let mut text = String::new();
         for outcome in &self.outcomes {

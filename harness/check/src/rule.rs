@@ -45,7 +45,6 @@ pub enum Check {
 }
 
 impl Rule {
-    /// Returns true if the check of this rule calls functions of the FMU's binary.
     pub fn is_of_calls(&self) -> bool {
         matches!(self.check, Check::Calls(_) | Check::Calls3(_))
     }

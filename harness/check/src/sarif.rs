@@ -9,11 +9,6 @@ use serde_json::json;
 use super::findings::Severity;
 use super::report::Report;
 
-/// Writes the report in SARIF.
-///
-/// # Errors
-///
-/// If `out` cannot be written.
 pub fn write(report: &Report, out: &mut impl Write) -> Result<()> {
     let path = report.path.display().to_string().replace('\\', "/");
     let start = if path.starts_with('/') { "file://" } else { "" };

@@ -44,7 +44,6 @@ pub fn run(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     report_not_finite(&mut session, &when, findings)
 }
 
-/// Reports the variables that are NaN or infinite at the end of a run.
 pub fn report_not_finite(session: &mut Session, when: &str, findings: &mut Findings) -> Result<()> {
     for (v, values) in session.fmu.readable().zip(session.readings()?) {
         if let Some(x) = values.iter().map(Value::number).find(|x| v.is_real() && !x.is_finite()) {

@@ -43,7 +43,6 @@ pub fn outputs(d: &Description, findings: &mut Findings) {
     compare(d, findings, d.words.outputs, is_output, is_output, "every output, once");
 }
 
-/// `xml.derivatives` of FMI 2.0.
 pub fn derivatives(d: &Description, findings: &mut Findings) {
     if d.hides_states() {
         return findings.skip("Co-Simulation alone need not list derivatives");
@@ -71,7 +70,6 @@ pub fn derivatives(d: &Description, findings: &mut Findings) {
     }
 }
 
-/// `xml.derivatives` of FMI 3.0.
 pub fn derivatives3(d: &Description, findings: &mut Findings) {
     let why = "variables with the attribute derivative, once";
     let allowed = |v: &Variable| v.derivative_of().is_some();

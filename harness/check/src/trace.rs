@@ -28,7 +28,6 @@ pub fn doing(what: &str, crash: Crash) {
     let _ = send(&Answer::Doing(what.into(), crash));
 }
 
-/// Sends the findings to the parent process as the last message.
 pub fn done(findings: Findings) -> Result<()> {
     send(&Answer::Done(findings))
 }

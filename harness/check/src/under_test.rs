@@ -52,7 +52,6 @@ pub struct Use {
     pub interface: Interface,
     pub event_mode: bool,
     pub early_return: bool,
-    /// True if the callback intermediateUpdate is passed.
     pub updates: bool,
 }
 
@@ -77,14 +76,11 @@ impl std::fmt::Display for Use {
 #[derive(Clone, Copy, Debug)]
 pub struct Experiment {
     pub start: f64,
-    /// Relative tolerance, if DefaultExperiment has one.
     pub tolerance: Option<f64>,
-    /// Stop time, s, if DefaultExperiment has one.
     pub stop: Option<f64>,
     pub step: f64,
 }
 
-/// A version of FMI whose FMUs are checked.
 pub trait Tested: Version + 'static {
     /// The rule that reports steps of Model Exchange that fail.
     const EXCHANGE_RUNS: &'static str;
@@ -102,7 +98,6 @@ pub trait Tested: Version + 'static {
     const EXCHANGE_STEPS: f64;
     /// Smallest number of suggested steps in the suggested experiment for which the suggestion is followed.
     const SUGGESTED_STEPS: f64;
-    /// Observations of a session that only rules of this version need.
     type Notes;
 
     /// Returns true if the rules call this interface, which `binary` has.
@@ -121,7 +116,6 @@ pub trait Tested: Version + 'static {
     /// Initialises a new instance with the default experiment, so that it is ready for its first step.
     fn initialise(session: &mut Session<Self>) -> Result<()>;
 
-    /// Makes one communication step of the usual size with changing inputs.
     fn make_usual_step(session: &mut Session<Self>) -> Result<()>;
 
     /// Returns the magnitudes of the states by which the integrator measures errors.
@@ -344,11 +338,6 @@ impl<V: Tested> UnderTest<V> {
         if doing.is_empty() { "a first call".into() } else { doing.clone() }
     }
 
-    /// Returns the binary of an interface.
-    ///
-    /// # Errors
-    ///
-    /// If the interface cannot be called.
     pub fn binary(&self, interface: Interface) -> Result<&Fmu<V>> {
         let of = self.interfaces.iter().find(|(i, _)| *i == interface);
         of.map(|(_, at)| &self.binaries[*at]).context("no such interface")
@@ -458,7 +447,6 @@ impl<V: Tested> UnderTest<V> {
         }
     }
 
-    /// Returns true if the element of `interface` declares the capability `flag`.
     pub fn can(&self, interface: Interface, flag: &str) -> bool {
         self.description.interface(element(interface)).is_some_and(|element| element.flag(flag))
     }
@@ -472,7 +460,6 @@ impl<V: Tested> UnderTest<V> {
     }
 }
 
-/// An instance together with the state of the host that simulates it.
 pub struct Session<'f, V: Tested = Fmi2> {
     pub fmu: &'f UnderTest<V>,
     pub using: Use,
@@ -481,9 +468,7 @@ pub struct Session<'f, V: Tested = Fmi2> {
     pub step: f64,
     /// Number of steps so far, from which the changing inputs follow.
     pub count: usize,
-    /// Time of the next event that the FMU has announced, s.
     pub next_event: Option<f64>,
-    /// Time at which the FMU has requested the end of the simulation, s, and the call.
     pub ended: Option<(f64, &'static str)>,
     pub notes: V::Notes,
 }
@@ -497,7 +482,6 @@ pub struct Mark {
     ended: Option<(f64, &'static str)>,
 }
 
-/// Values of the readable variables, each with its elements.
 pub type Readings = Vec<Vec<Value>>;
 
 impl<V: Tested> Session<'_, V> {
@@ -540,7 +524,6 @@ impl<V: Tested> Session<'_, V> {
         Ok(())
     }
 
-    /// Reads all elements of a variable; the caller handles a refusal.
     pub fn elements(&mut self, v: &Variable) -> Called<Vec<Value>> {
         self.instance.values(v.c_type, v.reference, v.length())
     }

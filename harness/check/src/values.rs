@@ -381,7 +381,6 @@ pub fn limits(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// Returns true if `text` contains `name` as a whole word.
 pub fn contains_name(text: &str, name: &str) -> bool {
     let part = |c: char| c.is_alphanumeric() || matches!(c, '_' | '.' | '[');
     text.match_indices(name).any(|(at, _)| {

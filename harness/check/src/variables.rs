@@ -24,7 +24,6 @@ pub fn names(d: &Description, findings: &mut Findings) {
     }
 }
 
-/// Reports names that are not structured although the description declares structured names.
 pub fn structured_names(d: &Description, findings: &mut Findings) {
     if d.root.get("variableNamingConvention") != Some("structured") {
         return findings.skip("names are not declared as structured");
@@ -35,7 +34,6 @@ pub fn structured_names(d: &Description, findings: &mut Findings) {
     });
 }
 
-/// Returns true if a name follows the grammar of structured names (section 2.2.9).
 fn is_structured(name: &str) -> bool {
     if let Some(inner) = name.strip_prefix("der(").and_then(|rest| rest.strip_suffix(')')) {
         // A comma after the last bracket precedes the order of the derivative; a comma between brackets

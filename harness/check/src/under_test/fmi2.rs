@@ -26,7 +26,6 @@ const ASKED: usize = 20;
 const JUMP: f64 = 1e-9;
 const UNKNOWN_NOMINAL: f64 = 1e-3;
 
-/// Observations of a session, for the rules of Model Exchange.
 #[derive(Default)]
 pub struct Notes {
     nominals: Vec<f64>,
@@ -175,7 +174,6 @@ impl Tested for Fmi2 {
     }
 }
 
-/// States of the standard's state machine in which rules call an instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
     Instantiated,
@@ -243,7 +241,6 @@ impl FmuUnderTest {
         self.session_of(interface.into(), instance)
     }
 
-    /// Creates an instance and brings it into the state `stage` of the standard's state machine.
     pub fn session_in(&self, using: impl Into<Use>, stage: Stage) -> Result<Session<'_>> {
         if matches!(stage, Stage::Initialised | Stage::Terminated) {
             let mut session = self.running(using)?;
@@ -262,7 +259,6 @@ impl FmuUnderTest {
 }
 
 impl Session<'_> {
-    /// Initialises with these start and stop times (s) and this tolerance.
     pub fn initialise_at(
         &mut self,
         start: f64,
@@ -400,7 +396,6 @@ impl Session<'_> {
         Ok(())
     }
 
-    /// Reads a variable, which in FMI 2.0 is a scalar; the caller handles a refusal.
     pub fn get(&mut self, v: &Variable) -> Called<Value> {
         Ok(self.elements(v)?.remove(0))
     }
@@ -409,7 +404,6 @@ impl Session<'_> {
         self.instance.set_values(v.c_type, v.reference, std::slice::from_ref(value))
     }
 
-    /// Reads a Real in an ordinary run. If this fails, `values.readable` reports it.
     pub fn real(&mut self, v: &Variable) -> Result<f64> {
         Ok(self.read(v)?[0].number())
     }

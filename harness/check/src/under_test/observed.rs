@@ -24,14 +24,12 @@ fn discrete(fmu: &UnderTest) -> impl Iterator<Item = &Variable> {
 }
 
 impl Observed {
-    /// Reads the present values of the continuous states, their derivatives and the discrete variables.
     pub fn read(session: &mut Session) -> Result<Observed> {
         let (states, derivatives) = (session.states()?, session.derivatives()?);
         let discrete = discrete(session.fmu).map(|v| session.read(v)).collect::<Result<_>>()?;
         Ok(Observed { states, derivatives, discrete })
     }
 
-    /// Describes the first quantity that differs in `after`: its name, and both values as text.
     pub fn change<'f>(&self, after: &Observed, fmu: &'f UnderTest) -> Option<(&'f str, String)> {
         let jumps = |a: f64, b: f64, share: f64, size: f64| {
             (a - b).abs() > share * a.abs().max(b.abs()).max(size)

@@ -3,7 +3,6 @@ use crate::archive::report_unknown_folders;
 use crate::findings::Findings;
 use host::xml::Element;
 
-/// Files and folders that FMI 3.0 allows at the top level of an FMU (2.5.1).
 const AT_THE_TOP: [&str; 7] = [
     "modelDescription.xml",
     "binaries",

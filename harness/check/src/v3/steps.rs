@@ -64,7 +64,6 @@ fn uses_with_events(subject: &Subject) -> Result<Vec<Use>> {
     if uses.is_empty() { skip("the FMU has no event mode") } else { Ok(uses) }
 }
 
-/// Number of steps in a run that should contain events.
 const LONG: usize = 200;
 
 pub fn runs(subject: &Subject, findings: &mut Findings) -> Result<()> {

@@ -21,7 +21,6 @@ const EVENTS: usize = 1000;
 /// Callback for intermediate updates within a step. It returns the time of an early return, or `None`.
 pub type Within<'a> = dyn FnMut(&Update) -> Option<f64> + 'a;
 
-/// Observations of a session.
 #[derive(Default)]
 pub struct Notes {
     pub events: usize,
@@ -134,7 +133,6 @@ impl Tested for Fmi3 {
 }
 
 impl Subject {
-    /// Returns the plain use of each interface that can be called.
     pub fn plain_uses(&self) -> Vec<Use> {
         let uses = [Use::PLAIN, Use::EXCHANGE].into_iter();
         uses.filter(|u| self.has(u.interface)).collect()
@@ -166,7 +164,6 @@ impl Session<'_> {
         self.instance.enter_initialization_mode(tolerance, self.time, None).map_err(starts)
     }
 
-    /// Leaves initialization mode and iterates events, so that the instance is ready for a step.
     pub fn leave_initialization(&mut self) -> Result<()> {
         self.fmu.announce("fmi3ExitInitializationMode");
         self.instance.exit_initialization_mode().map_err(starts)?;

@@ -9,7 +9,6 @@ use zip::{CompressionMethod, ZipWriter};
 
 use crate::common::{XML, binary, breaks, broken, look, ours, with, xml, zipped};
 
-/// Archives of an FMU with wrong compression, wrong file names, missing files or damage.
 #[test]
 fn archives_that_break_hosts_are_reported() {
     const DEFLATED: CompressionMethod = CompressionMethod::Deflated;

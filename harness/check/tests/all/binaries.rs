@@ -28,7 +28,6 @@ fn our_own_fmu_keeps_every_rule() {
     assert_eq!(report.outcomes.len(), RULES.len());
 }
 
-/// The binary of HubSlosh is changed, renamed or replaced by a library that needs other libraries.
 #[test]
 fn binaries_that_no_host_can_use_are_reported() {
     let name = binary();

@@ -57,7 +57,6 @@ pub fn with(name: &str, content: Vec<u8>) -> Files {
     files
 }
 
-/// Checks an FMU that is given as bytes by the rules `only`.
 pub fn look(bytes: &[u8], only: &[&str]) -> Report {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("Mutant.fmu");
@@ -74,7 +73,6 @@ pub fn check_rules(path: &Path, only: &[&str], limit: f64) -> Report {
     check::check(path, &options, |_| {}).unwrap()
 }
 
-/// Returns the rules that are broken.
 pub fn broken(report: &Report) -> BTreeSet<&'static str> {
     report.all().map(|(rule, _)| rule.id).collect()
 }
@@ -108,7 +106,6 @@ pub fn breaks(mutants: Vec<(&str, Vec<u8>, &[&str])>, groups: &[&str]) {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// Returns modelDescription.xml with the first `from` after `after` changed to `to`.
 pub fn changed(after: &str, from: &str, to: &str) -> Vec<u8> {
     let text = xml();
     let at = text.find(after).unwrap_or_else(|| panic!("no {after}"));
@@ -118,7 +115,6 @@ pub fn changed(after: &str, from: &str, to: &str) -> Vec<u8> {
     zipped(&with(XML, text.into_bytes()), CompressionMethod::Stored)
 }
 
-/// Packs our FMU with another model description.
 pub fn described(text: String) -> Vec<u8> {
     zipped(&with(XML, text.into_bytes()), CompressionMethod::Stored)
 }
@@ -142,7 +138,6 @@ pub fn words_break(table: &str) {
     breaks(mutants.collect(), &["xml"]);
 }
 
-/// Returns the library of a source in this folder, compiled once with these definitions.
 pub fn compiled(source: &str, definitions: &[&str]) -> Vec<u8> {
     static LIBRARIES: Mutex<BTreeMap<String, Vec<u8>>> = Mutex::new(BTreeMap::new());
     let mut libraries = LIBRARIES.lock().unwrap_or_else(|poisoned| poisoned.into_inner());

@@ -19,7 +19,6 @@ fn entity_bomb() -> String {
     text.replacen("description=\"", "description=\"&e9;", 1)
 }
 
-/// Returns a description with an annotation of nested elements; the schema allows any there.
 fn nested(levels: usize) -> String {
     let deep = "<a>".repeat(levels) + &"</a>".repeat(levels);
     let annotations =
@@ -142,7 +141,6 @@ a kind missing | index="3" | dependenciesKind="dependent  | dependenciesKind=" |
     );
 }
 
-/// Returns line `n` of a list in the description, counted from 0.
 fn line(list: &str, n: usize) -> String {
     let text = xml();
     text[text.find(list).unwrap()..].lines().nth(n + 1).unwrap().to_string()

@@ -168,7 +168,6 @@ fn a_wrong_archive_of_an_fmu_3_is_reported() {
     }
 }
 
-/// Faults of model3.c by number, and the rule that must find each.
 const BEHAVIOUR: &[(u32, &str)] = &[
     (1, "instantiate.token"),
     (2, "life.reset"),
@@ -235,7 +234,6 @@ fn a_reset_is_not_blamed_for_runs_that_always_differ() {
     assert_eq!(broken(&report), BTreeSet::from(["life.deterministic"]), "{}", report.text());
 }
 
-/// The first interface's library cannot be loaded; the other interface is checked nevertheless.
 #[test]
 fn an_interface_that_cannot_be_loaded_is_reported_and_the_other_is_checked() {
     let mut files = files(0);

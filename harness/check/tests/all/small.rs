@@ -9,9 +9,7 @@ use zip::{CompressionMethod, ZipArchive};
 
 use crate::common::{Files, XML, broken, compiled, keep, look, zipped};
 
-/// Capabilities of the FMU of model.c, and how to compile it.
 struct Small<'a> {
-    /// Definitions for the C compiler in addition to the rate.
     definitions: &'a [&'a str],
     /// Rate k of the equation x' = -k (x - u), 1/s.
     rate: f64,
@@ -89,7 +87,6 @@ const BOTH: &[&str] = &["-DCO_SIMULATION", "-DMODEL_EXCHANGE"];
 const ONCE: &[&str] = &["-DCO_SIMULATION", "-DMODEL_EXCHANGE", "-DONCE"];
 const USUAL: &str = "startTime=\"0\" stopTime=\"10\" stepSize=\"0.01\"";
 
-/// Asserts that correct FMUs get no finding: name, definitions, rate and experiment of each.
 #[cfg(target_os = "linux")]
 fn get_no_finding(cases: &[(&str, &[&str], f64, &str)]) {
     let mut wrong = Vec::new();
@@ -148,7 +145,6 @@ fn a_model_without_a_solution_is_reported_by_one_rule() {
     assert!(text.contains("cannot be followed past t = 0.1"), "{text}");
 }
 
-/// Checks the FMU for Co-Simulation with these additional definitions by the rules `only`.
 #[cfg(target_os = "linux")]
 fn stepped(definitions: &[&str], experiment: &str, only: &[&str]) -> Report {
     let all = [&BOTH[..1], definitions].concat();
