@@ -35,7 +35,6 @@ static WARNINGS: AtomicUsize = AtomicUsize::new(0);
 static JSON: AtomicBool = AtomicBool::new(false);
 
 impl Terminal {
-    /// Applies these settings from now on; only the first call has an effect.
     pub fn set(self) {
         TERMINAL.get_or_init(|| self);
     }
@@ -45,7 +44,6 @@ fn terminal() -> Terminal {
     TERMINAL.get().copied().unwrap_or_default()
 }
 
-/// Returns true if only results, warnings and errors are printed.
 pub fn is_quiet() -> bool {
     terminal().quiet
 }

@@ -159,7 +159,6 @@ impl CampaignArgs {
         format!("{DEFAULT_CAMPAIGN}_{}", &files::output::sha256(name.as_bytes())[..12]).into()
     }
 
-    /// Returns the plan that corresponds to the flags if `--plan` is not given.
     fn flags_as_plan(&self) -> Result<Plan> {
         for (name, _) in &self.settings {
             ensure!(

@@ -60,7 +60,6 @@ pub struct CheckCallsArgs {
     limit: f64,
 }
 
-/// Checks an FMU by the rules `only`, or by all, and shows the progress.
 pub fn checked(fmu: &Path, only: Vec<String>, limit: Duration) -> Result<Report> {
     let program = std::env::current_exe().context("the path of this program cannot be found")?;
     let bar = progress::rules_bar()?;

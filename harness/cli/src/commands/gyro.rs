@@ -70,7 +70,6 @@ pub struct GyroArgs {
 }
 
 impl GyroArgs {
-    /// Returns true if the command simulates the FMU's gyro, and false if it analyses a recording.
     pub fn needs_fmu(&self) -> bool {
         self.recording.is_none()
     }
@@ -98,7 +97,6 @@ impl GyroArgs {
     }
 }
 
-/// Longest lag of the autocorrelation, s.
 const LAG: f64 = 10.0;
 const LEAST_CHUNKS: f64 = 3.0;
 

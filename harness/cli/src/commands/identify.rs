@@ -298,7 +298,6 @@ fn trim(times: &[f64]) -> Result<Option<(f64, f64)>> {
 }
 
 impl IdentifyArgs {
-    /// Returns the FMU that the command simulates; a free decay needs none.
     pub fn fmu(&self) -> Option<&Path> {
         match &self.kind {
             Kind::Bench(args) => Some(&args.known.fmu),

@@ -100,7 +100,6 @@ pub struct TankArgs {
     force: bool,
 }
 
-/// The FMUs that take a tank's parameters.
 const MODELS: [&str; 3] = ["HubSlosh", "SloshTank", "Spacecraft"];
 
 impl TankArgs {

@@ -6,7 +6,6 @@ use std::process::{Command, Output};
 use pack::packed_for_tests;
 use signals::table::Table;
 
-/// Header of features.csv, on which other programs rely.
 const HEADER: &str = "model,fill_m,amplitude_nm,f_res_hz,f_dip_hz,delta_f_hz,notch_db,fit_freq_pct,fit_time_pct,coherence,snr_res_db,snr_dip_db,skewness,kurtosis,peak_slosh_angle_deg,peak_radial_angle_deg,peak_wave_height_m,max_energy_residual,stuck_s";
 
 fn campaign(directory: &Path, arguments: &[&str]) -> Output {
@@ -19,7 +18,6 @@ fn campaign(directory: &Path, arguments: &[&str]) -> Output {
         .expect("the program runs")
 }
 
-/// Returns the rows of features.csv as maps from name to text.
 fn features(directory: &Path) -> Vec<std::collections::HashMap<String, String>> {
     let mut reader = csv::Reader::from_path(directory.join("c/features.csv")).unwrap();
     reader.deserialize().map(|row| row.unwrap()).collect()

@@ -8,7 +8,6 @@ use host::xml::Element;
 use pack::archive::zipped;
 use pack::packed_for_tests;
 
-/// Checks a file with this content, and returns exit code, stdout and stderr.
 fn command(content: &[u8], arguments: &[&str]) -> (Option<i32>, String, String) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("file.fmu");

@@ -15,7 +15,6 @@ fn hubslosh(directory: &Path, arguments: &[&str]) -> Output {
         .expect("the program runs")
 }
 
-/// Makes a run of 0.2 s with further arguments.
 fn short_run(directory: &Path, arguments: &[&str]) -> Output {
     let fmu = packed_for_tests().to_str().unwrap();
     let common = ["run", "--fmu", fmu, "--stop", "0.2", "--out", "out.csv"];
@@ -44,7 +43,6 @@ fn refuses(directory: &Path, output: impl FnOnce() -> Output, words: &[&str]) {
     assert_eq!(files(directory), before, "it left something behind");
 }
 
-/// Copies the FMU to `directory` with its modelDescription.xml changed by `edit`; `None` leaves the file out.
 fn edited_fmu(directory: &Path, edit: impl Fn(String) -> Option<String>) -> PathBuf {
     use std::io::{Read, Write};
     let path = directory.join("Edited.fmu");
@@ -68,7 +66,6 @@ fn edited_fmu(directory: &Path, edit: impl Fn(String) -> Option<String>) -> Path
     path
 }
 
-/// `hubslosh run --columns theta,omega,stuck` writes a CSV file with the time and these three columns.
 #[test]
 fn a_run_writes_the_requested_columns() {
     let directory = tempfile::tempdir().unwrap();
@@ -311,7 +308,6 @@ fn a_parameter_or_output_given_twice_is_refused() {
     refuses(directory, same, &["t.toml is the file of two outputs"]);
 }
 
-/// The file has the columns time and torque, and HubSlosh has no input torque.
 #[test]
 fn a_torque_file_without_a_column_of_an_input_is_refused_and_the_message_lists_its_columns() {
     let directory = tempfile::tempdir().unwrap();
@@ -330,7 +326,6 @@ fn a_torque_file_without_a_column_of_an_input_is_refused_and_the_message_lists_i
     );
 }
 
-/// Files with NaN, infinity, a word, a time that goes back, or a single row.
 #[test]
 fn a_torque_that_is_not_a_number_is_named_by_file_and_row() {
     let directory = tempfile::tempdir().unwrap();
@@ -400,7 +395,6 @@ fn an_fmu_whose_description_and_binary_do_not_belong_together_is_refused() {
     refuses(directory, run, &["Edited.fmu", "modelDescription.xml"]);
 }
 
-/// book/scaling.md shows commands, each followed by its output; the test runs the commands.
 #[test]
 fn the_output_of_each_command_on_the_scaling_page_equals_the_printed_output() {
     let page = pack::root().join("book/scaling.md");
@@ -539,7 +533,6 @@ fn exit_codes_tell_a_failure_from_a_wrong_command_line() {
     }
 }
 
-/// `tank.h=50mm` gives the bytes of the output of `tank.h=0.05`.
 #[test]
 fn a_parameter_given_with_a_unit_has_the_same_effect_as_its_si_value() {
     let directory = tempfile::tempdir().unwrap();

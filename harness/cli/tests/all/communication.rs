@@ -22,7 +22,6 @@ fn refused(directory: &Path, arguments: &[&str]) -> String {
 /// inertia, so that only the rounding errors of a sum remain.
 const FREE: [&str; 4] = ["--set", "slosh.model=frozen", "--set", "friction.model=none"];
 
-/// Makes a run and returns `time`, `tau_cmd` and `omega`.
 fn run(directory: &Path, arguments: &[&str]) -> [Vec<f64>; 3] {
     let fmu = packed_for_tests().to_str().unwrap();
     let all = [&["run", "--quiet", "--fmu", fmu, "--out", "run.csv"], arguments].concat();
@@ -33,13 +32,11 @@ fn run(directory: &Path, arguments: &[&str]) -> [Vec<f64>; 3] {
     names.map(|name| table.column(name).unwrap().to_vec())
 }
 
-/// Measures the inertia of the free hub, kg·m², with 1 N·m for one second.
 fn inertia(directory: &Path) -> f64 {
     let profile = ["--profile", "constant:amplitude=1,duration=1"];
     1.0 / run(directory, &[&FREE[..], &profile].concat())[2].last().unwrap()
 }
 
-/// Compares runs with several steps with the integral of their torque (N·m·s), in every row.
 fn follows(directory: &Path, source: &[&str], integral: &dyn Fn(f64) -> f64, within: f64) {
     let inertia = inertia(directory);
     let mut first: Option<[Vec<f64>; 3]> = None;

@@ -213,7 +213,6 @@ const INTERRUPTED: &str = "profile = \"zero\"\n[vary]\nprofile = [\"sine:duratio
     \"exp-sweep:duration=40000,amplitude=0.05\", \"exp-sweep:duration=40000,amplitude=0.06\", \
     \"exp-sweep:duration=40000,amplitude=0.04\", \"exp-sweep:duration=40000,amplitude=0.03\"]\n";
 
-/// SIGTERM, SIGINT and SIGKILL end a campaign in the directory of a completed campaign.
 #[cfg(unix)]
 #[test]
 fn a_campaign_ended_by_a_signal_leaves_the_last_results_and_no_temporary_file() {

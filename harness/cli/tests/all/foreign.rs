@@ -5,7 +5,6 @@ use std::process::Command;
 
 use host::fmi3::PLATFORM;
 
-/// Packs the FMU of model3.c with the fault of this number.
 pub fn model(path: &Path, mutant: u32) {
     changed_model(path, mutant, &[]);
 }
@@ -69,7 +68,6 @@ fn an_fmu_with_only_model_exchange_runs_as_its_closed_solution() {
     );
 }
 
-/// Compares a run with the closed solution to `within`, and returns what the command printed.
 fn follows_its_closed_solution(path: &Path, folder: &Path, within: f64) -> String {
     let input = folder.join("u.csv");
     std::fs::write(&input, "time,u\n0,0\n10,5\n").unwrap();

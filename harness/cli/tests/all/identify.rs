@@ -7,7 +7,6 @@ use std::process::{Command, Output};
 use analysis::statistics::deviation;
 use signals::table::Table;
 
-/// Runs `hubslosh` in a folder with the FMU for tests.
 fn run(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_hubslosh"))
         .current_dir(folder)
@@ -17,7 +16,6 @@ fn run(folder: &Path, arguments: &[&str]) -> Output {
         .unwrap()
 }
 
-/// Runs `hubslosh` and returns its output, or its stderr if it fails.
 fn hubslosh(folder: &Path, arguments: &[&str]) -> Result<String, String> {
     let done = run(folder, arguments);
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
@@ -39,7 +37,6 @@ fn record(folder: &Path, name: &str, settings: &[&str]) {
     Table::new(names, columns).write(&folder.join(name), &Default::default()).unwrap();
 }
 
-/// A recording with hub.I = 0.5 is fitted; `run --parameters result.json` reproduces its rates.
 #[test]
 fn hubslosh_run_accepts_the_parameters_that_identify_has_estimated() {
     let folder = tempfile::tempdir().unwrap();
@@ -102,7 +99,6 @@ fn printed_json_is_the_only_content_of_stdout() {
     serde_json::from_str::<serde_json::Value>(&said).expect(&said);
 }
 
-/// `identify --out` or `--report` in a folder that does not exist fails before any simulation.
 #[test]
 fn outputs_that_cannot_be_written_are_refused_before_the_search() {
     let folder = tempfile::tempdir().unwrap();
@@ -127,7 +123,6 @@ fn outputs_that_cannot_be_written_are_refused_before_the_search() {
     }
 }
 
-/// A recording without liquid is fitted; `run --parameters friction.json` reproduces its rates.
 #[test]
 fn hubslosh_run_accepts_the_friction_that_identify_friction_has_estimated() {
     let folder = tempfile::tempdir().unwrap();
@@ -219,7 +214,6 @@ fn no_kind_of_recording_has_more_than_15_options() {
     }
 }
 
-/// `identify FILE` means `identify bench FILE`, and with --free `identify fmu FILE`.
 #[test]
 fn identify_without_a_kind_means_bench() {
     let folder = tempfile::tempdir().unwrap();
@@ -274,7 +268,6 @@ fn a_design_uses_the_damping_ratio_that_is_set_and_prints_no_infinite_percentage
     assert!(!said.contains("inf"), "{said}");
 }
 
-/// Each torque drives the FMU, and the gyro's samples are split into rate and noise.
 #[test]
 fn the_torque_for_a_signal_to_noise_ratio_gives_it_in_the_gyros_samples() {
     let folder = tempfile::tempdir().unwrap();

@@ -10,7 +10,6 @@ fn hubslosh(directory: &Path, arguments: &[&str]) -> Output {
     Command::new(program).current_dir(directory).args(arguments).output().unwrap()
 }
 
-/// Asserts that a command fails, and returns its error message.
 fn refused(directory: &Path, arguments: &[&str]) -> String {
     let output = hubslosh(directory, arguments);
     let said = String::from_utf8_lossy(&output.stderr).trim().to_string();
@@ -100,7 +99,6 @@ fn an_existing_file_that_looks_like_an_input_is_not_replaced() {
     assert_eq!(std::fs::read_to_string(at("A.fmu")).unwrap(), "an FMU");
 }
 
-/// Collects the help texts of a command and of its subcommands by name.
 fn helps(command: &[&str], texts: &mut Vec<(String, String)>) {
     let output =
         Command::new(env!("CARGO_BIN_EXE_hubslosh")).args(command).arg("--help").output().unwrap();
@@ -116,7 +114,6 @@ fn helps(command: &[&str], texts: &mut Vec<(String, String)>) {
     texts.push((command.join(" "), text));
 }
 
-/// Options with names of files that a command reads.
 const INPUTS: &str = "analyse --plan, analyse --bench-day, analyse --fmu, campaign --plan, campaign --fmu, \
     campaign --compare, design --fmu, example --fmu, gyro --recording, gyro --fmu, identify --fmu, run --input, \
     run --parameters, run --fmu, pack --parameters, variables --fmu, view --parameters, view --fmu, book --theme";
@@ -215,7 +212,6 @@ fn every_example_of_every_help_is_understood_and_the_cheap_ones_run() {
     assert!(understood > 50 && run > 15, "{understood} {run}");
 }
 
-/// Options that all commands share follow under the heading "Global options".
 #[test]
 fn every_help_has_the_commands_own_options_first_and_an_example() {
     let mut texts = Vec::new();
@@ -233,7 +229,6 @@ fn every_help_has_the_commands_own_options_first_and_an_example() {
     }
 }
 
-/// `hubslosh tank --sweep --parameters` writes the damping ratio of SloshTank at each fill of the sweep.
 #[test]
 fn a_draining_tank_gets_the_damping_of_every_fill() {
     let directory = tempfile::tempdir().unwrap();
@@ -377,7 +372,6 @@ fn a_driven_input_is_one_column_of_the_table() {
     assert_eq!(text.lines().next().unwrap(), "time,tau_cmd,omega");
 }
 
-/// Returns a parameter set of SSP with one value and, perhaps, units.
 fn ssv(name: &str, value: &str, units: &str) -> String {
     format!(
         "<?xml version=\"1.0\"?>\n<ssv:ParameterSet version=\"1.0\" name=\"p\" \
@@ -483,7 +477,6 @@ fn a_recording_in_another_unit_or_of_absurd_values_is_refused_at_once() {
     }
 }
 
-/// A campaign with a sweep of 1 ns succeeds; the run has no frequency response.
 #[test]
 fn a_sweep_that_is_shorter_than_a_step_ends_without_a_response() {
     let directory = tempfile::tempdir().unwrap();

@@ -16,7 +16,6 @@ fn hubslosh(directory: &Path, arguments: &[&str]) -> Command {
     command
 }
 
-/// Prepares `hubslosh campaign` on a plan with this text, with the directory `out` for the results.
 fn campaign(directory: &Path, plan: &str, out: &str, arguments: &[&str]) -> Command {
     std::fs::write(directory.join("plan.toml"), plan).unwrap();
     let fmu = packed_for_tests().to_str().unwrap();
@@ -35,7 +34,6 @@ fn text(directory: &Path, file: &str) -> String {
     std::fs::read_to_string(directory.join(file)).unwrap()
 }
 
-/// Returns the rows of a CSV file as maps from name to text.
 fn rows(directory: &Path, file: &str) -> Vec<HashMap<String, String>> {
     let mut reader = csv::Reader::from_path(directory.join(file)).unwrap();
     reader.deserialize().map(|row| row.unwrap()).collect()
@@ -186,7 +184,6 @@ fn a_stored_run_with_other_parameters_is_simulated_again_with_a_reason() {
     assert!(String::from_utf8_lossy(&done.stdout).contains("1 runs simulated, 0 reused"));
 }
 
-/// The plan has no sweep, so the columns of antiresonance and resonance in runs.csv are empty.
 #[test]
 fn features_that_the_torque_does_not_excite_stay_empty() {
     let directory = tempfile::tempdir().unwrap();
@@ -216,7 +213,6 @@ fn features_that_the_torque_does_not_excite_stay_empty() {
     }
 }
 
-/// A plan varies tank.d from −1 to 0.163 m; the FMU refuses the first value.
 #[test]
 fn a_failed_run_is_a_row_of_runs_csv_with_the_error() {
     let directory = tempfile::tempdir().unwrap();
@@ -355,7 +351,6 @@ fn the_command_in_the_report_makes_the_same_tables_again() {
     assert!(before.contains("linear_100mm_100"));
 }
 
-/// The table of a pulse has the columns time, tau_cmd and tau_slope.
 #[test]
 fn hubslosh_torque_writes_the_slope_of_each_row() {
     let directory = tempfile::tempdir().unwrap();

@@ -24,7 +24,6 @@ fn hubslosh(folder: &Path, arguments: &[&str]) -> Result<String, String> {
     }
 }
 
-/// Returns the rows of a table as maps from name to text.
 fn rows(path: &Path) -> Vec<HashMap<String, String>> {
     let mut reader = csv::Reader::from_path(path).unwrap();
     reader.deserialize().map(|row| row.unwrap()).collect()
@@ -350,7 +349,6 @@ fn a_free_decay_of_30_s_determines_frequency_damping_and_its_growth() {
     );
 }
 
-/// A sweep with an empty tank is recorded and fitted by `identify friction`.
 #[test]
 fn with_an_empty_tank_all_inertia_is_attributed_to_the_hub() {
     let directory = tempfile::tempdir().unwrap();

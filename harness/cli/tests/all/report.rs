@@ -7,7 +7,6 @@ use std::sync::LazyLock;
 
 use pack::packed_for_tests;
 
-/// Rows of a table as maps from name to text.
 type Rows = Vec<HashMap<String, String>>;
 
 fn campaign(directory: &Path, plan: &str) {
@@ -45,7 +44,6 @@ static TEN: LazyLock<(String, Rows, Rows)> = LazyLock::new(|| {
     (page(directory), rows(directory, "features.csv"), rows(directory, "features_spa.csv"))
 });
 
-/// Returns a feature of the five runs of a model in the order of the torque.
 fn figure(table: &Rows, model: &str, name: &str) -> Vec<f64> {
     let rows = table.iter().filter(|row| row["model"] == model);
     rows.map(|row| row[name].parse().unwrap_or(f64::NAN)).collect()
@@ -183,7 +181,6 @@ fn the_page_is_well_formed_and_has_every_figure() {
     assert!(places > 10 && figures(page).matches("\"traces\":").count() == places, "{places}");
 }
 
-/// Returns the specifications of the figures, JSON.
 fn figures(page: &str) -> &str {
     let json = page.split("id=\"figures\">").nth(1).expect("the figures");
     json.split("</script>").next().unwrap()
@@ -193,7 +190,6 @@ fn specifications(page: &str) -> Vec<serde_json::Value> {
     serde_json::from_str(figures(page)).unwrap()
 }
 
-/// Returns the page without its scripts.
 fn text_of(page: &str) -> String {
     let pieces = page.split("<script").enumerate();
     let without = |(i, piece): (usize, &str)| match i {
@@ -234,7 +230,6 @@ fn without_dry_friction_a_linear_model_fits_a_linear_liquid() {
     assert!(fit.iter().all(|fit| *fit > 98.5), "{fit:?}: dry friction is all that does not fit");
 }
 
-/// A plan draws the hub's inertia of eight runs from a normal distribution.
 #[test]
 fn a_report_of_random_draws_has_histograms_and_scatter_plots() {
     let directory = tempfile::tempdir().unwrap();
@@ -348,14 +343,12 @@ fn axes_of_varied_profile_parameters_have_names() {
     assert!(!axes.iter().any(|axis| axis.starts_with("profile.")), "{axes:?}");
 }
 
-/// Returns the titles of all x axes.
 fn axes(page: &str) -> Vec<String> {
     let figures = specifications(page);
     let panels = figures.iter().flat_map(|figure| figure["panels"].as_array().unwrap());
     panels.map(|panel| panel["x"].as_str().unwrap().to_string()).collect()
 }
 
-/// A campaign of Spacecraft draws more signals than there are colours; line styles tell them apart.
 #[test]
 fn all_curves_in_a_figure_of_a_spacecraft_campaign_look_different() {
     let directory = tempfile::tempdir().unwrap();

@@ -8,7 +8,6 @@ use pack::packed_for_tests;
 
 use crate::foreign;
 
-/// Writes the files that the commands read into a folder.
 fn prepare(folder: &Path) {
     let write = |name: &str, text: String| std::fs::write(folder.join(name), text).unwrap();
     let head = "time,tau_cmd,omega,theta,wave_height,slosh_angle\n";
@@ -38,7 +37,6 @@ fn prepare(folder: &Path) {
     foreign::model(&folder.join("Model3.fmu"), 0);
 }
 
-/// Commands; one with `@` is run for each of the recordings of this FMU.
 const COMMANDS: &str = "
 identify @ --out a.json
 identify friction @ --out a.json

@@ -20,7 +20,6 @@ fn said(output: &Output) -> String {
 const RUN: [&str; 5] =
     ["run", "--profile", "exp-sweep:amplitude=0.1,duration=20", "--set", "tank.d=200mm"];
 
-/// Returns the data that the page draws, and asserts that the page loads nothing from elsewhere.
 fn drawn(directory: &Path, file: &str) -> serde_json::Value {
     let page = std::fs::read_to_string(directory.join(file)).unwrap();
     for word in [" src=\"", "<link", "@import", "url(http"] {
@@ -76,7 +75,6 @@ fn runs_that_cannot_be_drawn_are_refused_without_a_page() {
     assert!(!directory.join("run.html").exists());
 }
 
-/// Returns the stored rows of a column of the page.
 fn column(run: &serde_json::Value, name: &str) -> Vec<f64> {
     let text = run["columns"][name].as_str().unwrap_or_else(|| panic!("no {name}"));
     let bytes = Base64::decode_vec(text).unwrap();

@@ -32,7 +32,6 @@ fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
-/// Returns the rows of `features.csv` as maps from column to text.
 fn features(directory: &Path) -> Vec<HashMap<String, String>> {
     let mut reader = csv::Reader::from_path(directory.join("out/features.csv")).unwrap();
     reader.deserialize().map(|row| row.unwrap()).collect()
@@ -42,7 +41,6 @@ fn number(row: &HashMap<String, String>, name: &str) -> f64 {
     row[name].parse().unwrap_or_else(|_| panic!("{name} = {:?}", row[name]))
 }
 
-/// Logs of a simulated day at the bench are analysed: gyro, friction, sweeps.
 #[test]
 #[ignore = "a minute of CPU time: .ci/long-tests"]
 fn bench_day_reports_every_chapter_and_the_true_values_are_within_the_intervals() {

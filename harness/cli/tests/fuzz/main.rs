@@ -33,7 +33,6 @@ use signals::table::{self, Table};
 const LIMIT: u64 = 10;
 const MEMORY: u64 = 1_000_000;
 
-/// Texts that are inserted into text files.
 const TOKENS: [&str; 22] = [
     "1e308",
     "-1e308",
@@ -59,7 +58,6 @@ const TOKENS: [&str; 22] = [
     "../",
 ];
 
-/// Returns one of the seeds with some random changes.
 fn mutated(seeds: &[Vec<u8>], dice: &mut Rng) -> Vec<u8> {
     let mut bytes = seeds[dice.usize(..seeds.len())].clone();
     for _ in 0..dice.usize(1..6) {
@@ -106,14 +104,12 @@ fn memory() -> u64 {
     line.and_then(|rest| rest.split_whitespace().next()?.parse().ok()).unwrap_or(0)
 }
 
-/// Keeps an input that breaks something, and returns its path.
 fn keep(name: &str, ending: &str, bytes: &[u8]) -> PathBuf {
     let path = std::env::temp_dir().join(format!("hubslosh-fuzz-{name}.{ending}"));
     std::fs::write(&path, bytes).unwrap();
     path
 }
 
-/// Passes `count` mutated inputs to a reader, as files with this ending.
 fn fuzz(
     name: &'static str,
     ending: &'static str,

@@ -77,7 +77,6 @@ impl Sandbox {
         output
     }
 
-    /// Runs a command that must fail with a message, and returns the message.
     fn fails(&self, arguments: &[&str]) -> String {
         let output = self.hubslosh(arguments);
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -98,7 +97,6 @@ fn size(folder: &Path) -> u64 {
         .sum()
 }
 
-/// Lists the processes with this variable in their environment.
 fn processes_with(marker: &str) -> Vec<String> {
     let folders = std::fs::read_dir("/proc").unwrap().flatten();
     let has = |folder: &PathBuf| {
@@ -142,7 +140,6 @@ fn xml(variables: &str) -> Vec<u8> {
     format!("{HEAD}{STEPPING}{variables}{TAIL}").into_bytes()
 }
 
-/// Changes the size of the first file in the central directory and in its local header.
 fn with_size(mut bytes: Vec<u8>, size: u32) -> Vec<u8> {
     let central = bytes.windows(4).position(|four| four == b"PK\x01\x02").unwrap();
     for at in [22, central + 24] {
@@ -263,12 +260,10 @@ fn hostile_archives_and_descriptions_are_refused_by_every_command() {
     memory_was_enough();
 }
 
-/// Returns the FMU of hostile.c, which does the harm with this number in the call `when`.
 fn harmful(harm: u32, when: &str) -> Vec<u8> {
     packed(harm, when, xml(""))
 }
 
-/// Returns the FMU of hostile.c without harm, but with another description.
 fn with_description(xml: Vec<u8>) -> Vec<u8> {
     packed(0, "AT_STEP", xml)
 }
@@ -289,7 +284,6 @@ fn packed(harm: u32, when: &str, xml: Vec<u8>) -> Vec<u8> {
     zipped(&vec![("modelDescription.xml", xml), (binary.as_str(), std::fs::read(out).unwrap())])
 }
 
-/// Names of the harms, in the order of hostile.c.
 const HARMS: [&str; 12] = [
     "exits with 0",
     "aborts",
@@ -304,10 +298,8 @@ const HARMS: [&str; 12] = [
     "starts processes and exits",
     "stops itself",
 ];
-/// Harm that only prints, so that a run succeeds.
 const LOUD: &str = "prints 1 GB";
 
-/// Runs every harmful FMU, which does its harm in the call `when`, by every command.
 fn ends_its_own_process(when: &str) {
     let sandbox = Sandbox::new();
     std::fs::write(sandbox.path("plan.toml"), "title = \"a\"\nprofile = \"zero:duration=1\"\n")
@@ -433,7 +425,6 @@ fn changes_of_the_process_by_loading_an_fmu_are_reported() {
     assert!(said.contains("warning: loading a.fmu has changed"), "{said}");
 }
 
-/// fmi2GetReal of the FMU loops; `run --call-limit 0.5` fails after 0.5 s.
 #[test]
 fn a_call_that_reads_a_value_without_end_fails_the_run_at_the_call_limit() {
     const LOOP: u32 = 4;
@@ -444,7 +435,6 @@ fn a_call_that_reads_a_value_without_end_fails_the_run_at_the_call_limit() {
     assert!(said.contains("has not returned within 0.5 s"), "{said}");
 }
 
-/// fmi2GetReal of the FMU returns NaN for each output; `run` and `campaign` fail.
 #[test]
 fn a_value_that_is_nan_and_a_run_without_values_are_failures() {
     const NONE: u32 = 14;

@@ -34,12 +34,10 @@ const THESIS: [(&str, f64); 5] = [
 ];
 /// Radius of Centaur's oxygen tank, m (thesis 7.2.1).
 const CENTAUR: f64 = 2.0425;
-/// Standard gravity as in the thesis, m/s².
 const GRAVITY: f64 = 9.81;
 const POINTS: usize = 1500;
 /// Rate up to which the report draws the friction curve near zero, in multiples of the Stribeck speed ω_s.
 const NEAR: f64 = 5.0;
-/// Longest lag of the gyro's autocorrelation, s.
 const LAG: f64 = 10.0;
 const CHUNK: f64 = 900.0;
 const CHUNKS: f64 = 8.0;
