@@ -49,7 +49,6 @@ impl System<f64, State> for Smooth {
     }
 }
 
-/// Fixed-step RK4 with `parts` steps between knots.
 fn rk4(system: &Smooth, parts: usize) -> State {
     let h = STEP / parts as f64;
     let slope = |t: f64, x: State| {
@@ -78,7 +77,6 @@ fn dopri5(system: Smooth) -> State {
     *solver.y_out().last().expect("it gives points")
 }
 
-/// Returns the shortest of five measured times.
 fn best(mut run: impl FnMut() -> Duration) -> Duration {
     (0..5).map(|_| run()).min().unwrap_or_default()
 }

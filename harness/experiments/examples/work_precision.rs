@@ -38,7 +38,6 @@ fn torque(seconds: f64) -> Vec<f64> {
     (0..=count).map(at).collect()
 }
 
-/// Returns the CPU time of this thread.
 #[cfg(unix)]
 fn cpu_time() -> Duration {
     let now = nix::time::clock_gettime(nix::time::ClockId::CLOCK_THREAD_CPUTIME_ID);
@@ -52,7 +51,6 @@ fn cpu_time() -> Duration {
     START.get_or_init(std::time::Instant::now).elapsed()
 }
 
-/// Returns the CPU time since `start`, s.
 fn since(start: Duration) -> f64 {
     (cpu_time() - start).as_secs_f64()
 }
@@ -122,7 +120,6 @@ impl System<f64, State> for Smooth<'_> {
     }
 }
 
-/// Selects the rates at the knots from the dense output of a solver.
 fn at_knots(times: &[f64], states: &[State], count: usize) -> Result<Vec<f64>> {
     let mut rates = vec![f64::NAN; count];
     for (t, x) in times.iter().zip(states) {

@@ -82,12 +82,10 @@ impl Example {
         })
     }
 
-    /// Returns the name of the file of the inputs: `time` (s) and the inputs.
     pub fn input(&self) -> String {
         format!("{}_in.csv", self.model)
     }
 
-    /// Returns the name of the file of the reference: `time` and every output.
     pub fn reference(&self) -> String {
         format!("{}_ref.csv", self.model)
     }
@@ -96,7 +94,6 @@ impl Example {
         format!("{}_ref.opt", self.model)
     }
 
-    /// Writes input, options and reference to `folder`, the reference from the given FMU.
     pub fn write(&self, fmu: &Fmu, folder: &Path) -> Result<()> {
         output::directory(folder)?;
         let none = BTreeMap::new();

@@ -226,7 +226,6 @@ pub fn parameters(
 const REPORT_EVERY: usize = 1024;
 
 impl Run {
-    /// Returns the start time of the run, s, at which the torque history begins.
     pub fn start(&self) -> f64 {
         self.torque.span().0
     }

@@ -21,10 +21,6 @@ pub const OXYGEN: Liquid = Liquid { density: 1141.0, tension: 0.0132 };
 /// Radius of the bench's tank and its distance from the axis, m.
 pub const BENCH: (f64, f64) = (0.0815, 0.225);
 
-/// Checks that all values are positive numbers.
-///
-/// # Errors
-/// Names all that are not.
 fn positive(values: &[(&str, f64)]) -> Result<()> {
     let wrong: Vec<String> = values
         .iter()

@@ -122,7 +122,6 @@ pub struct Campaign {
     pub out: PathBuf,
 }
 
-/// Joins sentences about one run; `None` if there are none.
 pub(crate) fn join_sentences(sentences: &[String]) -> Option<String> {
     (!sentences.is_empty()).then(|| sentences.join("; "))
 }
@@ -152,14 +151,12 @@ impl Results {
         self.outcomes.iter().filter(|run| run.is_recording()).count()
     }
 
-    /// Returns the runs that left the range of their model, each with a description.
     pub fn beyond_model(&self) -> impl Iterator<Item = (&Case, String)> {
         let analysed = self.outcomes.iter().map(|run| (&run.case, run.beyond_model()));
         let others = self.unanalysed.iter().map(|run| (&run.case, join_sentences(&run.limits)));
         analysed.chain(others).filter_map(|(case, how)| Some((case, how?)))
     }
 
-    /// Returns the number of runs that did not fail, and how many of them were reused.
     pub fn counts(&self) -> (usize, usize) {
         let reused = self.outcomes.iter().map(|run| run.reused);
         let reused: Vec<bool> = reused.chain(self.unanalysed.iter().map(|r| r.reused)).collect();

@@ -243,7 +243,6 @@ impl History {
         }
     }
 
-    /// Returns a signal as points (time, value); empty if the history does not have it.
     pub fn curve(&self, name: &str) -> Curve {
         let values = self.signals.iter().find(|(n, _)| n == name).map(|(_, values)| values);
         values.map_or(Curve::new(), |v| self.time.iter().copied().zip(v.iter().copied()).collect())
@@ -764,7 +763,6 @@ impl Outcome {
         self.estimate().map_or(Features::default(), |(estimate, _)| estimate.features)
     }
 
-    /// Describes how the run left the range of its model, if it did.
     pub fn beyond_model(&self) -> Option<String> {
         let how = [self.range.left(&[self.totals.peak_wave_height]), self.weightless.clone()];
         let how = how.into_iter().flatten().chain(self.limits.iter().cloned());
@@ -799,7 +797,6 @@ impl Outcome {
     }
 }
 
-/// The variable that shows whether the liquid is in its model's range.
 pub const WAVE: &str = WAVE_HEIGHT;
 
 /// Quantities that determine the range in which a model of the liquid is valid: radius of the tank, m, fill,

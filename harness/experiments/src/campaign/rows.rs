@@ -20,7 +20,7 @@ pub struct Row<'a> {
     pub limits: &'a [String],
 }
 
-/// Values that do not exist, or that the torque cannot show, are empty.
+/// Columns of the table of runs. The cell of a value that does not exist, or that the torque cannot show, is empty.
 enum Column {
     Number(fn(&Row) -> Option<f64>),
     Text(fn(&Row) -> Option<String>),

@@ -19,7 +19,6 @@ pub struct Draft {
 }
 
 impl Draft {
-    /// Returns a listed run that compares a recording with `values`, named as in a plan.
     pub fn run(
         recorded: &Recorded,
         values: impl IntoIterator<Item = (&'static str, Value)>,

@@ -60,7 +60,6 @@ const KEYS: [&str; 14] = [
     "sensor",
 ];
 
-/// Reads the plan from a text; returns `None` with `problems` that prevent it.
 pub(super) fn read(text: &str, has_lines: bool, problems: &mut Problems) -> Option<Plan> {
     let (table, errors) = DeTable::parse_recoverable(text);
     let table = table.get_ref();

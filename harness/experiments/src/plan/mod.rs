@@ -135,7 +135,6 @@ pub struct Case {
     /// Time between the rows of the result, and between the commands of the profile, s.
     pub step: f64,
     pub stop: f64,
-    /// Relative tolerance of the FMU's solver; `None` for the FMU's own.
     pub tolerance: Option<f64>,
     /// True if the torque is held over each step.
     pub hold: bool,
@@ -602,7 +601,6 @@ mod tests {
 
     use super::{AMPLITUDE, AMPLITUDES, BUILT_IN, Case, Draft, FILLS, MODELS, Plan};
 
-    /// Reads the FMU's own description, so that the test needs no FMU.
     fn description() -> ModelDescription {
         let path = concat!(
             env!("CARGO_MANIFEST_DIR"),
@@ -791,7 +789,6 @@ mod tests {
         names(&cases(text)).into_iter().map(String::from).collect()
     }
 
-    /// A plan has two [[run]] tables and two varied parameters, eight cases.
     #[test]
     fn each_listed_run_is_combined_with_all_varied_values_and_the_last_value_varies_fastest() {
         let text = "profile = \"sine:duration=1\"\n\
@@ -817,7 +814,6 @@ mod tests {
         );
     }
 
-    /// The runs "a b", "A/b" and "a_b" get the files a_b, A_b_2 and a_b_3.
     #[test]
     fn names_of_runs_become_unique_file_names_on_any_file_system() {
         let text = "profile = \"zero:duration=1\"\n[[run]]\nname = \"a b\"\n[[run]]\nname = \"A/b\"\n[[run]]\nname = \"a_b\"";
@@ -916,7 +912,6 @@ mod tests {
         friction.c = { distribution = \"normal\", mean = 0.0, deviation = 0.01, max = 0.02 }\n\
         imu.seed = { distribution = \"uniform\", from = 1, to = 6 }\n";
 
-    /// 4,000 random values of each varied parameter.
     #[test]
     fn draws_have_the_specified_distributions_within_the_variables_bounds() {
         let cases = cases(&RANDOM.replace("RUNS", "4000"));
@@ -968,7 +963,6 @@ mod tests {
         assert_eq!(error, expected);
     }
 
-    /// A changed torque file changes the hash, so that the run is simulated again.
     #[test]
     fn the_content_of_a_torque_file_is_part_of_the_definition_of_a_run() {
         let directory = tempfile::tempdir().unwrap();

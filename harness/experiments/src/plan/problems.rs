@@ -2,7 +2,6 @@
 
 use anyhow::{Result, bail};
 
-/// Line numbers of a file, ascending; empty without a file.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Lines(Vec<usize>);
 

@@ -289,7 +289,6 @@ pub const KINDS: &[Kind] = &[
     },
 ];
 
-/// The only profile that is not a formula: its text, and its description.
 pub const FILE: (&str, &str) = (
     "file:path=FILE,hold=false",
     "the rows of a CSV or Parquet file with the columns `time` and `tau_cmd`, joined by lines, or held with hold=true; a relative path starts where the command is started",

@@ -38,10 +38,6 @@ pub struct Values<'a> {
 }
 
 impl Values<'_> {
-    /// Returns the value of a parameter.
-    ///
-    /// # Panics
-    /// If the kind has no such parameter.
     pub fn value(&self, name: &str) -> f64 {
         self.get(name).unwrap_or_else(|| panic!("{} has no {name}", self.kind.name))
     }
@@ -161,7 +157,6 @@ impl Written {
         if self.name == "file" { self.file() } else { Ok(Torque::Profile(self.profile()?)) }
     }
 
-    /// Returns the path in `file:path=…`, `None` for other profiles.
     pub fn path(&self) -> Option<&Path> {
         let path = self.pairs.iter().find(|(key, _)| key == "path");
         path.filter(|_| self.name == "file").map(|(_, path)| Path::new(path))
@@ -524,7 +519,6 @@ mod tests {
         assert_eq!(profile.to_string().parse::<Profile>().unwrap(), profile);
     }
 
-    /// For example `sine:freq=2`; the error lists amplitude, frequency and duration.
     #[test]
     fn wrong_profiles_are_refused_with_the_allowed_names_and_values() {
         for (text, word) in [

@@ -250,7 +250,6 @@ impl Modes {
     }
 }
 
-/// HubSlosh's description and start values, from which the surface is computed.
 pub struct Surface<'a> {
     pub description: &'a ModelDescription,
     pub parameters: &'a BTreeMap<String, String>,

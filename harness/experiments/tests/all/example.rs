@@ -24,7 +24,6 @@ fn differences(answer: &Table, reference: &Table) -> Vec<(String, f64)> {
         .collect()
 }
 
-/// Returns the folder of the committed example.
 fn folder(example: &Example) -> PathBuf {
     pack::model(example.model).unwrap().example()
 }

@@ -14,7 +14,6 @@ fn settings(pairs: &[(&str, &str)]) -> Vec<(String, String)> {
     pairs.iter().map(|(name, value)| (name.to_string(), value.to_string())).collect()
 }
 
-/// Records a sweep through resonance with sensors and, in addition, `columns`.
 fn record(set: &[(&str, &str)], sensors: &[&str], columns: &[&str], seconds: f64) -> Table {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let profile = format!("lin-sweep:amplitude=0.1,f0=2,f1=3,duration={seconds}");
@@ -139,7 +138,6 @@ fn a_camera_sees_a_tilted_plane_where_liquid_stands_still_under_a_constant_pull(
     assert!((last("p") - hydrostatic).abs() < 1e-3 * 1000.0 * 9.81 * rise, "{}", last("p"));
 }
 
-/// Measures every error of every kind of sensor on its readings.
 #[test]
 fn sensors_have_the_requested_noise_bias_scale_quantisation_rate_and_delay() {
     let noises = [

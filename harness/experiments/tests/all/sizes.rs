@@ -6,7 +6,6 @@ use host::fmu::Fmu;
 use pack::{Fmi, packed_version_for_tests};
 use signals::table::Table;
 
-/// Settings of a craft with two tanks, by the names of the FMU with scalars.
 const SCALARS: [(&str, &str); 6] = [
     ("tank[1].position[3]", "-0.55"),
     ("tank[2].position[3]", "0.45"),
@@ -16,7 +15,6 @@ const SCALARS: [(&str, &str); 6] = [
     ("tanks", "2"),
 ];
 
-/// Four signals of the two tanks.
 const COLUMNS: [&str; 4] = ["omega[1]", "tank[1].p[1,2]", "tank[2].p[2,2]", "tank[2].wave_height"];
 
 /// Translates a variable's name in the FMU with scalars to its name in the FMU with arrays: `tank[2].p[1,3]` becomes
