@@ -87,7 +87,6 @@ pub fn report(panic: &str) -> String {
 mod tests {
     use super::*;
 
-    /// A panic is reported as a bug of hubslosh with its text and place.
     #[test]
     fn a_panic_becomes_a_message_that_blames_this_program() {
         assert_eq!(caught(|| 3), Ok(3));

@@ -572,7 +572,6 @@ mod tests {
         }
     }
 
-    /// Lines of manifest.sha256 of a campaign are changed, repeated or removed.
     #[test]
     fn a_damaged_manifest_is_an_error_or_its_runs_are_not_verified() {
         let directory = tempfile::tempdir().unwrap();
