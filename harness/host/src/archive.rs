@@ -209,7 +209,6 @@ impl Archive {
         Ok(content)
     }
 
-    /// Unpacks the archive into a folder, without overwriting any file.
     pub fn unpack(&self, directory: &Path) -> Result<()> {
         self.check()?;
         for entry in &self.entries {

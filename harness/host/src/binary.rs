@@ -90,7 +90,6 @@ impl fmt::Display for Kind {
 pub struct Binary {
     pub kind: Kind,
     pub size: usize,
-    /// `x86_64` or `arm64`, in the order of the file.
     pub architectures: Vec<&'static str>,
     pub libraries: Vec<String>,
     pub search_paths: Vec<String>,

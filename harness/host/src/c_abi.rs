@@ -271,7 +271,6 @@ pub(crate) use functions;
 pub struct HostState {
     pub float_control: u32,
     pub locale: String,
-    /// Hash of the installed signal handlers; 0 on systems without them.
     pub signal_handlers: u64,
     pub directory: Option<PathBuf>,
 }
@@ -290,7 +289,6 @@ impl HostState {
         }
     }
 
-    /// Lists the parts of the process state that differ from the recorded state.
     pub(crate) fn changed(&self) -> Vec<&'static str> {
         let now = HostState::now();
         let parts = [
@@ -306,7 +304,6 @@ impl HostState {
     }
 }
 
-/// Lists all files below a folder; the list is empty if the folder cannot be read.
 fn files_below(folder: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let below = entries.flat_map(|entry| match entry.path() {

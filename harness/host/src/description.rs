@@ -17,7 +17,6 @@ use crate::xml::Element;
 
 #[derive(Clone, Debug)]
 pub struct ModelDescription {
-    /// FMI version, for example "2.0" or "3.0".
     pub fmi_version: String,
     pub model_name: String,
     pub guid: String,
@@ -130,7 +129,6 @@ pub struct Item {
     pub value: i64,
 }
 
-/// A variable: the element `ScalarVariable`, in FMI 3.0 the element named after its type.
 #[derive(Clone, Debug)]
 pub struct Variable {
     pub name: String,
@@ -222,7 +220,6 @@ impl CType {
         })
     }
 
-    /// Returns the smallest and the largest value of an integer type, or `None` for other types.
     fn integer_bounds(self) -> Option<(i64, i64)> {
         Some(match self {
             CType::Int8 => (i8::MIN.into(), i8::MAX.into()),
@@ -257,7 +254,6 @@ impl Value {
         }
     }
 
-    /// Returns true if the two values are equal to the last bit.
     pub fn is_identical(&self, other: &Value) -> bool {
         match (self, other) {
             (Value::Real(a), Value::Real(b)) => a.to_bits() == b.to_bits(),
@@ -275,7 +271,6 @@ impl Value {
     }
 }
 
-/// Writes the value for messages, a text in quotes.
 impl std::fmt::Display for Value {
     fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
         match self {
@@ -640,7 +635,6 @@ impl ModelDescription {
         Ok(ModelDescription::from_archive(&Archive::open(path)?, path)?.1)
     }
 
-    /// Returns the text of the description as well.
     pub(crate) fn from_archive(archive: &Archive, path: &Path) -> Result<(String, Self)> {
         let name = path.display();
         let text = archive.description().with_context(|| format!("{name} is not an FMU"))?;

@@ -60,7 +60,6 @@ impl Inputs {
         Inputs { exchange: self.exchange.map(|default| tolerance.unwrap_or(default)), ..self }
     }
 
-    /// Returns true if inputs of this type can be set.
     pub fn takes(kind: Type) -> bool {
         matches!(kind, Type::Real | Type::Integer | Type::Enumeration | Type::Boolean)
     }

@@ -31,7 +31,6 @@ const A: [[f64; 5]; 6] = [
 ];
 const B: [f64; 6] =
     [35.0 / 384.0, 0.0, 500.0 / 1113.0, 125.0 / 192.0, -2187.0 / 6784.0, 11.0 / 84.0];
-/// Weights of the error estimate: six stages and the derivative at the end.
 const E: [f64; 7] = [
     71.0 / 57600.0,
     0.0,

@@ -26,7 +26,6 @@ pub mod guarded;
 pub type Fmu = version::Fmu<Fmi2>;
 pub type Instance<'fmu> = version::Instance<'fmu, Fmi2>;
 
-/// Folder of the binaries for the platform of this program.
 pub const PLATFORM: &str = version::PLATFORM[0];
 
 // ---------------------------------------------------------------- C types
@@ -283,14 +282,12 @@ macro_rules! answers {
     };
 }
 
-/// Returns the URI of a folder, percent-encoded (RFC 3986).
 pub fn file_uri(folder: &Path) -> String {
     let path = folder.to_string_lossy().replace(std::path::MAIN_SEPARATOR, "/");
     let start = if path.starts_with('/') { "file://" } else { "file:///" };
     format!("{start}{}", percent_encoded(&path, b"/:"))
 }
 
-/// Encodes the characters of a text that a URI reserves, except `kept`.
 pub fn percent_encoded(text: &str, kept: &[u8]) -> String {
     let mut encoded = String::new();
     for byte in text.bytes() {
@@ -312,22 +309,18 @@ impl Fmu {
         self.exchange.is_some() && self.own.events.is_some()
     }
 
-    /// Lists the 25 C functions that every FMU must export.
     pub fn symbols() -> Vec<&'static str> {
         [Common::<c_int>::symbols(0), Functions::symbols(0)].concat()
     }
 
-    /// Lists the 9 C functions that an FMU for Co-Simulation must export in addition.
     pub fn step_symbols() -> Vec<&'static str> {
         StepFunctions::symbols(0)
     }
 
-    /// Lists the 10 C functions that an FMU for Model Exchange must export in addition.
     pub fn exchange_symbols() -> Vec<&'static str> {
         [EventFunctions::symbols(0), Exchange::<c_int>::symbols(0)].concat()
     }
 
-    /// Returns the result of fmi2GetTypesPlatform; "default" is the only one that the standard allows.
     pub fn types_platform(&self) -> String {
         // SAFETY: takes nothing, returns a constant string.
         unsafe { copy_text((self.own.functions.get_types_platform.call)()) }
@@ -387,7 +380,6 @@ impl Fmu {
         })
     }
 
-    /// Calls each function with the instance NULL and returns the statuses, for tests.
     pub fn calls_with_null_instance(&self) -> Vec<(&'static str, Status)> {
         let c: Component = null_mut();
         let (mut i, mut x, mut n, mut s, mut t) = (0, 0.0, 0, null_mut(), null());
@@ -559,11 +551,6 @@ impl<'fmu> Instance<'fmu> {
         self.call(self.stepping().do_step, |f, c| unsafe { f(c, time, step, 1) })
     }
 
-    /// Calls fmi2NewDiscreteStates.
-    ///
-    /// # Panics
-    ///
-    /// If the FMU does not export it.
     pub fn new_discrete_states(&mut self) -> Called<EventInfo> {
         let mut info = EventInfo::default();
         // SAFETY: a place for the answer.
@@ -591,7 +578,6 @@ impl<'fmu> Instance<'fmu> {
         self.write(self.functions().set_boolean, references, values)
     }
 
-    /// Reads Strings and copies them, because the FMU's texts are valid only until its next call.
     pub fn get_string(&mut self, references: &[u32]) -> Called<Vec<String>> {
         self.read_texts(self.functions().get_string, references, references.len())
     }
@@ -628,7 +614,6 @@ impl<'fmu> Instance<'fmu> {
         })
     }
 
-    /// Calls fmi2GetDirectionalDerivative: the derivatives of `unknowns` for a change `change` of the knowns.
     pub fn get_directional_derivative(
         &mut self,
         unknowns: &[u32],
@@ -648,7 +633,6 @@ impl<'fmu> Instance<'fmu> {
 
     // ------------------------------------------------ status of an asynchronous step
 
-    /// Calls one of the functions that return the status of a step; `kind` is an fmi2StatusKind.
     fn read_status<T>(
         &mut self,
         function: Function<GetStatus<T>>,

@@ -26,7 +26,6 @@ use crate::description::{CType, Value};
 pub type Fmu = version::Fmu<Fmi3>;
 pub type Instance<'fmu> = version::Instance<'fmu, Fmi3>;
 
-/// Folder of the binaries for the platform of this program.
 pub const PLATFORM: &str = version::PLATFORM[1];
 
 // ---------------------------------------------------------------- C types
@@ -205,7 +204,6 @@ pub struct Stepping {
     /// Valid during one call of fmi3DoStep, otherwise NULL.
     within: Cell<*mut Within<'static>>,
     updates: Cell<usize>,
-    /// Memory for the inputs of a step, which is used again in every step.
     line: Cell<Line>,
     environment: *mut c_void,
 }
@@ -495,7 +493,6 @@ impl Version for Fmi3 {
 }
 
 impl Fmu {
-    /// Lists the 75 functions that every FMU must export (section 2.5).
     pub fn symbols() -> Vec<&'static str> {
         let mut all = Fmi3::required_functions(true, true);
         all.extend(UNCALLED);
@@ -728,7 +725,6 @@ impl<'fmu> Instance<'fmu> {
         self.read(T::calls(self.functions()).0, references, values)
     }
 
-    /// Calls fmi3Set… for the type of the values; `values` has all elements of all variables.
     pub fn set_numbers<T: Exchanged>(&mut self, references: &[u32], values: &[T]) -> Called {
         self.write(T::calls(self.functions()).1, references, values)
     }
@@ -840,20 +836,10 @@ impl<'fmu> Instance<'fmu> {
         Ok(count)
     }
 
-    /// Calls fmi3GetNumberOfContinuousStates.
-    ///
-    /// # Panics
-    ///
-    /// If the FMU does not export it.
     pub fn number_of_states(&mut self) -> Called<usize> {
         self.read_count(|f| f.number_of_continuous_states)
     }
 
-    /// Calls fmi3GetNumberOfEventIndicators.
-    ///
-    /// # Panics
-    ///
-    /// If the FMU does not export it.
     pub fn number_of_indicators(&mut self) -> Called<usize> {
         self.read_count(|f| f.number_of_event_indicators)
     }

@@ -87,12 +87,10 @@ impl Fmu {
         each!(Fmu, self, fmu => fmu.description())
     }
 
-    /// Returns the SHA-256 of the `.fmu` file, in hexadecimal digits.
     pub fn hash(&self) -> &str {
         each!(Fmu, self, fmu => fmu.hash())
     }
 
-    /// Returns the SHA-256 of the loaded binary, in hexadecimal digits.
     pub fn binary_hash(&self) -> &str {
         each!(Fmu, self, fmu => fmu.binary_hash())
     }
@@ -171,7 +169,6 @@ impl<'fmu> Instance<'fmu> {
         each!(Instance, self, instance => instance.fmu().description())
     }
 
-    /// Enters initialization mode with start and stop time (s) and relative tolerance.
     pub fn enter_initialization_mode(
         &mut self,
         tolerance: Option<f64>,

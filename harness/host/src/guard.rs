@@ -235,7 +235,6 @@ const CLOSED: Duration = Duration::from_secs(1);
 const COUNTING: Duration = Duration::from_millis(50);
 const COUNTED: usize = 100_000;
 
-/// Returns the disk space of the files below a folder, bytes.
 fn disk_usage(folder: &Path) -> u64 {
     let (mut folders, mut bytes, mut entries) = (vec![folder.to_path_buf()], 0, 0);
     while let Some(folder) = folders.pop() {

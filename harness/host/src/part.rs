@@ -28,7 +28,6 @@ pub struct Limit<'a> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Part {
     pub xml: String,
-    /// Content of [`START_VALUES`], if start values differ from the binary's.
     pub start_values: Option<String>,
 }
 

@@ -139,7 +139,6 @@ impl Cursor<'_> {
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct Schedule {
-    /// Times, ascending, s.
     pub time: Vec<f64>,
     /// True for each point that is a row of the result; `None` if all are.
     pub rows: Option<Vec<bool>>,
@@ -219,7 +218,6 @@ impl Schedule {
         Ok(Schedule { time, rows: (!all).then_some(rows) })
     }
 
-    /// Returns true if the communication point `k` is a row of the result.
     pub fn is_row(&self, k: usize) -> bool {
         self.rows.as_ref().is_none_or(|rows| rows[k])
     }
@@ -269,7 +267,6 @@ mod tests {
         (0..schedule.time.len()).map(|k| (schedule.time[k], schedule.is_row(k))).collect()
     }
 
-    /// Inputs at uneven times and results every 20 ms; times that differ by rounding are merged.
     #[test]
     fn every_row_of_an_input_and_of_the_result_is_a_communication_point() {
         let inputs = [0.0, 0.015, 0.02, 0.02, 0.06, 0.07];

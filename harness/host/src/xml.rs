@@ -157,7 +157,6 @@ impl Element {
         self.children.iter().find(|child| child.name == name)
     }
 
-    /// Iterates over the children of the child element `list`; there are none if it is missing.
     pub fn list<'a>(&'a self, list: &str) -> impl Iterator<Item = &'a Element> + use<'a> {
         self.child(list).into_iter().flat_map(|list| &list.children)
     }

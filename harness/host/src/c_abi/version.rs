@@ -90,7 +90,6 @@ pub struct Updated {
     /// The host must update the discrete states again.
     pub again: bool,
     pub terminate: bool,
-    /// Time of the next time event, s.
     pub next_event: Option<f64>,
 }
 
@@ -570,7 +569,6 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         self.calls.begin();
     }
 
-    /// Calls a function for this instance and turns its status into a result.
     pub(crate) fn call<T>(
         &self,
         function: Function<T>,
@@ -811,7 +809,6 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
         self.call(self.fmu.common.free_fmu_state, |f, c| unsafe { f(c, &mut state.0) })
     }
 
-    /// Serialises a saved state to bytes that another instance of the FMU can read.
     pub fn serialize(&mut self, state: &FmuState) -> Called<Vec<u8>> {
         let mut size = 0;
         let common = &self.fmu.common;

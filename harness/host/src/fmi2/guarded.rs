@@ -4,7 +4,6 @@
 use super::*;
 use crate::c_abi::version::{GetVector, State};
 
-/// Size of the margin on either side of an array, bytes.
 const MARGIN: usize = 1024;
 const FILL: u64 = 0xa5c3_5a3c_a53c_5ac3;
 
@@ -79,7 +78,6 @@ pub struct Lists {
     pub booleans: Vec<u32>,
     pub strings: Vec<u32>,
     pub inputs: Vec<(u32, f64)>,
-    /// Unknowns of directional derivatives; empty if the FMU does not provide them.
     pub unknowns: Vec<u32>,
     pub knowns: Vec<u32>,
     pub outputs: Vec<u32>,

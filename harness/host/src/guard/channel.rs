@@ -21,7 +21,6 @@ use std::time::Duration;
 use anyhow::Result;
 
 const NONCE: usize = 16;
-/// Number of bytes before the content of a message: the nonce, the kind and the length.
 const HEAD: usize = NONCE + 1 + 4;
 
 #[cfg(unix)]
