@@ -36,7 +36,6 @@ struct Way {
     named: &'static str,
 }
 
-/// Rows a second.
 const RATE: f64 = 25.0;
 
 const fn way(name: &'static str, named: &'static str) -> Way {

@@ -43,7 +43,6 @@ use identify::methods::output_error::identify;
 use identify::engine::Hold;
 use identify::tuning::COARSEST;
 
-/// Command-line arguments.
 struct Arguments {
     seeds: std::ops::RangeInclusive<u32>,
     torque: String,
@@ -125,7 +124,6 @@ fn arguments() -> Result<Arguments> {
     Ok(asked)
 }
 
-/// True values of the twin, by the names of the estimates.
 fn truths(fmu: &Fmu, twin: &Twin) -> Result<BTreeMap<String, f64>> {
     let mut instance = rest::instantiate(fmu, "truth")?;
     for (name, value) in &twin.settings {

@@ -18,7 +18,6 @@ pub struct Estimated {
 }
 
 impl Estimated {
-    /// Returns a number whose only uncertainty is normally distributed noise.
     pub fn normal(value: f64, std: f64, unit: &str) -> Self {
         let interval = [value - 1.96 * std, value + 1.96 * std];
         Estimated { value, std, std_noise: std, interval, determined: true, unit: unit.into() }

@@ -14,7 +14,7 @@ pub const KERNEL_HALF: isize = 24;
 
 // Gaps of the torque: `input/gaps.rs`.
 // Tests: `lost_samples_of_a_sweep_are_predicted`, `lost_rows_of_a_sweep_are_interpolated_and_lost_rows_of_noise_split_the_recording`.
-/// Spacing of samples, in usual ones, from which on some were lost.
+/// Ratio of the spacing of two samples to the usual spacing above which samples between them must have been lost.
 pub const LOST_SPACING: f64 = 1.75;
 /// Longest gap that is filled, s.
 pub const LONGEST_FILLED: f64 = 3.0;

@@ -10,9 +10,7 @@ use analysis::random::Random;
 
 use crate::bench::{Bearing, Bench, Drive, Liquid};
 
-/// Time between rows, s.
 const STEP: f64 = 0.02;
-/// Time before the torque begins, s.
 const LEAD_IN: f64 = 5.0;
 /// Standard deviation of the gyro's noise and its quantisation, rad/s (thesis 5.5: N = 5.75e-5 rad/s/√Hz at 50 Hz).
 pub const GYRO: (f64, f64) = (4.066e-4, 1.527e-4);
@@ -20,40 +18,30 @@ pub const GYRO: (f64, f64) = (4.066e-4, 1.527e-4);
 pub const ASYMMETRY: f64 = 0.15;
 /// Rates of the platform about x and y over the hub's rate.
 const TILT: [f64; 2] = [0.03, 0.02];
-/// Height of an empty tank's liquid, m.
 const EMPTY: f64 = 1e-9;
 
-/// Columns of logs with the encoder, and without it.
 const COLUMNS: [&str; 2] = [
     "time=t:ms,tau_cmd=T_cmd:mNm,omega=gyro_z:deg/s,theta=encoder:deg",
     "time=t:ms,tau_cmd=T_cmd:mNm,omega=gyro_z:deg/s,omega_x=gyro_x:deg/s,omega_y=gyro_y:deg/s",
 ];
 
-/// Logs of one day.
+/// Settings of a simulated day at the bench: the gyro's bias about x, y and z (deg/s), the liquid of the sweeps, filling heights (m),
+/// torque amplitudes (N·m), durations of a sweep and of the recording at rest (s, 0 for none), `friction` (true for friction runs and free
+/// decays), the slosh models of the report, and the fraction of rows that the logger loses.
 pub struct Day<'a> {
-    /// Bias of the gyro about x, y and z, deg/s.
     pub bias: [f64; 3],
-    /// Liquid of the sweeps.
     pub liquid: Liquid,
-    /// Filling heights, m.
     pub fills: &'a [f64],
-    /// Torque amplitudes, N·m.
     pub amplitudes: &'a [f64],
-    /// Duration of a sweep, s.
     pub sweep: f64,
-    /// Duration of the gyro's recording at rest, s; 0 for none.
     pub rest: f64,
-    /// True if the day has friction runs and free decays.
     pub friction: bool,
-    /// Slosh models that the report simulates.
     pub models: &'a str,
     /// Relative error of the recorder's clock: true times are the times of the logs multiplied by 1 − clock.
     pub clock: f64,
-    /// Part of the rows that the logger loses.
     pub lost: f64,
 }
 
-/// The day of the test: six short sweeps.
 pub const SHORT: Day = Day {
     bias: [5.0, -2.0, 1.0],
     liquid: Liquid::Linear,
@@ -67,14 +55,12 @@ pub const SHORT: Day = Day {
     lost: 0.0,
 };
 
-/// The bench with its bearing.
 pub fn bench(liquid: Liquid, height: f64) -> Bench {
     let bearing = Bearing { asymmetry: ASYMMETRY, ..Bench::default().bearing };
     Bench { liquid, height, bearing, ..Bench::default() }
 }
 
 impl Day<'_> {
-    /// Writes the logs and day.toml.
     pub fn write(&self, directory: &Path) -> io::Result<()> {
         let mut manifest = format!(
             "title = \"A day at the independent bench\"\nprofile = \"exp-sweep:f0=1.25,f1=3.5,duration={:?}\"\n\

@@ -14,14 +14,12 @@ use identify::bench::simulate::TORQUE_BESIDES;
 use identify::engine::Hold;
 use identify::input::recording::Recording;
 
-/// Errors of gyro and data link in addition to the FMU's own noise.
+/// Errors of gyro and data link in addition to the FMU's own noise: the delay from torque to rate (s; exact if it is a multiple of the
+/// sampling time), the gyro's scale (reading over rate) and its bias (rad/s).
 #[derive(Clone, Copy, Debug)]
 pub struct SensorErrors {
-    /// Delay from torque to rate, s; a multiple of the sampling time is exact.
     pub delay: f64,
-    /// Reading over rate.
     pub gyro_scale: f64,
-    /// Reading at rest, rad/s.
     pub gyro_bias: f64,
 }
 
@@ -52,7 +50,6 @@ pub enum Unmodelled {
 
 /// Frequency of rocking, Hz.
 const ROCKING: f64 = 4.1;
-/// Damping ratio of rocking.
 const ROCKING_DAMPING: f64 = 0.01;
 /// Rate of rocking that the gyro sees far below resonance, relative to the hub's rate.
 const ROCKING_SEEN: f64 = 0.01;
@@ -64,11 +61,9 @@ const AIR: f64 = 0.02;
 const LAG: f64 = 0.03;
 /// Parts of the way from row to row in which a lag is computed.
 const LAG_PARTS: usize = 8;
-/// Time constant of warming up, s.
 const WARMING: f64 = 600.0;
 
 impl Unmodelled {
-    /// Effect by its name.
     pub fn named(name: &str) -> Result<Self> {
         Ok(match name {
             "tilt" => Unmodelled::Tilt,
@@ -100,22 +95,17 @@ pub fn torque(text: &str) -> Result<Torque> {
     Torque::rows(&time, &tau, None, false)
 }
 
-/// A bench that is the FMU.
+/// A simulated bench (twin) that the FMU computes: its settings, the rows per second (`rate`), the gyro's values per second if they are
+/// fewer (`gyro`), the torque between rows (`intersample`), sensor errors, the standard deviation of an encoder's angle (rad, `None`
+/// without encoder), and effects that the fitted models do not have.
 #[derive(Clone, Debug)]
 pub struct Twin {
-    /// Settings of the FMU by name.
     pub settings: Vec<(String, String)>,
-    /// Rows a second.
     pub rate: f64,
-    /// Values of the gyro a second; `None`: as many as rows.
     pub gyro: Option<f64>,
-    /// Intersample behaviour of the torque.
     pub intersample: Hold,
-    /// Errors of gyro and data link.
     pub sensor_errors: SensorErrors,
-    /// Standard deviation of an encoder's angle, rad; `None`: there is no encoder.
     pub encoder: Option<f64>,
-    /// Unmodelled effects.
     pub unmodelled: Vec<Unmodelled>,
 }
 

@@ -27,13 +27,10 @@ use identify::methods::output_error;
 /// Bias of the gyro, rad/s.
 const BIAS: f64 = 0.002;
 
-/// Estimates, and whether the fit is accepted.
 struct Answer {
     parameters: BTreeMap<String, Estimated>,
-    /// Gyro's biases.
     measurement: BTreeMap<String, Estimated>,
     fits: bool,
-    /// Wall time, s.
     seconds: f64,
 }
 

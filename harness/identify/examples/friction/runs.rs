@@ -14,12 +14,10 @@ const GYRO: (f64, f64) = (4.066e-4, 1.53e-4);
 /// Torque of a run, N·m, over time, s.
 pub type Course = fn(f64) -> f64;
 
-/// A ramp, a step and a sweep.
+/// A ramp, a step and a sweep of the torque, each `seconds` long.
 pub struct Set {
     pub name: &'static str,
-    /// Length of each run, s.
     pub seconds: u32,
-    /// Torques of ramp, step and sweep.
     pub courses: [Course; 3],
 }
 
@@ -28,7 +26,6 @@ fn sweep(t: f64, (from, to): (f64, f64), seconds: f64) -> f64 {
     (TAU * (from * t + (to - from) / (2.0 * seconds) * t * t)).sin()
 }
 
-/// Sets of runs that differ in length, torque and direction.
 pub const SETS: [Set; 3] = [
     Set {
         name: "two minutes",
@@ -65,13 +62,11 @@ pub const SETS: [Set; 3] = [
     },
 ];
 
-/// The thesis's bench with a rigid liquid and this asymmetry.
 pub fn bench(asymmetry: f64) -> Bench {
     let bearing = Bearing { asymmetry, ..Bench::default().bearing };
     Bench { liquid: Liquid::Frozen, bearing, ..Bench::default() }
 }
 
-/// Recordings of a set, with this bias of the gyro, rad/s.
 pub fn recordings(set: &Set, seed: u64, bias: f64, asymmetry: f64) -> Vec<Recording> {
     let time: Vec<f64> = (0..=50 * set.seconds).map(|k| 0.02 * f64::from(k)).collect();
     let bench = bench(asymmetry);

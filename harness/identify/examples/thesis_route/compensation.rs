@@ -40,7 +40,6 @@ impl Friction {
     }
 }
 
-/// The linear bench without friction.
 fn bench_of(hub_inertia: f64, (d, h, zeta): (f64, f64, f64), bench: Bench) -> Linear {
     let liquid = bench.liquid(d, h);
     let Pendulum { mass, length, .. } = pendulum(0, d, h, liquid);

@@ -17,9 +17,7 @@
 use ode_solvers::dop853::Dop853;
 use ode_solvers::{OutputType, SVector, System};
 
-/// First zero of J₁'.
 const XI: f64 = 1.841_183_781_340_659;
-/// Tolerance of the integration, relative and absolute.
 const TOLERANCE: f64 = 1e-11;
 /// Instants closer than this are the same, s.
 const SAME: f64 = 1e-13;
@@ -33,10 +31,8 @@ const LOOK: f64 = 5e-3;
 /// State: θ, ω, then s and s' of the linear liquid or u and u' of the spherical one. The time is a state because ode_solvers
 /// 0.6.2 evaluates the twelfth stage of Dop853 at the beginning of the step (c₁₂ is 0 in its table, 1 in Hairer's).
 type State = SVector<f64, 9>;
-/// Index of the time in the state.
 const TIME: usize = 8;
 
-/// Model of the liquid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Liquid {
     /// All liquid turns with the hub.
@@ -47,24 +43,19 @@ pub enum Liquid {
     Spherical,
 }
 
-/// The bearing.
+/// Friction of the bearing: viscous coefficient b (N·m·s), dry friction c and Stribeck excess d (N·m), Stribeck speed `omega_s` (rad/s),
+/// `asymmetry` (the fraction by which dry friction is larger forwards and smaller backwards), and the rate eps (rad/s) of a smoothed sign
+/// tanh(ω/eps), `None` for the exact sign.
 #[derive(Clone, Copy, Debug)]
 pub struct Bearing {
-    /// Viscous friction, N·m·s.
     pub b: f64,
-    /// Dry friction, N·m.
     pub c: f64,
-    /// Stribeck's excess, N·m.
     pub d: f64,
-    /// Stribeck's speed, rad/s.
     pub omega_s: f64,
-    /// Part by which the dry friction is larger forwards and smaller backwards.
     pub asymmetry: f64,
-    /// Rate eps of a smoothed sign tanh(ω/eps), rad/s; `None`: the sign is not smoothed.
     pub eps: Option<f64>,
 }
 
-/// The bench; SI units.
 #[derive(Clone)]
 #[allow(missing_docs)]
 pub struct Bench {
@@ -145,20 +136,15 @@ enum Contact {
     /// With the sign of ω.
     Slips(f64),
     Sticks,
-    /// The law is smooth.
     Smooth,
 }
 
-/// Motion of the hub.
+/// Computed motion of the hub at the rows: angle (rad), rate (rad/s), the number of stops, and the largest slosh angle (rad).
 #[derive(Clone, Debug, Default)]
 pub struct Motion {
-    /// rad.
     pub angle: Vec<f64>,
-    /// rad/s.
     pub rate: Vec<f64>,
-    /// Number of stops of the hub.
     pub stops: usize,
-    /// Largest angle of the liquid, rad.
     pub slosh: f64,
 }
 
@@ -260,7 +246,6 @@ impl Equations<'_> {
         (c + d) * (1.0 + asymmetry * direction.signum())
     }
 
-    /// Returns the contact with which a hub at rest continues: it sticks or slips.
     fn after_rest(&self, t: f64, y: &State) -> Contact {
         let at_rest = Equations { contact: Contact::Sticks, ..*self };
         let driving = at_rest.rates(t, y).driving;

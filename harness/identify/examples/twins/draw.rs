@@ -25,7 +25,6 @@ const SPREAD: f64 = 0.3;
 /// White noise of a MEMS gyro, rad/s/√Hz; its drift, rad/s, with its correlation time, s; its least step, rad/s.
 const GYRO: (f64, f64, f64, f64) = (5.75e-5, 7.85e-5, 100.0, 1.53e-4);
 
-/// Kinds of torque.
 #[derive(Clone, Copy, Debug)]
 enum Excitation {
     Up,
@@ -36,22 +35,18 @@ enum Excitation {
     Gentle,
 }
 
-/// A bench with its sensors and their clock.
+/// A bench with its sensors and their clock. Times are in s, angles in rad, rates in rad/s, torques in N·m, and the sampling rate is in
+/// rows per second.
 pub struct Twin {
     pub seed: u64,
     bench: Bench,
     excitation: Excitation,
     between: Hold,
-    /// s.
     duration: f64,
-    /// s.
     pub delay: f64,
     gyro_scale: f64,
-    /// rad/s.
     gyro_bias: f64,
-    /// rad.
     pub encoder: Option<f64>,
-    /// Rows a second.
     rate: f64,
     /// Torque and clock of the recording over the true ones.
     torque_scale: f64,
@@ -60,18 +55,15 @@ pub struct Twin {
     drift: Vec<f64>,
 }
 
-/// Signals of a twin as its sensors read them.
+/// Signals of a twin as its sensors read them: torque (N·m) at the instants of the commands, rate (rad/s) and, with an encoder, angle
+/// (rad).
 pub struct Measured {
-    /// N·m, at the instants of the commands.
     pub torque: Vec<f64>,
-    /// rad/s.
     pub rate: Vec<f64>,
-    /// rad.
     pub angle: Option<Vec<f64>>,
 }
 
 impl Twin {
-    /// Draws the twin of a seed; its recording lasts `duration` (s).
     pub fn draw(seed: u64, duration: f64) -> Twin {
         let mut random = Random::new(seed, 7);
         let nominal = Bench::default();
@@ -144,7 +136,6 @@ impl Twin {
         twin
     }
 
-    /// Returns the twin with another sampling rate, rows per second.
     pub fn with_rate(mut self, rate: f64) -> Twin {
         let rows = (self.duration * rate).round() as usize;
         let last = self.drift.len() - 1;
@@ -178,7 +169,6 @@ impl Twin {
         )
     }
 
-    /// Returns the true values by the names of the estimates.
     pub fn truths(&self) -> Vec<(&'static str, f64)> {
         let Bench { hub_inertia, diameter, height, zeta, bearing, .. } = &self.bench;
         vec![
@@ -198,7 +188,6 @@ impl Twin {
         ]
     }
 
-    /// Returns the torque as a function of time, N·m.
     fn torque(&self) -> Box<dyn Fn(f64) -> f64> {
         let duration = self.duration;
         let profile = |text: String| -> Box<dyn Fn(f64) -> f64> {
@@ -232,14 +221,12 @@ impl Twin {
         }
     }
 
-    /// Records the twin with its sensors.
     pub fn record(&self) -> Recording {
         let rows = self.rows();
         let Measured { torque, rate, angle } = self.measure(&rows, &rows, self.delay);
         Recording { angle, ..Recording::of("twin", self.stamps(&rows), torque, rate) }
     }
 
-    /// Returns the instants of the rows, s.
     pub fn rows(&self) -> Vec<f64> {
         (0..self.drift.len()).map(|k| k as f64 / self.rate).collect()
     }
@@ -296,7 +283,6 @@ impl Twin {
         output_error::identify(fmu, &parts, &options, &mut |news| hear(news.line()))
     }
 
-    /// Identifies a file in which the twin's recording was written, as a user would.
     pub fn identify_file(
         &self,
         fmu: &Fmu,

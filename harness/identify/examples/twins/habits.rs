@@ -33,29 +33,21 @@ pub const HABITS: [&str; 20] = [
     "frozen",
 ];
 
-/// A file, and the options with which its user reads it.
+/// A recording in a file, with the options with which its user reads it: `--columns`, the first and last time (s), and the rows per second.
 #[derive(Default)]
 pub struct Written {
-    /// Path of the file.
     pub path: PathBuf,
-    /// Value of `--columns`.
     pub columns: String,
-    /// First and last time that are used, s.
     pub trim: Option<(f64, f64)>,
-    /// Rows a second.
     pub rate: Option<f64>,
 }
 
-/// A row of a log.
+/// A row of a log: time (s), torque (N·m), rate (rad/s) and angle (rad); `None` for an empty cell.
 #[derive(Clone, Copy)]
 struct Row {
-    /// s.
     time: f64,
-    /// N·m.
     torque: Option<f64>,
-    /// rad/s.
     rate: Option<f64>,
-    /// rad.
     angle: Option<f64>,
 }
 
@@ -182,7 +174,6 @@ fn log(twin: &Twin, habit: &str) -> Vec<Row> {
     rows
 }
 
-/// Returns the text of a file.
 fn text(rows: &[Row], habit: &str, encoder: bool) -> Result<String> {
     let mut text = String::new();
     let (separator, head) = match habit {

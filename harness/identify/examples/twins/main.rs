@@ -37,7 +37,6 @@ struct Row {
     inside: usize,
 }
 
-/// Results over all twins.
 #[derive(Default)]
 struct Tally {
     rows: BTreeMap<String, Row>,
@@ -123,7 +122,6 @@ impl Tally {
     }
 }
 
-/// Returns the habit with a name.
 fn known(name: &str) -> Result<&'static str> {
     let found = HABITS.into_iter().find(|habit| *habit == name);
     found.with_context(|| format!("{name} is not a habit (allowed: {})", HABITS.join(", ")))

@@ -27,7 +27,6 @@ pub struct Bound {
     pub inseparable_from: Vec<String>,
     /// Least standard deviation if all other unknowns were known.
     pub std_alone: f64,
-    /// Standard deviation of the prior; `None` without a prior.
     pub prior: Option<f64>,
     pub unit: String,
     /// Name of the unknown with which the correlation is largest, and this correlation.

@@ -52,7 +52,8 @@ pub struct Details {
     /// −2 ln L up to a constant.
     pub deviance: f64,
     pub starts: usize,
-    /// Distance to the minimum in standard deviations.
+    /// Newton decrement: the distance of the estimates from the minimum of −2 ln L, in standard deviations, that one further Newton step
+    /// predicts.
     pub decrement: f64,
     pub covariance: Vec<Vec<f64>>,
 }
@@ -491,7 +492,6 @@ fn size(system: &FmuSystem, unknowns: &[Unknown], j: usize) -> String {
     }
 }
 
-/// Sentence about intervals of a fit without tolerances.
 const NOISE_ALONE: &str = "The intervals include noise alone: settings, inputs and the clock count as exact. --tolerance states how sure they are.";
 
 fn say(

@@ -42,7 +42,6 @@ impl<'a> FmuSystem<'a> {
         Ok((FmuSystem { model, setup, records, targets, names }, unknowns))
     }
 
-    /// Returns true if an unknown is a parameter or a start of the FMU.
     pub fn is_parameter(&self, j: usize) -> bool {
         matches!(self.targets[j].0, Target::Parameter(_))
     }

@@ -32,7 +32,6 @@ use crate::words::page::RATE;
 /// Fit of the rates below which a minimum counts as a wrong one, %.
 const POOR_FIT: f64 = 90.0;
 
-/// Returns the numbers that describe the fit of one slosh model with one friction law.
 pub fn summary(solution: &Solution, (model, law): (&str, &str)) -> ModelFit {
     let fit = &solution.fit;
     let point = &solution.minimum.point;

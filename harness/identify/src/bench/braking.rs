@@ -6,7 +6,6 @@ use serde::Serialize;
 /// Mean of torque less inertia times acceleration over rows of similar rate.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct FrictionPoint {
-    /// Mean rate, rad/s.
     pub rate: f64,
     /// Mean friction torque, N·m; positive if it brakes a positive rate.
     pub torque: f64,

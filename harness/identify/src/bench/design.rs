@@ -34,7 +34,6 @@ pub struct Multisine {
     pub lines: Vec<u32>,
     /// Odd lines of the band without power.
     pub detection: Vec<u32>,
-    /// Amplitudes a_k, N·m.
     amplitudes: Vec<f64>,
     phases: Vec<f64>,
 }
@@ -91,7 +90,6 @@ impl Multisine {
         self.lines.iter().map(|&k| f64::from(k) / self.period).collect()
     }
 
-    /// Torque at `t` (s), N·m.
     pub fn at(&self, t: f64) -> f64 {
         let turn = (t / self.period).fract();
         let tones = self.lines.iter().zip(&self.amplitudes).zip(&self.phases);
@@ -116,7 +114,6 @@ pub fn check_rows(period: f64, band: (f64, f64), peak: f64, rows: usize) -> Resu
     Ok(())
 }
 
-/// Numbers of the odd lines between two frequencies (Hz) at a period (s).
 fn odd_lines(period: f64, band: (f64, f64), peak: f64) -> Result<Vec<u32>> {
     ensure!(0.0 < band.0 && band.0 < band.1, "a multisine's band must be 0 < f0 < f1");
     ensure!(
@@ -188,9 +185,7 @@ pub fn d_optimal(plant: &Linear, frequencies: &[f64]) -> Vec<f64> {
 
 #[derive(Clone, Copy, Debug)]
 pub struct Wheel {
-    /// Largest torque, N·m.
     pub torque: f64,
-    /// Moment of inertia, kg·m².
     pub inertia: f64,
     /// Speed at the start, and the least and the largest that are allowed, rad/s.
     pub speeds: [f64; 3],
@@ -365,7 +360,6 @@ mod tests {
         assert!((torque.at(13.7) + torque.at(63.7)).abs() < 1e-9);
     }
 
-    /// The power spectrum of a D-optimal torque for the bench.
     #[test]
     fn d_optimal_power_is_near_the_slosh_frequency_and_reduces_uncertainty() {
         let plant = Linear { friction: 0.1, ..Linear::bench_10_cm(0.003) };

@@ -14,9 +14,7 @@ use crate::tuning::LAG_PARTS;
 pub struct Effects<'a> {
     /// Torque on the hub besides the recorded one at the recording's rows, N·m.
     pub torque: Option<&'a [f64]>,
-    /// Time constant of the actuator, s.
     pub actuator_lag: f64,
-    /// Time constant of the gyro's filter, s.
     pub gyro_lag: f64,
     pub friction_drift: f64,
 }

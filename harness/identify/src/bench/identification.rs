@@ -14,16 +14,16 @@ use analysis::innovations::Tests;
 pub struct ModelFit {
     pub model: String,
     pub friction: String,
-    /// −2 ln L.
     pub deviance: f64,
     pub bic: f64,
     /// Fit of the simulated rates ŷ to the measured rates y, %: 100 (1 − ‖y − ŷ‖/‖y − mean y‖).
     pub fit_pct: f64,
     pub converged: bool,
-    /// Distance to the minimum in standard deviations.
+    /// Newton decrement: the distance of the estimates from the minimum of −2 ln L, in standard deviations, that one further Newton step
+    /// predicts.
     pub newton_decrement: f64,
     pub tests: Vec<Tests>,
-    /// Fit of the recordings held back, %.
+    /// Fit of each recording for validation, %.
     pub validation_pct: Vec<f64>,
     /// Standard deviation of the gyro's white noise, rad/s.
     pub noise_white: f64,
@@ -71,7 +71,6 @@ pub struct Details {
     pub friction_points: Vec<FrictionPoint>,
     /// Largest slosh angle of the fit, rad; 0 without slosh.
     pub slosh_angle: f64,
-    /// Wall time, s.
     pub seconds: f64,
 }
 

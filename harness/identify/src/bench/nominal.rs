@@ -11,10 +11,9 @@ use crate::tuning::COARSEST;
 
 #[derive(Clone, Copy, Debug)]
 pub struct Bench {
-    /// tank.r, m.
+    /// Distance of the tank from the axis of the bearing, m (`tank.r`).
     pub arm: f64,
     pub density: f64,
-    /// g_axial, m/s².
     pub gravity: f64,
 }
 
@@ -55,7 +54,6 @@ impl Start {
         *self.parameter_mut(name)
     }
 
-    /// Returns the place of the value of one of the [`PARAMETERS`].
     pub fn parameter_mut(&mut self, name: &str) -> &mut f64 {
         match name {
             tank::D => &mut self.d,
@@ -90,9 +88,7 @@ impl Start {
 pub struct Nominal {
     pub bench: Bench,
     pub start: Start,
-    /// Inertia of hub and liquid, kg·m².
     pub inertia: f64,
-    /// Period of the first slosh mode, s.
     pub period: f64,
 }
 
@@ -135,12 +131,10 @@ pub fn with_damping(mut settings: Vec<(String, String)>) -> Vec<(String, String)
 }
 
 impl Bench {
-    /// Returns the mass of the liquid in an upright cylinder, kg.
     pub fn liquid(self, d: f64, h: f64) -> f64 {
         self.density * std::f64::consts::PI / 4.0 * d * d * h
     }
 
-    /// Returns the mass of the first mode in an upright cylinder, kg.
     pub fn slosh_mass(self, d: f64, h: f64) -> f64 {
         pendulum(0, d, h, self.liquid(d, h)).mass
     }

@@ -26,7 +26,6 @@ pub struct Options {
     pub breaking: bool,
     /// Standard deviation of the gyro's scale about 1, from its data sheet; 0 if the scale is exactly 1.
     pub gyro_scale: f64,
-    /// Tolerances of values that are not estimated.
     pub tolerances: Tolerances,
     /// Intersample behaviour of the torque; `None` chooses the best fit.
     pub intersample: Option<Hold>,

@@ -26,7 +26,6 @@ pub struct Motion {
     pub angle: Vec<f64>,
     pub rate: Vec<f64>,
     pub acceleration: Vec<f64>,
-    /// Angle of the first slosh mode, rad.
     pub slosh_angle: Vec<f64>,
 }
 

@@ -22,9 +22,8 @@ use crate::tuning::{DAMPINGS, FREQUENCY_FINENESS};
 pub struct Response {
     pub slosh_frequency: f64,
     pub slosh_damping: f64,
-    /// Resonance, Hz: of the pair of poles.
+    /// Frequency of the pair of poles (resonance), Hz.
     pub resonance_frequency: f64,
-    /// Slosh mass, kg.
     pub slosh_mass: f64,
     /// I0, inertia of hub and fixed mass, kg·m².
     pub inertia: f64,

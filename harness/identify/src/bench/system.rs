@@ -36,13 +36,9 @@ pub enum Target {
     /// Inertia J that turns with the hub without the first mode's mass, kg·m².
     Inertia,
     Zeta,
-    /// Delay of the rate, s.
     Delay,
-    /// Delay of the angle, s.
     AngleDelay,
-    /// Time constant of the actuator, s.
     ActuatorLag,
-    /// Time constant of the gyro's filter, s.
     GyroLag,
     FrictionDrift,
     GyroScale,
@@ -53,9 +49,9 @@ pub enum Target {
     /// Asymmetry of the dry friction of a hub that turns only one way. The search has the friction c and d in this direction; the
     /// asymmetry converts them to the mean of both directions.
     Asymmetry,
-    /// Torque that acts over the recorded torque.
+    /// Scale of the torque: the acting torque divided by the recorded torque.
     Torque,
-    /// True time over the recorded time.
+    /// Scale of the clock: true time divided by recorded time.
     Clock,
     Gravity,
     Arm,
@@ -71,13 +67,9 @@ pub enum Target {
 pub struct Row {
     /// Time from the recording's first row, s.
     pub time: f64,
-    /// Commanded torque, N·m.
     pub torque: f64,
-    /// Angle of the hub, rad.
     pub angle: f64,
-    /// Rate of the hub, rad/s.
     pub rate: f64,
-    /// Slosh angle, rad.
     pub slosh_angle: f64,
 }
 
@@ -121,7 +113,6 @@ pub struct BenchSystem<'a> {
     pub derived: Vec<(String, String)>,
     /// Direction of rotation of a hub that turns in one direction only, 1 or −1; 0 if it turns in both.
     pub way: f64,
-    /// Largest command, N·m.
     pub largest: f64,
     pub base: OnceLock<Vec<Motion>>,
 }
@@ -147,7 +138,6 @@ fn diameter(length: f64, mass: f64, bench: Bench) -> f64 {
 }
 
 impl BenchSystem<'_> {
-    /// Returns the value of the unknown with a target; `None` if there is no such unknown.
     pub fn value(&self, values: &[f64], target: &Target) -> Option<f64> {
         self.targets.iter().position(|other| other == target).map(|k| values[k])
     }

@@ -81,7 +81,6 @@ pub fn columns(recording: &Recording) -> (Vec<String>, Vec<String>) {
 }
 
 struct Actuator {
-    /// wheel.I, kg·m².
     inertia: f64,
     /// First time at which the speed does not follow the torque, s, and total duration of these times, s.
     missing: Option<(f64, f64)>,

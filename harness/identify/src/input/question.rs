@@ -215,9 +215,7 @@ pub struct Question {
     /// Sensors that read what is not an output of the FMU: a wave gauge, a camera.
     pub sensors: Vec<Sensor>,
     pub biases: Vec<Bias>,
-    /// Instruments with three axes.
     pub triads: Vec<Triad>,
-    /// True if the noise of each output also drifts.
     pub drift: bool,
     pub solver: Solver,
     /// Relative tolerance that the FMU's own solver is given; `None`: its own choice.

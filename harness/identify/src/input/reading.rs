@@ -149,7 +149,6 @@ pub fn read_decay(
     Ok((found, all))
 }
 
-/// Returns the rows within two times, s.
 fn trimmed(all: Recording, trim: Option<(f64, f64)>, done: &mut dyn FnMut(String)) -> Recording {
     let Some((from, to)) = trim else { return all };
     let (before, part) = (all.time.len(), all.between(from, to));
@@ -245,7 +244,8 @@ pub fn prepare(
     Ok(parts)
 }
 
-/// Takes values that a sensor did not measure out of a part, and says which.
+/// Removes values that the sensor did not measure, for example saturated or frozen ones, from a part of the recording. `done` receives a
+/// message that names them.
 fn without_faults(part: &mut Recording, done: &mut dyn FnMut(String)) {
     let rows = part.time.len();
     let Recording { name, time, torque, rate, angle, fresh, angle_fresh, .. } = part;
@@ -273,7 +273,7 @@ fn without_faults(part: &mut Recording, done: &mut dyn FnMut(String)) {
     }
 }
 
-/// Takes single values that belong to no motion out of a part, and says which.
+/// Removes single values that belong to no motion (spikes) from a part of the recording. `done` receives a message that names them.
 fn without_spikes(part: &mut Recording, done: &mut dyn FnMut(String)) {
     let found = spikes::find(&part.time, &part.rate, &part.torque, part.fresh.as_deref());
     let Some(largest) = found.iter().map(|(k, y)| (part.rate[*k] - y).abs()).reduce(f64::max)
@@ -430,7 +430,6 @@ mod tests {
 
     use std::f64::consts::TAU;
 
-    /// 300 s of a rigid body of 0.4 kg·m² under a sweep.
     fn rigid() -> Recording {
         let time: Vec<f64> = (0..15_000).map(|k| 0.02 * f64::from(k)).collect();
         let phase = |t: f64| TAU * (1.0 + t / 300.0) * t;
@@ -476,7 +475,6 @@ mod tests {
         format!("{:#}", prepare(bad, COARSEST, &mut |_| {}).unwrap_err())
     }
 
-    /// A recording without faults is accepted without a message and is not split.
     #[test]
     fn a_sound_recording_passes() {
         assert_eq!(prepare(rigid(), COARSEST, &mut |_| {}).unwrap().len(), 1);

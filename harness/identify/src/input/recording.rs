@@ -16,7 +16,6 @@ use crate::tuning::{LARGEST_VALUE, ON_CLOCK, SLOW_GYRO, SLOWEST_GYRO};
 #[derive(Clone, Debug)]
 pub struct Recording {
     pub name: String,
-    /// Times of the rows, s, growing.
     pub time: Vec<f64>,
     /// Torque command, N·m.
     pub torque: Vec<f64>,
@@ -65,12 +64,10 @@ pub(crate) fn take_out(mask: &mut Option<Vec<bool>>, row: usize, rows: usize) {
 }
 
 impl Recording {
-    /// Length, s.
     pub fn duration(&self) -> f64 {
         self.time[self.time.len() - 1] - self.time[0]
     }
 
-    /// Mean time between rows, s.
     pub fn step(&self) -> f64 {
         self.duration() / (self.time.len() - 1) as f64
     }
@@ -104,7 +101,6 @@ impl Recording {
         places(&self.commanded, self.time.len())
     }
 
-    /// Returns the mean time between values of the torque, s.
     pub fn torque_step(&self) -> f64 {
         let time = masked(&self.time, self.commanded.as_deref());
         (time[time.len() - 1] - time[0]) / (time.len() - 1) as f64
@@ -154,7 +150,6 @@ impl Recording {
         mean(&first)
     }
 
-    /// Returns the standard deviation of the gyro's white noise, rad/s.
     pub fn rate_noise(&self) -> f64 {
         noise_level(&self.of_fresh(&self.rate))
     }
@@ -189,14 +184,12 @@ impl Recording {
         true
     }
 
-    /// Returns the rows from one time to another, s.
     pub fn between(&self, from: f64, to: f64) -> Recording {
         let first = self.time.partition_point(|t| *t < from);
         let last = self.time.partition_point(|t| *t <= to);
         self.rows(first, last.max(first))
     }
 
-    /// Returns the first part of the recording, `fraction` of its rows.
     pub fn beginning(&self, fraction: f64) -> Recording {
         let rows = ((self.time.len() as f64 * fraction) as usize).max(2);
         self.first_rows(rows.min(self.time.len()))

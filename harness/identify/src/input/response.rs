@@ -21,7 +21,6 @@ pub fn excited_band(step: f64, torque: &[f64], rate: &[f64]) -> Option<(f64, f64
     Some(((low + 1.0) * spectra.resolution, (high + 1.0) * spectra.resolution))
 }
 
-/// Estimates the frequency response from torque to rate over the band that the torque excites.
 pub fn response(recording: &Recording) -> Result<FrequencyResponse> {
     let (step, torque, rate) = recording.even()?;
     let band = excited_band(step, &torque, &rate).context("the torque has no spectrum")?;

@@ -235,7 +235,6 @@ mod tests {
         (found.rows.len(), found.words.join("\n"))
     }
 
-    /// In a simulated gyro recording without faults none is found.
     #[test]
     fn a_sound_gyro_has_no_faults() {
         let (time, mut rate) = gyro();
@@ -248,7 +247,6 @@ mod tests {
         assert_eq!(find("omega", &time, &rate, Rest::Rate(None)), Faults::default());
     }
 
-    /// A hub rests, turns, and rests again; the search for frozen or saturated gyros reports nothing.
     #[test]
     fn a_hub_at_rest_is_no_fault() {
         // at rest, half a turn in 10 s, at rest, back under constant acceleration to another rest, and on
@@ -298,7 +296,6 @@ mod tests {
         assert!(said.contains("the upper end") && said.contains("the lower end"), "{said}");
     }
 
-    /// Clipped, frozen and repeated values of a gyro are each found and named.
     #[test]
     fn each_fault_is_named() {
         let (time, rate) = gyro();

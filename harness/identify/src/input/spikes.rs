@@ -103,7 +103,6 @@ pub fn find(
     taken.iter().map(|&k| (rows[k], off_sound(&sound, k).1)).collect()
 }
 
-/// Returns the two nearest sound rows on either side of a row.
 fn near(sound: &BTreeSet<usize>, k: usize) -> Vec<usize> {
     sound.range(..k).rev().take(2).chain(sound.range(k + 1..).take(2)).copied().collect()
 }
@@ -158,7 +157,6 @@ mod tests {
         found.iter().for_each(|(k, y)| assert!((y - clean[*k]).abs() < 3.3e-3, "{k} {y}"));
     }
 
-    /// If more than 1 % of the rows are outliers, none is removed as a spike.
     #[test]
     fn more_than_one_value_in_a_hundred_is_no_spike() {
         let many: Vec<(usize, f64)> = (10..14_000).step_by(60).map(|k| (k, 0.1)).collect();

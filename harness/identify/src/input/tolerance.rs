@@ -16,7 +16,6 @@ pub struct Tolerances {
     pub density: f64,
 }
 
-/// Names of the tolerances, in the order of their fields.
 pub const NAMES: [&str; 5] = ["torque", "clock", G_AXIAL, tank::R, fluid::RHO];
 
 impl Default for Tolerances {
@@ -44,7 +43,6 @@ pub fn part(name: &str, text: &str) -> Result<Option<f64>> {
 
 pub struct Share {
     pub name: String,
-    /// Share, 0 to 1.
     pub share: f64,
     pub most: String,
 }
@@ -66,7 +64,6 @@ pub fn shares(known: &[String], shares: &[Share]) -> Option<String> {
 }
 
 impl Tolerances {
-    /// No tolerances: all values are known exactly.
     pub const NONE: Tolerances =
         Tolerances { torque: 0.0, clock: 0.0, gravity: 0.0, arm: 0.0, density: 0.0 };
 

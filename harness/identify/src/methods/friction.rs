@@ -126,7 +126,6 @@ pub fn empty() -> [(String, String); 1] {
     [(fluid::RHO.into(), "1e-6".into())]
 }
 
-/// Refuses recordings that cannot show friction.
 fn check(recordings: &[Recording]) -> Result<()> {
     ensure!(!recordings.is_empty(), "there is no recording");
     for recording in recordings {
@@ -284,7 +283,6 @@ fn braking(direction: &'static str, rows: &[FreeRow], speed: f64) -> Option<Brak
     })
 }
 
-/// Draws the friction torque against the rate, measured and fitted (thesis 5.8 and 5.9).
 fn friction_curve(found: &Identification) -> Markup {
     let points = &found.details.friction_points;
     let value = |name: &str| found.parameters.get(name).map_or(0.0, |p| p.value);
@@ -325,7 +323,6 @@ fn friction_curve(found: &Identification) -> Markup {
     }
 }
 
-/// Draws the deceleration over the angle in each direction (thesis 5.10 and 5.11).
 fn braking_chart(all: &[Braking]) -> Markup {
     let lines = all.iter().zip(["a", "b"]).map(|(braking, color)| {
         let angle = |k: usize| PI * (2.0 * k as f64 / PAGE_POINTS as f64 - 1.0);

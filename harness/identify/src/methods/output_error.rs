@@ -53,13 +53,10 @@ impl Method for OutputError {
     }
 }
 
-/// Slosh models in the order in which they are fitted.
 const ORDER: [&str; 4] = [Linear.name(), Planar.name(), Spherical.name(), Frozen.name()];
 
-/// Slosh models, the simplest first.
 const SIMPLEST: [&str; 4] = [Frozen.name(), Linear.name(), Planar.name(), Spherical.name()];
 
-/// Identifies the FMU from recordings. `progress` receives each message.
 pub fn identify(
     fmu: &Fmu,
     recordings: &[Recording],

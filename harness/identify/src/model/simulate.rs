@@ -75,7 +75,6 @@ fn interpolates(description: &ModelDescription) -> bool {
     description.co_simulation.as_ref().is_some_and(|cs| cs.can_interpolate_inputs)
 }
 
-/// Settings, inputs and outputs of the FMU's runs.
 #[derive(Clone, Debug)]
 pub struct Setup {
     settings: Vec<Setting>,
@@ -84,7 +83,6 @@ pub struct Setup {
     held: Vec<bool>,
     outputs: Vec<Output>,
     reads: Vec<u32>,
-    /// Relative tolerance of the solver, the host's or the FMU's; `None`: the FMU's own.
     tolerance: Option<f64>,
     /// Communication steps from one row to the next, of an FMU that steps itself.
     substeps: usize,
@@ -213,7 +211,6 @@ impl Setup {
         all
     }
 
-    /// Returns true if the FMU steps itself, and the host's solver could integrate the same motion.
     pub fn can_exchange(&self, model: &Model) -> bool {
         model.offers_exchange() && !self.slopes_act(model.fmu()).is_ok_and(|act| act)
     }
@@ -463,7 +460,6 @@ impl Setup {
         record.inputs.iter().zip(&self.held).map(one).unzip()
     }
 
-    /// Returns true if a held input changes at a row.
     fn jumps(&self, record: &Record, row: usize) -> bool {
         let held = record.inputs.iter().zip(&self.held).filter(|(_, held)| **held);
         held.into_iter().any(|(signal, _)| signal[row] != signal[row - 1])

@@ -270,7 +270,6 @@ fn known((unknown, target): Targeted, mean: f64, std: f64) -> Result<Targeted> {
     Ok((Unknown { start, reach, part, ..unknown.with_prior(mean, std) }, target))
 }
 
-/// Name of the clock among the scales.
 const CLOCK: &str = "time";
 
 /// Returns the least and largest value that the model description declares for a variable; infinite if it declares none.

@@ -7,7 +7,6 @@ use crate::estimate::prose;
 /// Two unknowns of which only a sum or a product is known.
 #[derive(Clone, Debug, Serialize)]
 pub struct Combination {
-    /// `a + b`, or `a (1 + b)`.
     pub name: String,
     pub of: [String; 2],
     pub value: f64,

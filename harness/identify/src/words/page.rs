@@ -77,7 +77,6 @@ pub(crate) fn digits(value: f64, deviation: f64) -> String {
     }
 }
 
-/// Returns the 95 % interval in words.
 fn interval(p: &Estimated) -> String {
     let [low, high] = p.interval.map(|end| digits(end, p.std));
     if p.interval[1].is_finite() {
@@ -190,7 +189,6 @@ fn residual(signals: &Residual) -> Chart {
     axis_chart(&title, "time, s", &signals.label, lines, false)
 }
 
-/// Autocorrelation of the residual, with the 95 % interval of white noise.
 fn autocorrelation(signals: &Residual) -> Chart {
     let count = signals.residual.len();
     let step = (signals.time[count - 1] - signals.time[0]) / (count - 1) as f64;

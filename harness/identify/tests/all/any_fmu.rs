@@ -22,13 +22,10 @@ use std::io::Write;
 
 use crate::fmu_twin::{self, SensorErrors};
 
-/// Time between rows, s.
 const STEP: f64 = 0.05;
 /// Moment of inertia, kg·m², and viscous coefficient, N·m·s.
 pub const TRUTH: (f64, f64) = (0.35, 0.05);
-/// Standard deviation of the noise in one row, rad/s.
 const NOISE: f64 = 1e-3;
-/// Bias of the gyro in the first recording, rad/s; the second has none.
 const BIAS: f64 = 4e-3;
 
 /// Records a hub with an initial rate `start` under a torque that changes in steps every 2 s.

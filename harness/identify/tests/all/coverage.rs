@@ -12,18 +12,14 @@ use pack::{Fmi, HUBSLOSH, packed_for_tests, packed_version_for_tests};
 use crate::any_fmu::{self, record_with_stops};
 use crate::solver_noise::{self, Adaptive};
 
-/// Twins of each kind.
 const TWINS: u64 = 100;
-/// Dry friction of the hub with events, N·m.
 const DRY: f64 = 0.03;
 
-/// Counts of one kind.
 #[derive(Default)]
 struct Count {
     inside: usize,
     given: usize,
     refused: usize,
-    /// Largest error over its standard deviation of a fit that passed.
     worst: f64,
 }
 

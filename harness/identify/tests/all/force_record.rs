@@ -15,11 +15,9 @@ use identify::model::simulate::Model;
 use ode_solvers::{Rk4, System, Vector2};
 use pack::{MODELS, packed_model_for_tests};
 
-/// SloshTank among the models.
 const SLOSHTANK: usize = 2;
 const G: f64 = 9.80665;
 
-/// A tank of which everything is known.
 #[derive(Clone, Copy, Debug)]
 struct Tank {
     mass: f64,
@@ -56,7 +54,6 @@ impl Tank {
         size * (std::f64::consts::TAU * (from + 0.5 * by * t) * t).sin()
     }
 
-    /// z, dz/dq and its derivative.
     fn curve(&self, q: f64) -> [f64; 3] {
         let Tank { length: l, kappa, .. } = *self;
         let root = (l * l - q * q).sqrt();
@@ -68,7 +65,6 @@ impl Tank {
         ]
     }
 
-    /// q'' and the drag along q.
     fn acceleration(&self, t: f64, q: f64, v: f64) -> f64 {
         let Tank { length: l, s, zeta, growth, breaking, .. } = *self;
         let [_, slope, bend] = self.curve(q);
@@ -121,7 +117,6 @@ impl Tank {
     }
 }
 
-/// Loads with noise, in every fourth row.
 fn measured(loads: [Vec<f64>; 3], size: impl Fn(f64) -> f64, seed: u64) -> Vec<Vec<f64>> {
     let mut random = Random::new(seed, 0);
     let one = |values: Vec<f64>| -> Vec<f64> {
@@ -155,7 +150,6 @@ const FREE: [(&str, &str); 9] = [
     ("tank.H_0", "0.05:-0.2:0.3"),
 ];
 
-/// The question with these unknowns left out of [`FREE`], and values of the FMU.
 fn question(without: &[&str], settings: &[&str]) -> Question {
     let names = |names: &[&str]| names.iter().map(|name| name.to_string()).collect();
     let free = FREE.iter().filter(|(name, _)| !without.contains(name));
@@ -194,7 +188,6 @@ fn found(question: &Question, record: &Record) -> Identification {
     identify(&model, question, std::slice::from_ref(record), hear).unwrap()
 }
 
-/// Names, intervals and truths of the estimates.
 fn compared(tank: &Tank, result: &Identification) -> Vec<(String, [f64; 2], f64)> {
     let truth = |name: &str| match name {
         "tank.mass[1]" => tank.mass,
@@ -238,7 +231,6 @@ fn a_forced_record_of_an_independent_integrator_determines_the_whole_model() {
     }
 }
 
-/// Settings of a release at rest at an angle, rad.
 fn released(angle: f64) -> [String; 2] {
     [format!("tank.p_0[1,1]={}", angle.sin()), format!("tank.p_0[1,3]={}", -angle.cos())]
 }
@@ -267,16 +259,13 @@ fn a_free_decay_from_a_known_angle_gives_the_mass() {
 #[derive(Clone, Copy, Debug)]
 struct Moving {
     tank: Tank,
-    /// Height of the reference point, m.
     point: f64,
-    /// Inertia of the rigid mass, kg·m².
     i_0: f64,
     /// Amplitudes of displacement, m, and angle, rad.
     size: [f64; 2],
 }
 
 impl Moving {
-    /// Displacement and angle, each with two derivatives.
     fn motion(&self, t: f64) -> [[f64; 3]; 2] {
         let turn = std::f64::consts::TAU;
         let (phase, rate, growth) =
@@ -395,10 +384,8 @@ fn a_tank_that_turns_about_another_point_is_found_with_the_offsets_of_its_balanc
     }
 }
 
-/// A tank whose waves break.
 const BREAKS: Tank = Tank { growth: 0.01, breaking: 0.04, ..TANK };
 
-/// Without the damping of breaking waves the residual is not noise.
 #[test]
 fn waves_that_break_do_not_fit_without_their_damping_which_a_known_release_gives() {
     let record = BREAKS.record(4.0, 0.02, 0.6, 0.01, 11);

@@ -21,7 +21,6 @@ use crate::bench::{Bench, Drive};
 use crate::fmu_twin::{self, SensorErrors, Twin};
 use crate::runs::{self, SETS, Set, recordings};
 
-/// Asymmetry of the bearing in these recordings.
 const ASYMMETRY: f64 = 0.15;
 /// Standard deviation of the noise of the thesis's gyro in one row at 50 Hz, rad/s.
 const NOISE: f64 = 4.066e-4;
@@ -73,7 +72,6 @@ pub fn options() -> Options {
     }
 }
 
-/// A fit of the rates only: the encoder of these recordings has no noise.
 fn fit(recordings: &[Recording], options: &Options) -> anyhow::Result<Identification> {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let rates: Vec<Recording> =
@@ -118,7 +116,6 @@ fn wrong(set: &Set, seed: u64, bias: f64, asymmetry: f64) -> Vec<String> {
     wrong
 }
 
-/// Fits each seed of each set of runs.
 fn all_sets(seeds: std::ops::RangeInclusive<u64>) -> Vec<String> {
     let of = |set| seeds.clone().flat_map(move |seed| wrong(set, seed, 0.002, ASYMMETRY));
     SETS.iter().flat_map(of).collect()
@@ -133,14 +130,12 @@ fn friction_of_three_sets_of_runs_ends_in_no_false_minimum() {
     assert_eq!(all_sets(1..=2), [""; 0]);
 }
 
-/// Fits the other six simulated recordings of each set, whose seeds the short test leaves out.
 #[test]
 #[ignore = "13 s of CPU time: .ci/run --nightly"]
 fn friction_of_eighteen_more_runs_ends_in_no_false_minimum() {
     assert_eq!(all_sets(3..=8), [""; 0]);
 }
 
-/// If the friction is lower in the negative direction of rotation, the estimated difference is negative.
 #[test]
 fn identify_finds_the_preferential_direction_in_both_directions() {
     assert_eq!(wrong(&SETS[0], 2, 0.002, -ASYMMETRY), [""; 0]);
@@ -204,7 +199,6 @@ fn a_hub_that_turns_one_way_determines_the_friction_in_that_direction_only() {
     }
 }
 
-/// A sweep of a bench with a rigid liquid, and the encoder's angle.
 fn rigid(fmu: &Fmu, settings: &[(&str, &str)], torque: &str) -> Recording {
     let torque = Torque::Profile(torque.parse().unwrap());
     let settings = [&[("slosh.model", "frozen")], settings].concat();

@@ -9,12 +9,10 @@ use pack::packed_for_tests;
 
 use crate::bench::{Bearing, Bench, Drive, Liquid};
 
-/// Rows every 20 ms, s.
 fn rows(seconds: f64) -> Vec<f64> {
     (0..=(seconds / 0.02) as u32).map(|k| 0.02 * f64::from(k)).collect()
 }
 
-/// A sweep across the resonance, N·m.
 fn sweep(amplitude: f64, time: &[f64]) -> Vec<f64> {
     let turn = std::f64::consts::TAU;
     time.iter().map(|t| amplitude * (turn * (1.9 * t + 0.01 * t * t / 2.0)).sin()).collect()

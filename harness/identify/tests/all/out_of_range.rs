@@ -16,7 +16,6 @@ use pack::packed_for_tests;
 use crate::fmu_twin::{self, SensorErrors};
 use crate::solver_noise::{Adaptive, question, record};
 
-/// The errors of all methods.
 fn errors(fmu: &Fmu, recording: &Recording) -> Vec<(&'static str, Option<String>)> {
     let recordings = std::slice::from_ref(recording);
     let task = Task { fmu: Some(fmu), recordings, validation: &[] };
@@ -85,7 +84,6 @@ fn no_method_hangs_or_panics_on_values_out_of_range() {
     }
 }
 
-/// `identify fmu` refuses NaN, infinite and too large times and values with row and reason.
 #[test]
 fn any_fmu_refuses_records_out_of_range() {
     let fmu = Adaptive::new(&["-DTOLERANCE=1e-5"]);

@@ -10,18 +10,15 @@ use identify::input::record::Record;
 use identify::model::simulate::Model;
 use pack::packed_for_tests;
 
-/// Settings that are known of both twins.
 const KNOWN: [(&str, &str); 4] = [
     ("slosh.model", "linear"),
     ("friction.model", "viscous"),
     ("slosh.zeta_from_correlation", "false"),
     ("init.slosh_angle", "0"),
 ];
-/// True values of the twins, which are not the starts of the search.
 const TRUTH: [(&str, f64); 3] = [("tank.h", 0.083), ("slosh.zeta", 0.006), ("hub.I", 0.35)];
 const STEP: f64 = 0.02;
 
-/// Records a twin under a random torque of 0.03 N·m by the readings of `sensor`.
 fn twin(sensor: &Sensor, column: &str) -> Record {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let known = KNOWN.iter().map(|(name, value)| (name.to_string(), value.to_string()));

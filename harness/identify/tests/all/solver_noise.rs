@@ -13,7 +13,6 @@ use identify::input::record::Record;
 use identify::model::simulate::{Model, Setup};
 use tempfile::TempDir;
 
-/// Time between rows, s.
 const STEP: f64 = 0.05;
 const ROWS: usize = 400;
 /// Standard deviation of the noise in one row: of r, m, and of phi, rad.
@@ -22,7 +21,6 @@ pub const TRUTH: [(&str, f64); 5] =
     [("k", 42.0), ("d", 0.1), ("c", 0.03), ("r", 1.3), ("phi", 0.4)];
 const FREE: [&str; 5] = ["k=40:20:80", "d=0.05:0:1", "c=0.02:0:1", "r=1.25:1:2", "phi=0.35:-1:1"];
 
-/// The FMU, with these definitions of `adaptive.c`.
 pub struct Adaptive {
     folder: TempDir,
 }
@@ -147,7 +145,6 @@ pub fn question(solver: Solver) -> Question {
     }
 }
 
-/// Fits one twin whose noise is `scale` times [`NOISE`].
 fn found(fmu: &Adaptive, question: &Question, seed: u64, scale: f64) -> Identification {
     let model = Model::open(&fmu.path(), question.solver).unwrap();
     identify(&model, question, &[record(seed, scale)], &mut |_| {}).unwrap()

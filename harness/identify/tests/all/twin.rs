@@ -650,7 +650,6 @@ fn a_run_that_would_not_end_is_refused() {
     assert!(run(&[lugre, ("friction.sigma0", "1000")], 0.0).is_ok());
 }
 
-/// If the actuator clips the torque of a simulated recording, no slosh model fits.
 #[test]
 fn no_model_fits_a_torque_that_is_clipped() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
@@ -737,7 +736,6 @@ fn a_torque_wrong_by_1_percent_moves_the_frictions_by_1_percent_and_delay_and_as
     assert!((b.value - 1.01 * a.value).abs() < 0.1 * a.std, "{a:?} {b:?}");
 }
 
-/// The recording has rigid liquid, one push forwards and one push backwards.
 #[test]
 fn a_push_and_a_free_decay_do_not_determine_the_preferential_direction() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
@@ -829,7 +827,6 @@ fn a_hub_that_turns_both_ways_is_not_taken_for_one_that_turns_one_way() {
     }
 }
 
-/// A recording of the independent bench with the thesis's gyro, under a linear sweep.
 fn on_bench(bench: &Bench, seed: u64, seconds: u32) -> Recording {
     let time: Vec<f64> = (0..=50 * seconds).map(|k| 0.02 * f64::from(k)).collect();
     let rate = (3.5 - 1.25) / f64::from(seconds);
