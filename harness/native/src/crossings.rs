@@ -37,7 +37,6 @@ pub struct Model {
     b: Vec<f64>,
     c: Vec<f64>,
     d: Vec<f64>,
-    /// Sampling period, s; 0 for continuous time.
     period: f64,
     /// For a model with one input and one output: A stored column after column. The states are chosen so that B is a multiple of
     /// the first unit vector, which [`Model::gain`] uses.
@@ -209,7 +208,6 @@ impl Model {
         self.eigenvalues_of(self.at(w))
     }
 
-    /// Returns the eigenvalues of the response matrix `response`, see [`Model::eigenvalues`].
     fn eigenvalues_of(&self, mut response: Vec<Complex>) -> Vec<Complex> {
         for value in response.iter_mut().filter(|value| !value.is_finite()) {
             *value = Complex::new(1e300, 0.0);
@@ -260,7 +258,6 @@ fn point(w: f64, period: f64) -> Complex {
     Complex::new(cos, sin)
 }
 
-/// A pole or a zero.
 struct Root {
     at: Complex,
     is_zero: bool,

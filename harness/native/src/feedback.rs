@@ -19,9 +19,7 @@ struct Linear {
     b: Vec<f64>,
     c: Vec<f64>,
     d: Vec<f64>,
-    /// Reference r, one row per cycle.
     reference: Vec<f64>,
-    /// Feedforward f, one row per cycle.
     feedforward: Vec<f64>,
     /// Places of an attitude quaternion (scalar first) among the measurements y. For this quaternion the error is not r − y but
     /// the vector part of q⁻¹ ⊗ r: half the small rotation about each body axis that remains, by the shorter way.
@@ -74,7 +72,6 @@ impl Linear {
     }
 }
 
-/// Controller that computes the commands of a cycle.
 enum Controller {
     Linear(Box<Linear>),
     /// A Python function of the number of the cycle, the time (s) and the measurements, which returns one number for each
@@ -82,19 +79,15 @@ enum Controller {
     Function(Py<PyAny>),
 }
 
-/// A reaction wheel whose torque the controller commands.
+/// A reaction wheel whose torque the controller commands: the column of its torque among the commands (`place`), its axis as a unit vector
+/// in body axes, its moment of inertia (kg·m²), the largest torque on the craft, to which a larger command is limited (N·m), the largest
+/// and the present speed relative to the body (rad/s), and the value references of `h_wheels`.
 struct Wheel {
-    /// Column of its torque among the commands.
     place: usize,
-    /// Unit vector of its axis, body axes.
     axis: [f64; 3],
-    /// Moment of inertia about its axis, kg·m².
     inertia: f64,
-    /// Largest torque on the craft, to which a larger command is limited, N·m.
     max_torque: f64,
-    /// Largest speed relative to the body, rad/s.
     max_speed: f64,
-    /// Present speed relative to the body, rad/s.
     speed: f64,
 }
 
@@ -116,14 +109,11 @@ impl Wheel {
 /// The wheels of a run, and the input of the FMU by which they turn the craft.
 struct Wheels {
     each: Vec<Wheel>,
-    /// Value references of `h_wheels`.
     references: [u32; 3],
     /// Angular momentum of all wheels relative to the body, N·m·s, at the begin of the present step, and its derivative.
     momentum: [f64; 3],
     slope: [f64; 3],
-    /// Length of the present step, s.
     step: f64,
-    /// Speeds at each row, rad/s.
     speeds: Numbers,
 }
 
@@ -299,7 +289,6 @@ pub fn expect(what: &str, found: usize, expected: usize) -> PyResult<()> {
     Err(PyValueError::new_err(format!("{what}: {found} (expected: {expected})")))
 }
 
-/// Reads the wheels of the Python object `feedback`; None if it has none.
 fn wheels(
     feedback: &Bound<PyAny>,
     fmu: &Fmu,

@@ -102,7 +102,6 @@ impl Instance {
         result
     }
 
-    /// Runs calls of the crate `host` as [`Instance::with`] does, and converts their errors to Python exceptions.
     fn call<T: Send>(
         &self,
         py: Python,

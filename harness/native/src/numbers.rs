@@ -40,7 +40,6 @@ pub struct Numbers {
     array: PyBuffer<f64>,
     width: usize,
     rows: Vec<f64>,
-    /// Number of values in the array before the present block.
     at: usize,
 }
 

@@ -60,7 +60,6 @@ impl<'fmu> Columns<'fmu> {
         Ok(self.last())
     }
 
-    /// Returns the values that `get` read last.
     fn last(&self) -> &[f64] {
         if self.others.is_empty() { &self.reals } else { &self.row }
     }
@@ -103,7 +102,6 @@ pub struct Run<'fmu> {
     /// compute all its outputs.
     wanted: Option<Vec<bool>>,
     inputs: (Columns<'fmu>, Numbers),
-    /// Time derivatives of the inputs after each row.
     slopes: Option<Numbers>,
     lines: Lines,
     outputs: (Columns<'fmu>, Numbers),

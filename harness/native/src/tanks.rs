@@ -195,7 +195,6 @@ fn target(model: &str) -> PyResult<Target> {
     }
 }
 
-/// Returns the liquid if the FMUs accept its gravity as `g_ref`, otherwise an error.
 fn checked(liquid: Liquid) -> Result<parameters::Liquid, Problems> {
     let gravity = liquid.0.gravity;
     if gravity > 0.0 && gravity < 1e-9 {
