@@ -100,7 +100,6 @@ fn write_at(files: &Files, out: &Path, level: i64) -> Result<()> {
         .with_context(|| format!("{} was not packed", out.display()))
 }
 
-/// Reads all files below a folder; their names are relative to it and sorted.
 pub fn below(folder: &Path) -> Result<Files> {
     let mut entries: Vec<_> = folder
         .read_dir()

@@ -34,7 +34,6 @@ pub fn pack(model: &Model, fmi: Fmi, out: &Path) -> Result<()> {
     archive::write(&files(model, fmi, &[binary])?, out)
 }
 
-/// Builds the binaries of an FMU for all platforms and packs the FMU to `out`.
 pub fn pack_all(model: &Model, fmi: Fmi, out: &Path) -> Result<Vec<Built>> {
     let all = platforms::build(model)?;
     pack_built(model, fmi, &all, out)?;

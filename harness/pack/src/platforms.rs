@@ -160,7 +160,6 @@ pub fn build(model: &Model) -> Result<Vec<Built>> {
     Ok(all)
 }
 
-/// Returns an error with all faults, if there are any.
 pub fn refuse(faults: &[String]) -> Result<()> {
     if !faults.is_empty() {
         bail!("the binaries would not work everywhere, so nothing was packed:{}", faults.concat());

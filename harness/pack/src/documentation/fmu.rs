@@ -82,7 +82,6 @@ mod tests {
         folder
     }
 
-    /// An FMU's documentation joins several Markdown pages in one HTML page.
     #[test]
     fn links_between_pages_become_links_within_the_page() {
         let folder = folder(&[

@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use pack::documentation::page::{Gathered, Page};
 
-/// Lists the paths of all Markdown files of the project, relative to its root.
 pub fn markdown() -> Vec<String> {
     fn below(folder: &Path, all: &mut Vec<PathBuf>) {
         for entry in folder.read_dir().unwrap().flatten() {

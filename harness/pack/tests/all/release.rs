@@ -27,7 +27,6 @@ fn released() -> Vec<(&'static Model, Fmi, PathBuf)> {
     vec![]
 }
 
-/// The model descriptions of the FMUs in dist/release equal the model descriptions of the source.
 #[test]
 fn the_committed_release_has_the_interface_of_the_source() {
     for (model, fmi, fmu) in released() {
@@ -60,7 +59,6 @@ fn the_committed_sbom_equals_the_sbom_inside_the_released_fmu() {
     }
 }
 
-/// The source tree keeps the files of one version, and only the hashes of older ones.
 #[test]
 fn release_folder_holds_one_version_and_the_hashes_of_all() {
     let folder = pack::root().join("dist").join("release");
@@ -191,7 +189,6 @@ fn release_files_match_the_manifest() {
     }
 }
 
-/// The report of `hubslosh check` next to each released FMU has 0 errors.
 #[test]
 fn release_passed_the_check() {
     for (.., fmu) in released() {
@@ -202,7 +199,6 @@ fn release_passed_the_check() {
     }
 }
 
-/// Each released FMU has a binary for each platform and is smaller than the stated limit.
 #[test]
 fn release_is_small_and_for_all_platforms() {
     for (Model { name, .. }, fmi, fmu) in released() {
