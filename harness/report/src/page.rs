@@ -51,7 +51,6 @@ pub fn axis_chart(title: &str, x: &str, y: &str, series: Vec<Series>, logarithmi
     Chart { size: (900.0, 260.0), ..Chart::new(title, x, y, series) }
 }
 
-/// Creates a curve in one of the colours of [`STYLE`], for example `a`.
 pub fn series(points: Vec<(f64, f64)>, color: &str, style: Style, title: &str) -> Series {
     svg::series(points, &format!("var(--{color})"), style, title)
 }

@@ -34,7 +34,6 @@ impl Axis {
         Axis { label: label.into(), from, to, logarithmic: false, ticks: ticks.collect() }
     }
 
-    /// Creates a logarithmic axis over whole decades that covers all positive `values`.
     pub fn decades(label: &str, values: impl IntoIterator<Item = f64>) -> Self {
         let (low, high) = range(values.into_iter().filter(|v| *v > 0.0).map(f64::log10));
         let (low, mut high) = ((low + 1e-9).floor() as i32, (high - 1e-9).ceil() as i32);

@@ -19,7 +19,6 @@ pub(super) const QUANTITIES: [Quantity; 4] = [
     ("notch depth", "dB", |run| best(run)?.0.features.notch_db),
 ];
 
-/// Lists the parameters that are drawn at random: index among the varied parameters, and name.
 fn random_parameters<'a>(page: &Page<'a>) -> Vec<(usize, &'a str)> {
     let grouping = page.plan.grouping();
     let drawn = page.plan.varied().into_iter().enumerate();
@@ -139,7 +138,6 @@ pub(super) fn moments(values: &[f64]) -> (f64, f64) {
     }
 }
 
-/// Returns the correlation coefficient, −1 to 1, or 0 if x or y is constant.
 fn correlation(points: &[(f64, f64)]) -> f64 {
     let (x, y): (Vec<f64>, Vec<f64>) = points.iter().copied().unzip();
     let found = statistics::correlation(&x, &y);

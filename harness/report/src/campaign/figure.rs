@@ -69,7 +69,6 @@ impl Default for Figure {
 pub(super) struct Figures {
     specifications: Vec<Value>,
     titles: Vec<String>,
-    /// True if captions name the corresponding figures of the thesis.
     of_the_thesis: bool,
 }
 

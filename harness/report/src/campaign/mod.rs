@@ -137,7 +137,6 @@ fn anchor(title: &str) -> String {
     title.to_lowercase().replace(|c: char| !c.is_ascii_alphanumeric(), "-")
 }
 
-/// Returns the titles and contents of the sections about runs of the bench, without empty sections.
 fn bench_sections<'a>(
     page: &Page,
     campaign: &Campaign,

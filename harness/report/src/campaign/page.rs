@@ -234,7 +234,6 @@ pub(super) fn manoeuvre(run: &Outcome) -> Option<f64> {
     run.ending.manoeuvre
 }
 
-/// Returns a sentence that names at most four `things`; empty if there are none.
 pub(super) fn sentence_with_names(what: &str, things: &[String]) -> String {
     match things {
         [] => String::new(),

@@ -104,7 +104,6 @@ pub(super) fn integral(time: &[f64], rate: &[f64]) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    /// Runs with up to a million rows are thinned out for the page.
     #[test]
     fn the_viewer_keeps_the_last_row_and_limits_the_number_of_values() {
         for (rows, columns) in [(2, 5), (100_000, 40), (1_000_003, 9)] {

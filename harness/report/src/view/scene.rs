@@ -103,7 +103,6 @@ fn tank_scene(tank: &Tank) -> Value {
     json!({ "position": tank.position, "q": tank.q, "shape": shape, "level": tank.level, "modes": modes })
 }
 
-/// Returns the bench about its axis, and the distance from the axis that contains it, m.
 fn bench(tank: &Tank, arrows: &mut Arrows) -> (Value, f64) {
     let r = tank.position[0];
     let radius = match &tank.outline {
@@ -153,7 +152,6 @@ fn bench(tank: &Tank, arrows: &mut Arrows) -> (Value, f64) {
     (geometry, reach)
 }
 
-/// Returns the craft about O, and the distance from O that contains it, m.
 fn craft(tanks: &[Tank], arrows: &mut Arrows, notes: &mut Vec<String>) -> (Value, f64) {
     let length = |v: &[f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
     let at = |tank: &Tank| length(&tank.position) + tank.extent();
