@@ -45,7 +45,6 @@ pub fn check(mut file: &File, start: u64, length: u64, size: u64) -> Result<()> 
     Ok(())
 }
 
-/// Reader of a `PageHeader` in Thrift's compact protocol.
 struct Header<'a> {
     bytes: &'a [u8],
     at: usize,

@@ -51,7 +51,6 @@ pub fn quantity(signal: &str) -> Result<Quantity> {
 impl FromStr for Columns {
     type Err = Error;
 
-    /// Parses the items between commas. The error lists every item that is wrong.
     fn from_str(text: &str) -> Result<Self> {
         Columns::parse(text.split(','), parse_signal)
     }

@@ -205,7 +205,6 @@ mod tests {
         assert!(why.contains("no even spacing"), "{why}");
     }
 
-    /// Rows at 33 Hz with times rounded to 1 ms, and others.
     #[test]
     fn times_printed_with_few_digits_are_restored_to_the_even_grid_of_the_samples() {
         // the last one has rows closer than its digits
@@ -225,7 +224,6 @@ mod tests {
         assert!((grid.time[4900] - grid.time[0] - 4984.0 / 33.0).abs() < 2e-5);
     }
 
-    /// Times that are already even, have a gap, or have jitter of 3 ms.
     #[test]
     fn times_that_do_not_fit_an_even_grid_are_not_changed() {
         let even = printed(0.02, 0..5000, 1e-3);

@@ -499,7 +499,6 @@ fn parted(text: &str) -> String {
 impl Quantity {
     const ALL: [Quantity; 7] = [Time, Torque, Rate, Angle, Acceleration, Length, Force];
 
-    /// Returns the dimension, the name with its article, and common units, the SI unit first.
     fn facts(self) -> (Dimension, &'static str, &'static str) {
         match self {
             Time => ([0, 0, 1, 0], "a time", "s, ms, us, ns, min, h, d"),
@@ -524,7 +523,6 @@ impl Quantity {
         }
     }
 
-    /// Lists the names of common units for messages, the SI unit first.
     pub fn units(self) -> &'static str {
         self.facts().2
     }

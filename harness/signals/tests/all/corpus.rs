@@ -13,7 +13,6 @@ use parquet::schema::types::{PrimitiveTypeBuilder, Type};
 use super::recording::{assert_close, column, read_text};
 
 const ROWS: usize = 40;
-/// Time of the first row, 2026-01-31T12:00:00Z, s since 1970.
 const BEGIN: i64 = 1_769_860_800;
 
 fn millis(k: usize) -> usize {
@@ -46,7 +45,6 @@ fn clock(k: usize) -> String {
     format!("12:00:0{}.{:03}", millis(k) / 1000, millis(k) % 1000)
 }
 
-/// Returns a text with a head and one line for each row.
 fn lines(head: &str, line: impl Fn(usize) -> String) -> Vec<u8> {
     let mut text = String::from(head);
     for k in 0..ROWS {
@@ -63,7 +61,6 @@ fn crlf(text: &[u8]) -> Vec<u8> {
     String::from_utf8_lossy(text).replace('\n', "\r\n").into_bytes()
 }
 
-/// Returns `--columns` for time, torque and rate in columns with these names.
 fn of(time: &str, tau: &str, omega: &str) -> String {
     format!("time={time},tau_cmd={tau},omega={omega}")
 }
@@ -454,7 +451,6 @@ fn programs() -> Vec<Case> {
     ]
 }
 
-/// Returns files with words before or within the rows, in addition to the tools' own.
 fn with_words() -> Vec<Case> {
     let row = |k: usize| format!("{},{},{}", millis(k), torque(k), rate(k));
     let numbered = || of("#1:ms", "#2:mNm", "#3:deg/s");

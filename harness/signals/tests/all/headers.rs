@@ -6,7 +6,6 @@ use fastrand::Rng;
 use signals::recording::{self, Between, Columns, Signal, Wanted};
 
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
-/// Spellings of units, each with its value in SI.
 type Units = &'static [(&'static str, f64)];
 
 const TIMES: Units = &[
@@ -70,7 +69,6 @@ const ANGLES: Units = &[
     ("arcsec", DEGREE / 3600.0),
 ];
 
-/// A signal with its units, and names of columns for it.
 type Kind = (&'static str, Units, &'static [&'static str]);
 
 const KINDS: [Kind; 4] = [
@@ -84,14 +82,11 @@ const KINDS: [Kind; 4] = [
     ("theta", ANGLES, &["theta", "encoder", "angle_1", "Angle", "theta_min"]),
 ];
 
-/// A column of a file.
 #[derive(Default)]
 struct Column {
-    /// Signal, or empty for a column that is not read.
     signal: &'static str,
     header: String,
     below: String,
-    /// Entry of --columns for this column.
     option: String,
     cells: Vec<String>,
     /// Values in SI, if the file states the unit.

@@ -21,7 +21,6 @@ fn columns(text: &str) -> Columns {
     text.parse().unwrap()
 }
 
-/// Reads a file and returns table and messages.
 fn read_file(path: &Path, columns: &Columns) -> Result<(Table, String), String> {
     let mut said = String::new();
     let table = read(path, &Wanted { signals: &SIGNALS, columns }, &mut |line| {
@@ -31,7 +30,6 @@ fn read_file(path: &Path, columns: &Columns) -> Result<(Table, String), String> 
     table.map(|table| (table, said)).map_err(|error| format!("{error:#}"))
 }
 
-/// Reads a text as a file with this ending, and returns table and messages.
 pub fn read_text(ending: &str, text: &[u8], of: &str) -> Result<(Table, String), String> {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join(format!("a.{ending}"));
@@ -43,7 +41,6 @@ pub fn column<'a>(table: &'a Table, name: &str) -> &'a [f64] {
     table.column(name).unwrap()
 }
 
-/// Asserts that numbers agree except for the rounding of a factor.
 pub fn assert_close(found: &[f64], expected: &[f64], of: &str) {
     assert_eq!(found.len(), expected.len(), "{of}: {found:?}");
     for (found, expected) in found.iter().zip(expected) {
@@ -178,7 +175,6 @@ fn rows_in_which_the_torque_is_missing_for_long_are_left_out() {
     );
 }
 
-/// Returns the path of a file of test data.
 fn stored(name: &str) -> PathBuf {
     PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/all/data")).join(name)
 }
@@ -351,7 +347,6 @@ fn files_of_loggers_and_spreadsheets_are_read_with_the_values_that_were_written(
     assert!(said.contains("columns of text are skipped: state, armed"), "{said}");
 }
 
-/// Each recording has three rows, 20 ms apart.
 #[test]
 fn recordings_with_clock_times_or_dates_in_many_notations_are_read() {
     let rows = |stamps: [&str; 3]| stamps.map(|stamp| format!("{stamp};0,1;2\n")).concat();
@@ -482,7 +477,6 @@ fn times_printed_to_milliseconds_are_restored_to_the_even_grid_of_33_hz() {
     assert!(said.contains("the times are printed to 1 ms: rows 30.303"), "{said}");
 }
 
-/// Writes a Parquet file with time, torque in mN·m and rate, compressed by a codec.
 fn write_parquet(path: &Path, names: [&str; 3], codec: parquet::basic::Compression) {
     use parquet::{basic, data_type, file, schema::types::Type};
     let field = |name: &str| {

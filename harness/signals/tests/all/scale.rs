@@ -12,7 +12,6 @@ use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::Type;
 use signals::recording::{self, Between, Columns, Signal, Wanted};
 
-/// Units of times with their lengths, ns.
 const UNITS: [(&str, i64); 6] = [
     ("s", 1_000_000_000),
     ("ms", 1_000_000),
@@ -22,22 +21,18 @@ const UNITS: [(&str, i64); 6] = [
     ("h", 3_600_000_000_000),
 ];
 const STEPS: [i64; 7] = [1, 2, 10, 20, 25, 100, 250];
-/// Time of the first row, 2026-01-31T12:00:00Z, s since 1970.
 const BEGIN: i64 = 1_769_860_800;
 /// Largest share of files that may be refused, although each of them states a unit, a date or a clock time.
 const REFUSED: f64 = 1e-3;
 
-/// The correct reading of a generated file.
 #[derive(Clone, Default)]
 struct Truth {
     columns: String,
     /// Times from the first one, s; rows at the end may be cut off.
     time: Vec<f64>,
-    /// True if the file does not state the unit.
     is_unstated: bool,
 }
 
-/// Reads `count` files from `make`, and compares them with their correct reading; few may be refused.
 fn judge(ending: &str, count: u64, make: fn(&mut Rng) -> (Vec<u8>, Truth)) {
     let seed = std::env::var("HUBSLOSH_FUZZ_SEED").ok().and_then(|seed| seed.parse().ok());
     let mut dice = Rng::with_seed(seed.unwrap_or(1));
@@ -89,7 +84,6 @@ fn judge(ending: &str, count: u64, make: fn(&mut Rng) -> (Vec<u8>, Truth)) {
     assert!(foreign < count / 2 && (ending == "parquet") == (foreign > 0), "{foreign} of {count}");
 }
 
-/// Formats a time in ns in a unit, exactly.
 fn number(ns: i64, unit: i64) -> String {
     match ns % unit {
         0 => (ns / unit).to_string(),
@@ -108,7 +102,6 @@ fn clock(ns: i64) -> String {
     )
 }
 
-/// Returns a text file as loggers write it, with random layout.
 fn text(dice: &mut Rng) -> (Vec<u8>, Truth) {
     let (step, rows) = (STEPS[dice.usize(..STEPS.len())] * 1_000_000, dice.usize(5..40));
     let time = |k: usize| step * k as i64;
@@ -201,7 +194,6 @@ fn text(dice: &mut Rng) -> (Vec<u8>, Truth) {
     (out.into_bytes(), Truth { columns, time, is_unstated: false })
 }
 
-/// Returns a Parquet file with times of a random type.
 fn columns(dice: &mut Rng) -> (Vec<u8>, Truth) {
     let (step, rows) = (STEPS[dice.usize(..STEPS.len())] * 1_000_000, dice.usize(5..40));
     let (unit, ns) = UNITS[dice.usize(..4)];
@@ -260,7 +252,6 @@ fn columns(dice: &mut Rng) -> (Vec<u8>, Truth) {
     (bytes, Truth { columns, time, is_unstated })
 }
 
-/// Number of files in the short form of the test.
 const FEW: u64 = 1000;
 
 /// Random text files with times in seconds, milliseconds, microseconds or nanoseconds, with and without a stated unit.
