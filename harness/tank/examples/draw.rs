@@ -6,7 +6,6 @@ use std::path::Path;
 
 use hubslosh_tank::{Problems, Tank, picture, sweep, table};
 
-/// Standard gravity, m/s2.
 const GRAVITY: f64 = 9.80665;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -86,7 +86,6 @@ impl Energy {
 pub enum EnergySource {
     CylinderTable,
     SphereTable,
-    /// Computed for this tank and fill (`finite_amplitude::add_large_waves`).
     ThisTank,
 }
 
@@ -100,7 +99,6 @@ impl EnergySource {
     }
 }
 
-/// Source of the angle at which a mode is out of range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LimitSource {

@@ -105,7 +105,6 @@ fn bob(row: &ModalData, n: usize) -> f64 {
     row.modes[n].height.unwrap_or(row.z_cg)
 }
 
-/// Returns the number of modes that carry liquid in all rows, at least one.
 fn count_carrying_modes(rows: &[ModalData]) -> usize {
     let most = rows.iter().map(|row| row.modes.len()).min().unwrap_or(0);
     let carries = |n: &usize| rows.iter().all(|row| row.modes[*n].m > 1e-6 * row.m_liq);

@@ -187,7 +187,6 @@ fn cylinder_energy(fill: f64) -> Option<Energy> {
     Some(Energy::new(&known, errors, limit.forced, EnergySource::CylinderTable))
 }
 
-/// Returns the radius of a tank that is a sphere; `None` for other contours.
 fn sphere_radius(contour: &Contour, wall: &Wall, depth: f64) -> Option<f64> {
     let Shape::Sphere { radius } = shape::recognise(wall, depth)?.shape else { return None };
     let centre = wall.z_surface - depth + radius;

@@ -231,7 +231,6 @@ pub struct ModalData {
     pub damping: Option<Damping>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub finite_amplitude: Option<FiniteAmplitude>,
-    /// The liquid in steady rotation with the tank, if a rate is given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub spin: Option<Spin>,
     #[serde(skip)]

@@ -48,7 +48,6 @@ impl Frame {
         let _ = writeln!(svg, "<path d=\"{}\" fill=\"none\" {style}/>", self.path(points));
     }
 
-    /// Draws axes on the left and at the bottom with round ticks and labels.
     pub fn axes(&self, svg: &mut String, x_label: &str, y_label: Option<&str>) {
         let Frame { left, top, width, height, .. } = *self;
         let bottom = top + height;

@@ -149,7 +149,6 @@ impl Cut {
     }
 }
 
-/// Kinds of measured shapes, in the order in which [`recognise`] tries them.
 const KINDS: [Kind; 4] = [Kind::Cylinder, Kind::Cone, Kind::Sphere, Kind::Torus];
 
 #[derive(Clone, Copy)]

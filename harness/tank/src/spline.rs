@@ -161,7 +161,6 @@ mod tests {
         }
     }
 
-    /// The not-a-knot condition at ends that are not on the axis of the tank.
     #[test]
     fn away_from_the_axis_the_first_two_pieces_of_a_spline_are_one_cubic_and_so_are_the_last_two() {
         let all = derivatives(&POINTS);

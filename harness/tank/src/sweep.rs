@@ -40,7 +40,6 @@ pub fn sweep(tank: &Tank, fills: &[f64], modes: usize) -> Result<Sweep, Problems
 }
 
 impl Sweep {
-    /// Computes the damping of every row that has modes, with the errors of [`tank_damping`].
     pub fn damp(&mut self, tank: &Tank, nu: f64, liquid: Liquid) -> Result<(), Problems> {
         for row in self.rows.iter_mut().filter(|row| !row.modes.is_empty()) {
             row.damping = Some(tank_damping(tank, row, nu, liquid)?);
@@ -48,8 +47,6 @@ impl Sweep {
         Ok(())
     }
 
-    /// Computes the third-order coefficients of every row that has modes, see
-    /// [`finite_amplitude::amplitude_dependence`].
     pub fn add_third_order(&mut self, tank: &Tank) {
         for row in self.rows.iter_mut().filter(|row| !row.modes.is_empty()) {
             row.finite_amplitude = Some(finite_amplitude::amplitude_dependence(tank, row));

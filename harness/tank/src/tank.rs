@@ -58,10 +58,6 @@ pub enum Shape {
 }
 
 impl Shape {
-    /// Returns the generating curve.
-    ///
-    /// # Errors
-    /// Lists every dimension that is not allowed.
     pub fn segments(&self) -> Result<Vec<Segment>, Problems> {
         let mut problems = Vec::new();
         let mut above = |limit: f64, dimensions: &[(&str, f64)]| {
@@ -178,7 +174,6 @@ pub enum Fill {
 #[error("`{0}` is neither a height in m (1.2) nor per cent of the volume (60%)")]
 pub struct NotAFill(String);
 
-/// Parses a height in m, or per cent of the volume: `1.2`, `60%`.
 impl core::str::FromStr for Fill {
     type Err = NotAFill;
 
@@ -416,7 +411,6 @@ impl Tank {
         if self.contour().is_some() { "revolution" } else { "box" }
     }
 
-    /// Returns the result without liquid: all masses 0, no modes.
     pub(crate) fn empty(&self) -> ModalData {
         let bottom = self.contour().map_or(0.0, Contour::bottom);
         let data =

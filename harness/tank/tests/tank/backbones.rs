@@ -32,7 +32,6 @@ fn backbones() -> Vec<(f64, Vec<Row>)> {
     all
 }
 
-/// The coefficients of a slosh mass without terms beyond the third order.
 fn pair(s: f64, kappa: f64) -> EnergyTerms {
     EnergyTerms { pair: [s, kappa], next: [0.0; 2], rotary: [0.0; 2], compared: 0.0 }
 }

@@ -35,7 +35,6 @@ pub fn tank(text: &str) -> Tank {
     Tank::parse(text, Path::new("")).unwrap_or_else(|problems| panic!("{text}: {problems}"))
 }
 
-/// Modes of a tank given without its density.
 pub fn solve(text: &str, fill: f64, modes: usize) -> ModalData {
     let tank = tank(&format!("density = 1000.0\n{text}"));
     tank.solve(fill, modes).unwrap_or_else(|problems| panic!("{text}: {problems}"))

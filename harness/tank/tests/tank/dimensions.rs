@@ -47,7 +47,6 @@ fn solved(c: f64, rho: f64) -> Vec<(Tank, ModalData)> {
     TANKS.map(one).into()
 }
 
-/// Name, value, powers of length and density.
 type Quantity = (String, f64, i32, i32);
 
 fn of_modes(axis: &str, modes: &[Mode], all: &mut Vec<Quantity>) {

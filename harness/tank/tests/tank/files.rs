@@ -657,7 +657,6 @@ fn every_dimension_of_a_shape_has_its_limit_and_is_named() {
     }
 }
 
-/// Covers tanks in closed form, solved tanks, and both axes of a box.
 #[test]
 fn modes_are_numbered_from_1() {
     for text in [
@@ -700,7 +699,6 @@ fn a_tank_drawn_far_above_its_zero_does_not_count_as_large() {
     assert!((far.m_liq / (500.0 * core::f64::consts::PI) - 1.0).abs() < 1e-12);
 }
 
-/// A file of 201 points gives 200 lines, which is the largest allowed number of segments.
 #[test]
 fn a_file_of_points_joins_at_most_201_by_lines() {
     let folder = tempfile::tempdir().unwrap();

@@ -73,7 +73,6 @@ fn damping_of_a_sphere_is_continuous() {
     }
 }
 
-/// Compares with values of the formulas for cone and torus that were computed by hand.
 #[test]
 fn cone_and_torus_have_their_values() {
     // b = 30: C5 = 1.3817, C4 = 0.638; Re = 1e-6/sqrt(9.81 0.125) = 9.0305e-7
