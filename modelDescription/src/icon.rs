@@ -21,7 +21,6 @@ pub fn draw(svg: &str) -> Result<resvg::tiny_skia::Pixmap, resvg::usvg::Error> {
     Ok(picture)
 }
 
-/// Returns the hashes of drawing and picture in the format of `sha256sum icon.svg icon.png`.
 pub fn hashes() -> std::io::Result<String> {
     let mut lines = String::new();
     for name in ["icon.svg", "icon.png"] {

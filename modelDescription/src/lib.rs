@@ -120,7 +120,6 @@ fn unit(unit: &Unit) -> Element {
         .holding(unit.display_units.iter().map(display_unit))
 }
 
-/// Returns the enumerations as type definitions, or `None` if there are none.
 fn type_definitions<M: Model>(one: impl Fn(&Enumeration) -> Element) -> Option<Element> {
     let all = M::table().enumerations();
     let some = !all.is_empty();
