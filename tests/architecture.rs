@@ -9,7 +9,6 @@ use cargo_metadata::{DependencyKind, MetadataCommand};
 
 use crate::common::run;
 
-/// Returns the packages that each package of the workspace links, without tests and build scripts.
 fn dependencies() -> BTreeMap<String, BTreeSet<String>> {
     let metadata =
         MetadataCommand::new().current_dir(pack::root()).no_deps().exec().expect("cargo metadata");
@@ -125,7 +124,6 @@ fn tests_and_the_python_package_enable_no_further_features_of_the_program_s_depe
     assert!(more.is_empty(), "{more:?}");
 }
 
-/// No other package depends on `indicatif`.
 #[test]
 fn only_the_command_line_draws_progress() {
     for (package, dependencies) in dependencies() {
@@ -133,7 +131,6 @@ fn only_the_command_line_draws_progress() {
     }
 }
 
-/// Lists the files in which the workspace's `unsafe_code = "deny"` is lifted.
 #[test]
 fn unsafe_code_is_only_in_the_files_of_the_c_interface() {
     let root = pack::root();
@@ -350,7 +347,6 @@ fn errors_made_from_text_are_found_in_every_form() {
     }
 }
 
-/// Crates in which modules of a folder must not use each other in a circle.
 const ONE_WAY: [&str; 24] = [
     "fmu/plant",
     "fmu/craft",
@@ -540,7 +536,6 @@ fn modules(
     all
 }
 
-/// Returns the modules that are part of a circle or use one.
 fn circles(mut left: BTreeMap<String, BTreeSet<String>>) -> BTreeMap<String, BTreeSet<String>> {
     // What uses nothing that is left is not part of a circle.
     while let Some(leaf) =

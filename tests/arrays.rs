@@ -28,7 +28,6 @@ fn key(name: &str) -> Key {
     (plain + rest, indices)
 }
 
-/// A variable as modelDescription.xml declares it.
 struct Variable {
     name: String,
     reference: u32,
@@ -120,7 +119,6 @@ impl Opened {
     }
 }
 
-/// An instance with the values of its structural parameters.
 struct Run<'a> {
     opened: &'a Opened,
     instance: Instance<'a>,
@@ -128,7 +126,6 @@ struct Run<'a> {
 }
 
 impl Run<'_> {
-    /// Sets a structural parameter in configuration mode.
     fn resize(&mut self, name: &str, size: usize) {
         let reference = self.opened.variable(name).reference;
         self.instance.enter_configuration_mode().unwrap();
@@ -149,7 +146,6 @@ impl Run<'_> {
         }
     }
 
-    /// Returns the bits of everything that can be read.
     fn everything(&mut self) -> BTreeMap<Key, u64> {
         let mut all = BTreeMap::new();
         for v in self.opened.variables.iter().filter(|v| v.kind != "UInt64") {
@@ -183,7 +179,6 @@ fn assert_same(arrays: &BTreeMap<Key, u64>, scalars: &BTreeMap<Key, u64>, when: 
     }
 }
 
-/// A test case: the FMU, and the size of its arrays.
 struct Case {
     model: &'static Model,
     size: Option<(&'static str, usize)>,
@@ -230,7 +225,6 @@ fn parameter(model: &Model, (name, indices): &Key) -> Option<Value> {
     }
 }
 
-/// Returns the value of an input that oscillates, differently for each element.
 fn input(model: &Model, inputs: &[String], (name, indices): &Key, time: f64) -> Option<Value> {
     if !inputs.contains(name) {
         return None;
@@ -248,7 +242,6 @@ fn input(model: &Model, inputs: &[String], (name, indices): &Key, time: f64) -> 
     Some(Value::Real(size * (n * time + 0.3 * n).sin()))
 }
 
-/// Creates an instance of both FMUs with the settings of a case.
 fn set_up<'a>(
     case: &Case,
     [arrays, scalars]: [&'a Opened; 2],
@@ -353,7 +346,6 @@ fn fmus_with_arrays_and_with_scalars_have_equal_states_derivatives_and_indicator
     }
 }
 
-/// Returns status and messages of a refused call.
 fn refusal<T>(called: Result<T, CallError>) -> (Status, String) {
     let error = called.err().expect("it is refused");
     let texts: Vec<_> = error.messages.iter().map(|message| &*message.text).collect();
@@ -404,7 +396,6 @@ fn array_sizes_are_set_only_in_configuration_mode_and_reset_the_arrays() {
     assert_eq!((size, run.instance.number_of_states().unwrap()), ([1], states(1)), "reset");
 }
 
-/// The messages of Spacecraft name the variable, the wrong size or type, and what is allowed.
 #[test]
 fn wrong_sizes_counts_and_types_of_arrays_are_refused_in_words() {
     let craft = Opened::new(pack::model("Spacecraft").unwrap(), Fmi::V3Arrays);
@@ -692,7 +683,6 @@ fn part_of_spacecraft(starts: &[(&str, &str)]) -> (Opened, tempfile::TempDir) {
     (Opened::from(&out), folder)
 }
 
-/// Start values of a reduced FMU, which are also settings of the full one.
 const STARTS: [(&str, f64); 8] = [
     ("tanks", 2.0),
     ("tank[2].position[1]", 0.4),

@@ -14,7 +14,6 @@ use runtime::variable::Causality;
 const STATES: usize = plant::STATES;
 const INDICATORS: usize = plant::INDICATORS;
 
-/// Start values with which everything moves.
 const START: [(&str, f64); 3] =
     [("init.omega", 0.2), ("init.slosh_angle", 0.2), ("init.slosh_angle_radial", 0.1)];
 const SPHERICAL: i32 = 4;
@@ -23,7 +22,6 @@ fn references(fmu: &Fmu, names: &[&str]) -> Vec<u32> {
     names.iter().map(|name| fmu.description().variable(name).unwrap().reference).collect()
 }
 
-/// Starts an instance of the other importer.
 fn start(instance: &mut impl Common, fmu: &Fmu) {
     let names = START.map(|(name, _)| name);
     instance.set_real(&references(fmu, &names), &START.map(|(_, value)| value)).unwrap();
@@ -34,7 +32,6 @@ fn start(instance: &mut impl Common, fmu: &Fmu) {
     Common::exit_initialization_mode(instance).unwrap();
 }
 
-/// Starts an instance of our host with the same calls.
 fn started<'fmu>(fmu: &'fmu Fmu, kind: i32) -> Instance<'fmu> {
     let mut with = fmu.instantiation("ours");
     with.kind = kind;
@@ -224,7 +221,6 @@ mod fmi3 {
         assert!(!flags.discrete_states_need_update && !flags.terminate_simulation);
     }
 
-    /// Returns an input and its value, which drives the FMU during a communication step.
     fn input(model: &Model) -> (&'static str, f64) {
         match model.name {
             "HubSlosh" => ("tau_cmd", 0.05),

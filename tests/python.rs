@@ -53,7 +53,6 @@ fn of_the_package() -> Command {
     command
 }
 
-/// Packs a wheel with all FMUs.
 fn wheel() -> PathBuf {
     let fmus = Fmi::ALL
         .map(|fmi| MODELS.each_ref().map(|model| pack::packed_version_for_tests(model, fmi)));

@@ -8,7 +8,6 @@ use pack::archive::{self, Files, Packed};
 
 use crate::common::{harness, python, run};
 
-/// Packs the FMU: XML, binary, and the least that a folder of documentation must have.
 fn packed() -> PathBuf {
     let binary = pack::build("spring-fmu", true).unwrap();
     let out = binary.ancestors().nth(2).unwrap().join("test-fmu/Spring.fmu");
@@ -67,7 +66,6 @@ fn a_minimal_fmu_needs_only_a_table_and_a_model() {
     run(Command::new(python()).args(["-c", FMPY]).arg(&fmu), "fmpy and the second FMU disagree");
 }
 
-/// The source of the spring FMU, table of variables and model together.
 #[test]
 fn a_minimal_fmu_on_the_runtime_takes_at_most_150_lines() {
     let folder = pack::root().join("tests/spring/src");

@@ -19,7 +19,6 @@ use runtime::table::Layout;
 
 const VERSIONS: [Fmi; 2] = [Fmi::V2, Fmi::V3];
 
-/// An unpacked FMU, and the facts about it that the C hosts need.
 struct Unpacked {
     fmi: Fmi,
     directory: tempfile::TempDir,
@@ -66,7 +65,6 @@ impl Unpacked {
         self.variable(name).reference.to_string()
     }
 
-    /// Compiles a host in C, once, and returns the command that runs it.
     fn host(&self, name: &str, sources: &[&str], link: &[&Path]) -> Command {
         let program = self.directory.path().join(name);
         let sources = sources.iter().map(|source| root().join(source));
@@ -103,7 +101,6 @@ impl Unpacked {
     }
 }
 
-/// Returns the code of a variable's type for the C host.
 fn letter(variable: &Variable) -> char {
     match variable.kind() {
         Type::Real => 'R',
@@ -113,7 +110,6 @@ fn letter(variable: &Variable) -> char {
     }
 }
 
-/// Cases that are tested in one version of FMI.
 #[derive(Clone, Copy)]
 struct Share {
     of: &'static str,
@@ -141,7 +137,6 @@ fn headers() -> &'static Path {
     &HEADERS
 }
 
-/// Returns the number before `word` in the last output of a host.
 fn number(said: &str, word: &str) -> f64 {
     let before = said.split(word).next().unwrap().trim_end();
     before.rsplit(' ').next().unwrap().parse().unwrap_or_else(|_| panic!("no {word} in: {said}"))
@@ -412,7 +407,6 @@ fn no_allowed_value_traps(model: &str, fmi: Fmi, share: Share) {
     assert!(number(&said, " refused") <= 0.5 * number(&said, " runs"), "{said}");
 }
 
-/// Returns settings that are made before the test, by the FMU's names.
 #[cfg(target_os = "linux")]
 fn scenes(model: &str) -> Vec<Vec<(&'static str, &'static str)>> {
     let few = ("solver.max_steps", "300");
@@ -719,10 +713,8 @@ fn the_stack_that_an_fmu_needs_is_no_more_than_the_book_says() {
     }
 }
 
-/// Number of steps of `rounding.c`, 20 ms each.
 const STEPS: usize = 250;
 
-/// Additional settings of a host before a motion, by name.
 type Settings<'a> = &'a [(&'a str, &'a str)];
 
 /// Returns the bits of all Reals, ten times in 5 s of a motion, under a host's floating-point environment.

@@ -22,7 +22,6 @@ fn reference(fmu: &Fmu, name: &str) -> u32 {
     fmu.description().variable(name).unwrap().reference
 }
 
-/// Returns an instance that is ready to step from 0 s on.
 fn stepping<'fmu>(fmu: &'fmu Fmu, settings: &[(&str, &str)]) -> Instance<'fmu> {
     stepping_from(fmu, 0.0, None, settings)
 }
@@ -43,7 +42,6 @@ fn stepping_from<'fmu>(
     instance
 }
 
-/// Start of a motion in which everything moves, sticks, samples and saturates.
 const LIVELY: &[(&str, &str)] = &[
     ("slosh.model", "spherical"),
     ("slosh.modes", "2"),
@@ -54,7 +52,6 @@ const LIVELY: &[(&str, &str)] = &[
     ("imu.enabled", "true"),
 ];
 
-/// Returns the bits of every variable.
 fn all(instance: &mut Instance) -> Vec<u64> {
     let variables = &instance.fmu().description().variables;
     let each = variables.iter().map(|variable| {
@@ -80,7 +77,6 @@ fn all(instance: &mut Instance) -> Vec<u64> {
     each.collect()
 }
 
-/// Returns the complete state of an instance as bytes.
 fn state(instance: &mut Instance) -> Vec<u8> {
     let saved = instance.get_state().unwrap();
     let bytes = instance.serialize(&saved).unwrap();
@@ -88,7 +84,6 @@ fn state(instance: &mut Instance) -> Vec<u8> {
     bytes
 }
 
-/// Simulates one second in uneven steps under a torque that changes its sign.
 fn drive(instance: &mut Instance, from: f64) {
     let torque = [reference(instance.fmu(), "tau_cmd")];
     let mut at = from;
@@ -100,7 +95,6 @@ fn drive(instance: &mut Instance, from: f64) {
     }
 }
 
-/// Asserts that a call was refused with fmi2Error and one message, which contains all of `parts`.
 #[track_caller]
 fn refused<T>(result: Result<T, CallError>, parts: &[&str]) {
     let Err(error) = result else { panic!("not refused") };
@@ -139,7 +133,6 @@ fn archive_begins_with_the_model_description_and_is_plain() {
     }
 }
 
-/// HubSlosh is packed a second time; the two FMU files are equal byte for byte.
 #[test]
 fn the_same_source_gives_the_same_archive() {
     let directory = tempfile();
@@ -153,7 +146,6 @@ fn tempfile() -> tempfile::TempDir {
     tempfile::tempdir().unwrap()
 }
 
-/// Lists the functions of fmi3FunctionTypes.h.
 fn fmi3_functions() -> BTreeSet<String> {
     let values = "Float32 Float64 Int8 UInt8 Int16 UInt16 Int32 UInt32 Int64 UInt64 Boolean String Binary Clock \
                   IntervalDecimal IntervalFraction ShiftDecimal ShiftFraction FMUState";
@@ -283,7 +275,6 @@ fn instances_in_several_threads_give_the_same_bits() {
     });
 }
 
-/// The FMU leaves rounding to nearest, subnormal numbers and the working directory unchanged.
 #[test]
 fn floating_point_state_and_working_directory_of_the_host_are_unchanged() {
     let arithmetic = || {
@@ -299,7 +290,6 @@ fn floating_point_state_and_working_directory_of_the_host_are_unchanged() {
 
 // ---- Making an instance ----
 
-/// The logged message names the given and the expected GUID.
 #[test]
 fn wrong_or_missing_guid_gives_no_instance_and_a_reason() {
     let fmu = open();
@@ -332,7 +322,6 @@ fn instantiation_without_callbacks_returns_null_and_does_not_crash() {
     assert!(fmu.instantiate_with(&with).is_err());
 }
 
-/// An instance without callback functions and without a resource location is initialised and stepped.
 #[test]
 fn every_callback_and_the_resource_location_may_be_null() {
     let fmu = open();
@@ -848,7 +837,6 @@ fn a_saved_state_continues_bit_for_bit_also_in_a_new_instance() {
     }
 }
 
-/// fmi2GetFMUstate with the handle of an earlier state overwrites this state; fmi2FreeFMUstate of NULL succeeds.
 #[test]
 fn a_handle_of_a_saved_state_can_be_reused_and_a_null_handle_can_be_freed() {
     let fmu = open();
@@ -877,7 +865,6 @@ fn a_saved_state_is_freed_by_itself_as_by_its_address() {
     instance.do_step(0.0, 0.1).unwrap();
 }
 
-/// fmi2DeSerializeFMUstate refuses bytes that are empty, zero, truncated or changed.
 #[test]
 fn bytes_that_are_no_state_are_refused() {
     let fmu = open();

@@ -20,7 +20,6 @@ fn open(name: &str) -> Fmu {
     fmu
 }
 
-/// Unknowns and knowns of the derivatives.
 struct Sides {
     unknowns: Vec<u32>,
     knowns: Vec<u32>,
@@ -221,7 +220,6 @@ fn exchange<'fmu>(fmu: &'fmu Fmu, settings: &[(String, String)]) -> (Instance<'f
     (instance, states)
 }
 
-/// Returns an instance for Co-Simulation after a step of 0.3 s.
 fn stepped<'fmu>(fmu: &'fmu Fmu, settings: &[(String, String)]) -> Instance<'fmu> {
     let mut instance = fmu.instantiate("one").unwrap();
     set(&mut instance, settings);
@@ -410,7 +408,6 @@ fn adjoint_and_directional_derivatives_of_spacecraft_equal_differences() {
     }
 }
 
-/// Returns the typical magnitude of a variable of a craft.
 fn of_craft(name: &str) -> f64 {
     match name.split('[').next() {
         Some("force") => 100.0,

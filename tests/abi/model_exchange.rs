@@ -15,7 +15,6 @@ fn open() -> Fmu {
 const STATES: usize = plant::STATES;
 const INDICATORS: usize = plant::INDICATORS;
 
-/// Changes of inputs or parameters, with their times, s.
 type Changes<'a> = &'a [(f64, &'a str, &'a str)];
 
 fn set_up<'fmu>(fmu: &'fmu Fmu, kind: i32, settings: &[(&str, &str)]) -> Instance<'fmu> {
@@ -36,7 +35,6 @@ struct Host<'fmu> {
     instance: Instance<'fmu>,
     time: f64,
     x: [f64; STATES],
-    /// Numbers of state events, time events and step events that have been handled.
     events: [usize; 3],
     next: EventInfo,
 }
@@ -83,7 +81,6 @@ impl<'fmu> Host<'fmu> {
         indicators
     }
 
-    /// Returns the states after a step of `h`.
     fn step(&mut self, h: f64) -> [f64; STATES] {
         let (t, x) = (self.time, self.x);
         let moved = |rate: &[f64; STATES], h: f64| std::array::from_fn(|i| x[i] + h * rate[i]);
@@ -142,7 +139,6 @@ impl<'fmu> Host<'fmu> {
     }
 }
 
-/// Reads every real output and some local variables.
 fn values(instance: &mut Instance) -> BTreeMap<String, f64> {
     let variables = &instance.fmu().description().variables;
     let outputs =
@@ -215,7 +211,6 @@ fn a_model_exchange_host_equals_co_simulation_with_stick_and_slip() {
     }
 }
 
-/// Tests two modes with the friction laws that do not stick.
 #[test]
 fn a_model_exchange_host_equals_co_simulation_with_every_friction_law() {
     for friction in ["none", "viscous", "stribeck_smooth"] {
@@ -286,7 +281,6 @@ fn the_regime_changes_only_at_events() {
     assert_eq!(host.instance.get("regime").unwrap(), before);
 }
 
-/// A host without root finding that uses Euler's method at 50 us agrees to first order.
 #[test]
 fn euler_in_model_exchange_converges_to_co_simulation_with_first_order() {
     let fmu = open();
@@ -319,7 +313,6 @@ fn euler_in_model_exchange_converges_to_co_simulation_with_first_order() {
     assert!(worst[1] < 1e-3 && worst[1] < 0.7 * worst[0], "{worst:?}");
 }
 
-/// For example fmi2GetDerivatives before initialisation.
 #[test]
 fn calls_of_model_exchange_in_the_wrong_state_are_refused() {
     let fmu = open();

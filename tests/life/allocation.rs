@@ -14,7 +14,6 @@ fn reference(name: &str) -> u32 {
     TABLE.find(name).unwrap()
 }
 
-/// Returns an initialised instance with all parts of the plant in use.
 fn initialised(interface: Interface, slosh_model: i32, friction_model: i32) -> Instance {
     let mut instance = HubSlosh::instance(interface);
     for (name, value) in

@@ -51,14 +51,12 @@ fn real(instance: &mut Instance, name: &str) -> f64 {
     }
 }
 
-/// Returns the time derivative of one variable.
 fn output_derivative(instance: &mut Instance, reference: u32, order: i32) -> Result<f64, Fault> {
     let mut answer = [0.0];
     instance.output_derivatives(&[reference], &[order], &mut answer)?;
     Ok(answer[0])
 }
 
-/// Returns the bits of every variable.
 fn all(instance: &mut Instance) -> Vec<u64> {
     let each =
         (0..TABLE.scalars.len() as u32).map(|n| match get_by_reference(instance, n).unwrap() {
@@ -69,7 +67,6 @@ fn all(instance: &mut Instance) -> Vec<u64> {
     each.collect()
 }
 
-/// Returns an instance that is ready to step from `start`.
 fn stepping_from(start: f64, stop: Option<f64>, values: &[(&str, Value)]) -> Instance {
     let mut instance = fresh();
     set(&mut instance, values);
@@ -103,7 +100,6 @@ fn lively(slosh_model: i32, friction_model: i32) -> Instance {
     ])
 }
 
-/// For example fmi2DoStep before initialisation; the saved state of HubSlosh stays bit-identical.
 #[test]
 fn calls_are_refused_in_the_wrong_state_and_change_nothing() {
     let mut instance = fresh();
@@ -201,7 +197,6 @@ fn all_wrong_parameters_are_reported_at_once_and_can_be_corrected() {
     instance.exit_initialization_mode().unwrap();
 }
 
-/// A minimum wheel speed above the initial wheel speed is refused at the end of initialisation.
 #[test]
 fn parameters_that_contradict_each_other_are_reported() {
     let mut instance = fresh();
@@ -411,7 +406,6 @@ fn a_restored_state_continues_bit_identically() {
     }
 }
 
-/// Makes one random step of any length, with or without a slope, sometimes with other friction.
 fn random_step(rng: &mut fastrand::Rng, instance: &mut Instance) {
     let mut between = |low: f64, high: f64| low + (high - low) * rng.f64();
     let inputs = ["tau_cmd", "tau_ext", "g_axial"].map(reference);
@@ -432,7 +426,6 @@ fn random_step(rng: &mut fastrand::Rng, instance: &mut Instance) {
     instance.do_step(instance.time(), h).unwrap();
 }
 
-/// Makes the calls of a host with an adaptive or iterating master algorithm.
 #[test]
 fn rollback_is_exact_in_a_thousand_random_sequences() {
     let mut rng = fastrand::Rng::with_seed(11);
@@ -476,7 +469,6 @@ fn rollback_is_exact_in_a_thousand_random_sequences() {
     }
 }
 
-/// Calls with any arguments return a result or are refused, but never panic.
 #[test]
 fn random_calls_never_panic() {
     let mut rng = fastrand::Rng::with_seed(13);
@@ -601,7 +593,6 @@ fn gyro_samples_are_on_time_after_many_steps_whether_the_host_adds_or_multiplies
     }
 }
 
-/// Replaces a number that occurs once in saved bytes, and adapts the checksum.
 fn with_number(mut bytes: Vec<u8>, old: f64, new: f64) -> Vec<u8> {
     let place = bytes.windows(8).position(|bytes| bytes == old.to_le_bytes()).unwrap();
     bytes[place..place + 8].copy_from_slice(&new.to_le_bytes());
@@ -824,7 +815,6 @@ fn directional_derivatives_in_initialization_mode_are_with_respect_to_inputs_and
     assert!(to_bytes(&instance) == before);
 }
 
-/// Derivatives of Booleans, and by parameters after initialisation, are refused with an error.
 #[test]
 fn directional_derivatives_of_variables_without_any_are_refused() {
     let mut instance = lively(4, 4);
@@ -877,7 +867,6 @@ fn only_friction_parameters_can_be_changed_between_steps() {
     assert_eq!(to_bytes(&instance), to_bytes(&other));
 }
 
-/// A state that was saved in Model Exchange cannot be restored in Co-Simulation, nor the reverse.
 #[test]
 fn a_state_of_the_other_interface_is_refused() {
     let mut exchange = HubSlosh::instance(Interface::ModelExchange);

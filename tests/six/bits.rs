@@ -124,7 +124,6 @@ fn spacecraft_equals_the_crate_bit_for_bit_in_every_reference_record() {
     }
 }
 
-/// Compares as [`compare`] does.
 fn compare_tank(
     what: &str,
     p: &TankParameters,
@@ -154,8 +153,6 @@ fn compare_tank(
     assert_eq!(packed.derivatives(&start), own.derivatives(&start), "{what}");
 }
 
-/// Tests every coupling, with and without a host, with the variety of
-/// [`the_fmu_and_the_crate_move_random_craft_bit_identically`].
 #[test]
 fn the_fmu_and_the_crate_move_random_tanks_bit_identically() {
     for seed in 0..36 {

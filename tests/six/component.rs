@@ -18,7 +18,6 @@ use pack::models::model;
 use pack::packed_model_for_tests;
 use runtime::table::Table;
 
-/// Packs and loads an FMU; the unpacked files are deleted at once.
 pub fn load(name: &str) -> Fmu {
     let packed = packed_model_for_tests(model(name).unwrap());
     let directory = tempfile::tempdir().unwrap();
@@ -53,12 +52,10 @@ pub fn elements(name: &str, n: usize) -> impl Iterator<Item = String> {
     (1..=n).map(move |i| format!("{name}[{i}]"))
 }
 
-/// Lists the names of the elements of a two-dimensional array, row by row.
 fn rows(name: &str, (n, m): (usize, usize)) -> impl Iterator<Item = String> {
     (1..=n).flat_map(move |i| (1..=m).map(move |j| format!("{name}[{i},{j}]")))
 }
 
-/// Parameters by name; integers are in a list of their own.
 #[derive(Clone, Default)]
 struct Settings {
     reals: Vec<(String, f64)>,
@@ -220,7 +217,6 @@ impl Settings {
     }
 }
 
-/// An instance with the value references of the variables that the test reads and sets.
 struct Bound {
     loaded: &'static Loaded,
     instance: Instance<'static>,
@@ -234,7 +230,6 @@ struct Bound {
     /// Value references of states and derivatives in the order of the crate `craft`.
     states: Vec<u32>,
     derivatives: Vec<u32>,
-    /// Position of each state in FMI's order.
     places: Vec<usize>,
 }
 
@@ -286,7 +281,6 @@ impl Bound {
         instance.exit_initialization_mode()
     }
 
-    /// Sets the inputs and, in Co-Simulation, their slopes for the next step.
     fn set(&mut self, values: &[f64], slopes: &[f64]) -> Result<(), CallError> {
         self.instance.set_real(&self.inputs, values)?;
         if self.kind == CO_SIMULATION {
@@ -344,7 +338,6 @@ impl Bound {
     }
 }
 
-/// Takes numbers from a list, one after the other.
 struct Numbers<'a>(std::slice::Iter<'a, f64>);
 
 impl Numbers<'_> {
@@ -487,7 +480,6 @@ impl Spacecraft {
         self.0.outputs()
     }
 
-    /// Returns the outputs as a host reads them after a step.
     pub fn outputs_after_step(&mut self) -> Outputs {
         let numbers = self.0.outputs();
         let next = &mut Numbers(numbers.iter());
@@ -600,7 +592,6 @@ impl SloshTank {
         self.0.outputs()
     }
 
-    /// Returns the outputs as a host reads them after a step.
     pub fn outputs_after_step(&mut self) -> SloshTankOutputs {
         let numbers = self.0.outputs();
         let next = &mut Numbers(numbers.iter());
@@ -618,14 +609,12 @@ impl SloshTank {
         }
     }
 
-    /// Returns the ranges at these inputs. The regime is not read.
     pub fn ranges(&mut self, inputs: &TankInputs) -> Ranges {
         let [values, slopes] = SloshTank::flat(inputs);
         self.0.set(&values, &slopes).unwrap();
         self.ranges_held()
     }
 
-    /// Returns the ranges as a host reads them after a step.
     pub fn ranges_held(&mut self) -> Ranges {
         let Bound { loaded, instance, .. } = &mut self.0;
         let [kind, in_range] =
@@ -638,7 +627,6 @@ impl SloshTank {
         Ranges { limited_by, ..Ranges::default() }
     }
 
-    /// Returns the warning that the instance has logged, if there is one.
     pub fn warning(&mut self) -> Option<String> {
         let mut messages = self.0.instance.take_messages();
         assert!(messages.len() < 2, "{messages:?}");
@@ -647,12 +635,10 @@ impl SloshTank {
         Some(message.text)
     }
 
-    /// Saves the complete state of the instance.
     pub fn save(&mut self) -> (FmuState, f64) {
         (self.0.instance.get_state().unwrap(), self.0.time)
     }
 
-    /// Restores a saved state.
     pub fn restore(&mut self, (state, time): (FmuState, f64)) {
         self.0.instance.set_state(&state).unwrap();
         self.0.instance.free_state(state).unwrap();

@@ -62,11 +62,8 @@ struct Pair {
     exchange: Exchange,
     order: Order,
     w: Vector3<f64>,
-    /// [a; w'] at the last two communication points.
     x: [Vector6<f64>; 2],
-    /// The tank's matrix and right-hand side at these points.
     given: [Given; 2],
-    /// The added mass at the start.
     at_rest: Matrix6<f64>,
 }
 
@@ -89,7 +86,6 @@ fn parameters(share: f64, tank: Tank) -> Parameters {
     p
 }
 
-/// Returns the coupling ratio lambda of [`parameters`] at share 1.
 fn ratio(tank: Tank) -> f64 {
     let host = Some(parameters(1.0, tank).craft);
     let p = TankParameters { tank, host, ..TankParameters::default() };
@@ -138,7 +134,6 @@ impl Pair {
         pair
     }
 
-    /// Returns the tank's input over a step at whose ends [a; w'] has the given values.
     fn input(&self, [from, to]: [Vector6<f64>; 2], h: f64) -> TankInputs {
         let ramp = |at: usize| Ramp {
             value: [from[at], from[at + 1], from[at + 2]],
@@ -237,7 +232,6 @@ impl Pair {
         self.x = [self.x[1], if is_held { from } else { to }];
     }
 
-    /// Returns p_x, p_x' of the slosh mass.
     fn slosh(&mut self) -> [f64; 2] {
         let x = self.tank.continuous_states();
         [x[0], x[3]]
@@ -262,7 +256,6 @@ fn total_wrench_diverges(lambda: f64, order: Order, h: f64) -> bool {
     false
 }
 
-/// Tests values within 3 % of the limits on either side, at both steps.
 #[test]
 fn coupling_by_total_force_and_torque_diverges_above_the_limit_of_the_inertia_ratio() {
     let limits = [
@@ -296,7 +289,6 @@ fn a_warning_names_a_coupling_that_would_diverge() {
     assert_eq!(warning(6.0, Coupling::RigidBody), None);
 }
 
-/// Returns the rate at which the slosh amplitude grows between 10 s and 60 s.
 fn growth(share: f64, order: Order, h: f64) -> (f64, f64) {
     let mut tank = Tank { zeta: [0.0; 3], ..Tank::default() };
     tank.p_0[0] = [0.01, 0.0, -1.0];
@@ -387,7 +379,6 @@ fn a_box() -> Tank {
     tank
 }
 
-/// Returns [`error_of`] for the default tank.
 fn error(share: f64, exchange: Exchange, order: Order, h: f64) -> f64 {
     let mut tank = Tank { zeta: [0.05; 3], damping_law: DampingLaw::Constant, ..Tank::default() };
     tank.p_0[0] = [0.1, 0.05, -1.0];

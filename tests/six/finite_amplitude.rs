@@ -36,7 +36,6 @@ impl Carried {
     }
 }
 
-/// Returns the force for the acceleration of a mass along x.
 fn push(mass: f64, a: [f64; 2]) -> Inputs {
     let a = sideways(a);
     let force = Ramp { value: a.value.map(|a| mass * a), slope: a.slope.map(|a| mass * a) };
@@ -158,7 +157,6 @@ fn forced_waves_near_resonance_equal_those_of_potential_flow_in_both_fmus() {
     }
 }
 
-/// Returns the tank of `bench` with the coefficients that give the wave's energy.
 fn bench_with_energy(fill: f64) -> Tank {
     let (mut tank, known) = (bench(fill), energy_terms(fill).unwrap());
     [tank.nonlinear_inertia[0], tank.nonlinear_stiffness[0]] = known.pair;

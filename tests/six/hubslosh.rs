@@ -5,7 +5,6 @@ use host::fmi2::{Fmu, Instance};
 
 use super::component::{SloshTank, Spacecraft, load};
 
-/// Time between the knots, between which the torque is linear, s.
 const KNOT: f64 = 0.01;
 const G: f64 = 9.81;
 
@@ -16,11 +15,9 @@ fn torque(k: usize) -> (f64, f64) {
     (at(k), (at(k + 1) - at(k)) / KNOT)
 }
 
-/// Slosh angles and rates at the start, tangential and radial.
 const ANGLES: [f64; 2] = [-0.1, 0.2];
 const RATES: [f64; 2] = [0.5, 0.3];
 
-/// Returns the thesis's bench without friction at the start of its motion.
 fn bench(fmu: &Fmu) -> Instance<'_> {
     let mut bench = fmu.instantiate("bench").unwrap();
     for (name, value) in [

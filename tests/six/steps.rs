@@ -205,7 +205,6 @@ fn a_warning_names_wheels_that_move_without_a_torque_once_in_model_exchange() {
     assert!(warning.text.contains("add -d(h_wheels)/dt to torque"), "{}", warning.text);
 }
 
-/// The FMU computes flight, impacts, sliding and both hand-overs bit-identical to the crate.
 #[test]
 fn detached_liquid_moves_in_the_packed_fmu_as_in_the_crate() {
     let mut p = Parameters::default();

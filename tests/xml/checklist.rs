@@ -3,7 +3,6 @@
 use std::fs;
 use std::path::Path;
 
-/// The text of all sources below `directory`, and their names.
 fn sources(directory: &Path, code: &mut String, files: &mut Vec<String>) {
     for entry in fs::read_dir(directory).expect("a directory of the project") {
         let path = entry.expect("an entry").path();
@@ -25,7 +24,6 @@ fn rows(page: &str, heading: &str) -> Vec<String> {
     tables.flat_map(|table| table.trim().lines().skip(2)).map(String::from).collect()
 }
 
-/// Returns the code in the last cell of a row.
 fn named(row: &str) -> impl Iterator<Item = &str> {
     let last = row.trim_end_matches([' ', '|']).rsplit(" | ").next().unwrap_or_default();
     last.split('`').skip(1).step_by(2)
@@ -50,7 +48,6 @@ fn missing(rows: &[String]) -> Vec<&str> {
     rows.iter().flat_map(|row| named(row)).filter(looked_up).filter(|n| !is_there(n)).collect()
 }
 
-/// Each row of book/checklist.md names at least one test function of the source.
 #[test]
 fn every_test_that_the_checklist_names_exists() {
     let rows = rows("checklist.md", "| demand");

@@ -272,7 +272,6 @@ fn capabilities_are_shown<M: Model>() {
     }
 }
 
-/// Each capability flag of the model description is listed with the test that shows it.
 #[test]
 fn every_declared_capability_of_fmi_3_has_a_test() {
     capabilities_are_shown::<HubSlosh::HubSlosh>();

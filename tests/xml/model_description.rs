@@ -13,7 +13,6 @@ fn number(element: &Element, attribute: &str) -> Option<f64> {
     element.get(attribute).map(|text| double(text).unwrap())
 }
 
-/// Returns the indices in an attribute that is a list.
 fn indices(element: &Element, attribute: &str) -> Vec<usize> {
     let words = element.get(attribute).unwrap_or_default().split_whitespace();
     words.map(|word| word.parse().unwrap()).collect()
@@ -27,7 +26,6 @@ fn root() -> Element {
     Element::parse(committed().as_bytes()).unwrap()
 }
 
-/// Returns each variable with the element of its type.
 fn variables() -> Vec<(Element, Element)> {
     let root = root();
     let of_type = |variable: &Element| (variable.clone(), variable.children[0].clone());
@@ -38,7 +36,6 @@ fn unknowns(list: &str) -> Vec<Element> {
     root().child("ModelStructure").unwrap().list(list).cloned().collect()
 }
 
-/// modelDescription.xml of HubSlosh is generated from the table of variables in the Rust source.
 #[test]
 fn the_committed_model_description_equals_the_table() {
     assert!(
@@ -52,7 +49,6 @@ fn the_guid_in_the_model_description_equals_the_guid_of_the_binary() {
     assert_eq!(root().get("guid"), Some(TABLE.guid()));
 }
 
-/// Each start value in modelDescription.xml equals the value that a new instance returns.
 #[test]
 fn start_values_equal_those_of_the_binary_to_the_last_bit() {
     let mut fresh = HubSlosh::instance(Interface::CoSimulation);
@@ -253,7 +249,6 @@ fn structure_lists_every_output_once_and_what_is_computed_at_the_start() {
     assert_eq!(listed("Derivatives"), rates);
 }
 
-/// Returns the indices of the derivatives and of their states.
 fn derivatives() -> Vec<(usize, usize)> {
     let all = variables();
     let with_index = all.iter().zip(1..);
@@ -334,7 +329,6 @@ fn every_name_in_the_table_s_dependencies_is_a_variable() {
     }
 }
 
-/// Programs and scripts of other people use these names; more may be added.
 #[test]
 fn variable_names_that_others_use_exist() {
     let names = "tau_cmd tau_ext g_axial theta omega omega_dot slosh_angle slosh_rate \
