@@ -262,8 +262,8 @@ impl HigherSeries {
         (self.inwards[n], self.around[n]) = (self.known[0] + inner, self.known[1] + pull);
     }
 
-    /// Returns coefficient n of (u P)' e + u P w x e, the torque of the coefficients beyond the third order per -m l^2;
-    /// `pull` is T tau' of the newest order.
+    /// Returns coefficient n of the vector (u P)' e + u P w x e. Multiplied by -m l^2 it is the torque with which the terms beyond the
+    /// third order act on the craft (see the module's head). `pull` is the part T tau' of order n.
     fn couple(&self, n: usize, pull: f64, w: &Vector, u: &Series) -> Vec3 {
         let mut couple = [0.0, 0.0, u[0] * (self.known[1] + pull)];
         for j in 0..n {

@@ -737,8 +737,8 @@ impl Motion for CraftMotion {
         if self.rubbing.is_empty() { h } else { h.min(self.friction_convergence_radius()) }
     }
 
-    /// Requires four negligible terms in succession with dry friction, because for tanh starting at rest
-    /// three may vanish by symmetry.
+    /// Returns the criterion by which the search for the order of the series ends. With dry friction it requires four negligible terms in
+    /// succession, because three successive terms of tanh vanish by symmetry if the motion starts at rest.
     #[inline(always)]
     fn convergence(&self) -> Convergence {
         if self.rubbing.is_empty() { Convergence::Decay } else { Convergence::Terms(4) }

@@ -446,8 +446,8 @@ impl Tank {
         }
     }
 
-    /// Returns the inertia that craft and rigid liquid must have for bobs with s < 1 within 45 degrees, as a
-    /// body of negative mass.
+    /// Returns the inertia by which bobs with s < 1 reduce the inertia of the craft within 45 degrees of the tank's axis (`surface.rs`), as
+    /// a body of negative mass. Craft and rigid liquid together must have more than this inertia.
     fn lent_inertia(&self) -> Rigid {
         let none = Rigid { mass: 0.0, moment: [0.0; 3], inertia: [[0.0; 3]; 3] };
         (0..self.modes).fold(none, |sum, n| {

@@ -573,8 +573,8 @@ impl<T: Number> Rotary<T> {
         self.lever * rate_d
     }
 
-    /// Returns the couple on the craft per mass of the bob. `slid` is n.(-l y), and `rate_d` is the angular
-    /// acceleration e.w' about the tank's axis.
+    /// Returns the torque on the craft, divided by the bob's mass, that the terms of rotary motion exert in addition to the
+    /// moment of the bob's force. `slid` is n.(-l y), and `rate_d` is the angular acceleration e.w' about the tank's axis.
     pub fn couple(&self, slid: T, rate_d: T, e: Vec3<T>) -> Vec3<T> {
         let tau_d = self.l * self.u * rate_d + self.turning - slid;
         let along = self.l * self.u * (self.inertia * tau_d + self.growing) + self.swept;

@@ -157,8 +157,8 @@ fn check(name: &str, relative: [f64; 3], excess: &mut Vec<String>) {
     }
 }
 
-/// Runs each of the reference motions for 1,000 s. Momentum and angular momentum must change only by the forces and
-/// torques on the craft, and the energy only by their work and by damping.
+/// Runs each of the reference motions for 1,000 s. Momentum and angular momentum must change only by the forces and torques on the craft,
+/// and the energy only by their work and by damping. The tests that follow do the same with random craft.
 #[test]
 #[ignore = "three seconds: .ci/long-tests"]
 fn momentum_angular_momentum_and_energy_balance_over_1000_s_of_every_record() {
@@ -175,15 +175,11 @@ fn name(record: &Value) -> &str {
     record["name"].as_str().unwrap()
 }
 
-/// Runs random craft for 100 s. Momentum and angular momentum must change only by the forces and torques on the
-/// craft, and the energy only by their work and by damping.
 #[test]
 fn momentum_angular_momentum_and_energy_balance_over_100_s_of_random_craft() {
     random_craft(END / 10);
 }
 
-/// Runs random craft for 1,000 s. Momentum and angular momentum must change only by the forces and torques on the
-/// craft, and the energy only by their work and by damping.
 #[test]
 #[ignore = "20 s: .ci/run --nightly"]
 fn momentum_angular_momentum_and_energy_balance_over_1000_s_of_random_craft() {

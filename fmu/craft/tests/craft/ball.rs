@@ -248,8 +248,6 @@ fn drive(
     seen
 }
 
-/// Random craft whose liquid detaches and settles fly for 300 s. Their momentum is constant except for rounding, and
-/// their energy never grows.
 #[test]
 fn momentum_is_exact_and_energy_never_grows_over_300_s_in_six_axes() {
     let mut seen = [0; 6];
@@ -404,7 +402,6 @@ fn detached_liquid_under_two_hundred_random_thrusts_moves_the_same_with_every_co
     move_alike(0..200);
 }
 
-/// The thrust always presses the liquid to the bottom; two craft run with `ball.travel` 0 and 0.6 m.
 #[test]
 fn a_craft_that_allows_detached_liquid_moves_bit_identically_until_the_liquid_detaches() {
     let forward = Inputs { torque: Ramp::held([3.0, -2.0, 1.0]), ..thrust(700.0) };
@@ -848,7 +845,6 @@ fn detachment_and_settling_keep_momenta_and_the_centre_of_mass_and_dissipate_ene
     assert!(settled > 10, "{settled}");
 }
 
-/// A craft with detached liquid is saved before each of 40 steps; the restored craft takes the step to an equal state.
 #[test]
 fn a_saved_state_of_detached_liquid_continues_bit_for_bit() {
     let p = off_axis_craft(&mut Random::new(3));

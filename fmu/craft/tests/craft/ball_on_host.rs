@@ -301,7 +301,8 @@ fn runge_kutta(x: &[f64], h: f64, mut rates: impl FnMut(f64, &[f64]) -> Vec<f64>
     (0..x.len()).map(|i| x[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i])).collect()
 }
 
-/// Returns a craft with one tank that stands off_axis_craft, whose bobs' drag does not depend on the acceleration.
+/// Returns a craft with one tank that stands off the craft's axis and inclined to it. The drag of its bobs does not depend on the
+/// acceleration.
 fn one(random: &mut Random) -> Parameters {
     let mut p = Parameters { tanks: 1, ..off_axis_craft(random) };
     let tank = &mut p.tank[0];
@@ -417,10 +418,10 @@ fn on_the_axis_the_host_s_velocity_is_exact_for_any_communication_step() {
     }
 }
 
-/// Six tanks that stand off_axis_craft fly with thrust backwards, then forwards. The host takes each step first, and host and tank
-/// exchange values that are linear over the step. The errors of rates, lump and dissipated energy are of second order in the
-/// communication step. The errors of attitude and position, and of the momentum's direction, which depends on the attitude, are
-/// of first order, because they lag behind the impulses within a step.
+/// Six tanks off the craft's axis fly with thrust backwards, then forwards. The host takes each step first, and host and tank exchange
+/// values that are linear over the step. The errors of rates, lump and dissipated energy are of second order in the communication step. The
+/// errors of attitude and position, and of the momentum's direction, which depends on the attitude, are of first order, because they lag
+/// behind the impulses within a step.
 #[test]
 fn a_host_that_exchanges_at_communication_points_converges_to_the_spacecraft_s_motion() {
     let errors = |steps: usize| {
@@ -490,8 +491,6 @@ const BALL: usize = 6 * craft::MODES + 2;
 const STATES: [BallState; 4] =
     [BallState::Settled, BallState::Flying, BallState::Sliding, BallState::Light];
 
-/// SloshTank gives a host the force and torque of the liquid, and the bias and the added mass with which the host can solve
-/// for its acceleration.
 #[test]
 fn force_and_torque_of_detached_liquid_equal_bias_minus_added_mass_times_acceleration() {
     for seed in 0..8 {
@@ -561,7 +560,6 @@ fn directional_derivatives_equal_differences_of_rates_and_outputs() {
     }
 }
 
-/// The tank is saved before each of 40 steps, in which the liquid detaches, hits walls and settles.
 #[test]
 fn a_saved_tank_with_detached_liquid_continues_bit_for_bit_and_a_refused_step_changes_no_state() {
     let p = one(&mut Random::new(3));
@@ -588,7 +586,6 @@ fn a_saved_tank_with_detached_liquid_continues_bit_for_bit_and_a_refused_step_ch
     }
 }
 
-/// The specific force of the host always presses the liquid to the bottom; two tanks run with `ball.travel` 0 and 0.6 m.
 #[test]
 fn a_tank_that_allows_detached_liquid_moves_bit_identically_until_the_liquid_detaches() {
     let u = TankInputs {

@@ -279,30 +279,22 @@ fn draining_craft_of(seed: u64, way: Way) -> Vec<f64> {
     craft_states(&p, &table_with_flows(&mut r), way)
 }
 
-/// Random craft on a pivot with dry friction are compared with runs in much shorter steps. The errors must stay near
-/// the tolerance of the solver.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
 fn dry_friction_of_a_pivot_keeps_the_solver_tolerance() {
     keep_the_tolerance((0..20).chain([62]), craft_on_a_pivot_of);
 }
 
-/// Random craft with planar slosh modes under thrust that crosses zero are compared with runs in much shorter steps.
-/// The errors must stay near the tolerance of the solver.
 #[test]
 fn thrust_that_crosses_zero_keeps_the_solver_tolerance_for_planar_modes() {
     keep_the_tolerance(0..15, planar_craft_of);
 }
 
-/// Random draining tanks under thrust that crosses zero are compared with runs in much shorter steps. The errors must
-/// stay near the tolerance of the solver.
 #[test]
 fn thrust_that_crosses_zero_keeps_the_solver_tolerance_for_a_draining_tank() {
     keep_the_tolerance(0..15, draining_tank_of);
 }
 
-/// Random draining craft under thrust that crosses zero are compared with runs in much shorter steps. The errors must
-/// stay near the tolerance of the solver.
 #[test]
 #[ignore = "three seconds: .ci/long-tests"]
 fn thrust_that_crosses_zero_keeps_the_solver_tolerance_for_a_draining_craft() {
@@ -316,8 +308,6 @@ fn thrust_that_crosses_zero_keeps_the_solver_tolerance_for_a_tank() {
     keep_the_tolerance(0..40, tank_of);
 }
 
-/// Random craft under thrust that crosses zero are compared with runs in much shorter steps. The errors must stay
-/// near the tolerance of the solver.
 #[test]
 fn thrust_that_crosses_zero_keeps_the_solver_tolerance_for_a_craft() {
     keep_the_tolerance(0..25, craft_of);

@@ -342,7 +342,6 @@ pub fn energy(out: &Outputs) -> f64 {
     out.energy + out.dissipated + out.drained - out.work
 }
 
-/// The runs take five seconds, with flows that follow ramps and jump every second, in free flight and on a pivot.
 #[test]
 fn the_energy_balance_holds_while_tanks_drain() {
     for seed in (0..8).chain(21..25).chain(41..45) {

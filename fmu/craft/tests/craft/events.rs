@@ -423,7 +423,7 @@ fn by_co_simulation(case: &Case, h: f64) -> Shown {
     compared_quantities(&mut craft, u)
 }
 
-/// Returns the tank of the default craft under a thrust of 1.2 kN that is reversed and slightly off_axis_craft.
+/// Returns the tank of the default craft under a thrust of 1.2 kN that is reversed and slightly inclined to the axis.
 fn default_case() -> Case {
     let mut p = Parameters::default();
     p.tank[0].ball.travel = 0.6;
@@ -616,7 +616,8 @@ fn by_model_exchange(case: &Case, method: Method) -> (Shown, usize) {
     (compared_quantities(&mut own.craft, &case.u), own.impacts)
 }
 
-/// Hosts that locate events, as CVODE does with an output every 5 ms, and with a fixed step; what they may be off by.
+/// Returns hosts that locate events, as CVODE does with an output every 5 ms, and with a fixed step, each with the largest allowed error of
+/// its results.
 fn locating(case: &Case) -> [(Method, f64); 3] {
     let step = case.step();
     let fixed = (step / 4.0).min(5e-3);
@@ -787,8 +788,6 @@ impl Equations for OnHost<'_> {
     }
 }
 
-/// A Model Exchange host with steps of up to 5 ms integrates SloshTank with detached liquid; its end state agrees with an
-/// independent simulator.
 #[test]
 fn hosts_of_a_slosh_tank_find_impacts_after_bounces_shorter_than_their_steps() {
     let method = Method { tolerance: 1e-9, longest: 5e-3, locates: true };
@@ -810,7 +809,7 @@ fn hosts_of_a_slosh_tank_find_impacts_after_bounces_shorter_than_their_steps() {
     }
 }
 
-/// The first three modes of the default tank; the liquid is thrown off off_axis_craft and comes back under thrust along the axis.
+/// The first three modes of the default tank. The liquid leaves the bottom obliquely and comes back under thrust along the axis.
 #[test]
 fn liquid_of_three_modes_that_has_settled_stays_under_steady_thrust() {
     for seed in 0..9 {

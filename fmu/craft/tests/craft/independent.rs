@@ -464,8 +464,6 @@ fn assert_close(got: &[f64], want: &[f64], size: f64, tolerance: f64, what: &str
 // Both solve a system whose condition is some 1e3: rounding leaves 1e-13 to 1e-12.
 const ROUNDING: f64 = 1e-11;
 
-/// 300 random craft: Newton's law for the craft and each slosh mass is solved with the forces in the pendulums' rods as
-/// unknowns.
 #[test]
 fn accelerations_forces_and_torques_follow_newtons_law_with_the_rod_forces_as_unknowns() {
     for seed in 0..300 {

@@ -13,7 +13,6 @@ fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs() / (1.0 + a.abs().max(b.abs()))).fold(0.0, f64::max)
 }
 
-/// One communication step of two seconds gives the same result as steps of random lengths that add up to two seconds.
 #[test]
 fn results_do_not_depend_on_the_communication_step() {
     for seed in 0..30 {
@@ -439,7 +438,6 @@ fn principal_moments_that_no_body_has_are_refused() {
     );
 }
 
-/// Steps with random parameters and inputs give finite states, or an error that leaves the state unchanged.
 #[test]
 fn random_steps_give_finite_results_or_an_error() {
     let mut refused = 0;
@@ -516,7 +514,6 @@ fn slosh_masses_of_planar_modes_stay_in_their_planes_within_rounding() {
     }
 }
 
-/// The craft has one tank with one mode; the states of all other modes keep their values although one has an initial rate.
 #[test]
 fn slosh_masses_of_unused_modes_and_tanks_stay_at_rest() {
     let mut p = Parameters::default();
@@ -535,7 +532,6 @@ fn slosh_masses_of_unused_modes_and_tanks_stay_at_rest() {
     assert_eq!(out.mass, 1180.0 + 253.493 + 128.211);
 }
 
-/// Spacecraft with four tanks, and SloshTank with planar and other modes, take 100 steps without allocating memory.
 #[test]
 fn nothing_is_allocated_while_stepping() {
     let record = record("four_tanks");
@@ -565,8 +561,6 @@ fn nothing_is_allocated_while_stepping() {
     assert_eq!(counted.count_total, 0);
 }
 
-/// A tank without a fill table keeps its mass under an outflow; with a table, an outflow that empties the tank below the
-/// table is refused.
 #[test]
 fn an_impossible_outflow_is_refused() {
     let (mut p, mut u) = (Parameters::default(), Inputs::default());

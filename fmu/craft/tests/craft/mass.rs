@@ -52,7 +52,6 @@ fn assert_same(got: (f64, [f64; 3], [[f64; 3]; 3]), want: &Body) {
     }
 }
 
-/// The outputs mass, centre of mass and inertia of random craft equal sums over dry craft, rigid liquid and slosh masses.
 #[test]
 fn mass_properties_equal_those_of_all_bodies_together() {
     for seed in 0..20 {

@@ -20,8 +20,8 @@ fn random_rows(random: &mut Random, total: f64) -> Vec<f64> {
     times.windows(2).map(|pair| pair[1] - pair[0]).collect()
 }
 
-/// A craft of each kind: pendulums, drag that follows the motion, other surfaces, planar modes, a pivot with dry friction,
-/// liquid that may detach, flexible appendages, spinning liquid.
+/// Returns a craft of the given kind: pendulums, drag that follows the motion, other surfaces, planar modes, a pivot with dry friction,
+/// liquid that may detach, flexible appendages, or spinning liquid.
 fn craft_of(kind: usize, seed: u64) -> (Parameters, [Inputs; 4]) {
     let mut random = Random::new(seed);
     let mut p = random.parameters();

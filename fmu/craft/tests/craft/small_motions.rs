@@ -146,8 +146,6 @@ fn poles_and_zeros_are_the_closed_forms_with_and_without_centring_stiffness() {
     }
 }
 
-/// A craft with one tank turns about one axis; damping and frequency of the slosh pole equal the roots of the quadratic in
-/// closed form.
 #[test]
 fn a_damped_slosh_pole_equals_the_closed_form() {
     let c = 31.9467;

@@ -78,8 +78,6 @@ fn assert_roots(found: [C; 2], want: [C; 2], what: &str) {
     assert!(off(0).min(off(1)) < 2e-9, "{what}: {found:?} {want:?}");
 }
 
-/// A spinning craft with a full spheroidal tank; the nutation frequencies equal the roots of the characteristic equation
-/// for Poincaré's flow of uniform vorticity.
 #[test]
 fn craft_with_full_spheroids_nutate_at_the_rates_of_poincare() {
     for (k, (body, want)) in SPHEROIDS.into_iter().enumerate() {
@@ -437,7 +435,6 @@ fn parameters_of_the_spin_without_spin_inertia_change_no_bit() {
     assert_eq!(bits(neutral), before);
 }
 
-/// For example `spin_inertia` = 1e-12, or a spin together with detached liquid; the error names the parameter.
 #[test]
 fn the_spin_of_liquid_is_refused_with_a_too_small_inertia_and_with_options_that_move_the_liquid() {
     let said = |change: &dyn Fn(&mut Tank)| {

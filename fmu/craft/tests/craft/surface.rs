@@ -44,7 +44,6 @@ fn frequencies_shift_as_s_and_kappa_predict_up_to_fourth_order() {
     }
 }
 
-/// One step gives the same result as shorter steps, and as a Runge-Kutta integration of the tank's derivatives.
 #[test]
 fn the_motion_of_a_tank_does_not_depend_on_the_communication_step() {
     for seed in 0..8 {
@@ -451,7 +450,6 @@ fn coefficients_beyond_the_third_order_are_refused_with_planar_modes_and_fill_ta
     assert!(said[0].starts_with("tank.nonlinear_inertia_2[1] = 200000.0 (allowed: "), "{said:?}");
 }
 
-/// A tank whose table has the same s and kappa at all points moves as a tank with these coefficients.
 #[test]
 fn a_fill_table_with_constant_s_and_kappa_moves_as_a_tank_with_these_values() {
     for seed in 0..6 {
