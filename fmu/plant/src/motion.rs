@@ -31,8 +31,9 @@ pub(crate) fn out_of_range(time: f64, mode: usize, what: &str) -> StepError {
     StepError::Model(format!("slosh mode {number} left its range at t = {time} s: {what}"))
 }
 
-/// Events at which a step stops. `offset` is the time from the start of the step to the current stretch, s;
-/// events up to `passed` seconds after the start of the step are ignored (infinity ignores all).
+/// Place of the current stretch of motion within its step, which decides whether an event stops the step. `offset` is the
+/// time from the start of the step to the start of the stretch, s. Events up to `passed` seconds after the start of the
+/// step do not stop it; with infinity no event does.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stop {
     pub offset: f64,

@@ -28,6 +28,8 @@ pub trait FrictionLaw {
 
     const STICKS: bool = false;
 
+    /// Number of successive negligible terms of the power series after which the search for its order ends. A law
+    /// whose terms vanish by symmetry needs more than the usual two.
     const NEGLIGIBLE_TERMS: usize = 2;
 
     fn new(p: &Friction) -> Self;

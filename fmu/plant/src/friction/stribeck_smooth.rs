@@ -35,7 +35,7 @@ pub struct StribeckSmooth {
 }
 
 impl FrictionLaw for StribeckSmooth {
-    /// One term may vanish by symmetry. For tanh(w/eps) from w = w' = 0 three successive terms vanish.
+    /// Four, because three successive terms of tanh(w/eps) vanish by symmetry if the motion starts with w = w' = 0.
     const NEGLIGIBLE_TERMS: usize = 4;
 
     fn new(p: &Friction) -> StribeckSmooth {
