@@ -1,8 +1,9 @@
 //! Estimates the FMU's parameters, with their uncertainty, from recordings of torque and hub rate.
 //!
-//! One [`engine`] makes every fit: it searches, states intervals and tests the residual, and knows no FMU. [`bench`] and [`any_fmu`]
-//! are its data for the slosh bench and for other FMUs, [`methods`] what is asked of the bench. [`input`] reads recordings, [`model`]
-//! runs FMUs, [`words`] says what was found. [`tuning`] has constants of these that are chosen and not derived.
+//! All fits use one [`engine`], which searches the minimum, computes intervals and tests the residual, and which knows no FMU. [`bench`]
+//! and [`any_fmu`] state the estimation problems of the slosh bench and of other FMUs, and [`methods`] contains the kinds of identification
+//! of the bench. [`input`] reads recordings, [`model`] runs FMUs, and [`words`] writes verdicts and pages. [`tuning`] has the constants of
+//! these modules that are chosen and not derived.
 
 pub mod any_fmu;
 pub mod bench;

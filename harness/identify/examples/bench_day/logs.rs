@@ -1,5 +1,6 @@
-//! A day of logs from the bench that is not the FMU: friction runs, free decays, a gyro at rest and sine sweeps, as a logger
-//! writes them. The gyro has three axes with bias, noise and quantisation; the platform tilts with the hub's motion.
+//! Logs of a simulated day of tests, on a bench whose equations are independent of the FMU: friction runs, free decays, a gyro at rest and
+//! sine sweeps, as a logger writes them. The gyro has three axes with bias, noise and quantisation; the platform tilts with the hub's
+//! motion.
 
 use std::f64::consts::TAU;
 use std::fmt::Write as _;

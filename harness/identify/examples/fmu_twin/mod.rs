@@ -261,7 +261,7 @@ struct Lag {
 }
 
 impl Lag {
-    /// Returns y after a step on which u is a line from its last value, by the trapezoidal rule.
+    /// Returns y after a step during which u changes linearly from its last value, by the trapezoidal rule.
     fn step(&mut self, u: f64, step: f64) -> f64 {
         let half = 0.5 * step / LAG;
         self.y = ((1.0 - half) * self.y + half * (self.u + u)) / (1.0 + half);

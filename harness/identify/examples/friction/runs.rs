@@ -1,5 +1,5 @@
-//! Runs for the identification of friction and inertia, of a bench that is not the FMU: a ramp, a step and a sweep with a rigid liquid, with
-//! the gyro of Rubaga's thesis and the encoder's angle.
+//! Runs for the identification of friction and inertia, on a bench whose equations are independent of the FMU: a ramp, a step and a sweep
+//! with a rigid liquid, with the gyro of Rubaga's thesis and the encoder's angle.
 
 use std::f64::consts::TAU;
 

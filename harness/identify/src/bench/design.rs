@@ -252,8 +252,8 @@ pub fn within_angle(
     Ok(within)
 }
 
-/// Returns the geometric mean of the relative standard deviations, by which plans are compared: the smaller, the more a plan
-/// tells. An unknown that is expected to be 0, such as a delay or a bias, has no relative deviation and does not count.
+/// Returns the geometric mean of the relative standard deviations, by which plans are compared: the smaller it is, the more information a
+/// plan gives. An unknown that is expected to be 0, such as a delay or a bias, has no relative deviation and does not count.
 pub fn merit(bounds: &[(String, f64, f64)]) -> f64 {
     let relative = bounds.iter().filter(|(_, value, _)| *value != 0.0);
     let logarithms: Vec<f64> = relative.map(|(_, value, std)| (std / value.abs()).ln()).collect();

@@ -1,4 +1,5 @@
-//! The slosh bench as data for [`crate::engine`]: what a recording shows, what that means in tank and hub, and what may act besides.
+//! The slosh bench as an estimation problem for [`crate::engine`]: the model and its unknowns, their conversion to dimensions of tank and
+//! hub, and effects that the model lacks, for example lags of the actuator and the gyro.
 
 pub mod answer;
 pub mod braking;

@@ -75,7 +75,7 @@ impl List<'_> {
         Unknown::positive(name, &unit, Role::Run(None), start, bounds)
     }
 
-    /// Returns a parameter of the FMU that may be 0 as an unknown that is searched in its value.
+    /// Returns a parameter of the FMU that may be 0 as an unknown. The search varies the value itself, because a logarithm cannot reach 0.
     fn nonnegative(&self, name: &str, start: f64) -> Unknown {
         let (unit, bounds) = self.variable(name, (0.0, f64::INFINITY));
         Unknown::linear(name, &unit, Role::Run(None), (start, start), bounds)

@@ -1,7 +1,7 @@
-//! Signals on clocks of their own, on one set of rows: which rows have a value of a signal, and what stands in the others.
+//! Signals that are sampled by different clocks, in one table: which rows have a measured value of a signal, and what fills the other rows.
 //!
-//! The rows of a recording are all instants at which something was measured. A sensor that has no value in a row is not fitted
-//! there; a torque that has none lies between its own samples. The values that stand in such rows serve spectra and plots alone.
+//! The rows of a recording are all instants at which something was measured. Where a sensor has no value, it is not compared with the
+//! model; a torque without a value is interpolated between its own samples. The filled-in values are used only for spectra and plots.
 
 use std::f64::consts::PI;
 

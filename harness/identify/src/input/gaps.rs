@@ -102,8 +102,8 @@ fn after<'v>(values: &'v [f64], gaps: &[usize], n: usize) -> &'v [f64] {
     &values[n + 1..to.min(n + 1 + GAP_SIDE)]
 }
 
-/// Returns the root mean square of the summed errors of trial fillings of `lost` samples that are known; infinite if no trial is
-/// possible.
+/// Estimates the error of filling a gap of `lost` samples by trials: known samples in other places are removed and filled, and the result
+/// is the root mean square of their summed errors. It is infinite if no trial is possible.
 fn tried_out(values: &[f64], gaps: &[usize], lost: usize) -> f64 {
     let side = 4 * GAP_ORDER;
     let room = values.len().saturating_sub(2 * side + lost);

@@ -1,5 +1,5 @@
-//! Plausibility of a recording for this bench: sizes that only a wrong unit produces, and evidence of further columns
-//! about the torque and other axes.
+//! Checks whether a recording is plausible for this bench: an inertia that only a wrong unit explains, and what additional columns show,
+//! for example the wheel's speed or rates about other axes.
 
 use anyhow::{Result, bail};
 

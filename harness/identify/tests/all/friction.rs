@@ -1,4 +1,4 @@
-//! Friction and inertia from runs of the torque, on recordings of a bench that is not the FMU.
+//! Friction and inertia from runs of the torque, on recordings of a bench whose equations are independent of the FMU.
 
 use std::collections::BTreeMap;
 

@@ -1,4 +1,4 @@
-//! Twins that are identified through a sensor that is not an output of the FMU's, and through its force.
+//! Twins that are identified through a sensor that is not an output of the FMU, for example a wave gauge or a force sensor.
 
 use experiments::profile::Torque;
 use experiments::run::{Run, TORQUE};
@@ -49,7 +49,7 @@ fn twin(sensor: &Sensor, column: &str) -> Record {
     }
 }
 
-/// Identifies a twin by one column of a sensor; `noise` of a reading as it is specified.
+/// Identifies a twin from one column of a sensor. `noise` is the specified standard deviation of one reading.
 fn comes_back(sensor: &str, column: &str, noise: f64) {
     let sensor: Sensor = sensor.parse().unwrap();
     let record = twin(&sensor, column);
