@@ -490,7 +490,8 @@ fn defect(segment: &Segment) -> Option<String> {
     None
 }
 
-/// Makes a closed curve away from the axis (a torus), which may begin anywhere, begin at its top.
+/// Rotates the list of segments of a closed contour away from the axis (a torus) so that it begins at the contour's
+/// highest point. Other contours are returned unchanged.
 fn from_the_top(segments: Vec<Segment>, size: f64) -> Vec<Segment> {
     let (start, end) = (segments[0].start(), segments[segments.len() - 1].end());
     if norm(sub(start, end)) > JOINED * size || start[0] <= JOINED * size {
