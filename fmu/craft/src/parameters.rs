@@ -770,7 +770,7 @@ impl Tank {
         }
         if !(2..=POINTS).contains(&table.points) {
             problems.0.push(format!(
-                "{name}.fill.points = {} (allowed: 0, or 2 to {POINTS})",
+                "{name}.fill.points = {} (allowed: 0 for a tank that does not drain, or 2 to {POINTS})",
                 table.points
             ));
             return;
@@ -784,7 +784,7 @@ impl Tank {
             problems.number(&name_of("liquid"), masses[i], low, HEAVIEST, "kg");
             if i > 0 && masses[i] == low {
                 problems.0.push(format!(
-                    "{} = {low:?} kg (allowed: more than at the previous point)",
+                    "{} = {low:?} kg equals the mass of the previous point (allowed: masses that increase from point to point)",
                     name_of("liquid")
                 ));
             }
@@ -828,7 +828,8 @@ impl Tank {
         ] {
             if is_set {
                 problems.0.push(format!(
-                    "{name}.{what} with {name}.fill (allowed: {name}.{what} = 0, because the table gives the modes)"
+                    "{name}.{what} cannot be combined with {name}.fill.points above 0, because the fill table gives the modes: set \
+                     {name}.{what} = 0, or {name}.fill.points = 0"
                 ));
             }
         }
@@ -894,16 +895,16 @@ impl Tank {
                 problems.number(&format!("{name}.{what}[{i}]"), value, -1e5, 1e5, "");
                 if value != 0.0 && self.fill.points > 0 {
                     problems.0.push(format!(
-                        "{name}.{what}[{i}] = {value:?} with {name}.fill (allowed: 0, because the table has coefficients of the third \
-                         order only)"
+                        "{name}.{what}[{i}] = {value:?} cannot be combined with {name}.fill.points above 0, because a fill table has \
+                         only coefficients of the third order: set {name}.{what}[{i}] = 0"
                     ));
                 } else if value != 0.0
                     && what.starts_with("rotary")
                     && self.plane_normal(n).is_some()
                 {
                     problems.0.push(format!(
-                        "{name}.{what}[{i}] = {value:?} with {name}.direction[{i}] (allowed: 0, because a mode in a plane does not \
-                         rotate)"
+                        "{name}.{what}[{i}] = {value:?} cannot be combined with {name}.direction[{i}], because a mode that swings in a \
+                         plane has no rotary motion: set {name}.{what}[{i}] = 0, or {name}.direction[{i}] = 0"
                     ));
                 }
             }
@@ -912,8 +913,9 @@ impl Tank {
             problems.number(&format!("{name}.gyroscopic_stiffness[{i}]"), epsilon, -1e3, 1e3, "");
             if self.gyroscopic(n).is_some() && self.plane_normal(n).is_some() {
                 problems.0.push(format!(
-                    "{name}.gyroscopic[{i}] = {c:?} and gyroscopic_stiffness[{i}] = {epsilon:?} with {name}.direction[{i}] \
-                     (allowed: 1 and 0, because a mode in a plane does not rotate)"
+                    "{name}.gyroscopic[{i}] = {c:?} and {name}.gyroscopic_stiffness[{i}] = {epsilon:?} cannot be combined with \
+                     {name}.direction[{i}], because a mode that swings in a plane has no rotary motion: set {name}.gyroscopic[{i}] = 1 \
+                     and {name}.gyroscopic_stiffness[{i}] = 0"
                 ));
             }
             for (what, value) in
@@ -978,14 +980,16 @@ impl Tank {
         ];
         if self.ball.travel > 0.0 && self.has_surface() {
             problems.0.push(format!(
-                "{name}.ball.travel with {name}.nonlinear_inertia or {name}.nonlinear_stiffness (allowed: ball.travel = 0, or \
-                 both 1 in every mode, because liquid detaches from pendulums only)"
+                "{name}.ball.travel cannot be combined with {name}.nonlinear_inertia or {name}.nonlinear_stiffness other than 1, \
+                 because the model of detached liquid takes over from pendulums only: set {name}.ball.travel = 0, or both \
+                 coefficients to 1 in every mode"
             ));
         }
         for (what, _) in uneven.iter().filter(|(_, is_set)| *is_set) {
             for (other, _) in axial.iter().filter(|(_, is_set)| *is_set) {
                 problems.0.push(format!(
-                    "{name}.{other} with {name}.{what} (allowed: one of them 0, because {other} is for axisymmetric tanks)"
+                    "{name}.{other} cannot be combined with {name}.{what}, because {name}.{other} is for axisymmetric tanks: set one \
+                     of the two to 0"
                 ));
             }
         }
@@ -1014,8 +1018,8 @@ impl Tank {
         {
             if is_set {
                 problems.0.push(format!(
-                    "{name}.spin_inertia with {name}.{what} (allowed: one of them 0, because the spin of liquid that leaves its \
-                     place is not modelled)"
+                    "{name}.spin_inertia cannot be combined with {name}.{what}, because the spin of liquid that drains or detaches is \
+                     not modelled: set one of the two to 0"
                 ));
             }
         }
@@ -1047,25 +1051,26 @@ impl Tank {
         let mass = self.whole_mass();
         if mass <= 0.0 {
             problems.0.push(format!(
-                "{name}.ball.travel with {name}.m_0 = {:?} kg: m_0 and the bobs of all modes add up to {mass:?} kg of \
-                 liquid (allowed: more than 0)",
-                self.m_0
+                "{name}.ball.travel = {:?} m needs liquid, but {name}.m_0 = {:?} kg and {name}.mass of all modes add up to {mass:?} kg \
+                 (allowed: more than 0)",
+                ball.travel, self.m_0
             ));
             return;
         }
         let Some(surface) = self.ball_surface() else {
             let modes = self.modes;
             problems.0.push(format!(
-                "{name}.ball.travel with {name}.modes = {modes} (allowed: at least one mode, because its bob decides when the \
-                 liquid detaches)"
+                "{name}.ball.travel = {:?} m cannot be combined with {name}.modes = {modes}, because the slosh angle of a mode decides \
+                 when the liquid detaches: set {name}.modes to 1 or more, or {name}.ball.travel = 0",
+                ball.travel
             ));
             return;
         };
         let least = 2.0 * surface.gyration;
         if ball.travel < least {
             problems.0.push(format!(
-                "{name}.ball.travel = {:?} (allowed: 0, or at least {least:?} m, twice the sum of {name}.mass {name}.length \
-                 over the liquid's mass)",
+                "{name}.ball.travel = {:?} m (allowed: 0, or at least {least:?} m, which is twice the sum of {name}.mass \
+                 {name}.length over all modes divided by the mass of the liquid)",
                 ball.travel
             ));
             return;
@@ -1073,8 +1078,8 @@ impl Tank {
         let least = libm::sqrt(surface.half * surface.gyration);
         if ball.radius > 0.0 && ball.radius < least {
             problems.0.push(format!(
-                "{name}.ball.radius = {:?} (allowed: 0, or at least {least:?} m, the curvature of the path of the pendulums' \
-                 common centre at the bottom)",
+                "{name}.ball.radius = {:?} m (allowed: 0, or at least {least:?} m, which gives the surface at the bottom the curvature \
+                 of the path of the pendulums' common centre)",
                 ball.radius
             ));
         }
@@ -1124,8 +1129,8 @@ impl Craft {
         let negative = determinant < -1e-12 * xx * yy * zz;
         if !indefinite && negative {
             problems.0.push(format!(
-                "{name}.Jxx to {name}.Jyz have a negative principal moment: the determinant is {determinant:?} \
-                 kg3.m6 (allowed: 0 and above)"
+                "{name}.Jxx to {name}.Jyz have a negative principal moment of inertia: the determinant of the inertia matrix is \
+                 {determinant:?} kg3.m6 (allowed: 0 and above)"
             ));
         }
         // None of the integrals of y^2 + z^2, x^2 + z^2 and x^2 + y^2 exceeds the sum of the other
@@ -1149,7 +1154,7 @@ impl Craft {
         self.find_problems(name, &mut problems);
         if problems.0.is_empty() && smallest_pivot(&self.rigid().mass_matrix()) < 1e-12 {
             problems.0.push(format!(
-                "{name}.J is singular: the inertia about every axis must be above 0"
+                "{name}.Jxx to {name}.Jyz are singular: the inertia about every axis must be above 0 kg.m2"
             ));
         }
         problems.0
@@ -1229,8 +1234,8 @@ impl Parameters {
         let that_drains = tanks.iter().position(|tank| tank.fill.points > 0);
         if let (Some(ball), Some(drains)) = (with_ball, that_drains) {
             problems.0.push(format!(
-                "tank[{}].ball.travel with tank[{}].fill.points (allowed: one of them 0, because a craft with detached \
-                 liquid cannot have a draining tank)",
+                "tank[{}].ball.travel cannot be combined with tank[{}].fill.points, because a craft with a model of detached liquid \
+                 cannot have a tank that drains: set one of the two to 0",
                 ball + 1,
                 drains + 1
             ));
@@ -1240,26 +1245,27 @@ impl Parameters {
             (
                 Tank::is_planar,
                 "direction",
-                "one of them 0, because a craft with detached liquid cannot have planar modes",
+                ", because a craft with a model of detached liquid cannot have planar modes: set one of the two to 0",
             ),
             (
                 Tank::has_surface,
                 "nonlinear_inertia or nonlinear_stiffness",
-                "ball.travel = 0, or both 1 in every mode, because a craft with detached liquid has pendulums only",
+                " other than 1, because a craft with a model of detached liquid can have pendulums only: set ball.travel = 0, or both \
+                 coefficients to 1 in every mode",
             ),
             (
                 |tank| tank.spin_inertia > 0.0,
                 "spin_inertia",
-                "one of them 0, because a craft with detached liquid has no liquid that spins",
+                ", because a craft with a model of detached liquid cannot have liquid that spins: set one of the two to 0",
             ),
         ];
-        for (has, what, allowed) in others {
+        for (has, what, remedy) in others {
             let other = tanks.iter().position(has);
             if let (Some(ball), Some(other)) = (with_ball, other)
                 && ball != other
             {
                 problems.0.push(format!(
-                    "tank[{}].ball.travel with tank[{}].{what} (allowed: {allowed})",
+                    "tank[{}].ball.travel cannot be combined with tank[{}].{what}{remedy}",
                     ball + 1,
                     other + 1
                 ));
@@ -1267,7 +1273,8 @@ impl Parameters {
         }
         if let (Some(ball), Mount::Pivot) = (with_ball, self.mount) {
             problems.0.push(format!(
-                "tank[{}].ball.travel with mount = pivot (allowed on a pivot: 0)",
+                "tank[{}].ball.travel cannot be combined with mount = pivot, because detached liquid is modelled for a craft in free \
+                 flight only: set ball.travel = 0",
                 ball + 1
             ));
         }
@@ -1277,7 +1284,8 @@ impl Parameters {
         problems.vector("init.velocity", &self.init.velocity, "m/s");
         if self.mount == Mount::Pivot && self.init.velocity != [0.0; 3] {
             problems.0.push(format!(
-                "init.velocity = {:?} m/s with mount = pivot (allowed: 0, because the pivot holds O)",
+                "init.velocity = {:?} m/s cannot be combined with mount = pivot, because the pivot holds the origin O of the body \
+                 frame: set init.velocity = 0",
                 self.init.velocity
             ));
         }
@@ -1285,9 +1293,9 @@ impl Parameters {
             let tanks: Vec<Tank> = self.tank[..self.tanks].iter().map(Tank::resolve).collect();
             if let Some(place) = singular_where(self.craft.rigid(), &tanks) {
                 problems.0.push(format!(
-                    "craft.J with the tanks' m_0, I_0 and I_z is singular{place}. Mass of craft and rigid liquid, and their inertia \
-                     about every axis through their centre of mass, must be above 0: increase craft.mass or craft.J, or the \
-                     tanks' m_0, I_0 and I_z"
+                    "the mass matrix of craft.mass, craft.Jxx to craft.Jyz and the tanks' m_0, I_0 and I_z is singular{place}. Mass of craft and rigid liquid, and their inertia \
+                     about every axis through their centre of mass, must be above 0: increase craft.mass or craft.Jxx to craft.Jzz, or \
+                     the tanks' m_0, I_0 and I_z"
                 ));
             } else if let Some(structure) =
                 Structure::new(&self.appendage[..self.appendages], self.craft.rigid())

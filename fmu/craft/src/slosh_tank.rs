@@ -185,15 +185,19 @@ impl TankParameters {
         let all = [
             (
                 self.host.is_none(),
-                "tank.ball.travel with host.mass = 0 (allowed: host.mass above 0, because impacts depend on the mass and \
-                 inertia of the host, host.mass to host.Jyz)",
+                "tank.ball.travel cannot be combined with host.mass = 0, because impacts of detached liquid depend on the mass and \
+                 inertia of the host: set host.mass to host.Jyz, or tank.ball.travel = 0",
             ),
             (
                 self.coupling != Coupling::Split,
-                "tank.ball.travel with coupling = lumped or rigid_body (allowed: coupling = split, because detached liquid \
-                 adds no mass to the host)",
+                "tank.ball.travel cannot be combined with coupling = lumped or rigid_body, because detached liquid adds no mass to the \
+                 host: set coupling = split, or tank.ball.travel = 0",
             ),
-            (drains, "tank.ball.travel with tank.fill.points (allowed: one of them 0)"),
+            (
+                drains,
+                "tank.ball.travel cannot be combined with tank.fill.points, because a tank that drains has no model of detached \
+                 liquid: set one of the two to 0",
+            ),
         ];
         all.into_iter().filter(|(is_so, _)| *is_so).map(|(_, said)| said).collect()
     }
@@ -205,16 +209,17 @@ impl TankParameters {
         let mass = tank.whole_mass();
         if mass <= 0.0 {
             return Some(format!(
-                "tank.m_0 = {:?} kg and the bobs of all modes add up to {mass:?} kg of liquid (allowed: more than 0)",
+                "tank.m_0 = {:?} kg and tank.mass of all modes add up to {mass:?} kg of liquid (allowed: more than 0)",
                 tank.m_0
             ));
         }
         let host = self.host?;
         singular_where(host.rigid(), &[tank]).map(|place| {
             format!(
-                "host.J with the tank's m_0, I_0, dI_y, I_z and products is singular{place}. Mass of host and rigid liquid, and \
-                 their inertia about every axis through their centre of mass, must be above 0: increase host.mass or host.J, or \
-                 the tank's m_0, I_0 and I_z"
+                "the mass matrix of host.mass, host.Jxx to host.Jyz and the tank's m_0, I_0, I_z, dI_y, I_xy, I_xz and I_yz is \
+                 singular{place}. Mass of host and rigid liquid, and \
+                 their inertia about every axis through their centre of mass, must be above 0: increase host.mass or \
+                 host.Jxx to host.Jzz, or the tank's m_0, I_0 and I_z"
             )
         })
     }

@@ -56,8 +56,8 @@ pub(crate) fn problems(p: &Parameters) -> Vec<String> {
     let along_one = slosh.model.moves_along_one();
     if table.one_axis && !along_one {
         problems.push(
-            "slosh.table.one_axis with slosh.model = spherical or liquid, which move along both axes with the \
-             same modes (allowed: slosh.model = frozen, linear or planar)"
+            "slosh.table.one_axis = true cannot be combined with slosh.model = spherical or liquid, whose slosh masses move along \
+             both axes with the same modes: set slosh.model = frozen, linear or planar, or slosh.table.one_axis = false"
                 .to_string(),
         );
     }
@@ -65,8 +65,8 @@ pub(crate) fn problems(p: &Parameters) -> Vec<String> {
     let askew = (0..modes).find(|n| table.direction[*n] != 0.0);
     if let (Some(n), false) = (askew, along_one) {
         problems.push(format!(
-            "slosh.table.direction[{}] = {} rad with slosh.model = spherical or liquid, which move along all \
-             directions with the same frequency (allowed: slosh.model = frozen, linear or planar)",
+            "slosh.table.direction[{}] = {} rad cannot be combined with slosh.model = spherical or liquid, whose slosh masses move \
+             along all directions with the same frequency: set slosh.model = frozen, linear or planar, or the direction to 0",
             n + 1,
             table.direction[n]
         ));
@@ -81,8 +81,8 @@ pub(crate) fn problems(p: &Parameters) -> Vec<String> {
         let (length, frequency, n) = (table.length[n], table.frequency[n], n + 1);
         if (length > 0.0) == (frequency > 0.0) {
             problems.push(format!(
-                "slosh.table.length[{n}] = {length} and slosh.table.frequency[{n}] = {frequency} \
-                 (allowed: one of them greater than 0, the other 0)"
+                "slosh.table.length[{n}] = {length} m and slosh.table.frequency[{n}] = {frequency} Hz: set one of the two above 0 and \
+                 the other to 0, because each determines the other"
             ));
         }
     }
@@ -92,7 +92,8 @@ pub(crate) fn problems(p: &Parameters) -> Vec<String> {
     let length = |n: usize| table.pendulum_length(n);
     for n in (0..modes).filter(|n| length(*n).is_nan() || length(*n) <= 0.0) {
         problems.push(format!(
-            "slosh.table.frequency[{0}] = {1} Hz (allowed: above the frequency that slosh.table.k[{0}] = {2} N/m causes without gravity)",
+            "slosh.table.frequency[{0}] = {1} Hz (allowed: above the frequency that the stiffness slosh.table.k[{0}] = {2} N/m causes without \
+             gravity)",
             n + 1,
             table.frequency[n],
             table.k[n]
@@ -123,8 +124,8 @@ pub(crate) fn problems(p: &Parameters) -> Vec<String> {
     let least = p.hub.inertia + p.tank.own_inertia + table.least_inertia(modes, p.tank.r);
     if askew.is_some() && slosh.model == SloshModel::Planar && least <= 0.0 {
         problems.push(format!(
-            "slosh.table.direction: hub and liquid have the inertia {least} kg.m2 at the most unfavourable directions of the slosh masses \
-             (allowed: greater than 0; hub.I = {} kg.m2)",
+            "slosh.table.direction: at the most unfavourable directions of the slosh masses hub and liquid together have the inertia {least} \
+             kg.m2 (allowed: greater than 0). Increase hub.I = {} kg.m2, or reduce slosh.table.mass",
             p.hub.inertia
         ));
     }
@@ -175,8 +176,8 @@ pub(crate) fn warnings(p: &Parameters, g: f64) -> Vec<String> {
     warnings.extend(leaning::warnings(p));
     if !geometry && slosh.model == SloshModel::Linear && slosh.table.is_askew(slosh.modes) {
         warnings.push(
-            "slosh.table.direction with slosh.model = linear: rotation of the hub excites only the tangential part of a mode. \
-             Use slosh.model = planar for centrifugal and Coriolis forces"
+            "slosh.table.direction is set and slosh.model = linear: this model has no centrifugal and Coriolis forces, so that \
+             rotation of the hub excites only the tangential part of a mode. Set slosh.model = planar for these forces"
                 .to_string(),
         );
     }
@@ -184,7 +185,7 @@ pub(crate) fn warnings(p: &Parameters, g: f64) -> Vec<String> {
         _ if slosh.model != SloshModel::Liquid => {}
         SloshSource::Geometry => warnings.extend(third_order_warning(p.tank.h / radius)),
         SloshSource::Table if slosh.third_order(0, 0.0) == (1.0, 1.0) => warnings.push(
-            "slosh.table.nonlinear_inertia[1] and slosh.table.nonlinear_stiffness[1] are 1 with slosh.model = liquid: the \
+            "slosh.table.nonlinear_inertia[1] and slosh.table.nonlinear_stiffness[1] are 1 although slosh.model = liquid: the \
              frequency of mode 1 then falls with the amplitude like the frequency of a pendulum, whatever the tank. Set both to the coefficients of this tank"
                 .to_string(),
         ),
@@ -202,15 +203,15 @@ pub(crate) fn warnings(p: &Parameters, g: f64) -> Vec<String> {
         ));
     } else if centring[0] == 0.0 && bond < LOW_BOND {
         warnings.push(format!(
-            "the Bond number is {bond:.3}: capillarity matters, but the model does not include it. Set \
-             slosh.capillarity or slosh.table.k"
+            "the Bond number is {bond:.3} (below {LOW_BOND}): surface tension changes the slosh frequency noticeably, but the model \
+             does not include it. Set slosh.capillarity or slosh.table.k"
         ));
     }
     if geometry && slosh.capillarity && bond < LOW_BOND {
         warnings.push(format!(
-            "slosh.capillarity at the Bond number {bond:.3} holds for a flat surface and a free contact \
-             line. For other contact angles set slosh.table.k. The modal masses remain those \
-             of a flat surface, because those of a curved meniscus are unknown"
+            "slosh.capillarity = true at the Bond number {bond:.3}: the frequencies are valid for a flat surface whose contact line \
+             moves freely. For other contact angles set slosh.table.k. The modal masses are those of a flat surface, because the \
+             masses under a curved meniscus are unknown"
         ));
     }
     warnings
@@ -259,8 +260,8 @@ fn inertia_problems(p: &Parameters) -> impl Iterator<Item = String> {
              slosh.model = spherical"
         ),
         SloshSource::Table => format!(
-            "slosh.table.nonlinear_inertia[{}] = {s} with slosh.model = liquid (allowed: greater than 0, because the kinetic \
-             energy would be indefinite; or slosh.model = spherical)",
+            "slosh.table.nonlinear_inertia[{}] = {s} cannot be combined with slosh.model = liquid, because the kinetic energy would be \
+             indefinite: set it above 0, or slosh.model = spherical",
             n + 1
         ),
     })
@@ -295,7 +296,7 @@ fn breaking_warning(p: &Parameters, calculated: &Calculated) -> Option<String> {
     }
     if onset <= 0.0 {
         return Some(format!(
-            "slosh.zeta_breaking = {zeta_breaking} with slosh.breaking_steepness = 0: damping grows from the smallest wave \
+            "slosh.zeta_breaking = {zeta_breaking} although slosh.breaking_steepness = 0: damping grows from the smallest wave \
              on. Measured waves break above a steepness of 0.60 to 0.66; for growth without a threshold use \
              slosh.zeta_amplitude"
         ));

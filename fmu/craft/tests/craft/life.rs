@@ -363,7 +363,8 @@ fn every_problem_with_the_parameters_is_returned() {
         "tank[2].length[1] = -0.1 (allowed: 1e-6 to 1000000000.0 m)",
         "tank[2].mass[3] = inf (allowed: 1e-9 to 1000000000000.0 kg)",
         "init.q[3] = NaN (allowed: -1000000000.0 to 1000000000.0)",
-        "init.velocity = [1.0, 0.0, 0.0] m/s with mount = pivot (allowed: 0, because the pivot holds O)",
+        "init.velocity = [1.0, 0.0, 0.0] m/s cannot be combined with mount = pivot, because the pivot holds the origin O of the body frame: \
+         set init.velocity = 0",
     ];
     assert_eq!(problems, expected);
 

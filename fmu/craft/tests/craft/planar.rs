@@ -158,14 +158,15 @@ fn options_of_axisymmetric_tanks_are_refused_together_with_options_of_asymmetric
             assert_eq!(p.problems(), [""; 0]);
             also(&mut p.tank[0]);
             let said = p.problems();
-            let names = format!("tank[1].{one} with tank[1].{other} (allowed: ");
+            let names = format!("tank[1].{one} cannot be combined with tank[1].{other}, because");
             assert!(said.iter().any(|text| text.starts_with(&names)), "{names} {said:?}");
         }
     }
     let mut p = Parameters { tanks: 2, ..Parameters::default() };
     p.tank[0].ball.travel = 1.0;
     p.tank[1].direction[0] = [1.0, 0.0];
-    assert!(p.problems()[0].starts_with("tank[1].ball.travel with tank[2].direction (allowed: "));
+    let names = "tank[1].ball.travel cannot be combined with tank[2].direction, because";
+    assert!(p.problems()[0].starts_with(names));
 }
 
 /// Rigid liquid of negative mass is allowed only with planar modes, and craft and liquid together must have positive inertia.
@@ -397,7 +398,7 @@ fn a_tank_with_negative_total_liquid_mass_is_refused() {
     }
     p.tank.i_z = -2000.0;
     let said = p.problems();
-    assert!(said.len() == 1 && said[0].starts_with("host.J with the tank's m_0"), "{said:?}");
+    assert!(said.len() == 1 && said[0].starts_with("the mass matrix of host.mass"), "{said:?}");
     p.host = None;
     assert_eq!(p.problems(), [""; 0]);
     p.tank.m_0 = -1120.0;
@@ -405,7 +406,7 @@ fn a_tank_with_negative_total_liquid_mass_is_refused() {
     assert_eq!(
         said,
         [
-            "tank.m_0 = -1120.0 kg and the bobs of all modes add up to 0.0 kg of liquid (allowed: more than 0)"
+            "tank.m_0 = -1120.0 kg and tank.mass of all modes add up to 0.0 kg of liquid (allowed: more than 0)"
         ]
     );
     (p.tank.m_0, p.tank.direction) = (-120.0, Default::default());

@@ -227,7 +227,7 @@ fn a_fill_table_must_rise_and_contain_the_modal_masses() {
     };
     one(|t| t.fill.points = 1, "tank[1].fill.points = 1 (allowed: 0, or 2 to 12)");
     one(|t| t.fill.points = 13, "tank[1].fill.points = 13");
-    one(|t| t.fill.liquid[2] = t.fill.liquid[1], "more than at the previous point");
+    one(|t| t.fill.liquid[2] = t.fill.liquid[1], "equals the mass of the previous point");
     one(|t| t.fill.liquid[2] = t.fill.liquid[1] * 0.99, "tank[1].fill.liquid[3] = 125.9");
     one(|t| t.liquid_0 = 63.6, "tank[1].liquid_0 = 63.6 (allowed: 63.6173 to 190.852 kg)");
     one(|t| t.liquid_0 = 190.9, "tank[1].liquid_0 = 190.9");
@@ -237,8 +237,8 @@ fn a_fill_table_must_rise_and_contain_the_modal_masses() {
     let all = |t: &mut Tank| t.fill.mass[0][2] = t.fill.liquid[2] - t.fill.mass[1][2];
     let problems = with(all);
     assert!(problems.iter().all(|text| !text.contains("adds up")), "{problems:?}");
-    one(|t| t.diameter = 0.9, "tank[1].diameter with tank[1].fill");
-    one(|t| t.frequency[1] = 1.0, "tank[1].frequency with tank[1].fill");
+    one(|t| t.diameter = 0.9, "tank[1].diameter cannot be combined with tank[1].fill");
+    one(|t| t.frequency[1] = 1.0, "tank[1].frequency cannot be combined with tank[1].fill");
     // The third mode is not kept.
     assert_eq!(with(|t| t.fill.mass[2][0] = 1e9), [""; 0]);
 }
@@ -252,7 +252,10 @@ fn a_host_without_inertia_about_an_axis_is_refused() {
     let host = p.host.as_mut().unwrap();
     host.r = [0.0; 3];
     (host.j.xx, host.j.yy, host.j.zz) = (5.0, 5.0, 0.0);
-    assert_eq!(p.problems(), ["host.J is singular: the inertia about every axis must be above 0"]);
+    assert_eq!(
+        p.problems(),
+        ["host.Jxx to host.Jyz are singular: the inertia about every axis must be above 0 kg.m2"]
+    );
     p.max_steps = 0;
     assert_eq!(p.problems().len(), 2);
 }

@@ -84,7 +84,7 @@ impl FrictionLaw for Lugre {
     fn problems(p: &Friction) -> Vec<String> {
         if p.c <= 0.0 {
             return vec![format!(
-                "friction.c = {} N.m with friction.model = lugre (allowed: above 0)",
+                "friction.c = {} N.m cannot be combined with friction.model = lugre: set friction.c above 0 N.m",
                 p.c
             )];
         }

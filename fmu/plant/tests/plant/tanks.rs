@@ -111,7 +111,7 @@ fn an_impossible_table_of_modes_is_refused_with_all_its_faults() {
         let problems = refused(change);
         assert!(problems.len() == 1 && problems[0].contains(what), "{problems:?}");
     };
-    one(|p| p.slosh.table.frequency[0] = 1.0, "one of them greater than 0");
+    one(|p| p.slosh.table.frequency[0] = 1.0, "set one of the two above 0");
     one(|p| p.slosh.table.length.swap(0, 1), "order of their frequencies");
     // A stiffness counts: omega^2 = g/l + k/m.
     one(|p| p.slosh.table.k[0] = 1000.0, "order of their frequencies");
