@@ -63,7 +63,7 @@ impl Archive {
                 fault: None,
             };
             if from.fault.is_some() {
-                unpacked.fault = Some("nothing of this archive is unpacked".into());
+                unpacked.fault = Some("no file of this archive is unpacked".into());
             } else if let Err(why) = archive.unpack(&from, entry, &mut unpacked.content) {
                 let error = why.downcast_ref::<std::io::Error>();
                 if error.is_some_and(|e| e.kind() == std::io::ErrorKind::StorageFull) {

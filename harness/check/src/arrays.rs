@@ -72,8 +72,7 @@ pub fn arrays(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         fmu.announce(format!("calls with margins around their arrays ({interface})"));
         for write in session.instance.find_stray_writes(&lists) {
             findings.at(format!("{}, {} ({interface})", write.call, write.array)).add(format!(
-                "{} (allowed: to write as many values as the call says, into what is to be \
-                     written)",
+                "{} (allowed: to write as many values as the call requests, and only into arrays for results)",
                 write.fault
             ));
         }

@@ -185,7 +185,7 @@ impl Binaries {
     /// Calls `look` for each binary that could be parsed. The rule is skipped if there is none.
     fn each(&self, findings: &mut Findings, look: impl Fn(&str, &Binary, &mut Findings)) {
         if self.readable().next().is_none() {
-            findings.skip("no binary can be read here");
+            findings.skip("the FMU has no binary that can be parsed");
         }
         for (name, binary) in self.readable() {
             look(name, binary, findings);
@@ -195,7 +195,9 @@ impl Binaries {
 
 pub fn present(binaries: &Binaries, findings: &mut Findings) {
     if !binaries.described {
-        return findings.skip("without a description nobody knows what the binary is called");
+        return findings.skip(
+            "the name of the binary is not known, because modelDescription.xml cannot be read",
+        );
     }
     if binaries.placed.is_empty() && binaries.of_vendors == 0 && !binaries.has_sources {
         let known = match binaries.own_folder == PLATFORM {
@@ -221,8 +223,8 @@ pub fn each_interface(binaries: &Binaries, findings: &mut Findings) {
             let mut here = binaries.placed.iter().filter(|p| p.folder == folder);
             if !here.any(|p| p.identifier == *identifier) {
                 findings.at(format!("binaries/{folder}/{identifier}{ending}")).add(format!(
-                    "it is missing: modelIdentifier of {interface} is \"{identifier}\" (allowed: \
-                         where one interface has its binary, so has the other)"
+                    "it is missing: modelIdentifier of {interface} is \"{identifier}\" (required: \
+                         a folder with the binary of one interface also has the binary of the other)"
                 ));
             }
         }
@@ -231,7 +233,9 @@ pub fn each_interface(binaries: &Binaries, findings: &mut Findings) {
 
 pub fn this_platform(binaries: &Binaries, findings: &mut Findings) {
     if !binaries.described {
-        return findings.skip("without a description nobody knows what the binary is called");
+        return findings.skip(
+            "the name of the binary is not known, because modelDescription.xml cannot be read",
+        );
     }
     if binaries.own().is_none() {
         findings.at(format!("binaries/{}", binaries.own_folder)).add("no binary is called here, so that no rule of calls is checked (allowed: a binary of this platform, or a \

@@ -94,7 +94,9 @@ pub fn capabilities(d: &Description, findings: &mut Findings) {
         let place = format!("line {}, {}", interface.line, interface.name);
         for (flag, needed) in NEEDS {
             if interface.flag(flag) && !interface.flag(needed) {
-                findings.at(&place).add(format!("{flag} without {needed}"));
+                findings.at(&place).add(format!(
+                    "{flag} is true, but {needed} is not (required: {flag} needs {needed})"
+                ));
             }
         }
         let step = interface.number("fixedInternalStepSize");
@@ -102,7 +104,7 @@ pub fn capabilities(d: &Description, findings: &mut Findings) {
             findings.at(&place).add(format!("fixedInternalStepSize={step} (allowed: above 0)"));
         }
         if interface.name == "CoSimulation" && d.has_clocks() && !interface.flag("hasEventMode") {
-            let text = "it has clocks, but not hasEventMode: clocks need event mode";
+            let text = "the FMU has clocks, but hasEventMode is not true (required: clocks need event mode)";
             findings.at(&place).add(text);
         }
         for flag in SHARED {
@@ -111,7 +113,9 @@ pub fn capabilities(d: &Description, findings: &mut Findings) {
             let (first, said) = *flags.entry(key).or_insert((&interface.name, own));
             if said != own {
                 let other = &interface.name;
-                let text = format!("one binary, but {first} and {other} say different things");
+                let text = format!(
+                    "{first} and {other} declare different values, although one binary serves both (required: equal values)"
+                );
                 findings.at(flag).add(text);
             }
         }

@@ -58,7 +58,7 @@ fn leak_per_call(mut call: impl FnMut() -> Result<()>) -> Result<Option<u64>> {
 
 pub fn memory(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     if writable_memory().is_none() {
-        return skip("this system does not tell how much memory a process has");
+        return skip("the operating system does not report how much memory a process uses");
     }
     for interface in fmu.interfaces() {
         look(fmu, interface, findings)?;

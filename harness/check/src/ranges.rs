@@ -21,7 +21,7 @@ pub fn in_range(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         |v: &&Variable| v.bounds() != (f64::NEG_INFINITY, f64::INFINITY) && !v.is_set_by_hosts();
     let all: Vec<&Variable> = fmu.variables().iter().filter(bounded).collect();
     if all.is_empty() {
-        return skip("nothing that the FMU computes has a min or a max");
+        return skip("no variable that the FMU computes has a min or a max");
     }
     let mut told = BTreeSet::new();
     for interface in fmu.interfaces() {
@@ -105,7 +105,7 @@ pub fn limits_exact(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         }
     }
     if !any {
-        findings.skip("no number that hosts set has a min or a max");
+        findings.skip("no number that a host sets has a min or a max");
     }
     Ok(())
 }

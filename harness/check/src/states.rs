@@ -177,7 +177,9 @@ pub fn garbage(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             if let Ok(after) = session.readings()
                 && let Some(text) = session.difference(&after, &before)
             {
-                findings.at(place).add(format!("it is refused, but {text}"));
+                findings
+                    .at(place)
+                    .add(format!("the call is refused and yet changes the FMU: {text}"));
             }
         }
         let mut session = fmu.running(interface)?;

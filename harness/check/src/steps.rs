@@ -73,7 +73,7 @@ pub fn size(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             && let Ok(after) = session.readings()
             && let Some(text) = session.difference(&after, &before)
         {
-            findings.at(&place).add(format!("it is refused, but {text}"));
+            findings.at(&place).add(format!("the call is refused and yet changes the FMU: {text}"));
         }
     }
     Ok(())

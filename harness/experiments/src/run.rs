@@ -120,7 +120,7 @@ pub fn histories(
         problems.push("the file has no column time".to_string());
     }
     if inputs.is_empty() {
-        problems.push("none of its columns is an input".to_string());
+        problems.push("none of its columns is an input of the FMU".to_string());
     }
     if !wrong.is_empty() && !ignore {
         problems.push(format!(
@@ -134,7 +134,7 @@ pub fn histories(
     }
     ensure!(
         problems.is_empty(),
-        "{file} cannot be used: {}; the FMU's inputs: {}; columns in the file: {}",
+        "the file of inputs {file} cannot be used: {}; the FMU's inputs: {}; columns in the file: {}",
         problems.join("; "),
         if all.is_empty() { "none".to_string() } else { all.join(", ") },
         columns.join(", ")
@@ -165,7 +165,7 @@ pub fn histories(
             };
             if let Some(row) = values.iter().position(|value| !allowed(value)) {
                 bail!(
-                    "{file} cannot be used: row {}: {name} is {} (allowed: {})",
+                    "the file of inputs {file} cannot be used: row {}: {name} is {} (allowed: {})",
                     row + 1,
                     values[row],
                     if kind == Type::Boolean {

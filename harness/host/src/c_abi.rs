@@ -335,7 +335,7 @@ pub(crate) fn load(
     // A library outside the archive is not part of the FMU.
     if identifier.contains(['/', '\\', ':', '\0']) {
         bail!(
-            "{name} cannot be used: modelIdentifier {identifier:?} leads out of the folder of its \
+            "the FMU {name} cannot be used: modelIdentifier {identifier:?} leads out of the folder of its \
              binary (allowed: letters, digits, underscores)"
         );
     }

@@ -638,7 +638,7 @@ impl ModelDescription {
     pub(crate) fn from_archive(archive: &Archive, path: &Path) -> Result<(String, Self)> {
         let name = path.display();
         let text = archive.description().with_context(|| format!("{name} is not an FMU"))?;
-        let refused = || format!("{name} cannot be used");
+        let refused = || format!("the FMU {name} cannot be used");
         let description = ModelDescription::from_xml(&text).with_context(refused)?;
         description.check_version().with_context(refused)?;
         Ok((text, description))

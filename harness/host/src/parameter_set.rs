@@ -46,7 +46,7 @@ impl ParameterSet {
     /// path.
     pub fn read(path: &Path) -> Result<ParameterSet> {
         let shown = path.display();
-        let text = input::text(path).with_context(|| format!("could not read {shown}"))?;
+        let text = input::text(path).with_context(|| format!("the file {shown} cannot be read"))?;
         let read = match path.extension().and_then(|ending| ending.to_str()) {
             Some("toml") => from_toml(&text),
             Some("ssv") => from_ssv(&text),
@@ -54,7 +54,10 @@ impl ParameterSet {
             _ => bail!("{shown}: the name must end in .toml, .ssv or .json"),
         };
         let found = read.with_context(|| shown.to_string())?;
-        ensure!(!found.parameters.is_empty(), "{shown} sets nothing");
+        ensure!(
+            !found.parameters.is_empty(),
+            "{shown} contains no parameters (allowed: one or more)"
+        );
         Ok(found)
     }
 }

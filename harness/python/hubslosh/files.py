@@ -33,7 +33,7 @@ def _check_table(table: Any, path: Any, ending: str) -> Path:
             f"(table, {str(table)!r})"
         )
     if not isinstance(table, pd.DataFrame):
-        raise FmuError(f"a pandas.DataFrame is expected, not {type(table).__name__}")
+        raise FmuError(f"the table must be a pandas.DataFrame, not {type(table).__name__}")
     return temporary.check_path(path, ending)
 
 

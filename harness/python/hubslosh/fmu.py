@@ -421,7 +421,7 @@ class Fmu:
         if not isinstance(value, tuple):
             return _finite(value)
         if len(value) != 2:
-            raise ValueError("a number and its unit are expected")
+            raise ValueError(f"{value!r} is not a pair of a number and its unit, such as (50, 'mm')")
         factor, offset = self.scale(name, value[1])
         return _finite((float(value[0]) - offset) / factor)
 
@@ -499,7 +499,7 @@ def _finite(value: Any) -> float:
     """Return a number that is neither NaN nor infinite."""
     number = float(value)
     if not math.isfinite(number):
-        raise ValueError("a finite number is expected")
+        raise ValueError(f"{number} is not a finite number")
     return number
 
 
@@ -507,7 +507,7 @@ def _integer(value: Any) -> int:
     """Return a whole number that FMI can hand over; C would wrap another one silently."""
     whole = int(value)
     if whole != float(value):
-        raise ValueError("a whole number is expected")
+        raise ValueError(f"{value} is not a whole number")
     if whole not in INTEGERS:
         raise ValueError(f"whole numbers from {INTEGERS[0]} to {INTEGERS[-1]} are expected")
     return whole

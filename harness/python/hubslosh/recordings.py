@@ -84,7 +84,7 @@ def read_recording(
             try:
                 convert(path, text)
             except FmuError as error:
-                raise FmuError(f"{path} cannot be used: {error}") from None
+                raise FmuError(f"the file {path} cannot be used: {error}") from None
             found = native.read_recording(text, path, columns, rate)
     signals, notes = found
     table = pd.DataFrame({name: np.frombuffer(values) for name, _, values in signals})

@@ -43,7 +43,7 @@ def output(path: Path) -> Iterator[Path]:
 def check_path(path: Any, ending: str) -> Path:
     """Return the path of a file whose name must have this ending, such as ``.mat``."""
     if not isinstance(path, str | os.PathLike):
-        raise FmuError(f"the file's name is expected, not {path!r}")
+        raise FmuError(f"the name of a file must be a str or a Path, not {path!r}")
     path = Path(path)
     if path.suffix.lower() != ending:
         raise FmuError(f"{path}: the name must end in {ending}")

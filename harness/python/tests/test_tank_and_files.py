@@ -128,8 +128,8 @@ def test_tables_are_read_back_from_files_with_every_digit(tmp_path: Path) -> Non
     wrong = {
         "give the table first, then the file": lambda: hubslosh.to_csv("a.csv", table),
         "must end in .mat": lambda: hubslosh.to_mat(table, "a.csv"),
-        "DataFrame is expected, not list": lambda: hubslosh.to_parquet([1], "a.parquet"),
-        "the file's name is expected": lambda: hubslosh.to_csv(table, 3),
+        "DataFrame, not list": lambda: hubslosh.to_parquet([1], "a.parquet"),
+        "the name of a file must be a str or a Path": lambda: hubslosh.to_csv(table, 3),
         "cannot be written": lambda: hubslosh.to_csv(table, tmp_path / "none" / "a.csv"),
         "the same name in MATLAB: a.b, a_b": lambda: hubslosh.to_mat(
             pd.DataFrame({"a.b": [1], "a_b": [2]}), "a.mat"

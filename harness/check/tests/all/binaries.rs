@@ -23,7 +23,7 @@ fn our_own_fmu_keeps_every_rule() {
     // none of its outputs and states has a range
     assert_eq!(
         skipped,
-        ["the FMU has no resources", "nothing that the FMU computes has a min or a max"]
+        ["the FMU has no resources", "no variable that the FMU computes has a min or a max"]
     );
     assert_eq!(report.outcomes.len(), RULES.len());
 }

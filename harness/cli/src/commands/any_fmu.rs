@@ -268,7 +268,7 @@ impl AnyFmuArgs {
             .collect();
         ensure!(
             missing.is_empty(),
-            "--noise OUTPUT=STD, the noise of a row, is not given of {}",
+            "--noise OUTPUT=STD, the standard deviation of one sample of an output, is missing for {}",
             missing.join(", ")
         );
         let sizes: Vec<f64> = question.outputs.iter().map(|name| given[name]).collect();
@@ -279,7 +279,10 @@ impl AnyFmuArgs {
             let outputs = vec![vec![0.0; read.time.len()]; question.outputs.len()];
             records.push(Record { outputs, ..read });
         }
-        ensure!(!records.is_empty(), "name the tables of inputs that are planned");
+        ensure!(
+            !records.is_empty(),
+            "no table of planned inputs is given: name one or more files with times and inputs"
+        );
         let bounds = foresee(&model, &question, &records, &sizes, &mut |warning| {
             terminal::warn(warning);
         })?;

@@ -129,7 +129,7 @@ impl DesignArgs {
         }
         ensure!(
             self.any.tolerances.is_empty(),
-            "--tolerance is for --free here: the bound of the bench takes what is set as exact"
+            "--tolerance needs --free, because the bound for the bench treats all known values as exact"
         );
         if let Some(out) = &self.out {
             table::check_ending(out)?;

@@ -130,7 +130,9 @@ impl RunArgs {
                     terminal::note(line);
                 })?;
                 let mut all = all.into_iter();
-                let Some((input, history)) = all.next() else { bail!("nothing is driven") };
+                let Some((input, history)) = all.next() else {
+                    bail!("the file of inputs drives no input of the FMU")
+                };
                 (Some(input), history, all.collect())
             }
             (None, None) => bail!("give the inputs of the run: --profile or --input"),

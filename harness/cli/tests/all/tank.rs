@@ -283,7 +283,7 @@ fn invalid_parameter_files_are_refused_in_a_sentence() {
     for (name, text, words) in [
         ("set.txt", "a = 1", "must end in .toml, .ssv or .json"),
         ("set.toml", "a = [1]", "line 1: a cannot be a value of a parameter"),
-        ("set.toml", "", "sets nothing"),
+        ("set.toml", "", "contains no parameters"),
         ("set.toml", "\"tank.q\" = 1", "tank.q"),
         ("set.ssv", "<a/>", "the root element is a, not ParameterSet"),
         (

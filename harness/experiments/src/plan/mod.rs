@@ -189,7 +189,7 @@ impl Plan {
             plan.each_name_once(&mut problems);
         }
         problems.check()?;
-        plan.context("the plan has no profile")
+        plan.context("the plan has no torque profile: write profile = \"NAME\" (hubslosh torque --profiles lists the names)")
     }
 
     fn each_name_once(&self, problems: &mut Problems) {
@@ -214,7 +214,12 @@ impl Plan {
             match owner.insert(name, (place, lines)) {
                 Some((other, others)) if other != place => {
                     let both = others.union(lines);
-                    problems.add(&both, format!("{name} stands in {other} and in {place}"));
+                    problems.add(
+                        &both,
+                        format!(
+                            "{name} is given in {other} and in {place} (allowed: in one of the two)"
+                        ),
+                    );
                 }
                 _ => {}
             }
@@ -363,7 +368,7 @@ impl Plan {
 
         let mut problems = Problems::default();
         let chosen = self.input.as_ref().map(|input| input.value.as_str());
-        let input = driven(description, chosen).context("the plan's input");
+        let input = driven(description, chosen).context("the input that the plan names");
         let lines = self.input.as_ref().map_or(Lines::default(), |input| input.lines.clone());
         let Some(input) = problems.take(&lines, input) else {
             problems.check()?;
@@ -586,7 +591,10 @@ fn settable(
     text: &str,
 ) -> Result<()> {
     let variable = description.variable(name)?;
-    ensure!(input.as_deref() != Some(name), "{name} comes from the profile");
+    ensure!(
+        input.as_deref() != Some(name),
+        "{name} cannot be set, because the torque profile drives it"
+    );
     ensure!(
         matches!(variable.causality, Causality::Parameter | Causality::Input),
         "{name} cannot be set: it is of causality {}, not a parameter or an input",

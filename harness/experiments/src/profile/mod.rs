@@ -326,7 +326,7 @@ impl Torque {
         let table = recording::read_inputs(path, &wanted, &[], &mut |_| {})?;
         let column = |name| table.column(name).unwrap_or_default();
         Torque::rows(column("time"), column(TAU_CMD), None, held)
-            .with_context(|| format!("{} cannot be used", path.display()))
+            .with_context(|| format!("the file {} cannot be used", path.display()))
     }
 
     /// Makes a torque from rows of time (s) and torque (N·m). With `slopes` (N·m/s) the torque follows each

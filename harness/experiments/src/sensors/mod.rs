@@ -275,9 +275,15 @@ impl Sensors {
         for sensor in sensors {
             if description.variables.iter().any(|v| v.name == sensor.name) || sensor.name == "time"
             {
-                problems.push(format!("sensor {}: a column has that name already", sensor.name));
+                problems.push(format!(
+                    "sensor {}: the FMU has a variable of this name (allowed: another name)",
+                    sensor.name
+                ));
             } else if taken.contains(&sensor.name) {
-                problems.push(format!("sensor {}: there are two of that name", sensor.name));
+                problems.push(format!(
+                    "sensor {}: two sensors have this name (allowed: one)",
+                    sensor.name
+                ));
             }
             taken.push(sensor.name.clone());
             let rows = sensor.rows(step).map(|_| ());
@@ -331,7 +337,13 @@ impl Sensors {
             let [every, late] = sensor.rows(step)?;
             let needs: Option<Vec<&[f64]>> =
                 quantity.needs.iter().map(|name| table.column(name)).collect();
-            let needs = needs.with_context(|| format!("sensor {}: not recorded", sensor.name))?;
+            let needs = needs.with_context(|| {
+                format!(
+                    "sensor {}: the run has not recorded {}",
+                    sensor.name,
+                    quantity.needs.join(", ")
+                )
+            })?;
             let mut truth = vec![Vec::with_capacity(table.rows()); quantity.channels.len()];
             for row in 0..table.rows() {
                 let read: Vec<f64> = needs.iter().map(|column| column[row]).collect();

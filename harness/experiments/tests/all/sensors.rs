@@ -254,7 +254,7 @@ fn errors_of_sensors_say_what_is_allowed() {
         ("a=force:of=theta", ("tank.h", "0.1"), "unit rad (allowed: N)"),
         ("a=gauge:rate=30", ("tank.h", "0.1"), "not a multiple of the step, 0.02 s"),
         ("a=gauge:rate=100", ("tank.h", "0.1"), "not a multiple of the step"),
-        ("theta=encoder", ("tank.h", "0.1"), "a column has that name already"),
+        ("theta=encoder", ("tank.h", "0.1"), "the FMU has a variable of this name"),
     ] {
         assert!(refused(text, &[set]).contains(words), "{text}: {}", refused(text, &[set]));
     }

@@ -294,7 +294,7 @@ impl<V: Version> Fmu<V> {
         root: &Element,
     ) -> Result<Self> {
         let description = ModelDescription::from_element(root, &BTreeMap::new())
-            .with_context(|| format!("{} cannot be used", path.display()))?;
+            .with_context(|| format!("the FMU {} cannot be used", path.display()))?;
         Fmu::load_described(description, interface, directory, path)
     }
 
@@ -320,12 +320,12 @@ impl<V: Version> Fmu<V> {
             V::required_functions(stepping == Some(identifier), exchange == Some(identifier));
         let lacking = missing_functions(&library, &needed);
         if !lacking.is_empty() {
-            bail!("{binary} in {name} lacks {}", lacking.join(", "));
+            bail!("{binary} in the FMU {name} lacks the functions {}", lacking.join(", "));
         }
         // SAFETY: the binary says it follows this version of FMI, whose types the tables declare; an FMU of one interface
         // lacks the other's functions, and nothing is wrong.
         let (common, own, exchange) = unsafe {
-            let refused = || format!("{binary} in {name} cannot be used");
+            let refused = || format!("{binary} in the FMU {name} cannot be used");
             (
                 Common::load(&library, V::NUMBER).with_context(refused)?,
                 V::load(&library).with_context(refused)?,
@@ -783,7 +783,7 @@ impl<'fmu, V: Version> Instance<'fmu, V> {
                  (`hubslosh run` can set it)"
             );
         }
-        self.set_value(variable, value).with_context(|| format!("{name}={text} was refused"))
+        self.set_value(variable, value).with_context(|| format!("the FMU refuses {name} = {text}"))
     }
 
     // ------------------------------------------------ snapshots

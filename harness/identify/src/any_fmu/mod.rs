@@ -95,7 +95,9 @@ pub fn identify(
 ) -> Result<Identification> {
     ensure!(!records.is_empty(), "there is no recording");
     for record in records {
-        record.check(question).with_context(|| format!("{} cannot be used", record.name))?;
+        record
+            .check(question)
+            .with_context(|| format!("the recording {} cannot be used", record.name))?;
     }
     let (system, unknowns) = FmuSystem::new(model, question, records)?;
     let mut done = Vec::new();

@@ -46,7 +46,8 @@ pub fn read(
     let wanted = Wanted { signals: &signals, columns: &source.columns };
     let table = recording::read(path, &wanted, done)?;
     let name = path.display().to_string();
-    let all = assembled(&name, &table, done).with_context(|| format!("{name} cannot be used"))?;
+    let all = assembled(&name, &table, done)
+        .with_context(|| format!("the recording {name} cannot be used"))?;
     prepare(trimmed(all, source.trim, done), coarsest, done)
 }
 

@@ -54,7 +54,9 @@ impl Record {
             inputs: question.inputs.iter().map(|name| column(name)).collect(),
             outputs: question.outputs.iter().map(|name| column(name)).collect(),
         };
-        record.check(question).with_context(|| format!("{} cannot be used", path.display()))?;
+        record
+            .check(question)
+            .with_context(|| format!("the recording {} cannot be used", path.display()))?;
         Ok(record)
     }
 

@@ -205,8 +205,13 @@ impl Recording {
     /// # Errors
     /// If times or values are out of range.
     pub fn check(&self) -> Result<f64> {
-        let of_file = || format!("{} cannot be used", self.name);
-        ensure!(self.time.len() > 2, "{}: {} rows are too few", self.name, self.time.len());
+        let of_file = || format!("the recording {} cannot be used", self.name);
+        ensure!(
+            self.time.len() > 2,
+            "the recording {} has {} rows (allowed: at least 3)",
+            self.name,
+            self.time.len()
+        );
         let step = check_times(&self.time).with_context(of_file)?;
         let signals = [
             ("tau_cmd", Some(&self.torque)),

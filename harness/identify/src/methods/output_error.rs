@@ -192,7 +192,7 @@ fn identify_whole(
                 Some(Fitted { system, solution, fit })
             }
             Err(error) => {
-                tell(News::Step(format!("{}: could not be fitted: {error:#}", pair.0)));
+                tell(News::Step(format!("the model {} could not be fitted: {error:#}", pair.0)));
                 failed = Some(error);
                 None
             }

@@ -55,7 +55,10 @@ impl Question {
             let at = unknowns.iter_mut().find(|(u, _): &&mut Targeted| u.name == prior.name);
             match at {
                 Some((unknown, _)) => unknown.prior = Some((prior.mean, prior.std)),
-                None => problems.push(format!("--prior {}: it is not free", prior.name)),
+                None => problems.push(format!(
+                    "--prior {}: this is not an unknown (allowed: names that --free names)",
+                    prior.name
+                )),
             }
         }
         let is_known = |u: &Unknown| u.part == Part::Tolerance;
@@ -64,11 +67,11 @@ impl Question {
             if let Some((other, _)) = before.iter().find(|(other, _)| other.name == unknown.name) {
                 problems.push(match (is_known(unknown), is_known(other)) {
                     (true, false) => format!(
-                        "--tolerance {}: it is estimated (allowed: --prior, its mean and standard deviation)",
+                        "--tolerance {}: --free names this value as an unknown (allowed: --prior, with its mean and standard deviation)",
                         unknown.name
                     ),
-                    (true, true) => format!("{} has two tolerances", unknown.name),
-                    _ => format!("{} is free twice", unknown.name),
+                    (true, true) => format!("--tolerance names {} twice", unknown.name),
+                    _ => format!("--free names {} twice", unknown.name),
                 });
             }
             let is_alias = |(other, of): &&Targeted| {
@@ -81,7 +84,7 @@ impl Question {
             };
             if let Some((other, _)) = before.iter().find(is_alias) {
                 problems.push(format!(
-                    "{} and {} are the same variable of the FMU (allowed: one of them is free)",
+                    "--free names {} and {}, which are the same variable of the FMU (allowed: one of the two)",
                     other.name, unknown.name
                 ));
             }
@@ -89,11 +92,14 @@ impl Question {
         for setting in &self.settings {
             if setting.recording.is_some_and(|n| n >= records.len()) {
                 let name = setting.named().0;
-                problems.push(format!("--set {name}: there are {} recordings", records.len()));
+                problems.push(format!("--set {name}: there are only {} recordings", records.len()));
             }
         }
         ensure!(problems.is_empty(), "{}", problems.join("; "));
-        ensure!(!unknowns.is_empty(), "nothing is free: name what is estimated with --free");
+        ensure!(
+            !unknowns.is_empty(),
+            "no unknown is given: name the parameters to estimate with --free"
+        );
         Ok(unknowns)
     }
 

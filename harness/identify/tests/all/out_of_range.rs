@@ -55,7 +55,7 @@ fn no_method_hangs_or_panics_on_values_out_of_range() {
         (|r, _| r.torque[0] = f64::NEG_INFINITY, "row 1: tau_cmd is -inf"),
         (|r, _| r.rate[5] = -1e300, "row 6: omega is -1e300"),
         (|r, _| r.angle = Some(vec![f64::NAN]), "row 1: theta is NaN"),
-        (|r, _| r.time.truncate(2), "2 rows are too few"),
+        (|r, _| r.time.truncate(2), "has 2 rows (allowed: at least 3)"),
     ];
     for (change, words) in refused {
         let mut bad = sound.clone();

@@ -32,7 +32,7 @@ pub fn even_with_gaps(
 ) -> Result<(f64, Table)> {
     let time = table.column("time").unwrap_or_default();
     let rows = time.len();
-    ensure!(rows > 2, "{rows} rows are too few");
+    ensure!(rows > 2, "the recording has {rows} rows (allowed: at least 3)");
     if let Some(row) = time.windows(2).position(|pair| pair[1] <= pair[0]) {
         anyhow::bail!(
             "row {}: time must grow, but {} s follows {} s",

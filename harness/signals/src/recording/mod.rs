@@ -246,7 +246,9 @@ pub fn read_here(
 ) -> Result<Option<Table>> {
     match read_as(path, wanted, None, done) {
         Err(error) if error.is::<Foreign>() => Ok(None),
-        read => read.map(Some).with_context(|| format!("{} cannot be used", name.display())),
+        read => {
+            read.map(Some).with_context(|| format!("the file {} cannot be used", name.display()))
+        }
     }
 }
 
@@ -298,7 +300,7 @@ fn with_text_file<T>(path: &Path, mut work: impl FnMut(&Path) -> Result<T>) -> R
         }
         read => read,
     };
-    read.with_context(|| format!("{} cannot be used", path.display()))
+    read.with_context(|| format!("the file {} cannot be used", path.display()))
 }
 
 /// Reads a recording, or histories of inputs if `inputs` is given; it then lists those that are Booleans.
@@ -317,12 +319,14 @@ fn read_as(
     if let Some(rate) = counted {
         ensure!(
             !wanted.columns.names("time"),
-            "--rate {rate} is for rows whose times are not read, and --columns names the column of the time, {} (allowed: one of \
-             them)",
+            "both a sampling rate ({rate} Hz) and a column of times ({}, from --columns) are given (allowed: one of the two)",
             wanted.columns.column("time").name
         );
         if let Ok(own) = header.place("time", Some(Quantity::Time.dimension())) {
-            done(format!("the column {} is passed over (--rate)", header.full[own]));
+            done(format!(
+                "the column {} is not read, because the times follow from the sampling rate of {rate} Hz",
+                header.full[own]
+            ));
         }
     }
     let (mut signals, mut places, mut factors) = (Vec::new(), Vec::new(), Vec::new());

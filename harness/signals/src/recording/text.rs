@@ -323,12 +323,12 @@ impl Layout {
                 );
                 let passed = at - 1 - usize::from(units.is_some());
                 if passed > 0 {
-                    notes.push(format!("the {passed} lines above its header were passed over"));
+                    notes.push(format!("the {passed} lines above its header are not read"));
                 }
                 names
             }
             _ if at > 0 => {
-                notes.push(format!("the {at} lines above its first row were passed over"));
+                notes.push(format!("the {at} lines above its first row are not read"));
                 Vec::new()
             }
             _ if comment.len() == width => comment.clone(),

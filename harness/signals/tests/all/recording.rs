@@ -429,16 +429,18 @@ fn a_file_without_times_is_read_only_with_a_stated_rate() {
     std::fs::write(&path, format!("time,{text}").replace('\n', "\n7,")).unwrap();
     let (table, said) = read_file(&path, &at_50_hz).unwrap();
     assert_close(column(&table, "time"), &TIME, text);
-    assert!(said.contains("the column time is passed over (--rate)"), "{said}");
+    assert!(said.contains("the column time is not read, because"), "{said}");
     let both = columns("time=time:ms").with_rate(Some(50.0)).unwrap();
     let error = read_file(&path, &both).unwrap_err();
     assert!(
-        error.contains("--columns names the column of the time, time (allowed: one of them)"),
+        error.contains(
+            "(50 Hz) and a column of times (time, from --columns) are given (allowed: one"
+        ),
         "{error}"
     );
     let of = columns("tau_cmd=omega").with_rate(Some(50.0)).unwrap();
     let (_, said) = read_file(&stored("dur_ns.parquet"), &of).unwrap();
-    assert!(said.contains("the column time is passed over"), "{said}");
+    assert!(said.contains("the column time is not read"), "{said}");
 }
 
 #[test]

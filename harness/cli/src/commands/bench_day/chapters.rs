@@ -435,8 +435,10 @@ fn at_rest(item: &Item) -> Result<Rest> {
     let signals = [Signal { name: "omega", required: true, between: Between::Line, unit: None }];
     let wanted = Wanted { signals: &signals, columns: &item.recorded.columns };
     let table = recording::read(&item.recorded.path, &wanted, &mut |line| terminal::note(line))?;
-    let (step, table) = recording::even(table, &mut |line| terminal::note(line))
-        .with_context(|| format!("{} cannot be used", item.recorded.path.display()))?;
+    let (step, table) =
+        recording::even(table, &mut |line| terminal::note(line)).with_context(|| {
+            format!("the recording {} cannot be used", item.recorded.path.display())
+        })?;
     let omega = table.column("omega").unwrap_or_default();
     let seconds = step * omega.len() as f64;
     anyhow::ensure!(
