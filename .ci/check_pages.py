@@ -284,7 +284,7 @@ class Check:
     """Failures of the pages, and which entries of the lists were used."""
 
     def __init__(self, reader: Reader, dear: bool) -> None:
-        """Begin."""
+        """Store the reader of the pages; ``dear``: also run commands of more than ten seconds."""
         self.reader, self.dear = reader, dear
         self.failures: list[str] = []
         self.used: set[str] = set()

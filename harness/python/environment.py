@@ -113,7 +113,7 @@ def _alone(lock: Path) -> Iterator[None]:
 
 
 def _run(command: list[str], sentence: str) -> None:
-    """Run ``command``; if it fails, show what it said and leave with ``sentence``."""
+    """Run ``command``. If it fails, print its output and exit with the message ``sentence``."""
     done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     if done.returncode != 0:
         sys.exit(f"{done.stdout}\nerror: {sentence}")

@@ -65,7 +65,7 @@ class Harness:
     """The program ``hubslosh``, with an FMU, a plan and a directory for what comes out."""
 
     def __init__(self, program: Path, fmu: Path, plan: str, out: Path) -> None:
-        """Take them as they are; `listing` finds out whether they are there."""
+        """Store the paths; `listing` checks whether they exist."""
         self.program, self.fmu, self.plan, self.out = program, fmu, plan, out
 
     def listing(self) -> dict[str, Any]:

@@ -244,7 +244,7 @@ class Tally:
     """
 
     def __init__(self) -> None:
-        """Begin without twins."""
+        """Create an empty list of twins."""
         self.seen: dict[str, list[tuple[bool, float, float]]] = defaultdict(list)
         self.refused: list[int] = []
         self.unfit: list[int] = []

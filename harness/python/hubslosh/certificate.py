@@ -216,7 +216,7 @@ class UnstableError(Exception):
     """Raised if a proof meets a Δ within its box at which the loop is unstable."""
 
     def __init__(self, delta: Vector) -> None:
-        """Store Δ."""
+        """Create the exception for ``delta``, the Δ at which the loop is unstable."""
         super().__init__()
         self.delta = delta
 
@@ -242,7 +242,7 @@ class Search:
         self, response: Callable[[Any], Complex], poles: Callable[[Vector], Complex],
         counts: Sequence[int], period: float, progress: Progress = None,
     ) -> None:  # fmt: skip
-        """Prepare the scalings."""
+        """Prepare the optimisation of the scalings D and G for ``counts`` repetitions of each δ."""
         self.closed, self.poles, self.period = response, poles, period
         self.scalings = Scalings(counts)
         self.nyquist = 0.5 / period

@@ -404,7 +404,7 @@ class Craft:
         return J
 
     def _resultant(self) -> tuple[Vector, Vector, Vector]:
-        """Return force, a point on its line of action from O, and the torque left there."""
+        """Return the thrust's force, a point on its line of action from O, and the torque there."""
         along_z = isinstance(self.thrust, int | float | np.number)
         given = [0.0, 0.0, self.thrust] if along_z else self.thrust
         return resultant(vector(given, 3, "thrust"), self.engines)
@@ -510,7 +510,7 @@ class Craft:
         return [None if _is_empty(key[1]) else self._known[key] for key in asked]
 
     def _capacity(self, name: str) -> Tank:
-        """Return the full tank, for its mass."""
+        """Return the tank at a fill of 100 %, from which the mass of a partial fill is computed."""
         (full,) = self._solve([(name, "100%", 1.0)])
         assert full is not None
         return full
@@ -609,7 +609,7 @@ class Craft:
         return [{name: tank for name, tank in of.items() if tank is not None} for of in tanks]
 
     def _warn(self) -> None:
-        """Issue the warnings of tanks that were solved."""
+        """Issue the warnings that arose when slosh modes of tanks were computed."""
         said, self._said[:] = self._said[:], []
         for text in dict.fromkeys(said):
             warnings.warn(text, FmuWarning, stacklevel=caller())
@@ -774,14 +774,14 @@ class Craft:
         trimmed: bool = True,
         **options: Any,
     ) -> tuple[OperatingPoint, float | None]:
-        """Return the operating point at a fill, and the delay if the parameters have it."""
+        """Return the operating point at a fill, and the delay if ``parameters`` have one."""
         every, modes, late = self._resolve(fill, parameters, **options)
         return self._realised(every, modes, trimmed=trimmed), late
 
     def _resolve(
         self, fill: Fill, parameters: Parameters | None, **options: Any
     ) -> tuple[dict[str, Quantity], dict[str, Quantity], Any]:
-        """Return untrimmed parameters, quantities of slosh modes and the delay, or None."""
+        """Return untrimmed parameters, given quantities of slosh modes, and the delay or None."""
         every = self._untrimmed(fill, **options)
         given = full_names(parameters_of(parameters), Fmu.open(self.model), self._names)
         late = given.pop(DELAY, None)
@@ -796,9 +796,9 @@ class Craft:
         *,
         trimmed: bool = True,
     ) -> OperatingPoint:
-        """Return the operating point of parameters, of whose modes then single quantities change.
+        """Return the operating point of parameters, and then change quantities of its slosh modes.
 
-        factors: frequencies by their ratio to those of the point.
+        ``factors`` multiply the frequencies of modes.
         """
         model = self.model
         if trimmed:
@@ -883,7 +883,7 @@ class Craft:
     def _draining(
         self, mass_flow: Any, tanks: dict[str, Tank], between: Sequence[float | str]
     ) -> dict[str, Quantity]:
-        """Return mass flows and fill tables."""
+        """Return the parameters of draining tanks: fill tables and mass flows."""
         found: dict[str, Quantity] = {}
         flows = self._by_tank(mass_flow, "mass_flow")
         for number, (name, flow) in enumerate(flows.items(), 1):
@@ -1301,7 +1301,7 @@ class Craft:
         return replace(model, tanks=order)
 
     def _with_intervals(self, fill: Fill, ranges: Mapping[str, Any]) -> dict[str, Any]:
-        """Return ranges by full names in which (low, high) replaces "interval"."""
+        """Return ranges by full names, with a pair (low, high) in place of "interval"."""
         tanks, order, found = self.tank_at(fill), self._names, dict(ranges)
         for name, of in ranges.items():
             if isinstance(of, str) and of == "interval":
@@ -1664,7 +1664,7 @@ class Craft:
 
 
 def _without_point(name: str) -> str:
-    """Return the parameter that a name of the fill table replaces."""
+    """Return the name of the parameter that a parameter of the fill table replaces."""
     prefix, key = name.split(".fill.")
     if key.startswith("liquid["):
         return f"{prefix}.m_0"

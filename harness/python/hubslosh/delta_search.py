@@ -43,7 +43,7 @@ class DeltaSearch:
     def __init__(
         self, model: "UncertainModel", loop: "Loop", K: LinearModel, progress: Progress = None
     ) -> None:
-        """Take the loop, whose linear controller is ``K``."""
+        """Prepare the search for a loop whose linear controller is ``K``."""
         self.model, self.loop, self.K = model, loop, K
         self.least = model._least
         """Least value of each δ."""
@@ -190,7 +190,10 @@ class DeltaSearch:
         return self.smallest([self._drawn(min(best.size, largest))], best, largest)
 
     def _followed(self, start: Complex, largest: float) -> Iterator[WorstCase]:
-        """Return limits of stability along the signs of the slopes of lightly damped poles."""
+        """Return limits of stability found by following each lightly damped pole.
+
+        The direction in Δ is the sign of the derivative of the pole's magnitude by each δ.
+        """
         count, seen = len(self.least), set()
         light = start[(start.imag > 0) & (np.abs(start) > np.exp(-0.3 * np.abs(np.angle(start))))]
         steps = 1e-4 * np.vstack([np.eye(count), -np.eye(count)])
@@ -237,7 +240,7 @@ class DeltaSearch:
         return best
 
     def _in_box(self, starts: Sequence[Matrix], best: WorstCase, box: float) -> WorstCase:
-        """Return the limit of stability on the line to an unstable Δ that is found in a box."""
+        """Search a box for an unstable Δ; return the limit of stability between 0 and it."""
         known = [self.model.delta(best.delta)] if best.delta else []
         near = [at * min(1.0, box / np.abs(at).max(initial=box)) for at in (*known, *starts)]
         for group in (near, self._meetings(box)):
@@ -247,7 +250,7 @@ class DeltaSearch:
         return NOTHING
 
     def _drawn(self, size: float) -> Matrix:
-        """Return the least stable of random Δ, of which half have the least damping ratios.
+        """Return the least stable of random Δ; half of them have the smallest damping ratios.
 
         They find a loop that is unstable only between the corners.
         """

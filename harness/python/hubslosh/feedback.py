@@ -52,7 +52,7 @@ class Feedback:
     two rows gives its torque until then, and none from then on."""
 
     def __post_init__(self) -> None:
-        """Make room for the commands."""
+        """Allocate the arrays of commands and of wheel speeds."""
         rows = self.cycles * self.parts + 1
         self.commands: Matrix = np.zeros((rows, len(self.command)))
         """The commands in force from each row on; the last row is not set."""

@@ -51,7 +51,7 @@ class DefinedUnit(str):
     def __new__(
         cls, name: str, exponents: dict[str, int], factor: float, offset: float
     ) -> "DefinedUnit":
-        """Take a unit: a number in it is factor · number + offset in SI base units."""
+        """Create a unit: the value in SI base units is factor · value in this unit + offset."""
         unit = super().__new__(cls, name)
         unit.exponents, unit.factor, unit.offset = exponents, factor, offset
         return unit
@@ -421,7 +421,9 @@ class Fmu:
         if not isinstance(value, tuple):
             return _finite(value)
         if len(value) != 2:
-            raise ValueError(f"{value!r} is not a pair of a number and its unit, such as (50, 'mm')")
+            raise ValueError(
+                f"{value!r} is not a pair of a number and its unit, such as (50, 'mm')"
+            )
         factor, offset = self.scale(name, value[1])
         return _finite((float(value[0]) - offset) / factor)
 
@@ -504,7 +506,7 @@ def _finite(value: Any) -> float:
 
 
 def _integer(value: Any) -> int:
-    """Return a whole number that FMI can hand over; C would wrap another one silently."""
+    """Return an integer in the range of FMI's integers; C would silently wrap a larger one."""
     whole = int(value)
     if whole != float(value):
         raise ValueError(f"{value} is not a whole number")

@@ -23,7 +23,7 @@ Matrix = NDArray[np.float64]
 
 
 def _check_states(states: int, cycles: int, period: float) -> None:
-    """Refuse a sampled model with too many commands on the way."""
+    """Raise FmuError if the delay of a sampled model needs too many states for delayed commands."""
     if states > MOST_STATES:
         raise FmuError(
             f"a delay of {cycles * period:g} s is {cycles} cycles of {period:g} s, and the "
@@ -275,7 +275,7 @@ class LinearModel:
         return mode_table(self._modes(below))
 
     def _modes(self, below: float) -> list[tuple[float, float, tuple[str, ...]]]:
-        """Return the rows of `modes`."""
+        """Return the rows of the table of modes: frequency, damping ratio and states of each."""
         poles, left, right = eigenvectors(self)
         rows = []
         for k, pole in enumerate(poles):
@@ -484,7 +484,7 @@ def linearize(
 
 
 def _seen(A: Matrix, C: Matrix) -> NDArray[np.bool_]:
-    """Return which states an output depends on, directly or through other states."""
+    """Return a mask of the states on which the outputs depend, directly or through other states."""
     seen: NDArray[np.bool_] = (C != 0).any(axis=0)
     while True:
         more = seen | (A[seen] != 0).any(axis=0)
@@ -494,7 +494,7 @@ def _seen(A: Matrix, C: Matrix) -> NDArray[np.bool_]:
 
 
 def _reals(fmu: Fmu, names: Sequence[str] | str | None, causality: str) -> list[str]:
-    """Return the Real variables meant."""
+    """Return the names of the given Real variables, or of all that have this causality."""
     if names is None:
         return [name for name in fmu.names(causality) if fmu.kind(name) == "Real"]
     problems: list[str] = []

@@ -453,7 +453,7 @@ def _heights(
 
 
 def _solid(occ: Any, name: str, size: Mapping[str, Any]) -> int:
-    """Make the inside of the whole tank, upright, in its own axes."""
+    """Create the tank's interior as a solid of gmsh, in tank axes, and return its tag."""
     if name == "cylinder":
         return int(occ.addCylinder(0, 0, 0, 0, 0, size["height"], size["radius"]))
     if name == "horizontal_cylinder":
@@ -482,7 +482,7 @@ def _solid(occ: Any, name: str, size: Mapping[str, Any]) -> int:
 
 
 class _Tank(NamedTuple):
-    """A shape with its dimensions, and the rotation that takes the specific force to z."""
+    """A tank's shape and dimensions, and the rotation that puts the specific force along z."""
 
     name: str
     size: Mapping[str, Any]
@@ -490,7 +490,7 @@ class _Tank(NamedTuple):
 
     @contextmanager
     def solid(self) -> "Iterator[tuple[Any, int, Sequence[float]]]":
-        """Return gmsh, the rotated inside of the tank as a solid, and its bounding box."""
+        """Return gmsh, the tag of the tank's rotated interior as a solid, and its bounding box."""
         try:
             import gmsh
             import skfem  # noqa: F401, of the same extra
@@ -522,7 +522,7 @@ class _Tank(NamedTuple):
 def _on_a_mesh(
     tank: _Tank, surface: float | None, elements: float, do: "Callable[[Any], Any]"
 ) -> Any:
-    """Call a function with a mesh, or with a slightly finer mesh if elements are unusable."""
+    """Call ``do`` with a mesh, and with finer meshes if elements are too distorted."""
     for again in range(4):
         mesh = _mesh(tank, surface, elements * 1.05**again)
         try:
@@ -645,14 +645,14 @@ def _on_surface(mesh: Any, surface: float) -> np.ndarray:
 
 
 def _volume_and_area(surface: float, mesh: Any) -> tuple[float, float]:
-    """Return a liquid's volume and the area of its surface, a little of its rim left out."""
+    """Return a liquid's volume and its free surface's area without a strip at the rim."""
     a, b, c = (mesh.p[:2, corner] for corner in mesh.facets[:, _on_surface(mesh, surface)])
     (x, y), (u, v) = b - a, c - a
     return _volume(mesh), float(np.abs(x * v - y * u).sum() / 2)
 
 
 def _cut(occ: Any, solid: int, box: Sequence[float], surface: float) -> int:
-    """Cut away the part of the tank above the surface, and return the liquid."""
+    """Cut away the tank above the free surface, and return the tag of the liquid's solid."""
     margin = max(box[3] - box[0], box[4] - box[1], box[5] - box[2])
     lid = occ.addBox(
         box[0] - margin, box[1] - margin, surface, *(3 * margin,) * 2, box[5] - surface + margin
@@ -673,9 +673,10 @@ def _is_at(gmsh: Any, tag: int, surface: float, box: Sequence[float]) -> bool:
 
 
 def _set_sizes(gmsh: Any, flat: list[int], size: float) -> None:
-    """Let elements grow away from the surface, where the modes are, and be fine at its edge.
+    """Set the element sizes: finest at the edge of the free surface, and growing away from it.
 
-    Without a surface they are of one size.
+    The modes decay with the distance from the free surface. Without a free surface all elements
+    have one size.
     """
     fields = gmsh.model.mesh.field
     if flat:
@@ -703,7 +704,7 @@ def _set_sizes(gmsh: Any, flat: list[int], size: float) -> None:
 
 
 def _solve(mesh: Any, surface: float, density: float, gravity: float, count: int) -> LiquidModes:
-    """Return the modes of a mesh; their error is not known yet."""
+    """Return the slosh modes that are computed on one mesh, without an estimate of their errors."""
     import pandas as pd
     from scipy.sparse.linalg import LinearOperator, eigsh, splu
     from skfem import Basis, BilinearForm, ElementTetP2, FacetBasis, Functional, LinearForm
@@ -728,7 +729,10 @@ def _solve(mesh: Any, surface: float, density: float, gravity: float, count: int
     center = np.array([integral(volume, lambda x, i=i: x[i]) / q for i in range(3)])
 
     def along(j: int) -> "Callable[[Any], Any]":
-        """Return N_j: velocity of the wall along n as the tank moves, j = 0..2, or turns."""
+        """Return N_j, the wall's velocity along its normal n per unit motion of the tank.
+
+        The motion is a displacement along x, y or z (j = 0 to 2) or a rotation (j = 3 to 5).
+        """
         if j < 3:
             return lambda w: w.n[j]
         a, b = (j - 2) % 3, (j - 1) % 3  # e_j × r has the components r_b, −r_a along b, a
@@ -778,9 +782,10 @@ def _solve(mesh: Any, surface: float, density: float, gravity: float, count: int
 
 
 def _aligned(lambdas: np.ndarray, phi: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Turn two modes of one frequency, whose directions are the mesh's chance, to x and y.
+    """Rotate pairs of modes of equal frequency so that they move along x and along y.
 
-    a: coupling of the modes, of unit norm, with the displacements, modes × 2.
+    The eigensolver returns such a pair in arbitrary directions, which depend on the mesh. ``a`` is
+    the coupling of the modes, of unit norm, with displacements along x and y: modes × 2.
     """
     lambdas, phi = lambdas.copy(), phi.copy()
     large = np.hypot(*a.T) > 1e-3 * np.hypot(*a.T).max()
@@ -797,7 +802,7 @@ def _aligned(lambdas: np.ndarray, phi: np.ndarray, a: np.ndarray) -> tuple[np.nd
 def _mode(
     density: float, gravity: float, lam: float, b: np.ndarray, norm: float, liquid: float
 ) -> dict[str, float]:
-    """Return the pendulum that stands for a mode; b: its coupling with the six motions."""
+    """Return the equivalent pendulum of a mode; ``b`` is its coupling with the tank's six motions."""
     a = np.hypot(b[0], b[1])
     mass = density * lam * a**2 / norm
     twist = density * lam * b[5] ** 2 / norm

@@ -144,7 +144,7 @@ class Loop:
         return self._examine()[0]
 
     def _examine(self) -> tuple[list[str], LinearModel | None]:
-        """Return everything that is wrong with it, and the controller if it is linear."""
+        """Return all problems of the loop, and its controller as a linear model if it is linear."""
         controller = None
         found = out_of_range(period=self.period, latency=self.latency, delay=self.delay)
         fmu = Fmu.open(self.model)
@@ -219,7 +219,7 @@ class Loop:
         return {name: of for name, of in torque_names(self.wheels).items() if name in commands}
 
     def _units(self) -> dict[str, str]:
-        """Return the units of torques and speeds of the wheels, which the FMU does not know."""
+        """Return the units of the wheels' torques and speeds, which are not in the FMU."""
         return units_of(torque_names(self.wheels))
 
     def _without_wheels(self) -> "Loop":
@@ -266,7 +266,7 @@ class Loop:
         return _linear(self.controller, self.period, measured, command)
 
     def _must_be_linear(self) -> LinearModel:
-        """Return the controller of a loop that is right, or raise FmuError."""
+        """Return the linear controller of the loop; raise FmuError if the loop has problems."""
         found, controller = self._examine()
         if found:
             raise FmuError("; ".join(found))
@@ -681,7 +681,11 @@ def _repeated(names: list[str]) -> list[str]:
 def _points(
     grid: NDArray[np.float64], substeps: int, period: float, rest: float
 ) -> tuple[NDArray[np.float64], int, NDArray[np.bool_] | None]:
-    """Return communication points, those at which a command acts, and those that are rows."""
+    """Return the communication points of a run.
+
+    Also returned are the index in each cycle at which a command begins to act, and the points that
+    are rows of the result (None: all).
+    """
     place = rest / period * substeps
     nearest = round(place)
     if abs(place - nearest) < 1e-9 * substeps:
@@ -697,7 +701,7 @@ def _points(
 def _checked_law(
     law: Law, constants: dict[str, float]
 ) -> Callable[[int, float, list[float]], list[float]]:
-    """Return the controller function with a check of its values, to which constants are added."""
+    """Return the controller function with a check of its result plus ``constants``."""
     command, added = list(constants), np.array(list(constants.values()))
     one = f"a finite number for {command[0]}"
     several = f"{len(command)} finite numbers ({', '.join(command)})"
@@ -721,7 +725,7 @@ def _checked_law(
 def _reference(
     reference: pd.DataFrame | None, measured: list[str], command: list[str]
 ) -> dict[str, History]:
-    """Return the reference values by name."""
+    """Return the reference histories by the names of their columns."""
     if reference is None:
         return {}
     allowed = [*measured, *command, *QUATERNION]
@@ -755,7 +759,7 @@ def _reference(
 def _linear(
     controller: Any, period: float, measured: list[str], command: list[str]
 ) -> LinearModel | None:
-    """Return a controller as a sampled linear model of this period; None: it is a function."""
+    """Return a controller as a linear model sampled with ``period``; None for a function."""
     if isinstance(controller, LinearModel):
         model = controller
     elif hasattr(controller, "dt") and hasattr(controller, "ninputs"):

@@ -93,7 +93,7 @@ class OperatingPoint:
         return self._remaining[1]
 
     def __repr__(self) -> str:
-        """Return the angular acceleration that is left."""
+        """Return the line that a console shows: the angular acceleration that trimming leaves."""
         return f"OperatingPoint({np.linalg.norm(self.angular_acceleration):.2g} rad/s² left)"
 
     def __str__(self) -> str:

@@ -31,7 +31,7 @@ COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 
 
 def _subplots(rows: int, height: float | None = None, **options: Any) -> "Sequence[Axes]":
-    """Return axes, one above the other, of a new figure with this height in inches."""
+    """Create a figure with this height in inches, and return its axes, one above the other."""
     try:
         import matplotlib.pyplot as plt
     except ModuleNotFoundError:
@@ -402,7 +402,7 @@ class _Mark(NamedTuple):
 
     @property
     def at(self) -> str:
-        """Margin and frequency."""
+        """Return the margin's value and its frequency as text for a label."""
         return f"{self.text} at {self.frequency:.3g} Hz" if self.text else ""
 
 

@@ -309,7 +309,7 @@ def _free_flags(
     outputs: Sequence[str],
     prior: Mapping[str, tuple[float, float]],
 ) -> list[str]:
-    """Return the flags that ask for any FMU's parameters."""
+    """Return the command-line options for the identification of any FMU's parameters."""
     flags = []
     for name, start in free.items():
         numbers = start if isinstance(start, tuple) else (start,)

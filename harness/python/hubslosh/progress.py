@@ -19,7 +19,7 @@ class Line:
     """A line on the terminal, or in a notebook, whose text is replaced as work proceeds."""
 
     def __init__(self, progress: Progress = None) -> None:
-        """Take who sees the line; None: those on a terminal and in a notebook."""
+        """Store the function that shows the line; None: a terminal or a notebook shows it."""
         show = is_watched() if progress is None else progress
         self._show = show if callable(show) else self._write if show else None
         self._width = 0

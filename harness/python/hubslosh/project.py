@@ -188,7 +188,7 @@ class Project:
         return np.asarray(law, float).tolist()
 
     def _each(self) -> "dict[str, tuple[Craft, dict[str, Any]]]":
-        """Return craft and settings of each case by name; without cases, those of the project."""
+        """Return craft and settings of each case by name, or of the project without cases."""
         if not self.cases:
             return {self.name: (self.craft, dict(self.settings))}
         found = {}
@@ -266,7 +266,7 @@ def _relative(path: Path, folder: Path) -> str:
 
 
 def _named(kind: str, tables: Mapping[str, Any]) -> dict[str, Any]:
-    """Return tables by their full names, without the craft's."""
+    """Return the tables of the project by their full names, without the tables of the craft."""
     found = {}
     for name, of in tables.items():
         if not isinstance(of, Mapping):

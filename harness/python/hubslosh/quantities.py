@@ -188,7 +188,7 @@ class Modes:
     """The slosh modes in parameters of Spacecraft, whose quantities can be read and changed."""
 
     def __init__(self, model: str | Path, given: Parameters) -> None:
-        """Take the parameters of an FMU; nothing is computed before it is asked for."""
+        """Store the parameters of an FMU; quantities of modes are computed when they are read."""
         self.model, self.fmu, self.given = model, Fmu.open(model), dict(given)
 
     def number(self, name: str) -> float:
@@ -295,7 +295,10 @@ class Modes:
             self._keep_at_rest(mode.tank, [(m, old), (-m, value)])
 
     def _keep_at_rest(self, tank: int, points: list[tuple[float, float]]) -> None:
-        """Add masses at heights to the rigid liquid; the dry craft lends it inertia."""
+        """Add point masses (kg) at heights (m) to the rigid liquid.
+
+        If the rigid liquid's inertia would become negative, inertia is taken from the dry craft.
+        """
         prefix = f"tank[{tank}]"
         m_0, H_0, I_0, more = (
             self.number(f"{prefix}.{name}") for name in ("m_0", "H_0", "I_0", "dI_y")

@@ -174,7 +174,7 @@ def figure_of(title: str, caption: str, height: float, draw: "Callable[[Figure],
 
 
 def _signs(margin: str, drawn: tuple[str, ...]) -> tuple[int, ...]:
-    """Return the signs with which a limit of a margin stands in a panel of these margins."""
+    """Return the signs of a margin's limits in a panel; a gain margin has two limits."""
     if margin == "gain_margin":
         return (1, -1) if "gain_up" in drawn else ()
     return (1,) if margin in drawn else ()
@@ -210,7 +210,7 @@ def _margins(figure: "Figure", review: "Review", unit: str) -> None:
 
 
 def _marked(review: "Review") -> str:
-    """Return how unstable fills are marked, if there are any."""
+    """Return the sentence that explains the marks of unstable fills, or an empty text."""
     bands = review.bands()
     if not bands["unstable"].any():
         return ""
@@ -233,7 +233,7 @@ def _mark_unstable(ax: "Axes", bands: pd.DataFrame) -> None:
 
 
 def _widened(low: float, high: float) -> tuple[float, float]:
-    """Return the ends of an axis at least 1 % of the value apart: rounding fills no axis."""
+    """Return ends of an axis at least 1 % apart, so that rounding errors do not fill it."""
     least = 0.01 * max(abs(low), abs(high))
     more = max(least - (high - low), 0) / 2
     return low - more, high + more
@@ -327,7 +327,7 @@ def _shade(share: float) -> str:
 
 
 def _key(figure: "Figure") -> None:
-    """Name the first and the last fill, unstable ones, and the worst case."""
+    """Add a legend that names the first and the last fill, unstable fills, and the worst case."""
     handles, labels = figure.axes[0].get_legend_handles_labels()
     unstable = [k for k, label in enumerate(labels[:-1]) if label.endswith("unstable")]
     last = len(labels) - 1

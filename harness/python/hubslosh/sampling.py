@@ -85,7 +85,7 @@ def draw(
 
 
 def _drawn(ranges: Mapping[str, Range], run: int, seed: int) -> dict[str, Any]:
-    """Return the values of one run from ranges without shares."""
+    """Return the random values of one run from ranges whose limits are absolute numbers."""
     shares = iter(uniforms(int(seed), int(run), len(ranges)))
     return {name: _value(of, next(shares)) for name, of in ranges.items()}
 
@@ -103,7 +103,7 @@ def _value(of: Range, share: float) -> Any:
 
 
 def _resolved(ranges: Any, nominal: Any) -> tuple[dict[str, Range], list[str]]:
-    """Return ranges in which (low, high) replaces each share, and a sentence for each wrong one."""
+    """Return ranges with (low, high) for relative limits, and a message for each error."""
     if not isinstance(ranges, Mapping) or not ranges:
         return {}, ["ranges must be (low, high), a share, a list or a distribution for each name"]
     if not isinstance(nominal, Mapping | None):
@@ -259,7 +259,7 @@ def monte_carlo(
 
 
 def _one(outcome: Outcome, values: dict[str, Any]) -> dict[str, Any]:
-    """Return the results of one draw."""
+    """Return the results of one random run."""
     try:
         found = outcome(dict(values))
     except FmuError as error:
@@ -279,7 +279,7 @@ def _one(outcome: Outcome, values: dict[str, Any]) -> dict[str, Any]:
 
 
 def _result(value: Any) -> float:
-    """Return a number that an outcome gives; a text is not one, even if it reads like one."""
+    """Return an outcome as a float; raise an error for a text, even if it is a number."""
     if isinstance(value, str | bytes | bytearray):
         raise TypeError
     return float(value)
@@ -350,14 +350,14 @@ class _InMemory:
 def _opened(
     folder: str | Path | None, seed: int, ranges: Mapping[str, Range]
 ) -> AbstractContextManager[Store | _InMemory]:
-    """Return where a study keeps its runs."""
+    """Return the store of a study's runs: a folder, or memory if no folder is given."""
     if folder is None:
         return nullcontext(_InMemory())
     return Store(folder, seed, {name: _text(name, of) for name, of in ranges.items()})
 
 
 def _text(name: str, of: Range) -> str:
-    """Return a text that differs between ranges."""
+    """Return a text that identifies a range, so that stored runs of other ranges are not reused."""
     if hasattr(of, "ppf"):
         shape = ", ".join(f"{of.ppf(share):.17g}" for share in (0.01, 0.2, 0.5, 0.8, 0.99))
         kind = getattr(getattr(of, "dist", None), "name", type(of).__name__)

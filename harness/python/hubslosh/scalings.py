@@ -68,7 +68,7 @@ class Scalings:
     """Finds scalings D and G for a Δ in which each parameter has a given number of copies."""
 
     def __init__(self, counts: Sequence[int]) -> None:
-        """Prepare the constraints; ``counts`` are the numbers of copies."""
+        """Prepare the constraints; ``counts`` are the numbers of repetitions of each δ in Δ."""
         self.clarabel = solver()
         self.counts = tuple(int(count) for count in counts)
         self.copies = np.repeat(np.arange(len(self.counts)), self.counts)

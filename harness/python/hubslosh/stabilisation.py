@@ -148,7 +148,7 @@ def _solved(value: Any, pole: complex, start: complex, offset: float) -> complex
 
 
 def _name(states: set[str], tanks: Sequence[str]) -> str:
-    """Return tanks and number of a mode from the states that take part."""
+    """Return the tanks and the number of a slosh mode from the states that move in it."""
     found: dict[str, set[str]] = {}
     for state in states:
         if match := _TANK.fullmatch(state):

@@ -138,7 +138,7 @@ class Margins:
 
 
 def _neutral_text(neutral: NDArray[np.complex128]) -> str:
-    """Return words on neutral poles; "" if there are none."""
+    """Return a sentence on neutral poles; an empty text if there are none."""
     count = len(neutral)
     if not count:
         return ""
@@ -334,7 +334,7 @@ def _closed_matrix(gain: LinearModel) -> Matrix:
 
 
 def _closed(gain: LinearModel) -> NDArray[np.complex128]:
-    """Return the closed loop's poles by magnitude."""
+    """Return the closed loop's poles in ascending order of magnitude."""
     poles = np.linalg.eigvals(_closed_matrix(gain)).astype(complex)
     return poles[np.argsort(np.abs(poles))]
 
@@ -360,7 +360,7 @@ def _errors(
 
 
 def _may_be_neutral(A: Matrix, poles: NDArray[np.complex128], period: float | None) -> Any:
-    """Return whether rounding can move a pole to the limit of stability; for `_errors`."""
+    """Return True if rounding errors can move a pole to the limit of stability."""
     off, most = _errors(A, poles, period)
     return (off <= most).any(axis=-1)
 
@@ -398,7 +398,7 @@ def _is_neutral(gain: LinearModel, poles: NDArray[np.complex128]) -> NDArray[np.
 
 
 def _moved(gain: LinearModel) -> NDArray[np.complex128]:
-    """Return the closed loop's poles by magnitude, without neutral poles."""
+    """Return the closed loop's poles in ascending order of magnitude, without neutral poles."""
     poles = _closed(gain)
     return poles[~_is_neutral(gain, poles)]
 
@@ -442,7 +442,7 @@ def _frequencies(values: Any, period: float | None) -> Matrix:
 
 
 def _compiled(model: LinearModel) -> Any:
-    """Return the model as compiled code evaluates it."""
+    """Return the model in the form that the compiled half of the package evaluates."""
     return Model(*(np.ascontiguousarray(matrix, float) for matrix in model), model.period or 0.0)
 
 
@@ -493,7 +493,7 @@ def _crossings(
 
 
 def _band(gain: LinearModel, roots: list[NDArray[np.complex128]]) -> tuple[float, float]:
-    """Return the frequencies between which a loop gain is looked at, rad/s."""
+    """Return the lowest and highest frequency of the search for crossings of a loop gain, rad/s."""
     nyquist = np.inf if gain.period is None else np.pi / gain.period
     known = np.concatenate([_frequencies(values, gain.period) for values in roots])
     sizes = np.concatenate([np.abs(values) for values in roots])
@@ -562,7 +562,7 @@ def _exact_delay(
     period = gain.period or 0.0
 
     def refined_delay(delay: float) -> float:
-        """Return a better delay: the magnitude is 1 at w, and the phase is made up for."""
+        """Return the delay corrected for the phase that remains at w, where the magnitude is 1."""
         nonlocal w
         cycles = int(delay / period)
         model = _compiled(delayed(delay - cycles * period))

@@ -61,7 +61,7 @@ class Store:
         self._store = NativeStore.study(self.path, seed, list(ranges.items()))
 
     def __enter__(self) -> Self:
-        """Return itself."""
+        """Return the store itself."""
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -83,7 +83,10 @@ def suggest(
 def _candidates(
     slosh: pd.DataFrame, rigid: "pd.Series[float]", period: float
 ) -> list[tuple[str, LinearModel]]:
-    """Return filters with their names: at the slosh mode that is unstable or shows most."""
+    """Return candidate filters with their names.
+
+    They act at the slosh mode that is unstable or has the largest loop gain.
+    """
     if slosh.empty:
         return []
     unstable = slosh["stabilised"] == "unstable"
@@ -147,7 +150,7 @@ def _sampled(point: "Point") -> tuple[NDArray[np.complex128], NDArray[np.complex
 def _distance(
     point: "Point", z: NDArray[np.complex128], L: NDArray[np.complex128], law: LinearModel
 ) -> float:
-    """Return the distance from instability at an operating point with a filter in the loop."""
+    """Return the modulus margin at an operating point with a filter; it is negative if unstable."""
     size = _largest(_moved(_series(point.gain, law)), point.gain.period)
     if size >= 1:
         return -float(np.log(size) / point.loop.period)

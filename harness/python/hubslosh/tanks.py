@@ -222,7 +222,7 @@ class Tank:
         return self._parameters("Spacecraft")
 
     def _prepare(self) -> list[str]:
-        """Compute the parameters of Spacecraft, if it has modes, and return warnings."""
+        """Compute the parameters of Spacecraft for a tank with modes, and return the warnings."""
         if not self.all["modes"]:
             return list(self._solved.warnings())
         found, warned = self._solved.parameters("Spacecraft")

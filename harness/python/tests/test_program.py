@@ -332,7 +332,9 @@ def test_any_fmu_is_fitted_by_the_names_of_its_variables(
             outputs=["omega"],
             program=option(request, "--hubslosh"),
         )
-    with pytest.raises(FmuError, match=r"^hubslosh identify: the recording data\[1\] cannot be used"):
+    with pytest.raises(
+        FmuError, match=r"^hubslosh identify: the recording data\[1\] cannot be used"
+    ):
         backwards = tables[1].iloc[::-1]
         hubslosh.identify([tables[0], backwards], fmu=fmu, **SPUN_DOWN, program=binary)
     with pytest.raises(FmuError, match="only together with free="):
