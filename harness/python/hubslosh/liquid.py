@@ -802,7 +802,7 @@ def _aligned(lambdas: np.ndarray, phi: np.ndarray, a: np.ndarray) -> tuple[np.nd
 def _mode(
     density: float, gravity: float, lam: float, b: np.ndarray, norm: float, liquid: float
 ) -> dict[str, float]:
-    """Return the equivalent pendulum of a mode; ``b`` is its coupling with the tank's six motions."""
+    """Return the equivalent pendulum of a mode; ``b``: its coupling with the tank's six motions."""
     a = np.hypot(b[0], b[1])
     mass = density * lam * a**2 / norm
     twist = density * lam * b[5] ** 2 / norm
