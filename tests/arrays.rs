@@ -1,5 +1,5 @@
-//! The FMU 3.0 with arrays is the FMU 3.0 with scalars: the same library, the same variables, the same bits. What sizes
-//! its arrays can be set before it initialises. So is an FMU with a part of the variables.
+//! The FMU 3.0 with arrays has the same library, the same variables and bit-identical results as the FMU 3.0 with scalars. The sizes of its
+//! arrays can be set before initialisation. An FMU with only a part of the variables also has identical results.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -596,8 +596,6 @@ fn input_arrays_changed_in_intermediate_update_act_as_scalar_inputs() {
     assert_eq!(all[0], all[1]);
 }
 
-/// Start, min, max, unit and the other attributes of each array element equal the attributes of the variable in the FMU
-/// with scalar variables.
 #[test]
 fn array_elements_have_the_attributes_of_the_scalar_variables() {
     for model in &MODELS {

@@ -1,5 +1,3 @@
-//! Functions shared by several tests.
-
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::LazyLock;

@@ -1,1 +1,1 @@
-//! Nothing: the package's tests are in `tests.rs`.
+//! This library is empty, because the tests of the package are in `tests.rs`.

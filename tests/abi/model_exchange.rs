@@ -1,5 +1,4 @@
-//! Model Exchange: a host that integrates the packed FMU's equations itself meets what
-//! the FMU does in Co-Simulation.
+//! Model Exchange: a host that integrates the equations of the packed FMU gets the same motion and events as in Co-Simulation.
 
 use std::collections::BTreeMap;
 

@@ -1,5 +1,5 @@
-//! One instance's life: which calls are allowed when, what is refused and how,
-//! that a refused call changes nothing, and that a saved state is all there is.
+//! The life cycle of one instance: which calls are allowed in which state, that a refused call changes nothing, and that a saved state is
+//! complete.
 
 use crate::common::items;
 use HubSlosh::table::TABLE;

@@ -1,4 +1,4 @@
-//! What the models of Spacecraft and SloshTank tell the runtime after a step: events that are due, and warnings.
+//! Events that are due after a step of Spacecraft or SloshTank, and warnings, as the models report them to the runtime.
 
 use SloshTank::model as sloshtank;
 use Spacecraft::model as spacecraft;

@@ -1,5 +1,4 @@
-//! Communication steps of both FMUs: what is shown after one, and that how many there are does not
-//! matter.
+//! Communication steps of both FMUs: their outputs after a step, and that results do not depend on the number of steps.
 
 use craft::{Inputs, Line, Parameters, Ramp, TankInputs, TankParameters};
 use host::fmi2::{CallError, MODEL_EXCHANGE, Status};

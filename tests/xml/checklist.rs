@@ -29,7 +29,7 @@ fn named(row: &str) -> impl Iterator<Item = &str> {
     last.split('`').skip(1).step_by(2)
 }
 
-/// Returns what rows name and the sources lack: `function_name`, `crate::file_stem` and `test_file.py`. Commands and
+/// Returns the names in the rows that the sources do not contain: `function_name`, `crate::file_stem` and `test_file.py`. Commands and
 /// scripts with a path are not looked up.
 fn missing(rows: &[String]) -> Vec<&str> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");

@@ -1,4 +1,4 @@
-//! Committed files that are generated equal their generators' output; the icon is what importers want.
+//! Committed files that are generated equal the output of their generators, and the icon has the size and format that importers expect.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! modelDescription.xml says what the binary does, and says it legally.
+//! The statements of modelDescription.xml agree with the binary, and are valid by the standard.
 
 use std::collections::{BTreeMap, BTreeSet};
 

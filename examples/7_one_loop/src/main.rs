@@ -42,8 +42,8 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// Steps both FMUs from time to time. At each, all outputs are read before any input is set (a
-/// Jacobi master). Returns time, tau and what is recorded, per row.
+/// Steps both FMUs together. At each communication point all outputs are read before any input is set (a Jacobi master). Returns the rows
+/// of time, tau and the recorded variables.
 fn closed_loop(plant: &Fmu, controller: &Fmu, slopes: bool) -> Result<Vec<Vec<f64>>> {
     let mut plant = started(plant, &PLANT)?;
     let mut controller = started(controller, &[])?;

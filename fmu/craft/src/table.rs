@@ -318,8 +318,6 @@ mod tests {
         }
     }
 
-    /// Below the first and above the last point of the table, the values are those of the point and their derivatives are
-    /// 0.
     #[test]
     fn beyond_the_ends_of_its_fill_table_a_tank_keeps_the_end_values() {
         let table = FillTable { points: 3, ..crate::Tank::default().fill };

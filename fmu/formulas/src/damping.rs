@@ -185,8 +185,8 @@ impl Part {
     }
 }
 
-/// Damping ratios as multiples f of the laminar layer's: the expected value `factor`, which holds for all
-/// modes, and the expected intervals of the first mode and of the other modes.
+/// Damping ratios as multiples f of the damping ratio of a laminar wall layer: the expected value `factor`, which holds for all modes, and
+/// the expected intervals of the first mode and of the higher modes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
     pub factor: f64,

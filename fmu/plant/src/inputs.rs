@@ -1,5 +1,3 @@
-//! Inputs of the plant, as ramps in time.
-
 /// A quantity that is linear in time: `value + slope t`.
 pub type Ramp = taylor::ramp::Ramp;
 

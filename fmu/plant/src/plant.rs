@@ -466,8 +466,7 @@ impl Plant {
         before
     }
 
-    /// Does what [`Plant::apply_present_contact`] does, but permanently: the next step begins with this
-    /// contact.
+    /// Sets the contact as [`Plant::apply_present_contact`] does, but permanently: the next step begins with this contact.
     pub fn take_present_contact(&mut self, inputs: &Inputs) {
         if self.omega() == 0.0 {
             let (contact, time) = (self.present_contact(inputs), self.state.time);

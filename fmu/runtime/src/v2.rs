@@ -355,7 +355,8 @@ c_functions! { $ export_fmi2, v2;
 fn fmi2GetTypesPlatform() -> fmi2String = c"default".as_ptr();
 fn fmi2GetVersion() -> fmi2String = c"2.0".as_ptr();
 
-/// Selects what is logged: off means nothing, and on without categories means everything.
+/// Selects the logged categories: if `loggingOn` is false, nothing is logged; if it is true and no categories are given, everything is
+/// logged.
 fn fmi2SetDebugLogging(c: fmi2Component, loggingOn: fmi2Boolean, nCategories: usize, categories: *const fmi2String) -> fmi2Status =
     perform_if_allowed::<M, Fmi2>(c, &SET_DEBUG_LOGGING, |component| {
         component.log.filter = match loggingOn {

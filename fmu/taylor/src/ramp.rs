@@ -1,5 +1,3 @@
-//! Inputs that are linear in time.
-
 use crate::vector::Vec3;
 
 /// A number or a vector that is linear in time: `value` now, plus `slope` (per second) times t, s.

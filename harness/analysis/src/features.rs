@@ -4,8 +4,8 @@ use crate::random::Random;
 use crate::response::FrequencyResponse;
 use signals::fourier::Complex64;
 
-/// Features of a frequency response: the frequencies of the local maximum of |H|, the resonance, and of the
-/// local minimum, the antiresonance, Hz, and the height of one over the other, dB.
+/// Features of a frequency response: the frequency of the local maximum of |H|, which is the resonance, the frequency of the local minimum,
+/// which is the antiresonance, both in Hz, and the ratio of the two magnitudes, dB.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Features {
     pub f_res: Option<f64>,

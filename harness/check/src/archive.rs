@@ -127,7 +127,6 @@ impl Archive {
     }
 }
 
-/// Lists what is wrong with an entry's name; each item completes the sentence "the name …".
 fn name_faults(name: &str) -> Vec<&'static str> {
     let mut faults = Vec::new();
     if name.is_empty() {

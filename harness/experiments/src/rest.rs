@@ -1,5 +1,3 @@
-//! Runs that begin at rest.
-
 use anyhow::Result;
 use host::description::ModelDescription;
 use host::fmu::{Fmu, Instance};

@@ -316,7 +316,6 @@ struct Reader {
 }
 
 impl Reader {
-    /// Adds a problem of the element. The first [`NAMED`] problems are stored, and all further ones are only counted.
     fn problem(&mut self, element: &Element, what: &str) {
         match self.problems.len() < NAMED {
             true => {

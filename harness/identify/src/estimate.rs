@@ -1,5 +1,3 @@
-//! A number with its uncertainty.
-
 use analysis::statistics::about_mean;
 use serde::Serialize;
 

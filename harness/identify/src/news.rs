@@ -1,5 +1,3 @@
-//! Progress of a method.
-
 #[derive(Clone, Debug)]
 pub enum News {
     Step(String),

@@ -277,8 +277,8 @@ impl Boundary {
 const FEW: usize = 12;
 const MANY: usize = 36;
 const WIDTH: f64 = 0.35;
-/// Grading exponent gamma at an apex on the axis. The exponents of the solution there are between 0.8 and 2 except for
-/// very slender cones.
+/// Exponent gamma with which points are concentrated towards an apex on the axis. The potential near an apex is a power of the distance
+/// with an exponent between 0.8 and 2, except for very slender cones.
 const APEX: f64 = 4.0;
 
 /// Returns gamma at a corner between two directions of travel, and nu = pi/al. gamma is a whole number, so

@@ -1,4 +1,3 @@
-//! A mass on a spring as an FMU.
 #![allow(non_snake_case)]
 
 pub mod spring;

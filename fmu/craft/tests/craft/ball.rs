@@ -554,8 +554,6 @@ fn loose(random: &mut Random, slides: [bool; 2]) -> (Parameters, Spacecraft) {
 
 const CASES: [[bool; 2]; 3] = [[false, false], [false, true], [true, true]];
 
-/// Detached liquid is a point mass that flies or slides along the wall. The rates equal those of Newton's law for craft and
-/// liquid, solved with the wall's force as an additional unknown.
 #[test]
 fn rates_equal_newtons_law_with_the_walls_force_as_an_unknown() {
     for seed in 0..12 {

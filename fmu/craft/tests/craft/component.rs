@@ -1,3 +1,1 @@
-//! The components under test.
-
 pub use craft::{SloshTank, Spacecraft};

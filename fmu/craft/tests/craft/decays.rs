@@ -87,8 +87,8 @@ fn rounded(x: f64) -> f64 {
     (x + x.hypot(0.02)) / 2.0
 }
 
-/// The amplitude A of a free oscillation decays by A'/A = -omega (zeta + zeta_A A + zeta_b max(0, k a - s_b)), tested
-/// up to 0.3 rad; 1 % is what a pendulum's own nonlinearity may take.
+/// The amplitude A of a free oscillation decays by A'/A = -omega (zeta + zeta_A A + zeta_b max(0, k a - s_b)), tested up to 0.3 rad. The
+/// tolerance of 1 % includes the pendulum's own nonlinearity.
 #[test]
 fn damping_of_free_oscillations_is_the_sum_of_zeta_amplitude_damping_and_breaking() {
     for (zeta_a, zeta_b, begins) in

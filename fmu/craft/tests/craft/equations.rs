@@ -1,4 +1,4 @@
-//! The derivatives of rates and outputs that hosts get.
+//! Derivatives of rates and outputs that hosts receive, compared with finite differences.
 
 use craft::{
     Coupling, INPUTS, Inputs, Line, MODES, Mount, Outputs, Parameters, Ramp, STATES, SloshTank,

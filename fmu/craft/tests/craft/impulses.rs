@@ -72,9 +72,9 @@ fn an_impulse_of_the_host_leaves_the_bobs_velocities_across_their_rods() {
     }
 }
 
-/// The impulse acts on the craft as it is, not as it was filled: after some of its liquid has left, a jump of the wheels
-/// keeps P and H. Its work is what energy and `drained` gain: rods whose ends the flow moves work, too, as much as while
-/// the wheels turn within 0.1 us.
+/// After some liquid has drained, a jump of the wheels' angular momentum conserves the momentum P and the angular momentum H of the craft
+/// with the remaining liquid. The work of the jump equals the increase of `energy` plus `drained`. The flow moves the ends of the rods,
+/// which therefore do work, too.
 #[test]
 fn a_jump_of_the_wheels_keeps_momentum_and_energy_of_a_draining_craft() {
     let (mut by_rods, h) = (0.0_f64, 1e-7);

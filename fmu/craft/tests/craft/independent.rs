@@ -144,7 +144,7 @@ struct Shape {
     /// dz/d|q|^2 and its derivative
     slope: f64,
     bend: f64,
-    /// Half the gradient of the left side, over l, and what its second derivative leaves without x''.
+    /// Half the gradient of the left side divided by l, and the terms of the second derivative of the left side without x''.
     normal: V,
     curving: f64,
 }

@@ -332,8 +332,8 @@ fn damping_that_stabilises_is_predicted_to_5_percent() {
     }
 }
 
-/// A prolate spinner with liquid at +-x: its nutation grows by what the liquid dissipates. The
-/// eigenvalue, from a linearisation apart from this code: 0.002551418 +- 0.468308812 i.
+/// A prolate spinner with liquid at +-x. The growth rate of its nutation, which the dissipation in the liquid causes, equals the eigenvalue
+/// of an independent linearisation, 0.002551418 +- 0.468308812 i.
 #[test]
 fn nutation_of_a_prolate_spinner_grows_at_the_analytic_rate() {
     let mut p = parameters(&record("spinner"));

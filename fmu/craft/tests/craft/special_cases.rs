@@ -1,4 +1,4 @@
-//! Cases with another, simpler description: one axis, degenerate parameters.
+//! Special cases with a simpler description: motion about one axis, and parameters at the ends of their ranges.
 
 use craft::{Inertia, Inputs, Mount, Parameters, Ramp, STATES, TankInputs, TankParameters, index};
 

@@ -1,5 +1,3 @@
-//! Plants that several tests share.
-
 use plant::{FrictionModel, Parameters, SloshModel};
 
 pub const SLOSH: [SloshModel; SloshModel::ALL.len()] = SloshModel::ALL;

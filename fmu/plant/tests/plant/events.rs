@@ -1,4 +1,4 @@
-//! Events as a host that integrates itself meets them.
+//! Event indicators and events of the plant in a host of Model Exchange, which integrates by itself.
 
 use super::common::bench;
 use plant::{

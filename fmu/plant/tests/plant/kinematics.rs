@@ -22,8 +22,8 @@ fn moving(slosh: SloshModel) -> Parameters {
     p
 }
 
-/// Places of the masses at an instant: hub's angle, and each slosh mass in the hub's frame with its height, m, and what
-/// stands for its height in the potential energy.
+/// Places of the masses at an instant: the hub's angle, and for each slosh mass its position in the hub's frame with its height, m, and the
+/// height that determines its potential energy.
 struct Place {
     theta: f64,
     /// For each slosh mass: x from the axis, y, height that moves with it, height that gravity acts on.

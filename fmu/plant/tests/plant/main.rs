@@ -1,5 +1,3 @@
-//! Tests of the plant.
-
 mod balances;
 mod changing_g;
 mod common;

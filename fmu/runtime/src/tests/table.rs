@@ -1,4 +1,4 @@
-//! Consequences of a table of variables.
+//! Tests of the properties of a model that follow from its table of variables.
 
 use super::*;
 use crate::table::{About, Layout, Scalar, Table, scalar_count, scalars};

@@ -1,5 +1,3 @@
-//! Dependencies of variables on each other.
-
 #![allow(unsafe_code)]
 
 use super::calls::*;

@@ -1,5 +1,3 @@
-//! Directional and adjoint derivatives.
-
 #![allow(unsafe_code)]
 
 use super::calls::*;

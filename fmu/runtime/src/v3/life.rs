@@ -1,5 +1,3 @@
-//! Instantiation in FMI 3.0.
-
 #![allow(unsafe_code)]
 
 use std::panic::catch_unwind;

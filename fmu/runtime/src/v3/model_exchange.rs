@@ -1,5 +1,3 @@
-//! Model Exchange: continuous states, their derivatives, and event indicators.
-
 #![allow(unsafe_code)]
 
 use super::calls::*;

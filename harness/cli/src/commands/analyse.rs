@@ -1,5 +1,3 @@
-//! `hubslosh analyse`.
-
 use std::path::{Path, PathBuf};
 
 use analysis::statistics;

@@ -1,5 +1,3 @@
-//! `hubslosh book`.
-
 use std::path::PathBuf;
 
 use anyhow::{Result, ensure};

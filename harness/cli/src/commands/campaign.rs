@@ -1,5 +1,3 @@
-//! `hubslosh campaign`.
-
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail, ensure};

@@ -1,5 +1,3 @@
-//! `hubslosh check`.
-
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 

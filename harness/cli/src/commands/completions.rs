@@ -1,5 +1,3 @@
-//! `hubslosh completions`.
-
 use anyhow::Result;
 
 /// Prints a script by which a shell completes commands and flags of hubslosh.

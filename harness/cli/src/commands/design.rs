@@ -1,5 +1,3 @@
-//! `hubslosh design`.
-
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 

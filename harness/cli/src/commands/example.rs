@@ -1,5 +1,3 @@
-//! `hubslosh example`.
-
 use std::path::PathBuf;
 
 use anyhow::Result;

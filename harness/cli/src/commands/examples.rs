@@ -1,5 +1,3 @@
-//! `hubslosh examples`.
-
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};

@@ -1,5 +1,3 @@
-//! `hubslosh fmus`.
-
 use anyhow::{Result, ensure};
 
 use crate::fmu;

@@ -1,5 +1,3 @@
-//! `hubslosh gyro`.
-
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 

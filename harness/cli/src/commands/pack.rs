@@ -1,5 +1,3 @@
-//! `hubslosh pack`.
-
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 

@@ -1,5 +1,3 @@
-//! `hubslosh release`.
-
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 

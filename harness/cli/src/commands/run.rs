@@ -1,5 +1,3 @@
-//! `hubslosh run`.
-
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 

@@ -1,5 +1,3 @@
-//! `hubslosh scale`.
-
 use anyhow::Result;
 use clap::Subcommand;
 use experiments::scaling::{self, Flight};

@@ -1,5 +1,3 @@
-//! `hubslosh tank`.
-
 use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail, ensure};

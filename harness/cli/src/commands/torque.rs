@@ -1,5 +1,3 @@
-//! `hubslosh torque`.
-
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 

@@ -1,5 +1,3 @@
-//! `hubslosh variables`.
-
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 

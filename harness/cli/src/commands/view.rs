@@ -1,5 +1,3 @@
-//! `hubslosh view`.
-
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 

@@ -1,4 +1,5 @@
-//! `hubslosh check` from outside: its exit codes, what it prints, the files that it writes. Facts of rules are tests of `check`.
+//! Runs `hubslosh check` as a process, and compares exit codes, output and written files. The rules themselves are tested in the crate
+//! `check`.
 
 use std::process::{Command, Output};
 

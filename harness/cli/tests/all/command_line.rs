@@ -1,5 +1,5 @@
-//! The program `hubslosh` from outside: what it makes, and what it says to bad
-//! input. Each failure is one sentence, a non-zero exit, and no new file.
+//! Runs the program `hubslosh` as a process: the files that it writes, and its errors for wrong input. Each failure must be one sentence
+//! with a non-zero exit code, and must leave no new file.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

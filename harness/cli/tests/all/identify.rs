@@ -1,4 +1,4 @@
-//! `hubslosh identify` from outside, and what is done with its result.
+//! Runs `hubslosh identify` as a process, and uses its results in further commands.
 
 use std::collections::BTreeSet;
 use std::path::Path;

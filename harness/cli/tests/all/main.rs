@@ -1,4 +1,4 @@
-//! The program `hubslosh` from outside.
+//! Tests that run the program `hubslosh` in a process of its own.
 
 mod campaign;
 mod check;

@@ -1,5 +1,5 @@
-//! Campaigns from plan files, from outside: kill and start again, runs simulated by another importer,
-//! what the tables say where there is nothing to say.
+//! Runs campaigns from plan files as processes: campaigns that are killed and started again, runs that another importer simulated, and
+//! tables in which values are missing.
 
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;

@@ -1,5 +1,3 @@
-//! `hubslosh tank`.
-
 use std::process::Command;
 
 fn tank(arguments: &[&str]) -> (bool, String, String) {

@@ -1,4 +1,4 @@
-//! A run as a page, from outside; what is drawn of it in a browser is compared by `.ci/browser`.
+//! Runs `hubslosh view` as a process. The script `.ci/browser` compares the drawing in a browser.
 
 use std::io::{Read, Write};
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! The gyro gives back the specified noise.
+//! The noise that is estimated from simulated records of the gyro equals the specified noise.
 
 use analysis::allan::{Noise, Term};
 use experiments::gyro::Recording;

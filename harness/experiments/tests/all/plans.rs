@@ -1,4 +1,4 @@
-//! Built-in plans stay where their models mean something.
+//! The built-in plans stay within the range of validity of their models, unless their texts say otherwise.
 
 use experiments::campaign::{Range, WAVE, seek_onset};
 use experiments::plan::{BUILT_IN, Case, Plan};

@@ -1,5 +1,5 @@
-//! Recordings of the FMU in place of a bench, with its gyro's noise. Identification is tried on them, and they show what a
-//! planned experiment would record.
+//! Recordings that the FMU computes in place of a bench, with the noise of its gyro. Identification is tried on these recordings, and they
+//! show what a planned experiment would record.
 
 use analysis::random::Random;
 use analysis::statistics::peak;
@@ -124,7 +124,7 @@ impl Default for Twin {
 }
 
 impl Twin {
-    /// Returns the settings, and the one of the effect that the models do not have.
+    /// Returns the settings of the FMU, together with the setting that causes the unmodelled effect.
     fn settings(&self, torque: &[f64], seed: Option<u32>) -> Vec<(String, String)> {
         let mut all = self.settings.clone();
         let mut set = |name: &str, value: String| all.push((name.into(), value));

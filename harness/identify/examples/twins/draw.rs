@@ -1,4 +1,4 @@
-//! A twin: a bench with truths of its own, a torque, and what measures it.
+//! A twin: a simulated bench with parameters of its own, a torque, and sensors.
 
 use std::f64::consts::TAU;
 
@@ -48,7 +48,7 @@ pub struct Twin {
     gyro_bias: f64,
     pub encoder: Option<f64>,
     rate: f64,
-    /// Torque and clock of the recording over the true ones.
+    /// Scales of the torque and of the clock of the recording: recorded value divided by true value.
     torque_scale: f64,
     clock: f64,
     /// Drift of the gyro at each row, rad/s.

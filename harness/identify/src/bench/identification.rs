@@ -1,5 +1,3 @@
-//! Results of the output-error method.
-
 use serde::Serialize;
 
 use super::braking::{Braking, FrictionPoint};

@@ -1,5 +1,3 @@
-//! Options of an identification.
-
 use anyhow::Result;
 use host::fmu::Fmu;
 use names::hubslosh::FrictionModel;

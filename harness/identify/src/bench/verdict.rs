@@ -1,4 +1,4 @@
-//! The answer about a bench in words.
+//! Writes the verdict on a bench: sentences on slosh model, friction, fit and estimates.
 
 use std::collections::BTreeMap;
 

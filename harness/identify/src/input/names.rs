@@ -1,5 +1,3 @@
-//! Lists of variable names.
-
 /// Returns the items between commas. A comma in brackets separates nothing: `a,inertia[1,2]` has two items.
 pub fn list(text: &str) -> impl Iterator<Item = &str> {
     let mut depth = 0i32;

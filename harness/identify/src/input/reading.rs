@@ -1,6 +1,6 @@
-//! Reads recordings of a bench, checks what must be true of them before anything is fitted, and cuts them.
+//! Reads recordings of a bench, refuses recordings that no fit can use, and cuts them at gaps.
 //!
-//! If torque is missing and cannot be predicted, the recording is cut ([`crate::input::gaps`]) and each part has a start of its own.
+//! If torque is missing and cannot be predicted, the recording is cut there ([`crate::input::gaps`]), and each part has a start of its own.
 
 use std::path::Path;
 
@@ -363,7 +363,7 @@ fn starts_at_rest(part: &Recording) -> bool {
     rests && part.torque[0].abs() < 0.1 * deviation(&part.torque)
 }
 
-/// Returns what the gyro reads on average less the mean rate that the encoder shows, if there is one, rad/s.
+/// Returns the mean of the gyro's readings minus the mean rate that the encoder shows, rad/s; without an encoder, the mean of the readings.
 fn mean_reading(part: &Recording) -> f64 {
     let turned = part.angle.as_ref().map_or(0.0, |angle| {
         let (time, angle) = (part.of_fresh_angle(&part.time), part.of_fresh_angle(angle));

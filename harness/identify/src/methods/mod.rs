@@ -1,4 +1,4 @@
-//! Methods of identification, one a file: what each is given, and what all return.
+//! Methods of identification, one in each file, and the types of their inputs and results.
 
 pub mod free_decay;
 pub mod friction;

@@ -1,5 +1,3 @@
-//! The documentation: links, figures, equations.
-
 use std::path::{Path, PathBuf};
 
 use pack::documentation::page::{Gathered, Page};

@@ -1,4 +1,4 @@
-//! Tables come back as they were written, and say what is wrong with them.
+//! Tables are read as they were written, and errors about damaged tables say what is wrong.
 
 use std::collections::BTreeMap;
 

@@ -1,5 +1,3 @@
-//! Tanks of the reference as files.
-
 use std::path::Path;
 
 use hubslosh_tank::{ModalData, Tank};

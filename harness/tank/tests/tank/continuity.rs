@@ -68,7 +68,6 @@ fn largest_steps(tank: &Tank, liquid: [f64; 2], from: f64, count: usize) -> [f64
     worst
 }
 
-/// Between adjacent ones of 500 fills the damping ratio of each tank changes by less than 1 %.
 #[test]
 #[ignore = "minutes: .ci/run --nightly"]
 fn the_damping_ratio_has_no_step_at_500_fills() {

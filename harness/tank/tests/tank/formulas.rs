@@ -1,5 +1,3 @@
-//! Damping and low gravity.
-
 use crate::common::solve;
 use formulas::damping;
 use hubslosh_tank::low_gravity::{self, Fluid};

@@ -1,5 +1,3 @@
-//! Tests of the tank's modal parameters, in one binary.
-
 mod backbones;
 mod common;
 mod continuity;

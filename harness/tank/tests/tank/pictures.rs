@@ -1,5 +1,3 @@
-//! Pictures of tanks.
-
 use std::path::Path;
 
 use crate::liquid_figure;

@@ -1,4 +1,4 @@
-//! Against the reference of 23 tanks.
+//! Compares modal parameters with the reference values of 23 tanks.
 
 use crate::common::{number, reference, tank, toml};
 use hubslosh_tank::{Mode, Rest};

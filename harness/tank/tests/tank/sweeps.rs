@@ -1,5 +1,3 @@
-//! Tables over the fill.
-
 use crate::common::tank;
 use hubslosh_tank::fill_table::Between;
 use hubslosh_tank::interpolation::Monotone;
@@ -74,8 +72,6 @@ fn a_sweep_has_the_third_order_coefficients_of_every_fill() {
     assert_eq!(cells, [s, kappa, known.error, known.angle_limit]);
 }
 
-/// After the other columns of each mode, the table has the damping ratio and its interval. Without a viscosity there are no
-/// such columns, and for an empty tank the cells are empty.
 #[test]
 fn a_sweep_has_the_damping_of_every_fill() {
     let tank = tank("density = 1000.0\nshape = { cylinder = { radius = 1.0, height = 3.0 } }");
