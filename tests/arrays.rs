@@ -270,8 +270,6 @@ fn inputs(opened: &Opened) -> Vec<String> {
     names
 }
 
-/// Each FMI 3.0 FMU is packed with array variables and with scalar variables; both have the same binary and run with the
-/// same inputs in Co-Simulation.
 #[test]
 fn an_fmu_with_arrays_steps_bit_identically_to_one_with_scalars() {
     for case in cases() {
@@ -295,8 +293,6 @@ fn an_fmu_with_arrays_steps_bit_identically_to_one_with_scalars() {
     }
 }
 
-/// Each FMI 3.0 FMU is packed with array variables and with scalar variables; both run in Model Exchange at the same
-/// states.
 #[test]
 fn fmus_with_arrays_and_with_scalars_have_equal_states_derivatives_and_indicators() {
     for case in cases() {

@@ -100,8 +100,6 @@ fn the_importer_crate_fmi_gets_bit_identical_outputs_in_co_simulation() {
     theirs.terminate().unwrap();
 }
 
-/// The crate `fmi`, an importer that is independent of this project, evaluates HubSlosh at the states that the harness
-/// uses.
 #[test]
 fn the_importer_crate_fmi_gets_bit_identical_derivatives_in_model_exchange() {
     let import: Fmi2Import = fmi::import::from_path(packed_for_tests()).unwrap();
@@ -314,8 +312,6 @@ mod fmi3 {
         }
     }
 
-    /// The crate `fmi`, an importer that is independent of this project, evaluates HubSlosh of FMI 3.0 in Model Exchange;
-    /// the harness evaluates HubSlosh of FMI 2.0.
     #[test]
     fn the_importer_crate_fmi_gets_bit_identical_derivatives_from_fmi_3_and_fmi_2() {
         let (import, description) = import(HUBSLOSH);

@@ -52,8 +52,6 @@ for kind in ("CoSimulation", "ModelExchange"):
     assert len(t) == 1001
 "#;
 
-/// An FMU of a spring on the project's runtime, which consists of a table of variables and a model, passes `hubslosh check`
-/// and runs in FMPy.
 #[test]
 fn a_minimal_fmu_needs_only_a_table_and_a_model() {
     let fmu = packed();

@@ -172,8 +172,6 @@ fn a_whole_life(fmi: Fmi, share: Share) {
     assert_eq!(number(&said, " more descriptors"), 0.0, "{said}");
 }
 
-/// A host written in C steps many instances in turns, makes wrong calls, saves and restores states, and loads and unloads
-/// the library hundreds of times, in both versions of FMI.
 #[test]
 fn a_c_host_survives_every_wrong_call_and_no_memory_is_leaked() {
     for fmi in VERSIONS {
@@ -195,8 +193,6 @@ fn functions_answer_as_the_table_has_it(model: &pack::Model, names: [&str; 6], s
     );
 }
 
-/// Each FMI 3.0 function is called in each mode; it either succeeds or returns an error with a message, as the standard
-/// demands for this mode.
 #[test]
 fn every_function_of_fmi_3_is_allowed_or_refused_in_words_in_every_mode() {
     for (model, names, sets) in [
@@ -254,19 +250,16 @@ fn no_calls_break<M: runtime::Model>(inputs: u32) {
     }
 }
 
-/// 3,000 random sequences of calls, with valid and invalid arguments, neither crash the FMU nor make it hang.
 #[test]
 fn no_calls_break_the_packed_binary_of_hubslosh() {
     no_calls_break::<HubSlosh::HubSlosh>(3000);
 }
 
-/// 600 random sequences of calls, with valid and invalid arguments, neither crash the FMU nor make it hang.
 #[test]
 fn no_calls_break_the_packed_binary_of_spacecraft() {
     no_calls_break::<Spacecraft::Model>(600);
 }
 
-/// 600 random sequences of calls, with valid and invalid arguments, neither crash the FMU nor make it hang.
 #[test]
 fn no_calls_break_the_packed_binary_of_sloshtank() {
     no_calls_break::<SloshTank::Model>(600);
@@ -581,8 +574,6 @@ fn scenes(model: &str) -> Vec<Vec<(&'static str, &'static str)>> {
     }
 }
 
-/// The host traps division by zero, invalid operations and overflow while it sets parameters of HubSlosh to values within
-/// their declared ranges.
 #[cfg(target_os = "linux")]
 #[test]
 fn no_allowed_value_of_hubslosh_raises_a_floating_point_exception() {
@@ -601,8 +592,6 @@ fn no_allowed_value_of_spacecraft_raises_a_floating_point_exception() {
     }
 }
 
-/// The host traps division by zero, invalid operations and overflow while it sets parameters of SloshTank to values within
-/// their declared ranges.
 #[cfg(target_os = "linux")]
 #[test]
 fn no_allowed_value_of_sloshtank_raises_a_floating_point_exception() {
@@ -819,8 +808,6 @@ fn states<M: runtime::Model>() {
     }
 }
 
-/// Serialised FMU states are damaged at random. The FMU refuses the bytes, or the restored instance goes on with finite
-/// numbers.
 #[test]
 fn damaged_saved_states_are_refused_or_give_a_valid_instance() {
     states::<HubSlosh::HubSlosh>();
@@ -865,8 +852,6 @@ fn hosts_whose_times_have_rounding_errors_get_the_same_outputs() {
     clocks([20, 2, 4]);
 }
 
-/// Hosts that add up their communication points, or multiply them, have other rounding errors in the time than the FMU; the
-/// sequences are random.
 #[test]
 #[ignore = "minutes: .ci/run --nightly"]
 fn hosts_with_other_clocks_get_the_same_outputs_in_a_hundred_thousand_sequences() {

@@ -254,8 +254,6 @@ fn several_copies_and_instances_do_not_disturb_each_other() {
     }
 }
 
-/// Eight threads simulate one instance of HubSlosh each, at the same time; the outputs are bit-identical to those of a
-/// single thread.
 #[test]
 fn instances_in_several_threads_give_the_same_bits() {
     let fmu = open();
@@ -369,7 +367,6 @@ fn every_function_handles_a_null_instance() {
 
 // ---- The logger ----
 
-/// Several errors are provoked; each message is valid UTF-8 and belongs to a log category of the model description.
 #[test]
 fn log_messages_are_valid_text_in_a_declared_category() {
     let fmu = open();
@@ -756,8 +753,6 @@ fn the_status_of_the_last_step_can_be_queried() {
 
 // ---- Reset, end, saved states ----
 
-/// Instances of HubSlosh during initialisation, after steps and after an error are reset; their saved states are
-/// bit-identical to the saved state of a new instance.
 #[test]
 fn reset_from_every_state_is_a_fresh_instance_bit_for_bit() {
     let fmu = open();
@@ -800,8 +795,6 @@ fn values_of_a_terminated_instance_can_still_be_read() {
     assert_eq!(all(&mut instance), last);
 }
 
-/// The state is restored into the same instance, and into one that was only created: no setup, no
-/// initialization.
 #[test]
 fn a_saved_state_continues_bit_for_bit_also_in_a_new_instance() {
     let fmu = open();

@@ -29,8 +29,6 @@ fn initialised(interface: Interface, slosh_model: i32, friction_model: i32) -> I
     instance
 }
 
-/// Setting inputs, stepping and reading outputs 100 times allocates no memory, with each slosh model and friction law of
-/// HubSlosh.
 #[test]
 fn stepping_setting_and_getting_allocate_nothing() {
     for slosh_model in items("slosh.model") {
@@ -53,8 +51,6 @@ fn stepping_setting_and_getting_allocate_nothing() {
     }
 }
 
-/// Setting states and reading derivatives and event indicators 100 times allocates no memory, with each slosh model and
-/// friction law of HubSlosh.
 #[test]
 fn calls_of_model_exchange_allocate_nothing() {
     for slosh_model in items("slosh.model") {

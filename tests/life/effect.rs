@@ -127,15 +127,11 @@ fn no_warning_names_a_parameter_of_hubslosh_that_changes_an_output() {
     check(&with(&[("wheel.enabled", 1.0), ("imu.enabled", 1.0)]));
 }
 
-/// Spacecraft warns of parameters that are set but have no effect. A change of each named parameter leaves all outputs
-/// bit-identical.
 #[test]
 fn no_warning_names_a_parameter_of_spacecraft_that_changes_an_output() {
     check::<Spacecraft::Model>(&[("force[1]", 10.0)]);
 }
 
-/// SloshTank warns of parameters that are set but have no effect. A change of each named parameter leaves all outputs
-/// bit-identical.
 #[test]
 fn no_warning_names_a_parameter_of_sloshtank_that_changes_an_output() {
     check::<SloshTank::Model>(&[]);

@@ -153,8 +153,6 @@ fn inputs_set_in_initialization_mode_count_from_the_start() {
     assert!((quarter / on_earth - 0.5).abs() < 1e-15);
 }
 
-/// HubSlosh gets five wrong parameters: leaving initialisation mode returns one error that names all five, and succeeds
-/// after the values are corrected.
 #[test]
 fn all_wrong_parameters_are_reported_at_once_and_can_be_corrected() {
     let mut instance = fresh();
@@ -206,8 +204,6 @@ fn parameters_that_contradict_each_other_are_reported() {
     assert!(fault.text.contains("wheel.speed_min"), "{}", fault.text);
 }
 
-/// NaN, an infinite torque and a negative g_axial are refused; a call with one wrong value among several sets none of the
-/// values.
 #[test]
 fn wrong_inputs_are_refused_by_the_call_that_sets_them() {
     let mut instance = stepping(&[]);
@@ -365,7 +361,6 @@ fn after_a_step_that_failed_values_can_be_read_and_a_saved_state_restored() {
     instance.do_step(0.0, 1.0).unwrap();
 }
 
-/// After a panic inside the FMU, all calls, including reset and the restoring of a saved state, return fmi2Fatal.
 #[test]
 fn after_a_panic_every_call_is_fatal() {
     let mut instance = stepping(&[]);
@@ -376,8 +371,6 @@ fn after_a_panic_every_call_is_fatal() {
     assert_eq!(instance.restore(&fresh()).unwrap_err().severity, Severity::Fatal);
 }
 
-/// Tests every model bit for bit, in memory and through bytes, in the same instance and in one that was only
-/// created.
 #[test]
 fn a_restored_state_continues_bit_identically() {
     for slosh_model in items("slosh.model") {
@@ -831,8 +824,6 @@ fn directional_derivatives_of_variables_without_any_are_refused() {
     assert_eq!(answer, [0.0]);
 }
 
-/// Other parameters, and friction parameters out of range, are refused after initialisation and leave the state of HubSlosh
-/// as before.
 #[test]
 fn only_friction_parameters_can_be_changed_between_steps() {
     let mut instance =
@@ -911,8 +902,6 @@ fn no_output_depends_directly_on_an_input_that_it_does_not_list() {
     }
 }
 
-/// Each parameter is changed by itself; if a value at the start then changes, the model description must list the parameter
-/// as a dependency.
 #[test]
 #[ignore = "six seconds: .ci/long-tests"]
 fn no_initial_value_depends_on_a_parameter_that_it_does_not_list() {

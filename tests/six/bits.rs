@@ -192,8 +192,6 @@ fn the_fmu_and_the_crate_move_random_tanks_bit_identically() {
     }
 }
 
-/// Under every recorded motion, which the host sets as inputs, the packed SloshTank is bit-identical to the tank in the
-/// crate `craft`.
 #[test]
 fn slosh_tank_equals_the_crate_bit_for_bit_in_every_reference_record() {
     for record in &records("tank") {

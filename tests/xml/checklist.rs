@@ -58,7 +58,6 @@ fn every_test_that_the_checklist_names_exists() {
     assert_eq!(missing(&rows), [""; 0]);
 }
 
-/// Each row of book/verification.md names a test function of the source or states a check by hand.
 #[test]
 fn every_test_that_the_page_of_verification_names_exists() {
     let rows = rows("verification.md", "| claim");

@@ -69,8 +69,6 @@ fn every_variable_is_as_in_fmi_2<M: Model>() {
     assert!(names.values().all(|count| *count == 1), "names are unique");
 }
 
-/// Names, units, ranges, start values and causality of each variable are equal in the model descriptions of FMI 3.0 and FMI
-/// 2.0.
 #[test]
 fn every_variable_of_fmi_3_is_as_in_fmi_2() {
     every_variable_is_as_in_fmi_2::<HubSlosh::HubSlosh>();

@@ -169,8 +169,6 @@ mod tests {
         assert!(energy_terms(0.7).is_some());
     }
 
-    /// The coefficients from fully nonlinear flow give frequency shifts of planar and circular waves within 0.05 of
-    /// third-order theory, for h/R from 0.4 to 0.7.
     #[test]
     fn frequency_shifts_are_close_to_the_third_order_theory() {
         for i in 0..=30 {

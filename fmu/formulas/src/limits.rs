@@ -277,8 +277,6 @@ mod tests {
         assert!(shallow[1] < 1.2 && shallow[2] < 0.5 && shallow[2] > 0.0, "{shallow:?}");
     }
 
-    /// A tank in which only free motion was compared with potential flow has the limits of the most unfavourable upright
-    /// cylinder.
     #[test]
     fn a_tank_without_a_forced_comparison_has_the_limits_of_the_most_unfavourable_cylinder() {
         let rows = || THIRD_ORDER.into_iter();

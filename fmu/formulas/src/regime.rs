@@ -31,7 +31,6 @@ impl Regime {
 mod tests {
     use super::*;
 
-    /// The output `regime` is linear below a wave height of 0.15 R, transitional up to 0.25 R, and nonlinear above.
     #[test]
     fn regimes_end_at_0_15_and_0_25_of_the_radius() {
         assert_eq!([0.1499, 0.15].map(Regime::from_ratio), [Regime::Linear, Regime::Transitional]);

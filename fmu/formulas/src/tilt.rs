@@ -163,8 +163,8 @@ mod tests {
         }
     }
 
-    /// The second mode's changes at the slope 0.2 come from the same meshes, which differ by 0.009 of Lambda
-    /// both upright and tilted.
+    /// At the slope 0.2 the factors of the second mode equal those of finite elements on two meshes, which differ from each other by 0.009
+    /// of Lambda for the upright and for the tilted cylinder.
     #[test]
     fn the_second_mode_changes_as_by_finite_elements() {
         for (fill, change) in [

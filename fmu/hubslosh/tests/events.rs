@@ -150,8 +150,6 @@ fn fmi_3_without_event_mode_gives_bit_identical_results_to_fmi_2() {
     }
 }
 
-/// FMI 3.0: the host allows early return and enters event mode at each event of HubSlosh; the motion is that of FMI 2.0 bit
-/// for bit.
 #[test]
 fn a_host_that_handles_events_gets_the_same_motion_to_the_last_bit() {
     let expected = trajectory();

@@ -376,7 +376,6 @@ mod tests {
         (plant, inputs)
     }
 
-    /// The state for the time in stiction has the derivative 1 for a hub at rest and 0 for a hub that turns.
     #[test]
     fn time_in_stiction_grows_by_one_second_per_second_while_the_hub_sticks() {
         for (omega, rate) in [(0.0, 1.0), (0.07, 0.0)] {
@@ -391,8 +390,6 @@ mod tests {
         }
     }
 
-    /// A host whose step has passed a speed limit of the rotor must handle an event, which returns the rotor
-    /// to the limit.
     #[test]
     fn a_rotor_beyond_its_speed_limit_makes_an_event_due_at_once() {
         let mut p = Parameters::default();
@@ -568,7 +565,6 @@ mod tests {
         }
     }
 
-    /// A torque exactly at the limit of the static friction makes an event, at which the hub begins to turn.
     #[test]
     fn torque_at_the_very_limit_breaks_the_hub_away_at_an_event() {
         let mut p = Parameters::default();
@@ -590,7 +586,6 @@ mod tests {
         }
     }
 
-    /// If a host has skipped sampling times, the missing samples of the gyro are taken at once, up to a limit.
     #[test]
     fn gyro_samples_that_are_due_are_taken_up_to_a_limit() {
         let mut p = Parameters::default();
@@ -631,7 +626,6 @@ mod tests {
         plant.step(&inputs, 100.0).unwrap();
     }
 
-    /// The hub's rate, or the rate of a slosh mass, is set to a value whose square overflows.
     #[test]
     fn a_motion_whose_energy_overflows_is_refused() {
         for slosh in SloshModel::ALL {

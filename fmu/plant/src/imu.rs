@@ -236,7 +236,6 @@ mod tests {
         }
     }
 
-    /// Random numbers of the rate random walk are drawn apart from those of white noise and bias.
     #[test]
     fn the_other_noise_of_the_gyro_is_equal_with_and_without_a_rate_random_walk() {
         let imu = Imu { lsb: 0.0, ..Imu::default() };

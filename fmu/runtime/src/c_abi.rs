@@ -563,7 +563,6 @@ mod tests {
     use std::cell::RefCell;
     use std::rc::Rc;
 
-    /// A panic inside an FMI function returns fmi2Fatal, and the log has the text of the panic.
     #[test]
     fn a_panic_is_fatal_and_reported_with_its_text() {
         let lines = Rc::new(RefCell::new(Vec::new()));

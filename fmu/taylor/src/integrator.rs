@@ -909,7 +909,6 @@ mod tests {
         assert!((motion.now[0] - since.cos()).abs() < 1e-12, "{:?}", motion.now);
     }
 
-    /// The integrator counts its internal steps, and an error states the time on the clock of the host.
     #[test]
     fn internal_steps_are_counted_and_errors_state_the_time_of_the_host() {
         let mut motion = Oscillator::new(Convergence::Decay);

@@ -57,8 +57,6 @@ pub fn noise_level(signal: &[f64]) -> f64 {
 mod tests {
     use super::*;
 
-    /// Mean, variance, peak, median, quantile and correlation of four values equal results that were computed by
-    /// hand.
     #[test]
     fn four_values_have_their_textbook_statistics() {
         let values = [1.0, -4.0, 2.0, 5.0];

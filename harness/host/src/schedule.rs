@@ -295,8 +295,6 @@ mod tests {
         assert_eq!(found, near.map(|t| (t, true)));
     }
 
-    /// Between the rows of a history of inputs values are interpolated linearly or held; two rows with the same time
-    /// are a jump.
     #[test]
     fn a_history_is_piecewise_linear_and_may_jump() {
         let lines = |hold| {

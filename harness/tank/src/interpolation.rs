@@ -76,8 +76,6 @@ mod tests {
         );
     }
 
-    /// The data have a jump, a plateau, and a turning point. The curve rises wherever they rise, and two
-    /// derivatives are continuous everywhere.
     #[test]
     fn curve_is_monotone_where_data_are_and_twice_differentiable() {
         let x = [0.0, 0.1, 0.2, 0.5, 0.6, 0.61, 0.9, 1.0, 1.3, 1.4, 1.5];

@@ -732,8 +732,6 @@ mod tests {
         }
     }
 
-    /// Modes of random tanks are computed with a finer discretisation; their errors are below the errors that the result
-    /// states.
     #[test]
     #[ignore = "some minutes: .ci/run --nightly"]
     fn stated_errors_bound_the_errors_of_a_hundred_random_contours() {

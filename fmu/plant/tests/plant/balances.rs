@@ -34,8 +34,6 @@ impl Turnover {
     }
 }
 
-/// Random benches with each slosh model and friction law: the change of energy equals the work of the torques less the
-/// dissipated energy.
 #[test]
 fn energy_balances_for_every_model_friction_and_damping() {
     let mut rng = fastrand::Rng::with_seed(1);
@@ -156,8 +154,6 @@ fn energy_never_grows_without_torque() {
     }
 }
 
-/// Inertia times angular acceleration of the hub equals the sum of all torques on the hub, computed from the outputs
-/// of the plant.
 #[test]
 fn hub_equation_holds_between_the_outputs() {
     let mut rng = fastrand::Rng::with_seed(4);
@@ -184,7 +180,6 @@ fn hub_equation_holds_between_the_outputs() {
     }
 }
 
-/// While dry friction holds the hub (stick), its rate is exactly 0 and its angle does not change by a bit.
 #[test]
 fn a_stuck_hub_is_exactly_at_rest() {
     let mut p = bench(SloshModel::Linear, FrictionModel::Stribeck);
@@ -200,7 +195,6 @@ fn a_stuck_hub_is_exactly_at_rest() {
     }
 }
 
-/// A torque ramp over 10 s, in steps of 20 ms, of 5 ms and of random length.
 #[test]
 fn trajectory_does_not_depend_on_the_communication_step() {
     let mut rng = fastrand::Rng::with_seed(5);
@@ -278,7 +272,6 @@ fn a_bench_with_liquid_of_vanishing_mass_moves_as_a_bench_with_rigid_liquid() {
     }
 }
 
-/// An asymmetry and harmonics over the angle that together make the friction factor negative.
 #[test]
 fn friction_that_would_drive_the_hub_is_refused() {
     let refused = |asymmetry: f64, forward: [f64; 4]| {
@@ -308,7 +301,6 @@ fn a_bearing_with_a_preferential_direction_holds_less_torque_in_that_direction()
     assert!(stuck(-7.105e-3) && !stuck(-7.106e-3));
 }
 
-/// The wheel reaches its torque limit and then its lowest speed; the sum of the angular momenta stays constant.
 #[test]
 fn hub_liquid_and_wheel_together_keep_their_momentum() {
     let mut p = bench(SloshModel::Spherical, FrictionModel::None);

@@ -109,7 +109,6 @@ fn a_jump_of_g_on_a_tilted_bench_does_the_work_of_the_change_in_height() {
     }
 }
 
-/// Torque and axial specific force change linearly, in one step of 10 s or in steps of 3 ms.
 #[test]
 fn motion_under_ramps_does_not_depend_on_the_communication_step() {
     for slosh in SLOSHING {
@@ -167,7 +166,6 @@ fn damping_follows_its_formula_while_g_ramps_through_zero() {
     assert!((x[x::SLOSH + 3] - rate).abs() < 2e-7, "{} {rate}", x[x::SLOSH + 3]);
 }
 
-/// Ramps of the axial acceleration to zero, and away from zero, take a bounded number of internal steps.
 #[test]
 fn ramps_to_zero_and_from_it_take_a_bounded_number_of_steps() {
     for slosh in SLOSHING {

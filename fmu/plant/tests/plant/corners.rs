@@ -142,8 +142,6 @@ fn amplitude_damping_keeps_the_solver_tolerance_where_g_vanishes() {
     keep_the_tolerance((0..60).chain([234, 1040, 1224, 1651]));
 }
 
-/// The bench is simulated under 2,000 random histories of torque, and compared with runs in much shorter steps. The
-/// errors must stay near the tolerance of the solver.
 #[test]
 #[ignore = "minutes: .ci/run --nightly"]
 fn two_thousand_random_tables_of_torque_keep_the_solver_tolerance() {

@@ -158,7 +158,6 @@ fn rigid_liquid_follows_the_hub() {
     }
 }
 
-/// Modes are corrected for a leaning bench only if they are computed from the geometry and the tilt is not 0.
 #[test]
 fn without_tilt_or_with_a_table_the_modes_are_used_as_given() {
     for model in SLOSHING {

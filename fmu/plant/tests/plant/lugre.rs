@@ -96,8 +96,6 @@ fn dissipation_is_never_negative_up_to_the_largest_sigma1_and_no_further() {
     assert!(problems[0].contains("friction.c"), "{problems:?}");
 }
 
-/// With growing bristle stiffness the motion under LuGre friction converges to the motion under Stribeck friction with true
-/// sticking.
 #[test]
 fn stiff_lugre_bristles_approach_the_set_valued_law() {
     // A sine that the hub follows with stops: sliding, reversal, rest.
@@ -276,8 +274,6 @@ fn a_lugre_hub_below_break_away_torque_stays_at_a_deflection() {
     assert_eq!(plant.omega(), -mirrored.omega());
 }
 
-/// Stiffer bristles of the LuGre friction law have a shorter relaxation time, and the integrator takes shorter steps
-/// in proportion.
 #[test]
 fn step_length_follows_the_bristle_stiffness() {
     // Sliding at 0.05 rad/s for 1 s with a relaxation time from 0.1 s to 0.1 ms. The number of

@@ -33,7 +33,6 @@ fn steps(p: &Parameters, inputs: &Inputs, tolerance: f64, h: f64) -> usize {
     enough
 }
 
-/// Each slosh model and friction law over 2 s, against a run at a tolerance of 1e-14.
 #[test]
 fn errors_of_states_stay_within_the_solver_tolerance() {
     for slosh in SloshModel::ALL {

@@ -62,8 +62,6 @@ fn modes_of_a_cylinder_given_as_a_table_move_like_the_cylinder() {
     }
 }
 
-/// A table of modes gives frequencies instead of lengths; the lengths follow from the frequency, g and the centring
-/// stiffness.
 #[test]
 fn a_slosh_frequency_in_the_table_determines_the_pendulum_length() {
     let mut p = sphere();

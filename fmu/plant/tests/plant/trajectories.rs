@@ -196,15 +196,11 @@ fn linear_model_equals_the_reference_at_tolerance_1e_10() {
     check("linear", 1e-10);
 }
 
-/// Trajectories of the planar slosh model, with stick and slip, equal reference trajectories that two other
-/// integrators computed.
 #[test]
 fn planar_model_equals_the_reference() {
     check("planar", 1e-11);
 }
 
-/// Trajectories of the spherical slosh model, with stick and slip, equal reference trajectories that two other
-/// integrators computed.
 #[test]
 fn spherical_model_equals_the_reference() {
     check("spherical", 1e-11);

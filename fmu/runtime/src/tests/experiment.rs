@@ -42,8 +42,6 @@ fn setup_experiment_refuses_invalid_values_and_names_each_of_them() {
     }
 }
 
-/// Initialisation, stepping or events, and termination lead through the instance states that FMI 2.0 defines for
-/// Co-Simulation and Model Exchange.
 #[test]
 fn instance_goes_through_the_states_of_its_interface() {
     use InstanceState::*;

@@ -42,7 +42,6 @@ fn failures_come_with_status_and_category() {
     Log::new(None).report(&Fault { severity: Severity::Fatal, text: String::new() });
 }
 
-/// If logEvents is enabled, a step with events writes one message, with the last event and the number of events.
 #[test]
 fn events_are_logged_on_request_with_the_last_one_and_their_number() {
     let (mut log, lines) = log();
@@ -108,7 +107,6 @@ fn parameters_without_effect_that_differ_from_their_start_values_are_named_with_
     assert_eq!(with(&[("gauges", 7.0), ("start.level[1]", 4.5), ("start.level[2]", 4.5)]), both);
 }
 
-/// A model that warns of the host's inputs in every step writes one message to the log.
 #[test]
 fn a_warning_about_the_hosts_inputs_comes_once() {
     let (mut log, lines) = log();

@@ -119,7 +119,6 @@ fn only_declared_dependencies_that_have_an_effect_now_are_reported() {
     }
 }
 
-/// After the host has set time, states or inputs, the outputs have the values for the new settings.
 #[test]
 fn outputs_have_the_values_for_the_time_states_and_inputs_that_the_host_set_last() {
     let mut instance = continuous(&[]);

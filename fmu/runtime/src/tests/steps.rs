@@ -138,8 +138,6 @@ fn an_input_ramp_down_to_the_smallest_allowed_value_is_accepted() {
     assert_eq!((real(&mut instance, "w"), real(&mut instance, "z")), (-2.0, -1.0));
 }
 
-/// After a refused step the slopes of the inputs that the host has set are unchanged, so that the host can repeat the
-/// step.
 #[test]
 fn a_step_that_is_refused_keeps_the_slopes() {
     let mut instance = started(CS, &[("w", 1.0)]);
@@ -153,7 +151,6 @@ fn a_step_that_is_refused_keeps_the_slopes() {
     assert!(why.contains("at the end of the step z = inf m"), "{why}");
 }
 
-/// The input w is the derivative of the input z; after a step z has increased by the integral of w.
 #[test]
 fn an_input_that_is_the_derivative_of_another_input_changes_the_other_input() {
     let mut instance = started(CS, &[("z", 1.0), ("w", 0.5)]);
@@ -201,7 +198,6 @@ fn input_slopes_of_the_last_step_are_kept_until_an_input_is_set() {
     assert_eq!(real(&mut asked, "trend"), 2.0);
 }
 
-/// An instance stores the input slopes of the last step only if outputs of the model use these slopes.
 #[test]
 fn a_model_whose_outputs_use_no_slopes_keeps_none() {
     let mut instance = spring(CS);

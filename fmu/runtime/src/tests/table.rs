@@ -159,8 +159,6 @@ static OTHER_NAME: Enumeration = Enumeration {
     items: &[Item::new("x", ""), Item::new("y", "")],
 };
 
-/// The GUID changes with everything on which a host, and therefore its model description, depends, and with
-/// nothing else.
 #[test]
 fn the_guid_changes_with_everything_that_a_host_depends_on() {
     let guid = |about: About, variables: Vec<Variable<Vessels>>| {

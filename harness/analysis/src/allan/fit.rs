@@ -700,7 +700,6 @@ mod tests {
         }
     }
 
-    /// The Allan fit adds a Gauss–Markov bias or a rate ramp if the record contains one, and names other misfits.
     #[test]
     fn a_misfit_of_the_noise_model_is_named_with_its_cause() {
         let bias = Noise { bias_instability: 1e-4, bias_time: 40.0, ..ALL };

@@ -278,7 +278,6 @@ fn an_experiment_without_information_is_refused() {
     assert!(said.contains("cannot be used with '--duration"), "{said}");
 }
 
-/// At 0.1 m/s² the FMU warns of a low Bond number; `hubslosh run` prints the warning, and prints none at normal gravity.
 #[test]
 fn warnings_of_the_fmu_are_printed() {
     let directory = tempfile::tempdir().unwrap();
@@ -521,7 +520,6 @@ fn shells_get_completions_with_every_command() {
     }
 }
 
-/// The exit code is 1 if a command fails, 2 if the command line is wrong, and 0 for --help.
 #[test]
 fn exit_codes_tell_a_failure_from_a_wrong_command_line() {
     for (arguments, code) in [

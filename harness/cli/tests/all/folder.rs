@@ -188,7 +188,6 @@ fn a_large_campaign_keeps_the_curves_of_some_runs_and_the_numbers_of_all() {
     assert!(all.iter().any(|row| same(row) == same(one)), "{one:?}");
 }
 
-/// While a campaign holds its directory, a second campaign fails and names the plan and the process of the first.
 #[test]
 fn a_second_campaign_in_a_directory_is_refused_with_the_name_of_the_first() {
     let directory = tempfile::tempdir().unwrap();

@@ -171,7 +171,6 @@ fn a_designed_multisine_is_within_the_wheels_limits() {
     assert!((0.09..=0.1).contains(&angle), "{limited}");
 }
 
-/// Each option of `identify` that was removed gives an error with the command, option or page that replaces it.
 #[test]
 fn a_removed_option_names_what_replaces_it() {
     let folder = tempfile::tempdir().unwrap();
@@ -193,7 +192,6 @@ fn a_removed_option_names_what_replaces_it() {
     }
 }
 
-/// Counts the options in the help of each kind of recording, without the options that every command has.
 #[test]
 fn no_kind_of_recording_has_more_than_15_options() {
     let folder = tempfile::tempdir().unwrap();

@@ -172,7 +172,6 @@ const CHEAP: [&str; 7] = [
     "hubslosh run --input torque.csv",
 ];
 
-/// The examples at the end of each --help are parsed, and those that take little time are run.
 #[test]
 fn every_example_of_every_help_is_understood_and_the_cheap_ones_run() {
     let directory = tempfile::tempdir().unwrap();
@@ -359,7 +358,6 @@ fn an_output_follows_links_and_is_written_to_a_pipe() {
     }
 }
 
-/// If --columns also lists the input that the profile drives, the table has the input once.
 #[test]
 fn a_driven_input_is_one_column_of_the_table() {
     let directory = tempfile::tempdir().unwrap();
@@ -381,7 +379,6 @@ fn ssv(name: &str, value: &str, units: &str) -> String {
     )
 }
 
-/// Values in an SSV file with a unit, for example mm, are converted to SI; an unknown or a wrong unit is refused.
 #[test]
 fn units_of_a_parameter_set_are_converted_or_refused() {
     let directory = tempfile::tempdir().unwrap();

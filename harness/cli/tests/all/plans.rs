@@ -45,7 +45,6 @@ const SWEEPS: &str = "title = \"Sweeps\"\n\
     [vary]\nslosh.model = [\"linear\", \"spherical\"]\nhub.I = [0.3, 0.35]\nprofile.amplitude = [0.05, 0.1, 0.2]\n\
     [count]\nimu.seed = 5\n";
 
-/// A campaign is killed after its first run; the next campaign with the same plan reuses this run.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
 fn a_killed_campaign_goes_on_where_it_stopped() {
@@ -228,7 +227,6 @@ fn a_failed_run_is_a_row_of_runs_csv_with_the_error() {
     assert!(text(directory, "c/report.html").contains("d_-1"));
 }
 
-/// A plan with an unknown key of its profile and an unknown parameter; the command creates no directory.
 #[test]
 fn a_wrong_plan_writes_nothing_and_reports_every_fault() {
     let directory = tempfile::tempdir().unwrap();
@@ -375,7 +373,6 @@ fn hubslosh_torque_writes_the_slope_of_each_row() {
     }
 }
 
-/// An FMU lacks one output that the analysis of a campaign needs; its runs are simulated and stored.
 #[test]
 fn an_fmu_that_is_not_the_bench_is_driven_and_stored_without_analysis() {
     // the bench under another name for one output that its analysis needs

@@ -56,8 +56,6 @@ const SAME: [&str; 22] = [
     "peak_acceleration_rad_s2",
 ];
 
-/// A simulated run is written in every file format for recordings; `analyse` must find the same antiresonance and
-/// resonance in each file as in the run.
 #[test]
 fn a_recording_of_a_run_has_the_features_of_the_run_in_every_file_format() {
     let directory = tempfile::tempdir().unwrap();

@@ -304,7 +304,6 @@ fn a_spacecraft_under_low_thrust_gets_its_antiresonance_and_resonance_to_a_hundr
     assert!(page.contains("0.0438") && page.contains("0.0450"), "the headline has them");
 }
 
-/// A sine of 0.25 N·m at the slosh frequency drives the slosh angle beyond the range in which the model is valid.
 #[test]
 fn the_report_names_runs_that_leave_the_range_of_the_model() {
     let directory = tempfile::tempdir().unwrap();

@@ -369,8 +369,6 @@ fn a_binary_that_does_harm_when_loaded_ends_its_own_process_and_every_command_sa
     ends_its_own_process("AT_LOAD");
 }
 
-/// FMU binaries that crash, exit, loop or fill the memory in fmi2DoStep end only the process that hubslosh started for
-/// them; each command then prints an error.
 #[test]
 fn a_binary_that_does_harm_in_a_step_ends_its_own_process_and_every_command_says_so() {
     ends_its_own_process("AT_STEP");

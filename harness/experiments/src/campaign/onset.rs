@@ -140,8 +140,6 @@ fn search(
 mod tests {
     use super::{Dwell, Found, WITHIN, search};
 
-    /// The search for the onset of rotary slosh finds the smallest torque at which a given test function reports
-    /// rotary slosh at any frequency.
     #[test]
     fn the_onset_is_the_smallest_torque_with_rotary_slosh() {
         // a leaning tongue: from 0.06 N·m at 2.4 Hz, wider with the torque

@@ -831,7 +831,6 @@ mod tests {
         assert_eq!(cases_of(text), ["zero", "sine"]);
     }
 
-    /// A plan file with unknown keys, wrong types and wrong distributions; the error lists each fault with its line.
     #[test]
     fn all_faults_of_a_wrong_plan_are_reported_at_once() {
         let text = "titel = \"x\"\nprofile = 3\nstep = -1\nhold = 1\n\
@@ -952,7 +951,6 @@ mod tests {
         }
     }
 
-    /// The third random run of a plan has the same parameters whether the plan has 3 or 9 runs.
     #[test]
     fn a_draw_does_not_depend_on_the_number_of_draws() {
         let (few, many) =

@@ -44,8 +44,6 @@ fn white_noise_has_no_bias_instability_and_rounding_adds_noise() {
     assert!((found.fit.noise.arw / found.specified.arw - 1.0).abs() < 0.05, "{}", found.text());
 }
 
-/// The fitted flicker noise and rate random walk are within their 95 % intervals; for three seeds in four
-/// both intervals contain the true value.
 #[test]
 fn simulated_flicker_noise_and_rate_random_walk_are_estimated() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();

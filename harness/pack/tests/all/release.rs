@@ -137,7 +137,6 @@ fn gathered(tree: &Path, arguments: &[&str]) -> Result<BTreeSet<String>, String>
     if done.status.success() { Ok(names) } else { Err(said) }
 }
 
-/// A script gathers the files of a release; the list is complete for FMUs and wheels.
 #[cfg(unix)]
 #[test]
 fn release_files_match_the_manifest() {

@@ -148,8 +148,6 @@ fn correlation(points: &[(f64, f64)]) -> f64 {
 mod tests {
     use super::{correlation, histogram};
 
-    /// The correlation coefficient of two columns is ±1 if they are linear in each other; for a constant column the
-    /// function returns 0.
     #[test]
     fn correlation_is_one_for_proportional_columns_and_undefined_for_constants() {
         let line: Vec<(f64, f64)> = (0..10).map(|i| (f64::from(i), 3.0 - f64::from(i))).collect();

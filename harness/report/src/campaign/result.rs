@@ -557,7 +557,6 @@ mod tests {
         );
     }
 
-    /// If no run of a campaign has a valid frequency response, the report makes no statement about linear models.
     #[test]
     fn runs_without_a_valid_response_give_no_statement() {
         let none = [series("linear", "", &[(1.0, 0.0, 0.0, false), (2.0, 0.0, 0.0, false)])];

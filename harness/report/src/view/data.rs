@@ -113,7 +113,6 @@ mod tests {
         }
     }
 
-    /// If a plot shows fewer points than the run has rows, the drawn envelope still contains every peak.
     #[test]
     fn an_envelope_misses_no_peak() {
         let time: Vec<f64> = (0..50_000).map(|k| k as f64 * 0.01).collect();

@@ -254,13 +254,11 @@ fn columns(dice: &mut Rng) -> (Vec<u8>, Truth) {
 
 const FEW: u64 = 1000;
 
-/// Random text files with times in seconds, milliseconds, microseconds or nanoseconds, with and without a stated unit.
 #[test]
 fn times_of_a_text_are_read_in_their_unit_or_refused() {
     judge("csv", FEW, text);
 }
 
-/// Random Parquet files with times in seconds, milliseconds, microseconds or nanoseconds, with and without a stated unit.
 #[test]
 fn times_of_a_parquet_file_are_read_in_their_unit_or_refused() {
     judge("parquet", FEW, columns);

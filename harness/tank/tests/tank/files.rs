@@ -14,7 +14,6 @@ fn problems(text: &str) -> String {
     }
 }
 
-/// Each defect has a message of one sentence; the test checks for the words that a reader needs.
 #[test]
 fn every_defect_of_a_contour_has_a_clear_message() {
     let cases = [
@@ -368,7 +367,6 @@ fn the_wetted_contour_ends_at_the_fill() {
     assert!(solve(dome, 0.7, 1).r_inner == Some(0.0));
 }
 
-/// Every built-in shape is a contour that the solver accepts, and its volume equals the formula of a textbook.
 #[test]
 fn built_in_shapes_have_the_volumes_of_textbooks() {
     use core::f64::consts::PI;
@@ -535,8 +533,6 @@ fn every_example_file_of_a_tank_is_read_and_solved() {
     assert!(count >= 6);
 }
 
-/// A contour of 200 segments is solved in a reasonable time. A contour of 201 segments is refused, and the message states
-/// this number.
 #[test]
 fn a_contour_has_at_most_200_segments() {
     let parsed = |count: usize| {
@@ -552,8 +548,6 @@ fn a_contour_has_at_most_200_segments() {
     assert!(message.contains("The contour has 201 segments, at most 200."), "{message}");
 }
 
-/// The JSON result states whether the tank is a body of revolution or a box, so that a program that reads the result can
-/// choose the lengths.
 #[test]
 fn a_result_says_whether_it_is_of_a_body_of_revolution_or_of_a_box() {
     for (text, kind) in [

@@ -156,7 +156,6 @@ fn limits_of_a_sphere_follow_from_its_large_waves() {
     assert_eq!(half.angle_limit_from, LimitSource::FreeWaves);
 }
 
-/// Parameter files contain the limits of the coefficients, or the limits of a pendulum if there are no coefficients.
 #[test]
 fn files_for_the_fmus_have_the_limits() {
     let limit = |text: &str, fill: f64, target: Target, name: &str| {

@@ -359,8 +359,6 @@ fn every_mode_of_a_cylinder_has_the_damping_of_its_own_laminar_layer() {
     assert_eq!(second.interval[0], second.laminar);
 }
 
-/// For h/R from 0.5 on the damping of a cylinder follows Mikishev and Dorozhkin, in shallower liquid Stephens, and the
-/// result names its source.
 #[test]
 fn a_cylinder_s_damping_names_its_source() {
     for radius in [0.25, 2.0] {

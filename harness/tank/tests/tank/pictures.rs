@@ -59,8 +59,6 @@ fn the_picture_of_a_scaled_tank_has_identical_lines() {
     }
 }
 
-/// If all values are equal (frequencies without gravity, hinges at the centre of a sphere), the axis of the diagram still
-/// has a range.
 #[test]
 fn a_sweep_with_equal_values_at_all_fills_can_be_drawn() {
     let text = "density = 1.0\nprofile = [{ arc = [0, 0, 1, -90, 90] }]";
@@ -83,7 +81,6 @@ fn a_sweep_with_equal_values_at_all_fills_can_be_drawn() {
     }
 }
 
-/// The picture of every example is well-formed XML that contains no NaN, and the table has every mode.
 #[test]
 fn examples_can_be_drawn_and_tabulated() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");

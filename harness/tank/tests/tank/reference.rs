@@ -107,7 +107,6 @@ fn massless_modes_have_no_height_and_keep_their_moment() {
     }
 }
 
-/// Both axes of the box have closed forms, so that the tolerance of 1e-11 is the number of digits in the reference.
 #[test]
 fn the_reference_box_is_reproduced_on_both_axes() {
     let cases = reference();
@@ -148,7 +147,6 @@ fn the_reference_annulus_is_reproduced_in_closed_form() {
     assert!(worst[..4].iter().all(|e| *e < 1e-11) && worst[4] < 1e-9, "{worst:?}");
 }
 
-/// The JSON of `hubslosh tank` for each reference case has the keys and types of the documentation.
 #[test]
 fn the_result_in_json_has_the_documented_keys() {
     for case in reference() {

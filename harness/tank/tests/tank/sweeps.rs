@@ -53,7 +53,6 @@ fn empty_and_full_tanks_have_no_modes() {
     assert!(!csv.contains("NaN") && csv.lines().all(|l| l.split(',').count() == 24), "{csv}");
 }
 
-/// The last columns have s and kappa of mode 1 and their error; the cells are empty where these are not known.
 #[test]
 fn a_sweep_has_the_third_order_coefficients_of_every_fill() {
     let tank = tank("density = 1000.0\nshape = { sphere = { radius = 0.1 } }");
@@ -146,8 +145,6 @@ fn twelve_placed_points_are_enough_for_tanks_of_many_shapes() {
     }
 }
 
-/// The errors that a table states are the largest between its points under the FMUs' interpolation. The test uses a
-/// cylinder, whose modes are known at every fill.
 #[test]
 fn a_placed_table_states_the_errors_between_its_points() {
     let tank = tank("density = 1000.0\nshape = { cylinder = { radius = 0.5, height = 1.5 } }");
