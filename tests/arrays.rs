@@ -134,8 +134,6 @@ impl Run<'_> {
         self.sizes.insert(reference, size);
     }
 
-    /// Sets variables to the values of a function of their keys, where it returns one; each array in one
-    /// call.
     fn set(&mut self, value: impl Fn(&Key) -> Option<Value>) {
         for v in &self.opened.variables {
             let keys = v.keys(&self.sizes);
@@ -655,7 +653,6 @@ fn array_elements_have_the_attributes_of_the_scalar_variables() {
     }
 }
 
-/// Packs Spacecraft for FMI 3.0 with the variables of two tanks of one mode and three modes of appendages.
 fn part_of_spacecraft(starts: &[(&str, &str)]) -> (Opened, tempfile::TempDir) {
     let size = |size: &'static names::Size| Limit {
         parameter: size.parameter,

@@ -90,8 +90,6 @@ fn size<M: Model>(variable: &Variable<M>) -> Option<i32> {
     (counts && M::table().variables.iter().any(lengths)).then_some(max)
 }
 
-/// Returns the text of the constant with the parameters that size arrays, and the arrays with the position of
-/// the sized dimension.
 fn sizes<M: Model>() -> String {
     let mut text = String::new();
     for (parameter, most) in M::table().sizes() {

@@ -84,8 +84,6 @@ const fn number(n: i32) -> Value {
     Value::Integer(n)
 }
 
-/// Returns an instance in which everything moves, with the given slosh model and friction law, wheel and gyro
-/// on.
 fn lively(slosh_model: i32, friction_model: i32) -> Instance {
     stepping(&[
         ("slosh.model", number(slosh_model)),
@@ -343,7 +341,6 @@ fn a_reset_instance_equals_a_new_one() {
     assert_eq!(to_bytes(&failed), expected);
 }
 
-/// Returns an instance after a step that failed: the torque acts so long that the angle exceeds all numbers.
 fn diverged() -> Instance {
     let mut instance = stepping(&[("slosh.model", number(1)), ("tau_cmd", Value::Real(1e12))]);
     instance.do_step(0.0, 1e200).unwrap_err();
@@ -672,8 +669,6 @@ fn directional_derivatives_of_outputs_and_state_derivatives_match_finite_differe
     }
 }
 
-/// Checks directional derivatives at a random point in a random direction of inputs and states, in Model
-/// Exchange, where states can be set.
 fn check_directional_derivatives(rng: &mut fastrand::Rng, slosh_model: i32, friction_model: i32) {
     let mut instance = HubSlosh::instance(Interface::ModelExchange);
     let mut between = |low: f64, high: f64| low + (high - low) * rng.f64();

@@ -3,8 +3,6 @@
 use hubslosh_tank::Tank;
 use plant::{FrictionModel, Inputs, Outputs, Parameters, Plant, Ramp, SloshModel, SloshSource};
 
-/// Returns parameters with a tank's modes as the plant's table, and with the damping ratios of the plant's
-/// correlation.
 fn with_table(p: &Parameters, tank: &str, modes: usize) -> Parameters {
     let tank = Tank::parse(tank, std::path::Path::new("")).unwrap();
     let data = tank.solve(p.tank.h, modes).unwrap();

@@ -76,7 +76,6 @@ fn symmetric(triangle: &[f64]) -> Matrix6<f64> {
     m
 }
 
-/// Returns the body of the tests, with its mass properties (1180 kg) times `share`, and its tank.
 fn parameters(share: f64, tank: Tank) -> Parameters {
     let j = Inertia { xx: 860.0, yy: 860.0, zz: 640.0, xy: 0.0, xz: 0.0, yz: 0.0 };
     let scaled = Inertia { xx: share * j.xx, yy: share * j.yy, zz: share * j.zz, ..j };
@@ -356,7 +355,6 @@ fn coupling_two_fmus_with_a_delay_makes_the_slosh_mode_grow_as_predicted() {
     }
 }
 
-/// Returns a tank with 400 kg, 0.2 m deep, in a box of 1 m by 0.6 m, from potential flow.
 fn a_box() -> Tank {
     let mut tank = Tank {
         zeta: [0.05; 3],

@@ -64,7 +64,6 @@ impl Moved for Carried {
     }
 }
 
-/// Returns the largest difference of two slosh masses in the direction and, over `w`, in its rate.
 fn apart(a: [f64; 6], b: [f64; 6], w: f64) -> f64 {
     (0..6).map(|i| (a[i] - b[i]).abs() / if i < 3 { 1.0 } else { w }).fold(0.0, f64::max)
 }

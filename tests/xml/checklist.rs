@@ -16,7 +16,6 @@ fn sources(directory: &Path, code: &mut String, files: &mut Vec<String>) {
     }
 }
 
-/// Returns the rows of the tables of a page of the book whose heading begins with `heading`: two or three cells.
 fn rows(page: &str, heading: &str) -> Vec<String> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let page = fs::read_to_string(root.join("book").join(page)).expect("the page");

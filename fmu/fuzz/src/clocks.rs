@@ -56,8 +56,6 @@ impl Clock {
         Clock { kind, start, origin: start, tick, ticks: 0, time: start, noise }
     }
 
-    /// Returns a clock that starts at 0 and whose step sizes in Co-Simulation are bit-identical to those of
-    /// this clock.
     fn started_at_zero(&self) -> Clock {
         Clock { origin: self.origin, ..Clock::new(self.kind, 0.0, self.tick) }
     }
@@ -311,7 +309,6 @@ fn co_simulation<M: Model, V: Values>(
     rows
 }
 
-/// Makes a step to its end, handling the events on the way. Returns false if the step was refused.
 fn step_all<M: Model, V: Values>(
     instance: &mut Instance<M, V>,
     clock: &mut Clock,

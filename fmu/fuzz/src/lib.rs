@@ -94,7 +94,6 @@ fn set<M: Model, V: Values>(
     instance.set(V::SET[place(scalar)], &[V::reference(scalar)], |_| value)
 }
 
-/// Makes one step. If the host handles events, the step stops at an event, and the event is handled.
 fn step<M: Model, V: Version>(
     instance: &mut Instance<M, V>,
     at: f64,

@@ -296,8 +296,6 @@ mod tests {
         plant_with(slosh, friction, |_| {})
     }
 
-    /// Sets a tilted bench, a suspension line, a ring baffle, amplitude damping, and a hundred times water's
-    /// surface tension.
     fn every_option(p: &mut Parameters) {
         (p.bench.tilt, p.bench.tilt_azimuth) = (0.1, 0.7);
         (p.hub.imbalance, p.hub.imbalance_angle) = (0.4, 2.0);
@@ -307,8 +305,6 @@ mod tests {
         p.slosh.zeta_amplitude = 0.05;
     }
 
-    /// Sets waves that break. Their onset is below the motion of these tests, or the motion is within the
-    /// rounded corner.
     fn breaking_waves(p: &mut Parameters) {
         (p.slosh.zeta_breaking, p.slosh.breaking_steepness) = (0.3, 0.8);
     }

@@ -25,7 +25,6 @@ use crate::suspension::Suspension;
 const ADVICE: &str = ", with stribeck_smooth a larger friction.eps, with the gyro (its samples count as \
                       steps) a lower imu.rate";
 
-/// Returns the error for a mode that has left its range at `time`; `mode` counts from 0.
 pub(crate) fn out_of_range(time: f64, mode: usize, what: &str) -> StepError {
     let number = mode + 1;
     StepError::Model(format!("slosh mode {number} left its range at t = {time} s: {what}"))
@@ -143,7 +142,6 @@ impl Motion {
         }
     }
 
-    /// Sets the specific force in the modes, and the drag that follows from it and from their motion.
     #[cold]
     fn set_axial<M: SloshMode>(&mut self, modes: &mut [M], g: Ramp) {
         self.hub.g = [g.value, g.slope];

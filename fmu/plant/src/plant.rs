@@ -424,8 +424,6 @@ impl Plant {
         c(last.work) + change * mean
     }
 
-    /// Returns mass times height of hub and liquid above rest, kg m, and its rate, at the last evaluation of
-    /// the equations.
     pub(crate) fn height<T: Number>(&self) -> [T; 2] {
         with_modes!(&self.liquid, modes => self.motion.height(modes))
     }

@@ -221,7 +221,6 @@ impl State {
         changes
     }
 
-    /// Returns true if the states of the hub and of this many modes, and their squares, are finite.
     pub(crate) fn is_finite(&self, modes: usize) -> bool {
         let within = |x: &f64| x.abs() < MAX_MAGNITUDE; // NaN is not
         let hub = [x::THETA, x::OMEGA, x::WORK, x::HEAT];

@@ -277,7 +277,6 @@ mod tests {
         assert!((x[0] - 32.0).abs() < 1e-12, "{}", x[0]);
     }
 
-    /// The system x' = x with errors relative to `scale`; it counts the steps that have begun.
     struct Growth {
         scale: f64,
         starts: Cell<usize>,

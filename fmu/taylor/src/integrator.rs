@@ -677,8 +677,6 @@ mod tests {
             advance(self, 7.0, h, tolerance, &mut Steps::new(100_000, "")).map(|_| ())
         }
 
-        /// Returns the largest difference of the state from the exact solution x = cos t, v = -sin t of the test
-        /// problem.
         fn error(&self, t: f64) -> f64 {
             f64::max((self.now[0] - t.cos()).abs(), (self.now[1] + t.sin()).abs())
         }

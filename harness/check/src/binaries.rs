@@ -34,8 +34,6 @@ fn platform(folder: &str) -> Option<Form> {
     known.map(|(_, ending, kind)| (*ending, *kind)).or_else(|| tuple(folder))
 }
 
-/// Returns the file ending and the readable format of the binary in the folder of a platform tuple, for
-/// example `x86_64-linux`.
 pub(crate) fn tuple(folder: &str) -> Option<Form> {
     // architecture-system or architecture-system-ABI
     let mut parts = folder.splitn(3, '-');

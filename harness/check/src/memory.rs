@@ -21,7 +21,6 @@ const WINDOWS: usize = 3;
 /// Growth that is a finding, bytes per step. Less is allowed, because an FMU may store a short history.
 const PER_STEP: u64 = 1024;
 
-/// Returns the writable memory of this process in bytes, or `None` if the system does not report it.
 fn writable_memory() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmData:"))?;

@@ -219,7 +219,6 @@ fn factor(rest: &mut &str) -> Option<Vec<Unit>> {
     (!base.is_empty()).then(|| base.iter().map(|u| Unit::ONE.times(*u, power)).collect())
 }
 
-/// Returns the unit in an element BaseUnit, or `None` if it is missing or one of its numbers is not valid.
 fn declared(unit: &Element) -> Option<Unit> {
     let BaseUnit { exponents, factor, offset } = BaseUnit::from_element(unit)?;
     Some(Unit { exponents, factor, offset })

@@ -29,7 +29,6 @@ const AMPLITUDE: f64 = 0.1;
 /// Number of steps of 20 ms in one piece of a run whose time is measured.
 const PIECE: usize = 500;
 
-/// Returns the torque at the knots of the exponential sweep from 1.25 to 3.5 Hz in 2700 s.
 fn torque(seconds: f64) -> Vec<f64> {
     let rate = (3.5f64 / 1.25).ln() / 2700.0;
     let cycles = |t: f64| 1.25 * ((rate * t).exp() - 1.0) / rate;

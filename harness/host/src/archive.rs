@@ -249,7 +249,6 @@ mod tests {
 
     use super::*;
 
-    /// Returns an archive with these files. `lie` is added to the sizes in the headers, so that the headers are wrong.
     fn archive(files: &[(&str, &[u8])], lie: i64) -> tempfile::NamedTempFile {
         let mut to = ZipWriter::new(std::io::Cursor::new(Vec::new()));
         for (name, content) in files {

@@ -409,8 +409,6 @@ impl Reader {
         }
     }
 
-    /// Reads the attributes that FMI 2.0 and 3.0 have in common. `typed` has the attributes that depend on
-    /// the type.
     fn common(
         &mut self,
         element: &Element,
@@ -533,8 +531,6 @@ impl Reader {
         (Variable { variability, ..common }, starts)
     }
 
-    /// Returns the sizes of an array; empty for a scalar. `sizes` has the values of structural parameters by
-    /// value reference.
     fn dimensions(&mut self, element: &Element, sizes: &BTreeMap<&str, u64>) -> Vec<usize> {
         let mut dimensions = Vec::new();
         for dimension in element.children.iter().filter(|child| child.name == "Dimension") {

@@ -107,7 +107,6 @@ fn text(value: &Value) -> String {
     }
 }
 
-/// Returns the parameters as a set, or an error if two of them have the same name.
 fn once(parameters: Vec<Parameter>) -> Result<ParameterSet> {
     for (k, parameter) in parameters.iter().enumerate() {
         let Parameter { name, line, .. } = parameter;

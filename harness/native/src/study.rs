@@ -118,7 +118,6 @@ impl Store {
     }
 }
 
-/// Returns an error that describes the difference if the definition `there` in a folder is not the `wanted` one.
 fn differences(there: &str, wanted: &Value) -> Result<()> {
     let there: Value = serde_json::from_str(there)
         .context("study.json is damaged; restore it, or give another folder")?;

@@ -111,7 +111,6 @@ fn native() -> Result<Binaries> {
     })
 }
 
-/// Builds the binaries for other platforms and checks that they run on all machines of these platforms.
 fn cross_build(platforms: &[&Platform]) -> Result<Vec<Binaries>> {
     let toolchain = Toolchain::find()?;
     toolchain.check(platforms)?;
@@ -211,8 +210,6 @@ fn tags(binaries: &[Binary]) -> Result<Vec<String>> {
     })
 }
 
-/// Returns the files of the wheel. The metadata come last, as the standard recommends, and RECORD at the very
-/// end.
 fn files(binaries: Binaries, tags: &[String]) -> Result<Files> {
     let package = below(&root().join("harness").join("python").join(PACKAGE))?.into_iter();
     let mut files: Files = package

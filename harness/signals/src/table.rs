@@ -28,10 +28,6 @@ pub struct Table {
     gaps: BTreeSet<String>,
 }
 
-/// Returns true for the name of a Parquet file, false for a CSV file.
-///
-/// # Errors
-/// If the name has another ending.
 fn is_parquet(path: &Path) -> Result<bool> {
     match path.extension().and_then(|e| e.to_str()).map(str::to_lowercase).as_deref() {
         Some("csv") => Ok(false),
@@ -274,10 +270,6 @@ fn header(path: &Path) -> Result<(csv::Reader<File>, Vec<String>)> {
     Ok((reader, names))
 }
 
-/// Finds the position of each wanted column.
-///
-/// # Errors
-/// Lists the columns that are missing, and those that exist twice.
 fn positions(there: &[String], wanted: &[&str]) -> Result<Vec<usize>> {
     let count = |name: &&&str| there.iter().filter(|other| other.trim() == **name).count();
     let listed = |of: fn(usize) -> bool| {

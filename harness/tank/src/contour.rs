@@ -535,7 +535,8 @@ fn narrowed([mut near, mut far]: [f64; 2], is_near: impl Fn(f64) -> bool) -> [f6
     [near, far]
 }
 
-/// Returns the ends of the part of an interval around the place that no other is `better` than, by golden section.
+/// Narrows an interval by golden-section search to the part around its best place, by the comparison `better`, and returns the ends of this
+/// part.
 pub(crate) fn golden(
     [mut a, mut b]: [f64; 2],
     steps: usize,

@@ -122,7 +122,8 @@ impl Coefficients {
         }
     }
 
-    /// Adds the coefficients with the energy of large waves in this tank. They also tell where the third order ends.
+    /// Adds the coefficients with the energy of large waves in this tank, which also determine the angle at which the third order ceases to
+    /// be valid.
     fn with_large_waves(
         self,
         terms: &EnergyTerms,

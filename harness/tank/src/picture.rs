@@ -152,7 +152,6 @@ fn section(tank: &Tank, data: &ModalData) -> Section {
     }
 }
 
-/// Returns a frame with equal scales for both halves of the tank and `margin` m above and below.
 fn tank_frame(
     section: &Section,
     left: f64,
@@ -204,8 +203,6 @@ fn draw_tank(svg: &mut String, frame: &Frame, section: &Section) {
     }
 }
 
-/// Draws the free surface displaced by each mode, on both sides of the axis; the largest elevation is
-/// `height`.
 fn draw_modes(svg: &mut String, frame: &Frame, section: &Section, modes: &[Mode], height: f64) {
     for (mode, colour) in modes.iter().take(DRAWN).zip(COLOURS) {
         let peak = mode.shape.iter().map(|p| p[1].abs()).fold(0.0, f64::max);

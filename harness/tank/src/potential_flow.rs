@@ -67,7 +67,8 @@ const ITERATIONS: usize = 30;
 /// absorbs the logarithm.
 const OWN: usize = 20;
 const OWN_POWER: i32 = 5;
-/// Longest interval of v for that rule, because the density is a polynomial of degree order - 1.
+/// Longest interval of v over which the rule with [`OWN`] points integrates, because the density is a polynomial of degree
+/// order - 1.
 const OWN_LENGTH: f64 = 0.2;
 
 impl Discretisation {

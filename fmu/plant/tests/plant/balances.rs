@@ -27,7 +27,6 @@ impl Turnover {
         self.last = now;
     }
 
-    /// Returns |E(t) - E(0) - work + heat| over the sum of the energy throughput and the energy at the start.
     fn residual(&self) -> f64 {
         let gained = self.last.energy - self.first.energy;
         (gained - self.last.work + self.last.heat).abs() / (self.sum + self.first.energy)

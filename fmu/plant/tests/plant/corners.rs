@@ -24,7 +24,6 @@ impl Row {
     }
 }
 
-/// Eight rows of 0.05 to 2 s with ramps, jumps and zeros of the torque, and of g if it varies.
 fn table(rng: &mut fastrand::Rng, varies: bool) -> Vec<Row> {
     let value = |rng: &mut fastrand::Rng| match rng.usize(..4) {
         0 => 0.0,
@@ -95,7 +94,6 @@ fn run(p: &Parameters, rows: &[Row], tolerance: f64, longest: f64) -> Result<Vec
     Ok(all)
 }
 
-/// Returns the largest difference relative to 1 rad, 1 rad/s, 1 J, or to the largest state if that is higher.
 fn off(a: &[f64], b: &[f64]) -> f64 {
     let size = b.iter().fold(1.0, |size: f64, x| size.max(x.abs()));
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / size

@@ -81,7 +81,6 @@ struct Newton<'a> {
 }
 
 impl Newton<'_> {
-    /// Returns the residual of the equations of hub and slosh masses for w' and al'' in `unknown`.
     fn residual(&self, x: &[f64], unknown: &[f64]) -> Vec<f64> {
         let (p, table) = (self.p, &self.p.slosh.table);
         let (r, w, w_d) = (p.tank.r, x[1], unknown[0]);

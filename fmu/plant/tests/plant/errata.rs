@@ -30,7 +30,6 @@ fn linear_system(h: f64, b: bool) -> ([[f64; 4]; 4], [f64; 4]) {
     (a, index.map(|i| rate[i]))
 }
 
-/// Returns |omega/tau| at s = i 2 pi f, by solving (s - A) x = B.
 fn gain(system: &([[f64; 4]; 4], [f64; 4]), f: f64) -> f64 {
     // Without theta, which nothing depends on: three complex equations by Cramer's rule.
     let (a, b) = system;

@@ -149,7 +149,6 @@ fn output_derivatives_are_linear_in_each_direction() {
     }
 }
 
-/// Ends of the steps of `plant` from its time to `end`, each begun where the last one ended.
 fn stops(plant: &mut Plant, inputs: &Inputs, end: f64) -> Vec<StepEnd> {
     let mut all = Vec::new();
     loop {

@@ -30,7 +30,6 @@ struct Place {
     bobs: Vec<[f64; 4]>,
 }
 
-/// Returns the displacement of a slosh mass from the hinge, its height, and the height that gravity acts on.
 fn displaced(p: &Parameters, l: f64, first: bool, q: [f64; 2]) -> [f64; 4] {
     let [a, b] = q;
     match p.slosh.model {

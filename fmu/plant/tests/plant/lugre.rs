@@ -51,7 +51,6 @@ fn energy_balances_and_the_bearing_never_adds_energy() {
     }
 }
 
-/// Returns the dissipated power with the hub at a rate and the bristles at a share of g_max.
 fn dissipation(plant: &mut Plant, p: &Friction, omega: f64, share: f64) -> f64 {
     let mut x = [0.0; STATES];
     (x[x::OMEGA], x[x::BRISTLE]) = (omega, share * G_MAX / p.sigma0);

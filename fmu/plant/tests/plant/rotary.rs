@@ -163,7 +163,6 @@ fn forced_pendulum_loses_planar_stability_at_the_analytic_boundaries() {
     }
 }
 
-/// Returns the radial over the tangential amplitude in the last 50 of 400 s of a steady sine.
 fn swirl(p: &Parameters, frequency: f64, amplitude: f64) -> f64 {
     let h = 0.02;
     let torque = |k: usize| amplitude * (TAU * frequency * k as f64 * h).sin();

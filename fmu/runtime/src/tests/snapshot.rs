@@ -19,8 +19,6 @@ fn read(bytes: &[u8]) -> Result<Subject, String> {
     from_bytes(bytes)
 }
 
-/// Returns an instance whose state has all parts: a stop time, a model that has moved, slopes for the next
-/// step.
 fn eventful() -> Subject {
     let mut instance = fresh(CS);
     instance.setup_experiment(Some(1e-4), 1.0, Some(9.0)).unwrap();

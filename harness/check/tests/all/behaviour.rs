@@ -158,7 +158,6 @@ fn binaries_that_misbehave_are_reported_by_the_intended_rule() {
     assert!(untold.is_empty(), "{}", untold.join("\n"));
 }
 
-/// Checks our FMU with one misbehaviour, and returns the severities of one rule's findings and the report.
 #[cfg(target_os = "linux")]
 fn severities(word: &str, rule: &str) -> (Vec<Severity>, String) {
     let report = look(&misbehaving(word), &[rule]);

@@ -134,7 +134,6 @@ fn read<T: std::str::FromStr<Err = anyhow::Error>>(
     parsed(flags.iter().flat_map(|flag| list(flag)).map(str::parse), problems)
 }
 
-/// Returns the items that were parsed, and adds the errors of the items that could not be parsed to `problems`.
 fn parsed<T>(read: impl Iterator<Item = Result<T>>, problems: &mut Vec<String>) -> Vec<T> {
     read.filter_map(|item| item.map_err(|error| problems.push(format!("{error:#}"))).ok()).collect()
 }

@@ -272,8 +272,6 @@ fn started(text: &str) -> Result<(String, f64, Option<f64>)> {
     }
 }
 
-/// Parses the tolerances of known values of the bench, `NAME=SIZE`, and the tolerance of the gyro's scale,
-/// `gyro_scale=SIZE`.
 fn tolerances(texts: &[String]) -> Result<(Tolerances, f64)> {
     let (mut all, mut scale) = (Tolerances::default(), Options::default().gyro_scale);
     for item in texts.iter().flat_map(|text| text.split(',')) {
@@ -288,7 +286,6 @@ fn tolerances(texts: &[String]) -> Result<(Tolerances, f64)> {
     Ok((all, scale))
 }
 
-/// Parses `--trim`, the first and last time (s) of the rows to use; empty means all rows.
 fn trim(times: &[f64]) -> Result<Option<(f64, f64)>> {
     match times {
         [] => Ok(None),

@@ -148,8 +148,6 @@ impl PackArgs {
         sizes.iter().map(limit).collect()
     }
 
-    /// Removes the variables beyond the limits from a packed FMU, and makes the parameters of `--parameters`
-    /// its start values.
     fn reduce(&self, limits: &[Limit], fmu: &Path) -> Result<()> {
         if limits.is_empty() {
             return Ok(());

@@ -46,11 +46,6 @@ impl ReleaseArgs {
     }
 }
 
-/// Returns the report of `hubslosh check` on an FMU.
-///
-/// # Errors
-///
-/// If the check finds errors; the message is the report.
 fn checked(fmu: &Path) -> Result<String> {
     let mut report = super::check::checked(fmu, Vec::new(), Duration::from_secs(60))?;
     // The report names the FMU, not the temporary folder in which it was checked.

@@ -154,7 +154,6 @@ fn variables_of_run(
     Table::read(file, &wanted)
 }
 
-/// Returns the path of the project's FMU whose variables the columns are; `None` if no FMU fits.
 fn find_model(columns: &[String]) -> Option<PathBuf> {
     let any = |beginning: &str| columns.iter().any(|name| name.starts_with(beginning));
     let name = match () {
@@ -166,11 +165,6 @@ fn find_model(columns: &[String]) -> Option<PathBuf> {
     Some(name.into())
 }
 
-/// Returns the rows with a time from `from` to `to`, s.
-///
-/// # Errors
-///
-/// If there are fewer than two such rows.
 fn part(table: &Table, from: Option<f64>, to: Option<f64>) -> Result<Table> {
     let time = table.column("time").unwrap_or_default();
     let (from, to) = (from.unwrap_or(f64::NEG_INFINITY), to.unwrap_or(f64::INFINITY));

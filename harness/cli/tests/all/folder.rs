@@ -10,8 +10,6 @@ use files::output::sha256;
 use files::store::{CAMPAIGN, MANIFEST, Store};
 use pack::packed_for_tests;
 
-/// Prepares `hubslosh campaign` on a plan with this text, with `directory`/c for the results and
-/// `directory`/tmp for temporary files.
 fn campaign(directory: &Path, plan: &str) -> Command {
     std::fs::write(directory.join("given.toml"), plan).unwrap();
     std::fs::create_dir_all(directory.join("tmp")).unwrap();
@@ -40,7 +38,6 @@ fn names(directory: &Path) -> Vec<String> {
     names
 }
 
-/// Returns the published files of the campaign (not the runs) as a map from name to content.
 fn published(directory: &Path) -> BTreeMap<String, Vec<u8>> {
     let files = names(&directory.join("c")).into_iter().filter(|name| name.contains('.'));
     let files = files.filter(|name| !name.starts_with('.'));
@@ -49,7 +46,6 @@ fn published(directory: &Path) -> BTreeMap<String, Vec<u8>> {
         .collect()
 }
 
-/// Asserts that every file has the hash in the manifest, and that tables and plan belong together.
 fn is_consistent(directory: &Path) {
     let folder = directory.join("c");
     let manifest = std::fs::read_to_string(folder.join(MANIFEST)).unwrap();
@@ -257,7 +253,6 @@ fn a_campaign_ended_by_a_signal_leaves_the_last_results_and_no_temporary_file() 
     }
 }
 
-/// Runs a command on a disk with room for files of this many blocks of 512 bytes.
 #[cfg(unix)]
 fn limited(command: &Command, blocks: usize) -> Command {
     let mut shell = Command::new("sh");

@@ -9,7 +9,6 @@ pub fn model(path: &Path, mutant: u32) {
     changed_model(path, mutant, &[]);
 }
 
-/// Packs the FMU of model3.c with a fault, and with texts replaced in its description and its source.
 fn changed_model(path: &Path, mutant: u32, changes: &[(&str, &str)]) {
     let sources = concat!(env!("CARGO_MANIFEST_DIR"), "/../check/tests/all/");
     let changed = |name: &str| {

@@ -22,7 +22,6 @@ fn hubslosh(folder: &Path, arguments: &[&str]) -> Result<String, String> {
     if done.status.success() { Ok(text(&done.stdout)) } else { Err(text(&done.stderr)) }
 }
 
-/// Simulates 90 s of a bench without slosh; the column `omega` of the recording has the gyro's noise.
 fn record(folder: &Path, name: &str, settings: &[&str]) {
     let torque = "lin-sweep:amplitude=0.05,f0=0.3,f1=3,duration=90";
     let mut arguments = vec!["run", "--profile", torque, "--columns", "omega,omega_imu"];

@@ -126,14 +126,12 @@ fn the_fit_of_one_linear_model_to_a_spherical_liquid_falls_with_the_torque() {
     assert!(coherence[0] > 0.5 && (0.15..0.35).contains(&coherence[4]), "{coherence:?}");
 }
 
-/// Returns the cells of the row that begins with `quantity` in the report's table of the thesis's numbers.
 fn row_of<'a>(page: &'a str, quantity: &str) -> Vec<&'a str> {
     let row = page.split("<tr>").find(|row| row.starts_with(&format!("<td>{quantity}")));
     let row = row.unwrap_or_else(|| panic!("no row for {quantity}"));
     row.split("<td>").skip(1).collect()
 }
 
-/// Returns true if the value of the `column`-th model is within the tolerance of the thesis's number.
 fn agrees(page: &str, quantity: &str, column: usize) -> bool {
     let cell = row_of(page, quantity)[3 + column];
     assert_ne!(cell.contains("class=\"yes\""), cell.contains("class=\"no\""), "{cell}");

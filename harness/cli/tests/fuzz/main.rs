@@ -97,7 +97,6 @@ fn mutated(seeds: &[Vec<u8>], dice: &mut Rng) -> Vec<u8> {
     bytes
 }
 
-/// Returns the largest memory of the process so far, kB; 0 if the system does not tell.
 fn memory() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
@@ -255,7 +254,6 @@ fn tank(count: u64) {
     });
 }
 
-/// Reads names, values and parameters of a run from a mutated file, and makes the page that shows them.
 fn page(count: u64) {
     let text = "time,omega,slosh_angle,slosh_angle_radial,tau_cmd,theta\n0,0.1,0,0,0.1,0\n0.02,0.1,0.1,0.1,0,0.1\n0.04,0,0.2,0,0,0.2\n";
     let description = description();

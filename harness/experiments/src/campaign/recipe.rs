@@ -110,7 +110,6 @@ pub fn stored(
 
 const NAMED: usize = 3;
 
-/// Describes in one line how a stored run differs from the wanted one; `None` if it does not.
 fn difference(
     found: &BTreeMap<String, String>,
     wanted: &BTreeMap<String, String>,

@@ -7,8 +7,6 @@ use host::fmu::Fmu;
 use pack::{packed_for_tests, packed_model_for_tests};
 use signals::table::Table;
 
-/// Returns the largest difference of each column over the column's largest value, at the rows of the
-/// reference.
 fn differences(answer: &Table, reference: &Table) -> Vec<(String, f64)> {
     let every = (answer.rows() - 1) / (reference.rows() - 1);
     let names = reference.names().iter();

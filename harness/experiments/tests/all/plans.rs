@@ -27,7 +27,6 @@ fn some<'a>(plan: &Plan, cases: &'a [Case]) -> Vec<&'a Case> {
     }
 }
 
-/// Describes how a run leaves its model's range, in the words of the FMU and of the tables.
 fn beyond(fmu: &Fmu, case: &Case) -> Vec<String> {
     let run = case.run();
     let mut instance = run.initialise(fmu).unwrap();

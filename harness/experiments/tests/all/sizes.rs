@@ -17,8 +17,6 @@ const SCALARS: [(&str, &str); 6] = [
 
 const COLUMNS: [&str; 4] = ["omega[1]", "tank[1].p[1,2]", "tank[2].p[2,2]", "tank[2].wave_height"];
 
-/// Translates a variable's name in the FMU with scalars to its name in the FMU with arrays: `tank[2].p[1,3]` becomes
-/// `tank.p[2,1,3]`.
 fn in_arrays(name: &str) -> String {
     let Some((tank, rest)) = name.strip_prefix("tank[").and_then(|rest| rest.split_once("]."))
     else {

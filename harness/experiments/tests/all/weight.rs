@@ -6,8 +6,6 @@ use experiments::weight::Tanks;
 use host::fmu::Fmu;
 use pack::packed_model_for_tests;
 
-/// Returns the warnings of a run of `model` with these settings, with `input` driven by rows and this surface
-/// tension, N/m.
 fn said(
     model: &str,
     settings: &[(&str, &str)],

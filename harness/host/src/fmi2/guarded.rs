@@ -41,7 +41,6 @@ impl Guarded {
         self.all_bytes()[MARGIN..MARGIN + self.bytes].to_vec()
     }
 
-    /// Describes the FMU's writes outside of the array, or to an array that it may only read; `None` if there are none.
     fn fault(&self) -> Option<String> {
         let all = self.all_bytes();
         let fill = FILL.to_ne_bytes();

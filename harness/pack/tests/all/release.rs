@@ -94,7 +94,6 @@ fn release_folder_holds_one_version_and_the_hashes_of_all() {
     assert_eq!(present.lines().find(absent), None, "sha256sum --check would fail");
 }
 
-/// Makes a source tree of version 1.2.3 with a release of small files, and the wheels that CI has made.
 #[cfg(unix)]
 fn tree_with_a_release(folder: &Path) {
     let write = |name: &str, text: &str| {
@@ -124,8 +123,6 @@ fn tree_with_a_release(folder: &Path) {
     write("dist/release/SHA256SUMS.all", &sums);
 }
 
-/// Runs the script that gathers the release files, and returns their names, or the script's message if it
-/// fails.
 #[cfg(unix)]
 fn gathered(tree: &Path, arguments: &[&str]) -> Result<BTreeSet<String>, String> {
     let mut command = Command::new("bash");

@@ -176,7 +176,6 @@ fn even(points: &[(f64, f64)]) -> Option<(f64, f64)> {
     (points.len() > 20 && step > 0.0 && most < 1e-6 * step).then_some((first.0, step))
 }
 
-/// Returns points joined by a line, each with the half-width of its uncertainty if it has one.
 pub(super) fn dots(
     panel: usize,
     name: &str,

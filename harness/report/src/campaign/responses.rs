@@ -197,7 +197,6 @@ struct Quantity {
 
 const CELLS: usize = 120;
 
-/// Plots heat maps over frequency and the parameter that the plan varies (thesis figures 7.11 to 7.16).
 pub(super) fn maps(group: &Group, axis: &Axis) -> Figure {
     let quantities = [
         Quantity { label: "magnitude |H| / dB", of: passing, ends: None },

@@ -301,7 +301,6 @@ pub fn conversion(from: &str, to: &str) -> Option<f64> {
     }
 }
 
-/// Returns dimension and value in SI of a unit of an FMU; `None` if it is unknown or ambiguous.
 pub(super) fn parse_unit(unit: &str) -> Option<Product> {
     match products(unit, false, false)[..] {
         [only] => Some(only),

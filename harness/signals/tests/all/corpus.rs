@@ -65,7 +65,6 @@ fn of(time: &str, tau: &str, omega: &str) -> String {
     format!("time={time},tau_cmd={tau},omega={omega}")
 }
 
-/// Returns a Parquet file with an index of timestamps in ns or a time in s, torque in mN·m and rate in deg/s.
 fn parquet(time: &str, timestamps: bool) -> Vec<u8> {
     fn real(name: &str) -> PrimitiveTypeBuilder<'_> {
         Type::primitive_type_builder(name, Physical::DOUBLE)

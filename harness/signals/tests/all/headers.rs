@@ -97,7 +97,6 @@ fn pick<T: Copy>(dice: &mut Rng, all: &[T]) -> T {
     all[dice.usize(..all.len())]
 }
 
-/// A file: its columns, and true if it has only one reading, so that it must be read.
 struct File {
     columns: Vec<Column>,
     is_clear: bool,
@@ -129,7 +128,6 @@ fn with_unit(dice: &mut Rng, name: &str, unit: &str) -> (String, bool) {
     }
 }
 
-/// Makes a column of numbers in a random unit and spelling; `si` are the values in SI.
 fn numbers(dice: &mut Rng, (signal, units, names): Kind, si: &[f64], clear: &mut bool) -> Column {
     let (unit, factor) = pick(dice, units);
     let name = pick(dice, names);
@@ -221,7 +219,6 @@ fn civil(day: i64) -> (i64, i64, i64) {
     (yoe + era * 400 + i64::from(month < 3), month, doy - (153 * mp + 2) / 5 + 1)
 }
 
-/// Makes columns of dates and clock times. A second column may contain the fraction of a second.
 fn stamps(dice: &mut Rng, ms: &[i64], clear: &mut bool) -> Vec<Column> {
     const NAMES: [&str; 12] =
         ["Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec"];

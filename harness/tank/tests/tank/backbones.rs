@@ -62,7 +62,6 @@ fn bob(of: &EnergyTerms, angle: f64) -> [f64; 2] {
     [PI / (2.0 * quarter), (pull / (1.0 + 2.0 * t * u + 3.0 * t_2 * u * u)).sqrt()]
 }
 
-/// Returns the angle, degrees, at which the error of a motion first reaches `allowed`, and `None` if it does not.
 fn end(rows: &[Row], motion: usize, of: &EnergyTerms, allowed: f64) -> Option<f64> {
     let mut last = (0.0, 0.0);
     for (angle, exact) in rows {

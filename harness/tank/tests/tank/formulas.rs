@@ -136,7 +136,6 @@ const MENISCUS: [(f64, [f64; 7]); 6] = [
     (100.0, [190.3599, 188.8619, 187.4498, 186.2136, 185.2381, 184.6017, 184.4012]),
 ];
 
-/// The parameters of two modes of a deep cylinder of 0.1 m, h/R = 20, at a Bond number.
 fn deep(bond: f64, contact_angle: f64, sigma: f64) -> ParameterSet {
     let (radius, fill) = (0.1, 2.0);
     let text =

@@ -97,11 +97,6 @@ struct Day {
 }
 
 impl Day {
-    /// Reads `day.toml` in `directory`.
-    ///
-    /// # Errors
-    ///
-    /// If the manifest or a recording in it is missing, or an entry is invalid.
     fn read(directory: &Path) -> Result<Day> {
         let path = directory.join(MANIFEST);
         let text = input::text(&path).with_context(|| {
