@@ -83,7 +83,7 @@ const HARNESS: [(&str, &[&str]); 14] = [
 ];
 
 #[test]
-fn the_harness_never_links_a_model_and_its_packages_depend_one_way() {
+fn the_harness_never_links_a_model_and_its_packages_have_no_cyclic_dependencies() {
     let all = dependencies();
     for (package, allowed) in HARNESS {
         let own = all[package].iter().map(String::as_str).filter(|name| all.contains_key(*name));
@@ -586,7 +586,7 @@ fn modules_do_not_import_from_the_root_of_their_crate() {
 }
 
 #[test]
-fn modules_of_a_crate_use_each_other_one_way() {
+fn modules_of_a_crate_have_no_cyclic_dependencies() {
     for krate in ONE_WAY {
         let mut all = BTreeMap::new();
         sources(&pack::root().join(krate).join("src"), &[], &mut all);

@@ -20,7 +20,7 @@ def folder(request: pytest.FixtureRequest) -> Path:
 
 
 @pytest.mark.parametrize(("name", "slopes"), [("held", False), ("slopes", True)])
-def test_fmpy_and_the_harness_give_one_answer(
+def test_fmpy_and_the_harness_give_equal_results(
     fmu: str, folder: Path, name: str, slopes: bool
 ) -> None:
     """The promised accuracy is 1e-9; with the same calls results are bit-identical."""

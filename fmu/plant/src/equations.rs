@@ -562,7 +562,7 @@ mod tests {
     }
 
     #[test]
-    fn torque_at_the_very_limit_breaks_the_hub_away_at_an_event() {
+    fn torque_equal_to_the_static_friction_starts_the_hub_at_an_event() {
         let mut p = Parameters::default();
         p.slosh.model = SloshModel::Frozen;
         let rest = Inputs::default();

@@ -237,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn the_other_noise_of_the_gyro_is_equal_with_and_without_a_rate_random_walk() {
+    fn white_noise_and_bias_of_the_gyro_do_not_depend_on_the_rate_random_walk() {
         let imu = Imu { lsb: 0.0, ..Imu::default() };
         let (mut gyro, mut slow) = (imu.start(), Imu { rrw: 1e-9, ..imu }.start());
         for _ in 0..100 {

@@ -4,7 +4,7 @@
 //! Coefficients of formulas, orders of tables and names stay with their code.
 
 // Signals on clocks of their own: `input/clocks.rs`.
-// Tests: `a_slow_gyro_is_completed_and_its_own_rows_are_known`, `a_band_limited_torque_of_10_hz_is_known_between_its_samples`.
+// Tests: `readings_of_a_slow_gyro_are_interpolated_and_measured_rows_are_marked`, `a_band_limited_torque_of_10_hz_is_known_between_its_samples`.
 /// Time between the instants of a band-limited torque that lines join, s: over much longer times lines add images of its spectrum.
 pub const FINE_TORQUE: f64 = 0.02;
 /// Part of the usual step by which rows of an even grid may be off.
@@ -69,7 +69,7 @@ pub const ON_CLOCK: f64 = 0.98;
 pub const SLOWEST_GYRO: usize = 100;
 
 // Sensor faults: `input/sensor_faults.rs`.
-// Tests: `each_fault_is_named`, `a_sound_gyro_has_no_faults`, `a_hub_at_rest_is_no_fault`, `a_clipping_limit_at_one_end_of_the_range_holds_at_the_other`.
+// Tests: `each_fault_is_named`, `a_sound_gyro_has_no_faults`, `a_hub_at_rest_is_no_fault`, `clipping_at_one_end_of_the_range_is_also_assumed_at_the_other_end`.
 /// Fewest values at an end of the range that are clipped, and how many times as many they are as equal values just inside it.
 pub const CLIPPED: (usize, f64) = (20, 4.0);
 /// Width of the range just inside an end of the sensor's range, in units of the noise.

@@ -76,7 +76,7 @@ def imports(path: Path) -> set[str]:
     return found
 
 
-def test_modules_import_each_other_one_way() -> None:
+def test_imports_between_modules_have_no_cycles() -> None:
     """No modules import each other in a circle.
 
     The test removes modules that import no other one until none is left; a module that stays is in

@@ -219,7 +219,7 @@ def test_an_unstable_worst_case_grows_as_predicted(craft: Craft) -> None:
     assert compared.frequency == pytest.approx(closed_form(craft, "50%")[2], rel=0.02)
 
 
-def test_the_page_answers_first_and_needs_no_network(
+def test_the_page_begins_with_the_result_and_needs_no_network(
     craft: Craft, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Every figure has a question as its title, axes with units, and the page's colours."""

@@ -248,7 +248,7 @@ LONG = np.arange(3_000_001) * STEP
 """Rows of some seconds of computing."""
 
 
-def test_an_interrupt_stops_a_run_on_its_way(fmu: Path) -> None:
+def test_an_interrupt_stops_a_running_simulation(fmu: Path) -> None:
     """A hub without friction turns through the whole run, which would take long."""
     turning = {"slosh.model": "frozen", "friction.model": "none", "init.omega": 1.0}
     # a shell starts its background jobs with SIGINT ignored, and Python keeps that
@@ -263,7 +263,7 @@ def test_an_interrupt_stops_a_run_on_its_way(fmu: Path) -> None:
         signal.signal(signal.SIGINT, handler)
 
 
-def test_python_goes_on_during_a_run(fmu: Path) -> None:
+def test_other_python_threads_run_during_a_simulation(fmu: Path) -> None:
     """While one thread simulates, the main thread counts."""
     with Plant(fmu) as plant:
         run = threading.Thread(target=plant.run, args=(LONG[:300_001], {}, None, ["theta"]))

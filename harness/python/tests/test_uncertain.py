@@ -495,7 +495,7 @@ def test_a_failed_certificate_is_reported(
         found.save(tmp_path / "none.npz")
 
 
-def test_a_loop_that_does_not_fit_the_model_is_told_both_lists(
+def test_the_error_about_a_loop_that_does_not_fit_the_model_lists_both_names(
     danger: tuple[UncertainModel, Loop],
 ) -> None:
     """The message names what loop and model have, and the call that gives a model that fits."""

@@ -636,7 +636,7 @@ fn swinging_tank() -> (SloshTank, TankInputs) {
 }
 
 #[test]
-fn a_tank_goes_on_from_a_saved_state_bit_for_bit() {
+fn a_tank_continues_bit_identically_from_a_saved_state() {
     let (mut tank, inputs) = swinging_tank();
     tank.step(&inputs, 0.7).unwrap();
     let saved = *tank.state();

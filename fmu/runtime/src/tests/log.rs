@@ -108,7 +108,7 @@ fn parameters_without_effect_that_differ_from_their_start_values_are_named_with_
 }
 
 #[test]
-fn a_warning_about_the_hosts_inputs_comes_once() {
+fn a_warning_about_the_hosts_inputs_is_logged_once() {
     let (mut log, lines) = log();
     let mut instance = continuous(&[]);
     log.report_step_warning(&instance);

@@ -168,7 +168,7 @@ fn only_inputs_and_tunable_parameters_are_set_in_motion() {
 
 /// The model refuses a tunable parameter that contradicts the state; an input set in the call keeps its old value.
 #[test]
-fn refusing_a_tuned_parameter_refuses_the_whole_call() {
+fn a_call_with_one_refused_tunable_parameter_sets_no_variable() {
     let mut instance = started(CS, &[("z", 3.0)]);
     let both = references(["q[1]", "leak"]);
     let why = unchanged(&mut instance, |i| i.set(&SET_REAL, &both, |n| Real([5.0, 200.0][n])));

@@ -229,7 +229,7 @@ fn an_fmu_3_that_hands_its_instance_to_the_callbacks_breaks_one_rule() {
 
 /// If no two runs are the same, a difference after a reset shows nothing.
 #[test]
-fn a_reset_is_not_blamed_for_runs_that_always_differ() {
+fn the_rule_on_reset_is_skipped_if_runs_differ_without_a_reset() {
     let report = report(&files(39), &["life"]);
     assert_eq!(broken(&report), BTreeSet::from(["life.deterministic"]), "{}", report.text());
 }

@@ -171,7 +171,7 @@ fn a_designed_multisine_is_within_the_wheels_limits() {
 }
 
 #[test]
-fn a_removed_option_names_what_replaces_it() {
+fn the_error_of_a_removed_option_names_its_replacement() {
     let folder = tempfile::tempdir().unwrap();
     for (option, replacement) in [
         (&["--method", "multisine"][..], "Noise or nonlinearity?"),

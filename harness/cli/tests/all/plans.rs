@@ -47,7 +47,7 @@ const SWEEPS: &str = "title = \"Sweeps\"\n\
 
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
-fn a_killed_campaign_goes_on_where_it_stopped() {
+fn a_killed_campaign_continues_with_its_stored_runs() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let plan = SWEEPS.replace("DURATION", "300");

@@ -152,7 +152,7 @@ mod tests {
     /// A gyro gives a reading in every third row; the other rows are NaN. These rows are interpolated, and rows with
     /// readings are marked.
     #[test]
-    fn a_slow_gyro_is_completed_and_its_own_rows_are_known() {
+    fn readings_of_a_slow_gyro_are_interpolated_and_measured_rows_are_marked() {
         let time: Vec<f64> = (0..2000).map(|k| 0.02 * f64::from(k)).collect();
         let sine = |t: f64| (2.0 * PI * 2.0 * t).sin();
         let values =

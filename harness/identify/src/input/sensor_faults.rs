@@ -281,7 +281,7 @@ mod tests {
     /// A gyro with a bias reaches one end of its range in each cycle, and the other end in few cycles. Its first
     /// reading after each end differs from the end by less than five standard deviations of its noise.
     #[test]
-    fn a_clipping_limit_at_one_end_of_the_range_holds_at_the_other() {
+    fn clipping_at_one_end_of_the_range_is_also_assumed_at_the_other_end() {
         let mut random = Random::new(5, 0);
         let time: Vec<f64> = (0..10_000).map(|k| 0.02 * f64::from(k)).collect();
         let mut gyro = |bias: f64| -> Vec<f64> {

@@ -401,7 +401,7 @@ fn a_minimum_at_a_bound_is_reported_in_the_verdict() {
 /// and the method `fmu`, which searches the named parameters, have to give the same estimates and intervals.
 #[test]
 #[ignore = "half a minute: .ci/long-tests"]
-fn a_bench_as_any_fmu_has_one_answer_and_one_interval() {
+fn identify_bench_and_identify_fmu_give_equal_estimates_and_intervals() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let torque = "lin-sweep:amplitude=0.1,f0=3,f1=1.7,duration=600".parse().unwrap();
     let none = SensorErrors::default();

@@ -387,7 +387,7 @@ fn a_tank_that_turns_about_another_point_is_found_with_the_offsets_of_its_balanc
 const BREAKS: Tank = Tank { growth: 0.01, breaking: 0.04, ..TANK };
 
 #[test]
-fn waves_that_break_do_not_fit_without_their_damping_which_a_known_release_gives() {
+fn breaking_waves_fit_only_with_their_damping_which_a_known_release_determines() {
     let record = BREAKS.record(4.0, 0.02, 0.6, 0.01, 11);
     let still = Record { inputs: vec![vec![0.0; record.time.len()]], ..record };
     let [x, z] = released(0.6);

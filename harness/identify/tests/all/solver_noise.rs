@@ -327,7 +327,7 @@ fn parameters_that_no_output_tells_apart_are_named_as_a_set_in_words_and_json() 
 /// Fits with one unknown, with all unknowns at their bounds, and with an unknown without effect have empty or singular
 /// matrices. Each fit gives a result or an error, and none panics.
 #[test]
-fn one_unknown_none_inside_its_bounds_and_one_without_effect_are_answered() {
+fn fits_with_one_unknown_all_at_bounds_or_without_effect_end_in_a_result_or_an_error() {
     let fmu = Adaptive::new(&["-DTOLERANCE=1e-5", "-DMODEL_EXCHANGE"]);
     let one_row =
         Record { time: vec![0.0], outputs: vec![vec![1.0], vec![0.0]], ..Record::default() };

@@ -862,7 +862,7 @@ fn a_flexible_hub_has_no_cause_among_those_that_are_tried() {
 /// of a minute.
 #[test]
 #[ignore = "some seconds: .ci/long-tests"]
-fn friction_that_drifts_is_named_as_such_or_not_at_all() {
+fn drifting_friction_is_never_reported_as_another_cause() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let settings = [("slosh.zeta_from_correlation", "false"), ("slosh.zeta", "0.003")];
     let settings = settings.map(|(name, value)| (name.to_string(), value.to_string())).to_vec();

@@ -54,7 +54,7 @@ fn a_delay_is_not_sure_while_another_torque_between_rows_fits_as_well() {
 /// foretold half of what the steps win, so that the delay was stated as 15.1 ms ± 0.05 ms with a linear torque.
 #[test]
 #[ignore = "a quarter of a minute: .ci/run --nightly"]
-fn a_torque_between_rows_is_not_given_up_by_its_first_forecast() {
+fn the_search_with_a_held_torque_is_not_stopped_after_its_first_step() {
     is_described(483, &["delay"]);
 }
 

@@ -323,7 +323,7 @@ fn a_fill_in_per_cent_or_as_a_mass_gives_the_height_with_this_volume() {
 /// Heights of a shape count from its lowest point, of a contour from the zero of its drawing. The test compares the
 /// same tank in both forms, in table, JSON and file.
 #[test]
-fn table_and_file_state_where_heights_count_from() {
+fn table_and_file_state_the_zero_of_heights() {
     let shape = tank("density = 1.0\nshape = { sphere = { radius = 1.0 } }");
     let drawn = tank("density = 1.0\nprofile = [{ arc = [0, -0.5, 1, -90, 90] }]");
     for (tank, lowest, words) in [

@@ -40,7 +40,7 @@ fn mikishev_dorozhkin_leaves_its_range_in_shallow_liquid() {
 /// Keulegan's logarithmic decrement in his own form: (sqrt(pi nu T)/w) [1 + w/a + (pi w/a)(1 - 2 h/a)/sinh(2 pi h/a)] = 2
 /// pi zeta.
 #[test]
-fn laminar_layer_is_the_known_one_in_cylinder_and_box() {
+fn damping_of_the_laminar_layer_in_cylinder_and_box_equals_published_values() {
     let contour = "profile = [{ line = [0, 0, 0.5, 0] }, { line = [0.5, 0, 0.5, 1] }]";
     for h in [0.1, 0.4, 0.9] {
         let mode = &solve(contour, h, 1).modes[0];

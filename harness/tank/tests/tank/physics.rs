@@ -111,7 +111,7 @@ fn closed_forms_keep_their_error_in_shallow_liquid() {
 /// I_0 = I_eff - m_0 h_0^2 - sum m h^2 is a difference, so that its stated error is at least the error of I_eff and grows
 /// with the distance of the fixed mass from the centre of mass.
 #[test]
-fn the_inertia_of_the_fixed_mass_is_never_more_exact_than_what_it_follows_from() {
+fn the_stated_error_of_the_fixed_mass_inertia_is_at_least_that_of_its_inputs() {
     for (shape, fill) in [
         ("cylinder = { radius = 1.0, height = 9.0 }", 0.3),
         ("cylinder = { radius = 1.0, height = 9.0 }", 9.0),

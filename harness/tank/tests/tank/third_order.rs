@@ -44,7 +44,7 @@ fn planar_hardening_begins_at_0_5058_with_one_excited_mode_each_and_at_0_5031_wi
 /// At these depths the frequency of the excited modes (0,1), (2,2) and (0,2) is twice the frequency of the first mode, 2
 /// omega_1.
 #[test]
-fn secondary_resonances_stand_at_their_depths() {
+fn secondary_resonances_occur_at_the_predicted_depths() {
     let found = resonances(&Overlaps::new(5));
     let modes: Vec<_> = found.iter().map(|r| r.1).collect();
     assert_eq!(modes, [[0, 1], [2, 2], [0, 2]]);
