@@ -728,7 +728,7 @@ def computed() -> list[tuple[float, float, float]]:
 
 
 def markdown(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
-    """Return a table."""
+    """Return the comparisons as a Markdown table."""
     lines = [head, ("---",) * len(head), *rows]
     return "\n".join("| " + " | ".join(cells) + " |" for cells in lines)
 

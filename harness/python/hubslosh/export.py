@@ -221,7 +221,7 @@ def _ssd(fmu: Fmu) -> str:
 
 @dataclass(frozen=True)
 class _Mat:
-    """Linear model, parameters and inputs, for `to_mat`."""
+    """Linear model, parameters and inputs of a craft in the form that `to_mat` writes."""
 
     linear: LinearModel
     values: Mapping[str, Value]

@@ -10,7 +10,7 @@ from hubslosh import FmuError, attitude, simulate
 
 
 def turn(axis: int, angle: float) -> np.ndarray:
-    """Return the matrix from axes turned about x, y or z back to those before, by hand."""
+    """Return the rotation matrix from axes that are turned about x, y or z to the original axes."""
     c, s = np.cos(angle), np.sin(angle)
     i, j = (axis + 1) % 3, (axis + 2) % 3
     matrix = np.eye(3)
@@ -20,7 +20,7 @@ def turn(axis: int, angle: float) -> np.ndarray:
 
 
 def matrix(q: np.ndarray) -> np.ndarray:
-    """Return what a quaternion does to vectors, by its definition."""
+    """Return the rotation matrix of a quaternion by its definition."""
     w, v = q[0], q[1:]
     cross = np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
     return (w**2 - v @ v) * np.eye(3) + 2 * np.outer(v, v) + 2 * w * cross

@@ -33,7 +33,7 @@ def line(a: complex, b: complex) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def arc(radius: float, start: float, end: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the same of an arc about 0."""
+    """Return points, derivative and weights of a circular arc about the origin, x + i z."""
     nodes, weights = np.polynomial.legendre.leggauss(80)
     w = radius * np.exp(1j * (start + (end - start) * (nodes + 1) / 2))
     return w, 1j * (end - start) * w, weights / 2

@@ -14,7 +14,7 @@ OUTPUTS = ["theta", "omega", "slosh_angle"]
 
 
 def command(time: float) -> float:
-    """Return something that steps at every cycle, N·m."""
+    """Return a torque that jumps at every cycle, N·m."""
     return 0.05 * np.sin(3.0 * time) + 0.02 * np.cos(17.0 * time)
 
 
