@@ -297,7 +297,7 @@ HABITS: dict[str, dict] = {
 
 @dataclass
 class Plant:
-    """An effect outside the model."""
+    """An effect of the bench that the fitted models do not have."""
 
     change: Callable[[Setup, Generator, float], None]  # of a setup, for an amplitude of the torque
     causes: str  # causes that are right, as a regular expression

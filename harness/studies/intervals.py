@@ -198,7 +198,7 @@ def foretold(found: dict[str, object], truth: float, std: float) -> tuple[float,
 def planned_bench(bench: Bench, draws: int) -> Iterator[Result]:
     """Plan an optimal multisine for the bench, whose gyro has another seed in each draw.
 
-    `design` foretells the noise's part of a deviation, `std_noise` of the fit.
+    `design` predicts the part of a standard deviation that noise causes, `std_noise` of the fit.
     """
     model = ["--set", "slosh.model=linear"]
     plan = ["--multisine", "0.25", "--period", "300", "--duration", "600", "--optimal"]

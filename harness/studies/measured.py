@@ -701,7 +701,7 @@ def ours_of(row: Row) -> str:
 
 
 def name_of(row: Row) -> str:
-    """Return a quantity with its unit, and a mark if its rule was changed."""
+    """Return the name of a quantity with its unit, and a mark if its pass criterion was changed."""
     unit = "" if row.unit in ("1", "share") else f", {row.unit}"
     return f"{row.quantity}{unit}{' †' if row.rule == 2 else ''}"
 

@@ -63,7 +63,11 @@ class Bench:
         return np.array([0, 0, x, y, -np.sqrt(1 - x * x - y * y), 0, 0, 0])
 
     def liquid(self, y):
-        """Return J, T, and rates without and per acceleration of the hub."""
+        """Return the equations of the liquid.
+
+        These are the inertia J that the liquid adds to the hub, its torque T on the hub, its rates
+        without acceleration of the hub, and the change of these rates per acceleration of the hub.
+        """
         p, c = self.p, self.c
         m, l, r, g, w = p["m"], p["l"], p["r"], p["g"], y[1]
         if not self.spherical:

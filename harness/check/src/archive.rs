@@ -163,11 +163,11 @@ pub fn readable(archive: &Archive, findings: &mut Findings) {
             && !entry.encrypted
             && is_common(entry.method)
         {
-            findings.at(&entry.name).add(format!("it cannot be unpacked: {why}"));
+            findings.at(&entry.name).add(format!("the file cannot be unpacked: {why}"));
         }
     }
     if archive.entries.is_empty() && archive.broken.is_none() {
-        findings.at("the archive").add("it is empty");
+        findings.at("the archive").add("the archive is empty");
     }
 }
 
@@ -178,13 +178,13 @@ fn is_common(method: CompressionMethod) -> bool {
 pub fn methods(archive: &Archive, findings: &mut Findings) {
     for entry in &archive.entries {
         if entry.encrypted {
-            findings.at(&entry.name).add("it is encrypted (allowed: no encryption)");
+            findings.at(&entry.name).add("the file is encrypted (allowed: no encryption)");
         }
         if !is_common(entry.method) {
             let method = format!("{:?}", entry.method);
             findings
                 .at(&entry.name)
-                .add(format!("it is compressed by {method} (allowed: stored, deflated)"));
+                .add(format!("the file is compressed by {method} (allowed: stored, deflated)"));
         }
     }
 }
@@ -203,7 +203,7 @@ pub fn names(archive: &Archive, findings: &mut Findings) {
 
 pub fn links(archive: &Archive, findings: &mut Findings) {
     for entry in archive.entries.iter().filter(|entry| entry.link) {
-        findings.at(&entry.name).add("it is a symbolic link (allowed: files and folders)");
+        findings.at(&entry.name).add("the entry is a symbolic link (allowed: files and folders)");
     }
 }
 
@@ -241,7 +241,7 @@ pub fn description(archive: &Archive, findings: &mut Findings) {
         0 => String::new(),
         _ => format!("; there is {}", elsewhere.join(", ")),
     };
-    findings.at(NAME).add(format!("it is not at the root of the archive{hint}"));
+    findings.at(NAME).add(format!("modelDescription.xml is not at the root of the archive{hint}"));
 }
 
 pub fn description_first(archive: &Archive, findings: &mut Findings) {
@@ -249,7 +249,7 @@ pub fn description_first(archive: &Archive, findings: &mut Findings) {
     if let Some(place) = place.filter(|place| *place > 0) {
         findings
             .at("modelDescription.xml")
-            .add(format!("it is entry {} of the archive (allowed: the first)", place + 1));
+            .add(format!("the file is entry {} of the archive (allowed: the first)", place + 1));
     }
 }
 
@@ -258,9 +258,9 @@ pub fn documentation(archive: &Archive, findings: &mut Findings) {
         None if archive.entries.iter().any(|entry| entry.name == INDEX) => {
             findings.skip("the FMU cannot be unpacked");
         }
-        None => findings.at(INDEX).add("it is missing"),
+        None => findings.at(INDEX).add("the file is missing"),
         Some(page) if page.iter().all(u8::is_ascii_whitespace) => {
-            findings.at(INDEX).add("it is empty");
+            findings.at(INDEX).add("the file is empty");
         }
         Some(_) => {}
     }

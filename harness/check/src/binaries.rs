@@ -221,7 +221,7 @@ pub fn each_interface(binaries: &Binaries, findings: &mut Findings) {
             let mut here = binaries.placed.iter().filter(|p| p.folder == folder);
             if !here.any(|p| p.identifier == *identifier) {
                 findings.at(format!("binaries/{folder}/{identifier}{ending}")).add(format!(
-                    "it is missing: modelIdentifier of {interface} is \"{identifier}\" (required: \
+                    "the binary is missing: modelIdentifier of {interface} is \"{identifier}\" (required: \
                          a folder with the binary of one interface also has the binary of the other)"
                 ));
             }
@@ -261,9 +261,10 @@ pub fn format(binaries: &Binaries, findings: &mut Findings) {
         looked = true;
         match &placed.binary {
             Err(why) => findings.at(&placed.name).add(format!("{why:#}")),
-            Ok(binary) if binary.kind != kind => findings
-                .at(&placed.name)
-                .add(format!("it is for {} (allowed in {}: {kind})", binary.kind, placed.folder)),
+            Ok(binary) if binary.kind != kind => findings.at(&placed.name).add(format!(
+                "the binary is for {} (allowed in {}: {kind})",
+                binary.kind, placed.folder
+            )),
             Ok(_) => {}
         }
     }

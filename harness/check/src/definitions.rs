@@ -30,7 +30,7 @@ pub fn fmi_version(d: &Description, findings: &mut Findings) {
         }
         (None, Some(version)) if version == expected => return,
         (None, Some(other)) => format!("\"{other}\""),
-        (None, None) => "it is missing".into(),
+        (None, None) => "the attribute is missing".into(),
     };
     findings.at("fmiVersion").add(format!("{text} (allowed: \"{expected}\")"));
 }
@@ -38,7 +38,7 @@ pub fn fmi_version(d: &Description, findings: &mut Findings) {
 pub fn token(d: &Description, findings: &mut Findings) {
     let name = d.words.token;
     if d.root.get(name).is_none_or(|token| token.trim().is_empty()) {
-        findings.at(name).add("it is missing or empty");
+        findings.at(name).add("the attribute is missing or empty");
     }
 }
 
@@ -263,9 +263,10 @@ pub fn types(d: &Description, findings: &mut Findings) {
         let declared = v.typed.get("declaredType")?;
         match types.get(declared) {
             None => Some(format!("declaredType \"{declared}\" is not among TypeDefinitions")),
-            Some(kind) if *kind != v.typed.name => {
-                Some(format!("it is a {}, its declaredType \"{declared}\" a {kind}", v.typed.name))
-            }
+            Some(kind) if *kind != v.typed.name => Some(format!(
+                "the variable is a {}, but its declaredType \"{declared}\" a {kind}",
+                v.typed.name
+            )),
             Some(_) => None,
         }
     });

@@ -189,7 +189,7 @@ pub fn feedthrough(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         if seen.moved.contains(input) {
             let (output, input) = (name(fmu, *output), name(fmu, *input));
             findings.at(format!("Outputs, {output}")).add(format!(
-                "it is declared to depend on the input {input}, but at {} different starts it \
+                "the output is declared to depend on the input {input}, but at {} different starts it \
                      never changed with it: hosts see an algebraic loop where there is none",
                 seen.starts
             ));

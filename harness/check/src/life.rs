@@ -99,7 +99,7 @@ pub fn guid(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 
 fn expect_null(findings: &mut Findings, place: &str, answer: Result<Instance, CallError>) {
     match answer {
-        Ok(_) => findings.at(place).add("it gives an instance (allowed: NULL)"),
+        Ok(_) => findings.at(place).add("the call returns an instance (allowed: NULL)"),
         Err(error) if error.messages.is_empty() => {
             findings
                 .at(place)
@@ -386,7 +386,9 @@ pub fn reset_anywhere(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
                 continue;
             }
             if let Err(error) = session.initialise() {
-                findings.at(place).add(format!("it cannot be initialised again: {error}"));
+                findings
+                    .at(place)
+                    .add(format!("the instance cannot be initialised again: {error}"));
             }
         }
     }
@@ -464,7 +466,7 @@ pub fn order(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 /// Adds a finding unless the call is refused with fmi2Error and a message that says why.
 pub fn expect_refusal(findings: &mut Findings, place: String, answer: Result<(), CallError>) {
     match answer {
-        Ok(()) => findings.at(place).add("it is accepted (allowed: fmi2Error and a message)"),
+        Ok(()) => findings.at(place).add("the call is accepted (allowed: fmi2Error and a message)"),
         Err(error) if error.status == Status::Fatal => {
             findings.at(place).add(format!("{error} (allowed: fmi2Error, the instance lives on)"));
         }
@@ -505,7 +507,7 @@ pub fn untouched(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                 "environment variables" => String::new(),
                 _ => format!(": {before} before, {after} after"),
             };
-            findings.at("the host's process").add(format!("it changes the {name}{values}"));
+            findings.at("the host's process").add(format!("the FMU changes the {name}{values}"));
         }
     }
     Ok(())

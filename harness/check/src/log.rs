@@ -26,7 +26,7 @@ pub fn percent(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     for message in &echoes {
         if !message.text.contains(TEXT) {
             findings.at(&place).add(format!(
-                "it arrives as {:?} (allowed: format \"%s\", the text as argument)",
+                "the logger receives {:?} (allowed: format \"%s\", the text as argument)",
                 message.text
             ));
         }
@@ -46,7 +46,9 @@ pub fn categories<V: Tested>(fmu: &UnderTest<V>, findings: &mut Findings) -> Res
     let (messages, uncategorised) = V::provoke_messages(fmu)?;
     if uncategorised > 0 {
         let all = declared.join(", ");
-        findings.at("a message").add(format!("its category is NULL (declared: {all})"));
+        findings
+            .at("a message")
+            .add(format!("the category of the message is NULL (declared: {all})"));
     }
     let mut unknown: Vec<String> = messages
         .into_iter()
@@ -57,7 +59,9 @@ pub fn categories<V: Tested>(fmu: &UnderTest<V>, findings: &mut Findings) -> Res
     unknown.dedup();
     for category in unknown {
         let all = declared.join(", ");
-        findings.at("a message").add(format!("its category is {category:?} (declared: {all})"));
+        findings
+            .at("a message")
+            .add(format!("the category of the message is {category:?} (declared: {all})"));
     }
     Ok(())
 }
@@ -70,11 +74,11 @@ pub fn text(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     for message in messages {
         let text = &message.text;
         let fault = if text.trim().is_empty() {
-            "it is empty"
+            "the message is empty"
         } else if text.ends_with(['\n', '\r']) {
-            "it ends with a line break"
+            "the message ends with a line break"
         } else if text.contains('\u{fffd}') {
-            "it is not UTF-8"
+            "the message is not UTF-8"
         } else {
             continue;
         };

@@ -105,7 +105,7 @@ pub fn file_and_folder(archive: &Archive, findings: &mut Findings) {
                 && told.insert(folder.to_string())
             {
                 findings.at(*file).add(format!(
-                    "it is a file, and a folder that holds {} (allowed: one of the two)",
+                    "the name is that of a file and of a folder that holds {} (allowed: one of the two)",
                     entry.name
                 ));
             }

@@ -142,7 +142,7 @@ fn run(
             return Ok(false);
         }
         Cause::Flood => {
-            (format!("it prints more than {} bytes (allowed: nothing)", guard::FLOOD), true)
+            (format!("the FMU prints more than {} bytes (allowed: nothing)", guard::FLOOD), true)
         }
     };
     let is_lost = done.is_none() && doing == LOADING;
@@ -157,10 +157,10 @@ fn run(
                     String::from_utf8_lossy(bytes).chars().take(PRINTED).collect()
                 };
                 if !stdout.is_empty() {
-                    findings.at("stdout").fail(format!("it prints {:?}", start(stdout)));
+                    findings.at("stdout").fail(format!("the FMU prints {:?}", start(stdout)));
                 }
                 if !stderr.is_empty() {
-                    findings.at("stderr").add(format!("it prints {:?}", start(stderr)));
+                    findings.at("stderr").add(format!("the FMU prints {:?}", start(stderr)));
                 }
             }
         }

@@ -44,7 +44,7 @@ pub fn in_range(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                 };
                 if (x < min - slack(min) || x > max + slack(max)) && told.insert(v.key) {
                     findings.at(v.place()).add(format!(
-                        "it is {x} after {step} steps of an ordinary run ({interface}) (allowed by its min \
+                        "the value is {x} after {step} steps of an ordinary run ({interface}) (allowed by its min \
                              and max: {min} to {max})"
                     ));
                 }
@@ -166,7 +166,7 @@ pub fn items_known(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             {
                 let list = known.iter().map(i64::to_string).collect::<Vec<_>>().join(", ");
                 findings.at(v.place()).fail(format!(
-                    "it is {value}, and no item of its type in modelDescription.xml has this \
+                    "the value is {value}, and no item of its type in modelDescription.xml has this \
                          value (items: {list})"
                 ));
             }

@@ -302,7 +302,7 @@ fn children(kind: &Kind, element: &Element, findings: &mut Findings) {
         };
         findings
             .at(place(child))
-            .add(format!("it is not allowed in {} (allowed: {allowed})", element.name));
+            .add(format!("the element is not allowed in {} (allowed: {allowed})", element.name));
     };
     match kind.children {
         Any => {}
@@ -312,7 +312,7 @@ fn children(kind: &Kind, element: &Element, findings: &mut Findings) {
                 match names.iter().position(|name| *name == child.name) {
                     None => unknown(child, names, findings),
                     Some(at) if at < reached => findings.at(place(child)).add(format!(
-                        "it stands after {} (allowed order: {})",
+                        "the element stands after {} (allowed order: {})",
                         names[reached],
                         names.join(", ")
                     )),
@@ -325,7 +325,7 @@ fn children(kind: &Kind, element: &Element, findings: &mut Findings) {
                 let one = if let [name] = names { name } else { "element" };
                 findings
                     .at(place(element))
-                    .add(format!("it is empty (allowed: one {one} or more)"));
+                    .add(format!("the element is empty (allowed: one {one} or more)"));
             }
             for child in element.children.iter().filter(|c| !names.contains(&&*c.name)) {
                 unknown(child, names, findings);
@@ -341,11 +341,11 @@ fn children(kind: &Kind, element: &Element, findings: &mut Findings) {
                     continue;
                 };
                 if seen.contains(&&*child.name) {
-                    findings.at(place(child)).add("it is there twice (allowed: once)");
+                    findings.at(place(child)).add("the element occurs twice (allowed: once)");
                 } else if at < reached && child.name != "ModelExchange" {
                     // The two interfaces may come in any order.
                     findings.at(place(child)).add(format!(
-                        "it stands after {} (allowed order: {})",
+                        "the element stands after {} (allowed order: {})",
                         names[reached].trim_start_matches('!'),
                         names.join(", ").replace('!', "")
                     ));
@@ -375,9 +375,10 @@ fn children(kind: &Kind, element: &Element, findings: &mut Findings) {
                     None => unknown(child, &all, findings),
                     // The type element comes first, whichever type it is.
                     Some(at) if at.max(choice.len().saturating_sub(1)) < reached => {
-                        findings
-                            .at(place(child))
-                            .add(format!("it stands too late (allowed order: {})", all.join(", ")));
+                        findings.at(place(child)).add(format!(
+                            "the element stands too late (allowed order: {})",
+                            all.join(", ")
+                        ));
                     }
                     Some(at) => reached = reached.max(at.max(choice.len().saturating_sub(1))),
                 }

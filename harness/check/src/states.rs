@@ -170,7 +170,7 @@ pub fn garbage(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                 }
             };
             if accepted {
-                findings.at(place).add("it is accepted (allowed: fmi2Error)");
+                findings.at(place).add("the call is accepted (allowed: fmi2Error)");
                 break;
             }
             // After an error the FMU may refuse to be read.
@@ -185,7 +185,7 @@ pub fn garbage(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         let mut session = fmu.running(interface)?;
         fmu.announce("fmi2SetFMUstate(NULL)");
         if session.instance.set_state_null().is_ok() {
-            findings.at(fmu.last_call()).add("it is accepted (allowed: fmi2Error)");
+            findings.at(fmu.last_call()).add("the call is accepted (allowed: fmi2Error)");
         }
     }
     Ok(())

@@ -47,7 +47,7 @@ pub fn run(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 pub fn report_not_finite(session: &mut Session, when: &str, findings: &mut Findings) -> Result<()> {
     for (v, values) in session.fmu.readable().zip(session.readings()?) {
         if let Some(x) = values.iter().map(Value::number).find(|x| v.is_real() && !x.is_finite()) {
-            findings.at(v.place()).add(format!("it is {x} {when}"));
+            findings.at(v.place()).add(format!("the value is {x} {when}"));
         }
     }
     Ok(())
@@ -527,7 +527,7 @@ pub fn small(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             let stays = (small[n] - before[n]).abs() <= 0.05 * moved.abs();
             if moved.abs() > visible && stays {
                 findings.at(v.place()).add(format!(
-                        "its value goes from {} to {} in {steps} steps of {:.1e} s, but to {} in {count} steps of {:.1e} s over \
+                        "the value goes from {} to {} in {steps} steps of {:.1e} s, but to {} in {count} steps of {:.1e} s over \
                          the same time (required: results that do not depend on the step, since {STEP_SIZES} is declared)",
                         before[n],
                         usually[n],
@@ -564,7 +564,7 @@ pub fn output_derivative_order(fmu: &FmuUnderTest, findings: &mut Findings) -> R
                 session.instance.get_real_output_derivatives(&[v.reference], &[order], &mut value);
             let fault = match answer {
                 Err(error) => error.to_string(),
-                Ok(()) if !value[0].is_finite() => format!("it is {}", value[0]),
+                Ok(()) if !value[0].is_finite() => format!("the derivative is {}", value[0]),
                 Ok(()) => continue,
             };
             findings

@@ -26,15 +26,17 @@ fn compare(
     let mut seen = BTreeSet::new();
     for unknown in d.unknowns(list).filter(|unknown| unknown.key.is_some()) {
         if !d.variable_of(unknown).is_none_or(&allowed) {
-            let text = format!("it is not allowed here (allowed: {why})");
+            let text = format!("the variable is not allowed in this list (allowed: {why})");
             findings.at(place(d, unknown)).add(text);
         }
         if !seen.insert(unknown.key) {
-            findings.at(place(d, unknown)).add("it is listed already");
+            findings.at(place(d, unknown)).add("the variable is listed twice");
         }
     }
     for v in d.variables.iter().filter(|v| needed(v) && !seen.contains(&Some(v.key))) {
-        findings.at(format!("{list}, {}", v.name)).add(format!("it is missing (required: {why})"));
+        findings
+            .at(format!("{list}, {}", v.name))
+            .add(format!("the variable is missing in this list (required: {why})"));
     }
 }
 
@@ -53,18 +55,21 @@ pub fn derivatives(d: &Description, findings: &mut Findings) {
         let Some(v) = d.variable_of(unknown) else { continue };
         let place = place(d, unknown);
         let Some(state) = v.derivative_of() else {
-            findings.at(&place).add("it has no attribute derivative, so its state is unknown");
+            findings
+                .at(&place)
+                .add("the variable has no attribute derivative, so that its state is unknown");
             continue;
         };
         if !seen.insert(v.key) {
-            findings.at(&place).add("it is listed already");
+            findings.at(&place).add("the variable is listed twice");
         } else if let Some(other) = taken.insert(state, &v.name) {
             findings.at(&place).add(format!("{other} is the derivative of the same state"));
         }
         if let Some(state) =
             d.at(state).filter(|state| !(v.is_continuous() && state.is_continuous()))
         {
-            let text = format!("it and its state {} must be continuous Reals", state.name);
+            let text =
+                format!("the derivative and its state {} must be continuous Reals", state.name);
             findings.at(&place).add(text);
         }
     }
@@ -218,7 +223,7 @@ pub fn dependencies_known(d: &Description, findings: &mut Findings) {
         };
         let listed = unknown.dependencies.iter().flatten().filter_map(|key| d.at(*key));
         for v in listed.filter(|v| !is_always_known(v) && !is_known(v)) {
-            let text = format!("it cannot depend on {} (allowed: {allowed})", v.name);
+            let text = format!("the unknown cannot depend on {} (allowed: {allowed})", v.name);
             findings.at(place(d, unknown)).add(text);
         }
     }

@@ -69,9 +69,9 @@ pub fn can_be_set(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
                 }
                 let read = session.get(v)?;
                 if !read.is_identical(&value) {
-                    findings
-                        .at(place)
-                        .add(format!("it reads {read} afterwards (allowed: {value})"));
+                    findings.at(place).add(format!(
+                        "the parameter is read as {read} afterwards (allowed: {value})"
+                    ));
                     break;
                 }
             }

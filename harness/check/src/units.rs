@@ -349,7 +349,7 @@ pub fn derivative_units(d: &Description, findings: &mut Findings) {
             |w: &Unit| expected.iter().any(|e| e.measures_like(w) && is_equal(e.factor, w.factor));
         if !written.iter().any(fits) {
             findings.at(v.place()).add(format!(
-                "it is the derivative of {}, in \"{of_state}\", but has the unit \
+                "the variable is the derivative of {}, in \"{of_state}\", but has the unit \
                      \"{of_derivative}\" (allowed: \"{of_state}\" per second: {})",
                 state.name,
                 expected[0].text()

@@ -77,7 +77,7 @@ pub fn readable(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             let fault = match session.get(v) {
                 Err(error) => error.to_string(),
                 Ok(Value::Real(x)) if !x.is_finite() => {
-                    format!("it is {x} {when} (allowed: finite)")
+                    format!("the value is {x} {when} (allowed: finite)")
                 }
                 Ok(_) => continue,
             };
@@ -105,7 +105,9 @@ pub fn booleans(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         let (reference, mut value) = ([v.reference], [0]);
         session.instance.get_boolean(&reference, &mut value)?;
         if !matches!(value, [0 | 1]) {
-            findings.at(v.place()).fail(format!("it reads as {} (allowed: 0 and 1)", value[0]));
+            findings
+                .at(v.place())
+                .fail(format!("the Boolean is read as {} (allowed: 0 and 1)", value[0]));
         }
         if v.is_set_by_hosts() && session.instance.set_boolean(&reference, &[2]).is_ok() {
             session.instance.get_boolean(&reference, &mut value)?;
@@ -127,7 +129,7 @@ pub fn round_trip(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         if let Err(error) = fresh.set(v, &start) {
             findings
                 .at(v.place())
-                .add(format!("its own start value is refused when instantiated: {error}"));
+                .add(format!("the call that sets the start value of modelDescription.xml is refused when instantiated: {error}"));
         }
         let mut tried = vec![start.clone()];
         tried.extend(other_value(fmu, v, &start));
@@ -293,10 +295,10 @@ pub fn fixed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         match refused {
             // The binary accepts it, so that this parameter is tunable there.
             Some(other) if is_taken => findings.at(place).fail(format!(
-                "it is accepted as tunable parameters are, while {other} is refused (allowed: \
+                "the call is accepted as for tunable parameters, while {other} is refused (allowed: \
                      fmi2Error, or variability=\"tunable\")"
             )),
-            _ => findings.at(place).add("it is accepted (allowed: fmi2Error and a message)"),
+            _ => findings.at(place).add("the call is accepted (allowed: fmi2Error and a message)"),
         }
     }
     if !any {
@@ -404,7 +406,7 @@ pub fn not_a_number(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             });
             if !refused {
                 findings.at(place).add(
-                    "it is accepted without error (allowed: fmi2Error at the step at the latest)",
+                    "the value is accepted without error (allowed: fmi2Error at the step at the latest)",
                 );
                 break;
             }

@@ -321,7 +321,7 @@ pub fn states(d: &Description, findings: &mut Findings) {
         if d.at(index).is_none() {
             return Some(format!("derivative={index} (allowed: 1 to {})", d.variables.len()));
         }
-        (index == v.key).then(|| "it is its own derivative".to_string())
+        (index == v.key).then(|| "the variable is declared as its own derivative".to_string())
     });
     let states = d.states();
     d.each(findings, |v| {

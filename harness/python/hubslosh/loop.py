@@ -176,7 +176,7 @@ class Loop:
                 found.append(f"{name} is of type {fmu.kind(name)}: only Reals are measured")
         found += [f"the command {name} is given twice" for name in _repeated(commands)]
         if not commands:
-            found.append("there is no command")
+            found.append("command is empty: name at least one input of the FMU")
         if not found:
             try:
                 controller = _linear(self.controller, self.period, measured, commands)

@@ -55,7 +55,9 @@ pub fn terminals(archive: &Archive, findings: &mut Findings) {
         Err(why) => return findings.at(FILE).add(why.to_string()),
     };
     if root.name != "fmiTerminalsAndIcons" {
-        findings.at(FILE).add(format!("its root is {} (allowed: fmiTerminalsAndIcons)", root.name));
+        findings
+            .at(FILE)
+            .add(format!("the root element is {} (allowed: fmiTerminalsAndIcons)", root.name));
     }
     let own = archive.file("modelDescription.xml").and_then(|xml| Element::parse(xml).ok());
     let own = own.and_then(|root| root.get("fmiVersion").map(String::from)).unwrap_or_default();
@@ -97,7 +99,7 @@ pub fn extra(archive: &Archive, findings: &mut Findings) {
     folders.dedup();
     for folder in folders.iter().filter(|f| !f.contains('.') || has(archive, &format!("extra/{f}")))
     {
-        findings.at(format!("extra/{folder}")).add("it is not a folder in the reverse domain notation of its maker (allowed: like org.example.data)");
+        findings.at(format!("extra/{folder}")).add("the name of the folder is not in the reverse domain notation of its maker (allowed: like org.example.data)");
     }
 }
 
@@ -120,7 +122,7 @@ pub fn tuples(archive: &Archive, findings: &mut Findings) {
     folders.dedup();
     for (old, new) in OF_FMI_2.iter().filter(|(old, _)| folders.contains(old)) {
         findings.at(format!("binaries/{old}")).add(format!(
-            "it is a folder of FMI 2.0, where no host of FMI 3.0 looks (allowed: {new})"
+            "the folder belongs to FMI 2.0, where no host of FMI 3.0 looks (allowed: {new})"
         ));
     }
 }

@@ -19,7 +19,7 @@ pub fn token(subject: &Subject, findings: &mut Findings) -> Result<()> {
         with.token = Some("{another token of another FMU}");
         subject.announce("making an instance with another instantiationToken");
         match subject.instantiate(&with)? {
-            Ok(_) => findings.at(subject.last_call()).add("it gives an instance (allowed: NULL for a token that is not that of modelDescription.xml)"),
+            Ok(_) => findings.at(subject.last_call()).add("the call returns an instance (allowed: NULL for a token that is not that of modelDescription.xml)"),
             Err(CallError { messages, .. }) if messages.is_empty() => {
                 findings.at(subject.last_call()).warn("the call returns no instance and logs no reason (allowed: a message)");
             }
@@ -83,7 +83,7 @@ pub fn start(subject: &Subject, findings: &mut Findings) -> Result<()> {
         });
         if let Some(i) = differ {
             findings.at(v.place()).add(format!(
-                "it is {:?} in initialization mode and {:?} in modelDescription.xml",
+                "the value is {:?} in initialization mode and {:?} in modelDescription.xml",
                 values[i], starts[i]
             ));
         }
@@ -178,7 +178,7 @@ pub fn unknown(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let mut session = subject.running(subject.plain_uses()[0])?;
     subject.announce(format!("fmi3GetFloat64 of valueReference {unknown}, which no variable has"));
     if session.instance.get_numbers(&[unknown], &mut [0.0f64]).is_ok() {
-        findings.at(subject.last_call()).add("it returns fmi3OK (allowed: fmi3Error)");
+        findings.at(subject.last_call()).add("the call returns fmi3OK (allowed: fmi3Error)");
     }
     Ok(())
 }
@@ -250,7 +250,7 @@ pub fn fixed(subject: &Subject, findings: &mut Findings) -> Result<()> {
             session.instance.set_numbers(&[v.reference], &moved)
         });
         if set.is_ok() && session.read(v)? != before {
-            findings.at(v.place()).add("it is fixed, and fmi3SetFloat64 after initialization changes it (allowed: fmi3Error)");
+            findings.at(v.place()).add("the parameter is fixed, and fmi3SetFloat64 after initialization changes it (allowed: fmi3Error)");
         }
     }
     if !any {
@@ -338,7 +338,7 @@ pub fn log_errors(subject: &Subject, findings: &mut Findings) -> Result<()> {
     {
         findings
             .at(subject.last_call())
-            .add("it returns fmi3Error and says nothing (allowed: a message)");
+            .add("the call returns fmi3Error without a message (allowed: a message)");
     }
     Ok(())
 }
@@ -360,7 +360,7 @@ pub fn exchange_counts(subject: &Subject, findings: &mut Findings) -> Result<()>
         if own != declared {
             findings
                 .at(call)
-                .add(format!("it says {own}; the elements {list} have {declared} values"));
+                .add(format!("the call returns {own}; the elements {list} have {declared} values"));
         }
     }
     Ok(())
@@ -384,9 +384,10 @@ pub fn exchange_vectors(subject: &Subject, findings: &mut Findings) -> Result<()
                 if let (Value::Real(a), Some(b)) = (&value, of.next())
                     && a.to_bits() != b.to_bits()
                 {
-                    findings
-                        .at(call)
-                        .add(format!("it has {b:?} in the place of {}, which is {a:?}", v.name));
+                    findings.at(call).add(format!(
+                        "the vector has {b:?} in the place of {}, which is {a:?}",
+                        v.name
+                    ));
                 }
             }
         }
@@ -424,7 +425,7 @@ pub fn indicators(subject: &Subject, findings: &mut Findings) -> Result<()> {
     if let Some((time, i)) = session.notes.zero_indicator {
         findings
             .at(format!("event indicator {}, t = {time:?} s", i + 1))
-            .add("it is 0 after event mode (allowed: on the side on which the model is)");
+            .add("the event indicator is 0 after event mode (allowed: above or below 0, by the state of the model)");
     }
     Ok(())
 }

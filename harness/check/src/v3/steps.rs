@@ -32,7 +32,7 @@ fn faults(using: Use, step: &Step, from: f64, h: f64) -> Vec<String> {
         faults.push("lastSuccessfulTime is not written".into());
     } else if step.early_return == 1 {
         if !using.early_return {
-            faults.push("it returns early although earlyReturnAllowed is false".into());
+            faults.push("fmi3DoStep returns early although earlyReturnAllowed is false".into());
         }
         if step.last_time < from - slack || step.last_time > end + slack {
             faults.push(format!(
@@ -74,9 +74,9 @@ pub fn runs(subject: &Subject, findings: &mut Findings) -> Result<()> {
             let wrong = |(_, x): &&(String, f64)| !x.is_finite();
             let outputs = outputs(&mut session, false)?;
             if let Some((name, x)) = outputs.iter().find(wrong) {
-                findings
-                    .at(format!("{name}, t = {:?} s ({using})", session.time))
-                    .add(format!("it is {x} after a step that returned fmi3OK (allowed: finite)"));
+                findings.at(format!("{name}, t = {:?} s ({using})", session.time)).add(format!(
+                    "the value is {x} after a step that returned fmi3OK (allowed: finite)"
+                ));
                 break;
             }
         }
@@ -135,7 +135,7 @@ pub fn wrong(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let place = "fmi3DoStep with a communicationStepSize below 0";
     let (time, h) = (session.time, -session.step);
     if subject.with_open_effect(place, findings, || session.instance.do_step(time, h)).is_ok() {
-        findings.at(place).add("it returns fmi3OK (allowed: fmi3Error)");
+        findings.at(place).add("the call returns fmi3OK (allowed: fmi3Error)");
     }
     Ok(())
 }
@@ -242,7 +242,7 @@ pub fn discrete_held(subject: &Subject, findings: &mut Findings) -> Result<()> {
                 let after = session.read(v)?;
                 if after != *before {
                     findings.at(v.place()).add(format!(
-                            "it is {before:?} before and {after:?} after fmi3DoStep from {from:?} s ({using}; allowed: \
+                            "the value is {before:?} before and {after:?} after fmi3DoStep from {from:?} s ({using}; allowed: \
                              discrete variables change in event mode alone)"
                         ));
                     return Ok(());
@@ -375,7 +375,7 @@ pub fn intermediate_time(subject: &Subject, findings: &mut Findings) -> Result<(
     if session.instance.updates() == 0 {
         findings
             .at("intermediateUpdate")
-            .add("it is never called, although providesIntermediateUpdate is true");
+            .add("intermediateUpdate is never called, although providesIntermediateUpdate is true");
     }
     Ok(())
 }
@@ -438,7 +438,7 @@ pub fn intermediate_inputs(subject: &Subject, findings: &mut Findings) -> Result
     const FINE: usize = 64;
     let fixed = subject.description.interface("CoSimulation");
     if fixed.is_some_and(|e| !e.flag("canHandleVariableCommunicationStepSize")) {
-        return skip("its communication step is fixed");
+        return skip("the communication step of the FMU is fixed");
     }
     for v in &inputs {
         let (min, max) = v.bounds();
@@ -536,7 +536,7 @@ fn require_derivatives(subject: &Subject, flag: &str) -> Result<Use> {
     // In Model Exchange derivatives follow immediately from states and inputs.
     if !subject.has(Interface::ModelExchange) {
         return skip(
-            "it offers no Model Exchange, where derivatives can be compared with differences",
+            "the FMU offers no Model Exchange, where derivatives can be compared with differences",
         );
     }
     subject.require(Interface::ModelExchange, flag)?;
@@ -607,7 +607,7 @@ pub fn directional(subject: &Subject, findings: &mut Findings) -> Result<()> {
                 }
                 for i in wrong {
                     findings.at(unknown.place()).add(format!(
-                        "its derivative by {} is {:?}, and {:?} by central differences",
+                        "the derivative by {} is {:?}, and {:?} by central differences",
                         known.name, own[i], last[i].quotient
                     ));
                 }
@@ -677,7 +677,7 @@ fn follows(after: f64, before: f64) -> bool {
 pub fn declared(subject: &Subject, findings: &mut Findings) -> Result<()> {
     if !subject.has(Interface::ModelExchange) {
         return skip(
-            "it offers no Model Exchange, where a value follows from states and inputs at once",
+            "the FMU offers no Model Exchange, where a value follows from states and inputs at once",
         );
     }
     let d = subject.description;
@@ -710,7 +710,7 @@ pub fn declared(subject: &Subject, findings: &mut Findings) -> Result<()> {
                 let after = displaced(&mut session, v, known, &base, element, by)?;
                 if after.iter().zip(&before).any(|(a, b)| follows(*a, *b)) {
                     findings.at(format!("line {}, {}, {}", unknown.line, unknown.list, v.name)).add(format!(
-                            "it follows {}, which is not among its dependencies: {before:?} becomes {after:?}",
+                            "the unknown follows {}, which is not among its dependencies: {before:?} becomes {after:?}",
                             known.name
                         ));
                     break;
@@ -740,7 +740,7 @@ pub fn elements(subject: &Subject, findings: &mut Findings) -> Result<()> {
             let length = d.at(one.independent).map(Variable::length);
             if !listed.contains(&one.independent) {
                 findings.at(v.place()).add(format!(
-                    "it depends on valueReference {}, which is not declared",
+                    "the unknown depends on valueReference {}, which is not declared",
                     one.independent
                 ));
             } else if one.element > v.length() || length.is_none_or(|n| one.independent_element > n)

@@ -158,14 +158,17 @@ pub fn derivatives_of(d: &Description, findings: &mut Findings) {
             ));
         };
         if of.key == v.key {
-            return Some("it is its own derivative".into());
+            return Some("the variable is declared as its own derivative".into());
         }
         if !(v.is_continuous() && of.is_continuous()) {
-            return Some(format!("it and {} must be continuous floating-point numbers", of.name));
+            return Some(format!(
+                "the variable and {} must be continuous floating-point numbers",
+                of.name
+            ));
         }
         (v.dimensions != of.dimensions).then(|| {
             format!(
-                "its dimensions are {:?}, those of {} {:?}",
+                "the dimensions are {:?}, but {} has {:?}",
                 v.dimensions, of.name, of.dimensions
             )
         })

@@ -209,7 +209,7 @@ fn resources_are_found_by_any_file_uri() {
 fn a_log_message_without_category_is_reported() {
     let report = stepped(&["-DNO_CATEGORY"], USUAL, &["log"]);
     assert_eq!(broken(&report), BTreeSet::from(["log.categories"]), "{}", report.text());
-    assert!(report.text().contains("its category is NULL"), "{}", report.text());
+    assert!(report.text().contains("the category of the message is NULL"), "{}", report.text());
 }
 
 #[cfg(target_os = "linux")]
