@@ -235,7 +235,7 @@ impl HigherSeries {
         ]
     }
 
-    /// Sets coefficient n of the rate in the drag, after [`HigherSeries::expand`].
+    /// Sets coefficient n of the rate on which the drag depends; [`HigherSeries::expand`] must have computed order n.
     fn set_rate(&mut self, n: usize, r: &Vector, r_d: Vec3, u: &Series) {
         let (mut radial, mut tangential) = (0.0, 0.0);
         for j in 1..=n {

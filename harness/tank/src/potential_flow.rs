@@ -45,8 +45,8 @@ pub(crate) struct Solution {
     pub(crate) psi: Vec<f64>,
 }
 
-/// A part [v0, v1] of a panel with points for integration over it, and the panel's Legendre polynomials at
-/// them, one after the other.
+/// A part [v0, v1] of a panel with its integration points, and the values of the panel's Legendre polynomials at these
+/// points, one point after the other.
 struct Part {
     v0: f64,
     v1: f64,

@@ -219,7 +219,7 @@ fn check_no_variable<M: Model>(
     }
 }
 
-/// Performs a function for a type that no variable has.
+/// Executes a getter or setter of a type that no variable of the FMU has, see [`check_no_variable`].
 pub(super) unsafe fn access_no_variable<M: Model>(
     instance: fmi3Instance,
     call: &'static Call,

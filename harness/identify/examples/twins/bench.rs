@@ -102,11 +102,11 @@ impl Default for Bench {
 
 /// The torque as it acts.
 pub enum Drive<'a> {
-    /// Rows (s, N·m) that lines join.
+    /// Rows of time (s) and torque (N·m), joined by straight lines.
     Lines(&'a [f64], &'a [f64]),
-    /// Rows that hold until the next.
+    /// Rows of time (s) and torque (N·m), each held until the next row.
     Held(&'a [f64], &'a [f64]),
-    /// A function of time that bends nowhere but at these instants.
+    /// A function of time that is smooth between these instants.
     Smooth(&'a [f64], &'a dyn Fn(f64) -> f64),
 }
 
