@@ -9,7 +9,9 @@ use std::fmt;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Interface {
+    /// Model Exchange: the host integrates.
     ModelExchange = 0,
+    /// Co-Simulation: the FMU integrates.
     CoSimulation = 1,
 }
 
