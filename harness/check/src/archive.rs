@@ -148,7 +148,7 @@ fn name_faults(name: &str) -> Vec<&'static str> {
         faults.push("has an empty part or \".\"");
     }
     if name.chars().any(char::is_control) || name.contains('\u{fffd}') {
-        faults.push("has characters that cannot be written");
+        faults.push("has control characters");
     }
     faults
 }
@@ -268,7 +268,7 @@ pub fn documentation(archive: &Archive, findings: &mut Findings) {
 
 pub fn licenses(archive: &Archive, findings: &mut Findings) {
     if archive.below("documentation/licenses/").next().is_none() {
-        findings.at("documentation/licenses/").add("no licence is in it");
+        findings.at("documentation/licenses/").add("the FMU contains no licence");
     }
 }
 

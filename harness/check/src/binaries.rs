@@ -236,8 +236,7 @@ pub fn this_platform(binaries: &Binaries, findings: &mut Findings) {
         );
     }
     if binaries.own().is_none() {
-        findings.at(format!("binaries/{}", binaries.own_folder)).add("no binary is called here, so that no rule of calls is checked (allowed: a binary of this platform, or a \
-             check on one of the FMU's platforms)");
+        findings.at(format!("binaries/{}", binaries.own_folder)).add("the FMU has no binary for this platform, so that the rules that call the FMU are not checked (required: a binary for this platform, or a check on one of the FMU's platforms)");
     }
 }
 
@@ -248,7 +247,7 @@ pub fn name(binaries: &Binaries, findings: &mut Findings) {
         let folder = name.rsplit_once('/').map_or("", |(folder, _)| folder);
         if binaries.described && empty(folder) {
             findings.at(name).add(format!(
-                "no host finds it: its name is not modelIdentifier and ending ({expected})"
+                "no host finds this binary, because its name is not the modelIdentifier with the ending of the platform (required: {expected})"
             ));
         }
     }
@@ -269,7 +268,7 @@ pub fn format(binaries: &Binaries, findings: &mut Findings) {
         }
     }
     if !looked {
-        findings.skip("there is no binary whose format is known here");
+        findings.skip("the FMU has no binary in a format that the check can parse");
     }
 }
 

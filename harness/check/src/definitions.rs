@@ -14,7 +14,7 @@ pub fn well_formed(archive: &super::archive::Archive, findings: &mut Findings) {
             let read = Element::parse(bytes);
             if let Err(Fault::TooLarge(_) | Fault::Doctype(_)) = read {
                 // Files that are too large or have a DOCTYPE break `xml.size` or `xml.doctype`.
-                findings.skip("modelDescription.xml is not read to its end");
+                findings.skip("modelDescription.xml cannot be read to its end");
             } else if let Err(why) = read {
                 findings.at("modelDescription.xml").add(why.to_string());
             }
@@ -26,7 +26,7 @@ pub fn fmi_version(d: &Description, findings: &mut Findings) {
     let (expected, version) = (d.words.version, d.root.get("fmiVersion"));
     let text = match (d.other_version(), version) {
         (Some(other), _) => {
-            format!("\"{other}\": this is not FMI 2.0, and no other rule is checked")
+            format!("\"{other}\", so that no other rule is checked for this FMU")
         }
         (None, Some(version)) if version == expected => return,
         (None, Some(other)) => format!("\"{other}\""),
@@ -55,8 +55,8 @@ pub fn date(d: &Description, findings: &mut Findings) {
 pub fn interfaces(d: &Description, findings: &mut Findings) {
     if d.interfaces().next().is_none() {
         findings.at("fmiModelDescription").add(match d.is_fmi3() {
-            true => "none of ModelExchange, CoSimulation and ScheduledExecution is there",
-            false => "neither ModelExchange nor CoSimulation is there",
+            true => "the element ModelExchange, CoSimulation or ScheduledExecution is missing (required: at least one)",
+            false => "the element ModelExchange or CoSimulation is missing (required: at least one)",
         });
     }
 }
@@ -202,9 +202,9 @@ pub fn unique(d: &Description, findings: &mut Findings) {
             if let Some(value) = element.get(attribute)
                 && !seen.insert(value)
             {
-                findings
-                    .at(format!("line {}, {what}", element.line))
-                    .add(format!("the {attribute} \"{value}\" is there already"));
+                findings.at(format!("line {}, {what}", element.line)).add(format!(
+                    "an earlier definition has the same {attribute} \"{value}\" (required: unique)"
+                ));
             }
         }
     };
@@ -234,17 +234,17 @@ pub fn units(d: &Description, findings: &mut Findings) {
     d.each(findings, |v| {
         let unit = v.typed.get("unit");
         if let Some(unit) = unit.filter(|unit| !units.contains_key(unit)) {
-            return Some(format!("the unit \"{unit}\" is not among UnitDefinitions"));
+            return Some(format!("the unit \"{unit}\" is not defined in UnitDefinitions"));
         }
         let aliases = v.typed.children.iter().filter(|c| c.name == "Alias");
         [&v.typed].into_iter().chain(aliases).filter_map(|of| of.get("displayUnit")).find_map(
             |shown| {
                 let Some(unit) = unit else {
-                    return Some(format!("displayUnit \"{shown}\" without a unit"));
+                    return Some(format!("displayUnit=\"{shown}\", but the variable has no unit (required with displayUnit)"));
                 };
                 let mut all = units[unit].children.iter().filter(|c| c.name == "DisplayUnit");
                 (shown != unit && !all.any(|c| c.get("name") == Some(shown)))
-                    .then(|| format!("displayUnit \"{shown}\" is not defined for \"{unit}\""))
+                    .then(|| format!("displayUnit=\"{shown}\" is not defined as a DisplayUnit of the unit \"{unit}\""))
             },
         )
     });
@@ -262,7 +262,7 @@ pub fn types(d: &Description, findings: &mut Findings) {
     d.each(findings, |v| {
         let declared = v.typed.get("declaredType")?;
         match types.get(declared) {
-            None => Some(format!("declaredType \"{declared}\" is not among TypeDefinitions")),
+            None => Some(format!("declaredType=\"{declared}\" is not defined in TypeDefinitions")),
             Some(kind) if *kind != v.typed.name => Some(format!(
                 "the variable is a {}, but its declaredType \"{declared}\" a {kind}",
                 v.typed.name

@@ -149,7 +149,7 @@ impl Seen {
             let missing: Vec<_> = missing.map(|(_, k)| name(fmu, *k)).collect();
             if !missing.is_empty() {
                 findings.at(format!("line {}, {}", unknown.line, name(fmu, key))).add(format!(
-                    "{when} it changes with {}, which is not declared",
+                    "{when} the variable changes with {}, which is not among its declared dependencies",
                     missing.join(", ")
                 ));
             }

@@ -132,7 +132,9 @@ pub fn nominals(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         return skip("no continuous state has a nominal");
     }
     if session.notes.nominals_changed {
-        return skip("nominalsOfContinuousStatesChanged: they are others than at the start");
+        return skip(
+            "the FMU has changed its nominals during the run (nominalsOfContinuousStatesChanged), so that they cannot be compared with modelDescription.xml",
+        );
     }
     fmu.announce("fmi2GetNominalsOfContinuousStates");
     for ((_, state), given) in states.iter().zip(session.nominals()?) {

@@ -108,7 +108,7 @@ pub fn variables(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             let read = session.get(v)?;
             if !read.is_identical(&Value::Real(vector)) {
                 findings.at(v.place()).add(format!(
-                    "the variable is read as {read}, but {call} gives {vector:?} in place {}",
+                    "the variable is {read}, but {call} returns {vector:?} as element {} of the vector (required: equal values)",
                     n + 1
                 ));
             }

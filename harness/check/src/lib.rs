@@ -203,7 +203,7 @@ fn write_description(root: &Element) -> Result<(temporary::Folder, PathBuf)> {
     let mut bytes = Vec::new();
     root.pack(&mut bytes);
     std::fs::write(&path, bytes)
-        .context("the model description cannot be written for the processes of the rules")?;
+        .context("the parsed modelDescription.xml cannot be written to the temporary folder from which the check's processes read it: make space there or set TMPDIR to another folder")?;
     Ok((folder, path))
 }
 

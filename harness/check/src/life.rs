@@ -101,9 +101,9 @@ fn expect_null(findings: &mut Findings, place: &str, answer: Result<Instance, Ca
     match answer {
         Ok(_) => findings.at(place).add("the call returns an instance (allowed: NULL)"),
         Err(error) if error.messages.is_empty() => {
-            findings
-                .at(place)
-                .add("NULL without a word to the logger (allowed: a message that says why)");
+            findings.at(place).add(
+                "the call returns NULL and logs no message (required: a message with the reason)",
+            );
         }
         Err(_) => {}
     }
@@ -177,7 +177,7 @@ pub fn resources(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         match run(Some(&location)) {
             Ok(values) if is_same(&values, &usual) => {}
             Ok(_) => {
-                findings.at(place).add(format!("other values than usual (allowed: {allowed})"))
+                findings.at(place).add(format!("the values differ from those of a run with the usual resource location (allowed as resource location: {allowed})"))
             }
             Err(error) => match error.downcast::<Unusable>() {
                 Ok(unusable) if unusable.rule.is_empty() => return Err(unusable.into()),
@@ -210,7 +210,7 @@ pub fn callbacks(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     {
         Ok(()) => {}
         Err(error) => {
-            findings.at(place).add(format!("{error} (allowed: an instance that initialises)"))
+            findings.at(place).add(format!("{error} (required: the instance can be initialised)"))
         }
     }
     // Hosts must pass a logger. Without one the FMU may refuse, but should not crash.
@@ -221,9 +221,9 @@ pub fn callbacks(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             .map_or(Ok(()), |instance| initialise_and_refuse(fmu, instance))
     });
     if let Err(error) = answer {
-        findings
-            .at(fmu.last_call())
-            .add(format!("{error} (allowed: no instance, or one that works)"));
+        findings.at(fmu.last_call()).add(format!(
+            "{error} (allowed: the FMU returns no instance, or one that can be simulated)"
+        ));
     }
     Ok(())
 }
@@ -252,7 +252,7 @@ pub fn copies(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     {
         findings
             .at(fmu.last_call())
-            .add("no message reaches the logger (allowed: a copy of the callbacks)");
+            .add("no message reaches the logger after the host has overwritten its struct of callbacks (required: the FMU keeps its own copy of the struct)");
     }
     Ok(())
 }
@@ -468,7 +468,9 @@ pub fn expect_refusal(findings: &mut Findings, place: String, answer: Result<(),
     match answer {
         Ok(()) => findings.at(place).add("the call is accepted (allowed: fmi2Error and a message)"),
         Err(error) if error.status == Status::Fatal => {
-            findings.at(place).add(format!("{error} (allowed: fmi2Error, the instance lives on)"));
+            findings
+                .at(place)
+                .add(format!("{error} (allowed: fmi2Error, and the instance can still be used)"));
         }
         Err(error) if error.messages.iter().all(|m| m.text.trim().is_empty()) => {
             // The standard requires only the error, so that a missing message is a warning.

@@ -32,7 +32,7 @@ pub fn percent(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         }
     }
     if echoes.is_empty() {
-        findings.skip("no message repeats what the host said");
+        findings.skip("no message of the FMU repeats text that the host has passed");
     }
     Ok(())
 }

@@ -77,7 +77,7 @@ fn look(fmu: &FmuUnderTest, interface: Interface, findings: &mut Findings) -> Re
         && bytes >= PER_STEP
     {
         findings.at(format!("steps ({name})")).add(format!(
-            "the process grows by {bytes} bytes with each (allowed: {PER_STEP}, for a history)"
+            "the memory of the process grows by {bytes} bytes in each step (allowed: {PER_STEP} bytes, for a history)"
         ));
     }
     if fmu.can(interface, "canGetAndSetFMUstate") {
@@ -89,7 +89,7 @@ fn look(fmu: &FmuUnderTest, interface: Interface, findings: &mut Findings) -> Re
         if let Some(bytes) = leak_per_call(state)? {
             findings
                 .at(format!("fmi2FreeFMUstate ({name})"))
-                .add(format!("{bytes} bytes stay behind with each state (allowed: none)"));
+                .add(format!("{bytes} bytes are not freed with each saved state (allowed: 0)"));
         }
     }
     drop(session);
@@ -109,7 +109,7 @@ fn look(fmu: &FmuUnderTest, interface: Interface, findings: &mut Findings) -> Re
     if let Some(bytes) = leak_per_call(instance)? {
         findings
             .at(format!("fmi2FreeInstance ({name})"))
-            .add(format!("{bytes} bytes stay behind with each instance (allowed: none)"));
+            .add(format!("{bytes} bytes are not freed with each instance (allowed: 0)"));
     }
     Ok(())
 }

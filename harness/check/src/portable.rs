@@ -105,7 +105,7 @@ pub fn file_and_folder(archive: &Archive, findings: &mut Findings) {
                 && told.insert(folder.to_string())
             {
                 findings.at(*file).add(format!(
-                    "the name is that of a file and of a folder that holds {} (allowed: one of the two)",
+                    "the archive has a file with this name and also a folder, which holds {} (allowed: one of the two)",
                     entry.name
                 ));
             }
@@ -152,7 +152,7 @@ pub fn capitals(archive: &Archive, findings: &mut Findings) {
         let is_there = |name: &String| archive.entries.iter().any(|e| e.name == *name);
         if let Some(right) = standard_spelling(&entry.name).filter(|right| !is_there(right)) {
             findings.at(&entry.name).add(format!(
-                "hosts on Linux do not find it: FMI writes {right} (allowed: these capitals)"
+                "hosts on Linux do not find the entry, because FMI writes {right} (required: the same upper-case and lower-case letters)"
             ));
         }
     }

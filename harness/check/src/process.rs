@@ -113,27 +113,27 @@ fn run(
     let endless = |limit: Duration| {
         let seconds = limit.as_secs_f64();
         format!(
-            "no end after {seconds:.0} s (allowed: every call returns; --limit gives more time)"
+            "the calls of this rule have not ended after {seconds:.0} s (required: every call returns; --limit allows more time)"
         )
     };
     let (why, was_ended) = match &ended.cause {
         Cause::Done(_) if is_damaged => {
-            let why = "its findings cannot be read: it has written into the memory of the host";
-            (format!("{why} (allowed: memory of its own)"), false)
+            let why = "the findings cannot be read, because the FMU has written into the memory of the host";
+            (format!("{why} (allowed: writing into the FMU's own memory)"), false)
         }
         Cause::Done(_) => ("the process ended without a result".into(), false),
         Cause::Ended(status) => {
-            (format!("the process ended ({status}{last}); allowed: every call returns"), false)
+            (format!("the process ended ({status}{last}; required: every call returns)"), false)
         }
         Cause::EndlessCall => (endless(limits.call), true),
         Cause::TooLong => (endless(options.limit), true),
         Cause::Hoard => {
             let most = limits.memory >> 20;
-            let why = "its temporary files or its shared memory take";
+            let why = "the FMU's temporary files or its shared memory take";
             (format!("{why} more than {most} MiB (allowed: less)"), true)
         }
         Cause::Interfered => {
-            let why = "it writes to a connection of the host, or closes one";
+            let why = "the FMU writes to a file or connection of the host, or closes it";
             (format!("{why} (allowed: files and connections that the FMU has opened)"), true)
         }
         Cause::Panicked(report) => {

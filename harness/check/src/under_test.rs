@@ -221,7 +221,7 @@ impl<V: Tested> UnderTest<V> {
         let why = || {
             let mut all: Vec<&str> = fmu.broken().collect();
             all.dedup();
-            if all.is_empty() { "it declares no interface".into() } else { all.join("; ") }
+            if all.is_empty() { "the FMU declares no interface".into() } else { all.join("; ") }
         };
         fmu.binaries.first().with_context(why)?;
         // Where one of two binaries is missing, FMI 2.0 has a rule of its own.
@@ -299,9 +299,9 @@ impl<V: Tested> UnderTest<V> {
         let (returned, waiting) = mpsc::channel::<()>();
         let watchdog = guard::spawn(move || {
             if waiting.recv_timeout(PATIENCE) == Err(RecvTimeoutError::Timeout) {
-                found
-                    .at(place)
-                    .add(format!("no end after {PATIENCE:?} (allowed: every call returns)"));
+                found.at(place).add(format!(
+                    "the call has not returned after {PATIENCE:?} (required: every call returns)"
+                ));
                 // If the findings cannot be written, the time limit of the parent process reports the hang.
                 let _ = trace::done(found);
                 std::process::exit(0);
@@ -369,9 +369,11 @@ impl<V: Tested> UnderTest<V> {
     ) -> Result<Result<T, E>> {
         let made = self.made.get();
         let why = if made > 0 && self.can(interface, "canBeInstantiatedOnlyOncePerProcess") {
-            "it can be instantiated only once per process".into()
+            "the FMU can be instantiated only once per process".into()
         } else if Instant::now() > self.deadline {
-            format!("the time for its calls is over after {made} instances (--limit gives more)")
+            format!(
+                "the time limit of the rule is reached after {made} instances (--limit allows more time)"
+            )
         } else {
             let instance = make();
             self.made.set(made + usize::from(instance.is_ok()));

@@ -268,7 +268,7 @@ pub fn base_units(d: &Description, findings: &mut Findings) {
             && !meant.iter().any(|m| fits(&m))
         {
             findings.at(format!("line {}, Unit \"{name}\"", unit.line)).add(format!(
-                "BaseUnit says {}, but the unit of that name has {} (allowed: what the name says)",
+                "BaseUnit declares {}, but the unit of that name has {} (required: the dimensions of the name)",
                 written.text(),
                 first.text()
             ));
@@ -349,8 +349,7 @@ pub fn derivative_units(d: &Description, findings: &mut Findings) {
             |w: &Unit| expected.iter().any(|e| e.measures_like(w) && is_equal(e.factor, w.factor));
         if !written.iter().any(fits) {
             findings.at(v.place()).add(format!(
-                "the variable is the derivative of {}, in \"{of_state}\", but has the unit \
-                     \"{of_derivative}\" (allowed: \"{of_state}\" per second: {})",
+                "the variable is the derivative of {} in \"{of_state}\", but its unit is \"{of_derivative}\" (required: \"{of_state}\" per second, which is {})",
                 state.name,
                 expected[0].text()
             ));

@@ -54,7 +54,7 @@ pub fn start(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             let Ok(value) = session.get(v) else { continue }; // values.readable tells
             if !has_digits_of(&value, start) && wrong.insert(v.key) {
                 findings.at(v.place()).add(format!(
-                    "start {start} in modelDescription.xml, {value} in the binary {when}"
+                    "the start value is {start} in modelDescription.xml, but {value} in the binary {when} (required: equal values)"
                 ));
             }
         }
@@ -112,7 +112,10 @@ pub fn booleans(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         if v.is_set_by_hosts() && session.instance.set_boolean(&reference, &[2]).is_ok() {
             session.instance.get_boolean(&reference, &mut value)?;
             if value != [1] {
-                let text = format!("set to 2, which is true, it reads {}", value[0]);
+                let text = format!(
+                    "the Boolean was set to 2, which counts as true, and is then read as {}",
+                    value[0]
+                );
                 findings.at(v.place()).add(text);
             }
         }
@@ -142,7 +145,9 @@ pub fn round_trip(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             }
             let read = session.get(v)?;
             if !read.is_identical(&value) {
-                findings.at(v.place()).add(format!("set to {value}, it reads {read}"));
+                findings
+                    .at(v.place())
+                    .add(format!("the variable was set to {value} and is then read as {read}"));
                 break;
             }
         }
@@ -265,7 +270,7 @@ pub fn wrong_type(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         }
     }
     if !looked {
-        findings.skip("every value reference is used by every type");
+        findings.skip("every value reference belongs to a variable of each type, so that no unknown one can be tried");
     }
     Ok(())
 }
@@ -328,7 +333,7 @@ pub fn computed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         expect_refusal(findings, place, answer);
     }
     if !any {
-        findings.skip("nothing is declared as calculated");
+        findings.skip("the FMU declares no calculated variable");
     }
     Ok(())
 }
@@ -363,16 +368,16 @@ pub fn limits(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             if let Some(why) = try_at(bound)?
                 && !settable(fmu).any(|(o, _)| o.name != v.name && contains_name(&why, &o.name))
             {
-                findings
-                    .at(v.place())
-                    .add(format!("{bound} is allowed by min and max, but refused: {why}"));
+                findings.at(v.place()).add(format!(
+                    "the value {bound} lies within min and max, but the FMU refuses it: {why}"
+                ));
             }
             if outside.is_finite()
                 && (v.kind == Type::Real || i32::try_from(outside as i64).is_ok())
                 && try_at(outside)?.is_none()
             {
                 findings.at(v.place()).add(format!(
-                    "{outside} is outside min and max ({min} to {max}), but accepted"
+                    "the value {outside} lies outside of min and max ({min} to {max}), but the FMU accepts it"
                 ));
             }
         }

@@ -16,9 +16,9 @@ pub fn names(d: &Description, findings: &mut Findings) {
             if name.is_empty() {
                 findings.at(format!("line {line}")).add("the name is empty");
             } else if let Some(other) = seen.insert(name, line) {
-                findings
-                    .at(format!("line {line}, {name}"))
-                    .add(format!("line {other} has the same name (allowed: unique names)"));
+                findings.at(format!("line {line}, {name}")).add(format!(
+                    "the variable in line {other} has the same name (required: unique names)"
+                ));
             }
         }
     }
@@ -26,7 +26,7 @@ pub fn names(d: &Description, findings: &mut Findings) {
 
 pub fn structured_names(d: &Description, findings: &mut Findings) {
     if d.root.get("variableNamingConvention") != Some("structured") {
-        return findings.skip("names are not declared as structured");
+        return findings.skip("variableNamingConvention is not \"structured\"");
     }
     d.each(findings, |v| {
         (!is_structured(&v.name))
@@ -107,13 +107,13 @@ pub fn flat_ports(d: &Description, findings: &mut Findings) {
             return None;
         }
         if v.name.contains('.') {
-            return Some("the name of a port has a point".to_string());
+            return Some("the name of the port has a full stop".to_string());
         }
         if !v.name.contains(['[', ']']) {
             return None;
         }
         if !is_structured {
-            return Some("the name of a port has a bracket, and names are not structured".to_string());
+            return Some("the name of the port has a bracket, but variableNamingConvention is not \"structured\"".to_string());
         }
         let whole = indexed(&v.name)
             .and_then(|(array, _)| arrays.get(&(&v.causality, array)))
@@ -155,12 +155,12 @@ pub fn causality(d: &Description, findings: &mut Findings) {
             let allowed: Vec<_> = all.into_iter().filter(|v| is_allowed(&(*v).into())).collect();
             let allowed = allowed.join(", ");
             return Some(format!(
-                "causality {causality} with variability {variability} (allowed: {allowed})"
+                "causality={causality} with variability={variability} (allowed with this causality: {allowed})"
             ));
         }
         let reals = d.words.reals;
         (v.variability == Variability::Continuous && !v.is_real())
-            .then(|| format!("a continuous {} (allowed: {reals} alone)", v.typed.name))
+            .then(|| format!("the variable is a continuous {} (allowed: only {reals} may be continuous)", v.typed.name))
     });
 }
 
@@ -194,10 +194,11 @@ pub fn start(d: &Description, findings: &mut Findings) {
             return None;
         }
         let initial = v.initial.as_deref();
-        let why = |other: String| initial.map_or(other, |i| format!("initial={i}"));
+        let why = initial.map_or(format!("causality={}", v.causality), |i| format!("initial={i}"));
         if v.causality == Causality::Independent || initial == Some("calculated") {
-            let why = why("independent".into());
-            return (count > 0).then(|| format!("a start value with {why} (allowed: none)"));
+            return (count > 0).then(|| {
+                format!("the variable has a start value and {why} (required: no start value)")
+            });
         }
         let is_set = matches!(
             v.causality,
@@ -205,7 +206,9 @@ pub fn start(d: &Description, findings: &mut Findings) {
         );
         let is_constant = v.variability == Variability::Constant;
         if count == 0 && (is_set || is_constant || matches!(initial, Some("exact" | "approx"))) {
-            return Some(format!("no start value with {}", why(v.causality.to_string())));
+            return Some(format!(
+                "the variable has no start value, but {why} (required: a start value)"
+            ));
         }
         (count > 1 && count != length).then(|| {
             format!("{count} start values (allowed: one, or {length}, one for each element)")
@@ -247,7 +250,10 @@ pub fn range(d: &Description, findings: &mut Findings) {
         let items: Vec<f64> = items(of).filter_map(|item| item.number("value")).collect();
         let odd = starts.iter().find(|x| !items.is_empty() && !items.contains(x))?;
         let list: Vec<_> = items.iter().map(f64::to_string).collect();
-        Some(format!("start={odd} is not an item (allowed: {})", list.join(", ")))
+        Some(format!(
+            "start={odd} is not an item of the enumeration (allowed: {})",
+            list.join(", ")
+        ))
     });
 }
 
@@ -270,22 +276,26 @@ pub fn aliases(d: &Description, findings: &mut Findings) {
         let place = format!("valueReference {}, {}", first.reference, names.join(" = "));
         let settable = set.iter().filter(|v| v.is_set_by_hosts()).count();
         if settable > 1 {
-            findings.at(&place).add(format!("{settable} of them are set by hosts (allowed: one)"));
+            findings.at(&place).add(format!("hosts can set {settable} of the variables that share this valueReference (allowed: one)"));
         }
         let started =
             set.iter().filter(|v| !v.starts.is_empty() && v.variability != Variability::Constant);
         if settable <= 1 && started.count() > 1 {
-            findings.at(&place).add("several of them have a start value (allowed: one)");
+            findings.at(&place).add("several of the variables that share this valueReference have a start value (allowed: one)");
         }
         if set.iter().any(|v| v.typed.get("unit") != first.typed.get("unit")) {
-            findings.at(&place).add("one value, but several units");
+            findings
+                .at(&place)
+                .add("the variables that share this valueReference have several units");
         }
         let constant = |v: &Variable| v.variability == Variability::Constant;
         if set.iter().any(|v| constant(v) != constant(first)) {
-            findings.at(&place).add("one value, but constant and not constant");
+            findings.at(&place).add("of the variables that share this valueReference, some are constant and some are not");
         }
         if set.iter().any(|v| v.kind != first.kind) {
-            findings.at(&place).add("one value, but several types");
+            findings
+                .at(&place)
+                .add("the variables that share this valueReference have several types");
         }
     }
 }
@@ -309,8 +319,12 @@ pub fn multiple_set(d: &Description, findings: &mut Findings) {
         if d.interface("ModelExchange").is_none() {
             return Some("canHandleMultipleSetPerTimeInstant without ModelExchange".into());
         }
-        (v.causality != Causality::Input)
-            .then(|| format!("canHandleMultipleSetPerTimeInstant of causality {}", v.causality))
+        (v.causality != Causality::Input).then(|| {
+            format!(
+                "canHandleMultipleSetPerTimeInstant on a variable of causality {} (allowed: input)",
+                v.causality
+            )
+        })
     });
 }
 
@@ -326,7 +340,7 @@ pub fn states(d: &Description, findings: &mut Findings) {
     let states = d.states();
     d.each(findings, |v| {
         (v.typed.flag("reinit") && !states.contains(&v.key)).then(|| {
-            "reinit, but Derivatives lists no derivative of it, so it is not a state".into()
+            "reinit is true, but the variable is not a state, because Derivatives lists no derivative of it".into()
         })
     });
 }

@@ -30,7 +30,7 @@ pub fn licenses(archive: &Archive, findings: &mut Findings) {
     if !entries.iter().any(|name| has(archive, &format!("{FOLDER}{name}"))) {
         findings
             .at(FOLDER)
-            .add("no entry point (required: license.spdx, license.txt or license.html)");
+            .add("documentation/licenses has no entry point (required: license.spdx, license.txt or license.html)");
     }
 }
 
@@ -40,7 +40,7 @@ pub fn pictures(archive: &Archive, findings: &mut Findings) {
         ("documentation/diagram.svg", "documentation/diagram.png"),
     ] {
         if has(archive, drawing) && !has(archive, picture) {
-            findings.at(drawing).add(format!("without {picture} (required with it)"));
+            findings.at(drawing).add(format!("{picture} is missing (required with this file)"));
         }
     }
 }

@@ -136,7 +136,7 @@ pub fn set(subject: &Subject, findings: &mut Findings) -> Result<()> {
         let read = session.read(v)?;
         if let Some(i) = (0..values.len()).find(|i| read[*i] != values[*i]) {
             findings.at(v.place()).add(format!(
-                "element {} was set to {:?} and is {:?}",
+                "element {} was set to {:?} and is then read as {:?}",
                 i + 1,
                 values[i],
                 read[i]
@@ -173,7 +173,9 @@ pub fn type_mismatch(subject: &Subject, findings: &mut Findings) -> Result<()> {
 pub fn unknown(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let last = subject.description.variables.iter().map(|v| v.reference).max().unwrap_or(0);
     let Some(unknown) = last.checked_add(1000) else {
-        return skip("no value reference is left");
+        return skip(
+            "every value reference belongs to a variable, so that no unknown one can be tried",
+        );
     };
     let mut session = subject.running(subject.plain_uses()[0])?;
     subject.announce(format!("fmi3GetFloat64 of valueReference {unknown}, which no variable has"));
@@ -202,7 +204,7 @@ pub fn counts(subject: &Subject, findings: &mut Findings) -> Result<()> {
                 ));
             } else if told < n && answer.is_ok() {
                 findings.at(v.place()).warn(format!(
-                    "fmi3GetFloat64 of an array of {n} values with nValues = {told} returns fmi3OK"
+                    "fmi3GetFloat64 of an array of {n} values returns fmi3OK for nValues = {told} (required: fmi3Error)"
                 ));
             }
         }
@@ -289,7 +291,7 @@ pub fn serialize(subject: &Subject, findings: &mut Findings) -> Result<()> {
             subject.announce("fmi3DeserializeFMUState of half the bytes");
             if let Ok(wrong) = session.instance.deserialize(&bytes[..half]) {
                 findings.at(using.to_string()).add(format!(
-                    "{half} of {} bytes are taken for a state (allowed: fmi3Error)",
+                    "{half} of the {} bytes of a serialised state are accepted as a state (required: fmi3Error)",
                     bytes.len()
                 ));
                 session.instance.free_state(wrong)?;
@@ -360,7 +362,7 @@ pub fn exchange_counts(subject: &Subject, findings: &mut Findings) -> Result<()>
         if own != declared {
             findings
                 .at(call)
-                .add(format!("the call returns {own}; the elements {list} have {declared} values"));
+                .add(format!("the call returns {own}, but the elements {list} of modelDescription.xml have {declared} values in all (required: equal numbers)"));
         }
     }
     Ok(())
@@ -385,7 +387,7 @@ pub fn exchange_vectors(subject: &Subject, findings: &mut Findings) -> Result<()
                     && a.to_bits() != b.to_bits()
                 {
                     findings.at(call).add(format!(
-                        "the vector has {b:?} in the place of {}, which is {a:?}",
+                        "the vector of states has {b:?} for {}, which is read as {a:?} (required: equal values)",
                         v.name
                     ));
                 }
@@ -407,7 +409,7 @@ pub fn states_set(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let x = session.states()?;
     if let Some(i) = (0..x.len()).find(|i| x[*i].to_bits() != moved[*i].to_bits()) {
         findings.at("fmi3SetContinuousStates").add(format!(
-            "state {} was set to {:?} and is {:?}",
+            "state {} was set to {:?} and is then read as {:?}",
             i + 1,
             moved[i],
             x[i]
@@ -425,7 +427,7 @@ pub fn indicators(subject: &Subject, findings: &mut Findings) -> Result<()> {
     if let Some((time, i)) = session.notes.zero_indicator {
         findings
             .at(format!("event indicator {}, t = {time:?} s", i + 1))
-            .add("the event indicator is 0 after event mode (allowed: above or below 0, by the state of the model)");
+            .add("the event indicator is exactly 0 after event mode (required: above or below 0, so that the host sees on which side the model is)");
     }
     Ok(())
 }

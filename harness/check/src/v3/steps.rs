@@ -42,12 +42,12 @@ fn faults(using: Use, step: &Step, from: f64, h: f64) -> Vec<String> {
         }
     } else if (step.last_time - end).abs() > slack {
         faults.push(format!(
-            "lastSuccessfulTime is {:?}, the end of the step {end:?}",
+            "lastSuccessfulTime is {:?}, but the step ends at {end:?} (required: equal times without early return)",
             step.last_time
         ));
     }
     if step.event == 1 && !using.event_mode {
-        faults.push("eventHandlingNeeded although eventModeUsed is false".into());
+        faults.push("eventHandlingNeeded is true although eventModeUsed is false".into());
     }
     faults
 }
@@ -107,7 +107,7 @@ pub fn answers(subject: &Subject, findings: &mut Findings) -> Result<()> {
                 && (own - step.last_time).abs() > 1e-2 * h
             {
                 all.push(format!(
-                    "lastSuccessfulTime is {:?}, {} is {own:?}",
+                    "lastSuccessfulTime is {:?}, but the independent variable {} is {own:?}",
                     step.last_time, v.name
                 ));
             }
@@ -167,9 +167,10 @@ pub fn event_answers(subject: &Subject, findings: &mut Findings) -> Result<()> {
             }
             let passed = |next: f64| next.is_nan() || next <= session.time;
             if info.next_event_defined == 1 && passed(info.next_event_time) {
-                findings
-                    .at(format!("{}, t = {:?} s", using, session.time))
-                    .add(format!("nextEventTime is {:?} (allowed: later)", info.next_event_time));
+                findings.at(format!("{}, t = {:?} s", using, session.time)).add(format!(
+                    "nextEventTime is {:?} (required: later than the present time)",
+                    info.next_event_time
+                ));
             }
             if session.is_ended() || !findings.list.is_empty() {
                 break;
@@ -314,7 +315,7 @@ pub fn same_trajectory(subject: &Subject, findings: &mut Findings) -> Result<()>
             if let Some(((name, a), (_, b))) = far {
                 findings
                     .at(format!("{using}, t = {to:?} s"))
-                    .add(format!("{name} is {a:?}, and {b:?} in plain Co-Simulation"));
+                    .add(format!("{name} is {a:?}, but {b:?} in Co-Simulation without events and early return (required: the same trajectory)"));
                 break;
             }
         }
@@ -354,11 +355,11 @@ pub fn intermediate_time(subject: &Subject, findings: &mut Findings) -> Result<(
                         "intermediateUpdateTime {t:?} lies outside of the step"
                     ));
                 } else if t < last - slack {
-                    wrong.get_or_insert(format!("intermediateUpdateTime {t:?} after {last:?}"));
+                    wrong.get_or_insert(format!("intermediateUpdateTime is {t:?}, but an earlier update had {last:?} (required: times that do not fall)"));
                 }
                 if update.can_return_early {
                     wrong.get_or_insert(
-                        "canReturnEarly although earlyReturnAllowed is false".into(),
+                        "canReturnEarly is true although earlyReturnAllowed is false".into(),
                     );
                 }
                 if update.step_finished {
@@ -403,13 +404,13 @@ pub fn intermediate_early_return(subject: &Subject, findings: &mut Findings) -> 
         }
         Some(time) if step.early_return != 1 => {
             findings.at(format!("step from {from:?} s by {h:?} s")).add(format!(
-                "an early return was asked for at {time:?} s, and earlyReturn is {}",
+                "the host requested an early return at {time:?} s, but earlyReturn is {} (required: 1)",
                 step.early_return
             ))
         }
         Some(time) if !(step.last_time <= from + h && step.last_time >= time - 1e-9 * h) => {
             findings.at(format!("step from {from:?} s by {h:?} s")).add(format!(
-                "lastSuccessfulTime is {:?} after an early return asked for at {time:?} s",
+                "lastSuccessfulTime is {:?} after an early return that the host requested at {time:?} s",
                 step.last_time
             ))
         }
@@ -607,7 +608,7 @@ pub fn directional(subject: &Subject, findings: &mut Findings) -> Result<()> {
                 }
                 for i in wrong {
                     findings.at(unknown.place()).add(format!(
-                        "the derivative by {} is {:?}, and {:?} by central differences",
+                        "fmi3GetDirectionalDerivative with respect to {} gives {:?}, but central differences give {:?} (required: equal derivatives)",
                         known.name, own[i], last[i].quotient
                     ));
                 }
@@ -620,7 +621,9 @@ pub fn directional(subject: &Subject, findings: &mut Findings) -> Result<()> {
 pub fn adjoint(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let using = require_derivatives(subject, "providesAdjointDerivatives")?;
     if !subject.can(using.interface, "providesDirectionalDerivatives") {
-        return skip("there are no directional derivatives to compare with");
+        return skip(
+            "the FMU provides no directional derivatives with which adjoint ones can be compared",
+        );
     }
     let mut session = subject.running(using)?;
     session.advance(2)?;
@@ -652,8 +655,7 @@ pub fn adjoint(subject: &Subject, findings: &mut Findings) -> Result<()> {
                     let error = (back - forward).abs();
                     if error.is_nan() || error > 1e-12 * forward.abs().max(1e-12) {
                         findings.at(unknown.place()).add(format!(
-                                "by {} the adjoint derivative is {back:?}, the directional one {forward:?} \
-                                 (allowed: the transpose)",
+                                "with respect to {} the adjoint derivative is {back:?}, but the directional derivative is {forward:?} (required: one is the transpose of the other)",
                                 known.name
                             ));
                     }
@@ -710,7 +712,7 @@ pub fn declared(subject: &Subject, findings: &mut Findings) -> Result<()> {
                 let after = displaced(&mut session, v, known, &base, element, by)?;
                 if after.iter().zip(&before).any(|(a, b)| follows(*a, *b)) {
                     findings.at(format!("line {}, {}, {}", unknown.line, unknown.list, v.name)).add(format!(
-                            "the unknown follows {}, which is not among its dependencies: {before:?} becomes {after:?}",
+                            "the unknown changes with {}, which is not among its dependencies: {before:?} becomes {after:?}",
                             known.name
                         ));
                     break;
@@ -745,7 +747,9 @@ pub fn elements(subject: &Subject, findings: &mut Findings) -> Result<()> {
                 ));
             } else if one.element > v.length() || length.is_none_or(|n| one.independent_element > n)
             {
-                findings.at(v.place()).add(format!("{one:?} names an element that is not there"));
+                findings
+                    .at(v.place())
+                    .add(format!("{one:?} names an element that the array does not have"));
             }
         }
     }

@@ -264,7 +264,7 @@ impl Session<'_> {
                 self.event()?;
             }
         }
-        let why = format!("{EVENTS} events before t = {until} s");
+        let why = format!("the FMU requests more than {EVENTS} events before t = {until} s");
         Err(Unusable { rule: "events.iteration", why }.into())
     }
 }

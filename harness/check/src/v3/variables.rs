@@ -48,14 +48,14 @@ pub fn flags(d: &Description, findings: &mut Findings) {
             && v.causality != Causality::Input
         {
             return Some(format!(
-                "canHandleMultipleSetPerTimeInstant of causality {}",
+                "canHandleMultipleSetPerTimeInstant on a variable of causality {} (allowed: input)",
                 v.causality
             ));
         }
         (v.written.flag("intermediateUpdate") && v.variability != Variability::Continuous).then(
             || {
                 format!(
-                    "intermediateUpdate with variability {} (allowed: continuous)",
+                    "intermediateUpdate is true on a variable of variability {} (allowed: continuous)",
                     v.variability
                 )
             },
@@ -77,7 +77,7 @@ pub fn clocks(d: &Description, findings: &mut Findings) {
             }
             if !matches!(v.variability, Variability::Discrete | Variability::Tunable) {
                 findings.at(v.place()).add(format!(
-                    "clocks with variability {} (allowed: discrete, tunable)",
+                    "the attribute clocks on a variable of variability {} (allowed: discrete, tunable)",
                     v.variability
                 ));
             }
@@ -97,10 +97,12 @@ pub fn clocks(d: &Description, findings: &mut Findings) {
                 ));
         }
         if clocks.is_none() || v.variability != Variability::Discrete {
-            findings.at(v.place()).add("previous of a variable that is not clocked and discrete");
+            findings
+                .at(v.place())
+                .add("the attribute previous on a variable that is not clocked and discrete");
         }
         if let Some(other) = previous.insert(text.trim(), &v.name) {
-            findings.at(v.place()).add(format!("{other} has the same previous"));
+            findings.at(v.place()).add(format!("{other} refers to the same variable by its attribute previous (allowed: one reference to each)"));
         }
     }
 }
@@ -111,12 +113,12 @@ pub fn dimensions(d: &Description, findings: &mut Findings) {
             let place = format!("line {}, Dimension of {}", dimension.line, v.name);
             match (dimension.get("start"), dimension.get("valueReference")) {
                 (Some(_), Some(_)) => {
-                    findings.at(place).add("start and valueReference (allowed: one of them)");
+                    findings.at(place).add("the dimension has both start and valueReference (required: exactly one of them)");
                 }
                 (None, None) => {
                     findings
                         .at(place)
-                        .add("neither start nor valueReference (allowed: one of them)");
+                        .add("the dimension has neither start nor valueReference (required: exactly one of them)");
                 }
                 (Some(start), None) if start.trim() == "0" => {
                     findings.at(place).add("start=0 (allowed: above 0)");
@@ -149,7 +151,7 @@ pub fn derivatives_of(d: &Description, findings: &mut Findings) {
     let states: BTreeSet<u32> = d.states().into_iter().collect();
     d.each(findings, |v| {
         if v.written.flag("reinit") && !states.contains(&v.key) {
-            return Some("reinit, but it is not a continuous state".to_string());
+            return Some("reinit is true, but the variable is not a continuous state".to_string());
         }
         let text = v.written.get("derivative")?;
         let Some(of) = v.derivative_of().and_then(|r| d.at(r)) else {
@@ -168,7 +170,7 @@ pub fn derivatives_of(d: &Description, findings: &mut Findings) {
         }
         (v.dimensions != of.dimensions).then(|| {
             format!(
-                "the dimensions are {:?}, but {} has {:?}",
+                "the variable has the dimensions {:?}, but {} has {:?} (required: equal dimensions)",
                 v.dimensions, of.name, of.dimensions
             )
         })
