@@ -26,7 +26,7 @@ def version_of(fmu: Path) -> int:
 
 
 def schema_findings(fmu: Path) -> list[str]:
-    """Return what the schema of its FMI, as fmpy carries it, finds in modelDescription.xml."""
+    """Return the errors of modelDescription.xml by the schema of its FMI version in fmpy."""
     name = f"fmi{version_of(fmu)}"
     folder = Path(fmpy.__file__).parent / "schema" / name
     schema = etree.XMLSchema(etree.parse(str(folder / f"{name}ModelDescription.xsd")))
