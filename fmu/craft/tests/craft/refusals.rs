@@ -168,7 +168,7 @@ fn products_of_inertia_need_moments_of_inertia_large_enough() {
     let equal = |c: f64| with([1.0, 1.0, 1.0, c, c, c].map(|x| 100.0 * x));
     let negative = equal(-0.51);
     assert!(negative.len() == 1, "{negative:?}");
-    assert!(negative[0].contains("the determinant is -45602"), "{negative:?}");
+    assert!(negative[0].contains("the inertia matrix is -45602"), "{negative:?}");
     assert_eq!(equal(-0.49), [""; 0]);
     // So for a craft of any size.
     let small = with([1.0, 1.0, 1.0, -0.51, -0.51, -0.51].map(|x| 1e-6 * x));
@@ -225,7 +225,10 @@ fn a_fill_table_must_rise_and_contain_the_modal_masses() {
         let problems = with(change);
         assert!(problems.len() == 1 && problems[0].contains(text), "{text}: {problems:?}");
     };
-    one(|t| t.fill.points = 1, "tank[1].fill.points = 1 (allowed: 0, or 2 to 12)");
+    one(
+        |t| t.fill.points = 1,
+        "tank[1].fill.points = 1 (allowed: 0 for a tank that does not drain, or 2 to 12)",
+    );
     one(|t| t.fill.points = 13, "tank[1].fill.points = 13");
     one(|t| t.fill.liquid[2] = t.fill.liquid[1], "equals the mass of the previous point");
     one(|t| t.fill.liquid[2] = t.fill.liquid[1] * 0.99, "tank[1].fill.liquid[3] = 125.9");
