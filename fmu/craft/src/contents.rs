@@ -58,8 +58,8 @@
 use alloc::format;
 use alloc::string::String;
 use taylor::error::StepError;
-use taylor::extrapolation::{self, Pace, System};
 use taylor::number::Number;
+use taylor::runge_kutta::{self, Pace, System};
 use taylor::vector::{
     Mat3, Vec3, add, constant, cross, dot, on_sphere, rotation, scale, sub, times,
     transposed_times, unit_quaternion,
@@ -855,7 +855,7 @@ pub trait Drains<const D: usize>: System<D> + Sized {
         let (mut t, mut pace) = (0.0, Pace::new(h, limits.steps()));
         while t < h {
             let end = self.outflows().fold(h, |end, flow| flow.next_point(start[flow.at], t, end));
-            let done = extrapolation::advance(self, x, (t, end), limits.tolerance, &mut pace);
+            let done = runge_kutta::advance(self, x, (t, end), limits.tolerance, &mut pace);
             // A step that cannot pass the bound of a surface ends just before it.
             self.check_surfaces(x)?;
             done.map_err(|why| why.delayed(begin))?;
@@ -867,12 +867,6 @@ pub trait Drains<const D: usize>: System<D> + Sized {
         }
         Ok(())
     }
-}
-
-/// Returns true if a trial step of an extrapolation was so long that rates would overflow; the step is then
-/// rejected without evaluating them.
-pub fn has_diverged(x: &[f64]) -> bool {
-    x.iter().any(|x| x.abs() > 1e50)
 }
 
 /// Normalises directions and rates of bobs, from the first to the last index of the states.

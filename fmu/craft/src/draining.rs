@@ -14,18 +14,16 @@ use alloc::vec::Vec;
 use core::ops::Range;
 
 use taylor::error::StepError;
-use taylor::extrapolation::System;
 use taylor::integrator::RATE_FLOOR;
 use taylor::number::{Dual, Number};
+use taylor::runge_kutta::System;
 use taylor::vector::{
     Mat3, Quaternion, Vec3, add, constant, cross, dot, largest, rotation, scale, sub, times,
     transposed_times, unit_quaternion,
 };
 
 use crate::appendage::{Deformed, Structure};
-use crate::contents::{
-    Contents, Drains, MountedTank, Outflow, has_diverged, normalise_bobs, vector_from,
-};
+use crate::contents::{Contents, Drains, MountedTank, Outflow, normalise_bobs, vector_from};
 use crate::motion::SCALE_TIME;
 use crate::outputs::{Now, TankNow};
 use crate::parameters::{Mount, Parameters, Tank};
@@ -81,7 +79,7 @@ impl Acting<Dual> {
     }
 }
 /// A craft with at least one tank that can drain, or with planar modes, other modes than pendulums, or liquid that spins.
-/// `follows` is true if any drag depends on acceleration or amplitude.
+/// `follows` is true if any drag depends on acceleration or amplitude; `moving` are the ranges of the states in use.
 #[derive(Clone, Debug)]
 pub struct Draining {
     craft: Rigid,
@@ -91,6 +89,7 @@ pub struct Draining {
     tanks: Vec<MountedTank>,
     appendages: Option<Structure>,
     follows: bool,
+    moving: Vec<Range<usize>>,
 }
 
 /// The system of equations for [a; w']: the factors of its matrix, in which on a pivot the upper rows hold a,
@@ -146,19 +145,12 @@ fn scales(
 }
 
 impl System<STATES> for Run<'_> {
-    fn moving(&self) -> impl Iterator<Item = Range<usize>> + Clone {
-        let tanks = self.craft.tanks.iter().enumerate();
-        let bobs = tanks.map(|(i, mounted)| index::bob(i, 0)..index::bob(i, mounted.modes()));
-        let modes = self.craft.appendages.as_ref().map_or(0, Structure::len);
-        let flexing = [index::ETA, index::ETA_DOT].map(|at| at..at + modes);
-        let spins =
-            tanks_with_spin(&self.craft.tanks).map(|(i, _)| index::spin(i)..index::spin(i + 1));
-        let others = bobs.chain(flexing).chain(spins);
-        [0..index::BOBS, index::LIQUID..index::BALLS].into_iter().chain(others)
+    fn moving(&self) -> &[Range<usize>] {
+        &self.craft.moving
     }
 
     fn rates(&self, t: f64, x: &[f64; STATES]) -> [f64; STATES] {
-        if self.moving().any(|part| has_diverged(&x[part])) || self.craft.is_beyond(x) {
+        if self.craft.is_beyond(x) {
             return [0.0; STATES];
         }
         self.craft.rates(x, &Acting::from_inputs(self.inputs, t))
@@ -225,13 +217,20 @@ impl Draining {
             return None;
         }
         let tanks: Vec<_> = tanks.iter().map(|tank| MountedTank::new(&tank.resolve())).collect();
+        let appendages = Structure::new(&p.appendage[..p.appendages], p.craft.rigid());
+        let bobs =
+            tanks.iter().enumerate().map(|(i, tank)| index::bob(i, 0)..index::bob(i, tank.modes()));
+        let spins = tanks_with_spin(&tanks).map(|(i, _)| index::spin(i)..index::spin(i + 1));
+        let flexing = [index::ETA, index::ETA_DOT].map(|at| at..at + p.appendages);
+        let always = [0..index::BOBS, index::LIQUID..index::BALLS];
         Some(Draining {
             craft: p.craft.rigid(),
             mount: p.mount,
             gravity: p.gravity,
             pivot: if p.mount == Mount::Pivot { p.pivot } else { Pivot::default() },
-            appendages: Structure::new(&p.appendage[..p.appendages], p.craft.rigid()),
+            appendages,
             follows: tanks.iter().any(MountedTank::follows),
+            moving: always.into_iter().chain(bobs).chain(spins).chain(flexing).collect(),
             tanks,
         })
     }

@@ -81,16 +81,16 @@ use alloc::vec::Vec;
 use core::ops::ControlFlow;
 use taylor::at_each_order;
 use taylor::error::StepError;
-use taylor::extrapolation::System;
 use taylor::integrator::{self, MAX_MAGNITUDE, Motion, RATE_FLOOR, Steps};
 use taylor::number::{Dual, Number};
+use taylor::runge_kutta::System;
 use taylor::series::{self, ORDER, Series, ZERO};
 use taylor::space::{self, Pair, Vector, ZERO_PAIR, ZERO_VECTOR, product_coefficients, products};
 use taylor::vector::{Mat3, Vec3, add, constant, cross, dot, largest, part, scale, sub, times};
 
 use crate::bob::{Bob, BobNow};
 use crate::constrained::ConstrainedBob;
-use crate::contents::{Drains, MountedTank, Outflow, has_diverged, normalise_bobs, vector_from};
+use crate::contents::{Drains, MountedTank, Outflow, normalise_bobs, vector_from};
 use crate::handover::Carrier;
 use crate::lump::{Directions, Due, Lump};
 use crate::motion::{SCALE_TIME, twice_crossed};
@@ -380,7 +380,7 @@ fn scales(swing: impl Fn(usize) -> f64) -> [f64; TANK_STATES] {
 
 impl System<TANK_STATES> for Run<'_> {
     fn rates(&self, t: f64, x: &[f64; TANK_STATES]) -> [f64; TANK_STATES] {
-        if has_diverged(x) || self.mounted.is_curved() && self.mounted.is_beyond(x, x[LIQUID]) {
+        if self.mounted.is_curved() && self.mounted.is_beyond(x, x[LIQUID]) {
             return [0.0; TANK_STATES];
         }
         let TankInputs { a, omega_dot, mass_flow, .. } = self.inputs;

@@ -2,7 +2,7 @@
 //!
 //! A model writes its right-hand side once, as rules for power series ([`series`], [`plane`], [`space`]), and
 //! implements [`integrator::Motion`]. [`integrator::advance`] integrates it. Functions of the states at an instant are
-//! written over [`number::Number`]: the same formula gives value and derivative along a direction. [`extrapolation`]
+//! written over [`number::Number`]: the same formula gives value and derivative along a direction. [`runge_kutta`]
 //! integrates rates that are not expanded.
 //!
 //! `error.rs` has the reasons for a refused step. `integrator.rs` decides when a series has converged, how long a step
@@ -14,12 +14,12 @@ extern crate alloc;
 
 pub mod angle;
 pub mod error;
-pub mod extrapolation;
 pub mod integrator;
 pub mod number;
 pub mod plane;
 pub mod ramp;
 pub mod root;
+pub mod runge_kutta;
 pub mod series;
 pub mod space;
 pub mod vector;

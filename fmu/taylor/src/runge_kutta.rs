@@ -1,0 +1,528 @@
+//! Integration by embedded Runge-Kutta methods, for rates that are too many to expand in power series by hand: craft with tanks
+//! that drain. Short steps use a method of order 5, which evaluates the rates 6 times, longer steps a method of order 8 with 12
+//! evaluations. A step whose estimated error exceeds the tolerance is rejected.
+//!
+//! ```text
+//! k_s = rates(t + c_s h, x + h sum of a_sj k_j),   k_0 = rates(t, x)
+//! x(t + h) = x + h sum of b_s k_s,   estimated error: h sum of e_s k_s
+//! ```
+//!
+//! Sources: Cash and Karp, A variable order Runge-Kutta method (ACM TOMS 16, 1990); Hairer, Norsett, Wanner, Solving Ordinary
+//! Differential Equations I, II.4 and II.10 (DOP853).
+
+use core::ops::Range;
+
+use crate::error::StepError;
+use crate::integrator::{MAX_MAGNITUDE, STEP_SHARE, Steps};
+
+/// A first-order system x' = rates(t, x) that [`advance`] integrates. Times t are in s; their origin is the origin of
+/// [`advance`]'s times.
+pub trait System<const D: usize> {
+    /// Returns the index ranges of the states that are in use. The rates of all other states must be 0.
+    fn moving(&self) -> &[Range<usize>] {
+        &[Range { start: 0, end: D }]
+    }
+
+    fn rates(&self, t: f64, x: &[f64; D]) -> [f64; D];
+
+    /// Returns for each state the magnitude to which a step's error is relative, from states and rates at its
+    /// start `t`; `h` is the rest of the stretch, s.
+    fn error_scale(&self, t: f64, x: &[f64; D], rate: &[f64; D], h: f64) -> [f64; D];
+}
+
+/// Smallest error to which a step is controlled, relative to its scale and to 1 rad, rad/s, m or m/s. Below
+/// it, cancellation of large terms in the rates may dominate.
+const ROUNDING: f64 = 2e-14;
+
+const LONGER: f64 = 4.0;
+const SHORTER: f64 = 0.1;
+
+/// Errors of a step that are smaller count as this value. Because of [`LONGER`] this has no effect on the step's length, but it
+/// avoids 1/0 and powers of numbers near the largest, which end the process of a host that traps them.
+const LEAST_ERROR: f64 = 1e-30;
+
+/// Errors that are larger count as this value, whose square does not overflow.
+const LARGEST_ERROR: f64 = 1e100;
+
+/// Magnitude of a state above which a trial step is rejected before rates are evaluated that might overflow.
+const DIVERGED: f64 = 1e50;
+
+/// Weights of some rates k_s in a sum, with their indices s.
+type Weights = &'static [(usize, f64)];
+
+/// An embedded method with `S` evaluations of the rates: c and a of every evaluation but the first, b, and e twice. The first
+/// estimate of the error is multiplied by its ratio to the root of the sum of its own square and a hundredth of the square of
+/// the second. `order` is the power of h to which the result is proportional.
+struct Method<const S: usize> {
+    stages: &'static [(f64, Weights)],
+    result: Weights,
+    errors: [Weights; 2],
+    order: f64,
+}
+
+/// Cash and Karp's method of order 5, with an estimate of order 4.
+const SHORT: Method<6> = Method {
+    stages: &[
+        (0.2, &[(0, 0.2)]),
+        (0.3, &[(0, 3.0 / 40.0), (1, 9.0 / 40.0)]),
+        (0.6, &[(0, 0.3), (1, -0.9), (2, 1.2)]),
+        (1.0, &[(0, -11.0 / 54.0), (1, 2.5), (2, -70.0 / 27.0), (3, 35.0 / 27.0)]),
+        (
+            0.875,
+            &[
+                (0, 1631.0 / 55296.0),
+                (1, 175.0 / 512.0),
+                (2, 575.0 / 13824.0),
+                (3, 44275.0 / 110592.0),
+                (4, 253.0 / 4096.0),
+            ],
+        ),
+    ],
+    result: &[(0, 37.0 / 378.0), (2, 250.0 / 621.0), (3, 125.0 / 594.0), (5, 512.0 / 1771.0)],
+    errors: [
+        &[
+            (0, 37.0 / 378.0 - 2825.0 / 27648.0),
+            (2, 250.0 / 621.0 - 18575.0 / 48384.0),
+            (3, 125.0 / 594.0 - 13525.0 / 55296.0),
+            (4, -277.0 / 14336.0),
+            (5, 512.0 / 1771.0 - 0.25),
+        ],
+        &[],
+    ],
+    order: 5.0,
+};
+
+/// Dormand and Prince's method of order 8, with estimates of orders 5 and 3.
+const LONG: Method<12> = Method {
+    stages: &[
+        (0.05260015195876773, &[(0, 0.05260015195876773)]),
+        (0.0789002279381516, &[(0, 0.0197250569845379), (1, 0.0591751709536137)]),
+        (0.1183503419072274, &[(0, 0.02958758547680685), (2, 0.08876275643042054)]),
+        (
+            0.2816496580927726,
+            &[(0, 0.2413651341592667), (2, -0.8845494793282861), (3, 0.924834003261792)],
+        ),
+        (
+            0.3333333333333333,
+            &[(0, 0.037037037037037035), (3, 0.17082860872947386), (4, 0.12546768756682242)],
+        ),
+        (
+            0.25,
+            &[
+                (0, 0.037109375),
+                (3, 0.17025221101954405),
+                (4, 0.06021653898045596),
+                (5, -0.017578125),
+            ],
+        ),
+        (
+            0.3076923076923077,
+            &[
+                (0, 0.03709200011850479),
+                (3, 0.17038392571223998),
+                (4, 0.10726203044637328),
+                (5, -0.015319437748624402),
+                (6, 0.008273789163814023),
+            ],
+        ),
+        (
+            0.6512820512820513,
+            &[
+                (0, 0.6241109587160757),
+                (3, -3.3608926294469414),
+                (4, -0.868219346841726),
+                (5, 27.59209969944671),
+                (6, 20.154067550477894),
+                (7, -43.48988418106996),
+            ],
+        ),
+        (
+            0.6,
+            &[
+                (0, 0.47766253643826434),
+                (3, -2.4881146199716677),
+                (4, -0.590290826836843),
+                (5, 21.230051448181193),
+                (6, 15.279233632882423),
+                (7, -33.28821096898486),
+                (8, -0.020331201708508627),
+            ],
+        ),
+        (
+            0.8571428571428571,
+            &[
+                (0, -0.9371424300859873),
+                (3, 5.186372428844064),
+                (4, 1.0914373489967295),
+                (5, -8.149787010746927),
+                (6, -18.52006565999696),
+                (7, 22.739487099350505),
+                (8, 2.4936055526796523),
+                (9, -3.0467644718982196),
+            ],
+        ),
+        (
+            1.0,
+            &[
+                (0, 2.273310147516538),
+                (3, -10.53449546673725),
+                (4, -2.0008720582248625),
+                (5, -17.9589318631188),
+                (6, 27.94888452941996),
+                (7, -2.8589982771350235),
+                (8, -8.87285693353063),
+                (9, 12.360567175794303),
+                (10, 0.6433927460157636),
+            ],
+        ),
+    ],
+    result: &[
+        (0, 0.054293734116568765),
+        (5, 4.450312892752409),
+        (6, 1.8915178993145003),
+        (7, -5.801203960010585),
+        (8, 0.3111643669578199),
+        (9, -0.1521609496625161),
+        (10, 0.20136540080403034),
+        (11, 0.04471061572777259),
+    ],
+    errors: [
+        &[
+            (0, 0.01312004499419488),
+            (5, -1.2251564463762044),
+            (6, -0.4957589496572502),
+            (7, 1.6643771824549864),
+            (8, -0.35032884874997366),
+            (9, 0.3341791187130175),
+            (10, 0.08192320648511571),
+            (11, -0.022355307863886294),
+        ],
+        &[
+            (0, -0.18980075407240762),
+            (5, 4.450312892752409),
+            (6, 1.8915178993145003),
+            (7, -5.801203960010585),
+            (8, -0.4226823213237919),
+            (9, -0.1521609496625161),
+            (10, 0.20136540080403034),
+            (11, 0.02265179219836082),
+        ],
+    ],
+    order: 8.0,
+};
+
+/// Time, s, in which slosh changes so much that a step of [`SHORT`] of this length would err by about the whole motion.
+const TIME: f64 = 1.0;
+
+/// Copies the ranges `moving` of an array one after the other to the start of `packed`; returns their length.
+fn pack<const D: usize>(moving: &[Range<usize>], x: &[f64; D], packed: &mut [f64; D]) -> usize {
+    moving.iter().fold(0, |at, part| {
+        packed[at..at + part.len()].copy_from_slice(&x[part.clone()]);
+        at + part.len()
+    })
+}
+
+/// Copies packed elements back to their ranges `moving` of an array.
+fn unpack<const D: usize>(moving: &[Range<usize>], packed: &[f64; D], x: &mut [f64; D]) {
+    moving.iter().fold(0, |at, part| {
+        x[part.clone()].copy_from_slice(&packed[at..at + part.len()]);
+        at + part.len()
+    });
+}
+
+/// Sets `sum` to the weighted sum of rates k.
+fn combine<const D: usize>(weights: Weights, k: &[[f64; D]], sum: &mut [f64]) {
+    sum.fill(0.0);
+    for (stage, weight) in weights {
+        for (sum, k) in sum.iter_mut().zip(&k[*stage]) {
+            *sum += weight * k;
+        }
+    }
+}
+
+/// State and rates at the start of a step, the states in use, packed, and the errors allowed for them.
+struct Start<'a, const D: usize> {
+    x: &'a [f64; D],
+    packed: &'a [f64],
+    first: &'a [f64; D],
+    allowed: &'a [f64],
+}
+
+/// Tries a step of length h from a start at the time t. Returns the state at its end, with its error relative to the allowed
+/// error, or `None` if a state diverges.
+fn try_step<const D: usize, const S: usize>(
+    system: &impl System<D>,
+    method: &Method<S>,
+    start: &Start<D>,
+    (t, h): (f64, f64),
+) -> Option<([f64; D], f64)> {
+    let (moving, n) = (system.moving(), start.packed.len());
+    let (mut k, mut now, mut sum) = ([*start.first; S], *start.x, [0.0; D]);
+    let mut move_to = |weights: Weights, k: &[[f64; D]; S], now: &mut [f64; D]| {
+        combine(weights, k, &mut sum[..n]);
+        let mut is_bounded = true;
+        for (sum, x) in sum[..n].iter_mut().zip(start.packed) {
+            *sum = x + h * *sum;
+            is_bounded &= sum.abs() < DIVERGED;
+        }
+        unpack(moving, &sum, now);
+        is_bounded.then_some(())
+    };
+    for (s, (node, weights)) in method.stages.iter().enumerate() {
+        move_to(weights, &k, &mut now)?;
+        pack(moving, &system.rates(t + node * h, &now), &mut k[s + 1]);
+    }
+    move_to(method.result, &k, &mut now)?;
+    let [error, second] = method.errors.map(|weights| {
+        combine(weights, &k, &mut sum[..n]);
+        let errors =
+            sum[..n].iter().zip(start.allowed).map(|(sum, allowed)| (h * sum).abs() / allowed);
+        // NaN counts as an unbounded error.
+        errors.fold(0.0, |most, off| if off <= most { most } else { f64::min(off, LARGEST_ERROR) })
+    });
+    let error = f64::max(error, LEAST_ERROR);
+    Some((now, error * (error / libm::hypot(error, 0.1 * second))))
+}
+
+/// Length `h`, s, of the next step, counter of the `steps` that were tried, and whether a step of [`SHORT`] was rejected. An
+/// integration carries them from one stretch of a call to the next.
+pub struct Pace {
+    steps: Steps,
+    h: f64,
+    is_fast: bool,
+}
+
+impl Pace {
+    /// Starts the pace of a call that advances by `h` (s). The first step tries the whole length.
+    pub fn new(h: f64, steps: Steps) -> Pace {
+        Pace { steps, h, is_fast: false }
+    }
+}
+
+/// Advances x from `begin` to `end`, s, in as many steps as the tolerance needs. The estimated error determines the length
+/// of the next step, and the states at its start determine the error scale.
+///
+/// # Errors
+/// [`StepError::NotFinite`] and [`StepError::TooManySteps`], whose time has the same origin as `begin`; x is then unusable.
+pub fn advance<const D: usize>(
+    system: &impl System<D>,
+    x: &mut [f64; D],
+    (begin, end): (f64, f64),
+    tolerance: f64,
+    pace: &mut Pace,
+) -> Result<(), StepError> {
+    let (mut t, moving) = (begin, system.moving());
+    let [mut packed, mut first, mut allowed] = [[0.0; D]; 3];
+    while t < end {
+        let rates = system.rates(t, x);
+        let n = pack(moving, x, &mut packed);
+        pack(moving, &rates, &mut first);
+        pack(moving, &system.error_scale(t, x, &rates, end - t), &mut allowed);
+        for scale in &mut allowed[..n] {
+            let rounding = ROUNDING * f64::max(*scale, 1.0);
+            *scale = f64::max(STEP_SHARE * tolerance * *scale, rounding);
+        }
+        let moved = loop {
+            pace.steps.add_steps(1, t)?;
+            let is_last = t + pace.h >= end;
+            let h = if is_last { end - t } else { pace.h };
+            let share = h / TIME;
+            let is_short =
+                !pace.is_fast && share * share * share * share * share < STEP_SHARE * tolerance;
+            let start = Start { x, packed: &packed[..n], first: &first, allowed: &allowed[..n] };
+            let (trial, order) = if is_short {
+                (try_step(system, &SHORT, &start, (t, h)), SHORT.order)
+            } else {
+                (try_step(system, &LONG, &start, (t, h)), LONG.order)
+            };
+            let (moved, error) = trial.unwrap_or((*x, LARGEST_ERROR));
+            let change = 0.9 * libm::pow(error, -1.0 / order);
+            let best = h * change.clamp(SHORTER, LONGER);
+            if error <= 1.0 {
+                // A step cut short by the end of a stretch tells less about the next step than the step
+                // before.
+                pace.h = if is_last { f64::max(best, pace.h) } else { best };
+                t = if is_last { end } else { t + h };
+                break moved;
+            }
+            if is_short {
+                pace.is_fast = true;
+            } else {
+                pace.h = best;
+            }
+            if t + pace.h <= t {
+                return Err(StepError::NotFinite { time: t });
+            }
+        };
+        if !moved.iter().all(|x| x.abs() < MAX_MAGNITUDE) {
+            return Err(StepError::NotFinite { time: t });
+        }
+        *x = moved;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use core::cell::Cell;
+
+    /// Kepler's problem, x'' = -x/|x|^3, on an ellipse; `growth` adds growth x to the rates.
+    struct Orbit {
+        growth: f64,
+        evaluations: Cell<usize>,
+    }
+
+    impl Orbit {
+        fn new() -> Orbit {
+            Orbit { growth: 0.0, evaluations: Cell::new(0) }
+        }
+    }
+
+    impl System<4> for Orbit {
+        fn rates(&self, _: f64, x: &[f64; 4]) -> [f64; 4] {
+            self.evaluations.set(self.evaluations.get() + 1);
+            let r3 = libm::pow(x[0] * x[0] + x[1] * x[1], 1.5);
+            let rate = [x[2], x[3], -x[0] / r3, -x[1] / r3];
+            core::array::from_fn(|i| rate[i] + self.growth * x[i] * x[i])
+        }
+
+        fn error_scale(&self, _: f64, _: &[f64; 4], _: &[f64; 4], _: f64) -> [f64; 4] {
+            [1.0; 4]
+        }
+    }
+
+    const STEPS: Steps = Steps::new(100_000, "");
+
+    /// State at the far end of an ellipse with eccentricity 0.6 and semi-axis 1, whose revolution takes 2 pi.
+    const START: [f64; 4] = [1.6, 0.0, 0.0, 0.5];
+
+    #[test]
+    fn a_kepler_orbit_integrated_over_one_revolution_ends_at_its_start_within_the_tolerance() {
+        let mut works = [0; 4];
+        for (k, tolerance) in [1e-4, 1e-6, 1e-8, 1e-10].into_iter().enumerate() {
+            let (orbit, mut x) = (Orbit::new(), START);
+            let end = core::f64::consts::TAU;
+            advance(&orbit, &mut x, (0.0, end), tolerance, &mut Pace::new(end, STEPS)).unwrap();
+            // A step may have an error of a hundredth of the tolerance. Errors grow tenfold and more along the orbit.
+            let off = (0..4).map(|i| (x[i] - START[i]).abs()).fold(0.0, f64::max);
+            assert!(off < 3.0 * tolerance, "{tolerance}: {off}");
+            works[k] = orbit.evaluations.get();
+        }
+        // Number of evaluations by the step control. A change here changes the cost of every run.
+        assert_eq!(works, [298, 445, 750, 1067]);
+    }
+
+    #[test]
+    fn an_integration_in_three_parts_equals_an_integration_in_one() {
+        let (mut x, mut y) = (START, START);
+        let mut pace = Pace::new(3.0, STEPS);
+        for (from, to) in [(0.0, 0.5), (0.5, 0.6), (0.6, 3.0)] {
+            advance(&Orbit::new(), &mut x, (from, to), 1e-10, &mut pace).unwrap();
+        }
+        advance(&Orbit::new(), &mut y, (0.0, 3.0), 1e-10, &mut Pace::new(3.0, STEPS)).unwrap();
+        for i in 0..4 {
+            assert!((x[i] - y[i]).abs() < 1e-10, "{i}");
+        }
+    }
+
+    /// Returns the error of one step of Kepler's problem, and its estimate, both relative to 1.
+    fn error_and_estimate<const S: usize>(method: &Method<S>, h: f64) -> [f64; 2] {
+        let (orbit, mut exact) = (Orbit::new(), START);
+        advance(&orbit, &mut exact, (0.0, h), 1e-14, &mut Pace::new(h / 4.0, STEPS)).unwrap();
+        let first = orbit.rates(0.0, &START);
+        let start = Start { x: &START, packed: &START, first: &first, allowed: &[1.0; 4] };
+        let (x, estimate) = try_step(&orbit, method, &start, (0.0, h)).unwrap();
+        [(0..4).map(|i| (x[i] - exact[i]).abs()).fold(0.0, f64::max), estimate]
+    }
+
+    /// Half a step has an error at least 2^(p + 1) times smaller, if p is the order of the method. A wrong digit of a coefficient
+    /// would lower the order.
+    #[test]
+    fn errors_of_steps_have_the_orders_of_their_methods_and_are_below_their_estimates() {
+        let short = [0.4, 0.2].map(|h| error_and_estimate(&SHORT, h));
+        let long = [1.2, 0.6].map(|h| error_and_estimate(&LONG, h));
+        for ([whole, half], orders) in [(short, [6.0, 5.0]), (long, [9.0, 8.0])] {
+            for (i, order) in orders.into_iter().enumerate() {
+                let ratio = f64::log2(whole[i] / half[i]);
+                assert!(ratio > order - 0.7, "{i} {whole:?} {half:?} {ratio}");
+            }
+            assert!(whole[0] < whole[1] && half[0] < half[1], "{whole:?} {half:?}");
+        }
+    }
+
+    /// The error scale is asked for with the rest of the stretch, and states that are not in use do not move.
+    #[test]
+    fn states_that_are_not_in_use_stay_as_they_are() {
+        struct Quartic;
+        impl System<5> for Quartic {
+            fn moving(&self) -> &[Range<usize>] {
+                &[1..2, 3..4]
+            }
+
+            fn rates(&self, t: f64, _: &[f64; 5]) -> [f64; 5] {
+                [0.0, 5.0 * t.powi(4), 0.0, 1.0, 0.0]
+            }
+
+            fn error_scale(&self, t: f64, _: &[f64; 5], _: &[f64; 5], h: f64) -> [f64; 5] {
+                assert_eq!(t + h, 2.0);
+                [1.0; 5]
+            }
+        }
+        let mut x = [7.0, 1.0, 8.0, 0.0, 9.0];
+        advance(&Quartic, &mut x, (1.0, 2.0), 1e-10, &mut Pace::new(1.0, STEPS)).unwrap();
+        assert!((x[1] - 32.0).abs() < 1e-12 && (x[3] - 1.0).abs() < 1e-14, "{x:?}");
+        assert_eq!([x[0], x[2], x[4]], [7.0, 8.0, 9.0]);
+    }
+
+    /// The system x' = x with errors relative to `scale`; it counts the steps that have begun.
+    struct Growth {
+        scale: f64,
+        starts: Cell<usize>,
+    }
+
+    impl System<1> for Growth {
+        fn rates(&self, _: f64, x: &[f64; 1]) -> [f64; 1] {
+            *x
+        }
+
+        fn error_scale(&self, _: f64, _: &[f64; 1], _: &[f64; 1], _: f64) -> [f64; 1] {
+            self.starts.set(self.starts.get() + 1);
+            [self.scale]
+        }
+    }
+
+    #[test]
+    fn with_zero_tolerance_the_allowed_error_is_rounding() {
+        for scale in [1e6, 1.0, 1e-6] {
+            let system = Growth { scale, starts: Cell::new(0) };
+            let mut x = [f64::max(scale, 1.0)];
+            let begin = x[0];
+            advance(&system, &mut x, (0.0, 1.0), 0.0, &mut Pace::new(1.0, STEPS)).unwrap();
+            assert!((x[0] / begin / 1f64.exp() - 1.0).abs() < 1e-13, "{scale} {}", x[0]);
+            assert!(system.starts.get() < 20, "{scale} {}", system.starts.get());
+        }
+    }
+
+    /// With negligible errors the steps are 1, 4, 16, ... milliseconds long, and the sixth reaches the end.
+    #[test]
+    fn a_step_is_at_most_four_times_as_long_as_the_one_before() {
+        let system = Growth { scale: 1e6, starts: Cell::new(0) };
+        advance(&system, &mut [1.0], (0.0, 1.0), 1e-2, &mut Pace::new(1e-3, STEPS)).unwrap();
+        assert_eq!(system.starts.get(), 6);
+    }
+
+    #[test]
+    fn overflow_and_too_many_steps_are_errors() {
+        let orbit = Orbit { growth: 10.0, ..Orbit::new() };
+        let run = |steps: Steps| {
+            advance(&orbit, &mut START.clone(), (0.0, 9.0), 1e-8, &mut Pace::new(9.0, steps))
+        };
+        let error = run(STEPS).unwrap_err();
+        assert!(matches!(error, StepError::NotFinite { .. } | StepError::TooManySteps { .. }));
+        assert!(matches!(
+            run(Steps::new(2, "")),
+            Err(StepError::TooManySteps { max_steps: 2, .. })
+        ));
+    }
+}
