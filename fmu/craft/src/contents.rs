@@ -31,7 +31,7 @@
 //!
 //! ```text
 //! K = j e + sum of m_n' l p_perp,   j = (m_0 H_0)' + sum of m_n' b_n + f z_out,   b_n = h + l e.p
-//! L = d x j e + sum of (d + b_n e) x (m_n' l p_perp)
+//! L = d x K + e x sum of b_n m_n' l p_perp
 //! ```
 //!
 //! In addition to their forces at constant mass, bobs and rigid liquid exert this force and torque on the craft, so that the
@@ -66,9 +66,9 @@ use taylor::vector::{
 };
 
 use crate::bob::{Bob, BobNow};
-use crate::damping;
+use crate::damping::Law;
 use crate::parameters::{Limits, Tank};
-use crate::rigid::{Mat6, Rigid, along_rod};
+use crate::rigid::{Mat6, Rigid, add_lower_rank_one, along_rod};
 use crate::sizes::MODES;
 use crate::spin::{Spin, SpinNow};
 use crate::state::Line;
@@ -89,6 +89,7 @@ pub struct MountedTank {
     across: [Option<Vec3>; MODES],
     curved: bool,
     surfaces: [Option<Surface>; MODES],
+    laws: [Law; MODES],
     spin: Option<Spin>,
     still: Option<[Rigid; 2]>,
 }
@@ -166,6 +167,7 @@ impl MountedTank {
             across,
             curved,
             surfaces,
+            laws: core::array::from_fn(|n| Law::new(tank, n)),
             spin: Spin::new(tank),
             still,
         };
@@ -174,8 +176,8 @@ impl MountedTank {
             let bobs = (0..tank.modes).map(|n| point(Bob::new(tank, 0, n)));
             Some([tank.rigid(), bobs.fold(tank.rigid(), |sum, bob| sum.combined_with(&bob))])
         } else {
-            let s = add(d, scale(tank.h_0, e));
-            let rigid = Rigid::axial(tank.m_0, s, tank.i_0, tank.i_z, e);
+            let (m, h) = (tank.m_0, tank.h_0);
+            let rigid = Rigid::on_axis([d, e], [m, m * h, m * h * h], [tank.i_0, tank.i_z]);
             (!mounted.drains()).then(|| [rigid, mounted.at_rest(0.0, None)])
         };
         MountedTank { still, ..mounted }
@@ -206,25 +208,29 @@ impl MountedTank {
         if let Some(whole) = self.rigid_at_rest() {
             return whole.lift();
         }
-        let constant_of = |x: f64| T::constant(x);
-        let (e, d, zero) = (constant::<T>(self.e), constant::<T>(self.d), constant_of(0.0));
-        let mut m_0 = if filling.is_some() { liquid } else { constant_of(tank.m_0) };
-        let mut bobs = Rigid { mass: zero, moment: [zero; 3], inertia: [[zero; 3]; 3] };
+        let c = T::constant;
+        let [h_0, i_0, i_z] = match filling {
+            Some(filling) => filling.rigid.map(|jet| jet[0]),
+            None => [tank.h_0, tank.i_0, tank.i_z].map(c),
+        };
+        let mut m_0 = if filling.is_some() { liquid } else { c(tank.m_0) };
+        let mut moments = [c(0.0); 3];
+        let mut put = |m: T, z: T| {
+            let first = m * z;
+            moments = [moments[0] + m, moments[1] + first, moments[2] + first * z];
+        };
         for n in 0..tank.modes {
             let [m, l, h] = match filling {
                 Some(filling) => filling.modes[n].map(|jet| jet[0]),
-                None => [tank.mass[n], tank.length[n], tank.hinge[n]].map(constant_of),
+                None => [tank.mass[n], tank.length[n], tank.hinge[n]].map(c),
             };
             if filling.is_some() {
                 m_0 = m_0 - m;
             }
-            bobs = bobs.combined_with(&Rigid::axial(m, add(d, scale(h - l, e)), zero, zero, e));
+            put(m, h - l);
         }
-        let [h_0, i_0, i_z] = match filling {
-            Some(filling) => filling.rigid.map(|jet| jet[0]),
-            None => [tank.h_0, tank.i_0, tank.i_z].map(constant_of),
-        };
-        bobs.combined_with(&Rigid::axial(m_0, add(d, scale(h_0, e)), i_0, i_z, e))
+        put(m_0, h_0);
+        Rigid::on_axis([self.d, self.e], moments, [i_0, i_z])
     }
 
     /// Returns hinge, p and p' of mode `n`, which counts from 0, projected into the plane of a planar mode.
@@ -419,6 +425,14 @@ impl<T: Number> Swing<T> {
         }
     }
 
+    /// Returns the force of [`Swing::wrench`].
+    fn pull(&self, a: Vec3<T>, w_d: Vec3<T>) -> Vec3<T> {
+        if self.surface.is_some() {
+            return self.wrench(a, w_d)[0];
+        }
+        add(scale(self.tension(a, w_d), self.p), self.phi)
+    }
+
     fn load(&self) -> [Vec3<T>; 2] {
         if self.surface.is_some() {
             return self.wrench(constant([0.0; 3]), constant([0.0; 3]));
@@ -496,8 +510,11 @@ impl<T: Number> Contents<'_, T> {
         let mut m_0 = if drains { [liquid, -flow, c(-slope)] } else { jet(tank.m_0) };
         let axes: Mat3<T> = axes.map(constant);
         let zero = constant::<T>([0.0; 3]);
-        // K and L without the axial part, with their derivatives; sum of m_n' b_n and its
-        // derivative.
+        // The specific force along the tank's axis is e.a + axial.r at a point r.
+        let w_e = dot(e, w);
+        let axial = add(cross(e, w_d), sub(scale(w_e, w), scale(dot(w, w), e)));
+        let at_origin = dot(e, a);
+        // Sums of m' l p_perp and of b m' l p_perp, with their derivatives; sum of m' b and its derivative.
         let (mut level, mut level_d) = ([zero; 2], [zero; 2]);
         let mut sinking = [c(0.0); 2];
         let mut turning = [c(0.0); 2];
@@ -537,18 +554,19 @@ impl<T: Number> Contents<'_, T> {
             }
             let height = dot(e, p);
             let p_perp = sub(p, scale(height, e));
-            let at_hinge = add(add(a, cross(w_d, hinge)), cross(w, cross(w, hinge)));
             let chord = add(p, e);
             let motion = [dot(chord, chord), dot(p_d, p_d)];
             let zeta = place.and_then(|place| curves.zeta(n, place));
-            let drag = damping::coefficient(tank, n, [m[0], l[0]], zeta, dot(e, at_hinge), motion);
+            let x = at_origin + dot(axial, hinge);
+            let drag = mounted.laws[n].coefficient_at([m[0], l[0]], zeta, x, motion);
             let moved = match &on_surface {
                 Some((meridian, _)) => meridian.apply_shear(p_d),
                 None => p_d,
             };
             let phi = add(scale(drag * l[0], moved), scale(l[0] * k, p_perp));
-            let centripetal = add(cross(w, cross(w, rho)), cross(w, rho_d).map(|x| x * 2.0));
-            let settling = add(centripetal, scale(h[2], e));
+            let turning = cross(w, rho);
+            let speed = add(turning, rho_d);
+            let settling = add(cross(w, add(speed, rho_d)), scale(h[2], e));
             let t_0 = m[0] * (l[0] * dot(p_d, p_d) - dot(p, settling) - l[2])
                 - l[0] * dot(p_perp, p_perp) * k;
             let mut known = add(add(settling, scale(l[1] * 2.0, p_d)), scale(m[0].recip(), phi));
@@ -571,14 +589,10 @@ impl<T: Number> Contents<'_, T> {
                 let lost = scale(m[1] * l[0], p_perp);
                 let lost_d =
                     add(scale(m[2] * l[0] + m[1] * l[1], p_perp), scale(m[1] * l[0], p_perp_d));
-                let foot = add(d, scale(b, e));
                 sinking = [sinking[0] + m[1] * b, sinking[1] + m[2] * b + m[1] * b_d];
-                level = [add(level[0], lost), add(level[1], cross(foot, lost))];
-                level_d = [
-                    add(level_d[0], lost_d),
-                    add(level_d[1], add(cross(foot, lost_d), cross(scale(b_d, e), lost))),
-                ];
-                let speed = add(cross(w, rho), rho_d);
+                level = [add(level[0], lost), add(level[1], scale(b, lost))];
+                let raised = add(scale(b, lost_d), scale(b_d, lost));
+                level_d = [add(level_d[0], lost_d), add(level_d[1], raised)];
                 self.flow_wrench = [
                     sub(self.flow_wrench[0], scale(m[1], rho_d)),
                     sub(self.flow_wrench[1], scale(m[1], cross(rho, speed))),
@@ -619,40 +633,37 @@ impl<T: Number> Contents<'_, T> {
         }
         let Some(filling) = filling else { return };
         let [h_0, i_0, i_z] = filling.rigid.map(follow);
-        // The rigid liquid about O.
-        let s = add(d, scale(h_0[0], e));
-        let s_d = scale(h_0[1], e);
-        if mounted.still.is_none() {
-            self.rigid = Rigid::axial(m_0[0], s, i_0[0], i_z[0], e);
-        }
+        // The rigid liquid about O: m h, m h^2 and their derivatives.
+        let first = m_0[0] * h_0[0];
         let moment = m_0[1] * h_0[0] + m_0[0] * h_0[1];
+        if mounted.still.is_none() {
+            let moments = [m_0[0], first, first * h_0[0]];
+            self.rigid = Rigid::on_axis([mounted.d, mounted.e], moments, [i_0[0], i_z[0]]);
+        }
         let moment_d = m_0[2] * h_0[0] + m_0[1] * h_0[1] * 2.0 + m_0[0] * h_0[2];
         let j = moment + sinking[0] + flow * tank.outlet;
         let j_d = moment_d + sinking[1] + c(slope * tank.outlet);
-        let axial = scale(j, e);
-        let axial_d = scale(j_d, e);
-        level = [add(level[0], axial), add(level[1], cross(d, axial))];
-        level_d = [add(level_d[0], axial_d), add(level_d[1], cross(d, axial_d))];
-        let [k, l] = level;
-        let force = add(cross(w, k).map(|x| x * 2.0), level_d[0]);
-        // I_0' w
-        let along = dot(e, w);
-        let own = add(scale(i_0[1], w), scale((i_z[1] - i_0[1]) * along, e));
-        let lighter = scale(m_0[1], cross(s, cross(w, s)));
-        let moving = scale(m_0[0], add(cross(s_d, cross(w, s)), cross(s, cross(w, s_d))));
-        let turning = add(own, add(lighter, moving));
-        self.shrinking = (m_0[1], [add(scale(m_0[1], s), scale(m_0[0], s_d)), turning]);
+        let momenta = |axial: T, [sum, raised]: [Vec3<T>; 2]| {
+            let k = add(scale(axial, e), sum);
+            [k, add(cross(d, k), cross(e, raised))]
+        };
+        let [[k, l], [k_d, l_d]] = [momenta(j, level), momenta(j_d, level_d)];
+        let force = add(cross(w, k).map(|x| x * 2.0), k_d);
+        let moments = [m_0[1], moment, moment * h_0[0] + first * h_0[1]];
+        let rate = Rigid::on_axis([mounted.d, mounted.e], moments, [i_0[1], i_z[1]]);
+        let turning = times(&rate.inertia, w);
+        self.shrinking = (m_0[1], [rate.moment, turning]);
         let leaving = scale(flow, cross(outlet, cross(w, outlet)));
-        let torque = [turning, leaving, cross(w, l), level_d[1]];
-        self.flow_momentum = level;
+        let torque = [turning, leaving, cross(w, l), l_d];
+        self.flow_momentum = [k, l];
         self.flow_wrench = [
             sub(self.flow_wrench[0], force),
             torque.into_iter().fold(self.flow_wrench[1], |sum, part| sub(sum, part)),
         ];
     }
 
-    /// Adds the inertia of the bobs to the craft's mass matrix: m u u^T along each rod, and for planar modes also
-    /// perpendicular to the plane of the mode.
+    /// Adds the inertia of the bobs to the lower triangle of the craft's mass matrix: m u u^T along each rod, and for planar
+    /// modes also perpendicular to the plane of the mode.
     pub fn add_rods(&self, matrix: &mut Mat6<T>) {
         for bob in self.bobs.iter().flatten() {
             if let Some(surface) = &bob.surface {
@@ -661,17 +672,13 @@ impl<T: Number> Contents<'_, T> {
                     surface.meridian.add_rotary([bob.m, bob.l], bob.rho, &mut held);
                 }
                 for i in 0..6 {
-                    for k in 0..6 {
+                    for k in 0..=i {
                         matrix[i][k] = matrix[i][k] + held[i][k];
                     }
                 }
                 continue;
             }
-            for i in 0..6 {
-                for k in 0..6 {
-                    matrix[i][k] = matrix[i][k] + bob.m * bob.u[i] * bob.u[k];
-                }
-            }
+            add_lower_rank_one(matrix, bob.m, &bob.u);
         }
         if self.mounted.planar {
             self.add_carried(matrix);
@@ -681,12 +688,7 @@ impl<T: Number> Contents<'_, T> {
     #[inline(never)]
     fn add_carried(&self, matrix: &mut Mat6<T>) {
         for (bob, b) in self.planar() {
-            let u = along_rod(b, bob.rho);
-            for i in 0..6 {
-                for k in 0..6 {
-                    matrix[i][k] = matrix[i][k] + bob.m * u[i] * u[k];
-                }
-            }
+            add_lower_rank_one(matrix, bob.m, &along_rod(b, bob.rho));
         }
     }
 
@@ -750,7 +752,7 @@ impl<T: Number> Contents<'_, T> {
         let mut moment_d = s_d;
         for bob in self.bobs.iter().flatten() {
             let speed = add(v, add(cross(w, bob.rho), bob.rho_d));
-            let [pull, _] = bob.wrench(a, w_d);
+            let pull = bob.pull(a, w_d);
             power = power + dot(speed, speed) * bob.m_d * half - dot(pull, bob.end_rate)
                 + bob.centring_d;
             moment_d = add(moment_d, scale(bob.m_d, bob.rho));

@@ -281,6 +281,20 @@ impl Law {
         }
     }
 
+    /// Returns the drag coefficient c (kg/s) of a slosh mode in a tank in which the mass m and the length l of the mode
+    /// change, from the specific force x along the tank (m/s2), from |p + e|^2, which determines the slosh angle, and from
+    /// |p'|^2, the squared rate of the bob's direction. `zeta` replaces the mode's own damping ratio.
+    pub fn coefficient_at<T: Number>(
+        &self,
+        size: [T; 2],
+        zeta: Option<T>,
+        x: T,
+        [chord2, rate2]: [T; 2],
+    ) -> T {
+        let motion = || [angle::squared(chord2) + T::constant(SMALLEST * SMALLEST), rate2];
+        self.coefficient(size, zeta, x, motion)
+    }
+
     /// Returns the drag coefficient c (kg/s) of a slosh mode with the mass m (kg) and the pendulum length l (m). It
     /// depends on the specific force x along the tank's axis (m/s2) and on the amplitude, given as [angle^2 + A_0^2,
     /// |p'|^2]: squared slosh angle plus the constant A_0^2, and squared rate of the bob's direction. `zeta` replaces
@@ -328,19 +342,4 @@ impl Law {
         let divisor = (above * above + w * w * (CORNER * CORNER)).sqrt() + w * root;
         c + m * steep * (T::constant(1.0) + (above - w * begins) / divisor) * zeta
     }
-}
-
-/// Returns the drag coefficient c (kg/s) of mode `n` of a tank in which the mass m and the length l of the mode change,
-/// from the specific force x along the tank (m/s2), from |p + e|^2, which determines the slosh angle, and from |p'|^2,
-/// the squared rate of the bob's direction. `zeta` replaces the tank's own damping ratio.
-pub fn coefficient<T: Number>(
-    tank: &Tank,
-    n: usize,
-    size: [T; 2],
-    zeta: Option<T>,
-    x: T,
-    [chord2, rate2]: [T; 2],
-) -> T {
-    let motion = || [angle::squared(chord2) + T::constant(SMALLEST * SMALLEST), rate2];
-    Law::new(tank, n).coefficient(size, zeta, x, motion)
 }

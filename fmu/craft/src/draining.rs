@@ -28,7 +28,7 @@ use crate::motion::SCALE_TIME;
 use crate::outputs::{Now, TankNow};
 use crate::parameters::{Mount, Parameters, Tank};
 use crate::pivot::Pivot;
-use crate::rigid::{Factors, Mat6, Rigid};
+use crate::rigid::{Factors, Mat6, Rigid, SMALLEST_DIVISOR};
 use crate::sizes::{APPENDAGES, MODES, TANKS};
 use crate::spin::SpinNow;
 use crate::state::{BallState, INPUTS, Inputs, Line, STATES, State, index};
@@ -92,16 +92,8 @@ pub struct Draining {
     moving: Vec<Range<usize>>,
 }
 
-/// The system of equations for [a; w']: the factors of its matrix, in which on a pivot the upper rows hold a,
-/// and its right-hand side.
-#[derive(Clone, Debug)]
-struct Equations<T> {
-    matrix: Mat6<T>,
-    factors: Factors<T>,
-}
-
-/// The craft at an instant, with its equations solved. `velocity` is the velocity of O, body axes; `by_pivot` is the power that
-/// the pivot dissipates, W.
+/// The craft at an instant, with its equations solved. `velocity` is the velocity of O, body axes; `by_pivot` is the power, W,
+/// that a pivot with a torque dissipates.
 struct Instant<T> {
     q: Quaternion<T>,
     axes: Mat3<T>,
@@ -109,7 +101,7 @@ struct Instant<T> {
     w: Vec3<T>,
     a: Vec3<T>,
     w_d: Vec3<T>,
-    by_pivot: T,
+    by_pivot: Option<T>,
     deformed: Option<Deformed<T>>,
 }
 
@@ -149,11 +141,12 @@ impl System<STATES> for Run<'_> {
         &self.craft.moving
     }
 
-    fn rates(&self, t: f64, x: &[f64; STATES]) -> [f64; STATES] {
+    fn write_rates(&self, t: f64, x: &[f64; STATES], rate: &mut [f64; STATES]) {
         if self.craft.is_beyond(x) {
-            return [0.0; STATES];
+            rate.fill(0.0);
+            return;
         }
-        self.craft.rates(x, &Acting::from_inputs(self.inputs, t))
+        self.craft.write_rates(x, &Acting::from_inputs(self.inputs, t), rate);
     }
 
     fn error_scale(
@@ -194,9 +187,10 @@ impl Drains<STATES> for Run<'_> {
         let q = unit_quaternion([x[0], x[1], x[2], x[3]]);
         x[index::Q..index::Q + 4].copy_from_slice(&q);
         for (i, mounted) in self.craft.tanks.iter().enumerate() {
-            mounted.flatten(&mut x[index::bob(i, 0)..]);
+            let bobs = index::bob(i, 0)..index::bob(i, mounted.modes());
+            mounted.flatten(&mut x[bobs.clone()]);
+            normalise_bobs(&mut x[bobs]);
         }
-        normalise_bobs(&mut x[index::BOBS..index::LIQUID]);
     }
 
     fn outflows(&self) -> impl Iterator<Item = Outflow<'_>> {
@@ -230,7 +224,13 @@ impl Draining {
             pivot: if p.mount == Mount::Pivot { p.pivot } else { Pivot::default() },
             appendages,
             follows: tanks.iter().any(MountedTank::follows),
-            moving: always.into_iter().chain(bobs).chain(spins).chain(flexing).collect(),
+            moving: always
+                .into_iter()
+                .chain(bobs)
+                .chain(spins)
+                .chain(flexing)
+                .filter(|part| !part.is_empty())
+                .collect(),
             tanks,
         })
     }
@@ -326,33 +326,28 @@ impl Draining {
         self.evaluate(&state.x, &acting).outputs(&state.x, |_| None).energy
     }
 
-    fn equations<T: Number>(&self, matrix: Mat6<T>) -> Equations<T> {
-        let mut held = matrix;
-        if self.mount == Mount::Pivot {
-            for i in 0..3 {
-                for k in 0..6 {
-                    let one = T::constant(if i == k { 1.0 } else { 0.0 });
-                    (held[i][k], held[k][i]) = (one, one);
-                }
-            }
-        }
-        Equations { matrix, factors: Factors::definite_or_zero(&held) }
+    /// Returns the acceleration a of a craft on a pivot, where only gravity acts on it.
+    fn held_acceleration<T: Number>(&self, axes: &Mat3<T>) -> Vec3<T> {
+        transposed_times(axes, constant(self.gravity)).map(|x| -x)
     }
 
+    /// Solves the equations of motion, of whose `matrix` only the lower triangle is read, for [a; w'].
     fn solve<T: Number>(
         &self,
-        Equations { matrix, factors }: &Equations<T>,
-        [mut force, mut torque]: [Vec3<T>; 2],
+        matrix: &Mat6<T>,
+        [force, torque]: [Vec3<T>; 2],
         axes: &Mat3<T>,
     ) -> [Vec3<T>; 2] {
-        if self.mount == Mount::Pivot {
-            let a = transposed_times(axes, constant(self.gravity)).map(|x| -x);
-            for (torque, row) in torque.iter_mut().zip(&matrix[3..]) {
-                *torque = *torque - (a[0] * row[0] + a[1] * row[1] + a[2] * row[2]);
-            }
-            force = a;
+        if self.mount == Mount::Free {
+            return Factors::definite_or_zero(matrix).solve([force, torque]);
         }
-        factors.solve([force, torque])
+        let a = self.held_acceleration(axes);
+        let rest = [0, 1, 2].map(|i| {
+            let row = matrix[3 + i];
+            torque[i] - (a[0] * row[0] + a[1] * row[1] + a[2] * row[2])
+        });
+        let inertia = [0, 1, 2].map(|i| [0, 1, 2].map(|k| matrix[3 + i][3 + k]));
+        [a, Factors::definite_or_zero(&inertia).solve_array(rest)]
     }
 
     fn at_rest<T: Number>(
@@ -376,19 +371,34 @@ impl Draining {
         axes: &Mat3<T>,
         fillings: &[Option<Filling<T>>; TANKS],
     ) -> [Vec3<T>; 2] {
-        let zero = constant::<T>([0.0; 3]);
         if !self.follows {
-            return [zero; 2];
+            return [constant([0.0; 3]); 2];
         }
         let w = vector_from(x, index::OMEGA);
         let whole = self.at_rest(x, fillings);
-        let [centripetal, gyroscopic] = whole.inertial_wrench(zero, w, zero);
+        let [centripetal, gyroscopic] = whole.gyroscopic_wrench(w);
         let force = sub(acting.force, centripetal);
         let mut torque = sub(acting.torque, add(gyroscopic, cross(w, acting.h_wheels)));
         if let Some(couple) = couple {
             torque = add(torque, couple);
         }
-        self.solve(&self.equations(whole.mass_matrix()), [force, torque], axes)
+        if self.mount == Mount::Pivot {
+            return self.solve(&whole.mass_matrix(), [force, torque], axes);
+        }
+        // About the centre of mass c translation and rotation are independent.
+        let inverse = whole.mass.at_least(SMALLEST_DIVISOR).recip();
+        let c = scale(inverse, whole.moment);
+        let parallel = dot(c, whole.moment);
+        let mut inertia = whole.inertia;
+        for i in 0..3 {
+            inertia[i][i] = inertia[i][i] - parallel;
+            for k in 0..=i {
+                inertia[i][k] = inertia[i][k] + c[i] * whole.moment[k];
+            }
+        }
+        let about_c = sub(torque, cross(c, force));
+        let w_d = Factors::definite_or_zero(&inertia).solve_array(about_c);
+        [sub(scale(inverse, force), cross(w_d, c)), w_d]
     }
 
     #[inline(always)]
@@ -398,12 +408,11 @@ impl Draining {
         acting: &Acting<T>,
         contents: &mut [Option<Contents<'a, T>>; TANKS],
     ) -> Instant<T> {
-        let zero = constant::<T>([0.0; 3]);
         let q = unit_quaternion([x[0], x[1], x[2], x[3]]);
         let axes = rotation(&q);
         let w = vector_from(x, index::OMEGA);
-        let (of_pivot, by_pivot, _) = self.pivot.present(&axes, w);
-        let of_pivot = self.pivot.acts().then_some(of_pivot);
+        let present = self.pivot.acts().then(|| self.pivot.present(&axes, w));
+        let (of_pivot, by_pivot) = present.map(|(torque, power, _)| (torque, power)).unzip();
         let mut couple = of_pivot;
         let mut spins: [Option<SpinNow<T>>; TANKS] = core::array::from_fn(|_| None);
         let mut fillings: [Option<Filling<T>>; TANKS] = core::array::from_fn(|_| None);
@@ -430,7 +439,7 @@ impl Draining {
         if let Some((_, deformed)) = &appendages {
             rigid = rigid.combined_with(&deformed.body);
         }
-        let [centripetal, gyroscopic] = rigid.inertial_wrench(zero, w, zero);
+        let [centripetal, gyroscopic] = rigid.gyroscopic_wrench(w);
         let mut force = sub(acting.force, centripetal);
         let mut torque = sub(acting.torque, add(gyroscopic, cross(w, acting.h_wheels)));
         if let Some(of_pivot) = of_pivot {
@@ -447,19 +456,25 @@ impl Draining {
             (force, torque) = (add(force, f), add(torque, tau));
             structure.reduce(&mut matrix);
         }
-        let [a, w_d] = self.solve(&self.equations(matrix), [force, torque], &axes);
+        let [a, w_d] = self.solve(&matrix, [force, torque], &axes);
         let velocity = transposed_times(&axes, vector_from(x, index::VELOCITY));
         let deformed = appendages.map(|(_, deformed)| deformed);
         Instant { q, axes, velocity, w, a, w_d, by_pivot, deformed }
     }
 
     pub fn rates<T: Number>(&self, x: &[T; STATES], acting: &Acting<T>) -> [T; STATES] {
+        let mut rate = [T::constant(0.0); STATES];
+        self.write_rates(x, acting, &mut rate);
+        rate
+    }
+
+    /// Writes the rates of all states that move; the others stay as they are.
+    fn write_rates<T: Number>(&self, x: &[T; STATES], acting: &Acting<T>, rate: &mut [T; STATES]) {
         let mut contents: [Option<Contents<'_, T>>; TANKS] = core::array::from_fn(|_| None);
         let Instant { q, axes, velocity, w, a, w_d, by_pivot, deformed } =
             self.solve_instant(x, acting, &mut contents);
         let all = || contents.iter().flatten();
         let c = T::constant;
-        let mut rate = [c(0.0); STATES];
         let mut put = |at: usize, numbers: &[T]| {
             rate[at..at + numbers.len()].copy_from_slice(numbers);
         };
@@ -474,7 +489,7 @@ impl Draining {
         }
         put(index::WORK, &[dot(acting.force, velocity) + dot(acting.torque, w)]);
         let mut dissipation = all().fold(c(0.0), |sum, tank: &Contents<T>| sum + tank.dissipation);
-        if self.pivot.acts() {
+        if let Some(by_pivot) = by_pivot {
             dissipation = dissipation + by_pivot;
         }
         if let (Some(structure), Some(deformed)) = (&self.appendages, &deformed) {
@@ -497,7 +512,6 @@ impl Draining {
             }
         }
         put(index::DRAINED, &[drained]);
-        rate
     }
 
     /// Returns everything from which the outputs are computed, for the states x under the acting forces and
@@ -550,9 +564,9 @@ mod tests {
     }
 
     impl System<STATES> for Counted<'_> {
-        fn rates(&self, t: f64, x: &[f64; STATES]) -> [f64; STATES] {
+        fn write_rates(&self, t: f64, x: &[f64; STATES], rate: &mut [f64; STATES]) {
             self.evaluations.set(self.evaluations.get() + 1);
-            self.run.rates(t, x)
+            self.run.write_rates(t, x, rate);
         }
 
         fn error_scale(

@@ -54,16 +54,22 @@ impl Rigid {
 }
 
 impl<T: Number> Rigid<T> {
-    /// Creates an axially symmetric body of mass `m` whose centre of mass is at `s`. About its centre of mass it has
-    /// the moment of inertia `i_z` about its axis `e`, and `i_0` about axes perpendicular to `e`.
-    pub fn axial(m: T, s: Vec3<T>, i_0: T, i_z: T, e: Vec3<T>) -> Rigid<T> {
-        let s2 = dot(s, s);
+    /// Creates an axially symmetric body on the axis e through the point d, from the moments m, m z and m z^2 of its mass along
+    /// the axis, where z is the distance from d, and from its moments of inertia without their parts m z^2: `i_z` about e, and
+    /// `i_0` about axes perpendicular to e.
+    pub fn on_axis([d, e]: [Vec3; 2], [m, first, second]: [T; 3], [i_0, i_z]: [T; 2]) -> Rigid<T> {
+        let across = i_0 + second + m * dot(d, d) + first * (2.0 * dot(d, e));
+        let along = i_z - i_0 - second;
         let element = |i: usize, j: usize| {
-            let one = if i == j { i_0 + m * s2 } else { T::constant(0.0) };
-            one + (i_z - i_0) * e[i] * e[j] - m * s[i] * s[j]
+            along * (e[i] * e[j]) - m * (d[i] * d[j]) - first * (d[i] * e[j] + e[i] * d[j])
         };
-        let inertia = [0, 1, 2].map(|i| [0, 1, 2].map(|j| element(i, j)));
-        Rigid { mass: m, moment: scale(m, s), inertia }
+        let [xy, xz, yz] = [element(0, 1), element(0, 2), element(1, 2)];
+        let [xx, yy, zz] = [0, 1, 2].map(|i| element(i, i) + across);
+        Rigid {
+            mass: m,
+            moment: [0, 1, 2].map(|i| m * d[i] + first * e[i]),
+            inertia: [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]],
+        }
     }
 
     pub fn combined_with(&self, b: &Rigid<T>) -> Rigid<T> {
@@ -95,9 +101,15 @@ impl<T: Number> Rigid<T> {
     /// w)], with its mass matrix M, first moment S and inertia I about O.
     pub fn inertial_wrench(&self, a: Vec3<T>, w: Vec3<T>, w_d: Vec3<T>) -> [Vec3<T>; 2] {
         let Rigid { mass, moment: s, inertia } = *self;
-        let force = add(a.map(|x| x * mass), add(cross(w_d, s), cross(w, cross(w, s))));
-        let torque = add(cross(s, a), add(times(&inertia, w_d), cross(w, times(&inertia, w))));
+        let [centripetal, gyroscopic] = self.gyroscopic_wrench(w);
+        let force = add(a.map(|x| x * mass), add(cross(w_d, s), centripetal));
+        let torque = add(cross(s, a), add(times(&inertia, w_d), gyroscopic));
         [force, torque]
+    }
+
+    /// Returns the parts w x (w x S) and w x (I w) of [`Rigid::inertial_wrench`].
+    pub fn gyroscopic_wrench(&self, w: Vec3<T>) -> [Vec3<T>; 2] {
+        [cross(w, cross(w, self.moment)), cross(w, times(&self.inertia, w))]
     }
 }
 
@@ -117,6 +129,17 @@ pub fn add_rank_one(matrix: &mut Mat6, m: f64, u: &[f64; 6]) {
     }
 }
 
+/// Adds m u u^T to the lower triangle of a matrix.
+#[inline(always)]
+pub fn add_lower_rank_one<T: Number>(matrix: &mut Mat6<T>, m: T, u: &[T; 6]) {
+    for i in 0..6 {
+        let row = m * u[i];
+        for j in 0..=i {
+            matrix[i][j] = matrix[i][j] + row * u[j];
+        }
+    }
+}
+
 /// Returns a unit force along the direction `p` of a rod and its moment about O, [p; P x p], for the `hinge` at P.
 #[inline(always)]
 pub fn along_rod<T: Number>(p: Vec3<T>, hinge: Vec3<T>) -> [T; 6] {
@@ -129,22 +152,22 @@ pub fn along_rod<T: Number>(p: Vec3<T>, hinge: Vec3<T>) -> [T; 6] {
 const LARGEST_INVERSE: f64 = 1e30;
 
 /// Smallest divisor, so that the factors of any matrix are finite. Its inverse is above [`LARGEST_INVERSE`].
-const SMALLEST_DIVISOR: f64 = 0.5 / LARGEST_INVERSE;
+pub(crate) const SMALLEST_DIVISOR: f64 = 0.5 / LARGEST_INVERSE;
 
 /// Factorisation L D L^T of a symmetric positive definite matrix; L has ones on its diagonal and is used only
 /// below it, and `inverse` is 1/D.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Factors<T = f64> {
-    l: Mat6<T>,
-    inverse: [T; 6],
+pub struct Factors<T = f64, const N: usize = 6> {
+    l: [[T; N]; N],
+    inverse: [T; N],
 }
 
-impl<T: Number> Factors<T> {
+impl<T: Number, const N: usize> Factors<T, N> {
     /// Factorises a matrix, of which only the lower triangle is read.
     #[inline(always)]
-    pub fn new(matrix: &Mat6<T>) -> Factors<T> {
+    pub fn new(matrix: &[[T; N]; N]) -> Factors<T, N> {
         let zero = T::constant(0.0);
-        let mut factors = Factors { l: [[zero; 6]; 6], inverse: [zero; 6] };
+        let mut factors = Factors { l: [[zero; N]; N], inverse: [zero; N] };
         factors.set(matrix);
         factors
     }
@@ -152,14 +175,13 @@ impl<T: Number> Factors<T> {
     /// Factorises a matrix that may be far from positive definite, because a host whose integration diverges
     /// hands over any states. If the matrix is not positive definite, all factors are 0 and
     /// [`Factors::solve`] returns 0: products of the true factors could overflow.
-    pub fn definite_or_zero(matrix: &Mat6<T>) -> Factors<T> {
+    pub fn definite_or_zero(matrix: &[[T; N]; N]) -> Factors<T, N> {
         let zero = T::constant(0.0);
-        let none = Factors { l: [[zero; 6]; 6], inverse: [zero; 6] };
-        let mut factors = none;
-        for j in 0..6 {
+        let mut factors = Factors { l: [[zero; N]; N], inverse: [zero; N] };
+        for j in 0..N {
             let d = factors.set_row(matrix, j);
             if d.value() < SMALLEST_DIVISOR {
-                return none;
+                return Factors { l: [[zero; N]; N], inverse: [zero; N] };
             }
             factors.inverse[j] = d.at_least(SMALLEST_DIVISOR).recip();
         }
@@ -169,8 +191,8 @@ impl<T: Number> Factors<T> {
     /// Factorises another matrix in place, because copies of matrices would take a fortieth of a step's
     /// instructions.
     #[inline(always)]
-    pub fn set(&mut self, matrix: &Mat6<T>) {
-        for j in 0..6 {
+    pub fn set(&mut self, matrix: &[[T; N]; N]) {
+        for j in 0..N {
             let d = self.set_row(matrix, j);
             self.inverse[j] = d.at_least(SMALLEST_DIVISOR).recip();
         }
@@ -179,7 +201,7 @@ impl<T: Number> Factors<T> {
     /// Sets row j of the triangular factor L from the rows before it. Returns the element of the diagonal factor D in
     /// this row.
     #[inline(always)]
-    fn set_row(&mut self, matrix: &Mat6<T>, j: usize) -> T {
+    fn set_row(&mut self, matrix: &[[T; N]; N], j: usize) -> T {
         let Factors { l, inverse } = self;
         // Row j of L D, then of L.
         let mut d = matrix[j][j];
@@ -204,22 +226,30 @@ impl<M: Copy> Factors<M> {
     /// although `b` has derivatives.
     #[inline(always)]
     pub fn solve<T: Number + Mul<M, Output = T>>(&self, b: [Vec3<T>; 2]) -> [Vec3<T>; 2] {
+        let x = self.solve_array([b[0][0], b[0][1], b[0][2], b[1][0], b[1][1], b[1][2]]);
+        [[x[0], x[1], x[2]], [x[3], x[4], x[5]]]
+    }
+}
+
+impl<M: Copy, const N: usize> Factors<M, N> {
+    /// Solves the linear system for the right-hand side x; see [`Factors::solve`].
+    #[inline(always)]
+    pub fn solve_array<T: Number + Mul<M, Output = T>>(&self, mut x: [T; N]) -> [T; N] {
         let l = &self.l;
-        let mut x = [b[0][0], b[0][1], b[0][2], b[1][0], b[1][1], b[1][2]];
-        for i in 1..6 {
+        for i in 1..N {
             for j in 0..i {
                 x[i] = x[i] - x[j] * l[i][j];
             }
         }
-        for i in 0..6 {
+        for i in 0..N {
             x[i] = x[i] * self.inverse[i];
         }
-        for i in (0..5).rev() {
-            for j in i + 1..6 {
+        for i in (0..N - 1).rev() {
+            for j in i + 1..N {
                 x[i] = x[i] - x[j] * l[j][i];
             }
         }
-        [[x[0], x[1], x[2]], [x[3], x[4], x[5]]]
+        x
     }
 }
 

@@ -379,13 +379,14 @@ fn scales(swing: impl Fn(usize) -> f64) -> [f64; TANK_STATES] {
 }
 
 impl System<TANK_STATES> for Run<'_> {
-    fn rates(&self, t: f64, x: &[f64; TANK_STATES]) -> [f64; TANK_STATES] {
+    fn write_rates(&self, t: f64, x: &[f64; TANK_STATES], rate: &mut [f64; TANK_STATES]) {
+        *rate = [0.0; TANK_STATES];
         if self.mounted.is_curved() && self.mounted.is_beyond(x, x[LIQUID]) {
-            return [0.0; TANK_STATES];
+            return;
         }
         let TankInputs { a, omega_dot, mass_flow, .. } = self.inputs;
         let moved = [a.value_at(t), self.inputs.omega_at(t), omega_dot.value_at(t)];
-        draining_rates(self.mounted, x, &(moved, mass_flow.value_at(t)), mass_flow.slope)
+        *rate = draining_rates(self.mounted, x, &(moved, mass_flow.value_at(t)), mass_flow.slope);
     }
 
     fn error_scale(
@@ -1045,11 +1046,12 @@ fn add_square<T: Number>(matrix: &mut [[T; 6]; 6], m: T, u: &[T; 6]) {
     }
 }
 
+/// Returns the upper triangle of a symmetric matrix, of which only the lower triangle is read.
 fn triangle<T: Number>(matrix: &[[T; 6]; 6]) -> [f64; TRIANGLE] {
     let mut elements = [0.0; TRIANGLE];
     let places = (0..6).flat_map(|i| (i..6).map(move |j| (i, j)));
     for (element, (i, j)) in elements.iter_mut().zip(places) {
-        *element = matrix[i][j].result();
+        *element = matrix[j][i].result();
     }
     elements
 }
@@ -1336,9 +1338,7 @@ impl SloshTank {
         let zero = constant::<T>([0.0; 3]);
         let lumped = self.lumped.lift::<T>();
         let bias = match self.coupling {
-            Coupling::Split => {
-                plus(loads, rigid.inertial_wrench(zero, w, zero).map(|half| half.map(|x| -x)))
-            }
+            Coupling::Split => plus(loads, rigid.gyroscopic_wrench(w).map(|half| half.map(|x| -x))),
             Coupling::Lumped => plus(wrench, lumped.inertial_wrench(a, zero, w_d)),
             Coupling::RigidBody => plus(wrench, lumped.inertial_wrench(a, w, w_d)),
         };
@@ -1381,7 +1381,9 @@ impl SloshTank {
     /// Returns x'. Directions and their rates are normalised first.
     pub fn derivatives(&mut self, inputs: &TankInputs) -> [f64; TANK_STATES] {
         if let Some(mounted) = &self.draining {
-            return Run { mounted, inputs }.rates(0.0, &self.motion.state.x);
+            let mut rate = [0.0; TANK_STATES];
+            Run { mounted, inputs }.write_rates(0.0, &self.motion.state.x, &mut rate);
+            return rate;
         }
         self.motion.evaluate(inputs);
         self.motion.state_rates::<0>()
