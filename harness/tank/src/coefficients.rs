@@ -3,13 +3,17 @@
 use serde::Serialize;
 
 /// Amplitude dependence of the first mode: its coefficients in the direction of motion or, for a box, along
-/// the first and the second length; `None` if they are not known. `warnings` hold their limits, and reasons
-/// for missing ones.
+/// the first and the second length; `None` if they are not known. `pendulum_limit` is the slosh angle, rad, above which a
+/// pendulum in place of these coefficients is out of range, for each mode that has a direction. `warnings` hold limits of the
+/// coefficients, and reasons for missing ones.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct FiniteAmplitude {
     pub mode: Option<Coefficients>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mode_y: Option<Coefficients>,
+    pub pendulum_limit: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pendulum_limit_y: Option<f64>,
     pub warnings: Vec<String>,
 }
 

@@ -222,9 +222,8 @@ pub fn parameters(
     let limits = |what: &str, n: usize| -> Vec<Option<f64>> {
         sets.iter().map(|set| value(set, what, n)).collect()
     };
-    let limits: Vec<_> = (1..=modes)
-        .map(|n| [fill_unknown_limits(limits("angle_limit", n)), limits("swirl_limit", n)])
-        .collect();
+    let limits: Vec<_> =
+        (1..=modes).map(|n| [limits("angle_limit", n), limits("swirl_limit", n)]).collect();
     let middle = between.map_or(&[][..], |between| &between.rows);
     let middle_sets = solved(middle, Liquid { nu: None, ..liquid })?;
     let third_order =
@@ -329,16 +328,6 @@ pub fn parameters(
     }
     set.values.push((target.name(fill::POINTS), Value::Integer(rows.len() as i64)));
     Ok(set)
-}
-
-/// Replaces each unknown limit over the fill by the smaller of the nearest known ones.
-fn fill_unknown_limits(limits: Vec<Option<f64>>) -> Vec<Option<f64>> {
-    let nearest = |i: usize| {
-        let below = limits[..i].iter().rev().find_map(|limit| *limit);
-        let above = limits[i..].iter().find_map(|limit| *limit);
-        below.into_iter().chain(above).reduce(f64::min)
-    };
-    (0..limits.len()).map(|i| limits[i].or_else(|| nearest(i))).collect()
 }
 
 const INERTIA: &str = "nonlinear_inertia[";

@@ -35,6 +35,8 @@ const COUNTS: [usize; 2] = [10, 20];
 const DEGREES: [usize; 2] = [18, 24];
 /// Difference of a box's lengths, relative, below which the modes along both exchange energy.
 const NEARLY_SQUARE: f64 = 0.1;
+/// Largest lambda over the wave number, tanh kh, of a ring of liquid between vertical walls.
+const DEEP: f64 = 0.999;
 /// Largest angle of the third order's validity, rad. At 26 degrees the circular wave of a cylinder with h/R
 /// 0.613 is 4 % from fully nonlinear flow.
 const MOST_ANGLE: f64 = 30.0 * PI / 180.0;
@@ -147,12 +149,18 @@ impl Coefficients {
         }
     }
 
-    /// Returns the slosh angle, rad, at which a pendulum in place of these coefficients is out of range.
-    pub(crate) fn pendulum_limit(&self) -> f64 {
+    /// Returns the slosh angle, rad, at which a pendulum in place of these coefficients is out of range: its shifts of
+    /// omega^2 differ from theirs, which are known up to the error of s and kappa.
+    fn pendulum_limit(&self) -> f64 {
+        let [s, kappa] = [self.nonlinear_inertia, self.nonlinear_stiffness]
+            .map(|x| self.error * (1.0 + x.abs()));
         let [planar, circular] = formulas::third_order::shifts(1.0, 1.0);
-        let shifts = [Some(planar), self.circular.map(|_| circular)];
-        let exact = [self.planar, self.circular.unwrap_or(circular)];
-        limits::shifted(self.angle_limit, limits::FORCED, shifts, exact)
+        let away = |shift: f64, exact: f64, error: f64| exact + error.copysign(exact - shift);
+        let exact = [
+            away(planar, self.planar, 0.375 * kappa + 0.5 * s),
+            self.circular.map_or(circular, |exact| away(circular, exact, 0.5 * kappa)),
+        ];
+        limits::shifted(self.angle_limit, limits::FORCED, [Some(planar), Some(circular)], exact)
     }
 }
 
@@ -292,6 +300,10 @@ impl Found {
     }
 }
 
+/// Coefficients of a mode; `Err` if their error is too large for a slosh mass. They then tell only how far a pendulum is from
+/// the liquid.
+type Judged = Result<Coefficients, Coefficients>;
+
 /// Returns the amplitude dependence of a tank's first mode, solved as `data`. The coefficients do not depend
 /// on the specific force; they hold without surface tension.
 pub fn amplitude_dependence(tank: &Tank, data: &ModalData) -> FiniteAmplitude {
@@ -299,22 +311,16 @@ pub fn amplitude_dependence(tank: &Tank, data: &ModalData) -> FiniteAmplitude {
         return FiniteAmplitude::default();
     };
     let mut warnings = Vec::new();
-    let [mode, mode_y] = match (&tank.geometry, &data.axes) {
+    let modes = match (&tank.geometry, &data.axes) {
         (Geometry::Box { length_x, length_y }, Some(axes)) => {
             let wave_y = axes.y.modes.first().map_or(mode.wave, |mode| mode.wave);
             box_coefficients([*length_x, *length_y], depth, [mode.wave, wave_y], &mut warnings)
+                .map(Some)
         }
         _ => {
             let known = match (ring(data), &data.wall) {
-                (Some([inner, outer]), _) => {
-                    let all = COUNTS.map(|count| Overlaps::round(inner, outer, count));
-                    let all = all.each_ref();
-                    match inner > 0.0 {
-                        true => coefficients_from_overlaps(all, depth, mode.wave, &mut warnings),
-                        false => {
-                            Some(cylinder_coefficients(all, depth, outer, mode.wave, &mut warnings))
-                        }
-                    }
+                (Some(radii), _) => {
+                    Some(upright_coefficients(radii, depth, mode.wave, &mut warnings))
                 }
                 (None, Some(wall)) => {
                     let known = contour_coefficients(wall, mode.wave, mode.lambda, &mut warnings);
@@ -324,13 +330,13 @@ pub fn amplitude_dependence(tank: &Tank, data: &ModalData) -> FiniteAmplitude {
                     };
                     let terms =
                         radius.and_then(|radius| sphere_waves::energy_terms(depth / radius));
-                    known.map(|known| match terms {
-                        Some(terms) => known.with_large_waves(
+                    Some(match (known, terms) {
+                        (Ok(known), Some(terms)) => Ok(known.with_large_waves(
                             &terms,
                             sphere_waves::ERRORS,
                             EnergySource::SphereTable,
-                        ),
-                        None => known,
+                        )),
+                        (known, _) => known,
                     })
                 }
                 (None, None) => None,
@@ -338,8 +344,8 @@ pub fn amplitude_dependence(tank: &Tank, data: &ModalData) -> FiniteAmplitude {
             [known, None]
         }
     };
-    let mut judge = |mode: Option<Coefficients>| {
-        let known = mode?;
+    let mut judge = |mode: Option<Judged>| {
+        let known = mode?.ok()?;
         if known.error > WORST {
             warnings.push(format!(
                 "finite amplitude: s and kappa of mode 1 are known to {:.0e} of 1 + |s| only (allowed: {WORST}), so they are left out; \
@@ -357,9 +363,27 @@ pub fn amplitude_dependence(tank: &Tank, data: &ModalData) -> FiniteAmplitude {
         }
         Some(known)
     };
-    let [mode, mode_y] = [mode, mode_y].map(&mut judge);
+    let [mode, mode_y] = modes.map(&mut judge);
     warnings.dedup();
-    FiniteAmplitude { mode, mode_y, warnings }
+    let limit = |mode: Judged| mode.unwrap_or_else(|refused| refused).pendulum_limit();
+    let [pendulum_limit, pendulum_limit_y] = modes.map(|mode| mode.map(limit));
+    FiniteAmplitude { mode, mode_y, pendulum_limit, pendulum_limit_y, warnings }
+}
+
+/// Computes the coefficients of a tank with vertical walls of these radii and a flat bottom, the inner radius 0 without an
+/// inner wall.
+fn upright_coefficients(
+    [inner, outer]: [f64; 2],
+    depth: f64,
+    wave: f64,
+    warnings: &mut Vec<String>,
+) -> Judged {
+    let all = COUNTS.map(|count| Overlaps::round(inner, outer, count));
+    let all = all.each_ref();
+    match inner > 0.0 {
+        true => coefficients_from_overlaps(all, depth, wave, warnings),
+        false => Ok(cylinder_coefficients(all, depth, outer, wave, warnings)),
+    }
 }
 
 fn coefficients_from_overlaps(
@@ -367,11 +391,11 @@ fn coefficients_from_overlaps(
     depth: f64,
     wave: f64,
     warnings: &mut Vec<String>,
-) -> Option<Coefficients> {
-    let mut known = Coefficients::new([rough, fine].map(|x| Found::from_overlaps(x, depth)), wave);
+) -> Judged {
+    let known = Coefficients::new([rough, fine].map(|x| Found::from_overlaps(x, depth)), wave);
     let excited = fine.secondary_resonance(depth);
     let detuned = |detuning| fine.detuned_equivalent(depth, detuning);
-    known.bounded_near(excited, &detuned, warnings).then_some(known)
+    known.judged_near(excited, &detuned, warnings)
 }
 
 fn cylinder_coefficients(
@@ -403,15 +427,15 @@ fn cylinder_coefficients(
 }
 
 impl Coefficients {
-    /// Returns true if s and kappa are bounded although a mode has nearly twice the frequency of mode 1, and
-    /// adds its share in them to the error. `detuned` gives them for another frequency of the second order.
-    fn bounded_near(
-        &mut self,
+    /// Adds the share of a mode that has nearly twice the frequency of mode 1, if there is one, to the error. Returns `Err`
+    /// if this share is too large. `detuned` gives s and kappa for another frequency of the second order.
+    fn judged_near(
+        mut self,
         excited: Option<[usize; 2]>,
         detuned: &dyn Fn(f64) -> [f64; 2],
         warnings: &mut Vec<String>,
-    ) -> bool {
-        let Some([m, n]) = excited else { return true };
+    ) -> Judged {
+        let Some([m, n]) = excited else { return Ok(self) };
         let known = [self.nonlinear_inertia, self.nonlinear_stiffness];
         // The second difference leaves out what the other modes change.
         let [below, above] = [-2.0, 2.0].map(|factor| detuned(factor * DETUNING));
@@ -423,13 +447,13 @@ impl Coefficients {
              have a pole",
             100.0 * DETUNING
         );
+        self.error = self.error.max(share);
         if share > WORST {
             warnings.push(format!("{near}, so they are left out; {ASSUMED}"));
-            return false;
+            return Err(self);
         }
         warnings.push(format!("{near}; here it changes them by at most {share:.0e} of 1 + |s|"));
-        self.error = self.error.max(share);
-        true
+        Ok(self)
     }
 }
 
@@ -452,12 +476,12 @@ fn box_coefficients(
     depth: f64,
     waves: [f64; 2],
     warnings: &mut Vec<String>,
-) -> [Option<Coefficients>; 2] {
+) -> [Judged; 2] {
     if length_x == length_y {
         let [side, diagonal] = [false, true].map(|diagonal| Overlaps::square(length_x, diagonal));
         let shifts = [&side, &diagonal].map(|overlaps| overlaps.shifts(depth)[0]);
         let known = coefficients_from_overlaps([&side; 2], depth, waves[0], warnings);
-        if known.is_some() {
+        if known.is_ok() {
             warnings.push(format!(
                 "finite amplitude: in a square box omega^2 shifts by {:.4} A^2 in planar motion along a side, and by {:.4} A^2 along a \
                  diagonal. s and kappa are those of a side and of circular motion",
@@ -482,13 +506,9 @@ fn box_coefficients(
 }
 
 /// Computes the coefficients of a body of revolution with any wall; `lambda`, 1/m, is the first mode's by the
-/// boundary integral equation.
-fn contour_coefficients(
-    wall: &Wall,
-    wave: f64,
-    lambda: f64,
-    warnings: &mut Vec<String>,
-) -> Option<Coefficients> {
+/// boundary integral equation. For a ring the coefficients are refused: they are those between vertical walls with the same
+/// radii and the same lambda.
+fn contour_coefficients(wall: &Wall, wave: f64, lambda: f64, warnings: &mut Vec<String>) -> Judged {
     let [Some(rough), Some(fine)] =
         DEGREES.map(|degree| contour_waves::waves(wall, degree, 1, 0.0))
     else {
@@ -496,7 +516,11 @@ fn contour_coefficients(
             "finite amplitude: s and kappa of mode 1 are not known for a ring of liquid, except between vertical walls (shape = {{ annulus \
              = … }}); {ASSUMED}"
         ));
-        return None;
+        let radii = [wall.r_inner, wall.r_outer];
+        let k = Overlaps::round(radii[0], radii[1], COUNTS[0]).k;
+        let depth = (lambda / k).min(DEEP).atanh() / k;
+        return Err(upright_coefficients(radii, depth, wave, &mut Vec::new())
+            .unwrap_or_else(|refused| refused));
     };
     let radius = wall.r_outer;
     let equivalent = |[planar, circular]: [f64; 2]| [1.5 * circular - 2.0 * planar, 2.0 * circular];
@@ -515,5 +539,5 @@ fn contour_coefficients(
         let waves = contour_waves::waves(wall, DEGREES[1], 1, detuning);
         waves.map_or([f64::INFINITY; 2], |waves| equivalent(waves.shifts))
     };
-    known.bounded_near(excited.map(|(mode, _)| *mode), &detuned, warnings).then_some(known)
+    known.judged_near(excited.map(|(mode, _)| *mode), &detuned, warnings)
 }

@@ -411,39 +411,44 @@ impl ParameterSet {
         let stiff = modes[0].m * modes[0].lambda * liquid.gravity * MOST_CAPILLARY;
         if springs[0].first().is_some_and(|spring| spring.abs() > stiff) {
             found = FiniteAmplitude {
+                mode: None,
+                mode_y: None,
                 warnings: vec![
                     "finite amplitude: surface tension adds more than a tenth to the stiffness of mode 1; s and kappa, which are known \
                      without it, are left out"
                         .to_string(),
                 ],
-                ..FiniteAmplitude::default()
+                ..found
             };
         }
         // HubSlosh has modes along both lengths of a box in its linear and planar models only.
         let is_linear = both.is_some() && target == Target::HubSlosh;
-        let known: Vec<(usize, Coefficients)> = (1..)
-            .zip(&chosen)
-            .filter(|(_, (_, of_axis))| *of_axis == 0)
-            .filter_map(|(n, (axis, _))| Some((n, [found.mode, found.mode_y][*axis]?)))
-            .collect();
         let energy = |known: &Coefficients| known.energy.filter(|_| has_energy);
         let is_written = |known: &Coefficients| {
             let holds = known.series_limit >= finite_amplitude::LEAST_ANGLE;
             !is_linear && (holds || energy(known).is_some())
         };
-        let third_order: Vec<_> = known.iter().filter(|of| is_written(&of.1)).copied().collect();
-        // Without its coefficients a mode is a pendulum.
-        let limit = |(n, known): &(usize, Coefficients)| {
-            let angle = match is_written(known) {
-                true => energy(known).map_or(known.angle_limit, |of| of.angle_limit),
-                false => known.pendulum_limit(),
+        let first = (1..).zip(&chosen).filter(|(_, (_, of_axis))| *of_axis == 0);
+        let mut third_order: Vec<(usize, Coefficients)> = Vec::new();
+        let mut limits = Vec::new();
+        for (n, (axis, _)) in first {
+            let known = [found.mode, found.mode_y][*axis];
+            let written = known.filter(is_written);
+            // Without its coefficients a mode is a pendulum.
+            let angle = match written {
+                Some(known) => Some(energy(&known).map_or(known.angle_limit, |of| of.angle_limit)),
+                None => [found.pendulum_limit, found.pendulum_limit_y][*axis],
             };
-            (*n, [("angle_limit", Some(angle)), ("swirl_limit", known.swirl_limit)])
-        };
-        let limits: Vec<_> = known.iter().map(limit).collect();
-        if limits.is_empty() {
-            set.notes
-                .push("angle_limit is not known: in_range ends at 45 degrees alone".to_string());
+            if let (Some(angle), None) = (angle, written) {
+                set.notes.push(format!(
+                    "mode {n} is a pendulum: in range up to {:.1} degrees (angle_limit). Beyond, its frequency differs too much from \
+                     the liquid's, by the third order of potential flow or an estimate of it",
+                    angle.to_degrees()
+                ));
+            }
+            let swirl = known.and_then(|known| known.swirl_limit);
+            limits.push((n, [("angle_limit", angle), ("swirl_limit", swirl)]));
+            third_order.extend(written.map(|known| (n, known)));
         }
         for (n, known) in &third_order {
             if let Some(energy) = energy(known) {

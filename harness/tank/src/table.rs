@@ -122,6 +122,9 @@ impl Text {
     fn amplitude(&mut self, found: &FiniteAmplitude, waves: [f64; 2]) {
         self.line("\nfinite amplitude of mode 1 at the slosh angle A, rad");
         let axes = if found.mode_y.is_some() { ["x", "y"] } else { ["", ""] };
+        if let (None, Some(limit)) = (&found.mode, found.pendulum_limit) {
+            self.line(format!("  pendulum in range up to {:.1} degrees", limit.to_degrees()));
+        }
         for ((mode, axis), wave) in [&found.mode, &found.mode_y].into_iter().zip(axes).zip(waves) {
             let Some(known) = mode else { continue };
             let along = if axis.is_empty() { "".into() } else { format!("motion along {axis}: ") };
