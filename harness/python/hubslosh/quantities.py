@@ -227,13 +227,13 @@ class Modes:
             return self.number(mode.name("hinge")) - self._length(mode)
         if mode.kind != "frequency":
             return self.number(mode.name(mode.kind))
-        w2 = self._axial_force(mode.tank) / self._length(mode)
+        along = self._axial_force(mode)
+        w2 = along / self._length(mode)
         w2 += self.number(mode.name("k")) / self.number(mode.name("mass"))
         if not w2 > 0:
             raise FmuError(
-                f"{mode.name('frequency')} does not exist: neither thrust "
-                f"({self._axial_force(mode.tank):.3g} m/s² along the tank's axis) nor surface "
-                "tension holds the liquid"
+                f"{mode.name('frequency')} does not exist: neither thrust and spin "
+                f"({along:.3g} m/s² along the tank's axis) nor surface tension holds the liquid"
             )
         return float(np.sqrt(w2)) / TURN
 
@@ -246,14 +246,19 @@ class Modes:
             length = self.number(f"tank[{mode.tank}].g_ref") / by_gravity
         return length
 
-    def _axial_force(self, tank: int) -> float:
-        """Return the specific force along a tank's axis in a craft that does not turn, m/s²."""
+    def _axial_force(self, mode: ModeQuantity) -> float:
+        """Return the specific force along a tank's axis at the slosh mass, m/s²."""
+        bob = self.number(mode.name("hinge")) - self._length(mode)
         with Plant(self.model, self.given) as plant:
-            force = plant.get([f"specific_force[{i}]" for i in (1, 2, 3)])
-            q = plant.get([f"tank[{tank}].q[{i}]" for i in range(1, 5)])
-        w, x, y, z = np.array(q) / np.linalg.norm(q)
-        axis = 2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)
-        return float(np.dot(axis, force))
+
+            def get(name: str, count: int = 3) -> np.ndarray:
+                return np.array(plant.get([f"{name}[{i}]" for i in range(1, count + 1)]))
+
+            w, x, y, z = (q := get(f"tank[{mode.tank}].q", 4)) / np.linalg.norm(q)
+            axis = np.array([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])
+            place, omega = get(f"tank[{mode.tank}].position") + bob * axis, get("omega")
+            turning = np.cross(get("omega_dot"), place) + np.cross(omega, np.cross(omega, place))
+            return float(axis @ (get("specific_force") + turning))
 
     def scale_frequency(self, mode: ModeQuantity, factor: float) -> None:
         """Multiply a mode's frequency by a factor.
@@ -290,9 +295,14 @@ class Modes:
             self._keep_at_rest(mode.tank, [(old, bob), (-value, bob)])
         else:
             length, old, m = self._length(mode), self.value(mode), self.number(mode.name("mass"))
+            spins = any(self.number(f"init.omega[{i}]") for i in (1, 2, 3))
+            before = self._axial_force(mode) if spins else 0.0
             self.given |= {mode.name("hinge"): value + length, mode.name("length"): length}
             self.given[mode.name("frequency")] = 0.0
             self._keep_at_rest(mode.tank, [(m, old), (-m, value)])
+            if before:  # the specific force differs there, but not the frequency
+                length *= self._axial_force(mode) / before
+                self.given |= {mode.name("length"): length, mode.name("hinge"): value + length}
 
     def _keep_at_rest(self, tank: int, points: list[tuple[float, float]]) -> None:
         """Add point masses (kg) at heights (m) to the rigid liquid.

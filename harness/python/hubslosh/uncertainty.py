@@ -1,34 +1,43 @@
 r"""Uncertain models of Spacecraft for robust control: a linear fractional transformation (M, Δ).
 
-Derivation, at rest, in body axes. X = [a; w']: specific force at O and angular acceleration. h_w is
-the wheels' momentum. A tank has its origin at d, the axis e and E = (x, y) across it; e × E = E S
-with S = [0 -1; 1 0]. A mode has the mass m, natural frequency ω (tank held, under the thrust that
-acts), damping ratio ζ, and its bob at rest at r = d + b e. X_0 is the acceleration at the point,
-g = e·(a_0 + w_0' × d).
+Derivation, in body axes. X = [a; w']: specific force at O and angular acceleration. h_w is the
+wheels' momentum, w the angular velocity, W = w× its matrix. A tank has its origin at d, the axis e
+and E = (x, y) across it; e × E = E S with S = [0 -1; 1 0]. A mode has the mass m, natural frequency
+ω (tank held, under the specific force that acts), damping ratio ζ, and its bob at rest in the tank
+at r = d + b e. At the point the specific force at the bob is A = a + w' × r + W W r, with
+X = γ X_f + X_c: X_c is the acceleration that the rotation alone gives, and γ a factor of the rest.
+
+    g = e·A = γ g_f + g_c - b |w_E|²        β = E^T A       w_E = E^T w,  w_e = e·w,  w_e' = e·w'
+    κ = S^T E^T w'                          G_r = -(W r)× - W r×   change of W W r by δw
 
 The liquid's mass, centre and inertia are known: a mass m that sloshes is one that the rigid liquid
 lacks at the bob (SP-106). Compared with rigid liquid a mode is then, with s = m · displacement:
 
-    α   = E^T (δa + δw' × d) + b S^T E^T δw'           acceleration of the bob across e
-    s'' = -m α - ν - γ w_e S s,    ν = ω (ω s + 2 ζ s')    w_e = e·w_0', γ: factor of X_0
-    M_tot δX = [δf; δτ - δw × h_w] + Σ [E R + e p; d × (E R + e p) + E S (b R + g γ s)]
-    R   = m α + ν                                       force of the bob beyond rigid liquid
-    p   = (1 - ρ) ω² (β + b κ)·s/g + γ κ·s              from the rod's tension T = m γ g
-    β   = E^T (a_0 + w_0' × d),  κ = S^T E^T w_0'       both 0 if the surface is at rest
-    ρ   = k/(m ω²): share of a centring stiffness, which a change of ω leaves as it is
+    α   = E^T (δa + δw' × r + G_r δw)                   acceleration of the bob across e
+    s'' = -R - w_e' S s - (w_E w_E^T - |w|² 1) s - 2 w_e S s'
+    R   = m α + ν + n,    ν = ω (ω s + 2 ζ s')          force of the bob beyond rigid liquid
+    p   = β·s/l + (κ - w_e w_E)·s + 2 S^T w_E·s'        from the rod's tension m g
+    M_tot δX = [δf; δτ - δw × h_w] - gyroscopic terms + Σ [E R + e p; r × (E R + e p) + g E S s]
+    1/l = (1 - ρ) ω²/g                                  ρ = k/(m ω²): share of a centring stiffness,
+                                                        which a change of ω leaves as it is
 
-A mode of an appendage has the participation u = [p; r + P × p] about O and the displacement η_0 at
-the point, with y = p η and D, the derivative of the inertia about O by η:
+In liquid that turns at the rate V with its tank a mode with the gyroscopic coefficient C and the
+stiffness ε has n = [2 (1 - C) V w_e + ε V²] s - (1 - C) (V' S s + 2 V S s'); otherwise n = 0. The
+liquid's own momentum L follows spin.rs, with no uncertain parameter.
 
-    η'' = -u·δX - ω (ω η + 2 ζ η')         M_tot has the first moment p η_0 and the inertia D η_0
-    M_tot δX = … - u η'' - [w_0' × y; y × a_0 + D w_0' η]
+A mode of an appendage has the participation u = [p; l] about O and the displacement η_0 at the
+point, with y = p η and D, the derivative of the inertia about O by η:
+
+    η'' = -u·δX + w·D δw - ω (ω η + 2 ζ η')    M_tot has the first moment p η_0, inertia D η_0
+    M_tot δX = … - u η'' - [w' × y + W W y; y × a + D w' η + W D w η] - [2 W p; W l + D w] η'
 
 The tanks' equations are Newton's law of the bob with the rod eliminated, linearised (book,
 Spacecraft: equations); m scales the state, so it multiplies α alone. M_tot X = m_b [A; r_b × A] +
-[0; J w'] + liquid, with A = a + w' × r_b. The products give the repetitions: m 2, ζ 2, ω 4, b 4 of
-each mode, γ 2 for each mode, dry mass 3, a moment of inertia 1, a product of inertia 2, a
-coordinate of r_b 4. With a surface that is not at rest ω and b may have 1 or 2 more. What the loop
-does not need goes: each repeated block is reduced to its controllable and observable part, exactly.
+[0; J w'] + liquid, with A = a + w' × r_b. The products give the repetitions in a craft that does
+not spin: m 2, ζ 2, ω 4, b 4 of each mode, γ 2 for each mode, dry mass 3, a moment of inertia 1, a
+product of inertia 2, a coordinate of r_b 4. With a surface that is not at rest ω and b may have 1
+or 2 more, in a craft that spins b and inertias 1 or 2 more. What the loop does not need goes: each
+repeated block is reduced to its controllable and observable part, exactly.
 """
 
 import json
@@ -90,6 +99,8 @@ class _Bob:
     mode: int
     length: float
     stiffness: float
+    swirl: tuple[float, float, float]
+    """In liquid that spins 2 (1 - C) V w_e + ε V², (1 - C) V' and 2 (1 - C) V."""
 
     def name(self, kind: str) -> str:
         return f"tank[{self.tank}].{kind}[{self.mode}]"
@@ -111,6 +122,27 @@ class _Tank:
 
 
 @dataclass(frozen=True)
+class _Spin:
+    """Liquid that spins: I⁻¹, Γ and K as matrices, and momentum L, tank axes (spin.rs)."""
+
+    inverse: Matrix
+    coupling: Matrix
+    friction: Matrix
+    momentum: Matrix
+
+    def rate(self, w: Matrix) -> Matrix:
+        """Return L' at the angular velocity w, tank axes."""
+        slip = self.slip(w)
+        found: Matrix = _cross(slip) @ self.momentum - self.friction @ slip
+        return found
+
+    def slip(self, w: Matrix) -> Matrix:
+        """Return the rotation of the liquid against the tank."""
+        found: Matrix = self.inverse @ self.momentum - self.coupling @ w
+        return found
+
+
+@dataclass(frozen=True)
 class _Mode:
     """A mode of an appendage: participation u, mass matrix per displacement, displacement."""
 
@@ -125,7 +157,7 @@ class _Mode:
 
 @dataclass(frozen=True)
 class _Craft:
-    """Spacecraft at rest: the values that may be uncertain, and the constants of the equations."""
+    """Spacecraft at its point: values that may be uncertain, and constants of the equations."""
 
     values: dict[str, float]
     tanks: dict[int, _Tank]
@@ -134,7 +166,9 @@ class _Craft:
     """Mass matrix of all liquid, rigid, about O."""
     wrench: Matrix
     wheels: Matrix
-    modes: tuple[_Mode, ...] = ()
+    omega: Matrix
+    spins: dict[int, _Spin]
+    modes: tuple[_Mode, ...]
 
     def deformed(self) -> Matrix:
         """Return the change of the 6 × 6 mass matrix by the deflection of the appendages."""
@@ -158,11 +192,50 @@ class _Craft:
         """Return the mass matrix of craft and liquid as one rigid body."""
         return _rigid(*self.dry(self.values)) + self.liquid
 
+    def load(self, values: Mapping[str, float], *, moving: bool = True) -> Matrix:
+        """Return force and torque (6 numbers, about O) that the craft's rotation takes at X = 0.
+
+        ``moving`` is False for the craft and its liquid as one rigid body.
+        """
+        w = self.omega
+        rigid = _rigid(*self.dry(values)) + self.liquid
+        load = _gyroscopic(rigid + moving * self.deformed(), w)
+        load[3:] += _cross(w) @ self.wheels
+        for number, spin in self.spins.items():
+            axes = self.tanks[number].axes
+            turned = spin.rate(axes.T @ w) + np.cross(axes.T @ w, spin.coupling @ spin.momentum)
+            load[3:] += axes @ turned
+        for bob in self.bobs if moving else ():
+            arm = self.arm(bob, values)
+            inwards = arm[:3].T @ self.specific(np.zeros(6), self.place(bob, values))
+            load -= values[bob.name("mass")] * arm @ inwards
+        for mode in self.modes if moving else ():
+            load += mode.u * (w @ mode.body[3:, 3:] @ w) / 2
+        return load
+
     def accelerations(self) -> tuple[Matrix, Matrix]:
         """Return the craft's acceleration (6 numbers) twice: with rigid liquid and with slosh."""
-        whole = np.linalg.solve(self.rigid(), self.wrench)
-        load = self.wrench + self.pull(self.values)
+        whole = np.linalg.solve(self.rigid(), self.wrench - self.load(self.values, moving=False))
+        load = self.wrench + self.pull(self.values) - self.load(self.values)
         return whole, np.linalg.solve(self.mass_matrix(self.values), load)
+
+    def specific(self, X: Matrix, place: Matrix) -> Matrix:
+        """Return the specific force (m/s²) at a place of the craft."""
+        found: Matrix = (
+            X[:3] + np.cross(X[3:], place) + np.cross(self.omega, np.cross(self.omega, place))
+        )
+        return found
+
+    def place(self, bob: _Bob, values: Mapping[str, float]) -> Matrix:
+        """Return the position of a bob at rest."""
+        tank = self.tanks[bob.tank]
+        found: Matrix = tank.origin + values[bob.name("bob")] * tank.axes[:, 2]
+        return found
+
+    def arm(self, bob: _Bob, values: Mapping[str, float]) -> Matrix:
+        """Return the matrix (6 × 2) whose transpose takes X to the bob's acceleration across e."""
+        E = self.tanks[bob.tank].axes[:, :2]
+        return np.vstack([E, _cross(self.place(bob, values)) @ E])
 
     def mass_matrix(self, values: Mapping[str, float]) -> Matrix:
         """Return the mass matrix without appendage modes and without slosh across the tank axes."""
@@ -170,9 +243,7 @@ class _Craft:
         for mode in self.modes:
             M = M - np.outer(mode.u, mode.u)
         for bob in self.bobs:
-            tank = self.tanks[bob.tank]
-            E, b = tank.axes[:, :2], values[bob.name("bob")]
-            arm = np.vstack([E, _cross(tank.origin + b * tank.axes[:, 2]) @ E])
+            arm = self.arm(bob, values)
             M = M - values[bob.name("mass")] * arm @ arm.T
         return M
 
@@ -181,6 +252,24 @@ def _cross(v: ArrayLike) -> Matrix:
     """Return the matrix of a cross product."""
     x, y, z = np.asarray(v, float)
     return np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+
+
+def _twice(w: Matrix) -> Matrix:
+    """Return the matrix (6 × 6) that takes each half of six numbers to its product w × with w."""
+    return np.kron(np.eye(2), _cross(w))
+
+
+def _gyroscopic(M: Matrix, w: Matrix) -> Matrix:
+    """Return force and torque about O that turn a rigid body with the mass matrix M at w."""
+    found: Matrix = _twice(w) @ M[:, 3:] @ w
+    return found
+
+
+def _gyroscopic_slope(M: Matrix, w: Matrix) -> Matrix:
+    """Return the derivative of `_gyroscopic` by w."""
+    momentum = (M[:, 3:] @ w).reshape(2, 3)
+    found: Matrix = _twice(w) @ M[:, 3:] - np.vstack([_cross(of) for of in momentum])
+    return found
 
 
 def _rigid(mass: float, center: Matrix, own: Matrix) -> Matrix:
@@ -208,18 +297,16 @@ def _read(
             raise FmuError(f"uncertain models exist only for Spacecraft, not for {plant.fmu.name}")
         free = (get("mount_kind")[0] or get("mount")[0]) == 1
         problems = [] if free else ["the craft is on a pivot: mount must be free"]
-        if vector("omega").any() or vector("q", 4)[1:].any():
-            problems.append(
-                "the craft must be at rest: init.omega 0, init.q 1, 0, 0, 0 (margins, reviews and "
-                "monte_carlo also take a craft that spins)"
-            )
+        if vector("q", 4)[1:].any():
+            problems.append("the attitude must be that of the axes: init.q 1, 0, 0, 0")
+        omega = vector("omega")
         values = dict(zip(
             names := ["craft.mass", *(f"craft.r[{i}]" for i in (1, 2, 3)),
                       *(f"craft.J{axes}" for axes in AXES)],
             get(*names).tolist(), strict=True,
         ))  # fmt: skip
         values[FACTOR] = 1.0
-        liquid, tanks, bobs = np.zeros((6, 6)), {}, []
+        liquid, tanks, bobs, spins = np.zeros((6, 6)), {}, [], {}
         drags: list[tuple[_Bob, float, float, int]] = []
         for number in range(1, int(get("tanks")[0]) + 1):
             of = f"tank[{number}]"
@@ -249,14 +336,29 @@ def _read(
             tanks[number] = tank
             own = axes @ np.array([[I_0, xy, xz], [xy, I_0 + dI_y, yz], [xz, yz, I_z]]) @ axes.T
             liquid += _rigid(m_0, tank.origin + H_0 * axes[:, 2], own)
+            axial, across, gamma = get(f"{of}.spin_inertia", f"{of}.spin_inertia_across",
+                                       f"{of}.spin_coupling")  # fmt: skip
+            V = V_d = 0.0
+            if axial:
+                inertia = np.array([across or axial, across or axial, axial])
+                decay = vector(f"{of}.spin_decay", 2)[[1, 1, 0]]
+                spin = _Spin(np.diag(1 / inertia), np.diag([gamma, gamma, 1.0]),
+                             np.diag(decay * inertia), vector(f"{of}.spin"))  # fmt: skip
+                spins[number] = spin
+                V, V_d = (float(of[2]) / axial for of in (spin.momentum, spin.rate(axes.T @ omega)))
             for n in range(1, modes + 1):
-                m, length, f, hinge, k, zeta = get(*(
+                m, length, f, hinge, k, zeta, C, stiffness = get(*(
                     f"{of}.{name}[{n}]"
-                    for name in ("mass", "length", "frequency", "hinge", "k", "zeta")
+                    for name in ("mass", "length", "frequency", "hinge", "k", "zeta",
+                                 "gyroscopic", "gyroscopic_stiffness")
                 )).tolist()  # fmt: skip
                 if f > 0:
                     length = g_ref / ((TURN * f) ** 2 - k / m)
-                bob = _Bob(number, n, length, k / m)
+                # gyroscopic_stiffness = ε + 1 - 2 C, and 0 with C = 1 is a pendulum
+                swirl = (2 * (1 - C) * float(axes[:, 2] @ omega) + (stiffness + 2 * C - 1) * V) * V
+                if (C, stiffness) == (1.0, 0.0):
+                    swirl = 0.0
+                bob = _Bob(number, n, length, k / m, (swirl, (1 - C) * V_d, 2 * (1 - C) * V))
                 bobs.append(bob)
                 values |= {bob.name("mass"): m, bob.name("bob"): hinge - length}
                 at = tank.origin + (hinge - length) * axes[:, 2]
@@ -282,13 +384,16 @@ def _read(
         if problems:
             raise FmuError("; ".join(problems))
         wrench = np.concatenate([vector("force"), vector("torque")])
-        found = _Craft(values, tanks, tuple(bobs), liquid, wrench, vector("h_wheels"), tuple(modes))
+        found = _Craft(values, tanks, tuple(bobs), liquid, wrench, vector("h_wheels"), omega, spins,
+                       tuple(modes))  # fmt: skip
     # the drag follows the acceleration of craft and liquid as one rigid body (damping.rs)
     whole, moving = held or found.accelerations()
     for bob, zeta, floor, law in drags:
         tank = tanks[bob.tank]
-        rest, g = (float(tank.axes[:, 2] @ (X[:3] + np.cross(X[3:], tank.origin)))
-                   for X in (whole, moving))  # fmt: skip
+        # the drag takes the hinge, the frequency the bob; they differ only if the craft spins
+        at, e = found.place(bob, values), tank.axes[:, 2]
+        hinge = at + bob.length * e
+        rest, g = (float(e @ found.specific(*of)) for of in ((whole, hinge), (moving, at)))
         above = (rest + np.hypot(rest, floor)) / 2
         reference = tank.g_ref / bob.length + bob.stiffness
         w2 = g / bob.length + bob.stiffness
@@ -397,7 +502,7 @@ class _Equations:
         self.values, self.spread = values, spread.to_numpy()
         self.index = {name: i for i, name in enumerate(spread.index)}
         self.width, self.channels = width, [(0, np.zeros(0))][:0]
-        self.most = width + 12 * max(np.count_nonzero(self.spread), 1) * (1 + len(values) // 4)
+        self.most = width + 30 * max(np.count_nonzero(self.spread), 1) * (1 + len(values) // 4)
 
     def unit(self, first: int, count: int) -> Matrix:
         """Return ``count`` signals, from number ``first`` on, as rows of an identity matrix."""
@@ -419,77 +524,121 @@ class _Equations:
 
 
 def _partitioned(
-    craft: _Craft, values: Mapping[str, float], spread: "pd.DataFrame", X_0: Matrix
+    craft: _Craft, values: Mapping[str, float], spread: "pd.DataFrame", X_f: Matrix, X_c: Matrix
 ) -> tuple[Matrix, list[int], tuple[str, ...]]:
     """Return M from (states, channels, all inputs) to (rates, channels, all outputs).
 
-    Also how many channels each column of ``spread`` has, and the states' names.
+    Also how many channels each column of ``spread`` has, and the states' names. The point has the
+    accelerations X_f, which the factor of the acceleration multiplies, and X_c.
     """
     states = [*OUTPUTS, *(
         f"tank[{bob.tank}].{of}[{bob.mode},{i}]"
         for bob in craft.bobs for of in ("p", "p_dot") for i in (1, 2)
-    ), *(mode.name(of) for mode in craft.modes for of in ("eta", "eta_dot"))]  # fmt: skip
-    n, m = len(states), len(INPUTS)
-    eq = _Equations(n + m + 6, values, spread)
+    ), *(mode.name(of) for mode in craft.modes for of in ("eta", "eta_dot")),
+      *(f"tank[{number}].spin[{i}]" for number in craft.spins for i in (1, 2, 3))]  # fmt: skip
+    n, m, unknown = len(states), len(INPUTS), 6 + len(craft.bobs)
+    eq = _Equations(n + m + unknown, values, spread)
     x, u, X = eq.unit(0, n), eq.unit(n, m), eq.unit(n + m, 6)
-    a, w_d = X[:3], X[3:]
-    rates = [x[3:6] / 2, w_d]
+    a, w_d, w, omega = X[:3], X[3:], x[3:6], craft.omega
+    W = _cross(omega)
+
+    def inwards(place: Matrix) -> Matrix:
+        """Return the change of w × (w × place) with w."""
+        return -_cross(W @ place) - W @ _cross(place)
+
+    def grown(signal: Matrix) -> Matrix:
+        """Return γ times signals; only in craft that spin, because β/g is without γ in others."""
+        return eq.times(FACTOR, signal) if omega.any() or X_c.any() else values[FACTOR] * signal
+
+    rates = [(w - W @ x[:3]) / 2, w_d]
     load = u.copy()
-    load[3:] += _cross(craft.wheels) @ x[3:6]
+    load[3:] += _cross(craft.wheels) @ w
+    quotients = []
     for k, bob in enumerate(craft.bobs):
         tank = craft.tanks[bob.tank]
         E, e, d = tank.axes[:, :2], tank.axes[:, 2], _cross(tank.origin)
         s, s_d = x[6 + 4 * k : 8 + 4 * k], x[8 + 4 * k : 10 + 4 * k]
-        at_origin = X_0[:3] - d @ X_0[3:]
-        g, beta = e @ at_origin, E.T @ at_origin
-        kappa, w_e = S.T @ E.T @ X_0[3:], e @ X_0[3:]
+        w_E, w_e, flat = E.T @ omega, e @ omega, np.eye(2)
+        at = np.array([X_f[:3] - d @ X_f[3:], X_c[:3] - d @ X_c[3:] + W @ W @ tank.origin])
+        (g_f, g_c), (beta_f, beta_c) = at @ e, at @ E
+        kappa_f, kappa_c = (S.T @ E.T @ of[3:] for of in (X_f, X_c))
         mass, frequency, zeta, height = (bob.name(kind) for kind in ("mass", *KINDS[:2], "bob"))
-        turned = eq.times(height, S.T @ E.T @ w_d)
-        drive = eq.times(mass, E.T @ (a - d @ w_d) + turned)
+        turned = eq.times(height, S.T @ E.T @ w_d + E.T @ inwards(e) @ w)
+        drive = eq.times(mass, E.T @ (a - d @ w_d + inwards(tank.origin) @ w) + turned)
         first = TURN * eq.times(frequency, s)
         nu = TURN * eq.times(frequency, first + 2 * eq.times(zeta, s_d))
         scaled = eq.times(FACTOR, s)
-        R = drive + nu
-        rates += [s_d, -R - w_e * S @ scaled]
-        tension = np.zeros((1, eq.most))
-        if g > 0 and max(np.abs(beta).max(), np.abs(kappa).max()) > ALONE * g:
-            along, tilt = beta[None] / g, kappa[None] / g
-            bend = along @ first + eq.times(height, tilt @ first)
-            by_gravity = 1 - bob.stiffness / (TURN * craft.values[frequency]) ** 2
-            tension = TURN * eq.times(frequency, by_gravity * bend) + kappa[None] @ scaled
-        force = E @ R + e[:, None] @ tension
+        stiff, twist, drift = bob.swirl
+        R = drive + nu + (stiff * flat - twist * S) @ s - drift * S @ s_d
+        turning = (e @ X_c[3:]) * S + np.outer(w_E, w_E) - omega @ omega * flat
+        rates += [s_d, -R - (e @ X_f[3:]) * S @ scaled - turning @ s - 2 * w_e * S @ s_d]
+        pull = kappa_f @ scaled + (kappa_c - w_e * w_E) @ s + 2 * (S.T @ w_E) @ s_d
+        # β = γ by_γ + β_c + b by_b; the rod is not along e if it is not 0
+        b, factor, by_b = values[height], values[FACTOR], kappa_c + w_e * w_E
+        g = factor * g_f + g_c - b * (w_E @ w_E)
+        size = ALONE * (np.abs(at).sum() + abs(b) * (omega @ omega))
+        by = {FACTOR: beta_f + b * kappa_f, height: factor * kappa_f + by_b}
+        leaning = [factor * by[FACTOR] + beta_c + b * by_b]
+        leaning += [of for name, of in by.items() if name in eq.index]
+        y = ratio = eq.unit(n + m + 6 + k, 1)
+        if g > size and np.abs(leaning).max() > size:
+            # y = (1 - ρ) ω² β·s/g
+            share = 1 - bob.stiffness / (TURN * craft.values[frequency]) ** 2
+            beta = grown(beta_f[None] @ first + eq.times(height, kappa_f[None] @ first))
+            beta += beta_c[None] @ first + eq.times(height, by_b[None] @ first)
+            ratio = g_f * grown(y) + g_c * y - (w_E @ w_E) * eq.times(height, y)
+            ratio -= TURN * eq.times(frequency, share * beta)
+            pull = pull + y[0]
+        quotients.append(ratio)
+        force = E @ R + np.outer(e, pull)
         load[:3] += force
-        load[3:] += d @ force + E @ S @ (eq.times(height, R) + g * scaled)
+        twisted = eq.times(height, R - (w_E @ w_E) * s)
+        load[3:] += d @ force + E @ S @ (twisted + g_f * scaled + g_c * s)
     first = 6 + 4 * len(craft.bobs)
     for k, flexing in enumerate(craft.modes):
         s, s_d = (x[first + 2 * k + i][None] for i in (0, 1))
         frequency, zeta = (flexing.name(kind) for kind in KINDS[:2])
         stiff = TURN * eq.times(frequency, s) + 2 * eq.times(zeta, s_d)
-        R = flexing.u[None] @ X + TURN * eq.times(frequency, stiff)
+        body, u_ = flexing.body, flexing.u
+        R = u_[None] @ X - (body[3:, 3:] @ omega)[None] @ w + TURN * eq.times(frequency, stiff)
         rates += [s_d, -R]
-        load += flexing.u[:, None] @ R
-        load -= (flexing.body @ X_0)[:, None] @ eq.times(FACTOR, s)
-    wet = (craft.liquid + craft.deformed()) @ X
+        load += u_[:, None] @ R - (body @ X_f)[:, None] @ eq.times(FACTOR, s)
+        load -= (body @ X_c + _gyroscopic(body, omega))[:, None] @ s
+        load -= np.concatenate([2 * W @ u_[:3], W @ u_[3:] + body[3:, 3:] @ omega])[:, None] @ s_d
+    first += 2 * len(craft.modes)
+    for k, (number, spin) in enumerate(craft.spins.items()):
+        axes, kept = craft.tanks[number].axes, spin.coupling @ spin.momentum
+        L, w_t = x[first + 3 * k : first + 3 * k + 3], axes.T @ w
+        slip = spin.inverse @ L - spin.coupling @ w_t
+        at_point = _cross(spin.slip(axes.T @ omega))
+        rate = at_point @ L - (_cross(spin.momentum) + spin.friction) @ slip
+        rates.append(rate)
+        turned = spin.coupling @ rate - _cross(kept) @ w_t
+        load[3:] -= axes @ (turned + _cross(axes.T @ omega) @ spin.coupling @ L)
+    known = craft.liquid + craft.deformed()
+    wet = known @ X + _gyroscopic_slope(known, omega) @ w
     # the dry craft: one product for each way in which a parameter acts
     accelerated = a.copy()
     turn = [_cross(np.eye(3)[i]) for i in range(3)]
     for i in range(3):
-        accelerated += eq.times(f"craft.r[{i + 1}]", -turn[i] @ w_d)
+        moved = inwards(np.eye(3)[i]) @ w - turn[i] @ w_d
+        accelerated += eq.times(f"craft.r[{i + 1}]", moved)
     weight = eq.times("craft.mass", accelerated)
     wet[:3] += weight
     for i in range(3):
         wet[3:] += eq.times(f"craft.r[{i + 1}]", turn[i] @ weight)
     for axes, (i, j) in AXES.items():
-        for row, column in {(i, j), (j, i)}:
-            wet[3 + row] += eq.times(f"craft.J{axes}", w_d[column][None])[0]
-    # X from its six equations
-    balance = load - wet
-    at = slice(n + m, n + m + 6)
+        J = np.zeros((6, 6))
+        J[3 + i, 3 + j] = J[3 + j, 3 + i] = 1.0
+        wet += eq.times(f"craft.J{axes}", J @ X + _gyroscopic_slope(J, omega) @ w)
+    # X and y from their equations
+    balance = np.vstack([load - wet, *quotients])
+    at = slice(n + m, n + m + unknown)
     solved = np.linalg.solve(-balance[:, at], balance)
     order = np.argsort([j for j, _ in eq.channels], kind="stable")
     z = [eq.channels[i][1] for i in order]
     rows = np.vstack([*rates, *(row[None] for row in z), x[:6]])
-    rows = rows + rows[:, at] @ (solved - eq.unit(n + m, 6))
+    rows = rows + rows[:, at] @ (solved - eq.unit(n + m, unknown))
     columns = [*range(n), *(eq.width + order), *range(n, n + m)]
     counts = [sum(j == of for j, _ in eq.channels) for of in range(spread.shape[1])]
     return rows[:, columns], counts, tuple(states)
@@ -604,7 +753,8 @@ class UncertainModel:
     given: "dict[str, Quantity]"
     _craft: _Craft
     _values: "dict[str, float]"
-    _X_0: Matrix
+    _X_f: Matrix
+    _X_c: Matrix
     tanks: tuple[str, ...] = ()
 
     @property
@@ -727,9 +877,20 @@ class UncertainModel:
         """Return the ratio of a mode's frequency to its value in the craft as given."""
         return values[bob.name("frequency")] / self._craft.values[bob.name("frequency")]
 
+    def _acceleration(self, values: Mapping[str, float]) -> Matrix:
+        """Return the craft's acceleration (6 numbers) at the point."""
+        return values[FACTOR] * self._X_f + self._X_c
+
     def _length(self, bob: _Bob, values: Mapping[str, float]) -> float:
         """Return the pendulum length (m) at which gravity's share of ω² is unchanged."""
-        return bob.length * values[FACTOR] / self._ratio(bob, values) ** 2
+        craft, axis = self._craft, self._craft.tanks[bob.tank].axes[:, 2]
+        before, now = (
+            axis @ craft.specific(self._acceleration(of), craft.place(bob, of))
+            for of in (craft.values, values)
+        )
+        # without gravity the length has no effect
+        grown = now / before if before > ALONE * craft.tanks[bob.tank].g_ref else 1.0
+        return float(bob.length * grown / self._ratio(bob, values) ** 2)
 
     def parameters(
         self, delta: Mapping[str, float] | ArrayLike, *, commanded: bool = False
@@ -756,8 +917,8 @@ class UncertainModel:
         craft, values = self._craft, self._values | self.values(delta)
         new: dict[str, Quantity] = dict(self.given)
         new |= {name: values[name] for name in craft.values if name.startswith("craft.")}
-        wrench, J = values[FACTOR] * craft.mass_matrix(values) @ self._X_0, craft.dry(values)[2]
-        wrench = wrench - craft.pull(values)
+        wrench = craft.mass_matrix(values) @ self._acceleration(values) + craft.load(values)
+        wrench, J = wrench - craft.pull(values), craft.dry(values)[2]
         for mode in craft.modes:
             new |= {mode.name(kind): values[mode.name(kind)] for kind in KINDS[:2]}
         new |= {name: float(x) for name, x in zip(INPUTS, wrench, strict=True)}
@@ -1261,7 +1422,8 @@ def uncertain(
     spread = pd.DataFrame(columns, index=every)
     _, X_0 = craft.accelerations()
     warn_of_rotation("the point of an uncertain Spacecraft", X_0[3:])
-    M, counts, states = _partitioned(craft, values, spread, X_0)
+    X_c = -np.linalg.solve(craft.mass_matrix(craft.values), craft.load(craft.values))
+    M, counts, states = _partitioned(craft, values, spread, X_0 - X_c, X_c)
     n = len(states)
     rows = [*range(n + sum(counts)), *(n + sum(counts) + OUTPUTS.index(name) for name in chosen[1])]
     M = M[rows][:, [*range(n + sum(counts)),
@@ -1279,4 +1441,5 @@ def uncertain(
                         (*(f"w:{name}" for name in signals), *chosen[0]),
                         (*(f"z:{name}" for name in signals), *chosen[1]))  # fmt: skip
     center = {name: values[name] for name in every}
-    return UncertainModel(whole, spread, center, tuple(counts), model, given, craft, values, X_0)
+    return UncertainModel(whole, spread, center, tuple(counts), model, given, craft, values,
+                          X_0 - X_c, X_c)  # fmt: skip
