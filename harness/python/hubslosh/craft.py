@@ -21,6 +21,7 @@ from .operating_point import OperatingPoint, rotation, trim
 from .quantities import (
     DELAY,
     NO_MODE,
+    OMEGA,
     RESERVED,
     Modes,
     Names,
@@ -64,6 +65,9 @@ BEYOND_THIRD_ORDER = re.compile(r"\.(nonlinear_(inertia|stiffness)_2|rotary_iner
 MOST_TANKS = 4
 """Number of tanks that Spacecraft has."""
 
+SAME_SPIN = 1e-6
+"""Relative difference up to which two rates of spin count as the same."""
+
 MOST_MODES = 6
 """Number of modes of appendages that Spacecraft has."""
 
@@ -93,9 +97,9 @@ class MountedTank:
     contact_angle : float, optional
         Contact angle between surface and wall, deg.
     spin : float, optional
-        Rate at which the liquid rotates with the tank about the tank's axis, rad/s, for the inertia
-        of its spin and the coefficients of its modes; without a rate the liquid has no spin. The
-        craft starts at rest: set ``init.omega`` to make craft and liquid turn.
+        Rate at which liquid, tank and craft rotate about the tank's axis, rad/s; by default it
+        follows from the ``spin`` of the `Craft`. The liquid then has an inertia of spin and its
+        modes gyroscopic coefficients.
 
     Examples
     --------
@@ -277,6 +281,11 @@ class Craft:
     appendages : mapping of Appendage
         Flexible appendages by name, with at most six modes in total. ``mass``, ``inertia`` and
         ``center_of_mass`` must include the undeformed appendages.
+    spin : float or sequence of float, shape (3,), optional
+        Angular velocity of a craft whose liquid rotates with it, body axes, rad/s; a number is
+        about z. By default it follows from the ``spin`` of the tanks: set it once, here or there. A
+        craft whose liquid is at rest while it begins to turn has ``init.omega`` among its
+        parameters instead.
 
     Raises
     ------
@@ -308,6 +317,7 @@ class Craft:
     model: str | Path = "Spacecraft"
     engines: Mapping[str, Engine] = field(default_factory=dict)
     appendages: Mapping[str, Appendage] = field(default_factory=dict)
+    spin: float | Sequence[float] | None = None
     _known: dict[Any, Any] = field(default_factory=dict, init=False)
     _said: list[str] = field(default_factory=list, init=False)
 
@@ -352,8 +362,42 @@ class Craft:
                     continue
                 problems += [f"tank {name}: {problem}" for problem in tank.problems()]
         problems += self._wrong_appendages()
+        if not problems:
+            problems += self._wrong_spins()
         if problems:
             raise FmuError("; ".join(problems))
+
+    @property
+    def _omega(self) -> Vector:
+        """Angular velocity of the craft with its liquid, body axes, rad/s."""
+        if self.spin is not None:
+            return _along_z(self.spin, "spin")
+        turned = [of for of in self.tanks.values() if of.spin is not None]
+        if not turned:
+            return np.zeros(3)
+        # a tank turned upside down spins the other way round
+        axes = np.array([of.rotation[:, 2] for of in turned])
+        axes *= np.where(axes @ axes[0] < 0, -1.0, 1.0)[:, None]
+        found: Vector = np.linalg.lstsq(axes, [float(of.spin or 0) for of in turned])[0]
+        return found
+
+    def _spin_of(self, name: str) -> float:
+        """Return the rate of the craft about the axis of a tank, rad/s; 0 if it is rounding."""
+        omega = self._omega
+        rate = abs(float(self.tanks[name].rotation[:, 2] @ omega))
+        return rate if rate > 1e-9 * np.linalg.norm(omega) else 0.0
+
+    def _wrong_spins(self) -> list[str]:
+        try:
+            rates = {name: self._spin_of(name) for name in self.tanks}
+        except FmuError as error:
+            return [str(error)]
+        return [
+            f"tank {name}: spin = {of.spin:g} rad/s, but the craft turns at {rates[name]:.6g} "
+            "rad/s about this tank's axis, by its spin or by those of other tanks: give one of them"
+            for name, of in self.tanks.items()
+            if of.spin is not None and abs(rates[name] - of.spin) > SAME_SPIN * of.spin
+        ]
 
     def _wrong_appendages(self) -> list[str]:
         if not isinstance(self.appendages, Mapping):
@@ -405,9 +449,7 @@ class Craft:
 
     def _resultant(self) -> tuple[Vector, Vector, Vector]:
         """Return the thrust's force, a point on its line of action from O, and the torque there."""
-        along_z = isinstance(self.thrust, int | float | np.number)
-        given = [0.0, 0.0, self.thrust] if along_z else self.thrust
-        return resultant(vector(given, 3, "thrust"), self.engines)
+        return resultant(_along_z(self.thrust, "thrust"), self.engines)
 
     def _force(self) -> Vector:
         return self._resultant()[0]
@@ -472,17 +514,9 @@ class Craft:
 
     def _case(self, name: str, fill: Any, gravity: float) -> TankCase:
         of = self.tanks[name]
-        spin = None if fill == "100%" else of.spin  # a full tank has no surface
-        return TankCase(
-            _tank_source(of.source),
-            fill,
-            of.modes,
-            gravity,
-            of.nu,
-            of.sigma,
-            of.contact_angle,
-            spin,
-        )
+        spin = None if fill == "100%" else self._spin_of(name) or None  # a full tank has no surface
+        return TankCase(_tank_source(of.source), fill, of.modes, gravity, of.nu, of.sigma,
+                        of.contact_angle, spin)  # fmt: skip
 
     def _solve(self, asked: Sequence[tuple[str, Any, float]]) -> list[Tank | None]:
         """Return the solved tanks by name, fill and gravity; None for an empty tank.
@@ -785,8 +819,21 @@ class Craft:
         every = self._untrimmed(fill, **options)
         given = full_names(parameters_of(parameters), Fmu.open(self.model), self._names)
         late = given.pop(DELAY, None)
+        self._check_rates(given)
         modes = {name: given.pop(name) for name in list(given) if mode_quantity(name)}
         return every | given, modes, late
+
+    def _check_rates(self, given: Parameters) -> None:
+        """Raise FmuError if ``init.omega`` contradicts the spin of the craft."""
+        omega, fmu = self._omega, Fmu.open(self.model)
+        spin = float(np.linalg.norm(omega))
+        w = [float(fmu.convert(name, given.get(name, omega[i]))) for i, name in enumerate(OMEGA)]
+        along = float(omega @ w) / spin if spin else 0.0
+        if abs(along - spin) > SAME_SPIN * spin:
+            raise FmuError(
+                f"init.omega is {along:.6g} rad/s about the axis about which craft and liquid spin "
+                f"at {spin:.6g} rad/s: leave out spin, of the craft and of its tanks, or init.omega"
+            )
 
     def _realised(
         self,
@@ -836,6 +883,8 @@ class Craft:
         found |= {f"craft.J{'xyz'[i]}{'xyz'[j]}": float(J[i, j]) for i, j in pairs}
         found |= {f"force[{i + 1}]": float(x) for i, x in enumerate(F)}
         found |= {f"torque[{i + 1}]": float(x) for i, x in enumerate(torque) if torque.any()}
+        omega = self._omega
+        found |= {name: float(x) for name, x in zip(OMEGA, omega, strict=True) if omega.any()}
         found |= dict(zip(MOMENTUM, momentum(self.wheels).tolist(), strict=True))
         j = 0
         for appendage in self.appendages.values():
@@ -1162,7 +1211,8 @@ class Craft:
             Fills to review, each as for `fills`.
         damping : {"interval", "nominal"}
             "interval" varies the damping of each tank over the confidence interval of the empirical
-            formula that computes the damping; "nominal" does not vary the damping.
+            formula that computes the damping, and the damping ratios of each appendage by half of
+            their values; "nominal" does not vary the damping.
         frequency : str
             Range of the slosh frequencies, and of the frequencies of appendages, as a share of
             their nominal values, such as "10%"; "nominal" does not vary them. All modes of a tank
@@ -1652,6 +1702,8 @@ class Craft:
             f"inertia Jxx, Jyy, Jzz {_row(np.diag(J))}, {products} kg·m²",
             f"thrust {_row(F)} N" + (f" by {', '.join(burning)}" if burning else ""),
         ]
+        if (omega := self._omega).any():
+            lines.append(f"spin {_row(omega)} rad/s")
         if pulsed := [name for name in self.engines if name not in burning]:
             lines.append(f"thrusters that fire in pulses: {', '.join(pulsed)}")
         lines += [
@@ -1661,6 +1713,12 @@ class Craft:
         lines += [f"wheel {name}: {of.describe()}" for name, of in self.wheels.items()]
         lines += [f"appendage {name}: {of.describe()}" for name, of in self.appendages.items()]
         return "\n".join(lines)
+
+
+def _along_z(given: Any, name: str) -> Vector:
+    """Return a vector that is given by its components, or by its component along z."""
+    along_z = isinstance(given, int | float | np.number)
+    return vector([0.0, 0.0, given] if along_z else given, 3, name)
 
 
 def _without_point(name: str) -> str:

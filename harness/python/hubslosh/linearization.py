@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .arguments import MOST_STATES, check_ranges, floats, names_of
 from .fmu import Fmu, FmuError, Parameters
-from .operating_point import is_spacecraft, warn_of_rotation
+from .operating_point import is_spacecraft, warn_of_attitude, warn_of_rotation
 from .plant import Instance
 from .simulation import parameters_of
 
@@ -461,6 +461,8 @@ def linearize(
         if is_spacecraft(fmu):
             turning = instance.get([f"omega_dot[{i}]" for i in (1, 2, 3)])
             warn_of_rotation(f"this point of {fmu.name}", turning)
+            omega = instance.get([f"omega[{i}]" for i in (1, 2, 3)])
+            warn_of_attitude(f"this point of {fmu.name}", names_out, omega)
     jacobian = np.frombuffer(columns).reshape(len(known), len(unknown)).T
     n = len(states)
     A, B, C, D = jacobian[:n, :n], jacobian[:n, n:], jacobian[n:, :n], jacobian[n:, n:]

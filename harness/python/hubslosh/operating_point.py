@@ -207,6 +207,17 @@ def warn_of_rotation(what: str, turning: Any) -> None:
         warnings.warn(text, FmuWarning, stacklevel=caller())
 
 
+def warn_of_attitude(what: str, names: Sequence[str], omega: Any) -> None:
+    """Warn if the attitude is measured in a craft that spins at ``omega``."""
+    if np.any(omega) and any(name.startswith("q[") for name in names):
+        warnings.warn(
+            f"{what} is no steady state of q: the attitude of a craft that spins at "
+            f"{_row(np.asarray(omega, float))} rad/s changes by itself, so that linear models and "
+            "margins with q hold at its start only. Measure omega instead",
+            FmuWarning, stacklevel=caller(),
+        )  # fmt: skip
+
+
 def rotation(what: str, turning: Any) -> str:
     """Return a warning if the angular acceleration ``turning`` is not 0; otherwise "".
 

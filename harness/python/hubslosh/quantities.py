@@ -23,6 +23,8 @@ KINDS = ("frequency", "zeta", "mass", "bob")
 
 DELAY = "delay"  # Delay of a loop, s
 
+OMEGA = tuple(f"init.omega[{i}]" for i in (1, 2, 3))  # Angular velocity at the start, rad/s
+
 # Names that no tank or appendage of a `Craft` may have: parameters of the FMU begin with them.
 RESERVED = re.compile(
     r"(tank|appendage)(\[\d\])?|appendages|craft|init|pivot|solver|delay|force|torque|omega|q"
@@ -295,7 +297,7 @@ class Modes:
             self._keep_at_rest(mode.tank, [(old, bob), (-value, bob)])
         else:
             length, old, m = self._length(mode), self.value(mode), self.number(mode.name("mass"))
-            spins = any(self.number(f"init.omega[{i}]") for i in (1, 2, 3))
+            spins = any(map(self.number, OMEGA))
             before = self._axial_force(mode) if spins else 0.0
             self.given |= {mode.name("hinge"): value + length, mode.name("length"): length}
             self.given[mode.name("frequency")] = 0.0

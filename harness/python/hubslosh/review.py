@@ -33,6 +33,7 @@ from .requirements import Requirement, judged, requirements_of
 from .review_point import Point, Vector
 from .sampling import draw
 from .short import ShortTable
+from .simulation import parameters_of
 from .stabilisation import resonances
 from .stability import margins_and_gain
 from .suggestion import Suggestion, suggest
@@ -41,6 +42,9 @@ from .worst_case import Confirmation, confirm, search
 
 if TYPE_CHECKING:
     from .craft import Craft, Fill
+
+# Share by which damping ratios of appendages vary, which no formula predicts.
+ZETA_PART = 0.5
 
 # Ways in which a slosh mode is stabilised, worst first.
 SEVERITY = ("unstable", "neither", "phase", "gain", "gain and phase")
@@ -51,7 +55,8 @@ class Uncertain:
     """An uncertain quantity of a review, with its range at each fill."""
 
     name: str
-    """Its name as it was given, "damping of" or "frequency of" a tank, or "inertia of craft"."""
+    """Its name as it was given, or "damping of" or "frequency of" a tank or an appendage, or
+    "inertia of craft"."""
     text: str
     """Its range in words."""
     ends: tuple[dict[str, tuple[float, float, float]], ...]
@@ -591,15 +596,18 @@ class _Space:
             warnings.warn(text, FmuWarning, stacklevel=4)
         ranges = _full_ranges(craft, uncertain or {})
         # a damping ratio that was given has no interval
-        known = {*ranges, *given[0][1]}
-        found = _damping(craft, tanks, known) if damping == "interval" else []
+        known = full_names(parameters_of(parameters), Fmu.open(craft.model), craft._names)
+        known |= dict.fromkeys(ranges, 0.0)
+        points = [every for every, _ in given]
+        found = []
+        if damping == "interval":
+            found += _damping(craft, tanks, known)
+            found += _of_appendages(craft, points, "zeta", ZETA_PART, known)
         parts = {name: _part(share, name) for name, share in shares.items()}
         found += _frequencies(craft, loops, parts["frequency"], ranges)
-        found += _array_frequencies(
-            craft, [every for every, _ in given], parts["frequency"], ranges
-        )
-        found += _inertia([every for every, _ in given], parts["inertia"], ranges)
-        found += _quantities(loops, [every for every, _ in given], ranges, craft._names)
+        found += _of_appendages(craft, points, "frequency", parts["frequency"], ranges)
+        found += _inertia(points, parts["inertia"], ranges)
+        found += _quantities(loops, points, ranges, craft._names)
         percent = all(isinstance(f, str) and f.strip().endswith("%") for f in fills)
         if percent:
             at = [float(fill.strip()[:-1]) for fill in fills]
@@ -725,21 +733,24 @@ def _frequencies(
     return found
 
 
-def _array_frequencies(
-    craft: "Craft", given: Sequence[Parameters], part: float, ranges: Mapping[str, Any]
+def _of_appendages(
+    craft: "Craft", given: Sequence[Parameters], kind: str, part: float, known: Container[str]
 ) -> list[Uncertain]:
-    """Return the frequencies of each appendage, whose modes vary together."""
-    found = []
+    """Return frequency or damping of each appendage, whose modes vary together.
+
+    ``known`` has the full names of quantities that have a value or a range of their own.
+    """
+    found, words = [], {"frequency": "frequency of", "zeta": "damping of"}[kind]
     for name in craft.appendages if part else ():
         owners = enumerate(craft._names.appendages, 1)
-        full = [f"appendage[{j}].frequency" for j, owner in owners if owner == name]
-        full = [of for of in full if of not in ranges]
+        full = [f"appendage[{j}].{kind}" for j, owner in owners if owner == name]
+        full = [of for of in full if of not in known]
         ends = tuple(
             _scaled(part, {of: float(every[of]) for of in full})  # type: ignore[arg-type]
             for every in given
         )
         if full:
-            found.append(Uncertain(f"frequency of {name}", f"± {100 * part:g}%", ends))
+            found.append(Uncertain(f"{words} {name}", f"± {100 * part:g}%", ends))
     return found
 
 

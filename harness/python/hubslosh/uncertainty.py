@@ -63,7 +63,7 @@ from .delta_search import DeltaSearch
 from .fmu import FmuError, Parameters, Quantity, did_you_mean
 from .linearization import LinearModel
 from .loop import Loop
-from .operating_point import warn_of_rotation
+from .operating_point import warn_of_attitude, warn_of_rotation
 from .plant import Plant
 from .progress import Progress
 from .quantities import KINDS, TURN, full_name, moves_the_bob, rigid_rest, short_name
@@ -1422,6 +1422,7 @@ def uncertain(
     spread = pd.DataFrame(columns, index=every)
     _, X_0 = craft.accelerations()
     warn_of_rotation("the point of an uncertain Spacecraft", X_0[3:])
+    warn_of_attitude("the point of an uncertain Spacecraft", chosen[1], craft.omega)
     X_c = -np.linalg.solve(craft.mass_matrix(craft.values), craft.load(craft.values))
     M, counts, states = _partitioned(craft, values, spread, X_0 - X_c, X_c)
     n = len(states)

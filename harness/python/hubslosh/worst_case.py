@@ -6,9 +6,12 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
+from .fmu import Fmu
 from .linearization import LinearModel
+from .quantities import OMEGA
 from .run import Run
 from .simulation import parameters_of
 from .stability import _closed, _is_neutral
@@ -221,8 +224,14 @@ def _compare(point: "Point", command: str | None, factor: float) -> tuple[Run, c
     if s.real > 0:
         cycles = min(cycles, max(GROWTH / (s.real * T), 20))
     stop = int(cycles) * T
-    start = {f"init.omega[{i}]": RATE for i in (1, 2, 3)}
-    run = loop.simulate(stop, start, outputs=[])
+    given, fmu = parameters_of(loop.parameters), Fmu.open(loop.model)
+    rates = {name: float(fmu.convert(name, given.get(name, 0.0))) for name in OMEGA}
+    # the controller of a craft that spins is to hold its rates
+    held = {name.removeprefix("init."): rate for name, rate in rates.items() if any(rates.values())}
+    held = {name: rate for name, rate in held.items() if name in loop.names[0]}
+    reference = pd.DataFrame({"time": [0.0, stop], **held}) if held else None
+    start = {name: rate + RATE for name, rate in rates.items()}
+    run = loop.simulate(stop, start, reference=reference, outputs=[])
     # not those in which it hardly shows: their own poles may be almost the same
     shown = [command] if command else _showing(gain, critical)
     constants = loop._constants(parameters_of(loop.parameters))
