@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from .arguments import caller
 from .fmu import Fmu, FmuWarning, Parameters, Quantity
 from .plant import Plant
+from .quantities import ModeQuantity, Modes
 
 Vector = NDArray[np.float64]
 
@@ -59,16 +60,21 @@ class OperatingPoint:
 
     @cached_property
     def _remaining(self) -> tuple[Vector, dict[str, float]]:
+        modes = Modes(self.model, self.parameters)
         with Plant(self.model, self.parameters) as plant:
 
             def get(name: str, count: int = 3) -> Vector:
                 return np.array(plant.get([f"{name}[{i}]" for i in range(1, count + 1)]))
 
             turning, force, across = get("omega_dot"), get("specific_force"), {}
+            omega = get("omega")
             for number, name in enumerate(self.tanks, 1):
                 w, x, y, z = (q := get(f"tank[{number}].q", 4)) / np.linalg.norm(q)
                 axis = np.array([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])
-                here = force + np.cross(turning, get(f"tank[{number}].position"))
+                place = get(f"tank[{number}].position")
+                if omega.any() and plant.get([f"tank[{number}].modes"])[0]:
+                    place = place + axis * modes.value(ModeQuantity(number, "bob", 1))
+                here = force + np.cross(turning, place) + np.cross(omega, np.cross(omega, place))
                 across[name] = float(np.linalg.norm(here - axis * (axis @ here)))
         return turning, across
 
@@ -89,7 +95,10 @@ class OperatingPoint:
 
     @property
     def lateral_acceleration(self) -> dict[str, float]:
-        """Acceleration across each tank's axis after trimming, m/s², which moves the liquid."""
+        """Acceleration across each tank's axis after trimming, m/s², which moves the liquid.
+
+        In a craft that spins it is taken at the slosh mass of the tank's first mode.
+        """
         return self._remaining[1]
 
     def __repr__(self) -> str:

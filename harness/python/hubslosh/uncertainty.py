@@ -203,8 +203,8 @@ class _Craft:
         load[3:] += _cross(w) @ self.wheels
         for number, spin in self.spins.items():
             axes = self.tanks[number].axes
-            turned = spin.rate(axes.T @ w) + np.cross(axes.T @ w, spin.coupling @ spin.momentum)
-            load[3:] += axes @ turned
+            kept, rate = (spin.coupling @ of for of in (spin.momentum, spin.rate(axes.T @ w)))
+            load[3:] += axes @ (rate + np.cross(axes.T @ w, kept))
         for bob in self.bobs if moving else ():
             arm = self.arm(bob, values)
             inwards = arm[:3].T @ self.specific(np.zeros(6), self.place(bob, values))

@@ -1,0 +1,219 @@
+"""Uncertain models, margins, worst cases and reviews of craft that spin."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from test_uncertain import MEASURED, POINT, RANGES, TORQUE, difference
+
+import hubslosh
+from hubslosh import Craft, FmuError, FmuWarning, Loop, MountedTank, UncertainModel, uncertain
+
+CYLINDER = {"density": 1000, "shape": {"cylinder": {"radius": 0.3, "height": 0.6}}}
+RATES = [f"omega[{i}]" for i in (1, 2, 3)]
+
+pytestmark = pytest.mark.filterwarnings("ignore:.*no steady state")
+
+TUMBLING = POINT | {
+    "init.omega[1]": 0.2, "init.omega[2]": -0.1, "init.omega[3]": 0.5,
+    "tank[1].spin_inertia": 3.1, "tank[1].spin_decay[1]": 0.02, "tank[1].spin_decay[2]": 0.05,
+    "tank[1].gyroscopic[1]": 0.42, "tank[1].gyroscopic_stiffness[1]": 0.13,
+    "tank[2].spin_inertia": 2.4, "tank[2].spin_inertia_across": 2.9, "tank[2].spin_coupling": 0.9,
+    "tank[2].gyroscopic[1]": 0.6, "tank[2].slip_0[1]": 0.03, "tank[2].slip_0[3]": -0.2,
+    "appendages": 1, "appendage[1].frequency": 0.4, "appendage[1].position[2]": 1.1,
+    "appendage[1].participation[1]": 1.4, "appendage[1].participation[3]": 2.0,
+    "appendage[1].participation[4]": 3.0, "appendage[1].eta_0": 0.02,
+}  # fmt: skip
+"""Every term acts: no surface is at rest, liquids spin and slip, an array is bent."""
+
+
+@pytest.fixture
+def spacecraft(fmu: Path) -> Path:
+    """Return the packed Spacecraft."""
+    return fmu.with_name("Spacecraft.fmu")
+
+
+def loop_difference(loop: Loop, model: UncertainModel, delta: np.ndarray) -> float:
+    """Return the largest difference of the loop gain to that of a new loop at Δ, relative."""
+    new = replace(loop, parameters=model.parameters(delta)).gain()
+    mine = loop._gain(model.at(delta), loop.linear())
+    f = np.geomspace(0.01, 4.9, 40)
+    a, b = mine.response(f), new.response(f)
+    return float(np.abs(a - b).max() / np.abs(b).max())
+
+
+def test_every_draw_is_the_linear_model_of_a_craft_that_spins(spacecraft: Path) -> None:
+    """Random vertices and interior points agree with a new linear model, and the loops with it."""
+    ranges = RANGES | {"appendage[1].frequency": "10%", "appendage[1].zeta": "50%"}
+    model = uncertain(TUMBLING, ranges, ("torque", "force"), model=spacecraft)
+    random = np.random.default_rng(3)
+    count = len(ranges)
+    for delta in [*random.choice([-1.0, 1.0], (20, count)), *random.uniform(-1, 1, (20, count))]:
+        assert difference(model, delta, spacecraft) < 1e-11
+    gains = np.hstack([40 * np.eye(3), 200 * np.eye(3)])
+    loop = Loop(gains, 0.1, spacecraft, TUMBLING, MEASURED, TORQUE, delay=0.07)
+    model = uncertain(TUMBLING, ranges, outputs=MEASURED, model=spacecraft)
+    for delta in [np.zeros(count), random.choice([-1.0, 1.0], count), random.uniform(-1, 1, count)]:
+        assert loop_difference(loop, model, delta) < 1e-8
+
+
+@pytest.fixture
+def spinner(spacecraft: Path) -> Craft:
+    """Return a craft that spins about its thrust, with a tank on the axis and two beside it.
+
+    Each tank has its axis along the specific force at its slosh mass, so that the liquid rests.
+    """
+    spin, thrust, x = 0.7, 500.0, 0.9
+    axial = MountedTank(CYLINDER, (0, 0, 0.4), modes=1, nu=1e-6)
+    upright = Craft(700, [500, 520, 610], tanks={"axial": axial}, thrust=thrust, model=spacecraft)
+    values = upright.parameters("50%")
+    bob = values["tank[1].hinge[1]"] - values["tank[1].length[1]"]
+    liquid = upright.mass_properties("50%").mass - upright.mass
+    lean = 0.0
+    for _ in range(40):
+        inwards = spin**2 * (x - bob * np.sin(lean))
+        lean = np.arctan2(inwards, thrust / (upright.mass + 3 * liquid))
+    tanks = {"axial": axial}
+    for name, side in (("left", 1), ("right", -1)):
+        axis = (-side * np.sin(lean), 0, np.cos(lean))
+        tanks[name] = replace(axial, position=(side * x, 0, -0.3), axis=axis)
+    return replace(upright, tanks=tanks, spin=spin)
+
+
+NAMED = {
+    "axial.frequency[1]": "10%", "axial.zeta[1]": "interval", "left.frequency[1]": "8%",
+    "right.mass[1]": "10%", "right.bob[1]": (0.16, 0.2), "craft.Jxx": "5%", "craft.Jzz": "5%",
+}  # fmt: skip
+
+
+def test_names_mean_the_same_in_the_uncertain_model_and_in_a_loop(spinner: Craft) -> None:
+    """A loop with the uncertain values among its parameters has the gain of the LFT at this Δ.
+
+    The liquid rests, so that none of these values moves the accelerations at the point. The drag
+    differs by 1e-7: it follows the specific force at the hinge, which moves with the frequency.
+    """
+    gains = 200 * np.eye(3)
+    ranges = {name: of for name, of in NAMED.items() if name != "right.bob[1]"}
+    model = spinner.uncertain("50%", ranges, outputs=RATES)
+    random = np.random.default_rng(1)
+    for delta in (random.choice([-1.0, 1.0], len(ranges)), random.uniform(-1, 1, len(ranges))):
+        values = model.values(delta)
+        loop = spinner.loop(gains, 0.1, "50%", measured="omega", delay=0.04, parameters=values)
+        mine = loop._gain(model.at(delta), loop.linear())
+        f = np.geomspace(0.01, 4.9, 40)
+        new = loop.gain().response(f)
+        assert np.abs(mine.response(f) - new).max() < 1e-6 * np.abs(new).max()
+
+
+def test_a_bob_that_moves_keeps_its_frequency(spinner: Craft) -> None:
+    """In a tank beside the spin axis the specific force varies with the height of the bob."""
+    model = spinner.uncertain("50%", {"right.bob[1]": (0.1, 0.25)}, outputs=RATES)
+    high = spinner.parameters("50%", parameters={"right.bob[1]": 0.25})
+    now = uncertain(high, {"craft.Jxx": "1%"}, model=spinner.model)._craft.values
+    name = "tank[3].frequency[1]"
+    assert now[name] == pytest.approx(model._craft.values[name], rel=1e-9)
+    assert now["tank[3].bob[1]"] == pytest.approx(0.25, rel=1e-12)
+    length = model.parameters([1.0])["tank[3].length[1]"]
+    # the model keeps the acceleration, the craft its thrust
+    assert length == pytest.approx(high["tank[3].length[1]"], rel=2e-3)
+    assert length < 0.99 * model.parameters([0.0])["tank[3].length[1]"]
+
+
+def test_the_worst_case_of_a_rigid_spinner_is_that_of_its_nutation(spacecraft: Path) -> None:
+    """ξ = ω_1 + j ω_2: across ξ' = j (along - across) s ξ + τ, with the moments of inertia.
+
+    With a sampled rate feedback, which acts a time later, the poles are roots of a polynomial.
+    """
+    across, along, s, k, period, delay = 400.0, 520.0, 2.0, 300.0, 0.1, 0.26
+    dry = Craft(900, [across, across, along], spin=s, model=spacecraft)
+
+    def roots(along: float) -> np.ndarray:
+        turn, rest = 1j * (along - across) * s / across, delay - 2 * period
+        late, whole = ((np.exp(turn * t) - 1) / turn / across for t in (period - rest, period))
+        # ξ_{n+1} = step ξ_n - k (late ξ_{n-2} + (whole - late) ξ_{n-3})
+        return np.roots([1, -np.exp(turn * period), 0, k * late, k * (whole - late)])
+
+    limit = brentq(lambda x: np.abs(roots(x)).max() - 1, along, 5 * across, xtol=1e-12)
+    critical = max(roots(limit), key=abs)
+    loop = dry.loop(np.diag([k, k, 5.0]), period, 0, measured="omega", delay=delay)
+    model = dry.uncertain(0, {"craft.Jzz": "20%"}, outputs=RATES)
+    worst = model.worst_case(loop, largest=10)
+    assert model.values(worst.delta)["craft.Jzz"] == pytest.approx(limit, rel=1e-7)
+    assert worst.frequency == pytest.approx(np.angle(critical) / (2 * np.pi * period), rel=1e-6)
+    found = model.certify(loop, largest=10, worst=worst)
+    assert found.size <= worst.size < 1.05 * found.size
+
+
+def test_the_worst_case_of_a_spinner_with_slosh_is_the_limit_of_a_new_loop(spinner: Craft) -> None:
+    """A loop that is made afresh is stable just below the worst case and unstable just above.
+
+    The certificate proves stability up to a size at most 5 % below.
+    """
+    # the gyro turns the torque by 50°
+    turn = np.radians(50)
+    mix = np.array([[np.cos(turn), np.sin(turn), 0], [-np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
+    loop = spinner.loop(150 * mix, 0.1, "50%", measured="omega", delay=0.1)
+    model = spinner.uncertain("50%", NAMED, outputs=RATES)
+    worst = model.worst_case(loop, largest=20)
+    assert worst.delta
+    for share, stable in ((0.999, True), (1.001, False)):
+        delta = {name: share * x for name, x in worst.delta.items()}
+        delta = np.maximum(model.delta(delta), model._least)
+        new = replace(loop, parameters=model.parameters(delta, commanded=True))
+        assert hubslosh.margins(new).stable is stable
+    found = model.certify(loop, largest=20, worst=worst)
+    assert 0 < found.size <= worst.size < 1.05 * found.size
+
+
+def test_a_spin_is_set_once(spinner: Craft) -> None:
+    """The craft's spin turns its liquids, and a tank's turns the craft and its other tanks."""
+    values = spinner.parameters("50%")
+    assert values["init.omega[3]"] == 0.7 and values["init.omega[1]"] == 0
+    assert values["tank[1].spin_inertia"] > 0 and values["tank[2].spin_inertia"] > 0
+    upside_down = MountedTank(CYLINDER, (0, 0, 0.4), (0, 0, -2), modes=1, spin=0.3)
+    tanks = {"up": replace(upside_down, axis=(0, 0, 1)), "down": upside_down}
+    tanks["other"] = replace(upside_down, spin=None)
+    by_tank = replace(spinner, tanks=tanks, spin=None, gravity=0.5)
+    values = by_tank.parameters("50%")
+    assert values["init.omega[3]"] == pytest.approx(0.3, rel=1e-15)
+    assert values["tank[3].spin_inertia"] == values["tank[1].spin_inertia"] > 0
+    assert "spin (0, 0, 0.3) rad/s" in str(by_tank)
+    # across the axis the start is free
+    nutating = by_tank.parameters("50%", parameters={"init.omega[1]": (2, "deg/s")})
+    assert nutating["init.omega[1]"] == (2, "deg/s")
+
+
+def test_spins_that_contradict_each_other_are_told_both(spinner: Craft) -> None:
+    """The message has both numbers, and what to do."""
+    tank = replace(spinner.tanks["axial"], spin=0.4)
+    with pytest.raises(
+        FmuError, match=r"axial: spin = 0\.4 rad/s, but .* at 0\.7 rad/s .*give one"
+    ):
+        replace(spinner, tanks={"axial": tank})
+    again = replace(spinner, tanks={"axial": replace(tank, spin=0.7)})
+    assert again.parameters("50%")["init.omega[3]"] == 0.7
+    for given in ({"init.omega[3]": 0.6}, {"init.omega[3]": (0.6, "rad/s")}):
+        with pytest.raises(
+            FmuError, match=r"init.omega is 0\.6 rad/s .* spin at 0\.7 rad/s: leave"
+        ):
+            again.parameters("50%", parameters=given)
+    with pytest.raises(FmuError, match="spin must be 3 finite numbers"):
+        replace(spinner, spin=(1.0, 2.0))
+
+
+def test_the_attitude_of_a_spinner_is_no_steady_state(spinner: Craft) -> None:
+    """Margins and uncertain models warn if a loop measures it."""
+    for call in (
+        lambda: hubslosh.margins(spinner.loop(np.ones((3, 6)), 0.1, "50%")),
+        lambda: spinner.uncertain("50%", {"craft.Jxx": "5%"}),
+    ):
+        with pytest.warns(FmuWarning, match=r"no steady state of q: .*Measure omega instead"):
+            call()
+
+
+def test_a_review_simulates_the_worst_case_at_the_spin(spinner: Craft) -> None:
+    """The simulated limit of stability agrees with the predicted one to 1 %."""
+    found = spinner.review(150 * np.eye(3), 0.1, ["50%"], draws=5, measured="omega", delay=0.1)
+    assert found.points["stable"].all() and found.confirmation.agrees
