@@ -201,7 +201,8 @@ impl Instance {
     ///
     /// `rows` has the times (s), and None or a byte for each row, which is 0 if the row only repeats the outputs of the row before.
     /// `inputs` and `outputs` are pairs of a list of names and a table of floats with one column for each name, also for Booleans
-    /// and enumerations. `slopes` has the derivatives of the inputs after each row, or is None.
+    /// and enumerations. `slopes` has the derivatives of the inputs after each row, or is None. The last `sampled` columns of
+    /// `outputs`, unless they are Reals, are read in at least 1000 rows only and repeated in between.
     ///
     /// Return None if the run reached its end. Otherwise return where and why the FMU stopped: the row, the number of rows that
     /// were recorded, and a sentence.
@@ -212,11 +213,12 @@ impl Instance {
         inputs: Table,
         slopes: Option<&Bound<PyAny>>,
         outputs: Table,
+        sampled: usize,
         feedback: Option<&Bound<PyAny>>,
     ) -> PyResult<Option<Stop>> {
         let fmu = self.fmu.get();
-        let mut run =
-            Run::new(fmu, (rows.0.to_vec(py)?, rows.1), &inputs, slopes, &outputs, feedback)?;
+        let rows = (rows.0.to_vec(py)?, rows.1);
+        let mut run = Run::new(fmu, rows, &inputs, slopes, &outputs, sampled, feedback)?;
         self.with(py, |held| run.make(&mut held.instance))
     }
 

@@ -496,7 +496,7 @@ class Loop:
         given = {name: history.after(points) for name, history in histories.items()}
         sloped = any(slopes.any() for _, slopes in given.values())
         start = {name: values[0] for name, (values, _) in given.items()}
-        asked = asked_of(fmu, columns, (*plain, *given))
+        asked, sampled = asked_of(fmu, columns, (*plain, *given))
         with Plant(
             self.model,
             every,
@@ -510,6 +510,7 @@ class Loop:
                 asked,
                 feedback,
                 wanted,
+                sampled,
             )
         for text in saturated(turned, feedback, points):
             warnings.warn(text, FmuWarning, stacklevel=caller())

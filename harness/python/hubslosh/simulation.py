@@ -193,7 +193,7 @@ def run_of(
     # without a slope the FMU has one call less to answer, and an FMU that cannot interpolate none
     sloped = any(slope.any() for _, slope in values.values())
     slopes = {name: slope for name, (_, slope) in values.items()} if sloped else None
-    asked = asked_of(fmu, columns, given)
+    asked, sampled = asked_of(fmu, columns, given)
     feedback = None
     if turned:
         table = np.column_stack([of.after(points)[0] for of in torques.values()])
@@ -206,7 +206,7 @@ def run_of(
         stop=stop,
         inputs={name: value[0] for name, value in given.items()},
     ) as plant:
-        recorded = plant.run(points, given, slopes, asked, feedback, wanted)
+        recorded = plant.run(points, given, slopes, asked, feedback, wanted, sampled)
     rows_made = {"time": points} | given | recorded
     if feedback is not None:
         rows_made |= columns_of(turned, feedback)
@@ -215,14 +215,15 @@ def run_of(
     return table
 
 
-def asked_of(fmu: Fmu, columns: Sequence[str], given: Container[str]) -> list[str]:
-    """Return the names of the variables that a run must record.
+def asked_of(fmu: Fmu, columns: Sequence[str], given: Container[str]) -> tuple[list[str], int]:
+    """Return the names of the variables that a run must record, and how many it may sample.
 
-    The list contains ``columns``, and the variables that show whether a tank is in the range of its
-    model; variables in ``given`` are left out.
+    The list contains ``columns``, and then the variables that show whether a tank is in the range
+    of its model, which need not be read in every row of a long run; variables in ``given`` are left
+    out.
     """
     limits = [name for name in native.limit_columns(fmu.native) if name not in columns]
-    return [name for name in (*columns, *limits) if name not in given]
+    return [*(name for name in columns if name not in given), *limits], len(limits)
 
 
 def table_of(
