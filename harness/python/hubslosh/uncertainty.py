@@ -952,6 +952,11 @@ class UncertainModel:
     def _controller(self, loop: Loop) -> LinearModel:
         """Return the controller of a loop around this model, or raise FmuError."""
         loop._must_be_linear()
+        if loop._turned and self._craft.omega.any():
+            raise FmuError(
+                "the momentum that wheels gain turns with a craft that spins, which the uncertain "
+                "model does not have: give the loop the command torque instead"
+            )
         given, loop = loop, loop._without_wheels()
         K = loop._must_be_linear()
         measured, commands = loop.names

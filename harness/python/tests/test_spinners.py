@@ -168,6 +168,16 @@ def test_the_worst_case_of_a_spinner_with_slosh_is_the_limit_of_a_new_loop(spinn
     assert 0 < found.size <= worst.size < 1.05 * found.size
 
 
+def test_wheels_of_a_spinner_are_refused(spinner: Craft) -> None:
+    """Their momentum would be a further state of the uncertain model."""
+    wheels = {"x": hubslosh.Wheel((1, 0, 0), 0.02, 0.2, 300)}
+    wheeled = replace(spinner, wheels=wheels)
+    loop = wheeled.loop(np.ones((1, 3)), 0.1, "50%", measured="omega", command="wheels")
+    model = wheeled.uncertain("50%", {"craft.Jxx": "5%"}, outputs=RATES)
+    with pytest.raises(FmuError, match="momentum that wheels gain .* command torque instead"):
+        model.worst_case(loop)
+
+
 def test_a_spin_is_set_once(spinner: Craft) -> None:
     """The craft's spin turns its liquids, and a tank's turns the craft and its other tanks."""
     values = spinner.parameters("50%")
