@@ -149,7 +149,8 @@ impl<'fmu> Run<'fmu> {
         }
         let columns = Columns::find(fmu, inputs)?;
         let mut read = Columns::find(fmu, outputs)?;
-        let read_rows = wanted.as_ref().map_or(rows, |of| of.iter().filter(|byte| **byte != 0).count());
+        let read_rows =
+            wanted.as_ref().map_or(rows, |of| of.iter().filter(|byte| **byte != 0).count());
         read.sample(sampled, read_rows);
         let slopes = slopes.map(|of| Numbers::borrow(of, rows, width, false)).transpose()?;
         Ok(Run {

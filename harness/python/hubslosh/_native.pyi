@@ -64,6 +64,7 @@ class Instance:
         inputs: Table,
         slopes: Floats | None,
         outputs: Table,
+        sampled: int,
         feedback: Feedback | None,
     ) -> tuple[int, int, str] | None: ...
     def save(self) -> bytes: ...
