@@ -12,8 +12,7 @@ estimate from a history, `fit` a transfer function through such an estimate. `an
 `check`, `identify` and `view` call the program ``hubslosh``. `tank` and `liquid_modes` find slosh
 modes, `mode_errors` says how many a model needs, `posterior` samples the result of `identify`.
 `read_recording` reads the files of loggers.
-`view` shows a run in 3-D, `plot` draws. `Plant` and `drive` are for those who step an instance
-themselves.
+`view` shows a run in 3-D, `plot` draws. `Plant` is for those who step an instance themselves.
 """
 
 from importlib import import_module
@@ -30,7 +29,7 @@ _MODULES = {
     "engines": ("Engine",),
     "files": ("to_csv", "to_mat", "to_parquet"),
     "fitting": ("TransferFunction", "fit"),
-    "fmu": ("Fmu", "FmuError", "FmuWarning", "Quantity", "Value", "fmu_path"),
+    "fmu": ("Fmu", "FmuError", "FmuWarning", "Quantity", "Value", "fmu_path", "read_parameters"),
     "inertia": ("bottom_up",),
     "linearization": ("LinearModel", "linearize"),
     "liquid": ("LiquidModes", "liquid_modes"),
@@ -38,7 +37,7 @@ _MODULES = {
     "mcmc": ("posterior",),
     "modes": ("mode_errors",),
     "operating_point": ("OperatingPoint",),
-    "plant": ("COLUMNS", "TORQUE", "Plant", "RunError", "drive"),
+    "plant": ("TORQUE", "Plant", "RunError"),
     "program": ("Estimated", "Identification", "analyse", "campaign", "identify"),
     "project": ("Project",),
     "recordings": ("read_recording",),
@@ -48,11 +47,18 @@ _MODULES = {
     "simulation": ("simulate",),
     "spectrum": ("frequency_response",),
     "stability": ("Margins", "margins"),
-    "tables": ("read_parameters", "read_table", "setting", "write_table"),
     "tanks": ("Tank", "tank"),
     "uncertainty": ("UncertainModel", "uncertain"),
     "viewing": ("View", "view"),
     "wheels": ("Wheel",),
+}
+# Removed names, and what does the same.
+_REMOVED = {
+    "COLUMNS": "the argument outputs of hubslosh.simulate",
+    "drive": "hubslosh.simulate",
+    "read_table": "hubslosh.read_recording",
+    "setting": "str.partition",
+    "write_table": "hubslosh.to_csv or hubslosh.to_parquet",
 }
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
 
@@ -68,7 +74,8 @@ def __getattr__(name: str) -> Any:
     elif name in __all__:
         value = import_module(f".{name}", __name__)
     else:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        use = f"; use {_REMOVED[name]} instead" if name in _REMOVED else ""
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}{use}")
     globals()[name] = value
     return value
 

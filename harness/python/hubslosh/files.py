@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 from . import temporary
 from .fmu import FmuError
-from .tables import write_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -93,16 +92,20 @@ def to_parquet(table: "pd.DataFrame", path: str | Path) -> None:
 
     Examples
     --------
-    >>> from pathlib import Path
+    >>> import pandas as pd
     >>> import hubslosh
     >>> run = hubslosh.simulate(stop=1, step=0.5, outputs="omega")
     >>> hubslosh.to_parquet(run, "run.parquet")
-    >>> hubslosh.read_table(Path("run.parquet"), ["time"])["time"]
-    array([0. , 0.5, 1. ])
+    >>> pd.read_parquet("run.parquet")["time"].tolist()
+    [0.0, 0.5, 1.0]
     """
+    import pyarrow.parquet
+
     path = _check_table(table, path, ".parquet")
     units = {f"unit:{name}": str(unit) for name, unit in table.attrs.get("units", {}).items()}
-    write_table(path, _columns(table), units)
+    columns = pyarrow.table(_columns(table)).replace_schema_metadata(units)
+    with temporary.output(path) as new:
+        pyarrow.parquet.write_table(columns, new, compression="zstd")
 
 
 def to_mat(

@@ -4,6 +4,7 @@ import atexit
 import difflib
 import math
 import re
+import warnings
 from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import Any, ClassVar
 
 from .native import Fmu as _Fmu
 from .native import FmuError, FmuWarning, Variable, source_tree
+from .native import read_parameters as _read_parameters
 
 __all__ = [
     "Fmu",
@@ -21,6 +23,7 @@ __all__ = [
     "Value",
     "did_you_mean",
     "fmu_path",
+    "read_parameters",
     "source_tree",
 ]
 
@@ -522,3 +525,52 @@ def _boolean(value: Any) -> bool:
     if value not in ("true", "false"):
         raise ValueError("the allowed values are true and false")
     return value == "true"
+
+
+def read_parameters(path: str | Path) -> dict[str, Quantity]:
+    r"""Read a file of parameters: .toml, .ssv or .json.
+
+    A .toml file has lines ``"name" = value``; nested tables give names with dots. An .ssv file is a
+    parameter set of SSP 1.0. A .json file is a result of ``hubslosh identify --out``. ``hubslosh
+    tank --parameters`` writes the first two kinds.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file; the ending of the file's name states the format.
+
+    Returns
+    -------
+    dict
+        Values by name, for `simulate` and `Loop`. A parameter of a .ssv with a unit is a pair
+        (number, unit), where the unit is defined by the file, or else by the FMU. `Fmu.convert`
+        converts or refuses the value.
+
+    Raises
+    ------
+    FmuError
+        If the file cannot be read, or is not a file of parameters.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import hubslosh
+    >>> _ = Path("bench.toml").write_text('tank.h = 0.05\n"slosh.model" = "spherical"\n')
+    >>> hubslosh.read_parameters("bench.toml")
+    {'tank.h': 0.05, 'slosh.model': 'spherical'}
+    """
+    if not isinstance(path, str | Path):
+        raise FmuError(f"the file of parameters must be a path, not {path!r}")
+    found, texts = _read_parameters(Path(path))
+    for text in texts:
+        warnings.warn(f"{path}: {text}", FmuWarning, stacklevel=2)
+    return {name: _with_unit(value, unit, base) for name, value, unit, base in found}
+
+
+def _with_unit(value: Value, unit: str | None, base: tuple | None) -> Quantity:
+    if unit is None or isinstance(value, str):
+        return value
+    if base is None:
+        return value, unit
+    exponents = dict(zip(DefinedUnit.EXPONENTS, base[0], strict=True))
+    return value, DefinedUnit(unit, exponents, *base[1:])

@@ -1,9 +1,4 @@
-"""Instances of an FMU, and the HubSlosh FMU driven through a torque history.
-
-The torque comes as rows of time (s) and ``tau_cmd`` (N·m). At every row the package sets the torque
-and the slope of the chord to the next row, as ``hubslosh run`` does: the FMU receives straight
-lines. All variables have their FMU names and SI units.
-"""
+"""Instances of an FMU, which step from time to time; variables have their FMU names and SI units."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -13,14 +8,10 @@ from typing import Self
 import numpy as np
 
 from . import native
-from .arguments import floats
 from .feedback import Feedback
 from .fmu import Fmu, FmuError, Parameters, Quantity
 
-TORQUE = "tau_cmd"  # The input that carries the torque, N·m
-
-# Default record of `drive` in addition to time and torque.
-COLUMNS = ("omega", "omega_imu", "slosh_angle", "slosh_angle_radial")
+TORQUE = "tau_cmd"  # Input of HubSlosh that carries the torque, N·m
 
 
 class RunError(FmuError):
@@ -466,73 +457,3 @@ class Plant(Instance):
         """
         self.native.restore(saved[1])
         self.time = saved[0]
-
-
-def drive(
-    fmu: Path | str,
-    time: Sequence[float] | np.ndarray,
-    torque: Sequence[float] | np.ndarray,
-    settings: Parameters | None = None,
-    *,
-    slope: Sequence[float] | np.ndarray | None = None,
-    tolerance: float | None = None,
-    hold: bool = False,
-    columns: Sequence[str] = COLUMNS,
-) -> dict[str, np.ndarray]:
-    """Drive a new instance of HubSlosh through a torque history, one step from row to row.
-
-    Parameters
-    ----------
-    fmu : str or Path
-        File of an FMU with the input ``tau_cmd``, or the name of one of this package.
-    time : array_like, shape (n,)
-        Communication points, ascending, s; two or more.
-    torque : array_like, shape (n,)
-        ``tau_cmd`` at these times, N·m.
-    settings : mapping, optional
-        Values of parameters by name, as for `Plant`.
-    slope : array_like, shape (n,), optional
-        Derivative of the torque from each row to the next, N·m/s; by default the slope of
-        straight lines between the rows.
-    tolerance : float, optional
-        Relative tolerance of the FMU's solver; by default its own choice.
-    hold : bool
-        Hold the torque from row to row, whatever the slope.
-    columns : sequence of str
-        Numeric variables to record.
-
-    Returns
-    -------
-    dict of ndarray, shape (n,)
-        ``time``, ``tau_cmd`` and ``columns`` as floats.
-
-    Raises
-    ------
-    FmuError
-        If the lengths differ, or the FMU refuses a value. A `RunError`, which is an FmuError,
-        has the record if the run stopped on its way.
-
-    Examples
-    --------
-    >>> import hubslosh
-    >>> run = hubslosh.drive("HubSlosh", [0, 1, 2], [0.1, 0.1, 0.0], {"friction.model": "none"})
-    >>> run["omega"].round(4)
-    array([0.    , 0.234 , 0.3495])
-    """
-    t, tau = floats(time), floats(torque)
-    if len(t) != len(tau) or len(t) < 2:
-        raise FmuError(f"a torque history needs two rows or more, not {len(t)} and {len(tau)}")
-    if hold:
-        slopes = None
-    elif slope is None:
-        slopes = {TORQUE: np.append(np.diff(tau) / np.diff(t), 0.0)}
-    else:
-        slopes = {TORQUE: floats(slope)}
-        if len(slopes[TORQUE]) != len(t):
-            raise FmuError(f"a slope for each of the {len(t)} rows is needed, not {len(slope)}")
-    start, stop = float(t[0]), float(t[-1])
-    with Plant(
-        fmu, settings, tolerance=tolerance, start=start, stop=stop, torque=float(tau[0])
-    ) as plant:
-        run = plant.run(t, {TORQUE: tau}, slopes, columns)
-    return {"time": t, TORQUE: tau} | {name: run[name].astype(float) for name in columns}

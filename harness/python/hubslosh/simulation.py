@@ -10,10 +10,17 @@ from numpy.typing import NDArray
 
 from . import native
 from .arguments import column_of, names_of, not_numbers
-from .fmu import INTEGERS, Fmu, FmuError, Parameters, Quantity, did_you_mean
+from .fmu import (
+    INTEGERS,
+    Fmu,
+    FmuError,
+    Parameters,
+    Quantity,
+    did_you_mean,
+    read_parameters,
+)
 from .plant import TORQUE, Plant
 from .run import Noted, Run
-from .tables import read_parameters
 from .wheels import Wheel, columns_of, follow, torques_of, units_of
 
 Real = NDArray[np.float64]

@@ -12,14 +12,17 @@ import os
 import subprocess
 import sys
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from hubslosh import COLUMNS, TORQUE, Plant, read_table
+from hubslosh import TORQUE, Plant, simulate
+
+# Columns of a recording of HubSlosh, besides time and torque.
+COLUMNS = ("omega", "omega_imu", "slosh_angle", "slosh_angle_radial")
 
 ROOT = Path(__file__).resolve().parents[3]
 TARGET = ROOT / os.environ.get("CARGO_TARGET_DIR", "target")
@@ -102,9 +105,22 @@ def harness(request: pytest.FixtureRequest, fmu: Path, tmp_path_factory) -> Harn
             [*command, "--fmu", fmu, "--out", out], capture_output=True, text=True, check=False
         )
         assert done.returncode == 0, done.stderr
-        return read_table(out, ["time", TORQUE, *columns])
+        table = pd.read_parquet(out)
+        return {name: table[name].to_numpy(float) for name in ("time", TORQUE, *columns)}
 
     return run
+
+
+def drive(
+    fmu: Path, time: Sequence, torque: Sequence, settings: dict | None = None, *,
+    slope: Sequence | None = None, columns: Sequence[str] = COLUMNS, **options,
+) -> dict[str, np.ndarray]:  # fmt: skip
+    """Return a record of HubSlosh under a torque history, with the options of `simulate`."""
+    inputs = pd.DataFrame({"time": np.asarray(time), TORQUE: np.asarray(torque)})
+    if slope is not None:
+        inputs["tau_slope"] = np.asarray(slope)
+    run = simulate(fmu, settings, inputs, outputs=list(columns), **options)
+    return {name: run[name].to_numpy(float) for name in ("time", TORQUE, *columns)}
 
 
 def single_calls(

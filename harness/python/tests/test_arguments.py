@@ -153,8 +153,6 @@ def test_masked_arrays_are_refused(given: SimpleNamespace) -> None:
     one = np.ma.array([1.0, 99.0, 3.0], mask=[False, True, False])
     matrix = np.ma.array(np.diag([3.0, 3.0, 3.0]), mask=np.eye(3) > 0)
     calls = [
-        lambda: hubslosh.drive(given.fmu, one, np.zeros(3)),
-        lambda: hubslosh.drive(given.fmu, np.arange(3.0), one),
         lambda: hubslosh.closed_loop(one[1:], 0.1, 1, given.fmu),
         lambda: hubslosh.closed_loop(lambda t, y: one[1:2], 0.1, 1, given.fmu),
         lambda: hubslosh.margins(Loop([one[:2]], 0.1, given.fmu, VISCOUS)),

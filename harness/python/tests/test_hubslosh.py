@@ -1,43 +1,45 @@
 """The package as a program, and its errors."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
+import pandas as pd
 import pytest
+from conftest import option
 
-from hubslosh import (
-    FmuError,
-    Plant,
-    drive,
-    read_parameters,
-    read_table,
-    simulate,
-    write_table,
-)
+import hubslosh
+from hubslosh import FmuError, Plant, read_parameters, simulate
 
 PACKAGE = Path(__file__).resolve().parents[1]
 
 
-def test_the_program_drives_the_fmu_and_writes_a_table(fmu: Path, tmp_path: Path) -> None:
-    """``python -m hubslosh`` reads a torque from a file and writes the results of `drive`."""
-    time = np.arange(101) * 0.02
-    torque, answer = tmp_path / "torque.csv", tmp_path / "answer.csv"
-    write_table(torque, {"time": time, "tau_cmd": 0.1 * np.sin(15 * time)})
-    command = [sys.executable, "-m", "hubslosh", "--fmu", fmu, "--input", torque, "--out", answer]
+def test_the_module_runs_the_commands_of_the_program(
+    fmu: Path, tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
+    """``python -m hubslosh run`` writes the results of `simulate`, and passes on the exit code."""
+    table = pd.DataFrame({"time": np.arange(101) * 0.02})
+    table["tau_cmd"] = 0.1 * np.sin(15 * table["time"])
+    hubslosh.to_csv(table, tmp_path / "torque.csv")
+    command = [sys.executable, "-m", "hubslosh", "run", "--fmu", fmu]
+    command += ["--input", tmp_path / "torque.csv", "--out", tmp_path / "answer.csv"]
     options = ["--set", "slosh.model=spherical", "--set", "friction.model=none"]
-    done = subprocess.run(
-        [*command, *options], capture_output=True, text=True, check=False, cwd=PACKAGE
-    )
-    assert done.returncode == 0, done.stderr
-    table = read_table(answer, ["time", "omega"])
-    settings = {"slosh.model": 4, "friction.model": 1}
-    assert np.array_equal(
-        table["omega"], drive(fmu, time, 0.1 * np.sin(15 * time), settings)["omega"]
-    )
+    surroundings = os.environ | {"HUBSLOSH": str(option(request, "--hubslosh"))}
+    for more, code in (options, 0), (["--set", "tank.height=1"], 1):
+        done = subprocess.run(
+            [*command, *more], capture_output=True, env=surroundings, check=False, cwd=PACKAGE
+        )
+        assert done.returncode == code, done.stderr
+    ours = simulate(fmu, {"slosh.model": 4, "friction.model": 1}, table, outputs="omega")
+    assert np.array_equal(pd.read_csv(tmp_path / "answer.csv")["omega"], ours["omega"])
+
+
+def test_removed_names_say_what_to_use() -> None:
+    """The error of a removed name contains what does the same."""
+    with pytest.raises(AttributeError, match=r"'drive'; use hubslosh\.simulate instead"):
+        _ = hubslosh.drive
 
 
 @pytest.mark.parametrize(
@@ -67,7 +69,7 @@ def test_wrong_settings_raise_a_one_sentence_error(
 def test_a_torque_that_is_not_a_number_is_refused(fmu: Path) -> None:
     """A NaN in the torque raises an error that names the input."""
     with pytest.raises(FmuError, match="tau_cmd"):
-        drive(fmu, [0, 1, 2], [0, float("nan"), 0])
+        simulate(fmu, inputs=pd.DataFrame({"time": [0, 1], "tau_cmd": [0, float("nan")]}))
 
 
 def test_a_missing_fmu_raises_an_error_with_the_command_that_builds_it(tmp_path: Path) -> None:
@@ -100,32 +102,3 @@ def test_a_file_of_parameters_equals_a_mapping(fmu: Path, tmp_path: Path) -> Non
     toml.write_text("a = [1]")
     with pytest.raises(FmuError, match="line 1: a cannot be a value of a parameter"):
         read_parameters(toml)
-
-
-def test_the_program_never_replaces_its_input(fmu: Path, tmp_path: Path) -> None:
-    """An output is refused if it is the input, also under another name of the same file."""
-    torque, link = tmp_path / "torque.csv", tmp_path / "link.csv"
-    torque.write_text("time,tau_cmd\n0,0\n1,0\n")
-    link.symlink_to(torque)
-    command = [sys.executable, "-m", "hubslosh", "--fmu", str(fmu), "--input", str(torque)]
-    done = subprocess.run(
-        [*command, "--out", str(link)], capture_output=True, text=True, check=False, cwd=PACKAGE
-    )
-    assert done.returncode == 1 and "it is the input" in done.stderr
-    assert torque.read_text() == "time,tau_cmd\n0,0\n1,0\n"
-
-
-def test_times_of_a_table_are_in_seconds(tmp_path: Path) -> None:
-    """Dates and durations are converted by their type; integers in Parquet have no unit."""
-    path = tmp_path / "a.parquet"
-    ticks = np.arange(3) * 20
-    for kind in ("duration[ms]", "timestamp[ms]", "time32[ms]"):
-        time = pa.array(ticks).cast("int32" if kind == "time32[ms]" else "int64").cast(kind)
-        pq.write_table(pa.table({"time": time, "omega": ticks}), path)
-        assert read_table(path, ["time"])["time"].tolist() == [0.0, 0.02, 0.04]
-        with pytest.raises(FmuError, match="omega holds"):
-            pq.write_table(pa.table({"time": [0.0, 1.0, 2.0], "omega": time}), path)
-            read_table(path, ["omega"])
-    pq.write_table(pa.table({"time": ticks}), path)
-    with pytest.raises(FmuError, match="their unit is not known"):
-        read_table(path, ["time"])

@@ -5,8 +5,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from conftest import drive
 
-from hubslosh import FmuError, Loop, closed_loop, drive, linearize, simulate
+from hubslosh import FmuError, Loop, closed_loop, linearize, simulate
 
 VISCOUS = {"friction.model": "viscous"}
 PERIOD = 0.1  # s

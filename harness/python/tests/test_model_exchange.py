@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import drive
 from fmpy import simulate_fmu
 
-from hubslosh import drive
 
 STEP = 0.02  # s
 TIME = np.arange(1001) * STEP  # 20 s

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from conftest import option, single_calls
+from conftest import drive, option, single_calls
 from fmpy import simulate_fmu
 
 import hubslosh
-from hubslosh import FmuError, FmuWarning, Plant, RunError, drive, simulate, simulation
+from hubslosh import FmuError, FmuWarning, Plant, RunError, simulate, simulation
 
 STEP = 0.02  # s
 TIME = np.arange(3001) * STEP

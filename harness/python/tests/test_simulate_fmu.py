@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import drive
 from fmpy import read_model_description, simulate_fmu, simulation
 
-from hubslosh import drive
 
 STEP = 0.02  # s
 TIME = np.arange(3001) * STEP

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import drive
 
-from hubslosh import drive
 
 DURATION = 60  # s
 KNOTS = np.arange(10 * DURATION + 1) / 10
