@@ -63,6 +63,11 @@ impl ParameterSet {
 }
 
 impl Parameter {
+    /// Creates a parameter that is not from a file.
+    pub fn new(name: &str, value: Value, unit: Option<Unit>) -> Parameter {
+        Parameter { name: name.into(), value, unit, line: 0 }
+    }
+
     /// Returns the value as a text in the unit of the FMU's variable.
     ///
     /// # Errors

@@ -5,17 +5,13 @@ use std::sync::{Mutex, PoisonError};
 
 use ::files::output::{self, Destination};
 use ::files::temporary::{self, PREFIX};
-use host::description::Value;
 use host::parameter_set::ParameterSet;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyList};
 use signals::recording::{self, Between, Columns, Signal, Wanted};
 
-use crate::fmu::error;
+use crate::fmu::{Base, error, object};
 use crate::schedule::bytes;
-
-/// Definition of a unit: exponents of the SI base units, factor and offset.
-type Base = ([i32; 8], f64, f64);
 
 /// Return the parameters in a file and warnings. Each parameter has its name, its value, and the name and the definition of its
 /// unit.
@@ -29,13 +25,7 @@ pub fn read_parameters(py: Python, path: PathBuf) -> PyResult<(Bound<PyList>, Ve
             None => (None, None),
         };
         let base: Option<Base> = base.map(|base| (base.exponents, base.factor, base.offset));
-        let name = parameter.name;
-        match parameter.value {
-            Value::Real(value) => all.append((name, value, unit, base))?,
-            Value::Integer(value) => all.append((name, value, unit, base))?,
-            Value::Boolean(value) => all.append((name, value, unit, base))?,
-            Value::String(value) => all.append((name, value, unit, base))?,
-        }
+        all.append((parameter.name, object(py, parameter.value)?, unit, base))?;
     }
     Ok((all, found.warnings))
 }

@@ -6,12 +6,19 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use ::files::input;
 use host::archive::{Archive, DESCRIPTION};
-use host::description::{self, ModelDescription};
+use host::description::{self, BaseUnit, ModelDescription, Value};
 use host::fmu::Interface;
+use host::parameter_set::{Parameter, Unit};
 use host::part::{self, Limit, START_VALUES};
+use pyo3::IntoPyObjectExt;
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyUserWarning};
 use pyo3::prelude::*;
+
+use crate::instance::Given;
+
+/// Definition of a unit: exponents of the SI base units, factor and offset.
+pub type Base = ([i32; 8], f64, f64);
 
 create_exception!(
     hubslosh,
@@ -52,6 +59,16 @@ pub fn error(why: impl Into<anyhow::Error>) -> PyErr {
     FmuError::new_err(input::without_error_numbers(&format!("{:#}", why.into())))
 }
 
+/// Returns a value as an object of Python.
+pub fn object(py: Python, value: Value) -> PyResult<Py<PyAny>> {
+    match value {
+        Value::Real(value) => value.into_py_any(py),
+        Value::Integer(value) => value.into_py_any(py),
+        Value::Boolean(value) => value.into_py_any(py),
+        Value::String(value) => value.into_py_any(py),
+    }
+}
+
 #[pyclass(frozen, get_all, module = "hubslosh")]
 pub struct Variable {
     name: String,
@@ -66,7 +83,7 @@ pub struct Variable {
     /// Display units, each with its name, factor and offset.
     shown: Vec<(String, f64, f64)>,
     /// Definition of the unit by SI base units (exponents, factor, offset), if the FMU has one.
-    base: Option<([i32; 8], f64, f64)>,
+    base: Option<Base>,
     /// Items of an enumeration, each with its name and number.
     items: Vec<(String, i64)>,
     /// True if the variable is one element of an array.
@@ -192,6 +209,30 @@ impl Fmu {
     #[getter]
     fn derivatives(&self) -> Vec<(u32, u32)> {
         self.description.derivatives.clone()
+    }
+
+    /// Convert a value to the type and the unit of a variable, as `Instance.set` receives it. `unit` is the unit of the value;
+    /// `base` is the definition of the unit by SI base units, if it is not one of the variable's units.
+    #[pyo3(signature = (name, value, unit=None, base=None))]
+    fn convert(
+        &self,
+        py: Python,
+        name: &str,
+        value: Given,
+        unit: Option<String>,
+        base: Option<Base>,
+    ) -> PyResult<Py<PyAny>> {
+        let variable = self.variable(name)?;
+        let value = value.for_type(variable.kind());
+        let base = base.map(|(exponents, factor, offset)| BaseUnit { exponents, factor, offset });
+        let unit = unit.map(|name| Unit { name, base });
+        let text = Parameter::new(name, value, unit).text(&self.description).map_err(error)?;
+        match self.description.value(variable, &text).map_err(error)? {
+            Value::Real(x) if !x.is_finite() => {
+                Err(FmuError::new_err(format!("{name} expects a finite number, not {x}")))
+            }
+            value => object(py, value),
+        }
     }
 
     /// Return the files of a reduced copy of this Spacecraft FMU, each as its name in the archive and its text: the model

@@ -47,6 +47,9 @@ class Fmu:
     def part(
         self, tanks: int, modes: int, appendages: int, starts: list[tuple[str, str]]
     ) -> list[tuple[str, str]]: ...
+    def convert(
+        self, name: str, value: Value, unit: str | None = None, base: Base | None = None
+    ) -> Value: ...
     def close(self) -> None: ...
 
 class Instance:

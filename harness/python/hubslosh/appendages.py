@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .arguments import floats, vector
+from .arguments import array, floats, not_vectors
 from .fmu import FmuError
 
 if TYPE_CHECKING:
@@ -223,19 +223,15 @@ class Appendage:
         >>> hubslosh.Appendage((0, 0, 0), [0.2, 0.0], [[1, 0, 0, 0, 0, 0]] * 2).problems()
         ['frequency must be numbers above 0, Hz, not [0.2, 0.0]']
         """
-        found = []
-        try:
-            vector(self.position, 3, "position")
-        except FmuError as error:
-            found.append(str(error))
-        frequency, zeta = (_numbers(x) for x in (self.frequency, self.zeta))
+        found = not_vectors(self, 3, "position")
+        frequency, zeta = (_unmasked(x) for x in (self.frequency, self.zeta))
         if frequency.ndim > 1 or not frequency.size or not (frequency > 0).all():
             return [*found, f"frequency must be numbers above 0, Hz, not {self.frequency!r}"]
         n = frequency.size
         if zeta.shape not in ((), (n,)) or not (zeta >= 0).all():
             found.append(f"zeta must be a number, or one for each of {n} modes, 0 or above, not "
                          f"{self.zeta!r}")  # fmt: skip
-        participation = _numbers(self.participation)
+        participation = _unmasked(self.participation)
         shapes = [(n, 6), *([(6,)] if n == 1 else [])]
         if participation.shape not in shapes or not np.isfinite(participation).all():
             found.append(
@@ -298,11 +294,11 @@ class Appendage:
         return f"{modes}, {' to '.join(ends)} Hz, at ({place}) m"
 
 
-def _numbers(given: Any) -> Vector:
-    """Return an array; an empty one if these are not numeric."""
+def _unmasked(given: Any) -> Vector:
+    """Return an array; an empty one if values are masked or not numbers."""
     try:
-        return floats(given)
-    except (FmuError, TypeError, ValueError):
+        return array(given)
+    except FmuError:
         return np.empty(0)
 
 
@@ -324,10 +320,7 @@ def _matrices(source: Any, names: tuple[str, str]) -> tuple[Vector, Vector]:
                 "mass and stiffness matrix by names="
             )
         source = tuple(every[name] for name in wanted)
-    try:
-        mass, stiffness = (floats(matrix) for matrix in source)
-    except (TypeError, ValueError):
-        mass = stiffness = np.empty(0)
+    mass, stiffness = (array(matrix) for matrix in source)
     n = len(mass)
     if mass.shape != (n, n) or stiffness.shape != (n, n) or n < 7:
         raise FmuError(

@@ -46,6 +46,11 @@ def caller() -> int:
     return level
 
 
+def is_number(value: Any) -> bool:
+    """Return True for a real number of Python or NumPy; a Boolean is none."""
+    return isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
+
+
 def out_of_range(**values: Any) -> list[str]:
     """Return a sentence for each argument that is outside its allowed range.
 
@@ -54,15 +59,13 @@ def out_of_range(**values: Any) -> list[str]:
     """
     found = []
     for name, value in values.items():
-        is_number = isinstance(value, int | float | np.integer | np.floating)
-        is_number &= not isinstance(value, bool)
         if name in WHOLE:
             least, most = WHOLE[name]
-            if not (is_number and least <= value <= most and value == int(value)):
+            if not (is_number(value) and least <= value <= most and value == int(value)):
                 found.append(f"{name} must be a whole number from {least} to {most}, not {value!r}")
             continue
         low, high = (SECONDS | PLAIN)[name]
-        if not (is_number and low <= value <= high):
+        if not (is_number(value) and low <= value <= high):
             unit = " of seconds" if name in SECONDS else ""
             found.append(f"{name} must be a number{unit} from {low:g} to {high:g}, not {value!r}")
     return found
@@ -90,6 +93,17 @@ def floats(values: Any) -> NDArray[np.float64]:
     return np.asarray(values, float)
 
 
+def array(values: Any) -> NDArray[np.float64]:
+    """Return values as an array of floats, which is empty if the values are not numbers.
+
+    Raises FmuError if a value is masked.
+    """
+    try:
+        return floats(values)
+    except (TypeError, ValueError):
+        return np.empty(0)
+
+
 def names_of(names: Any, what: str, problems: list[str]) -> list[str]:
     """Return one name, or a sequence of names, as a list of names.
 
@@ -110,12 +124,21 @@ def names_of(names: Any, what: str, problems: list[str]) -> list[str]:
 
 def not_numbers(**values: Any) -> list[str]:
     """Return one error sentence for each argument that is neither a number nor None."""
-    kinds = (int, float, np.integer, np.floating)
     return [
         f"{name} must be a number, not {value!r}"
         for name, value in values.items()
-        if value is not None and not isinstance(value, kinds)
+        if value is not None and not is_number(value)
     ]
+
+
+def not_positive(name: str, value: Any, unit: str = "", *, finite: bool = True) -> list[str]:
+    """Return one error sentence if a value is not a number above 0; otherwise none.
+
+    ``unit`` is part of the sentence. ``finite`` is False for a limit that may be infinite.
+    """
+    if is_number(value) and value > 0 and not (finite and value == np.inf):
+        return []
+    return [f"{name} must be a number above 0{unit and ', ' + unit}, not {value!r}"]
 
 
 def check_numbers(**values: Any) -> None:
@@ -188,14 +211,23 @@ def range_ends(given: Any, nominal: float) -> tuple[float, float]:
     return low, high
 
 
+def not_vectors(of: Any, length: int, *names: str) -> list[str]:
+    """Return one error sentence for each attribute that is not a vector of finite numbers."""
+    found = []
+    for name in names:
+        try:
+            vector(getattr(of, name), length, name)
+        except FmuError as error:
+            found.append(str(error))
+    return found
+
+
 def vector(values: Any, length: int, what: str) -> np.ndarray:
     """Return ``values`` as an array of ``length`` finite numbers."""
     try:
-        found = floats(values)
+        found = array(values)
     except FmuError as error:
         raise FmuError(f"{what}: {error}") from None
-    except (TypeError, ValueError):
-        found = np.empty(0)
     if found.shape != (length,) or not np.isfinite(found).all():
         raise FmuError(f"{what} must be {length} finite numbers, not {values!r}")
     return found

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .arguments import check_numbers, floats, vector
+from .arguments import array, check_numbers, floats, not_positive, vector
 from .fmu import FmuError
 
 if TYPE_CHECKING:
@@ -27,10 +27,7 @@ def _unit_quaternions(q: Any) -> Real:
         if missing := [name for name in NAMES if name not in q.columns]:
             raise FmuError(f"the table has no column {', '.join(missing)}")
         q = q[list(NAMES)].to_numpy(float)
-    try:
-        rows = floats(q)
-    except (TypeError, ValueError):
-        rows = np.empty(0)
+    rows = array(q)
     if rows.ndim not in (1, 2) or rows.shape[-1] != 4:
         raise FmuError("a quaternion has four numbers, the scalar first")
     length = np.linalg.norm(rows, axis=-1, keepdims=True)
@@ -294,9 +291,8 @@ def slew(
     import pandas as pd
 
     check_numbers(angle=angle, duration=duration, step=step, start=start, stop=stop)
-    for name, value in (("duration", duration), ("step", step)):
-        if not (np.isfinite(value) and value > 0):
-            raise FmuError(f"{name} must be a positive number of seconds, not {value}")
+    if wrong := not_positive("duration", duration, "s") + not_positive("step", step, "s"):
+        raise FmuError("; ".join(wrong))
     end = start + duration
     stop = end if stop is None else max(stop, end)
     time = np.append(np.arange(0.0, stop - 1e-9 * step, step), stop)
@@ -310,10 +306,7 @@ def slew(
     table |= {f"omega[{i + 1}]": rate * unit[i] for i in range(3)}
     units = {"time": "s"} | {f"omega[{i + 1}]": "rad/s" for i in range(3)}
     if inertia is not None:
-        try:
-            J = floats(inertia)
-        except (TypeError, ValueError):
-            J = np.empty(0)
+        J = array(inertia)
         if J.shape not in ((), (3, 3)):
             raise FmuError(f"inertia must be a number or a 3 × 3 matrix, not {inertia!r}")
         moment = J * unit if J.shape == () else J @ unit

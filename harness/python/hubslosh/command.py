@@ -16,7 +16,7 @@ from pathlib import Path
 from threading import Thread
 from typing import Any
 
-from .fmu import FmuError, source_tree
+from .fmu import FmuError, source_tree, text_of
 from .progress import Line, Progress
 
 
@@ -125,5 +125,5 @@ def settings_flags(settings: Mapping[str, object] | None) -> list[str]:
     """Return settings as flags ``--set NAME=VALUE`` of the command line."""
     flags = []
     for name, value in (settings or {}).items():
-        flags += ["--set", f"{name}={str(value).lower() if isinstance(value, bool) else value}"]
+        flags += ["--set", f"{name}={text_of(value)}"]
     return flags

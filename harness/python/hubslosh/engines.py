@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from .arguments import floats, vector
+from .arguments import floats, not_positive, not_vectors, vector
 from .fmu import FmuError, did_you_mean
 
 Vector = NDArray[np.float64]
@@ -60,16 +60,10 @@ class Engine:
         >>> hubslosh.Engine((0, 0, 0), (0, 0, 1), -5).problems()
         ['thrust must be a number above 0, N, not -5']
         """
-        found = []
-        for name in ("position", "direction"):
-            try:
-                if not vector(getattr(self, name), 3, name).any() and name == "direction":
-                    found.append("direction must not be zero")
-            except FmuError as error:
-                found.append(str(error))
-        is_number = isinstance(self.thrust, int | float | np.number)
-        if not (is_number and 0 < self.thrust < np.inf):
-            found.append(f"thrust must be a number above 0, N, not {self.thrust!r}")
+        found = not_vectors(self, 3, "position", "direction")
+        if not found and not np.any(self.direction):
+            found.append("direction must not be zero")
+        found += not_positive("thrust", self.thrust, "N")
         if not isinstance(self.burns, bool):
             found.append(f"burns must be True or False, not {self.burns!r}")
         return found
@@ -126,8 +120,8 @@ def pulse_history(
     example = 'such as {"roll": [(0.0, 0.02), (1.0, 1.05)]}'
     if not isinstance(firing, Mapping):
         raise FmuError(f"firing must be pulses by engine, {example}, not {firing!r}")
-    if not (isinstance(stop, int | float) and 0 < stop < np.inf):
-        raise FmuError(f"stop must be a time above 0, s, not {stop!r}")
+    if wrong := not_positive("stop", stop, "s"):
+        raise FmuError(*wrong)
     edges, steps = [0.0, float(stop)], []
     for name, given in firing.items():
         if name not in wrenches:

@@ -148,30 +148,27 @@ def to_mat(
     """
     from .linearization import LinearModel
 
+    models: list[Any] = []
     if isinstance(table, LinearModel):
-        arrays = _family([table])
+        models = [table]
+    elif isinstance(table, Mapping | list | tuple):
+        models = [*(table.values() if isinstance(table, Mapping) else table)]
+    if models and all(isinstance(model, LinearModel) for model in models):
+        names = {"points": [*map(str, table)]} if isinstance(table, Mapping) else {}
+        arrays = _family(models) | names
     elif isinstance(table, AsDict):
-        arrays = _in_mat(table.as_dict())
+        arrays = table.as_dict()
     elif isinstance(table, Mapping):
-        if all(isinstance(model, LinearModel) for model in table.values()):
-            arrays = _family([*table.values()]) | _in_mat({"points": [*map(str, table)]})
-        else:
-            values = {name: of[0] if isinstance(of, tuple) else of for name, of in table.items()}
-            units = {name: of[1] for name, of in table.items() if isinstance(of, tuple)}
-            arrays = _distinct_names(values, units)
-    elif (
-        isinstance(table, list | tuple)
-        and table
-        and all(isinstance(model, LinearModel) for model in table)
-    ):
-        arrays = _family(table)
+        values = {name: of[0] if isinstance(of, tuple) else of for name, of in table.items()}
+        units = {name: of[1] for name, of in table.items() if isinstance(of, tuple)}
+        arrays = _distinct_names(values, units)
     else:
         path = _check_table(table, path, ".mat")
         arrays = _distinct_names(_columns(table), table.attrs.get("units", {}))
     from scipy.io import savemat
 
     with temporary.output(temporary.check_path(path, ".mat")) as new:
-        savemat(new, arrays, oned_as="column", do_compression=False)
+        savemat(new, _in_mat(arrays), oned_as="column", do_compression=False)
 
 
 def _distinct_names(values: Mapping[str, Any], units: Mapping[str, str]) -> dict[str, Any]:
@@ -200,7 +197,7 @@ def _family(models: "Sequence[LinearModel]") -> dict[str, Any]:
     if len(models) == 1:
         matrices = {name: matrix[..., 0] for name, matrix in matrices.items()}
     names = {name: list(getattr(first, name)) for name in ("states", "inputs", "outputs")}
-    return matrices | _in_mat(names) | {"period": float(first.period or 0.0)}
+    return matrices | names | {"period": float(first.period or 0.0)}
 
 
 def _in_mat(values: Mapping[str, Any]) -> dict[str, Any]:

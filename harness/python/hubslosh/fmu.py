@@ -2,10 +2,9 @@
 
 import atexit
 import difflib
-import math
 import re
 import warnings
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
@@ -25,6 +24,7 @@ __all__ = [
     "fmu_path",
     "read_parameters",
     "source_tree",
+    "text_of",
 ]
 
 # A value in SI units, or with its unit, ``"50 mm"``; of an enumeration also an item's name.
@@ -44,24 +44,19 @@ Parameters = Mapping[str, Any]
 class DefinedUnit(str):
     """Unit that a file of parameters uses: its name, and its definition in SI base units."""
 
-    EXPONENTS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
-    """Base units, by their names in FMI and SSP."""
+    base: tuple[Sequence[int], float, float]
+    """Exponents of kg, m, s, A, K, mol, cd and rad, factor and offset: a number in this unit is
+    factor · number + offset in SI base units."""
 
-    exponents: dict[str, int]
-    factor: float
-    offset: float
-
-    def __new__(
-        cls, name: str, exponents: dict[str, int], factor: float, offset: float
-    ) -> "DefinedUnit":
-        """Create a unit: the value in SI base units is factor · value in this unit + offset."""
+    def __new__(cls, name: str, base: tuple[Sequence[int], float, float]) -> "DefinedUnit":
+        """Take the name and the definition of a unit."""
         unit = super().__new__(cls, name)
-        unit.exponents, unit.factor, unit.offset = exponents, factor, offset
+        unit.base = base
         return unit
 
-    def __getnewargs__(self) -> tuple[str, dict[str, int], float, float]:  # type: ignore[override]
+    def __getnewargs__(self) -> tuple[str, Any]:  # type: ignore[override]
         """Return the arguments from which a copy is made."""
-        return str(self), self.exponents, self.factor, self.offset
+        return str(self), self.base
 
 
 def fmu_path(model: str | Path) -> Path:
@@ -117,6 +112,13 @@ def fmu_path(model: str | Path) -> Path:
             f"{' --arrays' if own[3] else ''}"
         )
     raise FmuError(f"{there}{did_you_mean(model, names)}; for another FMU give its file, ….fmu")
+
+
+def text_of(value: object) -> str:
+    """Return a value as text for the program and for files, with its unit if it has one."""
+    if isinstance(value, tuple):
+        return "".join(map(str, value))
+    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def did_you_mean(wrong: str, names: Iterable[str]) -> str:
@@ -401,34 +403,15 @@ class Fmu:
         >>> fmu.convert("tank.h", "50 mm"), fmu.convert("slosh.model", "spherical")
         (0.05, 4)
         """
-        variable, kind = self.variable(name), self.kind(name)
-        converters: dict[str, Callable[[Any], Value]] = {
-            "Real": lambda v: self._real(name, v),
-            "Integer": _integer,
-            "Enumeration": lambda v: _item(variable, v),
-            "Boolean": _boolean,
-            "String": str,
-        }
+        self.variable(name)
+        number, unit = value if isinstance(value, tuple) and len(value) == 2 else (value, None)
         try:
-            if isinstance(value, tuple) and kind != "Real":
-                raise ValueError(f"a value of type {kind} has no unit")
-            if kind not in converters:
-                raise ValueError(f"a variable of type {kind} cannot be set")
-            return converters[kind](value)
-        except (TypeError, ValueError, OverflowError) as error:
-            raise FmuError(f"{name} cannot be {value!r}: {error}") from None
-
-    def _real(self, name: str, value: Quantity) -> float:
-        if isinstance(value, str):
-            value = _with_unit(value)
-        if not isinstance(value, tuple):
-            return _finite(value)
-        if len(value) != 2:
-            raise ValueError(
-                f"{value!r} is not a pair of a number and its unit, such as (50, 'mm')"
-            )
-        factor, offset = self.scale(name, value[1])
-        return _finite((float(value[0]) - offset) / factor)
+            return self.native.convert(name, number, unit, getattr(unit, "base", None))
+        except TypeError:
+            raise FmuError(
+                f"{name} cannot be {value!r} (allowed: a number, a Boolean, a text, or a number "
+                "with its unit)"
+            ) from None
 
     def scale(self, name: str, unit: str) -> tuple[float, float]:
         """Return the factor and the offset that convert a variable's values to another unit.
@@ -462,11 +445,6 @@ class Fmu:
         """
         variable = self.variable(name)
         base = variable.unit
-        if isinstance(unit, DefinedUnit) and variable.base is not None:
-            exponents, factor, offset = variable.base
-            if dict(zip(DefinedUnit.EXPONENTS, exponents, strict=True)) != unit.exponents:
-                raise ValueError(f"the unit {unit} in the file cannot be converted to {base}")
-            return factor / unit.factor, (offset - unit.offset) / unit.factor
         if unit == base:
             return 1.0, 0.0
         shown = {name: scale for name, *scale in variable.shown}
@@ -475,56 +453,6 @@ class Fmu:
             raise ValueError(f"the variable has no unit {unit} (units: {units or 'none'})")
         factor, offset = shown[unit]
         return factor, offset
-
-
-def _with_unit(text: str) -> Quantity:
-    """Return the number and the unit of ``"50 mm"`` or ``"50mm"``; a text without unit as it is."""
-    for end in range(len(text), 0, -1):
-        try:
-            number = float(text[:end])
-        except ValueError:
-            continue
-        unit = text[end:].strip()
-        return (number, unit) if unit else number
-    return text
-
-
-def _item(variable: Variable, value: Any) -> int:
-    """Return the number of an enumeration's item."""
-    items = dict(variable.items)
-    if value in items:
-        return items[value]
-    try:
-        return _integer(value)
-    except ValueError:
-        raise ValueError(f"the allowed values are {', '.join(items)}") from None
-
-
-def _finite(value: Any) -> float:
-    """Return a number that is neither NaN nor infinite."""
-    number = float(value)
-    if not math.isfinite(number):
-        raise ValueError(f"{number} is not a finite number")
-    return number
-
-
-def _integer(value: Any) -> int:
-    """Return an integer in the range of FMI's integers; C would silently wrap a larger one."""
-    whole = int(value)
-    if whole != float(value):
-        raise ValueError(f"{value} is not a whole number")
-    if whole not in INTEGERS:
-        raise ValueError(f"whole numbers from {INTEGERS[0]} to {INTEGERS[-1]} are expected")
-    return whole
-
-
-def _boolean(value: Any) -> bool:
-    """Return a truth value; texts are true or false."""
-    if not isinstance(value, str):
-        return bool(value)
-    if value not in ("true", "false"):
-        raise ValueError("the allowed values are true and false")
-    return value == "true"
 
 
 def read_parameters(path: str | Path) -> dict[str, Quantity]:
@@ -564,13 +492,7 @@ def read_parameters(path: str | Path) -> dict[str, Quantity]:
     found, texts = _read_parameters(Path(path))
     for text in texts:
         warnings.warn(f"{path}: {text}", FmuWarning, stacklevel=2)
-    return {name: _with_unit(value, unit, base) for name, value, unit, base in found}
-
-
-def _with_unit(value: Value, unit: str | None, base: tuple | None) -> Quantity:
-    if unit is None or isinstance(value, str):
-        return value
-    if base is None:
-        return value, unit
-    exponents = dict(zip(DefinedUnit.EXPONENTS, base[0], strict=True))
-    return value, DefinedUnit(unit, exponents, *base[1:])
+    return {
+        name: value if unit is None else (value, DefinedUnit(unit, base) if base else unit)
+        for name, value, unit, base in found
+    }

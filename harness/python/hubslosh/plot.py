@@ -4,7 +4,7 @@ Each function draws into the axes it is given, or into a new figure, and returns
 """
 
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -57,6 +57,29 @@ def _label(table: pd.DataFrame, name: str) -> str:
     return f"{name} ({unit})" if unit and unit != "1" else name
 
 
+def _line(ax: "Axes", x: Any, y: Any, label: str | None) -> None:
+    """Draw a line in the next colour of the axes, with a legend if the line has a label."""
+    ax.plot(x, y, color=COLORS[len(ax.lines) % len(COLORS)], linewidth=0.9, label=label)
+    ax.grid(alpha=0.3)
+    if label is not None:
+        ax.legend(fontsize=8)
+
+
+def _panels(
+    run: pd.DataFrame,
+    panels: Mapping[str, Sequence[tuple[str | None, Any]]],
+    axes: "Sequence[Axes] | None",
+) -> "Sequence[Axes]":
+    """Draw the lines of each panel, pairs of label and values, over the time of a run."""
+    axes = _subplots(len(panels), sharex=True) if axes is None else axes
+    for ax, (title, lines) in zip(axes, panels.items(), strict=True):
+        for label, values in lines:
+            _line(ax, run["time"], values, label)
+        ax.set_ylabel(title)
+    axes[-1].set_xlabel("time (s)")
+    return axes
+
+
 def time_histories(
     run: pd.DataFrame, *names: str, axes: "Sequence[Axes] | None" = None, label: str | None = None
 ) -> "Sequence[Axes]":
@@ -94,16 +117,7 @@ def time_histories(
     check_table(run, "what is drawn")
     columns = list(names) or [str(c) for c in run.columns if c != "time"]
     _check(run, ["time", *columns])
-    axes = _subplots(len(columns), sharex=True) if axes is None else axes
-    for ax, name in zip(axes, columns, strict=True):
-        color = COLORS[len(ax.lines) % len(COLORS)]
-        ax.plot(run["time"], run[name], color=color, linewidth=0.9, label=label)
-        ax.set_ylabel(_label(run, name))
-        ax.grid(alpha=0.3)
-        if label is not None:
-            ax.legend()
-    axes[-1].set_xlabel("time (s)")
-    return axes
+    return _panels(run, {_label(run, name): [(label, run[name])] for name in columns}, axes)
 
 
 def path(run: pd.DataFrame, ax: "Axes | None" = None, label: str | None = None) -> "Axes":
@@ -138,15 +152,10 @@ def path(run: pd.DataFrame, ax: "Axes | None" = None, label: str | None = None) 
     """
     _check(run, ["slosh_angle", "slosh_angle_radial"])
     ax = _subplots(1)[0] if ax is None else ax
-    color = COLORS[len(ax.lines) % len(COLORS)]
-    x, y = (np.degrees(run[name]) for name in ("slosh_angle_radial", "slosh_angle"))
-    ax.plot(x, y, color=color, linewidth=0.7, label=label)
+    _line(ax, *(np.degrees(run[name]) for name in ("slosh_angle_radial", "slosh_angle")), label)
     ax.set_xlabel("radial angle (deg), positive outwards")
     ax.set_ylabel("tangential angle (deg)")
     ax.set_aspect("equal", adjustable="datalim")
-    ax.grid(alpha=0.3)
-    if label is not None:
-        ax.legend()
     return ax
 
 
@@ -322,15 +331,8 @@ def nichols(
     >>> hubslosh.plot.nichols(loop).get_ylabel()
     'loop gain (dB)'
     """
-    found, curves = _loop_curves(loop, parameters)
     ax = _subplots(1, 5.5)[0] if ax is None else ax
-    draw_nichols(ax, curves)
-    labels = [
-        _mark(ax, mark.phase, mark.decibels, mark.symbol, mark.at, curve.color)
-        for curve, mark in _marks(found, curves)
-    ]
-    _finish(ax, found, labels)
-    return ax
+    return _diagram(loop, parameters, ax, draw_nichols, lambda mark: (mark.phase, mark.decibels))
 
 
 def nyquist(
@@ -369,13 +371,29 @@ def nyquist(
     >>> hubslosh.plot.nyquist(loop).get_xlabel()
     'Re L'
     """
-    found, curves = _loop_curves(loop, parameters)
-    ax = _subplots(1, 7.0)[0] if ax is None else ax
-    draw_nyquist(ax, curves)
-    labels = []
-    for curve, mark in _marks(found, curves):
+
+    def place(mark: _Mark) -> tuple[float, float]:
         z = 10 ** (mark.decibels / 20) * np.exp(1j * np.radians(mark.phase))
-        labels.append(_mark(ax, z.real, z.imag, mark.symbol, mark.at, curve.color))
+        return z.real, z.imag
+
+    ax = _subplots(1, 7.0)[0] if ax is None else ax
+    return _diagram(loop, parameters, ax, draw_nyquist, place)
+
+
+def _diagram(
+    loop: Any,
+    parameters: Mapping[str, Any] | None,
+    ax: "Axes",
+    draw: "Callable[[Axes, Curves], None]",
+    place: "Callable[[_Mark], tuple[float, float]]",
+) -> "Axes":
+    """Draw the loop gains into one diagram, in which ``place`` finds the place of a crossing."""
+    found, curves = _loop_curves(loop, parameters)
+    draw(ax, curves)
+    labels = [
+        _mark(ax, *place(mark), mark.symbol, mark.at, curve.color)
+        for curve, mark in _marks(found, curves)
+    ]
     _finish(ax, found, labels)
     return ax
 
@@ -466,26 +484,20 @@ def _annotate(labels: list[_Label]) -> None:
     """Write labels next to their places; those that would cover another one are left out."""
     if not labels:
         return
+    from matplotlib.transforms import Bbox
+
     labels[0][0].figure.draw_without_rendering()  # the layout moves the axes
-    taken: list[tuple[float, float, float, float]] = []
+    taken: list[Bbox] = []
     for ax, x, y, text, color in labels:
         at, unit = ax.transData.transform((x, y)), ax.figure.dpi / 72
-        width, height, box = 5.0 * len(text), 12.0, ax.bbox
-        for dx, dy in ((4, 4), (4, -12), (-width - 4, 4), (-width - 4, -12), (4, 14), (4, -22)):
-            left, low = at[0] + dx * unit, at[1] + dy * unit
-            right, high = left + width * unit, low + height * unit
-            inside = left >= box.x0 and right <= box.x1 and low >= box.y0 and high <= box.y1
-            if inside and all(
-                right < other[0] or left > other[2] or high < other[1] or low > other[3]
-                for other in taken
-            ):
-                taken.append((left, low, right, high))
-                ground = {
-                    "facecolor": ax.get_facecolor(),
-                    "alpha": 0.75,
-                    "pad": 0.5,
-                    "linewidth": 0,
-                }
+        back = -5.0 * len(text) - 4
+        for dx, dy in ((4, 4), (4, -12), (back, 4), (back, -12), (4, 14), (4, -22)):
+            corner = at[0] + dx * unit, at[1] + dy * unit
+            box = Bbox.from_bounds(*corner, 5.0 * len(text) * unit, 12.0 * unit)
+            is_inside = ax.bbox.contains(*box.min) and ax.bbox.contains(*box.max)
+            if is_inside and not box.count_overlaps(taken):
+                taken.append(box)
+                ground = {"facecolor": ax.get_facecolor(), "alpha": 0.75, "pad": 0.5, "lw": 0}
                 ax.annotate(text, (x, y), (dx, dy), textcoords="offset points", fontsize=7.5,
                             color=color, bbox=ground)  # fmt: skip
                 break
@@ -535,12 +547,11 @@ def closed_loop(
     from .attitude import NAMES, angles, error
 
     _check(run, ["time"])
-    panels: list[tuple[str, dict[str, pd.Series]]] = []
+    panels: dict[str, Mapping[Any, Any]] = {}
     if all(name in run.columns for name in NAMES):
-        turned = np.degrees(angles(run))
-        panels.append(("attitude (deg)", {name: turned[name] for name in turned.columns}))
+        panels["attitude (deg)"] = dict(np.degrees(angles(run)).items())
     elif "theta" in run.columns:
-        panels.append(("attitude (deg)", {"theta": np.degrees(run["theta"])}))
+        panels["attitude (deg)"] = {"theta": np.degrees(run["theta"])}
     if reference is not None:
         _check(reference, ["time"])
         wanted = {
@@ -549,35 +560,23 @@ def closed_loop(
         }
         if all(name in run.columns and name in wanted for name in NAMES):
             left = np.degrees(error(run, pd.DataFrame(wanted)))
-            panels.append(
-                (
-                    "left to turn (deg)",
-                    {f"about {x}": left[n] for x, n in zip("xyz", left, strict=True)},
-                )
-            )
+            named = zip("xyz", left, strict=True)
+            panels["left to turn (deg)"] = {f"about {x}": left[n] for x, n in named}
         elif "theta" in run.columns and "theta" in wanted:
-            panels.append(
-                ("left to turn (deg)", {"theta": np.degrees(wanted["theta"] - run["theta"])})
-            )
+            panels["left to turn (deg)"] = {"theta": np.degrees(wanted["theta"] - run["theta"])}
     rates = [n for n in run.columns if n == "omega" or n.startswith("omega[")]
-    if rates:
-        panels.append(("rate (deg/s)", {n: np.degrees(run[n]) for n in rates}))
+    panels["rate (deg/s)"] = {n: np.degrees(run[n]) for n in rates}
     torques = [n for n in run.columns if n == "tau_cmd" or n.startswith("torque[")]
-    if torques:
-        panels.append(("torque (N·m)", {n: run[n] for n in torques}))
-    if not panels:
+    panels["torque (N·m)"] = {n: run[n] for n in torques}
+    end = "" if label is None else f", {label}"
+    drawn = {
+        title: [(f"{name}{end}", values) for name, values in lines.items()]
+        for title, lines in panels.items()
+        if lines
+    }
+    if not drawn:
         raise FmuError("the run has neither an attitude, rates nor torques; see time_histories")
-    axes = _subplots(len(panels), sharex=True) if axes is None else axes
-    for ax, (title, lines) in zip(axes, panels, strict=True):
-        for name, values in lines.items():
-            text = name if label is None else f"{name}, {label}"
-            color = COLORS[len(ax.lines) % len(COLORS)]
-            ax.plot(run["time"], values, color=color, linewidth=0.9, label=text)
-        ax.set_ylabel(title)
-        ax.grid(alpha=0.3)
-        ax.legend(fontsize=8)
-    axes[-1].set_xlabel("time (s)")
-    return axes
+    return _panels(run, drawn, axes)
 
 
 def monte_carlo(

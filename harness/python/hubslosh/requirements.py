@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from .arguments import not_positive
 from .fmu import FmuError, did_you_mean
 from .short import ShortTable
 
@@ -55,14 +56,10 @@ def requirements_of(given: Any) -> tuple[Requirement, ...]:
             problems.append(f"requirements has {margin} (allowed: {', '.join(UNITS)}){hint}")
             continue
         for points, limit in (limits if isinstance(limits, Mapping) else {"all": limits}).items():
-            number = isinstance(limit, int | float | np.number) and not isinstance(limit, bool)
             if points not in POINTS:
                 problems.append(f"requirements.{margin} has {points} (allowed: nominal, all)")
-            elif not (number and 0 < limit < np.inf):
-                problems.append(
-                    f"requirements.{margin} must be a number above 0, or a table of them, not "
-                    f"{limit!r}"
-                )
+            elif wrong := not_positive(f"requirements.{margin}", limit, "or a table of them"):
+                problems += wrong
             else:
                 found.append(Requirement(margin, points, float(limit)))
     if problems:

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from . import temporary
 from .arguments import check_table
-from .command import call, find_program
-from .fmu import DefinedUnit, Fmu, FmuError, Parameters, Quantity, fmu_path
+from .command import call, find_program, settings_flags
+from .fmu import DefinedUnit, Fmu, FmuError, Parameters, fmu_path
 from .tanks import _tank_source, toml_of
 
 if TYPE_CHECKING:
@@ -150,7 +150,7 @@ def view(
         for name, value in {**known, **(parameters or {})}.items():
             if isinstance(value, tuple) and isinstance(value[-1], DefinedUnit):
                 value = Fmu.open(model or "HubSlosh").convert(name, value)
-            arguments += ["--set", f"{name}={_text(value)}"]
+            arguments += settings_flags({name: value})
         names = {} if isinstance(run, str | os.PathLike) else {str(file): "the run"}
         for number, source in numbered.items():
             drawn = _tank_source(source)
@@ -164,14 +164,3 @@ def view(
         arguments += [] if stop is None else ["--to", str(stop)]
         call(path, "view", arguments, names=names)
         return View(page.read_text(encoding="utf-8"), None if out is None else Path(out))
-
-
-def _text(value: Quantity) -> str:
-    """Return a value as text for the program, with its unit if it has one."""
-    match value:
-        case bool():
-            return str(value).lower()
-        case (number, unit):
-            return f"{number}{unit}"
-        case _:
-            return str(value)

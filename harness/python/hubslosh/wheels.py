@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .arguments import vector
+from .arguments import is_number, not_positive, not_vectors, vector
 from .feedback import Feedback, Linear
-from .fmu import FmuError
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -89,19 +88,13 @@ class Wheel:
         >>> hubslosh.Wheel((0, 0, 1), 0.01, 0.2, 400, speed=500).problems()
         ['speed must be from -400 to 400 rad/s (max_speed), not 500']
         """
-        found = []
-        try:
-            if not vector(self.axis, 3, "axis").any():
-                found.append("axis must not be zero")
-        except FmuError as error:
-            found.append(str(error))
-        units = {"inertia": "kg·m²", "max_torque": "N·m", "max_speed": "rad/s"}
-        for name, unit in units.items():
-            value = getattr(self, name)
-            endless = name == "inertia" and value == np.inf
-            if not (_is_number(value) and value > 0) or endless:
-                found.append(f"{name} must be a number above 0, {unit}, not {value!r}")
-        if not (_is_number(self.speed) and np.isfinite(self.speed)):
+        found = not_vectors(self, 3, "axis")
+        if not found and not np.any(self.axis):
+            found.append("axis must not be zero")
+        found += not_positive("inertia", self.inertia, "kg·m²")
+        found += not_positive("max_torque", self.max_torque, "N·m", finite=False)
+        found += not_positive("max_speed", self.max_speed, "rad/s", finite=False)
+        if not (is_number(self.speed) and np.isfinite(self.speed)):
             found.append(f"speed must be a finite number, rad/s, not {self.speed!r}")
         elif not found and abs(self.speed) > self.max_speed:
             found.append(
@@ -144,10 +137,6 @@ class Wheel:
     def __repr__(self) -> str:
         """Return the wheel in a line."""
         return f"Wheel({self.describe()})"
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float | np.number) and not isinstance(value, bool)
 
 
 def wrong_wheels(wheels: Any) -> list[str]:

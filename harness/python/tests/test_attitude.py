@@ -98,5 +98,5 @@ def test_invalid_attitudes_are_refused() -> None:
         attitude.axis_angle((0, 0, 0), 1)
     with pytest.raises(FmuError, match="must be numbers"):
         attitude.quaternion("x")
-    with pytest.raises(FmuError, match="duration must be a positive"):
+    with pytest.raises(FmuError, match="duration must be a number above 0, s"):
         attitude.slew(1, 0)
