@@ -11,7 +11,7 @@
 
 pub mod allan;
 pub mod demodulation;
-mod exponential;
+pub mod exponential;
 pub mod features;
 pub mod free_decay;
 pub mod gauss_markov;

@@ -76,10 +76,6 @@ impl Parameter {
     pub fn text(&self, description: &ModelDescription) -> Result<String> {
         let name = &self.name;
         let Some(unit) = &self.unit else { return Ok(text(&self.value)) };
-        let in_line = || match self.line {
-            0 => name.clone(),
-            line => format!("line {line}"),
-        };
         let convert = || -> Result<f64> {
             let variable = description.variable(name)?;
             ensure!(
@@ -99,7 +95,11 @@ impl Parameter {
                 },
             }
         };
-        Ok(format!("{:?}", convert().with_context(in_line)?))
+        let converted = match self.line {
+            0 => convert()?,
+            line => convert().with_context(|| format!("line {line}"))?,
+        };
+        Ok(format!("{converted:?}"))
     }
 }
 

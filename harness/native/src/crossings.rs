@@ -7,13 +7,15 @@
 //! the state-space model, and the crossings are located there by root finding.
 
 use nalgebra::allocator::Allocator;
-use nalgebra::{Const, DefaultAllocator, DimDiff, DimSub, Dyn, OMatrix, Schur, U1};
+use nalgebra::{Const, DMatrix, DefaultAllocator, DimDiff, DimSub, Dyn, OMatrix, Schur, U1};
 use num_complex::Complex64 as Complex;
 use pyo3::buffer::PyBuffer;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::types::PyBytes;
 
 use crate::numbers::numbers;
+use crate::schedule::bytes;
 
 /// Loop gain above which no phase crossing is searched, because such a gain occurs only next to a pole on the imaginary
 /// axis, for example an integrator at 0.
@@ -836,4 +838,25 @@ impl Model {
         let parts = |w: &f64| self.at(*w).into_iter().flat_map(|value| [value.re, value.im]);
         Ok(py.detach(|| frequencies.iter().flat_map(parts).collect()))
     }
+}
+
+/// Return the exponentials of square matrices of `size` rows, which follow one another in an array, as the bytes of 64-bit floats.
+#[pyfunction]
+pub fn exponential<'py>(
+    py: Python<'py>,
+    matrices: &Bound<PyAny>,
+    size: usize,
+) -> PyResult<Bound<'py, PyBytes>> {
+    let matrices = numbers(matrices)?;
+    // Columns are read and written as rows: the exponential of the transposed matrix is the transposed exponential.
+    let power = |columns: &[f64]| {
+        let matrix = DMatrix::from_column_slice(size, size, columns);
+        let sum = matrix.abs().sum();
+        analysis::exponential::exponential(matrix, sum, |matrix| matrix.exp())
+    };
+    let found: Vec<f64> = py.detach(|| {
+        let each = matrices.chunks((size * size).max(1)).map(power);
+        each.flat_map(|found| found.as_slice().to_vec()).collect()
+    });
+    Ok(bytes(py, &found))
 }

@@ -24,7 +24,7 @@ mod tanks;
 #[pyo3::pymodule]
 mod _native {
     #[pymodule_export]
-    use crate::crossings::Model;
+    use crate::crossings::{Model, exponential};
     #[pymodule_export]
     use crate::files::{Folder, destination, put, read_parameters, read_recording};
     #[pymodule_export]

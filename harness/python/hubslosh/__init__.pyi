@@ -25,6 +25,7 @@ from .fmu import FmuWarning as FmuWarning
 from .fmu import Quantity as Quantity
 from .fmu import Value as Value
 from .fmu import fmu_path as fmu_path
+from .fmu import read_parameters as read_parameters
 from .inertia import bottom_up as bottom_up
 from .linearization import LinearModel as LinearModel
 from .linearization import linearize as linearize
@@ -36,11 +37,9 @@ from .loop import closed_loop as closed_loop
 from .mcmc import posterior as posterior
 from .modes import mode_errors as mode_errors
 from .operating_point import OperatingPoint as OperatingPoint
-from .plant import COLUMNS as COLUMNS
 from .plant import Plant as Plant
 from .plant import RunError as RunError
 from .plant import TORQUE as TORQUE
-from .plant import drive as drive
 from .program import Estimated as Estimated
 from .program import Identification as Identification
 from .program import analyse as analyse
@@ -57,10 +56,6 @@ from .simulation import simulate as simulate
 from .spectrum import frequency_response as frequency_response
 from .stability import Margins as Margins
 from .stability import margins as margins
-from .tables import read_parameters as read_parameters
-from .tables import read_table as read_table
-from .tables import setting as setting
-from .tables import write_table as write_table
 from .tanks import Tank as Tank
 from .tanks import tank as tank
 from .uncertainty import UncertainModel as UncertainModel

@@ -1,6 +1,6 @@
 """Runs a command of the program ``hubslosh``, whose folder need not be on PATH.
 
-    python -m hubslosh run --input torque.csv --out answer.csv --set slosh.model=spherical
+python -m hubslosh run --input torque.csv --out answer.csv --set slosh.model=spherical
 """
 
 import subprocess

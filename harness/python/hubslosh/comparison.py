@@ -163,18 +163,12 @@ def _over_fills(figure: "Figure", reviews: Mapping[str, Review]) -> None:
         nominal = points[points["kind"] == "nominal"].set_index("fill")
         stable = groups["stable"].all()
         order = np.argsort(review.at)
+        at = review.at[order]
         for ax, margin in zip(axes, MARGINS, strict=True):
             least = groups[margin].min().where(stable).replace(np.inf, np.nan)
             line = nominal[margin].replace(np.inf, np.nan)
-            ax.plot(
-                review.at[order],
-                line.to_numpy()[order],
-                ".-",
-                color=color,
-                markersize=4,
-                label=name,
-            )
-            ax.plot(review.at[order], least.to_numpy()[order], "--", color=color, linewidth=1)
+            ax.plot(at, line.to_numpy()[order], ".-", color=color, markersize=4, label=name)
+            ax.plot(at, least.to_numpy()[order], "--", color=color, linewidth=1)
     for ax, label in zip(axes, MARGINS.values(), strict=True):
         ax.set_ylabel(label)
         ax.margins(y=0.15)

@@ -24,7 +24,7 @@ rotations. A mode without displacement only twists. Sources: H. N. Abramson (ed.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
@@ -32,9 +32,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from .arguments import floats
+from .arguments import array, not_positive, parse_share, vector
 from .fmu import FmuError
-from .tanks import SIX_AXES
+from .tanks import SIX_AXES, prefix_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -246,16 +246,12 @@ class LiquidModes:
         """
         if model not in SIX_AXES:
             raise FmuError(f"parameters are for {' and '.join(SIX_AXES)}, not for {model!r}")
-        if number not in (1, 2, 3, 4):
-            raise FmuError(f"the tank's number is 1 to 4, not {number!r}")
+        name, place = prefix_of(model, number), vector(position, 3, "position")
         moving = self.all[self.all["mass"] > _MASSLESS * self.mass]
         most = min(3, len(moving))
         count = most if modes is None else modes
         if not (isinstance(count, int) and 1 <= count <= most):
             raise FmuError(f"modes is 1 to {most} here, not {modes!r}")
-        place = [float(x) for x in position]
-        if len(place) != 3 or not np.isfinite(place).all():
-            raise FmuError(f"position must be three numbers, not {position!r}")
         kept = moving.sort_values("mass", ascending=False, kind="stable").head(count)
         center = np.array(self.center)
         turn = np.radians(kept["direction"].to_numpy())
@@ -274,7 +270,6 @@ class LiquidModes:
             inertia - points_inertia(masses, bobs) - points_inertia(np.array([m_0]), r_0[:, None])
         )
         axis = (place[0] + center[0], place[1] + center[1], place[2])
-        name = f"tank[{number}]" if model == "Spacecraft" else "tank"
         values: dict[str, Value] = {
             **{f"{name}.position[{i}]": float(x) for i, x in enumerate(axis, 1)},
             f"{name}.m_0": float(m_0), f"{name}.H_0": float(center[2] + r_0[2]),
@@ -358,7 +353,7 @@ def liquid_modes(
     import pandas as pd
 
     name, size = _check_shape(shape)
-    force = np.atleast_1d(floats(specific_force))
+    force = np.atleast_1d(array(specific_force))
     force = np.array([0.0, 0.0, force[0]]) if force.shape == (1,) else force
     if force.shape != (3,) or not np.isfinite(force).all() or not np.linalg.norm(force) > 0:
         raise FmuError("specific_force is a number or three, m/s², and not 0")
@@ -366,8 +361,8 @@ def liquid_modes(
         raise FmuError(f"resolution is 4 to 40 elements, not {resolution!r}")
     if not (isinstance(modes, int) and 1 <= modes <= 40):
         raise FmuError(f"modes is 1 to 40, not {modes!r}")
-    if not (density > 0 and np.isfinite(density)):
-        raise FmuError(f"density is a positive number of kg/m³, not {density!r}")
+    if wrong := not_positive("density", density, "kg/m³"):
+        raise FmuError(*wrong)
     gravity = float(np.linalg.norm(force))
     tank = _Tank(name, size, _level(force))
     meshes = (max(3.0, resolution / 1.5), float(resolution))
@@ -489,8 +484,12 @@ class _Tank(NamedTuple):
     level: np.ndarray
 
     @contextmanager
-    def solid(self) -> "Iterator[tuple[Any, int, Sequence[float]]]":
-        """Return gmsh, the tag of the tank's rotated interior as a solid, and its bounding box."""
+    def solid(self) -> "Iterator[tuple[Any, int, Sequence[float], float]]":
+        """Return gmsh, the rotated inside of the tank as a solid, its bounding box and its volume.
+
+        The volume is that before the rotation, which takes the exact volume of round shapes from
+        the geometry's kernel.
+        """
         try:
             import gmsh
             import skfem  # noqa: F401, of the same extra
@@ -506,11 +505,12 @@ class _Tank(NamedTuple):
             gmsh.option.setString("Geometry.OCCTargetUnit", "M")
             occ = gmsh.model.occ
             solid = _solid(occ, self.name, self.size)
+            volume = float(occ.getMass(3, solid))
             turn = np.eye(4)
             turn[:3, :3] = self.level
             occ.affineTransform([(3, solid)], turn.ravel().tolist())
             occ.synchronize()
-            yield gmsh, solid, gmsh.model.occ.getBoundingBox(3, solid)
+            yield gmsh, solid, occ.getBoundingBox(3, solid), volume
         except FmuError:
             raise
         except Exception as error:  # gmsh raises what it is
@@ -539,7 +539,7 @@ def _mesh(tank: _Tank, surface: float | None, elements: float) -> Any:
     """
     from skfem import MeshTet2
 
-    with tank.solid() as (gmsh, solid, box):
+    with tank.solid() as (gmsh, solid, box, _):
         if surface is None:
             liquid, flat = solid, []
             extent = np.array([box])
@@ -571,27 +571,22 @@ def _mesh(tank: _Tank, surface: float | None, elements: float) -> Any:
 def _surface(tank: _Tank, fill: float | str, elements: float) -> float:
     """Return the height of the free surface.
 
-    Volumes are those of meshes and closed forms: the geometry's kernel has those of round tanks up
-    to a hundredth wrong, and is good for a first guess.
+    Volumes are those of meshes and of upright tanks: the geometry's kernel has those of cut or
+    rotated round tanks up to a hundredth wrong, and is good for a first guess.
     """
-    per_cent = isinstance(fill, str) and fill.strip().endswith("%")
-    part = np.nan
-    if per_cent:
-        with suppress(ValueError):
-            part = float(fill.strip()[:-1]) / 100
-        if not 0 < part < 1:
-            raise FmuError(f"fill is between 0% and 100% of the volume, not {fill!r}")
-    with tank.solid() as (gmsh, solid, box):
+    part = parse_share(fill)
+    if isinstance(fill, str) and fill.strip().endswith("%") and not (part and part < 1):
+        raise FmuError(f"fill is between 0% and 100% of the volume, not {fill!r}")
+    with tank.solid() as (gmsh, solid, box, whole):
         occ = gmsh.model.occ
         low, high = _heights(occ, solid, tank.name, tank.size, tank.level)
-        if not per_cent:
+        if part is None:
             if isinstance(fill, bool | str) or not 0 < float(fill) < high - low:
                 raise FmuError(
                     f"fill is a height between 0 and {high - low:.6g} m, or a text like "
                     f'"60%", not {fill!r}'
                 )
             return low + float(fill)
-        whole = occ.getMass(3, solid)
 
         def excess(height: float) -> float:
             [(_, copy)] = occ.copy([(3, solid)])
@@ -607,8 +602,6 @@ def _surface(tank: _Tank, fill: float | str, elements: float) -> float:
 
     if tank.name == "step":
         whole = _on_a_mesh(tank, None, 1.5 * elements, _volume)
-    else:
-        whole = _VOLUMES[tank.name](**tank.size)
     for _ in range(5):
         volume, area = _on_a_mesh(tank, surface, elements, partial(_volume_and_area, surface))
         step = (part * whole - volume) / area
@@ -616,17 +609,6 @@ def _surface(tank: _Tank, fill: float | str, elements: float) -> float:
         if abs(step) < 1e-4 * (high - low):
             break  # what is left is a hundredth of this step, or less
     return surface
-
-
-_VOLUMES: "dict[str, Callable[..., float]]" = {
-    "cylinder": lambda radius, height: np.pi * radius**2 * height,
-    "horizontal_cylinder": lambda radius, length: np.pi * radius**2 * length,
-    "sphere": lambda radius: 4 / 3 * np.pi * radius**3,
-    "box": lambda length, width, height: length * width * height,
-    "sector": lambda radius, inner_radius, angle, height: (
-        np.radians(angle) / 2 * (radius**2 - inner_radius**2) * height
-    ),
-}
 
 
 def _volume(mesh: Any) -> float:
@@ -707,20 +689,13 @@ def _solve(mesh: Any, surface: float, density: float, gravity: float, count: int
     """Return the slosh modes that are computed on one mesh, without an estimate of their errors."""
     import pandas as pd
     from scipy.sparse.linalg import LinearOperator, eigsh, splu
-    from skfem import Basis, BilinearForm, ElementTetP2, FacetBasis, Functional, LinearForm
+    from skfem import Basis, ElementTetP2, FacetBasis, Functional, LinearForm
+    from skfem.models.poisson import laplace, mass
 
     element = ElementTetP2()
     volume = Basis(mesh, element, intorder=4)
     facets = (mesh.boundary_facets(), _on_surface(mesh, surface))
     wet, lid = (FacetBasis(mesh, element, facets=f, intorder=5) for f in facets)
-
-    @BilinearForm
-    def stiffness(u: Any, v: Any, _: Any) -> Any:
-        return sum(u.grad[i] * v.grad[i] for i in range(3))
-
-    @BilinearForm
-    def square(u: Any, v: Any, _: Any) -> Any:
-        return u * v
 
     def integral(basis: Any, f: "Callable[[np.ndarray], np.ndarray]") -> float:
         return float(Functional(lambda w: f(w.x)).assemble(basis))
@@ -740,7 +715,7 @@ def _solve(mesh: Any, surface: float, density: float, gravity: float, count: int
 
     normal = [along(j) for j in range(6)]
     flux = [LinearForm(lambda v, w, f=f: v * f(w)).assemble(wet) for f in normal]
-    s, m = stiffness.assemble(volume).tocsc(), square.assemble(lid).tocsc()
+    s, m = laplace.assemble(volume).tocsc(), mass.assemble(lid).tocsc()
 
     # M x = μ (S + M) x, μ = 1/(1 + λ): the constant, μ = 1, comes first
     both = splu((s + m).tocsc())

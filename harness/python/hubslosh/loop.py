@@ -382,17 +382,7 @@ class Loop:
         cycles, rest = split_delay(self.delay + more_delay, self.period)
         # measured as in the simulation: before the command changes
         P = plant._delayed(self.period, cycles + int(self.latency), rest)
-        n, m = len(P.A), len(K.A)
-        return LinearModel(
-            np.block([[P.A, np.zeros((n, m))], [K.B @ P.C, K.A]]),
-            np.vstack([P.B, np.zeros((m, P.B.shape[1]))]),
-            np.hstack([K.D @ P.C, K.C]),
-            np.zeros((len(K.D), P.B.shape[1])),
-            (*P.states, *(f"controller.{name}" for name in K.states)),
-            plant.inputs,
-            plant.inputs,
-            self.period,
-        )
+        return replace(P._then(K, "controller."), outputs=plant.inputs, period=self.period)
 
     def simulate(
         self,

@@ -1,4 +1,4 @@
-"""Instances of an FMU, which step from time to time; variables have their FMU names and SI units."""
+"""Instances of an FMU that step from time to time; variables have their FMU names, in SI units."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -372,20 +372,15 @@ def _from_transfer_functions(num: Any, den: Any, period: float | None) -> Linear
             "controller: num and den must be matrices of polynomials, a row for each command and a "
             "column for each measurement, such as num = [[[1.0, 2.0]]]"
         )
-    count = (len(shape), shape[0])
-    parts = [
-        [tf2ss(n, d) for n, d in zip(*rows, strict=True)] for rows in zip(num, den, strict=True)
-    ]
-    sizes = [len(A) for row in parts for A, *_ in row]
-    B, C = np.zeros((sum(sizes), count[1])), np.zeros((count[0], sum(sizes)))
-    D, start = np.zeros(count), 0
-    for i, row in enumerate(parts):
-        for j, (_, b, c, d) in enumerate(row):
-            end = start + len(b)
-            B[start:end, j], C[i, start:end], D[i, j] = b[:, 0], c[0], d[0, 0]
-            start = end
-    A = block_diag(*(A for row in parts for A, *_ in row)).reshape(sum(sizes), sum(sizes))
-    return LinearModel(A, B, C, D, (), (), (), period)
+    A, B, C, D = [], [], [], np.zeros((len(shape), shape[0]))
+    for i, row in enumerate(zip(num, den, strict=True)):
+        for j, polynomials in enumerate(zip(*row, strict=True)):
+            a, b, c, d = tf2ss(*polynomials)
+            A.append(a)
+            B.append(b * (np.arange(D.shape[1]) == j))
+            C.append(c * (np.arange(len(D)) == i)[:, None])
+            D[i, j] = d[0, 0]
+    return LinearModel(block_diag(*A), np.vstack(B), np.hstack(C), D, (), (), (), period)
 
 
 def main() -> None:

@@ -91,10 +91,9 @@ def _row(
     """Return the row of the table for one mode in one loop."""
     T = one.period
     assert T is not None
-    A, b, c, d = one.A, one.B[:, 0], one.C[0], one.D[0, 0]
 
     def value(z: complex) -> complex:
-        return complex(c @ np.linalg.solve(z * np.eye(len(A)) - A, b) + d)
+        return complex(one._at(np.array([z]))[0, 0, 0])
 
     s = np.log(pole) / T
     near = np.exp((1e-3 * abs(s) + 1j * s.imag) * T)  # where an undamped pole is finite too

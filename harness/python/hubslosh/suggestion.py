@@ -1,7 +1,7 @@
 """A notch or roll-off that a review suggests, and its cost in phase."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -54,7 +54,7 @@ def suggest(
     best = None
     for words, law in _candidates(slosh, rigid["frequency"], loop.period):
         at = np.exp(2j * np.pi * rigid["frequency"].to_numpy() * loop.period)
-        cost = float(-np.degrees(np.angle(_value(law, at))).min(initial=0.0))
+        cost = float(-np.degrees(np.angle(law._at(at)[:, 0, 0])).min(initial=0.0))
         if cost > DEAREST:
             continue
         after = min(_distance(p, w, L, law) for p, (w, L) in zip(points, grids, strict=True))
@@ -117,25 +117,12 @@ def _second_order(f: float, zeta: float, period: float, notch: float | None) -> 
     return _tustin(LinearModel(A, B, C, D, ("f[1]", "f[2]"), ("u",), ("y",)), period)
 
 
-def _value(law: LinearModel, z: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """Return the filter's transfer function in the z plane."""
-    states = np.linalg.solve(z[:, None, None] * np.eye(len(law.A)) - law.A, law.B)
-    return np.asarray((law.C @ states + law.D)[:, 0, 0])
-
-
 def _series(first: LinearModel, law: LinearModel) -> LinearModel:
     """Return a system with the filter on each of its outputs."""
     count = len(first.D)
-    A, B, C, D = (np.kron(np.eye(count), matrix) for matrix in law)
-    n, m = len(first.A), len(A)
-    return replace(
-        first,
-        A=np.block([[first.A, np.zeros((n, m))], [B @ first.C, A]]),
-        B=np.vstack([first.B, B @ first.D]),
-        C=np.hstack([D @ first.C, C]),
-        D=D @ first.D,
-        states=(*first.states, *(f"filter[{i + 1}]" for i in range(m))),
-    )
+    matrices = [np.kron(np.eye(count), matrix) for matrix in law]
+    states = tuple(f"filter[{i + 1}]" for i in range(len(matrices[0])))
+    return first._then(LinearModel(*matrices, states, first.outputs, first.outputs), "")
 
 
 def _sampled(point: "Point") -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
@@ -154,5 +141,5 @@ def _distance(
     size = _largest(_moved(_series(point.gain, law)), point.gain.period)
     if size >= 1:
         return -float(np.log(size) / point.loop.period)
-    sensitivity = np.linalg.inv(np.eye(L.shape[1]) + _value(law, z)[:, None, None] * L)
+    sensitivity = np.linalg.inv(np.eye(L.shape[1]) + law._at(z) * L)
     return float(1 / np.abs(np.diagonal(sensitivity, axis1=1, axis2=2)).max())

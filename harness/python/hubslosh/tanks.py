@@ -10,7 +10,10 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from . import native
+from .arguments import check_numbers, vector
 from .fmu import FmuError, FmuWarning
 from .temporary import write_file
 
@@ -74,7 +77,6 @@ class Tank:
         angle (m/rad). With a viscosity also the damping ratio ``zeta`` and its interval from
         ``zeta_low`` to ``zeta_high``.
         """
-        import numpy as np
         import pandas as pd
 
         columns = {"m": "mass", "l": "length", "H": "bob", "hinge": "hinge", "wave": "wave"}
@@ -170,37 +172,21 @@ class Tank:
         >>> values["tank[2].position[3]"], values["tank[2].modes"]
         (0.2, 3)
         """
-        placed = {"position": position, "axis": axis}
-        for name, value in placed.items():
-            if value is None:
-                continue
-            if model not in SIX_AXES:
-                raise FmuError(f"{name} is for {' and '.join(SIX_AXES)}, not for {model}")
-            try:
-                numbers = [float(x) for x in value]
-            except (TypeError, ValueError):
-                numbers = []
-            if len(numbers) != 3 or (name == "axis" and not any(numbers)):
-                raise FmuError(f"{name} must be three numbers, not {value!r}")
-        if model == "Spacecraft":
-            if number not in (1, 2, 3, 4):
-                raise FmuError(f"the tank's number is 1 to 4, not {number!r}")
-            prefix = f"tank[{number}]"
-            of = (
-                self._spacecraft_parameters
-                if rigid or self.all["modes"]
-                else self._parameters(model)
-            )
-            found = {prefix + name.removeprefix("tank[1]"): value for name, value in of.items()}
-        elif model == "SloshTank":
-            prefix, found = "tank", self._parameters("SloshTank")
-        elif model == "HubSlosh":
-            if rigid:
-                raise FmuError("rigid= is not for HubSlosh: set slosh.model = frozen instead")
-            return self._parameters("HubSlosh")
-        else:
+        if model not in (*SIX_AXES, "HubSlosh"):
             raise FmuError(f"there are no parameters of a tank for {model!r} (for: Spacecraft, "
                            "SloshTank, HubSlosh)")  # fmt: skip
+        if model == "HubSlosh":
+            for name, value in {"position": position, "axis": axis}.items():
+                if value is not None:
+                    raise FmuError(f"{name} is for {' and '.join(SIX_AXES)}, not for {model}")
+            if rigid:
+                raise FmuError("rigid= is not for HubSlosh: set slosh.model = frozen instead")
+            return self._parameters(model)
+        place = None if position is None else vector(position, 3, "position")
+        prefix = prefix_of(model, number)
+        is_known = model == "Spacecraft" and (rigid or self.all["modes"])
+        of = self._spacecraft_parameters if is_known else self._parameters(model)
+        found = {re.sub(r"^tank(\[1\])?", prefix, name): value for name, value in of.items()}
         if rigid:
             whole = ("m_0", "H_0", "I_0", "dI_y", "I_z", "g_ref", "modes")
             kept = {f"{prefix}.{name}" for name in whole}
@@ -209,8 +195,8 @@ class Tank:
             # of a box with two lengths that about y, along its first length
             about_x = float(self.all["I_eff_cg"]) - float(found.get(f"{prefix}.dI_y", 0.0))
             found |= {f"{prefix}.I_0": about_x, f"{prefix}.modes": 0}
-        if position is not None:
-            found |= {f"{prefix}.position[{i + 1}]": float(x) for i, x in enumerate(position)}
+        if place is not None:
+            found |= {f"{prefix}.position[{i + 1}]": float(x) for i, x in enumerate(place)}
         if axis is not None:
             found |= {f"{prefix}.q[{i + 1}]": x for i, x in enumerate(_from_z(axis))}
         return found
@@ -234,6 +220,15 @@ class Tank:
         for warning in warned:
             warnings.warn(warning, FmuWarning, stacklevel=4)
         return dict(found)
+
+
+def prefix_of(model: str, number: int) -> str:
+    """Return the beginning of the names of a tank's parameters in Spacecraft or SloshTank."""
+    if model == "SloshTank":
+        return "tank"
+    if number not in (1, 2, 3, 4):
+        raise FmuError(f"the tank's number is 1 to 4, not {number!r}")
+    return f"tank[{number}]"
 
 
 @dataclass(frozen=True, eq=False)
@@ -365,13 +360,10 @@ def tank(
         raise FmuError('give the fill: a height in m, "60%" of the volume, or fill_mass in kg')
     if fill is not None:
         check_fill(fill)
-    numbers = {
-        "fill_mass": fill_mass, "modes": modes, "gravity": gravity, "nu": nu, "sigma": sigma,
-        "contact_angle": contact_angle, "spin": spin,
-    }  # fmt: skip
-    for name, value in numbers.items():
-        if value is not None and (isinstance(value, bool) or not _is_number(value)):
-            raise FmuError(f"{name} must be a number, not {value!r}")
+    check_numbers(
+        fill_mass=fill_mass, modes=modes, gravity=gravity, nu=nu, sigma=sigma,
+        contact_angle=contact_angle, spin=spin,
+    )  # fmt: skip
     if modes < 1 or modes != int(modes):
         raise FmuError(f"modes must be a whole number from 1 on, not {modes!r}")
     amount = (float(fill_mass), "kg") if fill_mass is not None else fill
@@ -462,9 +454,10 @@ def _toml(value: Any) -> str:
 
 def _from_z(axis: Sequence[float]) -> list[float]:
     """Return the quaternion of the shortest turn that takes z to an axis."""
-    import numpy as np
-
-    x, y, z = np.asarray(axis, float) / np.linalg.norm(axis)
+    given = vector(axis, 3, "axis")
+    if not given.any():
+        raise FmuError("axis must not be zero")
+    x, y, z = given / np.linalg.norm(given)
     if z < -1 + 1e-12:
         return [0.0, 1.0, 0.0, 0.0]
     q = np.array([1 + z, -y, x, 0.0])

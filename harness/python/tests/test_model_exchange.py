@@ -7,7 +7,6 @@ import pytest
 from conftest import drive
 from fmpy import simulate_fmu
 
-
 STEP = 0.02  # s
 TIME = np.arange(1001) * STEP  # 20 s
 HELD = 25  # rows between two changes of the torque

@@ -9,7 +9,6 @@ import pytest
 from conftest import drive
 from fmpy import read_model_description, simulate_fmu, simulation
 
-
 STEP = 0.02  # s
 TIME = np.arange(3001) * STEP
 

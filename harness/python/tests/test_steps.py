@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from conftest import drive
 
-
 DURATION = 60  # s
 KNOTS = np.arange(10 * DURATION + 1) / 10
 """Corners of the torque, s; communication points of every run."""
