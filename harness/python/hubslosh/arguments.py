@@ -1,14 +1,14 @@
 """Checks of arguments, with messages for wrong ones."""
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .fmu import FmuError
+from .fmu import FmuError, did_you_mean
 
 # Allowed times, s.
 SECONDS: dict[str, tuple[float, float]] = {
@@ -155,10 +155,29 @@ def check_table(table: Any, what: str) -> None:
         raise FmuError(f"{what} must be a pandas.DataFrame, not {table!r}")
 
 
+def check_columns(table: Any, names: Iterable[str], what: str) -> None:
+    """Raise FmuError if an argument is not a pandas.DataFrame with columns of these names."""
+    check_table(table, what)
+    there = [str(name) for name in table.columns]
+    missing = [f"{name}{did_you_mean(name, there)}" for name in names if name not in there]
+    if missing:
+        raise FmuError(f"{what} has no column {', '.join(missing)}")
+
+
+def numbers_in(table: Any, names: Sequence[str], what: str) -> list[NDArray[np.float64]]:
+    """Return columns of a table as finite numbers, or raise FmuError that says what is wrong."""
+    check_columns(table, names, what)
+    problems: list[str] = []
+    found = [column_of(table, name, what, problems) for name in names]
+    if problems:
+        raise FmuError("; ".join(problems))
+    return found  # type: ignore[return-value]
+
+
 def column_of(table: Any, name: Any, what: str, problems: list[str]) -> np.ndarray | None:
     """Return the column ``name`` of a table as finite numbers.
 
-    If the column is missing or has other values, a sentence about the argument ``what`` is appended
+    If the column has other values, a sentence about the argument ``what`` is appended
     to ``problems``.
     """
     try:

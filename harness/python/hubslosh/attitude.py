@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .arguments import array, check_numbers, floats, not_positive, vector
+from .arguments import array, check_columns, check_numbers, floats, not_positive, vector
 from .fmu import FmuError
 
 if TYPE_CHECKING:
@@ -24,8 +24,7 @@ Real = NDArray[np.float64]
 def _unit_quaternions(q: Any) -> Real:
     """Return quaternions as rows, of length 1; of a table its columns q[1], …, q[4]."""
     if hasattr(q, "columns"):
-        if missing := [name for name in NAMES if name not in q.columns]:
-            raise FmuError(f"the table has no column {', '.join(missing)}")
+        check_columns(q, NAMES, "the table")
         q = q[list(NAMES)].to_numpy(float)
     rows = array(q)
     if rows.ndim not in (1, 2) or rows.shape[-1] != 4:

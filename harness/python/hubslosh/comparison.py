@@ -11,6 +11,7 @@ import pandas as pd
 from .curves import curves_of, draw_nichols
 from .fmu import FmuError
 from .plot import COLORS
+from .requirements import margins_of
 from .review import Review
 from .review_page import document, figure_of, key_of, table_of
 from .short import ShortTable
@@ -80,10 +81,7 @@ def compare(reviews: Mapping[str, Review], out: str | Path | None = None) -> pd.
 
 
 def _margins_of(review: Review) -> pd.DataFrame:
-    points = review.points
-    gain = points[["gain_up", "gain_down"]].abs().min(axis=1)
-    found = points.assign(gain_margin=gain, phase_margin=points["phase_margin"].abs())
-    return found[["kind", "fill", "stable", *MARGINS]]
+    return review.points[["kind", "fill", "stable"]].join(margins_of(review.points))
 
 
 def _row(review: Review) -> dict[str, Any]:

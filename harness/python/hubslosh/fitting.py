@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from .arguments import check_table, floats
+from .arguments import floats, numbers_in
 from .fmu import FmuError
 from .linearization import control_package
 
@@ -141,27 +141,18 @@ def fit(response: pd.DataFrame, poles: int = 3, zeros: int = 2) -> TransferFunct
     """
     from scipy.optimize import least_squares
 
-    check_table(response, "response")
+    frequency, real, imag = numbers_in(response, ["frequency", "real", "imag"], "response")
     for name, count in (("poles", poles), ("zeros", zeros)):
         if not isinstance(count, int | np.integer):
             raise FmuError(f"{name} must be a whole number, not {count!r}")
-    problems = [
-        f"response has no column {name}"
-        for name in ("frequency", "real", "imag")
-        if name not in response.columns
-    ]
+    problems = []
     if not (0 <= zeros <= poles and poles >= 1):
         problems.append(f"poles must be 1 or more and at least zeros, not {poles} and {zeros}")
     if not problems and len(response) < poles + zeros + 1:
         problems.append(f"{len(response)} frequencies are too few for {poles + zeros + 1} unknowns")
     if problems:
         raise FmuError("; ".join(problems))
-    frequency, real, imag = (
-        response[name].to_numpy(float) for name in ("frequency", "real", "imag")
-    )
     data = real + 1j * imag
-    if not (np.isfinite(data).all() and np.isfinite(frequency).all()):
-        raise FmuError("response is not finite everywhere")
     # s in units of the band's middle, for the equations' condition
     unit = 2 * np.pi * float(np.exp(np.mean(np.log(frequency))))
     s = 2j * np.pi * frequency / unit

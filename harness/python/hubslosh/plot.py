@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from .arguments import check_table
+from .arguments import check_columns, check_table
 from .curves import curves_of, draw_bode, draw_nichols, draw_nyquist
-from .fmu import FmuError, did_you_mean
+from .fmu import FmuError
 from .stability import _broken_at, band, frequencies, margins_and_gain
 
 if TYPE_CHECKING:
@@ -42,14 +42,6 @@ def _subplots(rows: int, height: float | None = None, **options: Any) -> "Sequen
     )
     column: Sequence[Axes] = axes[:, 0]
     return column
-
-
-def _check(table: pd.DataFrame, names: Sequence[str]) -> None:
-    check_table(table, "what is drawn")
-    there = [str(name) for name in table.columns]
-    missing = [f"{name}{did_you_mean(name, there)}" for name in names if name not in there]
-    if missing:
-        raise FmuError(f"the table has no column {', '.join(missing)}")
 
 
 def _label(table: pd.DataFrame, name: str) -> str:
@@ -114,9 +106,9 @@ def time_histories(
     >>> [ax.get_ylabel() for ax in axes]
     ['omega (rad/s)', 'slosh_angle (rad)']
     """
-    check_table(run, "what is drawn")
+    check_table(run, "the table")
     columns = list(names) or [str(c) for c in run.columns if c != "time"]
-    _check(run, ["time", *columns])
+    check_columns(run, ["time", *columns], "the table")
     return _panels(run, {_label(run, name): [(label, run[name])] for name in columns}, axes)
 
 
@@ -150,7 +142,7 @@ def path(run: pd.DataFrame, ax: "Axes | None" = None, label: str | None = None) 
     >>> hubslosh.plot.path(run).get_xlabel()
     'radial angle (deg), positive outwards'
     """
-    _check(run, ["slosh_angle", "slosh_angle_radial"])
+    check_columns(run, ["slosh_angle", "slosh_angle_radial"], "the table")
     ax = _subplots(1)[0] if ax is None else ax
     _line(ax, *(np.degrees(run[name]) for name in ("slosh_angle_radial", "slosh_angle")), label)
     ax.set_xlabel("radial angle (deg), positive outwards")
@@ -201,7 +193,7 @@ def bode(
     """
     frames = [r for r in responses if isinstance(r, pd.DataFrame)]
     for frame in frames:
-        _check(frame, ["frequency", "gain", "phase", "gain_std"])
+        check_columns(frame, ["frequency", "gain", "phase", "gain_std"], "the table")
     models = [r for r in responses if not isinstance(r, pd.DataFrame)]
     if wrong := [r for r in models if not hasattr(r, "response")]:
         raise FmuError(
@@ -546,14 +538,14 @@ def closed_loop(
     """
     from .attitude import NAMES, angles, error
 
-    _check(run, ["time"])
+    check_columns(run, ["time"], "the table")
     panels: dict[str, Mapping[Any, Any]] = {}
     if all(name in run.columns for name in NAMES):
         panels["attitude (deg)"] = dict(np.degrees(angles(run)).items())
     elif "theta" in run.columns:
         panels["attitude (deg)"] = {"theta": np.degrees(run["theta"])}
     if reference is not None:
-        _check(reference, ["time"])
+        check_columns(reference, ["time"], "the table")
         wanted = {
             str(n): np.interp(run["time"], reference["time"], reference[n])
             for n in reference.columns
@@ -619,13 +611,13 @@ def monte_carlo(
     """
     from .sampling import quantiles
 
-    check_table(table, "what is drawn")
+    check_table(table, "the table")
     drawn = table.attrs.get("drawn")
     if drawn is None:  # a table from elsewhere, such as runs.csv
         drawn = [c for c in table.columns if "." in str(c) or "[" in str(c)]
     numbers = [str(c) for c in table.select_dtypes("number").columns if c != "run"]
     names = list(columns) or [n for n in numbers if n not in drawn]
-    _check(table, names)
+    check_columns(table, names, "the table")
     if not names:
         raise FmuError("the table has no results to draw")
     axes = _subplots(len(names)) if axes is None else axes

@@ -67,15 +67,19 @@ def requirements_of(given: Any) -> tuple[Requirement, ...]:
     return tuple(found)
 
 
+def margins_of(points: pd.DataFrame) -> pd.DataFrame:
+    """Return the margins that may be required, at each operating point of a review."""
+    gain = points[["gain_up", "gain_down"]].abs().min(axis=1)
+    found = points.assign(gain_margin=gain, phase_margin=points["phase_margin"].abs())
+    return found[list(UNITS)]
+
+
 def judged(requirements: tuple[Requirement, ...], points: pd.DataFrame) -> ShortTable:
     """Judge the margins of the operating points by the requirements, failed requirements first.
 
     The returned table has one row for each requirement and the columns of `Review.requirements`.
     """
-    margins = points[["modulus_margin", "delay_margin"]].copy()
-    margins["phase_margin"] = points["phase_margin"].abs()
-    margins["gain_margin"] = points[["gain_up", "gain_down"]].abs().min(axis=1)
-    margins = margins.where(points["stable"], -np.inf)  # an unstable point has no margin
+    margins = margins_of(points).where(points["stable"], -np.inf)  # an unstable point has no margin
     rows = []
     for one in requirements:
         among = margins[points["kind"] == "nominal"] if one.points == "nominal" else margins

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .arguments import (
+    check_columns,
     check_numbers,
     check_table,
     floats,
@@ -456,8 +457,7 @@ def quantiles(
         names = names_of(columns, "columns", problems)
         if problems:
             raise FmuError("; ".join(problems))
-    if missing := [name for name in names if name not in table.columns]:
-        raise FmuError(f"the table has no column {', '.join(missing)}")
+    check_columns(table, names, "the table")
     try:
         shares = [float(share) for share in np.atleast_1d(floats(at))]
     except (TypeError, ValueError):

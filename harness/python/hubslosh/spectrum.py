@@ -6,8 +6,8 @@ This estimate is independent of the one in the program ``hubslosh``.
 import numpy as np
 import pandas as pd
 
-from .arguments import check_numbers, check_table, vector
-from .fmu import FmuError, did_you_mean
+from .arguments import check_numbers, numbers_in, vector
+from .fmu import FmuError
 
 BINS = 3  # Half the width of the smoothing in lines of the spectrum, unless a resolution is given
 
@@ -79,21 +79,10 @@ def frequency_response(
     """
     from scipy import fft, signal
 
-    check_table(data, "data")
     check_numbers(resolution=resolution)
     if band is not None:
         vector(band, 2, "band")
-    problems = [
-        f"data has no column {name}{did_you_mean(name, map(str, data.columns))}"
-        for name in ("time", input, output)
-        if name not in data.columns
-    ]
-    if problems:
-        raise FmuError("; ".join(problems))
-    time, u, y = (data[name].to_numpy(float) for name in ("time", input, output))
-    for name, values in (("time", time), (input, u), (output, y)):
-        if not np.isfinite(values).all():
-            raise FmuError(f"{name} is not finite in row {np.flatnonzero(~np.isfinite(values))[0]}")
+    time, u, y = numbers_in(data, ["time", input, output], "data")
     if len(time) < 16:
         raise FmuError(f"a frequency response needs 16 rows or more, not {len(time)}")
     step = float(np.median(np.diff(time)))

@@ -172,7 +172,10 @@ def test_all_faults_of_a_call_are_reported_at_once(fmu: Path) -> None:
         # C would take their last 32 bits: 1, and a seed
         ({"parameters": {"slosh.modes": 2**32 + 1}}, "from -2147483648 to 2147483647"),
         ({"parameters": {"imu.seed": 2**31}}, "from -2147483648 to 2147483647"),
-        ({"parameters": {"slosh.modes": float("inf")}}, 'slosh.modes expects a whole number, not "inf"'),
+        (
+            {"parameters": {"slosh.modes": float("inf")}},
+            'slosh.modes expects a whole number, not "inf"',
+        ),
         ({"parameters": {"slosh.model": 2**32 + 2}}, "expects one of frozen (1), linear (2)"),
         ({"parameters": {"tank.h": float("nan")}}, "tank.h expects a finite number, not NaN"),
         ({"stop": 1e12}, "rows (allowed: at most 20000000)"),
