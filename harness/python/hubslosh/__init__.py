@@ -23,7 +23,6 @@ from typing import Any
 _MODULES = {
     "appendages": ("Appendage",),
     "certificate": ("Certificate", "WorstCase"),
-    "checking": ("Checked", "CheckedRule", "Finding", "check"),
     "comparison": ("compare",),
     "craft": ("Craft", "MassProperties", "MountedTank"),
     "engines": ("Engine",),
@@ -34,11 +33,13 @@ _MODULES = {
     "linearization": ("LinearModel", "linearize"),
     "liquid": ("LiquidModes", "liquid_modes"),
     "loop": ("Law", "Loop", "closed_loop"),
-    "mcmc": ("posterior",),
     "modes": ("mode_errors",),
     "operating_point": ("OperatingPoint",),
     "plant": ("TORQUE", "Plant", "RunError"),
-    "program": ("Estimated", "Identification", "analyse", "campaign", "identify"),
+    "program": (
+        "Checked", "CheckedRule", "Estimated", "Finding", "Identification", "analyse", "campaign",
+        "check", "identify", "posterior",
+    ),
     "project": ("Project",),
     "recordings": ("read_recording",),
     "review": ("Review",),
@@ -51,7 +52,7 @@ _MODULES = {
     "uncertainty": ("UncertainModel", "uncertain"),
     "viewing": ("View", "view"),
     "wheels": ("Wheel",),
-}
+}  # fmt: skip
 # Removed names, and what does the same.
 _REMOVED = {
     "COLUMNS": "the argument outputs of hubslosh.simulate",

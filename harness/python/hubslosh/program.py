@@ -1,5 +1,6 @@
-"""Calls of the program ``hubslosh``: campaigns, recordings and identification."""
+"""Calls of the program ``hubslosh``: campaigns, recordings, identification and checks of FMUs."""
 
+import json
 import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -444,3 +445,289 @@ def identify(
         verdict=tuple(loaded["verdict"]),
         all=loaded,
     )
+
+
+def posterior(
+    found: Identification,
+    data: Table | Sequence[Table],
+    *arguments: str,
+    fmu: str | Path,
+    free: Mapping[str, Free],
+    inputs: Sequence[str] = (),
+    outputs: Sequence[str] = (),
+    prior: Mapping[str, tuple[float, float]] | None = None,
+    settings: Mapping[str, object] | None = None,
+    walkers: int | None = None,
+    steps: int = 300,
+    burn: int = 100,
+    seed: int = 1,
+    program: str | Path | None = None,
+) -> pd.DataFrame:
+    """Sample the posterior of the unknowns that `identify` has estimated with ``free=``.
+
+    emcee (Foreman-Mackey et al., PASP 125, 2013) samples the likelihood that `identify`
+    maximises, with the noise that it has estimated. Each step simulates the recordings once for
+    each walker. Needs the package emcee.
+
+    Parameters
+    ----------
+    found : Identification
+        Result of `identify`. The walkers start from its normal distribution.
+    data, *arguments, fmu, free, inputs, outputs, prior, settings
+        Arguments of the call of `identify` that has given ``found``, unchanged.
+    walkers : int, optional
+        Number of walkers, at least twice the number of unknowns; by default four times.
+    steps : int
+        Number of steps of each walker.
+    burn : int
+        Number of first steps that are dropped.
+    seed : int
+        Seed of the random numbers; the same seed gives the same samples.
+    program : str or Path, optional
+        The program ``hubslosh``; by default the one that comes with this package.
+
+    Returns
+    -------
+    DataFrame
+        A row for each of ``(steps - burn) * walkers`` samples and a column for each unknown, SI
+        units. ``table.quantile([0.025, 0.975])`` gives 95 % intervals.
+        ``.attrs["autocorrelation"]`` has the correlation time of each unknown in steps; if
+        ``steps - burn`` is less than ten correlation times, the intervals are inaccurate.
+
+    Raises
+    ------
+    FmuError
+        If emcee is not installed, ``found`` was not found with ``free=``, or an unknown is not
+        determined.
+
+    Examples
+    --------
+    Two seconds of a free decay from a known angle; a useful chain has 300 steps or more:
+
+    >>> import numpy as np
+    >>> import hubslosh
+    >>> bench = {"friction.model": "viscous", "init.slosh_angle": 0.1}
+    >>> run = hubslosh.simulate(parameters=bench, stop=4, step=0.05, outputs="omega")
+    >>> run["omega"] += np.random.default_rng(1).normal(0, 1e-5, len(run))  # noise of a gyro
+    >>> question = {"fmu": "HubSlosh", "free": {"friction.b": 0.03}, "outputs": ["omega"],
+    ...             "settings": bench}
+    >>> found = hubslosh.identify(run, **question)
+    >>> samples = hubslosh.posterior(found, run, **question, walkers=4, steps=5, burn=3)
+    >>> len(samples), list(samples.columns)
+    (8, ['friction.b'])
+    """
+    try:
+        import emcee
+    except ImportError:
+        raise FmuError("posterior() needs emcee: pip install emcee") from None
+    table = found.covariance
+    names, covariance = list(table.index), table.to_numpy()
+    estimates = found.parameters | found.measurement
+    middle = np.array([estimates[name].value for name in names])
+    if not np.isfinite(covariance).all():
+        raise FmuError(
+            "the recordings do not determine every unknown, so that the walkers have no range "
+            "in which to start"
+        )
+    walkers = walkers or 4 * len(names)
+    path = find_program(program)
+    with temporary.folder() as folder:
+        result, points = Path(folder) / "result.json", Path(folder) / "points.csv"
+        result.write_text(json.dumps(found.all), encoding="utf-8")
+        files, named = _files(data, (), Path(folder))
+        named |= {str(result): "found", str(points): "the samples"}
+        flags = ["--fmu", str(fmu_path(fmu)), *_free_flags(free, inputs, outputs, prior or {})]
+        flags += [*settings_flags(settings), *arguments]
+        flags += ["--points", str(points), "--found", str(result)]
+
+        def log_likelihood(x: np.ndarray) -> np.ndarray:
+            pd.DataFrame(x, columns=names).to_csv(points, index=False)
+            deviance = call(path, "identify", [*files, *flags], names=named)
+            return np.array([-np.inf if d is None else -0.5 * d for d in deviance])
+
+        random = np.random.default_rng(seed)
+        start = random.multivariate_normal(middle, covariance, size=walkers, method="eigh")
+        sampler = emcee.EnsembleSampler(walkers, len(names), log_likelihood, vectorize=True)
+        sampler.random_state = np.random.RandomState(seed).get_state()
+        sampler.run_mcmc(start, steps)
+    samples = pd.DataFrame(sampler.get_chain(discard=burn, flat=True), columns=names)
+    samples.attrs["autocorrelation"] = dict(
+        zip(names, sampler.get_autocorr_time(quiet=True, tol=0), strict=True)
+    )
+    return samples
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A place where an FMU breaks a rule.
+
+    Attributes
+    ----------
+    rule : str
+        Identifier of the rule, such as ``zip.names``.
+    severity : {"error", "warning"}
+        "error": the standard forbids the fault, or hosts fail. "warning": some importers fail
+        because of the fault.
+    place : str
+        Location: a file, a line, a variable, a call.
+    text : str
+        The fault, and what is allowed.
+
+    Examples
+    --------
+    >>> from hubslosh import Finding
+    >>> Finding("xml.units", "error", "line 12", "unit kg.m3 of I (allowed: kg.m2)")
+    error xml.units: line 12: unit kg.m3 of I (allowed: kg.m2)
+    """
+
+    rule: str
+    severity: Literal["error", "warning"]
+    place: str
+    text: str
+
+    def __repr__(self) -> str:
+        """Return the line of the command's report, shortened."""
+        line = f"{self.severity} {self.rule}: {self.place}: {self.text}"
+        return textwrap.shorten(line, 200, placeholder=" …")
+
+
+@dataclass(frozen=True)
+class CheckedRule:
+    """The result of one rule of `check`.
+
+    Attributes
+    ----------
+    rule : str
+        Identifier of the rule, such as ``zip.names``.
+    title : str
+        The requirement in words.
+    source : str
+        Section of the standard that states the requirement, or the hosts that need it.
+    findings : tuple of Finding
+        The findings, at most 1000.
+    skipped : str or None
+        Reason why the rule was not checked; None if it was.
+    seconds : float
+        Elapsed time, s.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> checked = hubslosh.check("HubSlosh", only=["zip.names"])
+    >>> rule = checked.rules[0]
+    >>> rule.rule, len(rule.findings), rule.skipped is None
+    ('zip.names', 0, True)
+    """
+
+    rule: str
+    title: str
+    source: str
+    findings: tuple[Finding, ...]
+    skipped: str | None
+    seconds: float
+
+    def __repr__(self) -> str:
+        """Return the demand and the number of findings."""
+        count = f"{len(self.findings)} findings" if self.skipped is None else "skipped"
+        return f"{self.rule}: {self.title} [{self.source}]: {count}"
+
+
+@dataclass(frozen=True)
+class Checked:
+    """The result of `check`.
+
+    Attributes
+    ----------
+    fmu : Path
+        File of the FMU.
+    errors : int
+        Number of errors.
+    warnings : int
+        Number of warnings.
+    rules : tuple of CheckedRule
+        All selected rules, including skipped rules.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> checked = hubslosh.check("HubSlosh", only=["zip"])
+    >>> checked.errors, checked.findings
+    (0, ())
+    """
+
+    fmu: Path
+    errors: int
+    warnings: int
+    rules: tuple[CheckedRule, ...]
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """Findings of all rules in one tuple, in the order of the rules."""
+        return tuple(finding for rule in self.rules for finding in rule.findings)
+
+    def __repr__(self) -> str:
+        """Return the first findings and a summary."""
+        most = 12
+        findings = self.findings
+        lines = [repr(finding) for finding in findings[:most]]
+        more = [f"and {len(findings) - most} more"] if len(findings) > most else []
+        skipped = sum(rule.skipped is not None for rule in self.rules)
+        counts = f"{self.errors} errors, {self.warnings} warnings"
+        rules = f"{len(self.rules) - skipped} rules checked, {skipped} skipped"
+        return "\n".join([*lines, *more, f"{self.fmu}: {counts}; {rules}"])
+
+
+def check(
+    fmu: str | Path,
+    *arguments: str,
+    only: Sequence[str] = (),
+    limit: float = 60.0,
+    progress: Progress = None,
+    program: str | Path | None = None,
+) -> Checked:
+    """Check an FMU against the FMI standard and the constraints of importers.
+
+    Each rule that calls the binary runs in a process of its own. Therefore an FMU that crashes is
+    reported as a finding, and does not end Python. The FMU's binary runs with your privileges.
+
+    Parameters
+    ----------
+    fmu : str or Path
+        File of an FMU 2.0 or 3.0, of other makers too, or the name of one of this package.
+    *arguments : str
+        Further flags of ``hubslosh check``, such as ``"--junit", "check.xml"``.
+    only : sequence of str
+        Rules (``"zip.names"``) or groups of rules (``"zip"``); by default all.
+    limit : float
+        Time that the calls of one rule may take, s.
+    progress : bool or callable, optional
+        True shows a line on stderr, which is the default on a terminal and in a notebook; a
+        function receives the line as text.
+    program : str or Path, optional
+        The program ``hubslosh``; by default the program of this package.
+
+    Returns
+    -------
+    Checked
+        The findings, and the rules that were skipped; ``print`` shows the first findings.
+
+    Raises
+    ------
+    FmuError
+        If no selected rule could be checked, for example because the file is no FMU.
+
+    Examples
+    --------
+    >>> import hubslosh
+    >>> hubslosh.check("SloshTank", only=["zip", "values.start"]).errors
+    0
+    """
+    flags = [*(["--only", ",".join(only)] if only else []), "--limit", repr(float(limit))]
+    report: dict[str, Any] = call(
+        find_program(program), "check", [fmu_path(fmu), *flags, *arguments], progress, (0, 1)
+    )
+    rules = []
+    for rule in report["rules"]:
+        findings = tuple(Finding(rule["rule"], **finding) for finding in rule.pop("findings"))
+        rules.append(CheckedRule(**rule, findings=findings))
+    return Checked(Path(report["fmu"]), report["errors"], report["warnings"], tuple(rules))
