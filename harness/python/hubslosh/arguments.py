@@ -1,5 +1,6 @@
 """Checks of arguments, with messages for wrong ones."""
 
+import re
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -145,6 +146,32 @@ def check_numbers(**values: Any) -> None:
     """Raise FmuError if an argument is neither a number nor None."""
     if wrong := not_numbers(**values):
         raise FmuError("; ".join(wrong))
+
+
+def wrong_parts(
+    kind: str, given: Any, of: Any, reserved: re.Pattern[str] | None = None, example: str = ""
+) -> list[str]:
+    """Return everything that is wrong with the parts of a craft by name, such as its engines.
+
+    ``of`` is the class of the parts, ``reserved`` matches names that they may not have, and
+    ``example`` follows the class in the message about a value that is not a mapping.
+    """
+    if not isinstance(given, Mapping):
+        return [f"{kind}s must be {of.__name__} by name{example}, not {given!r}"]
+    found = []
+    for name, part in given.items():
+        if not isinstance(name, str) or not name:
+            found.append(f"the name of each {kind} must be a text, not {name!r}")
+        elif reserved and reserved.fullmatch(name):
+            found.append(
+                f"the {kind} cannot have the name {name!r}: parameters of the FMU begin with it"
+            )
+        if isinstance(part, of):
+            found += [f"{kind} {name}: {problem}" for problem in part.problems()]
+        else:
+            article = "an" if of.__name__[0] in "AEIOU" else "a"
+            found.append(f"{kind} {name} must be {article} {of.__name__}, not {part!r}")
+    return found
 
 
 def check_table(table: Any, what: str) -> None:

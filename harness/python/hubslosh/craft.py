@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import native
 from .appendages import Appendage
-from .arguments import caller, floats, vector
+from .arguments import array, caller, not_positive, not_vectors, vector, wrong_parts
 from .engines import Engine, pulse_history, resultant
 from .fmu import Fmu, FmuError, FmuWarning, Parameters, Quantity
 from .linearization import LinearModel, linearize
@@ -129,14 +129,9 @@ class MountedTank:
     @property
     def rotation(self) -> Vector:
         """Matrix from tank to body axes."""
-        w, x, y, z = self.q
-        return np.array(
-            [
-                [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-                [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-                [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-            ]
-        )
+        from scipy.spatial.transform import Rotation
+
+        return np.asarray(Rotation.from_quat(self.q, scalar_first=True).as_matrix())
 
     def problems(self) -> list[str]:
         """Return everything that is wrong with the tank, except with its drawing.
@@ -156,12 +151,10 @@ class MountedTank:
         found = []
         for name, lengths in (("position", (3,)), ("axis", (3, 4))):
             try:
-                numbers = floats(getattr(self, name))
+                numbers = array(getattr(self, name))
             except FmuError as error:
                 found.append(f"{name}: {error}")
                 continue
-            except (TypeError, ValueError):
-                numbers = np.empty(0)
             right = numbers.shape in [(length,) for length in lengths]
             if not right or not np.isfinite(numbers).all() or (name == "axis" and not any(numbers)):
                 count = " or ".join(str(length) for length in lengths)
@@ -323,44 +316,21 @@ class Craft:
 
     def __post_init__(self) -> None:
         """Raise one FmuError that lists all wrong fields."""
-        problems = []
-        for name, value in {"mass": self.mass, "gravity": self.gravity}.items():
-            number = isinstance(value, int | float | np.number) and np.isfinite(value) and value > 0
-            if not number and not (name == "gravity" and value is None):
-                problems.append(f"{name} must be a positive number, not {value!r}")
-        try:
-            vector(self.center_of_mass, 3, "center_of_mass")
-        except FmuError as error:
-            problems.append(str(error))
+        problems = not_positive("mass", self.mass, "kg")
+        if self.gravity is not None:
+            problems += not_positive("gravity", self.gravity, "m/s²")
+        problems += not_vectors(self, 3, "center_of_mass")
         problems += wrong_wheels(self.wheels)
-        wrong = []
-        if not isinstance(self.engines, Mapping):
-            wrong.append(f"engines must be Engine by name, not {self.engines!r}")
-        for name, engine in self.engines.items() if not wrong else ():
-            if not isinstance(engine, Engine):
-                wrong.append(f"engine {name}: is not an Engine: {engine!r}")
-            else:
-                wrong += [f"engine {name}: {problem}" for problem in engine.problems()]
+        wrong = wrong_parts("engine", self.engines, Engine)
         problems += wrong
         for check in (self._inertia, *([] if wrong else [self._force])):
             try:
                 check()
             except FmuError as error:
                 problems.append(str(error))
-        if not isinstance(self.tanks, Mapping) or len(self.tanks) > MOST_TANKS:
-            problems.append(f"tanks must be up to {MOST_TANKS} MountedTank by name")
-        else:
-            for name, tank in self.tanks.items():
-                if not isinstance(name, str) or not name or RESERVED.fullmatch(name):
-                    problems.append(
-                        f"a tank cannot have the name {name!r}: parameters of the FMU begin with it"
-                        if isinstance(name, str) and name
-                        else f"the name of a tank must be a text, not {name!r}"
-                    )
-                if not isinstance(tank, MountedTank):
-                    problems.append(f"tank {name} must be a MountedTank, not {tank!r}")
-                    continue
-                problems += [f"tank {name}: {problem}" for problem in tank.problems()]
+        if isinstance(self.tanks, Mapping) and len(self.tanks) > MOST_TANKS:
+            problems.append(f"tanks has {len(self.tanks)} tanks (allowed: up to {MOST_TANKS})")
+        problems += wrong_parts("tank", self.tanks, MountedTank, RESERVED)
         problems += self._wrong_appendages()
         if not problems:
             problems += self._wrong_spins()
@@ -400,23 +370,17 @@ class Craft:
         ]
 
     def _wrong_appendages(self) -> list[str]:
+        problems = wrong_parts("appendage", self.appendages, Appendage, RESERVED)
         if not isinstance(self.appendages, Mapping):
-            return [f"appendages must be Appendage by name, not {self.appendages!r}"]
-        problems, count = [], 0
-        for name, appendage in self.appendages.items():
-            if not isinstance(name, str) or not name or RESERVED.fullmatch(name):
-                problems.append(
-                    f"an appendage cannot have the name {name!r}: it must be a text, and no "
-                    "parameter of the FMU may begin with it"
-                )
-            if isinstance(self.tanks, Mapping) and name in self.tanks:
-                problems.append(f"{name} is a tank and an appendage: give them different names")
-            if not isinstance(appendage, Appendage):
-                problems.append(f"appendage {name} must be an Appendage, not {appendage!r}")
-                continue
-            wrong = appendage.problems()
-            problems += [f"appendage {name}: {problem}" for problem in wrong]
-            count += 0 if wrong else appendage.count
+            return problems
+        if isinstance(self.tanks, Mapping):
+            problems += [
+                f"{name} is a tank and an appendage: give them different names"
+                for name in self.appendages
+                if name in self.tanks
+            ]
+        every = [of for of in self.appendages.values() if isinstance(of, Appendage)]
+        count = sum(of.count for of in every if not of.problems())
         if count > MOST_MODES:
             problems.append(
                 f"appendages have {count} modes in all (allowed: up to {MOST_MODES}): keep those "
@@ -431,10 +395,7 @@ class Craft:
         return Names.collect(self.tanks, modes)
 
     def _inertia(self) -> Vector:
-        try:
-            J = floats(self.inertia)
-        except (TypeError, ValueError):
-            J = np.empty(0)
+        J = array(self.inertia)
         J = np.diag(J) if J.shape == (3,) else J
         if J.shape != (3, 3) or not np.isfinite(J).all() or not (J == J.T).all():
             raise FmuError("inertia must be a symmetric matrix of 3 × 3, or its diagonal")

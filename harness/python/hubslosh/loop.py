@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from .arguments import caller, column_of, floats, names_of, not_numbers, out_of_range
+from .arguments import array, caller, column_of, floats, names_of, not_numbers, out_of_range
 from .feedback import Feedback, Linear
 from .fmu import Fmu, FmuError, FmuWarning, Parameters, did_you_mean
 from .linearization import LinearModel, linearize, split_delay
@@ -700,10 +700,7 @@ def _checked_law(
 
     def call(cycle: int, time: float, measured: list[float]) -> list[float]:
         returned = law(time, np.array(measured))
-        try:
-            values = np.atleast_1d(floats(returned))
-        except (TypeError, ValueError):
-            values = np.array([np.nan])
+        values = np.atleast_1d(array(returned))
         if values.shape != (len(command),) or not np.isfinite(values).all():
             raise FmuError(
                 f"the controller returned {returned!r} at t = {time:g} s; it must return {expected}"
@@ -758,16 +755,13 @@ def _linear(
     elif callable(controller):
         return None
     else:
-        try:
-            gains = np.atleast_2d(floats(controller))
-        except (TypeError, ValueError):
-            gains = np.empty(0)
-        if gains.ndim != 2:
+        gains = array(controller)
+        if not gains.size or gains.ndim > 2:
             raise FmuError(
                 "the controller must be a function of time and measurements, a matrix of gains, a "
                 f"LinearModel or a system of python-control, not {type(controller).__name__}"
             )
-        none = np.zeros((0, 0))
+        gains, none = np.atleast_2d(gains), np.zeros((0, 0))
         B, C = np.zeros((0, gains.shape[1])), np.zeros((len(gains), 0))
         model = LinearModel(none, B, C, gains, (), (), (), period)
     found = model.D.shape

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .arguments import is_number, not_positive, not_vectors, vector
+from .arguments import is_number, not_positive, not_vectors, vector, wrong_parts
 from .feedback import Feedback, Linear
 
 if TYPE_CHECKING:
@@ -141,21 +141,11 @@ class Wheel:
 
 def wrong_wheels(wheels: Any) -> list[str]:
     """Return everything that is wrong with the argument ``wheels`` of a craft or loop."""
-    if not isinstance(wheels, Mapping):
-        return [
-            'wheels must be Wheel by name, such as {"z": Wheel((0, 0, 1), inertia=0.01, '
-            f"max_torque=0.2, max_speed=400, speed=100)}}, not {wheels!r}; a constant angular "
-            "momentum is inertia times speed"
-        ]
-    found = []
-    for name, wheel in wheels.items():
-        if not isinstance(name, str) or not name:
-            found.append(f"the name of a wheel must be a text, not {name!r}")
-        elif not isinstance(wheel, Wheel):
-            found.append(f"wheel {name} must be a Wheel, not {wheel!r}")
-        else:
-            found += [f"wheel {name}: {problem}" for problem in wheel.problems()]
-    return found
+    example = (
+        ', such as {"z": Wheel((0, 0, 1), inertia=0.01, max_torque=0.2, max_speed=400, speed=100)} '
+        "(a constant angular momentum is inertia times speed)"
+    )
+    return wrong_parts("wheel", wheels, Wheel, example=example)
 
 
 def torque_names(wheels: Mapping[str, Wheel]) -> dict[str, Wheel]:

@@ -105,7 +105,7 @@ def test_wrong_engines_and_pulses_are_named(craft: Craft) -> None:
     """One message lists every wrong engine and pulse, with the allowed values."""
     with pytest.raises(FmuError, match=r"engine a: direction must not be zero; engine a: thrust"):
         replace(craft, engines={"a": Engine((0, 0, 0), (0, 0, 0), -1)})
-    with pytest.raises(FmuError, match="engine a: is not an Engine: 5"):
+    with pytest.raises(FmuError, match="engine a must be an Engine, not 5"):
         replace(craft, engines={"a": 5})
     with pytest.raises(FmuError, match="engines must be Engine by name"):
         replace(craft, engines=[Engine((0, 0, 0), (0, 0, 1), 1)])

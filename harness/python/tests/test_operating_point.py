@@ -257,7 +257,7 @@ def test_names_of_tanks_must_not_hide_parameters(craft: Craft) -> None:
     values = both.parameters("50%", parameters={"A.B.zeta[1]": 0.07, "A.zeta[1]": 0.03})
     assert (values["tank[2].zeta[1]"], values["tank[1].zeta[1]"]) == (0.07, 0.03)
     for name in ("craft", "tank[2]", "init", ""):
-        with pytest.raises(FmuError, match=r"a tank cannot have the name|must be a text"):
+        with pytest.raises(FmuError, match=r"the tank cannot have the name|must be a text"):
             replace(craft, tanks={name: craft.tanks["NTO"]})
 
 
