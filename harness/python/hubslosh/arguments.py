@@ -1,5 +1,6 @@
 """Checks of arguments, with messages for wrong ones."""
 
+import os
 import re
 import sys
 from collections.abc import Iterable, Mapping, Sequence
@@ -45,6 +46,13 @@ def caller() -> int:
     while frame.f_back and frame.f_code.co_filename.startswith(folder):
         frame, level = frame.f_back, level + 1
     return level
+
+
+def cores() -> int:
+    """Return the number of processor cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 def is_number(value: Any) -> bool:

@@ -1,6 +1,5 @@
 """A design review of a loop around a `Craft` over its fills: margins, slosh, worst case."""
 
-import os
 import re
 import warnings
 from collections.abc import Container, Iterable, Mapping, Sequence
@@ -13,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import pandas as pd
 
-from .arguments import MOST_FILLS, MOST_WORK, check_ranges, parse_share, range_ends
+from .arguments import MOST_FILLS, MOST_WORK, check_ranges, cores, parse_share, range_ends
 from .fmu import Fmu, FmuError, FmuWarning, Parameters, Quantity
 from .linearization import LinearModel
 from .loop import Loop
@@ -643,8 +642,7 @@ class _Space:
 
     def evaluate(self, which: Iterable[tuple[int, Vector]]) -> list[Point]:
         """Return points for pairs of a fill's index and positions in the ranges, on all cores."""
-        count = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else None
-        with warnings.catch_warnings(), ThreadPoolExecutor(count or os.cpu_count()) as pool:
+        with warnings.catch_warnings(), ThreadPoolExecutor(cores()) as pool:
             warnings.simplefilter("ignore", FmuWarning)  # those of the nominal points are told
             return list(pool.map(lambda job: self.point(*job), which))
 

@@ -2,10 +2,9 @@
 
 import hashlib
 import json
-import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from contextlib import AbstractContextManager, nullcontext
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +14,7 @@ from .arguments import (
     check_columns,
     check_numbers,
     check_table,
+    cores,
     floats,
     names_of,
     out_of_range,
@@ -231,18 +231,23 @@ def monte_carlo(
         table = ShortTable([{"run": run} | values for run, values in enumerate(draws)])
         table.attrs["drawn"] = list(ranges)
         return table
-    with _opened(folder, seed, ranges) as store:
-        rows = {run: {"run": run} | draws[run] | row for run, row in store.rows(draws).items()}
+    texts = {name: _text(name, of) for name, of in ranges.items()}
+    with nullcontext() if folder is None else Store(folder, seed, texts) as store:
+        stored = store.rows(draws) if store else {}
+        rows = {run: {"run": run} | draws[run] | row for run, row in stored.items()}
         missing = [run for run in range(runs) if run not in rows]
         left = _Left(len(missing), runs - len(missing), progress)
         jobs = ((run, draws[run]) for run in missing)
-        made = _on_dask(client, outcome, jobs) if client else _in_threads(workers, outcome, jobs)
+        count = workers or cores()
+        pool = client.get_executor(pure=False) if client else ThreadPoolExecutor(count)
+        made = _results(pool, np.inf if client else 2 * count, outcome, jobs)
         try:
             for run, found in made:
                 rows[run] = {"run": run} | draws[run] | found
-                refused = {FAILED: found[FAILED]} if FAILED in found else {}
-                numbers = {name: value for name, value in found.items() if name != FAILED}
-                store.add(run, draws[run], numbers, **refused)
+                if store:
+                    refused = {FAILED: found[FAILED]} if FAILED in found else {}
+                    numbers = {name: value for name, value in found.items() if name != FAILED}
+                    store.add(run, draws[run], numbers, **refused)
                 left.step(FAILED in found)
         finally:
             left.line.close()
@@ -251,7 +256,8 @@ def monte_carlo(
         table.attrs["drawn"] = list(ranges)
         if FAILED in table:
             table[FAILED] = table[FAILED].fillna("")
-        store.finish(table.to_csv(index=False, lineterminator="\n"))
+        if store:
+            store.finish(table.to_csv(index=False, lineterminator="\n"))
     if FAILED in table:
         failed = (table[FAILED] != "").sum()
         if failed == len(table):
@@ -292,17 +298,15 @@ def _checked(found: dict[str, Any], values: dict[str, Any]) -> dict[str, Any]:
     return found
 
 
-def _in_threads(
-    workers: int | None, outcome: Outcome, jobs: Iterator[tuple[int, dict[str, Any]]]
+def _results(
+    pool: Executor, most: float, outcome: Outcome, jobs: Iterator[tuple[int, dict[str, Any]]]
 ) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Yield each run with its results when it is done, from threads."""
-    count = workers or len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else None
-    count = workers or count or os.cpu_count() or 1
-    with ThreadPoolExecutor(count) as pool:
+    """Yield each run with its results when it is done, with ``most`` runs under way."""
+    with pool:
         under_way: dict[Future[dict[str, Any]], tuple[int, dict[str, Any]]] = {}
         try:
             while True:
-                while len(under_way) < 2 * count and (job := next(jobs, None)):
+                while len(under_way) < most and (job := next(jobs, None)):
                     under_way[pool.submit(_one, outcome, job[1])] = job
                 if not under_way:
                     return
@@ -314,47 +318,6 @@ def _in_threads(
         finally:
             for future in under_way:
                 future.cancel()
-
-
-def _on_dask(
-    client: Any, outcome: Outcome, jobs: Iterator[tuple[int, dict[str, Any]]]
-) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Yield each run with its results when the Dask cluster has simulated it."""
-    from distributed import as_completed
-
-    under_way = {}
-    for run, values in jobs:
-        future = client.submit(_one, outcome, values, pure=False, key=f"hubslosh-{id(jobs)}-{run}")
-        under_way[future] = run, values
-    try:
-        for future in as_completed(list(under_way)):
-            run, values = under_way.pop(future)
-            yield run, _checked(future.result(), values)
-    finally:
-        client.cancel(list(under_way))
-
-
-class _InMemory:
-    """A study without a folder."""
-
-    def rows(self, _draws: list[dict[str, Any]]) -> dict[int, dict[str, Any]]:
-        """Return no rows, because a study without a folder stores nothing."""
-        return {}
-
-    def add(self, *_: Any, **__: Any) -> None:
-        """Ignore a run, because a study without a folder stores nothing."""
-
-    def finish(self, _table: str) -> None:
-        """Ignore the table, because a study without a folder stores nothing."""
-
-
-def _opened(
-    folder: str | Path | None, seed: int, ranges: Mapping[str, Range]
-) -> AbstractContextManager[Store | _InMemory]:
-    """Return the store of a study's runs: a folder, or memory if no folder is given."""
-    if folder is None:
-        return nullcontext(_InMemory())
-    return Store(folder, seed, {name: _text(name, of) for name, of in ranges.items()})
 
 
 def _text(name: str, of: Range) -> str:
