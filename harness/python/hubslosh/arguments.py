@@ -225,19 +225,23 @@ def column_of(table: Any, name: Any, what: str, problems: list[str]) -> np.ndarr
     return values
 
 
+def percent_of(text: Any) -> float | None:
+    """Return 60.0 for the text "60%", and None for anything that is not a number with "%"."""
+    if not isinstance(text, str) or not text.strip().endswith("%"):
+        return None
+    try:
+        return float(text.strip()[:-1])
+    except ValueError:
+        return None
+
+
 def parse_share(text: Any) -> float | None:
     """Return the number that a share such as "5%" or "± 5%" stands for, if it is above 0.
 
     Anything else, such as a number or a text without "%", gives None.
     """
-    if not isinstance(text, str):
-        return None
-    text = text.strip().lstrip("±").strip()
-    try:
-        part = float(text.removesuffix("%")) / 100
-    except ValueError:
-        return None
-    return part if text.endswith("%") and 0 < part < np.inf else None
+    part = percent_of(text.strip().lstrip("±")) if isinstance(text, str) else None
+    return part / 100 if part and 0 < part < np.inf else None
 
 
 # Ranges that `range_ends` reads, for messages.

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import native
 from .appendages import Appendage
-from .arguments import array, caller, not_positive, not_vectors, vector, wrong_parts
+from .arguments import array, caller, not_positive, not_vectors, percent_of, vector, wrong_parts
 from .engines import Engine, pulse_history, resultant
 from .fmu import Fmu, FmuError, FmuWarning, Parameters, Quantity
 from .linearization import LinearModel, linearize
@@ -37,8 +37,10 @@ from .tanks import (
     TankCase,
     _from_z,
     _tank_source,
+    amount_of,
     check_fill,
     fill_table,
+    is_mass,
     read_drawing,
     solve,
 )
@@ -450,7 +452,7 @@ class Craft:
             if set(given) != set(names):
                 raise FmuError(f"{what} must have {', '.join(names)}, not {', '.join(given)}")
             return {name: given[name] for name in names}
-        single = isinstance(given, str | int | float | np.number) or _is_mass(given)
+        single = isinstance(given, str | int | float | np.number) or is_mass(given)
         if single:
             return dict.fromkeys(names, given)
         try:
@@ -514,10 +516,10 @@ class Craft:
         """Return the mass of liquid in a tank, kg."""
         if _is_empty(fill):
             return 0.0
-        if _is_mass(fill):
+        if is_mass(fill):
             return float(fill[0])
-        if isinstance(fill, str) and fill.strip().endswith("%"):
-            return float(fill.strip()[:-1]) / 100 * self._capacity(name).mass
+        if (percent := percent_of(fill)) is not None:
+            return percent / 100 * self._capacity(name).mass
         try:
             return float(self._drawing(name).mass(check_fill(fill)))
         except FmuError as error:
@@ -1695,19 +1697,8 @@ def _row(numbers: Any, digits: int = 6) -> str:
     return f"({', '.join(f'{float(x):.{digits}g}' for x in np.asarray(numbers, float))})"
 
 
-def _is_mass(fill: Any) -> bool:
-    return isinstance(fill, tuple) and len(fill) == 2 and fill[1] == "kg"
-
-
 def _is_empty(fill: Any) -> bool:
-    if _is_mass(fill):
-        return bool(fill[0] == 0)
-    if isinstance(fill, str):
-        try:
-            return float(fill.strip().removesuffix("%")) == 0
-        except ValueError:
-            return False
-    return bool(fill == 0)
+    return bool(amount_of(fill) == 0)
 
 
 def _own_inertia(tank: Tank, liquid: Liquid) -> Vector:

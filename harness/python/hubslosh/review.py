@@ -12,7 +12,15 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import pandas as pd
 
-from .arguments import MOST_FILLS, MOST_WORK, check_ranges, cores, parse_share, range_ends
+from .arguments import (
+    MOST_FILLS,
+    MOST_WORK,
+    check_ranges,
+    cores,
+    parse_share,
+    percent_of,
+    range_ends,
+)
 from .fmu import Fmu, FmuError, FmuWarning, Parameters, Quantity
 from .linearization import LinearModel
 from .loop import Loop
@@ -607,10 +615,9 @@ class _Space:
         found += _of_appendages(craft, points, "frequency", parts["frequency"], ranges)
         found += _inertia(points, parts["inertia"], ranges)
         found += _quantities(loops, points, ranges, craft._names)
-        percent = all(isinstance(f, str) and f.strip().endswith("%") for f in fills)
-        if percent:
-            at = [float(fill.strip()[:-1]) for fill in fills]
-        else:
+        at = [percent_of(fill) for fill in fills]
+        percent = None not in at
+        if not percent:
             at = [sum(tank.mass for tank in of.values()) for of in tanks]
         unit = "%" if percent else "kg"
         words = tuple(f"{x:.3g}%" if percent else f"{x:.4g} kg" for x in at)

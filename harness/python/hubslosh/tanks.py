@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import native
-from .arguments import check_numbers, vector
+from .arguments import check_numbers, is_number, percent_of, vector
 from .fmu import FmuError, FmuWarning
 from .temporary import write_file
 
@@ -411,22 +411,22 @@ def _tank_source(source: Any) -> "dict[str, Any] | Path":
 
 def check_fill(fill: Any) -> Any:
     """Return a fill; raise FmuError if it is neither a height, a percentage nor a mass."""
-    if isinstance(fill, str):
-        right = fill.strip().endswith("%") and _is_number(fill.strip()[:-1])
-    elif isinstance(fill, tuple):
-        right = len(fill) == 2 and _is_number(fill[0]) and fill[1] == "kg"
-    else:
-        right = not isinstance(fill, bool) and _is_number(fill)
-    if not right:
+    amount = amount_of(fill)
+    if not is_number(amount) or np.isnan(amount):
         raise FmuError(f'fill is a height in m, or a text such as "60%", not {fill!r}')
     return fill
 
 
-def _is_number(value: Any) -> bool:
-    try:
-        return float(value) == float(value)
-    except (TypeError, ValueError):
-        return False
+def amount_of(fill: Any) -> Any:
+    """Return the number in a fill, which is a height in m, a percentage or a mass in kg."""
+    if isinstance(fill, str):
+        return percent_of(fill)
+    return fill[0] if is_mass(fill) else fill
+
+
+def is_mass(fill: Any) -> bool:
+    """Return True if a fill is a mass, such as (120, "kg")."""
+    return isinstance(fill, tuple) and len(fill) == 2 and fill[1] == "kg"
 
 
 def toml_key(key: Any) -> str:
