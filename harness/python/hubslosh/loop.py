@@ -15,18 +15,17 @@ from .arguments import array, caller, column_of, floats, names_of, not_numbers, 
 from .feedback import Feedback, Linear
 from .fmu import Fmu, FmuError, FmuWarning, Parameters, did_you_mean
 from .linearization import LinearModel, linearize, split_delay
-from .plant import TORQUE, Plant
+from .plant import TORQUE
 from .run import Run
 from .short import names
 from .simulation import (
     History,
-    asked_of,
     check_outputs,
     check_parameters,
     histories_of,
     outputs_of,
     parameters_of,
-    table_of,
+    recorded,
     too_many_rows,
     without_replaced,
 )
@@ -483,34 +482,22 @@ class Loop:
             wheels=rows_of(turned, command),
             momentum=self._momentum(fmu, every),
         )  # fmt: skip
-        given = {name: history.after(points) for name, history in histories.items()}
-        sloped = any(slopes.any() for _, slopes in given.values())
-        start = {name: values[0] for name, (values, _) in given.items()}
-        asked, sampled = asked_of(fmu, columns, (*plain, *given))
-        with Plant(
-            self.model,
-            every,
-            tolerance=tolerance,
-            inputs={name: constants[name] for name in plain} | start,
-        ) as plant:
-            recorded = plant.run(
-                points,
-                {name: values for name, (values, _) in given.items()},
-                {name: slopes for name, (_, slopes) in given.items()} if sloped else None,
-                asked,
-                feedback,
-                wanted,
-                sampled,
-            )
+
+        def computed() -> dict[str, NDArray[np.float64]]:
+            """Return the commands, and torques and speeds of the wheels, after the run."""
+            commands = feedback.commands
+            commands[: feedback.latency * parts + switch] = list(constants.values())
+            commands[-1] = commands[-2]
+            return dict(zip(command, commands.T, strict=True)) | columns_of(turned, feedback)
+
+        run = recorded(
+            self.model, every, points, histories, columns, wanted=wanted, tolerance=tolerance,
+            constants={name: constants[name] for name in plain}, feedback=feedback,
+            units=self._units(), computed=computed,
+        )  # fmt: skip
         for text in saturated(turned, feedback, points):
             warnings.warn(text, FmuWarning, stacklevel=caller())
-        commands = feedback.commands
-        commands[: feedback.latency * parts + switch] = list(constants.values())
-        commands[-1] = commands[-2]
-        rows = {"time": points} | dict(zip(command, commands.T, strict=True))
-        rows |= columns_of(turned, feedback)
-        rows |= {name: values for name, (values, _) in given.items()} | recorded
-        return table_of(fmu, rows, wanted, columns, self.model, every, self._units())
+        return run
 
     def _constants(self, parameters: Parameters) -> dict[str, float]:
         """Return the constant to which each command is added.

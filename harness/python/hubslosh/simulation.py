@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from . import native
 from .arguments import column_of, names_of, not_numbers
+from .feedback import Feedback
 from .fmu import (
     INTEGERS,
     Fmu,
@@ -195,64 +196,70 @@ def run_of(
     times, rows_wanted = native.communication_points(start, stop, step, rows)
     points = np.frombuffer(times).copy()
     wanted = None if rows_wanted is None else np.frombuffer(rows_wanted, bool)
+    feedback = None
+    if turned:
+        commands = np.column_stack([of.after(points)[0] for of in torques.values()])
+        feedback = follow(commands[:-1], turned, momentum)
+    table = recorded(
+        model, parameters, points, histories, columns, wanted=wanted, start=start, stop=stop,
+        tolerance=tolerance, feedback=feedback, units=units_of(turned),
+        computed=lambda: {} if feedback is None else columns_of(turned, feedback),
+    )  # fmt: skip
+    table.attrs["rows"], table.attrs["inputs"] = native.pairing(hold)
+    return table
+
+
+def recorded(
+    model: str | Path,
+    parameters: Parameters,
+    points: Real,
+    histories: Mapping[str, History],
+    columns: Sequence[str],
+    *,
+    wanted: NDArray[np.bool_] | None,
+    start: float = 0.0,
+    stop: float | None = None,
+    tolerance: float | None = None,
+    constants: Mapping[str, float] = MappingProxyType({}),
+    feedback: Feedback | None = None,
+    units: Mapping[str, str] = MappingProxyType({}),
+    computed: Callable[[], dict[str, Real]] = dict,
+) -> Run:
+    """Run an FMU from point to point along ``histories`` and return its table.
+
+    * ``wanted`` marks the rows to return; None returns all.
+    * ``constants``: values of further inputs at the start, which ``feedback`` then sets.
+    * ``computed`` returns, after the run, columns that are no variables of the FMU, or that the
+      controller has computed; ``units`` has the units of the former.
+
+    The variables that say why a tank is out of range are recorded in any case, and become columns
+    if ``columns`` names them.
+    """
+    fmu = Fmu.open(model)
+    limits = native.limit_columns(fmu.native)
     values = {name: history.after(points) for name, history in histories.items()}
     given = {name: value for name, (value, _) in values.items()}
     # without a slope the FMU has one call less to answer, and an FMU that cannot interpolate none
     sloped = any(slope.any() for _, slope in values.values())
     slopes = {name: slope for name, (_, slope) in values.items()} if sloped else None
-    asked, sampled = asked_of(fmu, columns, given)
-    feedback = None
-    if turned:
-        table = np.column_stack([of.after(points)[0] for of in torques.values()])
-        feedback = follow(table[:-1], turned, momentum)
+    known = given.keys() | constants.keys()
+    # Whether tanks are in range need not be read in every row of a long run.
+    sampled = [name for name in limits if name not in columns]
+    asked = [*(name for name in dict.fromkeys(columns) if name not in known), *sampled]
+    inputs = dict(constants) | {name: value[0] for name, value in given.items()}
     with Plant(
-        model,
-        parameters,
-        tolerance=tolerance,
-        start=start,
-        stop=stop,
-        inputs={name: value[0] for name, value in given.items()},
+        model, parameters, tolerance=tolerance, start=start, stop=stop, inputs=inputs
     ) as plant:
-        recorded = plant.run(points, given, slopes, asked, feedback, wanted, sampled)
-    rows_made = {"time": points} | given | recorded
-    if feedback is not None:
-        rows_made |= columns_of(turned, feedback)
-    table = table_of(fmu, rows_made, wanted, columns, model, parameters, units_of(turned))
-    table.attrs["rows"], table.attrs["inputs"] = native.pairing(hold)
-    return table
-
-
-def asked_of(fmu: Fmu, columns: Sequence[str], given: Container[str]) -> tuple[list[str], int]:
-    """Return the names of the variables that a run must record, and how many it may sample.
-
-    The list contains ``columns``, and then the variables that show whether a tank is in the range
-    of its model, which need not be read in every row of a long run; variables in ``given`` are left
-    out.
-    """
-    limits = [name for name in native.limit_columns(fmu.native) if name not in columns]
-    return [*(name for name in columns if name not in given), *limits], len(limits)
-
-
-def table_of(
-    fmu: Fmu,
-    columns: dict[str, Real],
-    wanted: NDArray[np.bool_] | None,
-    asked: Sequence[str],
-    model: str | Path,
-    parameters: Parameters,
-    units: Mapping[str, str] = MappingProxyType({}),
-) -> Run:
-    """Return a run as a table.
-
-    ``wanted`` marks the rows to return; None returns all. ``units`` has the units of columns that
-    are no variables of the FMU. The variables that say why a tank is out
-    of range become columns only if ``asked`` names them.
-    """
-    limits = [name for name in native.limit_columns(fmu.native) if name in columns]
+        found = plant.run(points, given, slopes, asked, feedback, wanted, len(sampled))
+    every = {"time": points} | computed() | given | found
     rows = slice(None) if wanted is None else wanted
-    read = {name: np.ascontiguousarray(columns[name][rows], float) for name in ("time", *limits)}
-    columns = {name: of for name, of in columns.items() if name in asked or name not in limits}
-    table = Run(columns, copy=False)
+    read = {
+        name: np.ascontiguousarray(every[name][rows], float)
+        for name in ("time", *limits)
+        if name in every
+    }
+    shown = {name: of for name, of in every.items() if name in columns or name not in limits}
+    table = Run(shown, copy=False)
     if wanted is not None:
         table = table[wanted].reset_index(drop=True)
     units = {"time": "s", **units}
