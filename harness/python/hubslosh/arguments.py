@@ -190,13 +190,18 @@ def check_table(table: Any, what: str) -> None:
         raise FmuError(f"{what} must be a pandas.DataFrame, not {table!r}")
 
 
+def not_columns(table: Any, names: Iterable[str], what: str) -> list[str]:
+    """Return one error sentence if a table does not have columns of all these names."""
+    there = [str(name) for name in table.columns]
+    missing = [f"{name}{did_you_mean(name, there)}" for name in names if name not in there]
+    return [f"{what} has no column {', '.join(missing)}"] if missing else []
+
+
 def check_columns(table: Any, names: Iterable[str], what: str) -> None:
     """Raise FmuError if an argument is not a pandas.DataFrame with columns of these names."""
     check_table(table, what)
-    there = [str(name) for name in table.columns]
-    missing = [f"{name}{did_you_mean(name, there)}" for name in names if name not in there]
-    if missing:
-        raise FmuError(f"{what} has no column {', '.join(missing)}")
+    if wrong := not_columns(table, names, what):
+        raise FmuError(*wrong)
 
 
 def numbers_in(table: Any, names: Sequence[str], what: str) -> list[NDArray[np.float64]]:

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from .arguments import floats, numbers_in
+from .arguments import check_table, floats, not_columns, numbers_in
 from .fmu import FmuError
 from .linearization import control_package
 
@@ -141,17 +141,19 @@ def fit(response: pd.DataFrame, poles: int = 3, zeros: int = 2) -> TransferFunct
     """
     from scipy.optimize import least_squares
 
-    frequency, real, imag = numbers_in(response, ["frequency", "real", "imag"], "response")
+    check_table(response, "response")
     for name, count in (("poles", poles), ("zeros", zeros)):
         if not isinstance(count, int | np.integer):
             raise FmuError(f"{name} must be a whole number, not {count!r}")
-    problems = []
+    names = ["frequency", "real", "imag"]
+    problems = not_columns(response, names, "response")
     if not (0 <= zeros <= poles and poles >= 1):
         problems.append(f"poles must be 1 or more and at least zeros, not {poles} and {zeros}")
     if not problems and len(response) < poles + zeros + 1:
         problems.append(f"{len(response)} frequencies are too few for {poles + zeros + 1} unknowns")
     if problems:
         raise FmuError("; ".join(problems))
+    frequency, real, imag = numbers_in(response, names, "response")
     data = real + 1j * imag
     # s in units of the band's middle, for the equations' condition
     unit = 2 * np.pi * float(np.exp(np.mean(np.log(frequency))))

@@ -276,7 +276,7 @@ def parameters_of(
 ) -> dict[str, Quantity]:
     """Return a dictionary of parameters; a text or a path is read as a file of parameters.
 
-    See `tables.read_parameters` for the formats of the file.
+    See `hubslosh.read_parameters` for the formats of the file.
     """
     if isinstance(parameters, str | Path):
         return dict(read_parameters(Path(parameters)))
