@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .arguments import array, floats, not_vectors
+from .arguments import array, floats, not_vectors, refuse
 from .fmu import FmuError
 
 if TYPE_CHECKING:
@@ -194,8 +194,7 @@ class Appendage:
             )
             if is_wrong
         ]  # fmt: skip
-        if wrong:
-            raise FmuError("; ".join(wrong))
+        refuse(wrong)
         turn = np.eye(3) if axes is None else floats(axes)
         if turn.shape != (3, 3) or np.abs(turn @ turn.T - np.eye(3)).max() > 1e-6:
             raise FmuError("axes must be a rotation matrix of 3 × 3")

@@ -55,6 +55,12 @@ def cores() -> int:
     return os.cpu_count() or 1
 
 
+def refuse(problems: Sequence[str]) -> None:
+    """Raise one FmuError that lists all problems, if there are any."""
+    if problems:
+        raise FmuError("; ".join(problems))
+
+
 def is_number(value: Any) -> bool:
     """Return True for a real number of Python or NumPy; a Boolean is none."""
     return isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
@@ -82,8 +88,7 @@ def out_of_range(**values: Any) -> list[str]:
 
 def check_ranges(**values: Any) -> None:
     """Raise FmuError if an argument is outside its allowed range."""
-    if wrong := out_of_range(**values):
-        raise FmuError("; ".join(wrong))
+    refuse(out_of_range(**values))
 
 
 def floats(values: Any) -> NDArray[np.float64]:
@@ -152,8 +157,7 @@ def not_positive(name: str, value: Any, unit: str = "", *, finite: bool = True) 
 
 def check_numbers(**values: Any) -> None:
     """Raise FmuError if an argument is neither a number nor None."""
-    if wrong := not_numbers(**values):
-        raise FmuError("; ".join(wrong))
+    refuse(not_numbers(**values))
 
 
 def wrong_parts(
@@ -200,8 +204,7 @@ def not_columns(table: Any, names: Iterable[str], what: str) -> list[str]:
 def check_columns(table: Any, names: Iterable[str], what: str) -> None:
     """Raise FmuError if an argument is not a pandas.DataFrame with columns of these names."""
     check_table(table, what)
-    if wrong := not_columns(table, names, what):
-        raise FmuError(*wrong)
+    refuse(not_columns(table, names, what))
 
 
 def numbers_in(table: Any, names: Sequence[str], what: str) -> list[NDArray[np.float64]]:
@@ -209,8 +212,7 @@ def numbers_in(table: Any, names: Sequence[str], what: str) -> list[NDArray[np.f
     check_columns(table, names, what)
     problems: list[str] = []
     found = [column_of(table, name, what, problems) for name in names]
-    if problems:
-        raise FmuError("; ".join(problems))
+    refuse(problems)
     return found  # type: ignore[return-value]
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .arguments import array, check_columns, check_numbers, floats, not_positive, vector
+from .arguments import array, check_columns, check_numbers, floats, not_positive, refuse, vector
 from .fmu import FmuError
 
 if TYPE_CHECKING:
@@ -290,8 +290,7 @@ def slew(
     import pandas as pd
 
     check_numbers(angle=angle, duration=duration, step=step, start=start, stop=stop)
-    if wrong := not_positive("duration", duration, "s") + not_positive("step", step, "s"):
-        raise FmuError("; ".join(wrong))
+    refuse(not_positive("duration", duration, "s") + not_positive("step", step, "s"))
     end = start + duration
     stop = end if stop is None else max(stop, end)
     time = np.append(np.arange(0.0, stop - 1e-9 * step, step), stop)

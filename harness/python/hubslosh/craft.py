@@ -12,7 +12,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import native
 from .appendages import Appendage
-from .arguments import array, caller, not_positive, not_vectors, percent_of, vector, wrong_parts
+from .arguments import (
+    array,
+    caller,
+    not_positive,
+    not_vectors,
+    percent_of,
+    refuse,
+    vector,
+    wrong_parts,
+)
 from .engines import Engine, pulse_history, resultant
 from .fmu import Fmu, FmuError, FmuWarning, Parameters, Quantity
 from .linearization import LinearModel, linearize
@@ -336,8 +345,7 @@ class Craft:
         problems += self._wrong_appendages()
         if not problems:
             problems += self._wrong_spins()
-        if problems:
-            raise FmuError("; ".join(problems))
+        refuse(problems)
 
     @property
     def _omega(self) -> Vector:
@@ -1308,8 +1316,7 @@ class Craft:
             f"{short_name(name, order)} {problem}" for name in named
             if (mode := mode_quantity(name)) and (problem := known.problem(mode))
         ]  # fmt: skip
-        if problems:
-            raise FmuError("; ".join(problems))
+        refuse(problems)
         model = uncertain(point.parameters, named, outputs=outputs, model=point.model, **options)
         return replace(model, tanks=order)
 

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from .arguments import floats, not_positive, not_vectors, vector
+from .arguments import floats, not_positive, not_vectors, refuse, vector
 from .fmu import FmuError, did_you_mean
 
 Vector = NDArray[np.float64]
@@ -120,8 +120,7 @@ def pulse_history(
     example = 'such as {"roll": [(0.0, 0.02), (1.0, 1.05)]}'
     if not isinstance(firing, Mapping):
         raise FmuError(f"firing must be pulses by engine, {example}, not {firing!r}")
-    if wrong := not_positive("stop", stop, "s"):
-        raise FmuError(*wrong)
+    refuse(not_positive("stop", stop, "s"))
     edges, steps = [0.0, float(stop)], []
     for name, given in firing.items():
         if name not in wrenches:

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from .arguments import check_table, floats, not_columns, numbers_in
+from .arguments import check_table, floats, not_columns, numbers_in, refuse
 from .fmu import FmuError
 from .linearization import control_package
 
@@ -151,8 +151,7 @@ def fit(response: pd.DataFrame, poles: int = 3, zeros: int = 2) -> TransferFunct
         problems.append(f"poles must be 1 or more and at least zeros, not {poles} and {zeros}")
     if not problems and len(response) < poles + zeros + 1:
         problems.append(f"{len(response)} frequencies are too few for {poles + zeros + 1} unknowns")
-    if problems:
-        raise FmuError("; ".join(problems))
+    refuse(problems)
     frequency, real, imag = numbers_in(response, names, "response")
     data = real + 1j * imag
     # s in units of the band's middle, for the equations' condition

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import native
-from .arguments import MOST_STATES, check_ranges, floats, names_of
+from .arguments import MOST_STATES, check_ranges, floats, names_of, refuse
 from .fmu import Fmu, FmuError, Parameters
 from .operating_point import is_spacecraft, warn_of_attitude, warn_of_rotation
 from .plant import Instance
@@ -508,6 +508,5 @@ def _reals(fmu: Fmu, names: Sequence[str] | str | None, causality: str) -> list[
         elif causality == "input" and variable.causality != "input":
             allowed = ", ".join(fmu.names("input"))
             problems.append(f"{name} is not an input of {fmu.name} (inputs: {allowed})")
-    if problems:
-        raise FmuError("; ".join(problems))
+    refuse(problems)
     return list(names)

@@ -32,7 +32,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from .arguments import array, not_positive, parse_share, vector
+from .arguments import array, not_positive, parse_share, refuse, vector
 from .fmu import FmuError
 from .tanks import SIX_AXES, prefix_of
 
@@ -50,6 +50,8 @@ SHAPES: dict[str, tuple[str, ...]] = {
     "sector": ("inner_radius", "radius", "angle", "height"),
     "step": (),
 }
+
+OF_A_MODE = ("mass", "length", "hinge", "wave")  # Columns that are parameters of the FMUs
 
 _MASSLESS = 1e-6  # Part of the liquid's mass below which a mode is one without displacement
 _EQUAL = 3e-4  # Difference of two λ, of their size, that the mesh makes of one
@@ -187,12 +189,7 @@ class LiquidModes:
             ),
         }
         for n, (_, mode) in enumerate(chosen.head(modes).iterrows(), 1):
-            values |= {
-                f"slosh.table.mass[{n}]": float(mode["mass"]),
-                f"slosh.table.length[{n}]": float(mode["length"]),
-                f"slosh.table.hinge[{n}]": float(mode["hinge"]),
-                f"slosh.table.wave[{n}]": float(mode["wave"]),
-            }
+            values |= {f"slosh.table.{key}[{n}]": float(mode[key]) for key in OF_A_MODE}
         return values
 
     def parameters(
@@ -280,14 +277,10 @@ class LiquidModes:
             f"{name}.g_ref": self.gravity, f"{name}.modes": count,
         }  # fmt: skip
         for n, (_, mode) in enumerate(kept.iterrows(), 1):
-            values |= {
-                f"{name}.mass[{n}]": float(mode["mass"]),
-                f"{name}.length[{n}]": float(mode["length"]),
-                f"{name}.hinge[{n}]": float(mode["hinge"]),
+            values |= {f"{name}.{key}[{n}]": float(mode[key]) for key in OF_A_MODE} | {
                 f"{name}.direction[{n},1]": float(along[0, n - 1]),
                 f"{name}.direction[{n},2]": float(along[1, n - 1]),
                 f"{name}.arm[{n}]": float(arm[n - 1]),
-                f"{name}.wave[{n}]": float(mode["wave"]),
                 f"{name}.zeta[{n}]": 0.0,
             }
         return values
@@ -361,8 +354,7 @@ def liquid_modes(
         raise FmuError(f"resolution is 4 to 40 elements, not {resolution!r}")
     if not (isinstance(modes, int) and 1 <= modes <= 40):
         raise FmuError(f"modes is 1 to 40, not {modes!r}")
-    if wrong := not_positive("density", density, "kg/m³"):
-        raise FmuError(*wrong)
+    refuse(not_positive("density", density, "kg/m³"))
     gravity = float(np.linalg.norm(force))
     tank = _Tank(name, size, _level(force))
     meshes = (max(3.0, resolution / 1.5), float(resolution))

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from .arguments import array, caller, column_of, floats, names_of, not_numbers, out_of_range
+from .arguments import array, caller, column_of, floats, names_of, not_numbers, out_of_range, refuse
 from .feedback import Feedback, Linear
 from .fmu import Fmu, FmuError, FmuWarning, Parameters, did_you_mean
 from .linearization import LinearModel, linearize, split_delay
@@ -196,8 +196,7 @@ class Loop:
         >>> import hubslosh
         >>> hubslosh.Loop([[4.0, 2.0]], 0.1).check()
         """
-        if found := self.problems():
-            raise FmuError("; ".join(found))
+        refuse(self.problems())
 
     @property
     def names(self) -> tuple[list[str], list[str]]:
@@ -267,8 +266,7 @@ class Loop:
     def _must_be_linear(self) -> LinearModel:
         """Return the linear controller of the loop; raise FmuError if the loop has problems."""
         found, controller = self._examine()
-        if found:
-            raise FmuError("; ".join(found))
+        refuse(found)
         if controller is None:
             raise FmuError(
                 "the loop gain needs a linear controller: a matrix of gains, a LinearModel, or a "
@@ -458,8 +456,7 @@ class Loop:
         check_outputs(fmu, columns, problems)
         if not problems:
             problems += too_many_rows(0.0, stop, self.period / substeps)
-        if problems:
-            raise FmuError("; ".join(problems))
+        refuse(problems)
 
         constants = self._constants(every)
         every = {name: value for name, value in every.items() if name not in plain}
@@ -726,8 +723,7 @@ def _reference(
     some = [name for name in QUATERNION if name in histories]
     if 0 < len(some) < 4 and any(name not in measured for name in some):
         problems.append(f"reference has {', '.join(some)} of q[1], …, q[4]: all four are needed")
-    if problems:
-        raise FmuError("; ".join(problems))
+    refuse(problems)
     return {name: History(time, values, None, False) for name, values in histories.items()}
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from .arguments import refuse
 from .fmu import Fmu, FmuError, Parameters, Quantity, did_you_mean
 from .plant import Plant
 
@@ -164,8 +165,7 @@ def full_names(
             both = (full, short_name(full, tanks))
             problems.append(f"{' and '.join(both)} are the same quantity: give it once")
         found[full] = value
-    if problems:
-        raise FmuError("; ".join(problems))
+    refuse(problems)
     return found
 
 
@@ -387,8 +387,7 @@ def apply_changes(
             continue
         like = mode.name("hinge" if mode.kind == "bob" else mode.kind)
         modes.set(mode, float(modes.fmu.convert(like, value)))
-    if problems:
-        raise FmuError("; ".join(problems))
+    refuse(problems)
     for name, factor in (factors or {}).items():
         mode = mode_quantity(name)
         assert mode is not None

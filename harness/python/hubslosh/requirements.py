@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from .arguments import not_positive
+from .arguments import not_positive, refuse
 from .fmu import FmuError, did_you_mean
 from .short import ShortTable
 
@@ -62,8 +62,7 @@ def requirements_of(given: Any) -> tuple[Requirement, ...]:
                 problems += wrong
             else:
                 found.append(Requirement(margin, points, float(limit)))
-    if problems:
-        raise FmuError("; ".join(problems))
+    refuse(problems)
     return tuple(found)
 
 

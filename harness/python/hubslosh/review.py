@@ -20,6 +20,7 @@ from .arguments import (
     parse_share,
     percent_of,
     range_ends,
+    refuse,
 )
 from .fmu import Fmu, FmuError, FmuWarning, Parameters, Quantity
 from .linearization import LinearModel
@@ -594,8 +595,7 @@ class _Space:
                     turns = rotation(
                         "the nominal point", craft.trim(fill, parameters).angular_acceleration
                     )
-        if problems:
-            raise FmuError("; ".join(problems))
+        refuse(problems)
         said = tuple(dict.fromkeys([*(str(w.message) for w in caught), *filter(None, [turns])]))
         # the same warning with another number at another fill
         said = tuple({re.sub(r"= [\d.e+-]+", "", text): text for text in said}.values())
@@ -811,8 +811,7 @@ def _quantities(
             for (low, high), nominal in zip(limits, nominals, strict=True)
         )
         found.append(Uncertain(name, text, rows))
-    if problems:
-        raise FmuError("; ".join(problems))
+    refuse(problems)
     return found
 
 

@@ -20,6 +20,7 @@ from .arguments import (
     out_of_range,
     parse_share,
     range_ends,
+    refuse,
 )
 from .fmu import FmuError
 from .native import uniforms
@@ -80,8 +81,7 @@ def draw(
     {'tank.h': 0.09583574388883317, 'slosh.model': 'linear'}
     """
     ranges, wrong = _resolved(ranges, nominal)
-    if wrong := wrong + out_of_range(run=run, seed=seed):
-        raise FmuError("; ".join(wrong))
+    refuse(wrong + out_of_range(run=run, seed=seed))
     return _drawn(ranges, run, seed)
 
 
@@ -223,8 +223,7 @@ def monte_carlo(
         problems.append(f"client must be a distributed.Client, not {client!r}")
     if outcome is not None and not callable(outcome):
         problems.append(f"outcome must be a function of the drawn values, not {outcome!r}")
-    if problems:
-        raise FmuError("; ".join(problems))
+    refuse(problems)
     runs, seed = int(runs), int(seed)  # numpy's integers too
     draws = [_drawn(ranges, run, seed) for run in range(runs)]
     if outcome is None:
@@ -418,8 +417,7 @@ def quantiles(
     else:
         problems: list[str] = []
         names = names_of(columns, "columns", problems)
-        if problems:
-            raise FmuError("; ".join(problems))
+        refuse(problems)
     check_columns(table, names, "the table")
     try:
         shares = [float(share) for share in np.atleast_1d(floats(at))]

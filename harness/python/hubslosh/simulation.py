@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from . import native
-from .arguments import column_of, names_of, not_numbers
+from .arguments import column_of, names_of, not_numbers, refuse
 from .feedback import Feedback
 from .fmu import (
     INTEGERS,
@@ -188,8 +188,7 @@ def run_of(
         problems.append(f"tolerance must be a positive number, not {tolerance}")
     if not problems and step is not None:
         problems += too_many_rows(start, stop, step)
-    if problems:
-        raise FmuError("; ".join(problems))
+    refuse(problems)
 
     inputs_given = [(name, history.native) for name, history in histories.items()]
     native.check_interpolation(fmu.native, inputs_given, "hold=True")
