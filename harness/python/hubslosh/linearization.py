@@ -15,7 +15,7 @@ from .arguments import MOST_STATES, check_ranges, floats, names_of, refuse
 from .fmu import Fmu, FmuError, Parameters
 from .operating_point import is_spacecraft, warn_of_attitude, warn_of_rotation
 from .plant import Instance
-from .simulation import parameters_of
+from .simulation import check_outputs, parameters_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -497,16 +497,6 @@ def _reals(fmu: Fmu, names: Sequence[str] | str | None, causality: str) -> list[
         return [name for name in fmu.names(causality) if fmu.kind(name) == "Real"]
     problems: list[str] = []
     names = fmu.components(names_of(names, f"{causality}s", problems))
-    for name in names:
-        try:
-            variable, kind = fmu.variable(name), fmu.kind(name)
-        except FmuError as error:
-            problems.append(str(error))
-            continue
-        if kind != "Real":
-            problems.append(f"{name} is of type {kind}, not Real")
-        elif causality == "input" and variable.causality != "input":
-            allowed = ", ".join(fmu.names("input"))
-            problems.append(f"{name} is not an input of {fmu.name} (inputs: {allowed})")
+    check_outputs(fmu, names, problems, real=True, inputs=causality == "input")
     refuse(problems)
     return list(names)

@@ -169,10 +169,7 @@ class Loop:
             elif fmu.kind(name) != "Real":
                 found.append(f"the command {name} is of type {fmu.kind(name)}, not Real")
         measured = fmu.components(names_of(self.measured, "measured", found))
-        check_outputs(fmu, measured, found)
-        for name in measured:
-            if name in fmu.variables and fmu.kind(name) not in ("Real", "String"):
-                found.append(f"{name} is of type {fmu.kind(name)}: only Reals are measured")
+        check_outputs(fmu, measured, found, real=True)
         found += [f"the command {name} is given twice" for name in _repeated(commands)]
         if not commands:
             found.append("command is empty: name at least one input of the FMU")

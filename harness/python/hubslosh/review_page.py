@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 
 WIDTH = 4.8  # Width of a figure, inches; it fits a telephone without shrinking much
 
-# Colours in figures that the page replaces by those of its light or dark mode.
+# Colours in figures, also in review_page.mplstyle, that the page replaces by those of its light or
+# dark mode.
 INK, SOFT, LINE, BAD = "#010203", "#595a5b", "#cfd0d1", "#b30102"
 
 MOST_CURVES = 12  # Number of fills that are drawn in Nichols and Bode diagrams
@@ -141,16 +142,8 @@ def figure_of(title: str, caption: str, height: float, draw: "Callable[[Figure],
         from matplotlib.figure import Figure
     except ModuleNotFoundError:
         raise FmuError("the page of a review needs matplotlib: pip install matplotlib") from None
-    style = {
-        "svg.fonttype": "none", "svg.hashsalt": title, "font.size": 10, "text.color": INK,
-        "axes.edgecolor": SOFT, "axes.labelcolor": INK, "xtick.color": SOFT, "ytick.color": SOFT,
-        "xtick.labelcolor": INK, "ytick.labelcolor": INK, "grid.color": LINE,
-        "grid.linewidth": 0.6, "axes.grid": True, "axes.spines.top": False,
-        "axes.spines.right": False, "legend.frameon": False, "legend.fontsize": 9,
-        "axes.facecolor": "none", "figure.facecolor": "none", "savefig.facecolor": "none",
-        "lines.linewidth": 1.2, "path.simplify_threshold": 0.3,
-    }  # fmt: skip
-    with matplotlib.rc_context(style):
+    style = Path(__file__).with_suffix(".mplstyle")
+    with matplotlib.rc_context({"svg.hashsalt": title}, style):
         figure = Figure(figsize=(WIDTH, height), layout="constrained")
         draw(figure)
         out = io.StringIO()

@@ -455,14 +455,33 @@ def check_parameters(
             problems.append(f"{name} is given twice, in parameters and in inputs")
 
 
-def check_outputs(fmu: Fmu, columns: Sequence[str], problems: list[str]) -> None:
-    """Append to ``problems`` everything that is wrong with the names of outputs."""
-    check: list[tuple[Callable[[str], bool], str]] = [
-        (lambda name: columns.count(name) > 1, "is wanted twice"),
-        (lambda name: fmu.kind(name) == "String", "is a text; only numbers are recorded"),
-    ]
-    for name in dict.fromkeys(columns):
+def check_outputs(
+    fmu: Fmu,
+    names: Sequence[str],
+    problems: list[str],
+    *,
+    real: bool = False,
+    inputs: bool = False,
+) -> None:
+    """Append to ``problems`` everything that is wrong with the names of numeric variables.
+
+    If ``real`` is true, the variables must be of type Real; if ``inputs`` is true, they must be
+    inputs.
+    """
+    allowed = fmu.names("input")
+    for name in dict.fromkeys(names):
         try:
-            problems += [f"{name} {why}" for wrong, why in check if wrong(name)]
+            kind = fmu.kind(name)
         except FmuError as error:
             problems.append(str(error))
+            continue
+        if list(names).count(name) > 1:
+            problems.append(f"{name} is wanted twice")
+        if kind == "String":
+            problems.append(f"{name} is a text; only numbers are recorded")
+        elif real and kind != "Real":
+            problems.append(f"{name} is of type {kind}, not Real")
+        elif inputs and name not in allowed:
+            problems.append(
+                f"{name} is not an input of {fmu.name} (inputs: {', '.join(allowed) or 'none'})"
+            )
