@@ -10,7 +10,6 @@ where no scalings exist at a single frequency, the box is.
 """
 
 import io
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise, product
@@ -370,9 +369,10 @@ class Search:
         more than ``most`` convex problems would be needed.
         """
         self.width, self.pairs, self.found = high - low, [], {}
+        self.line.start()
         edges = np.append(0.0, np.geomspace(self.nyquist / 1000, self.nyquist, 16))
         stack = [(float(a), float(b), low, high) for a, b in pairwise(edges)]
-        shares, done, start = [1 / len(stack)] * len(stack), 0.0, time.monotonic()
+        shares, done = [1 / len(stack)] * len(stack), 0.0
         rows: list[tuple[float, float, Vector, Vector, float, float, int, int]] = []
         while stack:
             region, share = stack.pop(), shares.pop()
@@ -386,11 +386,10 @@ class Search:
                 if pieces := self.proved(region, ends, (a, b), HALVINGS):
                     rows.extend((*piece, *box, a, b, first[1], last[1]) for piece in pieces)
                     done += share
-                    left = (time.monotonic() - start) * (1 / done - 1)
                     size = max(np.abs(low).max(), np.abs(high).max())
                     self.line.show(
                         f"certificate for {size:.4g} times the ranges: {100 * done:.0f} % proved, "
-                        f"about {left:.0f} s left"
+                        f"about {self.line.left(done):.0f} s left"
                     )
                     continue
                 middle = (a + b) / 2

@@ -1,6 +1,5 @@
 """Search for the smallest Δ that brings a sampled loop to the limit of stability."""
 
-import time
 from collections.abc import Iterator, Sequence
 from itertools import combinations
 from typing import TYPE_CHECKING
@@ -55,7 +54,7 @@ class DeltaSearch:
             for name in model.deltas
         ])  # fmt: skip
         self.states = len(loop._gain(model.at(np.zeros(len(model.counts))), K).A)
-        self.line, self.started = Line(progress), time.monotonic()
+        self.line = Line(progress)
 
     def matrices(self, deltas: Matrix) -> Matrix:
         """Return the matrix of the closed loop for each Δ; NaN where there is no such craft."""
@@ -130,9 +129,8 @@ class DeltaSearch:
 
     def say(self, best: WorstCase, share: float) -> None:
         """Show the smallest size so far, and the time that is left after a share of the work."""
-        spent = time.monotonic() - self.started
         so_far = f"{best.size:.4g} times the ranges so far" if best.delta else "none so far"
-        left = f", about {spent * (1 / share - 1):.0f} s left" if share > 0.05 else ""
+        left = f", about {self.line.left(share):.0f} s left" if share > 0.05 else ""
         self.line.show(f"worst case: {so_far}{left}")
 
     def limits(self, ways: Matrix, largest: float, steps: int) -> list[WorstCase]:

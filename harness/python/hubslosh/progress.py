@@ -2,6 +2,7 @@
 
 import shutil
 import sys
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -23,6 +24,15 @@ class Line:
         show = is_watched() if progress is None else progress
         self._show = show if callable(show) else self._write if show else None
         self._width = 0
+        self.start()
+
+    def start(self) -> None:
+        """Count the time for `left` from now on."""
+        self._started = time.monotonic()
+
+    def left(self, share: float) -> float:
+        """Return the time, s, that is left after a share of the work."""
+        return (time.monotonic() - self._started) * (1 / share - 1)
 
     def show(self, text: str) -> None:
         """Replace the displayed text by a new one."""

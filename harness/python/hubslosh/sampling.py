@@ -235,21 +235,24 @@ def monte_carlo(
         stored = store.rows(draws) if store else {}
         rows = {run: {"run": run} | draws[run] | row for run, row in stored.items()}
         missing = [run for run in range(runs) if run not in rows]
-        left = _Left(len(missing), runs - len(missing), progress)
+        line, failed, there = Line(progress), 0, runs - len(missing)
         jobs = ((run, draws[run]) for run in missing)
         count = workers or cores()
         pool = client.get_executor(pure=False) if client else ThreadPoolExecutor(count)
         made = _results(pool, np.inf if client else 2 * count, outcome, jobs)
         try:
-            for run, found in made:
+            for done, (run, found) in enumerate(made, 1):
                 rows[run] = {"run": run} | draws[run] | found
                 if store:
                     refused = {FAILED: found[FAILED]} if FAILED in found else {}
                     numbers = {name: value for name, value in found.items() if name != FAILED}
                     store.add(run, draws[run], numbers, **refused)
-                left.step(FAILED in found)
+                failed += FAILED in found
+                text = f"{done} of {len(missing)} runs, {line.left(done / len(missing)):.0f} s left"
+                text += f", {failed} refused" if failed else ""
+                line.show(text + (f", {there} were there already" if there else ""))
         finally:
-            left.line.close()
+            line.close()
             made.close()
         table = ShortTable([rows[run] for run in sorted(rows)])
         table.attrs["drawn"] = list(ranges)
@@ -257,10 +260,8 @@ def monte_carlo(
             table[FAILED] = table[FAILED].fillna("")
         if store:
             store.finish(table.to_csv(index=False, lineterminator="\n"))
-    if FAILED in table:
-        failed = (table[FAILED] != "").sum()
-        if failed == len(table):
-            raise FmuError(f"every run failed; the first: {table[FAILED].iloc[0]}")
+    if FAILED in table and (table[FAILED] != "").all():
+        raise FmuError(f"every run failed; the first: {table[FAILED].iloc[0]}")
     return table
 
 
@@ -337,28 +338,6 @@ def _text(name: str, of: Range) -> str:
         return text if len(text) < 200 else hashlib.sha256(text.encode()).hexdigest()
     low, high = of
     return f"{float(low)!r} to {float(high)!r}"
-
-
-class _Left:
-    """Shows the number of finished runs and the remaining time."""
-
-    def __init__(self, runs: int, there: int, progress: Progress) -> None:
-        import time
-
-        self.runs, self.there, self.done, self.failed = runs, there, 0, 0
-        self.clock, self.start, self.last = time.monotonic, time.monotonic(), 0.0
-        self.line = Line(progress)
-
-    def step(self, failed: bool) -> None:
-        self.done += 1
-        self.failed += failed
-        now = self.clock()
-        if now - self.last > 0.2 or self.done == self.runs:
-            self.last = now
-            left = (now - self.start) / self.done * (self.runs - self.done)
-            text = f"{self.done} of {self.runs} runs, {left:.0f} s left"
-            text += f", {self.failed} refused" if self.failed else ""
-            self.line.show(text + (f", {self.there} were there already" if self.there else ""))
 
 
 def quantiles(
