@@ -151,7 +151,7 @@ def test_all_faults_of_a_call_are_reported_at_once(fmu: Path) -> None:
         "no variable tank.height; did you mean tank.h",
         'tank.h has no unit "inch" (allowed: m, mm)',
         "theta is computed by the FMU (output)",
-        "slosh.model expects one of frozen (1), linear (2), planar (3), spherical (4), liquid (6)",
+        "slosh.model expects one of frozen (1), linear (2), planar (3), spherical (4), liquid (5)",
         "no variable omga; did you mean omega",
         "omega is wanted twice",
         "step must be a positive number of seconds, not -1.0",
