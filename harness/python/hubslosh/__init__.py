@@ -16,43 +16,16 @@ modes, `mode_errors` says how many a model needs, `posterior` samples the result
 """
 
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
-# numpy, pandas and scipy take 0.3 to 1.2 s to import: each module comes on the first use of
-# one of its names (PEP 562). Type checkers read __init__.pyi, which tests/test_import.py writes.
-_MODULES = {
-    "appendages": ("Appendage",),
-    "certificate": ("Certificate", "WorstCase"),
-    "comparison": ("compare",),
-    "craft": ("Craft", "MassProperties", "MountedTank"),
-    "engines": ("Engine",),
-    "files": ("to_csv", "to_mat", "to_parquet"),
-    "fitting": ("TransferFunction", "fit"),
-    "fmu": ("Fmu", "FmuError", "FmuWarning", "Quantity", "Value", "fmu_path", "read_parameters"),
-    "inertia": ("bottom_up",),
-    "linearization": ("LinearModel", "linearize"),
-    "liquid": ("LiquidModes", "liquid_modes"),
-    "loop": ("Law", "Loop", "closed_loop"),
-    "modes": ("mode_errors",),
-    "operating_point": ("OperatingPoint",),
-    "plant": ("TORQUE", "Plant", "RunError"),
-    "program": (
-        "Checked", "CheckedRule", "Estimated", "Finding", "Identification", "analyse", "campaign",
-        "check", "identify", "posterior",
-    ),
-    "project": ("Project",),
-    "recordings": ("read_recording",),
-    "review": ("Review",),
-    "run": ("Run",),
-    "sampling": ("draw", "monte_carlo", "quantiles"),
-    "simulation": ("simulate",),
-    "spectrum": ("frequency_response",),
-    "stability": ("Margins", "margins"),
-    "tanks": ("Tank", "tank"),
-    "uncertainty": ("UncertainModel", "uncertain"),
-    "viewing": ("View", "view"),
-    "wheels": ("Wheel",),
-}  # fmt: skip
+# numpy, pandas and scipy take 0.3 to 1.2 s to import: each module comes on the first use of one of
+# its names (PEP 562). The lines "from .MODULE import NAME as NAME" of __init__.pyi, which type
+# checkers read, say where the names are.
+_LINES = Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8").splitlines()
+_WORDS = [line.split() for line in _LINES if line.startswith("from .")]
+_MODULE_OF = {name: module[1:] for _, module, _, name, *_ in _WORDS if module != "."}
+
 # Removed names, and what does the same.
 _REMOVED = {
     "COLUMNS": "the argument outputs of hubslosh.simulate",
@@ -61,7 +34,6 @@ _REMOVED = {
     "setting": "str.partition",
     "write_table": "hubslosh.to_csv or hubslosh.to_parquet",
 }
-_MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
 
 __all__ = [*sorted(_MODULE_OF), "attitude", "plot"]
 

@@ -1,4 +1,4 @@
-# Written by harness/python/tests/test_import.py from _MODULES of __init__.py.
+# Names of the package, one a line: __init__.py imports each from here when it is first used.
 # ruff: noqa: I001
 from . import attitude as attitude
 from . import plot as plot
