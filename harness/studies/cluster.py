@@ -80,7 +80,8 @@ class Harness:
             numbers = [text for name in times for text in (f"--{name}", repr(run[name]))]
             hold = ["--hold"] if run["hold"] else []
             self._say("torque", "--profile", run["profile"], *numbers, *hold, "--out", str(path))
-            return list(hubslosh.read_table(path, TORQUE_COLUMNS).values())
+            table = pyarrow.parquet.read_table(path)
+            return [table[name].to_numpy() for name in TORQUE_COLUMNS]
 
     def analyse(self) -> bool:
         """Write tables and report from the stored runs; whether every run is in them.
@@ -117,9 +118,12 @@ def why_not_stored(path: Path, run: Run, columns: list[str]) -> str | None:
             found = notes.get(key.encode(), b"").decode(errors="replace")
             if found != wanted:
                 return f"the {key} of the file differs"
-        times = hubslosh.read_table(path, columns)["time"]
-    except (OSError, pyarrow.ArrowException, hubslosh.FmuError) as error:
+        table = file.read(columns)
+    except (OSError, pyarrow.ArrowException) as error:
         return f"the file is incomplete: {error}"
+    if missing := set(columns) - set(table.column_names):
+        return f"the file is incomplete: it has no column {', '.join(sorted(missing))}"
+    times = table["time"].to_numpy()
     if len(times) != run["steps"] + 1 or times[-1] != run["stop"]:
         return f"the file has {len(times)} rows, but the run needs {run['steps'] + 1}"
     return None
@@ -132,27 +136,27 @@ def drive_here(
     import os
     from pathlib import Path
 
+    import pandas as pd
+
     import hubslosh
 
-    time, tau, slope = torque
+    inputs = pd.DataFrame(dict(zip(TORQUE_COLUMNS, torque, strict=True)))
     try:
-        table = hubslosh.drive(
+        made = hubslosh.simulate(
             Path(get_worker().local_directory) / fmu,
-            time,
-            tau,
             run["settings"],
-            slope=slope,
+            inputs.drop(columns="tau_slope") if run["hold"] else inputs,
+            outputs=[name for name in columns if name not in ("time", hubslosh.TORQUE)],
             tolerance=run["tolerance"],
             hold=run["hold"],
-            columns=[name for name in columns if name not in ("time", hubslosh.TORQUE)],
         )
     except hubslosh.FmuError as error:
         return None, str(error)
     # the torque also has rows at its edges, which the result does not have
-    steps = (time - time[0]) / run["step"]
+    steps = (torque[0] - torque[0][0]) / run["step"]
     wanted = np.abs(steps - np.round(steps)) <= 1e-6
     wanted[-1] = True
-    table = {name: values[wanted] for name, values in table.items()}
+    table = {name: made[name].to_numpy(float)[wanted] for name in columns}
     return table, f"hubslosh {hubslosh.__version__}, Dask, process {os.getpid()}"
 
 
@@ -163,7 +167,7 @@ class Package(WorkerPlugin):
         """Read its files; the compiled half has the name that Python looks for."""
         source = Path(hubslosh.__file__).parent
         native = Path(str(sys.modules["hubslosh._native"].__file__))
-        self.files = {file.name: file.read_bytes() for file in source.glob("*.py")}
+        self.files = {file.name: file.read_bytes() for file in source.iterdir() if file.is_file()}
         ending = ".pyd" if os.name == "nt" else ".abi3.so"
         self.files[f"_native{ending}"] = native.read_bytes()
 
@@ -174,7 +178,7 @@ class Package(WorkerPlugin):
         for name, content in self.files.items():
             (folder / "hubslosh" / name).write_bytes(content)
         sys.path.insert(0, str(folder))
-        import hubslosh.plant  # noqa: F401 - it may lack a package
+        import hubslosh.simulation  # noqa: F401 - it may lack a package
 
 
 def prepare(client: Client, fmu: Path, sha256: str) -> str:
@@ -290,7 +294,8 @@ def make_runs_in(
                 whole = {name: table[name] for name in columns}
                 with tempfile.TemporaryDirectory() as directory:
                     draft = Path(directory) / "run.parquet"
-                    hubslosh.write_table(draft, whole, notes)
+                    whole = pyarrow.table(whole).replace_schema_metadata(notes)
+                    pyarrow.parquet.write_table(whole, draft, compression="zstd")
                     store.add(run["name"], draft.read_bytes())
                 made(run)
             bar.update(run["steps"])

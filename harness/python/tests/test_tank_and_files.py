@@ -111,7 +111,7 @@ def test_errors_of_a_tank_are_reported_in_words(tmp_path: Path) -> None:
 
 
 def test_tables_are_read_back_from_files_with_every_digit(tmp_path: Path) -> None:
-    """`read_table` returns exactly the numbers that `write_table` wrote to the file."""
+    """Other programs read exactly the numbers of a table from .csv, .parquet and .mat."""
     from scipy.io import loadmat
 
     table = pd.DataFrame({"time": [0.0, 0.1], "q[1]": [1 / 3, np.pi], "stuck": [True, False]})
