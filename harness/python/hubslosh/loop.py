@@ -25,7 +25,7 @@ from .simulation import (
     histories_of,
     outputs_of,
     parameters_of,
-    recorded,
+    record_run,
     too_many_rows,
     without_replaced,
 )
@@ -484,7 +484,7 @@ class Loop:
             commands[-1] = commands[-2]
             return dict(zip(command, commands.T, strict=True)) | columns_of(turned, feedback)
 
-        run = recorded(
+        run = record_run(
             self.model, every, points, histories, columns, wanted=wanted, tolerance=tolerance,
             constants={name: constants[name] for name in plain}, feedback=feedback,
             units=self._units(), computed=computed,

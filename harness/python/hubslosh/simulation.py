@@ -199,7 +199,7 @@ def run_of(
     if turned:
         commands = np.column_stack([of.after(points)[0] for of in torques.values()])
         feedback = follow(commands[:-1], turned, momentum)
-    table = recorded(
+    table = record_run(
         model, parameters, points, histories, columns, wanted=wanted, start=start, stop=stop,
         tolerance=tolerance, feedback=feedback, units=units_of(turned),
         computed=lambda: {} if feedback is None else columns_of(turned, feedback),
@@ -208,7 +208,7 @@ def run_of(
     return table
 
 
-def recorded(
+def record_run(
     model: str | Path,
     parameters: Parameters,
     points: Real,
