@@ -81,9 +81,7 @@ def campaign(
         arguments: list[str | Path] = ["--plan", plan, "--fmu", fmu_path(model)]
         arguments += ["--out", directory, *(["--force"] if force else [])]
         call(path, "campaign", arguments, progress, names={f"the plan {plan}": "the plan"})
-    table = pd.read_csv(directory / "runs.csv")
-    table.attrs["directory"] = directory
-    return table
+    return _runs_in(directory)
 
 
 def analyse(
@@ -152,8 +150,13 @@ def analyse(
     where: list[str | Path] = ["--fmu", fmu_path(fmu), "--out", out]
     flags += [*settings_flags(settings), *arguments]
     call(find_program(program), "analyse", [*files, *flags, *where], progress)
-    table = pd.read_csv(Path(out) / "runs.csv")
-    table.attrs["directory"] = Path(out)
+    return _runs_in(Path(out))
+
+
+def _runs_in(directory: Path) -> pd.DataFrame:
+    """Return the table of runs that the command has written to a directory."""
+    table = pd.read_csv(directory / "runs.csv")
+    table.attrs["directory"] = directory
     return table
 
 

@@ -3,7 +3,7 @@
 import html
 import io
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -263,11 +263,16 @@ def _stabilisation(figure: "Figure", review: "Review") -> None:
     key_of(figure)
 
 
-def key_of(figure: "Figure", columns: int = 2) -> None:
-    """Move the legend of a figure below its axes, where it hides no curve."""
+def key_of(figure: "Figure", columns: int = 2, shown: Sequence[int] | None = None) -> None:
+    """Move the legend of a figure below its axes, where it hides no curve.
+
+    ``shown`` has the numbers of the lines to be named; by default all lines are.
+    """
     handles, labels = figure.axes[0].get_legend_handles_labels()
     if handles:
-        figure.legend(handles, labels, loc="outside lower center", ncols=columns)
+        rows = range(len(labels)) if shown is None else shown
+        figure.legend([handles[k] for k in rows], [labels[k] for k in rows],
+                      loc="outside lower center", ncols=columns)  # fmt: skip
 
 
 def _modes(figure: "Figure", review: "Review", unit: str) -> None:
@@ -320,14 +325,12 @@ def _shade(share: float) -> str:
 
 
 def _key(figure: "Figure") -> None:
-    """Add a legend that names the first and the last fill, unstable fills, and the worst case."""
-    handles, labels = figure.axes[0].get_legend_handles_labels()
+    """Name the first and the last fill, unstable ones, and the worst case."""
+    _, labels = figure.axes[0].get_legend_handles_labels()
     unstable = [k for k, label in enumerate(labels[:-1]) if label.endswith("unstable")]
     last = len(labels) - 1
     shown = sorted({0, (last - 1) // 2, last - 1, last, *unstable[:4]})
-    figure.legend([handles[k] for k in shown], [labels[k] for k in shown],
-                  loc="outside lower center",
-                  ncols=2 if any("unstable" in label for label in labels) else 4)  # fmt: skip
+    key_of(figure, 2 if any("unstable" in label for label in labels) else 4, shown)
 
 
 def _nichols(figure: "Figure", curves: Curves) -> None:
