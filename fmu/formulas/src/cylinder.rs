@@ -94,9 +94,10 @@ fn mcmahon(n: usize) -> f64 {
     b - 7.0 / x - 4.0 * (7.0 * 16.0 + 82.0 * 4.0 - 9.0) / (3.0 * x * x * x)
 }
 
-/// Returns mass, kg, height of the centre of mass above the bottom, m, and transverse inertia about it, kg m2, of the rigid
-/// liquid that remains when the modes `kept` are pendulums. The remainder is chosen so that mass, centre of mass and
-/// inertia of the whole liquid are exact while each slosh mass is at its position of rest.
+/// Returns the mass, kg, the height of the centre of mass above the bottom, m, and the transverse
+/// inertia about that centre, kg m2, of the rigid liquid that remains when the modes `kept` are
+/// pendulums. The rigid liquid is chosen so that mass, centre of mass and inertia of the whole
+/// liquid are exact while every pendulum hangs along the tank's axis.
 pub fn rest(d: f64, h: f64, m_liq: f64, kept: &[Pendulum]) -> [f64; 3] {
     let z_liq = h / 2.0;
     let sum = |f: &dyn Fn(&Pendulum) -> f64| kept.iter().map(f).sum::<f64>();
@@ -133,8 +134,8 @@ mod tests {
         }
     }
 
-    /// The fourth root of a product of order 1 has an error of some ulp; atanh near 1 multiplies it by 1/(1 -
-    /// tanh^2) = 20.
+    /// The fourth root in the formula for the diameter has an error of some units in the last
+    /// place, and atanh near 1 multiplies this error by 1/(1 - tanh^2) = 20.
     #[test]
     fn tank_dimensions_are_recovered_from_the_first_mode() {
         for (d, h) in [(0.163, 0.1), (0.163, 0.05), (0.9, 0.3)] {
@@ -202,9 +203,9 @@ mod tests {
         assert!((libm::tanh(2.0 * XI[0] * h / d) - 0.995).abs() < 1e-15);
     }
 
-    /// A thin film has no height, so the liquid turns like a disk, with R^2/4; the integral that replaces the
-    /// last zeros of the sum is then too small by 8/(12 pi end^3), end = 400 pi + 1.6. In a long column
-    /// h^2/12 - 3 R^2/4 remains.
+    /// A thin film has no height, so its inertia per mass is that of a disk, R^2/4; the integral
+    /// that replaces the last zeros of the sum is then too small by 8/(12 pi end^3), end = 400 pi +
+    /// 1.6. In a long column the inertia per mass tends to h^2/12 - 3 R^2/4.
     #[test]
     fn the_capped_inertia_has_its_limits() {
         let film = capped_inertia(2.0, 1e-12);
@@ -219,7 +220,8 @@ mod tests {
         assert!((column / (1e8 / 12.0) - 1.0).abs() < 1e-7, "{column}");
     }
 
-    /// The next term of McMahon's expansion is of the order of 1e4/(8 b)^5, which is 1e-8 at the tenth zero.
+    /// McMahon's expansion approximates the zeros of J1'. Its first omitted term is of the order of
+    /// 1e4/(8 b)^5, b being the leading term of the expansion, which is 1e-8 at the tenth zero.
     #[test]
     fn mcmahon_s_zeros_continue_the_table() {
         let tenth = mcmahon(10);

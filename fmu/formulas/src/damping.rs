@@ -20,8 +20,9 @@ use libm::{cosh, exp, log, pow, sinh, sqrt, tanh};
 
 use crate::cylinder::XI;
 
-/// Factor f of a shape without measurements. It lies between the measured cylinders' 1.49 (Stephens) and 1.39
-/// to 1.54 (Mikishev and Dorozhkin).
+/// Damping of a slosh mode over the damping of the laminar layer at its wall, for a tank whose
+/// shape nobody has measured. It lies between the measured cylinders' 1.49 (Stephens) and 1.39 to
+/// 1.54 (Mikishev and Dorozhkin).
 pub const UNMEASURED: f64 = 1.45;
 
 pub const SCATTER: f64 = 0.3;
@@ -72,8 +73,8 @@ pub struct Correlation {
 
 pub const BEYOND: f64 = 2.0;
 
-/// Half angle, degrees, at which the cone's correlation has lost its weight, because cones were measured up
-/// to 45 degrees.
+/// Half angle of a cone, degrees, from which on the measured correlation for cones is not used,
+/// because cones were measured only up to 45 degrees.
 const WIDEST: f64 = 50.0;
 
 const SHALLOW: f64 = 0.4;
@@ -152,12 +153,13 @@ pub struct Part {
     pub weight: f64,
 }
 
-/// Share of the wall from which on the interval of an estimate contains the shape's correlation entirely; if
-/// other shapes have at least this share, the interval is the one of a mixture.
+/// Share of the wetted wall from which on a measured shape counts in the interval of an estimate.
+/// From this share on the interval contains the shape's correlation entirely. If other shapes have
+/// at least this share, the estimate has the interval of a wall of several shapes.
 const COUNTS: f64 = 0.05;
 
-/// Factor below which a correlation does not count, because no wall can have less damping than its laminar
-/// layer.
+/// Damping by a correlation over the damping of the laminar layer below which the correlation is
+/// not used, because no wall can have less damping than its laminar layer.
 const BELOW: f64 = 0.8;
 
 impl Part {
@@ -169,8 +171,9 @@ impl Part {
         UNMEASURED + trusted * (self.factor.max(1.0) - UNMEASURED)
     }
 
-    /// Returns true if the correlation and the general value of [`UNMEASURED`] laminar layers differ by more
-    /// than measured tanks scatter.
+    /// Returns true if the damping by the shape's correlation differs from the damping of
+    /// [`UNMEASURED`] laminar layers by more than the damping ratios of measured tanks scatter
+    /// about a correlation.
     pub fn disagrees(&self) -> bool {
         let (low, high) = (self.factor.min(UNMEASURED), self.factor.max(UNMEASURED));
         high > (1.0 + SCATTER) * low
@@ -313,7 +316,9 @@ pub fn cone(radius: f64, half_angle: f64, nu: f64, g: f64) -> f64 {
     4.964 / TAU * c5 / sqrt(c4) * sqrt(inverse_reynolds(radius, nu, g))
 }
 
-/// Returns Re of a torus divided by Re_0 of the only torus that was measured.
+/// Returns the viscosity number Re = nu/sqrt(g R^3) of a torus divided by the viscosity number of
+/// the only torus whose damping was measured. `tube_radius` is the radius of the torus's section,
+/// m.
 pub fn torus_number(tube_radius: f64, nu: f64, g: f64) -> f64 {
     inverse_reynolds(tube_radius, nu, g) / inverse_reynolds(0.0635, 3.3e-6, 9.81)
 }
@@ -422,7 +427,8 @@ mod tests {
         assert!((both / (1.5077 / 1.2557 * sqrt(0.819 / 0.397)) - 1.0).abs() < 1e-12, "{both}");
     }
 
-    /// The fit is a polynomial of fourth order in the depth for a viscosity number of 1.
+    /// The damping ratio of a torus is a polynomial of fourth order in the depth, multiplied by the
+    /// root of the viscosity number over the viscosity number of the measured torus.
     #[test]
     fn the_damping_of_a_torus_equals_the_fit_and_grows_with_the_root_of_the_viscosity_number() {
         let full = torus(0.0635, 2.0 * 0.0635, 3.3e-6, 9.81);
@@ -571,8 +577,9 @@ mod tests {
         [factor, low, high]
     }
 
-    /// The damping ratio in units of laminar wall friction, with its lower and upper limits. Limits are ±30 % of the
-    /// correlation where it agrees with 1.45 times wall friction; otherwise they include both estimates.
+    /// The damping of a tank's first mode over the damping of its laminar wall layer, with lower
+    /// and upper limits. Limits are ±30 % of the correlation where it agrees with 1.45 layers;
+    /// otherwise they include both estimates.
     #[test]
     fn a_measured_shape_has_its_correlation_and_the_scatter_where_two_estimates_agree() {
         for (factor, low, high) in [
@@ -590,7 +597,8 @@ mod tests {
         is_near([low, high, 1.0], [1.0, 1.95, 1.0]);
     }
 
-    /// In units of laminar wall friction: the ratio without a correlation, or with a correlation of low weight or below 1.
+    /// The damping over the damping of the laminar layer is 1.45 for a tank without a correlation,
+    /// and for a tank whose correlation has low weight or gives less than the layer.
     #[test]
     fn unmeasured_shapes_have_1_45_times_the_laminar_damping() {
         is_near(numbers(&[]), [1.45, 1.0, 1.3 * 1.45]);

@@ -175,10 +175,11 @@ mod tests {
         }
     }
 
-    /// Returns the differences between neighbouring Bernstein coefficients of the quintic between two points, divided
-    /// by their distance h. From the left end they are d/5 and d/5 + h s/20 with the slope d and the second derivative
-    /// s, then follows the remainder, and then the same from the right end. If they all have the sign of the rise, the
-    /// curve is monotonic.
+    /// Returns the differences between neighbouring Bernstein coefficients of the quintic between
+    /// two points, divided by their distance h. With d the slope and s the second derivative at a
+    /// point, the first two differences are d/5 and d/5 + h s/20 at the left point, the last two
+    /// follow likewise from the right point, and the middle one is what remains of the rise. If all
+    /// have the sign of the rise, the curve is monotonic.
     fn steps(h: f64, [y_0, d_0, s_0]: [f64; 3], [y_1, d_1, s_1]: [f64; 3]) -> [f64; 5] {
         let secant = (y_1 - y_0) / h;
         let sign = if secant < 0.0 { -1.0 } else { 1.0 };
@@ -192,8 +193,9 @@ mod tests {
         .map(|step| sign * step)
     }
 
-    /// The data jump by factors up to 1e4, rise and fall smoothly, or turn. The tolerance is 1e-11: the last
-    /// digit of the largest value over the smallest distance.
+    /// The curve is monotone between points that jump by factors up to 1e4, that rise and fall
+    /// smoothly, or that turn. The tolerance is 1e-11: the last digit of the largest value over the
+    /// smallest distance between points.
     #[test]
     fn the_curve_rises_where_the_data_rise() {
         let mut seed = 1_u64;

@@ -21,7 +21,8 @@ use crate::cylinder::XI;
 use crate::energy_terms::energy_terms;
 use crate::third_order;
 
-/// Reason why no pendulum represents the liquid. The descriptions of the items are in [`LimitedBy::ITEMS`].
+/// Reason why a pendulum does not represent the liquid in the present state of a tank.
+/// [`LimitedBy::ITEMS`] describes each reason.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum LimitedBy {
@@ -48,7 +49,8 @@ impl LimitedBy {
         LimitedBy::Contact,
     ];
 
-    /// Names and descriptions of all reasons, in the order of their numbers.
+    /// Names and descriptions of all reasons why a pendulum does not represent the liquid, in the
+    /// order of their numbers.
     pub const ITEMS: [(&str, &str); 8] = [
         ("none", "In range"),
         (
@@ -75,10 +77,12 @@ impl LimitedBy {
     }
 }
 
-/// Relative error of the frequency that a model of the amplitude dependence may have at the end of its range.
+/// Relative error that a slosh model's natural frequency may have at the largest slosh angle of its
+/// range, compared with the frequency of fully nonlinear potential flow.
 pub const FREQUENCY: f64 = 3e-3;
-/// Relative error of the frequency at which a forced response is wrong by 3 %, if the response is wrong only because
-/// the frequencies of the model change with the amplitude in another way than the frequencies of the liquid.
+/// Relative error of the model's natural frequency at which a forced response is wrong by 3 %, if
+/// the response is wrong only because the model's frequency changes with the slosh angle in another
+/// way than the liquid's.
 pub const FORCED: f64 = 8.5e-4;
 
 /// Relative error of the third order's frequency at the angle at which a forced response is wrong by 3 %, for a tank in
@@ -121,8 +125,9 @@ const THIRD_ORDER: [[f64; 3]; 12] = [
 const FOLD: [[f64; 2]; 6] =
     [[0.8314, 0.5], [0.9, 4.6], [1.0, 7.0], [1.227, 9.4], [2.0, 10.8], [2.5, 10.4]];
 
-/// Slosh angles, rad, at which a model of the first mode ends: `frequency` where its frequency errs by
-/// [`FREQUENCY`], and `forced` where a forced response errs by 3 %.
+/// Largest slosh angles, rad, of a model of the first mode: up to `frequency` its natural frequency
+/// errs by at most [`FREQUENCY`], and up to `forced` a forced response near resonance errs by at
+/// most 3 %.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AngleLimit {
     pub frequency: f64,
@@ -188,7 +193,8 @@ fn interpolate<const N: usize>(x: f64, rows: [[f64; 2]; N]) -> f64 {
     y_0 + (y_1 - y_0) * (x - x_0) / (x_1 - x_0)
 }
 
-/// Largest Omega^2 R/g at which a tank that spins about its axis is modelled by pendulums.
+/// Largest spin number Omega^2 R/g at which the liquid of a tank that spins about its axis is
+/// modelled by pendulums. Omega is the spin rate, R the radius of the free surface.
 pub const SPIN_NUMBER: f64 = 0.3;
 
 /// Quantities of a tank's first mode that limit its spin: `factor` is 4 (1 + C_0), because the slower wave is
@@ -220,8 +226,10 @@ impl SpinLimit {
         SpinLimit { factor: 4.0 * (1.0 + gyroscopic), ratio }
     }
 
-    /// Returns C_0. A wave of the first mode has the frequencies C_0 Omega +- sqrt(C_0^2 Omega^2 + omega_0^2) seen from the tank,
-    /// to the first order in Omega; a pendulum, which does not take part in the spin, has them with C_0 = 1.
+    /// Returns the gyroscopic coefficient C_0 of the first mode. Seen from a tank that spins at the
+    /// rate Omega, a wave of the first mode has the frequencies C_0 Omega +- sqrt(C_0^2 Omega^2 +
+    /// omega_0^2), to the first order in Omega. A pendulum, which does not take part in the spin,
+    /// has the frequencies of this formula with C_0 = 1.
     pub fn gyroscopic_coefficient(&self) -> f64 {
         self.factor / 4.0 - 1.0
     }
@@ -232,12 +240,13 @@ impl SpinLimit {
         self.ratio
     }
 
-    /// Returns true if liquid that turns with its tank at `rate`, rad/s, about its axis is beyond the limits;
-    /// `omega2`, 1/s^2, is the squared natural frequency without spin.
+    /// Returns true if a pendulum does not represent liquid that spins with its tank at `rate`,
+    /// rad/s, about the tank's axis. `omega2`, 1/s^2, is the squared natural frequency without
+    /// spin.
     ///
-    /// Beyond 2 Omega/omega_0 = (1 + C_0)^(-1/2) a wave that runs with the spin is among the inertial waves
-    /// of the liquid. Beyond Omega^2 R/g = 0.3 even the gyroscopic formula errs by more than 2 %, and the
-    /// surface is 0.075 R lower at its centre.
+    /// Beyond 2 Omega/omega_0 = (1 + C_0)^(-1/2) a wave that runs with the spin is among the
+    /// inertial waves of the liquid. Beyond Omega^2 R/g = 0.3 even the gyroscopic formula errs by
+    /// more than 2 %, and the surface is 0.075 R lower at its centre.
     pub fn is_exceeded(&self, rate: f64, omega2: f64) -> bool {
         let rate2 = rate * rate;
         rate2 * self.factor > omega2 || rate2 * self.ratio > SPIN_NUMBER * omega2
@@ -294,8 +303,9 @@ mod tests {
         assert_eq!(compared.to_radians(), LARGEST_FORCED_ENERGY);
     }
 
-    /// From fully nonlinear flow, a pendulum's frequency of planar motion is off by 0.3 % at 1.6, 3.5, 8.3
-    /// and 7.8 degrees at these depths. The next order changes these angles by at most 0.3 degrees.
+    /// In fully nonlinear potential flow the frequency of planar motion differs from a pendulum's
+    /// by 0.3 % at the slosh angles 1.6, 3.5, 8.3 and 7.8 degrees for h/R = 0.25, 0.35, 1.227 and
+    /// 2. The term of the next order in the angle changes these angles by at most 0.3 degrees.
     #[test]
     fn the_range_of_a_pendulum_ends_where_the_third_order_differs_from_it() {
         for (fill, exact) in [(0.25, 1.6), (0.35, 3.5), (1.227, 8.3), (2.0, 7.8)] {

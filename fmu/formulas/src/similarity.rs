@@ -35,8 +35,8 @@ impl Liquid {
         self.density * velocity * velocity * length / self.tension
     }
 
-    /// Returns the time scale sqrt(rho L^3/sigma) of surface tension over a length, m (equation 2.29). It is
-    /// not a period.
+    /// Returns the time scale sqrt(rho L^3/sigma) on which surface tension moves liquid over the
+    /// length L, m (equation 2.29). It is not the period of an oscillation.
     pub fn capillary_time(&self, length: f64) -> f64 {
         sqrt(self.density * length * length * length / self.tension)
     }
@@ -58,7 +58,8 @@ pub fn froude_number(velocity: f64, acceleration: f64, length: f64) -> f64 {
     velocity * velocity / (acceleration * length)
 }
 
-/// Returns the time scale sqrt(L/a) of gravity over a length, m (equation 2.28).
+/// Returns the time scale sqrt(L/a) on which the acceleration a, m/s2, moves liquid over the length
+/// L, m (equation 2.28).
 pub fn gravity_time(acceleration: f64, length: f64) -> f64 {
     sqrt(length / acceleration)
 }

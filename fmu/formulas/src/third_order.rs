@@ -25,7 +25,8 @@
 
 use crate::cylinder::XI;
 
-/// Integral M = int J1(xi_1 r)^4 r dr/int J1^2 r dr over the section.
+/// Integral M = int J1(xi_1 r)^4 r dr/int J1(xi_1 r)^2 r dr of the first mode's shape over the
+/// section of a cylinder of radius 1.
 const M: f64 = 0.278_821_981_660_245_8;
 
 /// Squared amplitude of the wave per squared slosh angle, B = (2/((xi_1^2 - 1) J1(xi_1)))^2.

@@ -34,7 +34,8 @@ use crate::cylinder::XI;
 /// mode 1, and by 0.003 for mode 10 (from h/R = 0.2 on).
 const ZEROS: usize = 16;
 
-/// Zeros of J0' after 0, and of J2' below.
+/// Zeros of J0', the derivative of the Bessel function J0, that follow the zero at 0. The zeros of
+/// J2' are in `XI_2` below.
 const XI_0: [f64; ZEROS] = [
     3.831_705_970_207_512_5,
     7.015_586_669_815_619,
@@ -232,7 +233,8 @@ mod tests {
         assert!((along - 0.125).abs() < 0.01 && (across - 0.375).abs() < 0.01, "{along} {across}");
     }
 
-    /// Factors of the two frequencies of each mode in a leaning cylinder, for slopes up to 14.
+    /// In a cylinder whose axis leans from gravity no mode has a negative squared frequency, for
+    /// surface slopes up to 14.
     #[test]
     fn zero_tilt_changes_nothing_and_no_frequency_is_negative() {
         assert_eq!(factors(0, 1.0, 0.0), [1.0; 2]);

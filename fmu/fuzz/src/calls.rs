@@ -1,5 +1,5 @@
-//! Fuzzes the C interface of either FMI version: the bytes choose the calls and arguments of the hostile host
-//! in `host.c`.
+//! Fuzzes the C interface of FMI 2.0 or 3.0. A hostile host in C (`host.c`) makes calls in any
+//! order; random bytes choose the calls and their arguments.
 
 // This module has one call of a C function.
 #![allow(unsafe_code)]
@@ -19,12 +19,13 @@ struct HostFmu {
 }
 
 unsafe extern "C" {
-    /// Runs the hostile host. GUID and token in `fmu` must end with NUL, and `data` must have `size` bytes.
+    /// Runs the hostile host in `host.c`. The strings with GUID and token in `fmu` must end with
+    /// NUL, and `data` must have `size` bytes.
     fn host_run(fmu: *const HostFmu, data: *const u8, size: usize);
 }
 
-/// Runs the hostile host with `data` against the FMU with which this program is linked, which must be the FMU of the model
-/// `M`.
+/// Runs the hostile host of `host.c`, whose calls `data` chooses, against the FMU with which this
+/// program is linked. It must be the FMU of the model `M`.
 pub fn run<M: Model>(data: &[u8]) {
     let c_string = |text: &str| CString::new(text).expect("a GUID has no NUL");
     // Inputs for FMI 3.0 have an odd first byte; every fourth of them is for the FMU with arrays.

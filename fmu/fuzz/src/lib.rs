@@ -56,8 +56,8 @@ pub fn sizes<M: Model>(layout: Layout) -> [usize; 5] {
     [table.scalars.len(), outputs, states, table.about.event_indicators, input as usize]
 }
 
-/// Calls that get and set values in a version of FMI, for reals, integers, enumerations and Booleans in this
-/// order.
+/// Names of the calls that get and set values in one version of FMI, for reals, integers,
+/// enumerations and Booleans in this order.
 pub trait Values: Version {
     const GET: [&'static Call; 4];
     const SET: [&'static Call; 4];

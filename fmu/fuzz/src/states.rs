@@ -116,8 +116,8 @@ fn simulate<M: Model, V: Values>(instance: &mut Instance<M, V>) {
     survives_being_saved(instance);
 }
 
-/// Returns saved states of both interfaces, with each of the model's [`settings`], in every instance state
-/// that can be reached without an error.
+/// Returns saved states of an FMU for both interfaces, Co-Simulation and Model Exchange, with each
+/// of the model's [`settings`], in every instance state that can be reached without an error.
 fn bases<M: Model, V: Values>() -> &'static [Vec<u8>] {
     static BASES: Mutex<BTreeMap<[&str; 2], &[Vec<u8>]>> = Mutex::new(BTreeMap::new());
     let mut bases = BASES.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
@@ -168,11 +168,10 @@ fn life_of<M: Model, V: Values>(
     all.push(to_bytes(&instance));
 }
 
-/// Returns the settings whose saved states are modified. Together they use every part of the model, in
-/// motion.
+/// Returns sets of parameters with which the FMU runs before its saved states are modified.
+/// Together they use every part of the model, in motion.
 ///
 /// # Panics
-///
 /// If there are no settings for the model.
 pub(crate) fn settings(model: &str) -> Vec<Vec<(&'static str, Value)>> {
     match model {

@@ -87,7 +87,8 @@ fn co_simulation<M: Model, V: Values>(events: Events, data: &mut Unstructured) -
     Ok(())
 }
 
-/// Sets a parameter or an input, usually to an allowed value. A refusal must change nothing.
+/// Sets a parameter or an input of the FMU, usually to an allowed value. Panics if a call that the
+/// FMU refuses has changed a value.
 fn set_something<M: Model, V: Values>(
     instance: &mut Instance<M, V>,
     data: &mut Unstructured,

@@ -1,10 +1,9 @@
-//! Every variable of the FMU, once.
+//! Every variable of HubSlosh.fmu, each once.
 //!
-//! A variable exists exactly when it has an entry here. The model description,
-//! the value references, get and set, start values, range checks, saved states
-//! and the GUID follow from this table. Start values come from
-//! `plant::Parameters::default()`, with the liquid released at `model::START_ANGLE`, and from
-//! `plant::Inputs::default()`. The table reads them through the entry's accessor.
+//! A variable exists exactly when it has an entry here. The model description, the value
+//! references, get and set, start values, range checks, saved states and the GUID follow from this
+//! table. Start values come from `plant::Parameters::default()`, with the liquid released at
+//! `model::START_ANGLE`, and from `plant::Inputs::default()`.
 //!
 //! Ranges exclude values that no plant can have, such as a negative inertia, and are wide
 //! otherwise. `Plant::new` checks combinations of parameters.

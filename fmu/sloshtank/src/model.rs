@@ -8,8 +8,9 @@ use runtime::Dynamics;
 use runtime::clock::Instant;
 use runtime::model::StepFailure;
 
-/// Limit of `coupling_ratio` for the warning. Coupling by the total wrench with extrapolation on both sides
-/// is stable up to 2/sqrt(3) - 1 = 0.155.
+/// Largest `coupling_ratio`, the added mass of the liquid over the mass of the host, without a
+/// warning. If host and tank exchange forces once a step and extrapolate on both sides, the
+/// exchange is stable up to 2/sqrt(3) - 1 = 0.155.
 const LIMIT: f64 = 0.15;
 
 const OUT_OF_RANGE: &str = "the tank leaves its range (tank.in_range). Thrust pulls the tank off its liquid and nothing \
@@ -24,8 +25,8 @@ const LUMP: &str = "the liquid leaves the tank's bottom and moves on as detached
 pub struct Model {
     tank: SloshTank,
     coupling_ratio: f64,
-    /// True while the present inputs are applied: outputs then evaluate the ranges with them, and otherwise have the
-    /// ranges of the last event.
+    /// True while the present inputs are applied. The outputs for the model's range of validity are
+    /// then evaluated with the present inputs, and otherwise keep the values of the last event.
     present: bool,
     /// True after a tank without a model of detached liquid has left its range.
     has_left_range: bool,
@@ -113,8 +114,8 @@ impl Parameters {
     }
 }
 
-/// Inputs: the host's motion, by default rest without specific force. The slope of omega follows from
-/// omega_dot, whatever slope the host sets.
+/// Inputs of the tank: the motion of the host, by default rest without specific force. The slope of
+/// the angular rate omega within a step is always omega_dot, whatever slope the host sets.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Inputs {
     pub tank: TankInputs,

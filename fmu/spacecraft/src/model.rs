@@ -8,8 +8,9 @@ use runtime::model::StepFailure;
 #[derive(Clone, Debug)]
 pub struct Model {
     craft: Spacecraft,
-    /// True while the present inputs are applied. In Co-Simulation a jump of the wheels' momentum or of an
-    /// outflow acts immediately.
+    /// True while the present inputs are applied, so that outputs belong to them. In Co-Simulation
+    /// a jump of the wheels' momentum or of an outflow acts when it is applied, not at the next
+    /// step.
     present: bool,
     wheels: Wheels,
     /// True after a tank without a model of detached liquid has left its range.

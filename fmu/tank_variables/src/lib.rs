@@ -77,12 +77,14 @@ pub fn set_damping_law<M: Tanks>(p: &mut M::Parameters, tank: usize, number: i32
     }
 }
 
-/// Returns tank, mode and point of element `n` of an array over tanks, modes and points of the fill table.
+/// Returns the indices, from 0, of the tank, the mode and the point of the fill table that belong
+/// to element `n` of an array over tanks, modes and points.
 pub const fn point(n: usize) -> (usize, usize, usize) {
     (n / (POINTS * MODES), n / POINTS % MODES, n % POINTS)
 }
 
-/// Returns tank, mode and axis of element `n` of an array over tanks, modes and axes.
+/// Returns the indices, from 0, of the tank, the mode and the axis that belong to element `n` of an
+/// array over tanks, modes and axes.
 pub const fn place(n: usize) -> (usize, usize, usize) {
     (n / (3 * MODES), n / 3 % MODES, n % 3)
 }

@@ -57,8 +57,8 @@ mod tests {
     use super::*;
     use crate::number::Dual;
 
-    /// A sum of six terms gives the squared angle from the squared chord; the relative error of the angle is 3e-7 at 45
-    /// degrees and 6e-4 at 90.
+    /// The sum of six terms gives the square of an angle between two unit vectors from their
+    /// squared chord. The relative error of the angle is 3e-7 at 45 degrees and 6e-4 at 90.
     #[test]
     fn the_approximate_angle_is_exact_to_3e_7_up_to_45_degrees_and_smooth_to_180() {
         for (degrees, allowed) in [(1e-6, 1e-15), (30.0, 3e-9), (45.0, 3e-7), (90.0, 6e-4)] {

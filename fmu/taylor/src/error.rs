@@ -1,4 +1,4 @@
-//! Reasons for refusing a step.
+//! Reasons why an integrator refuses a time step of the simulation.
 
 use alloc::string::String;
 
@@ -12,8 +12,9 @@ pub enum StepError {
     NotFinite {
         time: f64,
     },
-    /// The step needs more internal steps than `solver.max_steps`, and has reached `time`. `advice` is a
-    /// remedy in this model other than shorter steps and a larger `solver.max_steps`.
+    /// The call needs more internal integration steps than `solver.max_steps`, and has reached
+    /// `time`. `advice` tells the user of this model what to change other than the communication
+    /// step and `solver.max_steps`.
     TooManySteps {
         time: f64,
         max_steps: usize,

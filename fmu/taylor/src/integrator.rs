@@ -16,11 +16,11 @@ use crate::error::StepError;
 use crate::for_each_order;
 use crate::series::ORDER;
 
-/// Error of one step relative to the tolerance. A step may err by less than the whole motion, because errors
-/// of some thousand steps add up until the liquid's damping removes them.
+/// Allowed error of one internal step over the allowed error of the whole motion. It is less than 1
+/// because the errors of some thousand steps add up until the liquid's damping removes them.
 pub const STEP_SHARE: f64 = 1e-2;
 
-/// Floor of the error scale, rad/s, because smaller rates are negligible.
+/// Smallest rate, rad/s, to which an allowed error is relative. Rates below it are negligible.
 pub const RATE_FLOOR: f64 = 1e-6;
 
 /// Largest magnitude of a state. Above it energies and forces may overflow although the states do not.
@@ -31,13 +31,16 @@ const LONGEST: f64 = 1e9;
 
 const MIN_ORDER: usize = 5;
 
-/// Ratio of two terms two orders apart below which the decay of a series may be extrapolated.
+/// Ratio of two terms of a power series, two orders apart, below which the terms that follow may be
+/// predicted from the decay of the terms so far.
 const DECAY: f64 = 0.1;
 
-/// Tolerance of a predicted term over the tolerance of a computed term.
+/// Allowed magnitude of a predicted term of the series over the allowed magnitude of a computed
+/// term.
 const PREDICTED_SHARE: f64 = 0.25;
 
-/// Largest last term of a series, relative to its tolerance, after which the omitted terms may be predicted.
+/// Largest last computed term of a series, relative to its allowed magnitude, from which the terms
+/// that follow may be predicted.
 const LARGEST_LAST: f64 = 30.0;
 
 /// Length of a step, s, from which on the step may err by the whole allowed error. A shorter step of a kept [`Expansion`] may err
@@ -83,8 +86,9 @@ impl Steps {
     }
 }
 
-/// Convergence criterion of a motion's series: either the given number of successive terms has to be negligible (`Terms`), or two
-/// successive terms, which may be predicted from the decay of the terms before them (`Decay`). One negligible term is not enough,
+/// Criterion by which the power series of a motion is long enough: with `Terms`, the given number
+/// of successive terms has to be negligible. With `Decay`, two successive terms have to be, which
+/// may be predicted from the decay of the terms before them. One negligible term is not enough,
 /// because a motion that starts at rest is even in time, so that every second term is zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Convergence {
@@ -129,7 +133,8 @@ pub trait Motion {
     /// real axis, which later coefficients may not show.
     fn set_error_scale(&mut self, h: f64, allowed: f64) -> f64;
 
-    /// Returns the largest of the states' coefficients n, each divided by its allowed error.
+    /// Returns the norm of coefficient n of the states' series: the largest of these coefficients,
+    /// each divided by its allowed error.
     fn coefficient_norm(&self, n: usize) -> f64;
 
     #[inline(always)]
@@ -147,8 +152,9 @@ pub trait Motion {
         ORDER
     }
 
-    /// Returns the error at `h` after the start of the expansion, relative to the allowed error, of functions
-    /// with rounded corners. It is the difference between their series up to order n and their values.
+    /// Returns the error of the series of functions with rounded corners, relative to the allowed
+    /// error, at `h` after the start of the expansion. The error is the difference between the
+    /// series up to order n and the function itself.
     #[inline(always)]
     fn defect(&self, _n: usize, _h: f64) -> f64 {
         0.0
@@ -178,7 +184,6 @@ pub trait Motion {
 
 /// A motion whose expansion further calls of [`advance_kept`] continue.
 pub trait KeptMotion: Motion {
-    /// Returns the progress of the expansion whose coefficients the motion has.
     fn expansion(&mut self) -> &mut Expansion;
 
     /// Stores the derivatives of the states that the series up to order n have at `h` after the start of the
@@ -186,8 +191,9 @@ pub trait KeptMotion: Motion {
     #[inline(always)]
     fn store_slopes(&mut self, _n: usize, _h: f64) {}
 
-    /// Returns the error, relative to the allowed error, that the difference between the stored derivatives
-    /// and coefficients 1 of the states makes over the time `h`.
+    /// Returns the error of the states over the time `h`, relative to the allowed error, that
+    /// follows from the difference between the derivatives that [`KeptMotion::store_slopes`] has
+    /// stored and the derivatives by the right-hand side.
     #[inline(always)]
     fn slope_defect(&self, _h: f64) -> f64 {
         0.0
@@ -317,7 +323,8 @@ pub fn advance<M: Motion>(
     Ok(ControlFlow::Continue(()))
 }
 
-/// Adds `t` to a time that is kept with its rounding error.
+/// Adds `t`, s, to a time that is kept as two numbers: the rounded sum and the rounding error of
+/// that sum. Many small steps then add up without error.
 #[inline(always)]
 pub fn add_time([time, rest]: [f64; 2], t: f64) -> [f64; 2] {
     // Knuth's sum of two numbers and its rounding error, then Dekker's.
@@ -373,7 +380,8 @@ impl Expansion {
     }
 }
 
-/// Computes again the coefficients of the expansion that were overwritten. The expansion starts `t` after the start of the call.
+/// Computes again the coefficients of the expansion that other uses of the motion have overwritten.
+/// The expansion starts `t`, s, after the start of the call.
 // Only four orders are compiled: all of them would be a sixth of the binary.
 #[inline(never)]
 fn repair<M: KeptMotion>(motion: &mut M, t: f64) {
@@ -389,7 +397,7 @@ fn repair<M: KeptMotion>(motion: &mut M, t: f64) {
     motion.expansion().overwritten = 0;
 }
 
-/// Computes coefficient n + 1 of the states, and its norm.
+/// Computes coefficient n + 1 of the states' series, and the norm of this coefficient.
 #[inline(always)]
 fn compute_order<M: KeptMotion>(motion: &mut M, n: usize, tolerance: f64) {
     motion.rates(n);
@@ -418,7 +426,8 @@ struct Search {
 }
 
 impl Search {
-    /// Adds the term of order n + 1, whose norm is known. Returns `Break` with the order if the search ends.
+    /// Adds the term of order n + 1 to the search; the norm of its coefficient is in `expansion`.
+    /// Returns `Break` with the order up to which the series is exact if the search ends.
     #[inline(always)]
     fn add_term(&mut self, expansion: &Expansion, n: usize) -> ControlFlow<Option<usize>> {
         if n < 2 {
@@ -520,7 +529,8 @@ fn whole_expansion<M: KeptMotion>(
     Ok((n, length))
 }
 
-/// Returns the length at which the last two terms up to order n meet the tolerance, at most `longest`.
+/// Returns the length of a step, s, at which the last two terms of the series up to order n just
+/// meet the tolerance, at most `longest`.
 fn length(norms: &[f64; ORDER + 1], n: usize, longest: f64) -> f64 {
     let length = |n: usize| {
         let term = norms[n];
@@ -807,8 +817,8 @@ mod tests {
         assert_eq!(order(Convergence::Decay, 1e-6), 6);
     }
 
-    /// The arguments are the last two terms of a power series and the two terms two orders earlier, in units of the allowed
-    /// error.
+    /// The arguments of `are_negligible` are the terms n, n - 1, n - 2 and n - 3 of a power series,
+    /// in units of the allowed error.
     #[test]
     fn a_series_ends_when_its_next_two_terms_are_negligible_or_predicted_to_be() {
         // Both are computed.

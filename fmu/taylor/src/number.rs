@@ -15,12 +15,12 @@ pub trait Number:
     + Neg<Output = Self>
 {
     fn constant(value: f64) -> Self;
-    /// Returns a quantity from coefficients 0 and 1 of its power series. A plain number drops the slope.
+    /// Returns a number made from coefficients 0 and 1 of a quantity's power series. A [`Dual`]
+    /// takes coefficient 1 as its derivative; an `f64` drops it.
     fn with_slope(value: f64, slope: f64) -> Self;
     /// Returns the number that the formula was evaluated for: the value of an `f64`, the derivative of a
     /// [`Dual`].
     fn result(self) -> f64;
-    /// Returns the value, for an `f64` and for a [`Dual`].
     fn value(self) -> f64;
     /// Returns the larger of the number and a constant. The value is computed as a maximum, not as a choice of two numbers,
     /// because a compiler turns 1/choice into a choice of two quotients and divides by a zero that was not chosen.

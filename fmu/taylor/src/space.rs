@@ -129,7 +129,8 @@ pub fn scale_head<const N: usize>(a: &Series, b: &Vector) -> Vec3 {
     sum
 }
 
-/// Returns coefficient N of the scalar product a.b without its term a_0.b_N.
+/// Returns coefficient N of the scalar product a.b without its term a_0.b_N, because b_N may not be
+/// known yet.
 #[inline(always)]
 pub fn dot_tail<const N: usize>(a: &Vector, b: &Vector) -> f64 {
     let mut sum = [EMPTY; 3];
